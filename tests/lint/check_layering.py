@@ -1,0 +1,129 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Who may include whom: the table of docs/architecture.md, checked from the #include lines.
+
+Reads text only; the link lines in CMake repeat the same order and are checked by the linker.
+"""
+
+import re
+
+import tree
+
+# Folder -> folders of ours that it may include, besides itself. The longest match decides.
+BASE = ["schema/base"]
+MODEL = BASE + ["schema/model"]
+CODEC = MODEL + ["schema/codec"]
+STORE = CODEC + ["schema/store"]
+SCHEMA = STORE + ["schema/interop"]
+# The main of dsg-ingest alone may choose between a local store and a remote one.
+INGEST_STAGES = ["log", "simulator", "odometry", "loop", "volume", "agents", "objects", "places",
+                 "rooms"]
+ALLOWED = {
+    "schema/base": [],
+    "schema/model": BASE,
+    "schema/codec": MODEL,
+    "schema/store": CODEC,
+    "schema/store/sqlite": STORE,
+    "schema/interop": STORE,
+    "ingest/config": SCHEMA,
+    "ingest/remote": SCHEMA,
+    "ingest/pipeline": (SCHEMA + ["ingest/config", "ingest/remote"] +
+                        [f"ingest/{s}" for s in INGEST_STAGES]),
+    "ingest": SCHEMA + ["ingest/config", "ingest/log", "ingest/pipeline", "ingest/remote"],
+    "query/view": SCHEMA,
+    "query/engine": SCHEMA + ["query/view"],
+    "query/client": SCHEMA + ["query/engine"],
+    "query/cli": SCHEMA + ["query/view", "query/engine", "query/client"],
+    "server": SCHEMA + ["query/view", "query/engine"],
+    "tests": SCHEMA + ["ingest", "query", "server"],
+}
+ALLOWED.update({f"ingest/{s}": SCHEMA + ["ingest/config"] for s in INGEST_STAGES})
+
+# Pattern of an include -> folders that may have it; "*.cc" after a folder means not in headers.
+# A header named *_internal.h counts as part of the .cc files of its folder, which alone may
+# include it.
+THIRD_PARTY = [
+    (r"sqlite3", ["schema/store/sqlite *.cc", "tests"]),
+    (r"libpq", ["schema/store/postgres *.cc"]),
+    (r"grpc(pp|\+\+)?/|.*\.grpc\.pb\.h$",
+     ["ingest/remote", "query/client", "server", "tests"]),
+    (r"(dsg/v1|google/protobuf)/.*",
+     ["schema/codec *.cc", "schema/store *.cc", "ingest/remote *.cc", "query *.cc", "server *.cc",
+      "tests"]),
+    (r"pcl/|opencv2?/|ceres/|gtsam/|fcl/", ["ingest *.cc", "tests"]),
+    (r"spdlog/", ["schema/base *.cc"]),
+    (r"CLI/", ["ingest *.cc", "query/cli", "server *.cc", "tests"]),
+    (r"png\.h$", ["ingest *.cc", "tests"]),
+    (r"nlohmann/", ["schema/interop", "ingest *.cc", "query/cli *.cc", "tests"]),
+]
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
+INTERNAL = "_internal.h"
+OURS = ("schema/", "ingest/", "query/", "server/", "tests/", "proto/")
+
+
+def longest(folder, table):
+    """The entry of `table` that is `folder` or the nearest above it; None if there is none."""
+    while folder:
+        if folder in table:
+            return folder
+        folder = folder.rpartition("/")[0]
+    return None
+
+
+def within(folder, above):
+    return folder == above or folder.startswith(above + "/")
+
+
+def may_include_ours(path, included):
+    folder, target = path.rpartition("/")[0], included.rpartition("/")[0]
+    if included.endswith(INTERNAL):
+        return folder == target and path.endswith((".cc", INTERNAL))
+    owner = longest(folder, ALLOWED)
+    if owner is None:
+        return False
+    if owner == "tests":
+        return True
+    target_owner = longest(target, ALLOWED)
+    return target_owner == owner or target_owner in ALLOWED[owner]
+
+
+def may_include_third_party(path, included):
+    for pattern, places in THIRD_PARTY:
+        if not re.match(pattern, included):
+            continue
+        for place in places:
+            folder, _, only = place.partition(" ")
+            if within(path, folder) and (not only or path.endswith((".cc", INTERNAL))):
+                return True
+        return False
+    return True
+
+
+def problems_of(path, text):
+    found = []
+    for match in INCLUDE.finditer(text):
+        quote, included = match.groups()
+        line = text.count("\n", 0, match.start(2)) + 1
+        if quote == '"' and "/" not in included:
+            found.append(f'{path}:{line}: write the whole path, not "{included}"')
+        elif included.startswith(OURS):
+            if not may_include_ours(path, included):
+                found.append(f"{path}:{line}: must not include {included}; "
+                             "see the table in docs/architecture.md")
+        elif not may_include_third_party(path, included):
+            found.append(f"{path}:{line}: must not include {included} here; "
+                         "wrap it in the folder that owns it")
+    return found
+
+
+def find_problems():
+    paths = tree.files(tree.CPP)
+    problems = [p for path in paths for p in problems_of(path, tree.read(path))]
+    problems += [f"{path}: no layer owns this folder; add it to ALLOWED" for path in paths
+                 if longest(path.rpartition("/")[0], ALLOWED) is None]
+    return problems, f"{len(paths)} files"
+
+
+if __name__ == "__main__":
+    tree.main("layering", find_problems)
