@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whole deltas, model <-> protobuf and JSON.
+#include <google/protobuf/util/json_util.h>
+
+#include "absl/strings/str_cat.h"
+#include "dsg/v1/graph.pb.h"
+#include "schema/base/check.h"
+#include "schema/base/status.h"
+#include "schema/codec/proto_internal.h"
+
+namespace dsg {
+namespace {
+
+void HeaderToProto(const GraphDelta& delta, v1::GraphDelta* out) {
+  out->set_map(delta.map);
+  out->set_session_id(delta.session_id);
+  out->set_sequence(delta.sequence);
+  if (delta.parent_revision.has_value()) out->set_parent_revision(*delta.parent_revision);
+  out->set_author(delta.author);
+  out->set_message(delta.message);
+  out->set_config_digest(delta.config_digest);
+}
+
+void HeaderFromProto(const v1::GraphDelta& in, GraphDelta* delta) {
+  delta->map = in.map();
+  delta->session_id = in.session_id();
+  delta->sequence = in.sequence();
+  if (in.has_parent_revision()) delta->parent_revision = in.parent_revision();
+  delta->author = in.author();
+  delta->message = in.message();
+  delta->config_digest = in.config_digest();
+}
+
+void ToProto(const Stay& stay, v1::Stay* out) {
+  out->set_agent(ToString(stay.agent));
+  out->set_place(ToString(stay.place));
+  out->set_room(ToString(stay.room));
+  out->set_enter_ns(stay.enter_ns);
+  out->set_exit_ns(stay.exit_ns);
+}
+
+absl::StatusOr<Stay> FromProto(const v1::Stay& in) {
+  Stay stay;
+  DSG_ASSIGN_OR_RETURN(stay.agent, ParseNodeId(in.agent()));
+  DSG_ASSIGN_OR_RETURN(stay.place, OptionalNodeId(in.place()));
+  DSG_ASSIGN_OR_RETURN(stay.room, OptionalNodeId(in.room()));
+  stay.enter_ns = in.enter_ns();
+  stay.exit_ns = in.exit_ns();
+  return stay;
+}
+
+void GraphToProto(const GraphDelta& delta, const LayerTable& layers, v1::GraphDelta* out) {
+  for (const Layer& layer : delta.layers) {
+    v1::Layer* to = out->add_layers();
+    to->set_id(layer.id);
+    to->set_name(layer.name);
+    to->set_rank(layer.rank);
+  }
+  for (const SemanticLabel& label : delta.labels) {
+    v1::SemanticLabel* to = out->add_labels();
+    to->set_id(label.id);
+    to->set_name(label.name);
+  }
+  for (const Node& node : delta.nodes) dsg::ToProto(node, layers, out->add_nodes());
+  for (const Retirement& item : delta.retirements) {
+    v1::Retirement* to = out->add_retirements();
+    to->set_id(ToString(item.id));
+    if (item.valid_to_ns.has_value()) to->set_valid_to_ns(*item.valid_to_ns);
+  }
+  for (const Edge& edge : delta.edges) dsg::ToProto(edge, out->add_edges());
+  for (const EdgeKey& key : delta.edge_removals) {
+    v1::EdgeKey* to = out->add_edge_removals();
+    to->set_source(ToString(key.source));
+    to->set_relation(key.relation);
+    to->set_target(ToString(key.target));
+  }
+}
+
+absl::Status GraphFromProto(const v1::GraphDelta& in, LayerTable layers, GraphDelta* delta) {
+  for (const v1::Layer& layer : in.layers()) {
+    delta->layers.push_back({layer.id(), layer.name(), layer.rank()});
+    layers.Add(delta->layers.back());
+  }
+  for (const v1::SemanticLabel& label : in.labels()) {
+    delta->labels.push_back({label.id(), label.name()});
+  }
+  for (const v1::Node& node : in.nodes()) {
+    DSG_ASSIGN_OR_RETURN(Node made, dsg::FromProto(node, layers));
+    delta->nodes.push_back(std::move(made));
+  }
+  for (const v1::Retirement& item : in.retirements()) {
+    Retirement made;
+    DSG_ASSIGN_OR_RETURN(made.id, ParseNodeId(item.id()));
+    if (item.has_valid_to_ns()) made.valid_to_ns = item.valid_to_ns();
+    delta->retirements.push_back(made);
+  }
+  for (const v1::Edge& edge : in.edges()) {
+    DSG_ASSIGN_OR_RETURN(Edge made, dsg::FromProto(edge));
+    delta->edges.push_back(std::move(made));
+  }
+  for (const v1::EdgeKey& key : in.edge_removals()) {
+    EdgeKey made;
+    DSG_ASSIGN_OR_RETURN(made.source, ParseNodeId(key.source()));
+    DSG_ASSIGN_OR_RETURN(made.target, ParseNodeId(key.target()));
+    made.relation = key.relation();
+    delta->edge_removals.push_back(std::move(made));
+  }
+  return absl::OkStatus();
+}
+
+void PosesToProto(const std::vector<TimedPose>& poses,
+                  google::protobuf::RepeatedPtrField<v1::TimedPose>* out) {
+  out->Reserve(static_cast<int>(poses.size()));
+  for (const TimedPose& pose : poses) dsg::ToProto(pose, out->Add());
+}
+
+absl::Status PosesFromProto(const google::protobuf::RepeatedPtrField<v1::TimedPose>& in,
+                            std::vector<TimedPose>* poses) {
+  poses->reserve(static_cast<size_t>(in.size()));
+  for (const v1::TimedPose& pose : in) {
+    DSG_ASSIGN_OR_RETURN(TimedPose made, dsg::FromProto(pose));
+    poses->push_back(std::move(made));
+  }
+  return absl::OkStatus();
+}
+
+void TracksToProto(const GraphDelta& delta, v1::GraphDelta* out) {
+  for (const TrajectoryAppend& item : delta.appends) {
+    v1::TrajectoryAppend* to = out->add_appends();
+    to->set_agent(ToString(item.agent));
+    PosesToProto(item.poses, to->mutable_poses());
+  }
+  for (const TrajectoryCorrection& item : delta.corrections) {
+    v1::TrajectoryCorrection* to = out->add_corrections();
+    to->set_agent(ToString(item.agent));
+    to->set_from_ns(item.from_ns);
+    to->set_to_ns(item.to_ns);
+    PosesToProto(item.poses, to->mutable_poses());
+  }
+  for (const FactorAppend& item : delta.factors) {
+    v1::FactorAppend* to = out->add_factors();
+    to->set_agent(ToString(item.agent));
+    for (const PoseFactor& factor : item.factors) dsg::ToProto(factor, to->add_factors());
+  }
+  for (const ShapeAppend& item : delta.shapes) {
+    v1::ShapeAppend* to = out->add_shapes();
+    to->set_agent(ToString(item.agent));
+    if (item.topology.has_value()) to->set_topology_sha256(BytesOf(*item.topology));
+    for (const BodyShape& shape : item.shapes) dsg::ToProto(shape, to->add_shapes());
+  }
+  for (const Stay& stay : delta.stays) ToProto(stay, out->add_stays());
+}
+
+absl::Status TracksFromProto(const v1::GraphDelta& in, GraphDelta* delta) {
+  for (const v1::TrajectoryAppend& item : in.appends()) {
+    TrajectoryAppend made;
+    DSG_ASSIGN_OR_RETURN(made.agent, ParseNodeId(item.agent()));
+    DSG_RETURN_IF_ERROR(PosesFromProto(item.poses(), &made.poses));
+    delta->appends.push_back(std::move(made));
+  }
+  for (const v1::TrajectoryCorrection& item : in.corrections()) {
+    TrajectoryCorrection made;
+    DSG_ASSIGN_OR_RETURN(made.agent, ParseNodeId(item.agent()));
+    made.from_ns = item.from_ns();
+    made.to_ns = item.to_ns();
+    DSG_RETURN_IF_ERROR(PosesFromProto(item.poses(), &made.poses));
+    delta->corrections.push_back(std::move(made));
+  }
+  for (const v1::FactorAppend& item : in.factors()) {
+    FactorAppend made;
+    DSG_ASSIGN_OR_RETURN(made.agent, ParseNodeId(item.agent()));
+    for (const v1::PoseFactor& factor : item.factors()) {
+      DSG_ASSIGN_OR_RETURN(PoseFactor one, dsg::FromProto(factor));
+      made.factors.push_back(std::move(one));
+    }
+    delta->factors.push_back(std::move(made));
+  }
+  for (const v1::ShapeAppend& item : in.shapes()) {
+    ShapeAppend made;
+    DSG_ASSIGN_OR_RETURN(made.agent, ParseNodeId(item.agent()));
+    DSG_ASSIGN_OR_RETURN(made.topology,
+                         Sha256FromProto(item.topology_sha256(), "shapes.topology_sha256"));
+    for (const v1::BodyShape& shape : item.shapes()) made.shapes.push_back(dsg::FromProto(shape));
+    delta->shapes.push_back(std::move(made));
+  }
+  for (const v1::Stay& stay : in.stays()) {
+    DSG_ASSIGN_OR_RETURN(const Stay made, FromProto(stay));
+    delta->stays.push_back(made);
+  }
+  return absl::OkStatus();
+}
+
+void BlobsToProto(const GraphDelta& delta, v1::GraphDelta* out) {
+  for (const MeshBlock& block : delta.mesh_blocks) dsg::ToProto(block, out->add_mesh_blocks());
+  for (const BlockIndex& index : delta.mesh_removals) {
+    v1::MeshBlockIndex* to = out->add_mesh_removals();
+    to->set_x(index.x);
+    to->set_y(index.y);
+    to->set_z(index.z);
+  }
+  for (const Asset& asset : delta.assets) {
+    v1::Asset* to = out->add_assets();
+    to->set_sha256(BytesOf(asset.sha256));
+    to->set_media_type(asset.media_type);
+    to->set_content(asset.content);
+  }
+}
+
+absl::Status BlobsFromProto(const v1::GraphDelta& in, GraphDelta* delta) {
+  for (const v1::MeshBlock& block : in.mesh_blocks()) {
+    DSG_ASSIGN_OR_RETURN(MeshBlock made, dsg::FromProto(block));
+    delta->mesh_blocks.push_back(std::move(made));
+  }
+  for (const v1::MeshBlockIndex& index : in.mesh_removals()) {
+    delta->mesh_removals.push_back({index.x(), index.y(), index.z()});
+  }
+  for (const v1::Asset& asset : in.assets()) {
+    DSG_ASSIGN_OR_RETURN(const auto sha256, Sha256FromProto(asset.sha256(), "assets.sha256"));
+    if (!sha256.has_value()) {
+      return MakeError(Reason::kFieldInvalid, "an asset has no sha256",
+                       {{"field", "assets.sha256"}});
+    }
+    delta->assets.push_back({*sha256, asset.media_type(), asset.content()});
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void ToProto(const GraphDelta& delta, const LayerTable& layers, v1::GraphDelta* out) {
+  LayerTable known = layers;
+  for (const Layer& layer : delta.layers) known.Add(layer);
+  HeaderToProto(delta, out);
+  GraphToProto(delta, known, out);
+  TracksToProto(delta, out);
+  BlobsToProto(delta, out);
+}
+
+absl::StatusOr<GraphDelta> FromProto(const v1::GraphDelta& in, const LayerTable& layers) {
+  GraphDelta delta;
+  HeaderFromProto(in, &delta);
+  DSG_RETURN_IF_ERROR(GraphFromProto(in, layers, &delta));
+  DSG_RETURN_IF_ERROR(TracksFromProto(in, &delta));
+  DSG_RETURN_IF_ERROR(BlobsFromProto(in, &delta));
+  return delta;
+}
+
+std::string DeltaToJson(const GraphDelta& delta) {
+  v1::GraphDelta message;
+  ToProto(delta, LayerTable(), &message);
+  google::protobuf::util::JsonPrintOptions options;
+  options.preserve_proto_field_names = true;
+  options.add_whitespace = true;
+  std::string json;
+  const auto printed = google::protobuf::util::MessageToJsonString(message, &json, options);
+  // Printing a message of a known type to a string cannot fail.
+  DSG_CHECK(printed.ok());
+  return json;
+}
+
+absl::StatusOr<GraphDelta> DeltaFromJson(std::string_view json) {
+  v1::GraphDelta message;
+  const auto parsed = google::protobuf::util::JsonStringToMessage(
+      google::protobuf::StringPiece(json.data(), json.size()), &message);
+  if (!parsed.ok()) {
+    return MakeError(Reason::kFileMalformed, absl::StrCat("not a graph delta in protobuf JSON: ",
+                                                          std::string(parsed.message())));
+  }
+  return FromProto(message, LayerTable());
+}
+
+}  // namespace dsg

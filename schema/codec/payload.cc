@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the store keeps as bytes: protobuf messages without what stands in columns, blocks
+// compressed.
+#include <google/protobuf/io/coded_stream.h>
+#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
+
+#include "dsg/v1/graph.pb.h"
+#include "schema/base/status.h"
+#include "schema/codec/proto_internal.h"
+#include "schema/codec/shuffle.h"
+
+namespace dsg {
+namespace {
+
+// A block of four million vertices with all channels stays below this.
+constexpr size_t kUnpackedBytesMax = size_t{512} << 20;
+
+// Maps are written in order of their keys, so that equal content gives equal bytes and digests.
+template <typename Message>
+std::string Serialize(const Message& message) {
+  std::string bytes;
+  {
+    google::protobuf::io::StringOutputStream stream(&bytes);
+    google::protobuf::io::CodedOutputStream coded(&stream);
+    coded.SetSerializationDeterministic(true);
+    message.SerializeToCodedStream(&coded);
+  }
+  return bytes;
+}
+
+template <typename Message>
+bool Unpack(std::string_view bytes, Message* message) {
+  std::string plain;
+  return Decompress(bytes, kUnpackedBytesMax, &plain) && message->ParseFromString(plain);
+}
+
+}  // namespace
+
+std::string EncodeNodePayload(const Node& node) {
+  v1::Node message;
+  NodeDetailsToProto(node, &message);
+  // The identity says nothing; leaving it out saves 11 bytes a place.
+  if (node.map_T_node.orientation.coeffs() == Eigen::Quaterniond::Identity().coeffs()) {
+    message.mutable_map_t_node()->clear_orientation();
+  }
+  return Serialize(message);
+}
+
+bool DecodeNodePayload(std::string_view bytes, Node* node) {
+  v1::Node message;
+  return message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) &&
+         NodeDetailsFromProto(message, node).ok();
+}
+
+std::string EncodeEdgePayload(const Edge& edge) {
+  v1::Edge message;
+  EdgeDetailsToProto(edge, &message);
+  return Serialize(message);
+}
+
+bool DecodeEdgePayload(std::string_view bytes, Edge* edge) {
+  v1::Edge message;
+  if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return false;
+  EdgeDetailsFromProto(message, edge);
+  return true;
+}
+
+void ToProto(const MeshBlock& block, v1::MeshBlock* out) {
+  out->set_x(block.index.x);
+  out->set_y(block.index.y);
+  out->set_z(block.index.z);
+  for (const auto& p : block.positions_map) {
+    for (int i = 0; i < 3; ++i) out->add_positions(p[i]);
+  }
+  for (const auto& n : block.normals_map) {
+    for (int i = 0; i < 3; ++i) out->add_normals(n[i]);
+  }
+  out->mutable_colors()->Add(block.colors.begin(), block.colors.end());
+  out->mutable_labels()->Add(block.labels.begin(), block.labels.end());
+  out->mutable_instance_ids()->Add(block.instance_ids.begin(), block.instance_ids.end());
+  out->mutable_first_seen_ns()->Add(block.first_seen_ns.begin(), block.first_seen_ns.end());
+  out->mutable_last_seen_ns()->Add(block.last_seen_ns.begin(), block.last_seen_ns.end());
+  for (const auto& face : block.faces) out->mutable_faces()->Add(face.begin(), face.end());
+}
+
+absl::StatusOr<MeshBlock> FromProto(const v1::MeshBlock& in) {
+  if (in.positions_size() % 3 != 0 || in.normals_size() % 3 != 0 || in.faces_size() % 3 != 0) {
+    return MakeError(Reason::kFieldInvalid,
+                     "a mesh block has positions, normals or faces that are not in threes",
+                     {{"field", "mesh_blocks"}});
+  }
+  MeshBlock block;
+  block.index = {in.x(), in.y(), in.z()};
+  for (int i = 0; i < in.positions_size(); i += 3) {
+    block.positions_map.emplace_back(in.positions(i), in.positions(i + 1), in.positions(i + 2));
+  }
+  for (int i = 0; i < in.normals_size(); i += 3) {
+    block.normals_map.emplace_back(in.normals(i), in.normals(i + 1), in.normals(i + 2));
+  }
+  block.colors.assign(in.colors().begin(), in.colors().end());
+  block.labels.assign(in.labels().begin(), in.labels().end());
+  block.instance_ids.assign(in.instance_ids().begin(), in.instance_ids().end());
+  block.first_seen_ns.assign(in.first_seen_ns().begin(), in.first_seen_ns().end());
+  block.last_seen_ns.assign(in.last_seen_ns().begin(), in.last_seen_ns().end());
+  for (int i = 0; i < in.faces_size(); i += 3) {
+    block.faces.push_back({in.faces(i), in.faces(i + 1), in.faces(i + 2)});
+  }
+  return block;
+}
+
+std::string EncodeMeshBlock(const MeshBlock& block) {
+  v1::MeshBlock message;
+  ToProto(block, &message);
+  return Compress(Serialize(message));
+}
+
+bool DecodeMeshBlock(std::string_view bytes, MeshBlock* block) {
+  v1::MeshBlock message;
+  if (!Unpack(bytes, &message)) return false;
+  auto decoded = FromProto(message);
+  if (!decoded.ok()) return false;
+  *block = *std::move(decoded);
+  return true;
+}
+
+void ToProto(const PoseFactor& factor, v1::PoseFactor* out) {
+  out->set_type(factor.type);
+  out->set_from_time_ns(factor.from_ns);
+  out->set_to_time_ns(factor.to_ns);
+  out->set_to_agent(ToString(factor.to_agent));
+  ToProto(factor.relative_pose, out->mutable_relative_pose());
+  if (factor.information.has_value()) {
+    out->mutable_information()->Add(factor.information->begin(), factor.information->end());
+  }
+}
+
+absl::StatusOr<PoseFactor> FromProto(const v1::PoseFactor& in) {
+  PoseFactor factor;
+  factor.type = in.type();
+  factor.from_ns = in.from_time_ns();
+  factor.to_ns = in.to_time_ns();
+  DSG_ASSIGN_OR_RETURN(factor.to_agent, OptionalNodeId(in.to_agent()));
+  factor.relative_pose = FromProto(in.relative_pose());
+  if (in.information_size() != 0) {
+    if (in.information_size() != 21) {
+      return MakeError(Reason::kFieldInvalid, "a factor's information needs 21 numbers or none",
+                       {{"field", "factors.information"}});
+    }
+    factor.information.emplace();
+    std::copy(in.information().begin(), in.information().end(), factor.information->begin());
+  }
+  return factor;
+}
+
+std::string EncodeFactors(const std::vector<PoseFactor>& factors) {
+  v1::FactorAppend message;
+  for (const PoseFactor& factor : factors) ToProto(factor, message.add_factors());
+  return Compress(Serialize(message));
+}
+
+bool DecodeFactors(std::string_view bytes, std::vector<PoseFactor>* factors) {
+  v1::FactorAppend message;
+  if (!Unpack(bytes, &message)) return false;
+  factors->clear();
+  for (const v1::PoseFactor& factor : message.factors()) {
+    auto decoded = FromProto(factor);
+    if (!decoded.ok()) return false;
+    factors->push_back(*std::move(decoded));
+  }
+  return true;
+}
+
+void ToProto(const BodyShape& shape, v1::BodyShape* out) {
+  out->set_time_ns(shape.time_ns);
+  out->mutable_pose_coefficients()->Add(shape.pose_coefficients.begin(),
+                                        shape.pose_coefficients.end());
+  out->mutable_shape_coefficients()->Add(shape.shape_coefficients.begin(),
+                                         shape.shape_coefficients.end());
+  out->mutable_vertices()->Add(shape.vertices.begin(), shape.vertices.end());
+}
+
+BodyShape FromProto(const v1::BodyShape& in) {
+  BodyShape shape;
+  shape.time_ns = in.time_ns();
+  shape.pose_coefficients.assign(in.pose_coefficients().begin(), in.pose_coefficients().end());
+  shape.shape_coefficients.assign(in.shape_coefficients().begin(), in.shape_coefficients().end());
+  shape.vertices.assign(in.vertices().begin(), in.vertices().end());
+  return shape;
+}
+
+std::string EncodeShapes(const ShapeAppend& shapes) {
+  v1::ShapeAppend message;
+  if (shapes.topology.has_value()) message.set_topology_sha256(BytesOf(*shapes.topology));
+  for (const BodyShape& shape : shapes.shapes) ToProto(shape, message.add_shapes());
+  return Compress(Serialize(message));
+}
+
+bool DecodeShapes(std::string_view bytes, ShapeAppend* shapes) {
+  v1::ShapeAppend message;
+  if (!Unpack(bytes, &message)) return false;
+  auto topology = Sha256FromProto(message.topology_sha256(), "topology_sha256");
+  if (!topology.ok()) return false;
+  shapes->topology = *topology;
+  shapes->shapes.clear();
+  for (const v1::BodyShape& shape : message.shapes()) {
+    shapes->shapes.push_back(FromProto(shape));
+  }
+  return true;
+}
+
+}  // namespace dsg

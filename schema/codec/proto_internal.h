@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Conversions shared by the .cc files of this folder only.
+#pragma once
+
+#include <google/protobuf/map.h>
+
+#include "schema/codec/proto_convert.h"
+
+namespace dsg::v1 {
+class AttributeValue;
+class Vector3;
+}  // namespace dsg::v1
+
+namespace dsg {
+
+void ToProto(const Eigen::Vector3d& v, v1::Vector3* out);
+Eigen::Vector3d FromProto(const v1::Vector3& in);
+
+void AttributesToProto(const Attributes& attributes,
+                       google::protobuf::Map<std::string, v1::AttributeValue>* out);
+Attributes AttributesFromProto(const google::protobuf::Map<std::string, v1::AttributeValue>& in);
+
+std::string BytesOf(const Sha256& digest);
+absl::StatusOr<std::optional<Sha256>> Sha256FromProto(const std::string& bytes,
+                                                      std::string_view field);
+/// The empty id for empty text.
+absl::StatusOr<NodeId> OptionalNodeId(const std::string& text);
+
+/// All of a node but id, layer and revision.
+void NodeDetailsToProto(const Node& node, v1::Node* out);
+absl::Status NodeDetailsFromProto(const v1::Node& in, Node* node);
+/// Validity and attributes.
+void EdgeDetailsToProto(const Edge& edge, v1::Edge* out);
+void EdgeDetailsFromProto(const v1::Edge& in, Edge* edge);
+
+void ToProto(const MeshBlock& block, v1::MeshBlock* out);
+absl::StatusOr<MeshBlock> FromProto(const v1::MeshBlock& in);
+void ToProto(const PoseFactor& factor, v1::PoseFactor* out);
+absl::StatusOr<PoseFactor> FromProto(const v1::PoseFactor& in);
+void ToProto(const BodyShape& shape, v1::BodyShape* out);
+BodyShape FromProto(const v1::BodyShape& in);
+
+}  // namespace dsg

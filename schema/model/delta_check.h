@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+// The invariants that every delta must satisfy before a row is written.
+#pragma once
+
+#include <optional>
+
+#include "absl/status/status.h"
+#include "schema/model/graph_delta.h"
+
+namespace dsg {
+
+/// What CheckDelta asks of the graph that the delta is to be applied to.
+class GraphLookup {
+ public:
+  struct NodeFacts {
+    LayerId layer = 0;
+    bool is_agent = false;
+    Interval valid;
+    /// Empty when the node has no extent of its own.
+    Box3d box_map;
+    Eigen::Vector3d position_map = Eigen::Vector3d::Zero();
+  };
+
+  virtual ~GraphLookup() = default;
+
+  /// nullopt when no such node is believed in at the head.
+  virtual absl::StatusOr<std::optional<NodeFacts>> FindNode(NodeId id) const = 0;
+  virtual absl::StatusOr<std::optional<Layer>> FindLayer(LayerId id) const = 0;
+  /// Sources of CONTAINS edges to `id`.
+  virtual absl::StatusOr<std::vector<NodeId>> FindParents(NodeId id) const = 0;
+  /// Targets of CONTAINS edges from `id`.
+  virtual absl::StatusOr<std::vector<NodeId>> FindChildren(NodeId id) const = 0;
+  /// Time of the last stored pose; nullopt for an empty track.
+  virtual absl::StatusOr<std::optional<TimeNs>> FindTrackEnd(NodeId agent) const = 0;
+  virtual absl::StatusOr<bool> HasAsset(const Sha256& sha256) const = 0;
+};
+
+/// A child's box may stick out of its parent's by this much: boxes are fitted in doubles, and
+/// rotating a box into the map and back costs a few ulps at kilometre coordinates.
+inline constexpr double kBoxToleranceM = 1e-6;
+
+/// Coordinates beyond this are refused as absurd: 10,000 km is no building, and the spatial
+/// index counts millimetres in 32 bits from the map's origin (2,147 km).
+inline constexpr double kCoordinateMaxM = 2.0e6;
+
+/// Limits that keep one delta, and every later answer about it, bounded.
+inline constexpr size_t kNameLengthMax = 1024;
+inline constexpr size_t kAttributeCountMax = 64;
+inline constexpr size_t kAttributeLengthMax = 65536;
+inline constexpr size_t kMeshVertexCountMax = 4'000'000;
+inline constexpr size_t kAssetBytesMax = size_t{256} << 20;
+
+/// Proves the invariants of the data model against the graph at the head: ids exist and match
+/// their kind's layer; a parent's layer outranks its child's, so no containment cycle can form;
+/// boxes contain their children's boxes; quaternions are unit, numbers finite; intervals are
+/// ordered; trajectory times strictly grow per agent; edge ends live; sizes are bounded; assets
+/// match their hash and referenced ones exist. Each entity appears at most once (see Coalesce).
+///
+/// Errors: INVALID_ARGUMENT/DELTA_INVALID or NUMBER_NOT_FINITE naming part, object and value;
+/// ALREADY_EXISTS/TRACK_CONFLICT when an append reaches back before the track's end.
+absl::Status CheckDelta(const GraphDelta& delta, const GraphLookup& graph);
+
+/// Sorts every part by key and keeps the last of entries with equal keys, so that an entity is
+/// written once per revision; merges appends to one agent. An edge both upserted and removed is
+/// removed. Deltas that say the same become byte-equal.
+void Coalesce(GraphDelta* delta);
+
+}  // namespace dsg

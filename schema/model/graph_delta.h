@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// The only way into a store: one change of one map, applied whole or not at all.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "schema/model/edge.h"
+#include "schema/model/layer.h"
+#include "schema/model/mesh.h"
+#include "schema/model/node.h"
+#include "schema/model/trajectory.h"
+
+namespace dsg {
+
+struct TrajectoryAppend {
+  NodeId agent;
+  /// Strictly growing in time, later than all that is stored for the agent.
+  std::vector<TimedPose> poses;
+};
+
+/// Replaces what is believed of the agent over [from_ns, to_ns) by `poses`.
+struct TrajectoryCorrection {
+  NodeId agent;
+  TimeNs from_ns = 0;
+  TimeNs to_ns = 0;
+  std::vector<TimedPose> poses;
+};
+
+struct FactorAppend {
+  NodeId agent;
+  std::vector<PoseFactor> factors;
+};
+
+struct ShapeAppend {
+  NodeId agent;
+  std::optional<Sha256> topology;
+  std::vector<BodyShape> shapes;
+};
+
+struct Retirement {
+  NodeId id;
+  /// The instant it left the world; unset: it never existed, and its row ends here.
+  std::optional<TimeNs> valid_to_ns;
+};
+
+/// The identity of a delta is (session_id, sequence): committing it again changes nothing.
+struct GraphDelta {
+  std::string map;
+  std::string session_id;
+  /// From 1, without gaps in a session.
+  int64_t sequence = 0;
+  /// If set, the commit fails unless this is still the newest revision.
+  std::optional<Revision> parent_revision;
+  std::string author;
+  std::string message;
+  std::string config_digest;
+
+  std::vector<Layer> layers;
+  std::vector<SemanticLabel> labels;
+  std::vector<Node> nodes;
+  std::vector<Retirement> retirements;
+  std::vector<Edge> edges;
+  std::vector<EdgeKey> edge_removals;
+  std::vector<TrajectoryAppend> appends;
+  std::vector<TrajectoryCorrection> corrections;
+  std::vector<FactorAppend> factors;
+  std::vector<ShapeAppend> shapes;
+  std::vector<Stay> stays;
+  std::vector<MeshBlock> mesh_blocks;
+  std::vector<BlockIndex> mesh_removals;
+  std::vector<Asset> assets;
+
+  /// Nothing to write besides the revision itself.
+  bool empty() const;
+};
+
+/// Grows the boxes of parents so that each holds its children's, bottom up along the delta's
+/// CONTAINS edges. Nodes that the delta does not hold are left alone.
+void FitBoxesToChildren(GraphDelta* delta);
+
+/// Cuts a large delta into ones of at most `item_count_max` rows (poses count one each), parents
+/// before children and nodes before their edges, so that each is valid when applied in order.
+/// Session and message are copied; sequences count from `delta.sequence`.
+std::vector<GraphDelta> SplitDelta(GraphDelta delta, size_t item_count_max);
+
+}  // namespace dsg

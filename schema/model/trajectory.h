@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// What moves: timed poses, the factors between them, body shapes, stays.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "schema/base/time.h"
+#include "schema/model/geometry.h"
+#include "schema/model/ids.h"
+#include "schema/model/node.h"
+
+namespace dsg {
+
+/// Upper triangle of a 6x6 covariance, row by row, translation before rotation.
+using Covariance6 = std::array<float, 21>;
+
+namespace pose_flags {
+/// The source gave positions only; the orientation is the identity and says nothing.
+inline constexpr uint32_t kNoOrientation = 1;
+/// Moved by a later estimate, such as a loop closure.
+inline constexpr uint32_t kCorrected = 2;
+inline constexpr uint32_t kPredicted = 4;
+inline constexpr uint32_t kAll = 7;
+}  // namespace pose_flags
+
+/// Where an agent was at one instant.
+struct TimedPose {
+  TimeNs time_ns = 0;
+  uint32_t flags = 0;
+  Pose3d map_T_agent;
+  /// Shared, because logs often repeat one covariance; null = not given.
+  std::shared_ptr<const Covariance6> covariance;
+};
+
+/// Constraint of a pose graph between two poses, or on one (from == to).
+/// Source: RSS 2020, section IV-A ("Human Nodes": odometry-free pose graph with detection priors
+/// and zero-velocity links; "Robot Node").
+struct PoseFactor {
+  /// "odometry", "zero_velocity", "detection_prior", "loop_closure".
+  std::string type;
+  TimeNs from_ns = 0;
+  TimeNs to_ns = 0;
+  /// The other agent of an inter-robot factor; empty = the same agent.
+  NodeId to_agent;
+  Pose3d relative_pose;
+  std::optional<Covariance6> information;
+};
+
+/// Body shape at one instant: model coefficients, or vertices in the agent's frame (metres).
+struct BodyShape {
+  TimeNs time_ns = 0;
+  std::vector<float> pose_coefficients;
+  std::vector<float> shape_coefficients;
+  std::vector<float> vertices;
+};
+
+/// An agent was in a place and a room during [enter_ns, exit_ns). Key: (agent, enter_ns).
+struct Stay {
+  NodeId agent;
+  /// May be empty.
+  NodeId place;
+  /// May be empty.
+  NodeId room;
+  TimeNs enter_ns = 0;
+  /// kTimeMax while the agent has not been seen to leave; readers clip it to the track's end.
+  TimeNs exit_ns = kTimeMax;
+  bool operator==(const Stay&) const = default;
+};
+
+/// Stays are cut at this length, so that "who was here at t" looks back no further.
+inline constexpr TimeNs kStayNsMax = 3600 * kNsPerSecond;
+
+}  // namespace dsg

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+// A store: a folder of maps, each one file with its history. Start reading here.
+//
+//   auto store  = *GraphStore::Open("/var/lib/dsg", {.create = true});
+//   store->CreateMap({.name = "office"});                  // once
+//   auto writer = *store->OpenWriter("office");            // takes the writer lock
+//   writer->Commit(delta);                                 // acknowledged = on disk
+//   auto map    = *store->OpenMap("office");               // any number of readers, no lock
+//   auto now    = *map->Latest();                          // a Snapshot at the newest revision
+//   auto then   = *map->At(17);                            // ... and as believed at revision 17
+//
+// Every call returns a Status or StatusOr; `*` above stands for a caller that has checked it.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "schema/store/graph_writer.h"
+#include "schema/store/snapshot.h"
+
+namespace dsg {
+
+/// Result of checking a whole map.
+struct VerifyReport {
+  int64_t row_count = 0;
+  int64_t pose_count = 0;
+  int64_t revision_count = 0;
+  /// One sentence a problem, naming table and key; empty = every byte is what was written.
+  std::vector<std::string> problems;
+};
+
+/// One map, open for reading.
+///
+/// Threads: safe from many threads. Sees commits of other processes as they happen.
+class MapReader {
+ public:
+  virtual ~MapReader() = default;
+
+  virtual const MapSpec& spec() const = 0;
+  /// False once the map's file was removed or replaced under it (a restore): open it again.
+  virtual bool IsCurrent() const = 0;
+  /// The newest revision; costs a microsecond when nothing has changed.
+  virtual absl::StatusOr<RevisionInfo> Head() = 0;
+  virtual absl::StatusOr<std::shared_ptr<const Snapshot>> Latest() = 0;
+  /// Errors: OUT_OF_RANGE/REVISION_IN_FUTURE or REVISION_COMPACTED, both with oldest and newest.
+  virtual absl::StatusOr<std::shared_ptr<const Snapshot>> At(Revision revision) = 0;
+  /// The oldest revision that can be read.
+  virtual absl::StatusOr<Revision> OldestRevision() = 0;
+  /// Newest first, below `before` (0 = from the newest), at most `limit`.
+  virtual absl::StatusOr<std::vector<RevisionInfo>> ListRevisions(Revision before, int limit) = 0;
+  virtual absl::StatusOr<SessionState> GetSession(const std::string& session_id) = 0;
+  /// Reads everything: database structure, payload checksums, the digest chain, invariants.
+  /// `progress` (may be empty) gets a fraction from 0 to 1.
+  virtual absl::StatusOr<VerifyReport> Verify(const std::function<void(double)>& progress) = 0;
+};
+
+struct StoreOptions {
+  /// Make the folder if it is missing.
+  bool create = false;
+  /// Upper bound on the memory of decoded tracks and segments, per open map.
+  size_t cache_bytes = size_t{256} << 20;
+  /// How writers and lock files name this process: "dsg-ingest", "dsg-server", ...
+  std::string program = "dsg";
+};
+
+/// Threads: safe from many threads.
+class GraphStore {
+ public:
+  virtual ~GraphStore() = default;
+
+  /// Errors: NOT_FOUND/MAP_UNKNOWN naming the folder; FAILED_PRECONDITION/NETWORK_FILE_SYSTEM.
+  static absl::StatusOr<std::unique_ptr<GraphStore>> Open(const std::string& folder,
+                                                          const StoreOptions& options);
+
+  /// Maps that this program can read; the others are logged and left out. Order: by name.
+  virtual absl::StatusOr<std::vector<MapSpec>> ListMaps() = 0;
+  /// Errors: ALREADY_EXISTS/MAP_EXISTS; what MapSpec::Validate returns.
+  virtual absl::Status CreateMap(const MapSpec& spec) = 0;
+  /// Errors: NOT_FOUND/MAP_UNKNOWN; FAILED_PRECONDITION/FORMAT_TOO_NEW or NOT_A_STORE.
+  virtual absl::StatusOr<std::shared_ptr<MapReader>> OpenMap(const std::string& name) = 0;
+  /// Errors: as OpenMap; UNAVAILABLE/WRITER_LOCKED naming who holds the lock.
+  virtual absl::StatusOr<std::unique_ptr<GraphWriter>> OpenWriter(const std::string& name) = 0;
+};
+
+/// The number in every map file; opening never upgrades it silently.
+inline constexpr int kStoreFormatVersion = 1;
+
+}  // namespace dsg

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+// The only way out of a store: one map as it was believed at one revision.
+// Refuses to blur the two times: the revision is fixed at opening; world time is an argument.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "schema/base/time.h"
+#include "schema/model/edge.h"
+#include "schema/model/layer.h"
+#include "schema/model/mesh.h"
+#include "schema/model/node.h"
+#include "schema/model/revision.h"
+#include "schema/model/trajectory.h"
+
+namespace dsg {
+
+struct LayerCount {
+  Layer layer;
+  int64_t node_count = 0;
+};
+
+struct MapStats {
+  RevisionInfo at;
+  /// Ascending by rank, then name.
+  std::vector<LayerCount> layers;
+  /// Database, write-ahead log and lock file, now (not as of the revision).
+  int64_t bytes_on_disk = 0;
+  /// First and last pose of all agents.
+  std::optional<TimeNs> first_pose_ns;
+  std::optional<TimeNs> last_pose_ns;
+};
+
+/// An agent's track as of a revision.
+struct TrackInfo {
+  NodeId agent;
+  std::string name;
+  std::string kind;
+  int64_t pose_count = 0;
+  /// Times of the first and last pose. Meaningful if pose_count > 0.
+  TimeNs first_ns = 0;
+  TimeNs last_ns = 0;
+  TimeNs gap_ns_max = 0;
+};
+
+enum class PoseQuality { kExact = 1, kInterpolated = 2, kInGap = 3 };
+
+/// Where an agent was at an instant.
+struct LocatedPose {
+  PoseQuality quality = PoseQuality::kExact;
+  /// Meaningless if quality is kInGap.
+  Pose3d map_T_agent;
+  /// Times of the stored poses on both sides; equal if kExact.
+  TimeNs before_ns = 0;
+  TimeNs after_ns = 0;
+  uint32_t flags = 0;
+  /// Of the nearer stored pose; null when none was stored.
+  std::shared_ptr<const Covariance6> covariance;
+};
+
+/// Narrows a listing of nodes; an unset field narrows nothing.
+struct NodeFilter {
+  std::optional<LayerId> layer;
+  std::string kind;
+  std::string class_name;
+  std::string name;
+  /// Children of this node by CONTAINS.
+  NodeId parent;
+  /// Box in the map frame that the node's box must touch.
+  std::optional<Box3d> box_map;
+  /// Instant of world time at which the node was valid.
+  std::optional<TimeNs> at_ns;
+
+  bool Matches(const Node& node) const;
+};
+
+struct EdgeFilter {
+  NodeId source;
+  std::string relation;
+  NodeId target;
+  std::optional<TimeNs> at_ns;
+};
+
+struct NearestNode {
+  Node node;
+  /// From the point to the node's box, metres; 0 inside.
+  double distance_m = 0.0;
+};
+
+/// A piece of a track inside a box: the agent was in it during [enter_ns, exit_ns).
+struct BoxVisit {
+  NodeId agent;
+  TimeNs enter_ns = 0;
+  TimeNs exit_ns = 0;
+};
+
+/// Tells a long read to stop: returns CANCELLED or DEADLINE_EXCEEDED once it must. May be empty.
+/// Called often (every few hundred rows or poses) and from the calling thread only.
+using StopCheck = std::function<absl::Status()>;
+
+/// An immutable map at one revision.
+///
+/// Threads: safe from many threads; never waits for the writer.
+/// Errors of every call: DATA_LOSS/STORE_CORRUPT naming map, table and key when stored bytes are
+/// not what was written; what `stop` returned.
+class Snapshot {
+ public:
+  virtual ~Snapshot() = default;
+
+  virtual const MapSpec& spec() const = 0;
+  virtual Revision revision() const = 0;
+
+  /// Ascending by rank, then name.
+  virtual absl::StatusOr<std::vector<Layer>> Layers() const = 0;
+  /// Errors: NOT_FOUND/LAYER_UNKNOWN listing the known ones.
+  virtual absl::StatusOr<Layer> FindLayer(std::string_view name) const = 0;
+  virtual absl::StatusOr<std::vector<SemanticLabel>> Labels() const = 0;
+  /// Reads counters only, whatever the size of the map.
+  virtual absl::StatusOr<MapStats> Stats() const = 0;
+
+  /// Errors: NOT_FOUND/NODE_UNKNOWN.
+  virtual absl::StatusOr<Node> GetNode(NodeId id) const = 0;
+  /// A node by id ("O42") or, failing that, by exact name; the lowest id when several share it
+  /// (callers that need it to be the only one look with ScanNodes).
+  /// Errors: NOT_FOUND/NODE_UNKNOWN.
+  virtual absl::StatusOr<NodeId> ResolveNode(std::string_view id_or_name) const = 0;
+  /// The same among humans and robots; an id goes before a name.
+  /// Errors: NOT_FOUND/AGENT_UNKNOWN; INVALID_ARGUMENT/FIELD_INVALID when several share the name.
+  virtual absl::StatusOr<NodeId> ResolveAgent(std::string_view id_or_name) const = 0;
+
+  /// Calls `visit` for each matching node with id > `after`, until it returns false.
+  /// Order: ascending id.
+  virtual absl::Status ScanNodes(const NodeFilter& filter, NodeId after, const StopCheck& stop,
+                                 const std::function<bool(const Node&)>& visit) const = 0;
+  /// Calls `visit` for each matching edge with key > `after` (if given), until it returns false.
+  /// Order: ascending (source, relation, target).
+  virtual absl::Status ScanEdges(const EdgeFilter& filter, const std::optional<EdgeKey>& after,
+                                 const StopCheck& stop,
+                                 const std::function<bool(const Edge&)>& visit) const = 0;
+  /// The k nodes whose boxes are nearest to a point of the map frame, agents left out.
+  /// Order: ascending distance, then id.
+  virtual absl::StatusOr<std::vector<NearestNode>> NearestNodes(const Eigen::Vector3d& point_map,
+                                                                int k, double max_distance_m,
+                                                                const NodeFilter& filter,
+                                                                const StopCheck& stop) const = 0;
+  /// Ancestors by CONTAINS, nearest first. Where a node has several parents, the lowest id.
+  virtual absl::StatusOr<std::vector<NodeId>> Ancestors(NodeId id) const = 0;
+
+  /// All agents with their tracks. Order: ascending id.
+  virtual absl::StatusOr<std::vector<TrackInfo>> Tracks() const = 0;
+  /// Errors: NOT_FOUND/AGENT_UNKNOWN.
+  virtual absl::StatusOr<TrackInfo> GetTrack(NodeId agent) const = 0;
+  /// Interpolated between stored poses, never extrapolated.
+  ///
+  /// Frames: map_T_agent.
+  /// Errors: NOT_FOUND/AGENT_UNKNOWN; OUT_OF_RANGE/TIME_OUTSIDE_TRACK with both ends.
+  /// Cost:   one lookup in a cached directory and the decoding of part of one block of 64 poses.
+  virtual absl::StatusOr<LocatedPose> Locate(NodeId agent, TimeNs at_ns) const = 0;
+  /// Calls `visit` for each stored pose with from_ns <= time < to_ns, until it returns false.
+  /// Order: ascending time. Errors: NOT_FOUND/AGENT_UNKNOWN.
+  virtual absl::Status ReadPoses(NodeId agent, TimeNs from_ns, TimeNs to_ns, const StopCheck& stop,
+                                 const std::function<bool(const TimedPose&)>& visit) const = 0;
+  /// Exact intervals in which interpolated positions were inside a box, gaps excluded.
+  /// A visit is clipped to [from_ns, to_ns) and at least 1 ns long, or one instant's pose.
+  /// Order: ascending enter_ns, then agent.
+  virtual absl::StatusOr<std::vector<BoxVisit>> VisitsToBox(const Box3d& box_map, TimeNs from_ns,
+                                                            TimeNs to_ns,
+                                                            const StopCheck& stop) const = 0;
+  /// Agents with at least one stored pose or interpolated position in [from_ns, to_ns).
+  virtual absl::StatusOr<int64_t> CountObservedAgents(TimeNs from_ns, TimeNs to_ns) const = 0;
+
+  /// The stay that holds an instant; nullopt when none does.
+  virtual absl::StatusOr<std::optional<Stay>> StayAt(NodeId agent, TimeNs at_ns) const = 0;
+  /// Stays of one agent that touch [from_ns, to_ns). Order: ascending enter_ns.
+  virtual absl::StatusOr<std::vector<Stay>> StaysOfAgent(NodeId agent, TimeNs from_ns,
+                                                         TimeNs to_ns) const = 0;
+  /// Stays in a room or place that touch [from_ns, to_ns), open ends clipped to the track's last
+  /// pose. Order: ascending enter_ns, then agent.
+  virtual absl::StatusOr<std::vector<Stay>> StaysInNode(NodeId room_or_place, TimeNs from_ns,
+                                                        TimeNs to_ns,
+                                                        const StopCheck& stop) const = 0;
+
+  /// Order: ascending time of the first pose.
+  virtual absl::StatusOr<std::vector<PoseFactor>> Factors(NodeId agent, TimeNs from_ns,
+                                                          TimeNs to_ns) const = 0;
+  virtual absl::StatusOr<std::vector<BodyShape>> Shapes(NodeId agent, TimeNs from_ns,
+                                                        TimeNs to_ns) const = 0;
+  /// Indices of all mesh blocks, ascending.
+  virtual absl::StatusOr<std::vector<BlockIndex>> MeshBlocks() const = 0;
+  /// Errors: NOT_FOUND/NODE_UNKNOWN when there is no such block.
+  virtual absl::StatusOr<MeshBlock> ReadMeshBlock(BlockIndex index) const = 0;
+  /// Errors: NOT_FOUND/ASSET_UNKNOWN.
+  virtual absl::StatusOr<Asset> ReadAsset(const Sha256& sha256) const = 0;
+};
+
+}  // namespace dsg

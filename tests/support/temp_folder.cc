@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/support/temp_folder.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <iostream>
+
+namespace dsg::test {
+
+TempFolder::TempFolder() {
+  std::string pattern = (std::filesystem::temp_directory_path() / "dsg-test-XXXXXX").string();
+  if (mkdtemp(pattern.data()) == nullptr) ADD_FAILURE() << "cannot make a folder like " << pattern;
+  path_ = pattern;
+}
+
+TempFolder::~TempFolder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
+}
+
+uint64_t TestSeed(uint64_t fallback) {
+  const char* text = std::getenv("DSG_SEED");
+  const uint64_t seed = text == nullptr ? fallback : std::strtoull(text, nullptr, 10);
+  std::cout << "seed " << seed << " (set DSG_SEED to repeat another)\n";
+  return seed;
+}
+
+}  // namespace dsg::test

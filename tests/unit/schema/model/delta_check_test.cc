@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every invariant has a delta that breaks it and nothing else.
+#include "schema/model/delta_check.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "schema/base/status.h"
+
+namespace dsg {
+namespace {
+
+// The graph before the delta: one room that holds one place, and one agent with a track.
+class SmallGraph : public GraphLookup {
+ public:
+  absl::StatusOr<std::optional<NodeFacts>> FindNode(NodeId id) const override {
+    const Box3d box(Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(10, 10, 3));
+    if (id == NodeId('R', 0)) return std::optional(NodeFacts{layers::kRooms, false, {}, box});
+    if (id == NodeId('p', 0)) {
+      return std::optional(NodeFacts{layers::kPlaces, false, {}, Box3d(), {1, 1, 1}});
+    }
+    if (id == NodeId('H', 0)) return std::optional(NodeFacts{layers::kAgents, true, {}, Box3d()});
+    return std::optional<NodeFacts>();
+  }
+  absl::StatusOr<std::optional<Layer>> FindLayer(LayerId id) const override {
+    for (const Layer& layer : DefaultLayers()) {
+      if (layer.id == id) return std::optional(layer);
+    }
+    return std::optional<Layer>();
+  }
+  absl::StatusOr<std::vector<NodeId>> FindParents(NodeId id) const override {
+    if (id == NodeId('p', 0)) return std::vector{NodeId('R', 0)};
+    return std::vector<NodeId>();
+  }
+  absl::StatusOr<std::vector<NodeId>> FindChildren(NodeId id) const override {
+    if (id == NodeId('R', 0)) return std::vector{NodeId('p', 0)};
+    return std::vector<NodeId>();
+  }
+  absl::StatusOr<std::optional<TimeNs>> FindTrackEnd(NodeId agent) const override {
+    if (agent == NodeId('H', 0)) return std::optional<TimeNs>(1000);
+    return std::optional<TimeNs>();
+  }
+  absl::StatusOr<bool> HasAsset(const Sha256&) const override { return false; }
+};
+
+Node Place(uint64_t index, double x) {
+  Node node;
+  node.id = NodeId('p', index);
+  node.layer = layers::kPlaces;
+  node.kind = kinds::kPlace;
+  node.map_T_node.position = {x, 1, 1};
+  return node;
+}
+
+GraphDelta Empty() {
+  GraphDelta delta;
+  delta.session_id = "s";
+  delta.sequence = 1;
+  return delta;
+}
+
+GraphDelta With(const std::function<void(GraphDelta*)>& change) {
+  GraphDelta delta = Empty();
+  change(&delta);
+  return delta;
+}
+
+void ExpectRefused(const std::function<void(GraphDelta*)>& change, Reason reason,
+                   const std::string& part_of_message) {
+  const auto status = CheckDelta(With(change), SmallGraph());
+  EXPECT_EQ(ReasonOf(status), reason) << status;
+  EXPECT_NE(std::string(status.message()).find(part_of_message), std::string::npos) << status;
+}
+
+TEST(CheckDelta, AcceptsASoundDelta) {
+  EXPECT_TRUE(CheckDelta(With([](GraphDelta* delta) {
+                           delta->nodes = {Place(1, 5.0)};
+                           delta->edges = {
+                               {NodeId('R', 0), relations::kContains, NodeId('p', 1)},
+                               {NodeId('p', 0), relations::kTraversable, NodeId('p', 1)}};
+                           delta->appends = {{NodeId('H', 0), {TimedPose{1001}}}};
+                           delta->stays = {{NodeId('H', 0), NodeId('p', 1), NodeId('R', 0), 5}};
+                         }),
+                         SmallGraph())
+                  .ok());
+}
+
+TEST(CheckDelta, RefusesADeltaWithoutIdentity) {
+  ExpectRefused([](GraphDelta* d) { d->session_id.clear(); }, Reason::kDeltaInvalid, "session_id");
+  ExpectRefused([](GraphDelta* d) { d->sequence = 0; }, Reason::kDeltaInvalid, "sequence is 0");
+}
+
+TEST(CheckDelta, RefusesNodesOutOfPlace) {
+  ExpectRefused([](GraphDelta* d) { d->nodes = {Place(1, std::nan(""))}; },
+                Reason::kNumberNotFinite, "position");
+  ExpectRefused([](GraphDelta* d) { d->nodes = {Place(1, 3.0e6)}; }, Reason::kNumberNotFinite,
+                "position (3e+06, 1, 1) of node p1");
+  ExpectRefused(
+      [](GraphDelta* d) {
+        d->nodes = {Place(1, 1)};
+        d->nodes[0].map_T_node.orientation.w() = 2.0;
+      },
+      Reason::kDeltaInvalid, "norm 2");
+  ExpectRefused(
+      [](GraphDelta* d) {
+        d->nodes = {Place(1, 1)};
+        d->nodes[0].layer = layers::kRooms;
+      },
+      Reason::kDeltaInvalid, "cannot be in layer \"rooms\"");
+  ExpectRefused(
+      [](GraphDelta* d) {
+        d->nodes = {Place(1, 1)};
+        d->nodes[0].layer = 99;
+      },
+      Reason::kDeltaInvalid, "layer 99");
+  ExpectRefused(
+      [](GraphDelta* d) {
+        d->nodes = {Place(1, 1)};
+        d->nodes[0].valid = {5, 5};
+      },
+      Reason::kDeltaInvalid, "validity [5, 5)");
+}
+
+TEST(CheckDelta, RefusesTextThatIsNotUtf8WhereverItStands) {
+  const std::string latin1 = "J\xf6rg";
+  const auto expect_refused = [&](const std::function<void(GraphDelta*)>& change) {
+    ExpectRefused(change, Reason::kDeltaInvalid, "is not UTF-8");
+  };
+  expect_refused([&](GraphDelta* d) { d->session_id = latin1; });
+  expect_refused([&](GraphDelta* d) { d->author = latin1; });
+  expect_refused([&](GraphDelta* d) { d->message = latin1; });
+  expect_refused([&](GraphDelta* d) { d->layers = {{99, latin1, 450}}; });
+  expect_refused([&](GraphDelta* d) { d->labels = {{1, latin1}}; });
+  expect_refused([&](GraphDelta* d) {
+    d->nodes = {Place(1, 1)};
+    d->nodes[0].name = latin1;
+  });
+  expect_refused([&](GraphDelta* d) {
+    d->nodes = {Place(1, 1)};
+    d->nodes[0].class_name = latin1;
+  });
+  expect_refused([&](GraphDelta* d) {
+    d->nodes = {Place(1, 1)};
+    d->nodes[0].attributes["note"] = latin1;
+  });
+  expect_refused([&](GraphDelta* d) {
+    d->nodes = {Place(1, 1)};
+    d->nodes[0].attributes[latin1] = 1.0;
+  });
+  expect_refused([&](GraphDelta* d) {
+    d->nodes = {Place(1, 1)};
+    d->edges = {{NodeId('p', 0), latin1, NodeId('p', 1)}};
+  });
+}
+
+TEST(CheckDelta, RefusesEdgesThatDangleOrLoop) {
+  ExpectRefused(
+      [](GraphDelta* d) {
+        d->edges = {{NodeId('p', 0), relations::kNear, NodeId('p', 7)}};
+      },
+      Reason::kDeltaInvalid, "p7, which does not exist");
+  ExpectRefused(
+      [](GraphDelta* d) {
+        d->edges = {{NodeId('p', 0), relations::kNear, NodeId('p', 0)}};
+      },
+      Reason::kDeltaInvalid, "ends where it begins");
+  ExpectRefused(
+      [](GraphDelta* d) {
+        d->retirements = {{NodeId('p', 0), std::nullopt}};
+        d->edges = {{NodeId('R', 0), relations::kContains, NodeId('p', 0)}};
+      },
+      Reason::kDeltaInvalid, "does not exist");
+}
+
+TEST(CheckDelta, RefusesContainmentAgainstRankOrBox) {
+  ExpectRefused(
+      [](GraphDelta* d) {
+        d->edges = {{NodeId('p', 0), relations::kContains, NodeId('R', 0)}};
+      },
+      Reason::kDeltaInvalid, "must outrank");
+  ExpectRefused(
+      [](GraphDelta* d) {
+        d->nodes = {Place(1, 11.0)};
+        d->edges = {{NodeId('R', 0), relations::kContains, NodeId('p', 1)}};
+      },
+      Reason::kDeltaInvalid, "sticks out");
+}
+
+TEST(CheckDelta, RefusesAMovedNodeThatLeavesItsStoredFamily) {
+  ExpectRefused([](GraphDelta* d) { d->nodes = {Place(0, 12.0)}; }, Reason::kDeltaInvalid,
+                "R0 CONTAINS p0");
+  ExpectRefused(
+      [](GraphDelta* d) {
+        Node room;
+        room.id = NodeId('R', 0);
+        room.layer = layers::kRooms;
+        room.kind = kinds::kRoom;
+        room.box_node = Box3d(Eigen::Vector3d(5, 5, 0), Eigen::Vector3d(10, 10, 3));
+        d->nodes = {room};
+      },
+      Reason::kDeltaInvalid, "R0 CONTAINS p0");
+  // Moving it out is fine when the edge ends in the same delta.
+  EXPECT_TRUE(
+      CheckDelta(With([](GraphDelta* d) {
+                   d->nodes = {Place(0, 12.0)};
+                   d->edge_removals = {{NodeId('R', 0), relations::kContains, NodeId('p', 0)}};
+                 }),
+                 SmallGraph())
+          .ok());
+}
+
+TEST(CheckDelta, RefusesTrajectoriesThatDoNotGrow) {
+  ExpectRefused(
+      [](GraphDelta* d) {
+        d->appends = {{NodeId('H', 0), {TimedPose{2000}, TimedPose{2000}}}};
+      },
+      Reason::kDeltaInvalid, "2000 comes after 2000");
+  ExpectRefused(
+      [](GraphDelta* d) {
+        d->appends = {{NodeId('H', 0), {TimedPose{1000}}}};
+      },
+      Reason::kTrackConflict, "stored end 1000");
+  ExpectRefused(
+      [](GraphDelta* d) {
+        d->appends = {{NodeId('p', 0), {TimedPose{1}}}};
+      },
+      Reason::kDeltaInvalid, "needs a human or robot");
+  ExpectRefused(
+      [](GraphDelta* d) {
+        d->corrections = {{NodeId('H', 0), 100, 200, {TimedPose{200}}}};
+      },
+      Reason::kDeltaInvalid, "outside [100, 200)");
+}
+
+TEST(CheckDelta, RefusesStaysNowhereOrTooLong) {
+  ExpectRefused(
+      [](GraphDelta* d) {
+        d->stays = {{NodeId('H', 0), NodeId(), NodeId(), 5}};
+      },
+      Reason::kDeltaInvalid, "nowhere");
+  ExpectRefused(
+      [](GraphDelta* d) {
+        d->stays = {{NodeId('H', 0), NodeId('p', 0), NodeId(), 0, kStayNsMax + 1}};
+      },
+      Reason::kDeltaInvalid, "longer than an hour");
+}
+
+TEST(CheckDelta, RefusesMeshesAndAssetsThatContradictThemselves) {
+  ExpectRefused(
+      [](GraphDelta* d) {
+        MeshBlock block;
+        block.positions_map.resize(2, Eigen::Vector3f::Zero());
+        block.faces.push_back({0, 1, 2});
+        d->mesh_blocks = {block};
+      },
+      Reason::kDeltaInvalid, "a vertex that does not exist");
+  ExpectRefused(
+      [](GraphDelta* d) {
+        d->assets = {{Sha256{}, "model/ply", "content"}};
+      },
+      Reason::kDeltaInvalid, "does not match its sha256");
+}
+
+TEST(CheckDelta, RefusesARedefinedLayer) {
+  ExpectRefused(
+      [](GraphDelta* d) {
+        d->layers = {{layers::kRooms, "rooms", 50}};
+      },
+      Reason::kDeltaInvalid, "cannot become");
+}
+
+}  // namespace
+}  // namespace dsg
