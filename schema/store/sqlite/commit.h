@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// The state of one commit while it is being applied, and the parts that apply it.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <unordered_map>
+
+#include "schema/codec/checksum.h"
+#include "schema/codec/trajectory_codec.h"
+#include "schema/model/graph_delta.h"
+#include "schema/model/revision.h"
+#include "schema/store/sqlite/database.h"
+#include "schema/store/sqlite/rows.h"
+
+namespace dsg::sqlite {
+
+/// Id of CONTAINS in the relation table of every map.
+inline constexpr int64_t kContainsId = 1;
+
+/// The newest revision and the sums that it carries.
+struct Head {
+  RevisionInfo info;
+  ContentDigest content;
+  std::map<LayerId, int64_t> layer_counts;
+  std::optional<TimeNs> first_pose_ns;
+  std::optional<TimeNs> last_pose_ns;
+};
+
+/// One commit. `head` begins as a copy of the newest revision, and becomes the next one.
+struct CommitContext {
+  Database& db;
+  const MapSpec& spec;
+  Head head;
+
+  Revision revision() const { return head.info.revision; }
+};
+
+/// Writes layers, labels, nodes, edges.
+class GraphRowsWriter {
+ public:
+  explicit GraphRowsWriter(CommitContext* commit) : commit_(*commit) {}
+  absl::Status Apply(const GraphDelta& delta);
+
+ private:
+  absl::Status WriteLayer(const Layer& layer);
+  absl::Status WriteLabel(const SemanticLabel& label);
+  absl::Status WriteNode(const Node& node);
+  absl::Status InsertNode(const Node& node, const std::string& payload);
+  absl::Status UpdateNodeBox(const Node& node);
+  absl::Status Retire(const Retirement& item);
+  /// Moves the current row to the history. Returns false if there is none.
+  absl::StatusOr<bool> EndNode(int64_t key);
+  absl::Status EndEdgesOf(int64_t key);
+  absl::Status WriteEdge(const Edge& edge);
+  absl::StatusOr<bool> EndEdge(int64_t source, int64_t relation, int64_t target);
+
+  CommitContext& commit_;
+};
+
+/// Writes stays, mesh blocks, assets, factors and shapes.
+absl::Status WriteStays(const std::vector<Stay>& stays, CommitContext* commit);
+absl::Status EndStaysOf(NodeId agent, CommitContext* commit);
+absl::Status WriteMesh(const GraphDelta& delta, CommitContext* commit);
+absl::Status WriteAssets(const std::vector<Asset>& assets, CommitContext* commit);
+absl::Status WriteFactors(const std::vector<FactorAppend>& factors, CommitContext* commit);
+absl::Status WriteShapes(const std::vector<ShapeAppend>& shapes, CommitContext* commit);
+
+/// Id of a relation's name, 0 if the map has never seen it.
+absl::StatusOr<int64_t> FindRelation(Database& db, const std::string& name);
+
+/// Writes trajectories. Keeps the open tail of each track between commits; after a failed commit
+/// it must be forgotten.
+class TrackWriter {
+ public:
+  TrackWriter();
+  ~TrackWriter();
+
+  absl::Status Append(const TrajectoryAppend& append, CommitContext* commit);
+  absl::Status Correct(const TrajectoryCorrection& correction, CommitContext* commit);
+  /// The agent never existed: its poses end with this revision.
+  absl::Status End(NodeId agent, CommitContext* commit);
+  void Forget();
+
+ private:
+  struct Tail;
+  absl::StatusOr<Tail*> LoadTail(NodeId agent, CommitContext* commit);
+  absl::Status LoadOpenSegment(Tail* tail, CommitContext* commit);
+  absl::Status AppendPose(const StoredPose& pose, Tail* tail, CommitContext* commit);
+  absl::Status WriteSegment(Tail* tail, CommitContext* commit);
+  absl::Status WriteMark(const Tail& tail, CommitContext* commit);
+  absl::Status TakeSegmentsFrom(TimeNs from_ns, Tail* tail, std::vector<StoredPose>* poses,
+                                CommitContext* commit);
+
+  std::unordered_map<NodeId, std::unique_ptr<Tail>> tails_;
+};
+
+}  // namespace dsg::sqlite

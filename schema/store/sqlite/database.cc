@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "schema/store/sqlite/database.h"
+
+#include <sqlite3.h>
+
+#include <cerrno>
+
+#include "absl/strings/str_cat.h"
+#include "schema/store/sqlite/page_checksum.h"
+
+namespace dsg::sqlite {
+namespace {
+
+// mmap turns an I/O error into a signal; double-quoted strings and untrusted schemas are loose
+// defaults of old times (SQLite's own advice for files that may be hostile).
+void Harden(sqlite3* db) {
+  sqlite3_db_config(db, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  sqlite3_db_config(db, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  sqlite3_db_config(db, SQLITE_DBCONFIG_DQS_DML, 0, nullptr);
+  sqlite3_db_config(db, SQLITE_DBCONFIG_DQS_DDL, 0, nullptr);
+  sqlite3_db_config(db, SQLITE_DBCONFIG_ENABLE_LOAD_EXTENSION, 0, nullptr);
+  sqlite3_db_config(db, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
+  sqlite3_limit(db, SQLITE_LIMIT_ATTACHED, 0);
+}
+
+constexpr char kReadPragmas[] =
+    "PRAGMA busy_timeout=5000; PRAGMA mmap_size=0; PRAGMA cell_size_check=ON;"
+    "PRAGMA cache_size=-16384; PRAGMA temp_store=MEMORY; PRAGMA wal_autocheckpoint=0;";
+constexpr char kWritePragmas[] =
+    "PRAGMA busy_timeout=5000; PRAGMA mmap_size=0; PRAGMA cell_size_check=ON;"
+    "PRAGMA cache_size=-65536; PRAGMA temp_store=MEMORY; PRAGMA wal_autocheckpoint=0;"
+    "PRAGMA synchronous=FULL; PRAGMA journal_size_limit=67108864;";
+
+int OnWalCommit(void* pages, sqlite3*, const char*, int wal_pages) {
+  *static_cast<int*>(pages) = wal_pages;
+  return SQLITE_OK;
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<Database>> Database::Open(const std::string& path, Mode mode,
+                                                         const std::string& map_name) {
+  std::unique_ptr<Database> made(new Database());
+  made->map_name_ = map_name;
+  made->path_ = path;
+  int flags = SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_EXRESCODE | SQLITE_OPEN_NOFOLLOW;
+  if (mode == Mode::kRead) flags |= SQLITE_OPEN_READONLY;
+  if (mode == Mode::kWrite) flags |= SQLITE_OPEN_READWRITE;
+  if (mode == Mode::kCreate) flags |= SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
+  if (sqlite3_open_v2(path.c_str(), &made->db_, flags, SealedFilesName()) != SQLITE_OK) {
+    return made->Error(absl::StrCat("opening ", path));
+  }
+  Harden(made->db_);
+  if (mode == Mode::kCreate) {
+    DSG_RETURN_IF_ERROR(made->Execute("PRAGMA page_size=4096;"));
+    if (!ReservePageSeals(made->db_)) return made->Error("making room for page checksums");
+    DSG_RETURN_IF_ERROR(made->Execute("PRAGMA journal_mode=WAL;"));
+  }
+  DSG_RETURN_IF_ERROR(made->Execute(mode == Mode::kRead ? kReadPragmas : kWritePragmas));
+  if (mode != Mode::kRead) sqlite3_wal_hook(made->db_, OnWalCommit, &made->wal_pages_);
+  return made;
+}
+
+Database::~Database() {
+  for (const auto& [sql, statement] : statements_) sqlite3_finalize(statement);
+  sqlite3_close_v2(db_);
+}
+
+absl::Status Database::Execute(const char* sql) {
+  if (sqlite3_exec(db_, sql, nullptr, nullptr, nullptr) == SQLITE_OK) return absl::OkStatus();
+  return Error(sql);
+}
+
+absl::StatusOr<int64_t> Database::QueryInt(const char* sql) {
+  Query query(*this, sql);
+  const bool found = query.Next();
+  DSG_RETURN_IF_ERROR(query.status());
+  return found ? query.Int(0) : -1;
+}
+
+bool Database::Checkpoint(bool truncate) {
+  const int mode = truncate ? SQLITE_CHECKPOINT_TRUNCATE : SQLITE_CHECKPOINT_PASSIVE;
+  int log_pages = 0;
+  int copied_pages = 0;
+  if (sqlite3_wal_checkpoint_v2(db_, nullptr, mode, &log_pages, &copied_pages) != SQLITE_OK) {
+    return false;
+  }
+  wal_pages_ = 0;
+  return log_pages == copied_pages;
+}
+
+int Database::error_code() const { return sqlite3_extended_errcode(db_); }
+
+absl::Status Database::Error(std::string_view doing) const {
+  const int code = db_ == nullptr ? SQLITE_NOMEM : sqlite3_extended_errcode(db_);
+  const std::string text = absl::StrCat("map \"", map_name_, "\": ", std::string(doing), ": ",
+                                        db_ == nullptr ? "out of memory" : sqlite3_errmsg(db_));
+  const ErrorMetadata metadata = {{"map", map_name_}, {"sqlite", absl::StrCat(code)}};
+  // A full disk also shows as an I/O error, where the shared index of the log has to grow.
+  const bool is_io_error = (code & 0xff) == SQLITE_IOERR;
+  const bool is_full = (code & 0xff) == SQLITE_FULL || code == SQLITE_IOERR_SHMSIZE ||
+                       (is_io_error && sqlite3_system_errno(db_) == ENOSPC);
+  if (is_full) {
+    return MakeError(Reason::kDiskFull,
+                     text + "; nothing was written, free some space and try again", metadata);
+  }
+  if (code == SQLITE_IOERR_DATA) {
+    return MakeError(Reason::kStoreCorrupt,
+                     text +
+                         ": a page is not what was written; run `dsg verify` and restore from "
+                         "a copy",
+                     metadata);
+  }
+  switch (code & 0xff) {
+    case SQLITE_CORRUPT:
+      return MakeError(Reason::kStoreCorrupt, text + "; run `dsg verify` and restore from a copy",
+                       metadata);
+    case SQLITE_NOTADB:
+      return MakeError(Reason::kNotAStore, text + "; the file is not a map", metadata);
+    case SQLITE_CANTOPEN:
+      if (sqlite3_system_errno(db_) == EMFILE || sqlite3_system_errno(db_) == ENFILE) {
+        return MakeError(Reason::kOverloaded, text + "; too many files are open, raise `ulimit -n`",
+                         metadata);
+      }
+      return MakeError(Reason::kReadOnly,
+                       text +
+                           "; reading needs write access to the map's folder too, for the "
+                           "shared index of its log",
+                       metadata);
+    case SQLITE_READONLY:
+    case SQLITE_PERM:
+      return MakeError(Reason::kReadOnly, text + "; check the permissions of the store", metadata);
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+      return MakeError(Reason::kWriterLocked, text + "; try again", metadata);
+    default:
+      return absl::InternalError(text);
+  }
+}
+
+sqlite3_stmt* Database::Take(const char* sql, bool* owned) {
+  sqlite3_stmt*& cached = statements_[sql];
+  *owned = cached != nullptr && sqlite3_stmt_busy(cached) != 0;
+  if (cached != nullptr && !*owned) return cached;
+  sqlite3_stmt* made = nullptr;
+  const unsigned flags = *owned ? 0 : SQLITE_PREPARE_PERSISTENT;
+  if (sqlite3_prepare_v3(db_, sql, -1, flags, &made, nullptr) != SQLITE_OK) return nullptr;
+  if (!*owned) cached = made;
+  return made;
+}
+
+Query::Query(Database& db, const char* sql) : db_(db), statement_(db.Take(sql, &owned_)) {
+  if (statement_ == nullptr) status_ = db_.Error(sql);
+}
+
+Query::~Query() {
+  if (statement_ == nullptr) return;
+  if (owned_) {
+    sqlite3_finalize(statement_);
+  } else {
+    sqlite3_reset(statement_);
+  }
+}
+
+void Query::BindOne(int index, int64_t value) {
+  if (statement_ != nullptr) sqlite3_bind_int64(statement_, index, value);
+}
+void Query::BindOne(int index, double value) {
+  if (statement_ != nullptr) sqlite3_bind_double(statement_, index, value);
+}
+void Query::BindOne(int index, const std::string& text) {
+  if (statement_ == nullptr) return;
+  sqlite3_bind_text64(statement_, index, text.data(), text.size(), SQLITE_STATIC, SQLITE_UTF8);
+}
+void Query::BindOne(int index, const BlobView& blob) {
+  if (statement_ == nullptr) return;
+  // An empty view may have a null pointer, which SQLite would take for NULL.
+  const char* data = blob.bytes.empty() ? "" : blob.bytes.data();
+  sqlite3_bind_blob64(statement_, index, data, blob.bytes.size(), SQLITE_STATIC);
+}
+void Query::BindNull(int index) {
+  if (statement_ != nullptr) sqlite3_bind_null(statement_, index);
+}
+
+bool Query::Next() {
+  if (!status_.ok()) return false;
+  const int code = sqlite3_step(statement_);
+  if (code == SQLITE_ROW) return true;
+  if (code != SQLITE_DONE) status_ = db_.Error(sqlite3_sql(statement_));
+  return false;
+}
+
+absl::Status Query::Run() {
+  while (Next()) {
+  }
+  return status_;
+}
+
+void Query::Reset() {
+  if (statement_ != nullptr) sqlite3_reset(statement_);
+}
+
+int64_t Query::Int(int column) const { return sqlite3_column_int64(statement_, column); }
+double Query::Real(int column) const { return sqlite3_column_double(statement_, column); }
+std::string_view Query::Text(int column) const {
+  const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(statement_, column));
+  return {text == nullptr ? "" : text,
+          static_cast<size_t>(sqlite3_column_bytes(statement_, column))};
+}
+std::string_view Query::Blob(int column) const {
+  const auto* blob = static_cast<const char*>(sqlite3_column_blob(statement_, column));
+  return {blob == nullptr ? "" : blob,
+          static_cast<size_t>(sqlite3_column_bytes(statement_, column))};
+}
+bool Query::IsNull(int column) const {
+  return sqlite3_column_type(statement_, column) == SQLITE_NULL;
+}
+
+}  // namespace dsg::sqlite

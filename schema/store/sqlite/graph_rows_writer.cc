@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absl/strings/str_cat.h"
+#include "schema/codec/proto_convert.h"
+#include "schema/store/sqlite/commit.h"
+
+namespace dsg::sqlite {
+namespace {
+
+absl::StatusOr<int64_t> FindOrAddRelation(Database& db, const std::string& name) {
+  DSG_ASSIGN_OR_RETURN(const int64_t found, FindRelation(db, name));
+  if (found != 0) return found;
+  DSG_RETURN_IF_ERROR(Query(db, "INSERT INTO relation (name) VALUES (?1)").Bind(name).Run());
+  return FindRelation(db, name);
+}
+
+}  // namespace
+
+absl::StatusOr<int64_t> FindRelation(Database& db, const std::string& name) {
+  Query query(db, "SELECT id FROM relation WHERE name = ?1");
+  query.Bind(name);
+  const bool found = query.Next();
+  DSG_RETURN_IF_ERROR(query.status());
+  return found ? query.Int(0) : 0;
+}
+
+absl::Status GraphRowsWriter::Apply(const GraphDelta& delta) {
+  for (const Layer& layer : delta.layers) DSG_RETURN_IF_ERROR(WriteLayer(layer));
+  for (const SemanticLabel& label : delta.labels) DSG_RETURN_IF_ERROR(WriteLabel(label));
+  for (const Node& node : delta.nodes) DSG_RETURN_IF_ERROR(WriteNode(node));
+  for (const EdgeKey& key : delta.edge_removals) {
+    DSG_ASSIGN_OR_RETURN(const int64_t relation, FindRelation(commit_.db, key.relation));
+    if (relation == 0) continue;
+    DSG_RETURN_IF_ERROR(EndEdge(KeyOf(key.source), relation, KeyOf(key.target)).status());
+  }
+  for (const Retirement& item : delta.retirements) DSG_RETURN_IF_ERROR(Retire(item));
+  for (const Edge& edge : delta.edges) DSG_RETURN_IF_ERROR(WriteEdge(edge));
+  return absl::OkStatus();
+}
+
+absl::Status GraphRowsWriter::WriteLayer(const Layer& layer) {
+  Query known(commit_.db, "SELECT 1 FROM layer WHERE id = ?1");
+  if (known.Bind(layer.id).Next()) return absl::OkStatus();
+  DSG_RETURN_IF_ERROR(known.status());
+  commit_.head.content.Add(
+      RowIdentity('L', {layer.id, layer.rank, commit_.revision()}, layer.name));
+  return Query(commit_.db, "INSERT INTO layer (id, name, rank, rev_from) VALUES (?1, ?2, ?3, ?4)")
+      .Bind(layer.id, layer.name, layer.rank, commit_.revision())
+      .Run();
+}
+
+absl::Status GraphRowsWriter::WriteLabel(const SemanticLabel& label) {
+  Query known(commit_.db, "SELECT name FROM label WHERE id = ?1 ORDER BY rev_from DESC LIMIT 1");
+  if (known.Bind(label.id).Next() && known.Text(0) == label.name) return absl::OkStatus();
+  DSG_RETURN_IF_ERROR(known.status());
+  // Earlier names stay: a label's version is chosen by the reader's revision.
+  commit_.head.content.Add(RowIdentity('l', {label.id, commit_.revision()}, label.name));
+  return Query(commit_.db, "INSERT INTO label (id, rev_from, name) VALUES (?1, ?2, ?3)")
+      .Bind(label.id, commit_.revision(), label.name)
+      .Run();
+}
+
+absl::Status GraphRowsWriter::WriteNode(const Node& node) {
+  const std::string payload = EncodeNodePayload(node);
+  {
+    Query current(commit_.db, "SELECT layer, payload FROM node WHERE key = ?1");
+    const bool exists = current.Bind(KeyOf(node.id)).Next();
+    DSG_RETURN_IF_ERROR(current.status());
+    if (exists && current.Int(0) == node.layer && current.Blob(1) == payload) {
+      return absl::OkStatus();
+    }
+  }
+  DSG_RETURN_IF_ERROR(EndNode(KeyOf(node.id)).status());
+  DSG_RETURN_IF_ERROR(InsertNode(node, payload));
+  return UpdateNodeBox(node);
+}
+
+absl::Status GraphRowsWriter::InsertNode(const Node& node, const std::string& payload) {
+  const int64_t key = KeyOf(node.id);
+  const std::initializer_list<int64_t> columns = {key, commit_.revision(), node.layer};
+  commit_.head.content.Add(RowIdentity('N', columns, payload));
+  ++commit_.head.info.node_count;
+  ++commit_.head.layer_counts[node.layer];
+  if (IsAgentKind(node.kind)) ++commit_.head.info.agent_count;
+  return Query(commit_.db,
+               "INSERT INTO node (key, rev_from, layer, name, payload, checksum)"
+               " VALUES (?1, ?2, ?3, ?4, ?5, ?6)")
+      .Bind(key, commit_.revision(), node.layer, node.name, Query::BlobView{payload},
+            RowChecksum(columns, payload))
+      .Run();
+}
+
+// Agents are where their tracks say, so they have no box here.
+absl::Status GraphRowsWriter::UpdateNodeBox(const Node& node) {
+  if (IsAgentKind(node.kind)) return absl::OkStatus();
+  const IntBox box = ToMillimetres(node.BoxMap());
+  return Query(commit_.db, "INSERT OR REPLACE INTO node_box VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)")
+      .Bind(KeyOf(node.id), box.x0, box.x1, box.y0, box.y1, box.z0, box.z1)
+      .Run();
+}
+
+absl::StatusOr<bool> GraphRowsWriter::EndNode(int64_t key) {
+  Query current(commit_.db, "SELECT rev_from, layer, payload, checksum FROM node WHERE key = ?1");
+  const bool exists = current.Bind(key).Next();
+  DSG_RETURN_IF_ERROR(current.status());
+  if (!exists) return false;
+  const int64_t rev_from = current.Int(0);
+  const auto layer = static_cast<LayerId>(current.Int(1));
+  const std::string payload(current.Blob(2));
+  Node node;
+  if (current.Int(3) != RowChecksum({key, rev_from, layer}, payload) ||
+      !DecodeNodePayload(payload, &node)) {
+    return CorruptRow(commit_.spec.name, "node", ToString(IdOf(key)));
+  }
+  commit_.head.content.Remove(RowIdentity('N', {key, rev_from, layer}, payload));
+  --commit_.head.info.node_count;
+  --commit_.head.layer_counts[layer];
+  if (IsAgentKind(node.kind)) --commit_.head.info.agent_count;
+  DSG_RETURN_IF_ERROR(
+      Query(commit_.db,
+            "INSERT INTO node_history (key, rev_from, rev_to, layer, name, payload, checksum)"
+            " SELECT key, rev_from, ?2, layer, name, payload, checksum FROM node WHERE key = ?1")
+          .Bind(key, commit_.revision())
+          .Run());
+  DSG_RETURN_IF_ERROR(Query(commit_.db, "DELETE FROM node WHERE key = ?1").Bind(key).Run());
+  return true;
+}
+
+absl::Status GraphRowsWriter::EndEdgesOf(int64_t key) {
+  std::vector<std::array<int64_t, 3>> ends;
+  for (const char* sql : {"SELECT source, relation, target FROM edge WHERE source = ?1",
+                          "SELECT source, relation, target FROM edge WHERE target = ?1"}) {
+    Query query(commit_.db, sql);
+    query.Bind(key);
+    while (query.Next()) ends.push_back({query.Int(0), query.Int(1), query.Int(2)});
+    DSG_RETURN_IF_ERROR(query.status());
+  }
+  for (const auto& [source, relation, target] : ends) {
+    DSG_RETURN_IF_ERROR(EndEdge(source, relation, target).status());
+  }
+  return absl::OkStatus();
+}
+
+absl::Status GraphRowsWriter::Retire(const Retirement& item) {
+  const int64_t key = KeyOf(item.id);
+  if (!item.valid_to_ns.has_value()) {
+    DSG_RETURN_IF_ERROR(EndNode(key).status());
+    DSG_RETURN_IF_ERROR(EndEdgesOf(key));
+    return Query(commit_.db, "DELETE FROM node_box WHERE key = ?1").Bind(key).Run();
+  }
+  Node node;
+  {
+    Query current(commit_.db, "SELECT layer, payload FROM node WHERE key = ?1");
+    if (!current.Bind(key).Next() || !DecodeNodePayload(current.Blob(1), &node)) {
+      DSG_RETURN_IF_ERROR(current.status());
+      return CorruptRow(commit_.spec.name, "node", ToString(item.id));
+    }
+    node.id = item.id;
+    node.layer = static_cast<LayerId>(current.Int(0));
+  }
+  node.valid.to_ns = *item.valid_to_ns;
+  return WriteNode(node);
+}
+
+absl::Status GraphRowsWriter::WriteEdge(const Edge& edge) {
+  DSG_ASSIGN_OR_RETURN(const int64_t relation, FindOrAddRelation(commit_.db, edge.relation));
+  const int64_t source = KeyOf(edge.source);
+  const int64_t target = KeyOf(edge.target);
+  const std::string payload = EncodeEdgePayload(edge);
+  {
+    Query current(commit_.db,
+                  "SELECT weight, payload FROM edge"
+                  " WHERE source = ?1 AND relation = ?2 AND target = ?3");
+    const bool exists = current.Bind(source, relation, target).Next();
+    DSG_RETURN_IF_ERROR(current.status());
+    if (exists && BitsOf(current.Real(0)) == BitsOf(edge.weight) && current.Blob(1) == payload) {
+      return absl::OkStatus();
+    }
+  }
+  DSG_RETURN_IF_ERROR(EndEdge(source, relation, target).status());
+  const std::initializer_list<int64_t> columns = {source, relation, target, commit_.revision(),
+                                                  BitsOf(edge.weight)};
+  commit_.head.content.Add(RowIdentity('E', columns, payload));
+  ++commit_.head.info.edge_count;
+  return Query(commit_.db,
+               "INSERT INTO edge (source, relation, target, rev_from, weight, payload, checksum)"
+               " VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)")
+      .Bind(source, relation, target, commit_.revision(), edge.weight, Query::BlobView{payload},
+            RowChecksum32(columns, payload))
+      .Run();
+}
+
+absl::StatusOr<bool> GraphRowsWriter::EndEdge(int64_t source, int64_t relation, int64_t target) {
+  Query current(commit_.db,
+                "SELECT rev_from, weight, payload, checksum FROM edge"
+                " WHERE source = ?1 AND relation = ?2 AND target = ?3");
+  const bool exists = current.Bind(source, relation, target).Next();
+  DSG_RETURN_IF_ERROR(current.status());
+  if (!exists) return false;
+  const std::initializer_list<int64_t> columns = {source, relation, target, current.Int(0),
+                                                  BitsOf(current.Real(1))};
+  if (current.Int(3) != RowChecksum32(columns, current.Blob(2))) {
+    return CorruptRow(commit_.spec.name, "edge",
+                      absl::StrCat(ToString(IdOf(source)), " ", ToString(IdOf(target))));
+  }
+  commit_.head.content.Remove(RowIdentity('E', columns, current.Blob(2)));
+  --commit_.head.info.edge_count;
+  DSG_RETURN_IF_ERROR(
+      Query(commit_.db,
+            "INSERT INTO edge_history"
+            " (source, relation, target, rev_from, rev_to, weight, payload, checksum)"
+            " SELECT source, relation, target, rev_from, ?4, weight, payload, checksum FROM edge"
+            " WHERE source = ?1 AND relation = ?2 AND target = ?3")
+          .Bind(source, relation, target, commit_.revision())
+          .Run());
+  DSG_RETURN_IF_ERROR(
+      Query(commit_.db, "DELETE FROM edge WHERE source = ?1 AND relation = ?2 AND target = ?3")
+          .Bind(source, relation, target)
+          .Run());
+  return true;
+}
+
+}  // namespace dsg::sqlite

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "schema/store/sqlite/map_file.h"
+
+#include <fcntl.h>
+#include <linux/magic.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <sys/vfs.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include "absl/strings/str_cat.h"
+#include "schema/model/edge.h"
+#include "schema/store/graph_store.h"
+
+namespace dsg::sqlite {
+
+extern const char kInitSql[];
+
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string Errno() { return std::strerror(errno); }
+
+// fs::create_directory may throw only without the error code overloads used here.
+absl::Status SyncFolder(const std::string& folder) {
+  const int fd = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const bool synced = fd >= 0 && fsync(fd) == 0;
+  if (fd >= 0) close(fd);
+  if (synced) return absl::OkStatus();
+  return absl::InternalError(absl::StrCat("cannot sync folder ", folder, ": ", Errno()));
+}
+
+absl::Status FillNewDatabase(Database& db, const MapSpec& spec) {
+  DSG_RETURN_IF_ERROR(db.Execute("BEGIN IMMEDIATE"));
+  DSG_RETURN_IF_ERROR(db.Execute(kInitSql));
+  DSG_RETURN_IF_ERROR(Query(db,
+                            "INSERT INTO map (id, name, frame, epoch_ns, clock, codec, gap_ns_max,"
+                            " mesh_block_size_m) VALUES (1, ?1, ?2, ?3, ?4, ?5, ?6, ?7)")
+                          .Bind(spec.name, spec.frame, spec.epoch_ns, static_cast<int>(spec.clock),
+                                static_cast<int>(spec.codec), spec.gap_ns_max,
+                                spec.mesh_block_size_m)
+                          .Run());
+  for (const Layer& layer : DefaultLayers()) {
+    DSG_RETURN_IF_ERROR(
+        Query(db, "INSERT INTO layer (id, name, rank, rev_from) VALUES (?1, ?2, ?3, 0)")
+            .Bind(layer.id, layer.name, layer.rank)
+            .Run());
+  }
+  DSG_RETURN_IF_ERROR(db.Execute(absl::StrCat("PRAGMA application_id=", kApplicationId,
+                                              "; PRAGMA user_version=", kStoreFormatVersion, ";")
+                                     .c_str()));
+  return db.Execute("COMMIT");
+}
+
+absl::Status CheckFormat(Database& db, const std::string& path) {
+  DSG_ASSIGN_OR_RETURN(const int64_t application_id, db.QueryInt("PRAGMA application_id"));
+  if (application_id != kApplicationId) {
+    return MakeError(Reason::kNotAStore,
+                     absl::StrCat(path, " is not a dsg map (application id ", application_id,
+                                  "); point --store at a folder made by dsg-ingest or dsg import"),
+                     {{"map", db.map_name()}});
+  }
+  DSG_ASSIGN_OR_RETURN(const int64_t version, db.QueryInt("PRAGMA user_version"));
+  if (version > kStoreFormatVersion) {
+    return MakeError(Reason::kFormatTooNew,
+                     absl::StrCat(path, " has format ", version, ", and this program reads up to ",
+                                  kStoreFormatVersion, "; use a newer dsgdb"),
+                     {{"map", db.map_name()}, {"format", absl::StrCat(version)}});
+  }
+  if (version < kStoreFormatVersion) {
+    return MakeError(
+        Reason::kFormatTooOld,
+        absl::StrCat(path, " has format ", version, "; this program needs ", kStoreFormatVersion),
+        {{"map", db.map_name()}, {"format", absl::StrCat(version)}});
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+std::string MapFolder(const std::string& store_folder, const std::string& map) {
+  return absl::StrCat(store_folder, "/", map);
+}
+
+std::string DatabasePath(const std::string& store_folder, const std::string& map) {
+  return absl::StrCat(MapFolder(store_folder, map), "/graph.db");
+}
+
+absl::Status CheckFileSystem(const std::string& folder) {
+  struct statfs info {};
+  if (statfs(folder.c_str(), &info) != 0) {
+    return MakeError(Reason::kMapUnknown,
+                     absl::StrCat("store folder ", folder, " cannot be read: ", Errno()),
+                     {{"store", folder}});
+  }
+  constexpr unsigned kNfs = NFS_SUPER_MAGIC;
+  constexpr unsigned kSmb = SMB_SUPER_MAGIC;
+  constexpr unsigned kSmb2 = 0xfe534d42;
+  constexpr unsigned kCifs = 0xff534d42;
+  constexpr unsigned k9p = V9FS_MAGIC;
+  const auto type = static_cast<unsigned>(info.f_type);
+  if (type != kNfs && type != kSmb && type != kSmb2 && type != kCifs && type != k9p) {
+    return absl::OkStatus();
+  }
+  return MakeError(Reason::kNetworkFileSystem,
+                   absl::StrCat("store folder ", folder,
+                                " is on a network file system, where a crash can corrupt it; "
+                                "keep the store on a local disk and reach it through dsg-server"),
+                   {{"store", folder}});
+}
+
+absl::Status CreateMapFile(const std::string& store_folder, const MapSpec& spec) {
+  DSG_RETURN_IF_ERROR(spec.Validate());
+  const std::string folder = MapFolder(store_folder, spec.name);
+  std::error_code error;
+  fs::create_directory(folder, error);
+  if (error) {
+    return absl::InternalError(absl::StrCat("cannot make ", folder, ": ", error.message()));
+  }
+  // Two processes may create the same map at once: the lock decides, the loser sees it exists.
+  DSG_ASSIGN_OR_RETURN(const auto lock, WriterLock::Acquire(store_folder, spec.name, "create"));
+  const std::string path = DatabasePath(store_folder, spec.name);
+  if (fs::exists(path, error)) {
+    return MakeError(Reason::kMapExists, absl::StrCat("map \"", spec.name, "\" exists already"),
+                     {{"map", spec.name}});
+  }
+  const std::string partial = path + ".new";
+  for (const char* suffix : {"", "-wal", "-shm"}) fs::remove(partial + suffix, error);
+  {
+    DSG_ASSIGN_OR_RETURN(const auto db,
+                         Database::Open(partial, Database::Mode::kCreate, spec.name));
+    DSG_RETURN_IF_ERROR(FillNewDatabase(*db, spec));
+    // A full disk may show only here; half a map must not get the name of a whole one.
+    if (!db->Checkpoint(/*truncate=*/true)) return db->Error("completing the new map");
+  }
+  fs::rename(partial, path, error);
+  if (error) {
+    return absl::InternalError(absl::StrCat("cannot name ", path, ": ", error.message()));
+  }
+  DSG_RETURN_IF_ERROR(SyncFolder(folder));
+  return SyncFolder(store_folder);
+}
+
+absl::StatusOr<std::unique_ptr<Database>> OpenMapFile(const std::string& store_folder,
+                                                      const std::string& map, Database::Mode mode) {
+  DSG_RETURN_IF_ERROR(CheckMapName(map));
+  const std::string path = DatabasePath(store_folder, map);
+  struct stat info {};
+  if (stat(path.c_str(), &info) != 0) {
+    return MakeError(Reason::kMapUnknown,
+                     absl::StrCat("map \"", map, "\" does not exist in store ", store_folder),
+                     {{"map", map}, {"store", store_folder}});
+  }
+  if (!S_ISREG(info.st_mode)) {
+    return MakeError(Reason::kNotAStore, absl::StrCat(path, " is not a file"), {{"map", map}});
+  }
+  if (info.st_nlink > 1) {
+    return MakeError(Reason::kNotAStore,
+                     absl::StrCat(path,
+                                  " has a second hard link; two names for one database lose "
+                                  "its locks, so remove the other"),
+                     {{"map", map}});
+  }
+  DSG_ASSIGN_OR_RETURN(auto db, Database::Open(path, mode, map));
+  DSG_RETURN_IF_ERROR(CheckFormat(*db, path));
+  DSG_ASSIGN_OR_RETURN(const MapSpec spec, ReadMapSpec(*db));
+  if (spec.name != map) {
+    return MakeError(
+        Reason::kNotAStore,
+        absl::StrCat("folder ", MapFolder(store_folder, map), " holds map \"", spec.name,
+                     "\"; a map cannot be copied under another name, "
+                     "rename the folder back"),
+        {{"map", map}});
+  }
+  return db;
+}
+
+absl::StatusOr<MapSpec> ReadMapSpec(Database& db) {
+  Query query(db,
+              "SELECT name, frame, epoch_ns, clock, codec, gap_ns_max, mesh_block_size_m FROM map");
+  if (!query.Next()) {
+    DSG_RETURN_IF_ERROR(query.status());
+    return MakeError(Reason::kStoreCorrupt, "map \"" + db.map_name() + "\" has no map record",
+                     {{"map", db.map_name()}, {"table", "map"}});
+  }
+  MapSpec spec;
+  spec.name = query.Text(0);
+  spec.frame = query.Text(1);
+  spec.epoch_ns = query.Int(2);
+  spec.clock = static_cast<Clock>(query.Int(3));
+  spec.codec = static_cast<TrajectoryCodec>(query.Int(4));
+  spec.gap_ns_max = query.Int(5);
+  spec.mesh_block_size_m = query.Real(6);
+  return spec;
+}
+
+std::optional<FileIdentity> IdentityOf(const std::string& store_folder, const std::string& map) {
+  struct stat info {};
+  if (stat(DatabasePath(store_folder, map).c_str(), &info) != 0) return std::nullopt;
+  return FileIdentity{info.st_dev, info.st_ino};
+}
+
+int64_t BytesOnDisk(const std::string& store_folder, const std::string& map) {
+  int64_t bytes = 0;
+  for (const char* name : {"/graph.db", "/graph.db-wal", "/writer.lock"}) {
+    struct stat info {};
+    if (stat((MapFolder(store_folder, map) + name).c_str(), &info) == 0) bytes += info.st_size;
+  }
+  return bytes;
+}
+
+absl::StatusOr<std::unique_ptr<WriterLock>> WriterLock::Acquire(const std::string& store_folder,
+                                                                const std::string& map,
+                                                                const std::string& program) {
+  const std::string path = MapFolder(store_folder, map) + "/writer.lock";
+  const int fd = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644);
+  if (fd < 0) {
+    return MakeError(Reason::kReadOnly, absl::StrCat("cannot open ", path, ": ", Errno()),
+                     {{"map", map}});
+  }
+  std::unique_ptr<WriterLock> lock(new WriterLock(fd));
+  if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
+    char text[256] = {};
+    const ssize_t size = pread(fd, text, sizeof(text) - 1, 0);
+    std::string holder(text, static_cast<size_t>(size > 0 ? size : 0));
+    if (!holder.empty() && holder.back() == '\n') holder.pop_back();
+    if (holder.empty()) holder = "another process";
+    return MakeError(Reason::kWriterLocked,
+                     absl::StrCat("map \"", map, "\" is being written by ", holder,
+                                  "; a map has one writer at a time: stop it, or write through it "
+                                  "with --server"),
+                     {{"map", map}, {"holder", holder}});
+  }
+  const std::string holder = absl::StrCat(program, " (process ", getpid(), ")\n");
+  const bool named = ftruncate(fd, 0) == 0 && pwrite(fd, holder.data(), holder.size(), 0) ==
+                                                  static_cast<ssize_t>(holder.size());
+  // The lock holds even if the disk is too full for the name; only the message suffers.
+  static_cast<void>(named);
+  return lock;
+}
+
+WriterLock::~WriterLock() { close(fd_); }
+
+}  // namespace dsg::sqlite

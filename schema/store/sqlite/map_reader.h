@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+// One map open for reading: a pool of read-only connections, and caches shared by all snapshots.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "schema/store/graph_store.h"
+#include "schema/store/sqlite/map_file.h"
+#include "schema/store/sqlite/track_cache.h"
+#include "schema/store/sqlite/writer.h"
+
+namespace dsg::sqlite {
+
+class SqliteMapReader : public MapReader, public std::enable_shared_from_this<SqliteMapReader> {
+ public:
+  static absl::StatusOr<std::shared_ptr<SqliteMapReader>> Open(const std::string& store_folder,
+                                                               const std::string& map,
+                                                               size_t cache_bytes);
+
+  const MapSpec& spec() const override { return spec_; }
+  bool IsCurrent() const override { return IdentityOf(store_folder_, spec_.name) == identity_; }
+  absl::StatusOr<RevisionInfo> Head() override;
+  absl::StatusOr<std::shared_ptr<const Snapshot>> Latest() override;
+  absl::StatusOr<std::shared_ptr<const Snapshot>> At(Revision revision) override;
+  absl::StatusOr<Revision> OldestRevision() override;
+  absl::StatusOr<std::vector<RevisionInfo>> ListRevisions(Revision before, int limit) override;
+  absl::StatusOr<SessionState> GetSession(const std::string& session_id) override;
+  absl::StatusOr<VerifyReport> Verify(const std::function<void(double)>& progress) override;
+
+  /// A connection for the length of one call; goes back to the pool when dropped.
+  class Lease {
+   public:
+    Lease(SqliteMapReader* reader, std::unique_ptr<Database> db)
+        : reader_(reader), db_(std::move(db)) {}
+    ~Lease();
+    Lease(Lease&&) = default;
+    Database& operator*() { return *db_; }
+    Database* operator->() { return db_.get(); }
+
+   private:
+    SqliteMapReader* reader_;
+    std::unique_ptr<Database> db_;
+  };
+  absl::StatusOr<Lease> LeaseConnection();
+
+  absl::StatusOr<std::shared_ptr<const Track>> GetTrack(NodeId agent, Revision revision);
+  absl::StatusOr<std::shared_ptr<const SegmentReader>> GetSegment(const SegmentRef& segment);
+  AncestorCache& ancestors() { return ancestors_; }
+  int64_t bytes_on_disk() const { return BytesOnDisk(store_folder_, spec_.name); }
+
+ private:
+  absl::StatusOr<std::shared_ptr<const sqlite::Head>> RefreshHead();
+
+  SqliteMapReader(std::string store_folder, size_t cache_bytes)
+      : store_folder_(std::move(store_folder)),
+        tracks_(cache_bytes / 4),
+        segments_(cache_bytes / 2),
+        ancestors_(cache_bytes / 4) {}
+
+  std::string store_folder_;
+  MapSpec spec_;
+  std::optional<FileIdentity> identity_;
+
+  std::mutex head_mutex_;
+  /// Watches for commits of other connections: SQLite counts them for us (data_version).
+  std::unique_ptr<Database> watcher_;
+  int64_t data_version_ = -1;
+  std::shared_ptr<const sqlite::Head> head_;
+
+  std::mutex pool_mutex_;
+  std::vector<std::unique_ptr<Database>> pool_;
+
+  TrackCache tracks_;
+  SegmentCache segments_;
+  AncestorCache ancestors_;
+};
+
+/// Makes the snapshot of a revision that exists.
+std::shared_ptr<const Snapshot> MakeSnapshot(std::shared_ptr<SqliteMapReader> reader,
+                                             std::shared_ptr<const sqlite::Head> head);
+
+/// Reads the whole map; see MapReader::Verify.
+absl::StatusOr<VerifyReport> VerifyMap(Database& db, const MapSpec& spec,
+                                       const std::function<void(double)>& progress);
+
+}  // namespace dsg::sqlite

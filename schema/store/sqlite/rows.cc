@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "schema/store/sqlite/rows.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+#include "schema/base/status.h"
+
+namespace dsg::sqlite {
+namespace {
+
+constexpr TimeNs kTenthNs = kNsPerSecond / 10;
+constexpr int64_t kInt32Max = INT32_MAX;
+constexpr int64_t kInt32Min = INT32_MIN;
+
+__extension__ using Int128 = __int128;
+
+int64_t FloorDivide(Int128 value, int64_t divisor) {
+  Int128 quotient = value / divisor;
+  if (value % divisor != 0 && value < 0) --quotient;
+  return static_cast<int64_t>(
+      std::clamp<Int128>(quotient, std::numeric_limits<int64_t>::min(), kTimeMax));
+}
+
+absl::StatusOr<int64_t> CheckTenths(int64_t tenths, TimeNs time_ns, const MapSpec& spec) {
+  if (tenths >= kInt32Min && tenths <= kInt32Max) return tenths;
+  return MakeError(Reason::kTimeOutsideMap,
+                   absl::StrCat("time ", time_ns, " ns is more than 6.8 years from the epoch ",
+                                spec.epoch_ns, " ns of map \"", spec.name,
+                                "\"; check the clock, or use a map with another epoch"),
+                   {{"map", spec.name}, {"time_ns", absl::StrCat(time_ns)}});
+}
+
+}  // namespace
+
+int64_t RowChecksum(std::initializer_list<int64_t> columns, std::string_view payload) {
+  const std::string_view head(reinterpret_cast<const char*>(columns.begin()),
+                              columns.size() * sizeof(int64_t));
+  return Checksum(payload, static_cast<uint64_t>(Checksum(head)));
+}
+
+int64_t RowChecksum32(std::initializer_list<int64_t> columns, std::string_view payload) {
+  return static_cast<int32_t>(RowChecksum(columns, payload));
+}
+
+std::string RowIdentity(char table, std::initializer_list<int64_t> columns,
+                        std::string_view payload) {
+  std::string identity(1, table);
+  identity.append(reinterpret_cast<const char*>(columns.begin()), columns.size() * sizeof(int64_t));
+  identity.append(payload);
+  return identity;
+}
+
+int64_t BitsOf(double value) { return std::bit_cast<int64_t>(value); }
+
+absl::Status CorruptRow(const std::string& map, std::string_view table, const std::string& key) {
+  return MakeError(Reason::kStoreCorrupt,
+                   absl::StrCat("map \"", map, "\": row ", key, " of table ", std::string(table),
+                                " is not what was written; run `dsg verify` and restore from a "
+                                "copy"),
+                   {{"map", map}, {"table", std::string(table)}, {"key", key}});
+}
+
+IntBox ToMillimetres(const Box3d& box) {
+  const auto low = [](double m) { return static_cast<int64_t>(std::floor(m * 1000.0)); };
+  const auto high = [](double m) { return static_cast<int64_t>(std::ceil(m * 1000.0)); };
+  return {low(box.min().x()),  high(box.max().x()), low(box.min().y()),
+          high(box.max().y()), low(box.min().z()),  high(box.max().z())};
+}
+
+absl::StatusOr<int64_t> ToTenthsFloor(TimeNs time_ns, const MapSpec& spec) {
+  return CheckTenths(FloorDivide(static_cast<Int128>(time_ns) - spec.epoch_ns, kTenthNs), time_ns,
+                     spec);
+}
+
+absl::StatusOr<int64_t> ToTenthsCeil(TimeNs time_ns, const MapSpec& spec) {
+  return CheckTenths(-FloorDivide(static_cast<Int128>(spec.epoch_ns) - time_ns, kTenthNs), time_ns,
+                     spec);
+}
+
+int64_t ClampToTenths(TimeNs time_ns, const MapSpec& spec) {
+  return std::clamp(FloorDivide(static_cast<Int128>(time_ns) - spec.epoch_ns, kTenthNs), kInt32Min,
+                    kInt32Max);
+}
+
+int64_t SegmentId(int64_t slot, TimeNs t0_ns, const MapSpec& spec) {
+  const int64_t bias = int64_t{1} << (kSegmentTimeBits - 1);
+  const int64_t ms = FloorDivide(static_cast<Int128>(t0_ns) - spec.epoch_ns, 1'000'000) + bias;
+  return FirstSegmentId(slot) + std::clamp<int64_t>(ms, 0, 2 * bias - 1);
+}
+
+}  // namespace dsg::sqlite

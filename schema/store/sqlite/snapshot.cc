@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+// The small answers of a snapshot: layers, counts, mesh, assets, factors, shapes.
+#include "schema/store/sqlite/snapshot.h"
+
+#include <algorithm>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "schema/codec/proto_convert.h"
+
+namespace dsg::sqlite {
+
+std::shared_ptr<const Snapshot> MakeSnapshot(std::shared_ptr<SqliteMapReader> reader,
+                                             std::shared_ptr<const sqlite::Head> head) {
+  return std::make_shared<const SqliteSnapshot>(std::move(reader), std::move(head));
+}
+
+absl::StatusOr<std::vector<Layer>> SqliteSnapshot::Layers() const {
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  Query query(*lease, "SELECT id, name, rank FROM layer WHERE rev_from <= ?1 ORDER BY rank, name");
+  query.Bind(revision());
+  std::vector<Layer> layers;
+  while (query.Next()) {
+    layers.push_back({static_cast<LayerId>(query.Int(0)), std::string(query.Text(1)),
+                      static_cast<int32_t>(query.Int(2))});
+  }
+  DSG_RETURN_IF_ERROR(query.status());
+  return layers;
+}
+
+absl::StatusOr<Layer> SqliteSnapshot::FindLayer(std::string_view name) const {
+  DSG_ASSIGN_OR_RETURN(const auto layers, Layers());
+  std::vector<std::string> names;
+  for (const Layer& layer : layers) {
+    if (layer.name == name) return layer;
+    names.push_back(layer.name);
+  }
+  return MakeError(Reason::kLayerUnknown,
+                   absl::StrCat("map \"", spec().name, "\" has no layer \"", std::string(name),
+                                "\"; it has ", absl::StrJoin(names, ", ")),
+                   {{"map", spec().name}, {"layer", std::string(name)}});
+}
+
+absl::StatusOr<std::vector<SemanticLabel>> SqliteSnapshot::Labels() const {
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  Query query(*lease,
+              "SELECT id, name, max(rev_from) FROM label WHERE rev_from <= ?1"
+              " GROUP BY id ORDER BY id");
+  query.Bind(revision());
+  std::vector<SemanticLabel> labels;
+  while (query.Next()) {
+    labels.push_back({static_cast<int32_t>(query.Int(0)), std::string(query.Text(1))});
+  }
+  DSG_RETURN_IF_ERROR(query.status());
+  return labels;
+}
+
+absl::StatusOr<MapStats> SqliteSnapshot::Stats() const {
+  MapStats stats;
+  stats.at = head_->info;
+  stats.first_pose_ns = head_->first_pose_ns;
+  stats.last_pose_ns = head_->last_pose_ns;
+  stats.bytes_on_disk = reader_->bytes_on_disk();
+  DSG_ASSIGN_OR_RETURN(const auto layers, Layers());
+  for (const Layer& layer : layers) {
+    const auto count = head_->layer_counts.find(layer.id);
+    stats.layers.push_back({layer, count == head_->layer_counts.end() ? 0 : count->second});
+  }
+  return stats;
+}
+
+absl::StatusOr<std::vector<PoseFactor>> SqliteSnapshot::Factors(NodeId agent, TimeNs from_ns,
+                                                                TimeNs to_ns) const {
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  Query query(*lease,
+              "SELECT rev_from, t0, t1, checksum, payload FROM factor_segment"
+              " WHERE agent = ?1 AND rev_from <= ?2 AND t0 < ?4 AND t1 >= ?3");
+  query.Bind(KeyOf(agent), revision(), from_ns, to_ns);
+  std::vector<PoseFactor> factors;
+  while (query.Next()) {
+    std::vector<PoseFactor> batch;
+    const std::string_view payload = query.Blob(4);
+    if (query.Int(3) !=
+            RowChecksum({KeyOf(agent), query.Int(0), query.Int(1), query.Int(2)}, payload) ||
+        !DecodeFactors(payload, &batch)) {
+      return CorruptRow(spec().name, "factor_segment", ToString(agent));
+    }
+    for (PoseFactor& factor : batch) {
+      if (factor.from_ns < to_ns && factor.to_ns >= from_ns) factors.push_back(std::move(factor));
+    }
+  }
+  DSG_RETURN_IF_ERROR(query.status());
+  std::stable_sort(factors.begin(), factors.end(),
+                   [](const PoseFactor& a, const PoseFactor& b) { return a.from_ns < b.from_ns; });
+  return factors;
+}
+
+absl::StatusOr<std::vector<BodyShape>> SqliteSnapshot::Shapes(NodeId agent, TimeNs from_ns,
+                                                              TimeNs to_ns) const {
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  Query query(*lease,
+              "SELECT rev_from, t0, t1, checksum, payload FROM shape_segment"
+              " WHERE agent = ?1 AND rev_from <= ?2 AND t0 < ?4 AND t1 >= ?3");
+  query.Bind(KeyOf(agent), revision(), from_ns, to_ns);
+  std::vector<BodyShape> shapes;
+  while (query.Next()) {
+    ShapeAppend batch;
+    const std::string_view payload = query.Blob(4);
+    if (query.Int(3) !=
+            RowChecksum({KeyOf(agent), query.Int(0), query.Int(1), query.Int(2)}, payload) ||
+        !DecodeShapes(payload, &batch)) {
+      return CorruptRow(spec().name, "shape_segment", ToString(agent));
+    }
+    for (BodyShape& shape : batch.shapes) {
+      if (shape.time_ns >= from_ns && shape.time_ns < to_ns) shapes.push_back(std::move(shape));
+    }
+  }
+  DSG_RETURN_IF_ERROR(query.status());
+  std::stable_sort(shapes.begin(), shapes.end(),
+                   [](const BodyShape& a, const BodyShape& b) { return a.time_ns < b.time_ns; });
+  return shapes;
+}
+
+absl::StatusOr<std::vector<BlockIndex>> SqliteSnapshot::MeshBlocks() const {
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  Query query(*lease,
+              "SELECT x, y, z FROM mesh_block WHERE rev_from <= ?1"
+              " UNION ALL SELECT x, y, z FROM mesh_block_history"
+              " WHERE rev_from <= ?1 AND rev_to > ?1 ORDER BY 1, 2, 3");
+  query.Bind(revision());
+  std::vector<BlockIndex> blocks;
+  while (query.Next()) {
+    blocks.push_back({static_cast<int32_t>(query.Int(0)), static_cast<int32_t>(query.Int(1)),
+                      static_cast<int32_t>(query.Int(2))});
+  }
+  DSG_RETURN_IF_ERROR(query.status());
+  return blocks;
+}
+
+absl::StatusOr<MeshBlock> SqliteSnapshot::ReadMeshBlock(BlockIndex index) const {
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  Query query(*lease,
+              "SELECT rev_from, checksum, payload FROM mesh_block"
+              " WHERE x = ?1 AND y = ?2 AND z = ?3 AND rev_from <= ?4"
+              " UNION ALL SELECT rev_from, checksum, payload FROM mesh_block_history"
+              " WHERE x = ?1 AND y = ?2 AND z = ?3 AND rev_from <= ?4 AND rev_to > ?4");
+  const bool found = query.Bind(index.x, index.y, index.z, revision()).Next();
+  DSG_RETURN_IF_ERROR(query.status());
+  const std::string key = absl::StrCat(index.x, ",", index.y, ",", index.z);
+  if (!found) {
+    return MakeError(Reason::kNodeUnknown,
+                     absl::StrCat("map \"", spec().name, "\" has no mesh block ", key),
+                     {{"map", spec().name}, {"block", key}});
+  }
+  MeshBlock block;
+  if (query.Int(1) != RowChecksum({index.x, index.y, index.z, query.Int(0)}, query.Blob(2)) ||
+      !DecodeMeshBlock(query.Blob(2), &block)) {
+    return CorruptRow(spec().name, "mesh_block", key);
+  }
+  return block;
+}
+
+absl::StatusOr<Asset> SqliteSnapshot::ReadAsset(const Sha256& sha256) const {
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  Query query(*lease,
+              "SELECT media_type, payload FROM asset WHERE sha256 = ?1 AND rev_from <= ?2"
+              " ORDER BY part");
+  query.Bind(Query::BlobView{{reinterpret_cast<const char*>(sha256.data()), sha256.size()}},
+             revision());
+  Asset asset;
+  asset.sha256 = sha256;
+  bool found = false;
+  while (query.Next()) {
+    found = true;
+    asset.media_type = query.Text(0);
+    asset.content += query.Blob(1);
+  }
+  DSG_RETURN_IF_ERROR(query.status());
+  if (!found) {
+    return MakeError(Reason::kAssetUnknown,
+                     absl::StrCat("map \"", spec().name, "\" has no asset ", ToHex(sha256)),
+                     {{"map", spec().name}, {"asset", ToHex(sha256)}});
+  }
+  if (ComputeSha256(asset.content) != sha256) {
+    return CorruptRow(spec().name, "asset", ToHex(sha256));
+  }
+  return asset;
+}
+
+}  // namespace dsg::sqlite

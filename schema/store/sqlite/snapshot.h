@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+// A snapshot over SQLite. Every statement names the revision and finds its rows in the current or
+// the history table, so that no lock and no long read transaction is needed.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "schema/store/sqlite/map_reader.h"
+
+namespace dsg::sqlite {
+
+class SqliteSnapshot : public Snapshot {
+ public:
+  SqliteSnapshot(std::shared_ptr<SqliteMapReader> reader, std::shared_ptr<const sqlite::Head> head)
+      : reader_(std::move(reader)), head_(std::move(head)) {}
+
+  const MapSpec& spec() const override { return reader_->spec(); }
+  Revision revision() const override { return head_->info.revision; }
+
+  absl::StatusOr<std::vector<Layer>> Layers() const override;
+  absl::StatusOr<Layer> FindLayer(std::string_view name) const override;
+  absl::StatusOr<std::vector<SemanticLabel>> Labels() const override;
+  absl::StatusOr<MapStats> Stats() const override;
+
+  absl::StatusOr<Node> GetNode(NodeId id) const override;
+  absl::StatusOr<NodeId> ResolveNode(std::string_view id_or_name) const override;
+  absl::StatusOr<NodeId> ResolveAgent(std::string_view id_or_name) const override;
+  absl::Status ScanNodes(const NodeFilter& filter, NodeId after, const StopCheck& stop,
+                         const std::function<bool(const Node&)>& visit) const override;
+  absl::Status ScanEdges(const EdgeFilter& filter, const std::optional<EdgeKey>& after,
+                         const StopCheck& stop,
+                         const std::function<bool(const Edge&)>& visit) const override;
+  absl::StatusOr<std::vector<NearestNode>> NearestNodes(const Eigen::Vector3d& point_map, int k,
+                                                        double max_distance_m,
+                                                        const NodeFilter& filter,
+                                                        const StopCheck& stop) const override;
+  absl::StatusOr<std::vector<NodeId>> Ancestors(NodeId id) const override;
+
+  absl::StatusOr<std::vector<TrackInfo>> Tracks() const override;
+  absl::StatusOr<TrackInfo> GetTrack(NodeId agent) const override;
+  absl::StatusOr<LocatedPose> Locate(NodeId agent, TimeNs at_ns) const override;
+  absl::Status ReadPoses(NodeId agent, TimeNs from_ns, TimeNs to_ns, const StopCheck& stop,
+                         const std::function<bool(const TimedPose&)>& visit) const override;
+  absl::StatusOr<std::vector<BoxVisit>> VisitsToBox(const Box3d& box_map, TimeNs from_ns,
+                                                    TimeNs to_ns,
+                                                    const StopCheck& stop) const override;
+  absl::StatusOr<int64_t> CountObservedAgents(TimeNs from_ns, TimeNs to_ns) const override;
+
+  absl::StatusOr<std::optional<Stay>> StayAt(NodeId agent, TimeNs at_ns) const override;
+  absl::StatusOr<std::vector<Stay>> StaysOfAgent(NodeId agent, TimeNs from_ns,
+                                                 TimeNs to_ns) const override;
+  absl::StatusOr<std::vector<Stay>> StaysInNode(NodeId room_or_place, TimeNs from_ns, TimeNs to_ns,
+                                                const StopCheck& stop) const override;
+
+  absl::StatusOr<std::vector<PoseFactor>> Factors(NodeId agent, TimeNs from_ns,
+                                                  TimeNs to_ns) const override;
+  absl::StatusOr<std::vector<BodyShape>> Shapes(NodeId agent, TimeNs from_ns,
+                                                TimeNs to_ns) const override;
+  absl::StatusOr<std::vector<BlockIndex>> MeshBlocks() const override;
+  absl::StatusOr<MeshBlock> ReadMeshBlock(BlockIndex index) const override;
+  absl::StatusOr<Asset> ReadAsset(const Sha256& sha256) const override;
+
+ private:
+  absl::StatusOr<std::vector<NodeId>> IdsNamed(const std::string& name) const;
+  absl::StatusOr<std::vector<NodeId>> ChildrenOf(NodeId parent) const;
+  /// Nodes whose boxes touch, at the head; nullopt when a later revision exists.
+  absl::StatusOr<std::optional<std::vector<NodeId>>> IdsTouching(const Box3d& box_map) const;
+  absl::StatusOr<std::optional<std::vector<NodeId>>> Candidates(const NodeFilter& filter) const;
+  absl::StatusOr<std::vector<Node>> ReadBatch(const NodeFilter& filter, NodeId after) const;
+  absl::StatusOr<std::vector<NearestNode>> NearestByScan(const Eigen::Vector3d& point_map, int k,
+                                                         double max_distance_m,
+                                                         const NodeFilter& filter,
+                                                         const StopCheck& stop) const;
+  absl::StatusOr<std::vector<Edge>> EdgesAt(NodeId end, bool outgoing) const;
+  absl::StatusOr<NodeId> FindParent(NodeId id) const;
+  absl::StatusOr<std::vector<NodeId>> AgentIds() const;
+  /// Segments whose boxes in space and time touch, by agent; ascending ids.
+  absl::StatusOr<std::map<NodeId, std::vector<int64_t>>> SegmentsTouching(const Box3d& box_map,
+                                                                          TimeNs from_ns,
+                                                                          TimeNs to_ns) const;
+  /// Positions around [from_ns, to_ns] of a segment and, joined to it, of the pose before it.
+  absl::Status PositionsAround(const Track& track, size_t segment, TimeNs from_ns, TimeNs to_ns,
+                               std::vector<TimedPosition>* positions) const;
+  /// Poses of a segment that this revision may see.
+  absl::StatusOr<std::vector<StoredPose>> VisiblePoses(const Track& track, size_t segment) const;
+
+  std::shared_ptr<SqliteMapReader> reader_;
+  std::shared_ptr<const sqlite::Head> head_;
+};
+
+/// An open stay ends where the track does; a closed one is as it is.
+Stay ClipToTrack(Stay stay, const TrackInfo& track);
+
+/// Visits of one track's stretch to a box. `positions` ascend in time; neighbours further apart
+/// than `gap_ns_max` are not joined. Appends to `visits`, joining with the last where they touch.
+void CollectVisits(NodeId agent, const std::vector<TimedPosition>& positions, TimeNs gap_ns_max,
+                   const Box3d& box, TimeNs from_ns, TimeNs to_ns, std::vector<BoxVisit>* visits);
+
+}  // namespace dsg::sqlite

@@ -1,0 +1,331 @@
+// SPDX-License-Identifier: Apache-2.0
+// Trajectories and stays of a snapshot.
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "absl/strings/str_cat.h"
+#include "schema/store/sqlite/snapshot.h"
+
+namespace dsg::sqlite {
+namespace {
+
+absl::Status OutsideTrack(const TrackInfo& track, TimeNs at_ns) {
+  const std::string who = track.name.empty()
+                              ? ToString(track.agent)
+                              : absl::StrCat(track.name, " (", ToString(track.agent), ")");
+  if (track.pose_count == 0) {
+    return MakeError(Reason::kTimeOutsideTrack,
+                     absl::StrCat("agent ", who, " has no poses at this revision"),
+                     {{"agent", ToString(track.agent)}});
+  }
+  return MakeError(
+      Reason::kTimeOutsideTrack,
+      absl::StrCat("time ", at_ns, " ns is ", at_ns < track.first_ns ? "before" : "after",
+                   " the track of agent ", who, ", which goes from ", track.first_ns, " to ",
+                   track.last_ns, " ns; ask for a time between these"),
+      {{"agent", ToString(track.agent)},
+       {"at_ns", absl::StrCat(at_ns)},
+       {"first_ns", absl::StrCat(track.first_ns)},
+       {"last_ns", absl::StrCat(track.last_ns)}});
+}
+
+absl::Status CorruptSegment(const std::string& map, const SegmentRef& segment) {
+  return CorruptRow(map, "trajectory_segment", absl::StrCat(segment.id));
+}
+
+absl::Status CheckStop(const StopCheck& stop) { return stop ? stop() : absl::OkStatus(); }
+
+bool ByEnter(const Stay& a, const Stay& b) {
+  return a.enter_ns != b.enter_ns ? a.enter_ns < b.enter_ns : a.agent < b.agent;
+}
+
+}  // namespace
+
+Stay ClipToTrack(Stay stay, const TrackInfo& track) {
+  // One nanosecond past the last pose, so that the half-open stay holds it.
+  if (stay.exit_ns == kTimeMax && track.pose_count > 0) {
+    stay.exit_ns = std::max(stay.enter_ns, track.last_ns) + 1;
+  }
+  return stay;
+}
+
+absl::StatusOr<std::vector<NodeId>> SqliteSnapshot::AgentIds() const {
+  std::vector<NodeId> ids;
+  NodeFilter filter;
+  filter.layer = layers::kAgents;
+  DSG_RETURN_IF_ERROR(ScanNodes(filter, NodeId(), {}, [&](const Node& node) {
+    if (IsAgentKind(node.kind)) ids.push_back(node.id);
+    return true;
+  }));
+  return ids;
+}
+
+absl::StatusOr<std::vector<TrackInfo>> SqliteSnapshot::Tracks() const {
+  DSG_ASSIGN_OR_RETURN(const auto ids, AgentIds());
+  std::vector<TrackInfo> tracks;
+  for (const NodeId id : ids) {
+    DSG_ASSIGN_OR_RETURN(const auto track, reader_->GetTrack(id, revision()));
+    tracks.push_back(track->info);
+  }
+  return tracks;
+}
+
+absl::StatusOr<TrackInfo> SqliteSnapshot::GetTrack(NodeId agent) const {
+  DSG_ASSIGN_OR_RETURN(const auto track, reader_->GetTrack(agent, revision()));
+  return track->info;
+}
+
+absl::StatusOr<LocatedPose> SqliteSnapshot::Locate(NodeId agent, TimeNs at_ns) const {
+  DSG_ASSIGN_OR_RETURN(const auto track, reader_->GetTrack(agent, revision()));
+  const TrackInfo& info = track->info;
+  if (info.pose_count == 0 || at_ns < info.first_ns || at_ns > info.last_ns) {
+    return OutsideTrack(info, at_ns);
+  }
+  const auto at = static_cast<size_t>(track->FindSegment(at_ns));
+  const SegmentRef& segment = track->segments[at];
+  DSG_ASSIGN_OR_RETURN(const auto reader, reader_->GetSegment(segment));
+  int index = 0;
+  StoredPose before;
+  StoredPose after;
+  if (!reader->FindBracket(at_ns, &index, &before, &after) || index < 0) {
+    return CorruptSegment(spec().name, segment);
+  }
+  LocatedPose located;
+  const TrajectoryCodec codec = spec().codec;
+  TimedPose from = FromStored(before, codec);
+  located.before_ns = located.after_ns = from.time_ns;
+  located.flags = from.flags;
+  located.covariance = from.covariance;
+  located.map_T_agent = from.map_T_agent;
+  if (from.time_ns == at_ns) return located;
+  // Past the segment's last pose, visible or stored, the next one begins the next segment.
+  if (before.time_ns >= segment.t1 || index + 1 >= reader->count()) {
+    if (at + 1 >= track->segments.size()) return CorruptSegment(spec().name, segment);
+    const SegmentRef& next = track->segments[at + 1];
+    DSG_ASSIGN_OR_RETURN(const auto next_reader, reader_->GetSegment(next));
+    StoredPose unused;
+    if (!next_reader->FindBracket(next.t0, &index, &after, &unused) || index < 0) {
+      return CorruptSegment(spec().name, next);
+    }
+  }
+  located.after_ns = after.time_ns;
+  if (located.after_ns - located.before_ns > info.gap_ns_max) {
+    located.quality = PoseQuality::kInGap;
+    return located;
+  }
+  const TimedPose to = FromStored(after, codec);
+  const double fraction =
+      static_cast<double>(at_ns - from.time_ns) / static_cast<double>(to.time_ns - from.time_ns);
+  located.quality = PoseQuality::kInterpolated;
+  located.map_T_agent = Interpolate(from.map_T_agent, to.map_T_agent, fraction);
+  located.flags = from.flags | to.flags;
+  if (fraction > 0.5) located.covariance = to.covariance;
+  return located;
+}
+
+absl::StatusOr<std::vector<StoredPose>> SqliteSnapshot::VisiblePoses(const Track& track,
+                                                                     size_t segment) const {
+  const SegmentRef& ref = track.segments[segment];
+  DSG_ASSIGN_OR_RETURN(const auto reader, reader_->GetSegment(ref));
+  std::vector<StoredPose> poses;
+  if (!reader->DecodeAll(&poses)) return CorruptSegment(spec().name, ref);
+  // Poses appended after this revision stand at the end.
+  while (!poses.empty() && poses.back().time_ns > ref.t1) poses.pop_back();
+  return poses;
+}
+
+absl::Status SqliteSnapshot::ReadPoses(NodeId agent, TimeNs from_ns, TimeNs to_ns,
+                                       const StopCheck& stop,
+                                       const std::function<bool(const TimedPose&)>& visit) const {
+  DSG_ASSIGN_OR_RETURN(const auto track, reader_->GetTrack(agent, revision()));
+  const int first = std::max(track->FindSegment(from_ns), 0);
+  for (auto i = static_cast<size_t>(first); i < track->segments.size(); ++i) {
+    if (track->segments[i].t0 >= to_ns) break;
+    DSG_RETURN_IF_ERROR(CheckStop(stop));
+    DSG_ASSIGN_OR_RETURN(const auto poses, VisiblePoses(*track, i));
+    for (const StoredPose& pose : poses) {
+      if (pose.time_ns < from_ns) continue;
+      if (pose.time_ns >= to_ns || !visit(FromStored(pose, spec().codec))) {
+        return absl::OkStatus();
+      }
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::map<NodeId, std::vector<int64_t>>> SqliteSnapshot::SegmentsTouching(
+    const Box3d& box_map, TimeNs from_ns, TimeNs to_ns) const {
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  constexpr double kLimit = 2.1e6;
+  const IntBox box = ToMillimetres(Box3d(box_map.min().cwiseMax(-kLimit).cwiseMin(kLimit),
+                                         box_map.max().cwiseMax(-kLimit).cwiseMin(kLimit)));
+  // Segments that were corrected after this revision are in no index; they are few, and all are
+  // candidates.
+  Query query(*lease,
+              "SELECT agent, id FROM ("
+              " SELECT id FROM segment_box WHERE x1 >= ?1 AND x0 <= ?2 AND y1 >= ?3"
+              "  AND y0 <= ?4 AND z1 >= ?5 AND z0 <= ?6 AND t1 >= ?7 AND t0 <= ?8"
+              " UNION ALL SELECT id FROM trajectory_history"
+              "  WHERE rev_to > ?9 AND +rev_from <= ?9)"
+              " JOIN track ON slot = id >> 42");
+  query.Bind(box.x0, box.x1, box.y0, box.y1, box.z0, box.z1, ClampToTenths(from_ns, spec()),
+             ClampToTenths(to_ns, spec()) + 1, revision());
+  std::map<NodeId, std::vector<int64_t>> segments_of;
+  while (query.Next()) segments_of[IdOf(query.Int(0))].push_back(query.Int(1));
+  DSG_RETURN_IF_ERROR(query.status());
+  for (auto& [agent, ids] : segments_of) std::sort(ids.begin(), ids.end());
+  return segments_of;
+}
+
+absl::Status SqliteSnapshot::PositionsAround(const Track& track, size_t segment, TimeNs from_ns,
+                                             TimeNs to_ns,
+                                             std::vector<TimedPosition>* positions) const {
+  if (segment > 0) {
+    // The way from the pose before belongs to this segment's box.
+    const SegmentRef& previous = track.segments[segment - 1];
+    DSG_ASSIGN_OR_RETURN(const auto reader, reader_->GetSegment(previous));
+    int index = 0;
+    StoredPose last;
+    StoredPose unused;
+    if (!reader->FindBracket(previous.t1, &index, &last, &unused) || index < 0) {
+      return CorruptSegment(spec().name, previous);
+    }
+    positions->push_back({last.time_ns, PositionOf(last, spec().codec)});
+  }
+  const SegmentRef& ref = track.segments[segment];
+  DSG_ASSIGN_OR_RETURN(const auto reader, reader_->GetSegment(ref));
+  const size_t before = positions->size();
+  if (!reader->DecodePositions(from_ns, to_ns, positions)) {
+    return CorruptSegment(spec().name, ref);
+  }
+  // Poses appended after this revision stand at the end.
+  while (positions->size() > before && positions->back().time_ns > ref.t1) positions->pop_back();
+  // Left-out blocks stand between: the pose before must not be joined to what follows them.
+  if (before > 0 && positions->size() > before && (*positions)[before].time_ns != ref.t0) {
+    positions->erase(positions->begin());
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<BoxVisit>> SqliteSnapshot::VisitsToBox(const Box3d& box_map,
+                                                                  TimeNs from_ns, TimeNs to_ns,
+                                                                  const StopCheck& stop) const {
+  DSG_ASSIGN_OR_RETURN(const auto segments_of, SegmentsTouching(box_map, from_ns, to_ns));
+  std::vector<BoxVisit> visits;
+  std::vector<TimedPosition> positions;
+  for (const auto& [agent, ids] : segments_of) {
+    DSG_RETURN_IF_ERROR(CheckStop(stop));
+    const auto found = reader_->GetTrack(agent, revision());
+    // The agent may be newer than this revision.
+    if (absl::IsNotFound(found.status())) continue;
+    DSG_RETURN_IF_ERROR(found.status());
+    const Track& track = **found;
+    for (const int64_t id : ids) {
+      // Segments ascend in time, and so do their ids.
+      const auto at = std::lower_bound(
+          track.segments.begin(), track.segments.end(), id,
+          [](const SegmentRef& segment, int64_t wanted) { return segment.id < wanted; });
+      if (at == track.segments.end() || at->id != id) continue;
+      positions.clear();
+      DSG_RETURN_IF_ERROR(PositionsAround(track, static_cast<size_t>(at - track.segments.begin()),
+                                          from_ns, to_ns, &positions));
+      CollectVisits(agent, positions, track.info.gap_ns_max, box_map, from_ns, to_ns, &visits);
+    }
+  }
+  std::sort(visits.begin(), visits.end(), [](const BoxVisit& a, const BoxVisit& b) {
+    return a.enter_ns != b.enter_ns ? a.enter_ns < b.enter_ns : a.agent < b.agent;
+  });
+  return visits;
+}
+
+absl::StatusOr<int64_t> SqliteSnapshot::CountObservedAgents(TimeNs from_ns, TimeNs to_ns) const {
+  DSG_ASSIGN_OR_RETURN(const auto ids, AgentIds());
+  int64_t count = 0;
+  for (const NodeId id : ids) {
+    DSG_ASSIGN_OR_RETURN(const auto track, reader_->GetTrack(id, revision()));
+    const auto& segments = track->segments;
+    bool observed = false;
+    for (size_t i = 0; i < segments.size() && !observed; ++i) {
+      // A segment is seen from its first to its last pose, and on to the next unless that is a gap.
+      const bool joined =
+          i + 1 < segments.size() && segments[i + 1].t0 - segments[i].t1 <= track->info.gap_ns_max;
+      const TimeNs seen_to = joined ? segments[i + 1].t0 : segments[i].t1;
+      observed = segments[i].t0 < to_ns && seen_to >= from_ns;
+    }
+    if (observed) ++count;
+  }
+  return count;
+}
+
+absl::StatusOr<std::optional<Stay>> SqliteSnapshot::StayAt(NodeId agent, TimeNs at_ns) const {
+  DSG_ASSIGN_OR_RETURN(const auto track, reader_->GetTrack(agent, revision()));
+  const auto next = std::upper_bound(track->stays.begin(), track->stays.end(), at_ns,
+                                     [](TimeNs t, const Stay& stay) { return t < stay.enter_ns; });
+  if (next == track->stays.begin()) return std::optional<Stay>();
+  const Stay stay = ClipToTrack(*(next - 1), track->info);
+  if (at_ns >= stay.exit_ns) return std::optional<Stay>();
+  return std::optional<Stay>(stay);
+}
+
+absl::StatusOr<std::vector<Stay>> SqliteSnapshot::StaysOfAgent(NodeId agent, TimeNs from_ns,
+                                                               TimeNs to_ns) const {
+  DSG_ASSIGN_OR_RETURN(const auto track, reader_->GetTrack(agent, revision()));
+  std::vector<Stay> stays;
+  for (const Stay& stored : track->stays) {
+    const Stay stay = ClipToTrack(stored, track->info);
+    if (stay.enter_ns < to_ns && stay.exit_ns > from_ns) stays.push_back(stay);
+  }
+  return stays;
+}
+
+absl::StatusOr<std::vector<Stay>> SqliteSnapshot::StaysInNode(NodeId room_or_place, TimeNs from_ns,
+                                                              TimeNs to_ns,
+                                                              const StopCheck& stop) const {
+  std::vector<Stay> stays;
+  {
+    DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+    // No stay is longer than an hour, so none that entered earlier can reach from_ns.
+    const TimeNs enter_min = from_ns < kTimeMin + kStayNsMax ? kTimeMin : from_ns - kStayNsMax;
+    for (const char* sql :
+         {"SELECT agent, place, room, enter_ns, exit_ns, rev_from, checksum FROM stay"
+          " WHERE room = ?1 AND enter_ns >= ?2 AND enter_ns < ?3 AND rev_from <= ?4"
+          " UNION ALL SELECT agent, place, room, enter_ns, exit_ns, rev_from, checksum"
+          " FROM stay_history WHERE room = ?1 AND enter_ns >= ?2 AND enter_ns < ?3"
+          " AND +rev_from <= ?4 AND +rev_to > ?4",
+          "SELECT agent, place, room, enter_ns, exit_ns, rev_from, checksum FROM stay"
+          " WHERE place = ?1 AND enter_ns >= ?2 AND enter_ns < ?3 AND rev_from <= ?4"
+          " UNION ALL SELECT agent, place, room, enter_ns, exit_ns, rev_from, checksum"
+          " FROM stay_history WHERE place = ?1 AND enter_ns >= ?2 AND enter_ns < ?3"
+          " AND +rev_from <= ?4 AND +rev_to > ?4"}) {
+      Query query(*lease, sql);
+      query.Bind(KeyOf(room_or_place), enter_min, to_ns, revision());
+      while (query.Next()) {
+        const auto checksum = RowChecksum32(
+            {query.Int(0), query.Int(3), query.Int(4), query.Int(1), query.Int(2), query.Int(5)},
+            "");
+        const NodeId agent = IdOf(query.Int(0));
+        if (checksum != query.Int(6)) {
+          return CorruptRow(spec().name, "stay", absl::StrCat(ToString(agent), " ", query.Int(3)));
+        }
+        stays.push_back(
+            {agent, IdOf(query.Int(1)), IdOf(query.Int(2)), query.Int(3), query.Int(4)});
+      }
+      DSG_RETURN_IF_ERROR(query.status());
+    }
+  }
+  std::vector<Stay> touching;
+  for (const Stay& stored : stays) {
+    DSG_RETURN_IF_ERROR(CheckStop(stop));
+    Stay stay = stored;
+    if (stay.exit_ns == kTimeMax) {
+      DSG_ASSIGN_OR_RETURN(const auto track, reader_->GetTrack(stay.agent, revision()));
+      stay = ClipToTrack(stay, track->info);
+    }
+    if (stay.exit_ns > from_ns) touching.push_back(stay);
+  }
+  std::sort(touching.begin(), touching.end(), ByEnter);
+  return touching;
+}
+
+}  // namespace dsg::sqlite

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+// GraphStore over a folder of SQLite files.
+#include <algorithm>
+#include <filesystem>
+#include <mutex>
+
+#include "absl/strings/str_cat.h"
+#include "schema/base/log.h"
+#include "schema/store/graph_store.h"
+#include "schema/store/sqlite/map_reader.h"
+
+namespace dsg {
+namespace {
+
+namespace fs = std::filesystem;
+
+class SqliteStore : public GraphStore {
+ public:
+  SqliteStore(std::string folder, StoreOptions options)
+      : folder_(std::move(folder)), options_(std::move(options)) {}
+
+  absl::StatusOr<std::vector<MapSpec>> ListMaps() override {
+    std::vector<MapSpec> maps;
+    std::error_code error;
+    for (fs::directory_iterator it(folder_, error), end; !error && it != end; it.increment(error)) {
+      const std::string name = it->path().filename().string();
+      std::error_code missing;
+      if (!IsValidMapName(name) || !fs::exists(sqlite::DatabasePath(folder_, name), missing)) {
+        continue;
+      }
+      const auto db = sqlite::OpenMapFile(folder_, name, sqlite::Database::Mode::kRead);
+      if (!db.ok()) {
+        // One map that this program cannot read must not hide the others.
+        Log(LogLevel::kWarning, "map-skipped",
+            {{"map", name}, {"error", std::string(db.status().message())}});
+        continue;
+      }
+      auto spec = sqlite::ReadMapSpec(**db);
+      if (spec.ok()) maps.push_back(*std::move(spec));
+    }
+    if (error) {
+      return absl::InternalError(
+          absl::StrCat("cannot list store ", folder_, ": ", error.message()));
+    }
+    std::sort(maps.begin(), maps.end(),
+              [](const MapSpec& a, const MapSpec& b) { return a.name < b.name; });
+    return maps;
+  }
+
+  absl::Status CreateMap(const MapSpec& spec) override {
+    return sqlite::CreateMapFile(folder_, spec);
+  }
+
+  absl::StatusOr<std::shared_ptr<MapReader>> OpenMap(const std::string& name) override {
+    DSG_ASSIGN_OR_RETURN(auto reader,
+                         sqlite::SqliteMapReader::Open(folder_, name, options_.cache_bytes));
+    return std::shared_ptr<MapReader>(std::move(reader));
+  }
+
+  absl::StatusOr<std::unique_ptr<GraphWriter>> OpenWriter(const std::string& name) override {
+    DSG_ASSIGN_OR_RETURN(auto writer, sqlite::SqliteWriter::Open(folder_, name, options_.program));
+    return std::unique_ptr<GraphWriter>(std::move(writer));
+  }
+
+ private:
+  std::string folder_;
+  StoreOptions options_;
+};
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<GraphStore>> GraphStore::Open(const std::string& folder,
+                                                             const StoreOptions& options) {
+  std::error_code error;
+  if (options.create) fs::create_directories(folder, error);
+  if (!fs::is_directory(folder, error)) {
+    return MakeError(Reason::kMapUnknown,
+                     absl::StrCat("store folder \"", folder, "\" ",
+                                  options.create ? "cannot be made" : "does not exist"),
+                     {{"store", folder}});
+  }
+  // SQLite wants one spelling of a path; a link may also lead to a network file system.
+  const std::string canonical = fs::canonical(folder, error).string();
+  if (error) {
+    return absl::InternalError(absl::StrCat("cannot resolve ", folder, ": ", error.message()));
+  }
+  DSG_RETURN_IF_ERROR(sqlite::CheckFileSystem(canonical));
+  return std::unique_ptr<GraphStore>(std::make_unique<SqliteStore>(canonical, options));
+}
+
+}  // namespace dsg

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "schema/store/sqlite/track_cache.h"
+
+#include <algorithm>
+
+#include "absl/strings/str_cat.h"
+#include "schema/codec/proto_convert.h"
+#include "schema/store/sqlite/rows.h"
+
+namespace dsg::sqlite {
+namespace {
+
+absl::Status UnknownAgent(const std::string& map, NodeId agent) {
+  return MakeError(Reason::kAgentUnknown,
+                   absl::StrCat("agent ", ToString(agent), " is unknown in map \"", map,
+                                "\"; `dsg ls --layer agents` lists the known ones"),
+                   {{"map", map}, {"agent", ToString(agent)}});
+}
+
+absl::Status LoadInfo(Database& db, Revision revision, NodeId agent, Track* track) {
+  Query query(db,
+              "SELECT rev_from, layer, payload, checksum FROM node"
+              " WHERE key = ?1 AND rev_from <= ?2"
+              " UNION ALL SELECT rev_from, layer, payload, checksum FROM node_history"
+              " WHERE key = ?1 AND rev_from <= ?2 AND rev_to > ?2");
+  const bool found = query.Bind(KeyOf(agent), revision).Next();
+  DSG_RETURN_IF_ERROR(query.status());
+  Node node;
+  if (found) {
+    const auto checksum = RowChecksum({KeyOf(agent), query.Int(0), query.Int(1)}, query.Blob(2));
+    if (checksum != query.Int(3) || !DecodeNodePayload(query.Blob(2), &node)) {
+      return CorruptRow(db.map_name(), "node", ToString(agent));
+    }
+  }
+  if (!found || !IsAgentKind(node.kind)) return UnknownAgent(db.map_name(), agent);
+  track->info.name = node.name;
+  track->info.kind = node.kind;
+  if (node.agent.has_value() && node.agent->gap_ns_max > 0) {
+    track->info.gap_ns_max = node.agent->gap_ns_max;
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<int64_t> FindSlot(Database& db, NodeId agent) {
+  Query query(db, "SELECT slot FROM track WHERE agent = ?1");
+  const bool found = query.Bind(KeyOf(agent)).Next();
+  DSG_RETURN_IF_ERROR(query.status());
+  return found ? query.Int(0) : 0;
+}
+
+absl::Status LoadSegments(Database& db, Revision revision, int64_t slot, Track* track) {
+  TimeNs end_ns = kTimeMin;
+  {
+    Query mark(db,
+               "SELECT last_ns, pose_count FROM track_mark WHERE slot = ?1 AND revision <= ?2"
+               " ORDER BY revision DESC LIMIT 1");
+    if (mark.Bind(slot, revision).Next()) {
+      end_ns = mark.Int(0);
+      track->info.pose_count = mark.Int(1);
+    }
+    DSG_RETURN_IF_ERROR(mark.status());
+  }
+  Query query(db,
+              "SELECT id, rev_from, t0, t1, pose_count FROM trajectory_segment"
+              " WHERE id BETWEEN ?1 AND ?2 AND rev_from <= ?3"
+              " UNION ALL SELECT id, rev_from, t0, t1, pose_count FROM trajectory_history"
+              " WHERE id BETWEEN ?1 AND ?2 AND rev_from <= ?3 AND rev_to > ?3");
+  query.Bind(FirstSegmentId(slot), LastSegmentId(slot), revision);
+  while (query.Next()) {
+    const SegmentRef segment{query.Int(0), query.Int(1), query.Int(2),
+                             std::min(query.Int(3), end_ns), query.Int(4)};
+    // Appended after this revision.
+    if (segment.t0 > end_ns) continue;
+    track->segments.push_back(segment);
+  }
+  DSG_RETURN_IF_ERROR(query.status());
+  std::sort(track->segments.begin(), track->segments.end(),
+            [](const SegmentRef& a, const SegmentRef& b) { return a.id < b.id; });
+  if (!track->segments.empty()) {
+    track->info.first_ns = track->segments.front().t0;
+    track->info.last_ns = end_ns;
+  }
+  return absl::OkStatus();
+}
+
+absl::Status LoadStays(Database& db, Revision revision, NodeId agent, Track* track) {
+  Query query(db,
+              "SELECT enter_ns, exit_ns, place, room, rev_from, checksum FROM stay"
+              " WHERE agent = ?1 AND rev_from <= ?2"
+              " UNION ALL SELECT enter_ns, exit_ns, place, room, rev_from, checksum"
+              " FROM stay_history WHERE agent = ?1 AND rev_from <= ?2 AND rev_to > ?2");
+  query.Bind(KeyOf(agent), revision);
+  while (query.Next()) {
+    const auto checksum = RowChecksum32(
+        {KeyOf(agent), query.Int(0), query.Int(1), query.Int(2), query.Int(3), query.Int(4)}, "");
+    if (checksum != query.Int(5)) {
+      return CorruptRow(db.map_name(), "stay", absl::StrCat(ToString(agent), " ", query.Int(0)));
+    }
+    track->stays.push_back(
+        {agent, IdOf(query.Int(2)), IdOf(query.Int(3)), query.Int(0), query.Int(1)});
+  }
+  DSG_RETURN_IF_ERROR(query.status());
+  std::sort(track->stays.begin(), track->stays.end(),
+            [](const Stay& a, const Stay& b) { return a.enter_ns < b.enter_ns; });
+  return absl::OkStatus();
+}
+
+absl::Status LoadAll(Database& db, NodeId agent, Revision revision, Track* track) {
+  DSG_RETURN_IF_ERROR(LoadInfo(db, revision, agent, track));
+  DSG_ASSIGN_OR_RETURN(const int64_t slot, FindSlot(db, agent));
+  if (slot != 0) DSG_RETURN_IF_ERROR(LoadSegments(db, revision, slot, track));
+  return LoadStays(db, revision, agent, track);
+}
+
+}  // namespace
+
+int Track::FindSegment(TimeNs t_ns) const {
+  const auto next =
+      std::upper_bound(segments.begin(), segments.end(), t_ns,
+                       [](TimeNs t, const SegmentRef& segment) { return t < segment.t0; });
+  return static_cast<int>(next - segments.begin()) - 1;
+}
+
+absl::StatusOr<std::shared_ptr<const Track>> LoadTrack(Database& db, const MapSpec& spec,
+                                                       NodeId agent, Revision revision) {
+  auto track = std::make_shared<Track>();
+  track->info.agent = agent;
+  track->info.gap_ns_max = spec.gap_ns_max;
+  // One transaction, so that a commit in between cannot move a segment to the history unseen.
+  DSG_RETURN_IF_ERROR(db.Execute("BEGIN"));
+  const absl::Status loaded = LoadAll(db, agent, revision, track.get());
+  // Nothing was written; after a bad page SQLite has ended the transaction itself.
+  db.Execute("ROLLBACK").IgnoreError();
+  DSG_RETURN_IF_ERROR(loaded);
+  return std::shared_ptr<const Track>(std::move(track));
+}
+
+absl::StatusOr<Revision> LastChangeOfTrack(Database& db, NodeId agent) {
+  Query query(db,
+              "SELECT max(rev) FROM ("
+              " SELECT rev_from AS rev FROM node WHERE key = ?1"
+              " UNION ALL SELECT max(revision) FROM track_mark"
+              "  WHERE slot = (SELECT slot FROM track WHERE agent = ?1)"
+              " UNION ALL SELECT max(rev_to) FROM stay_history WHERE agent = ?1"
+              " UNION ALL SELECT max(rev_from) FROM stay WHERE agent = ?1)");
+  query.Bind(KeyOf(agent));
+  const bool found = query.Next() && !query.IsNull(0);
+  DSG_RETURN_IF_ERROR(query.status());
+  return found ? query.Int(0) : kRevisionMax;
+}
+
+absl::StatusOr<std::shared_ptr<const SegmentReader>> LoadSegment(Database& db,
+                                                                 const SegmentRef& segment) {
+  Query query(db,
+              "SELECT t0, t1, pose_count, checksum, payload FROM trajectory_segment"
+              " WHERE id = ?1 AND rev_from = ?2"
+              " UNION ALL SELECT t0, t1, pose_count, checksum, payload FROM trajectory_history"
+              " WHERE id = ?1 AND rev_from = ?2");
+  const bool found = query.Bind(segment.id, segment.rev_from).Next();
+  DSG_RETURN_IF_ERROR(query.status());
+  std::shared_ptr<const SegmentReader> reader;
+  if (found) {
+    std::string payload(query.Blob(4));
+    const auto checksum = RowChecksum(
+        {segment.id, segment.rev_from, query.Int(0), query.Int(1), query.Int(2)}, payload);
+    if (checksum == query.Int(3)) reader = SegmentReader::Parse(std::move(payload));
+  }
+  if (reader == nullptr || reader->count() < segment.pose_count) {
+    return CorruptRow(db.map_name(), "trajectory_segment", absl::StrCat(segment.id));
+  }
+  return reader;
+}
+
+}  // namespace dsg::sqlite

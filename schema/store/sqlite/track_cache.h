@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tracks as of a revision: which segments they are made of, and the stays along them.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "schema/codec/trajectory_codec.h"
+#include "schema/store/snapshot.h"
+#include "schema/store/sqlite/database.h"
+#include "schema/store/sqlite/lru_cache.h"
+
+namespace dsg::sqlite {
+
+/// One segment of a track, as a reader at the track's revision may see it.
+struct SegmentRef {
+  int64_t id = 0;
+  Revision rev_from = 0;
+  TimeNs t0 = 0;
+  /// Of the last visible pose.
+  TimeNs t1 = 0;
+  /// Poses that the row must hold at least.
+  int64_t pose_count = 0;
+};
+
+/// An agent's track as of one revision. Immutable.
+struct Track {
+  TrackInfo info;
+  /// Ascending in time and in id.
+  std::vector<SegmentRef> segments;
+  /// Ascending by enter_ns; open ends are left open.
+  std::vector<Stay> stays;
+
+  /// Index of the last segment with t0 <= t; -1 if none.
+  int FindSegment(TimeNs t_ns) const;
+  size_t memory_bytes() const {
+    return sizeof(*this) + segments.capacity() * sizeof(SegmentRef) +
+           stays.capacity() * sizeof(Stay);
+  }
+};
+
+/// Reads a track as of `revision` in one read transaction.
+/// Errors: NOT_FOUND/AGENT_UNKNOWN.
+absl::StatusOr<std::shared_ptr<const Track>> LoadTrack(Database& db, const MapSpec& spec,
+                                                       NodeId agent, Revision revision);
+
+/// The newest revision in which the agent's node, poses or stays changed, at the head.
+absl::StatusOr<Revision> LastChangeOfTrack(Database& db, NodeId agent);
+
+/// Reads and checks one segment, whether it is current or was corrected since.
+absl::StatusOr<std::shared_ptr<const SegmentReader>> LoadSegment(Database& db,
+                                                                 const SegmentRef& segment);
+
+struct TrackKey {
+  NodeId agent;
+  Revision revision;
+  bool operator==(const TrackKey&) const = default;
+};
+struct SegmentKey {
+  int64_t id;
+  Revision rev_from;
+  int64_t pose_count;
+  bool operator==(const SegmentKey&) const = default;
+};
+struct PairHash {
+  static size_t Mix(uint64_t a, uint64_t b) {
+    return static_cast<size_t>((a * 0x9e3779b97f4a7c15ull ^ b) * 0xff51afd7ed558ccdull);
+  }
+  size_t operator()(const TrackKey& key) const {
+    return Mix(key.agent.value, static_cast<uint64_t>(key.revision));
+  }
+  size_t operator()(const SegmentKey& key) const {
+    return Mix(static_cast<uint64_t>(key.id), static_cast<uint64_t>(key.rev_from)) ^
+           static_cast<size_t>(key.pose_count);
+  }
+};
+
+using TrackCache = LruCache<TrackKey, Track, PairHash>;
+using SegmentCache = LruCache<SegmentKey, SegmentReader, PairHash>;
+using AncestorCache = LruCache<TrackKey, std::vector<NodeId>, PairHash>;
+
+}  // namespace dsg::sqlite

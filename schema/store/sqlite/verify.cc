@@ -1,0 +1,319 @@
+// SPDX-License-Identifier: Apache-2.0
+// Reads a whole map: SQLite's structure, every checksum, and the digest of every revision,
+// re-derived from rows and the revisions at which they came and went.
+#include <algorithm>
+#include <map>
+
+#include "absl/strings/str_cat.h"
+#include "schema/codec/proto_convert.h"
+#include "schema/store/sqlite/log_check.h"
+#include "schema/store/sqlite/map_reader.h"
+#include "schema/store/sqlite/rows.h"
+
+namespace dsg::sqlite {
+namespace {
+
+// A damaged map may have millions of bad rows; the first ones say enough.
+constexpr size_t kProblemsMax = 100;
+
+class Verifier {
+ public:
+  Verifier(Database& db, const MapSpec& spec, const std::function<void(double)>& progress)
+      : db_(db), spec_(spec), progress_(progress) {}
+
+  absl::StatusOr<VerifyReport> Run() {
+    // One snapshot of everything; a writer may go on meanwhile.
+    DSG_RETURN_IF_ERROR(db_.Execute("BEGIN"));
+    using Step = void (Verifier::*)();
+    const Step steps[] = {&Verifier::CheckStructure, &Verifier::CheckNodes,
+                          &Verifier::CheckEdges,     &Verifier::CheckStays,
+                          &Verifier::CheckTracks,    &Verifier::CheckBatches,
+                          &Verifier::CheckMesh,      &Verifier::CheckAssets,
+                          &Verifier::CheckLayers,    &Verifier::CheckRevisions};
+    double done = 0.0;
+    for (const Step step : steps) {
+      if (progress_) progress_(done / std::size(steps));
+      (this->*step)();
+      done += 1.0;
+    }
+    if (progress_) progress_(1.0);
+    db_.Execute("COMMIT").IgnoreError();
+    return std::move(report_);
+  }
+
+ private:
+  void Problem(std::string text) {
+    if (report_.problems.size() < kProblemsMax) report_.problems.push_back(std::move(text));
+  }
+  void BadRow(std::string_view table, const std::string& key) {
+    Problem(absl::StrCat("table ", std::string(table), ", row ", key,
+                         ": the bytes are not what was written"));
+  }
+  // A statement that fails has met a page that SQLite itself cannot read.
+  void Finish(const Query& query, std::string_view table) {
+    if (!query.status().ok()) {
+      Problem(
+          absl::StrCat("table ", std::string(table), ": ", std::string(query.status().message())));
+    }
+  }
+  void Count(const std::string& identity, Revision from, Revision to) {
+    changes_[from].Add(identity);
+    if (to != kRevisionMax) changes_[to].Remove(identity);
+    ++report_.row_count;
+  }
+
+  void CheckStructure() {
+    if (const auto damage = FindLogDamage(db_.path() + "-wal")) Problem(*damage);
+    Query query(db_, "PRAGMA quick_check(20)");
+    while (query.Next()) {
+      if (query.Text(0) != "ok") Problem(absl::StrCat("database: ", std::string(query.Text(0))));
+    }
+    Finish(query, "database");
+    for (const char* sql : {"SELECT rtreecheck('segment_box')", "SELECT rtreecheck('node_box')"}) {
+      Query check(db_, sql);
+      if (check.Next() && check.Text(0) != "ok") Problem(std::string(check.Text(0)));
+      Finish(check, "R*Tree");
+    }
+  }
+
+  void CheckNodes() {
+    Query query(db_,
+                "SELECT key, rev_from, layer, payload, checksum, name, 9223372036854775807"
+                " FROM node UNION ALL"
+                " SELECT key, rev_from, layer, payload, checksum, name, rev_to FROM node_history");
+    while (query.Next()) {
+      const std::initializer_list<int64_t> columns = {query.Int(0), query.Int(1), query.Int(2)};
+      Node node;
+      const bool sound = query.Int(4) == RowChecksum(columns, query.Blob(3)) &&
+                         DecodeNodePayload(query.Blob(3), &node) && node.name == query.Text(5);
+      if (!sound) BadRow("node", ToString(IdOf(query.Int(0))));
+      Count(RowIdentity('N', columns, query.Blob(3)), query.Int(1), query.Int(6));
+    }
+    Finish(query, "node");
+  }
+
+  void CheckEdges() {
+    Query query(db_,
+                "SELECT source, relation, target, rev_from, weight, payload, checksum,"
+                " 9223372036854775807 FROM edge UNION ALL"
+                " SELECT source, relation, target, rev_from, weight, payload, checksum, rev_to"
+                " FROM edge_history");
+    while (query.Next()) {
+      const std::initializer_list<int64_t> columns = {query.Int(0), query.Int(1), query.Int(2),
+                                                      query.Int(3), BitsOf(query.Real(4))};
+      if (query.Int(6) != RowChecksum32(columns, query.Blob(5))) {
+        BadRow("edge",
+               absl::StrCat(ToString(IdOf(query.Int(0))), " ", ToString(IdOf(query.Int(2)))));
+      }
+      Count(RowIdentity('E', columns, query.Blob(5)), query.Int(3), query.Int(7));
+    }
+    Finish(query, "edge");
+    Query ends(db_,
+               "SELECT source, target FROM edge"
+               " WHERE source NOT IN (SELECT key FROM node)"
+               " OR target NOT IN (SELECT key FROM node)");
+    while (ends.Next()) {
+      Problem(absl::StrCat("edge ", ToString(IdOf(ends.Int(0))), " ", ToString(IdOf(ends.Int(1))),
+                           ": an end does not exist"));
+    }
+    Finish(ends, "edge");
+  }
+
+  void CheckStays() {
+    Query query(db_,
+                "SELECT agent, enter_ns, exit_ns, place, room, rev_from, checksum,"
+                " 9223372036854775807 FROM stay UNION ALL"
+                " SELECT agent, enter_ns, exit_ns, place, room, rev_from, checksum, rev_to"
+                " FROM stay_history");
+    while (query.Next()) {
+      const std::initializer_list<int64_t> columns = {query.Int(0), query.Int(1), query.Int(2),
+                                                      query.Int(3), query.Int(4), query.Int(5)};
+      if (query.Int(6) != RowChecksum32(columns, "")) {
+        BadRow("stay", absl::StrCat(ToString(IdOf(query.Int(0))), " ", query.Int(1)));
+      }
+      Count(RowIdentity('S', columns, ""), query.Int(5), query.Int(7));
+    }
+    Finish(query, "stay");
+  }
+
+  void CheckTracks() {
+    std::map<int64_t, NodeId> agent_of;
+    Query tracks(db_, "SELECT slot, agent FROM track");
+    while (tracks.Next()) agent_of[tracks.Int(0)] = IdOf(tracks.Int(1));
+    Finish(tracks, "track");
+    Query query(db_,
+                "SELECT id, rev_from, t0, t1, pose_count, checksum, payload, 9223372036854775807"
+                " FROM trajectory_segment UNION ALL"
+                " SELECT id, rev_from, t0, t1, pose_count, checksum, payload, rev_to"
+                " FROM trajectory_history");
+    while (query.Next()) {
+      const int64_t slot = SlotOfSegment(query.Int(0));
+      const std::string payload(query.Blob(6));
+      const auto checksum = RowChecksum(
+          {query.Int(0), query.Int(1), query.Int(2), query.Int(3), query.Int(4)}, payload);
+      const auto reader = SegmentReader::Parse(payload);
+      std::vector<StoredPose> poses;
+      if (checksum != query.Int(5) || reader == nullptr || !reader->DecodeAll(&poses) ||
+          !agent_of.contains(slot)) {
+        BadRow("trajectory_segment", absl::StrCat(query.Int(0)));
+        continue;
+      }
+      ++report_.row_count;
+      CountPoses(agent_of[slot], slot, poses, query.Int(1), query.Int(7));
+    }
+    Finish(query, "trajectory_segment");
+    Query boxes(db_,
+                "SELECT (SELECT count(*) FROM segment_box) ="
+                " (SELECT count(*) FROM trajectory_segment)");
+    if (boxes.Next() && boxes.Int(0) == 0) Problem("segment_box: not one box for each segment");
+    Finish(boxes, "segment_box");
+  }
+
+  // A pose came with the first mark that reaches it, but not before its segment.
+  void CountPoses(NodeId agent, int64_t slot, const std::vector<StoredPose>& poses,
+                  Revision rev_from, Revision rev_to) {
+    std::vector<std::pair<Revision, TimeNs>> marks;
+    Query query(db_,
+                "SELECT revision, last_ns FROM track_mark WHERE slot = ?1 AND revision >= ?2"
+                " ORDER BY revision");
+    query.Bind(slot, rev_from);
+    while (query.Next()) {
+      marks.emplace_back(query.Int(0), query.Int(1));
+      if (query.Int(1) >= poses.back().time_ns) break;
+    }
+    Finish(query, "track_mark");
+    size_t mark = 0;
+    std::string scratch;
+    for (const StoredPose& pose : poses) {
+      while (mark < marks.size() && marks[mark].second < pose.time_ns) ++mark;
+      if (mark == marks.size()) {
+        Problem(absl::StrCat("track of ", ToString(agent), ": no mark reaches the pose at ",
+                             pose.time_ns, " ns"));
+        return;
+      }
+      const auto identity = PoseIdentity(agent, pose, spec_.codec, &scratch);
+      changes_[marks[mark].first].Add(identity);
+      if (rev_to != kRevisionMax) changes_[rev_to].Remove(identity);
+      ++report_.pose_count;
+    }
+  }
+
+  void CheckBatches() {
+    for (const auto& [sql, table, name] :
+         {std::make_tuple("SELECT agent, rev_from, t0, t1, checksum, payload FROM factor_segment",
+                          'F', "factor_segment"),
+          std::make_tuple("SELECT agent, rev_from, t0, t1, checksum, payload FROM shape_segment",
+                          'H', "shape_segment")}) {
+      Query query(db_, sql);
+      while (query.Next()) {
+        const std::initializer_list<int64_t> columns = {query.Int(0), query.Int(1), query.Int(2),
+                                                        query.Int(3)};
+        if (query.Int(4) != RowChecksum(columns, query.Blob(5))) {
+          BadRow(name, ToString(IdOf(query.Int(0))));
+        }
+        Count(RowIdentity(table, columns, query.Blob(5)), query.Int(1), kRevisionMax);
+      }
+      Finish(query, name);
+    }
+  }
+
+  void CheckMesh() {
+    Query query(db_,
+                "SELECT x, y, z, rev_from, checksum, payload, 9223372036854775807 FROM mesh_block"
+                " UNION ALL SELECT x, y, z, rev_from, checksum, payload, rev_to"
+                " FROM mesh_block_history");
+    while (query.Next()) {
+      const std::initializer_list<int64_t> columns = {query.Int(0), query.Int(1), query.Int(2),
+                                                      query.Int(3)};
+      if (query.Int(4) != RowChecksum(columns, query.Blob(5))) {
+        BadRow("mesh_block", absl::StrCat(query.Int(0), ",", query.Int(1), ",", query.Int(2)));
+      }
+      Count(RowIdentity('M', columns, query.Blob(5)), query.Int(3), query.Int(6));
+    }
+    Finish(query, "mesh_block");
+  }
+
+  void CheckAssets() {
+    Query query(db_,
+                "SELECT sha256, part, rev_from, checksum, payload FROM asset"
+                " ORDER BY sha256, part");
+    while (query.Next()) {
+      if (query.Int(3) != Checksum(query.Blob(4), static_cast<uint64_t>(query.Int(1)))) {
+        BadRow("asset", absl::StrCat(query.Int(1)));
+      }
+      if (query.Int(1) == 0) {
+        Count(RowIdentity('A', {query.Int(2)}, query.Blob(0)), query.Int(2), kRevisionMax);
+      }
+    }
+    Finish(query, "asset");
+  }
+
+  void CheckLayers() {
+    Query layers(db_, "SELECT id, rank, rev_from, name FROM layer WHERE rev_from > 0");
+    while (layers.Next()) {
+      Count(RowIdentity('L', {layers.Int(0), layers.Int(1), layers.Int(2)}, layers.Text(3)),
+            layers.Int(2), kRevisionMax);
+    }
+    Finish(layers, "layer");
+    Query labels(db_, "SELECT id, rev_from, name FROM label");
+    while (labels.Next()) {
+      Count(RowIdentity('l', {labels.Int(0), labels.Int(1)}, labels.Text(2)), labels.Int(1),
+            kRevisionMax);
+    }
+    Finish(labels, "label");
+  }
+
+  void CheckRevisions() {
+    Query query(db_, "SELECT " DSG_REVISION_COLUMNS " FROM revision ORDER BY revision");
+    ContentDigest content;
+    Sha256 parent{};
+    Revision expected = 1;
+    while (query.Next()) {
+      const auto head = HeadFromRow(query, spec_.name);
+      if (!head.ok()) {
+        Problem(std::string(head.status().message()));
+        continue;
+      }
+      const RevisionInfo& info = head->info;
+      if (info.revision != expected) {
+        Problem(absl::StrCat("revision ", expected, " is missing"));
+      }
+      if (const auto change = changes_.find(info.revision); change != changes_.end()) {
+        content += change->second;
+        changes_.erase(change);
+      }
+      if (!(content == head->content)) {
+        Problem(absl::StrCat("revision ", info.revision,
+                             ": its rows do not add up to its content digest"));
+        // Report each break once: go on from what the revision says.
+        content = head->content;
+      }
+      if (DigestOf(parent, *head) != info.digest) {
+        Problem(absl::StrCat("revision ", info.revision, ": its digest does not follow"));
+      }
+      parent = info.digest;
+      expected = info.revision + 1;
+      ++report_.revision_count;
+    }
+    Finish(query, "revision");
+    for (const auto& [revision, unused] : changes_) {
+      Problem(absl::StrCat("rows name revision ", revision, ", which does not exist"));
+    }
+  }
+
+  Database& db_;
+  const MapSpec& spec_;
+  const std::function<void(double)>& progress_;
+  VerifyReport report_;
+  /// What each revision added to and took from the content digest.
+  std::map<Revision, ContentDigest> changes_;
+};
+
+}  // namespace
+
+absl::StatusOr<VerifyReport> VerifyMap(Database& db, const MapSpec& spec,
+                                       const std::function<void(double)>& progress) {
+  return Verifier(db, spec, progress).Run();
+}
+
+}  // namespace dsg::sqlite

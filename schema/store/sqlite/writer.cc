@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "schema/store/sqlite/writer.h"
+
+#include "absl/strings/str_cat.h"
+#include "schema/base/time.h"
+#include "schema/model/delta_check.h"
+#include "schema/store/sqlite/delta_lookup.h"
+
+namespace dsg::sqlite {
+namespace {
+
+// The log is copied back when it has grown to 16 MiB: often enough for short reads, seldom enough
+// that commits do not wait for it.
+constexpr int kCheckpointPages = 4096;
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<SqliteWriter>> SqliteWriter::Open(const std::string& store_folder,
+                                                                 const std::string& map,
+                                                                 const std::string& program) {
+  std::unique_ptr<SqliteWriter> writer(new SqliteWriter(store_folder, map));
+  // Look before locking, so that asking for a map that is not there leaves nothing behind.
+  DSG_RETURN_IF_ERROR(OpenMapFile(store_folder, map, Database::Mode::kRead).status());
+  DSG_ASSIGN_OR_RETURN(writer->lock_, WriterLock::Acquire(store_folder, map, program));
+  DSG_RETURN_IF_ERROR(writer->Reopen());
+  return writer;
+}
+
+SqliteWriter::~SqliteWriter() {
+  if (db_ != nullptr) db_->Checkpoint(/*truncate=*/true);
+}
+
+absl::Status SqliteWriter::Reopen() {
+  tracks_.Forget();
+  db_.reset();
+  DSG_ASSIGN_OR_RETURN(db_, OpenMapFile(store_folder_, map_, Database::Mode::kWrite));
+  DSG_ASSIGN_OR_RETURN(spec_, ReadMapSpec(*db_));
+  DSG_ASSIGN_OR_RETURN(head_, LoadHead(*db_));
+  return absl::OkStatus();
+}
+
+absl::StatusOr<SessionState> SqliteWriter::GetSession(const std::string& session_id) {
+  if (db_ == nullptr) DSG_RETURN_IF_ERROR(Reopen());
+  return ReadSession(*db_, session_id);
+}
+
+absl::StatusOr<std::optional<CommitResult>> SqliteWriter::FindReplay(const GraphDelta& delta) {
+  Query query(*db_, "SELECT revision FROM revision WHERE session_id = ?1 AND sequence = ?2");
+  const bool found = query.Bind(delta.session_id, delta.sequence).Next();
+  DSG_RETURN_IF_ERROR(query.status());
+  if (!found) return std::optional<CommitResult>();
+  return std::optional<CommitResult>(CommitResult{query.Int(0), true});
+}
+
+// A missing number means that a delta was lost on its way: what follows may build on it.
+absl::Status SqliteWriter::CheckSequence(const GraphDelta& delta) {
+  DSG_ASSIGN_OR_RETURN(const SessionState session, ReadSession(*db_, delta.session_id));
+  if (delta.sequence <= session.last_sequence + 1) return absl::OkStatus();
+  return MakeError(
+      Reason::kSequenceGap,
+      absl::StrCat("session ", delta.session_id, " of map \"", map_, "\" is at sequence ",
+                   session.last_sequence, ", so the next is ", session.last_sequence + 1, ", not ",
+                   delta.sequence, "; send the missing deltas first"),
+      {{"map", map_},
+       {"session_id", delta.session_id},
+       {"last_sequence", absl::StrCat(session.last_sequence)}});
+}
+
+absl::StatusOr<CommitResult> SqliteWriter::Commit(GraphDelta delta) {
+  if (db_ == nullptr) DSG_RETURN_IF_ERROR(Reopen());
+  DSG_ASSIGN_OR_RETURN(const auto replay, FindReplay(delta));
+  if (replay.has_value()) return *replay;
+  DSG_RETURN_IF_ERROR(CheckSequence(delta));
+  if (delta.parent_revision.has_value() && *delta.parent_revision != head_.info.revision) {
+    return MakeError(Reason::kParentRevisionStale,
+                     absl::StrCat("map \"", map_, "\" is at revision ", head_.info.revision,
+                                  ", not at the delta's parent ", *delta.parent_revision,
+                                  "; read the head again and rebuild the delta"),
+                     {{"map", map_}, {"head", absl::StrCat(head_.info.revision)}});
+  }
+  if (!delta.map.empty() && delta.map != map_) {
+    return MakeError(Reason::kDeltaInvalid,
+                     absl::StrCat("delta refused: it is for map \"", delta.map,
+                                  "\" and was sent to map \"", map_, "\""),
+                     {{"map", map_}});
+  }
+  Coalesce(&delta);
+  DSG_RETURN_IF_ERROR(CheckDelta(delta, DeltaLookup(db_.get())));
+  DSG_RETURN_IF_ERROR(db_->Execute("BEGIN IMMEDIATE"));
+  CommitContext commit{*db_, spec_, head_};
+  const absl::Status applied = Apply(delta, &commit);
+  if (!applied.ok()) {
+    // SQLite may have rolled back already; then this one has nothing to do.
+    db_->Execute("ROLLBACK").IgnoreError();
+    tracks_.Forget();
+    return applied;
+  }
+  const absl::Status committed = db_->Execute("COMMIT");
+  if (!committed.ok()) return Settle(delta, committed);
+  head_ = commit.head;
+  if (db_->wal_pages() > kCheckpointPages) db_->Checkpoint(/*truncate=*/false);
+  return CommitResult{head_.info.revision, false};
+}
+
+absl::Status SqliteWriter::Apply(const GraphDelta& delta, CommitContext* commit) {
+  RevisionInfo& info = commit->head.info;
+  const Sha256 parent = info.digest;
+  ++info.revision;
+  info.committed_ns = WallClockNs();
+  info.author = delta.author;
+  info.message = delta.message;
+  info.session_id = delta.session_id;
+  info.sequence = delta.sequence;
+  info.config_digest = delta.config_digest;
+  DSG_RETURN_IF_ERROR(WriteAssets(delta.assets, commit));
+  for (const Retirement& item : delta.retirements) {
+    if (item.valid_to_ns.has_value()) continue;
+    DSG_RETURN_IF_ERROR(tracks_.End(item.id, commit));
+    DSG_RETURN_IF_ERROR(EndStaysOf(item.id, commit));
+  }
+  DSG_RETURN_IF_ERROR(GraphRowsWriter(commit).Apply(delta));
+  for (const auto& correction : delta.corrections) {
+    DSG_RETURN_IF_ERROR(tracks_.Correct(correction, commit));
+  }
+  for (const auto& append : delta.appends) DSG_RETURN_IF_ERROR(tracks_.Append(append, commit));
+  DSG_RETURN_IF_ERROR(WriteFactors(delta.factors, commit));
+  DSG_RETURN_IF_ERROR(WriteShapes(delta.shapes, commit));
+  DSG_RETURN_IF_ERROR(WriteStays(delta.stays, commit));
+  DSG_RETURN_IF_ERROR(WriteMesh(delta, commit));
+  info.digest = DigestOf(parent, commit->head);
+  return InsertRevision(*commit);
+}
+
+// A failed COMMIT says nothing about the disk: the row may be there after recovery. Only a fresh
+// connection that has read the log again can tell.
+absl::StatusOr<CommitResult> SqliteWriter::Settle(const GraphDelta& delta,
+                                                  const absl::Status& failure) {
+  const absl::Status reopened = Reopen();
+  if (!reopened.ok()) {
+    db_.reset();
+    return MakeError(
+        Reason::kCommitOutcomeUnknown,
+        absl::StrCat("commit of session ", delta.session_id, " sequence ", delta.sequence,
+                     " failed (", failure.message(), ") and the map cannot be reopened (",
+                     reopened.message(), "); send it again when the disk is back"),
+        {{"map", map_}, {"sequence", absl::StrCat(delta.sequence)}});
+  }
+  DSG_ASSIGN_OR_RETURN(const auto replay, FindReplay(delta));
+  if (replay.has_value()) return CommitResult{replay->revision, false};
+  return failure;
+}
+
+}  // namespace dsg::sqlite

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// The one writer of a map: checks a delta, applies it in one transaction, syncs, acknowledges.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "schema/store/graph_writer.h"
+#include "schema/store/sqlite/commit.h"
+#include "schema/store/sqlite/map_file.h"
+
+namespace dsg::sqlite {
+
+class SqliteWriter : public GraphWriter {
+ public:
+  static absl::StatusOr<std::unique_ptr<SqliteWriter>> Open(const std::string& store_folder,
+                                                            const std::string& map,
+                                                            const std::string& program);
+  ~SqliteWriter() override;
+
+  absl::StatusOr<CommitResult> Commit(GraphDelta delta) override;
+  absl::StatusOr<SessionState> GetSession(const std::string& session_id) override;
+
+ private:
+  SqliteWriter(std::string store_folder, std::string map)
+      : store_folder_(std::move(store_folder)), map_(std::move(map)) {}
+
+  absl::Status Reopen();
+  absl::StatusOr<std::optional<CommitResult>> FindReplay(const GraphDelta& delta);
+  absl::Status CheckSequence(const GraphDelta& delta);
+  absl::Status Apply(const GraphDelta& delta, CommitContext* commit);
+  absl::StatusOr<CommitResult> Settle(const GraphDelta& delta, const absl::Status& failure);
+
+  std::string store_folder_;
+  std::string map_;
+  std::unique_ptr<WriterLock> lock_;
+  /// Null after a COMMIT whose outcome is unknown, until reopened.
+  std::unique_ptr<Database> db_;
+  MapSpec spec_;
+  Head head_;
+  TrackWriter tracks_;
+};
+
+/// The head as stored; revision 0 for an empty map.
+absl::StatusOr<Head> LoadHead(Database& db);
+absl::Status InsertRevision(const CommitContext& commit);
+/// Columns of the revision table in the order that HeadFromRow reads.
+#define DSG_REVISION_COLUMNS                                                        \
+  "revision, digest, content, committed_ns, author, message, session_id, sequence," \
+  " config_digest, node_count, edge_count, agent_count, pose_count, stay_count,"    \
+  " mesh_block_count, first_pose_ns, last_pose_ns, layer_counts"
+absl::StatusOr<Head> HeadFromRow(const Query& query, const std::string& map);
+absl::StatusOr<SessionState> ReadSession(Database& db, const std::string& session_id);
+/// What a revision's digest must be.
+Sha256 DigestOf(const Sha256& parent, const Head& head);
+
+}  // namespace dsg::sqlite

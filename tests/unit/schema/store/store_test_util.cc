@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/unit/schema/store/store_test_util.h"
+
+#include <filesystem>
+
+namespace dsg::test {
+
+TempFolder::TempFolder() {
+  path_ = (std::filesystem::temp_directory_path() / "dsg-test-XXXXXX").string();
+  if (mkdtemp(path_.data()) == nullptr) std::abort();
+}
+
+TempFolder::~TempFolder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
+}
+
+int64_t EnvNumber(const char* name, int64_t fallback) {
+  const char* text = std::getenv(name);
+  return text == nullptr || *text == '\0' ? fallback : std::atoll(text);
+}
+
+uint64_t RecordSeed() {
+  const int64_t seed = EnvNumber("DSG_SEED", 20'240'607);
+  std::printf("seed: DSG_SEED=%lld\n", static_cast<long long>(seed));
+  return static_cast<uint64_t>(seed);
+}
+
+MapSpec Spec(TrajectoryCodec codec) {
+  MapSpec spec;
+  spec.name = kMap;
+  spec.codec = codec;
+  return spec;
+}
+
+TestMap::TestMap(const MapSpec& spec) {
+  StoreOptions options;
+  options.create = true;
+  options.program = "store-test";
+  store_ = OrDie(GraphStore::Open(folder_.path(), options));
+  OrDie(store_->CreateMap(spec));
+  Reopen();
+}
+
+void TestMap::Close() {
+  writer_.reset();
+  reader_.reset();
+}
+
+void TestMap::Reopen() {
+  writer_ = OrDie(store_->OpenWriter(kMap));
+  reader_ = OrDie(store_->OpenMap(kMap));
+}
+
+absl::StatusOr<CommitResult> TestMap::Commit(GraphDelta delta) {
+  delta.map = kMap;
+  delta.session_id = "test";
+  DSG_ASSIGN_OR_RETURN(const SessionState session, writer_->GetSession(delta.session_id));
+  delta.sequence = session.last_sequence + 1;
+  return writer_->Commit(std::move(delta));
+}
+
+Revision TestMap::MustCommit(GraphDelta delta) { return OrDie(Commit(std::move(delta))).revision; }
+
+std::string TestMap::Problems() {
+  std::string text;
+  for (const std::string& problem : OrDie(reader_->Verify({})).problems) text += problem + "\n";
+  return text;
+}
+
+Box3d BoxOf(double x0, double y0, double z0, double x1, double y1, double z1) {
+  return Box3d(Eigen::Vector3d(x0, y0, z0), Eigen::Vector3d(x1, y1, z1));
+}
+
+TimedPose PoseAt(TimeNs time_ns, double x, double y, double z) {
+  TimedPose pose;
+  pose.time_ns = time_ns;
+  pose.map_T_agent.position = Eigen::Vector3d(x, y, z);
+  return pose;
+}
+
+Node MakeNode(NodeId id, LayerId layer, const std::string& kind, const std::string& name,
+              const Box3d& box_map) {
+  Node node;
+  node.id = id;
+  node.layer = layer;
+  node.kind = kind;
+  node.name = name;
+  if (!box_map.isEmpty()) {
+    node.map_T_node.position = box_map.center();
+    node.box_node = Box3d(box_map.min() - box_map.center(), box_map.max() - box_map.center());
+  }
+  return node;
+}
+
+Node MakeObject(uint64_t index, const std::string& name, const Box3d& box_map) {
+  return MakeNode(NodeId('O', index), layers::kObjects, kinds::kObject, name, box_map);
+}
+
+Node MakeHuman(uint64_t index, const std::string& name) {
+  return MakeNode(NodeId('H', index), layers::kAgents, kinds::kHuman, name, Box3d());
+}
+
+Edge MakeEdge(NodeId source, const std::string& relation, NodeId target) {
+  Edge edge;
+  edge.source = source;
+  edge.relation = relation;
+  edge.target = target;
+  return edge;
+}
+
+GraphDelta DeltaOfNodes(std::vector<Node> nodes) {
+  GraphDelta delta;
+  delta.nodes = std::move(nodes);
+  return delta;
+}
+
+GraphDelta DeltaOfPoses(NodeId agent, std::vector<TimedPose> poses) {
+  GraphDelta delta;
+  delta.appends.push_back({agent, std::move(poses)});
+  return delta;
+}
+
+}  // namespace dsg::test
