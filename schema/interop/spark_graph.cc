@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "schema/interop/spark_graph.h"
+
+#include <cmath>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+namespace dsg {
+namespace {
+
+constexpr std::pair<std::string_view, SparkClass> kClassNames[] = {
+    {"NodeAttributes", SparkClass::kNode},
+    {"SemanticNodeAttributes", SparkClass::kSemantic},
+    {"ObjectNodeAttributes", SparkClass::kObject},
+    {"KhronosObjectAttributes", SparkClass::kKhronosObject},
+    {"RoomNodeAttributes", SparkClass::kRoom},
+    {"PlaceNodeAttributes", SparkClass::kPlace},
+    {"Place2dNodeAttributes", SparkClass::kPlace2d},
+    {"AgentNodeAttributes", SparkClass::kAgent},
+    {"TraversabilityNodeAttributes", SparkClass::kTraversability},
+    // An alias of the places' class; last, so that NameOf finds the class's own name first.
+    {"FrontierNodeAttributes", SparkClass::kPlace},
+};
+
+}  // namespace
+
+std::string ToString(const SparkVersion& version) {
+  return absl::StrCat(version.major, ".", version.minor, ".", version.patch);
+}
+
+std::optional<SparkClass> SparkClassOf(std::string_view name) {
+  for (const auto& [known, type] : kClassNames) {
+    if (known == name) return type;
+  }
+  return std::nullopt;
+}
+
+std::string_view NameOf(SparkClass type) {
+  for (const auto& [name, known] : kClassNames) {
+    if (known == type) return name;
+  }
+  return "";
+}
+
+bool IsSemantic(SparkClass type) {
+  return type != SparkClass::kNode && type != SparkClass::kAgent &&
+         type != SparkClass::kTraversability;
+}
+
+void AddLength(const char* name, size_t length, SparkGraph* graph, SparkNode* node) {
+  if (length == 0) return;
+  node->attributes[name] = static_cast<double>(length);
+  ++graph->shortened_lists[name];
+}
+
+void AddFlag(const char* name, bool value, SparkNode* node) {
+  if (value) node->attributes[name] = true;
+}
+
+void AddNumber(const std::string& name, double value, SparkNode* node) {
+  if (std::isfinite(value) && value != 0.0) node->attributes[name] = value;
+}
+
+TimeNs StampOrZero(uint64_t stamp_ns) {
+  return stamp_ns <= static_cast<uint64_t>(kTimeMax) ? static_cast<TimeNs>(stamp_ns) : 0;
+}
+
+}  // namespace dsg

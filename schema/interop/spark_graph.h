@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a Spark-DSG file says, in the file's own terms: the JSON and the binary reader both fill it.
+// Lists that only point into the peer's mesh or detectors are kept as their lengths.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <compare>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "schema/model/layer.h"
+#include "schema/model/mesh.h"
+#include "schema/model/node.h"
+
+namespace dsg {
+
+struct SparkVersion {
+  uint8_t major = 1;
+  uint8_t minor = 0;
+  uint8_t patch = 0;
+  auto operator<=>(const SparkVersion&) const = default;
+};
+
+/// "1.1.3".
+std::string ToString(const SparkVersion& version);
+
+/// The newest version whose files are known in full.
+inline constexpr SparkVersion kSparkVersionNewest = {1, 1, 3};
+
+/// Layer and partition; partition 0 is the primary one. A larger layer holds a smaller one.
+struct SparkLayerKey {
+  int64_t layer = 0;
+  uint32_t partition = 0;
+  auto operator<=>(const SparkLayerKey&) const = default;
+};
+
+/// The attribute classes, each extending an earlier one.
+enum class SparkClass {
+  kNode,
+  kSemantic,
+  kObject,
+  kKhronosObject,
+  kRoom,
+  kPlace,
+  kPlace2d,
+  kAgent,
+  kTraversability,
+};
+
+/// nullopt for a name that the format does not have.
+std::optional<SparkClass> SparkClassOf(std::string_view name);
+std::string_view NameOf(SparkClass type);
+/// All but nodes, agents and traversability carry the semantic fields.
+bool IsSemantic(SparkClass type);
+
+/// Bounds in the world frame, metres.
+struct SparkBox {
+  enum class Type { kInvalid = 0, kAligned = 1, kOriented = 2, kYawOnly = 3 };
+  Type type = Type::kInvalid;
+  Eigen::Vector3f dimensions = Eigen::Vector3f::Zero();
+  Eigen::Vector3f center = Eigen::Vector3f::Zero();
+  /// From the box's frame to the world.
+  Eigen::Matrix3f rotation = Eigen::Matrix3f::Identity();
+};
+
+struct SparkNode {
+  uint64_t id = 0;
+  SparkLayerKey key;
+  SparkClass type = SparkClass::kNode;
+  /// When the robot was there; from the node before 1.1.0 and from its attributes since.
+  std::optional<int64_t> stamp_ns;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  uint64_t last_update_ns = 0;
+  bool is_predicted = false;
+  std::string name;
+  std::optional<Color> color;
+  SparkBox box;
+  std::optional<uint32_t> label;
+  /// world_R_body, world_R_object or a frontier's orientation; not normalised.
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+  double distance = 0.0;
+  uint32_t basis_point_count = 0;
+  std::vector<Eigen::Vector3d> boundary;
+  std::map<std::string, double> class_probabilities;
+  std::vector<uint64_t> first_observed_ns;
+  std::vector<uint64_t> last_observed_ns;
+  /// Lengths of lists (none when empty), flags (only true ones), metadata as JSON text.
+  Attributes attributes;
+};
+
+struct SparkEdge {
+  uint64_t source = 0;
+  uint64_t target = 0;
+  bool weighted = false;
+  double weight = 1.0;
+  /// JSON text; "" for none.
+  std::string metadata;
+};
+
+struct SparkGraph {
+  SparkVersion version;
+  std::vector<SparkNode> nodes;
+  std::vector<SparkEdge> edges;
+  std::map<std::string, SparkLayerKey> layer_names;
+  std::map<SparkLayerKey, std::vector<SemanticLabel>> label_spaces;
+  /// One piece; its index is unused, stamps are in last_seen_ns.
+  std::optional<MeshBlock> mesh;
+  /// Lists kept as lengths: name -> number of nodes that had entries.
+  std::map<std::string, int64_t> shortened_lists;
+  std::vector<std::string> notes;
+};
+
+/// Keeps the length of a list that is not empty.
+void AddLength(const char* name, size_t length, SparkGraph* graph, SparkNode* node);
+/// Keeps a flag that is set.
+void AddFlag(const char* name, bool value, SparkNode* node);
+/// Keeps a number that is finite and not zero.
+void AddNumber(const std::string& name, double value, SparkNode* node);
+
+/// Spark-DSG counts mesh stamps in 64 unsigned bits; what does not fit is not a time and reads as
+/// 0.
+TimeNs StampOrZero(uint64_t stamp_ns);
+
+}  // namespace dsg

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where the layers of a Spark-DSG file go in a map.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "schema/interop/spark_graph.h"
+
+namespace dsg {
+
+/// The layer that keeps a robot's poses as nodes, beside its trajectory.
+inline constexpr LayerId kAgentPoseLayer = 20;
+inline constexpr char kAgentPoseKind[] = "agent_pose";
+
+/// Where a node goes.
+struct SparkPlacement {
+  Layer layer;
+  std::string kind;
+};
+
+/// Layers 2 to 5 are the map's own objects, places (3-D and 2-D), rooms and buildings. Agents'
+/// poses of layer 2 go to "agent_poses". All others become custom layers: id 1000 + 1000 x layer +
+/// partition, so that the same layer of two files is one layer; rank 100 x layer, so that every
+/// edge between layers of the file is a containment of the map; the file's name for the layer.
+class SparkLayers {
+ public:
+  explicit SparkLayers(const SparkGraph& graph);
+
+  /// Errors: INVALID_ARGUMENT/FILE_MALFORMED when the key is outside what ids can express.
+  absl::StatusOr<SparkPlacement> Place(const SparkNode& node, const std::string& file);
+
+  /// The custom layers that Place has returned so far, by id.
+  std::vector<Layer> custom_layers() const;
+
+ private:
+  std::string NameOfCustom(const SparkLayerKey& key) const;
+
+  std::map<SparkLayerKey, std::string> names_;
+  std::map<LayerId, Layer> custom_;
+};
+
+}  // namespace dsg

@@ -1,0 +1,253 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "schema/interop/spark_nodes.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
+#include "schema/base/status.h"
+#include "schema/interop/file_error.h"
+#include "schema/model/delta_check.h"
+
+namespace dsg {
+namespace {
+
+// Nodes are updated a little after the last pose was taken.
+constexpr TimeNs kUpdateDelayMaxNs = 10 * kNsPerSecond;
+// Without poses to compare with: 2100-01-01, later is no time that anybody has recorded.
+constexpr TimeNs kPlausibleEndNs = 4'102'444'800 * kNsPerSecond;
+constexpr size_t kBoundaryCornersMax = 65536;
+// The peer keeps boxes in single precision.
+constexpr double kBoxSlackM = 1e-3;
+
+bool IsSane(const Eigen::Vector3d& point) {
+  return point.allFinite() && point.cwiseAbs().maxCoeff() <= kCoordinateMaxM;
+}
+
+Interval PlausibleTimes(const SparkGraph& graph) {
+  Interval times = {kTimeMax, kTimeMin};
+  for (const SparkNode& node : graph.nodes) {
+    if (node.type != SparkClass::kAgent || !node.stamp_ns.has_value()) continue;
+    times.from_ns = std::min(times.from_ns, *node.stamp_ns);
+    times.to_ns = std::max(times.to_ns, *node.stamp_ns);
+  }
+  if (times.from_ns > times.to_ns) return {1, kPlausibleEndNs};
+  times.to_ns = std::min(times.to_ns, kTimeMax - kUpdateDelayMaxNs) + kUpdateDelayMaxNs;
+  return times;
+}
+
+Polygon2d OutlineOf(const Box3d& box) {
+  return {{box.min().x(), box.min().y()},
+          {box.max().x(), box.min().y()},
+          {box.max().x(), box.max().y()},
+          {box.min().x(), box.max().y()}};
+}
+
+RegionInfo RegionOfBoundary(const std::vector<Eigen::Vector3d>& boundary) {
+  RegionInfo region;
+  Box3d bounds;
+  for (const Eigen::Vector3d& corner : boundary) {
+    region.footprint_map.emplace_back(corner.x(), corner.y());
+    bounds.extend(corner);
+  }
+  region.z_min_m = bounds.min().z();
+  region.z_max_m = bounds.max().z();
+  return region;
+}
+
+std::string ColorText(const Color& color) {
+  return absl::StrFormat("#%02x%02x%02x%02x", color[0], color[1], color[2], color[3]);
+}
+
+// Khronos: the n-th presence lasts from the n-th first to the n-th last observation.
+std::string PresenceText(const SparkNode& in) {
+  std::vector<std::string> spans;
+  const size_t count = std::min(in.first_observed_ns.size(), in.last_observed_ns.size());
+  for (size_t i = 0; i < count; ++i) {
+    spans.push_back(absl::StrCat(in.first_observed_ns[i], "-", in.last_observed_ns[i]));
+  }
+  return absl::StrJoin(spans, " ");
+}
+
+}  // namespace
+
+SparkNodeConverter::SparkNodeConverter(const SparkGraph& graph, std::string file)
+    : graph_(graph), file_(std::move(file)), plausible_(PlausibleTimes(graph)) {}
+
+absl::Status SparkNodeConverter::Fail(const SparkNode& in, const std::string& what) const {
+  return FileError(file_, absl::StrCat("node ", ToString(NodeId(in.id))), what);
+}
+
+absl::StatusOr<Node> SparkNodeConverter::Convert(const SparkNode& in,
+                                                 const SparkPlacement& placement) {
+  Node out;
+  out.id = NodeId(in.id);
+  if (!out.id.IsValid()) {
+    return FileError(file_, absl::StrCat("node id ", in.id),
+                     "has no letter in its top 8 bits; ids are a letter and an index, as O42");
+  }
+  out.layer = placement.layer.id;
+  out.kind = placement.kind;
+  out.provenance = in.is_predicted ? Provenance::kPredicted : Provenance::kImported;
+  DSG_RETURN_IF_ERROR(ConvertPose(in, &out));
+  DSG_RETURN_IF_ERROR(ConvertBox(in, &out));
+  DSG_RETURN_IF_ERROR(ConvertClass(in, &out));
+  ConvertTimes(in, &out);
+  DSG_RETURN_IF_ERROR(ConvertComponents(in, &out));
+  ConvertAttributes(in, &out);
+  return out;
+}
+
+absl::Status SparkNodeConverter::ConvertPose(const SparkNode& in, Node* out) {
+  if (!IsSane(in.position)) {
+    return Fail(in,
+                absl::StrCat("position (", in.position.x(), ", ", in.position.y(), ", ",
+                             in.position.z(), ") is not finite or beyond ", kCoordinateMaxM, " m"));
+  }
+  out->map_T_node.position = in.position;
+  const double norm = in.orientation.norm();
+  if (std::isfinite(norm) && norm > 1e-6) {
+    out->map_T_node.orientation = in.orientation.normalized();
+  } else {
+    ++left_out_["orientations that are no rotation"];
+  }
+  return absl::OkStatus();
+}
+
+absl::Status SparkNodeConverter::ConvertBox(const SparkNode& in, Node* out) {
+  if (in.box.type == SparkBox::Type::kInvalid) return absl::OkStatus();
+  const Eigen::Vector3d center = in.box.center.cast<double>();
+  const Eigen::Vector3d half = 0.5 * in.box.dimensions.cast<double>();
+  const bool is_rotated = in.box.type != SparkBox::Type::kAligned;
+  if (!IsSane(center) || !IsSane(half) || (is_rotated && !in.box.rotation.allFinite())) {
+    return Fail(in, absl::StrCat("bounding_box has numbers that are not finite or beyond ",
+                                 kCoordinateMaxM, " m"));
+  }
+  if (half.minCoeff() < 0.0) {
+    ++left_out_["boxes of negative size"];
+    return absl::OkStatus();
+  }
+  Pose3d map_T_box = {center, Eigen::Quaterniond::Identity()};
+  if (is_rotated) {
+    map_T_box.orientation = Eigen::Quaterniond(in.box.rotation.cast<double>());
+    if (!(map_T_box.orientation.norm() > 1e-6)) return Fail(in, "bounding_box has no rotation");
+    map_T_box.orientation.normalize();
+  }
+  const Box3d box = TransformBox(out->map_T_node.Inverse() * map_T_box, Box3d(-half, half));
+  // An object's box is measured from its points. Elsewhere boxes are often left at a default
+  // around the origin, which would blow up every ancestor's box.
+  const Eigen::Vector3d slack = Eigen::Vector3d::Constant(kBoxSlackM);
+  const bool is_object = out->kind == kinds::kObject;
+  if (!is_object &&
+      !Box3d(box.min() - slack, box.max() + slack).contains(Eigen::Vector3d(0, 0, 0))) {
+    ++left_out_["boxes that do not hold their own node"];
+    return absl::OkStatus();
+  }
+  out->box_node = box;
+  return absl::OkStatus();
+}
+
+absl::Status SparkNodeConverter::ConvertClass(const SparkNode& in, Node* out) {
+  if (in.name.size() > kNameLengthMax) {
+    return Fail(in, absl::StrCat("name has ", in.name.size(), " bytes; at most ", kNameLengthMax,
+                                 " are kept"));
+  }
+  out->name = in.name;
+  if (!in.label.has_value()) return absl::OkStatus();
+  if (*in.label > static_cast<uint32_t>(std::numeric_limits<int32_t>::max())) {
+    return Fail(in, absl::StrCat("semantic_label is ", *in.label, "; at most 2147483647"));
+  }
+  out->class_id = static_cast<int32_t>(*in.label);
+  const auto space = graph_.label_spaces.find(in.key);
+  if (space == graph_.label_spaces.end()) return absl::OkStatus();
+  const auto label = std::find_if(space->second.begin(), space->second.end(),
+                                  [&](const auto& item) { return item.id == out->class_id; });
+  if (label != space->second.end()) out->class_name = label->name;
+  return absl::OkStatus();
+}
+
+void SparkNodeConverter::ConvertTimes(const SparkNode& in, Node* out) {
+  const auto keep = [this](uint64_t time, bool earliest, std::optional<TimeNs>* kept) {
+    if (time == 0) return;
+    const bool is_time = time <= static_cast<uint64_t>(kTimeMax) &&
+                         static_cast<TimeNs>(time) >= plausible_.from_ns &&
+                         static_cast<TimeNs>(time) <= plausible_.to_ns;
+    if (!is_time) {
+      ++left_out_["update times outside the time of the poses or of this century"];
+      return;
+    }
+    const auto time_ns = static_cast<TimeNs>(time);
+    if (!kept->has_value() || (earliest ? time_ns < **kept : time_ns > **kept)) *kept = time_ns;
+  };
+  keep(in.last_update_ns, false, &out->last_observed_ns);
+  for (const uint64_t time : in.first_observed_ns) keep(time, true, &out->first_observed_ns);
+  for (const uint64_t time : in.last_observed_ns) keep(time, false, &out->last_observed_ns);
+}
+
+absl::Status SparkNodeConverter::ConvertComponents(const SparkNode& in, Node* out) {
+  if (!std::isfinite(in.distance)) return Fail(in, "distance is not finite");
+  if (in.boundary.size() > kBoundaryCornersMax) {
+    return Fail(in, absl::StrCat("boundary has ", in.boundary.size(), " corners; at most ",
+                                 kBoundaryCornersMax));
+  }
+  if (!std::all_of(in.boundary.begin(), in.boundary.end(), IsSane)) {
+    return Fail(in,
+                absl::StrCat("boundary has a corner not finite or beyond ", kCoordinateMaxM, " m"));
+  }
+  if (out->kind == kinds::kObject) {
+    ObjectInfo object;
+    object.color = in.color;
+    if (!out->box_node.isEmpty()) object.size = in.box.dimensions.cast<double>();
+    out->object = object;
+  } else if (out->kind == kinds::kPlace) {
+    out->place =
+        PlaceInfo{in.distance, out->box_node,
+                  static_cast<int32_t>(std::min<uint32_t>(in.basis_point_count, INT32_MAX))};
+    if (!in.boundary.empty()) out->region = RegionOfBoundary(in.boundary);
+  } else if (out->kind != kAgentPoseKind) {
+    RegionInfo region = RegionOfBoundary(in.boundary);
+    if (!out->box_node.isEmpty()) {
+      const Box3d box_map = out->BoxMap();
+      region = {OutlineOf(box_map), box_map.min().z(), box_map.max().z(), {}};
+    } else if (in.boundary.empty()) {
+      region = {};
+    }
+    for (const auto& [name, probability] : in.class_probabilities) {
+      if (!std::isfinite(probability)) {
+        return Fail(in, absl::StrCat("probability of class \"", name, "\" is not finite"));
+      }
+    }
+    region.class_probabilities = in.class_probabilities;
+    out->region = std::move(region);
+  }
+  return absl::OkStatus();
+}
+
+void SparkNodeConverter::ConvertAttributes(const SparkNode& in, Node* out) {
+  out->attributes = in.attributes;
+  if (in.color.has_value() && !out->object.has_value()) {
+    out->attributes["color"] = ColorText(*in.color);
+  }
+  if (!out->place.has_value() && in.distance != 0.0) out->attributes["distance"] = in.distance;
+  if (in.type == SparkClass::kKhronosObject && !in.first_observed_ns.empty()) {
+    out->attributes["presence_ns"] = PresenceText(in);
+  }
+  std::erase_if(out->attributes, [this](const auto& item) {
+    const auto* text = std::get_if<std::string>(&item.second);
+    const bool is_long = text != nullptr && text->size() > kAttributeLengthMax;
+    if (is_long) ++left_out_[absl::StrCat("texts \"", item.first, "\" longer than 64 KiB")];
+    return is_long;
+  });
+}
+
+std::vector<std::string> SparkNodeConverter::notes() const {
+  std::vector<std::string> notes;
+  for (const auto& [reason, count] : left_out_) {
+    notes.push_back(absl::StrCat("left out: ", count, " ", reason));
+  }
+  return notes;
+}
+
+}  // namespace dsg

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// The JSON tree builder's limits and the UTF-8 check.
+#include "schema/interop/json_document.h"
+
+#include <gtest/gtest.h>
+
+#include "schema/base/utf8.h"
+#include "schema/interop/file_error.h"
+#include "tests/unit/schema/interop/interop_test_util.h"
+
+namespace dsg {
+namespace {
+
+TEST(JsonDocument, KeepsEveryBitOf64BitIntegers) {
+  const auto json =
+      ParseJson("[18446744073709551615, 5692549928996306945, -9223372036854775808]", "f.json");
+  ASSERT_TRUE(json.ok()) << json.status();
+  EXPECT_EQ((*json)[0].get<uint64_t>(), 18446744073709551615u);
+  EXPECT_EQ((*json)[1].get<uint64_t>(), 5692549928996306945u);
+  EXPECT_EQ((*json)[2].get<int64_t>(), std::numeric_limits<int64_t>::min());
+}
+
+TEST(JsonDocument, ReadsNestedValuesOfEveryType) {
+  const auto json = ParseJson(R"({"a": [1, {"b": null}, [true, "x"], -2.5]})", "f.json");
+  ASSERT_TRUE(json.ok()) << json.status();
+  EXPECT_EQ(json->dump(), R"({"a":[1,{"b":null},[true,"x"],-2.5]})");
+}
+
+TEST(JsonDocument, RefusesTextCutAtAnyByteNamingTheFile) {
+  const std::string text = R"({"nodes": [{"id": 5, "x": [1.5, true, null, "tail"]}], "e": {}})";
+  for (size_t size = 0; size < text.size(); ++size) {
+    const auto json = ParseJson(text.substr(0, size), "f.json");
+    ASSERT_FALSE(json.ok()) << size;
+    ExpectMalformed(json.status(), "f.json: byte ");
+  }
+}
+
+TEST(JsonDocument, RefusesADuplicateKeyNamingIt) {
+  ExpectMalformed(ParseJson(R"({"id": 1, "x": {"id": 2}, "id": 3})", "f.json").status(),
+                  "key \"id\"");
+}
+
+TEST(JsonDocument, AllowsNestingUpToTheLimitAndRefusesOneMore) {
+  const auto nested = [](size_t depth) {
+    return std::string(depth, '[') + std::string(depth, ']');
+  };
+  EXPECT_TRUE(ParseJson(nested(kJsonDepthMax), "f.json").ok());
+  ExpectMalformed(ParseJson(nested(kJsonDepthMax + 1), "f.json").status(), "nested deeper");
+  ExpectMalformed(ParseJson(std::string(5'000'000, '['), "f.json").status(), "nested deeper");
+}
+
+TEST(JsonDocument, RefusesWhatIsNotJson) {
+  for (const char* text : {"", "{]", "[1,]", "[NaN]", "[1e999]", "{} {}", "[\"\xff\"]"}) {
+    EXPECT_FALSE(ParseJson(text, "f.json").ok()) << text;
+  }
+}
+
+TEST(Utf8, AcceptsWellFormedTextAndRefusesTheRest) {
+  for (const char* good :
+       {"", "chair", "\xc3\xa9", "\xe2\x82\xac", "\xf0\x9f\x98\x80", "\xf4\x8f\xbf\xbf"}) {
+    EXPECT_TRUE(IsUtf8(good)) << good;
+  }
+  for (const char* bad : {"\x80", "\xc0\xaf", "\xc3", "\xe2\x82", "\xe0\x80\xaf", "\xed\xa0\x80",
+                          "\xf0\x80\x80\x80", "\xf4\x90\x80\x80", "\xff", "a\xc3(b"}) {
+    EXPECT_FALSE(IsUtf8(bad)) << bad;
+  }
+}
+
+}  // namespace
+}  // namespace dsg
