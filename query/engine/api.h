@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every question as a plain function from request to reply. Two implementations: ServiceCore
+// answers from a store folder, client::RemoteApi asks a dsg-server. The CLI cannot tell them apart,
+// and the server's handlers only pass calls on to a ServiceCore.
+#pragma once
+
+#include <functional>
+
+#include "absl/status/status.h"
+#include "query/engine/call_context.h"
+
+namespace dsg::v1 {
+class BatchLocateAgentsRequest;
+class BatchLocateAgentsResponse;
+class CommitRequest;
+class CommitResponse;
+class CreateMapRequest;
+class CreateMapResponse;
+class GetMapStatsRequest;
+class GetMapStatsResponse;
+class GetNodeRequest;
+class GetNodeResponse;
+class GetServerInfoRequest;
+class GetServerInfoResponse;
+class GetSessionRequest;
+class GetSessionResponse;
+class GetTrajectoryRequest;
+class GetTrajectoryResponse;
+class ListEdgesRequest;
+class ListEdgesResponse;
+class ListMapsRequest;
+class ListMapsResponse;
+class ListNearestNodesRequest;
+class ListNearestNodesResponse;
+class ListNodesRequest;
+class ListNodesResponse;
+class ListPresenceRequest;
+class ListPresenceResponse;
+class ListRevisionsRequest;
+class ListRevisionsResponse;
+class LocateAgentRequest;
+class LocateAgentResponse;
+}  // namespace dsg::v1
+
+namespace dsg::query {
+
+/// Threads: safe from many threads.
+/// Errors: the codes and reasons that the service protos document; what `call.Check()` returns.
+class Api {
+ public:
+  virtual ~Api() = default;
+
+  virtual absl::Status LocateAgent(const CallContext& call, const v1::LocateAgentRequest& request,
+                                   v1::LocateAgentResponse* reply) = 0;
+  virtual absl::Status BatchLocateAgents(const CallContext& call,
+                                         const v1::BatchLocateAgentsRequest& request,
+                                         v1::BatchLocateAgentsResponse* reply) = 0;
+  /// Calls `send` for each message of the stream, until it returns false.
+  virtual absl::Status GetTrajectory(
+      const CallContext& call, const v1::GetTrajectoryRequest& request,
+      const std::function<bool(const v1::GetTrajectoryResponse&)>& send) = 0;
+  virtual absl::Status ListPresence(const CallContext& call, const v1::ListPresenceRequest& request,
+                                    v1::ListPresenceResponse* reply) = 0;
+  virtual absl::Status GetNode(const CallContext& call, const v1::GetNodeRequest& request,
+                               v1::GetNodeResponse* reply) = 0;
+  virtual absl::Status ListNodes(const CallContext& call, const v1::ListNodesRequest& request,
+                                 v1::ListNodesResponse* reply) = 0;
+  virtual absl::Status ListEdges(const CallContext& call, const v1::ListEdgesRequest& request,
+                                 v1::ListEdgesResponse* reply) = 0;
+  virtual absl::Status ListNearestNodes(const CallContext& call,
+                                        const v1::ListNearestNodesRequest& request,
+                                        v1::ListNearestNodesResponse* reply) = 0;
+
+  virtual absl::Status CreateMap(const CallContext& call, const v1::CreateMapRequest& request,
+                                 v1::CreateMapResponse* reply) = 0;
+  virtual absl::Status ListMaps(const CallContext& call, const v1::ListMapsRequest& request,
+                                v1::ListMapsResponse* reply) = 0;
+  virtual absl::Status GetMapStats(const CallContext& call, const v1::GetMapStatsRequest& request,
+                                   v1::GetMapStatsResponse* reply) = 0;
+  virtual absl::Status ListRevisions(const CallContext& call,
+                                     const v1::ListRevisionsRequest& request,
+                                     v1::ListRevisionsResponse* reply) = 0;
+  virtual absl::Status GetServerInfo(const CallContext& call,
+                                     const v1::GetServerInfoRequest& request,
+                                     v1::GetServerInfoResponse* reply) = 0;
+
+  virtual absl::Status Commit(const CallContext& call, const v1::CommitRequest& request,
+                              v1::CommitResponse* reply) = 0;
+  virtual absl::Status GetSession(const CallContext& call, const v1::GetSessionRequest& request,
+                                  v1::GetSessionResponse* reply) = 0;
+};
+
+}  // namespace dsg::query

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/engine/commit.h"
+
+#include "absl/strings/str_cat.h"
+#include "dsg/v1/ingest_service.pb.h"
+#include "query/engine/nodes.h"
+#include "query/engine/request_check.h"
+#include "schema/base/status.h"
+#include "schema/codec/proto_convert.h"
+
+namespace dsg::query {
+
+absl::Status Commit(MapTable* maps, const CallContext& call, const v1::CommitRequest& request,
+                    v1::CommitResponse* reply) {
+  const v1::GraphDelta& in = request.delta();
+  if (in.session_id().empty()) {
+    return FieldError("delta.session_id", "",
+                      "name the log or process that commits, so that a repeated delta is known");
+  }
+  if (in.sequence() < 1) {
+    return FieldError("delta.sequence", absl::StrCat(in.sequence()),
+                      "count the deltas of a session from 1");
+  }
+  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> reader, maps->Reader(in.map()));
+  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> snapshot, reader->Latest());
+  DSG_ASSIGN_OR_RETURN(const LayerTable layers, LayersOf(*snapshot));
+  DSG_ASSIGN_OR_RETURN(GraphDelta delta, FromProto(in, layers));
+  DSG_ASSIGN_OR_RETURN(const CommitResult result, maps->Commit(std::move(delta), call.stop()));
+  reply->set_revision(result.revision);
+  reply->set_replayed(result.replayed);
+  return absl::OkStatus();
+}
+
+absl::Status GetSession(MapTable* maps, const v1::GetSessionRequest& request,
+                        v1::GetSessionResponse* reply) {
+  if (request.session_id().empty()) {
+    return FieldError("session_id", "", "name the session to look up");
+  }
+  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> reader, maps->Reader(request.map()));
+  DSG_ASSIGN_OR_RETURN(const SessionState state, reader->GetSession(request.session_id()));
+  reply->set_last_sequence(state.last_sequence);
+  reply->set_last_revision(state.last_revision);
+  return absl::OkStatus();
+}
+
+}  // namespace dsg::query

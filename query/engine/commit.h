@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// The way in over the service: one delta, translated with the map's own layers and handed to the
+// map's writer, which alone decides whether it is valid.
+#pragma once
+
+#include "absl/status/status.h"
+#include "query/engine/call_context.h"
+#include "query/engine/map_table.h"
+
+namespace dsg::v1 {
+class CommitRequest;
+class CommitResponse;
+class GetSessionRequest;
+class GetSessionResponse;
+}  // namespace dsg::v1
+
+namespace dsg::query {
+
+absl::Status Commit(MapTable* maps, const CallContext& call, const v1::CommitRequest& request,
+                    v1::CommitResponse* reply);
+absl::Status GetSession(MapTable* maps, const v1::GetSessionRequest& request,
+                        v1::GetSessionResponse* reply);
+
+}  // namespace dsg::query

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// The open maps of a store, by name. A name is checked before anything is made of it, so that no
+// request can reach outside the store's folder.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <shared_mutex>
+#include <string>
+#include <unordered_map>
+
+#include "absl/status/statusor.h"
+#include "schema/store/graph_store.h"
+
+namespace dsg::query {
+
+/// Threads: safe from many threads.
+class MapTable {
+ public:
+  explicit MapTable(std::unique_ptr<GraphStore> store) : store_(std::move(store)) {}
+
+  GraphStore& store() { return *store_; }
+
+  /// Opened at the first call and kept.
+  /// Errors: MAP_NAME_INVALID; MAP_UNKNOWN; what GraphStore::OpenMap returns.
+  absl::StatusOr<std::shared_ptr<MapReader>> Reader(const std::string& name);
+
+  /// Commits with the map's writer, which is opened at the first commit and kept with its lock.
+  /// Commits to one map wait for each other. `stop` is asked once the wait is over.
+  /// Errors: as Reader; WRITER_LOCKED while another process holds the lock.
+  absl::StatusOr<CommitResult> Commit(GraphDelta delta, const StopCheck& stop);
+
+ private:
+  struct WriterSlot {
+    std::mutex mutex;
+    /// Of the file that the writer writes.
+    std::shared_ptr<MapReader> reader;
+    /// Null until the lock could be taken.
+    std::unique_ptr<GraphWriter> writer;
+  };
+
+  WriterSlot* FindSlot(const std::string& name);
+
+  // First, so that it is destroyed after the readers and writers that it opened.
+  std::unique_ptr<GraphStore> store_;
+  std::shared_mutex readers_mutex_;
+  std::unordered_map<std::string, std::shared_ptr<MapReader>> readers_;
+  std::mutex slots_mutex_;
+  std::unordered_map<std::string, std::unique_ptr<WriterSlot>> slots_;
+};
+
+}  // namespace dsg::query

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/engine/nearest.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "dsg/v1/query_service.pb.h"
+#include "query/engine/nodes.h"
+#include "query/engine/request_check.h"
+#include "schema/base/status.h"
+#include "schema/codec/proto_convert.h"
+
+namespace dsg::query {
+namespace {
+
+struct Question {
+  Eigen::Vector3d point_map = Eigen::Vector3d::Zero();
+  int k = 1;
+  double max_distance_m = std::numeric_limits<double>::infinity();
+  NodeFilter filter;
+};
+
+absl::StatusOr<Question> ReadQuestion(const v1::ListNearestNodesRequest& request,
+                                      const Snapshot& snapshot) {
+  Question question;
+  if (!request.has_position()) return FieldError("position", "", "give a point of the map frame");
+  DSG_ASSIGN_OR_RETURN(question.point_map, PointFromProto(request.position(), "position"));
+  if (request.k() < 0 || request.k() > kPageSizeMax) {
+    return FieldError("k", absl::StrCat(request.k()), "give 1 to 1000, or 0 for 1");
+  }
+  question.k = std::max(request.k(), 1);
+  const double max_distance_m = request.max_distance_m();
+  if (!std::isfinite(max_distance_m) || max_distance_m < 0.0) {
+    return FieldError("max_distance_m", absl::StrCat(max_distance_m),
+                      "give finite metres, or 0 for no limit");
+  }
+  if (max_distance_m > 0.0) question.max_distance_m = max_distance_m;
+  DSG_ASSIGN_OR_RETURN(question.filter, FilterFromProto(request.filter(), snapshot));
+  return question;
+}
+
+bool AsksForAgents(const NodeFilter& filter) {
+  return IsAgentKind(filter.kind) || filter.layer == layers::kAgents;
+}
+
+// There are as many agents as tracks, hundreds rather than millions, and each stands somewhere
+// else at every instant: no index helps, and none is needed.
+absl::StatusOr<std::vector<NearestNode>> NearestAgents(const Snapshot& snapshot,
+                                                       const Question& question,
+                                                       const StopCheck& stop) {
+  const TimeNs at_ns = *question.filter.at_ns;
+  DSG_ASSIGN_OR_RETURN(const std::vector<TrackInfo> tracks, snapshot.Tracks());
+  std::vector<NearestNode> found;
+  for (const TrackInfo& track : tracks) {
+    DSG_RETURN_IF_ERROR(stop());
+    if (track.pose_count == 0 || at_ns < track.first_ns || at_ns > track.last_ns) continue;
+    if (!question.filter.kind.empty() && track.kind != question.filter.kind) continue;
+    DSG_ASSIGN_OR_RETURN(const LocatedPose located, snapshot.Locate(track.agent, at_ns));
+    if (located.quality == PoseQuality::kInGap) continue;
+    DSG_ASSIGN_OR_RETURN(Node node, snapshot.GetNode(track.agent));
+    node.map_T_node = located.map_T_agent;
+    if (!question.filter.Matches(node)) continue;
+    const double distance_m = DistanceToBox(question.point_map, node.BoxMap());
+    if (distance_m <= question.max_distance_m) found.push_back({std::move(node), distance_m});
+  }
+  std::sort(found.begin(), found.end(), [](const NearestNode& a, const NearestNode& b) {
+    return a.distance_m != b.distance_m ? a.distance_m < b.distance_m : a.node.id < b.node.id;
+  });
+  if (found.size() > static_cast<size_t>(question.k)) {
+    found.resize(static_cast<size_t>(question.k));
+  }
+  return found;
+}
+
+absl::StatusOr<std::vector<NearestNode>> FindNearest(const Snapshot& snapshot,
+                                                     const Question& question,
+                                                     const StopCheck& stop) {
+  if (!AsksForAgents(question.filter)) {
+    return snapshot.NearestNodes(question.point_map, question.k, question.max_distance_m,
+                                 question.filter, stop);
+  }
+  if (!question.filter.at_ns.has_value()) {
+    return FieldError("filter.at_ns", "",
+                      "agents move; say at which instant the nearest ones are wanted");
+  }
+  return NearestAgents(snapshot, question, stop);
+}
+
+}  // namespace
+
+absl::Status ListNearestNodes(const ReadView& view, const CallContext& call,
+                              const v1::ListNearestNodesRequest& request,
+                              v1::ListNearestNodesResponse* reply) {
+  const Snapshot& snapshot = view.snapshot();
+  DSG_RETURN_IF_ERROR(CheckNodeView(request.view()));
+  DSG_ASSIGN_OR_RETURN(const Question question, ReadQuestion(request, snapshot));
+  DSG_ASSIGN_OR_RETURN(const std::vector<NearestNode> found,
+                       FindNearest(snapshot, question, call.stop()));
+  DSG_ASSIGN_OR_RETURN(const LayerTable layers, LayersOf(snapshot));
+  view.FillHeader(reply->mutable_header());
+  size_t bytes = 0;
+  for (const NearestNode& nearest : found) {
+    v1::NearestNode* out = reply->add_nodes();
+    FillNode(nearest.node, layers, request.view(), out->mutable_node());
+    out->set_distance_m(nearest.distance_m);
+    bytes += out->ByteSizeLong();
+    if (bytes > kReplyBytesMax) {
+      return FieldError("k", absl::StrCat(request.k()),
+                        absl::StrCat("the first ", reply->nodes_size(),
+                                     " nodes alone fill a reply; ask for fewer, or for a smaller "
+                                     "view"));
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace dsg::query

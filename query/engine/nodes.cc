@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/engine/nodes.h"
+
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "dsg/v1/query_service.pb.h"
+#include "query/engine/edges.h"
+#include "query/engine/request_check.h"
+#include "schema/base/status.h"
+
+namespace dsg::query {
+namespace {
+
+// A node asked for by a name that several share would be an arbitrary one of them.
+absl::Status CheckNameIsUnique(const Snapshot& snapshot, const std::string& name,
+                               const StopCheck& stop) {
+  NodeFilter filter;
+  filter.name = name;
+  std::vector<NodeId> found;
+  DSG_RETURN_IF_ERROR(snapshot.ScanNodes(filter, NodeId(), stop, [&](const Node& node) {
+    found.push_back(node.id);
+    return found.size() < 2;
+  }));
+  if (found.size() < 2) return absl::OkStatus();
+  return FieldError("id", name,
+                    absl::StrCat("several nodes have this name, among them ", ToString(found[0]),
+                                 " and ", ToString(found[1]), "; give an id"));
+}
+
+absl::StatusOr<NodeId> ResolveOne(const Snapshot& snapshot, const std::string& id_or_name,
+                                  const StopCheck& stop) {
+  if (id_or_name.empty()) return FieldError("id", "", "give a node id such as O42, or a name");
+  DSG_ASSIGN_OR_RETURN(const NodeId id, snapshot.ResolveNode(id_or_name));
+  const absl::StatusOr<NodeId> parsed = ParseNodeId(id_or_name);
+  if (!parsed.ok() || *parsed != id) {
+    DSG_RETURN_IF_ERROR(CheckNameIsUnique(snapshot, id_or_name, stop));
+  }
+  return id;
+}
+
+absl::StatusOr<int64_t> CountChildren(const Snapshot& snapshot, NodeId id, const StopCheck& stop) {
+  int64_t count = 0;
+  DSG_RETURN_IF_ERROR(snapshot.ScanEdges(ChildrenOf(id), std::nullopt, stop, [&](const Edge&) {
+    ++count;
+    return true;
+  }));
+  return count;
+}
+
+}  // namespace
+
+absl::Status CheckNodeView(int view) {
+  if (v1::NodeView_IsValid(view)) return absl::OkStatus();
+  return FieldError("view", absl::StrCat(view),
+                    "give NODE_VIEW_BASIC, NODE_VIEW_GEOMETRY or NODE_VIEW_FULL");
+}
+
+void FillNode(const Node& node, const LayerTable& layers, int view, v1::Node* out) {
+  v1::Node full;
+  v1::Node* filled = view == v1::NODE_VIEW_BASIC || view == v1::NODE_VIEW_GEOMETRY ? &full : out;
+  ToProto(node, layers, filled);
+  if (filled == out) return;
+  out->set_id(full.id());
+  out->set_layer(full.layer());
+  out->set_kind(full.kind());
+  out->set_name(full.name());
+  if (full.has_semantic_class()) out->mutable_semantic_class()->Swap(full.mutable_semantic_class());
+  if (full.has_valid_from_ns()) out->set_valid_from_ns(full.valid_from_ns());
+  if (full.has_valid_to_ns()) out->set_valid_to_ns(full.valid_to_ns());
+  if (view == v1::NODE_VIEW_BASIC) return;
+  out->mutable_map_t_node()->Swap(full.mutable_map_t_node());
+  if (full.has_bounding_box()) out->mutable_bounding_box()->Swap(full.mutable_bounding_box());
+}
+
+absl::StatusOr<LayerTable> LayersOf(const Snapshot& snapshot) {
+  DSG_ASSIGN_OR_RETURN(std::vector<Layer> layers, snapshot.Layers());
+  return LayerTable(std::move(layers));
+}
+
+absl::Status GetNode(const ReadView& view, const CallContext& call,
+                     const v1::GetNodeRequest& request, v1::GetNodeResponse* reply) {
+  const Snapshot& snapshot = view.snapshot();
+  DSG_RETURN_IF_ERROR(CheckNodeView(request.view()));
+  DSG_ASSIGN_OR_RETURN(const NodeId id, ResolveOne(snapshot, request.id(), call.stop()));
+  DSG_ASSIGN_OR_RETURN(const Node node, snapshot.GetNode(id));
+  DSG_ASSIGN_OR_RETURN(const LayerTable layers, LayersOf(snapshot));
+  DSG_ASSIGN_OR_RETURN(const std::vector<NodeId> ancestors, snapshot.Ancestors(id));
+  DSG_ASSIGN_OR_RETURN(const int64_t child_count, CountChildren(snapshot, id, call.stop()));
+
+  view.FillHeader(reply->mutable_header());
+  FillNode(node, layers, request.view(), reply->mutable_node());
+  for (const NodeId ancestor : ancestors) reply->add_ancestor_ids(ToString(ancestor));
+  reply->set_child_count(child_count);
+  if (!IsAgentKind(node.kind)) return absl::OkStatus();
+  DSG_ASSIGN_OR_RETURN(const TrackInfo track, snapshot.GetTrack(id));
+  reply->set_pose_count(track.pose_count);
+  if (track.pose_count > 0) {
+    reply->set_first_pose_ns(track.first_ns);
+    reply->set_last_pose_ns(track.last_ns);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ListNodes(const Page& page, const CallContext& call,
+                       const v1::ListNodesRequest& request, v1::ListNodesResponse* reply) {
+  const Snapshot& snapshot = page.view.snapshot();
+  DSG_RETURN_IF_ERROR(CheckNodeView(request.view()));
+  DSG_ASSIGN_OR_RETURN(const NodeFilter filter, FilterFromProto(request.filter(), snapshot));
+  DSG_ASSIGN_OR_RETURN(const LayerTable layers, LayersOf(snapshot));
+  NodeId last;
+  if (!page.is_first()) {
+    std::string_view position = page.position;
+    if (!TakeWord(&position, &last.value) || !position.empty()) return PageTokenError();
+  }
+  size_t bytes = 0;
+  const auto take = [&](const Node& node) {
+    if (reply->nodes_size() == page.size || bytes > kPageBytesSoftMax) {
+      std::string position;
+      AppendWord(last.value, &position);
+      reply->set_next_page_token(page.NextToken(std::move(position)));
+      return false;
+    }
+    v1::Node* out = reply->add_nodes();
+    FillNode(node, layers, request.view(), out);
+    bytes += out->ByteSizeLong();
+    last = node.id;
+    return true;
+  };
+  page.view.FillHeader(reply->mutable_header());
+  return snapshot.ScanNodes(filter, last, call.stop(), take);
+}
+
+}  // namespace dsg::query

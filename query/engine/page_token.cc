@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/engine/page_token.h"
+
+#include "absl/strings/escaping.h"
+#include "dsg/v1/query_service.pb.h"
+#include "query/engine/request_check.h"
+#include "schema/base/status.h"
+
+namespace dsg::query {
+namespace {
+
+// Stands first in every token; a later layout takes another.
+constexpr char kLayout = '1';
+
+// FNV-1a. A token is no secret and guards against mistakes, not against forgery: whoever forges
+// one gets a page of a map that the same call could have read anyway.
+uint64_t Fnv1a(std::string_view bytes, uint64_t hash = 0xcbf29ce484222325ull) {
+  for (const char c : bytes) {
+    hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ull;
+  }
+  return hash;
+}
+
+}  // namespace
+
+uint64_t QuestionDigest(std::string_view method, const google::protobuf::MessageLite& request) {
+  return Fnv1a(request.SerializeAsString(), Fnv1a(method));
+}
+
+void AppendWord(uint64_t word, std::string* position) {
+  for (int shift = 56; shift >= 0; shift -= 8) {
+    position->push_back(static_cast<char>(word >> shift & 0xff));
+  }
+}
+
+bool TakeWord(std::string_view* position, uint64_t* word) {
+  if (position->size() < 8) return false;
+  *word = 0;
+  for (int i = 0; i < 8; ++i) {
+    *word = *word << 8 | static_cast<unsigned char>((*position)[static_cast<size_t>(i)]);
+  }
+  position->remove_prefix(8);
+  return true;
+}
+
+absl::Status PageTokenError() {
+  return MakeError(Reason::kPageTokenMismatch,
+                   "the page token was not given for this question, or was changed; repeat the "
+                   "question that it came from, or begin again without a token",
+                   {{"field", "page_token"}});
+}
+
+std::string EncodePageToken(const PageToken& token, uint64_t question) {
+  std::string body(1, kLayout);
+  AppendWord(static_cast<uint64_t>(token.revision), &body);
+  body += token.position;
+  std::string bytes;
+  AppendWord(Fnv1a(body, question), &bytes);
+  bytes += body;
+  return absl::WebSafeBase64Escape(bytes);
+}
+
+absl::StatusOr<PageToken> DecodePageToken(std::string_view text, uint64_t question) {
+  std::string bytes;
+  if (!absl::WebSafeBase64Unescape(absl::string_view(text.data(), text.size()), &bytes)) {
+    return PageTokenError();
+  }
+  std::string_view rest = bytes;
+  uint64_t seal = 0;
+  // The seal covers the body and, as its seed, the question.
+  if (!TakeWord(&rest, &seal) || seal != Fnv1a(rest, question)) return PageTokenError();
+  if (rest.empty() || rest.front() != kLayout) return PageTokenError();
+  rest.remove_prefix(1);
+  uint64_t revision = 0;
+  if (!TakeWord(&rest, &revision) || rest.empty()) return PageTokenError();
+  return PageToken{static_cast<Revision>(revision), std::string(rest)};
+}
+
+template <typename Request>
+absl::StatusOr<Page> OpenPage(MapTable* maps, std::string_view method, const Request& request) {
+  Page page;
+  DSG_ASSIGN_OR_RETURN(page.size, CheckPageSize(request.page_size()));
+  Request question = request;
+  question.clear_page_size();
+  question.clear_page_token();
+  page.question = QuestionDigest(method, question);
+  if (request.page_token().empty()) {
+    DSG_ASSIGN_OR_RETURN(page.view, ReadView::Open(maps, request.map(), request.read_at()));
+    return page;
+  }
+  DSG_ASSIGN_OR_RETURN(PageToken token, DecodePageToken(request.page_token(), page.question));
+  DSG_ASSIGN_OR_RETURN(page.view, ReadView::OpenAt(maps, request.map(), token.revision));
+  page.position = std::move(token.position);
+  return page;
+}
+
+template absl::StatusOr<Page> OpenPage(MapTable*, std::string_view, const v1::ListNodesRequest&);
+template absl::StatusOr<Page> OpenPage(MapTable*, std::string_view, const v1::ListEdgesRequest&);
+template absl::StatusOr<Page> OpenPage(MapTable*, std::string_view, const v1::ListPresenceRequest&);
+
+}  // namespace dsg::query

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where a list goes on: an opaque text bound to the revision that the first page read and to the
+// question. Refuses a token of another question, so that two lists cannot be mixed unnoticed.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "absl/status/statusor.h"
+#include "query/engine/read_view.h"
+
+namespace google::protobuf {
+class MessageLite;
+}  // namespace google::protobuf
+
+namespace dsg::query {
+
+/// A digest of the method and of every field that shapes its answer. The same in every process.
+/// `request` must have page_size and page_token cleared: both may change between pages.
+uint64_t QuestionDigest(std::string_view method, const google::protobuf::MessageLite& request);
+
+struct PageToken {
+  Revision revision = 0;
+  /// The key of the last entry that was delivered, as bytes that only its question reads.
+  std::string position;
+};
+
+std::string EncodePageToken(const PageToken& token, uint64_t question);
+
+/// Errors: PAGE_TOKEN_MISMATCH when the text is no token, was damaged, or belongs to another
+/// question.
+absl::StatusOr<PageToken> DecodePageToken(std::string_view text, uint64_t question);
+
+/// PAGE_TOKEN_MISMATCH, for a position that its question cannot read.
+absl::Status PageTokenError();
+
+/// Appends 64 bits to a position, so that positions compare as their numbers do when unsigned.
+void AppendWord(uint64_t word, std::string* position);
+/// Takes them off its front. False if there are fewer than 64 bits.
+bool TakeWord(std::string_view* position, uint64_t* word);
+
+/// One page of a list: what to read, from where on, and how much.
+struct Page {
+  ReadView view;
+  uint64_t question = 0;
+  int size = 0;
+  /// Empty for the first page.
+  std::string position;
+
+  bool is_first() const { return position.empty(); }
+  /// The token of the page after the one that ends at `last_position`.
+  std::string NextToken(std::string last_position) const {
+    return EncodePageToken({view.snapshot().revision(), std::move(last_position)}, question);
+  }
+};
+
+/// Settles page size, token and revision of a list request. A later page reads the revision that
+/// the first one read, whatever has been committed since.
+template <typename Request>
+absl::StatusOr<Page> OpenPage(MapTable* maps, std::string_view method, const Request& request);
+
+}  // namespace dsg::query

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/engine/read_view.h"
+
+#include <algorithm>
+
+#include "absl/strings/str_cat.h"
+#include "dsg/v1/query_service.pb.h"
+#include "query/engine/request_check.h"
+#include "schema/base/status.h"
+
+namespace dsg::query {
+
+absl::StatusOr<ReadView> ReadView::Make(std::shared_ptr<MapReader> map,
+                                        std::shared_ptr<const Snapshot> snapshot, Revision head) {
+  ReadView view;
+  DSG_ASSIGN_OR_RETURN(view.oldest_, map->OldestRevision());
+  // A commit between two reads makes the head newer than the snapshot, never older.
+  view.head_ = std::max(head, snapshot->revision());
+  view.map_ = std::move(map);
+  view.snapshot_ = std::move(snapshot);
+  return view;
+}
+
+absl::StatusOr<ReadView> ReadView::OpenAt(MapTable* maps, const std::string& map,
+                                          Revision revision) {
+  DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> reader, maps->Reader(map));
+  DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Snapshot> snapshot, reader->At(revision));
+  DSG_ASSIGN_OR_RETURN(const RevisionInfo head, reader->Head());
+  return Make(std::move(reader), std::move(snapshot), head.revision);
+}
+
+absl::StatusOr<ReadView> ReadView::Open(MapTable* maps, const std::string& map,
+                                        const v1::ReadAt& read_at) {
+  if (read_at.has_exact_revision()) {
+    if (read_at.exact_revision() < 0) {
+      return FieldError("read_at.exact_revision", absl::StrCat(read_at.exact_revision()),
+                        "revisions count from 0, the empty map");
+    }
+    return OpenAt(maps, map, read_at.exact_revision());
+  }
+  DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> reader, maps->Reader(map));
+  DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Snapshot> snapshot, reader->Latest());
+  // The newest revision is the head, so it need not be asked for again.
+  const Revision newest = snapshot->revision();
+  DSG_ASSIGN_OR_RETURN(ReadView view, Make(std::move(reader), std::move(snapshot), newest));
+  const Revision wanted = read_at.at_least_revision();
+  if (wanted < 0) {
+    return FieldError("read_at.at_least_revision", absl::StrCat(wanted),
+                      "revisions count from 0, the empty map");
+  }
+  if (view.snapshot().revision() < wanted) {
+    return MakeError(
+        Reason::kRevisionInFuture,
+        absl::StrCat("map ", map, " is at revision ", view.snapshot().revision(),
+                     ", older than revision ", wanted, " that was asked for; ask again later"),
+        {{"map", map},
+         {"oldest", absl::StrCat(view.oldest_)},
+         {"newest", absl::StrCat(view.head_)}});
+  }
+  return view;
+}
+
+void ReadView::FillHeader(v1::ResponseHeader* header) const {
+  header->set_read_revision(snapshot_->revision());
+  header->set_head_revision(head_);
+  header->set_oldest_revision(oldest_);
+}
+
+}  // namespace dsg::query

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a ReadAt resolves to: a snapshot, and the revisions that the answer's header names.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "query/engine/map_table.h"
+#include "schema/store/snapshot.h"
+
+namespace dsg::v1 {
+class ReadAt;
+class ResponseHeader;
+}  // namespace dsg::v1
+
+namespace dsg::query {
+
+/// Threads: safe from many threads; holds no lock.
+class ReadView {
+ public:
+  /// Errors: MAP_NAME_INVALID; MAP_UNKNOWN; REVISION_IN_FUTURE or REVISION_COMPACTED with `oldest`
+  /// and `newest`; FIELD_INVALID for a negative revision.
+  static absl::StatusOr<ReadView> Open(MapTable* maps, const std::string& map,
+                                       const v1::ReadAt& read_at);
+
+  /// The same at exactly one revision, as a page token names it.
+  static absl::StatusOr<ReadView> OpenAt(MapTable* maps, const std::string& map, Revision revision);
+
+  MapReader& map() const { return *map_; }
+  const Snapshot& snapshot() const { return *snapshot_; }
+  Revision head_revision() const { return head_; }
+
+  void FillHeader(v1::ResponseHeader* header) const;
+
+ private:
+  static absl::StatusOr<ReadView> Make(std::shared_ptr<MapReader> map,
+                                       std::shared_ptr<const Snapshot> snapshot, Revision head);
+
+  std::shared_ptr<MapReader> map_;
+  std::shared_ptr<const Snapshot> snapshot_;
+  Revision head_ = 0;
+  Revision oldest_ = 0;
+};
+
+}  // namespace dsg::query

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// The service without the network: checks requests, opens maps, asks the engine, fills replies.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "query/engine/api.h"
+#include "schema/store/graph_store.h"
+
+namespace dsg::query {
+
+/// A trajectory read one message at a time, for whoever cannot wait inside a callback.
+///
+/// Threads: one caller at a time. Holds no lock and no thread between two messages.
+class TrajectoryCursor {
+ public:
+  virtual ~TrajectoryCursor() = default;
+
+  /// Fills `reply`, which must be clear, with the next message of the stream: the first has the
+  /// header, also when there is no pose in the interval.
+  virtual absl::Status Next(const CallContext& call, v1::GetTrajectoryResponse* reply) = 0;
+  /// No message follows. May only be asked after Next.
+  virtual bool done() const = 0;
+};
+
+/// An Api in this process.
+class ServiceCore : public Api {
+ public:
+  /// GetTrajectory by pulling. Errors: those of GetTrajectory.
+  virtual absl::StatusOr<std::unique_ptr<TrajectoryCursor>> OpenTrajectory(
+      const v1::GetTrajectoryRequest& request) = 0;
+};
+
+/// Makes an Api that answers from `store`. Writers are opened at the first Commit to a map and kept
+/// (with their lock) until the Api is destroyed.
+std::unique_ptr<ServiceCore> MakeServiceCore(std::unique_ptr<GraphStore> store);
+
+}  // namespace dsg::query
