@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/call_deadline.h"
+
+#include <algorithm>
+
+namespace dsg::server {
+
+query::CallContext::Clock::time_point BoundDeadline(
+    std::chrono::system_clock::time_point deadline) {
+  using Wall = std::chrono::system_clock;
+  const auto now = query::CallContext::Clock::now();
+  if (deadline == Wall::time_point::max()) return now + kDeadlineDefault;
+  const Wall::duration left = deadline - Wall::now();
+  return now + std::min<Wall::duration>(left, kDeadlineMax);
+}
+
+}  // namespace dsg::server

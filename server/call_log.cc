@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/call_log.h"
+
+#include "absl/strings/str_cat.h"
+#include "dsg/v1/errors.pb.h"
+#include "schema/base/log.h"
+#include "schema/base/status.h"
+#include "server/status_mapping.h"
+
+namespace dsg::server {
+
+void CallLog::Write(const CallRecord& record) const {
+  const bool is_debug = record.status.ok() && record.elapsed <= kSlowCall;
+  const auto us = std::chrono::duration_cast<std::chrono::microseconds>(record.elapsed).count();
+  const std::string_view message(record.status.message().data(), record.status.message().size());
+  // A map's name has at most 64 characters, but this is what the caller sent.
+  Log(is_debug ? LogLevel::kDebug : LogLevel::kInfo, "rpc",
+      {{"method", std::string(record.method)},
+       {"map", CutText(record.map, 64)},
+       {"code", absl::StatusCodeToString(record.status.code())},
+       {"reason", v1::Reason_Name(static_cast<v1::Reason>(ReasonOf(record.status)))},
+       {"revision", absl::StrCat(record.revision)},
+       {"rows", absl::StrCat(record.row_count)},
+       {"us", absl::StrCat(us)},
+       {"peer", record.peer},
+       {"message", CutText(message, kMessageBytesMax)}});
+}
+
+}  // namespace dsg::server

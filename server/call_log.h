@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// One structured line a call: errors and calls slower than 100 ms at level info, all others at
+// level debug and only if that is on, since a line costs as much as a hundred lookups.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "absl/status/status.h"
+
+namespace dsg::server {
+
+/// Calls that took longer are written at level info.
+inline constexpr std::chrono::milliseconds kSlowCall{100};
+
+struct CallRecord {
+  std::string_view method;
+  /// Empty for calls that name no map.
+  std::string_view map;
+  absl::Status status;
+  /// 0 when the call failed, or reads no revision.
+  int64_t revision = 0;
+  int64_t row_count = 0;
+  std::chrono::steady_clock::duration elapsed{};
+  std::string peer;
+};
+
+class CallLog {
+ public:
+  /// `log_all`: the log's level is debug.
+  explicit CallLog(bool log_all) : log_all_(log_all) {}
+
+  /// Whether such a call gets a line; asked first, so that the others cost nothing.
+  bool Wants(const absl::Status& status, std::chrono::steady_clock::duration elapsed) const {
+    return log_all_ || !status.ok() || elapsed > kSlowCall;
+  }
+  void Write(const CallRecord& record) const;
+
+ private:
+  bool log_all_;
+};
+
+}  // namespace dsg::server

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// What every call needs: the engine, threads to run on, the log.
+#pragma once
+
+#include <atomic>
+
+#include "query/engine/service_core.h"
+#include "server/call_log.h"
+#include "server/worker_pool.h"
+
+namespace dsg::server {
+
+/// Owned by the server; outlives all calls.
+struct CallRuntime {
+  query::ServiceCore* core = nullptr;
+  WorkerPool* workers = nullptr;
+  CallLog log{false};
+  /// Streams that have begun and not ended, whether a worker is at them or their reader is slow.
+  std::atomic<int> open_stream_count{0};
+  int open_stream_max = 0;
+};
+
+/// RESOURCE_EXHAUSTED/OVERLOADED.
+absl::Status OverloadedError();
+
+}  // namespace dsg::server

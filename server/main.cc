@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+// dsg-server: serves the maps of one store folder over gRPC until it is told to stop.
+// Exits 0 after an orderly stop, 2 when it could not start, 3 when it could not stop in time.
+#include <signal.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <string>
+#include <thread>
+
+#include "CLI/CLI.hpp"
+#include "grpc/support/log.h"
+#include "schema/base/log.h"
+#include "schema/store/graph_store.h"
+#include "server/server.h"
+
+namespace {
+
+constexpr std::chrono::milliseconds kGrace{4'000};
+constexpr std::chrono::seconds kStopTimeMax{10};
+
+struct Flags {
+  std::string store;
+  std::string log_level = "info";
+  dsg::server::ServerOptions options;
+};
+
+void DeclareFlags(CLI::App* app, Flags* flags) {
+  app->add_option("--store", flags->store, "Folder of the maps; made if missing")->required();
+  app->add_option("--listen", flags->options.listen,
+                  "unix:PATH or HOST:PORT; default unix:<store>/dsg-server.sock");
+  app->add_option("--workers", flags->options.worker_count,
+                  "Threads that answer calls; 0 = two a core, at least four")
+      ->capture_default_str();
+  app->add_option("--max-in-flight", flags->options.in_flight_max,
+                  "Calls at a time; more are refused with RESOURCE_EXHAUSTED")
+      ->capture_default_str();
+  app->add_option("--max-streams", flags->options.open_stream_max,
+                  "Trajectory streams open at a time; more are refused")
+      ->capture_default_str();
+  app->add_option("--log-level", flags->log_level,
+                  "debug (a line a call), info (errors and calls over 100 ms), warning, error")
+      ->capture_default_str();
+  app->add_flag("--allow-remote", flags->options.allow_remote,
+                "Listen on addresses that other machines reach, though nothing authenticates them");
+  app->set_version_flag("--version", DSG_VERSION);
+}
+
+// Running out of descriptors crashes gRPC 1.51, and the soft limit is often 1024.
+void RaiseDescriptorLimit() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+  limit.rlim_cur = limit.rlim_max;
+  if (setrlimit(RLIMIT_NOFILE, &limit) != 0) {
+    dsg::Log(dsg::LogLevel::kWarning, "descriptor limit not raised");
+  }
+}
+
+void LogOfGrpc(gpr_log_func_args* args) {
+  if (args->severity == GPR_LOG_SEVERITY_ERROR) {
+    dsg::Log(dsg::LogLevel::kWarning, "grpc", {{"message", args->message}});
+  }
+}
+
+int FailToStart(const absl::Status& status) {
+  std::fprintf(stderr, "dsg-server: %s\n", std::string(status.message()).c_str());
+  return 2;
+}
+
+// Blocked in every thread made later, so that only sigwait sees them.
+sigset_t BlockStopSignals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  signal(SIGPIPE, SIG_IGN);
+  return signals;
+}
+
+// A call that ignores its cancellation must not keep the process for ever.
+void StartWatchdog() {
+  std::thread([] {
+    std::this_thread::sleep_for(kStopTimeMax);
+    dsg::Log(dsg::LogLevel::kError, "stop took too long", {{"exit", "3"}});
+    _exit(3);
+  }).detach();
+}
+
+int Serve(Flags flags) {
+  const sigset_t signals = BlockStopSignals();
+  RaiseDescriptorLimit();
+  gpr_set_log_function(LogOfGrpc);
+  dsg::StoreOptions store_options;
+  store_options.create = true;
+  store_options.program = "dsg-server";
+  auto store = dsg::GraphStore::Open(flags.store, store_options);
+  if (!store.ok()) return FailToStart(store.status());
+  const auto maps = (*store)->ListMaps();
+  if (!maps.ok()) return FailToStart(maps.status());
+
+  if (flags.options.listen.empty())
+    flags.options.listen = "unix:" + flags.store + "/dsg-server.sock";
+  flags.options.log_all_calls = flags.log_level == "debug";
+  auto server =
+      dsg::server::Server::Start(dsg::query::MakeServiceCore(*std::move(store)), flags.options);
+  if (!server.ok()) return FailToStart(server.status());
+  std::printf("dsg-server: listening on %s, store %s, %zu maps\n", (*server)->address().c_str(),
+              flags.store.c_str(), maps->size());
+  std::fflush(stdout);
+
+  int received = 0;
+  sigwait(&signals, &received);
+  dsg::Log(dsg::LogLevel::kInfo, "stopping", {{"signal", strsignal(received)}});
+  StartWatchdog();
+  (*server)->Shutdown(kGrace);
+  // Closes the store; its writers give up their locks.
+  server->reset();
+  dsg::Log(dsg::LogLevel::kInfo, "stopped");
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Flags flags;
+  CLI::App app("Serves the maps of a store folder over gRPC.", "dsg-server");
+  try {
+    DeclareFlags(&app, &flags);
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  if (!dsg::SetLogLevel(flags.log_level)) {
+    std::fprintf(stderr, "dsg-server: --log-level is \"%s\"; give debug, info, warning or error\n",
+                 flags.log_level.c_str());
+    return 2;
+  }
+  return Serve(std::move(flags));
+}

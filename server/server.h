@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// A running server: it binds, bounds what it accepts, and stops in order. Domain logic is not here.
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "query/engine/service_core.h"
+
+namespace dsg::server {
+
+struct ServerOptions {
+  /// "unix:PATH" or "HOST:PORT".
+  std::string listen;
+  /// Threads that answer calls; 0 = two a core, at least four.
+  int worker_count = 0;
+  /// Calls queued and running at a time; more are refused at once.
+  int in_flight_max = 256;
+  /// Streams open at a time, whether they are written to or wait for their reader. Each holds one
+  /// message of at most 1000 poses, and what gRPC buffers.
+  int open_stream_max = 128;
+  /// Listen on addresses that other machines can reach.
+  bool allow_remote = false;
+  /// A log line for every call, not only for errors and slow ones.
+  bool log_all_calls = false;
+
+  /// Errors: FIELD_INVALID; workers are 0 to 256, calls and streams 1 to 65536.
+  absl::Status Validate() const;
+};
+
+class Server {
+ public:
+  /// Listens when it returns.
+  ///
+  /// Errors: what ParseListenAddress and UnixSocketClaim::Take return; UNAVAILABLE when the address
+  /// is taken, naming it and the system's reason.
+  static absl::StatusOr<std::unique_ptr<Server>> Start(std::unique_ptr<query::ServiceCore> core,
+                                                       const ServerOptions& options);
+
+  /// As Shutdown with a grace of a second.
+  virtual ~Server() = default;
+
+  /// What a client dials, with the port that was taken.
+  virtual const std::string& address() const = 0;
+
+  /// Reports not-ready, accepts no more calls, lets the running ones end within `grace`, cancels
+  /// the rest, joins the workers. Further calls do nothing. Never from a handler.
+  virtual void Shutdown(std::chrono::milliseconds grace) = 0;
+};
+
+}  // namespace dsg::server

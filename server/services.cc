@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/services.h"
+
+#include <google/protobuf/arena.h>
+
+#include "dsg/v1/ingest_service.grpc.pb.h"
+#include "dsg/v1/map_service.grpc.pb.h"
+#include "dsg/v1/query_service.grpc.pb.h"
+#include "server/trajectory_call.h"
+#include "server/unary_call.h"
+
+namespace dsg::server {
+namespace {
+
+using grpc::CallbackServerContext;
+using grpc::ServerUnaryReactor;
+using query::Api;
+
+// Requests and replies on protobuf arenas. Worth it only where a message has tens of thousands of
+// parts: a batch of 10,000 answers is freed as one piece instead of 70,000, which gave a fifth more
+// lookups a second on two cores.
+template <typename Request, typename Reply>
+class ArenaMessages final : public grpc::MessageAllocator<Request, Reply> {
+ public:
+  grpc::MessageHolder<Request, Reply>* AllocateMessages() override { return new Holder(); }
+
+ private:
+  class Holder final : public grpc::MessageHolder<Request, Reply> {
+   public:
+    Holder() : arena_(Options()) {
+      this->set_request(google::protobuf::Arena::CreateMessage<Request>(&arena_));
+      this->set_response(google::protobuf::Arena::CreateMessage<Reply>(&arena_));
+    }
+    void Release() override { delete this; }
+
+   private:
+    static google::protobuf::ArenaOptions Options() {
+      google::protobuf::ArenaOptions options;
+      options.start_block_size = size_t{16} << 10;
+      // Below the size from which malloc asks the kernel for fresh, unmapped pages each time.
+      options.max_block_size = size_t{64} << 10;
+      return options;
+    }
+    google::protobuf::Arena arena_;
+  };
+};
+
+class QueryService final : public v1::QueryService::CallbackService {
+ public:
+  explicit QueryService(CallRuntime* runtime) : runtime_(runtime) {
+    SetMessageAllocatorFor_BatchLocateAgents(&batch_messages_);
+  }
+
+  ServerUnaryReactor* LocateAgent(CallbackServerContext* context,
+                                  const v1::LocateAgentRequest* request,
+                                  v1::LocateAgentResponse* reply) override {
+    return StartUnary(runtime_, "LocateAgent", &Api::LocateAgent, context, request, reply);
+  }
+  ServerUnaryReactor* BatchLocateAgents(CallbackServerContext* context,
+                                        const v1::BatchLocateAgentsRequest* request,
+                                        v1::BatchLocateAgentsResponse* reply) override {
+    return StartUnary(runtime_, "BatchLocateAgents", &Api::BatchLocateAgents, context, request,
+                      reply);
+  }
+  grpc::ServerWriteReactor<v1::GetTrajectoryResponse>* GetTrajectory(
+      CallbackServerContext* context, const v1::GetTrajectoryRequest* request) override {
+    return StartTrajectory(runtime_, context, request);
+  }
+  ServerUnaryReactor* ListPresence(CallbackServerContext* context,
+                                   const v1::ListPresenceRequest* request,
+                                   v1::ListPresenceResponse* reply) override {
+    return StartUnary(runtime_, "ListPresence", &Api::ListPresence, context, request, reply);
+  }
+  ServerUnaryReactor* GetNode(CallbackServerContext* context, const v1::GetNodeRequest* request,
+                              v1::GetNodeResponse* reply) override {
+    return StartUnary(runtime_, "GetNode", &Api::GetNode, context, request, reply);
+  }
+  ServerUnaryReactor* ListNodes(CallbackServerContext* context, const v1::ListNodesRequest* request,
+                                v1::ListNodesResponse* reply) override {
+    return StartUnary(runtime_, "ListNodes", &Api::ListNodes, context, request, reply);
+  }
+  ServerUnaryReactor* ListEdges(CallbackServerContext* context, const v1::ListEdgesRequest* request,
+                                v1::ListEdgesResponse* reply) override {
+    return StartUnary(runtime_, "ListEdges", &Api::ListEdges, context, request, reply);
+  }
+  ServerUnaryReactor* ListNearestNodes(CallbackServerContext* context,
+                                       const v1::ListNearestNodesRequest* request,
+                                       v1::ListNearestNodesResponse* reply) override {
+    return StartUnary(runtime_, "ListNearestNodes", &Api::ListNearestNodes, context, request,
+                      reply);
+  }
+
+ private:
+  ArenaMessages<v1::BatchLocateAgentsRequest, v1::BatchLocateAgentsResponse> batch_messages_;
+  CallRuntime* runtime_;
+};
+
+class MapService final : public v1::MapService::CallbackService {
+ public:
+  explicit MapService(CallRuntime* runtime) : runtime_(runtime) {}
+
+  ServerUnaryReactor* CreateMap(CallbackServerContext* context, const v1::CreateMapRequest* request,
+                                v1::CreateMapResponse* reply) override {
+    return StartUnary(runtime_, "CreateMap", &Api::CreateMap, context, request, reply);
+  }
+  ServerUnaryReactor* ListMaps(CallbackServerContext* context, const v1::ListMapsRequest* request,
+                               v1::ListMapsResponse* reply) override {
+    return StartUnary(runtime_, "ListMaps", &Api::ListMaps, context, request, reply);
+  }
+  ServerUnaryReactor* GetMapStats(CallbackServerContext* context,
+                                  const v1::GetMapStatsRequest* request,
+                                  v1::GetMapStatsResponse* reply) override {
+    return StartUnary(runtime_, "GetMapStats", &Api::GetMapStats, context, request, reply);
+  }
+  ServerUnaryReactor* ListRevisions(CallbackServerContext* context,
+                                    const v1::ListRevisionsRequest* request,
+                                    v1::ListRevisionsResponse* reply) override {
+    return StartUnary(runtime_, "ListRevisions", &Api::ListRevisions, context, request, reply);
+  }
+  ServerUnaryReactor* GetServerInfo(CallbackServerContext* context,
+                                    const v1::GetServerInfoRequest* request,
+                                    v1::GetServerInfoResponse* reply) override {
+    return StartUnary(runtime_, "GetServerInfo", &Api::GetServerInfo, context, request, reply);
+  }
+
+ private:
+  CallRuntime* runtime_;
+};
+
+class IngestService final : public v1::IngestService::CallbackService {
+ public:
+  explicit IngestService(CallRuntime* runtime) : runtime_(runtime) {}
+
+  ServerUnaryReactor* Commit(CallbackServerContext* context, const v1::CommitRequest* request,
+                             v1::CommitResponse* reply) override {
+    return StartUnary(runtime_, "Commit", &Api::Commit, context, request, reply);
+  }
+  ServerUnaryReactor* GetSession(CallbackServerContext* context,
+                                 const v1::GetSessionRequest* request,
+                                 v1::GetSessionResponse* reply) override {
+    return StartUnary(runtime_, "GetSession", &Api::GetSession, context, request, reply);
+  }
+
+ private:
+  CallRuntime* runtime_;
+};
+
+}  // namespace
+
+std::unique_ptr<grpc::Service> MakeQueryService(CallRuntime* runtime) {
+  return std::make_unique<QueryService>(runtime);
+}
+
+std::unique_ptr<grpc::Service> MakeMapService(CallRuntime* runtime) {
+  return std::make_unique<MapService>(runtime);
+}
+
+std::unique_ptr<grpc::Service> MakeIngestService(CallRuntime* runtime) {
+  return std::make_unique<IngestService>(runtime);
+}
+
+}  // namespace dsg::server

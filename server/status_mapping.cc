@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/status_mapping.h"
+
+#include "dsg/v1/errors.pb.h"
+#include "schema/base/status.h"
+
+namespace dsg::server {
+namespace {
+
+// Bytes of the UTF-8 character that begins at `at`, 0 if there is none.
+size_t CharacterLength(std::string_view text, size_t at) {
+  const auto byte = [&](size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned char lead = byte(at);
+  if (lead < 0x80) return 1;
+  const size_t length = lead >= 0xf0 ? 4 : lead >= 0xe0 ? 3 : 2;
+  if (lead < 0xc2 || lead > 0xf4 || at + length > text.size()) return 0;
+  for (size_t i = at + 1; i < at + length; ++i) {
+    if ((byte(i) & 0xc0) != 0x80) return 0;
+  }
+  // Overlong forms, surrogates, and what lies beyond Unicode.
+  const unsigned char second = byte(at + 1);
+  if (lead == 0xe0 && second < 0xa0) return 0;
+  if (lead == 0xed && second > 0x9f) return 0;
+  if (lead == 0xf0 && second < 0x90) return 0;
+  if (lead == 0xf4 && second > 0x8f) return 0;
+  return length;
+}
+
+}  // namespace
+
+std::string CutText(std::string_view text, size_t bytes_max) {
+  std::string out;
+  for (size_t at = 0; at < text.size();) {
+    const size_t length = CharacterLength(text, at);
+    const std::string_view piece = length == 0 ? std::string_view("?") : text.substr(at, length);
+    if (out.size() + piece.size() > bytes_max) break;
+    out += piece;
+    at += length == 0 ? 1 : length;
+  }
+  return out;
+}
+
+grpc::Status ToGrpc(const absl::Status& status) {
+  if (status.ok()) return grpc::Status::OK;
+  const std::string_view message(status.message().data(), status.message().size());
+  return grpc::Status(static_cast<grpc::StatusCode>(status.code()),
+                      CutText(message, kMessageBytesMax));
+}
+
+std::string EncodeErrorDetail(const absl::Status& status) {
+  const Reason reason = ReasonOf(status);
+  if (reason == Reason::kUnspecified) return "";
+  v1::ErrorDetail detail;
+  detail.set_reason(static_cast<v1::Reason>(reason));
+  detail.set_domain("dsg");
+  for (const auto& [key, value] : MetadataOf(status)) {
+    (*detail.mutable_metadata())[key] = CutText(value, kMessageBytesMax / 2);
+  }
+  return detail.SerializeAsString();
+}
+
+}  // namespace dsg::server

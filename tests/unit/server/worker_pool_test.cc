@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/worker_pool.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <future>
+
+namespace dsg::server {
+namespace {
+
+class CountJob final : public Job {
+ public:
+  explicit CountJob(std::atomic<int>* count) : count_(count) {}
+  void Run() override { count_->fetch_add(1); }
+
+ private:
+  std::atomic<int>* count_;
+};
+
+// Says that it runs, then runs until it is let go.
+class HeldJob final : public Job {
+ public:
+  void Run() override {
+    started_.set_value();
+    release_.get_future().wait();
+  }
+  void WaitUntilStarted() { started_.get_future().wait(); }
+  void Release() { release_.set_value(); }
+
+ private:
+  std::promise<void> started_;
+  std::promise<void> release_;
+};
+
+TEST(WorkerPool, RunsEveryJobOnce) {
+  std::atomic<int> count = 0;
+  CountJob job(&count);
+  WorkerPool pool(3, 1000);
+  for (int i = 0; i < 1000; ++i) ASSERT_TRUE(pool.TrySubmit(&job));
+  pool.Stop();
+  EXPECT_EQ(count, 1000);
+}
+
+TEST(WorkerPool, RefusesWhatIsTooMuchAndTakesMoreOnceThereIsRoom) {
+  std::atomic<int> count = 0;
+  CountJob small(&count);
+  HeldJob held;
+  WorkerPool pool(1, 2);
+  ASSERT_TRUE(pool.TrySubmit(&held));
+  held.WaitUntilStarted();
+  EXPECT_TRUE(pool.TrySubmit(&small));
+  EXPECT_FALSE(pool.TrySubmit(&small));
+  held.Release();
+  pool.Stop();
+  EXPECT_EQ(count, 1);
+}
+
+TEST(WorkerPool, NeverRefusesWhatHasBegun) {
+  std::atomic<int> count = 0;
+  CountJob small(&count);
+  HeldJob held;
+  WorkerPool pool(1, 1);
+  ASSERT_TRUE(pool.TrySubmit(&held));
+  held.WaitUntilStarted();
+  EXPECT_FALSE(pool.TrySubmit(&small));
+  pool.Resubmit(&small);
+  held.Release();
+  pool.Stop();
+  EXPECT_EQ(count, 1);
+}
+
+TEST(WorkerPool, TakesNothingAfterItStopped) {
+  std::atomic<int> count = 0;
+  CountJob job(&count);
+  WorkerPool pool(1, 10);
+  pool.Stop();
+  EXPECT_FALSE(pool.TrySubmit(&job));
+  pool.Stop();
+  EXPECT_EQ(count, 0);
+}
+
+}  // namespace
+}  // namespace dsg::server
