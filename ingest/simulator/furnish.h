@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Puts the catalogue's furniture into a floor plan.
+// Refuses a position that overlaps, blocks a door, or cuts off part of a room.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "ingest/simulator/floor_plan.h"
+#include "ingest/simulator/random.h"
+#include "schema/model/node.h"
+
+namespace dsg::simulator {
+
+/// A box of furniture.
+struct Furniture {
+  std::string class_name;
+  /// Unique in the world: "fridge", "chair 12".
+  std::string name;
+  int room = 0;
+  /// Index of the piece it stands on; -1 = the floor.
+  int on = -1;
+  /// Middle of the box, map frame.
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  /// In the piece's own frame, whose y axis is its front.
+  Eigen::Vector3d size = Eigen::Vector3d::Zero();
+  /// Turns to the left of that frame against the map, 0 to 3.
+  int quarter_turns = 0;
+  Color color = {128, 128, 128, 255};
+
+  /// What it covers of the floor, map frame.
+  Rect Footprint() const {
+    Point half(0.5 * size.x(), 0.5 * size.y());
+    if (quarter_turns % 2 == 1) std::swap(half.x(), half.y());
+    return Rect(center.head<2>() - half, center.head<2>() + half);
+  }
+};
+
+/// Order: by room; what stands on a piece comes after it.
+std::vector<Furniture> Furnish(const FloorPlan& plan, Random* random);
+
+/// Walls and all furniture that stands on the floor.
+FreeSpace FreeSpaceOf(const FloorPlan& plan, const std::vector<Furniture>& furniture);
+
+}  // namespace dsg::simulator

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// A plain picture: filled shapes, thick lines, small text, and PNG out.
+// Refuses to know what it shows.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/status/statusor.h"
+
+namespace dsg::simulator {
+
+/// 0 to 1 each; opacity 1 covers what is below.
+struct Paint {
+  float red = 0.0f;
+  float green = 0.0f;
+  float blue = 0.0f;
+  float opacity = 1.0f;
+};
+
+/// From 0xRRGGBB.
+Paint MakePaint(uint32_t rgb, float opacity = 1.0f);
+
+/// Rows from the top; three bytes a pixel: red, green, blue.
+struct Picture {
+  int width = 0;
+  int height = 0;
+  std::vector<uint8_t> rgb;
+};
+
+/// Errors: INTERNAL with what the library says.
+absl::StatusOr<std::string> EncodePng(const Picture& picture);
+
+/// Pixels count from the top left corner, y down; shapes are cut at the border.
+class Canvas {
+ public:
+  /// Requires: both sizes from 1 to 16384.
+  Canvas(int width, int height, const Paint& background);
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+
+  void FillRect(const Eigen::Vector2d& low, const Eigen::Vector2d& high, const Paint& paint);
+  void FillCircle(const Eigen::Vector2d& center, double radius, const Paint& paint);
+  /// One stroke through all points with round joints; it does not darken where it crosses itself.
+  void DrawPolyline(const std::vector<Eigen::Vector2d>& points, double width, const Paint& paint);
+  /// Letters of 5 x 7 dots, `dot` pixels each; lower case, digits, space, '-' and '.', anything
+  /// else is blank. `low` is the top left corner; g, p, q and y hang two dots below the seven.
+  void DrawText(const Eigen::Vector2d& low, std::string_view text, double dot, const Paint& paint);
+  static double TextWidth(std::string_view text, double dot);
+
+  /// Two by two pixels averaged to one, which smooths the edges.
+  Picture Halved() const;
+
+ private:
+  void Blend(int x, int y, const Paint& paint);
+
+  int width_;
+  int height_;
+  std::vector<float> pixels_;
+};
+
+}  // namespace dsg::simulator
