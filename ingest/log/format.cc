@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/log/format.h"
+
+#include <charconv>
+#include <filesystem>
+#include <fstream>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "ingest/log/text_table.h"
+#include "schema/base/status.h"
+#include "schema/interop/scene_graph_file.h"
+
+namespace dsg::ingest {
+namespace {
+
+// A header or a first row is far shorter; what is longer is no table.
+constexpr size_t kFirstLineMax = 65536;
+
+bool BeginsWithNumber(std::string_view field) {
+  double value = 0.0;
+  if (field.starts_with('+')) field.remove_prefix(1);
+  return std::from_chars(field.data(), field.data() + field.size(), value).ec == std::errc();
+}
+
+std::string WithoutBlanks(std::string_view text) {
+  std::string compact;
+  for (const char c : text.substr(0, 256)) {
+    if (c != ' ' && c != '\t' && c != '\r' && c != '\n') compact += c;
+  }
+  return compact;
+}
+
+bool Has(const std::vector<std::string_view>& fields, std::string_view name) {
+  for (const std::string_view field : fields) {
+    if (field == name) return true;
+  }
+  return false;
+}
+
+// Empty when the first line belongs to no format.
+std::string FormatOfCommaTable(const std::vector<std::string_view>& fields) {
+  if (fields[0].starts_with("#timestamp") && fields.size() >= 8) return "euroc";
+  if (Has(fields, "ag_id") && Has(fields, "Time") && Has(fields, "tracklet_id")) return "thor";
+  if (Has(fields, "time_ns") && Has(fields, "agent")) return "dsg-tracks";
+  int64_t stamp = 0;
+  const bool has_stamp =
+      std::from_chars(fields[0].data(), fields[0].data() + fields[0].size(), stamp).ec ==
+      std::errc();
+  if (has_stamp && (fields.size() == 8 || fields.size() == 17)) return "euroc";
+  return "";
+}
+
+std::string FormatOfBytes(std::string_view bytes) {
+  // Before the scene graphs, which are JSON objects too.
+  const std::string begin = WithoutBlanks(bytes);
+  if (begin.starts_with("{\"scene\":") || begin.starts_with("{\"track\":")) {
+    return "trajnet-ndjson";
+  }
+  if (LooksLikeSceneGraph(bytes)) return "spark-dsg";
+  LineReader lines(bytes.substr(0, kFirstLineMax));
+  TextLine line;
+  if (!lines.Next(&line)) return "";
+  std::vector<std::string_view> fields;
+  SplitAtCommas(line.text, &fields);
+  if (fields.size() > 1) return FormatOfCommaTable(fields);
+  SplitAtBlanks(line.text, &fields);
+  if (!BeginsWithNumber(fields[0])) return "";
+  if (fields.size() == 8) return "obsmat";
+  if (fields.size() == 4) return "trajnet";
+  return "";
+}
+
+absl::Status Unknown(const std::string& path, std::string_view what) {
+  return MakeError(Reason::kFileMalformed,
+                   absl::StrCat(path, ": ", std::string(what),
+                                "; name the format with --format: ", FormatList()),
+                   {{"file", path}, {"formats", FormatList()}});
+}
+
+bool IsFile(const std::filesystem::path& path) {
+  std::error_code error;
+  return std::filesystem::is_regular_file(path, error);
+}
+
+bool IsEurocTable(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::string begin(4096, '\0');
+  in.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  begin.resize(static_cast<size_t>(in.gcount()));
+  // An IMU's data.csv has seven columns.
+  return FormatOfBytes(begin) == "euroc";
+}
+
+}  // namespace
+
+const std::vector<std::string>& FormatNames() {
+  static const auto* const names = new std::vector<std::string>{
+      "obsmat",    "trajnet",     "trajnet-ndjson", "thor",      "euroc",
+      "spark-dsg", "kimera-json", "region-json",    "dsg-tracks"};
+  return *names;
+}
+
+std::string FormatList() { return absl::StrJoin(FormatNames(), ", "); }
+
+absl::StatusOr<std::string> DetectFileFormat(std::string_view bytes, const std::string& path) {
+  std::string format = FormatOfBytes(bytes);
+  if (format.empty()) return Unknown(path, "its first line belongs to no known log format");
+  return format;
+}
+
+std::string FindEurocFile(const std::string& folder) {
+  const std::filesystem::path root(folder);
+  const std::filesystem::path file =
+      std::filesystem::path("state_groundtruth_estimate0") / "data.csv";
+  for (const std::filesystem::path& candidate : {root / "mav0" / file, root / file}) {
+    if (IsFile(candidate)) return candidate.string();
+  }
+  if (IsFile(root / "data.csv") && IsEurocTable(root / "data.csv")) {
+    return (root / "data.csv").string();
+  }
+  return "";
+}
+
+absl::StatusOr<std::string> DetectFolderFormat(const std::string& folder) {
+  if (IsFile(std::filesystem::path(folder) / "tracks.csv")) return "dsg-tracks";
+  if (!FindEurocFile(folder).empty()) return "euroc";
+  return Unknown(folder,
+                 "holds neither tracks.csv (dsg-tracks) nor "
+                 "mav0/state_groundtruth_estimate0/data.csv (euroc); give the log file itself");
+}
+
+}  // namespace dsg::ingest

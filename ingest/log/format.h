@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which format a log is in, told by its content and the shape of its folder, never by a name's
+// ending.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/status/statusor.h"
+
+namespace dsg::ingest {
+
+/// The names that --format takes, besides "auto".
+const std::vector<std::string>& FormatNames();
+
+/// "obsmat, trajnet, ...".
+std::string FormatList();
+
+/// Errors: INVALID_ARGUMENT/FILE_MALFORMED listing the formats when nothing fits.
+absl::StatusOr<std::string> DetectFileFormat(std::string_view bytes, const std::string& path);
+absl::StatusOr<std::string> DetectFolderFormat(const std::string& folder);
+
+/// The ground truth inside an EuRoC folder ("mav0", its parent, or
+/// "state_groundtruth_estimate0"); empty when the folder is none.
+std::string FindEurocFile(const std::string& folder);
+
+}  // namespace dsg::ingest

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "absl/strings/str_cat.h"
+#include "ingest/log/frame_clock.h"
+#include "ingest/log/readers.h"
+#include "ingest/log/text_table.h"
+#include "ingest/log/track_log.h"
+#include "schema/base/status.h"
+
+namespace dsg::ingest {
+namespace {
+
+constexpr char kColumns[] = "frame person x z y vx vz vy";
+
+absl::Status AddRow(const LogOptions& options, const TextLine& line,
+                    const std::vector<std::string_view>& fields, TrackTable* table) {
+  const LinePosition at{table->file, line.number};
+  DSG_RETURN_IF_ERROR(CheckFieldCount(at, line, fields.size(), 8, kColumns));
+  DSG_ASSIGN_OR_RETURN(const int64_t frame, ParseFrame(at, fields[0]));
+  DSG_ASSIGN_OR_RETURN(const std::string person, ParsePersonName(at, fields[1]));
+  Eigen::Vector3d position;
+  DSG_ASSIGN_OR_RETURN(position.x(), ParseCoordinate(at, "x", fields[2]));
+  DSG_ASSIGN_OR_RETURN(position.z(), ParseCoordinate(at, "z", fields[3]));
+  DSG_ASSIGN_OR_RETURN(position.y(), ParseCoordinate(at, "y", fields[4]));
+  constexpr std::string_view kVelocities[] = {"vx", "vz", "vy"};
+  for (size_t i = 0; i < 3; ++i) {
+    DSG_RETURN_IF_ERROR(ParseNumber(at, kVelocities[i], fields[5 + i]).status());
+  }
+  const int32_t agent = table->FindOrAdd(options.agent_prefix + person, kinds::kHuman);
+  table->AddPosition(frame, line.number, agent, position);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+OpenedLog ReadObsmat(const LogFile& file, const LogOptions& options) {
+  TrackTable table;
+  table.file = file.path;
+  LineReader lines(file.bytes);
+  TextLine line;
+  std::vector<std::string_view> fields;
+  while (lines.Next(&line)) {
+    SplitAtBlanks(line.text, &fields);
+    DSG_RETURN_IF_ERROR(AddRow(options, line, fields, &table));
+  }
+  LogInfo info = DescribeTextLog("obsmat", file);
+  return MakeFrameLog(std::move(table), options, std::move(info));
+}
+
+}  // namespace dsg::ingest

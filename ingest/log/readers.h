@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// One function a format; each reads a whole log into memory and checks it line by line.
+// Errors of all: INVALID_ARGUMENT/FILE_MALFORMED naming file, line, field, value and what to do.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "ingest/log/file_bytes.h"
+#include "ingest/log/log_source.h"
+
+namespace dsg::ingest {
+
+using OpenedLog = absl::StatusOr<std::unique_ptr<LogSource>>;
+
+/// ETH/UCY: frame, person, x, z, y, vx, vz, vy between blanks; metres and m/s; velocities are
+/// checked to be numbers and not kept.
+OpenedLog ReadObsmat(const LogFile& file, const LogOptions& options);
+
+/// frame, person, x, y between blanks; metres.
+OpenedLog ReadTrajnet(const LogFile& file, const LogOptions& options);
+
+/// One JSON object a line: {"track": {f, p, x, y}}, metres; {"scene": ...} lines are counted.
+OpenedLog ReadTrajnetNdjson(const LogFile& file, const LogOptions& options);
+
+/// THOR-MAGNI tracklets: columns found by the header. Times restart with each run and repeat per
+/// helmet, so the agent is the tracklet, "<ag_id>/<tracklet_id>".
+OpenedLog ReadThor(const LogFile& file, const LogOptions& options);
+
+/// EuRoC state_groundtruth_estimate0/data.csv: stamp [ns, UNIX], p x y z, q w x y z, ...
+OpenedLog ReadEuroc(const LogFile& file, const LogOptions& options);
+
+/// Spark-DSG, Kimera and region files. `format` is "auto" or what the file must turn out to be.
+OpenedLog ReadSceneGraphLog(const LogFile& file, const LogOptions& options);
+
+/// What dsg-simulate writes: the world (may be missing) and tracks.csv, times from the epoch.
+OpenedLog ReadTracks(const std::optional<LogFile>& world, const LogFile& tracks,
+                     const LogOptions& options);
+
+}  // namespace dsg::ingest

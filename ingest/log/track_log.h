@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tracks of a log in memory: checked in the order of the file, handed out in the order of time.
+// Refuses logs in which an agent's time repeats or steps back, since no order could be trusted.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/container/flat_hash_map.h"
+#include "ingest/log/log_source.h"
+
+namespace dsg::ingest {
+
+/// One row of a track log.
+struct TrackRow {
+  /// Nanoseconds; while a reader without a clock collects rows, the frame number.
+  TimeNs time_ns = 0;
+  int64_t line = 0;
+  /// Index into TrackTable::names.
+  int32_t agent = 0;
+  uint32_t flags = 0;
+  Pose3d map_T_agent;
+};
+
+/// All rows of a log, in the order of the file.
+struct TrackTable {
+  struct Agent {
+    std::string name;
+    std::string kind;
+  };
+
+  /// The index of an agent, new or known. Name and kind together identify it.
+  int32_t FindOrAdd(std::string_view name, std::string_view kind);
+  /// A position without orientation.
+  void AddPosition(TimeNs time_ns, int64_t line, int32_t agent, const Eigen::Vector3d& position);
+
+  std::string file;
+  std::vector<Agent> agents;
+  std::vector<TrackRow> rows;
+
+ private:
+  absl::flat_hash_map<std::string, int32_t> index_;
+};
+
+/// Errors: FILE_MALFORMED when the log has no row.
+absl::Status CheckHasRows(const TrackTable& table);
+
+/// Times strictly grow per agent. `unit` is what a reader's times are: "time" or "frame".
+/// Errors: FILE_MALFORMED naming file, line, agent, both times and what to do.
+absl::Status CheckOrder(const TrackTable& table, std::string_view unit);
+
+/// A log that yields `graph` (if any), then the rows by time and agent name. Fills in what
+/// `info` has of counts and first stamp. Requires: CheckOrder holds for nanoseconds.
+std::unique_ptr<LogSource> MakeTrackLog(TrackTable table, std::optional<GraphMeasurement> graph,
+                                        LogInfo info);
+
+/// Checks rows that carry nanoseconds, and makes the log.
+absl::StatusOr<std::unique_ptr<LogSource>> MakeClockLog(TrackTable table,
+                                                        std::optional<GraphMeasurement> graph,
+                                                        LogInfo info);
+
+}  // namespace dsg::ingest

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/pipeline/delta_builder.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "schema/model/delta_check.h"
+
+namespace dsg::ingest {
+namespace {
+
+constexpr double kHumanHalfWidthM = 0.25;
+constexpr double kHumanHeightM = 1.8;
+constexpr double kRobotHalfSizeM = 0.25;
+
+}  // namespace
+
+Node DeltaBuilder::MakeNode(NodeId id, const PoseMeasurement& first) const {
+  Node node;
+  node.id = id;
+  node.layer = layers::kAgents;
+  node.kind = first.agent_kind;
+  node.name = first.agent_name;
+  node.provenance = Provenance::kPerceived;
+  node.valid = {first.pose.time_ns, kTimeMax};
+  node.first_observed_ns = first.pose.time_ns;
+  node.agent.emplace();
+  if (first.agent_kind == kinds::kHuman) {
+    // A helmet may be worn higher than the usual height; the box reaches up to it.
+    const double top = std::max(kHumanHeightM - feet_below_m_, 0.0);
+    node.box_node = {Eigen::Vector3d(-kHumanHalfWidthM, -kHumanHalfWidthM, -feet_below_m_),
+                     Eigen::Vector3d(kHumanHalfWidthM, kHumanHalfWidthM, top)};
+  } else {
+    node.box_node = {Eigen::Vector3d::Constant(-kRobotHalfSizeM),
+                     Eigen::Vector3d::Constant(kRobotHalfSizeM)};
+  }
+  return node;
+}
+
+void DeltaBuilder::AddPose(NodeId agent, const PoseMeasurement& measurement) {
+  auto [entry, is_new] = agents_.try_emplace(agent);
+  Agent& track = entry->second;
+  if (is_new) track.node = MakeNode(agent, measurement);
+  track.node.map_T_node = measurement.pose.map_T_agent;
+  track.node.last_observed_ns = measurement.pose.time_ns;
+  ++track.node.observation_count;
+  track.is_stale = true;
+  if (track.pending.empty()) touched_.push_back(&track);
+  track.pending.push_back(measurement.pose);
+  ++pose_count_;
+}
+
+GraphDelta DeltaBuilder::Take(std::vector<Stay> stays) {
+  GraphDelta delta;
+  for (Agent* agent : touched_) {
+    if (agent->is_new) {
+      delta.nodes.push_back(agent->node);
+      agent->is_new = agent->is_stale = false;
+    }
+    delta.appends.push_back({agent->node.id, std::move(agent->pending)});
+    agent->pending.clear();
+  }
+  touched_.clear();
+  pose_count_ = 0;
+  delta.stays = std::move(stays);
+  Coalesce(&delta);
+  return delta;
+}
+
+GraphDelta DeltaBuilder::TakeNodes() {
+  GraphDelta delta;
+  for (auto& [id, agent] : agents_) {
+    if (agent.is_stale) delta.nodes.push_back(agent.node);
+    agent.is_stale = false;
+  }
+  return delta;
+}
+
+}  // namespace dsg::ingest

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// Folds poses into deltas. Refuses to look at the map: the same log gives the same deltas,
+// whatever is stored already.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "ingest/log/log_source.h"
+#include "schema/model/graph_delta.h"
+
+namespace dsg::ingest {
+
+/// Threads: one caller at a time.
+class DeltaBuilder {
+ public:
+  /// `feet_below_m`: LogInfo::feet_below_m.
+  explicit DeltaBuilder(double feet_below_m) : feet_below_m_(feet_below_m) {}
+
+  /// The first pose of an agent also makes its node.
+  void AddPose(NodeId agent, const PoseMeasurement& measurement);
+
+  /// Poses since the last Take.
+  int64_t pose_count() const { return pose_count_; }
+  int64_t agent_count() const { return static_cast<int64_t>(agents_.size()); }
+
+  /// All that was added since the last call, with `stays`, coalesced. Identity is the caller's.
+  GraphDelta Take(std::vector<Stay> stays);
+
+  /// At the end of the log: what became of each agent whose node was told before its last pose
+  /// (last pose, times observed).
+  GraphDelta TakeNodes();
+
+ private:
+  struct Agent {
+    Node node;
+    std::vector<TimedPose> pending;
+    /// Not told yet at all.
+    bool is_new = true;
+    /// Has poses since its node was told.
+    bool is_stale = false;
+  };
+
+  Node MakeNode(NodeId id, const PoseMeasurement& first) const;
+
+  double feet_below_m_;
+  int64_t pose_count_ = 0;
+  /// Ascending by id, so deltas are sorted.
+  std::map<NodeId, Agent> agents_;
+  /// Agents with pending poses.
+  std::vector<Agent*> touched_;
+};
+
+}  // namespace dsg::ingest

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/pipeline/delta_size.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "schema/codec/proto_convert.h"
+
+namespace dsg::ingest {
+namespace {
+
+// Field tags, lengths, ids and stamps of one row.
+constexpr size_t kRowBytes = 64;
+constexpr size_t kPoseBytes = 96;
+constexpr size_t kCovarianceBytes = 88;
+constexpr size_t kFactorBytes = 256;
+// Position, normal, colour, label, instance and two stamps of a vertex; indices of a face.
+constexpr size_t kVertexBytes = 64;
+constexpr size_t kFaceBytes = 15;
+
+size_t BytesOf(const std::vector<TimedPose>& poses) {
+  size_t bytes = poses.size() * kPoseBytes;
+  for (const TimedPose& pose : poses) bytes += pose.covariance != nullptr ? kCovarianceBytes : 0;
+  return bytes;
+}
+
+size_t BytesOf(const BodyShape& shape) {
+  return kRowBytes + sizeof(float) * (shape.pose_coefficients.size() +
+                                      shape.shape_coefficients.size() + shape.vertices.size());
+}
+
+size_t BytesOf(const Edge& edge) {
+  return kRowBytes + edge.relation.size() + EncodeEdgePayload(edge).size();
+}
+
+void Append(std::vector<GraphDelta> parts, std::vector<GraphDelta>* all) {
+  std::move(parts.begin(), parts.end(), std::back_inserter(*all));
+}
+
+size_t RowCount(const GraphDelta& delta) {
+  size_t count = delta.layers.size() + delta.labels.size() + delta.nodes.size() +
+                 delta.retirements.size() + delta.edges.size() + delta.edge_removals.size() +
+                 delta.corrections.size() + delta.factors.size() + delta.shapes.size() +
+                 delta.stays.size() + delta.mesh_blocks.size() + delta.mesh_removals.size() +
+                 delta.assets.size();
+  for (const TrajectoryAppend& append : delta.appends) count += append.poses.size();
+  return count;
+}
+
+std::vector<GraphDelta> SplitToBytes(GraphDelta delta, size_t row_count_max) {
+  if (EstimateBytes(delta) <= kDeltaBytesMax || row_count_max <= 1) {
+    std::vector<GraphDelta> whole;
+    whole.push_back(std::move(delta));
+    return whole;
+  }
+  std::vector<GraphDelta> all;
+  for (GraphDelta& part : SplitDelta(std::move(delta), row_count_max / 2)) {
+    Append(SplitToBytes(std::move(part), row_count_max / 2), &all);
+  }
+  return all;
+}
+
+}  // namespace
+
+size_t EstimateBytes(const GraphDelta& delta) {
+  size_t bytes =
+      kRowBytes * (delta.layers.size() + delta.labels.size() + delta.retirements.size() +
+                   delta.edge_removals.size() + delta.stays.size() + delta.mesh_removals.size());
+  for (const Node& node : delta.nodes) bytes += kRowBytes + EncodeNodePayload(node).size();
+  for (const Edge& edge : delta.edges) bytes += BytesOf(edge);
+  for (const TrajectoryAppend& append : delta.appends) bytes += kRowBytes + BytesOf(append.poses);
+  for (const TrajectoryCorrection& item : delta.corrections) bytes += BytesOf(item.poses);
+  for (const FactorAppend& item : delta.factors) bytes += item.factors.size() * kFactorBytes;
+  for (const ShapeAppend& item : delta.shapes) {
+    for (const BodyShape& shape : item.shapes) bytes += BytesOf(shape);
+  }
+  for (const MeshBlock& block : delta.mesh_blocks) {
+    bytes += block.positions_map.size() * kVertexBytes + block.faces.size() * kFaceBytes;
+  }
+  for (const Asset& asset : delta.assets) bytes += kRowBytes + asset.content.size();
+  return bytes;
+}
+
+std::vector<GraphDelta> SplitToSize(GraphDelta delta) {
+  std::vector<GraphDelta> all;
+  if (RowCount(delta) <= kDeltaRowsMax && delta.mesh_blocks.empty()) {
+    return SplitToBytes(std::move(delta), kDeltaRowsMax);
+  }
+  for (GraphDelta& part : SplitDelta(std::move(delta), kDeltaRowsMax)) {
+    Append(SplitToBytes(std::move(part), kDeltaRowsMax), &all);
+  }
+  return all;
+}
+
+}  // namespace dsg::ingest

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where dsg-ingest writes to: a map of a local store, or of a server.
+// Part of the program, not of the library, so that the library names no store.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "ingest/pipeline/map_view.h"
+#include "schema/store/graph_writer.h"
+
+namespace dsg::ingest {
+
+/// Threads: one caller at a time.
+class Destination {
+ public:
+  virtual ~Destination() = default;
+  virtual const MapSpec& spec() const = 0;
+  virtual GraphWriter& writer() = 0;
+  /// The map as it is now.
+  virtual absl::StatusOr<std::unique_ptr<MapView>> View() = 0;
+};
+
+/// Opens a map for writing, creating folder and map from `spec` where they are missing.
+///
+/// Errors: UNAVAILABLE/WRITER_LOCKED naming who holds the lock; what GraphStore returns.
+absl::StatusOr<std::unique_ptr<Destination>> OpenLocal(const std::string& folder,
+                                                       const MapSpec& spec);
+
+/// The same through a server. Errors: UNAVAILABLE when it cannot be reached for 30 s.
+absl::StatusOr<std::unique_ptr<Destination>> OpenRemote(const std::string& address,
+                                                        const MapSpec& spec);
+
+}  // namespace dsg::ingest

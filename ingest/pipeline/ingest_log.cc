@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/pipeline/ingest_log.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+#include <unordered_set>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "ingest/pipeline/agent_namer.h"
+#include "ingest/pipeline/delta_builder.h"
+#include "ingest/pipeline/graph_agents.h"
+#include "ingest/pipeline/graph_boxes.h"
+#include "ingest/pipeline/region_index.h"
+#include "ingest/pipeline/session.h"
+#include "ingest/pipeline/stay_tracker.h"
+#include "schema/base/status.h"
+#include "schema/base/utf8.h"
+#include "schema/model/delta_check.h"
+
+namespace dsg::ingest {
+namespace {
+
+constexpr int64_t kPosesPerDeltaMax = 1'000'000;
+
+// Rooms and places that stays are derived from: the map's, and the log's own.
+class Regions {
+ public:
+  static absl::StatusOr<Regions> Read(const MapView& map) {
+    Regions regions;
+    DSG_ASSIGN_OR_RETURN(regions.rooms_, map.NodesOfLayer(layers::kRooms));
+    DSG_ASSIGN_OR_RETURN(regions.places_, map.NodesOfLayer(layers::kPlaces));
+    for (const Node& room : regions.rooms_) {
+      DSG_ASSIGN_OR_RETURN(const std::vector<NodeId> children, map.Children(room.id));
+      for (const NodeId child : children) regions.contains_.push_back({room.id, child});
+    }
+    return regions;
+  }
+
+  // The log's word on a node replaces the map's, as it will once it is committed; so a resumed
+  // run, which finds both the same, sees the same rooms.
+  void Add(const GraphDelta& graph) {
+    std::unordered_set<NodeId> replaced;
+    for (const Node& node : graph.nodes) {
+      if (node.layer == layers::kRooms || node.layer == layers::kPlaces) replaced.insert(node.id);
+    }
+    const auto is_replaced = [&replaced](const Node& node) { return replaced.contains(node.id); };
+    std::erase_if(rooms_, is_replaced);
+    std::erase_if(places_, is_replaced);
+    for (const Node& node : graph.nodes) {
+      if (node.layer == layers::kRooms) rooms_.push_back(node);
+      if (node.layer == layers::kPlaces) places_.push_back(node);
+    }
+    for (const Edge& edge : graph.edges) {
+      if (edge.relation == relations::kContains) contains_.push_back({edge.source, edge.target});
+    }
+  }
+
+  RegionIndex MakeIndex() const {
+    std::vector<Node> rooms = rooms_;
+    std::vector<Node> places = places_;
+    // What has left the world holds nobody any more.
+    const auto has_ended = [](const Node& node) { return node.valid.to_ns != kTimeMax; };
+    std::erase_if(rooms, has_ended);
+    std::erase_if(places, has_ended);
+    std::vector<RegionIndex::Containment> contains = contains_;
+    std::sort(contains.begin(), contains.end(),
+              [](const RegionIndex::Containment& a, const RegionIndex::Containment& b) {
+                return std::pair(a.room, a.place) < std::pair(b.room, b.place);
+              });
+    return RegionIndex(std::move(rooms), std::move(places), contains);
+  }
+
+ private:
+  std::vector<Node> rooms_;
+  std::vector<Node> places_;
+  std::vector<RegionIndex::Containment> contains_;
+};
+
+// The stages of one log, wired.
+class LogRun {
+ public:
+  LogRun(const LogInfo& info, const IngestOptions& options, const MapView& map,
+         const std::vector<Node>& agents, Regions regions, DeltaSink sink)
+      : options_(options),
+        map_(map),
+        namer_(agents),
+        regions_(std::move(regions)),
+        builder_(info.feet_below_m),
+        sink_(std::move(sink)) {}
+
+  absl::Status Take(Measurement measurement) {
+    if (auto* graph = std::get_if<GraphMeasurement>(&measurement)) {
+      return TakeGraph(std::move(graph->delta));
+    }
+    const auto& pose = std::get<PoseMeasurement>(measurement);
+    const NodeId agent = namer_.Assign(pose.agent_name, pose.agent_kind);
+    Tracker().Observe(agent, pose.pose.time_ns, pose.pose.map_T_agent.position);
+    builder_.AddPose(agent, pose);
+    if (builder_.pose_count() < options_.poses_per_delta) return absl::OkStatus();
+    return sink_.Put(builder_.Take(Tracker().TakeChanges()));
+  }
+
+  absl::Status Finish() {
+    Tracker().Finish();
+    DSG_RETURN_IF_ERROR(sink_.Put(builder_.Take(Tracker().TakeChanges())));
+    return sink_.Put(builder_.TakeNodes());
+  }
+
+  IngestSummary Summary() const {
+    return {graph_agent_count_ + builder_.agent_count(), sink_.counts()};
+  }
+
+ private:
+  absl::Status TakeGraph(GraphDelta graph) {
+    DSG_RETURN_IF_ERROR(RenameAgents(&namer_, &graph));
+    DSG_RETURN_IF_ERROR(LayOverStoredGraph(map_, &graph));
+    for (const Node& node : graph.nodes) graph_agent_count_ += IsAgentKind(node.kind) ? 1 : 0;
+    regions_.Add(graph);
+    Coalesce(&graph);
+    return sink_.Put(std::move(graph));
+  }
+
+  // Made when the first pose comes: by then the log's own rooms and places are known.
+  StayTracker& Tracker() {
+    if (!tracker_.has_value()) tracker_.emplace(regions_.MakeIndex(), map_.spec().gap_ns_max);
+    return *tracker_;
+  }
+
+  IngestOptions options_;
+  const MapView& map_;
+  AgentNamer namer_;
+  Regions regions_;
+  std::optional<StayTracker> tracker_;
+  DeltaBuilder builder_;
+  DeltaSink sink_;
+  int64_t graph_agent_count_ = 0;
+};
+
+SessionHeader MakeHeader(const LogInfo& info, const LogOptions& log_options,
+                         const IngestOptions& options, const MapSpec& spec) {
+  const SessionConfig config{.format = info.format,
+                             .epoch_ns = log_options.epoch_ns,
+                             .frame_period_ns = log_options.frame_period_ns,
+                             .agent_prefix = log_options.agent_prefix,
+                             .mesh_block_size_m = log_options.mesh_block_size_m,
+                             .poses_per_delta = options.poses_per_delta};
+  // The file's name alone: where it lies on this machine is no property of the log.
+  std::string name = std::filesystem::path(info.path).filename().string();
+  // File names may be any bytes; a map holds text only.
+  if (!IsUtf8(name)) name = "a file whose name is not UTF-8";
+  return {.map = spec.name,
+          .session_id = SessionId(info.content_sha256, config),
+          .author = options.author,
+          .message = absl::StrCat(name, " (", info.format, ")"),
+          .config_digest = config.Digest()};
+}
+
+}  // namespace
+
+absl::Status IngestOptions::Validate() const {
+  if (poses_per_delta >= 1 && poses_per_delta <= kPosesPerDeltaMax) return absl::OkStatus();
+  return MakeError(
+      Reason::kFieldInvalid,
+      absl::StrCat("poses per delta is ", poses_per_delta, "; give 1 to ", kPosesPerDeltaMax),
+      {{"field", "poses_per_delta"}, {"value", absl::StrCat(poses_per_delta)}});
+}
+
+absl::StatusOr<IngestSummary> IngestLog(LogSource& log, const LogOptions& log_options,
+                                        const IngestOptions& options, const MapView& map,
+                                        GraphWriter& writer,
+                                        const std::function<void(int64_t)>& on_progress) {
+  DSG_RETURN_IF_ERROR(options.Validate());
+  SessionHeader header = MakeHeader(log.info(), log_options, options, map.spec());
+  DSG_ASSIGN_OR_RETURN(const SessionState session, writer.GetSession(header.session_id));
+  DSG_ASSIGN_OR_RETURN(const std::vector<Node> agents, map.NodesOfLayer(layers::kAgents));
+  DSG_ASSIGN_OR_RETURN(Regions regions, Regions::Read(map));
+  LogRun run(log.info(), options, map, agents, std::move(regions),
+             DeltaSink(std::move(header), session.last_sequence, map, writer));
+  for (int64_t count = 1;; ++count) {
+    DSG_ASSIGN_OR_RETURN(std::optional<Measurement> measurement, log.Next());
+    if (!measurement.has_value()) break;
+    DSG_RETURN_IF_ERROR(run.Take(*std::move(measurement)));
+    if (on_progress) on_progress(count);
+  }
+  DSG_RETURN_IF_ERROR(run.Finish());
+  return run.Summary();
+}
+
+}  // namespace dsg::ingest

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// One log into one map: names agents, derives stays, cuts deltas, commits what is news.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "ingest/log/log_source.h"
+#include "ingest/pipeline/delta_sink.h"
+
+namespace dsg::ingest {
+
+struct IngestOptions {
+  /// A delta is closed after so many poses; the last one when the log ends.
+  int64_t poses_per_delta = 5000;
+  /// Who commits, for the record of revisions.
+  std::string author = "dsg-ingest";
+
+  /// Errors: INVALID_ARGUMENT/FIELD_INVALID.
+  absl::Status Validate() const;
+};
+
+struct IngestSummary {
+  /// Agents that the log speaks of.
+  int64_t agent_count = 0;
+  CommitCounts committed;
+};
+
+/// Reads `log` to its end. The same log, options and starting map give byte-equal deltas. A run
+/// that was cut off is continued by running it again; a log that the map holds adds nothing.
+/// `on_progress` (may be empty) gets the count of measurements read so far.
+///
+/// `log_options`: what the log was opened with.
+/// Errors: of the log, and of DeltaSink::Put. What is committed by then stays, and counts.
+absl::StatusOr<IngestSummary> IngestLog(LogSource& log, const LogOptions& log_options,
+                                        const IngestOptions& options, const MapView& map,
+                                        GraphWriter& writer,
+                                        const std::function<void(int64_t)>& on_progress);
+
+}  // namespace dsg::ingest

@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: Apache-2.0
+// dsg-ingest: sensor logs and scene-graph files in, committed revisions out.
+// Refuses to report success before everything is on disk.
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "ingest/log/log_source.h"
+#include "ingest/pipeline/destination.h"
+#include "ingest/pipeline/ingest_log.h"
+#include "ingest/pipeline/progress.h"
+#include "schema/base/status.h"
+
+namespace dsg::ingest {
+namespace {
+
+enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2, kUnavailable = 3, kDataLoss = 4 };
+
+struct Flags {
+  std::string store;
+  std::string server;
+  std::string map;
+  std::string format = "auto";
+  double frame_period_s = 0.4;
+  std::string agent_prefix;
+  std::string epoch;
+  std::string codec;
+  int64_t commit_poses = IngestOptions().poses_per_delta;
+  bool is_quiet = false;
+  std::vector<std::string> logs;
+};
+
+void AddFlags(CLI::App* app, Flags* flags) {
+  app->set_version_flag("--version", DSG_VERSION);
+  app->add_option("--store", flags->store, "Folder of the store; made if missing")
+      ->envname("DSG_STORE");
+  app->add_option(
+      "--server", flags->server,
+      "Commit through this dsg-server (unix:PATH or HOST:PORT); --store is not touched");
+  app->add_option("--map", flags->map, "Name of the map; made if missing")
+      ->envname("DSG_MAP")
+      ->required();
+  app->add_option("--format", flags->format,
+                  "auto, obsmat, trajnet, trajnet-ndjson, thor, euroc, spark-dsg, kimera-json, "
+                  "region-json or dsg-tracks")
+      ->capture_default_str();
+  app->add_option("--frame-period", flags->frame_period_s,
+                  "Seconds an annotation step of a log without a clock takes")
+      ->capture_default_str();
+  app->add_option("--agent-prefix", flags->agent_prefix,
+                  "Put before every agent's name, to keep apart logs that reuse names");
+  app->add_option("--epoch", flags->epoch,
+                  "World time a new map begins at (nanoseconds or RFC 3339); default: the first "
+                  "stamp of a log with a clock, else 0");
+  app->add_option("--codec", flags->codec,
+                  "How a new map keeps trajectories: quantized (default) or lossless")
+      ->check(CLI::IsMember({"quantized", "lossless"}));
+  app->add_option("--commit-poses", flags->commit_poses, "Poses a revision")->capture_default_str();
+  app->add_flag("--quiet", flags->is_quiet, "Write nothing but errors");
+  app->add_option("LOG", flags->logs, "Log files or folders, taken one after another")->required();
+}
+
+absl::StatusOr<LogOptions> MakeLogOptions(const Flags& flags) {
+  LogOptions options;
+  options.format = flags.format;
+  options.agent_prefix = flags.agent_prefix;
+  const double period_ns = flags.frame_period_s * static_cast<double>(kNsPerSecond);
+  // A day an annotation step is past any use, and keeps the product in range.
+  if (!(period_ns >= 1.0 && flags.frame_period_s <= 86400.0)) {
+    return MakeError(Reason::kFieldInvalid,
+                     absl::StrCat("--frame-period ", flags.frame_period_s,
+                                  " is no duration from 1e-9 to 86400 seconds"),
+                     {{"field", "frame-period"}, {"value", absl::StrCat(flags.frame_period_s)}});
+  }
+  options.frame_period_ns = std::llround(period_ns);
+  if (!flags.epoch.empty()) {
+    DSG_ASSIGN_OR_RETURN(options.epoch_ns, ParseTime(flags.epoch, 0));
+  }
+  return options;
+}
+
+MapSpec MakeSpec(const Flags& flags, const LogOptions& options, const LogInfo& info) {
+  MapSpec spec;
+  spec.name = flags.map;
+  spec.epoch_ns = options.epoch_ns;
+  if (flags.epoch.empty() && info.has_clock) spec.epoch_ns = info.first_ns;
+  spec.clock = info.has_clock ? info.clock : Clock::kMonotonic;
+  if (flags.codec == "lossless") spec.codec = TrajectoryCodec::kLossless;
+  return spec;
+}
+
+absl::StatusOr<std::unique_ptr<Destination>> OpenDestination(const Flags& flags,
+                                                             const MapSpec& spec) {
+  return flags.server.empty() ? OpenLocal(flags.store, spec) : OpenRemote(flags.server, spec);
+}
+
+// What a map is created with holds for its life; flags that say otherwise would be ignored.
+absl::Status CheckAgainstMap(const Flags& flags, const LogOptions& options, const MapSpec& spec) {
+  if (!flags.epoch.empty() && options.epoch_ns != spec.epoch_ns) {
+    return MakeError(
+        Reason::kFieldInvalid,
+        absl::StrCat("map \"", spec.name, "\" begins at ", spec.epoch_ns, " ns, --epoch says ",
+                     options.epoch_ns, " ns; leave --epoch out, or name another --map"),
+        {{"field", "epoch"}, {"value", flags.epoch}});
+  }
+  const std::string codec = spec.codec == TrajectoryCodec::kLossless ? "lossless" : "quantized";
+  if (!flags.codec.empty() && flags.codec != codec) {
+    return MakeError(
+        Reason::kFieldInvalid,
+        absl::StrCat("map \"", spec.name, "\" keeps its trajectories ", codec, ", --codec says ",
+                     flags.codec, "; leave --codec out, or name another --map"),
+        {{"field", "codec"}, {"value", flags.codec}});
+  }
+  return absl::OkStatus();
+}
+
+void PrintSummary(const std::string& path, const LogInfo& info, const IngestSummary& summary,
+                  double seconds) {
+  const CommitCounts& counts = summary.committed;
+  std::printf(
+      "%s (%s): %lld agents, %lld poses, %lld nodes, %lld edges, %lld stays in %lld revisions; "
+      "%lld poses skipped; %.1f s\n",
+      path.c_str(), info.format.c_str(), static_cast<long long>(summary.agent_count),
+      static_cast<long long>(counts.pose_count), static_cast<long long>(counts.node_count),
+      static_cast<long long>(counts.edge_count), static_cast<long long>(counts.stay_count),
+      static_cast<long long>(counts.revision_count),
+      static_cast<long long>(counts.skipped_pose_count), seconds);
+  if (counts.revision_count == 0) std::printf("%s: nothing new\n", path.c_str());
+  std::fflush(stdout);
+}
+
+absl::Status IngestOne(const Flags& flags, const std::string& path, LogOptions options,
+                       std::unique_ptr<Destination>* destination) {
+  const auto begin = std::chrono::steady_clock::now();
+  DSG_ASSIGN_OR_RETURN(std::unique_ptr<LogSource> log, OpenLog(path, options));
+  if (*destination == nullptr) {
+    const MapSpec wanted = MakeSpec(flags, options, log->info());
+    DSG_ASSIGN_OR_RETURN(*destination, OpenDestination(flags, wanted));
+  }
+  const MapSpec& spec = (*destination)->spec();
+  DSG_RETURN_IF_ERROR(CheckAgainstMap(flags, options, spec));
+  const LogOptions opened_with = options;
+  options.epoch_ns = spec.epoch_ns;
+  options.mesh_block_size_m = spec.mesh_block_size_m;
+  // The map must be open to know its epoch, and the log to make the map; so a log is at times
+  // read twice.
+  const bool is_shifted = !log->info().has_clock && options.epoch_ns != opened_with.epoch_ns;
+  if (is_shifted || options.mesh_block_size_m != opened_with.mesh_block_size_m) {
+    DSG_ASSIGN_OR_RETURN(log, OpenLog(path, options));
+  }
+  if (!flags.is_quiet) {
+    for (const std::string& note : log->info().notes) {
+      std::fprintf(stderr, "%s: note: %s\n", path.c_str(), note.c_str());
+    }
+  }
+  DSG_ASSIGN_OR_RETURN(const std::unique_ptr<MapView> view, (*destination)->View());
+  const IngestOptions ingest_options{.poses_per_delta = flags.commit_poses};
+  absl::StatusOr<IngestSummary> summary = absl::UnknownError("not run");
+  {
+    Progress progress(std::filesystem::path(path).filename().string(),
+                      log->info().measurement_count, flags.is_quiet);
+    summary = IngestLog(*log, options, ingest_options, *view, (*destination)->writer(),
+                        [&progress](int64_t done) { progress.Update(done); });
+  }
+  if (!summary.ok()) return summary.status();
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
+  if (!flags.is_quiet) PrintSummary(path, log->info(), *summary, elapsed.count());
+  return absl::OkStatus();
+}
+
+absl::Status Run(const Flags& flags) {
+  DSG_RETURN_IF_ERROR(CheckMapName(flags.map));
+  DSG_ASSIGN_OR_RETURN(const LogOptions options, MakeLogOptions(flags));
+  std::unique_ptr<Destination> destination;
+  for (const std::string& path : flags.logs) {
+    DSG_RETURN_IF_ERROR(IngestOne(flags, path, options, &destination));
+  }
+  return absl::OkStatus();
+}
+
+ExitCode Report(const absl::Status& status) {
+  if (status.ok()) return kDone;
+  const Reason reason = ReasonOf(status);
+  std::fprintf(stderr, "dsg-ingest: %s: %s\n",
+               std::string(absl::StatusCodeToString(status.code())).c_str(),
+               std::string(status.message()).c_str());
+  if (reason == Reason::kFieldInvalid || reason == Reason::kMapNameInvalid) return kUsage;
+  switch (status.code()) {
+    case absl::StatusCode::kUnavailable:
+    case absl::StatusCode::kDeadlineExceeded:
+      return kUnavailable;
+    case absl::StatusCode::kDataLoss:
+      return kDataLoss;
+    default:
+      return kFailed;
+  }
+}
+
+int Main(int argc, char** argv) {
+  CLI::App app("dsg-ingest: reads logs and scene graphs into a map of a dynamic scene graph store",
+               "dsg-ingest");
+  Flags flags;
+  AddFlags(&app, &flags);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kDone : kUsage;
+  }
+  if (flags.store.empty() && flags.server.empty()) {
+    std::fputs("dsg-ingest: give --store DIR or --server ADDR\n", stderr);
+    return kUsage;
+  }
+  return Report(Run(flags));
+}
+
+}  // namespace
+}  // namespace dsg::ingest
+
+int main(int argc, char** argv) { return dsg::ingest::Main(argc, argv); }

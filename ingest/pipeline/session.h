@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// The identity of one log's way into one map: what makes a second run a repetition.
+#pragma once
+
+#include <string>
+
+#include "ingest/log/log_source.h"
+
+namespace dsg::ingest {
+
+/// Everything besides the log's bytes that a log's deltas depend on.
+struct SessionConfig {
+  std::string format;
+  TimeNs epoch_ns = 0;
+  TimeNs frame_period_ns = 0;
+  std::string agent_prefix;
+  double mesh_block_size_m = 0.0;
+  int64_t poses_per_delta = 0;
+
+  /// SHA-256 in hexadecimal.
+  std::string Digest() const;
+};
+
+/// "log-" and 32 hexadecimal digits over content and configuration.
+std::string SessionId(const std::string& content_sha256, const SessionConfig& config);
+
+}  // namespace dsg::ingest

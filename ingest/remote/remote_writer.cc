@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/remote/remote_writer.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "dsg/v1/ingest_service.grpc.pb.h"
+#include "dsg/v1/map_service.grpc.pb.h"
+#include "dsg/v1/query_service.grpc.pb.h"
+#include "ingest/remote/remote_call.h"
+#include "schema/base/status.h"
+#include "schema/codec/proto_convert.h"
+
+namespace dsg::ingest {
+namespace {
+
+constexpr int kPageSize = 500;
+
+/// What all calls to one server share.
+struct Connection {
+  std::string address;
+  RemoteOptions options;
+  std::shared_ptr<grpc::Channel> channel;
+
+  absl::Status Call(const std::function<grpc::Status(grpc::ClientContext*)>& attempt) const {
+    return CallWithRetry(address, options.retry_ns_max, attempt);
+  }
+};
+
+class RemoteWriter : public GraphWriter {
+ public:
+  RemoteWriter(const Connection& connection, std::string map)
+      : connection_(connection),
+        stub_(v1::IngestService::NewStub(connection.channel)),
+        map_(std::move(map)) {}
+
+  absl::StatusOr<CommitResult> Commit(GraphDelta delta) override {
+    // The wire names layers; those of earlier deltas must be known by then.
+    for (const Layer& layer : delta.layers) {
+      if (layers_.Find(layer.id) == nullptr) layers_.Add(layer);
+    }
+    v1::CommitRequest request;
+    ToProto(delta, layers_, request.mutable_delta());
+    if (request.ByteSizeLong() > static_cast<size_t>(kSendBytesMax)) {
+      return MakeError(
+          Reason::kLimitExceeded,
+          absl::StrCat("part ", delta.sequence, " of session ", delta.session_id, " is ",
+                       request.ByteSizeLong(), " bytes long, a server takes ", kSendBytesMax,
+                       "; ingest into the store's folder with --store instead"),
+          {{"sequence", absl::StrCat(delta.sequence)}});
+    }
+    v1::CommitResponse response;
+    DSG_RETURN_IF_ERROR(connection_.Call(
+        [&](grpc::ClientContext* context) { return stub_->Commit(context, request, &response); }));
+    return CommitResult{response.revision(), response.replayed()};
+  }
+
+  absl::StatusOr<SessionState> GetSession(const std::string& session_id) override {
+    v1::GetSessionRequest request;
+    request.set_map(map_);
+    request.set_session_id(session_id);
+    v1::GetSessionResponse response;
+    DSG_RETURN_IF_ERROR(connection_.Call([&](grpc::ClientContext* context) {
+      return stub_->GetSession(context, request, &response);
+    }));
+    return SessionState{response.last_sequence(), response.last_revision()};
+  }
+
+ private:
+  const Connection& connection_;
+  std::unique_ptr<v1::IngestService::Stub> stub_;
+  std::string map_;
+  LayerTable layers_;
+};
+
+class GrpcRemoteMap : public RemoteMap {
+ public:
+  GrpcRemoteMap(std::unique_ptr<Connection> connection, MapSpec spec)
+      : connection_(std::move(connection)),
+        query_(v1::QueryService::NewStub(connection_->channel)),
+        spec_(std::move(spec)),
+        writer_(*connection_, spec_.name) {}
+
+  GraphWriter& writer() override { return writer_; }
+  const MapSpec& spec() const override { return spec_; }
+
+  absl::StatusOr<std::vector<Node>> ListNodes(const std::string& layer) override {
+    v1::ListNodesRequest request;
+    request.set_map(spec_.name);
+    request.mutable_filter()->set_layer(layer);
+    request.set_view(v1::NODE_VIEW_FULL);
+    request.set_page_size(kPageSize);
+    const LayerTable layers;
+    std::vector<Node> nodes;
+    do {
+      v1::ListNodesResponse response;
+      DSG_RETURN_IF_ERROR(connection_->Call([&](grpc::ClientContext* context) {
+        return query_->ListNodes(context, request, &response);
+      }));
+      for (const v1::Node& proto : response.nodes()) {
+        DSG_ASSIGN_OR_RETURN(Node node, FromProto(proto, layers));
+        nodes.push_back(std::move(node));
+      }
+      // The token holds the revision of the first page, so the list is of one revision.
+      request.set_page_token(response.next_page_token());
+    } while (!request.page_token().empty());
+    return nodes;
+  }
+
+  absl::StatusOr<std::vector<NodeId>> ListChildren(NodeId parent) override {
+    v1::ListEdgesRequest request;
+    request.set_map(spec_.name);
+    request.set_source(ToString(parent));
+    request.set_relation(relations::kContains);
+    request.set_page_size(kPageSize);
+    std::vector<NodeId> children;
+    do {
+      v1::ListEdgesResponse response;
+      DSG_RETURN_IF_ERROR(connection_->Call([&](grpc::ClientContext* context) {
+        return query_->ListEdges(context, request, &response);
+      }));
+      for (const v1::Edge& edge : response.edges()) {
+        DSG_ASSIGN_OR_RETURN(const NodeId child, ParseNodeId(edge.target()));
+        children.push_back(child);
+      }
+      request.set_page_token(response.next_page_token());
+    } while (!request.page_token().empty());
+    return children;
+  }
+
+  absl::StatusOr<std::vector<Node>> ListAgents() override {
+    DSG_ASSIGN_OR_RETURN(std::vector<Node> agents, ListNodes("agents"));
+    std::erase_if(agents, [](const Node& node) { return !IsAgentKind(node.kind); });
+    return agents;
+  }
+
+  absl::StatusOr<std::optional<TrackInfo>> FindTrack(NodeId agent) override {
+    v1::GetNodeRequest request;
+    request.set_map(spec_.name);
+    request.set_id(ToString(agent));
+    request.set_view(v1::NODE_VIEW_BASIC);
+    v1::GetNodeResponse response;
+    const absl::Status status = connection_->Call(
+        [&](grpc::ClientContext* context) { return query_->GetNode(context, request, &response); });
+    if (ReasonOf(status) == Reason::kNodeUnknown) return std::nullopt;
+    DSG_RETURN_IF_ERROR(status);
+    // An unknown id may be another node's name.
+    if (response.node().id() != request.id() || response.pose_count() == 0) return std::nullopt;
+    return TrackInfo{.agent = agent,
+                     .name = response.node().name(),
+                     .kind = response.node().kind(),
+                     .pose_count = response.pose_count(),
+                     .first_ns = response.first_pose_ns(),
+                     .last_ns = response.last_pose_ns(),
+                     .gap_ns_max = spec_.gap_ns_max};
+  }
+
+  absl::StatusOr<std::vector<TimedPose>> ReadPoses(NodeId agent, TimeNs from_ns,
+                                                   TimeNs to_ns) override {
+    v1::GetTrajectoryRequest request;
+    request.set_map(spec_.name);
+    request.set_agent(ToString(agent));
+    request.set_from_ns(from_ns);
+    request.set_to_ns(to_ns);
+    std::vector<v1::TimedPose> received;
+    const absl::Status status = connection_->Call([&](grpc::ClientContext* context) {
+      received.clear();
+      const auto reader = query_->GetTrajectory(context, request);
+      v1::GetTrajectoryResponse response;
+      while (reader->Read(&response)) {
+        received.insert(received.end(), response.poses().begin(), response.poses().end());
+      }
+      return reader->Finish();
+    });
+    const Reason reason = ReasonOf(status);
+    if (reason == Reason::kTimeOutsideTrack || reason == Reason::kAgentUnknown) {
+      return std::vector<TimedPose>();
+    }
+    DSG_RETURN_IF_ERROR(status);
+    std::vector<TimedPose> poses;
+    poses.reserve(received.size());
+    for (const v1::TimedPose& proto : received) {
+      DSG_ASSIGN_OR_RETURN(TimedPose pose, FromProto(proto));
+      poses.push_back(std::move(pose));
+    }
+    return poses;
+  }
+
+ private:
+  std::unique_ptr<Connection> connection_;
+  std::unique_ptr<v1::QueryService::Stub> query_;
+  MapSpec spec_;
+  RemoteWriter writer_;
+};
+
+absl::StatusOr<std::optional<MapSpec>> FindMap(const Connection& connection,
+                                               v1::MapService::Stub& maps,
+                                               const std::string& name) {
+  v1::ListMapsResponse response;
+  DSG_RETURN_IF_ERROR(connection.Call([&](grpc::ClientContext* context) {
+    return maps.ListMaps(context, v1::ListMapsRequest(), &response);
+  }));
+  for (const v1::MapSpec& map : response.maps()) {
+    if (map.name() != name) continue;
+    DSG_ASSIGN_OR_RETURN(MapSpec spec, FromProto(map));
+    return spec;
+  }
+  return std::nullopt;
+}
+
+absl::Status CreateMap(const Connection& connection, v1::MapService::Stub& maps,
+                       const MapSpec& spec) {
+  v1::CreateMapRequest request;
+  ToProto(spec, request.mutable_map());
+  v1::CreateMapResponse response;
+  const absl::Status status = connection.Call(
+      [&](grpc::ClientContext* context) { return maps.CreateMap(context, request, &response); });
+  // A repeated call, or another client that was faster; its map serves as well.
+  return ReasonOf(status) == Reason::kMapExists ? absl::OkStatus() : status;
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<RemoteMap>> OpenRemoteMap(const std::string& address,
+                                                         const MapSpec& spec,
+                                                         const RemoteOptions& options) {
+  auto connection =
+      std::make_unique<Connection>(Connection{address, options, OpenChannel(address)});
+  const std::unique_ptr<v1::MapService::Stub> maps = v1::MapService::NewStub(connection->channel);
+  DSG_ASSIGN_OR_RETURN(std::optional<MapSpec> found, FindMap(*connection, *maps, spec.name));
+  if (!found.has_value()) {
+    DSG_RETURN_IF_ERROR(CreateMap(*connection, *maps, spec));
+    DSG_ASSIGN_OR_RETURN(found, FindMap(*connection, *maps, spec.name));
+  }
+  if (!found.has_value()) {
+    return MakeError(Reason::kMapUnknown,
+                     absl::StrCat("map \"", spec.name, "\" was created on server ", address,
+                                  " but is not listed there; look at the server's log"),
+                     {{"map", spec.name}});
+  }
+  return std::make_unique<GrpcRemoteMap>(std::move(connection), *std::move(found));
+}
+
+}  // namespace dsg::ingest

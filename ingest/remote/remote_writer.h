@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// A GraphWriter that commits through a dsg-server; the only gRPC in ingest.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "schema/model/layer.h"
+#include "schema/model/node.h"
+#include "schema/store/graph_writer.h"
+#include "schema/store/snapshot.h"
+
+namespace dsg::ingest {
+
+/// A map on a server, as far as ingest needs it.
+class RemoteMap {
+ public:
+  virtual ~RemoteMap() = default;
+  /// Idempotent by session and sequence, so transport failures are retried for up to 30 s.
+  virtual GraphWriter& writer() = 0;
+  virtual const MapSpec& spec() const = 0;
+  /// Rooms and places, for deriving stays.
+  virtual absl::StatusOr<std::vector<Node>> ListNodes(const std::string& layer) = 0;
+  /// Targets of CONTAINS edges from `parent`.
+  virtual absl::StatusOr<std::vector<NodeId>> ListChildren(NodeId parent) = 0;
+  /// Existing agents (humans and robots), for naming.
+  virtual absl::StatusOr<std::vector<Node>> ListAgents() = 0;
+  /// nullopt for an unknown agent, and for one without poses.
+  virtual absl::StatusOr<std::optional<TrackInfo>> FindTrack(NodeId agent) = 0;
+  /// Stored poses with from_ns <= time < to_ns, ascending; for comparing a log that overlaps.
+  virtual absl::StatusOr<std::vector<TimedPose>> ReadPoses(NodeId agent, TimeNs from_ns,
+                                                           TimeNs to_ns) = 0;
+};
+
+struct RemoteOptions {
+  /// How long calls are repeated while the server cannot be reached.
+  TimeNs retry_ns_max = 30 * kNsPerSecond;
+};
+
+/// Opens a map on the server at `address` ("unix:PATH" or "HOST:PORT"), creating it from `spec`
+/// if it is missing.
+///
+/// Errors: UNAVAILABLE naming the address when the server cannot be reached in time; else what
+/// the server says, with its reason and metadata.
+absl::StatusOr<std::unique_ptr<RemoteMap>> OpenRemoteMap(const std::string& address,
+                                                         const MapSpec& spec,
+                                                         const RemoteOptions& options = {});
+
+}  // namespace dsg::ingest

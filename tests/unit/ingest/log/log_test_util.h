@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the tests of log readers share: files in a folder of their own, and reading to the end.
+// Refuses to hide errors: helpers fail the test that calls them.
+#pragma once
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ingest/log/log_source.h"
+
+namespace dsg::ingest {
+
+/// A folder that is removed with everything in it.
+class TempFolder {
+ public:
+  TempFolder() {
+    static int count = 0;
+    path_ = std::filesystem::path(testing::TempDir()) /
+            ("dsg_ingest_" + std::to_string(getpid()) + "_" + std::to_string(count++));
+    std::filesystem::create_directories(path_);
+  }
+  ~TempFolder() { std::filesystem::remove_all(path_); }
+  TempFolder(const TempFolder&) = delete;
+  TempFolder& operator=(const TempFolder&) = delete;
+
+  std::string Path(const std::string& name) const { return (path_ / name).string(); }
+
+  /// Writes a file and gives its path; folders in `name` are made.
+  std::string Write(const std::string& name, const std::string& bytes) const {
+    std::filesystem::create_directories((path_ / name).parent_path());
+    std::ofstream(path_ / name, std::ios::binary) << bytes;
+    return Path(name);
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// The folder of real data; empty when it is missing.
+inline std::filesystem::path DataFolder() {
+  const char* const given = std::getenv("DSG_DATA");
+  const std::filesystem::path folder =
+      given != nullptr ? std::filesystem::path(given)
+                       : std::filesystem::path(DSG_SOURCE_DIR) / ".." / "shared" / "data";
+  return std::filesystem::is_directory(folder) ? folder : std::filesystem::path();
+}
+
+/// A log read to its end.
+struct WholeLog {
+  LogInfo info;
+  std::vector<PoseMeasurement> poses;
+  std::vector<GraphMeasurement> graphs;
+};
+
+inline absl::StatusOr<WholeLog> ReadAll(const std::string& path, const LogOptions& options = {}) {
+  absl::StatusOr<std::unique_ptr<LogSource>> log = OpenLog(path, options);
+  if (!log.ok()) return log.status();
+  WholeLog whole{.info = (*log)->info(), .poses = {}, .graphs = {}};
+  while (true) {
+    absl::StatusOr<std::optional<Measurement>> next = (*log)->Next();
+    if (!next.ok()) return next.status();
+    if (!next->has_value()) return whole;
+    if (auto* pose = std::get_if<PoseMeasurement>(&**next)) {
+      whole.poses.push_back(std::move(*pose));
+    } else {
+      whole.graphs.push_back(std::move(std::get<GraphMeasurement>(**next)));
+    }
+  }
+}
+
+}  // namespace dsg::ingest
