@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// The program dsg: hands the process's arguments and environment to query/cli/run.h.
+#include <cstdlib>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "query/cli/run.h"
+
+namespace {
+
+std::string FromEnvironment(const char* name) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? "" : value;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const dsg::cli::Environment environment{.store = FromEnvironment("DSG_STORE"),
+                                          .server = FromEnvironment("DSG_SERVER"),
+                                          .map = FromEnvironment("DSG_MAP"),
+                                          .version = DSG_VERSION};
+  const std::vector<std::string> arguments(argv + 1, argv + argc);
+  return dsg::cli::Run(arguments, environment, std::cout, std::cerr);
+}

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/cli/render_graph.h"
+
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/escaping.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
+#include "dsg/v1/query_service.pb.h"
+#include "query/cli/render_agents.h"
+#include "query/cli/table.h"
+
+namespace dsg::cli {
+namespace {
+
+std::string PointText(const v1::Vector3& point) {
+  return absl::StrCat(Fixed(point.x(), 3), ", ", Fixed(point.y(), 3), ", ", Fixed(point.z(), 3));
+}
+
+std::string BoxText(const v1::Box& box) {
+  return absl::StrCat("(", PointText(box.min()), ") to (", PointText(box.max()), ") m");
+}
+
+// What every listing begins a node's line with, and the headings for it.
+std::vector<Column> NodeColumns() {
+  return {{"id"},
+          {"kind"},
+          {"layer"},
+          {"name"},
+          {"class"},
+          {"x m", Align::kRight},
+          {"y m", Align::kRight},
+          {"z m", Align::kRight}};
+}
+
+std::vector<std::string> NodeCells(const v1::Node& node) {
+  const v1::Vector3& p = node.map_t_node().position();
+  return {
+      node.id(),       node.kind(),     node.layer(),   node.name(), node.semantic_class().name(),
+      Fixed(p.x(), 2), Fixed(p.y(), 2), Fixed(p.z(), 2)};
+}
+
+std::string Footer(int count, const std::string& noun, int64_t revision, bool is_cut) {
+  return absl::StrCat(Counted(count, noun), " (revision ", revision, ")",
+                      is_cut ? "; there are more, see --limit" : "", "\n");
+}
+
+std::string AttributeText(const v1::AttributeValue& value) {
+  switch (value.value_case()) {
+    case v1::AttributeValue::kNumber:
+      return absl::StrFormat("%.17g", value.number());
+    case v1::AttributeValue::kText:
+      return absl::StrCat("\"", value.text(), "\"");
+    case v1::AttributeValue::kFlag:
+      return value.flag() ? "true" : "false";
+    case v1::AttributeValue::VALUE_NOT_SET:
+      break;
+  }
+  return "unset";
+}
+
+std::string ProvenanceText(v1::Provenance provenance) {
+  switch (provenance) {
+    case v1::PROVENANCE_PERCEIVED:
+      return "perceived";
+    case v1::PROVENANCE_IMPORTED:
+      return "imported";
+    case v1::PROVENANCE_PREDICTED:
+      return "predicted";
+    case v1::PROVENANCE_MANUAL:
+      return "manual";
+    default:
+      return "";
+  }
+}
+
+void AddObjectFields(const v1::ObjectComponent& object, std::vector<Field>* fields) {
+  if (object.has_size()) fields->push_back({"size", PointText(object.size()) + " m"});
+  if (object.has_color()) {
+    fields->push_back({"color", absl::StrFormat("#%02x%02x%02x", object.color().red(),
+                                                object.color().green(), object.color().blue())});
+  }
+  if (!object.model_sha256().empty()) {
+    fields->push_back(
+        {"model", absl::StrCat(absl::BytesToHexString(object.model_sha256()), ", residual ",
+                               Fixed(object.registration_residual_m(), 4), " m")});
+  }
+  if (object.mesh_instance_id() != 0) {
+    fields->push_back({"mesh instance", absl::StrCat(object.mesh_instance_id())});
+  }
+}
+
+void AddStructureFields(const v1::StructureComponent& structure, std::vector<Field>* fields) {
+  fields->push_back({"structure", structure.structure_type()});
+  if (structure.has_plane_normal()) {
+    fields->push_back(
+        {"plane", absl::StrCat("normal (", PointText(structure.plane_normal()), "), offset ",
+                               Fixed(structure.plane_offset_m(), 3), " m")});
+  }
+}
+
+void AddRegionFields(const v1::RegionComponent& region, std::vector<Field>* fields) {
+  if (region.footprint().xy_size() == 0) return;
+  fields->push_back({"footprint", absl::StrCat(region.footprint().xy_size() / 2, " corners")});
+  fields->push_back({"height", absl::StrCat(Fixed(region.z_min_m(), 2), " to ",
+                                            Fixed(region.z_max_m(), 2), " m")});
+}
+
+void AddComponentFields(const v1::Node& node, std::vector<Field>* fields) {
+  if (node.has_object()) AddObjectFields(node.object(), fields);
+  if (node.has_agent()) fields->push_back({"tracker", node.agent().track_state()});
+  if (node.has_place()) {
+    fields->push_back({"clearance", Fixed(node.place().clearance_m(), 3) + " m"});
+  }
+  if (node.has_structure()) AddStructureFields(node.structure(), fields);
+  if (node.has_region()) AddRegionFields(node.region(), fields);
+}
+
+std::string ObservedText(const v1::Node& node, const TimeText& times) {
+  if (!node.has_first_observed_ns() && !node.has_last_observed_ns()) return "";
+  std::string text;
+  if (node.has_first_observed_ns()) {
+    absl::StrAppend(&text, "first ", times.Full(node.first_observed_ns()), ", ");
+  }
+  if (node.has_last_observed_ns()) {
+    absl::StrAppend(&text, "last ", times.Full(node.last_observed_ns()), ", ");
+  }
+  return absl::StrCat(text, Counted(node.observation_count(), "time"));
+}
+
+void AddTimeFields(const v1::GetNodeResponse& reply, const TimeText& times,
+                   std::vector<Field>* fields) {
+  const v1::Node& node = reply.node();
+  fields->push_back(
+      {"existed", times.Span(node.has_valid_from_ns() ? node.valid_from_ns() : kTimeMin,
+                             node.has_valid_to_ns() ? node.valid_to_ns() : kTimeMax)});
+  fields->push_back({"observed", ObservedText(node, times)});
+  if (reply.pose_count() > 0) {
+    fields->push_back(
+        {"track", absl::StrCat(Counted(reply.pose_count(), "pose"), ", ",
+                               times.Span(reply.first_pose_ns(), reply.last_pose_ns()))});
+  }
+}
+
+void AddHierarchyFields(const v1::GetNodeResponse& reply, std::vector<Field>* fields) {
+  fields->push_back({"inside", absl::StrJoin(reply.ancestor_ids(), ", ")});
+  if (reply.child_count() > 0) fields->push_back({"children", absl::StrCat(reply.child_count())});
+}
+
+void AddAttributeFields(const v1::Node& node, std::vector<Field>* fields) {
+  // The message's own order is that of a hash.
+  std::map<std::string, std::string> sorted;
+  for (const auto& [name, value] : node.attributes()) sorted[name] = AttributeText(value);
+  for (auto& [name, text] : sorted) fields->push_back({"." + name, std::move(text)});
+}
+
+}  // namespace
+
+std::string RenderNodes(const v1::ListNodesResponse& reply) {
+  Table table(NodeColumns());
+  for (const v1::Node& node : reply.nodes()) table.AddRow(NodeCells(node));
+  return table.Render() + Footer(reply.nodes_size(), "node", reply.header().read_revision(),
+                                 !reply.next_page_token().empty());
+}
+
+std::string RenderEdges(const v1::ListEdgesResponse& reply, const TimeText& times) {
+  Table table({{"source"}, {"relation"}, {"target"}, {"weight", Align::kRight}, {"held"}});
+  for (const v1::Edge& edge : reply.edges()) {
+    table.AddRow({edge.source(), edge.relation(), edge.target(), Fixed(edge.weight(), 3),
+                  times.Span(edge.has_valid_from_ns() ? edge.valid_from_ns() : kTimeMin,
+                             edge.has_valid_to_ns() ? edge.valid_to_ns() : kTimeMax)});
+  }
+  return table.Render() + Footer(reply.edges_size(), "edge", reply.header().read_revision(),
+                                 !reply.next_page_token().empty());
+}
+
+std::string RenderNearest(const v1::ListNearestNodesResponse& reply) {
+  std::vector<Column> columns = NodeColumns();
+  columns.insert(columns.begin(), {"distance m", Align::kRight});
+  Table table(columns);
+  for (const v1::NearestNode& nearest : reply.nodes()) {
+    std::vector<std::string> cells = NodeCells(nearest.node());
+    cells.insert(cells.begin(), Fixed(nearest.distance_m(), 3));
+    table.AddRow(std::move(cells));
+  }
+  return table.Render() + Footer(reply.nodes_size(), "node", reply.header().read_revision(), false);
+}
+
+std::string RenderNode(const v1::GetNodeResponse& reply, const TimeText& times) {
+  const v1::Node& node = reply.node();
+  std::vector<Field> fields{{"id", node.id()},
+                            {"name", node.name()},
+                            {"kind", node.kind()},
+                            {"layer", node.layer()},
+                            {"class", node.semantic_class().name()}};
+  if (node.has_map_t_node()) {
+    fields.push_back({"position", PointText(node.map_t_node().position()) + " m"});
+    fields.push_back({"yaw", Fixed(YawDeg(node.map_t_node()), 1) + " deg"});
+  }
+  if (node.has_bounding_box()) {
+    fields.push_back({"box", BoxText(node.bounding_box()) + " in its own frame"});
+  }
+  AddHierarchyFields(reply, &fields);
+  AddTimeFields(reply, times, &fields);
+  if (node.has_confidence()) fields.push_back({"confidence", Fixed(node.confidence(), 3)});
+  fields.push_back({"provenance", ProvenanceText(node.provenance())});
+  AddComponentFields(node, &fields);
+  AddAttributeFields(node, &fields);
+  fields.push_back({"written", absl::StrCat("by revision ", node.revision(), ", read at ",
+                                            reply.header().read_revision())});
+  return RenderFields(fields);
+}
+
+}  // namespace dsg::cli

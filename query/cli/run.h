@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+// The whole program but for its surroundings: a command line in, text and an exit code out.
+#pragma once
+
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "query/cli/arguments.h"
+
+namespace dsg::cli {
+
+/// `arguments` without the program's name. Answers go to `out`; errors and progress to `errors`.
+/// Returns the exit code, see exit_code.h.
+int Run(const std::vector<std::string>& arguments, const Environment& environment,
+        std::ostream& out, std::ostream& errors);
+
+}  // namespace dsg::cli

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/cli/session.h"
+
+#include <chrono>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "dsg/v1/map_service.pb.h"
+#include "query/client/remote_api.h"
+#include "query/engine/service_core.h"
+#include "schema/base/status.h"
+#include "schema/codec/proto_convert.h"
+#include "schema/store/graph_store.h"
+
+namespace dsg::cli {
+namespace {
+
+std::string PlaceOf(const CommonOptions& common) {
+  return common.server.empty() ? absl::StrCat("store ", common.store)
+                               : absl::StrCat("server ", common.server);
+}
+
+absl::StatusOr<std::unique_ptr<query::Api>> OpenApi(const CommonOptions& common) {
+  if (!common.server.empty()) return client::Connect(common.server);
+  DSG_ASSIGN_OR_RETURN(std::unique_ptr<GraphStore> store,
+                       GraphStore::Open(common.store, {.program = "dsg"}));
+  return query::MakeServiceCore(std::move(store));
+}
+
+absl::StatusOr<v1::MapSpec> OnlyMap(const v1::ListMapsResponse& reply, const std::string& place) {
+  if (reply.maps().empty()) {
+    return MakeError(
+        Reason::kMapUnknown,
+        absl::StrCat(place, " has no maps yet; make one with dsg-ingest or dsg import"));
+  }
+  if (reply.maps_size() == 1) return reply.maps(0);
+  std::string names;
+  for (const v1::MapSpec& map : reply.maps()) absl::StrAppend(&names, " ", map.name());
+  return MakeError(
+      Reason::kFieldInvalid,
+      absl::StrCat(place, " has ", reply.maps_size(), " maps; name one with --map:", names),
+      {{"field", "map"}});
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<Session>> Session::Open(const CommonOptions& common) {
+  DSG_ASSIGN_OR_RETURN(std::unique_ptr<query::Api> api, OpenApi(common));
+  return std::unique_ptr<Session>(new Session(common, std::move(api)));
+}
+
+absl::Status Session::ChooseMap() {
+  v1::MapSpec spec;
+  if (common_.map.empty()) {
+    v1::ListMapsResponse reply;
+    DSG_RETURN_IF_ERROR(api_->ListMaps(NewCall(), v1::ListMapsRequest(), &reply));
+    DSG_ASSIGN_OR_RETURN(spec, OnlyMap(reply, PlaceOf(common_)));
+  } else {
+    v1::GetMapStatsRequest request;
+    request.set_map(common_.map);
+    v1::GetMapStatsResponse reply;
+    DSG_RETURN_IF_ERROR(api_->GetMapStats(NewCall(), request, &reply));
+    spec = reply.map();
+  }
+  DSG_ASSIGN_OR_RETURN(map_, FromProto(spec));
+  times_ = TimeText(map_);
+  return absl::OkStatus();
+}
+
+query::CallContext Session::NewCall() const {
+  using Clock = query::CallContext::Clock;
+  if (common_.timeout_s <= 0.0) return query::CallContext();
+  return query::CallContext(Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                               std::chrono::duration<double>(common_.timeout_s)));
+}
+
+}  // namespace dsg::cli

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/cli/table.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "schema/base/check.h"
+
+namespace dsg::cli {
+namespace {
+
+// Code points, so that columns after a UTF-8 name still line up.
+size_t Width(const std::string& text) {
+  return static_cast<size_t>(std::count_if(
+      text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) >> 6) != 2; }));
+}
+
+void AppendCell(const std::string& text, size_t width, Align align, std::string* line) {
+  const std::string padding(width - Width(text), ' ');
+  if (align == Align::kRight) line->append(padding);
+  line->append(text);
+  if (align == Align::kLeft) line->append(padding);
+}
+
+}  // namespace
+
+std::string Printable(const std::string& text) {
+  std::string printable = text;
+  for (char& c : printable) {
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
+  }
+  return printable;
+}
+
+std::string Fixed(double value, int decimals) {
+  std::string text = absl::StrFormat("%.*f", decimals, value);
+  if (text[0] == '-' && text.find_first_not_of("-0.") == std::string::npos) text.erase(0, 1);
+  return text;
+}
+
+std::string Counted(int64_t count, const std::string& noun) {
+  return absl::StrCat(count, " ", noun, count == 1 ? "" : "s");
+}
+
+void Table::AddRow(std::vector<std::string> cells) {
+  DSG_CHECK(cells.size() <= columns_.size());
+  cells.resize(columns_.size());
+  for (std::string& cell : cells) cell = Printable(cell);
+  rows_.push_back(std::move(cells));
+}
+
+std::string Table::Render() const {
+  std::vector<std::string> headings;
+  std::vector<size_t> widths;
+  for (size_t i = 0; i < columns_.size(); ++i) {
+    headings.push_back(columns_[i].heading);
+    widths.push_back(Width(columns_[i].heading));
+    for (const auto& row : rows_) widths[i] = std::max(widths[i], Width(row[i]));
+  }
+  std::string text;
+  const auto append_line = [&](const std::vector<std::string>& cells) {
+    std::string line;
+    for (size_t i = 0; i < cells.size(); ++i) {
+      if (i > 0) line.append("  ");
+      AppendCell(cells[i], widths[i], columns_[i].align, &line);
+    }
+    line.erase(line.find_last_not_of(' ') + 1);
+    text.append(line).append("\n");
+  };
+  append_line(headings);
+  for (const auto& row : rows_) append_line(row);
+  return text;
+}
+
+std::string RenderFields(const std::vector<Field>& fields) {
+  size_t width = 0;
+  for (const auto& [name, value] : fields) {
+    if (!value.empty()) width = std::max(width, Width(name));
+  }
+  std::string text;
+  for (const auto& [name, value] : fields) {
+    if (value.empty()) continue;
+    AppendCell(Printable(name), width, Align::kLeft, &text);
+    text.append("  ").append(Printable(value)).append("\n");
+  }
+  return text;
+}
+
+}  // namespace dsg::cli

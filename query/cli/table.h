@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Columns of text for people: a heading line, then one line a row, each column as wide as its
+// widest cell. Refuses to let a name from a log write control codes to the terminal.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace dsg::cli {
+
+/// `text` with control characters shown as '?'.
+std::string Printable(const std::string& text);
+
+/// A number with a fixed count of decimals; "-0.00" is written "0.00".
+std::string Fixed(double value, int decimals);
+
+/// "1 node", "2 nodes".
+std::string Counted(int64_t count, const std::string& noun);
+
+enum class Align { kLeft, kRight };
+
+struct Column {
+  std::string heading;
+  Align align = Align::kLeft;
+};
+
+class Table {
+ public:
+  explicit Table(std::vector<Column> columns) : columns_(std::move(columns)) {}
+
+  /// Cells that are missing at the end are empty. Requires: no more cells than columns.
+  void AddRow(std::vector<std::string> cells);
+
+  size_t row_count() const { return rows_.size(); }
+
+  /// Lines end with '\n' and have no blanks at their end; two blanks part the columns.
+  std::string Render() const;
+
+ private:
+  std::vector<Column> columns_;
+  std::vector<std::vector<std::string>> rows_;
+};
+
+using Field = std::pair<std::string, std::string>;
+
+/// One line a field, values aligned; fields without a value are left out.
+std::string RenderFields(const std::vector<Field>& fields);
+
+}  // namespace dsg::cli

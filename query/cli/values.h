@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Reads the values of options: points, boxes, durations, instants.
+// Refuses what is not finite or not complete, naming the option.
+#pragma once
+
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "schema/base/time.h"
+#include "schema/model/geometry.h"
+
+namespace dsg::cli {
+
+/// "X,Y,Z" in metres. Errors: INVALID_ARGUMENT/FIELD_INVALID or NUMBER_NOT_FINITE.
+absl::StatusOr<Eigen::Vector3d> ParsePoint(const std::string& option, const std::string& text);
+
+/// "X0,Y0,Z0,X1,Y1,Z1" in metres: two opposite corners, lower one first.
+/// Errors: as ParsePoint; INVALID_ARGUMENT/BOX_INVERTED.
+absl::StatusOr<Box3d> ParseBox(const std::string& option, const std::string& text);
+
+/// "0.5s", "200ms"; seconds without a unit. Errors: INVALID_ARGUMENT/FIELD_INVALID unless positive.
+absl::StatusOr<TimeNs> ParseDuration(const std::string& option, const std::string& text);
+
+/// dsg::ParseTime with the option's name in the error.
+absl::StatusOr<TimeNs> ParseInstant(const std::string& option, const std::string& text,
+                                    TimeNs epoch_ns);
+
+}  // namespace dsg::cli

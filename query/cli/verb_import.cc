@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+// The verb import: a scene-graph file into a map of a store folder.
+// Creates nothing before the whole file has been read and understood.
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "query/cli/progress.h"
+#include "query/cli/table.h"
+#include "query/cli/verbs.h"
+#include "schema/base/status.h"
+#include "schema/codec/checksum.h"
+#include "schema/interop/scene_graph_file.h"
+#include "schema/store/graph_store.h"
+
+namespace dsg::cli {
+namespace {
+
+constexpr int64_t kFileBytesMax = int64_t{512} << 20;
+// Rows of one commit: enough to spread its cost, few enough for its memory.
+constexpr size_t kItemsPerCommit = 20'000;
+// 2000-01-01: no log of a clock that counts from the start of a machine reaches it.
+constexpr TimeNs kFirstUnixNs = 946'684'800 * kNsPerSecond;
+
+absl::StatusOr<std::string> ReadFile(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) {
+    return absl::NotFoundError(absl::StrCat(path, " is not a file; check the path"));
+  }
+  const uintmax_t size = std::filesystem::file_size(path, error);
+  if (error || size > static_cast<uintmax_t>(kFileBytesMax)) {
+    return MakeError(
+        Reason::kLimitExceeded,
+        absl::StrCat(path, " has ", size, " bytes; the largest file is ", kFileBytesMax, " bytes"));
+  }
+  std::string bytes(size, '\0');
+  std::ifstream file(path, std::ios::binary);
+  if (!file.read(bytes.data(), static_cast<std::streamsize>(size))) {
+    return absl::UnavailableError(absl::StrCat(path, " cannot be read; check its permissions"));
+  }
+  return bytes;
+}
+
+bool IsMissing(const absl::Status& status) { return ReasonOf(status) == Reason::kMapUnknown; }
+
+// The spec of a map that is there already; nullopt if map or store are still to be made.
+absl::StatusOr<std::optional<MapSpec>> FindMap(const std::string& folder, const std::string& name) {
+  const auto store = GraphStore::Open(folder, {});
+  if (!store.ok()) {
+    if (IsMissing(store.status())) return std::optional<MapSpec>();
+    return store.status();
+  }
+  const auto map = (*store)->OpenMap(name);
+  if (!map.ok()) {
+    if (IsMissing(map.status())) return std::optional<MapSpec>();
+    return map.status();
+  }
+  return std::optional<MapSpec>((*map)->spec());
+}
+
+MapSpec SpecOfNewMap(const std::string& name, TimeNs first_ns) {
+  MapSpec spec;
+  spec.name = name;
+  spec.epoch_ns = first_ns;
+  spec.clock = first_ns >= kFirstUnixNs ? Clock::kUnix : Clock::kMonotonic;
+  return spec;
+}
+
+struct Committed {
+  Revision last_revision = 0;
+  /// Parts that this run added; 0 = all were there.
+  int64_t part_count = 0;
+};
+
+absl::StatusOr<Committed> CommitAll(GraphWriter* writer, GraphDelta delta, Progress* progress) {
+  DSG_ASSIGN_OR_RETURN(const SessionState session, writer->GetSession(delta.session_id));
+  Committed committed{.last_revision = session.last_revision};
+  std::vector<GraphDelta> parts = SplitDelta(std::move(delta), kItemsPerCommit);
+  for (size_t i = 0; i < parts.size(); ++i) {
+    // Parts are the same in every run, so what an interrupted one committed is skipped.
+    if (parts[i].sequence <= session.last_sequence) continue;
+    const auto result = writer->Commit(std::move(parts[i]));
+    if (!result.ok()) {
+      return Annotate(result.status(), absl::StrCat("part ", i + 1, " of ", parts.size()));
+    }
+    committed.last_revision = result->revision;
+    ++committed.part_count;
+    progress->Update(static_cast<double>(i + 1) / static_cast<double>(parts.size()));
+  }
+  return committed;
+}
+
+absl::StatusOr<Committed> CommitToStore(const CommonOptions& common, bool map_exists,
+                                        TimeNs first_ns, GraphDelta delta, Progress* progress) {
+  DSG_ASSIGN_OR_RETURN(const std::unique_ptr<GraphStore> store,
+                       GraphStore::Open(common.store, {.create = true, .program = "dsg import"}));
+  if (!map_exists) DSG_RETURN_IF_ERROR(store->CreateMap(SpecOfNewMap(common.map, first_ns)));
+  DSG_ASSIGN_OR_RETURN(const std::unique_ptr<GraphWriter> writer, store->OpenWriter(common.map));
+  const auto committed = CommitAll(writer.get(), std::move(delta), progress);
+  const Reason reason = ReasonOf(committed.status());
+  if (!map_exists || (reason != Reason::kDeltaInvalid && reason != Reason::kTrackConflict)) {
+    return committed;
+  }
+  return MakeError(reason,
+                   absl::StrCat("map \"", common.map,
+                                "\" holds another graph already, and the "
+                                "file contradicts it (",
+                                std::string(committed.status().message()),
+                                "); `dsg-ingest` lays a newer file of the same building over an "
+                                "older one, or import into another --map"),
+                   MetadataOf(committed.status()));
+}
+
+void PrintSummary(const ImportedGraph& graph, const std::string& file, const std::string& map,
+                  const Committed& committed, std::ostream& out) {
+  const std::string what = absl::StrCat(graph.node_count, " nodes, ", graph.edge_count, " edges, ",
+                                        graph.pose_count, " poses, ", graph.mesh_vertex_count,
+                                        " mesh vertices, ", graph.mesh_face_count, " mesh faces");
+  for (const std::string& note : graph.notes) out << "note: " << Printable(note) << "\n";
+  if (committed.part_count == 0) {
+    out << Printable(file) << " (" << graph.format << ": " << what << ") is already in map " << map
+        << "; nothing added, revision " << committed.last_revision << "\n";
+    return;
+  }
+  out << "imported " << Printable(file) << " (" << graph.format << ") into map " << map << ": "
+      << what << "; revision " << committed.last_revision << "\n";
+}
+
+}  // namespace
+
+absl::Status RunImport(const CommonOptions& common, const ImportVerb& verb, std::ostream& out,
+                       std::ostream& progress_out) {
+  DSG_RETURN_IF_ERROR(CheckMapName(common.map));
+  Progress progress("import", &progress_out);
+  DSG_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(verb.file));
+  DSG_ASSIGN_OR_RETURN(const std::optional<MapSpec> found, FindMap(common.store, common.map));
+  const std::string name = std::filesystem::path(verb.file).filename().string();
+  DSG_ASSIGN_OR_RETURN(ImportedGraph graph,
+                       ReadSceneGraph(bytes, name, found.value_or(MapSpec()).mesh_block_size_m));
+  GraphDelta delta = std::move(graph.delta);
+  delta.map = common.map;
+  delta.session_id = "import-" + ToHex(ComputeSha256(bytes)).substr(0, 32);
+  delta.sequence = 1;
+  delta.author = "dsg import";
+  delta.message = absl::StrCat("import of ", name, " (", graph.format, ")");
+  DSG_ASSIGN_OR_RETURN(
+      const Committed committed,
+      CommitToStore(common, found.has_value(), graph.first_ns, std::move(delta), &progress));
+  PrintSummary(graph, verb.file, common.map, committed, out);
+  return absl::OkStatus();
+}
+
+}  // namespace dsg::cli

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// One function a verb: asks, then writes the answer to `out`, as text or JSON.
+// A verb's error is its status; nothing is written to `out` then.
+#pragma once
+
+#include <ostream>
+
+#include "absl/status/status.h"
+#include "query/cli/arguments.h"
+#include "query/cli/session.h"
+
+namespace dsg::cli {
+
+// Agents: verbs_agents.cc. Requires: the session's map is chosen.
+absl::Status RunWhere(Session* session, const WhereVerb& verb, std::ostream& out);
+absl::Status RunTrack(Session* session, const TrackVerb& verb, std::ostream& out);
+absl::Status RunWho(Session* session, const WhoVerb& verb, std::ostream& out);
+
+// Nodes and edges: verbs_graph.cc. Requires: the session's map is chosen.
+absl::Status RunList(Session* session, const ListVerb& verb, std::ostream& out);
+absl::Status RunEdges(Session* session, const EdgesVerb& verb, std::ostream& out);
+absl::Status RunShow(Session* session, const ShowVerb& verb, std::ostream& out);
+absl::Status RunNear(Session* session, const NearVerb& verb, std::ostream& out);
+
+// Maps: verbs_maps.cc. RunLog and RunStats require that the session's map is chosen.
+absl::Status RunLog(Session* session, std::ostream& out);
+absl::Status RunStats(Session* session, std::ostream& out);
+absl::Status RunMaps(Session* session, std::ostream& out);
+/// Opens a session only if a server is named.
+absl::Status RunVersion(const CommonOptions& common, const Environment& environment,
+                        std::ostream& out);
+
+/// Commits a scene-graph file to a map of a store, both made if missing. The same file again adds
+/// nothing; an interrupted import goes on where it stopped.
+///
+/// Errors: NOT_FOUND without the file; INVALID_ARGUMENT/FILE_MALFORMED; as GraphWriter::Commit.
+absl::Status RunImport(const CommonOptions& common, const ImportVerb& verb, std::ostream& out,
+                       std::ostream& progress);
+
+/// Checks a whole map of a store, the problems listed on `out`.
+///
+/// Errors: DATA_LOSS/STORE_CORRUPT if there is any problem.
+absl::Status RunVerify(const CommonOptions& common, std::ostream& out, std::ostream& progress);
+
+}  // namespace dsg::cli

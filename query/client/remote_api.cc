@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/client/remote_api.h"
+
+#include <grpcpp/channel.h>
+
+#include <functional>
+#include <utility>
+
+#include "dsg/v1/ingest_service.grpc.pb.h"
+#include "dsg/v1/map_service.grpc.pb.h"
+#include "dsg/v1/query_service.grpc.pb.h"
+#include "query/client/call.h"
+#include "query/client/channel.h"
+#include "schema/base/status.h"
+
+namespace dsg::client {
+namespace {
+
+using query::CallContext;
+using QueryStub = v1::QueryService::Stub;
+using MapStub = v1::MapService::Stub;
+using IngestStub = v1::IngestService::Stub;
+using SendTrajectory = std::function<bool(const v1::GetTrajectoryResponse&)>;
+
+class RemoteApi final : public query::Api {
+ public:
+  explicit RemoteApi(std::string address)
+      : address_(std::move(address)),
+        channel_(MakeChannel(address_)),
+        query_(channel_),
+        map_(channel_),
+        ingest_(channel_) {}
+
+  absl::Status LocateAgent(const CallContext& call, const v1::LocateAgentRequest& request,
+                           v1::LocateAgentResponse* reply) override {
+    return Read(call, &query_, &QueryStub::PrepareAsyncLocateAgent, request, reply);
+  }
+  absl::Status BatchLocateAgents(const CallContext& call,
+                                 const v1::BatchLocateAgentsRequest& request,
+                                 v1::BatchLocateAgentsResponse* reply) override {
+    return Read(call, &query_, &QueryStub::PrepareAsyncBatchLocateAgents, request, reply);
+  }
+  absl::Status GetTrajectory(const CallContext& call, const v1::GetTrajectoryRequest& request,
+                             const SendTrajectory& send) override;
+  absl::Status ListPresence(const CallContext& call, const v1::ListPresenceRequest& request,
+                            v1::ListPresenceResponse* reply) override {
+    return Read(call, &query_, &QueryStub::PrepareAsyncListPresence, request, reply);
+  }
+  absl::Status GetNode(const CallContext& call, const v1::GetNodeRequest& request,
+                       v1::GetNodeResponse* reply) override {
+    return Read(call, &query_, &QueryStub::PrepareAsyncGetNode, request, reply);
+  }
+  absl::Status ListNodes(const CallContext& call, const v1::ListNodesRequest& request,
+                         v1::ListNodesResponse* reply) override {
+    return Read(call, &query_, &QueryStub::PrepareAsyncListNodes, request, reply);
+  }
+  absl::Status ListEdges(const CallContext& call, const v1::ListEdgesRequest& request,
+                         v1::ListEdgesResponse* reply) override {
+    return Read(call, &query_, &QueryStub::PrepareAsyncListEdges, request, reply);
+  }
+  absl::Status ListNearestNodes(const CallContext& call, const v1::ListNearestNodesRequest& request,
+                                v1::ListNearestNodesResponse* reply) override {
+    return Read(call, &query_, &QueryStub::PrepareAsyncListNearestNodes, request, reply);
+  }
+
+  // Not retried: whether the map was made is unknown, and a second try would say MAP_EXISTS.
+  absl::Status CreateMap(const CallContext& call, const v1::CreateMapRequest& request,
+                         v1::CreateMapResponse* reply) override {
+    return CallOnce(call, address_, &map_, &MapStub::PrepareAsyncCreateMap, request, reply);
+  }
+  absl::Status ListMaps(const CallContext& call, const v1::ListMapsRequest& request,
+                        v1::ListMapsResponse* reply) override {
+    return Read(call, &map_, &MapStub::PrepareAsyncListMaps, request, reply);
+  }
+  absl::Status GetMapStats(const CallContext& call, const v1::GetMapStatsRequest& request,
+                           v1::GetMapStatsResponse* reply) override {
+    return Read(call, &map_, &MapStub::PrepareAsyncGetMapStats, request, reply);
+  }
+  absl::Status ListRevisions(const CallContext& call, const v1::ListRevisionsRequest& request,
+                             v1::ListRevisionsResponse* reply) override {
+    return Read(call, &map_, &MapStub::PrepareAsyncListRevisions, request, reply);
+  }
+  absl::Status GetServerInfo(const CallContext& call, const v1::GetServerInfoRequest& request,
+                             v1::GetServerInfoResponse* reply) override {
+    return Read(call, &map_, &MapStub::PrepareAsyncGetServerInfo, request, reply);
+  }
+
+  // Not retried here: a writer that repeats a commit settles its outcome by the session first.
+  absl::Status Commit(const CallContext& call, const v1::CommitRequest& request,
+                      v1::CommitResponse* reply) override {
+    return CallOnce(call, address_, &ingest_, &IngestStub::PrepareAsyncCommit, request, reply);
+  }
+  absl::Status GetSession(const CallContext& call, const v1::GetSessionRequest& request,
+                          v1::GetSessionResponse* reply) override {
+    return Read(call, &ingest_, &IngestStub::PrepareAsyncGetSession, request, reply);
+  }
+
+ private:
+  template <class Stub, class Request, class Reply>
+  absl::Status Read(const CallContext& call, Stub* stub,
+                    std::unique_ptr<grpc::ClientAsyncResponseReader<Reply>> (Stub::*prepare)(
+                        grpc::ClientContext*, const Request&, grpc::CompletionQueue*),
+                    const Request& request, Reply* reply) {
+    return RetryRead(call, [&] { return CallOnce(call, address_, stub, prepare, request, reply); });
+  }
+
+  // Sets `started` once a message has reached `send`: from then on a repeat would send it twice.
+  absl::Status StreamOnce(const CallContext& call, const v1::GetTrajectoryRequest& request,
+                          const SendTrajectory& send, bool* started);
+
+  const std::string address_;
+  const std::shared_ptr<grpc::Channel> channel_;
+  QueryStub query_;
+  MapStub map_;
+  IngestStub ingest_;
+};
+
+absl::Status RemoteApi::StreamOnce(const CallContext& call, const v1::GetTrajectoryRequest& request,
+                                   const SendTrajectory& send, bool* started) {
+  CallInFlight flight(call, address_);
+  auto rpc = query_.PrepareAsyncGetTrajectory(flight.context(), request, flight.queue());
+  rpc->StartCall(flight.tag());
+  bool stopped = false;
+  v1::GetTrajectoryResponse message;
+  if (flight.Wait()) {
+    for (rpc->Read(&message, flight.tag()); flight.Wait(); rpc->Read(&message, flight.tag())) {
+      *started = true;
+      if (!send(message)) {
+        stopped = true;
+        flight.context()->TryCancel();
+        break;
+      }
+    }
+  }
+  grpc::Status status;
+  rpc->Finish(&status, flight.tag());
+  flight.Wait();
+  // The caller had enough, so the cancellation is ours and no error.
+  return stopped ? absl::OkStatus() : flight.Outcome(status);
+}
+
+absl::Status RemoteApi::GetTrajectory(const CallContext& call,
+                                      const v1::GetTrajectoryRequest& request,
+                                      const SendTrajectory& send) {
+  bool started = false;
+  absl::Status broken;
+  const absl::Status status = RetryRead(call, [&] {
+    broken = StreamOnce(call, request, send, &started);
+    return started ? absl::OkStatus() : broken;
+  });
+  return started ? broken : status;
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<query::Api>> Connect(const std::string& address) {
+  DSG_RETURN_IF_ERROR(CheckAddress(address));
+  return std::make_unique<RemoteApi>(address);
+}
+
+}  // namespace dsg::client

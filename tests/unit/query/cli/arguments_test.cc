@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/cli/arguments.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace dsg::cli {
+namespace {
+
+using Arguments = std::vector<std::string>;
+
+template <class V>
+V ParseAs(const Arguments& arguments, const Environment& environment = {.store = "s"}) {
+  const auto command = ParseArguments(arguments, environment);
+  EXPECT_TRUE(command.ok()) << command.status();
+  if (!command.ok() || !std::holds_alternative<V>(command->verb)) {
+    ADD_FAILURE() << "another verb than asked for";
+    return V();
+  }
+  return std::get<V>(command->verb);
+}
+
+CommonOptions ParseCommon(const Arguments& arguments, const Environment& environment) {
+  const auto command = ParseArguments(arguments, environment);
+  EXPECT_TRUE(command.ok()) << command.status();
+  return command.ok() ? command->common : CommonOptions();
+}
+
+std::string Refusal(const Arguments& arguments, const Environment& environment = {.store = "s"}) {
+  const auto command = ParseArguments(arguments, environment);
+  EXPECT_FALSE(command.ok());
+  EXPECT_TRUE(absl::IsInvalidArgument(command.status())) << command.status();
+  return std::string(command.status().message());
+}
+
+TEST(Arguments, TakesTimesWithEitherSign) {
+  for (const char* time :
+       {"+12.5s", "-3s", "-200ms", "1403715524907143168", "-5", "2014-06-25T16:58:44.9Z"}) {
+    EXPECT_EQ(ParseAs<WhereVerb>({"where", "H12", "--at", time}).at, time);
+    EXPECT_EQ(ParseAs<WhereVerb>({"where", "--at", time, "H12"}).agent, "H12");
+    EXPECT_EQ(ParseAs<WhereVerb>({"where", "H12", std::string("--at=") + time}).at, time);
+    EXPECT_EQ(ParseAs<TrackVerb>({"track", "H12", "--from", time, "--to", "+9s"}).from, time);
+  }
+}
+
+TEST(Arguments, TakesPointsAndBoxesThatBeginBelowZero) {
+  EXPECT_EQ(ParseAs<NearVerb>({"near", "-1.5,2,3"}).position, "-1.5,2,3");
+  EXPECT_EQ(ParseAs<NearVerb>({"near", "--k", "7", "-1,-2,-3"}).k, 7);
+  EXPECT_EQ(ParseAs<WhoVerb>({"who", "--box", "-1,-2,-3,1,2,3", "--from", "-1s"}).box,
+            "-1,-2,-3,1,2,3");
+}
+
+TEST(Arguments, AgentNamesMayBeNumbers) {
+  EXPECT_EQ(ParseAs<WhereVerb>({"where", "12", "--at", "0"}).agent, "12");
+}
+
+TEST(Arguments, FilterOfListingIsComplete) {
+  const ListVerb verb =
+      ParseAs<ListVerb>({"ls", "--layer", "rooms", "--kind", "room", "--class", "kitchen",
+                         "--parent", "B0", "--name", "n", "--box", "0,0,0,1,1,1", "--at", "+1s"});
+  EXPECT_EQ(verb.filter.layer, "rooms");
+  EXPECT_EQ(verb.filter.kind, "room");
+  EXPECT_EQ(verb.filter.class_name, "kitchen");
+  EXPECT_EQ(verb.filter.at, "+1s");
+  EXPECT_EQ(verb.parent, "B0");
+  EXPECT_EQ(verb.name, "n");
+  EXPECT_EQ(verb.box, "0,0,0,1,1,1");
+}
+
+TEST(Arguments, CommonOptionsStandBehindTheVerb) {
+  const CommonOptions common =
+      ParseCommon({"ls", "--server", "unix:s", "--map", "office", "--revision", "17", "--json",
+                   "--limit", "5", "--timeout", "2.5"},
+                  {});
+  EXPECT_EQ(common.server, "unix:s");
+  EXPECT_EQ(common.map, "office");
+  EXPECT_EQ(common.revision, 17);
+  EXPECT_TRUE(common.json);
+  EXPECT_EQ(common.limit, 5);
+  EXPECT_EQ(common.timeout_s, 2.5);
+}
+
+TEST(Arguments, EnvironmentFillsWhatIsLeftOpen) {
+  const CommonOptions common = ParseCommon({"stats"}, {.server = "unix:s", .map = "office"});
+  EXPECT_EQ(common.server, "unix:s");
+  EXPECT_EQ(common.map, "office");
+  EXPECT_FALSE(common.revision.has_value());
+}
+
+TEST(Arguments, CommandLineWinsOverEnvironment) {
+  const Environment both{.store = "env-store", .server = "env-server", .map = "env-map"};
+  const CommonOptions store = ParseCommon({"stats", "--store", "s", "--map", "m"}, both);
+  EXPECT_EQ(store.store, "s");
+  EXPECT_EQ(store.server, "");
+  EXPECT_EQ(store.map, "m");
+  EXPECT_EQ(ParseCommon({"stats", "--server", "unix:s"}, both).store, "");
+}
+
+TEST(Arguments, RefusesTwoPlaces) {
+  const std::string message = Refusal({"stats", "--store", "s", "--server", "unix:s"}, {});
+  EXPECT_NE(message.find("both a store (s) and a server (unix:s)"), std::string::npos) << message;
+  Refusal({"stats"}, {.store = "s", .server = "unix:s"});
+}
+
+TEST(Arguments, RefusesNoPlaceSayingWhatToGive) {
+  const std::string message = Refusal({"stats"}, {});
+  EXPECT_NE(message.find("--store DIR or --server ADDR"), std::string::npos) << message;
+}
+
+TEST(Arguments, ImportAndVerifyNeedAStore) {
+  const Environment server{.server = "unix:s", .map = "m"};
+  EXPECT_NE(Refusal({"import", "f.json"}, server).find("dsg-ingest --server"), std::string::npos);
+  EXPECT_NE(Refusal({"verify"}, server).find("--store DIR"), std::string::npos);
+  EXPECT_NE(Refusal({"import", "f.json", "--store", "s"}, {}).find("--map NAME"),
+            std::string::npos);
+  EXPECT_EQ(ParseAs<ImportVerb>({"import", "f.json", "--map", "m"}).file, "f.json");
+}
+
+TEST(Arguments, RefusesWhatItDoesNotKnow) {
+  Refusal({});
+  EXPECT_NE(Refusal({"fly"}).find("no verb \"fly\""), std::string::npos);
+  Refusal({"where", "H12"});
+  Refusal({"where", "--at", "+1s"});
+  Refusal({"where", "H12", "--at", "+1s", "--color", "red"});
+  Refusal({"stats", "--revision", "-1"});
+  Refusal({"stats", "--revision", "latest"});
+  Refusal({"ls", "--limit", "0"});
+  Refusal({"near", "0,0,0", "--k", "1001"});
+  Refusal({"near", "0,0,0", "--timeout", "0"});
+  // Revisions are what log lists, not what it is asked at.
+  Refusal({"log", "--revision", "1"});
+}
+
+TEST(Arguments, WhoNeedsExactlyOnePlace) {
+  EXPECT_NE(Refusal({"who"}).find("--room ID or --box"), std::string::npos);
+  Refusal({"who", "--room", "R1", "--box", "0,0,0,1,1,1"});
+  EXPECT_EQ(ParseAs<WhoVerb>({"who", "--room", "big kitchen"}).room, "big kitchen");
+}
+
+TEST(Arguments, HelpIsAnAnswer) {
+  const std::string all = ParseAs<HelpVerb>({"--help"}, {}).text;
+  for (const char* verb : {"where", "track", "who", "ls", "edges", "show", "near", "log", "stats",
+                           "maps", "import", "verify", "version"}) {
+    EXPECT_NE(all.find(std::string("  ") + verb), std::string::npos) << verb;
+  }
+  const std::string where = ParseAs<HelpVerb>({"where", "--help"}, {}).text;
+  EXPECT_NE(where.find("--at"), std::string::npos) << where;
+}
+
+TEST(Arguments, VersionNeedsNoPlace) { ParseAs<VersionVerb>({"version"}, {}); }
+
+}  // namespace
+}  // namespace dsg::cli

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/cli/values.h"
+
+#include <gtest/gtest.h>
+
+#include "schema/base/status.h"
+
+namespace dsg::cli {
+namespace {
+
+TEST(Values, ReadsPointsAndBoxes) {
+  EXPECT_EQ(*ParsePoint("POSITION", "-1.5,2e1,0"), Eigen::Vector3d(-1.5, 20.0, 0.0));
+  const Box3d box = *ParseBox("--box", "0,0,0,1,2,3");
+  EXPECT_EQ(box.min(), Eigen::Vector3d(0, 0, 0));
+  EXPECT_EQ(box.max(), Eigen::Vector3d(1, 2, 3));
+}
+
+TEST(Values, RefusesIncompleteOrStrangeNumbersNamingTheOption) {
+  for (const char* text : {"", "1,2", "1,2,3,4", "1,2,x", "1,,3", "1 2 3"}) {
+    const auto point = ParsePoint("POSITION", text);
+    ASSERT_FALSE(point.ok()) << text;
+    EXPECT_EQ(ReasonOf(point.status()), Reason::kFieldInvalid) << text;
+    EXPECT_EQ(MetadataOf(point.status())["field"], "POSITION");
+  }
+  EXPECT_EQ(ReasonOf(ParsePoint("POSITION", "nan,0,0").status()), Reason::kNumberNotFinite);
+  EXPECT_EQ(ReasonOf(ParsePoint("POSITION", "0,0,-inf").status()), Reason::kNumberNotFinite);
+}
+
+TEST(Values, RefusesInvertedBoxes) {
+  EXPECT_EQ(ReasonOf(ParseBox("--box", "0,0,0,1,-1,1").status()), Reason::kBoxInverted);
+}
+
+TEST(Values, ReadsDurations) {
+  EXPECT_EQ(*ParseDuration("--every", "0.5s"), kNsPerSecond / 2);
+  EXPECT_EQ(*ParseDuration("--every", "200ms"), 200'000'000);
+  EXPECT_EQ(*ParseDuration("--every", "2"), 2 * kNsPerSecond);
+}
+
+TEST(Values, RefusesDurationsThatAreNotAboveZero) {
+  for (const char* text : {"", "0", "0s", "-1s", "+1s", "fast", "2014-06-25T16:58:44Z"}) {
+    EXPECT_EQ(ReasonOf(ParseDuration("--every", text).status()), Reason::kFieldInvalid) << text;
+  }
+}
+
+TEST(Values, InstantsAreRelativeToTheEpochAndNameTheirOption) {
+  EXPECT_EQ(*ParseInstant("--at", "+12.5s", 100), 12'500'000'100);
+  EXPECT_EQ(*ParseInstant("--at", "77", 100), 77);
+  const auto bad = ParseInstant("--from", "soon", 0);
+  EXPECT_EQ(ReasonOf(bad.status()), Reason::kFieldInvalid);
+  EXPECT_EQ(bad.status().message().substr(0, 8), "--from: ");
+}
+
+}  // namespace
+}  // namespace dsg::cli
