@@ -1,0 +1,79 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""The server as a process: one address one server, clear refusals, answers during an ingest."""
+
+import os
+import signal
+import socket
+import unittest
+
+import support
+
+
+class Server(support.ProgramsTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.small = cls.simulate("small", people=3, seconds=60)
+        cls.ingest("store", cls.small)
+
+    def test_two_servers_never_share_a_port(self):
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            port = probe.getsockname()[1]
+        address = f"127.0.0.1:{port}"
+        with self.server("store", address):
+            self.refused(2, [address], "dsg-server", "--store", "store", "--listen", address)
+
+    def test_a_socket_left_by_a_killed_server_is_taken_over(self):
+        address = "unix:left.sock"
+        killed = support.start("dsg-server", "--store", "store", "--listen", address,
+                               cwd=self.folder)
+        support.wait_until(lambda: support.run("dsg", "version", "--server", address,
+                                               cwd=self.folder).returncode == 0, "the server")
+        killed.kill()
+        killed.wait()
+        with self.server("store", address):
+            self.assertGreater(self.ask("stats", "--server", address)["head_revision"], "0")
+
+    def test_wrong_starts_are_refused(self):
+        a_file = os.path.join(self.small, "tracks.csv")
+        self.refused(2, [a_file], "dsg-server", "--store", a_file, "--listen", "unix:a.sock")
+        self.refused(2, ["unix:"], "dsg-server", "--store", "store", "--listen", "unix:")
+        self.refused(2, ["--allow-remote"], "dsg-server", "--store", "store", "--listen",
+                     "0.0.0.0:50051")
+
+    def test_no_server_is_said_at_once(self):
+        self.refused(3, ["unix:none.sock"], "dsg", "stats", "--server", "unix:none.sock",
+                     "--map", "office", "--timeout", "2")
+
+    def test_answers_while_an_ingest_writes(self):
+        large = self.simulate("large", people=40, seconds=600)
+        self.ingest("busy", self.small)
+        with self.server("busy", "unix:busy.sock"):
+            heads = [self.head("unix:busy.sock")]
+            writer = support.start("dsg-ingest", "--store", "busy", "--map", "office",
+                                   "--agent-prefix", "b", large, cwd=self.folder)
+            try:
+                while writer.poll() is None:
+                    heads.append(self.head("unix:busy.sock"))
+                self.assertEqual(0, writer.returncode)
+                heads.append(self.head("unix:busy.sock"))
+            finally:
+                writer.kill()
+                writer.wait()
+            self.assertEqual(heads, sorted(heads))
+            self.assertGreater(heads[-1], heads[0])
+            self.assertEqual(heads[-1], int(self.ask("stats", "--store", "busy")["head_revision"]))
+
+    def head(self, address):
+        return int(self.ask("stats", "--server", address, "--map", "office")["head_revision"])
+
+    def test_stops_in_order_on_interrupt_too(self):
+        with self.server("store", "unix:int.sock") as process:
+            process.send_signal(signal.SIGINT)
+            self.assertEqual(0, process.wait(timeout=support.TIMEOUT_S))
+
+
+if __name__ == "__main__":
+    unittest.main()
