@@ -177,7 +177,7 @@ void Grammar::AddStoreVerbs() {
   CLI::App* import =
       AddVerb("import", "Add a scene-graph file (Spark-DSG, Kimera) to a map", kMap, &import_);
   import->add_option("FILE", import_.file, "The file")->required();
-  AddVerb("verify", "Check every byte and invariant of a map", kMap, &verify_);
+  AddVerb("verify", "Check every page, row and revision of a map", kMap, &verify_);
 }
 
 absl::Status Usage(const std::string& message) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The verb verify: every byte and invariant of one map, or of all maps of a store.
+// The verb verify: every page, row and revision of one map, or of all maps of a store.
 #include <memory>
 #include <string>
 #include <vector>

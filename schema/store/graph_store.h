@@ -41,7 +41,7 @@ class MapReader {
   virtual const MapSpec& spec() const = 0;
   /// False once the map's file was removed or replaced under it (a restore): open it again.
   virtual bool IsCurrent() const = 0;
-  /// The newest revision; costs a microsecond when nothing has changed.
+  /// The newest revision; costs a few microseconds when nothing has changed.
   virtual absl::StatusOr<RevisionInfo> Head() = 0;
   virtual absl::StatusOr<std::shared_ptr<const Snapshot>> Latest() = 0;
   /// Errors: OUT_OF_RANGE/REVISION_IN_FUTURE or REVISION_COMPACTED, both with oldest and newest.
@@ -51,7 +51,8 @@ class MapReader {
   /// Newest first, below `before` (0 = from the newest), at most `limit`.
   virtual absl::StatusOr<std::vector<RevisionInfo>> ListRevisions(Revision before, int limit) = 0;
   virtual absl::StatusOr<SessionState> GetSession(const std::string& session_id) = 0;
-  /// Reads everything: database structure, payload checksums, the digest chain, invariants.
+  /// Reads everything: database structure, the log, payload checksums, the digest of every
+  /// revision, the ends of edges. The other invariants are proven at each commit (CheckDelta).
   /// `progress` (may be empty) gets a fraction from 0 to 1.
   virtual absl::StatusOr<VerifyReport> Verify(const std::function<void(double)>& progress) = 0;
 };
