@@ -11,7 +11,7 @@
 
 #include "absl/status/statusor.h"
 
-namespace dsg::simulator {
+namespace dsg::ingest {
 
 /// Writes to PATH.part and renames on Commit(); removes PATH.part when dropped before.
 ///
@@ -51,4 +51,4 @@ class OutputFile {
 void AppendFixed(double value, int decimals, std::string* out);
 void AppendInteger(int64_t value, std::string* out);
 
-}  // namespace dsg::simulator
+}  // namespace dsg::ingest

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ingest/simulator/output_file.h"
+#include "ingest/files/output_file.h"
 
 #include <unistd.h>
 
@@ -12,7 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
 
-namespace dsg::simulator {
+namespace dsg::ingest {
 namespace {
 
 constexpr size_t kBufferBytes = size_t{1} << 20;
@@ -102,4 +102,4 @@ void AppendFixed(double value, int decimals, std::string* out) {
   out->append(digits, static_cast<size_t>(decimals));
 }
 
-}  // namespace dsg::simulator
+}  // namespace dsg::ingest

@@ -7,7 +7,7 @@
 #include <optional>
 #include <random>
 
-namespace dsg::simulator {
+namespace dsg {
 
 /// One stream of random numbers. Streams of one seed are independent of each other, so that a
 /// tenth walker does not change the paths of the first nine.
@@ -36,4 +36,4 @@ class Random {
   std::optional<double> spare_normal_;
 };
 
-}  // namespace dsg::simulator
+}  // namespace dsg

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Numbers as text, and files that appear whole or not at all.
-#include "ingest/simulator/output_file.h"
+#include "ingest/files/output_file.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -10,10 +10,10 @@
 #include <fstream>
 #include <sstream>
 
-#include "ingest/simulator/random.h"
+#include "schema/base/random.h"
 #include "schema/base/status.h"
 
-namespace dsg::simulator {
+namespace dsg::ingest {
 namespace {
 
 std::string Fixed(double value, int decimals) {
@@ -101,4 +101,4 @@ TEST(OutputFile, ReportsAFullDisk) {
 }
 
 }  // namespace
-}  // namespace dsg::simulator
+}  // namespace dsg::ingest

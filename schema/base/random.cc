@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ingest/simulator/random.h"
+#include "schema/base/random.h"
 
 #include <cmath>
 #include <numbers>
 
-namespace dsg::simulator {
+namespace dsg {
 namespace {
 
 // Source: Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014; the
@@ -43,4 +43,4 @@ double Random::Normal() {
 
 double Random::Exponential() { return -std::log(1.0 - Uniform()); }
 
-}  // namespace dsg::simulator
+}  // namespace dsg

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // The streams are what they were on the day they were written, and are distributed as they claim.
-#include "ingest/simulator/random.h"
+#include "schema/base/random.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <set>
 
-namespace dsg::simulator {
+namespace dsg {
 namespace {
 
 TEST(Random, RepeatsItselfAndSeparatesStreams) {
@@ -62,4 +62,4 @@ TEST(Random, ExponentialHasUnitMean) {
 }
 
 }  // namespace
-}  // namespace dsg::simulator
+}  // namespace dsg
