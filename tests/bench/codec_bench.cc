@@ -79,7 +79,7 @@ void DecodeTrack(benchmark::State& state) {
 
 void FindBracket(benchmark::State& state) {
   const auto readers = OpenAll(CodecOf(state));
-  simulator::Random random(kSeed, 7);
+  Random random(kSeed, 7);
   std::vector<std::pair<const SegmentReader*, TimeNs>> questions;
   for (int i = 0; i < 4096; ++i) {
     const auto& reader =
@@ -103,7 +103,7 @@ void FindBracket(benchmark::State& state) {
 
 void FindInPlainArray(benchmark::State& state) {
   const std::vector<TimedPose>& poses = Poses();
-  simulator::Random random(kSeed, 7);
+  Random random(kSeed, 7);
   std::vector<TimeNs> questions;
   for (int i = 0; i < 4096; ++i) {
     const double steps = random.Uniform(1.0, kPoseCount - 2.0);

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "ingest/simulator/random.h"
+#include "schema/base/random.h"
 #include "schema/model/graph_delta.h"
 
 namespace dsg::bench {
@@ -36,7 +36,7 @@ class Walker {
   void Advance();
   void ChooseGoal();
 
-  simulator::Random random_;
+  Random random_;
   int64_t step_ = 0;
   Eigen::Vector3d position_;
   Eigen::Vector3d goal_;

@@ -136,14 +136,13 @@ grpc::Status Call(Stub* stub,
   return (stub->*method)(&context, request, reply);
 }
 
-void FillInstant(const Flags& flags, simulator::Random* random, std::string* agent,
-                 int64_t* at_ns) {
+void FillInstant(const Flags& flags, Random* random, std::string* agent, int64_t* at_ns) {
   *agent = ToString(CrowdAgent(random->Index(flags.agent_count)));
   *at_ns = kCrowdEpochNs + static_cast<TimeNs>(random->Uniform(1.0, flags.poses_per_agent - 2.0) *
                                                static_cast<double>(kPosePeriodNs));
 }
 
-v1::LocateAgentRequest RandomLookup(const Flags& flags, simulator::Random* random) {
+v1::LocateAgentRequest RandomLookup(const Flags& flags, Random* random) {
   v1::LocateAgentRequest request;
   request.set_map(kMap);
   int64_t at_ns = 0;
@@ -171,7 +170,7 @@ absl::Status CheckReply(const Snapshot& snapshot, const v1::LocateAgentRequest& 
 absl::Status MeasureUnary(const Flags& flags, const Client& client, const Snapshot& snapshot,
                           Report* report) {
   constexpr int kWarmupCount = 2000;
-  simulator::Random random(kSeed, 1'000'000);
+  Random random(kSeed, 1'000'000);
   Samples ours;
   Samples empty;
   for (int i = 0; i < kWarmupCount + flags.unary_count; ++i) {
@@ -210,7 +209,7 @@ struct Tally {
   absl::Status status;
 };
 
-v1::BatchLocateAgentsRequest RandomBatch(const Flags& flags, simulator::Random* random) {
+v1::BatchLocateAgentsRequest RandomBatch(const Flags& flags, Random* random) {
   v1::BatchLocateAgentsRequest request;
   request.set_map(kMap);
   for (int i = 0; i < flags.batch_size; ++i) {
@@ -242,7 +241,7 @@ absl::Status CheckBatch(const v1::BatchLocateAgentsRequest& request,
 void LoadInBatches(const Flags& flags, const Client& client, uint64_t stream,
                    const std::atomic<bool>& stop, Tally* tally) {
   constexpr int kRequestCount = 16;
-  simulator::Random random(kSeed, stream);
+  Random random(kSeed, stream);
   std::vector<v1::BatchLocateAgentsRequest> requests;
   for (int i = 0; i < kRequestCount; ++i) requests.push_back(RandomBatch(flags, &random));
   v1::BatchLocateAgentsResponse reply;
@@ -260,7 +259,7 @@ void LoadInBatches(const Flags& flags, const Client& client, uint64_t stream,
 
 void LoadOneByOne(const Flags& flags, const Client& client, uint64_t stream,
                   const std::atomic<bool>& stop, Tally* tally) {
-  simulator::Random random(kSeed, stream);
+  Random random(kSeed, stream);
   v1::LocateAgentResponse reply;
   while (!stop && tally->status.ok()) {
     const v1::LocateAgentRequest request = RandomLookup(flags, &random);

@@ -178,7 +178,7 @@ struct Instant {
 };
 
 // Evenly over all agents and all of their tracks.
-Instant RandomInstant(const Flags& flags, simulator::Random* random) {
+Instant RandomInstant(const Flags& flags, Random* random) {
   const double last = static_cast<double>(flags.poses_per_agent() - 2);
   return {CrowdAgent(random->Index(flags.agent_count)),
           kCrowdEpochNs +
@@ -218,7 +218,7 @@ absl::Status AskAll(const std::vector<Instant>& instants, Locate&& locate, Sampl
 absl::Status MeasureLookups(const Flags& flags, const std::string& what, const Target& target,
                             Readers* readers, Report* report) {
   constexpr int kBlock = 500;
-  simulator::Random random(kSeed, 1'000'000);
+  Random random(kSeed, 1'000'000);
   const auto ask_ours = [&](NodeId agent, TimeNs at_ns) {
     return readers->ours().Locate(agent, at_ns);
   };
@@ -247,7 +247,7 @@ struct BoxQuestion {
   TimeNs from_ns = 0;
 };
 
-BoxQuestion RandomBox(const Flags& flags, simulator::Random* random) {
+BoxQuestion RandomBox(const Flags& flags, Random* random) {
   const double z = kFloorHeightM * random->Index(kFloorCount);
   const Eigen::Vector3d corner(random->Uniform(0, kBuildingXM - 5.0),
                                random->Uniform(0, kBuildingYM - 5.0), z);
@@ -325,7 +325,7 @@ absl::Status CompareVisitors(const Flags& flags, const BoxQuestion& question,
 }
 
 absl::Status MeasureBoxes(const Flags& flags, Readers* readers, Report* report) {
-  simulator::Random random(kSeed, 2'000'000);
+  Random random(kSeed, 2'000'000);
   Samples ours;
   Samples rows;
   int64_t visitor_count = 0;

@@ -9,7 +9,7 @@
 
 #include "CLI/CLI.hpp"
 #include "absl/strings/str_cat.h"
-#include "ingest/simulator/random.h"
+#include "schema/base/random.h"
 #include "schema/base/status.h"
 #include "schema/store/graph_store.h"
 #include "tests/bench/child_process.h"
@@ -80,7 +80,7 @@ absl::Status MeasureOneNodeCommits(const GraphDelta& graph, const std::string& f
   DSG_ASSIGN_OR_RETURN(const auto writer, store->OpenWriter(kMap));
   DSG_ASSIGN_OR_RETURN(const SessionState session, writer->GetSession(kSession));
   DSG_ASSIGN_OR_RETURN(const auto table, MakePlainTable(graph, rows_folder));
-  simulator::Random random(42, 1);
+  Random random(42, 1);
   Samples ours;
   Samples rows;
   for (int i = 1; i <= kChangeCount; ++i) {
@@ -194,7 +194,7 @@ absl::Status MeasureNearestPlace(const GraphDelta& graph, const Snapshot& snapsh
   }
   NodeFilter filter;
   filter.layer = layers::kPlaces;
-  simulator::Random random(42, 2);
+  Random random(42, 2);
   Samples ours;
   Samples scan;
   for (int i = 0; i < kQuestionCount; ++i) {
@@ -234,7 +234,7 @@ int ScanForPose(const std::vector<TimedPose>& poses, TimeNs at_ns) {
 
 absl::Status MeasureAgentAtTime(const GraphDelta& graph, const Snapshot& snapshot, Report* report) {
   const std::vector<TimedPose>& poses = graph.appends.front().poses;
-  simulator::Random random(42, 3);
+  Random random(42, 3);
   Samples ours;
   Samples scan;
   for (int i = 0; i < kQuestionCount; ++i) {

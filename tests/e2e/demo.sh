@@ -4,7 +4,7 @@
 # Takes the programs from DSG_BIN; leaves nothing behind unless a folder to keep is given.
 set -euo pipefail
 
-readonly SEED=7 PEOPLE=12 SECONDS_SIMULATED=300
+readonly SEED=12 PEOPLE=12 SECONDS_SIMULATED=300
 : "${DSG_BIN:?names the folder of the programs; ./dev demo sets it}"
 PATH=$(cd "$DSG_BIN" && pwd):$PATH
 server_pid=
@@ -75,7 +75,7 @@ printf 'ready\n'
 
 say '4. Where was carol at three instants?'
 show dsg where carol --at +30s
-show dsg where carol --at +90.25s
+show dsg where carol --at +100.25s
 show dsg where carol --at +3m
 
 say '5. Who was in the kitchen during the second minute?'

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Exact distances against dense sampling and by hand.
-#include "ingest/simulator/free_space.h"
+#include "ingest/simulator/world/free_space.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <vector>
 
-#include "ingest/simulator/random.h"
+#include "schema/base/random.h"
 
 namespace dsg::simulator {
 namespace {
@@ -46,6 +47,37 @@ TEST(FreeSpace, SegmentClearanceEqualsDenseSampling) {
     EXPECT_GE(exact, sampled - (to - from).norm() / kSamples);
     const double radius = random.Uniform(0.05, 3.0);
     EXPECT_EQ(space.SegmentKeepsClear(from, to, radius), exact >= radius);
+  }
+}
+
+// What was given at once is found through the index, what was added later is gone through.
+TEST(FreeSpace, AnswersTheSameWithAndWithoutItsIndex) {
+  const uint64_t seed = 8;
+  SCOPED_TRACE(testing::Message() << "seed " << seed);
+  Random random(seed, 0);
+  // Far outside of the obstacles too.
+  const auto draw = [&] { return Point(random.Uniform(-20, 60), random.Uniform(-20, 60)); };
+  for (const int count : {0, 1, 3, 200}) {
+    std::vector<Rect> obstacles;
+    FreeSpace plain;
+    for (int i = 0; i < count; ++i) {
+      const Point low(random.Uniform(0, 40), random.Uniform(0, 30));
+      obstacles.push_back(Rect(low, low + Point(random.Uniform(0.1, 9), random.Uniform(0.1, 2))));
+      plain.Add(obstacles.back());
+    }
+    FreeSpace indexed(obstacles);
+    for (int round = 0; round < 500; ++round) {
+      const Point from = draw();
+      const Point to = round % 2 == 0 ? draw() : Point(from + 0.05 * draw());
+      EXPECT_EQ(indexed.Clearance(from), plain.Clearance(from));
+      EXPECT_EQ(indexed.SegmentClearance(from, to), plain.SegmentClearance(from, to));
+      const double radius = random.Uniform(0.05, 3.0);
+      EXPECT_EQ(indexed.SegmentKeepsClear(from, to, radius),
+                plain.SegmentKeepsClear(from, to, radius));
+    }
+    const Rect late(Point(50, 50), Point(51, 51));
+    indexed.Add(late);
+    EXPECT_EQ(indexed.Clearance(Point(50.5, 50.5)), 0.0);
   }
 }
 

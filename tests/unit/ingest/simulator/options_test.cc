@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bounds of the options and what their errors say.
-#include "ingest/simulator/options.h"
+#include "ingest/simulator/world/options.h"
 
 #include <gtest/gtest.h>
 
@@ -72,6 +72,10 @@ TEST(SimulatorOptions, RefusesWhatIsOutOfBoundsNamingTheOption) {
 TEST(SimulatorOptions, KnowsTheNamesOfWorlds) {
   EXPECT_EQ(*ParseWorldKind("office"), WorldKind::kOffice);
   EXPECT_EQ(*ParseWorldKind("apartment"), WorldKind::kApartment);
+  EXPECT_EQ(*ParseWorldKind("wing"), WorldKind::kWing);
+  for (const WorldKind kind : {WorldKind::kOffice, WorldKind::kWing, WorldKind::kApartment}) {
+    EXPECT_EQ(*ParseWorldKind(Name(kind)), kind);
+  }
   EXPECT_EQ(ReasonOf(ParseWorldKind("castle").status()), Reason::kFieldInvalid);
 }
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Rounded lines stay near their legs, and speed profiles invert.
-#include "ingest/simulator/path.h"
+#include "ingest/simulator/world/path.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 
-#include "ingest/simulator/random.h"
+#include "schema/base/random.h"
 
 namespace dsg::simulator {
 namespace {

@@ -1,16 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 // Room visits tile the time and agree with a naive scan of the walk.
-#include "ingest/simulator/presence.h"
+#include "ingest/simulator/tracks/presence.h"
 
 #include <gtest/gtest.h>
+
+#include <string>
 
 namespace dsg::simulator {
 namespace {
 
-TEST(RoomVisits, TileTheTimeAndAgreeWithANaiveScan) {
+/// The door between two rooms; null without one.
+const Door* DoorBetween(const FloorPlan& plan, int from, int to) {
+  for (const Door& door : plan.doors) {
+    if (door.Joins(from) && door.Other(from) == to) return &door;
+  }
+  return nullptr;
+}
+
+class RoomVisitsIn : public testing::TestWithParam<WorldKind> {};
+
+TEST_P(RoomVisitsIn, TileTheTimeAndAgreeWithANaiveScan) {
   const uint64_t seed = 31;
   SCOPED_TRACE(testing::Message() << "seed " << seed);
-  const World world = *GenerateWorld({WorldKind::kOffice, seed});
+  const World world = *GenerateWorld({GetParam(), seed});
   const Planner planner(&world);
   constexpr TimeNs kUntil = 1200 * kNsPerSecond;
   for (const AgentSpec& agent : MakeCrowd(4)) {
@@ -25,7 +37,7 @@ TEST(RoomVisits, TileTheTimeAndAgreeWithANaiveScan) {
       EXPECT_EQ(visits[i].enter_ns, visits[i - 1].exit_ns);
       EXPECT_NE(visits[i].room, visits[i - 1].room);
       // One changes rooms through a door only.
-      EXPECT_TRUE(visits[i].room == 0 || visits[i - 1].room == 0);
+      EXPECT_NE(DoorBetween(world.plan, visits[i - 1].room, visits[i].room), nullptr);
     }
     Walker second(&world, &planner, agent, seed);
     size_t visit = 0;
@@ -37,8 +49,8 @@ TEST(RoomVisits, TileTheTimeAndAgreeWithANaiveScan) {
   }
 }
 
-TEST(RoomVisits, CrossTheDoorAtTheInstantTheySay) {
-  const World world = *GenerateWorld({WorldKind::kApartment, 32});
+TEST_P(RoomVisitsIn, CrossTheDoorAtTheInstantTheySay) {
+  const World world = *GenerateWorld({GetParam(), 32});
   const Planner planner(&world);
   const AgentSpec agent = MakeCrowd(1).front();
   Walker first(&world, &planner, agent, 32);
@@ -46,14 +58,18 @@ TEST(RoomVisits, CrossTheDoorAtTheInstantTheySay) {
   Walker second(&world, &planner, agent, 32);
   for (size_t i = 1; i < visits.size(); ++i) {
     const Point at = second.PoseAt(visits[i].enter_ns).position;
-    double nearest = 1e9;
-    for (const Door& door : world.plan.doors) {
-      if (std::abs(at.x() - door.center.x()) > 0.5 * door.width_m) continue;
-      nearest = std::min(nearest, std::abs(at.y() - door.center.y()));
-    }
-    EXPECT_LT(nearest, 1e-6) << "visit " << i;
+    const Door* door = DoorBetween(world.plan, visits[i - 1].room, visits[i].room);
+    ASSERT_NE(door, nullptr) << "visit " << i;
+    const Point off = (at - door->center).cwiseAbs();
+    EXPECT_LT(door->walks_along_y ? off.y() : off.x(), 1e-6) << "visit " << i;
+    EXPECT_LT(door->walks_along_y ? off.x() : off.y(), 0.5 * door->width_m) << "visit " << i;
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(Kinds, RoomVisitsIn,
+                         testing::Values(WorldKind::kOffice, WorldKind::kWing,
+                                         WorldKind::kApartment),
+                         [](const auto& param) { return std::string(Name(param.param)); });
 
 }  // namespace
 }  // namespace dsg::simulator

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pictures hold what was drawn, and their PNG has the frame that the format asks for.
-#include "ingest/simulator/raster.h"
+#include "ingest/simulator/picture/raster.h"
 
 #include <gtest/gtest.h>
 

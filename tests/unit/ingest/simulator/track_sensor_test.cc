@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Noise, jitter and losses are as large and as frequent as asked.
-#include "ingest/simulator/track_sensor.h"
+#include "ingest/simulator/tracks/track_sensor.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Whole logs: their files, their bytes, and what they refuse to overwrite.
-#include "ingest/simulator/tracks_log.h"
+#include "ingest/simulator/tracks/tracks_log.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// Puts together what really was: the truth folder beside a log.
+// Refuses to write it; ingest/truth does.
+#pragma once
+
+#include <vector>
+
+#include "ingest/simulator/body/detector.h"
+#include "ingest/simulator/sensors/observation.h"
+#include "ingest/simulator/sensors/session.h"
+#include "ingest/truth/truth.h"
+
+namespace dsg::simulator {
+
+/// `grid` with what was observed of it.
+truth::Truth BuildTruth(const SensorSession& session, const Observation& observation,
+                        const std::vector<DetectionOutput>& detections, truth::FreeGrid grid);
+
+/// The CAD models that the truth's objects name, as PLY files under `folder`/cad.
+/// Errors: of OutputFile.
+absl::Status WriteCadModels(const SensorSession& session, const std::string& folder);
+
+}  // namespace dsg::simulator
