@@ -1,86 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "absl/strings/str_cat.h"
+#include "ingest/log/pose_table.h"
 #include "ingest/log/readers.h"
-#include "ingest/log/text_table.h"
-#include "ingest/log/track_log.h"
+#include "ingest/log/sensor_log.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
-namespace {
-
-constexpr char kColumns[] = "timestamp, p x y z, q w x y z, then nothing or v, b_w, b_a";
-
-// A header that names other columns must not be read as if it named ours.
-absl::Status CheckHeader(const LinePosition& at, const std::vector<std::string_view>& fields) {
-  constexpr std::string_view kMarks[] = {"timestamp", "_x", "_y", "_z", "_w", "_x", "_y", "_z"};
-  if (fields.size() != 8 && fields.size() != 17) {
-    return at.Error(absl::StrCat("the header names ", fields.size(), " columns, expected 8 or 17 (",
-                                 kColumns, "); is this a state_groundtruth_estimate0?"));
-  }
-  for (size_t i = 0; i < std::size(kMarks); ++i) {
-    const bool is_group_right = i == 0 || fields[i].starts_with(i < 4 ? "p_" : "q_");
-    if (!is_group_right || fields[i].find(kMarks[i]) == std::string_view::npos) {
-      return at.FieldError(
-          "header", fields[i],
-          absl::StrCat("columns must be ", kColumns, "; is this a state_groundtruth_estimate0?"));
-    }
-  }
-  return absl::OkStatus();
-}
-
-absl::Status AddRow(const LinePosition& at, const std::vector<std::string_view>& fields,
-                    int32_t agent, TrackTable* table) {
-  DSG_ASSIGN_OR_RETURN(const int64_t stamp, ParseInteger(at, "timestamp", fields[0]));
-  if (stamp == kTimeMax || stamp == kTimeMin) {
-    return at.FieldError("timestamp", fields[0], "nanoseconds since 1970 are due");
-  }
-  Pose3d map_T_body;
-  constexpr std::string_view kPosition[] = {"p_x", "p_y", "p_z"};
-  for (size_t i = 0; i < 3; ++i) {
-    DSG_ASSIGN_OR_RETURN(map_T_body.position[static_cast<Eigen::Index>(i)],
-                         ParseCoordinate(at, kPosition[i], fields[1 + i]));
-  }
-  double wxyz[4] = {};
-  constexpr std::string_view kOrientation[] = {"q_w", "q_x", "q_y", "q_z"};
-  for (size_t i = 0; i < 4; ++i) {
-    DSG_ASSIGN_OR_RETURN(wxyz[i], ParseNumber(at, kOrientation[i], fields[4 + i]));
-  }
-  for (size_t i = 8; i < fields.size(); ++i) {
-    DSG_RETURN_IF_ERROR(ParseNumber(at, absl::StrCat("column ", i + 1), fields[i]).status());
-  }
-  DSG_ASSIGN_OR_RETURN(map_T_body.orientation, Normalize(at, {wxyz[0], wxyz[1], wxyz[2], wxyz[3]}));
-  table->rows.push_back(
-      {.time_ns = stamp, .line = at.line, .agent = agent, .flags = 0, .map_T_agent = map_T_body});
-  return absl::OkStatus();
-}
-
-}  // namespace
 
 OpenedLog ReadEuroc(const LogFile& file, const LogOptions& options) {
-  TrackTable table;
-  table.file = file.path;
-  const std::string name = options.agent_prefix.empty() ? "body" : options.agent_prefix;
-  const int32_t agent = table.FindOrAdd(name, kinds::kRobot);
-  LineReader lines(file.bytes);
-  TextLine line;
-  std::vector<std::string_view> fields;
-  size_t column_count = 0;
-  while (lines.Next(&line)) {
-    const LinePosition at{file.path, line.number};
-    const bool is_header = line.text.starts_with('#');
-    SplitAtCommas(is_header ? line.text.substr(1) : line.text, &fields);
-    if (is_header) {
-      DSG_RETURN_IF_ERROR(CheckHeader(at, fields));
-      column_count = fields.size();
-      continue;
-    }
-    if (column_count == 0) column_count = fields.size() == 8 ? 8 : 17;
-    DSG_RETURN_IF_ERROR(CheckFieldCount(at, line, fields.size(), column_count, kColumns));
-    DSG_RETURN_IF_ERROR(AddRow(at, fields, agent, &table));
-  }
+  DSG_ASSIGN_OR_RETURN(TrackTable table, ReadEurocPoses(file, RobotName(options)));
   LogInfo info = DescribeTextLog("euroc", file);
   info.has_clock = true;
   info.clock = Clock::kUnix;
+  info.channel_counts["poses"] = static_cast<int64_t>(table.rows.size());
   return MakeClockLog(std::move(table), std::nullopt, std::move(info));
 }
 

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ingest/log/format.h"
 
+#include <algorithm>
 #include <charconv>
 #include <filesystem>
 #include <fstream>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "ingest/log/folder_log.h"
+#include "ingest/log/rgbd_layout.h"
 #include "ingest/log/text_table.h"
 #include "schema/base/status.h"
 #include "schema/interop/scene_graph_file.h"
@@ -38,11 +41,19 @@ bool Has(const std::vector<std::string_view>& fields, std::string_view name) {
   return false;
 }
 
+// A name and seven numbers, perhaps with a comment.
+bool IsObjectRow(const std::vector<std::string_view>& fields) {
+  if (fields[0] == "#name" && fields.size() == 9) return true;
+  if ((fields.size() != 8 && fields.size() != 9) || BeginsWithNumber(fields[0])) return false;
+  return std::all_of(fields.begin() + 1, fields.begin() + 8, BeginsWithNumber);
+}
+
 // Empty when the first line belongs to no format.
 std::string FormatOfCommaTable(const std::vector<std::string_view>& fields) {
   if (fields[0].starts_with("#timestamp") && fields.size() >= 8) return "euroc";
   if (Has(fields, "ag_id") && Has(fields, "Time") && Has(fields, "tracklet_id")) return "thor";
   if (Has(fields, "time_ns") && Has(fields, "agent")) return "dsg-tracks";
+  if (IsObjectRow(fields)) return "tesse-objects";
   int64_t stamp = 0;
   const bool has_stamp =
       std::from_chars(fields[0].data(), fields[0].data() + fields[0].size(), stamp).ec ==
@@ -61,6 +72,8 @@ std::string FormatOfBytes(std::string_view bytes) {
   LineReader lines(bytes.substr(0, kFirstLineMax));
   TextLine line;
   if (!lines.Next(&line)) return "";
+  // A remark above the header; no header of ours begins so.
+  if (line.text.starts_with("#NOTE") && !lines.Next(&line)) return "";
   std::vector<std::string_view> fields;
   SplitAtCommas(line.text, &fields);
   if (fields.size() > 1) return FormatOfCommaTable(fields);
@@ -96,8 +109,8 @@ bool IsEurocTable(const std::filesystem::path& path) {
 
 const std::vector<std::string>& FormatNames() {
   static const auto* const names = new std::vector<std::string>{
-      "obsmat",    "trajnet",     "trajnet-ndjson", "thor",      "euroc",
-      "spark-dsg", "kimera-json", "region-json",    "dsg-tracks"};
+      "obsmat",      "trajnet",     "trajnet-ndjson", "thor", "euroc",  "spark-dsg",
+      "kimera-json", "region-json", "dsg-tracks",     "rgbd", "rosbag", "tesse-objects"};
   return *names;
 }
 
@@ -122,12 +135,40 @@ std::string FindEurocFile(const std::string& folder) {
   return "";
 }
 
+absl::StatusOr<bool> IsBag(const std::string& path) {
+  // Opening a pipe would wait for its other end.
+  if (!IsFile(path)) return false;
+  std::ifstream in(path, std::ios::binary);
+  std::string begin(16, '\0');
+  in.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  begin.resize(static_cast<size_t>(in.gcount()));
+  if (begin.starts_with("\x89MCAP0\r\n")) {
+    return MakeError(Reason::kFileMalformed,
+                     absl::StrCat(path,
+                                  ": is an MCAP file, which is not supported; convert it to a "
+                                  "ROS 1 bag"),
+                     {{"file", path}});
+  }
+  if (begin.starts_with("#ROSBAG V2.0")) return true;
+  if (!begin.starts_with("#ROSBAG") && !begin.starts_with("#ROSRECORD")) return false;
+  return MakeError(Reason::kFileMalformed,
+                   absl::StrCat(path, ": is a bag of an old version; run \"rosbag fix\" on it"),
+                   {{"file", path}});
+}
+
 absl::StatusOr<std::string> DetectFolderFormat(const std::string& folder) {
-  if (IsFile(std::filesystem::path(folder) / "tracks.csv")) return "dsg-tracks";
-  if (!FindEurocFile(folder).empty()) return "euroc";
+  const std::filesystem::path root(folder);
+  if (IsFile(root / "tracks.csv")) return "dsg-tracks";
+  if (!FindSensorRoot(folder).empty() || !FindEurocFile(folder).empty()) return "euroc";
+  if (FindRgbdLayout(folder) != RgbdLayout::kNone) return "rgbd";
+  if (!FindSensorRoot((root / "log").string()).empty()) {
+    return Unknown(folder,
+                   absl::StrCat("holds a simulation; give its log: ", (root / "log").string()));
+  }
   return Unknown(folder,
-                 "holds neither tracks.csv (dsg-tracks) nor "
-                 "mav0/state_groundtruth_estimate0/data.csv (euroc); give the log file itself");
+                 "holds neither tracks.csv (dsg-tracks) nor mav0/ with sensors or "
+                 "mav0/state_groundtruth_estimate0/data.csv (euroc), nor frames of a known RGB-D "
+                 "dataset (rgbd); give the log file itself");
 }
 
 }  // namespace dsg::ingest

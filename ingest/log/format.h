@@ -21,6 +21,10 @@ std::string FormatList();
 absl::StatusOr<std::string> DetectFileFormat(std::string_view bytes, const std::string& path);
 absl::StatusOr<std::string> DetectFolderFormat(const std::string& folder);
 
+/// Whether a file begins like a ROS bag.
+/// Errors: INVALID_ARGUMENT/FILE_MALFORMED for bags that are not read: version 1, MCAP.
+absl::StatusOr<bool> IsBag(const std::string& path);
+
 /// The ground truth inside an EuRoC folder ("mav0", its parent, or
 /// "state_groundtruth_estimate0"); empty when the folder is none.
 std::string FindEurocFile(const std::string& folder);

@@ -2,6 +2,8 @@
 // One recorded log, whatever its format, as a stream of stamped measurements.
 #pragma once
 
+#include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -9,6 +11,9 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "ingest/sensor/calibration.h"
+#include "ingest/sensor/human_detection.h"
+#include "ingest/sensor/image.h"
 #include "schema/model/graph_delta.h"
 
 namespace dsg::ingest {
@@ -29,15 +34,37 @@ struct GraphMeasurement {
   GraphDelta delta;
 };
 
-using Measurement = std::variant<PoseMeasurement, GraphMeasurement>;
+/// One sample of an inertial unit, in its own frame (the body, unless calibrated otherwise).
+struct ImuMeasurement {
+  TimeNs time_ns = 0;
+  Eigen::Vector3d angular_velocity_rad_s = Eigen::Vector3d::Zero();
+  /// Specific force: what an accelerometer at rest shows is minus gravity.
+  Eigen::Vector3d acceleration_m_s2 = Eigen::Vector3d::Zero();
+};
+
+/// An image, not decoded until asked for.
+struct ImageMeasurement {
+  TimeNs time_ns = 0;
+  /// "cam0" (left), "cam1" (right), "color0", "depth0", "label0".
+  std::string channel;
+  /// File or bag and message, for messages.
+  std::string origin;
+  /// Decodes; may be called from any thread, more than once, and after the log is closed.
+  /// Errors: INVALID_ARGUMENT/FILE_MALFORMED naming the origin; bounded by 16 Mpx.
+  std::function<absl::StatusOr<Image>()> load;
+};
+
+using Measurement = std::variant<PoseMeasurement, GraphMeasurement, ImuMeasurement,
+                                 ImageMeasurement, HumanDetection>;
 
 /// What a reader knows of its log before the first measurement.
 struct LogInfo {
   /// "obsmat", "trajnet", "trajnet-ndjson", "thor", "euroc", "spark-dsg", "kimera-json",
-  /// "region-json", "dsg-tracks".
+  /// "region-json", "dsg-tracks", "rgbd", "rosbag", "tesse-objects".
   std::string format;
   std::string path;
-  /// SHA-256 of the log's bytes, hexadecimal: the identity of the log.
+  /// SHA-256 of the log's bytes, hexadecimal: the identity of the log. Of image files only names
+  /// and sizes count.
   std::string content_sha256;
   /// Count of measurements, for the progress bar; 0 = unknown.
   int64_t measurement_count = 0;
@@ -49,8 +76,22 @@ struct LogInfo {
   Clock clock = Clock::kUnix;
   /// How far a human's feet are below its positions: 0 for tracks on the floor, more for heads.
   double feet_below_m = 0.0;
+  /// Empty for logs without sensors.
+  RigCalibration rig;
+  /// Measurements of each sensor channel, by name: "cam0", "imu0", "detections0", "poses".
+  std::map<std::string, int64_t> channel_counts;
   /// Sentences about what was dropped or assumed, for the user.
   std::vector<std::string> notes;
+};
+
+/// Where the robot's poses come from.
+enum class PoseSource {
+  /// External poses if the log holds some, ground truth otherwise; LogInfo::notes says which.
+  kAuto,
+  /// The log's own ground truth.
+  kGroundTruth,
+  /// Estimated by other software, in the log or in LogOptions::pose_file.
+  kExternal,
 };
 
 struct LogOptions {
@@ -64,6 +105,10 @@ struct LogOptions {
   std::string agent_prefix;
   /// Edge of the blocks that a mesh in the log is cut into: the map's.
   double mesh_block_size_m = 2.0;
+  /// Of sensor logs.
+  PoseSource poses = PoseSource::kAuto;
+  /// Poses to read instead of the log's (EuRoC or TUM columns); empty = the log's own.
+  std::string pose_file;
 };
 
 /// One log.

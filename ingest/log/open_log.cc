@@ -3,9 +3,13 @@
 #include <filesystem>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/log/bag_log.h"
+#include "ingest/log/folder_log.h"
 #include "ingest/log/format.h"
 #include "ingest/log/log_source.h"
 #include "ingest/log/readers.h"
+#include "ingest/log/rgbd_layout.h"
+#include "ingest/log/rgbd_log.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
@@ -34,6 +38,24 @@ absl::Status CheckOptions(const LogOptions& options) {
   return absl::OkStatus();
 }
 
+// A log that has no robot of its own would leave poses of another out without a word.
+absl::Status CheckPoseOptions(const std::string& path, const std::string& format,
+                              const LogOptions& options) {
+  if (format == "euroc" || format == "rgbd" || format == "rosbag") return absl::OkStatus();
+  if (options.pose_file.empty() && options.poses != PoseSource::kExternal) return absl::OkStatus();
+  return MakeError(Reason::kFieldInvalid,
+                   absl::StrCat(path, ": a ", format,
+                                " log takes no external poses; they go with logs of sensors"),
+                   {{"field", "poses"}, {"value", "external"}});
+}
+
+absl::Status NoSuchLog(const std::string& folder, const std::string& format) {
+  return MakeError(
+      Reason::kFileMalformed,
+      absl::StrCat(folder, ": this folder is no ", format, " log; give the log file itself"),
+      {{"file", folder}});
+}
+
 OpenedLog OpenTracks(const fs::path& folder, const LogOptions& options) {
   DSG_ASSIGN_OR_RETURN(const LogFile tracks, ReadLogFile((folder / kTracksFile).string()));
   std::optional<LogFile> world;
@@ -51,7 +73,16 @@ OpenedLog OpenFile(const LogFile& file, const std::string& format, const LogOpti
   if (format == "thor") return ReadThor(file, options);
   if (format == "euroc") return ReadEuroc(file, options);
   if (format == "dsg-tracks") return ReadTracks(std::nullopt, file, options);
+  if (format == "tesse-objects") return ReadTesseObjects(file, options);
   return ReadSceneGraphLog(file, options);
+}
+
+OpenedLog OpenEuroc(const std::string& folder, const LogOptions& options) {
+  if (!FindSensorRoot(folder).empty()) return OpenSensorFolder(folder, options);
+  const std::string path = FindEurocFile(folder);
+  if (path.empty()) return NoSuchLog(folder, "euroc");
+  DSG_ASSIGN_OR_RETURN(const LogFile file, ReadLogFile(path));
+  return ReadEuroc(file, options);
 }
 
 OpenedLog OpenFolder(const std::string& folder, const LogOptions& options) {
@@ -59,16 +90,13 @@ OpenedLog OpenFolder(const std::string& folder, const LogOptions& options) {
   if (format == "auto") {
     DSG_ASSIGN_OR_RETURN(format, DetectFolderFormat(folder));
   }
+  DSG_RETURN_IF_ERROR(CheckPoseOptions(folder, format, options));
   if (format == "dsg-tracks") return OpenTracks(folder, options);
-  const std::string euroc = format == "euroc" ? FindEurocFile(folder) : "";
-  if (euroc.empty()) {
-    return MakeError(
-        Reason::kFileMalformed,
-        absl::StrCat(folder, ": this folder is no ", format, " log; give the log file itself"),
-        {{"file", folder}});
+  if (format == "euroc") return OpenEuroc(folder, options);
+  if (format == "rgbd" && FindRgbdLayout(folder) != RgbdLayout::kNone) {
+    return OpenRgbdFolder(folder, options);
   }
-  DSG_ASSIGN_OR_RETURN(const LogFile file, ReadLogFile(euroc));
-  return ReadEuroc(file, options);
+  return NoSuchLog(folder, format);
 }
 
 }  // namespace
@@ -78,11 +106,22 @@ absl::StatusOr<std::unique_ptr<LogSource>> OpenLog(const std::string& path,
   DSG_RETURN_IF_ERROR(CheckOptions(options));
   std::error_code error;
   if (fs::is_directory(path, error)) return OpenFolder(path, options);
+  // Bags may be larger than the memory.
+  DSG_ASSIGN_OR_RETURN(const bool is_bag, IsBag(path));
+  if (fs::is_regular_file(path, error) && is_bag != (options.format == "rosbag") &&
+      options.format != "auto") {
+    return MakeError(Reason::kFileMalformed,
+                     absl::StrCat(path, is_bag ? ": is a rosbag, not " : ": is no ", options.format,
+                                  "; leave --format out"),
+                     {{"file", path}});
+  }
+  if (is_bag) return OpenBag(path, options);
   DSG_ASSIGN_OR_RETURN(const LogFile file, ReadLogFile(path));
   std::string format = options.format;
   if (format == "auto") {
     DSG_ASSIGN_OR_RETURN(format, DetectFileFormat(file.bytes, path));
   }
+  DSG_RETURN_IF_ERROR(CheckPoseOptions(path, format, options));
   return OpenFile(file, format, options);
 }
 

@@ -35,6 +35,10 @@ OpenedLog ReadEuroc(const LogFile& file, const LogOptions& options);
 /// Spark-DSG, Kimera and region files. `format` is "auto" or what the file must turn out to be.
 OpenedLog ReadSceneGraphLog(const LogFile& file, const LogOptions& options);
 
+/// The objects of a scene of TESSE, Unity's or ROS's axes; classes by name if the scene's
+/// segmentation mapping is beside the file.
+OpenedLog ReadTesseObjects(const LogFile& file, const LogOptions& options);
+
 /// What dsg-simulate writes: the world (may be missing) and tracks.csv, times from the epoch.
 OpenedLog ReadTracks(const std::optional<LogFile>& world, const LogFile& tracks,
                      const LogOptions& options);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <unordered_set>
 #include <utility>
@@ -78,6 +79,24 @@ class Regions {
   std::vector<RegionIndex::Containment> contains_;
 };
 
+// Of a measurement that no stage takes yet.
+std::string ChannelOf(const Measurement& measurement) {
+  if (const auto* image = std::get_if<ImageMeasurement>(&measurement)) return image->channel;
+  return std::holds_alternative<ImuMeasurement>(measurement) ? "imu0" : "detections0";
+}
+
+std::string_view NameOf(PoseSource source) {
+  switch (source) {
+    case PoseSource::kGroundTruth:
+      return "gt";
+    case PoseSource::kExternal:
+      return "external";
+    case PoseSource::kAuto:
+      break;
+  }
+  return "auto";
+}
+
 // The stages of one log, wired.
 class LogRun {
  public:
@@ -94,12 +113,9 @@ class LogRun {
     if (auto* graph = std::get_if<GraphMeasurement>(&measurement)) {
       return TakeGraph(std::move(graph->delta));
     }
-    const auto& pose = std::get<PoseMeasurement>(measurement);
-    const NodeId agent = namer_.Assign(pose.agent_name, pose.agent_kind);
-    Tracker().Observe(agent, pose.pose.time_ns, pose.pose.map_T_agent.position);
-    builder_.AddPose(agent, pose);
-    if (builder_.pose_count() < options_.poses_per_delta) return absl::OkStatus();
-    return sink_.Put(builder_.Take(Tracker().TakeChanges()));
+    if (auto* pose = std::get_if<PoseMeasurement>(&measurement)) return TakePose(*pose);
+    ++unused_[ChannelOf(measurement)];
+    return absl::OkStatus();
   }
 
   absl::Status Finish() {
@@ -109,10 +125,18 @@ class LogRun {
   }
 
   IngestSummary Summary() const {
-    return {graph_agent_count_ + builder_.agent_count(), sink_.counts()};
+    return {graph_agent_count_ + builder_.agent_count(), sink_.counts(), unused_};
   }
 
  private:
+  absl::Status TakePose(const PoseMeasurement& pose) {
+    const NodeId agent = namer_.Assign(pose.agent_name, pose.agent_kind);
+    Tracker().Observe(agent, pose.pose.time_ns, pose.pose.map_T_agent.position);
+    builder_.AddPose(agent, pose);
+    if (builder_.pose_count() < options_.poses_per_delta) return absl::OkStatus();
+    return sink_.Put(builder_.Take(Tracker().TakeChanges()));
+  }
+
   absl::Status TakeGraph(GraphDelta graph) {
     DSG_RETURN_IF_ERROR(RenameAgents(&namer_, &graph));
     DSG_RETURN_IF_ERROR(LayOverStoredGraph(map_, &graph));
@@ -136,6 +160,7 @@ class LogRun {
   DeltaBuilder builder_;
   DeltaSink sink_;
   int64_t graph_agent_count_ = 0;
+  std::map<std::string, int64_t> unused_;
 };
 
 SessionHeader MakeHeader(const LogInfo& info, const LogOptions& log_options,
@@ -145,7 +170,8 @@ SessionHeader MakeHeader(const LogInfo& info, const LogOptions& log_options,
                              .frame_period_ns = log_options.frame_period_ns,
                              .agent_prefix = log_options.agent_prefix,
                              .mesh_block_size_m = log_options.mesh_block_size_m,
-                             .poses_per_delta = options.poses_per_delta};
+                             .poses_per_delta = options.poses_per_delta,
+                             .poses = std::string(NameOf(log_options.poses))};
   // The file's name alone: where it lies on this machine is no property of the log.
   std::string name = std::filesystem::path(info.path).filename().string();
   // File names may be any bytes; a map holds text only.

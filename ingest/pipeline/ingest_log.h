@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <string>
 
 #include "ingest/log/log_source.h"
@@ -24,6 +25,9 @@ struct IngestSummary {
   /// Agents that the log speaks of.
   int64_t agent_count = 0;
   CommitCounts committed;
+  /// Measurements that were read and are not used yet, by channel: images, inertial samples,
+  /// detections.
+  std::map<std::string, int64_t> unused;
 };
 
 /// Reads `log` to its end. The same log, options and starting map give byte-equal deltas. A run

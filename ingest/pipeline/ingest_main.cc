@@ -14,6 +14,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
 #include "ingest/log/log_source.h"
 #include "ingest/pipeline/destination.h"
 #include "ingest/pipeline/ingest_log.h"
@@ -34,6 +35,8 @@ struct Flags {
   std::string agent_prefix;
   std::string epoch;
   std::string codec;
+  std::string poses = "auto";
+  std::string pose_file;
   int64_t commit_poses = IngestOptions().poses_per_delta;
   bool is_quiet = false;
   std::vector<std::string> logs;
@@ -51,7 +54,7 @@ void AddFlags(CLI::App* app, Flags* flags) {
       ->required();
   app->add_option("--format", flags->format,
                   "auto, obsmat, trajnet, trajnet-ndjson, thor, euroc, spark-dsg, kimera-json, "
-                  "region-json or dsg-tracks")
+                  "region-json, dsg-tracks, rgbd, rosbag or tesse-objects")
       ->capture_default_str();
   app->add_option("--frame-period", flags->frame_period_s,
                   "Seconds an annotation step of a log without a clock takes")
@@ -64,14 +67,34 @@ void AddFlags(CLI::App* app, Flags* flags) {
   app->add_option("--codec", flags->codec,
                   "How a new map keeps trajectories: quantized (default) or lossless")
       ->check(CLI::IsMember({"quantized", "lossless"}));
+  app->add_option("--poses", flags->poses,
+                  "Whose poses of the robot a sensor log is taken with: gt (its ground truth), "
+                  "external (other software's), auto (external if there are some) or vio (our own, "
+                  "not built yet)")
+      ->check(CLI::IsMember({"auto", "gt", "external", "vio"}))
+      ->capture_default_str();
+  app->add_option("--pose-file", flags->pose_file,
+                  "Poses of the robot, EuRoC or TUM columns, instead of the sensor log's own");
   app->add_option("--commit-poses", flags->commit_poses, "Poses a revision")->capture_default_str();
   app->add_flag("--quiet", flags->is_quiet, "Write nothing but errors");
   app->add_option("LOG", flags->logs, "Log files or folders, taken one after another")->required();
 }
 
+absl::StatusOr<PoseSource> ParsePoseSource(const std::string& text) {
+  if (text == "vio") {
+    return absl::UnimplementedError(
+        "--poses vio: estimating the robot's poses from its sensors is not built yet; use gt or "
+        "external");
+  }
+  if (text == "gt") return PoseSource::kGroundTruth;
+  return text == "external" ? PoseSource::kExternal : PoseSource::kAuto;
+}
+
 absl::StatusOr<LogOptions> MakeLogOptions(const Flags& flags) {
   LogOptions options;
   options.format = flags.format;
+  options.pose_file = flags.pose_file;
+  DSG_ASSIGN_OR_RETURN(options.poses, ParsePoseSource(flags.poses));
   options.agent_prefix = flags.agent_prefix;
   const double period_ns = flags.frame_period_s * static_cast<double>(kNsPerSecond);
   // A day an annotation step is past any use, and keeps the product in range.
@@ -123,6 +146,27 @@ absl::Status CheckAgainstMap(const Flags& flags, const LogOptions& options, cons
   return absl::OkStatus();
 }
 
+// "320 images (cam0 160, cam1 160), 1791 inertial samples".
+std::string UnusedText(const IngestSummary& summary) {
+  int64_t image_count = 0;
+  std::vector<std::string> cameras;
+  std::vector<std::string> parts;
+  for (const auto& [channel, count] : summary.unused) {
+    if (channel == "imu0") {
+      parts.push_back(absl::StrCat(count, " inertial samples"));
+    } else if (channel == "detections0") {
+      parts.push_back(absl::StrCat(count, " detections"));
+    } else {
+      image_count += count;
+      cameras.push_back(absl::StrCat(channel, " ", count));
+    }
+  }
+  if (image_count > 0) {
+    parts.push_back(absl::StrCat(image_count, " images (", absl::StrJoin(cameras, ", "), ")"));
+  }
+  return absl::StrJoin(parts, ", ");
+}
+
 void PrintSummary(const std::string& path, const LogInfo& info, const IngestSummary& summary,
                   double seconds) {
   const CommitCounts& counts = summary.committed;
@@ -135,6 +179,9 @@ void PrintSummary(const std::string& path, const LogInfo& info, const IngestSumm
       static_cast<long long>(counts.revision_count),
       static_cast<long long>(counts.skipped_pose_count), seconds);
   if (counts.revision_count == 0) std::printf("%s: nothing new\n", path.c_str());
+  if (!summary.unused.empty()) {
+    std::printf("%s: read and not used yet: %s\n", path.c_str(), UnusedText(summary).c_str());
+  }
   std::fflush(stdout);
 }
 

@@ -14,9 +14,10 @@ constexpr int kPipelineVersion = 1;
 }  // namespace
 
 std::string SessionConfig::Digest() const {
+  const std::string choice = poses == "auto" ? "" : absl::StrCat("poses=", poses, "\n");
   return Sha256Hex(
-      absl::StrCat("pipeline=", kPipelineVersion, "\nformat=", format, "\nepoch_ns=", epoch_ns,
-                   "\nframe_period_ns=", frame_period_ns,
+      absl::StrCat(choice, "pipeline=", kPipelineVersion, "\nformat=", format,
+                   "\nepoch_ns=", epoch_ns, "\nframe_period_ns=", frame_period_ns,
                    "\nmesh_block_size_um=", static_cast<int64_t>(mesh_block_size_m * 1e6),
                    "\nposes_per_delta=", poses_per_delta, "\nagent_prefix=", agent_prefix, "\n"));
 }

@@ -209,5 +209,55 @@ INSTANTIATE_TEST_SUITE_P(Logs, RealLogsTest,
                                   std::get<1>(param_info.param).first;
                          });
 
+struct SensorLog {
+  std::string name;
+  std::string path;
+  std::string options;
+  int64_t pose_count;
+  // Part of the line that says what was read and not used.
+  std::string unused;
+};
+
+const SensorLog kSensorLogs[] = {
+    {"EurocMh01", "euroc-mh01-stereo", "--poses gt", 1791,
+     "1791 inertial samples, 320 images (cam0 160, cam1 160)"},
+    {"EurocV102", "euroc-imu-groundtruth/V1_02_medium", "--poses gt", 16702,
+     "17100 inertial samples"},
+    {"LoopPairs", "euroc-loop-pairs", "--poses external", 4, "8 images (cam0 4, cam1 4)"},
+    {"SevenScenes", "rgbd-7scenes", "--poses external", 125, "250 images (color0 125, depth0 125)"},
+    {"LivingRoom", "rgbd-livingroom1", "", 106, "212 images (color0 106, depth0 106)"},
+    {"Replica", "rgbd-replica-office0", "", 2000, "4 images (color0 2, depth0 2)"},
+    {"TesseRgbd", "uhumans2-tesse/rgbd", "", 0, "4 images (color0 2, depth0 2)"},
+    {"TesseLoopPair", "uhumans2-tesse/loop_pair", "", 2, "4 images (color0 2, depth0 2)"},
+    {"EurocBag", "bags/euroc_mh01_stereo_4pairs_bz2.bag", "", 0,
+     "49 inertial samples, 8 images (cam0 4, cam1 4)"},
+};
+
+class SensorLogsTest : public testing::TestWithParam<SensorLog> {};
+
+TEST_P(SensorLogsTest, GivesItsPosesAndCountsTheRest) {
+  const SensorLog& log = GetParam();
+  const std::string path = DataFolder() + "/" + log.path;
+  if (!fs::exists(path)) GTEST_SKIP() << "no " << path << "; set DSG_DATA to the folder of logs";
+  const test::TempFolder folder;
+  const std::string output = folder.path() + "/output";
+  const std::string command = std::string(DSG_BINARY_DIR) + "/dsg-ingest --store " + folder.path() +
+                              "/store --map log " + log.options + " " + path + " > " + output +
+                              " 2>&1";
+  ASSERT_EQ(std::system(command.c_str()), 0) << command;
+  std::stringstream text;
+  text << std::ifstream(output).rdbuf();
+  EXPECT_NE(text.str().find("read and not used yet: " + log.unused + "\n"), std::string::npos)
+      << text.str();
+  auto store = GraphStore::Open(folder.path() + "/store", {});
+  ASSERT_TRUE(store.ok()) << store.status();
+  const auto stats = (*(*(*store)->OpenMap("log"))->Latest())->Stats();
+  ASSERT_TRUE(stats.ok()) << stats.status();
+  EXPECT_EQ(stats->at.pose_count, log.pose_count);
+}
+
+INSTANTIATE_TEST_SUITE_P(Logs, SensorLogsTest, testing::ValuesIn(kSensorLogs),
+                         [](const auto& param_info) { return param_info.param.name; });
+
 }  // namespace
 }  // namespace dsg

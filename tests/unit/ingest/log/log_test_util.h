@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -57,21 +58,46 @@ struct WholeLog {
   LogInfo info;
   std::vector<PoseMeasurement> poses;
   std::vector<GraphMeasurement> graphs;
+  std::vector<ImuMeasurement> imu;
+  std::vector<ImageMeasurement> images;
+  std::vector<HumanDetection> detections;
+  /// Channel and stamp of all but graphs, in the order in which they came.
+  std::vector<std::pair<std::string, TimeNs>> order;
+
+  int64_t ImageCount(const std::string& channel) const {
+    return std::count_if(images.begin(), images.end(),
+                         [&](const ImageMeasurement& image) { return image.channel == channel; });
+  }
 };
+
+inline void Keep(Measurement measurement, WholeLog* whole) {
+  if (auto* pose = std::get_if<PoseMeasurement>(&measurement)) {
+    whole->order.emplace_back("poses", pose->pose.time_ns);
+    whole->poses.push_back(std::move(*pose));
+  } else if (auto* image = std::get_if<ImageMeasurement>(&measurement)) {
+    whole->order.emplace_back(image->channel, image->time_ns);
+    whole->images.push_back(std::move(*image));
+  } else if (auto* imu = std::get_if<ImuMeasurement>(&measurement)) {
+    whole->order.emplace_back("imu0", imu->time_ns);
+    whole->imu.push_back(*imu);
+  } else if (auto* detection = std::get_if<HumanDetection>(&measurement)) {
+    whole->order.emplace_back("detections0", detection->time_ns);
+    whole->detections.push_back(std::move(*detection));
+  } else {
+    whole->graphs.push_back(std::move(std::get<GraphMeasurement>(measurement)));
+  }
+}
 
 inline absl::StatusOr<WholeLog> ReadAll(const std::string& path, const LogOptions& options = {}) {
   absl::StatusOr<std::unique_ptr<LogSource>> log = OpenLog(path, options);
   if (!log.ok()) return log.status();
-  WholeLog whole{.info = (*log)->info(), .poses = {}, .graphs = {}};
+  WholeLog whole;
+  whole.info = (*log)->info();
   while (true) {
     absl::StatusOr<std::optional<Measurement>> next = (*log)->Next();
     if (!next.ok()) return next.status();
     if (!next->has_value()) return whole;
-    if (auto* pose = std::get_if<PoseMeasurement>(&**next)) {
-      whole.poses.push_back(std::move(*pose));
-    } else {
-      whole.graphs.push_back(std::move(std::get<GraphMeasurement>(**next)));
-    }
+    Keep(**std::move(next), &whole);
   }
 }
 

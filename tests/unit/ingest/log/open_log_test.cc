@@ -63,7 +63,6 @@ TEST(OpenLog, FindsEurocGroundTruthAtEachLevelOfTheFolder) {
   const TempFolder folder;
   folder.Write("run/mav0/state_groundtruth_estimate0/data.csv",
                "#timestamp,p_x,p_y,p_z,q_w,q_x,q_y,q_z\n7,4,1,0,1,0,0,0\n");
-  folder.Write("run/mav0/imu0/data.csv", "#timestamp,w_x,w_y,w_z,a_x,a_y,a_z\n7,0,0,0,0,0,0\n");
   std::string identity;
   for (const char* path : {"run", "run/mav0", "run/mav0/state_groundtruth_estimate0",
                            "run/mav0/state_groundtruth_estimate0/data.csv"}) {
@@ -74,7 +73,34 @@ TEST(OpenLog, FindsEurocGroundTruthAtEachLevelOfTheFolder) {
     if (identity.empty()) identity = log->info.content_sha256;
     EXPECT_EQ(log->info.content_sha256, identity);
   }
+  // With another sensor it is another log, and that sensor's folder alone is none.
+  folder.Write("run/mav0/imu0/data.csv", "#timestamp,w_x,w_y,w_z,a_x,a_y,a_z\n7,0,0,0,0,0,0\n");
   EXPECT_EQ(ReasonOf(ReadAll(folder.Path("run/mav0/imu0")).status()), Reason::kFileMalformed);
+  const absl::StatusOr<WholeLog> both = ReadAll(folder.Path("run"));
+  ASSERT_TRUE(both.ok()) << both.status();
+  EXPECT_EQ(both->imu.size(), 1u);
+  EXPECT_NE(both->info.content_sha256, identity);
+}
+
+TEST(OpenLog, TellsBagsAndSaysThatMcapIsNotSupported) {
+  const TempFolder folder;
+  const absl::Status mcap =
+      ReadAll(folder.Write("log.mcap", std::string("\x89MCAP0\r\n") + "rest")).status();
+  EXPECT_NE(std::string(mcap.message()).find("MCAP"), std::string::npos) << mcap;
+  const absl::Status old = ReadAll(folder.Write("log.bag", "#ROSBAG V1.2\n")).status();
+  EXPECT_NE(std::string(old.message()).find("rosbag fix"), std::string::npos) << old;
+  LogOptions options;
+  options.format = "rosbag";
+  EXPECT_EQ(ReasonOf(ReadAll(folder.Write("log.txt", "0 1 2 3\n"), options).status()),
+            Reason::kFileMalformed);
+}
+
+TEST(OpenLog, RefusesExternalPosesForLogsWithoutARobot) {
+  const TempFolder folder;
+  LogOptions options;
+  options.pose_file = folder.Path("poses.txt");
+  EXPECT_EQ(ReasonOf(ReadAll(folder.Write("log.txt", "0 1 2 3\n"), options).status()),
+            Reason::kFieldInvalid);
 }
 
 TEST(OpenLog, NamesARobotByThePrefix) {

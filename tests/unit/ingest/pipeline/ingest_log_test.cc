@@ -393,6 +393,25 @@ TEST_F(IngestLogTest, RefusesDeltasOfNoSize) {
   EXPECT_EQ(ReasonOf(map.Ingest(WalkLog(), 0).status()), Reason::kFieldInvalid);
 }
 
+TEST_F(IngestLogTest, CountsSensorsThatItDoesNotUseYetAndTakesThePosesAskedFor) {
+  const std::string header = "#timestamp,p_x,p_y,p_z,q_w,q_x,q_y,q_z\n";
+  folder_.Write("rig/mav0/imu0/data.csv", "#\n5,0,0,0,0,0,9.81\n10,0,0,0,0,0,9.81\n");
+  folder_.Write("rig/mav0/state_groundtruth_estimate0/data.csv", header + "5,1,0,0,1,0,0,0\n");
+  folder_.Write("rig/mav0/state_external0/data.csv",
+                header + "5,2,0,0,1,0,0,0\n10,3,0,0,1,0,0,0\n");
+  TestMap map;
+  LogOptions options;
+  options.poses = PoseSource::kGroundTruth;
+  const auto truth = map.Ingest(folder_.Path("rig"), 100, kNever, options);
+  ASSERT_TRUE(truth.ok()) << truth.status();
+  EXPECT_EQ(truth->committed.pose_count, 1);
+  EXPECT_EQ(truth->unused, (std::map<std::string, int64_t>{{"imu0", 2}}));
+  options.poses = PoseSource::kExternal;
+  EXPECT_EQ(ReasonOf(map.Ingest(folder_.Path("rig"), 100, kNever, options).status()),
+            Reason::kTrackConflict)
+      << "other poses are another session, not a repetition";
+}
+
 TEST_F(IngestLogTest, TakesLaterSnapshotsOfARealSceneGraph) {
   if (DataFolder().empty()) GTEST_SKIP() << "the real data is not there; set DSG_DATA";
   const std::string stem =

@@ -37,6 +37,9 @@ TEST(SessionId, ChangesWithContentAndEveryOption) {
   other = base;
   other.poses_per_delta = 4;
   EXPECT_NE(id, SessionId("abc", other));
+  other = base;
+  other.poses = "gt";
+  EXPECT_NE(id, SessionId("abc", other));
 }
 
 }  // namespace

@@ -1,0 +1,327 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/log/bag_log.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "ingest/log/bag_file.h"
+#include "ingest/log/bag_topics.h"
+#include "ingest/log/detection_json.h"
+#include "ingest/log/image_file.h"
+#include "ingest/log/ros_image.h"
+#include "ingest/log/ros_messages.h"
+#include "ingest/log/sensor_log.h"
+#include "schema/base/status.h"
+
+namespace dsg::ingest {
+namespace {
+
+// Topics are recorded when they arrive, which is a little after their stamps and not all alike.
+constexpr TimeNs kHorizonNs = kNsPerSecond;
+// Far more than a second of any rig; stamps that all are equal must not fill the memory.
+constexpr size_t kWaitingMax = 200'000;
+// The head of an image: stamp, frame, size, encoding.
+constexpr size_t kImageHeadBytes = 4096;
+constexpr TimeNs kFirstPlausibleUnixNs = 1'000'000'000 * kNsPerSecond;
+
+struct Key {
+  TimeNs time_ns = 0;
+  ChannelRank rank = ChannelRank::kImages;
+  std::string channel;
+  int64_t sequence = 0;
+
+  auto operator<=>(const Key&) const = default;
+};
+
+ChannelRank RankOf(TopicUse use) {
+  switch (use) {
+    case TopicUse::kImu:
+      return ChannelRank::kImu;
+    case TopicUse::kTruth:
+    case TopicUse::kExternal:
+      return ChannelRank::kPoses;
+    case TopicUse::kDetections:
+      return ChannelRank::kDetections;
+    default:
+      return ChannelRank::kImages;
+  }
+}
+
+TimeNs TimeOf(const Measurement& measurement) {
+  if (const auto* imu = std::get_if<ImuMeasurement>(&measurement)) return imu->time_ns;
+  if (const auto* image = std::get_if<ImageMeasurement>(&measurement)) return image->time_ns;
+  if (const auto* pose = std::get_if<PoseMeasurement>(&measurement)) return pose->pose.time_ns;
+  return std::get<HumanDetection>(measurement).time_ns;
+}
+
+class BagLog : public LogSource {
+ public:
+  BagLog(std::shared_ptr<const BagFile> bag, BagPlan plan, std::string robot_name, LogInfo info)
+      : info_(std::move(info)),
+        bag_(std::move(bag)),
+        plan_(std::move(plan)),
+        class_of_color_(std::make_shared<const std::map<uint32_t, int32_t>>(plan_.class_of_color)),
+        robot_name_(std::move(robot_name)),
+        numbers_(plan_.topics.size(), 0),
+        last_(plan_.topics.size()) {}
+
+  const LogInfo& info() const override { return info_; }
+
+  /// Poses that are not in the bag.
+  void SetPoses(SensorChannel poses) { poses_ = std::move(poses); }
+
+  /// Reads until the first measurement is known.
+  absl::Status FindFirst() {
+    DSG_RETURN_IF_ERROR(Fill());
+    TimeNs first_ns = waiting_.empty() ? kTimeMax : waiting_.begin()->first.time_ns;
+    if (!poses_.times.empty()) first_ns = std::min(first_ns, poses_.times.front());
+    if (first_ns == kTimeMax) first_ns = 0;
+    info_.first_ns = first_ns;
+    info_.clock = first_ns >= kFirstPlausibleUnixNs ? Clock::kUnix : Clock::kMonotonic;
+    return absl::OkStatus();
+  }
+
+  absl::StatusOr<std::optional<Measurement>> Next() override {
+    if (info_.measurement_count == 0) return NothingUsable();
+    DSG_RETURN_IF_ERROR(Fill());
+    const bool has_pose = next_pose_ < poses_.times.size();
+    if (has_pose && (waiting_.empty() ||
+                     std::tie(poses_.times[next_pose_], poses_.rank) <
+                         std::tie(waiting_.begin()->first.time_ns, waiting_.begin()->first.rank))) {
+      DSG_ASSIGN_OR_RETURN(Measurement pose, poses_.make(next_pose_++));
+      return pose;
+    }
+    if (waiting_.empty()) return std::nullopt;
+    auto first = waiting_.extract(waiting_.begin());
+    emitted_ns_ = first.key().time_ns;
+    return std::move(first.mapped());
+  }
+
+ private:
+  absl::Status NothingUsable() const {
+    std::vector<std::string> topics;
+    for (const BagTopic& topic : plan_.topics) {
+      topics.push_back(absl::StrCat(topic.name, " (", topic.type, ")"));
+    }
+    return MakeError(Reason::kFileMalformed,
+                     absl::StrCat(info_.path, ": the bag holds no topic that can be used; it has: ",
+                                  absl::StrJoin(topics, ", "), "; see docs/sensor_logs.md"),
+                     {{"file", info_.path}});
+  }
+
+  // Until what comes first can no longer be overtaken.
+  absl::Status Fill() {
+    while (next_ < bag_->messages().size() &&
+           (waiting_.empty() || latest_ns_ - waiting_.begin()->first.time_ns < kHorizonNs)) {
+      const BagMessageRef& ref = bag_->messages()[next_++];
+      const size_t topic = plan_.topic_of_connection[ref.connection];
+      if (plan_.topics[topic].use == TopicUse::kNone) continue;
+      DSG_RETURN_IF_ERROR(Take(ref, topic));
+      if (waiting_.size() > kWaitingMax) {
+        return Malformed(
+            topic, absl::StrCat("more than ", kWaitingMax, " messages lie within one second"));
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status Take(const BagMessageRef& ref, size_t index) {
+    const BagTopic& topic = plan_.topics[index];
+    ++numbers_[index];
+    const std::string origin = BagOrigin(*bag_, topic.name, numbers_[index]);
+    DSG_ASSIGN_OR_RETURN(Measurement measurement, Read(ref, topic, origin));
+    int64_t sequence = numbers_[index];
+    if (const auto* detection = std::get_if<HumanDetection>(&measurement)) {
+      sequence = detection->id;
+    }
+    Key key{TimeOf(measurement), RankOf(topic.use), topic.channel, sequence};
+    DSG_RETURN_IF_ERROR(CheckOrder(key, index));
+    latest_ns_ = std::max(latest_ns_, key.time_ns);
+    waiting_.emplace(std::move(key), std::move(measurement));
+    return absl::OkStatus();
+  }
+
+  absl::Status CheckOrder(const Key& key, size_t index) {
+    std::optional<Key>& last = last_[index];
+    // Several people are seen in one image.
+    const bool is_after = !last.has_value() || key.time_ns > last->time_ns ||
+                          (key.rank == ChannelRank::kDetections && key > *last);
+    if (!is_after) {
+      return Malformed(index,
+                       absl::StrCat("has stamp ", key.time_ns, " after stamp ", last->time_ns,
+                                    "; stamps must grow within a topic: sort or filter the "
+                                    "bag"));
+    }
+    if (key.time_ns < emitted_ns_) {
+      return Malformed(index,
+                       absl::StrCat("has stamp ", key.time_ns,
+                                    ", more than a second before "
+                                    "stamp ",
+                                    latest_ns_, " of another topic; do they share a clock?"));
+    }
+    last = key;
+    return absl::OkStatus();
+  }
+
+  absl::Status Malformed(size_t topic, const std::string& message) const {
+    return MakeError(
+        Reason::kFileMalformed,
+        absl::StrCat(BagOrigin(*bag_, plan_.topics[topic].name, numbers_[topic]), " ", message),
+        {{"file", bag_->path()}, {"topic", plan_.topics[topic].name}});
+  }
+
+  absl::StatusOr<Measurement> Read(const BagMessageRef& ref, const BagTopic& topic,
+                                   const std::string& origin) const {
+    const bool is_image = topic.use == TopicUse::kImage || topic.use == TopicUse::kCompressedImage;
+    DSG_ASSIGN_OR_RETURN(const BagMessage message,
+                         bag_->Read(ref, is_image ? kImageHeadBytes : SIZE_MAX));
+    if (is_image) {
+      DSG_ASSIGN_OR_RETURN(const RosHeader header, ParseRosHeader(message.data, origin));
+      return Measurement(MakeImage(ref, topic, header.stamp_ns, origin));
+    }
+    if (topic.use == TopicUse::kImu) {
+      DSG_ASSIGN_OR_RETURN(const RosImu imu, ParseRosImu(message.data, origin));
+      return Measurement(
+          ImuMeasurement{imu.header.stamp_ns, imu.angular_velocity, imu.acceleration});
+    }
+    if (topic.use == TopicUse::kDetections) {
+      DSG_ASSIGN_OR_RETURN(const std::string_view text, ParseRosString(message.data, origin));
+      DSG_ASSIGN_OR_RETURN(HumanDetection detection, ParseDetection(LinePosition{origin, 1}, text));
+      return Measurement(std::move(detection));
+    }
+    return ReadPose(message.data, topic, origin);
+  }
+
+  absl::StatusOr<Measurement> ReadPose(std::string_view bytes, const BagTopic& topic,
+                                       const std::string& origin) const {
+    const auto parse = topic.type == "nav_msgs/Odometry"           ? &ParseRosOdometry
+                       : topic.type == "geometry_msgs/PoseStamped" ? &ParseRosPoseStamped
+                                                                   : &ParseRosTransform;
+    DSG_ASSIGN_OR_RETURN(const RosPose pose, parse(bytes, origin));
+    DSG_ASSIGN_OR_RETURN(const Pose3d map_T_body, pose.ToPose(origin));
+    return Measurement(
+        PoseMeasurement{.agent_name = robot_name_,
+                        .agent_kind = kinds::kRobot,
+                        .pose = {.time_ns = pose.header.stamp_ns,
+                                 .flags = 0,
+                                 .map_T_agent = map_T_body,
+                                 .covariance = nullptr},
+                        .line = numbers_[static_cast<size_t>(&topic - plan_.topics.data())]});
+  }
+
+  ImageMeasurement MakeImage(const BagMessageRef& ref, const BagTopic& topic, TimeNs time_ns,
+                             const std::string& origin) const {
+    ImageMeasurement image{
+        .time_ns = time_ns, .channel = topic.channel, .origin = origin, .load = {}};
+    const bool is_compressed = topic.use == TopicUse::kCompressedImage;
+    // The bag stays open as long as somebody may ask for the image.
+    image.load = [bag = bag_, classes = class_of_color_, ref, decoding = topic.decoding, origin,
+                  is_compressed]() -> absl::StatusOr<Image> {
+      DSG_ASSIGN_OR_RETURN(const BagMessage message, bag->Read(ref));
+      if (is_compressed) {
+        DSG_ASSIGN_OR_RETURN(const RosCompressedImage compressed,
+                             ParseRosCompressedImage(message.data, origin));
+        return DecodeImage(compressed.data, origin, decoding);
+      }
+      DSG_ASSIGN_OR_RETURN(const RosImage raw, ParseRosImage(message.data, origin));
+      return ToImage(raw, decoding, *classes, origin);
+    };
+    return image;
+  }
+
+  LogInfo info_;
+  std::shared_ptr<const BagFile> bag_;
+  BagPlan plan_;
+  std::shared_ptr<const std::map<uint32_t, int32_t>> class_of_color_;
+  std::string robot_name_;
+  SensorChannel poses_;
+  size_t next_pose_ = 0;
+  size_t next_ = 0;
+  /// By topic: messages seen, and the last one's key.
+  std::vector<int64_t> numbers_;
+  std::vector<std::optional<Key>> last_;
+  TimeNs latest_ns_ = 0;
+  TimeNs emitted_ns_ = 0;
+  std::map<Key, Measurement> waiting_;
+};
+
+bool HasUse(const BagPlan& plan, TopicUse use) {
+  return std::any_of(plan.topics.begin(), plan.topics.end(),
+                     [use](const BagTopic& topic) { return topic.use == use; });
+}
+
+// Leaves one source of poses in the plan; gives the table of a pose file.
+absl::StatusOr<std::optional<TrackTable>> PlanPoses(const LogOptions& options, BagPlan* plan,
+                                                    LogDigest* digest, LogInfo* info) {
+  const bool from_file = !options.pose_file.empty();
+  std::optional<TrackTable> table;
+  PoseChoice choice = PoseChoice::kNone;
+  if (from_file) {
+    DSG_ASSIGN_OR_RETURN(table, ChoosePoses(options, {}, digest, info));
+  } else {
+    DSG_ASSIGN_OR_RETURN(choice, ChoosePoseKind(options, HasUse(*plan, TopicUse::kTruth),
+                                                HasUse(*plan, TopicUse::kExternal), info->path));
+  }
+  for (BagTopic& topic : plan->topics) {
+    const bool is_taken = (topic.use == TopicUse::kTruth && choice == PoseChoice::kGroundTruth) ||
+                          (topic.use == TopicUse::kExternal && choice == PoseChoice::kExternal);
+    if (is_taken) {
+      info->notes.push_back(absl::StrCat(
+          "the robot's poses are ",
+          topic.use == TopicUse::kTruth ? "the log's ground truth: " : "external: ", topic.name));
+    } else if (topic.use == TopicUse::kTruth || topic.use == TopicUse::kExternal) {
+      topic.use = TopicUse::kNone;
+    }
+  }
+  if (!from_file && choice == PoseChoice::kNone) {
+    info->notes.push_back("the log holds no poses of the robot");
+  }
+  return table;
+}
+
+absl::StatusOr<std::string> Identity(const std::string& path, LogDigest digest,
+                                     bool has_pose_file) {
+  DSG_ASSIGN_OR_RETURN(const std::string hash, Sha256OfFile(path));
+  if (!has_pose_file) return hash;
+  digest.AddSha256("bag", hash);
+  return digest.Hex();
+}
+
+}  // namespace
+
+OpenedLog OpenBag(const std::string& path, const LogOptions& options) {
+  DSG_ASSIGN_OR_RETURN(std::shared_ptr<const BagFile> bag, BagFile::Open(path));
+  DSG_ASSIGN_OR_RETURN(BagPlan plan, PlanBag(*bag));
+  LogInfo info;
+  info.format = "rosbag";
+  info.path = path;
+  info.has_clock = true;
+  info.rig = plan.rig;
+  info.notes = plan.notes;
+  LogDigest digest;
+  DSG_ASSIGN_OR_RETURN(std::optional<TrackTable> poses, PlanPoses(options, &plan, &digest, &info));
+  DSG_ASSIGN_OR_RETURN(info.content_sha256, Identity(path, digest, poses.has_value()));
+  for (const BagTopic& topic : plan.topics) {
+    if (topic.use == TopicUse::kNone) continue;
+    info.channel_counts[topic.channel] += topic.message_count;
+    info.measurement_count += topic.message_count;
+  }
+  if (poses.has_value()) {
+    const auto count = static_cast<int64_t>(poses->rows.size());
+    info.channel_counts["poses"] = count;
+    info.measurement_count += count;
+  }
+  auto log = std::make_unique<BagLog>(std::move(bag), std::move(plan), RobotName(options),
+                                      std::move(info));
+  if (poses.has_value()) log->SetPoses(MakePoseChannel(*std::move(poses)));
+  DSG_RETURN_IF_ERROR(log->FindFirst());
+  return std::unique_ptr<LogSource>(std::move(log));
+}
+
+}  // namespace dsg::ingest

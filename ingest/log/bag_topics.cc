@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/log/bag_topics.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+#include <set>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "ingest/log/bag_calibration.h"
+#include "ingest/log/file_bytes.h"
+#include "ingest/log/image_channel.h"
+#include "ingest/log/label_table.h"
+#include "ingest/log/ros_messages.h"
+#include "schema/base/status.h"
+
+namespace dsg::ingest {
+namespace {
+
+constexpr char kImageType[] = "sensor_msgs/Image";
+constexpr char kCompressedType[] = "sensor_msgs/CompressedImage";
+constexpr char kLabelColors[] = "/tesse/seg_cam/rgb/image_raw";
+
+struct KnownTopic {
+  const char* name;
+  const char* type;
+  TopicUse use;
+  const char* channel;
+};
+
+// Source: the topics of uHumans2 (Rosinol et al., 2021) and of the EuRoC bags (Burri et al.,
+// 2016); /dsg/... are dsg-simulate's own.
+constexpr KnownTopic kKnown[] = {
+    {"/tesse/left_cam/mono/image_raw", kImageType, TopicUse::kImage, "cam0"},
+    {"/tesse/right_cam/mono/image_raw", kImageType, TopicUse::kImage, "cam1"},
+    {"/tesse/left_cam/rgb/image_raw", kImageType, TopicUse::kImage, "color0"},
+    {"/tesse/depth_cam/mono/image_raw", kImageType, TopicUse::kImage, "depth0"},
+    {"/dsg/label/image_raw", kImageType, TopicUse::kImage, "label0"},
+    {kLabelColors, kImageType, TopicUse::kImage, "label0"},
+    {"/tesse/imu/noisy/imu", "sensor_msgs/Imu", TopicUse::kImu, "imu0"},
+    {"/tesse/odom", "nav_msgs/Odometry", TopicUse::kTruth, "poses"},
+    {"/dsg/detections", "std_msgs/String", TopicUse::kDetections, "detections0"},
+    {"/cam0/image_raw", kImageType, TopicUse::kImage, "cam0"},
+    {"/cam1/image_raw", kImageType, TopicUse::kImage, "cam1"},
+    {"/imu0", "sensor_msgs/Imu", TopicUse::kImu, "imu0"},
+};
+
+BagTopic* FindTopic(BagPlan* plan, std::string_view name) {
+  for (BagTopic& topic : plan->topics) {
+    if (topic.name == name) return &topic;
+  }
+  return nullptr;
+}
+
+bool HasChannel(const BagPlan& plan, std::string_view channel) {
+  return std::any_of(plan.topics.begin(), plan.topics.end(),
+                     [&](const BagTopic& topic) { return topic.channel == channel; });
+}
+
+void Use(TopicUse use, const std::string& channel, BagTopic* topic) {
+  topic->use = use;
+  topic->channel = channel;
+  topic->decoding = DecodingOf(channel);
+}
+
+absl::Status ListTopics(const BagFile& bag, BagPlan* plan) {
+  std::map<std::string, size_t> index_of;
+  for (const BagConnection& connection : bag.connections()) {
+    BagTopic topic{.name = connection.topic, .type = connection.type};
+    const auto [entry, is_new] = index_of.try_emplace(connection.topic, plan->topics.size());
+    if (is_new) plan->topics.push_back(std::move(topic));
+    BagTopic& known = plan->topics[entry->second];
+    if (known.type != connection.type) {
+      return MakeError(
+          Reason::kFileMalformed,
+          absl::StrCat(bag.path(), ": topic ", connection.topic, " has messages of ", known.type,
+                       " and of ", connection.type, "; give each type a topic of its own"),
+          {{"file", bag.path()}, {"topic", connection.topic}});
+    }
+    known.message_count += connection.message_count;
+    plan->topic_of_connection.push_back(entry->second);
+  }
+  return absl::OkStatus();
+}
+
+void UseKnownTopics(BagPlan* plan) {
+  for (const KnownTopic& known : kKnown) {
+    if (HasChannel(*plan, known.channel)) continue;
+    BagTopic* topic = FindTopic(plan, known.name);
+    if (topic != nullptr && topic->type == known.type) {
+      Use(known.use, known.channel, topic);
+      continue;
+    }
+    BagTopic* compressed = FindTopic(plan, absl::StrCat(known.name, "/compressed"));
+    if (known.use == TopicUse::kImage && compressed != nullptr &&
+        compressed->type == kCompressedType) {
+      Use(TopicUse::kCompressedImage, known.channel, compressed);
+    }
+  }
+}
+
+// A topic that is the only one of its type needs no known name.
+void UseOnlyTopicOf(const std::string& type, TopicUse use, const std::string& channel,
+                    BagPlan* plan) {
+  if (HasChannel(*plan, channel)) return;
+  BagTopic* only = nullptr;
+  for (BagTopic& topic : plan->topics) {
+    if (topic.type != type || topic.use != TopicUse::kNone || topic.message_count == 0) continue;
+    if (only != nullptr) return;
+    only = &topic;
+  }
+  if (only == nullptr) return;
+  Use(use, channel, only);
+  plan->notes.push_back(absl::StrCat("topic ", only->name, ", the only one of type ", type,
+                                     ", is taken for ", channel));
+}
+
+// The first message of a topic; nullopt if there is none.
+std::optional<BagMessageRef> FirstMessage(const BagFile& bag, const BagPlan& plan,
+                                          const BagTopic& topic) {
+  for (const BagMessageRef& message : bag.messages()) {
+    if (&plan.topics[plan.topic_of_connection[message.connection]] == &topic) return message;
+  }
+  return std::nullopt;
+}
+
+// Cameras of unknown names, by what their first image is: one of depth, one of colour, one grey.
+absl::Status UseImagesByEncoding(const BagFile& bag, BagPlan* plan) {
+  std::map<std::string, std::vector<BagTopic*>> topics_of_channel;
+  for (BagTopic& topic : plan->topics) {
+    if (topic.use == TopicUse::kImage || topic.use == TopicUse::kCompressedImage) {
+      return absl::OkStatus();
+    }
+    if (topic.type != kImageType) continue;
+    const std::optional<BagMessageRef> first = FirstMessage(bag, *plan, topic);
+    if (!first.has_value()) continue;
+    DSG_ASSIGN_OR_RETURN(const BagMessage message, bag.Read(*first));
+    DSG_ASSIGN_OR_RETURN(const RosImage image,
+                         ParseRosImageHead(message.data, BagOrigin(bag, topic.name, 1)));
+    const std::string& encoding = image.encoding;
+    const bool is_depth = encoding == "16UC1" || encoding == "mono16" || encoding == "32FC1";
+    const bool is_gray = encoding == "mono8" || encoding == "8UC1";
+    topics_of_channel[is_depth ? "depth0" : is_gray ? "cam0" : "color0"].push_back(&topic);
+  }
+  for (const auto& [channel, topics] : topics_of_channel) {
+    if (topics.size() != 1) continue;
+    Use(TopicUse::kImage, channel, topics.front());
+    plan->notes.push_back(absl::StrCat("topic ", topics.front()->name, " is taken for ", channel,
+                                       " by its encoding"));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ReadLabels(const BagFile& bag, BagPlan* plan) {
+  LogFile file{.path = bag.path(), .name = "labels.csv", .bytes = {}};
+  if (const BagTopic* topic = FindTopic(plan, "/dsg/labels"); topic != nullptr) {
+    const std::optional<BagMessageRef> first = FirstMessage(bag, *plan, *topic);
+    if (first.has_value() && topic->type == "std_msgs/String") {
+      file.path = BagOrigin(bag, topic->name, 1);
+      DSG_ASSIGN_OR_RETURN(const BagMessage message, bag.Read(*first));
+      DSG_ASSIGN_OR_RETURN(const std::string_view text, ParseRosString(message.data, file.path));
+      file.bytes = std::string(text);
+    }
+  }
+  const std::filesystem::path beside =
+      std::filesystem::path(bag.path()).parent_path() / "labels.csv";
+  std::error_code error;
+  if (file.bytes.empty() && std::filesystem::is_regular_file(beside, error)) {
+    DSG_ASSIGN_OR_RETURN(file, ReadLogFile(beside.string()));
+    plan->notes.push_back(absl::StrCat("classes of label colours are from ", file.path));
+  }
+  if (file.bytes.empty()) return absl::OkStatus();
+  DSG_ASSIGN_OR_RETURN(const LabelTable table, ReadLabelTable(file));
+  plan->class_of_color = table.ClassOfColor();
+  return absl::OkStatus();
+}
+
+// Colours of which nobody knows the classes are of no use.
+void DropLabelsWithoutTable(BagPlan* plan) {
+  BagTopic* topic = FindTopic(plan, kLabelColors);
+  if (topic == nullptr || topic->use == TopicUse::kNone || !plan->class_of_color.empty()) return;
+  topic->use = TopicUse::kNone;
+  topic->channel.clear();
+  plan->notes.push_back(
+      absl::StrCat(kLabelColors,
+                   " shows classes by colours that the bag does not explain: put the scene's "
+                   "segmentation mapping beside the bag as labels.csv"));
+}
+
+void NoteUnusedTopics(BagPlan* plan) {
+  std::vector<std::string> unused;
+  for (const BagTopic& topic : plan->topics) {
+    const bool is_known = topic.use != TopicUse::kNone || topic.type == "sensor_msgs/CameraInfo" ||
+                          topic.name == "/tf_static" || topic.name == "/dsg/labels";
+    if (!is_known) {
+      unused.push_back(absl::StrCat(topic.name, " (", topic.message_count, " ", topic.type, ")"));
+    }
+  }
+  if (unused.empty()) return;
+  // Recordings of some cameras have a hundred topics of settings.
+  constexpr size_t kNamedMax = 20;
+  const size_t more = unused.size() > kNamedMax ? unused.size() - kNamedMax : 0;
+  unused.resize(unused.size() - more);
+  plan->notes.push_back(absl::StrCat("topics that are not read: ", absl::StrJoin(unused, ", "),
+                                     more > 0 ? absl::StrCat(" and ", more, " more") : ""));
+}
+
+}  // namespace
+
+std::string BagOrigin(const BagFile& bag, const std::string& topic, int64_t number) {
+  return absl::StrCat(bag.path(), ": topic ", topic, " message ", number);
+}
+
+absl::StatusOr<BagPlan> PlanBag(const BagFile& bag) {
+  BagPlan plan;
+  DSG_RETURN_IF_ERROR(ListTopics(bag, &plan));
+  UseKnownTopics(&plan);
+  DSG_RETURN_IF_ERROR(ReadLabels(bag, &plan));
+  DropLabelsWithoutTable(&plan);
+  DSG_RETURN_IF_ERROR(UseImagesByEncoding(bag, &plan));
+  UseOnlyTopicOf("sensor_msgs/Imu", TopicUse::kImu, "imu0", &plan);
+  for (const char* type :
+       {"nav_msgs/Odometry", "geometry_msgs/PoseStamped", "geometry_msgs/TransformStamped"}) {
+    UseOnlyTopicOf(type, TopicUse::kExternal, "poses", &plan);
+  }
+  DSG_RETURN_IF_ERROR(ReadBagCalibration(bag, &plan));
+  NoteUnusedTopics(&plan);
+  return plan;
+}
+
+}  // namespace dsg::ingest

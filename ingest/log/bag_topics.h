@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which topics of a bag are which sensors, and what the bag says of their calibration.
+// Refuses to read the stream of measurements: only what is said once.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "ingest/log/bag_file.h"
+#include "ingest/log/image_file.h"
+#include "ingest/log/log_source.h"
+
+namespace dsg::ingest {
+
+enum class TopicUse {
+  kNone,
+  kImage,
+  kCompressedImage,
+  kImu,
+  kTruth,
+  kExternal,
+  kDetections,
+};
+
+/// What becomes of a topic.
+struct BagTopic {
+  std::string name;
+  std::string type;
+  int64_t message_count = 0;
+  TopicUse use = TopicUse::kNone;
+  /// "cam0"; empty for kNone.
+  std::string channel;
+  ImageDecoding decoding;
+};
+
+struct BagPlan {
+  /// By name.
+  std::vector<BagTopic> topics;
+  /// Index into `topics` of each connection.
+  std::vector<size_t> topic_of_connection;
+  RigCalibration rig;
+  std::map<uint32_t, int32_t> class_of_color;
+  std::vector<std::string> notes;
+};
+
+/// Looks at the names and types, and reads the messages that are sent once: camera infos, static
+/// transforms, labels (or labels.csv beside the bag).
+/// Errors: INVALID_ARGUMENT/FILE_MALFORMED naming the topic.
+absl::StatusOr<BagPlan> PlanBag(const BagFile& bag);
+
+/// "bag.bag: topic /imu0 message 3".
+std::string BagOrigin(const BagFile& bag, const std::string& topic, int64_t number);
+
+}  // namespace dsg::ingest

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/log/calibration_file.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+#include "ingest/log/rigid_matrix.h"
+#include "ingest/log/text_table.h"
+#include "schema/base/status.h"
+
+namespace dsg::ingest {
+namespace {
+
+constexpr size_t kFileBytesMax = size_t{1} << 20;
+// A calibration nests four deep; the parser's own recursion must stay far from the stack's end.
+constexpr int kDepthMax = 32;
+
+// One map of a file, with errors that name the file and the line.
+class Section {
+ public:
+  Section(const LogFile& file, YAML::Node node) : file_(file), node_(std::move(node)) {}
+
+  LinePosition At(const YAML::Node& node) const { return {file_.path, node.Mark().line + 1}; }
+  absl::Status Missing(const std::string& field) const {
+    return At(node_).Error(absl::StrCat("the field ", field, " is missing; add it"));
+  }
+  bool Has(const std::string& field) const { return node_[field].IsDefined(); }
+
+  absl::StatusOr<std::string> Text(const std::string& field) const {
+    const YAML::Node value = node_[field];
+    if (!value.IsDefined()) return Missing(field);
+    if (!value.IsScalar()) return At(value).Error(absl::StrCat("field ", field, " is no scalar"));
+    return value.Scalar();
+  }
+
+  absl::StatusOr<double> Number(const std::string& field) const {
+    DSG_ASSIGN_OR_RETURN(const std::string text, Text(field));
+    return ParseNumber(At(node_[field]), field, text);
+  }
+
+  absl::StatusOr<std::vector<double>> Numbers(const std::string& field) const {
+    const YAML::Node list = node_[field];
+    if (!list.IsDefined()) return Missing(field);
+    if (!list.IsSequence()) return At(list).Error(absl::StrCat("field ", field, " is no list"));
+    std::vector<double> numbers;
+    for (const YAML::Node& item : list) {
+      if (!item.IsScalar() || numbers.size() == 64) {
+        return At(item).Error(absl::StrCat("field ", field, " is no list of a few numbers"));
+      }
+      DSG_ASSIGN_OR_RETURN(const double number, ParseNumber(At(item), field, item.Scalar()));
+      numbers.push_back(number);
+    }
+    return numbers;
+  }
+
+  // Either a plain list of 16, or OpenCV's {cols, rows, data}.
+  absl::StatusOr<Pose3d> Pose(const std::string& field) const {
+    const YAML::Node value = node_[field];
+    if (!value.IsDefined()) return Missing(field);
+    DSG_ASSIGN_OR_RETURN(const std::vector<double> numbers,
+                         value.IsMap() ? Section(file_, value).Numbers("data") : Numbers(field));
+    if (numbers.size() != 16) {
+      return At(value).Error(absl::StrCat("field ", field, " holds ", numbers.size(),
+                                          " numbers; 16 are due, row by row"));
+    }
+    const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> matrix(numbers.data());
+    const absl::StatusOr<RigidMatrix> rigid = ToRigid(matrix);
+    if (!rigid.ok()) {
+      return At(value).Error(absl::StrCat("field ", field, ": ", rigid.status().message()));
+    }
+    return rigid->pose;
+  }
+
+  absl::StatusOr<Section> Child(const std::string& field) const {
+    const YAML::Node value = node_[field];
+    if (!value.IsDefined()) return Missing(field);
+    if (!value.IsMap()) return At(value).Error(absl::StrCat("field ", field, " is no map"));
+    return Section(file_, value);
+  }
+
+  const YAML::Node& node() const { return node_; }
+
+ private:
+  const LogFile& file_;
+  YAML::Node node_;
+};
+
+// Brackets and indentation alone can nest; both are seen without parsing.
+bool NestsTooDeep(std::string_view text) {
+  int depth = 0;
+  int line_depth = 0;
+  bool at_line_start = true;
+  for (const char c : text) {
+    if (c == '\n') {
+      line_depth = 0;
+      at_line_start = true;
+      continue;
+    }
+    // "- - - -" opens a list at each dash.
+    if (at_line_start && (c == '-' || c == '?')) ++line_depth;
+    if (c != ' ' && c != '-' && c != '?') at_line_start = false;
+    if (c == '[' || c == '{') ++depth;
+    if ((c == ']' || c == '}') && depth > 0) --depth;
+    if (depth > kDepthMax || line_depth > kDepthMax) return true;
+  }
+  return false;
+}
+
+absl::StatusOr<Section> Parse(const LogFile& file) {
+  const LinePosition at{file.path, 1};
+  if (file.bytes.size() > kFileBytesMax) {
+    return at.Error(absl::StrCat("holds ", file.bytes.size(), " bytes; a calibration has at most ",
+                                 kFileBytesMax));
+  }
+  std::string text = file.bytes;
+  if (NestsTooDeep(text)) return at.Error("nests too deep for a calibration");
+  // OpenCV writes a directive that YAML does not know: as a comment it keeps its line.
+  if (text.starts_with("%YAML")) text[0] = '#';
+  YAML::Node root = YAML::Load(text);
+  if (!root.IsMap()) return at.Error("is no map of fields; is this a calibration?");
+  return Section(file, root);
+}
+
+// yaml-cpp reports by exceptions; here they end.
+template <typename T>
+absl::StatusOr<T> Guarded(const LogFile& file,
+                          absl::StatusOr<T> (*read)(const Section&, const std::string&),
+                          const std::string& name) {
+  try {
+    DSG_ASSIGN_OR_RETURN(const Section section, Parse(file));
+    return read(section, name);
+  } catch (const YAML::Exception& error) {
+    return LinePosition{file.path, error.mark.line + 1}.Error(
+        absl::StrCat("does not parse as YAML: ", error.msg, "; correct the file"));
+  } catch (const std::exception& error) {
+    return LinePosition{file.path, 1}.Error(
+        absl::StrCat("does not parse as YAML: ", error.what(), "; correct the file"));
+  }
+}
+
+// What Validate() says of the numbers, with the file's name.
+template <typename Calibration>
+absl::Status Check(const Section& section, const Calibration& calibration) {
+  const absl::Status status = calibration.Validate();
+  if (status.ok()) return status;
+  return section.At(section.node()).Error(std::string(status.message()));
+}
+
+absl::Status CheckType(const Section& section, const std::string& type) {
+  if (!section.Has("sensor_type")) return absl::OkStatus();
+  DSG_ASSIGN_OR_RETURN(const std::string found, section.Text("sensor_type"));
+  if (found == type) return absl::OkStatus();
+  return section.At(section.node())
+      .FieldError("sensor_type", found, absl::StrCat(type, " is due here"));
+}
+
+absl::Status ReadDistortion(const Section& section, CameraCalibration* camera) {
+  if (!section.Has("distortion_model")) return section.Missing("distortion_model");
+  DSG_ASSIGN_OR_RETURN(const std::string model, section.Text("distortion_model"));
+  if (model == "none") return absl::OkStatus();
+  if (model == "radial-tangential" || model == "radtan" || model == "plumb_bob") {
+    camera->distortion = Distortion::kRadialTangential;
+  } else if (model == "equidistant") {
+    camera->distortion = Distortion::kEquidistant;
+  } else {
+    return section.At(section.node())
+        .FieldError("distortion_model", model, "use radial-tangential, equidistant or none");
+  }
+  DSG_ASSIGN_OR_RETURN(camera->distortion_coefficients, section.Numbers("distortion_coefficients"));
+  const std::vector<double>& k = camera->distortion_coefficients;
+  if (std::all_of(k.begin(), k.end(), [](double value) { return value == 0.0; })) {
+    camera->distortion = Distortion::kNone;
+    camera->distortion_coefficients.clear();
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<CameraCalibration> ReadCamera(const Section& section, const std::string& name) {
+  CameraCalibration camera;
+  camera.name = name;
+  DSG_RETURN_IF_ERROR(CheckType(section, "camera"));
+  if (section.Has("camera_model")) {
+    DSG_ASSIGN_OR_RETURN(const std::string model, section.Text("camera_model"));
+    if (model != "pinhole") {
+      return section.At(section.node())
+          .FieldError("camera_model", model, "only pinhole cameras are known");
+    }
+  }
+  DSG_ASSIGN_OR_RETURN(camera.body_T_camera, section.Pose("T_BS"));
+  if (section.Has("rate_hz")) {
+    DSG_ASSIGN_OR_RETURN(camera.rate_hz, section.Number("rate_hz"));
+  }
+  DSG_ASSIGN_OR_RETURN(const std::vector<double> size, section.Numbers("resolution"));
+  if (size.size() != 2 || !(std::abs(size[0]) < 1e6) || !(std::abs(size[1]) < 1e6)) {
+    return section.At(section.node()).Error("field resolution must be [width, height]");
+  }
+  camera.width = static_cast<int>(size[0]);
+  camera.height = static_cast<int>(size[1]);
+  DSG_ASSIGN_OR_RETURN(const std::vector<double> focal, section.Numbers("intrinsics"));
+  if (focal.size() != 4) {
+    return section.At(section.node())
+        .Error(absl::StrCat("field intrinsics holds ", focal.size(),
+                            " numbers; [fu, fv, cu, cv] are due"));
+  }
+  camera.fx = focal[0];
+  camera.fy = focal[1];
+  camera.cx = focal[2];
+  camera.cy = focal[3];
+  DSG_RETURN_IF_ERROR(ReadDistortion(section, &camera));
+  DSG_RETURN_IF_ERROR(Check(section, camera));
+  return camera;
+}
+
+absl::StatusOr<ImuCalibration> ReadImu(const Section& section, const std::string& name) {
+  ImuCalibration imu;
+  imu.name = name;
+  DSG_RETURN_IF_ERROR(CheckType(section, "imu"));
+  if (section.Has("T_BS")) {
+    DSG_ASSIGN_OR_RETURN(imu.body_T_imu, section.Pose("T_BS"));
+  }
+  DSG_ASSIGN_OR_RETURN(imu.rate_hz, section.Number("rate_hz"));
+  DSG_ASSIGN_OR_RETURN(imu.gyro_noise_density, section.Number("gyroscope_noise_density"));
+  DSG_ASSIGN_OR_RETURN(imu.gyro_random_walk, section.Number("gyroscope_random_walk"));
+  DSG_ASSIGN_OR_RETURN(imu.accel_noise_density, section.Number("accelerometer_noise_density"));
+  DSG_ASSIGN_OR_RETURN(imu.accel_random_walk, section.Number("accelerometer_random_walk"));
+  DSG_RETURN_IF_ERROR(Check(section, imu));
+  return imu;
+}
+
+absl::StatusOr<std::vector<NumberedPose>> ReadPoses(const Section& section, const std::string&) {
+  std::vector<NumberedPose> poses;
+  for (const auto& entry : section.node()) {
+    const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "";
+    const LinePosition at = section.At(entry.first);
+    NumberedPose pose;
+    DSG_ASSIGN_OR_RETURN(pose.number, ParseFrame(at, key));
+    DSG_ASSIGN_OR_RETURN(const Section both, section.Child(key));
+    DSG_ASSIGN_OR_RETURN(const Section q, both.Child("q"));
+    DSG_ASSIGN_OR_RETURN(const Section t, both.Child("t"));
+    Eigen::Quaterniond rotation;
+    DSG_ASSIGN_OR_RETURN(rotation.w(), q.Number("w"));
+    DSG_ASSIGN_OR_RETURN(rotation.x(), q.Number("x"));
+    DSG_ASSIGN_OR_RETURN(rotation.y(), q.Number("y"));
+    DSG_ASSIGN_OR_RETURN(rotation.z(), q.Number("z"));
+    DSG_ASSIGN_OR_RETURN(pose.map_T_camera.orientation, Normalize(at, rotation));
+    DSG_ASSIGN_OR_RETURN(pose.map_T_camera.position.x(), t.Number("x"));
+    DSG_ASSIGN_OR_RETURN(pose.map_T_camera.position.y(), t.Number("y"));
+    DSG_ASSIGN_OR_RETURN(pose.map_T_camera.position.z(), t.Number("z"));
+    poses.push_back(pose);
+  }
+  std::sort(poses.begin(), poses.end(),
+            [](const NumberedPose& a, const NumberedPose& b) { return a.number < b.number; });
+  return poses;
+}
+
+}  // namespace
+
+absl::StatusOr<CameraCalibration> ReadCameraYaml(const LogFile& file, const std::string& name) {
+  return Guarded<CameraCalibration>(file, &ReadCamera, name);
+}
+
+absl::StatusOr<ImuCalibration> ReadImuYaml(const LogFile& file, const std::string& name) {
+  return Guarded<ImuCalibration>(file, &ReadImu, name);
+}
+
+absl::StatusOr<std::vector<NumberedPose>> ReadPosesYaml(const LogFile& file) {
+  return Guarded<std::vector<NumberedPose>>(file, &ReadPoses, "");
+}
+
+}  // namespace dsg::ingest

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/log/sensor_log.h"
+
+#include <algorithm>
+#include <tuple>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "ingest/log/pose_table.h"
+#include "ingest/log/text_table.h"
+#include "schema/base/status.h"
+
+namespace dsg::ingest {
+namespace {
+
+class SensorLog : public LogSource {
+ public:
+  SensorLog(std::vector<SensorChannel> channels, LogInfo info)
+      : info_(std::move(info)), channels_(std::move(channels)), next_(channels_.size(), 0) {}
+
+  const LogInfo& info() const override { return info_; }
+
+  absl::StatusOr<std::optional<Measurement>> Next() override {
+    // A rig has a dozen channels: looking at each costs less than a heap.
+    size_t first = channels_.size();
+    for (size_t i = 0; i < channels_.size(); ++i) {
+      if (next_[i] == channels_[i].times.size()) continue;
+      if (first == channels_.size() ||
+          channels_[i].times[next_[i]] < channels_[first].times[next_[first]]) {
+        first = i;
+      }
+    }
+    if (first == channels_.size()) return std::nullopt;
+    DSG_ASSIGN_OR_RETURN(Measurement measurement, channels_[first].make(next_[first]++));
+    return measurement;
+  }
+
+ private:
+  LogInfo info_;
+  std::vector<SensorChannel> channels_;
+  std::vector<size_t> next_;
+};
+
+absl::Status NoPoses(const std::string& value, const std::string& message) {
+  return MakeError(Reason::kFieldInvalid, message, {{"field", "poses"}, {"value", value}});
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<LogSource>> MakeSensorLog(std::vector<SensorChannel> channels,
+                                                         LogInfo info) {
+  std::sort(channels.begin(), channels.end(), [](const SensorChannel& a, const SensorChannel& b) {
+    return std::tie(a.rank, a.name) < std::tie(b.rank, b.name);
+  });
+  std::optional<TimeNs> first_ns;
+  for (const SensorChannel& channel : channels) {
+    info.channel_counts[channel.name] = static_cast<int64_t>(channel.times.size());
+    info.measurement_count += static_cast<int64_t>(channel.times.size());
+    if (channel.times.empty()) continue;
+    first_ns = std::min(first_ns.value_or(kTimeMax), channel.times.front());
+  }
+  if (!first_ns.has_value()) {
+    return MakeError(Reason::kFileMalformed,
+                     absl::StrCat(info.path,
+                                  ": no sensor of the log has a measurement; was the "
+                                  "recording or the copy cut short?"),
+                     {{"file", info.path}});
+  }
+  info.first_ns = *first_ns;
+  return std::make_unique<SensorLog>(std::move(channels), std::move(info));
+}
+
+absl::Status CheckGrows(const std::string& file, int64_t line, const std::string& channel,
+                        const std::vector<TimeNs>& times, TimeNs time_ns) {
+  if (times.empty() || time_ns > times.back()) return absl::OkStatus();
+  const char* const what = time_ns == times.back() ? " repeats the stamp " : " steps back from ";
+  return LinePosition{file, line}.Error(
+      absl::StrCat("channel ", channel, what, times.back(), " to ", time_ns,
+                   "; stamps must grow: sort the table, or remove the line if the clock jumped"));
+}
+
+std::string RobotName(const LogOptions& options) {
+  return options.agent_prefix.empty() ? "body" : options.agent_prefix;
+}
+
+absl::StatusOr<PoseChoice> ChoosePoseKind(const LogOptions& options, bool has_ground_truth,
+                                          bool has_external, const std::string& path) {
+  switch (options.poses) {
+    case PoseSource::kGroundTruth:
+      if (has_ground_truth) return PoseChoice::kGroundTruth;
+      return NoPoses("gt", absl::StrCat(path,
+                                        ": the log holds no ground truth of the robot's "
+                                        "poses; give --poses external with --pose-file FILE"));
+    case PoseSource::kExternal:
+      if (has_external) return PoseChoice::kExternal;
+      return NoPoses("external",
+                     absl::StrCat(path,
+                                  ": the log holds no poses by other software "
+                                  "(state_external0/data.csv); give --pose-file FILE with "
+                                  "EuRoC or TUM columns, or --poses gt"));
+    case PoseSource::kAuto:
+      break;
+  }
+  if (has_external) return PoseChoice::kExternal;
+  return has_ground_truth ? PoseChoice::kGroundTruth : PoseChoice::kNone;
+}
+
+absl::StatusOr<std::optional<TrackTable>> ChoosePoses(const LogOptions& options, PoseTables tables,
+                                                      LogDigest* digest, LogInfo* info) {
+  if (!options.pose_file.empty()) {
+    if (options.poses == PoseSource::kGroundTruth) {
+      return NoPoses("gt", absl::StrCat("--pose-file ", options.pose_file,
+                                        " is not the log's ground truth; give --poses external"));
+    }
+    DSG_ASSIGN_OR_RETURN(const LogFile file, ReadLogFile(options.pose_file));
+    digest->Add("--pose-file", file.bytes);
+    DSG_ASSIGN_OR_RETURN(tables.external, ReadPoseTable(file, RobotName(options)));
+  }
+  DSG_ASSIGN_OR_RETURN(const PoseChoice choice,
+                       ChoosePoseKind(options, tables.ground_truth.has_value(),
+                                      tables.external.has_value(), info->path));
+  if (choice == PoseChoice::kNone) {
+    info->notes.push_back("the log holds no poses of the robot");
+    return std::nullopt;
+  }
+  TrackTable table = choice == PoseChoice::kExternal ? *std::move(tables.external)
+                                                     : *std::move(tables.ground_truth);
+  info->notes.push_back(absl::StrCat(
+      "the robot's poses are ",
+      choice == PoseChoice::kExternal ? "external: " : "the log's ground truth: ", table.file));
+  DSG_RETURN_IF_ERROR(CheckHasRows(table));
+  DSG_RETURN_IF_ERROR(CheckOrder(table, "time"));
+  return table;
+}
+
+SensorChannel MakePoseChannel(TrackTable table) {
+  SensorChannel channel{.name = "poses", .rank = ChannelRank::kPoses, .times = {}, .make = {}};
+  channel.times.reserve(table.rows.size());
+  for (const TrackRow& row : table.rows) channel.times.push_back(row.time_ns);
+  // Shared, since a std::function must be copyable.
+  const auto shared = std::make_shared<const TrackTable>(std::move(table));
+  channel.make = [shared](size_t index) -> absl::StatusOr<Measurement> {
+    const TrackRow& row = shared->rows[index];
+    const TrackTable::Agent& agent = shared->agents[row.agent];
+    return Measurement(PoseMeasurement{.agent_name = agent.name,
+                                       .agent_kind = agent.kind,
+                                       .pose = {.time_ns = row.time_ns,
+                                                .flags = row.flags,
+                                                .map_T_agent = row.map_T_agent,
+                                                .covariance = nullptr},
+                                       .line = row.line});
+  };
+  return channel;
+}
+
+}  // namespace dsg::ingest

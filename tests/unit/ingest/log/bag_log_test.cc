@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+// Bags as logs: topics, calibration, the order of stamps.
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "absl/strings/str_cat.h"
+#include "schema/base/status.h"
+#include "tests/unit/ingest/log/bag_writer.h"
+#include "tests/unit/ingest/log/detection_lines.h"
+#include "tests/unit/ingest/log/log_test_util.h"
+
+namespace dsg::ingest {
+namespace {
+
+constexpr TimeNs kT0 = 1'600'000'000 * kNsPerSecond;
+constexpr char kImage[] = "sensor_msgs/Image";
+
+bool HasNote(const LogInfo& info, const std::string& part) {
+  for (const std::string& note : info.notes) {
+    if (note.find(part) != std::string::npos) return true;
+  }
+  return false;
+}
+
+void ExpectError(const absl::Status& status, const std::vector<std::string>& parts) {
+  EXPECT_EQ(ReasonOf(status), Reason::kFileMalformed) << status;
+  for (const std::string& part : parts) {
+    EXPECT_NE(std::string(status.message()).find(part), std::string::npos)
+        << "no \"" << part << "\" in: " << status.message();
+  }
+}
+
+std::string Floats(const std::vector<float>& values) {
+  return std::string(reinterpret_cast<const char*>(values.data()), values.size() * 4);
+}
+
+// All topics that are known, at two instants.
+BagWriter FullBag() {
+  BagWriter bag("lz4");
+  bag.Add("/dsg/labels", "std_msgs/String", kT0,
+          StringMessage("name,red,green,blue,alpha,id\nchair,10,20,30,255,5\nwall,1,2,3,255,19\n"));
+  const std::string extrinsics =
+      ByteWriter().U32(2).bytes() +
+      TransformBytes(kT0, "base_link_gt", "left_cam", {0, 0.05, 0, 0.5, -0.5, 0.5, -0.5}) +
+      TransformBytes(kT0, "base_link_gt", "right_cam", {0, -0.05, 0, 0.5, -0.5, 0.5, -0.5});
+  bag.Add("/tf_static", "tf2_msgs/TFMessage", kT0, extrinsics);
+  for (const std::string side : {"left", "right"}) {
+    bag.Add(absl::StrCat("/tesse/", side, "_cam/camera_info"), "sensor_msgs/CameraInfo", kT0,
+            CameraInfoMessage(2, 1, 415.7, "plumb_bob", {0.1, 0, 0, 0, 0}, side + "_cam"));
+  }
+  for (int i = 0; i < 2; ++i) {
+    const TimeNs t = kT0 + TimeNs{i} * 50'000'000;
+    // Recorded in no order at all.
+    bag.Add("/dsg/detections", "std_msgs/String", t, StringMessage(DetectionLine(t, 2 * i)));
+    bag.Add("/dsg/detections", "std_msgs/String", t, StringMessage(DetectionLine(t, 2 * i + 1)));
+    bag.Add("/tesse/depth_cam/mono/image_raw", kImage, t,
+            ImageMessage(t, "32FC1", 2, 1, 8, Floats({1.5f, 2.5f})));
+    bag.Add("/tesse/left_cam/mono/image_raw", kImage, t, ImageMessage(t, "mono8", 2, 1, 3, "abc"));
+    bag.Add("/tesse/right_cam/mono/image_raw", kImage, t, ImageMessage(t, "mono8", 2, 1, 2, "de"));
+    bag.Add("/tesse/left_cam/rgb/image_raw", kImage, t,
+            ImageMessage(t, "bgra8", 2, 1, 8, "BGRABGRA"));
+    bag.Add("/tesse/seg_cam/rgb/image_raw", kImage, t,
+            ImageMessage(t, "rgb8", 2, 1, 6, std::string("\x0a\x14\x1e\x01\x02\x03", 6)));
+    bag.Add("/tesse/odom", "nav_msgs/Odometry", t, OdometryMessage(t, {1.0 * i, 2, 3, 0, 0, 0, 1}));
+    bag.Add("/tesse/imu/noisy/imu", "sensor_msgs/Imu", t, ImuMessage(t, 0.1, 9.81));
+    bag.Add("/tesse/imu/clean/imu", "sensor_msgs/Imu", t, ImuMessage(t, 0.0, 9.81));
+  }
+  return bag;
+}
+
+TEST(BagLog, KnowsTheTopicsOfUHumans2) {
+  const TempFolder folder;
+  const auto log = ReadAll(folder.Write("log.bag", FullBag().Finish()));
+  ASSERT_TRUE(log.ok()) << log.status();
+  EXPECT_EQ(log->info.format, "rosbag");
+  EXPECT_EQ(log->info.first_ns, kT0);
+  EXPECT_EQ(log->info.clock, Clock::kUnix);
+  const std::map<std::string, int64_t> counts = {{"cam0", 2},   {"cam1", 2},       {"color0", 2},
+                                                 {"depth0", 2}, {"label0", 2},     {"poses", 2},
+                                                 {"imu0", 2},   {"detections0", 4}};
+  EXPECT_EQ(log->info.channel_counts, counts);
+  const std::vector<std::string> order = {"imu0",   "poses",  "cam0",        "cam1",       "color0",
+                                          "depth0", "label0", "detections0", "detections0"};
+  ASSERT_EQ(log->order.size(), 2 * order.size());
+  for (size_t i = 0; i < log->order.size(); ++i) {
+    EXPECT_EQ(log->order[i].first, order[i % order.size()]) << i;
+  }
+  EXPECT_EQ(log->imu[0].angular_velocity_rad_s.x(), 0.1);
+  EXPECT_EQ(log->imu[0].acceleration_m_s2.z(), 9.81);
+  EXPECT_EQ(log->poses[1].pose.map_T_agent.position, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(log->detections[3].id, 3);
+  EXPECT_TRUE(HasNote(log->info, "/tesse/imu/clean/imu (2 sensor_msgs/Imu)"));
+}
+
+TEST(BagLog, ConvertsPixelsAfterTheLogIsClosed) {
+  const TempFolder folder;
+  const auto log = ReadAll(folder.Write("log.bag", FullBag().Finish()));
+  ASSERT_TRUE(log.ok()) << log.status();
+  std::map<std::string, Image> images;
+  for (const ImageMeasurement& measurement : log->images) {
+    const auto image = measurement.load();
+    ASSERT_TRUE(image.ok()) << image.status();
+    images[measurement.channel] = *image;
+  }
+  EXPECT_EQ(images["cam0"].bytes, (std::vector<uint8_t>{'a', 'b'})) << "rows may be padded";
+  EXPECT_EQ(images["color0"].bytes, (std::vector<uint8_t>{'R', 'G', 'B', 'R', 'G', 'B'}));
+  EXPECT_EQ(images["color0"].format, PixelFormat::kRgb8);
+  EXPECT_EQ(DepthAt(images["depth0"], 1, 0), 2.5f);
+  EXPECT_EQ(LabelAt(images["label0"], 0, 0), 5 << 8);
+  EXPECT_EQ(LabelAt(images["label0"], 1, 0), 19 << 8);
+}
+
+TEST(BagLog, TakesCalibrationFromCameraInfoAndStaticTransforms) {
+  const TempFolder folder;
+  const auto log = OpenLog(folder.Write("log.bag", FullBag().Finish()), {});
+  ASSERT_TRUE(log.ok()) << log.status();
+  const RigCalibration& rig = (*log)->info().rig;
+  ASSERT_EQ(rig.cameras.size(), 5u);
+  const CameraCalibration& right = *rig.FindCamera("cam1");
+  EXPECT_EQ(right.fx, 415.7);
+  EXPECT_EQ(right.distortion, Distortion::kRadialTangential);
+  EXPECT_EQ(right.body_T_camera.position, Eigen::Vector3d(0, -0.05, 0));
+  // The optical axis points ahead.
+  EXPECT_NEAR((right.body_T_camera.orientation * Eigen::Vector3d::UnitZ()).x(), 1.0, 1e-9);
+  EXPECT_EQ(rig.FindCamera("depth0")->body_T_camera.position, Eigen::Vector3d(0, 0.05, 0));
+}
+
+TEST(BagLog, PrefersLabelImagesWithInstances) {
+  const TempFolder folder;
+  BagWriter bag = FullBag();
+  bag.Add("/dsg/label/image_raw", kImage, kT0, ImageMessage(kT0, "mono16", 1, 1, 2, "\x03\x05"));
+  const auto log = ReadAll(folder.Write("log.bag", bag.Finish()));
+  ASSERT_TRUE(log.ok()) << log.status();
+  EXPECT_EQ(log->ImageCount("label0"), 1);
+}
+
+TEST(BagLog, NamesTopicMessageAndStampsThatStepBack) {
+  const TempFolder folder;
+  BagWriter bag;
+  for (const TimeNs t : {10, 30, 20}) {
+    bag.Add("/imu0", "sensor_msgs/Imu", 100, ImuMessage(kT0 + t, 0, 0));
+  }
+  ExpectError(ReadAll(folder.Write("log.bag", bag.Finish())).status(),
+              {"/imu0", "message 3", absl::StrCat(kT0 + 20), absl::StrCat(kT0 + 30)});
+  BagWriter repeat;
+  for (int i = 0; i < 2; ++i) repeat.Add("/imu0", "sensor_msgs/Imu", 1, ImuMessage(kT0, 0, 0));
+  ExpectError(ReadAll(folder.Write("log.bag", repeat.Finish())).status(), {"message 2"});
+}
+
+TEST(BagLog, MergesTopicsThatAreLateByLessThanASecond) {
+  const TempFolder folder;
+  for (const bool is_too_late : {false, true}) {
+    BagWriter bag;
+    for (int i = 0; i < 100; ++i) {
+      const TimeNs t = kT0 + TimeNs{i} * 50'000'000;
+      bag.Add("/imu0", "sensor_msgs/Imu", t, ImuMessage(t, 0, 0));
+      const TimeNs late = t - (is_too_late ? 1'200'000'000 : 700'000'000);
+      if (i < 30) continue;
+      bag.Add("/cam0/image_raw", kImage, t, ImageMessage(late, "mono8", 1, 1, 1, "x"));
+    }
+    const auto log = ReadAll(folder.Write("log.bag", bag.Finish()));
+    if (is_too_late) {
+      ExpectError(log.status(), {"/cam0/image_raw", "more than a second", "clock"});
+      continue;
+    }
+    ASSERT_TRUE(log.ok()) << log.status();
+    EXPECT_EQ(log->order.size(), 170u);
+    for (size_t i = 1; i < log->order.size(); ++i) {
+      EXPECT_LE(log->order[i - 1].second, log->order[i].second);
+    }
+  }
+}
+
+TEST(BagLog, TakesUnknownTopicsThatCanOnlyBeOneThing) {
+  const TempFolder folder;
+  BagWriter bag;
+  bag.Add("/phone/imu", "sensor_msgs/Imu", 1, ImuMessage(kT0, 0, 0));
+  bag.Add("/phone/depth", kImage, 1, ImageMessage(kT0, "16UC1", 1, 1, 2, "\x10\x27"));
+  bag.Add("/phone/pose", "geometry_msgs/PoseStamped", 1,
+          ByteWriter().Header(kT0, "map").Doubles({1, 2, 3, 0, 0, 0, 1}).bytes());
+  const auto log = ReadAll(folder.Write("log.bag", bag.Finish()));
+  ASSERT_TRUE(log.ok()) << log.status();
+  EXPECT_EQ(log->imu.size(), 1u);
+  EXPECT_EQ(log->poses.size(), 1u);
+  ASSERT_EQ(log->ImageCount("depth0"), 1);
+  EXPECT_EQ(DepthAt(*log->images[0].load(), 0, 0), 10.0f);
+  EXPECT_TRUE(HasNote(log->info, "the only one of type sensor_msgs/Imu"));
+}
+
+TEST(BagLog, ReadsCompressedImages) {
+  const TempFolder folder;
+  std::vector<uint8_t> png;
+  cv::imencode(".png", cv::Mat(3, 4, CV_8UC1, cv::Scalar(77)), png);
+  BagWriter bag;
+  bag.Add("/cam0/image_raw/compressed", "sensor_msgs/CompressedImage", 1,
+          ByteWriter()
+              .Header(kT0, "cam0")
+              .String("mono8; png compressed")
+              .String(std::string(png.begin(), png.end()))
+              .bytes());
+  const auto log = ReadAll(folder.Write("log.bag", bag.Finish()));
+  ASSERT_TRUE(log.ok()) << log.status();
+  const auto image = log->images.at(0).load();
+  ASSERT_TRUE(image.ok()) << image.status();
+  EXPECT_EQ(image->bytes, std::vector<uint8_t>(12, 77));
+}
+
+TEST(BagLog, ChoosesPosesAsAsked) {
+  const TempFolder folder;
+  const std::string path = folder.Write("log.bag", FullBag().Finish());
+  LogOptions options;
+  options.poses = PoseSource::kExternal;
+  const absl::Status none = ReadAll(path, options).status();
+  EXPECT_EQ(ReasonOf(none), Reason::kFieldInvalid);
+  EXPECT_NE(std::string(none.message()).find("--pose-file"), std::string::npos) << none;
+  options.pose_file = folder.Write("poses.tum",
+                                   "# t x y z qx qy qz qw\n"
+                                   "1600000000.02 7 8 9 0 0 0 1\n"
+                                   "1600000000.070000001 7 8 9 0 0 0 1\n");
+  const auto log = ReadAll(path, options);
+  ASSERT_TRUE(log.ok()) << log.status();
+  ASSERT_EQ(log->poses.size(), 2u);
+  EXPECT_EQ(log->poses[1].pose.time_ns, kT0 + 70'000'001);
+  EXPECT_EQ(log->poses[0].pose.map_T_agent.position, Eigen::Vector3d(7, 8, 9));
+  EXPECT_EQ(log->order.back().first, "poses");
+  EXPECT_NE(log->info.content_sha256, OpenLog(path, {}).value()->info().content_sha256);
+}
+
+TEST(BagLog, RefusesBadImagesOnlyWhenTheyAreAskedFor) {
+  const TempFolder folder;
+  const std::pair<std::string, std::string> bad[] = {
+      {ImageMessage(kT0, "yuv422", 2, 1, 4, "abcd"), "yuv422"},
+      {ImageMessage(kT0, "mono8", 9, 1, 9, "abcd"), "bytes"},
+      {ImageMessage(kT0, "32FC1", 1, 1, 4, "abcd"), "does not fit"},
+      {ImageMessage(kT0, "mono8", 100000, 100000, 100000, "abcd"), "pixels"}};
+  for (const auto& [message, part] : bad) {
+    BagWriter bag;
+    bag.Add("/cam0/image_raw", kImage, 1, message);
+    const auto log = ReadAll(folder.Write("log.bag", bag.Finish()));
+    ASSERT_TRUE(log.ok()) << log.status();
+    ExpectError(log->images.at(0).load().status(), {part, "/cam0/image_raw message 1"});
+  }
+}
+
+}  // namespace
+}  // namespace dsg::ingest

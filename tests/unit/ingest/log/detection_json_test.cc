@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+// Detections from JSON: whole ones come through, wrong ones name their field.
+#include "ingest/log/detection_json.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "schema/base/status.h"
+#include "tests/unit/ingest/log/detection_lines.h"
+
+namespace dsg::ingest {
+namespace {
+
+absl::StatusOr<HumanDetection> Parse(const std::string& line) {
+  const std::string file = "data.jsonl";
+  return ParseDetection(LinePosition{file, 4}, line);
+}
+
+// The line with one piece replaced.
+std::string Changed(const std::string& from, const std::string& to) {
+  std::string line = DetectionLine(1000, 7);
+  const size_t at = line.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return line.replace(at, from.size(), to);
+}
+
+void ExpectError(const std::string& line, const std::string& field) {
+  const absl::Status status = Parse(line).status();
+  EXPECT_EQ(ReasonOf(status), Reason::kFileMalformed) << status;
+  for (const std::string& part : {std::string("data.jsonl:4"), field}) {
+    EXPECT_NE(std::string(status.message()).find(part), std::string::npos)
+        << "no \"" << part << "\" in: " << status.message();
+  }
+}
+
+TEST(DetectionJson, ReadsEveryField) {
+  const auto detection = Parse(DetectionLine(1000, 7));
+  ASSERT_TRUE(detection.ok()) << detection.status();
+  EXPECT_EQ(detection->time_ns, 1000);
+  EXPECT_EQ(detection->id, 7);
+  EXPECT_EQ(detection->camera, "cam0");
+  EXPECT_EQ(detection->score, 0.9);
+  EXPECT_EQ(detection->box_px, Eigen::Vector4d(10.5, 20, 30, 60));
+  EXPECT_EQ(detection->mask_instance, 3);
+  EXPECT_EQ(detection->joints_root[23], Eigen::Vector3d(0.1, -0.2, 0.3));
+  EXPECT_EQ(detection->joints_px[23], Eigen::Vector2d(20, 40.5));
+  EXPECT_EQ(detection->joint_visibility[23], 1.0);
+  EXPECT_EQ(detection->pose_coefficients, std::vector<float>(72, 0.25f));
+  EXPECT_EQ(detection->shape_coefficients, std::vector<float>(10, -0.5f));
+  EXPECT_EQ(detection->weak_scale, 0.8);
+  EXPECT_EQ(detection->weak_translation, Eigen::Vector2d(0.1, 0.2));
+  EXPECT_EQ(detection->crop_center_px, Eigen::Vector2d(20, 40));
+  EXPECT_EQ(detection->crop_px, 50.0);
+}
+
+TEST(DetectionJson, LetsPoseAndShapeBeMissing) {
+  EXPECT_TRUE(Parse(Changed("\"pose\"", "\"pose_\"")).ok());
+  EXPECT_TRUE(Parse(Changed("\"shape\"", "\"shape_\"")).ok());
+}
+
+TEST(DetectionJson, NamesTheFieldThatIsWrong) {
+  ExpectError("", "JSON");
+  ExpectError("[1]", "JSON");
+  ExpectError("{\"time_ns\":1", "JSON");
+  ExpectError("{}", "time_ns");
+  ExpectError(Changed("\"time_ns\":1000", "\"time_ns\":1000.5"), "time_ns");
+  ExpectError(Changed("\"time_ns\":1000", "\"time_ns\":-1"), "time_ns");
+  ExpectError(Changed("\"time_ns\":1000", "\"time_ns\":99999999999999999999"), "time_ns");
+  ExpectError(Changed("\"cam0\"", "7"), "camera");
+  ExpectError(Changed("\"score\":0.9", "\"score\":1.01"), "score");
+  ExpectError(Changed("\"score\":0.9", "\"score\":null"), "score");
+  ExpectError(Changed("[10.5,20,30,60]", "[30,20,10,60]"), "box");
+  ExpectError(Changed("[10.5,20,30,60]", "[10.5,20,30]"), "box");
+  ExpectError(Changed("\"mask_instance\":3", "\"mask_instance\":-3"), "mask_instance");
+  ExpectError(Changed("[0.1,-0.2,0.3]", "[0.1,-0.2]"), "joints");
+  ExpectError(Changed("[0.1,-0.2,0.3],", ""), "joints");
+  ExpectError(Changed("[0.1,-0.2,0.3]", "[0.1,-200,0.3]"), "joints");
+  ExpectError(Changed("[20,40.5,1]", "[20,40.5,2]"), "joints_px");
+  ExpectError(Changed("0.25,", ""), "pose");
+  ExpectError(Changed("\"weak_camera\":{", "\"weak\":{"), "weak_camera");
+  ExpectError(Changed("\"t\":[0.1,0.2]", "\"t\":[0.1]"), "field t");
+}
+
+TEST(DetectionJson, RefusesLinesThatAreTooLongOrTooDeep) {
+  ExpectError(std::string((size_t{1} << 20) + 1, ' '), "bytes");
+  ExpectError(std::string(100'000, '['), "deep");
+  ExpectError("{\"a\":\"\xff\"}", "UTF-8");
+  EXPECT_TRUE(Parse(Changed("\"cam0\"", "\"[[[[[[[[[[[[\"")).ok()) << "brackets in text";
+}
+
+TEST(DetectionJson, SurvivesAnyCutAndAnyChangedByte) {
+  constexpr unsigned kSeed = 20150711;
+  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
+  std::mt19937 random(kSeed);
+  const std::string line = DetectionLine(1000, 7);
+  for (size_t size = 0; size < line.size(); ++size) EXPECT_FALSE(Parse(line.substr(0, size)).ok());
+  for (int i = 0; i < 3000; ++i) {
+    std::string changed = line;
+    changed[random() % changed.size()] = static_cast<char>(random() % 256);
+    const auto detection = Parse(changed);
+    EXPECT_TRUE(detection.ok() || ReasonOf(detection.status()) == Reason::kFileMalformed);
+  }
+}
+
+}  // namespace
+}  // namespace dsg::ingest
