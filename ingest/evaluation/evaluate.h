@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// An estimate and the ground truth in, one report out.
+// Refuses to fill gaps: what was not built stays empty.
+#pragma once
+
+#include "ingest/evaluation/estimate.h"
+#include "ingest/evaluation/report.h"
+#include "ingest/evaluation/store_reader.h"
+#include "ingest/truth/truth.h"
+
+namespace dsg::evaluation {
+
+struct EvaluateOptions {
+  MeshOptions mesh;
+  HumanOptions humans;
+  ObjectOptions objects;
+  PlaceOptions places;
+  RoomOptions rooms;
+  PickOptions picks;
+};
+
+Report Evaluate(const Estimate& estimate, const truth::Truth& truth, const EvaluateOptions& options,
+                const ProgressFunction& progress);
+
+}  // namespace dsg::evaluation
