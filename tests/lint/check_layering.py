@@ -16,8 +16,10 @@ CODEC = MODEL + ["schema/codec"]
 STORE = CODEC + ["schema/store"]
 SCHEMA = STORE + ["schema/interop"]
 # The main of dsg-ingest alone may choose between a local store and a remote one.
-INGEST_STAGES = ["log", "simulator", "odometry", "loop", "volume", "agents", "objects", "places",
-                 "rooms"]
+INGEST_STAGES = ["log", "simulator", "evaluation", "odometry", "loop", "volume", "agents",
+                 "objects", "places", "rooms"]
+# Programs of their own beside the pipeline, which knows nothing of them.
+ASIDE = ["simulator", "evaluation"]
 ALLOWED = {
     "schema/base": [],
     "schema/model": BASE,
@@ -26,9 +28,11 @@ ALLOWED = {
     "schema/store/sqlite": STORE,
     "schema/interop": STORE,
     "ingest/config": SCHEMA,
+    "ingest/files": BASE,
+    "ingest/sensor": MODEL,
     "ingest/remote": SCHEMA,
-    "ingest/pipeline": (SCHEMA + ["ingest/config", "ingest/remote"] +
-                        [f"ingest/{s}" for s in INGEST_STAGES]),
+    "ingest/pipeline": (SCHEMA + ["ingest/config", "ingest/remote", "ingest/sensor"] +
+                        [f"ingest/{s}" for s in INGEST_STAGES if s not in ASIDE]),
     "ingest": SCHEMA + ["ingest/config", "ingest/log", "ingest/pipeline", "ingest/remote"],
     "query/view": SCHEMA,
     "query/engine": SCHEMA + ["query/view"],
@@ -37,7 +41,15 @@ ALLOWED = {
     "server": SCHEMA + ["query/view", "query/engine"],
     "tests": SCHEMA + ["ingest", "query", "server"],
 }
-ALLOWED.update({f"ingest/{s}": SCHEMA + ["ingest/config"] for s in INGEST_STAGES})
+ALLOWED.update({f"ingest/{s}": SCHEMA + ["ingest/config", "ingest/files", "ingest/sensor"]
+                for s in INGEST_STAGES})
+# Nobody but these two sees the ground truth.
+ALLOWED["ingest/truth"] = SCHEMA + ["ingest/files", "ingest/sensor"]
+ALLOWED["ingest/simulator"] += ["ingest/truth"]
+# A bag is made from what the readers make of a folder, so that both hold the same.
+ALLOWED["ingest/simulator/bag"] = ALLOWED["ingest/simulator"] + ["ingest/log", "ingest/simulator"]
+ALLOWED["ingest/simulator"] += ["ingest/simulator/bag"]
+ALLOWED["ingest/evaluation"] += ["ingest/truth"]
 
 # Pattern of an include -> folders that may have it; "*.cc" after a folder means not in headers.
 # A header named *_internal.h counts as part of the .cc files of its folder, which alone may
@@ -50,7 +62,8 @@ THIRD_PARTY = [
     (r"(dsg/v1|google/protobuf)/.*",
      ["schema/codec *.cc", "schema/store *.cc", "ingest/remote *.cc", "query *.cc", "server *.cc",
       "tests"]),
-    (r"pcl/|opencv2?/|ceres/|gtsam/|fcl/", ["ingest *.cc", "tests"]),
+    (r"pcl/|opencv2?/|ceres/|gtsam/|fcl/|embree3/|rosbag/|yaml-cpp/|nanoflann",
+     ["ingest *.cc", "tests"]),
     (r"spdlog/", ["schema/base *.cc"]),
     (r"CLI/", ["ingest *.cc", "query/cli", "server *.cc", "tests"]),
     (r"png\.h$", ["ingest *.cc", "tests"]),

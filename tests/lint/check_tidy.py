@@ -24,8 +24,8 @@ UNSEEDED = re.compile(
     r"\s+\w+(?<!_)\s*(;|\{\s*\})")
 PRINTS = re.compile(r"std::c(out|err)\b|\bf?printf\(|\bputs\(")
 # Mains and the command-line tool talk to people; so do tests.
-MAY_PRINT = re.compile(r"^(query/cli/|tests/)|(^|/|_)main\.cc$|schema/base/(log|check)\.|"
-                       r"^ingest/pipeline/progress")
+MAY_PRINT = re.compile(r"^(query/cli/|ingest/simulator/cli/|tests/)|(^|/|_)main\.cc$|"
+                       r"schema/base/(log|check)\.|^ingest/pipeline/progress")
 SPDX = "SPDX-License-Identifier: Apache-2.0"
 TRANSPARENT = re.compile(r"\b(namespace|class|struct|union|enum|extern)\b")
 

@@ -1,0 +1,122 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""A simulated sensor log from its making to its score: folder, bag, store, evaluation."""
+
+import filecmp
+import json
+import os
+import shutil
+import unittest
+
+import support
+
+SMALL = ["--world", "apartment", "--humans", "2", "--seed", "8", "--seconds", "2", "--rate", "5",
+         "--keyframe-every", "5"]
+FRAME_COUNT = 10
+KEYFRAME_COUNT = 2
+IMU_COUNT = 401
+
+
+def files_under(folder):
+    return sorted(os.path.relpath(os.path.join(root, name), folder)
+                  for root, _, names in os.walk(folder) for name in names)
+
+
+def figures_of(value):
+    """Names and values of all leaves of a family."""
+    for name, leaf in (value or {}).items():
+        if isinstance(leaf, dict):
+            yield from figures_of(leaf)
+        else:
+            yield name, leaf
+
+
+class Sensors(support.ProgramsTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.summary = cls.ok("dsg-simulate", "sensors", *SMALL, "--out", "sim", "--bag")
+
+    def ingest_and_evaluate(self, store, log, *options):
+        said = self.ok("dsg-ingest", "--store", store, "--map", "home", "--poses", "gt", *options,
+                       log)
+        return said, json.loads(self.ok("dsg-eval", "--store", store, "--map", "home", "--truth",
+                                        "sim/truth", "--json"))
+
+    def test_tells_what_it_made(self):
+        self.assertIn(f"{FRAME_COUNT} stereo pairs, {KEYFRAME_COUNT} keyframes", self.summary)
+        self.assertIn(f"{IMU_COUNT} inertial samples", self.summary)
+
+    def test_two_processes_over_two_ranges_write_the_same_bytes(self):
+        halves = [support.start("dsg-simulate", "sensors", *SMALL, "--out", "again", "--frames",
+                                frames, "--threads", "1", cwd=self.folder)
+                  for frames in ("0:4", "4:10")]
+        self.assertEqual([0, 0], [half.wait(timeout=support.TIMEOUT_S) for half in halves])
+        self.assertFalse(os.path.exists(self.path("again", "log")))
+        self.ok("dsg-simulate", "sensors", *SMALL, "--out", "again", "--bag")
+        names = files_under(self.path("sim"))
+        self.assertEqual(names, files_under(self.path("again")))
+        for name in names:
+            self.assertTrue(filecmp.cmp(self.path("sim", name), self.path("again", name), False),
+                            name)
+
+    def test_folder_and_bag_give_the_robot_its_true_poses(self):
+        for store, log in (("folder", "sim/log"), ("bag", "sim/log.bag")):
+            with self.subTest(log=log):
+                said, score = self.ingest_and_evaluate(store, log)
+                self.assertIn(f"{IMU_COUNT} inertial samples", said)
+                self.assertLess(score["trajectory"]["ate_m"], 1e-4)
+                self.assertGreater(score["trajectory"]["coverage"], 0.99)
+                stats = self.ask("stats", "--store", store, "--map", "home")
+                self.assertEqual("1", str(stats["agent_count"] if "agent_count" in stats else 1))
+
+    def test_what_was_not_built_is_null(self):
+        _, score = self.ingest_and_evaluate("nulls", "sim/log")
+        for family in ("mesh", "humans", "objects", "places", "rooms", "picks"):
+            value = score[family]
+            for name, figure in figures_of(value):
+                # Counts of what is there to be found, or was, are no scores.
+                if "count" in name:
+                    continue
+                self.assertIsNone(figure, f"{family}.{name}: {value}")
+
+    def test_pictures_are_written(self):
+        said = self.ok("dsg-simulate", "preview", "sim", "--count", "2")
+        for name in ("sheet.png", "camera.png", "depth.png", "labels.png", "top.png"):
+            self.assertIn(name, said)
+            with open(self.path("sim", "preview", name), "rb") as picture:
+                self.assertEqual(b"\x89PNG", picture.read(4))
+        shutil.rmtree(self.path("sim", "preview"))
+
+    def test_refuses_what_cannot_be(self):
+        self.refused(1, ["--world", "castle"], "dsg-simulate", "sensors", "--world", "castle",
+                     "--out", "x")
+        self.refused(1, ["--humans", "-3"], "dsg-simulate", "sensors", "--humans", "-3", "--out",
+                     "x")
+        self.refused(1, ["--seconds"], "dsg-simulate", "sensors", "--seconds", "1e9", "--out", "x")
+        self.refused(1, ["--frames"], "dsg-simulate", "sensors", "--frames", "9", "--out", "x")
+        self.refused(1, ["sim", "--force"], "dsg-simulate", "sensors", *SMALL, "--out", "sim")
+        self.refused(1, ["/proc"], "dsg-simulate", "sensors", *SMALL, "--out", "/proc/x")
+
+    def test_broken_logs_are_named(self):
+        shutil.copytree(self.path("sim", "log"), self.path("broken"))
+        os.remove(self.path("broken", "mav0", "cam1", "sensor.yaml"))
+        self.refused(1, ["cam1", "sensor.yaml"], "dsg-ingest", "--store", "s", "--map", "m",
+                     "--poses", "gt", "broken")
+        with open(self.path("broken", "mav0", "cam1", "sensor.yaml"), "w", encoding="utf-8") as f:
+            f.write("T_BS: [1, 2\n")
+        self.refused(1, ["sensor.yaml"], "dsg-ingest", "--store", "s", "--map", "m", "--poses",
+                     "gt", "broken")
+        with open(self.path("sim", "log.bag"), "rb") as bag:
+            start = bag.read(200_000)
+        with open(self.path("cut.bag"), "wb") as bag:
+            bag.write(start)
+        self.refused(1, ["cut.bag"], "dsg-ingest", "--store", "s", "--map", "m", "cut.bag")
+        self.refused(2, ["external"], "dsg-ingest", "--store", "s", "--map", "m", "--poses",
+                     "external", "sim/log")
+        self.refused(1, ["vio"], "dsg-ingest", "--store", "s", "--map", "m", "--poses", "vio",
+                     "sim/log")
+
+
+if __name__ == "__main__":
+    unittest.main()
