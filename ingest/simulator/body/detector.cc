@@ -57,6 +57,7 @@ std::vector<Sample> MakeSamples(const std::vector<BodyView>& views, const Camera
     sample.torso_camera = sample.map_T_camera.Inverse() * view.state.joints_map[ingest::kPelvis];
     // Beside or behind the lens, with an arm in the picture: nothing a network knows.
     if (sample.torso_camera.z() < kDetectionDepthMinM) continue;
+    if (sample.torso_camera.norm() > options.range_m_max) continue;
     Random random(seed, kDetectionStream + (static_cast<uint64_t>(view.frame) << 16) +
                             static_cast<uint64_t>(view.person));
     sample.draws = DrawDetectionErrors(PersonDepthLog(seed, view.person), &random);
