@@ -129,17 +129,24 @@ PrecisionRecall VolumetricScore(const PredictedRooms& predicted, const TrueCells
   }
   for (int room = 0; room < predicted.count; ++room) {
     for (const size_t cell : DiscCells(predicted, room, map)) {
+      // Free and never seen: nobody can say whose it is.
+      const bool is_unseen =
+          map.Has(cell, truth::kCellFree) && !map.Has(cell, truth::kCellObserved);
+      if (is_unseen) continue;
       overlap.predicted_size[room] += 1.0;
       if (cells.room_of[cell] >= 0) overlap.shared(room, cells.room_of[cell]) += 1.0;
     }
   }
   if (true_count == 0) return {};
   double precision = 0.0;
+  int64_t seen_count = 0;
   for (Eigen::Index room = 0; room < predicted.count; ++room) {
+    if (overlap.predicted_size[room] == 0.0) continue;
+    ++seen_count;
     precision += Ratio(overlap.shared.row(room).maxCoeff(), overlap.predicted_size[room]);
   }
   PrecisionRecall score;
-  score.precision = precision / static_cast<double>(predicted.count);
+  if (seen_count > 0) score.precision = precision / static_cast<double>(seen_count);
   double recall = 0.0;
   int64_t count = 0;
   for (Eigen::Index truth = 0; truth < true_count; ++truth) {

@@ -72,6 +72,12 @@ absl::Status OutputFile::Commit() {
   return absl::OkStatus();
 }
 
+absl::Status WriteFile(const std::string& path, std::string bytes) {
+  DSG_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path));
+  file.buffer() = std::move(bytes);
+  return file.Commit();
+}
+
 void AppendInteger(int64_t value, std::string* out) {
   char digits[24];
   const auto [end, error] = std::to_chars(digits, digits + sizeof(digits), value);

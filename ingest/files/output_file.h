@@ -46,6 +46,9 @@ class OutputFile {
   int64_t byte_count_ = 0;
 };
 
+/// A whole file at once. Errors: of Create and Commit.
+absl::Status WriteFile(const std::string& path, std::string bytes);
+
 /// "-12.345000" with `decimals` (1 to 9) digits after the point; "0" for zero.
 /// Requires: |value| * 10^decimals < 2^63.
 void AppendFixed(double value, int decimals, std::string* out);

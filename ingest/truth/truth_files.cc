@@ -31,12 +31,6 @@ std::string PathOf(const std::string& folder, const char* name) {
   return (fs::path(folder) / name).string();
 }
 
-absl::Status WriteWhole(const std::string& folder, const char* name, std::string bytes) {
-  DSG_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(PathOf(folder, name)));
-  file.buffer() = std::move(bytes);
-  return file.Commit();
-}
-
 template <typename Row>
 absl::Status WriteTable(const std::string& folder, const char* name, void (*header)(std::string*),
                         void (*append)(const Row&, std::string*), const std::vector<Row>& rows) {
@@ -128,12 +122,13 @@ absl::Status WriteTruth(const Truth& truth, const std::string& folder) {
       WriteTable(folder, kHumansFile, AppendHumanHeader, AppendHumanRow, truth.human_states));
   DSG_RETURN_IF_ERROR(WriteTable(folder, kDetectionsFile, AppendDetectionHeader, AppendDetectionRow,
                                  truth.detections));
-  DSG_RETURN_IF_ERROR(WriteWhole(folder, kMeshFile, MeshToPly(truth.mesh, truth.face_observed)));
+  DSG_RETURN_IF_ERROR(
+      ingest::WriteFile(PathOf(folder, kMeshFile), MeshToPly(truth.mesh, truth.face_observed)));
   if (!truth.free_grid.cells.empty()) {
     DSG_ASSIGN_OR_RETURN(std::string png, GridToPng(truth.free_grid));
-    DSG_RETURN_IF_ERROR(WriteWhole(folder, kGridFile, std::move(png)));
+    DSG_RETURN_IF_ERROR(ingest::WriteFile(PathOf(folder, kGridFile), std::move(png)));
   }
-  return WriteWhole(folder, kWorldFile, TruthToJson(truth));
+  return ingest::WriteFile(PathOf(folder, kWorldFile), TruthToJson(truth));
 }
 
 absl::StatusOr<Truth> ReadTruth(const std::string& folder) {

@@ -68,7 +68,8 @@ class Sensors(support.ProgramsTest):
                 self.assertLess(score["trajectory"]["ate_m"], 1e-4)
                 self.assertGreater(score["trajectory"]["coverage"], 0.99)
                 stats = self.ask("stats", "--store", store, "--map", "home")
-                self.assertEqual("1", str(stats["agent_count"] if "agent_count" in stats else 1))
+                agents = [layer for layer in stats["layers"] if layer["name"] == "agents"]
+                self.assertEqual("1", agents[0]["node_count"])
 
     def test_what_was_not_built_is_null(self):
         _, score = self.ingest_and_evaluate("nulls", "sim/log")

@@ -12,6 +12,7 @@
 #include <optional>
 #include <vector>
 
+#include "ingest/simulator/motion/dead_reckoning.h"
 #include "ingest/simulator/sensors/frame_files.h"
 #include "ingest/simulator/sensors/render_frames.h"
 #include "ingest/simulator/sensors/session.h"
@@ -230,6 +231,28 @@ TEST_P(LogQuality, DisparitiesAgreeWithDepth) {
               errors.size(), median, 100.0 * share, kDisparityPx);
   EXPECT_LE(median, 0.5 * kDisparityPx);
   EXPECT_GE(share, 0.85);
+}
+
+TEST_P(LogQuality, InertialSamplesStayWithinTheirNoiseModel) {
+  ReckoningShares sum;
+  for (uint64_t seed = 0; seed < 8; ++seed) {
+    // The motion is the log's; noise is drawn anew, for enough windows to count.
+    const std::vector<ImuSample> samples =
+        seed == 0 ? session_->imu() : SimulateImu(session_->robot(), ImuModel(), 200.0, seed);
+    const ReckoningShares shares =
+        SharesWithin(ReckonWindows(session_->robot(), samples, ImuModel(), kNsPerSecond));
+    sum.window_count += shares.window_count;
+    sum.position += shares.position / 8.0;
+    sum.rotation += shares.rotation / 8.0;
+    sum.all += shares.all / 8.0;
+  }
+  std::printf(
+      "%d windows of 1 s: within their 95 %% ellipsoids: position %.1f %%, rotation "
+      "%.1f %%, position, rotation and velocity together %.1f %%\n",
+      sum.window_count, 100.0 * sum.position, 100.0 * sum.rotation, 100.0 * sum.all);
+  EXPECT_NEAR(sum.position, 0.95, 0.04);
+  EXPECT_NEAR(sum.rotation, 0.95, 0.04);
+  EXPECT_NEAR(sum.all, 0.95, 0.04);
 }
 
 INSTANTIATE_TEST_SUITE_P(Worlds, LogQuality,

@@ -114,9 +114,8 @@ absl::Status WritePng(const std::string& path, const cv::Mat& rgb) {
   Image image{rgb.cols, rgb.rows, PixelFormat::kRgb8, {}};
   const cv::Mat whole = rgb.isContinuous() ? rgb : rgb.clone();
   image.bytes.assign(whole.datastart, whole.dataend);
-  DSG_ASSIGN_OR_RETURN(ingest::OutputFile file, ingest::OutputFile::Create(path));
-  DSG_ASSIGN_OR_RETURN(file.buffer(), EncodePng(image));
-  return file.Commit();
+  DSG_ASSIGN_OR_RETURN(std::string png, EncodePng(image));
+  return ingest::WriteFile(path, std::move(png));
 }
 
 /// Camera, depth and labels of some instants, one below the other.
@@ -199,9 +198,8 @@ absl::Status WriteTopView(const std::string& folder, const std::string& out,
   DSG_ASSIGN_OR_RETURN(const WorldKind kind, ParseWorldKind(truth.world));
   DSG_ASSIGN_OR_RETURN(const World world, GenerateWorld({kind, truth.seed}));
   paths->push_back(out + "/top.png");
-  DSG_ASSIGN_OR_RETURN(ingest::OutputFile file, ingest::OutputFile::Create(paths->back()));
-  DSG_ASSIGN_OR_RETURN(file.buffer(), DrawPreview(world, Tracks(truth)));
-  return file.Commit();
+  DSG_ASSIGN_OR_RETURN(std::string png, DrawPreview(world, Tracks(truth)));
+  return ingest::WriteFile(paths->back(), std::move(png));
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ namespace {
 
 using ingest::AppendFixed;
 using ingest::AppendInteger;
-using ingest::OutputFile;
+using ingest::WriteFile;
 
 constexpr char kImu[] = "imu0";
 constexpr char kTruth[] = "state_groundtruth_estimate0";
@@ -30,12 +30,6 @@ void AppendVector(const Eigen::Vector3d& vector, std::string* out) {
   }
 }
 
-absl::Status WriteText(const std::string& path, std::string text) {
-  DSG_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path));
-  file.buffer() = std::move(text);
-  return file.Commit();
-}
-
 absl::Status WriteImageTables(const SensorSession& session, const std::string& log_folder) {
   for (const ImageChannel& channel : ImageChannels()) {
     const std::string folder = ChannelFolder(log_folder, channel.name);
@@ -45,12 +39,12 @@ absl::Status WriteImageTables(const SensorSession& session, const std::string& l
       const TimeNs stamp_ns = session.StampOf(frame);
       absl::StrAppend(&table, stamp_ns, ",", stamp_ns, channel.ending, "\n");
     }
-    DSG_RETURN_IF_ERROR(WriteText(folder + "/data.csv", std::move(table)));
+    DSG_RETURN_IF_ERROR(WriteFile(folder + "/data.csv", std::move(table)));
     const std::string name(channel.name);
     const ingest::CameraCalibration* camera =
         session.told_rig().FindCamera(name.substr(0, name.find('_')));
     DSG_CHECK(camera != nullptr);
-    DSG_RETURN_IF_ERROR(WriteText(folder + "/sensor.yaml", CameraYaml(*camera)));
+    DSG_RETURN_IF_ERROR(WriteFile(folder + "/sensor.yaml", CameraYaml(*camera)));
   }
   return absl::OkStatus();
 }
@@ -67,8 +61,8 @@ absl::Status WriteImu(const SensorSession& session, const std::string& log_folde
     AppendVector(sample.accel, &table);
     table.push_back('\n');
   }
-  DSG_RETURN_IF_ERROR(WriteText(folder + "/data.csv", std::move(table)));
-  return WriteText(folder + "/sensor.yaml", ImuYaml(*session.told_rig().imu));
+  DSG_RETURN_IF_ERROR(WriteFile(folder + "/data.csv", std::move(table)));
+  return WriteFile(folder + "/sensor.yaml", ImuYaml(*session.told_rig().imu));
 }
 
 absl::Status WriteRobotPoses(const SensorSession& session, const std::string& log_folder) {
@@ -93,8 +87,8 @@ absl::Status WriteRobotPoses(const SensorSession& session, const std::string& lo
     AppendVector(sample.accel_bias, &table);
     table.push_back('\n');
   }
-  DSG_RETURN_IF_ERROR(WriteText(folder + "/data.csv", std::move(table)));
-  return WriteText(folder + "/sensor.yaml", GroundTruthYaml());
+  DSG_RETURN_IF_ERROR(WriteFile(folder + "/data.csv", std::move(table)));
+  return WriteFile(folder + "/sensor.yaml", GroundTruthYaml());
 }
 
 absl::Status WriteDetections(const std::vector<DetectionOutput>& detections,
@@ -105,7 +99,7 @@ absl::Status WriteDetections(const std::vector<DetectionOutput>& detections,
   for (const DetectionOutput& detection : detections) {
     absl::StrAppend(&lines, DetectionJson(detection.detection), "\n");
   }
-  return WriteText(folder + "/data.jsonl", std::move(lines));
+  return WriteFile(folder + "/data.jsonl", std::move(lines));
 }
 
 }  // namespace
@@ -117,7 +111,7 @@ absl::Status WriteLogTables(const SensorSession& session,
   DSG_RETURN_IF_ERROR(WriteImu(session, log_folder));
   DSG_RETURN_IF_ERROR(WriteRobotPoses(session, log_folder));
   DSG_RETURN_IF_ERROR(WriteDetections(detections, log_folder));
-  return WriteText(log_folder + "/labels.csv", LabelTable(Labels()));
+  return WriteFile(log_folder + "/labels.csv", LabelTable(Labels()));
 }
 
 std::string LogJson(const SensorSession& session, size_t detection_count) {

@@ -19,9 +19,7 @@ absl::Status WriteFrame(const SensorSession& session, int64_t frame,
   if (IsFrameComplete(session, frame, log_folder)) return absl::OkStatus();
   DSG_ASSIGN_OR_RETURN(std::vector<FrameFile> files, RenderFrame(session, frame, log_folder));
   for (FrameFile& file : files) {
-    DSG_ASSIGN_OR_RETURN(ingest::OutputFile out, ingest::OutputFile::Create(file.path));
-    out.buffer() = std::move(file.bytes);
-    DSG_RETURN_IF_ERROR(out.Commit());
+    DSG_RETURN_IF_ERROR(ingest::WriteFile(file.path, std::move(file.bytes)));
   }
   return absl::OkStatus();
 }

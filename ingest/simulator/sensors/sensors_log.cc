@@ -27,7 +27,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-using ingest::OutputFile;
+using ingest::WriteFile;
 
 /// The folders of a run.
 struct Folders {
@@ -49,12 +49,6 @@ std::string ReadText(const std::string& path) {
   std::ostringstream text;
   text << in.rdbuf();
   return text.str();
-}
-
-absl::Status WriteText(const std::string& path, std::string text) {
-  DSG_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path));
-  file.buffer() = std::move(text);
-  return file.Commit();
 }
 
 absl::Status Remove(const std::string& path) {
@@ -127,7 +121,7 @@ absl::Status PrepareFolders(const Folders& folders, const SensorsOptions& option
   if (Exists(folders.options)) return absl::OkStatus();
   // Two runs over two ranges may both find it missing, so each writes a file of its own name.
   const std::string own = absl::StrCat(folders.options, ".", getpid());
-  DSG_RETURN_IF_ERROR(WriteText(own, options.CommandLine()));
+  DSG_RETURN_IF_ERROR(WriteFile(own, options.CommandLine()));
   return Rename(own, folders.options);
 }
 
@@ -178,11 +172,11 @@ absl::Status Finish(const SensorSession& session, const Folders& folders, int th
   DSG_RETURN_IF_ERROR(truth::WriteTruth(truth, folders.work_truth));
   DSG_RETURN_IF_ERROR(WriteCadModels(session, folders.work_truth));
   DSG_RETURN_IF_ERROR(WriteLogTables(session, detections.outputs, folders.work_log));
-  return WriteText(folders.work_log + "/log.json", LogJson(session, detections.outputs.size()));
+  return WriteFile(folders.work_log + "/log.json", LogJson(session, detections.outputs.size()));
 }
 
 absl::Status Publish(const SensorsOptions& options, const Folders& folders) {
-  DSG_RETURN_IF_ERROR(WriteText(folders.out + "/README.txt", Readme(options)));
+  DSG_RETURN_IF_ERROR(WriteFile(folders.out + "/README.txt", Readme(options)));
   // A run that was cut off between the two renames has moved the truth already.
   if (Exists(folders.work_truth + "/world.json")) {
     DSG_RETURN_IF_ERROR(Remove(folders.truth));

@@ -191,10 +191,8 @@ absl::Status WriteCadModels(const SensorSession& session, const std::string& fol
   for (const Furniture& item : session.world().furniture) {
     if (item.class_name != kKnownClass) continue;
     DSG_RETURN_IF_ERROR(ingest::MakeFolder(folder + "/cad"));
-    DSG_ASSIGN_OR_RETURN(ingest::OutputFile file, ingest::OutputFile::Create(absl::StrCat(
-                                                      folder, "/cad/", CadFile(kKnownClass))));
-    file.buffer() = CadPly(CadModel(kKnownClass, item.size));
-    return file.Commit();
+    return ingest::WriteFile(absl::StrCat(folder, "/cad/", CadFile(kKnownClass)),
+                             CadPly(CadModel(kKnownClass, item.size)));
   }
   return absl::OkStatus();
 }

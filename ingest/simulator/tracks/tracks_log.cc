@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "ingest/files/output_file.h"
+#include "ingest/files/output_folder.h"
 #include "ingest/simulator/picture/preview.h"
 #include "ingest/simulator/tracks/presence.h"
 #include "ingest/simulator/tracks/track_sensor.h"
@@ -59,62 +60,19 @@ struct Files {
   }
 };
 
-// Folders alone do not count: a run that failed leaves some.
-bool HoldsFiles(const fs::path& folder) {
-  std::error_code error;
-  for (auto it = fs::recursive_directory_iterator(folder, error);
-       !error && it != fs::recursive_directory_iterator(); it.increment(error)) {
-    if (!it->is_directory(error)) return true;
-  }
-  // A folder that cannot be read holds something for all we know.
-  return static_cast<bool>(error) && fs::exists(folder, error);
-}
-
 absl::Status CheckFolder(const TracksOptions& options) {
-  std::error_code error;
-  const fs::path out(options.out);
-  if (fs::exists(out, error) && !fs::is_directory(out, error)) {
-    return MakeError(Reason::kFieldInvalid,
-                     absl::StrCat("--out ", options.out, " is not a folder; name another"),
-                     {{"field", "--out"}, {"path", options.out}});
-  }
-  if (options.force || !HoldsFiles(out)) return absl::OkStatus();
+  DSG_RETURN_IF_ERROR(ingest::CheckIsFolderOrMissing(options.out));
+  if (options.force || !ingest::HoldsFiles(options.out)) return absl::OkStatus();
   return absl::AlreadyExistsError(absl::StrCat(
       "--out ", options.out, " holds something already; name another folder or add --force"));
 }
 
-// Better now than after an hour of writing.
-absl::Status CheckDiskSpace(const TracksOptions& options) {
+absl::Status CheckSpace(const TracksOptions& options) {
   constexpr double kRowBytes = 100.0;
   const double rows = static_cast<double>(options.crowd.people_count + 1) *
                       options.crowd.duration_s * options.sensor.rate_hz;
-  const double needed = 2.0 * rows * kRowBytes;
-  std::error_code error;
-  fs::path existing = fs::absolute(options.out, error);
-  while (!error && !fs::exists(existing, error) && existing.has_relative_path()) {
-    existing = existing.parent_path();
-  }
-  const fs::space_info space = fs::space(existing, error);
-  if (error || needed <= static_cast<double>(space.available)) return absl::OkStatus();
-  return MakeError(
-      Reason::kDiskFull,
-      absl::StrFormat("the disk of %s has %.1f GB free, and this log takes about %.1f GB; free "
-                      "some space or lower --people, --seconds or --rate",
-                      options.out, static_cast<double>(space.available) * 1e-9, needed * 1e-9),
-      {{"path", options.out}});
-}
-
-absl::Status MakeFolders(const std::string& out) {
-  for (const char* folder : {"log", "truth"}) {
-    std::error_code error;
-    fs::create_directories(fs::path(out) / folder, error);
-    if (!error) continue;
-    return MakeError(Reason::kFieldInvalid,
-                     absl::StrCat("cannot make the folder ", (fs::path(out) / folder).string(),
-                                  ": ", error.message(), "; name a folder you may write to"),
-                     {{"field", "--out"}, {"path", out}});
-  }
-  return absl::OkStatus();
+  return ingest::CheckDiskSpace(options.out, 2.0 * rows * kRowBytes,
+                                "--people, --seconds or --rate");
 }
 
 absl::StatusOr<Files> CreateFiles(const std::string& out) {
@@ -272,9 +230,11 @@ std::string Readme(const TracksOptions& options) {
 absl::StatusOr<TracksSummary> WriteTracks(const TracksOptions& options, const Progress& progress) {
   DSG_RETURN_IF_ERROR(options.Validate());
   DSG_RETURN_IF_ERROR(CheckFolder(options));
-  DSG_RETURN_IF_ERROR(CheckDiskSpace(options));
+  DSG_RETURN_IF_ERROR(CheckSpace(options));
   DSG_ASSIGN_OR_RETURN(const World world, GenerateWorld(options.world));
-  DSG_RETURN_IF_ERROR(MakeFolders(options.out));
+  for (const char* folder : {"/log", "/truth"}) {
+    DSG_RETURN_IF_ERROR(ingest::MakeFolder(options.out + folder));
+  }
   DSG_ASSIGN_OR_RETURN(Files files, CreateFiles(options.out));
 
   const Planner planner(&world);
