@@ -37,7 +37,12 @@ void AddFlags(CLI::App* app, Flags* flags) {
   app->add_option("--map", flags->map, "Name of the map")->envname("DSG_MAP")->required();
   app->add_option("--truth", flags->truth, "Folder \"truth\" beside the simulated log")->required();
   app->add_option("--revision", flags->revision, "Revision to score; default: the newest")
-      ->check(CLI::PositiveNumber);
+      ->check([](const std::string& text) {
+        const bool is_number = text.find_first_not_of("0123456789") == std::string::npos;
+        return is_number && text.find_first_of("123456789") != std::string::npos
+                   ? std::string()
+                   : "revision is \"" + text + "\"; it must be a whole number from 1 on";
+      });
   app->add_option("--mesh-samples", flags->mesh_samples,
                   "Samples on each mesh; fewer is faster and coarser")
       ->check(CLI::Range(int64_t{1'000}, int64_t{20'000'000}))

@@ -174,6 +174,10 @@ void AppendNotes(const Report& report, const Estimate& estimate, std::vector<std
   if (trajectory.coverage.has_value() && *trajectory.coverage < kCoverageMin) {
     notes->push_back("the trajectory covers less than 95 % of the log, which counts as failure");
   }
+  if (!estimate.robot.empty() && !trajectory.smoothed.has_value()) {
+    notes->push_back(
+        "no three poses of the robot fall into the time of the truth: it is that of another log");
+  }
   if (!estimate.torsos.empty() && estimate.detection_priors.empty()) {
     notes->push_back(
         "people's tracks have no detection_prior factors, so nothing tells whose a pose is; they "

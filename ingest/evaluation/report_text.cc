@@ -61,7 +61,7 @@ void AppendMesh(const MeshResult& result, std::string* out) {
 
 void AppendHumans(const HumanResult& result, std::string* out) {
   absl::StrAppend(out, "People (Table III; m)\n");
-  Row(out, "raw detections", Cell(result.raw_m, 1.0, 2));
+  Row(out, "raw detections, mean over people", Cell(result.raw_m, 1.0, 2));
   Row(out, "filtered detections", Cell(result.filtered_m, 1.0, 2));
   Row(out, "tracked", Cell(result.tracked_m, 1.0, 2),
       absl::StrFormat("%d poses, %d unexplained", result.scored_pose_count,

@@ -42,9 +42,9 @@ absl::Status CheckDiskSpace(const std::string& path, double needed_bytes,
   if (error || needed_bytes <= static_cast<double>(space.available)) return absl::OkStatus();
   return MakeError(
       Reason::kDiskFull,
-      absl::StrFormat("the disk of %s has %.1f GB free, and this log takes about %.1f GB; free "
-                      "some space or lower %s",
-                      path, static_cast<double>(space.available) * 1e-9, needed_bytes * 1e-9,
+      absl::StrFormat("the disk of %s has %.3g MB free, and this log needs about %.3g MB more; "
+                      "free some space or lower %s",
+                      path, static_cast<double>(space.available) * 1e-6, needed_bytes * 1e-6,
                       advice),
       {{"path", path}});
 }

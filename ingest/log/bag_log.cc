@@ -8,6 +8,7 @@
 #include <tuple>
 #include <utility>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "ingest/log/bag_file.h"
@@ -107,7 +108,7 @@ class BagLog : public LogSource {
   absl::Status NothingUsable() const {
     std::vector<std::string> topics;
     for (const BagTopic& topic : plan_.topics) {
-      topics.push_back(absl::StrCat(topic.name, " (", topic.type, ")"));
+      topics.push_back(absl::Utf8SafeCHexEscape(absl::StrCat(topic.name, " (", topic.type, ")")));
     }
     return MakeError(Reason::kFileMalformed,
                      absl::StrCat(info_.path, ": the bag holds no topic that can be used; it has: ",

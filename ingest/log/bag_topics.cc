@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "ingest/log/bag_calibration.h"
@@ -194,7 +195,10 @@ void NoteUnusedTopics(BagPlan* plan) {
     const bool is_known = topic.use != TopicUse::kNone || topic.type == "sensor_msgs/CameraInfo" ||
                           topic.name == "/tf_static" || topic.name == "/dsg/labels";
     if (!is_known) {
-      unused.push_back(absl::StrCat(topic.name, " (", topic.message_count, " ", topic.type, ")"));
+      // A name may be any bytes; a terminal must not obey them.
+      unused.push_back(absl::Utf8SafeCHexEscape(
+          absl::StrCat(topic.name, " (", topic.message_count, " ", topic.type, ")")
+              .substr(0, 120)));
     }
   }
   if (unused.empty()) return;

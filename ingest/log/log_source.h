@@ -101,6 +101,8 @@ struct LogOptions {
   TimeNs epoch_ns = 0;
   /// Duration of one annotation step of a log without a clock.
   TimeNs frame_period_ns = 400'000'000;
+  /// The same for frames of images (RGB-D folders).
+  TimeNs image_period_ns = 33'333'333;
   /// Put before every agent's name, to keep apart logs that reuse names.
   std::string agent_prefix;
   /// Edge of the blocks that a mesh in the log is cut into: the map's.

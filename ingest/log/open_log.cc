@@ -29,11 +29,11 @@ absl::Status CheckOptions(const LogOptions& options) {
                                   "\" is unknown; use auto or one of: ", FormatList()),
                      {{"field", "format"}, {"value", options.format}});
   }
-  if (options.frame_period_ns <= 0) {
-    return MakeError(
-        Reason::kFieldInvalid,
-        absl::StrCat("frame period is ", options.frame_period_ns, " ns; give a positive duration"),
-        {{"field", "frame_period_ns"}, {"value", absl::StrCat(options.frame_period_ns)}});
+  const TimeNs period_ns = std::min(options.frame_period_ns, options.image_period_ns);
+  if (period_ns <= 0) {
+    return MakeError(Reason::kFieldInvalid,
+                     absl::StrCat("frame period is ", period_ns, " ns; give a positive duration"),
+                     {{"field", "frame_period_ns"}, {"value", absl::StrCat(period_ns)}});
   }
   return absl::OkStatus();
 }
@@ -86,6 +86,16 @@ OpenedLog OpenEuroc(const std::string& folder, const LogOptions& options) {
 }
 
 OpenedLog OpenFolder(const std::string& folder, const LogOptions& options) {
+  std::error_code error;
+  if (fs::exists(fs::path(folder) / ".rendering", error) &&
+      !fs::exists(fs::path(folder) / "log", error)) {
+    return MakeError(Reason::kFileMalformed,
+                     absl::StrCat(folder,
+                                  ": the simulation of this log is not finished; run the "
+                                  "same dsg-simulate command again, then give ",
+                                  folder, "/log"),
+                     {{"file", folder}});
+  }
   std::string format = options.format;
   if (format == "auto") {
     DSG_ASSIGN_OR_RETURN(format, DetectFolderFormat(folder));

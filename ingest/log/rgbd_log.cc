@@ -26,13 +26,13 @@ absl::StatusOr<TimeNs> TimeOfFrame(const std::string& folder, const RgbdFrames& 
   }
   TimeNs offset_ns = 0;
   TimeNs time_ns = 0;
-  if (__builtin_mul_overflow(number, options.frame_period_ns, &offset_ns) ||
+  if (__builtin_mul_overflow(number, options.image_period_ns, &offset_ns) ||
       __builtin_add_overflow(offset_ns, options.epoch_ns, &time_ns) || time_ns == kTimeMax ||
       time_ns == kTimeMin) {
     return MakeError(Reason::kFieldInvalid,
                      absl::StrCat(folder, ": frame ", number,
                                   " times --frame-period does not fit in 64 bits of nanoseconds"),
-                     {{"field", "frame_period"}, {"value", absl::StrCat(options.frame_period_ns)}});
+                     {{"field", "frame_period"}, {"value", absl::StrCat(options.image_period_ns)}});
   }
   return time_ns;
 }

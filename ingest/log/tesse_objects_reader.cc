@@ -95,6 +95,8 @@ absl::Status AddClasses(const std::string& path, GraphDelta* delta, std::string*
     if (found == class_of_name.end()) found = class_of_name.find(WithoutCopyNumber(node.name));
     if (found == class_of_name.end()) continue;
     node.class_id = found->second;
+    // Many names share a class; the table names none of the classes themselves.
+    node.class_name = absl::StrCat("class ", found->second);
     ++known_count;
   }
   info->notes.push_back(absl::StrCat("classes by name from ", file.name, ": ", known_count, " of ",

@@ -167,7 +167,8 @@ SessionHeader MakeHeader(const LogInfo& info, const LogOptions& log_options,
                          const IngestOptions& options, const MapSpec& spec) {
   const SessionConfig config{.format = info.format,
                              .epoch_ns = log_options.epoch_ns,
-                             .frame_period_ns = log_options.frame_period_ns,
+                             .frame_period_ns = info.format == "rgbd" ? log_options.image_period_ns
+                                                                      : log_options.frame_period_ns,
                              .agent_prefix = log_options.agent_prefix,
                              .mesh_block_size_m = log_options.mesh_block_size_m,
                              .poses_per_delta = options.poses_per_delta,

@@ -16,6 +16,7 @@
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 #include "ingest/log/log_source.h"
+#include "ingest/log/peeked_log.h"
 #include "ingest/pipeline/destination.h"
 #include "ingest/pipeline/ingest_log.h"
 #include "ingest/pipeline/progress.h"
@@ -31,7 +32,8 @@ struct Flags {
   std::string server;
   std::string map;
   std::string format = "auto";
-  double frame_period_s = 0.4;
+  /// 0 = what the format is used to.
+  double frame_period_s = 0.0;
   std::string agent_prefix;
   std::string epoch;
   std::string codec;
@@ -57,8 +59,8 @@ void AddFlags(CLI::App* app, Flags* flags) {
                   "region-json, dsg-tracks, rgbd, rosbag or tesse-objects")
       ->capture_default_str();
   app->add_option("--frame-period", flags->frame_period_s,
-                  "Seconds an annotation step of a log without a clock takes")
-      ->capture_default_str();
+                  "Seconds from frame to frame of a log without a clock; 0.4 for annotated tracks, "
+                  "1/30 for images if not given");
   app->add_option("--agent-prefix", flags->agent_prefix,
                   "Put before every agent's name, to keep apart logs that reuse names");
   app->add_option("--epoch", flags->epoch,
@@ -90,12 +92,7 @@ absl::StatusOr<PoseSource> ParsePoseSource(const std::string& text) {
   return text == "external" ? PoseSource::kExternal : PoseSource::kAuto;
 }
 
-absl::StatusOr<LogOptions> MakeLogOptions(const Flags& flags) {
-  LogOptions options;
-  options.format = flags.format;
-  options.pose_file = flags.pose_file;
-  DSG_ASSIGN_OR_RETURN(options.poses, ParsePoseSource(flags.poses));
-  options.agent_prefix = flags.agent_prefix;
+absl::Status SetFramePeriod(const Flags& flags, LogOptions* options) {
   const double period_ns = flags.frame_period_s * static_cast<double>(kNsPerSecond);
   // A day an annotation step is past any use, and keeps the product in range.
   if (!(period_ns >= 1.0 && flags.frame_period_s <= 86400.0)) {
@@ -104,7 +101,18 @@ absl::StatusOr<LogOptions> MakeLogOptions(const Flags& flags) {
                                   " is no duration from 1e-9 to 86400 seconds"),
                      {{"field", "frame-period"}, {"value", absl::StrCat(flags.frame_period_s)}});
   }
-  options.frame_period_ns = std::llround(period_ns);
+  options->frame_period_ns = std::llround(period_ns);
+  options->image_period_ns = options->frame_period_ns;
+  return absl::OkStatus();
+}
+
+absl::StatusOr<LogOptions> MakeLogOptions(const Flags& flags) {
+  LogOptions options;
+  options.format = flags.format;
+  options.pose_file = flags.pose_file;
+  DSG_ASSIGN_OR_RETURN(options.poses, ParsePoseSource(flags.poses));
+  options.agent_prefix = flags.agent_prefix;
+  if (flags.frame_period_s != 0.0) DSG_RETURN_IF_ERROR(SetFramePeriod(flags, &options));
   if (!flags.epoch.empty()) {
     DSG_ASSIGN_OR_RETURN(options.epoch_ns, ParseTime(flags.epoch, 0));
   }
@@ -189,6 +197,8 @@ absl::Status IngestOne(const Flags& flags, const std::string& path, LogOptions o
                        std::unique_ptr<Destination>* destination) {
   const auto begin = std::chrono::steady_clock::now();
   DSG_ASSIGN_OR_RETURN(std::unique_ptr<LogSource> log, OpenLog(path, options));
+  // A log without a sound beginning must not leave a map, nor give it its epoch.
+  DSG_ASSIGN_OR_RETURN(log, PeekLog(std::move(log)));
   if (*destination == nullptr) {
     const MapSpec wanted = MakeSpec(flags, options, log->info());
     DSG_ASSIGN_OR_RETURN(*destination, OpenDestination(flags, wanted));

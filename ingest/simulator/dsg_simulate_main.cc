@@ -42,6 +42,7 @@ int main(int argc, char** argv) {
     const absl::Status status = command();
     if (status.ok()) return 0;
     std::cerr << "dsg-simulate: " << std::string(status.message()) << "\n";
+    if (absl::IsInvalidArgument(status)) return kExitUsage;
   }
   return kExitFailed;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
+#include <limits>
 
 #include "absl/strings/str_cat.h"
 #include "ingest/truth/truth_parts_internal.h"
@@ -10,6 +11,14 @@ namespace {
 
 absl::Status Wrong(const std::string& what) {
   return MakeError(Reason::kFieldInvalid, absl::StrCat("ground truth: ", what));
+}
+
+// Differences of times must not overflow, and no building is larger than the earth.
+constexpr TimeNs kTimeNsMax = std::numeric_limits<TimeNs>::max() / 2;
+constexpr double kMetresMax = 1e7;
+
+bool IsNear(const Eigen::Vector3d& position_map) {
+  return position_map.allFinite() && position_map.cwiseAbs().maxCoeff() <= kMetresMax;
 }
 
 // -1 stands for none where the caller says so.
@@ -112,8 +121,9 @@ absl::Status CheckScene(const Truth& truth) {
 absl::Status CheckStates(const Truth& truth) {
   for (size_t i = 0; i < truth.robot.size(); ++i) {
     const RobotState& state = truth.robot[i];
-    const bool is_sound = IsValidPose(state.map_T_body) && state.velocity_map.allFinite() &&
-                          state.gyro_bias.allFinite() && state.accel_bias.allFinite() &&
+    const bool is_sound = IsValidPose(state.map_T_body) && IsNear(state.map_T_body.position) &&
+                          state.velocity_map.allFinite() && state.gyro_bias.allFinite() &&
+                          state.accel_bias.allFinite() &&
                           (i == 0 || truth.robot[i - 1].time_ns < state.time_ns);
     if (!is_sound) {
       return Wrong(absl::StrCat("robot state ", i, " at ", state.time_ns,
@@ -123,7 +133,7 @@ absl::Status CheckStates(const Truth& truth) {
   for (size_t i = 0; i < truth.human_states.size(); ++i) {
     const HumanState& state = truth.human_states[i];
     DSG_RETURN_IF_ERROR(CheckIndex(state.human, 0, truth.humans.size(), "human of a state"));
-    bool is_sound = IsValidPose(state.map_T_torso);
+    bool is_sound = IsValidPose(state.map_T_torso) && IsNear(state.map_T_torso.position);
     // Joints are written with AppendFixed, which has a range.
     for (const auto& joint : state.joints_map) {
       is_sound &= joint.allFinite() && joint.cwiseAbs().maxCoeff() < 1e9;
@@ -140,9 +150,12 @@ absl::Status CheckStates(const Truth& truth) {
   for (const DetectionTruth& detection : truth.detections) {
     DSG_RETURN_IF_ERROR(CheckIndex(detection.human, -1, truth.humans.size(),
                                    absl::StrCat("human of detection ", detection.id)));
-    if (!std::isfinite(detection.visibility) || !std::isfinite(detection.distance_m) ||
-        !detection.torso_map.allFinite() || !detection.detected_torso_map.allFinite()) {
-      return Wrong(absl::StrCat("detection ", detection.id, " has a number that is not finite"));
+    const bool is_share = detection.visibility >= 0.0 && detection.visibility <= 1.0;
+    if (!is_share || !std::isfinite(detection.distance_m) || !IsNear(detection.torso_map) ||
+        !IsNear(detection.detected_torso_map)) {
+      return Wrong(absl::StrCat("detection ", detection.id,
+                                " has a position beyond 1e7 m, a visibility that is no share, or a "
+                                "number that is not finite"));
     }
   }
   return absl::OkStatus();
@@ -151,6 +164,10 @@ absl::Status CheckStates(const Truth& truth) {
 }  // namespace
 
 absl::Status CheckTruth(const Truth& truth) {
+  if (truth.begin_ns < 0 || truth.end_ns > kTimeNsMax) {
+    return Wrong(absl::StrCat("the log lasts from ", truth.begin_ns, " to ", truth.end_ns,
+                              " ns; times are from 0 to ", kTimeNsMax));
+  }
   if (truth.begin_ns > truth.end_ns) {
     return Wrong(absl::StrCat("begin_ns ", truth.begin_ns, " is after end_ns ", truth.end_ns));
   }

@@ -90,14 +90,23 @@ class Sensors(support.ProgramsTest):
         shutil.rmtree(self.path("sim", "preview"))
 
     def test_refuses_what_cannot_be(self):
-        self.refused(1, ["--world", "castle"], "dsg-simulate", "sensors", "--world", "castle",
+        self.refused(2, ["--world", "castle"], "dsg-simulate", "sensors", "--world", "castle",
                      "--out", "x")
-        self.refused(1, ["--humans", "-3"], "dsg-simulate", "sensors", "--humans", "-3", "--out",
+        self.refused(2, ["--humans", "-3"], "dsg-simulate", "sensors", "--humans", "-3", "--out",
                      "x")
-        self.refused(1, ["--seconds"], "dsg-simulate", "sensors", "--seconds", "1e9", "--out", "x")
-        self.refused(1, ["--frames"], "dsg-simulate", "sensors", "--frames", "9", "--out", "x")
+        self.refused(2, ["--seconds"], "dsg-simulate", "sensors", "--seconds", "1e9", "--out", "x")
+        self.refused(2, ["--frames"], "dsg-simulate", "sensors", "--frames", "9", "--out", "x")
         self.refused(1, ["sim", "--force"], "dsg-simulate", "sensors", *SMALL, "--out", "sim")
         self.refused(1, ["/proc"], "dsg-simulate", "sensors", *SMALL, "--out", "/proc/x")
+
+    def test_the_truth_of_another_log_is_no_truth_of_this_one(self):
+        self.ok("dsg-simulate", "sensors", "--world", "apartment", "--humans", "0", "--seed", "9",
+                "--seconds", "1", "--rate", "2", "--out", "other")
+        self.ok("dsg-ingest", "--store", "mixed", "--map", "home", "--poses", "gt", "sim/log")
+        score = json.loads(self.ok("dsg-eval", "--store", "mixed", "--map", "home", "--truth",
+                                   "other/truth", "--json"))
+        self.assertIsNone(score["trajectory"]["ate_m"])
+        self.assertTrue(any("another log" in note for note in score["notes"]), score["notes"])
 
     def test_broken_logs_are_named(self):
         shutil.copytree(self.path("sim", "log"), self.path("broken"))

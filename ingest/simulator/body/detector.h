@@ -40,7 +40,7 @@ struct BodyView {
 struct DetectorOptions {
   std::string camera = "cam0";
   /// Less visible bodies are not detected.
-  double visibility_min = 0.05;
+  double visibility_min = 0.1;
   /// The same for bodies farther away: 60 pixels of height is where networks begin to miss people,
   /// and the error model was made for 2.5 to 11 m.
   double range_m_max = 12.0;

@@ -61,7 +61,7 @@ struct CrowdMotionOptions {
 ///
 /// People are planned one after the other. Each is a function of the seed, its index and those
 /// before it: it takes another goal, or waits, where it would come within half a metre of one of
-/// them, but gives up after four tries, so two bodies may still pass through each other now and
+/// them, but gives up after eight tries, so two bodies may still pass through each other now and
 /// then (below 0.5 % of the time even with 60 people in the office). An object is taken once.
 ///
 /// Threads: safe; immutable once made.

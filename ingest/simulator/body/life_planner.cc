@@ -13,7 +13,7 @@ constexpr double kPi = std::numbers::pi;
 constexpr double kGoalRangeM = 25.0;
 constexpr double kGoalNearM = 2.5;
 constexpr int kGoalTries = 20;
-constexpr int kWalkTries = 4;
+constexpr int kWalkTries = 8;
 constexpr double kWaitStepS = 1.5;
 /// Somebody with an errand before this begins in the room of the object.
 constexpr double kEarlyErrandS = 15.0;

@@ -24,7 +24,7 @@ void AddOptions(CLI::App* app, SensorsArguments* arguments) {
   SensorsRun& run = arguments->run;
   app->add_option("--out", run.out, "folder to write: log/, truth/, README.txt")->required();
   app->add_option("--world", arguments->world, "apartment, wing or office")->capture_default_str();
-  app->add_option("--humans", options.people_count, "0 to 250")->capture_default_str();
+  app->add_option("--humans,--people", options.people_count, "0 to 250")->capture_default_str();
   app->add_option("--seed", options.world.seed, "same seed, same bytes")->capture_default_str();
   app->add_option("--seconds", options.duration_s, "1 to 3600")->capture_default_str();
   app->add_option("--rate", options.rate_hz, "stereo pairs a second, 1 to 60")
@@ -50,6 +50,10 @@ void AddOptions(CLI::App* app, SensorsArguments* arguments) {
 
 void PrintSummary(const SensorsArguments& arguments, const SensorsSummary& summary) {
   const std::string& out = arguments.run.out;
+  if (summary.is_bag_only) {
+    std::cout << "the log was finished before; wrote " << out << "/log.bag\n";
+    return;
+  }
   if (!summary.is_finished) {
     std::cout << absl::StreamFormat(
         "rendered frames %s of %d; the same command without --frames finishes the log\n",
@@ -58,7 +62,7 @@ void PrintSummary(const SensorsArguments& arguments, const SensorsSummary& summa
   }
   std::cout << absl::StreamFormat(
       "%d stereo pairs, %d keyframes, %d inertial samples, %d picks\n"
-      "%d of %d rooms visited, %.0f %% of the free floor seen\n",
+      "%d of %d rooms and corridors visited, %.0f %% of the free floor seen\n",
       summary.frame_count, summary.keyframe_count, summary.imu_count, summary.pick_count,
       summary.rooms_visited, summary.room_count, 100.0 * summary.free_observed_share);
   if (summary.detections.raw.count > 0) {

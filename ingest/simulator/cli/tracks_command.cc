@@ -24,7 +24,8 @@ void AddTracks(CLI::App* app, TracksOptions* options, std::string* world) {
   app->add_flag("--force", options->force, "write into a folder that holds something");
   app->add_option("--world", *world, "office, wing or apartment")->capture_default_str();
   app->add_option("--seed", options->world.seed, "same seed, same bytes")->capture_default_str();
-  app->add_option("--people", options->crowd.people_count, "0 to 10000; a robot is always there")
+  app->add_option("--people,--humans", options->crowd.people_count,
+                  "0 to 10000; a robot is always there")
       ->capture_default_str();
   app->add_option("--seconds", options->crowd.duration_s, "1 to 86400")->capture_default_str();
   app->add_option("--rate", options->sensor.rate_hz, "samples a second of each agent, 0.1 to 200")

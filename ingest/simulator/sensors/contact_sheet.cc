@@ -18,7 +18,6 @@
 #include "ingest/simulator/sensors/image_codec.h"
 #include "ingest/simulator/sensors/label_colors.h"
 #include "ingest/simulator/sensors/log_layout.h"
-#include "ingest/simulator/sensors/session.h"
 #include "ingest/simulator/world/world.h"
 #include "ingest/truth/truth.h"
 #include "schema/base/status.h"
@@ -51,8 +50,10 @@ absl::StatusOr<std::vector<TimeNs>> KeyframeStamps(const std::string& log_folder
   }
   std::sort(stamps.begin(), stamps.end());
   if (!stamps.empty()) return stamps;
-  return absl::NotFoundError(absl::StrCat(
-      log_folder, " holds no colour images; give the folder that dsg-simulate sensors wrote"));
+  return absl::NotFoundError(
+      absl::StrCat(log_folder,
+                   " holds no finished log with colour images; give the folder that dsg-simulate "
+                   "sensors --out named, after it has finished"));
 }
 
 // In the middles of `count` equal parts of the log.
@@ -91,6 +92,9 @@ cv::Mat ColoredDepth(Image& depth) {
   cv::applyColorMap(near_bright, colored, cv::COLORMAP_TURBO);
   cv::cvtColor(colored, colored, cv::COLOR_BGR2RGB);
   colored.setTo(cv::Scalar(0, 0, 0), ToMat(depth) == 0);
+  cv::putText(colored, absl::StrFormat("red 0 m, blue %g m, black: no reading", kDepthShownM),
+              cv::Point(8, colored.rows - 10), cv::FONT_HERSHEY_SIMPLEX, 0.5,
+              cv::Scalar(255, 255, 255), 1, cv::LINE_AA);
   return colored;
 }
 
@@ -123,8 +127,15 @@ struct Columns {
   std::vector<cv::Mat> camera, depth, labels;
 };
 
+absl::Status CheckSize(const Image& image, const Image& first, TimeNs stamp) {
+  if (image.width == first.width && image.height == first.height) return absl::OkStatus();
+  return absl::DataLossError(absl::StrCat("the images of ", stamp, " ns are of different sizes, ",
+                                          first.width, " x ", first.height, " and ", image.width,
+                                          " x ", image.height, "; simulate the log again"));
+}
+
 absl::StatusOr<Columns> ReadColumns(const std::string& log_folder,
-                                    const std::vector<TimeNs>& stamps) {
+                                    const std::vector<TimeNs>& stamps, TimeNs begin_ns) {
   const std::multimap<TimeNs, cv::Rect> boxes = DetectionBoxes(log_folder);
   Columns columns;
   for (const TimeNs stamp : stamps) {
@@ -137,13 +148,18 @@ absl::StatusOr<Columns> ReadColumns(const std::string& log_folder,
     DSG_ASSIGN_OR_RETURN(
         const Image labels,
         DecodeFile(ImagePath(log_folder, Channel(kLabelsChannel), stamp), PixelFormat::kLabel16));
+    DSG_RETURN_IF_ERROR(CheckSize(depth, color, stamp));
+    DSG_RETURN_IF_ERROR(CheckSize(labels, color, stamp));
     cv::Mat camera = ToMat(color).clone();
+    if (!columns.camera.empty() && columns.camera.front().size() != camera.size()) {
+      return absl::DataLossError(absl::StrCat("the image of ", stamp, " ns is of another size"));
+    }
     const auto [first, last] = boxes.equal_range(stamp);
     for (auto box = first; box != last; ++box) {
       cv::rectangle(camera, box->second, cv::Scalar(255, 210, 0), 2);
     }
     const std::string time =
-        absl::StrFormat("t = %.2f s", static_cast<double>(stamp - kLogBeginNs) * 1e-9);
+        absl::StrFormat("t = %.2f s", static_cast<double>(stamp - begin_ns) * 1e-9);
     cv::putText(camera, time, cv::Point(8, 22), cv::FONT_HERSHEY_SIMPLEX, 0.6,
                 cv::Scalar(255, 255, 255), 2, cv::LINE_AA);
     columns.camera.push_back(camera);
@@ -208,7 +224,8 @@ absl::StatusOr<std::vector<std::string>> WriteContactSheet(const std::string& fo
                                                            const std::string& out) {
   DSG_ASSIGN_OR_RETURN(const std::vector<TimeNs> stamps, KeyframeStamps(folder + "/log"));
   DSG_RETURN_IF_ERROR(ingest::MakeFolder(out));
-  DSG_ASSIGN_OR_RETURN(const Columns columns, ReadColumns(folder + "/log", Spread(stamps, count)));
+  DSG_ASSIGN_OR_RETURN(const Columns columns,
+                       ReadColumns(folder + "/log", Spread(stamps, count), stamps.front()));
   std::vector<std::string> paths;
   DSG_RETURN_IF_ERROR(WriteImages(columns, out, &paths));
   DSG_RETURN_IF_ERROR(WriteTopView(folder, out, &paths));

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ingest/simulator/sensors/image_codec.h"
 
+#include <cstring>
+#include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/check.h"
+#include "schema/base/status.h"
 
 namespace dsg::simulator {
 namespace {
@@ -54,6 +57,22 @@ absl::StatusOr<std::string> Encode(const char* ending, const Image& image,
       absl::StrCat("cannot encode a ", std::string(Name(image.format)), " image as ", ending));
 }
 
+// A PNG tells its size in its first bytes; what is larger than any camera's is not decoded.
+absl::Status CheckPngSize(const std::string& path) {
+  constexpr uint64_t kPixelsMax = 16'000'000;
+  std::ifstream in(path, std::ios::binary);
+  unsigned char head[24] = {};
+  in.read(reinterpret_cast<char*>(head), sizeof head);
+  if (!in || std::memcmp(head, "\x89PNG", 4) != 0) return absl::OkStatus();
+  const auto number = [&head](int at) {
+    return uint64_t{head[at]} << 24 | uint64_t{head[at + 1]} << 16 | uint64_t{head[at + 2]} << 8 |
+           uint64_t{head[at + 3]};
+  };
+  if (number(16) * number(20) <= kPixelsMax) return absl::OkStatus();
+  return absl::DataLossError(absl::StrCat(path, " has ", number(16), " x ", number(20),
+                                          " pixels; at most 16 million are read"));
+}
+
 }  // namespace
 
 absl::StatusOr<std::string> EncodePng(const Image& image) {
@@ -66,6 +85,7 @@ absl::StatusOr<std::string> EncodeJpeg(const Image& image, int quality) {
 
 absl::StatusOr<Image> DecodeFile(const std::string& path, PixelFormat format) {
   const int type = TypeOf(format);
+  DSG_RETURN_IF_ERROR(CheckPngSize(path));
   cv::Mat mat;
   try {
     mat = cv::imread(path, type == CV_16UC1  ? cv::IMREAD_UNCHANGED

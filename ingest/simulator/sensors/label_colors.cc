@@ -5,12 +5,24 @@
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/simulator/world/catalogue.h"
 
 namespace dsg::simulator {
 namespace {
 
 // A room's class never appears in an image.
 constexpr int kSurfaceClassMax = 99;
+
+// The large surfaces are calm, so that people and things stand out.
+struct FixedColor {
+  const char* class_name;
+  Color color;
+};
+constexpr FixedColor kFixedColors[] = {{"wall", {168, 170, 178, 255}},
+                                       {"floor", {120, 96, 72, 255}},
+                                       {"ceiling", {224, 224, 218, 255}},
+                                       {"glass", {150, 210, 226, 255}},
+                                       {"human", {228, 26, 60, 255}}};
 
 uint8_t Channel(double hue, double shift, double low, double high) {
   const double wave = 0.5 + 0.5 * std::cos(6.283185307179586 * (hue + shift));
@@ -21,6 +33,9 @@ uint8_t Channel(double hue, double shift, double low, double high) {
 
 Color LabelColor(int class_id) {
   if (class_id == 0) return {0, 0, 0, 255};
+  for (const FixedColor& fixed : kFixedColors) {
+    if (ClassId(fixed.class_name) == class_id) return fixed.color;
+  }
   // The golden ratio spreads any number of hues; three levels of brightness part near ones.
   const double hue = std::fmod(class_id * 0.6180339887498949, 1.0);
   const double high = 255.0 - 50.0 * (class_id % 3);

@@ -56,7 +56,7 @@ absl::Status WriteImu(const SensorSession& session, const std::string& log_folde
       "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
       "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
   for (const ImuSample& sample : session.imu()) {
-    AppendInteger(kLogBeginNs + sample.time_ns + session.imu_delay_ns(), &table);
+    AppendInteger(session.begin_ns() + sample.time_ns + session.imu_delay_ns(), &table);
     AppendVector(sample.gyro, &table);
     AppendVector(sample.accel, &table);
     table.push_back('\n');
@@ -75,7 +75,7 @@ absl::Status WriteRobotPoses(const SensorSession& session, const std::string& lo
       "b_a_RS_S_z [m s^-2]\n";
   for (const ImuSample& sample : session.imu()) {
     const MotionState motion = session.robot().StateAt(sample.time_ns);
-    AppendInteger(kLogBeginNs + sample.time_ns, &table);
+    AppendInteger(session.begin_ns() + sample.time_ns, &table);
     AppendVector(motion.map_T_body.position, &table);
     const Eigen::Quaterniond& q = motion.map_T_body.orientation;
     for (const double number : {q.w(), q.x(), q.y(), q.z()}) {
@@ -116,13 +116,19 @@ absl::Status WriteLogTables(const SensorSession& session,
 
 std::string LogJson(const SensorSession& session, size_t detection_count) {
   const int every = session.options().keyframe_every;
-  return absl::StrCat(
-      "{\n  \"format\": \"dsg-sensors\",\n  \"version\": 1,\n  \"generator\": \"dsg-simulate\",\n",
-      "  \"command\": \"", session.options().CommandLine(),
-      "\",\n  \"frame_count\": ", session.frame_count(),
-      ",\n  \"keyframe_count\": ", (session.frame_count() + every - 1) / every,
-      ",\n  \"imu_count\": ", session.imu().size(), ",\n  \"detection_count\": ", detection_count,
-      "\n}\n");
+  const int64_t keyframe_count = (session.frame_count() + every - 1) / every;
+  std::string counts;
+  for (const ImageChannel& channel : ImageChannels()) {
+    if (std::string_view(channel.name).ends_with("_clean")) continue;
+    absl::StrAppend(&counts, "    \"", channel.name,
+                    "\": ", channel.keyframes_only ? keyframe_count : session.frame_count(), ",\n");
+  }
+  absl::StrAppend(&counts, "    \"", kImu, "\": ", session.imu().size(), ",\n    \"", kDetections,
+                  "\": ", detection_count, "\n");
+  return absl::StrCat("{\n  \"format\": \"dsg-sensors\",\n  \"version\": 1,\n",
+                      "  \"generator\": \"dsg-simulate\",\n  \"command\": \"",
+                      session.options().CommandLine(), "\",\n  \"counts\": {\n", counts,
+                      "  }\n}\n");
 }
 
 }  // namespace dsg::simulator

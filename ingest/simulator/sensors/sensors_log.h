@@ -20,7 +20,7 @@ struct SensorsRun {
   std::string out;
   /// Replace a finished log, or a begun one of other options.
   bool force = false;
-  /// Write out/log.bag too.
+  /// Write out/log.bag too; also for a log that is finished already.
   bool bag = false;
   /// Render only these and leave the rest to other runs, which may go on at the same time; the
   /// run without a range finishes the log.
@@ -32,10 +32,13 @@ struct SensorsRun {
 struct SensorsSummary {
   /// False after a run over a range of frames.
   bool is_finished = false;
+  /// The log was finished before; this run wrote its bag and counted nothing.
+  bool is_bag_only = false;
   int64_t frame_count = 0;
   int64_t keyframe_count = 0;
   int64_t imu_count = 0;
   int64_t pick_count = 0;
+  /// Corridors and hallways among them.
   int64_t room_count = 0;
   int64_t rooms_visited = 0;
   /// Of the free cells, that a camera saw.

@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "schema/base/random.h"
 #include "schema/base/status.h"
 
 namespace dsg::simulator {
@@ -30,6 +31,17 @@ absl::StatusOr<FrameRange> ParseFrameRange(std::string_view text) {
 int64_t SensorsOptions::FrameCount() const {
   // A hair more, so that 25 s at 20 Hz are 500 frames whatever the rounding.
   return static_cast<int64_t>(std::floor(duration_s * rate_hz + 1e-6));
+}
+
+TimeNs SensorsOptions::BeginNs() const {
+  constexpr TimeNs kFirstNs = 1'700'000'000 * kNsPerSecond;
+  // Longer than the longest log, so that two logs share no instant.
+  constexpr TimeNs kStepNs = 4000 * kNsPerSecond;
+  constexpr int kStepCount = 100'000;
+  uint64_t digest = 0;
+  for (const char letter : CommandLine())
+    digest = digest * 1'000'003 + static_cast<uint8_t>(letter);
+  return kFirstNs + Random(digest, 0).Index(kStepCount) * kStepNs;
 }
 
 absl::Status SensorsOptions::Validate() const {

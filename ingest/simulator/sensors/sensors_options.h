@@ -39,6 +39,8 @@ struct SensorsOptions {
   double calibration_error_factor = 1.0;
 
   int64_t FrameCount() const;
+  /// First stamp: some time in the years from 2023 on, drawn from all options.
+  TimeNs BeginNs() const;
   /// Errors: INVALID_ARGUMENT/FIELD_INVALID naming the option, its value and its bounds.
   absl::Status Validate() const;
   /// The options as they are typed: names the log, and tells whether a run continues another.

@@ -97,6 +97,10 @@ absl::StatusOr<std::unique_ptr<SensorSession>> SensorSession::Make(const Sensors
   session->scene_ = BuildScene(*session->world_, session->crowd_->movable());
   DSG_ASSIGN_OR_RETURN(session->renderer_, Renderer::Create(session->scene_));
   session->rig_ = ReferenceRig();
+  for (ingest::CameraCalibration& camera : session->rig_.cameras) {
+    const bool is_stereo = camera.name == "cam0" || camera.name == "cam1";
+    camera.rate_hz = is_stereo ? options.rate_hz : options.rate_hz / options.keyframe_every;
+  }
   const PerturbedRig perturbed =
       PerturbRig(session->rig_, Scaled(options.calibration_error_factor), options.world.seed);
   session->told_rig_ = perturbed.told;

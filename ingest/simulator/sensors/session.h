@@ -18,9 +18,6 @@
 
 namespace dsg::simulator {
 
-/// First stamp of every log: 14 November 2023, 22:13:20 UTC.
-inline constexpr TimeNs kLogBeginNs = 1'700'000'000 * kNsPerSecond;
-
 /// A person or a carried object, ready to be drawn. Owns what MovingBody refers to.
 struct DrawnBody {
   /// Index of the person; -1 = an object.
@@ -58,10 +55,13 @@ class SensorSession {
   int human_class_id() const { return human_class_id_; }
 
   int64_t frame_count() const { return options_.FrameCount(); }
+  /// First stamp of the log. Logs of other options have other times, so that the truth of one is
+  /// not taken for that of another.
+  TimeNs begin_ns() const { return options_.BeginNs(); }
   bool IsKeyframe(int64_t frame) const { return frame % options_.keyframe_every == 0; }
   /// From the log's begin.
   TimeNs TimeOf(int64_t frame) const;
-  TimeNs StampOf(int64_t frame) const { return kLogBeginNs + TimeOf(frame); }
+  TimeNs StampOf(int64_t frame) const { return begin_ns() + TimeOf(frame); }
   /// Requires: a camera of rig().
   Pose3d MapTCamera(const ingest::CameraCalibration& camera, int64_t frame) const;
 

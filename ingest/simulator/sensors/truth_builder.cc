@@ -27,7 +27,7 @@ std::vector<truth::RobotState> RobotStates(const SensorSession& session) {
   states.reserve(session.imu().size());
   for (const ImuSample& sample : session.imu()) {
     const MotionState motion = session.robot().StateAt(sample.time_ns);
-    states.push_back({kLogBeginNs + sample.time_ns, motion.map_T_body, motion.velocity_map,
+    states.push_back({session.begin_ns() + sample.time_ns, motion.map_T_body, motion.velocity_map,
                       sample.gyro_bias, sample.accel_bias});
   }
   return states;
@@ -127,7 +127,8 @@ void AddRooms(const FloorPlan& plan, truth::Truth* out) {
   }
 }
 
-bool IsWitnessed(const PickEvent& pick, const Observation& observation) {
+bool IsWitnessed(const SensorSession& session, const PickEvent& pick,
+                 const Observation& observation) {
   const bool before =
       std::any_of(observation.sightings.begin(), observation.sightings.end(),
                   [&](const ObjectSighting& sighting) {
@@ -135,7 +136,7 @@ bool IsWitnessed(const PickEvent& pick, const Observation& observation) {
                   });
   return before &&
          std::any_of(observation.views.begin(), observation.views.end(), [&](const BodyView& view) {
-           const TimeNs time_ns = view.time_ns - kLogBeginNs;
+           const TimeNs time_ns = view.time_ns - session.begin_ns();
            return view.person == pick.person && time_ns >= pick.pick_ns - kWitnessNs &&
                   time_ns <= pick.pick_ns + kWitnessNs;
          });
@@ -144,9 +145,9 @@ bool IsWitnessed(const PickEvent& pick, const Observation& observation) {
 void AddPicks(const SensorSession& session, const Observation& observation, truth::Truth* out) {
   for (const PickEvent& pick : session.crowd().picks()) {
     const bool is_placed = pick.place_ns != kTimeMax;
-    out->picks.push_back({pick.object, pick.person, pick.room, kLogBeginNs + pick.pick_ns,
-                          is_placed ? kLogBeginNs + pick.place_ns : kTimeMax,
-                          pick.map_T_object_after, IsWitnessed(pick, observation)});
+    out->picks.push_back({pick.object, pick.person, pick.room, session.begin_ns() + pick.pick_ns,
+                          is_placed ? session.begin_ns() + pick.place_ns : kTimeMax,
+                          pick.map_T_object_after, IsWitnessed(session, pick, observation)});
   }
 }
 
@@ -171,7 +172,7 @@ truth::Truth BuildTruth(const SensorSession& session, const Observation& observa
   truth::Truth out;
   out.world = Name(session.options().world.kind);
   out.seed = session.options().world.seed;
-  out.begin_ns = kLogBeginNs;
+  out.begin_ns = session.begin_ns();
   out.end_ns = session.StampOf(session.frame_count() - 1);
   out.labels = Labels();
   out.rig = session.rig();

@@ -217,7 +217,7 @@ TEST_F(RealSensorLogs, RealSenseBagHasItsCalibrationAndCountsItsTopics) {
 
 TEST_F(RealSensorLogs, SevenScenesKeepsItsFrameNumbersAndMendsItsRotations) {
   LogOptions options;
-  options.frame_period_ns = 1000;
+  options.image_period_ns = 1000;
   const auto log = ReadAll(Path("rgbd-7scenes"), options);
   ASSERT_TRUE(log.ok()) << log.status();
   EXPECT_FALSE(log->info.has_clock);

@@ -31,7 +31,7 @@ TEST(RgbdLog, ReadsSevenScenes) {
   folder.Write("camera-intrinsics.txt", "585 0 320\n0 585 240\n0 0 1\n");
   LogOptions options;
   options.epoch_ns = 1000;
-  options.frame_period_ns = 10;
+  options.image_period_ns = 10;
   const auto log = ReadAll(folder.Path(""), options);
   ASSERT_TRUE(log.ok()) << log.status();
   EXPECT_EQ(log->info.format, "rgbd");
@@ -74,7 +74,7 @@ TEST_F(RedwoodTest, ReadsFramesAndPoses) {
   const auto log = ReadAll(folder_.Path(""));
   ASSERT_TRUE(log.ok()) << log.status();
   EXPECT_EQ(log->poses.size(), 2u);
-  EXPECT_EQ(log->poses[1].pose.time_ns, 2 * TimeNs{400'000'000});
+  EXPECT_EQ(log->poses[1].pose.time_ns, 2 * TimeNs{33'333'333});
   EXPECT_EQ(log->info.rig.FindCamera("color0")->fx, 525.0);
 }
 

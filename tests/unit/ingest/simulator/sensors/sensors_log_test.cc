@@ -11,6 +11,8 @@
 #include <sstream>
 
 #include "ingest/simulator/sensors/contact_sheet.h"
+#include "ingest/simulator/sensors/image_codec.h"
+#include "ingest/simulator/sensors/log_folder.h"
 #include "ingest/simulator/sensors/session.h"
 #include "ingest/truth/truth.h"
 #include "schema/base/status.h"
@@ -30,6 +32,11 @@ SensorsOptions SmallOptions() {
   options.rate_hz = 4.0;
   options.keyframe_every = 2;
   return options;
+}
+
+// "STAMP" of a frame, as its files are named.
+std::string Stamp(int64_t frame) {
+  return std::to_string(SmallOptions().BeginNs() + frame * kNsPerSecond / 4);
 }
 
 std::map<std::string, std::string> BytesOf(const fs::path& folder) {
@@ -103,49 +110,48 @@ TEST_F(SensorsLog, HasTheSameBytesTwiceAndInPieces) {
   ExpectEqualFiles(BytesOf(Path("a")), BytesOf(Path("b")));
 }
 
+TEST_F(SensorsLog, HasATimeOfItsOwn) {
+  SensorsOptions other = SmallOptions();
+  other.people_count = 2;
+  EXPECT_GT(std::abs(other.BeginNs() - SmallOptions().BeginNs()), 3600 * kNsPerSecond);
+}
+
 TEST_F(SensorsLog, DiffersFromSeedToSeed) {
   SensorsOptions other = SmallOptions();
   other.world.seed = 7;
   ASSERT_TRUE(Write("a").ok());
   ASSERT_TRUE(Write("b", {}, other).ok());
-  const auto a = BytesOf(Path("a"));
-  const auto b = BytesOf(Path("b"));
-  for (const auto& [name, bytes] : a) {
-    if (!name.ends_with(".png") || !b.contains(name)) continue;
-    EXPECT_FALSE(bytes == b.at(name)) << name;
+  const auto a = BytesOf(Path("a/log/mav0/cam0/data"));
+  const auto b = BytesOf(Path("b/log/mav0/cam0/data"));
+  ASSERT_EQ(a.size(), b.size());
+  for (auto i = a.begin(), j = b.begin(); i != a.end(); ++i, ++j) {
+    EXPECT_FALSE(i->second == j->second) << i->first;
   }
 }
 
 TEST_F(SensorsLog, IsContinuedAfterAFullDisk) {
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "this system has no /dev/full";
+  ASSERT_TRUE(Write("a").ok());
   // The files are opened as PATH.part; a link makes the fourth one the device that is always full.
-  const std::string data = Path("a/.rendering/log/mav0/cam0/data");
-  fs::create_directories(data);
-  const std::string part = data + "/1700000000750000000.png.part";
-  fs::create_symlink("/dev/full", part);
-  const auto cut = Write("a", {.force = true, .thread_count = 1});
-  // Forced, since the folder was not begun by a run; it keeps nothing of it.
-  ASSERT_TRUE(cut.ok()) << cut.status();
-
   fs::create_directories(Path("b/.rendering"));
   std::ofstream(Path("b/.rendering/options.txt")) << SmallOptions().CommandLine();
   const std::string b_data = Path("b/.rendering/log/mav0/cam0/data");
   fs::create_directories(b_data);
-  fs::create_symlink("/dev/full", b_data + "/1700000000750000000.png.part");
+  fs::create_symlink("/dev/full", b_data + "/" + Stamp(3) + ".png.part");
   const auto full = Write("b", {.thread_count = 1});
   EXPECT_EQ(ReasonOf(full.status()), Reason::kDiskFull) << full.status();
   EXPECT_FALSE(fs::exists(Path("b/log")));
-  fs::remove(b_data + "/1700000000750000000.png.part");
-  const auto first_frame = fs::last_write_time(b_data + "/1700000000000000000.png");
+  fs::remove(b_data + "/" + Stamp(3) + ".png.part");
+  const auto first_frame = fs::last_write_time(b_data + "/" + Stamp(0) + ".png");
   ASSERT_TRUE(Write("b").ok());
-  EXPECT_EQ(fs::last_write_time(Path("b/log/mav0/cam0/data/1700000000000000000.png")), first_frame);
+  EXPECT_EQ(fs::last_write_time(Path("b/log/mav0/cam0/data/" + Stamp(0) + ".png")), first_frame);
   ExpectEqualFiles(BytesOf(Path("a")), BytesOf(Path("b")));
 }
 
 TEST_F(SensorsLog, RendersAgainWhatWasCutOff) {
   ASSERT_TRUE(Write("a").ok());
   ASSERT_TRUE(Write("b", {.frames = FrameRange{0, 6}}).ok());
-  const std::string image = Path("b/.rendering/log/mav0/cam1/data/1700000000500000000.png");
+  const std::string image = Path("b/.rendering/log/mav0/cam1/data/" + Stamp(2) + ".png");
   fs::resize_file(image, fs::file_size(image) / 2);
   ASSERT_TRUE(Write("b").ok());
   ExpectEqualFiles(BytesOf(Path("a")), BytesOf(Path("b")));
@@ -164,6 +170,43 @@ TEST_F(SensorsLog, RefusesToMixOrOverwrite) {
   std::ofstream(Path("d")) << "a file";
   EXPECT_EQ(ReasonOf(Write("d").status()), Reason::kFieldInvalid);
   EXPECT_EQ(ReasonOf(Write("e", {.frames = FrameRange{0, 7}}).status()), Reason::kFieldInvalid);
+}
+
+TEST_F(SensorsLog, RefusesAnEmptyName) {
+  EXPECT_EQ(ReasonOf(WriteSensors(SmallOptions(), {.out = ""}, nullptr).status()),
+            Reason::kFieldInvalid);
+}
+
+TEST_F(SensorsLog, RemovesNothingThatIsNotItsOwn) {
+  for (const char* name : {"log", "truth", ".rendering"}) {
+    const std::string home = Path(std::string("home-") + name);
+    fs::create_directories(home + "/" + name);
+    std::ofstream(home + "/" + name + "/diary") << "mine";
+    const auto refused = WriteSensors(SmallOptions(), {.out = home, .force = true}, nullptr);
+    EXPECT_EQ(refused.status().code(), absl::StatusCode::kAlreadyExists) << name;
+    EXPECT_TRUE(fs::exists(home + "/" + name + "/diary")) << name;
+  }
+}
+
+TEST_F(SensorsLog, AddsTheBagToAFinishedLog) {
+  ASSERT_TRUE(Write("a").ok());
+  const auto image = Path("a/log/mav0/cam0/data/" + Stamp(0) + ".png");
+  const auto written = fs::last_write_time(image);
+  const auto added = Write("a", {.bag = true});
+  ASSERT_TRUE(added.ok()) << added.status();
+  EXPECT_TRUE(added->is_bag_only);
+  EXPECT_TRUE(fs::exists(Path("a/log.bag")));
+  EXPECT_EQ(fs::last_write_time(image), written);
+  EXPECT_EQ(Write("a", {.bag = true}).status().code(), absl::StatusCode::kAlreadyExists);
+}
+
+TEST_F(SensorsLog, LetsNobodyFinishWhileAnotherRenders) {
+  ASSERT_TRUE(Write("a", {.frames = FrameRange{0, 1}}).ok());
+  const LogPaths paths(Path("a"));
+  const auto other = FolderLock::Take(paths, false);
+  ASSERT_TRUE(other.ok()) << other.status();
+  EXPECT_EQ(Write("a").status().code(), absl::StatusCode::kUnavailable);
+  EXPECT_TRUE(Write("a", {.frames = FrameRange{1, 2}}).ok());
 }
 
 TEST_F(SensorsLog, TellsTheTruthOfItself) {
@@ -195,6 +238,11 @@ TEST_F(SensorsLog, IsShownInPictures) {
   EXPECT_EQ(paths->size(), 5u);
   for (const std::string& path : *paths) EXPECT_GT(fs::file_size(path), 10'000u) << path;
   EXPECT_FALSE(WriteContactSheet(Path("nothing"), 2, Path("pictures")).ok());
+  // An image of another size is an error, and no crash.
+  const auto depth = Path("a/log/mav0/depth0/data/" + Stamp(2) + ".png");
+  ingest::Image small{8, 8, ingest::PixelFormat::kDepth16, std::vector<uint8_t>(128)};
+  std::ofstream(depth, std::ios::binary) << *EncodePng(small);
+  EXPECT_FALSE(WriteContactSheet(Path("a"), 3, Path("pictures")).ok());
 }
 
 }  // namespace
