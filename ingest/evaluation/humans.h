@@ -71,7 +71,7 @@ struct HumanResult {
 /// IDF1 = 2 IDTP / (truth + estimate) over (human, stamp) and (track, stamp), whole tracks
 /// assigned to whole humans so that IDTP is largest. MOTA = 1 - (misses + false + switches) /
 /// truth. A pose of a person below visibility_min counts neither way.
-/// Source: Ristani et al. 2016 (IDF1); Bernardin and Stiefelhagen 2008 (MOTA); perception brief D.
+/// Source: Ristani et al. 2016 (IDF1); Bernardin and Stiefelhagen 2008 (MOTA).
 HumanResult EvaluateHumans(const std::vector<TrueDetection>& detections,
                            const std::vector<EstimatedPrior>& priors,
                            const std::vector<EstimatedTorso>& poses, const HumanOptions& options);

@@ -48,7 +48,7 @@ struct MeshResult {
 
 /// `face_observed`: for each true face, whether it can be asked for. `rooms_map`: what "inside the
 /// building" means; empty = the box of the true mesh.
-/// Source: perception brief K (mesh error definition), after Rosinol et al. 2020, Table II.
+/// Source: after Rosinol et al. 2020, Table II.
 /// Cost:   some k-d tree look-ups per sample and vertex; 1e6 samples take tens of seconds.
 MeshResult EvaluateMesh(const MeshBlock& estimate, const MeshBlock& truth,
                         const std::vector<uint8_t>& face_observed,

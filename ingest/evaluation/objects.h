@@ -71,7 +71,7 @@ struct ObjectResult {
 std::vector<int> MatchObjects(const std::vector<EstimatedObject>& estimate,
                               const std::vector<TrueObject>& truth, double gate_m);
 
-/// Source: perception brief E; Rosinol et al. 2020, Table III.
+/// Source: Rosinol et al. 2020, Table III.
 ObjectResult EvaluateObjects(const std::vector<EstimatedObject>& estimate,
                              const std::vector<TrueObject>& truth, const ObjectOptions& options);
 

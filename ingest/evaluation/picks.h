@@ -44,7 +44,7 @@ struct PickResult {
 };
 
 /// A prediction is right if a pick of that object by that human is within the window; each pick
-/// serves one prediction, the surest first. Source: perception brief I; Brier 1950.
+/// serves one prediction, the surest first. Source: Brier 1950.
 PickResult EvaluatePicks(const std::vector<PredictedPick>& predicted,
                          const std::vector<TruePick>& truth, const PickOptions& options);
 

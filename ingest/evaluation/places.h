@@ -54,7 +54,7 @@ struct PlaceResult {
   int64_t pair_count = 0;
 };
 
-/// Source: perception brief F.
+/// Source: RSS 2020, section IV-B (places); what is measured of them is ours.
 PlaceResult EvaluatePlaces(const std::vector<EstimatedPlace>& places,
                            const std::vector<PlaceEdge>& edges, const GridMap& map,
                            const PlaceOptions& options);

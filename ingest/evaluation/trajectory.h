@@ -42,7 +42,7 @@ struct AteResult {
 };
 
 /// nullopt below three pairs, which an alignment makes look good whatever they are.
-/// Source: Zhang and Scaramuzza 2018; perception brief A.7.
+/// Source: Zhang and Scaramuzza 2018.
 std::optional<AteResult> AbsoluteError(const std::vector<PosePair>& pairs, Alignment alignment);
 
 /// Relative pose error over segments of the true path. From each pair to the first one at least

@@ -20,7 +20,7 @@
 namespace dsg::simulator {
 namespace {
 
-// Kimera-VIO's settings for uHumans2 : quality, distance, block.
+// Kimera-VIO's settings for uHumans2: quality, distance, block.
 constexpr int kCornersMax = 300;
 constexpr double kCornerQuality = 0.001;
 constexpr double kCornerDistancePx = 8.0;

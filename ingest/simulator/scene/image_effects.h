@@ -26,7 +26,7 @@ struct CameraEffects {
   double shot_noise = 3.0;
 };
 
-/// Depth noise of section J: sigma = base + square * z^2, metres.
+/// Depth noise: sigma = base + square * z^2, metres.
 struct DepthEffects {
   double sigma_base_m = 0.0025;
   double sigma_square_per_m = 0.002;

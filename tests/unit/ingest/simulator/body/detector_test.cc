@@ -59,9 +59,9 @@ BodyView MakeView(const BodyModel& body, int64_t frame, double depth_m, double v
   return view;
 }
 
-// The mixture of design section J: 58 % full, 22 % of 0.6 to 1, 12 % of 0.25 to 0.6, 8 % at the
-// border. The design leaves distances and the visibility at the border open: 2.5 to 11 m, and half
-// a body at most.
+// The mixture that the error model was made for: 58 % full, 22 % of 0.6 to 1, 12 % of 0.25 to 0.6,
+// 8 % at the border. It leaves distances and the visibility at the border open: 2.5 to 11 m, and
+// half a body at most.
 std::vector<BodyView> Mixture(int count, double depth_factor) {
   const BodyModel body{ShapeCoefficients()};
   Random random(99, 0);
