@@ -17,9 +17,6 @@
 
 namespace dsg::sqlite {
 
-/// Id of CONTAINS in the relation table of every map.
-inline constexpr int64_t kContainsId = 1;
-
 /// The newest revision and the sums that it carries.
 struct Head {
   RevisionInfo info;

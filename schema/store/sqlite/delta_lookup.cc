@@ -33,18 +33,24 @@ absl::StatusOr<std::optional<Layer>> DeltaLookup::FindLayer(LayerId id) const {
 absl::StatusOr<std::vector<NodeId>> DeltaLookup::ReadIds(const char* sql, NodeId id) const {
   std::vector<NodeId> ids;
   Query query(db_, sql);
-  query.Bind(KeyOf(id), kContainsId);
+  query.Bind(KeyOf(id), relations::kContains);
   while (query.Next()) ids.push_back(IdOf(query.Int(0)));
   DSG_RETURN_IF_ERROR(query.status());
   return ids;
 }
 
 absl::StatusOr<std::vector<NodeId>> DeltaLookup::FindParents(NodeId id) const {
-  return ReadIds("SELECT source FROM edge WHERE target = ?1 AND relation = ?2", id);
+  return ReadIds(
+      "SELECT source FROM edge WHERE target = ?1 AND relation ="
+      " (SELECT id FROM relation WHERE name = ?2)",
+      id);
 }
 
 absl::StatusOr<std::vector<NodeId>> DeltaLookup::FindChildren(NodeId id) const {
-  return ReadIds("SELECT target FROM edge WHERE source = ?1 AND relation = ?2", id);
+  return ReadIds(
+      "SELECT target FROM edge WHERE source = ?1 AND relation ="
+      " (SELECT id FROM relation WHERE name = ?2)",
+      id);
 }
 
 absl::StatusOr<std::optional<TimeNs>> DeltaLookup::FindTrackEnd(NodeId agent) const {

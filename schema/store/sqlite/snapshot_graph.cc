@@ -160,10 +160,12 @@ absl::StatusOr<NodeId> SqliteSnapshot::ResolveAgent(std::string_view id_or_name)
 absl::StatusOr<std::vector<NodeId>> SqliteSnapshot::ChildrenOf(NodeId parent) const {
   DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
   Query query(*lease,
-              "SELECT target FROM edge WHERE source = ?1 AND relation = ?3 AND rev_from <= ?2"
+              "SELECT target FROM edge WHERE source = ?1 AND relation = (SELECT id FROM relation "
+              "WHERE name = ?3) AND rev_from <= ?2"
               " UNION SELECT target FROM edge_history"
-              " WHERE source = ?1 AND relation = ?3 AND rev_from <= ?2 AND rev_to > ?2");
-  query.Bind(KeyOf(parent), revision(), kContainsId);
+              " WHERE source = ?1 AND relation = (SELECT id FROM relation WHERE name = ?3) AND "
+              "rev_from <= ?2 AND rev_to > ?2");
+  query.Bind(KeyOf(parent), revision(), relations::kContains);
   std::vector<NodeId> ids;
   while (query.Next()) ids.push_back(IdOf(query.Int(0)));
   DSG_RETURN_IF_ERROR(query.status());
@@ -372,10 +374,12 @@ absl::StatusOr<std::vector<NearestNode>> SqliteSnapshot::NearestNodes(
 absl::StatusOr<NodeId> SqliteSnapshot::FindParent(NodeId id) const {
   DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
   Query query(*lease,
-              "SELECT source FROM edge WHERE target = ?1 AND relation = ?3 AND rev_from <= ?2"
+              "SELECT source FROM edge WHERE target = ?1 AND relation = (SELECT id FROM relation "
+              "WHERE name = ?3) AND rev_from <= ?2"
               " UNION SELECT source FROM edge_history"
-              " WHERE target = ?1 AND relation = ?3 AND rev_from <= ?2 AND rev_to > ?2");
-  query.Bind(KeyOf(id), revision(), kContainsId);
+              " WHERE target = ?1 AND relation = (SELECT id FROM relation WHERE name = ?3) AND "
+              "rev_from <= ?2 AND rev_to > ?2");
+  query.Bind(KeyOf(id), revision(), relations::kContains);
   NodeId parent;
   while (query.Next()) {
     const NodeId candidate = IdOf(query.Int(0));

@@ -300,6 +300,19 @@ TEST(Edges, OfPastRevisionsAreAsTheyWereBelieved) {
   EXPECT_EQ(map.Problems(), "");
 }
 
+TEST(Edges, OfTheHierarchyAreKnownByNameWhateverRelationCameFirst) {
+  TestMap map;
+  const NodeId a('O', 1), b('O', 2);
+  GraphDelta first = DeltaOfNodes(
+      {MakeObject(1, "", BoxOf(0, 0, 0, 1, 1, 1)), MakeObject(2, "", BoxOf(2, 0, 0, 3, 1, 1))});
+  first.edges = {MakeEdge(a, relations::kNear, b)};
+  map.MustCommit(first);
+  EXPECT_TRUE(map.Latest()->ChildrenOf(a)->empty());
+  EXPECT_TRUE(map.Latest()->FindParent(b)->empty());
+  // A neighbour that grows beyond the other's box is no child that sticks out.
+  map.MustCommit(DeltaOfNodes({MakeObject(2, "", BoxOf(2, 0, 0, 9, 9, 9))}));
+}
+
 TEST(Edges, RemovedTwiceAreRemovedOnce) {
   TestMap map;
   GraphDelta delta;
