@@ -38,8 +38,8 @@ class Sensors(support.ProgramsTest):
         cls.summary = cls.ok("dsg-simulate", "sensors", *SMALL, "--out", "sim", "--bag")
 
     def ingest_and_evaluate(self, store, log, *options):
-        said = self.ok("dsg-ingest", "--store", store, "--map", "home", "--poses", "gt", *options,
-                       log)
+        said = self.ok("dsg-ingest", "--store", store, "--map", "home", "--poses", "gt",
+                       "--no-layers", *options, log)
         return said, json.loads(self.ok("dsg-eval", "--store", store, "--map", "home", "--truth",
                                         "sim/truth", "--json"))
 
@@ -48,10 +48,13 @@ class Sensors(support.ProgramsTest):
         self.assertIn(f"{IMU_COUNT} inertial samples", self.summary)
 
     def test_two_processes_over_two_ranges_write_the_same_bytes(self):
-        halves = [support.start("dsg-simulate", "sensors", *SMALL, "--out", "again", "--frames",
-                                frames, "--threads", "1", cwd=self.folder)
-                  for frames in ("0:4", "4:10")]
-        self.assertEqual([0, 0], [half.wait(timeout=support.TIMEOUT_S) for half in halves])
+        with open(self.path("halves.txt"), "w", encoding="utf-8") as said:
+            halves = [support.start("dsg-simulate", "sensors", *SMALL, "--out", "again", "--frames",
+                                    frames, "--threads", "1", cwd=self.folder, log=said)
+                      for frames in ("0:4", "4:10")]
+            codes = [half.wait(timeout=support.TIMEOUT_S) for half in halves]
+        with open(self.path("halves.txt"), encoding="utf-8") as said:
+            self.assertEqual([0, 0], codes, said.read())
         self.assertFalse(os.path.exists(self.path("again", "log")))
         self.ok("dsg-simulate", "sensors", *SMALL, "--out", "again", "--bag")
         names = files_under(self.path("sim"))

@@ -6,10 +6,12 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
+#include <thread>
 
 #include "absl/strings/str_cat.h"
 #include "ingest/files/output_file.h"
@@ -105,12 +107,16 @@ absl::StatusOr<FolderState> InspectFolder(const LogPaths& paths, const std::stri
     return absl::AlreadyExistsError(absl::StrCat(
         "--out ", paths.out, " holds a finished log; name another folder, or add --force"));
   }
+  if (!Exists(paths.options) && !ingest::HoldsFiles(paths.out)) return FolderState::kNew;
+  // A process that begins at the same time makes the work folder first and its options then.
+  for (int tries = 0; tries < 100 && Exists(paths.work) && !Exists(paths.options); ++tries) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
   if (Exists(paths.options)) {
     const std::string begun = ReadText(paths.options);
     if (begun != command) return OtherOptions(paths, begun);
     return FolderState::kBegun;
   }
-  if (!ingest::HoldsFiles(paths.out)) return FolderState::kNew;
   return absl::AlreadyExistsError(absl::StrCat(
       "--out ", paths.out, " holds something already; name another folder or add --force"));
 }
