@@ -14,10 +14,12 @@ BASE = ["schema/base"]
 MODEL = BASE + ["schema/model"]
 CODEC = MODEL + ["schema/codec"]
 STORE = CODEC + ["schema/store"]
-SCHEMA = STORE + ["schema/interop"]
+SCHEMA = STORE + ["schema/interop", "schema/picture"]
 # The main of dsg-ingest alone may choose between a local store and a remote one.
-INGEST_STAGES = ["log", "simulator", "evaluation", "odometry", "loop", "volume", "agents",
+INGEST_STAGES = ["log", "simulator", "evaluation", "odometry", "loop", "depth", "volume", "agents",
                  "objects", "places", "rooms"]
+# Plain types that stages hand to one another.
+INGEST_SHARED = ["ingest/config", "ingest/files", "ingest/sensor", "ingest/grid"]
 # Programs of their own beside the pipeline, which knows nothing of them.
 ASIDE = ["simulator", "evaluation"]
 ALLOWED = {
@@ -27,11 +29,13 @@ ALLOWED = {
     "schema/store": CODEC,
     "schema/store/sqlite": STORE,
     "schema/interop": STORE,
+    "schema/picture": MODEL,
     "ingest/config": SCHEMA,
     "ingest/files": BASE,
     "ingest/sensor": MODEL,
+    "ingest/grid": MODEL,
     "ingest/remote": SCHEMA,
-    "ingest/pipeline": (SCHEMA + ["ingest/config", "ingest/remote", "ingest/sensor"] +
+    "ingest/pipeline": (SCHEMA + INGEST_SHARED + ["ingest/remote"] +
                         [f"ingest/{s}" for s in INGEST_STAGES if s not in ASIDE]),
     "ingest": SCHEMA + ["ingest/config", "ingest/log", "ingest/pipeline", "ingest/remote"],
     "query/view": SCHEMA,
@@ -41,8 +45,7 @@ ALLOWED = {
     "server": SCHEMA + ["query/view", "query/engine"],
     "tests": SCHEMA + ["ingest", "query", "server"],
 }
-ALLOWED.update({f"ingest/{s}": SCHEMA + ["ingest/config", "ingest/files", "ingest/sensor"]
-                for s in INGEST_STAGES})
+ALLOWED.update({f"ingest/{s}": SCHEMA + INGEST_SHARED for s in INGEST_STAGES})
 # Nobody but these two sees the ground truth.
 ALLOWED["ingest/truth"] = SCHEMA + ["ingest/files", "ingest/sensor"]
 ALLOWED["ingest/simulator"] += ["ingest/truth"]
@@ -66,7 +69,7 @@ THIRD_PARTY = [
      ["ingest *.cc", "tests"]),
     (r"spdlog/", ["schema/base *.cc"]),
     (r"CLI/", ["ingest *.cc", "query/cli", "server *.cc", "tests"]),
-    (r"png\.h$", ["ingest *.cc", "tests"]),
+    (r"png\.h$", ["schema/picture *.cc", "ingest/truth *.cc", "tests"]),
     (r"nlohmann/", ["schema/interop", "ingest *.cc", "query/cli *.cc", "tests"]),
 ]
 
