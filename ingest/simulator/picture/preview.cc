@@ -5,10 +5,15 @@
 #include <array>
 #include <cmath>
 
-#include "ingest/simulator/picture/raster.h"
+#include "schema/picture/png_file.h"
+#include "schema/picture/raster.h"
 
 namespace dsg::simulator {
 namespace {
+
+using picture::Canvas;
+using picture::MakePaint;
+using picture::Paint;
 
 // Twice what the file will have: the picture is halved at the end.
 constexpr double kWorldWidthPx = 3200.0;
@@ -199,7 +204,7 @@ absl::StatusOr<std::string> DrawPreview(const World& world,
   const double legend_y = canvas.height() - kMarginPx - kTextHeightPx;
   DrawLegend(tracks, legend_y, &canvas);
   DrawScaleBar(view, legend_y, &canvas);
-  return EncodePng(canvas.Halved());
+  return picture::EncodePng(canvas.Halved());
 }
 
 }  // namespace dsg::simulator

@@ -1,75 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ingest/simulator/picture/raster.h"
+#include "schema/picture/raster.h"
 
-#include <png.h>
 #include <Eigen/Geometry>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstring>
 
-#include "absl/strings/str_cat.h"
 #include "schema/base/check.h"
+#include "schema/picture/font.h"
 
-namespace dsg::simulator {
+namespace dsg::picture {
 namespace {
-
-using Glyph = std::array<uint8_t, 7>;
-
-// Rows from the top, five dots each, the leftmost in bit 4; g, p, q and y hang lower.
-constexpr std::array<Glyph, 26> kLetters = {{
-    {0x00, 0x00, 0x0e, 0x01, 0x0f, 0x11, 0x0f},  // a
-    {0x10, 0x10, 0x1e, 0x11, 0x11, 0x11, 0x1e},  // b
-    {0x00, 0x00, 0x0e, 0x11, 0x10, 0x11, 0x0e},  // c
-    {0x01, 0x01, 0x0f, 0x11, 0x11, 0x11, 0x0f},  // d
-    {0x00, 0x00, 0x0e, 0x11, 0x1f, 0x10, 0x0e},  // e
-    {0x06, 0x08, 0x1e, 0x08, 0x08, 0x08, 0x08},  // f
-    {0x0f, 0x11, 0x11, 0x11, 0x0f, 0x01, 0x0e},  // g
-    {0x10, 0x10, 0x1e, 0x11, 0x11, 0x11, 0x11},  // h
-    {0x04, 0x00, 0x0c, 0x04, 0x04, 0x04, 0x0e},  // i
-    {0x02, 0x00, 0x06, 0x02, 0x02, 0x12, 0x0c},  // j
-    {0x10, 0x10, 0x12, 0x14, 0x18, 0x14, 0x12},  // k
-    {0x0c, 0x04, 0x04, 0x04, 0x04, 0x04, 0x0e},  // l
-    {0x00, 0x00, 0x1a, 0x15, 0x15, 0x15, 0x15},  // m
-    {0x00, 0x00, 0x1e, 0x11, 0x11, 0x11, 0x11},  // n
-    {0x00, 0x00, 0x0e, 0x11, 0x11, 0x11, 0x0e},  // o
-    {0x1e, 0x11, 0x11, 0x11, 0x1e, 0x10, 0x10},  // p
-    {0x0f, 0x11, 0x11, 0x11, 0x0f, 0x01, 0x01},  // q
-    {0x00, 0x00, 0x16, 0x19, 0x10, 0x10, 0x10},  // r
-    {0x00, 0x00, 0x0f, 0x10, 0x0e, 0x01, 0x1e},  // s
-    {0x08, 0x08, 0x1e, 0x08, 0x08, 0x08, 0x06},  // t
-    {0x00, 0x00, 0x11, 0x11, 0x11, 0x11, 0x0f},  // u
-    {0x00, 0x00, 0x11, 0x11, 0x11, 0x0a, 0x04},  // v
-    {0x00, 0x00, 0x15, 0x15, 0x15, 0x15, 0x0a},  // w
-    {0x00, 0x00, 0x11, 0x0a, 0x04, 0x0a, 0x11},  // x
-    {0x11, 0x11, 0x11, 0x11, 0x0f, 0x01, 0x0e},  // y
-    {0x00, 0x00, 0x1f, 0x02, 0x04, 0x08, 0x1f},  // z
-}};
-constexpr std::array<Glyph, 10> kDigits = {{
-    {0x0e, 0x11, 0x13, 0x15, 0x19, 0x11, 0x0e},  // 0
-    {0x04, 0x0c, 0x04, 0x04, 0x04, 0x04, 0x0e},  // 1
-    {0x0e, 0x11, 0x01, 0x06, 0x08, 0x10, 0x1f},  // 2
-    {0x1e, 0x01, 0x01, 0x0e, 0x01, 0x01, 0x1e},  // 3
-    {0x02, 0x06, 0x0a, 0x12, 0x1f, 0x02, 0x02},  // 4
-    {0x1f, 0x10, 0x1e, 0x01, 0x01, 0x11, 0x0e},  // 5
-    {0x0e, 0x10, 0x1e, 0x11, 0x11, 0x11, 0x0e},  // 6
-    {0x1f, 0x01, 0x02, 0x04, 0x08, 0x08, 0x08},  // 7
-    {0x0e, 0x11, 0x11, 0x0e, 0x11, 0x11, 0x0e},  // 8
-    {0x0e, 0x11, 0x11, 0x0f, 0x01, 0x01, 0x0e},  // 9
-}};
-constexpr Glyph kBlank = {};
-constexpr Glyph kDash = {0x00, 0x00, 0x00, 0x0e, 0x00, 0x00, 0x00};
-constexpr Glyph kDot = {0x00, 0x00, 0x00, 0x00, 0x00, 0x0c, 0x0c};
-constexpr int kAdvanceDots = 6;
-constexpr int kDescentDots = 2;
-
-const Glyph& GlyphOf(char c) {
-  if (c >= 'a' && c <= 'z') return kLetters[static_cast<size_t>(c - 'a')];
-  if (c >= '0' && c <= '9') return kDigits[static_cast<size_t>(c - '0')];
-  if (c == '-') return kDash;
-  return c == '.' ? kDot : kBlank;
-}
 
 double DistanceToStroke(const Eigen::Vector2d& point, const Eigen::Vector2d& from,
                         const Eigen::Vector2d& to) {
@@ -80,13 +21,30 @@ double DistanceToStroke(const Eigen::Vector2d& point, const Eigen::Vector2d& fro
   return (point - from - along * step).norm();
 }
 
+/// Where the row `y` cuts the outline, ascending.
+void FindCrossings(const std::vector<Eigen::Vector2d>& corners, double y,
+                   std::vector<double>* crossings) {
+  crossings->clear();
+  for (size_t i = 0; i < corners.size(); ++i) {
+    const Eigen::Vector2d& from = corners[i];
+    const Eigen::Vector2d& to = corners[i + 1 == corners.size() ? 0 : i + 1];
+    if ((from.y() <= y) == (to.y() <= y)) continue;
+    const double fraction = (y - from.y()) / (to.y() - from.y());
+    crossings->push_back(from.x() + fraction * (to.x() - from.x()));
+  }
+  std::sort(crossings->begin(), crossings->end());
+}
+
 /// Pixels whose middles may lie in [low, high], cut at the picture.
 struct PixelRange {
   PixelRange(const Eigen::Vector2d& low, const Eigen::Vector2d& high, int width, int height)
-      : x_begin(std::clamp(static_cast<int>(std::floor(low.x())), 0, width)),
-        x_end(std::clamp(static_cast<int>(std::ceil(high.x())) + 1, 0, width)),
-        y_begin(std::clamp(static_cast<int>(std::floor(low.y())), 0, height)),
-        y_end(std::clamp(static_cast<int>(std::ceil(high.y())) + 1, 0, height)) {}
+      : x_begin(Cut(std::floor(low.x()), width)),
+        x_end(Cut(std::ceil(high.x()) + 1.0, width)),
+        y_begin(Cut(std::floor(low.y()), height)),
+        y_end(Cut(std::ceil(high.y()) + 1.0, height)) {}
+  static int Cut(double pixel, int size) {
+    return static_cast<int>(std::clamp(pixel, 0.0, static_cast<double>(size)));
+  }
   int x_begin;
   int x_end;
   int y_begin;
@@ -128,6 +86,24 @@ void Canvas::FillRect(const Eigen::Vector2d& low, const Eigen::Vector2d& high, c
   }
 }
 
+void Canvas::FillPolygon(const std::vector<Eigen::Vector2d>& corners, const Paint& paint) {
+  if (corners.size() < 3) return;
+  Eigen::AlignedBox2d bounds;
+  for (const Eigen::Vector2d& corner : corners) bounds.extend(corner);
+  const PixelRange range(bounds.min(), bounds.max(), width_, height_);
+  std::vector<double> crossings;
+  for (int y = range.y_begin; y < range.y_end; ++y) {
+    FindCrossings(corners, y + 0.5, &crossings);
+    for (size_t i = 0; i + 1 < crossings.size(); i += 2) {
+      // Pixels whose middles lie in [from, to), so that neighbours neither overlap nor gape.
+      const double width = width_;
+      const int begin = static_cast<int>(std::ceil(std::clamp(crossings[i] - 0.5, 0.0, width)));
+      const int end = static_cast<int>(std::ceil(std::clamp(crossings[i + 1] - 0.5, 0.0, width)));
+      for (int x = begin; x < end; ++x) Blend(x, y, paint);
+    }
+  }
+}
+
 void Canvas::FillCircle(const Eigen::Vector2d& center, double radius, const Paint& paint) {
   DrawPolyline({center}, 2.0 * radius, paint);
 }
@@ -159,16 +135,21 @@ void Canvas::DrawPolyline(const std::vector<Eigen::Vector2d>& points, double wid
   }
 }
 
+void Canvas::DrawOutline(std::vector<Eigen::Vector2d> corners, double width, const Paint& paint) {
+  if (corners.empty()) return;
+  corners.push_back(corners.front());
+  DrawPolyline(corners, width, paint);
+}
+
 void Canvas::DrawText(const Eigen::Vector2d& low, std::string_view text, double dot,
                       const Paint& paint) {
   Eigen::Vector2d corner = low;
-  for (const char c : text) {
-    const Glyph& glyph = GlyphOf(c);
-    const bool hangs = c == 'g' || c == 'p' || c == 'q' || c == 'y';
-    const Eigen::Vector2d top = corner + Eigen::Vector2d(0.0, hangs ? kDescentDots * dot : 0.0);
-    for (int row = 0; row < 7; ++row) {
-      for (int column = 0; column < 5; ++column) {
-        if ((glyph[static_cast<size_t>(row)] >> (4 - column) & 1) == 0) continue;
+  for (const Glyph* glyph : GlyphsOf(text)) {
+    const Eigen::Vector2d top = corner + Eigen::Vector2d(0.0, glyph->drop * dot);
+    for (int row = 0; row < kGlyphHeightDots; ++row) {
+      for (int column = 0; column < kGlyphWidthDots; ++column) {
+        const int bit = kGlyphWidthDots - 1 - column;
+        if ((glyph->rows[static_cast<size_t>(row)] >> bit & 1) == 0) continue;
         const Eigen::Vector2d begin = top + dot * Eigen::Vector2d(column, row);
         FillRect(begin, begin + Eigen::Vector2d(dot, dot), paint);
       }
@@ -178,8 +159,8 @@ void Canvas::DrawText(const Eigen::Vector2d& low, std::string_view text, double 
 }
 
 double Canvas::TextWidth(std::string_view text, double dot) {
-  if (text.empty()) return 0.0;
-  return dot * (kAdvanceDots * static_cast<double>(text.size()) - 1.0);
+  const size_t count = GlyphsOf(text).size();
+  return count == 0 ? 0.0 : dot * (kAdvanceDots * static_cast<double>(count) - 1.0);
 }
 
 Picture Canvas::Halved() const {
@@ -202,21 +183,4 @@ Picture Canvas::Halved() const {
   return out;
 }
 
-absl::StatusOr<std::string> EncodePng(const Picture& picture) {
-  png_image image;
-  std::memset(&image, 0, sizeof(image));
-  image.version = PNG_IMAGE_VERSION;
-  image.width = static_cast<png_uint_32>(picture.width);
-  image.height = static_cast<png_uint_32>(picture.height);
-  image.format = PNG_FORMAT_RGB;
-  std::string out(PNG_IMAGE_PNG_SIZE_MAX(image), '\0');
-  png_alloc_size_t size = out.size();
-  if (png_image_write_to_memory(&image, out.data(), &size, 0, picture.rgb.data(), 0, nullptr) ==
-      0) {
-    return absl::InternalError(absl::StrCat("cannot encode a picture as PNG: ", image.message));
-  }
-  out.resize(size);
-  return out;
-}
-
-}  // namespace dsg::simulator
+}  // namespace dsg::picture

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pictures hold what was drawn, and their PNG has the frame that the format asks for.
-#include "ingest/simulator/picture/raster.h"
+#include "schema/picture/raster.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <array>
 
-namespace dsg::simulator {
+#include "schema/picture/png_file.h"
+
+namespace dsg::picture {
 namespace {
 
 using Pixel = std::array<int, 3>;
@@ -40,6 +42,45 @@ TEST(Canvas, CutsShapesAtItsBorder) {
   EXPECT_EQ(At(picture, 0, 0), (Pixel{0, 0, 0}));
   EXPECT_EQ(At(picture, 5, 5), (Pixel{255, 255, 255}));
   EXPECT_EQ(At(picture, 3, 7), (Pixel{0, 255, 0}));
+}
+
+TEST(Canvas, FillsPolygonsWithNotchesByTheEvenOddRule) {
+  Canvas canvas(40, 40, MakePaint(0xffffff));
+  // A U that opens to the top, partly above the border.
+  canvas.FillPolygon({Vector(4, -9), Vector(12, -9), Vector(12, 28), Vector(28, 28), Vector(28, 4),
+                      Vector(36, 4), Vector(36, 36), Vector(4, 36)},
+                     MakePaint(0x0000ff));
+  const Picture picture = canvas.Halved();
+  EXPECT_EQ(At(picture, 4, 0), (Pixel{0, 0, 255}));
+  EXPECT_EQ(At(picture, 10, 10), (Pixel{255, 255, 255}));
+  EXPECT_EQ(At(picture, 10, 16), (Pixel{0, 0, 255}));
+  EXPECT_EQ(At(picture, 16, 0), (Pixel{255, 255, 255}));
+  EXPECT_EQ(At(picture, 19, 19), (Pixel{255, 255, 255}));
+}
+
+TEST(Canvas, FillsPolygonsThatShareAnEdgeWithoutGapOrOverlap) {
+  Canvas canvas(40, 40, MakePaint(0xffffff));
+  const Vector middle(17.3, 21.9);
+  const std::array<Vector, 4> corners = {Vector(0, 0), Vector(40, 0), Vector(40, 40),
+                                         Vector(0, 40)};
+  for (size_t i = 0; i < 4; ++i) {
+    canvas.FillPolygon({corners[i], corners[(i + 1) % 4], middle}, MakePaint(0x000000, 0.5f));
+  }
+  const Picture picture = canvas.Halved();
+  EXPECT_TRUE(std::all_of(picture.rgb.begin(), picture.rgb.end(),
+                          [](uint8_t channel) { return channel == 128; }));
+}
+
+TEST(Canvas, DrawsNothingOfPolygonsWithoutAreaOrFarAway) {
+  Canvas canvas(20, 20, MakePaint(0xffffff));
+  canvas.FillPolygon({Vector(1, 1), Vector(9, 9)}, MakePaint(0x000000));
+  canvas.FillPolygon({}, MakePaint(0x000000));
+  canvas.DrawOutline({}, 2.0, MakePaint(0x000000));
+  canvas.FillPolygon({Vector(1e30, 1e30), Vector(2e30, 1e30), Vector(1e30, 2e30)},
+                     MakePaint(0x000000));
+  const Picture picture = canvas.Halved();
+  EXPECT_TRUE(std::all_of(picture.rgb.begin(), picture.rgb.end(),
+                          [](uint8_t channel) { return channel == 255; }));
 }
 
 TEST(Canvas, DoesNotDarkenAStrokeWhereItCrossesItself) {
@@ -82,4 +123,4 @@ TEST(EncodePng, WritesSignatureSizeAndEnd) {
 }
 
 }  // namespace
-}  // namespace dsg::simulator
+}  // namespace dsg::picture

@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// A plain picture: filled shapes, thick lines, small text, and PNG out.
+// A plain picture: filled shapes, thick lines and small text.
 // Refuses to know what it shows.
 #pragma once
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <string>
 #include <string_view>
 #include <vector>
 
-#include "absl/status/statusor.h"
-
-namespace dsg::simulator {
+namespace dsg::picture {
 
 /// 0 to 1 each; opacity 1 covers what is below.
 struct Paint {
@@ -31,9 +28,6 @@ struct Picture {
   std::vector<uint8_t> rgb;
 };
 
-/// Errors: INTERNAL with what the library says.
-absl::StatusOr<std::string> EncodePng(const Picture& picture);
-
 /// Pixels count from the top left corner, y down; shapes are cut at the border.
 class Canvas {
  public:
@@ -44,11 +38,15 @@ class Canvas {
   int height() const { return height_; }
 
   void FillRect(const Eigen::Vector2d& low, const Eigen::Vector2d& high, const Paint& paint);
+  /// Inside by the even-odd rule. Fewer than three corners fill nothing.
+  void FillPolygon(const std::vector<Eigen::Vector2d>& corners, const Paint& paint);
   void FillCircle(const Eigen::Vector2d& center, double radius, const Paint& paint);
   /// One stroke through all points with round joints; it does not darken where it crosses itself.
   void DrawPolyline(const std::vector<Eigen::Vector2d>& points, double width, const Paint& paint);
-  /// Letters of 5 x 7 dots, `dot` pixels each; lower case, digits, space, '-' and '.', anything
-  /// else is blank. `low` is the top left corner; g, p, q and y hang two dots below the seven.
+  /// As DrawPolyline, back to the first point.
+  void DrawOutline(std::vector<Eigen::Vector2d> corners, double width, const Paint& paint);
+  /// UTF-8 text in the letters of font.h, `dot` pixels a dot. `low` is the top left corner; some
+  /// letters hang kDescentDots below the line.
   void DrawText(const Eigen::Vector2d& low, std::string_view text, double dot, const Paint& paint);
   static double TextWidth(std::string_view text, double dot);
 
@@ -63,4 +61,4 @@ class Canvas {
   std::vector<float> pixels_;
 };
 
-}  // namespace dsg::simulator
+}  // namespace dsg::picture
