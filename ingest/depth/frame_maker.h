@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+// From the images of a sensor log to depth frames ready to be fused.
+// Refuses to guess poses: a frame between two poses of the robot gets theirs, others wait or go.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "ingest/sensor/calibration.h"
+#include "ingest/sensor/depth_frame.h"
+#include "ingest/sensor/human_detection.h"
+#include "ingest/sensor/image.h"
+
+namespace dsg::ingest {
+
+struct DepthOptions {
+  /// Stereo is used when there is no depth channel, on pairs at least this far apart.
+  TimeNs stereo_period_ns = 200'000'000;
+  /// Stereo readings beyond are dropped; 0 = 5 m. Those of a depth camera are all kept: the space
+  /// before them is free, which the map may want to know, and it has a range of its own.
+  double range_m = 0.0;
+  /// Class ids whose pixels move ("human", "person", "people" of the log's labels).
+  std::vector<int32_t> dynamic_classes;
+  /// Pixels that masks are grown by.
+  int mask_growth_px = 3;
+  /// Depth edges of more than this beside a mask belong to the mask, metres.
+  double mask_edge_m = 0.3;
+  /// Two poses further apart than this do not tell where the camera was in between.
+  TimeNs pose_gap_ns_max = 500'000'000;
+  /// The robot does not move faster; a frame across a faster step is skipped as a pose jump.
+  double speed_m_s_max = 20.0;
+};
+
+/// What could not be used, by reason, in words for the user. Frames: "no depth image", "no right
+/// image", "no pose", "pose jump", "size differs from calibration", "broken image", "out of order".
+/// Frames that came without colour or labels: "colour left out: ...", "labels left out: ..." and
+/// why. Poses: "broken pose".
+using SkipCounts = std::map<std::string, int64_t>;
+
+/// Put in what the log says, in its order; take out frames once all they need is there.
+///
+/// Depth is depth0's, of the left image of cam0 and cam1 if the rig has no depth0. Colour and
+/// labels are those of the nearest stamp within 20 ms and half the depth period, laid over the
+/// depth pixel by pixel if their camera stands in the same place (5 mm); cam0 stands in for a
+/// missing color0. Depth of a camera with distortion is rectified to a pinhole of the same size. No
+/// reading: 0, NaN, infinity, 65535 mm.
+///
+/// Order: stamps ascend, but for 20 ms between channels. A frame comes out when the next one is
+/// known, or after Finish. What comes out does not depend on when Next is called.
+/// Cost: pictures wait unopened, at most 10000 of a channel; then the oldest goes ("no pose").
+/// Threads: one caller at a time; images are decoded in the background, one frame ahead, which
+/// changes no result.
+class FrameMaker {
+ public:
+  /// An image as a log gives it.
+  struct Picture {
+    TimeNs time_ns = 0;
+    /// "cam0", "cam1", "color0", "depth0", "label0"; others are ignored.
+    std::string channel;
+    std::string origin;
+    std::function<absl::StatusOr<Image>()> load;
+  };
+
+  FrameMaker(const RigCalibration& rig, const DepthOptions& options);
+  ~FrameMaker();
+
+  /// True when the rig can give depth at all: a depth camera, or two rectifiable grey ones.
+  bool CanMakeFrames() const;
+
+  void AddPicture(Picture picture);
+  /// Pose of the robot's body in the map.
+  void AddPose(TimeNs time_ns, const Pose3d& map_T_body);
+  void AddDetection(const HumanDetection& detection);
+
+  /// The next frame, ascending in time; nullopt when more of the log is needed. After Finish,
+  /// nullopt means that there are no more.
+  std::optional<DepthFrame> Next();
+  /// No more of the log will come.
+  void Finish();
+
+  /// Of the frames taken out so far; complete when Next gives nothing after Finish.
+  const SkipCounts& skips() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace dsg::ingest

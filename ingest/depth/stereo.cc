@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/depth/stereo.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "ingest/depth/disparity_refinement_internal.h"
+#include "ingest/depth/pinhole.h"
+#include "ingest/depth/rectified_pair.h"
+#include "schema/base/status.h"
+
+namespace dsg::ingest {
+namespace {
+
+constexpr double kRangeDefaultM = 5.0;
+// Nothing nearer is looked for: each 16 columns of disparity cost as much again.
+constexpr double kNearestM = 0.4;
+constexpr int kBlockSize = 5;
+constexpr int kDisparitySteps = 16;
+constexpr int kRefineRounds = 2;
+// Mean absolute gradient along the rows in the window, grey levels a pixel. A blank wall shows 0.5
+// by the noise of the sensor alone.
+constexpr int kTextureWindow = 9;
+constexpr int kBorderSide = 9;
+constexpr double kTextureMin = 0.8;
+// Bytes hold the gradients in halves; Sobel's kernel gives eight of one.
+constexpr double kGradientScale = 2.0;
+
+// Lookup tables of cv::remap from a rectified camera to the real one.
+struct Lookup {
+  cv::Mat1f u;
+  cv::Mat1f v;
+  cv::Mat1b inside;
+};
+
+Lookup MakeLookup(const CameraCalibration& rectified, const CameraCalibration& real) {
+  const cv::Size size(rectified.width, rectified.height);
+  Lookup lookup{cv::Mat1f(size, -1e4f), cv::Mat1f(size, -1e4f), cv::Mat1b(size, uint8_t{0})};
+  const Eigen::Matrix3d real_R_rectified =
+      (real.body_T_camera.orientation.conjugate() * rectified.body_T_camera.orientation)
+          .toRotationMatrix();
+  const double radius_max = RadiusMax(real);
+  for (int v = 0; v < size.height; ++v) {
+    for (int u = 0; u < size.width; ++u) {
+      const Eigen::Vector3d ray = real_R_rectified * PinholeRay(rectified, u, v);
+      if (ray.z() <= 0.0 || ray.head<2>().norm() > radius_max * ray.z()) continue;
+      const Eigen::Vector2d at = Project(real, ray);
+      if (!at.allFinite()) continue;
+      if (at.x() < 0.0 || at.y() < 0.0 || at.x() > real.width - 1 || at.y() > real.height - 1) {
+        continue;
+      }
+      lookup.u(v, u) = static_cast<float>(at.x());
+      lookup.v(v, u) = static_cast<float>(at.y());
+      lookup.inside(v, u) = 255;
+    }
+  }
+  // Windows across the border would match its straight line.
+  cv::erode(lookup.inside, lookup.inside, cv::Mat::ones(kBorderSide, kBorderSide, CV_8U), {-1, -1},
+            1, cv::BORDER_CONSTANT, 0);
+  return lookup;
+}
+
+cv::Mat1b Rectified(const Image& image, const Lookup& lookup) {
+  const cv::Mat1b real(image.height, image.width, const_cast<uint8_t*>(image.bytes.data()));
+  cv::Mat1b rectified;
+  cv::remap(real, rectified, lookup.u, lookup.v, cv::INTER_LINEAR, cv::BORDER_CONSTANT, 0);
+  return rectified;
+}
+
+// 255 where there is enough to match.
+cv::Mat1b Textured(const cv::Mat1b& image) {
+  cv::Mat1s gradient;
+  cv::Sobel(image, gradient, CV_16S, 1, 0);
+  cv::Mat strength;
+  cv::convertScaleAbs(gradient, strength, kGradientScale / 8.0);
+  cv::boxFilter(strength, strength, CV_32F, {kTextureWindow, kTextureWindow});
+  cv::Mat1b textured;
+  cv::compare(strength, kTextureMin * kGradientScale, textured, cv::CMP_GE);
+  return textured;
+}
+
+int DisparityCount(const RectifiedPair& pair) {
+  const double largest = pair.left.fx * std::abs(pair.baseline_m) / kNearestM;
+  const int count = kDisparitySteps * static_cast<int>(std::ceil(std::min(largest, 1e4) / 16.0));
+  const int widest = (pair.left.width / 2 / kDisparitySteps) * kDisparitySteps;
+  return std::max(kDisparitySteps, std::min(count, widest));
+}
+
+}  // namespace
+
+class StereoDepth::Impl {
+ public:
+  Impl(const RectifiedPair& pair, const CameraCalibration& left, const CameraCalibration& right,
+       double range_m)
+      : pair_(pair),
+        range_m_(range_m > 0.0 ? range_m : kRangeDefaultM),
+        left_lookup_(MakeLookup(pair.left, left)),
+        right_lookup_(MakeLookup(pair.right, right)) {}
+
+  const CameraCalibration& camera() const { return pair_.left; }
+
+  std::vector<float> Compute(const Image& left, const Image& right) const {
+    cv::Mat1b left_image = Rectified(left, left_lookup_);
+    cv::Mat1b right_image = Rectified(right, right_lookup_);
+    cv::Mat1b usable;
+    cv::bitwise_and(Textured(left_image), left_lookup_.inside, usable);
+    cv::Mat1b right_inside = right_lookup_.inside;
+    const bool is_mirrored = pair_.baseline_m < 0.0;
+    if (is_mirrored) {
+      cv::flip(left_image, left_image, 1);
+      cv::flip(right_image, right_image, 1);
+      cv::flip(right_lookup_.inside, right_inside, 1);
+    }
+    cv::Mat1f disparity = Match(left_image, right_image, right_inside);
+    cv::Mat1f left_float;
+    cv::Mat1f right_float;
+    left_image.convertTo(left_float, CV_32F);
+    right_image.convertTo(right_float, CV_32F);
+    for (int i = 0; i < kRefineRounds; ++i) RefineDisparity(left_float, right_float, &disparity);
+    if (is_mirrored) cv::flip(disparity, disparity, 1);
+    return ToDepth(disparity, usable);
+  }
+
+ private:
+  // Pixels, 0 where there is no match.
+  cv::Mat1f Match(const cv::Mat1b& left, const cv::Mat1b& right,
+                  const cv::Mat1b& right_inside) const {
+    const int count = DisparityCount(pair_);
+    constexpr int kArea = kBlockSize * kBlockSize;
+    const cv::Ptr<cv::StereoSGBM> matcher = cv::StereoSGBM::create(
+        0, count, kBlockSize, 8 * kArea, 32 * kArea, /*disp12MaxDiff=*/1,
+        /*preFilterCap=*/31, /*uniquenessRatio=*/10,
+        /*speckleWindowSize=*/100, /*speckleRange=*/2, cv::StereoSGBM::MODE_SGBM_3WAY);
+    // The matcher leaves out as many columns on the left as it tries disparities.
+    cv::Mat left_wide;
+    cv::Mat right_wide;
+    cv::copyMakeBorder(left, left_wide, 0, 0, count, 0, cv::BORDER_REPLICATE);
+    cv::copyMakeBorder(right, right_wide, 0, 0, count, 0, cv::BORDER_REPLICATE);
+    cv::Mat wide;
+    matcher->compute(left_wide, right_wide, wide);
+    cv::Mat1f disparity;
+    wide(cv::Rect(count, 0, left.cols, left.rows)).convertTo(disparity, CV_32F, 1.0 / 16.0);
+    for (int v = 0; v < disparity.rows; ++v) {
+      for (int u = 0; u < disparity.cols; ++u) {
+        const int partner = u - static_cast<int>(std::lround(disparity(v, u)));
+        const bool is_match =
+            disparity(v, u) > 0.0f && partner >= 0 && right_inside(v, partner) != 0;
+        if (!is_match) disparity(v, u) = 0.0f;
+      }
+    }
+    return disparity;
+  }
+
+  std::vector<float> ToDepth(const cv::Mat1f& disparity, const cv::Mat1b& usable) const {
+    const double scale = pair_.left.fx * std::abs(pair_.baseline_m);
+    std::vector<float> depth_m(disparity.total(), 0.0f);
+    size_t i = 0;
+    for (int v = 0; v < disparity.rows; ++v) {
+      for (int u = 0; u < disparity.cols; ++u, ++i) {
+        if (disparity(v, u) <= 0.0f || usable(v, u) == 0) continue;
+        const double metres = scale / disparity(v, u);
+        if (metres <= range_m_) depth_m[i] = static_cast<float>(metres);
+      }
+    }
+    return depth_m;
+  }
+
+  RectifiedPair pair_;
+  double range_m_;
+  Lookup left_lookup_;
+  Lookup right_lookup_;
+};
+
+StereoDepth::StereoDepth(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+StereoDepth::~StereoDepth() = default;
+StereoDepth::StereoDepth(StereoDepth&&) noexcept = default;
+StereoDepth& StereoDepth::operator=(StereoDepth&&) noexcept = default;
+
+absl::StatusOr<StereoDepth> StereoDepth::Make(const CameraCalibration& left,
+                                              const CameraCalibration& right, double range_m) {
+  DSG_ASSIGN_OR_RETURN(const RectifiedPair pair, RectifiedPair::Make(left, right));
+  return StereoDepth(std::make_unique<Impl>(pair, left, right, range_m));
+}
+
+const CameraCalibration& StereoDepth::camera() const { return impl_->camera(); }
+
+absl::StatusOr<std::vector<float>> StereoDepth::Compute(const Image& left,
+                                                        const Image& right) const {
+  const CameraCalibration& camera = impl_->camera();
+  for (const Image* image : {&left, &right}) {
+    if (image->format != PixelFormat::kGray8 || image->width != camera.width ||
+        image->height != camera.height || image->bytes.size() != image->Offset(0, image->height)) {
+      return MakeError(
+          Reason::kFieldInvalid,
+          absl::StrCat("the ", image == &left ? "left" : "right", " image of a stereo pair is ",
+                       image->width, " x ", image->height, " ", std::string(Name(image->format)),
+                       "; the calibration says ", camera.width, " x ", camera.height, " gray8"),
+          {{"field", "resolution"}, {"value", absl::StrCat(image->width, "x", image->height)}});
+    }
+  }
+  return impl_->Compute(left, right);
+}
+
+}  // namespace dsg::ingest
