@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "ingest/volume/semantic_volume.h"
+#include "schema/base/status.h"
+
+namespace dsg::ingest {
+namespace {
+
+absl::Status CheckWithin(const std::string& field, double value, double low, double high) {
+  if (std::isfinite(value) && value >= low && value <= high) return absl::OkStatus();
+  return MakeError(
+      Reason::kFieldInvalid,
+      absl::StrCat("volume options: ", field, " is ", value, "; it must be ", low, " to ", high),
+      {{"field", field}, {"value", absl::StrCat(value)}});
+}
+
+}  // namespace
+
+absl::Status VolumeOptions::Validate() const {
+  DSG_RETURN_IF_ERROR(CheckWithin("voxel_m", voxel_m, 0.005, 2.0));
+  DSG_RETURN_IF_ERROR(CheckWithin("range_m", range_m, 4.0 * voxel_m, 1000.0 * voxel_m));
+  if (truncation_m != 0.0) {
+    const double high = std::min(16.0 * voxel_m, range_m);
+    DSG_RETURN_IF_ERROR(CheckWithin("truncation_m", truncation_m, 2.0 * voxel_m, high));
+  }
+  DSG_RETURN_IF_ERROR(CheckWithin("label_confidence", label_confidence, 0.01, 0.999));
+  DSG_RETURN_IF_ERROR(CheckWithin("thread_count", thread_count, 1, 64));
+  return CheckWithin("block_count_max", static_cast<double>(block_count_max), 1, 1e8);
+}
+
+}  // namespace dsg::ingest
