@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// Adds places until all of the space where a robot fits is in straight reach of one.
+// Refuses to link them.
+#pragma once
+
+#include <vector>
+
+#include "ingest/places/roadmap.h"
+
+namespace dsg::ingest {
+
+/// Where a robot has been without a place within 2 m in sight, there will be one.
+void CoverPath(const std::vector<Eigen::Vector3d>& path_map, Roadmap* roadmap);
+
+/// Widest spots first. Corners that are too narrow for a robot but not for its middle to look
+/// into are covered by a place that sees them.
+void CoverSpace(Roadmap* roadmap);
+
+}  // namespace dsg::ingest
