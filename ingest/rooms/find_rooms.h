@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+// Divides the places of a storey into rooms.
+// Refuses to read labels: the shape of free space decides.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "ingest/grid/distance_field.h"
+#include "schema/model/geometry.h"
+
+namespace dsg::ingest {
+
+/// A place as rooms need it; links carry the clearance of the straight way.
+struct RoomPlace {
+  Eigen::Vector3d position_map = Eigen::Vector3d::Zero();
+  double clearance_m = 0.0;
+};
+struct RoomLink {
+  int from = 0;
+  int to = 0;
+  double clearance_m = 0.0;
+};
+
+enum class RoomMethod {
+  /// Both; the ceiling's where it could be seen, free space where not.
+  kAuto,
+  /// Horizontal section of free space just below the ceiling: doors have lintels.
+  /// Source: RSS 2020, section IV-C.
+  kCeiling,
+  /// Free space at a person's height, cut at the narrow ways through its walls; no ceiling needed.
+  /// Source: critical points of Voronoi graphs (Thrun, 1998; Bormann et al., 2016).
+  kClearance,
+  /// Parts of the place graph that stay apart while obstacles grow; see filtration.h.
+  /// Source: Hughes et al., 2022.
+  kFiltration,
+};
+
+struct RoomOptions {
+  RoomMethod method = RoomMethod::kAuto;
+  /// Section below the ceiling, and how far from obstacles it is kept. RSS 2020: 0.3 and 0.2.
+  double below_ceiling_m = 0.3;
+  double section_clearance_m = 0.2;
+  double room_m2_min = 1.0;
+  /// Nets of corridors are cut where their straight arms meet; false leaves them whole.
+  bool split_corridors = true;
+};
+
+/// One storey of the map.
+struct RoomInput {
+  const DistanceField* field = nullptr;
+  std::vector<RoomPlace> places;
+  std::vector<RoomLink> links;
+  double floor_z_m = 0.0;
+  /// nullopt = no ceiling was seen.
+  std::optional<double> ceiling_z_m;
+};
+
+struct FoundRoom {
+  /// Stable over a run (RoomTracker); -1 = not given yet.
+  int64_t id = -1;
+  /// Indices of places, ascending.
+  std::vector<int> places;
+  /// Outline of its free floor, grown to the walls.
+  Polygon2d footprint_map;
+  double z_min_m = 0.0;
+  double z_max_m = 0.0;
+  double area_m2 = 0.0;
+};
+
+struct RoomLabelling {
+  RoomMethod method = RoomMethod::kCeiling;
+  std::vector<FoundRoom> rooms;
+  /// For each place its room in `rooms`; -1 = none.
+  std::vector<int> room_of_place;
+  /// Pairs of rooms with a place link between them, low index first, ascending.
+  std::vector<std::pair<int, int>> adjacent;
+};
+
+struct RoomResult {
+  RoomLabelling best;
+  /// The other method's word, when it differs on more than 5 % of the places.
+  std::optional<RoomLabelling> alternative;
+};
+
+/// Order: the same input gives the same rooms in the same order.
+RoomResult FindRooms(const RoomInput& input, const RoomOptions& options);
+
+/// Keeps the ids of rooms while the map grows: a room goes on as the one that it shares most
+/// places (by position) with.
+class RoomTracker {
+ public:
+  /// `places`: of the input that the rooms are of.
+  void Track(const std::vector<RoomPlace>& places, std::vector<FoundRoom>* rooms);
+
+ private:
+  struct Old {
+    int64_t id;
+    std::vector<Eigen::Vector3d> places_map;
+  };
+  std::vector<Old> last_;
+  int64_t next_id_ = 0;
+};
+
+}  // namespace dsg::ingest

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/rooms/structure_rooms.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace dsg::ingest {
+namespace {
+
+constexpr double kNearM = 0.4;
+constexpr double kHangGapM = 0.15;
+constexpr double kHangAboveM = 0.3;
+/// A wall that runs along a room for less is another room's.
+constexpr double kAlongM = 0.4;
+constexpr double kStepM = 0.2;
+
+Eigen::AlignedBox2d Floor(const Box3d& box) {
+  return {Eigen::Vector2d(box.min().head<2>()), Eigen::Vector2d(box.max().head<2>())};
+}
+
+Eigen::AlignedBox2d BoundsOf(const Polygon2d& polygon) {
+  Eigen::AlignedBox2d box;
+  for (const Eigen::Vector2d& corner : polygon) box.extend(corner);
+  return box;
+}
+
+// The two ends of a wall on the floor: of its box's diagonals, the one that lies in its plane.
+std::pair<Eigen::Vector2d, Eigen::Vector2d> EndsOf(const StructurePiece& wall) {
+  const Eigen::AlignedBox2d box = Floor(wall.box_map);
+  const Eigen::Vector2d normal = wall.normal_map.head<2>();
+  const bool rises = normal.x() * normal.y() < 0.0;
+  if (rises) return {box.min(), box.max()};
+  return {Eigen::Vector2d(box.min().x(), box.max().y()),
+          Eigen::Vector2d(box.max().x(), box.min().y())};
+}
+
+bool OverlapInHeight(const StructurePiece& piece, const FoundRoom& room) {
+  return piece.box_map.min().z() < room.z_max_m && piece.box_map.max().z() > room.z_min_m;
+}
+
+bool WallBounds(const StructurePiece& wall, const FoundRoom& room) {
+  if (!OverlapInHeight(wall, room)) return false;
+  const auto [from, to] = EndsOf(wall);
+  const double length_m = (to - from).norm();
+  const Eigen::Vector2d into = wall.normal_map.head<2>().normalized();
+  const int steps = std::max(1, static_cast<int>(std::lround(length_m / kStepM)));
+  int hits = 0;
+  for (int step = 0; step < steps; ++step) {
+    const Eigen::Vector2d at = from + (to - from) * ((step + 0.5) / steps);
+    if (std::abs(SignedDistanceToPolygon(room.footprint_map, at)) > kNearM) continue;
+    const bool faces = SignedDistanceToPolygon(room.footprint_map, at + kNearM * into) < 0.0;
+    const bool turns_away = SignedDistanceToPolygon(room.footprint_map, at - kNearM * into) < 0.0;
+    hits += faces && !turns_away ? 1 : 0;
+  }
+  return hits * length_m / steps >= std::min(kAlongM, 0.5 * length_m);
+}
+
+// Whether they share at least a tenth of a square metre, by points.
+bool LiesOver(const StructurePiece& piece, const FoundRoom& room) {
+  const Eigen::AlignedBox2d shared =
+      Floor(piece.box_map).intersection(BoundsOf(room.footprint_map));
+  if (shared.isEmpty()) return false;
+  int hits = 0;
+  for (double y = shared.min().y() + 0.5 * kStepM; y < shared.max().y(); y += kStepM) {
+    for (double x = shared.min().x() + 0.5 * kStepM; x < shared.max().x(); x += kStepM) {
+      if (PolygonContains(room.footprint_map, {x, y}) && ++hits * kStepM * kStepM >= 0.1) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+bool Bounds(const StructurePiece& piece, const FoundRoom& room) {
+  if (room.footprint_map.size() < 3 || piece.box_map.isEmpty()) return false;
+  Eigen::AlignedBox2d near = BoundsOf(room.footprint_map);
+  near.min().array() -= kNearM;
+  near.max().array() += kNearM;
+  if (!near.intersects(Floor(piece.box_map))) return false;
+  const double z_m = piece.box_map.center().z();
+  if (piece.type == "floor") return std::abs(z_m - room.z_min_m) < kNearM && LiesOver(piece, room);
+  if (piece.type == "ceiling") {
+    return std::abs(z_m - room.z_max_m) < kNearM && LiesOver(piece, room);
+  }
+  if (piece.type == "pillar") {
+    const Eigen::Vector2d middle = piece.box_map.center().head<2>();
+    return OverlapInHeight(piece, room) &&
+           SignedDistanceToPolygon(room.footprint_map, middle) < kNearM;
+  }
+  return WallBounds(piece, room);
+}
+
+}  // namespace
+
+std::vector<std::pair<int, int>> EnclosesOf(const std::vector<StructurePiece>& pieces,
+                                            const std::vector<FoundRoom>& rooms) {
+  std::vector<std::pair<int, int>> pairs;
+  for (size_t piece = 0; piece < pieces.size(); ++piece) {
+    for (size_t room = 0; room < rooms.size(); ++room) {
+      if (Bounds(pieces[piece], rooms[room])) {
+        pairs.emplace_back(static_cast<int>(piece), static_cast<int>(room));
+      }
+    }
+  }
+  return pairs;
+}
+
+std::optional<int> AttachedTo(const Box3d& box_map, double floor_z_m, bool rests_on_thing,
+                              const std::vector<StructurePiece>& pieces) {
+  if (rests_on_thing || box_map.isEmpty()) return std::nullopt;
+  if (box_map.min().z() <= floor_z_m + kHangAboveM) return std::nullopt;
+  std::optional<int> best;
+  double best_m = kHangGapM;
+  for (size_t i = 0; i < pieces.size(); ++i) {
+    const StructurePiece& wall = pieces[i];
+    if (wall.type != "wall" || wall.box_map.isEmpty()) continue;
+    if (wall.box_map.exteriorDistance(box_map) >= kHangGapM) continue;
+    const Eigen::Vector3d half = 0.5 * box_map.sizes();
+    const double reach_m = wall.normal_map.cwiseAbs().dot(half);
+    const double middle_m = wall.normal_map.dot(box_map.center()) + wall.offset_m;
+    // Before the wall, or sunk into it as far as a noisy box may be.
+    const double gap_m = std::abs(middle_m - reach_m);
+    if (middle_m < 0.0 || gap_m >= best_m) continue;
+    best_m = gap_m;
+    best = static_cast<int>(i);
+  }
+  return best;
+}
+
+}  // namespace dsg::ingest

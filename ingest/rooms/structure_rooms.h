@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which rooms a wall, floor or ceiling bounds, and which wall a thing hangs on.
+// Refuses to guess across walls: a wall bounds the room that it faces.
+#pragma once
+
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "ingest/rooms/find_rooms.h"
+#include "ingest/rooms/structure.h"
+
+namespace dsg::ingest {
+
+/// Pairs (piece, room), ascending: the piece runs along the room's outline within 0.4 m of it,
+/// faces it, and is at its height. Floors, ceilings and pillars: lie over or under it, or in it.
+std::vector<std::pair<int, int>> EnclosesOf(const std::vector<StructurePiece>& pieces,
+                                            const std::vector<FoundRoom>& rooms);
+
+/// The wall that a thing hangs on: nearest of those less than 0.15 m from its box, which is more
+/// than 0.3 m above the floor. nullopt for what stands on the floor or, as `rests_on_thing` says,
+/// on another thing.
+std::optional<int> AttachedTo(const Box3d& box_map, double floor_z_m, bool rests_on_thing,
+                              const std::vector<StructurePiece>& pieces);
+
+}  // namespace dsg::ingest

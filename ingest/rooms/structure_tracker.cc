@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "ingest/rooms/structure.h"
+
+namespace dsg::ingest {
+namespace {
+
+/// A piece goes on as one of the same class whose plane is this near and whose box touches it.
+constexpr double kCosine = 0.966;
+constexpr double kOffM = 0.2;
+constexpr double kApartM = 0.3;
+
+bool MayContinue(const StructurePiece& old, const StructurePiece& now) {
+  if (old.type != now.type || old.class_id != now.class_id) return false;
+  if (old.box_map.isEmpty() || now.box_map.isEmpty()) return false;
+  if (old.box_map.exteriorDistance(now.box_map) > kApartM) return false;
+  if (now.type == "pillar") return true;
+  if (old.normal_map.dot(now.normal_map) < kCosine) return false;
+  return std::abs(old.normal_map.dot(now.box_map.center()) + old.offset_m) <= kOffM;
+}
+
+// How much of the smaller of two boxes is in both, edges that are too thin made thicker.
+double Overlap(const Box3d& a, const Box3d& b) {
+  const auto thick = [](Box3d box) {
+    box.min().array() -= 0.5 * kApartM;
+    box.max().array() += 0.5 * kApartM;
+    return box;
+  };
+  const Box3d shared = thick(a).intersection(thick(b));
+  return shared.isEmpty() ? 0.0 : shared.volume();
+}
+
+}  // namespace
+
+void StructureTracker::Track(std::vector<StructurePiece>* pieces) {
+  std::vector<std::tuple<double, size_t, size_t>> pairs;
+  for (size_t i = 0; i < last_.size(); ++i) {
+    for (size_t j = 0; j < pieces->size(); ++j) {
+      if (!MayContinue(last_[i], (*pieces)[j])) continue;
+      pairs.emplace_back(-Overlap(last_[i].box_map, (*pieces)[j].box_map), i, j);
+    }
+  }
+  std::sort(pairs.begin(), pairs.end());
+  for (StructurePiece& piece : *pieces) piece.id = -1;
+  std::vector<bool> is_taken(last_.size(), false);
+  for (const auto& [negative_overlap, old, now] : pairs) {
+    if (is_taken[old] || (*pieces)[now].id >= 0) continue;
+    is_taken[old] = true;
+    (*pieces)[now].id = last_[old].id;
+  }
+  for (StructurePiece& piece : *pieces) {
+    if (piece.id < 0) piece.id = next_id_++;
+  }
+  last_ = *pieces;
+  // The older piece wins ties, whatever the order of the pieces.
+  std::sort(last_.begin(), last_.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
+}
+
+}  // namespace dsg::ingest
