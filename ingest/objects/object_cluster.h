@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// Objects of unknown shape: pieces of the labelled mesh that hang together.
+// Refuses to guess what nobody has seen, but for the way from an object down to the floor.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "schema/model/geometry.h"
+#include "schema/model/mesh.h"
+#include "schema/model/node.h"
+
+namespace dsg::ingest {
+
+struct ClusterOptions {
+  double voxel_m = 0.1;
+  /// RSS 2020: twice the voxel; 0 = that.
+  double tolerance_m = 0.0;
+  /// In vertices of the mesh, thinned to one a voxel.
+  int point_count_min = 8;
+  /// Classes that are objects: everything but structures and people.
+  std::vector<int32_t> class_ids;
+  /// Height of the floor that objects stand on; empty = from the horizontal surfaces of the mesh
+  /// that are no objects, storey by storey.
+  std::optional<double> floor_z_m;
+};
+
+struct ObjectCluster {
+  int32_t class_id = -1;
+  /// The mesh instance that most of its points have; 0 = none.
+  uint32_t instance_id = 0;
+  /// Thinned surface points, sorted; enough to fit a shape to.
+  std::vector<Eigen::Vector3f> points_map;
+  /// Middle of the box of the points, extended to what it stands on.
+  Eigen::Vector3d center_map = Eigen::Vector3d::Zero();
+  /// Mean of the points, the paper's position.
+  Eigen::Vector3d centroid_map = Eigen::Vector3d::Zero();
+  /// Upright box with the least footprint: pose of its centre (yaw only) and edge lengths.
+  Pose3d map_T_box;
+  Eigen::Vector3d size = Eigen::Vector3d::Zero();
+  Color color{};
+};
+
+/// Vertices without faces will do. Blocks whose labels have a wrong length are ignored; options
+/// that make no sense (a voxel of 0) find nothing.
+///
+/// Order: ascending by class, then by position; the same mesh gives the same clusters, whatever the
+/// order of its blocks.
+/// Source: RSS 2020, section IV-B (Euclidean clustering, PCL); instances split and join clusters.
+std::vector<ObjectCluster> FindClusters(const std::vector<const MeshBlock*>& mesh,
+                                        const ClusterOptions& options);
+
+}  // namespace dsg::ingest

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// Keeps the identity of objects from one look at the mesh to the next.
+// Refuses to forget an object only because nobody looked at it.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "ingest/objects/object_cluster.h"
+#include "schema/base/time.h"
+
+namespace dsg::ingest {
+
+struct TrackedObject {
+  /// Never given twice in a run.
+  int64_t id = -1;
+  ObjectCluster cluster;
+  TimeNs first_observed_ns = 0;
+  /// Of the last update that brought other points.
+  TimeNs last_observed_ns = 0;
+  /// Updates in which it changed.
+  int64_t observation_count = 0;
+};
+
+/// What an update did, by id.
+struct ObjectChanges {
+  std::vector<int64_t> added;
+  std::vector<int64_t> changed;
+  /// Parts of one thing that turned out to be one: `first` goes on as `second`.
+  std::vector<std::pair<int64_t, int64_t>> merged;
+  /// No longer there: its space has been seen through.
+  std::vector<int64_t> gone;
+};
+
+/// Threads: one caller at a time.
+class ObjectTracker {
+ public:
+  /// Matches clusters with the known objects by instance, class and overlap of boxes. An object
+  /// without a cluster is gone if `is_seen_through(point)` holds for most of its points, and
+  /// stays as it is otherwise. Too small a change of pose or box is no change. An object whose
+  /// points a cluster of another object has taken over is merged into that one.
+  /// Cost: known objects times clusters, in boxes.
+  ObjectChanges Update(std::vector<ObjectCluster> clusters, TimeNs time_ns,
+                       const std::function<bool(const Eigen::Vector3f&)>& is_seen_through);
+
+  /// Ascending by id.
+  const std::vector<TrackedObject>& objects() const { return objects_; }
+
+ private:
+  struct Assignment;
+  Assignment Assign(std::vector<ObjectCluster> clusters, TimeNs time_ns, ObjectChanges* changes);
+  void Refresh(size_t object, ObjectCluster cluster, TimeNs time_ns, ObjectChanges* changes);
+  void Retire(const Assignment& assignment,
+              const std::function<bool(const Eigen::Vector3f&)>& is_seen_through,
+              ObjectChanges* changes);
+
+  std::vector<TrackedObject> objects_;
+  /// By id: which points the latest cluster had.
+  std::map<int64_t, uint64_t> digests_;
+  int64_t next_id_ = 0;
+};
+
+}  // namespace dsg::ingest
