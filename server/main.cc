@@ -38,7 +38,7 @@ void DeclareFlags(CLI::App* app, Flags* flags) {
                   "Calls at a time; more are refused with RESOURCE_EXHAUSTED")
       ->capture_default_str();
   app->add_option("--max-streams", flags->options.open_stream_max,
-                  "Trajectory streams open at a time; more are refused")
+                  "Streams (tracks, meshes) open at a time; more are refused")
       ->capture_default_str();
   app->add_option("--log-level", flags->log_level,
                   "debug (a line a call), info (errors and calls over 100 ms), warning, error")

@@ -19,7 +19,7 @@ struct ServerOptions {
   /// Calls queued and running at a time; more are refused at once.
   int in_flight_max = 256;
   /// Streams open at a time, whether they are written to or wait for their reader. Each holds one
-  /// message of at most 1000 poses, and what gRPC buffers.
+  /// message of at most 1000 poses or a mesh block, and what gRPC buffers.
   int open_stream_max = 128;
   /// Listen on addresses that other machines can reach.
   bool allow_remote = false;

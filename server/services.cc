@@ -6,7 +6,7 @@
 #include "dsg/v1/ingest_service.grpc.pb.h"
 #include "dsg/v1/map_service.grpc.pb.h"
 #include "dsg/v1/query_service.grpc.pb.h"
-#include "server/trajectory_call.h"
+#include "server/stream_call.h"
 #include "server/unary_call.h"
 
 namespace dsg::server {
@@ -64,7 +64,8 @@ class QueryService final : public v1::QueryService::CallbackService {
   }
   grpc::ServerWriteReactor<v1::GetTrajectoryResponse>* GetTrajectory(
       CallbackServerContext* context, const v1::GetTrajectoryRequest* request) override {
-    return StartTrajectory(runtime_, context, request);
+    return StartStream(runtime_, "GetTrajectory", &query::ServiceCore::OpenTrajectory, context,
+                       request);
   }
   ServerUnaryReactor* ListPresence(CallbackServerContext* context,
                                    const v1::ListPresenceRequest* request,
@@ -88,6 +89,10 @@ class QueryService final : public v1::QueryService::CallbackService {
                                        v1::ListNearestNodesResponse* reply) override {
     return StartUnary(runtime_, "ListNearestNodes", &Api::ListNearestNodes, context, request,
                       reply);
+  }
+  grpc::ServerWriteReactor<v1::GetMeshResponse>* GetMesh(
+      CallbackServerContext* context, const v1::GetMeshRequest* request) override {
+    return StartStream(runtime_, "GetMesh", &query::ServiceCore::OpenMesh, context, request);
   }
 
  private:

@@ -40,7 +40,7 @@ int64_t RevisionOf(const Reply& reply) {
   }
 }
 
-/// Entries of a list; 1 for replies that are no list.
+/// Entries of a list or of a stream's message; 1 for replies that are no list.
 template <typename Reply>
 int64_t RowCountOf(const Reply& reply) {
   if constexpr (requires { reply.results_size(); }) {
@@ -55,6 +55,10 @@ int64_t RowCountOf(const Reply& reply) {
     return reply.revisions_size();
   } else if constexpr (requires { reply.maps_size(); }) {
     return reply.maps_size();
+  } else if constexpr (requires { reply.poses_size(); }) {
+    return reply.poses_size();
+  } else if constexpr (requires { reply.blocks_size(); }) {
+    return reply.blocks_size();
   } else {
     return 1;
   }

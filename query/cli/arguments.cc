@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "query/cli/export/top_view.h"
 #include "schema/base/status.h"
 
 namespace dsg::cli {
@@ -45,6 +46,7 @@ class Grammar {
   void AddNear();
   void AddMapVerbs();
   void AddStoreVerbs();
+  void AddFileVerbs();
 
   CLI::App app_{"Asks a store of dynamic scene graphs, or a server, where and when."};
   Command command_;
@@ -61,6 +63,8 @@ class Grammar {
   VersionVerb version_;
   VerifyVerb verify_;
   ImportVerb import_;
+  ExportVerb export_;
+  MapVerb map_;
 };
 
 constexpr char kTimeHelp[] =
@@ -77,6 +81,7 @@ Grammar::Grammar() {
   AddNear();
   AddMapVerbs();
   AddStoreVerbs();
+  AddFileVerbs();
 }
 
 CLI::App* Grammar::AddVerb(const std::string& name, const std::string& what, unsigned takes) {
@@ -180,6 +185,32 @@ void Grammar::AddStoreVerbs() {
   AddVerb("verify", "Check every page, row and revision of a map", kMap, &verify_);
 }
 
+void Grammar::AddFileVerbs() {
+  CLI::App* to_file =
+      AddVerb("export", "Write mesh and graph to files for 3D viewers", kQuestion, &export_);
+  to_file->add_option("--ply", export_.ply, "The mesh, binary PLY");
+  to_file->add_option("--graph-ply", export_.graph_ply, "The graph, PLY of points and lines");
+  to_file->add_option("--gltf", export_.gltf, "Mesh and graph, binary glTF 2.0 (.glb)");
+  to_file
+      ->add_option("--color", export_.color,
+                   "Mesh colours: rgb, label or instance; default rgb if there are any")
+      ->check(CLI::IsMember({"rgb", "label", "instance"}));
+  to_file->add_option("--at", export_.at, "The world at this TIME; default what has not ended");
+  to_file->add_flag("--force", export_.force, "Replace files that are there");
+  to_file->footer(kTimeHelp);
+
+  CLI::App* map = AddVerb("map", "Draw a map from above", kQuestion, &map_);
+  map->add_option("--png", map_.png, "The picture to write")->required();
+  map->add_option("--floor", map_.floor,
+                  "Only this floor: a level or room by id or name, or a height in metres");
+  map->add_option("--width", map_.width_px, "Pixels; the height follows")
+      ->check(CLI::Range(kTopViewWidthMin, kTopViewWidthMax))
+      ->capture_default_str();
+  map->add_option("--at", map_.at, "The world at this TIME; default what has not ended");
+  map->add_flag("--force", map_.force, "Replace a file that is there");
+  map->footer(kTimeHelp);
+}
+
 absl::Status Usage(const std::string& message) {
   return absl::InvalidArgumentError(absl::StrCat(message, "; see dsg --help"));
 }
@@ -251,6 +282,11 @@ absl::StatusOr<Command> ParseArguments(const std::vector<std::string>& arguments
   const auto* who = std::get_if<WhoVerb>(&command.verb);
   if (who != nullptr && who->room.empty() && who->box.empty()) {
     return Usage("who asks about one place: give --room ID or --box X0,Y0,Z0,X1,Y1,Z1");
+  }
+  const auto* to_file = std::get_if<ExportVerb>(&command.verb);
+  if (to_file != nullptr && to_file->ply.empty() && to_file->graph_ply.empty() &&
+      to_file->gltf.empty()) {
+    return Usage("export writes files: give --ply FILE, --graph-ply FILE or --gltf FILE");
   }
   return command;
 }

@@ -103,14 +103,34 @@ struct ImportVerb {
   std::string file;
 };
 
+struct ExportVerb {
+  /// Files to write; at least one is set.
+  std::string ply;
+  std::string graph_ply;
+  std::string gltf;
+  /// "rgb", "label", "instance"; empty = rgb if the mesh has it, else label.
+  std::string color;
+  std::string at;
+  bool force = false;
+};
+
+struct MapVerb {
+  std::string png;
+  /// A level or room by id or name, or a height; empty = all floors.
+  std::string floor;
+  int width_px = 1600;
+  std::string at;
+  bool force = false;
+};
+
 /// The user asked how to use the program.
 struct HelpVerb {
   std::string text;
 };
 
-using Verb =
-    std::variant<WhereVerb, TrackVerb, WhoVerb, ListVerb, EdgesVerb, ShowVerb, NearVerb, LogVerb,
-                 StatsVerb, MapsVerb, VersionVerb, VerifyVerb, ImportVerb, HelpVerb>;
+using Verb = std::variant<WhereVerb, TrackVerb, WhoVerb, ListVerb, EdgesVerb, ShowVerb, NearVerb,
+                          LogVerb, StatsVerb, MapsVerb, VersionVerb, VerifyVerb, ImportVerb,
+                          ExportVerb, MapVerb, HelpVerb>;
 
 struct Command {
   CommonOptions common;

@@ -58,6 +58,10 @@ class Dispatcher {
   absl::Status Ask(Session* session, const NearVerb& verb) { return RunNear(session, verb, out_); }
   absl::Status Ask(Session* session, const LogVerb&) { return RunLog(session, out_); }
   absl::Status Ask(Session* session, const StatsVerb&) { return RunStats(session, out_); }
+  absl::Status Ask(Session* session, const ExportVerb& verb) {
+    return RunExport(session, verb, out_);
+  }
+  absl::Status Ask(Session* session, const MapVerb& verb) { return RunMap(session, verb, out_); }
 
   const Command& command_;
   const Environment& environment_;

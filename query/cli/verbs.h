@@ -30,6 +30,16 @@ absl::Status RunMaps(Session* session, std::ostream& out);
 absl::Status RunVersion(const CommonOptions& common, const Environment& environment,
                         std::ostream& out);
 
+// Files to look at: verbs_export.cc. Require that the session's map is chosen.
+
+/// Writes mesh and graph as PLY or glTF.
+///
+/// Errors: FIELD_INVALID for a file that is there already; RESOURCE_EXHAUSTED/DISK_FULL, and then
+/// nothing stands under the file's name.
+absl::Status RunExport(Session* session, const ExportVerb& verb, std::ostream& out);
+/// Draws the map from above. Errors: as RunExport; NOT_FOUND/NODE_UNKNOWN for the floor.
+absl::Status RunMap(Session* session, const MapVerb& verb, std::ostream& out);
+
 /// Commits a scene-graph file to a map of a store, both made if missing. The same file again adds
 /// nothing; an interrupted import goes on where it stopped.
 ///

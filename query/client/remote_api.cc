@@ -20,7 +20,8 @@ using query::CallContext;
 using QueryStub = v1::QueryService::Stub;
 using MapStub = v1::MapService::Stub;
 using IngestStub = v1::IngestService::Stub;
-using SendTrajectory = std::function<bool(const v1::GetTrajectoryResponse&)>;
+template <class Reply>
+using Send = std::function<bool(const Reply&)>;
 
 class RemoteApi final : public query::Api {
  public:
@@ -41,7 +42,9 @@ class RemoteApi final : public query::Api {
     return Read(call, &query_, &QueryStub::PrepareAsyncBatchLocateAgents, request, reply);
   }
   absl::Status GetTrajectory(const CallContext& call, const v1::GetTrajectoryRequest& request,
-                             const SendTrajectory& send) override;
+                             const Send<v1::GetTrajectoryResponse>& send) override {
+    return Stream(call, &QueryStub::PrepareAsyncGetTrajectory, request, send);
+  }
   absl::Status ListPresence(const CallContext& call, const v1::ListPresenceRequest& request,
                             v1::ListPresenceResponse* reply) override {
     return Read(call, &query_, &QueryStub::PrepareAsyncListPresence, request, reply);
@@ -61,6 +64,10 @@ class RemoteApi final : public query::Api {
   absl::Status ListNearestNodes(const CallContext& call, const v1::ListNearestNodesRequest& request,
                                 v1::ListNearestNodesResponse* reply) override {
     return Read(call, &query_, &QueryStub::PrepareAsyncListNearestNodes, request, reply);
+  }
+  absl::Status GetMesh(const CallContext& call, const v1::GetMeshRequest& request,
+                       const Send<v1::GetMeshResponse>& send) override {
+    return Stream(call, &QueryStub::PrepareAsyncGetMesh, request, send);
   }
 
   // Not retried: whether the map was made is unknown, and a second try would say MAP_EXISTS.
@@ -104,9 +111,17 @@ class RemoteApi final : public query::Api {
     return RetryRead(call, [&] { return CallOnce(call, address_, stub, prepare, request, reply); });
   }
 
+  template <class Request, class Reply>
+  using PrepareStream = std::unique_ptr<grpc::ClientAsyncReader<Reply>> (QueryStub::*)(
+      grpc::ClientContext*, const Request&, grpc::CompletionQueue*);
+
+  template <class Request, class Reply>
+  absl::Status Stream(const CallContext& call, PrepareStream<Request, Reply> prepare,
+                      const Request& request, const Send<Reply>& send);
   // Sets `started` once a message has reached `send`: from then on a repeat would send it twice.
-  absl::Status StreamOnce(const CallContext& call, const v1::GetTrajectoryRequest& request,
-                          const SendTrajectory& send, bool* started);
+  template <class Request, class Reply>
+  absl::Status StreamOnce(const CallContext& call, PrepareStream<Request, Reply> prepare,
+                          const Request& request, const Send<Reply>& send, bool* started);
 
   const std::string address_;
   const std::shared_ptr<grpc::Channel> channel_;
@@ -115,13 +130,14 @@ class RemoteApi final : public query::Api {
   IngestStub ingest_;
 };
 
-absl::Status RemoteApi::StreamOnce(const CallContext& call, const v1::GetTrajectoryRequest& request,
-                                   const SendTrajectory& send, bool* started) {
+template <class Request, class Reply>
+absl::Status RemoteApi::StreamOnce(const CallContext& call, PrepareStream<Request, Reply> prepare,
+                                   const Request& request, const Send<Reply>& send, bool* started) {
   CallInFlight flight(call, address_);
-  auto rpc = query_.PrepareAsyncGetTrajectory(flight.context(), request, flight.queue());
+  auto rpc = (query_.*prepare)(flight.context(), request, flight.queue());
   rpc->StartCall(flight.tag());
   bool stopped = false;
-  v1::GetTrajectoryResponse message;
+  Reply message;
   if (flight.Wait()) {
     for (rpc->Read(&message, flight.tag()); flight.Wait(); rpc->Read(&message, flight.tag())) {
       *started = true;
@@ -139,13 +155,13 @@ absl::Status RemoteApi::StreamOnce(const CallContext& call, const v1::GetTraject
   return stopped ? absl::OkStatus() : flight.Outcome(status);
 }
 
-absl::Status RemoteApi::GetTrajectory(const CallContext& call,
-                                      const v1::GetTrajectoryRequest& request,
-                                      const SendTrajectory& send) {
+template <class Request, class Reply>
+absl::Status RemoteApi::Stream(const CallContext& call, PrepareStream<Request, Reply> prepare,
+                               const Request& request, const Send<Reply>& send) {
   bool started = false;
   absl::Status broken;
   const absl::Status status = RetryRead(call, [&] {
-    broken = StreamOnce(call, request, send, &started);
+    broken = StreamOnce(call, prepare, request, send, &started);
     return started ? absl::OkStatus() : broken;
   });
   return started ? broken : status;

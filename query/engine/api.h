@@ -18,6 +18,8 @@ class CreateMapRequest;
 class CreateMapResponse;
 class GetMapStatsRequest;
 class GetMapStatsResponse;
+class GetMeshRequest;
+class GetMeshResponse;
 class GetNodeRequest;
 class GetNodeResponse;
 class GetServerInfoRequest;
@@ -70,6 +72,9 @@ class Api {
   virtual absl::Status ListNearestNodes(const CallContext& call,
                                         const v1::ListNearestNodesRequest& request,
                                         v1::ListNearestNodesResponse* reply) = 0;
+  /// As GetTrajectory.
+  virtual absl::Status GetMesh(const CallContext& call, const v1::GetMeshRequest& request,
+                               const std::function<bool(const v1::GetMeshResponse&)>& send) = 0;
 
   virtual absl::Status CreateMap(const CallContext& call, const v1::CreateMapRequest& request,
                                  v1::CreateMapResponse* reply) = 0;

@@ -10,6 +10,7 @@
 #include "query/engine/locate.h"
 #include "query/engine/map_table.h"
 #include "query/engine/maps.h"
+#include "query/engine/mesh.h"
 #include "query/engine/nearest.h"
 #include "query/engine/nodes.h"
 #include "query/engine/page_token.h"
@@ -50,12 +51,20 @@ class LocalCore final : public ServiceCore {
       const std::function<bool(const v1::GetTrajectoryResponse&)>& send) override {
     DSG_RETURN_IF_ERROR(call.Check());
     DSG_ASSIGN_OR_RETURN(const std::unique_ptr<TrajectoryCursor> cursor, OpenTrajectory(request));
-    v1::GetTrajectoryResponse message;
-    do {
-      message.Clear();
-      DSG_RETURN_IF_ERROR(cursor->Next(call, &message));
-    } while (send(message) && !cursor->done());
-    return absl::OkStatus();
+    return SendAll(call, cursor.get(), send);
+  }
+
+  absl::StatusOr<std::unique_ptr<MeshCursor>> OpenMesh(const v1::GetMeshRequest& request) override {
+    DSG_ASSIGN_OR_RETURN(const ReadView view,
+                         ReadView::Open(&maps_, request.map(), request.read_at()));
+    return query::OpenMesh(view, request);
+  }
+
+  absl::Status GetMesh(const CallContext& call, const v1::GetMeshRequest& request,
+                       const std::function<bool(const v1::GetMeshResponse&)>& send) override {
+    DSG_RETURN_IF_ERROR(call.Check());
+    DSG_ASSIGN_OR_RETURN(const std::unique_ptr<MeshCursor> cursor, OpenMesh(request));
+    return SendAll(call, cursor.get(), send);
   }
 
   absl::Status ListPresence(const CallContext& call, const v1::ListPresenceRequest& request,
@@ -139,6 +148,17 @@ class LocalCore final : public ServiceCore {
   absl::StatusOr<ReadView> Open(const CallContext& call, const Request& request) {
     DSG_RETURN_IF_ERROR(call.Check());
     return ReadView::Open(&maps_, request.map(), request.read_at());
+  }
+
+  template <typename Reply>
+  static absl::Status SendAll(const CallContext& call, StreamCursor<Reply>* cursor,
+                              const std::function<bool(const Reply&)>& send) {
+    Reply message;
+    do {
+      message.Clear();
+      DSG_RETURN_IF_ERROR(cursor->Next(call, &message));
+    } while (send(message) && !cursor->done());
+    return absl::OkStatus();
   }
 
   template <typename Request>

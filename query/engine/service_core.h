@@ -11,19 +11,23 @@
 
 namespace dsg::query {
 
-/// A trajectory read one message at a time, for whoever cannot wait inside a callback.
+/// A stream read one message at a time, for whoever cannot wait inside a callback.
 ///
 /// Threads: one caller at a time. Holds no lock and no thread between two messages.
-class TrajectoryCursor {
+template <class Reply>
+class StreamCursor {
  public:
-  virtual ~TrajectoryCursor() = default;
+  virtual ~StreamCursor() = default;
 
   /// Fills `reply`, which must be clear, with the next message of the stream: the first has the
-  /// header, also when there is no pose in the interval.
-  virtual absl::Status Next(const CallContext& call, v1::GetTrajectoryResponse* reply) = 0;
+  /// header, also when there is nothing else to tell.
+  virtual absl::Status Next(const CallContext& call, Reply* reply) = 0;
   /// No message follows. May only be asked after Next.
   virtual bool done() const = 0;
 };
+
+using TrajectoryCursor = StreamCursor<v1::GetTrajectoryResponse>;
+using MeshCursor = StreamCursor<v1::GetMeshResponse>;
 
 /// An Api in this process.
 class ServiceCore : public Api {
@@ -31,6 +35,9 @@ class ServiceCore : public Api {
   /// GetTrajectory by pulling. Errors: those of GetTrajectory.
   virtual absl::StatusOr<std::unique_ptr<TrajectoryCursor>> OpenTrajectory(
       const v1::GetTrajectoryRequest& request) = 0;
+  /// GetMesh by pulling. Errors: those of GetMesh.
+  virtual absl::StatusOr<std::unique_ptr<MeshCursor>> OpenMesh(
+      const v1::GetMeshRequest& request) = 0;
 };
 
 /// Makes an Api that answers from `store`. Writers are opened at the first Commit to a map and kept

@@ -44,6 +44,24 @@ class Answers(support.ProgramsTest):
         cls.truth = truth_by_agent(cls.path("office", "truth", "tracks.csv"))
         cls.epoch_ns = int(cls.ask("maps", "--store", "store")["maps"][0]["epoch_ns"])
 
+    def test_files_from_store_and_server_are_the_same(self):
+        def files(place, *where):
+            options = []
+            for option, name in (("--ply", "m.ply"), ("--graph-ply", "g.ply"),
+                                 ("--gltf", "a.glb")):
+                options += [option, f"{place}-{name}"]
+            self.ok("dsg", "export", *options, *where, "--map", "office")
+            self.ok("dsg", "map", "--png", f"{place}-a.png", *where, "--map", "office")
+            content = []
+            for name in ("m.ply", "g.ply", "a.glb", "a.png"):
+                with open(self.path(f"{place}-{name}"), "rb") as file:
+                    content.append(file.read())
+            return content
+
+        local = files("store", "--store", "store")
+        with self.server("store", "unix:dsg.sock"):
+            self.assertEqual(local, files("server", "--server", "unix:dsg.sock"))
+
     def test_store_and_server_answer_with_the_same_bytes(self):
         agent = sorted(self.truth)[0]
         questions = [["where", agent, "--at", "+30s"], ["where", agent, "--at", "+61.25s"],

@@ -78,6 +78,14 @@ class HeldCore final : public query::ServiceCore {
       const std::function<bool(const v1::GetTrajectoryResponse&)>& send) override {
     return core_->GetTrajectory(call, request, send);
   }
+  absl::StatusOr<std::unique_ptr<query::MeshCursor>> OpenMesh(
+      const v1::GetMeshRequest& request) override {
+    return core_->OpenMesh(request);
+  }
+  absl::Status GetMesh(const CallContext& call, const v1::GetMeshRequest& request,
+                       const std::function<bool(const v1::GetMeshResponse&)>& send) override {
+    return core_->GetMesh(call, request, send);
+  }
 
 // Passed on as they are.
 #define DSG_PASS_ON(Method)                                                        \

@@ -111,6 +111,47 @@ TEST_F(Rpc, StreamsATrajectory) {
   EXPECT_EQ(message_count, 21);
 }
 
+TEST_F(Rpc, StreamsTheMesh) {
+  // More than one message: a sheet of 40,000 vertices in one block.
+  grpc::ClientContext commit_context;
+  v1::CommitRequest commit;
+  commit.mutable_delta()->set_map(kMap);
+  commit.mutable_delta()->set_session_id("mesh");
+  commit.mutable_delta()->set_sequence(1);
+  v1::MeshBlock* block = commit.mutable_delta()->add_mesh_blocks();
+  for (int i = 0; i < 40'000; ++i) {
+    for (const float value :
+         {0.01f * static_cast<float>(i % 200), 1e-5f * static_cast<float>(i), 0.f}) {
+      block->add_positions(value);
+    }
+    block->add_last_seen_ns(1'000'000'000'000'000'000 + i);
+  }
+  for (const uint32_t vertex : {0u, 1u, 39'999u}) block->add_faces(vertex);
+  v1::CommitResponse committed;
+  const grpc::Status status = ingest_->Commit(&commit_context, commit, &committed);
+  ASSERT_TRUE(status.ok()) << status.error_message();
+
+  grpc::ClientContext context;
+  v1::GetMeshRequest request;
+  request.set_map(kMap);
+  const auto reader = query_->GetMesh(&context, request);
+  v1::GetMeshResponse message;
+  int message_count = 0;
+  int vertex_count = 0;
+  int face_count = 0;
+  while (reader->Read(&message)) {
+    EXPECT_EQ(message.has_header(), message_count++ == 0);
+    for (const v1::MeshBlock& piece : message.blocks()) {
+      vertex_count += piece.positions_size() / 3;
+      face_count += piece.faces_size() / 3;
+    }
+  }
+  EXPECT_TRUE(reader->Finish().ok());
+  EXPECT_EQ(vertex_count, 40'000);
+  EXPECT_EQ(face_count, 1);
+  EXPECT_GE(message_count, 1);
+}
+
 TEST_F(Rpc, AnswersPresenceNodesEdgesAndNearest) {
   grpc::ClientContext presence_context;
   v1::ListPresenceRequest presence;

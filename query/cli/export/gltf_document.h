@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+// A glTF 2.0 file in the making, and its binary form (.glb).
+// Refuses to know what it shows; only what the format needs of it is here.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "query/cli/export/output_file.h"
+
+namespace dsg::cli {
+
+// Source: Khronos glTF 2.0 specification, sections 3.6 (buffers), 3.7 (geometry), 4.4 (.glb).
+
+/// What indices of the document's parts are when there is none.
+inline constexpr int kNone = -1;
+
+enum class GltfMode { kLines = 1, kTriangles = 4 };
+
+struct GltfPrimitive {
+  /// Accessors.
+  int positions = kNone;
+  int normals = kNone;
+  int colors = kNone;
+  int indices = kNone;
+  int material = kNone;
+  GltfMode mode = GltfMode::kTriangles;
+};
+
+struct GltfMesh {
+  std::string name;
+  std::vector<GltfPrimitive> primitives;
+};
+
+struct GltfMaterial {
+  std::string name;
+  /// 0xRRGGBB as seen on a screen.
+  uint32_t rgb = 0xffffff;
+  /// Shown in just this colour, whatever the light: for lines.
+  bool is_unlit = false;
+};
+
+struct GltfNode {
+  std::string name;
+  int mesh = kNone;
+  std::vector<int> children;
+  std::optional<Eigen::Vector3d> translation;
+  std::optional<Eigen::Quaterniond> rotation;
+  std::optional<Eigen::Vector3d> scale;
+  /// Texts beside the name.
+  std::vector<std::pair<std::string, std::string>> extras;
+};
+
+/// The parts may be changed freely before Write; geometry is only added.
+class GltfDocument {
+ public:
+  std::vector<GltfNode> nodes;
+  std::vector<GltfMesh> meshes;
+  std::vector<GltfMaterial> materials;
+  /// The nodes that are no other's children.
+  std::vector<int> roots;
+
+  int AddNode(GltfNode node);
+  int AddMesh(GltfMesh mesh);
+  int AddMaterial(GltfMaterial material);
+
+  /// Each returns an accessor. Requires: not empty; normals are unit.
+  int AddPositions(const std::vector<Eigen::Vector3f>& points);
+  int AddNormals(const std::vector<Eigen::Vector3f>& normals);
+  /// 0xRRGGBB as seen on a screen.
+  int AddColors(const std::vector<uint32_t>& colors);
+  int AddIndices(const std::vector<uint32_t>& indices);
+
+  /// The whole file. Errors: as OutputFile::Write; RESOURCE_EXHAUSTED/LIMIT_EXCEEDED for more than
+  /// the 4 GiB that the format can hold.
+  absl::Status Write(OutputFile* file) const;
+
+ private:
+  struct Accessor {
+    size_t offset = 0;
+    size_t byte_length = 0;
+    size_t count = 0;
+    /// 5123 = unsigned short, 5125 = unsigned int, 5126 = float.
+    int component_type = 0;
+    const char* type = "";
+    bool is_normalized = false;
+    /// 34962 = vertices, 34963 = indices.
+    int target = 0;
+    /// Of positions only; empty for others.
+    std::vector<float> low;
+    std::vector<float> high;
+  };
+
+  int AddAccessor(const void* data, size_t byte_length, Accessor accessor);
+  std::string MakeJson() const;
+
+  std::vector<Accessor> accessors_;
+  std::string buffer_;
+};
+
+}  // namespace dsg::cli

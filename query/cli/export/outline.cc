@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/cli/export/outline.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace dsg::cli {
+namespace {
+
+double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
+// One side of the hull over points in order of x.
+template <class Iterator>
+void AddChain(Iterator begin, Iterator end, Polygon2d* hull) {
+  const size_t first = hull->size();
+  for (Iterator it = begin; it != end; ++it) {
+    while (hull->size() >= first + 2 &&
+           Cross(hull->back() - hull->end()[-2], *it - hull->back()) <= 0.0) {
+      hull->pop_back();
+    }
+    hull->push_back(*it);
+  }
+  // It begins the next chain.
+  hull->pop_back();
+}
+
+// Floor, ceiling, and a line up at each corner.
+Wire PrismWire(const RegionInfo& region) {
+  Wire wire;
+  const auto count = static_cast<uint32_t>(region.footprint_map.size());
+  for (uint32_t i = 0; i < count; ++i) {
+    const Eigen::Vector2d& corner = region.footprint_map[i];
+    const uint32_t next = i + 1 == count ? 0 : i + 1;
+    wire.points.emplace_back(corner.x(), corner.y(), region.z_min_m);
+    wire.points.emplace_back(corner.x(), corner.y(), region.z_max_m);
+    wire.lines.push_back({2 * i, 2 * next});
+    wire.lines.push_back({2 * i + 1, 2 * next + 1});
+    wire.lines.push_back({2 * i, 2 * i + 1});
+  }
+  return wire;
+}
+
+}  // namespace
+
+std::array<Eigen::Vector3d, 8> BoxCorners(const Node& node) {
+  std::array<Eigen::Vector3d, 8> corners;
+  const Box3d& box = node.box_node;
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::Vector3d corner((i & 1 ? box.max() : box.min()).x(),
+                                 (i & 2 ? box.max() : box.min()).y(),
+                                 (i & 4 ? box.max() : box.min()).z());
+    corners[static_cast<size_t>(i)] = node.map_T_node * corner;
+  }
+  return corners;
+}
+
+Wire WireOf(const Node& node) {
+  if (node.region.has_value() && node.region->footprint_map.size() >= 3) {
+    return PrismWire(*node.region);
+  }
+  Wire wire;
+  if (node.box_node.isEmpty()) return wire;
+  const std::array<Eigen::Vector3d, 8> corners = BoxCorners(node);
+  wire.points.assign(corners.begin(), corners.end());
+  for (uint32_t corner = 0; corner < corners.size(); ++corner) {
+    for (const uint32_t axis : {1u, 2u, 4u}) {
+      if ((corner & axis) == 0) wire.lines.push_back({corner, corner | axis});
+    }
+  }
+  return wire;
+}
+
+Polygon2d ConvexHull(Polygon2d points) {
+  const auto less = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+    return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
+  };
+  std::sort(points.begin(), points.end(), less);
+  points.erase(std::unique(points.begin(), points.end()), points.end());
+  if (points.size() < 3) return points;
+  Polygon2d hull;
+  AddChain(points.begin(), points.end(), &hull);
+  AddChain(points.rbegin(), points.rend(), &hull);
+  return hull;
+}
+
+Polygon2d FloorOutline(const Node& node) {
+  if (node.region.has_value() && node.region->footprint_map.size() >= 3) {
+    return node.region->footprint_map;
+  }
+  if (node.box_node.isEmpty()) return {};
+  Polygon2d points;
+  for (const Eigen::Vector3d& corner : BoxCorners(node)) points.push_back(corner.head<2>());
+  return ConvexHull(std::move(points));
+}
+
+double AreaOf(const Polygon2d& polygon) {
+  double twice = 0.0;
+  for (size_t i = 0; i < polygon.size(); ++i) {
+    twice += Cross(polygon[i], polygon[i + 1 == polygon.size() ? 0 : i + 1]);
+  }
+  return 0.5 * std::abs(twice);
+}
+
+}  // namespace dsg::cli

@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/cli/export/top_view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "absl/strings/str_cat.h"
+#include "query/cli/export/floor_view.h"
+#include "query/cli/export/outline.h"
+#include "query/cli/export/palette.h"
+#include "query/cli/export/top_view_labels.h"
+#include "query/cli/export/top_view_mesh.h"
+#include "query/cli/table.h"
+#include "schema/base/check.h"
+#include "schema/picture/font.h"
+
+namespace dsg::cli {
+namespace {
+
+using Box2d = Eigen::AlignedBox2d;
+using picture::Canvas;
+using picture::LabelLayout;
+using picture::MakePaint;
+using picture::Paint;
+
+// Pixels of the canvas, which is halved at the end.
+constexpr double kMarginPx = 60.0;
+constexpr double kTitlePx = 70.0;
+constexpr double kFooterPx = 80.0;
+constexpr double kTextDotPx = 4.0;
+constexpr double kTextHeightPx = kTextDotPx * picture::kGlyphHeightDots;
+// What is smaller than this is drawn as large as this.
+constexpr double kMapSizeMinM = 2.0;
+
+constexpr uint32_t kPaperRgb = 0xfbfaf7;
+constexpr uint32_t kInkRgb = 0x2b2f3a;
+constexpr uint32_t kWallRgb = 0x3d4250;
+constexpr uint32_t kGlassRgb = 0x8fd0ea;
+constexpr uint32_t kGroundRgb = 0xefede6;
+
+std::string StructureType(const Node& node) {
+  if (node.structure.has_value() && !node.structure->structure_type.empty()) {
+    return node.structure->structure_type;
+  }
+  return node.class_name;
+}
+
+// Everything that is drawn at its own place.
+Box2d BoundsOf(const MapContent& content) {
+  Box2d bounds;
+  for (const Node& node : content.nodes) {
+    if (IsAgentKind(node.kind)) continue;
+    bounds.extend(Eigen::Vector2d(MiddleOf(node).head<2>()));
+    if (node.kind == kinds::kPlace) continue;
+    for (const Eigen::Vector2d& corner : FloorOutline(node)) bounds.extend(corner);
+  }
+  for (const Track& track : content.tracks) {
+    for (const auto& piece : track.pieces) {
+      for (const Eigen::Vector3d& point : piece) bounds.extend(Eigen::Vector2d(point.head<2>()));
+    }
+  }
+  for (const MeshBlock& block : content.mesh) {
+    for (const auto& face : block.faces) {
+      const Eigen::Vector3f& corner = block.positions_map[face[0]];
+      bounds.extend(Eigen::Vector2d(corner.head<2>().cast<double>()));
+    }
+  }
+  if (bounds.isEmpty()) bounds.extend(Eigen::Vector2d::Zero());
+  const Eigen::Vector2d lack =
+      (Eigen::Vector2d::Constant(kMapSizeMinM) - bounds.sizes()).cwiseMax(0.0);
+  return Box2d(bounds.min() - 0.5 * lack, bounds.max() + 0.5 * lack);
+}
+
+// The part of the canvas that the map may fill: all of its width, and a height that fits.
+Box2d AreaFor(const Box2d& bounds_map, int width_px) {
+  const double width = 2.0 * width_px - 2.0 * kMarginPx;
+  const double height_max =
+      std::min(4.0 * width_px, 2.0 * kTopViewWidthMax) - 2.0 * kMarginPx - kTitlePx - kFooterPx;
+  const double height = width * bounds_map.sizes().y() / bounds_map.sizes().x();
+  const Eigen::Vector2d low(kMarginPx, kMarginPx + kTitlePx);
+  return Box2d(low, low + Eigen::Vector2d(width, std::clamp(height, 60.0, height_max)));
+}
+
+void DrawGround(const MapContent& content, const FloorView& view, Canvas* canvas) {
+  for (const Node& node : content.nodes) {
+    if (node.kind != kinds::kStructure || StructureType(node) != "floor") continue;
+    canvas->FillPolygon(view.ToPixels(FloorOutline(node)), MakePaint(kGroundRgb));
+  }
+}
+
+void DrawRooms(const MapContent& content, const FloorView& view, Canvas* canvas) {
+  // Half transparent, since boxes of rooms without an outline overlap, and for a mesh below.
+  const float opacity = content.mesh.empty() ? 0.8f : 0.35f;
+  for (const Node& node : content.nodes) {
+    if (node.kind != kinds::kRoom) continue;
+    const Polygon2d outline = view.ToPixels(FloorOutline(node));
+    if (outline.size() < 3) {
+      canvas->FillCircle(view.ToPixel(MiddleOf(node)), 14.0, MakePaint(FloorColor(node)));
+      canvas->FillCircle(view.ToPixel(MiddleOf(node)), 6.0, MakePaint(LayerColor(node.layer)));
+      continue;
+    }
+    canvas->FillPolygon(outline, MakePaint(FloorColor(node), opacity));
+    canvas->DrawOutline(outline, 2.0, MakePaint(kWallRgb, 0.35f));
+  }
+}
+
+void DrawStructures(const MapContent& content, const FloorView& view, Canvas* canvas) {
+  for (const Node& node : content.nodes) {
+    if (node.kind != kinds::kStructure) continue;
+    const std::string type = StructureType(node);
+    if (type == "floor" || type == "ceiling") continue;
+    const Paint paint = MakePaint(type == "glass" || type == "window" ? kGlassRgb : kWallRgb);
+    const Polygon2d outline = view.ToPixels(FloorOutline(node));
+    canvas->FillPolygon(outline, paint);
+    // Walls may be planes without thickness.
+    canvas->DrawOutline(outline, 3.0, paint);
+  }
+}
+
+void DrawPlaces(const MapContent& content, const FloorView& view, Canvas* canvas) {
+  const auto nodes = NodesById(content);
+  for (const Edge& edge : content.edges) {
+    if (edge.relation != relations::kTraversable) continue;
+    canvas->DrawPolyline({view.ToPixel(MiddleOf(*nodes.at(edge.source))),
+                          view.ToPixel(MiddleOf(*nodes.at(edge.target)))},
+                         2.0, MakePaint(LayerColor(layers::kPlaces), 0.35f));
+  }
+  for (const Node& node : content.nodes) {
+    if (node.kind != kinds::kPlace) continue;
+    canvas->FillCircle(view.ToPixel(MiddleOf(node)), 5.0,
+                       MakePaint(LayerColor(layers::kPlaces), 0.7f));
+  }
+}
+
+// Kinds that the picture has no shape for: a dot each, so that nothing is left out unseen.
+void DrawOthers(const MapContent& content, const FloorView& view, Canvas* canvas) {
+  for (const Node& node : content.nodes) {
+    if (LayerOfKind(node.kind).has_value() || node.region.has_value()) continue;
+    canvas->FillCircle(view.ToPixel(MiddleOf(node)), 3.0, MakePaint(LayerColor(node.layer), 0.5f));
+  }
+}
+
+void DrawObjects(const MapContent& content, const FloorView& view, Canvas* canvas) {
+  std::vector<const Node*> objects;
+  for (const Node& node : content.nodes) {
+    if (node.kind == kinds::kObject) objects.push_back(&node);
+  }
+  // What stands on a table is drawn over the table.
+  const auto top_of = [](const Node* node) { return node->BoxMap().max().z(); };
+  std::stable_sort(objects.begin(), objects.end(),
+                   [&](const Node* a, const Node* b) { return top_of(a) < top_of(b); });
+  for (const Node* node : objects) {
+    const Polygon2d outline = view.ToPixels(FloorOutline(*node));
+    if (outline.size() < 3 || AreaOf(outline) < 64.0) {
+      canvas->FillCircle(view.ToPixel(MiddleOf(*node)), 6.0, MakePaint(kInkRgb));
+      canvas->FillCircle(view.ToPixel(MiddleOf(*node)), 4.0, MakePaint(ClassColor(*node)));
+      continue;
+    }
+    canvas->FillPolygon(outline, MakePaint(ClassColor(*node), 0.6f));
+    canvas->DrawOutline(outline, 2.5, MakePaint(kInkRgb, 0.25f));
+    canvas->DrawOutline(outline, 2.5, MakePaint(ClassColor(*node), 0.7f));
+  }
+}
+
+void DrawTracks(const MapContent& content, const FloorView& view, Canvas* canvas) {
+  for (size_t i = 0; i < content.tracks.size(); ++i) {
+    for (const auto& piece : content.tracks[i].pieces) {
+      std::vector<Eigen::Vector2d> pixels;
+      for (const Eigen::Vector3d& point : piece) pixels.push_back(view.ToPixel(point));
+      canvas->DrawPolyline(pixels, 3.0, MakePaint(AgentColor(i), 0.65f));
+    }
+  }
+  for (size_t i = 0; i < content.tracks.size(); ++i) {
+    const Eigen::Vector2d last = view.ToPixel(LastOf(content.tracks[i]));
+    canvas->FillCircle(last, 14.0, MakePaint(0xffffff));
+    canvas->FillCircle(last, 11.0, MakePaint(AgentColor(i)));
+  }
+}
+
+// 1, 2 or 5 times a power of ten.
+double RoundLength(double length_m) {
+  const double power = std::pow(10.0, std::floor(std::log10(length_m)));
+  for (const double factor : {5.0, 2.0}) {
+    if (factor * power <= length_m) return factor * power;
+  }
+  return power;
+}
+
+/// Returns where it begins.
+double DrawScaleBar(const FloorView& view, double y, Canvas* canvas) {
+  constexpr int kParts = 5;
+  const double length_m = RoundLength(0.25 * canvas->width() / view.px_per_m());
+  const double part_px = length_m * view.px_per_m() / kParts;
+  const Eigen::Vector2d begin(canvas->width() - kMarginPx - kParts * part_px,
+                              y + 0.5 * kTextHeightPx - 6.0);
+  for (int i = 0; i < kParts; ++i) {
+    const Eigen::Vector2d low = begin + Eigen::Vector2d(i * part_px, 0.0);
+    canvas->FillRect(low, low + Eigen::Vector2d(part_px, 12.0),
+                     MakePaint(i % 2 == 0 ? kInkRgb : 0xc4c6cc));
+  }
+  const std::string text = absl::StrCat(length_m, " m");
+  const double x = begin.x() - Canvas::TextWidth(text, kTextDotPx) - 16.0;
+  canvas->DrawText(Eigen::Vector2d(x, y), text, kTextDotPx, MakePaint(kInkRgb));
+  return x;
+}
+
+// How many of what, each with the colour it is drawn in.
+void DrawLegend(const MapContent& content, double y, double x_end, Canvas* canvas) {
+  std::map<std::string, int64_t> count_of;
+  for (const Node& node : content.nodes) ++count_of[node.kind];
+  double x = kMarginPx;
+  const auto add = [&](const char* kind, const std::string& noun, uint32_t rgb) {
+    if (count_of[kind] == 0) return;
+    const std::string text = Counted(count_of[kind], noun);
+    const double end = x + 40.0 + Canvas::TextWidth(text, kTextDotPx);
+    if (end > x_end) return;
+    canvas->FillCircle(Eigen::Vector2d(x + 12.0, y + 0.5 * kTextHeightPx), 11.0, MakePaint(rgb));
+    canvas->DrawText(Eigen::Vector2d(x + 40.0, y), text, kTextDotPx, MakePaint(kInkRgb));
+    x = end + 44.0;
+  };
+  add(kinds::kRoom, "room", 0xcfe0cf);
+  add(kinds::kStructure, "structure", kWallRgb);
+  add(kinds::kPlace, "place", LayerColor(layers::kPlaces));
+  add(kinds::kObject, "object", LayerColor(layers::kObjects));
+  add(kinds::kRobot, "robot", AgentColor(0));
+  add(kinds::kHuman, "human", AgentColor(1));
+}
+
+void DrawTitle(const std::string& title, Canvas* canvas) {
+  double dot = 6.0;
+  const double width = canvas->width() - 2.0 * kMarginPx;
+  while (dot > 2.0 && Canvas::TextWidth(title, dot) > width) dot -= 1.0;
+  canvas->DrawText(Eigen::Vector2d(kMarginPx, kMarginPx - 10.0), title, dot, MakePaint(kInkRgb));
+}
+
+}  // namespace
+
+picture::Picture DrawTopView(const MapContent& content, const TopViewOptions& options) {
+  DSG_CHECK(options.width_px >= kTopViewWidthMin && options.width_px <= kTopViewWidthMax);
+  const Box2d bounds_map = BoundsOf(content);
+  const Box2d area = AreaFor(bounds_map, options.width_px);
+  const FloorView view(bounds_map, area);
+  const double height = area.max().y() + kMarginPx + kFooterPx;
+  Canvas canvas(2 * options.width_px, 2 * static_cast<int>(std::ceil(0.5 * height)),
+                MakePaint(kPaperRgb));
+  DrawMesh(content.mesh, view, &canvas);
+  DrawGround(content, view, &canvas);
+  DrawRooms(content, view, &canvas);
+  DrawStructures(content, view, &canvas);
+  DrawOthers(content, view, &canvas);
+  DrawPlaces(content, view, &canvas);
+  DrawObjects(content, view, &canvas);
+  DrawTracks(content, view, &canvas);
+  const double margin = 0.5 * kMarginPx;
+  const Eigen::Vector2d around(margin, margin);
+  LabelLayout layout(Box2d(area.min() - around, area.max() + around));
+  DrawLabels(content, view, &layout, &canvas);
+  DrawTitle(options.title, &canvas);
+  const double footer_y = canvas.height() - kMarginPx - kTextHeightPx;
+  DrawLegend(content, footer_y, DrawScaleBar(view, footer_y, &canvas) - 40.0, &canvas);
+  return canvas.Halved();
+}
+
+}  // namespace dsg::cli

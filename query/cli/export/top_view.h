@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// A map from above, as a picture for people: floors, walls, places, objects, tracks, names.
+// Refuses to be exact to the pixel, and to let names cover each other: what has no room has no
+// name.
+#pragma once
+
+#include <string>
+
+#include "query/cli/export/map_content.h"
+#include "schema/picture/raster.h"
+
+namespace dsg::cli {
+
+inline constexpr int kTopViewWidthMin = 200;
+inline constexpr int kTopViewWidthMax = 4096;
+
+struct TopViewOptions {
+  /// kTopViewWidthMin to kTopViewWidthMax. The height follows, at most twice the width and
+  /// kTopViewWidthMax.
+  int width_px = 1600;
+  std::string title;
+};
+
+/// Draws what there is; an empty map is a title on empty paper.
+picture::Picture DrawTopView(const MapContent& content, const TopViewOptions& options);
+
+}  // namespace dsg::cli

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/cli/read_content.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "dsg/v1/map_service.pb.h"
+#include "dsg/v1/query_service.pb.h"
+#include "query/cli/paging.h"
+#include "schema/base/status.h"
+#include "schema/codec/proto_convert.h"
+
+namespace dsg::cli {
+namespace {
+
+// Closer to the last pose kept than this, a pose changes no picture.
+constexpr double kStepM = 0.02;
+
+// Ids that no map gives to its own layers' names; they only tell layers apart here.
+constexpr LayerId kFirstMadeUpLayer = 1'000'000;
+
+class Reader {
+ public:
+  Reader(const Session& session, query::Api* api, const ContentOptions& options)
+      : session_(session), api_(*api), options_(options) {}
+
+  absl::StatusOr<ContentAnswer> Read() {
+    DSG_RETURN_IF_ERROR(ReadStats());
+    DSG_RETURN_IF_ERROR(ReadNodes());
+    DSG_RETURN_IF_ERROR(ReadEdges());
+    DSG_RETURN_IF_ERROR(ReadTracks());
+    if (options_.with_mesh) DSG_RETURN_IF_ERROR(ReadMesh());
+    return std::move(answer_);
+  }
+
+ private:
+  // Later requests name the revision that the first answer was read at.
+  template <class Request>
+  Request Begin() const {
+    Request request;
+    request.set_map(session_.map().name);
+    request.mutable_read_at()->set_exact_revision(answer_.content.revision);
+    return request;
+  }
+
+  absl::Status ReadStats() {
+    const auto request = session_.Begin<v1::GetMapStatsRequest>();
+    v1::GetMapStatsResponse reply;
+    DSG_RETURN_IF_ERROR(api_.GetMapStats(session_.NewCall(), request, &reply));
+    MapContent& content = answer_.content;
+    content.spec = session_.map();
+    content.revision = reply.header().read_revision();
+    if (reply.has_last_pose_ns()) answer_.last_pose_ns = reply.last_pose_ns();
+    const LayerTable known;
+    for (const v1::LayerStats& layer : reply.layers()) {
+      const Layer* standard = known.Find(layer.name());
+      const LayerId id = standard != nullptr
+                             ? standard->id
+                             : kFirstMadeUpLayer + static_cast<LayerId>(content.layers.size());
+      content.layers.push_back({id, layer.name(), layer.rank()});
+    }
+    return absl::OkStatus();
+  }
+
+  bool IsWanted(const Interval& valid) const {
+    return options_.at_ns.has_value() ? valid.Contains(*options_.at_ns) : valid.to_ns == kTimeMax;
+  }
+
+  absl::Status ReadNodes() {
+    auto request = Begin<v1::ListNodesRequest>();
+    if (options_.at_ns.has_value()) request.mutable_filter()->set_at_ns(*options_.at_ns);
+    const LayerTable layers(answer_.content.layers);
+    const auto fetch = [&](const v1::ListNodesRequest& next, v1::ListNodesResponse* page) {
+      return api_.ListNodes(session_.NewCall(), next, page);
+    };
+    const auto count = [](const v1::ListNodesResponse& page) { return page.nodes_size(); };
+    v1::ListNodesResponse all;
+    DSG_RETURN_IF_ERROR(FetchPages(request, 0, count, fetch, &all));
+    for (const v1::Node& in : all.nodes()) {
+      DSG_ASSIGN_OR_RETURN(Node node, FromProto(in, layers));
+      if (IsWanted(node.valid)) answer_.content.nodes.push_back(std::move(node));
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status ReadEdges() {
+    auto request = Begin<v1::ListEdgesRequest>();
+    if (options_.at_ns.has_value()) request.set_at_ns(*options_.at_ns);
+    const auto fetch = [&](const v1::ListEdgesRequest& next, v1::ListEdgesResponse* page) {
+      return api_.ListEdges(session_.NewCall(), next, page);
+    };
+    const auto count = [](const v1::ListEdgesResponse& page) { return page.edges_size(); };
+    v1::ListEdgesResponse all;
+    DSG_RETURN_IF_ERROR(FetchPages(request, 0, count, fetch, &all));
+    const auto nodes = NodesById(answer_.content);
+    for (const v1::Edge& in : all.edges()) {
+      DSG_ASSIGN_OR_RETURN(Edge edge, FromProto(in));
+      const bool has_ends = nodes.contains(edge.source) && nodes.contains(edge.target);
+      if (has_ends && IsWanted(edge.valid)) answer_.content.edges.push_back(std::move(edge));
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status ReadTracks() {
+    for (const Node& node : answer_.content.nodes) {
+      if (!IsAgentKind(node.kind)) continue;
+      DSG_ASSIGN_OR_RETURN(Track track, ReadTrack(node));
+      if (!track.pieces.empty()) answer_.content.tracks.push_back(std::move(track));
+    }
+    return absl::OkStatus();
+  }
+
+  TimeNs GapOf(const Node& agent) const {
+    const bool has_own = agent.agent.has_value() && agent.agent->gap_ns_max > 0;
+    return has_own ? agent.agent->gap_ns_max : session_.map().gap_ns_max;
+  }
+
+  absl::StatusOr<Track> ReadTrack(const Node& agent) {
+    auto request = Begin<v1::GetTrajectoryRequest>();
+    request.set_agent(ToString(agent.id));
+    if (options_.at_ns.has_value() && *options_.at_ns < kTimeMax) {
+      request.set_to_ns(*options_.at_ns + 1);
+    }
+    Track track{.agent = agent.id, .pieces = {}};
+    const TimeNs gap_ns = GapOf(agent);
+    std::optional<TimeNs> last_ns;
+    Eigen::Vector3d last_map = Eigen::Vector3d::Zero();
+    const auto take = [&](const v1::TimedPose& in) {
+      const Eigen::Vector3d point_map = FromProto(in.pose()).position;
+      const bool begins = !last_ns.has_value() || in.time_ns() - *last_ns > gap_ns;
+      if (begins) track.pieces.emplace_back();
+      std::vector<Eigen::Vector3d>& piece = track.pieces.back();
+      if (begins || (point_map - piece.back()).norm() >= kStepM) piece.push_back(point_map);
+      last_ns = in.time_ns();
+      last_map = point_map;
+    };
+    DSG_RETURN_IF_ERROR(api_.GetTrajectory(session_.NewCall(), request,
+                                           [&](const v1::GetTrajectoryResponse& message) {
+                                             for (const v1::TimedPose& pose : message.poses())
+                                               take(pose);
+                                             return true;
+                                           }));
+    // The very last position is shown as such, however short the step to it.
+    if (last_ns.has_value() && track.pieces.back().back() != last_map) {
+      track.pieces.back().push_back(last_map);
+    }
+    return track;
+  }
+
+  // A server of another make must not lead us out of our own lists.
+  static absl::Status CheckBlock(const MeshBlock& block) {
+    const size_t count = block.positions_map.size();
+    const auto fits = [count](size_t size) { return size == 0 || size == count; };
+    const bool has_even_channels = fits(block.normals_map.size()) && fits(block.colors.size()) &&
+                                   fits(block.labels.size()) && fits(block.instance_ids.size());
+    const bool has_own_vertices = std::all_of(
+        block.faces.begin(), block.faces.end(),
+        [&](const auto& face) { return *std::max_element(face.begin(), face.end()) < count; });
+    if (has_even_channels && has_own_vertices) return absl::OkStatus();
+    return absl::DataLossError(absl::StrCat(
+        "mesh block ", block.index.x, ",", block.index.y, ",", block.index.z,
+        " has channels or faces that do not fit its vertices; verify the map with dsg verify"));
+  }
+
+  absl::Status ReadMesh() {
+    const auto request = Begin<v1::GetMeshRequest>();
+    absl::Status broken;
+    const auto take = [&](const v1::GetMeshResponse& message) {
+      for (const v1::MeshBlock& in : message.blocks()) {
+        absl::StatusOr<MeshBlock> block = FromProto(in);
+        broken = block.ok() ? CheckBlock(*block) : block.status();
+        if (!broken.ok()) return false;
+        answer_.content.mesh.push_back(*std::move(block));
+      }
+      return true;
+    };
+    DSG_RETURN_IF_ERROR(api_.GetMesh(session_.NewCall(), request, take));
+    return broken;
+  }
+
+  const Session& session_;
+  query::Api& api_;
+  const ContentOptions options_;
+  ContentAnswer answer_;
+};
+
+}  // namespace
+
+absl::StatusOr<ContentAnswer> ReadContent(const Session& session, query::Api* api,
+                                          const ContentOptions& options) {
+  return Reader(session, api, options).Read();
+}
+
+}  // namespace dsg::cli

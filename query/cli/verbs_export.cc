@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+// The verbs that turn a map into files to look at: export, map.
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "query/cli/export/floor_choice.h"
+#include "query/cli/export/gltf_scene.h"
+#include "query/cli/export/output_file.h"
+#include "query/cli/export/ply.h"
+#include "query/cli/export/top_view.h"
+#include "query/cli/read_content.h"
+#include "query/cli/table.h"
+#include "query/cli/values.h"
+#include "query/cli/verbs.h"
+#include "schema/base/status.h"
+#include "schema/picture/png_file.h"
+
+namespace dsg::cli {
+namespace {
+
+// What was written, told at the end, since a later file may fail.
+struct Written {
+  std::string format;
+  std::string path;
+  int64_t byte_count = 0;
+  /// What is in it: "vertices", "faces", ...
+  std::vector<std::pair<std::string, int64_t>> counts;
+};
+
+absl::StatusOr<ContentAnswer> Read(Session* session, const std::string& at, bool with_mesh) {
+  ContentOptions options{.at_ns = std::nullopt, .with_mesh = with_mesh};
+  if (!at.empty()) {
+    DSG_ASSIGN_OR_RETURN(options.at_ns, ParseInstant("--at", at, session->map().epoch_ns));
+  }
+  return ReadContent(*session, &session->api(), options);
+}
+
+absl::StatusOr<MeshColor> ParseColor(const std::string& text) {
+  if (text.empty()) return MeshColor::kAuto;
+  if (text == "rgb") return MeshColor::kRgb;
+  if (text == "label") return MeshColor::kLabel;
+  if (text == "instance") return MeshColor::kInstance;
+  return MakeError(Reason::kFieldInvalid,
+                   absl::StrCat("--color \"", text, "\": give rgb, label or instance"),
+                   {{"field", "--color"}, {"value", text}});
+}
+
+void Tell(const std::vector<Written>& files, Revision revision, bool as_json, std::ostream& out) {
+  // Numbers as text, as the 64-bit integers of the other verbs are.
+  nlohmann::ordered_json json = {{"read_revision", std::to_string(revision)},
+                                 {"files", nlohmann::ordered_json::array()}};
+  for (const Written& file : files) {
+    std::string text = absl::StrCat("wrote ", file.path, ": ");
+    nlohmann::ordered_json one = {{"format", file.format}, {"path", file.path}};
+    for (const auto& [what, count] : file.counts) {
+      absl::StrAppend(&text, count, " ", what, ", ");
+      one[what] = std::to_string(count);
+    }
+    one["byte_count"] = std::to_string(file.byte_count);
+    json["files"].push_back(std::move(one));
+    if (!as_json) out << text << file.byte_count << " bytes (revision " << revision << ")\n";
+  }
+  if (as_json) {
+    out << json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << "\n";
+  }
+}
+
+// Writes the files of one run and remembers what is in them.
+class Exporter {
+ public:
+  Exporter(const MapContent& content, MeshColor color, bool force)
+      : content_(content), color_(color), force_(force) {}
+
+  absl::Status WriteMesh(const std::string& path) {
+    DSG_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, force_));
+    DSG_RETURN_IF_ERROR(WriteMeshPly(content_, color_, &file));
+    const MeshCounts counts = CountMesh(content_.mesh);
+    return Finish("ply", {{"vertices", counts.vertices}, {"faces", counts.faces}}, &file);
+  }
+
+  absl::Status WriteGraph(const std::string& path) {
+    DSG_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, force_));
+    DSG_ASSIGN_OR_RETURN(const GraphPlyCounts counts, WriteGraphPly(content_, &file));
+    return Finish("ply", {{"vertices", counts.vertices}, {"edges", counts.edges}}, &file);
+  }
+
+  absl::Status WriteScene(const std::string& path) {
+    DSG_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, force_));
+    const GltfDocument document = MakeGltf(content_, color_);
+    DSG_RETURN_IF_ERROR(document.Write(&file));
+    const MeshCounts counts = CountMesh(content_.mesh);
+    return Finish("glb", {{"nodes", document.nodes.size()}, {"faces", counts.faces}}, &file);
+  }
+
+  const std::vector<Written>& files() const { return files_; }
+
+ private:
+  absl::Status Finish(const std::string& format,
+                      const std::vector<std::pair<std::string, size_t>>& counts, OutputFile* file) {
+    DSG_RETURN_IF_ERROR(file->Commit());
+    Written written{.format = format, .path = file->path(), .byte_count = file->byte_count()};
+    for (const auto& [what, count] : counts) {
+      written.counts.emplace_back(what, static_cast<int64_t>(count));
+    }
+    files_.push_back(std::move(written));
+    return absl::OkStatus();
+  }
+
+  const MapContent& content_;
+  const MeshColor color_;
+  const bool force_;
+  std::vector<Written> files_;
+};
+
+// Map, revision and instant, as a picture's title.
+std::string TitleOf(const Session& session, const ContentAnswer& answer, const MapVerb& verb) {
+  std::string title =
+      absl::StrCat(answer.content.spec.name, "  revision ", answer.content.revision);
+  if (!verb.at.empty()) {
+    const auto at_ns = ParseInstant("--at", verb.at, session.map().epoch_ns);
+    if (at_ns.ok()) absl::StrAppend(&title, "  at ", session.times().Full(*at_ns));
+  } else if (answer.last_pose_ns.has_value()) {
+    // To the millisecond, which is more than a picture shows.
+    constexpr TimeNs kMillisecond = 1'000'000;
+    const TimeNs last_ns = *answer.last_pose_ns / kMillisecond * kMillisecond;
+    absl::StrAppend(&title, "  up to ", session.times().Full(last_ns));
+  }
+  if (!verb.floor.empty()) absl::StrAppend(&title, "  floor ", verb.floor);
+  return title;
+}
+
+}  // namespace
+
+absl::Status RunExport(Session* session, const ExportVerb& verb, std::ostream& out) {
+  DSG_ASSIGN_OR_RETURN(const MeshColor color, ParseColor(verb.color));
+  for (const std::string* path : {&verb.ply, &verb.graph_ply, &verb.gltf}) {
+    if (!path->empty()) DSG_RETURN_IF_ERROR(CheckMayWrite(*path, verb.force));
+  }
+  const bool with_mesh = !verb.ply.empty() || !verb.gltf.empty();
+  DSG_ASSIGN_OR_RETURN(const ContentAnswer answer, Read(session, verb.at, with_mesh));
+  Exporter exporter(answer.content, color, verb.force);
+  if (!verb.ply.empty()) DSG_RETURN_IF_ERROR(exporter.WriteMesh(verb.ply));
+  if (!verb.graph_ply.empty()) DSG_RETURN_IF_ERROR(exporter.WriteGraph(verb.graph_ply));
+  if (!verb.gltf.empty()) DSG_RETURN_IF_ERROR(exporter.WriteScene(verb.gltf));
+  Tell(exporter.files(), answer.content.revision, session->common().json, out);
+  return absl::OkStatus();
+}
+
+absl::Status RunMap(Session* session, const MapVerb& verb, std::ostream& out) {
+  DSG_RETURN_IF_ERROR(CheckMayWrite(verb.png, verb.force));
+  DSG_ASSIGN_OR_RETURN(ContentAnswer answer, Read(session, verb.at, /*with_mesh=*/true));
+  MapContent& content = answer.content;
+  if (!verb.floor.empty()) {
+    DSG_ASSIGN_OR_RETURN(const HeightRange floor, ChooseFloor(content, verb.floor));
+    KeepFloor(floor, &content);
+  }
+  const picture::Picture picture =
+      DrawTopView(content, {.width_px = verb.width_px, .title = TitleOf(*session, answer, verb)});
+  DSG_ASSIGN_OR_RETURN(const std::string png, picture::EncodePng(picture));
+  DSG_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(verb.png, verb.force));
+  DSG_RETURN_IF_ERROR(file.Write(png));
+  DSG_RETURN_IF_ERROR(file.Commit());
+  const Written written{.format = "png",
+                        .path = verb.png,
+                        .byte_count = file.byte_count(),
+                        .counts = {{"columns", picture.width}, {"rows", picture.height}}};
+  Tell({written}, content.revision, session->common().json, out);
+  return absl::OkStatus();
+}
+
+}  // namespace dsg::cli

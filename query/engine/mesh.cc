@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/engine/mesh.h"
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "dsg/v1/query_service.pb.h"
+#include "query/engine/read_view.h"
+#include "query/engine/request_check.h"
+#include "schema/base/status.h"
+#include "schema/codec/proto_convert.h"
+
+namespace dsg::query {
+namespace {
+
+// About 60 bytes a vertex and 9 a face on the wire: below 2 MiB.
+constexpr size_t kVerticesPerPiece = 20'000;
+// A closed surface has two; a block of few vertices may still repeat its faces without end.
+constexpr size_t kFacesPerVertexMax = 3;
+constexpr uint32_t kNotYet = std::numeric_limits<uint32_t>::max();
+
+// Collects faces of one block into pieces.
+class BlockCutter {
+ public:
+  BlockCutter(const MeshBlock& block, size_t vertex_count_max)
+      : block_(block),
+        vertex_count_max_(vertex_count_max),
+        local_(block.positions_map.size(), kNotYet),
+        is_sent_(block.positions_map.size(), false) {
+    Begin();
+  }
+
+  std::vector<MeshBlock> Cut() {
+    for (const std::array<uint32_t, 3>& face : block_.faces) {
+      if (piece_.positions_map.size() + 3 > vertex_count_max_ ||
+          piece_.faces.size() == kFacesPerVertexMax * vertex_count_max_) {
+        End();
+      }
+      piece_.faces.push_back({Take(face[0]), Take(face[1]), Take(face[2])});
+    }
+    for (uint32_t i = 0; i < is_sent_.size(); ++i) {
+      if (is_sent_[i]) continue;
+      if (piece_.positions_map.size() >= vertex_count_max_) End();
+      Take(i);
+    }
+    End();
+    return std::move(pieces_);
+  }
+
+ private:
+  void Begin() {
+    piece_ = MeshBlock();
+    piece_.index = block_.index;
+  }
+
+  void End() {
+    if (piece_.positions_map.empty()) return;
+    for (const uint32_t index : taken_) local_[index] = kNotYet;
+    taken_.clear();
+    pieces_.push_back(std::move(piece_));
+    Begin();
+  }
+
+  template <class T>
+  static void CopyOne(const std::vector<T>& from, uint32_t index, std::vector<T>* to) {
+    if (!from.empty()) to->push_back(from[index]);
+  }
+
+  // The vertex's index in the current piece.
+  uint32_t Take(uint32_t index) {
+    if (local_[index] != kNotYet) return local_[index];
+    local_[index] = static_cast<uint32_t>(piece_.positions_map.size());
+    is_sent_[index] = true;
+    taken_.push_back(index);
+    CopyOne(block_.positions_map, index, &piece_.positions_map);
+    CopyOne(block_.normals_map, index, &piece_.normals_map);
+    CopyOne(block_.colors, index, &piece_.colors);
+    CopyOne(block_.labels, index, &piece_.labels);
+    CopyOne(block_.instance_ids, index, &piece_.instance_ids);
+    CopyOne(block_.first_seen_ns, index, &piece_.first_seen_ns);
+    CopyOne(block_.last_seen_ns, index, &piece_.last_seen_ns);
+    return local_[index];
+  }
+
+  const MeshBlock& block_;
+  const size_t vertex_count_max_;
+  // By index in the block: the index in the current piece.
+  std::vector<uint32_t> local_;
+  std::vector<bool> is_sent_;
+  std::vector<uint32_t> taken_;
+  MeshBlock piece_;
+  std::vector<MeshBlock> pieces_;
+};
+
+Box3d CubeOf(BlockIndex index, double size_m) {
+  const Eigen::Vector3d low = size_m * Eigen::Vector3d(index.x, index.y, index.z);
+  return Box3d(low, low + Eigen::Vector3d::Constant(size_m));
+}
+
+class Cursor final : public MeshCursor {
+ public:
+  Cursor(const ReadView& view, std::vector<BlockIndex> blocks)
+      : view_(view), blocks_(std::move(blocks)) {}
+
+  absl::Status Next(const CallContext& call, v1::GetMeshResponse* reply) override {
+    DSG_RETURN_IF_ERROR(call.Check());
+    if (is_first_) view_.FillHeader(reply->mutable_header());
+    is_first_ = false;
+    size_t bytes = 0;
+    while (!done() && bytes < kPageBytesSoftMax) {
+      DSG_RETURN_IF_ERROR(call.Check());
+      if (next_piece_ == pieces_.size()) DSG_RETURN_IF_ERROR(ReadBlock());
+      if (next_piece_ == pieces_.size()) continue;
+      v1::MeshBlock* out = reply->add_blocks();
+      ToProto(pieces_[next_piece_++], out);
+      bytes += out->ByteSizeLong();
+    }
+    return absl::OkStatus();
+  }
+
+  bool done() const override {
+    return next_block_ == blocks_.size() && next_piece_ == pieces_.size();
+  }
+
+ private:
+  absl::Status ReadBlock() {
+    DSG_ASSIGN_OR_RETURN(MeshBlock block, view_.snapshot().ReadMeshBlock(blocks_[next_block_]));
+    ++next_block_;
+    pieces_ = CutBlock(std::move(block), kVerticesPerPiece);
+    next_piece_ = 0;
+    return absl::OkStatus();
+  }
+
+  const ReadView view_;
+  const std::vector<BlockIndex> blocks_;
+  size_t next_block_ = 0;
+  std::vector<MeshBlock> pieces_;
+  size_t next_piece_ = 0;
+  bool is_first_ = true;
+};
+
+}  // namespace
+
+std::vector<MeshBlock> CutBlock(MeshBlock block, size_t vertex_count_max) {
+  if (block.positions_map.size() > vertex_count_max ||
+      block.faces.size() > kFacesPerVertexMax * vertex_count_max) {
+    return BlockCutter(block, vertex_count_max).Cut();
+  }
+  std::vector<MeshBlock> whole;
+  whole.push_back(std::move(block));
+  return whole;
+}
+
+absl::StatusOr<std::unique_ptr<MeshCursor>> OpenMesh(const ReadView& view,
+                                                     const v1::GetMeshRequest& request) {
+  std::optional<Box3d> box_map;
+  if (request.has_box()) {
+    DSG_ASSIGN_OR_RETURN(box_map, BoxFromProto(request.box(), "box"));
+  }
+  DSG_ASSIGN_OR_RETURN(std::vector<BlockIndex> blocks, view.snapshot().MeshBlocks());
+  const double size_m = view.snapshot().spec().mesh_block_size_m;
+  std::erase_if(blocks, [&](const BlockIndex& index) {
+    return box_map.has_value() && !box_map->intersects(CubeOf(index, size_m));
+  });
+  return std::unique_ptr<MeshCursor>(std::make_unique<Cursor>(view, std::move(blocks)));
+}
+
+}  // namespace dsg::query

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// The mesh of a map, a few blocks a message. Refuses to send a block that outgrows a message in one
+// piece.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "query/engine/service_core.h"
+#include "schema/model/mesh.h"
+
+namespace dsg::query {
+
+class ReadView;
+
+/// Errors: BOX_INVERTED, NUMBER_NOT_FINITE.
+absl::StatusOr<std::unique_ptr<MeshCursor>> OpenMesh(const ReadView& view,
+                                                     const v1::GetMeshRequest& request);
+
+/// Cuts a block into pieces of at most `vertex_count_max` vertices, each with the faces that it
+/// holds. Together they have every face once and every vertex at least once, with all channels; a
+/// block that is small enough stays as it is.
+/// Requires: vertex_count_max is at least 3.
+std::vector<MeshBlock> CutBlock(MeshBlock block, size_t vertex_count_max);
+
+}  // namespace dsg::query

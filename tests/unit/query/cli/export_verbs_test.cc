@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+// The verbs export and map on a store on disk: what is read, written, refused and told.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "query/cli/run.h"
+#include "schema/store/graph_store.h"
+#include "tests/support/temp_folder.h"
+#include "tests/unit/query/cli/example_content.h"
+
+namespace dsg::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using Arguments = std::vector<std::string>;
+using Json = nlohmann::json;
+
+struct Outcome {
+  int code = -1;
+  std::string out;
+  std::string errors;
+};
+
+std::string Read(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+class ExportVerbs : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto store = GraphStore::Open(store_, {.create = true});
+    ASSERT_TRUE(store.ok()) << store.status();
+    MapSpec spec;
+    spec.name = "example";
+    ASSERT_TRUE((*store)->CreateMap(spec).ok());
+    const auto writer = (*store)->OpenWriter("example");
+    ASSERT_TRUE(writer.ok()) << writer.status();
+    for (const GraphDelta& delta : {First(), Second()}) {
+      const auto committed = (*writer)->Commit(delta);
+      ASSERT_TRUE(committed.ok()) << committed.status();
+    }
+  }
+
+  static GraphDelta First() {
+    const MapContent content = test::ExampleContent();
+    GraphDelta delta;
+    delta.map = "example";
+    delta.session_id = "test";
+    delta.sequence = 1;
+    delta.nodes = content.nodes;
+    delta.edges = content.edges;
+    delta.labels = {{3, "chair"}};
+    TrajectoryAppend walk{.agent = NodeId('H', 1), .poses = {}};
+    for (const int second : {0, 1, 2, 3, 9, 10}) {
+      TimedPose pose;
+      pose.time_ns = second * kNsPerSecond;
+      pose.map_T_agent.position = Eigen::Vector3d(0.5 * second, 3.0, 1.0);
+      walk.poses.push_back(pose);
+    }
+    delta.appends = {walk};
+    return delta;
+  }
+
+  // The chair is taken away after six seconds, and the mesh becomes known.
+  static GraphDelta Second() {
+    GraphDelta delta;
+    delta.map = "example";
+    delta.session_id = "test";
+    delta.sequence = 2;
+    delta.retirements = {{.id = NodeId('O', 1), .valid_to_ns = 6 * kNsPerSecond}};
+    delta.mesh_blocks = test::ExampleContent().mesh;
+    return delta;
+  }
+
+  Outcome Ask(Arguments arguments) {
+    arguments.insert(arguments.end(), {"--store", store_});
+    std::ostringstream out, errors;
+    Outcome outcome;
+    outcome.code = cli::Run(arguments, {.version = "0.1.0"}, out, errors);
+    outcome.out = out.str();
+    outcome.errors = errors.str();
+    return outcome;
+  }
+  std::string Path(const std::string& name) const { return folder_.path() + "/" + name; }
+
+  // The text part of a .glb, which names the nodes.
+  std::string Scene(Arguments arguments) {
+    arguments.insert(arguments.begin(), {"export", "--gltf", Path("a.glb"), "--force"});
+    const Outcome outcome = Ask(arguments);
+    EXPECT_EQ(outcome.code, 0) << outcome.errors;
+    return Read(Path("a.glb"));
+  }
+
+  dsg::test::TempFolder folder_;
+  const std::string store_ = folder_.path() + "/store";
+};
+
+TEST_F(ExportVerbs, WritesAllFilesOfOneRunAndTellsWhatIsInThem) {
+  const Outcome outcome = Ask({"export", "--ply", Path("m.ply"), "--graph-ply", Path("g.ply"),
+                               "--gltf", Path("a.glb"), "--json"});
+  ASSERT_EQ(outcome.code, 0) << outcome.errors;
+  const Json told = Json::parse(outcome.out);
+  EXPECT_EQ(told["read_revision"], "2");
+  ASSERT_EQ(told["files"].size(), 3u);
+  EXPECT_EQ(told["files"][0]["vertices"], "8");
+  EXPECT_EQ(told["files"][0]["faces"], "4");
+  for (const Json& file : told["files"]) {
+    EXPECT_EQ(file["byte_count"], std::to_string(fs::file_size(file["path"].get<std::string>())));
+  }
+}
+
+TEST_F(ExportVerbs, LeavesOutWhatHasEndedUnlessAskedForThen) {
+  EXPECT_EQ(Scene({}).find("\"O1\""), std::string::npos);
+  EXPECT_NE(Scene({"--at", "+5s"}).find("\"O1\""), std::string::npos);
+  EXPECT_EQ(Scene({"--at", "+6s"}).find("\"O1\""), std::string::npos);
+  // As believed before the chair was known to be gone, and before there was a mesh.
+  const std::string before = Scene({"--revision", "1"});
+  EXPECT_NE(before.find("\"O1\""), std::string::npos);
+  EXPECT_EQ(before.find("\"name\":\"mesh\",\"mesh\""), std::string::npos);
+  EXPECT_NE(Scene({}).find("\"name\":\"mesh\",\"mesh\""), std::string::npos);
+}
+
+TEST_F(ExportVerbs, EndsTracksAtTheInstant) {
+  // At 5 s the human was last seen at 3 s, 1.5 m along.
+  EXPECT_NE(Scene({"--at", "+5s"}).find("\"translation\":[1.5,3.0,1.0]"), std::string::npos);
+  EXPECT_NE(Scene({}).find("\"translation\":[5.0,3.0,1.0]"), std::string::npos);
+}
+
+TEST_F(ExportVerbs, RefusesToReplaceFilesAndWritesNoneThen) {
+  std::ofstream(Path("g.ply")) << "mine";
+  const Arguments arguments = {"export", "--gltf", Path("a.glb"), "--graph-ply", Path("g.ply")};
+  const Outcome refused = Ask(arguments);
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_NE(refused.errors.find("--force"), std::string::npos);
+  EXPECT_TRUE(refused.out.empty());
+  EXPECT_EQ(Read(Path("g.ply")), "mine");
+  EXPECT_FALSE(fs::exists(Path("a.glb")));
+  Arguments forced = arguments;
+  forced.push_back("--force");
+  EXPECT_EQ(Ask(forced).code, 0);
+  EXPECT_NE(Read(Path("g.ply")), "mine");
+}
+
+TEST_F(ExportVerbs, SayWhatIsMissingOrWrong) {
+  EXPECT_EQ(Ask({"export"}).code, 2);
+  EXPECT_EQ(Ask({"map"}).code, 2);
+  EXPECT_EQ(Ask({"export", "--ply", Path("m.ply"), "--color", "loud"}).code, 2);
+  EXPECT_EQ(Ask({"map", "--png", Path("a.png"), "--width", "100000"}).code, 2);
+  EXPECT_EQ(Ask({"map", "--png", Path("a.png"), "--floor", "attic"}).code, 1);
+  EXPECT_EQ(Ask({"map", "--png", Path("a.png"), "--revision", "9"}).code, 1);
+  EXPECT_EQ(Ask({"map", "--png", Path("no/a.png")}).code, 2);
+  EXPECT_EQ(Ask({"map", "--png", "/dev/full", "--force"}).code, 2);
+  EXPECT_EQ(Ask({"map", "--png", Path("a.png"), "--at", "soon"}).code, 2);
+}
+
+TEST_F(ExportVerbs, AFullDiskIsToldAndLeavesNoFile) {
+  for (const auto& [verb, option] : {std::pair{"export", "--gltf"},
+                                     {"export", "--ply"},
+                                     {"export", "--graph-ply"},
+                                     {"map", "--png"}}) {
+    fs::create_symlink("/dev/full", Path("x.part"));
+    const Outcome outcome = Ask({verb, option, Path("x")});
+    EXPECT_EQ(outcome.code, 3) << verb << " " << option << " " << outcome.errors;
+    EXPECT_NE(outcome.errors.find("DISK_FULL"), std::string::npos) << outcome.errors;
+    EXPECT_FALSE(fs::exists(Path("x")));
+  }
+}
+
+TEST_F(ExportVerbs, DrawsAPicture) {
+  const Outcome outcome = Ask({"map", "--png", Path("a.png"), "--width", "640"});
+  ASSERT_EQ(outcome.code, 0) << outcome.errors;
+  EXPECT_EQ(outcome.out.find("wrote " + Path("a.png") + ": 640 columns, "), 0u) << outcome.out;
+  const std::string png = Read(Path("a.png"));
+  EXPECT_EQ(png.substr(0, 8), "\x89PNG\r\n\x1a\n");
+  EXPECT_EQ(png.substr(16, 4), std::string("\0\0\x02\x80", 4));
+  // A floor is another picture.
+  ASSERT_EQ(Ask({"map", "--png", Path("b.png"), "--width", "640", "--floor", "40"}).code, 0);
+  EXPECT_NE(Read(Path("b.png")), png);
+}
+
+}  // namespace
+}  // namespace dsg::cli

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+// The picture from above shows what there is, where it is.
+#include "query/cli/export/top_view.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+
+#include "query/cli/export/floor_choice.h"
+#include "query/cli/export/outline.h"
+#include "schema/base/random.h"
+#include "schema/base/status.h"
+#include "tests/unit/query/cli/example_content.h"
+
+namespace dsg::cli {
+namespace {
+
+using Pixel = std::array<int, 3>;
+using picture::Picture;
+
+constexpr Pixel kPaper = {251, 250, 247};
+
+Pixel At(const Picture& picture, int x, int y) {
+  const size_t i = 3 * static_cast<size_t>(y * picture.width + x);
+  return {picture.rgb[i], picture.rgb[i + 1], picture.rgb[i + 2]};
+}
+
+// Of the columns in which anything is drawn in a row, how many.
+int InkIn(const Picture& picture, int x_begin, int x_end, int y_begin, int y_end) {
+  int count = 0;
+  for (int y = y_begin; y < y_end; ++y) {
+    for (int x = x_begin; x < x_end; ++x) count += At(picture, x, y) != kPaper;
+  }
+  return count;
+}
+
+TEST(TopView, IsAsWideAsAskedAndFillsRooms) {
+  MapContent content = test::ExampleContent();
+  content.mesh.clear();
+  for (const int width : {kTopViewWidthMin, 801, 1600}) {
+    const Picture picture = DrawTopView(content, {.width_px = width, .title = "example"});
+    EXPECT_EQ(picture.width, width);
+    ASSERT_EQ(picture.rgb.size(), 3 * static_cast<size_t>(width * picture.height));
+    // The map is 8 m wide and 4 m high with a margin of 30 pixels; the room's lower left part is
+    // free of everything else.
+    const double px_per_m = (width - 60.0) / 8.0;
+    const int x = static_cast<int>(30.0 + 0.3 * px_per_m);
+    const int y = static_cast<int>(65.0 + (4.0 - 0.3) * px_per_m);
+    EXPECT_NE(At(picture, x, y), kPaper);
+    EXPECT_EQ(At(picture, 5, picture.height / 2), kPaper);
+  }
+}
+
+TEST(TopView, OfAnEmptyMapIsItsTitle) {
+  const Picture picture = DrawTopView(MapContent(), {.width_px = 400, .title = "nothing"});
+  EXPECT_GT(InkIn(picture, 0, 400, 0, 60), 50);
+  EXPECT_EQ(InkIn(picture, 0, 400, 75, picture.height - 60), 0);
+}
+
+TEST(TopView, DrawsAMeshWithoutNodes) {
+  MapContent content;
+  content.mesh = {test::FlatBlock(0), test::FlatBlock(1)};
+  const Picture picture = DrawTopView(content, {.width_px = 400, .title = ""});
+  EXPECT_NE(At(picture, 200, 200), kPaper);
+}
+
+TEST(TopView, KeepsTheHeightOfNarrowMapsInBounds) {
+  MapContent content;
+  content.tracks = {{NodeId('r', 1), {{{0, 0, 0}, {0, 500, 0}}}}};
+  Node robot;
+  robot.id = NodeId('r', 1);
+  robot.kind = kinds::kRobot;
+  robot.layer = layers::kAgents;
+  content.nodes = {robot};
+  const Picture picture = DrawTopView(content, {.width_px = 300, .title = "corridor"});
+  EXPECT_LE(picture.height, 600);
+  const Picture wide = DrawTopView(content, {.width_px = kTopViewWidthMax, .title = ""});
+  EXPECT_LE(wide.height, kTopViewWidthMax);
+}
+
+TEST(TopView, IsTheSameForTheSameMap) {
+  const MapContent content = test::ExampleContent();
+  EXPECT_EQ(DrawTopView(content, {.title = "a"}).rgb, DrawTopView(content, {.title = "a"}).rgb);
+}
+
+TEST(TopView, DrawsThousandsOfNodesOfAnySize) {
+  MapContent content;
+  content.layers = DefaultLayers();
+  Random random(1, 0);
+  for (uint64_t i = 0; i < 3000; ++i) {
+    Node node;
+    node.id = NodeId('O', i);
+    node.kind = kinds::kObject;
+    node.layer = layers::kObjects;
+    node.name = "thing";
+    node.map_T_node.position = {random.Uniform(-40.0, 40.0), random.Uniform(-40.0, 40.0), 0.0};
+    const double half_m = 0.5 * std::pow(10.0, random.Uniform(-4.0, 1.0));
+    node.box_node = Box3d(Eigen::Vector3d::Constant(-half_m), Eigen::Vector3d::Constant(half_m));
+    content.nodes.push_back(node);
+  }
+  const Picture picture = DrawTopView(content, {.title = "many"});
+  EXPECT_GT(InkIn(picture, 0, picture.width, 0, picture.height), 100'000);
+}
+
+TEST(FloorChoice, TakesANodesHeightsOrThoseOfTheRoomsAround) {
+  const MapContent content = test::ExampleContent();
+  const auto by_id = ChooseFloor(content, "R2");
+  ASSERT_TRUE(by_id.ok()) << by_id.status();
+  EXPECT_EQ(by_id->high_m, 3.0);
+  EXPECT_EQ(ChooseFloor(content, "Küche \"Süd\"")->low_m, 0.0);
+  EXPECT_EQ(ChooseFloor(content, "2.9")->high_m, 3.0);
+  EXPECT_EQ(ChooseFloor(content, "10")->low_m, 8.5);
+  EXPECT_EQ(ReasonOf(ChooseFloor(content, "attic").status()), Reason::kNodeUnknown);
+  EXPECT_EQ(ReasonOf(ChooseFloor(content, "nan").status()), Reason::kNodeUnknown);
+}
+
+TEST(FloorChoice, DropsWhatIsOnAnotherFloor) {
+  MapContent content = test::ExampleContent();
+  content.tracks[0].pieces[0][1].z() = 9.0;
+  KeepFloor({0.9, 1.1}, &content);
+  // The places, and the human, who walks there; rooms, wall and chair have their middles elsewhere.
+  EXPECT_EQ(content.nodes.size(), 3u);
+  ASSERT_EQ(content.edges.size(), 1u);
+  EXPECT_EQ(content.edges[0].relation, relations::kTraversable);
+  EXPECT_EQ(content.tracks[0].pieces.size(), 3u);
+  EXPECT_TRUE(content.mesh[0].faces.empty());
+  KeepFloor({50.0, 60.0}, &content);
+  EXPECT_TRUE(content.tracks.empty());
+}
+
+TEST(Outline, IsTheHullOfTheTurnedBox) {
+  const Polygon2d outline = FloorOutline(test::ExampleContent().nodes[1]);
+  EXPECT_EQ(outline.size(), 4u);
+  EXPECT_NEAR(AreaOf(outline), 0.5, 1e-9);
+  EXPECT_TRUE(FloorOutline(Node()).empty());
+}
+
+TEST(Outline, OfRandomPointsHoldsThemAll) {
+  Random random(1, 0);
+  for (int round = 0; round < 200; ++round) {
+    Polygon2d points;
+    for (int i = 0; i < 2 + round % 40; ++i) {
+      // On a coarse grid, so that many lie on one line or coincide.
+      points.emplace_back(random.Integer(0, 6), random.Integer(0, 6));
+    }
+    const Polygon2d hull = ConvexHull(points);
+    if (hull.size() < 3) continue;
+    for (const Eigen::Vector2d& point : points) {
+      EXPECT_LE(SignedDistanceToPolygon(hull, point), 1e-9);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace dsg::cli
