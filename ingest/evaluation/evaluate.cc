@@ -201,6 +201,9 @@ Report Evaluate(const Estimate& estimate, const truth::Truth& truth, const Evalu
   report.revision = estimate.revision;
   report.world = truth.world;
   report.seed = truth.seed;
+  for (const SemanticLabel& label : truth.labels) {
+    report.class_names[static_cast<uint32_t>(label.id)] = label.name;
+  }
   tell("scoring the trajectory", 0.0);
   report.trajectory = ScoreTrajectory(estimate, truth);
   tell("scoring people", 0.05);

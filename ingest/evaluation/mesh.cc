@@ -132,8 +132,9 @@ uint32_t LabelNear(const Surface& other, const Eigen::Vector3d& point, double re
   return nearest.distance_m <= reach_m ? other.LabelAt(nearest) : 0;
 }
 
-std::optional<double> MeanIou(const Surface& estimate, const Surface& truth,
-                              const std::vector<uint8_t>& face_observed, double reach_m) {
+std::map<uint32_t, MeshResult::ClassIou> IouOfClasses(const Surface& estimate, const Surface& truth,
+                                                      const std::vector<uint8_t>& face_observed,
+                                                      double reach_m) {
   std::map<uint32_t, ClassAreas> classes;
   const double true_share = truth.area_m2() / static_cast<double>(truth.even_sample_count());
   for (size_t i = 0; i < truth.even_sample_count(); ++i) {
@@ -153,12 +154,19 @@ std::optional<double> MeanIou(const Surface& estimate, const Surface& truth,
       found->second.false_m2 += share;
     }
   }
-  if (classes.empty()) return std::nullopt;
-  double sum = 0.0;
+  std::map<uint32_t, MeshResult::ClassIou> ious;
   for (const auto& [label, areas] : classes) {
-    sum += areas.hit_m2 / (areas.hit_m2 + areas.missed_m2 + areas.false_m2);
+    const double truth_m2 = areas.hit_m2 + areas.missed_m2;
+    ious[label] = {areas.hit_m2 / (truth_m2 + areas.false_m2), truth_m2};
   }
-  return sum / static_cast<double>(classes.size());
+  return ious;
+}
+
+std::optional<double> MeanIou(const std::map<uint32_t, MeshResult::ClassIou>& ious) {
+  if (ious.empty()) return std::nullopt;
+  double sum = 0.0;
+  for (const auto& [label, score] : ious) sum += score.iou;
+  return sum / static_cast<double>(ious.size());
 }
 
 }  // namespace
@@ -179,7 +187,9 @@ MeshResult EvaluateMesh(const MeshBlock& estimate, const MeshBlock& truth,
   EvaluateGhosts(estimated_surface, true_surface, Building(rooms_map, truth), options.ghost_m,
                  &result);
   if (!estimate.labels.empty() && estimated_surface.even_sample_count() > 0) {
-    result.miou = MeanIou(estimated_surface, true_surface, face_observed, options.label_m);
+    result.class_iou =
+        IouOfClasses(estimated_surface, true_surface, face_observed, options.label_m);
+    result.miou = MeanIou(result.class_iou);
   }
   return result;
 }

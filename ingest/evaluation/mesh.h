@@ -3,6 +3,7 @@
 // Refuses to forgive a shift silently: what an alignment hides is reported beside it.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -43,6 +44,12 @@ struct MeshResult {
   /// as FN; estimated surface counts as FP when the nearest true surface within `label_m` has
   /// another class or there is none. Class 0 is "unknown" and has no IoU of its own.
   std::optional<double> miou;
+  /// TP / (TP + FP + FN) of each of these classes, and how much true surface it has.
+  struct ClassIou {
+    double iou = 0.0;
+    double truth_m2 = 0.0;
+  };
+  std::map<uint32_t, ClassIou> class_iou;
   double area_m2 = 0.0;
 };
 

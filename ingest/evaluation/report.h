@@ -3,6 +3,7 @@
 // Refuses zeros for what was not built: that is null, or a dash.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -40,6 +41,8 @@ struct Report {
   uint64_t seed = 0;
   TrajectoryResult trajectory;
   MeshResult mesh;
+  /// Of the truth's classes, by id.
+  std::map<uint32_t, std::string> class_names;
   HumanResult humans;
   ObjectResult objects;
   PlaceResult places;

@@ -41,12 +41,26 @@ Json TrajectoryJson(const TrajectoryResult& result) {
   return out;
 }
 
-Json MeshJson(const MeshResult& result) {
+Json ClassesJson(const Report& report) {
+  Json out = Json::array();
+  for (const auto& [label, score] : report.mesh.class_iou) {
+    const auto name = report.class_names.find(label);
+    out.push_back(
+        {{"class", name == report.class_names.end() ? std::to_string(label) : name->second},
+         {"iou", score.iou},
+         {"truth_m2", score.truth_m2}});
+  }
+  return out;
+}
+
+Json MeshJson(const Report& report) {
+  const MeshResult& result = report.mesh;
   return {{"rmse_m", OrNull(result.rmse_m)},
           {"rmse_no_icp_m", OrNull(result.rmse_no_icp_m)},
           {"completeness", OrNull(result.completeness)},
           {"ghost_m2", OrNull(result.ghost_m2)},
           {"miou", OrNull(result.miou)},
+          {"class_iou", result.miou.has_value() ? ClassesJson(report) : Json()},
           {"rmse_samples_m", OrNull(result.rmse_samples_m)},
           {"icp_inlier_share", result.rmse_m.has_value() ? Json(result.icp_inlier_share) : Json()},
           {"stray_m2", OrNull(result.stray_m2)},
@@ -108,7 +122,7 @@ std::string ReportToJson(const Report& report) {
               {"world", report.world},
               {"seed", report.seed}};
   out["trajectory"] = TrajectoryJson(report.trajectory);
-  out["mesh"] = MeshJson(report.mesh);
+  out["mesh"] = MeshJson(report);
   out["humans"] = HumansJson(report.humans);
   out["objects"] = {{"unknown", ScoreJson(report.objects.unknown, false)},
                     {"known", ScoreJson(report.objects.known, true)},

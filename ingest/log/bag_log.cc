@@ -304,6 +304,7 @@ OpenedLog OpenBag(const std::string& path, const LogOptions& options) {
   info.path = path;
   info.has_clock = true;
   info.rig = plan.rig;
+  info.labels = plan.labels;
   info.notes = plan.notes;
   LogDigest digest;
   DSG_ASSIGN_OR_RETURN(std::optional<TrackTable> poses, PlanPoses(options, &plan, &digest, &info));

@@ -174,6 +174,7 @@ absl::Status ReadLabels(const BagFile& bag, BagPlan* plan) {
   if (file.bytes.empty()) return absl::OkStatus();
   DSG_ASSIGN_OR_RETURN(const LabelTable table, ReadLabelTable(file));
   plan->class_of_color = table.ClassOfColor();
+  plan->labels = table.Classes();
   return absl::OkStatus();
 }
 

@@ -43,6 +43,7 @@ struct BagPlan {
   std::vector<size_t> topic_of_connection;
   RigCalibration rig;
   std::map<uint32_t, int32_t> class_of_color;
+  std::vector<SemanticLabel> labels;
   std::vector<std::string> notes;
 };
 

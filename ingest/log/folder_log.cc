@@ -148,7 +148,9 @@ class FolderReader {
     if (!IsFile(labels)) return absl::OkStatus();
     DSG_ASSIGN_OR_RETURN(const LogFile label_file, ReadLogFile(labels.string()));
     digest_.Add("labels.csv", label_file.bytes);
-    return ReadLabelTable(label_file).status();
+    DSG_ASSIGN_OR_RETURN(const LabelTable table, ReadLabelTable(label_file));
+    info_.labels = table.Classes();
+    return absl::OkStatus();
   }
 
   absl::Status ReadCamera(const std::string& name) {

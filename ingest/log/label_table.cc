@@ -47,6 +47,14 @@ std::map<uint32_t, int32_t> LabelTable::ClassOfColor() const {
   return classes;
 }
 
+std::vector<SemanticLabel> LabelTable::Classes() const {
+  std::map<int32_t, std::string> name_of;
+  for (const LabelRow& row : rows) name_of.try_emplace(row.class_id, row.name);
+  std::vector<SemanticLabel> classes;
+  for (const auto& [id, name] : name_of) classes.push_back({id, name});
+  return classes;
+}
+
 absl::StatusOr<LabelTable> ReadLabelTable(const LogFile& file) {
   LabelTable table;
   LineReader lines(file.bytes);

@@ -10,6 +10,7 @@
 
 #include "absl/status/statusor.h"
 #include "ingest/log/file_bytes.h"
+#include "schema/model/layer.h"
 
 namespace dsg::ingest {
 
@@ -25,6 +26,8 @@ struct LabelTable {
 
   /// Class of a colour; colours that several classes share take the first row's.
   std::map<uint32_t, int32_t> ClassOfColor() const;
+  /// Each class once, ascending by id: of several names the first row's.
+  std::vector<SemanticLabel> Classes() const;
 };
 
 /// "name,red,green,blue,alpha,id" and its rows.

@@ -78,6 +78,8 @@ struct LogInfo {
   double feet_below_m = 0.0;
   /// Empty for logs without sensors.
   RigCalibration rig;
+  /// The classes of label images, ascending by id, each once; empty when the log names none.
+  std::vector<SemanticLabel> labels;
   /// Measurements of each sensor channel, by name: "cam0", "imu0", "detections0", "poses".
   std::map<std::string, int64_t> channel_counts;
   /// Sentences about what was dropped or assumed, for the user.

@@ -41,6 +41,14 @@ absl::Status DeltaSink::Put(GraphDelta delta) {
   return absl::OkStatus();
 }
 
+absl::Status DeltaSink::PutAsIs(GraphDelta delta) {
+  if (delta.empty()) return absl::OkStatus();
+  for (GraphDelta& part : SplitToSize(std::move(delta))) {
+    DSG_RETURN_IF_ERROR(PutPartAsIs(std::move(part)));
+  }
+  return absl::OkStatus();
+}
+
 absl::Status DeltaSink::PutPart(GraphDelta delta) {
   ++sequence_;
   if (sequence_ <= last_sequence_) {
@@ -50,6 +58,17 @@ absl::Status DeltaSink::PutPart(GraphDelta delta) {
     return absl::OkStatus();
   }
   DSG_RETURN_IF_ERROR(reconciler_.Reconcile(&delta));
+  return CommitNext(std::move(delta));
+}
+
+absl::Status DeltaSink::PutPartAsIs(GraphDelta delta) {
+  ++sequence_;
+  if (sequence_ > last_sequence_) return CommitNext(std::move(delta));
+  committed_sequence_ = sequence_;
+  return absl::OkStatus();
+}
+
+absl::Status DeltaSink::CommitNext(GraphDelta delta) {
   if (delta.empty()) return absl::OkStatus();
   // Sequences have no holes, or a resumed run could not count its way back to here: deltas
   // without news are committed empty once there is news after them.

@@ -52,10 +52,16 @@ class DeltaSink {
   /// Errors: what Reconciler::Reconcile and GraphWriter::Commit return.
   absl::Status Put(GraphDelta delta);
 
+  /// As Put, for what only this session speaks of: it is not compared with what the map held before
+  /// the log, so what a session says, takes back and says again is stored as it says it.
+  absl::Status PutAsIs(GraphDelta delta);
+
   CommitCounts counts() const;
 
  private:
   absl::Status PutPart(GraphDelta delta);
+  absl::Status PutPartAsIs(GraphDelta delta);
+  absl::Status CommitNext(GraphDelta delta);
   void FillHeader(int64_t sequence, GraphDelta* delta) const;
   absl::Status Commit(GraphDelta delta);
 

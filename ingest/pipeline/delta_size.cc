@@ -33,6 +33,10 @@ size_t BytesOf(const Edge& edge) {
   return kRowBytes + edge.relation.size() + EncodeEdgePayload(edge).size();
 }
 
+size_t BytesOf(const MeshBlock& block) {
+  return block.positions_map.size() * kVertexBytes + block.faces.size() * kFaceBytes;
+}
+
 void Append(std::vector<GraphDelta> parts, std::vector<GraphDelta>* all) {
   std::move(parts.begin(), parts.end(), std::back_inserter(*all));
 }
@@ -45,6 +49,21 @@ size_t RowCount(const GraphDelta& delta) {
                  delta.assets.size();
   for (const TrajectoryAppend& append : delta.appends) count += append.poses.size();
   return count;
+}
+
+std::vector<GraphDelta> PackMesh(std::vector<MeshBlock> blocks) {
+  std::vector<GraphDelta> parts;
+  size_t bytes = 0;
+  for (MeshBlock& block : blocks) {
+    const size_t more = BytesOf(block);
+    if (parts.empty() || bytes + more > kDeltaBytesMax) {
+      parts.emplace_back();
+      bytes = 0;
+    }
+    bytes += more;
+    parts.back().mesh_blocks.push_back(std::move(block));
+  }
+  return parts;
 }
 
 std::vector<GraphDelta> SplitToBytes(GraphDelta delta, size_t row_count_max) {
@@ -74,21 +93,23 @@ size_t EstimateBytes(const GraphDelta& delta) {
   for (const ShapeAppend& item : delta.shapes) {
     for (const BodyShape& shape : item.shapes) bytes += BytesOf(shape);
   }
-  for (const MeshBlock& block : delta.mesh_blocks) {
-    bytes += block.positions_map.size() * kVertexBytes + block.faces.size() * kFaceBytes;
-  }
+  for (const MeshBlock& block : delta.mesh_blocks) bytes += BytesOf(block);
   for (const Asset& asset : delta.assets) bytes += kRowBytes + asset.content.size();
   return bytes;
 }
 
 std::vector<GraphDelta> SplitToSize(GraphDelta delta) {
   std::vector<GraphDelta> all;
-  if (RowCount(delta) <= kDeltaRowsMax && delta.mesh_blocks.empty()) {
-    return SplitToBytes(std::move(delta), kDeltaRowsMax);
+  if (RowCount(delta) <= kDeltaRowsMax && EstimateBytes(delta) <= kDeltaBytesMax) {
+    all.push_back(std::move(delta));
+    return all;
   }
+  std::vector<MeshBlock> mesh = std::exchange(delta.mesh_blocks, {});
   for (GraphDelta& part : SplitDelta(std::move(delta), kDeltaRowsMax)) {
     Append(SplitToBytes(std::move(part), kDeltaRowsMax), &all);
   }
+  // Vertices are no rows: what counts of a mesh is its bytes.
+  Append(PackMesh(std::move(mesh)), &all);
   return all;
 }
 

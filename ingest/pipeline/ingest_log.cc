@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <optional>
 #include <unordered_set>
 #include <utility>
@@ -15,6 +16,7 @@
 #include "ingest/pipeline/graph_boxes.h"
 #include "ingest/pipeline/region_index.h"
 #include "ingest/pipeline/session.h"
+#include "ingest/pipeline/stay_mender.h"
 #include "ingest/pipeline/stay_tracker.h"
 #include "schema/base/status.h"
 #include "schema/base/utf8.h"
@@ -58,14 +60,22 @@ class Regions {
     }
   }
 
+  // The rooms and places that this log has found so far, instead of those it had found before.
+  void SetFound(GraphDelta found) { found_ = std::move(found); }
+
   RegionIndex MakeIndex() const {
     std::vector<Node> rooms = rooms_;
     std::vector<Node> places = places_;
+    for (const Node& node : found_.nodes) {
+      if (node.layer == layers::kRooms) rooms.push_back(node);
+      if (node.layer == layers::kPlaces) places.push_back(node);
+    }
     // What has left the world holds nobody any more.
     const auto has_ended = [](const Node& node) { return node.valid.to_ns != kTimeMax; };
     std::erase_if(rooms, has_ended);
     std::erase_if(places, has_ended);
     std::vector<RegionIndex::Containment> contains = contains_;
+    for (const Edge& edge : found_.edges) contains.push_back({edge.source, edge.target});
     std::sort(contains.begin(), contains.end(),
               [](const RegionIndex::Containment& a, const RegionIndex::Containment& b) {
                 return std::pair(a.room, a.place) < std::pair(b.room, b.place);
@@ -77,6 +87,7 @@ class Regions {
   std::vector<Node> rooms_;
   std::vector<Node> places_;
   std::vector<RegionIndex::Containment> contains_;
+  GraphDelta found_;
 };
 
 // Of a measurement that no stage takes yet.
@@ -97,44 +108,137 @@ std::string_view NameOf(PoseSource source) {
   return "auto";
 }
 
+TimeNs TimeOf(const Measurement& measurement) {
+  if (const auto* pose = std::get_if<PoseMeasurement>(&measurement)) return pose->pose.time_ns;
+  if (const auto* imu = std::get_if<ImuMeasurement>(&measurement)) return imu->time_ns;
+  if (const auto* image = std::get_if<ImageMeasurement>(&measurement)) return image->time_ns;
+  if (const auto* human = std::get_if<HumanDetection>(&measurement)) return human->time_ns;
+  return kTimeMin;
+}
+
 // The stages of one log, wired.
 class LogRun {
  public:
+  // `mapper`: null for logs without depth.
   LogRun(const LogInfo& info, const IngestOptions& options, const MapView& map,
-         const std::vector<Node>& agents, Regions regions, DeltaSink sink)
+         const std::vector<Node>& agents, Regions regions, DeltaSink sink,
+         std::unique_ptr<LogMapper> mapper)
       : options_(options),
         map_(map),
         namer_(agents),
         regions_(std::move(regions)),
         builder_(info.feet_below_m),
-        sink_(std::move(sink)) {}
+        sink_(std::move(sink)),
+        mapper_(std::move(mapper)) {}
 
   absl::Status Take(Measurement measurement) {
+    if (mapper_ != nullptr) DSG_RETURN_IF_ERROR(CommitIfDue(TimeOf(measurement)));
     if (auto* graph = std::get_if<GraphMeasurement>(&measurement)) {
       return TakeGraph(std::move(graph->delta));
     }
     if (auto* pose = std::get_if<PoseMeasurement>(&measurement)) return TakePose(*pose);
+    if (mapper_ != nullptr && TakeSensor(&measurement)) return mapper_->Advance();
     ++unused_[ChannelOf(measurement)];
     return absl::OkStatus();
   }
 
   absl::Status Finish() {
+    if (mapper_ != nullptr) {
+      mapper_->Close();
+      DSG_RETURN_IF_ERROR(mapper_->Advance());
+      DSG_RETURN_IF_ERROR(Commit(last_ns_, /*is_update=*/true));
+    }
+    ReplayWaiting();
     Tracker().Finish();
-    DSG_RETURN_IF_ERROR(sink_.Put(builder_.Take(Tracker().TakeChanges())));
+    std::vector<Stay> stays = Tracker().TakeChanges();
+    mender_.Remember(stays);
+    DSG_RETURN_IF_ERROR(sink_.Put(builder_.Take(std::move(stays))));
+    if (mapper_ != nullptr) DSG_RETURN_IF_ERROR(MendStays());
     return sink_.Put(builder_.TakeNodes());
   }
 
   IngestSummary Summary() const {
-    return {graph_agent_count_ + builder_.agent_count(), sink_.counts(), unused_};
+    IngestSummary summary{graph_agent_count_ + builder_.agent_count(), sink_.counts(), unused_, {}};
+    if (mapper_ != nullptr) summary.mapping = mapper_->Summary();
+    return summary;
   }
 
  private:
+  struct Waiting {
+    NodeId agent;
+    TimeNs time_ns;
+    Eigen::Vector3d position_map;
+  };
+
   absl::Status TakePose(const PoseMeasurement& pose) {
     const NodeId agent = namer_.Assign(pose.agent_name, pose.agent_kind);
-    Tracker().Observe(agent, pose.pose.time_ns, pose.pose.map_T_agent.position);
     builder_.AddPose(agent, pose);
-    if (builder_.pose_count() < options_.poses_per_delta) return absl::OkStatus();
-    return sink_.Put(builder_.Take(Tracker().TakeChanges()));
+    if (mapper_ == nullptr) {
+      Tracker().Observe(agent, pose.pose.time_ns, pose.pose.map_T_agent.position);
+      if (builder_.pose_count() < options_.poses_per_delta) return absl::OkStatus();
+      return sink_.Put(builder_.Take(Tracker().TakeChanges()));
+    }
+    // Rooms and places that this log is about to show are not known yet.
+    mender_.Observe(agent, pose.pose.time_ns, pose.pose.map_T_agent.position);
+    waiting_.push_back({agent, pose.pose.time_ns, pose.pose.map_T_agent.position});
+    if (tracker_.has_value()) ReplayWaiting();
+    mapper_->AddPose(pose);
+    return mapper_->Advance();
+  }
+
+  // False when the mapper has no use for it.
+  bool TakeSensor(Measurement* measurement) {
+    if (auto* image = std::get_if<ImageMeasurement>(measurement)) {
+      if (!mapper_->Uses(image->channel)) return false;
+      mapper_->AddPicture(std::move(*image));
+      return true;
+    }
+    // Detections mask people, but make no tracks yet: they count as not used.
+    if (auto* human = std::get_if<HumanDetection>(measurement)) mapper_->AddDetection(*human);
+    return false;
+  }
+
+  absl::Status CommitIfDue(TimeNs now_ns) {
+    if (now_ns == kTimeMin) return absl::OkStatus();
+    last_ns_ = std::max(last_ns_, now_ns);
+    if (begin_ns_ == kTimeMin) begin_ns_ = now_ns;
+    if (now_ns - begin_ns_ < options_.mapping.commit_period_ns) return absl::OkStatus();
+    begin_ns_ = now_ns;
+    return Commit(now_ns, mapper_->IsUpdateDue(now_ns));
+  }
+
+  // Stays end before what they are in is retired, and begin after what they are in is there.
+  absl::Status Commit(TimeNs now_ns, bool is_update) {
+    GraphDelta delta = mapper_->TakeMesh();
+    if (is_update) {
+      LogMapper::LayerChange change = mapper_->TakeLayers(now_ns);
+      regions_.SetFound(std::move(change.regions));
+      Tracker().SetRegions(regions_.MakeIndex());
+      change.delta.mesh_blocks = std::move(delta.mesh_blocks);
+      change.delta.mesh_removals = std::move(delta.mesh_removals);
+      delta = std::move(change.delta);
+    }
+    std::vector<Stay> stays;
+    if (tracker_.has_value()) stays = Tracker().TakeChanges();
+    mender_.Remember(stays);
+    DSG_RETURN_IF_ERROR(sink_.Put(builder_.Take(std::move(stays))));
+    DSG_RETURN_IF_ERROR(sink_.PutAsIs(std::move(delta)));
+    if (is_update) DSG_RETURN_IF_ERROR(MendStays());
+    if (tracker_.has_value()) ReplayWaiting();
+    return absl::OkStatus();
+  }
+
+  absl::Status MendStays() {
+    GraphDelta delta;
+    delta.stays = mender_.Mend(regions_.MakeIndex());
+    return sink_.PutAsIs(std::move(delta));
+  }
+
+  void ReplayWaiting() {
+    for (const Waiting& pose : waiting_) {
+      Tracker().Observe(pose.agent, pose.time_ns, pose.position_map);
+    }
+    waiting_.clear();
   }
 
   absl::Status TakeGraph(GraphDelta graph) {
@@ -159,9 +263,19 @@ class LogRun {
   std::optional<StayTracker> tracker_;
   DeltaBuilder builder_;
   DeltaSink sink_;
+  std::unique_ptr<LogMapper> mapper_;
+  StayMender mender_;
+  /// When the piece of the log began that is not committed yet.
+  TimeNs begin_ns_ = kTimeMin;
+  TimeNs last_ns_ = kTimeMin;
+  std::vector<Waiting> waiting_;
   int64_t graph_agent_count_ = 0;
   std::map<std::string, int64_t> unused_;
 };
+
+bool HasMapping(const LogInfo& info, const IngestOptions& options) {
+  return options.mapping.is_on && !info.rig.cameras.empty();
+}
 
 SessionHeader MakeHeader(const LogInfo& info, const LogOptions& log_options,
                          const IngestOptions& options, const MapSpec& spec) {
@@ -172,7 +286,9 @@ SessionHeader MakeHeader(const LogInfo& info, const LogOptions& log_options,
                              .agent_prefix = log_options.agent_prefix,
                              .mesh_block_size_m = log_options.mesh_block_size_m,
                              .poses_per_delta = options.poses_per_delta,
-                             .poses = std::string(NameOf(log_options.poses))};
+                             .poses = std::string(NameOf(log_options.poses)),
+                             .up = options.up,
+                             .mapping = HasMapping(info, options) ? options.mapping.Digest() : ""};
   // The file's name alone: where it lies on this machine is no property of the log.
   std::string name = std::filesystem::path(info.path).filename().string();
   // File names may be any bytes; a map holds text only.
@@ -203,8 +319,10 @@ absl::StatusOr<IngestSummary> IngestLog(LogSource& log, const LogOptions& log_op
   DSG_ASSIGN_OR_RETURN(const SessionState session, writer.GetSession(header.session_id));
   DSG_ASSIGN_OR_RETURN(const std::vector<Node> agents, map.NodesOfLayer(layers::kAgents));
   DSG_ASSIGN_OR_RETURN(Regions regions, Regions::Read(map));
+  DSG_ASSIGN_OR_RETURN(std::unique_ptr<LogMapper> mapper,
+                       LogMapper::Make(log.info(), options.mapping, map, header.session_id));
   LogRun run(log.info(), options, map, agents, std::move(regions),
-             DeltaSink(std::move(header), session.last_sequence, map, writer));
+             DeltaSink(std::move(header), session.last_sequence, map, writer), std::move(mapper));
   for (int64_t count = 1;; ++count) {
     DSG_ASSIGN_OR_RETURN(std::optional<Measurement> measurement, log.Next());
     if (!measurement.has_value()) break;

@@ -4,10 +4,12 @@
 
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "ingest/log/log_source.h"
 #include "ingest/pipeline/delta_sink.h"
+#include "ingest/pipeline/log_mapper.h"
 
 namespace dsg::ingest {
 
@@ -16,6 +18,10 @@ struct IngestOptions {
   int64_t poses_per_delta = 5000;
   /// Who commits, for the record of revisions.
   std::string author = "dsg-ingest";
+  /// How the log was turned (TurnUpright); part of what deltas depend on.
+  std::string up = "auto";
+  /// Of logs with depth: static layers, committed while the log runs.
+  MappingOptions mapping;
 
   /// Errors: INVALID_ARGUMENT/FIELD_INVALID.
   absl::Status Validate() const;
@@ -28,6 +34,8 @@ struct IngestSummary {
   /// Measurements that were read and are not used yet, by channel: images, inertial samples,
   /// detections.
   std::map<std::string, int64_t> unused;
+  /// Unset when the log has no depth, or mapping is off.
+  std::optional<MappingSummary> mapping;
 };
 
 /// Reads `log` to its end. The same log, options and starting map give byte-equal deltas. A run

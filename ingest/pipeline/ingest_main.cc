@@ -19,7 +19,9 @@
 #include "ingest/log/peeked_log.h"
 #include "ingest/pipeline/destination.h"
 #include "ingest/pipeline/ingest_log.h"
+#include "ingest/pipeline/mapping_flags.h"
 #include "ingest/pipeline/progress.h"
+#include "ingest/pipeline/upright.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
@@ -39,7 +41,9 @@ struct Flags {
   std::string codec;
   std::string poses = "auto";
   std::string pose_file;
+  std::string up = "auto";
   int64_t commit_poses = IngestOptions().poses_per_delta;
+  MappingFlags mapping;
   bool is_quiet = false;
   std::vector<std::string> logs;
 };
@@ -77,7 +81,13 @@ void AddFlags(CLI::App* app, Flags* flags) {
       ->capture_default_str();
   app->add_option("--pose-file", flags->pose_file,
                   "Poses of the robot, EuRoC or TUM columns, instead of the sensor log's own");
-  app->add_option("--commit-poses", flags->commit_poses, "Poses a revision")->capture_default_str();
+  app->add_option("--up", flags->up,
+                  "Which way is up in the log's frame: x, -x, y, -y, z, -z, \"x,y,z\", none, or "
+                  "auto (RGB-D folders: told from the pictures; others: z)")
+      ->capture_default_str();
+  app->add_option("--commit-poses", flags->commit_poses, "Poses a revision, of logs without depth")
+      ->capture_default_str();
+  AddMappingFlags(app, &flags->mapping);
   app->add_flag("--quiet", flags->is_quiet, "Write nothing but errors");
   app->add_option("LOG", flags->logs, "Log files or folders, taken one after another")->required();
 }
@@ -194,7 +204,7 @@ void PrintSummary(const std::string& path, const LogInfo& info, const IngestSumm
 }
 
 absl::Status IngestOne(const Flags& flags, const std::string& path, LogOptions options,
-                       std::unique_ptr<Destination>* destination) {
+                       const MappingOptions& mapping, std::unique_ptr<Destination>* destination) {
   const auto begin = std::chrono::steady_clock::now();
   DSG_ASSIGN_OR_RETURN(std::unique_ptr<LogSource> log, OpenLog(path, options));
   // A log without a sound beginning must not leave a map, nor give it its epoch.
@@ -219,8 +229,14 @@ absl::Status IngestOne(const Flags& flags, const std::string& path, LogOptions o
       std::fprintf(stderr, "%s: note: %s\n", path.c_str(), note.c_str());
     }
   }
+  std::string note;
+  DSG_ASSIGN_OR_RETURN(log, TurnUpright(std::move(log), path, options, flags.up, &note));
+  if (!flags.is_quiet && !note.empty()) {
+    std::fprintf(stderr, "%s: note: %s\n", path.c_str(), note.c_str());
+  }
   DSG_ASSIGN_OR_RETURN(const std::unique_ptr<MapView> view, (*destination)->View());
-  const IngestOptions ingest_options{.poses_per_delta = flags.commit_poses};
+  IngestOptions ingest_options{.poses_per_delta = flags.commit_poses, .up = flags.up};
+  ingest_options.mapping = mapping;
   absl::StatusOr<IngestSummary> summary = absl::UnknownError("not run");
   {
     Progress progress(std::filesystem::path(path).filename().string(),
@@ -231,15 +247,20 @@ absl::Status IngestOne(const Flags& flags, const std::string& path, LogOptions o
   if (!summary.ok()) return summary.status();
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
   if (!flags.is_quiet) PrintSummary(path, log->info(), *summary, elapsed.count());
+  if (!flags.is_quiet && summary->mapping.has_value()) {
+    PrintMapping(path, *summary->mapping, flags.mapping.has_timings);
+  }
   return absl::OkStatus();
 }
 
 absl::Status Run(const Flags& flags) {
   DSG_RETURN_IF_ERROR(CheckMapName(flags.map));
+  DSG_RETURN_IF_ERROR(CheckUp(flags.up));
   DSG_ASSIGN_OR_RETURN(const LogOptions options, MakeLogOptions(flags));
+  DSG_ASSIGN_OR_RETURN(const MappingOptions mapping, MakeMappingOptions(flags.mapping));
   std::unique_ptr<Destination> destination;
   for (const std::string& path : flags.logs) {
-    DSG_RETURN_IF_ERROR(IngestOne(flags, path, options, &destination));
+    DSG_RETURN_IF_ERROR(IngestOne(flags, path, options, mapping, &destination));
   }
   return absl::OkStatus();
 }

@@ -123,4 +123,15 @@ RegionState RegionIndex::Next(RegionState before, const Eigen::Vector3d& positio
   return next;
 }
 
+RegionState RegionIndex::Find(NodeId room, NodeId place) const {
+  const auto number_of = [](const auto& regions, NodeId id) {
+    const auto found =
+        std::lower_bound(regions.begin(), regions.end(), id,
+                         [](const auto& region, NodeId wanted) { return region.id < wanted; });
+    const bool is_there = found != regions.end() && found->id == id;
+    return is_there ? static_cast<int32_t>(found - regions.begin()) : -1;
+  };
+  return {number_of(rooms_, room), number_of(places_, place)};
+}
+
 }  // namespace dsg::ingest

@@ -48,6 +48,9 @@ class RegionIndex {
   /// kept until another is nearer by more than kHysteresisM. Ties go to the lower id.
   RegionState Next(RegionState before, const Eigen::Vector3d& position_map) const;
 
+  /// The numbers of a room and a place; -1 for ids that are unknown here.
+  RegionState Find(NodeId room, NodeId place) const;
+
   /// Empty for -1.
   NodeId RoomId(int32_t room) const { return room < 0 ? NodeId() : rooms_[room].id; }
   NodeId PlaceId(int32_t place) const { return place < 0 ? NodeId() : places_[place].id; }

@@ -14,7 +14,9 @@ constexpr int kPipelineVersion = 1;
 }  // namespace
 
 std::string SessionConfig::Digest() const {
-  const std::string choice = poses == "auto" ? "" : absl::StrCat("poses=", poses, "\n");
+  std::string choice = poses == "auto" ? "" : absl::StrCat("poses=", poses, "\n");
+  if (up != "auto") absl::StrAppend(&choice, "up=", up, "\n");
+  if (!mapping.empty()) absl::StrAppend(&choice, "mapping=", mapping, "\n");
   return Sha256Hex(
       absl::StrCat(choice, "pipeline=", kPipelineVersion, "\nformat=", format,
                    "\nepoch_ns=", epoch_ns, "\nframe_period_ns=", frame_period_ns,

@@ -19,6 +19,10 @@ struct SessionConfig {
   /// Which poses of a sensor log: "auto", "gt", "external". "auto" leaves the digest as it was
   /// before there was a choice. What a pose file says is part of the log's content.
   std::string poses = "auto";
+  /// IngestOptions::up; "auto" leaves the digest as it was before there was a choice.
+  std::string up = "auto";
+  /// MappingOptions::Digest of logs that give static layers; empty for others.
+  std::string mapping;
 
   /// SHA-256 in hexadecimal.
   std::string Digest() const;

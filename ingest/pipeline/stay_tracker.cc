@@ -30,6 +30,18 @@ void StayTracker::Observe(NodeId agent, TimeNs time_ns, const Eigen::Vector3d& p
   track.has_pose = true;
 }
 
+void StayTracker::SetRegions(RegionIndex regions) {
+  for (auto& [agent, track] : tracks_) {
+    const NodeId room = regions_.RoomId(track.where.room);
+    const NodeId place = regions_.PlaceId(track.where.place);
+    const RegionState now = regions.Find(room, place);
+    const bool is_lost = regions.RoomId(now.room) != room || regions.PlaceId(now.place) != place;
+    if (is_lost) End(agent, track.last_ns + 1, &track);
+    track.where = is_lost ? RegionState() : now;
+  }
+  regions_ = std::move(regions);
+}
+
 void StayTracker::Finish() {
   for (auto& [agent, track] : tracks_) End(agent, track.last_ns + 1, &track);
 }

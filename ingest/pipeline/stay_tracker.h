@@ -24,6 +24,10 @@ class StayTracker {
   /// Requires: times strictly grow per agent.
   void Observe(NodeId agent, TimeNs time_ns, const Eigen::Vector3d& position_map);
 
+  /// From here on rooms and places are those of `regions`. Stays in what is no longer there, or
+  /// was moved to another room, end 1 ns after their last pose.
+  void SetRegions(RegionIndex regions);
+
   /// Closes all stays: no pose will follow.
   void Finish();
 

@@ -51,6 +51,8 @@ void ToProto(const Node& node, const LayerTable& layers, v1::Node* out);
 absl::StatusOr<Node> FromProto(const v1::Node& in, const LayerTable& layers);
 void ToProto(const Edge& edge, v1::Edge* out);
 absl::StatusOr<Edge> FromProto(const v1::Edge& in);
+void ToProto(const MeshBlock& block, v1::MeshBlock* out);
+absl::StatusOr<MeshBlock> FromProto(const v1::MeshBlock& in);
 void ToProto(const MapSpec& spec, v1::MapSpec* out);
 /// Unset fields take the defaults of MapSpec.
 absl::StatusOr<MapSpec> FromProto(const v1::MapSpec& in);

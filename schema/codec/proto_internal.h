@@ -33,8 +33,6 @@ absl::Status NodeDetailsFromProto(const v1::Node& in, Node* node);
 void EdgeDetailsToProto(const Edge& edge, v1::Edge* out);
 void EdgeDetailsFromProto(const v1::Edge& in, Edge* edge);
 
-void ToProto(const MeshBlock& block, v1::MeshBlock* out);
-absl::StatusOr<MeshBlock> FromProto(const v1::MeshBlock& in);
 void ToProto(const PoseFactor& factor, v1::PoseFactor* out);
 absl::StatusOr<PoseFactor> FromProto(const v1::PoseFactor& in);
 void ToProto(const BodyShape& shape, v1::BodyShape* out);

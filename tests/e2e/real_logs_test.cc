@@ -111,8 +111,9 @@ class RealLogsTest
     const std::string path = DataFolder() + "/" + log.path;
     if (!fs::exists(path)) GTEST_SKIP() << "no " << path << "; set DSG_DATA to the folder of logs";
     source_ = log.read(path);
-    const std::string command = std::string(DSG_BINARY_DIR) + "/dsg-ingest --quiet --store " +
-                                folder_.path() + " --map log --codec " + codec.first + " " + path;
+    const std::string command = std::string(DSG_BINARY_DIR) +
+                                "/dsg-ingest --quiet --no-layers --store " + folder_.path() +
+                                " --map log --codec " + codec.first + " " + path;
     ASSERT_EQ(std::system(command.c_str()), 0) << command;
     auto store = GraphStore::Open(folder_.path(), {});
     ASSERT_TRUE(store.ok()) << store.status();
@@ -241,9 +242,9 @@ TEST_P(SensorLogsTest, GivesItsPosesAndCountsTheRest) {
   if (!fs::exists(path)) GTEST_SKIP() << "no " << path << "; set DSG_DATA to the folder of logs";
   const test::TempFolder folder;
   const std::string output = folder.path() + "/output";
-  const std::string command = std::string(DSG_BINARY_DIR) + "/dsg-ingest --store " + folder.path() +
-                              "/store --map log " + log.options + " " + path + " > " + output +
-                              " 2>&1";
+  const std::string command = std::string(DSG_BINARY_DIR) + "/dsg-ingest --no-layers --store " +
+                              folder.path() + "/store --map log " + log.options + " " + path +
+                              " > " + output + " 2>&1";
   ASSERT_EQ(std::system(command.c_str()), 0) << command;
   std::stringstream text;
   text << std::ifstream(output).rdbuf();

@@ -106,6 +106,7 @@ TEST_F(FolderLogTest, MergesAllChannelsByTimeThenRank) {
   EXPECT_EQ(at_100, (std::vector<std::string>{"imu0", "poses", "cam0", "cam1", "color0", "depth0",
                                               "label0", "detections0", "detections0"}));
   EXPECT_EQ(log->info.channel_counts.at("detections0"), 3);
+  EXPECT_EQ(log->info.labels, (std::vector<SemanticLabel>{{5, "chair"}}));
   EXPECT_EQ(log->detections[2].id, 2);
   EXPECT_EQ(log->imu[0].angular_velocity_rad_s, Eigen::Vector3d(0.1, 0.2, 0.3));
   EXPECT_EQ(log->poses[0].agent_name, "body");

@@ -49,6 +49,26 @@ TEST(SplitToSize, KeepsARowThatIsTooLargeOnItsOwn) {
   EXPECT_EQ(node_count, 3u);
 }
 
+TEST(SplitToSize, PacksMeshesByBytesAfterTheNodes) {
+  GraphDelta delta = Objects(10, 10);
+  for (int i = 0; i < 100; ++i) {
+    MeshBlock& block = delta.mesh_blocks.emplace_back();
+    block.index = {i, 0, 0};
+    block.positions_map.resize(2000);
+  }
+  const std::vector<GraphDelta> parts = SplitToSize(delta);
+  ASSERT_EQ(parts.size(), 1 + 100u * 2000u * 64u / kDeltaBytesMax + 1);
+  EXPECT_EQ(parts[0].nodes.size(), 10u);
+  size_t count = 0;
+  for (const GraphDelta& part : parts) {
+    EXPECT_LE(EstimateBytes(part), kDeltaBytesMax);
+    for (const MeshBlock& block : part.mesh_blocks) {
+      EXPECT_EQ(block.index.x, static_cast<int>(count++));
+    }
+  }
+  EXPECT_EQ(count, 100u);
+}
+
 TEST(SplitToSize, CutsLongTrajectories) {
   GraphDelta delta;
   delta.appends.push_back({NodeId('r', 0), {}});

@@ -56,6 +56,25 @@ TEST(StayTracker, EndsAStayAfterTheLastPoseBeforeAGap) {
                                InRoom(kAnna, 1, 4 * kNsPerSecond + 1, 4 * kNsPerSecond + 2)}));
 }
 
+TEST(StayTracker, KeepsStaysInRoomsThatAreStillThereWhenTheMapGrows) {
+  StayTracker tracker(TwoRooms(), 2 * kNsPerSecond);
+  tracker.Observe(kAnna, 100, {4, 2, 0});
+  tracker.SetRegions(RegionIndex({MakeRoom(0, -5, 0, 0, 5), MakeRoom(1, 0, 0, 5, 5)}, {}, {}));
+  tracker.Observe(kAnna, 200, {4, 2, 0});
+  tracker.Finish();
+  EXPECT_EQ(tracker.TakeChanges(), std::vector<Stay>{InRoom(kAnna, 1, 100, 201)});
+}
+
+TEST(StayTracker, EndsStaysInRoomsThatAreNoMore) {
+  StayTracker tracker(TwoRooms(), 2 * kNsPerSecond);
+  tracker.Observe(kAnna, 100, {4, 2, 0});
+  tracker.SetRegions(RegionIndex({MakeRoom(7, 0, 0, 10, 5)}, {}, {}));
+  EXPECT_EQ(tracker.TakeChanges(), std::vector<Stay>{InRoom(kAnna, 1, 100, 101)});
+  tracker.Observe(kAnna, 200, {4, 2, 0});
+  tracker.Finish();
+  EXPECT_EQ(tracker.TakeChanges(), std::vector<Stay>{InRoom(kAnna, 7, 200, 201)});
+}
+
 TEST(StayTracker, ForgetsTheRoomOverAGap) {
   StayTracker tracker(TwoRooms(), 2 * kNsPerSecond);
   tracker.Observe(kAnna, 0, {4, 2, 0});

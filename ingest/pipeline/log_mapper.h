@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+// A sensor log's way into the static layers: frames are made, fused, and what changed is told.
+// Refuses to commit; it hands out deltas.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "ingest/depth/frame_maker.h"
+#include "ingest/log/log_source.h"
+#include "ingest/pipeline/map_view.h"
+#include "ingest/pipeline/mapping_options.h"
+#include "ingest/pipeline/static_layers.h"
+
+namespace dsg::ingest {
+
+/// What became of a log's frames, for the user.
+struct MappingSummary {
+  VolumeCounts volume;
+  SkipCounts skipped;
+  std::map<std::string, StageClock::Time> stages;
+};
+
+/// Threads: one caller at a time.
+class LogMapper {
+ public:
+  /// nullptr when the log has no depth, or mapping is off.
+  ///
+  /// Errors: of MappingOptions::Validate and MapView.
+  static absl::StatusOr<std::unique_ptr<LogMapper>> Make(const LogInfo& info,
+                                                         const MappingOptions& options,
+                                                         const MapView& map,
+                                                         const std::string& session_id);
+
+  /// True when the mapper has a use for the channel.
+  bool Uses(std::string_view channel) const;
+
+  void AddPicture(ImageMeasurement image);
+  void AddPose(const PoseMeasurement& pose);
+  void AddDetection(const HumanDetection& detection);
+  /// No more will be added.
+  void Close();
+
+  /// Fuses the frames that are complete. Errors: of StaticLayers::Integrate.
+  absl::Status Advance();
+
+  bool IsUpdateDue(TimeNs now_ns) const { return layers_.IsUpdateDue(now_ns); }
+
+  /// The layers above the mesh found anew, as a change of what was told before, and the rooms,
+  /// places and their containment as they are now. Once a log is closed, this is its last word.
+  struct LayerChange {
+    GraphDelta delta;
+    GraphDelta regions;
+  };
+  LayerChange TakeLayers(TimeNs now_ns);
+  /// Mesh blocks that changed.
+  GraphDelta TakeMesh();
+
+  MappingSummary Summary();
+
+ private:
+  LogMapper(const LogInfo& info, const MappingOptions& options, const NodeNumbering& numbering,
+            double mesh_block_size_m);
+
+  std::vector<SemanticLabel> labels_;
+  double mesh_block_size_m_;
+  bool has_depth_camera_;
+  bool has_color_camera_;
+  bool is_closed_ = false;
+  bool is_begun_ = false;
+  FrameMaker frames_;
+  StaticLayers layers_;
+  GraphTold told_;
+};
+
+}  // namespace dsg::ingest

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// How a sensor log is turned into the static layers of a map.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "ingest/depth/frame_maker.h"
+#include "ingest/objects/shapes/cad_model.h"
+#include "ingest/objects/shapes/shape_fit.h"
+#include "ingest/places/extract_places.h"
+#include "ingest/rooms/find_rooms.h"
+#include "ingest/volume/semantic_volume.h"
+
+namespace dsg::ingest {
+
+struct MappingOptions {
+  /// False: poses only, as if the log had no images.
+  bool is_on = true;
+  VolumeOptions volume;
+  DepthOptions depth;
+  PlaceOptions places;
+  RoomOptions rooms;
+  ShapeOptions shapes;
+  /// Known shapes; empty = all shapes are unknown.
+  std::vector<CadModel> catalogue;
+  /// Log time between two commits of poses and mesh.
+  TimeNs commit_period_ns = kNsPerSecond;
+  /// Least log time between two updates of objects, places, structures and rooms. A large map is
+  /// updated less often, by its size.
+  TimeNs layers_period_ns = 5 * kNsPerSecond;
+  /// Cells of the grid that places and rooms are found in; the voxel if that is larger.
+  double grid_cell_m = 0.1;
+
+  /// Errors: INVALID_ARGUMENT/FIELD_INVALID naming field, value and bounds.
+  absl::Status Validate() const;
+
+  /// All that deltas depend on, as text; threads are left out.
+  std::string Digest() const;
+};
+
+}  // namespace dsg::ingest

@@ -1,0 +1,325 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/pipeline/static_layers.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "ingest/pipeline/map_things.h"
+#include "ingest/rooms/room_class.h"
+#include "ingest/rooms/structure_rooms.h"
+
+namespace dsg::ingest {
+namespace {
+
+// How often it is looked which objects are in one picture.
+constexpr TimeNs kTogetherPeriodNs = kNsPerSecond;
+constexpr int64_t kTogetherPicturesMin = 3;
+constexpr int kTogetherPartnersMax = 5;
+// Poses of the robot closer together than this add nothing to its path.
+constexpr double kPathStepM = 0.1;
+// Without a ceiling in sight.
+constexpr double kCeilingGuessM = 2.5;
+// Fits of known shapes in one update while the log runs; the rest waits for the next.
+constexpr size_t kFitsPerUpdate = 4;
+// A large map is updated less often: a second of log time for so many cells of the grid, and for
+// so many vertices of the mesh.
+constexpr double kCellsPerSecond = 2.0e6;
+constexpr double kVerticesPerSecond = 1.0e5;
+
+}  // namespace
+
+StaticLayers::StaticLayers(const MappingOptions& options, std::vector<SemanticLabel> labels,
+                           const NodeNumbering& numbering)
+    : options_(options),
+      labels_(std::move(labels)),
+      classes_(StructureClasses::FromLabels(labels_)),
+      fitter_(options_.catalogue, options.shapes),
+      maker_(numbering, NamesOf(labels_), options_.catalogue),
+      volume_(options.volume),
+      is_asset_told_(options_.catalogue.size(), false) {}
+
+absl::Status StaticLayers::Integrate(const DepthFrame& frame) {
+  {
+    const StageClock::Span span(&clock_, "fusion");
+    const absl::Status status = volume_.Integrate(frame);
+    if (!status.ok()) return status;
+  }
+  const Eigen::Vector3d& camera_map = frame.map_T_camera.position;
+  if (path_map_.empty() || (camera_map - path_map_.back()).norm() > kPathStepM) {
+    path_map_.push_back(camera_map);
+  }
+  if (observed_together_ns_ == kTimeMin ||
+      frame.time_ns - observed_together_ns_ >= kTogetherPeriodNs) {
+    observed_together_ns_ = frame.time_ns;
+    together_.Observe(ObjectsInView(object_tracker_.objects(), frame));
+  }
+  return absl::OkStatus();
+}
+
+std::vector<MeshBlock> StaticLayers::TakeMesh(double block_size_m) {
+  const StageClock::Span span(&clock_, "mesh");
+  std::vector<MeshBlock> changed = volume_.TakeChangedMesh(block_size_m);
+  for (const MeshBlock& block : changed) {
+    if (block.positions_map.empty()) {
+      mesh_.erase(block.index);
+    } else {
+      mesh_[block.index] = block;
+    }
+  }
+  return changed;
+}
+
+std::vector<const MeshBlock*> StaticLayers::Mesh() const {
+  std::vector<const MeshBlock*> blocks;
+  blocks.reserve(mesh_.size());
+  for (const auto& [index, block] : mesh_) blocks.push_back(&block);
+  return blocks;
+}
+
+bool StaticLayers::IsUpdateDue(TimeNs now_ns) const {
+  if (mesh_.empty()) return false;
+  if (updated_ns_ == kTimeMin) return true;
+  return now_ns - updated_ns_ >= std::max(options_.layers_period_ns, update_cost_ns_);
+}
+
+LayerGraph StaticLayers::Update(TimeNs now_ns, bool is_last) {
+  updated_ns_ = now_ns;
+  LayerParts parts;
+  parts.time_ns = now_ns;
+  const std::vector<const MeshBlock*> mesh = Mesh();
+  {
+    const StageClock::Span span(&clock_, "structures");
+    parts.structures = FindStructures(mesh, classes_);
+    structure_tracker_.Track(&parts.structures);
+  }
+  const std::vector<double> floors_m = FloorsOf(parts.structures, path_map_);
+  FindObjects(now_ns, mesh, parts.structures);
+  FitShapes(floors_m, is_last);
+  const DistanceField field = FindDistances(mesh, floors_m);
+  {
+    const StageClock::Span span(&clock_, "places");
+    PlaceOptions place_options = options_.places;
+    if (place_options.floors_m.empty()) place_options.floors_m = floors_m;
+    parts.places = ExtractPlaces(field.grid(), path_map_, place_options);
+    place_tracker_.Track(&parts.places);
+  }
+  parts.objects = object_tracker_.objects();
+  parts.fits = fits_;
+  parts.gone = gone_;
+  parts.relations = FindRelations(parts.objects);
+  parts.together =
+      KnownPairs(together_.Pairs(kTogetherPicturesMin, kTogetherPartnersMax), parts.objects);
+  FindPlacesOfObjects(field, &parts);
+  {
+    const StageClock::Span span(&clock_, "rooms");
+    FindRoomsOf(field, &parts);
+  }
+  NoteCost(field.frame().CellCount());
+  const StageClock::Span span(&clock_, "graph");
+  return maker_.Make(parts);
+}
+
+DistanceField StaticLayers::FindDistances(const std::vector<const MeshBlock*>& mesh,
+                                          const std::vector<double>& floors_m) {
+  const StageClock::Span span(&clock_, "distances");
+  OccupancyGrid grid =
+      volume_.MakeOccupancy(std::max(options_.grid_cell_m, options_.volume.voxel_m));
+  CloseGlass(mesh, GlassClasses(labels_), floors_m, options_.places.body_z_max_m, &grid);
+  return DistanceField(std::move(grid));
+}
+
+void StaticLayers::NoteCost(int64_t cell_count) {
+  size_t vertex_count = 0;
+  for (const auto& [index, block] : mesh_) vertex_count += block.positions_map.size();
+  const double cost_s = static_cast<double>(cell_count) / kCellsPerSecond +
+                        static_cast<double>(vertex_count) / kVerticesPerSecond;
+  update_cost_ns_ = static_cast<TimeNs>(cost_s * static_cast<double>(kNsPerSecond));
+}
+
+void StaticLayers::FindObjects(TimeNs now_ns, const std::vector<const MeshBlock*>& mesh,
+                               const std::vector<StructurePiece>& structures) {
+  const StageClock::Span span(&clock_, "objects");
+  ClusterOptions options;
+  options.voxel_m = options_.volume.voxel_m;
+  options.class_ids = ObjectClasses(labels_, classes_, options_.depth.dynamic_classes);
+  std::vector<ObjectCluster> clusters;
+  if (labels_.empty()) {
+    const std::vector<MeshBlock> things = UnlabelledThings(mesh, structures, options.voxel_m);
+    clusters = FindClusters(Pointers(things), options);
+  } else {
+    clusters = FindClusters(mesh, options);
+  }
+  const std::vector<TrackedObject> before = object_tracker_.objects();
+  const ObjectChanges changes =
+      object_tracker_.Update(std::move(clusters), now_ns, [this](const Eigen::Vector3f& point_map) {
+        return volume_.At(point_map.cast<double>()) == Occupancy::kFree;
+      });
+  for (const auto& [part, whole] : changes.merged) together_.Merge(part, whole);
+  for (const int64_t id : changes.gone) together_.Forget(id);
+  KeepGone(before, changes, now_ns);
+  unfitted_.insert(unfitted_.end(), changes.added.begin(), changes.added.end());
+  unfitted_.insert(unfitted_.end(), changes.changed.begin(), changes.changed.end());
+}
+
+// What left the world stays in the map, until when it was there.
+void StaticLayers::KeepGone(const std::vector<TrackedObject>& before, const ObjectChanges& changes,
+                            TimeNs now_ns) {
+  for (const int64_t id : changes.gone) {
+    const auto object =
+        std::lower_bound(before.begin(), before.end(), id,
+                         [](const TrackedObject& a, int64_t wanted) { return a.id < wanted; });
+    if (object == before.end() || object->id != id) continue;
+    GoneObject gone{*object, std::nullopt, now_ns};
+    // Seen in this very update only: it was never there.
+    if (object->first_observed_ns >= now_ns) continue;
+    const auto fit = fits_.find(id);
+    if (fit != fits_.end()) gone.fit = fit->second;
+    gone_.push_back(std::move(gone));
+  }
+}
+
+void StaticLayers::FitShapes(const std::vector<double>& floors_m, bool is_last) {
+  if (options_.catalogue.empty()) return;
+  const StageClock::Span span(&clock_, "shapes");
+  std::sort(unfitted_.begin(), unfitted_.end());
+  unfitted_.erase(std::unique(unfitted_.begin(), unfitted_.end()), unfitted_.end());
+  std::map<int64_t, const TrackedObject*> objects;
+  for (const TrackedObject& object : object_tracker_.objects()) objects[object.id] = &object;
+  std::erase_if(fits_, [&objects](const auto& entry) { return !objects.contains(entry.first); });
+  size_t fit_count = 0;
+  std::vector<int64_t> waiting;
+  for (const int64_t id : unfitted_) {
+    const auto object = objects.find(id);
+    if (object == objects.end()) continue;
+    if (!is_last && fit_count == kFitsPerUpdate) {
+      waiting.push_back(id);
+      continue;
+    }
+    const ObjectCluster& cluster = object->second->cluster;
+    const std::string name = maker_.ClassName(cluster.class_id);
+    if (!HasModelOf(options_.catalogue, name)) continue;
+    ++fit_count;
+    const std::optional<ShapeFit> fit = fitter_.Fit(
+        name, cluster.points_map,
+        [this](const Eigen::Vector3d& point_map) {
+          return volume_.At(point_map) == Occupancy::kFree;
+        },
+        FloorUnder(cluster, floors_m));
+    fits_.erase(id);
+    if (!fit.has_value()) continue;
+    fits_.emplace(id, *fit);
+    TellAsset(fit->model);
+  }
+  unfitted_ = std::move(waiting);
+}
+
+void StaticLayers::TellAsset(int model) {
+  if (is_asset_told_[model]) return;
+  is_asset_told_[model] = true;
+  assets_.push_back(options_.catalogue[model].asset);
+}
+
+std::vector<Asset> StaticLayers::TakeAssets() { return std::exchange(assets_, {}); }
+
+void StaticLayers::FindPlacesOfObjects(const DistanceField& field, LayerParts* parts) const {
+  for (const TrackedObject& object : parts->objects) {
+    parts->place_of_object.push_back(
+        NearestPlaceInSight(parts->places, field, object.cluster.center_map));
+  }
+  for (const GoneObject& gone : parts->gone) {
+    parts->place_of_object.push_back(
+        NearestPlaceInSight(parts->places, field, gone.object.cluster.center_map));
+  }
+}
+
+std::vector<Storey> StaticLayers::FindStoreys(const LayerParts& parts) const {
+  std::map<double, Storey> by_floor;
+  for (size_t i = 0; i < parts.places.places.size(); ++i) {
+    by_floor[parts.places.places[i].floor_z_m].places.push_back(static_cast<int>(i));
+  }
+  std::vector<Storey> storeys;
+  for (auto& [floor_z_m, storey] : by_floor) {
+    storey.floor_z_m = floor_z_m;
+    const std::optional<double> ceiling = CeilingAbove(parts.structures, floor_z_m);
+    storey.has_ceiling = ceiling.has_value();
+    storey.ceiling_z_m = ceiling.value_or(floor_z_m + kCeilingGuessM);
+    storeys.push_back(std::move(storey));
+  }
+  return storeys;
+}
+
+void StaticLayers::FindRoomsOf(const DistanceField& field, LayerParts* parts) {
+  const std::vector<Place>& places = parts->places.places;
+  parts->storeys = FindStoreys(*parts);
+  parts->room_of_place.assign(places.size(), -1);
+  std::vector<RoomPlace> all_places;
+  for (const Place& place : places) all_places.push_back({place.position_map, place.clearance_m});
+  std::vector<FoundRoom> rooms;
+  for (size_t storey = 0; storey < parts->storeys.size(); ++storey) {
+    RoomsOfStorey found =
+        FindRoomsOfStorey(field, parts->places, parts->storeys[storey], options_.rooms);
+    const int first = static_cast<int>(rooms.size());
+    for (FoundRoom& room : found.rooms) {
+      parts->rooms.push_back({{}, static_cast<int>(storey), found.method, {}});
+      rooms.push_back(std::move(room));
+    }
+    for (const auto& [a, b] : found.adjacent) parts->adjacent.push_back({first + a, first + b});
+    if (!found.other_room_of_place.empty()) {
+      parts->other_room_of_place.resize(places.size(), -1);
+      for (const auto& [place, room] : found.other_room_of_place) {
+        parts->other_room_of_place[place] = room;
+      }
+    }
+  }
+  room_tracker_.Track(all_places, &rooms);
+  for (size_t i = 0; i < rooms.size(); ++i) {
+    for (const int place : rooms[i].places) parts->room_of_place[place] = static_cast<int>(i);
+    parts->rooms[i].room = std::move(rooms[i]);
+  }
+  RelateStructures(parts);
+  ClassifyRooms(parts);
+}
+
+void StaticLayers::RelateStructures(LayerParts* parts) const {
+  std::vector<FoundRoom> rooms;
+  for (const RoomPart& part : parts->rooms) rooms.push_back(part.room);
+  parts->encloses = EnclosesOf(parts->structures, rooms);
+  std::set<int64_t> resting;
+  for (const ObjectRelation& relation : parts->relations) {
+    if (relation.relation == relations::kOn) resting.insert(relation.first);
+  }
+  for (size_t i = 0; i < parts->objects.size(); ++i) {
+    const ObjectCluster& cluster = parts->objects[i].cluster;
+    const int place = parts->place_of_object[i];
+    if (place < 0) continue;
+    const Box3d box =
+        TransformBox(cluster.map_T_box, Box3d(-0.5 * cluster.size, 0.5 * cluster.size));
+    const std::optional<int> piece =
+        AttachedTo(box, parts->places.places[place].floor_z_m,
+                   resting.contains(parts->objects[i].id), parts->structures);
+    if (piece.has_value()) parts->attached.push_back({static_cast<int>(i), *piece});
+  }
+}
+
+void StaticLayers::ClassifyRooms(LayerParts* parts) const {
+  std::vector<RoomContents> contents(parts->rooms.size());
+  for (size_t i = 0; i < parts->objects.size(); ++i) {
+    const int place = parts->place_of_object[i];
+    const int room = place < 0 ? -1 : parts->room_of_place[place];
+    if (room < 0) continue;
+    contents[room].object_classes.push_back(maker_.ClassName(parts->objects[i].cluster.class_id));
+  }
+  for (const auto& [a, b] : parts->adjacent) {
+    ++contents[a].door_count;
+    ++contents[b].door_count;
+  }
+  for (size_t i = 0; i < contents.size(); ++i) {
+    const FoundRoom& room = parts->rooms[i].room;
+    contents[i].area_m2 = room.area_m2;
+    contents[i].aspect = AspectOf(room.footprint_map);
+    parts->rooms[i].class_probabilities = ClassifyRoom(contents[i]);
+  }
+}
+
+}  // namespace dsg::ingest

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+// Everything that does not move, built up from depth frames: mesh, objects, places, structures,
+// rooms, building.
+// Refuses to know the store and the log; it calls the stages in their order.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "ingest/grid/distance_field.h"
+#include "ingest/objects/object_tracker.h"
+#include "ingest/objects/relations.h"
+#include "ingest/objects/shapes/shape_fit.h"
+#include "ingest/pipeline/graph_told.h"
+#include "ingest/pipeline/layer_graph.h"
+#include "ingest/pipeline/mapping_options.h"
+#include "ingest/pipeline/stage_clock.h"
+#include "ingest/places/place_tracker.h"
+#include "ingest/rooms/find_rooms.h"
+#include "ingest/rooms/structure.h"
+#include "ingest/volume/semantic_volume.h"
+#include "schema/model/layer.h"
+
+namespace dsg::ingest {
+
+/// The same frames and calls give the same layers.
+///
+/// Threads: one caller at a time.
+/// Source: RSS 2020, sections III-A and IV; built while the log runs, where the paper builds the
+/// upper layers at its end.
+class StaticLayers {
+ public:
+  /// `labels`: classes of the log's label images, may be empty. Requires: valid options.
+  StaticLayers(const MappingOptions& options, std::vector<SemanticLabel> labels,
+               const NodeNumbering& numbering);
+
+  /// Errors: of SemanticVolume::Integrate; nothing has changed then.
+  absl::Status Integrate(const DepthFrame& frame);
+
+  /// Blocks that changed since the last call.
+  std::vector<MeshBlock> TakeMesh(double block_size_m);
+
+  /// Finds all layers above the mesh anew. Call TakeMesh before.
+  LayerGraph Update(TimeNs now_ns, bool is_last);
+
+  /// CAD models that nodes refer to for the first time since the last call.
+  std::vector<Asset> TakeAssets();
+
+  /// Whether enough of the log has passed since the last Update.
+  bool IsUpdateDue(TimeNs now_ns) const;
+
+  VolumeCounts counts() const { return volume_.counts(); }
+  StageClock& clock() { return clock_; }
+
+ private:
+  std::vector<const MeshBlock*> Mesh() const;
+  DistanceField FindDistances(const std::vector<const MeshBlock*>& mesh,
+                              const std::vector<double>& floors_m);
+  void NoteCost(int64_t cell_count);
+  void FindObjects(TimeNs now_ns, const std::vector<const MeshBlock*>& mesh,
+                   const std::vector<StructurePiece>& structures);
+  void KeepGone(const std::vector<TrackedObject>& before, const ObjectChanges& changes,
+                TimeNs now_ns);
+  void FitShapes(const std::vector<double>& floors_m, bool is_last);
+  void TellAsset(int model);
+  void FindPlacesOfObjects(const DistanceField& field, LayerParts* parts) const;
+  std::vector<Storey> FindStoreys(const LayerParts& parts) const;
+  void FindRoomsOf(const DistanceField& field, LayerParts* parts);
+  void RelateStructures(LayerParts* parts) const;
+  void ClassifyRooms(LayerParts* parts) const;
+
+  MappingOptions options_;
+  std::vector<SemanticLabel> labels_;
+  StructureClasses classes_;
+  ShapeFitter fitter_;
+  LayerGraphMaker maker_;
+  SemanticVolume volume_;
+  std::map<BlockIndex, MeshBlock> mesh_;
+  std::vector<Eigen::Vector3d> path_map_;
+  ObjectTracker object_tracker_;
+  CoVisibility together_;
+  /// By object.
+  std::map<int64_t, ShapeFit> fits_;
+  std::vector<int64_t> unfitted_;
+  std::vector<GoneObject> gone_;
+  PlaceTracker place_tracker_;
+  StructureTracker structure_tracker_;
+  RoomTracker room_tracker_;
+  std::vector<bool> is_asset_told_;
+  std::vector<Asset> assets_;
+  TimeNs updated_ns_ = kTimeMin;
+  /// Log time that the next update should wait at least.
+  TimeNs update_cost_ns_ = 0;
+  TimeNs observed_together_ns_ = kTimeMin;
+  StageClock clock_;
+};
+
+}  // namespace dsg::ingest

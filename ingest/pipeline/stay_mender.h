@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// Keeps the stays of a log true to rooms and places that were told apart while it ran.
+// Refuses to change when a stay began and ended: only where it was.
+#pragma once
+
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "ingest/pipeline/region_index.h"
+#include "schema/model/trajectory.h"
+
+namespace dsg::ingest {
+
+/// Threads: one caller at a time.
+class StayMender {
+ public:
+  /// Requires: times strictly grow per agent.
+  void Observe(NodeId agent, TimeNs time_ns, const Eigen::Vector3d& position_map);
+
+  /// Takes note of stays that were told.
+  void Remember(const std::vector<Stay>& stays);
+
+  /// The ended stays whose room or place is not in `regions` any more, or which had no room: where
+  /// the agent was in the middle of each, by `regions`. Counts as told. Order: agent, enter_ns.
+  std::vector<Stay> Mend(const RegionIndex& regions);
+
+ private:
+  struct Seen {
+    TimeNs time_ns;
+    Eigen::Vector3d position_map;
+  };
+  const Eigen::Vector3d* MiddleOf(const Stay& stay) const;
+
+  std::map<NodeId, std::vector<Seen>> seen_;
+  std::map<std::pair<NodeId, TimeNs>, Stay> told_;
+};
+
+}  // namespace dsg::ingest

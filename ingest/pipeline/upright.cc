@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/pipeline/upright.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_split.h"
+#include "ingest/depth/frame_maker.h"
+#include "ingest/depth/gravity.h"
+#include "ingest/log/turned_log.h"
+#include "schema/base/status.h"
+
+namespace dsg::ingest {
+namespace {
+
+// Pictures that are looked at, spread over the log.
+constexpr int64_t kFrameCount = 16;
+// A frame that stands this upright is left alone: its poses know better than a look at the walls.
+constexpr double kUprightRad = 0.05;
+
+absl::StatusOr<Eigen::Vector3d> ParseUp(const std::string& up) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::string name(1, static_cast<char>('x' + axis));
+    if (up == name || up == "+" + name) return Eigen::Vector3d::Unit(axis);
+    if (up == "-" + name) return -Eigen::Vector3d::Unit(axis);
+  }
+  const std::vector<std::string> parts = absl::StrSplit(up, ',');
+  Eigen::Vector3d vector = Eigen::Vector3d::Zero();
+  bool is_read = parts.size() == 3;
+  for (size_t i = 0; is_read && i < parts.size(); ++i) {
+    is_read = absl::SimpleAtod(parts[i], &vector[static_cast<int>(i)]);
+  }
+  if (is_read && vector.allFinite() && vector.norm() > 1e-6 && vector.norm() < 1e6) {
+    return vector.normalized();
+  }
+  return MakeError(
+      Reason::kFieldInvalid,
+      absl::StrCat("--up ", up,
+                   " is no direction; give auto, none, x, -x, y, -y, z, -z or three numbers "
+                   "\"x,y,z\" of a vector that points up in the log's frame"),
+      {{"field", "up"}, {"value", up}});
+}
+
+// A few of the log's frames; depth pictures in between are never decoded.
+absl::StatusOr<std::vector<DepthFrame>> SpreadFrames(LogSource& log) {
+  FrameMaker maker(log.info().rig, DepthOptions());
+  std::vector<DepthFrame> frames;
+  const auto take = [&maker, &frames] {
+    while (std::optional<DepthFrame> frame = maker.Next()) frames.push_back(*std::move(frame));
+  };
+  const auto depth = log.info().channel_counts.find("depth0");
+  const int64_t depth_count = depth == log.info().channel_counts.end() ? 0 : depth->second;
+  const int64_t stride = std::max<int64_t>(1, depth_count / kFrameCount);
+  int64_t seen = 0;
+  while (true) {
+    DSG_ASSIGN_OR_RETURN(std::optional<Measurement> measurement, log.Next());
+    if (!measurement.has_value()) break;
+    if (const auto* pose = std::get_if<PoseMeasurement>(&*measurement)) {
+      maker.AddPose(pose->pose.time_ns, pose->pose.map_T_agent);
+    } else if (auto* image = std::get_if<ImageMeasurement>(&*measurement)) {
+      if (image->channel != "depth0" || seen++ % stride != 0) continue;
+      maker.AddPicture({image->time_ns, image->channel, image->origin, image->load});
+    }
+    take();
+  }
+  maker.Finish();
+  take();
+  return frames;
+}
+
+}  // namespace
+
+absl::Status CheckUp(const std::string& up) {
+  if (up == "auto" || up == "none") return absl::OkStatus();
+  return ParseUp(up).status();
+}
+
+absl::StatusOr<std::unique_ptr<LogSource>> TurnUpright(std::unique_ptr<LogSource> log,
+                                                       const std::string& path,
+                                                       const LogOptions& options,
+                                                       const std::string& up, std::string* note) {
+  Eigen::Vector3d up_log = Eigen::Vector3d::UnitZ();
+  if (up == "auto") {
+    if (log->info().format != "rgbd" || !log->info().channel_counts.contains("depth0")) return log;
+    DSG_ASSIGN_OR_RETURN(const std::vector<DepthFrame> frames, SpreadFrames(*log));
+    DSG_ASSIGN_OR_RETURN(log, OpenLog(path, options));
+    const std::optional<Eigen::Vector3d> found = EstimateUp(frames);
+    if (!found.has_value()) {
+      *note = "which way is up could not be told from the pictures; z is taken for up, give --up";
+      return log;
+    }
+    up_log = *found;
+  } else if (up != "none") {
+    DSG_ASSIGN_OR_RETURN(up_log, ParseUp(up));
+  }
+  if (std::acos(std::clamp(up_log.z(), -1.0, 1.0)) < kUprightRad) return log;
+  *note = absl::StrFormat("the log's (%.3f, %.3f, %.3f) points up; its poses are turned",
+                          up_log.x(), up_log.y(), up_log.z());
+  return TurnLog(std::move(log),
+                 Eigen::Quaterniond::FromTwoVectors(up_log, Eigen::Vector3d::UnitZ()));
+}
+
+}  // namespace dsg::ingest

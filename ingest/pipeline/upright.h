@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// Turns logs whose frame lies on its side upright: maps have z up.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "ingest/log/log_source.h"
+
+namespace dsg::ingest {
+
+/// How a log's frame stands, as the user says it: "z", "-y" and so on, "x,y,z" of a vector that
+/// points up, "none" (as "z"), or "auto": looked for in the depth pictures of RGB-D folders, whose
+/// frames stand as they like, and taken for z elsewhere.
+///
+/// The log opened again and turned, or `log` itself when z is up already. A sentence about what was
+/// done goes to `note`; it stays empty when nothing was.
+/// Errors: INVALID_ARGUMENT/FIELD_INVALID for another text; of OpenLog.
+absl::StatusOr<std::unique_ptr<LogSource>> TurnUpright(std::unique_ptr<LogSource> log,
+                                                       const std::string& path,
+                                                       const LogOptions& options,
+                                                       const std::string& up, std::string* note);
+
+/// Errors: as TurnUpright, for the text alone.
+absl::Status CheckUp(const std::string& up);
+
+}  // namespace dsg::ingest

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Stays in rooms that turned out to be others.
+#include "ingest/pipeline/stay_mender.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/unit/ingest/pipeline/pipeline_test_util.h"
+
+namespace dsg::ingest {
+namespace {
+
+const NodeId kRobot('r', 0);
+
+class StayMenderTest : public testing::Test {
+ protected:
+  StayMenderTest() {
+    for (int i = 0; i <= 10; ++i) mender_.Observe(kRobot, 100 * i, {i, 2.0, 0.0});
+  }
+  StayMender mender_;
+};
+
+TEST_F(StayMenderTest, LeavesStaysAloneWhoseRoomIsStillThere) {
+  mender_.Remember({{kRobot, NodeId(), NodeId('R', 1), 0, 501}});
+  EXPECT_TRUE(mender_.Mend(RegionIndex({MakeRoom(1, 0, 0, 3, 5)}, {}, {})).empty());
+}
+
+TEST_F(StayMenderTest, MovesStaysToTheRoomThatTheirMiddleIsIn) {
+  mender_.Remember({{kRobot, NodeId(), NodeId('R', 1), 0, 501}});
+  const RegionIndex regions({MakeRoom(2, 0, 0, 5, 5), MakeRoom(3, 5, 0, 11, 5)}, {}, {});
+  const std::vector<Stay> mended = mender_.Mend(regions);
+  ASSERT_EQ(mended.size(), 1u);
+  EXPECT_EQ(mended[0], (Stay{kRobot, NodeId(), NodeId('R', 2), 0, 501}));
+  EXPECT_TRUE(mender_.Mend(regions).empty()) << "told already";
+}
+
+TEST_F(StayMenderTest, GivesARoomToStaysThatHadNone) {
+  mender_.Remember({{kRobot, NodeId('p', 1), NodeId(), 600, 1001}});
+  const RegionIndex regions({MakeRoom(3, 5, 0, 11, 5)}, {MakePlace(1, 8, 2)}, {});
+  const std::vector<Stay> mended = mender_.Mend(regions);
+  ASSERT_EQ(mended.size(), 1u);
+  EXPECT_EQ(mended[0].room, NodeId('R', 3));
+}
+
+TEST_F(StayMenderTest, LeavesOpenStaysAndThoseThatAreNowhereNow) {
+  mender_.Remember({{kRobot, NodeId(), NodeId('R', 1), 0, 501},
+                    {kRobot, NodeId(), NodeId('R', 1), 501, kTimeMax}});
+  EXPECT_TRUE(mender_.Mend(RegionIndex({MakeRoom(9, 50, 50, 60, 60)}, {}, {})).empty());
+}
+
+}  // namespace
+}  // namespace dsg::ingest
