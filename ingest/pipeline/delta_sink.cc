@@ -64,6 +64,7 @@ absl::Status DeltaSink::PutPart(GraphDelta delta) {
 absl::Status DeltaSink::PutPartAsIs(GraphDelta delta) {
   ++sequence_;
   if (sequence_ > last_sequence_) return CommitNext(std::move(delta));
+  reconciler_.ObserveCommitted(delta);
   committed_sequence_ = sequence_;
   return absl::OkStatus();
 }

@@ -6,7 +6,6 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <unordered_set>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -14,6 +13,7 @@
 #include "ingest/pipeline/delta_builder.h"
 #include "ingest/pipeline/graph_agents.h"
 #include "ingest/pipeline/graph_boxes.h"
+#include "ingest/pipeline/log_regions.h"
 #include "ingest/pipeline/region_index.h"
 #include "ingest/pipeline/session.h"
 #include "ingest/pipeline/stay_mender.h"
@@ -26,69 +26,6 @@ namespace dsg::ingest {
 namespace {
 
 constexpr int64_t kPosesPerDeltaMax = 1'000'000;
-
-// Rooms and places that stays are derived from: the map's, and the log's own.
-class Regions {
- public:
-  static absl::StatusOr<Regions> Read(const MapView& map) {
-    Regions regions;
-    DSG_ASSIGN_OR_RETURN(regions.rooms_, map.NodesOfLayer(layers::kRooms));
-    DSG_ASSIGN_OR_RETURN(regions.places_, map.NodesOfLayer(layers::kPlaces));
-    for (const Node& room : regions.rooms_) {
-      DSG_ASSIGN_OR_RETURN(const std::vector<NodeId> children, map.Children(room.id));
-      for (const NodeId child : children) regions.contains_.push_back({room.id, child});
-    }
-    return regions;
-  }
-
-  // The log's word on a node replaces the map's, as it will once it is committed; so a resumed
-  // run, which finds both the same, sees the same rooms.
-  void Add(const GraphDelta& graph) {
-    std::unordered_set<NodeId> replaced;
-    for (const Node& node : graph.nodes) {
-      if (node.layer == layers::kRooms || node.layer == layers::kPlaces) replaced.insert(node.id);
-    }
-    const auto is_replaced = [&replaced](const Node& node) { return replaced.contains(node.id); };
-    std::erase_if(rooms_, is_replaced);
-    std::erase_if(places_, is_replaced);
-    for (const Node& node : graph.nodes) {
-      if (node.layer == layers::kRooms) rooms_.push_back(node);
-      if (node.layer == layers::kPlaces) places_.push_back(node);
-    }
-    for (const Edge& edge : graph.edges) {
-      if (edge.relation == relations::kContains) contains_.push_back({edge.source, edge.target});
-    }
-  }
-
-  // The rooms and places that this log has found so far, instead of those it had found before.
-  void SetFound(GraphDelta found) { found_ = std::move(found); }
-
-  RegionIndex MakeIndex() const {
-    std::vector<Node> rooms = rooms_;
-    std::vector<Node> places = places_;
-    for (const Node& node : found_.nodes) {
-      if (node.layer == layers::kRooms) rooms.push_back(node);
-      if (node.layer == layers::kPlaces) places.push_back(node);
-    }
-    // What has left the world holds nobody any more.
-    const auto has_ended = [](const Node& node) { return node.valid.to_ns != kTimeMax; };
-    std::erase_if(rooms, has_ended);
-    std::erase_if(places, has_ended);
-    std::vector<RegionIndex::Containment> contains = contains_;
-    for (const Edge& edge : found_.edges) contains.push_back({edge.source, edge.target});
-    std::sort(contains.begin(), contains.end(),
-              [](const RegionIndex::Containment& a, const RegionIndex::Containment& b) {
-                return std::pair(a.room, a.place) < std::pair(b.room, b.place);
-              });
-    return RegionIndex(std::move(rooms), std::move(places), contains);
-  }
-
- private:
-  std::vector<Node> rooms_;
-  std::vector<Node> places_;
-  std::vector<RegionIndex::Containment> contains_;
-  GraphDelta found_;
-};
 
 // Of a measurement that no stage takes yet.
 std::string ChannelOf(const Measurement& measurement) {
@@ -121,7 +58,7 @@ class LogRun {
  public:
   // `mapper`: null for logs without depth.
   LogRun(const LogInfo& info, const IngestOptions& options, const MapView& map,
-         const std::vector<Node>& agents, Regions regions, DeltaSink sink,
+         const std::vector<Node>& agents, LogRegions regions, DeltaSink sink,
          std::unique_ptr<LogMapper> mapper)
       : options_(options),
         map_(map),
@@ -151,9 +88,12 @@ class LogRun {
     ReplayWaiting();
     Tracker().Finish();
     std::vector<Stay> stays = Tracker().TakeChanges();
-    mender_.Remember(stays);
-    DSG_RETURN_IF_ERROR(sink_.Put(builder_.Take(std::move(stays))));
-    if (mapper_ != nullptr) DSG_RETURN_IF_ERROR(MendStays());
+    if (mapper_ == nullptr) {
+      DSG_RETURN_IF_ERROR(sink_.Put(builder_.Take(std::move(stays))));
+    } else {
+      DSG_RETURN_IF_ERROR(PutStays(std::move(stays)));
+      DSG_RETURN_IF_ERROR(PutStays(mender_.Mend(regions_.MakeIndex())));
+    }
     return sink_.Put(builder_.TakeNodes());
   }
 
@@ -218,19 +158,20 @@ class LogRun {
       change.delta.mesh_removals = std::move(delta.mesh_removals);
       delta = std::move(change.delta);
     }
-    std::vector<Stay> stays;
-    if (tracker_.has_value()) stays = Tracker().TakeChanges();
-    mender_.Remember(stays);
-    DSG_RETURN_IF_ERROR(sink_.Put(builder_.Take(std::move(stays))));
+    DSG_RETURN_IF_ERROR(sink_.Put(builder_.Take({})));
+    if (tracker_.has_value()) DSG_RETURN_IF_ERROR(PutStays(Tracker().TakeChanges()));
     DSG_RETURN_IF_ERROR(sink_.PutAsIs(std::move(delta)));
-    if (is_update) DSG_RETURN_IF_ERROR(MendStays());
+    if (is_update) DSG_RETURN_IF_ERROR(PutStays(mender_.Mend(regions_.MakeIndex())));
     if (tracker_.has_value()) ReplayWaiting();
     return absl::OkStatus();
   }
 
-  absl::Status MendStays() {
+  // As they are: these stays come later than their poses, so what the map holds of the poses tells
+  // nothing about the stays.
+  absl::Status PutStays(std::vector<Stay> stays) {
+    mender_.Remember(stays);
     GraphDelta delta;
-    delta.stays = mender_.Mend(regions_.MakeIndex());
+    delta.stays = std::move(stays);
     return sink_.PutAsIs(std::move(delta));
   }
 
@@ -259,7 +200,7 @@ class LogRun {
   IngestOptions options_;
   const MapView& map_;
   AgentNamer namer_;
-  Regions regions_;
+  LogRegions regions_;
   std::optional<StayTracker> tracker_;
   DeltaBuilder builder_;
   DeltaSink sink_;
@@ -318,9 +259,11 @@ absl::StatusOr<IngestSummary> IngestLog(LogSource& log, const LogOptions& log_op
   SessionHeader header = MakeHeader(log.info(), log_options, options, map.spec());
   DSG_ASSIGN_OR_RETURN(const SessionState session, writer.GetSession(header.session_id));
   DSG_ASSIGN_OR_RETURN(const std::vector<Node> agents, map.NodesOfLayer(layers::kAgents));
-  DSG_ASSIGN_OR_RETURN(Regions regions, Regions::Read(map));
   DSG_ASSIGN_OR_RETURN(std::unique_ptr<LogMapper> mapper,
                        LogMapper::Make(log.info(), options.mapping, map, header.session_id));
+  std::optional<NodeNumbering> own;
+  if (mapper != nullptr) own = mapper->numbering();
+  DSG_ASSIGN_OR_RETURN(LogRegions regions, LogRegions::Read(map, own));
   LogRun run(log.info(), options, map, agents, std::move(regions),
              DeltaSink(std::move(header), session.last_sequence, map, writer), std::move(mapper));
   for (int64_t count = 1;; ++count) {

@@ -77,6 +77,9 @@ struct NodeNumbering {
   int64_t session_number = 0;
 
   static constexpr uint64_t kPerSession = 1'000'000;
+  bool IsOwn(NodeId id) const {
+    return id.index() / kPerSession == static_cast<uint64_t>(session_number);
+  }
   NodeId Id(char letter, int64_t index) const {
     return NodeId(
         letter, static_cast<uint64_t>(session_number) * kPerSession + static_cast<uint64_t>(index));

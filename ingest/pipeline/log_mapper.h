@@ -47,6 +47,7 @@ class LogMapper {
   /// Fuses the frames that are complete. Errors: of StaticLayers::Integrate.
   absl::Status Advance();
 
+  const NodeNumbering& numbering() const { return layers_.numbering(); }
   bool IsUpdateDue(TimeNs now_ns) const { return layers_.IsUpdateDue(now_ns); }
 
   /// The layers above the mesh found anew, as a change of what was told before, and the rooms,

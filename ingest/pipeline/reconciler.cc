@@ -66,7 +66,10 @@ bool IsSameEdge(const Edge& a, const Edge& b) {
 }  // namespace
 
 void Reconciler::ObserveCommitted(const GraphDelta& delta) {
-  for (const Stay& stay : delta.stays) told_[stay.agent] = stay;
+  for (const Stay& stay : delta.stays) {
+    Stay& newest = told_.try_emplace(stay.agent, stay).first->second;
+    if (stay.enter_ns >= newest.enter_ns) newest = stay;
+  }
 }
 
 absl::Status Reconciler::CountNews(const std::vector<GraphDelta>& parts) {

@@ -53,6 +53,7 @@ class StaticLayers {
   /// Whether enough of the log has passed since the last Update.
   bool IsUpdateDue(TimeNs now_ns) const;
 
+  const NodeNumbering& numbering() const { return maker_.numbering(); }
   VolumeCounts counts() const { return volume_.counts(); }
   StageClock& clock() { return clock_; }
 

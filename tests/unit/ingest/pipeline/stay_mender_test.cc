@@ -14,7 +14,7 @@ const NodeId kRobot('r', 0);
 class StayMenderTest : public testing::Test {
  protected:
   StayMenderTest() {
-    for (int i = 0; i <= 10; ++i) mender_.Observe(kRobot, 100 * i, {i, 2.0, 0.0});
+    for (int i = 0; i <= 10; ++i) mender_.Observe(kRobot, 100 * i, {1.0 * i, 2.0, 0.0});
   }
   StayMender mender_;
 };
