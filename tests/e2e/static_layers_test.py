@@ -79,7 +79,9 @@ class StaticLayers(support.ProgramsTest):
     def revision_count(self, store):
         done = support.run("dsg", "stats", "--store", store, "--map", "home", "--json",
                            cwd=self.folder)
-        return int(json.loads(done.stdout)["header"]["head_revision"]) if done.returncode == 0 else 0
+        if done.returncode != 0:
+            return 0
+        return int(json.loads(done.stdout)["header"]["head_revision"])
 
     def test_a_killed_run_goes_on_to_the_same_map(self):
         command = ["dsg-ingest", "--store", "killed", "--map", "home", "--poses", "gt", "--cad",
