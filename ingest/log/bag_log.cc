@@ -281,7 +281,8 @@ absl::StatusOr<std::optional<TrackTable>> PlanPoses(const LogOptions& options, B
     }
   }
   if (!from_file && choice == PoseChoice::kNone) {
-    info->notes.push_back("the log holds no poses of the robot");
+    info->notes.push_back(
+        "the log holds no poses of the robot, so nothing can be mapped; give --pose-file");
   }
   return table;
 }

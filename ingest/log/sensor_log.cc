@@ -120,7 +120,8 @@ absl::StatusOr<std::optional<TrackTable>> ChoosePoses(const LogOptions& options,
                        ChoosePoseKind(options, tables.ground_truth.has_value(),
                                       tables.external.has_value(), info->path));
   if (choice == PoseChoice::kNone) {
-    info->notes.push_back("the log holds no poses of the robot");
+    info->notes.push_back(
+        "the log holds no poses of the robot, so nothing can be mapped; give --pose-file");
     return std::nullopt;
   }
   TrackTable table = choice == PoseChoice::kExternal ? *std::move(tables.external)

@@ -45,28 +45,33 @@ std::string_view NameOf(PoseSource source) {
   return "auto";
 }
 
+TimeNs TimeIn(const GraphMeasurement&) { return kTimeMin; }
+TimeNs TimeIn(const PoseMeasurement& pose) { return pose.pose.time_ns; }
+template <typename Sensor>
+TimeNs TimeIn(const Sensor& measurement) {
+  return measurement.time_ns;
+}
+
+// kTimeMin for what has none.
 TimeNs TimeOf(const Measurement& measurement) {
-  if (const auto* pose = std::get_if<PoseMeasurement>(&measurement)) return pose->pose.time_ns;
-  if (const auto* imu = std::get_if<ImuMeasurement>(&measurement)) return imu->time_ns;
-  if (const auto* image = std::get_if<ImageMeasurement>(&measurement)) return image->time_ns;
-  if (const auto* human = std::get_if<HumanDetection>(&measurement)) return human->time_ns;
-  return kTimeMin;
+  return std::visit([](const auto& any) { return TimeIn(any); }, measurement);
 }
 
 // The stages of one log, wired.
 class LogRun {
  public:
-  // `mapper`: null for logs without depth.
+  // `mapper`: null for logs without depth. `is_resumed`: an earlier run of the session was cut off.
   LogRun(const LogInfo& info, const IngestOptions& options, const MapView& map,
          const std::vector<Node>& agents, LogRegions regions, DeltaSink sink,
-         std::unique_ptr<LogMapper> mapper)
+         std::unique_ptr<LogMapper> mapper, bool is_resumed)
       : options_(options),
         map_(map),
         namer_(agents),
         regions_(std::move(regions)),
         builder_(info.feet_below_m),
         sink_(std::move(sink)),
-        mapper_(std::move(mapper)) {}
+        mapper_(std::move(mapper)),
+        is_resumed_(is_resumed) {}
 
   absl::Status Take(Measurement measurement) {
     if (mapper_ != nullptr) DSG_RETURN_IF_ERROR(CommitIfDue(TimeOf(measurement)));
@@ -118,12 +123,26 @@ class LogRun {
       if (builder_.pose_count() < options_.poses_per_delta) return absl::OkStatus();
       return sink_.Put(builder_.Take(Tracker().TakeChanges()));
     }
-    // Rooms and places that this log is about to show are not known yet.
-    mender_.Observe(agent, pose.pose.time_ns, pose.pose.map_T_agent.position);
-    waiting_.push_back({agent, pose.pose.time_ns, pose.pose.map_T_agent.position});
+    DSG_ASSIGN_OR_RETURN(const bool is_told, IsToldBefore(agent, pose.pose.time_ns));
+    if (!is_told) {
+      // Rooms and places that this log is about to show are not known yet.
+      mender_.Observe(agent, pose.pose.time_ns, pose.pose.map_T_agent.position);
+      waiting_.push_back({agent, pose.pose.time_ns, pose.pose.map_T_agent.position});
+    }
     if (tracker_.has_value()) ReplayWaiting();
     mapper_->AddPose(pose);
     return mapper_->Advance();
+  }
+
+  // Where an agent was at a time that another log has told of already is that log's business.
+  absl::StatusOr<bool> IsToldBefore(NodeId agent, TimeNs time_ns) {
+    if (is_resumed_) return false;
+    const auto [told_until, is_new] = told_until_ns_.try_emplace(agent, kTimeMin);
+    if (is_new) {
+      DSG_ASSIGN_OR_RETURN(const std::optional<TrackInfo> track, map_.FindTrack(agent));
+      if (track.has_value()) told_until->second = track->last_ns;
+    }
+    return time_ns <= told_until->second;
   }
 
   // False when the mapper has no use for it.
@@ -205,6 +224,9 @@ class LogRun {
   DeltaBuilder builder_;
   DeltaSink sink_;
   std::unique_ptr<LogMapper> mapper_;
+  bool is_resumed_;
+  /// By agent, the end of its track when the log began.
+  std::map<NodeId, TimeNs> told_until_ns_;
   StayMender mender_;
   /// When the piece of the log began that is not committed yet.
   TimeNs begin_ns_ = kTimeMin;
@@ -265,7 +287,8 @@ absl::StatusOr<IngestSummary> IngestLog(LogSource& log, const LogOptions& log_op
   if (mapper != nullptr) own = mapper->numbering();
   DSG_ASSIGN_OR_RETURN(LogRegions regions, LogRegions::Read(map, own));
   LogRun run(log.info(), options, map, agents, std::move(regions),
-             DeltaSink(std::move(header), session.last_sequence, map, writer), std::move(mapper));
+             DeltaSink(std::move(header), session.last_sequence, map, writer), std::move(mapper),
+             session.last_sequence > 0);
   for (int64_t count = 1;; ++count) {
     DSG_ASSIGN_OR_RETURN(std::optional<Measurement> measurement, log.Next());
     if (!measurement.has_value()) break;

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -303,4 +304,8 @@ int Main(int argc, char** argv) {
 }  // namespace
 }  // namespace dsg::ingest
 
-int main(int argc, char** argv) { return dsg::ingest::Main(argc, argv); }
+int main(int argc, char** argv) {
+  // A file over the limit of the shell is a failed write with a message, not a sudden end.
+  std::signal(SIGXFSZ, SIG_IGN);
+  return dsg::ingest::Main(argc, argv);
+}

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "ingest/pipeline/map_things.h"
 #include "schema/base/status.h"
 
@@ -140,7 +141,17 @@ LogMapper::LayerChange LogMapper::TakeLayers(TimeNs now_ns) {
 }
 
 MappingSummary LogMapper::Summary() {
-  return {layers_.counts(), frames_.skips(), layers_.clock().times()};
+  MappingSummary summary{"", layers_.counts(), frames_.skips(), layers_.clock().times()};
+  const int64_t number = numbering().session_number;
+  if (number > 0) {
+    summary.note = absl::StrCat(
+        "the map held layers of another log, or of this one with other options: this one's nodes "
+        "stand beside them, numbered from ",
+        number * static_cast<int64_t>(NodeNumbering::kPerSession),
+        ", and its mesh takes the place of theirs where both have a block (earlier revisions keep "
+        "it); name another --map to keep them apart");
+  }
+  return summary;
 }
 
 }  // namespace dsg::ingest

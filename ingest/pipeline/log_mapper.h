@@ -19,6 +19,8 @@ namespace dsg::ingest {
 
 /// What became of a log's frames, for the user.
 struct MappingSummary {
+  /// A sentence about what was in the map already; empty when there is nothing to say.
+  std::string note;
   VolumeCounts volume;
   SkipCounts skipped;
   std::map<std::string, StageClock::Time> stages;

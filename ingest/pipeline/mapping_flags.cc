@@ -13,10 +13,14 @@
 namespace dsg::ingest {
 namespace {
 
-TimeNs Nanoseconds(double seconds) {
-  // Beyond any use, and in range of the type; Validate refuses it.
-  if (!(seconds > 0.0 && seconds < 1e9)) return 0;
-  return std::llround(seconds * static_cast<double>(kNsPerSecond));
+absl::StatusOr<TimeNs> Nanoseconds(const char* flag, double seconds) {
+  // A day is past any use, and in range of the type.
+  if (seconds >= 0.1 && seconds <= 86400.0) {
+    return std::llround(seconds * static_cast<double>(kNsPerSecond));
+  }
+  return MakeError(Reason::kFieldInvalid,
+                   absl::StrCat("--", flag, " is ", seconds, "; give 0.1 to 86400 seconds"),
+                   {{"field", flag}, {"value", absl::StrCat(seconds)}});
 }
 
 }  // namespace
@@ -79,8 +83,8 @@ absl::StatusOr<MappingOptions> MakeMappingOptions(const MappingFlags& flags) {
   if (flags.rooms == "clearance") options.rooms.method = RoomMethod::kClearance;
   if (flags.places == "volume") options.places.mode = PlaceMode::kVolume;
   options.places.robot_radius_m = flags.robot_radius_m;
-  options.commit_period_ns = Nanoseconds(flags.commit_s);
-  options.layers_period_ns = Nanoseconds(flags.layers_s);
+  DSG_ASSIGN_OR_RETURN(options.commit_period_ns, Nanoseconds("commit-seconds", flags.commit_s));
+  DSG_ASSIGN_OR_RETURN(options.layers_period_ns, Nanoseconds("layers-seconds", flags.layers_s));
   DSG_RETURN_IF_ERROR(options.Validate());
   if (!flags.cad_folder.empty()) {
     DSG_ASSIGN_OR_RETURN(options.catalogue, ReadCatalogue(flags.cad_folder));
@@ -104,6 +108,15 @@ void PrintMapping(const std::string& path, const MappingSummary& summary, bool h
                 static_cast<long long>(volume.refused_block_count));
   }
   std::printf("\n");
+  if (!summary.note.empty()) {
+    std::fprintf(stderr, "%s: note: %s\n", path.c_str(), summary.note.c_str());
+  }
+  if (volume.pixel_count == 0) {
+    std::fprintf(stderr,
+                 "%s: warning: nothing was mapped: no frame had depth that could be used; look at "
+                 "what was skipped, at the depth images and at the time stamps of the poses\n",
+                 path.c_str());
+  }
   if (has_timings) {
     std::printf("%-12s %8s %10s %12s %12s\n", "stage", "times", "total s", "mean ms", "longest ms");
     for (const auto& [stage, time] : summary.stages) {

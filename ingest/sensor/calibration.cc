@@ -9,6 +9,8 @@
 namespace dsg::ingest {
 namespace {
 
+// Of 80 degrees.
+constexpr double kTanHalfViewMax = 5.671;
 constexpr int kSideMax = 16384;
 constexpr int64_t kPixelsMax = 16'000'000;
 
@@ -72,6 +74,12 @@ absl::Status CameraCalibration::Validate() const {
   }
   DSG_RETURN_IF_ERROR(CheckPositive(name, "fx", fx));
   DSG_RETURN_IF_ERROR(CheckPositive(name, "fy", fy));
+  // Normalised intrinsics, or those of another camera: nothing looks that wide through a pinhole.
+  if (distortion != Distortion::kEquidistant && width > 2.0 * kTanHalfViewMax * fx) {
+    return Bad(name, "fx", fx,
+               absl::StrCat("at least ", width / (2.0 * kTanHalfViewMax),
+                            " pixels, which is a view of 160 degrees"));
+  }
   DSG_RETURN_IF_ERROR(CheckNotNegative(name, "rate_hz", rate_hz));
   for (const auto& [field, value] : {std::pair("cx", cx), std::pair("cy", cy)}) {
     if (!std::isfinite(value)) return Bad(name, field, value, "finite");

@@ -37,7 +37,7 @@ struct VolumeOptions {
   /// Threads to integrate with. The result does not depend on it.
   int thread_count = 2;
   /// Voxel blocks that may be held; frames that would need more are cut there, and counted.
-  int64_t block_count_max = 400'000;
+  int64_t block_count_max = 220'000;
 
   /// Errors: INVALID_ARGUMENT/FIELD_INVALID naming field, value and bounds.
   absl::Status Validate() const;

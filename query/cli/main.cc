@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The program dsg: hands the process's arguments and environment to query/cli/run.h.
+#include <csignal>
 #include <cstdlib>
 #include <iostream>
 #include <string>
@@ -17,6 +18,8 @@ std::string FromEnvironment(const char* name) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // A file over the limit of the shell is a failed write with a message, not a sudden end.
+  std::signal(SIGXFSZ, SIG_IGN);
   const dsg::cli::Environment environment{.store = FromEnvironment("DSG_STORE"),
                                           .server = FromEnvironment("DSG_SERVER"),
                                           .map = FromEnvironment("DSG_MAP"),

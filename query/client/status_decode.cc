@@ -15,6 +15,10 @@ absl::Status DecodeStatus(int code, std::string_view message, std::string_view d
   const bool is_known_code = code > 0 && code <= 16;
   const auto status_code =
       is_known_code ? static_cast<absl::StatusCode>(code) : absl::StatusCode::kUnknown;
+  // gRPC itself says no more when a server lacks a call.
+  if (status_code == absl::StatusCode::kUnimplemented && message.empty()) {
+    message = "the server does not know this call; it is older than this program: update it";
+  }
   absl::Status plain(status_code, absl::string_view(message.data(), message.size()));
 
   v1::ErrorDetail parsed;

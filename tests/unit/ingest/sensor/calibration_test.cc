@@ -49,6 +49,19 @@ void ExpectRefused(const absl::Status& status, const std::string& sensor,
   EXPECT_NE(std::string(status.message()).find(sensor), std::string::npos) << status;
 }
 
+TEST(CameraCalibration, RefusesAViewThatNoPinholeHas) {
+  CameraCalibration camera = GoodCamera();
+  camera.fx = 0.577;
+  ExpectRefused(camera.Validate(), "cam0", "fx");
+  camera.fx = 70.0;
+  EXPECT_TRUE(camera.Validate().ok());
+  camera.fx = 41.0;
+  ExpectRefused(camera.Validate(), "cam0", "fx");
+  camera.distortion = Distortion::kEquidistant;
+  camera.distortion_coefficients = {0.0, 0.0, 0.0, 0.0};
+  EXPECT_TRUE(camera.Validate().ok()) << "a fisheye looks wider";
+}
+
 TEST(CameraCalibration, AcceptsWhatCamerasAre) {
   CameraCalibration camera = GoodCamera();
   EXPECT_TRUE(camera.Validate().ok());

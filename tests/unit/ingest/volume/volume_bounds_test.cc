@@ -101,7 +101,8 @@ TEST(VolumeBounds, GarbageMakesNoMoreBlocksThanAllowed) {
     DepthFrame frame = GoodFrame();
     for (float& depth : frame.depth_m) depth = static_cast<float>(random.Uniform(0.0, 1e4));
     frame.map_T_camera.position = {random.Uniform(-1e3, 1e3), random.Uniform(-1e3, 1e3), 0.0};
-    if (i % 3 == 0) frame.camera.fx = 1e-3;
+    // The widest view that a calibration may have.
+    if (i % 3 == 0) frame.camera.fx = frame.camera.width / 11.0;
     ASSERT_TRUE(volume.Integrate(frame).ok());
     EXPECT_LE(volume.counts().block_count, 700);
     volume.TakeChangedMesh(2.0);

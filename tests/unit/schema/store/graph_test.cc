@@ -307,8 +307,9 @@ TEST(Edges, OfTheHierarchyAreKnownByNameWhateverRelationCameFirst) {
       {MakeObject(1, "", BoxOf(0, 0, 0, 1, 1, 1)), MakeObject(2, "", BoxOf(2, 0, 0, 3, 1, 1))});
   first.edges = {MakeEdge(a, relations::kNear, b)};
   map.MustCommit(first);
-  EXPECT_TRUE(map.Latest()->ChildrenOf(a)->empty());
-  EXPECT_TRUE(map.Latest()->FindParent(b)->empty());
+  NodeFilter children_of_a;
+  children_of_a.parent = a;
+  EXPECT_TRUE(Ids(*map.Latest(), children_of_a).empty());
   // A neighbour that grows beyond the other's box is no child that sticks out.
   map.MustCommit(DeltaOfNodes({MakeObject(2, "", BoxOf(2, 0, 0, 9, 9, 9))}));
 }
