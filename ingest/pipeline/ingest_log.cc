@@ -73,7 +73,8 @@ class LogRun {
         mapper_(std::move(mapper)),
         is_resumed_(is_resumed) {}
 
-  absl::Status Take(Measurement measurement) {
+  // Takes what it needs out of `measurement`.
+  absl::Status Take(Measurement& measurement) {
     if (mapper_ != nullptr) DSG_RETURN_IF_ERROR(CommitIfDue(TimeOf(measurement)));
     if (auto* graph = std::get_if<GraphMeasurement>(&measurement)) {
       return TakeGraph(std::move(graph->delta));
@@ -292,7 +293,7 @@ absl::StatusOr<IngestSummary> IngestLog(LogSource& log, const LogOptions& log_op
   for (int64_t count = 1;; ++count) {
     DSG_ASSIGN_OR_RETURN(std::optional<Measurement> measurement, log.Next());
     if (!measurement.has_value()) break;
-    DSG_RETURN_IF_ERROR(run.Take(*std::move(measurement)));
+    DSG_RETURN_IF_ERROR(run.Take(*measurement));
     if (on_progress) on_progress(count);
   }
   DSG_RETURN_IF_ERROR(run.Finish());
