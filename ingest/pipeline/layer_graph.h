@@ -47,7 +47,6 @@ struct RoomPart {
 
 /// All that the stages found at one instant.
 struct LayerParts {
-  TimeNs time_ns = 0;
   std::vector<TrackedObject> objects;
   std::map<int64_t, ShapeFit> fits;
   std::vector<GoneObject> gone;

@@ -86,7 +86,6 @@ bool StaticLayers::IsUpdateDue(TimeNs now_ns) const {
 LayerGraph StaticLayers::Update(TimeNs now_ns, bool is_last) {
   updated_ns_ = now_ns;
   LayerParts parts;
-  parts.time_ns = now_ns;
   const std::vector<const MeshBlock*> mesh = Mesh();
   {
     const StageClock::Span span(&clock_, "structures");
