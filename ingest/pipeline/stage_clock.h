@@ -2,10 +2,12 @@
 // How long each stage has taken, for people; never part of a result.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <map>
 #include <string>
+#include <utility>
 
 namespace dsg::ingest {
 
