@@ -19,7 +19,8 @@ SCHEMA = STORE + ["schema/interop", "schema/picture"]
 INGEST_STAGES = ["log", "simulator", "evaluation", "odometry", "loop", "depth", "volume", "agents",
                  "objects", "places", "rooms"]
 # Plain types that stages hand to one another.
-INGEST_SHARED = ["ingest/config", "ingest/files", "ingest/sensor", "ingest/grid"]
+INGEST_SHARED = ["ingest/config", "ingest/files", "ingest/sensor", "ingest/grid",
+                 "ingest/matching"]
 # Programs of their own beside the pipeline, which knows nothing of them.
 ASIDE = ["simulator", "evaluation"]
 ALLOWED = {
@@ -34,6 +35,7 @@ ALLOWED = {
     "ingest/files": BASE,
     "ingest/sensor": MODEL,
     "ingest/grid": MODEL,
+    "ingest/matching": [],
     "ingest/remote": SCHEMA,
     "ingest/pipeline": (SCHEMA + INGEST_SHARED + ["ingest/remote"] +
                         [f"ingest/{s}" for s in INGEST_STAGES if s not in ASIDE]),

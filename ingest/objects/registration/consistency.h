@@ -4,7 +4,7 @@
 // lengths of the other.
 #pragma once
 
-#include "ingest/objects/registration/bitset_graph.h"
+#include "ingest/matching/bitset_graph.h"
 #include "ingest/objects/registration/gnc_rotation.h"
 
 namespace dsg::ingest {

@@ -7,10 +7,10 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/matching/max_clique.h"
 #include "ingest/objects/registration/adaptive_voting.h"
 #include "ingest/objects/registration/consistency.h"
 #include "ingest/objects/registration/gnc_rotation.h"
-#include "ingest/objects/registration/max_clique.h"
 #include "ingest/objects/registration/rigid_refine.h"
 #include "schema/base/status.h"
 

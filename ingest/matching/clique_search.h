@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "ingest/objects/registration/bitset_graph.h"
+#include "ingest/matching/bitset_graph.h"
 
 namespace dsg::ingest {
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ingest/evaluation/assignment.h"
+#include "ingest/matching/assignment.h"
 
 #include <algorithm>
 #include <limits>
 
-namespace dsg::evaluation {
+namespace dsg::ingest {
 namespace {
 
 /// Rows are added one by one, each by a shortest augmenting path in reduced costs. Indices count
@@ -110,4 +110,4 @@ std::vector<int> MaximumAssignment(const Eigen::MatrixXd& weight) {
   return column_of;
 }
 
-}  // namespace dsg::evaluation
+}  // namespace dsg::ingest

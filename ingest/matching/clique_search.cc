@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ingest/objects/registration/clique_search.h"
+#include "ingest/matching/clique_search.h"
 
 #include <algorithm>
 

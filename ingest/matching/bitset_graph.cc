@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ingest/objects/registration/bitset_graph.h"
+#include "ingest/matching/bitset_graph.h"
 
 #include <algorithm>
 #include <utility>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ingest/evaluation/assignment.h"
+#include "ingest/matching/assignment.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 
 #include "tests/support/temp_folder.h"
 
-namespace dsg::evaluation {
+namespace dsg::ingest {
 namespace {
 
 double CostOf(const Eigen::MatrixXd& cost, const std::vector<int>& column_of) {
@@ -84,4 +84,4 @@ TEST(Assignment, TakesEmptySides) {
 }
 
 }  // namespace
-}  // namespace dsg::evaluation
+}  // namespace dsg::ingest

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ingest/objects/registration/max_clique.h"
+#include "ingest/matching/max_clique.h"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-namespace dsg::evaluation {
+namespace dsg::ingest {
 
 /// For each row its column, -1 for rows that are left over when there are fewer columns.
 ///
@@ -23,4 +23,4 @@ std::vector<int> GatedAssignment(const Eigen::MatrixXd& cost, double gate);
 /// Pairs of the largest total weight; pairs of weight 0 stay apart. Requires: 0 <= weight.
 std::vector<int> MaximumAssignment(const Eigen::MatrixXd& weight);
 
-}  // namespace dsg::evaluation
+}  // namespace dsg::ingest

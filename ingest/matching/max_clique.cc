@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ingest/objects/registration/max_clique.h"
+#include "ingest/matching/max_clique.h"
 
 #include <algorithm>
 #include <numeric>
 #include <utility>
 
-#include "ingest/objects/registration/clique_search.h"
+#include "ingest/matching/clique_search.h"
 
 namespace dsg::ingest {
 namespace {
