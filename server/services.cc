@@ -94,6 +94,11 @@ class QueryService final : public v1::QueryService::CallbackService {
       CallbackServerContext* context, const v1::GetMeshRequest* request) override {
     return StartStream(runtime_, "GetMesh", &query::ServiceCore::OpenMesh, context, request);
   }
+  grpc::ServerWriteReactor<v1::GetAgentShapeResponse>* GetAgentShape(
+      CallbackServerContext* context, const v1::GetAgentShapeRequest* request) override {
+    return StartStream(runtime_, "GetAgentShape", &query::ServiceCore::OpenAgentShape, context,
+                       request);
+  }
 
  private:
   ArenaMessages<v1::BatchLocateAgentsRequest, v1::BatchLocateAgentsResponse> batch_messages_;

@@ -59,6 +59,8 @@ int64_t RowCountOf(const Reply& reply) {
     return reply.poses_size();
   } else if constexpr (requires { reply.blocks_size(); }) {
     return reply.blocks_size();
+  } else if constexpr (requires { reply.shapes_size(); }) {
+    return reply.shapes_size();
   } else {
     return 1;
   }

@@ -40,6 +40,7 @@ class Grammar {
     return app;
   }
   void AddAgentVerbs();
+  void AddShape();
   void AddWho();
   void AddFilter(CLI::App* app, FilterOptions* filter);
   void AddGraphVerbs();
@@ -52,6 +53,7 @@ class Grammar {
   Command command_;
   WhereVerb where_;
   TrackVerb track_;
+  ShapeVerb shape_;
   WhoVerb who_;
   ListVerb list_;
   EdgesVerb edges_;
@@ -76,6 +78,7 @@ Grammar::Grammar() {
   app_.require_subcommand(1);
   app_.footer(kTimeHelp);
   AddAgentVerbs();
+  AddShape();
   AddWho();
   AddGraphVerbs();
   AddNear();
@@ -120,6 +123,19 @@ void Grammar::AddAgentVerbs() {
   track->add_option("--to", track_.to, "TIME to stop before; default with the last pose");
   track->add_option("--every", track_.every, "Interpolate at this period: 0.5s, 200ms");
   track->footer(kTimeHelp);
+}
+
+void Grammar::AddShape() {
+  CLI::App* shape = AddVerb("shape", "The body of an agent over time", kQuestion | kLimit, &shape_);
+  shape->add_option("AGENT", shape_.agent, "Node id (H12) or the log's name (12)")->required();
+  shape->add_option("--from", shape_.from, "First TIME; default the first body");
+  shape->add_option("--to", shape_.to, "TIME to stop before; default with the last body");
+  CLI::Option* ply = shape->add_option("--ply", shape_.ply, "Write the first body, binary PLY");
+  CLI::Option* obj =
+      shape->add_option("--obj", shape_.obj_folder, "Folder to write a Wavefront OBJ a body into");
+  ply->excludes(obj);
+  shape->add_flag("--force", shape_.force, "Replace files that are there");
+  shape->footer(kTimeHelp);
 }
 
 void Grammar::AddWho() {

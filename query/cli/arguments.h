@@ -51,6 +51,16 @@ struct TrackVerb {
   std::string every;
 };
 
+struct ShapeVerb {
+  std::string agent;
+  std::string from;
+  std::string to;
+  /// At most one of both is set: a file for the first body, a folder for one file a body.
+  std::string ply;
+  std::string obj_folder;
+  bool force = false;
+};
+
 struct WhoVerb {
   /// Exactly one of both is set. A room, place or region by id or name.
   std::string room;
@@ -128,9 +138,9 @@ struct HelpVerb {
   std::string text;
 };
 
-using Verb = std::variant<WhereVerb, TrackVerb, WhoVerb, ListVerb, EdgesVerb, ShowVerb, NearVerb,
-                          LogVerb, StatsVerb, MapsVerb, VersionVerb, VerifyVerb, ImportVerb,
-                          ExportVerb, MapVerb, HelpVerb>;
+using Verb = std::variant<WhereVerb, TrackVerb, ShapeVerb, WhoVerb, ListVerb, EdgesVerb, ShowVerb,
+                          NearVerb, LogVerb, StatsVerb, MapsVerb, VersionVerb, VerifyVerb,
+                          ImportVerb, ExportVerb, MapVerb, HelpVerb>;
 
 struct Command {
   CommonOptions common;

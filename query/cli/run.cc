@@ -49,6 +49,9 @@ class Dispatcher {
   absl::Status Ask(Session* session, const TrackVerb& verb) {
     return RunTrack(session, verb, out_);
   }
+  absl::Status Ask(Session* session, const ShapeVerb& verb) {
+    return RunShape(session, verb, out_);
+  }
   absl::Status Ask(Session* session, const WhoVerb& verb) { return RunWho(session, verb, out_); }
   absl::Status Ask(Session* session, const ListVerb& verb) { return RunList(session, verb, out_); }
   absl::Status Ask(Session* session, const EdgesVerb& verb) {

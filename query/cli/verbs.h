@@ -16,6 +16,12 @@ absl::Status RunWhere(Session* session, const WhereVerb& verb, std::ostream& out
 absl::Status RunTrack(Session* session, const TrackVerb& verb, std::ostream& out);
 absl::Status RunWho(Session* session, const WhoVerb& verb, std::ostream& out);
 
+/// Lists the body shapes of an agent, or writes them as mesh files (verb_shape.cc).
+///
+/// Errors: FIELD_INVALID for a file that is there already; NOT_FOUND when there is no body to
+/// write; RESOURCE_EXHAUSTED/DISK_FULL, and then the last file is not there.
+absl::Status RunShape(Session* session, const ShapeVerb& verb, std::ostream& out);
+
 // Nodes and edges: verbs_graph.cc. Requires: the session's map is chosen.
 absl::Status RunList(Session* session, const ListVerb& verb, std::ostream& out);
 absl::Status RunEdges(Session* session, const EdgesVerb& verb, std::ostream& out);

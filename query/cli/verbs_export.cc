@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // The verbs that turn a map into files to look at: export, map.
-#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,20 +14,12 @@
 #include "query/cli/table.h"
 #include "query/cli/values.h"
 #include "query/cli/verbs.h"
+#include "query/cli/written.h"
 #include "schema/base/status.h"
 #include "schema/picture/png_file.h"
 
 namespace dsg::cli {
 namespace {
-
-// What was written, told at the end, since a later file may fail.
-struct Written {
-  std::string format;
-  std::string path;
-  int64_t byte_count = 0;
-  /// What is in it: "vertices", "faces", ...
-  std::vector<std::pair<std::string, int64_t>> counts;
-};
 
 absl::StatusOr<ContentAnswer> Read(Session* session, const std::string& at, bool with_mesh) {
   ContentOptions options{.at_ns = std::nullopt, .with_mesh = with_mesh};
@@ -46,26 +37,6 @@ absl::StatusOr<MeshColor> ParseColor(const std::string& text) {
   return MakeError(Reason::kFieldInvalid,
                    absl::StrCat("--color \"", text, "\": give rgb, label or instance"),
                    {{"field", "--color"}, {"value", text}});
-}
-
-void Tell(const std::vector<Written>& files, Revision revision, bool as_json, std::ostream& out) {
-  // Numbers as text, as the 64-bit integers of the other verbs are.
-  nlohmann::ordered_json json = {{"read_revision", std::to_string(revision)},
-                                 {"files", nlohmann::ordered_json::array()}};
-  for (const Written& file : files) {
-    std::string text = absl::StrCat("wrote ", file.path, ": ");
-    nlohmann::ordered_json one = {{"format", file.format}, {"path", file.path}};
-    for (const auto& [what, count] : file.counts) {
-      absl::StrAppend(&text, count, " ", what, ", ");
-      one[what] = std::to_string(count);
-    }
-    one["byte_count"] = std::to_string(file.byte_count);
-    json["files"].push_back(std::move(one));
-    if (!as_json) out << text << file.byte_count << " bytes (revision " << revision << ")\n";
-  }
-  if (as_json) {
-    out << json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << "\n";
-  }
 }
 
 // Writes the files of one run and remembers what is in them.
@@ -145,7 +116,7 @@ absl::Status RunExport(Session* session, const ExportVerb& verb, std::ostream& o
   if (!verb.ply.empty()) DSG_RETURN_IF_ERROR(exporter.WriteMesh(verb.ply));
   if (!verb.graph_ply.empty()) DSG_RETURN_IF_ERROR(exporter.WriteGraph(verb.graph_ply));
   if (!verb.gltf.empty()) DSG_RETURN_IF_ERROR(exporter.WriteScene(verb.gltf));
-  Tell(exporter.files(), answer.content.revision, session->common().json, out);
+  TellWritten(exporter.files(), answer.content.revision, session->common().json, out);
   return absl::OkStatus();
 }
 
@@ -167,7 +138,7 @@ absl::Status RunMap(Session* session, const MapVerb& verb, std::ostream& out) {
                         .path = verb.png,
                         .byte_count = file.byte_count(),
                         .counts = {{"columns", picture.width}, {"rows", picture.height}}};
-  Tell({written}, content.revision, session->common().json, out);
+  TellWritten({written}, content.revision, session->common().json, out);
   return absl::OkStatus();
 }
 

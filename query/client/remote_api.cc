@@ -69,6 +69,10 @@ class RemoteApi final : public query::Api {
                        const Send<v1::GetMeshResponse>& send) override {
     return Stream(call, &QueryStub::PrepareAsyncGetMesh, request, send);
   }
+  absl::Status GetAgentShape(const CallContext& call, const v1::GetAgentShapeRequest& request,
+                             const Send<v1::GetAgentShapeResponse>& send) override {
+    return Stream(call, &QueryStub::PrepareAsyncGetAgentShape, request, send);
+  }
 
   // Not retried: whether the map was made is unknown, and a second try would say MAP_EXISTS.
   absl::Status CreateMap(const CallContext& call, const v1::CreateMapRequest& request,

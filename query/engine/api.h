@@ -16,6 +16,8 @@ class CommitRequest;
 class CommitResponse;
 class CreateMapRequest;
 class CreateMapResponse;
+class GetAgentShapeRequest;
+class GetAgentShapeResponse;
 class GetMapStatsRequest;
 class GetMapStatsResponse;
 class GetMeshRequest;
@@ -75,6 +77,10 @@ class Api {
   /// As GetTrajectory.
   virtual absl::Status GetMesh(const CallContext& call, const v1::GetMeshRequest& request,
                                const std::function<bool(const v1::GetMeshResponse&)>& send) = 0;
+  /// As GetTrajectory.
+  virtual absl::Status GetAgentShape(
+      const CallContext& call, const v1::GetAgentShapeRequest& request,
+      const std::function<bool(const v1::GetAgentShapeResponse&)>& send) = 0;
 
   virtual absl::Status CreateMap(const CallContext& call, const v1::CreateMapRequest& request,
                                  v1::CreateMapResponse* reply) = 0;

@@ -4,6 +4,7 @@
 #include "dsg/v1/ingest_service.pb.h"
 #include "dsg/v1/map_service.pb.h"
 #include "dsg/v1/query_service.pb.h"
+#include "query/engine/agent_shape.h"
 #include "query/engine/ancestry.h"
 #include "query/engine/commit.h"
 #include "query/engine/edges.h"
@@ -64,6 +65,21 @@ class LocalCore final : public ServiceCore {
                        const std::function<bool(const v1::GetMeshResponse&)>& send) override {
     DSG_RETURN_IF_ERROR(call.Check());
     DSG_ASSIGN_OR_RETURN(const std::unique_ptr<MeshCursor> cursor, OpenMesh(request));
+    return SendAll(call, cursor.get(), send);
+  }
+
+  absl::StatusOr<std::unique_ptr<AgentShapeCursor>> OpenAgentShape(
+      const v1::GetAgentShapeRequest& request) override {
+    DSG_ASSIGN_OR_RETURN(const ReadView view,
+                         ReadView::Open(&maps_, request.map(), request.read_at()));
+    return query::OpenAgentShape(view, &names_, request);
+  }
+
+  absl::Status GetAgentShape(
+      const CallContext& call, const v1::GetAgentShapeRequest& request,
+      const std::function<bool(const v1::GetAgentShapeResponse&)>& send) override {
+    DSG_RETURN_IF_ERROR(call.Check());
+    DSG_ASSIGN_OR_RETURN(const std::unique_ptr<AgentShapeCursor> cursor, OpenAgentShape(request));
     return SendAll(call, cursor.get(), send);
   }
 

@@ -28,6 +28,7 @@ class StreamCursor {
 
 using TrajectoryCursor = StreamCursor<v1::GetTrajectoryResponse>;
 using MeshCursor = StreamCursor<v1::GetMeshResponse>;
+using AgentShapeCursor = StreamCursor<v1::GetAgentShapeResponse>;
 
 /// An Api in this process.
 class ServiceCore : public Api {
@@ -38,6 +39,9 @@ class ServiceCore : public Api {
   /// GetMesh by pulling. Errors: those of GetMesh.
   virtual absl::StatusOr<std::unique_ptr<MeshCursor>> OpenMesh(
       const v1::GetMeshRequest& request) = 0;
+  /// GetAgentShape by pulling. Errors: those of GetAgentShape.
+  virtual absl::StatusOr<std::unique_ptr<AgentShapeCursor>> OpenAgentShape(
+      const v1::GetAgentShapeRequest& request) = 0;
 };
 
 /// Makes an Api that answers from `store`. Writers are opened at the first Commit to a map and kept

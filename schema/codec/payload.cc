@@ -177,6 +177,7 @@ void ToProto(const BodyShape& shape, v1::BodyShape* out) {
   out->mutable_shape_coefficients()->Add(shape.shape_coefficients.begin(),
                                          shape.shape_coefficients.end());
   out->mutable_vertices()->Add(shape.vertices.begin(), shape.vertices.end());
+  out->mutable_joints()->Add(shape.joints.begin(), shape.joints.end());
 }
 
 BodyShape FromProto(const v1::BodyShape& in) {
@@ -185,27 +186,8 @@ BodyShape FromProto(const v1::BodyShape& in) {
   shape.pose_coefficients.assign(in.pose_coefficients().begin(), in.pose_coefficients().end());
   shape.shape_coefficients.assign(in.shape_coefficients().begin(), in.shape_coefficients().end());
   shape.vertices.assign(in.vertices().begin(), in.vertices().end());
+  shape.joints.assign(in.joints().begin(), in.joints().end());
   return shape;
-}
-
-std::string EncodeShapes(const ShapeAppend& shapes) {
-  v1::ShapeAppend message;
-  if (shapes.topology.has_value()) message.set_topology_sha256(BytesOf(*shapes.topology));
-  for (const BodyShape& shape : shapes.shapes) ToProto(shape, message.add_shapes());
-  return Compress(Serialize(message));
-}
-
-bool DecodeShapes(std::string_view bytes, ShapeAppend* shapes) {
-  v1::ShapeAppend message;
-  if (!Unpack(bytes, &message)) return false;
-  auto topology = Sha256FromProto(message.topology_sha256(), "topology_sha256");
-  if (!topology.ok()) return false;
-  shapes->topology = *topology;
-  shapes->shapes.clear();
-  for (const v1::BodyShape& shape : message.shapes()) {
-    shapes->shapes.push_back(FromProto(shape));
-  }
-  return true;
 }
 
 }  // namespace dsg

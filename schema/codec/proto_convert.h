@@ -10,6 +10,7 @@
 #include "schema/model/revision.h"
 
 namespace dsg::v1 {
+class BodyShape;
 class Box;
 class Edge;
 class GraphDelta;
@@ -19,7 +20,6 @@ class Node;
 class Pose;
 class PoseFactor;
 class Revision;
-class BodyShape;
 class TimedPose;
 }  // namespace dsg::v1
 
@@ -46,6 +46,9 @@ absl::StatusOr<Box3d> BoxFromProto(const v1::Box& in, std::string_view field);
 
 void ToProto(const TimedPose& pose, v1::TimedPose* out);
 absl::StatusOr<TimedPose> FromProto(const v1::TimedPose& in);
+
+void ToProto(const BodyShape& shape, v1::BodyShape* out);
+BodyShape FromProto(const v1::BodyShape& in);
 
 void ToProto(const Node& node, const LayerTable& layers, v1::Node* out);
 absl::StatusOr<Node> FromProto(const v1::Node& in, const LayerTable& layers);
@@ -79,7 +82,5 @@ std::string EncodeMeshBlock(const MeshBlock& block);
 bool DecodeMeshBlock(std::string_view bytes, MeshBlock* block);
 std::string EncodeFactors(const std::vector<PoseFactor>& factors);
 bool DecodeFactors(std::string_view bytes, std::vector<PoseFactor>* factors);
-std::string EncodeShapes(const ShapeAppend& shapes);
-bool DecodeShapes(std::string_view bytes, ShapeAppend* shapes);
 
 }  // namespace dsg

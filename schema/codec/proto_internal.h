@@ -35,7 +35,5 @@ void EdgeDetailsFromProto(const v1::Edge& in, Edge* edge);
 
 void ToProto(const PoseFactor& factor, v1::PoseFactor* out);
 absl::StatusOr<PoseFactor> FromProto(const v1::PoseFactor& in);
-void ToProto(const BodyShape& shape, v1::BodyShape* out);
-BodyShape FromProto(const v1::BodyShape& in);
 
 }  // namespace dsg

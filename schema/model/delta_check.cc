@@ -29,6 +29,13 @@ bool IsSane(const Eigen::Vector3d& v) {
   return v.allFinite() && v.cwiseAbs().maxCoeff() <= kCoordinateMaxM;
 }
 
+bool AreSane(const std::vector<float>& numbers) {
+  // Not-a-number is below nothing.
+  return std::all_of(numbers.begin(), numbers.end(), [](float number) {
+    return std::abs(static_cast<double>(number)) <= kCoordinateMaxM;
+  });
+}
+
 // What protobuf could not read back must not be stored.
 absl::Status CheckText(std::string_view text, size_t length_max, const std::string& what) {
   if (text.size() > length_max) {
@@ -431,10 +438,19 @@ class DeltaChecker {
     for (const BodyShape& shape : item.shapes) {
       if (shape.time_ns <= last_ns) return Invalid("times of " + what + " do not grow");
       last_ns = shape.time_ns;
-      if (shape.vertices.size() % 3 != 0 || shape.vertices.size() > 300'000 ||
-          shape.pose_coefficients.size() > 4096 || shape.shape_coefficients.size() > 4096) {
-        return Invalid(absl::StrCat(what, " at ", shape.time_ns,
-                                    " ns have vertices not in threes, or too many numbers"));
+      const std::string which = absl::StrCat(what, " at ", shape.time_ns, " ns");
+      if (shape.vertices.size() % 3 != 0 || shape.joints.size() % 3 != 0) {
+        return Invalid(which + " have vertices or joints that are not in threes");
+      }
+      if (shape.vertices.size() > kShapeVertexNumbersMax ||
+          shape.joints.size() > kShapeNumbersMax ||
+          shape.pose_coefficients.size() > kShapeNumbersMax ||
+          shape.shape_coefficients.size() > kShapeNumbersMax) {
+        return Invalid(which + " have too many numbers");
+      }
+      for (const auto* part :
+           {&shape.pose_coefficients, &shape.shape_coefficients, &shape.vertices, &shape.joints}) {
+        if (!AreSane(*part)) return NotFinite("a number of " + which);
       }
     }
     return absl::OkStatus();
@@ -523,6 +539,25 @@ void MergeByAgent(std::vector<T>* items, Payload T::*payload) {
   *items = std::move(merged);
 }
 
+// Joins what is appended to one agent on one topology. Of two shapes of one time the later said
+// stands, as between revisions: an estimate and its correction may come in one delta.
+void MergeShapes(std::vector<ShapeAppend>* items) {
+  const auto key = [](const ShapeAppend& item) { return std::tie(item.agent, item.topology); };
+  std::stable_sort(items->begin(), items->end(),
+                   [&](const auto& a, const auto& b) { return key(a) < key(b); });
+  std::vector<ShapeAppend> merged;
+  for (ShapeAppend& item : *items) {
+    if (merged.empty() || key(merged.back()) != key(item)) {
+      merged.push_back(std::move(item));
+      continue;
+    }
+    std::vector<BodyShape>& into = merged.back().shapes;
+    std::move(item.shapes.begin(), item.shapes.end(), std::back_inserter(into));
+    SortKeepLast(&into, [](const BodyShape& shape) { return shape.time_ns; });
+  }
+  *items = std::move(merged);
+}
+
 }  // namespace
 
 absl::Status CheckDelta(const GraphDelta& delta, const GraphLookup& graph) {
@@ -547,7 +582,7 @@ void Coalesce(GraphDelta* delta) {
   }
   MergeByAgent(&delta->appends, &TrajectoryAppend::poses);
   MergeByAgent(&delta->factors, &FactorAppend::factors);
-  MergeByAgent(&delta->shapes, &ShapeAppend::shapes);
+  MergeShapes(&delta->shapes);
   SortKeepLast(&delta->corrections, [](const TrajectoryCorrection& item) {
     return std::make_tuple(item.agent, item.from_ns);
   });

@@ -48,6 +48,9 @@ inline constexpr size_t kNameLengthMax = 1024;
 inline constexpr size_t kAttributeCountMax = 64;
 inline constexpr size_t kAttributeLengthMax = 65536;
 inline constexpr size_t kMeshVertexCountMax = 4'000'000;
+/// Numbers in one part of a body shape, and in its vertices.
+inline constexpr size_t kShapeNumbersMax = 4096;
+inline constexpr size_t kShapeVertexNumbersMax = 300'000;
 inline constexpr size_t kAssetBytesMax = size_t{256} << 20;
 
 /// Proves the invariants of the data model against the graph at the head: ids exist and match

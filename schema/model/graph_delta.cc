@@ -87,14 +87,18 @@ class DeltaSplitter {
     for (T& item : items) (Room(1).*part).push_back(std::move(item));
   }
 
-  void AddAppend(TrajectoryAppend& append) {
+  // Cuts `rows`, which belong to `append` (whose own are not used), wherever a delta is full.
+  template <typename T, typename Row>
+  void AddSeries(const std::vector<Row>& rows, T append, std::vector<Row> T::*series,
+                 std::vector<T> GraphDelta::*appends) {
     size_t next = 0;
-    while (next < append.poses.size()) {
+    while (next < rows.size()) {
       GraphDelta& part = Room(1);
       const size_t space = item_count_max_ > used_ ? item_count_max_ - used_ + 1 : 1;
-      const size_t count = std::min(space, append.poses.size() - next);
-      const auto begin = append.poses.begin() + static_cast<std::ptrdiff_t>(next);
-      part.appends.push_back({append.agent, {begin, begin + static_cast<std::ptrdiff_t>(count)}});
+      const size_t count = std::min(space, rows.size() - next);
+      const auto begin = rows.begin() + static_cast<std::ptrdiff_t>(next);
+      (append.*series).assign(begin, begin + static_cast<std::ptrdiff_t>(count));
+      (part.*appends).push_back(append);
       used_ += count - 1;
       next += count;
     }
@@ -153,10 +157,16 @@ std::vector<GraphDelta> SplitDelta(GraphDelta delta, size_t item_count_max) {
   splitter.Add(delta.retirements, &GraphDelta::retirements);
   splitter.Add(delta.nodes, &GraphDelta::nodes);
   splitter.Add(delta.edges, &GraphDelta::edges);
-  for (TrajectoryAppend& append : delta.appends) splitter.AddAppend(append);
+  for (const TrajectoryAppend& append : delta.appends) {
+    splitter.AddSeries(append.poses, {append.agent, {}}, &TrajectoryAppend::poses,
+                       &GraphDelta::appends);
+  }
   splitter.Add(delta.corrections, &GraphDelta::corrections);
   splitter.Add(delta.factors, &GraphDelta::factors);
-  splitter.Add(delta.shapes, &GraphDelta::shapes);
+  for (const ShapeAppend& append : delta.shapes) {
+    splitter.AddSeries(append.shapes, {append.agent, append.topology, {}}, &ShapeAppend::shapes,
+                       &GraphDelta::shapes);
+  }
   splitter.Add(delta.stays, &GraphDelta::stays);
   for (MeshBlock& block : delta.mesh_blocks) {
     const size_t size = block.positions_map.size() + block.faces.size();

@@ -33,9 +33,12 @@ struct FactorAppend {
   std::vector<PoseFactor> factors;
 };
 
+/// A shape of a time that is stored already replaces the older one from this revision on.
 struct ShapeAppend {
   NodeId agent;
+  /// The asset with the faces between the vertices (schema/codec/topology.h).
   std::optional<Sha256> topology;
+  /// Strictly growing in time.
   std::vector<BodyShape> shapes;
 };
 
@@ -80,9 +83,9 @@ struct GraphDelta {
 /// CONTAINS edges. Nodes that the delta does not hold are left alone.
 void FitBoxesToChildren(GraphDelta* delta);
 
-/// Cuts a large delta into ones of at most `item_count_max` rows (poses count one each), parents
-/// before children and nodes before their edges, so that each is valid when applied in order.
-/// Session and message are copied; sequences count from `delta.sequence`.
+/// Cuts a large delta into ones of at most `item_count_max` rows (poses and shapes count one each),
+/// parents before children and nodes before their edges, so that each is valid when applied in
+/// order. Session and message are copied; sequences count from `delta.sequence`.
 std::vector<GraphDelta> SplitDelta(GraphDelta delta, size_t item_count_max);
 
 }  // namespace dsg

@@ -41,7 +41,8 @@ struct TimedPose {
 /// Source: RSS 2020, section IV-A ("Human Nodes": odometry-free pose graph with detection priors
 /// and zero-velocity links; "Robot Node").
 struct PoseFactor {
-  /// "odometry", "zero_velocity", "detection_prior", "loop_closure".
+  /// "odometry", "zero_velocity", "motion", "detection_prior", "loop_closure",
+  /// "loop_closure_rejected" (seen, and not believed).
   std::string type;
   TimeNs from_ns = 0;
   TimeNs to_ns = 0;
@@ -51,12 +52,19 @@ struct PoseFactor {
   std::optional<Covariance6> information;
 };
 
-/// Body shape at one instant: model coefficients, or vertices in the agent's frame (metres).
+/// Body shape at one instant. Every part may be empty.
+///
+/// Frames: vertices and joints are in the agent's frame.
 struct BodyShape {
   TimeNs time_ns = 0;
+  /// Radians: the axis times the angle of each joint against its parent; 72 numbers for SMPL.
   std::vector<float> pose_coefficients;
+  /// 10 numbers for SMPL.
   std::vector<float> shape_coefficients;
+  /// x, y, z of each vertex, metres; the faces stand in the topology of the ShapeAppend.
   std::vector<float> vertices;
+  /// x, y, z of each joint, metres; 24 joints for SMPL.
+  std::vector<float> joints;
 };
 
 /// An agent was in a place and a room during [enter_ns, exit_ns). Key: (agent, enter_ns).

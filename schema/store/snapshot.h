@@ -100,6 +100,14 @@ struct BoxVisit {
   TimeNs exit_ns = 0;
 };
 
+/// A body shape as a reader is shown it; lives as long as the call that shows it.
+struct ShownShape {
+  const BodyShape& shape;
+  /// Also where the vertices were not asked for.
+  uint32_t vertex_count = 0;
+  const std::optional<Sha256>& topology;
+};
+
 /// Tells a long read to stop: returns CANCELLED or DEADLINE_EXCEEDED once it must. May be empty.
 /// Called often (every few hundred rows or poses) and from the calling thread only.
 using StopCheck = std::function<absl::Status()>;
@@ -189,8 +197,15 @@ class Snapshot {
   /// Order: ascending time of the first pose.
   virtual absl::StatusOr<std::vector<PoseFactor>> Factors(NodeId agent, TimeNs from_ns,
                                                           TimeNs to_ns) const = 0;
-  virtual absl::StatusOr<std::vector<BodyShape>> Shapes(NodeId agent, TimeNs from_ns,
-                                                        TimeNs to_ns) const = 0;
+  /// Calls `visit` for each body shape with from_ns <= time < to_ns, until it returns false. Of
+  /// several shapes of one time the one of the newest revision is believed.
+  /// Order: ascending time.
+  /// Cost:   decodes at most 32 shapes to show one; cheap without vertices.
+  virtual absl::Status ReadShapes(NodeId agent, TimeNs from_ns, TimeNs to_ns, bool with_vertices,
+                                  const StopCheck& stop,
+                                  const std::function<bool(const ShownShape&)>& visit) const = 0;
+  /// All of them at once. Order: ascending time.
+  absl::StatusOr<std::vector<BodyShape>> Shapes(NodeId agent, TimeNs from_ns, TimeNs to_ns) const;
   /// Indices of all mesh blocks, ascending.
   virtual absl::StatusOr<std::vector<BlockIndex>> MeshBlocks() const = 0;
   /// Errors: NOT_FOUND/NODE_UNKNOWN when there is no such block.

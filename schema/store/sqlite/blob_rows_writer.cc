@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "schema/codec/proto_convert.h"
+#include "schema/codec/shape_codec.h"
 #include "schema/store/sqlite/commit.h"
 
 namespace dsg::sqlite {
@@ -125,6 +126,23 @@ absl::Status InsertBatch(const char* sql, char table, NodeId agent, TimeNs t0, T
       .Run();
 }
 
+// The shapes from `first` on that make one segment.
+ShapeAppend CutShapes(const ShapeAppend& item, size_t first) {
+  ShapeAppend segment{item.agent, item.topology, {}};
+  const TimeNs t0 = item.shapes[first].time_ns;
+  for (size_t i = first; i < item.shapes.size(); ++i) {
+    const BodyShape& shape = item.shapes[i];
+    // Times may lie further apart than 63 bits count.
+    const uint64_t length_ns = static_cast<uint64_t>(shape.time_ns) - static_cast<uint64_t>(t0);
+    if (segment.shapes.size() == kShapesPerSegmentMax ||
+        length_ns > static_cast<uint64_t>(kShapeSegmentNsMax)) {
+      break;
+    }
+    segment.shapes.push_back(shape);
+  }
+  return segment;
+}
+
 }  // namespace
 
 absl::Status WriteStays(const std::vector<Stay>& stays, CommitContext* commit) {
@@ -205,12 +223,15 @@ absl::Status WriteFactors(const std::vector<FactorAppend>& factors, CommitContex
 
 absl::Status WriteShapes(const std::vector<ShapeAppend>& shapes, CommitContext* commit) {
   for (const ShapeAppend& item : shapes) {
-    if (item.shapes.empty()) continue;
-    DSG_RETURN_IF_ERROR(
-        InsertBatch("INSERT INTO shape_segment (agent, rev_from, t0, t1, checksum, payload)"
-                    " VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
-                    'H', item.agent, item.shapes.front().time_ns, item.shapes.back().time_ns,
-                    EncodeShapes(item), commit));
+    for (size_t first = 0; first < item.shapes.size();) {
+      const ShapeAppend segment = CutShapes(item, first);
+      first += segment.shapes.size();
+      DSG_RETURN_IF_ERROR(InsertBatch(
+          "INSERT INTO shape_segment (agent, rev_from, t0, t1, checksum, payload)"
+          " VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
+          'H', segment.agent, segment.shapes.front().time_ns, segment.shapes.back().time_ns,
+          EncodeShapes(segment, commit->spec.codec), commit));
+    }
   }
   return absl::OkStatus();
 }

@@ -9,6 +9,7 @@
 
 #include "schema/store/graph_store.h"
 #include "schema/store/sqlite/map_file.h"
+#include "schema/store/sqlite/shape_reader.h"
 #include "schema/store/sqlite/track_cache.h"
 #include "schema/store/sqlite/writer.h"
 
@@ -49,6 +50,7 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
   absl::StatusOr<std::shared_ptr<const Track>> GetTrack(NodeId agent, Revision revision);
   absl::StatusOr<std::shared_ptr<const SegmentReader>> GetSegment(const SegmentRef& segment);
   AncestorCache& ancestors() { return ancestors_; }
+  ShapeCache& shapes() { return shapes_; }
   int64_t bytes_on_disk() const { return BytesOnDisk(store_folder_, spec_.name); }
 
  private:
@@ -58,7 +60,8 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
       : store_folder_(std::move(store_folder)),
         tracks_(cache_bytes / 4),
         segments_(cache_bytes / 2),
-        ancestors_(cache_bytes / 4) {}
+        ancestors_(cache_bytes / 8),
+        shapes_(cache_bytes / 8) {}
 
   std::string store_folder_;
   MapSpec spec_;
@@ -76,6 +79,7 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
   TrackCache tracks_;
   SegmentCache segments_;
   AncestorCache ancestors_;
+  ShapeCache shapes_;
 };
 
 /// Makes the snapshot of a revision that exists.

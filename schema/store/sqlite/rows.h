@@ -48,6 +48,9 @@ absl::StatusOr<int64_t> ToTenthsCeil(TimeNs time_ns, const MapSpec& spec);
 /// Clamped, for the ends of a question.
 int64_t ClampToTenths(TimeNs time_ns, const MapSpec& spec);
 
+/// Shape segments are cut at this length, so that a reader of an instant looks back no further.
+inline constexpr TimeNs kShapeSegmentNsMax = 60 * kNsPerSecond;
+
 /// Ids of trajectory segments: the track's slot above the milliseconds of the first pose.
 inline constexpr int kSegmentTimeBits = 42;
 int64_t SegmentId(int64_t slot, TimeNs t0_ns, const MapSpec& spec);

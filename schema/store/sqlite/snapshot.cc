@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The small answers of a snapshot: layers, counts, mesh, assets, factors, shapes.
+// The small answers of a snapshot: layers, counts, mesh, assets, factors.
 #include "schema/store/sqlite/snapshot.h"
 
 #include <algorithm>
@@ -93,32 +93,6 @@ absl::StatusOr<std::vector<PoseFactor>> SqliteSnapshot::Factors(NodeId agent, Ti
   std::stable_sort(factors.begin(), factors.end(),
                    [](const PoseFactor& a, const PoseFactor& b) { return a.from_ns < b.from_ns; });
   return factors;
-}
-
-absl::StatusOr<std::vector<BodyShape>> SqliteSnapshot::Shapes(NodeId agent, TimeNs from_ns,
-                                                              TimeNs to_ns) const {
-  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
-  Query query(*lease,
-              "SELECT rev_from, t0, t1, checksum, payload FROM shape_segment"
-              " WHERE agent = ?1 AND rev_from <= ?2 AND t0 < ?4 AND t1 >= ?3");
-  query.Bind(KeyOf(agent), revision(), from_ns, to_ns);
-  std::vector<BodyShape> shapes;
-  while (query.Next()) {
-    ShapeAppend batch;
-    const std::string_view payload = query.Blob(4);
-    if (query.Int(3) !=
-            RowChecksum({KeyOf(agent), query.Int(0), query.Int(1), query.Int(2)}, payload) ||
-        !DecodeShapes(payload, &batch)) {
-      return CorruptRow(spec().name, "shape_segment", ToString(agent));
-    }
-    for (BodyShape& shape : batch.shapes) {
-      if (shape.time_ns >= from_ns && shape.time_ns < to_ns) shapes.push_back(std::move(shape));
-    }
-  }
-  DSG_RETURN_IF_ERROR(query.status());
-  std::stable_sort(shapes.begin(), shapes.end(),
-                   [](const BodyShape& a, const BodyShape& b) { return a.time_ns < b.time_ns; });
-  return shapes;
 }
 
 absl::StatusOr<std::vector<BlockIndex>> SqliteSnapshot::MeshBlocks() const {

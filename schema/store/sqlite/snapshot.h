@@ -57,8 +57,9 @@ class SqliteSnapshot : public Snapshot {
 
   absl::StatusOr<std::vector<PoseFactor>> Factors(NodeId agent, TimeNs from_ns,
                                                   TimeNs to_ns) const override;
-  absl::StatusOr<std::vector<BodyShape>> Shapes(NodeId agent, TimeNs from_ns,
-                                                TimeNs to_ns) const override;
+  absl::Status ReadShapes(NodeId agent, TimeNs from_ns, TimeNs to_ns, bool with_vertices,
+                          const StopCheck& stop,
+                          const std::function<bool(const ShownShape&)>& visit) const override;
   absl::StatusOr<std::vector<BlockIndex>> MeshBlocks() const override;
   absl::StatusOr<MeshBlock> ReadMeshBlock(BlockIndex index) const override;
   absl::StatusOr<Asset> ReadAsset(const Sha256& sha256) const override;

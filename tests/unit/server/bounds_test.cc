@@ -86,6 +86,15 @@ class HeldCore final : public query::ServiceCore {
                        const std::function<bool(const v1::GetMeshResponse&)>& send) override {
     return core_->GetMesh(call, request, send);
   }
+  absl::StatusOr<std::unique_ptr<query::AgentShapeCursor>> OpenAgentShape(
+      const v1::GetAgentShapeRequest& request) override {
+    return core_->OpenAgentShape(request);
+  }
+  absl::Status GetAgentShape(
+      const CallContext& call, const v1::GetAgentShapeRequest& request,
+      const std::function<bool(const v1::GetAgentShapeResponse&)>& send) override {
+    return core_->GetAgentShape(call, request, send);
+  }
 
 // Passed on as they are.
 #define DSG_PASS_ON(Method)                                                        \

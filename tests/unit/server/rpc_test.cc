@@ -152,6 +152,52 @@ TEST_F(Rpc, StreamsTheMesh) {
   EXPECT_GE(message_count, 1);
 }
 
+TEST_F(Rpc, StreamsBodyShapes) {
+  grpc::ClientContext commit_context;
+  v1::CommitRequest commit;
+  commit.mutable_delta()->set_map(kMap);
+  commit.mutable_delta()->set_session_id("bodies");
+  commit.mutable_delta()->set_sequence(1);
+  v1::ShapeAppend* append = commit.mutable_delta()->add_shapes();
+  append->set_agent("H12");
+  for (int i = 0; i < 20; ++i) {
+    v1::BodyShape* body = append->add_shapes();
+    body->set_time_ns(i * kSecond / 2);
+    for (int j = 0; j < 30'000; ++j) body->add_vertices(0.5f);
+    for (int j = 0; j < 72; ++j) body->add_joints(0.25f);
+  }
+  v1::CommitResponse committed;
+  const grpc::Status status = ingest_->Commit(&commit_context, commit, &committed);
+  ASSERT_TRUE(status.ok()) << status.error_message();
+
+  grpc::ClientContext context;
+  v1::GetAgentShapeRequest request;
+  request.set_map(kMap);
+  request.set_agent("12");
+  const auto reader = query_->GetAgentShape(&context, request);
+  v1::GetAgentShapeResponse message;
+  int message_count = 0;
+  std::vector<TimeNs> times;
+  while (reader->Read(&message)) {
+    EXPECT_EQ(message.has_header(), message_count++ == 0);
+    for (const v1::AgentShape& body : message.shapes()) {
+      times.push_back(body.shape().time_ns());
+      EXPECT_EQ(body.shape().vertices_size(), 30'000);
+      EXPECT_TRUE(body.has_pose());
+    }
+  }
+  EXPECT_TRUE(reader->Finish().ok());
+  EXPECT_GE(message_count, 2);
+  EXPECT_EQ(times.size(), 20u);
+  EXPECT_TRUE(std::is_sorted(times.begin(), times.end()));
+
+  grpc::ClientContext unknown_context;
+  request.set_agent("nobody");
+  const auto unknown = query_->GetAgentShape(&unknown_context, request);
+  EXPECT_FALSE(unknown->Read(&message));
+  EXPECT_EQ(unknown->Finish().error_code(), grpc::StatusCode::NOT_FOUND);
+}
+
 TEST_F(Rpc, AnswersPresenceNodesEdgesAndNearest) {
   grpc::ClientContext presence_context;
   v1::ListPresenceRequest presence;

@@ -30,6 +30,9 @@ class ScriptedService final : public v1::QueryService::Service {
   std::function<grpc::Status(grpc::ServerContext*, v1::LocateAgentResponse*)> locate;
   std::function<grpc::Status(grpc::ServerContext*, grpc::ServerWriter<v1::GetTrajectoryResponse>*)>
       stream;
+  std::function<grpc::Status(const v1::GetAgentShapeRequest&,
+                             grpc::ServerWriter<v1::GetAgentShapeResponse>*)>
+      shapes;
   std::atomic<int> call_count{0};
 
  private:
@@ -42,6 +45,11 @@ class ScriptedService final : public v1::QueryService::Service {
                              grpc::ServerWriter<v1::GetTrajectoryResponse>* writer) override {
     ++call_count;
     return stream(context, writer);
+  }
+  grpc::Status GetAgentShape(grpc::ServerContext*, const v1::GetAgentShapeRequest* request,
+                             grpc::ServerWriter<v1::GetAgentShapeResponse>* writer) override {
+    ++call_count;
+    return shapes(*request, writer);
   }
 };
 
@@ -102,6 +110,31 @@ TEST_F(RemoteApiTest, CarriesReplies) {
   const absl::Status status = Locate(CallContext(), &reply);
   ASSERT_TRUE(status.ok()) << status;
   EXPECT_EQ(reply.agent_id(), "H12");
+}
+
+TEST_F(RemoteApiTest, CarriesBodyShapesUntilTheCallerHasEnough) {
+  service_.shapes = [](const v1::GetAgentShapeRequest& request,
+                       grpc::ServerWriter<v1::GetAgentShapeResponse>* writer) {
+    for (int i = 0; i < 1000; ++i) {
+      v1::GetAgentShapeResponse message;
+      message.set_agent_id(request.agent());
+      message.add_shapes()->mutable_shape()->set_time_ns(i);
+      if (!writer->Write(message)) break;
+    }
+    return grpc::Status::OK;
+  };
+  StartServer();
+  v1::GetAgentShapeRequest request;
+  request.set_agent("H12");
+  std::vector<int64_t> times;
+  const absl::Status status =
+      Api()->GetAgentShape(CallContext(), request, [&](const v1::GetAgentShapeResponse& message) {
+        EXPECT_EQ(message.agent_id(), "H12");
+        times.push_back(message.shapes(0).shape().time_ns());
+        return times.size() < 3;
+      });
+  EXPECT_TRUE(status.ok()) << status;
+  EXPECT_EQ(times, (std::vector<int64_t>{0, 1, 2}));
 }
 
 TEST_F(RemoteApiTest, CarriesReasonAndMetadataOfErrors) {

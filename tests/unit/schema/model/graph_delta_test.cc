@@ -72,6 +72,39 @@ TEST(SplitDelta, CutsLongTracksWithoutLosingAPose) {
   EXPECT_EQ(count, 1000u);
 }
 
+TEST(SplitDelta, CutsShapesAndRepeatsTheirTopology) {
+  GraphDelta delta;
+  delta.shapes.push_back({NodeId('H', 1), Sha256{7}, std::vector<BodyShape>(100)});
+  size_t count = 0;
+  for (const GraphDelta& part : SplitDelta(delta, 32)) {
+    ASSERT_EQ(part.shapes.size(), 1u);
+    EXPECT_EQ(part.shapes[0].topology, Sha256{7});
+    EXPECT_LE(part.shapes[0].shapes.size(), 32u);
+    count += part.shapes[0].shapes.size();
+  }
+  EXPECT_EQ(count, 100u);
+}
+
+TEST(Coalesce, JoinsShapesByTopologyAndKeepsTheLastWordOnEachTime) {
+  const auto body = [](TimeNs time_ns, float number) {
+    BodyShape shape;
+    shape.time_ns = time_ns;
+    shape.joints = {number, 0.0f, 0.0f};
+    return shape;
+  };
+  GraphDelta delta;
+  delta.shapes = {{NodeId('H', 1), Sha256{1}, {body(10, 1), body(20, 1)}},
+                  {NodeId('H', 1), Sha256{2}, {body(20, 2)}},
+                  {NodeId('H', 1), Sha256{1}, {body(5, 3), body(20, 3)}}};
+  Coalesce(&delta);
+  ASSERT_EQ(delta.shapes.size(), 2u);
+  ASSERT_EQ(delta.shapes[0].shapes.size(), 3u);
+  EXPECT_EQ(delta.shapes[0].shapes[0].time_ns, 5);
+  EXPECT_EQ(delta.shapes[0].shapes[1].joints[0], 1.0f);
+  EXPECT_EQ(delta.shapes[0].shapes[2].joints[0], 3.0f);
+  EXPECT_EQ(delta.shapes[1].topology, Sha256{2});
+}
+
 TEST(Coalesce, KeepsTheLastWordOnEachEntity) {
   GraphDelta delta;
   Node first = MakeNode(NodeId('p', 1), layers::kPlaces, kinds::kPlace);

@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "schema/codec/checksum.h"
 #include "schema/codec/proto_convert.h"
+#include "schema/codec/shape_codec.h"
 #include "tests/unit/schema/store/store_test_util.h"
 
 namespace dsg::test {
@@ -295,8 +296,12 @@ class Asker {
     for (const TrackInfo& track : tracks) {
       DSG_ASSIGN_OR_RETURN(const auto factors, snapshot_.Factors(track.agent, kTimeMin, kTimeMax));
       DSG_ASSIGN_OR_RETURN(const auto shapes, snapshot_.Shapes(track.agent, kTimeMin, kTimeMax));
-      absl::StrAppend(&text, absl::BytesToHexString(EncodeFactors(factors)), "\n",
-                      absl::BytesToHexString(EncodeShapes({track.agent, {}, shapes})), "\n");
+      absl::StrAppend(&text, absl::BytesToHexString(EncodeFactors(factors)), "\n");
+      for (const BodyShape& shape : shapes) {
+        const ShapeAppend one{track.agent, {}, {shape}};
+        absl::StrAppend(
+            &text, absl::BytesToHexString(EncodeShapes(one, TrajectoryCodec::kLossless)), "\n");
+      }
     }
     return text;
   }

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+// The verb shape: the body of an agent over time, as a table or as mesh files.
+#include <filesystem>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "dsg/v1/query_service.pb.h"
+#include "query/cli/export/body_file.h"
+#include "query/cli/json.h"
+#include "query/cli/paging.h"
+#include "query/cli/render_shape.h"
+#include "query/cli/table.h"
+#include "query/cli/values.h"
+#include "query/cli/verbs.h"
+#include "query/cli/written.h"
+#include "schema/base/status.h"
+#include "schema/codec/proto_convert.h"
+#include "schema/codec/topology.h"
+
+namespace dsg::cli {
+namespace {
+
+absl::StatusOr<v1::GetAgentShapeRequest> RequestOf(const Session& session, const ShapeVerb& verb) {
+  auto request = session.Begin<v1::GetAgentShapeRequest>();
+  request.set_agent(verb.agent);
+  const TimeNs epoch_ns = session.map().epoch_ns;
+  if (!verb.from.empty()) {
+    DSG_ASSIGN_OR_RETURN(const TimeNs from_ns, ParseInstant("--from", verb.from, epoch_ns));
+    request.set_from_ns(from_ns);
+  }
+  if (!verb.to.empty()) {
+    DSG_ASSIGN_OR_RETURN(const TimeNs to_ns, ParseInstant("--to", verb.to, epoch_ns));
+    request.set_to_ns(to_ns);
+  }
+  return request;
+}
+
+absl::Status ListBodies(Session* session, v1::GetAgentShapeRequest request, std::ostream& out) {
+  // Vertices are for files: a second of them would fill a screen for an hour.
+  request.add_parts(v1::SHAPE_PART_COEFFICIENTS);
+  request.add_parts(v1::SHAPE_PART_JOINTS);
+  v1::GetAgentShapeResponse all;
+  const int64_t count_max = EntriesLeft(session->common().limit);
+  const auto merge = [&](const v1::GetAgentShapeResponse& message) {
+    all.MergeFrom(message);
+    return all.shapes_size() < count_max;
+  };
+  DSG_RETURN_IF_ERROR(session->api().GetAgentShape(session->NewCall(), request, merge));
+  if (all.shapes_size() > count_max) {
+    all.mutable_shapes()->DeleteSubrange(static_cast<int>(count_max),
+                                         all.shapes_size() - static_cast<int>(count_max));
+  }
+  if (session->common().json) return WriteJson(all, out);
+  out << RenderShapes(all, session->times());
+  return absl::OkStatus();
+}
+
+// Writes bodies as they arrive, and forgets them.
+class BodyWriter {
+ public:
+  BodyWriter(const Session& session, const ShapeVerb& verb)
+      : verb_(verb),
+        count_max_(verb.obj_folder.empty() ? 1 : EntriesLeft(session.common().limit)),
+        times_(session.times()) {}
+
+  /// False once no more is wanted; then status() says whether that is an error.
+  bool Take(const v1::GetAgentShapeResponse& message) {
+    if (message.has_header()) revision_ = message.header().read_revision();
+    if (!message.agent_id().empty()) agent_ = message.agent_id();
+    for (const v1::Asset& asset : message.topologies()) {
+      status_ = TakeTopology(asset);
+      if (!status_.ok()) return false;
+    }
+    for (const v1::AgentShape& body : message.shapes()) {
+      if (static_cast<int64_t>(files_.size()) >= count_max_) return false;
+      // A body that is nowhere cannot be put into the map.
+      if (body.shape().vertices().empty() || !body.has_pose()) continue;
+      status_ = Write(body);
+      if (!status_.ok()) return false;
+    }
+    return static_cast<int64_t>(files_.size()) < count_max_;
+  }
+
+  const absl::Status& status() const { return status_; }
+  const std::vector<Written>& files() const { return files_; }
+  Revision revision() const { return revision_; }
+  const std::string& agent() const { return agent_; }
+
+ private:
+  absl::Status TakeTopology(const v1::Asset& asset) {
+    if (DecodeTopology(asset.content(), &topologies_[asset.sha256()])) return absl::OkStatus();
+    return absl::DataLossError(
+        absl::StrCat("the topology of agent ", agent_, " is no ", std::string(kTopologyMediaType),
+                     " but ", Printable(asset.media_type()), "; commit one of that form"));
+  }
+
+  BodyMesh MeshOf(const v1::AgentShape& body) const {
+    const Pose3d map_T_agent = FromProto(body.pose());
+    BodyMesh mesh;
+    const auto& vertices = body.shape().vertices();
+    for (int i = 0; i + 2 < vertices.size(); i += 3) {
+      const Eigen::Vector3f point_agent(vertices[i], vertices[i + 1], vertices[i + 2]);
+      mesh.points_map.push_back((map_T_agent * point_agent.cast<double>()).cast<float>());
+    }
+    const auto topology = topologies_.find(body.topology_sha256());
+    if (topology != topologies_.end()) mesh.faces = topology->second.faces;
+    mesh.comment = absl::StrCat("agent ", agent_, " at ", times_.Full(body.shape().time_ns()),
+                                ", revision ", revision_, ", metres, z up");
+    return mesh;
+  }
+
+  absl::Status Write(const v1::AgentShape& body) {
+    const bool is_obj = !verb_.obj_folder.empty();
+    const std::string path =
+        is_obj ? absl::StrCat(verb_.obj_folder, "/", agent_, "_", body.shape().time_ns(), ".obj")
+               : verb_.ply;
+    const BodyMesh mesh = MeshOf(body);
+    DSG_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, verb_.force));
+    DSG_RETURN_IF_ERROR(is_obj ? WriteBodyObj(mesh, &file) : WriteBodyPly(mesh, &file));
+    DSG_RETURN_IF_ERROR(file.Commit());
+    files_.push_back({.format = is_obj ? "obj" : "ply",
+                      .path = path,
+                      .byte_count = file.byte_count(),
+                      .counts = {{"vertices", static_cast<int64_t>(mesh.points_map.size())},
+                                 {"faces", static_cast<int64_t>(mesh.faces.size())}}});
+    return absl::OkStatus();
+  }
+
+  const ShapeVerb& verb_;
+  const int64_t count_max_;
+  const TimeText& times_;
+  absl::Status status_;
+  Revision revision_ = 0;
+  std::string agent_;
+  std::map<std::string, Topology> topologies_;
+  std::vector<Written> files_;
+};
+
+absl::Status PrepareFiles(const ShapeVerb& verb) {
+  if (!verb.ply.empty()) return CheckMayWrite(verb.ply, verb.force);
+  std::error_code failure;
+  std::filesystem::create_directories(verb.obj_folder, failure);
+  if (!failure) return absl::OkStatus();
+  return MakeError(Reason::kFieldInvalid,
+                   absl::StrCat("--obj ", verb.obj_folder, ": the folder cannot be made (",
+                                failure.message(), "); name another one"),
+                   {{"field", "--obj"}, {"value", verb.obj_folder}});
+}
+
+absl::Status WriteBodies(Session* session, v1::GetAgentShapeRequest request, const ShapeVerb& verb,
+                         std::ostream& out) {
+  DSG_RETURN_IF_ERROR(PrepareFiles(verb));
+  request.add_parts(v1::SHAPE_PART_VERTICES);
+  request.add_parts(v1::SHAPE_PART_TOPOLOGY);
+  BodyWriter writer(*session, verb);
+  DSG_RETURN_IF_ERROR(session->api().GetAgentShape(
+      session->NewCall(), request,
+      [&](const v1::GetAgentShapeResponse& message) { return writer.Take(message); }));
+  DSG_RETURN_IF_ERROR(writer.status());
+  if (writer.files().empty()) {
+    return absl::NotFoundError(absl::StrCat("agent ", writer.agent(),
+                                            " has no body with vertices and a pose in that "
+                                            "time; see what there is with dsg shape ",
+                                            writer.agent()));
+  }
+  TellWritten(writer.files(), writer.revision(), session->common().json, out);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status RunShape(Session* session, const ShapeVerb& verb, std::ostream& out) {
+  DSG_ASSIGN_OR_RETURN(v1::GetAgentShapeRequest request, RequestOf(*session, verb));
+  if (verb.ply.empty() && verb.obj_folder.empty()) {
+    return ListBodies(session, std::move(request), out);
+  }
+  return WriteBodies(session, std::move(request), verb, out);
+}
+
+}  // namespace dsg::cli

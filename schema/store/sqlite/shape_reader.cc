@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "schema/store/sqlite/shape_reader.h"
+
+#include <algorithm>
+#include <string>
+#include <tuple>
+
+#include "schema/store/sqlite/rows.h"
+
+namespace dsg::sqlite {
+namespace {
+
+TimeNs LookBack(TimeNs from_ns) {
+  return from_ns < kTimeMin + kShapeSegmentNsMax ? kTimeMin : from_ns - kShapeSegmentNsMax;
+}
+
+}  // namespace
+
+absl::StatusOr<std::string> ShapeReader::LoadPayload(const Segment& segment) {
+  Query query(db_, "SELECT checksum, payload FROM shape_segment WHERE id = ?1");
+  const bool found = query.Bind(segment.row_id).Next();
+  DSG_RETURN_IF_ERROR(query.status());
+  const int64_t agent = KeyOf(question_.agent);
+  if (!found || query.Int(0) !=
+                    RowChecksum({agent, segment.rev_from, segment.t0, segment.t1}, query.Blob(1))) {
+    return CorruptRow(db_.map_name(), "shape_segment", ToString(question_.agent));
+  }
+  return std::string(query.Blob(1));
+}
+
+absl::Status ShapeReader::Reach(Segment segment) {
+  DSG_ASSIGN_OR_RETURN(const std::string payload, LoadPayload(segment));
+  if (!DecodeShapeTimes(payload, &segment.times)) {
+    return CorruptRow(db_.map_name(), "shape_segment", ToString(question_.agent));
+  }
+  const auto first =
+      std::lower_bound(segment.times.begin(), segment.times.end(), question_.from_ns);
+  segment.next = static_cast<size_t>(first - segment.times.begin());
+  if (first != segment.times.end()) reached_.push_back(std::move(segment));
+  return absl::OkStatus();
+}
+
+TimeNs ShapeReader::NextTime() const {
+  TimeNs next_ns = kTimeMax;
+  for (const Segment& segment : reached_) {
+    next_ns = std::min(next_ns, segment.times[segment.next]);
+  }
+  return next_ns;
+}
+
+const ShapeReader::Segment& ShapeReader::Pass(TimeNs time_ns, size_t* index) {
+  const Segment* believed = nullptr;
+  for (Segment& segment : reached_) {
+    if (segment.times[segment.next] != time_ns) continue;
+    if (believed == nullptr || std::tie(segment.rev_from, segment.row_id) >
+                                   std::tie(believed->rev_from, believed->row_id)) {
+      believed = &segment;
+      *index = segment.next;
+    }
+    ++segment.next;
+  }
+  return *believed;
+}
+
+absl::StatusOr<std::shared_ptr<const DecodedShapes>> ShapeReader::Decode(const Segment& segment) {
+  const ShapeKey key{segment.row_id, question_.with_vertices};
+  auto cached = cache_.Find(key);
+  if (cached != nullptr) return cached;
+  DSG_ASSIGN_OR_RETURN(const std::string payload, LoadPayload(segment));
+  auto decoded = std::make_shared<DecodedShapes>();
+  if (!DecodeShapes(payload, question_.with_vertices, decoded.get())) {
+    return CorruptRow(db_.map_name(), "shape_segment", ToString(question_.agent));
+  }
+  cache_.Insert(key, decoded, decoded->memory_bytes());
+  return std::shared_ptr<const DecodedShapes>(std::move(decoded));
+}
+
+absl::StatusOr<bool> ShapeReader::Show(const Segment& segment, size_t index, const Visit& visit) {
+  if (segment.row_id != decoded_id_) {
+    DSG_ASSIGN_OR_RETURN(decoded_, Decode(segment));
+    decoded_id_ = segment.row_id;
+  }
+  return visit({decoded_->shapes[index], decoded_->vertex_counts[index], decoded_->topology});
+}
+
+absl::Status ShapeReader::Read(const StopCheck& stop, const Visit& visit) {
+  Query rows(db_,
+             "SELECT id, rev_from, t0, t1 FROM shape_segment"
+             " WHERE agent = ?1 AND rev_from <= ?2 AND t0 >= ?3 AND t0 < ?5 AND t1 >= ?4"
+             " ORDER BY t0");
+  rows.Bind(KeyOf(question_.agent), question_.revision, LookBack(question_.from_ns),
+            question_.from_ns, question_.to_ns);
+  bool has_row = rows.Next();
+  for (;;) {
+    if (stop) DSG_RETURN_IF_ERROR(stop());
+    // A segment is reached before the first of its times is shown.
+    while (has_row && (reached_.empty() || rows.Int(2) <= NextTime())) {
+      DSG_RETURN_IF_ERROR(Reach({rows.Int(0), rows.Int(1), rows.Int(2), rows.Int(3), {}}));
+      has_row = rows.Next();
+    }
+    DSG_RETURN_IF_ERROR(rows.status());
+    if (reached_.empty() || NextTime() >= question_.to_ns) return absl::OkStatus();
+    size_t index = 0;
+    const Segment& believed = Pass(NextTime(), &index);
+    DSG_ASSIGN_OR_RETURN(const bool goes_on, Show(believed, index, visit));
+    if (!goes_on) return absl::OkStatus();
+    std::erase_if(reached_, [](const Segment& one) { return one.next == one.times.size(); });
+  }
+}
+
+}  // namespace dsg::sqlite

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// Reads the body shapes of an agent as of a revision, one at a time.
+// Refuses to decode a segment of which nothing is shown.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "schema/codec/shape_codec.h"
+#include "schema/store/snapshot.h"
+#include "schema/store/sqlite/database.h"
+#include "schema/store/sqlite/lru_cache.h"
+
+namespace dsg::sqlite {
+
+struct ShapeKey {
+  int64_t row_id;
+  bool with_vertices;
+  bool operator==(const ShapeKey&) const = default;
+};
+struct ShapeKeyHash {
+  size_t operator()(const ShapeKey& key) const {
+    return std::hash<int64_t>()(key.row_id * 2 + (key.with_vertices ? 1 : 0));
+  }
+};
+
+/// Rows are never changed, so what was decoded once stays right.
+using ShapeCache = LruCache<ShapeKey, DecodedShapes, ShapeKeyHash>;
+
+struct ShapeQuestion {
+  NodeId agent;
+  Revision revision = 0;
+  TimeNs from_ns = 0;
+  TimeNs to_ns = 0;
+  bool with_vertices = false;
+};
+
+/// Merges the segments that touch an interval: of shapes of one time the last written stands.
+/// Memory: two decoded segments, and the times of those that overlap.
+class ShapeReader {
+ public:
+  using Visit = std::function<bool(const ShownShape&)>;
+
+  ShapeReader(Database& db, ShapeCache* cache, const ShapeQuestion& question)
+      : db_(db), cache_(*cache), question_(question) {}
+
+  /// As Snapshot::ReadShapes.
+  absl::Status Read(const StopCheck& stop, const Visit& visit);
+
+ private:
+  /// A segment that the sweep has reached.
+  struct Segment {
+    int64_t row_id = 0;
+    Revision rev_from = 0;
+    TimeNs t0 = 0;
+    TimeNs t1 = 0;
+    std::vector<TimeNs> times;
+    /// The first time that the sweep has not passed.
+    size_t next = 0;
+  };
+
+  absl::Status Reach(Segment segment);
+  /// The time that comes next; kTimeMax when no segment is left.
+  TimeNs NextTime() const;
+  /// Where the shape of `time_ns` that is believed stands; passes it in all segments.
+  const Segment& Pass(TimeNs time_ns, size_t* index);
+  absl::StatusOr<bool> Show(const Segment& segment, size_t index, const Visit& visit);
+  absl::StatusOr<std::string> LoadPayload(const Segment& segment);
+  absl::StatusOr<std::shared_ptr<const DecodedShapes>> Decode(const Segment& segment);
+
+  Database& db_;
+  ShapeCache& cache_;
+  const ShapeQuestion question_;
+  std::vector<Segment> reached_;
+  /// The segment shown last.
+  int64_t decoded_id_ = -1;
+  std::shared_ptr<const DecodedShapes> decoded_;
+};
+
+}  // namespace dsg::sqlite
