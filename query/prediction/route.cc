@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/prediction/route.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace dsg::query {
+namespace {
+
+double Horizontal(const Eigen::Vector3d& from_map, const Eigen::Vector3d& to_map) {
+  return (to_map - from_map).head<2>().norm();
+}
+
+/// The point of the link that is nearest from above.
+Eigen::Vector3d NearestOnLink(const Eigen::Vector3d& position_map, const Eigen::Vector3d& a_map,
+                              const Eigen::Vector3d& b_map) {
+  const Eigen::Vector2d link = (b_map - a_map).head<2>();
+  const double square = link.squaredNorm();
+  if (square == 0.0) return a_map;
+  const double share = (position_map - a_map).head<2>().dot(link) / square;
+  return a_map + std::clamp(share, 0.0, 1.0) * (b_map - a_map);
+}
+
+Attachment Via(const Eigen::Vector3d& position_map, const Eigen::Vector3d& via_map, int place,
+               const WalkGraph& graph) {
+  return {place, via_map,
+          Horizontal(position_map, via_map) + (graph.places_map[place] - via_map).norm()};
+}
+
+bool OnStorey(const Eigen::Vector3d& position_map, const Eigen::Vector3d& point_map) {
+  return std::abs(position_map.z() - point_map.z()) <= kStoreyHeightM;
+}
+
+void AppendPlaces(const Eigen::Vector3d& position_map, const WalkGraph& graph,
+                  std::vector<Attachment>* found) {
+  for (size_t i = 0; i < graph.places_map.size(); ++i) {
+    const Eigen::Vector3d& place_map = graph.places_map[i];
+    const bool in_reach = Horizontal(position_map, place_map) <= graph.clearance_m[i];
+    if (!in_reach || !OnStorey(position_map, place_map)) continue;
+    found->push_back(Via(position_map, place_map, static_cast<int>(i), graph));
+  }
+}
+
+/// What is nearest, place or link, though perhaps behind a wall.
+void AppendNearest(const Eigen::Vector3d& position_map, const WalkGraph& graph, double reach_m,
+                   std::vector<Attachment>* found) {
+  double best_m = reach_m;
+  for (const auto& [a, b] : graph.links) {
+    const Eigen::Vector3d via_map =
+        NearestOnLink(position_map, graph.places_map[a], graph.places_map[b]);
+    const double way_m = Horizontal(position_map, via_map);
+    if (way_m > best_m || !OnStorey(position_map, via_map)) continue;
+    best_m = way_m;
+    *found = {Via(position_map, via_map, a, graph), Via(position_map, via_map, b, graph)};
+  }
+  for (size_t i = 0; i < graph.places_map.size(); ++i) {
+    const double way_m = Horizontal(position_map, graph.places_map[i]);
+    if (way_m >= best_m || !OnStorey(position_map, graph.places_map[i])) continue;
+    best_m = way_m;
+    *found = {Via(position_map, graph.places_map[i], static_cast<int>(i), graph)};
+  }
+}
+
+}  // namespace
+
+std::vector<Attachment> Attach(const Eigen::Vector3d& position_map, const WalkGraph& graph,
+                               const GoalOptions& options) {
+  std::vector<Attachment> found;
+  AppendPlaces(position_map, graph, &found);
+  for (const auto& [a, b] : graph.links) {
+    const Eigen::Vector3d via_map =
+        NearestOnLink(position_map, graph.places_map[a], graph.places_map[b]);
+    // Links keep this from obstacles, so nothing stands between.
+    const bool in_reach = Horizontal(position_map, via_map) <= options.clearance_m_min;
+    if (!in_reach || !OnStorey(position_map, via_map)) continue;
+    found.push_back(Via(position_map, via_map, a, graph));
+    found.push_back(Via(position_map, via_map, b, graph));
+  }
+  if (found.empty()) AppendNearest(position_map, graph, options.attach_m_max, &found);
+  return found;
+}
+
+int BestAttachment(const std::vector<Attachment>& attachments, const GoalField& field, int goal,
+                   double* way_m) {
+  int best = -1;
+  *way_m = std::numeric_limits<double>::infinity();
+  for (size_t i = 0; i < attachments.size(); ++i) {
+    const double whole_m = attachments[i].way_m + field.DistanceM(goal, attachments[i].place);
+    if (whole_m >= *way_m) continue;
+    *way_m = whole_m;
+    best = static_cast<int>(i);
+  }
+  return best;
+}
+
+Eigen::Vector3d Route::At(double along, size_t* segment) const {
+  size_t& i = *segment;
+  while (i > 0 && along_m[i] > along) --i;
+  while (i + 2 < points_map.size() && along_m[i + 1] < along) ++i;
+  if (i + 1 >= points_map.size()) return points_map[i];
+  const double length = along_m[i + 1] - along_m[i];
+  const double share = length > 0.0 ? std::clamp((along - along_m[i]) / length, 0.0, 1.0) : 1.0;
+  return points_map[i] + share * (points_map[i + 1] - points_map[i]);
+}
+
+Route BuildRoute(const Eigen::Vector3d& position_map, const Attachment& attachment,
+                 const GoalField& field, int goal, double length_m_max) {
+  const WalkGraph& graph = field.graph();
+  const Eigen::Vector3d lift(0.0, 0.0, position_map.z() - attachment.via_map.z());
+  Route route{{position_map}, {0.0}, {0.0}};
+  const auto append = [&route](const Eigen::Vector3d& point_map, double clearance_m) {
+    const double step_m = (point_map - route.points_map.back()).norm();
+    route.points_map.push_back(point_map);
+    route.clearance_m.push_back(clearance_m);
+    route.along_m.push_back(route.along_m.back() + step_m);
+  };
+  if (attachment.via_map != graph.places_map[attachment.place]) {
+    append(attachment.via_map + lift, 0.0);
+  }
+  for (int place = attachment.place; place >= 0 && route.length_m() <= length_m_max;
+       place = field.NextPlace(goal, place)) {
+    append(graph.places_map[place] + lift, graph.clearance_m[place]);
+  }
+  return route;
+}
+
+}  // namespace dsg::query
