@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: Apache-2.0
+// dsg-optimize: pose graphs of g2o files, optimised.
+// Refuses to write anything but the file it is told to.
+
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "ingest/loop/g2o_file.h"
+#include "ingest/loop/optimize.h"
+#include "ingest/loop/robust.h"
+#include "schema/base/status.h"
+
+namespace dsg::ingest {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+
+enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2, kUnavailable = 3, kDataLoss = 4 };
+
+struct Flags {
+  std::string file;
+  std::string out;
+  std::string objective = "se-sync";
+  std::string start = "chordal";
+  // Small graphs of large residuals take hundreds of steps, each of no time.
+  int iteration_count_max = 500;
+  bool is_robust = false;
+  bool is_json = false;
+};
+
+struct Report {
+  Flags flags;
+  double seconds = 0.0;
+  double cost_se_sync = 0.0;
+  int64_t loop_count = 0;
+  int64_t kept_count = 0;
+};
+
+void AddFlags(CLI::App* app, Flags* flags) {
+  app->set_version_flag("--version", DSG_VERSION);
+  app->add_option("FILE", flags->file, "Pose graph, planar or spatial, as g2o writes it")
+      ->required();
+  app->add_flag("--robust", flags->is_robust, "Leave out loop closures that do not fit the others");
+  app->add_option("--out", flags->out,
+                  "Write the optimised graph here, without the loops that were rejected");
+  app->add_flag("--json", flags->is_json, "Print JSON instead of lines");
+  app->add_option("--objective", flags->objective,
+                  "What is minimised: se-sync (one weight for the rotation and one for the "
+                  "translation of each edge), geodesic (whole information matrices), or g2o (the "
+                  "same, rotations as the vector part of quaternions)")
+      ->check(CLI::IsMember({"se-sync", "geodesic", "g2o"}))
+      ->capture_default_str();
+  app->add_option("--start", flags->start,
+                  "Where to begin: chordal (found from the edges) or file (its VERTEX lines)")
+      ->check(CLI::IsMember({"chordal", "file"}))
+      ->capture_default_str();
+  app->add_option("--iterations", flags->iteration_count_max, "At most so many steps")
+      ->check(CLI::Range(0, 100'000))
+      ->capture_default_str();
+}
+
+/// One line on a terminal, once it has taken two seconds.
+class Progress {
+ public:
+  void Update(int iteration, double cost) {
+    const auto now = SteadyClock::now();
+    if (!is_terminal_ || now < next_) return;
+    next_ = now + std::chrono::milliseconds(200);
+    std::fprintf(stderr, "\rstep %d, cost %.6g\033[K", iteration, cost);
+    std::fflush(stderr);
+    is_shown_ = true;
+  }
+  ~Progress() {
+    if (is_shown_) std::fputs("\r\033[K", stderr);
+  }
+
+ private:
+  const bool is_terminal_ = isatty(STDERR_FILENO) == 1;
+  SteadyClock::time_point next_ = SteadyClock::now() + std::chrono::seconds(2);
+  bool is_shown_ = false;
+};
+
+PoseObjective ObjectiveOf(const std::string& name) {
+  if (name == "geodesic") return PoseObjective::kGeodesic;
+  return name == "g2o" ? PoseObjective::kQuaternion : PoseObjective::kSeSync;
+}
+
+absl::StatusOr<RobustResult> Solve(const Flags& flags, const G2oFile& file) {
+  Progress progress;
+  RobustOptions options;
+  options.optimize.objective = ObjectiveOf(flags.objective);
+  options.optimize.is_chordal_start = flags.start == "chordal";
+  options.optimize.fixed_pose = file.fixed_pose;
+  options.optimize.iteration_count_max = flags.iteration_count_max;
+  options.optimize.on_iteration = [&progress](int iteration, double cost) {
+    progress.Update(iteration, cost);
+  };
+  if (flags.is_robust) return OptimizeRobustly(file.graph, options);
+  RobustResult result;
+  DSG_ASSIGN_OR_RETURN(result.optimized, Optimize(file.graph, options.optimize));
+  result.is_kept.assign(file.graph.edges.size(), true);
+  return result;
+}
+
+Report ReportOf(const Flags& flags, const PoseGraph& graph, const RobustResult& result) {
+  Report report{.flags = flags};
+  std::vector<double> weights;
+  weights.reserve(graph.edges.size());
+  for (size_t i = 0; i < graph.edges.size(); ++i) {
+    weights.push_back(result.is_kept[i] ? 1.0 : 0.0);
+    report.loop_count += graph.edges[i].is_loop ? 1 : 0;
+    report.kept_count += graph.edges[i].is_loop && result.is_kept[i] ? 1 : 0;
+  }
+  report.cost_se_sync =
+      2.0 * CostOf(graph, result.optimized.poses, weights, PoseObjective::kSeSync);
+  return report;
+}
+
+std::string ToJson(const Report& report, const G2oFile& file, const Optimized& optimized) {
+  nlohmann::ordered_json json;
+  json["cost"] = optimized.cost;
+  json["cost_se_sync"] = report.cost_se_sync;
+  json["start_cost"] = optimized.start_cost;
+  json["iterations"] = optimized.iteration_count;
+  json["seconds"] = report.seconds;
+  json["converged"] = optimized.is_converged;
+  json["poses"] = file.graph.poses.size();
+  json["edges"] = file.graph.edges.size();
+  json["loops"] = report.loop_count;
+  json["kept_loops"] = report.kept_count;
+  json["rejected_loops"] = report.loop_count - report.kept_count;
+  json["skipped"] = nlohmann::ordered_json::object();
+  for (const auto& [reason, count] : file.skipped) json["skipped"][reason] = count;
+  json["objective"] = report.flags.objective;
+  return json.dump(2) + "\n";
+}
+
+std::string ToText(const Report& report, const G2oFile& file, const Optimized& optimized) {
+  std::string text;
+  absl::StrAppendFormat(&text, "cost            %.9g\n", optimized.cost);
+  absl::StrAppendFormat(&text, "cost_se_sync    %.9g\n", report.cost_se_sync);
+  absl::StrAppendFormat(&text, "start_cost      %.9g\n", optimized.start_cost);
+  absl::StrAppendFormat(&text, "iterations      %d%s\n", optimized.iteration_count,
+                        optimized.is_converged ? "" : " (not converged)");
+  absl::StrAppendFormat(&text, "seconds         %.3f\n", report.seconds);
+  absl::StrAppendFormat(&text, "poses           %d\n", file.graph.poses.size());
+  absl::StrAppendFormat(&text, "edges           %d\n", file.graph.edges.size());
+  absl::StrAppendFormat(&text, "kept_loops      %d\n", report.kept_count);
+  absl::StrAppendFormat(&text, "rejected_loops  %d\n", report.loop_count - report.kept_count);
+  int64_t skipped_count = 0;
+  for (const auto& [reason, count] : file.skipped) skipped_count += count;
+  absl::StrAppendFormat(&text, "skipped_lines   %d\n", skipped_count);
+  for (const auto& [reason, count] : file.skipped) {
+    absl::StrAppendFormat(&text, "  %s: %d\n", reason, count);
+  }
+  return text;
+}
+
+absl::Status WriteResult(const std::string& path, PoseGraph graph, const RobustResult& result) {
+  graph.poses = result.optimized.poses;
+  std::vector<RelativePose> kept;
+  for (size_t i = 0; i < graph.edges.size(); ++i) {
+    if (result.is_kept[i]) kept.push_back(graph.edges[i]);
+  }
+  graph.edges = std::move(kept);
+  return WriteG2o(graph, path);
+}
+
+absl::Status Run(const Flags& flags) {
+  DSG_ASSIGN_OR_RETURN(const G2oFile file, ReadG2o(flags.file));
+  for (const std::string& note : file.notes) {
+    std::fprintf(stderr, "%s: note: %s\n", flags.file.c_str(), note.c_str());
+  }
+  if (flags.start == "file" && !file.has_start) {
+    std::fprintf(stderr, "%s: note: no VERTEX lines; beginning with poses along the edges\n",
+                 flags.file.c_str());
+  }
+  const auto begin = SteadyClock::now();
+  DSG_ASSIGN_OR_RETURN(const RobustResult result, Solve(flags, file));
+  const std::chrono::duration<double> elapsed = SteadyClock::now() - begin;
+  if (!flags.out.empty()) DSG_RETURN_IF_ERROR(WriteResult(flags.out, file.graph, result));
+  Report report = ReportOf(flags, file.graph, result);
+  report.seconds = elapsed.count();
+  const std::string out = flags.is_json ? ToJson(report, file, result.optimized)
+                                        : ToText(report, file, result.optimized);
+  if (std::fwrite(out.data(), 1, out.size(), stdout) != out.size() || std::fflush(stdout) != 0) {
+    return absl::UnavailableError("cannot write the figures to standard output");
+  }
+  return absl::OkStatus();
+}
+
+ExitCode ReportError(const absl::Status& status) {
+  if (status.ok()) return kDone;
+  std::fprintf(stderr, "dsg-optimize: %s: %s\n",
+               std::string(absl::StatusCodeToString(status.code())).c_str(),
+               std::string(status.message()).c_str());
+  if (ReasonOf(status) == Reason::kFieldInvalid) return kUsage;
+  switch (status.code()) {
+    case absl::StatusCode::kUnavailable:
+      return kUnavailable;
+    case absl::StatusCode::kDataLoss:
+      return kDataLoss;
+    default:
+      return kFailed;
+  }
+}
+
+int Main(int argc, char** argv) {
+  CLI::App app("dsg-optimize: finds the poses that agree best with what was measured between them",
+               "dsg-optimize");
+  Flags flags;
+  AddFlags(&app, &flags);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kDone : kUsage;
+  }
+  return ReportError(Run(flags));
+}
+
+}  // namespace
+}  // namespace dsg::ingest
+
+int main(int argc, char** argv) {
+  // A file over the limit of the shell is a failed write with a message, not a sudden end.
+  std::signal(SIGXFSZ, SIG_IGN);
+  return dsg::ingest::Main(argc, argv);
+}

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+// The robot's own pose graph: keyframes of its trajectory, odometry between them, loop closures.
+// Refuses to find loop closures, and to know what else hangs on the trajectory.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "ingest/loop/pose_graph.h"
+#include "ingest/loop/robust.h"
+#include "schema/model/trajectory.h"
+
+namespace dsg::ingest {
+
+/// The robot at `to_ns` seen from where it was at `from_ns`, by whatever recognised the place.
+struct LoopClosure {
+  TimeNs from_ns = 0;
+  TimeNs to_ns = 0;
+  Pose3d from_T_to;
+  /// Translation before rotation, as RelativePose::information.
+  Matrix6d information = Matrix6d::Identity();
+  /// Where it stood, for messages: "loops.jsonl:3".
+  std::string origin;
+};
+
+struct RobotGraphOptions {
+  /// A keyframe is taken after so much way, turn or time.
+  double keyframe_m = 0.5;
+  double keyframe_rad = 0.35;
+  TimeNs keyframe_ns_max = 5'000'000'000;
+  /// Errors of odometry are a random walk: so large a standard deviation after one metre or radian,
+  /// and twice that after four, however many keyframes lie between...
+  double odometry_m_per_m = 0.02;
+  double odometry_rad_per_m = 0.005;
+  double odometry_rad_per_rad = 0.02;
+  /// ...and at least this between two keyframes.
+  double odometry_m_min = 0.005;
+  double odometry_rad_min = 0.00087;
+  /// Of roll and pitch between two keyframes, whatever lies between: odometry with an inertial unit
+  /// sees gravity, and a map that loop closures tilt is worse than a turned one. Larger where
+  /// nothing knows which way is up.
+  double odometry_tilt_rad = 0.0002;
+  RobustOptions robust;
+};
+
+/// Where things were thought to be, against where they are now, by the time of seeing them.
+class TrajectoryChange {
+ public:
+  /// Identity everywhere.
+  TrajectoryChange() = default;
+  /// `times` ascending, one transform each: new map frame from old map frame.
+  TrajectoryChange(std::vector<TimeNs> times, std::vector<Pose3d> new_T_old);
+  /// The robot's poses before and after. Between keyframes both are interpolated, so that turns go
+  /// around the robot and not around the map's origin.
+  TrajectoryChange(std::vector<TimeNs> times, std::vector<Pose3d> old_T_body,
+                   std::vector<Pose3d> new_T_body);
+
+  /// Interpolated between keyframes, held at the ends.
+  Pose3d At(TimeNs time_ns) const;
+  bool IsIdentity() const { return times_.empty(); }
+  /// Largest shift of a keyframe, metres.
+  double largest_m() const { return largest_m_; }
+
+ private:
+  std::vector<TimeNs> times_;
+  std::vector<Pose3d> old_T_body_;
+  std::vector<Pose3d> new_T_body_;
+  double largest_m_ = 0.0;
+};
+
+/// Threads: one caller at a time. Deterministic.
+class RobotGraph {
+ public:
+  explicit RobotGraph(const RobotGraphOptions& options);
+
+  /// A pose that is not after the last one is left out.
+  void AddPose(TimeNs time_ns, const Pose3d& map_T_body);
+  /// May come before the poses it speaks of; used by the next Solve.
+  void AddLoop(const LoopClosure& loop);
+
+  struct Solution {
+    TrajectoryChange change;
+    int64_t loop_count = 0;
+    int64_t kept_count = 0;
+    /// Loops whose stamps are outside the trajectory, and such that join a keyframe to itself.
+    int64_t unusable_count = 0;
+    std::vector<TimeNs> keyframe_times;
+    /// By keyframe, of the pose against the first one (TimedPose::covariance); empty without loops.
+    std::vector<Covariance6> covariances;
+    /// By loop as added: whether it was believed. False for unusable ones.
+    std::vector<bool> is_kept;
+  };
+  /// Identity when no usable loop is believed. Loops bind the two poses nearest to their stamps,
+  /// which become keyframes; what the robot moved between stamp and pose is taken from odometry.
+  /// Errors: of OptimizeRobustly.
+  absl::StatusOr<Solution> Solve() const;
+
+  /// "odometry" between keyframes and "loop_closure" (all of them; a loop that was not kept has the
+  /// type "loop_closure_rejected"), for the store. `solution`: of the last Solve.
+  std::vector<PoseFactor> Factors(const Solution& solution) const;
+
+ private:
+  struct BoundLoop;
+  std::vector<BoundLoop> BindLoops() const;
+  std::vector<size_t> ChooseKeyframes(const std::vector<BoundLoop>& loops) const;
+  Pose3d PoseAt(TimeNs time_ns) const;
+  RelativePose Odometry(size_t from, size_t to) const;
+  PoseGraph MakeGraph(const std::vector<size_t>& keyframes,
+                      const std::vector<BoundLoop>& loops) const;
+
+  RobotGraphOptions options_;
+  std::vector<TimeNs> times_;
+  std::vector<Pose3d> poses_;
+  std::vector<LoopClosure> loops_;
+};
+
+}  // namespace dsg::ingest

@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: Apache-2.0
+// The robot's pose graph: drift that a loop closes, loops that lie, and how things move with it.
+#include "ingest/loop/robot_graph.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "schema/base/random.h"
+
+namespace dsg::ingest {
+namespace {
+
+constexpr double kPi = 3.14159265358979;
+constexpr TimeNs kStepNs = 200'000'000;
+
+Pose3d Planar(double x, double y, double yaw_rad) {
+  Pose3d pose;
+  pose.position = {x, y, 1.0};
+  pose.orientation = Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ());
+  return pose;
+}
+
+// Three times around a square of 8 m, a step of 0.2 m each 0.2 s, turning on the spot at corners.
+std::vector<Pose3d> SquareWay() {
+  std::vector<Pose3d> way = {Planar(0.0, 0.0, 0.0)};
+  for (int side = 0; side < 12; ++side) {
+    for (int i = 0; i < 40; ++i) way.push_back(way.back() * Planar(0.2, 0.0, 0.0));
+    for (int i = 0; i < 9; ++i) way.push_back(way.back() * Planar(0.0, 0.0, kPi / 18.0));
+  }
+  for (Pose3d& pose : way) pose.position.z() = 1.0;
+  return way;
+}
+
+// What odometry makes of it: each step a little off.
+std::vector<Pose3d> Drifted(const std::vector<Pose3d>& way, uint64_t seed) {
+  Random random(seed, 0);
+  std::vector<Pose3d> odometry = {way.front()};
+  for (size_t i = 1; i < way.size(); ++i) {
+    Pose3d step = way[i - 1].Inverse() * way[i];
+    const double walk = std::sqrt(step.position.norm());
+    step.position.x() += 0.02 * walk * random.Normal();
+    step.position.y() += 0.02 * walk * random.Normal();
+    step.orientation = step.orientation *
+                       Eigen::AngleAxisd(0.01 * walk * random.Normal(), Eigen::Vector3d::UnitZ());
+    odometry.push_back(odometry.back() * step);
+  }
+  return odometry;
+}
+
+double RmsM(const std::vector<Pose3d>& a, const std::vector<Pose3d>& b) {
+  double sum_m2 = 0.0;
+  for (size_t i = 0; i < a.size(); ++i) sum_m2 += (a[i].position - b[i].position).squaredNorm();
+  return std::sqrt(sum_m2 / static_cast<double>(a.size()));
+}
+
+LoopClosure MakeLoop(const std::vector<Pose3d>& way, size_t from, size_t to) {
+  LoopClosure loop;
+  loop.from_ns = static_cast<TimeNs>(from) * kStepNs;
+  loop.to_ns = static_cast<TimeNs>(to) * kStepNs;
+  loop.from_T_to = way[from].Inverse() * way[to];
+  loop.information.diagonal() << 400.0, 400.0, 400.0, 3000.0, 3000.0, 3000.0;
+  return loop;
+}
+
+class RobotGraphTest : public testing::Test {
+ protected:
+  static constexpr size_t kRound = 4 * 49;
+
+  explicit RobotGraphTest(uint64_t seed = 1) { Begin(seed); }
+
+  void Begin(uint64_t seed) {
+    way_ = SquareWay();
+    odometry_ = Drifted(way_, seed);
+    graph_ = RobotGraph(RobotGraphOptions());
+    for (size_t i = 0; i < odometry_.size(); ++i) {
+      graph_.AddPose(static_cast<TimeNs>(i) * kStepNs, odometry_[i]);
+    }
+  }
+
+  // One spot of each side is recognised in the next round.
+  void AddRightLoops() {
+    for (size_t i = 10; i + kRound < way_.size(); i += 49) {
+      graph_.AddLoop(MakeLoop(way_, i, i + kRound));
+    }
+  }
+
+  std::vector<Pose3d> Corrected(const TrajectoryChange& change) const {
+    std::vector<Pose3d> poses;
+    for (size_t i = 0; i < odometry_.size(); ++i) {
+      poses.push_back(change.At(static_cast<TimeNs>(i) * kStepNs) * odometry_[i]);
+    }
+    return poses;
+  }
+
+  std::vector<Pose3d> way_;
+  std::vector<Pose3d> odometry_;
+  RobotGraph graph_{RobotGraphOptions()};
+};
+
+TEST_F(RobotGraphTest, WithoutLoopsNothingMoves) {
+  const auto solution = graph_.Solve();
+  ASSERT_TRUE(solution.ok()) << solution.status();
+  EXPECT_TRUE(solution->change.IsIdentity());
+  EXPECT_TRUE(solution->covariances.empty());
+  EXPECT_GT(solution->keyframe_times.size(), 100u);
+  EXPECT_EQ(graph_.Factors(*solution).size(), solution->keyframe_times.size() - 1);
+}
+
+TEST_F(RobotGraphTest, LoopsHalveTheDriftOfASquare) {
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    SCOPED_TRACE(seed);
+    Begin(seed);
+    AddRightLoops();
+    const auto solution = graph_.Solve();
+    ASSERT_TRUE(solution.ok()) << solution.status();
+    EXPECT_EQ(solution->kept_count, solution->loop_count);
+    const double before_m = RmsM(odometry_, way_);
+    const double after_m = RmsM(Corrected(solution->change), way_);
+    RecordProperty("seed_" + std::to_string(seed),
+                   std::to_string(before_m) + " -> " + std::to_string(after_m));
+    EXPECT_LT(after_m, 0.5 * before_m) << before_m;
+  }
+}
+
+TEST_F(RobotGraphTest, LoopsThatLieAreToldAsRejected) {
+  AddRightLoops();
+  const size_t right_count = (way_.size() - 11 - kRound) / 49 + 1;
+  for (size_t i = 20; i < 200; i += 40) {
+    LoopClosure wrong = MakeLoop(way_, i, i + 90);
+    wrong.from_T_to = Planar(0.3, 0.2, 0.5);
+    graph_.AddLoop(wrong);
+  }
+  const auto solution = graph_.Solve();
+  ASSERT_TRUE(solution.ok()) << solution.status();
+  for (size_t i = 0; i < solution->is_kept.size(); ++i) {
+    EXPECT_EQ(solution->is_kept[i], i < right_count) << i;
+  }
+  EXPECT_LT(RmsM(Corrected(solution->change), way_), 0.5 * RmsM(odometry_, way_));
+  int64_t rejected_count = 0;
+  for (const PoseFactor& factor : graph_.Factors(*solution)) {
+    rejected_count += factor.type == "loop_closure_rejected" ? 1 : 0;
+    EXPECT_TRUE(factor.information.has_value());
+  }
+  EXPECT_EQ(rejected_count, 5);
+}
+
+TEST_F(RobotGraphTest, CountsLoopsThatNobodyCanUse) {
+  AddRightLoops();
+  LoopClosure early = MakeLoop(way_, 0, kRound);
+  early.from_ns = -1;
+  LoopClosure late = MakeLoop(way_, 0, kRound);
+  late.to_ns = static_cast<TimeNs>(way_.size()) * kStepNs;
+  LoopClosure same = MakeLoop(way_, 30, 30);
+  same.to_ns += 1000;
+  for (const LoopClosure& loop : {early, late, same}) graph_.AddLoop(loop);
+  const auto solution = graph_.Solve();
+  ASSERT_TRUE(solution.ok()) << solution.status();
+  EXPECT_EQ(solution->unusable_count, 3);
+  EXPECT_EQ(solution->loop_count, solution->kept_count + 3);
+}
+
+TEST_F(RobotGraphTest, LoopsMayComeBeforeTheirPosesAndBetweenThem) {
+  RobotGraph graph{RobotGraphOptions()};
+  for (size_t i = 10; i + kRound < way_.size(); i += 49) {
+    LoopClosure loop = MakeLoop(way_, i, i + kRound);
+    // Between two poses of a robot that drives straight on: 0.08 m further.
+    loop.to_ns += 2 * kStepNs / 5;
+    loop.from_T_to = loop.from_T_to * Planar(0.08, 0.0, 0.0);
+    loop.from_T_to.position.z() = 0.0;
+    graph.AddLoop(loop);
+  }
+  for (size_t i = 0; i < odometry_.size(); ++i) {
+    graph.AddPose(static_cast<TimeNs>(i) * kStepNs, odometry_[i]);
+  }
+  const auto solution = graph.Solve();
+  ASSERT_TRUE(solution.ok()) << solution.status();
+  EXPECT_EQ(solution->kept_count, solution->loop_count);
+  EXPECT_LT(RmsM(Corrected(solution->change), way_), 0.5 * RmsM(odometry_, way_));
+}
+
+TEST_F(RobotGraphTest, KeepsTheRobotLevelWhateverLoopsSay) {
+  Random random(3, 0);
+  for (size_t i = 10; i + kRound < way_.size(); i += 49) {
+    LoopClosure loop = MakeLoop(way_, i, i + kRound);
+    loop.from_T_to.orientation =
+        loop.from_T_to.orientation *
+        Eigen::AngleAxisd(0.03 * random.Normal(), Eigen::Vector3d::UnitX()) *
+        Eigen::AngleAxisd(0.03 * random.Normal(), Eigen::Vector3d::UnitY());
+    graph_.AddLoop(loop);
+  }
+  const auto solution = graph_.Solve();
+  ASSERT_TRUE(solution.ok()) << solution.status();
+  EXPECT_FALSE(solution->change.IsIdentity());
+  for (const Pose3d& pose : Corrected(solution->change)) {
+    EXPECT_GT((pose.orientation * Eigen::Vector3d::UnitZ()).z(), std::cos(0.01));
+  }
+}
+
+TEST_F(RobotGraphTest, IsMoreCertainNearTheStartAndAfterALoop) {
+  AddRightLoops();
+  const auto solution = graph_.Solve();
+  ASSERT_TRUE(solution.ok()) << solution.status();
+  ASSERT_EQ(solution->covariances.size(), solution->keyframe_times.size());
+  for (const Covariance6& covariance : solution->covariances) {
+    for (const size_t diagonal : {0, 6, 11, 15, 18, 20}) {
+      EXPECT_GE(covariance[diagonal], 0.0f);
+      EXPECT_LT(covariance[diagonal], 1.0f);
+    }
+  }
+  EXPECT_LT(solution->covariances[1][0], solution->covariances.back()[0]);
+}
+
+TEST_F(RobotGraphTest, TheSameInputGivesTheSameBits) {
+  AddRightLoops();
+  const auto a = graph_.Solve();
+  const auto b = graph_.Solve();
+  ASSERT_TRUE(a.ok() && b.ok());
+  for (TimeNs t = 0; t < 100 * kNsPerSecond; t += 777'777'777) {
+    EXPECT_EQ(a->change.At(t).position, b->change.At(t).position);
+    EXPECT_EQ(a->change.At(t).orientation.coeffs(), b->change.At(t).orientation.coeffs());
+  }
+}
+
+TEST(RobotGraph, IsEmptyWithoutPoses) {
+  RobotGraph graph{RobotGraphOptions()};
+  graph.AddLoop(LoopClosure{.from_ns = 1, .to_ns = 2});
+  const auto solution = graph.Solve();
+  ASSERT_TRUE(solution.ok()) << solution.status();
+  EXPECT_TRUE(solution->change.IsIdentity());
+  EXPECT_EQ(solution->unusable_count, 1);
+  EXPECT_TRUE(graph.Factors(*solution).empty());
+}
+
+TEST(TrajectoryChange, TurnsAroundTheRobotBetweenKeyframes) {
+  // Far from the origin, where interpolated transforms would swing things aside.
+  const std::vector<Pose3d> before = {Planar(1000.0, 0.0, 0.0), Planar(1001.0, 0.0, 0.0)};
+  const std::vector<Pose3d> after = {Planar(1000.0, 0.0, 0.0), Planar(1001.0, 0.0, 0.4)};
+  const TrajectoryChange change({0, 1000}, before, after);
+  const Eigen::Vector3d robot(1000.5, 0.0, 1.0);
+  EXPECT_LT((change.At(500) * robot - robot).norm(), 1e-9);
+  EXPECT_NEAR(AngleBetween(change.At(500).orientation, Eigen::Quaterniond::Identity()), 0.2, 1e-9);
+}
+
+TEST(TrajectoryChange, HoldsAtItsEndsAndIsIdentityWithoutKeyframes) {
+  const TrajectoryChange change({10, 20}, {Planar(1.0, 0.0, 0.0), Planar(3.0, 0.0, 0.0)});
+  EXPECT_EQ(change.At(0).position.x(), 1.0);
+  EXPECT_EQ(change.At(15).position.x(), 2.0);
+  EXPECT_EQ(change.At(99).position.x(), 3.0);
+  EXPECT_EQ(TrajectoryChange().At(5).position, Eigen::Vector3d::Zero());
+  EXPECT_TRUE(TrajectoryChange().IsIdentity());
+}
+
+}  // namespace
+}  // namespace dsg::ingest
