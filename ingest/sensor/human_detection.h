@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,8 @@ struct HumanDetection {
   Eigen::Vector4d box_px = Eigen::Vector4d::Zero();
   /// Instance in the label image of the same stamp; 0 = unknown.
   int mask_instance = 0;
+  /// False for detectors that give boxes only: then no field of joints says anything.
+  bool has_joints = true;
   /// Minus the pelvis, axes of the camera, metres.
   std::array<Eigen::Vector3d, kJointCount> joints_root;
   /// Pixels.
@@ -46,6 +49,12 @@ struct HumanDetection {
   std::vector<float> pose_coefficients;
   /// kShapeCount numbers or none.
   std::vector<float> shape_coefficients;
+  /// x, y, z of each vertex of the body's mesh minus the pelvis, axes of the camera, metres; may be
+  /// empty.
+  std::vector<float> vertices_root;
+  /// Where the pelvis is before the full camera, metres, from networks that say so; the weak camera
+  /// says nothing then.
+  std::optional<Eigen::Vector3d> pelvis_camera;
   /// x_px = crop centre + scale * (X + t) * crop_px / 2: the usual weak-perspective camera.
   double weak_scale = 0.0;
   Eigen::Vector2d weak_translation = Eigen::Vector2d::Zero();

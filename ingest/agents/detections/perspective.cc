@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/agents/detections/perspective.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "ingest/agents/detections/lens.h"
+#include "ingest/agents/detections/pnp.h"
+#include "ingest/agents/detections/torso_axes.h"
+#include "schema/base/status.h"
+
+namespace dsg::ingest {
+namespace {
+
+constexpr double kDepthMinM = 0.1;
+constexpr double kDepthMaxM = 200.0;
+constexpr double kVisibilityMin = 0.05;
+constexpr double kReprojectionGoodPx = 8.0;
+constexpr double kBodyHeightM = 1.7;
+// Of the pelvis above the soles, of the body's height.
+constexpr double kPelvisShare = 0.53;
+// What a network errs by, of the distance and beyond it; a box knows less.
+constexpr double kRayShare = 0.12;
+constexpr double kRayM = 0.1;
+constexpr double kBoxRayShare = 0.2;
+constexpr double kBoxRayM = 0.2;
+constexpr double kLateralShare = 0.02;
+constexpr double kLateralM = 0.08;
+// Of the hidden part of a body its place is guessed.
+constexpr double kHiddenLateralM = 0.3;
+constexpr double kNoHeadingSigmaRad = 3.0;
+
+double FocalPx(const CameraCalibration& camera) { return std::sqrt(camera.fx * camera.fy); }
+
+absl::Status Bad(const HumanDetection& detection, const std::string& message) {
+  return MakeError(Reason::kFieldInvalid,
+                   absl::StrCat("detection ", detection.id, " at ", detection.time_ns, " in ",
+                                detection.camera, " ", message),
+                   {{"detection", absl::StrCat(detection.id)}});
+}
+
+std::vector<SeenJoint> SeenJoints(const HumanDetection& detection,
+                                  const CameraCalibration& camera) {
+  std::vector<SeenJoint> seen;
+  if (!detection.has_joints) return seen;
+  for (size_t j = 0; j < size_t{kJointCount}; ++j) {
+    const double visibility = detection.joint_visibility[j];
+    if (!(visibility >= kVisibilityMin) || !detection.joints_root[j].allFinite()) continue;
+    const std::optional<Eigen::Vector3d> ray = RayThrough(camera, detection.joints_px[j]);
+    if (!ray.has_value()) continue;
+    seen.push_back({detection.joints_root[j], ray->head<2>(), visibility});
+  }
+  return seen;
+}
+
+// A standing body of the mean height fills the box.
+std::optional<Eigen::Vector3d> PlaceByBox(const HumanDetection& detection,
+                                          const CameraCalibration& camera) {
+  const Eigen::Vector4d& box = detection.box_px;
+  const double height_px = box[3] - box[1];
+  if (!box.allFinite() || !(height_px > 1.0)) return std::nullopt;
+  const std::optional<Eigen::Vector3d> ray =
+      RayThrough(camera, {0.5 * (box[0] + box[2]), box[3] - kPelvisShare * height_px});
+  const std::optional<Eigen::Vector3d> top = RayThrough(camera, {0.5 * (box[0] + box[2]), box[1]});
+  const std::optional<Eigen::Vector3d> bottom =
+      RayThrough(camera, {0.5 * (box[0] + box[2]), box[3]});
+  if (!ray.has_value() || !top.has_value() || !bottom.has_value()) return std::nullopt;
+  const double slope = bottom->y() - top->y();
+  if (!(slope > 1e-6)) return std::nullopt;
+  return *ray * (kBodyHeightM / slope);
+}
+
+Eigen::Matrix3d AlongRay(const Eigen::Vector3d& at, double sigma_ray_m, double sigma_lateral_m) {
+  const Eigen::Vector3d ray = at.normalized();
+  const Eigen::Matrix3d along = ray * ray.transpose();
+  return sigma_ray_m * sigma_ray_m * along +
+         sigma_lateral_m * sigma_lateral_m * (Eigen::Matrix3d::Identity() - along);
+}
+
+// By the joints' pixels; the turn and the pixel error are only theirs.
+std::optional<BodyPlacement> PlaceByJoints(const std::vector<SeenJoint>& seen, double focal_px) {
+  std::optional<BodyPlacement> placement = PlaceByTranslation(seen, focal_px);
+  if (placement.has_value() && placement->reprojection_px > kReprojectionGoodPx) {
+    if (const auto refined = RefineSixDof(seen, focal_px, *placement)) placement = refined;
+  }
+  return placement;
+}
+
+struct Placement {
+  BodyPlacement body;
+  bool is_by_box = false;
+};
+
+absl::StatusOr<Placement> Place(const HumanDetection& detection, const CameraCalibration& camera) {
+  const double focal_px = FocalPx(camera);
+  const std::vector<SeenJoint> seen = SeenJoints(detection, camera);
+  Placement placement;
+  BodyPlacement& body = placement.body;
+  body.covariance.setZero();
+  if (detection.pelvis_camera.has_value()) {
+    body.root_camera = *detection.pelvis_camera;
+  } else if (const auto by_joints = PlaceByJoints(seen, focal_px)) {
+    body = *by_joints;
+  } else if (const auto by_weak = PlaceByWeakCamera(detection, camera)) {
+    body.root_camera = *by_weak;
+  } else if (const auto by_box = PlaceByBox(detection, camera)) {
+    body.root_camera = *by_box;
+    placement.is_by_box = true;
+  } else {
+    return Bad(detection,
+               "has nothing to place the person by: neither four seen joints nor a "
+               "weak camera, a pelvis or a box; leave it out");
+  }
+  const double depth_m = body.root_camera.z();
+  if (!body.root_camera.allFinite() || !(depth_m >= kDepthMinM && depth_m <= kDepthMaxM)) {
+    return Bad(
+        detection,
+        absl::StrCat("puts the person at a depth of ", depth_m, " m; ", kDepthMinM, " to ",
+                     kDepthMaxM, " m before the camera is due; check joints and calibration"));
+  }
+  if (!body.covariance.allFinite()) return Bad(detection, "has joints beyond all bounds");
+  const double reprojection_px = ReprojectionPx(seen, focal_px, body.root_camera, body.turn);
+  body.reprojection_px = std::isfinite(reprojection_px) ? reprojection_px : 0.0;
+  return placement;
+}
+
+}  // namespace
+
+std::optional<Eigen::Vector3d> PlaceByWeakCamera(const HumanDetection& detection,
+                                                 const CameraCalibration& camera) {
+  const double scale_px = detection.weak_scale * detection.crop_px;
+  if (!(scale_px > 0.0) || !std::isfinite(scale_px)) return std::nullopt;
+  const double depth_m = 2.0 * FocalPx(camera) / scale_px;
+  const std::optional<Eigen::Vector3d> ray =
+      RayThrough(camera, detection.crop_center_px + 0.5 * scale_px * detection.weak_translation);
+  if (!ray.has_value() || !(depth_m >= kDepthMinM && depth_m <= kDepthMaxM)) return std::nullopt;
+  return *ray * depth_m;
+}
+
+absl::StatusOr<PersonInCamera> PlaceInCamera(const HumanDetection& detection,
+                                             const CameraCalibration& camera) {
+  DSG_ASSIGN_OR_RETURN(const Placement placement, Place(detection, camera));
+  const BodyPlacement& body = placement.body;
+  PersonInCamera person;
+  person.camera_T_torso.position = body.root_camera;
+  person.joints_turn = body.turn;
+  const double depth_m = body.root_camera.z();
+  const double ray_m =
+      placement.is_by_box ? kBoxRayShare * depth_m + kBoxRayM : kRayShare * depth_m + kRayM;
+  const double hidden_m = kHiddenLateralM * (1.0 - MeanVisibility(detection));
+  const double lateral_m = std::hypot(kLateralShare * depth_m + kLateralM, hidden_m);
+  person.covariance_camera = body.covariance + AlongRay(body.root_camera, ray_m, lateral_m);
+  person.reprojection_px = body.reprojection_px;
+  const std::optional<TorsoAxes> axes = FindTorsoAxes(detection);
+  person.has_heading = axes.has_value();
+  person.heading_sigma_rad = axes.has_value() ? axes->heading_sigma_rad : kNoHeadingSigmaRad;
+  if (axes.has_value()) person.camera_T_torso.orientation = body.turn * axes->camera_R_torso;
+  return person;
+}
+
+}  // namespace dsg::ingest

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/agents/estimation/torso_factors.h"
+
+#include <Eigen/Cholesky>
+
+namespace dsg::ingest {
+namespace {
+
+// Says nothing about tilt, which no link holds.
+constexpr double kNoInformation = 0.0;
+
+}  // namespace
+
+Covariance6 BlockCovariance(const Eigen::Matrix3d& position, double tilt, double heading) {
+  Eigen::Matrix<double, 6, 6> whole = Eigen::Matrix<double, 6, 6>::Zero();
+  whole.topLeftCorner<3, 3>() = position;
+  whole(3, 3) = whole(4, 4) = tilt;
+  whole(5, 5) = heading;
+  Covariance6 triangle{};
+  size_t next = 0;
+  for (int row = 0; row < 6; ++row) {
+    for (int column = row; column < 6; ++column) {
+      triangle[next++] = static_cast<float>(whole(row, column));
+    }
+  }
+  return triangle;
+}
+
+PoseFactor DetectionFactor(TimeNs time_ns, const Pose3d& map_T_torso,
+                           const Eigen::Matrix3d& position_covariance_map,
+                           double heading_sigma_rad) {
+  PoseFactor factor;
+  factor.type = "detection_prior";
+  factor.from_ns = factor.to_ns = time_ns;
+  factor.relative_pose = map_T_torso;
+  const Eigen::Matrix3d position = position_covariance_map.llt().solve(Eigen::Matrix3d::Identity());
+  const bool has_heading = heading_sigma_rad > 0.0;
+  const double tilt = has_heading ? 1.0 / (kTiltSigmaRad * kTiltSigmaRad) : kNoInformation;
+  const double heading =
+      has_heading ? 1.0 / (heading_sigma_rad * heading_sigma_rad) : kNoInformation;
+  factor.information = BlockCovariance(position, tilt, heading);
+  return factor;
+}
+
+PoseFactor LinkFactor(const char* type, TimeNs from_ns, TimeNs to_ns, const Pose3d& step,
+                      const Eigen::Vector3d& position_variance, double heading_variance) {
+  PoseFactor factor;
+  factor.type = type;
+  factor.from_ns = from_ns;
+  factor.to_ns = to_ns;
+  factor.relative_pose = step;
+  const Eigen::Matrix3d position = position_variance.cwiseInverse().asDiagonal();
+  factor.information = BlockCovariance(position, kNoInformation, 1.0 / heading_variance);
+  return factor;
+}
+
+}  // namespace dsg::ingest

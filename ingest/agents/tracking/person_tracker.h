@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+// Who is who: detections of each image are given to tracks, and tracks to persons.
+// Refuses to estimate where a torso was: each track's TorsoGraph does.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ingest/agents/estimation/torso_graph.h"
+#include "ingest/agents/person_observation.h"
+
+namespace dsg::ingest {
+
+struct TrackerOptions {
+  TorsoOptions torso;
+  /// Every joint moves at most this far in one second against the track's last skeleton, and not
+  /// less is allowed within a second. Source: RSS 2020, section IV-A ("3 m").
+  double joint_speed_m_s_max = 3.0;
+  /// The paper's association: a detection joins the first consistent track; the default assigns
+  /// all of an image at once.
+  bool is_first_consistent = false;
+  /// Squared Mahalanobis distance, three degrees of freedom at 99 %.
+  double gate = 11.34;
+  /// A tentative track is confirmed after so many hits within confirm_ns.
+  int confirm_hit_count = 3;
+  TimeNs confirm_ns = 1'000'000'000;
+  /// Unseen for longer, a track is closed (a tentative one is dropped after confirm_ns).
+  TimeNs close_ns = 5'000'000'000;
+  /// Unseen for longer, the place alone no longer says who somebody is: shapes must agree too.
+  TimeNs coast_ns = 1'500'000'000;
+  /// Closed tracks may be found again for so long.
+  TimeNs again_ns = 600'000'000'000;
+  /// Fastest walk for being found again elsewhere, m / s.
+  double again_speed_m_s = 2.0;
+  /// Least log-likelihood ratio of the shapes for being the same person.
+  double again_ratio_min = 3.0;
+  /// Found again with at least this probability, a track goes on; below, it gets a SameAs.
+  double again_probability_min = 0.99;
+  /// The same for a single detection, before it has made a track of its own.
+  double again_at_once_probability_min = 0.999;
+  /// Standard deviations of each shape coefficient, of one detection and among people, until the
+  /// tracker has learnt better from what it sees.
+  double shape_noise_sigma = 0.4;
+  double shape_spread_sigma = 1.0;
+  /// Squared Mahalanobis distance of shapes within a track: ten degrees of freedom at 99.99 %.
+  double shape_gate = 35.0;
+  /// The same for being found again: at 99 %.
+  double again_shape_gate = 23.2;
+  /// Observations so near to one of a track, with a shape like the track's, are a second box about
+  /// the same body.
+  double duplicate_m = 0.5;
+  /// Of the position of weak observations.
+  double weak_sigma_factor = 2.0;
+};
+
+/// As the paper has it: each detection joins the first consistent track or opens one; nobody is
+/// found again. Tracks of a single detection within a second are dropped.
+/// Source: RSS 2020, section IV-A ("Human Nodes").
+TrackerOptions PaperTrackerOptions();
+
+enum class TrackState { kTentative, kConfirmed, kLost, kClosed, kDropped };
+
+/// "tentative", "confirmed", "lost", "closed", "dropped".
+std::string_view ToString(TrackState state);
+
+/// Another track that may be the same person, seen before.
+struct SameAs {
+  int64_t earlier_track = 0;
+  double probability = 0.0;
+};
+
+/// What became of one track since the last call.
+struct TrackChange {
+  int64_t track = 0;
+  TrackState state = TrackState::kTentative;
+  /// The first estimate that may have moved or is new; estimates().size() when none.
+  size_t first_estimate = 0;
+  /// The first observation that is new.
+  size_t first_observation = 0;
+};
+
+struct TrackerCounts {
+  int64_t observation_count = 0;
+  /// Ever confirmed.
+  int64_t track_count = 0;
+  int64_t dropped_track_count = 0;
+  int64_t same_as_count = 0;
+  /// Confirmed tracks that went on after they had been lost from sight by place.
+  int64_t found_again_count = 0;
+  /// Second boxes about a body, observations with numbers that are not finite, and weak ones that
+  /// fitted no track: not used.
+  int64_t duplicate_count = 0;
+  int64_t unusable_count = 0;
+  int64_t weak_unused_count = 0;
+  /// Images before the last one.
+  int64_t refused_image_count = 0;
+};
+
+/// Deterministic. Threads: one caller at a time.
+class PersonTracker {
+ public:
+  /// One track, from its first detection on.
+  struct Track {
+    int64_t id = 0;
+    TrackState state = TrackState::kTentative;
+    TorsoGraph graph;
+    /// As they came, ascending in time.
+    std::vector<PersonObservation> observations;
+    /// Mean over the observations; empty when none has any.
+    std::vector<float> shape_coefficients;
+    std::vector<SameAs> same_as;
+  };
+
+  explicit PersonTracker(const TrackerOptions& options);
+  ~PersonTracker();
+
+  /// All observations of one image, in any order; may be none (people who are not seen coast).
+  /// An image before the last one is refused: false, and nothing changes.
+  bool Observe(TimeNs time_ns, std::vector<PersonObservation> observations);
+  /// No more will come: closes all tracks and smooths each over its whole length.
+  void Finish();
+
+  /// Confirmed tracks (and closed ones, and dropped ones, once) that changed since the last call,
+  /// ascending by track. A track is told from its first observation on when it is confirmed. A
+  /// closed one whose person is found again is told as confirmed again, and goes on where it ended.
+  std::vector<TrackChange> TakeChanges();
+  /// Requires: an id from TakeChanges. Tracks are kept until the end.
+  const Track& track(int64_t id) const;
+  TrackerCounts counts() const;
+  /// Frees the meshes of a track's observations from `first` on: they are large, and of no use to
+  /// the tracker.
+  void ForgetVertices(int64_t id, size_t first);
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace dsg::ingest

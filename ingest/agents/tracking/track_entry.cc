@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/agents/tracking/track_entry.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace dsg::ingest {
+namespace {
+
+std::vector<float> ToFloats(const ShapeVector& shape) {
+  std::vector<float> out;
+  for (int i = 0; i < kShapeCount; ++i) out.push_back(static_cast<float>(shape[i]));
+  return out;
+}
+
+}  // namespace
+
+SeenPerson MakeSeen(PersonObservation observation) {
+  SeenPerson seen;
+  seen.skeleton = PlaceSkeleton(observation, observation.map_T_torso);
+  const std::optional<ShapeVector> shape = ReadShape(observation.shape_coefficients);
+  if (shape.has_value()) seen.shape.Add(*shape);
+  seen.observation = std::move(observation);
+  return seen;
+}
+
+TrackEntry::TrackEntry(int64_t id, const TrackerOptions& options)
+    : options_(&options), track_{id, TrackState::kTentative, TorsoGraph(options.torso), {}, {},
+                                 {}} {}
+
+void TrackEntry::Append(PersonObservation observation) {
+  PersonObservation weighed = observation;
+  if (observation.is_weak) {
+    weighed.position_covariance_map *= options_->weak_sigma_factor * options_->weak_sigma_factor;
+  }
+  track_.graph.Add(weighed);
+  track_.observations.push_back(std::move(observation));
+}
+
+void TrackEntry::Solved(size_t first_moved) {
+  first_estimate_ = std::min(first_estimate_, first_moved);
+  is_changed_ = true;
+  skeleton_ =
+      PlaceSkeleton(track_.observations.back(), track_.graph.estimates().back().map_T_torso);
+  if (shape_.count > 0) track_.shape_coefficients = ToFloats(shape_.mean());
+}
+
+void TrackEntry::Add(const SeenPerson& seen) {
+  Append(seen.observation);
+  shape_.Add(seen.shape);
+  Solved(track_.graph.SolveRecent());
+}
+
+void TrackEntry::Absorb(TrackEntry* other) {
+  size_t first_moved = track_.observations.size();
+  for (PersonObservation& observation : other->track_.observations) {
+    Append(std::move(observation));
+    // One by one, as if they had been of this track from the beginning.
+    first_moved = std::min(first_moved, track_.graph.SolveRecent());
+  }
+  other->track_.observations.clear();
+  shape_.Add(other->shape_);
+  Solved(first_moved);
+}
+
+void TrackEntry::Smooth() {
+  if (track_.observations.empty()) return;
+  track_.graph.SolveAll();
+  Solved(0);
+}
+
+void TrackEntry::SetState(TrackState state) {
+  if (state == track_.state) return;
+  track_.state = state;
+  is_changed_ = true;
+  was_confirmed_ |= state == TrackState::kConfirmed;
+}
+
+bool TrackEntry::IsConfirmable(TimeNs now_ns) const {
+  const auto needed = static_cast<size_t>(std::max(1, options_->confirm_hit_count));
+  const size_t count = track_.observations.size();
+  return count >= needed &&
+         now_ns - track_.observations[count - needed].time_ns <= options_->confirm_ns;
+}
+
+std::optional<TrackChange> TrackEntry::TakeChange() {
+  if (!is_changed_ || (!was_confirmed_ && track_.state != TrackState::kDropped)) {
+    return std::nullopt;
+  }
+  const size_t estimate_count = track_.graph.estimates().size();
+  const TrackChange change{track_.id, track_.state, std::min(first_estimate_, estimate_count),
+                           first_observation_};
+  is_changed_ = false;
+  first_estimate_ = estimate_count;
+  first_observation_ = track_.observations.size();
+  return change;
+}
+
+}  // namespace dsg::ingest

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// One track and what the tracker remembers beside it: its last skeleton, its shape, what was told.
+// Refuses to decide what belongs to the track.
+#pragma once
+
+#include <optional>
+
+#include "ingest/agents/tracking/person_tracker.h"
+#include "ingest/agents/tracking/shape_statistics.h"
+#include "ingest/agents/tracking/skeleton.h"
+
+namespace dsg::ingest {
+
+/// An observation that waits for its track.
+struct SeenPerson {
+  PersonObservation observation;
+  Skeleton skeleton;
+  /// Of this observation alone; count 0 without a shape.
+  ShapeMean shape;
+};
+
+SeenPerson MakeSeen(PersonObservation observation);
+
+class TrackEntry {
+ public:
+  TrackEntry(int64_t id, const TrackerOptions& options);
+
+  /// Requires: later than the last; for Absorb, all of `other` later than the last.
+  void Add(const SeenPerson& seen);
+  void Absorb(TrackEntry* other);
+  /// Over its whole length.
+  void Smooth();
+  void SetState(TrackState state);
+
+  /// Whether enough hits are close together.
+  bool IsConfirmable(TimeNs now_ns) const;
+  /// What is new since the last call, if the track has been confirmed or dropped.
+  std::optional<TrackChange> TakeChange();
+
+  const PersonTracker::Track& track() const { return track_; }
+  PersonTracker::Track* mutable_track() { return &track_; }
+  TrackState state() const { return track_.state; }
+  const ShapeMean& shape() const { return shape_; }
+  const Skeleton& skeleton() const { return skeleton_; }
+  TimeNs first_ns() const { return track_.observations.front().time_ns; }
+  TimeNs last_ns() const { return track_.observations.back().time_ns; }
+  bool was_confirmed() const { return was_confirmed_; }
+
+ private:
+  void Append(PersonObservation observation);
+  void Solved(size_t first_moved);
+
+  const TrackerOptions* options_;
+  PersonTracker::Track track_;
+  ShapeMean shape_;
+  Skeleton skeleton_;
+  bool was_confirmed_ = false;
+  bool is_changed_ = false;
+  size_t first_estimate_ = 0;
+  size_t first_observation_ = 0;
+};
+
+}  // namespace dsg::ingest
