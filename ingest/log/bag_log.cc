@@ -15,6 +15,7 @@
 #include "ingest/log/bag_topics.h"
 #include "ingest/log/detection_json.h"
 #include "ingest/log/image_file.h"
+#include "ingest/log/loop_file.h"
 #include "ingest/log/ros_image.h"
 #include "ingest/log/ros_messages.h"
 #include "ingest/log/sensor_log.h"
@@ -74,14 +75,16 @@ class BagLog : public LogSource {
 
   const LogInfo& info() const override { return info_; }
 
-  /// Poses that are not in the bag.
-  void SetPoses(SensorChannel poses) { poses_ = std::move(poses); }
+  /// What is known as a whole before the bag is read: poses and loop closures.
+  void AddKnown(SensorChannel channel) { known_.push_back({std::move(channel)}); }
 
   /// Reads until the first measurement is known.
   absl::Status FindFirst() {
     DSG_RETURN_IF_ERROR(Fill());
     TimeNs first_ns = waiting_.empty() ? kTimeMax : waiting_.begin()->first.time_ns;
-    if (!poses_.times.empty()) first_ns = std::min(first_ns, poses_.times.front());
+    for (const Known& known : known_) {
+      if (!known.IsAtEnd()) first_ns = std::min(first_ns, known.key().first);
+    }
     if (first_ns == kTimeMax) first_ns = 0;
     info_.first_ns = first_ns;
     info_.clock = first_ns >= kFirstPlausibleUnixNs ? Clock::kUnix : Clock::kMonotonic;
@@ -91,12 +94,12 @@ class BagLog : public LogSource {
   absl::StatusOr<std::optional<Measurement>> Next() override {
     if (info_.measurement_count == 0) return NothingUsable();
     DSG_RETURN_IF_ERROR(Fill());
-    const bool has_pose = next_pose_ < poses_.times.size();
-    if (has_pose && (waiting_.empty() ||
-                     std::tie(poses_.times[next_pose_], poses_.rank) <
-                         std::tie(waiting_.begin()->first.time_ns, waiting_.begin()->first.rank))) {
-      DSG_ASSIGN_OR_RETURN(Measurement pose, poses_.make(next_pose_++));
-      return pose;
+    Known* const known = FirstKnown();
+    if (known != nullptr &&
+        (waiting_.empty() ||
+         known->key() < std::pair(waiting_.begin()->first.time_ns, waiting_.begin()->first.rank))) {
+      DSG_ASSIGN_OR_RETURN(Measurement measurement, known->channel.make(known->next++));
+      return measurement;
     }
     if (waiting_.empty()) return std::nullopt;
     auto first = waiting_.extract(waiting_.begin());
@@ -105,6 +108,23 @@ class BagLog : public LogSource {
   }
 
  private:
+  struct Known {
+    SensorChannel channel;
+    size_t next = 0;
+
+    bool IsAtEnd() const { return next == channel.times.size(); }
+    std::pair<TimeNs, ChannelRank> key() const { return {channel.times[next], channel.rank}; }
+  };
+
+  Known* FirstKnown() {
+    Known* first = nullptr;
+    for (Known& known : known_) {
+      if (known.IsAtEnd()) continue;
+      if (first == nullptr || known.key() < first->key()) first = &known;
+    }
+    return first;
+  }
+
   absl::Status NothingUsable() const {
     std::vector<std::string> topics;
     for (const BagTopic& topic : plan_.topics) {
@@ -241,8 +261,7 @@ class BagLog : public LogSource {
   BagPlan plan_;
   std::shared_ptr<const std::map<uint32_t, int32_t>> class_of_color_;
   std::string robot_name_;
-  SensorChannel poses_;
-  size_t next_pose_ = 0;
+  std::vector<Known> known_;
   size_t next_ = 0;
   /// By topic: messages seen, and the last one's key.
   std::vector<int64_t> numbers_;
@@ -287,10 +306,40 @@ absl::StatusOr<std::optional<TrackTable>> PlanPoses(const LogOptions& options, B
   return table;
 }
 
+// Loop closures are found, and recorded, long after their stamps: they are read before the rest.
+absl::StatusOr<std::optional<SensorChannel>> ReadLoops(const BagFile& bag,
+                                                       const LogOptions& options, BagPlan* plan,
+                                                       LogDigest* digest, LogInfo* info) {
+  LoopLines loops;
+  bool has_topic = false;
+  std::vector<int64_t> numbers(plan->topics.size(), 0);
+  for (const BagMessageRef& ref : bag.messages()) {
+    const size_t index = plan->topic_of_connection[ref.connection];
+    const BagTopic& topic = plan->topics[index];
+    if (topic.use != TopicUse::kLoops || !options.loop_file.empty()) continue;
+    has_topic = true;
+    const std::string origin = BagOrigin(bag, topic.name, ++numbers[index]);
+    DSG_ASSIGN_OR_RETURN(const BagMessage message, bag.Read(ref));
+    DSG_ASSIGN_OR_RETURN(const std::string_view text, ParseRosString(message.data, origin));
+    DSG_RETURN_IF_ERROR(loops.Add(LinePosition{origin, 1}, text));
+  }
+  for (BagTopic& topic : plan->topics) {
+    if (topic.use == TopicUse::kLoops) topic.use = TopicUse::kNone;
+  }
+  if (has_topic) return loops.TakeChannel(&info->notes);
+  return ReadLoopChannel(options, /*log_path=*/"", digest, info);
+}
+
+void Count(const SensorChannel& channel, LogInfo* info) {
+  const auto count = static_cast<int64_t>(channel.times.size());
+  info->channel_counts[channel.name] = count;
+  info->measurement_count += count;
+}
+
 absl::StatusOr<std::string> Identity(const std::string& path, LogDigest digest,
-                                     bool has_pose_file) {
+                                     bool has_other_file) {
   DSG_ASSIGN_OR_RETURN(const std::string hash, Sha256OfFile(path));
-  if (!has_pose_file) return hash;
+  if (!has_other_file) return hash;
   digest.AddSha256("bag", hash);
   return digest.Hex();
 }
@@ -309,20 +358,22 @@ OpenedLog OpenBag(const std::string& path, const LogOptions& options) {
   info.notes = plan.notes;
   LogDigest digest;
   DSG_ASSIGN_OR_RETURN(std::optional<TrackTable> poses, PlanPoses(options, &plan, &digest, &info));
-  DSG_ASSIGN_OR_RETURN(info.content_sha256, Identity(path, digest, poses.has_value()));
+  DSG_ASSIGN_OR_RETURN(std::optional<SensorChannel> loops,
+                       ReadLoops(*bag, options, &plan, &digest, &info));
+  const bool has_other_file = !options.pose_file.empty() || !options.loop_file.empty();
+  DSG_ASSIGN_OR_RETURN(info.content_sha256, Identity(path, digest, has_other_file));
   for (const BagTopic& topic : plan.topics) {
     if (topic.use == TopicUse::kNone) continue;
     info.channel_counts[topic.channel] += topic.message_count;
     info.measurement_count += topic.message_count;
   }
-  if (poses.has_value()) {
-    const auto count = static_cast<int64_t>(poses->rows.size());
-    info.channel_counts["poses"] = count;
-    info.measurement_count += count;
-  }
+  std::vector<SensorChannel> known;
+  if (poses.has_value()) known.push_back(MakePoseChannel(*std::move(poses)));
+  if (loops.has_value()) known.push_back(*std::move(loops));
+  for (const SensorChannel& channel : known) Count(channel, &info);
   auto log = std::make_unique<BagLog>(std::move(bag), std::move(plan), RobotName(options),
                                       std::move(info));
-  if (poses.has_value()) log->SetPoses(MakePoseChannel(*std::move(poses)));
+  for (SensorChannel& channel : known) log->AddKnown(std::move(channel));
   DSG_RETURN_IF_ERROR(log->FindFirst());
   return std::unique_ptr<LogSource>(std::move(log));
 }

@@ -42,6 +42,7 @@ constexpr KnownTopic kKnown[] = {
     {"/tesse/imu/noisy/imu", "sensor_msgs/Imu", TopicUse::kImu, "imu0"},
     {"/tesse/odom", "nav_msgs/Odometry", TopicUse::kTruth, "poses"},
     {"/dsg/detections", "std_msgs/String", TopicUse::kDetections, "detections0"},
+    {"/dsg/loop_closures", "std_msgs/String", TopicUse::kLoops, "loops0"},
     {"/cam0/image_raw", kImageType, TopicUse::kImage, "cam0"},
     {"/cam1/image_raw", kImageType, TopicUse::kImage, "cam1"},
     {"/imu0", "sensor_msgs/Imu", TopicUse::kImu, "imu0"},

@@ -23,6 +23,7 @@ enum class TopicUse {
   kTruth,
   kExternal,
   kDetections,
+  kLoops,
 };
 
 /// What becomes of a topic.

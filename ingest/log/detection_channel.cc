@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/container/flat_hash_map.h"
 #include "absl/strings/str_cat.h"
 #include "ingest/log/detection_json.h"
 #include "ingest/log/file_bytes.h"
@@ -62,10 +63,18 @@ absl::StatusOr<SensorChannel> ReadDetectionChannel(const std::string& path,
   LineReader lines(file.bytes);
   TextLine line;
   std::optional<HumanDetection> before;
+  absl::flat_hash_map<int64_t, int64_t> line_of_id;
   while (lines.Next(&line)) {
     const LinePosition at{path, line.number};
     DSG_ASSIGN_OR_RETURN(HumanDetection detection, ParseDetection(at, line.text));
     if (before.has_value()) DSG_RETURN_IF_ERROR(CheckFollows(at, *before, detection));
+    const auto [first, is_new] = line_of_id.emplace(detection.id, line.number);
+    if (!is_new) {
+      return at.FieldError("id", absl::StrCat(detection.id),
+                           absl::StrCat("line ", first->second,
+                                        " has it already; an id is for one "
+                                        "detection of the log"));
+    }
     index->offsets.push_back(static_cast<uint64_t>(line.text.data() - file.bytes.data()));
     index->lengths.push_back(static_cast<uint32_t>(line.text.size()));
     index->numbers.push_back(line.number);

@@ -18,6 +18,8 @@ constexpr int kDepthMax = 8;
 constexpr double kPixelMax = 1e6;
 // A joint is on its own body.
 constexpr double kJointMaxM = 10.0;
+constexpr double kPelvisMaxM = 1000.0;
+constexpr size_t kVertexCountMax = 20'000;
 // Axis-angle beyond a full turn, or a shape ten deviations out, is no body.
 constexpr double kAngleMax = 10.0;
 constexpr double kShapeMax = 50.0;
@@ -94,6 +96,31 @@ class Fields {
     return triples;
   }
 
+  // Lists of three or one flat list, as far as `count_max` threes; flat.
+  absl::StatusOr<std::vector<float>> FlatTriples(const char* key, size_t count_max,
+                                                 double max) const {
+    DSG_ASSIGN_OR_RETURN(const Json* value, Find(key));
+    const bool is_flat = value->is_array() && !value->empty() && value->front().is_number();
+    const size_t per_item = is_flat ? 1 : 3;
+    if (!value->is_array() || value->size() * per_item > 3 * count_max ||
+        (is_flat && value->size() % 3 != 0)) {
+      return at_.FieldError(key, absl::StrCat(value->type_name(), " of ", value->size()),
+                            absl::StrCat("a list of at most ", count_max, " [x,y,z] is due"));
+    }
+    std::vector<float> flat;
+    flat.reserve(value->size() * per_item);
+    for (const Json& item : *value) {
+      if (is_flat) {
+        DSG_ASSIGN_OR_RETURN(const double number, Number(key, item, -max, max));
+        flat.push_back(static_cast<float>(number));
+        continue;
+      }
+      DSG_ASSIGN_OR_RETURN(const std::vector<double> three, List(key, item, 3, max));
+      for (const double number : three) flat.push_back(static_cast<float>(number));
+    }
+    return flat;
+  }
+
  private:
   // Nested values are not printed: they may be as large as the line.
   static std::string Show(const Json& value) {
@@ -154,7 +181,16 @@ absl::Status ReadHead(const LinePosition& at, const Fields& fields, HumanDetecti
   return absl::OkStatus();
 }
 
-absl::Status ReadBody(const LinePosition& at, const Fields& fields, HumanDetection* detection) {
+absl::Status ReadJoints(const LinePosition& at, const Fields& fields, HumanDetection* detection) {
+  detection->has_joints = fields.Has("joints");
+  if (!detection->has_joints) {
+    detection->joints_root.fill(Eigen::Vector3d::Zero());
+    detection->joints_px.fill(Eigen::Vector2d::Zero());
+    if (!fields.Has("joints_px")) return absl::OkStatus();
+    return at.Error(
+        "the detection has a field \"joints_px\" and no field \"joints\"; give both, or "
+        "neither for a box alone");
+  }
   DSG_ASSIGN_OR_RETURN(const std::vector<Eigen::Vector3d> joints,
                        fields.Triples("joints", kJointCount, kJointMaxM));
   DSG_ASSIGN_OR_RETURN(const std::vector<Eigen::Vector3d> pixels,
@@ -167,6 +203,10 @@ absl::Status ReadBody(const LinePosition& at, const Fields& fields, HumanDetecti
       return at.FieldError("joints_px", absl::StrCat(pixels[i].z()), "visibility is 0 to 1");
     }
   }
+  return absl::OkStatus();
+}
+
+absl::Status ReadBody(const Fields& fields, HumanDetection* detection) {
   if (fields.Has("pose")) {
     DSG_ASSIGN_OR_RETURN(const std::vector<double> pose,
                          fields.List("pose", 3 * kJointCount, kAngleMax));
@@ -177,6 +217,20 @@ absl::Status ReadBody(const LinePosition& at, const Fields& fields, HumanDetecti
                          fields.List("shape", kShapeCount, kShapeMax));
     detection->shape_coefficients.assign(shape.begin(), shape.end());
   }
+  if (fields.Has("vertices")) {
+    DSG_ASSIGN_OR_RETURN(detection->vertices_root,
+                         fields.FlatTriples("vertices", kVertexCountMax, kJointMaxM));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ReadPelvis(const LinePosition& at, const Fields& fields, HumanDetection* detection) {
+  DSG_ASSIGN_OR_RETURN(const std::vector<double> pelvis, fields.List("pelvis", 3, kPelvisMaxM));
+  if (!(pelvis[2] > 0.0)) {
+    return at.FieldError("pelvis", absl::StrCat(pelvis[0], " ", pelvis[1], " ", pelvis[2]),
+                         "a point before the camera is due, z above 0");
+  }
+  detection->pelvis_camera = Eigen::Vector3d(pelvis[0], pelvis[1], pelvis[2]);
   return absl::OkStatus();
 }
 
@@ -191,6 +245,16 @@ absl::Status ReadWeakCamera(const LinePosition& at, const Json& value, HumanDete
   detection->weak_translation = {t[0], t[1]};
   detection->crop_center_px = {center[0], center[1]};
   return absl::OkStatus();
+}
+
+// A box alone is placed by its height; joints need a camera of one kind.
+absl::Status ReadCamera(const LinePosition& at, const Fields& fields, HumanDetection* detection) {
+  const bool has_pelvis = fields.Has("pelvis");
+  if (has_pelvis) DSG_RETURN_IF_ERROR(ReadPelvis(at, fields, detection));
+  const bool may_be_missing = has_pelvis || !detection->has_joints;
+  if (may_be_missing && !fields.Has("weak_camera")) return absl::OkStatus();
+  DSG_ASSIGN_OR_RETURN(const Json* weak_camera, fields.Find("weak_camera"));
+  return ReadWeakCamera(at, *weak_camera, detection);
 }
 
 }  // namespace
@@ -209,9 +273,9 @@ absl::StatusOr<HumanDetection> ParseDetection(const LinePosition& at, std::strin
   const Fields fields(at, object);
   HumanDetection detection;
   DSG_RETURN_IF_ERROR(ReadHead(at, fields, &detection));
-  DSG_RETURN_IF_ERROR(ReadBody(at, fields, &detection));
-  DSG_ASSIGN_OR_RETURN(const Json* weak_camera, fields.Find("weak_camera"));
-  DSG_RETURN_IF_ERROR(ReadWeakCamera(at, *weak_camera, &detection));
+  DSG_RETURN_IF_ERROR(ReadJoints(at, fields, &detection));
+  DSG_RETURN_IF_ERROR(ReadBody(fields, &detection));
+  DSG_RETURN_IF_ERROR(ReadCamera(at, fields, &detection));
   return detection;
 }
 

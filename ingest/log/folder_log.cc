@@ -15,6 +15,7 @@
 #include "ingest/log/image_channel.h"
 #include "ingest/log/imu_table.h"
 #include "ingest/log/label_table.h"
+#include "ingest/log/loop_file.h"
 #include "ingest/log/pose_table.h"
 #include "ingest/log/sensor_log.h"
 #include "schema/base/status.h"
@@ -28,6 +29,7 @@ constexpr char kTruth[] = "state_groundtruth_estimate0";
 constexpr char kExternal[] = "state_external0";
 constexpr char kImu[] = "imu0";
 constexpr char kDetections[] = "detections0";
+constexpr char kLoops[] = "loop_closures0";
 constexpr int64_t kManifestVersion = 1;
 // 2001-09-09: no clock of a robot shows less, and no simulation lasts that long.
 constexpr TimeNs kFirstPlausibleUnixNs = 1'000'000'000 * kNsPerSecond;
@@ -60,7 +62,7 @@ std::vector<std::string> FoldersIn(const fs::path& root) {
 
 bool IsChannelFolder(std::string_view name) {
   return IsImageChannel(name) || name == kImu || name == kTruth || name == kExternal ||
-         name == kDetections;
+         name == kDetections || name == kLoops;
 }
 
 // Without the sensor's errors: for ablations, never read here.
@@ -91,6 +93,7 @@ class FolderReader {
       channels_.push_back(std::move(detections));
     }
     DSG_RETURN_IF_ERROR(ReadPoses());
+    DSG_RETURN_IF_ERROR(ReadLoops());
     AddNotes();
     DSG_RETURN_IF_ERROR(CheckCounts());
     info_.content_sha256 = digest_.Hex();
@@ -219,6 +222,15 @@ class FolderReader {
     DSG_ASSIGN_OR_RETURN(std::optional<TrackTable> poses,
                          ChoosePoses(options_, std::move(tables), &digest_, &info_));
     if (poses.has_value()) channels_.push_back(MakePoseChannel(*std::move(poses)));
+    return absl::OkStatus();
+  }
+
+  absl::Status ReadLoops() {
+    std::string path = (root_ / kLoops / "data.jsonl").string();
+    if (!IsFolder(root_ / kLoops)) path.clear();
+    DSG_ASSIGN_OR_RETURN(std::optional<SensorChannel> loops,
+                         ReadLoopChannel(options_, path, &digest_, &info_));
+    if (loops.has_value()) channels_.push_back(*std::move(loops));
     return absl::OkStatus();
   }
 

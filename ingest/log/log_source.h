@@ -54,8 +54,24 @@ struct ImageMeasurement {
   std::function<absl::StatusOr<Image>()> load;
 };
 
+/// Whatever recognised a place says where the robot was at `time_ns`, seen from where it was at
+/// `from_ns`.
+struct LoopMeasurement {
+  TimeNs time_ns = 0;
+  /// Before or after `time_ns`, never the same.
+  TimeNs from_ns = 0;
+  Pose3d from_T_to;
+  /// Inverse covariance, translation before rotation (on the right of the pose), metres and
+  /// radians; symmetric positive definite.
+  Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Identity();
+  /// How sure the source was, as it counts.
+  std::optional<double> score;
+  /// Where it stood in the log, for messages: "loops.jsonl:3".
+  std::string origin;
+};
+
 using Measurement = std::variant<PoseMeasurement, GraphMeasurement, ImuMeasurement,
-                                 ImageMeasurement, HumanDetection>;
+                                 ImageMeasurement, HumanDetection, LoopMeasurement>;
 
 /// What a reader knows of its log before the first measurement.
 struct LogInfo {
@@ -80,7 +96,8 @@ struct LogInfo {
   RigCalibration rig;
   /// The classes of label images, ascending by id, each once; empty when the log names none.
   std::vector<SemanticLabel> labels;
-  /// Measurements of each sensor channel, by name: "cam0", "imu0", "detections0", "poses".
+  /// Measurements of each sensor channel, by name: "cam0", "imu0", "detections0", "poses",
+  /// "loops0".
   std::map<std::string, int64_t> channel_counts;
   /// Sentences about what was dropped or assumed, for the user.
   std::vector<std::string> notes;
@@ -113,6 +130,8 @@ struct LogOptions {
   PoseSource poses = PoseSource::kAuto;
   /// Poses to read instead of the log's (EuRoC or TUM columns); empty = the log's own.
   std::string pose_file;
+  /// Loop closures to read instead of the log's; empty = the log's own.
+  std::string loop_file;
 };
 
 /// One log.

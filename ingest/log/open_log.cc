@@ -42,6 +42,12 @@ absl::Status CheckOptions(const LogOptions& options) {
 absl::Status CheckPoseOptions(const std::string& path, const std::string& format,
                               const LogOptions& options) {
   if (format == "euroc" || format == "rgbd" || format == "rosbag") return absl::OkStatus();
+  if (!options.loop_file.empty()) {
+    return MakeError(Reason::kFieldInvalid,
+                     absl::StrCat(path, ": a ", format,
+                                  " log takes no loop closures; they go with logs of sensors"),
+                     {{"field", "loop_file"}, {"value", options.loop_file}});
+  }
   if (options.pose_file.empty() && options.poses != PoseSource::kExternal) return absl::OkStatus();
   return MakeError(Reason::kFieldInvalid,
                    absl::StrCat(path, ": a ", format,

@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "ingest/log/image_channel.h"
+#include "ingest/log/loop_file.h"
 #include "ingest/log/rgbd_layout.h"
 #include "ingest/log/sensor_log.h"
 #include "ingest/log/text_table.h"
@@ -100,6 +101,9 @@ OpenedLog OpenRgbdFolder(const std::string& folder, const LogOptions& options) {
   DSG_ASSIGN_OR_RETURN(std::optional<TrackTable> poses,
                        ChoosePoses(options, std::move(tables), &digest, &info));
   if (poses.has_value()) channels.push_back(MakePoseChannel(*std::move(poses)));
+  DSG_ASSIGN_OR_RETURN(std::optional<SensorChannel> loops,
+                       ReadLoopChannel(options, /*log_path=*/"", &digest, &info));
+  if (loops.has_value()) channels.push_back(*std::move(loops));
   info.content_sha256 = digest.Hex();
   return MakeSensorLog(std::move(channels), std::move(info));
 }

@@ -17,7 +17,7 @@
 namespace dsg::ingest {
 
 /// Who comes first at equal stamps.
-enum class ChannelRank { kImu = 0, kPoses = 1, kImages = 2, kDetections = 3 };
+enum class ChannelRank { kImu = 0, kPoses = 1, kImages = 2, kDetections = 3, kLoops = 4 };
 
 struct SensorChannel {
   std::string name;

@@ -27,10 +27,13 @@ int main(int argc, char** argv) {
       app.add_subcommand("tracks", "People walking between rooms and a robot touring them");
   CLI::App* sensors = app.add_subcommand(
       "sensors", "What a robot's cameras and inertial unit record in a building with people");
+  CLI::App* drift = app.add_subcommand(
+      "drift", "Drifting odometry and loop closures, right and wrong, beside a sensor log");
   CLI::App* preview = app.add_subcommand("preview", "Pictures of a sensor log, to look at");
   const std::vector<std::pair<CLI::App*, Command>> commands = {
       {tracks, dsg::simulator::AddTracksCommand(tracks)},
       {sensors, dsg::simulator::AddSensorsCommand(sensors)},
+      {drift, dsg::simulator::AddDriftCommand(drift)},
       {preview, dsg::simulator::AddPreviewCommand(preview)}};
   try {
     app.parse(argc, argv);

@@ -10,6 +10,7 @@
 #include <variant>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/log/loop_file.h"
 #include "ingest/simulator/bag/bag_messages.h"
 #include "ingest/simulator/bag/bag_output_internal.h"
 #include "ingest/simulator/bag/folder_text.h"
@@ -24,6 +25,7 @@ constexpr char kImuTopic[] = "/tesse/imu/noisy/imu";
 constexpr char kOdometryTopic[] = "/tesse/odom";
 constexpr char kSegmentationTopic[] = "/tesse/seg_cam/rgb/image_raw";
 constexpr char kDetectionsTopic[] = "/dsg/detections";
+constexpr char kLoopsTopic[] = "/dsg/loop_closures";
 constexpr char kLabelsTopic[] = "/dsg/labels";
 constexpr char kTransformsTopic[] = "/tf_static";
 // Calibrations that should be equal are read from text and were made orthonormal.
@@ -107,6 +109,12 @@ class Converter {
   absl::Status AddOne(const ingest::HumanDetection& detection) {
     // Its line is written as it stands in the file.
     return Advance(detection.time_ns).status();
+  }
+  absl::Status AddOne(const ingest::LoopMeasurement& loop) {
+    DSG_ASSIGN_OR_RETURN(const ros::Time stamp, Advance(loop.time_ns));
+    ros_messages::String message;
+    message.data = ingest::FormatLoop(loop);
+    return bag_->Write(kLoopsTopic, stamp, message);
   }
   absl::Status AddOne(const ingest::GraphMeasurement&) {
     return absl::InvalidArgumentError("a bag of sensors cannot hold a scene graph");

@@ -23,5 +23,7 @@ Command AddTracksCommand(CLI::App* app);
 Command AddSensorsCommand(CLI::App* app);
 /// Pictures of a sensor log.
 Command AddPreviewCommand(CLI::App* app);
+/// Drifting odometry and loop closures beside a sensor log.
+Command AddDriftCommand(CLI::App* app);
 
 }  // namespace dsg::simulator

@@ -59,6 +59,52 @@ TEST(DetectionJson, LetsPoseAndShapeBeMissing) {
   EXPECT_TRUE(Parse(Changed("\"shape\"", "\"shape_\"")).ok());
 }
 
+TEST(DetectionJson, ReadsABoxAlone) {
+  const auto detection = Parse(
+      "{\"time_ns\":5,\"camera\":\"cam0\",\"id\":1,\"score\":0.5,\"box\":[1,2,3,4],"
+      "\"mask_instance\":0}");
+  ASSERT_TRUE(detection.ok()) << detection.status();
+  EXPECT_FALSE(detection->has_joints);
+  EXPECT_EQ(detection->joints_root[5], Eigen::Vector3d::Zero());
+  EXPECT_EQ(detection->joint_visibility[5], 0.0);
+  EXPECT_TRUE(Parse(DetectionLine(1000, 7))->has_joints);
+  ExpectError(Changed("\"joints\"", "\"joints_\""), "joints_px");
+  ExpectError(Changed("\"joints_px\"", "\"joints_px_\""), "joints_px");
+}
+
+TEST(DetectionJson, TakesThePelvisForTheWeakCamera) {
+  const auto detection = Parse(Changed("\"weak_camera\":", "\"pelvis\":[0.5,-1,4],\"weak_\":"));
+  ASSERT_TRUE(detection.ok()) << detection.status();
+  EXPECT_EQ(detection->pelvis_camera, Eigen::Vector3d(0.5, -1, 4));
+  EXPECT_FALSE(Parse(DetectionLine(1000, 7))->pelvis_camera.has_value());
+  ExpectError(Changed("\"weak_camera\":", "\"pelvis\":[0.5,-1,-4],\"weak_\":"), "pelvis");
+  ExpectError(Changed("\"weak_camera\":", "\"pelvis\":[0.5,-1],\"weak_\":"), "pelvis");
+  ExpectError(Changed("\"weak_camera\":", "\"pelvis\":[0,0,1e9],\"weak_\":"), "pelvis");
+}
+
+TEST(DetectionJson, ReadsVerticesFlatOrInThrees) {
+  const auto with = [](const std::string& vertices) {
+    return Changed("\"shape\"", "\"vertices\":" + vertices + ",\"shape\"");
+  };
+  const std::vector<float> expected = {0.5f, 1.0f, -2.0f, 3.0f, 4.0f, 5.0f};
+  const auto threes = Parse(with("[[0.5,1,-2],[3,4,5]]"));
+  ASSERT_TRUE(threes.ok()) << threes.status();
+  EXPECT_EQ(threes->vertices_root, expected);
+  const auto flat = Parse(with("[0.5,1,-2,3,4,5]"));
+  ASSERT_TRUE(flat.ok()) << flat.status();
+  EXPECT_EQ(flat->vertices_root, expected);
+  EXPECT_TRUE(Parse(with("[]"))->vertices_root.empty());
+  EXPECT_TRUE(Parse(with(Repeated("0.5", 60'000))).ok());
+  ExpectError(with(Repeated("0.5", 60'003)), "vertices");
+  ExpectError(with(Repeated("[0,0,0]", 20'001)), "vertices");
+  ExpectError(with("[0.5,1]"), "vertices");
+  ExpectError(with("[[0.5,1]]"), "vertices");
+  ExpectError(with("[[0.5,1,null]]"), "vertices");
+  ExpectError(with("[0.5,1,[2,3,4]]"), "vertices");
+  ExpectError(with("[0.5,1,200]"), "vertices");
+  ExpectError(with("7"), "vertices");
+}
+
 TEST(DetectionJson, NamesTheFieldThatIsWrong) {
   ExpectError("", "JSON");
   ExpectError("[1]", "JSON");

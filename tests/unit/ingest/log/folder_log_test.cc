@@ -198,6 +198,8 @@ TEST_F(FolderLogTest, ChecksDetections) {
   ExpectMalformed({"data.jsonl:2", "time_ns"});
   Write("detections0/data.jsonl", DetectionLine(100, 1) + "\n" + DetectionLine(100, 1) + "\n");
   ExpectMalformed({"data.jsonl:2", "sort the lines"});
+  Write("detections0/data.jsonl", DetectionLine(100, 1) + "\n" + DetectionLine(200, 1) + "\n");
+  ExpectMalformed({"data.jsonl:2", "field id", "line 1"});
   Write("detections0/data.jsonl", "");
   const auto log = Read();
   ASSERT_TRUE(log.ok()) << log.status();

@@ -61,6 +61,7 @@ struct WholeLog {
   std::vector<ImuMeasurement> imu;
   std::vector<ImageMeasurement> images;
   std::vector<HumanDetection> detections;
+  std::vector<LoopMeasurement> loops;
   /// Channel and stamp of all but graphs, in the order in which they came.
   std::vector<std::pair<std::string, TimeNs>> order;
 
@@ -83,6 +84,9 @@ inline void Keep(Measurement measurement, WholeLog* whole) {
   } else if (auto* detection = std::get_if<HumanDetection>(&measurement)) {
     whole->order.emplace_back("detections0", detection->time_ns);
     whole->detections.push_back(std::move(*detection));
+  } else if (auto* loop = std::get_if<LoopMeasurement>(&measurement)) {
+    whole->order.emplace_back("loops0", loop->time_ns);
+    whole->loops.push_back(std::move(*loop));
   } else {
     whole->graphs.push_back(std::move(std::get<GraphMeasurement>(measurement)));
   }

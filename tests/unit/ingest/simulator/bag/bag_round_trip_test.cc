@@ -139,6 +139,13 @@ void ExpectSame(const ingest::ImageMeasurement& a, const ingest::ImageMeasuremen
   }
 }
 
+void ExpectSame(const ingest::LoopMeasurement& a, const ingest::LoopMeasurement& b) {
+  EXPECT_EQ(a.time_ns, b.time_ns);
+  EXPECT_EQ(a.from_ns, b.from_ns);
+  EXPECT_EQ(a.from_T_to.position, b.from_T_to.position);
+  EXPECT_TRUE(a.information.isApprox(b.information, 1e-12));
+}
+
 void ExpectSame(const ingest::GraphMeasurement&, const ingest::GraphMeasurement&) {
   ADD_FAILURE() << "a graph in a log of sensors";
 }
