@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "schema/base/check.h"
 #include "schema/model/delta_check.h"
 
 namespace dsg::ingest {
@@ -33,6 +34,7 @@ Node DeltaBuilder::MakeNode(NodeId id, const PoseMeasurement& first) const {
   } else {
     node.box_node = {Eigen::Vector3d::Constant(-kRobotHalfSizeM),
                      Eigen::Vector3d::Constant(kRobotHalfSizeM)};
+    if (robot_model_.has_value()) SetRobotModel(*robot_model_, &node);
   }
   return node;
 }
@@ -50,10 +52,20 @@ void DeltaBuilder::AddPose(NodeId agent, const PoseMeasurement& measurement) {
   ++pose_count_;
 }
 
+const Node& DeltaBuilder::NodeOf(NodeId agent) const {
+  const auto found = agents_.find(agent);
+  DSG_CHECK(found != agents_.end());
+  return found->second.node;
+}
+
 GraphDelta DeltaBuilder::Take(std::vector<Stay> stays) {
   GraphDelta delta;
   for (Agent* agent : touched_) {
     if (agent->is_new) {
+      const bool has_model = agent->node.agent->body_model.has_value();
+      if (has_model && !std::exchange(is_model_told_, true)) {
+        delta.assets.push_back(robot_model_->asset);
+      }
       delta.nodes.push_back(agent->node);
       agent->is_new = agent->is_stale = false;
     }

@@ -4,10 +4,13 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "ingest/log/log_source.h"
+#include "ingest/pipeline/robot_model.h"
 #include "schema/model/graph_delta.h"
 
 namespace dsg::ingest {
@@ -15,11 +18,16 @@ namespace dsg::ingest {
 /// Threads: one caller at a time.
 class DeltaBuilder {
  public:
-  /// `feet_below_m`: LogInfo::feet_below_m.
-  explicit DeltaBuilder(double feet_below_m) : feet_below_m_(feet_below_m) {}
+  /// `feet_below_m`: LogInfo::feet_below_m. `robot_model`: nullopt = unknown; else its asset goes
+  /// into the first delta.
+  explicit DeltaBuilder(double feet_below_m, std::optional<RobotModel> robot_model = std::nullopt)
+      : feet_below_m_(feet_below_m), robot_model_(std::move(robot_model)) {}
 
   /// The first pose of an agent also makes its node.
   void AddPose(NodeId agent, const PoseMeasurement& measurement);
+
+  /// Requires: an agent that has poses.
+  const Node& NodeOf(NodeId agent) const;
 
   /// Poses since the last Take.
   int64_t pose_count() const { return pose_count_; }
@@ -45,6 +53,8 @@ class DeltaBuilder {
   Node MakeNode(NodeId id, const PoseMeasurement& first) const;
 
   double feet_below_m_;
+  std::optional<RobotModel> robot_model_;
+  bool is_model_told_ = false;
   int64_t pose_count_ = 0;
   /// Ascending by id, so deltas are sorted.
   std::map<NodeId, Agent> agents_;

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/pipeline/correction.h"
 #include "ingest/pipeline/delta_size.h"
 #include "schema/base/status.h"
 
@@ -47,6 +48,19 @@ absl::Status DeltaSink::PutAsIs(GraphDelta delta) {
     DSG_RETURN_IF_ERROR(PutPartAsIs(std::move(part)));
   }
   return absl::OkStatus();
+}
+
+absl::Status DeltaSink::PutCorrection(GraphDelta delta) {
+  if (delta.empty()) return absl::OkStatus();
+  if (!is_size_bounded_) return PutPartAsIs(std::move(delta));
+  GraphDelta factors;
+  factors.factors = std::exchange(delta.factors, {});
+  if (!delta.empty()) {
+    for (GraphDelta& part : CutCorrection(std::move(delta))) {
+      DSG_RETURN_IF_ERROR(PutPartAsIs(std::move(part)));
+    }
+  }
+  return PutAsIs(std::move(factors));
 }
 
 absl::Status DeltaSink::PutPart(GraphDelta delta) {

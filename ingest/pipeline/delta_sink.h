@@ -39,11 +39,14 @@ struct SessionHeader {
 /// Threads: one caller at a time.
 class DeltaSink {
  public:
-  /// `last_sequence`: how far an earlier run of the session got.
+  /// `last_sequence`: how far an earlier run of the session got. `is_size_bounded`: deltas must fit
+  /// into messages to a server.
   /// Requires: `map` and `writer` outlive the sink.
-  DeltaSink(SessionHeader header, int64_t last_sequence, const MapView& map, GraphWriter& writer)
+  DeltaSink(SessionHeader header, int64_t last_sequence, bool is_size_bounded, const MapView& map,
+            GraphWriter& writer)
       : header_(std::move(header)),
         last_sequence_(last_sequence),
+        is_size_bounded_(is_size_bounded),
         reconciler_(map),
         writer_(writer) {}
 
@@ -56,6 +59,10 @@ class DeltaSink {
   /// the log, so what a session says, takes back and says again is stored as it says it.
   absl::Status PutAsIs(GraphDelta delta);
 
+  /// As PutAsIs, for a correction of much that was told: one revision whatever its size, or
+  /// CutCorrection's parts where sizes are bounded.
+  absl::Status PutCorrection(GraphDelta delta);
+
   CommitCounts counts() const;
 
  private:
@@ -67,6 +74,7 @@ class DeltaSink {
 
   SessionHeader header_;
   int64_t last_sequence_;
+  bool is_size_bounded_;
   /// Of the delta that came last.
   int64_t sequence_ = 0;
   /// Of the delta that the writer got last.

@@ -25,8 +25,9 @@ size_t BytesOf(const std::vector<TimedPose>& poses) {
 }
 
 size_t BytesOf(const BodyShape& shape) {
-  return kRowBytes + sizeof(float) * (shape.pose_coefficients.size() +
-                                      shape.shape_coefficients.size() + shape.vertices.size());
+  return kRowBytes +
+         sizeof(float) * (shape.pose_coefficients.size() + shape.shape_coefficients.size() +
+                          shape.joints.size() + shape.vertices.size());
 }
 
 size_t BytesOf(const Edge& edge) {

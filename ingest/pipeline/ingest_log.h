@@ -10,6 +10,9 @@
 #include "ingest/log/log_source.h"
 #include "ingest/pipeline/delta_sink.h"
 #include "ingest/pipeline/log_mapper.h"
+#include "ingest/pipeline/person_mapper.h"
+#include "ingest/pipeline/robot_model.h"
+#include "ingest/pipeline/robot_told.h"
 
 namespace dsg::ingest {
 
@@ -22,20 +25,36 @@ struct IngestOptions {
   std::string up = "auto";
   /// Of logs with depth: static layers, committed while the log runs.
   MappingOptions mapping;
+  /// Of logs with detections of people: their tracks.
+  PeopleOptions people;
+  /// Of logs with sensors: keyframes, odometry and loop closures of the robot.
+  RobotGraphOptions robot_graph;
+  /// The robot's shape; unset = unknown.
+  std::optional<RobotModel> robot_model;
+  /// Deltas must fit into messages to a server; a large correction then takes several revisions.
+  bool is_size_bounded = false;
 
   /// Errors: INVALID_ARGUMENT/FIELD_INVALID.
   absl::Status Validate() const;
+};
+
+struct PeopleSummary {
+  PeopleCounts counts;
+  std::map<std::string, StageClock::Time> stages;
 };
 
 struct IngestSummary {
   /// Agents that the log speaks of.
   int64_t agent_count = 0;
   CommitCounts committed;
-  /// Measurements that were read and are not used yet, by channel: images, inertial samples,
-  /// detections.
+  /// Measurements that were read and not used, by channel.
   std::map<std::string, int64_t> unused;
   /// Unset when the log has no depth, or mapping is off.
   std::optional<MappingSummary> mapping;
+  /// Unset when the log has no detections, or people are off.
+  std::optional<PeopleSummary> people;
+  /// Unset when the log has no loop closures.
+  std::optional<LoopCounts> loops;
 };
 
 /// Reads `log` to its end. The same log, options and starting map give byte-equal deltas. A run

@@ -21,6 +21,7 @@
 #include "ingest/pipeline/destination.h"
 #include "ingest/pipeline/ingest_log.h"
 #include "ingest/pipeline/mapping_flags.h"
+#include "ingest/pipeline/people_flags.h"
 #include "ingest/pipeline/progress.h"
 #include "ingest/pipeline/upright.h"
 #include "schema/base/status.h"
@@ -42,9 +43,12 @@ struct Flags {
   std::string codec;
   std::string poses = "auto";
   std::string pose_file;
+  std::string loop_file;
+  std::string robot_cad;
   std::string up = "auto";
   int64_t commit_poses = IngestOptions().poses_per_delta;
   MappingFlags mapping;
+  PeopleFlags people;
   bool is_quiet = false;
   std::vector<std::string> logs;
 };
@@ -82,6 +86,9 @@ void AddFlags(CLI::App* app, Flags* flags) {
       ->capture_default_str();
   app->add_option("--pose-file", flags->pose_file,
                   "Poses of the robot, EuRoC or TUM columns, instead of the sensor log's own");
+  app->add_option("--loops", flags->loop_file,
+                  "Loop closures of the robot (JSON lines), instead of the log's own");
+  app->add_option("--robot-cad", flags->robot_cad, "CAD model of the robot (PLY, OBJ), metres");
   app->add_option("--up", flags->up,
                   "Which way is up in the log's frame: x, -x, y, -y, z, -z, \"x,y,z\", none, or "
                   "auto (RGB-D folders: told from the pictures; others: z)")
@@ -89,6 +96,7 @@ void AddFlags(CLI::App* app, Flags* flags) {
   app->add_option("--commit-poses", flags->commit_poses, "Poses a revision, of logs without depth")
       ->capture_default_str();
   AddMappingFlags(app, &flags->mapping);
+  AddPeopleFlags(app, &flags->people);
   app->add_flag("--quiet", flags->is_quiet, "Write nothing but errors");
   app->add_option("LOG", flags->logs, "Log files or folders, taken one after another")->required();
 }
@@ -121,6 +129,7 @@ absl::StatusOr<LogOptions> MakeLogOptions(const Flags& flags) {
   LogOptions options;
   options.format = flags.format;
   options.pose_file = flags.pose_file;
+  options.loop_file = flags.loop_file;
   DSG_ASSIGN_OR_RETURN(options.poses, ParsePoseSource(flags.poses));
   options.agent_prefix = flags.agent_prefix;
   if (flags.frame_period_s != 0.0) DSG_RETURN_IF_ERROR(SetFramePeriod(flags, &options));
@@ -201,11 +210,21 @@ void PrintSummary(const std::string& path, const LogInfo& info, const IngestSumm
   if (!summary.unused.empty()) {
     std::printf("%s: read and not used yet: %s\n", path.c_str(), UnusedText(summary).c_str());
   }
+  if (summary.loops.has_value()) {
+    const LoopCounts& loops = *summary.loops;
+    std::printf(
+        "%s: %lld loop closures, %lld believed, %lld outside the trajectory; it moved by up to "
+        "%.2f m\n",
+        path.c_str(), static_cast<long long>(loops.loop_count),
+        static_cast<long long>(loops.kept_count), static_cast<long long>(loops.unusable_count),
+        loops.largest_m);
+  }
   std::fflush(stdout);
 }
 
 absl::Status IngestOne(const Flags& flags, const std::string& path, LogOptions options,
-                       const MappingOptions& mapping, std::unique_ptr<Destination>* destination) {
+                       const IngestOptions& ingest_options,
+                       std::unique_ptr<Destination>* destination) {
   const auto begin = std::chrono::steady_clock::now();
   DSG_ASSIGN_OR_RETURN(std::unique_ptr<LogSource> log, OpenLog(path, options));
   // A log without a sound beginning must not leave a map, nor give it its epoch.
@@ -236,8 +255,6 @@ absl::Status IngestOne(const Flags& flags, const std::string& path, LogOptions o
     std::fprintf(stderr, "%s: note: %s\n", path.c_str(), note.c_str());
   }
   DSG_ASSIGN_OR_RETURN(const std::unique_ptr<MapView> view, (*destination)->View());
-  IngestOptions ingest_options{.poses_per_delta = flags.commit_poses, .up = flags.up};
-  ingest_options.mapping = mapping;
   absl::StatusOr<IngestSummary> summary = absl::UnknownError("not run");
   {
     Progress progress(std::filesystem::path(path).filename().string(),
@@ -251,6 +268,9 @@ absl::Status IngestOne(const Flags& flags, const std::string& path, LogOptions o
   if (!flags.is_quiet && summary->mapping.has_value()) {
     PrintMapping(path, *summary->mapping, flags.mapping.has_timings);
   }
+  if (!flags.is_quiet && summary->people.has_value()) {
+    PrintPeople(path, *summary->people, flags.mapping.has_timings);
+  }
   return absl::OkStatus();
 }
 
@@ -258,10 +278,16 @@ absl::Status Run(const Flags& flags) {
   DSG_RETURN_IF_ERROR(CheckMapName(flags.map));
   DSG_RETURN_IF_ERROR(CheckUp(flags.up));
   DSG_ASSIGN_OR_RETURN(const LogOptions options, MakeLogOptions(flags));
-  DSG_ASSIGN_OR_RETURN(const MappingOptions mapping, MakeMappingOptions(flags.mapping));
+  IngestOptions ingest_options{.poses_per_delta = flags.commit_poses, .up = flags.up};
+  DSG_ASSIGN_OR_RETURN(ingest_options.mapping, MakeMappingOptions(flags.mapping));
+  ingest_options.is_size_bounded = !flags.server.empty();
+  if (!flags.robot_cad.empty()) {
+    DSG_ASSIGN_OR_RETURN(ingest_options.robot_model, ReadRobotModel(flags.robot_cad));
+  }
+  DSG_ASSIGN_OR_RETURN(ingest_options.people, MakePeopleOptions(flags.people));
   std::unique_ptr<Destination> destination;
   for (const std::string& path : flags.logs) {
-    DSG_RETURN_IF_ERROR(IngestOne(flags, path, options, mapping, &destination));
+    DSG_RETURN_IF_ERROR(IngestOne(flags, path, options, ingest_options, &destination));
   }
   return absl::OkStatus();
 }

@@ -103,6 +103,7 @@ absl::Status LogMapper::Advance() {
       frame = frames_.Next();
     }
     if (!frame.has_value()) return absl::OkStatus();
+    if (on_frame_) on_frame_(*frame);
     DSG_RETURN_IF_ERROR(layers_.Integrate(*frame));
   }
 }
@@ -130,6 +131,7 @@ LogMapper::LayerChange LogMapper::TakeLayers(TimeNs now_ns) {
   for (const Edge& edge : graph.edges) {
     if (edge.relation == relations::kContains) change.regions.edges.push_back(edge);
   }
+  graph_ = graph;
   change.delta = told_.Tell(std::move(graph));
   change.delta.assets = layers_.TakeAssets();
   if (!is_begun_ && !change.delta.empty()) {

@@ -4,15 +4,19 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "ingest/depth/frame_maker.h"
 #include "ingest/log/log_source.h"
 #include "ingest/pipeline/map_view.h"
 #include "ingest/pipeline/mapping_options.h"
+#include "ingest/pipeline/region_index.h"
 #include "ingest/pipeline/static_layers.h"
 
 namespace dsg::ingest {
@@ -43,6 +47,10 @@ class LogMapper {
   void AddPicture(ImageMeasurement image);
   void AddPose(const PoseMeasurement& pose);
   void AddDetection(const HumanDetection& detection);
+  /// Called with each frame before it is fused.
+  void SetFrameObserver(std::function<void(const DepthFrame&)> observer) {
+    on_frame_ = std::move(observer);
+  }
   /// No more will be added.
   void Close();
 
@@ -62,6 +70,13 @@ class LogMapper {
   /// Mesh blocks that changed.
   GraphDelta TakeMesh();
 
+  /// Of the last TakeLayers: heights of floors, the layers, the mesh, and whether nothing stands
+  /// between a point and a place.
+  const std::vector<double>& floors_m() const { return layers_.floors_m(); }
+  const LayerGraph& graph() const { return graph_; }
+  std::vector<const MeshBlock*> Mesh() const { return layers_.Mesh(); }
+  RegionIndex::Sight Sight() const { return layers_.Sight(); }
+
   MappingSummary Summary();
 
  private:
@@ -77,6 +92,8 @@ class LogMapper {
   FrameMaker frames_;
   StaticLayers layers_;
   GraphTold told_;
+  LayerGraph graph_;
+  std::function<void(const DepthFrame&)> on_frame_;
 };
 
 }  // namespace dsg::ingest

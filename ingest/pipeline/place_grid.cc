@@ -43,32 +43,35 @@ int64_t PlaceGrid::CellOf(double value, double origin, int64_t count) const {
   return static_cast<int64_t>(std::clamp(cell, 0.0, static_cast<double>(count - 1)));
 }
 
-void PlaceGrid::SearchCell(int64_t x, int64_t y, const Eigen::Vector3d& point, Found* best) const {
+void PlaceGrid::SearchCell(int64_t x, int64_t y, Search* search) const {
   if (x < 0 || y < 0 || x >= count_x_ || y >= count_y_) return;
+  Found& best = search->best;
   const auto cell = static_cast<size_t>(y * count_x_ + x);
   for (uint32_t i = cell_begin_[cell]; i < cell_begin_[cell + 1]; ++i) {
-    const double distance = (items_[i].position - point).norm();
-    if (distance < best->distance_m ||
-        (distance == best->distance_m && items_[i].number < best->number)) {
-      *best = {items_[i].number, distance};
-    }
+    const double distance = (items_[i].position - search->point).norm();
+    const bool is_better = distance < best.distance_m ||
+                           (distance == best.distance_m && items_[i].number < best.number);
+    if (!is_better || (search->accept && !search->accept(items_[i].number))) continue;
+    best = {items_[i].number, distance};
   }
 }
 
-void PlaceGrid::SearchRing(int64_t x, int64_t y, int64_t ring, const Eigen::Vector3d& point,
-                           Found* best) const {
+void PlaceGrid::SearchRing(int64_t x, int64_t y, int64_t ring, Search* search) const {
   for (int64_t dx = -ring; dx <= ring; ++dx) {
-    SearchCell(x + dx, y - ring, point, best);
-    if (ring > 0) SearchCell(x + dx, y + ring, point, best);
+    SearchCell(x + dx, y - ring, search);
+    if (ring > 0) SearchCell(x + dx, y + ring, search);
   }
   for (int64_t dy = -ring + 1; dy <= ring - 1; ++dy) {
-    SearchCell(x - ring, y + dy, point, best);
-    SearchCell(x + ring, y + dy, point, best);
+    SearchCell(x - ring, y + dy, search);
+    SearchCell(x + ring, y + dy, search);
   }
 }
 
-PlaceGrid::Found PlaceGrid::Nearest(const Eigen::Vector3d& point) const {
-  Found best{std::numeric_limits<int32_t>::max(), std::numeric_limits<double>::infinity()};
+PlaceGrid::Found PlaceGrid::Nearest(const Eigen::Vector3d& point, const Accept& accept,
+                                    double distance_m_max) const {
+  constexpr int32_t kNone = std::numeric_limits<int32_t>::max();
+  Search search{point, accept, {kNone, distance_m_max}};
+  const Found& best = search.best;
   // From outside, the search starts at the point's projection on the grid; the way there adds to
   // every distance (the angle at the projection is never acute).
   const Eigen::Vector2d start = point.head<2>().cwiseMax(origin_).cwiseMin(corner_);
@@ -79,9 +82,9 @@ PlaceGrid::Found PlaceGrid::Nearest(const Eigen::Vector3d& point) const {
     // The start may lie on the border of its cell, so a ring is only ring - 1 cells away.
     const double along = static_cast<double>(std::max<int64_t>(ring - 1, 0)) * cell_size_m_;
     if (outside_squared + along * along > best.distance_m * best.distance_m) break;
-    SearchRing(x, y, ring, point, &best);
+    SearchRing(x, y, ring, &search);
   }
-  return best;
+  return best.number == kNone ? Found() : best;
 }
 
 }  // namespace dsg::ingest

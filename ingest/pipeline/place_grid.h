@@ -4,6 +4,8 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
+#include <limits>
 #include <vector>
 
 namespace dsg::ingest {
@@ -25,15 +27,24 @@ class PlaceGrid {
 
   bool empty() const { return items_.empty(); }
 
-  /// The item with the least distance in space; the lower number when two are as near.
+  /// Whether an item, by its number, may be taken. Empty = all may.
+  using Accept = std::function<bool(int32_t number)>;
+
+  /// The item with the least distance in space; the lower number when two are as near. -1 when
+  /// none nearer than `distance_m_max` is accepted.
   /// Cost: the cells around the point, wherever the point is. Requires: not empty.
-  Found Nearest(const Eigen::Vector3d& point) const;
+  Found Nearest(const Eigen::Vector3d& point, const Accept& accept = {},
+                double distance_m_max = std::numeric_limits<double>::infinity()) const;
 
  private:
   int64_t CellOf(double value, double origin, int64_t count) const;
-  void SearchCell(int64_t x, int64_t y, const Eigen::Vector3d& point, Found* best) const;
-  void SearchRing(int64_t x, int64_t y, int64_t ring, const Eigen::Vector3d& point,
-                  Found* best) const;
+  struct Search {
+    const Eigen::Vector3d& point;
+    const Accept& accept;
+    Found best;
+  };
+  void SearchCell(int64_t x, int64_t y, Search* search) const;
+  void SearchRing(int64_t x, int64_t y, int64_t ring, Search* search) const;
 
   /// Grouped by cell, row by row; the cell i holds items [cell_begin_[i], cell_begin_[i + 1]).
   std::vector<Item> items_;

@@ -8,6 +8,9 @@
 namespace dsg::ingest {
 namespace {
 
+// Further away, a place in sight is no better than one that is not.
+constexpr double kSightM = 5.0;
+
 void SortById(std::vector<Node>* nodes) {
   std::sort(nodes->begin(), nodes->end(), [](const Node& a, const Node& b) { return a.id < b.id; });
 }
@@ -105,13 +108,24 @@ int32_t RegionIndex::NextRoom(int32_t before, const Eigen::Vector3d& position) c
   return is_other_clear ? deepest : before;
 }
 
+bool RegionIndex::IsInSight(const Eigen::Vector3d& position, int32_t place) const {
+  return !sight_ || sight_(position, places_[place].position);
+}
+
 int32_t RegionIndex::NextPlace(int32_t room, int32_t before,
                                const Eigen::Vector3d& position) const {
   if (places_.empty()) return -1;
   const bool is_within_room = room >= 0 && !rooms_[room].grid.empty();
-  const PlaceGrid::Found nearest =
-      is_within_room ? rooms_[room].grid.Nearest(position) : all_places_.Nearest(position);
+  const PlaceGrid& grid = is_within_room ? rooms_[room].grid : all_places_;
+  PlaceGrid::Found nearest;
+  if (sight_) {
+    nearest = grid.Nearest(
+        position, [&](int32_t place) { return IsInSight(position, place); }, kSightM);
+  }
+  const bool is_in_sight = nearest.number >= 0;
+  if (!is_in_sight) nearest = grid.Nearest(position);
   if (before < 0 || (is_within_room && places_[before].room != room)) return nearest.number;
+  if (is_in_sight && !IsInSight(position, before)) return nearest.number;
   const double own_m = (places_[before].position - position).norm();
   return nearest.distance_m < own_m - kHysteresisM ? nearest.number : before;
 }

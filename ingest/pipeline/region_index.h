@@ -4,7 +4,9 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "ingest/pipeline/place_grid.h"
@@ -32,6 +34,10 @@ class RegionIndex {
     NodeId place;
   };
 
+  /// Whether nothing stands between a point and a place.
+  using Sight =
+      std::function<bool(const Eigen::Vector3d& point_map, const Eigen::Vector3d& place_map)>;
+
   RegionIndex() = default;
   /// Rooms with neither outline nor box hold nobody. `contains`: which places are in which room;
   /// pairs of unknown nodes are ignored.
@@ -44,9 +50,14 @@ class RegionIndex {
   ///
   /// Room: kept until it is more than kHysteresisM behind, or another is deeper by more than
   /// that and more than that deep; a new one is the deepest that holds the position.
-  /// Place: the nearest of the room's places (of all, where there is no room or it has none);
-  /// kept until another is nearer by more than kHysteresisM. Ties go to the lower id.
+  /// Place: the nearest in sight, within some metres, of the room's places (of all, where there is
+  /// no room or it has none); the nearest of any where none is in sight. Kept until another is
+  /// nearer by more than kHysteresisM, or it is out of sight and another is not. Ties go to the
+  /// lower id. Source: RSS 2020, section IV-B, with line of sight added.
   RegionState Next(RegionState before, const Eigen::Vector3d& position_map) const;
+
+  /// Empty = everything is in sight, as where nothing is known of obstacles.
+  void SetSight(Sight sight) { sight_ = std::move(sight); }
 
   /// The numbers of a room and a place; -1 for ids that are unknown here.
   RegionState Find(NodeId room, NodeId place) const;
@@ -80,12 +91,14 @@ class RegionIndex {
   bool MakeRoom(const Node& node, Room* room) const;
   Depth DepthIn(const Room& room, const Eigen::Vector3d& position) const;
   int32_t NextRoom(int32_t before, const Eigen::Vector3d& position) const;
+  bool IsInSight(const Eigen::Vector3d& position, int32_t place) const;
   int32_t NextPlace(int32_t room, int32_t before, const Eigen::Vector3d& position) const;
 
   /// Ascending by id, so that a lower number is a lower id.
   std::vector<Room> rooms_;
   std::vector<Place> places_;
   PlaceGrid all_places_;
+  Sight sight_;
 };
 
 }  // namespace dsg::ingest

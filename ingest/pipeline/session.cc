@@ -9,7 +9,7 @@ namespace {
 
 // Counts changes of what the pipeline makes of a log; a half-done session of an older build must
 // not be continued with other deltas.
-constexpr int kPipelineVersion = 1;
+constexpr int kPipelineVersion = 2;
 
 }  // namespace
 
@@ -17,6 +17,9 @@ std::string SessionConfig::Digest() const {
   std::string choice = poses == "auto" ? "" : absl::StrCat("poses=", poses, "\n");
   if (up != "auto") absl::StrAppend(&choice, "up=", up, "\n");
   if (!mapping.empty()) absl::StrAppend(&choice, "mapping=", mapping, "\n");
+  if (!people.empty()) absl::StrAppend(&choice, "people=", people, "\n");
+  if (!robot_model.empty()) absl::StrAppend(&choice, "robot_model=", robot_model, "\n");
+  if (is_size_bounded) absl::StrAppend(&choice, "bounded\n");
   return Sha256Hex(
       absl::StrCat(choice, "pipeline=", kPipelineVersion, "\nformat=", format,
                    "\nepoch_ns=", epoch_ns, "\nframe_period_ns=", frame_period_ns,

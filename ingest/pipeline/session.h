@@ -23,6 +23,13 @@ struct SessionConfig {
   std::string up = "auto";
   /// MappingOptions::Digest of logs that give static layers; empty for others.
   std::string mapping;
+  /// PeopleOptions::Digest of logs that give people's tracks; empty for others.
+  std::string people;
+  /// SHA-256 of the robot's CAD model; empty for none.
+  std::string robot_model;
+  /// Whether corrections of logs with loop closures are cut to the size of messages: then their
+  /// sequences are others.
+  bool is_size_bounded = false;
 
   /// SHA-256 in hexadecimal.
   std::string Digest() const;

@@ -92,14 +92,17 @@ LayerGraph StaticLayers::Update(TimeNs now_ns, bool is_last) {
     parts.structures = FindStructures(mesh, classes_);
     structure_tracker_.Track(&parts.structures);
   }
-  const std::vector<double> floors_m = FloorsOf(parts.structures, path_map_);
+  floors_m_ = FloorsOf(parts.structures, path_map_);
   FindObjects(now_ns, mesh, parts.structures);
-  FitShapes(floors_m, is_last);
-  const DistanceField field = FindDistances(mesh, floors_m);
+  FitShapes(floors_m_, is_last);
+  // The last one is not needed beside the new one.
+  field_.reset();
+  field_ = std::make_shared<const DistanceField>(FindDistances(mesh, floors_m_));
+  const DistanceField& field = *field_;
   {
     const StageClock::Span span(&clock_, "places");
     PlaceOptions place_options = options_.places;
-    if (place_options.floors_m.empty()) place_options.floors_m = floors_m;
+    if (place_options.floors_m.empty()) place_options.floors_m = floors_m_;
     parts.places = ExtractPlaces(field.grid(), path_map_, place_options);
     place_tracker_.Track(&parts.places);
   }
@@ -126,6 +129,15 @@ DistanceField StaticLayers::FindDistances(const std::vector<const MeshBlock*>& m
       volume_.MakeOccupancy(std::max(options_.grid_cell_m, options_.volume.voxel_m));
   CloseGlass(mesh, GlassClasses(labels_), floors_m, options_.places.body_z_max_m, &grid);
   return DistanceField(std::move(grid));
+}
+
+std::function<bool(const Eigen::Vector3d&, const Eigen::Vector3d&)> StaticLayers::Sight() const {
+  if (field_ == nullptr) return {};
+  const bool is_on_floor = options_.places.mode == PlaceMode::kGround;
+  return [field = field_, is_on_floor](const Eigen::Vector3d& point_map,
+                                       const Eigen::Vector3d& place_map) {
+    return IsPlaceInSight(place_map, is_on_floor, *field, point_map);
+  };
 }
 
 void StaticLayers::NoteCost(int64_t cell_count) {

@@ -4,6 +4,7 @@
 // Refuses to know the store and the log; it calls the stages in their order.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -44,6 +45,9 @@ class StaticLayers {
   /// Blocks that changed since the last call.
   std::vector<MeshBlock> TakeMesh(double block_size_m);
 
+  /// All blocks, ascending by index, until the next call of TakeMesh.
+  std::vector<const MeshBlock*> Mesh() const;
+
   /// Finds all layers above the mesh anew. Call TakeMesh before.
   LayerGraph Update(TimeNs now_ns, bool is_last);
 
@@ -53,12 +57,18 @@ class StaticLayers {
   /// Whether enough of the log has passed since the last Update.
   bool IsUpdateDue(TimeNs now_ns) const;
 
+  /// Heights of the floors found by the last Update, ascending.
+  const std::vector<double>& floors_m() const { return floors_m_; }
+  /// Whether nothing stood between a point and a place by the last Update; empty before it. May be
+  /// called for as long as it is kept.
+  std::function<bool(const Eigen::Vector3d& point_map, const Eigen::Vector3d& place_map)> Sight()
+      const;
+
   const NodeNumbering& numbering() const { return maker_.numbering(); }
   VolumeCounts counts() const { return volume_.counts(); }
   StageClock& clock() { return clock_; }
 
  private:
-  std::vector<const MeshBlock*> Mesh() const;
   DistanceField FindDistances(const std::vector<const MeshBlock*>& mesh,
                               const std::vector<double>& floors_m);
   void NoteCost(int64_t cell_count);
@@ -93,6 +103,8 @@ class StaticLayers {
   RoomTracker room_tracker_;
   std::vector<bool> is_asset_told_;
   std::vector<Asset> assets_;
+  std::vector<double> floors_m_;
+  std::shared_ptr<const DistanceField> field_;
   TimeNs updated_ns_ = kTimeMin;
   /// Log time that the next update should wait at least.
   TimeNs update_cost_ns_ = 0;

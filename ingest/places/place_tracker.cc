@@ -76,12 +76,7 @@ std::vector<int> NearestPlaces(const PlaceGraph& graph, const Eigen::Vector3d& p
 bool IsOnFloor(const Place& place) { return place.position_map.z() == place.floor_z_m; }
 
 bool IsInSight(const Place& place, const DistanceField& field, const Eigen::Vector3d& point_map) {
-  Eigen::Vector3d at = place.position_map;
-  // Of a place on the floor, what counts is the body that stands there.
-  if (IsOnFloor(place)) {
-    at.z() = std::clamp(point_map.z(), place.floor_z_m + kEyeLowM, place.floor_z_m + kEyeHighM);
-  }
-  return field.HasLineOfSight(point_map, at, kForgivenM);
+  return IsPlaceInSight(place.position_map, IsOnFloor(place), field, point_map);
 }
 
 // No wall is between, whatever stands in front of the point.
@@ -134,6 +129,15 @@ void PlaceTracker::Track(PlaceGraph* graph) {
   }
   SortById(graph);
   last_ = *graph;
+}
+
+bool IsPlaceInSight(const Eigen::Vector3d& place_map, bool is_on_floor, const DistanceField& field,
+                    const Eigen::Vector3d& point_map) {
+  Eigen::Vector3d at = place_map;
+  if (is_on_floor) {
+    at.z() = std::clamp(point_map.z(), place_map.z() + kEyeLowM, place_map.z() + kEyeHighM);
+  }
+  return field.HasLineOfSight(point_map, at, kForgivenM);
 }
 
 int NearestPlaceInSight(const PlaceGraph& graph, const DistanceField& field,

@@ -29,4 +29,9 @@ class PlaceTracker {
 int NearestPlaceInSight(const PlaceGraph& graph, const DistanceField& field,
                         const Eigen::Vector3d& point_map);
 
+/// Whether a place is in straight sight of a point; of one on the floor, the body that stands
+/// there.
+bool IsPlaceInSight(const Eigen::Vector3d& place_map, bool is_on_floor, const DistanceField& field,
+                    const Eigen::Vector3d& point_map);
+
 }  // namespace dsg::ingest

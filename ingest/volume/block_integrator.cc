@@ -113,6 +113,8 @@ void BlockIntegrator::FuseSurface(const Reading& reading, float distance, float 
   FuseDistance(std::max(distance, -view_.band().truncation_m), weight, kWeightMax, &voxel);
   block->updated = true;
   block->has_surface = true;
+  block->first_surface_ns = std::min(block->first_surface_ns, view_.frame().time_ns);
+  block->last_surface_ns = std::max(block->last_surface_ns, view_.frame().time_ns);
   if (distance > kLabelBefore * view_.band().voxel_m ||
       distance < -kLabelBehind * view_.band().voxel_m ||
       !view_.IsInsideSurface(reading.column, reading.row)) {

@@ -34,6 +34,7 @@ class BlockMesher {
   void AddMeaning(const Eigen::Vector3i& outside, const Eigen::Vector3i& inside);
   void AddMeaningAround(const Eigen::Vector3i& voxel, uint32_t* class_id,
                         uint32_t* instance_id) const;
+  void AddTimes(const Eigen::Vector3i& outside, const Eigen::Vector3i& inside);
   void DropSpecks();
   void KeepFaces(const std::vector<uint8_t>& is_kept);
   size_t Offset(const Eigen::Vector3i& voxel) const {

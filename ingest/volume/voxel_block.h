@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "ingest/volume/label_slots.h"
+#include "schema/base/time.h"
 
 namespace dsg::ingest {
 
@@ -65,6 +66,9 @@ struct VoxelBlock {
   /// voxel in three is near enough to a surface to have labels.
   std::vector<uint16_t> label_index;
   std::vector<VoxelLabels> labels;
+  /// When a surface was near, first and last; the first is after the last when none was.
+  TimeNs first_surface_ns = kTimeMax;
+  TimeNs last_surface_ns = kTimeMin;
   /// Some voxel has been written by the frame at hand.
   bool updated = false;
   /// A surface has ever been near.

@@ -25,7 +25,8 @@ UNSEEDED = re.compile(
 PRINTS = re.compile(r"std::c(out|err)\b|\bf?printf\(|\bputs\(")
 # Mains and the command-line tool talk to people; so do tests.
 MAY_PRINT = re.compile(r"^(query/cli/|ingest/simulator/cli/|tests/)|(^|/|_)main\.cc$|"
-                       r"schema/base/(log|check)\.|^ingest/pipeline/(progress|mapping_flags)")
+                       r"schema/base/(log|check)\.|"
+                       r"^ingest/pipeline/(progress|mapping_flags|people_flags)")
 SPDX = "SPDX-License-Identifier: Apache-2.0"
 TRANSPARENT = re.compile(r"\b(namespace|class|struct|union|enum|extern)\b")
 

@@ -66,5 +66,26 @@ TEST(PlaceGrid, HoldsPointsOnALineAndOnTopOfEachOther) {
   ExpectNaive(stack, points);
 }
 
+TEST(PlaceGrid, GivesTheNearestThatIsAccepted) {
+  constexpr unsigned kSeed = 9;
+  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
+  std::mt19937 random(kSeed);
+  std::uniform_real_distribution<double> inside(-20.0, 20.0);
+  std::vector<PlaceGrid::Item> items;
+  std::vector<PlaceGrid::Item> accepted;
+  for (int i = 0; i < 200; ++i) {
+    items.push_back({i, {inside(random), inside(random), 0.0}});
+    if (i % 3 == 0) accepted.push_back(items.back());
+  }
+  const PlaceGrid grid(items);
+  for (int i = 0; i < 300; ++i) {
+    const Eigen::Vector3d point(inside(random), inside(random), 1.0);
+    const PlaceGrid::Found expected = Naive(accepted, point);
+    const PlaceGrid::Found found = grid.Nearest(
+        point, [](int32_t number) { return number % 3 == 0; }, 4.0);
+    EXPECT_EQ(found.number, expected.distance_m < 4.0 ? expected.number : -1);
+  }
+}
+
 }  // namespace
 }  // namespace dsg::ingest

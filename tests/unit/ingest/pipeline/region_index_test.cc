@@ -104,5 +104,34 @@ TEST(RegionIndex, ChoosesAmongAllPlacesWhereTheRoomHasNone) {
   EXPECT_EQ(index.PlaceId(outside.place), NodeId('p', 1));
 }
 
+// A wall along x = 0 with places on both sides.
+RegionIndex MakeWalledIndex() {
+  RegionIndex index({}, {MakePlace(1, -2.0, 0), MakePlace(2, 1.0, 0)}, {});
+  index.SetSight([](const Eigen::Vector3d& point_map, const Eigen::Vector3d& place_map) {
+    return point_map.x() * place_map.x() >= 0.0;
+  });
+  return index;
+}
+
+TEST(RegionIndex, TakesThePlaceInSightBeforeANearerOneBehindAWall) {
+  const RegionIndex index = MakeWalledIndex();
+  EXPECT_EQ(index.PlaceId(index.Next({}, {-0.2, 0, 1}).place), NodeId('p', 1));
+  EXPECT_EQ(index.PlaceId(index.Next({}, {0.2, 0, 1}).place), NodeId('p', 2));
+}
+
+TEST(RegionIndex, LeavesAPlaceThatIsOutOfSight) {
+  const RegionIndex index = MakeWalledIndex();
+  const RegionState before = index.Next({}, {0.2, 0, 1});
+  EXPECT_EQ(index.PlaceId(index.Next(before, {-0.1, 0, 1}).place), NodeId('p', 1));
+}
+
+TEST(RegionIndex, TakesTheNearestWhereNothingIsInSight) {
+  RegionIndex index({}, {MakePlace(1, -2.0, 0), MakePlace(2, 1.0, 0)}, {});
+  index.SetSight([](const Eigen::Vector3d&, const Eigen::Vector3d&) { return false; });
+  const RegionState state = index.Next({}, {-0.2, 0, 1});
+  EXPECT_EQ(index.PlaceId(state.place), NodeId('p', 2));
+  EXPECT_EQ(index.Next(state, {-0.3, 0, 1}), state) << "blindness is no reason to change";
+}
+
 }  // namespace
 }  // namespace dsg::ingest

@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/pipeline/people_told.h"
+
+#include <algorithm>
+#include <memory>
+#include <set>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "ingest/pipeline/layer_graph.h"
+#include "schema/base/check.h"
+#include "schema/model/delta_check.h"
+
+namespace dsg::ingest {
+namespace {
+
+constexpr char kDetectionPrior[] = "detection_prior";
+
+// A pose that moved by less keeps its row while the log runs, and at its end.
+constexpr double kLiveMoveM = 0.03;
+constexpr double kLiveTurnRad = 0.1;
+constexpr double kLastMoveM = 0.001;
+constexpr double kLastTurnRad = 0.005;
+
+// Of a body about its torso, metres, for people whose joints are not known.
+constexpr double kHalfWidthM = 0.3;
+constexpr double kBelowM = 1.0;
+constexpr double kAboveM = 0.85;
+// Joints are inside the body.
+constexpr double kFleshM = 0.1;
+
+bool HasMoved(const Pose3d& told, const Pose3d& now, bool is_last) {
+  return (told.position - now.position).norm() > (is_last ? kLastMoveM : kLiveMoveM) ||
+         AngleBetween(told.orientation, now.orientation) > (is_last ? kLastTurnRad : kLiveTurnRad);
+}
+
+TimedPose MakePose(const TorsoEstimate& estimate, bool has_heading) {
+  TimedPose pose;
+  pose.time_ns = estimate.time_ns;
+  pose.flags = has_heading ? 0 : pose_flags::kNoOrientation;
+  pose.map_T_agent = estimate.map_T_torso;
+  pose.covariance = std::make_shared<const Covariance6>(estimate.covariance);
+  return pose;
+}
+
+Box3d BodyBox(const PersonTracker::Track& track) {
+  Box3d box;
+  for (auto seen = track.observations.rbegin(); seen != track.observations.rend(); ++seen) {
+    if (!seen->has_joints) continue;
+    for (const Eigen::Vector3d& joint : seen->joints_torso) box.extend(joint);
+    box.min().array() -= kFleshM;
+    box.max().array() += kFleshM;
+    return box;
+  }
+  return {Eigen::Vector3d(-kHalfWidthM, -kHalfWidthM, -kBelowM),
+          Eigen::Vector3d(kHalfWidthM, kHalfWidthM, kAboveM)};
+}
+
+BodyShape MakeShape(const PersonObservation& observation) {
+  BodyShape shape;
+  shape.time_ns = observation.time_ns;
+  shape.pose_coefficients = observation.pose_coefficients;
+  shape.shape_coefficients = observation.shape_coefficients;
+  shape.vertices = observation.vertices_torso;
+  if (observation.has_joints) {
+    for (const Eigen::Vector3d& joint : observation.joints_torso) {
+      for (int axis = 0; axis < 3; ++axis) shape.joints.push_back(static_cast<float>(joint[axis]));
+    }
+  }
+  return shape;
+}
+
+bool HasShape(const PersonObservation& observation) {
+  return observation.has_joints || !observation.pose_coefficients.empty() ||
+         !observation.shape_coefficients.empty() || !observation.vertices_torso.empty();
+}
+
+}  // namespace
+
+GraphDelta PeopleTold::Tell(PersonTracker* tracker, bool is_last) {
+  GraphDelta delta;
+  for (const TrackChange& change : tracker->TakeChanges()) {
+    const PersonTracker::Track& track = tracker->track(change.track);
+    Person& person = PersonOf(change.track);
+    const bool is_dropped = change.state == TrackState::kDropped;
+    if (!is_dropped) TellPoses(track, change.first_estimate, is_last, &person, &delta);
+    TellObservations(track, &person, &delta);
+    tracker->ForgetVertices(change.track, change.first_observation);
+    TellSameAs(track, &person, &delta);
+    if (!person.is_told || person.state != change.state || is_last) {
+      person.state = change.state;
+      person.is_told = true;
+      TellNode(track, &person, &delta);
+    }
+  }
+  Coalesce(&delta);
+  return delta;
+}
+
+void PeopleTold::Replace(const std::vector<TrajectoryCorrection>& corrections) {
+  for (const TrajectoryCorrection& correction : corrections) {
+    for (auto& [number, person] : people_) {
+      if (person.id == correction.agent) person.poses = correction.poses;
+    }
+  }
+}
+
+std::vector<PeopleTold::Sighting> PeopleTold::TakeSightings() {
+  std::vector<Sighting> sightings = std::exchange(sightings_, {});
+  std::stable_sort(sightings.begin(), sightings.end(), [](const Sighting& a, const Sighting& b) {
+    return a.agent != b.agent ? a.agent < b.agent : a.time_ns < b.time_ns;
+  });
+  return sightings;
+}
+
+int64_t PeopleTold::agent_count() const {
+  return std::count_if(people_.begin(), people_.end(),
+                       [](const auto& person) { return !person.second.poses.empty(); });
+}
+
+PeopleTold::Person& PeopleTold::PersonOf(int64_t track) {
+  auto [found, is_new] = people_.try_emplace(track);
+  if (is_new) {
+    found->second.id = namer_->Assign(absl::StrCat(name_prefix_, track), kinds::kHuman);
+  }
+  return found->second;
+}
+
+void PeopleTold::TellNode(const PersonTracker::Track& track, Person* person,
+                          GraphDelta* delta) const {
+  DSG_CHECK(!track.observations.empty());
+  const bool is_dropped = track.state == TrackState::kDropped;
+  Node node;
+  node.id = person->id;
+  node.layer = layers::kAgents;
+  node.kind = kinds::kHuman;
+  node.name = absl::StrCat(name_prefix_, track.id);
+  node.provenance = Provenance::kPerceived;
+  const TimeNs first_ns = track.observations.front().time_ns;
+  const TimeNs last_ns = track.observations.back().time_ns;
+  node.first_observed_ns = first_ns;
+  node.last_observed_ns = last_ns;
+  // Nobody was there for sure; the row stays as evidence of what was seen.
+  node.valid = {first_ns, is_dropped ? last_ns + 1 : kTimeMax};
+  node.observation_count = static_cast<int64_t>(track.observations.size());
+  node.confidence = is_dropped ? 0.0 : 1.0;
+  node.map_T_node = is_dropped ? track.observations.back().map_T_torso
+                               : track.graph.estimates().back().map_T_torso;
+  node.box_node = BodyBox(track);
+  node.agent.emplace();
+  node.agent->shape_coefficients = track.shape_coefficients;
+  node.agent->track_state = std::string(ToString(track.state));
+  node.attributes[kSessionAttribute] = session_id_;
+  person->node = node;
+  delta->nodes.push_back(std::move(node));
+}
+
+void PeopleTold::TellPoses(const PersonTracker::Track& track, size_t first_moved, bool is_last,
+                           Person* person, GraphDelta* delta) {
+  const std::vector<TorsoEstimate>& estimates = track.graph.estimates();
+  std::vector<TimedPose>& told = person->poses;
+  const size_t told_count = told.size();
+  size_t first = told_count;
+  size_t end = told_count;
+  for (size_t i = is_last ? 0 : std::min(first_moved, told_count); i < told_count; ++i) {
+    if (!HasMoved(told[i].map_T_agent, estimates[i].map_T_torso, is_last)) continue;
+    if (first == told_count) first = i;
+    end = i + 1;
+  }
+  if (first < told_count) {
+    TrajectoryCorrection correction{person->id, told[first].time_ns, told[end - 1].time_ns + 1, {}};
+    for (size_t i = first; i < end; ++i) {
+      told[i] = MakePose(estimates[i], track.observations[i].has_heading);
+      told[i].flags |= pose_flags::kCorrected;
+      correction.poses.push_back(told[i]);
+    }
+    delta->corrections.push_back(std::move(correction));
+  }
+  TrajectoryAppend append{person->id, {}};
+  for (size_t i = told_count; i < estimates.size(); ++i) {
+    told.push_back(MakePose(estimates[i], track.observations[i].has_heading));
+    append.poses.push_back(told.back());
+    sightings_.push_back({person->id, told.back().time_ns, told.back().map_T_agent.position});
+  }
+  if (!append.poses.empty()) delta->appends.push_back(std::move(append));
+}
+
+void PeopleTold::TellObservations(const PersonTracker::Track& track, Person* person,
+                                  GraphDelta* delta) const {
+  const size_t first = person->observation_count;
+  if (first == track.observations.size()) return;
+  person->observation_count = track.observations.size();
+  FactorAppend factors{person->id, track.graph.Factors(first)};
+  if (track.state == TrackState::kDropped) {
+    std::erase_if(factors.factors,
+                  [](const PoseFactor& factor) { return factor.type != kDetectionPrior; });
+  }
+  if (!factors.factors.empty()) delta->factors.push_back(std::move(factors));
+  ShapeAppend shapes{person->id, std::nullopt, {}};
+  for (size_t i = first; i < track.observations.size(); ++i) {
+    if (HasShape(track.observations[i])) shapes.shapes.push_back(MakeShape(track.observations[i]));
+  }
+  if (!shapes.shapes.empty()) delta->shapes.push_back(std::move(shapes));
+}
+
+void PeopleTold::TellSameAs(const PersonTracker::Track& track, Person* person, GraphDelta* delta) {
+  for (; person->same_as_count < track.same_as.size(); ++person->same_as_count) {
+    const SameAs& same = track.same_as[person->same_as_count];
+    Edge edge{person->id, relations::kSameAs, PersonOf(same.earlier_track).id, same.probability};
+    edge.valid = {track.observations.front().time_ns, kTimeMax};
+    delta->edges.push_back(std::move(edge));
+  }
+}
+
+std::string PersonNamePrefix(const std::vector<Node>& known_agents, const std::string& prefix,
+                             const std::string& session_id) {
+  std::set<std::string> others;
+  for (const Node& node : known_agents) {
+    const auto session = node.attributes.find(kSessionAttribute);
+    if (session == node.attributes.end()) continue;
+    const auto* text = std::get_if<std::string>(&session->second);
+    if (text == nullptr) continue;
+    if (*text == session_id) return node.name.substr(0, node.name.rfind('-') + 1);
+    others.insert(*text);
+  }
+  if (others.empty()) return absl::StrCat(prefix, "person-");
+  return absl::StrCat(prefix, "person-", others.size(), "-");
+}
+
+}  // namespace dsg::ingest

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/pipeline/person_mapper.h"
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "ingest/depth/frame_maker.h"
+#include "schema/base/status.h"
+
+namespace dsg::ingest {
+namespace {
+
+// A depth picture this near in time is of the same moment.
+constexpr TimeNs kSameMomentNs = 20'000'000;
+constexpr double kCameraAboveFloorMinM = 0.2;
+constexpr double kCameraAboveFloorMaxM = 2.5;
+
+}  // namespace
+
+PersonMapper::PersonMapper(const RigCalibration& rig, const PeopleOptions& options, bool has_depth)
+    : rig_(rig),
+      options_(options),
+      has_depth_(has_depth),
+      poses_(DepthOptions().pose_gap_ns_max, DepthOptions().speed_m_s_max),
+      tracker_(options.tracker) {}
+
+void PersonMapper::AddPose(TimeNs time_ns, const Pose3d& map_T_body) {
+  if (!poses_.Add(time_ns, map_T_body)) return;
+  if (!has_depth_) TakeUntil(time_ns, nullptr);
+}
+
+void PersonMapper::AddDetection(HumanDetection detection) {
+  ++counts_.detection_count;
+  if (waiting_.empty() || waiting_.back().time_ns != detection.time_ns) {
+    waiting_.push_back({detection.time_ns, {}});
+  }
+  waiting_.back().detections.push_back(std::move(detection));
+}
+
+void PersonMapper::AddFrame(const DepthFrame& frame) {
+  TakeUntil(frame.time_ns + kSameMomentNs, &frame);
+}
+
+void PersonMapper::Close() {
+  TakeUntil(kTimeMax, nullptr);
+  tracker_.Finish();
+}
+
+PeopleCounts PersonMapper::counts() const {
+  PeopleCounts counts = counts_;
+  const TrackerCounts tracks = tracker_.counts();
+  counts.used_count = tracks.observation_count - tracks.duplicate_count - tracks.unusable_count -
+                      tracks.weak_unused_count;
+  counts.track_count = tracks.track_count;
+  counts.dropped_track_count = tracks.dropped_track_count;
+  counts.same_as_count = tracks.same_as_count;
+  const auto add = [&counts](const char* reason, int64_t count) {
+    if (count > 0) counts.rejected[reason] += count;
+  };
+  add("a second box about a body", tracks.duplicate_count);
+  add("not placeable in time or space", tracks.unusable_count);
+  add("at the border and of no track", tracks.weak_unused_count);
+  return counts;
+}
+
+void PersonMapper::TakeUntil(TimeNs until_ns, const DepthFrame* frame) {
+  while (!waiting_.empty() && waiting_.front().time_ns <= until_ns) {
+    const Image& image = waiting_.front();
+    const bool is_same_moment = frame != nullptr && image.time_ns >= frame->time_ns - kSameMomentNs;
+    Take(image, is_same_moment ? frame : nullptr);
+    poses_.ForgetBefore(image.time_ns);
+    waiting_.pop_front();
+  }
+}
+
+std::vector<PersonMapper::Filtered> PersonMapper::Filter(const Image& image) {
+  std::vector<Filtered> kept;
+  const std::string& camera_name = image.detections.front().camera;
+  for (const HumanDetection& detection : image.detections) {
+    const CameraCalibration* camera = CameraOf(detection.camera);
+    std::optional<std::string_view> why;
+    if (camera == nullptr) {
+      why = "camera without calibration";
+    } else if (detection.camera != camera_name) {
+      // One person in two images of a stamp would be two persons.
+      why = "another camera at the same stamp";
+    } else {
+      why = WhyRejected(detection, *camera, options_.filter);
+    }
+    const bool is_weak = why == kAtBorder && options_.is_border_used;
+    if (why.has_value() && !is_weak) {
+      ++counts_.rejected[std::string(*why)];
+    } else {
+      kept.push_back({&detection, is_weak});
+    }
+  }
+  return kept;
+}
+
+void PersonMapper::Take(const Image& image, const DepthFrame* frame) {
+  const StageClock::Span span(&clock_, "people");
+  const std::vector<Filtered> detections = Filter(image);
+  Pose3d map_T_body;
+  if (poses_.At(image.time_ns, &map_T_body) != PoseTrack::Answer::kKnown) {
+    counts_.rejected["no pose"] += static_cast<int64_t>(detections.size());
+    return;
+  }
+  ObservationContext context;
+  context.depth = options_.cues.is_depth_used ? frame : nullptr;
+  std::vector<PersonObservation> observations;
+  for (const auto& [detection, is_weak] : detections) {
+    context.camera = CameraOf(detection->camera);
+    context.map_T_camera = map_T_body * context.camera->body_T_camera;
+    context.floor_z_map = FloorUnder(context.map_T_camera.position.z());
+    absl::StatusOr<PersonObservation> observation = Observe(*detection, context, options_.cues);
+    if (observation.ok()) {
+      observation->is_weak = is_weak;
+      observations.push_back(*std::move(observation));
+    } else {
+      ++counts_.rejected["cannot be placed"];
+    }
+  }
+  const auto count = static_cast<int64_t>(observations.size());
+  if (!tracker_.Observe(image.time_ns, std::move(observations))) {
+    counts_.rejected["out of order"] += count;
+  }
+}
+
+const CameraCalibration* PersonMapper::CameraOf(const std::string& name) const {
+  for (const CameraCalibration& camera : rig_.cameras) {
+    if (camera.name == name) return &camera;
+  }
+  return nullptr;
+}
+
+std::optional<double> PersonMapper::FloorUnder(double camera_z_m) const {
+  if (options_.floor_z_m.has_value()) return options_.floor_z_m;
+  const auto above =
+      std::upper_bound(floors_m_.begin(), floors_m_.end(), camera_z_m - kCameraAboveFloorMinM);
+  if (above != floors_m_.begin()) return *std::prev(above);
+  const bool is_zero_likely =
+      camera_z_m >= kCameraAboveFloorMinM && camera_z_m <= kCameraAboveFloorMaxM;
+  return is_zero_likely ? std::optional<double>(0.0) : std::nullopt;
+}
+
+}  // namespace dsg::ingest

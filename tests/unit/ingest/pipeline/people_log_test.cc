@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: Apache-2.0
+// Logs with detections of people into real stores: tracks, factors, shapes, stays, and what a
+// repetition, an interruption and a second log change.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "ingest/pipeline/ingest_log.h"
+#include "schema/base/status.h"
+#include "schema/store/graph_store.h"
+#include "tests/unit/ingest/log/log_test_util.h"
+
+namespace dsg::ingest {
+namespace {
+
+constexpr TimeNs kStepNs = 200'000'000;
+constexpr TimeNs kBeginNs = 1'000'000'000'000;
+
+// A log held in memory.
+class ScriptedLog : public LogSource {
+ public:
+  ScriptedLog(std::vector<Measurement> measurements, std::string content) {
+    measurements_ = std::move(measurements);
+    info_.format = "scripted";
+    info_.path = "scripted";
+    info_.content_sha256 = std::move(content);
+    info_.has_clock = true;
+    info_.channel_counts = {{"poses", 1}, {"detections0", 1}};
+    CameraCalibration camera;
+    camera.name = "cam0";
+    camera.width = 720;
+    camera.height = 480;
+    camera.fx = camera.fy = 415.0;
+    camera.cx = 360.0;
+    camera.cy = 240.0;
+    // Looks along the body's x; x of the image is to the right, y down.
+    Eigen::Matrix3d body_R_camera;
+    body_R_camera << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+    camera.body_T_camera.orientation = Eigen::Quaterniond(body_R_camera);
+    info_.rig.cameras.push_back(camera);
+  }
+
+  const LogInfo& info() const override { return info_; }
+  absl::StatusOr<std::optional<Measurement>> Next() override {
+    if (next_ == measurements_.size()) return std::nullopt;
+    return measurements_[next_++];
+  }
+
+ private:
+  LogInfo info_;
+  std::vector<Measurement> measurements_;
+  size_t next_ = 0;
+};
+
+PoseMeasurement RobotAt(TimeNs time_ns) {
+  PoseMeasurement pose;
+  pose.agent_name = "body";
+  pose.agent_kind = kinds::kRobot;
+  pose.pose.time_ns = time_ns;
+  pose.pose.map_T_agent.position = {0, 0, 1};
+  return pose;
+}
+
+// Of each joint of somebody who stands, from the pelvis, metres.
+constexpr std::array<double, kJointCount> kDown = {
+    0.0,  0.08,  0.08,  -0.12, 0.48,  0.48,  -0.25, 0.88,  0.88, -0.3, 0.93, 0.93,
+    -0.5, -0.45, -0.45, -0.6,  -0.42, -0.42, -0.15, -0.15, 0.1,  0.1,  0.18, 0.18};
+constexpr std::array<double, kJointCount> kRight = {
+    0.0, -0.1, 0.1, 0.0, -0.1, 0.1, 0.0,   -0.1, 0.1,   0.0,  -0.1,  0.1,
+    0.0, -0.1, 0.1, 0.0, -0.2, 0.2, -0.25, 0.25, -0.25, 0.25, -0.25, 0.25};
+
+// Joints of somebody who stands `left_m` to the left and `ahead_m` before the robot, seen exactly.
+HumanDetection Seen(TimeNs time_ns, int64_t id, double ahead_m, double left_m, float tallness) {
+  HumanDetection detection;
+  detection.time_ns = time_ns;
+  detection.camera = "cam0";
+  detection.id = id;
+  detection.score = 0.9;
+  const Eigen::Vector3d pelvis_camera(-left_m, 0.05, ahead_m);
+  Eigen::Vector2d low(1e9, 1e9);
+  Eigen::Vector2d high(-1e9, -1e9);
+  for (int i = 0; i < kJointCount; ++i) {
+    const auto joint = static_cast<size_t>(i);
+    detection.joints_root[joint] = {kRight[joint], kDown[joint], 0.0};
+    const Eigen::Vector3d at = pelvis_camera + detection.joints_root[joint];
+    detection.joints_px[joint] = {360.0 + 415.0 * at.x() / at.z(), 240.0 + 415.0 * at.y() / at.z()};
+    detection.joint_visibility[joint] = 1.0;
+    low = low.cwiseMin(detection.joints_px[joint]);
+    high = high.cwiseMax(detection.joints_px[joint]);
+  }
+  detection.box_px = {low.x(), low.y(), high.x(), high.y()};
+  detection.pelvis_camera = pelvis_camera;
+  detection.shape_coefficients = std::vector<float>(kShapeCount, tallness);
+  return detection;
+}
+
+// Somebody walks to the left for `step_count` images, a little over half a metre a second.
+std::vector<Measurement> Walk(int step_count) {
+  std::vector<Measurement> log;
+  for (int i = 0; i < step_count; ++i) {
+    const TimeNs time_ns = kBeginNs + i * kStepNs;
+    log.emplace_back(RobotAt(time_ns));
+    log.emplace_back(Seen(time_ns, i, 4.0, -1.5 + 0.12 * i, 0.5F));
+  }
+  return log;
+}
+
+class PeopleLog : public testing::Test {
+ protected:
+  void SetUp() override {
+    StoreOptions options;
+    options.create = true;
+    store_ = *GraphStore::Open(folder_.Path("store"), options);
+    MapSpec spec;
+    spec.name = "test";
+    spec.epoch_ns = kBeginNs;
+    ASSERT_TRUE(store_->CreateMap(spec).ok());
+    writer_ = *store_->OpenWriter("test");
+    reader_ = *store_->OpenMap("test");
+  }
+
+  absl::StatusOr<IngestSummary> Ingest(std::vector<Measurement> measurements,
+                                       const std::string& content = "one",
+                                       const IngestOptions& options = {}) {
+    ScriptedLog log(std::move(measurements), content);
+    DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> latest, reader_->Latest());
+    const std::unique_ptr<MapView> view = MakeSnapshotMapView(latest);
+    return IngestLog(log, {}, options, *view, *writer_, {});
+  }
+
+  std::shared_ptr<const Snapshot> Latest() { return *reader_->Latest(); }
+
+  std::vector<TrackInfo> People() {
+    std::vector<TrackInfo> people = *Latest()->Tracks();
+    std::erase_if(people, [](const TrackInfo& track) { return track.kind != kinds::kHuman; });
+    return people;
+  }
+
+  TempFolder folder_;
+  std::unique_ptr<GraphStore> store_;
+  std::unique_ptr<GraphWriter> writer_;
+  std::shared_ptr<MapReader> reader_;
+};
+
+TEST_F(PeopleLog, MakesOneTrackOfOneWalker) {
+  const auto summary = Ingest(Walk(20));
+  ASSERT_TRUE(summary.ok()) << summary.status();
+  const std::vector<TrackInfo> people = People();
+  ASSERT_EQ(people.size(), 1U);
+  EXPECT_EQ(people[0].name, "person-1");
+  EXPECT_EQ(people[0].pose_count, 20);
+  const auto there = Latest()->Locate(people[0].agent, kBeginNs + 10 * kStepNs);
+  ASSERT_TRUE(there.ok()) << there.status();
+  EXPECT_NEAR(there->map_T_agent.position.x(), 4.0, 0.3);
+  EXPECT_NEAR(there->map_T_agent.position.y(), -0.3, 0.15);
+}
+
+TEST_F(PeopleLog, KeepsFactorsAndShapesOfEachDetection) {
+  ASSERT_TRUE(Ingest(Walk(20)).ok());
+  const NodeId agent = People().at(0).agent;
+  const auto factors = Latest()->Factors(agent, kTimeMin, kTimeMax);
+  ASSERT_TRUE(factors.ok());
+  EXPECT_EQ(std::count_if(factors->begin(), factors->end(),
+                          [](const PoseFactor& f) { return f.type == "detection_prior"; }),
+            20);
+  EXPECT_GE(factors->size(), 39U);
+  const auto shapes = Latest()->Shapes(agent, kTimeMin, kTimeMax);
+  ASSERT_TRUE(shapes.ok());
+  ASSERT_EQ(shapes->size(), 20U);
+  EXPECT_EQ(shapes->front().joints.size(), 72U);
+  EXPECT_EQ(shapes->front().shape_coefficients.size(), 10U);
+}
+
+TEST_F(PeopleLog, AddsNothingWhenRepeated) {
+  ASSERT_TRUE(Ingest(Walk(20)).ok());
+  const Revision before = Latest()->revision();
+  const auto again = Ingest(Walk(20));
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_EQ(Latest()->revision(), before);
+}
+
+TEST_F(PeopleLog, KeepsThePeopleOfTwoLogsApart) {
+  ASSERT_TRUE(Ingest(Walk(20), "one").ok());
+  std::vector<Measurement> later = Walk(20);
+  for (Measurement& measurement : later) {
+    if (auto* pose = std::get_if<PoseMeasurement>(&measurement))
+      pose->pose.time_ns += 60 * kNsPerSecond;
+    if (auto* seen = std::get_if<HumanDetection>(&measurement)) seen->time_ns += 60 * kNsPerSecond;
+  }
+  const auto second = Ingest(std::move(later), "two");
+  ASSERT_TRUE(second.ok()) << second.status();
+  const std::vector<TrackInfo> people = People();
+  ASSERT_EQ(people.size(), 2U);
+  EXPECT_EQ(people[1].name, "person-1-1");
+  EXPECT_EQ(people[0].pose_count, 20);
+  EXPECT_EQ(people[1].pose_count, 20);
+}
+
+TEST_F(PeopleLog, LeavesOutWhatItCannotUseAndSaysHowMuch) {
+  std::vector<Measurement> log = Walk(20);
+  // Before the robot's first pose, at the border, and of another camera.
+  log.insert(log.begin(), Measurement(Seen(kBeginNs - kStepNs, 100, 4.0, 0.0, 0.5F)));
+  HumanDetection at_border = Seen(kBeginNs + 19 * kStepNs, 101, 4.0, 0.0, 0.5F);
+  at_border.box_px[0] = 2.0;
+  log.emplace_back(at_border);
+  HumanDetection unknown = Seen(kBeginNs + 19 * kStepNs, 102, 4.0, 0.0, 0.5F);
+  unknown.camera = "cam7";
+  log.emplace_back(unknown);
+  const auto summary = Ingest(std::move(log));
+  ASSERT_TRUE(summary.ok()) << summary.status();
+  ASSERT_TRUE(summary->people.has_value());
+  EXPECT_EQ(summary->people->counts.detection_count, 23);
+  EXPECT_EQ(summary->people->counts.used_count, 20);
+  EXPECT_EQ(summary->people->counts.rejected.at("no pose"), 1);
+  EXPECT_EQ(summary->people->counts.rejected.at("camera without calibration"), 1);
+}
+
+TEST_F(PeopleLog, MakesNoTracksWhenSwitchedOff) {
+  IngestOptions options;
+  options.people.is_on = false;
+  const auto summary = Ingest(Walk(20), "one", options);
+  ASSERT_TRUE(summary.ok()) << summary.status();
+  EXPECT_FALSE(summary->people.has_value());
+  EXPECT_TRUE(People().empty());
+  EXPECT_EQ(summary->unused.at("detections0"), 20);
+}
+
+TEST_F(PeopleLog, TellsAnEncounterOfTwoPeople) {
+  std::vector<Measurement> log;
+  for (int i = 0; i < 25; ++i) {
+    const TimeNs time_ns = kBeginNs + i * kStepNs;
+    log.emplace_back(RobotAt(time_ns));
+    log.emplace_back(Seen(time_ns, 2 * i, 4.0, -1.9 + 0.12 * i, -1.0F));
+    log.emplace_back(Seen(time_ns, 2 * i + 1, 6.0, 1.9 - 0.12 * i, 2.0F));
+  }
+  IngestOptions options;
+  options.people.contacts.encounter_m = 2.5;
+  ASSERT_TRUE(Ingest(std::move(log), "one", options).ok());
+  ASSERT_EQ(People().size(), 2U);
+  EdgeFilter filter;
+  filter.relation = relations::kNear;
+  std::optional<Edge> edge;
+  ASSERT_TRUE(Latest()
+                  ->ScanEdges(filter, std::nullopt, {},
+                              [&edge](const Edge& found) {
+                                edge = found;
+                                return true;
+                              })
+                  .ok());
+  ASSERT_TRUE(edge.has_value());
+  EXPECT_EQ(edge->source, People()[0].agent);
+  EXPECT_EQ(edge->target, People()[1].agent);
+  EXPECT_NEAR(edge->weight, 2.0, 0.3);
+  EXPECT_EQ(edge->attributes.at("contact"), AttributeValue(std::string("encounter")));
+}
+
+}  // namespace
+}  // namespace dsg::ingest
