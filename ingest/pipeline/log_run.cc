@@ -67,8 +67,8 @@ LogRun::LogRun(Parts parts, const MapView& map, DeltaSink sink)
       mapper_(std::move(parts.mapper)),
       people_(std::move(parts.people)),
       detector_(std::move(parts.detector)),
-      people_told_(parts.session_id,
-                   PersonNamePrefix(parts.agents, parts.agent_prefix, parts.session_id), &namer_),
+      people_told_(parts.session_id, parts.agent_prefix,
+                   SessionPart(parts.agents, parts.agent_prefix, parts.session_id), &namer_),
       robot_(std::move(parts.robot)),
       has_loops_(parts.has_loops),
       is_resumed_(parts.is_resumed) {

@@ -15,6 +15,8 @@ namespace dsg::ingest {
 namespace {
 
 constexpr char kDetectionPrior[] = "detection_prior";
+constexpr char kPerson[] = "person-";
+constexpr char kUnconfirmed[] = "unconfirmed-";
 
 // A pose that moved by less keeps its row while the log runs, and at its end.
 constexpr double kLiveMoveM = 0.03;
@@ -81,7 +83,7 @@ GraphDelta PeopleTold::Tell(PersonTracker* tracker, bool is_last) {
   GraphDelta delta;
   for (const TrackChange& change : tracker->TakeChanges()) {
     const PersonTracker::Track& track = tracker->track(change.track);
-    Person& person = PersonOf(change.track);
+    Person& person = PersonOf(track);
     const bool is_dropped = change.state == TrackState::kDropped;
     if (!is_dropped) TellPoses(track, change.first_estimate, is_last, &person, &delta);
     TellObservations(track, &person, &delta);
@@ -118,12 +120,16 @@ int64_t PeopleTold::agent_count() const {
                        [](const auto& person) { return !person.second.poses.empty(); });
 }
 
-PeopleTold::Person& PeopleTold::PersonOf(int64_t track) {
-  auto [found, is_new] = people_.try_emplace(track);
+PeopleTold::Person& PeopleTold::PersonOf(const PersonTracker::Track& track) {
+  auto [found, is_new] = people_.try_emplace(track.id);
+  Person& person = found->second;
   if (is_new) {
-    found->second.id = namer_->Assign(absl::StrCat(name_prefix_, track), kinds::kHuman);
+    const bool is_dropped = track.state == TrackState::kDropped;
+    person.name =
+        absl::StrCat(agent_prefix_, is_dropped ? kUnconfirmed : kPerson, session_part_, track.id);
+    person.id = namer_->Assign(person.name, kinds::kHuman);
   }
-  return found->second;
+  return person;
 }
 
 void PeopleTold::TellNode(const PersonTracker::Track& track, Person* person,
@@ -134,7 +140,7 @@ void PeopleTold::TellNode(const PersonTracker::Track& track, Person* person,
   node.id = person->id;
   node.layer = layers::kAgents;
   node.kind = kinds::kHuman;
-  node.name = absl::StrCat(name_prefix_, track.id);
+  node.name = person->name;
   node.provenance = Provenance::kPerceived;
   const TimeNs first_ns = track.observations.front().time_ns;
   const TimeNs last_ns = track.observations.back().time_ns;
@@ -206,25 +212,32 @@ void PeopleTold::TellObservations(const PersonTracker::Track& track, Person* per
 void PeopleTold::TellSameAs(const PersonTracker::Track& track, Person* person, GraphDelta* delta) {
   for (; person->same_as_count < track.same_as.size(); ++person->same_as_count) {
     const SameAs& same = track.same_as[person->same_as_count];
-    Edge edge{person->id, relations::kSameAs, PersonOf(same.earlier_track).id, same.probability};
+    // It was told before: only confirmed tracks count as earlier ones.
+    const auto earlier = people_.find(same.earlier_track);
+    if (earlier == people_.end()) continue;
+    Edge edge{person->id, relations::kSameAs, earlier->second.id, same.probability};
     edge.valid = {track.observations.front().time_ns, kTimeMax};
     delta->edges.push_back(std::move(edge));
   }
 }
 
-std::string PersonNamePrefix(const std::vector<Node>& known_agents, const std::string& prefix,
-                             const std::string& session_id) {
+std::string SessionPart(const std::vector<Node>& known_agents, const std::string& agent_prefix,
+                        const std::string& session_id) {
   std::set<std::string> others;
   for (const Node& node : known_agents) {
     const auto session = node.attributes.find(kSessionAttribute);
     if (session == node.attributes.end()) continue;
     const auto* text = std::get_if<std::string>(&session->second);
     if (text == nullptr) continue;
-    if (*text == session_id) return node.name.substr(0, node.name.rfind('-') + 1);
-    others.insert(*text);
+    if (*text != session_id) {
+      others.insert(*text);
+      continue;
+    }
+    // "person-1-7": between the kind and the number.
+    const size_t begin = node.name.find('-', agent_prefix.size()) + 1;
+    return node.name.substr(begin, node.name.rfind('-') + 1 - begin);
   }
-  if (others.empty()) return absl::StrCat(prefix, "person-");
-  return absl::StrCat(prefix, "person-", others.size(), "-");
+  return others.empty() ? "" : absl::StrCat(others.size(), "-");
 }
 
 }  // namespace dsg::ingest

@@ -25,6 +25,7 @@ class PeopleTold {
   /// A track as told last.
   struct Person {
     NodeId id;
+    std::string name;
     /// As told last.
     Node node;
     std::vector<TimedPose> poses;
@@ -34,9 +35,15 @@ class PeopleTold {
     bool is_told = false;
   };
 
-  /// `name_prefix`: put before each track's number. Requires: `namer` outlives this.
-  PeopleTold(std::string session_id, std::string name_prefix, AgentNamer* namer)
-      : session_id_(std::move(session_id)), name_prefix_(std::move(name_prefix)), namer_(namer) {}
+  /// Tracks are named person-1, person-2, or unconfirmed-3 where they were dropped, with
+  /// `agent_prefix` before all and `session_part` before the number. Requires: `namer` outlives
+  /// this.
+  PeopleTold(std::string session_id, std::string agent_prefix, std::string session_part,
+             AgentNamer* namer)
+      : session_id_(std::move(session_id)),
+        agent_prefix_(std::move(agent_prefix)),
+        session_part_(std::move(session_part)),
+        namer_(namer) {}
 
   /// The tracker's changes since the last call. Poses that were told and have moved come as
   /// corrections: live ones only when they moved by a few centimetres, all of them when `is_last`.
@@ -54,7 +61,7 @@ class PeopleTold {
   const std::map<int64_t, Person>& people() const { return people_; }
 
  private:
-  Person& PersonOf(int64_t track);
+  Person& PersonOf(const PersonTracker::Track& track);
   void TellNode(const PersonTracker::Track& track, Person* person, GraphDelta* delta) const;
   void TellPoses(const PersonTracker::Track& track, size_t first_moved, bool is_last,
                  Person* person, GraphDelta* delta);
@@ -62,15 +69,16 @@ class PeopleTold {
   void TellSameAs(const PersonTracker::Track& track, Person* person, GraphDelta* delta);
 
   std::string session_id_;
-  std::string name_prefix_;
+  std::string agent_prefix_;
+  std::string session_part_;
   AgentNamer* namer_;
   std::map<int64_t, Person> people_;
   std::vector<Sighting> sightings_;
 };
 
-/// Names of this session's tracks begin so: `prefix` + "person-", and a number of the session when
-/// the map holds other sessions' people. A session that was cut off finds its number again.
-std::string PersonNamePrefix(const std::vector<Node>& known_agents, const std::string& prefix,
-                             const std::string& session_id);
+/// What keeps this session's names apart from those of the map's other sessions: empty for the
+/// first one, else "1-", "2-". A session that was cut off finds its own again.
+std::string SessionPart(const std::vector<Node>& known_agents, const std::string& agent_prefix,
+                        const std::string& session_id);
 
 }  // namespace dsg::ingest

@@ -110,10 +110,12 @@ std::vector<Measurement> Walk(int step_count) {
 
 class PeopleLog : public testing::Test {
  protected:
-  void SetUp() override {
+  void SetUp() override { SetUpStore("store"); }
+
+  void SetUpStore(const std::string& name) {
     StoreOptions options;
     options.create = true;
-    store_ = *GraphStore::Open(folder_.Path("store"), options);
+    store_ = *GraphStore::Open(folder_.Path(name), options);
     MapSpec spec;
     spec.name = "test";
     spec.epoch_ns = kBeginNs;
@@ -125,10 +127,16 @@ class PeopleLog : public testing::Test {
   absl::StatusOr<IngestSummary> Ingest(std::vector<Measurement> measurements,
                                        const std::string& content = "one",
                                        const IngestOptions& options = {}) {
+    return IngestWith(std::move(measurements), *writer_, content, options);
+  }
+
+  absl::StatusOr<IngestSummary> IngestWith(std::vector<Measurement> measurements,
+                                           GraphWriter& writer, const std::string& content = "one",
+                                           const IngestOptions& options = {}) {
     ScriptedLog log(std::move(measurements), content);
     DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> latest, reader_->Latest());
     const std::unique_ptr<MapView> view = MakeSnapshotMapView(latest);
-    return IngestLog(log, {}, options, *view, *writer_, {});
+    return IngestLog(log, {}, options, *view, writer, {});
   }
 
   std::shared_ptr<const Snapshot> Latest() { return *reader_->Latest(); }
@@ -255,6 +263,61 @@ TEST_F(PeopleLog, TellsAnEncounterOfTwoPeople) {
   EXPECT_EQ(edge->target, People()[1].agent);
   EXPECT_NEAR(edge->weight, 2.0, 0.3);
   EXPECT_EQ(edge->attributes.at("contact"), AttributeValue(std::string("encounter")));
+}
+
+TEST_F(PeopleLog, KeepsAStrayDetectionAsEvidenceOnly) {
+  std::vector<Measurement> log = Walk(20);
+  // Far from the walker, once, with another body.
+  log.insert(log.begin() + 10, Measurement(Seen(kBeginNs + 4 * kStepNs, 100, 9.0, 3.0, -2.0F)));
+  ASSERT_TRUE(Ingest(std::move(log)).ok());
+  const std::vector<TrackInfo> people = People();
+  ASSERT_EQ(people.size(), 2U);
+  EXPECT_EQ(people[1].name.substr(0, 12), "unconfirmed-");
+  EXPECT_EQ(people[1].pose_count, 0);
+  const auto node = Latest()->GetNode(people[1].agent);
+  ASSERT_TRUE(node.ok()) << node.status();
+  EXPECT_EQ(node->agent->track_state, "dropped");
+  EXPECT_EQ(node->confidence, 0.0);
+  EXPECT_EQ(Latest()->Factors(people[1].agent, kTimeMin, kTimeMax)->size(), 1U);
+}
+
+// Breaks down after some commits.
+class FragileWriter : public GraphWriter {
+ public:
+  FragileWriter(GraphWriter& writer, int commit_count) : writer_(writer), left_(commit_count) {}
+  absl::StatusOr<CommitResult> Commit(GraphDelta delta) override {
+    if (left_-- == 0) return absl::InternalError("the power went out");
+    return writer_.Commit(std::move(delta));
+  }
+  absl::StatusOr<SessionState> GetSession(const std::string& session_id) override {
+    return writer_.GetSession(session_id);
+  }
+
+ private:
+  GraphWriter& writer_;
+  int left_;
+};
+
+TEST_F(PeopleLog, EndsTheSameAfterAnInterruption) {
+  std::vector<Measurement> log = Walk(30);
+  log.insert(log.begin() + 10, Measurement(Seen(kBeginNs + 4 * kStepNs, 100, 9.0, 3.0, -2.0F)));
+  ASSERT_TRUE(Ingest(log).ok());
+  const std::vector<TrackInfo> whole = People();
+  const Revision whole_revision = Latest()->revision();
+  for (int commits = 0; commits < 8; ++commits) {
+    SetUpStore(absl::StrCat("cut", commits));
+    FragileWriter fragile(*writer_, commits);
+    EXPECT_FALSE(IngestWith(log, fragile).ok());
+    ASSERT_TRUE(Ingest(log).ok());
+    const std::vector<TrackInfo> people = People();
+    ASSERT_EQ(people.size(), whole.size()) << commits;
+    for (size_t i = 0; i < people.size(); ++i) {
+      EXPECT_EQ(people[i].agent, whole[i].agent) << commits;
+      EXPECT_EQ(people[i].name, whole[i].name) << commits;
+      EXPECT_EQ(people[i].pose_count, whole[i].pose_count) << commits;
+    }
+    EXPECT_EQ(Latest()->revision(), whole_revision) << commits;
+  }
 }
 
 }  // namespace
