@@ -20,7 +20,7 @@ absl::StatusOr<LogFile> ReadLogFile(const std::string& path) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (status.type() == fs::file_type::not_found) {
-    return absl::NotFoundError(absl::StrCat("log \"", path, "\" does not exist; check the path"));
+    return absl::NotFoundError(absl::StrCat("\"", path, "\" does not exist; check the path"));
   }
   if (status.type() != fs::file_type::regular) {
     return MakeError(Reason::kFileMalformed,

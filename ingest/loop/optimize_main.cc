@@ -8,8 +8,12 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
@@ -42,6 +46,8 @@ struct Report {
   double cost_se_sync = 0.0;
   int64_t loop_count = 0;
   int64_t kept_count = 0;
+  /// Of the file's graph.
+  std::vector<const RelativePose*> rejected;
 };
 
 void AddFlags(CLI::App* app, Flags* flags) {
@@ -93,6 +99,21 @@ PoseObjective ObjectiveOf(const std::string& name) {
   return name == "g2o" ? PoseObjective::kQuaternion : PoseObjective::kSeSync;
 }
 
+// Whether a loop fits is asked of its whole information; SE-Sync's weights count rotations of
+// planar graphs twice, and would find faults with good loops.
+absl::StatusOr<RobustResult> SolveRobustly(const PoseGraph& graph, RobustOptions options) {
+  const PoseObjective objective = options.optimize.objective;
+  options.optimize.objective = PoseObjective::kGeodesic;
+  DSG_ASSIGN_OR_RETURN(RobustResult result, OptimizeRobustly(graph, options));
+  if (objective == PoseObjective::kGeodesic) return result;
+  options.optimize.objective = objective;
+  for (const bool is_kept : result.is_kept) {
+    options.optimize.weights.push_back(is_kept ? 1.0 : 0.0);
+  }
+  DSG_ASSIGN_OR_RETURN(result.optimized, Optimize(graph, options.optimize));
+  return result;
+}
+
 absl::StatusOr<RobustResult> Solve(const Flags& flags, const G2oFile& file) {
   Progress progress;
   RobustOptions options;
@@ -103,7 +124,7 @@ absl::StatusOr<RobustResult> Solve(const Flags& flags, const G2oFile& file) {
   options.optimize.on_iteration = [&progress](int iteration, double cost) {
     progress.Update(iteration, cost);
   };
-  if (flags.is_robust) return OptimizeRobustly(file.graph, options);
+  if (flags.is_robust) return SolveRobustly(file.graph, options);
   RobustResult result;
   DSG_ASSIGN_OR_RETURN(result.optimized, Optimize(file.graph, options.optimize));
   result.is_kept.assign(file.graph.edges.size(), true);
@@ -118,6 +139,7 @@ Report ReportOf(const Flags& flags, const PoseGraph& graph, const RobustResult& 
     weights.push_back(result.is_kept[i] ? 1.0 : 0.0);
     report.loop_count += graph.edges[i].is_loop ? 1 : 0;
     report.kept_count += graph.edges[i].is_loop && result.is_kept[i] ? 1 : 0;
+    if (!result.is_kept[i]) report.rejected.push_back(&graph.edges[i]);
   }
   report.cost_se_sync =
       2.0 * CostOf(graph, result.optimized.poses, weights, PoseObjective::kSeSync);
@@ -137,6 +159,12 @@ std::string ToJson(const Report& report, const G2oFile& file, const Optimized& o
   json["loops"] = report.loop_count;
   json["kept_loops"] = report.kept_count;
   json["rejected_loops"] = report.loop_count - report.kept_count;
+  json["rejected"] = nlohmann::ordered_json::array();
+  for (const RelativePose* edge : report.rejected) {
+    json["rejected"].push_back({{"from", file.graph.ids[static_cast<size_t>(edge->from)]},
+                                {"to", file.graph.ids[static_cast<size_t>(edge->to)]},
+                                {"line", edge->line}});
+  }
   json["skipped"] = nlohmann::ordered_json::object();
   for (const auto& [reason, count] : file.skipped) json["skipped"][reason] = count;
   json["objective"] = report.flags.objective;
@@ -182,6 +210,13 @@ absl::Status Run(const Flags& flags) {
   if (flags.start == "file" && !file.has_start) {
     std::fprintf(stderr, "%s: note: no VERTEX lines; beginning with poses along the edges\n",
                  flags.file.c_str());
+  }
+  std::error_code ignored;
+  if (!flags.out.empty() && std::filesystem::equivalent(flags.out, flags.file, ignored)) {
+    return MakeError(
+        Reason::kFieldInvalid,
+        absl::StrCat("--out ", flags.out, " is the file that is read; give another name"),
+        {{"field", "out"}, {"value", flags.out}});
   }
   const auto begin = SteadyClock::now();
   DSG_ASSIGN_OR_RETURN(const RobustResult result, Solve(flags, file));

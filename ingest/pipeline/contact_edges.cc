@@ -46,11 +46,12 @@ Edge MakeEdge(const Contact* begin, const Contact* end, bool is_hand) {
   const Contact& closest = *std::min_element(
       begin, end, [](const Contact& a, const Contact& b) { return a.distance_m < b.distance_m; });
   Edge edge{begin->agent, relations::kNear, begin->other, closest.distance_m};
-  edge.valid = {begin->from_ns, begin->to_ns + 1};
+  // Half-open, and never empty.
+  edge.valid = {begin->from_ns, std::max(begin->to_ns, begin->from_ns + 1)};
   double total_s = 0.0;
   std::vector<std::string> intervals;
   for (const Contact* contact = begin; contact != end; ++contact) {
-    edge.valid.to_ns = std::max(edge.valid.to_ns, contact->to_ns + 1);
+    edge.valid.to_ns = std::max(edge.valid.to_ns, contact->to_ns);
     total_s += static_cast<double>(contact->to_ns - contact->from_ns) / kNsPerSecond;
     if (intervals.size() < kIntervalsMax) {
       intervals.push_back(absl::StrCat(contact->from_ns, "..", contact->to_ns));

@@ -101,7 +101,8 @@ void DeltaSink::FillHeader(int64_t sequence, GraphDelta* delta) const {
   delta->session_id = header_.session_id;
   delta->sequence = sequence;
   delta->author = header_.author;
-  delta->message = absl::StrCat(header_.message, ", part ", sequence);
+  const std::string about = delta->message.empty() ? "" : absl::StrCat(": ", delta->message);
+  delta->message = absl::StrCat(header_.message, ", part ", sequence, about);
   delta->config_digest = header_.config_digest;
 }
 

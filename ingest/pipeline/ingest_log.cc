@@ -43,21 +43,24 @@ bool HasLoops(const LogInfo& info) { return info.channel_counts.contains("loops0
 
 SessionHeader MakeHeader(const LogInfo& info, const LogOptions& log_options,
                          const IngestOptions& options, const MapSpec& spec) {
-  const SessionConfig config{.format = info.format,
-                             .epoch_ns = log_options.epoch_ns,
-                             .frame_period_ns = info.format == "rgbd" ? log_options.image_period_ns
-                                                                      : log_options.frame_period_ns,
-                             .agent_prefix = log_options.agent_prefix,
-                             .mesh_block_size_m = log_options.mesh_block_size_m,
-                             .poses_per_delta = options.poses_per_delta,
-                             .poses = std::string(NameOf(log_options.poses)),
-                             .up = options.up,
-                             .mapping = HasMapping(info, options) ? options.mapping.Digest() : "",
-                             .people = HasPeople(info, options) ? options.people.Digest() : "",
-                             .robot_model = options.robot_model.has_value()
-                                                ? ToHex(options.robot_model->asset.sha256)
-                                                : "",
-                             .is_size_bounded = options.is_size_bounded && HasLoops(info)};
+  const SessionConfig config{
+      .format = info.format,
+      .epoch_ns = log_options.epoch_ns,
+      .frame_period_ns =
+          info.format == "rgbd" ? log_options.image_period_ns : log_options.frame_period_ns,
+      .agent_prefix = log_options.agent_prefix,
+      .mesh_block_size_m = log_options.mesh_block_size_m,
+      .poses_per_delta = options.poses_per_delta,
+      .poses = std::string(NameOf(log_options.poses)),
+      .up = options.up,
+      .mapping = HasMapping(info, options) ? options.mapping.Digest() : "",
+      .people = HasPeople(info, options) ? options.people.Digest() : "",
+      .odometry = HasLoops(info) ? absl::StrCat(options.robot_graph.odometry_m_per_m, " ",
+                                                options.robot_graph.odometry_rad_per_m)
+                                 : "",
+      .robot_model =
+          options.robot_model.has_value() ? ToHex(options.robot_model->asset.sha256) : "",
+      .is_size_bounded = options.is_size_bounded && HasLoops(info)};
   // The file's name alone: where it lies on this machine is no property of the log.
   std::string name = std::filesystem::path(info.path).filename().string();
   // File names may be any bytes; a map holds text only.

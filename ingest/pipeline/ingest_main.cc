@@ -45,6 +45,8 @@ struct Flags {
   std::string pose_file;
   std::string loop_file;
   std::string robot_cad;
+  double odometry_m_per_m = RobotGraphOptions().odometry_m_per_m;
+  double odometry_rad_per_m = RobotGraphOptions().odometry_rad_per_m;
   std::string up = "auto";
   int64_t commit_poses = IngestOptions().poses_per_delta;
   MappingFlags mapping;
@@ -88,6 +90,14 @@ void AddFlags(CLI::App* app, Flags* flags) {
                   "Poses of the robot, EuRoC or TUM columns, instead of the sensor log's own");
   app->add_option("--loops", flags->loop_file,
                   "Loop closures of the robot (JSON lines), instead of the log's own");
+  app->add_option("--odometry-m-per-m", flags->odometry_m_per_m,
+                  "How far off the robot's poses are after one metre (one standard deviation), "
+                  "where loop closures may correct them; grows with the root of the way")
+      ->check(CLI::Range(1e-4, 1.0))
+      ->capture_default_str();
+  app->add_option("--odometry-rad-per-m", flags->odometry_rad_per_m, "The same about the vertical")
+      ->check(CLI::Range(1e-5, 1.0))
+      ->capture_default_str();
   app->add_option("--robot-cad", flags->robot_cad, "CAD model of the robot (PLY, OBJ), metres");
   app->add_option("--up", flags->up,
                   "Which way is up in the log's frame: x, -x, y, -y, z, -z, \"x,y,z\", none, or "
@@ -218,6 +228,15 @@ void PrintSummary(const std::string& path, const LogInfo& info, const IngestSumm
         path.c_str(), static_cast<long long>(loops.loop_count),
         static_cast<long long>(loops.kept_count), static_cast<long long>(loops.unusable_count),
         loops.largest_m);
+    constexpr size_t kNamedMax = 10;
+    std::vector<std::string> named(loops.doubted);
+    if (named.size() > kNamedMax) {
+      named.resize(kNamedMax);
+      named.push_back(absl::StrCat("and ", loops.doubted.size() - kNamedMax, " more"));
+    }
+    if (!named.empty()) {
+      std::printf("%s: not believed: %s\n", path.c_str(), absl::StrJoin(named, ", ").c_str());
+    }
   }
   std::fflush(stdout);
 }
@@ -281,6 +300,8 @@ absl::Status Run(const Flags& flags) {
   IngestOptions ingest_options{.poses_per_delta = flags.commit_poses, .up = flags.up};
   DSG_ASSIGN_OR_RETURN(ingest_options.mapping, MakeMappingOptions(flags.mapping));
   ingest_options.is_size_bounded = !flags.server.empty();
+  ingest_options.robot_graph.odometry_m_per_m = flags.odometry_m_per_m;
+  ingest_options.robot_graph.odometry_rad_per_m = flags.odometry_rad_per_m;
   if (!flags.robot_cad.empty()) {
     DSG_ASSIGN_OR_RETURN(ingest_options.robot_model, ReadRobotModel(flags.robot_cad));
   }

@@ -251,10 +251,12 @@ GraphDelta LogRun::TakeLayers(TimeNs now_ns) {
 absl::Status LogRun::PutRobotGraph() {
   if (!robot_.has_value() || robot_->poses().empty()) return absl::OkStatus();
   DSG_ASSIGN_OR_RETURN(const RobotGraph::Solution solution, robot_->graph().Solve());
-  loops_ = {solution.loop_count, solution.kept_count, solution.unusable_count,
-            solution.change.largest_m()};
+  loops_ = robot_->Count(solution);
   GraphDelta delta;
-  if (!solution.change.IsIdentity()) delta = Correct(solution);
+  if (!solution.change.IsIdentity()) {
+    delta = Correct(solution);
+    delta.message = "moved by loop closures";
+  }
   FactorAppend factors{robot_->agent(), robot_->graph().Factors(solution)};
   if (!factors.factors.empty()) delta.factors.push_back(std::move(factors));
   return sink_.PutCorrection(std::move(delta));

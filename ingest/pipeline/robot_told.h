@@ -3,6 +3,7 @@
 // Refuses a second robot: a log has one body that its sensors are on.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -19,6 +20,8 @@ struct LoopCounts {
   int64_t unusable_count = 0;
   /// By how much the trajectory has moved at most, metres.
   double largest_m = 0.0;
+  /// Where those that were not believed stood: "loops.jsonl:3".
+  std::vector<std::string> doubted;
 };
 
 /// Threads: one caller at a time.
@@ -33,7 +36,22 @@ class RobotTold {
     poses_.push_back(pose);
     graph_.AddPose(pose.time_ns, pose.map_T_agent);
   }
-  void AddLoop(const LoopClosure& loop) { graph_.AddLoop(loop); }
+  void AddLoop(const LoopClosure& loop) {
+    origins_.push_back(loop.origin);
+    graph_.AddLoop(loop);
+  }
+
+  LoopCounts Count(const RobotGraph::Solution& solution) const {
+    LoopCounts counts{solution.loop_count,
+                      solution.kept_count,
+                      solution.unusable_count,
+                      solution.change.largest_m(),
+                      {}};
+    for (size_t i = 0; i < solution.is_kept.size(); ++i) {
+      if (!solution.is_kept[i]) counts.doubted.push_back(origins_[i]);
+    }
+    return counts;
+  }
 
   const RobotGraph& graph() const { return graph_; }
   NodeId agent() const { return agent_; }
@@ -42,6 +60,7 @@ class RobotTold {
  private:
   NodeId agent_;
   std::vector<TimedPose> poses_;
+  std::vector<std::string> origins_;
   RobotGraph graph_;
 };
 

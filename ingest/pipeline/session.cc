@@ -18,6 +18,7 @@ std::string SessionConfig::Digest() const {
   if (up != "auto") absl::StrAppend(&choice, "up=", up, "\n");
   if (!mapping.empty()) absl::StrAppend(&choice, "mapping=", mapping, "\n");
   if (!people.empty()) absl::StrAppend(&choice, "people=", people, "\n");
+  if (!odometry.empty()) absl::StrAppend(&choice, "odometry=", odometry, "\n");
   if (!robot_model.empty()) absl::StrAppend(&choice, "robot_model=", robot_model, "\n");
   if (is_size_bounded) absl::StrAppend(&choice, "bounded\n");
   return Sha256Hex(

@@ -25,6 +25,8 @@ struct SessionConfig {
   std::string mapping;
   /// PeopleOptions::Digest of logs that give people's tracks; empty for others.
   std::string people;
+  /// How the robot's odometry is trusted; empty for logs without loop closures.
+  std::string odometry;
   /// SHA-256 of the robot's CAD model; empty for none.
   std::string robot_model;
   /// Whether corrections of logs with loop closures are cut to the size of messages: then their

@@ -42,7 +42,7 @@ class Optimize(support.ProgramsTest):
         figures = self.optimize(self.write("ring.g2o", ring(40)))
         self.assertEqual(
             ["cost", "cost_se_sync", "start_cost", "iterations", "seconds", "converged", "poses",
-             "edges", "loops", "kept_loops", "rejected_loops", "skipped", "objective"],
+             "edges", "loops", "kept_loops", "rejected_loops", "rejected", "skipped", "objective"],
             list(figures))
         self.assertTrue(figures["converged"])
         self.assertEqual((40, 40, 1, 1, 0), tuple(figures[key] for key in (
@@ -69,6 +69,7 @@ class Optimize(support.ProgramsTest):
         self.write("wrong.g2o", ring(40, *wrong, *right))
         figures = self.optimize("wrong.g2o", "--robust", "--out", "kept.g2o")
         self.assertEqual(2, figures["rejected_loops"], figures)
+        self.assertEqual([(3, 20), (8, 25)], [(e["from"], e["to"]) for e in figures["rejected"]])
         with open(self.path("kept.g2o"), encoding="utf-8") as kept:
             text = kept.read()
         self.assertNotIn("EDGE_SE2 3 20 ", text)
@@ -91,6 +92,7 @@ class Optimize(support.ProgramsTest):
         self.write("good.g2o", ring(10))
         self.refused(2, "good.g2o", "--objective", "best")
         self.refused(2)
+        self.assertIn("is the file that is read", self.refused(2, "good.g2o", "--out", "good.g2o"))
         self.assertIn("no/such", self.refused(2, "good.g2o", "--out", "no/such/file.g2o"))
 
 
