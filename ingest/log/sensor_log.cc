@@ -52,13 +52,19 @@ absl::StatusOr<std::unique_ptr<LogSource>> MakeSensorLog(std::vector<SensorChann
   std::sort(channels.begin(), channels.end(), [](const SensorChannel& a, const SensorChannel& b) {
     return std::tie(a.rank, a.name) < std::tie(b.rank, b.name);
   });
+  // What others derived from the sensors begins with them; a stray stamp of theirs must not give a
+  // map its epoch.
   std::optional<TimeNs> first_ns;
+  std::optional<TimeNs> first_derived_ns;
   for (const SensorChannel& channel : channels) {
     info.channel_counts[channel.name] = static_cast<int64_t>(channel.times.size());
     info.measurement_count += static_cast<int64_t>(channel.times.size());
     if (channel.times.empty()) continue;
-    first_ns = std::min(first_ns.value_or(kTimeMax), channel.times.front());
+    std::optional<TimeNs>& first =
+        channel.rank < ChannelRank::kDetections ? first_ns : first_derived_ns;
+    first = std::min(first.value_or(kTimeMax), channel.times.front());
   }
+  if (!first_ns.has_value()) first_ns = first_derived_ns;
   if (!first_ns.has_value()) {
     return MakeError(Reason::kFileMalformed,
                      absl::StrCat(info.path,

@@ -218,6 +218,12 @@ absl::Status Run(const Flags& flags) {
         absl::StrCat("--out ", flags.out, " is the file that is read; give another name"),
         {{"field", "out"}, {"value", flags.out}});
   }
+  if (std::filesystem::exists(flags.out, ignored) &&
+      !std::filesystem::is_regular_file(flags.out, ignored)) {
+    return MakeError(Reason::kFieldInvalid,
+                     absl::StrCat("--out ", flags.out, " is no file; give the name of one"),
+                     {{"field", "out"}, {"value", flags.out}});
+  }
   const auto begin = SteadyClock::now();
   DSG_ASSIGN_OR_RETURN(const RobustResult result, Solve(flags, file));
   const std::chrono::duration<double> elapsed = SteadyClock::now() - begin;

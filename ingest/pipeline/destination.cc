@@ -19,7 +19,7 @@ class LocalDestination : public Destination {
   GraphWriter& writer() override { return *writer_; }
   absl::StatusOr<std::unique_ptr<MapView>> View() override {
     DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Snapshot> latest, map_->Latest());
-    return MakeSnapshotMapView(std::move(latest));
+    return MakeSnapshotMapView(std::move(latest), map_);
   }
 
  private:

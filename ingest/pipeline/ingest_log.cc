@@ -103,7 +103,7 @@ absl::StatusOr<IngestSummary> IngestLog(LogSource& log, const LogOptions& log_op
                       .agent_prefix = log_options.agent_prefix,
                       .feet_below_m = log.info().feet_below_m,
                       .has_loops = HasLoops(log.info()),
-                      .is_resumed = session.last_sequence > 0};
+                      .first_revision = session.first_revision};
   if (HasPeople(log.info(), options)) {
     parts.people = std::make_unique<PersonMapper>(log.info().rig, options.people,
                                                   /*has_depth=*/parts.mapper != nullptr);

@@ -71,7 +71,7 @@ LogRun::LogRun(Parts parts, const MapView& map, DeltaSink sink)
                    SessionPart(parts.agents, parts.agent_prefix, parts.session_id), &namer_),
       robot_(std::move(parts.robot)),
       has_loops_(parts.has_loops),
-      is_resumed_(parts.is_resumed) {
+      first_revision_(parts.first_revision) {
   if (mapper_ == nullptr || people_ == nullptr) return;
   mapper_->SetFrameObserver([this](const DepthFrame& frame) { people_->AddFrame(frame); });
 }
@@ -138,8 +138,7 @@ absl::Status LogRun::TakePose(const PoseMeasurement& pose) {
   const NodeId agent = namer_.Assign(pose.agent_name, pose.agent_kind);
   builder_.AddPose(agent, pose);
   if (robot_.has_value() && pose.agent_kind == kinds::kRobot) {
-    DSG_ASSIGN_OR_RETURN(const bool is_told, IsToldBefore(agent, pose.pose.time_ns));
-    if (!is_told) robot_->AddPose(agent, pose.pose);
+    robot_->AddPose(agent, pose.pose);
   }
   if (IsTimed()) return TakeTimedPose(agent, pose);
   Tracker().Observe(agent, pose.pose.time_ns, pose.pose.map_T_agent.position);
@@ -164,12 +163,14 @@ absl::Status LogRun::TakeTimedPose(NodeId agent, const PoseMeasurement& pose) {
   return mapper_->Advance();
 }
 
-// Where an agent was at a time that another log has told of already is that log's business.
+// In which room an agent was at a time that another log has told of already is that log's business.
+// What counts is what the map held before this session, also when it goes on after a break.
 absl::StatusOr<bool> LogRun::IsToldBefore(NodeId agent, TimeNs time_ns) {
-  if (is_resumed_) return false;
   const auto [told_until, is_new] = told_until_ns_.try_emplace(agent, kTimeMin);
   if (is_new) {
-    DSG_ASSIGN_OR_RETURN(const std::optional<TrackInfo> track, map_.FindTrack(agent));
+    DSG_ASSIGN_OR_RETURN(const std::optional<TrackInfo> track,
+                         first_revision_ == 0 ? map_.FindTrack(agent)
+                                              : map_.FindTrackAt(agent, first_revision_ - 1));
     if (track.has_value()) told_until->second = track->last_ns;
   }
   return time_ns <= told_until->second;

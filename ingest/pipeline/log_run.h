@@ -43,8 +43,8 @@ class LogRun {
     /// Unset for logs without sensors.
     std::optional<RobotTold> robot;
     bool has_loops = false;
-    /// An earlier run of the session was cut off.
-    bool is_resumed = false;
+    /// Of an earlier run of the session, that was cut off; 0 = there was none.
+    Revision first_revision = 0;
   };
 
   /// Requires: `map` outlives the run.
@@ -102,7 +102,7 @@ class LogRun {
   LoopCounts loops_;
   /// The layers as loop closures have moved them.
   std::optional<LayerGraph> corrected_;
-  bool is_resumed_;
+  Revision first_revision_;
   /// By agent, the end of its track when the log began.
   std::map<NodeId, TimeNs> told_until_ns_;
   StayMender mender_;

@@ -10,6 +10,7 @@
 
 #include "absl/status/statusor.h"
 #include "ingest/remote/remote_writer.h"
+#include "schema/store/graph_store.h"
 #include "schema/store/snapshot.h"
 
 namespace dsg::ingest {
@@ -35,6 +36,9 @@ class MapView {
 
   /// nullopt for an unknown agent, and for one without poses.
   virtual absl::StatusOr<std::optional<TrackInfo>> FindTrack(NodeId agent) const = 0;
+  /// As FindTrack, as believed at a revision; 0 = before the first.
+  virtual absl::StatusOr<std::optional<TrackInfo>> FindTrackAt(NodeId agent,
+                                                               Revision revision) const = 0;
   /// Stored poses with from_ns <= time < to_ns, ascending.
   virtual absl::StatusOr<std::vector<TimedPose>> ReadPoses(NodeId agent, TimeNs from_ns,
                                                            TimeNs to_ns) const = 0;
@@ -42,7 +46,9 @@ class MapView {
   virtual absl::StatusOr<std::optional<Stay>> StayAt(NodeId agent, TimeNs at_ns) const = 0;
 };
 
-std::unique_ptr<MapView> MakeSnapshotMapView(std::shared_ptr<const Snapshot> snapshot);
+/// Requires: `map` is the map of the snapshot.
+std::unique_ptr<MapView> MakeSnapshotMapView(std::shared_ptr<const Snapshot> snapshot,
+                                             std::shared_ptr<MapReader> map);
 
 /// Requires: `map` outlives the view.
 std::unique_ptr<MapView> MakeRemoteMapView(RemoteMap& map);

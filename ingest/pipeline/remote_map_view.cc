@@ -48,7 +48,13 @@ class RemoteMapView : public MapView {
   absl::StatusOr<std::optional<TrackInfo>> FindTrack(NodeId agent) const override {
     DSG_ASSIGN_OR_RETURN(const std::optional<Node> node, FindNode(agent));
     if (!node.has_value()) return std::nullopt;
-    return map_.FindTrack(agent);
+    return map_.FindTrack(agent, std::nullopt);
+  }
+
+  absl::StatusOr<std::optional<TrackInfo>> FindTrackAt(NodeId agent,
+                                                       Revision revision) const override {
+    if (revision == 0) return std::nullopt;
+    return map_.FindTrack(agent, revision);
   }
 
   absl::StatusOr<std::vector<TimedPose>> ReadPoses(NodeId agent, TimeNs from_ns,

@@ -7,8 +7,8 @@ namespace {
 
 class SnapshotMapView : public MapView {
  public:
-  explicit SnapshotMapView(std::shared_ptr<const Snapshot> snapshot)
-      : snapshot_(std::move(snapshot)) {}
+  SnapshotMapView(std::shared_ptr<const Snapshot> snapshot, std::shared_ptr<MapReader> map)
+      : snapshot_(std::move(snapshot)), map_(std::move(map)) {}
 
   const MapSpec& spec() const override { return snapshot_->spec(); }
 
@@ -64,11 +64,14 @@ class SnapshotMapView : public MapView {
   }
 
   absl::StatusOr<std::optional<TrackInfo>> FindTrack(NodeId agent) const override {
-    const absl::StatusOr<TrackInfo> track = snapshot_->GetTrack(agent);
-    if (ReasonOf(track.status()) == Reason::kAgentUnknown) return std::nullopt;
-    if (!track.ok()) return track.status();
-    if (track->pose_count == 0) return std::nullopt;
-    return *track;
+    return TrackIn(*snapshot_, agent);
+  }
+
+  absl::StatusOr<std::optional<TrackInfo>> FindTrackAt(NodeId agent,
+                                                       Revision revision) const override {
+    if (revision == 0) return std::nullopt;
+    DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> then, map_->At(revision));
+    return TrackIn(*then, agent);
   }
 
   absl::StatusOr<std::vector<TimedPose>> ReadPoses(NodeId agent, TimeNs from_ns,
@@ -87,13 +90,23 @@ class SnapshotMapView : public MapView {
   }
 
  private:
+  static absl::StatusOr<std::optional<TrackInfo>> TrackIn(const Snapshot& snapshot, NodeId agent) {
+    const absl::StatusOr<TrackInfo> track = snapshot.GetTrack(agent);
+    if (ReasonOf(track.status()) == Reason::kAgentUnknown) return std::nullopt;
+    if (!track.ok()) return track.status();
+    if (track->pose_count == 0) return std::nullopt;
+    return *track;
+  }
+
   std::shared_ptr<const Snapshot> snapshot_;
+  std::shared_ptr<MapReader> map_;
 };
 
 }  // namespace
 
-std::unique_ptr<MapView> MakeSnapshotMapView(std::shared_ptr<const Snapshot> snapshot) {
-  return std::make_unique<SnapshotMapView>(std::move(snapshot));
+std::unique_ptr<MapView> MakeSnapshotMapView(std::shared_ptr<const Snapshot> snapshot,
+                                             std::shared_ptr<MapReader> map) {
+  return std::make_unique<SnapshotMapView>(std::move(snapshot), std::move(map));
 }
 
 }  // namespace dsg::ingest

@@ -64,7 +64,8 @@ class RemoteWriter : public GraphWriter {
     DSG_RETURN_IF_ERROR(connection_.Call([&](grpc::ClientContext* context) {
       return stub_->GetSession(context, request, &response);
     }));
-    return SessionState{response.last_sequence(), response.last_revision()};
+    return SessionState{response.last_sequence(), response.last_revision(),
+                        response.first_revision()};
   }
 
  private:
@@ -135,9 +136,11 @@ class GrpcRemoteMap : public RemoteMap {
     return agents;
   }
 
-  absl::StatusOr<std::optional<TrackInfo>> FindTrack(NodeId agent) override {
+  absl::StatusOr<std::optional<TrackInfo>> FindTrack(NodeId agent,
+                                                     std::optional<Revision> at) override {
     v1::GetNodeRequest request;
     request.set_map(spec_.name);
+    if (at.has_value()) request.mutable_read_at()->set_exact_revision(*at);
     request.set_id(ToString(agent));
     request.set_view(v1::NODE_VIEW_BASIC);
     v1::GetNodeResponse response;

@@ -28,8 +28,9 @@ class RemoteMap {
   virtual absl::StatusOr<std::vector<NodeId>> ListChildren(NodeId parent) = 0;
   /// Existing agents (humans and robots), for naming.
   virtual absl::StatusOr<std::vector<Node>> ListAgents() = 0;
-  /// nullopt for an unknown agent, and for one without poses.
-  virtual absl::StatusOr<std::optional<TrackInfo>> FindTrack(NodeId agent) = 0;
+  /// nullopt for an unknown agent, and for one without poses. `at`: as believed then; unset = now.
+  virtual absl::StatusOr<std::optional<TrackInfo>> FindTrack(NodeId agent,
+                                                             std::optional<Revision> at) = 0;
   /// Stored poses with from_ns <= time < to_ns, ascending; for comparing a log that overlaps.
   virtual absl::StatusOr<std::vector<TimedPose>> ReadPoses(NodeId agent, TimeNs from_ns,
                                                            TimeNs to_ns) = 0;

@@ -40,6 +40,7 @@ absl::Status GetSession(MapTable* maps, const v1::GetSessionRequest& request,
   DSG_ASSIGN_OR_RETURN(const SessionState state, reader->GetSession(request.session_id()));
   reply->set_last_sequence(state.last_sequence);
   reply->set_last_revision(state.last_revision);
+  reply->set_first_revision(state.first_revision);
   return absl::OkStatus();
 }
 

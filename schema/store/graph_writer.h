@@ -19,6 +19,8 @@ struct SessionState {
   /// 0 = the session has committed nothing.
   int64_t last_sequence = 0;
   Revision last_revision = 0;
+  /// Of its first delta: what the map held before is older.
+  Revision first_revision = 0;
 };
 
 /// Threads: one caller at a time.

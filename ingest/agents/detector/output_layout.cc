@@ -55,10 +55,8 @@ BoxTable TableOf(const OutputLayout& layout, const float* values) {
   return {values, kSsdNumberCount, 1};
 }
 
-// 0 for what is not a number, which no sound network gives for a box that matters.
 absl::StatusOr<double> ScoreAt(const BoxTable& table, int box, int number) {
   const double score = table.At(box, number);
-  if (score != score) return 0.0;
   DSG_RETURN_IF_ERROR(CheckScore(score));
   return std::clamp(score, 0.0, 1.0);
 }

@@ -14,6 +14,7 @@
 #include "ingest/agents/detector/letterbox.h"
 #include "ingest/agents/detector/model_file.h"
 #include "ingest/agents/detector/output_layout.h"
+#include "ingest/agents/detector/trial.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
@@ -259,6 +260,16 @@ absl::StatusOr<std::vector<HumanDetection>> OnnxPersonDetector::Detect(const Ima
   return detections;
 }
 
+// Loading, and one picture.
+constexpr double kTrialSeconds = 60.0;
+
+cv::dnn::Net ReadNet(const std::vector<uint8_t>& bytes) {
+  cv::dnn::Net net = cv::dnn::readNetFromONNX(bytes);
+  net.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);
+  net.setPreferableTarget(cv::dnn::DNN_TARGET_CPU);
+  return net;
+}
+
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<PersonDetector>> PersonDetector::Load(
@@ -268,10 +279,22 @@ absl::StatusOr<std::unique_ptr<PersonDetector>> PersonDetector::Load(
   try {
     DSG_ASSIGN_OR_RETURN(const std::vector<uint8_t> bytes, ReadModelFile(file));
     const QuietOpenCv quiet;
-    cv::dnn::Net net = cv::dnn::readNetFromONNX(bytes);
-    net.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);
-    net.setPreferableTarget(cv::dnn::DNN_TARGET_CPU);
-    auto detector = std::make_unique<OnnxPersonDetector>(options, net);
+    const absl::Status trial = TryApart(
+        [&] {
+          // A pool of threads stays behind in the process that was copied.
+          cv::setNumThreads(1);
+          try {
+            OnnxPersonDetector(options, ReadNet(bytes)).Rehearse().IgnoreError();
+          } catch (const cv::Exception& exception) {
+            // All else is said again, in words, where it can be reported.
+            if (exception.code == cv::Error::StsNoMem) throw;
+          }
+        },
+        kTrialSeconds);
+    if (!trial.ok()) {
+      return BadModel(file, absl::StrCat("OpenCV cannot run it: ", trial.message()));
+    }
+    auto detector = std::make_unique<OnnxPersonDetector>(options, ReadNet(bytes));
     const absl::Status rehearsal = detector->Rehearse();
     if (ReasonOf(rehearsal) == Reason::kFieldInvalid) return rehearsal;
     if (!rehearsal.ok()) return BadModel(file, std::string(rehearsal.message()));

@@ -116,6 +116,9 @@ absl::StatusOr<SessionState> ReadSession(Database& db, const std::string& sessio
     state.last_revision = query.Int(1);
   }
   DSG_RETURN_IF_ERROR(query.status());
+  Query first(db, "SELECT revision FROM revision WHERE session_id = ?1 ORDER BY sequence LIMIT 1");
+  if (first.Bind(session_id).Next()) state.first_revision = first.Int(0);
+  DSG_RETURN_IF_ERROR(first.status());
   return state;
 }
 

@@ -116,6 +116,13 @@ TEST_F(FolderLogTest, MergesAllChannelsByTimeThenRank) {
   EXPECT_EQ(log->info.rig.imu->rate_hz, 20.0);
 }
 
+TEST_F(FolderLogTest, BeginsWithItsSensorsNotWithAStrayDetection) {
+  Write("detections0/data.jsonl", DetectionLine(1, 0) + "\n");
+  const auto log = Read();
+  ASSERT_TRUE(log.ok()) << log.status();
+  EXPECT_EQ(log->info.first_ns, 50);
+}
+
 TEST_F(FolderLogTest, DecodesImagesWhenAsked) {
   const auto log = Read();
   ASSERT_TRUE(log.ok()) << log.status();

@@ -70,7 +70,7 @@ class TestMap {
                                        const LogOptions& log_options = {}) {
     DSG_ASSIGN_OR_RETURN(const std::unique_ptr<LogSource> log, OpenLog(path, log_options));
     DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> latest, reader_->Latest());
-    const std::unique_ptr<MapView> view = MakeSnapshotMapView(latest);
+    const std::unique_ptr<MapView> view = MakeSnapshotMapView(latest, reader_);
     FragileWriter writer(*writer_, commit_count_max);
     absl::StatusOr<IngestSummary> summary =
         IngestLog(*log, log_options, {.poses_per_delta = poses_per_delta}, *view, writer, {});

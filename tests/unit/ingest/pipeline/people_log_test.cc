@@ -135,7 +135,7 @@ class PeopleLog : public testing::Test {
                                            const IngestOptions& options = {}) {
     ScriptedLog log(std::move(measurements), content);
     DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> latest, reader_->Latest());
-    const std::unique_ptr<MapView> view = MakeSnapshotMapView(latest);
+    const std::unique_ptr<MapView> view = MakeSnapshotMapView(latest, reader_);
     return IngestLog(log, {}, options, *view, writer, {});
   }
 
@@ -317,6 +317,37 @@ TEST_F(PeopleLog, EndsTheSameAfterAnInterruption) {
       EXPECT_EQ(people[i].pose_count, whole[i].pose_count) << commits;
     }
     EXPECT_EQ(Latest()->revision(), whole_revision) << commits;
+  }
+}
+
+// Another session has told where the robot was: what a session makes of that must not depend on
+// whether it is run for the first time.
+TEST_F(PeopleLog, AddsNothingWhenASecondSessionIsRepeated) {
+  IngestOptions paper;
+  paper.people = PeopleOptions::Paper();
+  ASSERT_TRUE(Ingest(Walk(20)).ok());
+  ASSERT_TRUE(Ingest(Walk(20), "one", paper).ok());
+  const Revision before = Latest()->revision();
+  ASSERT_TRUE(Ingest(Walk(20), "one", paper).ok());
+  ASSERT_TRUE(Ingest(Walk(20)).ok());
+  EXPECT_EQ(Latest()->revision(), before);
+}
+
+TEST_F(PeopleLog, ASecondSessionEndsTheSameAfterAnInterruption) {
+  IngestOptions paper;
+  paper.people = PeopleOptions::Paper();
+  ASSERT_TRUE(Ingest(Walk(20)).ok());
+  ASSERT_TRUE(Ingest(Walk(20), "one", paper).ok());
+  const Revision whole_revision = Latest()->revision();
+  const size_t whole_count = People().size();
+  for (int commits = 0; commits < 5; ++commits) {
+    SetUpStore(absl::StrCat("second", commits));
+    ASSERT_TRUE(Ingest(Walk(20)).ok());
+    FragileWriter fragile(*writer_, commits);
+    EXPECT_FALSE(IngestWith(Walk(20), fragile, "one", paper).ok());
+    ASSERT_TRUE(Ingest(Walk(20), "one", paper).ok());
+    EXPECT_EQ(Latest()->revision(), whole_revision) << commits;
+    EXPECT_EQ(People().size(), whole_count) << commits;
   }
 }
 

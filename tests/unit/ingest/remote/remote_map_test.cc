@@ -165,12 +165,12 @@ TEST_F(RemoteMapTest, TakesALogAndItsContinuation) {
   const auto third = Ingest(longer, *map);
   ASSERT_TRUE(third.ok()) << third.status();
   EXPECT_EQ(third->committed.revision_count, 0);
-  const auto track = map->FindTrack(NodeId('H', 2));
+  const auto track = map->FindTrack(NodeId('H', 2), std::nullopt);
   ASSERT_TRUE(track.ok()) << track.status();
   EXPECT_EQ((*track)->pose_count, 100);
   EXPECT_EQ((*track)->first_ns, 77);
   EXPECT_EQ(map->ListAgents()->at(1).observation_count, 100);
-  EXPECT_EQ(*map->FindTrack(NodeId('H', 9)), std::nullopt);
+  EXPECT_EQ(*map->FindTrack(NodeId('H', 9), std::nullopt), std::nullopt);
   EXPECT_EQ(map->ReadPoses(NodeId('H', 2), 77, 78)->size(), 1u);
   EXPECT_TRUE(map->ReadPoses(NodeId('H', 2), 0, 5)->empty());
 }

@@ -78,12 +78,19 @@ TEST(OutputLayout, OfSsdTakesOneClassAndUsedRows) {
 }
 
 TEST(OutputLayout, LeavesOutBoxesThatAreNoNumbersOrHaveNoArea) {
-  const float no_number[] = {kNan, 20, 4, 8, 1,    1, 0,  //
-                             10,   20, 4, 8, kNan, 1, 0};
+  const float no_number[] = {kNan, 20,   4, 8, 1, 1, 0,  //
+                             10,   kNan, 4, 8, 1, 1, 0};
   EXPECT_TRUE(ReadCandidates(kRowsOfTwoClasses, no_number, {})->empty());
   const float no_area[] = {10, 20, 0,  8, 1, 1, 0,  //
                            10, 20, -4, 8, 1, 1, 0};
   EXPECT_TRUE(ReadCandidates(kRowsOfTwoClasses, no_area, {})->empty());
+}
+
+TEST(OutputLayout, RefusesScoresThatAreNoNumbers) {
+  const float no_score[] = {10, 20, 4, 8, kNan, 1, 0,  //
+                            10, 20, 4, 8, 1,    1, 0};
+  EXPECT_EQ(ReadCandidates(kRowsOfTwoClasses, no_score, {}).status().code(),
+            absl::StatusCode::kInternal);
 }
 
 TEST(OutputLayout, RefusesScoresBeyondOne) {
