@@ -4,6 +4,9 @@
 #include <google/protobuf/io/coded_stream.h>
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 
+#include <cstring>
+#include <type_traits>
+
 #include "dsg/v1/graph.pb.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_internal.h"
@@ -32,6 +35,23 @@ template <typename Message>
 bool Unpack(std::string_view bytes, Message* message) {
   std::string plain;
   return Decompress(bytes, kUnpackedBytesMax, &plain) && message->ParseFromString(plain);
+}
+
+// Numbers in threes, one after the other, in one copy: a mesh has millions of them.
+template <typename Triple, typename Number>
+void CopyTriples(const std::vector<Triple>& from, google::protobuf::RepeatedField<Number>* to) {
+  static_assert(sizeof(Triple) == 3 * sizeof(Number) && std::is_trivially_copyable_v<Number>);
+  if (from.empty()) return;
+  to->Resize(static_cast<int>(3 * from.size()), Number());
+  std::memcpy(to->mutable_data(), from.data(), from.size() * sizeof(Triple));
+}
+
+template <typename Triple, typename Number>
+void CopyTriples(const google::protobuf::RepeatedField<Number>& from, std::vector<Triple>* to) {
+  static_assert(sizeof(Triple) == 3 * sizeof(Number) && std::is_trivially_copyable_v<Number>);
+  if (from.empty()) return;
+  to->resize(static_cast<size_t>(from.size()) / 3);
+  std::memcpy(static_cast<void*>(to->data()), from.data(), to->size() * sizeof(Triple));
 }
 
 }  // namespace
@@ -69,18 +89,14 @@ void ToProto(const MeshBlock& block, v1::MeshBlock* out) {
   out->set_x(block.index.x);
   out->set_y(block.index.y);
   out->set_z(block.index.z);
-  for (const auto& p : block.positions_map) {
-    for (int i = 0; i < 3; ++i) out->add_positions(p[i]);
-  }
-  for (const auto& n : block.normals_map) {
-    for (int i = 0; i < 3; ++i) out->add_normals(n[i]);
-  }
+  CopyTriples(block.positions_map, out->mutable_positions());
+  CopyTriples(block.normals_map, out->mutable_normals());
   out->mutable_colors()->Add(block.colors.begin(), block.colors.end());
   out->mutable_labels()->Add(block.labels.begin(), block.labels.end());
   out->mutable_instance_ids()->Add(block.instance_ids.begin(), block.instance_ids.end());
   out->mutable_first_seen_ns()->Add(block.first_seen_ns.begin(), block.first_seen_ns.end());
   out->mutable_last_seen_ns()->Add(block.last_seen_ns.begin(), block.last_seen_ns.end());
-  for (const auto& face : block.faces) out->mutable_faces()->Add(face.begin(), face.end());
+  CopyTriples(block.faces, out->mutable_faces());
 }
 
 absl::StatusOr<MeshBlock> FromProto(const v1::MeshBlock& in) {
@@ -91,20 +107,14 @@ absl::StatusOr<MeshBlock> FromProto(const v1::MeshBlock& in) {
   }
   MeshBlock block;
   block.index = {in.x(), in.y(), in.z()};
-  for (int i = 0; i < in.positions_size(); i += 3) {
-    block.positions_map.emplace_back(in.positions(i), in.positions(i + 1), in.positions(i + 2));
-  }
-  for (int i = 0; i < in.normals_size(); i += 3) {
-    block.normals_map.emplace_back(in.normals(i), in.normals(i + 1), in.normals(i + 2));
-  }
+  CopyTriples(in.positions(), &block.positions_map);
+  CopyTriples(in.normals(), &block.normals_map);
   block.colors.assign(in.colors().begin(), in.colors().end());
   block.labels.assign(in.labels().begin(), in.labels().end());
   block.instance_ids.assign(in.instance_ids().begin(), in.instance_ids().end());
   block.first_seen_ns.assign(in.first_seen_ns().begin(), in.first_seen_ns().end());
   block.last_seen_ns.assign(in.last_seen_ns().begin(), in.last_seen_ns().end());
-  for (int i = 0; i < in.faces_size(); i += 3) {
-    block.faces.push_back({in.faces(i), in.faces(i + 1), in.faces(i + 2)});
-  }
+  CopyTriples(in.faces(), &block.faces);
   return block;
 }
 

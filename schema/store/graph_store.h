@@ -31,6 +31,20 @@ struct VerifyReport {
   std::vector<std::string> problems;
 };
 
+/// Entities with a row that begins or ends in a span of revisions: all that may differ between its
+/// ends. Each list ascends.
+struct Touched {
+  std::vector<NodeId> nodes;
+  std::vector<EdgeKey> edges;
+  /// Agents whose poses were appended or corrected.
+  std::vector<NodeId> tracks;
+  /// Those of `tracks` of which poses that were known before the span were rewritten. They may be
+  /// what they were.
+  std::vector<NodeId> corrected_tracks;
+  std::vector<BlockIndex> mesh_blocks;
+  bool layers_or_labels = false;
+};
+
 /// One map, open for reading.
 ///
 /// Threads: safe from many threads. Sees commits of other processes as they happen.
@@ -50,6 +64,12 @@ class MapReader {
   virtual absl::StatusOr<Revision> OldestRevision() = 0;
   /// Newest first, below `before` (0 = from the newest), at most `limit`.
   virtual absl::StatusOr<std::vector<RevisionInfo>> ListRevisions(Revision before, int limit) = 0;
+  /// What was touched by the revisions after `after`, up to and with `until`.
+  /// Nothing unless `after` is below `until`.
+  /// Cost: that of what was touched; of the whole map where it was made before commits listed it.
+  /// Errors: as At, for both; what `stop` returned.
+  virtual absl::StatusOr<Touched> TouchedBetween(Revision after, Revision until,
+                                                 const StopCheck& stop) = 0;
   virtual absl::StatusOr<SessionState> GetSession(const std::string& session_id) = 0;
   /// Reads everything: database structure, the log, payload checksums, the digest of every
   /// revision, the ends of edges. The other invariants are proven at each commit (CheckDelta).

@@ -78,6 +78,7 @@ absl::StatusOr<bool> EndMeshBlock(const BlockIndex& index, CommitContext* commit
     return CorruptRow(commit->spec.name, "mesh_block",
                       absl::StrCat(index.x, ",", index.y, ",", index.z));
   }
+  commit->touched.mesh_blocks.push_back(index);
   commit->head.content.Remove(RowIdentity('M', columns, current.Blob(1)));
   --commit->head.info.mesh_block_count;
   DSG_RETURN_IF_ERROR(
@@ -105,6 +106,7 @@ absl::Status WriteMeshBlock(const MeshBlock& block, CommitContext* commit) {
   }
   DSG_RETURN_IF_ERROR(EndMeshBlock(index, commit).status());
   const std::initializer_list<int64_t> columns = {index.x, index.y, index.z, commit->revision()};
+  commit->touched.mesh_blocks.push_back(index);
   commit->head.content.Add(RowIdentity('M', columns, payload));
   ++commit->head.info.mesh_block_count;
   return Query(commit->db,

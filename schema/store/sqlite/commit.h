@@ -14,6 +14,7 @@
 #include "schema/model/revision.h"
 #include "schema/store/sqlite/database.h"
 #include "schema/store/sqlite/rows.h"
+#include "schema/store/sqlite/touched_keys.h"
 
 namespace dsg::sqlite {
 
@@ -31,6 +32,8 @@ struct CommitContext {
   Database& db;
   const MapSpec& spec;
   Head head;
+  /// What has been touched so far.
+  TouchedKeys touched = {};
 
   Revision revision() const { return head.info.revision; }
 };
@@ -64,6 +67,9 @@ absl::Status WriteMesh(const GraphDelta& delta, CommitContext* commit);
 absl::Status WriteAssets(const std::vector<Asset>& assets, CommitContext* commit);
 absl::Status WriteFactors(const std::vector<FactorAppend>& factors, CommitContext* commit);
 absl::Status WriteShapes(const std::vector<ShapeAppend>& shapes, CommitContext* commit);
+
+/// Leaves the list of what the commit touched.
+absl::Status InsertTouched(CommitContext* commit);
 
 /// Id of a relation's name, 0 if the map has never seen it.
 absl::StatusOr<int64_t> FindRelation(Database& db, const std::string& name);

@@ -4,6 +4,7 @@
 #include <sqlite3.h>
 
 #include <cerrno>
+#include <cstring>
 
 #include "absl/strings/str_cat.h"
 #include "schema/store/sqlite/page_checksum.h"
@@ -171,6 +172,10 @@ void Query::BindOne(int index, double value) {
 void Query::BindOne(int index, const std::string& text) {
   if (statement_ == nullptr) return;
   sqlite3_bind_text64(statement_, index, text.data(), text.size(), SQLITE_STATIC, SQLITE_UTF8);
+}
+void Query::BindOne(int index, const char* text) {
+  if (statement_ == nullptr) return;
+  sqlite3_bind_text64(statement_, index, text, std::strlen(text), SQLITE_STATIC, SQLITE_UTF8);
 }
 void Query::BindOne(int index, const BlobView& blob) {
   if (statement_ == nullptr) return;

@@ -110,6 +110,8 @@ class Query {
   void BindOne(int index, int value) { BindOne(index, static_cast<int64_t>(value)); }
   void BindOne(int index, double value);
   void BindOne(int index, const std::string& text);
+  // Not by way of a string, which would be gone before the statement runs.
+  void BindOne(int index, const char* text);
   void BindOne(int index, const BlobView& blob);
   void BindNull(int index);
   template <typename T>
@@ -124,6 +126,24 @@ class Query {
   Database& db_;
   sqlite3_stmt* statement_;
   bool owned_ = false;
+  absl::Status status_;
+};
+
+/// Makes the statements of its life see one state and share the cost of opening it. Queries within
+/// must end before it does.
+class ReadTransaction {
+ public:
+  explicit ReadTransaction(Database* db) : db_(*db), status_(Query(db_, "BEGIN").Run()) {}
+  ~ReadTransaction() {
+    if (status_.ok()) Query(db_, "COMMIT").Run().IgnoreError();
+  }
+  ReadTransaction(const ReadTransaction&) = delete;
+  ReadTransaction& operator=(const ReadTransaction&) = delete;
+
+  const absl::Status& status() const { return status_; }
+
+ private:
+  Database& db_;
   absl::Status status_;
 };
 

@@ -41,6 +41,7 @@ absl::Status GraphRowsWriter::WriteLayer(const Layer& layer) {
   Query known(commit_.db, "SELECT 1 FROM layer WHERE id = ?1");
   if (known.Bind(layer.id).Next()) return absl::OkStatus();
   DSG_RETURN_IF_ERROR(known.status());
+  commit_.touched.layers_or_labels = true;
   commit_.head.content.Add(
       RowIdentity('L', {layer.id, layer.rank, commit_.revision()}, layer.name));
   return Query(commit_.db, "INSERT INTO layer (id, name, rank, rev_from) VALUES (?1, ?2, ?3, ?4)")
@@ -52,6 +53,7 @@ absl::Status GraphRowsWriter::WriteLabel(const SemanticLabel& label) {
   Query known(commit_.db, "SELECT name FROM label WHERE id = ?1 ORDER BY rev_from DESC LIMIT 1");
   if (known.Bind(label.id).Next() && known.Text(0) == label.name) return absl::OkStatus();
   DSG_RETURN_IF_ERROR(known.status());
+  commit_.touched.layers_or_labels = true;
   // Earlier names stay: a label's version is chosen by the reader's revision.
   commit_.head.content.Add(RowIdentity('l', {label.id, commit_.revision()}, label.name));
   return Query(commit_.db, "INSERT INTO label (id, rev_from, name) VALUES (?1, ?2, ?3)")
@@ -77,6 +79,7 @@ absl::Status GraphRowsWriter::WriteNode(const Node& node) {
 absl::Status GraphRowsWriter::InsertNode(const Node& node, const std::string& payload) {
   const int64_t key = KeyOf(node.id);
   const std::initializer_list<int64_t> columns = {key, commit_.revision(), node.layer};
+  commit_.touched.nodes.push_back(node.id);
   commit_.head.content.Add(RowIdentity('N', columns, payload));
   ++commit_.head.info.node_count;
   ++commit_.head.layer_counts[node.layer];
@@ -111,6 +114,7 @@ absl::StatusOr<bool> GraphRowsWriter::EndNode(int64_t key) {
       !DecodeNodePayload(payload, &node)) {
     return CorruptRow(commit_.spec.name, "node", ToString(IdOf(key)));
   }
+  commit_.touched.nodes.push_back(IdOf(key));
   commit_.head.content.Remove(RowIdentity('N', {key, rev_from, layer}, payload));
   --commit_.head.info.node_count;
   --commit_.head.layer_counts[layer];
@@ -179,6 +183,7 @@ absl::Status GraphRowsWriter::WriteEdge(const Edge& edge) {
   DSG_RETURN_IF_ERROR(EndEdge(source, relation, target).status());
   const std::initializer_list<int64_t> columns = {source, relation, target, commit_.revision(),
                                                   BitsOf(edge.weight)};
+  commit_.touched.edges.push_back({edge.source, relation, edge.target});
   commit_.head.content.Add(RowIdentity('E', columns, payload));
   ++commit_.head.info.edge_count;
   return Query(commit_.db,
@@ -202,6 +207,7 @@ absl::StatusOr<bool> GraphRowsWriter::EndEdge(int64_t source, int64_t relation, 
     return CorruptRow(commit_.spec.name, "edge",
                       absl::StrCat(ToString(IdOf(source)), " ", ToString(IdOf(target))));
   }
+  commit_.touched.edges.push_back({IdOf(source), relation, IdOf(target)});
   commit_.head.content.Remove(RowIdentity('E', columns, current.Blob(2)));
   --commit_.head.info.edge_count;
   DSG_RETURN_IF_ERROR(

@@ -63,4 +63,8 @@ class WriterLock {
   int fd_;
 };
 
+/// Whether commits to the map list what they touched. Maps made before there was such a list have
+/// no table for it, and get none.
+absl::StatusOr<bool> KeepsTouched(Database& db);
+
 }  // namespace dsg::sqlite

@@ -26,6 +26,7 @@ absl::StatusOr<std::shared_ptr<SqliteMapReader>> SqliteMapReader::Open(
   reader->identity_ = IdentityOf(store_folder, map);
   DSG_ASSIGN_OR_RETURN(reader->watcher_, OpenMapFile(store_folder, map, Database::Mode::kRead));
   DSG_ASSIGN_OR_RETURN(reader->spec_, ReadMapSpec(*reader->watcher_));
+  DSG_ASSIGN_OR_RETURN(reader->keeps_touched_, KeepsTouched(*reader->watcher_));
   return reader;
 }
 

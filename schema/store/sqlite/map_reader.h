@@ -28,6 +28,8 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
   absl::StatusOr<std::shared_ptr<const Snapshot>> At(Revision revision) override;
   absl::StatusOr<Revision> OldestRevision() override;
   absl::StatusOr<std::vector<RevisionInfo>> ListRevisions(Revision before, int limit) override;
+  absl::StatusOr<Touched> TouchedBetween(Revision after, Revision until,
+                                         const StopCheck& stop) override;
   absl::StatusOr<SessionState> GetSession(const std::string& session_id) override;
   absl::StatusOr<VerifyReport> Verify(const std::function<void(double)>& progress) override;
 
@@ -66,6 +68,7 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
   std::string store_folder_;
   MapSpec spec_;
   std::optional<FileIdentity> identity_;
+  bool keeps_touched_ = false;
 
   std::mutex head_mutex_;
   /// Watches for commits of other connections: SQLite counts them for us (data_version).

@@ -106,6 +106,15 @@ absl::Status InsertRevision(const CommitContext& commit) {
       .Run();
 }
 
+absl::Status InsertTouched(CommitContext* commit) {
+  commit->touched.Normalize();
+  const std::string payload = EncodeTouched(commit->touched);
+  return Query(commit->db, "INSERT INTO touched (revision, payload, checksum) VALUES (?1, ?2, ?3)")
+      .Bind(commit->revision(), Query::BlobView{payload},
+            RowChecksum({commit->revision()}, payload))
+      .Run();
+}
+
 absl::StatusOr<SessionState> ReadSession(Database& db, const std::string& session_id) {
   Query query(db,
               "SELECT sequence, revision FROM revision WHERE session_id = ?1"

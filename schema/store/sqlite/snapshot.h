@@ -33,6 +33,15 @@ class SqliteSnapshot : public Snapshot {
   absl::Status ScanEdges(const EdgeFilter& filter, const std::optional<EdgeKey>& after,
                          const StopCheck& stop,
                          const std::function<bool(const Edge&)>& visit) const override;
+  absl::StatusOr<std::optional<Edge>> FindEdge(const EdgeKey& key) const override;
+  absl::StatusOr<std::vector<std::optional<Node>>> FindNodes(const std::vector<NodeId>& ids,
+                                                             const StopCheck& stop) const override;
+  absl::StatusOr<std::vector<std::optional<Edge>>> FindEdges(const std::vector<EdgeKey>& keys,
+                                                             const StopCheck& stop) const override;
+  absl::Status ReadAllNodes(const StopCheck& stop,
+                            const std::function<void(const Node&)>& visit) const override;
+  absl::Status ReadAllEdges(const StopCheck& stop,
+                            const std::function<void(const Edge&)>& visit) const override;
   absl::StatusOr<std::vector<NearestNode>> NearestNodes(const Eigen::Vector3d& point_map, int k,
                                                         double max_distance_m,
                                                         const NodeFilter& filter,
@@ -61,6 +70,7 @@ class SqliteSnapshot : public Snapshot {
                           const StopCheck& stop,
                           const std::function<bool(const ShownShape&)>& visit) const override;
   absl::StatusOr<std::vector<BlockIndex>> MeshBlocks() const override;
+  absl::StatusOr<std::vector<std::pair<BlockIndex, Revision>>> MeshBlockVersions() const override;
   absl::StatusOr<MeshBlock> ReadMeshBlock(BlockIndex index) const override;
   absl::StatusOr<Asset> ReadAsset(const Sha256& sha256) const override;
 

@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "schema/codec/proto_convert.h"
+#include "schema/store/sqlite/graph_rows.h"
 #include "schema/store/sqlite/snapshot.h"
 
 namespace dsg::sqlite {
@@ -13,38 +14,6 @@ namespace {
 
 // Rows read by one statement: short enough that no read transaction pins the write-ahead log.
 constexpr int kBatchRows = 512;
-
-// Columns: key, rev_from, layer, payload, checksum.
-absl::StatusOr<Node> NodeFromRow(const Query& query, const std::string& map) {
-  Node node;
-  const NodeId id = IdOf(query.Int(0));
-  if (query.Int(4) != RowChecksum({query.Int(0), query.Int(1), query.Int(2)}, query.Blob(3)) ||
-      !DecodeNodePayload(query.Blob(3), &node)) {
-    return CorruptRow(map, "node", ToString(id));
-  }
-  node.id = id;
-  node.revision = query.Int(1);
-  node.layer = static_cast<LayerId>(query.Int(2));
-  return node;
-}
-
-// Columns: source, relation, target, rev_from, weight, payload, checksum, relation's name.
-absl::StatusOr<Edge> EdgeFromRow(const Query& query, const std::string& map) {
-  Edge edge;
-  edge.source = IdOf(query.Int(0));
-  edge.target = IdOf(query.Int(2));
-  edge.revision = query.Int(3);
-  edge.weight = query.Real(4);
-  edge.relation = query.Text(7);
-  const auto checksum = RowChecksum32(
-      {query.Int(0), query.Int(1), query.Int(2), query.Int(3), BitsOf(edge.weight)}, query.Blob(5));
-  if (checksum != query.Int(6) || !DecodeEdgePayload(query.Blob(5), &edge)) {
-    return CorruptRow(
-        map, "edge",
-        absl::StrCat(ToString(edge.source), " ", edge.relation, " ", ToString(edge.target)));
-  }
-  return edge;
-}
 
 constexpr char kEdgesFrom[] =
     "SELECT source, relation, target, rev_from, weight, payload, checksum,"
@@ -76,6 +45,39 @@ bool EdgeMatches(const EdgeFilter& filter, const std::optional<EdgeKey>& after, 
 }
 
 }  // namespace
+
+absl::StatusOr<Node> NodeFromRow(const Query& query, const std::string& map) {
+  Node node;
+  const NodeId id = IdOf(query.Int(0));
+  if (query.Int(4) != RowChecksum({query.Int(0), query.Int(1), query.Int(2)}, query.Blob(3)) ||
+      !DecodeNodePayload(query.Blob(3), &node)) {
+    return CorruptRow(map, "node", ToString(id));
+  }
+  node.id = id;
+  node.revision = query.Int(1);
+  node.layer = static_cast<LayerId>(query.Int(2));
+  return node;
+}
+
+absl::StatusOr<Edge> EdgeFromRow(const Query& query, std::string_view relation,
+                                 const std::string& map) {
+  Edge edge;
+  edge.source = IdOf(query.Int(0));
+  edge.target = IdOf(query.Int(2));
+  edge.revision = query.Int(3);
+  edge.weight = query.Real(4);
+  edge.relation = relation;
+  const std::string_view payload = query.Blob(5);
+  const auto checksum = RowChecksum32(
+      {query.Int(0), query.Int(1), query.Int(2), query.Int(3), BitsOf(edge.weight)}, payload);
+  // Nearly all edges have nothing to decode.
+  if (checksum != query.Int(6) || (!payload.empty() && !DecodeEdgePayload(payload, &edge))) {
+    return CorruptRow(
+        map, "edge",
+        absl::StrCat(ToString(edge.source), " ", edge.relation, " ", ToString(edge.target)));
+  }
+  return edge;
+}
 
 absl::StatusOr<Node> SqliteSnapshot::GetNode(NodeId id) const {
   DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
@@ -287,7 +289,7 @@ absl::StatusOr<std::vector<Edge>> SqliteSnapshot::EdgesAt(NodeId end, bool outgo
   query.Bind(KeyOf(end), revision());
   std::vector<Edge> edges;
   while (query.Next()) {
-    DSG_ASSIGN_OR_RETURN(Edge edge, EdgeFromRow(query, spec().name));
+    DSG_ASSIGN_OR_RETURN(Edge edge, EdgeFromRow(query, query.Text(7), spec().name));
     edges.push_back(std::move(edge));
   }
   DSG_RETURN_IF_ERROR(query.status());
@@ -321,6 +323,24 @@ absl::Status SqliteSnapshot::ScanEdges(const EdgeFilter& filter,
     return go_on.ok() && *go_on;
   }));
   return failure;
+}
+
+absl::StatusOr<std::optional<Edge>> SqliteSnapshot::FindEdge(const EdgeKey& key) const {
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  Query query(*lease,
+              "SELECT source, relation, target, rev_from, weight, payload, checksum, ?2 FROM edge"
+              " WHERE source = ?1 AND relation = (SELECT id FROM relation WHERE name = ?2)"
+              " AND target = ?3 AND rev_from <= ?4"
+              " UNION ALL SELECT source, relation, target, rev_from, weight, payload, checksum, ?2"
+              " FROM edge_history"
+              " WHERE source = ?1 AND relation = (SELECT id FROM relation WHERE name = ?2)"
+              " AND target = ?3 AND rev_from <= ?4 AND rev_to > ?4");
+  const bool found =
+      query.Bind(KeyOf(key.source), key.relation, KeyOf(key.target), revision()).Next();
+  DSG_RETURN_IF_ERROR(query.status());
+  if (!found) return std::optional<Edge>();
+  DSG_ASSIGN_OR_RETURN(Edge edge, EdgeFromRow(query, query.Text(7), spec().name));
+  return std::optional<Edge>(std::move(edge));
 }
 
 absl::StatusOr<std::vector<NearestNode>> SqliteSnapshot::NearestByScan(

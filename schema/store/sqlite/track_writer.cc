@@ -190,6 +190,7 @@ absl::Status TrackWriter::WriteSegment(Tail* tail, CommitContext* commit) {
 }
 
 absl::Status TrackWriter::WriteMark(const Tail& tail, CommitContext* commit) {
+  commit->touched.tracks.push_back(tail.agent);
   // An emptied track ends before all time.
   const TimeNs last_ns = tail.last.has_value() ? tail.last->time_ns : kTimeMin;
   return Query(commit->db,

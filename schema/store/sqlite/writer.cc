@@ -36,6 +36,7 @@ absl::Status SqliteWriter::Reopen() {
   DSG_ASSIGN_OR_RETURN(db_, OpenMapFile(store_folder_, map_, Database::Mode::kWrite));
   DSG_ASSIGN_OR_RETURN(spec_, ReadMapSpec(*db_));
   DSG_ASSIGN_OR_RETURN(head_, LoadHead(*db_));
+  DSG_ASSIGN_OR_RETURN(keeps_touched_, KeepsTouched(*db_));
   return absl::OkStatus();
 }
 
@@ -127,6 +128,7 @@ absl::Status SqliteWriter::Apply(const GraphDelta& delta, CommitContext* commit)
   DSG_RETURN_IF_ERROR(WriteShapes(delta.shapes, commit));
   DSG_RETURN_IF_ERROR(WriteStays(delta.stays, commit));
   DSG_RETURN_IF_ERROR(WriteMesh(delta, commit));
+  if (keeps_touched_) DSG_RETURN_IF_ERROR(InsertTouched(commit));
   info.digest = DigestOf(parent, commit->head);
   return InsertRevision(*commit);
 }

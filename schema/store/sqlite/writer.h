@@ -38,6 +38,7 @@ class SqliteWriter : public GraphWriter {
   std::unique_ptr<Database> db_;
   MapSpec spec_;
   Head head_;
+  bool keeps_touched_ = false;
   TrackWriter tracks_;
 };
 

@@ -60,6 +60,15 @@ CREATE TABLE revision (
 ) STRICT;
 CREATE UNIQUE INDEX revision_session ON revision (session_id, sequence);
 
+-- Keys of the nodes, edges, tracks and mesh blocks that the revision wrote or ended, so that what
+-- lies between two revisions is found at the cost of the difference. Maps made before this table
+-- do without.
+CREATE TABLE touched (
+  revision INTEGER PRIMARY KEY,
+  payload BLOB NOT NULL,
+  checksum INTEGER NOT NULL
+) STRICT;
+
 CREATE TABLE tag (
   name TEXT PRIMARY KEY,
   revision INTEGER NOT NULL

@@ -1,19 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/unit/schema/store/store_test_util.h"
 
-#include <filesystem>
-
 namespace dsg::test {
-
-TempFolder::TempFolder() {
-  path_ = (std::filesystem::temp_directory_path() / "dsg-test-XXXXXX").string();
-  if (mkdtemp(path_.data()) == nullptr) std::abort();
-}
-
-TempFolder::~TempFolder() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
-}
 
 int64_t EnvNumber(const char* name, int64_t fallback) {
   const char* text = std::getenv(name);

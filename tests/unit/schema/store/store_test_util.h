@@ -13,6 +13,7 @@
 #include "absl/status/statusor.h"
 #include "schema/base/status.h"
 #include "schema/store/graph_store.h"
+#include "tests/support/temp_folder.h"
 
 namespace dsg::test {
 
@@ -32,19 +33,6 @@ T OrDie(absl::StatusOr<T> value) {
 inline void OrDie(const absl::Status& status) {
   OrDie(status.ok() ? absl::StatusOr<int>(0) : absl::StatusOr<int>(status));
 }
-
-/// An empty folder, removed at the end.
-class TempFolder {
- public:
-  TempFolder();
-  ~TempFolder();
-  TempFolder(const TempFolder&) = delete;
-  TempFolder& operator=(const TempFolder&) = delete;
-  const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
 
 /// A number of the environment, or `fallback` when it is not set.
 int64_t EnvNumber(const char* name, int64_t fallback);

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "schema/store/sqlite/database.h"
+#include "schema/store/sqlite/touched_keys.h"
+#include "tests/unit/schema/store/delta_stream.h"
+#include "tests/unit/schema/store/store_test_util.h"
+
+namespace dsg::test {
+namespace {
+
+constexpr Revision kRevisionCount = 40;
+
+// Runs SQL on the file of a map that is closed.
+void RunSql(const std::string& path, const char* sql) {
+  const auto db = OrDie(sqlite::Database::Open(path, sqlite::Database::Mode::kWrite, kMap));
+  OrDie(db->Execute(sql));
+}
+
+void ExpectSame(const Touched& actual, const Touched& expected) {
+  EXPECT_EQ(actual.nodes, expected.nodes);
+  EXPECT_EQ(actual.edges, expected.edges);
+  EXPECT_EQ(actual.tracks, expected.tracks);
+  EXPECT_EQ(actual.corrected_tracks, expected.corrected_tracks);
+  EXPECT_EQ(actual.mesh_blocks, expected.mesh_blocks);
+  EXPECT_EQ(actual.layers_or_labels, expected.layers_or_labels);
+}
+
+using Spans = std::map<std::pair<Revision, Revision>, Touched>;
+
+Spans AllSpans(MapReader& reader) {
+  Spans spans;
+  for (Revision after = 0; after <= kRevisionCount; ++after) {
+    for (Revision until = after; until <= kRevisionCount; until += 3) {
+      spans[{after, until}] = OrDie(reader.TouchedBetween(after, until, {}));
+    }
+  }
+  return spans;
+}
+
+void FillFromStream(TestMap* map) {
+  DeltaStreamOptions options;
+  options.seed = RecordSeed();
+  for (Revision r = 1; r <= kRevisionCount; ++r) map->MustCommit(DeltaOfStream(options, r));
+}
+
+TEST(TouchedKeys, ComeBackAsTheyWere) {
+  using sqlite::EdgeRowKey;
+  sqlite::TouchedKeys keys;
+  keys.nodes = {NodeId('z', NodeId::kIndexMax), NodeId('A', 0), NodeId('A', 0), NodeId('p', 70000)};
+  keys.edges = {EdgeRowKey{NodeId('p', 7), 3, NodeId('p', 6)},
+                EdgeRowKey{NodeId('p', 7), 3, NodeId('O', NodeId::kIndexMax)},
+                EdgeRowKey{NodeId('p', NodeId::kIndexMax), 300, NodeId('p', 0)}};
+  keys.tracks = {NodeId('H', 3)};
+  keys.mesh_blocks = {{2147483647, -2147483647 - 1, 0}, {-2147483647 - 1, 2147483647, 5}};
+  keys.layers_or_labels = true;
+  keys.Normalize();
+  EXPECT_EQ(keys.nodes.size(), 3u);
+  sqlite::TouchedKeys read;
+  const std::string bytes = sqlite::EncodeTouched(keys);
+  ASSERT_TRUE(sqlite::DecodeTouched(bytes, &read));
+  EXPECT_EQ(read.nodes, keys.nodes);
+  EXPECT_EQ(read.edges, keys.edges);
+  EXPECT_EQ(read.tracks, keys.tracks);
+  EXPECT_EQ(read.mesh_blocks, keys.mesh_blocks);
+  EXPECT_TRUE(read.layers_or_labels);
+}
+
+TEST(TouchedKeys, AreRefusedWhenCutAnywhere) {
+  sqlite::TouchedKeys keys;
+  for (uint64_t i = 0; i < 20; ++i) keys.nodes.push_back(NodeId('p', i * 1000));
+  keys.edges = {{NodeId('p', 7), 3, NodeId('O', 6)}};
+  keys.mesh_blocks = {{1, 2, 3}};
+  const std::string bytes = sqlite::EncodeTouched(keys);
+  for (size_t size = 0; size < bytes.size(); ++size) {
+    sqlite::TouchedKeys read;
+    EXPECT_FALSE(sqlite::DecodeTouched(bytes.substr(0, size), &read)) << size;
+  }
+  // A count of thousands of millions must cost no memory.
+  sqlite::TouchedKeys read;
+  EXPECT_FALSE(sqlite::DecodeTouched(std::string("\1\0\xff\xff\xff\xff\x7f", 7), &read));
+}
+
+TEST(TouchedBetween, IsNothingForAnEmptyOrTurnedSpan) {
+  TestMap map;
+  FillFromStream(&map);
+  EXPECT_TRUE(OrDie(map.reader().TouchedBetween(7, 7, {})).nodes.empty());
+  EXPECT_TRUE(OrDie(map.reader().TouchedBetween(9, 7, {})).nodes.empty());
+}
+
+TEST(TouchedBetween, RefusesRevisionsThatAreNotThere) {
+  TestMap map;
+  FillFromStream(&map);
+  EXPECT_EQ(ReasonOf(map.reader().TouchedBetween(0, kRevisionCount + 1, {}).status()),
+            Reason::kRevisionInFuture);
+  EXPECT_EQ(ReasonOf(map.reader().TouchedBetween(-1, 2, {}).status()), Reason::kRevisionInFuture);
+}
+
+TEST(TouchedBetween, StopsWhenAsked) {
+  TestMap map;
+  FillFromStream(&map);
+  const auto touched =
+      map.reader().TouchedBetween(0, kRevisionCount, [] { return absl::CancelledError("enough"); });
+  EXPECT_TRUE(absl::IsCancelled(touched.status()));
+}
+
+// Two ways to the same answer: the lists that commits leave, and the rows themselves.
+TEST(TouchedBetween, IsTheSameInMapsMadeBeforeTheLists) {
+  TestMap map;
+  FillFromStream(&map);
+  const Spans with_lists = AllSpans(map.reader());
+  map.Close();
+  RunSql(map.database_path(), "DROP TABLE touched");
+  map.Reopen();
+  const Spans by_rows = AllSpans(map.reader());
+  ASSERT_EQ(with_lists.size(), by_rows.size());
+  for (const auto& [span, touched] : with_lists) {
+    SCOPED_TRACE(std::to_string(span.first) + " to " + std::to_string(span.second));
+    ExpectSame(touched, by_rows.at(span));
+  }
+  // Such a map can still be written, and is sound.
+  DeltaStreamOptions options;
+  options.seed = RecordSeed();
+  EXPECT_EQ(map.MustCommit(DeltaOfStream(options, kRevisionCount + 1)), kRevisionCount + 1);
+  EXPECT_EQ(map.Problems(), "");
+}
+
+TEST(TouchedLists, AreCheckedByVerify) {
+  TestMap map;
+  FillFromStream(&map);
+  EXPECT_EQ(map.Problems(), "");
+  map.Close();
+  RunSql(map.database_path(), "DELETE FROM touched WHERE revision = 5");
+  map.Reopen();
+  EXPECT_NE(map.Problems().find("touched 5"), std::string::npos) << map.Problems();
+  EXPECT_EQ(ReasonOf(map.reader().TouchedBetween(3, 8, {}).status()), Reason::kStoreCorrupt);
+  EXPECT_TRUE(map.reader().TouchedBetween(5, 8, {}).ok());
+}
+
+TEST(TouchedLists, AreNotBelievedWhenOfAnotherRevision) {
+  TestMap map;
+  FillFromStream(&map);
+  map.Close();
+  RunSql(map.database_path(),
+         "UPDATE touched SET (payload, checksum) ="
+         " (SELECT payload, checksum FROM touched WHERE revision = 6) WHERE revision = 5");
+  map.Reopen();
+  EXPECT_EQ(ReasonOf(map.reader().TouchedBetween(4, 5, {}).status()), Reason::kStoreCorrupt);
+  EXPECT_NE(map.Problems().find("touched"), std::string::npos);
+}
+
+TEST(FindEdge, SeesTheEdgeOfItsRevision) {
+  TestMap map;
+  map.MustCommit(DeltaOfNodes({MakeObject(1, "cup", BoxOf(0, 0, 0, 1, 1, 1)),
+                               MakeObject(2, "table", BoxOf(0, 0, 0, 1, 1, 1))}));
+  const EdgeKey key{NodeId('O', 1), "ON", NodeId('O', 2)};
+  Edge edge = MakeEdge(key.source, key.relation, key.target);
+  edge.weight = 0.25;
+  GraphDelta add;
+  add.edges = {edge};
+  map.MustCommit(add);
+  edge.weight = 0.5;
+  GraphDelta change;
+  change.edges = {edge};
+  map.MustCommit(change);
+  GraphDelta remove;
+  remove.edge_removals = {key};
+  map.MustCommit(remove);
+  EXPECT_FALSE(OrDie(map.At(1)->FindEdge(key)).has_value());
+  EXPECT_EQ(OrDie(map.At(2)->FindEdge(key))->weight, 0.25);
+  EXPECT_EQ(OrDie(map.At(3)->FindEdge(key))->weight, 0.5);
+  EXPECT_EQ(OrDie(map.At(3)->FindEdge(key))->revision, 3);
+  EXPECT_FALSE(OrDie(map.At(4)->FindEdge(key)).has_value());
+  EXPECT_FALSE(OrDie(map.At(3)->FindEdge({key.source, "UNDER", key.target})).has_value());
+  EXPECT_FALSE(OrDie(map.At(3)->FindEdge({key.target, "ON", key.source})).has_value());
+}
+
+TEST(MeshBlockVersions, NameTheRevisionThatWroteEach) {
+  TestMap map;
+  FillFromStream(&map);
+  std::map<BlockIndex, Revision> before;
+  for (Revision r = 0; r <= kRevisionCount; ++r) {
+    const auto snapshot = map.At(r);
+    const auto versions = OrDie(snapshot->MeshBlockVersions());
+    const auto indices = OrDie(snapshot->MeshBlocks());
+    ASSERT_EQ(versions.size(), indices.size());
+    std::map<BlockIndex, Revision> now;
+    for (size_t i = 0; i < versions.size(); ++i) {
+      EXPECT_EQ(versions[i].first, indices[i]);
+      EXPECT_LE(versions[i].second, r);
+      // A version is either the one before or of this very revision.
+      if (versions[i].second < r) {
+        EXPECT_EQ(before[indices[i]], versions[i].second);
+      }
+      now.insert(versions[i]);
+    }
+    before = std::move(now);
+  }
+  EXPECT_FALSE(before.empty());
+}
+
+}  // namespace
+}  // namespace dsg::test
