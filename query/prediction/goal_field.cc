@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
-#include <functional>
-#include <limits>
-#include <queue>
 #include <utility>
 
 #include "query/prediction/prediction.h"
@@ -11,83 +8,68 @@
 namespace dsg::query {
 namespace {
 
-struct Neighbour {
-  int place = 0;
-  double way_m = 0.0;
-};
-using Neighbours = std::vector<std::vector<Neighbour>>;
-
 bool IsPlace(int place, const WalkGraph& graph) {
   return place >= 0 && static_cast<size_t>(place) < graph.places_map.size();
 }
 
-void CheckGraph(const WalkGraph& graph, const std::vector<Goal>& goals) {
+void CheckGraph(const WalkGraph& graph) {
   DSG_CHECK(graph.clearance_m.size() == graph.places_map.size());
+  DSG_CHECK(graph.link_clearance_m.empty() || graph.link_clearance_m.size() == graph.links.size());
   for (const Eigen::Vector3d& place_map : graph.places_map) DSG_CHECK(place_map.allFinite());
   for (const double clearance_m : graph.clearance_m) {
     DSG_CHECK(clearance_m >= 0.0 && std::isfinite(clearance_m));
   }
+  for (const double clearance_m : graph.link_clearance_m) DSG_CHECK(clearance_m >= 0.0);
   for (const auto& [a, b] : graph.links) DSG_CHECK(IsPlace(a, graph) && IsPlace(b, graph));
+}
+
+void CheckGoals(const std::vector<Goal>& goals, const WalkGraph& graph) {
   for (const Goal& goal : goals) {
     DSG_CHECK(IsPlace(goal.place, graph));
     DSG_CHECK(goal.prior >= 0.0 && std::isfinite(goal.prior));
   }
 }
 
-Neighbours ListNeighbours(const WalkGraph& graph) {
-  Neighbours neighbours(graph.places_map.size());
-  for (const auto& [a, b] : graph.links) {
-    const double way_m = (graph.places_map[a] - graph.places_map[b]).norm();
-    neighbours[a].push_back({b, way_m});
-    neighbours[b].push_back({a, way_m});
-  }
-  return neighbours;
-}
-
-/// Dijkstra from the goal; both arrays hold a number for each place.
-void SpreadFromGoal(const Neighbours& neighbours, int goal_place, double* distance_m,
-                    int* next_place) {
-  using Entry = std::pair<double, int>;
-  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
-  distance_m[goal_place] = 0.0;
-  queue.push({0.0, goal_place});
-  while (!queue.empty()) {
-    const auto [way_m, place] = queue.top();
-    queue.pop();
-    if (way_m > distance_m[place]) continue;
-    for (const Neighbour& neighbour : neighbours[place]) {
-      const double longer_m = way_m + neighbour.way_m;
-      if (longer_m >= distance_m[neighbour.place]) continue;
-      distance_m[neighbour.place] = longer_m;
-      next_place[neighbour.place] = place;
-      queue.push({longer_m, neighbour.place});
-    }
-  }
-}
-
 }  // namespace
 
-GoalField::GoalField(WalkGraph graph, std::vector<Goal> goals)
-    : graph_(std::move(graph)), goals_(std::move(goals)) {
-  CheckGraph(graph_, goals_);
-  const size_t place_count = graph_.places_map.size();
-  distance_m_.assign(goals_.size() * place_count, std::numeric_limits<double>::infinity());
-  next_place_.assign(goals_.size() * place_count, -1);
-  const Neighbours neighbours = ListNeighbours(graph_);
-  for (size_t i = 0; i < goals_.size(); ++i) {
-    SpreadFromGoal(neighbours, goals_[i].place, distance_m_.data() + i * place_count,
-                   next_place_.data() + i * place_count);
+GoalField::GoalField(WalkGraph graph, std::vector<Goal> goals) : goals_(std::move(goals)) {
+  CheckGraph(graph);
+  CheckGoals(goals_, graph);
+  const auto ground = std::make_shared<Ground>(std::move(graph));
+  const std::vector<Eigen::Vector3d>& places_map = ground->graph.places_map;
+  std::vector<size_t>& offsets = ground->offsets;
+  offsets.assign(places_map.size() + 1, 0);
+  for (const auto& [a, b] : ground->graph.links) {
+    ++offsets[a + 1];
+    ++offsets[b + 1];
   }
+  for (size_t i = 1; i < offsets.size(); ++i) offsets[i] += offsets[i - 1];
+  ground->neighbours.resize(offsets.back());
+  std::vector<size_t> next(offsets.begin(), offsets.end() - 1);
+  for (const auto& [a, b] : ground->graph.links) {
+    const double way_m = (places_map[a] - places_map[b]).norm();
+    ground->neighbours[next[a]++] = {b, way_m};
+    ground->neighbours[next[b]++] = {a, way_m};
+  }
+  ground_ = ground;
 }
 
-double GoalField::DistanceM(int goal, int place) const {
-  DSG_CHECK(goal >= 0 && static_cast<size_t>(goal) < goals_.size() && IsPlace(place, graph_));
-  return distance_m_[static_cast<size_t>(goal) * graph_.places_map.size() + place];
+GoalField GoalField::WithGoals(std::vector<Goal> goals) const {
+  CheckGoals(goals, graph());
+  GoalField field;
+  field.ground_ = ground_;
+  field.goals_ = std::move(goals);
+  return field;
 }
 
-int GoalField::NextPlace(int goal, int place) const {
-  DSG_CHECK(goal >= 0 && static_cast<size_t>(goal) < goals_.size() && IsPlace(place, graph_));
-  return next_place_[static_cast<size_t>(goal) * graph_.places_map.size() + place];
+size_t GoalField::memory_bytes() const {
+  const WalkGraph& walk = graph();
+  return sizeof(Ground) + goals_.capacity() * sizeof(Goal) + free_space().memory_bytes() +
+         walk.places_map.capacity() * sizeof(Eigen::Vector3d) +
+         (walk.clearance_m.capacity() + walk.link_clearance_m.capacity()) * sizeof(double) +
+         walk.links.capacity() * sizeof(std::pair<int, int>) +
+         ground_->offsets.capacity() * sizeof(size_t) +
+         ground_->neighbours.capacity() * sizeof(Neighbour);
 }
 
 }  // namespace dsg::query

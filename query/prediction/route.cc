@@ -3,10 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace dsg::query {
 namespace {
+
+constexpr double kPartM = 0.25;
 
 double Horizontal(const Eigen::Vector3d& from_map, const Eigen::Vector3d& to_map) {
   return (to_map - from_map).head<2>().norm();
@@ -62,36 +63,34 @@ void AppendNearest(const Eigen::Vector3d& position_map, const WalkGraph& graph, 
   }
 }
 
+void Append(const Eigen::Vector3d& point_map, double clearance_m, Route* route) {
+  const double step_m = (point_map - route->points_map.back()).norm();
+  route->points_map.push_back(point_map);
+  route->clearance_m.push_back(clearance_m);
+  route->along_m.push_back(route->along_m.back() + step_m);
+}
+
 }  // namespace
 
 std::vector<Attachment> Attach(const Eigen::Vector3d& position_map, const WalkGraph& graph,
                                const GoalOptions& options) {
   std::vector<Attachment> found;
   AppendPlaces(position_map, graph, &found);
-  for (const auto& [a, b] : graph.links) {
+  for (size_t i = 0; i < graph.links.size(); ++i) {
+    const auto& [a, b] = graph.links[i];
     const Eigen::Vector3d via_map =
         NearestOnLink(position_map, graph.places_map[a], graph.places_map[b]);
     // Links keep this from obstacles, so nothing stands between.
-    const bool in_reach = Horizontal(position_map, via_map) <= options.clearance_m_min;
+    const double kept_m = graph.link_clearance_m.empty()
+                              ? options.clearance_m_min
+                              : std::min(options.clearance_m_min, graph.link_clearance_m[i]);
+    const bool in_reach = Horizontal(position_map, via_map) <= kept_m;
     if (!in_reach || !OnStorey(position_map, via_map)) continue;
     found.push_back(Via(position_map, via_map, a, graph));
     found.push_back(Via(position_map, via_map, b, graph));
   }
   if (found.empty()) AppendNearest(position_map, graph, options.attach_m_max, &found);
   return found;
-}
-
-int BestAttachment(const std::vector<Attachment>& attachments, const GoalField& field, int goal,
-                   double* way_m) {
-  int best = -1;
-  *way_m = std::numeric_limits<double>::infinity();
-  for (size_t i = 0; i < attachments.size(); ++i) {
-    const double whole_m = attachments[i].way_m + field.DistanceM(goal, attachments[i].place);
-    if (whole_m >= *way_m) continue;
-    *way_m = whole_m;
-    best = static_cast<int>(i);
-  }
-  return best;
 }
 
 Eigen::Vector3d Route::At(double along, size_t* segment) const {
@@ -105,24 +104,36 @@ Eigen::Vector3d Route::At(double along, size_t* segment) const {
 }
 
 Route BuildRoute(const Eigen::Vector3d& position_map, const Attachment& attachment,
-                 const GoalField& field, int goal, double length_m_max) {
-  const WalkGraph& graph = field.graph();
+                 const std::vector<int>& places, const WalkGraph& graph, double length_m_max) {
   const Eigen::Vector3d lift(0.0, 0.0, position_map.z() - attachment.via_map.z());
   Route route{{position_map}, {0.0}, {0.0}};
-  const auto append = [&route](const Eigen::Vector3d& point_map, double clearance_m) {
-    const double step_m = (point_map - route.points_map.back()).norm();
-    route.points_map.push_back(point_map);
-    route.clearance_m.push_back(clearance_m);
-    route.along_m.push_back(route.along_m.back() + step_m);
-  };
   if (attachment.via_map != graph.places_map[attachment.place]) {
-    append(attachment.via_map + lift, 0.0);
+    Append(attachment.via_map + lift, 0.0, &route);
   }
-  for (int place = attachment.place; place >= 0 && route.length_m() <= length_m_max;
-       place = field.NextPlace(goal, place)) {
-    append(graph.places_map[place] + lift, graph.clearance_m[place]);
+  for (const int place : places) {
+    if (route.length_m() > length_m_max) break;
+    Append(graph.places_map[place] + lift, graph.clearance_m[place], &route);
   }
   return route;
+}
+
+Route Straightened(const Route& route, const FreeSpace& space, double margin_m) {
+  const std::vector<Eigen::Vector3d>& points = route.points_map;
+  Route straight{{points.front()}, {std::max(0.0, space.RadiusM(points.front()))}, {0.0}};
+  size_t from = 0;
+  while (from + 1 < points.size()) {
+    size_t to = from + 1;
+    while (to + 1 < points.size() && space.IsClear(points[from], points[to + 1], margin_m)) ++to;
+    const Eigen::Vector3d way = points[to] - points[from];
+    const int part_count = 1 + static_cast<int>(way.norm() / kPartM);
+    for (int part = 1; part <= part_count; ++part) {
+      const Eigen::Vector3d next_map =
+          part == part_count ? points[to] : (points[from] + way * part / part_count).eval();
+      Append(next_map, std::max(0.0, space.RadiusM(next_map)), &straight);
+    }
+    from = to;
+  }
+  return straight;
 }
 
 }  // namespace dsg::query

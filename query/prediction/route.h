@@ -21,15 +21,11 @@ struct Attachment {
 };
 
 /// Every place whose clearance reaches over the position, and both ends of every link that passes
-/// within `clearance_m_min`; failing these, the ends of the nearest link or the nearest place
-/// within `attach_m_max`. Empty when there is nothing near.
-/// Distances are horizontal: people's torsos and places have heights of their own.
+/// within `clearance_m_min` and its own clearance; failing these, the ends of the nearest link or
+/// the nearest place within `attach_m_max`. Empty when there is nothing near. Distances are
+/// horizontal: people's torsos and places have heights of their own.
 std::vector<Attachment> Attach(const Eigen::Vector3d& position_map, const WalkGraph& graph,
                                const GoalOptions& options);
-
-/// The attachment with the shortest way to the goal, -1 when none leads there.
-int BestAttachment(const std::vector<Attachment>& attachments, const GoalField& field, int goal,
-                   double* way_m);
 
 /// A polyline from a person to a goal, at the person's height above the floor.
 struct Route {
@@ -44,8 +40,12 @@ struct Route {
   Eigen::Vector3d At(double along, size_t* segment) const;
 };
 
-/// No further than `length_m_max` (and the rest of that link).
+/// Along the attachment, then `places`, no further than `length_m_max` (and the rest of that link).
 Route BuildRoute(const Eigen::Vector3d& position_map, const Attachment& attachment,
-                 const GoalField& field, int goal, double length_m_max);
+                 const std::vector<int>& places, const WalkGraph& graph, double length_m_max);
+
+/// The same way with corners cut where `space` proves that free, with a point at least every
+/// quarter of a metre.
+Route Straightened(const Route& route, const FreeSpace& space, double margin_m);
 
 }  // namespace dsg::query

@@ -85,6 +85,31 @@ TEST(ConstantVelocity, DampsAsTheSumOfManySmallSteps) {
   EXPECT_EQ(PredictConstantVelocity(path, {4 * kSecond}, options).positions_map[0].x(), 0.0);
 }
 
+TEST(WeightedVelocity, SmoothsThoseWhoZigzagAndTrustsThoseWhoTurn) {
+  std::vector<PathPoint> noisy;
+  std::vector<PathPoint> turning;
+  for (int i = 0; i < 8; ++i) {
+    noisy.push_back(At(0.4 * i, 0.4 * i, i % 2 == 0 ? 0.1 : -0.1));
+    turning.push_back(At(0.4 * i, 3.0 * std::sin(0.15 * i), 3.0 - 3.0 * std::cos(0.15 * i)));
+  }
+  const std::vector<TimeNs> at_ns = {At(0.4 * 8, 0, 0).time_ns};
+  const auto error_m = [&](const std::vector<PathPoint>& path, const Eigen::Vector3d& truth_map,
+                           const PredictedPath& predicted) {
+    EXPECT_EQ(predicted.positions_map.size(), 1u) << path.size();
+    return (predicted.positions_map[0] - truth_map).norm();
+  };
+  const Eigen::Vector3d straight(3.2, 0, 0.9);
+  EXPECT_LT(error_m(noisy, straight, PredictWeightedVelocity(noisy, at_ns, {})),
+            0.8 * error_m(noisy, straight, PredictConstantVelocity(noisy, at_ns, {})));
+  const Eigen::Vector3d on(3.0 * std::sin(1.2), 3.0 - 3.0 * std::cos(1.2), 0.9);
+  EXPECT_LT(error_m(turning, on, PredictWeightedVelocity(turning, at_ns, {})), 0.1);
+}
+
+TEST(WeightedVelocity, LeavesALonelyPointWhereItIs) {
+  const PredictedPath path = PredictWeightedVelocity({At(0, 4, 5)}, {100 * kSecond}, {});
+  EXPECT_EQ(path.positions_map[0], Eigen::Vector3d(4, 5, 0.9));
+}
+
 TEST(PredictionDeathTest, RefusesWhatIsNotANumberOrGoesBack) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_DEATH(LastVelocity({At(0, 0, 0), At(1, nan, 0)}), "allFinite");

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "query/prediction/prediction.h"
+#include "query/prediction/ways.h"
 #include "schema/base/random.h"
 
 namespace dsg::query {
@@ -20,22 +21,44 @@ WalkGraph Row() {
   return graph;
 }
 
-TEST(GoalField, KnowsTheWayAndItsLength) {
-  const GoalField field(Row(), {{2}, {3}});
-  EXPECT_EQ(field.DistanceM(0, 0), 3.0);
-  EXPECT_EQ(field.NextPlace(0, 0), 1);
-  EXPECT_EQ(field.NextPlace(0, 1), 2);
-  EXPECT_EQ(field.NextPlace(0, 2), -1);
+/// From a place itself.
+Ways WaysFrom(int place, const GoalField& field, double way_m_max = 1e9) {
+  return Ways({{place, field.graph().places_map[place], 0.0}}, field, way_m_max);
 }
 
-TEST(GoalField, SaysWhereThereIsNoWay) {
-  const GoalField field(Row(), {{3}});
-  EXPECT_TRUE(std::isinf(field.DistanceM(0, 0)));
-  EXPECT_EQ(field.NextPlace(0, 0), -1);
-  EXPECT_EQ(field.DistanceM(0, 3), 0.0);
+TEST(Ways, KnowTheirLengthAndPlaces) {
+  const GoalField field(Row(), {});
+  const Ways ways = WaysFrom(2, field);
+  EXPECT_EQ(ways.WayM(0), 3.0);
+  EXPECT_EQ(ways.PlacesTo(0), (std::vector<int>{2, 1, 0}));
+  EXPECT_EQ(ways.PlacesTo(2), (std::vector<int>{2}));
+  EXPECT_EQ(ways.Origin(0), 0);
 }
 
-TEST(GoalField, AgreesWithEveryPairTriedByForce) {
+TEST(Ways, SayWhereThereIsNone) {
+  const GoalField field(Row(), {});
+  EXPECT_TRUE(std::isinf(WaysFrom(3, field).WayM(0)));
+  EXPECT_FALSE(WaysFrom(3, field).Reaches(0));
+  EXPECT_EQ(WaysFrom(3, field).WayM(3), 0.0);
+}
+
+TEST(Ways, EndWhereTheyGrowTooLong) {
+  const GoalField field(Row(), {});
+  const Ways ways = WaysFrom(0, field, 2.5);
+  EXPECT_TRUE(ways.Reaches(1));
+  EXPECT_FALSE(ways.Reaches(2));
+}
+
+TEST(Ways, BeginWhereTheWholeIsShortest) {
+  const GoalField field(Row(), {});
+  const Ways ways({{0, {0, 0, 0}, 1.5}, {2, {3, 0, 0}, 0.1}}, field, 1e9);
+  EXPECT_EQ(ways.Origin(0), 0);
+  EXPECT_EQ(ways.Origin(1), 1);
+  EXPECT_NEAR(ways.WayM(1), 2.1, 1e-12);
+  EXPECT_EQ(ways.PlacesTo(1), (std::vector<int>{2, 1}));
+}
+
+TEST(Ways, AgreeWithEveryPairTriedByForce) {
   constexpr uint64_t kSeed = 71;
   std::cout << "seed " << kSeed << "\n";
   Random random(kSeed, 0);
@@ -62,17 +85,17 @@ TEST(GoalField, AgreesWithEveryPairTriedByForce) {
       }
     }
   }
-  const GoalField field(graph, {{5}, {17}});
-  for (int place = 0; place < kPlaceCount; ++place) {
-    for (const auto& [goal, goal_place] : {std::pair{0, 5}, std::pair{1, 17}}) {
-      if (std::isinf(way_m[place][goal_place])) {
-        EXPECT_TRUE(std::isinf(field.DistanceM(goal, place)));
-        continue;
-      }
-      EXPECT_NEAR(field.DistanceM(goal, place), way_m[place][goal_place], 1e-9);
-      const int next = field.NextPlace(goal, place);
-      if (next < 0) continue;
-      EXPECT_LT(field.DistanceM(goal, next), field.DistanceM(goal, place) + 1e-12);
+  const GoalField field(graph, {});
+  for (const int from : {5, 17}) {
+    const Ways ways = WaysFrom(from, field);
+    for (int place = 0; place < kPlaceCount; ++place) {
+      ASSERT_EQ(ways.Reaches(place), !std::isinf(way_m[place][from]));
+      if (!ways.Reaches(place)) continue;
+      EXPECT_NEAR(ways.WayM(place), way_m[place][from], 1e-9);
+      const std::vector<int> places = ways.PlacesTo(place);
+      double walked_m = 0.0;
+      for (size_t i = 1; i < places.size(); ++i) walked_m += way_m[places[i - 1]][places[i]];
+      EXPECT_NEAR(walked_m, ways.WayM(place), 1e-9);
     }
   }
 }

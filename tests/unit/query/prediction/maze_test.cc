@@ -6,100 +6,15 @@
 #include <iostream>
 #include <utility>
 
+#include "query/prediction/goal_choice.h"
 #include "query/prediction/prediction.h"
 #include "schema/base/random.h"
+#include "tests/unit/query/prediction/mazes.h"
 
 namespace dsg::query {
 namespace {
 
 constexpr TimeNs kSecond = 1'000'000'000;
-
-// A maze of square cells. Walls stand on all borders but where a door was made.
-struct Wall {
-  Eigen::Vector2d a;
-  Eigen::Vector2d b;
-};
-
-double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
-
-double DistanceToWall(const Eigen::Vector2d& p, const Wall& wall) {
-  const Eigen::Vector2d along = wall.b - wall.a;
-  const double share = std::clamp((p - wall.a).dot(along) / along.squaredNorm(), 0.0, 1.0);
-  return (p - wall.a - share * along).norm();
-}
-
-/// Who walks along the line of a wall, in a door of it, does not cross it.
-bool Crosses(const Eigen::Vector2d& p, const Eigen::Vector2d& q, const Wall& wall) {
-  const double side_p = Cross(wall.b - wall.a, p - wall.a);
-  const double side_q = Cross(wall.b - wall.a, q - wall.a);
-  const double side_a = Cross(q - p, wall.a - p);
-  const double side_b = Cross(q - p, wall.b - p);
-  return (side_p * side_q < 0 && side_a * side_b <= 0) || DistanceToWall(q, wall) < 1e-6;
-}
-
-struct Maze {
-  std::vector<Wall> walls;
-  WalkGraph graph;
-  int cell_count_side = 0;
-  double cell_m = 0.0;
-
-  bool IsCrossed(const Eigen::Vector3d& p, const Eigen::Vector3d& q) const {
-    return std::any_of(walls.begin(), walls.end(), [&p, &q](const Wall& wall) {
-      return Crosses(p.head<2>(), q.head<2>(), wall);
-    });
-  }
-};
-
-constexpr double kDoorM = 0.9;
-
-void AddBorder(const Eigen::Vector2d& a, const Eigen::Vector2d& b, bool has_door, int cell_a,
-               int cell_b, Maze* maze) {
-  if (!has_door) {
-    maze->walls.push_back({a, b});
-    return;
-  }
-  const Eigen::Vector2d middle = 0.5 * (a + b);
-  const Eigen::Vector2d half_door = 0.5 * kDoorM * (b - a).normalized();
-  maze->walls.push_back({a, middle - half_door});
-  maze->walls.push_back({middle + half_door, b});
-  const int door = static_cast<int>(maze->graph.places_map.size());
-  maze->graph.places_map.emplace_back(middle.x(), middle.y(), 1.0);
-  maze->graph.links.emplace_back(cell_a, door);
-  maze->graph.links.emplace_back(door, cell_b);
-}
-
-Maze MakeMaze(Random* random) {
-  Maze maze;
-  maze.cell_count_side = 6;
-  maze.cell_m = random->Uniform(1.6, 4.0);
-  const int n = maze.cell_count_side;
-  for (int y = 0; y < n; ++y) {
-    for (int x = 0; x < n; ++x) {
-      const Eigen::Vector2d middle((x + 0.5) * maze.cell_m, (y + 0.5) * maze.cell_m);
-      maze.graph.places_map.emplace_back(middle.x(), middle.y(), 1.0);
-    }
-  }
-  for (int y = 0; y < n; ++y) {
-    for (int x = 0; x < n; ++x) {
-      const Eigen::Vector2d corner = Eigen::Vector2d(x + 1, y + 1) * maze.cell_m;
-      const int cell = y * n + x;
-      AddBorder(corner - Eigen::Vector2d(0, maze.cell_m), corner, x + 1 < n && random->Chance(0.75),
-                cell, cell + 1, &maze);
-      AddBorder(corner - Eigen::Vector2d(maze.cell_m, 0), corner, y + 1 < n && random->Chance(0.75),
-                cell, cell + n, &maze);
-    }
-  }
-  for (const Eigen::Vector3d& place_map : maze.graph.places_map) {
-    double clearance_m = maze.cell_m;
-    for (const Wall& wall : maze.walls) {
-      clearance_m = std::min(clearance_m, DistanceToWall(place_map.head<2>(), wall));
-    }
-    maze.graph.clearance_m.push_back(clearance_m);
-  }
-  return maze;
-}
 
 /// Along a link of the maze, beside it by up to 0.2 m, at a walking pace.
 std::vector<PathPoint> WalkOnALink(const Maze& maze, Random* random) {
@@ -129,6 +44,117 @@ bool CrossesWalls(const Maze& maze, const std::vector<PathPoint>& path,
     before = position;
   }
   return false;
+}
+
+/// Within the clearance of a place or of a link, or not, by looking at all of them.
+bool IsProven(const Maze& maze, const std::vector<double>& link_clearance_m,
+              const Eigen::Vector3d& position_map) {
+  constexpr double kTinyM = 1e-6;
+  const WalkGraph& graph = maze.graph;
+  for (size_t i = 0; i < graph.places_map.size(); ++i) {
+    const double way_m = (position_map - graph.places_map[i]).head<2>().norm();
+    if (way_m <= graph.clearance_m[i] + kTinyM) return true;
+  }
+  for (size_t i = 0; i < graph.links.size(); ++i) {
+    const Wall line{graph.places_map[graph.links[i].first].head<2>(),
+                    graph.places_map[graph.links[i].second].head<2>()};
+    if (DistanceToWall(position_map.head<2>(), line) <= link_clearance_m[i] + kTinyM) return true;
+  }
+  return false;
+}
+
+/// Looked at every four centimetres.
+bool LeavesProvenSpace(const Maze& maze, const std::vector<double>& link_clearance_m,
+                       const std::vector<PathPoint>& path, const PredictedPath& predicted) {
+  Eigen::Vector3d before = path.back().position_map;
+  for (const Eigen::Vector3d& position : predicted.positions_map) {
+    const int part_count = 1 + static_cast<int>((position - before).norm() / 0.04);
+    for (int part = 1; part <= part_count; ++part) {
+      const Eigen::Vector3d at_map = before + (position - before) * part / part_count;
+      if (!IsProven(maze, link_clearance_m, at_map)) return true;
+    }
+    before = position;
+  }
+  return false;
+}
+
+/// Anything that is allowed and does something.
+GoalOptions AnyOptions(double clearance_m_max, Random* random) {
+  GoalOptions options;
+  options.detour_m = random->Uniform(0.05, 10.0);
+  options.path_count_max = 1000;
+  options.look_ahead_m = random->Uniform(0.05, 10.0);
+  options.blend_s = random->Chance(0.2) ? 0.0 : random->Uniform(0.0, 20.0);
+  options.clearance_m_min = random->Uniform(0.05, clearance_m_max);
+  options.decay = random->Uniform(0.0, 1.0);
+  options.merge_m = random->Uniform(0.01, 5.0);
+  options.standing_m_s = random->Uniform(0.01, 0.3);
+  options.attach_m_max = random->Uniform(0.0, 3.0);
+  options.heading = random->Uniform(0.0, 50.0);
+  options.straight_m_min = random->Uniform(0.1, 0.6);
+  options.way_m_max = random->Uniform(2.0, 60.0);
+  options.walking_m_s = random->Uniform(0.0, 3.0);
+  options.pace_change_m_s_min = random->Uniform(0.01, 0.5);
+  return options;
+}
+
+GoalField FieldOf(const Maze& maze, Random* random) {
+  GoalChoiceOptions choice;
+  choice.anywhere_m = random->Uniform(0.5, 4.0);
+  std::vector<Goal> goals;
+  for (const ChosenGoal& chosen : ChooseGoals(maze.graph, {}, choice)) {
+    goals.push_back(chosen.goal);
+  }
+  return GoalField(maze.graph, goals);
+}
+
+/// Nobody is faster than 3 m / s; of that, steps of a walk may be two of 0.1 m out.
+bool Jumps(const std::vector<PathPoint>& path, const PredictedPath& predicted, double period_s) {
+  Eigen::Vector3d before = path.back().position_map;
+  for (const Eigen::Vector3d& position : predicted.positions_map) {
+    if ((position - before).norm() > 3.0 * period_s + 0.2) return true;
+    before = position;
+  }
+  return false;
+}
+
+TEST(PredictToGoals, NeverLeavesProvenSpaceWhateverTheOptions) {
+  constexpr uint64_t kSeed = 7;
+  std::cout << "seed " << kSeed << "\n";
+  Random random(kSeed, 0);
+  std::vector<TimeNs> at_ns;
+  for (int i = 0; i <= 120; ++i) at_ns.push_back(kSecond + i * (kSecond / 20));
+  int future_count = 0;
+  int alone_count = 0;
+  for (int round = 0; round < 80; ++round) {
+    Maze maze = MakeCrookedMaze(&random);
+    const std::vector<double> link_clearance_m = maze.graph.link_clearance_m;
+    double clearance_m_max = 1.5;
+    if (random.Chance(0.5)) {
+      // What is not said of links has to be true of them.
+      clearance_m_max = *std::min_element(link_clearance_m.begin(), link_clearance_m.end());
+      maze.graph.link_clearance_m.clear();
+    }
+    const GoalField field = FieldOf(maze, &random);
+    const GoalOptions options = AnyOptions(clearance_m_max, &random);
+    std::vector<double> kept_m = link_clearance_m;
+    for (double& kept : kept_m) kept = std::min(kept, options.clearance_m_min - 1e-3);
+    for (int i = 0; i < 8; ++i) {
+      const std::vector<PathPoint> path = WalkOnALink(maze, &random);
+      // Who is in no clearance comes onto the graph by a way that nothing proves.
+      if (!IsProven(maze, kept_m, path.back().position_map)) continue;
+      for (const PredictedPath& predicted : PredictToGoals(path, at_ns, field, options)) {
+        ++future_count;
+        alone_count += predicted.goal < 0;
+        SCOPED_TRACE(testing::Message() << "round " << round << " walk " << i);
+        ASSERT_FALSE(LeavesProvenSpace(maze, link_clearance_m, path, predicted));
+        ASSERT_FALSE(CrossesWalls(maze, path, predicted));
+        ASSERT_FALSE(Jumps(path, predicted, 0.05));
+      }
+    }
+  }
+  std::cout << future_count << " futures, " << alone_count << " without a goal\n";
+  EXPECT_GT(future_count, 2000);
 }
 
 TEST(PredictToGoals, NeverCrossesWallsThatConstantVelocityCrosses) {

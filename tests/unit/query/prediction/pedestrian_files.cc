@@ -7,7 +7,6 @@
 #include <iterator>
 #include <sstream>
 
-#include "query/prediction/prediction.h"
 #include "schema/base/check.h"
 
 namespace dsg::query {
@@ -19,18 +18,13 @@ Eigen::Vector3d Raised(const Eigen::Vector2d& position) {
   return {position.x(), position.y(), 0.0};
 }
 
-void ScoreWindow(const std::vector<Eigen::Vector2d>& window, Predictor predictor,
+void ScoreWindow(const std::vector<Eigen::Vector2d>& window, const Predictor& predictor,
                  WindowScore* score) {
   std::vector<PathPoint> path;
   for (int i = 0; i < kSeenCount; ++i) path.push_back({i * kStepNs, Raised(window[i])});
   std::vector<TimeNs> at_ns;
   for (int i = 0; i < kPredictedCount; ++i) at_ns.push_back((kSeenCount + i) * kStepNs);
-  ConstantVelocityOptions options;
-  if (predictor == Predictor::kWeighted) {
-    options.decay = 0.4;
-    options.damping = std::pow(0.98, 1.0 / 0.4);
-  }
-  const PredictedPath predicted = PredictConstantVelocity(path, at_ns, options);
+  const PredictedPath predicted = predictor(path, at_ns);
   double error_m = 0.0;
   for (int i = 0; i < kPredictedCount; ++i) {
     error_m = (predicted.positions_map[i] - Raised(window[kSeenCount + i])).norm();
@@ -41,6 +35,27 @@ void ScoreWindow(const std::vector<Eigen::Vector2d>& window, Predictor predictor
 }
 
 }  // namespace
+
+Predictor LastStep() {
+  return [](const std::vector<PathPoint>& path, const std::vector<TimeNs>& at_ns) {
+    return PredictConstantVelocity(path, at_ns, {});
+  };
+}
+
+Predictor Weighted() {
+  return [](const std::vector<PathPoint>& path, const std::vector<TimeNs>& at_ns) {
+    ConstantVelocityOptions options;
+    options.decay = 0.4;
+    options.damping = std::pow(0.98, 1.0 / 0.4);
+    return PredictConstantVelocity(path, at_ns, options);
+  };
+}
+
+Predictor Adaptive(const WeightedVelocityOptions& options) {
+  return [options](const std::vector<PathPoint>& path, const std::vector<TimeNs>& at_ns) {
+    return PredictWeightedVelocity(path, at_ns, options);
+  };
+}
 
 Pedestrians ReadPedestrians(const std::string& file, int x_column, int y_column) {
   std::ifstream stream(file);
@@ -56,7 +71,7 @@ Pedestrians ReadPedestrians(const std::string& file, int x_column, int y_column)
   return pedestrians;
 }
 
-void ScoreWindows(const Pedestrians& pedestrians, int64_t frame_step, Predictor predictor,
+void ScoreWindows(const Pedestrians& pedestrians, int64_t frame_step, const Predictor& predictor,
                   WindowScore* score) {
   for (const auto& [person, positions] : pedestrians) {
     for (const auto& [frame, position] : positions) {

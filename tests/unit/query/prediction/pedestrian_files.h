@@ -5,9 +5,12 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
+
+#include "query/prediction/prediction.h"
 
 namespace dsg::query {
 
@@ -29,17 +32,20 @@ struct WindowScore {
   int window_count = 0;
 };
 
-/// How people are predicted in a table.
-enum class Predictor {
-  /// Constant velocity of the last step.
-  kLastStep,
-  /// Steps weighted by 0.4^age, the velocity shrinks to 0.98 of itself each 0.4 s.
-  kWeighted,
-};
+/// From eight seen points to twelve instants.
+using Predictor =
+    std::function<PredictedPath(const std::vector<PathPoint>&, const std::vector<TimeNs>&)>;
+
+/// Constant velocity of the last step.
+Predictor LastStep();
+/// Steps weighted by 0.4^age, the velocity shrinks to 0.98 of itself each 0.4 s.
+Predictor Weighted();
+/// What PredictAgent calls WEIGHTED_VELOCITY.
+Predictor Adaptive(const WeightedVelocityOptions& options);
 
 /// Over every run of 20 frames of one person that are each `frame_step` after the one before.
 /// Scores add up: those of several files are one table.
-void ScoreWindows(const Pedestrians& pedestrians, int64_t frame_step, Predictor predictor,
+void ScoreWindows(const Pedestrians& pedestrians, int64_t frame_step, const Predictor& predictor,
                   WindowScore* score);
 
 /// From sums to means.

@@ -7,36 +7,17 @@
 #include <string>
 #include <utility>
 
+#include "query/prediction/goal_choice.h"
+
 namespace dsg::query {
 namespace {
 
 constexpr double kSquareM = 0.6;
 constexpr double kLinkClearanceM = 0.2;
 constexpr double kPlaceClearanceM = 0.25;
-constexpr double kGoalApartM = 2.0;
-constexpr double kGoalReachM = 1.5;
 constexpr double kTorsoHeightM = 0.9;
 
 using Square = std::pair<int, int>;
-
-int NearestPlace(const Eigen::Vector2d& point, const WalkGraph& graph) {
-  int best = -1;
-  double best_m = kGoalReachM;
-  for (size_t i = 0; i < graph.places_map.size(); ++i) {
-    const double way_m = (graph.places_map[i].head<2>() - point).norm();
-    if (way_m >= best_m) continue;
-    best_m = way_m;
-    best = static_cast<int>(i);
-  }
-  return best;
-}
-
-bool DrawsPeople(const std::string& class_name) {
-  constexpr std::array<const char*, 9> kNames = {"chair",    "office chair", "couch",
-                                                 "armchair", "printer",      "coffee machine",
-                                                 "counter",  "toilet",       "desk"};
-  return std::find(kNames.begin(), kNames.end(), class_name) != kNames.end();
-}
 
 }  // namespace
 
@@ -100,15 +81,12 @@ std::vector<Goal> GoalsOf(const truth::Truth& truth, const WalkGraph& graph) {
   for (const truth::Object& object : truth.objects) {
     if (DrawsPeople(object.class_name)) wanted.push_back(object.map_T_object.position.head<2>());
   }
-  std::vector<Goal> goals;
+  std::vector<Attraction> attractions;
   for (const Eigen::Vector2d& point : wanted) {
-    const int place = NearestPlace(point, graph);
-    if (place < 0) continue;
-    const bool is_known = std::any_of(goals.begin(), goals.end(), [&](const Goal& goal) {
-      return (graph.places_map[goal.place] - graph.places_map[place]).norm() < kGoalApartM;
-    });
-    if (!is_known) goals.push_back({place, 1.0});
+    attractions.push_back({{point.x(), point.y(), kTorsoHeightM}, 1.0});
   }
+  std::vector<Goal> goals;
+  for (const ChosenGoal& chosen : ChooseGoals(graph, attractions, {})) goals.push_back(chosen.goal);
   return goals;
 }
 

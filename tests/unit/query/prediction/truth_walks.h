@@ -19,7 +19,7 @@ ingest::DistanceField FreeField(const truth::Truth& truth);
 /// where a straight line keeps 0.2 m.
 WalkGraph GraphOf(const ingest::DistanceField& field);
 
-/// Doors, middles of rooms, and what people sit at or use, at least 2 m apart.
+/// Doors, middles of rooms, what people sit at or use, and places anywhere else.
 std::vector<Goal> GoalsOf(const truth::Truth& truth, const WalkGraph& graph);
 
 /// By person, ascending in time.

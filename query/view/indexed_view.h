@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// The graph view that answers from indexes, and how one is made from another.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+
+#include "query/view/graph_view.h"
+#include "query/view/place_graph.h"
+#include "query/view/view_parts.h"
+
+namespace dsg::query {
+
+/// The places of one or more views, made by the first that asks.
+struct SharedPlaces {
+  std::once_flag once;
+  std::shared_ptr<const PlaceGraph> graph;
+  /// Set after `graph`, so that others can look without waiting.
+  std::atomic<bool> is_made = false;
+
+  /// Grows with what planning keeps beside the graph.
+  size_t memory_bytes() const { return is_made ? graph->memory_bytes() : 0; }
+};
+
+class IndexedView : public GraphView {
+ public:
+  IndexedView(Revision revision, ViewParts parts, std::shared_ptr<SharedPlaces> places)
+      : revision_(revision), parts_(std::move(parts)), places_(std::move(places)) {}
+
+  static absl::StatusOr<std::shared_ptr<const IndexedView>> Load(
+      const Snapshot& snapshot, std::shared_ptr<SymbolTable> symbols, const StopCheck& stop);
+  /// `touched`: all that may differ between `from` and `snapshot`.
+  static absl::StatusOr<std::shared_ptr<const IndexedView>> Derive(const IndexedView& from,
+                                                                   const Touched& touched,
+                                                                   const Snapshot& snapshot,
+                                                                   const StopCheck& stop);
+
+  const ViewParts& parts() const { return parts_; }
+  const std::shared_ptr<SharedPlaces>& shared_places() const { return places_; }
+  /// What this view holds beside that which it shares with the one it was derived from.
+  size_t fresh_bytes() const { return parts_.fresh_bytes(); }
+
+  Revision revision() const override { return revision_; }
+  const SymbolTable& symbols() const override { return *parts_.symbols(); }
+  const std::vector<Layer>& layers() const override { return parts_.layers(); }
+  int64_t node_count() const override { return static_cast<int64_t>(parts_.nodes().size()); }
+  int64_t edge_count() const override { return parts_.edges().size(); }
+  size_t memory_bytes() const override;
+
+  const ViewNode* FindNode(NodeId id) const override { return parts_.nodes().Find(id); }
+  void ForEachNode(NodeId after, const std::function<bool(const ViewNode&)>& visit) const override;
+  std::vector<NodeId> NodesNamed(std::string_view name) const override;
+  std::vector<NodeId> NodesNamedIgnoringCase(std::string_view name) const override;
+  void ForEachOfClass(LayerId layer, Symbol class_name,
+                      const std::function<bool(const ViewNode&)>& visit) const override;
+  void ForEachInLayer(LayerId layer,
+                      const std::function<bool(const ViewNode&)>& visit) const override;
+  std::vector<std::pair<Symbol, int64_t>> ClassesOf(LayerId layer) const override;
+
+  void ForEachEdgeFrom(NodeId source,
+                       const std::function<bool(const ViewEdge&)>& visit) const override;
+  void ForEachEdgeFrom(NodeId source, Symbol relation,
+                       const std::function<bool(const ViewEdge&)>& visit) const override;
+  void ForEachEdgeTo(NodeId target,
+                     const std::function<bool(const ViewEdge&)>& visit) const override;
+  void ForEachEdgeTo(NodeId target, Symbol relation,
+                     const std::function<bool(const ViewEdge&)>& visit) const override;
+
+  NodeId Parent(NodeId id) const override;
+  std::vector<NodeId> Ancestors(NodeId id) const override;
+  void ForEachDescendant(NodeId id,
+                         const std::function<bool(const ViewNode&)>& visit) const override;
+
+  void ForEachNearest(
+      const Eigen::Vector3d& point_map, const SpaceFilter& filter, double distance_m_max,
+      const std::function<bool(const ViewNode&, double distance_m)>& visit) const override;
+  void ForEachTouching(const Box3d& box_map, const SpaceFilter& filter,
+                       const std::function<bool(const ViewNode&)>& visit) const override;
+
+  std::shared_ptr<const PlaceGraph> Places() const override;
+
+ private:
+  std::vector<SpaceRange> RangesOf(const SpaceFilter& filter) const;
+  void ForEachInRange(const SpaceRange& range,
+                      const std::function<bool(const ViewNode&)>& visit) const;
+  void AppendNodesNamed(Symbol name, std::vector<NodeId>* ids) const;
+
+  const Revision revision_;
+  const ViewParts parts_;
+  const std::shared_ptr<SharedPlaces> places_;
+};
+
+}  // namespace dsg::query

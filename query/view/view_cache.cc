@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/view/view_cache.h"
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <map>
+#include <mutex>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "query/view/indexed_view.h"
+#include "schema/base/status.h"
+
+namespace dsg::query {
+namespace {
+
+// How long a waiter sleeps between two looks at its own deadline.
+constexpr std::chrono::milliseconds kWaitSlice{5};
+// Above this share of a map, reading what was touched one by one costs more than reading all.
+constexpr double kDeriveShareMax = 0.25;
+constexpr size_t kMebibyte = size_t{1} << 20;
+
+using View = std::shared_ptr<const IndexedView>;
+
+struct Slot {
+  View view;
+  // Grows with every use.
+  uint64_t last_use = 0;
+  // Of its places when it was last looked at: they grow while questions fill them.
+  size_t place_bytes = 0;
+};
+
+// The views of one open map.
+struct MapViews {
+  std::shared_ptr<SymbolTable> symbols = std::make_shared<SymbolTable>();
+  std::map<Revision, Slot> slots;
+  std::set<Revision> being_made;
+
+  // Views derived from each other share their pages: the largest counts whole, of the others only
+  // what each does not share. They share their places wholly or not at all.
+  size_t Bytes() const {
+    size_t sum = symbols->memory_bytes();
+    size_t largest = 0;
+    size_t fresh_of_largest = 0;
+    std::set<const SharedPlaces*> places;
+    for (const auto& [revision, slot] : slots) {
+      const SharedPlaces* of_view = slot.view->shared_places().get();
+      if (places.insert(of_view).second) sum += of_view->memory_bytes();
+      const size_t whole = slot.view->parts().memory_bytes();
+      sum += slot.view->fresh_bytes();
+      if (whole > largest) {
+        largest = whole;
+        fresh_of_largest = slot.view->fresh_bytes();
+      }
+    }
+    return sum + largest - fresh_of_largest;
+  }
+
+  View Nearest(Revision revision) const {
+    if (slots.empty()) return nullptr;
+    const auto above = slots.lower_bound(revision);
+    if (above == slots.begin()) return above->second.view;
+    const auto below = std::prev(above);
+    if (above == slots.end()) return below->second.view;
+    return above->first - revision < revision - below->first ? above->second.view
+                                                             : below->second.view;
+  }
+};
+
+struct MadeView {
+  View view;
+  bool was_derived = false;
+};
+
+}  // namespace
+
+struct ViewCache::Impl {
+  explicit Impl(size_t bound) : bytes_max(bound) {}
+
+  absl::StatusOr<View> Get(const std::shared_ptr<MapReader>& map, const Snapshot& snapshot,
+                           const StopCheck& stop);
+  absl::StatusOr<MadeView> Make(MapReader* map, const Snapshot& snapshot, const View& nearest,
+                                std::shared_ptr<SymbolTable> symbols, const StopCheck& stop) const;
+  // Requires of these: the lock is held. What they put into `evicted` is to be freed without it.
+  absl::Status Keep(const std::shared_ptr<MapReader>& map, const MadeView& made,
+                    std::vector<View>* evicted);
+  void ForgetClosedMaps(std::vector<View>* evicted);
+  void EvictTo(size_t bound, const View& spared, std::vector<View>* evicted);
+  size_t Bytes() const;
+
+  const size_t bytes_max;
+  mutable std::mutex mutex;
+  std::condition_variable made_or_given_up;
+  // By what the pointers own, so that a new map at an old address is another one.
+  std::map<std::weak_ptr<MapReader>, MapViews, std::owner_less<>> maps;
+  uint64_t use_count = 0;
+  Stats counts;
+};
+
+size_t ViewCache::Impl::Bytes() const {
+  size_t sum = 0;
+  for (const auto& [map, views] : maps) sum += views.Bytes();
+  return sum;
+}
+
+void ViewCache::Impl::ForgetClosedMaps(std::vector<View>* evicted) {
+  for (auto map = maps.begin(); map != maps.end();) {
+    if (!map->first.expired() || !map->second.being_made.empty()) {
+      ++map;
+      continue;
+    }
+    for (auto& [revision, slot] : map->second.slots) evicted->push_back(std::move(slot.view));
+    map = maps.erase(map);
+  }
+}
+
+void ViewCache::Impl::EvictTo(size_t bound, const View& spared, std::vector<View>* evicted) {
+  while (Bytes() > bound) {
+    MapViews* oldest_map = nullptr;
+    std::map<Revision, Slot>::iterator oldest;
+    for (auto& [map, views] : maps) {
+      for (auto slot = views.slots.begin(); slot != views.slots.end(); ++slot) {
+        if (slot->second.view == spared) continue;
+        if (oldest_map != nullptr && slot->second.last_use > oldest->second.last_use) continue;
+        oldest_map = &views;
+        oldest = slot;
+      }
+    }
+    if (oldest_map == nullptr) return;
+    evicted->push_back(std::move(oldest->second.view));
+    oldest_map->slots.erase(oldest);
+  }
+}
+
+absl::StatusOr<MadeView> ViewCache::Impl::Make(MapReader* map, const Snapshot& snapshot,
+                                               const View& nearest,
+                                               std::shared_ptr<SymbolTable> symbols,
+                                               const StopCheck& stop) const {
+  if (nearest != nullptr) {
+    const Revision older = std::min(nearest->revision(), snapshot.revision());
+    const Revision newer = std::max(nearest->revision(), snapshot.revision());
+    const auto touched = map->TouchedBetween(older, newer, stop);
+    // Where the history between the two was compacted, the whole can still be read.
+    const bool is_readable = touched.ok();
+    if (!is_readable && !absl::IsOutOfRange(touched.status()) &&
+        !absl::IsUnimplemented(touched.status())) {
+      return touched.status();
+    }
+    const auto all = static_cast<double>(nearest->node_count() + nearest->edge_count());
+    if (is_readable && static_cast<double>(touched->nodes.size() + touched->edges.size()) <=
+                           kDeriveShareMax * all) {
+      DSG_ASSIGN_OR_RETURN(View view, IndexedView::Derive(*nearest, *touched, snapshot, stop));
+      return MadeView{std::move(view), true};
+    }
+  }
+  DSG_ASSIGN_OR_RETURN(View view, IndexedView::Load(snapshot, std::move(symbols), stop));
+  return MadeView{std::move(view), false};
+}
+
+absl::Status ViewCache::Impl::Keep(const std::shared_ptr<MapReader>& map, const MadeView& made,
+                                   std::vector<View>* evicted) {
+  ++(made.was_derived ? counts.derived_count : counts.loaded_count);
+  const size_t bytes = made.view->memory_bytes();
+  if (bytes > bytes_max) {
+    return MakeError(
+        Reason::kLimitExceeded,
+        absl::StrCat("the graph of map \"", map->spec().name, "\" at revision ",
+                     made.view->revision(), " takes ", bytes, " bytes in memory, more than the ",
+                     bytes_max, " of the cache of graphs; ask a dsg-server that was started with ",
+                     "--view-cache-mb ", bytes / kMebibyte + 1, " or more"),
+        {{"map", map->spec().name}, {"bytes", absl::StrCat(bytes)}});
+  }
+  maps[map].slots[made.view->revision()] = {made.view, ++use_count, 0};
+  ForgetClosedMaps(evicted);
+  EvictTo(bytes_max, made.view, evicted);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<View> ViewCache::Impl::Get(const std::shared_ptr<MapReader>& map,
+                                          const Snapshot& snapshot, const StopCheck& stop) {
+  const Revision revision = snapshot.revision();
+  // Before the lock, so that it is freed after it.
+  std::vector<View> evicted;
+  std::unique_lock lock(mutex);
+  for (;;) {
+    MapViews& views = maps[map];
+    if (const auto slot = views.slots.find(revision); slot != views.slots.end()) {
+      slot->second.last_use = ++use_count;
+      ++counts.hit_count;
+      const View view = slot->second.view;
+      // Planning may have kept more beside the places since.
+      const size_t place_bytes = view->shared_places()->memory_bytes();
+      if (std::exchange(slot->second.place_bytes, place_bytes) < place_bytes) {
+        EvictTo(bytes_max, view, &evicted);
+      }
+      return view;
+    }
+    if (views.being_made.insert(revision).second) break;
+    made_or_given_up.wait_for(lock, kWaitSlice);
+    lock.unlock();
+    if (stop) DSG_RETURN_IF_ERROR(stop());
+    lock.lock();
+  }
+  // The maker, from here on: whatever happens, those who wait must be told. If it fails, the next
+  // of them tries for itself.
+  const View nearest = maps[map].Nearest(revision);
+  const std::shared_ptr<SymbolTable> symbols = maps[map].symbols;
+  lock.unlock();
+  auto made = Make(map.get(), snapshot, nearest, symbols, stop);
+  lock.lock();
+  absl::Status status = made.ok() ? Keep(map, *made, &evicted) : made.status();
+  maps[map].being_made.erase(revision);
+  made_or_given_up.notify_all();
+  DSG_RETURN_IF_ERROR(status);
+  return made->view;
+}
+
+ViewCache::ViewCache(size_t bytes_max) : impl_(std::make_unique<Impl>(bytes_max)) {}
+ViewCache::~ViewCache() = default;
+
+absl::StatusOr<std::shared_ptr<const GraphView>> ViewCache::Get(
+    const std::shared_ptr<MapReader>& map, const std::shared_ptr<const Snapshot>& snapshot,
+    const StopCheck& stop) {
+  return impl_->Get(map, *snapshot, stop);
+}
+
+ViewCache::Stats ViewCache::stats() const {
+  std::lock_guard lock(impl_->mutex);
+  Stats stats = impl_->counts;
+  stats.bytes = impl_->Bytes();
+  for (const auto& [map, views] : impl_->maps) {
+    stats.view_count += static_cast<int64_t>(views.slots.size());
+  }
+  return stats;
+}
+
+}  // namespace dsg::query
