@@ -10,28 +10,42 @@
 #include "query/engine/call_context.h"
 
 namespace dsg::v1 {
+class BatchGetNodesRequest;
+class BatchGetNodesResponse;
 class BatchLocateAgentsRequest;
 class BatchLocateAgentsResponse;
+class CheckCollisionRequest;
+class CheckCollisionResponse;
 class CommitRequest;
 class CommitResponse;
 class CreateMapRequest;
 class CreateMapResponse;
+class DiffRevisionsRequest;
+class DiffRevisionsResponse;
 class GetAgentShapeRequest;
 class GetAgentShapeResponse;
 class GetMapStatsRequest;
 class GetMapStatsResponse;
 class GetMeshRequest;
 class GetMeshResponse;
+class GetNeighborsRequest;
+class GetNeighborsResponse;
 class GetNodeRequest;
 class GetNodeResponse;
 class GetServerInfoRequest;
 class GetServerInfoResponse;
 class GetSessionRequest;
 class GetSessionResponse;
+class GetSubgraphRequest;
+class GetSubgraphResponse;
 class GetTrajectoryRequest;
 class GetTrajectoryResponse;
 class ListEdgesRequest;
 class ListEdgesResponse;
+class ListEncountersRequest;
+class ListEncountersResponse;
+class ListInteractionsRequest;
+class ListInteractionsResponse;
 class ListMapsRequest;
 class ListMapsResponse;
 class ListNearestNodesRequest;
@@ -44,6 +58,16 @@ class ListRevisionsRequest;
 class ListRevisionsResponse;
 class LocateAgentRequest;
 class LocateAgentResponse;
+class PlanPathRequest;
+class PlanPathResponse;
+class PlanPathsRequest;
+class PlanPathsResponse;
+class PredictAgentRequest;
+class PredictAgentResponse;
+class SearchNodesRequest;
+class SearchNodesResponse;
+class WatchMapRequest;
+class WatchMapResponse;
 }  // namespace dsg::v1
 
 namespace dsg::query {
@@ -81,6 +105,32 @@ class Api {
   virtual absl::Status GetAgentShape(
       const CallContext& call, const v1::GetAgentShapeRequest& request,
       const std::function<bool(const v1::GetAgentShapeResponse&)>& send) = 0;
+  virtual absl::Status BatchGetNodes(const CallContext& call,
+                                     const v1::BatchGetNodesRequest& request,
+                                     v1::BatchGetNodesResponse* reply) = 0;
+  virtual absl::Status GetNeighbors(const CallContext& call, const v1::GetNeighborsRequest& request,
+                                    v1::GetNeighborsResponse* reply) = 0;
+  virtual absl::Status SearchNodes(const CallContext& call, const v1::SearchNodesRequest& request,
+                                   v1::SearchNodesResponse* reply) = 0;
+  virtual absl::Status ListEncounters(const CallContext& call,
+                                      const v1::ListEncountersRequest& request,
+                                      v1::ListEncountersResponse* reply) = 0;
+  virtual absl::Status ListInteractions(const CallContext& call,
+                                        const v1::ListInteractionsRequest& request,
+                                        v1::ListInteractionsResponse* reply) = 0;
+  virtual absl::Status PlanPath(const CallContext& call, const v1::PlanPathRequest& request,
+                                v1::PlanPathResponse* reply) = 0;
+  virtual absl::Status PlanPaths(const CallContext& call, const v1::PlanPathsRequest& request,
+                                 v1::PlanPathsResponse* reply) = 0;
+  virtual absl::Status CheckCollision(const CallContext& call,
+                                      const v1::CheckCollisionRequest& request,
+                                      v1::CheckCollisionResponse* reply) = 0;
+  virtual absl::Status PredictAgent(const CallContext& call, const v1::PredictAgentRequest& request,
+                                    v1::PredictAgentResponse* reply) = 0;
+  /// As GetTrajectory.
+  virtual absl::Status GetSubgraph(
+      const CallContext& call, const v1::GetSubgraphRequest& request,
+      const std::function<bool(const v1::GetSubgraphResponse&)>& send) = 0;
 
   virtual absl::Status CreateMap(const CallContext& call, const v1::CreateMapRequest& request,
                                  v1::CreateMapResponse* reply) = 0;
@@ -91,6 +141,12 @@ class Api {
   virtual absl::Status ListRevisions(const CallContext& call,
                                      const v1::ListRevisionsRequest& request,
                                      v1::ListRevisionsResponse* reply) = 0;
+  virtual absl::Status DiffRevisions(const CallContext& call,
+                                     const v1::DiffRevisionsRequest& request,
+                                     v1::DiffRevisionsResponse* reply) = 0;
+  /// As GetTrajectory; ends only when `send` returns false or `call` does.
+  virtual absl::Status WatchMap(const CallContext& call, const v1::WatchMapRequest& request,
+                                const std::function<bool(const v1::WatchMapResponse&)>& send) = 0;
   virtual absl::Status GetServerInfo(const CallContext& call,
                                      const v1::GetServerInfoRequest& request,
                                      v1::GetServerInfoResponse* reply) = 0;

@@ -10,6 +10,7 @@
 #include <unordered_map>
 
 #include "absl/status/statusor.h"
+#include "query/view/view_cache.h"
 #include "schema/store/graph_store.h"
 
 namespace dsg::query {
@@ -17,9 +18,11 @@ namespace dsg::query {
 /// Threads: safe from many threads.
 class MapTable {
  public:
-  explicit MapTable(std::unique_ptr<GraphStore> store) : store_(std::move(store)) {}
+  explicit MapTable(std::unique_ptr<GraphStore> store, size_t view_cache_bytes = size_t{1} << 30)
+      : store_(std::move(store)), views_(view_cache_bytes) {}
 
   GraphStore& store() { return *store_; }
+  ViewCache& views() { return views_; }
 
   /// Opened at the first call and kept.
   /// Errors: MAP_NAME_INVALID; MAP_UNKNOWN; what GraphStore::OpenMap returns.
@@ -43,6 +46,7 @@ class MapTable {
 
   // First, so that it is destroyed after the readers and writers that it opened.
   std::unique_ptr<GraphStore> store_;
+  ViewCache views_;
   std::shared_mutex readers_mutex_;
   std::unordered_map<std::string, std::shared_ptr<MapReader>> readers_;
   std::mutex slots_mutex_;

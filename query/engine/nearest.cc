@@ -10,6 +10,8 @@
 #include "dsg/v1/query_service.pb.h"
 #include "query/engine/nodes.h"
 #include "query/engine/request_check.h"
+#include "query/engine/view_filter.h"
+#include "query/engine/view_nodes.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 
@@ -75,18 +77,67 @@ absl::StatusOr<std::vector<NearestNode>> NearestAgents(const Snapshot& snapshot,
   return found;
 }
 
-absl::StatusOr<std::vector<NearestNode>> FindNearest(const Snapshot& snapshot,
-                                                     const Question& question,
-                                                     const StopCheck& stop) {
-  if (!AsksForAgents(question.filter)) {
-    return snapshot.NearestNodes(question.point_map, question.k, question.max_distance_m,
-                                 question.filter, stop);
+struct Found {
+  const ViewNode* node = nullptr;
+  double distance_m = 0.0;
+};
+
+absl::StatusOr<std::vector<Found>> NearestInView(const GraphView& graph, const Question& question,
+                                                 const StopCheck& stop) {
+  constexpr int kStopEvery = 256;
+  const ViewFilter filter(question.filter, graph);
+  std::vector<Found> found;
+  if (!filter.CanMatch()) return found;
+  absl::Status status;
+  int looked_at = 0;
+  graph.ForEachNearest(question.point_map, filter.space(), question.max_distance_m,
+                       [&](const ViewNode& node, double distance_m) {
+                         if (++looked_at % kStopEvery == 0) status = stop();
+                         if (filter.Matches(node)) found.push_back({&node, distance_m});
+                         return status.ok() && found.size() < static_cast<size_t>(question.k);
+                       });
+  DSG_RETURN_IF_ERROR(status);
+  return found;
+}
+
+absl::Status ReplyTooLarge(const v1::ListNearestNodesRequest& request, int node_count) {
+  return FieldError("k", absl::StrCat(request.k()),
+                    absl::StrCat("the first ", node_count,
+                                 " nodes alone fill a reply; ask for fewer, or for a smaller "
+                                 "view"));
+}
+
+absl::Status FillNearest(const ReadView& view, const GraphView& graph,
+                         const v1::ListNearestNodesRequest& request,
+                         const std::vector<Found>& found, v1::ListNearestNodesResponse* reply) {
+  NodeFiller filler(view.snapshot(), graph, request.view());
+  std::vector<NodeId> ids;
+  for (const Found& nearest : found) ids.push_back(nearest.node->id);
+  filler.Expect(std::move(ids));
+  size_t bytes = 0;
+  for (const Found& nearest : found) {
+    v1::NearestNode* out = reply->add_nodes();
+    DSG_RETURN_IF_ERROR(filler.Fill(*nearest.node, out->mutable_node()));
+    out->set_distance_m(nearest.distance_m);
+    bytes += out->ByteSizeLong();
+    if (bytes > kReplyBytesMax) return ReplyTooLarge(request, reply->nodes_size());
   }
-  if (!question.filter.at_ns.has_value()) {
-    return FieldError("filter.at_ns", "",
-                      "agents move; say at which instant the nearest ones are wanted");
+  return absl::OkStatus();
+}
+
+absl::Status FillAgents(const ReadView& view, const v1::ListNearestNodesRequest& request,
+                        const std::vector<NearestNode>& found,
+                        v1::ListNearestNodesResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const LayerTable layers, LayersOf(view.snapshot()));
+  size_t bytes = 0;
+  for (const NearestNode& nearest : found) {
+    v1::NearestNode* out = reply->add_nodes();
+    FillNode(nearest.node, layers, request.view(), out->mutable_node());
+    out->set_distance_m(nearest.distance_m);
+    bytes += out->ByteSizeLong();
+    if (bytes > kReplyBytesMax) return ReplyTooLarge(request, reply->nodes_size());
   }
-  return NearestAgents(snapshot, question, stop);
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -97,24 +148,20 @@ absl::Status ListNearestNodes(const ReadView& view, const CallContext& call,
   const Snapshot& snapshot = view.snapshot();
   DSG_RETURN_IF_ERROR(CheckNodeView(request.view()));
   DSG_ASSIGN_OR_RETURN(const Question question, ReadQuestion(request, snapshot));
-  DSG_ASSIGN_OR_RETURN(const std::vector<NearestNode> found,
-                       FindNearest(snapshot, question, call.stop()));
-  DSG_ASSIGN_OR_RETURN(const LayerTable layers, LayersOf(snapshot));
   view.FillHeader(reply->mutable_header());
-  size_t bytes = 0;
-  for (const NearestNode& nearest : found) {
-    v1::NearestNode* out = reply->add_nodes();
-    FillNode(nearest.node, layers, request.view(), out->mutable_node());
-    out->set_distance_m(nearest.distance_m);
-    bytes += out->ByteSizeLong();
-    if (bytes > kReplyBytesMax) {
-      return FieldError("k", absl::StrCat(request.k()),
-                        absl::StrCat("the first ", reply->nodes_size(),
-                                     " nodes alone fill a reply; ask for fewer, or for a smaller "
-                                     "view"));
+  if (AsksForAgents(question.filter)) {
+    if (!question.filter.at_ns.has_value()) {
+      return FieldError("filter.at_ns", "",
+                        "agents move; say at which instant the nearest ones are wanted");
     }
+    DSG_ASSIGN_OR_RETURN(const std::vector<NearestNode> agents,
+                         NearestAgents(snapshot, question, call.stop()));
+    return FillAgents(view, request, agents, reply);
   }
-  return absl::OkStatus();
+  const StopCheck stop = call.stop();
+  DSG_ASSIGN_OR_RETURN(const auto graph, view.Graph(stop));
+  DSG_ASSIGN_OR_RETURN(const std::vector<Found> found, NearestInView(*graph, question, stop));
+  return FillNearest(view, *graph, request, found, reply);
 }
 
 }  // namespace dsg::query

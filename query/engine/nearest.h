@@ -14,7 +14,9 @@ class ListNearestNodesResponse;
 
 namespace dsg::query {
 
-/// Cost: an index lookup; for agents, one Locate an agent.
+/// Cost: an index lookup in the revision's view, which the first question of a revision has to make
+/// (about a second for 100,000 nodes, a few milliseconds from the view of a revision close by); for
+/// agents, one Locate an agent and no view.
 absl::Status ListNearestNodes(const ReadView& view, const CallContext& call,
                               const v1::ListNearestNodesRequest& request,
                               v1::ListNearestNodesResponse* reply);

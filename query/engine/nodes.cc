@@ -15,7 +15,7 @@ namespace {
 
 // A node asked for by a name that several share would be an arbitrary one of them.
 absl::Status CheckNameIsUnique(const Snapshot& snapshot, const std::string& name,
-                               const StopCheck& stop) {
+                               std::string_view field, const StopCheck& stop) {
   NodeFilter filter;
   filter.name = name;
   std::vector<NodeId> found;
@@ -24,20 +24,9 @@ absl::Status CheckNameIsUnique(const Snapshot& snapshot, const std::string& name
     return found.size() < 2;
   }));
   if (found.size() < 2) return absl::OkStatus();
-  return FieldError("id", name,
+  return FieldError(field, name,
                     absl::StrCat("several nodes have this name, among them ", ToString(found[0]),
                                  " and ", ToString(found[1]), "; give an id"));
-}
-
-absl::StatusOr<NodeId> ResolveOne(const Snapshot& snapshot, const std::string& id_or_name,
-                                  const StopCheck& stop) {
-  if (id_or_name.empty()) return FieldError("id", "", "give a node id such as O42, or a name");
-  DSG_ASSIGN_OR_RETURN(const NodeId id, snapshot.ResolveNode(id_or_name));
-  const absl::StatusOr<NodeId> parsed = ParseNodeId(id_or_name);
-  if (!parsed.ok() || *parsed != id) {
-    DSG_RETURN_IF_ERROR(CheckNameIsUnique(snapshot, id_or_name, stop));
-  }
-  return id;
 }
 
 absl::StatusOr<int64_t> CountChildren(const Snapshot& snapshot, NodeId id, const StopCheck& stop) {
@@ -50,6 +39,17 @@ absl::StatusOr<int64_t> CountChildren(const Snapshot& snapshot, NodeId id, const
 }
 
 }  // namespace
+
+absl::StatusOr<NodeId> ResolveOne(const Snapshot& snapshot, const std::string& id_or_name,
+                                  std::string_view field, const StopCheck& stop) {
+  if (id_or_name.empty()) return FieldError(field, "", "give a node id such as O42, or a name");
+  DSG_ASSIGN_OR_RETURN(const NodeId id, snapshot.ResolveNode(id_or_name));
+  const absl::StatusOr<NodeId> parsed = ParseNodeId(id_or_name);
+  if (!parsed.ok() || *parsed != id) {
+    DSG_RETURN_IF_ERROR(CheckNameIsUnique(snapshot, id_or_name, field, stop));
+  }
+  return id;
+}
 
 absl::Status CheckNodeView(int view) {
   if (v1::NodeView_IsValid(view)) return absl::OkStatus();
@@ -83,7 +83,7 @@ absl::Status GetNode(const ReadView& view, const CallContext& call,
                      const v1::GetNodeRequest& request, v1::GetNodeResponse* reply) {
   const Snapshot& snapshot = view.snapshot();
   DSG_RETURN_IF_ERROR(CheckNodeView(request.view()));
-  DSG_ASSIGN_OR_RETURN(const NodeId id, ResolveOne(snapshot, request.id(), call.stop()));
+  DSG_ASSIGN_OR_RETURN(const NodeId id, ResolveOne(snapshot, request.id(), "id", call.stop()));
   DSG_ASSIGN_OR_RETURN(const Node node, snapshot.GetNode(id));
   DSG_ASSIGN_OR_RETURN(const LayerTable layers, LayersOf(snapshot));
   DSG_ASSIGN_OR_RETURN(const std::vector<NodeId> ancestors, snapshot.Ancestors(id));

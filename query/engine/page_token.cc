@@ -94,6 +94,12 @@ absl::StatusOr<Page> OpenPage(MapTable* maps, std::string_view method, const Req
   return page;
 }
 
+template absl::StatusOr<Page> OpenPage(MapTable*, std::string_view, const v1::GetNeighborsRequest&);
+template absl::StatusOr<Page> OpenPage(MapTable*, std::string_view,
+                                       const v1::ListEncountersRequest&);
+template absl::StatusOr<Page> OpenPage(MapTable*, std::string_view,
+                                       const v1::ListInteractionsRequest&);
+template absl::StatusOr<Page> OpenPage(MapTable*, std::string_view, const v1::SearchNodesRequest&);
 template absl::StatusOr<Page> OpenPage(MapTable*, std::string_view, const v1::ListNodesRequest&);
 template absl::StatusOr<Page> OpenPage(MapTable*, std::string_view, const v1::ListEdgesRequest&);
 template absl::StatusOr<Page> OpenPage(MapTable*, std::string_view, const v1::ListPresenceRequest&);

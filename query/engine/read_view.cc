@@ -10,12 +10,13 @@
 
 namespace dsg::query {
 
-absl::StatusOr<ReadView> ReadView::Make(std::shared_ptr<MapReader> map,
+absl::StatusOr<ReadView> ReadView::Make(MapTable* maps, std::shared_ptr<MapReader> map,
                                         std::shared_ptr<const Snapshot> snapshot, Revision head) {
   ReadView view;
   DSG_ASSIGN_OR_RETURN(view.oldest_, map->OldestRevision());
   // A commit between two reads makes the head newer than the snapshot, never older.
   view.head_ = std::max(head, snapshot->revision());
+  view.maps_ = maps;
   view.map_ = std::move(map);
   view.snapshot_ = std::move(snapshot);
   return view;
@@ -26,7 +27,7 @@ absl::StatusOr<ReadView> ReadView::OpenAt(MapTable* maps, const std::string& map
   DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> reader, maps->Reader(map));
   DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Snapshot> snapshot, reader->At(revision));
   DSG_ASSIGN_OR_RETURN(const RevisionInfo head, reader->Head());
-  return Make(std::move(reader), std::move(snapshot), head.revision);
+  return Make(maps, std::move(reader), std::move(snapshot), head.revision);
 }
 
 absl::StatusOr<ReadView> ReadView::Open(MapTable* maps, const std::string& map,
@@ -42,7 +43,7 @@ absl::StatusOr<ReadView> ReadView::Open(MapTable* maps, const std::string& map,
   DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Snapshot> snapshot, reader->Latest());
   // The newest revision is the head, so it need not be asked for again.
   const Revision newest = snapshot->revision();
-  DSG_ASSIGN_OR_RETURN(ReadView view, Make(std::move(reader), std::move(snapshot), newest));
+  DSG_ASSIGN_OR_RETURN(ReadView view, Make(maps, std::move(reader), std::move(snapshot), newest));
   const Revision wanted = read_at.at_least_revision();
   if (wanted < 0) {
     return FieldError("read_at.at_least_revision", absl::StrCat(wanted),
@@ -58,6 +59,10 @@ absl::StatusOr<ReadView> ReadView::Open(MapTable* maps, const std::string& map,
          {"newest", absl::StrCat(view.head_)}});
   }
   return view;
+}
+
+absl::StatusOr<std::shared_ptr<const GraphView>> ReadView::Graph(const StopCheck& stop) const {
+  return maps_->views().Get(map_, snapshot_, stop);
 }
 
 void ReadView::FillHeader(v1::ResponseHeader* header) const {

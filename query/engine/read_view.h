@@ -7,6 +7,7 @@
 
 #include "absl/status/statusor.h"
 #include "query/engine/map_table.h"
+#include "query/view/graph_view.h"
 #include "schema/store/snapshot.h"
 
 namespace dsg::v1 {
@@ -29,14 +30,20 @@ class ReadView {
 
   MapReader& map() const { return *map_; }
   const Snapshot& snapshot() const { return *snapshot_; }
+  const std::shared_ptr<const Snapshot>& shared_snapshot() const { return snapshot_; }
   Revision head_revision() const { return head_; }
+
+  /// The graph of this revision in memory, read or derived if nobody has asked for it yet.
+  /// Errors: as ViewCache::Get.
+  absl::StatusOr<std::shared_ptr<const GraphView>> Graph(const StopCheck& stop) const;
 
   void FillHeader(v1::ResponseHeader* header) const;
 
  private:
-  static absl::StatusOr<ReadView> Make(std::shared_ptr<MapReader> map,
+  static absl::StatusOr<ReadView> Make(MapTable* maps, std::shared_ptr<MapReader> map,
                                        std::shared_ptr<const Snapshot> snapshot, Revision head);
 
+  MapTable* maps_ = nullptr;
   std::shared_ptr<MapReader> map_;
   std::shared_ptr<const Snapshot> snapshot_;
   Revision head_ = 0;

@@ -1,31 +1,50 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "query/engine/service_core.h"
 
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
 #include "dsg/v1/ingest_service.pb.h"
 #include "dsg/v1/map_service.pb.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/engine/agent_shape.h"
 #include "query/engine/ancestry.h"
+#include "query/engine/collision.h"
 #include "query/engine/commit.h"
+#include "query/engine/diff.h"
 #include "query/engine/edges.h"
+#include "query/engine/encounters.h"
+#include "query/engine/interactions.h"
 #include "query/engine/locate.h"
 #include "query/engine/map_table.h"
 #include "query/engine/maps.h"
 #include "query/engine/mesh.h"
 #include "query/engine/nearest.h"
+#include "query/engine/neighbors.h"
 #include "query/engine/nodes.h"
 #include "query/engine/page_token.h"
+#include "query/engine/path.h"
+#include "query/engine/predict.h"
 #include "query/engine/presence.h"
 #include "query/engine/read_view.h"
+#include "query/engine/search.h"
+#include "query/engine/subgraph.h"
 #include "query/engine/trajectory.h"
+#include "query/engine/walk_area_cache.h"
+#include "query/engine/watch.h"
 #include "schema/base/status.h"
 
 namespace dsg::query {
 namespace {
 
+// How soon a call that waits for news sees that it was cancelled.
+constexpr std::chrono::milliseconds kCancelPeriod{20};
+
 class LocalCore final : public ServiceCore {
  public:
-  explicit LocalCore(std::unique_ptr<GraphStore> store) : maps_(std::move(store)) {}
+  LocalCore(std::unique_ptr<GraphStore> store, const ServiceCoreOptions& options)
+      : maps_(std::move(store), options.view_cache_bytes) {}
 
   absl::Status LocateAgent(const CallContext& call, const v1::LocateAgentRequest& request,
                            v1::LocateAgentResponse* reply) override {
@@ -114,6 +133,93 @@ class LocalCore final : public ServiceCore {
     return query::ListNearestNodes(view, call, request, reply);
   }
 
+  absl::Status BatchGetNodes(const CallContext& call, const v1::BatchGetNodesRequest& request,
+                             v1::BatchGetNodesResponse* reply) override {
+    DSG_ASSIGN_OR_RETURN(const ReadView view, Open(call, request));
+    return query::BatchGetNodes(view, call, request, reply);
+  }
+
+  absl::Status PlanPath(const CallContext& call, const v1::PlanPathRequest& request,
+                        v1::PlanPathResponse* reply) override {
+    DSG_ASSIGN_OR_RETURN(const ReadView view, Open(call, request));
+    return query::PlanPath(view, &names_, call, request, reply);
+  }
+
+  absl::Status PlanPaths(const CallContext& call, const v1::PlanPathsRequest& request,
+                         v1::PlanPathsResponse* reply) override {
+    DSG_ASSIGN_OR_RETURN(const ReadView view, Open(call, request));
+    return query::PlanPaths(view, &names_, call, request, reply);
+  }
+
+  absl::Status CheckCollision(const CallContext& call, const v1::CheckCollisionRequest& request,
+                              v1::CheckCollisionResponse* reply) override {
+    DSG_ASSIGN_OR_RETURN(const ReadView view, Open(call, request));
+    return query::CheckCollision(view, call, request, reply);
+  }
+
+  absl::Status PredictAgent(const CallContext& call, const v1::PredictAgentRequest& request,
+                            v1::PredictAgentResponse* reply) override {
+    DSG_ASSIGN_OR_RETURN(const ReadView view, Open(call, request));
+    return query::PredictAgent(view, &names_, &walk_areas_, call, request, reply);
+  }
+
+  absl::Status GetNeighbors(const CallContext& call, const v1::GetNeighborsRequest& request,
+                            v1::GetNeighborsResponse* reply) override {
+    DSG_ASSIGN_OR_RETURN(const Page page, OpenList(call, "GetNeighbors", request));
+    return query::GetNeighbors(page, call, request, reply);
+  }
+
+  absl::Status SearchNodes(const CallContext& call, const v1::SearchNodesRequest& request,
+                           v1::SearchNodesResponse* reply) override {
+    DSG_ASSIGN_OR_RETURN(const Page page, OpenList(call, "SearchNodes", request));
+    return query::SearchNodes(page, call, request, reply);
+  }
+
+  absl::Status ListEncounters(const CallContext& call, const v1::ListEncountersRequest& request,
+                              v1::ListEncountersResponse* reply) override {
+    DSG_ASSIGN_OR_RETURN(const Page page, OpenList(call, "ListEncounters", request));
+    return query::ListEncounters(page, &names_, call, request, reply);
+  }
+
+  absl::Status ListInteractions(const CallContext& call, const v1::ListInteractionsRequest& request,
+                                v1::ListInteractionsResponse* reply) override {
+    DSG_ASSIGN_OR_RETURN(const Page page, OpenList(call, "ListInteractions", request));
+    return query::ListInteractions(page, &names_, call, request, reply);
+  }
+
+  absl::StatusOr<std::unique_ptr<SubgraphCursor>> OpenSubgraph(
+      const v1::GetSubgraphRequest& request) override {
+    DSG_ASSIGN_OR_RETURN(const ReadView view,
+                         ReadView::Open(&maps_, request.map(), request.read_at()));
+    return query::OpenSubgraph(view, request);
+  }
+
+  absl::Status GetSubgraph(
+      const CallContext& call, const v1::GetSubgraphRequest& request,
+      const std::function<bool(const v1::GetSubgraphResponse&)>& send) override {
+    DSG_RETURN_IF_ERROR(call.Check());
+    DSG_ASSIGN_OR_RETURN(const std::unique_ptr<SubgraphCursor> cursor, OpenSubgraph(request));
+    return SendAll(call, cursor.get(), send);
+  }
+
+  absl::Status DiffRevisions(const CallContext& call, const v1::DiffRevisionsRequest& request,
+                             v1::DiffRevisionsResponse* reply) override {
+    DSG_RETURN_IF_ERROR(call.Check());
+    return query::DiffRevisions(&maps_, call, request, reply);
+  }
+
+  absl::StatusOr<std::unique_ptr<WatchCursor>> OpenWatch(
+      const v1::WatchMapRequest& request) override {
+    return query::OpenWatch(&maps_, request);
+  }
+
+  absl::Status WatchMap(const CallContext& call, const v1::WatchMapRequest& request,
+                        const std::function<bool(const v1::WatchMapResponse&)>& send) override {
+    DSG_RETURN_IF_ERROR(call.Check());
+    DSG_ASSIGN_OR_RETURN(const std::unique_ptr<WatchCursor> cursor, OpenWatch(request));
+    return SendAll(call, cursor.get(), send);
+  }
+
   absl::Status CreateMap(const CallContext& call, const v1::CreateMapRequest& request,
                          v1::CreateMapResponse* reply) override {
     DSG_RETURN_IF_ERROR(call.Check());
@@ -167,10 +273,20 @@ class LocalCore final : public ServiceCore {
   }
 
   template <typename Reply>
+  static absl::Status SleepUntilNews(const CallContext& call, StreamCursor<Reply>* cursor) {
+    for (auto left = cursor->Wait(); left.count() > 0; left = cursor->Wait()) {
+      DSG_RETURN_IF_ERROR(call.Check());
+      std::this_thread::sleep_for(std::min<std::chrono::nanoseconds>(left, kCancelPeriod));
+    }
+    return call.Check();
+  }
+
+  template <typename Reply>
   static absl::Status SendAll(const CallContext& call, StreamCursor<Reply>* cursor,
                               const std::function<bool(const Reply&)>& send) {
     Reply message;
     do {
+      DSG_RETURN_IF_ERROR(SleepUntilNews(call, cursor));
       message.Clear();
       DSG_RETURN_IF_ERROR(cursor->Next(call, &message));
     } while (send(message) && !cursor->done());
@@ -187,12 +303,14 @@ class LocalCore final : public ServiceCore {
   MapTable maps_;
   AgentNames names_;
   AncestryCache ancestries_;
+  WalkAreaCache walk_areas_;
 };
 
 }  // namespace
 
-std::unique_ptr<ServiceCore> MakeServiceCore(std::unique_ptr<GraphStore> store) {
-  return std::make_unique<LocalCore>(std::move(store));
+std::unique_ptr<ServiceCore> MakeServiceCore(std::unique_ptr<GraphStore> store,
+                                             const ServiceCoreOptions& options) {
+  return std::make_unique<LocalCore>(std::move(store), options);
 }
 
 }  // namespace dsg::query

@@ -2,6 +2,7 @@
 // The service without the network: checks requests, opens maps, asks the engine, fills replies.
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <string>
 
@@ -24,11 +25,16 @@ class StreamCursor {
   virtual absl::Status Next(const CallContext& call, Reply* reply) = 0;
   /// No message follows. May only be asked after Next.
   virtual bool done() const = 0;
+  /// How long to wait before this is asked again, because there is nothing to tell yet; zero once
+  /// Next has a message, or an error, to give at once. May be asked before the first Next.
+  virtual std::chrono::nanoseconds Wait() { return std::chrono::nanoseconds::zero(); }
 };
 
 using TrajectoryCursor = StreamCursor<v1::GetTrajectoryResponse>;
 using MeshCursor = StreamCursor<v1::GetMeshResponse>;
 using AgentShapeCursor = StreamCursor<v1::GetAgentShapeResponse>;
+using SubgraphCursor = StreamCursor<v1::GetSubgraphResponse>;
+using WatchCursor = StreamCursor<v1::WatchMapResponse>;
 
 /// An Api in this process.
 class ServiceCore : public Api {
@@ -42,10 +48,23 @@ class ServiceCore : public Api {
   /// GetAgentShape by pulling. Errors: those of GetAgentShape.
   virtual absl::StatusOr<std::unique_ptr<AgentShapeCursor>> OpenAgentShape(
       const v1::GetAgentShapeRequest& request) = 0;
+  /// GetSubgraph by pulling. Errors: those of GetSubgraph.
+  virtual absl::StatusOr<std::unique_ptr<SubgraphCursor>> OpenSubgraph(
+      const v1::GetSubgraphRequest& request) = 0;
+  /// WatchMap by pulling; never done. Errors: those of WatchMap.
+  virtual absl::StatusOr<std::unique_ptr<WatchCursor>> OpenWatch(
+      const v1::WatchMapRequest& request) = 0;
+};
+
+struct ServiceCoreOptions {
+  /// Bound of the graphs kept in memory, all maps and revisions together. A million nodes and 3.5
+  /// million edges take half of it, and a quarter once paths are asked for.
+  size_t view_cache_bytes = size_t{1} << 30;
 };
 
 /// Makes an Api that answers from `store`. Writers are opened at the first Commit to a map and kept
 /// (with their lock) until the Api is destroyed.
-std::unique_ptr<ServiceCore> MakeServiceCore(std::unique_ptr<GraphStore> store);
+std::unique_ptr<ServiceCore> MakeServiceCore(std::unique_ptr<GraphStore> store,
+                                             const ServiceCoreOptions& options = {});
 
 }  // namespace dsg::query

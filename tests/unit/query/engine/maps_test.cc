@@ -43,10 +43,11 @@ TEST_F(Maps, CreatesAMapWithDefaultsAndListsItByName) {
 
 TEST_F(Maps, RefusesNamesThatExistOrArePaths) {
   EXPECT_EQ(ReasonOf(Create("office")), Reason::kMapExists);
-  for (const char* name : {"", "../x", "/tmp/x", "a/b", "A", "a b", ".", "x\n"}) {
+  for (const char* name :
+       {"", "../dsg-escaped", "/tmp/dsg-escaped", "a/b", "A", "a b", ".", "x\n"}) {
     EXPECT_EQ(ReasonOf(Create(name)), Reason::kMapNameInvalid) << name;
   }
-  EXPECT_FALSE(std::filesystem::exists(folder_.path() + "/../x"));
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() + "/../dsg-escaped"));
 }
 
 TEST_F(Maps, MeasuresAMap) {

@@ -3,7 +3,6 @@
 
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
 
 namespace dsg::test {
 namespace {
@@ -61,13 +60,6 @@ void AddTracks(GraphDelta* delta) {
 }
 
 }  // namespace
-
-TempFolder::TempFolder() {
-  path_ = (std::filesystem::temp_directory_path() / "dsg-test-XXXXXX").string();
-  if (mkdtemp(path_.data()) == nullptr) std::abort();
-}
-
-TempFolder::~TempFolder() { std::filesystem::remove_all(path_); }
 
 TimedPose PoseAt(TimeNs time_ns, double x, double y, double z) {
   TimedPose pose;

@@ -10,24 +10,12 @@
 #include "query/engine/service_core.h"
 #include "schema/model/graph_delta.h"
 #include "schema/store/graph_store.h"
+#include "tests/support/temp_folder.h"
 
 namespace dsg::test {
 
 inline constexpr TimeNs kSecond = kNsPerSecond;
 inline constexpr char kMap[] = "office";
-
-/// A folder of its own under the test's temporary directory, removed at the end.
-class TempFolder {
- public:
-  TempFolder();
-  ~TempFolder();
-  TempFolder(const TempFolder&) = delete;
-  TempFolder& operator=(const TempFolder&) = delete;
-  const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
 
 /// Building B1 holds rooms R1 (x 0 to 10) and R2 (x 10 to 20), y 0 to 10, z 0 to 3; R1 holds places
 /// p1 (x 1 to 4) and p2 (x 5 to 8), R2 holds p3 (x 12 to 18); object O1 "cup" is in p1, O2 "chair"

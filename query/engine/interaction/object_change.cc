@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/engine/interaction/object_change.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "query/engine/interaction/track_path.h"
+#include "schema/base/status.h"
+#include "schema/model/edge.h"
+
+namespace dsg::query {
+namespace {
+
+constexpr TimeNs kSettleNs = 10 * kNsPerSecond;
+
+class ChangeFinder {
+ public:
+  ChangeFinder(const Snapshot& snapshot, const GraphView& view, const ChangeFilter& filter)
+      : snapshot_(snapshot), view_(view), filter_(filter) {}
+
+  absl::Status Begin() {
+    DSG_ASSIGN_OR_RETURN(const MapStats stats, snapshot_.Stats());
+    first_pose_ns_ = stats.first_pose_ns;
+    contains_ = view_.symbols().Find(relations::kContains);
+    return absl::OkStatus();
+  }
+
+  absl::Status Add(const ViewNode& node, std::vector<ObjectChange>* out) const {
+    if (!filter_.class_name.empty() &&
+        view_.symbols().Text(node.class_name) != filter_.class_name) {
+      return absl::OkStatus();
+    }
+    if (filter_.with_picked && node.valid.to_ns != kTimeMax) {
+      DSG_RETURN_IF_ERROR(AddPicked(node, out));
+    }
+    if (filter_.with_placed && node.valid.from_ns != kTimeMin) return AddPlaced(node, out);
+    return absl::OkStatus();
+  }
+
+ private:
+  absl::Status AddPicked(const ViewNode& node, std::vector<ObjectChange>* out) const {
+    DSG_ASSIGN_OR_RETURN(const Node full, snapshot_.GetNode(node.id));
+    ObjectChange change = Describe(node, full, AddTime(node.valid.to_ns, -1));
+    change.type = ChangeType::kPicked;
+    change.latest_ns = node.valid.to_ns;
+    // An observation after the end is of something else.
+    const TimeNs seen_ns = full.last_observed_ns.value_or(node.valid.from_ns);
+    change.earliest_ns = std::clamp(seen_ns, node.valid.from_ns, AddTime(node.valid.to_ns, -1));
+    Keep(std::move(change), out);
+    return absl::OkStatus();
+  }
+
+  absl::Status AddPlaced(const ViewNode& node, std::vector<ObjectChange>* out) const {
+    const TimeNs look_ns = FirstLook(node);
+    if (AddTime(look_ns, kSettleNs) > node.valid.from_ns) return absl::OkStatus();
+    DSG_ASSIGN_OR_RETURN(const Node full, snapshot_.GetNode(node.id));
+    ObjectChange change = Describe(node, full, node.valid.from_ns);
+    change.type = ChangeType::kPlaced;
+    change.earliest_ns = look_ns;
+    change.latest_ns = node.valid.from_ns;
+    Keep(std::move(change), out);
+    return absl::OkStatus();
+  }
+
+  void Keep(ObjectChange change, std::vector<ObjectChange>* out) const {
+    if (change.earliest_ns >= filter_.during.to_ns || change.latest_ns < filter_.during.from_ns) {
+      return;
+    }
+    const bool is_below = filter_.below.empty() || filter_.below == change.object ||
+                          std::find(change.ancestors.begin(), change.ancestors.end(),
+                                    filter_.below) != change.ancestors.end();
+    if (is_below) out->push_back(std::move(change));
+  }
+
+  // When the place of an object was first seen; kTimeMax where nothing tells.
+  TimeNs FirstLook(const ViewNode& node) const {
+    const ViewNode* parent = view_.FindNode(ParentAt(node.id, node.valid.from_ns));
+    if (parent != nullptr && parent->valid.from_ns != kTimeMin) return parent->valid.from_ns;
+    return first_pose_ns_.value_or(kTimeMax);
+  }
+
+  // The lowest id where there are several.
+  NodeId ParentAt(NodeId id, TimeNs at_ns) const {
+    NodeId parent;
+    if (!contains_.has_value()) return parent;
+    view_.ForEachEdgeTo(id, *contains_, [&](const ViewEdge& edge) {
+      if (!edge.valid.Contains(at_ns)) return true;
+      parent = edge.source;
+      return false;
+    });
+    return parent;
+  }
+
+  ObjectChange Describe(const ViewNode& node, const Node& full, TimeNs at_ns) const {
+    ObjectChange change;
+    change.object = node.id;
+    change.name = full.name;
+    change.class_name = full.class_name;
+    change.box_map = full.BoxMap();
+    change.observation_count = full.observation_count;
+    for (NodeId parent = ParentAt(node.id, at_ns); !parent.empty();
+         parent = ParentAt(parent, at_ns)) {
+      change.ancestors.push_back(parent);
+    }
+    for (const NodeId id : change.ancestors) {
+      const ViewNode* ancestor = view_.FindNode(id);
+      if (ancestor == nullptr || ancestor->layer != layers::kRooms) continue;
+      change.room = id;
+      break;
+    }
+    return change;
+  }
+
+  const Snapshot& snapshot_;
+  const GraphView& view_;
+  const ChangeFilter& filter_;
+  std::optional<TimeNs> first_pose_ns_;
+  std::optional<Symbol> contains_;
+};
+
+}  // namespace
+
+absl::StatusOr<std::vector<ObjectChange>> FindChanges(const Snapshot& snapshot,
+                                                      const GraphView& view,
+                                                      const ChangeFilter& filter,
+                                                      const StopCheck& stop) {
+  ChangeFinder finder(snapshot, view, filter);
+  DSG_RETURN_IF_ERROR(finder.Begin());
+  std::vector<ObjectChange> changes;
+  if (!filter.object.empty()) {
+    const ViewNode* node = view.FindNode(filter.object);
+    if (node != nullptr) DSG_RETURN_IF_ERROR(finder.Add(*node, &changes));
+  } else {
+    int64_t count = 0;
+    absl::Status status;
+    view.ForEachInLayer(layers::kObjects, [&](const ViewNode& node) {
+      if (stop && ++count % 256 == 0) status = stop();
+      if (status.ok()) status = finder.Add(node, &changes);
+      return status.ok();
+    });
+    DSG_RETURN_IF_ERROR(status);
+  }
+  std::sort(changes.begin(), changes.end(),
+            [](const ObjectChange& a, const ObjectChange& b) { return KeyOf(a) < KeyOf(b); });
+  return changes;
+}
+
+}  // namespace dsg::query

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/engine/planning/attach.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <tuple>
+
+#include "query/engine/planning/planning_annex.h"
+#include "schema/base/status.h"
+
+namespace dsg::query {
+namespace {
+
+constexpr size_t kAnchorsMax = 4;
+// The tiers whose clearances say that the way is free.
+constexpr size_t kProvenTiers = 2;
+// Looking for obstacles is costly: so many lines to a position are tried.
+constexpr size_t kLinesMax = 8;
+constexpr size_t kStopPeriod = 256;
+
+void KeepNearest(size_t count_max, std::vector<Anchor>* anchors) {
+  std::sort(anchors->begin(), anchors->end(), [](const Anchor& a, const Anchor& b) {
+    return std::tie(a.way_m, a.place) < std::tie(b.way_m, b.place);
+  });
+  if (anchors->size() > count_max) anchors->resize(count_max);
+}
+
+double DistanceToSegment(const Eigen::Vector3d& point, const Eigen::Vector3d& a,
+                         const Eigen::Vector3d& b) {
+  const Eigen::Vector3d along = b - a;
+  const double square = along.squaredNorm();
+  if (square == 0.0) return (point - a).norm();
+  const double fraction = std::clamp((point - a).dot(along) / square, 0.0, 1.0);
+  return (point - a - fraction * along).norm();
+}
+
+class Attacher {
+ public:
+  Attacher(const PlaceGraph& graph, const Limits& limits, const LineCheck& is_free)
+      : graph_(graph),
+        limits_(limits),
+        is_free_(is_free),
+        locator_(PlanningAnnex::Of(graph).locator()) {}
+
+  absl::StatusOr<std::vector<Anchor>> ToPosition(const Eigen::Vector3d& point_map,
+                                                 NodeId node) const {
+    std::array<std::vector<Anchor>, 4> tiers;
+    const double reach_m = std::max(kAttachM, locator_.clearance_m_max()) +
+                           0.5 * locator_.link_length_m_max() + kStoreyM;
+    locator_.ForEachNear(Box3d(point_map), reach_m, [&](PlaceIndex place) {
+      if (!limits_.Admits(graph_, place)) return;
+      const std::optional<size_t> tier = TierOf(place, point_map);
+      if (!tier.has_value()) return;
+      const double way_m = (graph_.position_map(place) - point_map).norm();
+      tiers[*tier].push_back({place, way_m, node});
+    });
+    for (size_t i = 0; i < tiers.size(); ++i) {
+      if (i >= kProvenTiers) {
+        KeepNearest(kLinesMax, &tiers[i]);
+        DSG_RETURN_IF_ERROR(DropUnfree(point_map, &tiers[i]));
+      }
+      if (tiers[i].empty()) continue;
+      KeepNearest(i + 1 == tiers.size() ? 1 : kAnchorsMax, &tiers[i]);
+      return std::move(tiers[i]);
+    }
+    return std::vector<Anchor>();
+  }
+
+  std::vector<Anchor> ToBox(const PathTarget& target) const {
+    const Box3d& box = *target.box_map;
+    std::vector<Anchor> near;
+    std::vector<Anchor> in_room;
+    const double reach_m = std::max(kAttachM, locator_.clearance_m_max());
+    locator_.ForEachNear(box, reach_m, [&](PlaceIndex place) {
+      if (!limits_.Admits(graph_, place)) return;
+      const Eigen::Vector3d& at = graph_.position_map(place);
+      const double way_m = box.exteriorDistance(at);
+      const double beside_m = box.exteriorDistance(AtHeight(at, box));
+      if (beside_m > std::max(kAttachM, graph_.clearance_m(place))) return;
+      if (at.z() < box.min().z() - kStoreyM || at.z() > box.max().z() + kStoreyM) return;
+      near.push_back({place, way_m, target.node, target.position_map.has_value()});
+      const bool same = !target.room.empty() && graph_.room(place) == target.room;
+      if (same) in_room.push_back(near.back());
+    });
+    std::vector<Anchor>& chosen = in_room.empty() ? near : in_room;
+    KeepNearest(kAnchorsMax, &chosen);
+    return std::move(chosen);
+  }
+
+  std::vector<Anchor> ToPlaces(const PathTarget& target) const {
+    std::vector<Anchor> anchors;
+    for (const PlaceIndex place : target.places) {
+      if (limits_.Admits(graph_, place)) anchors.push_back({place, 0.0, target.node});
+    }
+    return anchors;
+  }
+
+ private:
+  absl::Status DropUnfree(const Eigen::Vector3d& point_map, std::vector<Anchor>* anchors) const {
+    if (!is_free_) return absl::OkStatus();
+    std::vector<Anchor> kept;
+    for (const Anchor& anchor : *anchors) {
+      DSG_ASSIGN_OR_RETURN(const bool is_free,
+                           is_free_(point_map, graph_.position_map(anchor.place)));
+      if (is_free) kept.push_back(anchor);
+    }
+    *anchors = std::move(kept);
+    return absl::OkStatus();
+  }
+
+  // 0 = the best; see the header.
+  std::optional<size_t> TierOf(PlaceIndex place, const Eigen::Vector3d& point_map) const {
+    const Eigen::Vector3d to_place = graph_.position_map(place) - point_map;
+    const double clearance_m = graph_.clearance_m(place);
+    const double free_m = clearance_m - limits_.radius_m;
+    if (to_place.norm() <= free_m || IsBesideLink(place, point_map)) return 0;
+    if (std::abs(to_place.z()) > kStoreyM) {
+      return to_place.norm() <= clearance_m ? std::optional<size_t>(2) : std::nullopt;
+    }
+    const double level_m = to_place.head<2>().norm();
+    const Eigen::Vector3d level_map(point_map.x(), point_map.y(), graph_.position_map(place).z());
+    if (level_m <= free_m || IsBesideLink(place, level_map)) return 1;
+    if (level_m <= clearance_m) return 2;
+    return level_m <= kAttachM ? std::optional<size_t>(3) : std::nullopt;
+  }
+
+  // The same point at a height of the box, as far as that is within the storey.
+  static Eigen::Vector3d AtHeight(const Eigen::Vector3d& point, const Box3d& box) {
+    return {point.x(), point.y(), std::clamp(point.z(), box.min().z(), box.max().z())};
+  }
+
+  // The space that a link has swept is convex: whoever is in it gets to both ends.
+  bool IsBesideLink(PlaceIndex place, const Eigen::Vector3d& point_map) const {
+    return std::any_of(graph_.links_begin(place), graph_.links_end(place), [&](const auto& link) {
+      return limits_.Admits(link) && DistanceToSegment(point_map, graph_.position_map(place),
+                                                       graph_.position_map(link.to)) +
+                                             limits_.radius_m <=
+                                         static_cast<double>(link.clearance_m);
+    });
+  }
+
+  const PlaceGraph& graph_;
+  const Limits& limits_;
+  const LineCheck& is_free_;
+  const PlaceLocator& locator_;
+};
+
+}  // namespace
+
+absl::StatusOr<std::vector<Anchor>> Attach(const PlaceGraph& graph, const Limits& limits,
+                                           const std::vector<PathTarget>& targets,
+                                           const LineCheck& is_free, const StopCheck& stop) {
+  const Attacher attacher(graph, limits, is_free);
+  std::vector<Anchor> all;
+  for (size_t i = 0; i < targets.size(); ++i) {
+    if (i % kStopPeriod == 0 && stop) DSG_RETURN_IF_ERROR(stop());
+    const PathTarget& target = targets[i];
+    std::vector<Anchor> anchors = attacher.ToPlaces(target);
+    if (target.position_map.has_value()) {
+      DSG_ASSIGN_OR_RETURN(anchors, attacher.ToPosition(*target.position_map, target.node));
+    }
+    if (anchors.empty() && target.box_map.has_value()) anchors = attacher.ToBox(target);
+    all.insert(all.end(), anchors.begin(), anchors.end());
+  }
+  SortAnchors(&all);
+  return all;
+}
+
+}  // namespace dsg::query

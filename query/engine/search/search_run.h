@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// A search from start to end: one page of nodes, by id or nearest first, with the steps it took.
+// Refuses to remember anything between pages: where a page begins is all that the next one needs.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "query/engine/search/pattern.h"
+#include "query/engine/search/search_plan.h"
+
+namespace dsg::query {
+
+/// Orders hits: by distance, then id. Without a point to be near to, all distances are 0.
+struct HitKey {
+  double distance_m = 0.0;
+  NodeId id;
+  auto operator<=>(const HitKey&) const = default;
+};
+
+struct Hit {
+  HitKey key;
+  /// Of agents in a search with a point or a box: where they were.
+  std::optional<Pose3d> map_T_agent;
+  std::vector<NodeId> related;
+};
+
+struct SearchQuestion {
+  Pattern pattern;
+  /// nullopt: at any time.
+  std::optional<TimeNs> at_ns;
+  std::optional<Eigen::Vector3d> near_map;
+  double distance_m_max = std::numeric_limits<double>::infinity();
+  std::optional<Box3d> box_map;
+  /// Where an agent was at at_ns; nullopt if nobody knows. Asked only where there is a point or a
+  /// box, the pattern asks for agents, and at_ns is set.
+  std::function<absl::StatusOr<std::optional<Pose3d>>(NodeId agent)> locate;
+  std::optional<HitKey> after;
+  int limit = 1;
+  bool explain = false;
+};
+
+struct SearchAnswer {
+  /// Ascending by key.
+  std::vector<Hit> hits;
+  bool has_more = false;
+  /// Empty unless asked for.
+  std::vector<PlanStep> steps;
+};
+
+/// Agents have no place of their own, so with a point or a box only patterns that ask for agents
+/// find them, where their tracks put them at at_ns.
+///
+/// Errors: those of `locate`; what `stop` returned.
+absl::StatusOr<SearchAnswer> RunSearch(const GraphView& view, const SearchQuestion& question,
+                                       const StopCheck& stop);
+
+}  // namespace dsg::query

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Nodes of a view as replies carry them: from memory where the asked-for part of a node is there,
+// from the store otherwise. Refuses to differ: both ways give the same bytes.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "query/engine/in_turn.h"
+#include "query/engine/read_view.h"
+#include "query/view/graph_view.h"
+#include "schema/codec/proto_convert.h"
+
+namespace dsg::v1 {
+class Node;
+}  // namespace dsg::v1
+
+namespace dsg::query {
+
+/// Threads: one caller at a time.
+class NodeFiller {
+ public:
+  /// `node_view` is a number of v1.NodeView. All must outlive this.
+  NodeFiller(const Snapshot& snapshot, const GraphView& graph, int node_view);
+  NodeFiller(const NodeFiller&) = delete;
+  NodeFiller& operator=(const NodeFiller&) = delete;
+
+  /// The nodes of the coming calls of Fill, in their order: those that must come from the store
+  /// are then read many at a time.
+  void Expect(std::vector<NodeId> ids);
+
+  /// Errors: as Snapshot::GetNode.
+  absl::Status Fill(const ViewNode& node, v1::Node* out) { return Fill(node, std::nullopt, out); }
+  /// With `map_T_agent` in place of the pose, if given.
+  absl::Status Fill(const ViewNode& node, const std::optional<Pose3d>& map_T_agent, v1::Node* out);
+
+ private:
+  bool IsInView() const;
+  Node FromView(const ViewNode& node) const;
+  absl::StatusOr<Node> FromStore(NodeId id);
+
+  const Snapshot& snapshot_;
+  const GraphView& graph_;
+  LayerTable layers_;
+  int node_view_;
+  std::vector<NodeId> expected_ids_;
+  InTurn<NodeId> expected_;
+};
+
+}  // namespace dsg::query

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/engine/walk_area.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "query/prediction/goal_choice.h"
+
+namespace dsg::query {
+namespace {
+
+constexpr double kTileHeightM = 3.0;
+// Stairs lead up and down; whole storeys above do not matter.
+constexpr double kReachUpM = 6.0;
+// Places nearer to the outline of their building than this may lead out of it.
+constexpr double kExitM = 1.5;
+
+int64_t IndexOf(double coordinate_m, double size_m) {
+  return std::llround(std::clamp(std::floor(coordinate_m / size_m), -1e9, 1e9));
+}
+
+// Whether something is there at an instant, and from when to when that is so.
+class Instant {
+ public:
+  explicit Instant(TimeNs at_ns) : at_ns_(at_ns) {}
+
+  bool IsIn(const Interval& valid) {
+    const bool is_in = valid.Contains(at_ns_);
+    for (const TimeNs change_ns : {valid.from_ns, valid.to_ns}) {
+      if (change_ns <= at_ns_) same_.from_ns = std::max(same_.from_ns, change_ns);
+      if (change_ns > at_ns_) same_.to_ns = std::min(same_.to_ns, change_ns);
+    }
+    return is_in;
+  }
+
+  // While all answers were the same.
+  const Interval& same() const { return same_; }
+
+ private:
+  const TimeNs at_ns_;
+  Interval same_;
+};
+
+// What draws people, and the nodes that stand for it.
+struct Draws {
+  std::vector<Attraction> attractions;
+  std::vector<NodeId> nodes;
+
+  void Add(const Eigen::Vector3d& position_map, NodeId node) {
+    attractions.push_back({position_map, 1.0});
+    nodes.push_back(node);
+  }
+};
+
+// Where one room passes into another.
+void AddDoors(const PlaceGraph& all, const WalkGrounds& grounds, Draws* draws) {
+  for (const PlaceIndex place : grounds.places) {
+    const bool is_door = std::any_of(
+        all.links_begin(place), all.links_end(place), [&](const PlaceGraph::Link& link) {
+          return !all.room(place).empty() && !all.room(link.to).empty() &&
+                 all.room(place) != all.room(link.to);
+        });
+    if (is_door) draws->Add(all.position_map(place), all.id(place));
+  }
+}
+
+void AddFurniture(const GraphView& view, const WalkTile& tile, Instant* instant, Draws* draws) {
+  const SpaceFilter filter{layers::kObjects, std::nullopt};
+  std::vector<std::pair<NodeId, Eigen::Vector3d>> found;
+  view.ForEachTouching(tile.BoxMap(), filter, [&](const ViewNode& node) {
+    if (DrawsPeople(view.symbols().Text(node.class_name)) && instant->IsIn(node.valid)) {
+      found.push_back({node.id, node.BoxMap().center()});
+    }
+    return true;
+  });
+  std::sort(found.begin(), found.end(),
+            [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (const auto& [id, position_map] : found) draws->Add(position_map, id);
+}
+
+// Dead ends at the outline of their building.
+void AddExits(const GraphView& view, const PlaceGraph& all, const WalkGrounds& grounds,
+              Draws* draws) {
+  for (const PlaceIndex place : grounds.places) {
+    if (all.links_end(place) - all.links_begin(place) != 1) continue;
+    for (const NodeId above : view.Ancestors(all.id(place))) {
+      const ViewNode* node = view.FindNode(above);
+      if (node == nullptr || node->layer != layers::kBuildings) continue;
+      const Box3d box = node->BoxMap();
+      const Eigen::Vector2d position = all.position_map(place).head<2>();
+      const double edge_m = std::min((position - box.min().head<2>()).minCoeff(),
+                                     (box.max().head<2>() - position).minCoeff());
+      if (edge_m <= kExitM) draws->Add(all.position_map(place), all.id(place));
+      break;
+    }
+  }
+}
+
+void AddLinks(const PlaceGraph& all, const std::vector<PlaceIndex>& places, Instant* instant,
+              WalkGraph* graph) {
+  // Ascending, so that the index of a place is found by halving.
+  const auto index_of = [&places](PlaceIndex place) {
+    const auto at = std::lower_bound(places.begin(), places.end(), place);
+    return at != places.end() && *at == place ? static_cast<int>(at - places.begin()) : -1;
+  };
+  for (size_t from = 0; from < places.size(); ++from) {
+    const PlaceGraph::Link* end = all.links_end(places[from]);
+    for (const PlaceGraph::Link* link = all.links_begin(places[from]); link != end; ++link) {
+      if (link->to <= places[from]) continue;
+      const int to = index_of(link->to);
+      if (to < 0 || !instant->IsIn(link->valid)) continue;
+      graph->links.push_back({static_cast<int>(from), to});
+      graph->link_clearance_m.push_back(std::max(0.0, static_cast<double>(link->clearance_m)));
+    }
+  }
+}
+
+}  // namespace
+
+Box3d WalkTile::BoxMap() const {
+  const Eigen::Vector3d size(kTileM, kTileM, kTileHeightM);
+  const Eigen::Vector3d low =
+      Eigen::Vector3d(static_cast<double>(x), static_cast<double>(y), static_cast<double>(z))
+          .cwiseProduct(size);
+  const Eigen::Vector3d reach(reach_m, reach_m, kReachUpM);
+  return Box3d(low - reach, low + size + reach);
+}
+
+WalkTile TileOf(const Eigen::Vector3d& position_map, double reach_m) {
+  return {IndexOf(position_map.x(), WalkTile::kTileM), IndexOf(position_map.y(), WalkTile::kTileM),
+          IndexOf(position_map.z(), kTileHeightM), reach_m};
+}
+
+size_t WalkArea::memory_bytes() const {
+  return sizeof(WalkArea) + field.memory_bytes() + goal_nodes.capacity() * sizeof(NodeId);
+}
+
+WalkGrounds MakeWalkGrounds(const PlaceGraph& all, const WalkTile& tile, TimeNs at_ns) {
+  const Box3d box = tile.BoxMap();
+  Instant instant(at_ns);
+  WalkGraph graph;
+  std::vector<PlaceIndex> places;
+  for (PlaceIndex place = 0; place < all.size(); ++place) {
+    const Eigen::Vector3d& position_map = all.position_map(place);
+    if (!box.contains(position_map) || !instant.IsIn(all.valid(place))) continue;
+    places.push_back(place);
+    graph.places_map.push_back(position_map);
+    graph.clearance_m.push_back(std::max(0.0, all.clearance_m(place)));
+  }
+  AddLinks(all, places, &instant, &graph);
+  return {GoalField(std::move(graph), {}), std::move(places), instant.same()};
+}
+
+WalkArea MakeWalkArea(const GraphView& view, const PlaceGraph& all, const WalkGrounds& grounds,
+                      const WalkTile& tile, TimeNs at_ns) {
+  Instant instant(at_ns);
+  instant.IsIn(grounds.valid);
+  Draws draws;
+  AddDoors(all, grounds, &draws);
+  AddFurniture(view, tile, &instant, &draws);
+  AddExits(view, all, grounds, &draws);
+  std::vector<Goal> goals;
+  std::vector<NodeId> nodes;
+  for (const ChosenGoal& chosen : ChooseGoals(grounds.field.graph(), draws.attractions, {})) {
+    goals.push_back(chosen.goal);
+    nodes.push_back(chosen.attraction >= 0
+                        ? draws.nodes[static_cast<size_t>(chosen.attraction)]
+                        : all.id(grounds.places[static_cast<size_t>(chosen.goal.place)]));
+  }
+  return {grounds.field.WithGoals(std::move(goals)), std::move(nodes), instant.same()};
+}
+
+}  // namespace dsg::query

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where people can walk around a spot, and what draws them there: the places of a map as
+// predictions want them. Refuses to know who walks: everybody in a tile gets the same area.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "query/prediction/prediction.h"
+#include "query/view/graph_view.h"
+#include "query/view/place_graph.h"
+
+namespace dsg::query {
+
+/// A square of the floor plan with the places around it.
+struct WalkTile {
+  /// As many metres wide as kTileM, and as high as a storey or so.
+  static constexpr double kTileM = 20.0;
+
+  int64_t x = 0;
+  int64_t y = 0;
+  int64_t z = 0;
+  /// Places up to here beside the tile belong.
+  double reach_m = 0.0;
+
+  bool operator==(const WalkTile&) const = default;
+  /// What holds them.
+  Box3d BoxMap() const;
+};
+
+/// The tile of a position. Any finite position; beyond a billion metres tiles are the last ones.
+WalkTile TileOf(const Eigen::Vector3d& position_map, double reach_m);
+
+/// The places alone, at one instant.
+struct WalkGrounds {
+  /// Without goals.
+  GoalField field;
+  /// Of the places of `field`.
+  std::vector<PlaceIndex> places;
+  /// While all of this is the same.
+  Interval valid;
+};
+
+/// Places and goals.
+struct WalkArea {
+  GoalField field;
+  /// The node that stands for each goal of `field`.
+  std::vector<NodeId> goal_nodes;
+  /// While all of this is the same.
+  Interval valid;
+
+  size_t memory_bytes() const;
+};
+
+WalkGrounds MakeWalkGrounds(const PlaceGraph& all, const WalkTile& tile, TimeNs at_ns);
+
+/// Goals are where rooms meet, what people sit at or use, ways out of the building, and a place
+/// here and there. Requires: `grounds` of the same tile, valid at `at_ns`; `all` is
+/// `view.Places()`.
+WalkArea MakeWalkArea(const GraphView& view, const PlaceGraph& all, const WalkGrounds& grounds,
+                      const WalkTile& tile, TimeNs at_ns);
+
+}  // namespace dsg::query
