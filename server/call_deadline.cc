@@ -14,4 +14,11 @@ query::CallContext::Clock::time_point BoundDeadline(
   return now + std::min<Wall::duration>(left, kDeadlineMax);
 }
 
+query::CallContext::Clock::time_point WatchDeadline(
+    std::chrono::system_clock::time_point deadline) {
+  using Wall = std::chrono::system_clock;
+  if (deadline == Wall::time_point::max()) return query::CallContext::Clock::time_point::max();
+  return query::CallContext::Clock::now() + (deadline - Wall::now());
+}
+
 }  // namespace dsg::server

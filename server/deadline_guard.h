@@ -18,6 +18,7 @@ class DeadlineGuard {
                 query::CallContext::Clock::time_point deadline)
       : shared_(std::make_shared<Shared>()) {
     shared_->context = context;
+    if (deadline == query::CallContext::Clock::time_point::max()) return;
     const auto left = deadline - query::CallContext::Clock::now();
     alarm_.Set(std::chrono::system_clock::now() +
                    std::chrono::duration_cast<std::chrono::system_clock::duration>(left),

@@ -24,6 +24,7 @@ constexpr std::chrono::seconds kStopTimeMax{10};
 struct Flags {
   std::string store;
   std::string log_level = "info";
+  size_t view_cache_mb = 1024;
   dsg::server::ServerOptions options;
 };
 
@@ -39,6 +40,13 @@ void DeclareFlags(CLI::App* app, Flags* flags) {
       ->capture_default_str();
   app->add_option("--max-streams", flags->options.open_stream_max,
                   "Streams (tracks, meshes) open at a time; more are refused")
+      ->capture_default_str();
+  app->add_option("--max-watches", flags->options.open_watch_max,
+                  "Watches of maps open at a time; more are refused")
+      ->capture_default_str();
+  app->add_option("--view-cache-mb", flags->view_cache_mb,
+                  "Mebibytes of memory for the graphs of all maps; a larger graph is refused")
+      ->check(CLI::Range(size_t{1}, size_t{1} << 24))
       ->capture_default_str();
   app->add_option("--log-level", flags->log_level,
                   "debug (a line a call), info (errors and calls over 100 ms), warning, error")
@@ -104,8 +112,10 @@ int Serve(Flags flags) {
   if (flags.options.listen.empty())
     flags.options.listen = "unix:" + flags.store + "/dsg-server.sock";
   flags.options.log_all_calls = flags.log_level == "debug";
-  auto server =
-      dsg::server::Server::Start(dsg::query::MakeServiceCore(*std::move(store)), flags.options);
+  dsg::query::ServiceCoreOptions core_options;
+  core_options.view_cache_bytes = flags.view_cache_mb << 20;
+  auto server = dsg::server::Server::Start(
+      dsg::query::MakeServiceCore(*std::move(store), core_options), flags.options);
   if (!server.ok()) return FailToStart(server.status());
   std::printf("dsg-server: listening on %s, store %s, %zu maps\n", (*server)->address().c_str(),
               flags.store.c_str(), maps->size());

@@ -72,7 +72,8 @@ class RunningServer final : public Server {
   RunningServer(std::unique_ptr<query::ServiceCore> core, const ServerOptions& options)
       : core_(std::move(core)),
         workers_(WorkerCount(options.worker_count), options.in_flight_max),
-        commit_workers_(kCommitWorkerCount, std::min(options.in_flight_max, kCommitsInFlightMax)) {
+        commit_workers_(kCommitWorkerCount, std::min(options.in_flight_max, kCommitsInFlightMax)),
+        delays_(&workers_) {
     Prepare(options, &workers_, &questions_);
     Prepare(options, &commit_workers_, &commits_);
     services_.push_back(MakeQueryService(&questions_));
@@ -116,11 +117,15 @@ class RunningServer final : public Server {
   void Shutdown(std::chrono::milliseconds grace) override {
     if (grpc_server_ != nullptr) {
       grpc_server_->GetHealthCheckService()->Shutdown();
+      // Watches would use up the grace, since nothing else ends them.
+      questions_.stopping = true;
+      delays_.HurryAll();
       // Waits for every call: those that run past the grace are cancelled, see it, and finish.
       grpc_server_->Shutdown(std::chrono::system_clock::now() + grace);
       grpc_server_->Wait();
       grpc_server_ = nullptr;
     }
+    delays_.Stop();
     workers_.Stop();
     commit_workers_.Stop();
     claim_ = nullptr;
@@ -132,6 +137,8 @@ class RunningServer final : public Server {
     runtime->workers = workers;
     runtime->log = CallLog(options.log_all_calls);
     runtime->open_stream_max = options.open_stream_max;
+    runtime->delays = &delays_;
+    runtime->open_watch_max = options.open_watch_max;
   }
 
   // In the order of need: what stands lower is destroyed first.
@@ -139,6 +146,7 @@ class RunningServer final : public Server {
   std::unique_ptr<UnixSocketClaim> claim_;
   WorkerPool workers_;
   WorkerPool commit_workers_;
+  DelayQueue delays_;
   CallRuntime questions_;
   CallRuntime commits_;
   std::vector<std::unique_ptr<grpc::Service>> services_;
@@ -154,10 +162,25 @@ absl::Status OverloadedError() {
                    "use the batch calls instead of many small ones");
 }
 
+absl::Status TooManyWatchesError(int watch_max) {
+  return MakeError(Reason::kOverloaded,
+                   absl::StrCat("the server keeps ", watch_max,
+                                " watches at a time, and all are taken; end one, ask with "
+                                "ListRevisions instead, or start the server with --max-watches"),
+                   {{"watches", absl::StrCat(watch_max)}});
+}
+
+absl::Status ShuttingDownError() {
+  return MakeError(Reason::kShuttingDown,
+                   "the server is stopping; watch again from the last read_revision when it is "
+                   "back");
+}
+
 absl::Status ServerOptions::Validate() const {
   DSG_RETURN_IF_ERROR(CheckRange("workers", worker_count, 0, 256));
   DSG_RETURN_IF_ERROR(CheckRange("max-in-flight", in_flight_max, 1, 65536));
-  return CheckRange("max-streams", open_stream_max, 1, 65536);
+  DSG_RETURN_IF_ERROR(CheckRange("max-streams", open_stream_max, 1, 65536));
+  return CheckRange("max-watches", open_watch_max, 0, 65536);
 }
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(std::unique_ptr<query::ServiceCore> core,

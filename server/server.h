@@ -21,12 +21,16 @@ struct ServerOptions {
   /// Streams open at a time, whether they are written to or wait for their reader. Each holds one
   /// message of at most 1000 poses or a mesh block, and what gRPC buffers.
   int open_stream_max = 128;
+  /// Watches open at a time. A waiting one costs a look at the head each 50 ms; one that sends what
+  /// changed holds the keys of one revision.
+  int open_watch_max = 256;
   /// Listen on addresses that other machines can reach.
   bool allow_remote = false;
   /// A log line for every call, not only for errors and slow ones.
   bool log_all_calls = false;
 
-  /// Errors: FIELD_INVALID; workers are 0 to 256, calls and streams 1 to 65536.
+  /// Errors: FIELD_INVALID; workers are 0 to 256, calls and streams 1 to 65536, watches from
+  /// 0.
   absl::Status Validate() const;
 };
 

@@ -99,6 +99,55 @@ class QueryService final : public v1::QueryService::CallbackService {
     return StartStream(runtime_, "GetAgentShape", &query::ServiceCore::OpenAgentShape, context,
                        request);
   }
+  ServerUnaryReactor* BatchGetNodes(CallbackServerContext* context,
+                                    const v1::BatchGetNodesRequest* request,
+                                    v1::BatchGetNodesResponse* reply) override {
+    return StartUnary(runtime_, "BatchGetNodes", &Api::BatchGetNodes, context, request, reply);
+  }
+  ServerUnaryReactor* GetNeighbors(CallbackServerContext* context,
+                                   const v1::GetNeighborsRequest* request,
+                                   v1::GetNeighborsResponse* reply) override {
+    return StartUnary(runtime_, "GetNeighbors", &Api::GetNeighbors, context, request, reply);
+  }
+  ServerUnaryReactor* SearchNodes(CallbackServerContext* context,
+                                  const v1::SearchNodesRequest* request,
+                                  v1::SearchNodesResponse* reply) override {
+    return StartUnary(runtime_, "SearchNodes", &Api::SearchNodes, context, request, reply);
+  }
+  ServerUnaryReactor* ListEncounters(CallbackServerContext* context,
+                                     const v1::ListEncountersRequest* request,
+                                     v1::ListEncountersResponse* reply) override {
+    return StartUnary(runtime_, "ListEncounters", &Api::ListEncounters, context, request, reply);
+  }
+  ServerUnaryReactor* ListInteractions(CallbackServerContext* context,
+                                       const v1::ListInteractionsRequest* request,
+                                       v1::ListInteractionsResponse* reply) override {
+    return StartUnary(runtime_, "ListInteractions", &Api::ListInteractions, context, request,
+                      reply);
+  }
+  ServerUnaryReactor* PlanPath(CallbackServerContext* context, const v1::PlanPathRequest* request,
+                               v1::PlanPathResponse* reply) override {
+    return StartUnary(runtime_, "PlanPath", &Api::PlanPath, context, request, reply);
+  }
+  ServerUnaryReactor* PlanPaths(CallbackServerContext* context, const v1::PlanPathsRequest* request,
+                                v1::PlanPathsResponse* reply) override {
+    return StartUnary(runtime_, "PlanPaths", &Api::PlanPaths, context, request, reply);
+  }
+  ServerUnaryReactor* CheckCollision(CallbackServerContext* context,
+                                     const v1::CheckCollisionRequest* request,
+                                     v1::CheckCollisionResponse* reply) override {
+    return StartUnary(runtime_, "CheckCollision", &Api::CheckCollision, context, request, reply);
+  }
+  ServerUnaryReactor* PredictAgent(CallbackServerContext* context,
+                                   const v1::PredictAgentRequest* request,
+                                   v1::PredictAgentResponse* reply) override {
+    return StartUnary(runtime_, "PredictAgent", &Api::PredictAgent, context, request, reply);
+  }
+  grpc::ServerWriteReactor<v1::GetSubgraphResponse>* GetSubgraph(
+      CallbackServerContext* context, const v1::GetSubgraphRequest* request) override {
+    return StartStream(runtime_, "GetSubgraph", &query::ServiceCore::OpenSubgraph, context,
+                       request);
+  }
 
  private:
   ArenaMessages<v1::BatchLocateAgentsRequest, v1::BatchLocateAgentsResponse> batch_messages_;
@@ -126,6 +175,15 @@ class MapService final : public v1::MapService::CallbackService {
                                     const v1::ListRevisionsRequest* request,
                                     v1::ListRevisionsResponse* reply) override {
     return StartUnary(runtime_, "ListRevisions", &Api::ListRevisions, context, request, reply);
+  }
+  ServerUnaryReactor* DiffRevisions(CallbackServerContext* context,
+                                    const v1::DiffRevisionsRequest* request,
+                                    v1::DiffRevisionsResponse* reply) override {
+    return StartUnary(runtime_, "DiffRevisions", &Api::DiffRevisions, context, request, reply);
+  }
+  grpc::ServerWriteReactor<v1::WatchMapResponse>* WatchMap(
+      CallbackServerContext* context, const v1::WatchMapRequest* request) override {
+    return StartWatch(runtime_, "WatchMap", &query::ServiceCore::OpenWatch, context, request);
   }
   ServerUnaryReactor* GetServerInfo(CallbackServerContext* context,
                                     const v1::GetServerInfoRequest* request,

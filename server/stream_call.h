@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // One call that answers with a stream. Between two messages it is only memory: no worker waits for
-// a reader.
+// a reader, nor for news.
 #pragma once
 
+#include <chrono>
 #include <memory>
+#include <optional>
 #include <string_view>
 
 #include "grpcpp/grpcpp.h"
@@ -21,41 +23,52 @@ template <typename Request, typename Reply>
 using OpenStream = absl::StatusOr<std::unique_ptr<query::StreamCursor<Reply>>> (
     query::ServiceCore::*)(const Request&);
 
-// Run and OnWriteDone take turns, so one message is in flight at most, and Finish comes once.
+/// What bounds a stream.
+enum class StreamKind {
+  /// Ends by itself, and within kDeadlineMax.
+  kAnswer,
+  /// Lasts as long as its reader wants, and takes what it is told.
+  kWatch,
+};
+
+// Run, the wait for news and OnWriteDone take turns, so one message is in flight at most, and
+// Finish comes once.
 template <typename Request, typename Reply>
 class StreamCall final : public grpc::ServerWriteReactor<Reply>, public Job {
  public:
-  StreamCall(CallRuntime* runtime, std::string_view method, OpenStream<Request, Reply> open,
-             grpc::CallbackServerContext* context, const Request* request)
+  StreamCall(CallRuntime* runtime, std::string_view method, StreamKind kind,
+             OpenStream<Request, Reply> open, grpc::CallbackServerContext* context,
+             const Request* request)
       : runtime_(runtime),
         method_(method),
+        kind_(kind),
         open_(open),
         context_(context),
         request_(request),
-        deadline_(BoundDeadline(context->deadline())),
+        deadline_(is_watch() ? WatchDeadline(context->deadline())
+                             : BoundDeadline(context->deadline())),
         call_(deadline_),
         guard_(context, deadline_) {
-    const int open_count = runtime_->open_stream_count.fetch_add(1) + 1;
-    if (open_count > runtime_->open_stream_max || !runtime_->workers->TrySubmit(this)) {
-      this->Finish(LastWords(OverloadedError()));
-    }
+    const absl::Status begun = Begin();
+    if (!begun.ok()) this->Finish(LastWords(begun));
   }
 
   void Run() override {
-    const absl::Status status = ReadNext();
+    const absl::StatusOr<std::chrono::nanoseconds> wait = Prepare();
     // After each of these another thread may have deleted this.
-    if (!status.ok()) {
-      this->Finish(LastWords(status));
-    } else if (cursor_->done()) {
-      this->StartWriteAndFinish(&message_, grpc::WriteOptions(), LastWords(status));
+    if (!wait.ok()) {
+      this->Finish(LastWords(wait.status()));
+    } else if (wait->count() > 0) {
+      runtime_->delays->Add(this, DelayQueue::Clock::now() + *wait);
     } else {
-      this->StartWrite(&message_);
+      Write();
     }
   }
 
   void OnWriteDone(bool ok) override {
     // StartWriteAndFinish has already said the last word.
     if (cursor_->done()) return;
+    stall_guard_.reset();
     if (ok) {
       runtime_->workers->Resubmit(this);
     } else {
@@ -63,19 +76,56 @@ class StreamCall final : public grpc::ServerWriteReactor<Reply>, public Job {
     }
   }
 
-  void OnCancel() override { call_.Cancel(); }
+  void OnCancel() override {
+    call_.Cancel();
+    runtime_->delays->Hurry(this);
+  }
 
   void OnDone() override {
-    runtime_->open_stream_count.fetch_sub(1);
+    open_count().fetch_sub(1);
     delete this;
   }
 
  private:
-  absl::Status ReadNext() {
+  bool is_watch() const { return kind_ == StreamKind::kWatch; }
+  std::atomic<int>& open_count() {
+    return is_watch() ? runtime_->open_watch_count : runtime_->open_stream_count;
+  }
+
+  absl::Status Begin() {
+    const int count = open_count().fetch_add(1) + 1;
+    if (is_watch() && count > runtime_->open_watch_max) {
+      return TooManyWatchesError(runtime_->open_watch_max);
+    }
+    if (!is_watch() && count > runtime_->open_stream_max) return OverloadedError();
+    return runtime_->workers->TrySubmit(this) ? absl::OkStatus() : OverloadedError();
+  }
+
+  // How long until there is something to tell.
+  absl::StatusOr<std::chrono::nanoseconds> Prepare() {
     DSG_RETURN_IF_ERROR(call_.Check());
+    if (is_watch() && runtime_->stopping) return ShuttingDownError();
     if (cursor_ == nullptr) {
       DSG_ASSIGN_OR_RETURN(cursor_, (runtime_->core->*open_)(*request_));
     }
+    return cursor_->Wait();
+  }
+
+  void Write() {
+    const absl::Status status = ReadNext();
+    if (!status.ok()) {
+      this->Finish(LastWords(status));
+    } else if (cursor_->done()) {
+      this->StartWriteAndFinish(&message_, grpc::WriteOptions(), LastWords(status));
+    } else {
+      if (is_watch()) {
+        stall_guard_.emplace(context_, query::CallContext::Clock::now() + kWatchStallMax);
+      }
+      this->StartWrite(&message_);
+    }
+  }
+
+  absl::Status ReadNext() {
     message_.Clear();
     DSG_RETURN_IF_ERROR(cursor_->Next(call_, &message_));
     if (message_.has_header()) revision_ = message_.header().read_revision();
@@ -96,6 +146,7 @@ class StreamCall final : public grpc::ServerWriteReactor<Reply>, public Job {
 
   CallRuntime* runtime_;
   const std::string_view method_;
+  const StreamKind kind_;
   const OpenStream<Request, Reply> open_;
   grpc::CallbackServerContext* context_;
   const Request* request_;
@@ -103,6 +154,8 @@ class StreamCall final : public grpc::ServerWriteReactor<Reply>, public Job {
   const query::CallContext::Clock::time_point deadline_;
   query::CallContext call_;
   DeadlineGuard guard_;
+  // Of the message that is being written.
+  std::optional<DeadlineGuard> stall_guard_;
   std::unique_ptr<query::StreamCursor<Reply>> cursor_;
   Reply message_;
   int64_t revision_ = 0;
@@ -116,7 +169,18 @@ grpc::ServerWriteReactor<Reply>* StartStream(CallRuntime* runtime, std::string_v
                                              OpenStream<Request, Reply> open,
                                              grpc::CallbackServerContext* context,
                                              const Request* request) {
-  return new StreamCall<Request, Reply>(runtime, method, open, context, request);
+  return new StreamCall<Request, Reply>(runtime, method, StreamKind::kAnswer, open, context,
+                                        request);
+}
+
+/// The same for a stream that ends only with its reader.
+template <typename Request, typename Reply>
+grpc::ServerWriteReactor<Reply>* StartWatch(CallRuntime* runtime, std::string_view method,
+                                            OpenStream<Request, Reply> open,
+                                            grpc::CallbackServerContext* context,
+                                            const Request* request) {
+  return new StreamCall<Request, Reply>(runtime, method, StreamKind::kWatch, open, context,
+                                        request);
 }
 
 }  // namespace dsg::server

@@ -21,9 +21,12 @@ constexpr std::chrono::milliseconds kPollPeriod{20};
 constexpr std::array<std::chrono::milliseconds, 3> kBackoffs{
     std::chrono::milliseconds{100}, std::chrono::milliseconds{300}, std::chrono::milliseconds{900}};
 
-std::chrono::system_clock::time_point WallDeadline(const CallContext& call) {
+std::chrono::system_clock::time_point WallDeadline(const CallContext& call,
+                                                   std::chrono::seconds timeout) {
   const auto now = std::chrono::system_clock::now();
-  if (call.deadline() == CallContext::Clock::time_point::max()) return now + kDefaultTimeout;
+  if (call.deadline() == CallContext::Clock::time_point::max()) {
+    return timeout.count() == 0 ? std::chrono::system_clock::time_point::max() : now + timeout;
+  }
   return now + std::chrono::duration_cast<std::chrono::system_clock::duration>(
                    call.deadline() - CallContext::Clock::now());
 }
@@ -54,9 +57,10 @@ absl::Status NoServer(const std::string& address, const std::string& why) {
 
 }  // namespace
 
-CallInFlight::CallInFlight(const CallContext& call, const std::string& address)
-    : call_(call), address_(address) {
-  context_.set_deadline(WallDeadline(call));
+CallInFlight::CallInFlight(const CallContext& call, const std::string& address,
+                           const CallLimits& limits)
+    : call_(call), address_(address), limits_(limits) {
+  context_.set_deadline(WallDeadline(call, limits.timeout));
 }
 
 CallInFlight::~CallInFlight() {
@@ -70,6 +74,7 @@ CallInFlight::~CallInFlight() {
 bool CallInFlight::Wait() {
   void* event_tag = nullptr;
   bool ok = false;
+  const auto begin = CallContext::Clock::now();
   while (true) {
     const auto poll_end = std::chrono::system_clock::now() + kPollPeriod;
     switch (queue_.AsyncNext(&event_tag, &ok, poll_end)) {
@@ -78,7 +83,9 @@ bool CallInFlight::Wait() {
       case grpc::CompletionQueue::SHUTDOWN:
         return false;
       case grpc::CompletionQueue::TIMEOUT:
-        if (call_.cancelled()) context_.TryCancel();
+        was_silent_ = was_silent_ || (limits_.silence_max.count() > 0 &&
+                                      CallContext::Clock::now() - begin > limits_.silence_max);
+        if (was_silent_ || call_.cancelled()) context_.TryCancel();
         break;
     }
   }
@@ -86,6 +93,11 @@ bool CallInFlight::Wait() {
 
 absl::Status CallInFlight::Outcome(const grpc::Status& status) const {
   if (status.ok()) return absl::OkStatus();
+  if (was_silent_) {
+    return absl::UnavailableError(absl::StrCat("dsg-server at ", address_,
+                                               " gave no sign of life for too long; call again "
+                                               "from where the stream ended"));
+  }
   absl::Status decoded =
       DecodeStatus(status.error_code(), status.error_message(), Trailer(context_));
   // Errors with a reason were made by the server; the others by the transport, which names neither

@@ -21,13 +21,22 @@ namespace dsg::client {
 /// What a call without a deadline is given.
 inline constexpr std::chrono::seconds kDefaultTimeout{10};
 
+/// How long a call may take if its CallContext has no deadline, and be silent.
+struct CallLimits {
+  /// 0 = for ever.
+  std::chrono::seconds timeout = kDefaultTimeout;
+  /// A stream without a message for so long is given up; 0 = wait.
+  std::chrono::nanoseconds silence_max{0};
+};
+
 /// The calling side of one RPC in flight.
 ///
 /// Threads: one caller; the CallContext may be cancelled from any thread.
 class CallInFlight {
  public:
   /// `call` and `address` must outlive this.
-  CallInFlight(const query::CallContext& call, const std::string& address);
+  CallInFlight(const query::CallContext& call, const std::string& address,
+               const CallLimits& limits = {});
   ~CallInFlight();
   CallInFlight(const CallInFlight&) = delete;
   CallInFlight& operator=(const CallInFlight&) = delete;
@@ -45,6 +54,8 @@ class CallInFlight {
  private:
   const query::CallContext& call_;
   const std::string& address_;
+  const CallLimits limits_;
+  bool was_silent_ = false;
   grpc::ClientContext context_;
   grpc::CompletionQueue queue_;
 };

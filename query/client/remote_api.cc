@@ -3,6 +3,8 @@
 
 #include <grpcpp/channel.h>
 
+#include <algorithm>
+#include <chrono>
 #include <functional>
 #include <utility>
 
@@ -22,6 +24,10 @@ using MapStub = v1::MapService::Stub;
 using IngestStub = v1::IngestService::Stub;
 template <class Reply>
 using Send = std::function<bool(const Reply&)>;
+
+// Signs of life of a watch; see map_service.proto.
+constexpr int64_t kWatchIdleDefaultNs = 5'000'000'000;
+constexpr int64_t kWatchIdleMaxNs = 86'400'000'000'000;
 
 class RemoteApi final : public query::Api {
  public:
@@ -43,7 +49,7 @@ class RemoteApi final : public query::Api {
   }
   absl::Status GetTrajectory(const CallContext& call, const v1::GetTrajectoryRequest& request,
                              const Send<v1::GetTrajectoryResponse>& send) override {
-    return Stream(call, &QueryStub::PrepareAsyncGetTrajectory, request, send);
+    return Stream(call, &query_, &QueryStub::PrepareAsyncGetTrajectory, request, send);
   }
   absl::Status ListPresence(const CallContext& call, const v1::ListPresenceRequest& request,
                             v1::ListPresenceResponse* reply) override {
@@ -67,11 +73,51 @@ class RemoteApi final : public query::Api {
   }
   absl::Status GetMesh(const CallContext& call, const v1::GetMeshRequest& request,
                        const Send<v1::GetMeshResponse>& send) override {
-    return Stream(call, &QueryStub::PrepareAsyncGetMesh, request, send);
+    return Stream(call, &query_, &QueryStub::PrepareAsyncGetMesh, request, send);
   }
   absl::Status GetAgentShape(const CallContext& call, const v1::GetAgentShapeRequest& request,
                              const Send<v1::GetAgentShapeResponse>& send) override {
-    return Stream(call, &QueryStub::PrepareAsyncGetAgentShape, request, send);
+    return Stream(call, &query_, &QueryStub::PrepareAsyncGetAgentShape, request, send);
+  }
+  absl::Status BatchGetNodes(const CallContext& call, const v1::BatchGetNodesRequest& request,
+                             v1::BatchGetNodesResponse* reply) override {
+    return Read(call, &query_, &QueryStub::PrepareAsyncBatchGetNodes, request, reply);
+  }
+  absl::Status GetNeighbors(const CallContext& call, const v1::GetNeighborsRequest& request,
+                            v1::GetNeighborsResponse* reply) override {
+    return Read(call, &query_, &QueryStub::PrepareAsyncGetNeighbors, request, reply);
+  }
+  absl::Status SearchNodes(const CallContext& call, const v1::SearchNodesRequest& request,
+                           v1::SearchNodesResponse* reply) override {
+    return Read(call, &query_, &QueryStub::PrepareAsyncSearchNodes, request, reply);
+  }
+  absl::Status ListEncounters(const CallContext& call, const v1::ListEncountersRequest& request,
+                              v1::ListEncountersResponse* reply) override {
+    return Read(call, &query_, &QueryStub::PrepareAsyncListEncounters, request, reply);
+  }
+  absl::Status ListInteractions(const CallContext& call, const v1::ListInteractionsRequest& request,
+                                v1::ListInteractionsResponse* reply) override {
+    return Read(call, &query_, &QueryStub::PrepareAsyncListInteractions, request, reply);
+  }
+  absl::Status PlanPath(const CallContext& call, const v1::PlanPathRequest& request,
+                        v1::PlanPathResponse* reply) override {
+    return Read(call, &query_, &QueryStub::PrepareAsyncPlanPath, request, reply);
+  }
+  absl::Status PlanPaths(const CallContext& call, const v1::PlanPathsRequest& request,
+                         v1::PlanPathsResponse* reply) override {
+    return Read(call, &query_, &QueryStub::PrepareAsyncPlanPaths, request, reply);
+  }
+  absl::Status CheckCollision(const CallContext& call, const v1::CheckCollisionRequest& request,
+                              v1::CheckCollisionResponse* reply) override {
+    return Read(call, &query_, &QueryStub::PrepareAsyncCheckCollision, request, reply);
+  }
+  absl::Status PredictAgent(const CallContext& call, const v1::PredictAgentRequest& request,
+                            v1::PredictAgentResponse* reply) override {
+    return Read(call, &query_, &QueryStub::PrepareAsyncPredictAgent, request, reply);
+  }
+  absl::Status GetSubgraph(const CallContext& call, const v1::GetSubgraphRequest& request,
+                           const Send<v1::GetSubgraphResponse>& send) override {
+    return Stream(call, &query_, &QueryStub::PrepareAsyncGetSubgraph, request, send);
   }
 
   // Not retried: whether the map was made is unknown, and a second try would say MAP_EXISTS.
@@ -90,6 +136,20 @@ class RemoteApi final : public query::Api {
   absl::Status ListRevisions(const CallContext& call, const v1::ListRevisionsRequest& request,
                              v1::ListRevisionsResponse* reply) override {
     return Read(call, &map_, &MapStub::PrepareAsyncListRevisions, request, reply);
+  }
+  absl::Status DiffRevisions(const CallContext& call, const v1::DiffRevisionsRequest& request,
+                             v1::DiffRevisionsResponse* reply) override {
+    return Read(call, &map_, &MapStub::PrepareAsyncDiffRevisions, request, reply);
+  }
+  absl::Status WatchMap(const CallContext& call, const v1::WatchMapRequest& request,
+                        const Send<v1::WatchMapResponse>& send) override {
+    // Lasts until its caller has enough, or nothing is heard for three signs of life.
+    const int64_t idle_ns =
+        request.idle_period_ns() > 0 ? request.idle_period_ns() : kWatchIdleDefaultNs;
+    const CallLimits limits{std::chrono::seconds(0),
+                            std::chrono::seconds(10) +
+                                3 * std::chrono::nanoseconds(std::min(idle_ns, kWatchIdleMaxNs))};
+    return Stream(call, &map_, &MapStub::PrepareAsyncWatchMap, request, send, limits);
   }
   absl::Status GetServerInfo(const CallContext& call, const v1::GetServerInfoRequest& request,
                              v1::GetServerInfoResponse* reply) override {
@@ -115,17 +175,19 @@ class RemoteApi final : public query::Api {
     return RetryRead(call, [&] { return CallOnce(call, address_, stub, prepare, request, reply); });
   }
 
-  template <class Request, class Reply>
-  using PrepareStream = std::unique_ptr<grpc::ClientAsyncReader<Reply>> (QueryStub::*)(
+  template <class Stub, class Request, class Reply>
+  using PrepareStream = std::unique_ptr<grpc::ClientAsyncReader<Reply>> (Stub::*)(
       grpc::ClientContext*, const Request&, grpc::CompletionQueue*);
 
-  template <class Request, class Reply>
-  absl::Status Stream(const CallContext& call, PrepareStream<Request, Reply> prepare,
-                      const Request& request, const Send<Reply>& send);
+  template <class Stub, class Request, class Reply>
+  absl::Status Stream(const CallContext& call, Stub* stub,
+                      PrepareStream<Stub, Request, Reply> prepare, const Request& request,
+                      const Send<Reply>& send, const CallLimits& limits = {});
   // Sets `started` once a message has reached `send`: from then on a repeat would send it twice.
-  template <class Request, class Reply>
-  absl::Status StreamOnce(const CallContext& call, PrepareStream<Request, Reply> prepare,
-                          const Request& request, const Send<Reply>& send, bool* started);
+  template <class Stub, class Request, class Reply>
+  absl::Status StreamOnce(const CallContext& call, Stub* stub,
+                          PrepareStream<Stub, Request, Reply> prepare, const Request& request,
+                          const Send<Reply>& send, const CallLimits& limits, bool* started);
 
   const std::string address_;
   const std::shared_ptr<grpc::Channel> channel_;
@@ -134,11 +196,13 @@ class RemoteApi final : public query::Api {
   IngestStub ingest_;
 };
 
-template <class Request, class Reply>
-absl::Status RemoteApi::StreamOnce(const CallContext& call, PrepareStream<Request, Reply> prepare,
-                                   const Request& request, const Send<Reply>& send, bool* started) {
-  CallInFlight flight(call, address_);
-  auto rpc = (query_.*prepare)(flight.context(), request, flight.queue());
+template <class Stub, class Request, class Reply>
+absl::Status RemoteApi::StreamOnce(const CallContext& call, Stub* stub,
+                                   PrepareStream<Stub, Request, Reply> prepare,
+                                   const Request& request, const Send<Reply>& send,
+                                   const CallLimits& limits, bool* started) {
+  CallInFlight flight(call, address_, limits);
+  auto rpc = (stub->*prepare)(flight.context(), request, flight.queue());
   rpc->StartCall(flight.tag());
   bool stopped = false;
   Reply message;
@@ -159,13 +223,14 @@ absl::Status RemoteApi::StreamOnce(const CallContext& call, PrepareStream<Reques
   return stopped ? absl::OkStatus() : flight.Outcome(status);
 }
 
-template <class Request, class Reply>
-absl::Status RemoteApi::Stream(const CallContext& call, PrepareStream<Request, Reply> prepare,
-                               const Request& request, const Send<Reply>& send) {
+template <class Stub, class Request, class Reply>
+absl::Status RemoteApi::Stream(const CallContext& call, Stub* stub,
+                               PrepareStream<Stub, Request, Reply> prepare, const Request& request,
+                               const Send<Reply>& send, const CallLimits& limits) {
   bool started = false;
   absl::Status broken;
   const absl::Status status = RetryRead(call, [&] {
-    broken = StreamOnce(call, prepare, request, send, &started);
+    broken = StreamOnce(call, stub, prepare, request, send, limits, &started);
     return started ? absl::OkStatus() : broken;
   });
   return started ? broken : status;

@@ -96,6 +96,24 @@ class HeldCore final : public query::ServiceCore {
     return core_->GetAgentShape(call, request, send);
   }
 
+  absl::StatusOr<std::unique_ptr<query::SubgraphCursor>> OpenSubgraph(
+      const v1::GetSubgraphRequest& request) override {
+    return core_->OpenSubgraph(request);
+  }
+  absl::Status GetSubgraph(
+      const CallContext& call, const v1::GetSubgraphRequest& request,
+      const std::function<bool(const v1::GetSubgraphResponse&)>& send) override {
+    return core_->GetSubgraph(call, request, send);
+  }
+  absl::StatusOr<std::unique_ptr<query::WatchCursor>> OpenWatch(
+      const v1::WatchMapRequest& request) override {
+    return core_->OpenWatch(request);
+  }
+  absl::Status WatchMap(const CallContext& call, const v1::WatchMapRequest& request,
+                        const std::function<bool(const v1::WatchMapResponse&)>& send) override {
+    return core_->WatchMap(call, request, send);
+  }
+
 // Passed on as they are.
 #define DSG_PASS_ON(Method)                                                        \
   absl::Status Method(const CallContext& call, const v1::Method##Request& request, \
@@ -109,6 +127,16 @@ class HeldCore final : public query::ServiceCore {
   DSG_PASS_ON(ListNodes)
   DSG_PASS_ON(ListEdges)
   DSG_PASS_ON(ListNearestNodes)
+  DSG_PASS_ON(BatchGetNodes)
+  DSG_PASS_ON(GetNeighbors)
+  DSG_PASS_ON(SearchNodes)
+  DSG_PASS_ON(ListEncounters)
+  DSG_PASS_ON(ListInteractions)
+  DSG_PASS_ON(PlanPath)
+  DSG_PASS_ON(PlanPaths)
+  DSG_PASS_ON(CheckCollision)
+  DSG_PASS_ON(PredictAgent)
+  DSG_PASS_ON(DiffRevisions)
   DSG_PASS_ON(CreateMap)
   DSG_PASS_ON(GetMapStats)
   DSG_PASS_ON(ListRevisions)
