@@ -9,10 +9,11 @@
 #include "absl/strings/str_cat.h"
 
 namespace dsg::cli {
+namespace {
 
-absl::Status WriteJson(const google::protobuf::Message& reply, std::ostream& out) {
+absl::Status Write(const google::protobuf::Message& reply, bool on_one_line, std::ostream& out) {
   google::protobuf::util::JsonPrintOptions options;
-  options.add_whitespace = true;
+  options.add_whitespace = !on_one_line;
   options.always_print_primitive_fields = true;
   options.preserve_proto_field_names = true;
   std::string text;
@@ -22,7 +23,18 @@ absl::Status WriteJson(const google::protobuf::Message& reply, std::ostream& out
                                             " cannot be written as JSON: ", status.ToString()));
   }
   out << text;
+  if (on_one_line) out << "\n";
   return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status WriteJson(const google::protobuf::Message& reply, std::ostream& out) {
+  return Write(reply, /*on_one_line=*/false, out);
+}
+
+absl::Status WriteJsonLine(const google::protobuf::Message& reply, std::ostream& out) {
+  return Write(reply, /*on_one_line=*/true, out);
 }
 
 }  // namespace dsg::cli

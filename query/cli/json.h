@@ -16,4 +16,7 @@ namespace dsg::cli {
 /// count on every field that is not a message; 64-bit integers are strings, as protobuf has it.
 absl::Status WriteJson(const google::protobuf::Message& reply, std::ostream& out);
 
+/// The same on one line, for answers that come one after the other.
+absl::Status WriteJsonLine(const google::protobuf::Message& reply, std::ostream& out);
+
 }  // namespace dsg::cli

@@ -46,7 +46,10 @@ class Reader {
   }
 
   absl::Status ReadStats() {
-    const auto request = session_.Begin<v1::GetMapStatsRequest>();
+    auto request = session_.Begin<v1::GetMapStatsRequest>();
+    if (options_.revision.has_value()) {
+      request.mutable_read_at()->set_exact_revision(*options_.revision);
+    }
     v1::GetMapStatsResponse reply;
     DSG_RETURN_IF_ERROR(api_.GetMapStats(session_.NewCall(), request, &reply));
     MapContent& content = answer_.content;
@@ -80,6 +83,7 @@ class Reader {
     DSG_RETURN_IF_ERROR(FetchPages(request, 0, count, fetch, &all));
     for (const v1::Node& in : all.nodes()) {
       DSG_ASSIGN_OR_RETURN(Node node, FromProto(in, layers));
+      if (IsAgentKind(node.kind) && !options_.with_agents) continue;
       if (IsWanted(node.valid)) answer_.content.nodes.push_back(std::move(node));
     }
     return absl::OkStatus();

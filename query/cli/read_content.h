@@ -9,13 +9,18 @@
 #include "query/cli/export/map_content.h"
 #include "query/cli/session.h"
 #include "schema/base/time.h"
+#include "schema/model/revision.h"
 
 namespace dsg::cli {
 
 struct ContentOptions {
   /// The world at this instant, tracks up to it; unset = what has not ended, whole tracks.
-  std::optional<TimeNs> at_ns;
+  std::optional<TimeNs> at_ns{};
   bool with_mesh = true;
+  /// False: without agents, as they are no part of the building.
+  bool with_agents = true;
+  /// As believed then; unset = as the session asks.
+  std::optional<Revision> revision{};
 };
 
 struct ContentAnswer {

@@ -10,6 +10,7 @@
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 #include "dsg/v1/query_service.pb.h"
+#include "query/cli/node_cells.h"
 #include "query/cli/render_agents.h"
 #include "query/cli/table.h"
 
@@ -22,30 +23,6 @@ std::string PointText(const v1::Vector3& point) {
 
 std::string BoxText(const v1::Box& box) {
   return absl::StrCat("(", PointText(box.min()), ") to (", PointText(box.max()), ") m");
-}
-
-// What every listing begins a node's line with, and the headings for it.
-std::vector<Column> NodeColumns() {
-  return {{"id"},
-          {"kind"},
-          {"layer"},
-          {"name"},
-          {"class"},
-          {"x m", Align::kRight},
-          {"y m", Align::kRight},
-          {"z m", Align::kRight}};
-}
-
-std::vector<std::string> NodeCells(const v1::Node& node) {
-  const v1::Vector3& p = node.map_t_node().position();
-  return {
-      node.id(),       node.kind(),     node.layer(),   node.name(), node.semantic_class().name(),
-      Fixed(p.x(), 2), Fixed(p.y(), 2), Fixed(p.z(), 2)};
-}
-
-std::string Footer(int count, const std::string& noun, int64_t revision, bool is_cut) {
-  return absl::StrCat(Counted(count, noun), " (revision ", revision, ")",
-                      is_cut ? "; there are more, see --limit" : "", "\n");
 }
 
 std::string AttributeText(const v1::AttributeValue& value) {

@@ -42,7 +42,15 @@ class Dispatcher {
     return Ask(session.get(), verb);
   }
 
+  /// False if the answer is that there is none, which is no error.
+  bool found() const { return found_; }
+
  private:
+  absl::Status Ask(Session* session, const CollideVerb& verb) {
+    return RunCollide(session, verb, out_, &found_);
+  }
+  absl::Status Ask(Session* session, const LogVerb&) { return RunLog(session, out_); }
+  absl::Status Ask(Session* session, const StatsVerb&) { return RunStats(session, out_); }
   absl::Status Ask(Session* session, const WhereVerb& verb) {
     return RunWhere(session, verb, out_);
   }
@@ -53,14 +61,31 @@ class Dispatcher {
     return RunShape(session, verb, out_);
   }
   absl::Status Ask(Session* session, const WhoVerb& verb) { return RunWho(session, verb, out_); }
+  absl::Status Ask(Session* session, const MetVerb& verb) { return RunMet(session, verb, out_); }
+  absl::Status Ask(Session* session, const PickedVerb& verb) {
+    return RunPicked(session, verb, out_);
+  }
+  absl::Status Ask(Session* session, const PredictVerb& verb) {
+    return RunPredict(session, verb, out_);
+  }
+  absl::Status Ask(Session* session, const FindVerb& verb) { return RunFind(session, verb, out_); }
+  absl::Status Ask(Session* session, const PathVerb& verb) { return RunPath(session, verb, out_); }
   absl::Status Ask(Session* session, const ListVerb& verb) { return RunList(session, verb, out_); }
   absl::Status Ask(Session* session, const EdgesVerb& verb) {
     return RunEdges(session, verb, out_);
   }
   absl::Status Ask(Session* session, const ShowVerb& verb) { return RunShow(session, verb, out_); }
   absl::Status Ask(Session* session, const NearVerb& verb) { return RunNear(session, verb, out_); }
-  absl::Status Ask(Session* session, const LogVerb&) { return RunLog(session, out_); }
-  absl::Status Ask(Session* session, const StatsVerb&) { return RunStats(session, out_); }
+  absl::Status Ask(Session* session, const AroundVerb& verb) {
+    return RunAround(session, verb, out_);
+  }
+  absl::Status Ask(Session* session, const SubgraphVerb& verb) {
+    return RunSubgraph(session, verb, out_);
+  }
+  absl::Status Ask(Session* session, const DiffVerb& verb) { return RunDiff(session, verb, out_); }
+  absl::Status Ask(Session* session, const WatchVerb& verb) {
+    return RunWatch(session, verb, out_);
+  }
   absl::Status Ask(Session* session, const ExportVerb& verb) {
     return RunExport(session, verb, out_);
   }
@@ -70,25 +95,29 @@ class Dispatcher {
   const Environment& environment_;
   std::ostream& out_;
   std::ostream& errors_;
+  bool found_ = true;
 };
 
-absl::Status RunCommand(const std::vector<std::string>& arguments, const Environment& environment,
-                        std::ostream& out, std::ostream& errors) {
+absl::StatusOr<ExitCode> RunCommand(const std::vector<std::string>& arguments,
+                                    const Environment& environment, std::ostream& out,
+                                    std::ostream& errors) {
   DSG_ASSIGN_OR_RETURN(const Command command, ParseArguments(arguments, environment));
-  DSG_RETURN_IF_ERROR(std::visit(Dispatcher(command, environment, out, errors), command.verb));
+  Dispatcher dispatcher(command, environment, out, errors);
+  DSG_RETURN_IF_ERROR(std::visit(dispatcher, command.verb));
   out.flush();
   // A full disk or a closed pipe behind `out` must not look like a complete answer.
   if (!out) return absl::UnavailableError("the answer could not be written out in full");
-  return absl::OkStatus();
+  return dispatcher.found() ? kFound : kNotFound;
 }
 
 }  // namespace
 
 int Run(const std::vector<std::string>& arguments, const Environment& environment,
         std::ostream& out, std::ostream& errors) {
-  const absl::Status status = RunCommand(arguments, environment, out, errors);
-  if (!status.ok()) errors << ErrorLine(status) << std::flush;
-  return ExitCodeOf(status);
+  const absl::StatusOr<ExitCode> code = RunCommand(arguments, environment, out, errors);
+  if (code.ok()) return *code;
+  errors << ErrorLine(code.status()) << std::flush;
+  return ExitCodeOf(code.status());
 }
 
 }  // namespace dsg::cli

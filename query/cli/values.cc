@@ -18,8 +18,9 @@ absl::Status BadValue(Reason reason, const std::string& option, const std::strin
                    {{"field", option}, {"value", text}});
 }
 
-absl::StatusOr<std::vector<double>> ParseNumbers(const std::string& option, const std::string& text,
-                                                 size_t count, const std::string& form) {
+// As many as there are.
+absl::StatusOr<std::vector<double>> SplitNumbers(const std::string& option, const std::string& text,
+                                                 const std::string& form) {
   std::vector<double> numbers;
   for (const absl::string_view part : absl::StrSplit(text, ',')) {
     double number = 0.0;
@@ -33,6 +34,12 @@ absl::StatusOr<std::vector<double>> ParseNumbers(const std::string& option, cons
     }
     numbers.push_back(number);
   }
+  return numbers;
+}
+
+absl::StatusOr<std::vector<double>> ParseNumbers(const std::string& option, const std::string& text,
+                                                 size_t count, const std::string& form) {
+  DSG_ASSIGN_OR_RETURN(std::vector<double> numbers, SplitNumbers(option, text, form));
   if (numbers.size() != count) {
     return BadValue(
         Reason::kFieldInvalid, option, text,
@@ -57,6 +64,32 @@ absl::StatusOr<Box3d> ParseBox(const std::string& option, const std::string& tex
                     "the first corner is above the second; write the lower corner first");
   }
   return box;
+}
+
+absl::StatusOr<std::array<double, 2>> ParsePair(const std::string& option, const std::string& text,
+                                                const std::string& form) {
+  DSG_ASSIGN_OR_RETURN(const std::vector<double> n, ParseNumbers(option, text, 2, form));
+  return std::array<double, 2>{n[0], n[1]};
+}
+
+absl::StatusOr<Pose3d> ParsePose(const std::string& option, const std::string& text) {
+  constexpr char kForm[] = "X,Y,Z or X,Y,Z,QX,QY,QZ,QW";
+  constexpr double kLengthMin = 1e-6;
+  DSG_ASSIGN_OR_RETURN(const std::vector<double> n, SplitNumbers(option, text, kForm));
+  if (n.size() != 3 && n.size() != 7) {
+    return BadValue(Reason::kFieldInvalid, option, text,
+                    absl::StrCat("has ", n.size(), " numbers; write ", kForm));
+  }
+  Pose3d pose;
+  pose.position = Eigen::Vector3d(n[0], n[1], n[2]);
+  if (n.size() == 3) return pose;
+  const Eigen::Quaterniond orientation(n[6], n[3], n[4], n[5]);
+  if (!(orientation.norm() > kLengthMin)) {
+    return BadValue(Reason::kFieldInvalid, option, text,
+                    "the quaternion has no length; write 0,0,0,1 for no rotation");
+  }
+  pose.orientation = orientation.normalized();
+  return pose;
 }
 
 absl::StatusOr<TimeNs> ParseDuration(const std::string& option, const std::string& text) {

@@ -3,6 +3,7 @@
 // Refuses what is not finite or not complete, naming the option.
 #pragma once
 
+#include <array>
 #include <string>
 
 #include "absl/status/statusor.h"
@@ -17,6 +18,14 @@ absl::StatusOr<Eigen::Vector3d> ParsePoint(const std::string& option, const std:
 /// "X0,Y0,Z0,X1,Y1,Z1" in metres: two opposite corners, lower one first.
 /// Errors: as ParsePoint; INVALID_ARGUMENT/BOX_INVERTED.
 absl::StatusOr<Box3d> ParseBox(const std::string& option, const std::string& text);
+
+/// "RADIUS,LENGTH" and the like. Errors: as ParsePoint.
+absl::StatusOr<std::array<double, 2>> ParsePair(const std::string& option, const std::string& text,
+                                                const std::string& form);
+
+/// "X,Y,Z" or "X,Y,Z,QX,QY,QZ,QW"; the quaternion is brought to unit length.
+/// Errors: as ParsePoint; FIELD_INVALID for a quaternion of no length.
+absl::StatusOr<Pose3d> ParsePose(const std::string& option, const std::string& text);
 
 /// "0.5s", "200ms"; seconds without a unit. Errors: INVALID_ARGUMENT/FIELD_INVALID unless positive.
 absl::StatusOr<TimeNs> ParseDuration(const std::string& option, const std::string& text);

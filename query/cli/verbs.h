@@ -22,11 +22,30 @@ absl::Status RunWho(Session* session, const WhoVerb& verb, std::ostream& out);
 /// write; RESOURCE_EXHAUSTED/DISK_FULL, and then the last file is not there.
 absl::Status RunShape(Session* session, const ShapeVerb& verb, std::ostream& out);
 
-// Nodes and edges: verbs_graph.cc. Requires: the session's map is chosen.
+// Of one RPC each: verb_met.cc, verb_picked.cc, verb_predict.cc, verb_find.cc, verb_path.cc.
+// With --png they also draw the answer. Errors: of the RPC; FIELD_INVALID for a picture that is
+// there already; RESOURCE_EXHAUSTED/DISK_FULL. Requires: the session's map is chosen.
+absl::Status RunMet(Session* session, const MetVerb& verb, std::ostream& out);
+absl::Status RunPicked(Session* session, const PickedVerb& verb, std::ostream& out);
+absl::Status RunPredict(Session* session, const PredictVerb& verb, std::ostream& out);
+absl::Status RunFind(Session* session, const FindVerb& verb, std::ostream& out);
+absl::Status RunPath(Session* session, const PathVerb& verb, std::ostream& out);
+/// `is_hit`: the body touches something (verb_collide.cc).
+absl::Status RunCollide(Session* session, const CollideVerb& verb, std::ostream& out, bool* is_hit);
+
+// Nodes and edges: verbs_graph.cc, verbs_around.cc. Requires: the session's map is chosen.
 absl::Status RunList(Session* session, const ListVerb& verb, std::ostream& out);
 absl::Status RunEdges(Session* session, const EdgesVerb& verb, std::ostream& out);
 absl::Status RunShow(Session* session, const ShowVerb& verb, std::ostream& out);
 absl::Status RunNear(Session* session, const NearVerb& verb, std::ostream& out);
+absl::Status RunAround(Session* session, const AroundVerb& verb, std::ostream& out);
+absl::Status RunSubgraph(Session* session, const SubgraphVerb& verb, std::ostream& out);
+
+/// What differs between two revisions (verb_diff.cc).
+absl::Status RunDiff(Session* session, const DiffVerb& verb, std::ostream& out);
+/// Prints revisions as they come, until SIGINT, SIGTERM or the count (verb_watch.cc). Goes on over
+/// a restart of the server. Errors: of WatchMap; DEADLINE_EXCEEDED after --timeout.
+absl::Status RunWatch(Session* session, const WatchVerb& verb, std::ostream& out);
 
 // Maps: verbs_maps.cc. RunLog and RunStats require that the session's map is chosen.
 absl::Status RunLog(Session* session, std::ostream& out);

@@ -5,7 +5,10 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/map_service.pb.h"
 #include "dsg/v1/query_service.pb.h"
+#include "query/cli/answer_picture.h"
+#include "query/cli/asked_interval.h"
 #include "query/cli/json.h"
+#include "query/cli/node_names.h"
 #include "query/cli/paging.h"
 #include "query/cli/render_agents.h"
 #include "query/cli/values.h"
@@ -28,67 +31,34 @@ absl::StatusOr<std::string> RoomName(Session* session, const v1::LocateAgentResp
   return reply.node().name();
 }
 
-// The span of all poses at the revision asked for; open where there are none.
-absl::StatusOr<Interval> PoseSpan(Session* session) {
-  const auto request = session->Begin<v1::GetMapStatsRequest>();
-  v1::GetMapStatsResponse reply;
-  DSG_RETURN_IF_ERROR(session->api().GetMapStats(session->NewCall(), request, &reply));
-  Interval span;
-  if (reply.has_first_pose_ns()) span.from_ns = reply.first_pose_ns();
-  // Half-open, yet the last pose belongs to the span.
-  if (reply.has_last_pose_ns() && reply.last_pose_ns() < kTimeMax) {
-    span.to_ns = reply.last_pose_ns() + 1;
+AnswerPicture DrawTrack(const v1::GetTrajectoryResponse& track, const Session& session) {
+  constexpr uint32_t kTrackRgb = 0x1f5fbf;
+  AnswerPicture picture{.title = track.agent_id(), .revision = track.header().read_revision()};
+  if (track.poses().empty()) return picture;
+  const v1::TimedPose& first = track.poses(0);
+  const v1::TimedPose& last = track.poses(track.poses_size() - 1);
+  // To the tenth, which is more than a picture shows.
+  const auto short_time = [](TimeNs time_ns) { return time_ns - time_ns % (kNsPerSecond / 10); };
+  absl::StrAppend(&picture.title, "  ",
+                  session.times().Span(short_time(first.time_ns()), short_time(last.time_ns())));
+  picture.at_ns = last.time_ns();
+  Overlay& overlay = picture.overlay;
+  TimeNs before_ns = kTimeMin;
+  for (const v1::TimedPose& pose : track.poses()) {
+    const bool begins =
+        overlay.lines.empty() || pose.time_ns() - before_ns > session.map().gap_ns_max;
+    if (begins) overlay.lines.push_back({.points_map = {}, .rgb = kTrackRgb, .width_px = 5.0});
+    overlay.lines.back().points_map.push_back(PointOf(pose.pose().position()));
+    before_ns = pose.time_ns();
   }
-  return span;
-}
-
-absl::StatusOr<Interval> AskedInterval(Session* session, const WhoVerb& verb) {
-  Interval asked;
-  if (verb.from.empty() || verb.to.empty()) {
-    DSG_ASSIGN_OR_RETURN(asked, PoseSpan(session));
-  }
-  const TimeNs epoch_ns = session->map().epoch_ns;
-  if (!verb.from.empty()) {
-    DSG_ASSIGN_OR_RETURN(asked.from_ns, ParseInstant("--from", verb.from, epoch_ns));
-  }
-  if (!verb.to.empty()) {
-    DSG_ASSIGN_OR_RETURN(asked.to_ns, ParseInstant("--to", verb.to, epoch_ns));
-  }
-  return asked;
-}
-
-// Rooms of this name; the id of the only one, or "" if there is none.
-absl::StatusOr<std::string> RoomByName(Session* session, const std::string& name) {
-  auto request = session->Begin<v1::ListNodesRequest>();
-  request.mutable_filter()->set_name(name);
-  request.mutable_filter()->set_kind(kinds::kRoom);
-  request.set_view(v1::NODE_VIEW_BASIC);
-  v1::ListNodesResponse reply;
-  DSG_RETURN_IF_ERROR(session->api().ListNodes(session->NewCall(), request, &reply));
-  if (reply.nodes().empty()) return std::string();
-  if (reply.nodes_size() == 1) return reply.nodes(0).id();
-  std::string ids;
-  for (const v1::Node& room : reply.nodes()) absl::StrAppend(&ids, " ", room.id());
-  return MakeError(
-      Reason::kFieldInvalid,
-      absl::StrCat("several rooms are called \"", name, "\"; name one by its id:", ids),
-      {{"field", "--room"}, {"value", name}});
-}
-
-// ListPresence takes ids only. GetNode knows ids and names, but a name may be shared: by several
-// rooms, or by a room and the furniture in it. Then the room is meant.
-absl::StatusOr<std::string> RegionId(Session* session, const std::string& id_or_name) {
-  auto request = session->Begin<v1::GetNodeRequest>();
-  request.set_id(id_or_name);
-  request.set_view(v1::NODE_VIEW_BASIC);
-  v1::GetNodeResponse reply;
-  const absl::Status found = session->api().GetNode(session->NewCall(), request, &reply);
-  if (found.ok() && reply.node().id() == id_or_name) return id_or_name;
-  if (!found.ok() && !absl::IsNotFound(found) && !absl::IsInvalidArgument(found)) return found;
-  DSG_ASSIGN_OR_RETURN(const std::string room_id, RoomByName(session, id_or_name));
-  if (!room_id.empty()) return room_id;
-  if (!found.ok()) return found;
-  return reply.node().id();
+  overlay.marks = {{.position_map = PointOf(first.pose().position()),
+                    .rgb = kTrackRgb,
+                    .shape = OverlayMark::Shape::kRing,
+                    .label = session.times().Relative(short_time(first.time_ns()))},
+                   {.position_map = PointOf(last.pose().position()),
+                    .rgb = kTrackRgb,
+                    .label = session.times().Relative(short_time(last.time_ns()))}};
+  return picture;
 }
 
 }  // namespace
@@ -108,6 +78,7 @@ absl::Status RunWhere(Session* session, const WhereVerb& verb, std::ostream& out
 }
 
 absl::Status RunTrack(Session* session, const TrackVerb& verb, std::ostream& out) {
+  DSG_RETURN_IF_ERROR(CheckPicture(verb.picture));
   auto request = session->Begin<v1::GetTrajectoryRequest>();
   request.set_agent(verb.agent);
   const TimeNs epoch_ns = session->map().epoch_ns;
@@ -136,9 +107,12 @@ absl::Status RunTrack(Session* session, const TrackVerb& verb, std::ostream& out
     all.mutable_poses()->DeleteSubrange(static_cast<int>(pose_count_max),
                                         all.poses_size() - static_cast<int>(pose_count_max));
   }
-  if (session->common().json) return WriteJson(all, out);
-  out << RenderTrack(all, session->times());
-  return absl::OkStatus();
+  if (session->common().json) {
+    DSG_RETURN_IF_ERROR(WriteJson(all, out));
+  } else {
+    out << RenderTrack(all, session->times());
+  }
+  return WritePicture(session, verb.picture, DrawTrack(all, *session), out);
 }
 
 absl::Status RunWho(Session* session, const WhoVerb& verb, std::ostream& out) {
@@ -150,7 +124,7 @@ absl::Status RunWho(Session* session, const WhoVerb& verb, std::ostream& out) {
     DSG_ASSIGN_OR_RETURN(const Box3d box, ParseBox("--box", verb.box));
     ToProto(box, request.mutable_box());
   }
-  DSG_ASSIGN_OR_RETURN(const Interval asked, AskedInterval(session, verb));
+  DSG_ASSIGN_OR_RETURN(const Interval asked, AskedInterval(session, verb.from, verb.to));
   request.set_from_ns(asked.from_ns);
   request.set_to_ns(asked.to_ns);
   v1::ListPresenceResponse all;

@@ -22,7 +22,7 @@ namespace dsg::cli {
 namespace {
 
 absl::StatusOr<ContentAnswer> Read(Session* session, const std::string& at, bool with_mesh) {
-  ContentOptions options{.at_ns = std::nullopt, .with_mesh = with_mesh};
+  ContentOptions options{.with_mesh = with_mesh};
   if (!at.empty()) {
     DSG_ASSIGN_OR_RETURN(options.at_ns, ParseInstant("--at", at, session->map().epoch_ns));
   }

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "dsg/v1/query_service.pb.h"
+#include "query/cli/filter.h"
 #include "query/cli/json.h"
 #include "query/cli/paging.h"
 #include "query/cli/render_graph.h"
@@ -12,21 +13,6 @@
 #include "schema/codec/proto_convert.h"
 
 namespace dsg::cli {
-namespace {
-
-absl::Status FillFilter(const FilterOptions& options, TimeNs epoch_ns, v1::NodeFilter* filter) {
-  filter->set_layer(options.layer);
-  filter->set_kind(options.kind);
-  filter->set_class_name(options.class_name);
-  if (!options.at.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, ParseInstant("--at", options.at, epoch_ns));
-    filter->set_at_ns(at_ns);
-  }
-  return absl::OkStatus();
-}
-
-}  // namespace
-
 absl::Status RunList(Session* session, const ListVerb& verb, std::ostream& out) {
   auto request = session->Begin<v1::ListNodesRequest>();
   v1::NodeFilter* filter = request.mutable_filter();
@@ -46,6 +32,9 @@ absl::Status RunList(Session* session, const ListVerb& verb, std::ostream& out) 
         return session->api().ListNodes(session->NewCall(), next, page);
       },
       &all));
+  if (all.nodes().empty()) {
+    DSG_RETURN_IF_ERROR(CheckWords(session, verb.filter.layer, verb.filter.class_name, ""));
+  }
   if (session->common().json) return WriteJson(all, out);
   out << RenderNodes(all);
   return absl::OkStatus();
@@ -69,6 +58,9 @@ absl::Status RunEdges(Session* session, const EdgesVerb& verb, std::ostream& out
         return session->api().ListEdges(session->NewCall(), next, page);
       },
       &all));
+  if (all.edges().empty()) {
+    DSG_RETURN_IF_ERROR(CheckWords(session, "", "", verb.relation));
+  }
   if (session->common().json) return WriteJson(all, out);
   out << RenderEdges(all, session->times());
   return absl::OkStatus();

@@ -4,7 +4,7 @@
 # Takes the programs from DSG_BIN; leaves nothing behind unless a folder to keep is given.
 set -euo pipefail
 
-readonly SEED=12 PEOPLE=12 SECONDS_SIMULATED=300
+readonly SEED=12 PEOPLE=12 SECONDS_SIMULATED=300 PICKS=6
 : "${DSG_BIN:?names the folder of the programs; ./dev demo sets it}"
 PATH=$(cd "$DSG_BIN" && pwd):$PATH
 server_pid=
@@ -59,7 +59,7 @@ cd "$folder"
 
 say "1. An office: $PEOPLE people and a robot walk for $SECONDS_SIMULATED s, a tracker watches"
 show dsg-simulate tracks --out office --seed "$SEED" --people "$PEOPLE" \
-  --seconds "$SECONDS_SIMULATED"
+  --seconds "$SECONDS_SIMULATED" --picks "$PICKS"
 
 say '2. The log becomes a versioned scene graph in a store'
 show dsg-ingest --store store --map office office/log

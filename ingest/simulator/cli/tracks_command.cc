@@ -28,6 +28,9 @@ void AddTracks(CLI::App* app, TracksOptions* options, std::string* world) {
                   "0 to 10000; a robot is always there")
       ->capture_default_str();
   app->add_option("--seconds", options->crowd.duration_s, "1 to 86400")->capture_default_str();
+  app->add_option("--picks", options->pick_count,
+                  "things that people take away, 0 to 1000: their validity ends")
+      ->capture_default_str();
   app->add_option("--rate", options->sensor.rate_hz, "samples a second of each agent, 0.1 to 200")
       ->capture_default_str();
   app->add_option("--noise-m", options->sensor.position_noise_m,

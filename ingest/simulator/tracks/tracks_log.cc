@@ -12,6 +12,7 @@
 #include "ingest/files/output_file.h"
 #include "ingest/files/output_folder.h"
 #include "ingest/simulator/picture/preview.h"
+#include "ingest/simulator/tracks/picks.h"
 #include "ingest/simulator/tracks/presence.h"
 #include "ingest/simulator/tracks/track_sensor.h"
 #include "ingest/simulator/world/walker.h"
@@ -52,11 +53,12 @@ struct Files {
   OutputFile truth;
   OutputFile presence;
   OutputFile pauses;
+  OutputFile picks;
   OutputFile readme;
   OutputFile preview;
 
   std::vector<OutputFile*> all() {
-    return {&map, &truth, &presence, &pauses, &readme, &preview, &tracks};
+    return {&map, &truth, &presence, &pauses, &picks, &readme, &preview, &tracks};
   }
 };
 
@@ -85,10 +87,11 @@ absl::StatusOr<Files> CreateFiles(const std::string& out) {
   DSG_ASSIGN_OR_RETURN(OutputFile truth, create("truth/tracks.csv"));
   DSG_ASSIGN_OR_RETURN(OutputFile presence, create("truth/presence.csv"));
   DSG_ASSIGN_OR_RETURN(OutputFile pauses, create("truth/pauses.csv"));
+  DSG_ASSIGN_OR_RETURN(OutputFile picks, create("truth/picks.csv"));
   DSG_ASSIGN_OR_RETURN(OutputFile readme, create("README.txt"));
   DSG_ASSIGN_OR_RETURN(OutputFile preview, create("preview.png"));
   return Files{std::move(map),    std::move(tracks), std::move(truth),  std::move(presence),
-               std::move(pauses), std::move(readme), std::move(preview)};
+               std::move(pauses), std::move(picks),  std::move(readme), std::move(preview)};
 }
 
 void AppendRow(TimeNs time_ns, const AgentSpec& agent, const Pose3d& pose, std::string* out) {
@@ -178,6 +181,17 @@ absl::Status WritePauses(const Scene& scene, OutputFile* file) {
   return absl::OkStatus();
 }
 
+void WritePicks(const Scene& scene, const std::vector<Pick>& picks, OutputFile* file) {
+  absl::StrAppend(&file->buffer(), "agent,object_id,object,room_id,seen_ns,at_ns,missed_ns\n");
+  for (const Pick& pick : picks) {
+    const Furniture& item = scene.world.furniture[pick.object];
+    absl::StrAppend(&file->buffer(), scene.crowd[pick.agent].name, ",",
+                    ToString(ObjectId(static_cast<int>(pick.object))), ",", item.name, ",",
+                    ToString(RoomId(item.room)), ",", pick.seen_ns, ",", pick.at_ns, ",",
+                    pick.missed_ns, "\n");
+  }
+}
+
 // A few agents for a few minutes; more would be a scribble.
 std::vector<PreviewTrack> PreviewTracks(const Scene& scene) {
   constexpr size_t kTrackCountMax = 12;
@@ -208,6 +222,7 @@ std::string Readme(const TracksOptions& options) {
       "truth/tracks.csv   the same instants without noise and without gaps\n"
       "truth/presence.csv who was in which room, [enter_ns, exit_ns), exact\n"
       "truth/pauses.csv   where people stood still, and for how long\n"
+      "truth/picks.csv    which things people took away, and when; --picks asks for them\n"
       "preview.png        the building from above, with the first minutes of some tracks\n\n"
       "Frame: one map frame, right-handed, x and y along the walls, z up, origin at a corner of\n"
       "the building on the floor. Metres. Orientation: Hamilton quaternion x y z w of the body, "
@@ -248,7 +263,12 @@ absl::StatusOr<TracksSummary> WriteTracks(const TracksOptions& options, const Pr
   summary.object_count = static_cast<int64_t>(world.furniture.size());
   summary.place_count = static_cast<int64_t>(world.places.places.size());
   summary.people_count = options.crowd.people_count;
-  files.map.buffer() = DeltaToJson(WorldGraph(world));
+  const std::vector<Pick> picks =
+      DrawPicks(world, planner, crowd, scene.seed(), duration_ns, options.pick_count);
+  GraphDelta graph = WorldGraph(world);
+  ApplyPicks(picks, &graph);
+  files.map.buffer() = DeltaToJson(graph);
+  WritePicks(scene, picks, &files.picks);
   files.readme.buffer() = Readme(options);
   DSG_ASSIGN_OR_RETURN(files.preview.buffer(), DrawPreview(world, PreviewTracks(scene)));
   DSG_RETURN_IF_ERROR(WritePresence(scene, &files.presence, &summary));

@@ -33,7 +33,8 @@ struct TracksSummary {
 using Progress = std::function<void(double)>;
 
 /// Writes under options.out: log/map.json and log/tracks.csv (what to ingest), truth/tracks.csv,
-/// truth/presence.csv and truth/pauses.csv, README.txt, preview.png. Same options, same bytes.
+/// truth/presence.csv, truth/pauses.csv and truth/picks.csv, README.txt, preview.png. Same options,
+/// same bytes.
 ///
 /// Errors: INVALID_ARGUMENT for bad options; ALREADY_EXISTS when the folder holds something and
 /// force is off; RESOURCE_EXHAUSTED/DISK_FULL. No file is left half written.

@@ -59,6 +59,7 @@ absl::Status TracksOptions::Validate() const {
                      {{"field", "--out"}});
   }
   DSG_RETURN_IF_ERROR(crowd.Validate());
+  DSG_RETURN_IF_ERROR(CheckRange("--picks", pick_count, 0.0, 1000.0, ""));
   return sensor.Validate();
 }
 

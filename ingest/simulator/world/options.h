@@ -73,6 +73,8 @@ struct TracksOptions {
   WorldOptions world;
   CrowdOptions crowd;
   TrackSensorOptions sensor;
+  /// Things that people take away, if they come near so many; 0 to 1000.
+  int pick_count = 0;
 
   /// Errors: INVALID_ARGUMENT/FIELD_INVALID naming the option and its bounds.
   absl::Status Validate() const;

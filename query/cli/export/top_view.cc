@@ -11,6 +11,7 @@
 #include "query/cli/export/palette.h"
 #include "query/cli/export/top_view_labels.h"
 #include "query/cli/export/top_view_mesh.h"
+#include "query/cli/export/top_view_overlay.h"
 #include "query/cli/table.h"
 #include "schema/base/check.h"
 #include "schema/picture/font.h"
@@ -28,6 +29,7 @@ using picture::Paint;
 constexpr double kMarginPx = 60.0;
 constexpr double kTitlePx = 70.0;
 constexpr double kFooterPx = 80.0;
+constexpr double kKeyRowPx = 52.0;
 constexpr double kTextDotPx = 4.0;
 constexpr double kTextHeightPx = kTextDotPx * picture::kGlyphHeightDots;
 // What is smaller than this is drawn as large as this.
@@ -47,8 +49,8 @@ std::string StructureType(const Node& node) {
 }
 
 // Everything that is drawn at its own place.
-Box2d BoundsOf(const MapContent& content) {
-  Box2d bounds;
+Box2d BoundsOf(const MapContent& content, const Overlay& overlay) {
+  Box2d bounds = BoundsOf(overlay);
   for (const Node& node : content.nodes) {
     if (IsAgentKind(node.kind)) continue;
     bounds.extend(Eigen::Vector2d(MiddleOf(node).head<2>()));
@@ -238,10 +240,12 @@ void DrawTitle(const std::string& title, Canvas* canvas) {
 
 picture::Picture DrawTopView(const MapContent& content, const TopViewOptions& options) {
   DSG_CHECK(options.width_px >= kTopViewWidthMin && options.width_px <= kTopViewWidthMax);
-  const Box2d bounds_map = BoundsOf(content);
+  const Overlay& overlay = options.overlay;
+  const Box2d bounds_map = BoundsOf(content, overlay);
   const Box2d area = AreaFor(bounds_map, options.width_px);
   const FloorView view(bounds_map, area);
-  const double height = area.max().y() + kMarginPx + kFooterPx;
+  const double key_height = overlay.legend.empty() ? 0.0 : kKeyRowPx;
+  const double height = area.max().y() + kMarginPx + kFooterPx + key_height;
   Canvas canvas(2 * options.width_px, 2 * static_cast<int>(std::ceil(0.5 * height)),
                 MakePaint(kPaperRgb));
   DrawMesh(content.mesh, view, &canvas);
@@ -255,10 +259,17 @@ picture::Picture DrawTopView(const MapContent& content, const TopViewOptions& op
   const double margin = 0.5 * kMarginPx;
   const Eigen::Vector2d around(margin, margin);
   LabelLayout layout(Box2d(area.min() - around, area.max() + around));
+  if (!overlay.empty()) {
+    canvas.FillRect({0.0, 0.0}, {canvas.width(), canvas.height()}, MakePaint(kPaperRgb, 0.4f));
+    DrawOverlay(overlay, view, &layout, &canvas);
+    DrawOverlayLabels(overlay, view, &layout, &canvas);
+  }
   DrawLabels(content, view, &layout, &canvas);
   DrawTitle(options.title, &canvas);
   const double footer_y = canvas.height() - kMarginPx - kTextHeightPx;
   DrawLegend(content, footer_y, DrawScaleBar(view, footer_y, &canvas) - 40.0, &canvas);
+  DrawOverlayLegend(overlay, {kMarginPx, footer_y - key_height}, canvas.width() - kMarginPx,
+                    &canvas);
   return canvas.Halved();
 }
 

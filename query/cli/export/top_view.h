@@ -7,6 +7,7 @@
 #include <string>
 
 #include "query/cli/export/map_content.h"
+#include "query/cli/export/overlay.h"
 #include "schema/picture/raster.h"
 
 namespace dsg::cli {
@@ -19,6 +20,8 @@ struct TopViewOptions {
   /// kTopViewWidthMax.
   int width_px = 1600;
   std::string title;
+  /// Drawn over the map, which is paled then.
+  Overlay overlay{};
 };
 
 /// Draws what there is; an empty map is a title on empty paper.

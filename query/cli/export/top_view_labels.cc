@@ -22,6 +22,7 @@ using picture::LabelLayout;
 using picture::MakePaint;
 
 constexpr double kRoomDotPx = 4.0;
+constexpr double kAgentDotPx = 3.0;
 constexpr double kSmallDotPx = 2.0;
 constexpr double kPadPx = 6.0;
 // Of the dot that stands for a room without an outline.
@@ -139,11 +140,13 @@ std::vector<Box2d> SpotsBeside(const Box2d& thing, const Label& label) {
   return spots;
 }
 
-void WriteBeside(const Box2d& thing, const Label& label, LabelLayout* layout, Canvas* canvas) {
+// False where all room is taken.
+bool WriteBeside(const Box2d& thing, const Label& label, LabelLayout* layout, Canvas* canvas) {
   const std::optional<Box2d> spot = FirstFree(SpotsBeside(thing, label), *layout);
-  if (!spot.has_value()) return;
+  if (!spot.has_value()) return false;
   layout->Block(*spot);
   Write(label, *spot, canvas);
+  return true;
 }
 
 // Large letters clear of objects; else small ones; else over objects; else beside the room.
@@ -175,8 +178,9 @@ void WriteAgents(const MapContent& content, const FloorView& view, LabelLayout* 
   for (size_t i = 0; i < content.tracks.size(); ++i) {
     const Eigen::Vector2d middle = view.ToPixel(LastOf(content.tracks[i]));
     const Eigen::Vector2d reach(kDotRadiusPx, kDotRadiusPx);
-    const Label label{
-        .text = NameOf(*nodes.at(content.tracks[i].agent)), .dot_px = 3.0, .rgb = AgentColor(i)};
+    const Label label{.text = NameOf(*nodes.at(content.tracks[i].agent)),
+                      .dot_px = kAgentDotPx,
+                      .rgb = AgentColor(i)};
     WriteBeside(Box2d(middle - reach, middle + reach), label, layout, canvas);
   }
 }
@@ -202,6 +206,18 @@ void DrawLabels(const MapContent& content, const FloorView& view, LabelLayout* l
     bounds.extend(Box2d(middle.array() - kObjectRadiusPx, middle.array() + kObjectRadiusPx));
     const std::string text = ObjectText(node);
     if (!text.empty()) WriteBeside(bounds, {.text = text}, layout, canvas);
+  }
+}
+
+void WriteNameBeside(const Box2d& thing_px, const std::string& name, uint32_t rgb,
+                     LabelLayout* layout, Canvas* canvas) {
+  const Label label{.text = name, .dot_px = kAgentDotPx, .rgb = rgb};
+  // Close by if it can be, a little off otherwise.
+  for (const double off_px : {0.0, 30.0, 60.0, 100.0}) {
+    const Eigen::Vector2d off(off_px, off_px);
+    if (WriteBeside(Box2d(thing_px.min() - off, thing_px.max() + off), label, layout, canvas)) {
+      return;
+    }
   }
 }
 

@@ -3,6 +3,7 @@
 // Refuses to write a name that would touch another.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -17,5 +18,10 @@ namespace dsg::cli {
 /// can.
 void DrawLabels(const MapContent& content, const FloorView& view, picture::LabelLayout* layout,
                 picture::Canvas* canvas);
+
+/// A name beside a thing of the picture, in letters as large as those of agents; not written where
+/// all room is taken.
+void WriteNameBeside(const Eigen::AlignedBox2d& thing_px, const std::string& name, uint32_t rgb,
+                     picture::LabelLayout* layout, picture::Canvas* canvas);
 
 }  // namespace dsg::cli

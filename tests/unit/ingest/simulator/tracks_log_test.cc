@@ -9,7 +9,9 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <set>
 #include <sstream>
+#include <string>
 #include <tuple>
 #include <vector>
 
@@ -24,8 +26,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kFiles[] = {"log/map.json",       "log/tracks.csv",   "truth/tracks.csv",
-                                  "truth/presence.csv", "truth/pauses.csv", "README.txt",
-                                  "preview.png"};
+                                  "truth/presence.csv", "truth/pauses.csv", "truth/picks.csv",
+                                  "README.txt",         "preview.png"};
 
 class TracksLog : public testing::Test {
  protected:
@@ -77,6 +79,8 @@ TEST_F(TracksLog, IsTheSameForTheSameSeedAndAnotherForAnother) {
   ASSERT_TRUE(WriteTracks(other, nullptr).ok());
   for (const char* file : kFiles) {
     EXPECT_TRUE(Read("a", file) == Read("b", file)) << file;
+    // Nobody is asked to take anything, so that there is nothing to differ.
+    if (std::string(file) == "truth/picks.csv") continue;
     EXPECT_TRUE(Read("a", file) != Read("c", file)) << file;
   }
 }
@@ -160,6 +164,34 @@ TEST_F(TracksLog, PresenceTilesTheRecordingOfEachAgent) {
   }
   EXPECT_EQ(end.size(), 4u);
   for (const auto& [agent, exit_ns] : end) EXPECT_EQ(exit_ns, "60000000000") << agent;
+}
+
+TEST_F(TracksLog, PeopleTakeThingsAwayOnlyIfAsked) {
+  TracksOptions options = Options("none");
+  options.world.seed = 12;
+  options.crowd = {40, 150.0};
+  options.sensor.rate_hz = 1.0;
+  ASSERT_TRUE(WriteTracks(options, nullptr).ok());
+  EXPECT_EQ(ReadRows("none", "truth/picks.csv").size(), 1u);
+  EXPECT_EQ(Read("none", "log/map.json").find("valid_to_ns"), std::string::npos);
+
+  options.out = (folder_ / "some").string();
+  options.pick_count = 3;
+  ASSERT_TRUE(WriteTracks(options, nullptr).ok());
+  const auto rows = ReadRows("some", "truth/picks.csv");
+  ASSERT_EQ(rows.size(), 4u);
+  const std::string map = Read("some", "log/map.json");
+  std::set<std::string> objects;
+  for (size_t i = 1; i < rows.size(); ++i) {
+    ASSERT_EQ(rows[i].size(), 7u);
+    objects.insert(rows[i][1]);
+    EXPECT_LT(std::stoll(rows[i][4]), std::stoll(rows[i][5]));
+    EXPECT_LT(std::stoll(rows[i][5]), std::stoll(rows[i][6]));
+    EXPECT_NE(map.find(rows[i][6]), std::string::npos) << rows[i][6];
+  }
+  EXPECT_EQ(objects.size(), 3u);
+  // Who walks where is the same as without.
+  EXPECT_EQ(Read("none", "log/tracks.csv"), Read("some", "log/tracks.csv"));
 }
 
 TEST_F(TracksLog, RefusesAFolderThatHoldsSomethingUnlessForced) {

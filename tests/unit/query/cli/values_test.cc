@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "schema/base/status.h"
 
 namespace dsg::cli {
@@ -28,6 +30,19 @@ TEST(Values, RefusesIncompleteOrStrangeNumbersNamingTheOption) {
 
 TEST(Values, RefusesInvertedBoxes) {
   EXPECT_EQ(ReasonOf(ParseBox("--box", "0,0,0,1,-1,1").status()), Reason::kBoxInverted);
+}
+
+TEST(Values, ReadsPosesWithAndWithoutRotation) {
+  const auto plain = ParsePose("--pose", "-1,2,3");
+  ASSERT_TRUE(plain.ok());
+  EXPECT_EQ(plain->position, Eigen::Vector3d(-1.0, 2.0, 3.0));
+  const auto turned = ParsePose("--pose", "0,0,0,0,0,3,3");
+  ASSERT_TRUE(turned.ok());
+  EXPECT_NEAR(turned->orientation.z(), std::sqrt(0.5), 1e-12);
+  EXPECT_EQ(ReasonOf(ParsePose("--pose", "1,2").status()), Reason::kFieldInvalid);
+  EXPECT_EQ(ReasonOf(ParsePose("--pose", "1,2,3,4").status()), Reason::kFieldInvalid);
+  EXPECT_EQ(ReasonOf(ParsePose("--pose", "1,2,3,0,0,0,0").status()), Reason::kFieldInvalid);
+  EXPECT_EQ(ReasonOf(ParsePose("--pose", "1,2,nan").status()), Reason::kNumberNotFinite);
 }
 
 TEST(Values, ReadsDurations) {

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/cli/answer_picture.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "dsg/v1/query_service.pb.h"
+#include "query/cli/export/outline.h"
+#include "query/cli/export/output_file.h"
+#include "query/cli/export/top_view.h"
+#include "query/cli/read_content.h"
+#include "query/cli/written.h"
+#include "schema/base/status.h"
+#include "schema/codec/proto_convert.h"
+#include "schema/picture/png_file.h"
+
+namespace dsg::cli {
+
+absl::Status CheckPicture(const PictureOptions& options) {
+  return options.png.empty() ? absl::OkStatus() : CheckMayWrite(options.png, options.force);
+}
+
+absl::Status WritePicture(Session* session, const PictureOptions& options,
+                          const AnswerPicture& picture, std::ostream& out) {
+  if (options.png.empty()) return absl::OkStatus();
+  DSG_ASSIGN_OR_RETURN(
+      const ContentAnswer answer,
+      ReadContent(*session, &session->api(),
+                  {.at_ns = picture.at_ns, .with_agents = false, .revision = picture.revision}));
+  const std::string title =
+      absl::StrCat(answer.content.spec.name, "  revision ", picture.revision, "  ", picture.title);
+  const picture::Picture drawn = DrawTopView(
+      answer.content, {.width_px = options.width_px, .title = title, .overlay = picture.overlay});
+  DSG_ASSIGN_OR_RETURN(const std::string png, picture::EncodePng(drawn));
+  DSG_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(options.png, options.force));
+  DSG_RETURN_IF_ERROR(file.Write(png));
+  DSG_RETURN_IF_ERROR(file.Commit());
+  if (session->common().json) return absl::OkStatus();
+  TellWritten({{.format = "png",
+                .path = options.png,
+                .byte_count = file.byte_count(),
+                .counts = {{"columns", drawn.width}, {"rows", drawn.height}}}},
+              picture.revision, /*as_json=*/false, out);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<std::vector<Eigen::Vector3d>>> WayOf(Session* session,
+                                                                const std::string& agent,
+                                                                int64_t revision,
+                                                                const Interval& span) {
+  auto request = session->Begin<v1::GetTrajectoryRequest>();
+  request.mutable_read_at()->set_exact_revision(revision);
+  request.set_agent(agent);
+  if (span.from_ns != kTimeMin) request.set_from_ns(span.from_ns);
+  if (span.to_ns != kTimeMax) request.set_to_ns(span.to_ns);
+  std::vector<std::vector<Eigen::Vector3d>> pieces;
+  TimeNs last_ns = kTimeMin;
+  const auto take = [&](const v1::GetTrajectoryResponse& message) {
+    for (const v1::TimedPose& pose : message.poses()) {
+      if (pieces.empty() || pose.time_ns() - last_ns > session->map().gap_ns_max) {
+        pieces.emplace_back();
+      }
+      pieces.back().push_back(PointOf(pose.pose().position()));
+      last_ns = pose.time_ns();
+    }
+    return true;
+  };
+  DSG_RETURN_IF_ERROR(session->api().GetTrajectory(session->NewCall(), request, take));
+  return pieces;
+}
+
+Eigen::Vector3d PointOf(const v1::Vector3& point) { return {point.x(), point.y(), point.z()}; }
+
+Polygon2d OutlineOf(const v1::Node& node) {
+  // Outlines are the same in all layers, and the map's own ones are not known here.
+  v1::Node bare = node;
+  bare.set_layer("objects");
+  const auto plain = FromProto(bare, LayerTable());
+  return plain.ok() ? FloorOutline(*plain) : Polygon2d();
+}
+
+void MarkNode(const v1::Node& node, uint32_t rgb, const std::string& label, Overlay* overlay) {
+  OverlayMark mark{.position_map = PointOf(node.map_t_node().position()),
+                   .rgb = rgb,
+                   .radius_px = 10.0,
+                   .label = label};
+  Polygon2d outline = OutlineOf(node);
+  if (outline.size() >= 3) overlay->outlines.push_back({std::move(outline), rgb});
+  overlay->marks.push_back(std::move(mark));
+}
+
+}  // namespace dsg::cli

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// The grammar of the verbs about maps as a whole, their revisions and their files.
+#include "query/cli/export/top_view.h"
+#include "query/cli/grammar.h"
+
+namespace dsg::cli {
+namespace {
+
+void AddExport(Grammar* grammar) {
+  const auto [app, verb] =
+      grammar->Add<ExportVerb>("export", "Write mesh and graph to files for 3D viewers", kQuestion);
+  app->add_option("--ply", verb->ply, "The mesh, binary PLY");
+  app->add_option("--graph-ply", verb->graph_ply, "The graph, PLY of points and lines");
+  app->add_option("--gltf", verb->gltf, "Mesh and graph, binary glTF 2.0 (.glb)");
+  app->add_option("--color", verb->color,
+                  "Mesh colours: rgb, label or instance; default rgb if there are any")
+      ->check(CLI::IsMember({"rgb", "label", "instance"}));
+  app->add_option("--at", verb->at, "The world at this TIME; default what has not ended");
+  app->add_flag("--force", verb->force, "Replace files that are there");
+}
+
+void AddMap(Grammar* grammar) {
+  const auto [app, verb] = grammar->Add<MapVerb>("map", "Draw a map from above", kQuestion);
+  app->add_option("--png", verb->png, "The picture to write")->required();
+  app->add_option("--floor", verb->floor,
+                  "Only this floor: a level or room by id or name, or a height in metres");
+  app->add_option("--width", verb->width_px, "Pixels; the height follows")
+      ->check(CLI::Range(kTopViewWidthMin, kTopViewWidthMax))
+      ->capture_default_str();
+  app->add_option("--at", verb->at, "The world at this TIME; default what has not ended");
+  app->add_flag("--force", verb->force, "Replace a file that is there");
+}
+
+}  // namespace
+
+void AddMapVerbs(Grammar* grammar) {
+  grammar->Add<StatsVerb>("stats", "Counts and sizes of a map", kQuestion);
+  grammar->Add<MapsVerb>("maps", "List the maps", kServer | kJson);
+  grammar->Add<VersionVerb>("version", "Version of this program, and of the server if one is named",
+                            kServer | kJson);
+}
+
+void AddRevisionVerbs(Grammar* grammar) {
+  constexpr unsigned kTakes = kServer | kMap | kJson;
+  grammar->Add<LogVerb>("log", "List the revisions of a map, newest first", kTakes | kLimit);
+
+  const auto [diff_app, diff] =
+      grammar->Add<DiffVerb>("diff", "What differs between two revisions", kTakes | kLimit);
+  diff_app->add_option("FROM", diff->from_revision, "Revision before")
+      ->required()
+      ->check(CLI::NonNegativeNumber);
+  diff_app->add_option("TO", diff->to_revision, "Revision after; default the newest")
+      ->check(CLI::NonNegativeNumber);
+  diff_app->add_option("--layer", diff->layer, "Only nodes of this layer, and their edges");
+
+  const auto [watch_app, watch] =
+      grammar->Add<WatchVerb>("watch", "Revisions as they come, until Ctrl-C", kTakes);
+  watch_app
+      ->add_option("--after", watch->after, "The last revision that is known; default the newest")
+      ->check(CLI::NonNegativeNumber);
+  watch_app->add_flag("--changes", watch->changes, "Also say what changed");
+  watch_app->add_option("-n,--count", watch->count, "End after so many revisions")
+      ->check(CLI::PositiveNumber);
+}
+
+void AddFileVerbs(Grammar* grammar) {
+  const auto [app, import] = grammar->Add<ImportVerb>(
+      "import", "Add a scene-graph file (Spark-DSG, Kimera) to a map", kMap);
+  app->add_option("FILE", import->file, "The file")->required();
+  grammar->Add<VerifyVerb>("verify", "Check every page, row and revision of a map", kMap);
+  AddExport(grammar);
+  AddMap(grammar);
+}
+
+}  // namespace dsg::cli

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/cli/node_cells.h"
+
+#include "absl/strings/str_cat.h"
+#include "dsg/v1/graph.pb.h"
+
+namespace dsg::cli {
+
+std::vector<Column> NodeColumns() {
+  return {{"id"},
+          {"kind"},
+          {"layer"},
+          {"name"},
+          {"class"},
+          {"x m", Align::kRight},
+          {"y m", Align::kRight},
+          {"z m", Align::kRight}};
+}
+
+std::vector<std::string> NodeCells(const v1::Node& node) {
+  const v1::Vector3& p = node.map_t_node().position();
+  return {
+      node.id(),       node.kind(),     node.layer(),   node.name(), node.semantic_class().name(),
+      Fixed(p.x(), 2), Fixed(p.y(), 2), Fixed(p.z(), 2)};
+}
+
+std::string Footer(int64_t count, const std::string& noun, int64_t revision, bool is_cut) {
+  return absl::StrCat(Counted(count, noun), " (revision ", revision, ")",
+                      is_cut ? "; there are more, see --limit" : "", "\n");
+}
+
+std::string PositionText(const v1::Vector3& position) {
+  return absl::StrCat("x ", Fixed(position.x(), 2), " y ", Fixed(position.y(), 2), " z ",
+                      Fixed(position.z(), 2), " m");
+}
+
+}  // namespace dsg::cli

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// The verb diff: what differs between two revisions.
+#include "dsg/v1/map_service.pb.h"
+#include "query/cli/json.h"
+#include "query/cli/paging.h"
+#include "query/cli/render_changes.h"
+#include "query/cli/verbs.h"
+#include "schema/base/status.h"
+
+namespace dsg::cli {
+
+absl::Status RunDiff(Session* session, const DiffVerb& verb, std::ostream& out) {
+  v1::DiffRevisionsRequest request;
+  request.set_map(session->map().name);
+  request.set_from_revision(verb.from_revision);
+  request.set_to_revision(verb.to_revision);
+  request.set_layer(verb.layer);
+  v1::DiffRevisionsResponse all;
+  DSG_RETURN_IF_ERROR(FetchPages(
+      request, session->common().limit,
+      [](const v1::DiffRevisionsResponse& page) {
+        return page.nodes_size() + page.edges_size() + page.tracks_size() + page.mesh_blocks_size();
+      },
+      [&](v1::DiffRevisionsRequest next, v1::DiffRevisionsResponse* page) {
+        // The newest revision is that of the first page, whatever is committed meanwhile.
+        if (all.to_revision() != 0) next.set_to_revision(all.to_revision());
+        return session->api().DiffRevisions(session->NewCall(), next, page);
+      },
+      &all));
+  if (session->common().json) return WriteJson(all, out);
+  out << RenderDiff(all, session->times());
+  return absl::OkStatus();
+}
+
+}  // namespace dsg::cli

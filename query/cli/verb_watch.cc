@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// The verb watch: revisions as they come.
+#include <chrono>
+#include <optional>
+
+#include "dsg/v1/map_service.pb.h"
+#include "query/cli/interrupt.h"
+#include "query/cli/json.h"
+#include "query/cli/render_changes.h"
+#include "query/cli/verbs.h"
+#include "schema/base/status.h"
+
+namespace dsg::cli {
+namespace {
+
+// Prints what comes and remembers how far it has come.
+class Printer {
+ public:
+  Printer(const Session& session, const WatchVerb& verb, std::ostream& out)
+      : session_(session), verb_(verb), out_(out), after_(verb.after) {}
+
+  /// False when no more is wanted.
+  bool Take(const v1::WatchMapResponse& message) {
+    after_ = message.header().read_revision();
+    if (!message.has_revision()) return static_cast<bool>(out_);
+    status_ = Print(message);
+    out_.flush();
+    if (message.complete()) ++count_;
+    return status_.ok() && out_ && !IsDone();
+  }
+
+  bool IsDone() const { return verb_.count > 0 && count_ >= verb_.count; }
+  std::optional<int64_t> after() const { return after_; }
+  const absl::Status& status() const { return status_; }
+
+ private:
+  absl::Status Print(const v1::WatchMapResponse& message) {
+    if (session_.common().json) return WriteJsonLine(message, out_);
+    // Parts of one revision have one heading.
+    if (message.revision().revision() != shown_) out_ << RenderRevision(message.revision());
+    shown_ = message.revision().revision();
+    if (message.has_changes()) out_ << RenderChanges(message.changes(), session_.times());
+    return absl::OkStatus();
+  }
+
+  const Session& session_;
+  const WatchVerb& verb_;
+  std::ostream& out_;
+  std::optional<int64_t> after_;
+  int64_t count_ = 0;
+  int64_t shown_ = -1;
+  absl::Status status_;
+};
+
+v1::WatchMapRequest RequestFor(const Session& session, const WatchVerb& verb,
+                               const Printer& printer) {
+  v1::WatchMapRequest request;
+  request.set_map(session.map().name);
+  if (printer.after().has_value()) request.set_after_revision(*printer.after());
+  request.set_changes(verb.changes);
+  request.set_view(v1::NODE_VIEW_FULL);
+  return request;
+}
+
+}  // namespace
+
+absl::Status RunWatch(Session* session, const WatchVerb& verb, std::ostream& out) {
+  // A call without a deadline would be given one by the client.
+  constexpr std::chrono::hours kForEver{24 * 365};
+  const double timeout_s = session->common().timeout_s;
+  using Clock = query::CallContext::Clock;
+  const auto length =
+      timeout_s > 0.0
+          ? std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(timeout_s))
+          : std::chrono::duration_cast<Clock::duration>(kForEver);
+  query::CallContext call(Clock::now() + length);
+  const InterruptGuard guard(&call);
+  Printer printer(*session, verb, out);
+  const auto take = [&](const v1::WatchMapResponse& message) { return printer.Take(message); };
+  while (true) {
+    const std::optional<int64_t> before = printer.after();
+    const absl::Status status =
+        session->api().WatchMap(call, RequestFor(*session, verb, printer), take);
+    DSG_RETURN_IF_ERROR(printer.status());
+    if (printer.IsDone() || call.cancelled()) return absl::OkStatus();
+    // A server that was restarted is asked to go on from where the watch was.
+    const bool came_further = printer.after() != before;
+    if (absl::IsUnavailable(status) && came_further) continue;
+    return status;
+  }
+}
+
+}  // namespace dsg::cli

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// What an answer adds to the picture of a map is there, in its colour, where it belongs.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdlib>
+
+#include "query/cli/export/top_view.h"
+#include "query/cli/export/top_view_overlay.h"
+#include "tests/unit/query/cli/example_content.h"
+
+namespace dsg::cli {
+namespace {
+
+constexpr uint32_t kRed = 0xff0000;
+
+// Pixels that are nearly of one colour.
+int CountOf(const picture::Picture& picture, uint32_t rgb) {
+  int count = 0;
+  for (size_t i = 0; i + 2 < picture.rgb.size(); i += 3) {
+    const int distance = std::abs(picture.rgb[i] - static_cast<int>(rgb >> 16)) +
+                         std::abs(picture.rgb[i + 1] - static_cast<int>((rgb >> 8) & 0xff)) +
+                         std::abs(picture.rgb[i + 2] - static_cast<int>(rgb & 0xff));
+    count += distance < 60;
+  }
+  return count;
+}
+
+picture::Picture Draw(const Overlay& overlay) {
+  MapContent content = test::ExampleContent();
+  content.mesh.clear();
+  return DrawTopView(content, {.width_px = 800, .title = "t", .overlay = overlay});
+}
+
+TEST(Overlay, DrawsLinesMarksAndOutlines) {
+  EXPECT_EQ(CountOf(Draw({}), kRed), 0);
+  Overlay line;
+  line.lines.push_back({.points_map = {{0.5, 0.5, 0.0}, {7.5, 3.5, 0.0}}, .rgb = kRed});
+  EXPECT_GT(CountOf(Draw(line), kRed), 1000);
+  for (const auto shape :
+       {OverlayMark::Shape::kDot, OverlayMark::Shape::kRing, OverlayMark::Shape::kCross}) {
+    Overlay mark;
+    mark.marks.push_back({.position_map = {1.0, 1.0, 0.0}, .rgb = kRed, .shape = shape});
+    EXPECT_GT(CountOf(Draw(mark), kRed), 20);
+  }
+  Overlay outline;
+  outline.outlines.push_back({.corners_map = {{1, 1}, {2, 1}, {2, 2}, {1, 2}}, .rgb = kRed});
+  EXPECT_GT(CountOf(Draw(outline), kRed), 100);
+}
+
+TEST(Overlay, GrowsThePictureToWhatLiesOutsideTheMap) {
+  Overlay far;
+  far.lines.push_back({.points_map = {{0.0, 0.0, 0.0}, {8.0, 40.0, 0.0}}, .rgb = kRed});
+  EXPECT_GT(Draw(far).height, Draw({}).height);
+  EXPECT_GT(CountOf(Draw(far), kRed), 1000);
+}
+
+TEST(Overlay, LegendHasARowOfItsOwn) {
+  Overlay keyed;
+  keyed.legend.push_back({"the way", kRed});
+  EXPECT_EQ(Draw(keyed).height, Draw({}).height + 26);
+  EXPECT_GT(CountOf(Draw(keyed), kRed), 30);
+}
+
+TEST(Overlay, OfOnePointAndOfNothingIsNoFault) {
+  Overlay odd;
+  odd.lines.push_back({.points_map = {{1.0, 1.0, 0.0}}, .rgb = kRed});
+  odd.lines.push_back({.points_map = {}, .rgb = kRed});
+  odd.outlines.push_back({.corners_map = {}, .rgb = kRed});
+  EXPECT_GT(Draw(odd).width, 0);
+}
+
+}  // namespace
+}  // namespace dsg::cli
