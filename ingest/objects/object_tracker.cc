@@ -79,6 +79,11 @@ void ObjectTracker::Retire(const Assignment& assignment,
   }
 }
 
+void ObjectTracker::Remove(int64_t id) {
+  digests_.erase(id);
+  std::erase_if(objects_, [id](const TrackedObject& object) { return object.id == id; });
+}
+
 ObjectChanges ObjectTracker::Update(
     std::vector<ObjectCluster> clusters, TimeNs time_ns,
     const std::function<bool(const Eigen::Vector3f&)>& is_seen_through) {

@@ -46,6 +46,9 @@ class ObjectTracker {
   ObjectChanges Update(std::vector<ObjectCluster> clusters, TimeNs time_ns,
                        const std::function<bool(const Eigen::Vector3f&)>& is_seen_through);
 
+  /// Forgets an object that is known to be gone.
+  void Remove(int64_t id);
+
   /// Ascending by id.
   const std::vector<TrackedObject>& objects() const { return objects_; }
 

@@ -45,6 +45,7 @@ absl::Status StaticLayers::Integrate(const DepthFrame& frame) {
     const absl::Status status = volume_.Integrate(frame);
     if (!status.ok()) return status;
   }
+  object_watch_.Watch(frame);
   const Eigen::Vector3d& camera_map = frame.map_T_camera.position;
   if (path_map_.empty() || (camera_map - path_map_.back()).norm() > kPathStepM) {
     path_map_.push_back(camera_map);
@@ -161,6 +162,8 @@ void StaticLayers::FindObjects(TimeNs now_ns, const std::vector<const MeshBlock*
   } else {
     clusters = FindClusters(mesh, options);
   }
+  KeepVacated();
+  object_watch_.DropResidues(&clusters);
   const std::vector<TrackedObject> before = object_tracker_.objects();
   const ObjectChanges changes =
       object_tracker_.Update(std::move(clusters), now_ns, [this](const Eigen::Vector3f& point_map) {
@@ -169,8 +172,28 @@ void StaticLayers::FindObjects(TimeNs now_ns, const std::vector<const MeshBlock*
   for (const auto& [part, whole] : changes.merged) together_.Merge(part, whole);
   for (const int64_t id : changes.gone) together_.Forget(id);
   KeepGone(before, changes, now_ns);
+  object_watch_.Follow(object_tracker_.objects());
   unfitted_.insert(unfitted_.end(), changes.added.begin(), changes.added.end());
   unfitted_.insert(unfitted_.end(), changes.changed.begin(), changes.changed.end());
+}
+
+// Small things that pictures have shown to be gone, while their surface is still in the volume.
+void StaticLayers::KeepVacated() {
+  for (const VacatedObject& vacated : object_watch_.TakeVacated()) {
+    const std::vector<TrackedObject>& objects = object_tracker_.objects();
+    const auto object = std::find_if(objects.begin(), objects.end(), [&](const TrackedObject& one) {
+      return one.id == vacated.id;
+    });
+    if (object == objects.end()) continue;
+    GoneObject gone{*object, std::nullopt, vacated.first_absent_ns};
+    gone.object.last_observed_ns = std::max(vacated.last_present_ns, object->first_observed_ns);
+    gone.gone_ns = std::max(gone.gone_ns, gone.object.last_observed_ns + 1);
+    const auto fit = fits_.find(vacated.id);
+    if (fit != fits_.end()) gone.fit = fit->second;
+    gone_.push_back(std::move(gone));
+    together_.Forget(vacated.id);
+    object_tracker_.Remove(vacated.id);
+  }
 }
 
 // What left the world stays in the map, until when it was there.

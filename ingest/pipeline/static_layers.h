@@ -14,6 +14,7 @@
 #include "absl/status/statusor.h"
 #include "ingest/grid/distance_field.h"
 #include "ingest/objects/object_tracker.h"
+#include "ingest/objects/object_watch.h"
 #include "ingest/objects/relations.h"
 #include "ingest/objects/shapes/shape_fit.h"
 #include "ingest/pipeline/graph_told.h"
@@ -74,6 +75,7 @@ class StaticLayers {
   void NoteCost(int64_t cell_count);
   void FindObjects(TimeNs now_ns, const std::vector<const MeshBlock*>& mesh,
                    const std::vector<StructurePiece>& structures);
+  void KeepVacated();
   void KeepGone(const std::vector<TrackedObject>& before, const ObjectChanges& changes,
                 TimeNs now_ns);
   void FitShapes(const std::vector<double>& floors_m, bool is_last);
@@ -93,6 +95,7 @@ class StaticLayers {
   std::map<BlockIndex, MeshBlock> mesh_;
   std::vector<Eigen::Vector3d> path_map_;
   ObjectTracker object_tracker_;
+  ObjectWatch object_watch_;
   CoVisibility together_;
   /// By object.
   std::map<int64_t, ShapeFit> fits_;

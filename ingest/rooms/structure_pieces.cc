@@ -77,7 +77,7 @@ Eigen::Vector3d PlaneNormal(const Sums& sums) {
 
 class PieceFinder {
  public:
-  PieceFinder(const Surface& surface, const StructureClasses& classes)
+  PieceFinder(const StructureSurface& surface, const StructureClasses& classes)
       : surface_(surface), types_(surface.positions_map.size(), kNone) {
     ReadTypes(classes);
   }
@@ -263,7 +263,7 @@ class PieceFinder {
     return pieces;
   }
 
-  const Surface& surface_;
+  const StructureSurface& surface_;
   /// Of vertices that are not in a piece yet.
   std::vector<uint8_t> types_;
   bool is_labelled_ = false;
@@ -275,7 +275,7 @@ class PieceFinder {
 
 std::vector<StructurePiece> FindStructures(const std::vector<const MeshBlock*>& mesh,
                                            const StructureClasses& classes) {
-  const Surface surface = JoinBlocks(mesh);
+  const StructureSurface surface = JoinBlocks(mesh);
   return PieceFinder(surface, classes).Find();
 }
 

@@ -44,7 +44,7 @@ class Joiner {
  public:
   explicit Joiner(const std::vector<const MeshBlock*>& mesh) : mesh_(mesh) {}
 
-  Surface Join() {
+  StructureSurface Join() {
     size_t vertex_count = 0;
     size_t face_count = 0;
     for (const MeshBlock* block : mesh_) {
@@ -151,12 +151,14 @@ class Joiner {
   }
 
   const std::vector<const MeshBlock*>& mesh_;
-  Surface surface_;
+  StructureSurface surface_;
   std::vector<Face> faces_;
 };
 
 }  // namespace
 
-Surface JoinBlocks(const std::vector<const MeshBlock*>& mesh) { return Joiner(mesh).Join(); }
+StructureSurface JoinBlocks(const std::vector<const MeshBlock*>& mesh) {
+  return Joiner(mesh).Join();
+}
 
 }  // namespace dsg::ingest

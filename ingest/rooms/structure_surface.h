@@ -10,7 +10,7 @@
 
 namespace dsg::ingest {
 
-struct Surface {
+struct StructureSurface {
   std::vector<Eigen::Vector3f> positions_map;
   /// Unit; zero where no face says which way. Of the blocks where they have them, else of the
   /// faces; smoothed over neighbours.
@@ -29,6 +29,6 @@ struct Surface {
 };
 
 /// Order: vertices as they first come. Cost: linear.
-Surface JoinBlocks(const std::vector<const MeshBlock*>& mesh);
+StructureSurface JoinBlocks(const std::vector<const MeshBlock*>& mesh);
 
 }  // namespace dsg::ingest
