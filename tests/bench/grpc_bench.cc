@@ -10,15 +10,13 @@
 
 #include "CLI/CLI.hpp"
 #include "absl/strings/str_cat.h"
-#include "dsg/v1/map_service.grpc.pb.h"
-#include "dsg/v1/query_service.grpc.pb.h"
-#include "grpcpp/grpcpp.h"
 #include "schema/base/status.h"
 #include "schema/store/graph_store.h"
 #include "tests/bench/child_process.h"
 #include "tests/bench/crowd.h"
 #include "tests/bench/report.h"
 #include "tests/bench/scratch_folder.h"
+#include "tests/bench/wire_client.h"
 
 namespace dsg::bench {
 namespace {
@@ -104,38 +102,6 @@ absl::Status MakeStore(const Flags& flags, const std::string& folder) {
   return writer->Commit(std::move(delta)).status();
 }
 
-struct Client {
-  std::unique_ptr<v1::QueryService::Stub> query;
-  std::unique_ptr<v1::MapService::Stub> map;
-};
-
-// A connection of its own, so that threads do not share one.
-absl::StatusOr<Client> Connect(const std::string& address) {
-  grpc::ChannelArguments arguments;
-  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  const auto channel =
-      grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
-  if (!channel->WaitForConnected(std::chrono::system_clock::now() + std::chrono::seconds(10))) {
-    return absl::UnavailableError(absl::StrCat("no server answers at ", address));
-  }
-  return Client{v1::QueryService::NewStub(channel), v1::MapService::NewStub(channel)};
-}
-
-absl::Status ToStatus(const grpc::Status& status) {
-  if (status.ok()) return absl::OkStatus();
-  return absl::InternalError(absl::StrCat("call failed: ", status.error_message()));
-}
-
-// Makes one call with the deadline that any client should set.
-template <typename Stub, typename Request, typename Reply>
-grpc::Status Call(Stub* stub,
-                  grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Reply*),
-                  const Request& request, Reply* reply) {
-  grpc::ClientContext context;
-  context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(5));
-  return (stub->*method)(&context, request, reply);
-}
-
 void FillInstant(const Flags& flags, Random* random, std::string* agent, int64_t* at_ns) {
   *agent = ToString(CrowdAgent(random->Index(flags.agent_count)));
   *at_ns = kCrowdEpochNs + static_cast<TimeNs>(random->Uniform(1.0, flags.poses_per_agent - 2.0) *
@@ -167,7 +133,7 @@ absl::Status CheckReply(const Snapshot& snapshot, const v1::LocateAgentRequest& 
 }
 
 // Both calls in turn, on one connection of one thread.
-absl::Status MeasureUnary(const Flags& flags, const Client& client, const Snapshot& snapshot,
+absl::Status MeasureUnary(const Flags& flags, const WireClient& client, const Snapshot& snapshot,
                           Report* report) {
   constexpr int kWarmupCount = 2000;
   Random random(kSeed, 1'000'000);
@@ -190,8 +156,8 @@ absl::Status MeasureUnary(const Flags& flags, const Client& client, const Snapsh
     int64_t inform_ns = i % 2 == 0 ? NanosecondsOf(inform) : 0;
     const int64_t locate_ns = NanosecondsOf(locate);
     if (i % 2 != 0) inform_ns = NanosecondsOf(inform);
-    DSG_RETURN_IF_ERROR(ToStatus(located));
-    DSG_RETURN_IF_ERROR(ToStatus(informed));
+    DSG_RETURN_IF_ERROR(FromGrpc(located));
+    DSG_RETURN_IF_ERROR(FromGrpc(informed));
     DSG_RETURN_IF_ERROR(CheckReply(snapshot, request, reply));
     if (i < kWarmupCount) continue;
     ours.Add(locate_ns);
@@ -238,7 +204,7 @@ absl::Status CheckBatch(const v1::BatchLocateAgentsRequest& request,
   return absl::OkStatus();
 }
 
-void LoadInBatches(const Flags& flags, const Client& client, uint64_t stream,
+void LoadInBatches(const Flags& flags, const WireClient& client, uint64_t stream,
                    const std::atomic<bool>& stop, Tally* tally) {
   constexpr int kRequestCount = 16;
   Random random(kSeed, stream);
@@ -252,12 +218,12 @@ void LoadInBatches(const Flags& flags, const Client& client, uint64_t stream,
       called =
           Call(client.query.get(), &v1::QueryService::Stub::BatchLocateAgents, request, &reply);
     }));
-    tally->status = called.ok() ? CheckBatch(request, reply) : ToStatus(called);
+    tally->status = called.ok() ? CheckBatch(request, reply) : FromGrpc(called);
     tally->lookup_count += flags.batch_size;
   }
 }
 
-void LoadOneByOne(const Flags& flags, const Client& client, uint64_t stream,
+void LoadOneByOne(const Flags& flags, const WireClient& client, uint64_t stream,
                   const std::atomic<bool>& stop, Tally* tally) {
   Random random(kSeed, stream);
   v1::LocateAgentResponse reply;
@@ -267,12 +233,13 @@ void LoadOneByOne(const Flags& flags, const Client& client, uint64_t stream,
     tally->calls.Add(NanosecondsOf([&] {
       called = Call(client.query.get(), &v1::QueryService::Stub::LocateAgent, request, &reply);
     }));
-    tally->status = ToStatus(called);
+    tally->status = FromGrpc(called);
     ++tally->lookup_count;
   }
 }
 
-using Loader = void (*)(const Flags&, const Client&, uint64_t, const std::atomic<bool>&, Tally*);
+using Loader = void (*)(const Flags&, const WireClient&, uint64_t, const std::atomic<bool>&,
+                        Tally*);
 
 struct Throughput {
   double lookups_per_s = 0.0;
@@ -281,9 +248,9 @@ struct Throughput {
 };
 
 absl::StatusOr<Throughput> RunLoad(const Flags& flags, const std::string& address, Loader loader) {
-  std::vector<Client> clients;
+  std::vector<WireClient> clients;
   for (int i = 0; i < flags.thread_count; ++i) {
-    DSG_ASSIGN_OR_RETURN(Client client, Connect(address));
+    DSG_ASSIGN_OR_RETURN(WireClient client, Connect(address));
     clients.push_back(std::move(client));
   }
   std::vector<Tally> tallies(clients.size());
@@ -338,7 +305,7 @@ absl::Status Run(const Flags& flags, const CommonOptions& common, Report* report
   DSG_ASSIGN_OR_RETURN(const auto store, GraphStore::Open(folder->path(), {}));
   DSG_ASSIGN_OR_RETURN(const auto map, store->OpenMap(kMap));
   DSG_ASSIGN_OR_RETURN(const auto snapshot, map->Latest());
-  DSG_ASSIGN_OR_RETURN(const Client client, Connect(address));
+  DSG_ASSIGN_OR_RETURN(const WireClient client, Connect(address));
   DSG_RETURN_IF_ERROR(MeasureUnary(flags, client, *snapshot, report));
   ShowProgress("unary calls done");
   return MeasureBatches(flags, address, report);

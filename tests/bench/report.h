@@ -36,6 +36,7 @@ int64_t ThreadCpuNs();
 class Samples {
  public:
   void Add(int64_t ns) { ns_.push_back(ns); }
+  void Append(const Samples& other) { ns_.insert(ns_.end(), other.ns_.begin(), other.ns_.end()); }
   size_t count() const { return ns_.size(); }
   /// By nearest rank, nanoseconds. Requires: 0 < fraction <= 1, at least one sample.
   double Percentile(double fraction) const;

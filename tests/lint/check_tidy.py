@@ -24,7 +24,8 @@ UNSEEDED = re.compile(
     r"\s+\w+(?<!_)\s*(;|\{\s*\})")
 PRINTS = re.compile(r"std::c(out|err)\b|\bf?printf\(|\bputs\(")
 # Mains and the command-line tool talk to people; so do tests.
-MAY_PRINT = re.compile(r"^(query/cli/|ingest/simulator/cli/|tests/)|(^|/|_)main\.cc$|"
+MAY_PRINT = re.compile(r"^(docs/examples/|query/cli/|ingest/simulator/cli/|tests/)|"
+                       r"(^|/|_)main\.cc$|"
                        r"schema/base/(log|check)\.|"
                        r"^ingest/pipeline/(progress|mapping_flags|people_flags)")
 SPDX = "SPDX-License-Identifier: Apache-2.0"

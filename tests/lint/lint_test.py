@@ -9,6 +9,7 @@ import check_layering
 import check_packages
 import check_proto
 import check_tidy
+import check_types
 
 LICENCE = "// SPDX-License-Identifier: Apache-2.0\n"
 
@@ -112,6 +113,16 @@ class Proto(unittest.TestCase):
         same = FIELD.format("x", 1, "TYPE_DOUBLE")
         self.assertEqual(1, len(self.breaks(same, values='value { name: "ONE" number: 2 }')))
         self.assertEqual(1, len(self.breaks(same, values="")))
+
+
+class Types(unittest.TestCase):
+    def test_one_name_means_one_type(self):
+        type_in = "namespace dsg::query {{\nstruct {} {{\n}};\n}}  // namespace dsg::query\n".format
+        hidden = "namespace dsg::query {\nnamespace {\nstruct Way {\n};\n}  // namespace\n}\n"
+        self.assertEqual([], check_types.problems_of(
+            {"a.h": type_in("Way"), "b.h": type_in("Path"), "c.cc": hidden}))
+        self.assertEqual(1, len(check_types.problems_of(
+            {"a.h": type_in("Way"), "b.h": type_in("Way")})))
 
 
 class Pages(unittest.TestCase):
