@@ -231,18 +231,18 @@ void FillCollision(const CollisionHit& hit, v1::CollisionResult* out) {
   out->mutable_point()->set_z(hit.point_map.z());
 }
 
-absl::Status CheckCollision(const ReadView& view, const CallContext& call,
-                            const v1::CheckCollisionRequest& request,
+absl::Status CheckCollision(const ReadView& view, CollisionCache* collisions,
+                            const CallContext& call, const v1::CheckCollisionRequest& request,
                             v1::CheckCollisionResponse* reply) {
   DSG_ASSIGN_OR_RETURN(const std::vector<Body> bodies, ReadBodies(request));
   DSG_ASSIGN_OR_RETURN(CollisionScope scope, ReadScope(request));
   std::optional<TimeNs> at_ns;
   if (request.has_at_ns()) at_ns = request.at_ns();
   DSG_ASSIGN_OR_RETURN(const auto graph, view.Graph(call.stop()));
-  CollisionWorld world = CollisionWorld::Create(graph, view.shared_snapshot(), at_ns);
+  CollisionWorld world = CollisionWorld::Create(graph, view.shared_snapshot(), at_ns, collisions);
   for (const std::string& name : request.scope().ignored()) {
     DSG_ASSIGN_OR_RETURN(const NodeId node, view.snapshot().ResolveNode(name));
-    world.Ignore(node, &scope);
+    DSG_RETURN_IF_ERROR(world.Ignore(node, call.stop(), &scope));
   }
   view.FillHeader(reply->mutable_header());
   reply->mutable_results()->Reserve(request.bodies_size());

@@ -15,12 +15,13 @@ class CollisionResult;
 
 namespace dsg::query {
 
+class CollisionCache;
 struct CollisionHit;
 
 /// Errors: FIELD_INVALID and NUMBER_NOT_FINITE naming the field, NODE_UNKNOWN for what is ignored;
 /// as ReadView::Graph; the store's.
-absl::Status CheckCollision(const ReadView& view, const CallContext& call,
-                            const v1::CheckCollisionRequest& request,
+absl::Status CheckCollision(const ReadView& view, CollisionCache* collisions,
+                            const CallContext& call, const v1::CheckCollisionRequest& request,
                             v1::CheckCollisionResponse* reply);
 
 void FillCollision(const CollisionHit& hit, v1::CollisionResult* out);

@@ -18,6 +18,12 @@
 namespace dsg::query {
 namespace {
 
+struct NearestNode {
+  Node node;
+  /// From the point to the node's box, metres; 0 inside.
+  double distance_m = 0.0;
+};
+
 struct Question {
   Eigen::Vector3d point_map = Eigen::Vector3d::Zero();
   int k = 1;
@@ -54,7 +60,7 @@ absl::StatusOr<std::vector<NearestNode>> NearestAgents(const Snapshot& snapshot,
                                                        const Question& question,
                                                        const StopCheck& stop) {
   const TimeNs at_ns = *question.filter.at_ns;
-  DSG_ASSIGN_OR_RETURN(const std::vector<TrackInfo> tracks, snapshot.Tracks());
+  DSG_ASSIGN_OR_RETURN(const std::vector<TrackInfo> tracks, snapshot.Tracks(stop));
   std::vector<NearestNode> found;
   for (const TrackInfo& track : tracks) {
     DSG_RETURN_IF_ERROR(stop());

@@ -28,8 +28,14 @@ constexpr double kSweptRadiusMinM = 0.05;
 /// Answers questions about one revision.
 class PathAnswerer {
  public:
-  PathAnswerer(const ReadView& read, std::shared_ptr<const GraphView> view, const CallContext& call)
-      : read_(read), view_(std::move(view)), places_(view_->Places()), call_(call) {}
+  PathAnswerer(const ReadView& read, std::shared_ptr<const GraphView> view,
+               std::shared_ptr<const PlaceGraph> places, CollisionCache* collisions,
+               const CallContext& call)
+      : read_(read),
+        view_(std::move(view)),
+        places_(std::move(places)),
+        collisions_(collisions),
+        call_(call) {}
 
   absl::Status Answer(const v1::PlanPathRequest& request, v1::PlanPathResponse* reply) {
     DSG_ASSIGN_OR_RETURN(const PathQuestion question,
@@ -134,7 +140,7 @@ class PathAnswerer {
   CollisionWorld Obstacles(const v1::PlanPathRequest& request) const {
     return CollisionWorld::Create(
         view_, read_.shared_snapshot(),
-        request.has_at_ns() ? std::optional<TimeNs>(request.at_ns()) : std::nullopt);
+        request.has_at_ns() ? std::optional<TimeNs>(request.at_ns()) : std::nullopt, collisions_);
   }
 
   // Where no clearance says that a way is free: does the map know of anything in it?
@@ -163,7 +169,8 @@ class PathAnswerer {
     for (const NodeId node : {route.from.node, route.to.node}) {
       if (node.empty()) continue;
       const ViewNode* known = view_->FindNode(node);
-      if (known != nullptr && IsAgent(*view_, *known)) world.Ignore(node, &scope);
+      if (known == nullptr || !IsAgent(*view_, *known)) continue;
+      DSG_RETURN_IF_ERROR(world.Ignore(node, call_.stop(), &scope));
     }
     const Body body = SweptSphere(std::max(question.limits.radius_m, kSweptRadiusMinM), polyline);
     DSG_ASSIGN_OR_RETURN(const CollisionHit hit, world.Check(body, scope, call_.stop()));
@@ -184,28 +191,35 @@ class PathAnswerer {
   const ReadView& read_;
   std::shared_ptr<const GraphView> view_;
   std::shared_ptr<const PlaceGraph> places_;
+  CollisionCache* collisions_;
   const CallContext& call_;
 };
 
+absl::StatusOr<PathAnswerer> MakeAnswerer(const ReadView& view, CollisionCache* collisions,
+                                          const CallContext& call) {
+  const StopCheck stop = call.stop();
+  DSG_ASSIGN_OR_RETURN(std::shared_ptr<const GraphView> graph, view.Graph(stop));
+  DSG_ASSIGN_OR_RETURN(std::shared_ptr<const PlaceGraph> places, graph->Places(stop));
+  return PathAnswerer(view, std::move(graph), std::move(places), collisions, call);
+}
+
 }  // namespace
 
-absl::Status PlanPath(const ReadView& view, AgentNames*, const CallContext& call,
+absl::Status PlanPath(const ReadView& view, CollisionCache* collisions, const CallContext& call,
                       const v1::PlanPathRequest& request, v1::PlanPathResponse* reply) {
-  DSG_ASSIGN_OR_RETURN(std::shared_ptr<const GraphView> graph, view.Graph(call.stop()));
-  PathAnswerer answerer(view, std::move(graph), call);
+  DSG_ASSIGN_OR_RETURN(PathAnswerer answerer, MakeAnswerer(view, collisions, call));
   DSG_RETURN_IF_ERROR(answerer.Answer(request, reply));
   view.FillHeader(reply->mutable_header());
   return absl::OkStatus();
 }
 
-absl::Status PlanPaths(const ReadView& view, AgentNames*, const CallContext& call,
+absl::Status PlanPaths(const ReadView& view, CollisionCache* collisions, const CallContext& call,
                        const v1::PlanPathsRequest& request, v1::PlanPathsResponse* reply) {
   if (request.paths_size() > kPathsMax) {
     return FieldError("paths", absl::StrCat(request.paths_size(), " paths"),
                       "ask for at most 1000 a call");
   }
-  DSG_ASSIGN_OR_RETURN(std::shared_ptr<const GraphView> graph, view.Graph(call.stop()));
-  PathAnswerer answerer(view, std::move(graph), call);
+  DSG_ASSIGN_OR_RETURN(PathAnswerer answerer, MakeAnswerer(view, collisions, call));
   view.FillHeader(reply->mutable_header());
   size_t bytes = 0;
   for (const v1::PlanPathRequest& path : request.paths()) {

@@ -4,7 +4,6 @@
 #pragma once
 
 #include "absl/status/status.h"
-#include "query/engine/agent_names.h"
 #include "query/engine/call_context.h"
 #include "query/engine/read_view.h"
 
@@ -17,9 +16,11 @@ class PlanPathsResponse;
 
 namespace dsg::query {
 
-absl::Status PlanPath(const ReadView& view, AgentNames* names, const CallContext& call,
+class CollisionCache;
+
+absl::Status PlanPath(const ReadView& view, CollisionCache* collisions, const CallContext& call,
                       const v1::PlanPathRequest& request, v1::PlanPathResponse* reply);
-absl::Status PlanPaths(const ReadView& view, AgentNames* names, const CallContext& call,
+absl::Status PlanPaths(const ReadView& view, CollisionCache* collisions, const CallContext& call,
                        const v1::PlanPathsRequest& request, v1::PlanPathsResponse* reply);
 
 }  // namespace dsg::query

@@ -40,17 +40,19 @@ class QuestionReader {
     question.flat = request.mode() == v1::FLAT;
     question.limits.radius_m = radius_m;
     if (request.has_at_ns()) question.limits.at_ns = request.at_ns();
+    const StopCheck stop = call_.stop();
     const PathWorld world{
         *view_, read_.snapshot(), *places_,
-        request.has_at_ns() ? std::optional<TimeNs>(request.at_ns()) : std::nullopt};
-    DSG_RETURN_IF_ERROR(ReadBlocked(request, &question.limits));
+        request.has_at_ns() ? std::optional<TimeNs>(request.at_ns()) : std::nullopt, stop};
+    DSG_RETURN_IF_ERROR(ReadBlocked(world, request, &question.limits));
     DSG_ASSIGN_OR_RETURN(question.from, ReadEnd(world, question.limits, request.from(), "from"));
     DSG_ASSIGN_OR_RETURN(question.to, ReadEnd(world, question.limits, request.to(), "to"));
     return question;
   }
 
  private:
-  absl::Status ReadBlocked(const v1::PlanPathRequest& request, Limits* limits) const {
+  absl::Status ReadBlocked(const PathWorld& world, const v1::PlanPathRequest& request,
+                           Limits* limits) const {
     if (request.blocked_size() > kBlockedMax) {
       return FieldError("blocked", absl::StrCat(request.blocked_size(), " nodes"),
                         "give at most 10000; name rooms rather than their places");
@@ -58,7 +60,8 @@ class QuestionReader {
     for (int i = 0; i < request.blocked_size(); ++i) {
       const std::string field = absl::StrCat("blocked[", i, "]");
       DSG_ASSIGN_OR_RETURN(const ViewNode* node, FindNode(request.blocked(i), field));
-      if (!Block(*view_, *places_, *node, &limits->blocked)) {
+      DSG_ASSIGN_OR_RETURN(const bool is_blocked, Block(world, *node, &limits->blocked));
+      if (!is_blocked) {
         return FieldError(field, request.blocked(i),
                           "it is no place and has none below it; give places, rooms or nodes of "
                           "layers above");
@@ -138,7 +141,8 @@ class QuestionReader {
     PathEndpoint end;
     end.text = absl::StrCat("nearest ", FormatQuery(pattern.source()));
     for (size_t i = 0; i < found.size(); ++i) {
-      if (i % 256 == 0) DSG_RETURN_IF_ERROR(call_.Check());
+      // There may be many places below each.
+      if (i % 16 == 0) DSG_RETURN_IF_ERROR(call_.Check());
       absl::StatusOr<PathTarget> target = TargetOf(world, *view_->FindNode(found[i]));
       // Agents that were not seen at that time are not the nearest.
       if (ReasonOf(target.status()) == Reason::kTimeOutsideTrack) continue;

@@ -172,25 +172,29 @@ Foreseen Straight(const std::vector<PathPoint>& path, const Question& question,
 }
 
 // Of who is far from all places, what weighted velocity says.
-Foreseen ToGoals(const WalkArea& area, const std::vector<PathPoint>& path,
-                 const Question& question) {
+absl::StatusOr<Foreseen> ToGoals(const WalkArea& area, const std::vector<PathPoint>& path,
+                                 const Question& question, const StopCheck& stop) {
   GoalOptions options;
   options.path_count_max = question.path_count_max;
   options.way_m_max = std::max(options.way_m_max, WantedReachM(path, question));
-  if (Attach(path.back().position_map, area.field.graph(), options).empty()) {
+  if (Attach(path.back().position_map, area.field, options).empty()) {
     return Straight(path, question, v1::WEIGHTED_VELOCITY);
   }
-  return {v1::GOALS, PredictToGoals(path, question.at_ns, area.field, options), area.goal_nodes};
+  DSG_ASSIGN_OR_RETURN(std::vector<PredictedPath> paths,
+                       PredictToGoals(path, question.at_ns, area.field, options, stop));
+  return Foreseen{v1::GOALS, std::move(paths), area.goal_nodes};
 }
 
 // Straight walks are not bound to an area, however far they lead.
-void StopAtWalls(const PlaceGraph& places, const std::vector<PathPoint>& path,
-                 const Question& question, std::vector<PredictedPath>* paths) {
+absl::Status StopAtWalls(const PlaceGraph& places, const std::vector<PathPoint>& path,
+                         const Question& question, const StopCheck& stop,
+                         std::vector<PredictedPath>* paths) {
   const WalkTile tile = TileOf(path.back().position_map, kGoalReachMMin + ReachM(path, question));
-  const WalkGrounds grounds = MakeWalkGrounds(places, tile, question.from_ns);
+  DSG_ASSIGN_OR_RETURN(const WalkGraph graph, PlacesOfTile(places, tile, question.from_ns, stop));
   for (PredictedPath& predicted : *paths) {
-    StopAtEdge(path.back(), grounds.field.graph(), &predicted);
+    DSG_RETURN_IF_ERROR(StopAtEdge(path.back(), graph, stop, &predicted));
   }
+  return absl::OkStatus();
 }
 
 absl::StatusOr<Foreseen> Foresee(const ReadView& view, WalkAreaCache* areas,
@@ -198,21 +202,21 @@ absl::StatusOr<Foreseen> Foresee(const ReadView& view, WalkAreaCache* areas,
                                  const Question& question) {
   const bool is_straight = question.model != v1::GOALS;
   if (is_straight && !question.stop_at_walls) return Straight(path, question, question.model);
-  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const GraphView> graph, view.Graph(call.stop()));
-  const std::shared_ptr<const PlaceGraph> places = graph->Places();
-  DSG_RETURN_IF_ERROR(call.Check());
+  const StopCheck stop = call.stop();
+  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const GraphView> graph, view.Graph(stop));
+  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const PlaceGraph> places, graph->Places(stop));
   Foreseen foreseen;
   if (is_straight) {
     foreseen = Straight(path, question, question.model);
   } else {
-    const std::shared_ptr<const WalkArea> area =
-        areas->Get(graph, path.back().position_map, WantedReachM(path, question), question.from_ns);
-    foreseen = ToGoals(*area, path, question);
+    DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const WalkArea> area,
+                         areas->Get(graph, path.back().position_map, WantedReachM(path, question),
+                                    question.from_ns, stop));
+    DSG_ASSIGN_OR_RETURN(foreseen, ToGoals(*area, path, question, stop));
   }
   if (foreseen.model != v1::GOALS && question.stop_at_walls && places->size() > 0) {
-    StopAtWalls(*places, path, question, &foreseen.paths);
+    DSG_RETURN_IF_ERROR(StopAtWalls(*places, path, question, stop, &foreseen.paths));
   }
-  DSG_RETURN_IF_ERROR(call.Check());
   return foreseen;
 }
 

@@ -192,8 +192,9 @@ absl::Status ListPresence(const Page& page, const CallContext& call,
     if (!presence.key.node.empty()) interval->set_node_id(ToString(presence.key.node));
     bytes += interval->ByteSizeLong();
   }
-  DSG_ASSIGN_OR_RETURN(const int64_t observed,
-                       snapshot.CountObservedAgents(request.from_ns(), request.to_ns()));
+  DSG_ASSIGN_OR_RETURN(
+      const int64_t observed,
+      snapshot.CountObservedAgents(request.from_ns(), request.to_ns(), call.stop()));
   reply->set_observed_agent_count(observed);
   return absl::OkStatus();
 }

@@ -11,6 +11,7 @@
 #include "query/engine/agent_shape.h"
 #include "query/engine/ancestry.h"
 #include "query/engine/collision.h"
+#include "query/engine/collision/collision_cache.h"
 #include "query/engine/commit.h"
 #include "query/engine/diff.h"
 #include "query/engine/edges.h"
@@ -142,19 +143,19 @@ class LocalCore final : public ServiceCore {
   absl::Status PlanPath(const CallContext& call, const v1::PlanPathRequest& request,
                         v1::PlanPathResponse* reply) override {
     DSG_ASSIGN_OR_RETURN(const ReadView view, Open(call, request));
-    return query::PlanPath(view, &names_, call, request, reply);
+    return query::PlanPath(view, &collisions_, call, request, reply);
   }
 
   absl::Status PlanPaths(const CallContext& call, const v1::PlanPathsRequest& request,
                          v1::PlanPathsResponse* reply) override {
     DSG_ASSIGN_OR_RETURN(const ReadView view, Open(call, request));
-    return query::PlanPaths(view, &names_, call, request, reply);
+    return query::PlanPaths(view, &collisions_, call, request, reply);
   }
 
   absl::Status CheckCollision(const CallContext& call, const v1::CheckCollisionRequest& request,
                               v1::CheckCollisionResponse* reply) override {
     DSG_ASSIGN_OR_RETURN(const ReadView view, Open(call, request));
-    return query::CheckCollision(view, call, request, reply);
+    return query::CheckCollision(view, &collisions_, call, request, reply);
   }
 
   absl::Status PredictAgent(const CallContext& call, const v1::PredictAgentRequest& request,
@@ -304,6 +305,7 @@ class LocalCore final : public ServiceCore {
   AgentNames names_;
   AncestryCache ancestries_;
   WalkAreaCache walk_areas_;
+  CollisionCache collisions_;
 };
 
 }  // namespace

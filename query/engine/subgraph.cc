@@ -2,6 +2,7 @@
 #include "query/engine/subgraph.h"
 
 #include <algorithm>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <unordered_set>
@@ -17,6 +18,7 @@
 #include "query/engine/search/relation_set.h"
 #include "query/engine/view_filter.h"
 #include "query/engine/view_nodes.h"
+#include "query/view/stoppable_sort.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 
@@ -108,7 +110,7 @@ class Cursor final : public SubgraphCursor {
           if (question_.tree_only) tree_edges_.push_back(KeyOf(from, step));
         }
       }
-      std::sort(deeper.begin(), deeper.end());
+      DSG_RETURN_IF_ERROR(SortStoppably(std::less<>(), call.stop(), &deeper));
     }
     ++depth_;
     level_ = std::move(deeper);
@@ -116,11 +118,11 @@ class Cursor final : public SubgraphCursor {
     filler_->Expect(level_);
     if (!level_.empty()) return absl::OkStatus();
     if (question_.tree_only) {
-      std::sort(tree_edges_.begin(), tree_edges_.end());
+      DSG_RETURN_IF_ERROR(SortStoppably(std::less<>(), call.stop(), &tree_edges_));
       edges_ = InTurn<EdgeKey>(tree_edges_);
     } else {
       sources_.assign(reached_.begin(), reached_.end());
-      std::sort(sources_.begin(), sources_.end());
+      DSG_RETURN_IF_ERROR(SortStoppably(std::less<>(), call.stop(), &sources_));
     }
     return absl::OkStatus();
   }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "query/prediction/goal_choice.h"
+#include "schema/base/status.h"
 
 namespace dsg::query {
 namespace {
@@ -16,6 +17,8 @@ constexpr double kTileHeightM = 3.0;
 constexpr double kReachUpM = 6.0;
 // Places nearer to the outline of their building than this may lead out of it.
 constexpr double kExitM = 1.5;
+// Places or objects between two questions to the stop check.
+constexpr int64_t kStopPeriod = 256;
 
 int64_t IndexOf(double coordinate_m, double size_m) {
   return std::llround(std::clamp(std::floor(coordinate_m / size_m), -1e9, 1e9));
@@ -55,8 +58,11 @@ struct Draws {
 };
 
 // Where one room passes into another.
-void AddDoors(const PlaceGraph& all, const WalkGrounds& grounds, Draws* draws) {
+absl::Status AddDoors(const PlaceGraph& all, const WalkGrounds& grounds, const StopCheck& stop,
+                      Draws* draws) {
+  StopCounter counter(stop, kStopPeriod);
   for (const PlaceIndex place : grounds.places) {
+    DSG_RETURN_IF_ERROR(counter.Check());
     const bool is_door = std::any_of(
         all.links_begin(place), all.links_end(place), [&](const PlaceGraph::Link& link) {
           return !all.room(place).empty() && !all.room(link.to).empty() &&
@@ -64,26 +70,35 @@ void AddDoors(const PlaceGraph& all, const WalkGrounds& grounds, Draws* draws) {
         });
     if (is_door) draws->Add(all.position_map(place), all.id(place));
   }
+  return absl::OkStatus();
 }
 
-void AddFurniture(const GraphView& view, const WalkTile& tile, Instant* instant, Draws* draws) {
+absl::Status AddFurniture(const GraphView& view, const WalkTile& tile, const StopCheck& stop,
+                          Instant* instant, Draws* draws) {
+  StopCounter counter(stop, kStopPeriod);
+  absl::Status status;
   const SpaceFilter filter{layers::kObjects, std::nullopt};
   std::vector<std::pair<NodeId, Eigen::Vector3d>> found;
   view.ForEachTouching(tile.BoxMap(), filter, [&](const ViewNode& node) {
     if (DrawsPeople(view.symbols().Text(node.class_name)) && instant->IsIn(node.valid)) {
       found.push_back({node.id, node.BoxMap().center()});
     }
-    return true;
+    status = counter.Check();
+    return status.ok();
   });
+  DSG_RETURN_IF_ERROR(status);
   std::sort(found.begin(), found.end(),
             [](const auto& a, const auto& b) { return a.first < b.first; });
   for (const auto& [id, position_map] : found) draws->Add(position_map, id);
+  return absl::OkStatus();
 }
 
 // Dead ends at the outline of their building.
-void AddExits(const GraphView& view, const PlaceGraph& all, const WalkGrounds& grounds,
-              Draws* draws) {
+absl::Status AddExits(const GraphView& view, const PlaceGraph& all, const WalkGrounds& grounds,
+                      const StopCheck& stop, Draws* draws) {
+  StopCounter counter(stop, kStopPeriod);
   for (const PlaceIndex place : grounds.places) {
+    DSG_RETURN_IF_ERROR(counter.Check());
     if (all.links_end(place) - all.links_begin(place) != 1) continue;
     for (const NodeId above : view.Ancestors(all.id(place))) {
       const ViewNode* node = view.FindNode(above);
@@ -96,25 +111,46 @@ void AddExits(const GraphView& view, const PlaceGraph& all, const WalkGrounds& g
       break;
     }
   }
+  return absl::OkStatus();
 }
 
-void AddLinks(const PlaceGraph& all, const std::vector<PlaceIndex>& places, Instant* instant,
-              WalkGraph* graph) {
-  // Ascending, so that the index of a place is found by halving.
-  const auto index_of = [&places](PlaceIndex place) {
-    const auto at = std::lower_bound(places.begin(), places.end(), place);
-    return at != places.end() && *at == place ? static_cast<int>(at - places.begin()) : -1;
-  };
+// Those of a tile at an instant, and which of all places they are.
+absl::StatusOr<std::vector<PlaceIndex>> AddPlaces(const PlaceGraph& all, const WalkTile& tile,
+                                                  const StopCheck& stop, Instant* instant,
+                                                  WalkGraph* graph) {
+  const Box3d box = tile.BoxMap();
+  StopCounter counter(stop, kStopPeriod);
+  std::vector<PlaceIndex> places;
+  for (PlaceIndex place = 0; place < all.size(); ++place) {
+    DSG_RETURN_IF_ERROR(counter.Check());
+    const Eigen::Vector3d& position_map = all.position_map(place);
+    if (!box.contains(position_map) || !instant->IsIn(all.valid(place))) continue;
+    places.push_back(place);
+    graph->places_map.push_back(position_map);
+    graph->clearance_m.push_back(std::max(0.0, all.clearance_m(place)));
+  }
+  return places;
+}
+
+absl::Status AddLinks(const PlaceGraph& all, const std::vector<PlaceIndex>& places,
+                      const StopCheck& stop, Instant* instant, WalkGraph* graph) {
+  std::vector<int> index_of(static_cast<size_t>(all.size()), -1);
+  for (size_t i = 0; i < places.size(); ++i) {
+    index_of[static_cast<size_t>(places[i])] = static_cast<int>(i);
+  }
+  StopCounter counter(stop, kStopPeriod);
   for (size_t from = 0; from < places.size(); ++from) {
+    DSG_RETURN_IF_ERROR(counter.Check());
     const PlaceGraph::Link* end = all.links_end(places[from]);
     for (const PlaceGraph::Link* link = all.links_begin(places[from]); link != end; ++link) {
       if (link->to <= places[from]) continue;
-      const int to = index_of(link->to);
+      const int to = index_of[static_cast<size_t>(link->to)];
       if (to < 0 || !instant->IsIn(link->valid)) continue;
       graph->links.push_back({static_cast<int>(from), to});
       graph->link_clearance_m.push_back(std::max(0.0, static_cast<double>(link->clearance_m)));
     }
   }
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -137,39 +173,45 @@ size_t WalkArea::memory_bytes() const {
   return sizeof(WalkArea) + field.memory_bytes() + goal_nodes.capacity() * sizeof(NodeId);
 }
 
-WalkGrounds MakeWalkGrounds(const PlaceGraph& all, const WalkTile& tile, TimeNs at_ns) {
-  const Box3d box = tile.BoxMap();
+absl::StatusOr<WalkGraph> PlacesOfTile(const PlaceGraph& all, const WalkTile& tile, TimeNs at_ns,
+                                       const StopCheck& stop) {
   Instant instant(at_ns);
   WalkGraph graph;
-  std::vector<PlaceIndex> places;
-  for (PlaceIndex place = 0; place < all.size(); ++place) {
-    const Eigen::Vector3d& position_map = all.position_map(place);
-    if (!box.contains(position_map) || !instant.IsIn(all.valid(place))) continue;
-    places.push_back(place);
-    graph.places_map.push_back(position_map);
-    graph.clearance_m.push_back(std::max(0.0, all.clearance_m(place)));
-  }
-  AddLinks(all, places, &instant, &graph);
-  return {GoalField(std::move(graph), {}), std::move(places), instant.same()};
+  DSG_RETURN_IF_ERROR(AddPlaces(all, tile, stop, &instant, &graph).status());
+  return graph;
 }
 
-WalkArea MakeWalkArea(const GraphView& view, const PlaceGraph& all, const WalkGrounds& grounds,
-                      const WalkTile& tile, TimeNs at_ns) {
+absl::StatusOr<WalkGrounds> MakeWalkGrounds(const PlaceGraph& all, const WalkTile& tile,
+                                            TimeNs at_ns, const StopCheck& stop) {
+  Instant instant(at_ns);
+  WalkGraph graph;
+  DSG_ASSIGN_OR_RETURN(std::vector<PlaceIndex> places,
+                       AddPlaces(all, tile, stop, &instant, &graph));
+  DSG_RETURN_IF_ERROR(AddLinks(all, places, stop, &instant, &graph));
+  DSG_ASSIGN_OR_RETURN(GoalField field, GoalField::Make(std::move(graph), {}, stop));
+  return WalkGrounds{std::move(field), std::move(places), instant.same()};
+}
+
+absl::StatusOr<WalkArea> MakeWalkArea(const GraphView& view, const PlaceGraph& all,
+                                      const WalkGrounds& grounds, const WalkTile& tile,
+                                      TimeNs at_ns, const StopCheck& stop) {
   Instant instant(at_ns);
   instant.IsIn(grounds.valid);
   Draws draws;
-  AddDoors(all, grounds, &draws);
-  AddFurniture(view, tile, &instant, &draws);
-  AddExits(view, all, grounds, &draws);
+  DSG_RETURN_IF_ERROR(AddDoors(all, grounds, stop, &draws));
+  DSG_RETURN_IF_ERROR(AddFurniture(view, tile, stop, &instant, &draws));
+  DSG_RETURN_IF_ERROR(AddExits(view, all, grounds, stop, &draws));
+  DSG_ASSIGN_OR_RETURN(const std::vector<ChosenGoal> all_chosen,
+                       ChooseGoals(grounds.field.graph(), draws.attractions, {}, stop));
   std::vector<Goal> goals;
   std::vector<NodeId> nodes;
-  for (const ChosenGoal& chosen : ChooseGoals(grounds.field.graph(), draws.attractions, {})) {
+  for (const ChosenGoal& chosen : all_chosen) {
     goals.push_back(chosen.goal);
     nodes.push_back(chosen.attraction >= 0
                         ? draws.nodes[static_cast<size_t>(chosen.attraction)]
                         : all.id(grounds.places[static_cast<size_t>(chosen.goal.place)]));
   }
-  return {grounds.field.WithGoals(std::move(goals)), std::move(nodes), instant.same()};
+  return WalkArea{grounds.field.WithGoals(std::move(goals)), std::move(nodes), instant.same()};
 }
 
 }  // namespace dsg::query

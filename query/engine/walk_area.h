@@ -53,12 +53,20 @@ struct WalkArea {
   size_t memory_bytes() const;
 };
 
-WalkGrounds MakeWalkGrounds(const PlaceGraph& all, const WalkTile& tile, TimeNs at_ns);
+/// Errors: what `stop` returned.
+absl::StatusOr<WalkGrounds> MakeWalkGrounds(const PlaceGraph& all, const WalkTile& tile,
+                                            TimeNs at_ns, const StopCheck& stop);
+
+/// The places of a tile as they are at one instant, without links.
+/// Errors: what `stop` returned.
+absl::StatusOr<WalkGraph> PlacesOfTile(const PlaceGraph& all, const WalkTile& tile, TimeNs at_ns,
+                                       const StopCheck& stop);
 
 /// Goals are where rooms meet, what people sit at or use, ways out of the building, and a place
 /// here and there. Requires: `grounds` of the same tile, valid at `at_ns`; `all` is
-/// `view.Places()`.
-WalkArea MakeWalkArea(const GraphView& view, const PlaceGraph& all, const WalkGrounds& grounds,
-                      const WalkTile& tile, TimeNs at_ns);
+/// `view.Places()`. Errors: what `stop` returned.
+absl::StatusOr<WalkArea> MakeWalkArea(const GraphView& view, const PlaceGraph& all,
+                                      const WalkGrounds& grounds, const WalkTile& tile,
+                                      TimeNs at_ns, const StopCheck& stop);
 
 }  // namespace dsg::query

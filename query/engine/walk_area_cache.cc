@@ -3,6 +3,8 @@
 
 #include <utility>
 
+#include "schema/base/status.h"
+
 namespace dsg::query {
 namespace {
 
@@ -56,19 +58,20 @@ void WalkAreaCache::Insert(Entry entry) {
   }
 }
 
-std::shared_ptr<const WalkArea> WalkAreaCache::Get(const std::shared_ptr<const GraphView>& view,
-                                                   const Eigen::Vector3d& position_map,
-                                                   double reach_m, TimeNs at_ns) {
+absl::StatusOr<std::shared_ptr<const WalkArea>> WalkAreaCache::Get(
+    const std::shared_ptr<const GraphView>& view, const Eigen::Vector3d& position_map,
+    double reach_m, TimeNs at_ns, const StopCheck& stop) {
   const WalkTile tile = TileOf(position_map, reach_m);
   if (std::shared_ptr<const WalkArea> kept = FindArea(view, tile, at_ns)) return kept;
-  const std::shared_ptr<const PlaceGraph> places = view->Places();
+  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const PlaceGraph> places, view->Places(stop));
   std::shared_ptr<const WalkGrounds> grounds = FindGrounds(places, tile, at_ns);
   const bool is_shared = grounds != nullptr;
   if (!is_shared) {
-    grounds = std::make_shared<const WalkGrounds>(MakeWalkGrounds(*places, tile, at_ns));
+    DSG_ASSIGN_OR_RETURN(WalkGrounds made, MakeWalkGrounds(*places, tile, at_ns, stop));
+    grounds = std::make_shared<const WalkGrounds>(std::move(made));
   }
-  const auto area =
-      std::make_shared<const WalkArea>(MakeWalkArea(*view, *places, *grounds, tile, at_ns));
+  DSG_ASSIGN_OR_RETURN(WalkArea made, MakeWalkArea(*view, *places, *grounds, tile, at_ns, stop));
+  const auto area = std::make_shared<const WalkArea>(std::move(made));
   const size_t bytes =
       area->memory_bytes() + sizeof(Entry) + grounds->places.capacity() * sizeof(PlaceIndex);
   Insert({view, places, tile, grounds, area, bytes});

@@ -18,10 +18,12 @@ class WalkAreaCache {
   explicit WalkAreaCache(size_t bytes_max = size_t{64} << 20) : bytes_max_(bytes_max) {}
 
   /// The area of the tile of a position at an instant; the same whether or not it was kept.
+  /// Errors: what `stop` returned; nothing is kept of what was half made.
   /// Cost: when it is not kept, a look at every place of the map.
-  std::shared_ptr<const WalkArea> Get(const std::shared_ptr<const GraphView>& view,
-                                      const Eigen::Vector3d& position_map, double reach_m,
-                                      TimeNs at_ns);
+  absl::StatusOr<std::shared_ptr<const WalkArea>> Get(const std::shared_ptr<const GraphView>& view,
+                                                      const Eigen::Vector3d& position_map,
+                                                      double reach_m, TimeNs at_ns,
+                                                      const StopCheck& stop);
 
   struct Stats {
     size_t bytes = 0;

@@ -8,6 +8,7 @@
 
 #include "query/prediction/prediction.h"
 #include "query/prediction/route.h"
+#include "schema/base/status.h"
 
 namespace dsg::query {
 namespace {
@@ -16,11 +17,8 @@ constexpr double kStepM = 0.1;
 constexpr double kCellM = 1.0;
 /// Larger clearances are used up to here, so that a place in a hall does not fill a thousand cells.
 constexpr double kRadiusMMax = 3.0;
-
-int32_t CellOf(double coordinate_m) {
-  // Nobody maps beyond; the cast would be undefined.
-  return static_cast<int32_t>(std::clamp(std::floor(coordinate_m / kCellM), -2e9, 2e9));
-}
+/// Places between two questions to the stop check.
+constexpr int64_t kStopPeriod = 256;
 
 struct Ball {
   Eigen::Vector2d centre;
@@ -52,14 +50,16 @@ bool InOneBall(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const std::ve
 }
 
 /// How far towards `to_map` all is known to be free.
-Eigen::Vector3d LastFree(const Eigen::Vector3d& from_map, const Eigen::Vector3d& to_map,
-                         const std::vector<Ball>& balls) {
+absl::StatusOr<Eigen::Vector3d> LastFree(const Eigen::Vector3d& from_map,
+                                         const Eigen::Vector3d& to_map,
+                                         const std::vector<Ball>& balls, const StopCheck& stop) {
   const Eigen::Vector3d way = to_map - from_map;
   const int part_count = 1 + static_cast<int>(std::min(way.norm() / kStepM, 1e6));
   Eigen::Vector3d reached_map = from_map;
   for (int part = 1; part <= part_count; ++part) {
     const Eigen::Vector3d next_map =
         part == part_count ? to_map : (from_map + way * part / part_count).eval();
+    DSG_RETURN_IF_ERROR(AskStop(stop));
     if (!InOneBall(reached_map.head<2>(), next_map.head<2>(), balls)) break;
     reached_map = next_map;
   }
@@ -68,27 +68,30 @@ Eigen::Vector3d LastFree(const Eigen::Vector3d& from_map, const Eigen::Vector3d&
 
 }  // namespace
 
-FreeSpace::FreeSpace(const WalkGraph& graph) {
+FreeSpace::FreeSpace() : cells_(kCellM) {}
+
+absl::StatusOr<FreeSpace> FreeSpace::Make(const WalkGraph& graph, const StopCheck& stop) {
+  FreeSpace space;
+  StopCounter counter(stop, kStopPeriod);
+  space.balls_.reserve(graph.places_map.size());
   for (size_t i = 0; i < graph.places_map.size(); ++i) {
-    const Ball ball{graph.places_map[i], std::min(graph.clearance_m[i], kRadiusMMax)};
-    balls_.push_back(ball);
-    for (int32_t x = CellOf(ball.centre_map.x() - ball.radius_m);
-         x <= CellOf(ball.centre_map.x() + ball.radius_m); ++x) {
-      for (int32_t y = CellOf(ball.centre_map.y() - ball.radius_m);
-           y <= CellOf(ball.centre_map.y() + ball.radius_m); ++y) {
-        cells_.push_back({{x, y}, static_cast<int>(i)});
-      }
-    }
+    space.balls_.push_back({graph.places_map[i], std::min(graph.clearance_m[i], kRadiusMMax)});
   }
-  std::sort(cells_.begin(), cells_.end());
+  std::sort(space.balls_.begin(), space.balls_.end(),
+            [](const auto& a, const auto& b) { return a.radius_m > b.radius_m; });
+  for (size_t i = 0; i < space.balls_.size(); ++i) {
+    DSG_RETURN_IF_ERROR(counter.Check());
+    space.cells_.Add(space.balls_[i].centre_map, space.balls_[i].radius_m, static_cast<int>(i));
+  }
+  return space;
 }
 
 double FreeSpace::RadiusM(const Eigen::Vector3d& point_map) const {
-  const Cell cell{CellOf(point_map.x()), CellOf(point_map.y())};
   double best_m = -std::numeric_limits<double>::infinity();
-  for (auto at = std::lower_bound(cells_.begin(), cells_.end(), std::pair(cell, 0));
-       at != cells_.end() && at->first == cell; ++at) {
-    const Ball& ball = balls_[at->second];
+  for (const int i : cells_.At(point_map)) {
+    const Ball& ball = balls_[i];
+    // Those that follow are no larger.
+    if (ball.radius_m <= best_m) break;
     if (std::abs(ball.centre_map.z() - point_map.z()) > kStoreyHeightM) continue;
     best_m = std::max(best_m, ball.radius_m - (ball.centre_map - point_map).head<2>().norm());
   }
@@ -110,15 +113,19 @@ bool FreeSpace::IsClear(const Eigen::Vector3d& from_map, const Eigen::Vector3d& 
   }
 }
 
-void StopAtEdge(const PathPoint& last, const WalkGraph& graph, PredictedPath* predicted) {
+absl::Status StopAtEdge(const PathPoint& last, const WalkGraph& graph, const StopCheck& stop,
+                        PredictedPath* predicted) {
   const std::vector<Ball> balls = BallsAround(last, *predicted, graph);
   Eigen::Vector3d reached_map = last.position_map;
   bool waits = false;
   for (Eigen::Vector3d& position_map : predicted->positions_map) {
-    if (!waits) reached_map = LastFree(reached_map, position_map, balls);
+    if (!waits) {
+      DSG_ASSIGN_OR_RETURN(reached_map, LastFree(reached_map, position_map, balls, stop));
+    }
     waits = waits || reached_map != position_map;
     position_map = reached_map;
   }
+  return absl::OkStatus();
 }
 
 }  // namespace dsg::query

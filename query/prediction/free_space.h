@@ -4,9 +4,11 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstdint>
-#include <utility>
 #include <vector>
+
+#include "absl/status/statusor.h"
+#include "query/prediction/cell_map.h"
+#include "schema/base/stop_check.h"
 
 namespace dsg::query {
 
@@ -18,8 +20,8 @@ struct WalkGraph;
 /// places around the point.
 class FreeSpace {
  public:
-  /// Copies what it needs.
-  explicit FreeSpace(const WalkGraph& graph);
+  /// Copies what it needs. Errors: what `stop` returned.
+  static absl::StatusOr<FreeSpace> Make(const WalkGraph& graph, const StopCheck& stop);
 
   /// A circle of this radius around the point is free; less than 0 where nothing is known.
   double RadiusM(const Eigen::Vector3d& point_map) const;
@@ -28,20 +30,19 @@ class FreeSpace {
   bool IsClear(const Eigen::Vector3d& from_map, const Eigen::Vector3d& to_map,
                double margin_m) const;
 
-  size_t memory_bytes() const {
-    return balls_.capacity() * sizeof(Ball) + cells_.capacity() * sizeof(cells_[0]);
-  }
+  size_t memory_bytes() const { return balls_.capacity() * sizeof(Ball) + cells_.memory_bytes(); }
 
  private:
   struct Ball {
     Eigen::Vector3d centre_map;
     double radius_m = 0.0;
   };
-  using Cell = std::pair<int32_t, int32_t>;
 
+  FreeSpace();
+
+  // The largest first.
   std::vector<Ball> balls_;
-  // Ascending by cell, then ball.
-  std::vector<std::pair<Cell, int>> cells_;
+  CellMap cells_;
 };
 
 }  // namespace dsg::query

@@ -4,54 +4,57 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
-#include <set>
 #include <string>
 #include <tuple>
+#include <unordered_map>
+#include <utility>
 
+#include "query/prediction/cell_map.h"
 #include "query/prediction/route.h"
 #include "schema/base/check.h"
+#include "schema/base/status.h"
 
 namespace dsg::query {
 namespace {
 
 using Square = std::tuple<int64_t, int64_t, int64_t>;
 
+constexpr double kCellM = 1.0;
+/// Places or attractions between two questions to the stop check.
+constexpr int64_t kStopPeriod = 256;
+
 double Horizontal(const Eigen::Vector3d& a_map, const Eigen::Vector3d& b_map) {
   return (a_map - b_map).head<2>().norm();
 }
 
-/// Places by x, so that few are looked at for each attraction.
-class PlaceStrips {
- public:
-  explicit PlaceStrips(const WalkGraph& graph) : graph_(graph) {
-    for (size_t i = 0; i < graph.places_map.size(); ++i) {
-      by_x_.push_back({graph.places_map[i].x(), static_cast<int>(i)});
-    }
-    std::sort(by_x_.begin(), by_x_.end());
-  }
+/// Of the storey, nearer than `reach_m`; of equals the lowest; -1 = none. `places` are those of the
+/// graph.
+int NearestPlace(const WalkGraph& graph, const CellMap& places, const Eigen::Vector3d& position_map,
+                 double reach_m) {
+  int best = -1;
+  double best_m = reach_m;
+  places.ForEachAround(position_map, reach_m, [&](int place) {
+    const Eigen::Vector3d& place_map = graph.places_map[place];
+    if (std::abs(place_map.z() - position_map.z()) > kStoreyHeightM) return;
+    const double way_m = Horizontal(place_map, position_map);
+    if (way_m > best_m || (way_m == best_m && (best < 0 || place > best))) return;
+    best_m = way_m;
+    best = place;
+  });
+  return best;
+}
 
-  /// Of the storey, nearer than `reach_m`; of equals the lowest; -1 = none.
-  int Nearest(const Eigen::Vector3d& position_map, double reach_m) const {
-    int best = -1;
-    double best_m = reach_m;
-    const std::pair<double, int> low{position_map.x() - reach_m, 0};
-    for (auto at = std::lower_bound(by_x_.begin(), by_x_.end(), low);
-         at != by_x_.end() && at->first <= position_map.x() + reach_m; ++at) {
-      const Eigen::Vector3d& place_map = graph_.places_map[at->second];
-      if (std::abs(place_map.z() - position_map.z()) > kStoreyHeightM) continue;
-      const double way_m = Horizontal(place_map, position_map);
-      if (way_m > best_m || (way_m == best_m && (best < 0 || at->second > best))) continue;
-      best_m = way_m;
-      best = at->second;
-    }
-    return best;
-  }
-
- private:
-  const WalkGraph& graph_;
-  std::vector<std::pair<double, int>> by_x_;
-};
+/// Whether one of the chosen places is of the storey and nearer than `apart_m`.
+bool IsTaken(const WalkGraph& graph, const CellMap& chosen, int place, double apart_m) {
+  const Eigen::Vector3d& place_map = graph.places_map[place];
+  bool is_taken = false;
+  chosen.ForEachAround(place_map, apart_m, [&](int other) {
+    const Eigen::Vector3d& other_map = graph.places_map[other];
+    is_taken = is_taken || (std::abs(other_map.z() - place_map.z()) <= kStoreyHeightM &&
+                            Horizontal(other_map, place_map) < apart_m);
+  });
+  return is_taken;
+}
 
 Square SquareOf(const Eigen::Vector3d& position_map, double size_m) {
   return {std::llround(std::floor(position_map.x() / size_m)),
@@ -59,48 +62,72 @@ Square SquareOf(const Eigen::Vector3d& position_map, double size_m) {
           std::llround(std::floor(position_map.z() / (2.0 * kStoreyHeightM)))};
 }
 
+struct SquareHash {
+  size_t operator()(const Square& square) const {
+    const auto [x, y, z] = square;
+    size_t hash = 0;
+    for (const int64_t part : {x, y, z}) {
+      hash = (hash ^ static_cast<size_t>(part)) * 0x9e3779b97f4a7c15ull;
+      hash ^= hash >> 32;
+    }
+    return hash;
+  }
+};
+
 /// The place with the most room around it stands for its square.
-void AppendAnywhere(const WalkGraph& graph, const GoalChoiceOptions& options,
-                    std::vector<ChosenGoal>* goals) {
-  std::map<Square, int> best;
+absl::Status AppendAnywhere(const WalkGraph& graph, const GoalChoiceOptions& options,
+                            const StopCheck& stop, std::vector<ChosenGoal>* goals) {
+  StopCounter counter(stop, kStopPeriod);
+  std::unordered_map<Square, int, SquareHash> best;
   for (size_t i = 0; i < graph.places_map.size(); ++i) {
+    DSG_RETURN_IF_ERROR(counter.Check());
     const int place = static_cast<int>(i);
     const auto [found, is_new] =
         best.emplace(SquareOf(graph.places_map[i], options.anywhere_m), place);
     if (!is_new && graph.clearance_m[i] > graph.clearance_m[found->second]) found->second = place;
   }
-  std::set<Square> taken;
   for (const ChosenGoal& goal : *goals) {
-    taken.insert(SquareOf(graph.places_map[goal.goal.place], options.anywhere_m));
+    best.erase(SquareOf(graph.places_map[goal.goal.place], options.anywhere_m));
   }
-  for (const auto& [square, place] : best) {
-    if (!taken.contains(square)) goals->push_back({{place, options.anywhere_prior}, -1});
-  }
+  std::vector<std::pair<Square, int>> ordered(best.begin(), best.end());
+  std::sort(ordered.begin(), ordered.end());
+  for (const auto& [square, place] : ordered)
+    goals->push_back({{place, options.anywhere_prior}, -1});
+  return absl::OkStatus();
 }
 
 }  // namespace
 
+absl::StatusOr<std::vector<ChosenGoal>> ChooseGoals(const WalkGraph& graph,
+                                                    const std::vector<Attraction>& attractions,
+                                                    const GoalChoiceOptions& options,
+                                                    const StopCheck& stop) {
+  DSG_CHECK(options.anywhere_m > 0.0 && options.anywhere_prior >= 0.0);
+  StopCounter counter(stop, kStopPeriod);
+  CellMap places(kCellM);
+  for (size_t i = 0; i < graph.places_map.size(); ++i) {
+    DSG_RETURN_IF_ERROR(counter.Check());
+    places.Add(graph.places_map[i], 0.0, static_cast<int>(i));
+  }
+  CellMap chosen(kCellM);
+  std::vector<ChosenGoal> goals;
+  for (size_t i = 0; i < attractions.size(); ++i) {
+    DSG_RETURN_IF_ERROR(counter.Check());
+    const int place = NearestPlace(graph, places, attractions[i].position_map, options.reach_m);
+    if (place < 0 || IsTaken(graph, chosen, place, options.apart_m)) continue;
+    goals.push_back({{place, attractions[i].prior}, static_cast<int>(i)});
+    chosen.Add(graph.places_map[place], 0.0, place);
+  }
+  if (options.anywhere_prior > 0.0) {
+    DSG_RETURN_IF_ERROR(AppendAnywhere(graph, options, stop, &goals));
+  }
+  return goals;
+}
+
 std::vector<ChosenGoal> ChooseGoals(const WalkGraph& graph,
                                     const std::vector<Attraction>& attractions,
                                     const GoalChoiceOptions& options) {
-  DSG_CHECK(options.anywhere_m > 0.0 && options.anywhere_prior >= 0.0);
-  std::vector<ChosenGoal> goals;
-  const PlaceStrips strips(graph);
-  for (size_t i = 0; i < attractions.size(); ++i) {
-    const int place = strips.Nearest(attractions[i].position_map, options.reach_m);
-    if (place < 0) continue;
-    const bool is_known = std::any_of(goals.begin(), goals.end(), [&](const ChosenGoal& goal) {
-      const Eigen::Vector3d& other_map = graph.places_map[goal.goal.place];
-      const Eigen::Vector3d way = other_map - graph.places_map[place];
-      // Most are far away, which one coordinate tells.
-      return std::abs(way.x()) < options.apart_m && std::abs(way.z()) <= kStoreyHeightM &&
-             Horizontal(other_map, graph.places_map[place]) < options.apart_m;
-    });
-    if (is_known) continue;
-    goals.push_back({{place, attractions[i].prior}, static_cast<int>(i)});
-  }
-  if (options.anywhere_prior > 0.0) AppendAnywhere(graph, options, &goals);
-  return goals;
+  return *ChooseGoals(graph, attractions, options, StopCheck());
 }
 
 bool DrawsPeople(std::string_view class_name) {

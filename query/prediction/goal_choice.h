@@ -38,7 +38,13 @@ struct ChosenGoal {
 
 /// In the order of the attractions, then of the places. The nearest place of the storey stands for
 /// an attraction, distances are horizontal.
-/// Cost: attractions * (places of a strip as wide as the reach + goals).
+/// Errors: what `stop` returned. Cost: places + attractions * (places and goals around each).
+absl::StatusOr<std::vector<ChosenGoal>> ChooseGoals(const WalkGraph& graph,
+                                                    const std::vector<Attraction>& attractions,
+                                                    const GoalChoiceOptions& options,
+                                                    const StopCheck& stop);
+
+/// The same without an end before it is done.
 std::vector<ChosenGoal> ChooseGoals(const WalkGraph& graph,
                                     const std::vector<Attraction>& attractions,
                                     const GoalChoiceOptions& options);

@@ -13,6 +13,7 @@
 #include "query/prediction/route_walk.h"
 #include "query/prediction/ways.h"
 #include "schema/base/check.h"
+#include "schema/base/status.h"
 
 namespace dsg::query {
 namespace {
@@ -42,29 +43,35 @@ void CheckOptions(const GoalOptions& options) {
 
 /// The ways from the last point.
 struct Departure {
-  Departure(const std::vector<PathPoint>& path, const GoalField& field, const GoalOptions& options)
-      : attachments(Attach(path.back().position_map, field.graph(), options)),
-        ways(attachments, field, options.way_m_max) {}
-
   std::vector<Attachment> attachments;
   Ways ways;
 };
 
-/// Someone may have walked where the graph has a gap.
-bool ShareAGoal(const Ways& first, const Ways& last, const GoalField& field) {
-  return std::any_of(field.goals().begin(), field.goals().end(), [&](const Goal& goal) {
-    return first.Reaches(goal.place) && last.Reaches(goal.place);
-  });
+absl::StatusOr<Departure> Depart(const std::vector<PathPoint>& path, const GoalField& field,
+                                 const GoalOptions& options, const StopCheck& stop) {
+  std::vector<Attachment> attachments = Attach(path.back().position_map, field, options);
+  DSG_ASSIGN_OR_RETURN(Ways ways, Ways::Find(attachments, field, options.way_m_max, stop));
+  return Departure{std::move(attachments), std::move(ways)};
 }
 
-/// From the first point that is near the graph, on the same part of it as the last one.
-Ways WaysFromFirst(const std::vector<PathPoint>& path, const Ways& last, const GoalField& field,
-                   const GoalOptions& options) {
+/// From the first point that is near the graph, on the same part of it as the last one: someone may
+/// have walked where the graph has a gap. Knows the ways to the goals that `last` reaches.
+absl::StatusOr<Ways> WaysFromFirst(const std::vector<PathPoint>& path, const Ways& last,
+                                   const GoalField& field, const GoalOptions& options,
+                                   const StopCheck& stop) {
+  std::vector<int> wanted;
+  for (const Goal& goal : field.goals()) {
+    if (last.Reaches(goal.place)) wanted.push_back(goal.place);
+  }
+  if (wanted.empty()) return last;
   for (const PathPoint& point : path) {
-    const std::vector<Attachment> found = Attach(point.position_map, field.graph(), options);
+    const std::vector<Attachment> found = Attach(point.position_map, field, options);
     if (found.empty()) continue;
-    Ways ways(found, field, 2.0 * options.way_m_max);
-    if (ShareAGoal(ways, last, field)) return ways;
+    DSG_ASSIGN_OR_RETURN(Ways ways,
+                         Ways::FindThese(found, field, 2.0 * options.way_m_max, wanted, stop));
+    const bool share_a_goal =
+        std::any_of(wanted.begin(), wanted.end(), [&](int place) { return ways.Reaches(place); });
+    if (share_a_goal) return ways;
   }
   return last;
 }
@@ -145,14 +152,16 @@ void WeighHeadings(const Eigen::Vector3d& velocity_map, const GoalOptions& optio
 }
 
 /// The ways to the likely goals, those that begin alike as one, most probable first.
-std::vector<Candidate> Candidates(const std::vector<double>& probabilities,
-                                  const std::vector<PathPoint>& path, const Departure& from,
-                                  const GoalField& field, double length_m_max,
-                                  const GoalOptions& options) {
+absl::StatusOr<std::vector<Candidate>> Candidates(const std::vector<double>& probabilities,
+                                                  const std::vector<PathPoint>& path,
+                                                  const Departure& from, const GoalField& field,
+                                                  double length_m_max, const GoalOptions& options,
+                                                  const StopCheck& stop) {
   // By the attachment and the places up to that length.
   std::map<std::pair<int, std::vector<int>>, size_t> known;
   std::vector<Candidate> candidates;
   for (const int goal : LikelyGoals(probabilities)) {
+    DSG_RETURN_IF_ERROR(AskStop(stop));
     const int place = field.goals()[goal].place;
     const int origin = from.ways.Origin(place);
     std::vector<int> places = from.ways.PlacesWithin(place, length_m_max);
@@ -186,21 +195,24 @@ std::vector<double> GoalProbabilities(const std::vector<PathPoint>& path, const 
                                       const GoalOptions& options) {
   CheckOptions(options);
   CheckPathAndTimes(path, {});
-  const Ways last = Departure(path, field, options).ways;
-  return Probabilities(WaysFromFirst(path, last, field, options), last, field, options);
+  const Departure last = *Depart(path, field, options, StopCheck());
+  const Ways first = *WaysFromFirst(path, last.ways, field, options, StopCheck());
+  return Probabilities(first, last.ways, field, options);
 }
 
-std::vector<PredictedPath> PredictToGoals(const std::vector<PathPoint>& path,
-                                          const std::vector<TimeNs>& at_ns, const GoalField& field,
-                                          const GoalOptions& options) {
+absl::StatusOr<std::vector<PredictedPath>> PredictToGoals(const std::vector<PathPoint>& path,
+                                                          const std::vector<TimeNs>& at_ns,
+                                                          const GoalField& field,
+                                                          const GoalOptions& options,
+                                                          const StopCheck& stop) {
   CheckOptions(options);
   CheckPathAndTimes(path, at_ns);
   if (WalkingVelocity(path, options).norm() < options.standing_m_s) {
-    return {ConstantVelocityAlone(path, at_ns, options, true)};
+    return std::vector<PredictedPath>{ConstantVelocityAlone(path, at_ns, options, true)};
   }
-  const Departure from(path, field, options);
-  const std::vector<double> probabilities =
-      Probabilities(WaysFromFirst(path, from.ways, field, options), from.ways, field, options);
+  DSG_ASSIGN_OR_RETURN(const Departure from, Depart(path, field, options, stop));
+  DSG_ASSIGN_OR_RETURN(const Ways first, WaysFromFirst(path, from.ways, field, options, stop));
+  const std::vector<double> probabilities = Probabilities(first, from.ways, field, options);
 
   const Eigen::Vector3d velocity_map = WalkingVelocity(path, options);
   const Pace pace = PaceOf(path, velocity_map.norm(), options);
@@ -213,9 +225,11 @@ std::vector<PredictedPath> PredictToGoals(const std::vector<PathPoint>& path,
   // The look-ahead needs some way beyond the last time.
   const double length_m_max =
       (seconds.empty() ? 0.0 : pace.WayM(seconds.back())) + 2.0 * options.look_ahead_m;
+  DSG_ASSIGN_OR_RETURN(const std::vector<Candidate> candidates,
+                       Candidates(probabilities, path, from, field, length_m_max, options, stop));
   std::vector<PredictedPath> paths;
-  for (const Candidate& candidate :
-       Candidates(probabilities, path, from, field, length_m_max, options)) {
+  for (const Candidate& candidate : candidates) {
+    DSG_RETURN_IF_ERROR(AskStop(stop));
     PredictedPath predicted{
         candidate.probability,
         WalkRoute(candidate.route, velocity_map.normalized(), pace, seconds, options), sigma_m,
@@ -226,8 +240,10 @@ std::vector<PredictedPath> PredictToGoals(const std::vector<PathPoint>& path,
   if (paths.empty()) {
     PredictedPath alone = ConstantVelocityAlone(path, at_ns, options, false);
     // Far from the graph nothing is known of walls, near it a good deal.
-    if (!from.attachments.empty()) StopAtEdge(path.back(), field.graph(), &alone);
-    return {alone};
+    if (!from.attachments.empty()) {
+      DSG_RETURN_IF_ERROR(StopAtEdge(path.back(), field.graph(), stop, &alone));
+    }
+    return std::vector<PredictedPath>{alone};
   }
   std::stable_sort(paths.begin(), paths.end(), [](const PredictedPath& a, const PredictedPath& b) {
     return a.probability > b.probability;
@@ -236,6 +252,12 @@ std::vector<PredictedPath> PredictToGoals(const std::vector<PathPoint>& path,
     paths.resize(options.path_count_max);
   }
   return paths;
+}
+
+std::vector<PredictedPath> PredictToGoals(const std::vector<PathPoint>& path,
+                                          const std::vector<TimeNs>& at_ns, const GoalField& field,
+                                          const GoalOptions& options) {
+  return *PredictToGoals(path, at_ns, field, options, StopCheck());
 }
 
 std::vector<PredictedPath> PredictToGoals(const std::vector<PathPoint>& path,

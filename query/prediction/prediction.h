@@ -9,7 +9,10 @@
 #include <utility>
 #include <vector>
 
+#include "absl/status/statusor.h"
 #include "query/prediction/free_space.h"
+#include "query/prediction/walk_index.h"
+#include "schema/base/stop_check.h"
 #include "schema/base/time.h"
 
 namespace dsg::query {
@@ -145,6 +148,10 @@ class GoalField {
   };
 
   /// Requires: links and goals name places; clearances and priors finite and not negative.
+  /// Errors: what `stop` returned.
+  static absl::StatusOr<GoalField> Make(WalkGraph graph, std::vector<Goal> goals,
+                                        const StopCheck& stop);
+  /// The same without an end before it is done.
   GoalField(WalkGraph graph, std::vector<Goal> goals);
   /// The same graph with other goals.
   GoalField WithGoals(std::vector<Goal> goals) const;
@@ -152,6 +159,7 @@ class GoalField {
   const WalkGraph& graph() const { return ground_->graph; }
   const std::vector<Goal>& goals() const { return goals_; }
   const FreeSpace& free_space() const { return ground_->free_space; }
+  const WalkIndex& index() const { return ground_->index; }
   /// In the order of the links.
   std::span<const Neighbour> Neighbours(int place) const {
     const std::vector<size_t>& offsets = ground_->offsets;
@@ -162,10 +170,9 @@ class GoalField {
 
  private:
   struct Ground {
-    explicit Ground(WalkGraph from) : graph(std::move(from)), free_space(graph) {}
-
     WalkGraph graph;
     FreeSpace free_space;
+    WalkIndex index;
     std::vector<size_t> offsets;
     std::vector<Neighbour> neighbours;
   };
@@ -191,11 +198,18 @@ std::vector<double> GoalProbabilities(const std::vector<PathPoint>& path, const 
 /// last point to the graph the way goes straight to a place within whose clearance the point lies;
 /// only where there is none, to the nearest link, which nothing proves to be on this side of a
 /// wall. Nobody walks at a speed that changes for ever: who slows down is taken to stop, who speeds
-/// up from below the pace of a walk to reach it. Cost: looks at every place and link for those near
-/// the path, then two searches of ways up to twice `way_m_max`, whatever the number of goals.
+/// up from below the pace of a walk to reach it. Cost: two searches of ways up to twice
+/// `way_m_max`, whatever the number of goals.
 /// Without places near the path: constant velocity alone. Near places but without a way to any
 /// goal: constant velocity that waits where it leaves their clearances. Requires: as
-/// PredictConstantVelocity; `clearance_m_min` at least 0.05.
+/// PredictConstantVelocity; `clearance_m_min` at least 0.05. Errors: what `stop` returned.
+absl::StatusOr<std::vector<PredictedPath>> PredictToGoals(const std::vector<PathPoint>& path,
+                                                          const std::vector<TimeNs>& at_ns,
+                                                          const GoalField& field,
+                                                          const GoalOptions& options,
+                                                          const StopCheck& stop);
+
+/// The same without an end before it is done.
 std::vector<PredictedPath> PredictToGoals(const std::vector<PathPoint>& path,
                                           const std::vector<TimeNs>& at_ns, const GoalField& field,
                                           const GoalOptions& options);
@@ -208,6 +222,8 @@ std::vector<PredictedPath> PredictToGoals(const std::vector<PathPoint>& path,
 
 /// Waits from where a path leaves what is known to be free: the clearances of places of its storey.
 /// Nothing is known where there is no place, so that a path which begins outside all waits at once.
-void StopAtEdge(const PathPoint& last, const WalkGraph& graph, PredictedPath* predicted);
+/// Errors: what `stop` returned.
+absl::Status StopAtEdge(const PathPoint& last, const WalkGraph& graph, const StopCheck& stop,
+                        PredictedPath* predicted);
 
 }  // namespace dsg::query

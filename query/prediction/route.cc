@@ -33,21 +33,24 @@ bool OnStorey(const Eigen::Vector3d& position_map, const Eigen::Vector3d& point_
   return std::abs(position_map.z() - point_map.z()) <= kStoreyHeightM;
 }
 
-void AppendPlaces(const Eigen::Vector3d& position_map, const WalkGraph& graph,
+void AppendPlaces(const Eigen::Vector3d& position_map, const GoalField& field,
                   std::vector<Attachment>* found) {
-  for (size_t i = 0; i < graph.places_map.size(); ++i) {
+  const WalkGraph& graph = field.graph();
+  for (const int i : field.index().PlacesNear(position_map, field.index().clearance_m_max())) {
     const Eigen::Vector3d& place_map = graph.places_map[i];
     const bool in_reach = Horizontal(position_map, place_map) <= graph.clearance_m[i];
     if (!in_reach || !OnStorey(position_map, place_map)) continue;
-    found->push_back(Via(position_map, place_map, static_cast<int>(i), graph));
+    found->push_back(Via(position_map, place_map, i, graph));
   }
 }
 
 /// What is nearest, place or link, though perhaps behind a wall.
-void AppendNearest(const Eigen::Vector3d& position_map, const WalkGraph& graph, double reach_m,
+void AppendNearest(const Eigen::Vector3d& position_map, const GoalField& field, double reach_m,
                    std::vector<Attachment>* found) {
+  const WalkGraph& graph = field.graph();
   double best_m = reach_m;
-  for (const auto& [a, b] : graph.links) {
+  for (const int i : field.index().LinksNear(position_map, reach_m)) {
+    const auto& [a, b] = graph.links[i];
     const Eigen::Vector3d via_map =
         NearestOnLink(position_map, graph.places_map[a], graph.places_map[b]);
     const double way_m = Horizontal(position_map, via_map);
@@ -55,11 +58,11 @@ void AppendNearest(const Eigen::Vector3d& position_map, const WalkGraph& graph, 
     best_m = way_m;
     *found = {Via(position_map, via_map, a, graph), Via(position_map, via_map, b, graph)};
   }
-  for (size_t i = 0; i < graph.places_map.size(); ++i) {
+  for (const int i : field.index().PlacesNear(position_map, reach_m)) {
     const double way_m = Horizontal(position_map, graph.places_map[i]);
     if (way_m >= best_m || !OnStorey(position_map, graph.places_map[i])) continue;
     best_m = way_m;
-    *found = {Via(position_map, graph.places_map[i], static_cast<int>(i), graph)};
+    *found = {Via(position_map, graph.places_map[i], i, graph)};
   }
 }
 
@@ -72,11 +75,12 @@ void Append(const Eigen::Vector3d& point_map, double clearance_m, Route* route) 
 
 }  // namespace
 
-std::vector<Attachment> Attach(const Eigen::Vector3d& position_map, const WalkGraph& graph,
+std::vector<Attachment> Attach(const Eigen::Vector3d& position_map, const GoalField& field,
                                const GoalOptions& options) {
+  const WalkGraph& graph = field.graph();
   std::vector<Attachment> found;
-  AppendPlaces(position_map, graph, &found);
-  for (size_t i = 0; i < graph.links.size(); ++i) {
+  AppendPlaces(position_map, field, &found);
+  for (const int i : field.index().LinksNear(position_map, options.clearance_m_min)) {
     const auto& [a, b] = graph.links[i];
     const Eigen::Vector3d via_map =
         NearestOnLink(position_map, graph.places_map[a], graph.places_map[b]);
@@ -89,7 +93,7 @@ std::vector<Attachment> Attach(const Eigen::Vector3d& position_map, const WalkGr
     found.push_back(Via(position_map, via_map, a, graph));
     found.push_back(Via(position_map, via_map, b, graph));
   }
-  if (found.empty()) AppendNearest(position_map, graph, options.attach_m_max, &found);
+  if (found.empty()) AppendNearest(position_map, field, options.attach_m_max, &found);
   return found;
 }
 

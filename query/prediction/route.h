@@ -24,7 +24,7 @@ struct Attachment {
 /// within `clearance_m_min` and its own clearance; failing these, the ends of the nearest link or
 /// the nearest place within `attach_m_max`. Empty when there is nothing near. Distances are
 /// horizontal: people's torsos and places have heights of their own.
-std::vector<Attachment> Attach(const Eigen::Vector3d& position_map, const WalkGraph& graph,
+std::vector<Attachment> Attach(const Eigen::Vector3d& position_map, const GoalField& field,
                                const GoalOptions& options);
 
 /// A polyline from a person to a goal, at the person's height above the floor.

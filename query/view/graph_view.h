@@ -138,8 +138,8 @@ class GraphView {
                                const std::function<bool(const ViewNode&)>& visit) const = 0;
 
   /// Places and the links between them, made at the first call and shared with the views of
-  /// neighbouring revisions while no place and no link differs.
-  virtual std::shared_ptr<const PlaceGraph> Places() const = 0;
+  /// neighbouring revisions while no place and no link differs. Errors: what `stop` returned.
+  virtual absl::StatusOr<std::shared_ptr<const PlaceGraph>> Places(const StopCheck& stop) const = 0;
 };
 
 }  // namespace dsg::query

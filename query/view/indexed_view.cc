@@ -146,12 +146,8 @@ void IndexedView::ForEachTouching(const Box3d& box_map, const SpaceFilter& filte
   });
 }
 
-std::shared_ptr<const PlaceGraph> IndexedView::Places() const {
-  std::call_once(places_->once, [this] {
-    places_->graph = PlaceGraph::Build(*this);
-    places_->is_made = true;
-  });
-  return places_->graph;
+absl::StatusOr<std::shared_ptr<const PlaceGraph>> IndexedView::Places(const StopCheck& stop) const {
+  return places_->graph.Get(stop, [&] { return PlaceGraph::Build(*this, stop); });
 }
 
 }  // namespace dsg::query

@@ -2,11 +2,10 @@
 // The graph view that answers from indexes, and how one is made from another.
 #pragma once
 
-#include <atomic>
 #include <memory>
-#include <mutex>
 
 #include "query/view/graph_view.h"
+#include "query/view/make_once.h"
 #include "query/view/place_graph.h"
 #include "query/view/view_parts.h"
 
@@ -14,13 +13,13 @@ namespace dsg::query {
 
 /// The places of one or more views, made by the first that asks.
 struct SharedPlaces {
-  std::once_flag once;
-  std::shared_ptr<const PlaceGraph> graph;
-  /// Set after `graph`, so that others can look without waiting.
-  std::atomic<bool> is_made = false;
+  MakeOnce<const PlaceGraph> graph;
 
   /// Grows with what planning keeps beside the graph.
-  size_t memory_bytes() const { return is_made ? graph->memory_bytes() : 0; }
+  size_t memory_bytes() const {
+    const PlaceGraph* made = graph.MadeOrNull();
+    return made == nullptr ? 0 : made->memory_bytes();
+  }
 };
 
 class IndexedView : public GraphView {
@@ -78,7 +77,7 @@ class IndexedView : public GraphView {
   void ForEachTouching(const Box3d& box_map, const SpaceFilter& filter,
                        const std::function<bool(const ViewNode&)>& visit) const override;
 
-  std::shared_ptr<const PlaceGraph> Places() const override;
+  absl::StatusOr<std::shared_ptr<const PlaceGraph>> Places(const StopCheck& stop) const override;
 
  private:
   std::vector<SpaceRange> RangesOf(const SpaceFilter& filter) const;

@@ -4,15 +4,14 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <vector>
 
 #include "query/view/graph_view.h"
+#include "query/view/make_once.h"
 
 namespace dsg::query {
 
@@ -39,9 +38,14 @@ class PlaceGraph {
   };
 
   /// All nodes of the places' layer with kind place, all TRAVERSABLE edges between them.
-  static std::shared_ptr<const PlaceGraph> Build(const GraphView& view);
+  /// Errors: what `stop` returned.
+  static absl::StatusOr<std::shared_ptr<const PlaceGraph>> Build(const GraphView& view,
+                                                                 const StopCheck& stop);
   /// The same of plain lists, in any order. Passages to oneself or to an unknown place are left
   /// out. Requires: no two places share an id.
+  static absl::StatusOr<std::shared_ptr<const PlaceGraph>> Make(
+      std::vector<Place> places, const std::vector<Passage>& passages, const StopCheck& stop);
+  /// The same without an end before it is done.
   static std::shared_ptr<const PlaceGraph> Make(std::vector<Place> places,
                                                 const std::vector<Passage>& passages);
 
@@ -79,14 +83,18 @@ class PlaceGraph {
     virtual ~Annex() = default;
     virtual size_t memory_bytes() const = 0;
   };
-  /// What the first caller's `make` made. One user only: planning.
-  Annex& annex(const std::function<std::unique_ptr<Annex>()>& make) const;
+  /// What the first `make` that succeeds makes. One user only: planning.
+  /// Errors: what `stop` or `make` returned.
+  absl::StatusOr<Annex*> annex(
+      const StopCheck& stop,
+      const std::function<absl::StatusOr<std::unique_ptr<Annex>>()>& make) const;
 
   /// Grows while questions fill the annex.
   size_t memory_bytes() const;
 
  private:
-  void MakeLinks(const std::vector<Passage>& passages);
+  absl::Status MakeLinks(const std::vector<Passage>& passages, const StopCheck& stop);
+  void SortLinksOf(size_t place);
 
   // Ascending.
   std::vector<NodeId> ids_;
@@ -97,10 +105,7 @@ class PlaceGraph {
   std::vector<uint32_t> offsets_;
   std::vector<Link> links_;
 
-  mutable std::mutex annex_mutex_;
-  mutable std::unique_ptr<Annex> annex_;
-  // For those who count its bytes and must not wait while it is made.
-  mutable std::atomic<const Annex*> made_annex_ = nullptr;
+  mutable MakeOnce<Annex> annex_;
 };
 
 }  // namespace dsg::query

@@ -8,25 +8,9 @@
 #include <vector>
 
 #include "schema/base/status.h"
-#include "schema/store/snapshot.h"
+#include "schema/base/stop_check.h"
 
 namespace dsg::query {
-
-/// Asks a stop check once in a few thousand steps.
-class StopCounter {
- public:
-  /// `stop` may be empty, and must outlive this.
-  explicit StopCounter(const StopCheck& stop) : stop_(stop) {}
-
-  absl::Status Check() {
-    constexpr int kPeriod = 4096;
-    return ++count_ % kPeriod == 0 && stop_ ? stop_() : absl::OkStatus();
-  }
-
- private:
-  const StopCheck& stop_;
-  int64_t count_ = 0;
-};
 
 /// Sorted runs of a few thousand, merged pairwise.
 /// Errors: what `stop` returned; `items` may then be in any state.

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "schema/base/stop_check.h"
 #include "schema/base/time.h"
 #include "schema/model/edge.h"
 #include "schema/model/layer.h"
@@ -87,12 +88,6 @@ struct EdgeFilter {
   std::optional<TimeNs> at_ns;
 };
 
-struct NearestNode {
-  Node node;
-  /// From the point to the node's box, metres; 0 inside.
-  double distance_m = 0.0;
-};
-
 /// A piece of a track inside a box: the agent was in it during [enter_ns, exit_ns).
 struct BoxVisit {
   NodeId agent;
@@ -107,10 +102,6 @@ struct ShownShape {
   uint32_t vertex_count = 0;
   const std::optional<Sha256>& topology;
 };
-
-/// Tells a long read to stop: returns CANCELLED or DEADLINE_EXCEEDED once it must. May be empty.
-/// Called often (every few hundred rows or poses) and from the calling thread only.
-using StopCheck = std::function<absl::Status()>;
 
 /// An immutable map at one revision.
 ///
@@ -168,17 +159,12 @@ class Snapshot {
   /// As ReadAllNodes.
   virtual absl::Status ReadAllEdges(const StopCheck& stop,
                                     const std::function<void(const Edge&)>& visit) const = 0;
-  /// The k nodes whose boxes are nearest to a point of the map frame, agents left out.
-  /// Order: ascending distance, then id.
-  virtual absl::StatusOr<std::vector<NearestNode>> NearestNodes(const Eigen::Vector3d& point_map,
-                                                                int k, double max_distance_m,
-                                                                const NodeFilter& filter,
-                                                                const StopCheck& stop) const = 0;
   /// Ancestors by CONTAINS, nearest first. Where a node has several parents, the lowest id.
   virtual absl::StatusOr<std::vector<NodeId>> Ancestors(NodeId id) const = 0;
 
   /// All agents with their tracks. Order: ascending id.
-  virtual absl::StatusOr<std::vector<TrackInfo>> Tracks() const = 0;
+  virtual absl::StatusOr<std::vector<TrackInfo>> Tracks(const StopCheck& stop) const = 0;
+  absl::StatusOr<std::vector<TrackInfo>> Tracks() const { return Tracks(StopCheck()); }
   /// Errors: NOT_FOUND/AGENT_UNKNOWN.
   virtual absl::StatusOr<TrackInfo> GetTrack(NodeId agent) const = 0;
   /// Interpolated between stored poses, never extrapolated.
@@ -198,7 +184,8 @@ class Snapshot {
                                                             TimeNs to_ns,
                                                             const StopCheck& stop) const = 0;
   /// Agents with at least one stored pose or interpolated position in [from_ns, to_ns).
-  virtual absl::StatusOr<int64_t> CountObservedAgents(TimeNs from_ns, TimeNs to_ns) const = 0;
+  virtual absl::StatusOr<int64_t> CountObservedAgents(TimeNs from_ns, TimeNs to_ns,
+                                                      const StopCheck& stop) const = 0;
 
   /// The stay that holds an instant; nullopt when none does.
   virtual absl::StatusOr<std::optional<Stay>> StayAt(NodeId agent, TimeNs at_ns) const = 0;
@@ -226,8 +213,8 @@ class Snapshot {
   /// Indices of all mesh blocks, ascending.
   virtual absl::StatusOr<std::vector<BlockIndex>> MeshBlocks() const = 0;
   /// The same, with the revision that wrote each: what is derived from a block can be kept by both.
-  virtual absl::StatusOr<std::vector<std::pair<BlockIndex, Revision>>> MeshBlockVersions()
-      const = 0;
+  virtual absl::StatusOr<std::vector<std::pair<BlockIndex, Revision>>> MeshBlockVersions(
+      const StopCheck& stop) const = 0;
   /// Errors: NOT_FOUND/NODE_UNKNOWN when there is no such block.
   virtual absl::StatusOr<MeshBlock> ReadMeshBlock(BlockIndex index) const = 0;
   /// Errors: NOT_FOUND/ASSET_UNKNOWN.

@@ -65,7 +65,7 @@ absl::StatusOr<std::vector<PathPoint>> LastPoints(const Snapshot& snapshot, cons
 
 absl::StatusOr<std::vector<Obstacle>> AgentsAt(const Snapshot& snapshot,
                                                std::optional<TimeNs> at_ns, const StopCheck& stop) {
-  DSG_ASSIGN_OR_RETURN(const std::vector<TrackInfo> tracks, snapshot.Tracks());
+  DSG_ASSIGN_OR_RETURN(const std::vector<TrackInfo> tracks, snapshot.Tracks(stop));
   TimeNs newest_ns = kTimeMin;
   for (const TrackInfo& track : tracks) {
     if (track.pose_count > 0) newest_ns = std::max(newest_ns, track.last_ns);
@@ -86,7 +86,7 @@ absl::StatusOr<std::vector<Obstacle>> AgentsAt(const Snapshot& snapshot,
 
 absl::StatusOr<std::vector<Obstacle>> AgentsForeseenAt(const Snapshot& snapshot, TimeNs at_ns,
                                                        const StopCheck& stop) {
-  DSG_ASSIGN_OR_RETURN(const std::vector<TrackInfo> tracks, snapshot.Tracks());
+  DSG_ASSIGN_OR_RETURN(const std::vector<TrackInfo> tracks, snapshot.Tracks(stop));
   std::vector<Obstacle> agents;
   for (const TrackInfo& track : tracks) {
     if (stop) DSG_RETURN_IF_ERROR(stop());

@@ -73,12 +73,6 @@ size_t CollisionCache::KeyHash::operator()(const Key& key) const noexcept {
   return hash;
 }
 
-CollisionCache& CollisionCache::OfProcess() {
-  // Never destroyed, so that threads may still ask while the process ends.
-  static auto* const cache = new CollisionCache();
-  return *cache;
-}
-
 std::shared_ptr<RevisionFacts> CollisionCache::FactsOf(
     const std::shared_ptr<const GraphView>& view) {
   std::lock_guard lock(mutex_);
@@ -112,7 +106,7 @@ absl::StatusOr<std::shared_ptr<const BlockTable>> CollisionCache::Blocks(Revisio
 
 absl::StatusOr<std::shared_ptr<const BlockTable>> CollisionCache::ReadBlocks(
     uint64_t map_key, const Snapshot& snapshot, const StopCheck& stop) {
-  DSG_ASSIGN_OR_RETURN(const auto versions, snapshot.MeshBlockVersions());
+  DSG_ASSIGN_OR_RETURN(const auto versions, snapshot.MeshBlockVersions(stop));
   const KnownBounds known = FindBounds(map_key);
   auto next = known->begin();
   std::vector<BlockBounds> bounds;

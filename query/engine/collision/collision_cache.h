@@ -97,9 +97,6 @@ class CollisionCache {
   /// Of trees; facts and tables live as long as the views that they belong to.
   explicit CollisionCache(size_t bytes_max = size_t{256} << 20) : bytes_max_(bytes_max) {}
 
-  /// The one of those who bring none.
-  static CollisionCache& OfProcess();
-
   std::shared_ptr<RevisionFacts> FactsOf(const std::shared_ptr<const GraphView>& view);
   /// Where the triangles of each block are.
   /// Errors: what `stop` returned (asked at each block; what was read until then is kept), as

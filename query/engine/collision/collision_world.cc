@@ -99,7 +99,6 @@ CollisionWorld CollisionWorld::Create(std::shared_ptr<const GraphView> view,
                                       std::shared_ptr<const Snapshot> snapshot,
                                       std::optional<TimeNs> at_ns, CollisionCache* cache) {
   DSG_CHECK(view->revision() == snapshot->revision());
-  if (cache == nullptr) cache = &CollisionCache::OfProcess();
   return CollisionWorld(std::unique_ptr<Impl>(
       new Impl{ObstacleFinder(std::move(view), std::move(snapshot), at_ns, cache), {}}));
 }
@@ -109,12 +108,18 @@ CollisionWorld::CollisionWorld(CollisionWorld&&) noexcept = default;
 CollisionWorld& CollisionWorld::operator=(CollisionWorld&&) noexcept = default;
 CollisionWorld::~CollisionWorld() = default;
 
-void CollisionWorld::Ignore(NodeId node, CollisionScope* scope) const {
+absl::Status CollisionWorld::Ignore(NodeId node, const StopCheck& stop,
+                                    CollisionScope* scope) const {
+  constexpr int64_t kStopPeriod = 256;
+  StopCounter counter(stop, kStopPeriod);
+  absl::Status status;
   scope->ignored.insert(node);
   impl_->finder.view().ForEachDescendant(node, [&](const ViewNode& below) {
     scope->ignored.insert(below.id);
-    return true;
+    status = counter.Check();
+    return status.ok();
   });
+  return status;
 }
 
 absl::StatusOr<CollisionHit> CollisionWorld::Check(const Body& body, const CollisionScope& scope,

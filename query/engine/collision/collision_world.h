@@ -70,18 +70,17 @@ struct CollisionHit {
 class CollisionWorld {
  public:
   /// `at_ns`: world time; unset = what is valid for ever, and agents at their last poses, as far as
-  /// these are recent. `view` and `snapshot` are of the same revision. `cache` outlives the world;
-  /// null = that of the process.
+  /// these are recent. `view` and `snapshot` are of the same revision. `cache` outlives the world.
   static CollisionWorld Create(std::shared_ptr<const GraphView> view,
                                std::shared_ptr<const Snapshot> snapshot,
-                               std::optional<TimeNs> at_ns, CollisionCache* cache = nullptr);
+                               std::optional<TimeNs> at_ns, CollisionCache* cache);
 
   CollisionWorld(CollisionWorld&&) noexcept;
   CollisionWorld& operator=(CollisionWorld&&) noexcept;
   ~CollisionWorld();
 
-  /// Leaves out a node and all below it.
-  void Ignore(NodeId node, CollisionScope* scope) const;
+  /// Leaves out a node and all below it. Errors: what `stop` returned.
+  absl::Status Ignore(NodeId node, const StopCheck& stop, CollisionScope* scope) const;
 
   /// The first contact on the way, or else the smallest clearance; equal ones go by id.
   /// Errors: what `stop` returned (asked at each step of the way, and at every 256th pair of

@@ -37,11 +37,9 @@ double DistanceToSegment(const Eigen::Vector3d& point, const Eigen::Vector3d& a,
 
 class Attacher {
  public:
-  Attacher(const PlaceGraph& graph, const Limits& limits, const LineCheck& is_free)
-      : graph_(graph),
-        limits_(limits),
-        is_free_(is_free),
-        locator_(PlanningAnnex::Of(graph).locator()) {}
+  Attacher(const PlaceGraph& graph, const Limits& limits, const LineCheck& is_free,
+           const PlaceLocator& locator)
+      : graph_(graph), limits_(limits), is_free_(is_free), locator_(locator) {}
 
   absl::StatusOr<std::vector<Anchor>> ToPosition(const Eigen::Vector3d& point_map,
                                                  NodeId node) const {
@@ -151,7 +149,8 @@ class Attacher {
 absl::StatusOr<std::vector<Anchor>> Attach(const PlaceGraph& graph, const Limits& limits,
                                            const std::vector<PathTarget>& targets,
                                            const LineCheck& is_free, const StopCheck& stop) {
-  const Attacher attacher(graph, limits, is_free);
+  DSG_ASSIGN_OR_RETURN(const PlanningAnnex* annex, PlanningAnnex::Of(graph, stop));
+  const Attacher attacher(graph, limits, is_free, annex->locator());
   std::vector<Anchor> all;
   for (size_t i = 0; i < targets.size(); ++i) {
     if (i % kStopPeriod == 0 && stop) DSG_RETURN_IF_ERROR(stop());

@@ -34,9 +34,9 @@ class LandmarkBuilder {
 
   absl::StatusOr<std::shared_ptr<const Landmarks>> Build() {
     landmarks_->distances_.resize(static_cast<size_t>(graph_.size()));
-    FindComponents();
-    DSG_RETURN_IF_ERROR(Check());
+    DSG_RETURN_IF_ERROR(FindComponents());
     for (int slot = 0; slot < kLandmarkCount; ++slot) {
+      DSG_RETURN_IF_ERROR(AskStop(stop_));
       const std::vector<PlaceIndex> chosen = slot < kCornerCount ? Corners(slot) : Farthest(slot);
       DSG_RETURN_IF_ERROR(Measure(slot, chosen));
     }
@@ -44,9 +44,8 @@ class LandmarkBuilder {
   }
 
  private:
-  absl::Status Check() const { return stop_ ? stop_() : absl::OkStatus(); }
-
-  void FindComponents() {
+  absl::Status FindComponents() {
+    StopCounter counter(stop_, kStopPeriod);
     std::vector<int32_t>& component = landmarks_->components_;
     component.assign(static_cast<size_t>(graph_.size()), -1);
     std::vector<PlaceIndex> pending;
@@ -57,6 +56,7 @@ class LandmarkBuilder {
       component[static_cast<size_t>(first)] = number;
       pending.push_back(first);
       while (!pending.empty()) {
+        DSG_RETURN_IF_ERROR(counter.Check());
         const PlaceIndex place = pending.back();
         pending.pop_back();
         box.extend(graph_.position_map(place));
@@ -69,6 +69,7 @@ class LandmarkBuilder {
         }
       }
     }
+    return absl::OkStatus();
   }
 
   // The place of each component with the largest value; the lowest of equal ones.
@@ -118,7 +119,7 @@ class LandmarkBuilder {
     }
     double farthest_m = 0.0;
     for (int64_t count = 0; !queue->empty(); ++count) {
-      if (count % kStopPeriod == 0) DSG_RETURN_IF_ERROR(Check());
+      if (count % kStopPeriod == 0) DSG_RETURN_IF_ERROR(AskStop(stop_));
       const SearchScratch::Entry entry = queue->Pop();
       const PlaceIndex place = entry.place();
       if (entry.total_m > way_m_[static_cast<size_t>(place)]) continue;

@@ -119,8 +119,8 @@ std::string Explain(const NoPath& reason, double radius_m, const std::string& fr
     case NoPathCause::kTooNarrowAndBlocked:
       (*metadata)["radius_m_max"] = radius;
       return absl::StrCat(
-          "blocked nodes cut the ways that are wide enough; without them the "
-          "widest way admits ",
+          "blocked nodes cut ways, and those left open are too narrow; without them the widest "
+          "way admits ",
           radius, " m");
     case NoPathCause::kNotAtThatTime:
       return "the places were linked at other times, not at the one asked for";

@@ -5,10 +5,15 @@
 #include <cmath>
 #include <tuple>
 
+#include "query/view/stoppable_sort.h"
+#include "schema/base/status.h"
+
 namespace dsg::query {
 namespace {
 
 constexpr double kCellM = 2.0;
+// Places between two questions to the stop check.
+constexpr int64_t kStopPeriod = 1024;
 constexpr int64_t kCellMax = (int64_t{1} << 20) - 1;
 
 // What lies beyond 2000 km from the origin shares the outermost cells.
@@ -25,19 +30,24 @@ uint64_t Pack(int64_t x, int64_t y, int64_t z) {
 
 }  // namespace
 
-PlaceLocator::PlaceLocator(const PlaceGraph& graph) {
-  entries_.reserve(static_cast<size_t>(graph.size()));
+absl::StatusOr<PlaceLocator> PlaceLocator::Build(const PlaceGraph& graph, const StopCheck& stop) {
+  PlaceLocator made;
+  made.entries_.reserve(static_cast<size_t>(graph.size()));
+  StopCounter counter(stop, kStopPeriod);
   for (PlaceIndex place = 0; place < graph.size(); ++place) {
+    DSG_RETURN_IF_ERROR(counter.Check());
     const Eigen::Vector3d& at = graph.position_map(place);
-    entries_.push_back({Pack(CellOf(at.x()), CellOf(at.y()), CellOf(at.z())), place});
-    clearance_m_max_ = std::max(clearance_m_max_, graph.clearance_m(place));
+    made.entries_.push_back({Pack(CellOf(at.x()), CellOf(at.y()), CellOf(at.z())), place});
+    made.clearance_m_max_ = std::max(made.clearance_m_max_, graph.clearance_m(place));
     for (const auto* link = graph.links_begin(place); link != graph.links_end(place); ++link) {
-      link_length_m_max_ = std::max(link_length_m_max_, link->length_m);
+      made.link_length_m_max_ = std::max(made.link_length_m_max_, link->length_m);
     }
   }
-  std::sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) {
+  const auto less = [](const Entry& a, const Entry& b) {
     return std::tie(a.cell, a.place) < std::tie(b.cell, b.place);
-  });
+  };
+  DSG_RETURN_IF_ERROR(SortStoppably(less, stop, &made.entries_));
+  return made;
 }
 
 void PlaceLocator::ForEachNear(const Box3d& box_map, double reach_m,

@@ -7,6 +7,7 @@
 #include <functional>
 #include <vector>
 
+#include "absl/status/statusor.h"
 #include "query/view/place_graph.h"
 
 namespace dsg::query {
@@ -14,7 +15,8 @@ namespace dsg::query {
 /// Threads: immutable.
 class PlaceLocator {
  public:
-  explicit PlaceLocator(const PlaceGraph& graph);
+  /// Errors: what `stop` returned.
+  static absl::StatusOr<PlaceLocator> Build(const PlaceGraph& graph, const StopCheck& stop);
 
   /// All places no further than `reach_m` from the box, and some that are. In no useful order.
   void ForEachNear(const Box3d& box_map, double reach_m,
@@ -31,6 +33,8 @@ class PlaceLocator {
     uint64_t cell = 0;
     PlaceIndex place = 0;
   };
+
+  PlaceLocator() = default;
 
   // Ascending cell, then place.
   std::vector<Entry> entries_;

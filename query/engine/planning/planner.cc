@@ -152,13 +152,13 @@ absl::StatusOr<PlanResult> PlanHierarchical(const PlaceGraph& graph, const Limit
   const std::vector<Anchor> starts = Admitted(graph, limits, from);
   const std::vector<Anchor> goals = Admitted(graph, limits, to);
   if (starts.empty() || goals.empty()) return PlanResult();
-  PlanningAnnex& annex = PlanningAnnex::Of(graph);
-  const std::vector<uint8_t> open = annex.rooms().LeadingTo(graph, goals, limits);
+  DSG_ASSIGN_OR_RETURN(PlanningAnnex * annex, PlanningAnnex::Of(graph, stop));
+  const std::vector<uint8_t> open = annex->rooms().LeadingTo(graph, goals, limits);
   DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Landmarks> landmarks,
-                       annex.landmarks().Get(graph, limits, stop));
+                       annex->landmarks().Get(graph, limits, stop));
   const Guide guide(graph, goals, landmarks.get());
   Search search(graph, limits, starts, goals, guide, kWeight);
-  search.Confine(&annex.rooms(), &open);
+  search.Confine(&annex->rooms(), &open);
   return search.Run(stop);
 }
 

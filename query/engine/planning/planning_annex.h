@@ -3,8 +3,9 @@
 // Refuses to depend on the questions: it only saves their time.
 #pragma once
 
-#include <memory>
+#include <utility>
 
+#include "absl/status/statusor.h"
 #include "query/engine/planning/landmarks.h"
 #include "query/engine/planning/place_locator.h"
 #include "query/engine/planning/room_graph.h"
@@ -15,13 +16,12 @@ namespace dsg::query {
 /// Threads: safe from many threads.
 class PlanningAnnex final : public PlaceGraph::Annex {
  public:
-  explicit PlanningAnnex(const PlaceGraph& graph) : rooms_(graph), locator_(graph) {}
+  PlanningAnnex(RoomGraph rooms, PlaceLocator locator)
+      : rooms_(std::move(rooms)), locator_(std::move(locator)) {}
 
-  /// Of this graph, made at the first call.
-  static PlanningAnnex& Of(const PlaceGraph& graph) {
-    return static_cast<PlanningAnnex&>(
-        graph.annex([&graph] { return std::make_unique<PlanningAnnex>(graph); }));
-  }
+  /// Of this graph, made at the first call; lives as long as the graph.
+  /// Errors: what `stop` returned.
+  static absl::StatusOr<PlanningAnnex*> Of(const PlaceGraph& graph, const StopCheck& stop);
 
   const RoomGraph& rooms() const { return rooms_; }
   const PlaceLocator& locator() const { return locator_; }

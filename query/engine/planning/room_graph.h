@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "absl/status/statusor.h"
 #include "query/engine/planning/anchor.h"
 #include "query/engine/planning/limits.h"
 #include "query/view/place_graph.h"
@@ -17,7 +18,8 @@ namespace dsg::query {
 /// Threads: immutable.
 class RoomGraph {
  public:
-  explicit RoomGraph(const PlaceGraph& graph);
+  /// Errors: what `stop` returned.
+  static absl::StatusOr<RoomGraph> Build(const PlaceGraph& graph, const StopCheck& stop);
 
   int32_t room_of(PlaceIndex place) const { return room_of_[static_cast<size_t>(place)]; }
   int32_t room_count() const { return static_cast<int32_t>(first_door_.size()) - 1; }
@@ -43,11 +45,24 @@ class RoomGraph {
     uint32_t end = 0;
   };
 
+  // From one room to another.
+  struct FoundCrossing {
+    int32_t from = 0;
+    int32_t to = 0;
+    Crossing crossing;
+  };
+
+  RoomGraph() = default;
+
+  absl::Status FindRooms(const PlaceGraph& graph, const StopCheck& stop);
+  absl::StatusOr<std::vector<FoundCrossing>> FindCrossings(const PlaceGraph& graph,
+                                                           const StopCheck& stop) const;
   bool IsOpen(const PlaceGraph& graph, const Door& door, const Limits& limits) const;
 
   std::vector<int32_t> room_of_;
   std::vector<Crossing> crossings_;
   std::vector<Door> doors_;
+  // Of each room, and the end of all.
   std::vector<uint32_t> first_door_;
 };
 

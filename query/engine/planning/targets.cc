@@ -9,13 +9,20 @@
 namespace dsg::query {
 namespace {
 
-std::vector<PlaceIndex> PlacesBelow(const GraphView& view, const PlaceGraph& places, NodeId top) {
+// Nodes between two questions to the stop check.
+constexpr int64_t kStopPeriod = 256;
+
+absl::StatusOr<std::vector<PlaceIndex>> PlacesBelow(const PathWorld& world, NodeId top) {
   std::vector<PlaceIndex> below;
-  view.ForEachDescendant(top, [&](const ViewNode& node) {
-    const std::optional<PlaceIndex> place = places.Find(node.id);
+  StopCounter counter(world.stop, kStopPeriod);
+  absl::Status status;
+  world.view.ForEachDescendant(top, [&](const ViewNode& node) {
+    const std::optional<PlaceIndex> place = world.places.Find(node.id);
     if (place.has_value()) below.push_back(*place);
-    return true;
+    status = counter.Check();
+    return status.ok();
   });
+  DSG_RETURN_IF_ERROR(status);
   return below;
 }
 
@@ -78,7 +85,7 @@ absl::StatusOr<PathTarget> TargetOf(const PathWorld& world, const ViewNode& node
     return target;
   }
   if (IsAbovePlaces(world.view, node)) {
-    target.places = PlacesBelow(world.view, world.places, node.id);
+    DSG_ASSIGN_OR_RETURN(target.places, PlacesBelow(world, node.id));
     if (!target.places.empty()) return target;
   }
   target.box_map = node.BoxMap();
@@ -91,17 +98,17 @@ absl::StatusOr<PathTarget> TargetOf(const PathWorld& world, const ViewNode& node
   return target;
 }
 
-bool Block(const GraphView& view, const PlaceGraph& places, const ViewNode& node,
-           std::vector<uint8_t>* blocked) {
+absl::StatusOr<bool> Block(const PathWorld& world, const ViewNode& node,
+                           std::vector<uint8_t>* blocked) {
   std::vector<PlaceIndex> below;
-  if (const std::optional<PlaceIndex> place = places.Find(node.id); place.has_value()) {
+  if (const std::optional<PlaceIndex> place = world.places.Find(node.id); place.has_value()) {
     below.push_back(*place);
-  } else if (IsAbovePlaces(view, node)) {
-    below = PlacesBelow(view, places, node.id);
+  } else if (IsAbovePlaces(world.view, node)) {
+    DSG_ASSIGN_OR_RETURN(below, PlacesBelow(world, node.id));
   } else {
     return false;
   }
-  blocked->resize(static_cast<size_t>(places.size()), 0);
+  blocked->resize(static_cast<size_t>(world.places.size()), 0);
   for (const PlaceIndex place : below) (*blocked)[static_cast<size_t>(place)] = 1;
   return true;
 }

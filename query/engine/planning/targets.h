@@ -22,18 +22,20 @@ struct PathWorld {
   const PlaceGraph& places;
   /// World time of agents; unset: at the ends of their tracks.
   std::optional<TimeNs> at_ns;
+  /// Ends long walks down the hierarchy.
+  const StopCheck& stop;
 };
 
 /// A place is itself; an agent is where it was, or near there if it is in the way; a node above
 /// places is all of them; anything else is its box. Errors: OUT_OF_RANGE/TIME_OUTSIDE_TRACK for an
-/// agent that was not seen then.
+/// agent that was not seen then; what the world's `stop` returned.
 absl::StatusOr<PathTarget> TargetOf(const PathWorld& world, const ViewNode& node);
 
 bool IsAgent(const GraphView& view, const ViewNode& node);
 
 /// Marks the place, or all places below the node. False if the node is neither a place nor of a
-/// layer above places.
-bool Block(const GraphView& view, const PlaceGraph& places, const ViewNode& node,
-           std::vector<uint8_t>* blocked);
+/// layer above places. Errors: what the world's `stop` returned.
+absl::StatusOr<bool> Block(const PathWorld& world, const ViewNode& node,
+                           std::vector<uint8_t>* blocked);
 
 }  // namespace dsg::query

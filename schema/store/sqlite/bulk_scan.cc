@@ -15,15 +15,13 @@ constexpr int kBatchRows = 2048;
 constexpr int64_t kLowest = std::numeric_limits<int64_t>::min();
 constexpr int64_t kHighest = std::numeric_limits<int64_t>::max();
 
-absl::Status CheckStop(const StopCheck& stop) { return stop ? stop() : absl::OkStatus(); }
-
 // Runs a statement again and again, each time after the last row of the time before, until it
 // gives no full batch. `bind` binds where to go on; `take` takes a row and notes where it was.
 template <typename Bind, typename Take>
 absl::Status RunInBatches(SqliteMapReader* reader, const char* sql, const StopCheck& stop,
                           const Bind& bind, const Take& take) {
   for (;;) {
-    DSG_RETURN_IF_ERROR(CheckStop(stop));
+    DSG_RETURN_IF_ERROR(AskStop(stop));
     DSG_ASSIGN_OR_RETURN(auto lease, reader->LeaseConnection());
     Query query(*lease, sql);
     bind(&query);

@@ -111,8 +111,8 @@ absl::StatusOr<std::vector<BlockIndex>> SqliteSnapshot::MeshBlocks() const {
   return blocks;
 }
 
-absl::StatusOr<std::vector<std::pair<BlockIndex, Revision>>> SqliteSnapshot::MeshBlockVersions()
-    const {
+absl::StatusOr<std::vector<std::pair<BlockIndex, Revision>>> SqliteSnapshot::MeshBlockVersions(
+    const StopCheck& stop) const {
   DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
   Query query(*lease,
               "SELECT x, y, z, rev_from FROM mesh_block WHERE rev_from <= ?1"
@@ -120,7 +120,9 @@ absl::StatusOr<std::vector<std::pair<BlockIndex, Revision>>> SqliteSnapshot::Mes
               " WHERE rev_from <= ?1 AND rev_to > ?1 ORDER BY 1, 2, 3");
   query.Bind(revision());
   std::vector<std::pair<BlockIndex, Revision>> blocks;
+  StopCounter counter(stop, 512);
   while (query.Next()) {
+    DSG_RETURN_IF_ERROR(counter.Check());
     const BlockIndex index{static_cast<int32_t>(query.Int(0)), static_cast<int32_t>(query.Int(1)),
                            static_cast<int32_t>(query.Int(2))};
     blocks.emplace_back(index, query.Int(3));

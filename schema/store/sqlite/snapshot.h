@@ -42,13 +42,10 @@ class SqliteSnapshot : public Snapshot {
                             const std::function<void(const Node&)>& visit) const override;
   absl::Status ReadAllEdges(const StopCheck& stop,
                             const std::function<void(const Edge&)>& visit) const override;
-  absl::StatusOr<std::vector<NearestNode>> NearestNodes(const Eigen::Vector3d& point_map, int k,
-                                                        double max_distance_m,
-                                                        const NodeFilter& filter,
-                                                        const StopCheck& stop) const override;
   absl::StatusOr<std::vector<NodeId>> Ancestors(NodeId id) const override;
 
-  absl::StatusOr<std::vector<TrackInfo>> Tracks() const override;
+  using Snapshot::Tracks;
+  absl::StatusOr<std::vector<TrackInfo>> Tracks(const StopCheck& stop) const override;
   absl::StatusOr<TrackInfo> GetTrack(NodeId agent) const override;
   absl::StatusOr<LocatedPose> Locate(NodeId agent, TimeNs at_ns) const override;
   absl::Status ReadPoses(NodeId agent, TimeNs from_ns, TimeNs to_ns, const StopCheck& stop,
@@ -56,7 +53,8 @@ class SqliteSnapshot : public Snapshot {
   absl::StatusOr<std::vector<BoxVisit>> VisitsToBox(const Box3d& box_map, TimeNs from_ns,
                                                     TimeNs to_ns,
                                                     const StopCheck& stop) const override;
-  absl::StatusOr<int64_t> CountObservedAgents(TimeNs from_ns, TimeNs to_ns) const override;
+  absl::StatusOr<int64_t> CountObservedAgents(TimeNs from_ns, TimeNs to_ns,
+                                              const StopCheck& stop) const override;
 
   absl::StatusOr<std::optional<Stay>> StayAt(NodeId agent, TimeNs at_ns) const override;
   absl::StatusOr<std::vector<Stay>> StaysOfAgent(NodeId agent, TimeNs from_ns,
@@ -70,7 +68,8 @@ class SqliteSnapshot : public Snapshot {
                           const StopCheck& stop,
                           const std::function<bool(const ShownShape&)>& visit) const override;
   absl::StatusOr<std::vector<BlockIndex>> MeshBlocks() const override;
-  absl::StatusOr<std::vector<std::pair<BlockIndex, Revision>>> MeshBlockVersions() const override;
+  absl::StatusOr<std::vector<std::pair<BlockIndex, Revision>>> MeshBlockVersions(
+      const StopCheck& stop) const override;
   absl::StatusOr<MeshBlock> ReadMeshBlock(BlockIndex index) const override;
   absl::StatusOr<Asset> ReadAsset(const Sha256& sha256) const override;
 
@@ -81,13 +80,9 @@ class SqliteSnapshot : public Snapshot {
   absl::StatusOr<std::optional<std::vector<NodeId>>> IdsTouching(const Box3d& box_map) const;
   absl::StatusOr<std::optional<std::vector<NodeId>>> Candidates(const NodeFilter& filter) const;
   absl::StatusOr<std::vector<Node>> ReadBatch(const NodeFilter& filter, NodeId after) const;
-  absl::StatusOr<std::vector<NearestNode>> NearestByScan(const Eigen::Vector3d& point_map, int k,
-                                                         double max_distance_m,
-                                                         const NodeFilter& filter,
-                                                         const StopCheck& stop) const;
   absl::StatusOr<std::vector<Edge>> EdgesAt(NodeId end, bool outgoing) const;
   absl::StatusOr<NodeId> FindParent(NodeId id) const;
-  absl::StatusOr<std::vector<NodeId>> AgentIds() const;
+  absl::StatusOr<std::vector<NodeId>> AgentIds(const StopCheck& stop) const;
   /// Segments whose boxes in space and time touch, by agent; ascending ids.
   absl::StatusOr<std::map<NodeId, std::vector<int64_t>>> SegmentsTouching(const Box3d& box_map,
                                                                           TimeNs from_ns,

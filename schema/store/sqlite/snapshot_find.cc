@@ -14,15 +14,13 @@ namespace {
 // Keys of one read transaction: about a millisecond, so that it does not pin the log.
 constexpr size_t kBatchKeys = 256;
 
-absl::Status CheckStop(const StopCheck& stop) { return stop ? stop() : absl::OkStatus(); }
-
 // Calls `find_batch` with one stretch of the keys after the other, a read transaction for each.
 template <typename Key, typename FindBatch>
 absl::Status FindInBatches(SqliteMapReader* reader, const std::vector<Key>& keys,
                            const StopCheck& stop, const FindBatch& find_batch) {
   const std::span<const Key> all(keys);
   for (size_t first = 0; first < all.size(); first += kBatchKeys) {
-    DSG_RETURN_IF_ERROR(CheckStop(stop));
+    DSG_RETURN_IF_ERROR(AskStop(stop));
     DSG_ASSIGN_OR_RETURN(auto lease, reader->LeaseConnection());
     const ReadTransaction transaction(&*lease);
     DSG_RETURN_IF_ERROR(transaction.status());

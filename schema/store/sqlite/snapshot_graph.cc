@@ -30,12 +30,6 @@ constexpr char kEdgesTo[] =
     " (SELECT name FROM relation WHERE id = relation) FROM edge_history"
     " WHERE target = ?1 AND rev_from <= ?2 AND rev_to > ?2";
 
-absl::Status CheckStop(const StopCheck& stop) { return stop ? stop() : absl::OkStatus(); }
-
-bool Nearer(const NearestNode& a, const NearestNode& b) {
-  return a.distance_m != b.distance_m ? a.distance_m < b.distance_m : a.node.id < b.node.id;
-}
-
 bool EdgeMatches(const EdgeFilter& filter, const std::optional<EdgeKey>& after, const Edge& edge) {
   return (filter.relation.empty() || edge.relation == filter.relation) &&
          (filter.source.empty() || edge.source == filter.source) &&
@@ -264,7 +258,7 @@ absl::Status SqliteSnapshot::ScanNodes(const NodeFilter& filter, NodeId after,
   if (candidates.has_value()) {
     for (auto it = std::upper_bound(candidates->begin(), candidates->end(), after);
          it != candidates->end(); ++it) {
-      DSG_RETURN_IF_ERROR(CheckStop(stop));
+      DSG_RETURN_IF_ERROR(AskStop(stop));
       const auto node = GetNode(*it);
       if (absl::IsNotFound(node.status())) continue;
       DSG_RETURN_IF_ERROR(node.status());
@@ -273,7 +267,7 @@ absl::Status SqliteSnapshot::ScanNodes(const NodeFilter& filter, NodeId after,
     return absl::OkStatus();
   }
   for (;;) {
-    DSG_RETURN_IF_ERROR(CheckStop(stop));
+    DSG_RETURN_IF_ERROR(AskStop(stop));
     DSG_ASSIGN_OR_RETURN(const auto batch, ReadBatch(rest, after));
     for (const Node& node : batch) {
       if (rest.Matches(node) && !visit(node)) return absl::OkStatus();
@@ -302,7 +296,7 @@ absl::Status SqliteSnapshot::ScanEdges(const EdgeFilter& filter,
                                        const std::optional<EdgeKey>& after, const StopCheck& stop,
                                        const std::function<bool(const Edge&)>& visit) const {
   const auto emit = [&](NodeId end, bool outgoing) -> absl::StatusOr<bool> {
-    DSG_RETURN_IF_ERROR(CheckStop(stop));
+    DSG_RETURN_IF_ERROR(AskStop(stop));
     DSG_ASSIGN_OR_RETURN(const auto edges, EdgesAt(end, outgoing));
     for (const Edge& edge : edges) {
       if (EdgeMatches(filter, after, edge) && !visit(edge)) return false;
@@ -341,54 +335,6 @@ absl::StatusOr<std::optional<Edge>> SqliteSnapshot::FindEdge(const EdgeKey& key)
   if (!found) return std::optional<Edge>();
   DSG_ASSIGN_OR_RETURN(Edge edge, EdgeFromRow(query, query.Text(7), spec().name));
   return std::optional<Edge>(std::move(edge));
-}
-
-absl::StatusOr<std::vector<NearestNode>> SqliteSnapshot::NearestByScan(
-    const Eigen::Vector3d& point_map, int k, double max_distance_m, const NodeFilter& filter,
-    const StopCheck& stop) const {
-  std::vector<NearestNode> nearest;
-  const auto size = static_cast<size_t>(k);
-  DSG_RETURN_IF_ERROR(ScanNodes(filter, NodeId(), stop, [&](const Node& node) {
-    if (IsAgentKind(node.kind)) return true;
-    NearestNode candidate{node, DistanceToBox(point_map, node.BoxMap())};
-    if (candidate.distance_m > max_distance_m) return true;
-    if (nearest.size() == size && !Nearer(candidate, nearest.back())) return true;
-    const auto at = std::upper_bound(nearest.begin(), nearest.end(), candidate, Nearer);
-    nearest.insert(at, std::move(candidate));
-    if (nearest.size() > size) nearest.pop_back();
-    return true;
-  }));
-  return nearest;
-}
-
-absl::StatusOr<std::vector<NearestNode>> SqliteSnapshot::NearestNodes(
-    const Eigen::Vector3d& point_map, int k, double max_distance_m, const NodeFilter& filter,
-    const StopCheck& stop) const {
-  // Boxes of doubling size around the point, until enough of what they touch is near enough that
-  // nothing outside can be nearer.
-  constexpr double kFirstRadiusM = 0.25;
-  constexpr double kLastRadiusM = 1024.0;
-  for (double radius = kFirstRadiusM; radius <= kLastRadiusM; radius *= 2.0) {
-    DSG_RETURN_IF_ERROR(CheckStop(stop));
-    const Eigen::Vector3d half = Eigen::Vector3d::Constant(std::min(radius, max_distance_m));
-    DSG_ASSIGN_OR_RETURN(const auto ids, IdsTouching(Box3d(point_map - half, point_map + half)));
-    if (!ids.has_value()) break;
-    std::vector<NearestNode> nearest;
-    for (const NodeId id : *ids) {
-      DSG_ASSIGN_OR_RETURN(Node node, GetNode(id));
-      const double distance = DistanceToBox(point_map, node.BoxMap());
-      if (distance > std::min(radius, max_distance_m) || !filter.Matches(node)) continue;
-      nearest.push_back({std::move(node), distance});
-    }
-    if (nearest.size() >= static_cast<size_t>(k) || radius >= max_distance_m) {
-      std::sort(nearest.begin(), nearest.end(), Nearer);
-      if (nearest.size() > static_cast<size_t>(k)) nearest.resize(static_cast<size_t>(k));
-      return nearest;
-    }
-    // Few matches among many neighbours: a scan of the layer costs less than larger boxes.
-    if (ids->size() > 2000) break;
-  }
-  return NearestByScan(point_map, k, max_distance_m, filter, stop);
 }
 
 absl::StatusOr<NodeId> SqliteSnapshot::FindParent(NodeId id) const {

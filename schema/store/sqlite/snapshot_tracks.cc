@@ -34,8 +34,6 @@ absl::Status CorruptSegment(const std::string& map, const SegmentRef& segment) {
   return CorruptRow(map, "trajectory_segment", absl::StrCat(segment.id));
 }
 
-absl::Status CheckStop(const StopCheck& stop) { return stop ? stop() : absl::OkStatus(); }
-
 bool ByEnter(const Stay& a, const Stay& b) {
   return a.enter_ns != b.enter_ns ? a.enter_ns < b.enter_ns : a.agent < b.agent;
 }
@@ -50,21 +48,22 @@ Stay ClipToTrack(Stay stay, const TrackInfo& track) {
   return stay;
 }
 
-absl::StatusOr<std::vector<NodeId>> SqliteSnapshot::AgentIds() const {
+absl::StatusOr<std::vector<NodeId>> SqliteSnapshot::AgentIds(const StopCheck& stop) const {
   std::vector<NodeId> ids;
   NodeFilter filter;
   filter.layer = layers::kAgents;
-  DSG_RETURN_IF_ERROR(ScanNodes(filter, NodeId(), {}, [&](const Node& node) {
+  DSG_RETURN_IF_ERROR(ScanNodes(filter, NodeId(), stop, [&](const Node& node) {
     if (IsAgentKind(node.kind)) ids.push_back(node.id);
     return true;
   }));
   return ids;
 }
 
-absl::StatusOr<std::vector<TrackInfo>> SqliteSnapshot::Tracks() const {
-  DSG_ASSIGN_OR_RETURN(const auto ids, AgentIds());
+absl::StatusOr<std::vector<TrackInfo>> SqliteSnapshot::Tracks(const StopCheck& stop) const {
+  DSG_ASSIGN_OR_RETURN(const auto ids, AgentIds(stop));
   std::vector<TrackInfo> tracks;
   for (const NodeId id : ids) {
+    DSG_RETURN_IF_ERROR(AskStop(stop));
     DSG_ASSIGN_OR_RETURN(const auto track, reader_->GetTrack(id, revision()));
     tracks.push_back(track->info);
   }
@@ -142,7 +141,7 @@ absl::Status SqliteSnapshot::ReadPoses(NodeId agent, TimeNs from_ns, TimeNs to_n
   const int first = std::max(track->FindSegment(from_ns), 0);
   for (auto i = static_cast<size_t>(first); i < track->segments.size(); ++i) {
     if (track->segments[i].t0 >= to_ns) break;
-    DSG_RETURN_IF_ERROR(CheckStop(stop));
+    DSG_RETURN_IF_ERROR(AskStop(stop));
     DSG_ASSIGN_OR_RETURN(const auto poses, VisiblePoses(*track, i));
     for (const StoredPose& pose : poses) {
       if (pose.time_ns < from_ns) continue;
@@ -215,13 +214,13 @@ absl::StatusOr<std::vector<BoxVisit>> SqliteSnapshot::VisitsToBox(const Box3d& b
   std::vector<BoxVisit> visits;
   std::vector<TimedPosition> positions;
   for (const auto& [agent, ids] : segments_of) {
-    DSG_RETURN_IF_ERROR(CheckStop(stop));
     const auto found = reader_->GetTrack(agent, revision());
     // The agent may be newer than this revision.
     if (absl::IsNotFound(found.status())) continue;
     DSG_RETURN_IF_ERROR(found.status());
     const Track& track = **found;
     for (const int64_t id : ids) {
+      DSG_RETURN_IF_ERROR(AskStop(stop));
       // Segments ascend in time, and so do their ids.
       const auto at = std::lower_bound(
           track.segments.begin(), track.segments.end(), id,
@@ -239,10 +238,12 @@ absl::StatusOr<std::vector<BoxVisit>> SqliteSnapshot::VisitsToBox(const Box3d& b
   return visits;
 }
 
-absl::StatusOr<int64_t> SqliteSnapshot::CountObservedAgents(TimeNs from_ns, TimeNs to_ns) const {
-  DSG_ASSIGN_OR_RETURN(const auto ids, AgentIds());
+absl::StatusOr<int64_t> SqliteSnapshot::CountObservedAgents(TimeNs from_ns, TimeNs to_ns,
+                                                            const StopCheck& stop) const {
+  DSG_ASSIGN_OR_RETURN(const auto ids, AgentIds(stop));
   int64_t count = 0;
   for (const NodeId id : ids) {
+    DSG_RETURN_IF_ERROR(AskStop(stop));
     DSG_ASSIGN_OR_RETURN(const auto track, reader_->GetTrack(id, revision()));
     const auto& segments = track->segments;
     bool observed = false;
@@ -316,7 +317,7 @@ absl::StatusOr<std::vector<Stay>> SqliteSnapshot::StaysInNode(NodeId room_or_pla
   }
   std::vector<Stay> touching;
   for (const Stay& stored : stays) {
-    DSG_RETURN_IF_ERROR(CheckStop(stop));
+    DSG_RETURN_IF_ERROR(AskStop(stop));
     Stay stay = stored;
     if (stay.exit_ns == kTimeMax) {
       DSG_ASSIGN_OR_RETURN(const auto track, reader_->GetTrack(stay.agent, revision()));

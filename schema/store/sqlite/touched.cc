@@ -12,8 +12,6 @@
 namespace dsg::sqlite {
 namespace {
 
-absl::Status CheckStop(const StopCheck& stop) { return stop ? stop() : absl::OkStatus(); }
-
 // Rows between two questions to `stop`.
 constexpr int kStopPeriod = 512;
 
@@ -25,7 +23,7 @@ absl::Status ReadLists(Database& db, Revision after, Revision until, const StopC
   query.Bind(after, until);
   Revision expected = after;
   while (query.Next()) {
-    DSG_RETURN_IF_ERROR(CheckStop(stop));
+    DSG_RETURN_IF_ERROR(AskStop(stop));
     const Revision revision = query.Int(0);
     if (revision != ++expected || query.Int(2) != RowChecksum({revision}, query.Blob(1)) ||
         !DecodeTouched(query.Blob(1), keys)) {
@@ -44,7 +42,7 @@ absl::Status Scan(Database& db, const char* sql, Revision after, Revision until,
   Query query(db, sql);
   query.Bind(after, until);
   for (int row = 0; query.Next(); ++row) {
-    if (row % kStopPeriod == 0) DSG_RETURN_IF_ERROR(CheckStop(stop));
+    if (row % kStopPeriod == 0) DSG_RETURN_IF_ERROR(AskStop(stop));
     take(query);
   }
   return query.status();
@@ -52,7 +50,7 @@ absl::Status Scan(Database& db, const char* sql, Revision after, Revision until,
 
 absl::Status ScanRows(Database& db, Revision after, Revision until, const StopCheck& stop,
                       TouchedKeys* keys) {
-  DSG_RETURN_IF_ERROR(CheckStop(stop));
+  DSG_RETURN_IF_ERROR(AskStop(stop));
   DSG_RETURN_IF_ERROR(
       Scan(db,
            "SELECT key FROM node WHERE rev_from > ?1 AND rev_from <= ?2"

@@ -200,30 +200,30 @@ TEST_F(WalkAreas, AreMadeOnceATileAndWhileNothingChanges) {
   query::WalkAreaCache cache;
   const auto view = View(4);
   const Eigen::Vector3d here(230.0, 210.0, 1.0);
-  const auto area = cache.Get(view, here, kReachM, kBeginNs);
+  const auto area = *cache.Get(view, here, kReachM, kBeginNs, {});
   EXPECT_GT(area->goal_nodes.size(), 10u);
   EXPECT_TRUE(area->valid.Contains(kBeginNs));
-  EXPECT_EQ(cache.Get(view, here + Eigen::Vector3d(2.0, 3.0, 0.5), kReachM, kBeginNs), area);
-  EXPECT_EQ(cache.Get(view, here, kReachM, area->valid.to_ns - 1), area);
-  EXPECT_NE(cache.Get(view, here, kReachM, area->valid.to_ns), area);
-  EXPECT_NE(cache.Get(view, here + Eigen::Vector3d(20.0, 0.0, 0.0), kReachM, kBeginNs), area);
-  EXPECT_NE(cache.Get(view, here, 40.0, kBeginNs), area);
+  EXPECT_EQ(*cache.Get(view, here + Eigen::Vector3d(2.0, 3.0, 0.5), kReachM, kBeginNs, {}), area);
+  EXPECT_EQ(*cache.Get(view, here, kReachM, area->valid.to_ns - 1, {}), area);
+  EXPECT_NE(*cache.Get(view, here, kReachM, area->valid.to_ns, {}), area);
+  EXPECT_NE(*cache.Get(view, here + Eigen::Vector3d(20.0, 0.0, 0.0), kReachM, kBeginNs, {}), area);
+  EXPECT_NE(*cache.Get(view, here, 40.0, kBeginNs, {}), area);
   EXPECT_EQ(cache.stats().hit_count, 2);
   EXPECT_EQ(cache.stats().made_count, 4);
 }
 
 TEST_F(WalkAreas, HoldWhatIsThereAtTheInstant) {
   const auto view = View(4);
-  const auto places = view->Places();
+  const auto places = *view->Places({});
   Random random(kSeed, 1);
   for (int i = 0; i < 50; ++i) {
     const TimeNs at_ns = kBeginNs + random.Integer(-20, 50) * kSecond;
     const query::WalkTile tile = query::TileOf({230.0, 210.0, 1.0}, kReachM);
-    const query::WalkGrounds grounds = query::MakeWalkGrounds(*places, tile, at_ns);
+    const query::WalkGrounds grounds = *query::MakeWalkGrounds(*places, tile, at_ns, {});
     EXPECT_TRUE(grounds.valid.Contains(at_ns));
     // At either end of the interval it is the same, beyond it is not.
     for (const TimeNs same_ns : {grounds.valid.from_ns, grounds.valid.to_ns - 1}) {
-      const query::WalkGrounds same = query::MakeWalkGrounds(*places, tile, same_ns);
+      const query::WalkGrounds same = *query::MakeWalkGrounds(*places, tile, same_ns, {});
       EXPECT_EQ(same.places, grounds.places);
       EXPECT_EQ(same.field.graph().links, grounds.field.graph().links);
     }
@@ -233,14 +233,38 @@ TEST_F(WalkAreas, HoldWhatIsThereAtTheInstant) {
   }
 }
 
+TEST_F(WalkAreas, AreWholeOrNotThere) {
+  const auto view = View(4);
+  const Eigen::Vector3d here(230.0, 210.0, 1.0);
+  query::WalkAreaCache plain;
+  const auto expected = *plain.Get(view, here, kReachM, kBeginNs, {});
+  query::WalkAreaCache cache;
+  for (int asked_max = 0;; ++asked_max) {
+    int asked = 0;
+    const StopCheck stop = [&] {
+      return asked++ < asked_max ? absl::OkStatus() : absl::CancelledError("enough");
+    };
+    const auto area = cache.Get(view, here, kReachM, kBeginNs, stop);
+    if (area.ok()) {
+      EXPECT_GT(asked_max, 3);
+      EXPECT_EQ((*area)->goal_nodes, expected->goal_nodes);
+      EXPECT_EQ((*area)->field.graph().links, expected->field.graph().links);
+      break;
+    }
+    EXPECT_TRUE(absl::IsCancelled(area.status()));
+    EXPECT_EQ(cache.stats().area_count, 0);
+  }
+  EXPECT_EQ(cache.stats().made_count, 1);
+}
+
 TEST_F(WalkAreas, ShareThePlacesOfRevisionsWithoutOtherPlaces) {
   query::WalkAreaCache cache;
   const auto before = View(2);
   const auto after = *query::GraphView::Derive(before, map_.get(), **map_->At(3), StopCheck());
-  ASSERT_EQ(before->Places(), after->Places());
+  ASSERT_EQ(*before->Places({}), *after->Places({}));
   const Eigen::Vector3d here(230.0, 210.0, 1.0);
-  const auto first = cache.Get(before, here, kReachM, kBeginNs);
-  const auto second = cache.Get(after, here, kReachM, kBeginNs);
+  const auto first = *cache.Get(before, here, kReachM, kBeginNs, {});
+  const auto second = *cache.Get(after, here, kReachM, kBeginNs, {});
   EXPECT_EQ(cache.stats().shared_count, 1);
   EXPECT_EQ(&first->field.graph(), &second->field.graph());
   EXPECT_NE(first->goal_nodes, second->goal_nodes);
@@ -251,13 +275,13 @@ TEST_F(WalkAreas, StayWithinTheirMemoryAndForgetGraphsThatAreGone) {
   const Eigen::Vector3d here(230.0, 210.0, 1.0);
   query::WalkAreaCache small(1'000'000);
   for (int i = 0; i < 40; ++i) {
-    small.Get(view, here, kReachM, kBeginNs + (i - 10) * kSecond);
+    ASSERT_TRUE(small.Get(view, here, kReachM, kBeginNs + (i - 10) * kSecond, {}).ok());
     EXPECT_TRUE(small.stats().bytes <= 1'000'000 || small.stats().area_count == 1);
   }
   EXPECT_LT(small.stats().area_count, small.stats().made_count);
   query::WalkAreaCache cache;
-  cache.Get(View(3), here, kReachM, kBeginNs);
-  cache.Get(view, here, kReachM, kBeginNs);
+  ASSERT_TRUE(cache.Get(View(3), here, kReachM, kBeginNs, {}).ok());
+  ASSERT_TRUE(cache.Get(view, here, kReachM, kBeginNs, {}).ok());
   EXPECT_EQ(cache.stats().area_count, 1);
 }
 

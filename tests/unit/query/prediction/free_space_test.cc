@@ -17,7 +17,7 @@ TEST(FreeSpace, IsThatOfTheBestPlace) {
   WalkGraph graph;
   graph.places_map = {{0, 0, 1}, {1, 0, 1}, {0, 0, 5}};
   graph.clearance_m = {0.5, 0.8, 2.0};
-  const FreeSpace space(graph);
+  const FreeSpace space = *FreeSpace::Make(graph, {});
   EXPECT_NEAR(space.RadiusM({0.3, 0, 1}), 0.2, 1e-12);
   EXPECT_NEAR(space.RadiusM({0.7, 0, 1}), 0.5, 1e-12);
   EXPECT_NEAR(space.RadiusM({0.7, 0, 5}), 1.3, 1e-12);
@@ -28,7 +28,7 @@ TEST(FreeSpace, KnowsLinesThatBendAroundNothing) {
   WalkGraph graph;
   graph.places_map = {{0, 0, 1}, {0.8, 0, 1}, {1.6, 0, 1}, {4, 0, 1}};
   graph.clearance_m = {0.6, 0.6, 0.6, 0.6};
-  const FreeSpace space(graph);
+  const FreeSpace space = *FreeSpace::Make(graph, {});
   EXPECT_TRUE(space.IsClear({0, 0, 1}, {1.6, 0.2, 1}, 0.15));
   EXPECT_FALSE(space.IsClear({0, 0, 1}, {1.6, 0.2, 1}, 0.5));
   EXPECT_FALSE(space.IsClear({1.6, 0, 1}, {4, 0, 1}, 0.15)) << "between lies what nobody saw";
@@ -44,7 +44,7 @@ TEST(FreeSpace, NeverCallsALineFreeThatLeavesAllClearances) {
     graph.places_map.emplace_back(random.Uniform(0, 8), random.Uniform(0, 8), 1.0);
     graph.clearance_m.push_back(random.Uniform(0.3, 1.2));
   }
-  const FreeSpace space(graph);
+  const FreeSpace space = *FreeSpace::Make(graph, {});
   const auto is_free = [&](const Eigen::Vector3d& point_map) {
     for (size_t i = 0; i < graph.places_map.size(); ++i) {
       if ((graph.places_map[i] - point_map).norm() <= graph.clearance_m[i]) return true;

@@ -23,7 +23,7 @@ WalkGraph Row() {
 
 /// From a place itself.
 Ways WaysFrom(int place, const GoalField& field, double way_m_max = 1e9) {
-  return Ways({{place, field.graph().places_map[place], 0.0}}, field, way_m_max);
+  return *Ways::Find({{place, field.graph().places_map[place], 0.0}}, field, way_m_max, {});
 }
 
 TEST(Ways, KnowTheirLengthAndPlaces) {
@@ -51,7 +51,7 @@ TEST(Ways, EndWhereTheyGrowTooLong) {
 
 TEST(Ways, BeginWhereTheWholeIsShortest) {
   const GoalField field(Row(), {});
-  const Ways ways({{0, {0, 0, 0}, 1.5}, {2, {3, 0, 0}, 0.1}}, field, 1e9);
+  const Ways ways = *Ways::Find({{0, {0, 0, 0}, 1.5}, {2, {3, 0, 0}, 0.1}}, field, 1e9, {});
   EXPECT_EQ(ways.Origin(0), 0);
   EXPECT_EQ(ways.Origin(1), 1);
   EXPECT_NEAR(ways.WayM(1), 2.1, 1e-12);

@@ -168,10 +168,10 @@ TEST(PredictToGoals, KeepsTheMostProbableFutures) {
 
 TEST(PredictToGoalsDeathTest, RefusesWhatIsNotANumber) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_DEATH(PredictToGoals({At(0, nan, 0)}, {}, {}, {}, {}), "allFinite");
+  EXPECT_DEATH(PredictToGoals({At(0, nan, 0)}, {}, WalkGraph(), {}, {}), "allFinite");
   GoalOptions options;
   options.detour_m = nan;
-  EXPECT_DEATH(PredictToGoals({At(0, 0, 0)}, {}, {}, {}, options), "detour_m");
+  EXPECT_DEATH(PredictToGoals({At(0, 0, 0)}, {}, WalkGraph(), {}, options), "detour_m");
 }
 
 }  // namespace

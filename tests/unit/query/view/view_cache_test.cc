@@ -110,8 +110,9 @@ class GrowingAnnex final : public PlaceGraph::Annex {
 };
 
 GrowingAnnex& AnnexOf(const GraphView& view) {
+  const auto places = *view.Places({});
   return static_cast<GrowingAnnex&>(
-      view.Places()->annex([] { return std::make_unique<GrowingAnnex>(); }));
+      **places->annex({}, [] { return std::make_unique<GrowingAnnex>(); }));
 }
 
 TEST(ViewCache, CountsWhatPlanningAddsLaterOnceForAllViewsOfThePlaces) {
@@ -120,7 +121,7 @@ TEST(ViewCache, CountsWhatPlanningAddsLaterOnceForAllViewsOfThePlaces) {
   ViewCache cache(kPlenty);
   const auto view = *cache.Get(map.reader(), map.At(head), {});
   const auto later = *cache.Get(map.reader(), map.At(map.GrowTracksOnly()), {});
-  ASSERT_EQ(view->Places(), later->Places());
+  ASSERT_EQ(*view->Places({}), *later->Places({}));
   const size_t before = cache.stats().bytes;
   AnnexOf(*view).bytes = 5'000'000;
   EXPECT_EQ(cache.stats().bytes, before + 5'000'000);
@@ -143,7 +144,7 @@ TEST(ViewCache, ForgetsOthersWhenAViewsPlacesGrowBeyondTheBound) {
   place.nodes.back().layer = layers::kPlaces;
   place.nodes.back().kind = kinds::kPlace;
   const auto view = *cache.Get(map.reader(), map.At(map.Commit(place)), {});
-  ASSERT_NE(view->Places(), old->Places());
+  ASSERT_NE(*view->Places({}), *old->Places({}));
   EXPECT_EQ(cache.stats().view_count, 2);
   AnnexOf(*view).bytes = 30'000'000;
   ASSERT_TRUE(cache.Get(map.reader(), map.At(view->revision()), {}).ok());
@@ -185,7 +186,7 @@ TEST(ViewCache, MakesEachViewOnceForManyThreads) {
           return true;
         });
         EXPECT_EQ(count, (*view)->node_count());
-        EXPECT_NE((*view)->Places(), nullptr);
+        EXPECT_NE(*(*view)->Places({}), nullptr);
       }
     });
   }

@@ -68,7 +68,6 @@ class Asker {
         {"ScanNodes of a layer", &Asker::AskLayers},
         {"ScanNodes in a box", &Asker::AskBoxes},
         {"ResolveNode", &Asker::AskNames},
-        {"NearestNodes", &Asker::AskNearest},
         {"Ancestors", &Asker::AskAncestors},
         {"ScanEdges", &Asker::AskEdges},
         {"ScanEdges to a node", &Asker::AskEdgesTo},
@@ -170,17 +169,6 @@ class Asker {
       if (node.name.empty()) continue;
       DSG_ASSIGN_OR_RETURN(const NodeId found, snapshot_.ResolveNode(node.name));
       absl::StrAppend(&text, node.name, " ", ToString(found), "\n");
-    }
-    return text;
-  }
-
-  absl::StatusOr<std::string> AskNearest() {
-    std::string text;
-    for (double x = 5.0; x < 100.0; x += 30.0) {
-      DSG_ASSIGN_OR_RETURN(const auto nearest, snapshot_.NearestNodes({x, 40, 1}, 5, 1e3, {}, {}));
-      for (const NearestNode& item : nearest) {
-        absl::StrAppend(&text, Hex(item.distance_m), " ", Text(item.node));
-      }
     }
     return text;
   }

@@ -313,7 +313,8 @@ TEST(Snapshot, StopsALongReadWhenTold) {
       absl::IsCancelled(snapshot->ReadPoses(NodeId('H', 1), kTimeMin, kTimeMax, stop, go_on)));
   EXPECT_TRUE(absl::IsCancelled(
       snapshot->VisitsToBox(BoxOf(0, 0, 0, 100, 60, 3), kTimeMin, kTimeMax, stop).status()));
-  EXPECT_TRUE(absl::IsCancelled(snapshot->NearestNodes({0, 0, 0}, 3, 100.0, {}, stop).status()));
+  EXPECT_TRUE(absl::IsCancelled(snapshot->Tracks(stop).status()));
+  EXPECT_TRUE(absl::IsCancelled(snapshot->CountObservedAgents(kTimeMin, kTimeMax, stop).status()));
   EXPECT_TRUE(
       absl::IsCancelled(snapshot->StaysInNode(NodeId('R', 0), kTimeMin, kTimeMax, stop).status()));
 }

@@ -453,68 +453,11 @@ TEST(Scan, WithAFilterEqualsALookAtEveryNode) {
   }
 }
 
-TEST(Nearest, EqualsALookAtEveryNodeAlsoAtPastRevisions) {
-  TestMap map;
-  std::mt19937_64 random(RecordSeed());
-  const auto uniform = [&](double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(random);
-  };
-  for (int r = 0; r < 4; ++r) {
-    GraphDelta delta;
-    for (uint64_t i = 0; i < 150; ++i) {
-      const Eigen::Vector3d low(uniform(-80, 80), uniform(-80, 80), uniform(-2, 2));
-      delta.nodes.push_back(MakeObject(
-          random() % 300, "",
-          Box3d(low, low + Eigen::Vector3d(uniform(0.1, 3), uniform(0.1, 3), uniform(0.1, 1)))));
-    }
-    delta.nodes.push_back(MakeHuman(1, "ann"));
-    map.MustCommit(delta);
-  }
-  for (int i = 0; i < 150; ++i) {
-    const auto snapshot = map.At(i % 2 == 0 ? 4 : 1 + static_cast<Revision>(random() % 4));
-    const Eigen::Vector3d point(uniform(-150, 150), uniform(-150, 150), uniform(-5, 5));
-    const int k = 1 + static_cast<int>(random() % 12);
-    const double limit_m = i % 3 == 0 ? uniform(0.5, 60) : 1e4;
-    std::vector<std::pair<double, NodeId>> expected;
-    ASSERT_TRUE(snapshot
-                    ->ScanNodes({}, NodeId(), {},
-                                [&](const Node& node) {
-                                  const double distance_m = DistanceToBox(point, node.BoxMap());
-                                  if (!IsAgentKind(node.kind) && distance_m <= limit_m) {
-                                    expected.emplace_back(distance_m, node.id);
-                                  }
-                                  return true;
-                                })
-                    .ok());
-    std::sort(expected.begin(), expected.end());
-    if (expected.size() > static_cast<size_t>(k)) expected.resize(static_cast<size_t>(k));
-    std::vector<std::pair<double, NodeId>> found;
-    for (const NearestNode& item : OrDie(snapshot->NearestNodes(point, k, limit_m, {}, {}))) {
-      found.emplace_back(item.distance_m, item.node.id);
-    }
-    EXPECT_EQ(found, expected) << "question " << i;
-  }
-}
-
-TEST(Nearest, SkipsWhatAFilterLeavesOut) {
-  TestMap map;
-  ASSERT_TRUE(map.writer().Commit(DeltaOfStream({}, 1)).ok());
-  NodeFilter filter;
-  filter.layer = layers::kRooms;
-  const auto nearest = OrDie(map.Latest()->NearestNodes({60, 10, 1}, 10, 1e4, filter, {}));
-  ASSERT_EQ(nearest.size(), 4u);
-  EXPECT_EQ(nearest[0].node.id, NodeId('R', 2));
-  EXPECT_EQ(nearest[0].distance_m, 0.0);
-}
-
-TEST(Nearest, FindsThingsAtTheEdgeOfTheMappableWorld) {
+TEST(Scan, FindsThingsAtTheEdgeOfTheMappableWorld) {
   TestMap map;
   const double far = 1.9e6;
   map.MustCommit(DeltaOfNodes({MakeObject(1, "", BoxOf(-far - 1, -far, 0, -far, 1 - far, 1)),
                                MakeObject(2, "", BoxOf(far, far, 0, far + 1, far + 1, 1))}));
-  const auto nearest = OrDie(map.Latest()->NearestNodes({far, far, 0}, 2, 1e9, {}, {}));
-  ASSERT_EQ(nearest.size(), 2u);
-  EXPECT_EQ(nearest[0].node.id, NodeId('O', 2));
   NodeFilter filter;
   filter.layer = layers::kObjects;
   filter.box_map = BoxOf(-1e9, -1e9, -1e9, 0, 0, 1e9);

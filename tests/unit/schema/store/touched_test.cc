@@ -183,7 +183,7 @@ TEST(MeshBlockVersions, NameTheRevisionThatWroteEach) {
   std::map<BlockIndex, Revision> before;
   for (Revision r = 0; r <= kRevisionCount; ++r) {
     const auto snapshot = map.At(r);
-    const auto versions = OrDie(snapshot->MeshBlockVersions());
+    const auto versions = OrDie(snapshot->MeshBlockVersions({}));
     const auto indices = OrDie(snapshot->MeshBlocks());
     ASSERT_EQ(versions.size(), indices.size());
     std::map<BlockIndex, Revision> now;

@@ -571,10 +571,10 @@ TEST(ObservedAgents, AreThoseSeenOrInterpolatedInTheInterval) {
   tracks.Append(kAnn, {PoseAt(0, 0, 0, 0), PoseAt(kSecond, 0, 0, 0)});
   tracks.Append(kBob, {PoseAt(0, 0, 0, 0), PoseAt(5 * kSecond, 0, 0, 0)});
   const auto snapshot = tracks.map().Latest();
-  EXPECT_EQ(OrDie(snapshot->CountObservedAgents(10, 20)), 1);
-  EXPECT_EQ(OrDie(snapshot->CountObservedAgents(0, 1)), 2);
-  EXPECT_EQ(OrDie(snapshot->CountObservedAgents(kSecond + 1, 5 * kSecond)), 0);
-  EXPECT_EQ(OrDie(snapshot->CountObservedAgents(5 * kSecond, 6 * kSecond)), 1);
+  EXPECT_EQ(OrDie(snapshot->CountObservedAgents(10, 20, {})), 1);
+  EXPECT_EQ(OrDie(snapshot->CountObservedAgents(0, 1, {})), 2);
+  EXPECT_EQ(OrDie(snapshot->CountObservedAgents(kSecond + 1, 5 * kSecond, {})), 0);
+  EXPECT_EQ(OrDie(snapshot->CountObservedAgents(5 * kSecond, 6 * kSecond, {})), 1);
 }
 
 TEST(Stays, AreFoundByAgentByInstantAndByRoom) {

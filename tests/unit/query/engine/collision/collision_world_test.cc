@@ -202,7 +202,7 @@ TEST(CollisionWorld, LeavesOutWhatIsNotAskedFor) {
   scope.objects = true;
   EXPECT_TRUE(Ask(scene.World(revision), body, scope).hit);
   CollisionWorld world = scene.World(revision);
-  world.Ignore(NodeId('O', 1), &scope);
+  ASSERT_TRUE(world.Ignore(NodeId('O', 1), {}, &scope).ok());
   EXPECT_FALSE(Ask(std::move(world), body, scope).hit);
 }
 

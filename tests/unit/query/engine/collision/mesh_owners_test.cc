@@ -74,7 +74,7 @@ TEST(MeshOwners, TrianglesOfAnObjectThatLeftOrIsIgnoredAreNotThere) {
   EXPECT_FALSE(Ask(scene.World(revision), on_the_plate, {}).hit);
   CollisionWorld world = scene.World(revision, 150);
   CollisionScope scope;
-  world.Ignore(NodeId('O', 1), &scope);
+  ASSERT_TRUE(world.Ignore(NodeId('O', 1), {}, &scope).ok());
   EXPECT_FALSE(Ask(std::move(world), on_the_plate, scope).hit);
 }
 

@@ -95,7 +95,7 @@ TEST(PlaceLocator, MissesNoPlaceThatIsNear) {
     SCOPED_TRACE(seed);
     Random random(seed, 7);
     const auto graph = test::RandomPlaces::Make(&random).Graph();
-    const PlaceLocator locator(*graph);
+    const PlaceLocator locator = *PlaceLocator::Build(*graph, {});
     const Eigen::Vector3d corner(random.Uniform(-3.0, 14.0), random.Uniform(-3.0, 14.0),
                                  random.Uniform(-2.0, 5.0));
     const Box3d box(corner, corner + Eigen::Vector3d::Constant(random.Uniform(0.0, 2.0)));

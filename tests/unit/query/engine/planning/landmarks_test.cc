@@ -74,7 +74,7 @@ TEST(PlanningAnnex, CountsTowardsTheMemoryOfTheGraph) {
   Random random(5, 4);
   const auto graph = RandomPlaces::Make(&random).Graph();
   const size_t before = graph->memory_bytes();
-  PlanningAnnex& annex = PlanningAnnex::Of(*graph);
+  PlanningAnnex& annex = **PlanningAnnex::Of(*graph, {});
   EXPECT_GT(graph->memory_bytes(), before);
   const size_t between = graph->memory_bytes();
   ASSERT_TRUE(annex.landmarks().Get(*graph, {}, {}).ok());
