@@ -14,6 +14,11 @@ query::CallContext::Clock::time_point BoundDeadline(
   return now + std::min<Wall::duration>(left, kDeadlineMax);
 }
 
+bool OutlastsBound(std::chrono::system_clock::time_point deadline) {
+  return deadline == std::chrono::system_clock::time_point::max() ||
+         deadline - std::chrono::system_clock::now() > kDeadlineMax;
+}
+
 query::CallContext::Clock::time_point WatchDeadline(
     std::chrono::system_clock::time_point deadline) {
   using Wall = std::chrono::system_clock;

@@ -5,6 +5,7 @@
 #include <atomic>
 
 #include "query/engine/service_core.h"
+#include "server/call_guard.h"
 #include "server/call_log.h"
 #include "server/delay_queue.h"
 #include "server/worker_pool.h"
@@ -15,6 +16,7 @@ namespace dsg::server {
 struct CallRuntime {
   query::ServiceCore* core = nullptr;
   WorkerPool* workers = nullptr;
+  CallGuard* guard = nullptr;
   CallLog log{false};
   /// Streams that have begun and not ended, whether a worker is at them or their reader is slow.
   std::atomic<int> open_stream_count{0};

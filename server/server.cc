@@ -73,7 +73,8 @@ class RunningServer final : public Server {
       : core_(std::move(core)),
         workers_(WorkerCount(options.worker_count), options.in_flight_max),
         commit_workers_(kCommitWorkerCount, std::min(options.in_flight_max, kCommitsInFlightMax)),
-        delays_(&workers_) {
+        delays_(&workers_),
+        guard_(options.reader_stall_max) {
     Prepare(options, &workers_, &questions_);
     Prepare(options, &commit_workers_, &commits_);
     services_.push_back(MakeQueryService(&questions_));
@@ -114,6 +115,11 @@ class RunningServer final : public Server {
 
   const std::string& address() const override { return address_; }
 
+  ServerLoad Load() const override {
+    const auto [running_count, queued_count] = workers_.Load();
+    return {running_count, queued_count, questions_.open_stream_count, questions_.open_watch_count};
+  }
+
   void Shutdown(std::chrono::milliseconds grace) override {
     if (grpc_server_ != nullptr) {
       grpc_server_->GetHealthCheckService()->Shutdown();
@@ -123,8 +129,11 @@ class RunningServer final : public Server {
       // Waits for every call: those that run past the grace are cancelled, see it, and finish.
       grpc_server_->Shutdown(std::chrono::system_clock::now() + grace);
       grpc_server_->Wait();
+      // It may still hold a call that it has just ended.
+      guard_.Stop();
       grpc_server_ = nullptr;
     }
+    guard_.Stop();
     delays_.Stop();
     workers_.Stop();
     commit_workers_.Stop();
@@ -135,6 +144,7 @@ class RunningServer final : public Server {
   void Prepare(const ServerOptions& options, WorkerPool* workers, CallRuntime* runtime) {
     runtime->core = core_.get();
     runtime->workers = workers;
+    runtime->guard = &guard_;
     runtime->log = CallLog(options.log_all_calls);
     runtime->open_stream_max = options.open_stream_max;
     runtime->delays = &delays_;
@@ -147,6 +157,7 @@ class RunningServer final : public Server {
   WorkerPool workers_;
   WorkerPool commit_workers_;
   DelayQueue delays_;
+  CallGuard guard_;
   CallRuntime questions_;
   CallRuntime commits_;
   std::vector<std::unique_ptr<grpc::Service>> services_;
@@ -180,7 +191,15 @@ absl::Status ServerOptions::Validate() const {
   DSG_RETURN_IF_ERROR(CheckRange("workers", worker_count, 0, 256));
   DSG_RETURN_IF_ERROR(CheckRange("max-in-flight", in_flight_max, 1, 65536));
   DSG_RETURN_IF_ERROR(CheckRange("max-streams", open_stream_max, 1, 65536));
-  return CheckRange("max-watches", open_watch_max, 0, 65536);
+  DSG_RETURN_IF_ERROR(CheckRange("max-watches", open_watch_max, 0, 65536));
+  if (reader_stall_max >= std::chrono::milliseconds(1) &&
+      reader_stall_max <= std::chrono::hours(1)) {
+    return absl::OkStatus();
+  }
+  const std::string ms = absl::StrCat(reader_stall_max.count());
+  return MakeError(Reason::kFieldInvalid,
+                   absl::StrCat("reader stall is ", ms, " ms; give 1 ms to an hour"),
+                   {{"field", "reader_stall_max"}, {"value", ms}});
 }
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(std::unique_ptr<query::ServiceCore> core,

@@ -24,14 +24,27 @@ struct ServerOptions {
   /// Watches open at a time. A waiting one costs a look at the head each 50 ms; one that sends what
   /// changed holds the keys of one revision.
   int open_watch_max = 256;
+  /// A stream or watch whose reader takes no message for so long is ended.
+  std::chrono::milliseconds reader_stall_max{30'000};
   /// Listen on addresses that other machines can reach.
   bool allow_remote = false;
   /// A log line for every call, not only for errors and slow ones.
   bool log_all_calls = false;
 
-  /// Errors: FIELD_INVALID; workers are 0 to 256, calls and streams 1 to 65536, watches from
-  /// 0.
+  /// Errors: FIELD_INVALID; workers are 0 to 256, calls and streams 1 to 65536, watches from 0,
+  /// the stall is 1 ms to an hour.
   absl::Status Validate() const;
+};
+
+/// What the workers of questions are at, at one instant.
+struct ServerLoad {
+  /// Workers that are at a call or at a message of a stream.
+  int running_count = 0;
+  /// Calls and streams that wait for a worker.
+  int queued_count = 0;
+  /// Streams, watches excepted, that have begun and not ended.
+  int open_stream_count = 0;
+  int open_watch_count = 0;
 };
 
 class Server {
@@ -48,6 +61,8 @@ class Server {
 
   /// What a client dials, with the port that was taken.
   virtual const std::string& address() const = 0;
+
+  virtual ServerLoad Load() const = 0;
 
   /// Reports not-ready, accepts no more calls, lets the running ones end within `grace`, cancels
   /// the rest, joins the workers. Further calls do nothing. Never from a handler.

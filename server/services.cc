@@ -6,6 +6,7 @@
 #include "dsg/v1/ingest_service.grpc.pb.h"
 #include "dsg/v1/map_service.grpc.pb.h"
 #include "dsg/v1/query_service.grpc.pb.h"
+#include "server/arena_blocks.h"
 #include "server/stream_call.h"
 #include "server/unary_call.h"
 
@@ -16,39 +17,67 @@ using grpc::CallbackServerContext;
 using grpc::ServerUnaryReactor;
 using query::Api;
 
-// Requests and replies on protobuf arenas. Worth it only where a message has tens of thousands of
-// parts: a batch of 10,000 answers is freed as one piece instead of 70,000, which gave a fifth more
-// lookups a second on two cores.
+// Requests and replies on an arena, which whatever thread ends the call frees as one piece. Part by
+// part it would free what others have allocated: a fifth of the instructions of 20 nodes.
 template <typename Request, typename Reply>
 class ArenaMessages final : public grpc::MessageAllocator<Request, Reply> {
  public:
-  grpc::MessageHolder<Request, Reply>* AllocateMessages() override { return new Holder(); }
+  /// `blocks` must outlive this and all calls.
+  explicit ArenaMessages(ArenaBlocks* blocks) : blocks_(blocks) {}
+
+  grpc::MessageHolder<Request, Reply>* AllocateMessages() override { return new Holder(blocks_); }
 
  private:
   class Holder final : public grpc::MessageHolder<Request, Reply> {
    public:
-    Holder() : arena_(Options()) {
-      this->set_request(google::protobuf::Arena::CreateMessage<Request>(&arena_));
-      this->set_response(google::protobuf::Arena::CreateMessage<Reply>(&arena_));
+    explicit Holder(ArenaBlocks* blocks)
+        : blocks_(blocks),
+          block_(blocks->Take()),
+          arena_(std::make_unique<google::protobuf::Arena>(Options(block_.get()))) {
+      this->set_request(google::protobuf::Arena::CreateMessage<Request>(arena_.get()));
+      this->set_response(google::protobuf::Arena::CreateMessage<Reply>(arena_.get()));
     }
-    void Release() override { delete this; }
+    void Release() override {
+      arena_ = nullptr;
+      blocks_->Give(std::move(block_));
+      delete this;
+    }
 
    private:
-    static google::protobuf::ArenaOptions Options() {
+    static google::protobuf::ArenaOptions Options(char* block) {
       google::protobuf::ArenaOptions options;
-      options.start_block_size = size_t{16} << 10;
+      options.initial_block = block;
+      options.initial_block_size = ArenaBlocks::kBlockBytes;
       // Below the size from which malloc asks the kernel for fresh, unmapped pages each time.
+      options.start_block_size = size_t{64} << 10;
       options.max_block_size = size_t{64} << 10;
       return options;
     }
-    google::protobuf::Arena arena_;
+
+    ArenaBlocks* const blocks_;
+    ArenaBlocks::Block block_;
+    std::unique_ptr<google::protobuf::Arena> arena_;
   };
+
+  ArenaBlocks* const blocks_;
 };
 
 class QueryService final : public v1::QueryService::CallbackService {
  public:
   explicit QueryService(CallRuntime* runtime) : runtime_(runtime) {
-    SetMessageAllocatorFor_BatchLocateAgents(&batch_messages_);
+    SetMessageAllocatorFor_BatchLocateAgents(&locations_);
+    SetMessageAllocatorFor_BatchGetNodes(&batch_);
+    SetMessageAllocatorFor_ListNodes(&nodes_);
+    SetMessageAllocatorFor_ListEdges(&edges_);
+    SetMessageAllocatorFor_ListNearestNodes(&nearest_);
+    SetMessageAllocatorFor_GetNeighbors(&neighbors_);
+    SetMessageAllocatorFor_SearchNodes(&matches_);
+    SetMessageAllocatorFor_ListEncounters(&encounters_);
+    SetMessageAllocatorFor_ListInteractions(&interactions_);
+    SetMessageAllocatorFor_PlanPath(&path_);
+    SetMessageAllocatorFor_PlanPaths(&paths_);
+    SetMessageAllocatorFor_CheckCollision(&collisions_);
+    SetMessageAllocatorFor_PredictAgent(&predictions_);
   }
 
   ServerUnaryReactor* LocateAgent(CallbackServerContext* context,
@@ -150,13 +179,29 @@ class QueryService final : public v1::QueryService::CallbackService {
   }
 
  private:
-  ArenaMessages<v1::BatchLocateAgentsRequest, v1::BatchLocateAgentsResponse> batch_messages_;
+  // Of replies that have many parts. A small one gains nothing.
+  ArenaBlocks blocks_;
+  ArenaMessages<v1::BatchLocateAgentsRequest, v1::BatchLocateAgentsResponse> locations_{&blocks_};
+  ArenaMessages<v1::BatchGetNodesRequest, v1::BatchGetNodesResponse> batch_{&blocks_};
+  ArenaMessages<v1::ListNodesRequest, v1::ListNodesResponse> nodes_{&blocks_};
+  ArenaMessages<v1::ListEdgesRequest, v1::ListEdgesResponse> edges_{&blocks_};
+  ArenaMessages<v1::ListNearestNodesRequest, v1::ListNearestNodesResponse> nearest_{&blocks_};
+  ArenaMessages<v1::GetNeighborsRequest, v1::GetNeighborsResponse> neighbors_{&blocks_};
+  ArenaMessages<v1::SearchNodesRequest, v1::SearchNodesResponse> matches_{&blocks_};
+  ArenaMessages<v1::ListEncountersRequest, v1::ListEncountersResponse> encounters_{&blocks_};
+  ArenaMessages<v1::ListInteractionsRequest, v1::ListInteractionsResponse> interactions_{&blocks_};
+  ArenaMessages<v1::PlanPathRequest, v1::PlanPathResponse> path_{&blocks_};
+  ArenaMessages<v1::PlanPathsRequest, v1::PlanPathsResponse> paths_{&blocks_};
+  ArenaMessages<v1::CheckCollisionRequest, v1::CheckCollisionResponse> collisions_{&blocks_};
+  ArenaMessages<v1::PredictAgentRequest, v1::PredictAgentResponse> predictions_{&blocks_};
   CallRuntime* runtime_;
 };
 
 class MapService final : public v1::MapService::CallbackService {
  public:
-  explicit MapService(CallRuntime* runtime) : runtime_(runtime) {}
+  explicit MapService(CallRuntime* runtime) : runtime_(runtime) {
+    SetMessageAllocatorFor_DiffRevisions(&difference_);
+  }
 
   ServerUnaryReactor* CreateMap(CallbackServerContext* context, const v1::CreateMapRequest* request,
                                 v1::CreateMapResponse* reply) override {
@@ -192,6 +237,8 @@ class MapService final : public v1::MapService::CallbackService {
   }
 
  private:
+  ArenaBlocks blocks_;
+  ArenaMessages<v1::DiffRevisionsRequest, v1::DiffRevisionsResponse> difference_{&blocks_};
   CallRuntime* runtime_;
 };
 

@@ -5,14 +5,12 @@
 
 #include <chrono>
 #include <memory>
-#include <optional>
 #include <string_view>
 
 #include "grpcpp/grpcpp.h"
 #include "schema/base/status.h"
 #include "server/call_deadline.h"
 #include "server/call_runtime.h"
-#include "server/deadline_guard.h"
 #include "server/status_mapping.h"
 #include "server/unary_call.h"
 
@@ -45,10 +43,9 @@ class StreamCall final : public grpc::ServerWriteReactor<Reply>, public Job {
         open_(open),
         context_(context),
         request_(request),
-        deadline_(is_watch() ? WatchDeadline(context->deadline())
-                             : BoundDeadline(context->deadline())),
-        call_(deadline_),
-        guard_(context, deadline_) {
+        call_(kind == StreamKind::kWatch ? WatchDeadline(context->deadline())
+                                         : BoundDeadline(context->deadline())),
+        place_(runtime->guard->Guard(context->c_call(), call_.deadline())) {
     const absl::Status begun = Begin();
     if (!begun.ok()) this->Finish(LastWords(begun));
   }
@@ -66,9 +63,9 @@ class StreamCall final : public grpc::ServerWriteReactor<Reply>, public Job {
   }
 
   void OnWriteDone(bool ok) override {
+    place_->EndWrite();
     // StartWriteAndFinish has already said the last word.
     if (cursor_->done()) return;
-    stall_guard_.reset();
     if (ok) {
       runtime_->workers->Resubmit(this);
     } else {
@@ -98,7 +95,8 @@ class StreamCall final : public grpc::ServerWriteReactor<Reply>, public Job {
       return TooManyWatchesError(runtime_->open_watch_max);
     }
     if (!is_watch() && count > runtime_->open_stream_max) return OverloadedError();
-    return runtime_->workers->TrySubmit(this) ? absl::OkStatus() : OverloadedError();
+    return runtime_->workers->TrySubmit(this, JobKind::kStream) ? absl::OkStatus()
+                                                                : OverloadedError();
   }
 
   // How long until there is something to tell.
@@ -115,12 +113,12 @@ class StreamCall final : public grpc::ServerWriteReactor<Reply>, public Job {
     const absl::Status status = ReadNext();
     if (!status.ok()) {
       this->Finish(LastWords(status));
-    } else if (cursor_->done()) {
+      return;
+    }
+    place_->BeginWrite();
+    if (cursor_->done()) {
       this->StartWriteAndFinish(&message_, grpc::WriteOptions(), LastWords(status));
     } else {
-      if (is_watch()) {
-        stall_guard_.emplace(context_, query::CallContext::Clock::now() + kWatchStallMax);
-      }
       this->StartWrite(&message_);
     }
   }
@@ -133,8 +131,10 @@ class StreamCall final : public grpc::ServerWriteReactor<Reply>, public Job {
     return absl::OkStatus();
   }
 
-  // Logs the call and prepares its trailers.
-  grpc::Status LastWords(const absl::Status& status) {
+  // Logs the call and prepares its trailers. A call that was ended for its reader's sake looks
+  // cancelled from inside.
+  grpc::Status LastWords(absl::Status status) {
+    if (const absl::Status verdict = place_->verdict(); !verdict.ok()) status = verdict;
     const auto elapsed = query::CallContext::Clock::now() - begin_;
     if (runtime_->log.Wants(status, elapsed)) {
       runtime_->log.Write(
@@ -151,11 +151,8 @@ class StreamCall final : public grpc::ServerWriteReactor<Reply>, public Job {
   grpc::CallbackServerContext* context_;
   const Request* request_;
   const query::CallContext::Clock::time_point begin_ = query::CallContext::Clock::now();
-  const query::CallContext::Clock::time_point deadline_;
   query::CallContext call_;
-  DeadlineGuard guard_;
-  // Of the message that is being written.
-  std::optional<DeadlineGuard> stall_guard_;
+  const std::unique_ptr<CallGuard::Place> place_;
   std::unique_ptr<query::StreamCursor<Reply>> cursor_;
   Reply message_;
   int64_t revision_ = 0;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <chrono>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -110,6 +111,11 @@ class UnaryCall final : public grpc::ServerUnaryReactor, public Job {
                            status.ok() ? RowCountOf(*reply_) : 0, elapsed, context_->peer()});
     }
     if (!status.ok()) AddErrorTrailer(status, context_);
+    // A reply that nobody takes would be kept for ever.
+    if (OutlastsBound(context_->deadline())) {
+      place_ = runtime_->guard->Guard(context_->c_call(), CallGuard::Clock::time_point::max());
+      place_->BeginWrite();
+    }
     Finish(ToGrpc(status));
   }
 
@@ -121,6 +127,7 @@ class UnaryCall final : public grpc::ServerUnaryReactor, public Job {
   Reply* reply_;
   const query::CallContext::Clock::time_point begin_ = query::CallContext::Clock::now();
   query::CallContext call_;
+  std::unique_ptr<CallGuard::Place> place_;
 };
 
 /// What a handler returns. `name` must be a literal.

@@ -6,6 +6,7 @@
 #include <spawn.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <cinttypes>
@@ -112,11 +113,20 @@ absl::StatusOr<std::unique_ptr<ChildServer>> ChildServer::Start(
     const std::vector<std::string>& command) {
   DSG_ASSIGN_OR_RETURN(const Started started, SpawnAndListen(command));
   std::unique_ptr<ChildServer> server(new ChildServer(started.pid));
-  int byte = 0;
-  while (byte != '\n' && byte != EOF) byte = fgetc(started.output);
+  int byte = fgetc(started.output);
+  for (; byte != '\n' && byte != EOF; byte = fgetc(started.output)) {
+    server->first_line_ += static_cast<char>(byte);
+  }
   fclose(started.output);
   if (byte == '\n') return server;
   return absl::InternalError(absl::StrCat(command[0], " ended before it was ready"));
+}
+
+int64_t ChildServer::CpuNs() const {
+  clockid_t clock{};
+  timespec time{};
+  if (clock_getcpuclockid(pid_, &clock) != 0 || clock_gettime(clock, &time) != 0) return 0;
+  return int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
 }
 
 ChildServer::~ChildServer() {

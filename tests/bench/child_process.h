@@ -37,6 +37,8 @@ bool MeasureAsCopy(int argc, char** argv, int* exit_code);
 class ChildServer {
  public:
   /// Starts `command` and waits for its first line on standard output, which says it is ready.
+  ///
+  /// Errors: INTERNAL when it does not start or ends before.
   static absl::StatusOr<std::unique_ptr<ChildServer>> Start(
       const std::vector<std::string>& command);
   /// SIGTERM, and waits.
@@ -44,9 +46,14 @@ class ChildServer {
   ChildServer(const ChildServer&) = delete;
   ChildServer& operator=(const ChildServer&) = delete;
 
+  const std::string& first_line() const { return first_line_; }
+  /// Processor time that all its threads have used.
+  int64_t CpuNs() const;
+
  private:
   explicit ChildServer(pid_t pid) : pid_(pid) {}
-  pid_t pid_;
+  const pid_t pid_;
+  std::string first_line_;
 };
 
 }  // namespace dsg::bench

@@ -17,6 +17,7 @@
 #include "schema/base/random.h"
 #include "schema/base/status.h"
 #include "schema/store/graph_store.h"
+#include "tests/bench/collision_duel.h"
 #include "tests/bench/collision_maps.h"
 #include "tests/bench/fcl_rival.h"
 #include "tests/bench/report.h"
@@ -27,27 +28,18 @@ namespace {
 
 using query::Body;
 using query::CollisionCache;
-using query::CollisionHit;
 using query::CollisionScope;
 using query::CollisionWorld;
 using query::Convex;
 using query::GraphView;
 
-constexpr double kRadiusM = 0.3;
 constexpr int kQuestionCount = 2'000;
 constexpr int kSlowQuestionCount = 100;
-// Ours and FCL take turns after so many questions.
-constexpr size_t kTurn = 100;
 constexpr double kSameM = 1e-6;
 
 struct Flags {
   std::string store;
   std::string map = "map";
-};
-
-struct OpenMap {
-  std::shared_ptr<const Snapshot> snapshot;
-  std::shared_ptr<const GraphView> view;
 };
 
 absl::StatusOr<OpenMap> Open(GraphStore* store, const std::string& map) {
@@ -83,7 +75,7 @@ double SlowClearance(const Eigen::Vector3d& center, const std::vector<Convex>& s
   for (const Convex& shape : shapes) {
     nearest_m = std::min(nearest_m, (query::NearestPoint(shape, center) - center).norm());
   }
-  return std::min(std::max(0.0, nearest_m - kRadiusM), clearance_m_max);
+  return std::min(std::max(0.0, nearest_m - kSphereRadiusM), clearance_m_max);
 }
 
 std::unique_ptr<FclRival> MakeRival(const OpenMap& open, const std::vector<Convex>& shapes,
@@ -103,75 +95,6 @@ std::unique_ptr<FclRival> MakeRival(const OpenMap& open, const std::vector<Conve
   return FclRival::OfBoxes(boxes);
 }
 
-// One question of each sort to each of both sides.
-struct Asked {
-  std::vector<double> clearances_m;
-  std::vector<double> fcl_clearances_m;
-  Samples ours;
-  Samples fcl;
-  Samples ours_touch;
-  Samples fcl_touch;
-  int hit_count = 0;
-  int other_hit_count = 0;
-};
-
-class Duel {
- public:
-  Duel(const OpenMap& open, const CollisionScope& scope, FclRival* rival)
-      : open_(open), scope_(scope), touch_scope_(scope), rival_(rival) {
-    // Hit or not is all that is asked for: what is further away than nearly nothing is left alone.
-    touch_scope_.clearance_m_max = 1e-9;
-  }
-
-  absl::Status AskOurs(const Eigen::Vector3d& center) {
-    CollisionHit hit;
-    DSG_ASSIGN_OR_RETURN(const int64_t ns, Check(center, scope_, &hit));
-    DSG_ASSIGN_OR_RETURN(const int64_t touch_ns, Check(center, touch_scope_, &touch_));
-    asked_.ours.Add(ns);
-    asked_.ours_touch.Add(touch_ns);
-    asked_.clearances_m.push_back(hit.clearance_m);
-    asked_.hit_count += hit.hit ? 1 : 0;
-    return absl::OkStatus();
-  }
-
-  void AskFcl(const Eigen::Vector3d& center) {
-    double clearance_m = 0.0;
-    bool touches = false;
-    asked_.fcl.Add(NanosecondsOf(
-        [&] { clearance_m = rival_->Clearance(center, kRadiusM, scope_.clearance_m_max); }));
-    asked_.fcl_touch.Add(NanosecondsOf([&] { touches = rival_->Touches(center, kRadiusM); }));
-    asked_.fcl_clearances_m.push_back(clearance_m);
-    asked_.other_hit_count += touches ? 1 : 0;
-  }
-
-  /// Forgets what was asked, not what is cached.
-  Asked Take() { return std::exchange(asked_, Asked()); }
-  const CollisionCache& cache() const { return cache_; }
-
- private:
-  absl::StatusOr<int64_t> Check(const Eigen::Vector3d& center, const CollisionScope& scope,
-                                CollisionHit* hit) {
-    const Body body = query::SweptSphere(kRadiusM, {center});
-    absl::StatusOr<CollisionHit> answer;
-    const int64_t ns = NanosecondsOf([&] {
-      CollisionWorld world =
-          CollisionWorld::Create(open_.view, open_.snapshot, std::nullopt, &cache_);
-      answer = world.Check(body, scope, StopCheck());
-    });
-    DSG_RETURN_IF_ERROR(answer.status());
-    *hit = *answer;
-    return ns;
-  }
-
-  const OpenMap& open_;
-  const CollisionScope& scope_;
-  CollisionScope touch_scope_;
-  FclRival* rival_;
-  CollisionCache cache_;
-  CollisionHit touch_;
-  Asked asked_;
-};
-
 std::vector<Eigen::Vector3d> Centers(const Box3d& box) {
   Random random(1, 0);
   std::vector<Eigen::Vector3d> centers;
@@ -181,19 +104,6 @@ std::vector<Eigen::Vector3d> Centers(const Box3d& box) {
                          random.Uniform(box.min().z(), box.max().z()));
   }
   return centers;
-}
-
-absl::StatusOr<Asked> AskBoth(const std::vector<Eigen::Vector3d>& centers, Duel* duel) {
-  // The first round reads what is missing.
-  for (int round = 0; round < 2; ++round) {
-    duel->Take();
-    for (size_t first = 0; first < centers.size(); first += kTurn) {
-      const size_t end = std::min(first + kTurn, centers.size());
-      for (size_t i = first; i < end; ++i) DSG_RETURN_IF_ERROR(duel->AskOurs(centers[i]));
-      for (size_t i = first; i < end; ++i) duel->AskFcl(centers[i]);
-    }
-  }
-  return duel->Take();
 }
 
 // Ours must be what looking at all gives; FCL's may be off, which is noted.
@@ -230,7 +140,7 @@ absl::Status CheckPoints(const std::string& what, const OpenMap& open, const Box
   Duel duel(open, scope, rival.get());
   const std::vector<Eigen::Vector3d> centers = Centers(box);
   const int64_t first_ns = NanosecondsOf([&] { duel.AskOurs(centers[0]).IgnoreError(); });
-  DSG_ASSIGN_OR_RETURN(const Asked asked, AskBoth(centers, &duel));
+  DSG_ASSIGN_OR_RETURN(const Asked asked, duel.AskBoth(centers));
   DSG_ASSIGN_OR_RETURN(const Samples slow,
                        CompareAnswers(what, asked, centers, shapes, scope.clearance_m_max, report));
   report->Note(absl::StrCat(what, ": our first question ", first_ns / 1'000'000, " ms, FCL's tree ",
@@ -251,7 +161,8 @@ absl::Status CheckWays(const OpenMap& open, const CollisionScope& scope, Report*
   for (int i = 0; i < 200; ++i) {
     const Eigen::Vector3d from(random.Uniform(0, 49), random.Uniform(0, 49), 6.0);
     const Eigen::Vector3d to(random.Uniform(0, 49), random.Uniform(0, 49), 6.0);
-    const Body body = query::SweptSphere(kRadiusM, {from, from + (to - from).normalized() * 10.0});
+    const Body body =
+        query::SweptSphere(kSphereRadiusM, {from, from + (to - from).normalized() * 10.0});
     absl::Status status;
     ours.Add(NanosecondsOf([&] {
       CollisionWorld world = CollisionWorld::Create(open.view, open.snapshot, std::nullopt, &cache);

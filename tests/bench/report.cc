@@ -72,17 +72,21 @@ std::string LoadText() {
   return getloadavg(load, 1) == 1 ? absl::StrFormat("load %.1f", load[0]) : "load unknown";
 }
 
+int64_t NsOf(clockid_t clock) {
+  timespec now{};
+  clock_gettime(clock, &now);
+  return now.tv_sec * int64_t{1'000'000'000} + now.tv_nsec;
+}
+
 Figure Scaled(const Samples& samples, double ns_per_unit) {
   return {samples.Percentile(0.5) / ns_per_unit, samples.Percentile(0.99) / ns_per_unit};
 }
 
 }  // namespace
 
-int64_t ThreadCpuNs() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return now.tv_sec * int64_t{1'000'000'000} + now.tv_nsec;
-}
+int64_t ThreadCpuNs() { return NsOf(CLOCK_THREAD_CPUTIME_ID); }
+
+int64_t ProcessCpuNs() { return NsOf(CLOCK_PROCESS_CPUTIME_ID); }
 
 double Samples::Percentile(double fraction) const {
   std::vector<int64_t> ns = ns_;

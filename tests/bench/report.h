@@ -32,6 +32,9 @@ int64_t NanosecondsOf(Work&& work) {
 /// Nanoseconds of processor time that this thread has used; what a busy machine does not stretch.
 int64_t ThreadCpuNs();
 
+/// The same of all threads of this process.
+int64_t ProcessCpuNs();
+
 /// Durations of one operation.
 class Samples {
  public:

@@ -3,9 +3,7 @@
 // Each beside a rival of the same run; only the peer's file size is a constant, and named so.
 #include <algorithm>
 #include <cstdlib>
-#include <limits>
 #include <memory>
-#include <tuple>
 
 #include "CLI/CLI.hpp"
 #include "absl/strings/str_cat.h"
@@ -176,49 +174,6 @@ absl::Status MeasureColdStats(const std::string& folder, Report* report) {
   return absl::OkStatus();
 }
 
-// The scan that the peer does: over all places, nearest box, then id.
-NodeId ScanForNearest(const std::vector<std::pair<NodeId, Box3d>>& places,
-                      const Eigen::Vector3d& point) {
-  auto best = std::make_tuple(std::numeric_limits<double>::infinity(), NodeId());
-  for (const auto& [id, box] : places) {
-    best = std::min(best, std::make_tuple(box.squaredExteriorDistance(point), id));
-  }
-  return std::get<1>(best);
-}
-
-absl::Status MeasureNearestPlace(const GraphDelta& graph, const Snapshot& snapshot,
-                                 Report* report) {
-  std::vector<std::pair<NodeId, Box3d>> places;
-  for (const Node& node : graph.nodes) {
-    if (node.layer == layers::kPlaces) places.emplace_back(node.id, node.BoxMap());
-  }
-  NodeFilter filter;
-  filter.layer = layers::kPlaces;
-  Random random(42, 2);
-  Samples ours;
-  Samples scan;
-  for (int i = 0; i < kQuestionCount; ++i) {
-    const Eigen::Vector3d point(random.Uniform(0, 50), random.Uniform(0, 50), random.Uniform(0, 5));
-    absl::StatusOr<std::vector<NearestNode>> nearest = absl::InternalError("not asked");
-    NodeId expected;
-    ours.Add(NanosecondsOf([&] {
-      nearest =
-          snapshot.NearestNodes(point, 1, std::numeric_limits<double>::infinity(), filter, {});
-    }));
-    scan.Add(NanosecondsOf([&] { expected = ScanForNearest(places, point); }));
-    DSG_RETURN_IF_ERROR(nearest.status());
-    if (nearest->size() != 1 || nearest->front().node.id != expected) {
-      return absl::DataLossError(
-          absl::StrCat("nearest place to ", point.x(), ", ", point.y(), ", ", point.z(), " is ",
-                       nearest->empty() ? "none" : ToString(nearest->front().node.id),
-                       ", the scan says ", ToString(expected)));
-    }
-  }
-  report->Line("nearest place", "us", Microseconds(ours),
-               Rival{"scan of 100,000", Microseconds(scan)}, {});
-  return absl::OkStatus();
-}
-
 // The scan that the peer's users write: the pose nearest in time, then up to its place.
 int ScanForPose(const std::vector<TimedPose>& poses, TimeNs at_ns) {
   int best = 0;
@@ -283,7 +238,6 @@ absl::Status Run(const CommonOptions& common, Report* report) {
   DSG_ASSIGN_OR_RETURN(const auto map, store->OpenMap(kMap));
   DSG_ASSIGN_OR_RETURN(const auto snapshot, map->Latest());
   DSG_RETURN_IF_ERROR(CheckCounts(*snapshot));
-  DSG_RETURN_IF_ERROR(MeasureNearestPlace(graph, *snapshot, report));
   return MeasureAgentAtTime(graph, *snapshot, report);
 }
 

@@ -3,14 +3,13 @@
 // cancelled it. Refuses to measure a question that ends before it is cancelled.
 #pragma once
 
-#include <string>
-
 #include "tests/bench/report.h"
+#include "tests/bench/wire_server.h"
 
 namespace dsg::bench {
 
-/// Cancels each kind of long question `repeat_count` times, at instants spread over its work.
-absl::Status MeasureCancels(const std::string& store, const std::string& address, int repeat_count,
-                            Report* report);
+/// Cancels each kind of long question `repeat_count` times, at instants spread over the first 600
+/// ms of its work.
+absl::Status MeasureCancels(const WirePlace& place, int repeat_count, Report* report);
 
 }  // namespace dsg::bench

@@ -246,13 +246,18 @@ void AddMaps(Questions* out) {
 
 }  // namespace
 
-std::vector<std::unique_ptr<Question>> AllQuestions() {
+std::vector<std::unique_ptr<Question>> QuestionsWanted(const QuestionFilter& filter) {
   Questions questions;
   AddLookups(&questions);
   AddLists(&questions);
   AddMeetings(&questions);
   AddSpace(&questions);
   AddMaps(&questions);
+  std::erase_if(questions, [&](const auto& question) {
+    const std::string& name = question->name();
+    return name.find(filter.only) == std::string::npos ||
+           (!filter.except.empty() && name.find(filter.except) != std::string::npos);
+  });
   return questions;
 }
 

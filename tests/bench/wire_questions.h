@@ -33,7 +33,13 @@ class Question {
   std::string name_;
 };
 
-/// One of each.
-std::vector<std::unique_ptr<Question>> AllQuestions();
+/// By parts of their names; an empty part is no condition.
+struct QuestionFilter {
+  std::string only;
+  std::string except;
+};
+
+/// One of each that passes.
+std::vector<std::unique_ptr<Question>> QuestionsWanted(const QuestionFilter& filter);
 
 }  // namespace dsg::bench

@@ -14,6 +14,7 @@
 #include "server/server.h"
 #include "server/status_mapping.h"
 #include "tests/unit/query/engine/office.h"
+#include "tests/unit/server/passing_core.h"
 
 namespace dsg::server {
 namespace {
@@ -26,7 +27,7 @@ using test::kSecond;
 
 // The real core, except that ListMaps takes as long as the test wants or until it must stop.
 // Only this way a test decides, rather than a clock, how long a call runs.
-class HeldCore final : public query::ServiceCore {
+class HeldCore final : public PassingCore {
  public:
   // Shared with the test, since the server owns the core.
   struct Gate {
@@ -48,7 +49,7 @@ class HeldCore final : public query::ServiceCore {
   };
 
   HeldCore(std::unique_ptr<query::ServiceCore> core, std::shared_ptr<Gate> gate)
-      : core_(std::move(core)), gate_(std::move(gate)) {}
+      : PassingCore(std::move(core)), gate_(std::move(gate)) {}
 
   absl::Status ListMaps(const CallContext& call, const v1::ListMapsRequest& request,
                         v1::ListMapsResponse* reply) override {
@@ -66,87 +67,10 @@ class HeldCore final : public query::ServiceCore {
       gate_->changed.notify_all();
       if (!stop.ok()) return stop;
     }
-    return core_->ListMaps(call, request, reply);
+    return PassingCore::ListMaps(call, request, reply);
   }
-
-  absl::StatusOr<std::unique_ptr<query::TrajectoryCursor>> OpenTrajectory(
-      const v1::GetTrajectoryRequest& request) override {
-    return core_->OpenTrajectory(request);
-  }
-  absl::Status GetTrajectory(
-      const CallContext& call, const v1::GetTrajectoryRequest& request,
-      const std::function<bool(const v1::GetTrajectoryResponse&)>& send) override {
-    return core_->GetTrajectory(call, request, send);
-  }
-  absl::StatusOr<std::unique_ptr<query::MeshCursor>> OpenMesh(
-      const v1::GetMeshRequest& request) override {
-    return core_->OpenMesh(request);
-  }
-  absl::Status GetMesh(const CallContext& call, const v1::GetMeshRequest& request,
-                       const std::function<bool(const v1::GetMeshResponse&)>& send) override {
-    return core_->GetMesh(call, request, send);
-  }
-  absl::StatusOr<std::unique_ptr<query::AgentShapeCursor>> OpenAgentShape(
-      const v1::GetAgentShapeRequest& request) override {
-    return core_->OpenAgentShape(request);
-  }
-  absl::Status GetAgentShape(
-      const CallContext& call, const v1::GetAgentShapeRequest& request,
-      const std::function<bool(const v1::GetAgentShapeResponse&)>& send) override {
-    return core_->GetAgentShape(call, request, send);
-  }
-
-  absl::StatusOr<std::unique_ptr<query::SubgraphCursor>> OpenSubgraph(
-      const v1::GetSubgraphRequest& request) override {
-    return core_->OpenSubgraph(request);
-  }
-  absl::Status GetSubgraph(
-      const CallContext& call, const v1::GetSubgraphRequest& request,
-      const std::function<bool(const v1::GetSubgraphResponse&)>& send) override {
-    return core_->GetSubgraph(call, request, send);
-  }
-  absl::StatusOr<std::unique_ptr<query::WatchCursor>> OpenWatch(
-      const v1::WatchMapRequest& request) override {
-    return core_->OpenWatch(request);
-  }
-  absl::Status WatchMap(const CallContext& call, const v1::WatchMapRequest& request,
-                        const std::function<bool(const v1::WatchMapResponse&)>& send) override {
-    return core_->WatchMap(call, request, send);
-  }
-
-// Passed on as they are.
-#define DSG_PASS_ON(Method)                                                        \
-  absl::Status Method(const CallContext& call, const v1::Method##Request& request, \
-                      v1::Method##Response* reply) override {                      \
-    return core_->Method(call, request, reply);                                    \
-  }
-  DSG_PASS_ON(LocateAgent)
-  DSG_PASS_ON(BatchLocateAgents)
-  DSG_PASS_ON(ListPresence)
-  DSG_PASS_ON(GetNode)
-  DSG_PASS_ON(ListNodes)
-  DSG_PASS_ON(ListEdges)
-  DSG_PASS_ON(ListNearestNodes)
-  DSG_PASS_ON(BatchGetNodes)
-  DSG_PASS_ON(GetNeighbors)
-  DSG_PASS_ON(SearchNodes)
-  DSG_PASS_ON(ListEncounters)
-  DSG_PASS_ON(ListInteractions)
-  DSG_PASS_ON(PlanPath)
-  DSG_PASS_ON(PlanPaths)
-  DSG_PASS_ON(CheckCollision)
-  DSG_PASS_ON(PredictAgent)
-  DSG_PASS_ON(DiffRevisions)
-  DSG_PASS_ON(CreateMap)
-  DSG_PASS_ON(GetMapStats)
-  DSG_PASS_ON(ListRevisions)
-  DSG_PASS_ON(GetServerInfo)
-  DSG_PASS_ON(Commit)
-  DSG_PASS_ON(GetSession)
-#undef DSG_PASS_ON
 
  private:
-  std::unique_ptr<query::ServiceCore> core_;
   std::shared_ptr<Gate> gate_;
 };
 

@@ -5,6 +5,8 @@
 
 #include <atomic>
 #include <future>
+#include <string>
+#include <vector>
 
 namespace dsg::server {
 namespace {
@@ -31,6 +33,17 @@ class HeldJob final : public Job {
  private:
   std::promise<void> started_;
   std::promise<void> release_;
+};
+
+// Only for a single worker.
+class NoteJob final : public Job {
+ public:
+  NoteJob(char name, std::vector<char>* order) : name_(name), order_(order) {}
+  void Run() override { order_->push_back(name_); }
+
+ private:
+  char name_;
+  std::vector<char>* order_;
 };
 
 TEST(WorkerPool, RunsEveryJobOnce) {
@@ -68,6 +81,40 @@ TEST(WorkerPool, NeverRefusesWhatHasBegun) {
   held.Release();
   pool.Stop();
   EXPECT_EQ(count, 1);
+}
+
+TEST(WorkerPool, LeavesHalfOfTheWorkersToCalls) {
+  std::vector<HeldJob> streams(4);
+  HeldJob call;
+  WorkerPool pool(4, 100);
+  for (HeldJob& stream : streams) ASSERT_TRUE(pool.TrySubmit(&stream, JobKind::kStream));
+  streams[0].WaitUntilStarted();
+  streams[1].WaitUntilStarted();
+  EXPECT_EQ(pool.Load().running, 2);
+  EXPECT_EQ(pool.Load().queued, 2);
+  ASSERT_TRUE(pool.TrySubmit(&call));
+  call.WaitUntilStarted();
+  EXPECT_EQ(pool.Load().running, 3);
+  call.Release();
+  for (HeldJob& stream : streams) stream.Release();
+  pool.Stop();
+  EXPECT_EQ(pool.Load().running, 0);
+  EXPECT_EQ(pool.Load().queued, 0);
+}
+
+TEST(WorkerPool, TakesCallsFirstButLetsNoStreamStarve) {
+  std::vector<char> order;
+  HeldJob held;
+  NoteJob call('c', &order);
+  NoteJob stream('s', &order);
+  WorkerPool pool(1, 100);
+  ASSERT_TRUE(pool.TrySubmit(&held));
+  held.WaitUntilStarted();
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(pool.TrySubmit(&stream, JobKind::kStream));
+  for (int i = 0; i < 7; ++i) ASSERT_TRUE(pool.TrySubmit(&call));
+  held.Release();
+  pool.Stop();
+  EXPECT_EQ(std::string(order.begin(), order.end()), "cccscccsc");
 }
 
 TEST(WorkerPool, TakesNothingAfterItStopped) {

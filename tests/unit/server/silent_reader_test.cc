@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+// Readers that open a stream and then never read: counted is what they hold, not how long others
+// wait.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "dsg/v1/map_service.grpc.pb.h"
+#include "dsg/v1/query_service.grpc.pb.h"
+#include "grpcpp/grpcpp.h"
+#include "schema/base/random.h"
+#include "server/server.h"
+#include "tests/unit/query/engine/office.h"
+#include "tests/unit/server/passing_core.h"
+
+namespace dsg::server {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using std::chrono::system_clock;
+
+constexpr int kBlockCount = 600;
+constexpr uint32_t kVertexCount = 3000;
+
+// Counts the messages that streams of the mesh were asked for.
+class CountingCore final : public PassingCore {
+ public:
+  CountingCore(std::unique_ptr<query::ServiceCore> core, std::atomic<int>* message_count)
+      : PassingCore(std::move(core)), message_count_(message_count) {}
+
+  absl::StatusOr<std::unique_ptr<query::MeshCursor>> OpenMesh(
+      const v1::GetMeshRequest& request) override {
+    auto cursor = PassingCore::OpenMesh(request);
+    if (!cursor.ok()) return cursor;
+    return std::unique_ptr<query::MeshCursor>(
+        std::make_unique<Cursor>(*std::move(cursor), message_count_));
+  }
+
+ private:
+  class Cursor final : public query::MeshCursor {
+   public:
+    Cursor(std::unique_ptr<query::MeshCursor> cursor, std::atomic<int>* message_count)
+        : cursor_(std::move(cursor)), message_count_(message_count) {}
+    absl::Status Next(const query::CallContext& call, v1::GetMeshResponse* reply) override {
+      ++*message_count_;
+      return cursor_->Next(call, reply);
+    }
+    bool done() const override { return cursor_->done(); }
+
+   private:
+    std::unique_ptr<query::MeshCursor> cursor_;
+    std::atomic<int>* message_count_;
+  };
+
+  std::atomic<int>* message_count_;
+};
+
+// On a connection of its own.
+class MeshReader {
+ public:
+  explicit MeshReader(const std::string& address) {
+    grpc::ChannelArguments arguments;
+    arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+    stub_ = v1::QueryService::NewStub(
+        grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments));
+    // Only so that a test that goes wrong ends.
+    context_.set_deadline(system_clock::now() + seconds(60));
+    v1::GetMeshRequest request;
+    request.set_map(test::kMap);
+    reader_ = stub_->GetMesh(&context_, request);
+  }
+  ~MeshReader() {
+    context_.TryCancel();
+    if (!is_finished_) Finish();
+  }
+
+  bool Read() {
+    v1::GetMeshResponse reply;
+    return reader_->Read(&reply);
+  }
+  grpc::Status Finish() {
+    is_finished_ = true;
+    while (Read()) {
+    }
+    return reader_->Finish();
+  }
+
+ private:
+  std::unique_ptr<v1::QueryService::Stub> stub_;
+  grpc::ClientContext context_;
+  std::unique_ptr<grpc::ClientReader<v1::GetMeshResponse>> reader_;
+  bool is_finished_ = false;
+};
+
+class SilentReader : public testing::Test {
+ protected:
+  SilentReader() {
+    test::MakeOffice(folder_.path());
+    GraphDelta delta;
+    Random random(23, 0);
+    for (int i = 0; i < kBlockCount; ++i) {
+      MeshBlock block;
+      block.index = {i % 20, i / 20, 0};
+      for (uint32_t k = 0; k < kVertexCount; ++k) {
+        block.positions_map.emplace_back(2.0 * block.index.x + random.Uniform(0, 2),
+                                         2.0 * block.index.y + random.Uniform(0, 2),
+                                         random.Uniform(0, 2));
+        block.normals_map.emplace_back(random.Uniform(), random.Uniform(), random.Uniform());
+      }
+      delta.mesh_blocks.push_back(std::move(block));
+    }
+    test::CommitToOffice(folder_.path(), std::move(delta));
+  }
+
+  void Start(milliseconds reader_stall_max = seconds(30)) {
+    ServerOptions options;
+    options.listen = "unix:" + folder_.path() + "/server.sock";
+    options.worker_count = 2;
+    options.reader_stall_max = reader_stall_max;
+    auto server = Server::Start(
+        std::make_unique<CountingCore>(test::OpenCore(folder_.path()), &message_count_), options);
+    ASSERT_TRUE(server.ok()) << server.status();
+    server_ = *std::move(server);
+    channel_ = grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials());
+  }
+
+  grpc::Status AskInfo() {
+    grpc::ClientContext context;
+    context.set_deadline(system_clock::now() + seconds(20));
+    v1::GetServerInfoResponse reply;
+    return v1::MapService::NewStub(channel_)->GetServerInfo(&context, {}, &reply);
+  }
+
+  // Asks one question after the other, until the streams have got on no further for a hundred of
+  // them and no worker is busy.
+  bool ComesToRest() {
+    constexpr int kQuietCount = 100;
+    int quiet_count = 0;
+    for (int i = 0; i < 20'000; ++i) {
+      const int before = message_count_;
+      if (!AskInfo().ok()) return false;
+      const bool is_quiet = message_count_ == before && server_->Load().queued_count == 0;
+      quiet_count = is_quiet ? quiet_count + 1 : 0;
+      if (quiet_count >= kQuietCount && server_->Load().running_count == 0) return true;
+    }
+    return false;
+  }
+
+  // Unlike other waits this has no count of questions: it ends with the readers' deadline.
+  bool AllStreamsEnd() {
+    while (server_->Load().open_stream_count > 0) std::this_thread::yield();
+    return true;
+  }
+
+  test::TempFolder folder_;
+  std::atomic<int> message_count_{0};
+  std::unique_ptr<Server> server_;
+  std::shared_ptr<grpc::Channel> channel_;
+};
+
+TEST_F(SilentReader, HoldsNoWorkerAndFewMessages) {
+  constexpr int kReaderCount = 12;
+  Start();
+  std::vector<std::unique_ptr<MeshReader>> readers;
+  for (int i = 0; i < kReaderCount; ++i) {
+    readers.push_back(std::make_unique<MeshReader>(server_->address()));
+    ASSERT_TRUE(readers.back()->Read());
+  }
+  ASSERT_TRUE(ComesToRest());
+  const ServerLoad load = server_->Load();
+  EXPECT_EQ(load.running_count, 0);
+  EXPECT_EQ(load.queued_count, 0);
+  EXPECT_EQ(load.open_stream_count, kReaderCount);
+  // What gRPC and the kernel take unread, of a stream of some sixty messages.
+  EXPECT_LT(message_count_, 16 * kReaderCount);
+  readers.clear();
+  EXPECT_TRUE(AllStreamsEnd());
+}
+
+TEST_F(SilentReader, IsGivenUpWithAReasonLongBeforeItsDeadline) {
+  Start(milliseconds(200));
+  MeshReader reader(server_->address());
+  ASSERT_TRUE(reader.Read());
+  ASSERT_TRUE(AllStreamsEnd());
+  const grpc::Status status = reader.Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED) << status.error_message();
+  EXPECT_NE(status.error_message().find("took no message"), std::string::npos)
+      << status.error_message();
+}
+
+TEST_F(SilentReader, IsGivenUpThoughOthersRead) {
+  Start(milliseconds(500));
+  MeshReader silent(server_->address());
+  ASSERT_TRUE(silent.Read());
+  int whole_count = 0;
+  while (server_->Load().open_stream_count > 0) {
+    MeshReader eager(server_->address());
+    while (eager.Read()) {
+    }
+    ASSERT_TRUE(eager.Finish().ok());
+    ++whole_count;
+  }
+  EXPECT_GE(whole_count, 1);
+}
+
+}  // namespace
+}  // namespace dsg::server
