@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "schema/base/time.h"
 #include "schema/model/geometry.h"
 #include "schema/model/mesh.h"
 #include "schema/model/node.h"
@@ -40,6 +41,11 @@ struct ObjectCluster {
   Pose3d map_T_box;
   Eigen::Vector3d size = Eigen::Vector3d::Zero();
   Color color{};
+  /// First and last picture of a thing that was found in pictures; kTimeMax, kTimeMin otherwise.
+  TimeNs first_seen_ns = kTimeMax;
+  TimeNs last_seen_ns = kTimeMin;
+  /// In how many pictures; 0 otherwise.
+  int64_t seen_count = 0;
 };
 
 /// Vertices without faces will do. Blocks whose labels have a wrong length are ignored; options

@@ -22,7 +22,12 @@ void ObjectTracker::Refresh(size_t object, ObjectCluster cluster, TimeNs time_ns
   TrackedObject& known = objects_[object];
   uint64_t& digest = digests_[known.id];
   const uint64_t new_digest = DigestOf(cluster);
-  if (digest != new_digest) known.last_observed_ns = time_ns;
+  if (cluster.last_seen_ns != kTimeMin) {
+    known.last_observed_ns = std::max(known.last_observed_ns, cluster.last_seen_ns);
+    known.observation_count = std::max(known.observation_count, cluster.seen_count);
+  } else if (digest != new_digest) {
+    known.last_observed_ns = time_ns;
+  }
   digest = new_digest;
   if (!IsChanged(known.cluster, cluster)) return;
   known.cluster = std::move(cluster);
@@ -46,9 +51,10 @@ ObjectTracker::Assignment ObjectTracker::Assign(std::vector<ObjectCluster> clust
     TrackedObject added;
     added.id = next_id_++;
     added.cluster = clusters[i];
-    added.first_observed_ns = time_ns;
-    added.last_observed_ns = time_ns;
-    added.observation_count = 1;
+    added.first_observed_ns = std::min(time_ns, added.cluster.first_seen_ns);
+    added.last_observed_ns = std::max(added.first_observed_ns, added.cluster.last_seen_ns);
+    if (added.cluster.last_seen_ns == kTimeMin) added.last_observed_ns = time_ns;
+    added.observation_count = std::max<int64_t>(1, added.cluster.seen_count);
     digests_[added.id] = DigestOf(added.cluster);
     changes->added.push_back(added.id);
     result.id_of.push_back(added.id);

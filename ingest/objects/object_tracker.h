@@ -18,10 +18,11 @@ struct TrackedObject {
   /// Never given twice in a run.
   int64_t id = -1;
   ObjectCluster cluster;
+  /// Of the first update that had it, or of its first picture.
   TimeNs first_observed_ns = 0;
-  /// Of the last update that brought other points.
+  /// Of the last update that brought other points, or of its last picture.
   TimeNs last_observed_ns = 0;
-  /// Updates in which it changed.
+  /// Updates in which it changed, or pictures that showed it.
   int64_t observation_count = 0;
 };
 

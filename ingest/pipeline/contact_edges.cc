@@ -89,7 +89,12 @@ void AddEdges(const std::vector<Contact>& contacts, bool is_hand, std::vector<Ed
 std::vector<Edge> FindContactEdges(const PersonTracker& tracker, const PeopleTold& told,
                                    const std::vector<ThingBox>& things,
                                    const ContactOptions& options) {
-  const std::vector<AgentPath> paths = PathsOf(tracker, told);
+  return FindContactEdges(PathsOf(tracker, told), things, options);
+}
+
+std::vector<Edge> FindContactEdges(const std::vector<AgentPath>& paths,
+                                   const std::vector<ThingBox>& things,
+                                   const ContactOptions& options) {
   std::vector<Edge> edges;
   AddEdges(FindEncounters(paths, options), /*is_hand=*/false, &edges);
   AddEdges(FindReaches(paths, things, options), /*is_hand=*/true, &edges);

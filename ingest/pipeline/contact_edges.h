@@ -20,4 +20,9 @@ std::vector<Edge> FindContactEdges(const PersonTracker& tracker, const PeopleTol
                                    const std::vector<ThingBox>& things,
                                    const ContactOptions& options);
 
+/// The same of paths, whoever made them.
+std::vector<Edge> FindContactEdges(const std::vector<AgentPath>& paths,
+                                   const std::vector<ThingBox>& things,
+                                   const ContactOptions& options);
+
 }  // namespace dsg::ingest

@@ -76,6 +76,8 @@ class LogMapper {
   const LayerGraph& graph() const { return graph_; }
   std::vector<const MeshBlock*> Mesh() const { return layers_.Mesh(); }
   RegionIndex::Sight Sight() const { return layers_.Sight(); }
+  /// Small things that were seen on their way in somebody's hand.
+  std::vector<Carry> Carries() const { return layers_.Carries(); }
 
   MappingSummary Summary();
 

@@ -9,6 +9,7 @@
 #include "ingest/pipeline/correction.h"
 #include "ingest/pipeline/graph_agents.h"
 #include "ingest/pipeline/graph_boxes.h"
+#include "ingest/pipeline/held_edges.h"
 #include "schema/base/status.h"
 #include "schema/model/delta_check.h"
 
@@ -289,8 +290,26 @@ absl::Status LogRun::PutContacts() {
   GraphDelta delta;
   delta.edges =
       FindContactEdges(people_->tracker(), people_told_, things, options_.people.contacts);
+  const std::vector<Edge> held = HeldEdges();
+  delta.edges.insert(delta.edges.end(), held.begin(), held.end());
   Coalesce(&delta);
   return sink_.PutAsIs(std::move(delta));
+}
+
+// Nobody is asked for their hands: what they carried was seen.
+std::vector<Edge> LogRun::HeldEdges() const {
+  if (mapper_ == nullptr) return {};
+  std::vector<Node> objects = corrected_.has_value() ? corrected_->nodes : mapper_->graph().nodes;
+  std::erase_if(objects, [](const Node& node) { return node.kind != kinds::kObject; });
+  std::vector<AgentPath> paths;
+  for (const auto& [number, person] : people_told_.people()) {
+    AgentPath& path = paths.emplace_back();
+    path.agent = person.id;
+    for (const TimedPose& pose : person.poses) {
+      path.torso.push_back({pose.time_ns, pose.map_T_agent.position});
+    }
+  }
+  return FindHeldEdges(paths, mapper_->Carries(), objects);
 }
 
 // As they are: these stays come later than their poses, so what the map holds of the poses tells

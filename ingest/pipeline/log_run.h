@@ -80,6 +80,7 @@ class LogRun {
   absl::Status PutRobotGraph();
   GraphDelta Correct(const RobotGraph::Solution& solution);
   absl::Status PutContacts();
+  std::vector<Edge> HeldEdges() const;
   absl::Status PutStays(std::vector<Stay> stays);
   void AwaitSightings();
   void ReplayWaiting();

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <set>
 
+#include "ingest/objects/object_matching.h"
 #include "ingest/pipeline/map_things.h"
 #include "ingest/rooms/room_class.h"
 #include "ingest/rooms/structure_rooms.h"
@@ -37,6 +38,7 @@ StaticLayers::StaticLayers(const MappingOptions& options, std::vector<SemanticLa
       fitter_(options_.catalogue, options.shapes),
       maker_(numbering, NamesOf(labels_), options_.catalogue),
       volume_(options.volume),
+      object_classes_(ObjectClasses(labels_, classes_, options_.depth.dynamic_classes)),
       is_asset_told_(options_.catalogue.size(), false) {}
 
 absl::Status StaticLayers::Integrate(const DepthFrame& frame) {
@@ -45,7 +47,13 @@ absl::Status StaticLayers::Integrate(const DepthFrame& frame) {
     const absl::Status status = volume_.Integrate(frame);
     if (!status.ok()) return status;
   }
-  object_watch_.Watch(frame);
+  {
+    const StageClock::Span span(&clock_, "small");
+    std::vector<SmallSighting> sightings = FindSmallSightings(frame, object_classes_);
+    carried_things_.See(sightings, frame.time_ns);
+    small_objects_.See(frame, std::move(sightings));
+    object_watch_.Watch(frame);
+  }
   const Eigen::Vector3d& camera_map = frame.map_T_camera.position;
   if (path_map_.empty() || (camera_map - path_map_.back()).norm() > kPathStepM) {
     path_map_.push_back(camera_map);
@@ -141,6 +149,13 @@ std::function<bool(const Eigen::Vector3d&, const Eigen::Vector3d&)> StaticLayers
   };
 }
 
+std::vector<Carry> StaticLayers::Carries() const {
+  std::vector<Carry> carries = carried_things_.Carries();
+  std::erase_if(
+      carries, [this](const Carry& carry) { return !small_objects_.IsSmallClass(carry.class_id); });
+  return carries;
+}
+
 void StaticLayers::NoteCost(int64_t cell_count) {
   size_t vertex_count = 0;
   for (const auto& [index, block] : mesh_) vertex_count += block.positions_map.size();
@@ -154,7 +169,7 @@ void StaticLayers::FindObjects(TimeNs now_ns, const std::vector<const MeshBlock*
   const StageClock::Span span(&clock_, "objects");
   ClusterOptions options;
   options.voxel_m = options_.volume.voxel_m;
-  options.class_ids = ObjectClasses(labels_, classes_, options_.depth.dynamic_classes);
+  options.class_ids = object_classes_;
   std::vector<ObjectCluster> clusters;
   if (labels_.empty()) {
     const std::vector<MeshBlock> things = UnlabelledThings(mesh, structures, options.voxel_m);
@@ -163,6 +178,7 @@ void StaticLayers::FindObjects(TimeNs now_ns, const std::vector<const MeshBlock*
     clusters = FindClusters(mesh, options);
   }
   KeepVacated();
+  small_objects_.Place(&clusters);
   object_watch_.DropResidues(&clusters);
   const std::vector<TrackedObject> before = object_tracker_.objects();
   const ObjectChanges changes =
@@ -185,6 +201,8 @@ void StaticLayers::KeepVacated() {
       return one.id == vacated.id;
     });
     if (object == objects.end()) continue;
+    small_objects_.Forget(object->cluster.class_id, AxisAlignedBox(object->cluster),
+                          vacated.first_absent_ns);
     GoneObject gone{*object, std::nullopt, vacated.first_absent_ns};
     gone.object.last_observed_ns = std::max(vacated.last_present_ns, object->first_observed_ns);
     gone.gone_ns = std::max(gone.gone_ns, gone.object.last_observed_ns + 1);

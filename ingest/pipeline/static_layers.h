@@ -13,10 +13,12 @@
 
 #include "absl/status/statusor.h"
 #include "ingest/grid/distance_field.h"
+#include "ingest/objects/carried_things.h"
 #include "ingest/objects/object_tracker.h"
 #include "ingest/objects/object_watch.h"
 #include "ingest/objects/relations.h"
 #include "ingest/objects/shapes/shape_fit.h"
+#include "ingest/objects/small_objects.h"
 #include "ingest/pipeline/graph_told.h"
 #include "ingest/pipeline/layer_graph.h"
 #include "ingest/pipeline/mapping_options.h"
@@ -65,6 +67,9 @@ class StaticLayers {
   std::function<bool(const Eigen::Vector3d& point_map, const Eigen::Vector3d& place_map)> Sight()
       const;
 
+  /// Small things that were seen on their way in somebody's hand, by class of objects.
+  std::vector<Carry> Carries() const;
+
   const NodeNumbering& numbering() const { return maker_.numbering(); }
   VolumeCounts counts() const { return volume_.counts(); }
   StageClock& clock() { return clock_; }
@@ -95,6 +100,10 @@ class StaticLayers {
   std::map<BlockIndex, MeshBlock> mesh_;
   std::vector<Eigen::Vector3d> path_map_;
   ObjectTracker object_tracker_;
+  /// Ascending.
+  std::vector<int32_t> object_classes_;
+  SmallObjects small_objects_;
+  CarriedThings carried_things_;
   ObjectWatch object_watch_;
   CoVisibility together_;
   /// By object.
