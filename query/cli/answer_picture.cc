@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
+#include "query/cli/export/floor_choice.h"
 #include "query/cli/export/outline.h"
 #include "query/cli/export/output_file.h"
 #include "query/cli/export/top_view.h"
@@ -24,13 +25,20 @@ absl::Status WritePicture(Session* session, const PictureOptions& options,
                           const AnswerPicture& picture, std::ostream& out) {
   if (options.png.empty()) return absl::OkStatus();
   DSG_ASSIGN_OR_RETURN(
-      const ContentAnswer answer,
+      ContentAnswer answer,
       ReadContent(*session, &session->api(),
                   {.at_ns = picture.at_ns, .with_agents = false, .revision = picture.revision}));
-  const std::string title =
-      absl::StrCat(answer.content.spec.name, "  revision ", picture.revision, "  ", picture.title);
-  const picture::Picture drawn = DrawTopView(
-      answer.content, {.width_px = options.width_px, .title = title, .overlay = picture.overlay});
+  TopViewOptions top{.width_px = options.width_px,
+                     .title = absl::StrCat(answer.content.spec.name, "  revision ",
+                                           picture.revision, "  ", picture.title),
+                     .overlay = picture.overlay};
+  if (!options.floor.empty()) {
+    DSG_ASSIGN_OR_RETURN(const HeightRange floor, ChooseFloor(answer.content, options.floor));
+    KeepFloor(floor, &answer.content);
+    KeepFloor(floor, &top.overlay);
+    absl::StrAppend(&top.title, "  floor ", options.floor);
+  }
+  const picture::Picture drawn = DrawTopView(answer.content, top);
   DSG_ASSIGN_OR_RETURN(const std::string png, picture::EncodePng(drawn));
   DSG_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(options.png, options.force));
   DSG_RETURN_IF_ERROR(file.Write(png));
@@ -85,7 +93,10 @@ void MarkNode(const v1::Node& node, uint32_t rgb, const std::string& label, Over
                    .radius_px = 10.0,
                    .label = label};
   Polygon2d outline = OutlineOf(node);
-  if (outline.size() >= 3) overlay->outlines.push_back({std::move(outline), rgb});
+  const double height_m = mark.position_map.z();
+  if (outline.size() >= 3) overlay->outlines.push_back({std::move(outline), rgb, height_m});
+  const absl::StatusOr<NodeId> id = ParseNodeId(node.id());
+  if (id.ok() && !label.empty()) overlay->named.insert(*id);
   overlay->marks.push_back(std::move(mark));
 }
 

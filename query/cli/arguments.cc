@@ -20,7 +20,8 @@ absl::Status SettlePlace(const Environment& environment, CommonOptions* common) 
   }
   if (!common->store.empty() && !common->server.empty()) {
     return Usage(absl::StrCat("both a store (", common->store, ") and a server (", common->server,
-                              ") are given; name one with --store or --server"));
+                              ") are given; name one with --store or --server"),
+                 "");
   }
   if (common->map.empty()) common->map = environment.map;
   return absl::OkStatus();
@@ -32,27 +33,31 @@ absl::Status CheckPlace(const Command& command) {
   const bool is_import = std::holds_alternative<ImportVerb>(command.verb);
   const bool needs_store = is_import || std::holds_alternative<VerifyVerb>(command.verb);
   if (needs_store && common.store.empty()) {
-    return Usage(is_import ? "import writes to a store folder: give --store DIR (for a server: "
-                             "dsg-ingest --server ADDR)"
-                           : "verify reads a store folder: give --store DIR");
+    return is_import ? Usage(
+                           "import writes to a store folder: give --store DIR (for a server: "
+                           "dsg-ingest --server ADDR)",
+                           "import")
+                     : Usage("verify reads a store folder: give --store DIR", "verify");
   }
-  if (is_import && common.map.empty()) return Usage("name the map to import into with --map NAME");
+  if (is_import && common.map.empty())
+    return Usage("name the map to import into with --map NAME", "import");
   if (common.store.empty() && common.server.empty()) {
     return Usage(
         "say where the maps are: --store DIR or --server ADDR (or set DSG_STORE or "
-        "DSG_SERVER)");
+        "DSG_SERVER)",
+        "");
   }
   return absl::OkStatus();
 }
 
 absl::Status Check(const WhoVerb& verb) {
   if (!verb.room.empty() || !verb.box.empty()) return absl::OkStatus();
-  return Usage("who asks about one place: give --room ID or --box X0,Y0,Z0,X1,Y1,Z1");
+  return Usage("who asks about one place: give --room ID or --box X0,Y0,Z0,X1,Y1,Z1", "who");
 }
 
 absl::Status Check(const ExportVerb& verb) {
   if (!verb.ply.empty() || !verb.graph_ply.empty() || !verb.gltf.empty()) return absl::OkStatus();
-  return Usage("export writes files: give --ply FILE, --graph-ply FILE or --gltf FILE");
+  return Usage("export writes files: give --ply FILE, --graph-ply FILE or --gltf FILE", "export");
 }
 
 absl::Status Check(const CollideVerb& verb) {
@@ -61,7 +66,8 @@ absl::Status Check(const CollideVerb& verb) {
   if (std::count(std::begin(given), std::end(given), true) == 1) return absl::OkStatus();
   return Usage(
       "collide asks about one body: give one of --sphere RADIUS, --box X,Y,Z, --capsule "
-      "RADIUS,LENGTH, --mesh FILE.ply");
+      "RADIUS,LENGTH, --mesh FILE.ply",
+      "collide");
 }
 
 // The other verbs are complete if the grammar let them through.

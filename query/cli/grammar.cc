@@ -4,12 +4,15 @@
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "query/cli/export/top_view.h"
+#include "query/cli/number_checks.h"
 
 namespace dsg::cli {
 
-absl::Status Usage(const std::string& message) {
-  return absl::InvalidArgumentError(absl::StrCat(message, "; see dsg --help"));
+absl::Status Usage(const std::string& message, const std::string& verb) {
+  return absl::InvalidArgumentError(
+      absl::StrCat(message, "; see dsg ", verb, verb.empty() ? "" : " ", "--help"));
 }
 
 Grammar::Grammar() {
@@ -20,35 +23,37 @@ Grammar::Grammar() {
 
 CLI::App* Grammar::AddApp(const std::string& name, const std::string& what, unsigned takes) {
   CLI::App* app = app_.add_subcommand(name, what);
-  app->footer(kTimeHelp);
+  app->footer(ExampleOf(name) + kTimeHelp);
   CommonOptions& common = command_.common;
   app->add_option("--store", common.store, "Folder of the store (or DSG_STORE)");
   if (takes & kServer) {
     app->add_option("--server", common.server,
                     "unix:PATH or HOST:PORT of a dsg-server (or DSG_SERVER)");
     app->add_option("--timeout", common.timeout_s, "Bound on each call, seconds")
-        ->check(CLI::Range(0.001, 86400.0));
+        ->check(Between(0.001, 86400.0));
   }
   if (takes & kMap) {
     app->add_option("--map", common.map, "Name of the map (or DSG_MAP); may be left out if alone");
   }
   if (takes & kRevision) {
     app->add_option("--revision", common.revision, "As believed at this revision; default newest")
-        ->check(CLI::NonNegativeNumber);
+        ->check(WholeZeroOrMore());
   }
   if (takes & kJson) app->add_flag("--json", common.json, "Print the reply as protobuf JSON");
   if (takes & kLimit) {
-    app->add_option("--limit", common.limit, "List at most this many")->check(CLI::PositiveNumber);
+    app->add_option("--limit", common.limit, "List at most this many")->check(WholeAboveZero());
   }
   return app;
 }
 
 absl::Status Grammar::Parse(std::vector<std::string> arguments) {
   // CLI11 would only say that a subcommand is missing.
-  const auto is_first = [&](const CLI::App* verb) { return verb->check_name(arguments[0]); };
-  if (!arguments.empty() && arguments[0].substr(0, 1) != "-" &&
-      app_.get_subcommands(is_first).empty()) {
-    return Usage(absl::StrCat("there is no verb \"", arguments[0], "\""));
+  if (arguments.empty()) return Usage("say what is wanted: where, who, find, path, ...", "");
+  const std::string first = arguments[0];
+  const auto is_first = [&](const CLI::App* verb) { return verb->check_name(first); };
+  const bool is_verb = !app_.get_subcommands(is_first).empty();
+  if (!is_verb && first != "-h" && first != "--help") {
+    return Usage(absl::StrCat("there is no verb \"", first, "\""), "");
   }
   // CLI11 takes them last first.
   std::reverse(arguments.begin(), arguments.end());
@@ -57,8 +62,11 @@ absl::Status Grammar::Parse(std::vector<std::string> arguments) {
   } catch (const CLI::CallForHelp&) {
     // Help of the verb that was named, if one was.
     command_.verb = HelpVerb{app_.help()};
+  } catch (const CLI::ExtrasError&) {
+    return Usage(absl::StrCat("not understood: ", absl::StrJoin(app_.remaining(true), " ")),
+                 is_verb ? first : "");
   } catch (const CLI::ParseError& error) {
-    return Usage(error.what());
+    return Usage(error.what(), is_verb ? first : "");
   }
   return absl::OkStatus();
 }
@@ -72,8 +80,9 @@ void AddFilter(CLI::App* app, FilterOptions* filter) {
 
 void AddPicture(CLI::App* app, const std::string& what, PictureOptions* picture) {
   CLI::Option* png = app->add_option("--png", picture->png, "Also draw " + what + " on the map");
+  app->add_option("--floor", picture->floor, kFloorHelp)->needs(png);
   app->add_option("--width", picture->width_px, "Pixels of the picture; the height follows")
-      ->check(CLI::Range(kTopViewWidthMin, kTopViewWidthMax))
+      ->check(Between(kTopViewWidthMin, kTopViewWidthMax))
       ->capture_default_str()
       ->needs(png);
   app->add_flag("--force", picture->force, "Replace a picture that is there")->needs(png);

@@ -28,8 +28,11 @@ inline constexpr char kTimeHelp[] =
     "TIME is +12.5s from the map's epoch, RFC 3339, or nanoseconds.\n"
     "Exit codes: 0 found, 1 not found, 2 usage, 3 unavailable, 4 data loss.";
 
-/// INVALID_ARGUMENT that says where help is.
-absl::Status Usage(const std::string& message);
+/// INVALID_ARGUMENT that says where help is; `verb` may be empty.
+absl::Status Usage(const std::string& message, const std::string& verb);
+
+/// A command line of the verb to begin with, on its own line.
+std::string ExampleOf(const std::string& verb);
 
 class Grammar {
  public:
@@ -56,6 +59,9 @@ class Grammar {
   CLI::App app_{"Asks a store of dynamic scene graphs, or a server, where and when."};
   Command command_;
 };
+
+inline constexpr char kFloorHelp[] =
+    "Draw only this floor: a level or room by id or name, or a height in metres";
 
 // Options that several verbs have.
 void AddFilter(CLI::App* app, FilterOptions* filter);

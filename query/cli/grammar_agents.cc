@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The grammar of the verbs about agents: where, track, shape, who; met, picked, predict.
 #include "query/cli/grammar.h"
+#include "query/cli/number_checks.h"
 
 namespace dsg::cli {
 namespace {
@@ -34,7 +35,8 @@ void AddWho(Grammar* grammar) {
   const auto [app, verb] =
       grammar->Add<WhoVerb>("who", "Who was in a room or a box, and when", kQuestion | kLimit);
   CLI::Option* room =
-      app->add_option("--room", verb->room, "Room, place or region, by id (R2) or name");
+      app->add_option("--room", verb->room,
+                      "Room, place or region, by id (R2) or name; or the only room of a class");
   CLI::Option* box =
       app->add_option("--box", verb->box, "X0,Y0,Z0,X1,Y1,Z1 in the map frame, metres");
   room->excludes(box);
@@ -49,10 +51,13 @@ void AddMet(Grammar* grammar) {
   app->add_option("OTHER", verb->other_agent, "Only with this one");
   app->add_option("--from", verb->from, "First TIME; default the first pose of the map");
   app->add_option("--to", verb->to, "TIME to stop before; default with the last pose");
-  app->add_option("--within", verb->within_m, "Metres between them; default 2")
-      ->check(CLI::PositiveNumber);
+  app->add_option("--within", verb->within_m, "Metres between them; default 2")->check(AboveZero());
   app->add_option("--for", verb->for_at_least, "Leave out what was shorter: 2s, 500ms");
-  app->add_flag("--line-of-sight", verb->line_of_sight, "Only while no wall stood between them");
+  CLI::Option* sight = app->add_flag("--line-of-sight", verb->line_of_sight,
+                                     "Only while no wall stood between them");
+  app->add_option("--sight-gap", verb->sight_gap,
+                  "Out of sight for no longer than this is the same meeting; default 2s")
+      ->needs(sight);
   AddPicture(app, "where they met", &verb->picture);
 }
 
@@ -85,7 +90,7 @@ void AddPredict(Grammar* grammar) {
          "goals: along the places; cv: constant velocity; weighted: mean of the last steps")
       ->check(CLI::IsMember({"goals", "cv", "weighted"}));
   app->add_option("--paths", verb->path_count, "At most so many ways; default 6")
-      ->check(CLI::Range(1, 20));
+      ->check(Between(1, 20));
   app->add_flag("--stop-at-walls", verb->stop_at_walls, "Cut straight predictions at walls");
   AddPicture(app, "the ways", &verb->picture);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The grammar of the verbs about nodes and edges: ls, edges, show, near; find, around, subgraph.
 #include "query/cli/grammar.h"
+#include "query/cli/number_checks.h"
 
 namespace dsg::cli {
 namespace {
@@ -9,9 +10,9 @@ void AddNear(Grammar* grammar) {
   const auto [app, verb] =
       grammar->Add<NearVerb>("near", "The nodes nearest to a point", kQuestion);
   app->add_option("POSITION", verb->position, "X,Y,Z in the map frame, metres")->required();
-  app->add_option("-k,--k", verb->k, "How many")->check(CLI::Range(1, 1000))->capture_default_str();
+  app->add_option("-k,--k", verb->k, "How many")->check(Between(1, 1000))->capture_default_str();
   app->add_option("--max-distance", verb->max_distance_m, "No further than this, metres")
-      ->check(CLI::PositiveNumber);
+      ->check(AboveZero());
   AddFilter(app, &verb->filter);
 }
 
@@ -24,12 +25,12 @@ void AddFind(Grammar* grammar) {
   CLI::Option* near =
       app->add_option("--near", verb->near, "Nearest first from X,Y,Z in the map frame, metres");
   app->add_option("--max-distance", verb->max_distance_m, "No further from there than this, metres")
-      ->check(CLI::PositiveNumber)
+      ->check(AboveZero())
       ->needs(near);
   app->add_option("--box", verb->box, "Only nodes that touch X0,Y0,Z0,X1,Y1,Z1, metres");
   app->add_option("--at", verb->at, "What held at this TIME; default now or before");
   app->add_option("-k,--limit", grammar->common()->limit, "List at most this many")
-      ->check(CLI::PositiveNumber);
+      ->check(WholeAboveZero());
   app->add_flag("--explain", verb->explain, "Also show how the answer was found");
   AddPicture(app, "what was found", &verb->picture);
 }
@@ -54,7 +55,7 @@ void AddSubgraph(Grammar* grammar) {
       ->allow_extra_args(false);
   app->add_flag("--both", verb->both_directions, "Also against the direction of edges");
   app->add_option("--depth", verb->depth, "No more edges than this from the node")
-      ->check(CLI::PositiveNumber);
+      ->check(WholeAboveZero());
   app->add_flag("--tree", verb->tree_only, "Only the edges that were followed");
   AddFilter(app, &verb->filter);
 }

@@ -2,6 +2,7 @@
 // The grammar of the verbs about maps as a whole, their revisions and their files.
 #include "query/cli/export/top_view.h"
 #include "query/cli/grammar.h"
+#include "query/cli/number_checks.h"
 
 namespace dsg::cli {
 namespace {
@@ -22,10 +23,9 @@ void AddExport(Grammar* grammar) {
 void AddMap(Grammar* grammar) {
   const auto [app, verb] = grammar->Add<MapVerb>("map", "Draw a map from above", kQuestion);
   app->add_option("--png", verb->png, "The picture to write")->required();
-  app->add_option("--floor", verb->floor,
-                  "Only this floor: a level or room by id or name, or a height in metres");
+  app->add_option("--floor", verb->floor, kFloorHelp);
   app->add_option("--width", verb->width_px, "Pixels; the height follows")
-      ->check(CLI::Range(kTopViewWidthMin, kTopViewWidthMax))
+      ->check(Between(kTopViewWidthMin, kTopViewWidthMax))
       ->capture_default_str();
   app->add_option("--at", verb->at, "The world at this TIME; default what has not ended");
   app->add_flag("--force", verb->force, "Replace a file that is there");
@@ -48,19 +48,19 @@ void AddRevisionVerbs(Grammar* grammar) {
       grammar->Add<DiffVerb>("diff", "What differs between two revisions", kTakes | kLimit);
   diff_app->add_option("FROM", diff->from_revision, "Revision before")
       ->required()
-      ->check(CLI::NonNegativeNumber);
+      ->check(WholeZeroOrMore());
   diff_app->add_option("TO", diff->to_revision, "Revision after; default the newest")
-      ->check(CLI::NonNegativeNumber);
+      ->check(WholeZeroOrMore());
   diff_app->add_option("--layer", diff->layer, "Only nodes of this layer, and their edges");
 
   const auto [watch_app, watch] =
       grammar->Add<WatchVerb>("watch", "Revisions as they come, until Ctrl-C", kTakes);
   watch_app
       ->add_option("--after", watch->after, "The last revision that is known; default the newest")
-      ->check(CLI::NonNegativeNumber);
+      ->check(WholeZeroOrMore());
   watch_app->add_flag("--changes", watch->changes, "Also say what changed");
   watch_app->add_option("-n,--count", watch->count, "End after so many revisions")
-      ->check(CLI::PositiveNumber);
+      ->check(WholeAboveZero());
 }
 
 void AddFileVerbs(Grammar* grammar) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The grammar of the verbs about ways and obstacles: path, collide.
 #include "query/cli/grammar.h"
+#include "query/cli/number_checks.h"
 
 namespace dsg::cli {
 namespace {
@@ -11,14 +12,16 @@ void AddPath(Grammar* grammar) {
   app->add_option("FROM", verb->from, kEnd)->required();
   app->add_option("TO", verb->to, kEnd)->required();
   app->add_option("--radius", verb->radius_m, "Of the robot, metres; default a point")
-      ->check(CLI::PositiveNumber);
+      ->check(AboveZero());
   app->add_option("--avoid", verb->blocked,
                   "Not over this place, or through this room; may be "
                   "given again")
       ->allow_extra_args(false);
   app->add_flag("--flat", verb->flat, "Over all places at once, instead of rooms first");
   app->add_option("--at", verb->at, "The world at this TIME; default now");
-  app->add_flag("--check", verb->check, "Sweep the robot along the way and say what it touches");
+  app->add_flag("--check", verb->check,
+                "Sweep the robot along the way and say what it touches: things, walls, and the\n"
+                "other agents where they were at --at (default: at their last poses)");
   AddPicture(app, "the way", &verb->picture);
 }
 
@@ -39,7 +42,7 @@ void AddSpaceVerbs(Grammar* grammar) {
   AddPath(grammar);
   const auto [app, verb] =
       grammar->Add<CollideVerb>("collide", "What a body touches, or how far all is", kQuestion);
-  app->add_option("--sphere", verb->sphere_radius_m, "Radius, metres")->check(CLI::PositiveNumber);
+  app->add_option("--sphere", verb->sphere_radius_m, "Radius, metres")->check(AboveZero());
   app->add_option("--box", verb->box, "X,Y,Z: edge lengths, metres");
   app->add_option("--capsule", verb->capsule,
                   "RADIUS,LENGTH along z, between the centres of its ends, metres");
@@ -49,12 +52,13 @@ void AddSpaceVerbs(Grammar* grammar) {
       ->required();
   app->add_option("--at", verb->at, "The world at this TIME; default now");
   app->add_option("--margin", verb->margin_m, "Closer than this is a hit, metres")
-      ->check(CLI::NonNegativeNumber);
+      ->check(ZeroOrMore());
   app->add_option("--reach", verb->clearance_max_m, "Look no further than this, metres; default 2")
-      ->check(CLI::PositiveNumber);
+      ->check(AboveZero());
   AddScope(app, verb);
   AddPicture(app, "body and obstacle", &verb->picture);
   app->footer(
+      ExampleOf("collide") +
       "Against everything but predicted agents unless --objects and the like say otherwise.\n"
       "Exit codes: 0 the body touches something, 1 it is free, 2 usage, 3 unavailable, 4 data "
       "loss.");

@@ -13,10 +13,14 @@
 namespace dsg::cli {
 namespace {
 
-// Rooms of this name; the id of the only one, or "" if there is none.
-absl::StatusOr<std::string> RoomByName(Session* session, const std::string& name) {
+// Rooms of this name or of this class; the id of the only one, or "" if there is none.
+absl::StatusOr<std::string> OnlyRoom(Session* session, const std::string& word, bool by_class) {
   auto request = session->Begin<v1::ListNodesRequest>();
-  request.mutable_filter()->set_name(name);
+  if (by_class) {
+    request.mutable_filter()->set_class_name(word);
+  } else {
+    request.mutable_filter()->set_name(word);
+  }
   request.mutable_filter()->set_kind(kinds::kRoom);
   request.set_view(v1::NODE_VIEW_BASIC);
   v1::ListNodesResponse reply;
@@ -27,8 +31,9 @@ absl::StatusOr<std::string> RoomByName(Session* session, const std::string& name
   for (const v1::Node& room : reply.nodes()) absl::StrAppend(&ids, " ", room.id());
   return MakeError(
       Reason::kFieldInvalid,
-      absl::StrCat("several rooms are called \"", name, "\"; name one by its id:", ids),
-      {{"field", "--room"}, {"value", name}});
+      absl::StrCat("--room: several rooms are ", by_class ? "of class \"" : "called \"", word,
+                   "\"; name one by its id:", ids),
+      {{"field", "--room"}, {"value", word}});
 }
 
 }  // namespace
@@ -68,10 +73,12 @@ absl::StatusOr<std::string> RegionId(Session* session, const std::string& id_or_
   const absl::Status found = session->api().GetNode(session->NewCall(), request, &reply);
   if (found.ok() && reply.node().id() == id_or_name) return id_or_name;
   if (!found.ok() && !absl::IsNotFound(found) && !absl::IsInvalidArgument(found)) return found;
-  DSG_ASSIGN_OR_RETURN(const std::string room_id, RoomByName(session, id_or_name));
-  if (!room_id.empty()) return room_id;
-  if (!found.ok()) return found;
-  return reply.node().id();
+  DSG_ASSIGN_OR_RETURN(const std::string named, OnlyRoom(session, id_or_name, false));
+  if (!named.empty()) return named;
+  if (found.ok()) return reply.node().id();
+  // Rooms that were made from images have a class and no name.
+  DSG_ASSIGN_OR_RETURN(const std::string room, OnlyRoom(session, id_or_name, true));
+  return room.empty() ? absl::StatusOr<std::string>(found) : room;
 }
 
 }  // namespace dsg::cli

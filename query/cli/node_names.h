@@ -30,9 +30,9 @@ class NodeNames {
 absl::StatusOr<NodeNames> NamesOf(Session* session, int64_t revision,
                                   const std::vector<std::string>& ids);
 
-/// The id of a room, place or region by id or name. A name may be shared by a room and the
-/// furniture in it; then the room is meant. Errors: NOT_FOUND/NODE_UNKNOWN; FIELD_INVALID if
-/// several rooms have the name.
+/// The id of a room, place or region by id or name, or of the only room of a class. A name may be
+/// shared by a room and the furniture in it; then the room is meant. Errors:
+/// NOT_FOUND/NODE_UNKNOWN; FIELD_INVALID if several rooms have the name, or the class.
 absl::StatusOr<std::string> RegionId(Session* session, const std::string& id_or_name);
 
 }  // namespace dsg::cli

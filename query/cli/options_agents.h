@@ -53,6 +53,8 @@ struct MetVerb {
   /// A duration; empty = however short.
   std::string for_at_least;
   bool line_of_sight = false;
+  /// A duration; empty = as the service has it.
+  std::string sight_gap;
   PictureOptions picture;
 };
 

@@ -9,6 +9,8 @@ namespace dsg::cli {
 struct PictureOptions {
   /// Empty = no picture.
   std::string png;
+  /// A level or room by id or name, or a height; empty = all floors.
+  std::string floor;
   int width_px = 1600;
   /// Replace a file that is there.
   bool force = false;

@@ -20,17 +20,19 @@ std::string HeldText(const v1::Edge& edge, const TimeText& times) {
 }
 
 // The room or whatever lies nearest above places, for people; the parent where there is none.
-std::string InText(const v1::SearchHit& hit, const NodeNames& names) {
+std::string WhereIn(const v1::SearchHit& hit) {
   for (const std::string& id : hit.ancestor_ids()) {
-    if (!id.empty() && id[0] == 'R') return names.Text(id);
+    if (!id.empty() && id[0] == 'R') return id;
   }
-  return hit.ancestor_ids().empty() ? "" : names.Text(hit.ancestor_ids(0));
+  return hit.ancestor_ids().empty() ? "" : hit.ancestor_ids(0);
 }
 
+// What satisfied the relations, but for what stands in the column before.
 std::string RelatedText(const v1::SearchHit& hit, const NodeNames& names) {
+  const std::string in = WhereIn(hit);
   std::vector<std::string> parts;
   for (const std::string& id : hit.related_ids()) {
-    if (!id.empty()) parts.push_back(names.Text(id));
+    if (!id.empty() && id != in) parts.push_back(names.Text(id));
   }
   return absl::StrJoin(parts, ", ");
 }
@@ -53,7 +55,7 @@ std::string RenderHits(const v1::SearchNodesResponse& reply, const NodeNames& na
                   [](const v1::SearchHit& hit) { return hit.has_distance_m(); });
   const bool has_related =
       std::any_of(reply.hits().begin(), reply.hits().end(),
-                  [](const v1::SearchHit& hit) { return hit.related_ids_size() > 0; });
+                  [&](const v1::SearchHit& hit) { return !RelatedText(hit, names).empty(); });
   std::vector<Column> columns = NodeColumns();
   if (has_distance) columns.insert(columns.begin(), {"distance m", Align::kRight});
   columns.push_back({"in"});
@@ -62,7 +64,7 @@ std::string RenderHits(const v1::SearchNodesResponse& reply, const NodeNames& na
   for (const v1::SearchHit& hit : reply.hits()) {
     std::vector<std::string> cells = NodeCells(hit.node());
     if (has_distance) cells.insert(cells.begin(), Fixed(hit.distance_m(), 3));
-    cells.push_back(InText(hit, names));
+    cells.push_back(names.Text(WhereIn(hit)));
     if (has_related) cells.push_back(RelatedText(hit, names));
     table.AddRow(std::move(cells));
   }

@@ -5,6 +5,7 @@
 #include <variant>
 
 #include "query/cli/exit_code.h"
+#include "query/cli/flag_names.h"
 #include "query/cli/session.h"
 #include "query/cli/verbs.h"
 #include "schema/base/status.h"
@@ -84,7 +85,7 @@ class Dispatcher {
   }
   absl::Status Ask(Session* session, const DiffVerb& verb) { return RunDiff(session, verb, out_); }
   absl::Status Ask(Session* session, const WatchVerb& verb) {
-    return RunWatch(session, verb, out_);
+    return RunWatch(session, verb, out_, errors_);
   }
   absl::Status Ask(Session* session, const ExportVerb& verb) {
     return RunExport(session, verb, out_);
@@ -116,7 +117,7 @@ int Run(const std::vector<std::string>& arguments, const Environment& environmen
         std::ostream& out, std::ostream& errors) {
   const absl::StatusOr<ExitCode> code = RunCommand(arguments, environment, out, errors);
   if (code.ok()) return *code;
-  errors << ErrorLine(code.status()) << std::flush;
+  errors << ErrorLine(InFlags(code.status())) << std::flush;
   return ExitCodeOf(code.status());
 }
 

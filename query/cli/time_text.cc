@@ -25,6 +25,16 @@ std::string TimeText::Full(TimeNs time_ns) const {
   return date.empty() ? Relative(time_ns) : absl::StrCat(Relative(time_ns), " (", date, ")");
 }
 
+std::string TimeText::Tenth(TimeNs time_ns) const {
+  constexpr TimeNs kTenth = kNsPerSecond / 10;
+  if (time_ns <= kTimeMin + kTenth || time_ns >= kTimeMax - kTenth) return Relative(time_ns);
+  // Of the time since the epoch, which need not be a whole tenth itself.
+  const TimeNs since = time_ns - epoch_ns_;
+  TimeNs rest = since % kTenth;
+  if (rest < 0) rest += kTenth;
+  return Relative(rest < kTenth / 2 ? time_ns - rest : time_ns - rest + kTenth);
+}
+
 std::string TimeText::Span(TimeNs from_ns, TimeNs to_ns) const {
   if (IsOpen(from_ns) && IsOpen(to_ns)) return "";
   return absl::StrCat(Full(from_ns), " to ", Full(to_ns));

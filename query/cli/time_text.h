@@ -23,6 +23,8 @@ class TimeText {
   std::string Date(TimeNs time_ns) const;
   /// "+12.5s (2014-06-25T16:58:44.9Z)", or as Relative where there are no dates.
   std::string Full(TimeNs time_ns) const;
+  /// As Relative, to the nearest tenth of a second: "+12.5s".
+  std::string Tenth(TimeNs time_ns) const;
   /// "+1s to +2.5s"; empty if both ends are open.
   std::string Span(TimeNs from_ns, TimeNs to_ns) const;
 

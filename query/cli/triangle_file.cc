@@ -247,7 +247,9 @@ absl::StatusOr<Triangles> ParseTriangles(const std::string& bytes, const std::st
 
 absl::StatusOr<Triangles> ReadTriangles(const std::string& path) {
   std::ifstream file(path, std::ios::binary | std::ios::ate);
-  if (!file) return absl::NotFoundError(absl::StrCat("--mesh ", path, ": cannot be read"));
+  if (!file)
+    return absl::NotFoundError(
+        absl::StrCat("--mesh ", path, ": cannot be read; check the path and its permissions"));
   if (file.tellg() > static_cast<std::streamoff>(kBytesMax)) {
     return Malformed(path, "is larger than 64 MiB");
   }

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // The verb collide: what a body touches, or how far away everything is.
+#include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/cli/answer_picture.h"
+#include "query/cli/export/outline.h"
 #include "query/cli/json.h"
 #include "query/cli/node_names.h"
 #include "query/cli/render_space.h"
@@ -83,9 +86,36 @@ absl::StatusOr<v1::CheckCollisionRequest> RequestFor(Session* session, const Col
   return request;
 }
 
+Polygon2d CircleAround(const Eigen::Vector3d& middle_map, double radius_m) {
+  constexpr int kCornerCount = 24;
+  Polygon2d circle;
+  for (int i = 0; i < kCornerCount; ++i) {
+    const double angle = 2.0 * M_PI * i / kCornerCount;
+    circle.push_back(middle_map.head<2>() +
+                     radius_m * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
+  }
+  return circle;
+}
+
+// The body at one of its poses, as large as it is. Nothing for meshes.
+std::vector<Polygon2d> OutlinesOf(const v1::CollisionBody& body, const Pose3d& map_T_body) {
+  if (body.has_sphere()) return {CircleAround(map_T_body.position, body.sphere().radius_m())};
+  if (body.has_capsule()) {
+    const Eigen::Vector3d half(0.0, 0.0, 0.5 * body.capsule().length_m());
+    return {CircleAround(map_T_body * -half, body.capsule().radius_m()),
+            CircleAround(map_T_body * half, body.capsule().radius_m())};
+  }
+  if (!body.has_cuboid()) return {};
+  Node node;
+  node.map_T_node = map_T_body;
+  const Eigen::Vector3d half = 0.5 * PointOf(body.cuboid().size());
+  node.box_node = Box3d(-half, half);
+  return {FloorOutline(node)};
+}
+
 AnswerPicture Draw(const v1::CheckCollisionRequest& request,
-                   const v1::CheckCollisionResponse& reply, bool is_hit) {
-  AnswerPicture picture{.title = is_hit ? "hit" : "free",
+                   const v1::CheckCollisionResponse& reply, const NodeNames& names, bool is_hit) {
+  AnswerPicture picture{.title = is_hit ? "the body hits" : "the body is free",
                         .revision = reply.header().read_revision()};
   if (request.has_at_ns()) picture.at_ns = request.at_ns();
   Overlay& overlay = picture.overlay;
@@ -93,15 +123,19 @@ AnswerPicture Draw(const v1::CheckCollisionRequest& request,
   for (const v1::Pose& pose : request.bodies(0).poses()) {
     way.points_map.push_back(PointOf(pose.position()));
     overlay.marks.push_back(
-        {.position_map = way.points_map.back(), .rgb = kBodyRgb, .radius_px = 9.0});
+        {.position_map = way.points_map.back(), .rgb = kBodyRgb, .radius_px = 6.0});
+    for (Polygon2d& outline : OutlinesOf(request.bodies(0), FromProto(pose))) {
+      overlay.outlines.push_back({std::move(outline), kBodyRgb, pose.position().z()});
+    }
   }
   overlay.lines.push_back(std::move(way));
   for (const v1::CollisionResult& result : reply.results()) {
     if (result.what().empty()) continue;
-    overlay.marks.push_back({.position_map = PointOf(result.point()),
-                             .rgb = result.hit() ? kHitRgb : kFreeRgb,
-                             .shape = OverlayMark::Shape::kCross,
-                             .label = absl::StrCat(result.what(), " ", result.node_id())});
+    overlay.marks.push_back(
+        {.position_map = PointOf(result.point()),
+         .rgb = result.hit() ? kHitRgb : kFreeRgb,
+         .shape = OverlayMark::Shape::kCross,
+         .label = result.node_id().empty() ? result.what() : names.Text(result.node_id())});
   }
   overlay.legend = {{"body", kBodyRgb},
                     {is_hit ? "touched" : "nearest", is_hit ? kHitRgb : kFreeRgb}};
@@ -118,16 +152,16 @@ absl::Status RunCollide(Session* session, const CollideVerb& verb, std::ostream&
   DSG_RETURN_IF_ERROR(session->api().CheckCollision(session->NewCall(), request, &reply));
   *is_hit = false;
   for (const v1::CollisionResult& result : reply.results()) *is_hit = *is_hit || result.hit();
+  std::vector<std::string> ids;
+  for (const v1::CollisionResult& result : reply.results()) ids.push_back(result.node_id());
+  DSG_ASSIGN_OR_RETURN(const NodeNames names,
+                       NamesOf(session, reply.header().read_revision(), ids));
   if (session->common().json) {
     DSG_RETURN_IF_ERROR(WriteJson(reply, out));
   } else {
-    std::vector<std::string> ids;
-    for (const v1::CollisionResult& result : reply.results()) ids.push_back(result.node_id());
-    DSG_ASSIGN_OR_RETURN(const NodeNames names,
-                         NamesOf(session, reply.header().read_revision(), ids));
     out << RenderCollisions(reply, names);
   }
-  return WritePicture(session, verb.picture, Draw(request, reply, *is_hit), out);
+  return WritePicture(session, verb.picture, Draw(request, reply, names, *is_hit), out);
 }
 
 }  // namespace dsg::cli

@@ -65,6 +65,12 @@ absl::Status ShowMistake(const absl::Status& status, const std::string& query) {
                    metadata);
 }
 
+std::string LabelOf(const v1::Node& node) {
+  if (!node.name().empty()) return node.name();
+  const std::string& class_name = node.semantic_class().name();
+  return class_name.empty() ? node.id() : absl::StrCat(class_name, " ", node.id());
+}
+
 AnswerPicture Draw(const v1::SearchNodesRequest& request, const v1::SearchNodesResponse& reply,
                    const FindVerb& verb) {
   AnswerPicture picture{
@@ -79,7 +85,7 @@ AnswerPicture Draw(const v1::SearchNodesRequest& request, const v1::SearchNodesR
   }
   for (const v1::SearchHit& hit : reply.hits()) {
     const v1::Node& node = hit.node();
-    MarkNode(node, kHitRgb, node.name().empty() ? node.id() : node.name(), &picture.overlay);
+    MarkNode(node, kHitRgb, LabelOf(node), &picture.overlay);
   }
   return picture;
 }

@@ -84,6 +84,10 @@ absl::StatusOr<v1::ListEncountersRequest> RequestFor(Session* session, const Met
     request.set_duration_ns_min(duration_ns);
   }
   request.set_line_of_sight(verb.line_of_sight);
+  if (!verb.sight_gap.empty()) {
+    DSG_ASSIGN_OR_RETURN(const TimeNs gap_ns, ParseDuration("--sight-gap", verb.sight_gap));
+    request.set_sight_gap_ns_max(gap_ns);
+  }
   return request;
 }
 

@@ -6,7 +6,9 @@
 #include <vector>
 
 #include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
 #include "absl/strings/strip.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/cli/answer_picture.h"
@@ -42,17 +44,23 @@ void FillPattern(absl::string_view words, v1::NodePattern* pattern) {
   pattern->set_class_name(std::string(words));
 }
 
+// Names may hold commas, but hardly numbers on either side of them.
+bool IsMeantAsPoint(const std::string& text) {
+  const std::vector<std::string> parts = absl::StrSplit(text, ',');
+  const auto is_number = [](const std::string& part) {
+    double number = 0.0;
+    return part.empty() || absl::SimpleAtod(part, &number);
+  };
+  return parts.size() > 1 && std::all_of(parts.begin(), parts.end(), is_number);
+}
+
 absl::Status FillEnd(const std::string& option, const std::string& text, v1::PathEnd* end) {
   absl::string_view rest = text;
   if (absl::ConsumePrefix(&rest, "nearest ")) {
     FillPattern(rest, end->mutable_nearest());
     return absl::OkStatus();
   }
-  // Names may hold commas, but hardly begin like a number as well.
-  const bool is_point = std::count(text.begin(), text.end(), ',') == 2 &&
-                        text.find_first_of("0123456789") <= 2 &&
-                        text.find_first_not_of("0123456789.,+-eE ") == std::string::npos;
-  if (!is_point) {
+  if (!IsMeantAsPoint(text)) {
     end->set_node(text);
     return absl::OkStatus();
   }

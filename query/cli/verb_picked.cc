@@ -8,6 +8,7 @@
 #include "query/cli/answer_picture.h"
 #include "query/cli/asked_interval.h"
 #include "query/cli/export/palette.h"
+#include "query/cli/filter.h"
 #include "query/cli/json.h"
 #include "query/cli/node_names.h"
 #include "query/cli/paging.h"
@@ -99,6 +100,9 @@ absl::Status RunPicked(Session* session, const PickedVerb& verb, std::ostream& o
         return session->api().ListInteractions(session->NewCall(), next, page);
       },
       &all));
+  if (all.interactions().empty()) {
+    DSG_RETURN_IF_ERROR(CheckWords(session, "", verb.class_name, ""));
+  }
   AnswerPicture picture;
   if (!verb.picture.png.empty()) {
     DSG_ASSIGN_OR_RETURN(picture, Draw(session, all));

@@ -49,12 +49,11 @@ absl::StatusOr<v1::PredictAgentRequest> RequestFor(Session* session, const Predi
 }
 
 // The last seconds that were seen and the ways that are foreseen, the likelier ones thicker.
-absl::StatusOr<AnswerPicture> Draw(Session* session, const v1::PredictAgentResponse& reply) {
+absl::StatusOr<AnswerPicture> Draw(Session* session, const v1::PredictAgentResponse& reply,
+                                   const std::string& agent) {
   constexpr TimeNs kPastNs = 10 * kNsPerSecond;
-  // To the tenth, which is more than a picture shows.
-  const TimeNs observed_ns = reply.observed_ns() - reply.observed_ns() % (kNsPerSecond / 10);
   AnswerPicture picture{
-      .title = absl::StrCat(reply.agent_id(), " after ", session->times().Full(observed_ns)),
+      .title = absl::StrCat(agent, " after ", session->times().Tenth(reply.observed_ns())),
       .revision = reply.header().read_revision(),
       .at_ns = reply.observed_ns()};
   Overlay& overlay = picture.overlay;
@@ -87,7 +86,7 @@ absl::StatusOr<AnswerPicture> Draw(Session* session, const v1::PredictAgentRespo
   for (const auto& piece : pieces) overlay.lines.push_back({piece, kPastRgb});
   if (!pieces.empty()) {
     overlay.marks.push_back(
-        {.position_map = pieces.back().back(), .rgb = kPastRgb, .label = reply.agent_id()});
+        {.position_map = pieces.back().back(), .rgb = kPastRgb, .label = agent});
   }
   return picture;
 }
@@ -102,7 +101,7 @@ absl::Status RunPredict(Session* session, const PredictVerb& verb, std::ostream&
       session->times().Explain(session->api().PredictAgent(session->NewCall(), request, &reply)));
   AnswerPicture picture;
   if (!verb.picture.png.empty()) {
-    DSG_ASSIGN_OR_RETURN(picture, Draw(session, reply));
+    DSG_ASSIGN_OR_RETURN(picture, Draw(session, reply, verb.agent));
   }
   if (session->common().json) {
     DSG_RETURN_IF_ERROR(WriteJson(reply, out));

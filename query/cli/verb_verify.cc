@@ -47,6 +47,7 @@ absl::Status RunVerify(const CommonOptions& common, std::ostream& out, std::ostr
                        GraphStore::Open(common.store, {.program = "dsg verify"}));
   DSG_ASSIGN_OR_RETURN(const std::vector<std::string> names, MapNames(store.get(), common.map));
   size_t problem_count = 0;
+  if (names.empty()) out << "store " << common.store << " has no maps\n";
   for (const std::string& name : names) {
     DSG_ASSIGN_OR_RETURN(const VerifyReport report, FindProblems(store.get(), name, progress_out));
     out << name << ": " << Counted(report.revision_count, "revision") << ", "

@@ -2,6 +2,7 @@
 // The verb watch: revisions as they come.
 #include <chrono>
 #include <optional>
+#include <thread>
 
 #include "dsg/v1/map_service.pb.h"
 #include "query/cli/interrupt.h"
@@ -12,6 +13,8 @@
 
 namespace dsg::cli {
 namespace {
+
+using Clock = query::CallContext::Clock;
 
 // Prints what comes and remembers how far it has come.
 class Printer {
@@ -52,6 +55,48 @@ class Printer {
   absl::Status status_;
 };
 
+// Waits for a server that went away, and tells people about it.
+class Patience {
+ public:
+  explicit Patience(std::ostream* notes) : notes_(*notes) {}
+
+  void Heard(int64_t revision) {
+    if (is_lost_) {
+      notes_ << "dsg: the server is back; watching on after revision " << *revision_ << "\n"
+             << std::flush;
+    }
+    is_lost_ = false;
+    revision_ = revision;
+  }
+
+  /// False if it is not to be asked again: nothing was ever heard, or not for too long.
+  bool Wait(const query::CallContext& call) {
+    if (!revision_.has_value()) return false;
+    const auto now = Clock::now();
+    if (!is_lost_) {
+      notes_ << "dsg: the server went away after revision " << *revision_
+             << "; asking for a minute whether it is back\n"
+             << std::flush;
+      is_lost_ = true;
+      lost_at_ = now;
+    }
+    if (now - lost_at_ > kPatience) return false;
+    // The client itself pauses between its tries; this is for what refuses at once.
+    std::this_thread::sleep_for(kPause);
+    return !call.cancelled();
+  }
+
+ private:
+  static constexpr std::chrono::seconds kPatience{60};
+  static constexpr std::chrono::milliseconds kPause{200};
+
+  std::ostream& notes_;
+  // The last one that was told.
+  std::optional<int64_t> revision_;
+  bool is_lost_ = false;
+  Clock::time_point lost_at_;
+};
+
 v1::WatchMapRequest RequestFor(const Session& session, const WatchVerb& verb,
                                const Printer& printer) {
   v1::WatchMapRequest request;
@@ -64,11 +109,11 @@ v1::WatchMapRequest RequestFor(const Session& session, const WatchVerb& verb,
 
 }  // namespace
 
-absl::Status RunWatch(Session* session, const WatchVerb& verb, std::ostream& out) {
+absl::Status RunWatch(Session* session, const WatchVerb& verb, std::ostream& out,
+                      std::ostream& notes) {
   // A call without a deadline would be given one by the client.
   constexpr std::chrono::hours kForEver{24 * 365};
   const double timeout_s = session->common().timeout_s;
-  using Clock = query::CallContext::Clock;
   const auto length =
       timeout_s > 0.0
           ? std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(timeout_s))
@@ -76,17 +121,23 @@ absl::Status RunWatch(Session* session, const WatchVerb& verb, std::ostream& out
   query::CallContext call(Clock::now() + length);
   const InterruptGuard guard(&call);
   Printer printer(*session, verb, out);
-  const auto take = [&](const v1::WatchMapResponse& message) { return printer.Take(message); };
+  Patience patience(&notes);
+  const auto take = [&](const v1::WatchMapResponse& message) {
+    const bool goes_on = printer.Take(message);
+    patience.Heard(*printer.after());
+    return goes_on;
+  };
   while (true) {
-    const std::optional<int64_t> before = printer.after();
     const absl::Status status =
         session->api().WatchMap(call, RequestFor(*session, verb, printer), take);
     DSG_RETURN_IF_ERROR(printer.status());
     if (printer.IsDone() || call.cancelled()) return absl::OkStatus();
-    // A server that was restarted is asked to go on from where the watch was.
-    const bool came_further = printer.after() != before;
-    if (absl::IsUnavailable(status) && came_further) continue;
-    return status;
+    // A server that was restarted is asked to go on from where the watch was. While it shuts down
+    // it may cancel what it has just taken; and it gives up readers that were held up.
+    const bool was_given_up =
+        absl::IsResourceExhausted(status) && ReasonOf(status) == Reason::kUnspecified;
+    const bool is_away = absl::IsUnavailable(status) || absl::IsCancelled(status) || was_given_up;
+    if (!is_away || !patience.Wait(call)) return status;
   }
 }
 

@@ -44,8 +44,10 @@ absl::Status RunSubgraph(Session* session, const SubgraphVerb& verb, std::ostrea
 /// What differs between two revisions (verb_diff.cc).
 absl::Status RunDiff(Session* session, const DiffVerb& verb, std::ostream& out);
 /// Prints revisions as they come, until SIGINT, SIGTERM or the count (verb_watch.cc). Goes on over
-/// a restart of the server. Errors: of WatchMap; DEADLINE_EXCEEDED after --timeout.
-absl::Status RunWatch(Session* session, const WatchVerb& verb, std::ostream& out);
+/// a restart of the server, and says so on `notes`. Errors: of WatchMap, UNAVAILABLE after a minute
+/// without the server; DEADLINE_EXCEEDED after --timeout.
+absl::Status RunWatch(Session* session, const WatchVerb& verb, std::ostream& out,
+                      std::ostream& notes);
 
 // Maps: verbs_maps.cc. RunLog and RunStats require that the session's map is chosen.
 absl::Status RunLog(Session* session, std::ostream& out);

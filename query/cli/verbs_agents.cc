@@ -31,16 +31,17 @@ absl::StatusOr<std::string> RoomName(Session* session, const v1::LocateAgentResp
   return reply.node().name();
 }
 
-AnswerPicture DrawTrack(const v1::GetTrajectoryResponse& track, const Session& session) {
+AnswerPicture DrawTrack(const v1::GetTrajectoryResponse& track, const Session& session,
+                        const std::string& agent) {
   constexpr uint32_t kTrackRgb = 0x1f5fbf;
-  AnswerPicture picture{.title = track.agent_id(), .revision = track.header().read_revision()};
+  AnswerPicture picture{.title = agent, .revision = track.header().read_revision()};
   if (track.poses().empty()) return picture;
   const v1::TimedPose& first = track.poses(0);
   const v1::TimedPose& last = track.poses(track.poses_size() - 1);
   // To the tenth, which is more than a picture shows.
-  const auto short_time = [](TimeNs time_ns) { return time_ns - time_ns % (kNsPerSecond / 10); };
-  absl::StrAppend(&picture.title, "  ",
-                  session.times().Span(short_time(first.time_ns()), short_time(last.time_ns())));
+  const std::string begin = session.times().Tenth(first.time_ns());
+  const std::string end = session.times().Tenth(last.time_ns());
+  absl::StrAppend(&picture.title, "  ", begin, " to ", end);
   picture.at_ns = last.time_ns();
   Overlay& overlay = picture.overlay;
   TimeNs before_ns = kTimeMin;
@@ -51,13 +52,12 @@ AnswerPicture DrawTrack(const v1::GetTrajectoryResponse& track, const Session& s
     overlay.lines.back().points_map.push_back(PointOf(pose.pose().position()));
     before_ns = pose.time_ns();
   }
-  overlay.marks = {{.position_map = PointOf(first.pose().position()),
-                    .rgb = kTrackRgb,
-                    .shape = OverlayMark::Shape::kRing,
-                    .label = session.times().Relative(short_time(first.time_ns()))},
-                   {.position_map = PointOf(last.pose().position()),
-                    .rgb = kTrackRgb,
-                    .label = session.times().Relative(short_time(last.time_ns()))}};
+  overlay.marks = {
+      {.position_map = PointOf(first.pose().position()),
+       .rgb = kTrackRgb,
+       .shape = OverlayMark::Shape::kRing,
+       .label = begin},
+      {.position_map = PointOf(last.pose().position()), .rgb = kTrackRgb, .label = end}};
   return picture;
 }
 
@@ -112,7 +112,7 @@ absl::Status RunTrack(Session* session, const TrackVerb& verb, std::ostream& out
   } else {
     out << RenderTrack(all, session->times());
   }
-  return WritePicture(session, verb.picture, DrawTrack(all, *session), out);
+  return WritePicture(session, verb.picture, DrawTrack(all, *session, verb.agent), out);
 }
 
 absl::Status RunWho(Session* session, const WhoVerb& verb, std::ostream& out) {

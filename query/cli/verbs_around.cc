@@ -53,6 +53,10 @@ absl::Status RunSubgraph(Session* session, const SubgraphVerb& verb, std::ostrea
     return true;
   };
   DSG_RETURN_IF_ERROR(session->api().GetSubgraph(session->NewCall(), request, merge));
+  // The root alone: perhaps nothing could pass the filter.
+  if (all.nodes_size() <= 1) {
+    DSG_RETURN_IF_ERROR(CheckWords(session, "", verb.filter.class_name, ""));
+  }
   if (session->common().json) return WriteJson(all, out);
   out << RenderSubgraph(all, session->times());
   return absl::OkStatus();

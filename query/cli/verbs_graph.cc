@@ -89,6 +89,9 @@ absl::Status RunNear(Session* session, const NearVerb& verb, std::ostream& out) 
   DSG_RETURN_IF_ERROR(FillFilter(verb.filter, session->map().epoch_ns, request.mutable_filter()));
   v1::ListNearestNodesResponse reply;
   DSG_RETURN_IF_ERROR(session->api().ListNearestNodes(session->NewCall(), request, &reply));
+  if (reply.nodes().empty()) {
+    DSG_RETURN_IF_ERROR(CheckWords(session, "", verb.filter.class_name, ""));
+  }
   if (session->common().json) return WriteJson(reply, out);
   out << RenderNearest(reply);
   return absl::OkStatus();

@@ -57,6 +57,11 @@ absl::StatusOr<EncounterQuestion> QuestionFromProto(const Page& page, AgentNames
                       "give nanoseconds, 0 for any duration");
   }
   question.duration_ns_min = in.duration_ns_min();
+  if (in.sight_gap_ns_max() < 0) {
+    return FieldError("sight_gap_ns_max", absl::StrCat(in.sight_gap_ns_max()),
+                      "give nanoseconds, 0 for 2 s");
+  }
+  if (in.sight_gap_ns_max() > 0) question.sight_gap_ns_max = in.sight_gap_ns_max();
   const Snapshot& snapshot = page.view.snapshot();
   if (!in.agent().empty()) {
     DSG_ASSIGN_OR_RETURN(question.agent, names->Resolve(snapshot, in.agent()));
@@ -143,7 +148,7 @@ absl::Status ListEncounters(const Page& page, AgentNames* names, const CallConte
     bytes += encounter->ByteSizeLong();
   }
   DSG_ASSIGN_OR_RETURN(const int64_t observed,
-                       snapshot.CountObservedAgents(request.from_ns(), request.to_ns()));
+                       snapshot.CountObservedAgents(request.from_ns(), request.to_ns(), stop));
   reply->set_observed_agent_count(observed);
   return absl::OkStatus();
 }

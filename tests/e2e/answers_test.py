@@ -69,7 +69,13 @@ class Answers(support.ProgramsTest):
                      ["track", agent, "--every", "0.5s"],
                      ["who", "--room", "kitchen", "--from", "+0s", "--to", "+120s"],
                      ["who", "--box", "0,0,-1,8,8,3", "--from", "+0s", "--to", "+60s"],
-                     ["ls"], ["ls", "--kind", "room"], ["log"], ["stats"]]
+                     ["ls"], ["ls", "--kind", "room"], ["log"], ["stats"],
+                     ["met", "--line-of-sight"], ["met", "--for", "2s", "--within", "1"],
+                     ["picked", "--all"], ["predict", agent, "--at", "+60s"],
+                     ["find", "cup on table", "--explain"], ["find", "chair in kitchen"],
+                     ["path", agent, "nearest fridge", "--at", "+30s", "--check"],
+                     ["near", "3,2,0", "--k", "9"], ["around", "R0"], ["subgraph", "R0"],
+                     ["diff", "0", "1"]]
         with self.server("store", "unix:dsg.sock"):
             for question in questions:
                 with self.subTest(question=question):

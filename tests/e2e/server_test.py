@@ -5,6 +5,7 @@
 import os
 import signal
 import socket
+import subprocess
 import unittest
 
 import support
@@ -68,6 +69,34 @@ class Server(support.ProgramsTest):
 
     def head(self, address):
         return int(self.ask("stats", "--server", address, "--map", "office")["head_revision"])
+
+    def test_a_watch_goes_on_over_a_restart(self):
+        self.ingest("watched", self.small)
+        said, seen = self.path("watch.err"), self.path("watch.out")
+
+        def says(text):
+            with open(said, encoding="utf-8") as f:
+                return text in f.read()
+
+        with open(said, "w", encoding="utf-8") as err, open(seen, "w", encoding="utf-8") as out:
+            with self.server("watched", "unix:watch.sock"):
+                before = self.head("unix:watch.sock")
+                watch = subprocess.Popen(
+                    ["dsg", "watch", "--server", "unix:watch.sock", "--after", str(before - 1),
+                     "-n", "2"], cwd=self.folder, env=support.environment(), stdout=out,
+                    stderr=err, stdin=subprocess.DEVNULL)
+                self.addCleanup(watch.kill)
+                support.wait_until(lambda: os.path.getsize(seen) > 0, "the first revision")
+            support.wait_until(lambda: says("went away"), "the watch to miss the server")
+            with self.server("watched", "unix:watch.sock"):
+                support.wait_until(lambda: says(f"watching on after revision {before}"),
+                                   "the watch to go on")
+                self.ok("dsg-ingest", "--store", "watched", "--map", "office", "--agent-prefix",
+                        "c", self.small)
+                self.assertEqual(0, watch.wait(timeout=support.TIMEOUT_S))
+        with open(seen, encoding="utf-8") as f:
+            told = [line.split()[1] for line in f.read().splitlines()]
+        self.assertEqual([str(before), str(before + 1)], told)
 
     def test_stops_in_order_on_interrupt_too(self):
         with self.server("store", "unix:int.sock") as process:

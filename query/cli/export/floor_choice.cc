@@ -42,17 +42,31 @@ double MiddleHeight(const Node& node) {
   return 0.5 * (heights.low_m + heights.high_m);
 }
 
-// The pieces of a track on the floor; a track that leaves and comes back is cut.
+using Points = std::vector<Eigen::Vector3d>;
+
+// Where things that stand or lie on the floor are, with the errors of their heights.
+HeightRange Standing(const HeightRange& floor) {
+  constexpr double kErrorM = 0.3;
+  return {floor.low_m - kErrorM, floor.high_m};
+}
+
+// The pieces of a way on the floor; a way that leaves and comes back is cut.
+std::vector<Points> PiecesOn(const HeightRange& floor, const Points& way) {
+  std::vector<Points> pieces;
+  bool is_inside = false;
+  for (const Eigen::Vector3d& point : way) {
+    const bool was_inside = is_inside;
+    is_inside = Standing(floor).Contains(point.z());
+    if (is_inside && !was_inside) pieces.emplace_back();
+    if (is_inside) pieces.back().push_back(point);
+  }
+  return pieces;
+}
+
 Track TrackOn(const HeightRange& floor, const Track& track) {
   Track kept{.agent = track.agent, .pieces = {}};
-  for (const auto& piece : track.pieces) {
-    bool is_inside = false;
-    for (const Eigen::Vector3d& point : piece) {
-      const bool was_inside = is_inside;
-      is_inside = floor.Contains(point.z());
-      if (is_inside && !was_inside) kept.pieces.emplace_back();
-      if (is_inside) kept.pieces.back().push_back(point);
-    }
+  for (const Points& piece : track.pieces) {
+    for (Points& part : PiecesOn(floor, piece)) kept.pieces.push_back(std::move(part));
   }
   return kept;
 }
@@ -93,6 +107,22 @@ void KeepFloor(const HeightRange& floor, MapContent* content) {
       });
     });
   }
+}
+
+void KeepFloor(const HeightRange& floor, Overlay* overlay) {
+  const HeightRange heights = Standing(floor);
+  std::vector<OverlayLine> lines;
+  for (const OverlayLine& line : overlay->lines) {
+    for (Points& piece : PiecesOn(floor, line.points_map)) {
+      OverlayLine& kept = lines.emplace_back(line);
+      kept.points_map = std::move(piece);
+    }
+  }
+  overlay->lines = std::move(lines);
+  std::erase_if(overlay->marks,
+                [&](const OverlayMark& mark) { return !heights.Contains(mark.position_map.z()); });
+  std::erase_if(overlay->outlines,
+                [&](const OverlayOutline& outline) { return !heights.Contains(outline.height_m); });
 }
 
 }  // namespace dsg::cli

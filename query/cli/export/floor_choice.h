@@ -7,6 +7,7 @@
 
 #include "absl/status/statusor.h"
 #include "query/cli/export/map_content.h"
+#include "query/cli/export/overlay.h"
 
 namespace dsg::cli {
 
@@ -22,7 +23,11 @@ struct HeightRange {
 /// Errors: NOT_FOUND/NODE_UNKNOWN naming what may be given.
 absl::StatusOr<HeightRange> ChooseFloor(const MapContent& content, const std::string& floor);
 
-/// Drops nodes whose middle is elsewhere, edges that lost an end, poses and faces elsewhere.
+/// Drops nodes whose middle is elsewhere, edges that lost an end, poses and faces elsewhere. Poses
+/// up to 0.3 m below the floor stay: tracks lie on it, with their errors.
 void KeepFloor(const HeightRange& floor, MapContent* content);
+
+/// The same for what an answer adds; ways are cut where they leave the floor.
+void KeepFloor(const HeightRange& floor, Overlay* overlay);
 
 }  // namespace dsg::cli

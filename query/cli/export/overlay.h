@@ -5,10 +5,12 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "schema/model/geometry.h"
+#include "schema/model/ids.h"
 
 namespace dsg::cli {
 
@@ -34,6 +36,8 @@ struct OverlayMark {
 struct OverlayOutline {
   Polygon2d corners_map;
   uint32_t rgb = 0;
+  /// Which floor it belongs to, metres.
+  double height_m = 0.0;
 };
 
 struct OverlayKey {
@@ -47,6 +51,8 @@ struct Overlay {
   std::vector<OverlayLine> lines;
   std::vector<OverlayMark> marks;
   std::vector<OverlayKey> legend;
+  /// Nodes that marks name: the map does not name them again.
+  std::set<NodeId> named;
 
   bool empty() const {
     return outlines.empty() && lines.empty() && marks.empty() && legend.empty();

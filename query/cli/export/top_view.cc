@@ -264,7 +264,7 @@ picture::Picture DrawTopView(const MapContent& content, const TopViewOptions& op
     DrawOverlay(overlay, view, &layout, &canvas);
     DrawOverlayLabels(overlay, view, &layout, &canvas);
   }
-  DrawLabels(content, view, &layout, &canvas);
+  DrawLabels(content, overlay.named, view, &layout, &canvas);
   DrawTitle(options.title, &canvas);
   const double footer_y = canvas.height() - kMarginPx - kTextHeightPx;
   DrawLegend(content, footer_y, DrawScaleBar(view, footer_y, &canvas) - 40.0, &canvas);

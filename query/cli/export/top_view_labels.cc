@@ -187,19 +187,20 @@ void WriteAgents(const MapContent& content, const FloorView& view, LabelLayout* 
 
 }  // namespace
 
-void DrawLabels(const MapContent& content, const FloorView& view, LabelLayout* layout,
-                Canvas* canvas) {
+void DrawLabels(const MapContent& content, const std::set<NodeId>& named, const FloorView& view,
+                LabelLayout* layout, Canvas* canvas) {
   const std::vector<Shape> objects = ShapesOf(content, kinds::kObject, view);
   LabelLayout with_objects = *layout;
   for (const Shape& object : objects) {
     if (!object.outline_px.empty()) with_objects.Block(BoundsOf(object.outline_px));
   }
   for (const Shape& room : ShapesOf(content, kinds::kRoom, view)) {
-    WriteRoom(room, view, &with_objects, layout, canvas);
+    if (!named.contains(room.node->id)) WriteRoom(room, view, &with_objects, layout, canvas);
   }
   WriteAgents(content, view, layout, canvas);
   for (const Shape& object : objects) {
     const Node& node = *object.node;
+    if (named.contains(node.id)) continue;
     Box2d bounds = BoundsOf(object.outline_px);
     const Eigen::Vector2d middle = view.ToPixel(MiddleOf(node));
     // No smaller than the dot that stands for the smallest.

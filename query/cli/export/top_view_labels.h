@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -14,10 +15,10 @@
 
 namespace dsg::cli {
 
-/// Rooms by size, then agents, then objects by size. Room names keep clear of objects where they
-/// can.
-void DrawLabels(const MapContent& content, const FloorView& view, picture::LabelLayout* layout,
-                picture::Canvas* canvas);
+/// Rooms by size, then agents, then objects by size, but for the nodes that are `named` already.
+/// Room names keep clear of objects where they can.
+void DrawLabels(const MapContent& content, const std::set<NodeId>& named, const FloorView& view,
+                picture::LabelLayout* layout, picture::Canvas* canvas);
 
 /// A name beside a thing of the picture, in letters as large as those of agents; not written where
 /// all room is taken.

@@ -13,6 +13,8 @@ namespace {
 // Walls are looked for at multiples of this, so that slices and pages see the same instants.
 constexpr TimeNs kSightStepNs = kNsPerSecond / 10;
 constexpr TimeNs kSightExactNs = kNsPerSecond / 1000;
+// Tracks of robots and of people without bodies lie on the floor, which is no wall between them.
+const Eigen::Vector3d kSightAbove(0.0, 0.0, 0.3);
 
 TimeNs StepAtOrBefore(TimeNs time_ns) {
   TimeNs rest = time_ns % kSightStepNs;
@@ -34,13 +36,20 @@ Eigen::Vector3d PositionAt(const TrackPath& path, TimeNs at_ns) {
   return PositionBetween(*before, *(before + 1), at_ns);
 }
 
-// The parts of a meeting during which the two saw each other.
+// The parts of a meeting during which the two saw each other, joined over short times out of sight.
 class SightCutter {
  public:
-  SightCutter(Sight* sight, const TrackPath& a, const TrackPath& b, double distance_m)
-      : sight_(*sight), a_(a), b_(b), distance_m_(distance_m) {}
+  SightCutter(const EncounterQuestion& question, const TrackPath& a, const TrackPath& b)
+      : sight_(*question.sight),
+        gap_ns_max_(question.sight_gap_ns_max),
+        distance_m_(question.distance_m),
+        a_(a),
+        b_(b) {}
 
-  absl::Status Cut(const Meeting& meeting, const StopCheck& stop, std::vector<Meeting>* out) {
+  // `near_from_ns`: since when the two have been near without interruption.
+  absl::Status Cut(const Meeting& meeting, TimeNs near_from_ns, const StopCheck& stop,
+                   std::vector<Meeting>* out) {
+    near_from_ns_ = near_from_ns;
     const Interval& all = meeting.during;
     TimeNs from_ns = all.from_ns;
     DSG_ASSIGN_OR_RETURN(bool is_clear, IsClearAt(from_ns));
@@ -64,7 +73,8 @@ class SightCutter {
 
  private:
   absl::StatusOr<bool> IsClearAt(TimeNs at_ns) {
-    return sight_.IsClear(PositionAt(a_, at_ns), PositionAt(b_, at_ns), at_ns);
+    return sight_.IsClear(PositionAt(a_, at_ns) + kSightAbove, PositionAt(b_, at_ns) + kSightAbove,
+                          at_ns);
   }
 
   absl::StatusOr<TimeNs> FindChange(TimeNs from_ns, TimeNs to_ns, bool is_clear_first) {
@@ -77,13 +87,25 @@ class SightCutter {
   }
 
   void Keep(const Interval& during, std::vector<Meeting>* out) const {
-    for (const Meeting& part : FindMeetings(a_, b_, during, distance_m_)) JoinMeeting(part, out);
+    for (Meeting& part : FindMeetings(a_, b_, during, distance_m_)) {
+      if (!out->empty()) {
+        const TimeNs lost_ns = out->back().during.to_ns;
+        const bool was_near = lost_ns > near_from_ns_;
+        if (was_near &&
+            TimeApart(lost_ns, part.during.from_ns) <= static_cast<uint64_t>(gap_ns_max_)) {
+          part.during.from_ns = lost_ns;
+        }
+      }
+      JoinMeeting(part, out);
+    }
   }
 
   Sight& sight_;
+  const TimeNs gap_ns_max_;
+  const double distance_m_;
   const TrackPath& a_;
   const TrackPath& b_;
-  double distance_m_;
+  TimeNs near_from_ns_ = kTimeMin;
 };
 
 class Search {
@@ -96,7 +118,8 @@ class Search {
     TimeNs from_ns = question_.during.from_ns;
     // What ended before the last page's last entry began is on an earlier page.
     if (question_.after.from_ns > from_ns) {
-      from_ns = std::max(from_ns, StepAtOrBefore(AddTime(question_.after.from_ns, -kSightStepNs)));
+      const TimeNs seen_ns = AddTime(question_.after.from_ns, -GapNs());
+      from_ns = std::max(from_ns, StepAtOrBefore(AddTime(seen_ns, -kSightStepNs)));
     }
     from_ns = std::max(from_ns, first_ns_);
     const TimeNs to_ns = std::min(question_.during.to_ns, AddTime(last_ns_, 1));
@@ -111,7 +134,7 @@ class Search {
 
  private:
   absl::Status ChooseTracks() {
-    DSG_ASSIGN_OR_RETURN(tracks_, snapshot_.Tracks());
+    DSG_ASSIGN_OR_RETURN(tracks_, snapshot_.Tracks(stop_));
     std::erase_if(tracks_, [&](const TrackInfo& track) {
       if (track.pose_count == 0) return true;
       return !question_.agent.empty() && !question_.other.empty() &&
@@ -158,17 +181,23 @@ class Search {
         for (const Meeting& meeting : found) JoinMeeting(meeting, &meetings);
       }
       std::vector<Meeting>& kept = found_[pair];
+      Interval& near = near_[pair];
       for (const Meeting& meeting : meetings) {
         if (question_.sight == nullptr) {
           JoinMeeting(meeting, &kept);
           continue;
         }
-        SightCutter cutter(question_.sight, a, b, question_.distance_m);
-        DSG_RETURN_IF_ERROR(cutter.Cut(meeting, stop_, &kept));
+        if (near.to_ns != meeting.during.from_ns) near.from_ns = meeting.during.from_ns;
+        near.to_ns = meeting.during.to_ns;
+        SightCutter cutter(question_, a, b);
+        DSG_RETURN_IF_ERROR(cutter.Cut(meeting, near.from_ns, stop_, &kept));
       }
     }
     return absl::OkStatus();
   }
+
+  // What ended no longer ago than this may still go on.
+  TimeNs GapNs() const { return question_.sight == nullptr ? 0 : question_.sight_gap_ns_max; }
 
   bool IsChosen(const FoundEncounter& encounter) const {
     return encounter.key() > question_.after &&
@@ -184,7 +213,7 @@ class Search {
     TimeNs open_from_ns = kTimeMax;
     for (const auto& [pair, meetings] : found_) {
       for (const Meeting& meeting : meetings) {
-        if (meeting.during.to_ns >= until_ns) {
+        if (AddTime(meeting.during.to_ns, GapNs()) >= until_ns) {
           open_from_ns = std::min(open_from_ns, meeting.during.from_ns);
         } else if (IsChosen(Encounter(pair, meeting))) {
           closed.push_back(meeting.during.from_ns);
@@ -223,6 +252,8 @@ class Search {
   TimeNs last_ns_ = kTimeMin;
   TimeNs slice_ns_ = kNsPerSecond;
   std::map<std::pair<int32_t, int32_t>, std::vector<Meeting>> found_;
+  // The last time during which a pair was near, in sight or not.
+  std::map<std::pair<int32_t, int32_t>, Interval> near_;
 };
 
 }  // namespace

@@ -31,6 +31,9 @@ struct FoundEncounter {
   EncounterKey key() const { return {meeting.during.from_ns, agent, other}; }
 };
 
+/// Somebody who passes a pillar or a door frame is still there.
+inline constexpr TimeNs kSightGapNs = 2 * kNsPerSecond;
+
 struct EncounterQuestion {
   /// Empty = all pairs.
   NodeId agent;
@@ -41,6 +44,8 @@ struct EncounterQuestion {
   TimeNs duration_ns_min = 0;
   /// Null = walls do not matter.
   Sight* sight = nullptr;
+  /// Out of sight for no longer than this, while near all along, ends no encounter.
+  TimeNs sight_gap_ns_max = kSightGapNs;
   /// Only those after this one.
   EncounterKey after;
   /// At least so many, if there are.

@@ -43,6 +43,8 @@ TEST(MetArguments, NeedNobodyOneOrTwo) {
   EXPECT_TRUE(verb.line_of_sight);
   Refusal({"met", "a", "b", "c"});
   Refusal({"met", "--within", "0"});
+  EXPECT_EQ(ParseAs<MetVerb>({"met", "--line-of-sight", "--sight-gap", "5s"}).sight_gap, "5s");
+  Refusal({"met", "--sight-gap", "5s"});
 }
 
 TEST(PickedArguments, MayNameObjectClassAndRoom) {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <sstream>
 #include <string>
 #include <variant>
 #include <vector>
@@ -148,6 +149,61 @@ TEST(Arguments, HelpIsAnAnswer) {
   }
   const std::string where = ParseAs<HelpVerb>({"where", "--help"}, {}).text;
   EXPECT_NE(where.find("--at"), std::string::npos) << where;
+}
+
+// As a shell would: quotes keep words together.
+Arguments WordsOf(const std::string& line) {
+  Arguments words;
+  char quote = 0;
+  bool is_open = false;
+  for (const char c : line) {
+    if (quote != 0 ? c == quote : c == '\'' || c == '"') {
+      quote = quote != 0 ? 0 : c;
+    } else if (c == ' ' && quote == 0) {
+      is_open = false;
+    } else {
+      if (!is_open) words.emplace_back();
+      is_open = true;
+      words.back() += c;
+    }
+  }
+  return words;
+}
+
+TEST(Arguments, HelpOfEachVerbHasAnExampleThatCanBeTyped) {
+  const std::string all = ParseAs<HelpVerb>({"--help"}, {}).text;
+  std::istringstream lines(all.substr(all.find("Subcommands:")));
+  std::string line;
+  std::getline(lines, line);
+  int count = 0;
+  while (std::getline(lines, line) && line.substr(0, 2) == "  ") {
+    const std::string verb = WordsOf(line)[0];
+    const std::string help = ParseAs<HelpVerb>({verb, "--help"}, {}).text;
+    const size_t at = help.find("Example: dsg ");
+    ASSERT_NE(at, std::string::npos) << help;
+    Arguments words = WordsOf(help.substr(at + 13, help.find('\n', at) - at - 13));
+    ASSERT_EQ(words[0], verb);
+    const auto command = ParseArguments(words, {.store = "s"});
+    EXPECT_TRUE(command.ok()) << command.status();
+    ++count;
+  }
+  EXPECT_GE(count, 26);
+}
+
+TEST(Arguments, MistakesNameTheOptionAndWhereHelpIs) {
+  EXPECT_EQ(Refusal({"path", "a", "b", "--radius", "-1"}),
+            "--radius: \"-1\" is not a number above zero; see dsg path --help");
+  EXPECT_EQ(Refusal({"path", "a", "b", "--radius", "nan"}),
+            "--radius: \"nan\" is not a number above zero; see dsg path --help");
+  EXPECT_EQ(Refusal({"ls", "--limit", "0"}),
+            "--limit: \"0\" is not a whole number above zero; see dsg ls --help");
+  EXPECT_EQ(Refusal({"near", "1,2,3", "-k", "1001"}),
+            "--k: \"1001\" is not a number from 1 to 1000; see dsg near --help");
+  EXPECT_EQ(Refusal({"verify", "--server", "x"}),
+            "not understood: --server x; see dsg verify --help");
+  EXPECT_NE(Refusal({"where", "carol"}).find("--at is required; see dsg where --help"),
+            std::string::npos);
+  EXPECT_NE(Refusal({}).find("see dsg --help"), std::string::npos);
 }
 
 TEST(Arguments, VersionNeedsNoPlace) { ParseAs<VersionVerb>({"version"}, {}); }

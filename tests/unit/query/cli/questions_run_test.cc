@@ -62,6 +62,7 @@ TrajectoryAppend Walk(NodeId agent, double from_x_m, double speed_m_s) {
 }
 
 constexpr NodeId kBuilding('B', 0), kHall('R', 1), kKitchen('R', 2), kTable('O', 1), kCup('O', 2);
+constexpr NodeId kBath('R', 3);
 
 // Ten places a metre apart: five in the hall, five in the kitchen. Ann and bob walk towards one
 // another and pass at x = 4.5.
@@ -73,8 +74,13 @@ GraphDelta House() {
   delta.nodes = {MakeNode(kBuilding, kinds::kBuilding, "house", 5.0),
                  MakeNode(kHall, kinds::kRoom, "hall", 2.0),
                  MakeNode(kKitchen, kinds::kRoom, "kitchen", 7.0),
+                 MakeNode(kBath, kinds::kRoom, "", 20.0),
                  MakeNode(NodeId('H', 1), kinds::kHuman, "ann", 0.0),
                  MakeNode(NodeId('H', 2), kinds::kHuman, "bob", 9.0)};
+  // As maps made from images have it: a class and no name.
+  delta.labels = {{5, "bathroom"}};
+  delta.nodes[3].class_id = 5;
+  delta.nodes[3].class_name = "bathroom";
   delta.edges = {MakeEdge(kBuilding, relations::kContains, kHall),
                  MakeEdge(kBuilding, relations::kContains, kKitchen),
                  MakeEdge(kHall, relations::kAdjacent, kKitchen)};
@@ -193,6 +199,8 @@ TEST_F(QuestionsRun, PathGoesFromPointsIdsAndNames) {
   ExpectRefused(1, "NO_PATH", {"path", "p0", "p9", "--avoid", "p5"});
   ExpectRefused(1, "NODE_UNKNOWN", {"path", "p0", "attic"});
   ExpectRefused(2, "FROM", {"path", "1,,2", "p0", "--flat"});
+  ExpectRefused(2, "NUMBER_NOT_FINITE", {"path", "nan,0,0", "p0"});
+  ExpectRefused(2, "FROM", {"path", "1,2", "p0"});
 }
 
 TEST_F(QuestionsRun, CollideExitsWithOneWhereTheBodyIsFree) {
@@ -220,11 +228,33 @@ TEST_F(QuestionsRun, MetKnowsWhoCameNearWhom) {
   ExpectRefused(2, "TIME_RANGE_INVERTED", {"met", "--from", "+2s", "--to", "+1s"});
 }
 
+TEST_F(QuestionsRun, ErrorsOfTheServiceNameWhatWasTyped) {
+  ExpectRefused(2, "--from 2000000000 is not before --to 1000000000",
+                {"met", "--from", "+2s", "--to", "+1s"});
+  ExpectRefused(2, "OTHER is ann", {"met", "ann", "ann"});
+  ExpectRefused(2, "--horizon is 1", {"predict", "ann", "--horizon", "1ns"});
+  ExpectRefused(2, "--box: size.x is 0", {"collide", "--box", "0,1,1", "--pose", "0,0,0"});
+  ExpectRefused(2, "--reach is 2; give metres above --margin",
+                {"collide", "--sphere", "1", "--pose", "0,0,0", "--margin", "3", "--reach", "2"});
+  ExpectRefused(1, "TO: no node of map", {"path", "p0", "attic"});
+  ExpectRefused(1, "`dsg ls` and `dsg find`", {"show", "attic"});
+  ExpectRefused(1, "`dsg maps` lists", {"stats", "--map", "nope"});
+}
+
+TEST_F(QuestionsRun, ARoomWithoutANameIsKnownByItsClass) {
+  EXPECT_EQ(AskJson({"who", "--room", "bathroom"})["intervals"].size(), 0u);
+  EXPECT_EQ(AskJson({"who", "--room", "bathroom"}), AskJson({"who", "--room", "R3"}));
+  // What is no room is no place to be in.
+  ExpectRefused(1, "NODE_UNKNOWN", {"who", "--room", "attic"});
+}
+
 TEST_F(QuestionsRun, NothingPickedIsAnAnswer) {
   const Outcome outcome = Ask({"picked", "ann", "--room", "kitchen"});
   EXPECT_EQ(outcome.code, 0) << outcome.errors;
   EXPECT_NE(outcome.out.find("0 objects"), std::string::npos) << outcome.out;
   ExpectRefused(1, "NODE_UNKNOWN", {"picked", "--room", "attic"});
+  ExpectRefused(1, "CLASS_UNKNOWN", {"picked", "--class", "unicorn"});
+  ExpectRefused(1, "CLASS_UNKNOWN", {"near", "0,0,0", "--class", "unicorn"});
 }
 
 TEST_F(QuestionsRun, PredictGoesOnWhereTheTrackEnds) {
@@ -280,7 +310,7 @@ TEST_F(QuestionsRun, AnswersCanBeDrawn) {
                                             {"picked"},
                                             {"find", "cup"},
                                             {"path", "p0", "cup"},
-                                            {"predict", "ann"},
+                                            {"predict", "ann", "--floor", "0"},
                                             {"collide", "--sphere", "2", "--pose", "8,0,0.6"}};
   for (const Arguments& question : questions) {
     const std::string file = folder_ + "/" + question[0] + ".png";

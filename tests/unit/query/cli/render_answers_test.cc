@@ -119,6 +119,12 @@ TEST(RenderHits, ShowsDistanceRoomAndWhatItStandsOn) {
       "distance m  id  kind    layer    name  class   x m   y m   z m  in            with\n"
       "     1.500  O8  object  objects        plate  0.00  0.00  0.00  kitchen (R9)  cup (O7)\n"
       "1 node (revision 4)\n");
+  // What the query asked for by its room alone is said once.
+  hit->set_related_ids(0, "R9");
+  EXPECT_EQ(RenderHits(reply, Names()),
+            "distance m  id  kind    layer    name  class   x m   y m   z m  in\n"
+            "     1.500  O8  object  objects        plate  0.00  0.00  0.00  kitchen (R9)\n"
+            "1 node (revision 4)\n");
   v1::SearchStep* step = reply.add_plan();
   step->set_operation("class index");
   step->set_detail("plate");

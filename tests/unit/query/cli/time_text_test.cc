@@ -47,6 +47,14 @@ TEST(TimeText, OtherErrorsPassUnchanged) {
   EXPECT_EQ(times.Explain(absl::NotFoundError("m")), absl::NotFoundError("m"));
 }
 
+TEST(TimeText, TenthsAreTheNearest) {
+  const TimeText times = On(Clock::kMonotonic, 30'000'000);
+  EXPECT_EQ(times.Tenth(30'000'000 + 83'999'914'236), "+84s");
+  EXPECT_EQ(times.Tenth(30'000'000 + 84'049'999'999), "+84s");
+  EXPECT_EQ(times.Tenth(30'000'000 - 160'000'000), "-0.2s");
+  EXPECT_EQ(times.Tenth(kTimeMax), "open");
+}
+
 TEST(TimeText, DurationsHaveNoSign) { EXPECT_EQ(DurationText(5, 5 + 2 * kNsPerSecond), "2s"); }
 
 }  // namespace

@@ -129,6 +129,26 @@ TEST(FloorChoice, DropsWhatIsOnAnotherFloor) {
   EXPECT_TRUE(content.tracks.empty());
 }
 
+TEST(FloorChoice, KeepsTracksThatLieOnTheFloorAndCutsWaysThatLeaveIt) {
+  MapContent content = test::ExampleContent();
+  const size_t piece_count = content.tracks[0].pieces.size();
+  for (auto& piece : content.tracks[0].pieces) {
+    for (Eigen::Vector3d& point : piece) point.z() = -0.02;
+  }
+  KeepFloor({0.0, 3.0}, &content);
+  EXPECT_EQ(content.tracks[0].pieces.size(), piece_count);
+  Overlay overlay;
+  overlay.lines.push_back(
+      {.points_map = {{0, 0, 0}, {1, 0, 0}, {2, 0, 3.5}, {3, 0, 0}, {4, 0, 0}}});
+  overlay.marks = {{.position_map = {1, 1, 1}}, {.position_map = {1, 1, 4}}};
+  overlay.outlines = {{.height_m = 1.0}, {.height_m = 4.0}};
+  KeepFloor({0.0, 3.0}, &overlay);
+  ASSERT_EQ(overlay.lines.size(), 2u);
+  EXPECT_EQ(overlay.lines[1].points_map.front().x(), 3.0);
+  EXPECT_EQ(overlay.marks.size(), 1u);
+  EXPECT_EQ(overlay.outlines.size(), 1u);
+}
+
 TEST(Outline, IsTheHullOfTheTurnedBox) {
   const Polygon2d outline = FloorOutline(test::ExampleContent().nodes[1]);
   EXPECT_EQ(outline.size(), 4u);

@@ -5,6 +5,7 @@
 #include <limits>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include "dsg/v1/meetings.pb.h"
 #include "query/engine/interaction/encounter_search.h"
@@ -75,13 +76,33 @@ class Encounters : public testing::Test {
     }
     for (uint64_t i = 0; i < 2; ++i) {
       const double y = i == 0 ? 0.0 : 6.0;
-      Node wall = MakeNode(NodeId('S', i), layers::kStructures, kinds::kStructure,
-                           "wall " + std::to_string(i),
-                           Box3d(Eigen::Vector3d(9.9, y, 0), Eigen::Vector3d(10.1, y + 4, 3)));
-      wall.structure = StructureInfo{"wall", Eigen::Vector3d::Zero(), 0.0, 0};
-      delta.nodes.push_back(wall);
+      delta.nodes.push_back(MakeStructure(i, "wall", {9.9, y, 0}, {10.1, y + 4, 3}));
     }
     CommitToOffice(folder_.path(), std::move(delta));
+  }
+
+  static Node MakeStructure(uint64_t index, const std::string& type, const Eigen::Vector3d& low,
+                            const Eigen::Vector3d& high) {
+    Node node = MakeNode(NodeId('S', index), layers::kStructures, kinds::kStructure,
+                         type + " " + std::to_string(index), Box3d(low, high));
+    node.structure = StructureInfo{type, Eigen::Vector3d::Zero(), 0.0, 0};
+    return node;
+  }
+
+  // Two people walk along y at 1 m/s from 3000 s on, at x = 4.5 and 5.5, with tracks on the floor.
+  static GraphDelta PairOnTheFloor() {
+    GraphDelta delta;
+    for (const uint64_t i : {1u, 2u}) {
+      const NodeId agent('H', i);
+      delta.nodes.push_back(
+          MakeNode(agent, layers::kAgents, kinds::kHuman, "w" + std::to_string(i), Box3d()));
+      delta.appends.push_back({agent, {}});
+      for (int t = 0; t <= 9; ++t) {
+        delta.appends.back().poses.push_back(
+            PoseAt((3000 + t) * kSecond, i == 1 ? 4.5 : 5.5, 0.5 + t, t % 2 == 0 ? 0.04 : -0.04));
+      }
+    }
+    return delta;
   }
 
   TempFolder folder_;
@@ -178,6 +199,44 @@ TEST_F(Encounters, EndWhereAWallStandsBetween) {
   EXPECT_NEAR(static_cast<double>(reply->encounters(0).to_ns() - 3000 * kSecond), 5.5e9, 2e6);
 }
 
+TEST_F(Encounters, AreNotCutByTheFloorThatTracksLieOn) {
+  GraphDelta delta = PairOnTheFloor();
+  delta.nodes.push_back(MakeStructure(50, "floor", {0, 0, -0.2}, {20, 10, 0}));
+  CommitToOffice(folder_.path(), std::move(delta));
+  auto request = Ask(3000 * kSecond, 3009 * kSecond);
+  const std::string all = ShowAll(request, 10);
+  EXPECT_FALSE(all.empty());
+  request.set_line_of_sight(true);
+  request.set_sight_gap_ns_max(1);
+  EXPECT_EQ(ShowAll(request, 10), all);
+}
+
+TEST_F(Encounters, GoOnBehindAPillarAndEndBehindAWall) {
+  GraphDelta delta = PairOnTheFloor();
+  // Out of sight for half a second from 2 s on, and for three seconds from 5 s on.
+  delta.nodes.push_back(MakeStructure(50, "pillar", {4.9, 2.5, 0}, {5.1, 3.0, 3}));
+  delta.nodes.push_back(MakeStructure(51, "wall", {4.9, 5.5, 0}, {5.1, 8.5, 3}));
+  CommitToOffice(folder_.path(), std::move(delta));
+  auto request = Ask(3000 * kSecond, 3009 * kSecond);
+  request.set_line_of_sight(true);
+  const auto spans = [&](TimeNs gap_ns) {
+    request.set_sight_gap_ns_max(gap_ns);
+    const auto reply = Get(request);
+    EXPECT_TRUE(reply.ok()) << reply.status();
+    std::vector<int64_t> tenths;
+    for (const auto& one : reply->encounters()) {
+      for (const TimeNs at_ns : {one.from_ns(), one.to_ns()}) {
+        tenths.push_back((at_ns - 3000 * kSecond + kSecond / 20) / (kSecond / 10));
+      }
+    }
+    return tenths;
+  };
+  using Spans = std::vector<int64_t>;
+  EXPECT_EQ(spans(1), Spans({0, 20, 25, 50, 80, 90}));
+  EXPECT_EQ(spans(0), Spans({0, 50, 80, 90}));
+  EXPECT_EQ(spans(4 * kSecond), Spans({0, 90}));
+}
+
 TEST_F(Encounters, RefuseBadQuestions) {
   auto request = Ask(5, 5);
   EXPECT_EQ(ReasonOf(Get(request).status()), Reason::kTimeRangeInverted);
@@ -186,6 +245,9 @@ TEST_F(Encounters, RefuseBadQuestions) {
   EXPECT_EQ(ReasonOf(Get(request).status()), Reason::kFieldInvalid);
   request.set_distance_m(std::numeric_limits<double>::quiet_NaN());
   EXPECT_EQ(ReasonOf(Get(request).status()), Reason::kNumberNotFinite);
+  request = Ask(0, kSecond);
+  request.set_sight_gap_ns_max(-1);
+  EXPECT_EQ(ReasonOf(Get(request).status()), Reason::kFieldInvalid);
   request = Ask(0, kSecond);
   request.set_agent("nobody");
   EXPECT_EQ(ReasonOf(Get(request).status()), Reason::kAgentUnknown);
