@@ -161,6 +161,7 @@ absl::Status ListInteractions(const Page& page, AgentNames* names, const CallCon
   ChangeKey last;
   for (const ObjectChange& change : asked) {
     if (!page.is_first() && KeyOf(change) <= question.after) continue;
+    DSG_RETURN_IF_ERROR(call.Check());
     DSG_ASSIGN_OR_RETURN(const Verdict verdict, finder.Examine(change, stop));
     if (!IsShown(question, verdict)) continue;
     if (reply->interactions_size() == page.size || bytes > kPageBytesSoftMax) {

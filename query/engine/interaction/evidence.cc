@@ -2,15 +2,13 @@
 #include "query/engine/interaction/evidence.h"
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 #include <string>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "query/engine/interaction/carried.h"
-#include "query/engine/interaction/hands.h"
+#include "query/engine/interaction/evidence_rows.h"
 #include "query/engine/interaction/track_path.h"
 #include "query/engine/interaction/weights.h"
 #include "schema/base/status.h"
@@ -19,9 +17,10 @@
 namespace dsg::query {
 namespace {
 
-double Seconds(TimeNs from_ns, TimeNs to_ns) {
-  return static_cast<double>(TimeApart(from_ns, to_ns)) / static_cast<double>(kNsPerSecond);
-}
+// Who is about at that time, and so far away, may have come near while nobody looked.
+constexpr double kAboutM = 4.0;
+// A robot sees what people do so far away, along the floor.
+constexpr double kWatchM = 6.0;
 
 bool IsHandEdge(const GraphView& view, NodeId agent, NodeId object) {
   const std::optional<Symbol> near = view.symbols().Find(relations::kNear);
@@ -62,80 +61,36 @@ absl::StatusOr<std::optional<HandEdge>> FindHandEdge(const Snapshot& snapshot, N
   return hand;
 }
 
-void AddHand(const ObjectChange& change, NodeId agent, const Nearness& near, bool has_edge,
-             Suspect* out) {
-  const std::string source =
-      has_edge ? absl::StrCat(ToString(agent), " NEAR ", ToString(change.object)) : ToString(agent);
-  if (!near.hand_m.has_value()) {
-    out->evidence.push_back({"hand_distance", weights::kHandUnseen, 0.0, near.visit.from_ns,
-                             near.visit.to_ns, ToString(agent),
-                             "no hand of theirs was seen while within reach"});
-    return;
-  }
-  const double deviations = *near.hand_m / weights::kHandSigmaM;
-  const double weight =
-      std::max(weights::kHandFloor, weights::kHandAtBox - 0.5 * deviations * deviations);
-  out->evidence.push_back(
-      {"hand_distance", weight, *near.hand_m, near.hand_ns, near.hand_ns, source,
-       absl::StrFormat("a hand came within %.2f m of the object", *near.hand_m)});
+const Hold* FindHold(const std::vector<Hold>& holds, NodeId agent) {
+  const auto hold =
+      std::find_if(holds.begin(), holds.end(), [&](const Hold& one) { return one.agent == agent; });
+  return hold == holds.end() ? nullptr : &*hold;
 }
 
-void AddVisit(const ObjectChange& change, NodeId agent, const Nearness& near, Suspect* out) {
-  const std::string source = ToString(agent);
-  out->evidence.push_back(
-      {"dwell", weights::kDwell * std::log1p(near.dwell_s / 2.0), near.dwell_s, near.visit.from_ns,
-       near.visit.to_ns, source,
-       absl::StrFormat("spent %.1f s within %.1f m of the object", near.dwell_s, kDwellM)});
-  const bool is_inside =
-      near.visit.from_ns >= change.earliest_ns && near.visit.to_ns <= change.latest_ns;
-  out->evidence.push_back({"visit_window", is_inside ? weights::kVisitWindow : 0.0,
-                           is_inside ? 1.0 : 0.0, near.visit.from_ns, near.visit.to_ns,
-                           ToString(change.object),
-                           is_inside ? "came and went between the two looks at the object"
-                                     : "was within reach at one of the two looks as well"});
-  if (near.unobserved_share > 0.0) {
-    out->evidence.push_back(
-        {"unobserved", weights::kUnobserved * near.unobserved_share, near.unobserved_share,
-         near.visit.from_ns, near.visit.to_ns, source,
-         absl::StrFormat("%.0f %% of the visit was not observed", 100.0 * near.unobserved_share)});
-  }
+// Whether it may have been taken at this visit to be held then, or put after that.
+bool IsBeforeOrWhile(const ObjectChange& change, const Visit& visit, const Hold& hold) {
+  if (!visit.is_seen) return false;
+  return change.type == ChangeType::kPicked ? visit.during.from_ns <= hold.during.to_ns
+                                            : visit.during.to_ns >= hold.during.from_ns;
 }
 
-Suspect FalseChange(const ObjectChange& change, const std::vector<OtherEnd>& ends) {
-  Suspect none;
-  none.alternative = kFalseChange;
-  none.at_ns = change.latest_ns;
-  const auto count = static_cast<double>(std::min<int64_t>(change.observation_count, 10));
-  none.evidence.push_back({"prior",
-                           weights::kFalseChange + weights::kFalseChangePerObservation * count,
-                           count, change.earliest_ns, change.latest_ns, ToString(change.object),
-                           "the mapper may be wrong, the less the more often it saw the object"});
+// What came before and after the instant at which the agent is thought to have been there.
+void AddWay(const ObjectChange& change, const std::vector<OtherEnd>& ends, Suspect* out) {
+  const bool is_picked = change.type == ChangeType::kPicked;
+  if (!is_picked) AddDelay(change, out);
   for (const OtherEnd& end : ends) {
-    if (end.distance_m > kReachM || end.room != change.room) continue;
-    none.evidence.push_back(
-        {"moved", weights::kMovedAside, end.distance_m, end.at_ns, end.at_ns,
+    const TimeNs after_ns = is_picked ? out->at_ns : AddTime(end.at_ns, -kNsPerSecond);
+    const TimeNs until_ns = is_picked ? end.at_ns : out->at_ns;
+    const std::optional<TimeNs> visit_ns = FirstVisit(end, out->agent, after_ns, until_ns);
+    if (!visit_ns.has_value()) continue;
+    out->evidence.push_back(
+        {"carried", weights::kCarried, end.distance_m, *visit_ns, end.at_ns,
          end.is_same_as ? absl::StrCat(ToString(change.object), " SAME_AS ", ToString(end.object))
                         : ToString(end.object),
-         absl::StrFormat("a %s is %.1f m away in the same room: moved rather "
-                         "than taken",
-                         change.class_name, end.distance_m)});
+         absl::StrFormat("was also where a %s %s, %.1f m from here", change.class_name,
+                         is_picked ? "appeared afterwards" : "was taken before", end.distance_m)});
     break;
   }
-  return none;
-}
-
-// During the longest part of the interval nobody may have been looked at; each of its seconds
-// counts alike.
-Suspect Unseen(const ObjectChange& change, double seen_s) {
-  Suspect unseen;
-  unseen.alternative = kUnseen;
-  unseen.at_ns = change.earliest_ns + (change.latest_ns - change.earliest_ns) / 2;
-  const double alone_s = std::max(0.0, Seconds(change.earliest_ns, change.latest_ns) - seen_s);
-  unseen.evidence.push_back(
-      {"prior", std::log(weights::kUnseenRatePerS * std::max(alone_s, 1.0)), alone_s,
-       change.earliest_ns, change.latest_ns, ToString(change.object),
-       absl::StrFormat("for %.0f s nobody who was tracked was within reach", alone_s)});
-  return unseen;
 }
 
 }  // namespace
@@ -148,71 +103,111 @@ absl::StatusOr<EvidenceFinder> EvidenceFinder::Make(const Snapshot& snapshot, co
   return finder;
 }
 
-absl::StatusOr<std::vector<NodeId>> EvidenceFinder::AgentsNear(const ObjectChange& change,
-                                                               const StopCheck& stop) const {
-  std::set<NodeId> agents;
-  const TimeNs to_ns = AddTime(change.latest_ns, 1);
+absl::StatusOr<std::map<NodeId, bool>> EvidenceFinder::AgentsNear(const ObjectChange& change,
+                                                                  const StopCheck& stop) const {
+  std::map<NodeId, bool> agents;
+  const TimeNs from_ns = AddTime(change.earliest_ns, -kAboutNs);
+  const TimeNs to_ns = AddTime(change.latest_ns, kAboutNs);
+  const auto add = [&](NodeId agent, TimeNs enter_ns, TimeNs exit_ns) {
+    bool& was_there = agents[agent];
+    was_there = was_there || (enter_ns <= change.latest_ns && exit_ns > change.earliest_ns);
+  };
   if (!change.room.empty()) {
     DSG_ASSIGN_OR_RETURN(const std::vector<Stay> stays,
-                         snapshot_->StaysInNode(change.room, change.earliest_ns, to_ns, stop));
-    for (const Stay& stay : stays) agents.insert(stay.agent);
+                         snapshot_->StaysInNode(change.room, from_ns, to_ns, stop));
+    for (const Stay& stay : stays) add(stay.agent, stay.enter_ns, stay.exit_ns);
   }
-  const Eigen::Vector3d reach = Eigen::Vector3d::Constant(kReachM);
-  const Box3d box(change.box_map.min() - reach, change.box_map.max() + reach);
+  const Eigen::Vector3d about = Eigen::Vector3d::Constant(kAboutM);
+  const Box3d box(change.box_map.min() - about, change.box_map.max() + about);
   DSG_ASSIGN_OR_RETURN(const std::vector<BoxVisit> visits,
-                       snapshot_->VisitsToBox(box, change.earliest_ns, to_ns, stop));
-  for (const BoxVisit& visit : visits) agents.insert(visit.agent);
-  std::erase_if(agents, [&](NodeId agent) {
-    const auto track = tracks_.find(agent);
+                       snapshot_->VisitsToBox(box, from_ns, to_ns, stop));
+  for (const BoxVisit& visit : visits) agents.try_emplace(visit.agent, false);
+  std::erase_if(agents, [&](const auto& agent) {
+    const auto track = tracks_.find(agent.first);
     if (track == tracks_.end()) return true;
-    return track->second.kind != kinds::kHuman && !IsHandEdge(*view_, agent, change.object);
+    return track->second.kind != kinds::kHuman && !IsHandEdge(*view_, agent.first, change.object);
   });
-  return std::vector<NodeId>(agents.begin(), agents.end());
+  return agents;
 }
 
-absl::StatusOr<Suspect> EvidenceFinder::Weigh(const ObjectChange& change, const TrackInfo& track,
-                                              const std::vector<OtherEnd>& ends,
-                                              const StopCheck& stop) const {
+absl::StatusOr<Suspect> EvidenceFinder::WeighVisit(const ObjectChange& change, NodeId agent,
+                                                   const Leads& leads, Visit visit) const {
+  const Hold* const hold = FindHold(leads.holds, agent);
+  Suspect candidate;
+  candidate.agent = agent;
+  candidate.at_ns = visit.is_seen
+                        ? visit.torso_ns
+                        : visit.during.from_ns + (visit.during.to_ns - visit.during.from_ns) / 2;
+  DSG_ASSIGN_OR_RETURN(const auto edge,
+                       FindHandEdge(*snapshot_, agent, change.object, visit.during));
+  if (edge.has_value() && !visit.hand_m.has_value()) {
+    visit.hand_m = edge->distance_m;
+    visit.hand_ns = edge->closest_ns;
+  }
+  if (visit.hand_m.has_value()) candidate.at_ns = visit.hand_ns;
+  if (visit.is_seen || visit.hand_m.has_value()) {
+    AddHand(change, agent, visit, edge.has_value(), &candidate);
+    AddVisit(change, agent, visit, &candidate);
+  } else {
+    candidate.was_near = false;
+    AddPossibleVisit(agent, visit, &candidate);
+  }
+  if (hold != nullptr && IsBeforeOrWhile(change, visit, *hold)) AddHeld(change, *hold, &candidate);
+  AddWay(change, leads.ends, &candidate);
+  return candidate;
+}
+
+absl::StatusOr<std::optional<Suspect>> EvidenceFinder::Weigh(const ObjectChange& change,
+                                                             const TrackInfo& track,
+                                                             const Leads& leads, bool was_there,
+                                                             const StopCheck& stop,
+                                                             double* seen_s) const {
+  const Interval during{change.earliest_ns, change.latest_ns};
+  DSG_ASSIGN_OR_RETURN(const Nearness near,
+                       MeasureNearness(*snapshot_, track, change.box_map, during, stop));
+  std::optional<Suspect> best;
+  // Who had it in hand was there, whoever looked.
+  if (const Hold* const hold = FindHold(leads.holds, track.agent); hold != nullptr) {
+    best = Holder(change, *hold);
+    AddWay(change, leads.ends, &*best);
+  }
+  for (const Visit& visit : near.visits) {
+    DSG_ASSIGN_OR_RETURN(Suspect candidate, WeighVisit(change, track.agent, leads, visit));
+    if (visit.is_seen) *seen_s += SecondsBetween(visit.during.from_ns, visit.during.to_ns);
+    if (best.has_value() && candidate.LogOdds() <= best->LogOdds()) continue;
+    best = std::move(candidate);
+  }
+  if (best.has_value() || !was_there) return best;
   Suspect candidate;
   candidate.agent = track.agent;
-  const Interval during{change.earliest_ns, change.latest_ns};
-  DSG_ASSIGN_OR_RETURN(Nearness near,
-                       MeasureNearness(*snapshot_, track, change.box_map, during, stop));
+  candidate.was_near = false;
   candidate.at_ns = near.torso_m.has_value() ? near.torso_ns : change.earliest_ns;
-  if (!near.reached) {
-    candidate.evidence.push_back(
-        {"dwell", weights::kOutOfReach, near.torso_m.value_or(0.0), change.earliest_ns,
-         change.latest_ns, ToString(track.agent),
-         near.torso_m.has_value()
-             ? absl::StrFormat("was in the room, but came no nearer than %.1f m", *near.torso_m)
-             : std::string("was in the room, but no pose of theirs says where")});
-    return candidate;
-  }
-  DSG_ASSIGN_OR_RETURN(const auto edge,
-                       FindHandEdge(*snapshot_, track.agent, change.object, during));
-  if (edge.has_value() && !near.hand_m.has_value()) {
-    near.hand_m = edge->distance_m;
-    near.hand_ns = edge->closest_ns;
-  }
-  if (near.hand_m.has_value()) candidate.at_ns = near.hand_ns;
-  AddHand(change, track.agent, near, edge.has_value(), &candidate);
-  AddVisit(change, track.agent, near, &candidate);
-  for (const OtherEnd& end : ends) {
-    const bool is_picked = change.type == ChangeType::kPicked;
-    const TimeNs after_ns = is_picked ? near.visit.to_ns : AddTime(end.at_ns, -kNsPerSecond);
-    const TimeNs until_ns = is_picked ? end.at_ns : near.visit.from_ns;
-    DSG_ASSIGN_OR_RETURN(const auto visit_ns, FirstVisit(*snapshot_, track.agent, end.box_map,
-                                                         after_ns, until_ns, stop));
-    if (!visit_ns.has_value()) continue;
-    candidate.evidence.push_back(
-        {"carried", weights::kCarried, end.distance_m, *visit_ns, end.at_ns,
-         end.is_same_as ? absl::StrCat(ToString(change.object), " SAME_AS ", ToString(end.object))
-                        : ToString(end.object),
-         absl::StrFormat("was also where a %s %s, %.1f m from here", change.class_name,
-                         is_picked ? "appeared afterwards" : "was taken before", end.distance_m)});
-    break;
-  }
+  candidate.evidence.push_back(
+      {"dwell", weights::kOutOfReach, near.torso_m.value_or(0.0), change.earliest_ns,
+       change.latest_ns, ToString(track.agent),
+       near.torso_m.has_value()
+           ? absl::StrFormat("was in the room, but came no nearer than %.1f m", *near.torso_m)
+           : std::string("was in the room, but no pose of theirs says where")});
   return candidate;
+}
+
+absl::StatusOr<double> EvidenceFinder::SecondsAway(const ObjectChange& change,
+                                                   const StopCheck& stop) const {
+  const auto is_robot = [](const auto& track) {
+    return track.second.kind == kinds::kRobot && track.second.pose_count > 1;
+  };
+  if (std::none_of(tracks_.begin(), tracks_.end(), is_robot)) return 0.0;
+  const Eigen::Vector3d watch = Eigen::Vector3d::Constant(kWatchM);
+  const Box3d box(change.box_map.min() - watch, change.box_map.max() + watch);
+  DSG_ASSIGN_OR_RETURN(const std::vector<BoxVisit> visits,
+                       snapshot_->VisitsToBox(box, change.earliest_ns, change.latest_ns, stop));
+  double away_s = SecondsBetween(change.earliest_ns, change.latest_ns);
+  for (const BoxVisit& visit : visits) {
+    const auto track = tracks_.find(visit.agent);
+    if (track == tracks_.end() || !is_robot(*track)) continue;
+    away_s -= SecondsBetween(visit.enter_ns, visit.exit_ns);
+  }
+  return std::max(0.0, away_s);
 }
 
 std::vector<SameAgent> EvidenceFinder::Identities(const std::vector<Suspect>& candidates) const {
@@ -239,19 +234,23 @@ std::vector<SameAgent> EvidenceFinder::Identities(const std::vector<Suspect>& ca
 
 absl::StatusOr<Verdict> EvidenceFinder::Examine(const ObjectChange& change,
                                                 const StopCheck& stop) const {
-  const std::vector<OtherEnd> ends = FindOtherEnds(*view_, change, *all_);
-  DSG_ASSIGN_OR_RETURN(const std::vector<NodeId> agents, AgentsNear(change, stop));
+  Leads leads;
+  DSG_ASSIGN_OR_RETURN(leads.ends, FindOtherEnds(*snapshot_, *view_, change, *all_, stop));
+  leads.holds = FindHolds(*view_, change);
+  DSG_ASSIGN_OR_RETURN(auto agents, AgentsNear(change, stop));
+  for (const Hold& hold : leads.holds) {
+    if (tracks_.contains(hold.agent)) agents.try_emplace(hold.agent, false);
+  }
   std::vector<Suspect> candidates;
   double seen_s = 0.0;
-  for (const NodeId agent : agents) {
-    DSG_ASSIGN_OR_RETURN(Suspect candidate, Weigh(change, tracks_.at(agent), ends, stop));
-    for (const EvidenceRow& row : candidate.evidence) {
-      if (row.kind == "visit_window") seen_s += Seconds(row.from_ns, row.to_ns);
-    }
-    candidates.push_back(std::move(candidate));
+  for (const auto& [agent, was_there] : agents) {
+    DSG_ASSIGN_OR_RETURN(std::optional<Suspect> candidate,
+                         Weigh(change, tracks_.at(agent), leads, was_there, stop, &seen_s));
+    if (candidate.has_value()) candidates.push_back(*std::move(candidate));
   }
-  candidates.push_back(Unseen(change, seen_s));
-  candidates.push_back(FalseChange(change, ends));
+  DSG_ASSIGN_OR_RETURN(const double away_s, SecondsAway(change, stop));
+  candidates.push_back(Unseen(change, seen_s, away_s));
+  candidates.push_back(FalseChange(change, leads.ends, leads.holds));
   std::vector<SameAgent> same = Identities(candidates);
   return Judge(std::move(candidates), std::move(same));
 }

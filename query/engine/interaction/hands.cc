@@ -28,9 +28,74 @@ double Seconds(uint64_t span_ns) {
   return static_cast<double>(span_ns) / static_cast<double>(kNsPerSecond);
 }
 
-class TorsoMeter {
+// Walks along a path once, in time.
+class VisitFinder {
  public:
-  TorsoMeter(const Box3d& box_map, Nearness* out) : box_map_(box_map), out_(*out) {}
+  VisitFinder(const Box3d& box_map, const Interval& during, Nearness* out)
+      : box_map_(box_map), during_(during), out_(*out) {}
+
+  void Walk(const TrackPath& path) {
+    if (path.points.empty()) return;
+    Appear(path.points.front());
+    for (size_t i = 0; i < path.points.size(); ++i) {
+      const TrackPoint& point = path.points[i];
+      if (point.time_ns >= during_.from_ns && point.time_ns <= during_.to_ns) {
+        See(point.time_ns, point.position_map);
+      }
+      if (i + 1 == path.points.size()) break;
+      const TrackPoint& next = path.points[i + 1];
+      if (path.IsJoined(i)) {
+        Follow(point, next);
+      } else if (TimeApart(point.time_ns, next.time_ns) <= uint64_t{2} * kAboutNs) {
+        MayVisit(ComeBy(point), LeaveBy(next));
+      } else {
+        Vanish(point);
+        Appear(next);
+      }
+    }
+    Vanish(path.points.back());
+  }
+
+ private:
+  TimeNs WayNs(const TrackPoint& point) const {
+    const double way_m = std::max(0.0, FloorDistance(point.position_map, box_map_) - kReachM);
+    return static_cast<TimeNs>(std::min(way_m / kWalkMS, 1e6) * static_cast<double>(kNsPerSecond));
+  }
+  TimeNs ComeBy(const TrackPoint& point) const { return AddTime(point.time_ns, WayNs(point)); }
+  TimeNs LeaveBy(const TrackPoint& point) const { return AddTime(point.time_ns, -WayNs(point)); }
+
+  // Who was away for long may have been anywhere meanwhile, and here in no particular.
+  void Vanish(const TrackPoint& point) {
+    MayVisit(ComeBy(point), AddTime(point.time_ns, kAboutNs));
+    is_open_ = false;
+  }
+  void Appear(const TrackPoint& point) {
+    MayVisit(AddTime(point.time_ns, -kAboutNs), LeaveBy(point));
+  }
+
+  Visit& Open(TimeNs at_ns) {
+    if (!is_open_) {
+      Visit visit;
+      visit.during = {at_ns, at_ns};
+      out_.visits.push_back(visit);
+    }
+    is_open_ = true;
+    return out_.visits.back();
+  }
+
+  // Nobody looked; it may have been within reach all the while.
+  void MayVisit(TimeNs from_ns, TimeNs to_ns) {
+    from_ns = std::max(from_ns, during_.from_ns);
+    to_ns = std::min(to_ns, during_.to_ns);
+    was_near_ = false;
+    if (from_ns >= to_ns) {
+      is_open_ = false;
+      return;
+    }
+    Visit& visit = Open(from_ns);
+    visit.unseen_s += Seconds(TimeApart(from_ns, to_ns));
+    visit.during.to_ns = to_ns;
+  }
 
   void See(TimeNs at_ns, const Eigen::Vector3d& torso_map) {
     const double distance_m = FloorDistance(torso_map, box_map_);
@@ -38,62 +103,47 @@ class TorsoMeter {
       out_.torso_m = distance_m;
       out_.torso_ns = at_ns;
     }
-    if (distance_m <= kReachM) {
-      if (!out_.reached) out_.visit = {at_ns, at_ns};
-      out_.reached = true;
-      out_.visit.to_ns = at_ns;
-    }
     was_near_ = distance_m <= kDwellM;
+    if (distance_m > kReachM) {
+      is_open_ = false;
+      return;
+    }
+    Visit& visit = Open(at_ns);
+    if (!visit.is_seen || distance_m < visit.torso_m) {
+      visit.torso_m = distance_m;
+      visit.torso_ns = at_ns;
+    }
+    if (!visit.is_seen) visit.seen.from_ns = at_ns;
+    visit.is_seen = true;
+    visit.seen.to_ns = at_ns;
+    visit.during.to_ns = at_ns;
   }
 
-  void Step(const TrackPoint& a, const TrackPoint& b, TimeNs from_ns, TimeNs to_ns) {
+  void Follow(const TrackPoint& a, const TrackPoint& b) {
+    TimeNs from_ns = std::max(a.time_ns, during_.from_ns);
+    const TimeNs to_ns = std::min(b.time_ns, during_.to_ns);
+    if (from_ns >= to_ns) return;
+    See(from_ns, PositionBetween(a, b, from_ns));
     while (from_ns < to_ns) {
       const TimeNs next_ns = std::min(to_ns, from_ns + kStepNs);
       const bool was_near = was_near_;
       See(next_ns, PositionBetween(a, b, next_ns));
-      if (was_near && was_near_) out_.dwell_s += Seconds(TimeApart(from_ns, next_ns));
+      if (was_near && was_near_) {
+        out_.visits.back().dwell_s += Seconds(TimeApart(from_ns, next_ns));
+      }
       from_ns = next_ns;
     }
   }
 
- private:
   const Box3d& box_map_;
+  const Interval during_;
   Nearness& out_;
+  bool is_open_ = false;
   bool was_near_ = false;
 };
 
-void MeasureTorso(const TrackPath& path, const Box3d& box_map, const Interval& during,
-                  Nearness* out) {
-  TorsoMeter meter(box_map, out);
-  for (size_t i = 0; i < path.points.size(); ++i) {
-    const TrackPoint& point = path.points[i];
-    if (point.time_ns >= during.from_ns && point.time_ns <= during.to_ns) {
-      meter.See(point.time_ns, point.position_map);
-    }
-    if (i + 1 == path.points.size() || !path.IsJoined(i)) continue;
-    const TimeNs from_ns = std::max(point.time_ns, during.from_ns);
-    const TimeNs to_ns = std::min(path.points[i + 1].time_ns, during.to_ns);
-    if (from_ns >= to_ns) continue;
-    meter.See(from_ns, PositionBetween(point, path.points[i + 1], from_ns));
-    meter.Step(point, path.points[i + 1], from_ns, to_ns);
-  }
-}
-
-double GapShare(const TrackPath& path, const Interval& visit) {
-  if (visit.from_ns >= visit.to_ns) return 0.0;
-  uint64_t gap_ns = 0;
-  for (size_t i = 0; i + 1 < path.points.size(); ++i) {
-    if (path.IsJoined(i)) continue;
-    const TimeNs from_ns = std::max(path.points[i].time_ns, visit.from_ns);
-    const TimeNs to_ns = std::min(path.points[i + 1].time_ns, visit.to_ns);
-    if (from_ns < to_ns) gap_ns += TimeApart(from_ns, to_ns);
-  }
-  return Seconds(gap_ns) / Seconds(TimeApart(visit.from_ns, visit.to_ns));
-}
-
 absl::Status MeasureHands(const Snapshot& snapshot, NodeId agent, const Box3d& box_map,
-                          const StopCheck& stop, Nearness* out) {
-  absl::Status status;
+                          const StopCheck& stop, Visit* out) {
   const auto visit = [&](const ShownShape& shown) {
     const std::vector<float>& joints = shown.shape.joints;
     if (joints.size() < 3 * kJointCount) return true;
@@ -111,7 +161,7 @@ absl::Status MeasureHands(const Snapshot& snapshot, NodeId agent, const Box3d& b
     }
     return true;
   };
-  return snapshot.ReadShapes(agent, out->visit.from_ns, AddTime(out->visit.to_ns, 1),
+  return snapshot.ReadShapes(agent, out->during.from_ns, AddTime(out->during.to_ns, 1),
                              /*with_vertices=*/false, stop, visit);
 }
 
@@ -121,12 +171,15 @@ absl::StatusOr<Nearness> MeasureNearness(const Snapshot& snapshot, const TrackIn
                                          const Box3d& box_map, const Interval& during,
                                          const StopCheck& stop) {
   Nearness result;
+  // What nobody saw lies between what was seen before and after.
   DSG_ASSIGN_OR_RETURN(const TrackPath path,
-                       ReadTrackPath(snapshot, track, during.from_ns, during.to_ns, stop));
-  MeasureTorso(path, box_map, during, &result);
-  if (!result.reached) return result;
-  result.unobserved_share = GapShare(path, result.visit);
-  DSG_RETURN_IF_ERROR(MeasureHands(snapshot, track.agent, box_map, stop, &result));
+                       ReadTrackPath(snapshot, track, AddTime(during.from_ns, -kAboutNs),
+                                     AddTime(during.to_ns, kAboutNs), stop));
+  VisitFinder(box_map, during, &result).Walk(path);
+  for (Visit& visit : result.visits) {
+    if (!visit.is_seen) continue;
+    DSG_RETURN_IF_ERROR(MeasureHands(snapshot, track.agent, box_map, stop, &visit));
+  }
   return result;
 }
 

@@ -12,11 +12,14 @@ namespace dsg::query {
 namespace {
 
 constexpr TimeNs kSettleNs = 10 * kNsPerSecond;
+// From farther away robots overlook small things, along the floor.
+constexpr double kLookM = 4.0;
 
 class ChangeFinder {
  public:
-  ChangeFinder(const Snapshot& snapshot, const GraphView& view, const ChangeFilter& filter)
-      : snapshot_(snapshot), view_(view), filter_(filter) {}
+  ChangeFinder(const Snapshot& snapshot, const GraphView& view, const ChangeFilter& filter,
+               const StopCheck& stop)
+      : snapshot_(snapshot), view_(view), filter_(filter), stop_(stop) {}
 
   absl::Status Begin() {
     DSG_ASSIGN_OR_RETURN(const MapStats stats, snapshot_.Stats());
@@ -25,7 +28,7 @@ class ChangeFinder {
     return absl::OkStatus();
   }
 
-  absl::Status Add(const ViewNode& node, std::vector<ObjectChange>* out) const {
+  absl::Status Add(const ViewNode& node, std::vector<ObjectChange>* out) {
     if (!filter_.class_name.empty() &&
         view_.symbols().Text(node.class_name) != filter_.class_name) {
       return absl::OkStatus();
@@ -50,13 +53,18 @@ class ChangeFinder {
     return absl::OkStatus();
   }
 
-  absl::Status AddPlaced(const ViewNode& node, std::vector<ObjectChange>* out) const {
-    const TimeNs look_ns = FirstLook(node);
+  absl::Status AddPlaced(const ViewNode& node, std::vector<ObjectChange>* out) {
+    TimeNs look_ns = FirstLook(node);
     if (AddTime(look_ns, kSettleNs) > node.valid.from_ns) return absl::OkStatus();
     DSG_ASSIGN_OR_RETURN(const Node full, snapshot_.GetNode(node.id));
+    DSG_RETURN_IF_ERROR(ReadRobots());
+    const std::optional<TimeNs> near_ns = FirstRobotNear(full.BoxMap());
+    look_ns = std::max(look_ns, near_ns.value_or(kTimeMin));
+    if (AddTime(look_ns, kSettleNs) > node.valid.from_ns) return absl::OkStatus();
     ObjectChange change = Describe(node, full, node.valid.from_ns);
     change.type = ChangeType::kPlaced;
     change.earliest_ns = look_ns;
+    change.is_passed_by = near_ns.has_value();
     change.latest_ns = node.valid.from_ns;
     Keep(std::move(change), out);
     return absl::OkStatus();
@@ -70,6 +78,36 @@ class ChangeFinder {
                           std::find(change.ancestors.begin(), change.ancestors.end(),
                                     filter_.below) != change.ancestors.end();
     if (is_below) out->push_back(std::move(change));
+  }
+
+  absl::Status ReadRobots() {
+    if (has_robots_) return absl::OkStatus();
+    DSG_ASSIGN_OR_RETURN(const std::vector<TrackInfo> tracks, snapshot_.Tracks());
+    for (const TrackInfo& track : tracks) {
+      if (track.kind != kinds::kRobot || track.pose_count == 0) continue;
+      DSG_ASSIGN_OR_RETURN(TrackPath path,
+                           ReadTrackPath(snapshot_, track, track.first_ns, track.last_ns, stop_));
+      robots_.push_back(std::move(path));
+    }
+    has_robots_ = true;
+    return absl::OkStatus();
+  }
+
+  // nullopt where none ever came near: something else looks there.
+  std::optional<TimeNs> FirstRobotNear(const Box3d& box_map) const {
+    std::optional<TimeNs> first_ns;
+    const Eigen::Array2d low = box_map.min().head<2>().array() - kLookM;
+    const Eigen::Array2d high = box_map.max().head<2>().array() + kLookM;
+    for (const TrackPath& path : robots_) {
+      const auto near =
+          std::find_if(path.points.begin(), path.points.end(), [&](const TrackPoint& point) {
+            const Eigen::Array2d at = point.position_map.head<2>().array();
+            return (at >= low).all() && (at <= high).all();
+          });
+      if (near == path.points.end()) continue;
+      first_ns = std::min(first_ns.value_or(near->time_ns), near->time_ns);
+    }
+    return first_ns;
   }
 
   // When the place of an object was first seen; kTimeMax where nothing tells.
@@ -114,7 +152,10 @@ class ChangeFinder {
   const Snapshot& snapshot_;
   const GraphView& view_;
   const ChangeFilter& filter_;
+  const StopCheck& stop_;
   std::optional<TimeNs> first_pose_ns_;
+  bool has_robots_ = false;
+  std::vector<TrackPath> robots_;
   std::optional<Symbol> contains_;
 };
 
@@ -124,7 +165,7 @@ absl::StatusOr<std::vector<ObjectChange>> FindChanges(const Snapshot& snapshot,
                                                       const GraphView& view,
                                                       const ChangeFilter& filter,
                                                       const StopCheck& stop) {
-  ChangeFinder finder(snapshot, view, filter);
+  ChangeFinder finder(snapshot, view, filter, stop);
   DSG_RETURN_IF_ERROR(finder.Begin());
   std::vector<ObjectChange> changes;
   if (!filter.object.empty()) {

@@ -32,6 +32,8 @@ struct ObjectChange {
   TimeNs earliest_ns = 0;
   TimeNs latest_ns = 0;
   int64_t observation_count = 0;
+  /// Its spot is one that a robot passes, and looks at only then.
+  bool is_passed_by = false;
 };
 
 /// Compares as the answer is ordered. An object may be put and picked.
@@ -60,7 +62,9 @@ struct ChangeFilter {
 /// Changes whose interval touches the filter's, ascending by KeyOf.
 /// Picked: the object's validity ended; from its last observation on.
 /// Placed: its validity began at least 10 s (two updates of a mapper) after its place was first
-/// known, or after the map's first pose where the place has no begin.
+/// known, or after the map's first pose where the place has no begin; and, in a map that a robot
+/// made, after the robot first came within 4 m of it, since from farther small things are
+/// overlooked.
 absl::StatusOr<std::vector<ObjectChange>> FindChanges(const Snapshot& snapshot,
                                                       const GraphView& view,
                                                       const ChangeFilter& filter,

@@ -100,8 +100,11 @@ using Triangle = std::array<Eigen::Vector3f, 3>;
 class MeshSight final : public Sight {
  public:
   MeshSight(const Snapshot& snapshot, std::vector<BlockIndex> blocks,
-            std::optional<std::set<uint32_t>> wall_labels)
-      : snapshot_(snapshot), blocks_(std::move(blocks)), wall_labels_(std::move(wall_labels)) {}
+            std::optional<std::set<uint32_t>> wall_labels, StopCheck stop)
+      : snapshot_(snapshot),
+        blocks_(std::move(blocks)),
+        wall_labels_(std::move(wall_labels)),
+        stop_(std::move(stop)) {}
 
   absl::StatusOr<bool> IsClear(const Eigen::Vector3d& from_map, const Eigen::Vector3d& to_map,
                                TimeNs) override {
@@ -136,6 +139,8 @@ class MeshSight final : public Sight {
     if (walls_.size() >= kBlocksKeptMax) walls_.clear();
     std::vector<Triangle>& walls = walls_[index];
     if (!std::binary_search(blocks_.begin(), blocks_.end(), index)) return &walls;
+    // A line through a hall reads hundreds of them.
+    DSG_RETURN_IF_ERROR(AskStop(stop_));
     DSG_ASSIGN_OR_RETURN(const MeshBlock block, snapshot_.ReadMeshBlock(index));
     for (const auto& face : block.faces) {
       if (!IsWall(block, face)) continue;
@@ -156,6 +161,7 @@ class MeshSight final : public Sight {
   std::vector<BlockIndex> blocks_;
   /// nullopt: the map has no labels, all surfaces count.
   std::optional<std::set<uint32_t>> wall_labels_;
+  const StopCheck stop_;
   std::map<BlockIndex, std::vector<Triangle>> walls_;
 };
 
@@ -172,7 +178,7 @@ absl::StatusOr<std::unique_ptr<Sight>> Sight::Make(const Snapshot& snapshot,
       if (IsWallLike(label.name)) walls->insert(static_cast<uint32_t>(label.id));
     }
     if (walls.has_value() && walls->empty()) walls.reset();
-    return std::make_unique<MeshSight>(snapshot, std::move(blocks), std::move(walls));
+    return std::make_unique<MeshSight>(snapshot, std::move(blocks), std::move(walls), stop);
   }
   NodeFilter filter;
   filter.kind = kinds::kStructure;

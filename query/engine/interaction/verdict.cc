@@ -42,6 +42,7 @@ void Share(const SameAgent& same, std::vector<Suspect>* candidates) {
                   absl::StrFormat("%s is %s, seen again, with probability %.2f",
                                   ToString(same.later), ToString(same.earlier), probability)};
   const TimeNs at_ns = later->at_ns;
+  const bool was_near = later->was_near;
   row.log_weight = std::log(std::max(1.0 - probability, 1e-6));
   later->probability -= moved;
   later->evidence.push_back(row);
@@ -50,10 +51,12 @@ void Share(const SameAgent& same, std::vector<Suspect>* candidates) {
     Suspect added;
     added.agent = same.earlier;
     added.at_ns = at_ns;
+    added.was_near = was_near;
     candidates->push_back(std::move(added));
     earlier = candidates->end() - 1;
   }
   row.log_weight = std::log1p(moved / std::max(earlier->probability, 1e-6));
+  earlier->was_near = earlier->was_near || was_near;
   if (moved > earlier->probability) earlier->at_ns = at_ns;
   earlier->probability += moved;
   earlier->evidence.push_back(std::move(row));
@@ -70,6 +73,10 @@ void Decide(Verdict* verdict) {
       verdict->reason = "most likely somebody whom nobody saw";
     } else if (best.alternative == kFalseChange) {
       verdict->reason = "most likely nothing was taken or put";
+    } else if (!best.was_near) {
+      verdict->abstained = true;
+      verdict->reason = absl::StrCat("the best, ", ToString(best.agent),
+                                     ", was about, but nobody saw it within reach");
     }
     return;
   }

@@ -30,6 +30,8 @@ struct Suspect {
   std::string alternative;
   double probability = 0.0;
   TimeNs at_ns = 0;
+  /// Seen within reach, or known to be somebody who was. Others are not named, however likely.
+  bool was_near = true;
   std::vector<EvidenceRow> evidence;
 
   double LogOdds() const;

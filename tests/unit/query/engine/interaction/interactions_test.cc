@@ -1,113 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
-#include <optional>
-#include <string>
-#include <utility>
-
-#include "dsg/v1/meetings.pb.h"
-#include "schema/base/status.h"
-#include "tests/unit/query/engine/office.h"
+#include "tests/unit/query/engine/interaction/interactions_fixture.h"
 
 namespace dsg::test {
 namespace {
-
-// A mug in R1 was last seen at 100 s and missed at 140 s.
-constexpr NodeId kMug('O', 10);
-const Eigen::Vector3d kMugAt(3.0, 5.0, 0.8);
-
-class Interactions : public testing::Test {
- protected:
-  Interactions() { MakeOffice(folder_.path()); }
-
-  void AddObject(NodeId id, const Eigen::Vector3d& at, TimeNs from_s, TimeNs to_s, TimeNs seen_s,
-                 NodeId place = NodeId('p', 1)) {
-    const Eigen::Vector3d half = Eigen::Vector3d::Constant(0.05);
-    Node node = MakeNode(id, layers::kObjects, kinds::kObject, "", Box3d(at - half, at + half));
-    node.class_name = "mug";
-    node.valid = {from_s * kSecond, to_s == 0 ? kTimeMax : to_s * kSecond};
-    node.last_observed_ns = seen_s * kSecond;
-    node.observation_count = 5;
-    Edge edge{place, relations::kContains, id};
-    edge.valid = node.valid;
-    delta_.edges.push_back(edge);
-    delta_.nodes.push_back(std::move(node));
-  }
-
-  void AddMug(TimeNs missed_s = 140) { AddObject(kMug, kMugAt, 20, missed_s, 100); }
-
-  // Stands at `at` from from_s to to_s, a pose each half second; the right hand is at `hand` in the
-  // middle of that, and beside the body else.
-  void AddPerson(uint64_t index, const Eigen::Vector3d& at, TimeNs from_s, TimeNs to_s,
-                 std::optional<Eigen::Vector3d> hand = std::nullopt) {
-    const NodeId agent('H', index);
-    Node node =
-        MakeNode(agent, layers::kAgents, kinds::kHuman, "p" + std::to_string(index), Box3d());
-    delta_.nodes.push_back(node);
-    TrajectoryAppend track{agent, {}};
-    ShapeAppend shapes;
-    shapes.agent = agent;
-    const TimeNs middle_ns = (from_s + to_s) * kSecond / 2;
-    for (TimeNs t = from_s * kSecond; t <= to_s * kSecond; t += kSecond / 2) {
-      track.poses.push_back(PoseAt(t, at.x(), at.y(), at.z()));
-      BodyShape shape;
-      shape.time_ns = t;
-      shape.joints.assign(72, 0.0F);
-      if (hand.has_value() && std::abs(t - middle_ns) <= kSecond / 2) {
-        for (int i = 0; i < 3; ++i) shape.joints[69 + i] = static_cast<float>((*hand - at)[i]);
-      }
-      shapes.shapes.push_back(shape);
-    }
-    delta_.appends.push_back(std::move(track));
-    delta_.shapes.push_back(std::move(shapes));
-    delta_.stays.push_back(
-        {agent, NodeId('p', 1), NodeId('R', 1), from_s * kSecond, to_s * kSecond});
-  }
-
-  v1::ListInteractionsRequest Ask() {
-    v1::ListInteractionsRequest request;
-    request.set_map(kMap);
-    request.set_object(ToString(kMug));
-    request.set_from_ns(0);
-    request.set_to_ns(1000 * kSecond);
-    request.add_types(v1::PICKED);
-    request.set_include_abstained(true);
-    return request;
-  }
-
-  absl::StatusOr<v1::ListInteractionsResponse> Get(const v1::ListInteractionsRequest& request) {
-    if (!delta_.nodes.empty()) CommitToOffice(folder_.path(), std::exchange(delta_, {}));
-    if (core_ == nullptr) core_ = OpenCore(folder_.path());
-    v1::ListInteractionsResponse reply;
-    const absl::Status status = core_->ListInteractions(query::CallContext(), request, &reply);
-    if (!status.ok()) return status;
-    return reply;
-  }
-
-  v1::Interaction GetOne() {
-    const auto reply = Get(Ask());
-    EXPECT_TRUE(reply.ok()) << reply.status();
-    if (!reply.ok() || reply->interactions_size() != 1) {
-      ADD_FAILURE() << "not one interaction";
-      return {};
-    }
-    double sum = 0.0;
-    for (const auto& one : reply->interactions(0).candidates()) sum += one.probability();
-    EXPECT_NEAR(sum, 1.0, 1e-9);
-    return reply->interactions(0);
-  }
-
-  static bool HasEvidence(const v1::InteractionCandidate& candidate, const std::string& kind) {
-    for (const auto& row : candidate.evidence()) {
-      if (row.kind() == kind && !row.source().empty() && !row.detail().empty()) return true;
-    }
-    return false;
-  }
-
-  TempFolder folder_;
-  GraphDelta delta_;
-  std::unique_ptr<query::ServiceCore> core_;
-};
 
 TEST_F(Interactions, NameWhoseHandWasAtTheObject) {
   AddMug();
@@ -155,16 +50,6 @@ TEST_F(Interactions, DoNotAccuseSomebodyWhoOnlyStoodInTheRoom) {
   EXPECT_NE(one.candidates(0).agent_name(), "p20");
 }
 
-TEST_F(Interactions, TakeAThingThatIsBesideItsOldSpotForMoved) {
-  AddMug();
-  AddObject(NodeId('O', 11), kMugAt + Eigen::Vector3d(0.6, 0, 0), 140, 0, 150);
-  AddPerson(20, {3.0, 5.5, 1.0}, 110, 118, kMugAt + Eigen::Vector3d(0, 0, 0.3));
-  const v1::Interaction one = GetOne();
-  EXPECT_TRUE(one.abstained()) << one.DebugString();
-  EXPECT_EQ(one.candidates(0).alternative(), "false_change");
-  EXPECT_TRUE(HasEvidence(one.candidates(0), "moved"));
-}
-
 TEST_F(Interactions, CountWhereTheThingWasCarried) {
   AddMug();
   AddPerson(20, {3.0, 5.5, 1.0}, 110, 118);
@@ -191,6 +76,111 @@ TEST_F(Interactions, ShareTheEvidenceOfATrackThatIsPerhapsAnEarlierOne) {
   EXPECT_TRUE(one.abstained());
   EXPECT_TRUE(HasEvidence(one.candidates(0), "identity"));
   EXPECT_TRUE(HasEvidence(one.candidates(1), "identity"));
+}
+
+// Comes from afar by 110 s, is not seen for 8 s, and is seen to leave.
+TEST_F(Interactions, CountWhoMayHaveBeenThereWhileNobodyLooked) {
+  AddMug();
+  AddPerson(20, {6.0, 5.0, 1.0}, 106, 110);
+  for (int t = 118; t <= 121; ++t) {
+    delta_.appends[0].poses.push_back(PoseAt(t * kSecond, 6.0, 5.0, 1.0));
+  }
+  const v1::Interaction one = GetOne();
+  EXPECT_TRUE(one.abstained()) << "seen by nobody within reach: " << one.DebugString();
+  ASSERT_TRUE(HasCandidate(one, "p20"));
+  EXPECT_TRUE(HasEvidence(Candidate(one, "p20"), "unobserved"));
+  EXPECT_FALSE(HasEvidence(Candidate(one, "p20"), "dwell"));
+}
+
+TEST_F(Interactions, DoNotSuspectWhoWasTooFarAwayToComeAndGoUnseen) {
+  AddMug();
+  AddPerson(20, {9.5, 9.5, 1.0}, 90, 110);
+  for (int t = 115; t <= 150; ++t) {
+    delta_.appends[0].poses.push_back(PoseAt(t * kSecond, 9.5, 9.5, 1.0));
+  }
+  const v1::Interaction one = GetOne();
+  ASSERT_TRUE(HasCandidate(one, "p20")) << "was in the room";
+  EXPECT_FALSE(HasEvidence(Candidate(one, "p20"), "unobserved"));
+  EXPECT_LT(Candidate(one, "p20").probability(), 0.05);
+}
+
+// Two seconds before the last look at the mug, two metres from it, and never again.
+TEST_F(Interactions, CountWhoWasLostOnTheWayThere) {
+  AddMug();
+  AddPerson(20, {5.0, 5.0, 1.0}, 90, 98);
+  const v1::Interaction one = GetOne();
+  EXPECT_TRUE(one.abstained());
+  ASSERT_TRUE(HasCandidate(one, "p20"));
+  EXPECT_TRUE(HasEvidence(Candidate(one, "p20"), "unobserved"));
+}
+
+TEST_F(Interactions, DoNotHoldAGapAgainstAHandThatWasFarBeforeIt) {
+  AddMug();
+  // Beside the mug until 112 s and from 120 s on, hands at the body.
+  AddPerson(20, {3.0, 6.0, 1.2}, 110, 112, kMugAt + Eigen::Vector3d(0, 1.0, 0.4));
+  for (int t = 120; t <= 122; ++t) {
+    delta_.appends[0].poses.push_back(PoseAt(t * kSecond, 3.0, 6.0, 1.2));
+  }
+  const v1::Interaction with_gap = GetOne();
+  ASSERT_TRUE(HasCandidate(with_gap, "p20"));
+  EXPECT_GT(Candidate(with_gap, "p20").probability(), 0.3) << with_gap.DebugString();
+}
+
+TEST_F(Interactions, JudgeEachVisitForItself) {
+  AddMug(900);
+  // Passed by long before; took it later, with a hand at it.
+  AddPerson(20, {3.0, 6.0, 1.0}, 110, 114);
+  for (int t = 700; t <= 704; ++t) {
+    delta_.appends[0].poses.push_back(PoseAt(t * kSecond, 3.0, 5.5, 1.0));
+    BodyShape shape;
+    shape.time_ns = t * kSecond;
+    shape.joints.assign(72, 0.0F);
+    for (int i = 0; i < 3; ++i) {
+      shape.joints[69 + i] = static_cast<float>((kMugAt - Eigen::Vector3d(3.0, 5.5, 1.0))[i]);
+    }
+    delta_.shapes[0].shapes.push_back(shape);
+  }
+  const v1::Interaction one = GetOne();
+  ASSERT_TRUE(HasCandidate(one, "p20"));
+  const v1::InteractionCandidate candidate = Candidate(one, "p20");
+  for (const auto& row : candidate.evidence()) {
+    if (row.kind() != "visit_window") continue;
+    EXPECT_EQ(row.from_ns(), 700 * kSecond);
+    EXPECT_EQ(row.to_ns(), 704 * kSecond);
+  }
+  EXPECT_EQ(candidate.at_ns(), 700 * kSecond);
+}
+
+TEST_F(Interactions, PreferWhoPutAThingJustBeforeItWasSeen) {
+  AddObject(kMug, kMugAt, 140, 0, 150);
+  AddPerson(20, {3.0, 5.5, 1.0}, 40, 48, kMugAt);
+  AddPerson(21, {3.0, 4.5, 1.0}, 130, 138, kMugAt);
+  auto request = Ask();
+  request.clear_types();
+  const auto reply = Get(request);
+  ASSERT_TRUE(reply.ok()) << reply.status();
+  ASSERT_EQ(reply->interactions_size(), 1);
+  EXPECT_EQ(reply->interactions(0).candidates(0).agent_name(), "p21");
+  EXPECT_TRUE(HasEvidence(reply->interactions(0).candidates(0), "delay"));
+}
+
+TEST_F(Interactions, DoNotCallPutWhatARobotSawAsSoonAsItCameNear) {
+  AddObject(kMug, kMugAt, 140, 0, 150);
+  AddRobot(kMugAt + Eigen::Vector3d(2.0, 0, 0), 135, 160);
+  auto request = Ask();
+  request.clear_types();
+  const auto reply = Get(request);
+  ASSERT_TRUE(reply.ok()) << reply.status();
+  EXPECT_EQ(reply->interactions_size(), 0) << reply->DebugString();
+}
+
+TEST_F(Interactions, ThinkMoreOfUnseenPeopleWhileTheRobotWasElsewhere) {
+  AddMug(300);
+  AddPerson(20, {3.0, 5.5, 1.0}, 110, 112);
+  const double watched = Alternative(GetOne(), "unseen").probability();
+  AddRobot({18.0, 5.0, 0.0}, 0, 400);
+  const double alone = Alternative(GetOne(), "unseen").probability();
+  EXPECT_GT(alone, 1.5 * watched);
 }
 
 TEST_F(Interactions, ReportWhatWasPut) {

@@ -60,6 +60,15 @@ TEST(Verdict, AbstainsWhenTheIdentityIsOpen) {
   EXPECT_TRUE(verdict.abstained);
 }
 
+TEST(Verdict, NamesNobodyWhomNobodySawNear) {
+  Suspect anna = Of(kAnna, 4.0);
+  anna.was_near = false;
+  const Verdict verdict = Judge({anna, Of(NodeId(), -1.0)}, {});
+  EXPECT_TRUE(verdict.abstained);
+  EXPECT_EQ(verdict.candidates[0].agent, kAnna);
+  EXPECT_NE(verdict.reason.find("H1"), std::string::npos) << verdict.reason;
+}
+
 TEST(Verdict, SurvivesExtremeWeights) {
   const Verdict verdict = Judge({Of(kAnna, -1e5), Of(kBert, -1e6)}, {});
   EXPECT_EQ(verdict.candidates[0].agent, kAnna);
