@@ -109,12 +109,14 @@ class Walks {
 };
 
 TEST(PlannedPaths, NeverTouchTheWorld) {
+  // Above those on which parameters were tuned.
+  const uint64_t first_seed = test::TestSeed(11);
   constexpr int kQuestionCount = 180;
   int asked_count = 0;
   int found_count = 0;
   int touched_count = 0;
   for (const WorldKind kind : {WorldKind::kApartment, WorldKind::kWing, WorldKind::kOffice}) {
-    for (uint64_t seed = 1; seed <= 3; ++seed) {
+    for (uint64_t seed = first_seed; seed < first_seed + 3; ++seed) {
       SCOPED_TRACE(testing::Message() << Name(kind) << ", seed " << seed);
       const World world = *GenerateWorld({kind, seed});
       Walks walks(world, seed);

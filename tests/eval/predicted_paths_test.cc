@@ -182,9 +182,11 @@ class Crowd {
 };
 
 TEST(PredictedPaths, StayOutOfTheWorldAndBeatConstantVelocity) {
+  // Above those on which parameters were tuned.
+  const uint64_t first_seed = test::TestSeed(11);
   for (const WorldKind kind : {WorldKind::kApartment, WorldKind::kWing, WorldKind::kOffice}) {
     Tally tally;
-    for (uint64_t seed = 1; seed <= 3; ++seed) {
+    for (uint64_t seed = first_seed; seed < first_seed + 3; ++seed) {
       SCOPED_TRACE(testing::Message() << Name(kind) << ", seed " << seed);
       const World world = *GenerateWorld({kind, seed});
       Crowd(world, seed).PredictAll(&tally);
