@@ -187,7 +187,9 @@ void SparkNodeConverter::ConvertTimes(const SparkNode& in, Node* out) {
 }
 
 absl::Status SparkNodeConverter::ConvertComponents(const SparkNode& in, Node* out) {
-  if (!std::isfinite(in.distance)) return Fail(in, "distance is not finite");
+  if (!std::isfinite(in.distance) || in.distance < 0.0) {
+    return Fail(in, absl::StrCat("distance ", in.distance, " is not 0 or more"));
+  }
   if (in.boundary.size() > kBoundaryCornersMax) {
     return Fail(in, absl::StrCat("boundary has ", in.boundary.size(), " corners; at most ",
                                  kBoundaryCornersMax));

@@ -234,17 +234,30 @@ class DeltaChecker {
     if (node.agent.has_value()) {
       DSG_RETURN_IF_ERROR(CheckAssetKnown(node.agent->body_model, what));
       DSG_RETURN_IF_ERROR(CheckText(node.agent->track_state, 64, "track state of " + what));
+      if (node.agent->gap_ns_max < 0) {
+        return Invalid(absl::StrCat("gap_ns_max of ", what, " is ", node.agent->gap_ns_max,
+                                    "; give nanoseconds above 0, or 0 for the map's"));
+      }
       if (node.agent->shape_coefficients.size() > 1024) {
         return Invalid("shape coefficients of " + what + " are more than 1024");
       }
     }
     if (node.place.has_value()) {
-      if (!std::isfinite(node.place->clearance_m)) return NotFinite("clearance of " + what);
+      const double clearance_m = node.place->clearance_m;
+      if (!std::isfinite(clearance_m)) return NotFinite("clearance of " + what);
+      if (clearance_m < 0.0) {
+        return Invalid(absl::StrCat("clearance of ", what, " is ", clearance_m,
+                                    " m; it is a distance, 0 or more"));
+      }
       DSG_RETURN_IF_ERROR(CheckBox(node.place->free_box, what));
     }
     if (node.structure.has_value()) {
       DSG_RETURN_IF_ERROR(
           CheckText(node.structure->structure_type, 64, "structure type of " + what));
+      if (!IsSane(node.structure->plane_normal_map) ||
+          !(std::abs(node.structure->plane_offset_m) <= kCoordinateMaxM)) {
+        return NotFinite("the plane of " + what);
+      }
     }
     if (node.region.has_value()) {
       for (const auto& [name, probability] : node.region->class_probabilities) {
@@ -378,6 +391,11 @@ class DeltaChecker {
       if (!IsSane(pose.map_T_agent.position) || !IsValidPose(pose.map_T_agent)) {
         return CheckPose(pose.map_T_agent, absl::StrCat(what, " at ", pose.time_ns, " ns"));
       }
+      if (pose.covariance != nullptr &&
+          !std::all_of(pose.covariance->begin(), pose.covariance->end(),
+                       [](float number) { return std::isfinite(number); })) {
+        return NotFinite(absl::StrCat("covariance of ", what, " at ", pose.time_ns, " ns"));
+      }
       if ((pose.flags & ~pose_flags::kAll) != 0) {
         return Invalid(absl::StrCat("unknown flags ", pose.flags, " in ", what));
       }
@@ -486,6 +504,9 @@ class DeltaChecker {
     }
     for (const auto& position : block.positions_map) {
       if (!IsSane(position.cast<double>())) return NotFinite("a vertex of " + what);
+    }
+    for (const auto& normal : block.normals_map) {
+      if (!normal.allFinite()) return NotFinite("a normal of " + what);
     }
     for (const auto& face : block.faces) {
       if (*std::max_element(face.begin(), face.end()) >= count) {

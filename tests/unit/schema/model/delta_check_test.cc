@@ -248,6 +248,50 @@ TEST(CheckDelta, RefusesStaysNowhereOrTooLong) {
       Reason::kDeltaInvalid, "longer than an hour");
 }
 
+TEST(CheckDelta, RefusesComponentsThatAreNoNumbers) {
+  const auto with_wall = [](double normal_x, double offset_m) {
+    return [=](GraphDelta* d) {
+      d->nodes = {Place(1, 1)};
+      d->nodes[0].structure.emplace();
+      d->nodes[0].structure->plane_normal_map = {normal_x, 0, 0};
+      d->nodes[0].structure->plane_offset_m = offset_m;
+    };
+  };
+  ExpectRefused(with_wall(std::nan(""), 0), Reason::kNumberNotFinite, "the plane of node p1");
+  ExpectRefused(with_wall(1, INFINITY), Reason::kNumberNotFinite, "the plane of node p1");
+  ExpectRefused(
+      [](GraphDelta* d) {
+        d->nodes = {Place(1, 1)};
+        d->nodes[0].place.emplace();
+        d->nodes[0].place->clearance_m = -1;
+      },
+      Reason::kDeltaInvalid, "clearance of node p1 is -1 m");
+  ExpectRefused(
+      [](GraphDelta* d) {
+        d->nodes = {Place(1, 1)};
+        d->nodes[0].agent.emplace();
+        d->nodes[0].agent->gap_ns_max = -5;
+      },
+      Reason::kDeltaInvalid, "gap_ns_max of node p1 is -5");
+  ExpectRefused(
+      [](GraphDelta* d) {
+        TimedPose pose{2000};
+        Covariance6 covariance{};
+        covariance[3] = NAN;
+        pose.covariance = std::make_shared<const Covariance6>(covariance);
+        d->appends = {{NodeId('H', 0), {pose}}};
+      },
+      Reason::kNumberNotFinite, "covariance of trajectory of H0 at 2000 ns");
+  ExpectRefused(
+      [](GraphDelta* d) {
+        MeshBlock block;
+        block.positions_map.resize(1, Eigen::Vector3f::Zero());
+        block.normals_map.push_back({0, NAN, 1});
+        d->mesh_blocks = {block};
+      },
+      Reason::kNumberNotFinite, "a normal of mesh block 0,0,0");
+}
+
 TEST(CheckDelta, RefusesMeshesAndAssetsThatContradictThemselves) {
   ExpectRefused(
       [](GraphDelta* d) {
