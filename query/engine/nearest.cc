@@ -71,7 +71,7 @@ absl::StatusOr<std::vector<NearestNode>> NearestAgents(const Snapshot& snapshot,
     DSG_ASSIGN_OR_RETURN(Node node, snapshot.GetNode(track.agent));
     node.map_T_node = located.map_T_agent;
     if (!question.filter.Matches(node)) continue;
-    const double distance_m = DistanceToBox(question.point_map, node.BoxMap());
+    const double distance_m = node.DistanceTo(question.point_map);
     if (distance_m <= question.max_distance_m) found.push_back({std::move(node), distance_m});
   }
   std::sort(found.begin(), found.end(), [](const NearestNode& a, const NearestNode& b) {

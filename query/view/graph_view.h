@@ -47,6 +47,10 @@ struct ViewNode {
   Box3d BoxMap() const {
     return box_node.isEmpty() ? Box3d(map_T_node.position) : TransformBox(map_T_node, box_node);
   }
+  /// As Node::DistanceTo.
+  double DistanceTo(const Eigen::Vector3d& point_map) const {
+    return DistanceToBox(point_map, map_T_node, box_node);
+  }
 };
 
 struct ViewEdge {

@@ -98,7 +98,7 @@ class NearestSearch {
         Open(*nearest.page, nearest.range);
       } else {
         const ViewNode* node = find_(nearest.id);
-        Push({DistanceToBox(point_map_, node->BoxMap()), nearest.id, nullptr, node, 0});
+        Push({node->DistanceTo(point_map_), nearest.id, nullptr, node, 0});
       }
     }
   }

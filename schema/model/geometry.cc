@@ -34,6 +34,15 @@ double DistanceToBox(const Eigen::Vector3d& point, const Box3d& box) {
   return std::sqrt(box.squaredExteriorDistance(point));
 }
 
+double DistanceToBox(const Eigen::Vector3d& point_map, const Pose3d& map_T_node,
+                     const Box3d& box_node) {
+  if (box_node.isEmpty()) return DistanceToBox(point_map, Box3d(map_T_node.position));
+  if (map_T_node.orientation.coeffs() == Eigen::Quaterniond::Identity().coeffs()) {
+    return DistanceToBox(point_map, TransformBox(map_T_node, box_node));
+  }
+  return DistanceToBox(map_T_node.Inverse() * point_map, box_node);
+}
+
 bool PolygonContains(const Polygon2d& polygon, const Eigen::Vector2d& point) {
   bool inside = false;
   for (size_t i = 0, j = polygon.size() - 1; i < polygon.size(); j = i++) {

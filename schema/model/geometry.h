@@ -43,6 +43,10 @@ Box3d TransformBox(const Pose3d& map_T_node, const Box3d& box_node);
 
 /// Distance from a point to a box, 0 inside. Requires: the box is not empty.
 double DistanceToBox(const Eigen::Vector3d& point, const Box3d& box);
+/// Distance from a point to a box in frame node, turned as the node is, 0 inside; to the node's
+/// position if the box is empty.
+double DistanceToBox(const Eigen::Vector3d& point_map, const Pose3d& map_T_node,
+                     const Box3d& box_node);
 
 /// Corners in order, map frame, z ignored.
 using Polygon2d = std::vector<Eigen::Vector2d>;

@@ -123,6 +123,10 @@ struct Node {
   Box3d BoxMap() const {
     return box_node.isEmpty() ? Box3d(map_T_node.position) : TransformBox(map_T_node, box_node);
   }
+  /// To its box, turned as it is; see DistanceToBox.
+  double DistanceTo(const Eigen::Vector3d& point_map) const {
+    return DistanceToBox(point_map, map_T_node, box_node);
+  }
 };
 
 }  // namespace dsg

@@ -141,7 +141,7 @@ absl::Status MeasureNearest(const GraphView& view, const Snapshot& snapshot, con
         measured.Ask(pattern, question, [&](const ViewNode& node) -> std::optional<double> {
           if (node.layer != layer) return std::nullopt;
           if (most.first != 0 && node.class_name != most.first) return std::nullopt;
-          return DistanceToBox(point, node.BoxMap());
+          return node.DistanceTo(point);
         }));
   }
   report->Line(absl::StrCat(what, " (", FormatQuery(pattern), ")"), "us",

@@ -65,22 +65,20 @@ class Runner {
     Hit hit;
     hit.key.id = node.id;
     if (!question_.near_map.has_value() && !question_.box_map.has_value()) return hit;
-    Box3d box_map = node.BoxMap();
+    ViewNode placed = node;
     if (IsAgentKind(view_.symbols().Text(node.kind))) {
       if (!pattern_.asks_for_agents) return std::nullopt;
       absl::StatusOr<std::optional<Pose3d>> located = question_.locate(node.id);
       if (!located.ok()) locate_status_ = located.status();
       if (!located.ok() || !located->has_value()) return std::nullopt;
       hit.map_T_agent = *located;
-      ViewNode moved = node;
-      moved.map_T_node = **located;
-      box_map = moved.BoxMap();
+      placed.map_T_node = **located;
     }
-    if (question_.box_map.has_value() && !question_.box_map->intersects(box_map)) {
+    if (question_.box_map.has_value() && !question_.box_map->intersects(placed.BoxMap())) {
       return std::nullopt;
     }
     if (!question_.near_map.has_value()) return hit;
-    hit.key.distance_m = DistanceToBox(*question_.near_map, box_map);
+    hit.key.distance_m = placed.DistanceTo(*question_.near_map);
     if (hit.key.distance_m > question_.distance_m_max) return std::nullopt;
     return hit;
   }

@@ -84,7 +84,7 @@ class Comparison {
         random_->Int(0, 1) == 0 ? 1e9 : static_cast<double>(random_->Int(0, 8));
     std::vector<std::pair<double, NodeId>> expected;
     for (const Node& node : nodes_) {
-      const double distance_m = DistanceToBox(point, node.BoxMap());
+      const double distance_m = node.DistanceTo(point);
       if (Matches(filter, node) && distance_m <= distance_m_max) {
         expected.emplace_back(distance_m, node.id);
       }

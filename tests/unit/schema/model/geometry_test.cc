@@ -62,6 +62,17 @@ TEST(DistanceToBox, IsZeroInside) {
   EXPECT_DOUBLE_EQ(DistanceToBox({4, 5, 1}, box), 5.0);
 }
 
+TEST(DistanceToBox, TurnsWithItsNode) {
+  const Box3d box(Eigen::Vector3d(-2, -0.1, -1), Eigen::Vector3d(2, 0.1, 1));
+  Pose3d map_T_node;
+  map_T_node.position = {1, 1, 0};
+  map_T_node.orientation = Eigen::AngleAxisd(M_PI / 4, Eigen::Vector3d::UnitZ());
+  // Across the long side: sqrt(2) from the middle plane, which is 0.1 m inside.
+  EXPECT_NEAR(DistanceToBox({2, 0, 0}, map_T_node, box), std::sqrt(2.0) - 0.1, 1e-12);
+  EXPECT_EQ(DistanceToBox({2, 2, 0}, map_T_node, box), 0.0);
+  EXPECT_EQ(DistanceToBox({1, 1, 3}, map_T_node, Box3d()), 3.0);
+}
+
 TEST(Polygon, KnowsInsideFromOutsideOfAnLShape) {
   const Polygon2d shape = {{0, 0}, {4, 0}, {4, 1}, {1, 1}, {1, 3}, {0, 3}};
   EXPECT_TRUE(PolygonContains(shape, {3.5, 0.5}));

@@ -141,7 +141,7 @@ std::vector<query::HitKey> Scan(const Belief& belief, const ScanQuestion& questi
     if (is_in_space && IsAgentKind(node.kind)) continue;
     if (question.box_map.has_value() && !question.box_map->intersects(node.BoxMap())) continue;
     if (question.near_map.has_value()) {
-      key.distance_m = DistanceToBox(*question.near_map, node.BoxMap());
+      key.distance_m = node.DistanceTo(*question.near_map);
       if (question.distance_m_max > 0.0 && key.distance_m > question.distance_m_max) continue;
     }
     found.push_back(key);
