@@ -21,8 +21,10 @@ bool WorkerPool::TrySubmit(Job* job, JobKind kind) {
   Seat* called = nullptr;
   {
     std::lock_guard lock(mutex_);
-    const size_t in_flight_count = calls_.size() + streams_.size() + running_count_;
-    if (stopped_ || in_flight_count >= in_flight_max_) return false;
+    // Streams are bounded by how many may be open. Their messages come again and again, and must
+    // not count as calls, or many watches would shut calls out.
+    const size_t call_count = calls_.size() + running_count_ - running_stream_count_;
+    if (stopped_ || (kind == JobKind::kCall && call_count >= in_flight_max_)) return false;
     (kind == JobKind::kStream ? streams_ : calls_).push_back(job);
     if (HasWork()) called = CallOne();
   }

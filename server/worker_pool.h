@@ -36,14 +36,14 @@ class WorkerPool {
     int queued = 0;
   };
 
-  /// At most `in_flight_max` jobs are queued and running at a time.
+  /// At most `in_flight_max` calls are queued and running at a time.
   WorkerPool(int worker_count, int in_flight_max);
   ~WorkerPool() { Stop(); }
 
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
 
-  /// False when the pool is full or stopped; the job is then not run.
+  /// False when the pool is full of calls or stopped; the job is then not run.
   [[nodiscard]] bool TrySubmit(Job* job, JobKind kind = JobKind::kCall);
 
   /// For a stream that was submitted before and has more to do, such as one whose reader is ready

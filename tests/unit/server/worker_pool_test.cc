@@ -102,6 +102,18 @@ TEST(WorkerPool, LeavesHalfOfTheWorkersToCalls) {
   EXPECT_EQ(pool.Load().queued, 0);
 }
 
+TEST(WorkerPool, TakesCallsHoweverManyStreamsWait) {
+  std::vector<HeldJob> streams(6);
+  HeldJob call;
+  WorkerPool pool(2, /*in_flight_max=*/2);
+  for (HeldJob& stream : streams) ASSERT_TRUE(pool.TrySubmit(&stream, JobKind::kStream));
+  streams[0].WaitUntilStarted();
+  ASSERT_TRUE(pool.TrySubmit(&call));
+  call.WaitUntilStarted();
+  call.Release();
+  for (HeldJob& stream : streams) stream.Release();
+}
+
 TEST(WorkerPool, TakesCallsFirstButLetsNoStreamStarve) {
   std::vector<char> order;
   HeldJob held;
