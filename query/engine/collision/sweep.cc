@@ -20,6 +20,8 @@ constexpr double kClearanceErrorM = 5e-3;
 constexpr double kClearanceErrorShare = 0.05;
 // A reach below zero ends a walk.
 constexpr double kEndWalk = -1.0;
+// More than distances are wrong by.
+constexpr double kRoundingM = 1e-9;
 
 // A body at one pose: everything within `radius_m` of a convex core or of a mesh.
 struct PosedBody {
@@ -157,7 +159,8 @@ class Nearest {
     if (!IsNearer(contact, best_)) return;
     best_ = contact;
     limit_m_ = contact.distance_m;
-    reach_m_ = contact.distance_m + body_.radius_m;
+    // Rounded, the sum may be less than the core's distance: others as near would be passed over.
+    reach_m_ = contact.distance_m + body_.radius_m + kRoundingM;
   }
 
   const Leg& leg_;
