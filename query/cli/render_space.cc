@@ -93,7 +93,8 @@ std::string CollisionText(const v1::CollisionResult& result, const NodeNames& na
   std::string thing = result.what();
   for (char& c : thing) c = c == '_' ? ' ' : c;
   if (!result.node_id().empty()) absl::StrAppend(&thing, " ", names.Text(result.node_id()));
-  const char* unobserved = result.observed() ? "" : "; nothing is known of this spot";
+  const char* unobserved =
+      result.observed() ? "" : "; part of the body is outside of what the map knows";
   if (result.hit()) {
     return absl::StrCat("hit ", thing, " at ", PositionText(result.point()), unobserved);
   }

@@ -21,9 +21,7 @@ absl::Status RunDiff(Session* session, const DiffVerb& verb, std::ostream& out) 
       [](const v1::DiffRevisionsResponse& page) {
         return page.nodes_size() + page.edges_size() + page.tracks_size() + page.mesh_blocks_size();
       },
-      [&](v1::DiffRevisionsRequest next, v1::DiffRevisionsResponse* page) {
-        // The newest revision is that of the first page, whatever is committed meanwhile.
-        if (all.to_revision() != 0) next.set_to_revision(all.to_revision());
+      [&](const v1::DiffRevisionsRequest& next, v1::DiffRevisionsResponse* page) {
         return session->api().DiffRevisions(session->NewCall(), next, page);
       },
       &all));

@@ -8,6 +8,7 @@
 #include "dsg/v1/query_service.pb.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
+#include "schema/model/delta_check.h"
 
 namespace dsg::query {
 
@@ -37,8 +38,12 @@ absl::Status CheckTimeRange(TimeNs from_ns, TimeNs to_ns) {
 
 absl::StatusOr<Eigen::Vector3d> PointFromProto(const v1::Vector3& in, std::string_view field) {
   const Eigen::Vector3d point(in.x(), in.y(), in.z());
-  if (point.allFinite()) return point;
   const std::string name(field);
+  if (point.allFinite()) {
+    if (point.cwiseAbs().maxCoeff() <= kCoordinateMaxM) return point;
+    return FieldError(name, absl::StrCat(point.cwiseAbs().maxCoeff(), " m"),
+                      "stay within 2000 km of the map's origin, as all nodes do");
+  }
   return MakeError(Reason::kNumberNotFinite,
                    absl::StrCat(name, " is (", in.x(), ", ", in.y(), ", ", in.z(),
                                 "); give finite metres in the map frame"),

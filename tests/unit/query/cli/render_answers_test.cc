@@ -185,7 +185,7 @@ TEST(CollisionText, TellsHitFreeAndUnknown) {
   EXPECT_EQ(CollisionText(result, Names()), "free, nothing within 2.00 m");
   result.set_observed(false);
   EXPECT_EQ(CollisionText(result, Names()),
-            "free, nothing within 2.00 m; nothing is known of this spot");
+            "free, nothing within 2.00 m; part of the body is outside of what the map knows");
   result.set_observed(true);
   result.set_hit(true);
   result.set_what("predicted_agent");

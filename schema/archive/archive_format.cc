@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "schema/archive/archive_format.h"
+
+#include <zstd.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "absl/strings/escaping.h"
+#include "absl/strings/str_cat.h"
+#include "schema/base/check.h"
+#include "schema/base/status.h"
+#include "schema/codec/checksum.h"
+#include "schema/store/graph_store.h"
+
+namespace dsg {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::string_view kMagic("DSGZ\r\n\x1a\n", 8);
+constexpr std::string_view kEndMagic("DSGE", 4);
+constexpr int kCompressionLevel = 3;
+// Of the head; frames count from 0.
+constexpr uint64_t kHeadSeed = ~uint64_t{0};
+
+template <typename Number>
+void AppendNumber(Number value, std::string* out) {
+  for (size_t i = 0; i < sizeof(Number); ++i) {
+    out->push_back(static_cast<char>(value >> (8 * i) & 0xff));
+  }
+}
+
+template <typename Number>
+Number NumberAt(std::string_view bytes, size_t at) {
+  Number value = 0;
+  for (size_t i = 0; i < sizeof(Number); ++i) {
+    value |= static_cast<Number>(static_cast<Number>(static_cast<uint8_t>(bytes[at + i])) << (8 * i));
+  }
+  return value;
+}
+
+uint64_t ChecksumOf(std::string_view bytes, uint64_t seed) {
+  return static_cast<uint64_t>(Checksum(bytes, seed));
+}
+
+// Of what the header says, but for its checksum, and of the manifest.
+uint64_t HeadChecksum(std::string_view header, std::string_view manifest) {
+  return ChecksumOf(absl::StrCat(std::string(header.substr(0, 16)), std::string(manifest)),
+                    kHeadSeed);
+}
+
+// Of a frame's size and bytes.
+uint64_t FrameChecksum(int64_t index, uint32_t size, std::string_view bytes) {
+  return ChecksumOf(bytes, static_cast<uint64_t>(index) << 32 | size);
+}
+
+std::string TextOf(const ArchiveManifest& manifest) {
+  const MapSpec& spec = manifest.spec;
+  const Json json = {
+      {"map", spec.name},
+      {"frame", spec.frame},
+      {"epoch_ns", std::to_string(spec.epoch_ns)},
+      {"clock", static_cast<int>(spec.clock)},
+      {"codec", static_cast<int>(spec.codec)},
+      {"gap_ns_max", std::to_string(spec.gap_ns_max)},
+      {"mesh_block_size_m", spec.mesh_block_size_m},
+      {"store_format", manifest.store_format},
+      {"newest_revision", std::to_string(manifest.newest_revision)},
+      {"newest_digest", ToHex(manifest.newest_digest)},
+      {"oldest_revision", std::to_string(manifest.oldest_revision)},
+      {"state", ToHex(manifest.state)},
+      {"database_bytes", std::to_string(manifest.database_bytes)},
+      {"program", manifest.program},
+  };
+  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+int64_t IntOf(const Json& json, const char* field) {
+  int64_t value = 0;
+  const std::string text = json.at(field).get<std::string>();
+  if (!absl::SimpleAtoi(text, &value)) throw std::invalid_argument(field);
+  return value;
+}
+
+Sha256 DigestOf(const Json& json, const char* field) {
+  const std::string text = json.at(field).get<std::string>();
+  Sha256 digest{};
+  if (text.size() != 2 * digest.size() ||
+      text.find_first_not_of("0123456789abcdef") != std::string::npos) {
+    throw std::invalid_argument(field);
+  }
+  const std::string bytes = absl::HexStringToBytes(text);
+  std::copy(bytes.begin(), bytes.end(), digest.begin());
+  return digest;
+}
+
+// Throws what the parts throw.
+ArchiveManifest ManifestOf(const Json& json) {
+  ArchiveManifest manifest;
+  MapSpec& spec = manifest.spec;
+  spec.name = json.at("map").get<std::string>();
+  spec.frame = json.at("frame").get<std::string>();
+  spec.epoch_ns = IntOf(json, "epoch_ns");
+  spec.clock = static_cast<Clock>(json.at("clock").get<int>());
+  spec.codec = static_cast<TrajectoryCodec>(json.at("codec").get<int>());
+  spec.gap_ns_max = IntOf(json, "gap_ns_max");
+  spec.mesh_block_size_m = json.at("mesh_block_size_m").get<double>();
+  manifest.store_format = json.at("store_format").get<int>();
+  manifest.newest_revision = IntOf(json, "newest_revision");
+  manifest.newest_digest = DigestOf(json, "newest_digest");
+  manifest.oldest_revision = IntOf(json, "oldest_revision");
+  manifest.state = DigestOf(json, "state");
+  manifest.database_bytes = IntOf(json, "database_bytes");
+  manifest.program = json.at("program").get<std::string>();
+  return manifest;
+}
+
+absl::Status CheckManifest(const std::string& path, const ArchiveManifest& manifest) {
+  if (manifest.store_format > kStoreFormatVersion) {
+    return MakeError(Reason::kFormatTooNew,
+                     absl::StrCat(path, " holds a map of format ", manifest.store_format,
+                                  ", and this program reads up to ", kStoreFormatVersion,
+                                  "; use a newer dsgdb"),
+                     {{"path", path}, {"format", absl::StrCat(manifest.store_format)}});
+  }
+  DSG_RETURN_IF_ERROR(CheckMapName(manifest.spec.name));
+  DSG_RETURN_IF_ERROR(manifest.spec.Validate());
+  if (manifest.database_bytes <= 0) return NoArchive(path, "declares a database of no bytes");
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+Sha256 StateDigest(const MapSpec& spec, Revision newest, const Sha256& newest_digest,
+                   Revision oldest, const std::vector<Tag>& tags) {
+  Json json = {spec.name,
+               spec.frame,
+               spec.epoch_ns,
+               static_cast<int>(spec.clock),
+               static_cast<int>(spec.codec),
+               spec.gap_ns_max,
+               spec.mesh_block_size_m,
+               newest,
+               ToHex(newest_digest),
+               oldest};
+  for (const Tag& tag : tags) json.push_back({tag.name, tag.revision, tag.created_ns, tag.note});
+  return ComputeSha256(json.dump(-1, ' ', true, Json::error_handler_t::replace));
+}
+
+absl::Status NoArchive(const std::string& path, std::string_view why) {
+  return MakeError(Reason::kFileMalformed,
+                   absl::StrCat(path, " is no archive of a map: it ", std::string(why),
+                                "; give a .dsgz that dsg export or dsg backup wrote"),
+                   {{"path", path}});
+}
+
+absl::Status DamagedArchive(const std::string& path, int64_t at_byte, std::string_view why) {
+  return MakeError(Reason::kStoreCorrupt,
+                   absl::StrCat("archive ", path, " is damaged at byte ", at_byte, ": ",
+                                std::string(why), "; take another copy of it"),
+                   {{"path", path}, {"byte", absl::StrCat(at_byte)}});
+}
+
+std::string EncodeArchiveHead(const ArchiveManifest& manifest) {
+  const std::string text = TextOf(manifest);
+  DSG_CHECK(text.size() <= kArchiveManifestBytesMax);
+  std::string head(kMagic);
+  AppendNumber(kArchiveVersion, &head);
+  AppendNumber(static_cast<uint32_t>(text.size()), &head);
+  AppendNumber(HeadChecksum(head, text), &head);
+  return head + text;
+}
+
+absl::StatusOr<size_t> ManifestBytes(const std::string& path, std::string_view header) {
+  if (header.substr(0, kMagic.size()) != kMagic) return NoArchive(path, "begins with other bytes");
+  const auto version = NumberAt<uint32_t>(header, 8);
+  if (version != kArchiveVersion) {
+    return NoArchive(path, absl::StrCat("has version ", version, " of the format, and this program "
+                                        "reads ", kArchiveVersion));
+  }
+  const size_t size = NumberAt<uint32_t>(header, 12);
+  if (size > kArchiveManifestBytesMax) {
+    return NoArchive(path, absl::StrCat("declares ", size, " bytes of manifest"));
+  }
+  return size;
+}
+
+absl::StatusOr<ArchiveManifest> DecodeArchiveHead(const std::string& path, std::string_view header,
+                                                  std::string_view manifest) {
+  if (HeadChecksum(header, manifest) != NumberAt<uint64_t>(header, 16)) {
+    return DamagedArchive(path, 0, "the checksum of its header and manifest is another");
+  }
+  ArchiveManifest decoded;
+  try {
+    decoded = ManifestOf(Json::parse(manifest));
+  } catch (const std::exception& error) {
+    return NoArchive(path, absl::StrCat("has a manifest that cannot be read (", error.what(), ")"));
+  }
+  DSG_RETURN_IF_ERROR(CheckManifest(path, decoded));
+  return decoded;
+}
+
+int64_t FrameCount(int64_t database_bytes) {
+  constexpr auto kFrame = static_cast<int64_t>(kArchiveFrameBytes);
+  return database_bytes / kFrame + (database_bytes % kFrame != 0 ? 1 : 0);
+}
+
+void AppendFrame(int64_t index, std::string_view bytes, std::string* out) {
+  std::string packed(ZSTD_compressBound(bytes.size()), '\0');
+  const size_t size = ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(),
+                                    kCompressionLevel);
+  const bool is_packed = ZSTD_isError(size) == 0 && size < bytes.size() &&
+                         size >= bytes.size() / kArchiveRatioMax;
+  const std::string_view stored = is_packed ? std::string_view(packed).substr(0, size) : bytes;
+  const auto stored_size = static_cast<uint32_t>(stored.size());
+  AppendNumber(stored_size, out);
+  AppendNumber(FrameChecksum(index, stored_size, stored), out);
+  out->append(stored);
+}
+
+uint32_t StoredBytes(std::string_view frame_head) { return NumberAt<uint32_t>(frame_head, 0); }
+
+absl::Status DecodeFrame(int64_t index, std::string_view frame_head, std::string_view stored,
+                         size_t byte_count, std::string* bytes) {
+  if (FrameChecksum(index, StoredBytes(frame_head), stored) != NumberAt<uint64_t>(frame_head, 4)) {
+    return absl::DataLossError("the checksum of this part is another");
+  }
+  if (stored.size() == byte_count) {
+    bytes->assign(stored);
+    return absl::OkStatus();
+  }
+  bytes->resize(byte_count);
+  const size_t size = ZSTD_decompress(bytes->data(), byte_count, stored.data(), stored.size());
+  if (ZSTD_isError(size) != 0 || size != byte_count) {
+    return absl::DataLossError("this part cannot be unpacked");
+  }
+  return absl::OkStatus();
+}
+
+std::string EncodeArchiveEnd(int64_t frame_count, const Sha256& all) {
+  std::string end(kEndMagic);
+  AppendNumber(static_cast<uint32_t>(frame_count), &end);
+  end.append(reinterpret_cast<const char*>(all.data()), all.size());
+  return end;
+}
+
+}  // namespace dsg
