@@ -31,7 +31,8 @@ absl::Status CheckPlace(const Command& command) {
   if (std::holds_alternative<VersionVerb>(command.verb)) return absl::OkStatus();
   const CommonOptions& common = command.common;
   const bool is_import = std::holds_alternative<ImportVerb>(command.verb);
-  const bool needs_store = is_import || std::holds_alternative<VerifyVerb>(command.verb);
+  const bool needs_store = is_import || std::holds_alternative<VerifyVerb>(command.verb) ||
+                           std::holds_alternative<UpgradeVerb>(command.verb);
   if (needs_store && common.store.empty()) {
     return is_import ? Usage(
                            "import writes to a store folder: give --store DIR (for a server: "

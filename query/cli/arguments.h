@@ -51,7 +51,7 @@ using Verb =
     std::variant<WhereVerb, TrackVerb, ShapeVerb, WhoVerb, MetVerb, PickedVerb, PredictVerb,
                  ListVerb, EdgesVerb, ShowVerb, NearVerb, FindVerb, AroundVerb, SubgraphVerb,
                  PathVerb, CollideVerb, LogVerb, DiffVerb, WatchVerb, StatsVerb, MapsVerb,
-                 VersionVerb, VerifyVerb, ImportVerb, ExportVerb, MapVerb, HelpVerb>;
+                 VersionVerb, VerifyVerb, UpgradeVerb, ImportVerb, ExportVerb, MapVerb, HelpVerb>;
 
 struct Command {
   CommonOptions common;

@@ -11,7 +11,7 @@ namespace {
 
 using Example = std::pair<absl::string_view, absl::string_view>;
 
-constexpr std::array<Example, 26> kExamples = {{
+constexpr std::array<Example, 27> kExamples = {{
     {"where", "carol --at +100.25s"},
     {"track", "carol --from +30s --to +32s --every 500ms --png carol.png"},
     {"shape", "person-1 --from +20s --to +30s --obj bodies"},
@@ -36,6 +36,7 @@ constexpr std::array<Example, 26> kExamples = {{
     {"version", "--server unix:dsg.sock"},
     {"import", "--store store --map house house.json"},
     {"verify", "--store store --map office"},
+    {"upgrade", "--store store --map office"},
     {"export", "--gltf office.glb"},
     {"map", "--png office.png"},
 }};

@@ -68,6 +68,7 @@ void AddFileVerbs(Grammar* grammar) {
       "import", "Add a scene-graph file (Spark-DSG, Kimera) to a map", kMap);
   app->add_option("FILE", import->file, "The file")->required();
   grammar->Add<VerifyVerb>("verify", "Check every page, row and revision of a map", kMap);
+  grammar->Add<UpgradeVerb>("upgrade", "Bring a map to this program's store format", kMap);
   AddExport(grammar);
   AddMap(grammar);
 }

@@ -14,6 +14,7 @@ struct StatsVerb {};
 struct MapsVerb {};
 struct VersionVerb {};
 struct VerifyVerb {};
+struct UpgradeVerb {};
 
 struct DiffVerb {
   int64_t from_revision = 0;

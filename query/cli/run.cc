@@ -31,6 +31,7 @@ class Dispatcher {
     return RunImport(command_.common, verb, out_, errors_);
   }
   absl::Status operator()(const VerifyVerb&) { return RunVerify(command_.common, out_, errors_); }
+  absl::Status operator()(const UpgradeVerb&) { return RunUpgrade(command_.common, out_); }
   absl::Status operator()(const MapsVerb&) {
     DSG_ASSIGN_OR_RETURN(const std::unique_ptr<Session> session, Session::Open(command_.common));
     return RunMaps(session.get(), out_);

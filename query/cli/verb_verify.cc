@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "query/cli/map_names.h"
 #include "query/cli/progress.h"
 #include "query/cli/table.h"
 #include "query/cli/verbs.h"
@@ -13,15 +14,6 @@
 
 namespace dsg::cli {
 namespace {
-
-absl::StatusOr<std::vector<std::string>> MapNames(GraphStore* store, const std::string& asked) {
-  if (!asked.empty()) return std::vector<std::string>{asked};
-  DSG_ASSIGN_OR_RETURN(const std::vector<MapSpec> maps, store->ListMaps());
-  std::vector<std::string> names;
-  names.reserve(maps.size());
-  for (const MapSpec& map : maps) names.push_back(map.name);
-  return names;
-}
 
 absl::StatusOr<VerifyReport> VerifyMap(GraphStore* store, const std::string& name,
                                        std::ostream& progress_out) {

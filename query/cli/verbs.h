@@ -79,4 +79,9 @@ absl::Status RunImport(const CommonOptions& common, const ImportVerb& verb, std:
 /// Errors: DATA_LOSS/STORE_CORRUPT if there is any problem.
 absl::Status RunVerify(const CommonOptions& common, std::ostream& out, std::ostream& progress);
 
+/// Brings maps of a store to the newest format, a copy of the old file beside each.
+///
+/// Errors: as GraphStore::UpgradeMap; the maps before the failing one are upgraded.
+absl::Status RunUpgrade(const CommonOptions& common, std::ostream& out);
+
 }  // namespace dsg::cli

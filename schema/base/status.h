@@ -35,6 +35,7 @@ enum class Reason {
   kClassUnknown = 25,
   kRelationUnknown = 26,
   kNoPath = 27,
+  kTagUnknown = 28,
   kTimeOutsideTrack = 40,
   kRevisionInFuture = 41,
   kRevisionCompacted = 42,

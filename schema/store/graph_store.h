@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "schema/store/graph_writer.h"
+#include "schema/store/map_writer.h"
 #include "schema/store/snapshot.h"
 
 namespace dsg {
@@ -53,15 +53,18 @@ class MapReader {
   virtual ~MapReader() = default;
 
   virtual const MapSpec& spec() const = 0;
-  /// False once the map's file was removed or replaced under it (a restore): open it again.
+  /// False once the map's file was removed or replaced under it (a restore), or its past was
+  /// rewritten (erased from): open it again.
   virtual bool IsCurrent() const = 0;
   /// The newest revision; costs a few microseconds when nothing has changed.
   virtual absl::StatusOr<RevisionInfo> Head() = 0;
   virtual absl::StatusOr<std::shared_ptr<const Snapshot>> Latest() = 0;
   /// Errors: OUT_OF_RANGE/REVISION_IN_FUTURE or REVISION_COMPACTED, both with oldest and newest.
   virtual absl::StatusOr<std::shared_ptr<const Snapshot>> At(Revision revision) = 0;
-  /// The oldest revision that can be read.
+  /// From this revision on all can be read; of older ones those with a tag.
   virtual absl::StatusOr<Revision> OldestRevision() = 0;
+  /// Order: by name.
+  virtual absl::StatusOr<std::vector<Tag>> Tags() = 0;
   /// Newest first, below `before` (0 = from the newest), at most `limit`.
   virtual absl::StatusOr<std::vector<RevisionInfo>> ListRevisions(Revision before, int limit) = 0;
   /// What was touched by the revisions after `after`, up to and with `until`.
@@ -75,6 +78,14 @@ class MapReader {
   /// revision, the ends of edges. The other invariants are proven at each commit (CheckDelta).
   /// `progress` (may be empty) gets a fraction from 0 to 1.
   virtual absl::StatusOr<VerifyReport> Verify(const std::function<void(double)>& progress) = 0;
+};
+
+/// Result of bringing a map to the newest format.
+struct UpgradeReport {
+  int64_t from_format = 0;
+  int64_t to_format = 0;
+  /// The file as it was, beside the map; empty if nothing was to do. Delete it when content.
+  std::string copy;
 };
 
 struct StoreOptions {
@@ -95,17 +106,23 @@ class GraphStore {
   static absl::StatusOr<std::unique_ptr<GraphStore>> Open(const std::string& folder,
                                                           const StoreOptions& options);
 
-  /// Maps that this program can read; the others are logged and left out. Order: by name.
+  /// Maps that this program can read or upgrade; the others are logged and left out. Order: by
+  /// name.
   virtual absl::StatusOr<std::vector<MapSpec>> ListMaps() = 0;
   /// Errors: ALREADY_EXISTS/MAP_EXISTS; what MapSpec::Validate returns.
   virtual absl::Status CreateMap(const MapSpec& spec) = 0;
   /// Errors: NOT_FOUND/MAP_UNKNOWN; FAILED_PRECONDITION/FORMAT_TOO_NEW or NOT_A_STORE.
   virtual absl::StatusOr<std::shared_ptr<MapReader>> OpenMap(const std::string& name) = 0;
+  /// Brings a map to the newest format, in one transaction, after keeping a copy. Opening never
+  /// does it.
+  /// Errors: NOT_FOUND/MAP_UNKNOWN; UNAVAILABLE/WRITER_LOCKED; FAILED_PRECONDITION/FORMAT_TOO_NEW;
+  /// RESOURCE_EXHAUSTED/DISK_FULL, nothing changed.
+  virtual absl::StatusOr<UpgradeReport> UpgradeMap(const std::string& name) = 0;
   /// Errors: as OpenMap; UNAVAILABLE/WRITER_LOCKED naming who holds the lock.
-  virtual absl::StatusOr<std::unique_ptr<GraphWriter>> OpenWriter(const std::string& name) = 0;
+  virtual absl::StatusOr<std::unique_ptr<MapWriter>> OpenWriter(const std::string& name) = 0;
 };
 
 /// The number in every map file; opening never upgrades it silently.
-inline constexpr int kStoreFormatVersion = 1;
+inline constexpr int kStoreFormatVersion = 2;
 
 }  // namespace dsg

@@ -18,11 +18,11 @@ constexpr int64_t kHighest = std::numeric_limits<int64_t>::max();
 // Runs a statement again and again, each time after the last row of the time before, until it
 // gives no full batch. `bind` binds where to go on; `take` takes a row and notes where it was.
 template <typename Bind, typename Take>
-absl::Status RunInBatches(SqliteMapReader* reader, const char* sql, const StopCheck& stop,
-                          const Bind& bind, const Take& take) {
+absl::Status RunInBatches(SqliteMapReader* reader, Revision revision, const char* sql,
+                          const StopCheck& stop, const Bind& bind, const Take& take) {
   for (;;) {
     DSG_RETURN_IF_ERROR(AskStop(stop));
-    DSG_ASSIGN_OR_RETURN(auto lease, reader->LeaseConnection());
+    DSG_ASSIGN_OR_RETURN(auto lease, reader->LeaseAt(revision));
     Query query(*lease, sql);
     bind(&query);
     int row_count = 0;
@@ -32,8 +32,9 @@ absl::Status RunInBatches(SqliteMapReader* reader, const char* sql, const StopCh
   }
 }
 
-absl::StatusOr<std::unordered_map<int64_t, std::string>> ReadRelations(SqliteMapReader* reader) {
-  DSG_ASSIGN_OR_RETURN(auto lease, reader->LeaseConnection());
+absl::StatusOr<std::unordered_map<int64_t, std::string>> ReadRelations(SqliteMapReader* reader,
+                                                                       Revision revision) {
+  DSG_ASSIGN_OR_RETURN(auto lease, reader->LeaseAt(revision));
   std::unordered_map<int64_t, std::string> names;
   Query query(*lease, "SELECT id, name FROM relation");
   while (query.Next()) names[query.Int(0)] = query.Text(1);
@@ -54,7 +55,7 @@ absl::Status SqliteSnapshot::ReadAllNodes(const StopCheck& stop,
   };
   int64_t after_key = kLowest;
   DSG_RETURN_IF_ERROR(RunInBatches(
-      reader_.get(),
+      reader_.get(), revision(),
       "SELECT key, rev_from, layer, payload, checksum FROM node"
       " WHERE key > ?1 AND rev_from <= ?2 ORDER BY key LIMIT ?3",
       stop, [&](Query* query) { query->Bind(after_key, revision(), kBatchRows); },
@@ -66,7 +67,7 @@ absl::Status SqliteSnapshot::ReadAllNodes(const StopCheck& stop,
   Revision after_end = revision();
   int64_t after_row = kHighest;
   return RunInBatches(
-      reader_.get(),
+      reader_.get(), revision(),
       "SELECT key, rev_from, layer, payload, checksum, rev_to, rowid"
       " FROM node_history INDEXED BY node_history_rev_to"
       " WHERE (rev_to, rowid) > (?1, ?2) AND +rev_from <= ?3 ORDER BY rev_to, rowid LIMIT ?4",
@@ -80,7 +81,7 @@ absl::Status SqliteSnapshot::ReadAllNodes(const StopCheck& stop,
 
 absl::Status SqliteSnapshot::ReadAllEdges(const StopCheck& stop,
                                           const std::function<void(const Edge&)>& visit) const {
-  DSG_ASSIGN_OR_RETURN(const auto relations, ReadRelations(reader_.get()));
+  DSG_ASSIGN_OR_RETURN(const auto relations, ReadRelations(reader_.get(), revision()));
   const auto show = [&](const Query& query) -> absl::Status {
     const auto relation = relations.find(query.Int(1));
     if (relation == relations.end()) {
@@ -95,7 +96,7 @@ absl::Status SqliteSnapshot::ReadAllEdges(const StopCheck& stop,
   int64_t relation = kLowest;
   int64_t target = kLowest;
   DSG_RETURN_IF_ERROR(RunInBatches(
-      reader_.get(),
+      reader_.get(), revision(),
       "SELECT source, relation, target, rev_from, weight, payload, checksum FROM edge"
       " WHERE (source, relation, target) > (?1, ?2, ?3) AND rev_from <= ?4"
       " ORDER BY source, relation, target LIMIT ?5",
@@ -109,7 +110,7 @@ absl::Status SqliteSnapshot::ReadAllEdges(const StopCheck& stop,
   Revision after_end = revision();
   int64_t after_row = kHighest;
   return RunInBatches(
-      reader_.get(),
+      reader_.get(), revision(),
       "SELECT source, relation, target, rev_from, weight, payload, checksum, rev_to, rowid"
       " FROM edge_history INDEXED BY edge_history_rev_to"
       " WHERE (rev_to, rowid) > (?1, ?2) AND +rev_from <= ?3 ORDER BY rev_to, rowid LIMIT ?4",

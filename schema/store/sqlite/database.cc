@@ -55,7 +55,8 @@ absl::StatusOr<std::unique_ptr<Database>> Database::Open(const std::string& path
   if (mode == Mode::kCreate) {
     DSG_RETURN_IF_ERROR(made->Execute("PRAGMA page_size=4096;"));
     if (!ReservePageSeals(made->db_)) return made->Error("making room for page checksums");
-    DSG_RETURN_IF_ERROR(made->Execute("PRAGMA journal_mode=WAL;"));
+    // Incremental: forgetting gives pages back without room for a second copy of the file.
+    DSG_RETURN_IF_ERROR(made->Execute("PRAGMA auto_vacuum=INCREMENTAL; PRAGMA journal_mode=WAL;"));
   }
   DSG_RETURN_IF_ERROR(made->Execute(mode == Mode::kRead ? kReadPragmas : kWritePragmas));
   if (mode != Mode::kRead) sqlite3_wal_hook(made->db_, OnWalCommit, &made->wal_pages_);
@@ -89,6 +90,16 @@ bool Database::Checkpoint(bool truncate) {
   wal_pages_ = 0;
   return log_pages == copied_pages;
 }
+
+absl::Status Database::WriteAnew() {
+  // SQLite attaches the copy, which we allow nobody else.
+  sqlite3_limit(db_, SQLITE_LIMIT_ATTACHED, 1);
+  absl::Status status = Execute("PRAGMA auto_vacuum=INCREMENTAL; VACUUM");
+  sqlite3_limit(db_, SQLITE_LIMIT_ATTACHED, 0);
+  return status;
+}
+
+int64_t Database::changed_row_count() const { return sqlite3_changes64(db_); }
 
 int Database::error_code() const { return sqlite3_extended_errcode(db_); }
 

@@ -45,6 +45,9 @@ class Database {
   /// Copies the write-ahead log into the database as far as readers allow; false if not all of it.
   /// For a map in use that is no error: the log only grows.
   bool Checkpoint(bool truncate);
+  /// Writes the whole file anew, so that it holds no free pages and can shrink in steps later.
+  /// Needs room for a second copy while it runs.
+  absl::Status WriteAnew();
   /// Pages in the write-ahead log after the last commit.
   int wal_pages() const { return wal_pages_; }
 
@@ -52,6 +55,8 @@ class Database {
   absl::Status Error(std::string_view doing) const;
   const std::string& map_name() const { return map_name_; }
   const std::string& path() const { return path_; }
+  /// Rows that the last statement inserted, changed or deleted.
+  int64_t changed_row_count() const;
   /// Last SQLite result code.
   int error_code() const;
 

@@ -19,6 +19,7 @@
 namespace dsg::sqlite {
 
 extern const char kInitSql[];
+extern const char kLongLivedSql[];
 
 namespace {
 
@@ -38,6 +39,7 @@ absl::Status SyncFolder(const std::string& folder) {
 absl::Status FillNewDatabase(Database& db, const MapSpec& spec) {
   DSG_RETURN_IF_ERROR(db.Execute("BEGIN IMMEDIATE"));
   DSG_RETURN_IF_ERROR(db.Execute(kInitSql));
+  DSG_RETURN_IF_ERROR(db.Execute(kLongLivedSql));
   DSG_RETURN_IF_ERROR(Query(db,
                             "INSERT INTO map (id, name, frame, epoch_ns, clock, codec, gap_ns_max,"
                             " mesh_block_size_m) VALUES (1, ?1, ?2, ?3, ?4, ?5, ?6, ?7)")
@@ -57,7 +59,8 @@ absl::Status FillNewDatabase(Database& db, const MapSpec& spec) {
   return db.Execute("COMMIT");
 }
 
-absl::Status CheckFormat(Database& db, const std::string& path) {
+// A map, of a format that this program knows.
+absl::Status CheckKnownFormat(Database& db, const std::string& path) {
   DSG_ASSIGN_OR_RETURN(const int64_t application_id, db.QueryInt("PRAGMA application_id"));
   if (application_id != kApplicationId) {
     return MakeError(Reason::kNotAStore,
@@ -72,16 +75,30 @@ absl::Status CheckFormat(Database& db, const std::string& path) {
                                   kStoreFormatVersion, "; use a newer dsgdb"),
                      {{"map", db.map_name()}, {"format", absl::StrCat(version)}});
   }
+  return absl::OkStatus();
+}
+
+absl::Status CheckNewestFormat(Database& db, const std::string& path) {
+  DSG_ASSIGN_OR_RETURN(const int64_t version, db.QueryInt("PRAGMA user_version"));
   if (version < kStoreFormatVersion) {
     return MakeError(
         Reason::kFormatTooOld,
-        absl::StrCat(path, " has format ", version, "; this program needs ", kStoreFormatVersion),
+        absl::StrCat(path, " has format ", version, ", and this program needs ",
+                     kStoreFormatVersion, "; run `dsg upgrade`, which keeps a copy of the old"),
         {{"map", db.map_name()}, {"format", absl::StrCat(version)}});
   }
   return absl::OkStatus();
 }
 
 }  // namespace
+
+absl::Status SyncFile(const std::string& path) {
+  const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const bool synced = fd >= 0 && fsync(fd) == 0;
+  if (fd >= 0) close(fd);
+  if (synced) return absl::OkStatus();
+  return absl::InternalError(absl::StrCat("cannot sync ", path, ": ", Errno()));
+}
 
 std::string MapFolder(const std::string& store_folder, const std::string& map) {
   return absl::StrCat(store_folder, "/", map);
@@ -148,6 +165,14 @@ absl::Status CreateMapFile(const std::string& store_folder, const MapSpec& spec)
 
 absl::StatusOr<std::unique_ptr<Database>> OpenMapFile(const std::string& store_folder,
                                                       const std::string& map, Database::Mode mode) {
+  DSG_ASSIGN_OR_RETURN(auto db, OpenAnyFormat(store_folder, map, mode));
+  DSG_RETURN_IF_ERROR(CheckNewestFormat(*db, db->path()));
+  return db;
+}
+
+absl::StatusOr<std::unique_ptr<Database>> OpenAnyFormat(const std::string& store_folder,
+                                                        const std::string& map,
+                                                        Database::Mode mode) {
   DSG_RETURN_IF_ERROR(CheckMapName(map));
   const std::string path = DatabasePath(store_folder, map);
   struct stat info {};
@@ -167,7 +192,7 @@ absl::StatusOr<std::unique_ptr<Database>> OpenMapFile(const std::string& store_f
                      {{"map", map}});
   }
   DSG_ASSIGN_OR_RETURN(auto db, Database::Open(path, mode, map));
-  DSG_RETURN_IF_ERROR(CheckFormat(*db, path));
+  DSG_RETURN_IF_ERROR(CheckKnownFormat(*db, path));
   DSG_ASSIGN_OR_RETURN(const MapSpec spec, ReadMapSpec(*db));
   if (spec.name != map) {
     return MakeError(

@@ -30,6 +30,12 @@ absl::Status CreateMapFile(const std::string& store_folder, const MapSpec& spec)
 /// Errors: NOT_FOUND/MAP_UNKNOWN; FAILED_PRECONDITION/NOT_A_STORE or FORMAT_TOO_NEW.
 absl::StatusOr<std::unique_ptr<Database>> OpenMapFile(const std::string& store_folder,
                                                       const std::string& map, Database::Mode mode);
+/// The same for a map of an older format, whose tables are not as this program expects them.
+absl::StatusOr<std::unique_ptr<Database>> OpenAnyFormat(const std::string& store_folder,
+                                                        const std::string& map,
+                                                        Database::Mode mode);
+/// Returns when the file's bytes are on the disk.
+absl::Status SyncFile(const std::string& path);
 
 absl::StatusOr<MapSpec> ReadMapSpec(Database& db);
 
@@ -62,9 +68,5 @@ class WriterLock {
   explicit WriterLock(int fd) : fd_(fd) {}
   int fd_;
 };
-
-/// Whether commits to the map list what they touched. Maps made before there was such a list have
-/// no table for it, and get none.
-absl::StatusOr<bool> KeepsTouched(Database& db);
 
 }  // namespace dsg::sqlite

@@ -2,6 +2,8 @@
 #include "schema/store/sqlite/map_reader.h"
 
 #include "absl/strings/str_cat.h"
+#include "schema/store/sqlite/sessions.h"
+#include "schema/store/sqlite/tags.h"
 
 namespace dsg::sqlite {
 namespace {
@@ -26,14 +28,30 @@ absl::StatusOr<std::shared_ptr<SqliteMapReader>> SqliteMapReader::Open(
   reader->identity_ = IdentityOf(store_folder, map);
   DSG_ASSIGN_OR_RETURN(reader->watcher_, OpenMapFile(store_folder, map, Database::Mode::kRead));
   DSG_ASSIGN_OR_RETURN(reader->spec_, ReadMapSpec(*reader->watcher_));
-  DSG_ASSIGN_OR_RETURN(reader->keeps_touched_, KeepsTouched(*reader->watcher_));
+  DSG_ASSIGN_OR_RETURN(const Readable readable, LoadReadable(*reader->watcher_));
+  reader->generation_ = readable.generation;
   return reader;
 }
 
 SqliteMapReader::Lease::~Lease() {
   if (db_ == nullptr) return;
+  // Nothing was written; after a bad page SQLite has ended the transaction itself.
+  if (is_in_transaction_) Query(*db_, "ROLLBACK").Run().IgnoreError();
   const std::lock_guard lock(reader_->pool_mutex_);
   if (reader_->pool_.size() < kPoolMax) reader_->pool_.push_back(std::move(db_));
+}
+
+absl::Status SqliteMapReader::Lease::BeginTransaction() {
+  DSG_RETURN_IF_ERROR(Query(*db_, "BEGIN").Run());
+  is_in_transaction_ = true;
+  return absl::OkStatus();
+}
+
+absl::StatusOr<SqliteMapReader::Lease> SqliteMapReader::LeaseAt(Revision revision) {
+  DSG_ASSIGN_OR_RETURN(Lease lease, LeaseConnection());
+  DSG_RETURN_IF_ERROR(lease.BeginTransaction());
+  DSG_RETURN_IF_ERROR(CheckReadable(*lease, revision, generation_));
+  return lease;
 }
 
 absl::StatusOr<SqliteMapReader::Lease> SqliteMapReader::LeaseConnection() {
@@ -49,46 +67,59 @@ absl::StatusOr<SqliteMapReader::Lease> SqliteMapReader::LeaseConnection() {
   return Lease(this, std::move(db));
 }
 
-absl::StatusOr<std::shared_ptr<const sqlite::Head>> SqliteMapReader::RefreshHead() {
+absl::StatusOr<SqliteMapReader::State> SqliteMapReader::Refresh() {
   const std::lock_guard lock(head_mutex_);
   DSG_ASSIGN_OR_RETURN(const int64_t version, watcher_->QueryInt("PRAGMA data_version"));
-  if (head_ == nullptr || version != data_version_) {
+  if (state_.head == nullptr || version != data_version_) {
+    const ReadTransaction transaction(watcher_.get());
+    DSG_RETURN_IF_ERROR(transaction.status());
     DSG_ASSIGN_OR_RETURN(sqlite::Head head, LoadHead(*watcher_));
-    head_ = std::make_shared<const sqlite::Head>(std::move(head));
+    DSG_ASSIGN_OR_RETURN(Readable readable, LoadReadable(*watcher_));
+    if (readable.generation != generation_) is_rewritten_ = true;
+    state_ = {std::make_shared<const sqlite::Head>(std::move(head)),
+              std::make_shared<const Readable>(std::move(readable))};
     data_version_ = version;
   }
-  return head_;
+  return state_;
 }
 
 absl::StatusOr<RevisionInfo> SqliteMapReader::Head() {
-  DSG_ASSIGN_OR_RETURN(const auto head, RefreshHead());
-  return head->info;
+  DSG_ASSIGN_OR_RETURN(const State state, Refresh());
+  return state.head->info;
 }
 
 absl::StatusOr<std::shared_ptr<const Snapshot>> SqliteMapReader::Latest() {
-  DSG_ASSIGN_OR_RETURN(auto head, RefreshHead());
-  return MakeSnapshot(shared_from_this(), std::move(head));
+  DSG_ASSIGN_OR_RETURN(State state, Refresh());
+  return MakeSnapshot(shared_from_this(), std::move(state.head));
 }
 
 absl::StatusOr<std::shared_ptr<const Snapshot>> SqliteMapReader::At(Revision revision) {
-  DSG_ASSIGN_OR_RETURN(auto head, RefreshHead());
-  const Revision newest = head->info.revision;
-  if (revision == newest) return MakeSnapshot(shared_from_this(), std::move(head));
+  DSG_ASSIGN_OR_RETURN(State state, Refresh());
+  const Revision newest = state.head->info.revision;
+  if (revision == newest) return MakeSnapshot(shared_from_this(), std::move(state.head));
   if (revision < 0 || revision > newest) {
-    return MakeError(Reason::kRevisionInFuture,
-                     absl::StrCat("revision ", revision, " of map \"", spec_.name,
-                                  "\" does not exist; readable are 0 to ", newest),
-                     {{"map", spec_.name}, {"oldest", "0"}, {"newest", absl::StrCat(newest)}});
+    return FutureError(spec_.name, revision, newest, *state.readable);
+  }
+  if (!state.readable->Holds(revision)) {
+    return CompactedError(spec_.name, revision, newest, *state.readable);
   }
   sqlite::Head at;
   if (revision > 0) {
-    DSG_ASSIGN_OR_RETURN(Lease lease, LeaseConnection());
+    DSG_ASSIGN_OR_RETURN(Lease lease, LeaseAt(revision));
     DSG_ASSIGN_OR_RETURN(at, LoadRevision(*lease, revision));
   }
   return MakeSnapshot(shared_from_this(), std::make_shared<const sqlite::Head>(std::move(at)));
 }
 
-absl::StatusOr<Revision> SqliteMapReader::OldestRevision() { return Revision{0}; }
+absl::StatusOr<Revision> SqliteMapReader::OldestRevision() {
+  DSG_ASSIGN_OR_RETURN(const State state, Refresh());
+  return state.readable->oldest;
+}
+
+absl::StatusOr<std::vector<Tag>> SqliteMapReader::Tags() {
+  DSG_ASSIGN_OR_RETURN(Lease lease, LeaseConnection());
+  return ReadTags(*lease);
+}
 
 absl::StatusOr<std::vector<RevisionInfo>> SqliteMapReader::ListRevisions(Revision before,
                                                                          int limit) {
@@ -119,7 +150,7 @@ absl::StatusOr<std::shared_ptr<const Track>> SqliteMapReader::GetTrack(NodeId ag
                                                                        Revision revision) {
   const TrackKey key{agent, revision};
   if (auto cached = tracks_.Find(key)) return cached;
-  DSG_ASSIGN_OR_RETURN(Lease lease, LeaseConnection());
+  DSG_ASSIGN_OR_RETURN(Lease lease, LeaseAt(revision));
   // What is cached for the revision before is still true if the agent has not changed since.
   if (auto before = tracks_.Find({agent, revision - 1})) {
     DSG_ASSIGN_OR_RETURN(const Revision changed, LastChangeOfTrack(*lease, agent));
@@ -134,10 +165,10 @@ absl::StatusOr<std::shared_ptr<const Track>> SqliteMapReader::GetTrack(NodeId ag
 }
 
 absl::StatusOr<std::shared_ptr<const SegmentReader>> SqliteMapReader::GetSegment(
-    const SegmentRef& segment) {
+    const SegmentRef& segment, Revision revision) {
   const SegmentKey key{segment.id, segment.rev_from, segment.pose_count};
   if (auto cached = segments_.Find(key)) return cached;
-  DSG_ASSIGN_OR_RETURN(Lease lease, LeaseConnection());
+  DSG_ASSIGN_OR_RETURN(Lease lease, LeaseAt(revision));
   DSG_ASSIGN_OR_RETURN(auto reader, LoadSegment(*lease, segment));
   segments_.Insert(key, reader, reader->memory_bytes());
   return reader;

@@ -2,6 +2,7 @@
 // One map open for reading: a pool of read-only connections, and caches shared by all snapshots.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -9,6 +10,7 @@
 
 #include "schema/store/graph_store.h"
 #include "schema/store/sqlite/map_file.h"
+#include "schema/store/sqlite/readable.h"
 #include "schema/store/sqlite/shape_reader.h"
 #include "schema/store/sqlite/track_cache.h"
 #include "schema/store/sqlite/writer.h"
@@ -22,11 +24,14 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
                                                                size_t cache_bytes);
 
   const MapSpec& spec() const override { return spec_; }
-  bool IsCurrent() const override { return IdentityOf(store_folder_, spec_.name) == identity_; }
+  bool IsCurrent() const override {
+    return !is_rewritten_.load() && IdentityOf(store_folder_, spec_.name) == identity_;
+  }
   absl::StatusOr<RevisionInfo> Head() override;
   absl::StatusOr<std::shared_ptr<const Snapshot>> Latest() override;
   absl::StatusOr<std::shared_ptr<const Snapshot>> At(Revision revision) override;
   absl::StatusOr<Revision> OldestRevision() override;
+  absl::StatusOr<std::vector<Tag>> Tags() override;
   absl::StatusOr<std::vector<RevisionInfo>> ListRevisions(Revision before, int limit) override;
   absl::StatusOr<Touched> TouchedBetween(Revision after, Revision until,
                                          const StopCheck& stop) override;
@@ -40,23 +45,35 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
         : reader_(reader), db_(std::move(db)) {}
     ~Lease();
     Lease(Lease&&) = default;
+    /// Until it is dropped.
+    absl::Status BeginTransaction();
     Database& operator*() { return *db_; }
     Database* operator->() { return db_.get(); }
 
    private:
     SqliteMapReader* reader_;
     std::unique_ptr<Database> db_;
+    bool is_in_transaction_ = false;
   };
   absl::StatusOr<Lease> LeaseConnection();
+  /// One that sees one state, in which the revision can be read.
+  /// Errors: OUT_OF_RANGE/REVISION_COMPACTED; ABORTED/MAP_REPLACED.
+  absl::StatusOr<Lease> LeaseAt(Revision revision);
 
   absl::StatusOr<std::shared_ptr<const Track>> GetTrack(NodeId agent, Revision revision);
-  absl::StatusOr<std::shared_ptr<const SegmentReader>> GetSegment(const SegmentRef& segment);
+  absl::StatusOr<std::shared_ptr<const SegmentReader>> GetSegment(const SegmentRef& segment,
+                                                                  Revision revision);
   AncestorCache& ancestors() { return ancestors_; }
   ShapeCache& shapes() { return shapes_; }
   int64_t bytes_on_disk() const { return BytesOnDisk(store_folder_, spec_.name); }
 
  private:
-  absl::StatusOr<std::shared_ptr<const sqlite::Head>> RefreshHead();
+  /// The newest revision and which others can be read, as of one instant.
+  struct State {
+    std::shared_ptr<const sqlite::Head> head;
+    std::shared_ptr<const Readable> readable;
+  };
+  absl::StatusOr<State> Refresh();
 
   SqliteMapReader(std::string store_folder, size_t cache_bytes)
       : store_folder_(std::move(store_folder)),
@@ -68,13 +85,15 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
   std::string store_folder_;
   MapSpec spec_;
   std::optional<FileIdentity> identity_;
-  bool keeps_touched_ = false;
 
   std::mutex head_mutex_;
   /// Watches for commits of other connections: SQLite counts them for us (data_version).
   std::unique_ptr<Database> watcher_;
   int64_t data_version_ = -1;
-  std::shared_ptr<const sqlite::Head> head_;
+  State state_;
+  /// Of the map when it was opened.
+  int64_t generation_ = 0;
+  std::atomic<bool> is_rewritten_ = false;
 
   std::mutex pool_mutex_;
   std::vector<std::unique_ptr<Database>> pool_;

@@ -3,6 +3,7 @@
 #include <charconv>
 
 #include "absl/strings/str_cat.h"
+#include "schema/store/sqlite/sessions.h"
 #include "schema/store/sqlite/writer.h"
 
 namespace dsg::sqlite {
@@ -94,6 +95,7 @@ absl::StatusOr<Head> LoadHead(Database& db) {
 
 absl::Status InsertRevision(const CommitContext& commit) {
   const RevisionInfo& info = commit.head.info;
+  DSG_RETURN_IF_ERROR(WriteSession(commit.db, info));
   const std::string content = commit.head.content.bytes();
   return Query(commit.db, "INSERT INTO revision (" DSG_REVISION_COLUMNS
                           ") VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13,"
@@ -113,22 +115,6 @@ absl::Status InsertTouched(CommitContext* commit) {
       .Bind(commit->revision(), Query::BlobView{payload},
             RowChecksum({commit->revision()}, payload))
       .Run();
-}
-
-absl::StatusOr<SessionState> ReadSession(Database& db, const std::string& session_id) {
-  Query query(db,
-              "SELECT sequence, revision FROM revision WHERE session_id = ?1"
-              " ORDER BY sequence DESC LIMIT 1");
-  SessionState state;
-  if (query.Bind(session_id).Next()) {
-    state.last_sequence = query.Int(0);
-    state.last_revision = query.Int(1);
-  }
-  DSG_RETURN_IF_ERROR(query.status());
-  Query first(db, "SELECT revision FROM revision WHERE session_id = ?1 ORDER BY sequence LIMIT 1");
-  if (first.Bind(session_id).Next()) state.first_revision = first.Int(0);
-  DSG_RETURN_IF_ERROR(first.status());
-  return state;
 }
 
 }  // namespace dsg::sqlite

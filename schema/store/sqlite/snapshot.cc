@@ -16,7 +16,7 @@ std::shared_ptr<const Snapshot> MakeSnapshot(std::shared_ptr<SqliteMapReader> re
 }
 
 absl::StatusOr<std::vector<Layer>> SqliteSnapshot::Layers() const {
-  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
   Query query(*lease, "SELECT id, name, rank FROM layer WHERE rev_from <= ?1 ORDER BY rank, name");
   query.Bind(revision());
   std::vector<Layer> layers;
@@ -42,7 +42,7 @@ absl::StatusOr<Layer> SqliteSnapshot::FindLayer(std::string_view name) const {
 }
 
 absl::StatusOr<std::vector<SemanticLabel>> SqliteSnapshot::Labels() const {
-  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
   Query query(*lease,
               "SELECT id, name, max(rev_from) FROM label WHERE rev_from <= ?1"
               " GROUP BY id ORDER BY id");
@@ -71,7 +71,7 @@ absl::StatusOr<MapStats> SqliteSnapshot::Stats() const {
 
 absl::StatusOr<std::vector<PoseFactor>> SqliteSnapshot::Factors(NodeId agent, TimeNs from_ns,
                                                                 TimeNs to_ns) const {
-  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
   Query query(*lease,
               "SELECT rev_from, t0, t1, checksum, payload FROM factor_segment"
               " WHERE agent = ?1 AND rev_from <= ?2 AND t0 < ?4 AND t1 >= ?3");
@@ -96,7 +96,7 @@ absl::StatusOr<std::vector<PoseFactor>> SqliteSnapshot::Factors(NodeId agent, Ti
 }
 
 absl::StatusOr<std::vector<BlockIndex>> SqliteSnapshot::MeshBlocks() const {
-  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
   Query query(*lease,
               "SELECT x, y, z FROM mesh_block WHERE rev_from <= ?1"
               " UNION ALL SELECT x, y, z FROM mesh_block_history"
@@ -113,7 +113,7 @@ absl::StatusOr<std::vector<BlockIndex>> SqliteSnapshot::MeshBlocks() const {
 
 absl::StatusOr<std::vector<std::pair<BlockIndex, Revision>>> SqliteSnapshot::MeshBlockVersions(
     const StopCheck& stop) const {
-  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
   Query query(*lease,
               "SELECT x, y, z, rev_from FROM mesh_block WHERE rev_from <= ?1"
               " UNION ALL SELECT x, y, z, rev_from FROM mesh_block_history"
@@ -132,7 +132,7 @@ absl::StatusOr<std::vector<std::pair<BlockIndex, Revision>>> SqliteSnapshot::Mes
 }
 
 absl::StatusOr<MeshBlock> SqliteSnapshot::ReadMeshBlock(BlockIndex index) const {
-  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
   Query query(*lease,
               "SELECT rev_from, checksum, payload FROM mesh_block"
               " WHERE x = ?1 AND y = ?2 AND z = ?3 AND rev_from <= ?4"
@@ -155,7 +155,7 @@ absl::StatusOr<MeshBlock> SqliteSnapshot::ReadMeshBlock(BlockIndex index) const 
 }
 
 absl::StatusOr<Asset> SqliteSnapshot::ReadAsset(const Sha256& sha256) const {
-  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
   Query query(*lease,
               "SELECT media_type, payload FROM asset WHERE sha256 = ?1 AND rev_from <= ?2"
               " ORDER BY part");

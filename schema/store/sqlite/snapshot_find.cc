@@ -16,14 +16,12 @@ constexpr size_t kBatchKeys = 256;
 
 // Calls `find_batch` with one stretch of the keys after the other, a read transaction for each.
 template <typename Key, typename FindBatch>
-absl::Status FindInBatches(SqliteMapReader* reader, const std::vector<Key>& keys,
+absl::Status FindInBatches(SqliteMapReader* reader, Revision revision, const std::vector<Key>& keys,
                            const StopCheck& stop, const FindBatch& find_batch) {
   const std::span<const Key> all(keys);
   for (size_t first = 0; first < all.size(); first += kBatchKeys) {
     DSG_RETURN_IF_ERROR(AskStop(stop));
-    DSG_ASSIGN_OR_RETURN(auto lease, reader->LeaseConnection());
-    const ReadTransaction transaction(&*lease);
-    DSG_RETURN_IF_ERROR(transaction.status());
+    DSG_ASSIGN_OR_RETURN(auto lease, reader->LeaseAt(revision));
     DSG_RETURN_IF_ERROR(
         find_batch(&*lease, all.subspan(first, std::min(kBatchKeys, all.size() - first))));
   }
@@ -72,7 +70,7 @@ absl::StatusOr<std::vector<std::optional<Node>>> SqliteSnapshot::FindNodes(
     }
     return absl::OkStatus();
   };
-  DSG_RETURN_IF_ERROR(FindInBatches(reader_.get(), ids, stop, find_batch));
+  DSG_RETURN_IF_ERROR(FindInBatches(reader_.get(), revision(), ids, stop, find_batch));
   return nodes;
 }
 
@@ -101,7 +99,7 @@ absl::StatusOr<std::vector<std::optional<Edge>>> SqliteSnapshot::FindEdges(
     }
     return absl::OkStatus();
   };
-  DSG_RETURN_IF_ERROR(FindInBatches(reader_.get(), keys, stop, find_batch));
+  DSG_RETURN_IF_ERROR(FindInBatches(reader_.get(), revision(), keys, stop, find_batch));
   return edges;
 }
 

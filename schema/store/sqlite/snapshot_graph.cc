@@ -74,7 +74,7 @@ absl::StatusOr<Edge> EdgeFromRow(const Query& query, std::string_view relation,
 }
 
 absl::StatusOr<Node> SqliteSnapshot::GetNode(NodeId id) const {
-  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
   Query query(*lease,
               "SELECT key, rev_from, layer, payload, checksum FROM node"
               " WHERE key = ?1 AND rev_from <= ?2"
@@ -92,7 +92,7 @@ absl::StatusOr<Node> SqliteSnapshot::GetNode(NodeId id) const {
 absl::StatusOr<std::vector<NodeId>> SqliteSnapshot::IdsNamed(const std::string& name) const {
   std::vector<NodeId> ids;
   if (name.empty()) return ids;
-  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
   // `name <> ''` lets the partial index serve.
   Query query(*lease,
               "SELECT key FROM node WHERE name = ?1 AND name <> '' AND rev_from <= ?2"
@@ -154,7 +154,7 @@ absl::StatusOr<NodeId> SqliteSnapshot::ResolveAgent(std::string_view id_or_name)
 }
 
 absl::StatusOr<std::vector<NodeId>> SqliteSnapshot::ChildrenOf(NodeId parent) const {
-  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
   Query query(*lease,
               "SELECT target FROM edge WHERE source = ?1 AND relation = (SELECT id FROM relation "
               "WHERE name = ?3) AND rev_from <= ?2"
@@ -173,7 +173,7 @@ absl::StatusOr<std::vector<NodeId>> SqliteSnapshot::ChildrenOf(NodeId parent) co
 // still the revision asked for.
 absl::StatusOr<std::optional<std::vector<NodeId>>> SqliteSnapshot::IdsTouching(
     const Box3d& box_map) const {
-  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
   constexpr double kLimit = 2.1e6;
   const Box3d clamped(box_map.min().cwiseMax(-kLimit).cwiseMin(kLimit),
                       box_map.max().cwiseMax(-kLimit).cwiseMin(kLimit));
@@ -215,7 +215,7 @@ absl::StatusOr<std::optional<std::vector<NodeId>>> SqliteSnapshot::Candidates(
 
 absl::StatusOr<std::vector<Node>> SqliteSnapshot::ReadBatch(const NodeFilter& filter,
                                                             NodeId after) const {
-  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
   const int64_t letter = static_cast<unsigned char>(after.letter());
   const auto index = static_cast<int64_t>(after.index());
   // Two texts, so that each has the index it needs. History rows are found by rev_to: near the
@@ -278,7 +278,7 @@ absl::Status SqliteSnapshot::ScanNodes(const NodeFilter& filter, NodeId after,
 }
 
 absl::StatusOr<std::vector<Edge>> SqliteSnapshot::EdgesAt(NodeId end, bool outgoing) const {
-  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
   Query query(*lease, outgoing ? kEdgesFrom : kEdgesTo);
   query.Bind(KeyOf(end), revision());
   std::vector<Edge> edges;
@@ -320,7 +320,7 @@ absl::Status SqliteSnapshot::ScanEdges(const EdgeFilter& filter,
 }
 
 absl::StatusOr<std::optional<Edge>> SqliteSnapshot::FindEdge(const EdgeKey& key) const {
-  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
   Query query(*lease,
               "SELECT source, relation, target, rev_from, weight, payload, checksum, ?2 FROM edge"
               " WHERE source = ?1 AND relation = (SELECT id FROM relation WHERE name = ?2)"
@@ -338,7 +338,7 @@ absl::StatusOr<std::optional<Edge>> SqliteSnapshot::FindEdge(const EdgeKey& key)
 }
 
 absl::StatusOr<NodeId> SqliteSnapshot::FindParent(NodeId id) const {
-  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
   Query query(*lease,
               "SELECT source FROM edge WHERE target = ?1 AND relation = (SELECT id FROM relation "
               "WHERE name = ?3) AND rev_from <= ?2"

@@ -83,7 +83,7 @@ absl::StatusOr<LocatedPose> SqliteSnapshot::Locate(NodeId agent, TimeNs at_ns) c
   }
   const auto at = static_cast<size_t>(track->FindSegment(at_ns));
   const SegmentRef& segment = track->segments[at];
-  DSG_ASSIGN_OR_RETURN(const auto reader, reader_->GetSegment(segment));
+  DSG_ASSIGN_OR_RETURN(const auto reader, reader_->GetSegment(segment, revision()));
   int index = 0;
   StoredPose before;
   StoredPose after;
@@ -102,7 +102,7 @@ absl::StatusOr<LocatedPose> SqliteSnapshot::Locate(NodeId agent, TimeNs at_ns) c
   if (before.time_ns >= segment.t1 || index + 1 >= reader->count()) {
     if (at + 1 >= track->segments.size()) return CorruptSegment(spec().name, segment);
     const SegmentRef& next = track->segments[at + 1];
-    DSG_ASSIGN_OR_RETURN(const auto next_reader, reader_->GetSegment(next));
+    DSG_ASSIGN_OR_RETURN(const auto next_reader, reader_->GetSegment(next, revision()));
     StoredPose unused;
     if (!next_reader->FindBracket(next.t0, &index, &after, &unused) || index < 0) {
       return CorruptSegment(spec().name, next);
@@ -126,7 +126,7 @@ absl::StatusOr<LocatedPose> SqliteSnapshot::Locate(NodeId agent, TimeNs at_ns) c
 absl::StatusOr<std::vector<StoredPose>> SqliteSnapshot::VisiblePoses(const Track& track,
                                                                      size_t segment) const {
   const SegmentRef& ref = track.segments[segment];
-  DSG_ASSIGN_OR_RETURN(const auto reader, reader_->GetSegment(ref));
+  DSG_ASSIGN_OR_RETURN(const auto reader, reader_->GetSegment(ref, revision()));
   std::vector<StoredPose> poses;
   if (!reader->DecodeAll(&poses)) return CorruptSegment(spec().name, ref);
   // Poses appended after this revision stand at the end.
@@ -155,7 +155,7 @@ absl::Status SqliteSnapshot::ReadPoses(NodeId agent, TimeNs from_ns, TimeNs to_n
 
 absl::StatusOr<std::map<NodeId, std::vector<int64_t>>> SqliteSnapshot::SegmentsTouching(
     const Box3d& box_map, TimeNs from_ns, TimeNs to_ns) const {
-  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
   constexpr double kLimit = 2.1e6;
   const IntBox box = ToMillimetres(Box3d(box_map.min().cwiseMax(-kLimit).cwiseMin(kLimit),
                                          box_map.max().cwiseMax(-kLimit).cwiseMin(kLimit)));
@@ -183,7 +183,7 @@ absl::Status SqliteSnapshot::PositionsAround(const Track& track, size_t segment,
   if (segment > 0) {
     // The way from the pose before belongs to this segment's box.
     const SegmentRef& previous = track.segments[segment - 1];
-    DSG_ASSIGN_OR_RETURN(const auto reader, reader_->GetSegment(previous));
+    DSG_ASSIGN_OR_RETURN(const auto reader, reader_->GetSegment(previous, revision()));
     int index = 0;
     StoredPose last;
     StoredPose unused;
@@ -193,7 +193,7 @@ absl::Status SqliteSnapshot::PositionsAround(const Track& track, size_t segment,
     positions->push_back({last.time_ns, PositionOf(last, spec().codec)});
   }
   const SegmentRef& ref = track.segments[segment];
-  DSG_ASSIGN_OR_RETURN(const auto reader, reader_->GetSegment(ref));
+  DSG_ASSIGN_OR_RETURN(const auto reader, reader_->GetSegment(ref, revision()));
   const size_t before = positions->size();
   if (!reader->DecodePositions(from_ns, to_ns, positions)) {
     return CorruptSegment(spec().name, ref);
@@ -285,7 +285,7 @@ absl::StatusOr<std::vector<Stay>> SqliteSnapshot::StaysInNode(NodeId room_or_pla
                                                               const StopCheck& stop) const {
   std::vector<Stay> stays;
   {
-    DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseConnection());
+    DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
     // No stay is longer than an hour, so none that entered earlier can reach from_ns.
     const TimeNs enter_min = from_ns < kTimeMin + kStayNsMax ? kTimeMin : from_ns - kStayNsMax;
     for (const char* sql :

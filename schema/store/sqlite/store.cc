@@ -8,6 +8,7 @@
 #include "schema/base/log.h"
 #include "schema/store/graph_store.h"
 #include "schema/store/sqlite/map_reader.h"
+#include "schema/store/sqlite/upgrade.h"
 
 namespace dsg {
 namespace {
@@ -28,7 +29,8 @@ class SqliteStore : public GraphStore {
       if (!IsValidMapName(name) || !fs::exists(sqlite::DatabasePath(folder_, name), missing)) {
         continue;
       }
-      const auto db = sqlite::OpenMapFile(folder_, name, sqlite::Database::Mode::kRead);
+      // Those of older formats too: opening one says how to upgrade it.
+      const auto db = sqlite::OpenAnyFormat(folder_, name, sqlite::Database::Mode::kRead);
       if (!db.ok()) {
         // One map that this program cannot read must not hide the others.
         Log(LogLevel::kWarning, "map-skipped",
@@ -57,9 +59,13 @@ class SqliteStore : public GraphStore {
     return std::shared_ptr<MapReader>(std::move(reader));
   }
 
-  absl::StatusOr<std::unique_ptr<GraphWriter>> OpenWriter(const std::string& name) override {
+  absl::StatusOr<UpgradeReport> UpgradeMap(const std::string& name) override {
+    return sqlite::UpgradeMapFile(folder_, name, options_.program);
+  }
+
+  absl::StatusOr<std::unique_ptr<MapWriter>> OpenWriter(const std::string& name) override {
     DSG_ASSIGN_OR_RETURN(auto writer, sqlite::SqliteWriter::Open(folder_, name, options_.program));
-    return std::unique_ptr<GraphWriter>(std::move(writer));
+    return std::unique_ptr<MapWriter>(std::move(writer));
   }
 
  private:

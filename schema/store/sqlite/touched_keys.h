@@ -33,6 +33,22 @@ struct TouchedKeys {
   void Normalize();
 };
 
+/// One row a key and revision that began or ended a row of that key, whatever the number of rows:
+/// kind (N, E, M, T, L), three numbers of its key, revision.
+inline constexpr char kTouchedRows[] =
+    "SELECT 'N', key, 0, 0, rev_from FROM node"
+    " UNION SELECT 'N', key, 0, 0, rev_from FROM node_history"
+    " UNION SELECT 'N', key, 0, 0, rev_to FROM node_history"
+    " UNION SELECT 'E', source, relation, target, rev_from FROM edge"
+    " UNION SELECT 'E', source, relation, target, rev_from FROM edge_history"
+    " UNION SELECT 'E', source, relation, target, rev_to FROM edge_history"
+    " UNION SELECT 'M', x, y, z, rev_from FROM mesh_block"
+    " UNION SELECT 'M', x, y, z, rev_from FROM mesh_block_history"
+    " UNION SELECT 'M', x, y, z, rev_to FROM mesh_block_history"
+    " UNION SELECT 'T', agent, 0, 0, revision FROM track_mark JOIN track USING (slot)"
+    " UNION SELECT 'L', 0, 0, 0, rev_from FROM layer WHERE rev_from > 0"
+    " UNION SELECT 'L', 0, 0, 0, rev_from FROM label";
+
 /// `keys` must be normalized.
 std::string EncodeTouched(const TouchedKeys& keys);
 /// Appends to `keys`. False if the bytes are not encoded keys.

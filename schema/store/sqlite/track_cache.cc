@@ -126,12 +126,7 @@ absl::StatusOr<std::shared_ptr<const Track>> LoadTrack(Database& db, const MapSp
   auto track = std::make_shared<Track>();
   track->info.agent = agent;
   track->info.gap_ns_max = spec.gap_ns_max;
-  // One transaction, so that a commit in between cannot move a segment to the history unseen.
-  DSG_RETURN_IF_ERROR(db.Execute("BEGIN"));
-  const absl::Status loaded = LoadAll(db, agent, revision, track.get());
-  // Nothing was written; after a bad page SQLite has ended the transaction itself.
-  db.Execute("ROLLBACK").IgnoreError();
-  DSG_RETURN_IF_ERROR(loaded);
+  DSG_RETURN_IF_ERROR(LoadAll(db, agent, revision, track.get()));
   return std::shared_ptr<const Track>(std::move(track));
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads a whole map: SQLite's structure, every checksum, and the digest of every revision,
-// re-derived from rows and the revisions at which they came and went.
+// Reads a whole map: SQLite's structure and every checksum, and what each row adds to the digests
+// of the revisions.
 #include <algorithm>
 #include <map>
 
@@ -10,7 +10,7 @@
 #include "schema/store/sqlite/log_check.h"
 #include "schema/store/sqlite/map_reader.h"
 #include "schema/store/sqlite/rows.h"
-#include "schema/store/sqlite/touched_keys.h"
+#include "schema/store/sqlite/verify_history.h"
 
 namespace dsg::sqlite {
 namespace {
@@ -25,39 +25,6 @@ bool HoldsTimes(std::string_view payload, TimeNs t0, TimeNs t1) {
          times.back() == t1;
 }
 
-// One row a key and revision that began or ended a row of that key, whatever the number of rows.
-constexpr char kTouchedRows[] =
-    "SELECT 'N', key, 0, 0, rev_from FROM node"
-    " UNION SELECT 'N', key, 0, 0, rev_from FROM node_history"
-    " UNION SELECT 'N', key, 0, 0, rev_to FROM node_history"
-    " UNION SELECT 'E', source, relation, target, rev_from FROM edge"
-    " UNION SELECT 'E', source, relation, target, rev_from FROM edge_history"
-    " UNION SELECT 'E', source, relation, target, rev_to FROM edge_history"
-    " UNION SELECT 'M', x, y, z, rev_from FROM mesh_block"
-    " UNION SELECT 'M', x, y, z, rev_from FROM mesh_block_history"
-    " UNION SELECT 'M', x, y, z, rev_to FROM mesh_block_history"
-    " UNION SELECT 'T', agent, 0, 0, revision FROM track_mark JOIN track USING (slot)"
-    " UNION SELECT 'L', 0, 0, 0, rev_from FROM layer WHERE rev_from > 0"
-    " UNION SELECT 'L', 0, 0, 0, rev_from FROM label";
-
-std::string TouchedIdentity(char table, int64_t a, int64_t b, int64_t c) {
-  return RowIdentity(table, {a, b, c}, "");
-}
-
-ContentDigest SumOf(const TouchedKeys& keys) {
-  ContentDigest sum;
-  for (const NodeId id : keys.nodes) sum.Add(TouchedIdentity('N', KeyOf(id), 0, 0));
-  for (const EdgeRowKey& edge : keys.edges) {
-    sum.Add(TouchedIdentity('E', KeyOf(edge.source), edge.relation, KeyOf(edge.target)));
-  }
-  for (const BlockIndex& block : keys.mesh_blocks) {
-    sum.Add(TouchedIdentity('M', block.x, block.y, block.z));
-  }
-  for (const NodeId id : keys.tracks) sum.Add(TouchedIdentity('T', KeyOf(id), 0, 0));
-  if (keys.layers_or_labels) sum.Add(TouchedIdentity('L', 0, 0, 0));
-  return sum;
-}
-
 class Verifier {
  public:
   Verifier(Database& db, const MapSpec& spec, const std::function<void(double)>& progress)
@@ -67,11 +34,11 @@ class Verifier {
     // One snapshot of everything; a writer may go on meanwhile.
     DSG_RETURN_IF_ERROR(db_.Execute("BEGIN"));
     using Step = void (Verifier::*)();
-    const Step steps[] = {
-        &Verifier::CheckStructure, &Verifier::CheckNodes,  &Verifier::CheckEdges,
-        &Verifier::CheckStays,     &Verifier::CheckTracks, &Verifier::CheckBatches,
-        &Verifier::CheckMesh,      &Verifier::CheckAssets, &Verifier::CheckLayers,
-        &Verifier::CheckRevisions, &Verifier::CheckTouched};
+    const Step steps[] = {&Verifier::CheckStructure, &Verifier::CheckNodes,
+                          &Verifier::CheckEdges,     &Verifier::CheckStays,
+                          &Verifier::CheckTracks,    &Verifier::CheckBatches,
+                          &Verifier::CheckMesh,      &Verifier::CheckAssets,
+                          &Verifier::CheckLayers,    &Verifier::CheckHistory};
     double done = 0.0;
     for (const Step step : steps) {
       if (progress_) progress_(done / std::size(steps));
@@ -306,84 +273,15 @@ class Verifier {
     Finish(labels, "label");
   }
 
-  void CheckRevisions() {
-    Query query(db_, "SELECT " DSG_REVISION_COLUMNS " FROM revision ORDER BY revision");
-    ContentDigest content;
-    Sha256 parent{};
-    Revision expected = 1;
-    while (query.Next()) {
-      const auto head = HeadFromRow(query, spec_.name);
-      if (!head.ok()) {
-        Problem(std::string(head.status().message()));
-        continue;
-      }
-      const RevisionInfo& info = head->info;
-      if (info.revision != expected) {
-        Problem(absl::StrCat("revision ", expected, " is missing"));
-      }
-      if (const auto change = changes_.find(info.revision); change != changes_.end()) {
-        content += change->second;
-        changes_.erase(change);
-      }
-      if (!(content == head->content)) {
-        Problem(absl::StrCat("revision ", info.revision,
-                             ": its rows do not add up to its content digest"));
-        // Report each break once: go on from what the revision says.
-        content = head->content;
-      }
-      if (DigestOf(parent, *head) != info.digest) {
-        Problem(absl::StrCat("revision ", info.revision, ": its digest does not follow"));
-      }
-      parent = info.digest;
-      expected = info.revision + 1;
-      last_revision_ = info.revision;
-      ++report_.revision_count;
-    }
-    Finish(query, "revision");
-    for (const auto& [revision, unused] : changes_) {
-      Problem(absl::StrCat("rows name revision ", revision, ", which does not exist"));
-    }
-  }
-
-  // The list of each revision against the rows that begin or end in it, as sums of their keys.
-  void CheckTouched() {
-    const auto keeps = KeepsTouched(db_);
-    if (keeps.ok() && !*keeps) return;
-    std::map<Revision, ContentDigest> sums;
-    Query rows(db_, kTouchedRows);
-    while (rows.Next()) {
-      sums[rows.Int(4)].Add(
-          TouchedIdentity(rows.Text(0).front(), rows.Int(1), rows.Int(2), rows.Int(3)));
-    }
-    Finish(rows, "touched");
-    Query query(db_, "SELECT revision, payload, checksum FROM touched ORDER BY revision");
-    Revision last = 0;
-    while (query.Next()) {
-      const Revision revision = query.Int(0);
-      TouchedKeys keys;
-      if (query.Int(2) != RowChecksum({revision}, query.Blob(1)) ||
-          !DecodeTouched(query.Blob(1), &keys)) {
-        BadRow("touched", absl::StrCat(revision));
-      } else if (!(SumOf(keys) == sums[revision])) {
-        Problem(absl::StrCat("touched ", revision, ": not what the rows of the revision say"));
-      }
-      sums.erase(revision);
-      last = revision;
-    }
-    Finish(query, "touched");
-    for (const auto& [revision, unused] : sums) {
-      Problem(absl::StrCat("touched ", revision, ": there is no list of what it touched"));
-    }
-    if (last != last_revision_) {
-      Problem(absl::StrCat("touched: ends at revision ", last, ", not at ", last_revision_));
-    }
+  void CheckHistory() {
+    report_.revision_count = CheckRevisions(db_, spec_.name, std::move(changes_),
+                                            [this](std::string text) { Problem(std::move(text)); });
   }
 
   Database& db_;
   const MapSpec& spec_;
   const std::function<void(double)>& progress_;
   VerifyReport report_;
-  Revision last_revision_ = 0;
   /// What each revision added to and took from the content digest.
   std::map<Revision, ContentDigest> changes_;
 };

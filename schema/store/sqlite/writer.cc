@@ -1,10 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "schema/store/sqlite/writer.h"
 
+#include <algorithm>
+
 #include "absl/strings/str_cat.h"
 #include "schema/base/time.h"
 #include "schema/model/delta_check.h"
+#include "schema/store/sqlite/compaction.h"
 #include "schema/store/sqlite/delta_lookup.h"
+#include "schema/store/sqlite/readable.h"
+#include "schema/store/sqlite/sessions.h"
+#include "schema/store/sqlite/tags.h"
 
 namespace dsg::sqlite {
 namespace {
@@ -36,21 +42,12 @@ absl::Status SqliteWriter::Reopen() {
   DSG_ASSIGN_OR_RETURN(db_, OpenMapFile(store_folder_, map_, Database::Mode::kWrite));
   DSG_ASSIGN_OR_RETURN(spec_, ReadMapSpec(*db_));
   DSG_ASSIGN_OR_RETURN(head_, LoadHead(*db_));
-  DSG_ASSIGN_OR_RETURN(keeps_touched_, KeepsTouched(*db_));
   return absl::OkStatus();
 }
 
 absl::StatusOr<SessionState> SqliteWriter::GetSession(const std::string& session_id) {
   if (db_ == nullptr) DSG_RETURN_IF_ERROR(Reopen());
   return ReadSession(*db_, session_id);
-}
-
-absl::StatusOr<std::optional<CommitResult>> SqliteWriter::FindReplay(const GraphDelta& delta) {
-  Query query(*db_, "SELECT revision FROM revision WHERE session_id = ?1 AND sequence = ?2");
-  const bool found = query.Bind(delta.session_id, delta.sequence).Next();
-  DSG_RETURN_IF_ERROR(query.status());
-  if (!found) return std::optional<CommitResult>();
-  return std::optional<CommitResult>(CommitResult{query.Int(0), true});
 }
 
 // A missing number means that a delta was lost on its way: what follows may build on it.
@@ -69,7 +66,7 @@ absl::Status SqliteWriter::CheckSequence(const GraphDelta& delta) {
 
 absl::StatusOr<CommitResult> SqliteWriter::Commit(GraphDelta delta) {
   if (db_ == nullptr) DSG_RETURN_IF_ERROR(Reopen());
-  DSG_ASSIGN_OR_RETURN(const auto replay, FindReplay(delta));
+  DSG_ASSIGN_OR_RETURN(const auto replay, FindCommitted(*db_, delta.session_id, delta.sequence));
   if (replay.has_value()) return *replay;
   DSG_RETURN_IF_ERROR(CheckSequence(delta));
   if (delta.parent_revision.has_value() && *delta.parent_revision != head_.info.revision) {
@@ -128,7 +125,7 @@ absl::Status SqliteWriter::Apply(const GraphDelta& delta, CommitContext* commit)
   DSG_RETURN_IF_ERROR(WriteShapes(delta.shapes, commit));
   DSG_RETURN_IF_ERROR(WriteStays(delta.stays, commit));
   DSG_RETURN_IF_ERROR(WriteMesh(delta, commit));
-  if (keeps_touched_) DSG_RETURN_IF_ERROR(InsertTouched(commit));
+  DSG_RETURN_IF_ERROR(InsertTouched(commit));
   info.digest = DigestOf(parent, commit->head);
   return InsertRevision(*commit);
 }
@@ -147,9 +144,46 @@ absl::StatusOr<CommitResult> SqliteWriter::Settle(const GraphDelta& delta,
                      reopened.message(), "); send it again when the disk is back"),
         {{"map", map_}, {"sequence", absl::StrCat(delta.sequence)}});
   }
-  DSG_ASSIGN_OR_RETURN(const auto replay, FindReplay(delta));
+  DSG_ASSIGN_OR_RETURN(const auto replay, FindCommitted(*db_, delta.session_id, delta.sequence));
   if (replay.has_value()) return CommitResult{replay->revision, false};
   return failure;
+}
+
+absl::Status SqliteWriter::CheckRevision(Revision revision) {
+  const Revision newest = head_.info.revision;
+  DSG_ASSIGN_OR_RETURN(const Readable readable, LoadReadable(*db_));
+  if (revision < 0 || revision > newest) return FutureError(map_, revision, newest, readable);
+  if (readable.Holds(revision)) return absl::OkStatus();
+  return CompactedError(map_, revision, newest, readable);
+}
+
+absl::StatusOr<Tag> SqliteWriter::SetTag(const std::string& name, Revision revision,
+                                         const std::string& note) {
+  if (db_ == nullptr) DSG_RETURN_IF_ERROR(Reopen());
+  const Tag tag{name, revision, WallClockNs(), note};
+  DSG_RETURN_IF_ERROR(CheckTag(tag));
+  DSG_RETURN_IF_ERROR(CheckRevision(revision));
+  DSG_RETURN_IF_ERROR(WriteTag(*db_, tag));
+  return tag;
+}
+
+absl::Status SqliteWriter::RemoveTag(const std::string& name) {
+  if (db_ == nullptr) DSG_RETURN_IF_ERROR(Reopen());
+  return DeleteTag(*db_, name);
+}
+
+absl::StatusOr<CompactReport> SqliteWriter::Compact(Revision keep_from, const StopCheck& stop,
+                                                    const Progress& progress) {
+  if (db_ == nullptr) DSG_RETURN_IF_ERROR(Reopen());
+  DSG_RETURN_IF_ERROR(CheckRevision(keep_from));
+  DSG_ASSIGN_OR_RETURN(const Readable readable, LoadReadable(*db_));
+  CompactReport report;
+  report.bytes_before = BytesOnDisk(store_folder_, map_);
+  // A tagged revision can be read, but what lies after it may be gone: nothing comes back.
+  DSG_RETURN_IF_ERROR(
+      CompactMap(*db_, std::max(keep_from, readable.oldest), stop, progress, &report));
+  report.bytes_after = BytesOnDisk(store_folder_, map_);
+  return report;
 }
 
 }  // namespace dsg::sqlite

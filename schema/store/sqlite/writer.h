@@ -5,13 +5,13 @@
 #include <memory>
 #include <string>
 
-#include "schema/store/graph_writer.h"
+#include "schema/store/map_writer.h"
 #include "schema/store/sqlite/commit.h"
 #include "schema/store/sqlite/map_file.h"
 
 namespace dsg::sqlite {
 
-class SqliteWriter : public GraphWriter {
+class SqliteWriter : public MapWriter {
  public:
   static absl::StatusOr<std::unique_ptr<SqliteWriter>> Open(const std::string& store_folder,
                                                             const std::string& map,
@@ -20,13 +20,19 @@ class SqliteWriter : public GraphWriter {
 
   absl::StatusOr<CommitResult> Commit(GraphDelta delta) override;
   absl::StatusOr<SessionState> GetSession(const std::string& session_id) override;
+  absl::StatusOr<Tag> SetTag(const std::string& name, Revision revision,
+                             const std::string& note) override;
+  absl::Status RemoveTag(const std::string& name) override;
+  absl::StatusOr<CompactReport> Compact(Revision keep_from, const StopCheck& stop,
+                                        const Progress& progress) override;
 
  private:
   SqliteWriter(std::string store_folder, std::string map)
       : store_folder_(std::move(store_folder)), map_(std::move(map)) {}
 
   absl::Status Reopen();
-  absl::StatusOr<std::optional<CommitResult>> FindReplay(const GraphDelta& delta);
+  /// Unless the revision can be read.
+  absl::Status CheckRevision(Revision revision);
   absl::Status CheckSequence(const GraphDelta& delta);
   absl::Status Apply(const GraphDelta& delta, CommitContext* commit);
   absl::StatusOr<CommitResult> Settle(const GraphDelta& delta, const absl::Status& failure);
@@ -38,7 +44,6 @@ class SqliteWriter : public GraphWriter {
   std::unique_ptr<Database> db_;
   MapSpec spec_;
   Head head_;
-  bool keeps_touched_ = false;
   TrackWriter tracks_;
 };
 
@@ -51,7 +56,6 @@ absl::Status InsertRevision(const CommitContext& commit);
   " config_digest, node_count, edge_count, agent_count, pose_count, stay_count,"    \
   " mesh_block_count, first_pose_ns, last_pose_ns, layer_counts"
 absl::StatusOr<Head> HeadFromRow(const Query& query, const std::string& map);
-absl::StatusOr<SessionState> ReadSession(Database& db, const std::string& session_id);
 /// What a revision's digest must be.
 Sha256 DigestOf(const Sha256& parent, const Head& head);
 

@@ -57,6 +57,7 @@ TEST(Status, ReasonsHaveTheNumbersOfTheWire) {
       {Reason::kClassUnknown, v1::CLASS_UNKNOWN},
       {Reason::kRelationUnknown, v1::RELATION_UNKNOWN},
       {Reason::kNoPath, v1::NO_PATH},
+      {Reason::kTagUnknown, v1::TAG_UNKNOWN},
       {Reason::kTimeOutsideTrack, v1::TIME_OUTSIDE_TRACK},
       {Reason::kRevisionInFuture, v1::REVISION_IN_FUTURE},
       {Reason::kRevisionCompacted, v1::REVISION_COMPACTED},

@@ -50,7 +50,7 @@ class TestMap {
   const std::string& folder() const { return folder_.path(); }
   std::string database_path() const { return folder() + "/" + kMap + "/graph.db"; }
   GraphStore& store() { return *store_; }
-  GraphWriter& writer() { return *writer_; }
+  MapWriter& writer() { return *writer_; }
   MapReader& reader() { return *reader_; }
 
   /// Fills in the map, session "test" and the next sequence, then commits.
@@ -69,7 +69,7 @@ class TestMap {
  private:
   TempFolder folder_;
   std::unique_ptr<GraphStore> store_;
-  std::unique_ptr<GraphWriter> writer_;
+  std::unique_ptr<MapWriter> writer_;
   std::shared_ptr<MapReader> reader_;
 };
 

@@ -19,27 +19,6 @@ void RunSql(const std::string& path, const char* sql) {
   OrDie(db->Execute(sql));
 }
 
-void ExpectSame(const Touched& actual, const Touched& expected) {
-  EXPECT_EQ(actual.nodes, expected.nodes);
-  EXPECT_EQ(actual.edges, expected.edges);
-  EXPECT_EQ(actual.tracks, expected.tracks);
-  EXPECT_EQ(actual.corrected_tracks, expected.corrected_tracks);
-  EXPECT_EQ(actual.mesh_blocks, expected.mesh_blocks);
-  EXPECT_EQ(actual.layers_or_labels, expected.layers_or_labels);
-}
-
-using Spans = std::map<std::pair<Revision, Revision>, Touched>;
-
-Spans AllSpans(MapReader& reader) {
-  Spans spans;
-  for (Revision after = 0; after <= kRevisionCount; ++after) {
-    for (Revision until = after; until <= kRevisionCount; until += 3) {
-      spans[{after, until}] = OrDie(reader.TouchedBetween(after, until, {}));
-    }
-  }
-  return spans;
-}
-
 void FillFromStream(TestMap* map) {
   DeltaStreamOptions options;
   options.seed = RecordSeed();
@@ -107,26 +86,6 @@ TEST(TouchedBetween, StopsWhenAsked) {
 }
 
 // Two ways to the same answer: the lists that commits leave, and the rows themselves.
-TEST(TouchedBetween, IsTheSameInMapsMadeBeforeTheLists) {
-  TestMap map;
-  FillFromStream(&map);
-  const Spans with_lists = AllSpans(map.reader());
-  map.Close();
-  RunSql(map.database_path(), "DROP TABLE touched");
-  map.Reopen();
-  const Spans by_rows = AllSpans(map.reader());
-  ASSERT_EQ(with_lists.size(), by_rows.size());
-  for (const auto& [span, touched] : with_lists) {
-    SCOPED_TRACE(std::to_string(span.first) + " to " + std::to_string(span.second));
-    ExpectSame(touched, by_rows.at(span));
-  }
-  // Such a map can still be written, and is sound.
-  DeltaStreamOptions options;
-  options.seed = RecordSeed();
-  EXPECT_EQ(map.MustCommit(DeltaOfStream(options, kRevisionCount + 1)), kRevisionCount + 1);
-  EXPECT_EQ(map.Problems(), "");
-}
-
 TEST(TouchedLists, AreCheckedByVerify) {
   TestMap map;
   FillFromStream(&map);

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+// First the revisions become unreadable, in one transaction; what is left of them then is garbage
+// that nobody sees, and goes in small steps.
+#include "schema/store/sqlite/compaction.h"
+
+#include "absl/strings/str_cat.h"
+#include "schema/store/sqlite/readable.h"
+#include "schema/store/sqlite/rows.h"
+#include "schema/store/sqlite/touched_keys.h"
+
+namespace dsg::sqlite {
+namespace {
+
+// The write-ahead log is copied back when it has grown to 16 MiB.
+constexpr int kCheckpointPages = 4096;
+// Pages given back to the file system in one transaction.
+constexpr char kGivePagesBack[] = "PRAGMA incremental_vacuum(1024)";
+
+// Rows looked at in one transaction: some megabytes of log at most, tens of milliseconds.
+struct HistoryTable {
+  const char* last_row;
+  const char* drop;
+  int64_t step;
+};
+
+#define DSG_HISTORY_TABLE(name, step)                                           \
+  {                                                                             \
+    "SELECT max(rowid) FROM " name,                                             \
+        "DELETE FROM " name                                                     \
+        " AS old WHERE rowid > ?2 AND rowid <= ?3 AND rev_to <= ?1"             \
+        " AND NOT EXISTS (SELECT 1 FROM tag WHERE tag.revision >= old.rev_from" \
+        " AND tag.revision < old.rev_to)",                                      \
+        step                                                                    \
+  }
+
+constexpr HistoryTable kHistories[] = {
+    DSG_HISTORY_TABLE("node_history", 5'000), DSG_HISTORY_TABLE("edge_history", 20'000),
+    DSG_HISTORY_TABLE("trajectory_history", 1'000), DSG_HISTORY_TABLE("stay_history", 20'000),
+    DSG_HISTORY_TABLE("mesh_block_history", 100)};
+
+#undef DSG_HISTORY_TABLE
+
+// A mark matters to the readable revisions from it on, up to the next of its track.
+constexpr char kDropMarks[] =
+    "DELETE FROM track_mark AS old WHERE revision < ?1"
+    " AND EXISTS (SELECT 1 FROM track_mark AS next WHERE next.slot = old.slot"
+    "  AND next.revision > old.revision AND next.revision <= ?1)"
+    " AND NOT EXISTS (SELECT 1 FROM tag WHERE tag.revision >= old.revision"
+    "  AND tag.revision < (SELECT min(next.revision) FROM track_mark AS next"
+    "   WHERE next.slot = old.slot AND next.revision > old.revision))";
+
+// All or nothing.
+template <typename Work>
+absl::Status InTransaction(Database& db, const Work& work) {
+  DSG_RETURN_IF_ERROR(db.Execute("BEGIN IMMEDIATE"));
+  absl::Status status = work();
+  if (status.ok()) status = db.Execute("COMMIT");
+  // SQLite may have rolled back already; then this has nothing to do.
+  if (!status.ok()) db.Execute("ROLLBACK").IgnoreError();
+  return status;
+}
+
+// Records of revisions, oldest first: those that go leave their digest and their touched keys to
+// the next one that stays.
+class RevisionDropper {
+ public:
+  RevisionDropper(Database* db, const Readable& kept) : db_(*db), kept_(kept) {}
+
+  absl::Status Run() {
+    std::vector<std::pair<Revision, std::string>> revisions;
+    Query query(db_,
+                "SELECT revision, digest FROM revision WHERE revision <= ?1 ORDER BY revision");
+    query.Bind(kept_.oldest);
+    while (query.Next()) revisions.emplace_back(query.Int(0), query.Blob(1));
+    DSG_RETURN_IF_ERROR(query.status());
+    for (const auto& [revision, digest] : revisions) {
+      DSG_RETURN_IF_ERROR(kept_.Holds(revision) ? Keep(revision) : Drop(revision, digest));
+    }
+    return absl::OkStatus();
+  }
+
+  int64_t count() const { return count_; }
+
+ private:
+  absl::Status TakeTouched(Revision revision) {
+    Query query(db_, "SELECT payload, checksum FROM touched WHERE revision = ?1");
+    const bool found = query.Bind(revision).Next();
+    DSG_RETURN_IF_ERROR(query.status());
+    if (!found) return absl::OkStatus();
+    if (query.Int(1) == RowChecksum({revision}, query.Blob(0)) &&
+        DecodeTouched(query.Blob(0), &touched_)) {
+      return absl::OkStatus();
+    }
+    return CorruptRow(db_.map_name(), "touched", absl::StrCat(revision));
+  }
+
+  absl::Status Drop(Revision revision, const std::string& digest) {
+    digest_ = digest;
+    ++count_;
+    DSG_RETURN_IF_ERROR(TakeTouched(revision));
+    for (const char* sql :
+         {"DELETE FROM touched WHERE revision = ?1", "DELETE FROM revision WHERE revision = ?1"}) {
+      DSG_RETURN_IF_ERROR(Query(db_, sql).Bind(revision).Run());
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status Keep(Revision revision) {
+    if (!digest_.empty()) {
+      DSG_RETURN_IF_ERROR(Query(db_, "UPDATE revision SET parent_digest = ?2 WHERE revision = ?1")
+                              .Bind(revision, Query::BlobView{digest_})
+                              .Run());
+      DSG_RETURN_IF_ERROR(
+          has_kept_ ? WriteTouched(revision)
+                    : Query(db_, "DELETE FROM touched WHERE revision = ?1").Bind(revision).Run());
+    }
+    digest_.clear();
+    touched_ = {};
+    has_kept_ = true;
+    return absl::OkStatus();
+  }
+
+  // Everything since the last revision that is kept.
+  absl::Status WriteTouched(Revision revision) {
+    DSG_RETURN_IF_ERROR(TakeTouched(revision));
+    touched_.Normalize();
+    const std::string payload = EncodeTouched(touched_);
+    return Query(db_, "UPDATE touched SET payload = ?2, checksum = ?3 WHERE revision = ?1")
+        .Bind(revision, Query::BlobView{payload}, RowChecksum({revision}, payload))
+        .Run();
+  }
+
+  Database& db_;
+  const Readable& kept_;
+  /// Of the last one dropped since one was kept; empty if none was.
+  std::string digest_;
+  TouchedKeys touched_;
+  bool has_kept_ = false;
+  int64_t count_ = 0;
+};
+
+absl::Status CloseRevisions(Database& db, Revision keep_from, CompactReport* report) {
+  return InTransaction(db, [&]() -> absl::Status {
+    DSG_RETURN_IF_ERROR(Query(db, "UPDATE map SET oldest_revision = ?1").Bind(keep_from).Run());
+    DSG_ASSIGN_OR_RETURN(const Readable kept, LoadReadable(db));
+    RevisionDropper dropper(&db, kept);
+    DSG_RETURN_IF_ERROR(dropper.Run());
+    report->revision_count = dropper.count();
+    report->oldest = keep_from;
+    return absl::OkStatus();
+  });
+}
+
+void CopyLogBack(Database& db) {
+  if (db.wal_pages() > kCheckpointPages) db.Checkpoint(/*truncate=*/false);
+}
+
+absl::Status DropRows(Database& db, const HistoryTable& table, Revision oldest,
+                      const StopCheck& stop, CompactReport* report) {
+  DSG_ASSIGN_OR_RETURN(const int64_t last, db.QueryInt(table.last_row));
+  for (int64_t after = 0; after < last; after += table.step) {
+    DSG_RETURN_IF_ERROR(AskStop(stop));
+    DSG_RETURN_IF_ERROR(Query(db, table.drop).Bind(oldest, after, after + table.step).Run());
+    report->row_count += db.changed_row_count();
+    CopyLogBack(db);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status GivePagesBack(Database& db, const StopCheck& stop) {
+  // Files of format 1 cannot shrink in steps until they have been written anew, once.
+  DSG_ASSIGN_OR_RETURN(const int64_t mode, db.QueryInt("PRAGMA auto_vacuum"));
+  if (mode == 0) return db.WriteAnew();
+  for (;;) {
+    DSG_RETURN_IF_ERROR(AskStop(stop));
+    DSG_ASSIGN_OR_RETURN(const int64_t free_count, db.QueryInt("PRAGMA freelist_count"));
+    if (free_count == 0) return absl::OkStatus();
+    DSG_RETURN_IF_ERROR(Query(db, kGivePagesBack).Run());
+    CopyLogBack(db);
+  }
+}
+
+}  // namespace
+
+absl::Status CompactMap(Database& db, Revision keep_from, const StopCheck& stop,
+                        const Progress& progress, CompactReport* report) {
+  const auto tell = [&](double fraction) {
+    if (progress) progress(fraction);
+  };
+  DSG_RETURN_IF_ERROR(CloseRevisions(db, keep_from, report));
+  double done = 0.1;
+  tell(done);
+  for (const HistoryTable& table : kHistories) {
+    DSG_RETURN_IF_ERROR(DropRows(db, table, keep_from, stop, report));
+    tell(done += 0.12);
+  }
+  // Last: rows that are still there may need the marks to be understood.
+  DSG_RETURN_IF_ERROR(Query(db, kDropMarks).Bind(keep_from).Run());
+  report->row_count += db.changed_row_count();
+  DSG_RETURN_IF_ERROR(GivePagesBack(db, stop));
+  tell(0.95);
+  report->is_shrunk = db.Checkpoint(/*truncate=*/true);
+  tell(1.0);
+  return absl::OkStatus();
+}
+
+}  // namespace dsg::sqlite

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// How far each session got, so that a delta that comes twice is written once.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "schema/model/revision.h"
+#include "schema/store/graph_writer.h"
+#include "schema/store/sqlite/database.h"
+
+namespace dsg::sqlite {
+
+/// All zero for a session that has committed nothing.
+absl::StatusOr<SessionState> ReadSession(Database& db, const std::string& session_id);
+
+/// The session is at this revision now.
+absl::Status WriteSession(Database& db, const RevisionInfo& info);
+
+/// A revision that holds the delta: the one that it made or, if that is compacted away, the last
+/// one of its session; nullopt if the delta is new.
+absl::StatusOr<std::optional<CommitResult>> FindCommitted(Database& db,
+                                                          const std::string& session_id,
+                                                          int64_t sequence);
+
+}  // namespace dsg::sqlite
