@@ -1,15 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ingest/files/output_file.h"
 
-#include <unistd.h>
-
-#include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <cstring>
 #include <utility>
 
-#include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
@@ -17,44 +12,15 @@ namespace {
 
 constexpr size_t kBufferBytes = size_t{1} << 20;
 
-std::string PartPath(const std::string& path) { return path + ".part"; }
-
 }  // namespace
 
 absl::StatusOr<OutputFile> OutputFile::Create(const std::string& path) {
-  std::FILE* file = std::fopen(PartPath(path).c_str(), "wb");
-  if (file == nullptr) {
-    return MakeError(Reason::kFieldInvalid,
-                     absl::StrCat("cannot create ", PartPath(path), ": ", std::strerror(errno),
-                                  "; name a folder you may write to"),
-                     {{"path", path}});
-  }
-  // We keep our own buffer; a second copy in the library would only cost time.
-  std::setvbuf(file, nullptr, _IONBF, 0);
-  return OutputFile(path, file);
-}
-
-OutputFile::~OutputFile() {
-  if (file_ == nullptr) return;
-  file_.reset();
-  std::remove(PartPath(path_).c_str());
-}
-
-absl::Status OutputFile::Failure(const char* what) const {
-  const int error = errno;
-  const std::string message = absl::StrCat("cannot ", what, " ", path_, ": ", std::strerror(error));
-  if (error == ENOSPC || error == EDQUOT) {
-    return MakeError(Reason::kDiskFull, absl::StrCat(message, "; free some space"),
-                     {{"path", path_}});
-  }
-  return absl::UnavailableError(message);
+  DSG_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(path));
+  return OutputFile(std::move(file));
 }
 
 absl::Status OutputFile::WriteBuffer() {
-  if (std::fwrite(buffer_.data(), 1, buffer_.size(), file_.get()) != buffer_.size()) {
-    return Failure("write");
-  }
-  byte_count_ += static_cast<int64_t>(buffer_.size());
+  DSG_RETURN_IF_ERROR(file_.Write(buffer_));
   buffer_.clear();
   return absl::OkStatus();
 }
@@ -65,11 +31,7 @@ absl::Status OutputFile::Flush() {
 
 absl::Status OutputFile::Commit() {
   DSG_RETURN_IF_ERROR(WriteBuffer());
-  if (fsync(fileno(file_.get())) != 0) return Failure("sync");
-  // Closed by hand, since closing may be what fails.
-  if (std::fclose(file_.release()) != 0) return Failure("close");
-  if (std::rename(PartPath(path_).c_str(), path_.c_str()) != 0) return Failure("rename to");
-  return absl::OkStatus();
+  return file_.Commit();
 }
 
 absl::Status WriteFile(const std::string& path, std::string bytes) {

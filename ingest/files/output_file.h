@@ -4,46 +4,35 @@
 #pragma once
 
 #include <cstdint>
-#include <cstdio>
-#include <memory>
 #include <string>
-#include <string_view>
+#include <utility>
 
 #include "absl/status/statusor.h"
+#include "schema/files/atomic_file.h"
 
 namespace dsg::ingest {
 
-/// Writes to PATH.part and renames on Commit(); removes PATH.part when dropped before.
+/// An AtomicFile with a buffer that rows of text are appended to.
 ///
 /// Threads: one caller at a time.
 class OutputFile {
  public:
   /// Errors: INVALID_ARGUMENT/FIELD_INVALID naming the path and what the system says.
   static absl::StatusOr<OutputFile> Create(const std::string& path);
-  OutputFile(OutputFile&&) = default;
-  OutputFile& operator=(OutputFile&&) = delete;
-  ~OutputFile();
-
   /// The text to come; whoever appends to it calls Flush() between rows.
   std::string& buffer() { return buffer_; }
   /// Writes the buffer out once it is large. Errors: RESOURCE_EXHAUSTED/DISK_FULL; UNAVAILABLE.
   absl::Status Flush();
   /// Writes the rest, syncs and renames. The last call.
   absl::Status Commit();
-  int64_t byte_count() const { return byte_count_ + static_cast<int64_t>(buffer_.size()); }
+  int64_t byte_count() const { return file_.byte_count() + static_cast<int64_t>(buffer_.size()); }
 
  private:
-  struct Closer {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
-  OutputFile(std::string path, std::FILE* file) : path_(std::move(path)), file_(file) {}
+  explicit OutputFile(AtomicFile file) : file_(std::move(file)) {}
   absl::Status WriteBuffer();
-  absl::Status Failure(const char* what) const;
 
-  std::string path_;
-  std::unique_ptr<std::FILE, Closer> file_;
+  AtomicFile file_;
   std::string buffer_;
-  int64_t byte_count_ = 0;
 };
 
 /// A whole file at once. Errors: of Create and Commit.

@@ -19,7 +19,7 @@ void Append(const T& value, std::string* out) {
   out->append(reinterpret_cast<const char*>(&value), sizeof(T));
 }
 
-absl::Status CheckFaces(const BodyMesh& body, const OutputFile& file) {
+absl::Status CheckFaces(const BodyMesh& body, const AtomicFile& file) {
   for (const auto& face : body.faces) {
     const uint32_t vertex = *std::max_element(face.begin(), face.end());
     if (vertex < body.points_map.size()) continue;
@@ -33,7 +33,7 @@ absl::Status CheckFaces(const BodyMesh& body, const OutputFile& file) {
 
 }  // namespace
 
-absl::Status WriteBodyPly(const BodyMesh& body, OutputFile* file) {
+absl::Status WriteBodyPly(const BodyMesh& body, AtomicFile* file) {
   DSG_RETURN_IF_ERROR(CheckFaces(body, *file));
   std::string bytes =
       absl::StrCat("ply\nformat binary_little_endian 1.0\ncomment ", Printable(body.comment),
@@ -50,7 +50,7 @@ absl::Status WriteBodyPly(const BodyMesh& body, OutputFile* file) {
   return file->Write(bytes);
 }
 
-absl::Status WriteBodyObj(const BodyMesh& body, OutputFile* file) {
+absl::Status WriteBodyObj(const BodyMesh& body, AtomicFile* file) {
   DSG_RETURN_IF_ERROR(CheckFaces(body, *file));
   std::string text = absl::StrCat("# ", Printable(body.comment), "\n");
   for (const Eigen::Vector3f& point : body.points_map) {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "query/cli/export/output_file.h"
+#include "schema/files/atomic_file.h"
 
 namespace dsg::cli {
 
@@ -23,9 +23,9 @@ struct BodyMesh {
 };
 
 /// Binary, little endian. Errors: DATA_LOSS for a face of a vertex that is not there; as
-/// OutputFile::Write.
-absl::Status WriteBodyPly(const BodyMesh& body, OutputFile* file);
+/// AtomicFile::Write.
+absl::Status WriteBodyPly(const BodyMesh& body, AtomicFile* file);
 /// Text. Errors: as WriteBodyPly.
-absl::Status WriteBodyObj(const BodyMesh& body, OutputFile* file);
+absl::Status WriteBodyObj(const BodyMesh& body, AtomicFile* file);
 
 }  // namespace dsg::cli

@@ -214,7 +214,7 @@ std::string GltfDocument::MakeJson() const {
   return document.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-absl::Status GltfDocument::Write(OutputFile* file) const {
+absl::Status GltfDocument::Write(AtomicFile* file) const {
   std::string json = MakeJson();
   json.append(Padding(json.size()), ' ');
   size_t size = 12 + 8 + json.size();

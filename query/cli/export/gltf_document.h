@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "query/cli/export/output_file.h"
+#include "schema/files/atomic_file.h"
 
 namespace dsg::cli {
 
@@ -77,9 +77,9 @@ class GltfDocument {
   int AddColors(const std::vector<uint32_t>& colors);
   int AddIndices(const std::vector<uint32_t>& indices);
 
-  /// The whole file. Errors: as OutputFile::Write; RESOURCE_EXHAUSTED/LIMIT_EXCEEDED for more than
+  /// The whole file. Errors: as AtomicFile::Write; RESOURCE_EXHAUSTED/LIMIT_EXCEEDED for more than
   /// the 4 GiB that the format can hold.
-  absl::Status Write(OutputFile* file) const;
+  absl::Status Write(AtomicFile* file) const;
 
  private:
   struct Accessor {

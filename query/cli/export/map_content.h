@@ -12,6 +12,7 @@
 #include "schema/model/layer.h"
 #include "schema/model/mesh.h"
 #include "schema/model/node.h"
+#include "schema/model/trajectory.h"
 
 namespace dsg::cli {
 
@@ -20,6 +21,8 @@ struct Track {
   NodeId agent;
   /// Without standstill; a new piece begins after each gap. Map frame.
   std::vector<std::vector<Eigen::Vector3d>> pieces;
+  /// All of it, if asked for.
+  std::vector<TimedPose> poses;
 };
 
 struct MapContent {

@@ -23,7 +23,7 @@ constexpr size_t kFlushBytes = size_t{1} << 20;
 // Appends values as they lie in memory and writes them out in large pieces.
 class Writer {
  public:
-  explicit Writer(OutputFile* file) : file_(file) {}
+  explicit Writer(AtomicFile* file) : file_(file) {}
 
   template <class T>
   void Add(const T& value) {
@@ -47,11 +47,11 @@ class Writer {
   }
 
  private:
-  OutputFile* file_;
+  AtomicFile* file_;
   std::string buffer_;
 };
 
-absl::Status CheckCount(size_t count, const OutputFile& file) {
+absl::Status CheckCount(size_t count, const AtomicFile& file) {
   if (count <= static_cast<size_t>(std::numeric_limits<int32_t>::max())) return absl::OkStatus();
   return MakeError(Reason::kLimitExceeded,
                    absl::StrCat(file.path(), " would have ", count,
@@ -215,7 +215,7 @@ std::string GraphHeader(const MapContent& content, const GraphPlyCounts& counts)
 
 }  // namespace
 
-absl::Status WriteMeshPly(const MapContent& content, MeshColor color, OutputFile* file) {
+absl::Status WriteMeshPly(const MapContent& content, MeshColor color, AtomicFile* file) {
   const MeshCounts counts = CountMesh(content.mesh);
   DSG_RETURN_IF_ERROR(CheckCount(counts.vertices, *file));
   Writer writer(file);
@@ -225,7 +225,7 @@ absl::Status WriteMeshPly(const MapContent& content, MeshColor color, OutputFile
   return writer.Flush(0);
 }
 
-absl::StatusOr<GraphPlyCounts> WriteGraphPly(const MapContent& content, OutputFile* file) {
+absl::StatusOr<GraphPlyCounts> WriteGraphPly(const MapContent& content, AtomicFile* file) {
   const GraphLines graph(content);
   const GraphPlyCounts counts{graph.vertices().size(), graph.lines().size()};
   DSG_RETURN_IF_ERROR(CheckCount(counts.vertices, *file));

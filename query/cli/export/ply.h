@@ -6,14 +6,14 @@
 #include "absl/status/status.h"
 #include "query/cli/export/map_content.h"
 #include "query/cli/export/mesh_look.h"
-#include "query/cli/export/output_file.h"
+#include "schema/files/atomic_file.h"
 
 namespace dsg::cli {
 
 /// Vertices with normal, colour, label and instance; faces.
-/// Errors: as OutputFile::Write; RESOURCE_EXHAUSTED/LIMIT_EXCEEDED from 2^31 vertices on, which the
+/// Errors: as AtomicFile::Write; RESOURCE_EXHAUSTED/LIMIT_EXCEEDED from 2^31 vertices on, which the
 /// format's readers do not count.
-absl::Status WriteMeshPly(const MapContent& content, MeshColor color, OutputFile* file);
+absl::Status WriteMeshPly(const MapContent& content, MeshColor color, AtomicFile* file);
 
 struct GraphPlyCounts {
   size_t vertices = 0;
@@ -23,6 +23,6 @@ struct GraphPlyCounts {
 /// A point a node, in the colour of its class or layer; a line an edge; boxes and tracks as lines
 /// between points of their own. The property `layer` is the layer's id, which comments name.
 /// Errors: as WriteMeshPly.
-absl::StatusOr<GraphPlyCounts> WriteGraphPly(const MapContent& content, OutputFile* file);
+absl::StatusOr<GraphPlyCounts> WriteGraphPly(const MapContent& content, AtomicFile* file);
 
 }  // namespace dsg::cli
