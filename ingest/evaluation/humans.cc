@@ -5,7 +5,7 @@
 #include <set>
 #include <utility>
 
-#include "ingest/matching/assignment.h"
+#include "schema/matching/assignment.h"
 
 namespace dsg::evaluation {
 namespace {
@@ -60,7 +60,7 @@ Explanations Explain(const std::vector<TrueDetection>& detections,
                          .norm();
       }
     }
-    const std::vector<int> assigned = ingest::GatedAssignment(cost, gate_m);
+    const std::vector<int> assigned = GatedAssignment(cost, gate_m);
     for (size_t i = 0; i < assigned.size(); ++i) {
       if (assigned[i] < 0) continue;
       out[{time_ns, stamped[i]->track}] = {stamped[i],
@@ -114,7 +114,7 @@ int64_t IdTruePositives(const Tally& tally) {
     weight(rows[pair.first], columns[pair.second]) = static_cast<double>(count);
   }
   double total = 0.0;
-  const std::vector<int> assigned = ingest::MaximumAssignment(weight);
+  const std::vector<int> assigned = MaximumAssignment(weight);
   for (size_t row = 0; row < assigned.size(); ++row) {
     if (assigned[row] >= 0) total += weight(static_cast<Eigen::Index>(row), assigned[row]);
   }

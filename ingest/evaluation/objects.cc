@@ -5,7 +5,7 @@
 #include <cmath>
 #include <map>
 
-#include "ingest/matching/assignment.h"
+#include "schema/matching/assignment.h"
 
 namespace dsg::evaluation {
 namespace {
@@ -162,7 +162,7 @@ std::vector<int> MatchObjects(const std::vector<EstimatedObject>& estimate,
                                 estimate[nodes[static_cast<size_t>(i)]].position_map);
       }
     }
-    const std::vector<int> assigned = ingest::GatedAssignment(cost, gate_m);
+    const std::vector<int> assigned = GatedAssignment(cost, gate_m);
     for (size_t i = 0; i < assigned.size(); ++i) {
       if (assigned[i] >= 0) {
         truth_of[nodes[i]] = static_cast<int>(objects[static_cast<size_t>(assigned[i])]);

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <set>
 
-#include "ingest/matching/assignment.h"
+#include "schema/matching/assignment.h"
 
 namespace dsg::evaluation {
 namespace {
@@ -220,7 +220,7 @@ RoomResult EvaluateRooms(const PredictedRooms& predicted, const TrueRooms& truth
   result.of_places = PaperScore(overlap, cells.is_asked);
   result.outside_doors = PaperScore(without, cells.is_asked);
   if (map.cell_count() > 0) result.volumetric = VolumetricScore(predicted, cells, map);
-  const std::vector<int> truth_of = ingest::MaximumAssignment(overlap.shared);
+  const std::vector<int> truth_of = MaximumAssignment(overlap.shared);
   result.one_to_one = OneToOneScore(overlap, truth_of, cells.is_asked);
   result.adjacency_f1 = AdjacencyF1(predicted, truth, truth_of, cells.is_asked);
   return result;

@@ -3,7 +3,7 @@
 
 #include "ingest/loop/odometry_tree.h"
 #include "ingest/loop/pairwise.h"
-#include "ingest/matching/max_clique.h"
+#include "schema/matching/max_clique.h"
 
 namespace dsg::ingest {
 namespace {

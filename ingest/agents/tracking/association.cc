@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ingest/matching/assignment.h"
+#include "schema/matching/assignment.h"
 
 namespace dsg::ingest {
 namespace {

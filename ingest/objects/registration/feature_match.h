@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "ingest/objects/registration/registration.h"
+#include "schema/matching/registration.h"
 
 namespace dsg::ingest {
 

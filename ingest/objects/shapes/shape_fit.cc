@@ -7,12 +7,12 @@
 #include <utility>
 
 #include "absl/strings/match.h"
-#include "ingest/objects/registration/registration.h"
 #include "ingest/objects/shapes/alignment.h"
 #include "ingest/objects/shapes/keypoints.h"
 #include "ingest/objects/shapes/model_index.h"
 #include "ingest/objects/shapes/pose_starts.h"
 #include "ingest/objects/shapes/surface.h"
+#include "schema/matching/registration.h"
 
 namespace dsg::ingest {
 namespace {

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "schema/base/status.h"
-#include "tests/unit/ingest/objects/registration/registration_test_util.h"
+#include "tests/unit/schema/matching/registration_test_util.h"
 
 namespace dsg::ingest {
 namespace {

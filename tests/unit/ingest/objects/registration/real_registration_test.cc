@@ -11,7 +11,7 @@
 
 #include "ingest/objects/registration/feature_match.h"
 #include "tests/unit/ingest/objects/registration/cloud_files.h"
-#include "tests/unit/ingest/objects/registration/registration_test_util.h"
+#include "tests/unit/schema/matching/registration_test_util.h"
 
 namespace dsg::ingest {
 namespace {

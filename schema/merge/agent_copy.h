@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// What an agent of the other map did, carried into this one piece by piece.
+// Refuses to repeat: what an earlier merge brought is left out.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "schema/merge/merge.h"
+
+namespace dsg::merge {
+
+/// Threads: one caller at a time. All that is given must outlive this.
+class AgentCopy {
+ public:
+  /// `theirs` in the other map is `mine` in this one, which may not be there yet.
+  AgentCopy(const Snapshot& into, const Snapshot& other, const MergePlan& plan, NodeId theirs,
+            NodeId mine);
+
+  /// Poses, then stays and factors, then shapes, at most plan.batch_row_count rows each; nullopt at
+  /// the end.
+  absl::StatusOr<std::optional<GraphDelta>> Next(const StopCheck& stop);
+
+  /// Assets that the last delta refers to.
+  std::vector<Sha256> TakeTopologies();
+
+ private:
+  enum class Stage { kBegin, kPoses, kStays, kShapes, kEnd };
+
+  absl::Status Begin(const StopCheck& stop);
+  absl::Status ReadPoses(const StopCheck& stop, GraphDelta* delta);
+  absl::Status ReadStays(GraphDelta* delta);
+  absl::Status ReadFactors(GraphDelta* delta) const;
+  absl::Status ReadShapes(const StopCheck& stop, GraphDelta* delta);
+  /// The empty id for a node that has none here.
+  NodeId Mapped(NodeId theirs_id) const;
+
+  const Snapshot& into_;
+  const Snapshot& other_;
+  const MergePlan& plan_;
+  NodeId theirs_;
+  NodeId mine_;
+  Stage stage_ = Stage::kBegin;
+  bool is_known_ = false;
+  TimeNs next_pose_ns_ = kTimeMin;
+  TimeNs next_shape_ns_ = kTimeMin;
+  std::vector<Sha256> topologies_;
+};
+
+}  // namespace dsg::merge

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+// Two maps of one world into one: what becomes of each node of the other map, and the deltas that
+// do it. Refuses to write: a plan can be shown, and its deltas committed by whoever has the writer.
+//
+//   auto plan = *PlanMerge(*into, *other, map_T_other, {.used_ids = ...}, stop);
+//   MergeDeltas deltas(*into, *other, std::move(plan), "author");
+//   while (auto delta = *deltas.Next(stop)) writer->Commit(*delta);
+#pragma once
+
+#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "schema/base/stop_check.h"
+#include "schema/merge/match_nodes.h"
+#include "schema/merge/mesh_join.h"
+#include "schema/merge/session_change.h"
+#include "schema/model/graph_delta.h"
+#include "schema/store/graph_store.h"
+#include "schema/store/snapshot.h"
+
+namespace dsg::merge {
+
+/// By letter: the largest index that a map ever used.
+using UsedIds = std::map<char, uint64_t>;
+
+/// Looks through all readable revisions. Ids that only revisions compacted or erased away have
+/// shown are known to nobody.
+absl::StatusOr<UsedIds> FindUsedIds(MapReader* map, const StopCheck& stop);
+
+struct MergeOptions {
+  MatchOptions match;
+  ChangeOptions change;
+  MeshJoinOptions mesh;
+  /// What is believed at the head of `into` counts as used in any case.
+  UsedIds used_ids;
+  /// Look for what the other map's session contradicts; see session_change.h.
+  bool find_changes = true;
+  /// Rows of one delta, about.
+  size_t batch_row_count = 4000;
+};
+
+struct MergeCounts {
+  int64_t fused_object_count = 0;
+  int64_t fused_place_count = 0;
+  int64_t fused_room_count = 0;
+  int64_t fused_structure_count = 0;
+  /// Nodes that are new, agents too.
+  int64_t added_node_count = 0;
+  int64_t gone_count = 0;
+  int64_t moved_count = 0;
+};
+
+struct MergePlan {
+  std::string into_name;
+  std::string other_name;
+  Revision into_revision = 0;
+  Revision other_revision = 0;
+  Pose3d map_T_other;
+  /// Every node of `other`, and what it is in `into`.
+  std::map<NodeId, NodeId> node_ids;
+  MergeCounts counts;
+  /// Root mean square distance of objects fused, metres; 0 without any.
+  double residual_m = 0.0;
+  /// Ids in `into`, ascending: closed, and where they went: (old, new).
+  std::vector<NodeId> gone;
+  std::vector<std::pair<NodeId, NodeId>> moved;
+  /// Nodes and edges to write, whole; may be empty when nothing is new.
+  GraphDelta graph;
+  /// Class and mesh instance of the other map's vertices, here.
+  std::map<uint32_t, uint32_t> class_of;
+  std::map<uint32_t, uint32_t> instance_of;
+  MeshJoinOptions mesh;
+  size_t batch_row_count = 0;
+};
+
+/// Errors: INVALID_ARGUMENT/FIELD_INVALID for a map with itself, or a transform that is none or
+/// tilts; FAILED_PRECONDITION/FRAMES_INCOMPATIBLE when clocks differ or a layer has another rank;
+/// what `stop` returned.
+/// Cost: both graphs in memory.
+absl::StatusOr<MergePlan> PlanMerge(const Snapshot& into, const Snapshot& other,
+                                    const Pose3d& map_T_other, const MergeOptions& options,
+                                    const StopCheck& stop);
+
+/// What makes maps impossible to merge, whatever the transform.
+/// Errors: as PlanMerge.
+absl::Status CheckMergeable(const Snapshot& into, const Snapshot& other);
+
+/// Where the other map was put when it was merged before; nullopt if it was not, or has been
+/// rebuilt since.
+std::optional<Pose3d> TransformOfLastMerge(const MapContent& into, const MapContent& other);
+
+/// The deltas of a plan, one at a time: assets, graph, tracks, stays and factors, shapes, mesh.
+/// Poses and blocks are read as they are needed. A merge that was cut short goes on with a new
+/// plan: what has been written is known by its origins.
+///
+/// Threads: one caller at a time.
+class MergeDeltas {
+ public:
+  MergeDeltas(std::shared_ptr<const Snapshot> into, std::shared_ptr<const Snapshot> other,
+              MergePlan plan, std::string author);
+  ~MergeDeltas();
+
+  const MergePlan& plan() const;
+  /// nullopt at the end. Sequences count from 1 in a session named after both revisions.
+  absl::StatusOr<std::optional<GraphDelta>> Next(const StopCheck& stop);
+  /// From 0 to 1.
+  double progress() const;
+  /// Blocks that both maps had, so far.
+  int64_t fused_mesh_block_count() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace dsg::merge

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <deque>
+#include <set>
+#include <tuple>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "schema/base/status.h"
+#include "schema/merge/agent_copy.h"
+#include "schema/merge/merge.h"
+
+namespace dsg::merge {
+namespace {
+
+std::set<Sha256> AssetsOf(const GraphDelta& graph) {
+  std::set<Sha256> assets;
+  for (const Node& node : graph.nodes) {
+    if (node.object.has_value() && node.object->model.has_value()) {
+      assets.insert(*node.object->model);
+    }
+    if (node.agent.has_value() && node.agent->body_model.has_value()) {
+      assets.insert(*node.agent->body_model);
+    }
+  }
+  return assets;
+}
+
+std::string Describe(const MergePlan& plan) {
+  const Eigen::Vector3d& p = plan.map_T_other.position;
+  const Eigen::Quaterniond& q = plan.map_T_other.orientation;
+  return absl::StrFormat("merge of %s revision %d at %.6f,%.6f,%.6f,%.9f,%.9f,%.9f,%.9f",
+                         plan.other_name, plan.other_revision, p.x(), p.y(), p.z(), q.x(), q.y(),
+                         q.z(), q.w());
+}
+
+size_t RowsOf(const MeshBlock& block) { return block.positions_map.size() + block.faces.size(); }
+
+}  // namespace
+
+class MergeDeltas::Impl {
+ public:
+  Impl(std::shared_ptr<const Snapshot> into, std::shared_ptr<const Snapshot> other, MergePlan plan,
+       std::string author)
+      : into_(std::move(into)),
+        other_(std::move(other)),
+        plan_(std::move(plan)),
+        mesh_(into_, other_, plan_.map_T_other, {plan_.class_of, plan_.instance_of}, plan_.mesh) {
+    header_.map = plan_.into_name;
+    header_.session_id = absl::StrCat("merge/", plan_.other_name, "@", plan_.other_revision, "/",
+                                      plan_.into_revision);
+    header_.author = std::move(author);
+    header_.message = Describe(plan_);
+    header_.parent_revision = plan_.into_revision;
+    for (const auto& [theirs, mine] : plan_.node_ids) agents_left_.emplace_back(theirs, mine);
+  }
+
+  absl::StatusOr<std::optional<GraphDelta>> Next(const StopCheck& stop) {
+    if (!is_graph_ready_) DSG_RETURN_IF_ERROR(PrepareGraph());
+    while (queue_.empty()) {
+      DSG_RETURN_IF_ERROR(AskStop(stop));
+      DSG_ASSIGN_OR_RETURN(const bool is_done, ReadMore(stop));
+      if (is_done && queue_.empty()) return std::optional<GraphDelta>();
+    }
+    GraphDelta delta = std::move(queue_.front());
+    queue_.pop_front();
+    delta.map = header_.map;
+    delta.session_id = header_.session_id;
+    delta.author = header_.author;
+    delta.message = header_.message;
+    delta.parent_revision = header_.parent_revision;
+    delta.sequence = ++sequence_;
+    // Only the first can know its parent; who commits sets those of the others.
+    header_.parent_revision.reset();
+    return std::optional<GraphDelta>(std::move(delta));
+  }
+
+  double progress() const {
+    if (!is_graph_ready_ || !queue_.empty()) return 0.05;
+    const double agents =
+        1.0 - static_cast<double>(agents_left_.size()) /
+                  std::max<double>(1.0, static_cast<double>(plan_.node_ids.size()));
+    return 0.1 + 0.4 * agents + 0.5 * mesh_.progress();
+  }
+
+  const MergePlan& plan() const { return plan_; }
+  const MeshJoin& mesh() const { return mesh_; }
+
+ private:
+  absl::Status PrepareGraph() {
+    for (const Sha256& sha256 : AssetsOf(plan_.graph)) DSG_RETURN_IF_ERROR(QueueAsset(sha256));
+    if (!plan_.graph.empty()) {
+      for (GraphDelta& part : SplitDelta(plan_.graph, plan_.batch_row_count)) {
+        queue_.push_back(std::move(part));
+      }
+    }
+    is_graph_ready_ = true;
+    return absl::OkStatus();
+  }
+
+  // Assets may be large, so each goes alone.
+  absl::Status QueueAsset(const Sha256& sha256) {
+    if (into_->ReadAsset(sha256).ok()) return absl::OkStatus();
+    DSG_ASSIGN_OR_RETURN(Asset asset, other_->ReadAsset(sha256));
+    GraphDelta delta;
+    delta.assets.push_back(std::move(asset));
+    queue_.push_back(std::move(delta));
+    return absl::OkStatus();
+  }
+
+  // True when nothing is left.
+  absl::StatusOr<bool> ReadMore(const StopCheck& stop) {
+    if (agent_ != nullptr) {
+      DSG_ASSIGN_OR_RETURN(std::optional<GraphDelta> delta, agent_->Next(stop));
+      if (!delta.has_value()) {
+        agent_.reset();
+        return false;
+      }
+      for (const Sha256& topology : agent_->TakeTopologies()) {
+        DSG_RETURN_IF_ERROR(QueueAsset(topology));
+      }
+      queue_.push_back(*std::move(delta));
+      return false;
+    }
+    while (!agents_left_.empty()) {
+      const auto [theirs, mine] = agents_left_.front();
+      agents_left_.pop_front();
+      DSG_ASSIGN_OR_RETURN(const Node node, other_->GetNode(theirs));
+      if (!IsAgentKind(node.kind)) continue;
+      agent_ = std::make_unique<AgentCopy>(*into_, *other_, plan_, theirs, mine);
+      return false;
+    }
+    return ReadMesh(stop);
+  }
+
+  absl::StatusOr<bool> ReadMesh(const StopCheck& stop) {
+    GraphDelta delta;
+    size_t row_count = 0;
+    while (row_count < kMeshRowsMax) {
+      DSG_ASSIGN_OR_RETURN(std::optional<MeshBlock> block, mesh_.Next(stop));
+      if (!block.has_value()) break;
+      row_count += RowsOf(*block);
+      delta.mesh_blocks.push_back(*std::move(block));
+    }
+    if (delta.mesh_blocks.empty()) return true;
+    queue_.push_back(std::move(delta));
+    return false;
+  }
+
+  static constexpr size_t kMeshRowsMax = 200'000;
+
+  std::shared_ptr<const Snapshot> into_;
+  std::shared_ptr<const Snapshot> other_;
+  MergePlan plan_;
+  MeshJoin mesh_;
+  GraphDelta header_;
+  int64_t sequence_ = 0;
+  bool is_graph_ready_ = false;
+  std::deque<GraphDelta> queue_;
+  std::deque<std::pair<NodeId, NodeId>> agents_left_;
+  std::unique_ptr<AgentCopy> agent_;
+};
+
+MergeDeltas::MergeDeltas(std::shared_ptr<const Snapshot> into,
+                         std::shared_ptr<const Snapshot> other, MergePlan plan, std::string author)
+    : impl_(std::make_unique<Impl>(std::move(into), std::move(other), std::move(plan),
+                                   std::move(author))) {}
+MergeDeltas::~MergeDeltas() = default;
+
+const MergePlan& MergeDeltas::plan() const { return impl_->plan(); }
+absl::StatusOr<std::optional<GraphDelta>> MergeDeltas::Next(const StopCheck& stop) {
+  return impl_->Next(stop);
+}
+double MergeDeltas::progress() const { return impl_->progress(); }
+int64_t MergeDeltas::fused_mesh_block_count() const { return impl_->mesh().fused_block_count(); }
+
+}  // namespace dsg::merge

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "schema/merge/merge_edges.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <string>
+
+#include "schema/merge/point_grid.h"
+
+namespace dsg::merge {
+namespace {
+
+// Written once, from either end.
+bool IsSymmetric(const std::string& relation) {
+  return relation == relations::kTraversable || relation == relations::kAdjacent ||
+         relation == relations::kNear || relation == relations::kCoVisible ||
+         relation == relations::kSameAs;
+}
+
+// A node has one of each of these; of two beliefs the one of this map stays.
+bool IsSingle(const std::string& relation) {
+  return relation == relations::kNearestPlace || relation == relations::kOn ||
+         relation == relations::kIn || relation == relations::kHeldBy;
+}
+
+class EdgeJoiner {
+ public:
+  EdgeJoiner(const MapContent& into, const std::vector<int>& pair_of,
+             const std::vector<NodeId>& id_of)
+      : into_(into), pair_of_(pair_of), id_of_(id_of) {
+    for (const Edge& edge : into.edges) {
+      into_keys_.push_back(edge.key());
+      if (IsSingle(edge.relation)) taken_.insert({edge.source, edge.relation});
+    }
+  }
+
+  void Add(const MapContent& other, const Edge& edge) {
+    const int source = other.IndexOf(edge.source);
+    const int target = other.IndexOf(edge.target);
+    if (source < 0 || target < 0) return;
+    Edge mine = edge;
+    mine.source = id_of_[static_cast<size_t>(source)];
+    mine.target = id_of_[static_cast<size_t>(target)];
+    if (mine.source == mine.target) return;
+    if (IsKnown(mine)) return;
+    if (edge.relation == relations::kContains && HasParent(target)) return;
+    if (IsSingle(edge.relation) && taken_.contains({mine.source, edge.relation})) return;
+    added_.try_emplace(mine.key(), std::move(mine));
+  }
+
+  std::vector<Edge> Take() && {
+    std::vector<Edge> edges;
+    for (auto& [key, edge] : added_) edges.push_back(std::move(edge));
+    return edges;
+  }
+
+ private:
+  bool Has(const EdgeKey& key) const {
+    return added_.contains(key) || std::binary_search(into_keys_.begin(), into_keys_.end(), key);
+  }
+
+  bool IsKnown(const Edge& edge) const {
+    return Has(edge.key()) ||
+           (IsSymmetric(edge.relation) && Has({edge.target, edge.relation, edge.source}));
+  }
+
+  // Of a node that stood in this map before the merge.
+  bool HasParent(int child) const {
+    const int pair = pair_of_[static_cast<size_t>(child)];
+    return pair >= 0 && into_.parent[static_cast<size_t>(pair)] >= 0;
+  }
+
+  const MapContent& into_;
+  const std::vector<int>& pair_of_;
+  const std::vector<NodeId>& id_of_;
+  std::vector<EdgeKey> into_keys_;
+  std::set<std::pair<NodeId, std::string>> taken_;
+  std::map<EdgeKey, Edge> added_;
+};
+
+double ClearanceOf(const Node& node) {
+  return node.place.has_value() ? node.place->clearance_m : 0.0;
+}
+
+// Places of `other` that a way leads from into a place that both maps have.
+std::set<int> JoinedPlaces(const MapContent& other, const std::vector<int>& pair_of) {
+  std::set<int> joined;
+  for (const Edge& edge : other.edges) {
+    if (edge.relation != relations::kTraversable) continue;
+    const int a = other.IndexOf(edge.source);
+    const int b = other.IndexOf(edge.target);
+    if (a < 0 || b < 0) continue;
+    if (pair_of[static_cast<size_t>(a)] >= 0) joined.insert(b);
+    if (pair_of[static_cast<size_t>(b)] >= 0) joined.insert(a);
+  }
+  return joined;
+}
+
+}  // namespace
+
+std::vector<Edge> JoinEdges(const MapContent& into, const MapContent& other,
+                            const std::vector<int>& pair_of, const std::vector<NodeId>& id_of) {
+  EdgeJoiner joiner(into, pair_of, id_of);
+  for (const Edge& edge : other.edges) joiner.Add(other, edge);
+  return std::move(joiner).Take();
+}
+
+std::vector<Edge> BridgePlaces(const MapContent& into, const MapContent& other,
+                               const std::vector<int>& pair_of, const std::vector<NodeId>& id_of) {
+  const std::vector<int> mine = into.OfClass(NodeClass::kPlace);
+  std::vector<Eigen::Vector3d> positions;
+  for (const int i : mine) {
+    positions.push_back(into.nodes[static_cast<size_t>(i)].map_T_node.position);
+  }
+  const PointGrid grid(positions, 1.0);
+  const std::set<int> joined = JoinedPlaces(other, pair_of);
+  std::vector<Edge> bridges;
+  for (const int i : other.OfClass(NodeClass::kPlace)) {
+    if (pair_of[static_cast<size_t>(i)] >= 0 || joined.contains(i)) continue;
+    const Node& place = other.nodes[static_cast<size_t>(i)];
+    int nearest = -1;
+    double least = 3.0;
+    grid.ForEachNear(place.map_T_node.position, least, [&](int k) {
+      const Node& known = into.nodes[static_cast<size_t>(mine[static_cast<size_t>(k)])];
+      const double distance = (known.map_T_node.position - place.map_T_node.position).norm();
+      // Nine tenths: clearances are measured on a grid.
+      if (distance > 0.9 * std::max(ClearanceOf(known), ClearanceOf(place))) return;
+      if (distance > least || (distance == least && k > nearest)) return;
+      least = distance;
+      nearest = k;
+    });
+    if (nearest < 0) continue;
+    const Node& known = into.nodes[static_cast<size_t>(mine[static_cast<size_t>(nearest)])];
+    Edge bridge;
+    bridge.source = std::min(known.id, id_of[static_cast<size_t>(i)]);
+    bridge.relation = relations::kTraversable;
+    bridge.target = std::max(known.id, id_of[static_cast<size_t>(i)]);
+    bridge.weight = std::min(ClearanceOf(known), ClearanceOf(place));
+    bridges.push_back(std::move(bridge));
+  }
+  std::sort(bridges.begin(), bridges.end(),
+            [](const Edge& a, const Edge& b) { return a.key() < b.key(); });
+  return bridges;
+}
+
+}  // namespace dsg::merge

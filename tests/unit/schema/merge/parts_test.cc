@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "schema/base/random.h"
+#include "schema/merge/footprint.h"
+#include "schema/merge/fuse.h"
+#include "schema/merge/origins.h"
+#include "schema/merge/transform_node.h"
+#include "schema/model/edge.h"
+#include "tests/unit/schema/merge/small_map.h"
+
+namespace dsg::merge {
+namespace {
+
+Polygon2d Square(double x, double y, double side) {
+  return {{x, y}, {x + side, y}, {x + side, y + side}, {x, y + side}};
+}
+
+TEST(Footprint, MeasuresWhatTwoOutlinesShare) {
+  EXPECT_DOUBLE_EQ(AreaOf(Square(0, 0, 2)), 4.0);
+  EXPECT_NEAR(SharedArea(Square(0, 0, 2), Square(1, 1, 2)), 1.0, 1e-9);
+  EXPECT_EQ(SharedArea(Square(0, 0, 2), Square(5, 5, 2)), 0.0);
+  EXPECT_EQ(SharedArea(Square(0, 0, 2), {}), 0.0);
+  EXPECT_NEAR(AreaOf(UnionOf(Square(0, 0, 2), Square(1, 1, 2))), 7.0, 1e-9);
+}
+
+TEST(Footprint, TakesAnyPolygonThereIs) {
+  for (uint64_t seed = 1; seed <= 300; ++seed) {
+    Random random(seed, 4);
+    const auto draw = [&] {
+      Polygon2d outline;
+      for (int i = random.Integer(3, 12); i > 0; --i) {
+        outline.emplace_back(random.Uniform(0, 3), random.Uniform(0, 3));
+      }
+      return outline;
+    };
+    const Polygon2d a = draw();
+    const Polygon2d b = draw();
+    const double shared = SharedArea(a, b);
+    EXPECT_GE(shared, 0.0) << seed;
+    EXPECT_LE(shared, 9.0) << seed;
+    EXPECT_LE(AreaOf(UnionOf(a, b)), 9.0) << seed;
+  }
+}
+
+TEST(Origins, AreReadBackAsTheyWereSet) {
+  Node node;
+  EXPECT_EQ(SetOrigin({"home", NodeId('O', 3), 5, true}, &node), 0);
+  EXPECT_TRUE(CopiedFrom(node).has_value());
+  EXPECT_EQ(SetOrigin({"lab", NodeId('O', 9), 2, false}, &node), 0);
+  EXPECT_FALSE(CopiedFrom(node).has_value());
+  EXPECT_EQ(SetOrigin({"home", NodeId('O', 3), 8, false}, &node), 5);
+  const std::vector<Origin> origins = OriginsOf(node);
+  ASSERT_EQ(origins.size(), 2u);
+  EXPECT_EQ(origins[0].map, "home");
+  EXPECT_EQ(origins[0].observation_count, 8);
+  EXPECT_TRUE(origins[0].is_copy);
+  EXPECT_EQ(origins[1].id, NodeId('O', 9));
+  EXPECT_EQ(std::get<std::string>(node.attributes.at("merged_from")), "home/O3 lab/O9");
+}
+
+TEST(Origins, OfAttributesThatSomebodyElseWroteAreNone) {
+  Node node;
+  for (const AttributeValue& value :
+       {AttributeValue(3.0), AttributeValue(true), AttributeValue(std::string("O4")),
+        AttributeValue(std::string("home/ home/?? / //")), AttributeValue(std::string())}) {
+    node.attributes["merged_from"] = value;
+    EXPECT_TRUE(OriginsOf(node).empty());
+  }
+}
+
+TEST(Fuse, KeepsTheBetterLookAndCountsEachObservationOnce) {
+  Node known = test::MakeObject(1, "chair", {1, 1, 0});
+  Node seen = test::MakeObject(8, "chair", {1.1, 1, 0});
+  seen.observation_count = 30;
+  seen.last_observed_ns = 99;
+  seen.confidence = 0.7;
+  FuseNode("b", seen.id, seen, &known);
+  EXPECT_EQ(known.id, test::O(1));
+  EXPECT_NEAR(known.map_T_node.position.x(), 1.1, 1e-12);
+  EXPECT_EQ(known.observation_count, 40);
+  EXPECT_EQ(known.last_observed_ns, 99);
+  EXPECT_EQ(known.confidence, 0.7);
+  FuseNode("b", seen.id, seen, &known);
+  EXPECT_EQ(known.observation_count, 40);
+}
+
+TEST(Transform, TurnsCovariancesPlanesAndOutlines) {
+  const Pose3d turn{{1, 0, 2},
+                    Eigen::Quaterniond(Eigen::AngleAxisd(M_PI_2, Eigen::Vector3d::UnitZ()))};
+  TimedPose pose;
+  Covariance6 covariance{};
+  covariance[0] = 4.0f;
+  covariance[6] = 1.0f;
+  pose.covariance = std::make_shared<const Covariance6>(covariance);
+  TransformPose(turn, &pose);
+  EXPECT_NEAR((*pose.covariance)[0], 1.0f, 1e-6f);
+  EXPECT_NEAR((*pose.covariance)[6], 4.0f, 1e-6f);
+  Node wall;
+  wall.structure = StructureInfo{"wall", Eigen::Vector3d::UnitX(), -3.0, 0};
+  TransformNode(turn, &wall);
+  const Eigen::Vector3d on_wall = turn * Eigen::Vector3d(3, 7, 1);
+  EXPECT_NEAR(wall.structure->plane_normal_map.dot(on_wall) + wall.structure->plane_offset_m, 0.0,
+              1e-12);
+  Node room = test::MakeRoom(0, {0, 0, 0}, {4, 2, 3});
+  TransformNode(turn, &room);
+  EXPECT_NEAR(room.region->z_min_m, 2.0, 1e-12);
+  EXPECT_NEAR(AreaOf(room.region->footprint_map), 8.0, 1e-9);
+}
+
+TEST(Transform, LeavesPosesWithoutOrientationWithoutOne) {
+  const Pose3d turn{{1, 0, 2},
+                    Eigen::Quaterniond(Eigen::AngleAxisd(1.0, Eigen::Vector3d::UnitZ()))};
+  TimedPose pose;
+  pose.flags = pose_flags::kNoOrientation;
+  TransformPose(turn, &pose);
+  EXPECT_EQ(pose.map_T_agent.orientation.coeffs(), Eigen::Quaterniond::Identity().coeffs());
+}
+
+}  // namespace
+}  // namespace dsg::merge
