@@ -36,6 +36,7 @@ enum class Reason {
   kRelationUnknown = 26,
   kNoPath = 27,
   kTagUnknown = 28,
+  kNoRegistration = 29,
   kTimeOutsideTrack = 40,
   kRevisionInFuture = 41,
   kRevisionCompacted = 42,
@@ -47,6 +48,8 @@ enum class Reason {
   kNotAStore = 82,
   kNetworkFileSystem = 83,
   kReadOnly = 84,
+  kPolicyMatchesAll = 85,
+  kFramesIncompatible = 86,
   kParentRevisionStale = 100,
   kSequenceGap = 101,
   kMapReplaced = 102,
@@ -56,6 +59,7 @@ enum class Reason {
   kOverloaded = 140,
   kDiskFull = 141,
   kLimitExceeded = 142,
+  kQuotaExceeded = 143,
   kStoreCorrupt = 160,
 };
 

@@ -19,6 +19,7 @@ void HeaderToProto(const GraphDelta& delta, v1::GraphDelta* out) {
   out->set_author(delta.author);
   out->set_message(delta.message);
   out->set_config_digest(delta.config_digest);
+  out->set_is_forgetting(delta.is_forgetting);
 }
 
 void HeaderFromProto(const v1::GraphDelta& in, GraphDelta* delta) {
@@ -29,6 +30,7 @@ void HeaderFromProto(const v1::GraphDelta& in, GraphDelta* delta) {
   delta->author = in.author();
   delta->message = in.message();
   delta->config_digest = in.config_digest();
+  delta->is_forgetting = in.is_forgetting();
 }
 
 void ToProto(const Stay& stay, v1::Stay* out) {
@@ -47,6 +49,45 @@ absl::StatusOr<Stay> FromProto(const v1::Stay& in) {
   stay.enter_ns = in.enter_ns();
   stay.exit_ns = in.exit_ns();
   return stay;
+}
+
+void SpansToProto(const std::vector<TrackSpan>& spans,
+                  google::protobuf::RepeatedPtrField<v1::TrackSpan>* out) {
+  for (const TrackSpan& span : spans) {
+    v1::TrackSpan* to = out->Add();
+    to->set_agent(ToString(span.agent));
+    to->set_from_ns(span.from_ns);
+    to->set_to_ns(span.to_ns);
+  }
+}
+
+absl::Status SpansFromProto(const google::protobuf::RepeatedPtrField<v1::TrackSpan>& in,
+                            std::vector<TrackSpan>* spans) {
+  for (const v1::TrackSpan& span : in) {
+    DSG_ASSIGN_OR_RETURN(const NodeId agent, ParseNodeId(span.agent()));
+    spans->push_back({agent, span.from_ns(), span.to_ns()});
+  }
+  return absl::OkStatus();
+}
+
+void RemovalsToProto(const GraphDelta& delta, v1::GraphDelta* out) {
+  SpansToProto(delta.factor_removals, out->mutable_factor_removals());
+  SpansToProto(delta.shape_removals, out->mutable_shape_removals());
+  for (const StayKey& key : delta.stay_removals) {
+    v1::StayKey* to = out->add_stay_removals();
+    to->set_agent(ToString(key.agent));
+    to->set_enter_ns(key.enter_ns);
+  }
+}
+
+absl::Status RemovalsFromProto(const v1::GraphDelta& in, GraphDelta* delta) {
+  DSG_RETURN_IF_ERROR(SpansFromProto(in.factor_removals(), &delta->factor_removals));
+  DSG_RETURN_IF_ERROR(SpansFromProto(in.shape_removals(), &delta->shape_removals));
+  for (const v1::StayKey& key : in.stay_removals()) {
+    DSG_ASSIGN_OR_RETURN(const NodeId agent, ParseNodeId(key.agent()));
+    delta->stay_removals.push_back({agent, key.enter_ns()});
+  }
+  return absl::OkStatus();
 }
 
 void GraphToProto(const GraphDelta& delta, const LayerTable& layers, v1::GraphDelta* out) {
@@ -233,6 +274,7 @@ void ToProto(const GraphDelta& delta, const LayerTable& layers, v1::GraphDelta* 
   HeaderToProto(delta, out);
   GraphToProto(delta, known, out);
   TracksToProto(delta, out);
+  RemovalsToProto(delta, out);
   BlobsToProto(delta, out);
 }
 
@@ -241,6 +283,7 @@ absl::StatusOr<GraphDelta> FromProto(const v1::GraphDelta& in, const LayerTable&
   HeaderFromProto(in, &delta);
   DSG_RETURN_IF_ERROR(GraphFromProto(in, layers, &delta));
   DSG_RETURN_IF_ERROR(TracksFromProto(in, &delta));
+  DSG_RETURN_IF_ERROR(RemovalsFromProto(in, &delta));
   DSG_RETURN_IF_ERROR(BlobsFromProto(in, &delta));
   return delta;
 }

@@ -263,6 +263,17 @@ bool DecodeShapeTimes(std::string_view bytes, std::vector<TimeNs>* times) {
   return true;
 }
 
+bool DecodeShapeTopology(std::string_view bytes, std::optional<Sha256>* topology) {
+  ByteReader reader(bytes);
+  if (reader.Fixed<uint8_t>() != kVersion) return false;
+  reader.Fixed<uint8_t>();
+  const auto has_topology = reader.Fixed<uint8_t>();
+  if (has_topology > 1) return false;
+  topology->reset();
+  if (has_topology == 1) *topology = reader.Fixed<Sha256>();
+  return reader.ok();
+}
+
 bool DecodeShapes(std::string_view bytes, bool with_vertices, DecodedShapes* shapes) {
   ByteReader reader(bytes);
   Header header;

@@ -48,6 +48,8 @@ std::string EncodeShapes(const ShapeAppend& shapes, TrajectoryCodec codec);
 
 /// Only the times. False if the bytes are no encoded shapes.
 bool DecodeShapeTimes(std::string_view bytes, std::vector<TimeNs>* times);
+/// Only the topology; the first 35 bytes are enough. False if they are no encoded shapes.
+bool DecodeShapeTopology(std::string_view bytes, std::optional<Sha256>* topology);
 /// `with_vertices`: else only their count, which is much cheaper. False if the bytes are no encoded
 /// shapes. Verify the checksum first: this finds bad structure, not bad numbers.
 bool DecodeShapes(std::string_view bytes, bool with_vertices, DecodedShapes* shapes);

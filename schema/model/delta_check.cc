@@ -109,6 +109,12 @@ class DeltaChecker {
     for (const Node& node : delta_.nodes) DSG_RETURN_IF_ERROR(CheckFamily(node));
     for (const TrajectoryAppend& item : delta_.appends) DSG_RETURN_IF_ERROR(CheckAppend(item));
     for (const auto& item : delta_.corrections) DSG_RETURN_IF_ERROR(CheckCorrection(item));
+    for (const TrackSpan& span : delta_.factor_removals) {
+      DSG_RETURN_IF_ERROR(CheckSpan(span, "factors to remove"));
+    }
+    for (const TrackSpan& span : delta_.shape_removals) {
+      DSG_RETURN_IF_ERROR(CheckSpan(span, "shapes to remove"));
+    }
     for (const FactorAppend& item : delta_.factors) DSG_RETURN_IF_ERROR(CheckFactors(item));
     for (const ShapeAppend& item : delta_.shapes) DSG_RETURN_IF_ERROR(CheckShapes(item));
     for (const Stay& stay : delta_.stays) DSG_RETURN_IF_ERROR(CheckStay(stay));
@@ -436,6 +442,12 @@ class DeltaChecker {
     return absl::OkStatus();
   }
 
+  absl::Status CheckSpan(const TrackSpan& span, const std::string& which) {
+    const std::string what = absl::StrCat(which, " of ", ToString(span.agent));
+    DSG_RETURN_IF_ERROR(CheckAgent(span.agent, what));
+    return CheckInterval({span.from_ns, span.to_ns}, what);
+  }
+
   absl::Status CheckFactors(const FactorAppend& item) {
     const std::string what = absl::StrCat("factors of ", ToString(item.agent));
     DSG_RETURN_IF_ERROR(CheckAgent(item.agent, what));
@@ -607,6 +619,12 @@ void Coalesce(GraphDelta* delta) {
   SortKeepLast(&delta->corrections, [](const TrajectoryCorrection& item) {
     return std::make_tuple(item.agent, item.from_ns);
   });
+  const auto span_key = [](const TrackSpan& span) {
+    return std::make_tuple(span.agent, span.from_ns, span.to_ns);
+  };
+  SortKeepLast(&delta->factor_removals, span_key);
+  SortKeepLast(&delta->shape_removals, span_key);
+  SortKeepLast(&delta->stay_removals, [](const StayKey& key) { return key; });
   SortKeepLast(&delta->stays,
                [](const Stay& stay) { return std::make_tuple(stay.agent, stay.enter_ns); });
   SortKeepLast(&delta->mesh_blocks, [](const MeshBlock& block) { return block.index; });

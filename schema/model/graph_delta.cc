@@ -116,6 +116,7 @@ class DeltaSplitter {
     part.author = header_.author;
     part.message = header_.message;
     part.config_digest = header_.config_digest;
+    part.is_forgetting = header_.is_forgetting;
     parts_.push_back(std::move(part));
     used_ = 0;
   }
@@ -140,8 +141,9 @@ void SortParentsFirst(GraphDelta* delta) {
 bool GraphDelta::empty() const {
   return layers.empty() && labels.empty() && nodes.empty() && retirements.empty() &&
          edges.empty() && edge_removals.empty() && appends.empty() && corrections.empty() &&
-         factors.empty() && shapes.empty() && stays.empty() && mesh_blocks.empty() &&
-         mesh_removals.empty() && assets.empty();
+         factor_removals.empty() && factors.empty() && shape_removals.empty() && shapes.empty() &&
+         stay_removals.empty() && stays.empty() && mesh_blocks.empty() && mesh_removals.empty() &&
+         assets.empty();
 }
 
 void FitBoxesToChildren(GraphDelta* delta) { BoxFitter(delta).Fit(); }
@@ -152,6 +154,9 @@ std::vector<GraphDelta> SplitDelta(GraphDelta delta, size_t item_count_max) {
   splitter.Add(delta.layers, &GraphDelta::layers);
   splitter.Add(delta.labels, &GraphDelta::labels);
   splitter.Add(delta.assets, &GraphDelta::assets);
+  splitter.Add(delta.factor_removals, &GraphDelta::factor_removals);
+  splitter.Add(delta.shape_removals, &GraphDelta::shape_removals);
+  splitter.Add(delta.stay_removals, &GraphDelta::stay_removals);
   splitter.Add(delta.edge_removals, &GraphDelta::edge_removals);
   splitter.Add(delta.mesh_removals, &GraphDelta::mesh_removals);
   splitter.Add(delta.retirements, &GraphDelta::retirements);

@@ -48,6 +48,19 @@ struct Retirement {
   std::optional<TimeNs> valid_to_ns;
 };
 
+/// A stretch of one agent's life, half-open.
+struct TrackSpan {
+  NodeId agent;
+  TimeNs from_ns = kTimeMin;
+  TimeNs to_ns = kTimeMax;
+};
+
+struct StayKey {
+  NodeId agent;
+  TimeNs enter_ns = 0;
+  auto operator<=>(const StayKey&) const = default;
+};
+
 /// The identity of a delta is (session_id, sequence): committing it again changes nothing.
 struct GraphDelta {
   std::string map;
@@ -68,12 +81,24 @@ struct GraphDelta {
   std::vector<EdgeKey> edge_removals;
   std::vector<TrajectoryAppend> appends;
   std::vector<TrajectoryCorrection> corrections;
+  /// Factors of the agent of which an end lies in the span are no longer believed. Go before
+  /// `factors`.
+  std::vector<TrackSpan> factor_removals;
   std::vector<FactorAppend> factors;
+  /// Body shapes with from_ns <= time < to_ns are no longer believed. Go before `shapes`.
+  std::vector<TrackSpan> shape_removals;
   std::vector<ShapeAppend> shapes;
+  /// Go before `stays`; one that is not there is no error.
+  std::vector<StayKey> stay_removals;
   std::vector<Stay> stays;
   std::vector<MeshBlock> mesh_blocks;
   std::vector<BlockIndex> mesh_removals;
   std::vector<Asset> assets;
+
+  /// May use the space that is kept for forgetting when the disk or the quota of the map is full.
+  /// Such a delta brings nothing new: it holds retirements, removals, corrections, stays and mesh
+  /// blocks only. Says how to commit, and is not stored.
+  bool is_forgetting = false;
 
   /// Nothing to write besides the revision itself.
   bool empty() const;

@@ -78,6 +78,15 @@ class MapReader {
   /// revision, the ends of edges. The other invariants are proven at each commit (CheckDelta).
   /// `progress` (may be empty) gets a fraction from 0 to 1.
   virtual absl::StatusOr<VerifyReport> Verify(const std::function<void(double)>& progress) = 0;
+  /// Writes the newest revision with all its history as a database file that needs no log beside
+  /// it, while others read and write. The bytes depend on the content of the map alone. Nobody
+  /// sees half a copy: it gets its name when it is whole and on the disk.
+  ///
+  /// Cost:   reads and writes the whole map; the write-ahead log grows meanwhile.
+  /// Errors: INVALID_ARGUMENT/FIELD_INVALID if `path` exists; RESOURCE_EXHAUSTED/DISK_FULL, with
+  /// nothing left behind; DATA_LOSS/STORE_CORRUPT; what `stop` returned.
+  virtual absl::Status CopyTo(const std::string& path, const StopCheck& stop,
+                              const Progress& progress) = 0;
 };
 
 /// Result of bringing a map to the newest format.
@@ -95,6 +104,12 @@ struct StoreOptions {
   size_t cache_bytes = size_t{256} << 20;
   /// How writers and lock files name this process: "dsg-ingest", "dsg-server", ...
   std::string program = "dsg";
+  /// Each map keeps a file of this size while there is space, which is given up when the disk is
+  /// full, so that forgetting can go on; 0 = none.
+  int64_t reserve_bytes = int64_t{16} << 20;
+  /// Commits that would make a map larger are refused; 0 = no limit. The write-ahead log may stand
+  /// above it for the moment.
+  int64_t quota_bytes = 0;
 };
 
 /// Threads: safe from many threads.
@@ -105,6 +120,9 @@ class GraphStore {
   /// Errors: NOT_FOUND/MAP_UNKNOWN naming the folder; FAILED_PRECONDITION/NETWORK_FILE_SYSTEM.
   static absl::StatusOr<std::unique_ptr<GraphStore>> Open(const std::string& folder,
                                                           const StoreOptions& options);
+
+  /// Absolute, without links.
+  virtual const std::string& folder() const = 0;
 
   /// Maps that this program can read or upgrade; the others are logged and left out. Order: by
   /// name.
@@ -118,6 +136,15 @@ class GraphStore {
   /// Errors: NOT_FOUND/MAP_UNKNOWN; UNAVAILABLE/WRITER_LOCKED; FAILED_PRECONDITION/FORMAT_TOO_NEW;
   /// RESOURCE_EXHAUSTED/DISK_FULL, nothing changed.
   virtual absl::StatusOr<UpgradeReport> UpgradeMap(const std::string& name) = 0;
+  /// Makes a database file, such as CopyTo writes, the map `name`, after reading it whole; the file
+  /// is gone then. It may bear another name inside. It must be on the store's file system.
+  /// Readers of a map that is replaced notice (IsCurrent).
+  ///
+  /// Errors: ALREADY_EXISTS/MAP_EXISTS unless `replace`; UNAVAILABLE/WRITER_LOCKED;
+  /// FAILED_PRECONDITION/FORMAT_TOO_NEW, FORMAT_TOO_OLD or NOT_A_STORE; DATA_LOSS/STORE_CORRUPT.
+  /// After an error the store is as it was, and the file still there.
+  virtual absl::Status InstallMap(const std::string& name, const std::string& file,
+                                  bool replace) = 0;
   /// Errors: as OpenMap; UNAVAILABLE/WRITER_LOCKED naming who holds the lock.
   virtual absl::StatusOr<std::unique_ptr<MapWriter>> OpenWriter(const std::string& name) = 0;
 };

@@ -5,9 +5,11 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "schema/base/stop_check.h"
+#include "schema/model/graph_delta.h"
 #include "schema/store/graph_writer.h"
 
 namespace dsg {
@@ -26,10 +28,40 @@ struct CompactReport {
   int64_t revision_count = 0;
   /// Rows that no readable revision shows, now gone.
   int64_t row_count = 0;
+  /// To which nothing referred any more.
+  int64_t asset_count = 0;
   int64_t bytes_before = 0;
   int64_t bytes_after = 0;
   /// False when a reader kept the log from being copied back: the file shrinks at a later time.
   bool is_shrunk = true;
+};
+
+/// Whose past is to be wiped out. What is believed now stays: retire or correct it first, by an
+/// ordinary commit.
+struct Erasure {
+  /// All past versions of these nodes, and of edges at them. Of those that are gone also tracks,
+  /// shapes, factors, and stays of them or in them.
+  std::vector<NodeId> nodes;
+  std::vector<EdgeKey> edges;
+  std::vector<BlockIndex> mesh_blocks;
+  /// Past poses, shapes and factors within, and past stays that touch them.
+  std::vector<TrackSpan> tracks;
+  /// Also assets that only such versions referred to.
+  bool assets = false;
+};
+
+struct EraseReport {
+  int64_t row_count = 0;
+  int64_t pose_count = 0;
+  int64_t asset_count = 0;
+  int64_t bytes_before = 0;
+  int64_t bytes_after = 0;
+  /// False when a reader kept the write-ahead log from being cut to nothing: it may hold the bytes
+  /// until the same call is made again.
+  bool is_clean = true;
+  /// Paths in the store that this program does not write any more, such as copies that an upgrade
+  /// kept: they may hold the bytes, and are left alone.
+  std::vector<std::string> other_files;
 };
 
 /// Gets a fraction from 0 to 1; may be empty.
@@ -48,11 +80,22 @@ class MapWriter : public GraphWriter {
 
   /// Makes the revisions before `keep_from` unreadable, but for those with tags, drops the rows
   /// that only they show, and gives the space back to the file system. What is kept reads as
-  /// before. Done in steps: when stopped or killed, the next call goes on.
+  /// before. Done in steps: when stopped or killed, the next call goes on. The report of a call
+  /// that goes on after a stop, by the same writer to the same revision, speaks of both.
   ///
   /// Errors: OUT_OF_RANGE/REVISION_IN_FUTURE or REVISION_COMPACTED; what `stop` returned.
   virtual absl::StatusOr<CompactReport> Compact(Revision keep_from, const StopCheck& stop,
                                                 const Progress& progress) = 0;
+
+  /// Wipes the past of what is named out of all revisions, so that neither the database nor its
+  /// log holds the bytes, and counts and digests of the revisions are of what is left. Readers find
+  /// the map replaced. Done in steps: when stopped or killed, the map is sound, and the same call
+  /// again does the rest. Messages of revisions stay.
+  ///
+  /// Errors: INVALID_ARGUMENT/FIELD_INVALID for an agent that is still there (name spans of its
+  /// track); what `stop` returned.
+  virtual absl::StatusOr<EraseReport> Erase(const Erasure& erasure, const StopCheck& stop,
+                                            const Progress& progress) = 0;
 };
 
 }  // namespace dsg

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stays, mesh blocks, assets, factors and shapes.
-#include <algorithm>
-
+// Stays, mesh blocks and assets.
 #include "absl/strings/str_cat.h"
 #include "schema/codec/proto_convert.h"
-#include "schema/codec/shape_codec.h"
 #include "schema/store/sqlite/commit.h"
 
 namespace dsg::sqlite {
@@ -117,34 +114,6 @@ absl::Status WriteMeshBlock(const MeshBlock& block, CommitContext* commit) {
       .Run();
 }
 
-// Factors and shapes: append-only batches of one agent.
-absl::Status InsertBatch(const char* sql, char table, NodeId agent, TimeNs t0, TimeNs t1,
-                         const std::string& payload, CommitContext* commit) {
-  const std::initializer_list<int64_t> columns = {KeyOf(agent), commit->revision(), t0, t1};
-  commit->head.content.Add(RowIdentity(table, columns, payload));
-  return Query(commit->db, sql)
-      .Bind(KeyOf(agent), commit->revision(), t0, t1, RowChecksum(columns, payload),
-            Query::BlobView{payload})
-      .Run();
-}
-
-// The shapes from `first` on that make one segment.
-ShapeAppend CutShapes(const ShapeAppend& item, size_t first) {
-  ShapeAppend segment{item.agent, item.topology, {}};
-  const TimeNs t0 = item.shapes[first].time_ns;
-  for (size_t i = first; i < item.shapes.size(); ++i) {
-    const BodyShape& shape = item.shapes[i];
-    // Times may lie further apart than 63 bits count.
-    const uint64_t length_ns = static_cast<uint64_t>(shape.time_ns) - static_cast<uint64_t>(t0);
-    if (segment.shapes.size() == kShapesPerSegmentMax ||
-        length_ns > static_cast<uint64_t>(kShapeSegmentNsMax)) {
-      break;
-    }
-    segment.shapes.push_back(shape);
-  }
-  return segment;
-}
-
 }  // namespace
 
 absl::Status WriteStays(const std::vector<Stay>& stays, CommitContext* commit) {
@@ -152,24 +121,28 @@ absl::Status WriteStays(const std::vector<Stay>& stays, CommitContext* commit) {
   return absl::OkStatus();
 }
 
-absl::Status EndStaysOf(NodeId agent, CommitContext* commit) {
-  std::vector<int64_t> enters;
-  {
-    Query query(commit->db, "SELECT enter_ns FROM stay WHERE agent = ?1");
-    query.Bind(KeyOf(agent));
-    while (query.Next()) enters.push_back(query.Int(0));
-    DSG_RETURN_IF_ERROR(query.status());
-  }
-  for (const int64_t enter_ns : enters) {
+absl::Status EndStays(const std::vector<StayKey>& keys, CommitContext* commit) {
+  for (const StayKey& key : keys) {
     Query current(commit->db,
                   "SELECT exit_ns, place, room, rev_from, checksum FROM stay"
                   " WHERE agent = ?1 AND enter_ns = ?2");
-    if (current.Bind(KeyOf(agent), enter_ns).Next()) {
-      DSG_RETURN_IF_ERROR(EndStay(KeyOf(agent), enter_ns, current, commit));
+    if (current.Bind(KeyOf(key.agent), key.enter_ns).Next()) {
+      DSG_RETURN_IF_ERROR(EndStay(KeyOf(key.agent), key.enter_ns, current, commit));
     }
     DSG_RETURN_IF_ERROR(current.status());
   }
   return absl::OkStatus();
+}
+
+absl::Status EndStaysOf(NodeId agent, CommitContext* commit) {
+  std::vector<StayKey> keys;
+  {
+    Query query(commit->db, "SELECT enter_ns FROM stay WHERE agent = ?1");
+    query.Bind(KeyOf(agent));
+    while (query.Next()) keys.push_back({agent, query.Int(0)});
+    DSG_RETURN_IF_ERROR(query.status());
+  }
+  return EndStays(keys, commit);
 }
 
 absl::Status WriteMesh(const GraphDelta& delta, CommitContext* commit) {
@@ -201,38 +174,6 @@ absl::Status WriteAssets(const std::vector<Asset>& assets, CommitContext* commit
               .Bind(Query::BlobView{sha256}, static_cast<int64_t>(part), commit->revision(),
                     asset.media_type, Checksum(bytes, part), Query::BlobView{bytes})
               .Run());
-    }
-  }
-  return absl::OkStatus();
-}
-
-absl::Status WriteFactors(const std::vector<FactorAppend>& factors, CommitContext* commit) {
-  for (const FactorAppend& item : factors) {
-    if (item.factors.empty()) continue;
-    TimeNs t0 = kTimeMax;
-    TimeNs t1 = kTimeMin;
-    for (const PoseFactor& factor : item.factors) {
-      t0 = std::min({t0, factor.from_ns, factor.to_ns});
-      t1 = std::max({t1, factor.from_ns, factor.to_ns});
-    }
-    DSG_RETURN_IF_ERROR(
-        InsertBatch("INSERT INTO factor_segment (agent, rev_from, t0, t1, checksum, payload)"
-                    " VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
-                    'F', item.agent, t0, t1, EncodeFactors(item.factors), commit));
-  }
-  return absl::OkStatus();
-}
-
-absl::Status WriteShapes(const std::vector<ShapeAppend>& shapes, CommitContext* commit) {
-  for (const ShapeAppend& item : shapes) {
-    for (size_t first = 0; first < item.shapes.size();) {
-      const ShapeAppend segment = CutShapes(item, first);
-      first += segment.shapes.size();
-      DSG_RETURN_IF_ERROR(InsertBatch(
-          "INSERT INTO shape_segment (agent, rev_from, t0, t1, checksum, payload)"
-          " VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
-          'H', segment.agent, segment.shapes.front().time_ns, segment.shapes.back().time_ns,
-          EncodeShapes(segment, commit->spec.codec), commit));
     }
   }
   return absl::OkStatus();

@@ -62,11 +62,14 @@ class GraphRowsWriter {
 
 /// Writes stays, mesh blocks, assets, factors and shapes.
 absl::Status WriteStays(const std::vector<Stay>& stays, CommitContext* commit);
+absl::Status EndStays(const std::vector<StayKey>& keys, CommitContext* commit);
 absl::Status EndStaysOf(NodeId agent, CommitContext* commit);
 absl::Status WriteMesh(const GraphDelta& delta, CommitContext* commit);
 absl::Status WriteAssets(const std::vector<Asset>& assets, CommitContext* commit);
 absl::Status WriteFactors(const std::vector<FactorAppend>& factors, CommitContext* commit);
 absl::Status WriteShapes(const std::vector<ShapeAppend>& shapes, CommitContext* commit);
+absl::Status EndFactors(const TrackSpan& span, CommitContext* commit);
+absl::Status EndShapes(const TrackSpan& span, CommitContext* commit);
 
 /// Leaves the list of what the commit touched.
 absl::Status InsertTouched(CommitContext* commit);
@@ -94,8 +97,14 @@ class TrackWriter {
   absl::Status AppendPose(const StoredPose& pose, Tail* tail, CommitContext* commit);
   absl::Status WriteSegment(Tail* tail, CommitContext* commit);
   absl::Status WriteMark(const Tail& tail, CommitContext* commit);
-  absl::Status TakeSegmentsFrom(TimeNs from_ns, Tail* tail, std::vector<StoredPose>* poses,
-                                CommitContext* commit);
+  absl::Status TakeSegments(TimeNs from_ns, TimeNs to_ns, Tail* tail,
+                            std::vector<StoredPose>* poses, int64_t* next_id,
+                            CommitContext* commit);
+  absl::Status LoadSegmentBefore(int64_t next_id, Tail* tail, CommitContext* commit);
+  absl::Status ExtendBox(int64_t id, const StoredPose& before, CommitContext* commit);
+  absl::Status WriteBetween(std::vector<StoredPose> poses, int64_t next_id, Tail* tail,
+                            CommitContext* commit);
+  absl::Status FindEnds(CommitContext* commit);
 
   std::unordered_map<NodeId, std::unique_ptr<Tail>> tails_;
 };

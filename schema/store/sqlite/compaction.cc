@@ -4,17 +4,14 @@
 #include "schema/store/sqlite/compaction.h"
 
 #include "absl/strings/str_cat.h"
+#include "schema/store/sqlite/asset_references.h"
 #include "schema/store/sqlite/readable.h"
 #include "schema/store/sqlite/rows.h"
+#include "schema/store/sqlite/space.h"
 #include "schema/store/sqlite/touched_keys.h"
 
 namespace dsg::sqlite {
 namespace {
-
-// The write-ahead log is copied back when it has grown to 16 MiB.
-constexpr int kCheckpointPages = 4096;
-// Pages given back to the file system in one transaction.
-constexpr char kGivePagesBack[] = "PRAGMA incremental_vacuum(1024)";
 
 // Rows looked at in one transaction: some megabytes of log at most, tens of milliseconds.
 struct HistoryTable {
@@ -34,9 +31,10 @@ struct HistoryTable {
   }
 
 constexpr HistoryTable kHistories[] = {
-    DSG_HISTORY_TABLE("node_history", 5'000), DSG_HISTORY_TABLE("edge_history", 20'000),
+    DSG_HISTORY_TABLE("node_history", 5'000),       DSG_HISTORY_TABLE("edge_history", 20'000),
     DSG_HISTORY_TABLE("trajectory_history", 1'000), DSG_HISTORY_TABLE("stay_history", 20'000),
-    DSG_HISTORY_TABLE("mesh_block_history", 100)};
+    DSG_HISTORY_TABLE("mesh_block_history", 40),    DSG_HISTORY_TABLE("shape_history", 1'000),
+    DSG_HISTORY_TABLE("factor_history", 1'000)};
 
 #undef DSG_HISTORY_TABLE
 
@@ -48,17 +46,6 @@ constexpr char kDropMarks[] =
     " AND NOT EXISTS (SELECT 1 FROM tag WHERE tag.revision >= old.revision"
     "  AND tag.revision < (SELECT min(next.revision) FROM track_mark AS next"
     "   WHERE next.slot = old.slot AND next.revision > old.revision))";
-
-// All or nothing.
-template <typename Work>
-absl::Status InTransaction(Database& db, const Work& work) {
-  DSG_RETURN_IF_ERROR(db.Execute("BEGIN IMMEDIATE"));
-  absl::Status status = work();
-  if (status.ok()) status = db.Execute("COMMIT");
-  // SQLite may have rolled back already; then this has nothing to do.
-  if (!status.ok()) db.Execute("ROLLBACK").IgnoreError();
-  return status;
-}
 
 // Records of revisions, oldest first: those that go leave their digest and their touched keys to
 // the next one that stays.
@@ -139,67 +126,81 @@ class RevisionDropper {
   int64_t count_ = 0;
 };
 
+// Nothing to close is found without a commit: a compaction may go on in many slices.
+absl::StatusOr<bool> AreClosed(Database& db, Revision keep_from) {
+  Query query(db,
+              "SELECT oldest_revision = ?1 AND NOT EXISTS (SELECT 1 FROM revision"
+              " WHERE revision < ?1 AND revision NOT IN (SELECT revision FROM tag)) FROM map");
+  const bool found = query.Bind(keep_from).Next();
+  DSG_RETURN_IF_ERROR(query.status());
+  return found && query.Int(0) == 1;
+}
+
 absl::Status CloseRevisions(Database& db, Revision keep_from, CompactReport* report) {
+  report->oldest = keep_from;
+  DSG_ASSIGN_OR_RETURN(const bool are_closed, AreClosed(db, keep_from));
+  if (are_closed) return absl::OkStatus();
   return InTransaction(db, [&]() -> absl::Status {
     DSG_RETURN_IF_ERROR(Query(db, "UPDATE map SET oldest_revision = ?1").Bind(keep_from).Run());
     DSG_ASSIGN_OR_RETURN(const Readable kept, LoadReadable(db));
     RevisionDropper dropper(&db, kept);
     DSG_RETURN_IF_ERROR(dropper.Run());
-    report->revision_count = dropper.count();
-    report->oldest = keep_from;
+    report->revision_count += dropper.count();
     return absl::OkStatus();
   });
 }
 
-void CopyLogBack(Database& db) {
-  if (db.wal_pages() > kCheckpointPages) db.Checkpoint(/*truncate=*/false);
-}
-
-absl::Status DropRows(Database& db, const HistoryTable& table, Revision oldest,
-                      const StopCheck& stop, CompactReport* report) {
+absl::Status DropRows(Database& db, const HistoryTable& table, const StopCheck& stop,
+                      Compaction* work) {
   DSG_ASSIGN_OR_RETURN(const int64_t last, db.QueryInt(table.last_row));
-  for (int64_t after = 0; after < last; after += table.step) {
+  for (; work->after < last; work->after += table.step) {
     DSG_RETURN_IF_ERROR(AskStop(stop));
-    DSG_RETURN_IF_ERROR(Query(db, table.drop).Bind(oldest, after, after + table.step).Run());
-    report->row_count += db.changed_row_count();
+    DSG_RETURN_IF_ERROR(
+        Query(db, table.drop).Bind(work->keep_from, work->after, work->after + table.step).Run());
+    work->report.row_count += db.changed_row_count();
     CopyLogBack(db);
   }
   return absl::OkStatus();
 }
 
-absl::Status GivePagesBack(Database& db, const StopCheck& stop) {
-  // Files of format 1 cannot shrink in steps until they have been written anew, once.
-  DSG_ASSIGN_OR_RETURN(const int64_t mode, db.QueryInt("PRAGMA auto_vacuum"));
-  if (mode == 0) return db.WriteAnew();
-  for (;;) {
-    DSG_RETURN_IF_ERROR(AskStop(stop));
-    DSG_ASSIGN_OR_RETURN(const int64_t free_count, db.QueryInt("PRAGMA freelist_count"));
-    if (free_count == 0) return absl::OkStatus();
-    DSG_RETURN_IF_ERROR(Query(db, kGivePagesBack).Run());
+// Those that nothing refers to any more; one of the newest revisions may be about to be referred
+// to. They go on counting in the digests of the revisions that are kept.
+absl::Status DropAssets(Database& db, const StopCheck& stop, Compaction* work) {
+  DSG_ASSIGN_OR_RETURN(std::vector<StoredAsset> assets, ListAssets(db));
+  std::erase_if(assets,
+                [&](const StoredAsset& asset) { return asset.rev_from >= work->keep_from; });
+  if (assets.empty()) return absl::OkStatus();
+  DSG_ASSIGN_OR_RETURN(const std::set<Sha256> used, ReadReferences(db));
+  for (const StoredAsset& asset : assets) {
+    if (used.contains(asset.sha256)) continue;
+    DSG_RETURN_IF_ERROR(InTransaction(db, [&] { return DropAsset(db, asset); }));
+    ++work->report.asset_count;
     CopyLogBack(db);
+    // After a step: finding out took the time of many.
+    DSG_RETURN_IF_ERROR(AskStop(stop));
   }
+  return absl::OkStatus();
 }
 
 }  // namespace
 
-absl::Status CompactMap(Database& db, Revision keep_from, const StopCheck& stop,
-                        const Progress& progress, CompactReport* report) {
+absl::Status CompactMap(Database& db, const StopCheck& stop, const Progress& progress,
+                        Compaction* work) {
   const auto tell = [&](double fraction) {
     if (progress) progress(fraction);
   };
-  DSG_RETURN_IF_ERROR(CloseRevisions(db, keep_from, report));
-  double done = 0.1;
-  tell(done);
-  for (const HistoryTable& table : kHistories) {
-    DSG_RETURN_IF_ERROR(DropRows(db, table, keep_from, stop, report));
-    tell(done += 0.12);
+  DSG_RETURN_IF_ERROR(CloseRevisions(db, work->keep_from, &work->report));
+  for (; work->table < std::size(kHistories); ++work->table, work->after = 0) {
+    tell(0.1 + 0.8 * static_cast<double>(work->table) / std::size(kHistories));
+    DSG_RETURN_IF_ERROR(DropRows(db, kHistories[work->table], stop, work));
   }
   // Last: rows that are still there may need the marks to be understood.
-  DSG_RETURN_IF_ERROR(Query(db, kDropMarks).Bind(keep_from).Run());
-  report->row_count += db.changed_row_count();
+  DSG_RETURN_IF_ERROR(Query(db, kDropMarks).Bind(work->keep_from).Run());
+  work->report.row_count += db.changed_row_count();
+  DSG_RETURN_IF_ERROR(DropAssets(db, stop, work));
   DSG_RETURN_IF_ERROR(GivePagesBack(db, stop));
   tell(0.95);
-  report->is_shrunk = db.Checkpoint(/*truncate=*/true);
+  work->report.is_shrunk = db.Checkpoint(/*truncate=*/true);
   tell(1.0);
   return absl::OkStatus();
 }

@@ -30,7 +30,10 @@ constexpr char kReadPragmas[] =
 constexpr char kWritePragmas[] =
     "PRAGMA busy_timeout=5000; PRAGMA mmap_size=0; PRAGMA cell_size_check=ON;"
     "PRAGMA cache_size=-65536; PRAGMA temp_store=MEMORY; PRAGMA wal_autocheckpoint=0;"
-    "PRAGMA synchronous=FULL; PRAGMA journal_size_limit=67108864;";
+    "PRAGMA synchronous=FULL; PRAGMA journal_size_limit=67108864; PRAGMA secure_delete=ON;";
+
+// Of SQLite's virtual machine; some tenths of a millisecond.
+constexpr int kStepsPerQuestion = 20'000;
 
 int OnWalCommit(void* pages, sqlite3*, const char*, int wal_pages) {
   *static_cast<int*>(pages) = wal_pages;
@@ -97,6 +100,30 @@ absl::Status Database::WriteAnew() {
   absl::Status status = Execute("PRAGMA auto_vacuum=INCREMENTAL; VACUUM");
   sqlite3_limit(db_, SQLITE_LIMIT_ATTACHED, 0);
   return status;
+}
+
+absl::Status Database::CopyInto(const std::string& path, const std::function<bool()>& goes_on) {
+  DSG_ASSIGN_OR_RETURN(const int64_t vacuum_mode, QueryInt("PRAGMA auto_vacuum"));
+  // Of a database that has another mode already this one would be a change to itself.
+  if (vacuum_mode == 0) DSG_RETURN_IF_ERROR(Execute("PRAGMA auto_vacuum=INCREMENTAL"));
+  sqlite3_limit(db_, SQLITE_LIMIT_ATTACHED, 1);
+  sqlite3_progress_handler(
+      db_, kStepsPerQuestion,
+      [](void* ask) { return (*static_cast<const std::function<bool()>*>(ask))() ? 0 : 1; },
+      const_cast<std::function<bool()>*>(&goes_on));
+  absl::Status status = Query(*this, "VACUUM INTO ?1").Bind(path).Run();
+  sqlite3_progress_handler(db_, 0, nullptr, nullptr);
+  sqlite3_limit(db_, SQLITE_LIMIT_ATTACHED, 0);
+  return status;
+}
+
+absl::Status Database::SetSchemaVersion() {
+  const OpenTables open(this);
+  return Execute("PRAGMA schema_version=1");
+}
+
+void Database::SetDefensive(bool is_defensive) {
+  sqlite3_db_config(db_, SQLITE_DBCONFIG_DEFENSIVE, is_defensive ? 1 : 0, nullptr);
 }
 
 int64_t Database::changed_row_count() const { return sqlite3_changes64(db_); }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -48,6 +49,23 @@ class Database {
   /// Writes the whole file anew, so that it holds no free pages and can shrink in steps later.
   /// Needs room for a second copy while it runs.
   absl::Status WriteAnew();
+  /// Writes all that is in the database now to a new file, without free pages and ready to shrink
+  /// in steps. Asks `goes_on` often, and gives up when it says false.
+  absl::Status CopyInto(const std::string& path, const std::function<bool()>& goes_on);
+  /// While it lives, tables can be written that SQLite keeps for itself, such as the nodes of
+  /// R*Trees.
+  class OpenTables {
+   public:
+    explicit OpenTables(Database* db) : db_(*db) { db_.SetDefensive(false); }
+    ~OpenTables() { db_.SetDefensive(true); }
+    OpenTables(const OpenTables&) = delete;
+    OpenTables& operator=(const OpenTables&) = delete;
+
+   private:
+    Database& db_;
+  };
+  /// Sets the counter of changes to the tables back, so that equal content is equal bytes.
+  absl::Status SetSchemaVersion();
   /// Pages in the write-ahead log after the last commit.
   int wal_pages() const { return wal_pages_; }
 
@@ -63,6 +81,7 @@ class Database {
  private:
   friend class Query;
   Database() = default;
+  void SetDefensive(bool is_defensive);
   /// From the cache, or freshly prepared when the cached one is in use.
   sqlite3_stmt* Take(const char* sql, bool* owned);
 

@@ -8,6 +8,7 @@
 #include <sys/vfs.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -26,15 +27,6 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string Errno() { return std::strerror(errno); }
-
-// fs::create_directory may throw only without the error code overloads used here.
-absl::Status SyncFolder(const std::string& folder) {
-  const int fd = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  const bool synced = fd >= 0 && fsync(fd) == 0;
-  if (fd >= 0) close(fd);
-  if (synced) return absl::OkStatus();
-  return absl::InternalError(absl::StrCat("cannot sync folder ", folder, ": ", Errno()));
-}
 
 absl::Status FillNewDatabase(Database& db, const MapSpec& spec) {
   DSG_RETURN_IF_ERROR(db.Execute("BEGIN IMMEDIATE"));
@@ -92,12 +84,25 @@ absl::Status CheckNewestFormat(Database& db, const std::string& path) {
 
 }  // namespace
 
+absl::Status SyncFolder(const std::string& folder) {
+  const int fd = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const bool synced = fd >= 0 && fsync(fd) == 0;
+  if (fd >= 0) close(fd);
+  if (synced) return absl::OkStatus();
+  return absl::InternalError(absl::StrCat("cannot sync folder ", folder, ": ", Errno()));
+}
+
 absl::Status SyncFile(const std::string& path) {
   const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC);
   const bool synced = fd >= 0 && fsync(fd) == 0;
   if (fd >= 0) close(fd);
   if (synced) return absl::OkStatus();
   return absl::InternalError(absl::StrCat("cannot sync ", path, ": ", Errno()));
+}
+
+absl::Status CheckFormat(Database& db) {
+  DSG_RETURN_IF_ERROR(CheckKnownFormat(db, db.path()));
+  return CheckNewestFormat(db, db.path());
 }
 
 std::string MapFolder(const std::string& store_folder, const std::string& map) {
@@ -237,6 +242,24 @@ int64_t BytesOnDisk(const std::string& store_folder, const std::string& map) {
     if (stat((MapFolder(store_folder, map) + name).c_str(), &info) == 0) bytes += info.st_size;
   }
   return bytes;
+}
+
+std::vector<std::string> ListOtherFiles(const std::string& store_folder, const std::string& map) {
+  constexpr std::string_view kOwn[] = {"graph.db", "graph.db-wal", "graph.db-shm", "writer.lock",
+                                       "reserve"};
+  std::vector<std::string> others;
+  std::error_code error;
+  const auto list = [&](const std::string& folder, const auto& is_other) {
+    for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+      if (is_other(it->path().filename().string())) others.push_back(it->path().string());
+    }
+  };
+  list(MapFolder(store_folder, map), [&](const std::string& name) {
+    return std::find(std::begin(kOwn), std::end(kOwn), name) == std::end(kOwn);
+  });
+  list(store_folder, [](const std::string& name) { return name.front() == '.'; });
+  std::sort(others.begin(), others.end());
+  return others;
 }
 
 absl::StatusOr<std::unique_ptr<WriterLock>> WriterLock::Acquire(const std::string& store_folder,

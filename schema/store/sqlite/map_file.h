@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "schema/model/layer.h"
@@ -34,8 +35,14 @@ absl::StatusOr<std::unique_ptr<Database>> OpenMapFile(const std::string& store_f
 absl::StatusOr<std::unique_ptr<Database>> OpenAnyFormat(const std::string& store_folder,
                                                         const std::string& map,
                                                         Database::Mode mode);
+/// Whether it is a map of the format that this program reads and writes.
+/// Errors: FAILED_PRECONDITION/NOT_A_STORE, FORMAT_TOO_NEW or FORMAT_TOO_OLD.
+absl::Status CheckFormat(Database& db);
+
 /// Returns when the file's bytes are on the disk.
 absl::Status SyncFile(const std::string& path);
+/// The same for the names in a folder.
+absl::Status SyncFolder(const std::string& folder);
 
 absl::StatusOr<MapSpec> ReadMapSpec(Database& db);
 
@@ -51,6 +58,10 @@ std::optional<FileIdentity> IdentityOf(const std::string& store_folder, const st
 
 /// Bytes of the database, its write-ahead log and the lock file.
 int64_t BytesOnDisk(const std::string& store_folder, const std::string& map);
+
+/// Files beside those of the map, and copies under way in the store's folder, whoever makes them.
+/// Order: by path.
+std::vector<std::string> ListOtherFiles(const std::string& store_folder, const std::string& map);
 
 /// Held by the one process that may write a map; released when destroyed or when the process ends,
 /// however it ends.

@@ -2,6 +2,7 @@
 #include "schema/store/sqlite/map_reader.h"
 
 #include "absl/strings/str_cat.h"
+#include "schema/store/sqlite/copy.h"
 #include "schema/store/sqlite/sessions.h"
 #include "schema/store/sqlite/tags.h"
 
@@ -64,10 +65,22 @@ absl::StatusOr<SqliteMapReader::Lease> SqliteMapReader::LeaseConnection() {
     }
   }
   DSG_ASSIGN_OR_RETURN(auto db, OpenMapFile(store_folder_, spec_.name, Database::Mode::kRead));
-  return Lease(this, std::move(db));
+  // Connections to the old file and to the new would answer one question from two maps.
+  if (IdentityOf(store_folder_, spec_.name) == identity_) return Lease(this, std::move(db));
+  return MakeError(Reason::kMapReplaced,
+                   absl::StrCat("the file of map \"", spec_.name,
+                                "\" was replaced while it was read; ask again"),
+                   {{"map", spec_.name}});
 }
 
-absl::StatusOr<SqliteMapReader::State> SqliteMapReader::Refresh() {
+bool SqliteMapReader::IsCurrent() const {
+  if (is_rewritten_.load() || IdentityOf(store_folder_, spec_.name) != identity_) return false;
+  // If that fails, so will the question that comes next, and say why.
+  Refresh().IgnoreError();
+  return !is_rewritten_.load();
+}
+
+absl::StatusOr<SqliteMapReader::State> SqliteMapReader::Refresh() const {
   const std::lock_guard lock(head_mutex_);
   DSG_ASSIGN_OR_RETURN(const int64_t version, watcher_->QueryInt("PRAGMA data_version"));
   if (state_.head == nullptr || version != data_version_) {
@@ -144,6 +157,14 @@ absl::StatusOr<SessionState> SqliteMapReader::GetSession(const std::string& sess
 absl::StatusOr<VerifyReport> SqliteMapReader::Verify(const std::function<void(double)>& progress) {
   DSG_ASSIGN_OR_RETURN(Lease lease, LeaseConnection());
   return VerifyMap(*lease, spec_, progress);
+}
+
+absl::Status SqliteMapReader::CopyTo(const std::string& path, const StopCheck& stop,
+                                     const Progress& progress) {
+  // Not one of the pool: what it is set to for copying stays with it.
+  DSG_ASSIGN_OR_RETURN(const auto db,
+                       OpenMapFile(store_folder_, spec_.name, Database::Mode::kRead));
+  return CopyMap(*db, path, stop, progress);
 }
 
 absl::StatusOr<std::shared_ptr<const Track>> SqliteMapReader::GetTrack(NodeId agent,

@@ -24,9 +24,7 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
                                                                size_t cache_bytes);
 
   const MapSpec& spec() const override { return spec_; }
-  bool IsCurrent() const override {
-    return !is_rewritten_.load() && IdentityOf(store_folder_, spec_.name) == identity_;
-  }
+  bool IsCurrent() const override;
   absl::StatusOr<RevisionInfo> Head() override;
   absl::StatusOr<std::shared_ptr<const Snapshot>> Latest() override;
   absl::StatusOr<std::shared_ptr<const Snapshot>> At(Revision revision) override;
@@ -37,6 +35,8 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
                                          const StopCheck& stop) override;
   absl::StatusOr<SessionState> GetSession(const std::string& session_id) override;
   absl::StatusOr<VerifyReport> Verify(const std::function<void(double)>& progress) override;
+  absl::Status CopyTo(const std::string& path, const StopCheck& stop,
+                      const Progress& progress) override;
 
   /// A connection for the length of one call; goes back to the pool when dropped.
   class Lease {
@@ -73,7 +73,7 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
     std::shared_ptr<const sqlite::Head> head;
     std::shared_ptr<const Readable> readable;
   };
-  absl::StatusOr<State> Refresh();
+  absl::StatusOr<State> Refresh() const;
 
   SqliteMapReader(std::string store_folder, size_t cache_bytes)
       : store_folder_(std::move(store_folder)),
@@ -86,14 +86,14 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
   MapSpec spec_;
   std::optional<FileIdentity> identity_;
 
-  std::mutex head_mutex_;
+  mutable std::mutex head_mutex_;
   /// Watches for commits of other connections: SQLite counts them for us (data_version).
   std::unique_ptr<Database> watcher_;
-  int64_t data_version_ = -1;
-  State state_;
+  mutable int64_t data_version_ = -1;
+  mutable State state_;
   /// Of the map when it was opened.
   int64_t generation_ = 0;
-  std::atomic<bool> is_rewritten_ = false;
+  mutable std::atomic<bool> is_rewritten_ = false;
 
   std::mutex pool_mutex_;
   std::vector<std::unique_ptr<Database>> pool_;

@@ -64,6 +64,43 @@ bool IsForeignHeader(const char* page) {
   return !is_map || is_newer;
 }
 
+uint32_t BigEndian16(const char* bytes) {
+  return static_cast<uint32_t>(static_cast<uint8_t>(bytes[0]) << 8 |
+                               static_cast<uint8_t>(bytes[1]));
+}
+
+// Maps of pointers stand at fixed places in files that can shrink: after each comes a page for each
+// of its entries of five bytes.
+bool IsPointerMap(sqlite3_int64 offset) {
+  const sqlite3_int64 number = offset / kPageBytes + 1;
+  return number >= 2 && (number - 2) % (kSealedBytes / 5 + 1) == 0;
+}
+
+// Other pages begin with the number of a page, if not with zeros: below this size, its first byte
+// is none that a page of a tree begins with.
+constexpr sqlite3_int64 kPlainFileBytesMax = (sqlite3_int64{1} << 24) * kPageBytes;
+
+// A page of a tree has its header and the places of its cells at the front, and the cells at the
+// back. Between them is nothing, but what SQLite left there: zeroes it.
+void WipeGap(sqlite3_file* below, char* page, sqlite3_int64 offset) {
+  const size_t header = offset == 0 ? 100 : 0;
+  const char kind = page[header];
+  const bool is_leaf = kind == 10 || kind == 13;
+  if ((!is_leaf && kind != 2 && kind != 5) || IsPointerMap(offset)) return;
+  sqlite3_int64 size = 0;
+  if (below->pMethods->xFileSize(below, &size) != SQLITE_OK || size > kPlainFileBytesMax) return;
+  const size_t places = header + (is_leaf ? 8 : 12);
+  const size_t count = BigEndian16(page + header + 3);
+  const size_t begin = places + 2 * count;
+  const size_t end = BigEndian16(page + header + 5);
+  if (end > static_cast<size_t>(kSealedBytes) || begin >= end) return;
+  for (size_t i = 0; i < count; ++i) {
+    const size_t cell = BigEndian16(page + places + 2 * i);
+    if (cell < end || cell >= static_cast<size_t>(kSealedBytes)) return;
+  }
+  std::memset(page + begin, 0, end - begin);
+}
+
 int Close(sqlite3_file* file) { return Below(file)->pMethods->xClose(Below(file)); }
 
 int Read(sqlite3_file* file, void* buffer, int size, sqlite3_int64 offset) {
@@ -85,6 +122,7 @@ int Write(sqlite3_file* file, const void* buffer, int size, sqlite3_int64 offset
   }
   char page[kPageBytes];
   std::memcpy(page, buffer, kSealedBytes);
+  WipeGap(Below(file), page, offset);
   const int64_t seal = SealOf(page, offset);
   std::memcpy(page + kSealedBytes, &seal, sizeof(seal));
   return Below(file)->pMethods->xWrite(Below(file), page, size, offset);

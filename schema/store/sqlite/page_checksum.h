@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A file layer under SQLite that seals every page of a map with a checksum and never hands out a
 // page whose seal is broken. SQLite itself notices few flipped bits, and rows cannot vouch for
-// what is missing around them: indexes, R*Trees, counts.
+// what is missing around them: indexes, R*Trees, counts. And SQLite leaves old bytes in the unused
+// middle of pages, where rows have been moved; they are wiped here.
 #pragma once
 
 struct sqlite3;

@@ -108,6 +108,20 @@ absl::Status InsertRevision(const CommitContext& commit) {
       .Run();
 }
 
+absl::Status UpdateRevision(Database& db, const Head& head) {
+  const RevisionInfo& info = head.info;
+  const std::string content = head.content.bytes();
+  return Query(db,
+               "UPDATE revision SET digest = ?2, content = ?3, node_count = ?4, edge_count = ?5,"
+               " agent_count = ?6, pose_count = ?7, stay_count = ?8, mesh_block_count = ?9,"
+               " first_pose_ns = ?10, last_pose_ns = ?11, layer_counts = ?12 WHERE revision = ?1")
+      .Bind(info.revision, Query::BlobView{View(info.digest)}, Query::BlobView{content},
+            info.node_count, info.edge_count, info.agent_count, info.pose_count, info.stay_count,
+            info.mesh_block_count, head.first_pose_ns, head.last_pose_ns,
+            FormatCounts(head.layer_counts))
+      .Run();
+}
+
 absl::Status InsertTouched(CommitContext* commit) {
   commit->touched.Normalize();
   const std::string payload = EncodeTouched(commit->touched);

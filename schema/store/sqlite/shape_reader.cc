@@ -17,8 +17,11 @@ TimeNs LookBack(TimeNs from_ns) {
 }  // namespace
 
 absl::StatusOr<std::string> ShapeReader::LoadPayload(const Segment& segment) {
-  Query query(db_, "SELECT checksum, payload FROM shape_segment WHERE id = ?1");
-  const bool found = query.Bind(segment.row_id).Next();
+  Query query(db_,
+              "SELECT checksum, payload FROM shape_segment WHERE id = ?1 AND rev_from = ?2"
+              " UNION ALL SELECT checksum, payload FROM shape_history"
+              " WHERE id = ?1 AND rev_from = ?2");
+  const bool found = query.Bind(segment.row_id, segment.rev_from).Next();
   DSG_RETURN_IF_ERROR(query.status());
   const int64_t agent = KeyOf(question_.agent);
   if (!found || query.Int(0) !=
@@ -63,7 +66,7 @@ const ShapeReader::Segment& ShapeReader::Pass(TimeNs time_ns, size_t* index) {
 }
 
 absl::StatusOr<std::shared_ptr<const DecodedShapes>> ShapeReader::Decode(const Segment& segment) {
-  const ShapeKey key{segment.row_id, question_.with_vertices};
+  const ShapeKey key{segment.row_id, segment.rev_from, question_.with_vertices};
   auto cached = cache_.Find(key);
   if (cached != nullptr) return cached;
   DSG_ASSIGN_OR_RETURN(const std::string payload, LoadPayload(segment));
@@ -76,9 +79,10 @@ absl::StatusOr<std::shared_ptr<const DecodedShapes>> ShapeReader::Decode(const S
 }
 
 absl::StatusOr<bool> ShapeReader::Show(const Segment& segment, size_t index, const Visit& visit) {
-  if (segment.row_id != decoded_id_) {
+  if (segment.row_id != decoded_id_ || segment.rev_from != decoded_rev_from_) {
     DSG_ASSIGN_OR_RETURN(decoded_, Decode(segment));
     decoded_id_ = segment.row_id;
+    decoded_rev_from_ = segment.rev_from;
   }
   return visit({decoded_->shapes[index], decoded_->vertex_counts[index], decoded_->topology});
 }
@@ -87,6 +91,9 @@ absl::Status ShapeReader::Read(const StopCheck& stop, const Visit& visit) {
   Query rows(db_,
              "SELECT id, rev_from, t0, t1 FROM shape_segment"
              " WHERE agent = ?1 AND rev_from <= ?2 AND t0 >= ?3 AND t0 < ?5 AND t1 >= ?4"
+             " UNION ALL SELECT id, rev_from, t0, t1 FROM shape_history"
+             " WHERE agent = ?1 AND rev_from <= ?2 AND rev_to > ?2 AND t0 >= ?3 AND t0 < ?5"
+             "  AND t1 >= ?4"
              " ORDER BY t0");
   rows.Bind(KeyOf(question_.agent), question_.revision, LookBack(question_.from_ns),
             question_.from_ns, question_.to_ns);

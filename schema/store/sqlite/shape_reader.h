@@ -15,14 +15,17 @@
 
 namespace dsg::sqlite {
 
+/// Row ids are given again once their rows are history.
 struct ShapeKey {
   int64_t row_id;
+  Revision rev_from;
   bool with_vertices;
   bool operator==(const ShapeKey&) const = default;
 };
 struct ShapeKeyHash {
   size_t operator()(const ShapeKey& key) const {
-    return std::hash<int64_t>()(key.row_id * 2 + (key.with_vertices ? 1 : 0));
+    return std::hash<int64_t>()((key.row_id * 1'000'003 + key.rev_from) * 2 +
+                                (key.with_vertices ? 1 : 0));
   }
 };
 
@@ -76,6 +79,7 @@ class ShapeReader {
   std::vector<Segment> reached_;
   /// The segment shown last.
   int64_t decoded_id_ = -1;
+  Revision decoded_rev_from_ = 0;
   std::shared_ptr<const DecodedShapes> decoded_;
 };
 

@@ -74,7 +74,9 @@ absl::StatusOr<std::vector<PoseFactor>> SqliteSnapshot::Factors(NodeId agent, Ti
   DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
   Query query(*lease,
               "SELECT rev_from, t0, t1, checksum, payload FROM factor_segment"
-              " WHERE agent = ?1 AND rev_from <= ?2 AND t0 < ?4 AND t1 >= ?3");
+              " WHERE agent = ?1 AND rev_from <= ?2 AND t0 < ?4 AND t1 >= ?3"
+              " UNION ALL SELECT rev_from, t0, t1, checksum, payload FROM factor_history"
+              " WHERE agent = ?1 AND rev_from <= ?2 AND rev_to > ?2 AND t0 < ?4 AND t1 >= ?3");
   query.Bind(KeyOf(agent), revision(), from_ns, to_ns);
   std::vector<PoseFactor> factors;
   while (query.Next()) {

@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "schema/base/log.h"
 #include "schema/store/graph_store.h"
+#include "schema/store/sqlite/copy.h"
 #include "schema/store/sqlite/map_reader.h"
 #include "schema/store/sqlite/upgrade.h"
 
@@ -19,6 +20,8 @@ class SqliteStore : public GraphStore {
  public:
   SqliteStore(std::string folder, StoreOptions options)
       : folder_(std::move(folder)), options_(std::move(options)) {}
+
+  const std::string& folder() const override { return folder_; }
 
   absl::StatusOr<std::vector<MapSpec>> ListMaps() override {
     std::vector<MapSpec> maps;
@@ -63,8 +66,12 @@ class SqliteStore : public GraphStore {
     return sqlite::UpgradeMapFile(folder_, name, options_.program);
   }
 
+  absl::Status InstallMap(const std::string& name, const std::string& file, bool replace) override {
+    return sqlite::InstallMapFile(folder_, name, file, replace, options_.program);
+  }
+
   absl::StatusOr<std::unique_ptr<MapWriter>> OpenWriter(const std::string& name) override {
-    DSG_ASSIGN_OR_RETURN(auto writer, sqlite::SqliteWriter::Open(folder_, name, options_.program));
+    DSG_ASSIGN_OR_RETURN(auto writer, sqlite::SqliteWriter::Open(folder_, name, options_));
     return std::unique_ptr<MapWriter>(std::move(writer));
   }
 

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
+// Tracks that grow at their ends. Corrections: track_correction.cc.
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
-#include "schema/store/sqlite/commit.h"
+#include "schema/store/sqlite/track_writer_internal.h"
 
 namespace dsg::sqlite {
 namespace {
@@ -10,11 +11,7 @@ namespace {
 // Tracks kept open between commits; beyond, all are reloaded when needed.
 constexpr size_t kOpenTracksMax = 2000;
 
-struct SegmentRow {
-  int64_t id = 0;
-  Revision rev_from = 0;
-  std::vector<StoredPose> poses;
-};
+}  // namespace
 
 absl::StatusOr<SegmentRow> DecodeSegmentRow(Query& query, const MapSpec& spec) {
   SegmentRow row;
@@ -29,34 +26,6 @@ absl::StatusOr<SegmentRow> DecodeSegmentRow(Query& query, const MapSpec& spec) {
   }
   return row;
 }
-
-constexpr char kSelectLast[] =
-    "SELECT id, rev_from, t0, t1, pose_count, checksum, payload FROM trajectory_segment"
-    " WHERE id BETWEEN ?1 AND ?2 ORDER BY id DESC LIMIT 1";
-
-void Grow(const StoredPose& pose, TrajectoryCodec codec, Box3d* box) {
-  box->extend(PositionOf(pose, codec));
-}
-
-}  // namespace
-
-/// The open end of a track.
-struct TrackWriter::Tail {
-  NodeId agent;
-  int64_t slot = 0;
-  int64_t pose_count = 0;
-  /// The last pose of the track, if there is one.
-  std::optional<StoredPose> last;
-  SegmentEncoder encoder{TrajectoryCodec::kQuantized};
-  /// Row of the segment in `encoder`; 0 until it has one.
-  int64_t segment_id = 0;
-  bool segment_stored = false;
-  Revision segment_rev_from = 0;
-  int64_t previous_segment_id = 0;
-  /// Bounds of the segment's poses and of the way from the pose before.
-  Box3d box;
-  TimeNs box_t0 = 0;
-};
 
 TrackWriter::TrackWriter() = default;
 TrackWriter::~TrackWriter() = default;
@@ -216,92 +185,6 @@ absl::Status TrackWriter::Append(const TrajectoryAppend& append, CommitContext* 
   head.first_pose_ns = std::min(head.first_pose_ns.value_or(first_ns), first_ns);
   head.last_pose_ns = std::max(head.last_pose_ns.value_or(last_ns), last_ns);
   return WriteMark(*tail, commit);
-}
-
-// Moves all segments that end at or after `from_ns` to the history and hands out their poses.
-absl::Status TrackWriter::TakeSegmentsFrom(TimeNs from_ns, Tail* tail,
-                                           std::vector<StoredPose>* poses, CommitContext* commit) {
-  std::vector<SegmentRow> rows;
-  {
-    Query query(commit->db,
-                "SELECT id, rev_from, t0, t1, pose_count, checksum, payload"
-                " FROM trajectory_segment WHERE id BETWEEN ?1 AND ?2 AND t1 >= ?3 ORDER BY id");
-    query.Bind(FirstSegmentId(tail->slot), LastSegmentId(tail->slot), from_ns);
-    while (query.Next()) {
-      DSG_ASSIGN_OR_RETURN(SegmentRow row, DecodeSegmentRow(query, commit->spec));
-      rows.push_back(std::move(row));
-    }
-    DSG_RETURN_IF_ERROR(query.status());
-  }
-  for (SegmentRow& row : rows) {
-    // A row of this very revision was never visible, so history need not know it.
-    DSG_RETURN_IF_ERROR(Query(commit->db,
-                              "INSERT INTO trajectory_history"
-                              " SELECT id, rev_from, ?2, t0, t1, pose_count, checksum, payload"
-                              " FROM trajectory_segment WHERE id = ?1 AND rev_from < ?2")
-                            .Bind(row.id, commit->revision())
-                            .Run());
-    DSG_RETURN_IF_ERROR(
-        Query(commit->db, "DELETE FROM trajectory_segment WHERE id = ?1").Bind(row.id).Run());
-    DSG_RETURN_IF_ERROR(
-        Query(commit->db, "DELETE FROM segment_box WHERE id = ?1").Bind(row.id).Run());
-    tail->pose_count -= static_cast<int64_t>(row.poses.size());
-    poses->insert(poses->end(), std::make_move_iterator(row.poses.begin()),
-                  std::make_move_iterator(row.poses.end()));
-  }
-  return absl::OkStatus();
-}
-
-// Rewrites the track from the first corrected segment to its end: what lies outside of the
-// correction is kept, and links between segments and their boxes stay right without special cases.
-absl::Status TrackWriter::Correct(const TrajectoryCorrection& correction, CommitContext* commit) {
-  tails_.erase(correction.agent);
-  const TrajectoryCodec codec = commit->spec.codec;
-  DSG_ASSIGN_OR_RETURN(const Tail* const loaded, LoadTail(correction.agent, commit));
-  Tail tail;
-  tail.agent = correction.agent;
-  tail.slot = loaded->slot;
-  tail.pose_count = loaded->pose_count;
-  tail.encoder = SegmentEncoder(codec);
-  tails_.erase(correction.agent);
-  std::vector<StoredPose> poses;
-  DSG_RETURN_IF_ERROR(TakeSegmentsFrom(correction.from_ns, &tail, &poses, commit));
-  std::string scratch;
-  std::erase_if(poses, [&](const StoredPose& pose) {
-    const bool replaced = correction.from_ns <= pose.time_ns && pose.time_ns < correction.to_ns;
-    if (replaced) {
-      commit->head.content.Remove(PoseIdentity(correction.agent, pose, codec, &scratch));
-      --commit->head.info.pose_count;
-    }
-    return replaced;
-  });
-  for (const TimedPose& pose : correction.poses) {
-    poses.push_back(ToStored(pose, codec));
-    commit->head.content.Add(PoseIdentity(correction.agent, poses.back(), codec, &scratch));
-    ++commit->head.info.pose_count;
-  }
-  std::sort(poses.begin(), poses.end(),
-            [](const StoredPose& a, const StoredPose& b) { return a.time_ns < b.time_ns; });
-  DSG_RETURN_IF_ERROR(LoadOpenSegment(&tail, commit));
-  // The segment before stays as it is: begin a new one.
-  tail.encoder = SegmentEncoder(codec);
-  for (const StoredPose& pose : poses) DSG_RETURN_IF_ERROR(AppendPose(pose, &tail, commit));
-  if (!tail.encoder.empty()) DSG_RETURN_IF_ERROR(WriteSegment(&tail, commit));
-  DSG_RETURN_IF_ERROR(WriteMark(tail, commit));
-  Query span(commit->db, "SELECT min(t0), max(t1) FROM trajectory_segment");
-  const bool any = span.Next() && !span.IsNull(0);
-  DSG_RETURN_IF_ERROR(span.status());
-  commit->head.first_pose_ns = any ? std::optional<TimeNs>(span.Int(0)) : std::nullopt;
-  commit->head.last_pose_ns = any ? std::optional<TimeNs>(span.Int(1)) : std::nullopt;
-  return absl::OkStatus();
-}
-
-absl::Status TrackWriter::End(NodeId agent, CommitContext* commit) {
-  Query known(commit->db, "SELECT 1 FROM track WHERE agent = ?1");
-  const bool has_track = known.Bind(KeyOf(agent)).Next();
-  DSG_RETURN_IF_ERROR(known.status());
-  if (!has_track) return absl::OkStatus();
-  return Correct({agent, kTimeMin, kTimeMax, {}}, commit);
 }
 
 }  // namespace dsg::sqlite

@@ -209,9 +209,15 @@ class Verifier {
 
   void CheckBatches() {
     for (const auto& [sql, table, name] :
-         {std::make_tuple("SELECT agent, rev_from, t0, t1, checksum, payload FROM factor_segment",
+         {std::make_tuple("SELECT agent, rev_from, t0, t1, checksum, payload, 9223372036854775807"
+                          " FROM factor_segment UNION ALL"
+                          " SELECT agent, rev_from, t0, t1, checksum, payload, rev_to"
+                          " FROM factor_history",
                           'F', "factor_segment"),
-          std::make_tuple("SELECT agent, rev_from, t0, t1, checksum, payload FROM shape_segment",
+          std::make_tuple("SELECT agent, rev_from, t0, t1, checksum, payload, 9223372036854775807"
+                          " FROM shape_segment UNION ALL"
+                          " SELECT agent, rev_from, t0, t1, checksum, payload, rev_to"
+                          " FROM shape_history",
                           'H', "shape_segment")}) {
       Query query(db_, sql);
       while (query.Next()) {
@@ -221,7 +227,7 @@ class Verifier {
             query.Int(4) == RowChecksum(columns, query.Blob(5)) &&
             (table != 'H' || HoldsTimes(query.Blob(5), query.Int(2), query.Int(3)));
         if (!is_sound) BadRow(name, ToString(IdOf(query.Int(0))));
-        Count(RowIdentity(table, columns, query.Blob(5)), query.Int(1), kRevisionMax);
+        Count(RowIdentity(table, columns, query.Blob(5)), query.Int(1), query.Int(6));
       }
       Finish(query, name);
     }
@@ -256,6 +262,11 @@ class Verifier {
       }
     }
     Finish(query, "asset");
+    Query dropped(db_, "SELECT rev_from, sha256 FROM dropped_asset");
+    while (dropped.Next()) {
+      Count(RowIdentity('A', {dropped.Int(0)}, dropped.Blob(1)), dropped.Int(0), kRevisionMax);
+    }
+    Finish(dropped, "dropped_asset");
   }
 
   void CheckLayers() {

@@ -6,8 +6,9 @@
 #include "absl/strings/str_cat.h"
 #include "schema/base/time.h"
 #include "schema/model/delta_check.h"
-#include "schema/store/sqlite/compaction.h"
 #include "schema/store/sqlite/delta_lookup.h"
+#include "schema/store/sqlite/erasure.h"
+#include "schema/store/sqlite/page_checksum.h"
 #include "schema/store/sqlite/readable.h"
 #include "schema/store/sqlite/sessions.h"
 #include "schema/store/sqlite/tags.h"
@@ -16,19 +17,45 @@ namespace dsg::sqlite {
 namespace {
 
 // The log is copied back when it has grown to 16 MiB: often enough for short reads, seldom enough
-// that commits do not wait for it.
-constexpr int kCheckpointPages = 4096;
+// that commits do not wait for it. In a small map it must not outgrow the map.
+constexpr int64_t kCheckpointPages = 4096;
+constexpr int64_t kCheckpointPagesMin = 64;
+
+int CheckpointPages(int64_t quota_bytes) {
+  if (quota_bytes <= 0) return kCheckpointPages;
+  return static_cast<int>(
+      std::clamp(quota_bytes / kPageBytes / 4, kCheckpointPagesMin, kCheckpointPages));
+}
+
+absl::Status CheckForgetting(const GraphDelta& delta) {
+  const bool brings_nothing = delta.layers.empty() && delta.labels.empty() && delta.nodes.empty() &&
+                              delta.edges.empty() && delta.appends.empty() &&
+                              delta.factors.empty() && delta.shapes.empty() && delta.assets.empty();
+  if (!delta.is_forgetting || brings_nothing) return absl::OkStatus();
+  return MakeError(Reason::kDeltaInvalid,
+                   "delta refused: it says that it forgets, and brings layers, labels, nodes, "
+                   "edges, poses, factors, shapes or assets; commit these apart");
+}
 
 }  // namespace
 
+SqliteWriter::SqliteWriter(const std::string& store_folder, const std::string& map,
+                           const StoreOptions& options)
+    : store_folder_(store_folder),
+      map_(map),
+      reserve_(MapFolder(store_folder, map), options.reserve_bytes),
+      quota_bytes_(options.quota_bytes),
+      checkpoint_pages_(CheckpointPages(options.quota_bytes)) {}
+
 absl::StatusOr<std::unique_ptr<SqliteWriter>> SqliteWriter::Open(const std::string& store_folder,
                                                                  const std::string& map,
-                                                                 const std::string& program) {
-  std::unique_ptr<SqliteWriter> writer(new SqliteWriter(store_folder, map));
+                                                                 const StoreOptions& options) {
+  std::unique_ptr<SqliteWriter> writer(new SqliteWriter(store_folder, map, options));
   // Look before locking, so that asking for a map that is not there leaves nothing behind.
   DSG_RETURN_IF_ERROR(OpenMapFile(store_folder, map, Database::Mode::kRead).status());
-  DSG_ASSIGN_OR_RETURN(writer->lock_, WriterLock::Acquire(store_folder, map, program));
+  DSG_ASSIGN_OR_RETURN(writer->lock_, WriterLock::Acquire(store_folder, map, options.program));
   DSG_RETURN_IF_ERROR(writer->Reopen());
+  writer->reserve_.Make();
   return writer;
 }
 
@@ -64,7 +91,21 @@ absl::Status SqliteWriter::CheckSequence(const GraphDelta& delta) {
        {"last_sequence", absl::StrCat(session.last_sequence)}});
 }
 
+template <typename Work>
+auto SqliteWriter::WithReserve(const Work& work) -> decltype(work()) {
+  auto result = work();
+  if (ReasonOf(result.status()) == Reason::kDiskFull && reserve_.Release()) result = work();
+  reserve_.Make();
+  return result;
+}
+
 absl::StatusOr<CommitResult> SqliteWriter::Commit(GraphDelta delta) {
+  DSG_RETURN_IF_ERROR(CheckForgetting(delta));
+  if (!delta.is_forgetting) return CommitOnce(std::move(delta));
+  return WithReserve([&] { return CommitOnce(delta); });
+}
+
+absl::StatusOr<CommitResult> SqliteWriter::CommitOnce(GraphDelta delta) {
   if (db_ == nullptr) DSG_RETURN_IF_ERROR(Reopen());
   DSG_ASSIGN_OR_RETURN(const auto replay, FindCommitted(*db_, delta.session_id, delta.sequence));
   if (replay.has_value()) return *replay;
@@ -86,7 +127,9 @@ absl::StatusOr<CommitResult> SqliteWriter::Commit(GraphDelta delta) {
   DSG_RETURN_IF_ERROR(CheckDelta(delta, DeltaLookup(db_.get())));
   DSG_RETURN_IF_ERROR(db_->Execute("BEGIN IMMEDIATE"));
   CommitContext commit{*db_, spec_, head_};
-  const absl::Status applied = Apply(delta, &commit);
+  const auto pages_before = db_->QueryInt("PRAGMA page_count");
+  absl::Status applied = pages_before.ok() ? Apply(delta, &commit) : pages_before.status();
+  if (applied.ok()) applied = CheckQuota(delta, *pages_before);
   if (!applied.ok()) {
     // SQLite may have rolled back already; then this one has nothing to do.
     db_->Execute("ROLLBACK").IgnoreError();
@@ -96,8 +139,21 @@ absl::StatusOr<CommitResult> SqliteWriter::Commit(GraphDelta delta) {
   const absl::Status committed = db_->Execute("COMMIT");
   if (!committed.ok()) return Settle(delta, committed);
   head_ = commit.head;
-  if (db_->wal_pages() > kCheckpointPages) db_->Checkpoint(/*truncate=*/false);
+  if (db_->wal_pages() > checkpoint_pages_) db_->Checkpoint(/*truncate=*/false);
   return CommitResult{head_.info.revision, false};
+}
+
+absl::Status SqliteWriter::CheckQuota(const GraphDelta& delta, int64_t pages_before) {
+  if (quota_bytes_ <= 0 || delta.is_forgetting) return absl::OkStatus();
+  DSG_ASSIGN_OR_RETURN(const int64_t pages, db_->QueryInt("PRAGMA page_count"));
+  // Pages that forgetting left free are used again without growing.
+  if (pages <= pages_before || pages * kPageBytes <= quota_bytes_) return absl::OkStatus();
+  return MakeError(Reason::kQuotaExceeded,
+                   absl::StrCat("map \"", map_, "\" may have ", quota_bytes_,
+                                " bytes and the delta would make it ", pages * kPageBytes,
+                                "; nothing was written: forget something (`dsg prune`, `dsg "
+                                "compact`) or raise the quota"),
+                   {{"map", map_}, {"quota_bytes", absl::StrCat(quota_bytes_)}});
 }
 
 absl::Status SqliteWriter::Apply(const GraphDelta& delta, CommitContext* commit) {
@@ -115,14 +171,21 @@ absl::Status SqliteWriter::Apply(const GraphDelta& delta, CommitContext* commit)
     if (item.valid_to_ns.has_value()) continue;
     DSG_RETURN_IF_ERROR(tracks_.End(item.id, commit));
     DSG_RETURN_IF_ERROR(EndStaysOf(item.id, commit));
+    DSG_RETURN_IF_ERROR(EndFactors({item.id}, commit));
+    DSG_RETURN_IF_ERROR(EndShapes({item.id}, commit));
   }
   DSG_RETURN_IF_ERROR(GraphRowsWriter(commit).Apply(delta));
   for (const auto& correction : delta.corrections) {
     DSG_RETURN_IF_ERROR(tracks_.Correct(correction, commit));
   }
   for (const auto& append : delta.appends) DSG_RETURN_IF_ERROR(tracks_.Append(append, commit));
+  for (const TrackSpan& span : delta.factor_removals) {
+    DSG_RETURN_IF_ERROR(EndFactors(span, commit));
+  }
   DSG_RETURN_IF_ERROR(WriteFactors(delta.factors, commit));
+  for (const TrackSpan& span : delta.shape_removals) DSG_RETURN_IF_ERROR(EndShapes(span, commit));
   DSG_RETURN_IF_ERROR(WriteShapes(delta.shapes, commit));
+  DSG_RETURN_IF_ERROR(EndStays(delta.stay_removals, commit));
   DSG_RETURN_IF_ERROR(WriteStays(delta.stays, commit));
   DSG_RETURN_IF_ERROR(WriteMesh(delta, commit));
   DSG_RETURN_IF_ERROR(InsertTouched(commit));
@@ -163,26 +226,58 @@ absl::StatusOr<Tag> SqliteWriter::SetTag(const std::string& name, Revision revis
   const Tag tag{name, revision, WallClockNs(), note};
   DSG_RETURN_IF_ERROR(CheckTag(tag));
   DSG_RETURN_IF_ERROR(CheckRevision(revision));
+  compaction_.reset();
   DSG_RETURN_IF_ERROR(WriteTag(*db_, tag));
   return tag;
 }
 
 absl::Status SqliteWriter::RemoveTag(const std::string& name) {
   if (db_ == nullptr) DSG_RETURN_IF_ERROR(Reopen());
+  compaction_.reset();
   return DeleteTag(*db_, name);
 }
 
 absl::StatusOr<CompactReport> SqliteWriter::Compact(Revision keep_from, const StopCheck& stop,
                                                     const Progress& progress) {
+  return WithReserve([&] { return CompactOnce(keep_from, stop, progress); });
+}
+
+absl::StatusOr<CompactReport> SqliteWriter::CompactOnce(Revision keep_from, const StopCheck& stop,
+                                                        const Progress& progress) {
   if (db_ == nullptr) DSG_RETURN_IF_ERROR(Reopen());
   DSG_RETURN_IF_ERROR(CheckRevision(keep_from));
   DSG_ASSIGN_OR_RETURN(const Readable readable, LoadReadable(*db_));
-  CompactReport report;
-  report.bytes_before = BytesOnDisk(store_folder_, map_);
   // A tagged revision can be read, but what lies after it may be gone: nothing comes back.
-  DSG_RETURN_IF_ERROR(
-      CompactMap(*db_, std::max(keep_from, readable.oldest), stop, progress, &report));
+  keep_from = std::max(keep_from, readable.oldest);
+  if (!compaction_.has_value() || compaction_->keep_from != keep_from) {
+    compaction_ = Compaction{.keep_from = keep_from};
+    compaction_->report.bytes_before = BytesOnDisk(store_folder_, map_);
+  }
+  DSG_RETURN_IF_ERROR(CompactMap(*db_, stop, progress, &*compaction_));
+  CompactReport report = compaction_->report;
+  compaction_.reset();
   report.bytes_after = BytesOnDisk(store_folder_, map_);
+  return report;
+}
+
+absl::StatusOr<EraseReport> SqliteWriter::Erase(const Erasure& erasure, const StopCheck& stop,
+                                                const Progress& progress) {
+  return WithReserve([&] { return EraseOnce(erasure, stop, progress); });
+}
+
+absl::StatusOr<EraseReport> SqliteWriter::EraseOnce(const Erasure& erasure, const StopCheck& stop,
+                                                    const Progress& progress) {
+  if (db_ == nullptr) DSG_RETURN_IF_ERROR(Reopen());
+  EraseReport report;
+  report.bytes_before = BytesOnDisk(store_folder_, map_);
+  const absl::Status erased = EraseFromMap(*db_, spec_, erasure, stop, progress, &report);
+  // Digests of the past are others now, and tracks that were open may be gone.
+  const absl::Status reopened = Reopen();
+  if (!reopened.ok()) db_.reset();
+  DSG_RETURN_IF_ERROR(erased);
+  DSG_RETURN_IF_ERROR(reopened);
+  report.bytes_after = BytesOnDisk(store_folder_, map_);
+  report.other_files = ListOtherFiles(store_folder_, map_);
   return report;
 }
 

@@ -3,11 +3,14 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
-#include "schema/store/map_writer.h"
+#include "schema/store/graph_store.h"
 #include "schema/store/sqlite/commit.h"
+#include "schema/store/sqlite/compaction.h"
 #include "schema/store/sqlite/map_file.h"
+#include "schema/store/sqlite/reserve.h"
 
 namespace dsg::sqlite {
 
@@ -15,7 +18,7 @@ class SqliteWriter : public MapWriter {
  public:
   static absl::StatusOr<std::unique_ptr<SqliteWriter>> Open(const std::string& store_folder,
                                                             const std::string& map,
-                                                            const std::string& program);
+                                                            const StoreOptions& options);
   ~SqliteWriter() override;
 
   absl::StatusOr<CommitResult> Commit(GraphDelta delta) override;
@@ -25,31 +28,50 @@ class SqliteWriter : public MapWriter {
   absl::Status RemoveTag(const std::string& name) override;
   absl::StatusOr<CompactReport> Compact(Revision keep_from, const StopCheck& stop,
                                         const Progress& progress) override;
+  absl::StatusOr<EraseReport> Erase(const Erasure& erasure, const StopCheck& stop,
+                                    const Progress& progress) override;
 
  private:
-  SqliteWriter(std::string store_folder, std::string map)
-      : store_folder_(std::move(store_folder)), map_(std::move(map)) {}
+  SqliteWriter(const std::string& store_folder, const std::string& map,
+               const StoreOptions& options);
 
   absl::Status Reopen();
   /// Unless the revision can be read.
   absl::Status CheckRevision(Revision revision);
   absl::Status CheckSequence(const GraphDelta& delta);
+  absl::StatusOr<CommitResult> CommitOnce(GraphDelta delta);
   absl::Status Apply(const GraphDelta& delta, CommitContext* commit);
+  /// Of a commit that has been applied and began with so many pages.
+  absl::Status CheckQuota(const GraphDelta& delta, int64_t pages_before);
+  absl::StatusOr<CompactReport> CompactOnce(Revision keep_from, const StopCheck& stop,
+                                            const Progress& progress);
+  absl::StatusOr<EraseReport> EraseOnce(const Erasure& erasure, const StopCheck& stop,
+                                        const Progress& progress);
+  /// Runs `work`, and when the disk is full once again without the reserve.
+  template <typename Work>
+  auto WithReserve(const Work& work) -> decltype(work());
   absl::StatusOr<CommitResult> Settle(const GraphDelta& delta, const absl::Status& failure);
 
   std::string store_folder_;
   std::string map_;
+  Reserve reserve_;
+  int64_t quota_bytes_;
+  int checkpoint_pages_;
   std::unique_ptr<WriterLock> lock_;
   /// Null after a COMMIT whose outcome is unknown, until reopened.
   std::unique_ptr<Database> db_;
   MapSpec spec_;
   Head head_;
   TrackWriter tracks_;
+  /// One that was stopped.
+  std::optional<Compaction> compaction_;
 };
 
 /// The head as stored; revision 0 for an empty map.
 absl::StatusOr<Head> LoadHead(Database& db);
 absl::Status InsertRevision(const CommitContext& commit);
+/// Writes digest, content, counts and times of a record that is there.
+absl::Status UpdateRevision(Database& db, const Head& head);
 /// Columns of the revision table in the order that HeadFromRow reads.
 #define DSG_REVISION_COLUMNS                                                        \
   "revision, digest, content, committed_ns, author, message, session_id, sequence," \

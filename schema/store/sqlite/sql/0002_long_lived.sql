@@ -21,3 +21,46 @@ CREATE TABLE session (
 ) STRICT, WITHOUT ROWID;
 INSERT INTO session
   SELECT session_id, max(sequence), max(revision), min(revision) FROM revision GROUP BY session_id;
+
+-- Shapes and factors that are no longer believed. `id` is that of the row's time as a current one;
+-- it may have been given again since.
+CREATE TABLE shape_history (
+  id INTEGER NOT NULL,
+  agent INTEGER NOT NULL,
+  rev_from INTEGER NOT NULL,
+  rev_to INTEGER NOT NULL,
+  t0 INTEGER NOT NULL,
+  t1 INTEGER NOT NULL,
+  checksum INTEGER NOT NULL,
+  payload BLOB NOT NULL
+) STRICT;
+CREATE UNIQUE INDEX shape_history_id ON shape_history (id, rev_from);
+CREATE INDEX shape_history_agent ON shape_history (agent, t0);
+CREATE INDEX shape_history_rev_to ON shape_history (rev_to);
+
+CREATE TABLE factor_history (
+  id INTEGER NOT NULL,
+  agent INTEGER NOT NULL,
+  rev_from INTEGER NOT NULL,
+  rev_to INTEGER NOT NULL,
+  t0 INTEGER NOT NULL,
+  t1 INTEGER NOT NULL,
+  checksum INTEGER NOT NULL,
+  payload BLOB NOT NULL
+) STRICT;
+CREATE UNIQUE INDEX factor_history_id ON factor_history (id, rev_from);
+CREATE INDEX factor_history_agent ON factor_history (agent, t0);
+CREATE INDEX factor_history_rev_to ON factor_history (rev_to);
+
+-- Assets that nothing refers to any more and that compaction dropped: they still count in the
+-- digests of the revisions that are kept.
+CREATE TABLE dropped_asset (
+  sha256 BLOB NOT NULL,
+  rev_from INTEGER NOT NULL,
+  PRIMARY KEY (sha256, rev_from)
+) STRICT, WITHOUT ROWID;
+
+-- Assets to which erased rows referred, until it is known whether others do.
+CREATE TABLE doubtful_asset (
+  sha256 BLOB PRIMARY KEY
+) STRICT, WITHOUT ROWID;

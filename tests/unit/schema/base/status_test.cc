@@ -58,6 +58,7 @@ TEST(Status, ReasonsHaveTheNumbersOfTheWire) {
       {Reason::kRelationUnknown, v1::RELATION_UNKNOWN},
       {Reason::kNoPath, v1::NO_PATH},
       {Reason::kTagUnknown, v1::TAG_UNKNOWN},
+      {Reason::kNoRegistration, v1::NO_REGISTRATION},
       {Reason::kTimeOutsideTrack, v1::TIME_OUTSIDE_TRACK},
       {Reason::kRevisionInFuture, v1::REVISION_IN_FUTURE},
       {Reason::kRevisionCompacted, v1::REVISION_COMPACTED},
@@ -69,6 +70,8 @@ TEST(Status, ReasonsHaveTheNumbersOfTheWire) {
       {Reason::kNotAStore, v1::NOT_A_STORE},
       {Reason::kNetworkFileSystem, v1::NETWORK_FILE_SYSTEM},
       {Reason::kReadOnly, v1::READ_ONLY},
+      {Reason::kPolicyMatchesAll, v1::POLICY_MATCHES_ALL},
+      {Reason::kFramesIncompatible, v1::FRAMES_INCOMPATIBLE},
       {Reason::kParentRevisionStale, v1::PARENT_REVISION_STALE},
       {Reason::kSequenceGap, v1::SEQUENCE_GAP},
       {Reason::kMapReplaced, v1::MAP_REPLACED},
@@ -78,6 +81,7 @@ TEST(Status, ReasonsHaveTheNumbersOfTheWire) {
       {Reason::kOverloaded, v1::OVERLOADED},
       {Reason::kDiskFull, v1::DISK_FULL},
       {Reason::kLimitExceeded, v1::LIMIT_EXCEEDED},
+      {Reason::kQuotaExceeded, v1::QUOTA_EXCEEDED},
       {Reason::kStoreCorrupt, v1::STORE_CORRUPT},
   };
   for (const auto& [ours, wire] : pairs) EXPECT_EQ(static_cast<int>(ours), static_cast<int>(wire));

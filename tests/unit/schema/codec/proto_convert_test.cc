@@ -143,6 +143,10 @@ GraphDelta FullDelta() {
   block.faces = {{0, 1, 2}};
   delta.mesh_blocks = {block};
   delta.mesh_removals = {{4, 5, 6}};
+  delta.factor_removals = {{NodeId('H', 1), 1, 2}};
+  delta.shape_removals = {{NodeId('H', 1), 3, 4}};
+  delta.stay_removals = {{NodeId('H', 1), 5}};
+  delta.is_forgetting = true;
   delta.assets = {{ComputeSha256("x"), "model/ply", "x"}};
   return delta;
 }

@@ -4,6 +4,7 @@
 #include <map>
 
 #include "absl/strings/match.h"
+#include "schema/codec/checksum.h"
 #include "tests/unit/schema/store/delta_stream.h"
 #include "tests/unit/schema/store/store_test_util.h"
 
@@ -150,6 +151,91 @@ TEST_F(Compaction, DoesNotBringBackWhatIsGone) {
   EXPECT_EQ(ReasonOf(map_.writer().Compact(61, {}, {}).status()), Reason::kRevisionInFuture);
   EXPECT_EQ(Compact(23).oldest, 40);
   EXPECT_EQ(Compact(40).row_count, 0);
+}
+
+class CompactionOfAssets : public testing::Test {
+ protected:
+  static Asset MakeAsset(const std::string& content) {
+    return {ComputeSha256(content), "model/ply", content};
+  }
+  Node Chair(uint64_t index, const Asset& asset) {
+    const double x = static_cast<double>(index);
+    Node node = test::MakeObject(index, "chair", test::BoxOf(x, 0, 0, x + 0.5, 1, 1));
+    node.object.emplace().model = asset.sha256;
+    return node;
+  }
+  bool IsThere(const Asset& asset) {
+    return OrDie(map_.reader().Latest())->ReadAsset(asset.sha256).ok();
+  }
+
+  TestMap map_;
+};
+
+TEST_F(CompactionOfAssets, DropsThoseThatNothingReadableRefersTo) {
+  const Asset shared = MakeAsset(std::string(5000, 'a'));
+  const Asset lonely = MakeAsset(std::string(3'000'000, 'b'));
+  const Asset topology = MakeAsset("c");
+  GraphDelta delta;
+  delta.assets = {shared, lonely, topology};
+  delta.nodes = {Chair(1, shared), Chair(2, shared), Chair(3, lonely), test::MakeHuman(1, "")};
+  delta.shapes.push_back({NodeId('H', 1), topology.sha256, {{.time_ns = 5}}});
+  map_.MustCommit(delta);
+  delta = {};
+  delta.retirements = {{NodeId('O', 1), std::nullopt}, {NodeId('O', 3), std::nullopt}};
+  const Revision retired = map_.MustCommit(delta);
+  OrDie(map_.writer().SetTag("with", retired - 1, ""));
+  EXPECT_EQ(OrDie(map_.writer().Compact(retired, {}, {})).asset_count, 0);
+  EXPECT_TRUE(IsThere(lonely)) << "a tagged revision shows who has it";
+  OrDie(map_.writer().RemoveTag("with"));
+  const auto report = OrDie(map_.writer().Compact(retired, {}, {}));
+  EXPECT_EQ(report.asset_count, 1);
+  EXPECT_LT(report.bytes_after, report.bytes_before - 2'900'000);
+  EXPECT_FALSE(IsThere(lonely));
+  EXPECT_TRUE(IsThere(shared));
+  EXPECT_TRUE(IsThere(topology));
+  EXPECT_EQ(map_.Problems(), "");
+  // It may come again.
+  delta = {};
+  delta.assets = {lonely};
+  delta.nodes = {Chair(4, lonely)};
+  map_.MustCommit(delta);
+  EXPECT_TRUE(IsThere(lonely));
+  EXPECT_EQ(map_.Problems(), "");
+}
+
+TEST_F(CompactionOfAssets, KeepsOneThatIsAboutToBeReferredTo) {
+  const Asset asset = MakeAsset("model");
+  GraphDelta delta;
+  map_.MustCommit(delta);
+  delta.assets = {asset};
+  const Revision head = map_.MustCommit(delta);
+  OrDie(map_.writer().Compact(head, {}, {}));
+  EXPECT_TRUE(IsThere(asset));
+  delta = {};
+  delta.nodes = {Chair(1, asset)};
+  map_.MustCommit(delta);
+  EXPECT_EQ(map_.Problems(), "");
+}
+
+TEST_F(Compaction, CountsAcrossSlices) {
+  const auto whole = [&] {
+    TestMap map;
+    for (int64_t s = 1; s <= kRevisionCount; ++s) {
+      OrDie(map.writer().Commit(test::DeltaOfStream({.seed = 5}, s)));
+    }
+    return OrDie(map.writer().Compact(40, {}, {}));
+  }();
+  absl::StatusOr<CompactReport> report = absl::CancelledError("not yet");
+  for (int slice = 0; !report.ok(); ++slice) {
+    ASSERT_LT(slice, 1000);
+    int left = 1;
+    report = map_.writer().Compact(
+        40, [&] { return left-- > 0 ? absl::OkStatus() : absl::CancelledError("enough"); }, {});
+  }
+  EXPECT_EQ(report->row_count, whole.row_count);
+  EXPECT_EQ(report->revision_count, whole.revision_count);
+  EXPECT_EQ(report->asset_count, whole.asset_count);
+  EXPECT_GT(report->bytes_before, report->bytes_after);
 }
 
 TEST(CompactionOfAnEmptyMap, DoesNothing) {

@@ -73,6 +73,14 @@ class DamagedCopies {
   DamagedCopies() {
     TestMap map(Spec(TrajectoryCodec::kQuantized));
     for (int64_t s = 1; s <= 40; ++s) OrDie(map.writer().Commit(DeltaOfStream({}, s)));
+    // With all behind it that a map of some years has.
+    OrDie(map.writer().SetTag("summer", 23, ""));
+    OrDie(map.writer().Compact(38, {}, {}));
+    const std::vector<NodeId> gone = {NodeId('O', 5), NodeId('H', 3)};
+    GraphDelta delta;
+    for (const NodeId id : gone) delta.retirements.push_back({id, std::nullopt});
+    map.MustCommit(delta);
+    OrDie(map.writer().Erase({.nodes = gone, .assets = true}, {}, {}));
     map.Close();
     sound_ = ReadFile(map.database_path());
     std::filesystem::create_directory(folder_.path() + "/" + kMap);
@@ -109,7 +117,7 @@ class DamagedCopies {
   }
 
  private:
-  const std::vector<Revision> kRevisions = {40, 23};
+  const std::vector<Revision> kRevisions = {41, 38, 23};
 
   void Write(const std::string& bytes) {
     const std::string path = folder_.path() + "/" + kMap + "/graph.db";

@@ -113,6 +113,27 @@ TEST_F(Format1, GoesOnAfterItsUpgrade) {
   EXPECT_TRUE(OrDie(map->Verify({})).problems.empty());
 }
 
+TEST_F(Format1, CanBeErasedFromAndSaysWhereTheOldCopyIs) {
+  const UpgradeReport upgraded = OrDie(store_->UpgradeMap(kMap));
+  const auto writer = OrDie(store_->OpenWriter(kMap));
+  const std::vector<NodeId> nodes = {NodeId('O', 8), NodeId('H', 3)};
+  GraphDelta delta;
+  delta.session_id = "prune";
+  delta.sequence = 1;
+  for (const NodeId id : nodes) delta.retirements.push_back({id, std::nullopt});
+  OrDie(writer->Commit(delta));
+  const EraseReport report = OrDie(writer->Erase({.nodes = nodes, .assets = true}, {}, {}));
+  EXPECT_TRUE(report.is_clean);
+  EXPECT_EQ(report.other_files, std::vector<std::string>{upgraded.copy});
+  const auto map = OrDie(store_->OpenMap(kMap));
+  EXPECT_EQ(ReasonOf(OrDie(map->At(20))->GetNode(NodeId('O', 8)).status()), Reason::kNodeUnknown);
+  const VerifyReport verified = OrDie(map->Verify({}));
+  EXPECT_TRUE(verified.problems.empty()) << verified.problems.front();
+  // From now on it shrinks in steps.
+  const auto db = OrDie(sqlite::Database::Open(path(), sqlite::Database::Mode::kRead, kMap));
+  EXPECT_EQ(OrDie(db->QueryInt("PRAGMA auto_vacuum")), 2);
+}
+
 // Of a build before the first release.
 TEST_F(Format1, GetsListsOfWhatWasTouchedIfItHasNone) {
   RunSql("DROP TABLE touched");

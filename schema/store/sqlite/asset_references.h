@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which assets the rows of a map refer to.
+#pragma once
+
+#include <set>
+
+#include "schema/model/node.h"
+#include "schema/store/sqlite/database.h"
+
+namespace dsg::sqlite {
+
+void CollectReferences(const Node& node, std::set<Sha256>* assets);
+
+/// Of all nodes and shapes, current and past. Reads them all.
+absl::StatusOr<std::set<Sha256>> ReadReferences(Database& db);
+
+/// An asset, by its rows.
+struct StoredAsset {
+  Sha256 sha256{};
+  Revision rev_from = 0;
+};
+absl::StatusOr<std::vector<StoredAsset>> ListAssets(Database& db);
+absl::Status DeleteAsset(Database& db, const Sha256& sha256);
+/// The same, and notes that digests go on counting it.
+absl::Status DropAsset(Database& db, const StoredAsset& asset);
+
+/// Those that were referred to by rows which an erasure took out, until it has looked for others.
+absl::Status AddDoubtfulAssets(Database& db, const std::set<Sha256>& assets);
+absl::StatusOr<std::set<Sha256>> ReadDoubtfulAssets(Database& db);
+
+}  // namespace dsg::sqlite

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+// Rows go in steps of some megabytes, each with the records of all revisions made right; then what
+// they left in the file is overwritten and given back.
+#include "schema/store/sqlite/erasure.h"
+
+#include "absl/strings/str_cat.h"
+#include "schema/codec/proto_convert.h"
+#include "schema/store/sqlite/asset_references.h"
+#include "schema/store/sqlite/erased_rows.h"
+#include "schema/store/sqlite/readable.h"
+#include "schema/store/sqlite/space.h"
+
+namespace dsg::sqlite {
+namespace {
+
+class Eraser {
+ public:
+  Eraser(Database* db, const MapSpec& spec, const Erasure& erasure, const StopCheck& stop,
+         const Progress& progress, const EraseStep& step, EraseReport* report)
+      : db_(*db),
+        spec_(spec),
+        erasure_(erasure),
+        stop_(stop),
+        progress_(progress),
+        step_(step),
+        report_(*report) {}
+
+  absl::Status Run() {
+    DSG_RETURN_IF_ERROR(CheckAgents());
+    DSG_RETURN_IF_ERROR(EraseRows());
+    Tell(0.7);
+    if (erasure_.assets) DSG_RETURN_IF_ERROR(EraseAssets());
+    if (!erasure_.nodes.empty() || !erasure_.tracks.empty()) {
+      DSG_RETURN_IF_ERROR(InTransaction(db_, [&] { return RepairPoseTimes(db_); }));
+    }
+    DSG_RETURN_IF_ERROR(WipeBoxes(db_, stop_));
+    Tell(0.8);
+    DSG_RETURN_IF_ERROR(GivePagesBack(db_, stop_));
+    Tell(0.95);
+    report_.is_clean = db_.Checkpoint(/*truncate=*/true);
+    Tell(1.0);
+    return absl::OkStatus();
+  }
+
+ private:
+  void Tell(double fraction) const {
+    if (progress_) progress_(fraction);
+  }
+
+  // Without its past an agent's track would belong to nobody there.
+  absl::Status CheckAgents() {
+    for (const NodeId id : erasure_.nodes) {
+      Query query(db_, "SELECT payload FROM node WHERE key = ?1");
+      Node node;
+      if (query.Bind(KeyOf(id)).Next() && DecodeNodePayload(query.Blob(0), &node) &&
+          IsAgentKind(node.kind)) {
+        return MakeError(
+            Reason::kFieldInvalid,
+            absl::StrCat("cannot erase the past of agent ", ToString(id), " of map \"", spec_.name,
+                         "\": it is still there; retire it first, or name spans of "
+                         "its track"),
+            {{"field", "nodes"}, {"value", ToString(id)}});
+      }
+      DSG_RETURN_IF_ERROR(query.status());
+    }
+    return absl::OkStatus();
+  }
+
+  size_t ItemCount() const {
+    return erasure_.nodes.size() + erasure_.edges.size() + erasure_.mesh_blocks.size() +
+           erasure_.tracks.size();
+  }
+
+  absl::Status EraseItem(size_t item, ErasedRows* erased) {
+    if (item < erasure_.nodes.size()) return EraseNodeRows(erasure_.nodes[item], erased);
+    item -= erasure_.nodes.size();
+    if (item < erasure_.edges.size()) return EraseEdgeRows(erasure_.edges[item], erased);
+    item -= erasure_.edges.size();
+    if (item < erasure_.mesh_blocks.size()) {
+      return EraseMeshRows(erasure_.mesh_blocks[item], erased);
+    }
+    const TrackSpan& span = erasure_.tracks[item - erasure_.mesh_blocks.size()];
+    // How far stays reached is told by the track.
+    DSG_RETURN_IF_ERROR(EraseStayRows(span, erased));
+    DSG_RETURN_IF_ERROR(EraseBatchRows(span, erased));
+    return ErasePoses(span, erased);
+  }
+
+  absl::Status EraseRows() {
+    const size_t count = ItemCount();
+    for (size_t next = 0; next < count;) {
+      DSG_RETURN_IF_ERROR(AskStop(stop_));
+      ErasedRows erased{db_, spec_};
+      size_t reached = next;
+      const absl::Status done = InTransaction(db_, [&]() -> absl::Status {
+        while (reached < count && erased.byte_count < step_.bytes &&
+               erased.row_count < step_.rows) {
+          DSG_RETURN_IF_ERROR(EraseItem(reached++, &erased));
+        }
+        if (erasure_.assets) DSG_RETURN_IF_ERROR(AddDoubtfulAssets(db_, erased.assets));
+        return erased.past.Apply(db_);
+      });
+      DSG_RETURN_IF_ERROR(done);
+      next = reached;
+      report_.row_count += erased.row_count;
+      report_.pose_count += erased.pose_count;
+      CopyLogBack(db_);
+      Tell(0.7 * static_cast<double>(next) / static_cast<double>(count));
+    }
+    return absl::OkStatus();
+  }
+
+  // Those that rows referred to which are gone now, and none that is left; and old ones to which
+  // nothing refers. A new one may be about to be referred to.
+  absl::Status EraseAssets() {
+    DSG_ASSIGN_OR_RETURN(const std::vector<StoredAsset> stored, ListAssets(db_));
+    DSG_ASSIGN_OR_RETURN(const std::set<Sha256> doubtful, ReadDoubtfulAssets(db_));
+    if (stored.empty() && doubtful.empty()) return absl::OkStatus();
+    DSG_ASSIGN_OR_RETURN(const Readable readable, LoadReadable(db_));
+    DSG_ASSIGN_OR_RETURN(const std::set<Sha256> used, ReadReferences(db_));
+    for (const StoredAsset& asset : stored) {
+      const bool is_old = asset.rev_from < readable.oldest || doubtful.contains(asset.sha256);
+      if (!is_old || used.contains(asset.sha256)) continue;
+      DSG_RETURN_IF_ERROR(AskStop(stop_));
+      DSG_RETURN_IF_ERROR(InTransaction(db_, [&] { return EraseAsset(asset); }));
+      ++report_.asset_count;
+      CopyLogBack(db_);
+    }
+    return Query(db_, "DELETE FROM doubtful_asset").Run();
+  }
+
+  absl::Status EraseAsset(const StoredAsset& asset) {
+    ErasedRows erased{db_, spec_};
+    RowSums sums;
+    sums.content.Add(
+        RowIdentity('A', {asset.rev_from},
+                    {reinterpret_cast<const char*>(asset.sha256.data()), asset.sha256.size()}));
+    erased.past.Take(sums, asset.rev_from, kRevisionMax);
+    DSG_RETURN_IF_ERROR(DeleteAsset(db_, asset.sha256));
+    return erased.past.Apply(db_);
+  }
+
+  Database& db_;
+  const MapSpec& spec_;
+  const Erasure& erasure_;
+  const StopCheck& stop_;
+  const Progress& progress_;
+  const EraseStep step_;
+  EraseReport& report_;
+};
+
+}  // namespace
+
+absl::Status EraseFromMap(Database& db, const MapSpec& spec, const Erasure& erasure,
+                          const StopCheck& stop, const Progress& progress, EraseReport* report,
+                          const EraseStep& step) {
+  return Eraser(&db, spec, erasure, stop, progress, step, report).Run();
+}
+
+}  // namespace dsg::sqlite
