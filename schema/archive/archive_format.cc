@@ -35,7 +35,8 @@ template <typename Number>
 Number NumberAt(std::string_view bytes, size_t at) {
   Number value = 0;
   for (size_t i = 0; i < sizeof(Number); ++i) {
-    value |= static_cast<Number>(static_cast<Number>(static_cast<uint8_t>(bytes[at + i])) << (8 * i));
+    value |=
+        static_cast<Number>(static_cast<Number>(static_cast<uint8_t>(bytes[at + i])) << (8 * i));
   }
   return value;
 }
@@ -118,11 +119,11 @@ ArchiveManifest ManifestOf(const Json& json) {
 
 absl::Status CheckManifest(const std::string& path, const ArchiveManifest& manifest) {
   if (manifest.store_format > kStoreFormatVersion) {
-    return MakeError(Reason::kFormatTooNew,
-                     absl::StrCat(path, " holds a map of format ", manifest.store_format,
-                                  ", and this program reads up to ", kStoreFormatVersion,
-                                  "; use a newer dsgdb"),
-                     {{"path", path}, {"format", absl::StrCat(manifest.store_format)}});
+    return MakeError(
+        Reason::kFormatTooNew,
+        absl::StrCat(path, " holds a map of format ", manifest.store_format,
+                     ", and this program reads up to ", kStoreFormatVersion, "; use a newer dsgdb"),
+        {{"path", path}, {"format", absl::StrCat(manifest.store_format)}});
   }
   DSG_RETURN_IF_ERROR(CheckMapName(manifest.spec.name));
   DSG_RETURN_IF_ERROR(manifest.spec.Validate());
@@ -176,8 +177,10 @@ absl::StatusOr<size_t> ManifestBytes(const std::string& path, std::string_view h
   if (header.substr(0, kMagic.size()) != kMagic) return NoArchive(path, "begins with other bytes");
   const auto version = NumberAt<uint32_t>(header, 8);
   if (version != kArchiveVersion) {
-    return NoArchive(path, absl::StrCat("has version ", version, " of the format, and this program "
-                                        "reads ", kArchiveVersion));
+    return NoArchive(path, absl::StrCat("has version ", version,
+                                        " of the format, and this program "
+                                        "reads ",
+                                        kArchiveVersion));
   }
   const size_t size = NumberAt<uint32_t>(header, 12);
   if (size > kArchiveManifestBytesMax) {
@@ -208,10 +211,10 @@ int64_t FrameCount(int64_t database_bytes) {
 
 void AppendFrame(int64_t index, std::string_view bytes, std::string* out) {
   std::string packed(ZSTD_compressBound(bytes.size()), '\0');
-  const size_t size = ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(),
-                                    kCompressionLevel);
-  const bool is_packed = ZSTD_isError(size) == 0 && size < bytes.size() &&
-                         size >= bytes.size() / kArchiveRatioMax;
+  const size_t size =
+      ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), kCompressionLevel);
+  const bool is_packed =
+      ZSTD_isError(size) == 0 && size < bytes.size() && size >= bytes.size() / kArchiveRatioMax;
   const std::string_view stored = is_packed ? std::string_view(packed).substr(0, size) : bytes;
   const auto stored_size = static_cast<uint32_t>(stored.size());
   AppendNumber(stored_size, out);

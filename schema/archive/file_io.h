@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files that are read in pieces, and files that appear whole or not at all.
-// Refuses to let a failed write or sync pass as a success.
+// Files that are read in pieces. Refuses to wait on what is no plain file.
 #pragma once
 
 #include <cstdint>
@@ -38,37 +37,6 @@ class InputFile {
   int fd_;
   int64_t byte_count_;
 };
-
-/// Writes to PATH.part; Commit() syncs and renames. PATH.part is gone if it is dropped before.
-///
-/// Threads: one caller at a time.
-class WholeFile {
- public:
-  /// Replaces PATH.part if there is one.
-  /// Errors: INVALID_ARGUMENT/FIELD_INVALID with what the system says.
-  static absl::StatusOr<WholeFile> Create(const std::string& path);
-  WholeFile(WholeFile&& other) noexcept;
-  WholeFile& operator=(WholeFile&&) = delete;
-  ~WholeFile();
-
-  /// Errors: RESOURCE_EXHAUSTED/DISK_FULL; UNAVAILABLE.
-  absl::Status Write(std::string_view bytes);
-  /// Returns when file and name are on the disk; replaces PATH. The last call. Errors: as Write.
-  absl::Status Commit();
-
-  const std::string& path() const { return path_; }
-  int64_t byte_count() const { return byte_count_; }
-
- private:
-  WholeFile(std::string path, int fd) : path_(std::move(path)), fd_(fd) {}
-
-  std::string path_;
-  int fd_;
-  int64_t byte_count_ = 0;
-};
-
-/// Returns when the names in a folder are on the disk. Errors: UNAVAILABLE.
-absl::Status SyncNames(const std::string& folder);
 
 /// RESOURCE_EXHAUSTED/DISK_FULL if `error` (an errno) says so, else UNAVAILABLE.
 absl::Status SystemError(const std::string& what, const std::string& path, int error);

@@ -10,7 +10,9 @@ namespace dsg {
 struct Sha256Stream::State {
   EVP_MD_CTX* context = EVP_MD_CTX_new();
 
-  State() { DSG_CHECK(context != nullptr && EVP_DigestInit_ex(context, EVP_sha256(), nullptr) == 1); }
+  State() {
+    DSG_CHECK(context != nullptr && EVP_DigestInit_ex(context, EVP_sha256(), nullptr) == 1);
+  }
   ~State() { EVP_MD_CTX_free(context); }
   State(const State&) = delete;
   State& operator=(const State&) = delete;

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// From a map to its archive, whoever writes the map meanwhile.
+// Refuses to hold a lock on the map while the archive's bytes are read.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "schema/archive/archive_encoder.h"
+#include "schema/base/stop_check.h"
+#include "schema/store/graph_store.h"
+
+namespace dsg {
+
+/// Copies the newest revision, with its history, into a hidden file of folder `scratch`, which is
+/// gone when the encoder is, and makes an archive of the copy. The archive depends on what is in
+/// the map alone: neither on when nor by whom it was made.
+/// Errors: as MapReader::CopyTo; RESOURCE_EXHAUSTED/DISK_FULL.
+absl::StatusOr<std::unique_ptr<ArchiveEncoder>> ArchiveMap(MapReader* map,
+                                                           const std::string& scratch,
+                                                           const StopCheck& stop,
+                                                           const Progress& progress);
+
+/// What the archive of a map says of it.
+absl::StatusOr<ArchiveManifest> DescribeMap(MapReader* map);
+
+}  // namespace dsg

@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "schema/archive/backup_folder.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <set>
+#include <utility>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "schema/archive/archive_file.h"
+#include "schema/archive/file_io.h"
+#include "schema/base/status.h"
+#include "schema/codec/checksum.h"
+
+namespace dsg {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kManifestName[] = "MANIFEST";
+constexpr size_t kManifestBytesMax = size_t{16} << 20;
+constexpr size_t kReadBytes = size_t{1} << 20;
+
+std::string ManifestPath(const std::string& folder) {
+  return absl::StrCat(folder, "/", kManifestName);
+}
+
+// What this class writes, and what it leaves when it is killed.
+bool IsOurs(const std::string& name) {
+  return name == kManifestName || absl::EndsWith(name, ".dsgz") || absl::EndsWith(name, ".part");
+}
+
+absl::StatusOr<std::vector<std::string>> NamesIn(const std::string& folder) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    names.push_back(it->path().filename().string());
+  }
+  if (error) return SystemError("list", folder, error.value());
+  return names;
+}
+
+absl::Status CheckIsBackup(const std::string& folder) {
+  DSG_ASSIGN_OR_RETURN(const auto names, NamesIn(folder));
+  const auto other = std::find_if_not(names.begin(), names.end(), IsOurs);
+  if (other == names.end()) return absl::OkStatus();
+  return MakeError(Reason::kFieldInvalid,
+                   absl::StrCat("folder ", folder, " holds \"", *other,
+                                "\", which is no part of a backup; name a folder of its own"),
+                   {{"path", folder}});
+}
+
+std::string ShortHex(const Sha256& digest) { return ToHex(digest).substr(0, 16); }
+
+}  // namespace
+
+absl::StatusOr<BackupManifest> ReadBackupManifest(const std::string& folder) {
+  const std::string path = ManifestPath(folder);
+  std::error_code error;
+  if (!fs::exists(path, error)) {
+    return absl::NotFoundError(
+        fs::is_directory(folder, error)
+            ? absl::StrCat("folder ", folder,
+                           " has no MANIFEST, so no backup in it was ever finished; run dsg backup "
+                           "again")
+            : absl::StrCat("there is no folder ", folder, "; check the path"));
+  }
+  DSG_ASSIGN_OR_RETURN(InputFile file, InputFile::Open(path));
+  if (file.byte_count() > static_cast<int64_t>(kManifestBytesMax)) {
+    return MakeError(Reason::kStoreCorrupt, absl::StrCat(path, " is too large for a manifest"),
+                     {{"path", path}});
+  }
+  std::string text;
+  DSG_RETURN_IF_ERROR(file.Read(kManifestBytesMax, &text));
+  return DecodeBackupManifest(path, text);
+}
+
+absl::Status CheckBackupFile(const std::string& folder, const BackupEntry& entry,
+                             const StopCheck& stop, const Progress& progress) {
+  const std::string path = absl::StrCat(folder, "/", entry.file);
+  const auto damaged = [&](const std::string& why) {
+    return MakeError(Reason::kStoreCorrupt,
+                     absl::StrCat(path, " of map \"", entry.map,
+                                  "\" is not as the backup's MANIFEST says: ", why,
+                                  "; take another copy of this backup"),
+                     {{"path", path}, {"map", entry.map}});
+  };
+  absl::StatusOr<InputFile> file = InputFile::Open(path);
+  if (absl::IsNotFound(file.status())) return damaged("it is gone");
+  DSG_RETURN_IF_ERROR(file.status());
+  if (file->byte_count() != entry.byte_count) {
+    return damaged(absl::StrCat("it has ", file->byte_count(), " bytes, not ", entry.byte_count));
+  }
+  Sha256Stream sha256;
+  std::string bytes;
+  for (int64_t done = 0; done < entry.byte_count; done += static_cast<int64_t>(bytes.size())) {
+    DSG_RETURN_IF_ERROR(AskStop(stop));
+    DSG_RETURN_IF_ERROR(file->Read(kReadBytes, &bytes));
+    if (bytes.empty()) return damaged("it ends too early");
+    sha256.Add(bytes);
+    if (progress) progress(static_cast<double>(done) / static_cast<double>(entry.byte_count));
+  }
+  return sha256.Finish() == entry.sha256 ? absl::OkStatus() : damaged("its SHA-256 is another");
+}
+
+absl::StatusOr<BackupFile> BackupFile::Create(const std::string& folder, const std::string& map) {
+  DSG_ASSIGN_OR_RETURN(AtomicFile file,
+                       AtomicFile::Create(absl::StrCat(folder, "/", map, ".coming.dsgz")));
+  return BackupFile(folder, map, std::move(file));
+}
+
+absl::Status BackupFile::Write(std::string_view bytes) {
+  sha256_.Add(bytes);
+  return file_.Write(bytes);
+}
+
+absl::StatusOr<BackupEntry> BackupFile::Commit(const StopCheck& stop) {
+  DSG_RETURN_IF_ERROR(file_.Commit());
+  DSG_ASSIGN_OR_RETURN(const ArchiveManifest archive,
+                       ReadArchiveFile(file_.path(), nullptr, stop, nullptr));
+  if (archive.spec.name != map_) {
+    return MakeError(Reason::kStoreCorrupt,
+                     absl::StrCat("the archive of map \"", map_, "\" holds map \"",
+                                  archive.spec.name, "\"; back it up again"),
+                     {{"map", map_}});
+  }
+  BackupEntry entry{.map = map_,
+                    .byte_count = file_.byte_count(),
+                    .sha256 = sha256_.Finish(),
+                    .newest_revision = archive.newest_revision,
+                    .newest_digest = archive.newest_digest,
+                    .state = archive.state};
+  // Of its state, so that it never replaces an archive that the last manifest names.
+  entry.file =
+      absl::StrCat(map_, "-r", entry.newest_revision, "-", ShortHex(archive.state), ".dsgz");
+  const std::string path = absl::StrCat(folder_, "/", entry.file);
+  if (rename(file_.path().c_str(), path.c_str()) != 0) return SystemError("name", path, errno);
+  DSG_RETURN_IF_ERROR(SyncFolder(folder_));
+  return entry;
+}
+
+absl::StatusOr<std::unique_ptr<BackupFolder>> BackupFolder::Open(const std::string& folder) {
+  std::error_code error;
+  if (!fs::exists(folder, error)) fs::create_directories(folder, error);
+  const int fd = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) {
+    return MakeError(Reason::kFieldInvalid,
+                     absl::StrCat("cannot use ", folder, " as the folder of a backup: ",
+                                  std::strerror(errno), "; name another"),
+                     {{"path", folder}});
+  }
+  std::unique_ptr<BackupFolder> made(new BackupFolder(folder, fd));
+  if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
+    return absl::UnavailableError(absl::StrCat("another process writes the backup in ", folder,
+                                               "; wait for its end, or name another folder"));
+  }
+  DSG_RETURN_IF_ERROR(CheckIsBackup(folder));
+  auto last = ReadBackupManifest(folder);
+  if (last.ok()) {
+    made->last_ = *std::move(last);
+  } else if (!absl::IsNotFound(last.status())) {
+    return last.status();
+  }
+  return made;
+}
+
+BackupFolder::~BackupFolder() { close(lock_fd_); }
+
+absl::Status BackupFolder::Finish(const BackupManifest& manifest) {
+  DSG_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(ManifestPath(folder_)));
+  DSG_RETURN_IF_ERROR(file.Write(EncodeBackupManifest(manifest)));
+  DSG_RETURN_IF_ERROR(file.Commit());
+  std::set<std::string> named = {kManifestName};
+  for (const BackupEntry& entry : manifest.maps) named.insert(entry.file);
+  DSG_ASSIGN_OR_RETURN(const auto names, NamesIn(folder_));
+  std::error_code error;
+  for (const std::string& name : names) {
+    if (!named.contains(name)) fs::remove(absl::StrCat(folder_, "/", name), error);
+  }
+  return SyncFolder(folder_);
+}
+
+}  // namespace dsg

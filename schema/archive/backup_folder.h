@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+// A backup: a folder of archives, one a map, and a MANIFEST that names them, written last.
+// It is at any instant the old backup, whole, or the new one; refuses folders of anything else.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "schema/archive/archive_format.h"
+#include "schema/archive/backup_manifest.h"
+#include "schema/archive/sha256_stream.h"
+#include "schema/base/stop_check.h"
+#include "schema/files/atomic_file.h"
+#include "schema/store/map_writer.h"
+
+namespace dsg {
+
+/// Errors: NOT_FOUND without the folder, or MANIFEST in it: such a backup was never finished;
+/// DATA_LOSS/STORE_CORRUPT.
+absl::StatusOr<BackupManifest> ReadBackupManifest(const std::string& folder);
+
+/// Whether an archive of a backup is the one that the manifest means, by its size and SHA-256.
+/// Errors: DATA_LOSS/STORE_CORRUPT, also for a file that is gone; what `stop` returned.
+absl::Status CheckBackupFile(const std::string& folder, const BackupEntry& entry,
+                             const StopCheck& stop, const Progress& progress);
+
+/// An archive on its way into a backup.
+///
+/// Threads: one caller at a time.
+class BackupFile {
+ public:
+  /// Errors: as AtomicFile::Create.
+  static absl::StatusOr<BackupFile> Create(const std::string& folder, const std::string& map);
+
+  absl::Status Write(std::string_view bytes);
+  /// Reads what was written, checks it, and gives it its name. The last call.
+  /// Errors: as AtomicFile; DATA_LOSS/STORE_CORRUPT when it is no whole archive of the map.
+  absl::StatusOr<BackupEntry> Commit(const StopCheck& stop);
+
+ private:
+  BackupFile(std::string folder, std::string map, AtomicFile file)
+      : folder_(std::move(folder)), map_(std::move(map)), file_(std::move(file)) {}
+
+  std::string folder_;
+  std::string map_;
+  AtomicFile file_;
+  Sha256Stream sha256_;
+};
+
+/// The folder while it is being written.
+class BackupFolder {
+ public:
+  /// Makes the folder if it is missing.
+  /// Errors: INVALID_ARGUMENT/FIELD_INVALID for a folder of other things; UNAVAILABLE while another
+  /// process writes it; STORE_CORRUPT for a damaged manifest.
+  static absl::StatusOr<std::unique_ptr<BackupFolder>> Open(const std::string& folder);
+  ~BackupFolder();
+  BackupFolder(const BackupFolder&) = delete;
+  BackupFolder& operator=(const BackupFolder&) = delete;
+
+  /// As it was before; empty for a new one.
+  const BackupManifest& last() const { return last_; }
+  /// Writes the manifest and removes archives that it does not name.
+  absl::Status Finish(const BackupManifest& manifest);
+
+ private:
+  BackupFolder(std::string folder, int lock_fd) : folder_(std::move(folder)), lock_fd_(lock_fd) {}
+
+  const std::string folder_;
+  const int lock_fd_;
+  BackupManifest last_;
+};
+
+}  // namespace dsg

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// A store for a map that is on its way in or out: a hidden folder beside the maps, gone afterwards.
+// Those that killed processes have left are removed; those in use are let alone.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+
+namespace dsg {
+
+class ScratchStore {
+ public:
+  /// Makes `parent`/.`purpose`-N.new.
+  /// Errors: RESOURCE_EXHAUSTED/DISK_FULL; UNAVAILABLE with what the system says.
+  static absl::StatusOr<std::unique_ptr<ScratchStore>> Make(const std::string& parent,
+                                                            const std::string& purpose);
+  ~ScratchStore();
+  ScratchStore(const ScratchStore&) = delete;
+  ScratchStore& operator=(const ScratchStore&) = delete;
+
+  const std::string& folder() const { return folder_; }
+  /// The path of a map's database, in a folder that is made for it.
+  absl::StatusOr<std::string> MakeDatabasePath(const std::string& map) const;
+
+ private:
+  ScratchStore(std::string folder, int lock_fd) : folder_(std::move(folder)), lock_fd_(lock_fd) {}
+
+  const std::string folder_;
+  /// Of the folder itself; its lock says that it is in use.
+  const int lock_fd_;
+};
+
+}  // namespace dsg

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
+#include "schema/archive/backup_folder.h"
+#include "schema/archive/backup_manifest.h"
+#include "schema/codec/checksum.h"
+#include "tests/unit/schema/archive/archive_test_util.h"
+
+namespace dsg::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+BackupManifest SomeManifest() {
+  BackupManifest manifest;
+  manifest.maps.push_back({.map = "a", .file = "a-r1-00.dsgz", .byte_count = 3});
+  manifest.maps.push_back({.map = "b", .file = "b-r2-00.dsgz", .byte_count = 4});
+  manifest.maps[1].sha256[0] = 7;
+  return manifest;
+}
+
+// With the last line made right again, as an attacker would.
+std::string Seal(const std::string& body) {
+  return absl::StrCat(body, "sha256 ", ToHex(ComputeSha256(body)), "\n");
+}
+
+TEST(BackupManifest, IsReadAsItWasWritten) {
+  const auto read = DecodeBackupManifest("M", EncodeBackupManifest(SomeManifest()));
+  ASSERT_TRUE(read.ok()) << read.status();
+  ASSERT_EQ(read->maps.size(), 2U);
+  EXPECT_EQ(read->maps[1].sha256, SomeManifest().maps[1].sha256);
+  EXPECT_EQ(read->Find("b")->file, "b-r2-00.dsgz");
+  EXPECT_EQ(read->Find("c"), nullptr);
+  EXPECT_TRUE(DecodeBackupManifest("M", EncodeBackupManifest({})).ok());
+}
+
+TEST(BackupManifest, AnyAlteredOrMissingByteIsDataLoss) {
+  const std::string text = EncodeBackupManifest(SomeManifest());
+  for (size_t at = 0; at < text.size(); ++at) {
+    std::string altered = text;
+    altered[at] = static_cast<char>(altered[at] ^ 1);
+    EXPECT_EQ(ReasonOf(DecodeBackupManifest("M", altered).status()), Reason::kStoreCorrupt) << at;
+    EXPECT_EQ(ReasonOf(DecodeBackupManifest("M", text.substr(0, at)).status()),
+              Reason::kStoreCorrupt)
+        << at;
+  }
+}
+
+TEST(BackupManifest, NamesThatLeadOutOfTheFolderAreRefused) {
+  const std::string text = EncodeBackupManifest(SomeManifest());
+  const std::string body = text.substr(0, text.rfind("sha256 "));
+  ASSERT_TRUE(DecodeBackupManifest("M", Seal(body)).ok());
+  for (const char* name : {"../a-r1-00.dsgz", "/a.dsgz", ".dsgz", "a.db", "x/y.dsgz", ""}) {
+    const std::string forged = absl::StrReplaceAll(body, {{"a-r1-00.dsgz", name}});
+    EXPECT_FALSE(DecodeBackupManifest("M", Seal(forged)).ok()) << name;
+  }
+  EXPECT_FALSE(
+      DecodeBackupManifest("M", Seal(absl::StrReplaceAll(body, {{"\"b\"", "\"a\""}}))).ok());
+}
+
+class BackupFolderTest : public testing::Test {
+ protected:
+  BackupEntry Save(const std::string& folder) {
+    BackupFile file = OrDie(BackupFile::Create(folder, kMap));
+    OrDie(file.Write(OrDie(ArchiveBytes(&map_->reader(), map_->folder()))));
+    return OrDie(file.Commit(nullptr));
+  }
+
+  std::string path() const { return folder_.path() + "/backup"; }
+
+  const std::unique_ptr<TestMap> map_ = MakeArchivedMap(5);
+  TempFolder folder_;
+};
+
+TEST_F(BackupFolderTest, IsNoneUntilItsManifestIsThere) {
+  const auto folder = OrDie(BackupFolder::Open(path()));
+  const BackupEntry entry = Save(path());
+  EXPECT_TRUE(absl::IsNotFound(ReadBackupManifest(path()).status()));
+  OrDie(folder->Finish({.maps = {entry}}));
+  EXPECT_EQ(OrDie(ReadBackupManifest(path())).maps.size(), 1U);
+  EXPECT_TRUE(CheckBackupFile(path(), entry, nullptr, nullptr).ok());
+  EXPECT_EQ(NamesOf(path()), "MANIFEST " + entry.file);
+}
+
+TEST_F(BackupFolderTest, IsTheOldOneUntilTheNewOneIsWhole) {
+  BackupEntry first;
+  {
+    const auto folder = OrDie(BackupFolder::Open(path()));
+    first = Save(path());
+    OrDie(folder->Finish({.maps = {first}}));
+  }
+  OrDie(map_->writer().SetTag("more", 5, ""));
+  const auto folder = OrDie(BackupFolder::Open(path()));
+  EXPECT_EQ(folder->last().maps.size(), 1U);
+  const BackupEntry second = Save(path());
+  EXPECT_NE(second.file, first.file);
+  EXPECT_TRUE(
+      CheckBackupFile(path(), OrDie(ReadBackupManifest(path())).maps[0], nullptr, nullptr).ok());
+  OrDie(folder->Finish({.maps = {second}}));
+  EXPECT_EQ(NamesOf(path()), "MANIFEST " + second.file);
+}
+
+TEST_F(BackupFolderTest, WhatIsCutOrAlteredIsFound) {
+  const auto folder = OrDie(BackupFolder::Open(path()));
+  const BackupEntry entry = Save(path());
+  const std::string file = path() + "/" + entry.file;
+  const std::string bytes = ReadBytes(file);
+  std::string altered = bytes;
+  altered[bytes.size() / 3] ^= 16;
+  for (const std::string& other : {altered, bytes.substr(1), std::string()}) {
+    WriteBytes(file, other);
+    EXPECT_EQ(ReasonOf(CheckBackupFile(path(), entry, nullptr, nullptr)), Reason::kStoreCorrupt);
+  }
+  fs::remove(file);
+  EXPECT_EQ(ReasonOf(CheckBackupFile(path(), entry, nullptr, nullptr)), Reason::kStoreCorrupt);
+}
+
+TEST_F(BackupFolderTest, WhatIsNotAWholeArchiveOfTheMapIsNotTaken) {
+  const auto folder = OrDie(BackupFolder::Open(path()));
+  const std::string bytes = OrDie(ArchiveBytes(&map_->reader(), map_->folder()));
+  BackupFile cut = OrDie(BackupFile::Create(path(), kMap));
+  OrDie(cut.Write(bytes.substr(0, bytes.size() - 1)));
+  EXPECT_FALSE(cut.Commit(nullptr).ok());
+  BackupFile other = OrDie(BackupFile::Create(path(), "kitchen"));
+  OrDie(other.Write(bytes));
+  EXPECT_FALSE(other.Commit(nullptr).ok());
+}
+
+TEST_F(BackupFolderTest, FoldersOfOtherThingsAreLetAlone) {
+  fs::create_directories(path());
+  WriteBytes(path() + "/holiday.jpg", "x");
+  EXPECT_EQ(ReasonOf(BackupFolder::Open(path()).status()), Reason::kFieldInvalid);
+  EXPECT_EQ(ReasonOf(BackupFolder::Open(path() + "/holiday.jpg").status()), Reason::kFieldInvalid);
+  EXPECT_EQ(NamesOf(path()), "holiday.jpg");
+}
+
+TEST_F(BackupFolderTest, OneProcessWritesAtATime) {
+  const auto folder = OrDie(BackupFolder::Open(path()));
+  EXPECT_TRUE(absl::IsUnavailable(BackupFolder::Open(path()).status()));
+}
+
+}  // namespace
+}  // namespace dsg::test
