@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "schema/interop/scene_graph_file.h"
 
+#include <utility>
+
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
 #include "schema/interop/file_error.h"
@@ -26,10 +28,10 @@ constexpr std::string_view kKnownKeys[] = {
 
 absl::StatusOr<ImportedGraph> ReadJsonGraph(std::string_view bytes, const std::string& name,
                                             double mesh_block_size_m) {
-  DSG_ASSIGN_OR_RETURN(const nlohmann::json root, ParseJson(bytes, name));
+  DSG_ASSIGN_OR_RETURN(nlohmann::json root, ParseJson(bytes, name));
   if (IsKimeraJson(root)) return ReadKimeraJson(root, name);
   if (IsRegionJson(root)) return ReadRegionJson(root, name);
-  DSG_ASSIGN_OR_RETURN(const SparkGraph graph, ReadSparkJson(root, name));
+  DSG_ASSIGN_OR_RETURN(const SparkGraph graph, ReadSparkJson(std::move(root), name));
   return SparkToDelta(graph, name, mesh_block_size_m);
 }
 

@@ -7,82 +7,12 @@
 #include <unordered_set>
 
 #include "absl/strings/str_cat.h"
+#include "schema/interop/json_peek.h"
 #include "schema/interop/spark_layers.h"
+#include "schema/interop/spark_stays.h"
 
 namespace dsg {
 namespace {
-
-struct Visit {
-  TimeNs time_ns = 0;
-  NodeId place;
-  NodeId room;
-};
-
-// The place and room of each pose node, read off the converted edges. Of several the lowest id.
-class Whereabouts {
- public:
-  explicit Whereabouts(const GraphDelta& delta) {
-    std::unordered_set<NodeId> rooms;
-    for (const Node& node : delta.nodes) {
-      if (node.layer == layers::kRooms) rooms.insert(node.id);
-    }
-    for (const Edge& edge : delta.edges) {
-      if (edge.relation == relations::kNearestPlace) KeepLower(edge.source, edge.target, &place_);
-      if (edge.relation == kPoseIn && rooms.contains(edge.target)) {
-        KeepLower(edge.source, edge.target, &room_);
-      }
-      if (edge.relation == relations::kContains && rooms.contains(edge.source)) {
-        KeepLower(edge.target, edge.source, &room_);
-      }
-    }
-  }
-
-  NodeId PlaceOf(NodeId pose) const { return Lookup(place_, pose); }
-
-  NodeId RoomOf(NodeId pose) const {
-    const NodeId room_of_place = Lookup(room_, PlaceOf(pose));
-    return room_of_place.empty() ? Lookup(room_, pose) : room_of_place;
-  }
-
- private:
-  using Links = std::unordered_map<NodeId, NodeId>;
-
-  static void KeepLower(NodeId from, NodeId to, Links* links) {
-    const auto [it, added] = links->try_emplace(from, to);
-    if (!added) it->second = std::min(it->second, to);
-  }
-
-  static NodeId Lookup(const Links& links, NodeId from) {
-    const auto found = links.find(from);
-    return found == links.end() ? NodeId() : found->second;
-  }
-
-  Links place_;
-  Links room_;
-};
-
-void AddStay(NodeId agent, const Visit& visit, TimeNs exit_ns, std::vector<Stay>* stays) {
-  if (visit.place.empty() && visit.room.empty()) return;
-  for (TimeNs enter_ns = visit.time_ns; enter_ns < exit_ns; enter_ns += kStayNsMax) {
-    const TimeNs cut_ns = exit_ns - enter_ns > kStayNsMax ? enter_ns + kStayNsMax : exit_ns;
-    stays->push_back({agent, visit.place, visit.room, enter_ns, cut_ns});
-  }
-}
-
-void AddStays(NodeId agent, const std::vector<Visit>& visits, std::vector<Stay>* stays) {
-  size_t begin = 0;
-  for (size_t i = 0; i < visits.size(); ++i) {
-    const bool is_last = i + 1 == visits.size();
-    const bool is_lost = is_last || visits[i + 1].time_ns - visits[i].time_ns > kStayGapNs;
-    const bool moves_on = is_lost || visits[i + 1].place != visits[begin].place ||
-                          visits[i + 1].room != visits[begin].room;
-    if (!moves_on) continue;
-    // Half-open: one nanosecond more, so that the last pose's own instant is covered.
-    const TimeNs exit_ns = is_lost ? visits[i].time_ns + 1 : visits[i + 1].time_ns;
-    AddStay(agent, visits[begin], exit_ns, stays);
-    begin = i + 1;
-  }
-}
 
 // r0 for a, r1 for b, ... r26 for A; the next index when the file uses that id itself.
 NodeId RobotId(char letter, const std::unordered_set<NodeId>& taken) {
@@ -90,6 +20,12 @@ NodeId RobotId(char letter, const std::unordered_set<NodeId>& taken) {
   auto index = static_cast<uint64_t>(is_lower ? letter - 'a' : 26 + letter - 'A');
   while (taken.contains(NodeId('r', index))) ++index;
   return NodeId('r', index);
+}
+
+// Not so in exports of maps that had them as a track only.
+bool AreNodes(const SparkGraph& graph, char letter) {
+  const nlohmann::json& robot = Peek(Peek(graph.own, "robots"), std::string(1, letter).c_str());
+  return robot.is_null() || PeekBool(Peek(robot, "poses_are_nodes"));
 }
 
 struct Track {
@@ -121,6 +57,7 @@ Node RobotNode(NodeId id, char letter, const Track& track) {
   robot.map_T_node = track.poses.front().map_T_agent;
   robot.provenance = Provenance::kImported;
   robot.agent = AgentInfo{};
+  robot.attributes[kPosesAttribute] = std::string(1, letter);
   robot.first_observed_ns = track.poses.front().time_ns;
   robot.last_observed_ns = track.poses.back().time_ns;
   robot.observation_count = static_cast<int64_t>(track.poses.size());
@@ -160,7 +97,8 @@ void AddSparkAgents(const SparkGraph& graph, GraphDelta* delta, std::vector<std:
     robots.push_back(RobotNode(id, letter, track));
     AddStays(id, track.visits, &delta->stays);
     notes->push_back(absl::StrCat("robot ", ToString(id), " (", std::string(1, letter), ") has ",
-                                  track.poses.size(), " poses; each is also kept as a node"));
+                                  track.poses.size(), " poses",
+                                  AreNodes(graph, letter) ? "; each is also kept as a node" : ""));
     if (track.out_of_order_count > 0) {
       notes->push_back(absl::StrCat("robot ", ToString(id), ": ", track.out_of_order_count,
                                     " poses are no later than the one before them; they are kept "

@@ -13,6 +13,9 @@ namespace dsg {
 /// A pose edge that leads to the nearest place is NEAREST_PLACE; one to any other layer is this.
 inline constexpr char kPoseIn[] = "POSE_IN";
 
+/// Attribute of a robot whose poses are also nodes: the letter of these.
+inline constexpr char kPosesAttribute[] = "spark_dsg_poses";
+
 /// Poses of one robot further apart than this are no stay; the default gap of a map.
 inline constexpr TimeNs kStayGapNs = 2 * kNsPerSecond;
 

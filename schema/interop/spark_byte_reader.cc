@@ -207,32 +207,4 @@ void SparkByteReader::Matrix(const char* field, double* out, size_t rows, size_t
   for (size_t i = 0; i < rows * columns; ++i) out[i] = Number(field);
 }
 
-void SparkByteReader::SkipScalar(const char* field) {
-  const uint8_t tag = TakeTag(field);
-  if (tag == kNil || tag == kTrue || tag == kFalse) return;
-  const size_t width = WidthOf(tag);
-  if (width == 0) {
-    Fail(field, absl::StrFormat("should be a scalar and has type byte 0x%02x", tag));
-    return;
-  }
-  TakeWord(field, width);
-}
-
-size_t SparkByteReader::SkipScalars(const char* field, size_t scalars_per_element) {
-  const size_t count = Array(field, 2 * scalars_per_element);
-  for (size_t i = 0; i < count * scalars_per_element && ok(); ++i) SkipScalar(field);
-  return count;
-}
-
-size_t SparkByteReader::SkipMatrix(const char* field) {
-  const size_t size = Array(field, 2);
-  if (size < 2) Fail(field, "should be a matrix and has no rows and columns");
-  if (!ok()) return 0;
-  const uint64_t rows = Unsigned(field, size);
-  const uint64_t columns = Unsigned(field, UINT32_MAX);
-  if (rows * columns + 2 != size) Fail(field, "has not as many values as rows times columns");
-  for (size_t i = 2; i < size && ok(); ++i) SkipScalar(field);
-  return size - 2;
-}
-
 }  // namespace dsg

@@ -56,13 +56,6 @@ class SparkByteReader {
   /// Rows, columns and `out`'s count of values, row by row.
   void Matrix(const char* field, double* out, size_t rows, size_t columns);
 
-  /// Passes over an array of arrays, texts or scalars, `scalars_per_element` of these each;
-  /// returns its count.
-  size_t SkipScalars(const char* field, size_t scalars_per_element);
-  /// Passes over a matrix of any size; returns the count of its values.
-  size_t SkipMatrix(const char* field);
-  void SkipScalar(const char* field);
-
   /// Makes `what` the error of this reader, at the present offset, if it is the first.
   void Fail(const char* field, const std::string& what);
 

@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "schema/interop/spark_fields.h"
+#include "schema/interop/spark_metadata.h"
 
 namespace dsg {
 namespace {
@@ -46,6 +48,31 @@ std::string_view NameOf(SparkClass type) {
 bool IsSemantic(SparkClass type) {
   return type != SparkClass::kNode && type != SparkClass::kAgent &&
          type != SparkClass::kTraversability;
+}
+
+nlohmann::json TakeOwn(nlohmann::json* metadata) {
+  if (!metadata->is_object()) return nullptr;
+  const auto found = metadata->find(kOwnMetadata);
+  if (found == metadata->end()) return nullptr;
+  nlohmann::json own = std::move(*found);
+  metadata->erase(found);
+  return own;
+}
+
+void FinishNode(nlohmann::json attributes, SparkNode* node) {
+  attributes["type"] = NameOf(node->type);
+  // On the node itself before 1.1.0.
+  const bool is_timed = node->type == SparkClass::kAgent && node->stamp_ns.has_value();
+  if (is_timed) attributes["timestamp"] = *node->stamp_ns;
+  UpgradeFields(node->type, node->id, &attributes);
+  nlohmann::json& metadata = attributes["metadata"];
+  node->own = TakeOwn(&metadata);
+  if (!node->own.is_null()) {
+    node->attributes.erase("metadata");
+    std::string text = MetadataText(metadata);
+    if (!text.empty()) node->attributes["metadata"] = std::move(text);
+  }
+  node->fields = std::move(attributes);
 }
 
 void AddLength(const char* name, size_t length, SparkGraph* graph, SparkNode* node) {

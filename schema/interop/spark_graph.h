@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a Spark-DSG file says, in the file's own terms: the JSON and the binary reader both fill it.
-// Lists that only point into the peer's mesh or detectors are kept as their lengths.
+// What a Spark-DSG file says, in the file's own terms: readers fill it, writers write it.
+// Refuses to judge it: what no map can hold is found when it is turned into one.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,6 +8,7 @@
 #include <compare>
 #include <cstdint>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -68,6 +69,13 @@ struct SparkBox {
   Eigen::Matrix3f rotation = Eigen::Matrix3f::Identity();
 };
 
+/// Opaque black, which the format has where nobody gave a colour.
+inline constexpr Color kSparkNoColor = {0, 0, 0, 255};
+
+/// The key in the metadata of nodes, edges and graph under which exports of maps keep what the
+/// format has no words for. Readers take it out of the metadata, writers put it back.
+inline constexpr char kOwnMetadata[] = "dsgdb";
+
 struct SparkNode {
   uint64_t id = 0;
   SparkLayerKey key;
@@ -91,6 +99,11 @@ struct SparkNode {
   std::vector<uint64_t> last_observed_ns;
   /// Lengths of lists (none when empty), flags (only true ones), metadata as JSON text.
   Attributes attributes;
+  /// All attributes as the newest version has them in JSON, "type" and "metadata" among them;
+  /// null in nodes that were not read from a file.
+  nlohmann::json fields;
+  /// What of our own stood, or is to stand, in the metadata; see kOwnMetadata.
+  nlohmann::json own;
 };
 
 struct SparkEdge {
@@ -100,6 +113,8 @@ struct SparkEdge {
   double weight = 1.0;
   /// JSON text; "" for none.
   std::string metadata;
+  /// As SparkNode::own.
+  nlohmann::json own;
 };
 
 struct SparkGraph {
@@ -107,13 +122,25 @@ struct SparkGraph {
   std::vector<SparkNode> nodes;
   std::vector<SparkEdge> edges;
   std::map<std::string, SparkLayerKey> layer_names;
+  /// Also layers without nodes.
+  std::vector<SparkLayerKey> layer_keys;
   std::map<SparkLayerKey, std::vector<SemanticLabel>> label_spaces;
+  /// All of the graph's metadata, label spaces among it; null for none.
+  nlohmann::json metadata;
+  /// As SparkNode::own.
+  nlohmann::json own;
   /// One piece; its index is unused, stamps are in last_seen_ns.
   std::optional<MeshBlock> mesh;
   /// Lists kept as lengths: name -> number of nodes that had entries.
   std::map<std::string, int64_t> shortened_lists;
   std::vector<std::string> notes;
 };
+
+/// The last step of reading a node: its `fields` are those of `attributes` in their newest form,
+/// without what is our own.
+void FinishNode(nlohmann::json attributes, SparkNode* node);
+/// Takes what is our own out of metadata; null if nothing is.
+nlohmann::json TakeOwn(nlohmann::json* metadata);
 
 /// Keeps the length of a list that is not empty.
 void AddLength(const char* name, size_t length, SparkGraph* graph, SparkNode* node);

@@ -17,6 +17,6 @@ bool IsSparkJsonMesh(const nlohmann::json& root);
 /// version that the header claims, because old files often carry none.
 ///
 /// Errors: INVALID_ARGUMENT/FILE_MALFORMED naming `file` and the field.
-absl::StatusOr<SparkGraph> ReadSparkJson(const nlohmann::json& root, const std::string& file);
+absl::StatusOr<SparkGraph> ReadSparkJson(nlohmann::json root, const std::string& file);
 
 }  // namespace dsg

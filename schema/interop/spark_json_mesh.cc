@@ -82,4 +82,24 @@ MeshBlock ReadSparkJsonMesh(const JsonFields& fields, JsonSource* source) {
   return mesh;
 }
 
+nlohmann::json SparkMeshToJson(const MeshBlock& mesh) {
+  Json out = {{"has_colors", !mesh.colors.empty()},
+              {"has_timestamps", !mesh.last_seen_ns.empty()},
+              {"has_labels", !mesh.labels.empty()},
+              {"has_first_seen_stamps", !mesh.first_seen_ns.empty()}};
+  for (const Eigen::Vector3f& point : mesh.positions_map) {
+    const Eigen::Vector3d p = point.cast<double>();
+    out["points"].push_back({p.x(), p.y(), p.z()});
+  }
+  for (const uint32_t rgb : mesh.colors) {
+    out["colors"].push_back(
+        {{"r", rgb >> 16 & 255}, {"g", rgb >> 8 & 255}, {"b", rgb & 255}, {"a", 255}});
+  }
+  if (!mesh.last_seen_ns.empty()) out["stamps"] = mesh.last_seen_ns;
+  if (!mesh.labels.empty()) out["labels"] = mesh.labels;
+  if (!mesh.first_seen_ns.empty()) out["first_seen_stamps"] = mesh.first_seen_ns;
+  if (!mesh.faces.empty()) out["faces"] = mesh.faces;
+  return out;
+}
+
 }  // namespace dsg

@@ -11,4 +11,7 @@ namespace dsg {
 /// (vertices of x, y, z, r, g, b). Errors go to `source`. Lengths of channels are not compared.
 MeshBlock ReadSparkJsonMesh(const JsonFields& mesh, JsonSource* source);
 
+/// The present form, without a header; empty channels are left out.
+nlohmann::json SparkMeshToJson(const MeshBlock& mesh);
+
 }  // namespace dsg

@@ -7,6 +7,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "schema/interop/file_error.h"
+#include "schema/interop/json_peek.h"
 
 namespace dsg {
 namespace {
@@ -19,6 +20,19 @@ const Layer& DefaultLayer(LayerId id) {
   const auto& defaults = DefaultLayers();
   return *std::find_if(defaults.begin(), defaults.end(),
                        [id](const Layer& layer) { return layer.id == id; });
+}
+
+LayerId IdOfCustom(const SparkLayerKey& key) {
+  return static_cast<LayerId>(1000 + 1000 * key.layer + key.partition);
+}
+
+// The kind of the nodes of a standard layer; "" for others.
+std::string KindOf(LayerId layer) {
+  for (const char* kind :
+       {kinds::kObject, kinds::kPlace, kinds::kStructure, kinds::kRoom, kinds::kBuilding}) {
+    if (LayerOfKind(kind) == layer) return kind;
+  }
+  return "";
 }
 
 // Names no kind of the model, which would tie the node to the model's layer.
@@ -40,6 +54,28 @@ SparkLayers::SparkLayers(const SparkGraph& graph) {
     if (name.starts_with("layer_")) continue;
     names_.emplace(key, name);
   }
+  ReadOwn(Peek(graph.own, "layers"));
+}
+
+// Entries that make no layer are passed over: the file then reads as a foreign one.
+void SparkLayers::ReadOwn(const nlohmann::json& layers) {
+  for (size_t i = 0; layers.is_array() && i < layers.size(); ++i) {
+    const nlohmann::json& entry = layers[i];
+    const nlohmann::json& name = Peek(entry, "name");
+    const SparkLayerKey key = {PeekSigned(Peek(entry, "layer")),
+                               static_cast<uint32_t>(PeekUnsigned(Peek(entry, "partition")))};
+    const int64_t rank = PeekSigned(Peek(entry, "rank"));
+    const bool is_layer = name.is_string() && !name.get_ref<const std::string&>().empty() &&
+                          name.get_ref<const std::string&>().size() <= kLayerNameMax && rank > 0 &&
+                          rank <= kLayerMax && key.layer >= 0 && key.layer <= kLayerMax &&
+                          key.partition <= kPartitionMax;
+    if (!is_layer) continue;
+    Layer layer = {IdOfCustom(key), name.get<std::string>(), static_cast<int32_t>(rank)};
+    for (const Layer& standard : DefaultLayers()) {
+      if (standard.name == layer.name) layer = standard;
+    }
+    own_[key] = layer;
+  }
 }
 
 std::string SparkLayers::NameOfCustom(const SparkLayerKey& key) const {
@@ -56,6 +92,12 @@ absl::StatusOr<SparkPlacement> SparkLayers::Place(const SparkNode& node, const s
                                   kLayerMax, ", 0 to ", kPartitionMax));
   }
   const bool is_pose = node.type == SparkClass::kAgent;
+  const auto own = own_.find(node.key);
+  if (own != own_.end() && !is_pose) {
+    const std::string kind = KindOf(own->second.id);
+    if (kind.empty()) custom_[own->second.id] = own->second;
+    return SparkPlacement{own->second, kind.empty() ? CustomKind(node.type) : kind};
+  }
   if (is_pose && layer == 2) {
     const Layer poses = {kAgentPoseLayer, "agent_poses", 200};
     custom_[poses.id] = poses;
@@ -73,8 +115,8 @@ absl::StatusOr<SparkPlacement> SparkLayers::Place(const SparkNode& node, const s
   if (!is_pose && layer == 5 && partition == 0) {
     return SparkPlacement{DefaultLayer(layers::kBuildings), kinds::kBuilding};
   }
-  const Layer custom = {static_cast<LayerId>(1000 + 1000 * layer + partition),
-                        NameOfCustom(node.key), static_cast<int32_t>(100 * layer)};
+  const Layer custom = {IdOfCustom(node.key), NameOfCustom(node.key),
+                        static_cast<int32_t>(100 * layer)};
   custom_[custom.id] = custom;
   return SparkPlacement{custom, is_pose ? kAgentPoseKind : CustomKind(node.type)};
 }

@@ -25,6 +25,7 @@ struct SparkPlacement {
 /// poses of layer 2 go to "agent_poses". All others become custom layers: id 1000 + 1000 x layer +
 /// partition, so that the same layer of two files is one layer; rank 100 x layer, so that every
 /// edge between layers of the file is a containment of the map; the file's name for the layer.
+/// An export of a map says itself which of the map's layers its layers are.
 class SparkLayers {
  public:
   explicit SparkLayers(const SparkGraph& graph);
@@ -32,13 +33,17 @@ class SparkLayers {
   /// Errors: INVALID_ARGUMENT/FILE_MALFORMED when the key is outside what ids can express.
   absl::StatusOr<SparkPlacement> Place(const SparkNode& node, const std::string& file);
 
+  /// The layers that an export of a map has besides the standard ones.
+  const std::map<SparkLayerKey, Layer>& own_layers() const { return own_; }
   /// The custom layers that Place has returned so far, by id.
   std::vector<Layer> custom_layers() const;
 
  private:
   std::string NameOfCustom(const SparkLayerKey& key) const;
+  void ReadOwn(const nlohmann::json& layers);
 
   std::map<SparkLayerKey, std::string> names_;
+  std::map<SparkLayerKey, Layer> own_;
   std::map<LayerId, Layer> custom_;
 };
 

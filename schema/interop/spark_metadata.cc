@@ -49,20 +49,18 @@ std::string MetadataText(const Json& metadata) {
 
 void ReadGraphMetadata(const Json& metadata, SparkGraph* graph) {
   if (!metadata.is_object()) return;
+  graph->metadata = metadata;
+  graph->own = TakeOwn(&graph->metadata);
   for (const auto& [name, value] : metadata.items()) {
-    if (name != "labelspaces" || !value.is_object()) {
-      graph->notes.push_back(
-          absl::StrCat("graph metadata \"", name.substr(0, 64), "\" was not kept"));
-      continue;
-    }
+    if (name != "labelspaces" || !value.is_object()) continue;
     for (const auto& [space_name, space] : value.items()) {
       const auto key = LabelSpaceKey(space_name);
       auto labels = LabelsOf(space);
       if (key.has_value() && labels.has_value()) {
         graph->label_spaces[*key] = *std::move(labels);
       } else {
-        graph->notes.push_back(absl::StrCat("label space \"", space_name.substr(0, 64),
-                                            "\" was not understood and not kept"));
+        graph->notes.push_back(
+            absl::StrCat("label space \"", space_name.substr(0, 64), "\" was not understood"));
       }
     }
   }

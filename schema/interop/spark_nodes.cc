@@ -169,6 +169,12 @@ absl::Status SparkNodeConverter::ConvertClass(const SparkNode& in, Node* out) {
 }
 
 void SparkNodeConverter::ConvertTimes(const SparkNode& in, Node* out) {
+  if (in.type == SparkClass::kAgent) {
+    // The instant of the pose, whatever clock it is of.
+    out->first_observed_ns = in.stamp_ns;
+    out->last_observed_ns = in.stamp_ns;
+    return;
+  }
   const auto keep = [this](uint64_t time, bool earliest, std::optional<TimeNs>* kept) {
     if (time == 0) return;
     const bool is_time = time <= static_cast<uint64_t>(kTimeMax) &&
@@ -200,7 +206,7 @@ absl::Status SparkNodeConverter::ConvertComponents(const SparkNode& in, Node* ou
   }
   if (out->kind == kinds::kObject) {
     ObjectInfo object;
-    object.color = in.color;
+    if (in.color != kSparkNoColor) object.color = in.color;
     if (!out->box_node.isEmpty()) object.size = in.box.dimensions.cast<double>();
     out->object = object;
   } else if (out->kind == kinds::kPlace) {
@@ -229,7 +235,7 @@ absl::Status SparkNodeConverter::ConvertComponents(const SparkNode& in, Node* ou
 
 void SparkNodeConverter::ConvertAttributes(const SparkNode& in, Node* out) {
   out->attributes = in.attributes;
-  if (in.color.has_value() && !out->object.has_value()) {
+  if (in.color.has_value() && in.color != kSparkNoColor && !out->object.has_value()) {
     out->attributes["color"] = ColorText(*in.color);
   }
   if (!out->place.has_value() && in.distance != 0.0) out->attributes["distance"] = in.distance;

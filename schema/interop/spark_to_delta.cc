@@ -9,9 +9,13 @@
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
 #include "schema/interop/file_error.h"
+#include "schema/interop/graph_rest.h"
+#include "schema/interop/mesh_numbering.h"
+#include "schema/interop/own_parts.h"
 #include "schema/interop/spark_agents.h"
 #include "schema/interop/spark_layers.h"
 #include "schema/interop/spark_nodes.h"
+#include "schema/interop/spark_rest.h"
 #include "schema/model/delta_check.h"
 
 namespace dsg {
@@ -33,11 +37,12 @@ class SparkDeltaBuilder {
     DSG_RETURN_IF_ERROR(AddEdges());
     result_.delta.layers = layers_.custom_layers();
     AddLabels();
-    NoteShortenedLists();
     AddSparkAgents(graph_, &result_.delta, &result_.notes);
     DSG_RETURN_IF_ERROR(AddMesh());
-    FindFirstTime();
     FitBoxesToChildren(&result_.delta);
+    DSG_RETURN_IF_ERROR(TakeOwnParts(graph_, layers_, file_, &result_.delta));
+    KeepRests();
+    FindFirstTime();
     return std::move(result_);
   }
 
@@ -154,10 +159,26 @@ class SparkDeltaBuilder {
     }
   }
 
-  void NoteShortenedLists() {
-    for (const auto& [name, count] : graph_.shortened_lists) {
-      result_.notes.push_back(absl::StrCat("of the lists \"", name, "\" of ", count,
-                                           " nodes only the lengths are kept, as attributes"));
+  // What nodes, edges and graph say beyond what a map has fields for, so that an export is whole.
+  void KeepRests() {
+    const MeshNumbering numbering(graph_, mesh_block_size_m_);
+    std::unordered_map<NodeId, Node*> nodes;
+    for (Node& node : result_.delta.nodes) nodes[node.id] = &node;
+    int64_t lost_count = 0;
+    for (const SparkNode& read : graph_.nodes) {
+      const auto node = nodes.find(NodeId(read.id));
+      // An export says itself what the attributes were.
+      if (node == nodes.end() || read.own.is_object()) continue;
+      const bool keep_key = !layers_.own_layers().contains(read.key);
+      const bool is_kept = numbering.is_needed()
+                               ? KeepRest(numbering.Renumber(read), keep_key, node->second)
+                               : KeepRest(read, keep_key, node->second);
+      if (!is_kept) ++lost_count;
+    }
+    if (!KeepGraphRest(graph_, &result_.delta)) ++lost_count;
+    if (lost_count > 0) {
+      result_.notes.push_back(absl::StrCat(
+          lost_count, " nodes say more than a node of a map can keep; an export lacks it"));
     }
   }
 

@@ -103,13 +103,14 @@ TEST(SparkJson, IgnoresTheUninitialisedEllipseFields) {
   EXPECT_EQ(graph->nodes[0].boundary.size(), 3u);
 }
 
-TEST(SparkJson, NotesMetadataThatIsNotKept) {
+TEST(SparkJson, KeepsMetadataAndNotesLabelSpacesThatItDoesNotUnderstand) {
   const auto graph = Read(R"({"nodes": [], "edges": [], "metadata": {"mission": 7,
       "labelspaces": {"_l3p1": [[2, "floor"]], "odd": [[1, "x"]], "_l2p0": [["x", 1]]}}})");
   ASSERT_TRUE(graph.ok()) << graph.status();
   EXPECT_EQ(graph->label_spaces.size(), 1u);
   EXPECT_EQ(graph->label_spaces.at({3, 1})[0].name, "floor");
-  EXPECT_EQ(graph->notes.size(), 3u);
+  EXPECT_EQ(graph->notes.size(), 2u);
+  EXPECT_EQ(graph->metadata["mission"], 7);
 }
 
 struct BadField {

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Lists of mesh vertices, renumbered as an export of the map numbers them.
+// Refuses to touch lists with numbers that the mesh does not have: they speak of another mesh.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "schema/interop/spark_graph.h"
+
+namespace dsg {
+
+class MeshNumbering {
+ public:
+  MeshNumbering(const SparkGraph& graph, double block_size_m);
+
+  /// False if the numbers stay as they are.
+  bool is_needed() const { return is_needed_; }
+  SparkNode Renumber(const SparkNode& node) const;
+
+ private:
+  bool is_needed_ = false;
+  std::vector<uint32_t> number_of_;
+};
+
+}  // namespace dsg

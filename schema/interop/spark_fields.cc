@@ -1,0 +1,408 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "schema/interop/spark_fields.h"
+
+#include <array>
+#include <limits>
+#include <map>
+#include <utility>
+
+#include "schema/interop/json_peek.h"
+
+namespace dsg {
+namespace {
+
+using Json = nlohmann::json;
+using Type = SparkFieldType;
+
+constexpr uint32_t kNoLabel = std::numeric_limits<uint32_t>::max();
+
+constexpr SparkField kNode[] = {{"position", Type::kVector3},
+                                {"last_update_time_ns", Type::kUnsigned64},
+                                {"is_active", Type::kBool},
+                                {"is_predicted", Type::kBool, {1, 0, 4}}};
+constexpr SparkField kSemantic[] = {{"name", Type::kText},
+                                    {"color", Type::kColor},
+                                    {"bounding_box", Type::kBox},
+                                    {"semantic_label", Type::kLabel},
+                                    {"semantic_feature", Type::kFeature}};
+constexpr SparkField kObject[] = {{"mesh_connections", Type::kList64},
+                                  {"registered", Type::kBool},
+                                  {"world_R_object", Type::kQuaternion}};
+constexpr SparkField kKhronos[] = {{"first_observed_ns", Type::kList64},
+                                   {"last_observed_ns", Type::kList64},
+                                   {"trajectory_positions", Type::kFloatVectorList},
+                                   {"trajectory_timestamps", Type::kList64},
+                                   {"dynamic_object_points", Type::kCloudList},
+                                   {"details", Type::kDetails},
+                                   {"mesh", Type::kMesh}};
+constexpr SparkField kRoom[] = {{"semantic_class_probabilities", Type::kProbabilities}};
+constexpr SparkField kPlace[] = {{"distance", Type::kNumber},
+                                 {"num_basis_points", Type::kUnsigned32},
+                                 {"voxblox_mesh_connections", Type::kMeshLinks},
+                                 {"pcl_mesh_connections", Type::kList64},
+                                 {"mesh_vertex_labels", Type::kList8},
+                                 {"deformation_connections", Type::kList64},
+                                 {"real_place", Type::kBool},
+                                 {"active_frontier", Type::kBool},
+                                 {"frontier_scale", Type::kVector3},
+                                 {"orientation", Type::kQuaternion},
+                                 {"need_cleanup", Type::kBool},
+                                 {"num_frontier_voxels", Type::kUnsigned64},
+                                 {"anti_frontier", Type::kBool, {1, 1, 3}}};
+constexpr SparkField kPlace2d[] = {{"boundary", Type::kVectorList},
+                                   {"ellipse_centroid", Type::kVector3},
+                                   {"ellipse_matrix_compress", Type::kMatrix2},
+                                   {"ellipse_matrix_expand", Type::kMatrix2},
+                                   {"pcl_boundary_connections", Type::kList64},
+                                   {"voxblox_mesh_connections", Type::kMeshLinks},
+                                   {"pcl_mesh_connections", Type::kList64},
+                                   {"mesh_vertex_labels", Type::kList8},
+                                   {"deformation_connections", Type::kList64},
+                                   {"need_cleanup_splitting", Type::kBool},
+                                   {"has_active_mesh_indices", Type::kBool}};
+constexpr SparkField kAgent[] = {{"timestamp", Type::kTime, {1, 1, 0}},
+                                 {"world_R_body", Type::kQuaternion},
+                                 {"external_key", Type::kNodeId},
+                                 {"dbow_ids", Type::kColumnUnsigned32},
+                                 {"dbow_values", Type::kColumnFloat}};
+constexpr SparkField kTraversability[] = {{"first_observed_ns", Type::kUnsigned64},
+                                          {"last_observed_ns", Type::kUnsigned64},
+                                          {"distance", Type::kNumber},
+                                          {"min", Type::kVector2},
+                                          {"max", Type::kVector2},
+                                          {"states_0", Type::kList8},
+                                          {"states_1", Type::kList8},
+                                          {"states_2", Type::kList8},
+                                          {"states_3", Type::kList8}};
+
+template <size_t n>
+void Append(const SparkField (&own)[n], std::vector<SparkField>* fields) {
+  fields->insert(fields->end(), std::begin(own), std::end(own));
+}
+
+std::vector<SparkField> Collect(SparkClass type) {
+  std::vector<SparkField> fields;
+  Append(kNode, &fields);
+  if (IsSemantic(type)) Append(kSemantic, &fields);
+  switch (type) {
+    case SparkClass::kKhronosObject:
+      Append(kObject, &fields);
+      Append(kKhronos, &fields);
+      break;
+    case SparkClass::kObject:
+      Append(kObject, &fields);
+      break;
+    case SparkClass::kRoom:
+      Append(kRoom, &fields);
+      break;
+    case SparkClass::kPlace:
+      Append(kPlace, &fields);
+      break;
+    case SparkClass::kPlace2d:
+      Append(kPlace2d, &fields);
+      break;
+    case SparkClass::kAgent:
+      Append(kAgent, &fields);
+      break;
+    case SparkClass::kTraversability:
+      Append(kTraversability, &fields);
+      break;
+    case SparkClass::kNode:
+    case SparkClass::kSemantic:
+      break;
+  }
+  return fields;
+}
+
+Json QuaternionJson(const Eigen::Quaterniond& q) {
+  return {{"w", q.w()}, {"x", q.x()}, {"y", q.y()}, {"z", q.z()}};
+}
+
+template <typename V>
+Json VectorJson(const V& v) {
+  return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
+}
+
+Json ColorJson(const Color& color) {
+  return {{"r", color[0]}, {"g", color[1]}, {"b", color[2]}, {"a", color[3]}};
+}
+
+Json EmptyMesh() {
+  return {{"has_colors", false},
+          {"has_timestamps", false},
+          {"has_labels", false},
+          {"has_first_seen_stamps", false}};
+}
+
+Json EmptyBox() {
+  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+  return {{"type", "INVALID"},
+          {"dimensions", VectorJson(zero)},
+          {"world_P_center", VectorJson(zero)},
+          {"world_R_center", QuaternionJson(Eigen::Quaterniond::Identity())}};
+}
+
+void UpgradeColor(Json* color) {
+  if (color->is_object()) {
+    if (!color->contains("a")) (*color)["a"] = 255;
+    return;
+  }
+  Color parts = {0, 0, 0, 255};
+  for (size_t i = 0; i < color->size() && i < 4; ++i) {
+    parts[i] = static_cast<uint8_t>(PeekUnsigned(PeekAt(*color, i)));
+  }
+  *color = ColorJson(parts);
+}
+
+void UpgradeBox(Json* box) {
+  if (!box->is_object()) {
+    *box = EmptyBox();
+    return;
+  }
+  const Json type = Peek(*box, "type");
+  constexpr const char* kNames[] = {"INVALID", "AABB", "OBB", "RAABB"};
+  if (type.is_number_unsigned() && type.get<size_t>() < 4) {
+    (*box)["type"] = kNames[type.get<size_t>()];
+  }
+  if (type.is_null()) (*box)["type"] = "INVALID";
+  const bool is_old = !box->contains("dimensions") && box->contains("min") && box->contains("max");
+  if (is_old) {
+    Json dimensions = Json::array();
+    for (size_t i = 0; i < 3; ++i) {
+      const auto max = static_cast<float>(PeekNumber(PeekAt((*box)["max"], i)));
+      const auto min = static_cast<float>(PeekNumber(PeekAt((*box)["min"], i)));
+      dimensions.push_back(static_cast<double>(max - min));
+    }
+    (*box)["dimensions"] = std::move(dimensions);
+    box->erase("min");
+    box->erase("max");
+  }
+  const Json empty = EmptyBox();
+  for (const auto& [name, value] : empty.items()) {
+    if (!box->contains(name)) (*box)[name] = value;
+  }
+}
+
+// Before 1.0.2 a Khronos object's mesh was three flat lists beside the other fields.
+void UpgradeKhronosMesh(Json* attributes) {
+  if (attributes->contains("mesh")) return;
+  Json mesh = EmptyMesh();
+  const std::pair<const char*, const char*> lists[] = {
+      {"vertices", "points"}, {"colors", "colors"}, {"faces", "faces"}};
+  for (const auto& [old_name, name] : lists) {
+    const auto found = attributes->find(old_name);
+    if (found == attributes->end()) continue;
+    const bool is_flat = found->is_array() && !found->empty() && !found->front().is_structured();
+    if (is_flat && found->size() % 3 == 0) {
+      Json triples = Json::array();
+      for (size_t i = 0; i < found->size(); i += 3) {
+        triples.push_back({(*found)[i], (*found)[i + 1], (*found)[i + 2]});
+        if (old_name == std::string_view("colors")) triples.back().push_back(255);
+      }
+      mesh[name] = std::move(triples);
+    }
+    attributes->erase(found);
+  }
+  mesh["has_colors"] = mesh.contains("colors");
+  (*attributes)["mesh"] = std::move(mesh);
+}
+
+bool HasFlag(const SparkNode& node, const char* name) {
+  const auto found = node.attributes.find(name);
+  const bool* flag = found == node.attributes.end() ? nullptr : std::get_if<bool>(&found->second);
+  return flag != nullptr && *flag;
+}
+
+double NumberIn(const SparkNode& node, const std::string& name) {
+  const auto found = node.attributes.find(name);
+  const auto* number =
+      found == node.attributes.end() ? nullptr : std::get_if<double>(&found->second);
+  return number == nullptr ? 0.0 : *number;
+}
+
+Json BoxJson(const SparkBox& box) {
+  if (box.type == SparkBox::Type::kInvalid) return EmptyBox();
+  constexpr const char* kNames[] = {"INVALID", "AABB", "OBB", "RAABB"};
+  const Eigen::Quaternionf rotation(box.rotation);
+  return {{"type", kNames[static_cast<int>(box.type)]},
+          {"dimensions", VectorJson(box.dimensions)},
+          {"world_P_center", VectorJson(box.center)},
+          {"world_R_center", QuaternionJson(rotation.cast<double>())}};
+}
+
+void MakeSemantic(const SparkNode& node, Json* out) {
+  (*out)["name"] = node.name;
+  if (node.color.has_value()) (*out)["color"] = ColorJson(*node.color);
+  (*out)["bounding_box"] = BoxJson(node.box);
+  if (node.label.has_value()) (*out)["semantic_label"] = *node.label;
+}
+
+void MakePlace(const SparkNode& node, Json* out) {
+  (*out)["distance"] = node.distance;
+  (*out)["num_basis_points"] = node.basis_point_count;
+  (*out)["frontier_scale"] = VectorJson(Eigen::Vector3d(NumberIn(node, "frontier_scale_x"),
+                                                        NumberIn(node, "frontier_scale_y"),
+                                                        NumberIn(node, "frontier_scale_z")));
+  (*out)["orientation"] = QuaternionJson(node.orientation);
+  (*out)["num_frontier_voxels"] = static_cast<uint64_t>(NumberIn(node, "num_frontier_voxels"));
+}
+
+void MakeTraversability(const SparkNode& node, Json* out) {
+  const auto first = [](const std::vector<uint64_t>& times) {
+    return times.empty() ? uint64_t{0} : times.front();
+  };
+  (*out)["first_observed_ns"] = first(node.first_observed_ns);
+  (*out)["last_observed_ns"] = first(node.last_observed_ns);
+  (*out)["distance"] = node.distance;
+  for (const std::string corner : {"min", "max"}) {
+    (*out)[corner] = {NumberIn(node, corner + "_x"), NumberIn(node, corner + "_y")};
+  }
+}
+
+void MakeOwn(const SparkNode& node, Json* out) {
+  switch (node.type) {
+    case SparkClass::kKhronosObject:
+      (*out)["first_observed_ns"] = node.first_observed_ns;
+      (*out)["last_observed_ns"] = node.last_observed_ns;
+      (*out)["world_R_object"] = QuaternionJson(node.orientation);
+      return;
+    case SparkClass::kObject:
+      (*out)["world_R_object"] = QuaternionJson(node.orientation);
+      return;
+    case SparkClass::kRoom:
+      (*out)["semantic_class_probabilities"] = Json::object();
+      for (const auto& [name, probability] : node.class_probabilities) {
+        (*out)["semantic_class_probabilities"][name] = probability;
+      }
+      return;
+    case SparkClass::kPlace:
+      return MakePlace(node, out);
+    case SparkClass::kPlace2d:
+      (*out)["boundary"] = Json::array();
+      for (const Eigen::Vector3d& corner : node.boundary) {
+        (*out)["boundary"].push_back(VectorJson(corner));
+      }
+      return;
+    case SparkClass::kAgent:
+      if (node.stamp_ns.has_value()) (*out)["timestamp"] = *node.stamp_ns;
+      (*out)["world_R_body"] = QuaternionJson(node.orientation);
+      return;
+    case SparkClass::kTraversability:
+      return MakeTraversability(node, out);
+    case SparkClass::kNode:
+    case SparkClass::kSemantic:
+      return;
+  }
+}
+
+}  // namespace
+
+const std::vector<SparkField>& FieldsOf(SparkClass type) {
+  static const auto* const all = [] {
+    auto* fields = new std::map<SparkClass, std::vector<SparkField>>;
+    for (int i = 0; i <= static_cast<int>(SparkClass::kTraversability); ++i) {
+      (*fields)[static_cast<SparkClass>(i)] = Collect(static_cast<SparkClass>(i));
+    }
+    return fields;
+  }();
+  return all->at(type);
+}
+
+Json DefaultOf(SparkFieldType type, uint64_t node_id) {
+  switch (type) {
+    case Type::kVector3:
+      return VectorJson(Eigen::Vector3d(Eigen::Vector3d::Zero()));
+    case Type::kVector2:
+      return {0.0, 0.0};
+    case Type::kMatrix2:
+      return {0.0, 0.0, 0.0, 0.0};
+    case Type::kUnsigned64:
+    case Type::kUnsigned32:
+      return 0u;
+    case Type::kNodeId:
+      return node_id;
+    case Type::kTime:
+    case Type::kColumnUnsigned32:
+    case Type::kColumnFloat:
+      return nullptr;
+    case Type::kLabel:
+      return kNoLabel;
+    case Type::kNumber:
+      return 0.0;
+    case Type::kBool:
+      return false;
+    case Type::kText:
+      return "";
+    case Type::kColor:
+      return ColorJson(kSparkNoColor);
+    case Type::kBox:
+      return EmptyBox();
+    case Type::kFeature:
+      return {{"rows", 0}, {"cols", 0}, {"data", nullptr}};
+    case Type::kQuaternion:
+      return QuaternionJson(Eigen::Quaterniond::Identity());
+    case Type::kList64:
+    case Type::kList8:
+    case Type::kVectorList:
+    case Type::kFloatVectorList:
+    case Type::kCloudList:
+    case Type::kMeshLinks:
+      return Json::array();
+    case Type::kProbabilities:
+    case Type::kDetails:
+      return Json::object();
+    case Type::kMesh:
+      return EmptyMesh();
+  }
+  return nullptr;
+}
+
+void UpgradeFields(SparkClass type, uint64_t node_id, Json* attributes) {
+  if (type == SparkClass::kKhronosObject) UpgradeKhronosMesh(attributes);
+  for (const SparkField& field : FieldsOf(type)) {
+    const auto found = attributes->find(field.name);
+    const bool is_missing = found == attributes->end() || found->is_null();
+    if (is_missing) {
+      const Json fallback = DefaultOf(field.type, node_id);
+      const bool is_absent = fallback.is_null() && field.type == Type::kTime;
+      if (!is_absent) (*attributes)[field.name] = fallback;
+      continue;
+    }
+    if (field.type == Type::kColor) UpgradeColor(&*found);
+    if (field.type == Type::kBox) UpgradeBox(&*found);
+    // A bare list once stood for a column.
+    if (field.type == Type::kFeature && found->is_array()) {
+      *found = {{"rows", found->size()}, {"cols", 1}, {"data", *found}};
+    }
+  }
+  if (!attributes->contains("metadata") || (*attributes)["metadata"].is_null()) {
+    (*attributes)["metadata"] = Json::object();
+  }
+}
+
+Json MakeFields(const SparkNode& node) {
+  Json out = {{"type", NameOf(node.type)},
+              {"position", VectorJson(node.position)},
+              {"last_update_time_ns", node.last_update_ns},
+              {"is_predicted", node.is_predicted}};
+  if (IsSemantic(node.type)) MakeSemantic(node, &out);
+  MakeOwn(node, &out);
+  for (const SparkField& field : FieldsOf(node.type)) {
+    if (field.type == Type::kBool && HasFlag(node, field.name)) out[field.name] = true;
+  }
+  const auto key = node.attributes.find("external_key");
+  if (node.type == SparkClass::kAgent && key != node.attributes.end()) {
+    const auto* text = std::get_if<std::string>(&key->second);
+    const Json parsed = text == nullptr ? Json() : Json::parse(*text, nullptr, false);
+    if (parsed.is_number_unsigned()) out["external_key"] = parsed;
+  }
+  const auto metadata = node.attributes.find("metadata");
+  const auto* text =
+      metadata == node.attributes.end() ? nullptr : std::get_if<std::string>(&metadata->second);
+  if (text != nullptr) out["metadata"] = Json::parse(*text, nullptr, false);
+  if (out.contains("metadata") && out["metadata"].is_discarded()) out.erase("metadata");
+  UpgradeFields(node.type, node.id, &out);
+  return out;
+}
+
+}  // namespace dsg
