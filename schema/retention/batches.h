@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// Makes the changes of a plan: deltas of bounded size, each of which leaves a sound map.
+// Refuses to overwrite what others have changed since the plan was made: that is left as it is.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "schema/model/graph_delta.h"
+#include "schema/retention/plan.h"
+
+namespace dsg {
+
+struct BatchHeader {
+  std::string map;
+  /// Must be new with each plan.
+  std::string session_id;
+  std::string author;
+  /// "prune NAME"; ", part 1" and so on is added.
+  std::string message;
+};
+
+/// Rows of one delta.
+inline constexpr size_t kPruneBatchRows = 5'000;
+
+/// Order: meshes; then agent by agent shapes, factors and poses; stays; nodes, children before
+/// parents, each with its edges. Cut off at any point, the same policies find the rest.
+///
+/// Threads: one caller at a time.
+class PruneBatches {
+ public:
+  /// `at_plan`: the map at the revision of the plan.
+  PruneBatches(std::shared_ptr<const Snapshot> at_plan, PrunePlan plan, BatchHeader header);
+  ~PruneBatches();
+
+  /// The next delta; nullopt when all is done. `head`: the map as it is now.
+  absl::StatusOr<std::optional<GraphDelta>> Next(const Snapshot& head, const StopCheck& stop);
+
+  /// Others have changed these: what is left of the plan for them is dropped.
+  void Avoid(const Touched& touched);
+
+  /// From 0 to 1.
+  double progress() const;
+  const PrunePlan& plan() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace dsg

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Finds what exactly a selection takes from a map, and counts it.
+// Refuses to decide what is selected.
+#pragma once
+
+#include <set>
+
+#include "absl/status/status.h"
+#include "schema/retention/plan.h"
+#include "schema/retention/selection.h"
+
+namespace dsg {
+
+/// One selection with what comes of it.
+struct Measured {
+  Selection selection;
+  Amount amount;
+  std::vector<TrackPlan> tracks;
+  std::vector<StayKey> stay_removals;
+  std::vector<Stay> stay_edits;
+  MeshPlan mesh;
+  /// Edges by the first node of the selection at them, in the order of GraphIndex::bottom_up.
+  std::vector<int32_t> edge_counts;
+  /// Poses that are forgotten, thinned ones not counted.
+  int64_t forgotten_pose_count = 0;
+};
+
+/// Fills all but `selection` of each.
+absl::Status Measure(const Snapshot& map, const GraphIndex& index, const StopCheck& stop,
+                     std::vector<Measured>* all);
+
+/// What was clipped to the end of a track gets its open end back.
+Stay WithOpenEnd(Stay stay, const TrackInfo& track);
+
+// Parts of Measure: measure_tracks.cc, measure_stays.cc.
+
+/// Also collects the topologies of shapes that go.
+absl::Status MeasureTracks(const Snapshot& map, const GraphIndex& index, const StopCheck& stop,
+                           Measured* measured, std::set<Sha256>* topologies);
+absl::Status MeasureStays(const Snapshot& map, const GraphIndex& index, const StopCheck& stop,
+                          Measured* measured);
+
+}  // namespace dsg

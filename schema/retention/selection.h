@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// What policies match in one map at one revision, before it is known what that amounts to.
+// Refuses to look into tracks and meshes: it names spans and spaces.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "schema/retention/graph_index.h"
+#include "schema/retention/policy.h"
+
+namespace dsg {
+
+/// Thinning of one track (simplify.h).
+struct Thinning {
+  Interval span;
+  /// The ends of the span lie in the world, not at an age: they will be the same next time.
+  bool ends_are_fixed = false;
+  double position_m = 0.0;
+  double rotation_rad = 0.0;
+};
+
+struct TrackChoice {
+  NodeId agent;
+  /// Poses, shapes and factors inside go. Ascending, disjoint.
+  std::vector<Interval> forgotten;
+  /// Stays that end until then go.
+  TimeNs stays_until_ns = kTimeMin;
+  std::vector<Thinning> thinnings;
+};
+
+struct Selection {
+  /// By index in the GraphIndex.
+  std::vector<bool> is_gone;
+  bool all_mesh = false;
+  std::vector<Solid> solids;
+  /// Ascending by agent.
+  std::vector<TrackChoice> tracks;
+
+  /// What either matches.
+  void Add(const Selection& other);
+};
+
+/// Joins what touches or overlaps. Order: ascending.
+std::vector<Interval> JoinIntervals(std::vector<Interval> intervals);
+
+/// What one policy matches; of a history policy nothing.
+/// Errors: NOT_FOUND/NODE_UNKNOWN, LAYER_UNKNOWN.
+absl::StatusOr<Selection> Select(const Snapshot& map, const GraphIndex& index,
+                                 const PrunePolicy& policy, const StopCheck& stop);
+
+/// The instant before which an age or an instant of a policy lies; nullopt for policies without
+/// one, and for ages in a map in which nothing was observed.
+std::optional<TimeNs> CutoffOf(const PrunePolicy& policy, std::optional<TimeNs> newest_ns);
+
+/// Layers that a policy may touch.
+class LayerSet {
+ public:
+  /// Errors: NOT_FOUND/LAYER_UNKNOWN.
+  static absl::StatusOr<LayerSet> Of(const PrunePolicy& policy, const Snapshot& map);
+  bool Holds(LayerId layer) const;
+
+ private:
+  bool is_all_ = true;
+  std::vector<LayerId> layers_;
+};
+
+// Parts of Select: node_choice.cc, track_choice.cc.
+absl::Status ChooseNodes(const Snapshot& map, const GraphIndex& index, const PrunePolicy& policy,
+                         const LayerSet& layers, Selection* selection);
+absl::Status ChooseTracks(const Snapshot& map, const GraphIndex& index, const PrunePolicy& policy,
+                          const StopCheck& stop, Selection* selection);
+
+}  // namespace dsg
