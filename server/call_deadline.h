@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How long a call may take: what the caller gave, within bounds. Only a watch may last for ever.
+// How long a call may take: what the caller gave, within bounds.
+// Only watches and maintenance may last for ever.
 #pragma once
 
 #include <chrono>
@@ -19,7 +20,8 @@ query::CallContext::Clock::time_point BoundDeadline(std::chrono::system_clock::t
 /// Whether gRPC would let a call with that deadline last longer.
 bool OutlastsBound(std::chrono::system_clock::time_point deadline);
 
-/// BoundDeadline for watches, which have no end of their own: none unless the caller gave one.
+/// BoundDeadline for watches and maintenance, which may take any time: none unless the caller gave
+/// one.
 query::CallContext::Clock::time_point WatchDeadline(std::chrono::system_clock::time_point deadline);
 
 }  // namespace dsg::server

@@ -7,13 +7,18 @@
 
 #include <chrono>
 #include <cstdio>
+#include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "CLI/CLI.hpp"
 #include "grpc/support/log.h"
 #include "schema/base/log.h"
+#include "schema/base/status.h"
+#include "schema/retention/policy_file.h"
 #include "schema/store/graph_store.h"
+#include "server/prune_schedule.h"
 #include "server/server.h"
 
 namespace {
@@ -25,6 +30,8 @@ struct Flags {
   std::string store;
   std::string log_level = "info";
   size_t view_cache_mb = 1024;
+  dsg::StoreOptions limits;
+  std::string policy_file;
   dsg::server::ServerOptions options;
 };
 
@@ -44,6 +51,14 @@ void DeclareFlags(CLI::App* app, Flags* flags) {
   app->add_option("--max-watches", flags->options.open_watch_max,
                   "Watches of maps open at a time; more are refused")
       ->capture_default_str();
+  app->add_option("--quota", flags->limits.quota_bytes,
+                  "Refuse to let a map grow beyond (10GB, 500MiB); 0 = no limit")
+      ->transform(CLI::AsSizeValue(true));
+  app->add_option("--reserve", flags->limits.reserve_bytes,
+                  "Space kept in each map so that forgetting works on a full disk; 0 = none")
+      ->transform(CLI::AsSizeValue(true));
+  app->add_option("--policy", flags->policy_file,
+                  "Forget on a schedule what this file of policies names (docs/forgetting.md)");
   app->add_option("--view-cache-mb", flags->view_cache_mb,
                   "Mebibytes of memory for the graphs of all maps; a larger graph is refused")
       ->check(CLI::Range(size_t{1}, size_t{1} << 24))
@@ -97,11 +112,37 @@ void StartWatchdog() {
   }).detach();
 }
 
+// Applies a file of policies on a thread of its own, until it is destroyed.
+class Forgetting {
+ public:
+  Forgetting(dsg::query::ServiceCore* core, dsg::PolicyFile file)
+      : schedule_(core, std::move(file), dsg::server::PruneScheduleOptions(),
+                  dsg::server::MakeScheduleClock()),
+        thread_([this] { schedule_.Run(); }) {}
+  ~Forgetting() {
+    schedule_.Stop();
+    thread_.join();
+  }
+
+ private:
+  dsg::server::PruneSchedule schedule_;
+  std::thread thread_;
+};
+
+// No file, no policies.
+absl::StatusOr<std::optional<dsg::PolicyFile>> ReadPolicies(const std::string& path) {
+  if (path.empty()) return std::optional<dsg::PolicyFile>();
+  DSG_ASSIGN_OR_RETURN(dsg::PolicyFile file, dsg::ReadPolicyFile(path));
+  return std::optional<dsg::PolicyFile>(std::move(file));
+}
+
 int Serve(Flags flags) {
   const sigset_t signals = BlockStopSignals();
   RaiseDescriptorLimit();
   gpr_set_log_function(LogOfGrpc);
-  dsg::StoreOptions store_options;
+  auto policies = ReadPolicies(flags.policy_file);
+  if (!policies.ok()) return FailToStart(policies.status());
+  dsg::StoreOptions store_options = flags.limits;
   store_options.create = true;
   store_options.program = "dsg-server";
   auto store = dsg::GraphStore::Open(flags.store, store_options);
@@ -114,9 +155,12 @@ int Serve(Flags flags) {
   flags.options.log_all_calls = flags.log_level == "debug";
   dsg::query::ServiceCoreOptions core_options;
   core_options.view_cache_bytes = flags.view_cache_mb << 20;
-  auto server = dsg::server::Server::Start(
-      dsg::query::MakeServiceCore(*std::move(store), core_options), flags.options);
+  auto core = dsg::query::MakeServiceCore(*std::move(store), core_options);
+  dsg::query::ServiceCore* const kept_core = core.get();
+  auto server = dsg::server::Server::Start(std::move(core), flags.options);
   if (!server.ok()) return FailToStart(server.status());
+  std::optional<Forgetting> forgetting;
+  if (policies->has_value()) forgetting.emplace(kept_core, **std::move(policies));
   std::printf("dsg-server: listening on %s, store %s, %zu maps\n", (*server)->address().c_str(),
               flags.store.c_str(), maps->size());
   std::fflush(stdout);
@@ -125,6 +169,7 @@ int Serve(Flags flags) {
   sigwait(&signals, &received);
   dsg::Log(dsg::LogLevel::kInfo, "stopping", {{"signal", strsignal(received)}});
   StartWatchdog();
+  forgetting.reset();
   (*server)->Shutdown(kGrace);
   // Closes the store; its writers give up their locks.
   server->reset();

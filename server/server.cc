@@ -80,6 +80,8 @@ class RunningServer final : public Server {
     services_.push_back(MakeQueryService(&questions_));
     services_.push_back(MakeMapService(&questions_));
     services_.push_back(MakeIngestService(&commits_));
+    // Beside the commits, as it writes too and may wait for them.
+    services_.push_back(MakeMaintenanceService(&commits_));
   }
 
   ~RunningServer() override { Shutdown(std::chrono::seconds(1)); }
@@ -125,6 +127,7 @@ class RunningServer final : public Server {
       grpc_server_->GetHealthCheckService()->Shutdown();
       // Watches would use up the grace, since nothing else ends them.
       questions_.stopping = true;
+      commits_.stopping = true;
       delays_.HurryAll();
       // Waits for every call: those that run past the grace are cancelled, see it, and finish.
       grpc_server_->Shutdown(std::chrono::system_clock::now() + grace);
@@ -183,8 +186,8 @@ absl::Status TooManyWatchesError(int watch_max) {
 
 absl::Status ShuttingDownError() {
   return MakeError(Reason::kShuttingDown,
-                   "the server is stopping; watch again from the last read_revision when it is "
-                   "back");
+                   "the server is stopping; call again when it is back: a watch goes on from "
+                   "the last read_revision, and maintenance does what is left");
 }
 
 absl::Status ServerOptions::Validate() const {

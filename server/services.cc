@@ -4,6 +4,7 @@
 #include <google/protobuf/arena.h>
 
 #include "dsg/v1/ingest_service.grpc.pb.h"
+#include "dsg/v1/maintenance_service.grpc.pb.h"
 #include "dsg/v1/map_service.grpc.pb.h"
 #include "dsg/v1/query_service.grpc.pb.h"
 #include "server/arena_blocks.h"
@@ -260,6 +261,47 @@ class IngestService final : public v1::IngestService::CallbackService {
   CallRuntime* runtime_;
 };
 
+class MaintenanceService final : public v1::MaintenanceService::CallbackService {
+ public:
+  explicit MaintenanceService(CallRuntime* runtime) : runtime_(runtime) {}
+
+  grpc::ServerWriteReactor<v1::PruneResponse>* Prune(CallbackServerContext* context,
+                                                     const v1::PruneRequest* request) override {
+    return StartWork(runtime_, "Prune", &query::ServiceCore::OpenPrune, context, request);
+  }
+  grpc::ServerWriteReactor<v1::CompactResponse>* Compact(
+      CallbackServerContext* context, const v1::CompactRequest* request) override {
+    return StartWork(runtime_, "Compact", &query::ServiceCore::OpenCompact, context, request);
+  }
+  grpc::ServerWriteReactor<v1::RevertResponse>* Revert(CallbackServerContext* context,
+                                                       const v1::RevertRequest* request) override {
+    return StartWork(runtime_, "Revert", &query::ServiceCore::OpenRevert, context, request);
+  }
+  grpc::ServerWriteReactor<v1::MergeMapsResponse>* MergeMaps(
+      CallbackServerContext* context, const v1::MergeMapsRequest* request) override {
+    return StartWork(runtime_, "MergeMaps", &query::ServiceCore::OpenMerge, context, request);
+  }
+  grpc::ServerWriteReactor<v1::ReadArchiveResponse>* ReadArchive(
+      CallbackServerContext* context, const v1::ReadArchiveRequest* request) override {
+    return StartWork(runtime_, "ReadArchive", &query::ServiceCore::OpenArchive, context, request);
+  }
+  ServerUnaryReactor* SetTag(CallbackServerContext* context, const v1::SetTagRequest* request,
+                             v1::SetTagResponse* reply) override {
+    return StartUnary(runtime_, "SetTag", &Api::SetTag, context, request, reply);
+  }
+  ServerUnaryReactor* RemoveTag(CallbackServerContext* context, const v1::RemoveTagRequest* request,
+                                v1::RemoveTagResponse* reply) override {
+    return StartUnary(runtime_, "RemoveTag", &Api::RemoveTag, context, request, reply);
+  }
+  ServerUnaryReactor* ListTags(CallbackServerContext* context, const v1::ListTagsRequest* request,
+                               v1::ListTagsResponse* reply) override {
+    return StartUnary(runtime_, "ListTags", &Api::ListTags, context, request, reply);
+  }
+
+ private:
+  CallRuntime* runtime_;
+};
+
 }  // namespace
 
 std::unique_ptr<grpc::Service> MakeQueryService(CallRuntime* runtime) {
@@ -272,6 +314,10 @@ std::unique_ptr<grpc::Service> MakeMapService(CallRuntime* runtime) {
 
 std::unique_ptr<grpc::Service> MakeIngestService(CallRuntime* runtime) {
   return std::make_unique<IngestService>(runtime);
+}
+
+std::unique_ptr<grpc::Service> MakeMaintenanceService(CallRuntime* runtime) {
+  return std::make_unique<MaintenanceService>(runtime);
 }
 
 }  // namespace dsg::server

@@ -13,5 +13,6 @@ namespace dsg::server {
 std::unique_ptr<grpc::Service> MakeQueryService(CallRuntime* runtime);
 std::unique_ptr<grpc::Service> MakeMapService(CallRuntime* runtime);
 std::unique_ptr<grpc::Service> MakeIngestService(CallRuntime* runtime);
+std::unique_ptr<grpc::Service> MakeMaintenanceService(CallRuntime* runtime);
 
 }  // namespace dsg::server

@@ -27,6 +27,8 @@ enum class StreamKind {
   kAnswer,
   /// Lasts as long as its reader wants, and takes what it is told.
   kWatch,
+  /// Ends by itself, whenever that is.
+  kWork,
 };
 
 // Run, the wait for news and OnWriteDone take turns, so one message is in flight at most, and
@@ -43,8 +45,8 @@ class StreamCall final : public grpc::ServerWriteReactor<Reply>, public Job {
         open_(open),
         context_(context),
         request_(request),
-        call_(kind == StreamKind::kWatch ? WatchDeadline(context->deadline())
-                                         : BoundDeadline(context->deadline())),
+        call_(kind == StreamKind::kAnswer ? BoundDeadline(context->deadline())
+                                          : WatchDeadline(context->deadline())),
         place_(runtime->guard->Guard(context->c_call(), call_.deadline())) {
     const absl::Status begun = Begin();
     if (!begun.ok()) this->Finish(LastWords(begun));
@@ -102,7 +104,7 @@ class StreamCall final : public grpc::ServerWriteReactor<Reply>, public Job {
   // How long until there is something to tell.
   absl::StatusOr<std::chrono::nanoseconds> Prepare() {
     DSG_RETURN_IF_ERROR(call_.Check());
-    if (is_watch() && runtime_->stopping) return ShuttingDownError();
+    if (kind_ != StreamKind::kAnswer && runtime_->stopping) return ShuttingDownError();
     if (cursor_ == nullptr) {
       DSG_ASSIGN_OR_RETURN(cursor_, (runtime_->core->*open_)(*request_));
     }
@@ -126,7 +128,9 @@ class StreamCall final : public grpc::ServerWriteReactor<Reply>, public Job {
   absl::Status ReadNext() {
     message_.Clear();
     DSG_RETURN_IF_ERROR(cursor_->Next(call_, &message_));
-    if (message_.has_header()) revision_ = message_.header().read_revision();
+    if constexpr (requires { message_.has_header(); }) {
+      if (message_.has_header()) revision_ = message_.header().read_revision();
+    }
     row_count_ += RowCountOf(message_);
     return absl::OkStatus();
   }
@@ -168,6 +172,15 @@ grpc::ServerWriteReactor<Reply>* StartStream(CallRuntime* runtime, std::string_v
                                              const Request* request) {
   return new StreamCall<Request, Reply>(runtime, method, StreamKind::kAnswer, open, context,
                                         request);
+}
+
+/// The same for work that has no bound but its own end.
+template <typename Request, typename Reply>
+grpc::ServerWriteReactor<Reply>* StartWork(CallRuntime* runtime, std::string_view method,
+                                           OpenStream<Request, Reply> open,
+                                           grpc::CallbackServerContext* context,
+                                           const Request* request) {
+  return new StreamCall<Request, Reply>(runtime, method, StreamKind::kWork, open, context, request);
 }
 
 /// The same for a stream that ends only with its reader.

@@ -7,12 +7,12 @@
 #include "dsg/v1/query_service.pb.h"
 #include "query/cli/export/floor_choice.h"
 #include "query/cli/export/outline.h"
-#include "query/cli/export/output_file.h"
 #include "query/cli/export/top_view.h"
 #include "query/cli/read_content.h"
 #include "query/cli/written.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
+#include "schema/files/atomic_file.h"
 #include "schema/picture/png_file.h"
 
 namespace dsg::cli {
@@ -40,7 +40,7 @@ absl::Status WritePicture(Session* session, const PictureOptions& options,
   }
   const picture::Picture drawn = DrawTopView(answer.content, top);
   DSG_ASSIGN_OR_RETURN(const std::string png, picture::EncodePng(drawn));
-  DSG_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(options.png, options.force));
+  DSG_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(options.png, options.force));
   DSG_RETURN_IF_ERROR(file.Write(png));
   DSG_RETURN_IF_ERROR(file.Commit());
   if (session->common().json) return absl::OkStatus();

@@ -6,14 +6,16 @@
 
 #include "absl/strings/str_cat.h"
 #include "query/cli/grammar.h"
+#include "query/cli/spark_export.h"
 #include "schema/base/status.h"
 
 namespace dsg::cli {
 namespace {
 
 // Fills in from the environment what the command line leaves open. A place named on the command
-// line hides both variables, so that --server is not refused because DSG_STORE is set.
-absl::Status SettlePlace(const Environment& environment, CommonOptions* common) {
+// line hides both variables, so that --server is not refused because DSG_STORE is set. Where --map
+// narrows or renames what would be dealt with otherwise, a variable must not do it unseen.
+absl::Status SettlePlace(const Environment& environment, bool map_is_asked, CommonOptions* common) {
   if (common->store.empty() && common->server.empty()) {
     common->store = environment.store;
     common->server = environment.server;
@@ -23,13 +25,26 @@ absl::Status SettlePlace(const Environment& environment, CommonOptions* common) 
                               ") are given; name one with --store or --server"),
                  "");
   }
-  if (common->map.empty()) common->map = environment.map;
+  if (common->map.empty() && map_is_asked) common->map = environment.map;
   return absl::OkStatus();
+}
+
+// An archive is checked, or imported, under its own name.
+bool NamesArchive(const Verb& verb) {
+  const auto* verify = std::get_if<VerifyVerb>(&verb);
+  const auto* import = std::get_if<ImportVerb>(&verb);
+  return (verify != nullptr && !verify->path.empty()) ||
+         (import != nullptr && IsArchivePath(import->file));
 }
 
 absl::Status CheckPlace(const Command& command) {
   if (std::holds_alternative<VersionVerb>(command.verb)) return absl::OkStatus();
   const CommonOptions& common = command.common;
+  const auto* verify = std::get_if<VerifyVerb>(&command.verb);
+  if (verify != nullptr && !verify->path.empty()) return absl::OkStatus();
+  if (std::holds_alternative<RestoreVerb>(command.verb) && common.store.empty()) {
+    return Usage("restore writes to a store folder: give --store DIR", "restore");
+  }
   const bool is_import = std::holds_alternative<ImportVerb>(command.verb);
   const bool needs_store = is_import || std::holds_alternative<VerifyVerb>(command.verb) ||
                            std::holds_alternative<UpgradeVerb>(command.verb);
@@ -40,7 +55,7 @@ absl::Status CheckPlace(const Command& command) {
                            "import")
                      : Usage("verify reads a store folder: give --store DIR", "verify");
   }
-  if (is_import && common.map.empty())
+  if (is_import && common.map.empty() && !NamesArchive(command.verb))
     return Usage("name the map to import into with --map NAME", "import");
   if (common.store.empty() && common.server.empty()) {
     return Usage(
@@ -57,8 +72,26 @@ absl::Status Check(const WhoVerb& verb) {
 }
 
 absl::Status Check(const ExportVerb& verb) {
-  if (!verb.ply.empty() || !verb.graph_ply.empty() || !verb.gltf.empty()) return absl::OkStatus();
-  return Usage("export writes files: give --ply FILE, --graph-ply FILE or --gltf FILE", "export");
+  if (!verb.archive.empty()) {
+    if (IsArchivePath(verb.archive)) return absl::OkStatus();
+    return Usage(
+        absl::StrCat("\"", verb.archive, "\" is no .dsgz file; other formats have options"),
+        "export");
+  }
+  if (!verb.spark.empty() && !SparkFormOf(verb.spark).has_value()) {
+    return Usage(absl::StrCat("--spark \"", verb.spark,
+                              "\": end the name in .json, or in .sparkdsg or .bin for the binary "
+                              "form"),
+                 "export");
+  }
+  const std::string* const paths[] = {&verb.ply, &verb.graph_ply, &verb.gltf, &verb.spark};
+  const bool has_file = std::any_of(std::begin(paths), std::end(paths),
+                                    [](const std::string* path) { return !path->empty(); });
+  if (has_file) return absl::OkStatus();
+  return Usage(
+      "export writes files: give FILE.dsgz, --ply FILE, --graph-ply FILE, --gltf FILE or --spark "
+      "FILE",
+      "export");
 }
 
 absl::Status Check(const CollideVerb& verb) {
@@ -90,10 +123,16 @@ absl::StatusOr<Command> ParseArguments(const std::vector<std::string>& arguments
   AddRevisionVerbs(&grammar);
   AddMapVerbs(&grammar);
   AddFileVerbs(&grammar);
+  AddKeepVerbs(&grammar);
+  AddMergeVerb(&grammar);
+  AddPruneVerb(&grammar);
   DSG_RETURN_IF_ERROR(grammar.Parse(arguments));
   Command command = grammar.command();
   if (std::holds_alternative<HelpVerb>(command.verb)) return command;
-  DSG_RETURN_IF_ERROR(SettlePlace(environment, &command.common));
+  const bool is_about_all = std::holds_alternative<BackupVerb>(command.verb) ||
+                            std::holds_alternative<RestoreVerb>(command.verb) ||
+                            NamesArchive(command.verb);
+  DSG_RETURN_IF_ERROR(SettlePlace(environment, !is_about_all, &command.common));
   DSG_RETURN_IF_ERROR(CheckPlace(command));
   DSG_RETURN_IF_ERROR(std::visit([](const auto& verb) { return Check(verb); }, command.verb));
   return command;

@@ -12,7 +12,10 @@
 #include "absl/status/statusor.h"
 #include "query/cli/options_agents.h"
 #include "query/cli/options_graph.h"
+#include "query/cli/options_keep.h"
 #include "query/cli/options_maps.h"
+#include "query/cli/options_merge.h"
+#include "query/cli/options_prune.h"
 #include "query/cli/options_space.h"
 
 namespace dsg::cli {
@@ -35,6 +38,8 @@ struct CommonOptions {
   /// Empty = the store's only map.
   std::string map;
   std::optional<int64_t> revision;
+  /// The revision by its name; with `revision` unset.
+  std::string tag;
   bool json = false;
   /// Most entries listed; 0 = all.
   int64_t limit = 0;
@@ -51,7 +56,8 @@ using Verb =
     std::variant<WhereVerb, TrackVerb, ShapeVerb, WhoVerb, MetVerb, PickedVerb, PredictVerb,
                  ListVerb, EdgesVerb, ShowVerb, NearVerb, FindVerb, AroundVerb, SubgraphVerb,
                  PathVerb, CollideVerb, LogVerb, DiffVerb, WatchVerb, StatsVerb, MapsVerb,
-                 VersionVerb, VerifyVerb, UpgradeVerb, ImportVerb, ExportVerb, MapVerb, HelpVerb>;
+                 VersionVerb, VerifyVerb, UpgradeVerb, TagVerb, CompactVerb, RevertVerb, BackupVerb,
+                 RestoreVerb, MergeVerb, PruneVerb, ImportVerb, ExportVerb, MapVerb, HelpVerb>;
 
 struct Command {
   CommonOptions common;

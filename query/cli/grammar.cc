@@ -36,8 +36,8 @@ CLI::App* Grammar::AddApp(const std::string& name, const std::string& what, unsi
     app->add_option("--map", common.map, "Name of the map (or DSG_MAP); may be left out if alone");
   }
   if (takes & kRevision) {
-    app->add_option("--revision", common.revision, "As believed at this revision; default newest")
-        ->check(WholeZeroOrMore());
+    AddRevision(app, "--revision", "As believed at this revision or tag; default newest",
+                &revision_);
   }
   if (takes & kJson) app->add_flag("--json", common.json, "Print the reply as protobuf JSON");
   if (takes & kLimit) {
@@ -68,6 +68,8 @@ absl::Status Grammar::Parse(std::vector<std::string> arguments) {
   } catch (const CLI::ParseError& error) {
     return Usage(error.what(), is_verb ? first : "");
   }
+  command_.common.revision = revision_.number;
+  command_.common.tag = revision_.tag;
   return absl::OkStatus();
 }
 

@@ -58,6 +58,7 @@ class Grammar {
 
   CLI::App app_{"Asks a store of dynamic scene graphs, or a server, where and when."};
   Command command_;
+  RevisionOption revision_;
 };
 
 inline constexpr char kFloorHelp[] =
@@ -66,6 +67,9 @@ inline constexpr char kFloorHelp[] =
 // Options that several verbs have.
 void AddFilter(CLI::App* app, FilterOptions* filter);
 void AddPicture(CLI::App* app, const std::string& what, PictureOptions* picture);
+/// An option, or an argument, that takes the number of a revision or a tag.
+CLI::Option* AddRevision(CLI::App* app, const std::string& name, const std::string& what,
+                         RevisionOption* revision);
 
 // The families of verbs: grammar_*.cc.
 void AddAgentVerbs(Grammar* grammar);
@@ -76,5 +80,8 @@ void AddSpaceVerbs(Grammar* grammar);
 void AddMapVerbs(Grammar* grammar);
 void AddRevisionVerbs(Grammar* grammar);
 void AddFileVerbs(Grammar* grammar);
+void AddKeepVerbs(Grammar* grammar);
+void AddMergeVerb(Grammar* grammar);
+void AddPruneVerb(Grammar* grammar);
 
 }  // namespace dsg::cli

@@ -11,7 +11,7 @@ namespace {
 
 using Example = std::pair<absl::string_view, absl::string_view>;
 
-constexpr std::array<Example, 27> kExamples = {{
+constexpr std::array<Example, 34> kExamples = {{
     {"where", "carol --at +100.25s"},
     {"track", "carol --from +30s --to +32s --every 500ms --png carol.png"},
     {"shape", "person-1 --from +20s --to +30s --obj bodies"},
@@ -37,6 +37,13 @@ constexpr std::array<Example, 27> kExamples = {{
     {"import", "--store store --map house house.json"},
     {"verify", "--store store --map office"},
     {"upgrade", "--store store --map office"},
+    {"tag", "before-moving --note \"desks as built\""},
+    {"compact", "--keep-from before-moving"},
+    {"revert", "before-moving --dry-run"},
+    {"backup", "backup"},
+    {"restore", "backup --store elsewhere"},
+    {"merge", "office-later --dry-run --png both.png"},
+    {"prune", "--branch \"office 4\" --dry-run"},
     {"export", "--gltf office.glb"},
     {"map", "--png office.png"},
 }};

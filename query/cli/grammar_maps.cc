@@ -10,9 +10,15 @@ namespace {
 void AddExport(Grammar* grammar) {
   const auto [app, verb] =
       grammar->Add<ExportVerb>("export", "Write mesh and graph to files for 3D viewers", kQuestion);
+  app->add_option("FILE", verb->archive, "All of the map and its history, FILE.dsgz");
   app->add_option("--ply", verb->ply, "The mesh, binary PLY");
   app->add_option("--graph-ply", verb->graph_ply, "The graph, PLY of points and lines");
   app->add_option("--gltf", verb->gltf, "Mesh and graph, binary glTF 2.0 (.glb)");
+  app->add_option("--spark", verb->spark, "A Spark-DSG graph, .json, or binary .sparkdsg or .bin");
+  app->add_option("--pose-step", verb->pose_step_m,
+                  "Metres between the poses that --spark writes; 0 = every pose")
+      ->check(ZeroOrMore())
+      ->capture_default_str();
   app->add_option("--color", verb->color,
                   "Mesh colours: rgb, label or instance; default rgb if there are any")
       ->check(CLI::IsMember({"rgb", "label", "instance"}));
@@ -46,18 +52,14 @@ void AddRevisionVerbs(Grammar* grammar) {
 
   const auto [diff_app, diff] =
       grammar->Add<DiffVerb>("diff", "What differs between two revisions", kTakes | kLimit);
-  diff_app->add_option("FROM", diff->from_revision, "Revision before")
-      ->required()
-      ->check(WholeZeroOrMore());
-  diff_app->add_option("TO", diff->to_revision, "Revision after; default the newest")
-      ->check(WholeZeroOrMore());
+  AddRevision(diff_app, "FROM", "Revision or tag before", &diff->from)->required();
+  AddRevision(diff_app, "TO", "Revision or tag after; default the newest", &diff->to);
   diff_app->add_option("--layer", diff->layer, "Only nodes of this layer, and their edges");
 
   const auto [watch_app, watch] =
       grammar->Add<WatchVerb>("watch", "Revisions as they come, until Ctrl-C", kTakes);
-  watch_app
-      ->add_option("--after", watch->after, "The last revision that is known; default the newest")
-      ->check(WholeZeroOrMore());
+  AddRevision(watch_app, "--after", "The last revision that is known, or a tag; default the newest",
+              &watch->after);
   watch_app->add_flag("--changes", watch->changes, "Also say what changed");
   watch_app->add_option("-n,--count", watch->count, "End after so many revisions")
       ->check(WholeAboveZero());
@@ -66,8 +68,11 @@ void AddRevisionVerbs(Grammar* grammar) {
 void AddFileVerbs(Grammar* grammar) {
   const auto [app, import] = grammar->Add<ImportVerb>(
       "import", "Add a scene-graph file (Spark-DSG, Kimera) to a map", kMap);
-  app->add_option("FILE", import->file, "The file")->required();
-  grammar->Add<VerifyVerb>("verify", "Check every page, row and revision of a map", kMap);
+  app->add_option("FILE", import->file, "The file; a .dsgz is restored")->required();
+  const auto [verify_app, verify] = grammar->Add<VerifyVerb>(
+      "verify", "Check every page, row and revision of a map, an archive or a backup", kMap);
+  verify_app->add_option("PATH", verify->path,
+                         "A .dsgz file, or the folder of a backup; default the store");
   grammar->Add<UpgradeVerb>("upgrade", "Bring a map to this program's store format", kMap);
   AddExport(grammar);
   AddMap(grammar);

@@ -4,8 +4,9 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <string>
+
+#include "query/cli/options_keep.h"
 
 namespace dsg::cli {
 
@@ -13,19 +14,22 @@ struct LogVerb {};
 struct StatsVerb {};
 struct MapsVerb {};
 struct VersionVerb {};
-struct VerifyVerb {};
+struct VerifyVerb {
+  /// An archive, or the folder of a backup; empty = the store.
+  std::string path;
+};
 struct UpgradeVerb {};
 
 struct DiffVerb {
-  int64_t from_revision = 0;
-  /// 0 = the newest.
-  int64_t to_revision = 0;
+  RevisionOption from;
+  /// Unset = the newest.
+  RevisionOption to;
   std::string layer;
 };
 
 struct WatchVerb {
   /// Unset = from the newest.
-  std::optional<int64_t> after;
+  RevisionOption after;
   /// Say what changed, not only that it did.
   bool changes = false;
   /// End after so many revisions; 0 = never.
@@ -37,10 +41,16 @@ struct ImportVerb {
 };
 
 struct ExportVerb {
-  /// Files to write; at least one is set.
+  /// An archive of all of the map (.dsgz).
+  std::string archive;
+  /// Files to write; at least one is set, or `archive` is.
   std::string ply;
   std::string graph_ply;
   std::string gltf;
+  /// Spark-DSG, JSON or binary by its ending.
+  std::string spark;
+  /// Of the poses in it, metres; 0 = every pose.
+  double pose_step_m = 0.5;
   /// "rgb", "label", "instance"; empty = rgb if the mesh has it, else label.
   std::string color;
   std::string at;

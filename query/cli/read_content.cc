@@ -121,17 +121,25 @@ class Reader {
     return has_own ? agent.agent->gap_ns_max : session_.map().gap_ns_max;
   }
 
+  static absl::Status KeepPose(const v1::TimedPose& in, std::vector<TimedPose>* poses) {
+    DSG_ASSIGN_OR_RETURN(TimedPose pose, FromProto(in));
+    poses->push_back(std::move(pose));
+    return absl::OkStatus();
+  }
+
   absl::StatusOr<Track> ReadTrack(const Node& agent) {
     auto request = Begin<v1::GetTrajectoryRequest>();
     request.set_agent(ToString(agent.id));
     if (options_.at_ns.has_value() && *options_.at_ns < kTimeMax) {
       request.set_to_ns(*options_.at_ns + 1);
     }
-    Track track{.agent = agent.id, .pieces = {}};
+    Track track{.agent = agent.id, .pieces = {}, .poses = {}};
+    absl::Status broken;
     const TimeNs gap_ns = GapOf(agent);
     std::optional<TimeNs> last_ns;
     Eigen::Vector3d last_map = Eigen::Vector3d::Zero();
     const auto take = [&](const v1::TimedPose& in) {
+      if (options_.with_poses) broken = KeepPose(in, &track.poses);
       const Eigen::Vector3d point_map = FromProto(in.pose()).position;
       const bool begins = !last_ns.has_value() || in.time_ns() - *last_ns > gap_ns;
       if (begins) track.pieces.emplace_back();
@@ -144,8 +152,9 @@ class Reader {
                                            [&](const v1::GetTrajectoryResponse& message) {
                                              for (const v1::TimedPose& pose : message.poses())
                                                take(pose);
-                                             return true;
+                                             return broken.ok();
                                            }));
+    DSG_RETURN_IF_ERROR(broken);
     // The very last position is shown as such, however short the step to it.
     if (last_ns.has_value() && track.pieces.back().back() != last_map) {
       track.pieces.back().push_back(last_map);

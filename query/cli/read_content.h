@@ -19,6 +19,8 @@ struct ContentOptions {
   bool with_mesh = true;
   /// False: without agents, as they are no part of the building.
   bool with_agents = true;
+  /// Also every pose of the tracks.
+  bool with_poses = false;
   /// As believed then; unset = as the session asks.
   std::optional<Revision> revision{};
 };

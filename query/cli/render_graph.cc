@@ -25,12 +25,23 @@ std::string BoxText(const v1::Box& box) {
   return absl::StrCat("(", PointText(box.min()), ") to (", PointText(box.max()), ") m");
 }
 
+// Longer ones are for programs; --json has them whole.
+constexpr size_t kShownBytesMax = 120;
+
+std::string Shown(const std::string& text) {
+  if (text.size() <= kShownBytesMax) return absl::StrCat("\"", text, "\"");
+  size_t end = kShownBytesMax;
+  // Not within a character.
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;
+  return absl::StrCat("\"", text.substr(0, end), "...\" (", text.size(), " bytes)");
+}
+
 std::string AttributeText(const v1::AttributeValue& value) {
   switch (value.value_case()) {
     case v1::AttributeValue::kNumber:
       return absl::StrFormat("%.17g", value.number());
     case v1::AttributeValue::kText:
-      return absl::StrCat("\"", value.text(), "\"");
+      return Shown(value.text());
     case v1::AttributeValue::kFlag:
       return value.flag() ? "true" : "false";
     case v1::AttributeValue::VALUE_NOT_SET:

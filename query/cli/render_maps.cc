@@ -2,9 +2,13 @@
 #include "query/cli/render_maps.h"
 
 #include <array>
+#include <map>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "dsg/v1/maintenance_service.pb.h"
 #include "dsg/v1/map_service.pb.h"
 #include "query/cli/table.h"
 #include "schema/base/time.h"
@@ -97,23 +101,35 @@ std::string RenderStats(const v1::GetMapStatsResponse& reply, const TimeText& ti
   return absl::StrCat(RenderFields(fields), "\n", layers.Render());
 }
 
-std::string RenderRevisions(const v1::ListRevisionsResponse& reply) {
-  Table table({{"revision", Align::kRight},
-               {"committed"},
-               {"author"},
-               {"nodes", Align::kRight},
-               {"edges", Align::kRight},
-               {"agents", Align::kRight},
-               {"poses", Align::kRight},
-               {"session"},
-               {"message"}});
+std::string RenderRevisions(const v1::ListRevisionsResponse& reply,
+                            const v1::ListTagsResponse& tags) {
+  std::map<int64_t, std::vector<std::string>> tags_of;
+  for (const v1::Tag& tag : tags.tags()) tags_of[tag.revision()].push_back(tag.name());
+  std::vector<Column> columns = {{"revision", Align::kRight},
+                                 {"committed"},
+                                 {"author"},
+                                 {"nodes", Align::kRight},
+                                 {"edges", Align::kRight},
+                                 {"agents", Align::kRight},
+                                 {"poses", Align::kRight},
+                                 {"session"},
+                                 {"message"}};
+  if (!tags_of.empty()) columns.insert(columns.begin() + 1, {"tags"});
+  Table table(std::move(columns));
   for (const v1::Revision& revision : reply.revisions()) {
-    table.AddRow({absl::StrCat(revision.revision()), FormatRfc3339(revision.committed_ns()),
-                  revision.author(), absl::StrCat(revision.node_count()),
-                  absl::StrCat(revision.edge_count()), absl::StrCat(revision.agent_count()),
-                  absl::StrCat(revision.pose_count()),
-                  absl::StrCat(revision.session_id(), "/", revision.sequence()),
-                  revision.message()});
+    std::vector<std::string> cells = {absl::StrCat(revision.revision()),
+                                      FormatRfc3339(revision.committed_ns()),
+                                      revision.author(),
+                                      absl::StrCat(revision.node_count()),
+                                      absl::StrCat(revision.edge_count()),
+                                      absl::StrCat(revision.agent_count()),
+                                      absl::StrCat(revision.pose_count()),
+                                      absl::StrCat(revision.session_id(), "/", revision.sequence()),
+                                      revision.message()};
+    if (!tags_of.empty()) {
+      cells.insert(cells.begin() + 1, absl::StrJoin(tags_of[revision.revision()], " "));
+    }
+    table.AddRow(std::move(cells));
   }
   return table.Render();
 }

@@ -11,6 +11,7 @@ namespace dsg::v1 {
 class GetMapStatsResponse;
 class ListMapsResponse;
 class ListRevisionsResponse;
+class ListTagsResponse;
 }  // namespace dsg::v1
 
 namespace dsg::cli {
@@ -20,6 +21,8 @@ std::string BytesText(int64_t byte_count);
 
 std::string RenderMaps(const v1::ListMapsResponse& reply);
 std::string RenderStats(const v1::GetMapStatsResponse& reply, const TimeText& times);
-std::string RenderRevisions(const v1::ListRevisionsResponse& reply);
+/// With a column of tags if there are any.
+std::string RenderRevisions(const v1::ListRevisionsResponse& reply,
+                            const v1::ListTagsResponse& tags);
 
 }  // namespace dsg::cli

@@ -30,7 +30,16 @@ class Dispatcher {
   absl::Status operator()(const ImportVerb& verb) {
     return RunImport(command_.common, verb, out_, errors_);
   }
-  absl::Status operator()(const VerifyVerb&) { return RunVerify(command_.common, out_, errors_); }
+  absl::Status operator()(const VerifyVerb& verb) {
+    return RunVerify(command_.common, verb, out_, errors_);
+  }
+  absl::Status operator()(const RestoreVerb& verb) {
+    return RunRestore(command_.common, verb, out_, errors_);
+  }
+  absl::Status operator()(const BackupVerb& verb) {
+    DSG_ASSIGN_OR_RETURN(const std::unique_ptr<Session> session, Session::Open(command_.common));
+    return RunBackup(session.get(), verb, out_, errors_);
+  }
   absl::Status operator()(const UpgradeVerb&) { return RunUpgrade(command_.common, out_); }
   absl::Status operator()(const MapsVerb&) {
     DSG_ASSIGN_OR_RETURN(const std::unique_ptr<Session> session, Session::Open(command_.common));
@@ -50,6 +59,19 @@ class Dispatcher {
  private:
   absl::Status Ask(Session* session, const CollideVerb& verb) {
     return RunCollide(session, verb, out_, &found_);
+  }
+  absl::Status Ask(Session* session, const TagVerb& verb) { return RunTag(session, verb, out_); }
+  absl::Status Ask(Session* session, const CompactVerb& verb) {
+    return RunCompact(session, verb, out_, errors_);
+  }
+  absl::Status Ask(Session* session, const RevertVerb& verb) {
+    return RunRevert(session, verb, out_, errors_);
+  }
+  absl::Status Ask(Session* session, const MergeVerb& verb) {
+    return RunMerge(session, verb, out_, errors_);
+  }
+  absl::Status Ask(Session* session, const PruneVerb& verb) {
+    return RunPrune(session, verb, out_, errors_);
   }
   absl::Status Ask(Session* session, const LogVerb&) { return RunLog(session, out_); }
   absl::Status Ask(Session* session, const StatsVerb&) { return RunStats(session, out_); }
@@ -89,7 +111,7 @@ class Dispatcher {
     return RunWatch(session, verb, out_, errors_);
   }
   absl::Status Ask(Session* session, const ExportVerb& verb) {
-    return RunExport(session, verb, out_);
+    return RunExport(session, verb, out_, errors_);
   }
   absl::Status Ask(Session* session, const MapVerb& verb) { return RunMap(session, verb, out_); }
 

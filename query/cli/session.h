@@ -41,6 +41,8 @@ class Session {
     request.set_map(map_.name);
     if (common_.revision.has_value()) {
       request.mutable_read_at()->set_exact_revision(*common_.revision);
+    } else if (!common_.tag.empty()) {
+      request.mutable_read_at()->set_tag(common_.tag);
     }
     return request;
   }

@@ -4,6 +4,7 @@
 #include "query/cli/json.h"
 #include "query/cli/paging.h"
 #include "query/cli/render_changes.h"
+#include "query/cli/tag_names.h"
 #include "query/cli/verbs.h"
 #include "schema/base/status.h"
 
@@ -12,8 +13,10 @@ namespace dsg::cli {
 absl::Status RunDiff(Session* session, const DiffVerb& verb, std::ostream& out) {
   v1::DiffRevisionsRequest request;
   request.set_map(session->map().name);
-  request.set_from_revision(verb.from_revision);
-  request.set_to_revision(verb.to_revision);
+  DSG_ASSIGN_OR_RETURN(const Revision from, NumberOf(verb.from, 0, session));
+  DSG_ASSIGN_OR_RETURN(const Revision to, NumberOf(verb.to, 0, session));
+  request.set_from_revision(from);
+  request.set_to_revision(to);
   request.set_layer(verb.layer);
   v1::DiffRevisionsResponse all;
   DSG_RETURN_IF_ERROR(FetchPages(

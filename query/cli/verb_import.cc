@@ -134,6 +134,9 @@ void PrintSummary(const ImportedGraph& graph, const std::string& file, const std
 
 absl::Status RunImport(const CommonOptions& common, const ImportVerb& verb, std::ostream& out,
                        std::ostream& progress_out) {
+  if (IsArchivePath(verb.file)) {
+    return RunRestore(common, {.path = verb.file, .as = common.map}, out, progress_out);
+  }
   DSG_RETURN_IF_ERROR(CheckMapName(common.map));
   Progress progress("import", &progress_out);
   DSG_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(verb.file));

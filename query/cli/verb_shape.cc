@@ -118,7 +118,7 @@ class BodyWriter {
         is_obj ? absl::StrCat(verb_.obj_folder, "/", agent_, "_", body.shape().time_ns(), ".obj")
                : verb_.ply;
     const BodyMesh mesh = MeshOf(body);
-    DSG_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, verb_.force));
+    DSG_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(path, verb_.force));
     DSG_RETURN_IF_ERROR(is_obj ? WriteBodyObj(mesh, &file) : WriteBodyPly(mesh, &file));
     DSG_RETURN_IF_ERROR(file.Commit());
     files_.push_back({.format = is_obj ? "obj" : "ply",

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The verb verify: every page, row and revision of one map, or of all maps of a store.
+// The verb verify: every page, row and revision of one map, or of all maps of a store; or of an
+// archive, or a backup.
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -9,11 +11,19 @@
 #include "query/cli/progress.h"
 #include "query/cli/table.h"
 #include "query/cli/verbs.h"
+#include "schema/archive/backup_folder.h"
+#include "schema/archive/restore.h"
 #include "schema/base/status.h"
 #include "schema/store/graph_store.h"
 
 namespace dsg::cli {
 namespace {
+
+VerifyReport DamageOf(const absl::Status& status) {
+  VerifyReport damaged;
+  damaged.problems.push_back(std::string(status.message()));
+  return damaged;
+}
 
 absl::StatusOr<VerifyReport> VerifyMap(GraphStore* store, const std::string& name,
                                        std::ostream& progress_out) {
@@ -27,34 +37,86 @@ absl::StatusOr<VerifyReport> FindProblems(GraphStore* store, const std::string& 
                                           std::ostream& progress_out) {
   auto report = VerifyMap(store, name, progress_out);
   if (!absl::IsDataLoss(report.status())) return report;
-  VerifyReport damaged;
-  damaged.problems.push_back(std::string(report.status().message()));
-  return damaged;
+  return DamageOf(report.status());
+}
+
+// Maps that were looked at, and what is wrong with them.
+class Findings {
+ public:
+  explicit Findings(std::ostream* out) : out_(*out) {}
+
+  void Add(const std::string& name, const VerifyReport& report) {
+    out_ << name << ": " << Counted(report.revision_count, "revision") << ", "
+         << Counted(report.row_count, "row") << ", " << Counted(report.pose_count, "pose") << ", "
+         << Counted(static_cast<int64_t>(report.problems.size()), "problem") << "\n";
+    for (const std::string& problem : report.problems) out_ << "  " << Printable(problem) << "\n";
+    problem_count_ += static_cast<int64_t>(report.problems.size());
+  }
+
+  absl::Status Verdict(const std::string& where, const std::string& advice) const {
+    if (problem_count_ == 0) return absl::OkStatus();
+    return MakeError(Reason::kStoreCorrupt,
+                     absl::StrCat(where, " has ", Counted(problem_count_, "problem"), "; ", advice),
+                     {{"problem_count", absl::StrCat(problem_count_)}});
+  }
+
+ private:
+  std::ostream& out_;
+  int64_t problem_count_ = 0;
+};
+
+absl::Status AddArchive(const std::string& path, const std::string& name, Findings* findings,
+                        std::ostream& progress_out) {
+  Progress progress(absl::StrCat("verify ", name), &progress_out);
+  const auto report =
+      VerifyArchive(path, StopCheck(), [&progress](double fraction) { progress.Update(fraction); });
+  if (!report.ok() && !absl::IsDataLoss(report.status())) return report.status();
+  findings->Add(name, report.ok() ? *report : DamageOf(report.status()));
+  return absl::OkStatus();
+}
+
+absl::Status VerifyFiles(const std::string& path, const std::string& map, std::ostream& out,
+                         std::ostream& progress_out) {
+  Findings findings(&out);
+  std::error_code error;
+  if (!std::filesystem::is_directory(path, error)) {
+    DSG_RETURN_IF_ERROR(AddArchive(path, path, &findings, progress_out));
+    return findings.Verdict(absl::StrCat("archive ", path), "take another copy of it");
+  }
+  DSG_ASSIGN_OR_RETURN(const BackupManifest backup, ReadBackupManifest(path));
+  for (const BackupEntry& entry : backup.maps) {
+    if (!map.empty() && entry.map != map) continue;
+    const absl::Status intact = CheckBackupFile(path, entry, StopCheck(), nullptr);
+    if (!intact.ok() && !absl::IsDataLoss(intact)) return intact;
+    if (intact.ok()) {
+      const std::string file = absl::StrCat(path, "/", entry.file);
+      DSG_RETURN_IF_ERROR(AddArchive(file, entry.map, &findings, progress_out));
+    } else {
+      findings.Add(entry.map, DamageOf(intact));
+    }
+  }
+  if (backup.maps.empty()) out << "backup " << path << " has no maps\n";
+  return findings.Verdict(absl::StrCat("backup ", path),
+                          "take another copy of it, or back the maps up again");
 }
 
 }  // namespace
 
-absl::Status RunVerify(const CommonOptions& common, std::ostream& out, std::ostream& progress_out) {
+absl::Status RunVerify(const CommonOptions& common, const VerifyVerb& verb, std::ostream& out,
+                       std::ostream& progress_out) {
+  if (!verb.path.empty()) return VerifyFiles(verb.path, common.map, out, progress_out);
   DSG_ASSIGN_OR_RETURN(const std::unique_ptr<GraphStore> store,
                        GraphStore::Open(common.store, {.program = "dsg verify"}));
   DSG_ASSIGN_OR_RETURN(const std::vector<std::string> names, MapNames(store.get(), common.map));
-  size_t problem_count = 0;
   if (names.empty()) out << "store " << common.store << " has no maps\n";
+  Findings findings(&out);
   for (const std::string& name : names) {
     DSG_ASSIGN_OR_RETURN(const VerifyReport report, FindProblems(store.get(), name, progress_out));
-    out << name << ": " << Counted(report.revision_count, "revision") << ", "
-        << Counted(report.row_count, "row") << ", " << Counted(report.pose_count, "pose") << ", "
-        << Counted(static_cast<int64_t>(report.problems.size()), "problem") << "\n";
-    for (const std::string& problem : report.problems) out << "  " << Printable(problem) << "\n";
-    problem_count += report.problems.size();
+    findings.Add(name, report);
   }
-  if (problem_count == 0) return absl::OkStatus();
-  return MakeError(Reason::kStoreCorrupt,
-                   absl::StrCat("store ", common.store, " has ",
-                                Counted(static_cast<int64_t>(problem_count), "problem"),
-                                "; restore the maps listed from a backup, or ingest "
-                                "their logs again into a new store"),
-                   {{"problem_count", absl::StrCat(problem_count)}});
+  return findings.Verdict(absl::StrCat("store ", common.store),
+                          "restore the maps listed from a backup, or ingest their logs again into "
+                          "a new store");
 }
 
 }  // namespace dsg::cli

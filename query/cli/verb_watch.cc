@@ -8,6 +8,7 @@
 #include "query/cli/interrupt.h"
 #include "query/cli/json.h"
 #include "query/cli/render_changes.h"
+#include "query/cli/tag_names.h"
 #include "query/cli/verbs.h"
 #include "schema/base/status.h"
 
@@ -19,8 +20,9 @@ using Clock = query::CallContext::Clock;
 // Prints what comes and remembers how far it has come.
 class Printer {
  public:
-  Printer(const Session& session, const WatchVerb& verb, std::ostream& out)
-      : session_(session), verb_(verb), out_(out), after_(verb.after) {}
+  Printer(const Session& session, const WatchVerb& verb, std::optional<int64_t> after,
+          std::ostream& out)
+      : session_(session), verb_(verb), out_(out), after_(after) {}
 
   /// False when no more is wanted.
   bool Take(const v1::WatchMapResponse& message) {
@@ -120,7 +122,11 @@ absl::Status RunWatch(Session* session, const WatchVerb& verb, std::ostream& out
           : std::chrono::duration_cast<Clock::duration>(kForEver);
   query::CallContext call(Clock::now() + length);
   const InterruptGuard guard(&call);
-  Printer printer(*session, verb, out);
+  std::optional<int64_t> after;
+  if (verb.after.is_set()) {
+    DSG_ASSIGN_OR_RETURN(after, NumberOf(verb.after, 0, session));
+  }
+  Printer printer(*session, verb, after, out);
   Patience patience(&notes);
   const auto take = [&](const v1::WatchMapResponse& message) {
     const bool goes_on = printer.Take(message);

@@ -49,6 +49,17 @@ absl::Status RunDiff(Session* session, const DiffVerb& verb, std::ostream& out);
 absl::Status RunWatch(Session* session, const WatchVerb& verb, std::ostream& out,
                       std::ostream& notes);
 
+/// Takes another map into the session's (verb_merge.cc).
+///
+/// Errors: of MergeMaps; FIELD_INVALID for a transform that is none, or a picture that is there
+/// already; RESOURCE_EXHAUSTED/DISK_FULL.
+absl::Status RunMerge(Session* session, const MergeVerb& verb, std::ostream& out,
+                      std::ostream& progress_out);
+/// Forgets what the policies name (verb_prune.cc). Errors: of Prune; FILE_MALFORMED for a file of
+/// policies; POLICY_MATCHES_ALL when nobody could be asked, or said no.
+absl::Status RunPrune(Session* session, const PruneVerb& verb, std::ostream& out,
+                      std::ostream& progress);
+
 // Maps: verbs_maps.cc. RunLog and RunStats require that the session's map is chosen.
 absl::Status RunLog(Session* session, std::ostream& out);
 absl::Status RunStats(Session* session, std::ostream& out);
@@ -59,11 +70,15 @@ absl::Status RunVersion(const CommonOptions& common, const Environment& environm
 
 // Files to look at: verbs_export.cc. Require that the session's map is chosen.
 
-/// Writes mesh and graph as PLY or glTF.
+/// Writes all of the map as an archive, or mesh and graph as PLY or glTF.
 ///
 /// Errors: FIELD_INVALID for a file that is there already; RESOURCE_EXHAUSTED/DISK_FULL, and then
 /// nothing stands under the file's name.
-absl::Status RunExport(Session* session, const ExportVerb& verb, std::ostream& out);
+absl::Status RunExport(Session* session, const ExportVerb& verb, std::ostream& out,
+                       std::ostream& progress);
+/// The part of RunExport that writes an archive (verb_export_archive.cc).
+absl::Status RunExportArchive(Session* session, const ExportVerb& verb, std::ostream& out,
+                              std::ostream& progress);
 /// Draws the map from above. Errors: as RunExport; NOT_FOUND/NODE_UNKNOWN for the floor.
 absl::Status RunMap(Session* session, const MapVerb& verb, std::ostream& out);
 
@@ -74,14 +89,35 @@ absl::Status RunMap(Session* session, const MapVerb& verb, std::ostream& out);
 absl::Status RunImport(const CommonOptions& common, const ImportVerb& verb, std::ostream& out,
                        std::ostream& progress);
 
-/// Checks a whole map of a store, the problems listed on `out`.
+/// Checks a whole map of a store, an archive or a backup, the problems listed on `out`.
 ///
 /// Errors: DATA_LOSS/STORE_CORRUPT if there is any problem.
-absl::Status RunVerify(const CommonOptions& common, std::ostream& out, std::ostream& progress);
+absl::Status RunVerify(const CommonOptions& common, const VerifyVerb& verb, std::ostream& out,
+                       std::ostream& progress);
 
 /// Brings maps of a store to the newest format, a copy of the old file beside each.
 ///
 /// Errors: as GraphStore::UpgradeMap; the maps before the failing one are upgraded.
 absl::Status RunUpgrade(const CommonOptions& common, std::ostream& out);
+
+// Keeping maps for years: verbs_keep.cc. Require that the session's map is chosen. Errors: of the
+// RPCs. Ctrl-C ends the work; what was told to `progress` is done, and the same verb does the rest.
+absl::Status RunTag(Session* session, const TagVerb& verb, std::ostream& out);
+absl::Status RunCompact(Session* session, const CompactVerb& verb, std::ostream& out,
+                        std::ostream& progress);
+absl::Status RunRevert(Session* session, const RevertVerb& verb, std::ostream& out,
+                       std::ostream& progress);
+
+/// Writes archives of maps to a folder (verb_backup.cc). Until it returns OK the folder is the
+/// backup that it was. The session needs no map.
+///
+/// Errors: as BackupFolder::Open, of ReadArchive; RESOURCE_EXHAUSTED/DISK_FULL.
+absl::Status RunBackup(Session* session, const BackupVerb& verb, std::ostream& out,
+                       std::ostream& progress);
+/// Puts the maps of a backup, or one archive, into a store (verb_restore.cc).
+///
+/// Errors: as RestoreArchive, and then the map is as it was.
+absl::Status RunRestore(const CommonOptions& common, const RestoreVerb& verb, std::ostream& out,
+                        std::ostream& progress);
 
 }  // namespace dsg::cli

@@ -4,10 +4,12 @@
 #include <memory>
 
 #include "absl/strings/str_cat.h"
+#include "dsg/v1/maintenance_service.pb.h"
 #include "dsg/v1/map_service.pb.h"
 #include "query/cli/json.h"
 #include "query/cli/paging.h"
 #include "query/cli/render_maps.h"
+#include "query/cli/tag_names.h"
 #include "query/cli/verbs.h"
 #include "schema/base/status.h"
 #include "schema/store/graph_store.h"
@@ -30,7 +32,8 @@ absl::Status RunLog(Session* session, std::ostream& out) {
     request.set_before_revision(page.revisions(page.revisions_size() - 1).revision());
   }
   if (session->common().json) return WriteJson(all, out);
-  out << RenderRevisions(all);
+  DSG_ASSIGN_OR_RETURN(const v1::ListTagsResponse tags, ReadTags(session));
+  out << RenderRevisions(all, tags);
   return absl::OkStatus();
 }
 

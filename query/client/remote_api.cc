@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "dsg/v1/ingest_service.grpc.pb.h"
+#include "dsg/v1/maintenance_service.grpc.pb.h"
 #include "dsg/v1/map_service.grpc.pb.h"
 #include "dsg/v1/query_service.grpc.pb.h"
 #include "query/client/call.h"
@@ -22,12 +23,16 @@ using query::CallContext;
 using QueryStub = v1::QueryService::Stub;
 using MapStub = v1::MapService::Stub;
 using IngestStub = v1::IngestService::Stub;
+using MaintenanceStub = v1::MaintenanceService::Stub;
 template <class Reply>
 using Send = std::function<bool(const Reply&)>;
 
 // Signs of life of a watch; see map_service.proto.
 constexpr int64_t kWatchIdleDefaultNs = 5'000'000'000;
 constexpr int64_t kWatchIdleMaxNs = 86'400'000'000'000;
+
+// Maintenance takes as long as it takes; the keepalive of the channel finds a server that is gone.
+constexpr CallLimits kWorkLimits{std::chrono::seconds(0), std::chrono::nanoseconds(0)};
 
 class RemoteApi final : public query::Api {
  public:
@@ -36,7 +41,8 @@ class RemoteApi final : public query::Api {
         channel_(MakeChannel(address_)),
         query_(channel_),
         map_(channel_),
-        ingest_(channel_) {}
+        ingest_(channel_),
+        maintenance_(channel_) {}
 
   absl::Status LocateAgent(const CallContext& call, const v1::LocateAgentRequest& request,
                            v1::LocateAgentResponse* reply) override {
@@ -166,6 +172,42 @@ class RemoteApi final : public query::Api {
     return Read(call, &ingest_, &IngestStub::PrepareAsyncGetSession, request, reply);
   }
 
+  absl::Status Prune(const CallContext& call, const v1::PruneRequest& request,
+                     const Send<v1::PruneResponse>& send) override {
+    return Work(call, &MaintenanceStub::PrepareAsyncPrune, request, send);
+  }
+  absl::Status Compact(const CallContext& call, const v1::CompactRequest& request,
+                       const Send<v1::CompactResponse>& send) override {
+    return Work(call, &MaintenanceStub::PrepareAsyncCompact, request, send);
+  }
+  absl::Status Revert(const CallContext& call, const v1::RevertRequest& request,
+                      const Send<v1::RevertResponse>& send) override {
+    return Work(call, &MaintenanceStub::PrepareAsyncRevert, request, send);
+  }
+  absl::Status MergeMaps(const CallContext& call, const v1::MergeMapsRequest& request,
+                         const Send<v1::MergeMapsResponse>& send) override {
+    return Work(call, &MaintenanceStub::PrepareAsyncMergeMaps, request, send);
+  }
+  absl::Status ReadArchive(const CallContext& call, const v1::ReadArchiveRequest& request,
+                           const Send<v1::ReadArchiveResponse>& send) override {
+    return Work(call, &MaintenanceStub::PrepareAsyncReadArchive, request, send);
+  }
+  // Tags are not retried: a second try could move a tag that another has set meanwhile.
+  absl::Status SetTag(const CallContext& call, const v1::SetTagRequest& request,
+                      v1::SetTagResponse* reply) override {
+    return CallOnce(call, address_, &maintenance_, &MaintenanceStub::PrepareAsyncSetTag, request,
+                    reply);
+  }
+  absl::Status RemoveTag(const CallContext& call, const v1::RemoveTagRequest& request,
+                         v1::RemoveTagResponse* reply) override {
+    return CallOnce(call, address_, &maintenance_, &MaintenanceStub::PrepareAsyncRemoveTag, request,
+                    reply);
+  }
+  absl::Status ListTags(const CallContext& call, const v1::ListTagsRequest& request,
+                        v1::ListTagsResponse* reply) override {
+    return Read(call, &maintenance_, &MaintenanceStub::PrepareAsyncListTags, request, reply);
+  }
+
  private:
   template <class Stub, class Request, class Reply>
   absl::Status Read(const CallContext& call, Stub* stub,
@@ -183,6 +225,11 @@ class RemoteApi final : public query::Api {
   absl::Status Stream(const CallContext& call, Stub* stub,
                       PrepareStream<Stub, Request, Reply> prepare, const Request& request,
                       const Send<Reply>& send, const CallLimits& limits = {});
+  template <class Request, class Reply>
+  absl::Status Work(const CallContext& call, PrepareStream<MaintenanceStub, Request, Reply> prepare,
+                    const Request& request, const Send<Reply>& send) {
+    return Stream(call, &maintenance_, prepare, request, send, kWorkLimits);
+  }
   // Sets `started` once a message has reached `send`: from then on a repeat would send it twice.
   template <class Stub, class Request, class Reply>
   absl::Status StreamOnce(const CallContext& call, Stub* stub,
@@ -194,6 +241,7 @@ class RemoteApi final : public query::Api {
   QueryStub query_;
   MapStub map_;
   IngestStub ingest_;
+  MaintenanceStub maintenance_;
 };
 
 template <class Stub, class Request, class Reply>

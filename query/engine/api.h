@@ -18,6 +18,8 @@ class CheckCollisionRequest;
 class CheckCollisionResponse;
 class CommitRequest;
 class CommitResponse;
+class CompactRequest;
+class CompactResponse;
 class CreateMapRequest;
 class CreateMapResponse;
 class DiffRevisionsRequest;
@@ -56,16 +58,30 @@ class ListPresenceRequest;
 class ListPresenceResponse;
 class ListRevisionsRequest;
 class ListRevisionsResponse;
+class ListTagsRequest;
+class ListTagsResponse;
 class LocateAgentRequest;
 class LocateAgentResponse;
+class MergeMapsRequest;
+class MergeMapsResponse;
 class PlanPathRequest;
 class PlanPathResponse;
 class PlanPathsRequest;
 class PlanPathsResponse;
 class PredictAgentRequest;
 class PredictAgentResponse;
+class PruneRequest;
+class PruneResponse;
+class ReadArchiveRequest;
+class ReadArchiveResponse;
+class RemoveTagRequest;
+class RemoveTagResponse;
+class RevertRequest;
+class RevertResponse;
 class SearchNodesRequest;
 class SearchNodesResponse;
+class SetTagRequest;
+class SetTagResponse;
 class WatchMapRequest;
 class WatchMapResponse;
 }  // namespace dsg::v1
@@ -155,6 +171,26 @@ class Api {
                               v1::CommitResponse* reply) = 0;
   virtual absl::Status GetSession(const CallContext& call, const v1::GetSessionRequest& request,
                                   v1::GetSessionResponse* reply) = 0;
+
+  // Maintenance. The streams tell how far the work has come; ending one leaves done what it told.
+  virtual absl::Status Prune(const CallContext& call, const v1::PruneRequest& request,
+                             const std::function<bool(const v1::PruneResponse&)>& send) = 0;
+  virtual absl::Status Compact(const CallContext& call, const v1::CompactRequest& request,
+                               const std::function<bool(const v1::CompactResponse&)>& send) = 0;
+  virtual absl::Status Revert(const CallContext& call, const v1::RevertRequest& request,
+                              const std::function<bool(const v1::RevertResponse&)>& send) = 0;
+  virtual absl::Status MergeMaps(const CallContext& call, const v1::MergeMapsRequest& request,
+                                 const std::function<bool(const v1::MergeMapsResponse&)>& send) = 0;
+  virtual absl::Status SetTag(const CallContext& call, const v1::SetTagRequest& request,
+                              v1::SetTagResponse* reply) = 0;
+  virtual absl::Status RemoveTag(const CallContext& call, const v1::RemoveTagRequest& request,
+                                 v1::RemoveTagResponse* reply) = 0;
+  virtual absl::Status ListTags(const CallContext& call, const v1::ListTagsRequest& request,
+                                v1::ListTagsResponse* reply) = 0;
+  /// As GetTrajectory.
+  virtual absl::Status ReadArchive(
+      const CallContext& call, const v1::ReadArchiveRequest& request,
+      const std::function<bool(const v1::ReadArchiveResponse&)>& send) = 0;
 };
 
 }  // namespace dsg::query

@@ -29,22 +29,36 @@ MapTable::WriterSlot* MapTable::FindSlot(const std::string& name) {
   return slot.get();
 }
 
-absl::StatusOr<CommitResult> MapTable::Commit(GraphDelta delta, const StopCheck& stop) {
+absl::Status MapTable::WithWriter(const std::string& name, const StopCheck& stop,
+                                  const std::function<absl::Status(MapWriter&)>& work) {
   // Only maps that exist get a slot; otherwise callers could grow the table with invented names.
-  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> reader, Reader(delta.map));
-  WriterSlot* slot = FindSlot(delta.map);
+  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> reader, Reader(name));
+  WriterSlot* slot = FindSlot(name);
   std::lock_guard lock(slot->mutex);
-  DSG_RETURN_IF_ERROR(stop());
+  DSG_RETURN_IF_ERROR(AskStop(stop));
   // Another reader means another file: what the old writer wrote would be in no folder.
   if (slot->reader != reader) slot->writer.reset();
   slot->reader = reader;
   if (slot->writer == nullptr) {
-    DSG_ASSIGN_OR_RETURN(slot->writer, store_->OpenWriter(delta.map));
+    DSG_ASSIGN_OR_RETURN(slot->writer, store_->OpenWriter(name));
   }
-  absl::StatusOr<CommitResult> result = slot->writer->Commit(std::move(delta));
+  absl::Status status = work(*slot->writer);
+  // A look by which the reader sees that the past was erased from, if it was; who asks next then
+  // gets a new one.
+  reader->Head().status().IgnoreError();
   // After a failed commit the writer's connection is of no more use; the next caller, who will ask
   // with the same session and sequence, gets a fresh one.
-  if (ReasonOf(result.status()) == Reason::kCommitOutcomeUnknown) slot->writer.reset();
+  if (ReasonOf(status) == Reason::kCommitOutcomeUnknown) slot->writer.reset();
+  return status;
+}
+
+absl::StatusOr<CommitResult> MapTable::Commit(GraphDelta delta, const StopCheck& stop) {
+  CommitResult result;
+  const std::string name = delta.map;
+  DSG_RETURN_IF_ERROR(WithWriter(name, stop, [&](MapWriter& writer) -> absl::Status {
+    DSG_ASSIGN_OR_RETURN(result, writer.Commit(std::move(delta)));
+    return absl::OkStatus();
+  }));
   return result;
 }
 

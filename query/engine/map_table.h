@@ -3,6 +3,7 @@
 // request can reach outside the store's folder.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <shared_mutex>
@@ -33,13 +34,19 @@ class MapTable {
   /// Errors: as Reader; WRITER_LOCKED while another process holds the lock.
   absl::StatusOr<CommitResult> Commit(GraphDelta delta, const StopCheck& stop);
 
+  /// The same for other work of the map's writer. Commits wait meanwhile, so long work is to be
+  /// done in pieces, a call each.
+  /// Errors: as Commit; what `work` returns.
+  absl::Status WithWriter(const std::string& name, const StopCheck& stop,
+                          const std::function<absl::Status(MapWriter&)>& work);
+
  private:
   struct WriterSlot {
     std::mutex mutex;
     /// Of the file that the writer writes.
     std::shared_ptr<MapReader> reader;
     /// Null until the lock could be taken.
-    std::unique_ptr<GraphWriter> writer;
+    std::unique_ptr<MapWriter> writer;
   };
 
   WriterSlot* FindSlot(const std::string& name);

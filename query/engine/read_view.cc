@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/engine/request_check.h"
+#include "query/engine/tags.h"
 #include "schema/base/status.h"
 
 namespace dsg::query {
@@ -40,6 +41,10 @@ absl::StatusOr<ReadView> ReadView::Open(MapTable* maps, const std::string& map,
     return OpenAt(maps, map, read_at.exact_revision());
   }
   DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> reader, maps->Reader(map));
+  if (!read_at.tag().empty()) {
+    DSG_ASSIGN_OR_RETURN(const Revision tagged, RevisionOfTag(reader.get(), read_at.tag()));
+    return OpenAt(maps, map, tagged);
+  }
   DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Snapshot> snapshot, reader->Latest());
   // The newest revision is the head, so it need not be asked for again.
   const Revision newest = snapshot->revision();

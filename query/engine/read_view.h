@@ -21,7 +21,7 @@ namespace dsg::query {
 class ReadView {
  public:
   /// Errors: MAP_NAME_INVALID; MAP_UNKNOWN; REVISION_IN_FUTURE or REVISION_COMPACTED with `oldest`
-  /// and `newest`; FIELD_INVALID for a negative revision.
+  /// and `newest`; TAG_UNKNOWN; FIELD_INVALID for a negative revision.
   static absl::StatusOr<ReadView> Open(MapTable* maps, const std::string& map,
                                        const v1::ReadAt& read_at);
 

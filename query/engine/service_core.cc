@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "query/engine/service_core.h"
 
-#include <algorithm>
-#include <chrono>
-#include <thread>
+#include <utility>
 
 #include "dsg/v1/ingest_service.pb.h"
 #include "dsg/v1/map_service.pb.h"
@@ -18,7 +16,7 @@
 #include "query/engine/encounters.h"
 #include "query/engine/interactions.h"
 #include "query/engine/locate.h"
-#include "query/engine/map_table.h"
+#include "query/engine/maintenance_core.h"
 #include "query/engine/maps.h"
 #include "query/engine/mesh.h"
 #include "query/engine/nearest.h"
@@ -30,6 +28,7 @@
 #include "query/engine/presence.h"
 #include "query/engine/read_view.h"
 #include "query/engine/search.h"
+#include "query/engine/send_all.h"
 #include "query/engine/subgraph.h"
 #include "query/engine/trajectory.h"
 #include "query/engine/walk_area_cache.h"
@@ -39,13 +38,10 @@
 namespace dsg::query {
 namespace {
 
-// How soon a call that waits for news sees that it was cancelled.
-constexpr std::chrono::milliseconds kCancelPeriod{20};
-
-class LocalCore final : public ServiceCore {
+class LocalCore final : public MaintenanceCore {
  public:
   LocalCore(std::unique_ptr<GraphStore> store, const ServiceCoreOptions& options)
-      : maps_(std::move(store), options.view_cache_bytes) {}
+      : MaintenanceCore(std::move(store), options.view_cache_bytes) {}
 
   absl::Status LocateAgent(const CallContext& call, const v1::LocateAgentRequest& request,
                            v1::LocateAgentResponse* reply) override {
@@ -273,27 +269,6 @@ class LocalCore final : public ServiceCore {
     return ReadView::Open(&maps_, request.map(), request.read_at());
   }
 
-  template <typename Reply>
-  static absl::Status SleepUntilNews(const CallContext& call, StreamCursor<Reply>* cursor) {
-    for (auto left = cursor->Wait(); left.count() > 0; left = cursor->Wait()) {
-      DSG_RETURN_IF_ERROR(call.Check());
-      std::this_thread::sleep_for(std::min<std::chrono::nanoseconds>(left, kCancelPeriod));
-    }
-    return call.Check();
-  }
-
-  template <typename Reply>
-  static absl::Status SendAll(const CallContext& call, StreamCursor<Reply>* cursor,
-                              const std::function<bool(const Reply&)>& send) {
-    Reply message;
-    do {
-      DSG_RETURN_IF_ERROR(SleepUntilNews(call, cursor));
-      message.Clear();
-      DSG_RETURN_IF_ERROR(cursor->Next(call, &message));
-    } while (send(message) && !cursor->done());
-    return absl::OkStatus();
-  }
-
   template <typename Request>
   absl::StatusOr<Page> OpenList(const CallContext& call, std::string_view method,
                                 const Request& request) {
@@ -301,7 +276,6 @@ class LocalCore final : public ServiceCore {
     return OpenPage(&maps_, method, request);
   }
 
-  MapTable maps_;
   AgentNames names_;
   AncestryCache ancestries_;
   WalkAreaCache walk_areas_;

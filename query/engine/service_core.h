@@ -35,6 +35,11 @@ using MeshCursor = StreamCursor<v1::GetMeshResponse>;
 using AgentShapeCursor = StreamCursor<v1::GetAgentShapeResponse>;
 using SubgraphCursor = StreamCursor<v1::GetSubgraphResponse>;
 using WatchCursor = StreamCursor<v1::WatchMapResponse>;
+using PruneCursor = StreamCursor<v1::PruneResponse>;
+using CompactCursor = StreamCursor<v1::CompactResponse>;
+using RevertCursor = StreamCursor<v1::RevertResponse>;
+using MergeCursor = StreamCursor<v1::MergeMapsResponse>;
+using ArchiveCursor = StreamCursor<v1::ReadArchiveResponse>;
 
 /// An Api in this process.
 class ServiceCore : public Api {
@@ -54,6 +59,20 @@ class ServiceCore : public Api {
   /// WatchMap by pulling; never done. Errors: those of WatchMap.
   virtual absl::StatusOr<std::unique_ptr<WatchCursor>> OpenWatch(
       const v1::WatchMapRequest& request) = 0;
+
+  // Work by pulling: each Next does a piece of it, after which others may write. Errors: those of
+  // the calls that they are named after.
+  virtual absl::StatusOr<std::unique_ptr<PruneCursor>> OpenPrune(
+      const v1::PruneRequest& request) = 0;
+  virtual absl::StatusOr<std::unique_ptr<CompactCursor>> OpenCompact(
+      const v1::CompactRequest& request) = 0;
+  virtual absl::StatusOr<std::unique_ptr<RevertCursor>> OpenRevert(
+      const v1::RevertRequest& request) = 0;
+  virtual absl::StatusOr<std::unique_ptr<MergeCursor>> OpenMerge(
+      const v1::MergeMapsRequest& request) = 0;
+  /// ReadArchive by pulling.
+  virtual absl::StatusOr<std::unique_ptr<ArchiveCursor>> OpenArchive(
+      const v1::ReadArchiveRequest& request) = 0;
 };
 
 struct ServiceCoreOptions {

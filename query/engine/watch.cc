@@ -33,9 +33,10 @@ constexpr int kBacklogSize = 64;
 absl::Status ReplacedError(const std::string& map) {
   return MakeError(
       Reason::kMapReplaced,
-      absl::StrCat("map \"", map,
-                   "\" was removed or replaced while it was watched, so its revisions are others "
-                   "now; read the map again, then watch from the revision that was read"),
+      absl::StrCat(
+          "map \"", map,
+          "\" was removed, replaced or erased from while it was watched, so its revisions "
+          "are others now; read the map again, then watch from the revision that was read"),
       {{"map", map}});
 }
 
@@ -62,16 +63,20 @@ class Watch final : public WatchCursor {
 
   std::chrono::nanoseconds Wait() override {
     const auto now = Clock::now();
-    if (changes_ != nullptr || !map_->IsCurrent()) return {};
+    if (changes_ != nullptr) return {};
+    // Before it is asked whether the map is the same: this look shows it.
     const absl::StatusOr<RevisionInfo> head = map_->Head();
+    if (!map_->IsCurrent()) return {};
     if (!head.ok() || head->revision != after_ || now >= idle_until_) return {};
     return std::min<std::chrono::nanoseconds>(kPollPeriod, idle_until_ - now);
   }
 
   absl::Status Next(const CallContext& call, v1::WatchMapResponse* reply) override {
     DSG_RETURN_IF_ERROR(call.Check());
+    const absl::StatusOr<RevisionInfo> looked = map_->Head();
     if (!map_->IsCurrent()) return ReplacedError(map_->spec().name);
-    DSG_ASSIGN_OR_RETURN(const RevisionInfo head, map_->Head());
+    DSG_RETURN_IF_ERROR(looked.status());
+    const RevisionInfo& head = *looked;
     if (changes_ == nullptr && head.revision > after_) {
       DSG_RETURN_IF_ERROR(TakeRevision(head.revision));
       if (with_changes_) {

@@ -14,38 +14,43 @@ BASE = ["schema/base"]
 MODEL = BASE + ["schema/model"]
 CODEC = MODEL + ["schema/codec"]
 STORE = CODEC + ["schema/store"]
-SCHEMA = STORE + ["schema/interop", "schema/picture"]
+SCHEMA = STORE + ["schema/files", "schema/interop", "schema/picture", "schema/matching"]
 # The main of dsg-ingest alone may choose between a local store and a remote one.
 INGEST_STAGES = ["log", "simulator", "evaluation", "odometry", "loop", "depth", "volume", "agents",
                  "objects", "places", "rooms"]
 # Plain types that stages hand to one another.
-INGEST_SHARED = ["ingest/config", "ingest/files", "ingest/sensor", "ingest/grid",
-                 "ingest/matching"]
+INGEST_SHARED = ["ingest/config", "ingest/files", "ingest/sensor", "ingest/grid"]
 # Programs of their own beside the pipeline, which knows nothing of them.
 ASIDE = ["simulator", "evaluation"]
 ALLOWED = {
     "schema/base": [],
+    "schema/files": BASE,
     "schema/model": BASE,
     "schema/codec": MODEL,
     "schema/store": CODEC,
     "schema/store/sqlite": STORE,
+    "schema/archive": STORE + ["schema/files"],
     "schema/interop": STORE,
     "schema/picture": MODEL,
+    "schema/matching": BASE,
+    "schema/retention": STORE,
+    "schema/merge": STORE + ["schema/matching"],
     "ingest/config": SCHEMA,
-    "ingest/files": BASE,
+    "ingest/files": BASE + ["schema/files"],
     "ingest/sensor": MODEL,
     "ingest/grid": MODEL,
-    "ingest/matching": BASE,
     "ingest/remote": SCHEMA,
     "ingest/pipeline": (SCHEMA + INGEST_SHARED + ["ingest/remote"] +
                         [f"ingest/{s}" for s in INGEST_STAGES if s not in ASIDE]),
     "ingest": SCHEMA + ["ingest/config", "ingest/log", "ingest/pipeline", "ingest/remote"],
     "query/view": SCHEMA,
     "query/prediction": MODEL,
-    "query/engine": SCHEMA + ["query/view", "query/prediction"],
+    "query/engine": SCHEMA + ["query/view", "query/prediction", "schema/archive", "schema/merge",
+                             "schema/retention"],
     "query/client": SCHEMA + ["query/engine"],
-    "query/cli": SCHEMA + ["query/view", "query/engine", "query/client"],
-    "server": SCHEMA + ["query/view", "query/engine"],
+    "query/cli": SCHEMA + ["schema/archive", "schema/retention", "query/view", "query/engine",
+                           "query/client"],
+    "server": SCHEMA + ["schema/retention", "query/view", "query/engine"],
     "tests": SCHEMA + ["ingest", "query", "server"],
 }
 # What users of the client library would include.
@@ -72,11 +77,12 @@ THIRD_PARTY = [
       "docs/examples *.cc", "tests"]),
     (r"fcl/", ["query/engine *.cc", "tests"]),
     (r"pcl/|opencv2?/|ceres/|gtsam/|embree3/|rosbag/|yaml-cpp/|nanoflann",
-     ["ingest *.cc", "tests"]),
+     ["schema/retention *.cc", "ingest *.cc", "tests"]),
     (r"spdlog/", ["schema/base *.cc"]),
     (r"CLI/", ["ingest *.cc", "query/cli", "server *.cc", "tests"]),
     (r"png\.h$", ["schema/picture *.cc", "ingest/truth *.cc", "tests"]),
-    (r"nlohmann/", ["schema/interop", "ingest *.cc", "query/cli *.cc", "tests"]),
+    (r"nlohmann/", ["schema/interop", "schema/archive *.cc", "ingest *.cc", "query/cli *.cc",
+                    "tests"]),
 ]
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)

@@ -59,6 +59,23 @@ class PassingCore : public query::ServiceCore {
     return core_->WatchMap(call, request, send);
   }
 
+// Streams of maintenance.
+#define DSG_PASS_STREAM_ON(Method, Kind)                                                       \
+  absl::StatusOr<std::unique_ptr<query::Kind##Cursor>> Open##Kind(                             \
+      const v1::Method##Request& request) override {                                           \
+    return core_->Open##Kind(request);                                                         \
+  }                                                                                            \
+  absl::Status Method(const query::CallContext& call, const v1::Method##Request& request,      \
+                      const std::function<bool(const v1::Method##Response&)>& send) override { \
+    return core_->Method(call, request, send);                                                 \
+  }
+  DSG_PASS_STREAM_ON(Prune, Prune)
+  DSG_PASS_STREAM_ON(Compact, Compact)
+  DSG_PASS_STREAM_ON(Revert, Revert)
+  DSG_PASS_STREAM_ON(MergeMaps, Merge)
+  DSG_PASS_STREAM_ON(ReadArchive, Archive)
+#undef DSG_PASS_STREAM_ON
+
 // Passed on as they are.
 #define DSG_PASS_ON(Method)                                                               \
   absl::Status Method(const query::CallContext& call, const v1::Method##Request& request, \
@@ -89,6 +106,9 @@ class PassingCore : public query::ServiceCore {
   DSG_PASS_ON(GetServerInfo)
   DSG_PASS_ON(Commit)
   DSG_PASS_ON(GetSession)
+  DSG_PASS_ON(SetTag)
+  DSG_PASS_ON(RemoveTag)
+  DSG_PASS_ON(ListTags)
 #undef DSG_PASS_ON
 
  private:

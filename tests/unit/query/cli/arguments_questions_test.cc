@@ -122,17 +122,17 @@ TEST(AroundArguments, RelationMayBeGivenAgain) {
 }
 
 TEST(DiffArguments, TheSecondRevisionIsTheNewestUnlessGiven) {
-  EXPECT_EQ(ParseAs<DiffVerb>({"diff", "3"}).to_revision, 0);
-  EXPECT_EQ(ParseAs<DiffVerb>({"diff", "3", "7"}).to_revision, 7);
-  EXPECT_EQ(ParseAs<DiffVerb>({"diff", "0"}).from_revision, 0);
+  EXPECT_FALSE(ParseAs<DiffVerb>({"diff", "3"}).to.is_set());
+  EXPECT_EQ(ParseAs<DiffVerb>({"diff", "3", "7"}).to.number, 7);
+  EXPECT_EQ(ParseAs<DiffVerb>({"diff", "0"}).from.number, 0);
   Refusal({"diff"});
   Refusal({"diff", "-1"});
 }
 
 TEST(WatchArguments, CountIsN) {
   EXPECT_EQ(ParseAs<WatchVerb>({"watch", "-n", "2", "--after", "0"}).count, 2);
-  EXPECT_EQ(ParseAs<WatchVerb>({"watch", "--after", "0"}).after, 0);
-  EXPECT_FALSE(ParseAs<WatchVerb>({"watch"}).after.has_value());
+  EXPECT_EQ(ParseAs<WatchVerb>({"watch", "--after", "0"}).after.number, 0);
+  EXPECT_FALSE(ParseAs<WatchVerb>({"watch"}).after.is_set());
 }
 
 TEST(PictureArguments, BelongToAPicture) {

@@ -127,7 +127,7 @@ TEST(Arguments, RefusesWhatItDoesNotKnow) {
   Refusal({"where", "--at", "+1s"});
   Refusal({"where", "H12", "--at", "+1s", "--color", "red"});
   Refusal({"stats", "--revision", "-1"});
-  Refusal({"stats", "--revision", "latest"});
+  Refusal({"stats", "--revision", ""});
   Refusal({"ls", "--limit", "0"});
   Refusal({"near", "0,0,0", "--k", "1001"});
   Refusal({"near", "0,0,0", "--timeout", "0"});
@@ -199,8 +199,8 @@ TEST(Arguments, MistakesNameTheOptionAndWhereHelpIs) {
             "--limit: \"0\" is not a whole number above zero; see dsg ls --help");
   EXPECT_EQ(Refusal({"near", "1,2,3", "-k", "1001"}),
             "--k: \"1001\" is not a number from 1 to 1000; see dsg near --help");
-  EXPECT_EQ(Refusal({"verify", "--server", "x"}),
-            "not understood: --server x; see dsg verify --help");
+  EXPECT_EQ(Refusal({"upgrade", "--server", "x"}),
+            "not understood: --server x; see dsg upgrade --help");
   EXPECT_NE(Refusal({"where", "carol"}).find("--at is required; see dsg where --help"),
             std::string::npos);
   EXPECT_NE(Refusal({}).find("see dsg --help"), std::string::npos);

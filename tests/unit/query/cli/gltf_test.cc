@@ -125,7 +125,7 @@ class GltfTest : public testing::Test {
  protected:
   Glb Export(const MapContent& content, size_t vertex_count_max = kPrimitiveVertexCountMax) {
     const std::string path = folder_.path() + "/a.glb";
-    auto file = OutputFile::Create(path, true);
+    auto file = AtomicFile::Create(path, true);
     EXPECT_TRUE(file.ok());
     const GltfDocument document = MakeGltf(content, MeshColor::kAuto, vertex_count_max);
     EXPECT_TRUE(document.Write(&*file).ok() && file->Commit().ok());

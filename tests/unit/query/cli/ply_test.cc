@@ -118,12 +118,12 @@ uint32_t RgbOf(const Row& row) {
 class PlyTest : public testing::Test {
  protected:
   Ply Mesh(const MapContent& content, MeshColor color = MeshColor::kAuto) {
-    auto file = OutputFile::Create(path_, true);
+    auto file = AtomicFile::Create(path_, true);
     EXPECT_TRUE(file.ok() && WriteMeshPly(content, color, &*file).ok() && file->Commit().ok());
     return ReadPly(path_);
   }
   Ply Graph(const MapContent& content) {
-    auto file = OutputFile::Create(path_, true);
+    auto file = AtomicFile::Create(path_, true);
     EXPECT_TRUE(file.ok() && WriteGraphPly(content, &*file).ok() && file->Commit().ok());
     return ReadPly(path_);
   }

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include <atomic>
+#include <functional>
 #include <thread>
 
 #include "dsg/v1/map_service.pb.h"
@@ -16,61 +16,6 @@ namespace {
 using query::CallContext;
 using query::MapTable;
 using query::WatchCursor;
-
-/// A map whose old revisions were compacted away, as far as it says.
-class CompactedMap final : public MapReader {
- public:
-  CompactedMap(std::shared_ptr<MapReader> map, const std::atomic<Revision>* oldest)
-      : map_(std::move(map)), oldest_(oldest) {}
-
-  const MapSpec& spec() const override { return map_->spec(); }
-  bool IsCurrent() const override { return map_->IsCurrent(); }
-  absl::StatusOr<RevisionInfo> Head() override { return map_->Head(); }
-  absl::StatusOr<std::shared_ptr<const Snapshot>> Latest() override { return map_->Latest(); }
-  absl::StatusOr<std::shared_ptr<const Snapshot>> At(Revision revision) override {
-    return map_->At(revision);
-  }
-  absl::StatusOr<Revision> OldestRevision() override { return oldest_->load(); }
-  absl::StatusOr<std::vector<RevisionInfo>> ListRevisions(Revision before, int limit) override {
-    DSG_ASSIGN_OR_RETURN(std::vector<RevisionInfo> list, map_->ListRevisions(before, limit));
-    std::erase_if(list, [&](const RevisionInfo& info) { return info.revision < *oldest_; });
-    return list;
-  }
-  absl::StatusOr<Touched> TouchedBetween(Revision after, Revision until,
-                                         const StopCheck& stop) override {
-    return map_->TouchedBetween(after, until, stop);
-  }
-  absl::StatusOr<SessionState> GetSession(const std::string& session_id) override {
-    return map_->GetSession(session_id);
-  }
-  absl::StatusOr<VerifyReport> Verify(const std::function<void(double)>& progress) override {
-    return map_->Verify(progress);
-  }
-
- private:
-  std::shared_ptr<MapReader> map_;
-  const std::atomic<Revision>* oldest_;
-};
-
-class CompactedStore final : public GraphStore {
- public:
-  CompactedStore(std::unique_ptr<GraphStore> store, const std::atomic<Revision>* oldest)
-      : store_(std::move(store)), oldest_(oldest) {}
-
-  absl::StatusOr<std::vector<MapSpec>> ListMaps() override { return store_->ListMaps(); }
-  absl::Status CreateMap(const MapSpec& spec) override { return store_->CreateMap(spec); }
-  absl::StatusOr<std::shared_ptr<MapReader>> OpenMap(const std::string& name) override {
-    DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> map, store_->OpenMap(name));
-    return std::make_shared<CompactedMap>(std::move(map), oldest_);
-  }
-  absl::StatusOr<std::unique_ptr<GraphWriter>> OpenWriter(const std::string& name) override {
-    return store_->OpenWriter(name);
-  }
-
- private:
-  std::unique_ptr<GraphStore> store_;
-  const std::atomic<Revision>* oldest_;
-};
 
 GraphDelta DeltaOfObjects(uint64_t first, uint64_t count) {
   GraphDelta delta;
@@ -87,13 +32,25 @@ class WatchTest : public testing::Test {
     MakeOffice(folder_.path());
     auto store = GraphStore::Open(folder_.path(), {});
     EXPECT_TRUE(store.ok()) << store.status();
-    maps_ =
-        std::make_unique<MapTable>(std::make_unique<CompactedStore>(*std::move(store), &oldest_));
+    maps_ = std::make_unique<MapTable>(*std::move(store));
     request_.set_map(kMap);
   }
 
   void Commit(uint64_t first, uint64_t count = 1) {
     CommitToOffice(folder_.path(), DeltaOfObjects(first, count));
+  }
+
+  void Work(const std::function<absl::Status(MapWriter&)>& work) {
+    auto store = GraphStore::Open(folder_.path(), {});
+    ASSERT_TRUE(store.ok()) << store.status();
+    auto writer = (*store)->OpenWriter(kMap);
+    ASSERT_TRUE(writer.ok()) << writer.status();
+    const absl::Status done = work(**writer);
+    ASSERT_TRUE(done.ok()) << done;
+  }
+
+  void Compact(Revision keep_from) {
+    Work([&](MapWriter& writer) { return writer.Compact(keep_from, {}, {}).status(); });
   }
 
   std::unique_ptr<WatchCursor> Open() {
@@ -112,7 +69,6 @@ class WatchTest : public testing::Test {
   }
 
   TempFolder folder_;
-  std::atomic<Revision> oldest_{0};
   std::unique_ptr<MapTable> maps_;
   CallContext call_;
   v1::WatchMapRequest request_;
@@ -181,7 +137,7 @@ TEST_F(WatchTest, SendsALargeRevisionInPiecesThatCanBeBegunAgain) {
 
 TEST_F(WatchTest, SaysWhereToBeginAgainWhenItsStartWasCompacted) {
   for (uint64_t i = 0; i < 8; ++i) Commit(100 + i);
-  oldest_ = 5;
+  Compact(5);
   request_.set_after_revision(3);
   const auto refused = OpenWatch(maps_.get(), request_);
   EXPECT_EQ(ReasonOf(refused.status()), Reason::kRevisionCompacted);
@@ -196,11 +152,37 @@ TEST_F(WatchTest, SaysWhereToBeginAgainWhenCompactionOvertakesIt) {
   const auto cursor = Open();
   Next(cursor.get());
   for (uint64_t i = 0; i < 8; ++i) Commit(100 + i);
-  oldest_ = 6;
+  Compact(6);
   v1::WatchMapResponse message;
   const absl::Status status = cursor->Next(call_, &message);
   EXPECT_EQ(ReasonOf(status), Reason::kRevisionCompacted);
   EXPECT_EQ(MetadataOf(status)["newest"], "9");
+}
+
+TEST_F(WatchTest, TellsATaggedRevisionThatIsLeftThenWhereToBeginAgain) {
+  const auto cursor = Open();
+  Next(cursor.get());
+  for (uint64_t i = 0; i < 8; ++i) Commit(100 + i);
+  Work([](MapWriter& writer) { return writer.SetTag("two", 2, "").status(); });
+  Compact(6);
+  EXPECT_EQ(Next(cursor.get()).revision().revision(), 2);
+  v1::WatchMapResponse message;
+  EXPECT_EQ(ReasonOf(cursor->Next(call_, &message)), Reason::kRevisionCompacted);
+}
+
+TEST_F(WatchTest, EndsWhenThePastIsErased) {
+  const auto cursor = Open();
+  Next(cursor.get());
+  Commit(100);
+  GraphDelta gone;
+  gone.retirements = {{NodeId('O', 100), std::nullopt}};
+  CommitToOffice(folder_.path(), gone);
+  Work([](MapWriter& writer) {
+    return writer.Erase({.nodes = {NodeId('O', 100)}}, {}, {}).status();
+  });
+  EXPECT_EQ(cursor->Wait().count(), 0);
+  v1::WatchMapResponse message;
+  EXPECT_EQ(ReasonOf(cursor->Next(call_, &message)), Reason::kMapReplaced);
 }
 
 TEST_F(WatchTest, RefusesFieldsOutOfRange) {

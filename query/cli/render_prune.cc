@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/cli/render_prune.h"
+
+#include <array>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "dsg/v1/maintenance_service.pb.h"
+#include "query/cli/render_maps.h"
+#include "query/cli/table.h"
+
+namespace dsg::cli {
+namespace {
+
+using Count = std::pair<const char*, int64_t (v1::Amount::*)() const>;
+
+constexpr std::array<Count, 9> kCounts = {{{"nodes", &v1::Amount::node_count},
+                                           {"edges", &v1::Amount::edge_count},
+                                           {"poses", &v1::Amount::pose_count},
+                                           {"shapes", &v1::Amount::shape_count},
+                                           {"factors", &v1::Amount::factor_count},
+                                           {"stays", &v1::Amount::stay_count},
+                                           {"mesh blocks", &v1::Amount::mesh_block_count},
+                                           {"assets", &v1::Amount::asset_count},
+                                           {"revisions", &v1::Amount::revision_count}}};
+
+using Row = std::pair<std::string, const v1::Amount*>;
+
+// Kinds of rows that the map does not have are left out.
+Table TableOf(const std::vector<Row>& rows) {
+  std::vector<Count> shown;
+  for (const Count& count : kCounts) {
+    bool is_used = false;
+    for (const auto& [name, amount] : rows) is_used |= (amount->*count.second)() != 0;
+    if (is_used) shown.push_back(count);
+  }
+  std::vector<Column> columns = {{""}};
+  for (const Count& count : shown) columns.push_back({count.first, Align::kRight});
+  columns.push_back({"payload", Align::kRight});
+  Table table(std::move(columns));
+  for (const auto& [name, amount] : rows) {
+    std::vector<std::string> cells = {Printable(name)};
+    for (const Count& count : shown) cells.push_back(absl::StrCat((amount->*count.second)()));
+    cells.push_back(BytesText(amount->byte_count()));
+    table.AddRow(std::move(cells));
+  }
+  return table;
+}
+
+}  // namespace
+
+std::string RenderPrune(const v1::PruneResponse& reply, bool is_dry_run, bool is_erase) {
+  std::vector<Row> rows;
+  for (const v1::PolicyReport& policy : reply.policies()) {
+    rows.emplace_back(policy.name(), &policy.matched());
+  }
+  rows.emplace_back(is_dry_run ? "map" : "map before", &reply.map_before());
+  if (!is_dry_run) rows.emplace_back("map after", &reply.map_after());
+  std::string text = TableOf(rows).Render();
+  if (is_dry_run) return text + "nothing was changed\n";
+  absl::StrAppend(&text, "files: ", BytesText(reply.file_bytes_before()), " before, ",
+                  BytesText(reply.file_bytes_after()), " now\n");
+  if (reply.revision() == 0) {
+    absl::StrAppend(&text, "no new revision\n");
+  } else {
+    absl::StrAppend(&text, "newest revision: ", reply.revision(), "\n");
+  }
+  if (is_erase) {
+    absl::StrAppend(&text, reply.erased()
+                               ? "erased: no revision knows it, and no byte of it is in the map's "
+                                 "files; backups made before still have it\n"
+                               : "not erased for good: a reader kept the log; do the same again\n");
+  }
+  return text;
+}
+
+}  // namespace dsg::cli

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+// The verb merge: another map of the same place, taken into this one.
+#include <algorithm>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
+#include "dsg/v1/maintenance_service.pb.h"
+#include "dsg/v1/query_service.pb.h"
+#include "query/cli/answer_picture.h"
+#include "query/cli/interrupt.h"
+#include "query/cli/json.h"
+#include "query/cli/paging.h"
+#include "query/cli/progress.h"
+#include "query/cli/render_merge.h"
+#include "query/cli/values.h"
+#include "query/cli/verbs.h"
+#include "schema/base/status.h"
+#include "schema/codec/proto_convert.h"
+
+namespace dsg::cli {
+namespace {
+
+constexpr uint32_t kFusedRgb = 0x2a8c4a;
+constexpr uint32_t kAddedRgb = 0x1f5fbf;
+constexpr uint32_t kGoneRgb = 0xc8321e;
+constexpr uint32_t kMovedRgb = 0xc87a1e;
+
+// "X,Y,Z,YAW" besides what ParsePose takes.
+absl::StatusOr<Pose3d> ParseTransform(const std::string& text) {
+  const std::vector<std::string> parts = absl::StrSplit(text, ',');
+  if (parts.size() != 4) return ParsePose("--transform", text);
+  DSG_ASSIGN_OR_RETURN(
+      const Eigen::Vector3d shift,
+      ParsePoint("--transform", absl::StrCat(parts[0], ",", parts[1], ",", parts[2])));
+  DSG_ASSIGN_OR_RETURN(const Eigen::Vector3d yaw,
+                       ParsePoint("--transform", absl::StrCat(parts[3], ",0,0")));
+  return Pose3d{shift, Eigen::Quaterniond(Eigen::AngleAxisd(yaw.x(), Eigen::Vector3d::UnitZ()))};
+}
+
+absl::StatusOr<v1::ListNodesResponse> ObjectsOf(Session* session, const std::string& map) {
+  v1::ListNodesRequest request;
+  request.set_map(map);
+  request.mutable_filter()->set_kind("object");
+  v1::ListNodesResponse all;
+  DSG_RETURN_IF_ERROR(FetchPages(
+      request, 0, [](const v1::ListNodesResponse& page) { return page.nodes_size(); },
+      [&](const v1::ListNodesRequest& ask, v1::ListNodesResponse* page) {
+        return session->api().ListNodes(session->NewCall(), ask, page);
+      },
+      &all));
+  return all;
+}
+
+// Objects of both maps, by what became of them.
+class MergePicture {
+ public:
+  MergePicture(v1::ListNodesResponse mine, v1::ListNodesResponse theirs)
+      : mine_(std::move(mine)), theirs_(std::move(theirs)) {}
+
+  AnswerPicture Draw(const v1::MergeMapsResponse& reply, const std::string& other) {
+    AnswerPicture picture{.title = absl::StrCat("with ", other)};
+    picture.revision = reply.revision() > 0 ? reply.revision() : mine_.header().read_revision();
+    std::set<std::string> known;
+    for (const v1::Node& node : mine_.nodes()) known.insert(node.id());
+    const Pose3d map_T_other = FromProto(reply.map_t_other());
+    for (const v1::Node& node : theirs_.nodes()) {
+      const auto mine = reply.node_ids().find(node.id());
+      const bool is_fused = mine != reply.node_ids().end() && known.contains(mine->second);
+      Mark(node, map_T_other, is_fused ? kFusedRgb : kAddedRgb, OverlayMark::Shape::kDot);
+    }
+    const std::set<std::string> gone(reply.gone_ids().begin(), reply.gone_ids().end());
+    for (const v1::Node& node : mine_.nodes()) {
+      if (!gone.contains(node.id())) continue;
+      const bool has_moved = reply.moved_ids().contains(node.id());
+      Mark(node, Pose3d(), has_moved ? kMovedRgb : kGoneRgb, OverlayMark::Shape::kCross);
+    }
+    overlay_.legend = {{absl::StrCat(reply.fused_object_count(), " objects in both"), kFusedRgb},
+                       {"objects added", kAddedRgb}};
+    if (reply.gone_count() > 0) {
+      overlay_.legend.push_back({absl::StrCat(reply.gone_count(), " gone"), kGoneRgb});
+      overlay_.legend.push_back({absl::StrCat(reply.moved_ids().size(), " moved"), kMovedRgb});
+    }
+    picture.overlay = std::move(overlay_);
+    return picture;
+  }
+
+ private:
+  void Mark(const v1::Node& node, const Pose3d& map_T_node_frame, uint32_t rgb,
+            OverlayMark::Shape shape) {
+    OverlayMark mark{.position_map = map_T_node_frame * PointOf(node.map_t_node().position()),
+                     .rgb = rgb,
+                     .shape = shape,
+                     .radius_px = 5.0,
+                     .label = ""};
+    OverlayOutline outline{{}, rgb, mark.position_map.z()};
+    for (const Eigen::Vector2d& corner : OutlineOf(node)) {
+      const Eigen::Vector3d at(corner.x(), corner.y(), node.map_t_node().position().z());
+      outline.corners_map.push_back((map_T_node_frame * at).head<2>());
+    }
+    if (outline.corners_map.size() >= 3) overlay_.outlines.push_back(std::move(outline));
+    overlay_.marks.push_back(std::move(mark));
+  }
+
+  v1::ListNodesResponse mine_;
+  v1::ListNodesResponse theirs_;
+  Overlay overlay_;
+};
+
+}  // namespace
+
+absl::Status RunMerge(Session* session, const MergeVerb& verb, std::ostream& out,
+                      std::ostream& progress_out) {
+  DSG_RETURN_IF_ERROR(CheckPicture(verb.picture));
+  v1::MergeMapsRequest request;
+  request.set_map(session->map().name);
+  request.set_other(verb.other);
+  request.set_dry_run(verb.dry_run);
+  request.set_author("dsg merge");
+  if (!verb.transform.empty()) {
+    DSG_ASSIGN_OR_RETURN(const Pose3d transform, ParseTransform(verb.transform));
+    ToProto(transform, request.mutable_map_t_other());
+  }
+  v1::ListNodesResponse mine;
+  v1::ListNodesResponse theirs;
+  if (!verb.picture.png.empty()) {
+    DSG_ASSIGN_OR_RETURN(mine, ObjectsOf(session, request.map()));
+    DSG_ASSIGN_OR_RETURN(theirs, ObjectsOf(session, request.other()));
+  }
+  Progress progress(absl::StrCat("merge ", verb.other, " into ", session->map().name),
+                    &progress_out);
+  query::CallContext call = session->NewCall();
+  const InterruptGuard guard(&call);
+  v1::MergeMapsResponse last;
+  DSG_RETURN_IF_ERROR(
+      session->api().MergeMaps(call, request, [&](const v1::MergeMapsResponse& message) {
+        progress.Update(message.progress());
+        auto ids = std::move(*last.mutable_node_ids());
+        last = message;
+        for (const auto& [before, after] : ids) (*last.mutable_node_ids())[before] = after;
+        return true;
+      }));
+  if (session->common().json) {
+    DSG_RETURN_IF_ERROR(WriteJson(last, out));
+  } else {
+    out << RenderMerge(last, verb.other, session->map().name, verb.dry_run);
+  }
+  if (verb.picture.png.empty()) return absl::OkStatus();
+  MergePicture picture(std::move(mine), std::move(theirs));
+  return WritePicture(session, verb.picture, picture.Draw(last, verb.other), out);
+}
+
+}  // namespace dsg::cli

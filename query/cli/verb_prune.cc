@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+// The verb prune: forgets a part of a map.
+#include <unistd.h>
+
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "dsg/v1/maintenance_service.pb.h"
+#include "query/cli/interrupt.h"
+#include "query/cli/json.h"
+#include "query/cli/progress.h"
+#include "query/cli/render_prune.h"
+#include "query/cli/values.h"
+#include "query/cli/verbs.h"
+#include "query/engine/prune_convert.h"
+#include "schema/base/status.h"
+#include "schema/retention/duration.h"
+#include "schema/retention/policy_file.h"
+
+namespace dsg::cli {
+namespace {
+
+absl::StatusOr<PrunePolicy::What> WhatOf(const PruneVerb& verb, TimeNs epoch_ns) {
+  if (!verb.branch.empty()) return PrunePolicy::Branch{verb.branch};
+  if (!verb.layer.empty()) return PrunePolicy::WholeLayer{verb.layer};
+  if (!verb.region.empty()) {
+    DSG_ASSIGN_OR_RETURN(const Box3d box, ParseBox("--region", verb.region));
+    return PrunePolicy::Region{box};
+  }
+  if (!verb.before.empty()) {
+    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, ParseInstant("--before", verb.before, epoch_ns));
+    return PrunePolicy::Before{at_ns};
+  }
+  if (!verb.unseen_since.empty()) {
+    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns,
+                         ParseInstant("--unseen-since", verb.unseen_since, epoch_ns));
+    return PrunePolicy::UnseenSince{at_ns};
+  }
+  if (!verb.older_than.empty()) {
+    DSG_ASSIGN_OR_RETURN(const TimeNs age_ns, ParseAge(verb.older_than));
+    return PrunePolicy::OlderThan{age_ns};
+  }
+  if (!verb.unseen_for.empty()) {
+    DSG_ASSIGN_OR_RETURN(const TimeNs age_ns, ParseAge(verb.unseen_for));
+    return PrunePolicy::UnseenFor{age_ns};
+  }
+  return PrunePolicy::What();
+}
+
+absl::StatusOr<std::vector<PrunePolicy>> PoliciesOf(const PruneVerb& verb, TimeNs epoch_ns) {
+  if (!verb.policy_file.empty()) {
+    DSG_ASSIGN_OR_RETURN(PolicyFile file, ReadPolicyFile(verb.policy_file));
+    return std::move(file.policies);
+  }
+  PrunePolicy policy;
+  DSG_ASSIGN_OR_RETURN(policy.what, WhatOf(verb, epoch_ns));
+  policy.layers = verb.only;
+  policy.simplify_m = verb.simplify_m;
+  if (verb.erase) policy.strength = PruneStrength::kErase;
+  if (std::holds_alternative<std::monostate>(policy.what) && !policy.IsThinning()) {
+    return MakeError(Reason::kFieldInvalid,
+                     "say what to forget: --branch, --region, --before, --older-than, --layer, "
+                     "--unseen-since, --unseen-for, --simplify or --policy");
+  }
+  DSG_RETURN_IF_ERROR(policy.Validate());
+  return std::vector<PrunePolicy>{policy};
+}
+
+// What all messages say together: reports stand in the first, ends in the last.
+absl::StatusOr<v1::PruneResponse> Run(Session* session, const v1::PruneRequest& request,
+                                      std::ostream& progress_out) {
+  Progress progress(absl::StrCat("prune ", session->map().name), &progress_out);
+  query::CallContext call = session->NewCall();
+  const InterruptGuard guard(&call);
+  v1::PruneResponse all;
+  DSG_RETURN_IF_ERROR(session->api().Prune(call, request, [&](const v1::PruneResponse& message) {
+    progress.Update(message.progress());
+    all.MergeFrom(message);
+    return true;
+  }));
+  return all;
+}
+
+// A person says whether everything may go; nobody is there to ask a script.
+bool AskPerson(const absl::Status& refusal, std::ostream& questions) {
+  if (isatty(STDIN_FILENO) == 0) return false;
+  questions << "dsg: " << refusal.message() << "\nForget it all? [y/N] " << std::flush;
+  std::string answer;
+  return std::getline(std::cin, answer) && (answer == "y" || answer == "yes");
+}
+
+}  // namespace
+
+absl::Status RunPrune(Session* session, const PruneVerb& verb, std::ostream& out,
+                      std::ostream& progress_out) {
+  DSG_ASSIGN_OR_RETURN(const std::vector<PrunePolicy> policies,
+                       PoliciesOf(verb, session->map().epoch_ns));
+  v1::PruneRequest request;
+  request.set_map(session->map().name);
+  request.set_author("dsg prune");
+  request.set_dry_run(verb.dry_run);
+  request.set_allow_everything(verb.yes);
+  bool is_erase = false;
+  for (const PrunePolicy& policy : policies) {
+    query::ToProto(policy, request.add_policies());
+    is_erase |= policy.strength == PruneStrength::kErase;
+  }
+  auto reply = Run(session, request, progress_out);
+  if (ReasonOf(reply.status()) == Reason::kPolicyMatchesAll) {
+    if (!AskPerson(reply.status(), progress_out)) {
+      return Annotate(reply.status(), "refused without --yes");
+    }
+    request.set_allow_everything(true);
+    reply = Run(session, request, progress_out);
+  }
+  DSG_RETURN_IF_ERROR(reply.status());
+  if (session->common().json) return WriteJson(*reply, out);
+  out << RenderPrune(*reply, verb.dry_run, is_erase);
+  return absl::OkStatus();
+}
+
+}  // namespace dsg::cli

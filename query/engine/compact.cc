@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/engine/compact.h"
+
+#include <algorithm>
+#include <chrono>
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "dsg/v1/maintenance_service.pb.h"
+#include "query/engine/request_check.h"
+#include "schema/base/status.h"
+
+namespace dsg::query {
+namespace {
+
+// How long commits to the map wait, about.
+constexpr std::chrono::milliseconds kSlice{200};
+
+class Compaction final : public CompactCursor {
+ public:
+  Compaction(MapTable* maps, std::string map, Revision keep_from)
+      : maps_(maps), map_(std::move(map)), keep_from_(keep_from) {}
+
+  absl::Status Next(const CallContext& call, v1::CompactResponse* reply) override {
+    DSG_RETURN_IF_ERROR(call.Check());
+    DSG_RETURN_IF_ERROR(maps_->WithWriter(
+        map_, call.stop(), [&](MapWriter& writer) { return RunSlice(call, &writer, reply); }));
+    reply->set_progress(progress_);
+    reply->set_done(is_done_);
+    return absl::OkStatus();
+  }
+
+  bool done() const override { return is_done_; }
+
+ private:
+  absl::Status RunSlice(const CallContext& call, MapWriter* writer, v1::CompactResponse* reply) {
+    DSG_RETURN_IF_ERROR(SettleKeepFrom());
+    const auto slice_end = CallContext::Clock::now() + kSlice;
+    bool slice_is_over = false;
+    const StopCheck stop = [&]() -> absl::Status {
+      DSG_RETURN_IF_ERROR(call.Check());
+      slice_is_over = CallContext::Clock::now() >= slice_end;
+      return slice_is_over ? absl::CancelledError("commits go first") : absl::OkStatus();
+    };
+    // A later slice passes again, quickly, over what earlier ones have done.
+    const auto tell = [&](double fraction) { progress_ = std::max(progress_, fraction); };
+    const absl::StatusOr<CompactReport> report = writer->Compact(keep_from_, stop, tell);
+    if (!report.ok()) {
+      return slice_is_over && absl::IsCancelled(report.status()) ? absl::OkStatus()
+                                                                 : report.status();
+    }
+    is_done_ = true;
+    progress_ = 1.0;
+    reply->set_oldest_revision(report->oldest);
+    reply->set_revision_count(report->revision_count);
+    reply->set_row_count(report->row_count);
+    reply->set_file_bytes_before(report->bytes_before);
+    reply->set_file_bytes_after(report->bytes_after);
+    reply->set_shrunk(report->is_shrunk);
+    return absl::OkStatus();
+  }
+
+  // 0 stands for the revision that is the newest when the work begins.
+  absl::Status SettleKeepFrom() {
+    if (keep_from_ > 0) return absl::OkStatus();
+    DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> map, maps_->Reader(map_));
+    DSG_ASSIGN_OR_RETURN(const RevisionInfo head, map->Head());
+    keep_from_ = head.revision;
+    return absl::OkStatus();
+  }
+
+  MapTable* const maps_;
+  const std::string map_;
+  Revision keep_from_;
+  double progress_ = 0.0;
+  bool is_done_ = false;
+};
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<CompactCursor>> OpenCompact(MapTable* maps,
+                                                           const v1::CompactRequest& request) {
+  if (request.keep_from_revision() < 0) {
+    return FieldError("keep_from_revision", absl::StrCat(request.keep_from_revision()),
+                      "give a revision, or 0 for the newest");
+  }
+  DSG_RETURN_IF_ERROR(maps->Reader(request.map()).status());
+  return std::make_unique<Compaction>(maps, request.map(), request.keep_from_revision());
+}
+
+}  // namespace dsg::query

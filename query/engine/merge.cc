@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/engine/merge.h"
+
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "dsg/v1/maintenance_service.pb.h"
+#include "query/engine/request_check.h"
+#include "schema/base/status.h"
+#include "schema/codec/proto_convert.h"
+#include "schema/merge/merge.h"
+#include "schema/merge/refine.h"
+
+namespace dsg::query {
+namespace {
+
+// A message of so many pairs of ids stays below a megabyte.
+constexpr int kIdsAMessage = 20'000;
+
+class Merge final : public MergeCursor {
+ public:
+  Merge(MapTable* maps, std::shared_ptr<MapReader> into, std::shared_ptr<MapReader> other,
+        std::optional<Pose3d> map_T_other, bool is_dry_run, std::string author)
+      : maps_(maps),
+        into_(std::move(into)),
+        other_(std::move(other)),
+        map_T_other_(map_T_other),
+        is_dry_run_(is_dry_run),
+        author_(std::move(author)) {}
+
+  absl::Status Next(const CallContext& call, v1::MergeMapsResponse* reply) override {
+    DSG_RETURN_IF_ERROR(call.Check());
+    if (deltas_ == nullptr) {
+      DSG_RETURN_IF_ERROR(Plan(call));
+    } else if (!is_written_) {
+      DSG_RETURN_IF_ERROR(Write(call));
+    }
+    if (is_written_) TellIds(reply);
+    Tell(reply);
+    return absl::OkStatus();
+  }
+
+  bool done() const override { return is_done_; }
+
+ private:
+  absl::Status Plan(const CallContext& call) {
+    DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> into, into_->Latest());
+    DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> other, other_->Latest());
+    DSG_RETURN_IF_ERROR(merge::CheckMergeable(*into, *other));
+    if (!map_T_other_.has_value()) {
+      DSG_ASSIGN_OR_RETURN(const merge::Alignment alignment,
+                           merge::FindTransform(*into, *other, {}, call.stop()));
+      map_T_other_ = alignment.map_T_other;
+      agreeing_count_ = alignment.agreeing_count;
+    }
+    merge::MergeOptions options;
+    DSG_ASSIGN_OR_RETURN(options.used_ids, merge::FindUsedIds(into_.get(), call.stop()));
+    DSG_ASSIGN_OR_RETURN(merge::MergePlan plan,
+                         merge::PlanMerge(*into, *other, *map_T_other_, options, call.stop()));
+    parent_ = plan.into_revision;
+    deltas_ = std::make_unique<merge::MergeDeltas>(into, other, std::move(plan), author_);
+    next_id_ = deltas_->plan().node_ids.begin();
+    is_written_ = is_dry_run_;
+    return absl::OkStatus();
+  }
+
+  absl::Status Write(const CallContext& call) {
+    DSG_ASSIGN_OR_RETURN(std::optional<GraphDelta> delta, deltas_->Next(call.stop()));
+    if (!delta.has_value()) {
+      is_written_ = true;
+      return absl::OkStatus();
+    }
+    // What was planned holds only while nobody else changes the map.
+    delta->parent_revision = parent_;
+    DSG_ASSIGN_OR_RETURN(const CommitResult result, maps_->Commit(*std::move(delta), call.stop()));
+    parent_ = result.revision;
+    revision_ = result.revision;
+    return absl::OkStatus();
+  }
+
+  void TellIds(v1::MergeMapsResponse* reply) {
+    const auto& ids = deltas_->plan().node_ids;
+    for (int count = 0; next_id_ != ids.end() && count < kIdsAMessage; ++count, ++next_id_) {
+      (*reply->mutable_node_ids())[ToString(next_id_->first)] = ToString(next_id_->second);
+    }
+    is_done_ = next_id_ == ids.end();
+    if (!is_done_) return;
+    for (const NodeId id : deltas_->plan().gone) reply->add_gone_ids(ToString(id));
+    for (const auto& [before, after] : deltas_->plan().moved) {
+      (*reply->mutable_moved_ids())[ToString(before)] = ToString(after);
+    }
+  }
+
+  void Tell(v1::MergeMapsResponse* reply) const {
+    const merge::MergePlan& plan = deltas_->plan();
+    ToProto(*map_T_other_, reply->mutable_map_t_other());
+    reply->set_residual_m(plan.residual_m);
+    reply->set_agreeing_count(agreeing_count_ > 0
+                                  ? agreeing_count_
+                                  : static_cast<int32_t>(plan.counts.fused_object_count));
+    reply->set_fused_object_count(plan.counts.fused_object_count);
+    reply->set_fused_place_count(plan.counts.fused_place_count);
+    reply->set_fused_room_count(plan.counts.fused_room_count);
+    reply->set_fused_structure_count(plan.counts.fused_structure_count);
+    reply->set_fused_mesh_block_count(deltas_->fused_mesh_block_count());
+    reply->set_added_node_count(plan.counts.added_node_count);
+    reply->set_gone_count(plan.counts.gone_count);
+    reply->set_revision(revision_);
+    reply->set_progress(is_done_ ? 1.0 : 0.99 * (is_written_ ? 1.0 : deltas_->progress()));
+    reply->set_done(is_done_);
+  }
+
+  MapTable* const maps_;
+  const std::shared_ptr<MapReader> into_;
+  const std::shared_ptr<MapReader> other_;
+  std::optional<Pose3d> map_T_other_;
+  const bool is_dry_run_;
+  const std::string author_;
+  std::unique_ptr<merge::MergeDeltas> deltas_;
+  std::map<NodeId, NodeId>::const_iterator next_id_;
+  int32_t agreeing_count_ = 0;
+  Revision parent_ = 0;
+  Revision revision_ = 0;
+  bool is_written_ = false;
+  bool is_done_ = false;
+};
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<MergeCursor>> OpenMerge(MapTable* maps,
+                                                       const v1::MergeMapsRequest& request) {
+  DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> into, maps->Reader(request.map()));
+  DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> other, maps->Reader(request.other()));
+  if (request.map() == request.other()) {
+    return FieldError("other", request.other(),
+                      "a map cannot be merged with itself; name another map");
+  }
+  std::optional<Pose3d> map_T_other;
+  if (request.has_map_t_other()) map_T_other = FromProto(request.map_t_other());
+  return std::make_unique<Merge>(maps, std::move(into), std::move(other), map_T_other,
+                                 request.dry_run(), request.author());
+}
+
+}  // namespace dsg::query

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// Policies and amounts as messages and back. Refuses to judge a policy: that is Validate.
+#pragma once
+
+#include "absl/status/statusor.h"
+#include "schema/retention/amount.h"
+#include "schema/retention/policy.h"
+
+namespace dsg::v1 {
+class Amount;
+class PrunePolicy;
+}  // namespace dsg::v1
+
+namespace dsg::query {
+
+void ToProto(const PrunePolicy& policy, v1::PrunePolicy* out);
+/// A policy without a name gets one that says what it does.
+/// Errors: BOX_INVERTED, NUMBER_NOT_FINITE; what PrunePolicy::Validate returns.
+absl::StatusOr<PrunePolicy> FromProto(const v1::PrunePolicy& in);
+
+void ToProto(const Amount& amount, v1::Amount* out);
+
+}  // namespace dsg::query

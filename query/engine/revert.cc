@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/engine/revert.h"
+
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "dsg/v1/maintenance_service.pb.h"
+#include "query/engine/request_check.h"
+#include "query/engine/revert_plan.h"
+#include "query/engine/tags.h"
+#include "schema/base/status.h"
+
+namespace dsg::query {
+namespace {
+
+void ToProto(const RevertCounts& counts, v1::Amount* out) {
+  out->set_node_count(counts.node_count);
+  out->set_edge_count(counts.edge_count);
+  out->set_pose_count(counts.pose_count);
+  out->set_shape_count(counts.shape_count);
+  out->set_factor_count(counts.factor_count);
+  out->set_stay_count(counts.stay_count);
+  out->set_mesh_block_count(counts.mesh_block_count);
+}
+
+class Reversion final : public RevertCursor {
+ public:
+  Reversion(MapTable* maps, std::shared_ptr<MapReader> map, std::shared_ptr<const Snapshot> present,
+            std::shared_ptr<const Snapshot> wanted, const v1::RevertRequest& request)
+      : maps_(maps),
+        map_(std::move(map)),
+        present_(std::move(present)),
+        wanted_(std::move(wanted)),
+        author_(request.author().empty() ? "revert" : request.author()),
+        is_dry_run_(request.dry_run()),
+        parent_(present_->revision()) {}
+
+  // The first message has what will change; each later one a batch.
+  absl::Status Next(const CallContext& call, v1::RevertResponse* reply) override {
+    DSG_RETURN_IF_ERROR(call.Check());
+    if (!is_planned_) {
+      DSG_ASSIGN_OR_RETURN(plan_, PlanRevert(map_.get(), *present_, *wanted_, call.stop()));
+      is_planned_ = true;
+    } else {
+      DSG_RETURN_IF_ERROR(CommitBatch(call));
+    }
+    ToProto(plan_.added, reply->mutable_added());
+    ToProto(plan_.removed, reply->mutable_removed());
+    reply->set_revision(written_);
+    reply->set_done(done());
+    reply->set_progress(
+        done() ? 1.0 : static_cast<double>(next_) / static_cast<double>(plan_.batches.size()));
+    return absl::OkStatus();
+  }
+
+  bool done() const override {
+    return is_planned_ && (is_dry_run_ || next_ == plan_.batches.size());
+  }
+
+ private:
+  absl::Status CommitBatch(const CallContext& call) {
+    DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> head, map_->Latest());
+    DSG_ASSIGN_OR_RETURN(GraphDelta delta,
+                         MakeRevertDelta(plan_.batches[next_], *head, *wanted_, call.stop()));
+    ++next_;
+    delta.map = map_->spec().name;
+    // Another run begins at another head, and so has another name.
+    delta.session_id = absl::StrCat("revert-", present_->revision(), "-to-", wanted_->revision());
+    delta.sequence = static_cast<int64_t>(next_);
+    // What others write meanwhile would be neither kept nor undone.
+    delta.parent_revision = parent_;
+    delta.author = author_;
+    delta.message = absl::StrCat("revert to ", wanted_->revision(), ", part ", next_, "/",
+                                 plan_.batches.size());
+    const auto result = maps_->Commit(std::move(delta), call.stop());
+    if (ReasonOf(result.status()) == Reason::kParentRevisionStale) {
+      return MakeError(
+          Reason::kParentRevisionStale,
+          absl::StrCat("map \"", map_->spec().name, "\" was written by others while it was made ",
+                       "what it was at revision ", wanted_->revision(), ", after part ", next_ - 1,
+                       " of ", plan_.batches.size(), "; stop its writers and revert again"),
+          MetadataOf(result.status()));
+    }
+    DSG_RETURN_IF_ERROR(result.status());
+    written_ = parent_ = result->revision;
+    return absl::OkStatus();
+  }
+
+  MapTable* const maps_;
+  const std::shared_ptr<MapReader> map_;
+  const std::shared_ptr<const Snapshot> present_;
+  const std::shared_ptr<const Snapshot> wanted_;
+  const std::string author_;
+  const bool is_dry_run_;
+  /// The newest revision, as far as we know.
+  Revision parent_;
+  Revision written_ = 0;
+  bool is_planned_ = false;
+  RevertPlan plan_;
+  size_t next_ = 0;
+};
+
+absl::StatusOr<Revision> WantedRevision(MapReader* map, const v1::RevertRequest& request) {
+  if (!request.tag().empty()) return RevisionOfTag(map, request.tag());
+  if (request.has_revision() && request.revision() >= 0) return request.revision();
+  return FieldError("revision", absl::StrCat(request.revision()),
+                    "name the revision or the tag to go back to");
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<RevertCursor>> OpenRevert(MapTable* maps,
+                                                         const v1::RevertRequest& request) {
+  DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> map, maps->Reader(request.map()));
+  DSG_ASSIGN_OR_RETURN(const Revision wanted_revision, WantedRevision(map.get(), request));
+  DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Snapshot> wanted, map->At(wanted_revision));
+  DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Snapshot> present, map->Latest());
+  return std::make_unique<Reversion>(maps, std::move(map), std::move(present), std::move(wanted),
+                                     request);
+}
+
+}  // namespace dsg::query

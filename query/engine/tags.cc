@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "query/engine/tags.h"
+
+#include <memory>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "dsg/v1/maintenance_service.pb.h"
+#include "query/engine/request_check.h"
+#include "schema/base/status.h"
+
+namespace dsg::query {
+namespace {
+
+void ToProto(const Tag& tag, v1::Tag* out) {
+  out->set_name(tag.name);
+  out->set_revision(tag.revision);
+  out->set_created_ns(tag.created_ns);
+  out->set_note(tag.note);
+}
+
+}  // namespace
+
+absl::Status SetTag(MapTable* maps, const CallContext& call, const v1::SetTagRequest& request,
+                    v1::SetTagResponse* reply) {
+  if (request.revision() < 0) {
+    return FieldError("revision", absl::StrCat(request.revision()),
+                      "give a revision, or 0 for the newest");
+  }
+  return maps->WithWriter(request.map(), call.stop(), [&](MapWriter& writer) -> absl::Status {
+    Revision revision = request.revision();
+    if (revision == 0) {
+      // Read under the writer's lock, so that nothing is newer when the tag is set.
+      DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> map, maps->Reader(request.map()));
+      DSG_ASSIGN_OR_RETURN(const RevisionInfo head, map->Head());
+      revision = head.revision;
+    }
+    DSG_ASSIGN_OR_RETURN(const Tag tag, writer.SetTag(request.name(), revision, request.note()));
+    ToProto(tag, reply->mutable_tag());
+    return absl::OkStatus();
+  });
+}
+
+absl::Status RemoveTag(MapTable* maps, const CallContext& call,
+                       const v1::RemoveTagRequest& request) {
+  return maps->WithWriter(request.map(), call.stop(),
+                          [&](MapWriter& writer) { return writer.RemoveTag(request.name()); });
+}
+
+absl::Status ListTags(MapTable* maps, const v1::ListTagsRequest& request,
+                      v1::ListTagsResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> map, maps->Reader(request.map()));
+  DSG_ASSIGN_OR_RETURN(const std::vector<Tag> tags, map->Tags());
+  for (const Tag& tag : tags) ToProto(tag, reply->add_tags());
+  return absl::OkStatus();
+}
+
+absl::StatusOr<Revision> RevisionOfTag(MapReader* map, const std::string& tag) {
+  DSG_ASSIGN_OR_RETURN(const std::vector<Tag> tags, map->Tags());
+  for (const Tag& one : tags) {
+    if (one.name == tag) return one.revision;
+  }
+  const std::string known = absl::StrJoin(
+      tags, ", ", [](std::string* out, const Tag& one) { absl::StrAppend(out, one.name); });
+  return MakeError(Reason::kTagUnknown,
+                   absl::StrCat("map \"", map->spec().name, "\" has no tag \"", tag, "\"; it has ",
+                                known.empty() ? "none" : known),
+                   {{"map", map->spec().name}, {"tag", tag}});
+}
+
+}  // namespace dsg::query

@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: Apache-2.0
+// Forgetting as the service has it. What each policy takes is in tests/unit/schema/retention.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "dsg/v1/maintenance_service.pb.h"
+#include "dsg/v1/query_service.pb.h"
+#include "schema/base/status.h"
+#include "tests/unit/query/engine/office.h"
+
+namespace dsg::test {
+namespace {
+
+using query::CallContext;
+
+class PruneCallTest : public testing::Test {
+ protected:
+  PruneCallTest() {
+    MakeOffice(folder_.path());
+    core_ = OpenCore(folder_.path());
+    request_.set_map(kMap);
+  }
+
+  absl::StatusOr<v1::PruneResponse> Prune() {
+    v1::PruneResponse all;
+    double progress = 0.0;
+    DSG_RETURN_IF_ERROR(core_->Prune(call_, request_, [&](const v1::PruneResponse& message) {
+      EXPECT_GE(message.progress(), progress);
+      progress = message.progress();
+      if (message_count_++ == 0) {
+        EXPECT_EQ(message.policies_size(), request_.policies_size());
+        EXPECT_GT(message.map_before().node_count(), 0);
+      }
+      all.MergeFrom(message);
+      return true;
+    }));
+    EXPECT_EQ(all.done(), true);
+    return all;
+  }
+
+  bool Has(const std::string& id, Revision revision = 0) {
+    v1::GetNodeRequest request;
+    request.set_map(kMap);
+    request.set_id(id);
+    if (revision > 0) request.mutable_read_at()->set_exact_revision(revision);
+    v1::GetNodeResponse reply;
+    return core_->GetNode(call_, request, &reply).ok();
+  }
+
+  TempFolder folder_;
+  std::unique_ptr<query::ServiceCore> core_;
+  CallContext call_;
+  v1::PruneRequest request_;
+  int message_count_ = 0;
+};
+
+TEST_F(PruneCallTest, TellsWhatGoesThenRetiresIt) {
+  request_.add_policies()->set_branch("R1");
+  const auto reply = Prune();
+  ASSERT_TRUE(reply.ok()) << reply.status();
+  // R1, p1, p2, O1.
+  EXPECT_EQ(reply->policies(0).matched().node_count(), 4);
+  EXPECT_EQ(reply->policies(0).name(), "branch R1");
+  EXPECT_EQ(reply->map_after().node_count(), reply->map_before().node_count() - 4);
+  EXPECT_LT(reply->map_after().byte_count(), reply->map_before().byte_count());
+  EXPECT_EQ(reply->revision(), 3);
+  EXPECT_FALSE(Has("R1"));
+  EXPECT_TRUE(Has("R1", 1));
+  EXPECT_TRUE(Has("R2"));
+}
+
+TEST_F(PruneCallTest, ADryRunChangesNothing) {
+  request_.add_policies()->set_layer("objects");
+  request_.set_dry_run(true);
+  const auto reply = Prune();
+  ASSERT_TRUE(reply.ok()) << reply.status();
+  EXPECT_EQ(reply->policies(0).matched().node_count(), 2);
+  EXPECT_EQ(reply->map_after().node_count(), reply->map_before().node_count());
+  EXPECT_EQ(reply->revision(), 0);
+  EXPECT_EQ(message_count_, 1);
+  EXPECT_TRUE(Has("O1"));
+}
+
+TEST_F(PruneCallTest, AskedAgainFindsNothingLeft) {
+  request_.add_policies()->set_before_ns(10 * kSecond);
+  ASSERT_TRUE(Prune().ok());
+  const auto again = Prune();
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_EQ(again->policies(0).matched().pose_count(), 0);
+  EXPECT_EQ(again->revision(), 0);
+}
+
+TEST_F(PruneCallTest, RefusesToForgetEverythingUnlessTold) {
+  request_.add_policies()->set_before_ns(1000 * kSecond);
+  EXPECT_EQ(ReasonOf(Prune().status()), Reason::kPolicyMatchesAll);
+  EXPECT_TRUE(Has("H12"));
+  request_.set_allow_everything(true);
+  ASSERT_TRUE(Prune().ok());
+  EXPECT_FALSE(Has("H12"));
+}
+
+TEST_F(PruneCallTest, HistoryPoliciesCompact) {
+  for (uint64_t i = 0; i < 5; ++i) {
+    GraphDelta delta;
+    delta.nodes = {MakeNode(NodeId('O', 100 + i), layers::kObjects, kinds::kObject, "thing",
+                            Box3d(Eigen::Vector3d::Zero(), Eigen::Vector3d::Ones()))};
+    CommitToOffice(folder_.path(), delta);
+  }
+  core_ = OpenCore(folder_.path());
+  request_.add_policies()->set_history_before_revision(4);
+  const auto reply = Prune();
+  ASSERT_TRUE(reply.ok()) << reply.status();
+  EXPECT_EQ(reply->policies(0).matched().revision_count(), 3);
+  EXPECT_FALSE(Has("R1", 3));
+  EXPECT_TRUE(Has("R1", 4));
+}
+
+TEST_F(PruneCallTest, NamesWhatIsWrong) {
+  EXPECT_EQ(ReasonOf(Prune().status()), Reason::kFieldInvalid);
+  request_.add_policies()->set_branch("R99");
+  EXPECT_EQ(ReasonOf(Prune().status()), Reason::kNodeUnknown);
+  request_.mutable_policies(0)->set_layer("attics");
+  EXPECT_EQ(ReasonOf(Prune().status()), Reason::kLayerUnknown);
+  request_.mutable_policies(0)->set_older_than_ns(-1);
+  EXPECT_EQ(ReasonOf(Prune().status()), Reason::kFieldInvalid);
+  request_.mutable_policies(0)->mutable_region_map()->mutable_min()->set_x(5);
+  request_.mutable_policies(0)->mutable_region_map()->mutable_max()->set_x(1);
+  EXPECT_EQ(ReasonOf(Prune().status()), Reason::kBoxInverted);
+  request_.set_map("cellar");
+  EXPECT_EQ(ReasonOf(Prune().status()), Reason::kMapUnknown);
+}
+
+TEST_F(PruneCallTest, EraseLeavesNoRevisionThatKnows) {
+  v1::PrunePolicy* const policy = request_.add_policies();
+  policy->set_branch("R1");
+  policy->set_strength(v1::ERASE);
+  const auto reply = Prune();
+  ASSERT_TRUE(reply.ok()) << reply.status();
+  EXPECT_TRUE(reply->erased());
+  EXPECT_FALSE(Has("R1"));
+  EXPECT_FALSE(Has("R1", 1));
+  EXPECT_TRUE(Has("R2", 1));
+  // Again: nothing is left of it, not even in the past.
+  EXPECT_EQ(ReasonOf(Prune().status()), Reason::kNodeUnknown);
+}
+
+// Every file of a folder, one after the other.
+std::string BytesOf(const std::string& folder) {
+  std::string bytes;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (!entry.is_regular_file()) continue;
+    std::ifstream in(entry.path(), std::ios::binary);
+    bytes.append(std::istreambuf_iterator<char>(in), {});
+  }
+  return bytes;
+}
+
+int HitCount(const std::string& bytes, const std::vector<std::string>& patterns) {
+  return static_cast<int>(std::count_if(
+      patterns.begin(), patterns.end(),
+      [&](const std::string& pattern) { return bytes.find(pattern) != std::string::npos; }));
+}
+
+TEST_F(PruneCallTest, EraseLeavesNoByteOfAHundredPlantedNamesInTheStoreOrACopyOfIt) {
+  core_.reset();
+  std::vector<std::string> patterns;
+  // Two names a thing, one after the other; some things are gone again before.
+  for (uint64_t version = 0; version < 2; ++version) {
+    GraphDelta delta;
+    for (uint64_t i = 0; i < 50; ++i) {
+      patterns.push_back("planted-" + std::to_string(version) + "-" + std::to_string(7919 * i));
+      const Eigen::Vector3d corner(1.0 + 0.05 * static_cast<double>(i), 2, 0);
+      delta.nodes.push_back(MakeNode(NodeId('O', 500 + i), layers::kObjects, kinds::kObject,
+                                     patterns.back(), Box3d(corner, corner.array() + 0.1)));
+      if (version > 0) continue;
+      Edge edge{NodeId('R', 1), relations::kContains, NodeId('O', 500 + i)};
+      delta.edges.push_back(edge);
+    }
+    CommitToOffice(folder_.path(), delta);
+  }
+  GraphDelta gone;
+  for (uint64_t i = 0; i < 10; ++i) gone.retirements.push_back({NodeId('O', 500 + i), {}});
+  CommitToOffice(folder_.path(), gone);
+  EXPECT_EQ(HitCount(BytesOf(folder_.path()), patterns), 100);
+
+  core_ = OpenCore(folder_.path());
+  v1::PrunePolicy* const policy = request_.add_policies();
+  policy->set_branch("R1");
+  policy->set_strength(v1::ERASE);
+  const auto reply = Prune();
+  ASSERT_TRUE(reply.ok()) << reply.status();
+  EXPECT_TRUE(reply->erased());
+  EXPECT_EQ(HitCount(BytesOf(folder_.path()), patterns), 0);
+  core_.reset();
+  const TempFolder copy;
+  auto store = GraphStore::Open(folder_.path(), {});
+  ASSERT_TRUE(store.ok()) << store.status();
+  auto map = (*store)->OpenMap(kMap);
+  ASSERT_TRUE(map.ok()) << map.status();
+  ASSERT_TRUE((*map)->CopyTo(copy.path() + "/copy.db", StopCheck(), Progress()).ok());
+  EXPECT_EQ(HitCount(BytesOf(copy.path()), patterns), 0);
+  const auto verified = (*map)->Verify(Progress());
+  ASSERT_TRUE(verified.ok()) << verified.status();
+  EXPECT_TRUE(verified->problems.empty()) << verified->problems.front();
+}
+
+TEST_F(PruneCallTest, EraseOfATimeLeavesNoRevisionThatKnowsWhereSomebodyWas) {
+  v1::PrunePolicy* const policy = request_.add_policies();
+  policy->set_before_ns(10 * kSecond);
+  policy->set_strength(v1::ERASE);
+  ASSERT_TRUE(Prune().ok());
+  core_.reset();
+  auto store = GraphStore::Open(folder_.path(), {});
+  ASSERT_TRUE(store.ok()) << store.status();
+  auto map = (*store)->OpenMap(kMap);
+  ASSERT_TRUE(map.ok()) << map.status();
+  for (Revision revision = 1; revision <= 2; ++revision) {
+    const auto then = (*map)->At(revision);
+    ASSERT_TRUE(then.ok()) << then.status();
+    const auto tracks = (*then)->Tracks();
+    ASSERT_TRUE(tracks.ok()) << tracks.status();
+    for (const TrackInfo& track : *tracks) {
+      EXPECT_TRUE(track.pose_count == 0 || track.first_ns >= 10 * kSecond);
+    }
+  }
+  const auto verified = (*map)->Verify(Progress());
+  ASSERT_TRUE(verified.ok()) << verified.status();
+  EXPECT_TRUE(verified->problems.empty()) << verified->problems.front();
+}
+
+TEST_F(PruneCallTest, EraseGoesOnWhereAPruneWasCutOff) {
+  v1::PrunePolicy* const policy = request_.add_policies();
+  policy->set_branch("R1");
+  ASSERT_TRUE(Prune().ok());
+  EXPECT_TRUE(Has("O1", 1));
+  policy->set_strength(v1::ERASE);
+  const auto reply = Prune();
+  ASSERT_TRUE(reply.ok()) << reply.status();
+  EXPECT_FALSE(Has("O1", 1));
+}
+
+}  // namespace
+}  // namespace dsg::test

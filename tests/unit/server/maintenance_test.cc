@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+// Maintenance over the wire: streams that work beside commits and questions, and end with the
+// caller, the map or the server.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <thread>
+
+#include "dsg/v1/errors.pb.h"
+#include "dsg/v1/maintenance_service.grpc.pb.h"
+#include "dsg/v1/map_service.grpc.pb.h"
+#include "grpcpp/grpcpp.h"
+#include "schema/base/status.h"
+#include "server/server.h"
+#include "server/status_mapping.h"
+#include "tests/unit/query/engine/office.h"
+#include "tests/unit/server/passing_core.h"
+
+namespace dsg::server {
+namespace {
+
+using test::kMap;
+
+// A compaction that is never done, and tells so as fast as it is read.
+class EndlessCompaction final : public query::CompactCursor {
+ public:
+  explicit EndlessCompaction(std::atomic<int>* open_count) : open_count_(open_count) {
+    ++*open_count_;
+  }
+  ~EndlessCompaction() override { --*open_count_; }
+  absl::Status Next(const query::CallContext& call, v1::CompactResponse* reply) override {
+    reply->set_progress(0.5);
+    return call.Check();
+  }
+  bool done() const override { return false; }
+
+ private:
+  std::atomic<int>* const open_count_;
+};
+
+class EndlessCore final : public PassingCore {
+ public:
+  EndlessCore(std::unique_ptr<query::ServiceCore> core, std::atomic<int>* open_count)
+      : PassingCore(std::move(core)), open_count_(open_count) {}
+  absl::StatusOr<std::unique_ptr<query::CompactCursor>> OpenCompact(
+      const v1::CompactRequest&) override {
+    return std::make_unique<EndlessCompaction>(open_count_);
+  }
+
+ private:
+  std::atomic<int>* const open_count_;
+};
+
+class MaintenanceRpc : public testing::Test {
+ protected:
+  MaintenanceRpc() { test::MakeOffice(folder_.path()); }
+
+  void Start(std::unique_ptr<query::ServiceCore> core) {
+    ServerOptions options;
+    options.listen = "unix:" + folder_.path() + "/server.sock";
+    options.worker_count = 2;
+    auto server = Server::Start(std::move(core), options);
+    ASSERT_TRUE(server.ok()) << server.status();
+    server_ = *std::move(server);
+    channel_ = grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials());
+    stub_ = v1::MaintenanceService::NewStub(channel_);
+  }
+
+  static v1::Reason ReasonIn(const grpc::ClientContext& context) {
+    const auto& trailers = context.GetServerTrailingMetadata();
+    const auto found = trailers.find(kErrorTrailer);
+    v1::ErrorDetail detail;
+    if (found != trailers.end()) {
+      detail.ParseFromString(std::string(found->second.data(), found->second.size()));
+    }
+    return detail.reason();
+  }
+
+  bool AnswersQuestions() {
+    grpc::ClientContext context;
+    v1::GetMapStatsRequest request;
+    request.set_map(kMap);
+    v1::GetMapStatsResponse reply;
+    return v1::MapService::NewStub(channel_)->GetMapStats(&context, request, &reply).ok();
+  }
+
+  test::TempFolder folder_;
+  std::unique_ptr<Server> server_;
+  std::shared_ptr<grpc::Channel> channel_;
+  std::unique_ptr<v1::MaintenanceService::Stub> stub_;
+};
+
+TEST_F(MaintenanceRpc, TagsAndCompactionAndRevertAnswer) {
+  Start(test::OpenCore(folder_.path()));
+  {
+    grpc::ClientContext context;
+    v1::SetTagRequest request;
+    request.set_map(kMap);
+    request.set_name("start");
+    v1::SetTagResponse reply;
+    const grpc::Status status = stub_->SetTag(&context, request, &reply);
+    ASSERT_TRUE(status.ok()) << status.error_message();
+    EXPECT_EQ(reply.tag().revision(), 1);
+  }
+  {
+    grpc::ClientContext context;
+    v1::RevertRequest request;
+    request.set_map(kMap);
+    request.set_tag("start");
+    const auto reader = stub_->Revert(&context, request);
+    v1::RevertResponse message;
+    while (reader->Read(&message)) {
+    }
+    EXPECT_TRUE(reader->Finish().ok());
+    EXPECT_TRUE(message.done());
+  }
+  grpc::ClientContext context;
+  v1::CompactRequest request;
+  request.set_map(kMap);
+  const auto reader = stub_->Compact(&context, request);
+  v1::CompactResponse message;
+  while (reader->Read(&message)) {
+  }
+  EXPECT_TRUE(reader->Finish().ok());
+  EXPECT_TRUE(message.done());
+  EXPECT_EQ(message.oldest_revision(), 1);
+}
+
+TEST_F(MaintenanceRpc, ErrorsCarryTheirReason) {
+  Start(test::OpenCore(folder_.path()));
+  grpc::ClientContext context;
+  v1::ReadArchiveRequest request;
+  request.set_map("attic");
+  const auto reader = stub_->ReadArchive(&context, request);
+  v1::ReadArchiveResponse message;
+  EXPECT_FALSE(reader->Read(&message));
+  EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::NOT_FOUND);
+  EXPECT_EQ(ReasonIn(context), v1::MAP_UNKNOWN);
+}
+
+TEST_F(MaintenanceRpc, AnArchiveComesWhole) {
+  Start(test::OpenCore(folder_.path()));
+  grpc::ClientContext context;
+  v1::ReadArchiveRequest request;
+  request.set_map(kMap);
+  const auto reader = stub_->ReadArchive(&context, request);
+  v1::ReadArchiveResponse message;
+  std::string bytes;
+  while (reader->Read(&message)) bytes += message.content();
+  EXPECT_TRUE(reader->Finish().ok());
+  EXPECT_EQ(message.progress(), 1.0);
+  EXPECT_EQ(bytes.substr(bytes.size() - 40, 4), "DSGE");
+}
+
+TEST_F(MaintenanceRpc, LongWorkLetsQuestionsPassAndEndsWithItsCaller) {
+  std::atomic<int> open_count = 0;
+  Start(std::make_unique<EndlessCore>(test::OpenCore(folder_.path()), &open_count));
+  grpc::ClientContext contexts[3];
+  std::unique_ptr<grpc::ClientReader<v1::CompactResponse>> readers[3];
+  v1::CompactResponse message;
+  for (int i = 0; i < 3; ++i) {
+    readers[i] = stub_->Compact(&contexts[i], v1::CompactRequest());
+    EXPECT_TRUE(readers[i]->Read(&message));
+  }
+  EXPECT_EQ(open_count, 3);
+  for (int i = 0; i < 100; ++i) EXPECT_TRUE(AnswersQuestions());
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 100; ++k) EXPECT_TRUE(readers[i]->Read(&message));
+    contexts[i].TryCancel();
+    while (readers[i]->Read(&message)) {
+    }
+    EXPECT_EQ(readers[i]->Finish().error_code(), grpc::StatusCode::CANCELLED);
+  }
+  server_->Shutdown(std::chrono::seconds(5));
+  EXPECT_EQ(open_count, 0);
+}
+
+TEST_F(MaintenanceRpc, AServerThatStopsEndsWorkAndSaysSo) {
+  std::atomic<int> open_count = 0;
+  Start(std::make_unique<EndlessCore>(test::OpenCore(folder_.path()), &open_count));
+  grpc::ClientContext context;
+  const auto reader = stub_->Compact(&context, v1::CompactRequest());
+  v1::CompactResponse message;
+  ASSERT_TRUE(reader->Read(&message));
+  std::thread stopper([&] { server_->Shutdown(std::chrono::seconds(20)); });
+  while (reader->Read(&message)) {
+  }
+  EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
+  EXPECT_EQ(ReasonIn(context), v1::SHUTTING_DOWN);
+  stopper.join();
+  EXPECT_EQ(open_count, 0);
+}
+
+}  // namespace
+}  // namespace dsg::server

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/prune_schedule.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "dsg/v1/maintenance_service.pb.h"
+#include "dsg/v1/map_service.pb.h"
+#include "schema/base/status.h"
+#include "tests/unit/query/engine/office.h"
+#include "tests/unit/server/passing_core.h"
+
+namespace dsg::server {
+namespace {
+
+using std::chrono::hours;
+using std::chrono::minutes;
+
+// Time stands still but for waits, and ends at some instant.
+class TestClock final : public ScheduleClock {
+ public:
+  explicit TestClock(std::chrono::nanoseconds length) : end_(TimePoint() + length) {}
+
+  TimePoint Now() override { return now_; }
+  bool WaitUntil(TimePoint until) override {
+    now_ = std::max(now_, until);
+    return now_ < end_;
+  }
+  void Interrupt() override { end_ = now_; }
+
+ private:
+  TimePoint now_;
+  TimePoint end_;
+};
+
+class Pruned final : public query::PruneCursor {
+ public:
+  explicit Pruned(int message_count, absl::Status status)
+      : left_(message_count), status_(std::move(status)) {}
+  absl::Status Next(const query::CallContext&, v1::PruneResponse*) override {
+    --left_;
+    return status_;
+  }
+  bool done() const override { return left_ <= 0; }
+
+ private:
+  int left_;
+  absl::Status status_;
+};
+
+// Three maps, of which one always fails.
+class Core final : public PassingCore {
+ public:
+  Core() : PassingCore(nullptr) {}
+  absl::Status ListMaps(const query::CallContext&, const v1::ListMapsRequest&,
+                        v1::ListMapsResponse* reply) override {
+    for (const char* name : {"a", "b", "c"}) reply->add_maps()->set_name(name);
+    return absl::OkStatus();
+  }
+  absl::StatusOr<std::unique_ptr<query::PruneCursor>> OpenPrune(
+      const v1::PruneRequest& request) override {
+    ++count_of_[request.map()];
+    last_ = request;
+    absl::Status status;
+    if (request.map() == "b") status = MakeError(Reason::kWriterLocked, "somebody writes it");
+    return std::make_unique<Pruned>(3, status);
+  }
+
+  std::map<std::string, int> count_of_;
+  v1::PruneRequest last_;
+};
+
+PolicyFile FileOf(TimeNs every_ns) {
+  PrunePolicy policy;
+  policy.name = "mesh";
+  policy.what = PrunePolicy::WholeLayer{"mesh"};
+  return {every_ns, {policy}};
+}
+
+TEST(PruneSchedule, RunsEachMapAtEachDueTimeAndSurvivesErrors) {
+  Core core;
+  PruneSchedule schedule(&core, FileOf(3600 * kNsPerSecond), {.first_after = minutes(1)},
+                         std::make_unique<TestClock>(hours(5)));
+  schedule.Run();
+  for (const char* name : {"a", "b", "c"}) EXPECT_EQ(core.count_of_[name], 5) << name;
+  ASSERT_EQ(core.last_.policies_size(), 1);
+  EXPECT_EQ(core.last_.policies(0).layer(), "mesh");
+  EXPECT_FALSE(core.last_.allow_everything());
+}
+
+TEST(PruneSchedule, DoesNothingBeforeItsFirstTime) {
+  Core core;
+  PruneSchedule schedule(&core, FileOf(kNsPerSecond), {.first_after = minutes(1)},
+                         std::make_unique<TestClock>(minutes(1)));
+  schedule.Run();
+  EXPECT_TRUE(core.count_of_.empty());
+}
+
+TEST(PruneSchedule, OverdueRunsAreNotMadeUpFor) {
+  Core core;
+  // Each of the maps takes two pauses of ten minutes, so a run is longer than its period.
+  PruneSchedule schedule(&core, FileOf(60 * kNsPerSecond),
+                         {.first_after = minutes(0), .pause = minutes(10)},
+                         std::make_unique<TestClock>(hours(2)));
+  schedule.Run();
+  EXPECT_EQ(core.count_of_["a"], 3);
+}
+
+TEST(PruneSchedule, StopsAtOnceWhenTold) {
+  Core core;
+  PruneSchedule schedule(&core, FileOf(kNsPerSecond), {}, MakeScheduleClock());
+  schedule.Stop();
+  schedule.Run();
+  EXPECT_TRUE(core.count_of_.empty());
+}
+
+}  // namespace
+}  // namespace dsg::server
