@@ -43,8 +43,11 @@ class RemoteDestination : public Destination {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Destination>> OpenLocal(const std::string& folder,
-                                                       const MapSpec& spec) {
+                                                       const MapSpec& spec,
+                                                       const SpaceLimits& limits) {
   StoreOptions options;
+  options.reserve_bytes = limits.reserve_bytes;
+  options.quota_bytes = limits.quota_bytes;
   options.create = true;
   options.program = "dsg-ingest";
   DSG_ASSIGN_OR_RETURN(std::unique_ptr<GraphStore> store, GraphStore::Open(folder, options));
@@ -61,8 +64,9 @@ absl::StatusOr<std::unique_ptr<Destination>> OpenLocal(const std::string& folder
 }
 
 absl::StatusOr<std::unique_ptr<Destination>> OpenRemote(const std::string& address,
-                                                        const MapSpec& spec) {
-  DSG_ASSIGN_OR_RETURN(std::unique_ptr<RemoteMap> map, OpenRemoteMap(address, spec));
+                                                        const MapSpec& spec,
+                                                        const RemoteOptions& options) {
+  DSG_ASSIGN_OR_RETURN(std::unique_ptr<RemoteMap> map, OpenRemoteMap(address, spec, options));
   return std::make_unique<RemoteDestination>(std::move(map));
 }
 

@@ -3,10 +3,12 @@
 // Part of the program, not of the library, so that the library names no store.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 
 #include "ingest/pipeline/map_view.h"
+#include "ingest/remote/remote_writer.h"
 #include "schema/store/graph_writer.h"
 
 namespace dsg::ingest {
@@ -21,14 +23,22 @@ class Destination {
   virtual absl::StatusOr<std::unique_ptr<MapView>> View() = 0;
 };
 
+/// As StoreOptions has them.
+struct SpaceLimits {
+  int64_t reserve_bytes = int64_t{16} << 20;
+  int64_t quota_bytes = 0;
+};
+
 /// Opens a map for writing, creating folder and map from `spec` where they are missing.
 ///
 /// Errors: UNAVAILABLE/WRITER_LOCKED naming who holds the lock; what GraphStore returns.
 absl::StatusOr<std::unique_ptr<Destination>> OpenLocal(const std::string& folder,
-                                                       const MapSpec& spec);
+                                                       const MapSpec& spec,
+                                                       const SpaceLimits& limits = {});
 
-/// The same through a server. Errors: UNAVAILABLE when it cannot be reached for 30 s.
+/// The same through a server. Errors: what OpenRemoteMap returns.
 absl::StatusOr<std::unique_ptr<Destination>> OpenRemote(const std::string& address,
-                                                        const MapSpec& spec);
+                                                        const MapSpec& spec,
+                                                        const RemoteOptions& options);
 
 }  // namespace dsg::ingest

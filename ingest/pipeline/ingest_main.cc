@@ -2,6 +2,8 @@
 // dsg-ingest: sensor logs and scene-graph files in, committed revisions out.
 // Refuses to report success before everything is on disk.
 
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cmath>
@@ -34,6 +36,8 @@ enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2, kUnavailable = 3, kDataLoss 
 struct Flags {
   std::string store;
   std::string server;
+  std::string retry_for = "10m";
+  SpaceLimits limits;
   std::string map;
   std::string format = "auto";
   /// 0 = what the format is used to.
@@ -62,6 +66,16 @@ void AddFlags(CLI::App* app, Flags* flags) {
   app->add_option(
       "--server", flags->server,
       "Commit through this dsg-server (unix:PATH or HOST:PORT); --store is not touched");
+  app->add_option("--retry-for", flags->retry_for,
+                  "How long to wait for a server that does not answer (90s, 10m, 24h); the log "
+                  "waits too")
+      ->capture_default_str();
+  app->add_option("--quota", flags->limits.quota_bytes,
+                  "With --store: refuse to let the map grow beyond (10GB, 500MiB); 0 = no limit")
+      ->transform(CLI::AsSizeValue(true));
+  app->add_option("--reserve", flags->limits.reserve_bytes,
+                  "With --store: space kept so that forgetting works on a full disk; 0 = none")
+      ->transform(CLI::AsSizeValue(true));
   app->add_option("--map", flags->map, "Name of the map; made if missing")
       ->envname("DSG_MAP")
       ->required();
@@ -159,9 +173,28 @@ MapSpec MakeSpec(const Flags& flags, const LogOptions& options, const LogInfo& i
   return spec;
 }
 
+absl::StatusOr<TimeNs> ParseRetryFor(const std::string& text) {
+  const absl::StatusOr<TimeNs> span = ParseTime(absl::StrCat("+", text), 0);
+  if (span.ok() && *span >= 0) return *span;
+  return MakeError(
+      Reason::kFieldInvalid,
+      absl::StrCat("--retry-for \"", text, "\" is no duration; write it as 90s, 10m or 24h"),
+      {{"field", "retry-for"}, {"value", text}});
+}
+
+// A progress bar is drawn over, and drawn again below.
+void SayAboveProgress(const std::string& sentence) {
+  std::fprintf(stderr, "%sdsg-ingest: %s\n", isatty(STDERR_FILENO) == 1 ? "\r\033[K" : "",
+               sentence.c_str());
+}
+
 absl::StatusOr<std::unique_ptr<Destination>> OpenDestination(const Flags& flags,
                                                              const MapSpec& spec) {
-  return flags.server.empty() ? OpenLocal(flags.store, spec) : OpenRemote(flags.server, spec);
+  if (flags.server.empty()) return OpenLocal(flags.store, spec, flags.limits);
+  RemoteOptions options;
+  DSG_ASSIGN_OR_RETURN(options.retry_ns_max, ParseRetryFor(flags.retry_for));
+  if (!flags.is_quiet) options.tell = SayAboveProgress;
+  return OpenRemote(flags.server, spec, options);
 }
 
 // What a map is created with holds for its life; flags that say otherwise would be ignored.
@@ -296,6 +329,7 @@ absl::Status IngestOne(const Flags& flags, const std::string& path, LogOptions o
 absl::Status Run(const Flags& flags) {
   DSG_RETURN_IF_ERROR(CheckMapName(flags.map));
   DSG_RETURN_IF_ERROR(CheckUp(flags.up));
+  DSG_RETURN_IF_ERROR(ParseRetryFor(flags.retry_for).status());
   DSG_ASSIGN_OR_RETURN(const LogOptions options, MakeLogOptions(flags));
   IngestOptions ingest_options{.poses_per_delta = flags.commit_poses, .up = flags.up};
   DSG_ASSIGN_OR_RETURN(ingest_options.mapping, MakeMappingOptions(flags.mapping));

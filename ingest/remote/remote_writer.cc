@@ -19,18 +19,40 @@ constexpr int kPageSize = 500;
 
 /// What all calls to one server share.
 struct Connection {
-  std::string address;
-  RemoteOptions options;
-  std::shared_ptr<grpc::Channel> channel;
+  Connection(const std::string& address, const RemoteOptions& options)
+      : channel(OpenChannel(address)), caller(address, options.retry_ns_max, options.tell) {}
 
-  absl::Status Call(const std::function<grpc::Status(grpc::ClientContext*)>& attempt) const {
-    return CallWithRetry(address, options.retry_ns_max, attempt);
+  absl::Status Call(const std::function<grpc::Status(grpc::ClientContext*)>& attempt) {
+    return caller.Call(attempt);
   }
+
+  std::shared_ptr<grpc::Channel> channel;
+  ServerCaller caller;
 };
+
+// What a robot, or who looks after it, can do about a commit that the server refused.
+absl::Status Advise(const absl::Status& status, const std::string& address) {
+  constexpr char kGoesOn[] = "then run the same dsg-ingest again: it goes on where it stopped";
+  switch (ReasonOf(status)) {
+    case Reason::kDiskFull:
+    case Reason::kQuotaExceeded:
+      return Annotate(status, absl::StrCat("server ", address,
+                                           " takes no more; make room on its disk, or forget with "
+                                           "dsg prune, ",
+                                           kGoesOn));
+    case Reason::kSequenceGap:
+      return Annotate(
+          status,
+          absl::StrCat("server ", address,
+                       " has less than it acknowledged (was a backup restored?); ", kGoesOn));
+    default:
+      return status;
+  }
+}
 
 class RemoteWriter : public GraphWriter {
  public:
-  RemoteWriter(const Connection& connection, std::string map)
+  RemoteWriter(Connection& connection, std::string map)
       : connection_(connection),
         stub_(v1::IngestService::NewStub(connection.channel)),
         map_(std::move(map)) {}
@@ -51,8 +73,9 @@ class RemoteWriter : public GraphWriter {
           {{"sequence", absl::StrCat(delta.sequence)}});
     }
     v1::CommitResponse response;
-    DSG_RETURN_IF_ERROR(connection_.Call(
-        [&](grpc::ClientContext* context) { return stub_->Commit(context, request, &response); }));
+    const absl::Status status = connection_.Call(
+        [&](grpc::ClientContext* context) { return stub_->Commit(context, request, &response); });
+    if (!status.ok()) return Advise(status, connection_.caller.address());
     return CommitResult{response.revision(), response.replayed()};
   }
 
@@ -69,7 +92,7 @@ class RemoteWriter : public GraphWriter {
   }
 
  private:
-  const Connection& connection_;
+  Connection& connection_;
   std::unique_ptr<v1::IngestService::Stub> stub_;
   std::string map_;
   LayerTable layers_;
@@ -197,8 +220,7 @@ class GrpcRemoteMap : public RemoteMap {
   RemoteWriter writer_;
 };
 
-absl::StatusOr<std::optional<MapSpec>> FindMap(const Connection& connection,
-                                               v1::MapService::Stub& maps,
+absl::StatusOr<std::optional<MapSpec>> FindMap(Connection& connection, v1::MapService::Stub& maps,
                                                const std::string& name) {
   v1::ListMapsResponse response;
   DSG_RETURN_IF_ERROR(connection.Call([&](grpc::ClientContext* context) {
@@ -212,8 +234,7 @@ absl::StatusOr<std::optional<MapSpec>> FindMap(const Connection& connection,
   return std::nullopt;
 }
 
-absl::Status CreateMap(const Connection& connection, v1::MapService::Stub& maps,
-                       const MapSpec& spec) {
+absl::Status CreateMap(Connection& connection, v1::MapService::Stub& maps, const MapSpec& spec) {
   v1::CreateMapRequest request;
   ToProto(spec, request.mutable_map());
   v1::CreateMapResponse response;
@@ -228,8 +249,7 @@ absl::Status CreateMap(const Connection& connection, v1::MapService::Stub& maps,
 absl::StatusOr<std::unique_ptr<RemoteMap>> OpenRemoteMap(const std::string& address,
                                                          const MapSpec& spec,
                                                          const RemoteOptions& options) {
-  auto connection =
-      std::make_unique<Connection>(Connection{address, options, OpenChannel(address)});
+  auto connection = std::make_unique<Connection>(address, options);
   const std::unique_ptr<v1::MapService::Stub> maps = v1::MapService::NewStub(connection->channel);
   DSG_ASSIGN_OR_RETURN(std::optional<MapSpec> found, FindMap(*connection, *maps, spec.name));
   if (!found.has_value()) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "ingest/remote/wait_notes.h"
 #include "schema/model/layer.h"
 #include "schema/model/node.h"
 #include "schema/store/graph_writer.h"
@@ -19,7 +20,9 @@ namespace dsg::ingest {
 class RemoteMap {
  public:
   virtual ~RemoteMap() = default;
-  /// Idempotent by session and sequence, so transport failures are retried for up to 30 s.
+  /// Idempotent by session and sequence, so what was not answered is sent again, see
+  /// RemoteOptions. One delta is under way at a time: whoever makes them waits, and no more than
+  /// that one is held in memory however long the link is down.
   virtual GraphWriter& writer() = 0;
   virtual const MapSpec& spec() const = 0;
   /// Rooms and places, for deriving stays.
@@ -37,8 +40,11 @@ class RemoteMap {
 };
 
 struct RemoteOptions {
-  /// How long calls are repeated while the server cannot be reached.
-  TimeNs retry_ns_max = 30 * kNsPerSecond;
+  /// How long a call is repeated while the server cannot be reached or is overloaded.
+  TimeNs retry_ns_max = 600 * kNsPerSecond;
+  /// Gets a sentence when a server does not answer, every few seconds while it does not, and when
+  /// it does again. May be empty.
+  TellWait tell;
 };
 
 /// Opens a map on the server at `address` ("unix:PATH" or "HOST:PORT"), creating it from `spec`

@@ -72,6 +72,7 @@ absl::Status FeedCrowd(const Flags& flags, const std::string& who, Load* load,
 absl::StatusOr<Load> LoadOurs(const Flags& flags, const std::string& folder) {
   StoreOptions options;
   options.create = true;
+  options.reserve_bytes = 0;
   DSG_ASSIGN_OR_RETURN(const auto store, GraphStore::Open(folder, options));
   MapSpec spec;
   spec.name = kMap;

@@ -30,6 +30,7 @@ constexpr double kMebibyte = 1024.0 * 1024.0;
 absl::Status LoadGraph(GraphDelta graph, const std::string& folder, Report* report) {
   StoreOptions options;
   options.create = true;
+  options.reserve_bytes = 0;
   DSG_ASSIGN_OR_RETURN(const auto store, GraphStore::Open(folder, options));
   MapSpec spec;
   spec.name = kMap;

@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <condition_variable>
+#include <mutex>
 #include <vector>
 
 namespace dsg::ingest {
@@ -13,14 +15,15 @@ namespace {
 // Runs a call whose attempts end as `answers` say, the last one for ever after.
 absl::Status CallAnswered(const std::vector<grpc::Status>& answers, int* attempt_count) {
   *attempt_count = 0;
-  return CallWithRetry("unix:/nowhere", kNsPerSecond / 5, [&](grpc::ClientContext*) {
+  ServerCaller caller("unix:/nowhere", kNsPerSecond / 5, {});
+  return caller.Call([&](grpc::ClientContext*) {
     const size_t i = std::min(static_cast<size_t>(*attempt_count), answers.size() - 1);
     ++*attempt_count;
     return answers[i];
   });
 }
 
-TEST(CallWithRetry, RepeatsTransportFailures) {
+TEST(ServerCaller, RepeatsTransportFailures) {
   int attempt_count = 0;
   EXPECT_TRUE(
       CallAnswered({{grpc::StatusCode::UNAVAILABLE, "connection refused"}, grpc::Status::OK},
@@ -29,7 +32,7 @@ TEST(CallWithRetry, RepeatsTransportFailures) {
   EXPECT_EQ(attempt_count, 2);
 }
 
-TEST(CallWithRetry, GivesUpInTimeNamingTheAddress) {
+TEST(ServerCaller, GivesUpInTimeNamingTheAddress) {
   int attempt_count = 0;
   const absl::Status status =
       CallAnswered({{grpc::StatusCode::UNAVAILABLE, "connection refused"}}, &attempt_count);
@@ -38,15 +41,84 @@ TEST(CallWithRetry, GivesUpInTimeNamingTheAddress) {
   EXPECT_NE(std::string(status.message()).find("unix:/nowhere"), std::string::npos);
 }
 
-TEST(CallWithRetry, DoesNotRepeatWhatTheServerAnswered) {
+TEST(ServerCaller, DoesNotRepeatWhatTheServerAnswered) {
   int attempt_count = 0;
   for (const grpc::StatusCode code :
        {grpc::StatusCode::INVALID_ARGUMENT, grpc::StatusCode::ALREADY_EXISTS,
-        grpc::StatusCode::DATA_LOSS, grpc::StatusCode::DEADLINE_EXCEEDED}) {
+        grpc::StatusCode::DATA_LOSS, grpc::StatusCode::RESOURCE_EXHAUSTED}) {
     EXPECT_EQ(static_cast<int>(CallAnswered({{code, "no"}}, &attempt_count).code()),
               static_cast<int>(code));
     EXPECT_EQ(attempt_count, 1);
   }
+}
+
+TEST(ServerCaller, RepeatsWhatABrokenLinkOrAnEndingServerMakesOfACall) {
+  int attempt_count = 0;
+  for (const grpc::StatusCode code :
+       {grpc::StatusCode::DEADLINE_EXCEEDED, grpc::StatusCode::CANCELLED,
+        grpc::StatusCode::INTERNAL, grpc::StatusCode::UNKNOWN}) {
+    EXPECT_TRUE(CallAnswered({{code, "stream removed"}, grpc::Status::OK}, &attempt_count).ok());
+    EXPECT_EQ(attempt_count, 2);
+  }
+}
+
+TEST(ServerCaller, DoesNotRepeatForEverWhatMayBeTheServersOwnError) {
+  int attempt_count = 0;
+  EXPECT_EQ(CallAnswered({{grpc::StatusCode::INTERNAL, "a bug"}}, &attempt_count).code(),
+            absl::StatusCode::kInternal);
+  EXPECT_LE(attempt_count, 5);
+}
+
+TEST(ServerCaller, SaysAtOnceThatItWaitsAndThatItIsOver) {
+  std::vector<std::string> told;
+  int attempt_count = 0;
+  {
+    ServerCaller caller("unix:/nowhere", kNsPerSecond,
+                        [&](const std::string& sentence) { told.push_back(sentence); });
+    const auto answer = [&](grpc::ClientContext*) {
+      return ++attempt_count < 3 ? grpc::Status(grpc::StatusCode::UNAVAILABLE, "refused")
+                                 : grpc::Status::OK;
+    };
+    EXPECT_TRUE(caller.Call(answer).ok());
+    EXPECT_TRUE(caller.Call(answer).ok());
+  }
+  ASSERT_EQ(told.size(), 2u);
+  EXPECT_NE(told[0].find("unix:/nowhere"), std::string::npos) << told[0];
+  EXPECT_NE(told[0].find("refused"), std::string::npos) << told[0];
+  EXPECT_NE(told[1].find("answers again"), std::string::npos) << told[1];
+}
+
+// Waits for the sentences instead of for a time.
+class Listener {
+ public:
+  void Hear(const std::string& sentence) {
+    const std::lock_guard lock(mutex_);
+    sentences_.push_back(sentence);
+    heard_.notify_all();
+  }
+  std::vector<std::string> WaitFor(size_t count) {
+    std::unique_lock lock(mutex_);
+    heard_.wait(lock, [&] { return sentences_.size() >= count; });
+    return sentences_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable heard_;
+  std::vector<std::string> sentences_;
+};
+
+TEST(WaitNotes, SpeaksAgainAndAgainOfACallThatHangs) {
+  Listener listener;
+  WaitNotes notes(
+      "host:1", [&](const std::string& sentence) { listener.Hear(sentence); },
+      {.silence_max = std::chrono::milliseconds(5), .repeat_every = std::chrono::milliseconds(5)});
+  notes.CallBegins(WaitNotes::Clock::now() + std::chrono::hours(1));
+  for (const std::string& sentence : listener.WaitFor(3)) {
+    EXPECT_NE(sentence.find("waiting for server host:1"), std::string::npos) << sentence;
+  }
+  notes.CallEnds(/*is_answered=*/true);
+  EXPECT_NE(listener.WaitFor(4).back().find("answers again"), std::string::npos);
 }
 
 }  // namespace
