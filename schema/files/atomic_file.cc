@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "schema/files/atomic_file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "schema/base/status.h"
+
+namespace dsg {
+namespace {
+
+// Writers hand over pieces of all sizes; a system call for each would cost more than the copy.
+constexpr size_t kBufferBytes = size_t{256} << 10;
+
+std::string PartPath(const std::string& path) { return path + kPartSuffix; }
+
+bool IsDiskFull(int error) { return error == ENOSPC || error == EDQUOT; }
+
+absl::Status DiskFull(const std::string& message, const std::string& path) {
+  return MakeError(Reason::kDiskFull, absl::StrCat(message, "; free some space"), {{"path", path}});
+}
+
+}  // namespace
+
+absl::Status CheckMayWrite(const std::string& path, bool may_replace, std::string_view advice) {
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  if (!std::filesystem::exists(status)) return absl::OkStatus();
+  if (!std::filesystem::is_regular_file(status)) {
+    return MakeError(Reason::kFieldInvalid,
+                     absl::StrCat(path, " is there and is no plain file; name another"),
+                     {{"path", path}});
+  }
+  if (may_replace) return absl::OkStatus();
+  return MakeError(
+      Reason::kFieldInvalid,
+      absl::StrCat(path, " is there already; name another file, or ", std::string(advice)),
+      {{"path", path}});
+}
+
+absl::StatusOr<AtomicFile> AtomicFile::Create(const std::string& path) {
+  std::FILE* file = std::fopen(PartPath(path).c_str(), "wb");
+  if (file == nullptr) {
+    const int error = errno;
+    const std::string message =
+        absl::StrCat("cannot create ", PartPath(path), ": ", std::strerror(error));
+    if (IsDiskFull(error)) return DiskFull(message, path);
+    return MakeError(Reason::kFieldInvalid,
+                     absl::StrCat(message, "; name a folder you may write to"), {{"path", path}});
+  }
+  std::setvbuf(file, nullptr, _IOFBF, kBufferBytes);
+  return AtomicFile(path, file);
+}
+
+absl::StatusOr<AtomicFile> AtomicFile::Create(const std::string& path, bool may_replace) {
+  DSG_RETURN_IF_ERROR(CheckMayWrite(path, may_replace));
+  return Create(path);
+}
+
+AtomicFile::~AtomicFile() {
+  if (file_ == nullptr) return;
+  file_.reset();
+  std::remove(PartPath(path_).c_str());
+}
+
+absl::Status AtomicFile::Failure(const char* what) const {
+  const int error = errno;
+  const std::string message = absl::StrCat("cannot ", what, " ", path_, ": ", std::strerror(error));
+  return IsDiskFull(error) ? DiskFull(message, path_) : absl::UnavailableError(message);
+}
+
+absl::Status AtomicFile::Write(std::string_view bytes) {
+  if (std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size()) {
+    return Failure("write");
+  }
+  byte_count_ += static_cast<int64_t>(bytes.size());
+  return absl::OkStatus();
+}
+
+absl::Status AtomicFile::Commit() {
+  const bool is_written = std::fflush(file_.get()) == 0 && fsync(fileno(file_.get())) == 0;
+  if (!is_written) return Failure("write");
+  const std::string part = PartPath(path_);
+  // Closed by hand, since closing may be what fails; from here on the destructor removes nothing.
+  if (std::fclose(file_.release()) != 0 || std::rename(part.c_str(), path_.c_str()) != 0) {
+    const absl::Status failure = Failure("finish");
+    std::remove(part.c_str());
+    return failure;
+  }
+  const std::string folder = std::filesystem::path(path_).parent_path().string();
+  return SyncFolder(folder.empty() ? "." : folder);
+}
+
+absl::Status WriteAtomically(const std::string& path, std::string_view bytes) {
+  DSG_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(path));
+  DSG_RETURN_IF_ERROR(file.Write(bytes));
+  return file.Commit();
+}
+
+absl::Status SyncFolder(const std::string& folder) {
+  const int descriptor = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) {
+    return absl::UnavailableError(
+        absl::StrCat("cannot open the folder ", folder, ": ", std::strerror(errno)));
+  }
+  const int result = fsync(descriptor);
+  const int error = errno;
+  close(descriptor);
+  // Some file systems cannot sync folders and say so; their renames are as safe as they get.
+  if (result == 0 || error == EINVAL || error == ENOTSUP) return absl::OkStatus();
+  return absl::UnavailableError(
+      absl::StrCat("cannot sync the folder ", folder, ": ", std::strerror(error)));
+}
+
+}  // namespace dsg
