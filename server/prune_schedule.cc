@@ -88,17 +88,29 @@ void PruneSchedule::RunOnce() {
 }
 
 void PruneSchedule::RunMap(const std::string& map) {
-  const absl::Status status = PruneMap(map);
+  const absl::Status status = PruneMap(map, file_.policies);
   if (status.ok() || call_.cancelled()) return;
-  Log(LogLevel::kWarning, "policies not applied to map",
-      {{"map", map}, {"error", std::string(status.message())}});
+  if (file_.policies.size() == 1) return LogFailure(map, file_.policies.front(), status);
+  // One that cannot be applied must not keep the others from it.
+  for (const PrunePolicy& policy : file_.policies) {
+    const absl::Status alone = PruneMap(map, {policy});
+    if (call_.cancelled()) return;
+    if (!alone.ok()) LogFailure(map, policy, alone);
+  }
 }
 
-absl::Status PruneSchedule::PruneMap(const std::string& map) {
+void PruneSchedule::LogFailure(const std::string& map, const PrunePolicy& policy,
+                               const absl::Status& status) {
+  Log(LogLevel::kWarning, "policy not applied to map",
+      {{"map", map}, {"policy", policy.name}, {"error", std::string(status.message())}});
+}
+
+absl::Status PruneSchedule::PruneMap(const std::string& map,
+                                     const std::vector<PrunePolicy>& policies) {
   v1::PruneRequest request;
   request.set_map(map);
   request.set_author("dsg-server policies");
-  for (const PrunePolicy& policy : file_.policies) query::ToProto(policy, request.add_policies());
+  for (const PrunePolicy& policy : policies) query::ToProto(policy, request.add_policies());
   DSG_ASSIGN_OR_RETURN(const std::unique_ptr<query::PruneCursor> cursor, core_->OpenPrune(request));
   v1::PruneResponse all;
   do {

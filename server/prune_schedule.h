@@ -7,6 +7,8 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "query/engine/service_core.h"
 #include "schema/retention/policy_file.h"
@@ -53,7 +55,9 @@ class PruneSchedule {
  private:
   void RunOnce();
   void RunMap(const std::string& map);
-  absl::Status PruneMap(const std::string& map);
+  absl::Status PruneMap(const std::string& map, const std::vector<PrunePolicy>& policies);
+  static void LogFailure(const std::string& map, const PrunePolicy& policy,
+                         const absl::Status& status);
 
   query::ServiceCore* const core_;
   const PolicyFile file_;

@@ -119,8 +119,10 @@ class Prune final : public PruneCursor {
   absl::Status Plan(const CallContext& call, v1::PruneResponse* reply) {
     DSG_ASSIGN_OR_RETURN(const OpenedMap opened, OpenNewest(maps_, map_));
     const auto& [reader, map] = opened;
-    DSG_ASSIGN_OR_RETURN(PrunePlan plan, PlanPrune(reader.get(), *map, policies_,
-                                                   {.wall_now_ns = WallClockNs()}, call.stop()));
+    auto planned =
+        PlanPrune(reader.get(), *map, policies_, {.wall_now_ns = WallClockNs()}, call.stop());
+    if (!planned.ok()) return EndErasure(call, opened, planned.status(), reply);
+    PrunePlan& plan = *planned;
     if (!is_dry_run_ && !allow_everything_ && !plan.all_matching_policy.empty()) {
       return MakeError(
           Reason::kPolicyMatchesAll,
@@ -152,6 +154,29 @@ class Prune final : public PruneCursor {
     phase_ = is_dry_run_ || !has_work ? Phase::kEnd : Phase::kCommit;
     batches_.emplace(map, std::move(plan),
                      BatchHeader{map_, NewSessionId(), author_, MessageOf(policies_)});
+    return absl::OkStatus();
+  }
+
+  // Of a branch that is wholly erased no revision knows any more. If that was done by a call that
+  // was cut off, what it left in the file is still to be overwritten.
+  absl::Status EndErasure(const CallContext& call, const OpenedMap& opened,
+                          const absl::Status& failure, v1::PruneResponse* reply) {
+    const bool may_be_erased = ReasonOf(failure) == Reason::kNodeUnknown && !is_dry_run_ &&
+                               policies_.size() == 1 &&
+                               policies_.front().strength == PruneStrength::kErase;
+    if (!may_be_erased) return failure;
+    DSG_RETURN_IF_ERROR(
+        maps_->WithWriter(map_, call.stop(), [&](MapWriter& writer) -> absl::Status {
+          DSG_ASSIGN_OR_RETURN(const EraseReport report, writer.Erase({}, call.stop(), {}));
+          is_clean_ = report.is_clean;
+          return report.was_pending ? absl::OkStatus() : failure;
+        }));
+    DSG_ASSIGN_OR_RETURN(before_, CountMap(*opened.map, call.stop()));
+    reply->clear_policies();
+    reply->add_policies()->set_name(policies_.front().name);
+    ToProto(before_, reply->mutable_map_before());
+    erasure_.emplace();
+    phase_ = Phase::kEnd;
     return absl::OkStatus();
   }
 

@@ -36,7 +36,9 @@ class PruneBatches::Impl {
     // Nodes go last: until then the branch is found again by its root. They look at the stays as
     // these are in `head`, so not in one delta with changes of them.
     const bool has_stays = !delta.stays.empty() || !delta.stay_removals.empty();
-    if (!IsFull() && !has_stays) DSG_RETURN_IF_ERROR(AddNodes(head, stop, &delta));
+    if (!IsFull() && !has_stays && !ChangesGoneAgents(delta)) {
+      DSG_RETURN_IF_ERROR(AddNodes(head, stop, &delta));
+    }
     if (delta.empty()) return std::optional<GraphDelta>();
     delta.map = header_.map;
     delta.session_id = header_.session_id;
@@ -60,6 +62,15 @@ class PruneBatches::Impl {
 
  private:
   bool IsFull() const { return rows_ >= kPruneBatchRows; }
+
+  // A delta that retires an agent cannot correct its track as well.
+  bool ChangesGoneAgents(const GraphDelta& delta) const {
+    const auto is_gone = [this](const auto& change) { return gone_.contains(change.agent); };
+    const auto any = [&](const auto& changes) {
+      return std::any_of(changes.begin(), changes.end(), is_gone);
+    };
+    return any(delta.corrections) || any(delta.shape_removals) || any(delta.factor_removals);
+  }
 
   absl::Status AddMesh(const StopCheck& stop, GraphDelta* delta) {
     const MeshPlan& mesh = plan_.mesh;

@@ -96,17 +96,23 @@ class NodeChooser {
     });
   }
 
-  // A node is seen when something in it is. One that was never looked for goes with its parents.
+  // A node is seen when something in it is. What was never looked for itself, and holds what was
+  // not, has no time: it goes only with all that contains it.
   absl::Status TakeUnseen() {
     const auto cutoff = CutoffOf(policy_, index_.newest_observation_ns());
     if (!cutoff.has_value()) return absl::OkStatus();
     std::vector<std::optional<TimeNs>> seen(is_gone_.size());
+    std::vector<bool> holds_undated(is_gone_.size(), false);
+    std::vector<bool> is_dated(is_gone_.size(), false);
     for (const uint32_t at : index_.bottom_up()) {
       const auto own = LastSeen(index_.nodes()[at]);
       if (own.has_value()) seen[at] = std::max(seen[at].value_or(*own), *own);
-      if (!seen[at].has_value()) continue;
+      is_dated[at] = own.has_value() || (seen[at].has_value() && !holds_undated[at]);
       for (const uint32_t parent : index_.parents(at)) {
-        seen[parent] = std::max(seen[parent].value_or(*seen[at]), *seen[at]);
+        if (!is_dated[at]) holds_undated[parent] = true;
+        if (seen[at].has_value()) {
+          seen[parent] = std::max(seen[parent].value_or(*seen[at]), *seen[at]);
+        }
       }
     }
     const auto& order = index_.bottom_up();
@@ -114,9 +120,8 @@ class NodeChooser {
       const auto& parents = index_.parents(*it);
       const auto is_gone = [this](uint32_t parent) { return is_gone_[parent]; };
       is_gone_[*it] =
-          seen[*it].has_value()
-              ? *seen[*it] < *cutoff
-              : !parents.empty() && std::all_of(parents.begin(), parents.end(), is_gone);
+          is_dated[*it] ? *seen[*it] < *cutoff
+                        : !parents.empty() && std::all_of(parents.begin(), parents.end(), is_gone);
     }
     return absl::OkStatus();
   }

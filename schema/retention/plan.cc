@@ -38,14 +38,16 @@ class Planner {
   }
 
  private:
-  // What is to be erased need not be there any more: then the past is searched for it.
+  // What is to be erased need not be there any more: then the past is searched for it. One of
+  // several policies that names what this map does not have (any more) matches nothing.
   absl::StatusOr<Selection> SelectOf(const GraphIndex& index, const PrunePolicy& policy) {
     auto selection = Select(map_, index, policy, stop_);
-    const bool is_gone_node = ReasonOf(selection.status()) == Reason::kNodeUnknown &&
-                              policy.strength == PruneStrength::kErase;
-    if (!is_gone_node) return selection;
-    DSG_ASSIGN_OR_RETURN(const bool was_there, WasEverThere(&reader_, map_, policy, stop_));
-    if (!was_there) return selection;
+    if (ReasonOf(selection.status()) != Reason::kNodeUnknown) return selection;
+    bool may_be_gone = policies_.size() > 1;
+    if (!may_be_gone && policy.strength == PruneStrength::kErase) {
+      DSG_ASSIGN_OR_RETURN(may_be_gone, WasEverThere(&reader_, map_, policy, stop_));
+    }
+    if (!may_be_gone) return selection;
     Selection nothing;
     nothing.is_gone.assign(index.nodes().size(), false);
     return nothing;

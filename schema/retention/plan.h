@@ -79,8 +79,9 @@ struct PlanOptions {
 /// left. Cost:   reads all nodes and edges, the tracks and meshes that are matched; with kErase
 /// also what
 ///         each revision changed.
-/// Errors: what PrunePolicy::Validate returns; NOT_FOUND/NODE_UNKNOWN, LAYER_UNKNOWN;
-///         OUT_OF_RANGE/REVISION_IN_FUTURE; what `stop` returned.
+/// Errors: what PrunePolicy::Validate returns; NOT_FOUND/NODE_UNKNOWN (of a policy that stands
+///         alone; among others it matches nothing), LAYER_UNKNOWN; OUT_OF_RANGE/REVISION_IN_FUTURE;
+///         what `stop` returned.
 absl::StatusOr<PrunePlan> PlanPrune(MapReader* reader, const Snapshot& map,
                                     const std::vector<PrunePolicy>& policies,
                                     const PlanOptions& options, const StopCheck& stop);

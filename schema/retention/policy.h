@@ -45,7 +45,8 @@ struct PrunePolicy {
   struct WholeLayer {
     std::string name;
   };
-  /// Nodes last observed before, with all that they contain.
+  /// Nodes last observed before, with what they contain that was never looked for itself. A node
+  /// without such a time has that of what it contains, if all of it has one.
   struct UnseenSince {
     TimeNs at_ns = 0;
   };

@@ -59,6 +59,8 @@ struct EraseReport {
   /// False when a reader kept the write-ahead log from being cut to nothing: it may hold the bytes
   /// until the same call is made again.
   bool is_clean = true;
+  /// An earlier erasure was cut off, and this call has ended what it left in the file.
+  bool was_pending = false;
   /// Paths in the store that this program does not write any more, such as copies that an upgrade
   /// kept: they may hold the bytes, and are left alone.
   std::vector<std::string> other_files;

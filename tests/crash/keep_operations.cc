@@ -118,7 +118,8 @@ KeepOperation Revert() {
 }
 
 // `erased`: a text that no file may hold afterwards; empty where the past is kept.
-KeepOperation Prune(const std::string& name, Command policy, const std::string& erased) {
+KeepOperation Prune(const std::string& name, Command policy, const std::string& erased,
+                    const std::string& done_reason = "") {
   return {.name = name,
           .command =
               [policy](const KeepRig&, const std::string& place) {
@@ -135,7 +136,8 @@ KeepOperation Prune(const std::string& name, Command policy, const std::string& 
                        (!is_past_kept && after.is_done && Holds(after.place, erased)
                             ? "the file still holds names of what was erased"
                             : "");
-              }};
+              },
+          .done_reason = done_reason};
 }
 
 KeepOperation Merge() {
@@ -197,7 +199,8 @@ KeepOperation Restore() {
             // Not there at all, or wholly.
             if (after.main.newest == 0) return after.is_done ? "the map is not there" : "";
             return PastViolation(after, AllLooked());
-          }};
+          },
+          .done_reason = "MAP_EXISTS"};
 }
 
 KeepOperation Upgrade() {
@@ -279,7 +282,8 @@ std::vector<KeepOperation> KeepOperations(std::vector<std::string>* missing) {
   add("prune", Prune("prune (retire)", {"--layer", "objects", "--retire"}, ""));
   // The names that the stream of deltas gives to objects, and to the room.
   add("prune", Prune("prune (erase)", {"--layer", "objects", "--erase"}, "object 1"));
-  add("prune", Prune("prune (erase a branch)", {"--branch", "R2", "--erase"}, "room 2"));
+  add("prune",
+      Prune("prune (erase a branch)", {"--branch", "R2", "--erase"}, "room 2", "NODE_UNKNOWN"));
   add("merge", Merge());
   add("backup", Backup());
   add("restore", Restore());

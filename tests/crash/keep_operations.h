@@ -32,6 +32,8 @@ struct KeepOperation {
   std::function<std::vector<std::string>(const KeepRig&, const std::string& place)> command;
   /// What is wrong; empty if nothing is. What Verify finds is looked at elsewhere.
   std::function<std::string(const Aftermath&)> violation;
+  /// A killed program may have done all of it, and is refused with this reason when it runs again.
+  std::string done_reason = "";
   /// Map whose soundness is checked, and that may be missing.
   bool may_be_of_old_format = false;
 };

@@ -81,7 +81,7 @@ absl::Status ForgetCounters(const std::string& path, const std::string& map) {
   DSG_ASSIGN_OR_RETURN(const auto db, Database::Open(path, Database::Mode::kWrite, map));
   // One transaction, which is counted too, whether or not the generation was another.
   return InTransaction(*db, [&]() -> absl::Status {
-    DSG_RETURN_IF_ERROR(Query(*db, "UPDATE map SET generation = 0").Run());
+    DSG_RETURN_IF_ERROR(Query(*db, "UPDATE map SET generation = 0, is_erasing = 0").Run());
     return db->SetSchemaVersion();
   });
 }

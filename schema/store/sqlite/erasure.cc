@@ -27,6 +27,7 @@ class Eraser {
 
   absl::Status Run() {
     DSG_RETURN_IF_ERROR(CheckAgents());
+    DSG_RETURN_IF_ERROR(Begin());
     DSG_RETURN_IF_ERROR(EraseRows());
     Tell(0.7);
     if (erasure_.assets) DSG_RETURN_IF_ERROR(EraseAssets());
@@ -38,6 +39,9 @@ class Eraser {
     DSG_RETURN_IF_ERROR(GivePagesBack(db_, stop_));
     Tell(0.95);
     report_.is_clean = db_.Checkpoint(/*truncate=*/true);
+    if (report_.is_clean) {
+      DSG_RETURN_IF_ERROR(db_.Execute("UPDATE map SET is_erasing = 0 WHERE is_erasing"));
+    }
     Tell(1.0);
     return absl::OkStatus();
   }
@@ -45,6 +49,14 @@ class Eraser {
  private:
   void Tell(double fraction) const {
     if (progress_) progress_(fraction);
+  }
+
+  // Once rows are gone nothing else tells that the file still holds their bytes.
+  absl::Status Begin() {
+    DSG_ASSIGN_OR_RETURN(const int64_t is_erasing, db_.QueryInt("SELECT is_erasing FROM map"));
+    report_.was_pending = is_erasing != 0;
+    if (ItemCount() == 0) return absl::OkStatus();
+    return db_.Execute("UPDATE map SET is_erasing = 1");
   }
 
   // Without its past an agent's track would belong to nobody there.

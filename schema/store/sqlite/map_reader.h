@@ -65,6 +65,8 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
                                                                   Revision revision);
   AncestorCache& ancestors() { return ancestors_; }
   ShapeCache& shapes() { return shapes_; }
+  /// Ids of humans and robots, by revision.
+  AgentCache& agents() { return agents_; }
   int64_t bytes_on_disk() const { return BytesOnDisk(store_folder_, spec_.name); }
 
  private:
@@ -102,6 +104,7 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
   SegmentCache segments_;
   AncestorCache ancestors_;
   ShapeCache shapes_;
+  AgentCache agents_{size_t{1} << 20};
 };
 
 /// Makes the snapshot of a revision that exists.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <memory>
 
 #include "absl/strings/str_cat.h"
 #include "schema/store/sqlite/snapshot.h"
@@ -48,21 +49,25 @@ Stay ClipToTrack(Stay stay, const TrackInfo& track) {
   return stay;
 }
 
-absl::StatusOr<std::vector<NodeId>> SqliteSnapshot::AgentIds(const StopCheck& stop) const {
-  std::vector<NodeId> ids;
+// Kept by the reader: over the years there are far more agents than in the minute asked about.
+absl::StatusOr<std::shared_ptr<const std::vector<NodeId>>> SqliteSnapshot::AgentIds(
+    const StopCheck& stop) const {
+  if (auto known = reader_->agents().Find(revision())) return known;
+  auto ids = std::make_shared<std::vector<NodeId>>();
   NodeFilter filter;
   filter.layer = layers::kAgents;
   DSG_RETURN_IF_ERROR(ScanNodes(filter, NodeId(), stop, [&](const Node& node) {
-    if (IsAgentKind(node.kind)) ids.push_back(node.id);
+    if (IsAgentKind(node.kind)) ids->push_back(node.id);
     return true;
   }));
+  reader_->agents().Insert(revision(), ids, sizeof(NodeId) * ids->capacity());
   return ids;
 }
 
 absl::StatusOr<std::vector<TrackInfo>> SqliteSnapshot::Tracks(const StopCheck& stop) const {
   DSG_ASSIGN_OR_RETURN(const auto ids, AgentIds(stop));
   std::vector<TrackInfo> tracks;
-  for (const NodeId id : ids) {
+  for (const NodeId id : *ids) {
     DSG_RETURN_IF_ERROR(AskStop(stop));
     DSG_ASSIGN_OR_RETURN(const auto track, reader_->GetTrack(id, revision()));
     tracks.push_back(track->info);
@@ -242,19 +247,19 @@ absl::StatusOr<int64_t> SqliteSnapshot::CountObservedAgents(TimeNs from_ns, Time
                                                             const StopCheck& stop) const {
   DSG_ASSIGN_OR_RETURN(const auto ids, AgentIds(stop));
   int64_t count = 0;
-  for (const NodeId id : ids) {
+  for (const NodeId id : *ids) {
     DSG_RETURN_IF_ERROR(AskStop(stop));
     DSG_ASSIGN_OR_RETURN(const auto track, reader_->GetTrack(id, revision()));
     const auto& segments = track->segments;
-    bool observed = false;
-    for (size_t i = 0; i < segments.size() && !observed; ++i) {
-      // A segment is seen from its first to its last pose, and on to the next unless that is a gap.
-      const bool joined =
-          i + 1 < segments.size() && segments[i + 1].t0 - segments[i].t1 <= track->info.gap_ns_max;
-      const TimeNs seen_to = joined ? segments[i + 1].t0 : segments[i].t1;
-      observed = segments[i].t0 < to_ns && seen_to >= from_ns;
-    }
-    if (observed) ++count;
+    const auto next =
+        std::partition_point(segments.begin(), segments.end(),
+                             [&](const SegmentRef& segment) { return segment.t0 < to_ns; });
+    if (next == segments.begin()) continue;
+    // Of those that begin in time the last is seen longest: from its first to its last pose, and on
+    // to the next segment unless that is a gap.
+    const SegmentRef& last = *(next - 1);
+    const bool joined = next != segments.end() && next->t0 - last.t1 <= track->info.gap_ns_max;
+    if ((joined ? next->t0 : last.t1) >= from_ns) ++count;
   }
   return count;
 }

@@ -2,6 +2,7 @@
 // Tracks as of a revision: which segments they are made of, and the stays along them.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -78,5 +79,7 @@ struct PairHash {
 using TrackCache = LruCache<TrackKey, Track, PairHash>;
 using SegmentCache = LruCache<SegmentKey, SegmentReader, PairHash>;
 using AncestorCache = LruCache<TrackKey, std::vector<NodeId>, PairHash>;
+/// Humans and robots at a revision; ascending.
+using AgentCache = LruCache<Revision, std::vector<NodeId>, std::hash<Revision>>;
 
 }  // namespace dsg::sqlite

@@ -66,11 +66,18 @@ class Core final : public PassingCore {
     ++count_of_[request.map()];
     last_ = request;
     absl::Status status;
+    for (const auto& policy : request.policies()) {
+      if (policy.name() == "everything") status = MakeError(Reason::kPolicyMatchesAll, "all");
+    }
+    if (status.ok()) {
+      for (const auto& policy : request.policies()) applied_[policy.name()] += 1;
+    }
     if (request.map() == "b") status = MakeError(Reason::kWriterLocked, "somebody writes it");
     return std::make_unique<Pruned>(3, status);
   }
 
   std::map<std::string, int> count_of_;
+  std::map<std::string, int> applied_;
   v1::PruneRequest last_;
 };
 
@@ -90,6 +97,18 @@ TEST(PruneSchedule, RunsEachMapAtEachDueTimeAndSurvivesErrors) {
   ASSERT_EQ(core.last_.policies_size(), 1);
   EXPECT_EQ(core.last_.policies(0).layer(), "mesh");
   EXPECT_FALSE(core.last_.allow_everything());
+}
+
+TEST(PruneSchedule, PolicyThatCannotBeAppliedDoesNotKeepTheOthersFromIt) {
+  Core core;
+  PolicyFile file = FileOf(3600 * kNsPerSecond);
+  file.policies.push_back(file.policies.front());
+  file.policies.back().name = "everything";
+  PruneSchedule schedule(&core, file, {.first_after = minutes(1)},
+                         std::make_unique<TestClock>(minutes(2)));
+  schedule.Run();
+  EXPECT_EQ(core.applied_["mesh"], 3);
+  EXPECT_EQ(core.applied_.count("everything"), 0u);
 }
 
 TEST(PruneSchedule, DoesNothingBeforeItsFirstTime) {

@@ -5,6 +5,8 @@
 ALTER TABLE map ADD COLUMN oldest_revision INTEGER NOT NULL DEFAULT 0;
 -- Counts how often the past was rewritten (erased from), so that readers drop what they keep of it.
 ALTER TABLE map ADD COLUMN generation INTEGER NOT NULL DEFAULT 0;
+-- 1 from the begin of an erasure until the file and the log hold nothing of it.
+ALTER TABLE map ADD COLUMN is_erasing INTEGER NOT NULL DEFAULT 0;
 
 -- Set where the revision before is gone: what its digest was.
 ALTER TABLE revision ADD COLUMN parent_digest BLOB;

@@ -68,6 +68,33 @@ TEST_F(PruneTest, UnknownNodesAndLayersAreErrors) {
   EXPECT_EQ(ask(erased), Reason::kNodeUnknown);
 }
 
+TEST_F(PruneTest, UnknownBranchAmongOthersMatchesNothing) {
+  const PrunePlan plan =
+      Prune(&map_, {PolicyOf(P::Branch{"R77"}), PolicyOf(P::WholeLayer{"mesh"})});
+  ASSERT_EQ(plan.policies.size(), 2u);
+  EXPECT_EQ(plan.policies[0].matched, Amount());
+  EXPECT_TRUE(OrDie(map_.Latest()->MeshBlocks()).empty());
+}
+
+TEST_F(PruneTest, AgentGoesWithATrackOfSeveralBatches) {
+  constexpr NodeId kRunner('H', 3);
+  constexpr int64_t kPoseCount = 11'000;
+  GraphDelta delta;
+  delta.nodes.push_back(OrDie(map_.Latest()->GetNode(kStander)));
+  delta.nodes.back().id = kRunner;
+  delta.nodes.back().name = "runner";
+  TrajectoryAppend run{kRunner, {}};
+  for (int64_t i = 0; i < kPoseCount; ++i) {
+    TimedPose pose;
+    pose.time_ns = i * (kNsPerSecond / 1000);
+    run.poses.push_back(pose);
+  }
+  delta.appends.push_back(std::move(run));
+  map_.MustCommit(std::move(delta));
+  Prune(&map_, {PolicyOf(P::Before{20 * kSecond})});
+  EXPECT_EQ(NodesOf(*map_.Latest()), "B1 H1 O1 O2 O3 O4 R1 R2 p1 p2 p3");
+}
+
 TEST_F(PruneTest, RegionTakesNodesPosesShapesAndMeshInside) {
   const Box3d box = BoxOf(0, 0, -1, 4.5, 10, 3);
   const PrunePlan plan = Prune(&map_, {PolicyOf(P::Region{box})});
@@ -133,6 +160,12 @@ TEST_F(PruneTest, UnseenNodesGoWithWhatTheyContainUnlessThatWasSeen) {
   Prune(&map_, {PolicyOf(P::UnseenSince{10 * kSecond}, {"objects", "places"})});
   // p1 and p3 contain chairs seen at 30 s; O3 was in p2 and p3, of which p3 stays.
   EXPECT_EQ(NodesOf(*map_.Latest()), "B1 H1 H2 O1 O2 O3 O5 R1 R2 p1 p3");
+}
+
+TEST_F(PruneTest, UnseenThingsDoNotTakeAlongARoomThatHoldsWhatWasNeverLookedFor) {
+  // Chairs were seen at 30 s; O3, rooms and places were never looked for.
+  Prune(&map_, {PolicyOf(P::UnseenSince{35 * kSecond})});
+  EXPECT_EQ(NodesOf(*map_.Latest()), "B1 H1 O3 R1 R2 p2 p3");
 }
 
 TEST_F(PruneTest, ThinnedTracksAnswerWithinTheBoundAtDroppedInstants) {
