@@ -25,15 +25,16 @@ absl::StatusOr<std::vector<TimedPose>> ReadChunk(const Snapshot& snapshot, NodeI
   return poses;
 }
 
-bool IsSame(const TimedPose& a, const TimedPose& b) {
+}  // namespace
+
+bool IsSamePose(const TimedPose& a, const TimedPose& b) {
   if ((a.covariance == nullptr) != (b.covariance == nullptr)) return false;
+  const Eigen::Vector4d& q = a.map_T_agent.orientation.coeffs();
+  const Eigen::Vector4d& r = b.map_T_agent.orientation.coeffs();
   return a.time_ns == b.time_ns && a.flags == b.flags &&
-         a.map_T_agent.position == b.map_T_agent.position &&
-         a.map_T_agent.orientation.coeffs() == b.map_T_agent.orientation.coeffs() &&
+         a.map_T_agent.position == b.map_T_agent.position && (q == r || q == -r) &&
          (a.covariance == nullptr || *a.covariance == *b.covariance);
 }
-
-}  // namespace
 
 absl::StatusOr<bool> PosesWereCorrected(const Snapshot& earlier, const Snapshot& later,
                                         NodeId agent, const StopCheck& stop) {
@@ -45,7 +46,7 @@ absl::StatusOr<bool> PosesWereCorrected(const Snapshot& earlier, const Snapshot&
     // One more than were told shows that there are others in between.
     DSG_ASSIGN_OR_RETURN(const std::vector<TimedPose> now,
                          ReadChunk(later, agent, from_ns, to_ns, told.size() + 1, stop));
-    if (!std::equal(told.begin(), told.end(), now.begin(), now.end(), IsSame)) return true;
+    if (!std::equal(told.begin(), told.end(), now.begin(), now.end(), IsSamePose)) return true;
     if (told.size() < kChunkSize) return false;
     from_ns = to_ns;
   }

@@ -8,6 +8,10 @@
 
 namespace dsg::query {
 
+/// Equal to the last bit, but that q and -q are one rotation: which of them is stored depends on
+/// the poses before it.
+bool IsSamePose(const TimedPose& a, const TimedPose& b);
+
 /// An agent that either snapshot does not know has no poses there.
 /// Cost: the poses up to the first difference; a few thousand are held at a time.
 absl::StatusOr<bool> PosesWereCorrected(const Snapshot& earlier, const Snapshot& later,

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "query/engine/pose_difference.h"
 #include "schema/base/status.h"
 #include "schema/codec/trajectory_codec.h"
 
@@ -22,13 +23,7 @@ struct StoredShape {
 TimeNs TimeOf(const TimedPose& pose) { return pose.time_ns; }
 TimeNs TimeOf(const StoredShape& stored) { return stored.shape.time_ns; }
 
-bool IsSame(const TimedPose& a, const TimedPose& b) {
-  if ((a.covariance == nullptr) != (b.covariance == nullptr)) return false;
-  return a.time_ns == b.time_ns && a.flags == b.flags &&
-         a.map_T_agent.position == b.map_T_agent.position &&
-         a.map_T_agent.orientation.coeffs() == b.map_T_agent.orientation.coeffs() &&
-         (a.covariance == nullptr || *a.covariance == *b.covariance);
-}
+bool IsSame(const TimedPose& a, const TimedPose& b) { return IsSamePose(a, b); }
 
 bool IsSame(const StoredShape& a, const StoredShape& b) {
   return a.shape.time_ns == b.shape.time_ns && a.topology == b.topology &&

@@ -161,6 +161,35 @@ TEST(Revert, OfTheHeadWritesNothing) {
   EXPECT_EQ(OrDie(reverter.Revert(4)).revision(), 0);
 }
 
+// Of q and -q the one near the pose before is stored, so what comes back after a hole may have the
+// other sign.
+TEST(Revert, OfATurningAgentArrives) {
+  TestMap map(Spec(TrajectoryCodec::kQuantized));
+  constexpr NodeId kDancer('H', 1);
+  const auto at = [](int i) {
+    TimedPose pose = PoseAt(i * kNsPerSecond / 10, 0.01 * i, 0.0, 0.0);
+    pose.flags = 0;
+    pose.map_T_agent.orientation =
+        Eigen::Quaterniond(Eigen::AngleAxisd(0.05 * i, Eigen::Vector3d::UnitZ()));
+    if (pose.map_T_agent.orientation.w() < 0.0) pose.map_T_agent.orientation.coeffs() *= -1.0;
+    return pose;
+  };
+  GraphDelta first = DeltaOfNodes({MakeHuman(1, "dancer")});
+  TrajectoryAppend dance{kDancer, {}};
+  for (int i = 0; i < 2'000; ++i) dance.poses.push_back(at(i));
+  first.appends.push_back(dance);
+  const Revision then = map.MustCommit(std::move(first));
+  for (int i = 50; i < 1'900; i += 170) {
+    GraphDelta hole;
+    hole.corrections.push_back({kDancer, at(i).time_ns, at(i + 90).time_ns, {}});
+    map.MustCommit(std::move(hole));
+  }
+  map.Close();
+  Reverter reverter(map.folder());
+  EXPECT_GT(OrDie(reverter.Revert(then)).revision(), 0);
+  EXPECT_EQ(OrDie(reverter.Revert(then)).revision(), 0);
+}
+
 TEST(Revert, DoesNotMixWithTheWritesOfOthers) {
   TestMap map;
   for (Revision r = 1; r <= 5; ++r) OrDie(map.writer().Commit(DeltaOfStream({}, r)));
