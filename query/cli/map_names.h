@@ -6,20 +6,12 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "schema/base/status.h"
-#include "schema/store/graph_store.h"
 
 namespace dsg::cli {
 
-/// The one asked for, or all of them.
-inline absl::StatusOr<std::vector<std::string>> MapNames(GraphStore* store,
-                                                         const std::string& asked) {
-  if (!asked.empty()) return std::vector<std::string>{asked};
-  DSG_ASSIGN_OR_RETURN(const std::vector<MapSpec> maps, store->ListMaps());
-  std::vector<std::string> names;
-  names.reserve(maps.size());
-  for (const MapSpec& map : maps) names.push_back(map.name);
-  return names;
-}
+/// The one asked for, or all of them, also those that cannot be opened. Order: by name.
+/// Errors: UNAVAILABLE for a folder that cannot be listed.
+absl::StatusOr<std::vector<std::string>> MapNames(const std::string& store_folder,
+                                                  const std::string& asked);
 
 }  // namespace dsg::cli

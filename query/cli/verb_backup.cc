@@ -12,6 +12,7 @@
 #include "dsg/v1/map_service.pb.h"
 #include "query/cli/archive_copy.h"
 #include "query/cli/interrupt.h"
+#include "query/cli/map_names.h"
 #include "query/cli/progress.h"
 #include "query/cli/render_maps.h"
 #include "query/cli/table.h"
@@ -55,7 +56,10 @@ absl::Status CheckIsOutside(const std::string& folder, const std::string& store)
 }
 
 absl::StatusOr<std::vector<std::string>> MapsOf(Session* session) {
-  if (!session->common().map.empty()) return std::vector<std::string>{session->common().map};
+  const CommonOptions& common = session->common();
+  // A map that cannot be opened must fail the backup, not be missing from it.
+  if (!common.store.empty()) return MapNames(common.store, common.map);
+  if (!common.map.empty()) return std::vector<std::string>{common.map};
   v1::ListMapsResponse reply;
   DSG_RETURN_IF_ERROR(session->api().ListMaps(session->NewCall(), v1::ListMapsRequest(), &reply));
   std::vector<std::string> names;

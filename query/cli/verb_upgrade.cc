@@ -14,7 +14,7 @@ namespace dsg::cli {
 absl::Status RunUpgrade(const CommonOptions& common, std::ostream& out) {
   DSG_ASSIGN_OR_RETURN(const std::unique_ptr<GraphStore> store,
                        GraphStore::Open(common.store, {.program = "dsg upgrade"}));
-  DSG_ASSIGN_OR_RETURN(const std::vector<std::string> names, MapNames(store.get(), common.map));
+  DSG_ASSIGN_OR_RETURN(const std::vector<std::string> names, MapNames(store->folder(), common.map));
   if (names.empty()) out << "store " << common.store << " has no maps\n";
   for (const std::string& name : names) {
     DSG_ASSIGN_OR_RETURN(const UpgradeReport report, store->UpgradeMap(name));

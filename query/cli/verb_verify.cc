@@ -33,10 +33,14 @@ absl::StatusOr<VerifyReport> VerifyMap(GraphStore* store, const std::string& nam
 }
 
 // A map that is too damaged to be read is a finding about it, and the others are still checked.
-absl::StatusOr<VerifyReport> FindProblems(GraphStore* store, const std::string& name,
+absl::StatusOr<VerifyReport> FindProblems(GraphStore* store, const std::string& name, bool is_asked,
                                           std::ostream& progress_out) {
   auto report = VerifyMap(store, name, progress_out);
-  if (!absl::IsDataLoss(report.status())) return report;
+  const Reason reason = ReasonOf(report.status());
+  const bool is_other_format = reason == Reason::kFormatTooNew || reason == Reason::kFormatTooOld;
+  // A name that was given may be a wrong one.
+  const bool is_damage = absl::IsDataLoss(report.status()) || (!is_asked && !is_other_format);
+  if (report.ok() || !is_damage) return report;
   return DamageOf(report.status());
 }
 
@@ -107,11 +111,12 @@ absl::Status RunVerify(const CommonOptions& common, const VerifyVerb& verb, std:
   if (!verb.path.empty()) return VerifyFiles(verb.path, common.map, out, progress_out);
   DSG_ASSIGN_OR_RETURN(const std::unique_ptr<GraphStore> store,
                        GraphStore::Open(common.store, {.program = "dsg verify"}));
-  DSG_ASSIGN_OR_RETURN(const std::vector<std::string> names, MapNames(store.get(), common.map));
+  DSG_ASSIGN_OR_RETURN(const std::vector<std::string> names, MapNames(store->folder(), common.map));
   if (names.empty()) out << "store " << common.store << " has no maps\n";
   Findings findings(&out);
   for (const std::string& name : names) {
-    DSG_ASSIGN_OR_RETURN(const VerifyReport report, FindProblems(store.get(), name, progress_out));
+    DSG_ASSIGN_OR_RETURN(const VerifyReport report,
+                         FindProblems(store.get(), name, !common.map.empty(), progress_out));
     findings.Add(name, report);
   }
   return findings.Verdict(absl::StrCat("store ", common.store),

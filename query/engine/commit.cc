@@ -25,6 +25,8 @@ absl::Status Commit(MapTable* maps, const CallContext& call, const v1::CommitReq
   DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> snapshot, reader->Latest());
   DSG_ASSIGN_OR_RETURN(const LayerTable layers, LayersOf(*snapshot));
   DSG_ASSIGN_OR_RETURN(GraphDelta delta, FromProto(in, layers));
+  // Past the quota, and into the reserve, goes only what the service itself forgets.
+  delta.is_forgetting = false;
   DSG_ASSIGN_OR_RETURN(const CommitResult result, maps->Commit(std::move(delta), call.stop()));
   reply->set_revision(result.revision);
   reply->set_replayed(result.replayed);

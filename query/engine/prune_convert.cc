@@ -3,6 +3,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/maintenance_service.pb.h"
+#include "query/engine/request_check.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/retention/duration.h"
@@ -110,6 +111,10 @@ absl::StatusOr<PrunePolicy> FromProto(const v1::PrunePolicy& in) {
   policy.layers.assign(in.layers().begin(), in.layers().end());
   policy.simplify_m = in.simplify_m();
   if (in.simplify_rad() != 0.0) policy.simplify_rad = in.simplify_rad();
+  if (in.simplify_rad() != 0.0 && in.simplify_m() == 0.0) {
+    return FieldError("simplify_rad", absl::StrCat(in.simplify_rad()),
+                      "give simplify_m too: without it a policy forgets and does not thin");
+  }
   if (in.strength() == v1::ERASE) policy.strength = PruneStrength::kErase;
   // Before it has a name: one made of a node's name may be too long.
   DSG_RETURN_IF_ERROR(policy.Validate());

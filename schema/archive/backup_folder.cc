@@ -9,10 +9,10 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <regex>
 #include <set>
 #include <utility>
 
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "schema/archive/archive_file.h"
 #include "schema/archive/file_io.h"
@@ -32,9 +32,12 @@ std::string ManifestPath(const std::string& folder) {
   return absl::StrCat(folder, "/", kManifestName);
 }
 
-// What this class writes, and what it leaves when it is killed.
+// What this class writes, and what it leaves when it is killed: it is all that a later backup may
+// remove. Archives that somebody exported have other names.
 bool IsOurs(const std::string& name) {
-  return name == kManifestName || absl::EndsWith(name, ".dsgz") || absl::EndsWith(name, ".part");
+  static const std::regex kOurs(
+      "MANIFEST(\\.part)?|.+-r[0-9]+-[0-9a-f]{16}\\.dsgz|.+\\.coming\\.dsgz(\\.part)?");
+  return std::regex_match(name, kOurs);
 }
 
 absl::StatusOr<std::vector<std::string>> NamesIn(const std::string& folder) {

@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <map>
 #include <set>
-#include <sstream>
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
@@ -214,12 +214,18 @@ class Reader {
   absl::Status TakeRest(const YAML::Node& item, PrunePolicy* policy) const {
     if (item["layers"].IsDefined()) {
       DSG_ASSIGN_OR_RETURN(policy->layers, Words(item["layers"], "layers"));
+      if (policy->layers.empty()) {
+        return Wrong(item["layers"], "layers is empty; name some, or leave it out for all");
+      }
     }
     if (item["simplify"].IsDefined()) {
       DSG_ASSIGN_OR_RETURN(policy->simplify_m, Number(item["simplify"], "simplify"));
       if (policy->simplify_m <= 0.0) return Wrong(item["simplify"], "simplify is not above 0");
     }
     if (item["simplify_rad"].IsDefined()) {
+      if (!policy->IsThinning()) {
+        return Wrong(item["simplify_rad"], "simplify_rad needs simplify, in metres, beside it");
+      }
       DSG_ASSIGN_OR_RETURN(policy->simplify_rad, Number(item["simplify_rad"], "simplify_rad"));
     }
     if (!item["strength"].IsDefined()) return absl::OkStatus();
@@ -267,12 +273,20 @@ absl::StatusOr<PolicyFile> ParsePolicyFile(std::string_view text, const std::str
 }
 
 absl::StatusOr<PolicyFile> ReadPolicyFile(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) {
+    return absl::NotFoundError(absl::StrCat("policy file ", path, " cannot be read: ",
+                                            error ? error.message() : "it is no plain file"));
+  }
   std::ifstream in(path, std::ios::binary);
-  std::ostringstream text;
-  if (!in || !(text << in.rdbuf())) {
+  // One byte more than may be, so that ParsePolicyFile sees that it is too large.
+  std::string text(kFileBytesMax + 1, '\0');
+  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (!in.is_open() || in.bad()) {
     return absl::NotFoundError(absl::StrCat("policy file ", path, " cannot be read"));
   }
-  return ParsePolicyFile(text.str(), path);
+  text.resize(static_cast<size_t>(in.gcount()));
+  return ParsePolicyFile(text, path);
 }
 
 }  // namespace dsg

@@ -56,7 +56,8 @@ class BagOutput {
     (*header)["type"] = ros::message_traits::DataType<Message>::value();
     (*header)["md5sum"] = ros::message_traits::MD5Sum<Message>::value();
     (*header)["message_definition"] = ros::message_traits::Definition<Message>::value();
-    (*header)["latching"] = "1";
+    // Not by assignment, of which g++ 12 at -O3 wrongly says that it overlaps.
+    header->emplace("latching", "1");
     return header;
   }
   template <class Action>

@@ -40,6 +40,8 @@ void Reserve::Make() const {
       {{"file", path_}, {"error", std::error_code(failure, std::generic_category()).message()}});
 }
 
+bool Reserve::IsThere() const { return access(path_.c_str(), F_OK) == 0; }
+
 bool Reserve::Release() const { return unlink(path_.c_str()) == 0; }
 
 }  // namespace dsg::sqlite

@@ -17,6 +17,7 @@ class Reserve {
 
   /// Makes the file, unless it is there or the disk has less than four times its size left.
   void Make() const;
+  bool IsThere() const;
   /// Removes it; false if there was none.
   bool Release() const;
 

@@ -20,6 +20,8 @@ namespace {
 // that commits do not wait for it. In a small map it must not outgrow the map.
 constexpr int64_t kCheckpointPages = 4096;
 constexpr int64_t kCheckpointPagesMin = 64;
+// While forgetting lives on the reserve, its log must not eat it up.
+constexpr int kCheckpointPagesOnReserve = 64;
 
 int CheckpointPages(int64_t quota_bytes) {
   if (quota_bytes <= 0) return kCheckpointPages;
@@ -94,8 +96,14 @@ absl::Status SqliteWriter::CheckSequence(const GraphDelta& delta) {
 template <typename Work>
 auto SqliteWriter::WithReserve(const Work& work) -> decltype(work()) {
   auto result = work();
-  if (ReasonOf(result.status()) == Reason::kDiskFull && reserve_.Release()) result = work();
+  if (ReasonOf(result.status()) == Reason::kDiskFull && reserve_.Release()) {
+    is_on_reserve_ = true;
+    // What the log took before is worth more than the pages that it adds to the map.
+    if (db_ != nullptr) db_->Checkpoint(/*truncate=*/true);
+    result = work();
+  }
   reserve_.Make();
+  is_on_reserve_ = is_on_reserve_ && !reserve_.IsThere();
   return result;
 }
 
@@ -139,7 +147,9 @@ absl::StatusOr<CommitResult> SqliteWriter::CommitOnce(GraphDelta delta) {
   const absl::Status committed = db_->Execute("COMMIT");
   if (!committed.ok()) return Settle(delta, committed);
   head_ = commit.head;
-  if (db_->wal_pages() > checkpoint_pages_) db_->Checkpoint(/*truncate=*/false);
+  const bool is_log_long =
+      db_->wal_pages() > (is_on_reserve_ ? kCheckpointPagesOnReserve : checkpoint_pages_);
+  if (is_log_long) db_->Checkpoint(/*truncate=*/is_on_reserve_);
   return CommitResult{head_.info.revision, false};
 }
 

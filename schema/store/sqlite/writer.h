@@ -55,6 +55,8 @@ class SqliteWriter : public MapWriter {
   std::string store_folder_;
   std::string map_;
   Reserve reserve_;
+  /// The disk was full, and the reserve is given up for now.
+  bool is_on_reserve_ = false;
   int64_t quota_bytes_;
   int checkpoint_pages_;
   std::unique_ptr<WriterLock> lock_;

@@ -138,6 +138,13 @@ TEST_F(BackupFolderTest, FoldersOfOtherThingsAreLetAlone) {
   EXPECT_EQ(NamesOf(path()), "holiday.jpg");
 }
 
+TEST_F(BackupFolderTest, ArchivesOfOthersAreLetAlone) {
+  fs::create_directories(path());
+  WriteBytes(path() + "/office-2025.dsgz", "exported");
+  EXPECT_EQ(ReasonOf(BackupFolder::Open(path()).status()), Reason::kFieldInvalid);
+  EXPECT_EQ(NamesOf(path()), "office-2025.dsgz");
+}
+
 TEST_F(BackupFolderTest, OneProcessWritesAtATime) {
   const auto folder = OrDie(BackupFolder::Open(path()));
   EXPECT_TRUE(absl::IsUnavailable(BackupFolder::Open(path()).status()));

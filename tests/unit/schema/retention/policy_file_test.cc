@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <fstream>
+
 #include "schema/base/random.h"
 #include "schema/base/status.h"
 #include "schema/retention/duration.h"
@@ -72,6 +74,8 @@ TEST(PolicyFile, RefusesWhatIsHalfSaid) {
         "policies: [{name: a, branch: R3, simplify: 0.1}]",  // a branch has no poses
         "policies: [{name: a, older_than: 30d, simplify: -1}]",
         "policies: [{name: a, older_than: 30d, simplify: nan}]",
+        "policies: [{name: a, older_than: 30d, simplify_rad: 0.1}]",  // thins without a bound
+        "policies: [{name: a, older_than: 30d, layers: []}]",
         "policies: [{name: a, older_than: -1d}]",
         "policies: [{name: a, older_than: 1e3d}]",
         "policies: [{name: a, before: +30s}]",
@@ -83,6 +87,15 @@ TEST(PolicyFile, RefusesWhatIsHalfSaid) {
     const auto file = ParsePolicyFile(text, "p.yaml");
     EXPECT_EQ(ReasonOf(file.status()), Reason::kFileMalformed) << text;
   }
+}
+
+TEST(PolicyFile, ReadsPlainFilesOfBoundedSizeOnly) {
+  EXPECT_TRUE(absl::IsNotFound(ReadPolicyFile("/dev/zero").status()));
+  EXPECT_TRUE(absl::IsNotFound(ReadPolicyFile("/no/such/file").status()));
+  const test::TempFolder folder;
+  const std::string path = folder.path() + "/large.yaml";
+  std::ofstream(path) << std::string(3 << 20, '#');
+  EXPECT_EQ(ReasonOf(ReadPolicyFile(path).status()), Reason::kFileMalformed);
 }
 
 TEST(PolicyFile, SurvivesRandomEdits) {

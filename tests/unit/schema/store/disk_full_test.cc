@@ -194,6 +194,20 @@ TEST_F(FullDiskWithReserve, LetsRetiringCommitsThrough) {
   ExpectGoesOnWithSpace();
 }
 
+// More than the reserve holds, were the log of all of it kept.
+TEST_F(FullDiskWithReserve, LetsALongSeriesOfRetiringCommitsThrough) {
+  ASSERT_NO_FATAL_FAILURE(Fill(0));
+  for (int i = 0; i < 400; ++i) {
+    const auto committed = writer_->Commit(Forget({}));
+    ASSERT_TRUE(committed.ok()) << "commit " << i << ": " << committed.status();
+  }
+  EXPECT_FALSE(HasReserve());
+  writer_.reset();
+  ExpectSound();
+  writer_ = OrDie(store_->OpenWriter(kMap));
+  ExpectGoesOnWithSpace();
+}
+
 TEST_F(FullDiskWithReserve, LetsCompactionFreeSpace) {
   for (const size_t spare_bytes : {size_t{0}, size_t{20'000}, size_t{60'000}}) {
     SCOPED_TRACE(absl::StrCat("spare bytes ", spare_bytes));
