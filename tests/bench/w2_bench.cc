@@ -74,7 +74,7 @@ absl::StatusOr<std::unique_ptr<RowTable>> MakePlainTable(const GraphDelta& graph
 
 absl::Status MeasureOneNodeCommits(const GraphDelta& graph, const std::string& folder,
                                    const std::string& rows_folder, Report* report) {
-  DSG_ASSIGN_OR_RETURN(const auto store, GraphStore::Open(folder, {}));
+  DSG_ASSIGN_OR_RETURN(const auto store, GraphStore::Open(folder, {.reserve_bytes = 0}));
   DSG_ASSIGN_OR_RETURN(const auto map, store->OpenMap(kMap));
   DSG_ASSIGN_OR_RETURN(const auto writer, store->OpenWriter(kMap));
   DSG_ASSIGN_OR_RETURN(const SessionState session, writer->GetSession(kSession));
