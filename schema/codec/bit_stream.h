@@ -44,6 +44,16 @@ class ByteReader {
     return value;
   }
   uint64_t Varint();
+  /// They live as long as what is read.
+  std::string_view Bytes(uint64_t size) {
+    if (remaining() < size) {
+      ok_ = false;
+      return {};
+    }
+    const std::string_view bytes = bytes_.substr(at_, size);
+    at_ += size;
+    return bytes;
+  }
   bool ok() const { return ok_; }
   size_t position() const { return at_; }
   size_t remaining() const { return bytes_.size() - at_; }

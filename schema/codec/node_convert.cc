@@ -117,30 +117,39 @@ absl::StatusOr<RegionInfo> FromProto(const v1::RegionComponent& in) {
 
 void ComponentsToProto(const Node& node, v1::Node* out) {
   if (node.object.has_value()) ToProto(*node.object, out->mutable_object());
-  if (node.agent.has_value()) ToProto(*node.agent, out->mutable_agent());
   if (node.place.has_value()) ToProto(*node.place, out->mutable_place());
-  if (node.structure.has_value()) ToProto(*node.structure, out->mutable_structure());
-  if (node.region.has_value()) ToProto(*node.region, out->mutable_region());
 }
 
 absl::Status ComponentsFromProto(const v1::Node& in, Node* node) {
   if (in.has_object()) {
     DSG_ASSIGN_OR_RETURN(node->object, FromProto(in.object()));
   }
-  if (in.has_agent()) {
-    DSG_ASSIGN_OR_RETURN(node->agent, FromProto(in.agent()));
-  }
   if (in.has_place()) {
     DSG_ASSIGN_OR_RETURN(node->place, FromProto(in.place()));
-  }
-  if (in.has_structure()) node->structure = FromProto(in.structure());
-  if (in.has_region()) {
-    DSG_ASSIGN_OR_RETURN(node->region, FromProto(in.region()));
   }
   return absl::OkStatus();
 }
 
 }  // namespace
+
+void RareDetailsToProto(const Node& node, v1::Node* out) {
+  if (node.agent.has_value()) ToProto(*node.agent, out->mutable_agent());
+  if (node.structure.has_value()) ToProto(*node.structure, out->mutable_structure());
+  if (node.region.has_value()) ToProto(*node.region, out->mutable_region());
+  AttributesToProto(node.attributes, out->mutable_attributes());
+}
+
+absl::Status RareDetailsFromProto(const v1::Node& in, Node* node) {
+  if (in.has_agent()) {
+    DSG_ASSIGN_OR_RETURN(node->agent, FromProto(in.agent()));
+  }
+  if (in.has_structure()) node->structure = FromProto(in.structure());
+  if (in.has_region()) {
+    DSG_ASSIGN_OR_RETURN(node->region, FromProto(in.region()));
+  }
+  node->attributes = AttributesFromProto(in.attributes());
+  return absl::OkStatus();
+}
 
 void NodeDetailsToProto(const Node& node, v1::Node* out) {
   out->set_kind(node.kind);
@@ -159,7 +168,7 @@ void NodeDetailsToProto(const Node& node, v1::Node* out) {
   if (node.confidence.has_value()) out->set_confidence(*node.confidence);
   out->set_provenance(static_cast<v1::Provenance>(node.provenance));
   ComponentsToProto(node, out);
-  AttributesToProto(node.attributes, out->mutable_attributes());
+  RareDetailsToProto(node, out);
 }
 
 absl::Status NodeDetailsFromProto(const v1::Node& in, Node* node) {
@@ -181,8 +190,7 @@ absl::Status NodeDetailsFromProto(const v1::Node& in, Node* node) {
   if (in.has_confidence()) node->confidence = in.confidence();
   node->provenance = static_cast<Provenance>(in.provenance());
   DSG_RETURN_IF_ERROR(ComponentsFromProto(in, node));
-  node->attributes = AttributesFromProto(in.attributes());
-  return absl::OkStatus();
+  return RareDetailsFromProto(in, node);
 }
 
 void ToProto(const Node& node, const LayerTable& layers, v1::Node* out) {

@@ -18,19 +18,6 @@ namespace {
 // A block of four million vertices with all channels stays below this.
 constexpr size_t kUnpackedBytesMax = size_t{512} << 20;
 
-// Maps are written in order of their keys, so that equal content gives equal bytes and digests.
-template <typename Message>
-std::string Serialize(const Message& message) {
-  std::string bytes;
-  {
-    google::protobuf::io::StringOutputStream stream(&bytes);
-    google::protobuf::io::CodedOutputStream coded(&stream);
-    coded.SetSerializationDeterministic(true);
-    message.SerializeToCodedStream(&coded);
-  }
-  return bytes;
-}
-
 template <typename Message>
 bool Unpack(std::string_view bytes, Message* message) {
   std::string plain;
@@ -56,26 +43,21 @@ void CopyTriples(const google::protobuf::RepeatedField<Number>& from, std::vecto
 
 }  // namespace
 
-std::string EncodeNodePayload(const Node& node) {
-  v1::Node message;
-  NodeDetailsToProto(node, &message);
-  // The identity says nothing; leaving it out saves 11 bytes a place.
-  if (node.map_T_node.orientation.coeffs() == Eigen::Quaterniond::Identity().coeffs()) {
-    message.mutable_map_t_node()->clear_orientation();
+std::string SerializeInOrder(const google::protobuf::MessageLite& message) {
+  std::string bytes;
+  {
+    google::protobuf::io::StringOutputStream stream(&bytes);
+    google::protobuf::io::CodedOutputStream coded(&stream);
+    coded.SetSerializationDeterministic(true);
+    message.SerializeToCodedStream(&coded);
   }
-  return Serialize(message);
-}
-
-bool DecodeNodePayload(std::string_view bytes, Node* node) {
-  v1::Node message;
-  return message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) &&
-         NodeDetailsFromProto(message, node).ok();
+  return bytes;
 }
 
 std::string EncodeEdgePayload(const Edge& edge) {
   v1::Edge message;
   EdgeDetailsToProto(edge, &message);
-  return Serialize(message);
+  return SerializeInOrder(message);
 }
 
 bool DecodeEdgePayload(std::string_view bytes, Edge* edge) {
@@ -121,7 +103,7 @@ absl::StatusOr<MeshBlock> FromProto(const v1::MeshBlock& in) {
 std::string EncodeMeshBlock(const MeshBlock& block) {
   v1::MeshBlock message;
   ToProto(block, &message);
-  return Compress(Serialize(message));
+  return Compress(SerializeInOrder(message));
 }
 
 bool DecodeMeshBlock(std::string_view bytes, MeshBlock* block) {
@@ -165,7 +147,7 @@ absl::StatusOr<PoseFactor> FromProto(const v1::PoseFactor& in) {
 std::string EncodeFactors(const std::vector<PoseFactor>& factors) {
   v1::FactorAppend message;
   for (const PoseFactor& factor : factors) ToProto(factor, message.add_factors());
-  return Compress(Serialize(message));
+  return Compress(SerializeInOrder(message));
 }
 
 bool DecodeFactors(std::string_view bytes, std::vector<PoseFactor>* factors) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <google/protobuf/map.h>
+#include <google/protobuf/message_lite.h>
 
 #include "schema/codec/proto_convert.h"
 
@@ -29,6 +30,11 @@ absl::StatusOr<NodeId> OptionalNodeId(const std::string& text);
 /// All of a node but id, layer and revision.
 void NodeDetailsToProto(const Node& node, v1::Node* out);
 absl::Status NodeDetailsFromProto(const v1::Node& in, Node* node);
+/// What few nodes have: all but the fields that schema/codec/node_codec.cc writes itself.
+void RareDetailsToProto(const Node& node, v1::Node* out);
+absl::Status RareDetailsFromProto(const v1::Node& in, Node* node);
+/// Maps are written in order of their keys, so that equal content gives equal bytes and digests.
+std::string SerializeInOrder(const google::protobuf::MessageLite& message);
 /// Validity and attributes.
 void EdgeDetailsToProto(const Edge& edge, v1::Edge* out);
 void EdgeDetailsFromProto(const v1::Edge& in, Edge* edge);

@@ -49,7 +49,6 @@ class GraphRowsWriter {
   absl::Status WriteLabel(const SemanticLabel& label);
   absl::Status WriteNode(const Node& node);
   absl::Status InsertNode(const Node& node, const std::string& payload);
-  absl::Status UpdateNodeBox(const Node& node);
   absl::Status Retire(const Retirement& item);
   /// Moves the current row to the history. Returns false if there is none.
   absl::StatusOr<bool> EndNode(int64_t key);

@@ -203,7 +203,6 @@ absl::Status EraseNodeRows(NodeId id, ErasedRows* erased) {
   DSG_RETURN_IF_ERROR(TakeStays(kStaysInRoom, erased, key));
   DSG_RETURN_IF_ERROR(TakeStays(kStaysInPlace, erased, key));
   if (since == 0) {
-    DSG_RETURN_IF_ERROR(Query(erased->db, "DELETE FROM node_box WHERE key = ?1").Bind(key).Run());
     // A track may outlive the versions, when the same call was stopped between the two.
     return EraseGoneAgent(id, erased);
   }

@@ -2,6 +2,7 @@
 #include "absl/strings/str_cat.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/store/sqlite/commit.h"
+#include "schema/store/sqlite/node_cells.h"
 
 namespace dsg::sqlite {
 namespace {
@@ -73,7 +74,7 @@ absl::Status GraphRowsWriter::WriteNode(const Node& node) {
   }
   DSG_RETURN_IF_ERROR(EndNode(KeyOf(node.id)).status());
   DSG_RETURN_IF_ERROR(InsertNode(node, payload));
-  return UpdateNodeBox(node);
+  return AddCell(commit_.db, node);
 }
 
 absl::Status GraphRowsWriter::InsertNode(const Node& node, const std::string& payload) {
@@ -92,15 +93,6 @@ absl::Status GraphRowsWriter::InsertNode(const Node& node, const std::string& pa
       .Run();
 }
 
-// Agents are where their tracks say, so they have no box here.
-absl::Status GraphRowsWriter::UpdateNodeBox(const Node& node) {
-  if (IsAgentKind(node.kind)) return absl::OkStatus();
-  const IntBox box = ToMillimetres(node.BoxMap());
-  return Query(commit_.db, "INSERT OR REPLACE INTO node_box VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)")
-      .Bind(KeyOf(node.id), box.x0, box.x1, box.y0, box.y1, box.z0, box.z1)
-      .Run();
-}
-
 absl::StatusOr<bool> GraphRowsWriter::EndNode(int64_t key) {
   Query current(commit_.db, "SELECT rev_from, layer, payload, checksum FROM node WHERE key = ?1");
   const bool exists = current.Bind(key).Next();
@@ -114,6 +106,8 @@ absl::StatusOr<bool> GraphRowsWriter::EndNode(int64_t key) {
       !DecodeNodePayload(payload, &node)) {
     return CorruptRow(commit_.spec.name, "node", ToString(IdOf(key)));
   }
+  node.id = IdOf(key);
+  DSG_RETURN_IF_ERROR(RemoveCell(commit_.db, node));
   commit_.touched.nodes.push_back(IdOf(key));
   commit_.head.content.Remove(RowIdentity('N', {key, rev_from, layer}, payload));
   --commit_.head.info.node_count;
@@ -148,8 +142,7 @@ absl::Status GraphRowsWriter::Retire(const Retirement& item) {
   const int64_t key = KeyOf(item.id);
   if (!item.valid_to_ns.has_value()) {
     DSG_RETURN_IF_ERROR(EndNode(key).status());
-    DSG_RETURN_IF_ERROR(EndEdgesOf(key));
-    return Query(commit_.db, "DELETE FROM node_box WHERE key = ?1").Bind(key).Run();
+    return EndEdgesOf(key);
   }
   Node node;
   {

@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/store/sqlite/graph_rows.h"
+#include "schema/store/sqlite/node_cells.h"
 #include "schema/store/sqlite/snapshot.h"
 
 namespace dsg::sqlite {
@@ -14,6 +15,8 @@ namespace {
 
 // Rows read by one statement: short enough that no read transaction pins the write-ahead log.
 constexpr int kBatchRows = 512;
+// Candidates read before it is asked whether the caller has enough.
+constexpr std::ptrdiff_t kCandidatesAtOnce = 64;
 
 constexpr char kEdgesFrom[] =
     "SELECT source, relation, target, rev_from, weight, payload, checksum,"
@@ -169,28 +172,14 @@ absl::StatusOr<std::vector<NodeId>> SqliteSnapshot::ChildrenOf(NodeId parent) co
   return ids;
 }
 
-// The R*Tree holds the head only. Reading the head in the same transaction tells whether that is
-// still the revision asked for.
+// Cells are of the head only. Reading the head in the same transaction tells whether that is still
+// the revision asked for.
 absl::StatusOr<std::optional<std::vector<NodeId>>> SqliteSnapshot::IdsTouching(
     const Box3d& box_map) const {
   DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
-  constexpr double kLimit = 2.1e6;
-  const Box3d clamped(box_map.min().cwiseMax(-kLimit).cwiseMin(kLimit),
-                      box_map.max().cwiseMax(-kLimit).cwiseMin(kLimit));
-  const IntBox box = ToMillimetres(clamped);
-  Query query(*lease,
-              "SELECT key, (SELECT max(revision) FROM revision) FROM node_box"
-              " WHERE x1 >= ?1 AND x0 <= ?2 AND y1 >= ?3 AND y0 <= ?4 AND z1 >= ?5 AND z0 <= ?6"
-              " UNION ALL SELECT 0, (SELECT max(revision) FROM revision)");
-  query.Bind(box.x0, box.x1, box.y0, box.y1, box.z0, box.z1);
-  std::vector<NodeId> ids;
-  bool is_head = true;
-  while (query.Next()) {
-    is_head = is_head && query.Int(1) == revision();
-    if (query.Int(0) != 0) ids.push_back(IdOf(query.Int(0)));
-  }
-  DSG_RETURN_IF_ERROR(query.status());
-  if (!is_head) return std::optional<std::vector<NodeId>>();
+  DSG_ASSIGN_OR_RETURN(const int64_t head, lease->QueryInt("SELECT max(revision) FROM revision"));
+  if (head != revision()) return std::optional<std::vector<NodeId>>();
+  DSG_ASSIGN_OR_RETURN(std::vector<NodeId> ids, FindNear(*lease, box_map));
   std::sort(ids.begin(), ids.end());
   return std::optional<std::vector<NodeId>>(std::move(ids));
 }
@@ -256,13 +245,14 @@ absl::Status SqliteSnapshot::ScanNodes(const NodeFilter& filter, NodeId after,
   rest.parent = NodeId();
   DSG_ASSIGN_OR_RETURN(const auto candidates, Candidates(filter));
   if (candidates.has_value()) {
-    for (auto it = std::upper_bound(candidates->begin(), candidates->end(), after);
-         it != candidates->end(); ++it) {
-      DSG_RETURN_IF_ERROR(AskStop(stop));
-      const auto node = GetNode(*it);
-      if (absl::IsNotFound(node.status())) continue;
-      DSG_RETURN_IF_ERROR(node.status());
-      if (rest.Matches(*node) && !visit(*node)) return absl::OkStatus();
+    auto it = std::upper_bound(candidates->begin(), candidates->end(), after);
+    while (it != candidates->end()) {
+      const auto end = it + std::min<std::ptrdiff_t>(kCandidatesAtOnce, candidates->end() - it);
+      DSG_ASSIGN_OR_RETURN(const auto nodes, FindNodes({it, end}, stop));
+      for (const std::optional<Node>& node : nodes) {
+        if (node.has_value() && rest.Matches(*node) && !visit(*node)) return absl::OkStatus();
+      }
+      it = end;
     }
     return absl::OkStatus();
   }

@@ -27,8 +27,6 @@ struct BoxTable {
 };
 
 constexpr BoxTable kBoxTables[] = {
-    {"SELECT nodeno, data FROM node_box_node WHERE nodeno > ?1 ORDER BY nodeno LIMIT ?2",
-     "UPDATE node_box_node SET data = ?2 WHERE nodeno = ?1", 8 + 6 * 4},
     {"SELECT nodeno, data FROM segment_box_node WHERE nodeno > ?1 ORDER BY nodeno LIMIT ?2",
      "UPDATE segment_box_node SET data = ?2 WHERE nodeno = ?1", 8 + 8 * 4}};
 

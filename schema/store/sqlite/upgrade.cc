@@ -6,7 +6,9 @@
 #include <map>
 
 #include "absl/strings/str_cat.h"
+#include "schema/store/sqlite/graph_rows.h"
 #include "schema/store/sqlite/map_file.h"
+#include "schema/store/sqlite/node_cells.h"
 #include "schema/store/sqlite/rows.h"
 #include "schema/store/sqlite/touched_keys.h"
 
@@ -64,6 +66,15 @@ absl::Status FillTouched(Database& db) {
   return absl::OkStatus();
 }
 
+absl::Status FillCells(Database& db) {
+  Query query(db, "SELECT key, rev_from, layer, payload, checksum FROM node");
+  while (query.Next()) {
+    DSG_ASSIGN_OR_RETURN(const Node node, NodeFromRow(query, db.map_name()));
+    DSG_RETURN_IF_ERROR(AddCell(db, node));
+  }
+  return query.status();
+}
+
 absl::Status FromFormat1(Database& db) {
   DSG_ASSIGN_OR_RETURN(
       const int64_t has_lists,
@@ -73,6 +84,7 @@ absl::Status FromFormat1(Database& db) {
     DSG_RETURN_IF_ERROR(FillTouched(db));
   }
   DSG_RETURN_IF_ERROR(db.Execute(kLongLivedSql));
+  DSG_RETURN_IF_ERROR(FillCells(db));
   return db.Execute("PRAGMA user_version=2");
 }
 

@@ -9,6 +9,7 @@
 #include "schema/codec/shape_codec.h"
 #include "schema/store/sqlite/log_check.h"
 #include "schema/store/sqlite/map_reader.h"
+#include "schema/store/sqlite/node_cells.h"
 #include "schema/store/sqlite/rows.h"
 #include "schema/store/sqlite/verify_history.h"
 
@@ -78,11 +79,9 @@ class Verifier {
       if (query.Text(0) != "ok") Problem(absl::StrCat("database: ", std::string(query.Text(0))));
     }
     Finish(query, "database");
-    for (const char* sql : {"SELECT rtreecheck('segment_box')", "SELECT rtreecheck('node_box')"}) {
-      Query check(db_, sql);
-      if (check.Next() && check.Text(0) != "ok") Problem(std::string(check.Text(0)));
-      Finish(check, "R*Tree");
-    }
+    Query check(db_, "SELECT rtreecheck('segment_box')");
+    if (check.Next() && check.Text(0) != "ok") Problem(std::string(check.Text(0)));
+    Finish(check, "R*Tree");
   }
 
   void CheckNodes() {
@@ -95,10 +94,27 @@ class Verifier {
       Node node;
       const bool sound = query.Int(4) == RowChecksum(columns, query.Blob(3)) &&
                          DecodeNodePayload(query.Blob(3), &node) && node.name == query.Text(5);
-      if (!sound) BadRow("node", ToString(IdOf(query.Int(0))));
+      node.id = IdOf(query.Int(0));
+      if (!sound) BadRow("node", ToString(node.id));
+      if (sound && query.Int(6) == kRevisionMax && !IsAgentKind(node.kind)) CheckCell(node);
       Count(RowIdentity('N', columns, query.Blob(3)), query.Int(1), query.Int(6));
     }
     Finish(query, "node");
+    Query cells(db_, "SELECT count(*) FROM node_cell");
+    if (cells.Next() && cells.Int(0) != cell_count_) {
+      Problem(absl::StrCat("table node_cell: ", cells.Int(0), " rows for ", cell_count_, " nodes"));
+    }
+    Finish(cells, "node_cell");
+  }
+
+  void CheckCell(const Node& node) {
+    ++cell_count_;
+    const auto found = HasCell(db_, node);
+    if (!found.ok()) {
+      Problem(absl::StrCat("table node_cell: ", std::string(found.status().message())));
+    } else if (!*found) {
+      Problem(absl::StrCat("node ", ToString(node.id), " is not in the cell where it should be"));
+    }
   }
 
   void CheckEdges() {
@@ -293,6 +309,8 @@ class Verifier {
   const MapSpec& spec_;
   const std::function<void(double)>& progress_;
   VerifyReport report_;
+  /// Current nodes that have a cell.
+  int64_t cell_count_ = 0;
   /// What each revision added to and took from the content digest.
   std::map<Revision, ContentDigest> changes_;
 };

@@ -54,6 +54,19 @@ CREATE UNIQUE INDEX factor_history_id ON factor_history (id, rev_from);
 CREATE INDEX factor_history_agent ON factor_history (agent, t0);
 CREATE INDEX factor_history_rev_to ON factor_history (rev_to);
 
+-- A node's cell in a grid that is as coarse as the node is large: candidates only.
+CREATE TABLE node_cell (
+  cell INTEGER NOT NULL,
+  key INTEGER NOT NULL,
+  PRIMARY KEY (cell, key)
+) STRICT, WITHOUT ROWID;
+DROP TABLE node_box;
+
+-- In the order of ids. The layer stands in it so that listing one reads no other nodes.
+DROP INDEX node_layer;
+DROP INDEX node_order;
+CREATE INDEX node_order ON node (key & 255, key >> 8, layer);
+
 -- Assets that nothing refers to any more and that compaction dropped: they still count in the
 -- digests of the revisions that are kept.
 CREATE TABLE dropped_asset (

@@ -72,6 +72,12 @@ TEST(ProtoConvert, NodePayloadsRestoreAndAreDeterministic) {
   EXPECT_EQ(EncodeNodePayload(back), payload);
   EXPECT_EQ(back.attributes, node.attributes);
   EXPECT_EQ(back.valid, node.valid);
+  back.id = node.id;
+  back.layer = node.layer;
+  v1::Node wire, wire_of_back;
+  ToProto(node, LayerTable(), &wire);
+  ToProto(back, LayerTable(), &wire_of_back);
+  EXPECT_EQ(wire_of_back.DebugString(), wire.DebugString());
   EXPECT_FALSE(DecodeNodePayload("\xff\xff", &back));
 }
 

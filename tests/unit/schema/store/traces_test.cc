@@ -112,18 +112,15 @@ class Traces : public testing::Test {
     return hit_count;
   }
 
-  // Nodes of the R*Trees that hold more than their entries.
+  // Nodes of the R*Tree that hold more than their entries.
   size_t CountStaleBoxes() const {
+    constexpr size_t kEntryBytes = 40;
     size_t count = 0;
-    for (const auto& [table, entry_bytes] :
-         {std::make_pair("node_box_node", 32), std::make_pair("segment_box_node", 40)}) {
-      for (const std::string& node :
-           Payloads(map_.database_path(), absl::StrCat("SELECT data FROM ", table))) {
-        const size_t entries =
-            static_cast<uint8_t>(node[2]) * size_t{256} + static_cast<uint8_t>(node[3]);
-        const size_t used = 4 + entries * static_cast<size_t>(entry_bytes);
-        if (node.find_first_not_of('\0', used) != node.npos) ++count;
-      }
+    for (const std::string& node :
+         Payloads(map_.database_path(), "SELECT data FROM segment_box_node")) {
+      const size_t entries =
+          static_cast<uint8_t>(node[2]) * size_t{256} + static_cast<uint8_t>(node[3]);
+      if (node.find_first_not_of('\0', 4 + entries * kEntryBytes) != node.npos) ++count;
     }
     return count;
   }
