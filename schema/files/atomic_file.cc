@@ -20,10 +20,24 @@ constexpr size_t kBufferBytes = size_t{256} << 10;
 
 std::string PartPath(const std::string& path) { return path + kPartSuffix; }
 
-bool IsDiskFull(int error) { return error == ENOSPC || error == EDQUOT; }
+// EFBIG: beyond what the file system, or the limit of this process, lets a file be.
+bool IsDiskFull(int error) { return error == ENOSPC || error == EDQUOT || error == EFBIG; }
 
-absl::Status DiskFull(const std::string& message, const std::string& path) {
-  return MakeError(Reason::kDiskFull, absl::StrCat(message, "; free some space"), {{"path", path}});
+absl::Status DiskFull(int error, const std::string& message, const std::string& path) {
+  const char* advice =
+      error == EFBIG ? "; raise `ulimit -f`, or name another file system" : "; free some space";
+  return MakeError(Reason::kDiskFull, absl::StrCat(message, advice), {{"path", path}});
+}
+
+// A new file, never one that somebody has put there for us to write to, nor what a link points to.
+std::FILE* CreateNew(const std::string& path) {
+  // Of a run that was killed.
+  unlink(path.c_str());
+  const int fd = open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+  if (fd < 0) return nullptr;
+  std::FILE* const file = fdopen(fd, "wb");
+  if (file == nullptr) close(fd);
+  return file;
 }
 
 }  // namespace
@@ -45,12 +59,12 @@ absl::Status CheckMayWrite(const std::string& path, bool may_replace, std::strin
 }
 
 absl::StatusOr<AtomicFile> AtomicFile::Create(const std::string& path) {
-  std::FILE* file = std::fopen(PartPath(path).c_str(), "wb");
+  std::FILE* file = CreateNew(PartPath(path));
   if (file == nullptr) {
     const int error = errno;
     const std::string message =
         absl::StrCat("cannot create ", PartPath(path), ": ", std::strerror(error));
-    if (IsDiskFull(error)) return DiskFull(message, path);
+    if (IsDiskFull(error)) return DiskFull(error, message, path);
     return MakeError(Reason::kFieldInvalid,
                      absl::StrCat(message, "; name a folder you may write to"), {{"path", path}});
   }
@@ -72,7 +86,7 @@ AtomicFile::~AtomicFile() {
 absl::Status AtomicFile::Failure(const char* what) const {
   const int error = errno;
   const std::string message = absl::StrCat("cannot ", what, " ", path_, ": ", std::strerror(error));
-  return IsDiskFull(error) ? DiskFull(message, path_) : absl::UnavailableError(message);
+  return IsDiskFull(error) ? DiskFull(error, message, path_) : absl::UnavailableError(message);
 }
 
 absl::Status AtomicFile::Write(std::string_view bytes) {

@@ -23,7 +23,8 @@ inline constexpr char kPartSuffix[] = ".part";
 absl::Status CheckMayWrite(const std::string& path, bool may_replace,
                            std::string_view advice = "add --force");
 
-/// Writes to PATH.part and renames on Commit(); removes PATH.part when dropped before.
+/// Writes to PATH.part and renames on Commit(); removes PATH.part when dropped before. What was
+/// there under that name, of a run that was killed, goes; a link goes, and not what it points to.
 ///
 /// Threads: one caller at a time.
 class AtomicFile {

@@ -144,13 +144,12 @@ class OwnMap(support.ProgramsTest):
         self.assertFalse(os.path.exists(self.path("office.txt")))
 
     def test_a_full_disk_leaves_no_file(self):
-        if not os.path.exists("/dev/full"):
-            self.skipTest("this system has no /dev/full")
-        os.symlink("/dev/full", self.path("full.json.part"))
-        done = support.run("dsg", "export", "--spark", "full.json", "--store", self.store, "--map",
+        # The graph is larger than what a file may be; the index of the store's log is smaller.
+        done = support.run("bash", "-c", "trap '' XFSZ; ulimit -f 64; exec \"$@\"", "bash",
+                           "dsg", "export", "--spark", "full.json", "--store", self.store, "--map",
                            "office", cwd=self.folder)
         self.assertNotEqual(0, done.returncode)
-        self.assertIn("free some space", done.stderr)
+        self.assertIn("DISK_FULL", done.stderr)
         self.assertFalse(os.path.exists(self.path("full.json")))
         self.assertFalse(os.path.lexists(self.path("full.json.part")))
 

@@ -12,6 +12,7 @@
 
 #include "schema/base/random.h"
 #include "schema/base/status.h"
+#include "tests/support/full_disk.h"
 
 namespace dsg::ingest {
 namespace {
@@ -89,10 +90,8 @@ TEST(OutputFile, SaysWhichFileCannotBeCreated) {
 }
 
 TEST(OutputFile, ReportsAFullDisk) {
-  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "this system has no /dev/full";
-  // The file is opened as PATH.part; a link makes that the device that is always full.
   const std::string path = TempPath("full");
-  std::filesystem::create_symlink("/dev/full", path + ".part");
+  const test::FullDisk full;
   auto file = OutputFile::Create(path);
   ASSERT_TRUE(file.ok()) << file.status();
   file->buffer() = "does not fit";

@@ -10,6 +10,7 @@
 
 #include "query/cli/run.h"
 #include "schema/store/graph_store.h"
+#include "tests/support/full_disk.h"
 #include "tests/support/temp_folder.h"
 #include "tests/unit/query/cli/example_content.h"
 
@@ -160,12 +161,18 @@ TEST_F(ExportVerbs, SayWhatIsMissingOrWrong) {
 }
 
 TEST_F(ExportVerbs, AFullDiskIsToldAndLeavesNoFile) {
+  // The first reader of a map writes the index of its log.
+  const auto store = GraphStore::Open(store_, {});
+  const auto map = (*store)->OpenMap("example");
+  ASSERT_TRUE(map.ok() && (*map)->Latest().ok());
   for (const auto& [verb, option] : {std::pair{"export", "--gltf"},
                                      {"export", "--ply"},
                                      {"export", "--graph-ply"},
                                      {"map", "--png"}}) {
-    fs::create_symlink("/dev/full", Path("x.part"));
-    const Outcome outcome = Ask({verb, option, Path("x")});
+    const Outcome outcome = [&] {
+      const dsg::test::FullDisk full;
+      return Ask({verb, option, Path("x")});
+    }();
     EXPECT_EQ(outcome.code, 3) << verb << " " << option << " " << outcome.errors;
     EXPECT_NE(outcome.errors.find("DISK_FULL"), std::string::npos) << outcome.errors;
     EXPECT_FALSE(fs::exists(Path("x")));

@@ -9,6 +9,7 @@
 #include <iterator>
 
 #include "schema/base/status.h"
+#include "tests/support/full_disk.h"
 #include "tests/support/temp_folder.h"
 
 namespace dsg {
@@ -70,15 +71,36 @@ TEST_F(AtomicFileTest, SaysWhichFileCannotBeCreated) {
 }
 
 TEST_F(AtomicFileTest, AFullDiskIsAnErrorAndLeavesNoFile) {
-  if (!fs::exists("/dev/full")) GTEST_SKIP() << "this system has no /dev/full";
-  // The file is opened as PATH.part; a link makes that the device that is always full.
-  fs::create_symlink("/dev/full", path_ + kPartSuffix);
+  const test::FullDisk full;
   EXPECT_EQ(ReasonOf(WriteAtomically(path_, std::string(1 << 20, 'x'))), Reason::kDiskFull);
   EXPECT_TRUE(fs::is_empty(folder_.path()));
   // Few bytes stay in the buffer until the end, and fail there.
-  fs::create_symlink("/dev/full", path_ + kPartSuffix);
   EXPECT_EQ(ReasonOf(WriteAtomically(path_, "x")), Reason::kDiskFull);
   EXPECT_TRUE(fs::is_empty(folder_.path()));
+}
+
+TEST_F(AtomicFileTest, NeverWritesWhereALinkPoints) {
+  const std::string other = folder_.path() + "/other";
+  std::ofstream(other) << "mine";
+  fs::create_symlink(other, path_ + kPartSuffix);
+  ASSERT_TRUE(WriteAtomically(path_, "new").ok());
+  EXPECT_EQ(Read(other), "mine");
+  EXPECT_EQ(Read(path_), "new");
+  EXPECT_FALSE(fs::is_symlink(path_));
+}
+
+TEST_F(AtomicFileTest, NeverWritesIntoAFileThatHasAnotherName) {
+  const std::string other = folder_.path() + "/other";
+  std::ofstream(other) << "mine";
+  fs::create_hard_link(other, path_ + kPartSuffix);
+  ASSERT_TRUE(WriteAtomically(path_, "new").ok());
+  EXPECT_EQ(Read(other), "mine");
+}
+
+TEST_F(AtomicFileTest, BeginsAnewWhereAKilledRunLeftAPart) {
+  std::ofstream(path_ + kPartSuffix) << "a longer one, cut off";
+  ASSERT_TRUE(WriteAtomically(path_, "new").ok());
+  EXPECT_EQ(Read(path_), "new");
 }
 
 TEST_F(AtomicFileTest, WhatCannotTakeItsNameLeavesNoPart) {
