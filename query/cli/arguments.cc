@@ -53,7 +53,9 @@ absl::Status CheckPlace(const Command& command) {
                            "import writes to a store folder: give --store DIR (for a server: "
                            "dsg-ingest --server ADDR)",
                            "import")
-                     : Usage("verify reads a store folder: give --store DIR", "verify");
+           : std::holds_alternative<UpgradeVerb>(command.verb)
+               ? Usage("upgrade works on a store folder: give --store DIR", "upgrade")
+               : Usage("verify reads a store folder: give --store DIR", "verify");
   }
   if (is_import && common.map.empty() && !NamesArchive(command.verb))
     return Usage("name the map to import into with --map NAME", "import");

@@ -67,13 +67,14 @@ void AddRevisionVerbs(Grammar* grammar) {
 
 void AddFileVerbs(Grammar* grammar) {
   const auto [app, import] = grammar->Add<ImportVerb>(
-      "import", "Add a scene-graph file (Spark-DSG, Kimera) to a map", kMap);
+      "import", "Add a scene-graph file (Spark-DSG, Kimera) to a map", kMap | kJson);
   app->add_option("FILE", import->file, "The file; a .dsgz is restored")->required();
   const auto [verify_app, verify] = grammar->Add<VerifyVerb>(
-      "verify", "Check every page, row and revision of a map, an archive or a backup", kMap);
+      "verify", "Check every page, row and revision of a map, an archive or a backup",
+      kMap | kJson);
   verify_app->add_option("PATH", verify->path,
                          "A .dsgz file, or the folder of a backup; default the store");
-  grammar->Add<UpgradeVerb>("upgrade", "Bring a map to this program's store format", kMap);
+  grammar->Add<UpgradeVerb>("upgrade", "Bring a map to this program's store format", kMap | kJson);
   AddExport(grammar);
   AddMap(grammar);
 }

@@ -12,7 +12,6 @@
 #include "dsg/v1/map_service.pb.h"
 #include "query/cli/archive_copy.h"
 #include "query/cli/interrupt.h"
-#include "query/cli/map_names.h"
 #include "query/cli/progress.h"
 #include "query/cli/render_maps.h"
 #include "query/cli/table.h"
@@ -24,6 +23,12 @@ namespace dsg::cli {
 namespace {
 
 namespace fs = std::filesystem;
+
+// A map that cannot be read, so that only the last backup has it, if that does.
+struct LeftOut {
+  std::string map;
+  absl::Status why;
+};
 
 // A map of the new backup, and how it came there.
 struct Saved {
@@ -55,16 +60,23 @@ absl::Status CheckIsOutside(const std::string& folder, const std::string& store)
                    {{"path", folder}});
 }
 
+// Also those that cannot be opened: they must be told of, not be missing.
 absl::StatusOr<std::vector<std::string>> MapsOf(Session* session) {
   const CommonOptions& common = session->common();
-  // A map that cannot be opened must fail the backup, not be missing from it.
-  if (!common.store.empty()) return MapNames(common.store, common.map);
   if (!common.map.empty()) return std::vector<std::string>{common.map};
   v1::ListMapsResponse reply;
   DSG_RETURN_IF_ERROR(session->api().ListMaps(session->NewCall(), v1::ListMapsRequest(), &reply));
-  std::vector<std::string> names;
+  std::vector<std::string> names(reply.unreadable_maps().begin(), reply.unreadable_maps().end());
   for (const v1::MapSpec& map : reply.maps()) names.push_back(map.name());
+  std::sort(names.begin(), names.end());
   return names;
+}
+
+// What is wrong with one map, and is no reason to leave out the others; the rest is about the disk,
+// the link or the caller.
+bool IsOfTheMap(const absl::Status& status) {
+  return absl::IsDataLoss(status) || absl::IsFailedPrecondition(status) ||
+         absl::IsNotFound(status) || absl::IsInternal(status);
 }
 
 class Backup {
@@ -77,13 +89,15 @@ class Backup {
     std::vector<Saved> saved;
     for (const std::string& map : maps) {
       absl::StatusOr<Saved> one = Save(map, call);
-      if (!one.ok()) return Annotate(one.status(), absl::StrCat("backup of map \"", map, "\""));
-      saved.push_back(*std::move(one));
+      if (one.ok()) {
+        saved.push_back(*std::move(one));
+      } else if (session_->common().map.empty() && IsOfTheMap(one.status())) {
+        left_out_.push_back({map, one.status()});
+      } else {
+        return Annotate(one.status(), absl::StrCat("backup of map \"", map, "\""));
+      }
     }
-    for (const BackupEntry& entry : folder_->last().maps) {
-      if (std::find(maps.begin(), maps.end(), entry.map) != maps.end()) continue;
-      saved.push_back({entry, Saved::How::kKept});
-    }
+    KeepOthers(&saved);
     std::sort(saved.begin(), saved.end(),
               [](const Saved& a, const Saved& b) { return a.entry.map < b.entry.map; });
     BackupManifest manifest;
@@ -92,7 +106,19 @@ class Backup {
     return saved;
   }
 
+  /// Once Run has returned.
+  const std::vector<LeftOut>& left_out() const { return left_out_; }
+
  private:
+  void KeepOthers(std::vector<Saved>* saved) const {
+    for (const BackupEntry& entry : folder_->last().maps) {
+      const auto is_it = [&](const Saved& one) { return one.entry.map == entry.map; };
+      if (std::none_of(saved->begin(), saved->end(), is_it)) {
+        saved->push_back({entry, Saved::How::kKept});
+      }
+    }
+  }
+
   absl::StatusOr<Saved> Save(const std::string& map, const query::CallContext& call) {
     Progress progress(absl::StrCat("backup ", map), progress_out_);
     const auto tell = [&](double fraction) { progress.Update(fraction); };
@@ -116,11 +142,27 @@ class Backup {
   BackupFolder* const folder_;
   const std::string path_;
   std::ostream* const progress_out_;
+  std::vector<LeftOut> left_out_;
 };
 
-void TellSaved(const std::vector<Saved>& saved, const std::string& folder, bool as_json,
-               std::ostream& out) {
-  nlohmann::ordered_json json = {{"folder", folder}, {"maps", nlohmann::ordered_json::array()}};
+// The error that a backup without some maps ends with.
+absl::Status VerdictOn(const std::vector<LeftOut>& left_out, const std::string& folder) {
+  if (left_out.empty()) return absl::OkStatus();
+  const Reason reason = ReasonOf(left_out.front().why);
+  return MakeError(reason == Reason::kUnspecified ? Reason::kStoreCorrupt : reason,
+                   absl::StrCat("the backup in ", folder, " is without the newest of ",
+                                Counted(static_cast<int64_t>(left_out.size()), "map"),
+                                " that could not be read, \"", left_out.front().map,
+                                "\" first; the others are in it. Run dsg verify on the store, and "
+                                "mend or remove what it names"),
+                   {{"map", left_out.front().map}});
+}
+
+void TellSaved(const std::vector<Saved>& saved, const std::vector<LeftOut>& left_out,
+               const std::string& folder, bool as_json, std::ostream& out) {
+  nlohmann::ordered_json json = {{"folder", folder},
+                                 {"maps", nlohmann::ordered_json::array()},
+                                 {"left_out", nlohmann::ordered_json::array()}};
   for (const auto& [entry, how] : saved) {
     json["maps"].push_back({{"map", entry.map},
                             {"file", entry.file},
@@ -130,6 +172,10 @@ void TellSaved(const std::vector<Saved>& saved, const std::string& folder, bool 
     if (as_json) continue;
     out << entry.map << ": " << TextOf(how) << ", revision " << entry.newest_revision << ", "
         << BytesText(entry.byte_count) << ", " << entry.file << "\n";
+  }
+  for (const auto& [map, why] : left_out) {
+    json["left_out"].push_back({{"map", map}, {"error", std::string(why.message())}});
+    if (!as_json) out << map << ": left out: " << Printable(std::string(why.message())) << "\n";
   }
   if (as_json) {
     out << json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << "\n";
@@ -150,8 +196,8 @@ absl::Status RunBackup(Session* session, const BackupVerb& verb, std::ostream& o
   const InterruptGuard guard(&call);
   Backup backup(session, folder.get(), verb.folder, &progress_out);
   DSG_ASSIGN_OR_RETURN(const std::vector<Saved> saved, backup.Run(call));
-  TellSaved(saved, verb.folder, common.json, out);
-  return absl::OkStatus();
+  TellSaved(saved, backup.left_out(), verb.folder, common.json, out);
+  return VerdictOn(backup.left_out(), verb.folder);
 }
 
 }  // namespace dsg::cli

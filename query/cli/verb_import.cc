@@ -4,7 +4,9 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -115,6 +117,23 @@ absl::StatusOr<Committed> CommitToStore(const CommonOptions& common, bool map_ex
                    MetadataOf(committed.status()));
 }
 
+void PrintJson(const ImportedGraph& graph, const std::string& file, const std::string& map,
+               const Committed& committed, std::ostream& out) {
+  const nlohmann::ordered_json json = {
+      {"file", file},
+      {"format", graph.format},
+      {"map", map},
+      {"revision", std::to_string(committed.last_revision)},
+      {"added", committed.part_count > 0},
+      {"node_count", std::to_string(graph.node_count)},
+      {"edge_count", std::to_string(graph.edge_count)},
+      {"pose_count", std::to_string(graph.pose_count)},
+      {"mesh_vertex_count", std::to_string(graph.mesh_vertex_count)},
+      {"mesh_face_count", std::to_string(graph.mesh_face_count)},
+      {"notes", graph.notes}};
+  out << json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << "\n";
+}
+
 void PrintSummary(const ImportedGraph& graph, const std::string& file, const std::string& map,
                   const Committed& committed, std::ostream& out) {
   const std::string what = absl::StrCat(graph.node_count, " nodes, ", graph.edge_count, " edges, ",
@@ -153,7 +172,8 @@ absl::Status RunImport(const CommonOptions& common, const ImportVerb& verb, std:
   DSG_ASSIGN_OR_RETURN(
       const Committed committed,
       CommitToStore(common, found.has_value(), graph.first_ns, std::move(delta), &progress));
-  PrintSummary(graph, verb.file, common.map, committed, out);
+  const auto print = common.json ? PrintJson : PrintSummary;
+  print(graph, verb.file, common.map, committed, out);
   return absl::OkStatus();
 }
 

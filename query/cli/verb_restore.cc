@@ -22,6 +22,8 @@
 namespace dsg::cli {
 namespace {
 
+namespace fs = std::filesystem;
+
 // A map that is to be restored.
 struct Wanted {
   std::string path;
@@ -35,16 +37,24 @@ class Restorer {
 
   absl::Status Run() {
     std::error_code error;
-    const bool is_folder = std::filesystem::is_directory(verb_.path, error);
+    const bool is_folder = fs::is_directory(verb_.path, error);
     DSG_RETURN_IF_ERROR(is_folder ? TakeFolder() : TakeFile());
-    DSG_ASSIGN_OR_RETURN(
-        const std::unique_ptr<GraphStore> store,
-        GraphStore::Open(common_.store, {.create = true, .program = "dsg restore"}));
-    for (const Wanted& wanted : wanted_) DSG_RETURN_IF_ERROR(CheckMayRestore(wanted, store.get()));
-    for (const Wanted& wanted : wanted_) DSG_RETURN_IF_ERROR(Restore(wanted, store.get()));
-    return absl::OkStatus();
+    // From the deepest one up.
+    std::vector<fs::path> made;
+    for (fs::path path = common_.store; !path.empty() && !fs::exists(path, error);
+         path = path.parent_path()) {
+      made.push_back(path);
+    }
+    const absl::Status status = RestoreAll();
+    // Those that hold nothing.
+    if (!status.ok()) {
+      for (const fs::path& path : made) fs::remove(path, error);
+    }
+    return status;
   }
 
+  bool has_restored() const { return !restored_.empty(); }
+  /// Also of those that were restored before an error.
   void Tell(std::ostream& out) const {
     nlohmann::ordered_json json = {{"maps", nlohmann::ordered_json::array()}};
     for (const auto& [name, manifest] : restored_) {
@@ -61,6 +71,15 @@ class Restorer {
   }
 
  private:
+  absl::Status RestoreAll() {
+    DSG_ASSIGN_OR_RETURN(
+        const std::unique_ptr<GraphStore> store,
+        GraphStore::Open(common_.store, {.create = true, .program = "dsg restore"}));
+    for (const Wanted& wanted : wanted_) DSG_RETURN_IF_ERROR(CheckMayRestore(wanted, store.get()));
+    for (const Wanted& wanted : wanted_) DSG_RETURN_IF_ERROR(Restore(wanted, store.get()));
+    return absl::OkStatus();
+  }
+
   absl::Status TakeFile() {
     DSG_ASSIGN_OR_RETURN(const ArchiveManifest manifest, ReadArchiveManifest(verb_.path));
     std::string name = !verb_.as.empty() ? verb_.as : common_.map;
@@ -95,7 +114,8 @@ class Restorer {
   }
 
   absl::Status CheckMayRestore(const Wanted& wanted, GraphStore* store) const {
-    if (verb_.force || CheckNameIsFree(store, wanted.name).ok()) return absl::OkStatus();
+    if (verb_.force) return CheckMayReplace(store, wanted.name);
+    if (CheckNameIsFree(store, wanted.name).ok()) return absl::OkStatus();
     return ExistsError(wanted.name);
   }
 
@@ -136,8 +156,7 @@ absl::Status RunRestore(const CommonOptions& common, const RestoreVerb& verb, st
   }
   Restorer restorer(common, verb, &progress_out);
   const absl::Status status = restorer.Run();
-  // Before an error it is a note about what is there now.
-  restorer.Tell(status.ok() ? out : progress_out);
+  if (status.ok() || restorer.has_restored()) restorer.Tell(out);
   return status;
 }
 

@@ -3,6 +3,7 @@
 // archive, or a backup.
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -47,18 +48,41 @@ absl::StatusOr<VerifyReport> FindProblems(GraphStore* store, const std::string& 
 // Maps that were looked at, and what is wrong with them.
 class Findings {
  public:
-  explicit Findings(std::ostream* out) : out_(*out) {}
+  Findings(std::ostream* out, bool as_json) : out_(*out), as_json_(as_json) {}
 
   void Add(const std::string& name, const VerifyReport& report) {
+    problem_count_ += static_cast<int64_t>(report.problems.size());
+    json_["maps"].push_back({{"map", name},
+                             {"revision_count", std::to_string(report.revision_count)},
+                             {"row_count", std::to_string(report.row_count)},
+                             {"pose_count", std::to_string(report.pose_count)},
+                             {"problems", report.problems}});
+    if (as_json_) return;
     out_ << name << ": " << Counted(report.revision_count, "revision") << ", "
          << Counted(report.row_count, "row") << ", " << Counted(report.pose_count, "pose") << ", "
          << Counted(static_cast<int64_t>(report.problems.size()), "problem") << "\n";
     for (const std::string& problem : report.problems) out_ << "  " << Printable(problem) << "\n";
-    problem_count_ += static_cast<int64_t>(report.problems.size());
   }
 
+  /// A map that only another release can look at; the others are checked all the same.
+  void AddOtherFormat(const std::string& name, const absl::Status& why) {
+    if (other_format_.ok()) other_format_ = why;
+    json_["maps"].push_back({{"map", name}, {"unchecked", std::string(why.message())}});
+    if (!as_json_) {
+      out_ << name << ": not checked: " << Printable(std::string(why.message())) << "\n";
+    }
+  }
+
+  /// `what` has no maps to look at.
+  void AddNothing(const std::string& what) {
+    if (!as_json_) out_ << what << " has no maps\n";
+  }
+
+  /// Once, after the last.
   absl::Status Verdict(const std::string& where, const std::string& advice) const {
-    if (problem_count_ == 0) return absl::OkStatus();
+    if (as_json_)
+      out_ << json_.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << "\n";
+    if (problem_count_ == 0) return other_format_;
     return MakeError(Reason::kStoreCorrupt,
                      absl::StrCat(where, " has ", Counted(problem_count_, "problem"), "; ", advice),
                      {{"problem_count", absl::StrCat(problem_count_)}});
@@ -66,7 +90,10 @@ class Findings {
 
  private:
   std::ostream& out_;
+  const bool as_json_;
+  nlohmann::ordered_json json_ = {{"maps", nlohmann::ordered_json::array()}};
   int64_t problem_count_ = 0;
+  absl::Status other_format_;
 };
 
 absl::Status AddArchive(const std::string& path, const std::string& name, Findings* findings,
@@ -79,9 +106,9 @@ absl::Status AddArchive(const std::string& path, const std::string& name, Findin
   return absl::OkStatus();
 }
 
-absl::Status VerifyFiles(const std::string& path, const std::string& map, std::ostream& out,
+absl::Status VerifyFiles(const std::string& path, const CommonOptions& common, std::ostream& out,
                          std::ostream& progress_out) {
-  Findings findings(&out);
+  Findings findings(&out, common.json);
   std::error_code error;
   if (!std::filesystem::is_directory(path, error)) {
     DSG_RETURN_IF_ERROR(AddArchive(path, path, &findings, progress_out));
@@ -89,7 +116,7 @@ absl::Status VerifyFiles(const std::string& path, const std::string& map, std::o
   }
   DSG_ASSIGN_OR_RETURN(const BackupManifest backup, ReadBackupManifest(path));
   for (const BackupEntry& entry : backup.maps) {
-    if (!map.empty() && entry.map != map) continue;
+    if (!common.map.empty() && entry.map != common.map) continue;
     const absl::Status intact = CheckBackupFile(path, entry, StopCheck(), nullptr);
     if (!intact.ok() && !absl::IsDataLoss(intact)) return intact;
     if (intact.ok()) {
@@ -99,7 +126,7 @@ absl::Status VerifyFiles(const std::string& path, const std::string& map, std::o
       findings.Add(entry.map, DamageOf(intact));
     }
   }
-  if (backup.maps.empty()) out << "backup " << path << " has no maps\n";
+  if (backup.maps.empty()) findings.AddNothing(absl::StrCat("backup ", path));
   return findings.Verdict(absl::StrCat("backup ", path),
                           "take another copy of it, or back the maps up again");
 }
@@ -108,16 +135,21 @@ absl::Status VerifyFiles(const std::string& path, const std::string& map, std::o
 
 absl::Status RunVerify(const CommonOptions& common, const VerifyVerb& verb, std::ostream& out,
                        std::ostream& progress_out) {
-  if (!verb.path.empty()) return VerifyFiles(verb.path, common.map, out, progress_out);
+  if (!verb.path.empty()) return VerifyFiles(verb.path, common, out, progress_out);
   DSG_ASSIGN_OR_RETURN(const std::unique_ptr<GraphStore> store,
                        GraphStore::Open(common.store, {.program = "dsg verify"}));
   DSG_ASSIGN_OR_RETURN(const std::vector<std::string> names, MapNames(store->folder(), common.map));
-  if (names.empty()) out << "store " << common.store << " has no maps\n";
-  Findings findings(&out);
+  Findings findings(&out, common.json);
+  if (names.empty()) findings.AddNothing(absl::StrCat("store ", common.store));
   for (const std::string& name : names) {
-    DSG_ASSIGN_OR_RETURN(const VerifyReport report,
-                         FindProblems(store.get(), name, !common.map.empty(), progress_out));
-    findings.Add(name, report);
+    const auto report = FindProblems(store.get(), name, !common.map.empty(), progress_out);
+    if (report.ok()) {
+      findings.Add(name, *report);
+    } else if (common.map.empty() && absl::IsFailedPrecondition(report.status())) {
+      findings.AddOtherFormat(name, report.status());
+    } else {
+      return report.status();
+    }
   }
   return findings.Verdict(absl::StrCat("store ", common.store),
                           "restore the maps listed from a backup, or ingest their logs again into "

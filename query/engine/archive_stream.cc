@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "dsg/v1/maintenance_service.pb.h"
-#include "schema/archive/archive_map.h"
+#include "query/engine/archive_copies.h"
 #include "schema/base/status.h"
 
 namespace dsg::query {
@@ -13,27 +13,26 @@ namespace {
 
 class ArchiveStream final : public ArchiveCursor {
  public:
-  ArchiveStream(MapTable* maps, std::shared_ptr<MapReader> map)
-      : maps_(maps), map_(std::move(map)) {}
+  ArchiveStream(ArchiveCopies* copies, std::shared_ptr<ArchiveRead> read)
+      : copies_(copies), read_(std::move(read)) {}
+  ~ArchiveStream() override { copies_->Leave(read_.get()); }
 
   absl::Status Next(const CallContext& call, v1::ReadArchiveResponse* reply) override {
     DSG_RETURN_IF_ERROR(call.Check());
-    if (encoder_ == nullptr) {
-      // Beside the maps, where there is as much space as a map needs.
-      DSG_ASSIGN_OR_RETURN(encoder_,
-                           ArchiveMap(map_.get(), maps_->store().folder(), call.stop(), nullptr));
-    }
-    DSG_ASSIGN_OR_RETURN(*reply->mutable_content(), encoder_->Next(call.stop()));
-    reply->set_progress(encoder_->progress());
+    DSG_ASSIGN_OR_RETURN(ArchiveRead::Piece piece, read_->Next(call.stop(), copies_->limits()));
+    *reply->mutable_content() = std::move(piece.content);
+    reply->set_progress(piece.progress);
+    is_done_ = piece.is_last;
+    if (is_done_) copies_->Leave(read_.get());
     return absl::OkStatus();
   }
 
-  bool done() const override { return encoder_->done(); }
+  bool done() const override { return is_done_; }
 
  private:
-  MapTable* const maps_;
-  const std::shared_ptr<MapReader> map_;
-  std::unique_ptr<ArchiveEncoder> encoder_;
+  ArchiveCopies* const copies_;
+  const std::shared_ptr<ArchiveRead> read_;
+  bool is_done_ = false;
 };
 
 }  // namespace
@@ -41,7 +40,8 @@ class ArchiveStream final : public ArchiveCursor {
 absl::StatusOr<std::unique_ptr<ArchiveCursor>> OpenArchive(MapTable* maps,
                                                            const v1::ReadArchiveRequest& request) {
   DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> map, maps->Reader(request.map()));
-  return std::make_unique<ArchiveStream>(maps, std::move(map));
+  DSG_ASSIGN_OR_RETURN(std::shared_ptr<ArchiveRead> read, maps->archives().Begin(std::move(map)));
+  return std::make_unique<ArchiveStream>(&maps->archives(), std::move(read));
 }
 
 }  // namespace dsg::query

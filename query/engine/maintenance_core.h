@@ -12,8 +12,8 @@ namespace dsg::query {
 
 class MaintenanceCore : public ServiceCore {
  public:
-  MaintenanceCore(std::unique_ptr<GraphStore> store, size_t view_cache_bytes)
-      : maps_(std::move(store), view_cache_bytes) {}
+  MaintenanceCore(std::unique_ptr<GraphStore> store, const ServiceCoreOptions& options)
+      : maps_(std::move(store), options.view_cache_bytes, options.archives) {}
 
   absl::StatusOr<std::unique_ptr<PruneCursor>> OpenPrune(const v1::PruneRequest& request) override;
   absl::Status Prune(const CallContext& call, const v1::PruneRequest& request,

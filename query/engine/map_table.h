@@ -11,6 +11,7 @@
 #include <unordered_map>
 
 #include "absl/status/statusor.h"
+#include "query/engine/archive_copies.h"
 #include "query/view/view_cache.h"
 #include "schema/store/graph_store.h"
 
@@ -19,11 +20,15 @@ namespace dsg::query {
 /// Threads: safe from many threads.
 class MapTable {
  public:
-  explicit MapTable(std::unique_ptr<GraphStore> store, size_t view_cache_bytes = size_t{1} << 30)
-      : store_(std::move(store)), views_(view_cache_bytes) {}
+  explicit MapTable(std::unique_ptr<GraphStore> store, size_t view_cache_bytes = size_t{1} << 30,
+                    const ArchiveLimits& archive_limits = {})
+      : store_(std::move(store)),
+        views_(view_cache_bytes),
+        archives_(store_->folder(), archive_limits) {}
 
   GraphStore& store() { return *store_; }
   ViewCache& views() { return views_; }
+  ArchiveCopies& archives() { return archives_; }
 
   /// Opened at the first call and kept.
   /// Errors: MAP_NAME_INVALID; MAP_UNKNOWN; what GraphStore::OpenMap returns.
@@ -54,6 +59,7 @@ class MapTable {
   // First, so that it is destroyed after the readers and writers that it opened.
   std::unique_ptr<GraphStore> store_;
   ViewCache views_;
+  ArchiveCopies archives_;
   std::shared_mutex readers_mutex_;
   std::unordered_map<std::string, std::shared_ptr<MapReader>> readers_;
   std::mutex slots_mutex_;

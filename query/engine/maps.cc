@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "query/engine/maps.h"
 
+#include <set>
+#include <string>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/map_service.pb.h"
+#include "query/engine/map_names.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
@@ -23,7 +26,15 @@ absl::Status CreateMap(GraphStore* store, const v1::CreateMapRequest& request,
 
 absl::Status ListMaps(GraphStore* store, v1::ListMapsResponse* reply) {
   DSG_ASSIGN_OR_RETURN(const std::vector<MapSpec> specs, store->ListMaps());
-  for (const MapSpec& spec : specs) ToProto(spec, reply->add_maps());
+  std::set<std::string> readable;
+  for (const MapSpec& spec : specs) {
+    ToProto(spec, reply->add_maps());
+    readable.insert(spec.name);
+  }
+  DSG_ASSIGN_OR_RETURN(const std::vector<std::string> names, MapNamesIn(store->folder()));
+  for (const std::string& name : names) {
+    if (!readable.contains(name)) reply->add_unreadable_maps(name);
+  }
   return absl::OkStatus();
 }
 

@@ -41,7 +41,7 @@ namespace {
 class LocalCore final : public MaintenanceCore {
  public:
   LocalCore(std::unique_ptr<GraphStore> store, const ServiceCoreOptions& options)
-      : MaintenanceCore(std::move(store), options.view_cache_bytes) {}
+      : MaintenanceCore(std::move(store), options) {}
 
   absl::Status LocateAgent(const CallContext& call, const v1::LocateAgentRequest& request,
                            v1::LocateAgentResponse* reply) override {

@@ -8,6 +8,7 @@
 
 #include "absl/status/statusor.h"
 #include "query/engine/api.h"
+#include "query/engine/archive_copies.h"
 #include "schema/store/graph_store.h"
 
 namespace dsg::query {
@@ -79,6 +80,7 @@ struct ServiceCoreOptions {
   /// Bound of the graphs kept in memory, all maps and revisions together. A million nodes and 3.5
   /// million edges take half of it, and a quarter once paths are asked for.
   size_t view_cache_bytes = size_t{1} << 30;
+  ArchiveLimits archives;
 };
 
 /// Makes an Api that answers from `store`. Writers are opened at the first Commit to a map and kept

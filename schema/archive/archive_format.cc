@@ -3,11 +3,10 @@
 
 #include <zstd.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
+#include "schema/archive/manifest_fields.h"
 #include "schema/base/check.h"
 #include "schema/base/status.h"
 #include "schema/codec/checksum.h"
@@ -77,43 +76,23 @@ std::string TextOf(const ArchiveManifest& manifest) {
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-int64_t IntOf(const Json& json, const char* field) {
-  int64_t value = 0;
-  const std::string text = json.at(field).get<std::string>();
-  if (!absl::SimpleAtoi(text, &value)) throw std::invalid_argument(field);
-  return value;
-}
-
-Sha256 DigestOf(const Json& json, const char* field) {
-  const std::string text = json.at(field).get<std::string>();
-  Sha256 digest{};
-  if (text.size() != 2 * digest.size() ||
-      text.find_first_not_of("0123456789abcdef") != std::string::npos) {
-    throw std::invalid_argument(field);
-  }
-  const std::string bytes = absl::HexStringToBytes(text);
-  std::copy(bytes.begin(), bytes.end(), digest.begin());
-  return digest;
-}
-
-// Throws what the parts throw.
-ArchiveManifest ManifestOf(const Json& json) {
+ArchiveManifest ManifestOf(ManifestFields* json) {
   ArchiveManifest manifest;
   MapSpec& spec = manifest.spec;
-  spec.name = json.at("map").get<std::string>();
-  spec.frame = json.at("frame").get<std::string>();
-  spec.epoch_ns = IntOf(json, "epoch_ns");
-  spec.clock = static_cast<Clock>(json.at("clock").get<int>());
-  spec.codec = static_cast<TrajectoryCodec>(json.at("codec").get<int>());
-  spec.gap_ns_max = IntOf(json, "gap_ns_max");
-  spec.mesh_block_size_m = json.at("mesh_block_size_m").get<double>();
-  manifest.store_format = json.at("store_format").get<int>();
-  manifest.newest_revision = IntOf(json, "newest_revision");
-  manifest.newest_digest = DigestOf(json, "newest_digest");
-  manifest.oldest_revision = IntOf(json, "oldest_revision");
-  manifest.state = DigestOf(json, "state");
-  manifest.database_bytes = IntOf(json, "database_bytes");
-  manifest.program = json.at("program").get<std::string>();
+  spec.name = json->Text("map");
+  spec.frame = json->Text("frame");
+  spec.epoch_ns = json->Integer("epoch_ns");
+  spec.clock = static_cast<Clock>(json->SmallInteger("clock"));
+  spec.codec = static_cast<TrajectoryCodec>(json->SmallInteger("codec"));
+  spec.gap_ns_max = json->Integer("gap_ns_max");
+  spec.mesh_block_size_m = json->Number("mesh_block_size_m");
+  manifest.store_format = json->SmallInteger("store_format");
+  manifest.newest_revision = json->Count("newest_revision");
+  manifest.newest_digest = json->Digest("newest_digest");
+  manifest.oldest_revision = json->Count("oldest_revision");
+  manifest.state = json->Digest("state");
+  manifest.database_bytes = json->Integer("database_bytes");
+  manifest.program = json->Text("program");
   return manifest;
 }
 
@@ -176,12 +155,14 @@ std::string EncodeArchiveHead(const ArchiveManifest& manifest) {
 absl::StatusOr<size_t> ManifestBytes(const std::string& path, std::string_view header) {
   if (header.substr(0, kMagic.size()) != kMagic) return NoArchive(path, "begins with other bytes");
   const auto version = NumberAt<uint32_t>(header, 8);
-  if (version != kArchiveVersion) {
-    return NoArchive(path, absl::StrCat("has version ", version,
-                                        " of the format, and this program "
-                                        "reads ",
-                                        kArchiveVersion));
+  if (version > kArchiveVersion) {
+    return MakeError(
+        Reason::kFormatTooNew,
+        absl::StrCat(path, " is an archive of version ", version, ", and this program reads up to ",
+                     kArchiveVersion, "; use a newer dsgdb"),
+        {{"path", path}, {"format", absl::StrCat(version)}});
   }
+  if (version < kArchiveVersion) return NoArchive(path, absl::StrCat("has version ", version));
   const size_t size = NumberAt<uint32_t>(header, 12);
   if (size > kArchiveManifestBytesMax) {
     return NoArchive(path, absl::StrCat("declares ", size, " bytes of manifest"));
@@ -194,11 +175,11 @@ absl::StatusOr<ArchiveManifest> DecodeArchiveHead(const std::string& path, std::
   if (HeadChecksum(header, manifest) != NumberAt<uint64_t>(header, 16)) {
     return DamagedArchive(path, 0, "the checksum of its header and manifest is another");
   }
-  ArchiveManifest decoded;
-  try {
-    decoded = ManifestOf(Json::parse(manifest));
-  } catch (const std::exception& error) {
-    return NoArchive(path, absl::StrCat("has a manifest that cannot be read (", error.what(), ")"));
+  ManifestFields json(manifest);
+  ArchiveManifest decoded = ManifestOf(&json);
+  if (!json.problem().empty()) {
+    return NoArchive(path,
+                     absl::StrCat("has a manifest that cannot be read (", json.problem(), ")"));
   }
   DSG_RETURN_IF_ERROR(CheckManifest(path, decoded));
   return decoded;

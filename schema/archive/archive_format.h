@@ -60,7 +60,7 @@ absl::Status DamagedArchive(const std::string& path, int64_t at_byte, std::strin
 /// Header and manifest.
 std::string EncodeArchiveHead(const ArchiveManifest& manifest);
 /// How many bytes the manifest has. Requires: `header` is of kArchiveHeaderBytes.
-/// Errors: FILE_MALFORMED.
+/// Errors: FILE_MALFORMED; FORMAT_TOO_NEW.
 absl::StatusOr<size_t> ManifestBytes(const std::string& path, std::string_view header);
 /// Requires: sizes as ManifestBytes says. Errors: FILE_MALFORMED; STORE_CORRUPT.
 absl::StatusOr<ArchiveManifest> DecodeArchiveHead(const std::string& path, std::string_view header,

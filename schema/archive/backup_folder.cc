@@ -110,7 +110,22 @@ absl::Status CheckBackupFile(const std::string& folder, const BackupEntry& entry
     sha256.Add(bytes);
     if (progress) progress(static_cast<double>(done) / static_cast<double>(entry.byte_count));
   }
-  return sha256.Finish() == entry.sha256 ? absl::OkStatus() : damaged("its SHA-256 is another");
+  if (sha256.Finish() != entry.sha256) return damaged("its SHA-256 is another");
+  DSG_ASSIGN_OR_RETURN(const ArchiveManifest archive, ReadArchiveManifest(path));
+  const auto differs = [&](const char* field, const auto& said, const auto& found) {
+    return damaged(absl::StrCat("its ", field, " is ", found, ", not ", said));
+  };
+  if (archive.spec.name != entry.map) return differs("map", entry.map, archive.spec.name);
+  if (archive.newest_revision != entry.newest_revision) {
+    return differs("newest_revision", entry.newest_revision, archive.newest_revision);
+  }
+  if (archive.newest_digest != entry.newest_digest) {
+    return differs("newest_digest", ToHex(entry.newest_digest), ToHex(archive.newest_digest));
+  }
+  if (archive.state != entry.state) {
+    return differs("state", ToHex(entry.state), ToHex(archive.state));
+  }
+  return absl::OkStatus();
 }
 
 absl::StatusOr<BackupFile> BackupFile::Create(const std::string& folder, const std::string& map) {
@@ -161,8 +176,10 @@ absl::StatusOr<std::unique_ptr<BackupFolder>> BackupFolder::Open(const std::stri
   }
   std::unique_ptr<BackupFolder> made(new BackupFolder(folder, fd));
   if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
-    return absl::UnavailableError(absl::StrCat("another process writes the backup in ", folder,
-                                               "; wait for its end, or name another folder"));
+    return MakeError(Reason::kWriterLocked,
+                     absl::StrCat("another process writes the backup in ", folder,
+                                  "; wait for its end, or name another folder"),
+                     {{"path", folder}});
   }
   DSG_RETURN_IF_ERROR(CheckIsBackup(folder));
   auto last = ReadBackupManifest(folder);

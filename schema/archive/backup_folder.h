@@ -21,8 +21,10 @@ namespace dsg {
 /// DATA_LOSS/STORE_CORRUPT.
 absl::StatusOr<BackupManifest> ReadBackupManifest(const std::string& folder);
 
-/// Whether an archive of a backup is the one that the manifest means, by its size and SHA-256.
-/// Errors: DATA_LOSS/STORE_CORRUPT, also for a file that is gone; what `stop` returned.
+/// Whether an archive of a backup is the one that the manifest means, by its size and SHA-256, and
+/// by what it says of its map.
+/// Errors: DATA_LOSS/STORE_CORRUPT, also for a file that is gone; as ReadArchiveManifest; what
+/// `stop` returned.
 absl::Status CheckBackupFile(const std::string& folder, const BackupEntry& entry,
                              const StopCheck& stop, const Progress& progress);
 
@@ -53,8 +55,8 @@ class BackupFile {
 class BackupFolder {
  public:
   /// Makes the folder if it is missing.
-  /// Errors: INVALID_ARGUMENT/FIELD_INVALID for a folder of other things; UNAVAILABLE while another
-  /// process writes it; STORE_CORRUPT for a damaged manifest.
+  /// Errors: INVALID_ARGUMENT/FIELD_INVALID for a folder of other things; WRITER_LOCKED while
+  /// another process writes it; STORE_CORRUPT for a damaged manifest.
   static absl::StatusOr<std::unique_ptr<BackupFolder>> Open(const std::string& folder);
   ~BackupFolder();
   BackupFolder(const BackupFolder&) = delete;

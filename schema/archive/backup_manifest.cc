@@ -5,9 +5,9 @@
 #include <nlohmann/json.hpp>
 
 #include "absl/strings/ascii.h"
-#include "absl/strings/escaping.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "schema/archive/manifest_fields.h"
 #include "schema/base/status.h"
 #include "schema/codec/checksum.h"
 #include "schema/model/ids.h"
@@ -40,46 +40,47 @@ Json JsonOf(const BackupEntry& entry) {
           {"state", ToHex(entry.state)}};
 }
 
-Sha256 DigestOf(const Json& json, const char* field) {
-  const std::string text = json.at(field).get<std::string>();
-  Sha256 digest{};
-  if (text.size() != 2 * digest.size() ||
-      text.find_first_not_of("0123456789abcdef") != std::string::npos) {
-    throw std::invalid_argument(field);
-  }
-  const std::string bytes = absl::HexStringToBytes(text);
-  std::copy(bytes.begin(), bytes.end(), digest.begin());
-  return digest;
-}
-
-int64_t CountOf(const Json& json, const char* field) {
-  int64_t value = 0;
-  if (!absl::SimpleAtoi(json.at(field).get<std::string>(), &value) || value < 0) {
-    throw std::invalid_argument(field);
-  }
-  return value;
-}
-
-// Throws what the parts throw.
-BackupEntry EntryOf(const Json& json) {
-  BackupEntry entry;
-  entry.map = json.at("map").get<std::string>();
-  entry.file = json.at("file").get<std::string>();
-  if (!IsValidMapName(entry.map)) throw std::invalid_argument("map");
-  if (!IsArchiveName(entry.file)) throw std::invalid_argument("file");
-  entry.byte_count = CountOf(json, "byte_count");
-  entry.sha256 = DigestOf(json, "sha256");
-  entry.newest_revision = CountOf(json, "newest_revision");
-  entry.newest_digest = DigestOf(json, "newest_digest");
-  entry.state = DigestOf(json, "state");
-  return entry;
-}
-
 absl::Status Damaged(const std::string& path, const std::string& why) {
   return MakeError(
       Reason::kStoreCorrupt,
       absl::StrCat(path, " is not as it was written: ", why, "; take another copy of this backup"),
       {{"path", path}});
+}
+
+BackupEntry EntryOf(ManifestFields* json) {
+  BackupEntry entry;
+  entry.map = json->Text("map");
+  entry.file = json->Text("file");
+  if (!IsValidMapName(entry.map)) json->Refuse("map", "is no name of a map");
+  if (!IsArchiveName(entry.file)) json->Refuse("file", "is no name of an archive in this folder");
+  entry.byte_count = json->Count("byte_count");
+  entry.sha256 = json->Digest("sha256");
+  entry.newest_revision = json->Count("newest_revision");
+  entry.newest_digest = json->Digest("newest_digest");
+  entry.state = json->Digest("state");
+  return entry;
+}
+
+// Of the body, without the line of its digest.
+absl::StatusOr<BackupManifest> ManifestOf(const std::string& path, std::string_view body) {
+  ManifestFields json(body);
+  const int version = json.SmallInteger("dsg_backup");
+  if (version > kVersion) {
+    return MakeError(
+        Reason::kFormatTooNew,
+        absl::StrCat(path, " is of version ", version, ", and this program reads up to ", kVersion,
+                     "; use a newer dsgdb"),
+        {{"path", path}, {"format", absl::StrCat(version)}});
+  }
+  if (version < kVersion) json.Refuse("dsg_backup", "is no version of a backup");
+  BackupManifest manifest;
+  for (ManifestFields& map : json.Objects("maps")) {
+    manifest.maps.push_back(EntryOf(&map));
+    if (map.problem().empty()) continue;
+    return Damaged(path, absl::StrCat("entry ", manifest.maps.size(), ": ", map.problem()));
+  }
+  if (!json.problem().empty()) return Damaged(path, json.problem());
+  return manifest;
 }
 
 }  // namespace
@@ -105,14 +106,7 @@ absl::StatusOr<BackupManifest> DecodeBackupManifest(const std::string& path,
   if (text.substr(body.size()) != absl::StrCat(kDigestLine, ToHex(ComputeSha256(body)), "\n")) {
     return Damaged(path, "its last line is not the digest of the others");
   }
-  BackupManifest manifest;
-  try {
-    const Json json = Json::parse(body);
-    if (json.at("dsg_backup").get<int>() != kVersion) throw std::invalid_argument("dsg_backup");
-    for (const Json& entry : json.at("maps")) manifest.maps.push_back(EntryOf(entry));
-  } catch (const std::exception& error) {
-    return Damaged(path, absl::StrCat("it cannot be read (", error.what(), ")"));
-  }
+  DSG_ASSIGN_OR_RETURN(BackupManifest manifest, ManifestOf(path, body));
   const auto is_before = [](const BackupEntry& a, const BackupEntry& b) { return a.map < b.map; };
   const bool is_in_order = std::is_sorted(manifest.maps.begin(), manifest.maps.end(), is_before) &&
                            std::adjacent_find(manifest.maps.begin(), manifest.maps.end(),

@@ -36,7 +36,7 @@ struct BackupManifest {
 
 /// JSON, and a last line with its SHA-256.
 std::string EncodeBackupManifest(const BackupManifest& manifest);
-/// `path` is for errors. Errors: DATA_LOSS/STORE_CORRUPT.
+/// `path` is for errors. Errors: DATA_LOSS/STORE_CORRUPT; FAILED_PRECONDITION/FORMAT_TOO_NEW.
 absl::StatusOr<BackupManifest> DecodeBackupManifest(const std::string& path, std::string_view text);
 
 }  // namespace dsg

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "schema/archive/restore.h"
 
+#include <charconv>
 #include <filesystem>
 #include <memory>
 
@@ -9,6 +10,7 @@
 #include "schema/archive/archive_map.h"
 #include "schema/archive/scratch_store.h"
 #include "schema/base/status.h"
+#include "schema/codec/checksum.h"
 #include "schema/files/atomic_file.h"
 
 namespace dsg {
@@ -30,6 +32,48 @@ absl::StatusOr<ArchiveManifest> Unpack(const std::string& path, const std::strin
   return manifest;
 }
 
+// All digits, as two numbers that differ in the last are two.
+std::string ExactText(double value) {
+  char text[32];
+  return std::string(text, std::to_chars(text, text + sizeof(text), value).ptr);
+}
+
+// What the manifest says of the map must be what the map says of itself. `state` comes last: it is
+// of the other fields and of the tags.
+absl::Status CheckManifestIs(const std::string& path, const ArchiveManifest& said,
+                             const ArchiveManifest& found) {
+  const auto number = [](int64_t value) { return absl::StrCat(value); };
+  const auto choice = [](auto value) { return absl::StrCat(static_cast<int>(value)); };
+  const struct {
+    const char* field;
+    std::string said;
+    std::string found;
+  } fields[] = {
+      {"map", said.spec.name, found.spec.name},
+      {"frame", said.spec.frame, found.spec.frame},
+      {"epoch_ns", number(said.spec.epoch_ns), number(found.spec.epoch_ns)},
+      {"clock", choice(said.spec.clock), choice(found.spec.clock)},
+      {"codec", choice(said.spec.codec), choice(found.spec.codec)},
+      {"gap_ns_max", number(said.spec.gap_ns_max), number(found.spec.gap_ns_max)},
+      {"mesh_block_size_m", ExactText(said.spec.mesh_block_size_m),
+       ExactText(found.spec.mesh_block_size_m)},
+      {"store_format", number(said.store_format), number(found.store_format)},
+      {"newest_revision", number(said.newest_revision), number(found.newest_revision)},
+      {"newest_digest", ToHex(said.newest_digest), ToHex(found.newest_digest)},
+      {"oldest_revision", number(said.oldest_revision), number(found.oldest_revision)},
+      {"state", ToHex(said.state), ToHex(found.state)},
+  };
+  for (const auto& field : fields) {
+    if (field.said == field.found) continue;
+    return MakeError(
+        Reason::kStoreCorrupt,
+        absl::StrCat("the manifest of archive ", path, " says ", field.field, " \"", field.said,
+                     "\", and the map in it \"", field.found, "\"; take another copy of it"),
+        {{"path", path}, {"field", field.field}, {"expected", field.said}, {"found", field.found}});
+  }
+  return absl::OkStatus();
+}
+
 absl::StatusOr<std::shared_ptr<MapReader>> OpenUnpacked(const std::string& path,
                                                         const std::string& folder,
                                                         const ArchiveManifest& manifest) {
@@ -38,16 +82,8 @@ absl::StatusOr<std::shared_ptr<MapReader>> OpenUnpacked(const std::string& path,
   auto map = store->OpenMap(manifest.spec.name);
   if (!map.ok()) return Annotate(map.status(), absl::StrCat("archive ", path));
   DSG_ASSIGN_OR_RETURN(const ArchiveManifest found, DescribeMap(map->get()));
-  if (found.state == manifest.state && found.newest_digest == manifest.newest_digest &&
-      found.newest_revision == manifest.newest_revision) {
-    return *std::move(map);
-  }
-  return MakeError(Reason::kStoreCorrupt,
-                   absl::StrCat("archive ", path, " holds map \"", found.spec.name,
-                                "\" at revision ", found.newest_revision,
-                                ", which is not the one that its manifest names; take another "
-                                "copy of it"),
-                   {{"path", path}});
+  DSG_RETURN_IF_ERROR(CheckManifestIs(path, manifest, found));
+  return *std::move(map);
 }
 
 }  // namespace
@@ -63,6 +99,12 @@ absl::Status CheckNameIsFree(GraphStore* store, const std::string& name) {
                    {{"map", name}});
 }
 
+absl::Status CheckMayReplace(GraphStore* store, const std::string& name) {
+  const absl::Status opened = store->OpenWriter(name).status();
+  // What cannot be opened for another reason is one to be replaced.
+  return ReasonOf(opened) == Reason::kWriterLocked ? opened : absl::OkStatus();
+}
+
 absl::StatusOr<ArchiveManifest> RestoreArchive(const std::string& path, GraphStore* store,
                                                const RestoreOptions& options, const StopCheck& stop,
                                                const Progress& progress) {
@@ -75,7 +117,11 @@ absl::StatusOr<ArchiveManifest> RestoreArchive(const std::string& path, GraphSto
   DSG_ASSIGN_OR_RETURN(const ArchiveManifest manifest, Unpack(path, database, stop, progress));
   DSG_RETURN_IF_ERROR(OpenUnpacked(path, place->folder(), manifest).status());
   DSG_RETURN_IF_ERROR(AskStop(stop));
-  DSG_RETURN_IF_ERROR(store->InstallMap(name, database, options.replace));
+  const absl::Status installed = store->InstallMap(name, database, options.replace);
+  // The file that such an error names is gone by the time it is read.
+  const bool is_of_file = absl::IsDataLoss(installed) || absl::IsFailedPrecondition(installed);
+  if (is_of_file) return Annotate(installed, absl::StrCat("archive ", path));
+  DSG_RETURN_IF_ERROR(installed);
   if (progress) progress(1.0);
   return manifest;
 }

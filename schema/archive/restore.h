@@ -29,6 +29,11 @@ absl::StatusOr<ArchiveManifest> RestoreArchive(const std::string& path, GraphSto
 /// Errors: ALREADY_EXISTS/MAP_EXISTS for a map that is there, readable or not.
 absl::Status CheckNameIsFree(GraphStore* store, const std::string& name);
 
+/// Whether a map that is to be replaced is at rest; fine if there is none. For whoever restores
+/// several: what holds now may not hold later.
+/// Errors: UNAVAILABLE/WRITER_LOCKED naming who writes it.
+absl::Status CheckMayReplace(GraphStore* store, const std::string& name);
+
 /// Proves that an archive can be restored, in a temporary folder of the system: every byte of the
 /// file, then the map in it as MapReader::Verify does.
 /// Errors: as RestoreArchive, but for those about the store.

@@ -6,9 +6,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <filesystem>
+#include <iterator>
+#include <string_view>
 #include <vector>
 
 #include "absl/strings/match.h"
@@ -23,8 +26,6 @@ namespace fs = std::filesystem;
 
 constexpr int kTriesMax = 100;
 constexpr char kSuffix[] = ".new";
-
-std::string PrefixOf(const std::string& purpose) { return absl::StrCat(".", purpose, "-"); }
 
 // The lock of a folder; -1 if another holds it, or it is not there.
 int Lock(const std::string& folder) {
@@ -42,15 +43,21 @@ bool IsStillThere(int fd, const std::string& folder) {
          held.st_ino == named.st_ino && held.st_dev == named.st_dev;
 }
 
-void RemoveLeftovers(const std::string& parent, const std::string& purpose) {
-  const std::string prefix = PrefixOf(purpose);
+bool IsScratchName(const std::string& name) {
+  constexpr std::string_view kPrefixes[] = {".archive-", ".restore-", ".dsg-verify-"};
+  return absl::EndsWith(name, kSuffix) &&
+         std::any_of(std::begin(kPrefixes), std::end(kPrefixes), [&](std::string_view prefix) {
+           return name.compare(0, prefix.size(), prefix) == 0;
+         });
+}
+
+}  // namespace
+
+void RemoveScratchLeftovers(const std::string& parent) {
   std::vector<std::string> found;
   std::error_code error;
   for (fs::directory_iterator it(parent, error), end; !error && it != end; it.increment(error)) {
-    const std::string name = it->path().filename().string();
-    if (absl::StartsWith(name, prefix) && absl::EndsWith(name, kSuffix)) {
-      found.push_back(it->path().string());
-    }
+    if (IsScratchName(it->path().filename().string())) found.push_back(it->path().string());
   }
   for (const std::string& folder : found) {
     const int fd = Lock(folder);
@@ -60,15 +67,13 @@ void RemoveLeftovers(const std::string& parent, const std::string& purpose) {
   }
 }
 
-}  // namespace
-
 absl::StatusOr<std::unique_ptr<ScratchStore>> ScratchStore::Make(const std::string& parent,
                                                                  const std::string& purpose) {
   static std::atomic<int> count = 0;
-  RemoveLeftovers(parent, purpose);
+  RemoveScratchLeftovers(parent);
   for (int i = 0; i < kTriesMax; ++i) {
     const std::string folder =
-        absl::StrCat(parent, "/", PrefixOf(purpose), getpid(), "-", count.fetch_add(1), kSuffix);
+        absl::StrCat(parent, "/", ".", purpose, "-", getpid(), "-", count.fetch_add(1), kSuffix);
     // For its user alone: it holds a whole map.
     if (mkdir(folder.c_str(), 0700) != 0) {
       if (errno == EEXIST) continue;

@@ -10,9 +10,13 @@
 
 namespace dsg {
 
+/// Removes what killed processes have left in `parent`, whatever it was for. What cannot be removed
+/// stays.
+void RemoveScratchLeftovers(const std::string& parent);
+
 class ScratchStore {
  public:
-  /// Makes `parent`/.`purpose`-N.new.
+  /// Makes `parent`/.`purpose`-N.new. Purposes: archive, restore, dsg-verify.
   /// Errors: RESOURCE_EXHAUSTED/DISK_FULL; UNAVAILABLE with what the system says.
   static absl::StatusOr<std::unique_ptr<ScratchStore>> Make(const std::string& parent,
                                                             const std::string& purpose);

@@ -2,6 +2,7 @@
 #include "schema/files/atomic_file.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -79,8 +80,16 @@ absl::StatusOr<AtomicFile> AtomicFile::Create(const std::string& path, bool may_
 
 AtomicFile::~AtomicFile() {
   if (file_ == nullptr) return;
+  const bool is_ours = IsPartOurs();
   file_.reset();
-  std::remove(PartPath(path_).c_str());
+  if (is_ours) std::remove(PartPath(path_).c_str());
+}
+
+bool AtomicFile::IsPartOurs() const {
+  struct stat held {};
+  struct stat named {};
+  return fstat(fileno(file_.get()), &held) == 0 && lstat(PartPath(path_).c_str(), &named) == 0 &&
+         held.st_ino == named.st_ino && held.st_dev == named.st_dev;
 }
 
 absl::Status AtomicFile::Failure(const char* what) const {
@@ -100,6 +109,10 @@ absl::Status AtomicFile::Write(std::string_view bytes) {
 absl::Status AtomicFile::Commit() {
   const bool is_written = std::fflush(file_.get()) == 0 && fsync(fileno(file_.get())) == 0;
   if (!is_written) return Failure("write");
+  if (!IsPartOurs()) {
+    return absl::UnavailableError(absl::StrCat(
+        "cannot finish ", path_, ": another process writes it; wait for its end and try again"));
+  }
   const std::string part = PartPath(path_);
   // Closed by hand, since closing may be what fails; from here on the destructor removes nothing.
   if (std::fclose(file_.release()) != 0 || std::rename(part.c_str(), path_.c_str()) != 0) {

@@ -41,7 +41,8 @@ class AtomicFile {
 
   /// Errors: RESOURCE_EXHAUSTED/DISK_FULL; UNAVAILABLE.
   absl::Status Write(std::string_view bytes);
-  /// Syncs the file, renames it and syncs its folder. The last call. Errors: as Write.
+  /// Syncs the file, renames it and syncs its folder. The last call. Errors: as Write, also when
+  /// another writer of the same path began later.
   absl::Status Commit();
   const std::string& path() const { return path_; }
   int64_t byte_count() const { return byte_count_; }
@@ -52,6 +53,8 @@ class AtomicFile {
   };
   AtomicFile(std::string path, std::FILE* file) : path_(std::move(path)), file_(file) {}
   absl::Status Failure(const char* what) const;
+  /// False once another writer of the same path has put its own file there.
+  bool IsPartOurs() const;
 
   std::string path_;
   std::unique_ptr<std::FILE, Closer> file_;

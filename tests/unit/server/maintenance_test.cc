@@ -10,7 +10,9 @@
 #include "dsg/v1/maintenance_service.grpc.pb.h"
 #include "dsg/v1/map_service.grpc.pb.h"
 #include "grpcpp/grpcpp.h"
+#include "schema/base/random.h"
 #include "schema/base/status.h"
+#include "schema/codec/checksum.h"
 #include "server/server.h"
 #include "server/status_mapping.h"
 #include "tests/unit/query/engine/office.h"
@@ -55,8 +57,7 @@ class MaintenanceRpc : public testing::Test {
  protected:
   MaintenanceRpc() { test::MakeOffice(folder_.path()); }
 
-  void Start(std::unique_ptr<query::ServiceCore> core) {
-    ServerOptions options;
+  void Start(std::unique_ptr<query::ServiceCore> core, ServerOptions options = {}) {
     options.listen = "unix:" + folder_.path() + "/server.sock";
     options.worker_count = 2;
     auto server = Server::Start(std::move(core), options);
@@ -150,6 +151,64 @@ TEST_F(MaintenanceRpc, AnArchiveComesWhole) {
   EXPECT_TRUE(reader->Finish().ok());
   EXPECT_EQ(message.progress(), 1.0);
   EXPECT_EQ(bytes.substr(bytes.size() - 40, 4), "DSGE");
+}
+
+// Of more pieces than a connection takes from us unread.
+GraphDelta DeltaWithALargeAsset() {
+  Random random(1, 0);
+  Asset asset;
+  asset.media_type = "application/octet-stream";
+  for (int i = 0; i < 4'000'000; ++i) {
+    asset.content.push_back(static_cast<char>(random.Integer(0, 255)));
+  }
+  asset.sha256 = ComputeSha256(asset.content);
+  GraphDelta delta;
+  delta.assets = {asset};
+  return delta;
+}
+
+TEST_F(MaintenanceRpc, ArchivesThatNobodyReadsLeaveRoomForOtherWork) {
+  test::CommitToOffice(folder_.path(), DeltaWithALargeAsset());
+  constexpr int kStreamCount = 40;
+  Start(test::OpenCore(folder_.path()), {.open_stream_max = 32});
+  // Takes nothing ahead of its reader.
+  grpc::ChannelArguments arguments;
+  arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
+  arguments.SetInt(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, 64 << 10);
+  channel_ =
+      grpc::CreateCustomChannel(server_->address(), grpc::InsecureChannelCredentials(), arguments);
+  stub_ = v1::MaintenanceService::NewStub(channel_);
+  v1::ReadArchiveRequest request;
+  request.set_map(kMap);
+  std::vector<std::unique_ptr<grpc::ClientContext>> contexts;
+  std::vector<std::unique_ptr<grpc::ClientReader<v1::ReadArchiveResponse>>> readers;
+  for (int i = 0; i < kStreamCount; ++i) {
+    contexts.push_back(std::make_unique<grpc::ClientContext>());
+    readers.push_back(stub_->ReadArchive(contexts.back().get(), request));
+    // It has been opened, or refused.
+    readers.back()->WaitForInitialMetadata();
+  }
+  // A stream that was refused counts until the server has seen the last of it.
+  grpc::Status compacted;
+  do {
+    grpc::ClientContext context;
+    v1::CompactRequest compact;
+    compact.set_map(kMap);
+    const auto reader = stub_->Compact(&context, compact);
+    v1::CompactResponse message;
+    while (reader->Read(&message)) {
+    }
+    compacted = reader->Finish();
+  } while (compacted.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_TRUE(compacted.ok()) << compacted.error_message();
+  int refused_count = 0;
+  for (size_t i = 0; i < readers.size(); ++i) {
+    v1::ReadArchiveResponse message;
+    while (readers[i]->Read(&message)) {
+    }
+    if (readers[i]->Finish().error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED) ++refused_count;
+  }
+  EXPECT_EQ(refused_count, kStreamCount - query::ArchiveLimits().count_max);
 }
 
 TEST_F(MaintenanceRpc, LongWorkLetsQuestionsPassAndEndsWithItsCaller) {

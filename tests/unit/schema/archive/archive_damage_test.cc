@@ -4,6 +4,7 @@
 
 #include <filesystem>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
 #include "schema/archive/archive_file.h"
@@ -11,6 +12,7 @@
 #include "schema/archive/restore.h"
 #include "schema/base/random.h"
 #include "schema/codec/checksum.h"
+#include "schema/store/sqlite/database.h"
 #include "tests/unit/schema/archive/archive_test_util.h"
 
 namespace dsg::test {
@@ -34,7 +36,8 @@ class DamagedArchiveTest : public testing::Test {
 
   static bool IsRefusal(const absl::Status& status) {
     const Reason reason = ReasonOf(status);
-    return reason == Reason::kStoreCorrupt || reason == Reason::kFileMalformed;
+    return reason == Reason::kStoreCorrupt || reason == Reason::kFileMalformed ||
+           reason == Reason::kFormatTooNew;
   }
 
   std::string path() const { return folder_.path() + "/map.dsgz"; }
@@ -68,6 +71,17 @@ TEST_F(DamagedArchiveTest, AlteredAtAnyByteIsRefused) {
     const absl::Status status = Read(bytes);
     EXPECT_TRUE(IsRefusal(status)) << "altered at " << at << ": " << status;
   }
+}
+
+TEST_F(DamagedArchiveTest, OfANewerVersionSaysWhichAndWhatIsKnown) {
+  std::string bytes = *bytes_;
+  bytes[8] = static_cast<char>(kArchiveVersion + 1);
+  const absl::Status newer = Read(bytes);
+  EXPECT_EQ(ReasonOf(newer), Reason::kFormatTooNew);
+  EXPECT_TRUE(absl::StrContains(newer.message(), "version 2")) << newer;
+  EXPECT_TRUE(absl::StrContains(newer.message(), "reads up to 1")) << newer;
+  bytes[8] = 0;
+  EXPECT_EQ(ReasonOf(Read(bytes)), Reason::kFileMalformed);
 }
 
 TEST_F(DamagedArchiveTest, EachBitOfHeaderManifestAndEndCounts) {
@@ -136,16 +150,81 @@ TEST_F(DamagedArchiveTest, OfANewerFormatOrWithABadNameIsRefused) {
   EXPECT_EQ(ReasonOf(Read(Forge(manifest, "x"))), Reason::kMapNameInvalid);
 }
 
-TEST_F(DamagedArchiveTest, WhoseDatabaseIsNoneOrAnotherIsNotInstalled) {
-  WriteBytes(path(), *bytes_);
-  std::string database;
-  ArchiveManifest manifest = OrDie(ReadArchiveFile(
-      path(),
-      [&](std::string_view bytes) {
-        database += bytes;
-        return absl::OkStatus();
-      },
-      nullptr, nullptr));
+class ForgedArchiveTest : public DamagedArchiveTest {
+ protected:
+  ForgedArchiveTest() {
+    WriteBytes(path(), *bytes_);
+    manifest_ = OrDie(ReadArchiveFile(
+        path(),
+        [&](std::string_view bytes) {
+          database_ += bytes;
+          return absl::OkStatus();
+        },
+        nullptr, nullptr));
+  }
+
+  ArchiveManifest manifest_;
+  std::string database_;
+};
+
+TEST_F(ForgedArchiveTest, WhoseManifestSaysOtherThanItsMapIsRefusedByName) {
+  const auto refusal = [&](auto forge) {
+    ArchiveManifest forged = manifest_;
+    forge(&forged);
+    WriteBytes(path(), Forge(forged, database_));
+    return VerifyArchive(path(), nullptr, nullptr).status();
+  };
+  const auto expect_named = [&](const std::string& field, const absl::Status& status) {
+    EXPECT_TRUE(absl::IsDataLoss(status)) << field << ": " << status;
+    EXPECT_TRUE(absl::StrContains(status.message(), absl::StrCat("says ", field))) << status;
+    EXPECT_NE(MetadataOf(status)["expected"], MetadataOf(status)["found"]);
+  };
+  using Manifest = ArchiveManifest;
+  expect_named("frame", refusal([](Manifest* m) { m->spec.frame = "attic"; }));
+  expect_named("epoch_ns", refusal([](Manifest* m) { m->spec.epoch_ns += 1; }));
+  expect_named("clock", refusal([](Manifest* m) {
+                 m->spec.clock = m->spec.clock == Clock::kUnix ? Clock::kMonotonic : Clock::kUnix;
+               }));
+  expect_named("codec", refusal([](Manifest* m) {
+                 m->spec.codec = m->spec.codec == TrajectoryCodec::kLossless
+                                     ? TrajectoryCodec::kQuantized
+                                     : TrajectoryCodec::kLossless;
+               }));
+  expect_named("gap_ns_max", refusal([](Manifest* m) { m->spec.gap_ns_max += 1; }));
+  expect_named("mesh_block_size_m",
+               refusal([](Manifest* m) { m->spec.mesh_block_size_m += 1e-12; }));
+  expect_named("store_format", refusal([](Manifest* m) { m->store_format -= 1; }));
+  expect_named("newest_revision", refusal([](Manifest* m) { m->newest_revision += 1; }));
+  expect_named("newest_digest", refusal([](Manifest* m) { m->newest_digest[5] ^= 1; }));
+  expect_named("oldest_revision", refusal([](Manifest* m) { m->oldest_revision += 1; }));
+  expect_named("state", refusal([](Manifest* m) { m->state[5] ^= 1; }));
+  EXPECT_TRUE(refusal([](Manifest*) {}).ok());
+}
+
+TEST_F(ForgedArchiveTest, WhoseDatabaseHasTriggersOrViewsFailsVerifyAndRestore) {
+  const auto store = OrDie(GraphStore::Open(folder_.path() + "/store", {.create = true}));
+  for (const char* foreign : {"CREATE VIEW spy AS SELECT 1",
+                              "CREATE TRIGGER spy AFTER INSERT ON node BEGIN SELECT 1; END"}) {
+    const std::string file = folder_.path() + "/forged.db";
+    WriteBytes(file, database_);
+    OrDie(
+        OrDie(sqlite::Database::Open(file, sqlite::Database::Mode::kWrite, "m"))->Execute(foreign));
+    ArchiveManifest forged = manifest_;
+    forged.database_bytes = static_cast<int64_t>(ReadBytes(file).size());
+    WriteBytes(path(), Forge(forged, ReadBytes(file)));
+    const auto report = VerifyArchive(path(), nullptr, nullptr);
+    ASSERT_TRUE(report.ok()) << report.status();
+    ASSERT_EQ(report->problems.size(), 1U) << foreign;
+    EXPECT_TRUE(absl::StrContains(report->problems.front(), "\"spy\""));
+    const absl::Status refused = RestoreArchive(path(), store.get(), {}, nullptr, nullptr).status();
+    EXPECT_EQ(ReasonOf(refused), Reason::kNotAStore) << refused;
+    EXPECT_TRUE(absl::StrContains(refused.message(), path())) << refused;
+  }
+}
+
+TEST_F(ForgedArchiveTest, WhoseDatabaseIsNoneOrAnotherIsNotInstalled) {
+  const std::string& database = database_;
+  const ArchiveManifest& manifest = manifest_;
   const auto store = OrDie(GraphStore::Open(folder_.path() + "/store", {.create = true}));
   const auto restore = [&](const ArchiveManifest& forged, const std::string& forged_database) {
     WriteBytes(path(), Forge(forged, forged_database));

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -62,6 +63,28 @@ TEST(BackupManifest, NamesThatLeadOutOfTheFolderAreRefused) {
       DecodeBackupManifest("M", Seal(absl::StrReplaceAll(body, {{"\"b\"", "\"a\""}}))).ok());
 }
 
+TEST(BackupManifest, SaysWhichFieldOfWhichEntryIsWrong) {
+  const std::string text = EncodeBackupManifest(SomeManifest());
+  const std::string body = text.substr(0, text.rfind("sha256 "));
+  const auto refusal = [&](const std::string& from, const std::string& to) {
+    const std::string forged = Seal(absl::StrReplaceAll(body, {{from, to}}));
+    return std::string(DecodeBackupManifest("M", forged).status().message());
+  };
+  using testing::HasSubstr;
+  EXPECT_THAT(refusal("\"4\"", "4"), HasSubstr("entry 2: field \"byte_count\" is not a text"));
+  EXPECT_THAT(refusal("\"4\"", "\"4x\""), HasSubstr("\"byte_count\" is not a whole number"));
+  EXPECT_THAT(refusal("\"4\"", "\"-4\""), HasSubstr("\"byte_count\" is negative"));
+  EXPECT_THAT(refusal("\"state\"", "\"estate\""), HasSubstr("entry 1: field \"state\" is missing"));
+  EXPECT_THAT(refusal("0700", "07g0"), HasSubstr("entry 2: field \"sha256\""));
+  EXPECT_THAT(refusal("\"maps\"", "\"map\""), HasSubstr("field \"maps\" is missing"));
+  EXPECT_THAT(refusal("}", ""), HasSubstr("not one JSON object"));
+  EXPECT_THAT(refusal("[", "[1,"), HasSubstr("\"maps\" is not a list of objects"));
+  // Nothing of the library that reads JSON.
+  EXPECT_EQ(refusal("}", "").find("json.exception"), std::string::npos);
+  const std::string newer = Seal(absl::StrReplaceAll(body, {{"backup\": 1", "backup\": 2"}}));
+  EXPECT_EQ(ReasonOf(DecodeBackupManifest("M", newer).status()), Reason::kFormatTooNew);
+}
+
 class BackupFolderTest : public testing::Test {
  protected:
   BackupEntry Save(const std::string& folder) {
@@ -117,6 +140,24 @@ TEST_F(BackupFolderTest, WhatIsCutOrAlteredIsFound) {
   }
   fs::remove(file);
   EXPECT_EQ(ReasonOf(CheckBackupFile(path(), entry, nullptr, nullptr)), Reason::kStoreCorrupt);
+}
+
+TEST_F(BackupFolderTest, AnArchiveOfAnotherMapOrRevisionIsFound) {
+  const auto folder = OrDie(BackupFolder::Open(path()));
+  const BackupEntry entry = Save(path());
+  const auto found = [&](auto forge) {
+    BackupEntry forged = entry;
+    forge(&forged);
+    const absl::Status status = CheckBackupFile(path(), forged, nullptr, nullptr);
+    EXPECT_EQ(ReasonOf(status), Reason::kStoreCorrupt);
+    return std::string(status.message());
+  };
+  using testing::HasSubstr;
+  EXPECT_THAT(found([](BackupEntry* e) { e->map = "kitchen"; }), HasSubstr("its map is"));
+  EXPECT_THAT(found([](BackupEntry* e) { ++e->newest_revision; }),
+              HasSubstr("its newest_revision is 5, not 6"));
+  EXPECT_THAT(found([](BackupEntry* e) { e->newest_digest[0] ^= 1; }), HasSubstr("newest_digest"));
+  EXPECT_THAT(found([](BackupEntry* e) { e->state[0] ^= 1; }), HasSubstr("its state is"));
 }
 
 TEST_F(BackupFolderTest, WhatIsNotAWholeArchiveOfTheMapIsNotTaken) {

@@ -103,6 +103,19 @@ TEST_F(AtomicFileTest, BeginsAnewWhereAKilledRunLeftAPart) {
   EXPECT_EQ(Read(path_), "new");
 }
 
+TEST_F(AtomicFileTest, OfTwoWritersOfOnePathTheLaterOneIsWhole) {
+  auto first = AtomicFile::Create(path_);
+  ASSERT_TRUE(first.ok() && first->Write("first").ok());
+  auto second = AtomicFile::Create(path_);
+  ASSERT_TRUE(second.ok() && second->Write("sec").ok());
+  EXPECT_FALSE(first->Commit().ok());
+  EXPECT_FALSE(fs::exists(path_));
+  { const AtomicFile dropped = *std::move(first); }
+  ASSERT_TRUE(second->Write("ond").ok());
+  ASSERT_TRUE(second->Commit().ok());
+  EXPECT_EQ(Read(path_), "second");
+}
+
 TEST_F(AtomicFileTest, WhatCannotTakeItsNameLeavesNoPart) {
   auto file = AtomicFile::Create(path_);
   ASSERT_TRUE(file.ok() && file->Write("abc").ok());
