@@ -62,8 +62,9 @@ std::string EdgeText(const v1::Edge& edge) {
 
 std::string TrackText(const v1::TrackChange& track, const TimeText& times) {
   const int64_t more = track.pose_count_after() - track.pose_count_before();
-  std::string text = more >= 0 ? absl::StrCat(Counted(more, "pose"), " more")
-                               : absl::StrCat(Counted(-more, "pose"), " fewer");
+  std::string text = more > 0   ? absl::StrCat(Counted(more, "pose"), " more")
+                     : more < 0 ? absl::StrCat(Counted(-more, "pose"), " fewer")
+                                : "as many poses";
   if (track.pose_count_after() > 0) {
     absl::StrAppend(&text, ", up to ", times.Full(track.last_pose_ns_after()));
   }

@@ -27,16 +27,36 @@ std::string Ended(const v1::MergeMapsResponse& reply, bool is_dry_run) {
   return absl::StrCat("revision ", reply.revision(), "\n");
 }
 
+// Of fewer things a wrong transform may find as many by chance.
+constexpr int kFewThings = 8;
+
+// Empty if there is nothing to warn of.
+std::string Doubts(const v1::MergeMapsResponse& reply, const MergeAsked& asked) {
+  // A map that was merged before and brings nothing new need not be found again.
+  if (reply.added_node_count() == 0 && reply.revision() == 0) return "";
+  constexpr char kWhatToDo[] =
+      "look at both with --dry-run --png FILE, and say where it lies with --transform X,Y,Z,YAW "
+      "(metres, radians)";
+  if (reply.agreeing_count() == 0) {
+    return absl::StrCat("\nwarning: no thing of ", asked.other, " is one of ", asked.map,
+                        ": they share nothing, or the transform is wrong; ", kWhatToDo, "\n");
+  }
+  if (asked.has_transform || reply.agreeing_count() >= kFewThings) return "";
+  return absl::StrCat("\nwarning: the transform rests on ",
+                      Counted(reply.agreeing_count(), "thing"), " only; ", kWhatToDo, "\n");
+}
+
 }  // namespace
 
-std::string RenderMerge(const v1::MergeMapsResponse& reply, const std::string& other,
-                        const std::string& map, bool is_dry_run) {
+std::string RenderMerge(const v1::MergeMapsResponse& reply, const MergeAsked& asked) {
+  const bool has_pairs = reply.fused_object_count() > 0;
   std::string text = RenderFields(
-      {{"map", map},
-       {"other", other},
+      {{"map", asked.map},
+       {"other", asked.other},
        {"other lies at", PoseText(reply.map_t_other())},
        {"things agreeing", absl::StrCat(reply.agreeing_count())},
-       {"they differ by", absl::StrCat(Fixed(reply.residual_m(), 3), " m (root mean square)")}});
+       {"they differ by",
+        has_pairs ? absl::StrCat(Fixed(reply.residual_m(), 3), " m (root mean square)") : "-"}});
   Table table({{"", Align::kLeft}, {"nodes", Align::kRight}});
   const auto row = [&](const char* what, int64_t count) {
     table.AddRow({what, absl::StrCat(count)});
@@ -52,7 +72,7 @@ std::string RenderMerge(const v1::MergeMapsResponse& reply, const std::string& o
   if (reply.fused_mesh_block_count() > 0) {
     absl::StrAppend(&text, "\n", reply.fused_mesh_block_count(), " mesh blocks joined\n");
   }
-  return absl::StrCat(text, "\n", Ended(reply, is_dry_run));
+  return absl::StrCat(text, "\n", Ended(reply, asked.is_dry_run), Doubts(reply, asked));
 }
 
 }  // namespace dsg::cli

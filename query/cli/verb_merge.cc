@@ -28,11 +28,21 @@ constexpr uint32_t kFusedRgb = 0x2a8c4a;
 constexpr uint32_t kAddedRgb = 0x1f5fbf;
 constexpr uint32_t kGoneRgb = 0xc8321e;
 constexpr uint32_t kMovedRgb = 0xc87a1e;
+// Rooms of this map and of the other one.
+constexpr uint32_t kMineRgb = 0x303030;
+constexpr uint32_t kTheirsRgb = 0x8a2bb0;
 
 // "X,Y,Z,YAW" besides what ParsePose takes.
 absl::StatusOr<Pose3d> ParseTransform(const std::string& text) {
   const std::vector<std::string> parts = absl::StrSplit(text, ',');
-  if (parts.size() != 4) return ParsePose("--transform", text);
+  if (parts.size() == 7) return ParsePose("--transform", text);
+  if (parts.size() != 4) {
+    return MakeError(Reason::kFieldInvalid,
+                     absl::StrCat("--transform \"", text, "\" has ", parts.size(),
+                                  " numbers; write X,Y,Z,YAW or X,Y,Z,QX,QY,QZ,QW, in metres and "
+                                  "radians"),
+                     {{"field", "--transform"}, {"value", text}});
+  }
   DSG_ASSIGN_OR_RETURN(
       const Eigen::Vector3d shift,
       ParsePoint("--transform", absl::StrCat(parts[0], ",", parts[1], ",", parts[2])));
@@ -41,10 +51,11 @@ absl::StatusOr<Pose3d> ParseTransform(const std::string& text) {
   return Pose3d{shift, Eigen::Quaterniond(Eigen::AngleAxisd(yaw.x(), Eigen::Vector3d::UnitZ()))};
 }
 
-absl::StatusOr<v1::ListNodesResponse> ObjectsOf(Session* session, const std::string& map) {
+absl::StatusOr<v1::ListNodesResponse> NodesOf(Session* session, const std::string& map,
+                                              const char* kind) {
   v1::ListNodesRequest request;
   request.set_map(map);
-  request.mutable_filter()->set_kind("object");
+  request.mutable_filter()->set_kind(kind);
   v1::ListNodesResponse all;
   DSG_RETURN_IF_ERROR(FetchPages(
       request, 0, [](const v1::ListNodesResponse& page) { return page.nodes_size(); },
@@ -55,30 +66,52 @@ absl::StatusOr<v1::ListNodesResponse> ObjectsOf(Session* session, const std::str
   return all;
 }
 
-// Objects of both maps, by what became of them.
+struct SeenNodes {
+  v1::ListNodesResponse objects;
+  /// Rooms, or places of a map without rooms: where it has been.
+  v1::ListNodesResponse spaces;
+};
+
+absl::StatusOr<SeenNodes> SeenBy(Session* session, const std::string& map) {
+  SeenNodes seen;
+  DSG_ASSIGN_OR_RETURN(seen.objects, NodesOf(session, map, "object"));
+  DSG_ASSIGN_OR_RETURN(seen.spaces, NodesOf(session, map, "room"));
+  if (seen.spaces.nodes().empty()) {
+    DSG_ASSIGN_OR_RETURN(seen.spaces, NodesOf(session, map, "place"));
+  }
+  return seen;
+}
+
+// Rooms of both maps, and their objects by what became of them.
 class MergePicture {
  public:
-  MergePicture(v1::ListNodesResponse mine, v1::ListNodesResponse theirs)
+  MergePicture(SeenNodes mine, SeenNodes theirs)
       : mine_(std::move(mine)), theirs_(std::move(theirs)) {}
 
-  AnswerPicture Draw(const v1::MergeMapsResponse& reply, const std::string& other) {
+  AnswerPicture Draw(const v1::MergeMapsResponse& reply, const std::string& map,
+                     const std::string& other) {
     AnswerPicture picture{.title = absl::StrCat("with ", other)};
-    picture.revision = reply.revision() > 0 ? reply.revision() : mine_.header().read_revision();
+    picture.revision =
+        reply.revision() > 0 ? reply.revision() : mine_.objects.header().read_revision();
     std::set<std::string> known;
-    for (const v1::Node& node : mine_.nodes()) known.insert(node.id());
+    for (const v1::Node& node : mine_.objects.nodes()) known.insert(node.id());
     const Pose3d map_T_other = FromProto(reply.map_t_other());
-    for (const v1::Node& node : theirs_.nodes()) {
+    for (const v1::Node& node : mine_.spaces.nodes()) Outline(node, Pose3d(), kMineRgb);
+    for (const v1::Node& node : theirs_.spaces.nodes()) Outline(node, map_T_other, kTheirsRgb);
+    for (const v1::Node& node : theirs_.objects.nodes()) {
       const auto mine = reply.node_ids().find(node.id());
       const bool is_fused = mine != reply.node_ids().end() && known.contains(mine->second);
       Mark(node, map_T_other, is_fused ? kFusedRgb : kAddedRgb, OverlayMark::Shape::kDot);
     }
     const std::set<std::string> gone(reply.gone_ids().begin(), reply.gone_ids().end());
-    for (const v1::Node& node : mine_.nodes()) {
+    for (const v1::Node& node : mine_.objects.nodes()) {
       if (!gone.contains(node.id())) continue;
       const bool has_moved = reply.moved_ids().contains(node.id());
       Mark(node, Pose3d(), has_moved ? kMovedRgb : kGoneRgb, OverlayMark::Shape::kCross);
     }
-    overlay_.legend = {{absl::StrCat(reply.fused_object_count(), " objects in both"), kFusedRgb},
+    overlay_.legend = {{absl::StrCat("seen by ", map), kMineRgb},
+                       {absl::StrCat("seen by ", other), kTheirsRgb},
+                       {absl::StrCat(reply.fused_object_count(), " objects in both"), kFusedRgb},
                        {"objects added", kAddedRgb}};
     if (reply.gone_count() > 0) {
       overlay_.legend.push_back({absl::StrCat(reply.gone_count(), " gone"), kGoneRgb});
@@ -96,17 +129,22 @@ class MergePicture {
                      .shape = shape,
                      .radius_px = 5.0,
                      .label = ""};
-    OverlayOutline outline{{}, rgb, mark.position_map.z()};
+    Outline(node, map_T_node_frame, rgb);
+    overlay_.marks.push_back(std::move(mark));
+  }
+
+  void Outline(const v1::Node& node, const Pose3d& map_T_node_frame, uint32_t rgb) {
+    const Eigen::Vector3d middle = map_T_node_frame * PointOf(node.map_t_node().position());
+    OverlayOutline outline{{}, rgb, middle.z()};
     for (const Eigen::Vector2d& corner : OutlineOf(node)) {
       const Eigen::Vector3d at(corner.x(), corner.y(), node.map_t_node().position().z());
       outline.corners_map.push_back((map_T_node_frame * at).head<2>());
     }
     if (outline.corners_map.size() >= 3) overlay_.outlines.push_back(std::move(outline));
-    overlay_.marks.push_back(std::move(mark));
   }
 
-  v1::ListNodesResponse mine_;
-  v1::ListNodesResponse theirs_;
+  SeenNodes mine_;
+  SeenNodes theirs_;
   Overlay overlay_;
 };
 
@@ -124,11 +162,11 @@ absl::Status RunMerge(Session* session, const MergeVerb& verb, std::ostream& out
     DSG_ASSIGN_OR_RETURN(const Pose3d transform, ParseTransform(verb.transform));
     ToProto(transform, request.mutable_map_t_other());
   }
-  v1::ListNodesResponse mine;
-  v1::ListNodesResponse theirs;
+  SeenNodes mine;
+  SeenNodes theirs;
   if (!verb.picture.png.empty()) {
-    DSG_ASSIGN_OR_RETURN(mine, ObjectsOf(session, request.map()));
-    DSG_ASSIGN_OR_RETURN(theirs, ObjectsOf(session, request.other()));
+    DSG_ASSIGN_OR_RETURN(mine, SeenBy(session, request.map()));
+    DSG_ASSIGN_OR_RETURN(theirs, SeenBy(session, request.other()));
   }
   Progress progress(absl::StrCat("merge ", verb.other, " into ", session->map().name),
                     &progress_out);
@@ -146,11 +184,13 @@ absl::Status RunMerge(Session* session, const MergeVerb& verb, std::ostream& out
   if (session->common().json) {
     DSG_RETURN_IF_ERROR(WriteJson(last, out));
   } else {
-    out << RenderMerge(last, verb.other, session->map().name, verb.dry_run);
+    out << RenderMerge(last,
+                       {session->map().name, verb.other, !verb.transform.empty(), verb.dry_run});
   }
   if (verb.picture.png.empty()) return absl::OkStatus();
   MergePicture picture(std::move(mine), std::move(theirs));
-  return WritePicture(session, verb.picture, picture.Draw(last, verb.other), out);
+  return WritePicture(session, verb.picture, picture.Draw(last, session->map().name, verb.other),
+                      out);
 }
 
 }  // namespace dsg::cli

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "query/engine/merge.h"
 
+#include <algorithm>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -47,36 +49,64 @@ class Merge final : public MergeCursor {
  private:
   absl::Status Plan(const CallContext& call) {
     DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> into, into_->Latest());
-    DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> other, other_->Latest());
-    DSG_RETURN_IF_ERROR(merge::CheckMergeable(*into, *other));
+    DSG_ASSIGN_OR_RETURN(other_now_, other_->Latest());
+    DSG_RETURN_IF_ERROR(merge::CheckMergeable(*into, *other_now_));
     if (!map_T_other_.has_value()) {
       DSG_ASSIGN_OR_RETURN(const merge::Alignment alignment,
-                           merge::FindTransform(*into, *other, {}, call.stop()));
+                           merge::FindTransform(*into, *other_now_, {}, call.stop()));
       map_T_other_ = alignment.map_T_other;
       agreeing_count_ = alignment.agreeing_count;
     }
-    merge::MergeOptions options;
-    DSG_ASSIGN_OR_RETURN(options.used_ids, merge::FindUsedIds(into_.get(), call.stop()));
-    DSG_ASSIGN_OR_RETURN(merge::MergePlan plan,
-                         merge::PlanMerge(*into, *other, *map_T_other_, options, call.stop()));
-    parent_ = plan.into_revision;
-    deltas_ = std::make_unique<merge::MergeDeltas>(into, other, std::move(plan), author_);
-    next_id_ = deltas_->plan().node_ids.begin();
+    DSG_ASSIGN_OR_RETURN(options_.used_ids, merge::FindUsedIds(into_.get(), call.stop()));
+    DSG_RETURN_IF_ERROR(PlanAt(into, call));
+    options_.check_reach = false;
     is_written_ = is_dry_run_;
     return absl::OkStatus();
   }
 
+  absl::Status PlanAt(const std::shared_ptr<const Snapshot>& into, const CallContext& call) {
+    DSG_ASSIGN_OR_RETURN(merge::MergePlan plan, merge::PlanMerge(*into, *other_now_, *map_T_other_,
+                                                                 options_, call.stop()));
+    // What a plan finds written by an earlier one is neither added nor gone to it.
+    added_node_count_ = std::max(added_node_count_, plan.counts.added_node_count);
+    gone_.insert(plan.gone.begin(), plan.gone.end());
+    for (const auto& [before, after] : plan.moved) moved_[before] = after;
+    seen_ = plan.into_revision;
+    deltas_ = std::make_unique<merge::MergeDeltas>(into, other_now_, std::move(plan), author_,
+                                                   part_count_);
+    next_id_ = deltas_->plan().node_ids.begin();
+    return absl::OkStatus();
+  }
+
+  // With the map's writer, so that nobody changes the map between the look at it and the commit.
   absl::Status Write(const CallContext& call) {
-    DSG_ASSIGN_OR_RETURN(std::optional<GraphDelta> delta, deltas_->Next(call.stop()));
-    if (!delta.has_value()) {
-      is_written_ = true;
-      return absl::OkStatus();
+    return maps_->WithWriter(
+        into_->spec().name, call.stop(), [&](MapWriter& writer) -> absl::Status {
+          DSG_RETURN_IF_ERROR(CatchUp(call));
+          DSG_ASSIGN_OR_RETURN(std::optional<GraphDelta> delta, deltas_->Next(call.stop()));
+          is_written_ = !delta.has_value();
+          if (is_written_) return absl::OkStatus();
+          delta->parent_revision = seen_;
+          DSG_ASSIGN_OR_RETURN(const CommitResult result, writer.Commit(*std::move(delta)));
+          seen_ = revision_ = result.revision;
+          ++part_count_;
+          return absl::OkStatus();
+        });
+  }
+
+  // A robot may commit all the time: only what touches the rest of the plan has it made anew.
+  absl::Status CatchUp(const CallContext& call) {
+    DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> head, into_->Latest());
+    if (head->revision() == seen_) return absl::OkStatus();
+    DSG_ASSIGN_OR_RETURN(const Touched touched,
+                         into_->TouchedBetween(seen_, head->revision(), call.stop()));
+    for (const NodeId id : touched.nodes) {
+      uint64_t& largest = options_.used_ids[id.letter()];
+      largest = std::max(largest, id.index());
     }
-    // What was planned holds only while nobody else changes the map.
-    delta->parent_revision = parent_;
-    DSG_ASSIGN_OR_RETURN(const CommitResult result, maps_->Commit(*std::move(delta), call.stop()));
-    parent_ = result.revision;
-    revision_ = result.revision;
+    DSG_ASSIGN_OR_RETURN(const bool holds, deltas_->Follow(head, touched));
+    if (!holds) return PlanAt(head, call);
+    seen_ = head->revision();
     return absl::OkStatus();
   }
 
@@ -87,13 +117,13 @@ class Merge final : public MergeCursor {
     }
     is_done_ = next_id_ == ids.end();
     if (!is_done_) return;
-    for (const NodeId id : deltas_->plan().gone) reply->add_gone_ids(ToString(id));
-    for (const auto& [before, after] : deltas_->plan().moved) {
+    for (const NodeId id : gone_) reply->add_gone_ids(ToString(id));
+    for (const auto& [before, after] : moved_) {
       (*reply->mutable_moved_ids())[ToString(before)] = ToString(after);
     }
   }
 
-  void Tell(v1::MergeMapsResponse* reply) const {
+  void Tell(v1::MergeMapsResponse* reply) {
     const merge::MergePlan& plan = deltas_->plan();
     ToProto(*map_T_other_, reply->mutable_map_t_other());
     reply->set_residual_m(plan.residual_m);
@@ -105,10 +135,11 @@ class Merge final : public MergeCursor {
     reply->set_fused_room_count(plan.counts.fused_room_count);
     reply->set_fused_structure_count(plan.counts.fused_structure_count);
     reply->set_fused_mesh_block_count(deltas_->fused_mesh_block_count());
-    reply->set_added_node_count(plan.counts.added_node_count);
-    reply->set_gone_count(plan.counts.gone_count);
+    reply->set_added_node_count(added_node_count_);
+    reply->set_gone_count(static_cast<int64_t>(gone_.size()));
     reply->set_revision(revision_);
-    reply->set_progress(is_done_ ? 1.0 : 0.99 * (is_written_ ? 1.0 : deltas_->progress()));
+    progress_ = std::max(progress_, 0.99 * (is_written_ ? 1.0 : deltas_->progress()));
+    reply->set_progress(is_done_ ? 1.0 : progress_);
     reply->set_done(is_done_);
   }
 
@@ -118,11 +149,19 @@ class Merge final : public MergeCursor {
   std::optional<Pose3d> map_T_other_;
   const bool is_dry_run_;
   const std::string author_;
+  std::shared_ptr<const Snapshot> other_now_;
+  merge::MergeOptions options_;
   std::unique_ptr<merge::MergeDeltas> deltas_;
   std::map<NodeId, NodeId>::const_iterator next_id_;
   int32_t agreeing_count_ = 0;
-  Revision parent_ = 0;
+  int64_t added_node_count_ = 0;
+  std::set<NodeId> gone_;
+  std::map<NodeId, NodeId> moved_;
+  /// The newest revision that the plan was compared with, or that it wrote.
+  Revision seen_ = 0;
   Revision revision_ = 0;
+  int64_t part_count_ = 0;
+  double progress_ = 0.0;
   bool is_written_ = false;
   bool is_done_ = false;
 };

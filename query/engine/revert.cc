@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/maintenance_service.pb.h"
+#include "query/engine/prune_convert.h"
 #include "query/engine/request_check.h"
 #include "query/engine/revert_plan.h"
 #include "query/engine/tags.h"
@@ -13,16 +14,6 @@
 
 namespace dsg::query {
 namespace {
-
-void ToProto(const RevertCounts& counts, v1::Amount* out) {
-  out->set_node_count(counts.node_count);
-  out->set_edge_count(counts.edge_count);
-  out->set_pose_count(counts.pose_count);
-  out->set_shape_count(counts.shape_count);
-  out->set_factor_count(counts.factor_count);
-  out->set_stay_count(counts.stay_count);
-  out->set_mesh_block_count(counts.mesh_block_count);
-}
 
 class Reversion final : public RevertCursor {
  public:
@@ -40,12 +31,11 @@ class Reversion final : public RevertCursor {
   absl::Status Next(const CallContext& call, v1::RevertResponse* reply) override {
     DSG_RETURN_IF_ERROR(call.Check());
     if (!is_planned_) {
-      DSG_ASSIGN_OR_RETURN(plan_, PlanRevert(map_.get(), *present_, *wanted_, call.stop()));
-      is_planned_ = true;
+      DSG_RETURN_IF_ERROR(PlanFrom(present_, call));
     } else {
-      DSG_RETURN_IF_ERROR(CommitBatch(call));
+      DSG_RETURN_IF_ERROR(Write(call));
     }
-    ToProto(plan_.added, reply->mutable_added());
+    ToProto(plan_.written, reply->mutable_added());
     ToProto(plan_.removed, reply->mutable_removed());
     reply->set_revision(written_);
     reply->set_done(done());
@@ -59,37 +49,53 @@ class Reversion final : public RevertCursor {
   }
 
  private:
-  absl::Status CommitBatch(const CallContext& call) {
-    DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> head, map_->Latest());
+  absl::Status PlanFrom(const std::shared_ptr<const Snapshot>& present, const CallContext& call) {
+    DSG_ASSIGN_OR_RETURN(plan_, PlanRevert(map_.get(), *present, *wanted_, call.stop()));
+    present_ = present;
+    parent_ = present->revision();
+    next_ = 0;
+    is_planned_ = true;
+    return absl::OkStatus();
+  }
+
+  // A batch at a time, so that others may write between; but if they do, the rest is planned anew
+  // and written at once while they wait: whatever was committed before is then undone, whatever
+  // comes after is kept, and someone who commits all the time cannot keep this from its end.
+  absl::Status Write(const CallContext& call) {
+    return maps_->WithWriter(
+        map_->spec().name, call.stop(), [&](MapWriter& writer) -> absl::Status {
+          DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> head, map_->Latest());
+          if (head->revision() == parent_) return CommitBatch(*head, &writer, call);
+          DSG_RETURN_IF_ERROR(PlanFrom(head, call));
+          while (!done()) {
+            DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> now, map_->Latest());
+            DSG_RETURN_IF_ERROR(CommitBatch(*now, &writer, call));
+          }
+          return absl::OkStatus();
+        });
+  }
+
+  absl::Status CommitBatch(const Snapshot& head, MapWriter* writer, const CallContext& call) {
     DSG_ASSIGN_OR_RETURN(GraphDelta delta,
-                         MakeRevertDelta(plan_.batches[next_], *head, *wanted_, call.stop()));
+                         MakeRevertDelta(plan_.batches[next_], head, *wanted_, call.stop()));
     ++next_;
     delta.map = map_->spec().name;
     // Another run begins at another head, and so has another name.
     delta.session_id = absl::StrCat("revert-", present_->revision(), "-to-", wanted_->revision());
     delta.sequence = static_cast<int64_t>(next_);
-    // What others write meanwhile would be neither kept nor undone.
     delta.parent_revision = parent_;
     delta.author = author_;
-    delta.message = absl::StrCat("revert to ", wanted_->revision(), ", part ", next_, "/",
+    delta.message = absl::StrCat("revert to ", wanted_->revision(), ", part ", next_, " of ",
                                  plan_.batches.size());
-    const auto result = maps_->Commit(std::move(delta), call.stop());
-    if (ReasonOf(result.status()) == Reason::kParentRevisionStale) {
-      return MakeError(
-          Reason::kParentRevisionStale,
-          absl::StrCat("map \"", map_->spec().name, "\" was written by others while it was made ",
-                       "what it was at revision ", wanted_->revision(), ", after part ", next_ - 1,
-                       " of ", plan_.batches.size(), "; stop its writers and revert again"),
-          MetadataOf(result.status()));
-    }
-    DSG_RETURN_IF_ERROR(result.status());
-    written_ = parent_ = result->revision;
+    DSG_ASSIGN_OR_RETURN(const CommitResult result, writer->Commit(std::move(delta)));
+    written_ = parent_ = result.revision;
     return absl::OkStatus();
   }
 
   MapTable* const maps_;
   const std::shared_ptr<MapReader> map_;
-  const std::shared_ptr<const Snapshot> present_;
+  /// What the plan was made from.
+  std::shared_ptr<const Snapshot> present_;
   const std::shared_ptr<const Snapshot> wanted_;
   const std::string author_;
   const bool is_dry_run_;

@@ -67,6 +67,12 @@ class Planner {
     int64_t weight;
   };
 
+  // Of rows that come in place of others, as many as there are of both are changed, and not gone.
+  void CountRows(int64_t present_count, int64_t wanted_count, int64_t Amount::*count) {
+    plan_.written.*count += wanted_count;
+    plan_.removed.*count += std::max<int64_t>(0, present_count - wanted_count);
+  }
+
   void Add(std::vector<Weighted>* part, RevertStep step, int64_t weight = 1) {
     part->push_back({std::move(step), weight});
   }
@@ -88,12 +94,13 @@ class Planner {
       if (IsSame(*now, *then)) return;
       if (IsElsewhere(*now, *then)) moved_.insert(id);
     }
-    if (now.has_value()) ++plan_.removed.node_count;
     if (!then.has_value()) {
-      if (now.has_value()) Add(&first_, RetireNode{id});
+      if (!now.has_value()) return;
+      ++plan_.removed.node_count;
+      Add(&first_, RetireNode{id});
       return;
     }
-    ++plan_.added.node_count;
+    ++plan_.written.node_count;
     Add(&nodes_, WriteNode{id});
   }
 
@@ -112,12 +119,13 @@ class Planner {
   void PlanEdge(const EdgeKey& key, const std::optional<Edge>& now,
                 const std::optional<Edge>& then) {
     if (now.has_value() && then.has_value() && IsSame(*now, *then)) return;
-    if (now.has_value()) ++plan_.removed.edge_count;
     if (!then.has_value()) {
-      if (now.has_value()) Add(&first_, RemoveEdge{key});
+      if (!now.has_value()) return;
+      ++plan_.removed.edge_count;
+      Add(&first_, RemoveEdge{key});
       return;
     }
-    ++plan_.added.edge_count;
+    ++plan_.written.edge_count;
     written_edges_.insert(key);
     Add(&last_, WriteEdge{key});
   }
@@ -128,8 +136,7 @@ class Planner {
       DSG_ASSIGN_OR_RETURN(const auto differences,
                            FindPoseDifferences(present_, wanted_, agent, stop_));
       for (const SeriesDifference& difference : differences) {
-        plan_.removed.pose_count += difference.present_count;
-        plan_.added.pose_count += difference.wanted_count;
+        CountRows(difference.present_count, difference.wanted_count, &Amount::pose_count);
         // The track of an agent that is retired ends with it.
         if (!is_wanted) continue;
         Add(&last_, CorrectTrack{difference.span},
@@ -166,14 +173,14 @@ class Planner {
     DSG_ASSIGN_OR_RETURN(const auto then, StaysOf(wanted_, agent));
     for (const auto& [enter_ns, stay] : now) {
       const auto same = then.find(enter_ns);
-      if (same != then.end() && same->second == stay) continue;
+      if (same != then.end()) continue;
       ++plan_.removed.stay_count;
-      if (same == then.end() && is_wanted) Add(&first_, RemoveStay{{agent, enter_ns}});
+      if (is_wanted) Add(&first_, RemoveStay{{agent, enter_ns}});
     }
     for (const auto& [enter_ns, stay] : then) {
       const auto same = now.find(enter_ns);
       if (same != now.end() && same->second == stay) continue;
-      ++plan_.added.stay_count;
+      ++plan_.written.stay_count;
       Add(&last_, WriteStay{stay});
     }
     return absl::OkStatus();
@@ -192,8 +199,8 @@ class Planner {
     DSG_ASSIGN_OR_RETURN(const auto now, present_.Factors(agent, kTimeMin, kTimeMax));
     DSG_ASSIGN_OR_RETURN(const auto then, wanted_.Factors(agent, kTimeMin, kTimeMax));
     if (EncodeFactors(now) == EncodeFactors(then)) return absl::OkStatus();
-    plan_.removed.factor_count += static_cast<int64_t>(now.size());
-    plan_.added.factor_count += static_cast<int64_t>(then.size());
+    CountRows(static_cast<int64_t>(now.size()), static_cast<int64_t>(then.size()),
+              &Amount::factor_count);
     if (!is_wanted) return absl::OkStatus();
     Add(&last_, ReplaceFactors{agent}, static_cast<int64_t>(now.size() + then.size()));
     return absl::OkStatus();
@@ -203,8 +210,7 @@ class Planner {
     DSG_ASSIGN_OR_RETURN(const auto differences,
                          FindShapeDifferences(present_, wanted_, agent, stop_));
     for (const SeriesDifference& difference : differences) {
-      plan_.removed.shape_count += difference.present_count;
-      plan_.added.shape_count += difference.wanted_count;
+      CountRows(difference.present_count, difference.wanted_count, &Amount::shape_count);
       if (!is_wanted) continue;
       Add(&last_, ReplaceShapes{difference.span}, kShapeWeight * (1 + difference.wanted_count));
     }
@@ -217,11 +223,11 @@ class Planner {
       DSG_ASSIGN_OR_RETURN(const auto now, EncodedBlock(present_, index));
       DSG_ASSIGN_OR_RETURN(const auto then, EncodedBlock(wanted_, index));
       if (now == then) continue;
-      if (now.has_value()) ++plan_.removed.mesh_block_count;
       if (then.has_value()) {
-        ++plan_.added.mesh_block_count;
+        ++plan_.written.mesh_block_count;
         Add(&last_, WriteBlock{index}, kBlockWeight);
       } else {
+        ++plan_.removed.mesh_block_count;
         Add(&last_, RemoveBlock{index});
       }
     }

@@ -11,20 +11,10 @@
 #include "absl/status/statusor.h"
 #include "schema/base/stop_check.h"
 #include "schema/model/graph_delta.h"
+#include "schema/retention/amount.h"
 #include "schema/store/graph_store.h"
 
 namespace dsg::query {
-
-/// Rows that come and go, by what they are.
-struct RevertCounts {
-  int64_t node_count = 0;
-  int64_t edge_count = 0;
-  int64_t pose_count = 0;
-  int64_t shape_count = 0;
-  int64_t factor_count = 0;
-  int64_t stay_count = 0;
-  int64_t mesh_block_count = 0;
-};
 
 // The steps. What is written is read from the wanted snapshot when its turn comes.
 struct RemoveEdge {
@@ -72,9 +62,9 @@ struct RevertPlan {
   /// Each a delta.
   std::vector<std::vector<RevertStep>> batches;
   /// Rows that the wanted snapshot has and the present one has not, or otherwise.
-  RevertCounts added;
-  /// The other way round.
-  RevertCounts removed;
+  Amount written;
+  /// Rows that the present snapshot has and the wanted one has not.
+  Amount removed;
 };
 
 /// Both snapshots must be of `map`, `wanted` the older one.

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <set>
+#include <span>
 #include <tuple>
 
 #include "schema/base/status.h"
+#include "schema/merge/origins.h"
 #include "schema/merge/transform_node.h"
 
 namespace dsg::merge {
@@ -18,6 +20,35 @@ using FactorKey = std::tuple<std::string, TimeNs, TimeNs, NodeId>;
 
 FactorKey KeyOf(const PoseFactor& factor) {
   return {factor.type, factor.from_ns, factor.to_ns, factor.to_agent};
+}
+
+// Through a codec, and through a transform told from nodes that went through it.
+constexpr double kSameM = 1e-3;
+constexpr double kSameRad = 1e-3;
+
+bool IsSame(const TimedPose& a, const TimedPose& b) {
+  if (a.time_ns != b.time_ns || a.flags != b.flags) return false;
+  if ((a.map_T_agent.position - b.map_T_agent.position).norm() > kSameM) return false;
+  return (a.flags & pose_flags::kNoOrientation) != 0 ||
+         AngleBetween(a.map_T_agent.orientation, b.map_T_agent.orientation) <= kSameRad;
+}
+
+// From the first to the last of `wanted` that `known` has not: an empty span if it has all. Both
+// ascend in time. What only `known` has is nobody's correction: the other map may have forgotten
+// it.
+std::span<const TimedPose> PartThatDiffers(const std::vector<TimedPose>& wanted,
+                                           const std::vector<TimedPose>& known) {
+  size_t first = wanted.size();
+  size_t last = 0;
+  auto at = known.begin();
+  for (size_t i = 0; i < wanted.size(); ++i) {
+    while (at != known.end() && at->time_ns < wanted[i].time_ns) ++at;
+    if (at != known.end() && IsSame(wanted[i], *at)) continue;
+    first = std::min(first, i);
+    last = i;
+  }
+  if (first == wanted.size()) return {};
+  return std::span(wanted).subspan(first, last - first + 1);
 }
 
 }  // namespace
@@ -38,6 +69,9 @@ absl::Status AgentCopy::Begin(const StopCheck& stop) {
   is_known_ = track.ok();
   if (!is_known_) return absl::OkStatus();
   if (track->pose_count > 0) next_pose_ns_ = track->last_ns + 1;
+  DSG_ASSIGN_OR_RETURN(const Node node, into_.GetNode(mine_));
+  const auto copy = CopiedFrom(node);
+  is_copy_ = copy.has_value() && copy->map == plan_.other_name && copy->id == theirs_;
   return into_.ReadShapes(mine_, kTimeMin, kTimeMax, /*with_vertices=*/false, stop,
                           [&](const ShownShape& shown) {
                             next_shape_ns_ = shown.shape.time_ns + 1;
@@ -51,7 +85,11 @@ absl::StatusOr<std::optional<GraphDelta>> AgentCopy::Next(const StopCheck& stop)
     switch (stage_) {
       case Stage::kBegin:
         DSG_RETURN_IF_ERROR(Begin(stop));
-        stage_ = Stage::kPoses;
+        stage_ = is_copy_ ? Stage::kCorrections : Stage::kPoses;
+        break;
+      case Stage::kCorrections:
+        DSG_RETURN_IF_ERROR(ReadCorrections(stop, &delta));
+        if (delta.empty()) stage_ = Stage::kPoses;
         break;
       case Stage::kPoses:
         DSG_RETURN_IF_ERROR(ReadPoses(stop, &delta));
@@ -74,17 +112,42 @@ absl::StatusOr<std::optional<GraphDelta>> AgentCopy::Next(const StopCheck& stop)
   return std::optional<GraphDelta>();
 }
 
+absl::StatusOr<std::vector<TimedPose>> AgentCopy::Carried(TimeNs from_ns, TimeNs to_ns,
+                                                          const StopCheck& stop) const {
+  std::vector<TimedPose> poses;
+  DSG_RETURN_IF_ERROR(other_.ReadPoses(theirs_, from_ns, to_ns, stop, [&](const TimedPose& pose) {
+    poses.push_back(pose);
+    TransformPose(plan_.map_T_other, &poses.back());
+    return poses.size() < plan_.batch_row_count;
+  }));
+  return poses;
+}
+
+absl::Status AgentCopy::ReadCorrections(const StopCheck& stop, GraphDelta* delta) {
+  while (delta->empty()) {
+    DSG_ASSIGN_OR_RETURN(const std::vector<TimedPose> wanted,
+                         Carried(compared_to_ns_, next_pose_ns_, stop));
+    if (wanted.empty()) return absl::OkStatus();
+    compared_to_ns_ = wanted.back().time_ns + 1;
+    std::vector<TimedPose> known;
+    DSG_RETURN_IF_ERROR(into_.ReadPoses(mine_, wanted.front().time_ns, compared_to_ns_, stop,
+                                        [&](const TimedPose& pose) {
+                                          known.push_back(pose);
+                                          return true;
+                                        }));
+    const std::span<const TimedPose> part = PartThatDiffers(wanted, known);
+    if (part.empty()) continue;
+    delta->corrections.push_back(
+        {mine_, part.front().time_ns, part.back().time_ns + 1, {part.begin(), part.end()}});
+  }
+  return absl::OkStatus();
+}
+
 absl::Status AgentCopy::ReadPoses(const StopCheck& stop, GraphDelta* delta) {
-  TrajectoryAppend append{mine_, {}};
-  DSG_RETURN_IF_ERROR(
-      other_.ReadPoses(theirs_, next_pose_ns_, kTimeMax, stop, [&](const TimedPose& pose) {
-        append.poses.push_back(pose);
-        TransformPose(plan_.map_T_other, &append.poses.back());
-        return append.poses.size() < plan_.batch_row_count;
-      }));
-  if (append.poses.empty()) return absl::OkStatus();
-  next_pose_ns_ = append.poses.back().time_ns + 1;
-  delta->appends.push_back(std::move(append));
+  DSG_ASSIGN_OR_RETURN(std::vector<TimedPose> poses, Carried(next_pose_ns_, kTimeMax, stop));
+  if (poses.empty()) return absl::OkStatus();
+  next_pose_ns_ = poses.back().time_ns + 1;
+  delta->appends.push_back({mine_, std::move(poses)});
   return absl::OkStatus();
 }
 

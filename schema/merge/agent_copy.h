@@ -17,18 +17,23 @@ class AgentCopy {
   AgentCopy(const Snapshot& into, const Snapshot& other, const MergePlan& plan, NodeId theirs,
             NodeId mine);
 
-  /// Poses, then stays and factors, then shapes, at most plan.batch_row_count rows each; nullopt at
-  /// the end.
+  /// Of an agent that an earlier merge copied whole, poses that the other map has corrected since;
+  /// then new poses, then stays and factors, then shapes, at most plan.batch_row_count rows each;
+  /// nullopt at the end.
   absl::StatusOr<std::optional<GraphDelta>> Next(const StopCheck& stop);
 
   /// Assets that the last delta refers to.
   std::vector<Sha256> TakeTopologies();
 
  private:
-  enum class Stage { kBegin, kPoses, kStays, kShapes, kEnd };
+  enum class Stage { kBegin, kCorrections, kPoses, kStays, kShapes, kEnd };
 
   absl::Status Begin(const StopCheck& stop);
+  absl::Status ReadCorrections(const StopCheck& stop, GraphDelta* delta);
   absl::Status ReadPoses(const StopCheck& stop, GraphDelta* delta);
+  /// Poses of the other map in the frame of this one, the first at or after `from_ns`.
+  absl::StatusOr<std::vector<TimedPose>> Carried(TimeNs from_ns, TimeNs to_ns,
+                                                 const StopCheck& stop) const;
   absl::Status ReadStays(GraphDelta* delta);
   absl::Status ReadFactors(GraphDelta* delta) const;
   absl::Status ReadShapes(const StopCheck& stop, GraphDelta* delta);
@@ -42,6 +47,9 @@ class AgentCopy {
   NodeId mine_;
   Stage stage_ = Stage::kBegin;
   bool is_known_ = false;
+  /// Copied whole by an earlier merge, so that nobody but the other map knows its poses.
+  bool is_copy_ = false;
+  TimeNs compared_to_ns_ = kTimeMin;
   TimeNs next_pose_ns_ = kTimeMin;
   TimeNs next_shape_ns_ = kTimeMin;
   std::vector<Sha256> topologies_;

@@ -112,7 +112,7 @@ bool AreApart(const Pose3d& a, const Pose3d& b) {
 absl::Status NoRegistration(const std::string& why) {
   return MakeError(Reason::kNoRegistration,
                    absl::StrCat("no transform between the maps can be told: ", why,
-                                "; give one with --transform x,y,z,yaw"));
+                                "; give one with --transform X,Y,Z,YAW"));
 }
 
 std::string Describe(const Pose3d& pose) {

@@ -22,10 +22,14 @@ class BlockCache {
 
   absl::StatusOr<std::shared_ptr<const MeshBlock>> Read(BlockIndex index);
 
+  /// From now on this block is read from `map`, and the others from where they were.
+  void ReadAnew(BlockIndex index, std::shared_ptr<const Snapshot> map);
+
  private:
   using Entry = std::pair<BlockIndex, std::shared_ptr<const MeshBlock>>;
 
   std::shared_ptr<const Snapshot> map_;
+  std::map<BlockIndex, std::shared_ptr<const Snapshot>> read_anew_;
   Pose3d map_T_stored_;
   size_t count_max_;
   /// Newest first.

@@ -11,6 +11,7 @@
 #include "schema/merge/merge_graph.h"
 #include "schema/merge/mesh_probe.h"
 #include "schema/merge/origins.h"
+#include "schema/merge/plan_check.h"
 #include "schema/merge/transform_node.h"
 
 namespace dsg::merge {
@@ -129,6 +130,9 @@ absl::StatusOr<MergePlan> PlanMerge(const Snapshot& into, const Snapshot& other,
   DSG_ASSIGN_OR_RETURN(const Vocabulary vocabulary, JoinVocabularies(mine, theirs));
   std::vector<int> known = KnownPairs(mine, theirs);
   Adopt(map_T_other, vocabulary, &theirs);
+  if (options.check_reach) {
+    DSG_RETURN_IF_ERROR(CheckReach(mine.spec, other, theirs, map_T_other, stop));
+  }
   DSG_ASSIGN_OR_RETURN(const std::vector<int> pair_of,
                        MatchNodes(mine, theirs, std::move(known), options.match, stop));
   SessionChanges changes;
@@ -155,6 +159,7 @@ absl::StatusOr<MergePlan> PlanMerge(const Snapshot& into, const Snapshot& other,
     }
   }
   BuildGraph(mine, theirs, pair_of, changes, options.used_ids, &plan);
+  DSG_RETURN_IF_ERROR(CheckGraph(mine, &plan));
   return plan;
 }
 

@@ -41,6 +41,9 @@ struct MergeOptions {
   UsedIds used_ids;
   /// Look for what the other map's session contradicts; see session_change.h.
   bool find_changes = true;
+  /// Read the whole other map to see that all of it fits into this one; a plan that is made anew
+  /// need not.
+  bool check_reach = true;
   /// Rows of one delta, about.
   size_t batch_row_count = 4000;
 };
@@ -79,10 +82,11 @@ struct MergePlan {
   size_t batch_row_count = 0;
 };
 
-/// Errors: INVALID_ARGUMENT/FIELD_INVALID for a map with itself, or a transform that is none or
-/// tilts; FAILED_PRECONDITION/FRAMES_INCOMPATIBLE when clocks differ or a layer has another rank;
-/// what `stop` returned.
-/// Cost: both graphs in memory.
+/// Errors: INVALID_ARGUMENT/FIELD_INVALID for a map with itself, or a transform that is none, tilts
+/// or leads beyond the coordinates of a map; FAILED_PRECONDITION/FRAMES_INCOMPATIBLE when clocks
+/// differ or a layer has another rank; OUT_OF_RANGE/TIME_OUTSIDE_MAP for tracks too far from the
+/// epoch of `into`; as CheckDelta for nodes that it could not hold; what `stop` returned.
+/// Cost: both graphs in memory; reads poses and mesh of `other`.
 absl::StatusOr<MergePlan> PlanMerge(const Snapshot& into, const Snapshot& other,
                                     const Pose3d& map_T_other, const MergeOptions& options,
                                     const StopCheck& stop);
@@ -102,13 +106,19 @@ std::optional<Pose3d> TransformOfLastMerge(const MapContent& into, const MapCont
 /// Threads: one caller at a time.
 class MergeDeltas {
  public:
+  /// `part_count`: how many parts of the merge an earlier plan has written, for messages.
   MergeDeltas(std::shared_ptr<const Snapshot> into, std::shared_ptr<const Snapshot> other,
-              MergePlan plan, std::string author);
+              MergePlan plan, std::string author, int64_t part_count = 0);
   ~MergeDeltas();
 
   const MergePlan& plan() const;
   /// nullopt at the end. Sequences count from 1 in a session named after both revisions.
   absl::StatusOr<std::optional<GraphDelta>> Next(const StopCheck& stop);
+  /// Others have changed `into`, which is now `head`. False if what is left of the plan does not
+  /// hold any more: then what was not written has to be planned anew.
+  /// Errors: ABORTED/PARENT_REVISION_STALE when an agent whose track is to go on with that of the
+  /// other map has gone on already.
+  absl::StatusOr<bool> Follow(const std::shared_ptr<const Snapshot>& head, const Touched& touched);
   /// From 0 to 1.
   double progress() const;
   /// Blocks that both maps had, so far.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cmath>
 #include <deque>
 #include <set>
 #include <tuple>
@@ -9,6 +10,7 @@
 #include "schema/base/status.h"
 #include "schema/merge/agent_copy.h"
 #include "schema/merge/merge.h"
+#include "schema/merge/transform_node.h"
 
 namespace dsg::merge {
 namespace {
@@ -26,13 +28,52 @@ std::set<Sha256> AssetsOf(const GraphDelta& graph) {
   return assets;
 }
 
-std::string Describe(const MergePlan& plan) {
-  const Eigen::Vector3d& p = plan.map_T_other.position;
-  const Eigen::Quaterniond& q = plan.map_T_other.orientation;
-  return absl::StrFormat("merge of %s revision %d at %.6f,%.6f,%.6f,%.9f,%.9f,%.9f,%.9f",
-                         plan.other_name, plan.other_revision, p.x(), p.y(), p.z(), q.x(), q.y(),
-                         q.z(), q.w());
+std::string NameOf(const MergePlan& plan) {
+  return absl::StrCat("merge of ", plan.other_name, " revision ", plan.other_revision);
 }
+
+// As `dsg merge --transform` takes it.
+std::string Describe(const Pose3d& pose) {
+  const Eigen::Vector3d& p = pose.position;
+  const Eigen::Quaterniond& q = pose.orientation;
+  const std::string position = absl::StrFormat("%.4f,%.4f,%.4f", p.x(), p.y(), p.z());
+  if (TiltOf(pose) < 1e-6) {
+    return absl::StrFormat("%s,%.6f", position, 2.0 * std::atan2(q.z(), q.w()));
+  }
+  return absl::StrFormat("%s,%.8f,%.8f,%.8f,%.8f", position, q.x(), q.y(), q.z(), q.w());
+}
+
+// Whether a delta builds on what others have changed.
+class ConflictFinder {
+ public:
+  explicit ConflictFinder(const Touched& touched)
+      : nodes_(touched.nodes.begin(), touched.nodes.end()),
+        has_new_numbers_(touched.layers_or_labels) {
+    for (const EdgeKey& key : touched.edges) {
+      edges_.insert(key);
+      if (key.relation == relations::kContains) children_.insert(key.target);
+    }
+  }
+
+  bool IsIn(const GraphDelta& delta) const {
+    if (has_new_numbers_ && !delta.nodes.empty()) return true;
+    const auto is_touched_node = [&](const Node& node) { return nodes_.contains(node.id); };
+    const auto is_touched_edge = [&](const Edge& edge) {
+      return nodes_.contains(edge.source) || nodes_.contains(edge.target) ||
+             edges_.contains(edge.key()) ||
+             (edge.relation == relations::kContains && children_.contains(edge.target));
+    };
+    return std::any_of(delta.nodes.begin(), delta.nodes.end(), is_touched_node) ||
+           std::any_of(delta.edges.begin(), delta.edges.end(), is_touched_edge);
+  }
+
+ private:
+  std::set<NodeId> nodes_;
+  std::set<EdgeKey> edges_;
+  /// That got or lost a parent.
+  std::set<NodeId> children_;
+  bool has_new_numbers_;
+};
 
 size_t RowsOf(const MeshBlock& block) { return block.positions_map.size() + block.faces.size(); }
 
@@ -41,16 +82,17 @@ size_t RowsOf(const MeshBlock& block) { return block.positions_map.size() + bloc
 class MergeDeltas::Impl {
  public:
   Impl(std::shared_ptr<const Snapshot> into, std::shared_ptr<const Snapshot> other, MergePlan plan,
-       std::string author)
+       std::string author, int64_t part_count)
       : into_(std::move(into)),
         other_(std::move(other)),
         plan_(std::move(plan)),
-        mesh_(into_, other_, plan_.map_T_other, {plan_.class_of, plan_.instance_of}, plan_.mesh) {
+        mesh_(into_, other_, plan_.map_T_other, {plan_.class_of, plan_.instance_of}, plan_.mesh),
+        part_count_(part_count) {
     header_.map = plan_.into_name;
     header_.session_id = absl::StrCat("merge/", plan_.other_name, "@", plan_.other_revision, "/",
                                       plan_.into_revision);
     header_.author = std::move(author);
-    header_.message = Describe(plan_);
+    header_.message = NameOf(plan_);
     header_.parent_revision = plan_.into_revision;
     for (const auto& [theirs, mine] : plan_.node_ids) agents_left_.emplace_back(theirs, mine);
   }
@@ -67,12 +109,25 @@ class MergeDeltas::Impl {
     delta.map = header_.map;
     delta.session_id = header_.session_id;
     delta.author = header_.author;
-    delta.message = header_.message;
+    delta.message = absl::StrCat(header_.message, ", part ", ++part_count_);
+    // Once is enough to repeat the merge by hand.
+    if (part_count_ == 1) absl::StrAppend(&delta.message, " at ", Describe(plan_.map_T_other));
     delta.parent_revision = header_.parent_revision;
     delta.sequence = ++sequence_;
     // Only the first can know its parent; who commits sets those of the others.
     header_.parent_revision.reset();
     return std::optional<GraphDelta>(std::move(delta));
+  }
+
+  absl::StatusOr<bool> Follow(const std::shared_ptr<const Snapshot>& head, const Touched& touched) {
+    if (!is_graph_ready_) DSG_RETURN_IF_ERROR(PrepareGraph());
+    const ConflictFinder conflicts(touched);
+    for (const GraphDelta& delta : queue_) {
+      if (conflicts.IsIn(delta)) return false;
+    }
+    for (const NodeId mine : touched.tracks) DSG_RETURN_IF_ERROR(CheckTrackOf(mine));
+    DSG_RETURN_IF_ERROR(mesh_.Follow(head, touched.mesh_blocks));
+    return true;
   }
 
   double progress() const {
@@ -95,6 +150,27 @@ class MergeDeltas::Impl {
       }
     }
     is_graph_ready_ = true;
+    return absl::OkStatus();
+  }
+
+  // Of an agent that others have gone on with: has the other map more of it that is to be written?
+  absl::Status CheckTrackOf(NodeId mine) const {
+    const auto known = into_->GetTrack(mine);
+    if (!known.ok()) return absl::OkStatus();
+    for (const auto& [theirs_id, mine_id] : plan_.node_ids) {
+      if (mine_id != mine) continue;
+      DSG_ASSIGN_OR_RETURN(const TrackInfo theirs, other_->GetTrack(theirs_id));
+      const bool has_more =
+          theirs.pose_count > 0 && (known->pose_count == 0 || theirs.last_ns > known->last_ns);
+      if (!has_more) continue;
+      return MakeError(Reason::kParentRevisionStale,
+                       absl::StrCat("agent ", ToString(mine), " \"", known->name, "\" of map \"",
+                                    plan_.into_name,
+                                    "\" was written by others while its track was to go on with ",
+                                    "that of map \"", plan_.other_name,
+                                    "\"; stop its writer, or give one of them another name"),
+                       {{"map", plan_.into_name}, {"agent", ToString(mine)}});
+    }
     return absl::OkStatus();
   }
 
@@ -155,6 +231,7 @@ class MergeDeltas::Impl {
   MeshJoin mesh_;
   GraphDelta header_;
   int64_t sequence_ = 0;
+  int64_t part_count_;
   bool is_graph_ready_ = false;
   std::deque<GraphDelta> queue_;
   std::deque<std::pair<NodeId, NodeId>> agents_left_;
@@ -162,14 +239,19 @@ class MergeDeltas::Impl {
 };
 
 MergeDeltas::MergeDeltas(std::shared_ptr<const Snapshot> into,
-                         std::shared_ptr<const Snapshot> other, MergePlan plan, std::string author)
+                         std::shared_ptr<const Snapshot> other, MergePlan plan, std::string author,
+                         int64_t part_count)
     : impl_(std::make_unique<Impl>(std::move(into), std::move(other), std::move(plan),
-                                   std::move(author))) {}
+                                   std::move(author), part_count)) {}
 MergeDeltas::~MergeDeltas() = default;
 
 const MergePlan& MergeDeltas::plan() const { return impl_->plan(); }
 absl::StatusOr<std::optional<GraphDelta>> MergeDeltas::Next(const StopCheck& stop) {
   return impl_->Next(stop);
+}
+absl::StatusOr<bool> MergeDeltas::Follow(const std::shared_ptr<const Snapshot>& head,
+                                         const Touched& touched) {
+  return impl_->Follow(head, touched);
 }
 double MergeDeltas::progress() const { return impl_->progress(); }
 int64_t MergeDeltas::fused_mesh_block_count() const { return impl_->mesh().fused_block_count(); }

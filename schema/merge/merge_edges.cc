@@ -6,6 +6,7 @@
 #include <set>
 #include <string>
 
+#include "schema/merge/origins.h"
 #include "schema/merge/point_grid.h"
 
 namespace dsg::merge {
@@ -24,13 +25,34 @@ bool IsSingle(const std::string& relation) {
          relation == relations::kIn || relation == relations::kHeldBy;
 }
 
+// By such an edge a node hangs on another one: its parent, or the one that it has.
+bool HangsOn(const std::string& relation) {
+  return relation == relations::kContains || IsSingle(relation);
+}
+
+NodeId Hanging(const Edge& edge) {
+  return edge.relation == relations::kContains ? edge.target : edge.source;
+}
+
+NodeId Holding(const Edge& edge) {
+  return edge.relation == relations::kContains ? edge.source : edge.target;
+}
+
+Edge WithEnds(Edge edge, NodeId source, NodeId target) {
+  edge.source = source;
+  edge.target = target;
+  return edge;
+}
+
 class EdgeJoiner {
  public:
   EdgeJoiner(const MapContent& into, const std::vector<int>& pair_of,
-             const std::vector<NodeId>& id_of)
-      : into_(into), pair_of_(pair_of), id_of_(id_of) {
+             const std::vector<NodeId>& id_of, const std::vector<EdgeKey>& replaced)
+      : pair_of_(pair_of), id_of_(id_of) {
     for (const Edge& edge : into.edges) {
+      if (std::binary_search(replaced.begin(), replaced.end(), edge.key())) continue;
       into_keys_.push_back(edge.key());
+      if (edge.relation == relations::kContains) has_parent_.insert(edge.target);
       if (IsSingle(edge.relation)) taken_.insert({edge.source, edge.relation});
     }
   }
@@ -67,14 +89,14 @@ class EdgeJoiner {
 
   // Of a node that stood in this map before the merge.
   bool HasParent(int child) const {
-    const int pair = pair_of_[static_cast<size_t>(child)];
-    return pair >= 0 && into_.parent[static_cast<size_t>(pair)] >= 0;
+    const auto i = static_cast<size_t>(child);
+    return pair_of_[i] >= 0 && has_parent_.contains(id_of_[i]);
   }
 
-  const MapContent& into_;
   const std::vector<int>& pair_of_;
   const std::vector<NodeId>& id_of_;
   std::vector<EdgeKey> into_keys_;
+  std::set<NodeId> has_parent_;
   std::set<std::pair<NodeId, std::string>> taken_;
   std::map<EdgeKey, Edge> added_;
 };
@@ -99,9 +121,36 @@ std::set<int> JoinedPlaces(const MapContent& other, const std::vector<int>& pair
 
 }  // namespace
 
+std::vector<EdgeKey> ReplacedEdges(const MapContent& into, const MapContent& other,
+                                   const std::vector<NodeId>& id_of) {
+  const std::set<NodeId> images(id_of.begin(), id_of.end());
+  // By node and relation: the other ends that the other map names.
+  std::map<std::pair<NodeId, std::string>, std::set<NodeId>> wanted;
+  for (const Edge& edge : other.edges) {
+    const int source = other.IndexOf(edge.source);
+    const int target = other.IndexOf(edge.target);
+    if (source < 0 || target < 0 || !HangsOn(edge.relation)) continue;
+    const Edge mine =
+        WithEnds(edge, id_of[static_cast<size_t>(source)], id_of[static_cast<size_t>(target)]);
+    wanted[{Hanging(mine), mine.relation}].insert(Holding(mine));
+  }
+  std::vector<EdgeKey> replaced;
+  for (const Edge& edge : into.edges) {
+    if (!HangsOn(edge.relation) || !images.contains(Holding(edge))) continue;
+    const auto now = wanted.find({Hanging(edge), edge.relation});
+    if (now == wanted.end() || now->second.contains(Holding(edge))) continue;
+    const int node = into.IndexOf(Hanging(edge));
+    if (node < 0) continue;
+    const auto copy = CopiedFrom(into.nodes[static_cast<size_t>(node)]);
+    if (copy.has_value() && copy->map == other.spec.name) replaced.push_back(edge.key());
+  }
+  return replaced;
+}
+
 std::vector<Edge> JoinEdges(const MapContent& into, const MapContent& other,
-                            const std::vector<int>& pair_of, const std::vector<NodeId>& id_of) {
-  EdgeJoiner joiner(into, pair_of, id_of);
+                            const std::vector<int>& pair_of, const std::vector<NodeId>& id_of,
+                            const std::vector<EdgeKey>& replaced) {
+  EdgeJoiner joiner(into, pair_of, id_of, replaced);
   for (const Edge& edge : other.edges) joiner.Add(other, edge);
   return std::move(joiner).Take();
 }

@@ -9,10 +9,17 @@
 
 namespace dsg::merge {
 
-/// New or widened edges in the ids of `into`. `id_of`: by node of `other`; `pair_of` as MatchNodes.
-/// Order: ascending by key.
+/// Edges of `into` that an earlier merge brought and that the other map has replaced since: those
+/// by which a node copied whole from there has its parent, its nearest place or what it stands on,
+/// where the other map now names another. `id_of`: by node of `other`. Order: ascending.
+std::vector<EdgeKey> ReplacedEdges(const MapContent& into, const MapContent& other,
+                                   const std::vector<NodeId>& id_of);
+
+/// New or widened edges in the ids of `into`, as if it had not those in `replaced`. `id_of`: by
+/// node of `other`; `pair_of` as MatchNodes. Order: ascending by key.
 std::vector<Edge> JoinEdges(const MapContent& into, const MapContent& other,
-                            const std::vector<int>& pair_of, const std::vector<NodeId>& id_of);
+                            const std::vector<int>& pair_of, const std::vector<NodeId>& id_of,
+                            const std::vector<EdgeKey>& replaced);
 
 /// Ways between new places and places of `into` so near that one stands in the free space of the
 /// other, where no fused place joins them. Order: as JoinEdges.

@@ -150,11 +150,16 @@ class GraphBuilder {
   }
 
   void AddEdges() {
-    plan_.graph.edges = JoinEdges(into_, other_, pair_of_, id_of_);
+    const std::vector<EdgeKey> replaced = ReplacedEdges(into_, other_, id_of_);
+    plan_.graph.edge_removals = replaced;
+    plan_.graph.edges = JoinEdges(into_, other_, pair_of_, id_of_, replaced);
     for (Edge& bridge : BridgePlaces(into_, other_, pair_of_, id_of_)) {
       plan_.graph.edges.push_back(std::move(bridge));
     }
-    whole_.edges = into_.edges;
+    for (const Edge& edge : into_.edges) {
+      const bool stays = !std::binary_search(replaced.begin(), replaced.end(), edge.key());
+      if (stays) whole_.edges.push_back(edge);
+    }
     whole_.edges.insert(whole_.edges.end(), plan_.graph.edges.begin(), plan_.graph.edges.end());
   }
 

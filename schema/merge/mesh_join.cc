@@ -43,6 +43,22 @@ class MeshJoin::Impl {
     return std::optional<MeshBlock>();
   }
 
+  absl::Status Follow(const std::shared_ptr<const Snapshot>& head,
+                      const std::vector<BlockIndex>& touched) {
+    if (touched.empty()) return absl::OkStatus();
+    if (!is_listed_) DSG_RETURN_IF_ERROR(List());
+    DSG_ASSIGN_OR_RETURN(const std::vector<BlockIndex> there, head->MeshBlocks());
+    for (const BlockIndex& index : touched) {
+      mine_.ReadAnew(index, head);
+      if (std::binary_search(there.begin(), there.end(), index)) {
+        known_.insert(index);
+      } else {
+        known_.erase(index);
+      }
+    }
+    return absl::OkStatus();
+  }
+
   double progress() const {
     if (!is_listed_) return 0.0;
     if (sources_of_.empty()) return 1.0;
@@ -157,6 +173,10 @@ MeshJoin::~MeshJoin() = default;
 
 absl::StatusOr<std::optional<MeshBlock>> MeshJoin::Next(const StopCheck& stop) {
   return impl_->Next(stop);
+}
+absl::Status MeshJoin::Follow(const std::shared_ptr<const Snapshot>& head,
+                              const std::vector<BlockIndex>& touched) {
+  return impl_->Follow(head, touched);
 }
 double MeshJoin::progress() const { return impl_->progress(); }
 int64_t MeshJoin::fused_block_count() const { return impl_->fused_block_count(); }

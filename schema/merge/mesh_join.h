@@ -43,6 +43,10 @@ class MeshJoin {
   /// grows, and where it had no instance it takes theirs.
   /// Order: ascending index.
   absl::StatusOr<std::optional<MeshBlock>> Next(const StopCheck& stop);
+  /// Others have written or removed these blocks of `into`: they are taken from `head`. All others
+  /// stay as they were, for what Next gave must not be met again as a surface of this map.
+  absl::Status Follow(const std::shared_ptr<const Snapshot>& head,
+                      const std::vector<BlockIndex>& touched);
   /// Of the blocks that the other map touches, how many are done.
   double progress() const;
   /// Blocks so far that both maps had.

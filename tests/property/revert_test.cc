@@ -190,21 +190,59 @@ TEST(Revert, OfATurningAgentArrives) {
   EXPECT_EQ(OrDie(reverter.Revert(then)).revision(), 0);
 }
 
+// Others write between plan and batch: the rest is planned anew, so that what is left is the wanted
+// revision and no mixture.
 TEST(Revert, DoesNotMixWithTheWritesOfOthers) {
   TestMap map;
-  for (Revision r = 1; r <= 5; ++r) OrDie(map.writer().Commit(DeltaOfStream({}, r)));
+  for (Revision r = 1; r <= 30; ++r) {
+    OrDie(map.writer().Commit(DeltaOfStream({.poses_per_append = 400}, r)));
+  }
   map.Close();
   Reverter reverter(map.folder());
-  v1::RevertRequest request;
-  request.set_map(kMap);
-  request.set_revision(2);
-  const auto cursor = OrDie(reverter.core().OpenRevert(request));
-  v1::RevertResponse message;
-  OrDie(cursor->Next(query::CallContext(), &message));
-  EXPECT_FALSE(message.done());
-  OrDie(reverter.Revert(3));
-  message.Clear();
-  EXPECT_EQ(ReasonOf(cursor->Next(query::CallContext(), &message)), Reason::kParentRevisionStale);
+  const auto reader = OrDie(OrDie(GraphStore::Open(map.folder(), {}))->OpenMap(kMap));
+  for (const int batch_count : {0, 1, 3}) {
+    v1::RevertRequest request;
+    request.set_map(kMap);
+    request.set_revision(2);
+    const auto cursor = OrDie(reverter.core().OpenRevert(request));
+    v1::RevertResponse message;
+    for (int i = 0; i <= batch_count; ++i) {
+      message.Clear();
+      OrDie(cursor->Next(query::CallContext(), &message));
+      ASSERT_FALSE(message.done());
+    }
+    OrDie(reverter.Revert(30));
+    const Revision others = OrDie(reader->Head()).revision;
+    while (!cursor->done()) {
+      message.Clear();
+      OrDie(cursor->Next(query::CallContext(), &message));
+    }
+    EXPECT_GT(message.revision(), others);
+    ExpectSame(*OrDie(reader->Latest()), *OrDie(reader->At(2)));
+    OrDie(reverter.Revert(30));
+  }
+  EXPECT_TRUE(OrDie(reader->Verify(nullptr)).problems.empty());
+}
+
+TEST(Revert, CountsARowThatChangesOnce) {
+  TestMap map;
+  map.MustCommit(DeltaOfNodes({MakeHuman(1, "anna"), MakeHuman(2, "bert")}));
+  GraphDelta walk;
+  walk.appends = {
+      {NodeId('H', 1),
+       {PoseAt(1 * kNsPerSecond, 1.0, 0.0, 0.0), PoseAt(2 * kNsPerSecond, 2.0, 0.0, 0.0)}}};
+  const Revision then = map.MustCommit(std::move(walk));
+  GraphDelta changes = DeltaOfNodes({MakeHuman(1, "anne"), MakeHuman(3, "carl")});
+  changes.corrections = {
+      {NodeId('H', 1), 1, 3 * kNsPerSecond, {PoseAt(1 * kNsPerSecond, 1.5, 0.0, 0.0)}}};
+  map.MustCommit(std::move(changes));
+  map.Close();
+  Reverter reverter(map.folder());
+  const auto back = OrDie(reverter.Revert(then));
+  EXPECT_EQ(back.added().node_count(), 1);
+  EXPECT_EQ(back.removed().node_count(), 1);
+  EXPECT_EQ(back.added().pose_count(), 2);
+  EXPECT_EQ(back.removed().pose_count(), 0);
 }
 
 TEST(StoredAsBefore, GivesWhatTheCodecStoresAsTheSameNumbers) {

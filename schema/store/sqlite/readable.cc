@@ -6,6 +6,23 @@
 #include "absl/strings/str_cat.h"
 
 namespace dsg::sqlite {
+namespace {
+
+// "6 to 10 and the tagged 2, 4".
+std::string NamesOf(const Readable& readable, Revision newest) {
+  constexpr size_t kNamedMax = 20;
+  std::string text = absl::StrCat(readable.oldest, " to ", newest);
+  size_t count = 0;
+  for (const Revision tagged : readable.tagged) {
+    if (tagged >= readable.oldest) break;
+    if (count == kNamedMax) return absl::StrCat(text, " and others with tags");
+    absl::StrAppend(&text, count == 0 ? " and the tagged " : ", ", tagged);
+    ++count;
+  }
+  return text;
+}
+
+}  // namespace
 
 bool Readable::Holds(Revision revision) const {
   return revision >= oldest || std::binary_search(tagged.begin(), tagged.end(), revision);
@@ -36,23 +53,16 @@ absl::Status FutureError(const std::string& map, Revision revision, Revision new
   return MakeError(
       Reason::kRevisionInFuture,
       absl::StrCat("revision ", revision, " of map \"", map, "\" does not exist; readable are ",
-                   readable.oldest, " to ", newest),
+                   NamesOf(readable, newest)),
       {{"map", map}, {"oldest", absl::StrCat(readable.oldest)}, {"newest", absl::StrCat(newest)}});
 }
 
 absl::Status CompactedError(const std::string& map, Revision revision, Revision newest,
                             const Readable& readable) {
-  std::string text =
-      absl::StrCat("revision ", revision, " of map \"", map,
-                   "\" has been compacted away; readable are ", readable.oldest, " to ", newest);
-  const char* separator = " and the tagged ";
-  for (const Revision tagged : readable.tagged) {
-    if (tagged >= readable.oldest) continue;
-    absl::StrAppend(&text, separator, tagged);
-    separator = ", ";
-  }
   return MakeError(
-      Reason::kRevisionCompacted, text,
+      Reason::kRevisionCompacted,
+      absl::StrCat("revision ", revision, " of map \"", map,
+                   "\" has been compacted away; readable are ", NamesOf(readable, newest)),
       {{"map", map}, {"oldest", absl::StrCat(readable.oldest)}, {"newest", absl::StrCat(newest)}});
 }
 

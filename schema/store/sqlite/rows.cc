@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
+#include "schema/store/time_range.h"
 
 namespace dsg::sqlite {
 namespace {
@@ -21,15 +22,6 @@ int64_t FloorDivide(Int128 value, int64_t divisor) {
   if (value % divisor != 0 && value < 0) --quotient;
   return static_cast<int64_t>(
       std::clamp<Int128>(quotient, std::numeric_limits<int64_t>::min(), kTimeMax));
-}
-
-absl::StatusOr<int64_t> CheckTenths(int64_t tenths, TimeNs time_ns, const MapSpec& spec) {
-  if (tenths >= kInt32Min && tenths <= kInt32Max) return tenths;
-  return MakeError(Reason::kTimeOutsideMap,
-                   absl::StrCat("time ", time_ns, " ns is more than 6.8 years from the epoch ",
-                                spec.epoch_ns, " ns of map \"", spec.name,
-                                "\"; check the clock, or use a map with another epoch"),
-                   {{"map", spec.name}, {"time_ns", absl::StrCat(time_ns)}});
 }
 
 }  // namespace
@@ -70,13 +62,13 @@ IntBox ToMillimetres(const Box3d& box) {
 }
 
 absl::StatusOr<int64_t> ToTenthsFloor(TimeNs time_ns, const MapSpec& spec) {
-  return CheckTenths(FloorDivide(static_cast<Int128>(time_ns) - spec.epoch_ns, kTenthNs), time_ns,
-                     spec);
+  DSG_RETURN_IF_ERROR(CheckTimeInMap(time_ns, spec));
+  return FloorDivide(static_cast<Int128>(time_ns) - spec.epoch_ns, kTenthNs);
 }
 
 absl::StatusOr<int64_t> ToTenthsCeil(TimeNs time_ns, const MapSpec& spec) {
-  return CheckTenths(-FloorDivide(static_cast<Int128>(spec.epoch_ns) - time_ns, kTenthNs), time_ns,
-                     spec);
+  DSG_RETURN_IF_ERROR(CheckTimeInMap(time_ns, spec));
+  return -FloorDivide(static_cast<Int128>(spec.epoch_ns) - time_ns, kTenthNs);
 }
 
 int64_t ClampToTenths(TimeNs time_ns, const MapSpec& spec) {

@@ -5,64 +5,19 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <sstream>
 
 #include "dsg/v1/maintenance_service.pb.h"
-#include "query/cli/run.h"
+#include "query/cli/render_merge.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 #include "tests/unit/query/engine/office.h"
+#include "tests/unit/query/engine/two_halves.h"
 #include "tests/unit/schema/merge/perceived_half.h"
 
 namespace dsg::query {
 namespace {
 
-// Maps "west" and "east" of an apartment, seen with noise in frames of their own.
-class TwoHalves {
- public:
-  TwoHalves() {
-    const simulator::World world = test::MakeWorld(simulator::WorldKind::kWing, 1);
-    auto store = *GraphStore::Open(folder_.path(), {});
-    test::PerceiveOptions west;
-    west.to = 0.65;
-    west.seed = 5;
-    test::StoreMap(store.get(), "west", test::Perceive(world, west).delta);
-    test::PerceiveOptions east;
-    east.from = 0.3;
-    east.seed = 6;
-    east.map_T_world = test::SomeTransform(6);
-    truth_ = east.map_T_world.Inverse();
-    test::StoreMap(store.get(), "east", test::Perceive(world, east).delta);
-  }
-
-  const std::string& folder() const { return folder_.path(); }
-  const Pose3d& truth() const { return truth_; }
-
-  absl::StatusOr<std::vector<v1::MergeMapsResponse>> Merge(const v1::MergeMapsRequest& request) {
-    const auto core = test::OpenCore(folder());
-    std::vector<v1::MergeMapsResponse> messages;
-    DSG_RETURN_IF_ERROR(
-        core->MergeMaps(CallContext(), request, [&](const v1::MergeMapsResponse& message) {
-          messages.push_back(message);
-          return true;
-        }));
-    return messages;
-  }
-
-  int Run(std::vector<std::string> arguments, std::string* out, std::string* errors) {
-    arguments.insert(arguments.begin() + 1, {"--store", folder()});
-    std::ostringstream text;
-    std::ostringstream problems;
-    const int code = cli::Run(arguments, {}, text, problems);
-    *out = text.str();
-    *errors = problems.str();
-    return code;
-  }
-
- private:
-  test::TempFolder folder_;
-  Pose3d truth_;
-};
+using test::TwoHalves;
 
 v1::MergeMapsRequest WestWithEast() {
   v1::MergeMapsRequest request;
@@ -144,6 +99,42 @@ TEST(MergeVerb, TellsInATableAndDrawsBoth) {
   EXPECT_NE(out.find("\nrevision "), std::string::npos) << out;
 }
 
+TEST(MergeVerb, WarnsWhenNothingAgreesWithTheTransform) {
+  TwoHalves halves;
+  std::string out;
+  std::string errors;
+  EXPECT_EQ(halves.Run({"merge", "--map", "west", "east", "--dry-run", "--transform", "500,0,0,0"},
+                       &out, &errors),
+            0)
+      << errors;
+  EXPECT_NE(out.find("things agreeing  0\n"), std::string::npos) << out;
+  EXPECT_NE(out.find("they differ by   -\n"), std::string::npos) << out;
+  EXPECT_NE(out.find("warning: no thing of east is one of west"), std::string::npos) << out;
+  EXPECT_NE(out.find("--transform X,Y,Z,YAW"), std::string::npos) << out;
+  EXPECT_EQ(halves.Run({"merge", "--map", "west", "east"}, &out, &errors), 0) << errors;
+  EXPECT_EQ(out.find("warning"), std::string::npos) << out;
+  EXPECT_EQ(halves.Run({"merge", "--map", "west", "east"}, &out, &errors), 0) << errors;
+  EXPECT_EQ(out.find("warning"), std::string::npos) << out;
+  EXPECT_EQ(halves.Run({"log", "--map", "west"}, &out, &errors), 0) << errors;
+  EXPECT_NE(out.find("merge of east revision 1, part 1 at "), std::string::npos) << out;
+}
+
+TEST(MergeVerb, WarnsWhenAnEstimateRestsOnFewThings) {
+  v1::MergeMapsResponse reply;
+  reply.set_agreeing_count(4);
+  reply.set_fused_object_count(4);
+  reply.set_added_node_count(9);
+  EXPECT_NE(cli::RenderMerge(reply, {.map = "a", .other = "b"})
+                .find("warning: the transform rests "
+                      "on 4 things only"),
+            std::string::npos);
+  EXPECT_EQ(
+      cli::RenderMerge(reply, {.map = "a", .other = "b", .has_transform = true}).find("warning"),
+      std::string::npos);
+  reply.set_agreeing_count(8);
+  EXPECT_EQ(cli::RenderMerge(reply, {.map = "a", .other = "b"}).find("warning"), std::string::npos);
+}
+
 TEST(MergeVerb, TakesATransformOfFourOrSevenNumbersAndNoOther) {
   TwoHalves halves;
   std::string out;
@@ -155,9 +146,10 @@ TEST(MergeVerb, TakesATransformOfFourOrSevenNumbersAndNoOther) {
         << errors;
     EXPECT_NE(out.find("1.000,2.000,0.000"), std::string::npos) << out;
   }
-  for (const char* text : {"1,2", "1,2,3,nan", "1,2,3,x", "1,2,3,0,0,0,0"}) {
+  for (const char* text : {"1,2", "1,2,3,nan", "1,2,3,x", "1,2,3,0,0,0,0", "1,2,3,4,5"}) {
     EXPECT_EQ(halves.Run({"merge", "--map", "west", "east", "--transform", text}, &out, &errors), 2)
         << text;
+    EXPECT_NE(errors.find("--transform"), std::string::npos) << errors;
   }
 }
 

@@ -254,6 +254,76 @@ TEST(Merge, NumbersLayersAndClassesAsTheMapDoes) {
   EXPECT_EQ(plan.class_of.at(2), 1u);
 }
 
+// Of an agent that only the other map observes: x at each second.
+std::vector<double> TrackOf(SmallMaps* maps, const std::string& map, NodeId agent) {
+  std::vector<double> xs;
+  EXPECT_TRUE(maps->Newest(map)
+                  ->ReadPoses(agent, kTimeMin, kTimeMax, {},
+                              [&](const TimedPose& pose) {
+                                xs.push_back(pose.map_T_agent.position.x());
+                                return true;
+                              })
+                  .ok());
+  return xs;
+}
+
+TEST(Merge, CarriesCorrectionsOfATrackThatItCopied) {
+  constexpr NodeId kAnna('H', 1);
+  SmallMaps maps;
+  maps.Commit("a", Home());
+  GraphDelta b = HomeAgain();
+  b.nodes.push_back(MakeAgent(kAnna, "anna"));
+  b.appends = {MakeTrack(kAnna, 0, 12)};
+  maps.Commit("b", std::move(b));
+  MergeOptions in_small_parts;
+  in_small_parts.batch_row_count = 5;
+  const NodeId mine = maps.Merge("a", "b", {}, in_small_parts).node_ids.at(kAnna);
+  // A loop closure moves three poses; two more are observed.
+  GraphDelta change;
+  TrajectoryAppend moved = MakeTrack(kAnna, 0, 14);
+  for (TimedPose& pose : moved.poses) pose.map_T_agent.position.x() += 0.5;
+  change.corrections = {{kAnna,
+                         6 * kNsPerSecond,
+                         9 * kNsPerSecond,
+                         {moved.poses.begin() + 6, moved.poses.begin() + 9}}};
+  change.appends = {{kAnna, {moved.poses.begin() + 12, moved.poses.end()}}};
+  maps.Commit("b", std::move(change));
+  maps.Merge("a", "b", {}, in_small_parts);
+  EXPECT_EQ(TrackOf(&maps, "a", mine), TrackOf(&maps, "b", kAnna));
+  EXPECT_EQ(maps.Write("a", "b", *maps.Plan("a", "b")), 0);
+  // What the other map forgets stays.
+  GraphDelta forgotten;
+  forgotten.corrections = {{kAnna, 2 * kNsPerSecond, 7 * kNsPerSecond, {}}};
+  maps.Commit("b", std::move(forgotten));
+  EXPECT_EQ(maps.Write("a", "b", *maps.Plan("a", "b")), 0);
+  EXPECT_EQ(TrackOf(&maps, "a", mine).size(), 14u);
+  EXPECT_TRUE(maps.Problems("a").empty());
+}
+
+TEST(Merge, MovesACopyToTheParentAndPlaceThatTheOtherMapNamesNow) {
+  SmallMaps maps;
+  maps.Commit("a", Home());
+  maps.Commit("b", HomeAgain());
+  const NodeId lamp = maps.Merge("a", "b").node_ids.at(O(0));
+  EXPECT_TRUE(maps.Has("a", {P(0), "CONTAINS", lamp}));
+  GraphDelta change;
+  Node parent = MakePlace(6, {2.2, 2, 0}, 0.8);
+  parent.box_node = Box3d(Eigen::Vector3d(-4, -4, 0), Eigen::Vector3d(4, 4, 2));
+  change.nodes = {parent};
+  change.edges = {MakeEdge(P(6), "CONTAINS", O(0)), MakeEdge(O(0), "NEAREST_PLACE", P(5))};
+  change.edge_removals = {{P(5), "CONTAINS", O(0)}, {O(0), "NEAREST_PLACE", P(6)}};
+  maps.Commit("b", std::move(change));
+  const NodeId place = maps.Merge("a", "b").node_ids.at(P(6));
+  EXPECT_TRUE(maps.Has("a", {place, "CONTAINS", lamp}));
+  EXPECT_FALSE(maps.Has("a", {P(0), "CONTAINS", lamp}));
+  EXPECT_TRUE(maps.Has("a", {lamp, "NEAREST_PLACE", P(0)}));
+  EXPECT_FALSE(maps.Has("a", {lamp, "NEAREST_PLACE", place}));
+  // What this map had stays as it was.
+  EXPECT_TRUE(maps.Has("a", {P(0), "CONTAINS", O(0)}));
+  EXPECT_EQ(maps.Write("a", "b", *maps.Plan("a", "b")), 0);
+  EXPECT_TRUE(maps.Problems("a").empty());
+}
+
 TEST(Merge, RefusesWhatCannotBeMerged) {
   SmallMaps maps;
   maps.Commit("a", Home());
@@ -278,6 +348,69 @@ TEST(Merge, RefusesWhatCannotBeMerged) {
   other_level.layers = {{8, "level", 470}};
   maps.Commit("b", std::move(other_level));
   EXPECT_EQ(ReasonOf(maps.Plan("a", "b").status()), Reason::kFramesIncompatible);
+}
+
+// x far beyond what a map may hold; the plan is what a dry run shows.
+TEST(Merge, RefusesATransformThatLeadsBeyondTheCoordinatesOfAMap) {
+  const Pose3d far{{1e9, 0, 0}, Eigen::Quaterniond::Identity()};
+  GraphDelta of_nodes;
+  of_nodes.nodes = {MakeObject(0, "chair", {1, 1, 0.4})};
+  GraphDelta of_mesh;
+  MeshBlock block;
+  block.index = {1, 0, 0};
+  block.positions_map = {{2.1f, 0, 0}, {2.2f, 0, 0}, {2.1f, 0.1f, 0}};
+  block.faces = {{0, 1, 2}};
+  of_mesh.mesh_blocks = {block};
+  SmallMaps maps;
+  maps.Commit("a", Home());
+  maps.Commit("nodes", std::move(of_nodes));
+  maps.Commit("mesh", std::move(of_mesh));
+  for (const char* other : {"nodes", "mesh"}) {
+    const absl::Status refused = maps.Plan("a", other, far).status();
+    EXPECT_EQ(ReasonOf(refused), Reason::kFieldInvalid) << other << refused;
+    EXPECT_EQ(MetadataOf(refused)["field"], "map_t_other");
+    EXPECT_EQ(MetadataOf(refused)["bound"], "2e+06") << refused;
+    EXPECT_NE(std::string(refused.message()).find("2000000 m"), std::string::npos) << refused;
+  }
+}
+
+TEST(Merge, RefusesTracksThatLeadBeyondTheCoordinatesOrTheTimesOfAMap) {
+  SmallMaps maps;
+  maps.Commit("a", Home());
+  GraphDelta walk;
+  walk.nodes = {MakeAgent(NodeId('H', 1), "anna")};
+  walk.appends = {MakeTrack(NodeId('H', 1), 0, 10)};
+  walk.appends[0].poses[7].map_T_agent.position.x() = 1.9e6;
+  maps.Commit("b", std::move(walk));
+  EXPECT_TRUE(maps.Plan("a", "b", {{9e4, 0, 0}, Eigen::Quaterniond::Identity()}).ok());
+  const Pose3d far{{2e5, 0, 0}, Eigen::Quaterniond::Identity()};
+  const absl::Status refused = maps.Plan("a", "b", far).status();
+  EXPECT_EQ(ReasonOf(refused), Reason::kFieldInvalid) << refused;
+  EXPECT_NE(std::string(refused.message()).find("a pose of agent H1"), std::string::npos);
+
+  MapSpec late;
+  late.name = "late";
+  late.codec = TrajectoryCodec::kLossless;
+  late.epoch_ns = int64_t{50} * 365 * 86'400 * kNsPerSecond;
+  ASSERT_TRUE(maps.store()->CreateMap(late).ok());
+  GraphDelta late_walk;
+  late_walk.nodes = {MakeAgent(NodeId('H', 1), "bert")};
+  late_walk.appends = {MakeTrack(NodeId('H', 1), late.epoch_ns, 10)};
+  maps.Commit("late", std::move(late_walk));
+  const absl::Status late_refused = maps.Plan("a", "late").status();
+  EXPECT_EQ(ReasonOf(late_refused), Reason::kTimeOutsideMap) << late_refused;
+  EXPECT_NE(std::string(late_refused.message()).find("H1"), std::string::npos) << late_refused;
+}
+
+TEST(Merge, RefusesNodesThatTheMapCouldNotHold) {
+  SmallMaps maps;
+  maps.Commit("a", Home());
+  GraphDelta b = HomeAgain();
+  for (int i = 0; i < 63; ++i) b.nodes[0].attributes["attribute" + std::to_string(i)] = 1.0;
+  maps.Commit("b", std::move(b));
+  const absl::Status refused = maps.Plan("a", "b").status();
+  EXPECT_EQ(ReasonOf(refused), Reason::kDeltaInvalid) << refused;
+  EXPECT_NE(std::string(refused.message()).find("65 attributes"), std::string::npos) << refused;
 }
 
 TEST(Merge, UnitesTheOutlinesOfARoomThatBothSawAPartOf) {
