@@ -89,18 +89,25 @@ void PruneSchedule::RunOnce() {
 
 void PruneSchedule::RunMap(const std::string& map) {
   const absl::Status status = PruneMap(map, file_.policies);
-  if (status.ok() || call_.cancelled()) return;
-  if (file_.policies.size() == 1) return LogFailure(map, file_.policies.front(), status);
+  if (call_.cancelled()) return;
+  const bool are_alone = !status.ok() && file_.policies.size() > 1;
   // One that cannot be applied must not keep the others from it.
   for (const PrunePolicy& policy : file_.policies) {
-    const absl::Status alone = PruneMap(map, {policy});
+    absl::Status result = are_alone ? PruneMap(map, {policy}) : status;
     if (call_.cancelled()) return;
-    if (!alone.ok()) LogFailure(map, policy, alone);
+    // Among others a branch that is gone matches nothing.
+    if (are_alone && ReasonOf(result) == Reason::kNodeUnknown) result = absl::OkStatus();
+    Report(map, policy, result);
   }
 }
 
-void PruneSchedule::LogFailure(const std::string& map, const PrunePolicy& policy,
-                               const absl::Status& status) {
+void PruneSchedule::Report(const std::string& map, const PrunePolicy& policy,
+                           const absl::Status& status) {
+  const auto [at, is_new] = told_.try_emplace({map, policy.name}, absl::OkStatus());
+  const bool is_told = !is_new && !status.ok() && status.code() == at->second.code() &&
+                       ReasonOf(status) == ReasonOf(at->second);
+  at->second = status;
+  if (status.ok() || is_told) return;
   Log(LogLevel::kWarning, "policy not applied to map",
       {{"map", map}, {"policy", policy.name}, {"error", std::string(status.message())}});
 }

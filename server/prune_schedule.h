@@ -6,8 +6,10 @@
 
 #include <chrono>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "query/engine/service_core.h"
@@ -38,8 +40,8 @@ class ScheduleClock {
 std::unique_ptr<ScheduleClock> MakeScheduleClock();
 
 /// Runs the policies at start + first_after, and then every `file.every_ns` after the begin of the
-/// run before (at once if that took longer). An error ends the work on that map until the next run,
-/// with a line in the log; the other maps are done.
+/// run before (at once if that took longer). A policy that cannot be applied to a map does not keep
+/// the others from it, nor the other maps; the log says so once, and again when the reason changes.
 ///
 /// Threads: Run blocks its thread until Stop, which any thread may call.
 class PruneSchedule {
@@ -56,14 +58,16 @@ class PruneSchedule {
   void RunOnce();
   void RunMap(const std::string& map);
   absl::Status PruneMap(const std::string& map, const std::vector<PrunePolicy>& policies);
-  static void LogFailure(const std::string& map, const PrunePolicy& policy,
-                         const absl::Status& status);
+  /// Warns of a failure that is not the one of the run before.
+  void Report(const std::string& map, const PrunePolicy& policy, const absl::Status& status);
 
   query::ServiceCore* const core_;
   const PolicyFile file_;
   const PruneScheduleOptions options_;
   const std::unique_ptr<ScheduleClock> clock_;
   query::CallContext call_;
+  /// By map and policy: how the run before ended.
+  std::map<std::pair<std::string, std::string>, absl::Status> told_;
 };
 
 }  // namespace dsg::server

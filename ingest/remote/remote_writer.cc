@@ -34,8 +34,12 @@ struct Connection {
 absl::Status Advise(const absl::Status& status, const std::string& address) {
   constexpr char kGoesOn[] = "then run the same dsg-ingest again: it goes on where it stopped";
   switch (ReasonOf(status)) {
-    case Reason::kDiskFull:
     case Reason::kQuotaExceeded:
+      // The server says how to make room; only where, and what then, is missing.
+      return MakeError(Reason::kQuotaExceeded,
+                       absl::StrCat(status.message(), " of server ", address, ", ", kGoesOn),
+                       MetadataOf(status));
+    case Reason::kDiskFull:
       return Annotate(status, absl::StrCat("server ", address,
                                            " takes no more; make room on its disk, or forget with "
                                            "dsg prune, ",

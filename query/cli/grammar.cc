@@ -49,6 +49,7 @@ CLI::App* Grammar::AddApp(const std::string& name, const std::string& what, unsi
 absl::Status Grammar::Parse(std::vector<std::string> arguments) {
   // CLI11 would only say that a subcommand is missing.
   if (arguments.empty()) return Usage("say what is wanted: where, who, find, path, ...", "");
+  if (arguments[0] == "--version") arguments[0] = "version";
   const std::string first = arguments[0];
   const auto is_first = [&](const CLI::App* verb) { return verb->check_name(first); };
   const bool is_verb = !app_.get_subcommands(is_first).empty();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The grammar of the verb prune.
 #include "query/cli/grammar.h"
+#include "query/cli/number_checks.h"
 
 namespace dsg::cli {
 
@@ -17,6 +18,11 @@ void AddPruneVerb(Grammar* grammar) {
   what->add_option("--unseen-since", verb->unseen_since, "Nodes last observed before this TIME");
   what->add_option("--unseen-for", verb->unseen_for,
                    "The same, counted back from the newest observation");
+  what->add_option("--history-older-than", verb->history_older_than,
+                   "Revisions committed longer ago than this that have no tag: 30d");
+  what->add_option("--history-before", verb->history_before,
+                   "Revisions before this one that have no tag")
+      ->check(WholeZeroOrMore());
   CLI::Option* file =
       what->add_option("--policy", verb->policy_file, "A file of policies (docs/forgetting.md)");
   what->require_option(0, 1);
@@ -24,7 +30,7 @@ void AddPruneVerb(Grammar* grammar) {
       app->add_option("--simplify", verb->simplify_m,
                       "Do not forget tracks but thin them: drop poses that interpolation gives "
                       "back within so many metres")
-          ->check(CLI::PositiveNumber);
+          ->check(AboveZero());
   CLI::Option* only =
       app->add_option("--only", verb->only, "Only of this layer; may be given several times");
   CLI::Option* retire = app->add_flag_callback(
@@ -34,7 +40,8 @@ void AddPruneVerb(Grammar* grammar) {
   erase->excludes(retire);
   for (CLI::Option* other : {simplify, only, retire, erase}) file->excludes(other);
   app->add_flag("--dry-run", verb->dry_run, "Only say what would go");
-  app->add_flag("--yes", verb->yes, "Do not ask when a policy matches every node or every pose");
+  app->add_flag("--yes", verb->yes,
+                "Do not ask when a policy matches every node, every pose or the only building");
 }
 
 }  // namespace dsg::cli

@@ -3,6 +3,8 @@
 // Refuses to know what times and boxes mean: they stay text until the map is open.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +19,8 @@ struct PruneVerb {
   std::string layer;
   std::string unseen_since;
   std::string unseen_for;
+  std::string history_older_than;
+  std::optional<int64_t> history_before;
   std::string policy_file;
   /// Empty = all layers.
   std::vector<std::string> only;

@@ -45,8 +45,8 @@ std::string AmountText(const v1::Amount& amount) {
 std::string RenderCompact(const v1::CompactResponse& reply) {
   return absl::StrCat(
       "dropped ", Counted(reply.revision_count(), "revision"), " and ",
-      Counted(reply.row_count(), "row"), "; readable from revision ", reply.oldest_revision(),
-      " on; ", BytesText(reply.file_bytes_before()), " before, ",
+      Counted(reply.row_count(), "row"), "; readable are revision ", reply.oldest_revision(),
+      " and later, and those with tags; ", BytesText(reply.file_bytes_before()), " before, ",
       BytesText(reply.file_bytes_after()), " now",
       reply.shrunk() ? ""
                      : "; a reader keeps the file from shrinking, which it will at a later time",
@@ -55,7 +55,7 @@ std::string RenderCompact(const v1::CompactResponse& reply) {
 
 std::string RenderRevert(const v1::RevertResponse& reply, const std::string& to, bool is_dry_run) {
   const std::string changes =
-      absl::StrCat("written ", AmountText(reply.added()), "; gone ", AmountText(reply.removed()));
+      absl::StrCat("restored ", AmountText(reply.added()), "; gone ", AmountText(reply.removed()));
   if (is_dry_run) return absl::StrCat("would go back to ", to, ": ", changes, "\n");
   if (reply.revision() == 0) {
     return absl::StrCat("the map is what it was at ", to, " already; nothing written\n");

@@ -70,7 +70,12 @@ std::string RenderMaps(const v1::ListMapsResponse& reply) {
                   CodecText(map.codec()), DurationText(0, map.gap_ns_max()),
                   Fixed(map.mesh_block_size_m(), 1)});
   }
-  return table.Render();
+  std::string text = table.Render();
+  for (const std::string& name : reply.unreadable_maps()) {
+    absl::StrAppend(&text, "map ", Printable(name),
+                    " cannot be opened; dsg verify or a question to it says why\n");
+  }
+  return text;
 }
 
 std::string RenderStats(const v1::GetMapStatsResponse& reply, const TimeText& times) {

@@ -48,6 +48,29 @@ Table TableOf(const std::vector<Row>& rows) {
   return table;
 }
 
+// What is kept but for a name in it is no row that goes.
+std::string StaysText(const v1::PolicyReport& policy) {
+  const int64_t count = policy.matched().stay_edit_count();
+  if (count == 0) return "";
+  return absl::StrCat(
+      Printable(policy.name()), ": ", Counted(count, "stay"),
+      count == 1 ? " loses its place or room and stays\n" : " lose their place or room and stay\n");
+}
+
+std::string FilesText(const v1::PruneResponse& reply) {
+  return absl::StrCat("database: ", BytesText(reply.file_bytes_before() - reply.log_bytes_before()),
+                      " before, ", BytesText(reply.file_bytes_after() - reply.log_bytes_after()),
+                      " now; log, used again: ", BytesText(reply.log_bytes_before()), " before, ",
+                      BytesText(reply.log_bytes_after()), " now\n");
+}
+
+// Something but history went.
+bool HasRows(const v1::PruneResponse& reply) {
+  const v1::Amount& before = reply.map_before();
+  const v1::Amount& after = reply.map_after();
+  return reply.revision() > 0 && before.byte_count() > after.byte_count();
+}
+
 }  // namespace
 
 std::string RenderPrune(const v1::PruneResponse& reply, bool is_dry_run, bool is_erase) {
@@ -58,9 +81,9 @@ std::string RenderPrune(const v1::PruneResponse& reply, bool is_dry_run, bool is
   rows.emplace_back(is_dry_run ? "map" : "map before", &reply.map_before());
   if (!is_dry_run) rows.emplace_back("map after", &reply.map_after());
   std::string text = TableOf(rows).Render();
+  for (const v1::PolicyReport& policy : reply.policies()) text += StaysText(policy);
   if (is_dry_run) return text + "nothing was changed\n";
-  absl::StrAppend(&text, "files: ", BytesText(reply.file_bytes_before()), " before, ",
-                  BytesText(reply.file_bytes_after()), " now\n");
+  text += FilesText(reply);
   if (reply.revision() == 0) {
     absl::StrAppend(&text, "no new revision\n");
   } else {
@@ -71,6 +94,8 @@ std::string RenderPrune(const v1::PruneResponse& reply, bool is_dry_run, bool is
                                ? "erased: no revision knows it, and no byte of it is in the map's "
                                  "files; backups made before still have it\n"
                                : "not erased for good: a reader kept the log; do the same again\n");
+  } else if (HasRows(reply)) {
+    text += "older revisions still know it: `dsg compact` gives their bytes back\n";
   }
   return text;
 }

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "query/cli/tag_names.h"
 
+#include <vector>
+
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/maintenance_service.pb.h"
 #include "schema/base/status.h"
+#include "schema/store/tag_list.h"
 
 namespace dsg::cli {
 
@@ -20,16 +23,16 @@ absl::StatusOr<Revision> NumberOf(const RevisionOption& revision, Revision unset
                                   Session* session) {
   if (revision.tag.empty()) return revision.number.value_or(unset);
   DSG_ASSIGN_OR_RETURN(const v1::ListTagsResponse reply, ReadTags(session));
-  std::string known;
+  std::vector<Tag> tags;
   for (const v1::Tag& tag : reply.tags()) {
     if (tag.name() == revision.tag) return tag.revision();
-    absl::StrAppend(&known, known.empty() ? "" : ", ", tag.name());
+    tags.emplace_back().name = tag.name();
   }
   const std::string& map = session->map().name;
-  return MakeError(Reason::kTagUnknown,
-                   absl::StrCat("map \"", map, "\" has no tag \"", revision.tag, "\"; it has ",
-                                known.empty() ? "none" : known),
-                   {{"map", map}, {"tag", revision.tag}});
+  return MakeError(
+      Reason::kTagUnknown,
+      absl::StrCat("map \"", map, "\" has no tag \"", revision.tag, "\"; it has ", TagNames(tags)),
+      {{"map", map}, {"tag", revision.tag}});
 }
 
 }  // namespace dsg::cli

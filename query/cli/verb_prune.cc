@@ -46,6 +46,11 @@ absl::StatusOr<PrunePolicy::What> WhatOf(const PruneVerb& verb, TimeNs epoch_ns)
     DSG_ASSIGN_OR_RETURN(const TimeNs age_ns, ParseAge(verb.unseen_for));
     return PrunePolicy::UnseenFor{age_ns};
   }
+  if (!verb.history_older_than.empty()) {
+    DSG_ASSIGN_OR_RETURN(const TimeNs age_ns, ParseAge(verb.history_older_than));
+    return PrunePolicy::HistoryOlderThan{age_ns};
+  }
+  if (verb.history_before.has_value()) return PrunePolicy::HistoryBefore{*verb.history_before};
   return PrunePolicy::What();
 }
 
@@ -62,7 +67,8 @@ absl::StatusOr<std::vector<PrunePolicy>> PoliciesOf(const PruneVerb& verb, TimeN
   if (std::holds_alternative<std::monostate>(policy.what) && !policy.IsThinning()) {
     return MakeError(Reason::kFieldInvalid,
                      "say what to forget: --branch, --region, --before, --older-than, --layer, "
-                     "--unseen-since, --unseen-for, --simplify or --policy");
+                     "--unseen-since, --unseen-for, --history-older-than, --history-before, "
+                     "--simplify or --policy");
   }
   DSG_RETURN_IF_ERROR(policy.Validate());
   return std::vector<PrunePolicy>{policy};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "query/cli/written.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "absl/strings/str_cat.h"
@@ -17,7 +18,9 @@ void TellWritten(const std::vector<Written>& files, Revision revision, bool as_j
     nlohmann::ordered_json one = {{"format", file.format}, {"path", file.path}};
     for (const auto& [what, count] : file.counts) {
       absl::StrAppend(&text, count, " ", what, ", ");
-      one[what] = std::to_string(count);
+      std::string key = what;
+      std::replace(key.begin(), key.end(), ' ', '_');
+      one[key] = std::to_string(count);
     }
     one["byte_count"] = std::to_string(file.byte_count);
     json["files"].push_back(std::move(one));

@@ -18,6 +18,7 @@
 #include "schema/base/status.h"
 #include "schema/retention/batches.h"
 #include "schema/retention/plan.h"
+#include "schema/store/log_bytes.h"
 
 namespace dsg::query {
 namespace {
@@ -127,14 +128,15 @@ class Prune final : public PruneCursor {
       return MakeError(
           Reason::kPolicyMatchesAll,
           absl::StrCat("map \"", map_, "\": ", plan.all_matching_policy,
-                       " matches every node or every pose; nothing was forgotten. Narrow it, or "
-                       "say that everything may go"),
+                       " matches every node, every pose or the only building; nothing was "
+                       "forgotten. Narrow it, or say that everything may go"),
           {{"map", map_}, {"policy", plan.all_matching_policy}});
     }
     DSG_ASSIGN_OR_RETURN(before_, CountMap(*map, call.stop()));
     DSG_ASSIGN_OR_RETURN(const MapStats stats, map->Stats());
     before_.revision_count = stats.at.revision;
     file_bytes_before_ = stats.bytes_on_disk;
+    log_bytes_before_ = LogBytesOnDisk(maps_->store(), map_);
     reply->clear_policies();
     for (const PolicyMatch& match : plan.policies) {
       v1::PolicyReport* const report = reply->add_policies();
@@ -171,6 +173,7 @@ class Prune final : public PruneCursor {
           is_clean_ = report.is_clean;
           return report.was_pending ? absl::OkStatus() : failure;
         }));
+    maps_->archives().EndOf(map_);
     DSG_ASSIGN_OR_RETURN(before_, CountMap(*opened.map, call.stop()));
     reply->clear_policies();
     reply->add_policies()->set_name(policies_.front().name);
@@ -260,6 +263,8 @@ class Prune final : public PruneCursor {
     double fraction = 0.0;
     const auto tell = [&](double done) { fraction = done; };
     bool is_over = false;
+    // A copy that is being made keeps the log from being cut.
+    maps_->archives().EndOf(map_);
     const absl::Status status =
         maps_->WithWriter(map_, call.stop(), [&](MapWriter& writer) -> absl::Status {
           DSG_ASSIGN_OR_RETURN(const EraseReport report, writer.Erase(*erasure_, stop, tell));
@@ -271,7 +276,10 @@ class Prune final : public PruneCursor {
     if (!status.ok()) {
       return slice_is_over && absl::IsCancelled(status) ? absl::OkStatus() : status;
     }
-    return is_over ? AfterErase() : absl::OkStatus();
+    if (!is_over) return absl::OkStatus();
+    // Those that began meanwhile hold the bytes, too.
+    maps_->archives().EndOf(map_);
+    return AfterErase();
   }
 
   absl::Status CompactSlice(const CallContext& call) {
@@ -294,6 +302,8 @@ class Prune final : public PruneCursor {
     ToProto(after, reply->mutable_map_after());
     reply->set_file_bytes_before(file_bytes_before_);
     reply->set_file_bytes_after(stats.bytes_on_disk);
+    reply->set_log_bytes_before(log_bytes_before_);
+    reply->set_log_bytes_after(LogBytesOnDisk(maps_->store(), map_));
     reply->set_erased(erasure_.has_value() && !is_dry_run_ && is_clean_);
     DSG_RETURN_IF_ERROR(FillHeader(reader.get(), *map, reply));
     progress_ = 1.0;
@@ -315,6 +325,7 @@ class Prune final : public PruneCursor {
   std::chrono::milliseconds erase_slice_ = kEraseSlice;
   Amount before_;
   int64_t file_bytes_before_ = 0;
+  int64_t log_bytes_before_ = 0;
   bool has_changes_ = false;
   bool is_clean_ = false;
   // The newest revision that the plan was compared with, or that it wrote.
@@ -328,14 +339,14 @@ class Prune final : public PruneCursor {
 
 absl::StatusOr<std::unique_ptr<PruneCursor>> OpenPrune(MapTable* maps,
                                                        const v1::PruneRequest& request) {
-  DSG_RETURN_IF_ERROR(maps->Reader(request.map()).status());
+  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> map, maps->Reader(request.map()));
   if (request.policies().empty() || request.policies_size() > kPolicyCountMax) {
     return FieldError("policies", absl::StrCat(request.policies_size()),
                       absl::StrCat("give 1 to ", kPolicyCountMax, " policies"));
   }
   std::vector<PrunePolicy> policies;
   for (const v1::PrunePolicy& policy : request.policies()) {
-    DSG_ASSIGN_OR_RETURN(PrunePolicy made, FromProto(policy));
+    DSG_ASSIGN_OR_RETURN(PrunePolicy made, FromProto(policy, map->spec()));
     policies.push_back(std::move(made));
   }
   return std::make_unique<Prune>(maps, request, std::move(policies));

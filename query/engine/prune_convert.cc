@@ -68,18 +68,20 @@ absl::StatusOr<Policy::What> WhatFromProto(const v1::PrunePolicy& in) {
 // For the log of revisions.
 class NameOf {
  public:
+  explicit NameOf(const MapSpec& map) : map_(map) {}
+
   std::string operator()(const std::monostate&) const { return "all tracks"; }
   std::string operator()(const Policy::Branch& what) const { return "branch " + what.id_or_name; }
   std::string operator()(const Policy::Region&) const { return "region"; }
   std::string operator()(const Policy::Before& what) const {
-    return absl::StrCat("before ", FormatRfc3339(what.at_ns));
+    return "before " + Instant(what.at_ns);
   }
   std::string operator()(const Policy::OlderThan& what) const {
     return "older than " + FormatAge(what.age_ns);
   }
   std::string operator()(const Policy::WholeLayer& what) const { return "layer " + what.name; }
   std::string operator()(const Policy::UnseenSince& what) const {
-    return absl::StrCat("unseen since ", FormatRfc3339(what.at_ns));
+    return "unseen since " + Instant(what.at_ns);
   }
   std::string operator()(const Policy::UnseenFor& what) const {
     return "unseen for " + FormatAge(what.age_ns);
@@ -90,6 +92,14 @@ class NameOf {
   std::string operator()(const Policy::HistoryBefore& what) const {
     return absl::StrCat("history before revision ", what.revision);
   }
+
+ private:
+  // A clock that is not UTC has no dates.
+  std::string Instant(TimeNs at_ns) const {
+    return map_.clock == Clock::kUnix ? FormatRfc3339(at_ns) : FormatRelative(at_ns, map_.epoch_ns);
+  }
+
+  const MapSpec& map_;
 };
 
 }  // namespace
@@ -104,7 +114,11 @@ void ToProto(const PrunePolicy& policy, v1::PrunePolicy* out) {
                                                              : v1::PRUNE_STRENGTH_UNSPECIFIED);
 }
 
-absl::StatusOr<PrunePolicy> FromProto(const v1::PrunePolicy& in) {
+absl::StatusOr<PrunePolicy> FromProto(const v1::PrunePolicy& in, const MapSpec& map) {
+  if (!v1::PruneStrength_IsValid(in.strength())) {
+    return FieldError("policies.strength", absl::StrCat(static_cast<int>(in.strength())),
+                      "give RETIRE or ERASE");
+  }
   PrunePolicy policy;
   policy.name = in.name();
   DSG_ASSIGN_OR_RETURN(policy.what, WhatFromProto(in));
@@ -119,7 +133,7 @@ absl::StatusOr<PrunePolicy> FromProto(const v1::PrunePolicy& in) {
   // Before it has a name: one made of a node's name may be too long.
   DSG_RETURN_IF_ERROR(policy.Validate());
   if (policy.name.empty()) {
-    policy.name = std::visit(NameOf(), policy.what);
+    policy.name = std::visit(NameOf(map), policy.what);
     // Messages of revisions stay: they must not tell the name of what is erased.
     const bool is_branch = std::holds_alternative<Policy::Branch>(policy.what);
     if (is_branch && policy.strength == PruneStrength::kErase) policy.name = "branch";
@@ -138,6 +152,7 @@ void ToProto(const Amount& amount, v1::Amount* out) {
   out->set_shape_count(amount.shape_count);
   out->set_factor_count(amount.factor_count);
   out->set_stay_count(amount.stay_count);
+  out->set_stay_edit_count(amount.stay_edit_count);
   out->set_mesh_block_count(amount.mesh_block_count);
   out->set_asset_count(amount.asset_count);
   out->set_revision_count(amount.revision_count);

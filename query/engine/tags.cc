@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_join.h"
 #include "dsg/v1/maintenance_service.pb.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
+#include "schema/store/tag_list.h"
 
 namespace dsg::query {
 namespace {
@@ -61,11 +61,9 @@ absl::StatusOr<Revision> RevisionOfTag(MapReader* map, const std::string& tag) {
   for (const Tag& one : tags) {
     if (one.name == tag) return one.revision;
   }
-  const std::string known = absl::StrJoin(
-      tags, ", ", [](std::string* out, const Tag& one) { absl::StrAppend(out, one.name); });
   return MakeError(Reason::kTagUnknown,
                    absl::StrCat("map \"", map->spec().name, "\" has no tag \"", tag, "\"; it has ",
-                                known.empty() ? "none" : known),
+                                TagNames(tags)),
                    {{"map", map->spec().name}, {"tag", tag}});
 }
 

@@ -83,6 +83,7 @@ Amount& Amount::operator+=(const Amount& other) {
   shape_count += other.shape_count;
   factor_count += other.factor_count;
   stay_count += other.stay_count;
+  stay_edit_count += other.stay_edit_count;
   mesh_block_count += other.mesh_block_count;
   asset_count += other.asset_count;
   revision_count += other.revision_count;

@@ -19,6 +19,8 @@ struct Amount {
   int64_t shape_count = 0;
   int64_t factor_count = 0;
   int64_t stay_count = 0;
+  /// Stays that are kept, and only lose their room or their place; no rows that go.
+  int64_t stay_edit_count = 0;
   int64_t mesh_block_count = 0;
   int64_t asset_count = 0;
   int64_t revision_count = 0;

@@ -31,8 +31,8 @@ class StayMeasurer {
       }
     }
     measured_.stay_removals = removals_;
-    measured_.amount.stay_count +=
-        static_cast<int64_t>(removals_.size() + measured_.stay_edits.size());
+    measured_.amount.stay_count += static_cast<int64_t>(removals_.size());
+    measured_.amount.stay_edit_count += static_cast<int64_t>(measured_.stay_edits.size());
     return absl::OkStatus();
   }
 

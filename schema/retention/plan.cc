@@ -67,7 +67,8 @@ class Planner {
         if (one.selection.is_gone[n] && !index.nodes()[n].is_agent) ++gone_count;
       }
       const bool matches_all = (fixed_count > 0 && gone_count == fixed_count) ||
-                               (pose_count > 0 && one.forgotten_pose_count == pose_count);
+                               (pose_count > 0 && one.forgotten_pose_count == pose_count) ||
+                               (!is_union && TakesOnlyBuilding(index, policies_[i], one.selection));
       if (matches_all && plan_.all_matching_policy.empty()) {
         plan_.all_matching_policy = name.empty() ? absl::StrCat("policy ", i + 1) : name;
       }
@@ -80,6 +81,20 @@ class Planner {
       }
     }
     return absl::OkStatus();
+  }
+
+  // What is left of such a map has nothing that holds it together.
+  static bool TakesOnlyBuilding(const GraphIndex& index, const PrunePolicy& policy,
+                                const Selection& selection) {
+    if (!std::holds_alternative<PrunePolicy::Branch>(policy.what)) return false;
+    int64_t count = 0;
+    int64_t gone_count = 0;
+    for (size_t n = 0; n < index.nodes().size(); ++n) {
+      if (index.nodes()[n].layer != layers::kBuildings) continue;
+      ++count;
+      if (selection.is_gone[n]) ++gone_count;
+    }
+    return count > 0 && gone_count == count;
   }
 
   absl::Status ReportPolicy(const PrunePolicy& policy, Amount amount) {

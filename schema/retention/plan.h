@@ -63,7 +63,8 @@ struct PrunePlan {
   std::optional<Erasure> erasure;
   /// Revisions before are to be compacted; nullopt without a history policy.
   std::optional<Revision> keep_from;
-  /// A policy that matches every node that is no agent, or every pose; empty = none does.
+  /// A policy that matches every node that is no agent, or every pose, or the branch of the map's
+  /// only building; empty = none does.
   std::string all_matching_policy;
 
   /// There is nothing to commit.

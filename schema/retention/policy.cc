@@ -20,15 +20,22 @@ class Checker {
   explicit Checker(const PrunePolicy& policy) : policy_(policy) {}
 
   absl::Status Check() const {
-    if (policy_.name.size() > kNameBytesMax || !IsUtf8(policy_.name)) {
-      return Refuse("name", "",
-                    absl::StrCat("a name is UTF-8 of at most ", kNameBytesMax, " bytes"));
+    if (policy_.name.size() > kNameBytesMax || !IsUtf8(policy_.name) || HasNul(policy_.name)) {
+      return Error("its name is not UTF-8 of at most " + std::to_string(kNameBytesMax) +
+                       " bytes, none of them 0",
+                   "name", "");
     }
+    // First: without it a policy that says nothing else would be blamed for that.
+    DSG_RETURN_IF_ERROR(CheckMetres());
     DSG_RETURN_IF_ERROR(
         std::visit([this](const auto& what) { return CheckWhat(what); }, policy_.what));
     DSG_RETURN_IF_ERROR(CheckThinning());
     for (const std::string& layer : policy_.layers) {
-      if (layer.empty()) return Refuse("layers", "", "name a layer, or leave the list empty");
+      DSG_RETURN_IF_ERROR(CheckWord("layers", layer, "name a layer, or leave the list empty"));
+    }
+    if (policy_.IsHistory() && policy_.strength == PruneStrength::kErase) {
+      return Refuse("strength", "erase",
+                    "history is dropped by compacting; leave the strength out");
     }
     if (policy_.IsHistory() && !policy_.layers.empty()) {
       return Refuse("layers", policy_.layers.front(), "history goes of all layers at once");
@@ -37,12 +44,34 @@ class Checker {
   }
 
  private:
+  static bool HasNul(const std::string& text) { return text.find('\0') != std::string::npos; }
+
+  // Those of the command line have no names.
+  std::string Who() const {
+    return policy_.name.empty() ? "the policy" : absl::StrCat("policy \"", policy_.name, "\"");
+  }
+
+  absl::Status Error(const std::string& what, std::string_view field,
+                     const std::string& value) const {
+    // A name that is refused itself would not make a message.
+    const bool has_name = field != "name";
+    return MakeError(Reason::kFieldInvalid,
+                     absl::StrCat(has_name ? Who() : "the policy", ": ", what),
+                     {{"policy", has_name ? policy_.name : ""},
+                      {"field", std::string(field)},
+                      {"value", value}});
+  }
+
   absl::Status Refuse(std::string_view field, const std::string& value,
                       const std::string& rule) const {
-    return MakeError(Reason::kFieldInvalid,
-                     absl::StrCat("policy \"", policy_.name, "\": ", std::string(field), " is \"",
-                                  value, "\"; ", rule),
-                     {{"policy", policy_.name}, {"field", std::string(field)}, {"value", value}});
+    return Error(absl::StrCat(std::string(field), " is \"", value, "\"; ", rule), field, value);
+  }
+
+  absl::Status CheckWord(std::string_view field, const std::string& word,
+                         const std::string& rule) const {
+    if (word.empty()) return Refuse(field, "", rule);
+    if (!HasNul(word)) return absl::OkStatus();
+    return Error(absl::StrCat(std::string(field), " has a byte 0 in it; ", rule), field, "");
   }
 
   absl::Status CheckAge(std::string_view field, TimeNs age_ns) const {
@@ -57,31 +86,26 @@ class Checker {
                   "history; only thinning may leave it out");
   }
   absl::Status CheckWhat(const PrunePolicy::Branch& what) const {
-    if (!what.id_or_name.empty()) return absl::OkStatus();
-    return Refuse("branch", "", "give a node's id or name");
+    return CheckWord("branch", what.id_or_name, "give a node's id or name");
   }
   absl::Status CheckWhat(const PrunePolicy::Region& what) const {
     const Box3d& box = what.box_map;
     if (!box.min().allFinite() || !box.max().allFinite()) {
       return MakeError(Reason::kNumberNotFinite,
-                       absl::StrCat("policy \"", policy_.name,
-                                    "\": a corner of the region is not a finite number"),
+                       Who() + ": a corner of the region is not a finite number",
                        {{"policy", policy_.name}, {"field", "region"}});
     }
     if (!box.isEmpty()) return absl::OkStatus();
-    return MakeError(
-        Reason::kBoxInverted,
-        absl::StrCat("policy \"", policy_.name,
-                     "\": the region's lower corner is above its upper one; swap them"),
-        {{"policy", policy_.name}, {"field", "region"}});
+    return MakeError(Reason::kBoxInverted,
+                     Who() + ": the region's lower corner is above its upper one; swap them",
+                     {{"policy", policy_.name}, {"field", "region"}});
   }
   absl::Status CheckWhat(const PrunePolicy::Before&) const { return absl::OkStatus(); }
   absl::Status CheckWhat(const PrunePolicy::OlderThan& what) const {
     return CheckAge("older_than", what.age_ns);
   }
   absl::Status CheckWhat(const PrunePolicy::WholeLayer& what) const {
-    if (!what.name.empty()) return absl::OkStatus();
-    return Refuse("layer", "", "name a layer");
+    return CheckWord("layer", what.name, "name a layer");
   }
   absl::Status CheckWhat(const PrunePolicy::UnseenSince&) const { return absl::OkStatus(); }
   absl::Status CheckWhat(const PrunePolicy::UnseenFor& what) const {
@@ -95,13 +119,19 @@ class Checker {
     return Refuse("history_before_revision", absl::StrCat(what.revision), "revisions count from 0");
   }
 
+  absl::Status CheckMetres() const {
+    const double metres = policy_.simplify_m;
+    // 0 forgets; -0 is a slip of whoever made it.
+    if (std::isfinite(metres) && !std::signbit(metres) && metres <= kSimplifyMaxM) {
+      return absl::OkStatus();
+    }
+    return Refuse("simplify_m", absl::StrCat(metres),
+                  absl::StrCat("give metres above 0, at most ", kSimplifyMaxM));
+  }
+
   absl::Status CheckThinning() const {
     const double metres = policy_.simplify_m;
     const double radians = policy_.simplify_rad;
-    if (!std::isfinite(metres) || metres < 0.0 || metres > kSimplifyMaxM) {
-      return Refuse("simplify", absl::StrCat(metres),
-                    absl::StrCat("give metres above 0, at most ", kSimplifyMaxM));
-    }
     if (!policy_.IsThinning()) return absl::OkStatus();
     if (!std::isfinite(radians) || radians <= 0.0 || radians > std::numbers::pi) {
       return Refuse("simplify_rad", absl::StrCat(radians), "give radians above 0, at most pi");
@@ -115,7 +145,7 @@ class Checker {
                              (layer != nullptr && layer->name == "agents");
     if (names_poses) return absl::OkStatus();
     return Refuse(
-        "simplify", absl::StrCat(metres),
+        "simplify_m", absl::StrCat(metres),
         "tracks are thinned in a region, before a time, of the layer agents, or all; drop "
         "one of both");
   }

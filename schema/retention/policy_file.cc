@@ -15,6 +15,7 @@
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
 #include "schema/retention/duration.h"
+#include "schema/retention/yaml_documents.h"
 
 namespace dsg {
 namespace {
@@ -90,8 +91,9 @@ class Reader {
   }
 
   absl::StatusOr<std::string> Text(const YAML::Node& node, const std::string& key) const {
-    if (node.IsScalar() && !node.Scalar().empty()) return node.Scalar();
-    return Wrong(node, key + " is no word");
+    if (!node.IsScalar() || node.Scalar().empty()) return Wrong(node, key + " is no word");
+    if (node.Scalar().find('\0') == std::string::npos) return node.Scalar();
+    return Wrong(node, key + " has a byte 0 in it, which no name has");
   }
 
   absl::StatusOr<TimeNs> Age(const YAML::Node& node, const std::string& key) const {
@@ -266,7 +268,13 @@ absl::StatusOr<PolicyFile> ParsePolicyFile(std::string_view text, const std::str
     return reader.Wrong(YAML::Mark(), "the file is too large for a file of policies");
   }
   try {
-    return reader.Read(YAML::Load(std::string(text)));
+    const YAML::Node root = YAML::Load(std::string(text));
+    if (const auto line = FindSecondDocument(text)) {
+      YAML::Mark begin;
+      begin.line = *line;
+      return reader.Wrong(begin, "a second document begins here; write all policies into one list");
+    }
+    return reader.Read(root);
   } catch (const YAML::Exception& error) {
     return reader.Wrong(error.mark, error.msg);
   }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/codec/shape_codec.h"
@@ -27,7 +28,9 @@ absl::Status ReadNodes(Database& db, const char* sql, std::set<Sha256>* assets) 
   Query query(db, sql);
   while (query.Next()) {
     Node node;
-    if (!DecodeNodePayload(query.Blob(1), &node)) {
+    // What a damaged row refers to would be taken for unused, and dropped.
+    if (query.Int(4) != RowChecksum({query.Int(0), query.Int(1), query.Int(2)}, query.Blob(3)) ||
+        !DecodeNodePayload(query.Blob(3), &node)) {
       return CorruptRow(db.map_name(), "node", ToString(IdOf(query.Int(0))));
     }
     CollectReferences(node, assets);
@@ -58,15 +61,22 @@ void CollectReferences(const Node& node, std::set<Sha256>* assets) {
   }
 }
 
-absl::StatusOr<std::set<Sha256>> ReadReferences(Database& db) {
+absl::StatusOr<std::set<Sha256>> ReadReferences(Database& db,
+                                                const std::vector<StoredAsset>& stored) {
   std::set<Sha256> assets;
-  for (const char* sql :
-       {"SELECT key, payload FROM node", "SELECT key, payload FROM node_history"}) {
+  for (const char* sql : {"SELECT key, rev_from, layer, payload, checksum FROM node",
+                          "SELECT key, rev_from, layer, payload, checksum FROM node_history"}) {
     DSG_RETURN_IF_ERROR(ReadNodes(db, sql, &assets));
   }
   for (const char* sql : {"SELECT agent, substr(payload, 1, 64) FROM shape_segment",
                           "SELECT agent, substr(payload, 1, 64) FROM shape_history"}) {
     DSG_RETURN_IF_ERROR(ReadShapes(db, sql, &assets));
+  }
+  std::set<Sha256> unknown = assets;
+  for (const StoredAsset& asset : stored) unknown.erase(asset.sha256);
+  if (!unknown.empty()) {
+    return CorruptRow(db.map_name(), "asset",
+                      absl::BytesToHexString(std::string(View(*unknown.begin()))));
   }
   return assets;
 }

@@ -11,15 +11,19 @@ namespace dsg::sqlite {
 
 void CollectReferences(const Node& node, std::set<Sha256>* assets);
 
-/// Of all nodes and shapes, current and past. Reads them all.
-absl::StatusOr<std::set<Sha256>> ReadReferences(Database& db);
-
 /// An asset, by its rows.
 struct StoredAsset {
   Sha256 sha256{};
   Revision rev_from = 0;
 };
 absl::StatusOr<std::vector<StoredAsset>> ListAssets(Database& db);
+
+/// Of all nodes and shapes, current and past. Reads them all.
+/// Errors: DATA_LOSS/STORE_CORRUPT for one that is not among all of `stored`: the map never was
+/// like that, and the asset that was meant would be taken for unused.
+absl::StatusOr<std::set<Sha256>> ReadReferences(Database& db,
+                                                const std::vector<StoredAsset>& stored);
+
 absl::Status DeleteAsset(Database& db, const Sha256& sha256);
 /// The same, and notes that digests go on counting it.
 absl::Status DropAsset(Database& db, const StoredAsset& asset);

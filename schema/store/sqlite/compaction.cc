@@ -166,11 +166,12 @@ absl::Status DropRows(Database& db, const HistoryTable& table, const StopCheck& 
 // Those that nothing refers to any more; one of the newest revisions may be about to be referred
 // to. They go on counting in the digests of the revisions that are kept.
 absl::Status DropAssets(Database& db, const StopCheck& stop, Compaction* work) {
-  DSG_ASSIGN_OR_RETURN(std::vector<StoredAsset> assets, ListAssets(db));
+  DSG_ASSIGN_OR_RETURN(const std::vector<StoredAsset> stored, ListAssets(db));
+  std::vector<StoredAsset> assets = stored;
   std::erase_if(assets,
                 [&](const StoredAsset& asset) { return asset.rev_from >= work->keep_from; });
   if (assets.empty()) return absl::OkStatus();
-  DSG_ASSIGN_OR_RETURN(const std::set<Sha256> used, ReadReferences(db));
+  DSG_ASSIGN_OR_RETURN(const std::set<Sha256> used, ReadReferences(db, stored));
   for (const StoredAsset& asset : assets) {
     if (used.contains(asset.sha256)) continue;
     DSG_RETURN_IF_ERROR(InTransaction(db, [&] { return DropAsset(db, asset); }));

@@ -14,6 +14,9 @@ struct Compaction {
   size_t table = 0;
   int64_t after = 0;
   CompactReport report = {};
+
+  /// Other rows are to go than those that were looked for; what went counts on.
+  void BeginAgain() { table = after = 0; }
 };
 
 /// The work of MapWriter::Compact but for its checks and for the counting of bytes. Each step is a

@@ -34,6 +34,15 @@ constexpr char kSelectCurrent[] =
     "SELECT id, rev_from, t0, t1, pose_count, checksum, payload, 9223372036854775807"
     " FROM trajectory_segment WHERE id BETWEEN ?1 AND ?2 AND t0 < ?4 AND t1 >= ?3";
 
+// Columns: id, rev_from, t0, t1, pose_count, checksum. False if the row is not what was written.
+bool DecodeRow(const Query& query, const std::string& payload, std::vector<StoredPose>* poses) {
+  const int64_t checksum =
+      RowChecksum({query.Int(0), query.Int(1), query.Int(2), query.Int(3), query.Int(4)}, payload);
+  if (checksum != query.Int(5)) return false;
+  const auto reader = SegmentReader::Parse(payload);
+  return reader != nullptr && reader->DecodeAll(poses);
+}
+
 // One agent's track while poses are taken out of it.
 class TrackEraser {
  public:
@@ -84,10 +93,7 @@ class TrackEraser {
       Segment segment{query.Int(0), query.Int(1), query.Int(7), query.Int(2), query.Int(3), {}, 0};
       const std::string payload(query.Blob(6));
       segment.payload_bytes = payload.size();
-      const auto checksum = RowChecksum(
-          {segment.id, segment.rev_from, segment.t0, segment.t1, query.Int(4)}, payload);
-      const auto reader = checksum == query.Int(5) ? SegmentReader::Parse(payload) : nullptr;
-      if (reader == nullptr || !reader->DecodeAll(&segment.poses)) {
+      if (!DecodeRow(query, payload, &segment.poses)) {
         return CorruptRow(db_.map_name(), "trajectory_history", absl::StrCat(segment.id));
       }
       segments.push_back(std::move(segment));
@@ -210,18 +216,18 @@ class TrackEraser {
   absl::StatusOr<TimeNs> LastTime(const Mark& mark) {
     TimeNs last_ns = kTimeMin;
     for (const char* sql :
-         {"SELECT payload FROM trajectory_segment WHERE id BETWEEN ?1 AND ?2 AND rev_from <= ?3"
-          " AND t0 <= ?4 ORDER BY id DESC LIMIT 1",
-          "SELECT payload FROM trajectory_history WHERE id BETWEEN ?1 AND ?2 AND rev_from <= ?3"
-          " AND rev_to > ?3 AND t0 <= ?4 ORDER BY id DESC LIMIT 1"}) {
+         {"SELECT id, rev_from, t0, t1, pose_count, checksum, payload FROM trajectory_segment"
+          " WHERE id BETWEEN ?1 AND ?2 AND rev_from <= ?3 AND t0 <= ?4 ORDER BY id DESC LIMIT 1",
+          "SELECT id, rev_from, t0, t1, pose_count, checksum, payload FROM trajectory_history"
+          " WHERE id BETWEEN ?1 AND ?2 AND rev_from <= ?3 AND rev_to > ?3 AND t0 <= ?4"
+          " ORDER BY id DESC LIMIT 1"}) {
       Query query(db_, sql);
       query.Bind(FirstSegmentId(slot_), LastSegmentId(slot_), mark.revision, mark.last_ns);
       const bool found = query.Next();
       DSG_RETURN_IF_ERROR(query.status());
       if (!found) continue;
-      const auto reader = SegmentReader::Parse(std::string(query.Blob(0)));
       std::vector<StoredPose> poses;
-      if (reader == nullptr || !reader->DecodeAll(&poses)) {
+      if (!DecodeRow(query, std::string(query.Blob(6)), &poses)) {
         return CorruptRow(db_.map_name(), "trajectory_segment", ToString(agent_));
       }
       for (const StoredPose& pose : poses) {

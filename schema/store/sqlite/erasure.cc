@@ -62,10 +62,16 @@ class Eraser {
   // Without its past an agent's track would belong to nobody there.
   absl::Status CheckAgents() {
     for (const NodeId id : erasure_.nodes) {
-      Query query(db_, "SELECT payload FROM node WHERE key = ?1");
+      Query query(db_, "SELECT rev_from, layer, payload, checksum FROM node WHERE key = ?1");
+      const bool is_there = query.Bind(KeyOf(id)).Next();
+      DSG_RETURN_IF_ERROR(query.status());
+      if (!is_there) continue;
       Node node;
-      if (query.Bind(KeyOf(id)).Next() && DecodeNodePayload(query.Blob(0), &node) &&
-          IsAgentKind(node.kind)) {
+      if (query.Int(3) != RowChecksum({KeyOf(id), query.Int(0), query.Int(1)}, query.Blob(2)) ||
+          !DecodeNodePayload(query.Blob(2), &node)) {
+        return CorruptRow(spec_.name, "node", ToString(id));
+      }
+      if (IsAgentKind(node.kind)) {
         return MakeError(
             Reason::kFieldInvalid,
             absl::StrCat("cannot erase the past of agent ", ToString(id), " of map \"", spec_.name,
@@ -73,7 +79,6 @@ class Eraser {
                          "its track"),
             {{"field", "nodes"}, {"value", ToString(id)}});
       }
-      DSG_RETURN_IF_ERROR(query.status());
     }
     return absl::OkStatus();
   }
@@ -129,7 +134,7 @@ class Eraser {
     DSG_ASSIGN_OR_RETURN(const std::set<Sha256> doubtful, ReadDoubtfulAssets(db_));
     if (stored.empty() && doubtful.empty()) return absl::OkStatus();
     DSG_ASSIGN_OR_RETURN(const Readable readable, LoadReadable(db_));
-    DSG_ASSIGN_OR_RETURN(const std::set<Sha256> used, ReadReferences(db_));
+    DSG_ASSIGN_OR_RETURN(const std::set<Sha256> used, ReadReferences(db_, stored));
     for (const StoredAsset& asset : stored) {
       const bool is_old = asset.rev_from < readable.oldest || doubtful.contains(asset.sha256);
       if (!is_old || used.contains(asset.sha256)) continue;

@@ -16,6 +16,7 @@
 #include "absl/strings/str_cat.h"
 #include "schema/model/edge.h"
 #include "schema/store/graph_store.h"
+#include "schema/store/log_bytes.h"
 
 namespace dsg::sqlite {
 
@@ -27,6 +28,11 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string Errno() { return std::strerror(errno); }
+
+int64_t SizeOf(const std::string& path) {
+  struct stat info {};
+  return stat(path.c_str(), &info) == 0 ? info.st_size : 0;
+}
 
 absl::Status FillNewDatabase(Database& db, const MapSpec& spec) {
   DSG_RETURN_IF_ERROR(db.Execute("BEGIN IMMEDIATE"));
@@ -236,12 +242,9 @@ std::optional<FileIdentity> IdentityOf(const std::string& store_folder, const st
 }
 
 int64_t BytesOnDisk(const std::string& store_folder, const std::string& map) {
-  int64_t bytes = 0;
-  for (const char* name : {"/graph.db", "/graph.db-wal", "/writer.lock"}) {
-    struct stat info {};
-    if (stat((MapFolder(store_folder, map) + name).c_str(), &info) == 0) bytes += info.st_size;
-  }
-  return bytes;
+  const std::string folder = MapFolder(store_folder, map);
+  return SizeOf(folder + "/graph.db") + SizeOf(folder + "/graph.db-wal") +
+         SizeOf(folder + "/writer.lock");
 }
 
 std::vector<std::string> ListOtherFiles(const std::string& store_folder, const std::string& map) {
@@ -295,3 +298,7 @@ absl::StatusOr<std::unique_ptr<WriterLock>> WriterLock::Acquire(const std::strin
 WriterLock::~WriterLock() { close(fd_); }
 
 }  // namespace dsg::sqlite
+
+int64_t dsg::LogBytesOnDisk(const GraphStore& store, const std::string& map) {
+  return sqlite::SizeOf(sqlite::MapFolder(store.folder(), map) + "/graph.db-wal");
+}

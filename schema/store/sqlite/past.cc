@@ -74,6 +74,8 @@ absl::Status PastChange::ApplySums(Database& db) const {
   auto change = changes_.begin();
   RowSums sums;
   Sha256 parent{};
+  // As it stands there: a new digest over a record that is damaged would say that it is sound.
+  Sha256 stored_parent{};
   Revision before = 0;
   std::vector<Head> changed;
   Query query(db, kSelectRevisions);
@@ -86,7 +88,12 @@ absl::Status PastChange::ApplySums(Database& db) const {
         return CorruptRow(db.map_name(), "revision", absl::StrCat(revision));
       }
       std::copy(bytes.begin(), bytes.end(), parent.begin());
+      stored_parent = parent;
     }
+    if (DigestOf(stored_parent, head) != head.info.digest) {
+      return CorruptRow(db.map_name(), "revision", absl::StrCat(revision));
+    }
+    stored_parent = head.info.digest;
     before = revision;
     for (; change != changes_.end() && change->first <= revision; ++change) sums += change->second;
     if (revision >= changes_.begin()->first) {

@@ -79,6 +79,13 @@ class Verifier {
       if (query.Text(0) != "ok") Problem(absl::StrCat("database: ", std::string(query.Text(0))));
     }
     Finish(query, "database");
+    // They would run in whoever reads the map; no map of ours has any, and none is installed.
+    Query foreign(db_, "SELECT type, name FROM sqlite_master WHERE type NOT IN ('table', 'index')");
+    while (foreign.Next()) {
+      Problem(absl::StrCat("database: it has the ", std::string(foreign.Text(0)), " \"",
+                           std::string(foreign.Text(1)), "\", and no map has one"));
+    }
+    Finish(foreign, "sqlite_master");
     Query check(db_, "SELECT rtreecheck('segment_box')");
     if (check.Next() && check.Text(0) != "ok") Problem(std::string(check.Text(0)));
     Finish(check, "R*Tree");

@@ -236,14 +236,14 @@ absl::StatusOr<Tag> SqliteWriter::SetTag(const std::string& name, Revision revis
   const Tag tag{name, revision, WallClockNs(), note};
   DSG_RETURN_IF_ERROR(CheckTag(tag));
   DSG_RETURN_IF_ERROR(CheckRevision(revision));
-  compaction_.reset();
+  if (compaction_.has_value()) compaction_->BeginAgain();
   DSG_RETURN_IF_ERROR(WriteTag(*db_, tag));
   return tag;
 }
 
 absl::Status SqliteWriter::RemoveTag(const std::string& name) {
   if (db_ == nullptr) DSG_RETURN_IF_ERROR(Reopen());
-  compaction_.reset();
+  if (compaction_.has_value()) compaction_->BeginAgain();
   return DeleteTag(*db_, name);
 }
 

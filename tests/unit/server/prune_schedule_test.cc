@@ -68,11 +68,14 @@ class Core final : public PassingCore {
     absl::Status status;
     for (const auto& policy : request.policies()) {
       if (policy.name() == "everything") status = MakeError(Reason::kPolicyMatchesAll, "all");
+      if (policy.name() == "attics" && request.map() == "a") {
+        status = MakeError(Reason::kLayerUnknown, "a has no layer attics");
+      }
     }
+    if (request.map() == "b") status = MakeError(Reason::kWriterLocked, "somebody writes it");
     if (status.ok()) {
       for (const auto& policy : request.policies()) applied_[policy.name()] += 1;
     }
-    if (request.map() == "b") status = MakeError(Reason::kWriterLocked, "somebody writes it");
     return std::make_unique<Pruned>(3, status);
   }
 
@@ -107,8 +110,26 @@ TEST(PruneSchedule, PolicyThatCannotBeAppliedDoesNotKeepTheOthersFromIt) {
   PruneSchedule schedule(&core, file, {.first_after = minutes(1)},
                          std::make_unique<TestClock>(minutes(2)));
   schedule.Run();
-  EXPECT_EQ(core.applied_["mesh"], 3);
+  EXPECT_EQ(core.applied_["mesh"], 2);
   EXPECT_EQ(core.applied_.count("everything"), 0u);
+}
+
+TEST(PruneSchedule, SaysOnceThatAMapLacksALayerAndAppliesTheRest) {
+  Core core;
+  PolicyFile file = FileOf(3600 * kNsPerSecond);
+  file.policies.push_back(file.policies.front());
+  file.policies.front().name = "attics";
+  PruneSchedule schedule(&core, file, {.first_after = minutes(1)},
+                         std::make_unique<TestClock>(hours(5)));
+  testing::internal::CaptureStderr();
+  schedule.Run();
+  const std::string log = testing::internal::GetCapturedStderr();
+  // Of three maps one lacks the layer, and one is never to be had.
+  EXPECT_EQ(core.applied_["mesh"], 5 * 2);
+  EXPECT_EQ(core.applied_["attics"], 5 * 1);
+  const size_t first = log.find("a has no layer attics");
+  ASSERT_NE(first, std::string::npos) << log;
+  EXPECT_EQ(log.find("a has no layer attics", first + 1), std::string::npos) << log;
 }
 
 TEST(PruneSchedule, DoesNothingBeforeItsFirstTime) {

@@ -18,9 +18,10 @@ namespace {
 
 class RemoteMapTest : public testing::Test {
  protected:
-  void StartServer() {
+  void StartServer(int64_t quota_bytes = 0) {
     StoreOptions options;
     options.create = true;
+    options.quota_bytes = quota_bytes;
     absl::StatusOr<std::unique_ptr<GraphStore>> store =
         GraphStore::Open(folder_.Path("store"), options);
     ASSERT_TRUE(store.ok()) << store.status();
@@ -173,6 +174,19 @@ TEST_F(RemoteMapTest, TakesALogAndItsContinuation) {
   EXPECT_EQ(*map->FindTrack(NodeId('H', 9), std::nullopt), std::nullopt);
   EXPECT_EQ(map->ReadPoses(NodeId('H', 2), 77, 78)->size(), 1u);
   EXPECT_TRUE(map->ReadPoses(NodeId('H', 2), 0, 5)->empty());
+}
+
+TEST_F(RemoteMapTest, SaysInOneSentenceThatTheServersQuotaIsReached) {
+  StartServer(/*quota_bytes=*/1);
+  const auto map = OpenMap();
+  const absl::Status refused = map->writer().Commit(Rooms(2'000, "s", 1)).status();
+  EXPECT_EQ(ReasonOf(refused), Reason::kQuotaExceeded);
+  const std::string message(refused.message());
+  EXPECT_EQ(message.find("map \"test\" may have 1 bytes"), 0U) << message;
+  EXPECT_NE(message.find("raise the quota of server " + address() + ", then run the same"),
+            std::string::npos)
+      << message;
+  EXPECT_EQ(MetadataOf(refused)["quota_bytes"], "1");
 }
 
 TEST_F(RemoteMapTest, RefusesAContradictionThroughTheServer) {

@@ -206,7 +206,10 @@ TEST(Arguments, MistakesNameTheOptionAndWhereHelpIs) {
   EXPECT_NE(Refusal({}).find("see dsg --help"), std::string::npos);
 }
 
-TEST(Arguments, VersionNeedsNoPlace) { ParseAs<VersionVerb>({"version"}, {}); }
+TEST(Arguments, VersionNeedsNoPlace) {
+  ParseAs<VersionVerb>({"version"}, {});
+  ParseAs<VersionVerb>({"--version"}, {});
+}
 
 }  // namespace
 }  // namespace dsg::cli

@@ -11,6 +11,7 @@
 
 #include "query/cli/run.h"
 #include "schema/base/status.h"
+#include "schema/codec/checksum.h"
 #include "schema/store/graph_store.h"
 #include "tests/support/temp_folder.h"
 
@@ -123,15 +124,18 @@ TEST_F(KeepVerbs, ATagStandsWhereverARevisionDoes) {
 TEST_F(KeepVerbs, CompactAndRevertSayWhatTheyDid) {
   EXPECT_EQ(Ask({"tag", "two", "--revision", "2", "--map", "office"}).code, 0);
   const Outcome dry = Ask({"revert", "two", "--dry-run", "--map", "office"});
-  EXPECT_EQ(dry.out, "would go back to tag two: written nothing; gone 2 nodes\n");
+  EXPECT_EQ(dry.out, "would go back to tag two: restored nothing; gone 2 nodes\n");
   EXPECT_EQ(Ask({"revert", "two", "--map", "office"}).out,
-            "went back to tag two as revision 5: written nothing; gone 2 nodes\n");
+            "went back to tag two as revision 5: restored nothing; gone 2 nodes\n");
   EXPECT_EQ(NodeCount(store_, "office"), 2U);
   EXPECT_EQ(Ask({"revert", "2", "--map", "office"}).out,
             "the map is what it was at revision 2 already; nothing written\n");
   const Outcome compacted = Ask({"compact", "--map", "office"});
   EXPECT_EQ(compacted.code, 0) << compacted.errors;
   EXPECT_EQ(compacted.out.substr(0, 19), "dropped 3 revisions");
+  EXPECT_NE(compacted.out.find("readable are revision 5 and later, and those with tags"),
+            std::string::npos)
+      << compacted.out;
   ExpectRefused(1, "REVISION_COMPACTED", {"revert", "3", "--map", "office"});
   ExpectRefused(1, "REVISION_IN_FUTURE", {"revert", "9", "--map", "office"});
   ExpectRefused(1, "REVISION_IN_FUTURE", {"compact", "--keep-from", "9", "--map", "office"});
@@ -210,6 +214,115 @@ TEST_F(KeepVerbs, ADamagedBackupIsFoundBeforeAnythingIsRestored) {
   EXPECT_EQ(Dsg({"restore", out_, "--store", other}).code, 1);
 }
 
+TEST_F(KeepVerbs, ABackupNamesMapsThatCannotBeOpenedAndHoldsTheOthers) {
+  ASSERT_EQ(Ask({"backup", out_, "--map", "office"}).code, 0);
+  fs::create_directories(store_ + "/cellar");
+  WriteBytes(store_ + "/cellar/graph.db", "no database");
+  WriteBytes(store_ + "/office/graph.db", "once a database");
+  const Outcome outcome = Ask({"backup", out_});
+  EXPECT_NE(outcome.code, 0);
+  EXPECT_NE(outcome.out.find("attic: copied"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("cellar: left out: "), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("office: left out: "), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("office: kept from the last backup"), std::string::npos);
+  EXPECT_NE(outcome.errors.find("2 maps that could not be read, \"cellar\""), std::string::npos)
+      << outcome.errors;
+  EXPECT_NE(outcome.errors.find("["), std::string::npos) << outcome.errors;
+  const Json json = Json::parse(Ask({"backup", out_, "--json"}).out);
+  ASSERT_EQ(json["left_out"].size(), 2U);
+  EXPECT_EQ(json["left_out"][1]["map"], "office");
+  EXPECT_EQ(json["maps"].size(), 2U);
+  EXPECT_EQ(Dsg({"verify", out_}).code, 0);
+  // One that was asked for is an error of its own.
+  ExpectRefused(outcome.code, "backup of map \"cellar\"", {"backup", out_, "--map", "cellar"});
+  EXPECT_NE(Ask({"maps"}).out.find("map cellar cannot be opened"), std::string::npos);
+}
+
+TEST_F(KeepVerbs, VerifyNamesMapsThatCannotBeOpenedAndLooksAtTheOthers) {
+  WriteBytes(store_ + "/attic/graph.db", "once a database");
+  const Outcome outcome = Ask({"verify"});
+  EXPECT_EQ(outcome.code, 4) << outcome.errors;
+  EXPECT_NE(outcome.out.find("attic: 0 revisions, 0 rows, 0 poses, 1 problem\n"), std::string::npos)
+      << outcome.out;
+  EXPECT_NE(outcome.out.find("office: 4 revisions"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.errors.find("STORE_CORRUPT"), std::string::npos) << outcome.errors;
+  const Json json = Json::parse(Ask({"verify", "--json"}).out);
+  ASSERT_EQ(json["maps"].size(), 2U);
+  EXPECT_EQ(json["maps"][0]["map"], "attic");
+  EXPECT_EQ(json["maps"][0]["problems"].size(), 1U);
+  EXPECT_EQ(json["maps"][1]["revision_count"], "4");
+  EXPECT_TRUE(json["maps"][1]["problems"].empty());
+}
+
+TEST_F(KeepVerbs, VerifyLooksAtTheOthersWhereOneIsOfANewerFormat) {
+  // Where SQLite keeps user_version, in the head of the database.
+  std::string bytes = ReadBytes(store_ + "/attic/graph.db");
+  bytes[63] = static_cast<char>(kStoreFormatVersion + 1);
+  WriteBytes(store_ + "/attic/graph.db", bytes);
+  const Outcome outcome = Ask({"verify"});
+  EXPECT_EQ(outcome.code, 2) << outcome.errors;
+  EXPECT_NE(outcome.out.find("attic: not checked: "), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("office: 4 revisions"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.errors.find("FORMAT_TOO_NEW"), std::string::npos) << outcome.errors;
+}
+
+TEST_F(KeepVerbs, UpgradeSpeaksToScriptsAndOfItself) {
+  const Json json = Json::parse(Ask({"upgrade", "--json"}).out);
+  ASSERT_EQ(json["maps"].size(), 2U);
+  EXPECT_EQ(json["maps"][0]["from_format"], kStoreFormatVersion);
+  EXPECT_EQ(json["maps"][0]["copy"], "");
+  const Outcome remote = Dsg({"upgrade"}, {.server = "unix:/nowhere"});
+  EXPECT_EQ(remote.code, 2);
+  EXPECT_NE(remote.errors.find("upgrade works on a store folder"), std::string::npos)
+      << remote.errors;
+}
+
+TEST_F(KeepVerbs, ARestoreThatFailsLeavesNoFolder) {
+  ASSERT_EQ(Ask({"backup", out_}).code, 0);
+  const std::string file = folder_.path() + "/attic.dsgz";
+  ASSERT_EQ(Ask({"export", file, "--map", "attic"}).code, 0);
+  std::string bytes = ReadBytes(file);
+  bytes[bytes.size() - 100] ^= 1;
+  WriteBytes(file, bytes);
+  EXPECT_EQ(Dsg({"restore", file, "--store", folder_.path() + "/new/deep"}).code, 4);
+  EXPECT_FALSE(fs::exists(folder_.path() + "/new"));
+  // One that was there stays.
+  fs::create_directories(folder_.path() + "/empty");
+  EXPECT_EQ(Dsg({"restore", file, "--store", folder_.path() + "/empty"}).code, 4);
+  EXPECT_TRUE(fs::exists(folder_.path() + "/empty"));
+}
+
+TEST_F(KeepVerbs, ARestoreLooksAtAllMapsBeforeItReplacesOne) {
+  ASSERT_EQ(Ask({"backup", out_}).code, 0);
+  {
+    const auto store = GraphStore::Open(store_, {.program = "a robot"});
+    AddObject((*store)->OpenWriter("attic")->get(), "attic", 2);
+    const auto writer = (*store)->OpenWriter("office");
+    ExpectRefused(3, "a robot", {"restore", out_, "--force"});
+  }
+  EXPECT_EQ(NodeCount(store_, "attic"), 2U);
+  const Outcome done = Ask({"restore", out_, "--force"});
+  EXPECT_EQ(done.code, 0) << done.errors;
+  EXPECT_NE(done.out.find("attic: restored at revision 1"), std::string::npos) << done.out;
+  EXPECT_EQ(NodeCount(store_, "attic"), 1U);
+}
+
+TEST_F(KeepVerbs, ABackupWithItsArchivesExchangedIsRefused) {
+  ASSERT_EQ(Ask({"backup", out_}).code, 0);
+  // As by somebody who knows how the manifest is sealed.
+  std::string text = ReadBytes(out_ + "/MANIFEST");
+  text = text.substr(0, text.rfind("sha256 "));
+  Json json = Json::parse(text);
+  std::swap(json["maps"][0]["map"], json["maps"][1]["map"]);
+  std::swap(json["maps"][0], json["maps"][1]);
+  text = json.dump();
+  WriteBytes(out_ + "/MANIFEST", text + "sha256 " + ToHex(ComputeSha256(text)) + "\n");
+  const Outcome outcome = Dsg({"restore", out_, "--store", folder_.path() + "/other"});
+  EXPECT_EQ(outcome.code, 4);
+  EXPECT_NE(outcome.errors.find("its map is"), std::string::npos) << outcome.errors;
+  EXPECT_EQ(Dsg({"verify", out_}).code, 4);
+}
+
 TEST_F(KeepVerbs, AnArchiveGoesOutAndComesBackWithTheSameBytes) {
   const std::string file = folder_.path() + "/office.dsgz";
   const std::string again = folder_.path() + "/again.dsgz";
@@ -218,7 +331,8 @@ TEST_F(KeepVerbs, AnArchiveGoesOutAndComesBackWithTheSameBytes) {
   ASSERT_EQ(written.code, 0) << written.errors;
   EXPECT_EQ(written.out.substr(0, 6 + file.size()), "wrote " + file);
   ExpectRefused(2, "is there already", {"export", file, "--map", "office"});
-  EXPECT_EQ(Ask({"export", file, "--map", "office", "--force"}).code, 0);
+  const Json told = Json::parse(Ask({"export", file, "--map", "office", "--force", "--json"}).out);
+  EXPECT_TRUE(told["files"][0].contains("database_bytes")) << told;
   EXPECT_EQ(Dsg({"verify", file}).code, 0);
   EXPECT_EQ(Dsg({"import", file, "--store", other}).code, 0);
   EXPECT_EQ(Dsg({"export", again, "--store", other}).code, 0);

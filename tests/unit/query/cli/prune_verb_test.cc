@@ -116,6 +116,34 @@ TEST_F(PruneVerbTest, TakesAFileOfPolicies) {
   EXPECT_NE(wrong.errors.find(path + ":2:"), std::string::npos) << wrong.errors;
 }
 
+TEST_F(PruneVerbTest, TellsDatabaseFromLogAndWhatGivesTheBytesBack) {
+  const Outcome retired = Dsg({"prune", "--branch", "kitchen"});
+  EXPECT_NE(retired.out.find("database: "), std::string::npos) << retired.out;
+  EXPECT_NE(retired.out.find("log, used again: "), std::string::npos) << retired.out;
+  EXPECT_NE(retired.out.find("dsg compact"), std::string::npos) << retired.out;
+  const Outcome erased = Dsg({"prune", "--branch", "bed", "--erase", "--yes"});
+  EXPECT_EQ(erased.out.find("dsg compact"), std::string::npos) << erased.out;
+}
+
+TEST_F(PruneVerbTest, DropsHistory) {
+  ASSERT_EQ(Dsg({"prune", "--branch", "kitchen"}).code, 0);
+  const Outcome kept = Dsg({"prune", "--history-older-than", "30d"});
+  EXPECT_EQ(kept.code, 0) << kept.errors;
+  EXPECT_EQ(Dsg({"ls", "--revision", "1"}).code, 0);
+  const Outcome dropped = Dsg({"prune", "--history-before", "2"});
+  EXPECT_EQ(dropped.code, 0) << dropped.errors;
+  EXPECT_NE(dropped.out.find("history before revision 2"), std::string::npos) << dropped.out;
+  EXPECT_EQ(dropped.out.find("dsg compact"), std::string::npos) << dropped.out;
+  EXPECT_NE(Dsg({"ls", "--revision", "1"}).code, 0);
+}
+
+TEST_F(PruneVerbTest, SaysBoundsThatPeopleCanRead) {
+  const Outcome wrong = Dsg({"prune", "--simplify", "-1"});
+  EXPECT_EQ(wrong.code, 2);
+  EXPECT_NE(wrong.errors.find("\"-1\" is not a number above zero"), std::string::npos)
+      << wrong.errors;
+}
+
 TEST_F(PruneVerbTest, RefusesCommandLinesThatSayTooLittleOrTooMuch) {
   for (const std::vector<std::string>& wrong :
        std::vector<std::vector<std::string>>{{"prune"},
@@ -125,6 +153,8 @@ TEST_F(PruneVerbTest, RefusesCommandLinesThatSayTooLittleOrTooMuch) {
                                              {"prune", "--branch", "R1", "--simplify", "0.1"},
                                              {"prune", "--simplify", "-1"},
                                              {"prune", "--older-than", "30"},
+                                             {"prune", "--history-before", "-1"},
+                                             {"prune", "--history-before", "2", "--only", "mesh"},
                                              {"prune", "--region", "1,1,1,0,0,0"},
                                              {"prune", "--before", "yesterday"}}) {
     const Outcome outcome = Dsg(wrong);

@@ -266,6 +266,19 @@ TEST(RenderDiff, ListsEachKindOfChange) {
             "4 changes from revision 1 to 2\n");
 }
 
+TEST(RenderDiff, OfATrackThatIsOnlyCorrectedSaysSo) {
+  v1::DiffRevisionsResponse reply;
+  v1::TrackChange* track = reply.add_tracks();
+  track->set_agent_id("H1");
+  track->set_pose_count_before(5);
+  track->set_pose_count_after(5);
+  track->set_last_pose_ns_after(kNsPerSecond);
+  track->set_corrected(true);
+  const std::string text = RenderDiff(reply, Monotonic());
+  EXPECT_NE(text.find("as many poses, up to +1s, earlier ones corrected\n"), std::string::npos)
+      << text;
+}
+
 TEST(RenderDiff, OfTheSameIsOneLine) {
   v1::DiffRevisionsResponse reply;
   reply.set_from_revision(2);

@@ -56,6 +56,22 @@ TEST_F(CommitCall, AppliesADeltaAndAnswersARepeatWithTheFirstAnswer) {
   EXPECT_TRUE(again->replayed());
 }
 
+TEST_F(CommitCall, DoesNotBelieveAClientThatSaysThatItForgets) {
+  core_.reset();
+  auto store = GraphStore::Open(folder_.path(), {.quota_bytes = 1});
+  ASSERT_TRUE(store.ok()) << store.status();
+  core_ = query::MakeServiceCore(*std::move(store));
+  v1::CommitRequest request = OnePose("s", 1, 10 * kSecond);
+  for (int64_t i = 0; i < 5'000; ++i) {
+    auto* const pose = request.mutable_delta()->mutable_appends(0)->add_poses();
+    pose->CopyFrom(request.delta().appends(0).poses(0));
+    pose->set_time_ns((11 + i) * kSecond);
+  }
+  // What forgets may go past the quota.
+  request.mutable_delta()->set_is_forgetting(true);
+  EXPECT_EQ(ReasonOf(Commit(request).status()), Reason::kQuotaExceeded);
+}
+
 TEST_F(CommitCall, GoesToTheMapThatIsInTheFolderAlsoAfterARestore) {
   const std::string map = folder_.path() + "/" + kMap;
   TempFolder elsewhere;

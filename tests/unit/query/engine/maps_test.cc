@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 
 #include "dsg/v1/map_service.pb.h"
 #include "schema/base/status.h"
@@ -39,6 +40,16 @@ TEST_F(Maps, CreatesAMapWithDefaultsAndListsItByName) {
   ASSERT_EQ(reply.maps_size(), 2);
   EXPECT_EQ(reply.maps(0).name(), "attic");
   EXPECT_EQ(reply.maps(1).name(), "office");
+}
+
+TEST_F(Maps, NamesThoseThatCannotBeOpened) {
+  std::filesystem::create_directories(folder_.path() + "/cellar");
+  std::ofstream(folder_.path() + "/cellar/graph.db") << "no database";
+  v1::ListMapsResponse reply;
+  ASSERT_TRUE(core_->ListMaps(call_, {}, &reply).ok());
+  EXPECT_EQ(reply.maps_size(), 1);
+  ASSERT_EQ(reply.unreadable_maps_size(), 1);
+  EXPECT_EQ(reply.unreadable_maps(0), "cellar");
 }
 
 TEST_F(Maps, RefusesNamesThatExistOrArePaths) {

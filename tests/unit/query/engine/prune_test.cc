@@ -119,6 +119,27 @@ TEST_F(PruneCallTest, HistoryPoliciesCompact) {
   EXPECT_TRUE(Has("R1", 4));
 }
 
+TEST_F(PruneCallTest, CountsApartTheStaysThatOnlyLoseTheirPlaceAndTheLog) {
+  request_.add_policies()->set_branch("p1");
+  const auto reply = Prune();
+  ASSERT_TRUE(reply.ok()) << reply.status();
+  EXPECT_EQ(reply->policies(0).matched().stay_count(), 0);
+  EXPECT_EQ(reply->policies(0).matched().stay_edit_count(), 2);
+  EXPECT_EQ(reply->map_after().stay_count(), reply->map_before().stay_count());
+  EXPECT_GT(reply->log_bytes_after(), 0);
+  EXPECT_LT(reply->log_bytes_after(), reply->file_bytes_after());
+}
+
+TEST_F(PruneCallTest, NamesOfPoliciesHaveDatesOnlyOnAClockThatHasThem) {
+  request_.add_policies()->set_before_ns(2 * kSecond);
+  request_.add_policies()->set_unseen_since_ns(1 * kSecond);
+  request_.set_dry_run(true);
+  const auto reply = Prune();
+  ASSERT_TRUE(reply.ok()) << reply.status();
+  EXPECT_EQ(reply->policies(0).name(), "before +2s");
+  EXPECT_EQ(reply->policies(1).name(), "unseen since +1s");
+}
+
 TEST_F(PruneCallTest, NamesWhatIsWrong) {
   EXPECT_EQ(ReasonOf(Prune().status()), Reason::kFieldInvalid);
   request_.add_policies()->set_branch("R99");
@@ -127,6 +148,11 @@ TEST_F(PruneCallTest, NamesWhatIsWrong) {
   EXPECT_EQ(ReasonOf(Prune().status()), Reason::kLayerUnknown);
   request_.mutable_policies(0)->set_older_than_ns(-1);
   EXPECT_EQ(ReasonOf(Prune().status()), Reason::kFieldInvalid);
+  request_.mutable_policies(0)->set_layer("mesh");
+  request_.mutable_policies(0)->set_strength(static_cast<v1::PruneStrength>(77));
+  EXPECT_EQ(MetadataOf(Prune().status())["field"], "policies.strength");
+  EXPECT_EQ(MetadataOf(Prune().status())["value"], "77");
+  request_.mutable_policies(0)->clear_strength();
   request_.mutable_policies(0)->mutable_region_map()->mutable_min()->set_x(5);
   request_.mutable_policies(0)->mutable_region_map()->mutable_max()->set_x(1);
   EXPECT_EQ(ReasonOf(Prune().status()), Reason::kBoxInverted);

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <fstream>
 
 #include "schema/base/random.h"
@@ -83,10 +84,38 @@ TEST(PolicyFile, RefusesWhatIsHalfSaid) {
         "policies: [{name: a, region: [0, 0, 0, 1, 1]}]",
         "policies: [{name: a, layer: mesh, strength: forget}]",
         "policies: [{name: a, history_older_than: 1d, layers: [mesh]}]",
+        "policies: [{name: a, history_older_than: 1d, strength: erase}]",
+        "policies: [{name: a, branch: \"bed\\0room\"}]",
+        "policies: [{name: \"a\\0\", branch: bedroom}]",
+        "policies: [{name: a, branch: R3}]\n---\npolicies: [{name: b, branch: R4}]",
         "every: 10ms\npolicies: [{name: a, layer: mesh}]"}) {
     const auto file = ParsePolicyFile(text, "p.yaml");
     EXPECT_EQ(ReasonOf(file.status()), Reason::kFileMalformed) << text;
   }
+}
+
+TEST(PolicyFile, TellsWhereASecondDocumentBegins) {
+  const auto file = ParsePolicyFile(
+      "---\npolicies: [{name: a, branch: R3}]\n---\npolicies: [{name: b, branch: R4}]\n", "p.yaml");
+  EXPECT_EQ(MetadataOf(file.status())["line"], "3") << file.status();
+  EXPECT_TRUE(ParsePolicyFile("---\npolicies: [{name: a, branch: R3}]\n...\n", "p.yaml").ok());
+}
+
+TEST(Policy, BlamesTheFieldThatIsWrong) {
+  for (const double wrong : {std::nan(""), -0.0, -1.0, 1e9, HUGE_VAL}) {
+    PrunePolicy policy;
+    policy.simplify_m = wrong;
+    const absl::Status refused = policy.Validate();
+    EXPECT_EQ(MetadataOf(refused)["field"], "simplify_m") << refused;
+    EXPECT_EQ(refused.message().find("\"\""), std::string::npos) << refused;
+  }
+  PrunePolicy policy;
+  EXPECT_EQ(MetadataOf(policy.Validate())["field"], "what");
+  policy.what = PrunePolicy::Branch{std::string("bed\0room", 8)};
+  EXPECT_EQ(MetadataOf(policy.Validate())["field"], "branch");
+  policy.what = PrunePolicy::WholeLayer{"mesh"};
+  policy.name = std::string("a\0b", 3);
+  EXPECT_EQ(MetadataOf(policy.Validate())["field"], "name");
 }
 
 TEST(PolicyFile, ReadsPlainFilesOfBoundedSizeOnly) {

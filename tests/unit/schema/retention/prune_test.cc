@@ -35,12 +35,16 @@ TEST_F(PruneTest, BranchTakesWhatOnlyItContainsAndTheMeshOfItsRooms) {
   ASSERT_EQ(stays.size(), 1u);
   EXPECT_EQ(stays[0].room, NodeId('R', 2));
   EXPECT_EQ(plan.total.stay_count, 3);
+  EXPECT_EQ(plan.total.stay_edit_count, 0);
   // Older revisions know it still.
   EXPECT_EQ(NodesOf(*map_.At(1)), "B1 H1 H2 O1 O2 O3 O4 O5 R1 R2 p1 p2 p3");
 }
 
 TEST_F(PruneTest, BranchOfAPlaceLeavesTheRoomInTheStay) {
-  Prune(&map_, {PolicyOf(P::Branch{"p1"})});
+  const PrunePlan plan = Prune(&map_, {PolicyOf(P::Branch{"p1"})});
+  // They are no rows that go.
+  EXPECT_EQ(plan.total.stay_count, 0);
+  EXPECT_EQ(plan.total.stay_edit_count, 2);
   const auto stays = OrDie(map_.Latest()->StaysOfAgent(kStander, kTimeMin, kTimeMax));
   ASSERT_EQ(stays.size(), 1u);
   EXPECT_EQ(stays[0].room, NodeId('R', 1));
@@ -48,6 +52,16 @@ TEST_F(PruneTest, BranchOfAPlaceLeavesTheRoomInTheStay) {
   // It is open still: when the track goes on, so does the stay.
   map_.MustCommit(DeltaOfPoses(kStander, {PoseAt(5 * kSecond, 2, 5, 1)}));
   EXPECT_TRUE(OrDie(map_.Latest()->StayAt(kStander, 5 * kSecond)).has_value());
+}
+
+TEST_F(PruneTest, TheBranchOfTheOnlyBuildingIsEverythingWhateverStandsOutsideOfIt) {
+  map_.MustCommit(DeltaOfNodes({MakeObject(90, "stray", BoxOf(50, 0, 0, 51, 1, 1))}));
+  EXPECT_EQ(PlanOf(&map_, {PolicyOf(P::Branch{"B1"})}).all_matching_policy, "test");
+  EXPECT_EQ(PlanOf(&map_, {PolicyOf(P::Branch{"R1"})}).all_matching_policy, "");
+  EXPECT_EQ(PlanOf(&map_, {PolicyOf(P::Branch{"B1"}, {"objects"})}).all_matching_policy, "");
+  map_.MustCommit(DeltaOfNodes({MakeNode({'B', 2}, layers::kBuildings, kinds::kBuilding, "shed",
+                                         BoxOf(50, 0, 0, 60, 9, 3))}));
+  EXPECT_EQ(PlanOf(&map_, {PolicyOf(P::Branch{"B1"})}).all_matching_policy, "");
 }
 
 TEST_F(PruneTest, BranchOfOnlySomeLayersLeavesTheOthers) {

@@ -73,6 +73,9 @@ TEST_F(Compaction, RefusesWhatIsGoneNamingWhatCanBeRead) {
     EXPECT_EQ(MetadataOf(refused)["newest"], "60");
     EXPECT_TRUE(absl::StrContains(refused.message(), "40 to 60 and the tagged 23")) << refused;
   }
+  const auto future = map_.reader().At(61).status();
+  EXPECT_EQ(ReasonOf(future), Reason::kRevisionInFuture);
+  EXPECT_TRUE(absl::StrContains(future.message(), "40 to 60 and the tagged 23")) << future;
   EXPECT_EQ(OrDie(map_.reader().OldestRevision()), 40);
 }
 
@@ -228,6 +231,9 @@ TEST_F(Compaction, CountsAcrossSlices) {
   absl::StatusOr<CompactReport> report = absl::CancelledError("not yet");
   for (int slice = 0; !report.ok(); ++slice) {
     ASSERT_LT(slice, 1000);
+    // A tag changes what is to go, but not what went.
+    if (slice == 3) OrDie(map_.writer().SetTag("now", kRevisionCount, ""));
+    if (slice == 4) OrDie(map_.writer().RemoveTag("now"));
     int left = 1;
     report = map_.writer().Compact(
         40, [&] { return left-- > 0 ? absl::OkStatus() : absl::CancelledError("enough"); }, {});
