@@ -62,10 +62,13 @@ class Killing {
     const std::string place = operation_.make_place(rig_);
     const std::vector<std::string> command = operation_.command(rig_, place);
     Process program = Process::Run(command, place + "/output");
-    std::this_thread::sleep_for(std::chrono::nanoseconds(Moment()));
+    const int64_t moment_ns = Moment();
+    std::this_thread::sleep_for(std::chrono::nanoseconds(moment_ns));
     program.Kill();
     const Process::Ending ending = program.Wait();
     if (!ending.killed) {
+      // The machine was busier when the operation was timed.
+      length_ns_ = moment_ns;
       ++tally_.ended_before_count;
       EXPECT_EQ(ending.exit_code, 0) << operation_.name << ": " << OutputOf(place);
     } else {
