@@ -133,6 +133,7 @@ absl::StatusOr<Command> ParseArguments(const std::vector<std::string>& arguments
   if (std::holds_alternative<HelpVerb>(command.verb)) return command;
   const bool is_about_all = std::holds_alternative<BackupVerb>(command.verb) ||
                             std::holds_alternative<RestoreVerb>(command.verb) ||
+                            std::holds_alternative<VerifyVerb>(command.verb) ||
                             NamesArchive(command.verb);
   DSG_RETURN_IF_ERROR(SettlePlace(environment, !is_about_all, &command.common));
   DSG_RETURN_IF_ERROR(CheckPlace(command));

@@ -25,7 +25,7 @@ inline bool IsArchivePath(const std::string& path) {
 struct TagVerb {
   /// Set this one, at the common option --revision.
   std::string name;
-  std::string note;
+  std::optional<std::string> note;
   std::string removed;
   bool list = false;
 };

@@ -19,13 +19,12 @@ absl::StatusOr<v1::ListTagsResponse> ReadTags(Session* session) {
   return reply;
 }
 
-absl::StatusOr<Revision> NumberOf(const RevisionOption& revision, Revision unset,
-                                  Session* session) {
-  if (revision.tag.empty()) return revision.number.value_or(unset);
+absl::StatusOr<std::optional<Revision>> NumberOf(const RevisionOption& revision, Session* session) {
+  if (revision.tag.empty()) return revision.number;
   DSG_ASSIGN_OR_RETURN(const v1::ListTagsResponse reply, ReadTags(session));
   std::vector<Tag> tags;
   for (const v1::Tag& tag : reply.tags()) {
-    if (tag.name() == revision.tag) return tag.revision();
+    if (tag.name() == revision.tag) return std::optional<Revision>(tag.revision());
     tags.emplace_back().name = tag.name();
   }
   const std::string& map = session->map().name;

@@ -2,6 +2,8 @@
 // What a tag on the command line stands for. Refuses to guess: the map is asked.
 #pragma once
 
+#include <optional>
+
 #include "absl/status/statusor.h"
 #include "query/cli/options_keep.h"
 #include "query/cli/session.h"
@@ -13,9 +15,9 @@ class ListTagsResponse;
 
 namespace dsg::cli {
 
-/// The number of the revision, `unset` if none was given. Requires: the session's map is chosen.
+/// The number of the revision, if one was given. Requires: the session's map is chosen.
 /// Errors: NOT_FOUND/TAG_UNKNOWN.
-absl::StatusOr<Revision> NumberOf(const RevisionOption& revision, Revision unset, Session* session);
+absl::StatusOr<std::optional<Revision>> NumberOf(const RevisionOption& revision, Session* session);
 
 /// The tags of the session's map; none from a server that knows of no tags.
 absl::StatusOr<v1::ListTagsResponse> ReadTags(Session* session);

@@ -13,10 +13,10 @@ namespace dsg::cli {
 absl::Status RunDiff(Session* session, const DiffVerb& verb, std::ostream& out) {
   v1::DiffRevisionsRequest request;
   request.set_map(session->map().name);
-  DSG_ASSIGN_OR_RETURN(const Revision from, NumberOf(verb.from, 0, session));
-  DSG_ASSIGN_OR_RETURN(const Revision to, NumberOf(verb.to, 0, session));
-  request.set_from_revision(from);
-  request.set_to_revision(to);
+  DSG_ASSIGN_OR_RETURN(const std::optional<Revision> from, NumberOf(verb.from, session));
+  DSG_ASSIGN_OR_RETURN(const std::optional<Revision> to, NumberOf(verb.to, session));
+  request.set_from_revision(from.value_or(0));
+  if (to.has_value()) request.set_to_revision(*to);
   request.set_layer(verb.layer);
   v1::DiffRevisionsResponse all;
   DSG_RETURN_IF_ERROR(FetchPages(

@@ -122,10 +122,7 @@ absl::Status RunWatch(Session* session, const WatchVerb& verb, std::ostream& out
           : std::chrono::duration_cast<Clock::duration>(kForEver);
   query::CallContext call(Clock::now() + length);
   const InterruptGuard guard(&call);
-  std::optional<int64_t> after;
-  if (verb.after.is_set()) {
-    DSG_ASSIGN_OR_RETURN(after, NumberOf(verb.after, 0, session));
-  }
+  DSG_ASSIGN_OR_RETURN(const std::optional<Revision> after, NumberOf(verb.after, session));
   Printer printer(*session, verb, after, out);
   Patience patience(&notes);
   const auto take = [&](const v1::WatchMapResponse& message) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The verbs about revisions that are kept or dropped: tag, compact, revert.
+#include <optional>
 #include <string>
 
 #include "absl/strings/str_cat.h"
@@ -45,9 +46,9 @@ absl::Status RunTag(Session* session, const TagVerb& verb, std::ostream& out) {
   v1::SetTagRequest request;
   request.set_map(session->map().name);
   request.set_name(verb.name);
-  request.set_note(verb.note);
-  DSG_ASSIGN_OR_RETURN(const Revision revision, NumberOf(at, 0, session));
-  request.set_revision(revision);
+  if (verb.note.has_value()) request.set_note(*verb.note);
+  DSG_ASSIGN_OR_RETURN(const std::optional<Revision> revision, NumberOf(at, session));
+  if (revision.has_value()) request.set_revision(*revision);
   v1::SetTagResponse reply;
   DSG_RETURN_IF_ERROR(session->api().SetTag(session->NewCall(), request, &reply));
   if (session->common().json) return WriteJson(reply, out);
@@ -59,8 +60,8 @@ absl::Status RunCompact(Session* session, const CompactVerb& verb, std::ostream&
                         std::ostream& progress_out) {
   v1::CompactRequest request;
   request.set_map(session->map().name);
-  DSG_ASSIGN_OR_RETURN(const Revision keep_from, NumberOf(verb.keep_from, 0, session));
-  request.set_keep_from_revision(keep_from);
+  DSG_ASSIGN_OR_RETURN(const std::optional<Revision> keep_from, NumberOf(verb.keep_from, session));
+  if (keep_from.has_value()) request.set_keep_from_revision(*keep_from);
   Progress progress(absl::StrCat("compact ", session->map().name), &progress_out);
   query::CallContext call = session->NewCall();
   const InterruptGuard guard(&call);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -19,7 +20,7 @@ constexpr std::chrono::milliseconds kSlice{200};
 
 class Compaction final : public CompactCursor {
  public:
-  Compaction(MapTable* maps, std::string map, Revision keep_from)
+  Compaction(MapTable* maps, std::string map, std::optional<Revision> keep_from)
       : maps_(maps), map_(std::move(map)), keep_from_(keep_from) {}
 
   absl::Status Next(const CallContext& call, v1::CompactResponse* reply) override {
@@ -45,7 +46,7 @@ class Compaction final : public CompactCursor {
     };
     // A later slice passes again, quickly, over what earlier ones have done.
     const auto tell = [&](double fraction) { progress_ = std::max(progress_, fraction); };
-    const absl::StatusOr<CompactReport> report = writer->Compact(keep_from_, stop, tell);
+    const absl::StatusOr<CompactReport> report = writer->Compact(*keep_from_, stop, tell);
     if (!report.ok()) {
       return slice_is_over && absl::IsCancelled(report.status()) ? absl::OkStatus()
                                                                  : report.status();
@@ -61,9 +62,9 @@ class Compaction final : public CompactCursor {
     return absl::OkStatus();
   }
 
-  // 0 stands for the revision that is the newest when the work begins.
+  // The newest is that when the work begins.
   absl::Status SettleKeepFrom() {
-    if (keep_from_ > 0) return absl::OkStatus();
+    if (keep_from_.has_value()) return absl::OkStatus();
     DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> map, maps_->Reader(map_));
     DSG_ASSIGN_OR_RETURN(const RevisionInfo head, map->Head());
     keep_from_ = head.revision;
@@ -72,7 +73,7 @@ class Compaction final : public CompactCursor {
 
   MapTable* const maps_;
   const std::string map_;
-  Revision keep_from_;
+  std::optional<Revision> keep_from_;
   double progress_ = 0.0;
   bool is_done_ = false;
 };
@@ -83,10 +84,12 @@ absl::StatusOr<std::unique_ptr<CompactCursor>> OpenCompact(MapTable* maps,
                                                            const v1::CompactRequest& request) {
   if (request.keep_from_revision() < 0) {
     return FieldError("keep_from_revision", absl::StrCat(request.keep_from_revision()),
-                      "give a revision, or 0 for the newest");
+                      "give a revision, or none for the newest");
   }
   DSG_RETURN_IF_ERROR(maps->Reader(request.map()).status());
-  return std::make_unique<Compaction>(maps, request.map(), request.keep_from_revision());
+  std::optional<Revision> keep_from;
+  if (request.has_keep_from_revision()) keep_from = request.keep_from_revision();
+  return std::make_unique<Compaction>(maps, request.map(), keep_from);
 }
 
 }  // namespace dsg::query

@@ -22,11 +22,11 @@ absl::Status CheckRevision(std::string_view field, Revision revision) {
   return FieldError(field, absl::StrCat(revision), "revisions count from 0, the empty map");
 }
 
-// Where a page begins, and the revision that 0 stood for on the first one.
+// Where a page begins, and the revision that was the newest on the first one.
 absl::StatusOr<PageToken> StartOf(MapTable* maps, const v1::DiffRevisionsRequest& request,
                                   uint64_t question) {
   if (!request.page_token().empty()) return DecodePageToken(request.page_token(), question);
-  if (request.to_revision() > 0) return PageToken{request.to_revision(), ""};
+  if (request.has_to_revision()) return PageToken{request.to_revision(), ""};
   DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> map, maps->Reader(request.map()));
   DSG_ASSIGN_OR_RETURN(const RevisionInfo head, map->Head());
   return PageToken{head.revision, ""};

@@ -2,6 +2,7 @@
 #include "query/engine/tags.h"
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -20,23 +21,37 @@ void ToProto(const Tag& tag, v1::Tag* out) {
   out->set_note(tag.note);
 }
 
+absl::StatusOr<std::string> NoteOf(MapTable* maps, const std::string& map,
+                                   const std::string& name) {
+  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> reader, maps->Reader(map));
+  DSG_ASSIGN_OR_RETURN(const std::vector<Tag> tags, reader->Tags());
+  for (const Tag& tag : tags) {
+    if (tag.name == name) return tag.note;
+  }
+  return std::string();
+}
+
 }  // namespace
 
 absl::Status SetTag(MapTable* maps, const CallContext& call, const v1::SetTagRequest& request,
                     v1::SetTagResponse* reply) {
   if (request.revision() < 0) {
     return FieldError("revision", absl::StrCat(request.revision()),
-                      "give a revision, or 0 for the newest");
+                      "give a revision, or none for the newest");
   }
   return maps->WithWriter(request.map(), call.stop(), [&](MapWriter& writer) -> absl::Status {
     Revision revision = request.revision();
-    if (revision == 0) {
+    if (!request.has_revision()) {
       // Read under the writer's lock, so that nothing is newer when the tag is set.
       DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> map, maps->Reader(request.map()));
       DSG_ASSIGN_OR_RETURN(const RevisionInfo head, map->Head());
       revision = head.revision;
     }
-    DSG_ASSIGN_OR_RETURN(const Tag tag, writer.SetTag(request.name(), revision, request.note()));
+    std::string note = request.note();
+    if (!request.has_note()) {
+      DSG_ASSIGN_OR_RETURN(note, NoteOf(maps, request.map(), request.name()));
+    }
+    DSG_ASSIGN_OR_RETURN(const Tag tag, writer.SetTag(request.name(), revision, note));
     ToProto(tag, reply->mutable_tag());
     return absl::OkStatus();
   });

@@ -9,8 +9,8 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <regex>
 #include <set>
+#include <string_view>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -18,6 +18,7 @@
 #include "schema/archive/file_io.h"
 #include "schema/base/status.h"
 #include "schema/codec/checksum.h"
+#include "schema/files/atomic_file.h"
 
 namespace dsg {
 namespace {
@@ -32,12 +33,32 @@ std::string ManifestPath(const std::string& folder) {
   return absl::StrCat(folder, "/", kManifestName);
 }
 
+// Cuts `end` off; false if the text does not end so.
+bool Consume(std::string_view end, std::string_view* text) {
+  if (!text->ends_with(end)) return false;
+  text->remove_suffix(end.size());
+  return true;
+}
+
+// "office-r12-" and the first 16 hex digits of a digest.
+bool IsMapRevisionDigest(std::string_view stem) {
+  constexpr size_t kDigestDigits = 16;
+  const size_t mark = stem.rfind("-r");
+  if (mark == 0 || mark == std::string_view::npos) return false;
+  const std::string_view rest = stem.substr(mark + 2);
+  const size_t digits = std::min(rest.find_first_not_of("0123456789"), rest.size());
+  return digits > 0 && rest.size() == digits + 1 + kDigestDigits && rest[digits] == '-' &&
+         rest.find_first_not_of("0123456789abcdef", digits + 1) == std::string_view::npos;
+}
+
 // What this class writes, and what it leaves when it is killed: it is all that a later backup may
 // remove. Archives that somebody exported have other names.
-bool IsOurs(const std::string& name) {
-  static const std::regex kOurs(
-      "MANIFEST(\\.part)?|.+-r[0-9]+-[0-9a-f]{16}\\.dsgz|.+\\.coming\\.dsgz(\\.part)?");
-  return std::regex_match(name, kOurs);
+bool IsOurs(std::string_view name) {
+  const bool is_part = Consume(kPartSuffix, &name);
+  if (name == kManifestName) return true;
+  if (!Consume(".dsgz", &name)) return false;
+  if (Consume(".coming", &name)) return !name.empty();
+  return !is_part && IsMapRevisionDigest(name);
 }
 
 absl::StatusOr<std::vector<std::string>> NamesIn(const std::string& folder) {

@@ -15,6 +15,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+// A list of objects in an object, and some to spare. Values are copied a call deep for each level.
+constexpr int kDepthMax = 8;
+
 bool IsSmallInteger(const Json& value) {
   return value.is_number_integer() && value.get<double>() >= std::numeric_limits<int>::min() &&
          value.get<double>() <= std::numeric_limits<int>::max();
@@ -32,8 +35,17 @@ struct ManifestFields::Value {
 };
 
 ManifestFields::ManifestFields(std::string_view text) : object_(std::make_unique<Value>()) {
-  object_->json = Json::parse(text, nullptr, /*allow_exceptions=*/false);
-  if (!object_->json.is_object()) problem_ = "it is not one JSON object";
+  bool is_too_deep = false;
+  const auto is_taken = [&](int depth, Json::parse_event_t, Json&) {
+    is_too_deep = is_too_deep || depth > kDepthMax;
+    return depth <= kDepthMax;
+  };
+  object_->json = Json::parse(text, is_taken, /*allow_exceptions=*/false);
+  if (is_too_deep) {
+    problem_ = "it is nested too deeply";
+  } else if (!object_->json.is_object()) {
+    problem_ = "it is not one JSON object";
+  }
 }
 
 ManifestFields::ManifestFields(std::unique_ptr<Value> object) : object_(std::move(object)) {}

@@ -207,6 +207,16 @@ double DrawScaleBar(const FloorView& view, double y, Canvas* canvas) {
   return x;
 }
 
+// Agents have a colour each: that of the first of the kind.
+uint32_t ColorOfKind(const MapContent& content, const char* kind) {
+  for (size_t i = 0; i < content.tracks.size(); ++i) {
+    const auto node = std::find_if(content.nodes.begin(), content.nodes.end(),
+                                   [&](const Node& n) { return n.id == content.tracks[i].agent; });
+    if (node != content.nodes.end() && node->kind == kind) return AgentColor(i);
+  }
+  return LayerColor(layers::kAgents);
+}
+
 // How many of what, each with the colour it is drawn in.
 void DrawLegend(const MapContent& content, double y, double x_end, Canvas* canvas) {
   std::map<std::string, int64_t> count_of;
@@ -225,8 +235,8 @@ void DrawLegend(const MapContent& content, double y, double x_end, Canvas* canva
   add(kinds::kStructure, "structure", kWallRgb);
   add(kinds::kPlace, "place", LayerColor(layers::kPlaces));
   add(kinds::kObject, "object", LayerColor(layers::kObjects));
-  add(kinds::kRobot, "robot", AgentColor(0));
-  add(kinds::kHuman, "human", AgentColor(1));
+  add(kinds::kRobot, "robot", ColorOfKind(content, kinds::kRobot));
+  add(kinds::kHuman, "human", ColorOfKind(content, kinds::kHuman));
 }
 
 void DrawTitle(const std::string& title, Canvas* canvas) {

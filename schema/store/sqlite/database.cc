@@ -132,9 +132,12 @@ int Database::error_code() const { return sqlite3_extended_errcode(db_); }
 
 absl::Status Database::Error(std::string_view doing) const {
   const int code = db_ == nullptr ? SQLITE_NOMEM : sqlite3_extended_errcode(db_);
-  const std::string text = absl::StrCat("map \"", map_name_, "\": ", std::string(doing), ": ",
-                                        db_ == nullptr ? "out of memory" : sqlite3_errmsg(db_));
-  const ErrorMetadata metadata = {{"map", map_name_}, {"sqlite", absl::StrCat(code)}};
+  // Users know files, not statements.
+  const std::string text =
+      absl::StrCat("map \"", map_name_, "\" (", path_,
+                   "): ", db_ == nullptr ? "out of memory" : sqlite3_errmsg(db_));
+  const ErrorMetadata metadata = {
+      {"map", map_name_}, {"sqlite", absl::StrCat(code)}, {"doing", std::string(doing)}};
   // A full disk also shows as an I/O error, where the shared index of the log has to grow.
   const bool is_io_error = (code & 0xff) == SQLITE_IOERR;
   const bool is_full = (code & 0xff) == SQLITE_FULL || code == SQLITE_IOERR_SHMSIZE ||
@@ -173,7 +176,7 @@ absl::Status Database::Error(std::string_view doing) const {
     case SQLITE_LOCKED:
       return MakeError(Reason::kWriterLocked, text + "; try again", metadata);
     default:
-      return absl::InternalError(text);
+      return absl::InternalError(absl::StrCat(text, ", while ", std::string(doing)));
   }
 }
 

@@ -100,7 +100,9 @@ absl::StatusOr<std::string> KeepCopy(Database& db, int64_t format) {
   const std::string copy = absl::StrCat(db.path(), ".format", format);
   const std::string partial = copy + ".new";
   std::error_code error;
-  fs::copy_file(db.path(), partial, fs::copy_options::overwrite_existing, error);
+  // What a killed upgrade left; of a link the link, so that nothing is written where it points.
+  fs::remove(partial, error);
+  fs::copy_file(db.path(), partial, fs::copy_options::none, error);
   if (!error) DSG_RETURN_IF_ERROR(SyncFile(partial));
   if (!error) fs::rename(partial, copy, error);
   if (error) {

@@ -74,7 +74,7 @@ class Verifier {
 
   void CheckStructure() {
     if (const auto damage = FindLogDamage(db_.path() + "-wal")) Problem(*damage);
-    Query query(db_, "PRAGMA quick_check(20)");
+    Query query(db_, "PRAGMA integrity_check(20)");
     while (query.Next()) {
       if (query.Text(0) != "ok") Problem(absl::StrCat("database: ", std::string(query.Text(0))));
     }

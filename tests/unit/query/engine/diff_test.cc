@@ -64,9 +64,11 @@ class Diff : public testing::Test {
     request_.set_map(kMap);
   }
 
-  v1::DiffRevisionsResponse Ask(int64_t from, int64_t to) {
+  // To the newest, unless it is said.
+  v1::DiffRevisionsResponse Ask(int64_t from, std::optional<int64_t> to = std::nullopt) {
     request_.set_from_revision(from);
-    request_.set_to_revision(to);
+    request_.clear_to_revision();
+    if (to.has_value()) request_.set_to_revision(*to);
     v1::DiffRevisionsResponse reply;
     const absl::Status status = core_->DiffRevisions(call_, request_, &reply);
     EXPECT_TRUE(status.ok()) << status;
@@ -148,7 +150,7 @@ TEST_F(Diff, TellsAppendedFromCorrectedPoses) {
 }
 
 TEST_F(Diff, TakesTheNewestRevisionForZero) {
-  const auto reply = Ask(6, 0);
+  const auto reply = Ask(6);
   EXPECT_EQ(reply.to_revision(), 7);
   EXPECT_EQ(reply.tracks_size(), 1);
 }
@@ -180,14 +182,14 @@ TEST_F(Diff, ShowsAsMuchOfANodeAsTheViewAsksFor) {
 
 TEST_F(Diff, KeepsItsRevisionsOverItsPages) {
   request_.set_page_size(1);
-  auto page = Ask(1, 0);
+  auto page = Ask(1);
   EXPECT_EQ(page.to_revision(), 7);
   ASSERT_NE(page.next_page_token(), "");
   GraphDelta later;
   later.nodes = {Lamp("later")};
   CommitToOffice(folder_.path(), later);
   request_.set_page_token(page.next_page_token());
-  page = Ask(1, 0);
+  page = Ask(1);
   EXPECT_EQ(page.to_revision(), 7);
   EXPECT_EQ(page.header().head_revision(), 8);
   request_.set_from_revision(2);
@@ -227,6 +229,13 @@ TEST_F(Diff, StopsWhenCancelled) {
   call_.Cancel();
   request_.set_from_revision(1);
   EXPECT_TRUE(absl::IsCancelled(Fail()));
+}
+
+TEST_F(Diff, ToTheEmptyMapTellsAllAsGone) {
+  const auto reply = Ask(7, 0);
+  EXPECT_EQ(reply.to_revision(), 0);
+  ASSERT_GT(reply.nodes_size(), 0);
+  for (const v1::NodeChange& change : reply.nodes()) EXPECT_EQ(change.type(), v1::REMOVED);
 }
 
 }  // namespace

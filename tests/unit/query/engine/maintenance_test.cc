@@ -30,12 +30,15 @@ class MaintenanceTest : public testing::Test {
     core_ = OpenCore(folder_.path());
   }
 
-  absl::StatusOr<v1::Tag> SetTag(const std::string& name, Revision revision,
-                                 const std::string& map = kMap) {
+  // No revision stands for the newest.
+  absl::StatusOr<v1::Tag> SetTag(const std::string& name, std::optional<Revision> revision,
+                                 const std::string& map = kMap,
+                                 std::optional<std::string> note = std::nullopt) {
     v1::SetTagRequest request;
     request.set_map(map);
     request.set_name(name);
-    request.set_revision(revision);
+    if (revision.has_value()) request.set_revision(*revision);
+    if (note.has_value()) request.set_note(*note);
     v1::SetTagResponse reply;
     DSG_RETURN_IF_ERROR(core_->SetTag(call_, request, &reply));
     return reply.tag();
@@ -49,10 +52,10 @@ class MaintenanceTest : public testing::Test {
     return core_->RemoveTag(call_, request, &reply);
   }
 
-  absl::StatusOr<v1::CompactResponse> Compact(Revision keep_from) {
+  absl::StatusOr<v1::CompactResponse> Compact(std::optional<Revision> keep_from) {
     v1::CompactRequest request;
     request.set_map(kMap);
-    request.set_keep_from_revision(keep_from);
+    if (keep_from.has_value()) request.set_keep_from_revision(*keep_from);
     v1::CompactResponse last;
     DSG_RETURN_IF_ERROR(core_->Compact(call_, request, [&](const v1::CompactResponse& message) {
       EXPECT_GE(message.progress(), last.progress());
@@ -101,7 +104,7 @@ TEST(MapTable, OpensAMapAgainOnceItsPastWasErased) {
 
 TEST_F(MaintenanceTest, ATagIsSetMovedListedAndTakenAway) {
   EXPECT_EQ(SetTag("start", 3)->revision(), 3);
-  EXPECT_EQ(SetTag("now", 0)->revision(), 10);
+  EXPECT_EQ(SetTag("now", std::nullopt)->revision(), 10);
   EXPECT_EQ(SetTag("start", 4)->revision(), 4);
   v1::ListTagsRequest request;
   request.set_map(kMap);
@@ -112,6 +115,21 @@ TEST_F(MaintenanceTest, ATagIsSetMovedListedAndTakenAway) {
   EXPECT_EQ(reply.tags(1).revision(), 4);
   EXPECT_TRUE(RemoveTag("now").ok());
   EXPECT_EQ(ReasonOf(RemoveTag("now")), Reason::kTagUnknown);
+}
+
+TEST_F(MaintenanceTest, ATagThatMovesKeepsItsNoteUnlessItGetsAnother) {
+  EXPECT_EQ(SetTag("start", 3, kMap, "before moving")->note(), "before moving");
+  EXPECT_EQ(SetTag("start", 4)->note(), "before moving");
+  EXPECT_EQ(SetTag("start", 5, kMap, "")->note(), "");
+}
+
+// The empty map is a revision like others, and not "the newest".
+TEST_F(MaintenanceTest, RevisionZeroIsTheFirst) {
+  EXPECT_EQ(SetTag("empty", 0)->revision(), 0);
+  const auto done = Compact(0);
+  ASSERT_TRUE(done.ok()) << done.status();
+  EXPECT_EQ(done->oldest_revision(), 0);
+  EXPECT_EQ(done->revision_count(), 0);
 }
 
 TEST_F(MaintenanceTest, TagsThatCannotBeAreRefused) {
@@ -142,8 +160,8 @@ TEST_F(MaintenanceTest, CompactionKeepsTagsAndTheRest) {
   EXPECT_EQ(ReasonOf(Compact(11).status()), Reason::kRevisionInFuture);
   EXPECT_EQ(ReasonOf(Compact(-1).status()), Reason::kFieldInvalid);
   // All but the newest, and again.
-  EXPECT_EQ(Compact(0)->oldest_revision(), 10);
-  EXPECT_EQ(Compact(0)->revision_count(), 0);
+  EXPECT_EQ(Compact(std::nullopt)->oldest_revision(), 10);
+  EXPECT_EQ(Compact(std::nullopt)->revision_count(), 0);
 }
 
 TEST_F(MaintenanceTest, CommitsGetBetweenTheSlicesOfACompaction) {
@@ -152,7 +170,7 @@ TEST_F(MaintenanceTest, CommitsGetBetweenTheSlicesOfACompaction) {
   request.set_keep_from_revision(5);
   const auto cursor = core_->OpenCompact(request);
   ASSERT_TRUE(cursor.ok());
-  ASSERT_TRUE(SetTag("between", 0).ok());
+  ASSERT_TRUE(SetTag("between", std::nullopt).ok());
   v1::CompactResponse message;
   do {
     message.Clear();

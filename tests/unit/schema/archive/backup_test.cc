@@ -79,6 +79,8 @@ TEST(BackupManifest, SaysWhichFieldOfWhichEntryIsWrong) {
   EXPECT_THAT(refusal("\"maps\"", "\"map\""), HasSubstr("field \"maps\" is missing"));
   EXPECT_THAT(refusal("}", ""), HasSubstr("not one JSON object"));
   EXPECT_THAT(refusal("[", "[1,"), HasSubstr("\"maps\" is not a list of objects"));
+  const std::string deep = std::string(1'000'000, '[') + std::string(1'000'000, ']');
+  EXPECT_THAT(refusal("\"b\"", deep), HasSubstr("nested too deeply"));
   // Nothing of the library that reads JSON.
   EXPECT_EQ(refusal("}", "").find("json.exception"), std::string::npos);
   const std::string newer = Seal(absl::StrReplaceAll(body, {{"backup\": 1", "backup\": 2"}}));
@@ -180,10 +182,27 @@ TEST_F(BackupFolderTest, FoldersOfOtherThingsAreLetAlone) {
 }
 
 TEST_F(BackupFolderTest, ArchivesOfOthersAreLetAlone) {
-  fs::create_directories(path());
-  WriteBytes(path() + "/office-2025.dsgz", "exported");
-  EXPECT_EQ(ReasonOf(BackupFolder::Open(path()).status()), Reason::kFieldInvalid);
-  EXPECT_EQ(NamesOf(path()), "office-2025.dsgz");
+  for (const char* name :
+       {"office-2025.dsgz", "office-r12-0123456789abcde.dsgz", "office-r-0123456789abcdef.dsgz",
+        "office-r12_0123456789abcdef.dsgz", "-r12-0123456789abcdef.dsgz",
+        "office-r12-0123456789abcdeF.dsgz", "office-r12-0123456789abcdef.dsgz.part", ".coming.dsgz",
+        "MANIFEST.old"}) {
+    fs::create_directories(path());
+    WriteBytes(path() + "/" + name, "exported");
+    EXPECT_EQ(ReasonOf(BackupFolder::Open(path()).status()), Reason::kFieldInvalid) << name;
+    EXPECT_EQ(NamesOf(path()), name);
+    fs::remove_all(path());
+  }
+}
+
+TEST_F(BackupFolderTest, WhatAKilledBackupLeftIsNoOtherThing) {
+  for (const char* name : {"a-r1-b-r12-0123456789abcdef.dsgz", "office.coming.dsgz",
+                           "office.coming.dsgz.part", "MANIFEST.part"}) {
+    fs::create_directories(path());
+    WriteBytes(path() + "/" + name, "x");
+    EXPECT_TRUE(BackupFolder::Open(path()).ok()) << name;
+    fs::remove_all(path());
+  }
 }
 
 TEST_F(BackupFolderTest, OneProcessWritesAtATime) {

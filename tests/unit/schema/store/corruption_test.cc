@@ -9,6 +9,7 @@
 #include <random>
 
 #include "absl/strings/str_cat.h"
+#include "schema/store/sqlite/database.h"
 #include "tests/unit/schema/store/delta_stream.h"
 #include "tests/unit/schema/store/store_test_util.h"
 
@@ -178,6 +179,29 @@ TEST(Corruption, BySwappedOrEmptiedPagesIsFound) {
     copies.Check(bytes, absl::StrCat("pages ", a + 1, " and ", b + 1,
                                      i % 2 == 0 ? " swapped" : ", one empty"));
   }
+}
+
+// By a program that seals pages as we do, so that only the index can tell.
+TEST(Corruption, OfAnIndexThatLacksARowIsFound) {
+  TestMap map;
+  map.MustCommit(DeltaOfNodes({MakeHuman(1, "ann"), MakeHuman(2, "bob")}));
+  map.Close();
+  {
+    const auto db =
+        OrDie(sqlite::Database::Open(map.database_path(), sqlite::Database::Mode::kWrite, kMap));
+    const sqlite::Database::OpenTables open(db.get());
+    for (const char* sql :
+         {"CREATE TEMP TABLE row AS SELECT * FROM node WHERE name = 'ann'",
+          "DELETE FROM node WHERE name = 'ann'", "PRAGMA writable_schema = ON",
+          "CREATE TEMP TABLE hidden AS SELECT * FROM sqlite_master WHERE name = 'node_order'",
+          "DELETE FROM sqlite_master WHERE name = 'node_order'", "PRAGMA writable_schema = RESET",
+          "INSERT INTO node SELECT * FROM row", "PRAGMA writable_schema = ON",
+          "INSERT INTO sqlite_master SELECT * FROM hidden", "PRAGMA writable_schema = RESET"}) {
+      OrDie(db->Execute(sql));
+    }
+  }
+  map.Reopen();
+  EXPECT_NE(map.Problems().find("node_order"), std::string::npos) << map.Problems();
 }
 
 }  // namespace

@@ -92,6 +92,15 @@ TEST_F(Format1, IsTheSameMapAfterItsUpgrade) {
   ExpectIsWhatItWas();
 }
 
+TEST_F(Format1, IsNotKeptWhereALinkPoints) {
+  const std::string victim = folder_.path() + "/victim";
+  std::ofstream(victim) << "mine";
+  std::filesystem::create_symlink(victim, path() + ".format1.new");
+  const UpgradeReport report = OrDie(store_->UpgradeMap(kMap));
+  EXPECT_EQ(ReadFile(victim), "mine");
+  EXPECT_FALSE(std::filesystem::is_symlink(report.copy));
+}
+
 TEST_F(Format1, IsUpgradedOnce) {
   OrDie(store_->UpgradeMap(kMap));
   const UpgradeReport again = OrDie(store_->UpgradeMap(kMap));
