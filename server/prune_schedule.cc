@@ -135,6 +135,11 @@ absl::Status PruneSchedule::PruneMap(const std::string& map,
          {"revisions", absl::StrCat(policy.matched().revision_count())},
          {"bytes", absl::StrCat(policy.matched().byte_count())}});
   }
+  if (all.left_count() > 0) {
+    Log(LogLevel::kWarning,
+        "not all was erased: others went on writing it; the next run tries again",
+        {{"map", map}, {"left", absl::StrCat(all.left_count())}, {"first", all.left_ids(0)}});
+  }
   Log(LogLevel::kInfo, "policies applied to map",
       {{"map", map},
        {"revision", absl::StrCat(all.revision())},

@@ -10,7 +10,9 @@ void AddPruneVerb(Grammar* grammar) {
       grammar->Add<PruneVerb>("prune", "Forget a part of a map", kServer | kMap | kJson);
   CLI::Option_group* const what = app->add_option_group("What", "What to forget");
   what->add_option("--branch", verb->branch, "A node by id or name, and all that it contains");
-  what->add_option("--region", verb->region, "X0,Y0,Z0,X1,Y1,Z1: nodes, poses and mesh inside");
+  what->add_option("--region", verb->region,
+                   "X0,Y0,Z0,X1,Y1,Z1: nodes, poses and mesh inside; begin a metre below the "
+                   "floor, about which feet scatter");
   what->add_option("--before", verb->before, "Tracks before this TIME, and nodes that ended");
   what->add_option("--older-than", verb->older_than,
                    "The same, counted back from the newest observation: 90s, 24h, 30d");

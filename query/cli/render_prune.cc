@@ -48,13 +48,13 @@ Table TableOf(const std::vector<Row>& rows) {
   return table;
 }
 
-// What is kept but for a name in it is no row that goes.
+// What is kept but for a part of it is no row that goes.
 std::string StaysText(const v1::PolicyReport& policy) {
   const int64_t count = policy.matched().stay_edit_count();
   if (count == 0) return "";
-  return absl::StrCat(
-      Printable(policy.name()), ": ", Counted(count, "stay"),
-      count == 1 ? " loses its place or room and stays\n" : " lose their place or room and stay\n");
+  return absl::StrCat(Printable(policy.name()), ": ", Counted(count, "stay"),
+                      count == 1 ? " loses its place, room or beginning and stays\n"
+                                 : " lose their place, room or beginning and stay\n");
 }
 
 std::string FilesText(const v1::PruneResponse& reply) {
@@ -62,6 +62,39 @@ std::string FilesText(const v1::PruneResponse& reply) {
                       " before, ", BytesText(reply.file_bytes_after() - reply.log_bytes_after()),
                       " now; log, used again: ", BytesText(reply.log_bytes_before()), " before, ",
                       BytesText(reply.log_bytes_after()), " now\n");
+}
+
+template <typename Names>
+std::string NamesText(const Names& names, int64_t count) {
+  std::string text;
+  for (const std::string& name : names) {
+    absl::StrAppend(&text, text.empty() ? "" : " ", Printable(name));
+  }
+  return count > static_cast<int64_t>(names.size()) ? text + " ..." : text;
+}
+
+std::string ErasedText(const v1::PruneResponse& reply) {
+  std::string text;
+  if (reply.rewritten_count() > 0) {
+    absl::StrAppend(&text, Counted(reply.rewritten_count(), "node"),
+                    " written again by others meanwhile: the past of these is erased, but they are "
+                    "believed now: ",
+                    NamesText(reply.rewritten_ids(), reply.rewritten_count()), "\n");
+  }
+  if (reply.erased()) {
+    absl::StrAppend(&text, "erased: no ", reply.rewritten_count() > 0 ? "older " : "",
+                    "revision knows it, and no byte of it is in the map's files; backups made "
+                    "before still have it\n");
+    return text;
+  }
+  if (reply.left_count() == 0) {
+    return text + "not erased for good: a reader kept the log; do the same again\n";
+  }
+  absl::StrAppend(&text, "not erased for good: others went on writing ",
+                  Counted(reply.left_count(), "thing"), ": ",
+                  NamesText(reply.left_ids(), reply.left_count()),
+                  "; stop these writers, and do the same again\n");
+  return text;
 }
 
 // Something but history went.
@@ -90,10 +123,7 @@ std::string RenderPrune(const v1::PruneResponse& reply, bool is_dry_run, bool is
     absl::StrAppend(&text, "newest revision: ", reply.revision(), "\n");
   }
   if (is_erase) {
-    absl::StrAppend(&text, reply.erased()
-                               ? "erased: no revision knows it, and no byte of it is in the map's "
-                                 "files; backups made before still have it\n"
-                               : "not erased for good: a reader kept the log; do the same again\n");
+    text += ErasedText(reply);
   } else if (HasRows(reply)) {
     text += "older revisions still know it: `dsg compact` gives their bytes back\n";
   }

@@ -97,6 +97,18 @@ bool AskPerson(const absl::Status& refusal, std::ostream& questions) {
   return std::getline(std::cin, answer) && (answer == "y" || answer == "yes");
 }
 
+// A script must not take for erased what is still there.
+absl::Status CheckErased(const std::string& map, const v1::PruneResponse& reply) {
+  if (reply.erased()) return absl::OkStatus();
+  return MakeError(
+      Reason::kWriterLocked,
+      absl::StrCat("map \"", map, "\" still holds some of what was to be erased: ",
+                   reply.left_count() == 0 ? "a reader kept its log; stop the readers"
+                                           : "others went on writing it; stop the writers",
+                   " and do the same again"),
+      {{"map", map}, {"left_count", absl::StrCat(reply.left_count())}});
+}
+
 }  // namespace
 
 absl::Status RunPrune(Session* session, const PruneVerb& verb, std::ostream& out,
@@ -111,7 +123,7 @@ absl::Status RunPrune(Session* session, const PruneVerb& verb, std::ostream& out
   bool is_erase = false;
   for (const PrunePolicy& policy : policies) {
     query::ToProto(policy, request.add_policies());
-    is_erase |= policy.strength == PruneStrength::kErase;
+    is_erase |= policy.strength == PruneStrength::kErase && !policy.IsHistory();
   }
   auto reply = Run(session, request, progress_out);
   if (ReasonOf(reply.status()) == Reason::kPolicyMatchesAll) {
@@ -122,9 +134,12 @@ absl::Status RunPrune(Session* session, const PruneVerb& verb, std::ostream& out
     reply = Run(session, request, progress_out);
   }
   DSG_RETURN_IF_ERROR(reply.status());
-  if (session->common().json) return WriteJson(*reply, out);
-  out << RenderPrune(*reply, verb.dry_run, is_erase);
-  return absl::OkStatus();
+  if (session->common().json) {
+    DSG_RETURN_IF_ERROR(WriteJson(*reply, out));
+  } else {
+    out << RenderPrune(*reply, verb.dry_run, is_erase);
+  }
+  return is_erase && !verb.dry_run ? CheckErased(request.map(), *reply) : absl::OkStatus();
 }
 
 }  // namespace dsg::cli

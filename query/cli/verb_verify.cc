@@ -56,12 +56,14 @@ class Findings {
                              {"revision_count", std::to_string(report.revision_count)},
                              {"row_count", std::to_string(report.row_count)},
                              {"pose_count", std::to_string(report.pose_count)},
-                             {"problems", report.problems}});
+                             {"problems", report.problems},
+                             {"notes", report.notes}});
     if (as_json_) return;
     out_ << name << ": " << Counted(report.revision_count, "revision") << ", "
          << Counted(report.row_count, "row") << ", " << Counted(report.pose_count, "pose") << ", "
          << Counted(static_cast<int64_t>(report.problems.size()), "problem") << "\n";
     for (const std::string& problem : report.problems) out_ << "  " << Printable(problem) << "\n";
+    for (const std::string& note : report.notes) out_ << "  note: " << Printable(note) << "\n";
   }
 
   /// A map that only another release can look at; the others are checked all the same.

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <functional>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -17,6 +18,8 @@
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
 #include "schema/retention/batches.h"
+#include "schema/retention/contested.h"
+#include "schema/retention/past.h"
 #include "schema/retention/plan.h"
 #include "schema/store/log_bytes.h"
 
@@ -28,6 +31,10 @@ constexpr int kPolicyCountMax = 100;
 // number, for a step that takes longer than a slice would never end.
 constexpr std::chrono::milliseconds kEraseSlice{500};
 constexpr std::chrono::milliseconds kEraseSliceMax{60'000};
+// How often what others wrote meanwhile is planned again, when all of it is to be erased.
+constexpr int kRoundsMax = 4;
+// Of what is left, so many are named.
+constexpr size_t kNamedMax = 20;
 // Shares of the whole work, for the progress.
 constexpr double kPlanned = 0.05;
 constexpr double kCommitted = 0.6;
@@ -91,6 +98,9 @@ class Prune final : public PruneCursor {
       case Phase::kPlan:
         DSG_RETURN_IF_ERROR(WithoutOldReaders([&] { return Plan(call, reply); }));
         break;
+      case Phase::kPlanAgain:
+        DSG_RETURN_IF_ERROR(WithoutOldReaders([&] { return PlanAgain(call); }));
+        break;
       case Phase::kCommit:
         DSG_RETURN_IF_ERROR(CommitBatch(call));
         break;
@@ -115,7 +125,7 @@ class Prune final : public PruneCursor {
   bool done() const override { return is_done_; }
 
  private:
-  enum class Phase { kPlan, kCommit, kErase, kCompact, kEnd };
+  enum class Phase { kPlan, kPlanAgain, kCommit, kErase, kCompact, kEnd };
 
   absl::Status Plan(const CallContext& call, v1::PruneResponse* reply) {
     DSG_ASSIGN_OR_RETURN(const OpenedMap opened, OpenNewest(maps_, map_));
@@ -132,54 +142,98 @@ class Prune final : public PruneCursor {
                        "forgotten. Narrow it, or say that everything may go"),
           {{"map", map_}, {"policy", plan.all_matching_policy}});
     }
-    DSG_ASSIGN_OR_RETURN(before_, CountMap(*map, call.stop()));
-    DSG_ASSIGN_OR_RETURN(const MapStats stats, map->Stats());
-    before_.revision_count = stats.at.revision;
-    file_bytes_before_ = stats.bytes_on_disk;
-    log_bytes_before_ = LogBytesOnDisk(maps_->store(), map_);
-    reply->clear_policies();
+    DSG_RETURN_IF_ERROR(FillBefore(call, opened, reply));
     for (const PolicyMatch& match : plan.policies) {
       v1::PolicyReport* const report = reply->add_policies();
       report->set_name(match.name);
       ToProto(match.matched, report->mutable_matched());
     }
-    ToProto(before_, reply->mutable_map_before());
-    DSG_RETURN_IF_ERROR(FillHeader(reader.get(), *map, reply));
     has_changes_ = !plan.IsEmpty();
-    seen_ = plan.revision;
     // Nothing to compact is no reason to take the writer's lock.
     if (plan.total.revision_count > 0) keep_from_ = plan.keep_from;
-    erasure_ = std::move(plan.erasure);
-    plan.erasure.reset();
+    DSG_RETURN_IF_ERROR(TakeErasure(opened, &plan));
     progress_ = kPlanned;
     const bool has_work = has_changes_ || erasure_.has_value() || keep_from_.has_value();
     phase_ = is_dry_run_ || !has_work ? Phase::kEnd : Phase::kCommit;
-    batches_.emplace(map, std::move(plan),
-                     BatchHeader{map_, NewSessionId(), author_, MessageOf(policies_)});
+    BeginRound(map, std::move(plan));
     return absl::OkStatus();
   }
 
-  // Of a branch that is wholly erased no revision knows any more. If that was done by a call that
-  // was cut off, what it left in the file is still to be overwritten.
+  // Nor is nothing to erase a reason to end the archives that are being read.
+  absl::Status TakeErasure(const OpenedMap& opened, PrunePlan* plan) {
+    std::optional<Erasure> erasure;
+    erasure.swap(plan->erasure);
+    if (!erasure.has_value()) return absl::OkStatus();
+    is_erase_ = true;
+    DSG_ASSIGN_OR_RETURN(const bool is_pending, opened.reader->IsErasing());
+    is_clean_ = IsEmpty(*erasure) && !has_changes_ && !is_pending;
+    if (!is_clean_) erasure_ = std::move(erasure);
+    return absl::OkStatus();
+  }
+
+  // Of a branch that is wholly gone no revision knows any more. If it was erased by a call that was
+  // cut off, the map knows what that left.
   absl::Status EndErasure(const CallContext& call, const OpenedMap& opened,
                           const absl::Status& failure, v1::PruneResponse* reply) {
     const bool may_be_erased = ReasonOf(failure) == Reason::kNodeUnknown && !is_dry_run_ &&
                                policies_.size() == 1 &&
                                policies_.front().strength == PruneStrength::kErase;
     if (!may_be_erased) return failure;
-    DSG_RETURN_IF_ERROR(
-        maps_->WithWriter(map_, call.stop(), [&](MapWriter& writer) -> absl::Status {
-          DSG_ASSIGN_OR_RETURN(const EraseReport report, writer.Erase({}, call.stop(), {}));
-          is_clean_ = report.is_clean;
-          return report.was_pending ? absl::OkStatus() : failure;
-        }));
-    maps_->archives().EndOf(map_);
-    DSG_ASSIGN_OR_RETURN(before_, CountMap(*opened.map, call.stop()));
-    reply->clear_policies();
+    DSG_ASSIGN_OR_RETURN(const bool is_pending, opened.reader->IsErasing());
+    if (!is_pending) return failure;
+    DSG_RETURN_IF_ERROR(FillBefore(call, opened, reply));
     reply->add_policies()->set_name(policies_.front().name);
-    ToProto(before_, reply->mutable_map_before());
+    is_erase_ = true;
     erasure_.emplace();
-    phase_ = Phase::kEnd;
+    progress_ = kCommitted;
+    phase_ = Phase::kErase;
+    return absl::OkStatus();
+  }
+
+  absl::Status FillBefore(const CallContext& call, const OpenedMap& opened,
+                          v1::PruneResponse* reply) {
+    const auto& [reader, map] = opened;
+    DSG_ASSIGN_OR_RETURN(before_, CountMap(*map, call.stop()));
+    DSG_ASSIGN_OR_RETURN(const MapStats stats, map->Stats());
+    before_.revision_count = stats.at.revision;
+    file_bytes_before_ = stats.bytes_on_disk;
+    log_bytes_before_ = LogBytesOnDisk(maps_->store(), map_);
+    reply->clear_policies();
+    ToProto(before_, reply->mutable_map_before());
+    return FillHeader(reader.get(), *map, reply);
+  }
+
+  void BeginRound(const std::shared_ptr<const Snapshot>& map, PrunePlan plan) {
+    seen_ = plan.revision;
+    others_ = {};
+    batches_.emplace(map, std::move(plan),
+                     BatchHeader{map_, NewSessionId(), author_, MessageOf(policies_)});
+  }
+
+  // What others wrote of agents, tracks and meshes would else be left for good. Other nodes keep
+  // what was written of them.
+  absl::Status PlanAgain(const CallContext& call) {
+    ++round_;
+    phase_ = Phase::kErase;
+    DSG_ASSIGN_OR_RETURN(const OpenedMap opened, OpenNewest(maps_, map_));
+    auto planned = PlanPrune(opened.reader.get(), *opened.map, policies_,
+                             {.wall_now_ns = WallClockNs()}, call.stop());
+    if (ReasonOf(planned.status()) == Reason::kNodeUnknown) return absl::OkStatus();
+    DSG_RETURN_IF_ERROR(planned.status());
+    // That everything may go was not said; then what is contested is left, and told.
+    if (!allow_everything_ && !planned->all_matching_policy.empty()) return absl::OkStatus();
+    if (planned->erasure.has_value()) Join(*planned->erasure, &*erasure_);
+    planned->erasure.reset();
+    const std::vector<NodeId> rewritten(rewritten_.begin(), rewritten_.end());
+    DSG_ASSIGN_OR_RETURN(const auto nodes, opened.map->FindNodes(rewritten, call.stop()));
+    Touched kept;
+    for (const auto& node : nodes) {
+      if (node.has_value() && !IsAgentKind(node->kind)) kept.nodes.push_back(node->id);
+    }
+    has_changes_ = has_changes_ || !planned->IsEmpty();
+    BeginRound(opened.map, *std::move(planned));
+    batches_->Avoid(kept);
+    phase_ = Phase::kCommit;
     return absl::OkStatus();
   }
 
@@ -201,6 +255,7 @@ class Prune final : public PruneCursor {
             DSG_ASSIGN_OR_RETURN(const Touched touched,
                                  reader->TouchedBetween(seen_, head->revision(), call.stop()));
             batches_->Avoid(touched);
+            if (erasure_.has_value()) others_.Add(touched);
             seen_ = head->revision();
           }
           DSG_ASSIGN_OR_RETURN(std::optional<GraphDelta> delta, batches_->Next(*head, call.stop()));
@@ -210,20 +265,21 @@ class Prune final : public PruneCursor {
           revision_ = seen_ = result.revision;
           return absl::OkStatus();
         }));
-    progress_ = kPlanned + (kCommitted - kPlanned) * batches_->progress();
+    progress_ = std::max(progress_, kPlanned + (kCommitted - kPlanned) * batches_->progress());
     if (!is_over) return absl::OkStatus();
-    // Nothing may hold on to the past that is to be wiped out.
-    batches_.reset();
     progress_ = kCommitted;
-    return AfterCommit(call);
+    return AfterCommit();
   }
 
-  absl::Status AfterCommit(const CallContext& call) {
+  absl::Status AfterCommit() {
     if (erasure_.has_value()) {
-      phase_ = Phase::kErase;
-      return LeaveOutWhatIsThere(call);
+      left_ = others_.FindContested(batches_->plan(), *erasure_);
+      rewritten_.insert(others_.nodes().begin(), others_.nodes().end());
+      phase_ = left_.empty() || round_ >= kRoundsMax ? Phase::kErase : Phase::kPlanAgain;
     }
-    return AfterErase();
+    // Nothing may hold on to the past that is to be wiped out.
+    batches_.reset();
+    return erasure_.has_value() ? absl::OkStatus() : AfterErase();
   }
 
   absl::Status AfterErase() {
@@ -239,16 +295,37 @@ class Prune final : public PruneCursor {
     return absl::OkStatus();
   }
 
-  // What others wrote again meanwhile is no more to be forgotten.
-  absl::Status LeaveOutWhatIsThere(const CallContext& call) {
-    DSG_ASSIGN_OR_RETURN(const OpenedMap opened, OpenNewest(maps_, map_));
-    DSG_ASSIGN_OR_RETURN(const auto nodes, opened.map->FindNodes(erasure_->nodes, call.stop()));
-    std::vector<NodeId> gone;
-    for (size_t i = 0; i < nodes.size(); ++i) {
-      if (!nodes[i].has_value()) gone.push_back(erasure_->nodes[i]);
+  // Of the nodes to erase those that are there now: others wrote them meanwhile.
+  absl::StatusOr<std::vector<Node>> ErasedThatAreThere(const CallContext& call) {
+    std::vector<Node> there;
+    DSG_RETURN_IF_ERROR(WithoutOldReaders([&]() -> absl::Status {
+      there.clear();
+      DSG_ASSIGN_OR_RETURN(const OpenedMap opened, OpenNewest(maps_, map_));
+      DSG_ASSIGN_OR_RETURN(const auto nodes, opened.map->FindNodes(erasure_->nodes, call.stop()));
+      for (const auto& node : nodes) {
+        if (node.has_value()) there.push_back(*node);
+      }
+      return absl::OkStatus();
+    }));
+    return there;
+  }
+
+  // The past of an agent that is there again cannot go without its present. True if there is time
+  // for another round; else it is left.
+  absl::StatusOr<bool> MustPlanAgain(const CallContext& call) {
+    DSG_ASSIGN_OR_RETURN(const std::vector<Node> there, ErasedThatAreThere(call));
+    std::set<NodeId> agents;
+    for (const Node& node : there) {
+      if (IsAgentKind(node.kind)) agents.insert(node.id);
     }
-    erasure_->nodes = std::move(gone);
-    return absl::OkStatus();
+    if (agents.empty()) return false;
+    if (round_ < kRoundsMax) {
+      phase_ = Phase::kPlanAgain;
+      return true;
+    }
+    std::erase_if(erasure_->nodes, [&](NodeId id) { return agents.contains(id); });
+    left_.agents.insert(agents.begin(), agents.end());
+    return false;
   }
 
   absl::Status EraseSlice(const CallContext& call) {
@@ -263,12 +340,16 @@ class Prune final : public PruneCursor {
     double fraction = 0.0;
     const auto tell = [&](double done) { fraction = done; };
     bool is_over = false;
+    bool must_plan_again = false;
     // A copy that is being made keeps the log from being cut.
     maps_->archives().EndOf(map_);
     const absl::Status status =
         maps_->WithWriter(map_, call.stop(), [&](MapWriter& writer) -> absl::Status {
+          DSG_ASSIGN_OR_RETURN(must_plan_again, MustPlanAgain(call));
+          if (must_plan_again) return absl::OkStatus();
           DSG_ASSIGN_OR_RETURN(const EraseReport report, writer.Erase(*erasure_, stop, tell));
           is_clean_ = report.is_clean;
+          left_.agents.insert(report.left_agents.begin(), report.left_agents.end());
           is_over = true;
           return absl::OkStatus();
         });
@@ -276,7 +357,7 @@ class Prune final : public PruneCursor {
     if (!status.ok()) {
       return slice_is_over && absl::IsCancelled(status) ? absl::OkStatus() : status;
     }
-    if (!is_over) return absl::OkStatus();
+    if (!is_over || must_plan_again) return absl::OkStatus();
     // Those that began meanwhile hold the bytes, too.
     maps_->archives().EndOf(map_);
     return AfterErase();
@@ -304,10 +385,26 @@ class Prune final : public PruneCursor {
     reply->set_file_bytes_after(stats.bytes_on_disk);
     reply->set_log_bytes_before(log_bytes_before_);
     reply->set_log_bytes_after(LogBytesOnDisk(maps_->store(), map_));
-    reply->set_erased(erasure_.has_value() && !is_dry_run_ && is_clean_);
+    reply->set_erased(is_erase_ && !is_dry_run_ && is_clean_ && left_.empty());
+    if (erasure_.has_value() && !is_dry_run_) DSG_RETURN_IF_ERROR(FillLeft(call, reply));
     DSG_RETURN_IF_ERROR(FillHeader(reader.get(), *map, reply));
     progress_ = 1.0;
     is_done_ = true;
+    return absl::OkStatus();
+  }
+
+  absl::Status FillLeft(const CallContext& call, v1::PruneResponse* reply) {
+    reply->clear_left_ids();
+    reply->clear_rewritten_ids();
+    reply->set_left_count(static_cast<int64_t>(left_.size()));
+    for (const std::string& name : left_.Names(kNamedMax)) reply->add_left_ids(name);
+    DSG_ASSIGN_OR_RETURN(const std::vector<Node> there, ErasedThatAreThere(call));
+    int64_t count = 0;
+    for (const Node& node : there) {
+      if (IsAgentKind(node.kind)) continue;
+      if (static_cast<size_t>(count++) < kNamedMax) reply->add_rewritten_ids(ToString(node.id));
+    }
+    reply->set_rewritten_count(count);
     return absl::OkStatus();
   }
 
@@ -319,7 +416,15 @@ class Prune final : public PruneCursor {
   const std::vector<PrunePolicy> policies_;
   Phase phase_ = Phase::kPlan;
   std::optional<PruneBatches> batches_;
+  /// Whether a policy erases, also when there is nothing to erase.
+  bool is_erase_ = false;
   std::optional<Erasure> erasure_;
+  int round_ = 1;
+  /// What others touched since the plan of this round.
+  Others others_;
+  /// Nodes that others touched in any round.
+  std::set<NodeId> rewritten_;
+  Contested left_;
   std::optional<Revision> keep_from_;
   std::unique_ptr<CompactCursor> compaction_;
   std::chrono::milliseconds erase_slice_ = kEraseSlice;

@@ -11,8 +11,9 @@
 namespace dsg::query {
 
 /// The first message says what will go; the others that a batch of it is gone and on disk. Commits
-/// of others go in between; what they change meanwhile is left as it is. A prune that ended early
-/// is gone on with by asking for the same again.
+/// of others go in between; what they change meanwhile is left as it is, but where it is to be
+/// erased: there its past goes, and what cannot go is named. A prune that ended early is gone on
+/// with by asking for the same again; the map itself knows what an erasure has left.
 ///
 /// Errors: MAP_UNKNOWN, FIELD_INVALID, BOX_INVERTED, NUMBER_NOT_FINITE; in the stream NODE_UNKNOWN,
 /// LAYER_UNKNOWN, POLICY_MATCHES_ALL, REVISION_IN_FUTURE, WRITER_LOCKED, DISK_FULL.

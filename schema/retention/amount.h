@@ -19,7 +19,7 @@ struct Amount {
   int64_t shape_count = 0;
   int64_t factor_count = 0;
   int64_t stay_count = 0;
-  /// Stays that are kept, and only lose their room or their place; no rows that go.
+  /// Stays that are kept, and only lose their room, place or beginning; no rows that go.
   int64_t stay_edit_count = 0;
   int64_t mesh_block_count = 0;
   int64_t asset_count = 0;

@@ -114,7 +114,10 @@ class PruneBatches::Impl {
       delta->stay_removals.push_back(plan_.stay_removals[next_stay_]);
     }
     for (; !IsFull() && next_edit_ < plan_.stay_edits.size(); ++next_edit_, ++step_, ++rows_) {
-      delta->stays.push_back(plan_.stay_edits[next_edit_]);
+      const StayEdit& edit = plan_.stay_edits[next_edit_];
+      // Its beginning is part of its key.
+      if (edit.stay.enter_ns != edit.key.enter_ns) delta->stay_removals.push_back(edit.key);
+      delta->stays.push_back(edit.stay);
     }
   }
 

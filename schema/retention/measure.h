@@ -17,7 +17,7 @@ struct Measured {
   Amount amount;
   std::vector<TrackPlan> tracks;
   std::vector<StayKey> stay_removals;
-  std::vector<Stay> stay_edits;
+  std::vector<StayEdit> stay_edits;
   MeshPlan mesh;
   /// Edges by the first node of the selection at them, in the order of GraphIndex::bottom_up.
   std::vector<int32_t> edge_counts;

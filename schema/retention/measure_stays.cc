@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which stays go, and which lose the room or place that they were in.
+// Which stays go, and which lose their beginning, or the room or place that they were in.
 #include <algorithm>
 #include <map>
 
@@ -27,7 +27,7 @@ class StayMeasurer {
     removals_.erase(std::unique(removals_.begin(), removals_.end()), removals_.end());
     for (const auto& [key, stay] : edits_) {
       if (!std::binary_search(removals_.begin(), removals_.end(), key)) {
-        measured_.stay_edits.push_back(stay);
+        measured_.stay_edits.push_back({key, stay});
       }
     }
     measured_.stay_removals = removals_;
@@ -59,7 +59,14 @@ class StayMeasurer {
     DSG_ASSIGN_OR_RETURN(const std::vector<Stay> stays,
                          map_.StaysOfAgent(agent, kTimeMin, until_ns));
     for (const Stay& stay : stays) {
-      if (stay.exit_ns <= until_ns) removals_.push_back({agent, stay.enter_ns});
+      const StayKey key{agent, stay.enter_ns};
+      if (stay.exit_ns <= until_ns) {
+        removals_.push_back(key);
+      } else if (stay.enter_ns < until_ns) {
+        // Its end is as readers are shown it: where the track ends, at the latest.
+        edits_[key] = stay;
+        edits_[key].enter_ns = until_ns;
+      }
     }
     return absl::OkStatus();
   }
@@ -75,12 +82,13 @@ class StayMeasurer {
     return absl::OkStatus();
   }
 
-  void Clear(Stay stay) {
+  void Clear(const Stay& shown) {
+    const auto [edit, is_new] = edits_.try_emplace({shown.agent, shown.enter_ns}, shown);
+    Stay& stay = edit->second;
     const auto track = track_of_.find(stay.agent);
-    if (track != track_of_.end()) stay = WithOpenEnd(stay, *track->second);
+    if (is_new && track != track_of_.end()) stay = WithOpenEnd(stay, *track->second);
     if (IsGone(stay.place)) stay.place = NodeId();
     if (IsGone(stay.room)) stay.room = NodeId();
-    edits_[{stay.agent, stay.enter_ns}] = stay;
   }
 
   const Snapshot& map_;

@@ -258,6 +258,23 @@ absl::StatusOr<bool> WasEverThere(MapReader* reader, const Snapshot& map, const 
   return false;
 }
 
+void Join(const Erasure& other, Erasure* erasure) {
+  const auto append = [](const auto& from, auto* to) {
+    to->insert(to->end(), from.begin(), from.end());
+  };
+  append(other.nodes, &erasure->nodes);
+  append(other.edges, &erasure->edges);
+  append(other.mesh_blocks, &erasure->mesh_blocks);
+  append(other.tracks, &erasure->tracks);
+  erasure->assets = erasure->assets || other.assets;
+  Normalize(erasure);
+}
+
+bool IsEmpty(const Erasure& erasure) {
+  return erasure.nodes.empty() && erasure.edges.empty() && erasure.mesh_blocks.empty() &&
+         erasure.tracks.empty();
+}
+
 void Normalize(Erasure* erasure) {
   SortUnique(&erasure->nodes, [](NodeId id) { return id; });
   SortUnique(&erasure->edges, [](const EdgeKey& key) { return key; });

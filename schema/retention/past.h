@@ -26,5 +26,9 @@ absl::StatusOr<bool> WasEverThere(MapReader* reader, const Snapshot& map, const 
 
 /// Sorts, and leaves out what stands twice.
 void Normalize(Erasure* erasure);
+/// Names also what `other` names.
+void Join(const Erasure& other, Erasure* erasure);
+/// Names nothing.
+bool IsEmpty(const Erasure& erasure);
 
 }  // namespace dsg

@@ -125,7 +125,7 @@ class Planner {
       const uint32_t at = index.bottom_up()[i];
       if (!all->selection.is_gone[at]) continue;
       const IndexedNode& node = index.nodes()[at];
-      plan_.nodes.push_back({node.id, all->edge_counts[i], node.may_hold_stays});
+      plan_.nodes.push_back({node.id, all->edge_counts[i], node.may_hold_stays, node.is_agent});
     }
     plan_.tracks = std::move(all->tracks);
     plan_.stay_removals = std::move(all->stay_removals);

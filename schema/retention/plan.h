@@ -25,6 +25,7 @@ struct NodePlan {
   /// Edges that end with it, those of nodes before it in the plan excepted.
   int32_t edge_count = 0;
   bool may_hold_stays = false;
+  bool is_agent = false;
 };
 
 struct TrackPlan {
@@ -36,6 +37,13 @@ struct TrackPlan {
   /// Spans out of which shapes and factors go, where there are any.
   std::vector<Interval> shape_spans;
   std::vector<Interval> factor_spans;
+};
+
+struct StayEdit {
+  /// As it is stored.
+  StayKey key;
+  /// As it is to be: without room or place, or with a later beginning.
+  Stay stay;
 };
 
 struct MeshPlan {
@@ -56,8 +64,8 @@ struct PrunePlan {
   std::vector<NodePlan> nodes;
   std::vector<TrackPlan> tracks;
   std::vector<StayKey> stay_removals;
-  /// Stays that lose their room or place.
-  std::vector<Stay> stay_edits;
+  /// Stays that lose their room, their place or their beginning.
+  std::vector<StayEdit> stay_edits;
   MeshPlan mesh;
   /// Of policies with kErase: what to wipe out of the past, also where nothing is left of it now.
   std::optional<Erasure> erasure;

@@ -29,6 +29,8 @@ struct VerifyReport {
   int64_t revision_count = 0;
   /// One sentence a problem, naming table and key; empty = every byte is what was written.
   std::vector<std::string> problems;
+  /// What is no damage, and still to be done: one sentence each.
+  std::vector<std::string> notes;
 };
 
 /// Entities with a row that begins or ends in a span of revisions: all that may differ between its
@@ -63,6 +65,8 @@ class MapReader {
   virtual absl::StatusOr<std::shared_ptr<const Snapshot>> At(Revision revision) = 0;
   /// From this revision on all can be read; of older ones those with a tag.
   virtual absl::StatusOr<Revision> OldestRevision() = 0;
+  /// Whether an erasure was begun and has not come to its end: MapWriter::Erase ends it.
+  virtual absl::StatusOr<bool> IsErasing() = 0;
   /// Order: by name.
   virtual absl::StatusOr<std::vector<Tag>> Tags() = 0;
   /// Newest first, below `before` (0 = from the newest), at most `limit`.

@@ -59,8 +59,10 @@ struct EraseReport {
   /// False when a reader kept the write-ahead log from being cut to nothing: it may hold the bytes
   /// until the same call is made again.
   bool is_clean = true;
-  /// An earlier erasure was cut off, and this call has ended what it left in the file.
+  /// An earlier erasure was cut off, and this call has ended it.
   bool was_pending = false;
+  /// Agents that such an erasure named and that are there again: nothing more of them was erased.
+  std::vector<NodeId> left_agents;
   /// Paths in the store that this program does not write any more, such as copies that an upgrade
   /// kept: they may hold the bytes, and are left alone.
   std::vector<std::string> other_files;
@@ -91,8 +93,8 @@ class MapWriter : public GraphWriter {
 
   /// Wipes the past of what is named out of all revisions, so that neither the database nor its
   /// log holds the bytes, and counts and digests of the revisions are of what is left. Readers find
-  /// the map replaced. Done in steps: when stopped or killed, the map is sound, and the same call
-  /// again does the rest. Messages of revisions stay.
+  /// the map replaced. Done in steps: when stopped or killed, the map is sound and remembers what
+  /// is left, and the next call does that too, whatever it names. Messages of revisions stay.
   ///
   /// Errors: INVALID_ARGUMENT/FIELD_INVALID for an agent that is still there (name spans of its
   /// track); what `stop` returned.

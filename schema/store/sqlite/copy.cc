@@ -76,12 +76,16 @@ absl::Status WriteCopy(Database& db, const std::string& path, const StopCheck& s
   return copied;
 }
 
-// What counts how often a map was copied or erased from is not its content.
+// What counts how often a map was copied or erased from is not its content. Of an erasure that is
+// going on the rows that are left go with the copy, but no bytes of those that are gone.
 absl::Status ForgetCounters(const std::string& path, const std::string& map) {
   DSG_ASSIGN_OR_RETURN(const auto db, Database::Open(path, Database::Mode::kWrite, map));
   // One transaction, which is counted too, whether or not the generation was another.
   return InTransaction(*db, [&]() -> absl::Status {
-    DSG_RETURN_IF_ERROR(Query(*db, "UPDATE map SET generation = 0, is_erasing = 0").Run());
+    DSG_RETURN_IF_ERROR(Query(*db,
+                              "UPDATE map SET generation = 0,"
+                              " is_erasing = EXISTS (SELECT 1 FROM pending_erasure)")
+                            .Run());
     return db->SetSchemaVersion();
   });
 }

@@ -221,17 +221,15 @@ absl::Status EraseNodeRows(NodeId id, ErasedRows* erased) {
   return absl::OkStatus();
 }
 
-absl::Status EraseEdgeRows(const EdgeKey& key, ErasedRows* erased) {
-  DSG_ASSIGN_OR_RETURN(const int64_t relation, FindRelation(erased->db, key.relation));
-  if (relation == 0) return absl::OkStatus();
+absl::Status EraseEdgeRows(const EdgeRowKey& key, ErasedRows* erased) {
   const int64_t source = KeyOf(key.source);
   const int64_t target = KeyOf(key.target);
-  DSG_RETURN_IF_ERROR(TakeEdges(kEdgesBetween, erased, source, relation, target));
+  DSG_RETURN_IF_ERROR(TakeEdges(kEdgesBetween, erased, source, key.relation, target));
   Query query(erased->db,
               "SELECT rev_from FROM edge WHERE source = ?1 AND relation = ?2 AND target = ?3");
-  const bool is_current = query.Bind(source, relation, target).Next();
+  const bool is_current = query.Bind(source, key.relation, target).Next();
   DSG_RETURN_IF_ERROR(query.status());
-  erased->past.ForgetEdge({key.source, relation, key.target}, is_current ? query.Int(0) : 0);
+  erased->past.ForgetEdge(key, is_current ? query.Int(0) : 0);
   return absl::OkStatus();
 }
 

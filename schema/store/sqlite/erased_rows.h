@@ -28,7 +28,7 @@ struct ErasedRows {
 /// All past versions of a node and of the edges at it, and past stays in it. Current edges at it
 /// begin no earlier than its current row. Of an agent that is gone all else too.
 absl::Status EraseNodeRows(NodeId id, ErasedRows* erased);
-absl::Status EraseEdgeRows(const EdgeKey& key, ErasedRows* erased);
+absl::Status EraseEdgeRows(const EdgeRowKey& key, ErasedRows* erased);
 absl::Status EraseMeshRows(const BlockIndex& index, ErasedRows* erased);
 /// Past stays of the agent that touch the span.
 absl::Status EraseStayRows(const TrackSpan& span, ErasedRows* erased);

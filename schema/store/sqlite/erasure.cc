@@ -3,10 +3,13 @@
 // they left in the file is overwritten and given back.
 #include "schema/store/sqlite/erasure.h"
 
+#include <algorithm>
+
 #include "absl/strings/str_cat.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/store/sqlite/asset_references.h"
 #include "schema/store/sqlite/erased_rows.h"
+#include "schema/store/sqlite/pending_erasure.h"
 #include "schema/store/sqlite/readable.h"
 #include "schema/store/sqlite/space.h"
 
@@ -30,10 +33,8 @@ class Eraser {
     DSG_RETURN_IF_ERROR(Begin());
     DSG_RETURN_IF_ERROR(EraseRows());
     Tell(0.7);
-    if (erasure_.assets) DSG_RETURN_IF_ERROR(EraseAssets());
-    if (!erasure_.nodes.empty() || !erasure_.tracks.empty()) {
-      DSG_RETURN_IF_ERROR(InTransaction(db_, [&] { return RepairPoseTimes(db_); }));
-    }
+    if (list_.assets) DSG_RETURN_IF_ERROR(EraseAssets());
+    DSG_RETURN_IF_ERROR(EndRows());
     DSG_RETURN_IF_ERROR(WipeBoxes(db_, stop_));
     Tell(0.8);
     DSG_RETURN_IF_ERROR(GivePagesBack(db_, stop_));
@@ -51,27 +52,64 @@ class Eraser {
     if (progress_) progress_(fraction);
   }
 
-  // Once rows are gone nothing else tells that the file still holds their bytes.
+  // Once rows are gone nothing else tells what was to go with them, nor that the file still holds
+  // their bytes.
   absl::Status Begin() {
     DSG_ASSIGN_OR_RETURN(const int64_t is_erasing, db_.QueryInt("SELECT is_erasing FROM map"));
     report_.was_pending = is_erasing != 0;
-    if (ItemCount() == 0) return absl::OkStatus();
-    return db_.Execute("UPDATE map SET is_erasing = 1");
+    DSG_ASSIGN_OR_RETURN(list_, ListOf(db_, erasure_));
+    DSG_ASSIGN_OR_RETURN(const EraseList pending, ReadPendingErasure(db_));
+    list_.Add(pending);
+    if (list_.size() == 0) return absl::OkStatus();
+    const absl::Status noted = InTransaction(db_, [&]() -> absl::Status {
+      DSG_RETURN_IF_ERROR(db_.Execute("UPDATE map SET is_erasing = 1 WHERE NOT is_erasing"));
+      return WritePendingErasure(db_, list_);
+    });
+    DSG_RETURN_IF_ERROR(noted);
+    return LeaveAgentsThatAreBack(pending);
+  }
+
+  // Since the earlier erasure began.
+  absl::Status LeaveAgentsThatAreBack(const EraseList& pending) {
+    for (const NodeId id : pending.keys.nodes) {
+      DSG_ASSIGN_OR_RETURN(const bool is_agent, IsAgentThatIsThere(id));
+      if (is_agent) report_.left_agents.push_back(id);
+    }
+    std::erase_if(list_.keys.nodes, [&](NodeId id) {
+      return std::binary_search(report_.left_agents.begin(), report_.left_agents.end(), id);
+    });
+    return absl::OkStatus();
+  }
+
+  // The last of what needs the list. What is left to do is to wipe bytes.
+  absl::Status EndRows() {
+    if (list_.size() + report_.left_agents.size() == 0) return absl::OkStatus();
+    return InTransaction(db_, [&]() -> absl::Status {
+      if (!list_.keys.nodes.empty() || !list_.spans.empty()) {
+        DSG_RETURN_IF_ERROR(RepairPoseTimes(db_));
+      }
+      return DropPendingErasure(db_);
+    });
+  }
+
+  absl::StatusOr<bool> IsAgentThatIsThere(NodeId id) {
+    Query query(db_, "SELECT rev_from, layer, payload, checksum FROM node WHERE key = ?1");
+    const bool is_there = query.Bind(KeyOf(id)).Next();
+    DSG_RETURN_IF_ERROR(query.status());
+    if (!is_there) return false;
+    Node node;
+    if (query.Int(3) != RowChecksum({KeyOf(id), query.Int(0), query.Int(1)}, query.Blob(2)) ||
+        !DecodeNodePayload(query.Blob(2), &node)) {
+      return CorruptRow(spec_.name, "node", ToString(id));
+    }
+    return IsAgentKind(node.kind);
   }
 
   // Without its past an agent's track would belong to nobody there.
   absl::Status CheckAgents() {
     for (const NodeId id : erasure_.nodes) {
-      Query query(db_, "SELECT rev_from, layer, payload, checksum FROM node WHERE key = ?1");
-      const bool is_there = query.Bind(KeyOf(id)).Next();
-      DSG_RETURN_IF_ERROR(query.status());
-      if (!is_there) continue;
-      Node node;
-      if (query.Int(3) != RowChecksum({KeyOf(id), query.Int(0), query.Int(1)}, query.Blob(2)) ||
-          !DecodeNodePayload(query.Blob(2), &node)) {
-        return CorruptRow(spec_.name, "node", ToString(id));
-      }
-      if (IsAgentKind(node.kind)) {
+      DSG_ASSIGN_OR_RETURN(const bool is_agent, IsAgentThatIsThere(id));
+      if (is_agent) {
         return MakeError(
             Reason::kFieldInvalid,
             absl::StrCat("cannot erase the past of agent ", ToString(id), " of map \"", spec_.name,
@@ -83,20 +121,14 @@ class Eraser {
     return absl::OkStatus();
   }
 
-  size_t ItemCount() const {
-    return erasure_.nodes.size() + erasure_.edges.size() + erasure_.mesh_blocks.size() +
-           erasure_.tracks.size();
-  }
-
   absl::Status EraseItem(size_t item, ErasedRows* erased) {
-    if (item < erasure_.nodes.size()) return EraseNodeRows(erasure_.nodes[item], erased);
-    item -= erasure_.nodes.size();
-    if (item < erasure_.edges.size()) return EraseEdgeRows(erasure_.edges[item], erased);
-    item -= erasure_.edges.size();
-    if (item < erasure_.mesh_blocks.size()) {
-      return EraseMeshRows(erasure_.mesh_blocks[item], erased);
-    }
-    const TrackSpan& span = erasure_.tracks[item - erasure_.mesh_blocks.size()];
+    const TouchedKeys& keys = list_.keys;
+    if (item < keys.nodes.size()) return EraseNodeRows(keys.nodes[item], erased);
+    item -= keys.nodes.size();
+    if (item < keys.edges.size()) return EraseEdgeRows(keys.edges[item], erased);
+    item -= keys.edges.size();
+    if (item < keys.mesh_blocks.size()) return EraseMeshRows(keys.mesh_blocks[item], erased);
+    const TrackSpan& span = list_.spans[item - keys.mesh_blocks.size()];
     // How far stays reached is told by the track.
     DSG_RETURN_IF_ERROR(EraseStayRows(span, erased));
     DSG_RETURN_IF_ERROR(EraseBatchRows(span, erased));
@@ -104,7 +136,7 @@ class Eraser {
   }
 
   absl::Status EraseRows() {
-    const size_t count = ItemCount();
+    const size_t count = list_.size();
     for (size_t next = 0; next < count;) {
       DSG_RETURN_IF_ERROR(AskStop(stop_));
       ErasedRows erased{db_, spec_};
@@ -114,7 +146,7 @@ class Eraser {
                erased.row_count < step_.rows) {
           DSG_RETURN_IF_ERROR(EraseItem(reached++, &erased));
         }
-        if (erasure_.assets) DSG_RETURN_IF_ERROR(AddDoubtfulAssets(db_, erased.assets));
+        if (list_.assets) DSG_RETURN_IF_ERROR(AddDoubtfulAssets(db_, erased.assets));
         return erased.past.Apply(db_);
       });
       DSG_RETURN_IF_ERROR(done);
@@ -160,6 +192,8 @@ class Eraser {
   Database& db_;
   const MapSpec& spec_;
   const Erasure& erasure_;
+  /// What is named, and what an earlier erasure left.
+  EraseList list_;
   const StopCheck& stop_;
   const Progress& progress_;
   const EraseStep step_;

@@ -129,6 +129,12 @@ absl::StatusOr<Revision> SqliteMapReader::OldestRevision() {
   return state.readable->oldest;
 }
 
+absl::StatusOr<bool> SqliteMapReader::IsErasing() {
+  DSG_ASSIGN_OR_RETURN(Lease lease, LeaseConnection());
+  DSG_ASSIGN_OR_RETURN(const int64_t is_erasing, lease->QueryInt("SELECT is_erasing FROM map"));
+  return is_erasing != 0;
+}
+
 absl::StatusOr<std::vector<Tag>> SqliteMapReader::Tags() {
   DSG_ASSIGN_OR_RETURN(Lease lease, LeaseConnection());
   return ReadTags(*lease);

@@ -29,6 +29,7 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
   absl::StatusOr<std::shared_ptr<const Snapshot>> Latest() override;
   absl::StatusOr<std::shared_ptr<const Snapshot>> At(Revision revision) override;
   absl::StatusOr<Revision> OldestRevision() override;
+  absl::StatusOr<bool> IsErasing() override;
   absl::StatusOr<std::vector<Tag>> Tags() override;
   absl::StatusOr<std::vector<RevisionInfo>> ListRevisions(Revision before, int limit) override;
   absl::StatusOr<Touched> TouchedBetween(Revision after, Revision until,

@@ -10,6 +10,7 @@
 #include "schema/store/sqlite/log_check.h"
 #include "schema/store/sqlite/map_reader.h"
 #include "schema/store/sqlite/node_cells.h"
+#include "schema/store/sqlite/pending_erasure.h"
 #include "schema/store/sqlite/rows.h"
 #include "schema/store/sqlite/verify_history.h"
 
@@ -35,11 +36,11 @@ class Verifier {
     // One snapshot of everything; a writer may go on meanwhile.
     DSG_RETURN_IF_ERROR(db_.Execute("BEGIN"));
     using Step = void (Verifier::*)();
-    const Step steps[] = {&Verifier::CheckStructure, &Verifier::CheckNodes,
-                          &Verifier::CheckEdges,     &Verifier::CheckStays,
-                          &Verifier::CheckTracks,    &Verifier::CheckBatches,
-                          &Verifier::CheckMesh,      &Verifier::CheckAssets,
-                          &Verifier::CheckLayers,    &Verifier::CheckHistory};
+    const Step steps[] = {
+        &Verifier::CheckStructure, &Verifier::CheckNodes,  &Verifier::CheckEdges,
+        &Verifier::CheckStays,     &Verifier::CheckTracks, &Verifier::CheckBatches,
+        &Verifier::CheckMesh,      &Verifier::CheckAssets, &Verifier::CheckLayers,
+        &Verifier::CheckErasure,   &Verifier::CheckHistory};
     double done = 0.0;
     for (const Step step : steps) {
       if (progress_) progress_(done / std::size(steps));
@@ -305,6 +306,18 @@ class Verifier {
             kRevisionMax);
     }
     Finish(labels, "label");
+  }
+
+  void CheckErasure() {
+    const auto is_erasing = db_.QueryInt("SELECT is_erasing FROM map");
+    const auto pending = ReadPendingErasure(db_);
+    if (!pending.ok()) return Problem(std::string(pending.status().message()));
+    if (!is_erasing.ok() || *is_erasing == 0) return;
+    report_.notes.push_back(
+        absl::StrCat("an erasure has not come to its end, ",
+                     pending->size() == 0 ? "and what it took out may still be in the file"
+                                          : absl::StrCat("and names ", pending->size(), " things"),
+                     "; the next `dsg prune --erase`, whatever it names, does the rest"));
   }
 
   void CheckHistory() {

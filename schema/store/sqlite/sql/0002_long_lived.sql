@@ -79,3 +79,13 @@ CREATE TABLE dropped_asset (
 CREATE TABLE doubtful_asset (
   sha256 BLOB PRIMARY KEY
 ) STRICT, WITHOUT ROWID;
+
+-- What is being erased: the keys that are named (as in `touched`) and spans of tracks. The rows in
+-- which they are found may be gone when an erasure is cut off. No row when none is.
+CREATE TABLE pending_erasure (
+  one INTEGER PRIMARY KEY CHECK (one = 1),
+  assets INTEGER NOT NULL,
+  keys BLOB NOT NULL,
+  spans BLOB NOT NULL,
+  checksum INTEGER NOT NULL
+) STRICT;

@@ -172,6 +172,29 @@ TEST_F(ArchiveCopiesTest, AnErasureEndsTheArchivesOfItsMap) {
   while (!after->done()) ASSERT_TRUE(Next(after.get()).ok());
 }
 
+TEST_F(ArchiveCopiesTest, AnErasureOfNothingLeavesArchivesAlone) {
+  OpenCore();
+  const auto cursor = Begun();
+  v1::PruneRequest request;
+  request.set_map(kMap);
+  for (const char* branch : {"R77", "R78"}) {
+    v1::PrunePolicy* const policy = request.add_policies();
+    policy->set_branch(branch);
+    policy->set_strength(v1::ERASE);
+  }
+  v1::PruneResponse last;
+  ASSERT_TRUE(core_
+                  ->Prune(call_, request,
+                          [&](const v1::PruneResponse& message) {
+                            last = message;
+                            return true;
+                          })
+                  .ok());
+  EXPECT_TRUE(last.done());
+  EXPECT_TRUE(last.erased());
+  while (!cursor->done()) ASSERT_TRUE(Next(cursor.get()).ok());
+}
+
 TEST_F(ArchiveCopiesTest, RetiringLeavesArchivesAlone) {
   OpenCore();
   const auto cursor = Begun();

@@ -146,6 +146,50 @@ TEST_F(PruneTest, TimeTakesTracksStaysAndWhatEnded) {
   EXPECT_EQ(OrDie(map_.At(1)->Factors(kWalker, kTimeMin, kTimeMax)).size(), 38u);
 }
 
+TEST_F(PruneTest, TimeCutsStaysThatBeganBefore) {
+  const PrunePlan plan = Prune(&map_, {PolicyOf(P::Before{12 * kSecond})});
+  // Of the stander with its stay nothing is left.
+  EXPECT_EQ(plan.total.stay_count, 2);
+  EXPECT_EQ(plan.total.stay_edit_count, 1);
+  const auto stays = OrDie(map_.Latest()->StaysOfAgent(kWalker, kTimeMin, kTimeMax));
+  ASSERT_EQ(stays.size(), 2u);
+  EXPECT_EQ(stays[0], (Stay{kWalker, NodeId('p', 2), NodeId('R', 1), 12 * kSecond, 19 * kSecond}));
+  EXPECT_EQ(stays[1].enter_ns, 19 * kSecond);
+  EXPECT_FALSE(OrDie(map_.Latest()->StayAt(kWalker, 12 * kSecond - 1)).has_value());
+  EXPECT_EQ(OrDie(map_.At(1)->StaysOfAgent(kWalker, kTimeMin, kTimeMax)).size(), 3u);
+  EXPECT_TRUE(PlanOf(&map_, {PolicyOf(P::Before{12 * kSecond})}).IsEmpty());
+}
+
+TEST_F(PruneTest, ErasedTimeHasNoStaysInAnyRevision) {
+  P policy = PolicyOf(P::Before{12 * kSecond});
+  policy.strength = PruneStrength::kErase;
+  const PrunePlan plan = Prune(&map_, {policy});
+  ASSERT_TRUE(plan.erasure.has_value());
+  const auto erased = map_.writer().Erase(*plan.erasure, StopCheck(), Progress());
+  ASSERT_TRUE(erased.ok()) << erased.status();
+  map_.Close();
+  map_.Reopen();
+  for (Revision revision = 1; revision <= map_.Latest()->revision(); ++revision) {
+    EXPECT_TRUE(OrDie(map_.At(revision)->StaysOfAgent(kWalker, kTimeMin, 12 * kSecond)).empty());
+  }
+  EXPECT_EQ(OrDie(map_.Latest()->StaysOfAgent(kWalker, kTimeMin, kTimeMax)).size(), 2u);
+}
+
+TEST_F(PruneTest, StayThatIsCutLosesARoomThatGoesToo) {
+  Prune(&map_, {PolicyOf(P::Before{12 * kSecond}), PolicyOf(P::Branch{"p2"})});
+  const auto stays = OrDie(map_.Latest()->StaysOfAgent(kWalker, kTimeMin, kTimeMax));
+  ASSERT_EQ(stays.size(), 2u);
+  EXPECT_EQ(stays[0], (Stay{kWalker, NodeId(), NodeId('R', 1), 12 * kSecond, 19 * kSecond}));
+}
+
+TEST_F(PruneTest, ThinningLeavesStaysWhole) {
+  PrunePolicy policy = PolicyOf(P::Before{12 * kSecond});
+  policy.simplify_m = 0.05;
+  const PrunePlan plan = Prune(&map_, {policy});
+  EXPECT_EQ(plan.total.stay_count + plan.total.stay_edit_count, 0);
+  EXPECT_EQ(OrDie(map_.Latest()->StaysOfAgent(kWalker, kTimeMin, kTimeMax)).size(), 3u);
+}
+
 TEST_F(PruneTest, AgeCountsBackFromTheNewestObservation) {
   const PrunePlan by_age = PlanOf(&map_, {PolicyOf(P::OlderThan{28 * kSecond})});
   const PrunePlan by_time = PlanOf(&map_, {PolicyOf(P::Before{10 * kSecond})});
