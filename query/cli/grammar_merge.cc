@@ -13,6 +13,7 @@ void AddMergeVerb(Grammar* grammar) {
       "X,Y,Z,YAW or X,Y,Z,QX,QY,QZ,QW: carries points of OTHER into the map, metres and "
       "radians; estimated from things that both have seen if not given");
   app->add_flag("--dry-run", verb->dry_run, "Only say what would become of it");
+  app->add_flag("--yes", verb->yes, "Do not ask when little speaks for the transform");
   AddPicture(app, "what both maps have, what is new and what is gone", &verb->picture);
 }
 

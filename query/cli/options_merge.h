@@ -15,6 +15,8 @@ struct MergeVerb {
   /// Empty = estimated.
   std::string transform;
   bool dry_run = false;
+  /// Although little speaks for the transform.
+  bool yes = false;
   PictureOptions picture;
 };
 

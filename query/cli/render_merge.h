@@ -19,7 +19,11 @@ struct MergeAsked {
   bool is_dry_run = false;
 };
 
-/// The last message of a stream, ids of all messages in it.
+/// What makes the transform doubtful, and what to do about it, in one line without an end; empty if
+/// nothing does. `plan` is the last message of a dry run.
+std::string DoubtsOf(const v1::MergeMapsResponse& plan, const MergeAsked& asked);
+
+/// The last message of a stream, ids of all messages in it. A dry run's has the doubts.
 std::string RenderMerge(const v1::MergeMapsResponse& reply, const MergeAsked& asked);
 
 }  // namespace dsg::cli

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The verb merge: another map of the same place, taken into this one.
+#include <unistd.h>
+
 #include <algorithm>
+#include <iostream>
 #include <set>
 #include <string>
 #include <vector>
@@ -148,27 +151,10 @@ class MergePicture {
   Overlay overlay_;
 };
 
-}  // namespace
-
-absl::Status RunMerge(Session* session, const MergeVerb& verb, std::ostream& out,
-                      std::ostream& progress_out) {
-  DSG_RETURN_IF_ERROR(CheckPicture(verb.picture));
-  v1::MergeMapsRequest request;
-  request.set_map(session->map().name);
-  request.set_other(verb.other);
-  request.set_dry_run(verb.dry_run);
-  request.set_author("dsg merge");
-  if (!verb.transform.empty()) {
-    DSG_ASSIGN_OR_RETURN(const Pose3d transform, ParseTransform(verb.transform));
-    ToProto(transform, request.mutable_map_t_other());
-  }
-  SeenNodes mine;
-  SeenNodes theirs;
-  if (!verb.picture.png.empty()) {
-    DSG_ASSIGN_OR_RETURN(mine, SeenBy(session, request.map()));
-    DSG_ASSIGN_OR_RETURN(theirs, SeenBy(session, request.other()));
-  }
-  Progress progress(absl::StrCat("merge ", verb.other, " into ", session->map().name),
+// The last message, with the ids of all.
+absl::StatusOr<v1::MergeMapsResponse> Call(Session* session, const v1::MergeMapsRequest& request,
+                                           std::ostream& progress_out) {
+  Progress progress(absl::StrCat("merge ", request.other(), " into ", request.map()),
                     &progress_out);
   query::CallContext call = session->NewCall();
   const InterruptGuard guard(&call);
@@ -181,11 +167,67 @@ absl::Status RunMerge(Session* session, const MergeVerb& verb, std::ostream& out
         for (const auto& [before, after] : ids) (*last.mutable_node_ids())[before] = after;
         return true;
       }));
+  return last;
+}
+
+// A person says whether a doubtful transform is meant; nobody is there to ask a script.
+absl::Status Confirm(const std::string& doubts, bool is_meant, std::ostream& questions) {
+  if (doubts.empty()) return absl::OkStatus();
+  if (!is_meant && isatty(STDIN_FILENO) == 0) {
+    return MakeError(Reason::kNoRegistration, absl::StrCat("refused without --yes: ", doubts));
+  }
+  questions << "dsg: warning: " << doubts << "\n" << std::flush;
+  if (is_meant) return absl::OkStatus();
+  questions << "Merge all the same? [y/N] " << std::flush;
+  std::string answer;
+  if (std::getline(std::cin, answer) && (answer == "y" || answer == "yes")) return absl::OkStatus();
+  return MakeError(Reason::kNoRegistration, "nothing was written: the transform is not meant");
+}
+
+// What would become of it is looked at first: what is written stays.
+absl::StatusOr<v1::MergeMapsResponse> PlanAndWrite(Session* session, const MergeAsked& asked,
+                                                   bool is_meant, v1::MergeMapsRequest request,
+                                                   std::ostream& progress_out) {
+  request.set_dry_run(true);
+  DSG_ASSIGN_OR_RETURN(v1::MergeMapsResponse plan, Call(session, request, progress_out));
+  if (asked.is_dry_run) return plan;
+  DSG_RETURN_IF_ERROR(Confirm(DoubtsOf(plan, asked), is_meant, progress_out));
+  request.set_dry_run(false);
+  *request.mutable_map_t_other() = plan.map_t_other();
+  DSG_ASSIGN_OR_RETURN(v1::MergeMapsResponse last, Call(session, request, progress_out));
+  last.set_agreeing_count(plan.agreeing_count());
+  return last;
+}
+
+}  // namespace
+
+absl::Status RunMerge(Session* session, const MergeVerb& verb, std::ostream& out,
+                      std::ostream& progress_out) {
+  DSG_RETURN_IF_ERROR(CheckPicture(verb.picture));
+  v1::MergeMapsRequest request;
+  request.set_map(session->map().name);
+  request.set_other(verb.other);
+  request.set_author("dsg merge");
+  if (!verb.transform.empty()) {
+    DSG_ASSIGN_OR_RETURN(const Pose3d transform, ParseTransform(verb.transform));
+    ToProto(transform, request.mutable_map_t_other());
+  }
+  SeenNodes mine;
+  SeenNodes theirs;
+  if (!verb.picture.png.empty()) {
+    DSG_ASSIGN_OR_RETURN(mine, SeenBy(session, request.map()));
+    DSG_ASSIGN_OR_RETURN(theirs, SeenBy(session, request.other()));
+  }
+  const MergeAsked asked{session->map().name, verb.other, !verb.transform.empty(), verb.dry_run};
+  DSG_ASSIGN_OR_RETURN(const v1::MergeMapsResponse last,
+                       PlanAndWrite(session, asked, verb.yes, request, progress_out));
   if (session->common().json) {
+    if (verb.dry_run && !DoubtsOf(last, asked).empty()) {
+      progress_out << "dsg: warning: " << DoubtsOf(last, asked) << "\n";
+    }
     DSG_RETURN_IF_ERROR(WriteJson(last, out));
   } else {
-    out << RenderMerge(last,
-                       {session->map().name, verb.other, !verb.transform.empty(), verb.dry_run});
+    out << RenderMerge(last, asked);
   }
   if (verb.picture.png.empty()) return absl::OkStatus();
   MergePicture picture(std::move(mine), std::move(theirs));

@@ -1,13 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "query/engine/merge.h"
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <atomic>
 #include <map>
 #include <optional>
 #include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "dsg/v1/maintenance_service.pb.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
@@ -20,6 +25,13 @@ namespace {
 
 // A message of so many pairs of ids stays below a megabyte.
 constexpr int kIdsAMessage = 20'000;
+
+// Deltas are known by session and sequence, and two merges of one pair of maps may meet.
+std::string NewSessionId(const merge::MergePlan& plan) {
+  static std::atomic<int64_t> count{0};
+  return absl::StrCat("merge/", plan.other_name, "@", plan.other_revision, "/", WallClockNs(), "-",
+                      getpid(), "-", ++count);
+}
 
 class Merge final : public MergeCursor {
  public:
@@ -57,6 +69,8 @@ class Merge final : public MergeCursor {
       map_T_other_ = alignment.map_T_other;
       agreeing_count_ = alignment.agreeing_count;
     }
+    options_.into_map = into_.get();
+    options_.other_map = other_.get();
     DSG_ASSIGN_OR_RETURN(options_.used_ids, merge::FindUsedIds(into_.get(), call.stop()));
     DSG_RETURN_IF_ERROR(PlanAt(into, call));
     options_.check_reach = false;
@@ -71,6 +85,9 @@ class Merge final : public MergeCursor {
     added_node_count_ = std::max(added_node_count_, plan.counts.added_node_count);
     gone_.insert(plan.gone.begin(), plan.gone.end());
     for (const auto& [before, after] : plan.moved) moved_[before] = after;
+    if (session_id_.empty()) session_id_ = NewSessionId(plan);
+    // Later plans meet what earlier ones have written.
+    if (part_count_ == 0) evidence_ = plan.evidence;
     seen_ = plan.into_revision;
     deltas_ = std::make_unique<merge::MergeDeltas>(into, other_now_, std::move(plan), author_,
                                                    part_count_);
@@ -86,12 +103,39 @@ class Merge final : public MergeCursor {
           DSG_ASSIGN_OR_RETURN(std::optional<GraphDelta> delta, deltas_->Next(call.stop()));
           is_written_ = !delta.has_value();
           if (is_written_) return absl::OkStatus();
-          delta->parent_revision = seen_;
-          DSG_ASSIGN_OR_RETURN(const CommitResult result, writer.Commit(*std::move(delta)));
-          seen_ = revision_ = result.revision;
-          ++part_count_;
-          return absl::OkStatus();
+          return Commit(*std::move(delta), &writer);
         });
+  }
+
+  absl::Status Commit(GraphDelta delta, MapWriter* writer) {
+    delta.parent_revision = seen_;
+    delta.session_id = session_id_;
+    delta.sequence = ++part_count_;
+    std::vector<NodeId> nodes;
+    for (const Node& node : delta.nodes) nodes.push_back(node.id);
+    std::vector<EdgeKey> edges;
+    for (const Edge& edge : delta.edges) edges.push_back(edge.key());
+    DSG_ASSIGN_OR_RETURN(const CommitResult result, writer->Commit(std::move(delta)));
+    if (result.replayed) {
+      return absl::InternalError(
+          absl::StrCat("part ", part_count_, " of the merge was known to map \"",
+                       into_->spec().name, "\" already and not written; run the merge again"));
+    }
+    seen_ = revision_ = result.revision;
+    Note(std::move(nodes), edges);
+    return absl::OkStatus();
+  }
+
+  // What is written is not written again, whatever becomes of it.
+  void Note(std::vector<NodeId> nodes, const std::vector<EdgeKey>& edges) {
+    options_.written.edges.insert(edges.begin(), edges.end());
+    if (nodes.empty()) return;
+    std::sort(nodes.begin(), nodes.end());
+    for (const auto& [theirs, mine] : deltas_->plan().node_ids) {
+      if (std::binary_search(nodes.begin(), nodes.end(), mine)) {
+        options_.written.nodes[theirs] = mine;
+      }
+    }
   }
 
   // A robot may commit all the time: only what touches the rest of the plan has it made anew.
@@ -130,6 +174,8 @@ class Merge final : public MergeCursor {
     reply->set_agreeing_count(agreeing_count_ > 0
                                   ? agreeing_count_
                                   : static_cast<int32_t>(plan.counts.fused_object_count));
+    reply->set_missing_count(evidence_.missing_count);
+    reply->set_blocked_share(evidence_.blocked_share);
     reply->set_fused_object_count(plan.counts.fused_object_count);
     reply->set_fused_place_count(plan.counts.fused_place_count);
     reply->set_fused_room_count(plan.counts.fused_room_count);
@@ -154,12 +200,14 @@ class Merge final : public MergeCursor {
   std::unique_ptr<merge::MergeDeltas> deltas_;
   std::map<NodeId, NodeId>::const_iterator next_id_;
   int32_t agreeing_count_ = 0;
+  merge::Evidence evidence_;
   int64_t added_node_count_ = 0;
   std::set<NodeId> gone_;
   std::map<NodeId, NodeId> moved_;
   /// The newest revision that the plan was compared with, or that it wrote.
   Revision seen_ = 0;
   Revision revision_ = 0;
+  std::string session_id_;
   int64_t part_count_ = 0;
   double progress_ = 0.0;
   bool is_written_ = false;

@@ -7,7 +7,6 @@
 #include <tuple>
 
 #include "schema/base/status.h"
-#include "schema/merge/origins.h"
 #include "schema/merge/transform_node.h"
 
 namespace dsg::merge {
@@ -33,17 +32,57 @@ bool IsSame(const TimedPose& a, const TimedPose& b) {
          AngleBetween(a.map_T_agent.orientation, b.map_T_agent.orientation) <= kSameRad;
 }
 
-// From the first to the last of `wanted` that `known` has not: an empty span if it has all. Both
-// ascend in time. What only `known` has is nobody's correction: the other map may have forgotten
-// it.
-std::span<const TimedPose> PartThatDiffers(const std::vector<TimedPose>& wanted,
-                                           const std::vector<TimedPose>& known) {
+using Poses = std::vector<TimedPose>;
+
+const TimedPose* Find(const Poses& poses, TimeNs time_ns) {
+  const auto found =
+      std::lower_bound(poses.begin(), poses.end(), time_ns,
+                       [](const TimedPose& pose, TimeNs at_ns) { return pose.time_ns < at_ns; });
+  return found == poses.end() || found->time_ns != time_ns ? nullptr : &*found;
+}
+
+// What is believed after three have spoken: the other map now, this one, and the other map as it
+// was when this one followed it. A pose that is here as it was there follows; one that others have
+// written, and one that they have removed, stays so. What only `known` has is nobody's correction:
+// the other map may have forgotten it. `has_own`: others go on with the track.
+Poses Reconcile(const Poses& wanted, const Poses& known, const std::vector<Poses>& bases,
+                bool has_own) {
+  const auto was_in_all = [&](TimeNs time_ns) {
+    return std::all_of(bases.begin(), bases.end(),
+                       [&](const Poses& base) { return Find(base, time_ns) != nullptr; });
+  };
+  const auto is_of_a_base = [&](const TimedPose& pose) {
+    return std::any_of(bases.begin(), bases.end(), [&](const Poses& base) {
+      const TimedPose* before = Find(base, pose.time_ns);
+      return before != nullptr && IsSame(*before, pose);
+    });
+  };
+  has_own = has_own || std::any_of(known.begin(), known.end(), [&](const TimedPose& pose) {
+              return Find(wanted, pose.time_ns) == nullptr && !is_of_a_base(pose);
+            });
+  Poses believed;
+  auto at = known.begin();
+  for (const TimedPose& pose : wanted) {
+    while (at != known.end() && at->time_ns < pose.time_ns) believed.push_back(*at++);
+    if (at == known.end() || at->time_ns != pose.time_ns) {
+      if (!has_own && !was_in_all(pose.time_ns)) believed.push_back(pose);
+      continue;
+    }
+    const bool follows = !IsSame(pose, *at) && is_of_a_base(*at);
+    believed.push_back(follows ? pose : *at);
+    ++at;
+  }
+  believed.insert(believed.end(), at, known.end());
+  return believed;
+}
+
+// From the first to the last of `wanted` that `known` has not: an empty span if it has all.
+std::span<const TimedPose> PartThatDiffers(const Poses& wanted, const Poses& known) {
   size_t first = wanted.size();
   size_t last = 0;
-  auto at = known.begin();
   for (size_t i = 0; i < wanted.size(); ++i) {
-    while (at != known.end() && at->time_ns < wanted[i].time_ns) ++at;
-    if (at != known.end() && IsSame(wanted[i], *at)) continue;
+    const TimedPose* same = Find(known, wanted[i].time_ns);
+    if (same != nullptr && IsSame(wanted[i], *same)) continue;
     first = std::min(first, i);
     last = i;
   }
@@ -69,14 +108,24 @@ absl::Status AgentCopy::Begin(const StopCheck& stop) {
   is_known_ = track.ok();
   if (!is_known_) return absl::OkStatus();
   if (track->pose_count > 0) next_pose_ns_ = track->last_ns + 1;
-  DSG_ASSIGN_OR_RETURN(const Node node, into_.GetNode(mine_));
-  const auto copy = CopiedFrom(node);
-  is_copy_ = copy.has_value() && copy->map == plan_.other_name && copy->id == theirs_;
+  const auto bases = plan_.track_bases.find(mine_);
+  if (bases != plan_.track_bases.end() && !bases->second.empty()) bases_ = &bases->second;
+  if (bases_ != nullptr) DSG_RETURN_IF_ERROR(LookAtEnd(*track, stop));
   return into_.ReadShapes(mine_, kTimeMin, kTimeMax, /*with_vertices=*/false, stop,
                           [&](const ShownShape& shown) {
                             next_shape_ns_ = shown.shape.time_ns + 1;
                             return true;
                           });
+}
+
+absl::Status AgentCopy::LookAtEnd(const TrackInfo& track, const StopCheck& stop) {
+  if (track.pose_count == 0) return absl::OkStatus();
+  const TimeNs last_ns = track.last_ns;
+  DSG_ASSIGN_OR_RETURN(const Poses now, Carried(last_ns, last_ns + 1, stop));
+  DSG_ASSIGN_OR_RETURN(const std::vector<Poses> bases, CarriedBefore(last_ns, last_ns + 1, stop));
+  has_own_end_ = now.empty() && std::all_of(bases.begin(), bases.end(),
+                                            [](const Poses& base) { return base.empty(); });
+  return absl::OkStatus();
 }
 
 absl::StatusOr<std::optional<GraphDelta>> AgentCopy::Next(const StopCheck& stop) {
@@ -85,7 +134,7 @@ absl::StatusOr<std::optional<GraphDelta>> AgentCopy::Next(const StopCheck& stop)
     switch (stage_) {
       case Stage::kBegin:
         DSG_RETURN_IF_ERROR(Begin(stop));
-        stage_ = is_copy_ ? Stage::kCorrections : Stage::kPoses;
+        stage_ = bases_ != nullptr ? Stage::kCorrections : Stage::kPoses;
         break;
       case Stage::kCorrections:
         DSG_RETURN_IF_ERROR(ReadCorrections(stop, &delta));
@@ -123,6 +172,24 @@ absl::StatusOr<std::vector<TimedPose>> AgentCopy::Carried(TimeNs from_ns, TimeNs
   return poses;
 }
 
+absl::StatusOr<std::vector<std::vector<TimedPose>>> AgentCopy::CarriedBefore(
+    TimeNs from_ns, TimeNs to_ns, const StopCheck& stop) const {
+  std::vector<Poses> all;
+  for (const std::shared_ptr<const Snapshot>& base : *bases_) {
+    Poses& poses = all.emplace_back();
+    const absl::Status read =
+        (base != nullptr ? *base : other_)
+            .ReadPoses(theirs_, from_ns, to_ns, stop, [&](const TimedPose& pose) {
+              poses.push_back(pose);
+              TransformPose(plan_.map_T_other_before, &poses.back());
+              return true;
+            });
+    // Not all of them had it.
+    if (ReasonOf(read) != Reason::kAgentUnknown) DSG_RETURN_IF_ERROR(read);
+  }
+  return all;
+}
+
 absl::Status AgentCopy::ReadCorrections(const StopCheck& stop, GraphDelta* delta) {
   while (delta->empty()) {
     DSG_ASSIGN_OR_RETURN(const std::vector<TimedPose> wanted,
@@ -135,7 +202,10 @@ absl::Status AgentCopy::ReadCorrections(const StopCheck& stop, GraphDelta* delta
                                           known.push_back(pose);
                                           return true;
                                         }));
-    const std::span<const TimedPose> part = PartThatDiffers(wanted, known);
+    DSG_ASSIGN_OR_RETURN(const std::vector<Poses> bases,
+                         CarriedBefore(wanted.front().time_ns, compared_to_ns_, stop));
+    const Poses believed = Reconcile(wanted, known, bases, has_own_end_);
+    const std::span<const TimedPose> part = PartThatDiffers(believed, known);
     if (part.empty()) continue;
     delta->corrections.push_back(
         {mine_, part.front().time_ns, part.back().time_ns + 1, {part.begin(), part.end()}});
@@ -151,6 +221,23 @@ absl::Status AgentCopy::ReadPoses(const StopCheck& stop, GraphDelta* delta) {
   return absl::OkStatus();
 }
 
+absl::StatusOr<bool> AgentCopy::IsAsWritten(const Stay& known) const {
+  if (bases_ == nullptr) return !plan_.copied_agents.contains(mine_);
+  for (const std::shared_ptr<const Snapshot>& base : *bases_) {
+    auto stays = (base != nullptr ? *base : other_)
+                     .StaysOfAgent(theirs_, known.enter_ns, known.enter_ns + 1);
+    if (ReasonOf(stays.status()) == Reason::kAgentUnknown) continue;
+    DSG_RETURN_IF_ERROR(stays.status());
+    for (Stay& stay : *stays) {
+      stay.agent = mine_;
+      stay.place = Mapped(stay.place);
+      stay.room = Mapped(stay.room);
+      if (stay == known) return true;
+    }
+  }
+  return false;
+}
+
 absl::Status AgentCopy::ReadStays(GraphDelta* delta) {
   DSG_ASSIGN_OR_RETURN(const std::vector<Stay> stays,
                        other_.StaysOfAgent(theirs_, kTimeMin, kTimeMax));
@@ -164,6 +251,13 @@ absl::Status AgentCopy::ReadStays(GraphDelta* delta) {
     stay.room = Mapped(stay.room);
     const bool is_nowhere = stay.place.empty() && stay.room.empty();
     if (is_nowhere || std::find(known.begin(), known.end(), stay) != known.end()) continue;
+    const auto mine = std::find_if(known.begin(), known.end(), [&](const Stay& each) {
+      return each.enter_ns == stay.enter_ns;
+    });
+    if (mine != known.end()) {
+      DSG_ASSIGN_OR_RETURN(const bool follows, IsAsWritten(*mine));
+      if (!follows) continue;
+    }
     delta->stays.push_back(stay);
   }
   return absl::OkStatus();
@@ -181,7 +275,10 @@ absl::Status AgentCopy::ReadFactors(GraphDelta* delta) const {
   FactorAppend append{mine_, {}};
   for (PoseFactor factor : factors) {
     TransformFactor(plan_.map_T_other, &factor);
-    if (!factor.to_agent.empty()) factor.to_agent = Mapped(factor.to_agent);
+    if (!factor.to_agent.empty()) {
+      factor.to_agent = Mapped(factor.to_agent);
+      if (factor.to_agent.empty()) continue;
+    }
     if (!known.contains(KeyOf(factor))) append.factors.push_back(std::move(factor));
   }
   if (!append.factors.empty()) delta->factors.push_back(std::move(append));

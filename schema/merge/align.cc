@@ -127,12 +127,8 @@ Pose3d WithCenters(const Pose3d& pose, const Eigen::Vector3d& into_center,
   return {into_center + pose.position - pose.orientation * other_center, pose.orientation};
 }
 
-absl::Status Judge(const std::vector<Candidate>& candidates, const AlignOptions& options,
-                   Alignment* alignment) {
-  if (candidates.empty()) return NoRegistration("the maps share no kinds of things with a class");
-  const Candidate& best = candidates.front();
+absl::Status JudgeAlone(const Candidate& best, const AlignOptions& options) {
   const int agreeing = static_cast<int>(best.score.matches.size());
-  const int missing = best.score.shared_count - 2 * agreeing;
   if (agreeing < options.agreeing_count_min) {
     return NoRegistration(absl::StrCat(agreeing, " things agree at best, and ",
                                        options.agreeing_count_min, " are needed"));
@@ -141,23 +137,56 @@ absl::Status Judge(const std::vector<Candidate>& candidates, const AlignOptions&
     return NoRegistration(
         absl::StrCat(agreeing, " things agree at best, as many as would by chance"));
   }
-  if (agreeing < options.agreeing_share_min * (agreeing + 0.5 * missing)) {
-    return NoRegistration(absl::StrCat(agreeing, " things agree at best, and ", missing,
+  if (best.score.agreeing_share < options.agreeing_share_min) {
+    return NoRegistration(absl::StrCat(agreeing, " things agree at best, and ",
+                                       best.score.missing_count,
                                        " are missing where both maps looked"));
   }
-  alignment->agreeing_count = agreeing;
+  if (best.score.blocked_share > options.blocked_share_max) {
+    return NoRegistration(absl::StrCat(agreeing, " things agree at best, but then ",
+                                       best.score.blocked_count, " of ", best.score.walled_count,
+                                       " places would stand in walls of the other map"));
+  }
+  return absl::OkStatus();
+}
+
+// Nothing speaks against it.
+bool IsClean(const AlignScore& score, const AlignOptions& options) {
+  return score.agreeing_share >= options.clean_agreeing_share_min &&
+         score.walled_count >= options.clean_walled_count_min &&
+         score.blocked_share <= options.clean_blocked_share_max;
+}
+
+absl::Status JudgeAgainst(const Candidate& rival, const Candidate& best,
+                          const AlignOptions& options) {
+  const int agreeing = static_cast<int>(best.score.matches.size());
+  const int rival_agreeing = static_cast<int>(rival.score.matches.size());
+  const bool is_alike = rival.score.score > options.rival_share_max * best.score.score;
+  const double count_share_max = IsClean(best.score, options) ? options.clean_rival_count_share_max
+                                                              : options.rival_count_share_max;
+  if (!is_alike && rival_agreeing <= count_share_max * agreeing) {
+    return absl::OkStatus();
+  }
+  return NoRegistration(absl::StrFormat(
+      "%s, %d and %d things agree and they lie %s and %s from the middle of one map to that of "
+      "the other",
+      is_alike ? "two answers are as good as each other"
+               : "the best answer is hardly better than any other",
+      agreeing, rival_agreeing, Describe(best.into_T_other), Describe(rival.into_T_other)));
+}
+
+absl::Status Judge(const std::vector<Candidate>& candidates, const AlignOptions& options,
+                   Alignment* alignment) {
+  if (candidates.empty()) return NoRegistration("the maps share no kinds of things with a class");
+  const Candidate& best = candidates.front();
+  DSG_RETURN_IF_ERROR(JudgeAlone(best, options));
+  alignment->agreeing_count = static_cast<int>(best.score.matches.size());
   alignment->shared_count = best.score.shared_count;
   for (const Candidate& rival : candidates) {
     if (!AreApart(best.into_T_other, rival.into_T_other)) continue;
-    alignment->rival_share = rival.score.score / std::max(best.score.score, 1e-9);
-    if (alignment->rival_share > options.rival_share_max) {
-      return NoRegistration(absl::StrFormat(
-          "two answers are as good as each other, %d and %d things agree and they lie %s and %s "
-          "from the middle of one map to that of the other",
-          agreeing, static_cast<int>(rival.score.matches.size()), Describe(best.into_T_other),
-          Describe(rival.into_T_other)));
-    }
-    break;
+    DSG_RETURN_IF_ERROR(JudgeAgainst(rival, best, options));
+    const double share = rival.score.score / std::max(best.score.score, 1e-9);
+    alignment->rival_share = std::max(alignment->rival_share, share);
   }
   return absl::OkStatus();
 }
@@ -181,6 +210,17 @@ absl::StatusOr<Alignment> EstimateTransform(const MapContent& into, const MapCon
   alignment.residual_m = best.registration.residual_m;
   alignment.covariance = best.registration.covariance;
   return alignment;
+}
+
+Evidence EvidenceFor(const MapContent& into, const MapContent& other, const Pose3d& map_T_other,
+                     const AlignOptions& options) {
+  const Eigen::Vector3d center = CenterOf(into);
+  const Eigen::Vector3d other_center = CenterOf(other);
+  const Pose3d centered{map_T_other * other_center - center, map_T_other.orientation};
+  const AlignScore score =
+      ScoreTransform(MakeSide(into, false, center), MakeSide(other, false, other_center), centered,
+                     options.noise_bound_m);
+  return {static_cast<int>(score.matches.size()), score.missing_count, score.blocked_share};
 }
 
 }  // namespace dsg::merge

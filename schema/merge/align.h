@@ -19,12 +19,22 @@ struct AlignOptions {
   int agreeing_count_min = 4;
   /// Where maps have fewer things than this, rooms and places help.
   int few_things = 12;
-  /// The second best answer must score less than this share of the best.
+  /// Whatever lies elsewhere must score less than this share of the best, and fewer things than
+  /// this share of its may agree: maps of strangers have many answers that are alike.
   double rival_share_max = 0.75;
+  double rival_count_share_max = 0.6;
+  /// Where nothing speaks against an answer, that is where so many of what both could have seen are
+  /// found and next to no places stand in walls, more things may agree elsewhere.
+  double clean_agreeing_share_min = 0.6;
+  double clean_blocked_share_max = 0.05;
+  int clean_walled_count_min = 20;
+  double clean_rival_count_share_max = 0.9;
   /// How often maps of strangers may agree as well as these do.
-  double chance_max = 0.01;
+  double chance_max = 0.001;
   /// Of what both maps could have seen, at least this share was found in both.
-  double agreeing_share_min = 0.3;
+  double agreeing_share_min = 0.25;
+  /// Of the places near walls of the other map, no more than this share stand in them.
+  double blocked_share_max = 0.15;
 };
 
 /// Threads: plain values.
@@ -50,5 +60,17 @@ struct Alignment {
 /// Source: TEASER (Yang, Shi and Carlone, 2021) for the registration of each guess.
 absl::StatusOr<Alignment> EstimateTransform(const MapContent& into, const MapContent& other,
                                             const AlignOptions& options, const StopCheck& stop);
+
+/// What speaks for a transform, whoever gave it, and what against it.
+struct Evidence {
+  int agreeing_count = 0;
+  /// Landmarks of either map that the other does not have though it has been there.
+  int missing_count = 0;
+  /// Of the places near walls of the other map, those that stand in them; 0 to 1.
+  double blocked_share = 0.0;
+};
+
+Evidence EvidenceFor(const MapContent& into, const MapContent& other, const Pose3d& map_T_other,
+                     const AlignOptions& options);
 
 }  // namespace dsg::merge

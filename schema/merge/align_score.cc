@@ -53,14 +53,15 @@ std::vector<int> NearestOf(const std::vector<Landmark>& points, const AlignSide&
   return nearest;
 }
 
-// How many of `points` lie where `side` has been.
-int CountSeen(const std::vector<Landmark>& points, const AlignSide& side,
-              const Pose3d& side_T_points) {
+// How many of `points` match nothing, though they lie where `side` has been.
+int CountMissing(const std::vector<Landmark>& points, const std::vector<char>& is_matched,
+                 const AlignSide& side, const Pose3d& side_T_points) {
   const PointGrid places(PositionsOf(side.places), 1.0);
   const PointGrid things(PositionsOf(side.landmarks), 1.0);
   int count = 0;
-  for (const Landmark& point : points) {
-    const Eigen::Vector3d at = side_T_points * point.position;
+  for (size_t k = 0; k < points.size(); ++k) {
+    if (is_matched[k] != 0) continue;
+    const Eigen::Vector3d at = side_T_points * points[k].position;
     bool is_seen = false;
     places.ForEachNear(at, kClearanceMaxM + kSeenBeyondM, [&](int i) {
       const Eigen::Vector4d& place = side.places[static_cast<size_t>(i)];
@@ -78,9 +79,13 @@ int CountSeen(const std::vector<Landmark>& points, const AlignSide& side,
   return count;
 }
 
-// Counts places of `free` that a wall of `side` stands in, and those that have any wall near.
-void CountBlocked(const AlignSide& free, const AlignSide& side, const Pose3d& side_T_free,
-                  AlignScore* score) {
+struct Blocked {
+  int walled_count = 0;
+  int blocked_count = 0;
+};
+
+// Places of `free` that have a wall of `side` near, and those that such a wall stands in.
+Blocked CountBlocked(const AlignSide& free, const AlignSide& side, const Pose3d& side_T_free) {
   std::vector<Eigen::Vector3d> places;
   places.reserve(free.places.size());
   for (const Eigen::Vector4d& place : free.places) places.push_back(side_T_free * place.head<3>());
@@ -102,9 +107,11 @@ void CountBlocked(const AlignSide& free, const AlignSide& side, const Pose3d& si
       if (distance < clearance - kWallSlackM) is_blocked[place] = 1;
     });
   }
-  score->walled_count += static_cast<int>(std::count(is_near.begin(), is_near.end(), 1));
-  score->blocked_count += static_cast<int>(std::count(is_blocked.begin(), is_blocked.end(), 1));
+  return {static_cast<int>(std::count(is_near.begin(), is_near.end(), 1)),
+          static_cast<int>(std::count(is_blocked.begin(), is_blocked.end(), 1))};
 }
+
+double ShareOf(double part, double whole) { return part / std::max(1.0, whole); }
 
 }  // namespace
 
@@ -125,6 +132,8 @@ AlignSide MakeSide(const MapContent& content, bool with_regions, const Eigen::Ve
       side.walls.emplace_back(pose, node.box_node);
     }
   }
+  const Blocked own = CountBlocked(side, side, Pose3d());
+  side.own_blocked_share = ShareOf(own.blocked_count, own.walled_count);
   return side;
 }
 
@@ -172,17 +181,24 @@ AlignScore ScoreTransform(const AlignSide& into, const AlignSide& other, const P
   AlignScore score;
   const Pose3d other_T_into = into_T_other.Inverse();
   score.matches = MatchLandmarks(into, other, into_T_other, gate_m);
+  std::vector<char> mine(into.landmarks.size(), 0);
+  std::vector<char> theirs(other.landmarks.size(), 0);
+  for (const auto& [a, b] : score.matches) {
+    mine[static_cast<size_t>(a)] = theirs[static_cast<size_t>(b)] = 1;
+  }
   const int match_count = static_cast<int>(score.matches.size());
-  score.shared_count =
-      std::max(2 * match_count, CountSeen(other.landmarks, into, into_T_other) +
-                                    CountSeen(into.landmarks, other, other_T_into));
-  CountBlocked(other, into, into_T_other, &score);
-  CountBlocked(into, other, other_T_into, &score);
-  const double agreeing = match_count;
-  const double missing = score.shared_count - 2 * match_count;
-  const double agreement = agreeing / std::max(1.0, agreeing + 0.5 * missing);
-  const double blocked = static_cast<double>(score.blocked_count) / std::max(1, score.walled_count);
-  score.score = agreeing * agreement * std::max(0.0, 1.0 - 3.0 * blocked);
+  score.missing_count = CountMissing(other.landmarks, theirs, into, into_T_other) +
+                        CountMissing(into.landmarks, mine, other, other_T_into);
+  score.shared_count = 2 * match_count + score.missing_count;
+  const Blocked there = CountBlocked(other, into, into_T_other);
+  const Blocked here = CountBlocked(into, other, other_T_into);
+  score.walled_count = there.walled_count + here.walled_count;
+  score.blocked_count = there.blocked_count + here.blocked_count;
+  const double expected =
+      there.walled_count * other.own_blocked_share + here.walled_count * into.own_blocked_share;
+  score.blocked_share = ShareOf(std::max(0.0, score.blocked_count - expected), score.walled_count);
+  score.agreeing_share = ShareOf(2.0 * match_count, score.shared_count);
+  score.score = match_count * score.agreeing_share * std::max(0.0, 1.0 - 3.0 * score.blocked_share);
   return score;
 }
 

@@ -18,6 +18,8 @@ struct AlignSide {
   std::vector<Eigen::Vector4d> places;
   /// Upright faces: walls with the box in their frame.
   std::vector<std::pair<Pose3d, Box3d>> walls;
+  /// Of its places near a wall of its own, those that stand in one: walls are drawn across doors.
+  double own_blocked_share = 0.0;
 };
 
 /// `center` is taken off all positions, so that far frames cost no precision.
@@ -26,11 +28,17 @@ AlignSide MakeSide(const MapContent& content, bool with_regions, const Eigen::Ve
 struct AlignScore {
   /// Index in the landmarks of `into`, of `other`.
   std::vector<std::pair<int, int>> matches;
-  /// Landmarks of both that lie where the other map has been.
+  /// Landmarks of both that match nothing, though they lie where the other map has been.
+  int missing_count = 0;
+  /// Those, and those that match.
   int shared_count = 0;
-  /// Places that a wall of the other map stands in, and places near any wall.
-  int blocked_count = 0;
+  /// Places near a wall of the other map, and those that such a wall stands in.
   int walled_count = 0;
+  int blocked_count = 0;
+  /// Of the former, beyond what walls of one's own would do; 0 to 1.
+  double blocked_share = 0.0;
+  /// Of what both maps could have seen, what both did see; 0 to 1.
+  double agreeing_share = 0.0;
   double score = 0.0;
 };
 

@@ -6,7 +6,6 @@
 
 #include "schema/merge/footprint.h"
 #include "schema/merge/map_content.h"
-#include "schema/merge/origins.h"
 
 namespace dsg::merge {
 namespace {
@@ -120,6 +119,44 @@ void FuseClass(const Node& seen, Node* known) {
   known->class_name = seen.class_name;
 }
 
+// Each map's own observations count once, by whatever way they came: the larger of two counts of
+// one origin is the later one.
+void CountObservations(const std::string& into, Origin origin, bool is_known, const Node& seen,
+                       Node* known) {
+  int64_t own_count = OwnCount(*known);
+  std::vector<Origin> taken = OriginsOf(seen);
+  origin.observation_count = OwnCount(seen);
+  taken.push_back(origin);
+  for (Origin& each : taken) {
+    if (each.map == into) {
+      if (each.id == known->id) own_count = std::max(own_count, each.observation_count);
+      continue;
+    }
+    const bool is_seen = each.map == origin.map && each.id == origin.id;
+    each.is_copy = false;
+    for (const Origin& before : OriginsOf(*known)) {
+      if (before.map != each.map || before.id != each.id) continue;
+      if (is_seen && !is_known) {
+        // Another map had this name; what it observed has been observed.
+        own_count = AddCounts(own_count, before.observation_count);
+        continue;
+      }
+      if (!is_seen && before.observation_count >= each.observation_count) {
+        each = before;
+        continue;
+      }
+      each.is_copy = before.is_copy;
+      each.written_mark = before.written_mark;
+      each.observation_count = std::max(each.observation_count, before.observation_count);
+    }
+    SetOrigin(each, known);
+  }
+  known->observation_count = own_count;
+  for (const Origin& each : OriginsOf(*known)) {
+    known->observation_count = AddCounts(known->observation_count, each.observation_count);
+  }
+}
+
 bool AreClose(const Pose3d& a, const Pose3d& b) {
   return (a.position - b.position).cwiseAbs().maxCoeff() < kSameM &&
          AngleBetween(a.orientation, b.orientation) < kSameM;
@@ -170,17 +207,22 @@ bool IsSameGeometry(const Node& a, const Node& b) {
          std::abs(a.region->z_max_m - b.region->z_max_m) < kSameM;
 }
 
-void FuseNode(const std::string& from, NodeId seen_id, const Node& seen, Node* known) {
+void FuseNode(const std::string& into, Origin origin, bool is_known, const Node& seen,
+              Node* known) {
   const bool is_better = IsBetterSeen(seen, seen.observation_count, *known);
-  const int64_t before = SetOrigin({from, seen_id, seen.observation_count, false}, known);
-  known->observation_count += std::max<int64_t>(0, seen.observation_count - before);
+  CountObservations(into, std::move(origin), is_known, seen, known);
+  const bool is_later = seen.last_observed_ns > known->last_observed_ns;
   WidenObserved(seen, known);
   WidenValidity(seen, known);
   if (seen.confidence.has_value()) {
     known->confidence = std::max(known->confidence.value_or(0.0), *seen.confidence);
   }
   FuseClass(seen, known);
-  if (IsAgentKind(known->kind)) return;
+  if (IsAgentKind(known->kind)) {
+    // An agent is where its track ends.
+    if (is_later) known->map_T_node = seen.map_T_node;
+    return;
+  }
   if (known->kind == kinds::kPlace) {
     if (!known->place.has_value()) known->place = seen.place;
   } else if (known->region.has_value() || seen.region.has_value()) {
@@ -192,13 +234,14 @@ void FuseNode(const std::string& from, NodeId seen_id, const Node& seen, Node* k
   }
 }
 
-void RefreshCopy(const std::string& from, NodeId seen_id, const Node& seen, Node* known) {
+void RefreshCopy(Origin origin, const Node& seen, Node* known) {
   Node fresh = seen;
   fresh.id = known->id;
   fresh.name = known->name;
   fresh.attributes[kMergedFrom] = known->attributes[kMergedFrom];
   fresh.attributes[kMergedCounts] = known->attributes[kMergedCounts];
-  SetOrigin({from, seen_id, seen.observation_count, true}, &fresh);
+  origin.observation_count = OwnCount(seen);
+  SetOrigin(std::move(origin), &fresh);
   if (known->valid.to_ns < fresh.valid.to_ns &&
       !(IsObserved(seen) && *seen.last_observed_ns >= known->valid.to_ns)) {
     fresh.valid.to_ns = known->valid.to_ns;

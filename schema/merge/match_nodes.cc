@@ -6,7 +6,6 @@
 #include <map>
 
 #include "schema/base/status.h"
-#include "schema/merge/origins.h"
 
 namespace dsg::merge {
 namespace {
@@ -25,23 +24,6 @@ bool IsLater(const TrackInfo* later, const TrackInfo* earlier) {
 }
 
 }  // namespace
-
-std::vector<int> KnownPairs(const MapContent& into, const MapContent& other) {
-  std::vector<int> pair_of(other.nodes.size(), -1);
-  for (size_t i = 0; i < other.nodes.size(); ++i) {
-    for (const Origin& origin : OriginsOf(other.nodes[i])) {
-      if (origin.map == into.spec.name) pair_of[i] = into.IndexOf(origin.id);
-    }
-  }
-  for (size_t i = 0; i < into.nodes.size(); ++i) {
-    for (const Origin& origin : OriginsOf(into.nodes[i])) {
-      if (origin.map != other.spec.name) continue;
-      const int index = other.IndexOf(origin.id);
-      if (index >= 0) pair_of[static_cast<size_t>(index)] = static_cast<int>(i);
-    }
-  }
-  return pair_of;
-}
 
 bool IsGeneratedName(const Node& agent) {
   if (agent.name.empty() || agent.name == agent.kind) return true;

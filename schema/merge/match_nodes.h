@@ -31,7 +31,7 @@ struct MatchOptions {
 
 /// For each node of `other` the index of the node of `into` that it is, -1 for new ones. Several
 /// places, rooms or structures of `other` may be one of `into`; objects pair one to one, but for
-/// fragments inside another's box. Agents are paired by Origins and PairAgents only.
+/// fragments inside another's box. Agents are paired by origins and PairAgents only.
 ///
 /// `other` is in the frame of `into`, its layers numbered as there. `known`: pairs that are certain
 /// already, as long as other.nodes, -1 where not; those are kept.
@@ -39,10 +39,6 @@ struct MatchOptions {
 absl::StatusOr<std::vector<int>> MatchNodes(const MapContent& into, const MapContent& other,
                                             std::vector<int> known, const MatchOptions& options,
                                             const StopCheck& stop);
-
-/// Pairs by `merged_from`: nodes of `into` that came from the other map before, and nodes of the
-/// other map that came from `into`.
-std::vector<int> KnownPairs(const MapContent& into, const MapContent& other);
 
 /// A name that a program counted ("", "person 12", "robot" of a robot) tells nobody from another.
 bool IsGeneratedName(const Node& agent);

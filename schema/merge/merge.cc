@@ -8,11 +8,14 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "schema/base/status.h"
+#include "schema/merge/known_pairs.h"
 #include "schema/merge/merge_graph.h"
 #include "schema/merge/mesh_probe.h"
 #include "schema/merge/origins.h"
 #include "schema/merge/plan_check.h"
+#include "schema/merge/track_history.h"
 #include "schema/merge/transform_node.h"
+#include "schema/merge/vocabulary.h"
 
 namespace dsg::merge {
 namespace {
@@ -54,6 +57,55 @@ void Count(NodeId id, UsedIds* used) {
 absl::Status CountNodesAt(MapReader* map, Revision revision, const StopCheck& stop, UsedIds* used) {
   DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> snapshot, map->At(revision));
   return snapshot->ReadAllNodes(stop, [&](const Node& node) { Count(node.id, used); });
+}
+
+// What this merge has written and others have retired since does not come again.
+void LeaveOutRetired(const Written& written, const MapContent& mine, MapContent* theirs) {
+  const auto is_retired = [&](NodeId id) {
+    const auto found = written.nodes.find(id);
+    return found != written.nodes.end() && mine.IndexOf(found->second) < 0;
+  };
+  std::erase_if(theirs->nodes, [&](const Node& node) { return is_retired(node.id); });
+  std::erase_if(theirs->edges, [&](const Edge& edge) {
+    return is_retired(edge.source) || is_retired(edge.target);
+  });
+  std::erase_if(theirs->tracks, [&](const TrackInfo& track) { return is_retired(track.agent); });
+  theirs->Index();
+}
+
+// Others may have taken the origins off.
+void PairWritten(const Written& written, const MapContent& mine, const MapContent& theirs,
+                 std::vector<int>* pair_of) {
+  for (const auto& [theirs_id, mine_id] : written.nodes) {
+    const int index = theirs.IndexOf(theirs_id);
+    if (index >= 0) (*pair_of)[static_cast<size_t>(index)] = mine.IndexOf(mine_id);
+  }
+}
+
+void ListCopiedAgents(const MapContent& mine, const MapContent& theirs, const KnownPairs& known,
+                      const TrackHistory& tracks, MergePlan* plan) {
+  for (const int agent : theirs.OfClass(NodeClass::kAgent)) {
+    const std::optional<Origin>& origin = known.origin_of[static_cast<size_t>(agent)];
+    if (!origin.has_value() || !origin->is_copy) continue;
+    const int index = known.pair_of[static_cast<size_t>(agent)];
+    if (index < 0) continue;
+    const NodeId id = mine.nodes[static_cast<size_t>(index)].id;
+    plan->copied_agents.insert(id);
+    const auto bases = tracks.bases.find(agent);
+    if (bases != tracks.bases.end()) plan->track_bases[id] = bases->second;
+  }
+}
+
+absl::StatusOr<SessionChanges> ChangesOf(const MapContent& mine, const MapContent& theirs,
+                                         const std::vector<int>& pair_of, const Snapshot& other,
+                                         const Pose3d& map_T_other, const MergeOptions& options,
+                                         const StopCheck& stop) {
+  if (!options.find_changes) return SessionChanges();
+  MeshProbe mesh(other, map_T_other);
+  const auto probe = [&](const Pose3d& map_T_box, const Box3d& box, double slack_m) {
+    return mesh.Look(map_T_box, box, slack_m);
+  };
+  return FindChanges(mine, theirs, pair_of, options.change, probe, stop);
 }
 
 }  // namespace
@@ -99,6 +151,8 @@ std::optional<Pose3d> TransformOfLastMerge(const MapContent& into, const MapCont
     if (!copy.has_value() || copy->map != other.spec.name) continue;
     const int index = other.IndexOf(copy->id);
     if (index < 0) continue;
+    const bool is_other = !HoldsNow(*copy, other).value_or(true);
+    if (is_other || !IsAsWritten(node, *copy)) continue;
     const Node& theirs = other.nodes[static_cast<size_t>(index)];
     Pose3d transform = node.map_T_node * theirs.map_T_node.Inverse();
     transform.orientation.normalize();
@@ -128,27 +182,28 @@ absl::StatusOr<MergePlan> PlanMerge(const Snapshot& into, const Snapshot& other,
   DSG_ASSIGN_OR_RETURN(const MapContent mine, ReadContent(into, stop));
   DSG_ASSIGN_OR_RETURN(MapContent theirs, ReadContent(other, stop));
   DSG_ASSIGN_OR_RETURN(const Vocabulary vocabulary, JoinVocabularies(mine, theirs));
-  std::vector<int> known = KnownPairs(mine, theirs);
+  LeaveOutRetired(options.written, mine, &theirs);
+  const std::optional<Pose3d> before = TransformOfLastMerge(mine, theirs);
+  DSG_ASSIGN_OR_RETURN(KnownPairs known,
+                       FindKnownPairs(mine, theirs, options.into_map, options.other_map, stop));
+  PairWritten(options.written, mine, theirs, &known.pair_of);
   Adopt(map_T_other, vocabulary, &theirs);
   if (options.check_reach) {
     DSG_RETURN_IF_ERROR(CheckReach(mine.spec, other, theirs, map_T_other, stop));
   }
   DSG_ASSIGN_OR_RETURN(const std::vector<int> pair_of,
-                       MatchNodes(mine, theirs, std::move(known), options.match, stop));
-  SessionChanges changes;
-  if (options.find_changes) {
-    MeshProbe mesh(other, map_T_other);
-    const auto probe = [&](const Pose3d& map_T_box, const Box3d& box, double slack_m) {
-      return mesh.Look(map_T_box, box, slack_m);
-    };
-    DSG_ASSIGN_OR_RETURN(changes, FindChanges(mine, theirs, pair_of, options.change, probe, stop));
-  }
+                       MatchNodes(mine, theirs, known.pair_of, options.match, stop));
+  DSG_ASSIGN_OR_RETURN(const SessionChanges changes,
+                       ChangesOf(mine, theirs, pair_of, other, map_T_other, options, stop));
   MergePlan plan;
   plan.into_name = mine.spec.name;
   plan.other_name = theirs.spec.name;
   plan.into_revision = mine.revision;
   plan.other_revision = theirs.revision;
   plan.map_T_other = map_T_other;
+  // By now the other map lies in the frame of this one.
+  plan.evidence = EvidenceFor(mine, theirs, Pose3d(), {});
+  plan.map_T_other_before = before.value_or(map_T_other);
   plan.mesh = options.mesh;
   plan.batch_row_count = options.batch_row_count;
   plan.graph.layers = vocabulary.new_layers;
@@ -158,7 +213,10 @@ absl::StatusOr<MergePlan> PlanMerge(const Snapshot& into, const Snapshot& other,
       plan.class_of[static_cast<uint32_t>(theirs_id)] = static_cast<uint32_t>(mine_id);
     }
   }
-  BuildGraph(mine, theirs, pair_of, changes, options.used_ids, &plan);
+  DSG_ASSIGN_OR_RETURN(const TrackHistory tracks,
+                       ReadTrackHistory(theirs, known, other, options.other_map, stop));
+  ListCopiedAgents(mine, theirs, known, tracks, &plan);
+  DSG_RETURN_IF_ERROR(BuildGraph(mine, theirs, {pair_of, known, changes, tracks}, options, &plan));
   DSG_RETURN_IF_ERROR(CheckGraph(mine, &plan));
   return plan;
 }

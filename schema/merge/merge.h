@@ -11,12 +11,14 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
 #include "schema/base/stop_check.h"
+#include "schema/merge/align.h"
 #include "schema/merge/match_nodes.h"
 #include "schema/merge/mesh_join.h"
 #include "schema/merge/session_change.h"
@@ -33,12 +35,25 @@ using UsedIds = std::map<char, uint64_t>;
 /// shown are known to nobody.
 absl::StatusOr<UsedIds> FindUsedIds(MapReader* map, const StopCheck& stop);
 
+/// What earlier plans of one merge have committed. What became of it since is for others to say.
+struct Written {
+  /// Nodes of the other map, and what they are here.
+  std::map<NodeId, NodeId> nodes;
+  std::set<EdgeKey> edges;
+};
+
 struct MergeOptions {
   MatchOptions match;
   ChangeOptions change;
   MeshJoinOptions mesh;
   /// What is believed at the head of `into` counts as used in any case.
   UsedIds used_ids;
+  /// To look up what maps were when they were merged before. Where one is null, only the newest
+  /// revision of that map tells.
+  MapReader* into_map = nullptr;
+  MapReader* other_map = nullptr;
+  /// Empty for the first plan of a merge.
+  Written written;
   /// Look for what the other map's session contradicts; see session_change.h.
   bool find_changes = true;
   /// Read the whole other map to see that all of it fits into this one; a plan that is made anew
@@ -57,6 +72,8 @@ struct MergeCounts {
   int64_t added_node_count = 0;
   int64_t gone_count = 0;
   int64_t moved_count = 0;
+  /// Copies that others have changed here, and that do not follow the other map therefore.
+  int64_t kept_count = 0;
 };
 
 struct MergePlan {
@@ -65,6 +82,7 @@ struct MergePlan {
   Revision into_revision = 0;
   Revision other_revision = 0;
   Pose3d map_T_other;
+  Evidence evidence;
   /// Every node of `other`, and what it is in `into`.
   std::map<NodeId, NodeId> node_ids;
   MergeCounts counts;
@@ -75,6 +93,12 @@ struct MergePlan {
   std::vector<std::pair<NodeId, NodeId>> moved;
   /// Nodes and edges to write, whole; may be empty when nothing is new.
   GraphDelta graph;
+  /// Agents in `into` that were copied whole by earlier merges: the other map as it was then, as
+  /// far as it can be read (null: as it is now), and where it was put.
+  std::map<NodeId, std::vector<std::shared_ptr<const Snapshot>>> track_bases;
+  Pose3d map_T_other_before;
+  /// All of them, with or without such a past.
+  std::set<NodeId> copied_agents;
   /// Class and mesh instance of the other map's vertices, here.
   std::map<uint32_t, uint32_t> class_of;
   std::map<uint32_t, uint32_t> instance_of;
@@ -85,8 +109,9 @@ struct MergePlan {
 /// Errors: INVALID_ARGUMENT/FIELD_INVALID for a map with itself, or a transform that is none, tilts
 /// or leads beyond the coordinates of a map; FAILED_PRECONDITION/FRAMES_INCOMPATIBLE when clocks
 /// differ or a layer has another rank; OUT_OF_RANGE/TIME_OUTSIDE_MAP for tracks too far from the
-/// epoch of `into`; as CheckDelta for nodes that it could not hold; what `stop` returned.
-/// Cost: both graphs in memory; reads poses and mesh of `other`.
+/// epoch of `into`; RESOURCE_EXHAUSTED/LIMIT_EXCEEDED when ids have come to their end; as
+/// CheckDelta for nodes that it could not hold; what `stop` returned. Cost: both graphs in memory;
+/// reads poses and mesh of `other`.
 absl::StatusOr<MergePlan> PlanMerge(const Snapshot& into, const Snapshot& other,
                                     const Pose3d& map_T_other, const MergeOptions& options,
                                     const StopCheck& stop);
@@ -96,7 +121,7 @@ absl::StatusOr<MergePlan> PlanMerge(const Snapshot& into, const Snapshot& other,
 absl::Status CheckMergeable(const Snapshot& into, const Snapshot& other);
 
 /// Where the other map was put when it was merged before; nullopt if it was not, or has been
-/// rebuilt since.
+/// rebuilt since. Neither map is carried anywhere yet.
 std::optional<Pose3d> TransformOfLastMerge(const MapContent& into, const MapContent& other);
 
 /// The deltas of a plan, one at a time: assets, graph, tracks, stays and factors, shapes, mesh.
@@ -112,7 +137,8 @@ class MergeDeltas {
   ~MergeDeltas();
 
   const MergePlan& plan() const;
-  /// nullopt at the end. Sequences count from 1 in a session named after both revisions.
+  /// nullopt at the end. Sequences count from 1 in a session named after both revisions: who may
+  /// meet another merge of the same maps names a session of his own.
   absl::StatusOr<std::optional<GraphDelta>> Next(const StopCheck& stop);
   /// Others have changed `into`, which is now `head`. False if what is left of the plan does not
   /// hold any more: then what was not written has to be planned anew.

@@ -111,7 +111,8 @@ class MergeDeltas::Impl {
     delta.author = header_.author;
     delta.message = absl::StrCat(header_.message, ", part ", ++part_count_);
     // Once is enough to repeat the merge by hand.
-    if (part_count_ == 1) absl::StrAppend(&delta.message, " at ", Describe(plan_.map_T_other));
+    if (part_count_ == 1)
+      absl::StrAppend(&delta.message, " at ", Describe(plan_.map_T_other), Kept());
     delta.parent_revision = header_.parent_revision;
     delta.sequence = ++sequence_;
     // Only the first can know its parent; who commits sets those of the others.
@@ -142,6 +143,12 @@ class MergeDeltas::Impl {
   const MeshJoin& mesh() const { return mesh_; }
 
  private:
+  std::string Kept() const {
+    const int64_t count = plan_.counts.kept_count;
+    if (count == 0) return "";
+    return absl::StrCat("; nodes that were changed here since they were copied, and stay: ", count);
+  }
+
   absl::Status PrepareGraph() {
     for (const Sha256& sha256 : AssetsOf(plan_.graph)) DSG_RETURN_IF_ERROR(QueueAsset(sha256));
     if (!plan_.graph.empty()) {

@@ -6,7 +6,6 @@
 #include <set>
 #include <string>
 
-#include "schema/merge/origins.h"
 #include "schema/merge/point_grid.h"
 
 namespace dsg::merge {
@@ -47,8 +46,9 @@ Edge WithEnds(Edge edge, NodeId source, NodeId target) {
 class EdgeJoiner {
  public:
   EdgeJoiner(const MapContent& into, const std::vector<int>& pair_of,
-             const std::vector<NodeId>& id_of, const std::vector<EdgeKey>& replaced)
-      : pair_of_(pair_of), id_of_(id_of) {
+             const std::vector<NodeId>& id_of, const std::vector<EdgeKey>& replaced,
+             const std::set<EdgeKey>& written)
+      : pair_of_(pair_of), id_of_(id_of), written_(written) {
     for (const Edge& edge : into.edges) {
       if (std::binary_search(replaced.begin(), replaced.end(), edge.key())) continue;
       into_keys_.push_back(edge.key());
@@ -68,6 +68,8 @@ class EdgeJoiner {
     if (IsKnown(mine)) return;
     if (edge.relation == relations::kContains && HasParent(target)) return;
     if (IsSingle(edge.relation) && taken_.contains({mine.source, edge.relation})) return;
+    mine.attributes.erase(kEdgeFrom);
+    if (HangsOn(edge.relation)) mine.attributes[kEdgeFrom] = other.spec.name;
     added_.try_emplace(mine.key(), std::move(mine));
   }
 
@@ -79,7 +81,8 @@ class EdgeJoiner {
 
  private:
   bool Has(const EdgeKey& key) const {
-    return added_.contains(key) || std::binary_search(into_keys_.begin(), into_keys_.end(), key);
+    return added_.contains(key) || written_.contains(key) ||
+           std::binary_search(into_keys_.begin(), into_keys_.end(), key);
   }
 
   bool IsKnown(const Edge& edge) const {
@@ -95,6 +98,7 @@ class EdgeJoiner {
 
   const std::vector<int>& pair_of_;
   const std::vector<NodeId>& id_of_;
+  const std::set<EdgeKey>& written_;
   std::vector<EdgeKey> into_keys_;
   std::set<NodeId> has_parent_;
   std::set<std::pair<NodeId, std::string>> taken_;
@@ -122,7 +126,8 @@ std::set<int> JoinedPlaces(const MapContent& other, const std::vector<int>& pair
 }  // namespace
 
 std::vector<EdgeKey> ReplacedEdges(const MapContent& into, const MapContent& other,
-                                   const std::vector<NodeId>& id_of) {
+                                   const std::vector<NodeId>& id_of,
+                                   const std::vector<char>& is_copy) {
   const std::set<NodeId> images(id_of.begin(), id_of.end());
   // By node and relation: the other ends that the other map names.
   std::map<std::pair<NodeId, std::string>, std::set<NodeId>> wanted;
@@ -140,17 +145,19 @@ std::vector<EdgeKey> ReplacedEdges(const MapContent& into, const MapContent& oth
     const auto now = wanted.find({Hanging(edge), edge.relation});
     if (now == wanted.end() || now->second.contains(Holding(edge))) continue;
     const int node = into.IndexOf(Hanging(edge));
-    if (node < 0) continue;
-    const auto copy = CopiedFrom(into.nodes[static_cast<size_t>(node)]);
-    if (copy.has_value() && copy->map == other.spec.name) replaced.push_back(edge.key());
+    if (node < 0 || is_copy[static_cast<size_t>(node)] == 0) continue;
+    const auto from = edge.attributes.find(kEdgeFrom);
+    if (from == edge.attributes.end() || from->second != AttributeValue(other.spec.name)) continue;
+    replaced.push_back(edge.key());
   }
   return replaced;
 }
 
 std::vector<Edge> JoinEdges(const MapContent& into, const MapContent& other,
                             const std::vector<int>& pair_of, const std::vector<NodeId>& id_of,
-                            const std::vector<EdgeKey>& replaced) {
-  EdgeJoiner joiner(into, pair_of, id_of, replaced);
+                            const std::vector<EdgeKey>& replaced,
+                            const std::set<EdgeKey>& written) {
+  EdgeJoiner joiner(into, pair_of, id_of, replaced, written);
   for (const Edge& edge : other.edges) joiner.Add(other, edge);
   return std::move(joiner).Take();
 }

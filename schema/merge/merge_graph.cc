@@ -9,19 +9,16 @@
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/merge/fit_boxes.h"
+#include "schema/merge/free_number.h"
 #include "schema/merge/fuse.h"
 #include "schema/merge/merge_edges.h"
-#include "schema/merge/origins.h"
-#include "schema/merge/transform_node.h"
 #include "schema/model/delta_check.h"
 
 namespace dsg::merge {
 namespace {
 
-template <typename Key>
-Key FreshKey(const std::set<Key>& used) {
-  return used.empty() ? 1 : *used.rbegin() + 1;
-}
+// Agents keep so many revisions of their origin.
+constexpr size_t kRevisionsKept = 4;
 
 uint32_t InstanceOf(const Node& node) {
   if (node.object.has_value()) return node.object->mesh_instance_id;
@@ -37,9 +34,17 @@ void SetInstance(uint32_t instance, Node* node) {
 // Puts together what the map will hold, and at the end lists what differs from what it holds.
 class GraphBuilder {
  public:
-  GraphBuilder(const MapContent& into, const MapContent& other, const std::vector<int>& pair_of,
-               const UsedIds& used_ids, MergePlan* plan)
-      : into_(into), other_(other), pair_of_(pair_of), used_ids_(used_ids), plan_(*plan) {
+  GraphBuilder(const MapContent& into, const MapContent& other, const Findings& findings,
+               const MergeOptions& options, MergePlan* plan)
+      : into_(into),
+        other_(other),
+        pair_of_(findings.pair_of),
+        known_(findings.known),
+        tracks_(findings.tracks),
+        written_(options.written),
+        used_ids_(options.used_ids),
+        is_copy_(into.nodes.size(), 0),
+        plan_(*plan) {
     whole_.layers = into.layers;
     whole_.layers.insert(whole_.layers.end(), plan->graph.layers.begin(), plan->graph.layers.end());
     whole_.nodes = into.nodes;
@@ -47,73 +52,137 @@ class GraphBuilder {
       uint64_t& largest = used_ids_[node.id.letter()];
       largest = std::max(largest, node.id.index());
       if (IsAgentKind(node.kind)) agent_names_.insert(node.name);
-      instance_last_ = std::max(instance_last_, InstanceOf(node));
+      if (InstanceOf(node) != 0) instances_.insert(InstanceOf(node));
     }
   }
 
-  void Build(const SessionChanges& changes) {
-    AssignIds();
+  absl::Status Build(const SessionChanges& changes) {
+    DSG_RETURN_IF_ERROR(AssignIds());
     for (size_t i = 0; i < other_.nodes.size(); ++i) TakeNode(i);
     AddEdges();
     Close(changes);
     FitParents(whole_.layers, whole_.edges, &whole_.nodes);
+    MarkCopies();
     ListChanges();
+    return absl::OkStatus();
   }
 
  private:
-  void AssignIds() {
+  absl::Status AssignIds() {
     id_of_.resize(other_.nodes.size());
     for (size_t i = 0; i < other_.nodes.size(); ++i) {
       const int pair = pair_of_[i];
-      const char letter = other_.nodes[i].id.letter();
-      id_of_[i] = pair >= 0 ? into_.nodes[static_cast<size_t>(pair)].id : FreshId(letter);
+      if (pair >= 0) {
+        id_of_[i] = into_.nodes[static_cast<size_t>(pair)].id;
+      } else {
+        DSG_ASSIGN_OR_RETURN(id_of_[i], FreshId(other_.nodes[i].id));
+      }
       plan_.node_ids[other_.nodes[i].id] = id_of_[i];
     }
+    return absl::OkStatus();
   }
 
-  NodeId FreshId(char letter) {
+  absl::StatusOr<NodeId> FreshId(NodeId theirs) {
+    const char letter = theirs.letter();
     const auto [found, is_new] = used_ids_.try_emplace(letter, 0);
     // A letter that nobody has used may begin at 0, as those of the robots do.
     if (is_new) return NodeId(letter, found->second);
-    return NodeId(letter, ++found->second);
+    if (found->second < NodeId::kIndexMax) return NodeId(letter, ++found->second);
+    const std::string last = ToString(NodeId(letter, found->second));
+    return MakeError(Reason::kLimitExceeded,
+                     absl::StrCat("node ", ToString(theirs), " of map \"", plan_.other_name,
+                                  "\" cannot be added: map \"", plan_.into_name, "\" has used ",
+                                  last, ", and there is no id of that letter above it; merge \"",
+                                  plan_.into_name, "\" into a new map, which numbers anew"),
+                     {{"map", plan_.into_name}, {"id", last}});
   }
 
   void TakeNode(size_t i) {
     Node seen = other_.nodes[i];
-    const int pair = pair_of_[i];
-    TakeInstance(pair, &seen);
-    if (pair < 0) {
+    if (pair_of_[i] < 0) {
+      TakeInstance(-1, &seen);
       AddNode(i, std::move(seen));
       return;
     }
-    Node& known = whole_.nodes[static_cast<size_t>(pair)];
-    const auto copy = CopiedFrom(known);
-    if (copy.has_value() && copy->map == plan_.other_name && copy->id == seen.id) {
-      RefreshCopy(plan_.other_name, seen.id, seen, &known);
+    Node& known = whole_.nodes[static_cast<size_t>(pair_of_[i])];
+    const std::optional<Origin>& origin = known_.origin_of[i];
+    const bool is_copy = origin.has_value() && CopiedFrom(known).has_value();
+    if (is_copy) {
+      is_copy_[static_cast<size_t>(pair_of_[i])] = 1;
+    } else {
+      CountFused(known, seen);
+    }
+    if (Stays(i, known, is_copy)) {
+      KeepInstance(known, seen);
       return;
     }
-    CountFused(known, seen);
-    FuseNode(plan_.other_name, seen.id, seen, &known);
+    TakeInstance(pair_of_[i], &seen);
+    if (is_copy) {
+      RefreshCopy(OriginNow(i), seen, &known);
+      copies_.insert(static_cast<size_t>(pair_of_[i]));
+    } else {
+      FuseNode(plan_.into_name, OriginNow(i), origin.has_value(), seen, &known);
+    }
+  }
+
+  // Whether what is believed of the node here is not to be touched by what the other map says.
+  bool Stays(size_t i, const Node& known, bool is_copy) {
+    if (written_.nodes.contains(other_.nodes[i].id)) return true;
+    const std::optional<Origin>& origin = known_.origin_of[i];
+    const bool is_news = !origin.has_value() || origin->seen_mark != known_.mark_of[i];
+    // Here since it was changed by others, who know better than what was seen before them.
+    if (is_copy && !IsAsWritten(known, *origin)) {
+      if (is_news) ++plan_.counts.kept_count;
+      return true;
+    }
+    return !is_copy && !is_news;
+  }
+
+  // What is said of node `i` once it is taken.
+  Origin OriginNow(size_t i) const {
+    Origin origin;
+    origin.map = plan_.other_name;
+    origin.id = other_.nodes[i].id;
+    origin.seen_mark = known_.mark_of[i];
+    const std::optional<Origin>& before = known_.origin_of[i];
+    origin.is_copy = before.has_value() && before->is_copy;
+    const bool is_track_new = tracks_.changed.contains(static_cast<int>(i));
+    if (before.has_value() && before->seen_mark == origin.seen_mark && !is_track_new) {
+      origin.revisions = before->revisions;
+      return origin;
+    }
+    if (before.has_value() && IsAgentKind(other_.nodes[i].kind)) {
+      origin.revisions = before->revisions;
+      if (origin.revisions.size() >= kRevisionsKept) {
+        origin.revisions.erase(origin.revisions.begin());
+      }
+    }
+    if (origin.revisions.empty() || origin.revisions.back() != plan_.other_revision) {
+      origin.revisions.push_back(plan_.other_revision);
+    }
+    return origin;
   }
 
   void AddNode(size_t i, Node node) {
-    const NodeId origin = node.id;
+    Origin origin = OriginNow(i);
+    origin.is_copy = true;
+    origin.observation_count = OwnCount(node);
     node.id = id_of_[i];
     node.revision = 0;
     const std::vector<Origin> older = OriginsOf(node);
     node.attributes.erase(kMergedFrom);
     node.attributes.erase(kMergedCounts);
-    SetOrigin({plan_.other_name, origin, node.observation_count, true}, &node);
+    SetOrigin(std::move(origin), &node);
     // What the other map took from third ones is known to have come from there.
-    for (const Origin& each : older) {
-      if (each.map != plan_.into_name) {
-        SetOrigin({each.map, each.id, each.observation_count, false}, &node);
-      }
+    for (Origin each : older) {
+      each.is_copy = false;
+      if (each.map != plan_.into_name) SetOrigin(std::move(each), &node);
     }
     if (IsAgentKind(node.kind)) {
       if (agent_names_.contains(node.name)) absl::StrAppend(&node.name, "@", plan_.other_name);
       agent_names_.insert(node.name);
     }
+    copies_.insert(whole_.nodes.size());
     whole_.nodes.push_back(std::move(node));
     ++plan_.counts.added_node_count;
   }
@@ -123,9 +192,14 @@ class GraphBuilder {
     const uint32_t theirs = InstanceOf(*seen);
     if (theirs == 0) return;
     uint32_t mine = pair < 0 ? 0 : InstanceOf(into_.nodes[static_cast<size_t>(pair)]);
-    if (mine == 0) mine = ++instance_last_;
+    if (mine == 0) mine = *instances_.insert(FreeNumber(instances_)).first;
     plan_.instance_of[theirs] = mine;
     SetInstance(mine, seen);
+  }
+
+  void KeepInstance(const Node& known, const Node& seen) {
+    const uint32_t theirs = InstanceOf(seen);
+    if (theirs != 0 && InstanceOf(known) != 0) plan_.instance_of[theirs] = InstanceOf(known);
   }
 
   void CountFused(const Node& known, const Node& seen) {
@@ -150,9 +224,9 @@ class GraphBuilder {
   }
 
   void AddEdges() {
-    const std::vector<EdgeKey> replaced = ReplacedEdges(into_, other_, id_of_);
+    const std::vector<EdgeKey> replaced = ReplacedEdges(into_, other_, id_of_, is_copy_);
     plan_.graph.edge_removals = replaced;
-    plan_.graph.edges = JoinEdges(into_, other_, pair_of_, id_of_, replaced);
+    plan_.graph.edges = JoinEdges(into_, other_, pair_of_, id_of_, replaced, written_.edges);
     for (Edge& bridge : BridgePlaces(into_, other_, pair_of_, id_of_)) {
       plan_.graph.edges.push_back(std::move(bridge));
     }
@@ -183,6 +257,17 @@ class GraphBuilder {
     plan_.counts.moved_count = static_cast<int64_t>(plan_.moved.size());
   }
 
+  // Last of all, when nothing is changed in them any more.
+  void MarkCopies() {
+    for (const size_t i : copies_) {
+      Node& node = whole_.nodes[i];
+      std::optional<Origin> origin = CopiedFrom(node);
+      if (!origin.has_value()) continue;
+      origin->written_mark = MarkOf(node);
+      SetOrigin(*std::move(origin), &node);
+    }
+  }
+
   void ListChanges() {
     for (size_t i = 0; i < whole_.nodes.size(); ++i) {
       Node& node = whole_.nodes[i];
@@ -199,80 +284,27 @@ class GraphBuilder {
   const MapContent& into_;
   const MapContent& other_;
   const std::vector<int>& pair_of_;
+  const KnownPairs& known_;
+  const TrackHistory& tracks_;
+  const Written& written_;
   UsedIds used_ids_;
+  /// By node of `into`: copied from the other map whole.
+  std::vector<char> is_copy_;
   MergePlan& plan_;
   GraphDelta whole_;
   std::vector<NodeId> id_of_;
   std::set<std::string> agent_names_;
-  uint32_t instance_last_ = 0;
+  std::set<uint32_t> instances_;
+  /// In `whole_`: nodes that are, from now on, as this plan says.
+  std::set<size_t> copies_;
   double squared_sum_ = 0.0;
 };
 
 }  // namespace
 
-absl::StatusOr<Vocabulary> JoinVocabularies(const MapContent& into, const MapContent& other) {
-  Vocabulary vocabulary;
-  std::map<std::string, Layer> layer_by_name;
-  std::set<LayerId> layer_ids;
-  for (const Layer& layer : into.layers) {
-    layer_by_name[layer.name] = layer;
-    layer_ids.insert(layer.id);
-  }
-  for (Layer layer : other.layers) {
-    const auto known = layer_by_name.find(layer.name);
-    if (known != layer_by_name.end() && known->second.rank != layer.rank) {
-      return MakeError(
-          Reason::kFramesIncompatible,
-          absl::StrCat("layer \"", layer.name, "\" has rank ", known->second.rank, " in map \"",
-                       into.spec.name, "\" and ", layer.rank, " in \"", other.spec.name,
-                       "\"; maps are merged only when their layers mean the same"),
-          {{"layer", layer.name}});
-    }
-    LayerId& mine = vocabulary.layer_of[layer.id];
-    if (known != layer_by_name.end()) {
-      mine = known->second.id;
-      continue;
-    }
-    if (layer_ids.contains(layer.id)) layer.id = FreshKey(layer_ids);
-    layer_ids.insert(layer.id);
-    mine = layer.id;
-    vocabulary.new_layers.push_back(layer);
-  }
-  std::map<std::string, int32_t> class_by_name;
-  std::set<int32_t> class_ids;
-  for (const SemanticLabel& label : into.labels) {
-    class_by_name.try_emplace(label.name, label.id);
-    class_ids.insert(label.id);
-  }
-  for (SemanticLabel label : other.labels) {
-    const auto known = class_by_name.find(label.name);
-    if (known != class_by_name.end()) {
-      vocabulary.class_of[label.id] = known->second;
-      continue;
-    }
-    const int32_t theirs = label.id;
-    if (class_ids.contains(label.id)) label.id = FreshKey(class_ids);
-    class_ids.insert(label.id);
-    vocabulary.class_of[theirs] = label.id;
-    vocabulary.new_labels.push_back(label);
-  }
-  return vocabulary;
-}
-
-void Adopt(const Pose3d& map_T_other, const Vocabulary& vocabulary, MapContent* other) {
-  for (Node& node : other->nodes) {
-    TransformNode(map_T_other, &node);
-    node.layer = vocabulary.layer_of.at(node.layer);
-    const auto mine = vocabulary.class_of.find(node.class_id);
-    if (mine != vocabulary.class_of.end()) node.class_id = mine->second;
-  }
-  for (Layer& layer : other->layers) layer.id = vocabulary.layer_of.at(layer.id);
-  other->Index();
-}
-
-void BuildGraph(const MapContent& into, const MapContent& other, const std::vector<int>& pair_of,
-                const SessionChanges& changes, const UsedIds& used_ids, MergePlan* plan) {
-  GraphBuilder(into, other, pair_of, used_ids, plan).Build(changes);
+absl::Status BuildGraph(const MapContent& into, const MapContent& other, const Findings& findings,
+                        const MergeOptions& options, MergePlan* plan) {
+  return GraphBuilder(into, other, findings, options, plan).Build(findings.changes);
 }
 
 }  // namespace dsg::merge

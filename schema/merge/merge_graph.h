@@ -3,30 +3,26 @@
 // Refuses to decide who is who: pairs and changes are given.
 #pragma once
 
-#include <map>
-#include <string>
 #include <vector>
 
+#include "schema/merge/known_pairs.h"
 #include "schema/merge/merge.h"
+#include "schema/merge/track_history.h"
 
 namespace dsg::merge {
 
-/// Numbers of the other map's layers and classes here, with what is new.
-struct Vocabulary {
-  std::map<LayerId, LayerId> layer_of;
-  std::map<int32_t, int32_t> class_of;
-  std::vector<Layer> new_layers;
-  std::vector<SemanticLabel> new_labels;
+/// What has been found out about two maps. All refers to what outlives it.
+struct Findings {
+  /// By node of the other map: as MatchNodes.
+  const std::vector<int>& pair_of;
+  const KnownPairs& known;
+  const SessionChanges& changes;
+  const TrackHistory& tracks;
 };
 
-/// By name. Errors: FAILED_PRECONDITION/FRAMES_INCOMPATIBLE when a layer has two ranks.
-absl::StatusOr<Vocabulary> JoinVocabularies(const MapContent& into, const MapContent& other);
-
-/// Carries the content into the frame and the numbers of the other map.
-void Adopt(const Pose3d& map_T_other, const Vocabulary& vocabulary, MapContent* other);
-
 /// Fills ids, counts, gone, moved and graph of `plan`. `other` is adopted already.
-void BuildGraph(const MapContent& into, const MapContent& other, const std::vector<int>& pair_of,
-                const SessionChanges& changes, const UsedIds& used_ids, MergePlan* plan);
+/// Errors: RESOURCE_EXHAUSTED/LIMIT_EXCEEDED when there is no id above all that were used.
+absl::Status BuildGraph(const MapContent& into, const MapContent& other, const Findings& findings,
+                        const MergeOptions& options, MergePlan* plan);
 
 }  // namespace dsg::merge

@@ -46,13 +46,24 @@ absl::Status CheckNodes(const MapContent& theirs) {
   return absl::OkStatus();
 }
 
+absl::Status TooFarInTime(TimeNs time_ns, const MapSpec& into, const std::string& agent) {
+  return MakeError(
+      Reason::kTimeOutsideMap,
+      absl::StrCat("the track of ", agent, " has poses at ", time_ns,
+                   " ns, more than 6.8 years from the epoch ", into.epoch_ns, " ns of map \"",
+                   into.name, "\"; ingest the log of map \"", into.name,
+                   "\" again with an --epoch within 6.8 years of both, or mend the clock of the "
+                   "other log"),
+      {{"map", into.name}, {"time_ns", absl::StrCat(time_ns)}});
+}
+
 absl::Status CheckTrack(const MapSpec& into, const Snapshot& other, const TrackInfo& track,
                         const Pose3d& map_T_other, const StopCheck& stop) {
   const std::string what =
       absl::StrCat("agent ", ToString(track.agent), " of map \"", other.spec().name, "\"");
   if (track.pose_count > 0) {
     for (const TimeNs time_ns : {track.first_ns, track.last_ns}) {
-      DSG_RETURN_IF_ERROR(Annotate(CheckTimeInMap(time_ns, into), "the track of " + what));
+      if (!CheckTimeInMap(time_ns, into).ok()) return TooFarInTime(time_ns, into, what);
     }
   }
   absl::Status status;

@@ -144,7 +144,7 @@ KeepOperation Merge() {
   return {.name = "merge",
           .command =
               [](const KeepRig&, const std::string& place) {
-                return Dsg("merge", place, {KeepRig::kOther, "--transform", "200,0,0,0"});
+                return Dsg("merge", place, {KeepRig::kOther, "--transform", "200,0,0,0", "--yes"});
               },
           .violation =
               [](const Aftermath& after) {

@@ -10,6 +10,7 @@
 #include "dsg/v1/ingest_service.pb.h"
 #include "schema/codec/proto_convert.h"
 #include "tests/unit/query/engine/two_halves.h"
+#include "tests/unit/schema/merge/small_map.h"
 
 namespace dsg::query {
 namespace {
@@ -176,6 +177,169 @@ TEST(BusyMap, IsMergedByANewPlanWhenTheRobotWritesWhatTheOldOneChanges) {
   const auto west = test::Newest(store.get(), "west");
   EXPECT_EQ(west->GetNode(NodeId('O', largest + 1))->name, "thing");
   for (const std::string& id : ids) EXPECT_TRUE(west->ResolveNode(id).ok()) << id;
+}
+
+// A map "b" of so many chairs in a hall that a merge writes them in several parts, to be merged
+// into map "a", which has the hall (R1) and a closet (R2).
+class LargeMerge : public testing::Test {
+ protected:
+  LargeMerge() : core_(test::OpenCore(folder_.path())) {
+    const auto store = *GraphStore::Open(folder_.path(), {});
+    GraphDelta a;
+    a.nodes = {Room(1, 0.0), Room(2, 1000.0)};
+    test::StoreMap(store.get(), "a", std::move(a));
+    GraphDelta b;
+    b.nodes = {Room(5, 0.0), Room(6, 1000.0)};
+    for (int i = 0; i < 5000; ++i) {
+      b.nodes.push_back(test::MakeObject(i, "chair", {2.0 * (i % 70), 2.0 * (i / 70), 0.4}));
+      b.edges.push_back(test::MakeEdge(test::R(5), relations::kContains, test::O(i)));
+    }
+    test::StoreMap(store.get(), "b", std::move(b));
+    v1::MergeMapsRequest request;
+    request.set_map("a");
+    request.set_other("b");
+    ToProto(Pose3d(), request.mutable_map_t_other());
+    cursor_ = *core_->OpenMerge(request);
+  }
+
+  static Node Room(uint64_t index, double x) {
+    Node room = test::MakeRoom(index, {x, 0, 0}, {150, 150, 3});
+    room.box_node = Box3d(Eigen::Vector3d(-3000, -3000, -3), Eigen::Vector3d(3000, 3000, 9));
+    return room;
+  }
+
+  void Next() {
+    v1::MergeMapsResponse message;
+    const absl::Status status = cursor_->Next(CallContext(), &message);
+    ASSERT_TRUE(status.ok()) << status;
+  }
+  void ToTheEnd() {
+    while (!cursor_->done()) ASSERT_NO_FATAL_FAILURE(Next());
+    ExpectSound(folder_.path(), "a");
+  }
+  // The hall too, which the merge has still to write: it plans anew.
+  void CommitToA(GraphDelta delta) {
+    delta.nodes.push_back(Room(1, 0.0));
+    delta.nodes.back().name = "hall";
+    delta.map = "a";
+    delta.session_id = "robot";
+    delta.sequence = 1;
+    v1::CommitRequest request;
+    ToProto(delta, LayerTable(), request.mutable_delta());
+    v1::CommitResponse reply;
+    const absl::Status status = core_->Commit(CallContext(), request, &reply);
+    ASSERT_TRUE(status.ok()) << status;
+  }
+  std::shared_ptr<const Snapshot> Newest() {
+    return test::Newest(GraphStore::Open(folder_.path(), {})->get(), "a");
+  }
+  int64_t CountThings() {
+    int64_t count = 0;
+    EXPECT_TRUE(Newest()
+                    ->ReadAllNodes({}, [&](const Node& node) { count += node.id.letter() == 'O'; })
+                    .ok());
+    return count;
+  }
+
+  test::TempFolder folder_;
+  std::unique_ptr<ServiceCore> core_;
+  std::unique_ptr<MergeCursor> cursor_;
+};
+
+TEST_F(LargeMerge, LeavesWhatOthersWriteOfTheNodesThatItHasBrought) {
+  Next();
+  Next();
+  Node chair = *Newest()->GetNode(test::O(7));
+  chair.revision = 0;
+  chair.observation_count = 50;
+  chair.attributes["robot"] = std::string("saw it");
+  Node bare = *Newest()->GetNode(test::O(8));
+  bare.revision = 0;
+  bare.attributes.clear();
+  GraphDelta delta;
+  delta.nodes = {chair, bare};
+  CommitToA(std::move(delta));
+  ToTheEnd();
+  EXPECT_EQ(Newest()->GetNode(test::O(7))->observation_count, 50);
+  EXPECT_TRUE(Newest()->GetNode(test::O(7))->attributes.contains("robot"));
+  EXPECT_TRUE(Newest()->GetNode(test::O(8))->attributes.empty());
+  EXPECT_EQ(Newest()->GetNode(test::R(1))->name, "hall");
+  EXPECT_EQ(CountThings(), 5000);
+}
+
+TEST_F(LargeMerge, BringsNothingBackThatOthersRetireMeanwhile) {
+  Next();
+  Next();
+  GraphDelta delta;
+  delta.retirements = {{test::O(7), std::nullopt}};
+  CommitToA(std::move(delta));
+  ToTheEnd();
+  EXPECT_EQ(CountThings(), 4999);
+}
+
+TEST_F(LargeMerge, LeavesParentsThatOthersGiveMeanwhile) {
+  Next();
+  Next();
+  GraphDelta delta;
+  delta.edges = {test::MakeEdge(test::R(2), relations::kContains, test::O(7))};
+  CommitToA(std::move(delta));
+  ToTheEnd();
+  EXPECT_TRUE(Newest()->FindEdge({test::R(2), relations::kContains, test::O(7)})->has_value());
+  EXPECT_FALSE(Newest()->FindEdge({test::R(1), relations::kContains, test::O(7)})->has_value());
+  EXPECT_TRUE(Newest()->FindEdge({test::R(1), relations::kContains, test::O(8)})->has_value());
+}
+
+// 10,000 vertices and 19,602 faces.
+MeshBlock Floor(int x) {
+  constexpr uint32_t kSide = 100;
+  MeshBlock block;
+  block.index = {x, 0, 0};
+  for (uint32_t j = 0; j < kSide; ++j) {
+    for (uint32_t i = 0; i < kSide; ++i) {
+      block.positions_map.push_back(
+          Eigen::Vector3d(2.0 * x + 0.01 + 0.02 * i, 0.01 + 0.02 * j, 1.0).cast<float>());
+    }
+  }
+  for (uint32_t j = 0; j + 1 < kSide; ++j) {
+    for (uint32_t i = 0; i + 1 < kSide; ++i) {
+      const uint32_t k = j * kSide + i;
+      block.faces.push_back({k, k + 1, k + kSide});
+      block.faces.push_back({k + 1, k + kSide + 1, k + kSide});
+    }
+  }
+  return block;
+}
+
+TEST(BusyMap, IsMergedTwiceAtOnceAndHasAllOfTheMeshWhenOneOfThemIsCancelled) {
+  constexpr int kBlockCount = 16;
+  test::TempFolder folder;
+  const auto store = *GraphStore::Open(folder.path(), {});
+  GraphDelta a;
+  a.nodes = {test::MakeObject(1, "chair", {500, 500, 0})};
+  test::StoreMap(store.get(), "a", std::move(a));
+  GraphDelta b;
+  for (int x = 0; x < kBlockCount; ++x) b.mesh_blocks.push_back(Floor(x));
+  test::StoreMap(store.get(), "b", std::move(b));
+  const auto core = test::OpenCore(folder.path());
+  v1::MergeMapsRequest request;
+  request.set_map("a");
+  request.set_other("b");
+  ToProto(Pose3d(), request.mutable_map_t_other());
+  auto one = *core->OpenMerge(request);
+  const auto two = *core->OpenMerge(request);
+  v1::MergeMapsResponse message;
+  ASSERT_TRUE(one->Next(CallContext(), &message).ok());
+  ASSERT_TRUE(two->Next(CallContext(), &message).ok());
+  ASSERT_TRUE(one->Next(CallContext(), &message).ok());
+  one.reset();
+  while (!two->done()) {
+    const absl::Status status = two->Next(CallContext(), &message);
+    ASSERT_TRUE(status.ok()) << status;
+  }
+  const auto merged = test::Newest(store.get(), "a");
+  EXPECT_EQ(merged->MeshBlocks()->size(), static_cast<size_t>(kBlockCount));
+  EXPECT_EQ(merged->ReadMeshBlock({kBlockCount - 1, 0, 0})->faces.size(), 19'602u);
+  ExpectSound(folder.path(), "a");
 }
 
 TEST(BusyMap, IsRevertedAndKeepsWhatTheRobotWritesAfterwards) {

@@ -4,8 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 
+#include "absl/strings/str_cat.h"
 #include "dsg/v1/maintenance_service.pb.h"
 #include "query/cli/render_merge.h"
 #include "schema/base/status.h"
@@ -92,6 +94,7 @@ TEST(MergeVerb, TellsInATableAndDrawsBoth) {
   EXPECT_EQ(
       halves.Run({"merge", "--map", "west", "east", "--dry-run", "--png", png}, &out, &errors), 0)
       << errors;
+  EXPECT_NE(out.find("nodes of east"), std::string::npos) << out;
   EXPECT_NE(out.find("objects in both"), std::string::npos) << out;
   EXPECT_NE(out.find("nothing was written"), std::string::npos) << out;
   EXPECT_GT(std::filesystem::file_size(png), 1000u);
@@ -119,20 +122,58 @@ TEST(MergeVerb, WarnsWhenNothingAgreesWithTheTransform) {
   EXPECT_NE(out.find("merge of east revision 1, part 1 at "), std::string::npos) << out;
 }
 
+TEST(MergeVerb, WritesNothingWithoutAWordWhenLittleSpeaksForTheTransform) {
+  TwoHalves halves;
+  std::string out;
+  std::string errors;
+  // A few metres beside the truth: here and there two chairs meet.
+  const Pose3d& truth = halves.truth();
+  const Eigen::Vector3d x = truth.orientation * Eigen::Vector3d::UnitX();
+  const std::string beside = absl::StrCat(truth.position.x() + 5.0, ",", truth.position.y() + 5.0,
+                                          ",", truth.position.z(), ",", std::atan2(x.y(), x.x()));
+  const std::vector<std::string> merge = {"merge", "--map", "west", "east", "--transform", beside};
+  EXPECT_NE(halves.Run(merge, &out, &errors), 0);
+  EXPECT_NE(errors.find("refused without --yes"), std::string::npos) << errors;
+  EXPECT_EQ(out, "");
+  EXPECT_EQ(test::Newest(GraphStore::Open(halves.folder(), {})->get(), "west")->revision(), 1);
+  std::vector<std::string> meant = merge;
+  meant.push_back("--yes");
+  EXPECT_EQ(halves.Run(meant, &out, &errors), 0) << errors;
+  EXPECT_NE(errors.find("warning: "), std::string::npos) << errors;
+  EXPECT_NE(out.find("\nrevision "), std::string::npos) << out;
+}
+
+TEST(MergeVerb, MeasuresWhatAgreesAgainstWhatIsMissing) {
+  v1::MergeMapsResponse reply;
+  reply.set_agreeing_count(20);
+  reply.set_added_node_count(9);
+  reply.set_missing_count(100);
+  const cli::MergeAsked asked{.map = "a", .other = "b", .has_transform = true};
+  EXPECT_EQ(cli::DoubtsOf(reply, asked), "");
+  reply.set_missing_count(200);
+  EXPECT_NE(cli::DoubtsOf(reply, asked).find("20 things of both maps agree, and 200 are missing"),
+            std::string::npos);
+  reply.set_missing_count(0);
+  reply.set_blocked_share(0.3);
+  EXPECT_NE(cli::DoubtsOf(reply, asked).find("30 % stand in them"), std::string::npos);
+  // Nothing new, so nothing is there twice afterwards.
+  reply.set_added_node_count(0);
+  EXPECT_EQ(cli::DoubtsOf(reply, asked), "");
+}
+
 TEST(MergeVerb, WarnsWhenAnEstimateRestsOnFewThings) {
   v1::MergeMapsResponse reply;
   reply.set_agreeing_count(4);
   reply.set_fused_object_count(4);
   reply.set_added_node_count(9);
-  EXPECT_NE(cli::RenderMerge(reply, {.map = "a", .other = "b"})
-                .find("warning: the transform rests "
-                      "on 4 things only"),
+  cli::MergeAsked asked{.map = "a", .other = "b", .is_dry_run = true};
+  EXPECT_NE(cli::RenderMerge(reply, asked).find("warning: the transform rests on 4 things only"),
             std::string::npos);
-  EXPECT_EQ(
-      cli::RenderMerge(reply, {.map = "a", .other = "b", .has_transform = true}).find("warning"),
-      std::string::npos);
+  asked.has_transform = true;
+  EXPECT_EQ(cli::RenderMerge(reply, asked).find("warning"), std::string::npos);
+  asked.has_transform = false;
   reply.set_agreeing_count(8);
-  EXPECT_EQ(cli::RenderMerge(reply, {.map = "a", .other = "b"}).find("warning"), std::string::npos);
+  EXPECT_EQ(cli::RenderMerge(reply, asked).find("warning"), std::string::npos);
 }
 
 TEST(MergeVerb, TakesATransformOfFourOrSevenNumbersAndNoOther) {

@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
+#include "absl/strings/str_cat.h"
+#include "ingest/simulator/world/world_graph.h"
 #include "schema/base/random.h"
 #include "schema/base/status.h"
 #include "schema/merge/refine.h"
@@ -20,6 +24,11 @@ MapContent ContentOf(std::vector<Node> nodes) {
   content.nodes = std::move(nodes);
   content.Index();
   return content;
+}
+
+std::vector<Node> Sorted(std::vector<Node> nodes) {
+  std::sort(nodes.begin(), nodes.end(), [](const Node& a, const Node& b) { return a.id < b.id; });
+  return nodes;
 }
 
 MapContent Moved(MapContent content, const Pose3d& transform) {
@@ -109,6 +118,66 @@ TEST(Align, SaysThatStrangersDoNotFit) {
                                          ContentOf(ScatteredThings(100 + seed, 25)), {}, {});
     EXPECT_EQ(ReasonOf(found.status()), Reason::kNoRegistration) << found.status();
   }
+}
+
+TEST(Align, SaysThatBuildingsOfOneStyleAreNotOneBuilding) {
+  using simulator::WorldKind;
+  struct Strangers {
+    WorldKind into;
+    uint64_t into_seed;
+    WorldKind other;
+    uint64_t other_seed;
+  };
+  // Kitchens and bathrooms are furnished alike, so that ten things and more agree.
+  const Strangers kStrangers[] = {{WorldKind::kApartment, 5, WorldKind::kApartment, 1},
+                                  {WorldKind::kApartment, 2, WorldKind::kApartment, 1},
+                                  {WorldKind::kWing, 1, WorldKind::kApartment, 1},
+                                  {WorldKind::kWing, 3, WorldKind::kApartment, 2},
+                                  {WorldKind::kOffice, 3, WorldKind::kApartment, 5},
+                                  {WorldKind::kWing, 2, WorldKind::kWing, 1}};
+  for (const Strangers& pair : kStrangers) {
+    SCOPED_TRACE(absl::StrCat("seeds ", pair.into_seed, " and ", pair.other_seed));
+    const auto into = simulator::WorldGraph(test::MakeWorld(pair.into, pair.into_seed));
+    const auto other = simulator::WorldGraph(test::MakeWorld(pair.other, pair.other_seed));
+    const auto found =
+        EstimateTransform(ContentOf(Sorted(into.nodes)), ContentOf(Sorted(other.nodes)), {}, {});
+    EXPECT_EQ(ReasonOf(found.status()), Reason::kNoRegistration) << found.status();
+  }
+}
+
+TEST(Align, FindsAnApartmentWhoseHalvesShareAFewThings) {
+  for (uint64_t seed = 1; seed <= 4; ++seed) {
+    SCOPED_TRACE(seed);
+    const auto world = test::MakeWorld(simulator::WorldKind::kApartment, seed);
+    test::PerceiveOptions west;
+    west.to = 0.7;
+    west.seed = 1000 + seed;
+    test::PerceiveOptions east;
+    east.from = 0.3;
+    east.seed = 2000 + seed;
+    east.map_T_world = test::SomeTransform(seed);
+    const auto found =
+        EstimateTransform(ContentOf(Sorted(test::Perceive(world, west).delta.nodes)),
+                          ContentOf(Sorted(test::Perceive(world, east).delta.nodes)), {}, {});
+    ASSERT_TRUE(found.ok()) << found.status();
+    const Pose3d error = found->map_T_other * east.map_T_world;
+    const Eigen::Vector3d middle(6, 5, 1);
+    EXPECT_LT((error * middle - middle).norm(), 0.15);
+  }
+}
+
+TEST(Align, TellsWhatSpeaksForATransformAndWhatAgainst) {
+  const auto graph = simulator::WorldGraph(test::MakeWorld(simulator::WorldKind::kWing, 1));
+  const MapContent wing = ContentOf(Sorted(graph.nodes));
+  const Evidence right = EvidenceFor(wing, wing, Pose3d(), {});
+  EXPECT_GT(right.agreeing_count, 150);
+  EXPECT_EQ(right.missing_count, 0);
+  EXPECT_LT(right.blocked_share, 0.01);
+  const Pose3d beside{{5, 5, 0}, Eigen::Quaterniond::Identity()};
+  const Evidence wrong = EvidenceFor(wing, wing, beside, {});
+  EXPECT_LT(wrong.agreeing_count, 20);
+  EXPECT_GT(wrong.missing_count, 100);
+  EXPECT_GT(wrong.blocked_share, 0.1);
 }
 
 TEST(Align, SaysThatTooFewThingsAgree) {

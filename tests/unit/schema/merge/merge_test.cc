@@ -222,6 +222,27 @@ TEST(Merge, KeepsAgentsOfOneNameApartUnlessOneIsLaterAndHasAGivenName) {
   EXPECT_EQ(maps.Problems("a"), std::vector<std::string>());
 }
 
+TEST(Merge, PutsAnAgentWhereItsLaterTrackEnds) {
+  const auto session = [](TimeNs from_ns, double x) {
+    GraphDelta delta;
+    Node robot = MakeAgent(NodeId('r', 0), "spot");
+    robot.map_T_node.position = {x, 0, 0};
+    robot.last_observed_ns = from_ns + 4 * kNsPerSecond;
+    delta.nodes = {robot};
+    delta.appends = {MakeTrack(NodeId('r', 0), from_ns, 5)};
+    return delta;
+  };
+  for (const bool is_later : {true, false}) {
+    SmallMaps maps;
+    maps.Commit("a", session(is_later ? 0 : 100 * kNsPerSecond, 3.0));
+    maps.Commit("b", session(is_later ? 100 * kNsPerSecond : 0, 7.0));
+    maps.Merge("a", "b", Pose3d{{0, 1, 0}, Eigen::Quaterniond::Identity()});
+    const Node robot = maps.Get("a", NodeId('r', 0));
+    const Eigen::Vector3d expected = is_later ? Eigen::Vector3d(7, 1, 0) : Eigen::Vector3d(3, 0, 0);
+    EXPECT_LT((robot.map_T_node.position - expected).norm(), 1e-9) << is_later;
+  }
+}
+
 TEST(Merge, CarriesTracksIntoTheFrameOfTheMap) {
   SmallMaps maps;
   maps.Commit("a", Home());
@@ -295,6 +316,8 @@ TEST(Merge, CarriesCorrectionsOfATrackThatItCopied) {
   GraphDelta forgotten;
   forgotten.corrections = {{kAnna, 2 * kNsPerSecond, 7 * kNsPerSecond, {}}};
   maps.Commit("b", std::move(forgotten));
+  // The agent notes the revision that it was compared with.
+  EXPECT_EQ(maps.Write("a", "b", *maps.Plan("a", "b")), 1);
   EXPECT_EQ(maps.Write("a", "b", *maps.Plan("a", "b")), 0);
   EXPECT_EQ(TrackOf(&maps, "a", mine).size(), 14u);
   EXPECT_TRUE(maps.Problems("a").empty());
@@ -400,6 +423,7 @@ TEST(Merge, RefusesTracksThatLeadBeyondTheCoordinatesOrTheTimesOfAMap) {
   const absl::Status late_refused = maps.Plan("a", "late").status();
   EXPECT_EQ(ReasonOf(late_refused), Reason::kTimeOutsideMap) << late_refused;
   EXPECT_NE(std::string(late_refused.message()).find("H1"), std::string::npos) << late_refused;
+  EXPECT_NE(late_refused.message().find("--epoch"), absl::string_view::npos) << late_refused;
 }
 
 TEST(Merge, RefusesNodesThatTheMapCouldNotHold) {

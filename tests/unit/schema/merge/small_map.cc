@@ -111,7 +111,10 @@ absl::StatusOr<merge::MergePlan> SmallMaps::Plan(const std::string& into, const 
                                                  const Pose3d& map_T_other,
                                                  merge::MergeOptions options) {
   auto map = *store_->OpenMap(into);
+  auto other_map = *store_->OpenMap(other);
   options.used_ids = *merge::FindUsedIds(map.get(), {});
+  options.into_map = map.get();
+  options.other_map = other_map.get();
   return merge::PlanMerge(*Newest(into), *Newest(other), map_T_other, options, {});
 }
 
