@@ -2,6 +2,7 @@
 #include "ingest/pipeline/delta_sink.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -13,6 +14,8 @@ namespace dsg::ingest {
 namespace {
 
 constexpr int kCommitTriesMax = 3;
+// Each names hundreds of nodes that the map has forgotten; they can be forgotten while we mend.
+constexpr int kMendTriesMax = 100;
 
 int64_t PoseCount(const GraphDelta& delta) {
   int64_t count = 0;
@@ -67,9 +70,14 @@ absl::Status DeltaSink::PutPart(GraphDelta delta) {
   ++sequence_;
   if (sequence_ <= last_sequence_) {
     reconciler_.ObserveCommitted(delta);
+    forgotten_.ObserveCommitted(delta);
     counts_.skipped_pose_count += PoseCount(delta);
     committed_sequence_ = sequence_;
     return absl::OkStatus();
+  }
+  forgotten_.Observe(delta);
+  for (const Node& node : delta.nodes) {
+    if (forgotten_.HasReturned(node.id)) reconciler_.ForgetNode(node.id);
   }
   DSG_RETURN_IF_ERROR(reconciler_.Reconcile(&delta));
   return CommitNext(std::move(delta));
@@ -77,13 +85,18 @@ absl::Status DeltaSink::PutPart(GraphDelta delta) {
 
 absl::Status DeltaSink::PutPartAsIs(GraphDelta delta) {
   ++sequence_;
-  if (sequence_ > last_sequence_) return CommitNext(std::move(delta));
+  if (sequence_ > last_sequence_) {
+    forgotten_.Observe(delta);
+    return CommitNext(std::move(delta));
+  }
   reconciler_.ObserveCommitted(delta);
+  forgotten_.ObserveCommitted(delta);
   committed_sequence_ = sequence_;
   return absl::OkStatus();
 }
 
 absl::Status DeltaSink::CommitNext(GraphDelta delta) {
+  DSG_RETURN_IF_ERROR(forgotten_.LeaveOut(&delta));
   if (delta.empty()) return absl::OkStatus();
   // Sequences have no holes, or a resumed run could not count its way back to here: deltas
   // without news are committed empty once there is news after them.
@@ -108,20 +121,34 @@ void DeltaSink::FillHeader(int64_t sequence, GraphDelta* delta) const {
 
 absl::Status DeltaSink::Commit(GraphDelta delta) {
   committed_sequence_ = delta.sequence;
-  ++counts_.revision_count;
-  for (const Node& node : delta.nodes) nodes_.insert(node.id);
-  counts_.edge_count += static_cast<int64_t>(delta.edges.size());
-  for (const Stay& stay : delta.stays) stays_.insert({stay.agent, stay.enter_ns});
-  counts_.pose_count += PoseCount(delta);
+  absl::StatusOr<CommitResult> result = Send(delta);
+  for (int tries = 0; tries < kMendTriesMax && !result.ok(); ++tries) {
+    if (!forgotten_.Mend(result.status(), &delta)) break;
+    result = Send(delta);
+  }
+  Count(delta);
+  if (!result.ok()) return Annotate(result.status(), delta.message);
+  forgotten_.ObserveTaken(delta);
+  counts_.last_revision = result->revision;
+  return absl::OkStatus();
+}
+
+absl::StatusOr<CommitResult> DeltaSink::Send(const GraphDelta& delta) {
   absl::StatusOr<CommitResult> result;
   for (int tries = 0; tries < kCommitTriesMax; ++tries) {
     result = writer_.Commit(delta);
     // The same session and sequence again settles what became of it.
     if (ReasonOf(result.status()) != Reason::kCommitOutcomeUnknown) break;
   }
-  if (!result.ok()) return Annotate(result.status(), delta.message);
-  counts_.last_revision = result->revision;
-  return absl::OkStatus();
+  return result;
+}
+
+void DeltaSink::Count(const GraphDelta& delta) {
+  ++counts_.revision_count;
+  for (const Node& node : delta.nodes) nodes_.insert(node.id);
+  counts_.edge_count += std::ssize(delta.edges);
+  for (const Stay& stay : delta.stays) stays_.insert({stay.agent, stay.enter_ns});
+  counts_.pose_count += PoseCount(delta);
 }
 
 CommitCounts DeltaSink::counts() const {

@@ -8,6 +8,7 @@
 #include <unordered_set>
 #include <utility>
 
+#include "ingest/pipeline/forgotten.h"
 #include "ingest/pipeline/map_view.h"
 #include "ingest/pipeline/reconciler.h"
 #include "schema/store/graph_writer.h"
@@ -48,6 +49,7 @@ class DeltaSink {
         last_sequence_(last_sequence),
         is_size_bounded_(is_size_bounded),
         reconciler_(map),
+        forgotten_(map),
         writer_(writer) {}
 
   /// Takes the next delta of the log, whatever its size. An empty one is passed over.
@@ -71,6 +73,8 @@ class DeltaSink {
   absl::Status CommitNext(GraphDelta delta);
   void FillHeader(int64_t sequence, GraphDelta* delta) const;
   absl::Status Commit(GraphDelta delta);
+  absl::StatusOr<CommitResult> Send(const GraphDelta& delta);
+  void Count(const GraphDelta& delta);
 
   SessionHeader header_;
   int64_t last_sequence_;
@@ -80,6 +84,7 @@ class DeltaSink {
   /// Of the delta that the writer got last.
   int64_t committed_sequence_ = 0;
   Reconciler reconciler_;
+  Forgotten forgotten_;
   GraphWriter& writer_;
   CommitCounts counts_;
   std::unordered_set<NodeId> nodes_;

@@ -169,10 +169,12 @@ absl::Status LogRun::TakeTimedPose(NodeId agent, const PoseMeasurement& pose) {
 absl::StatusOr<bool> LogRun::IsToldBefore(NodeId agent, TimeNs time_ns) {
   const auto [told_until, is_new] = told_until_ns_.try_emplace(agent, kTimeMin);
   if (is_new) {
-    DSG_ASSIGN_OR_RETURN(const std::optional<TrackInfo> track,
-                         first_revision_ == 0 ? map_.FindTrack(agent)
-                                              : map_.FindTrackAt(agent, first_revision_ - 1));
-    if (track.has_value()) told_until->second = track->last_ns;
+    absl::StatusOr<std::optional<TrackInfo>> track =
+        first_revision_ == 0 ? map_.FindTrack(agent) : map_.FindTrackAt(agent, first_revision_ - 1);
+    // Nobody knows any more; most agents are new to the map.
+    if (ReasonOf(track.status()) == Reason::kRevisionCompacted) track = std::nullopt;
+    if (!track.ok()) return track.status();
+    if (track->has_value()) told_until->second = (*track)->last_ns;
   }
   return time_ns <= told_until->second;
 }

@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -42,6 +43,10 @@ class MapView {
   /// Stored poses with from_ns <= time < to_ns, ascending.
   virtual absl::StatusOr<std::vector<TimedPose>> ReadPoses(NodeId agent, TimeNs from_ns,
                                                            TimeNs to_ns) const = 0;
+  /// As FindTrack, but of the map as it is by now.
+  virtual absl::StatusOr<std::optional<TrackInfo>> FindTrackNow(NodeId agent) const = 0;
+  /// Agents of the map as it is by now.
+  virtual absl::StatusOr<std::set<NodeId>> AgentsNow() const = 0;
   /// The stored stay that holds an instant; nullopt also when the map cannot be asked for it.
   virtual absl::StatusOr<std::optional<Stay>> StayAt(NodeId agent, TimeNs at_ns) const = 0;
 };

@@ -72,6 +72,11 @@ void Reconciler::ObserveCommitted(const GraphDelta& delta) {
   }
 }
 
+void Reconciler::ForgetNode(NodeId agent) {
+  const auto known = known_.find(agent);
+  if (known != known_.end()) known->second.node.reset();
+}
+
 absl::Status Reconciler::CountNews(const std::vector<GraphDelta>& parts) {
   for (const GraphDelta& part : parts) {
     for (const TrajectoryAppend& append : part.appends) {
@@ -193,15 +198,30 @@ absl::Status Reconciler::CompareStored(const TrackInfo& track,
   DSG_ASSIGN_OR_RETURN(const std::vector<TimedPose> stored,
                        map_.ReadPoses(track.agent, log.front().time_ns, log.back().time_ns + 1));
   size_t next = 0;
+  // Asked for only where a pose is missing.
+  std::optional<TimeNs> kept_from_ns;
   for (const TimedPose& pose : log) {
     while (next < stored.size() && stored[next].time_ns < pose.time_ns) ++next;
     const bool is_there = next < stored.size() && stored[next].time_ns == pose.time_ns;
-    if (!is_there) return Conflict(track, pose, nullptr);
+    if (!is_there) {
+      if (!kept_from_ns.has_value()) {
+        DSG_ASSIGN_OR_RETURN(kept_from_ns, KeptFrom(track.agent));
+      }
+      // Forgotten while the log is read.
+      if (track.first_ns <= pose.time_ns && pose.time_ns < *kept_from_ns) continue;
+      return Conflict(track, pose, nullptr);
+    }
     if (!SaysTheSame(stored[next], pose, map_.spec().codec)) {
       return Conflict(track, pose, &stored[next]);
     }
   }
   return absl::OkStatus();
+}
+
+// Where a track begins by now that began earlier when the log did.
+absl::StatusOr<TimeNs> Reconciler::KeptFrom(NodeId agent) const {
+  DSG_ASSIGN_OR_RETURN(const std::optional<TrackInfo> now, map_.FindTrackNow(agent));
+  return now.has_value() ? now->first_ns : kTimeMax;
 }
 
 absl::Status Reconciler::ReconcileStays(GraphDelta* delta) {

@@ -25,6 +25,9 @@ class Reconciler {
   /// Takes note of a delta that this session has committed in an earlier run.
   void ObserveCommitted(const GraphDelta& delta);
 
+  /// What the map knew of the node of an agent when the log began counts no more.
+  void ForgetNode(NodeId agent);
+
   /// Counts the new poses of a delta that is about to be reconciled, in parts.
   absl::Status CountNews(const std::vector<GraphDelta>& parts);
 
@@ -59,6 +62,7 @@ class Reconciler {
   absl::Status ReconcileEdges(GraphDelta* delta);
   absl::Status ReconcileAppends(GraphDelta* delta);
   absl::Status CompareStored(const TrackInfo& track, const std::vector<TimedPose>& log) const;
+  absl::StatusOr<TimeNs> KeptFrom(NodeId agent) const;
   absl::Status ReconcileStays(GraphDelta* delta);
   absl::StatusOr<bool> IsInAnotherRoom(const Stay& stay, const Known& known) const;
   void ReconcileStay(const Stay& stay, Known* known, std::vector<Stay>* news);

@@ -57,6 +57,17 @@ class RemoteMapView : public MapView {
     return map_.FindTrack(agent, revision);
   }
 
+  absl::StatusOr<std::optional<TrackInfo>> FindTrackNow(NodeId agent) const override {
+    return map_.FindTrack(agent, std::nullopt);
+  }
+
+  absl::StatusOr<std::set<NodeId>> AgentsNow() const override {
+    DSG_ASSIGN_OR_RETURN(const std::vector<Node> nodes, map_.ListAgents());
+    std::set<NodeId> agents;
+    for (const Node& node : nodes) agents.insert(node.id);
+    return agents;
+  }
+
   absl::StatusOr<std::vector<TimedPose>> ReadPoses(NodeId agent, TimeNs from_ns,
                                                    TimeNs to_ns) const override {
     return map_.ReadPoses(agent, from_ns, to_ns);

@@ -74,6 +74,23 @@ class SnapshotMapView : public MapView {
     return TrackIn(*then, agent);
   }
 
+  absl::StatusOr<std::optional<TrackInfo>> FindTrackNow(NodeId agent) const override {
+    DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> now, map_->Latest());
+    return TrackIn(*now, agent);
+  }
+
+  absl::StatusOr<std::set<NodeId>> AgentsNow() const override {
+    DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> now, map_->Latest());
+    std::set<NodeId> agents;
+    NodeFilter filter;
+    filter.layer = layers::kAgents;
+    DSG_RETURN_IF_ERROR(now->ScanNodes(filter, NodeId(), {}, [&agents](const Node& node) {
+      agents.insert(node.id);
+      return true;
+    }));
+    return agents;
+  }
+
   absl::StatusOr<std::vector<TimedPose>> ReadPoses(NodeId agent, TimeNs from_ns,
                                                    TimeNs to_ns) const override {
     std::vector<TimedPose> poses;

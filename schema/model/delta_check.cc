@@ -15,8 +15,12 @@
 namespace dsg {
 namespace {
 
-absl::Status Invalid(std::string_view what) {
-  return MakeError(Reason::kDeltaInvalid, absl::StrCat("delta refused: ", std::string(what)));
+// Ids that an error names, so that it fits into the trailer of a call.
+constexpr size_t kMissingNodeCountMax = 200;
+
+absl::Status Invalid(std::string_view what, ErrorMetadata metadata = {}) {
+  return MakeError(Reason::kDeltaInvalid, absl::StrCat("delta refused: ", std::string(what)),
+                   std::move(metadata));
 }
 
 absl::Status NotFinite(std::string_view what) {
@@ -294,7 +298,10 @@ class DeltaChecker {
                                       [&](const Node& node) { return node.id == item.id; });
     if (upserted) return Invalid(what + " is both written and retired");
     DSG_ASSIGN_OR_RETURN(const auto facts, Find(item.id));
-    if (!facts.has_value()) return Invalid(what + " is to be retired but does not exist");
+    if (!facts.has_value()) {
+      DSG_ASSIGN_OR_RETURN(ErrorMetadata missing, Missing());
+      return Invalid(what + " is to be retired but does not exist", std::move(missing));
+    }
     if (item.valid_to_ns.has_value() && *item.valid_to_ns <= facts->valid.from_ns) {
       return Invalid(absl::StrCat(what, " cannot leave the world at ", *item.valid_to_ns,
                                   ": it came at ", facts->valid.from_ns));
@@ -306,10 +313,39 @@ class DeltaChecker {
   absl::StatusOr<Facts> FindEnd(NodeId id, const std::string& what) {
     DSG_ASSIGN_OR_RETURN(const auto facts, Find(id));
     if (!facts.has_value() || gone_.contains(id)) {
-      return Invalid(
-          absl::StrCat(what, " refers to node ", ToString(id), ", which does not exist"));
+      DSG_ASSIGN_OR_RETURN(ErrorMetadata missing, Missing());
+      return Invalid(absl::StrCat(what, " refers to node ", ToString(id), ", which does not exist"),
+                     std::move(missing));
     }
     return *facts;
+  }
+
+  // All nodes that the delta refers to and that do not exist: who sent it can leave them out, or
+  // bring them, at one go.
+  absl::StatusOr<ErrorMetadata> Missing() {
+    std::set<NodeId> named;
+    for (const Retirement& item : delta_.retirements) named.insert(item.id);
+    for (const Edge& edge : delta_.edges) named.insert({edge.source, edge.target});
+    for (const TrajectoryAppend& item : delta_.appends) named.insert(item.agent);
+    for (const TrajectoryCorrection& item : delta_.corrections) named.insert(item.agent);
+    for (const TrackSpan& span : delta_.factor_removals) named.insert(span.agent);
+    for (const TrackSpan& span : delta_.shape_removals) named.insert(span.agent);
+    for (const FactorAppend& item : delta_.factors) {
+      named.insert(item.agent);
+      for (const PoseFactor& factor : item.factors) named.insert(factor.to_agent);
+    }
+    for (const ShapeAppend& item : delta_.shapes) named.insert(item.agent);
+    for (const Stay& stay : delta_.stays) named.insert({stay.agent, stay.place, stay.room});
+    std::string text;
+    size_t count = 0;
+    for (const NodeId id : named) {
+      if (id.empty() || count == kMissingNodeCountMax) continue;
+      DSG_ASSIGN_OR_RETURN(const auto facts, Find(id));
+      if (facts.has_value()) continue;
+      absl::StrAppend(&text, count == 0 ? "" : " ", ToString(id));
+      ++count;
+    }
+    return text.empty() ? ErrorMetadata() : ErrorMetadata{{"missing_nodes", text}};
   }
 
   absl::Status CheckEdge(const Edge& edge) {
@@ -431,12 +467,16 @@ class DeltaChecker {
     DSG_RETURN_IF_ERROR(CheckInterval({item.from_ns, item.to_ns}, what));
     DSG_RETURN_IF_ERROR(CheckPoses(item.poses, what));
     DSG_ASSIGN_OR_RETURN(const auto end_ns, graph_.FindTrackEnd(item.agent));
-    if (!end_ns.has_value()) return Invalid(what + ": the agent has no poses to correct");
+    if (!end_ns.has_value()) {
+      return Invalid(what + ": the agent has no poses to correct",
+                     {{"correction_of", ToString(item.agent)}});
+    }
     for (const TimedPose& pose : item.poses) {
       if (pose.time_ns < item.from_ns || pose.time_ns >= item.to_ns || pose.time_ns > *end_ns) {
-        return Invalid(absl::StrCat(what, ": pose at ", pose.time_ns, " ns is outside [",
-                                    item.from_ns, ", ", item.to_ns, ") or after the track's end ",
-                                    *end_ns));
+        return Invalid(
+            absl::StrCat(what, ": pose at ", pose.time_ns, " ns is outside [", item.from_ns, ", ",
+                         item.to_ns, ") or after the track's end ", *end_ns),
+            {{"correction_of", ToString(item.agent)}, {"stored_end_ns", absl::StrCat(*end_ns)}});
       }
     }
     return absl::OkStatus();

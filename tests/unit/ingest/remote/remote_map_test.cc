@@ -150,6 +150,58 @@ TEST_F(RemoteMapTest, NamesAnAddressWhereNobodyListens) {
   EXPECT_NE(std::string(status.message()).find(address()), std::string::npos) << status;
 }
 
+// Commits a delta of somebody else before the third of its own.
+class CrossedWriter : public GraphWriter {
+ public:
+  CrossedWriter(GraphWriter& writer, GraphDelta crossing)
+      : writer_(writer), crossing_(std::move(crossing)) {}
+
+  absl::StatusOr<CommitResult> Commit(GraphDelta delta) override {
+    if (++count_ == 3) DSG_RETURN_IF_ERROR(writer_.Commit(crossing_).status());
+    return writer_.Commit(std::move(delta));
+  }
+  absl::StatusOr<SessionState> GetSession(const std::string& session_id) override {
+    return writer_.GetSession(session_id);
+  }
+
+ private:
+  GraphWriter& writer_;
+  GraphDelta crossing_;
+  int count_ = 0;
+};
+
+TEST_F(RemoteMapTest, LogGoesOnWhenTheServerForgetsWhatItTold) {
+  StartServer();
+  const auto map = OpenMap();
+  ASSERT_TRUE(map->writer().Commit(Rooms(2, "s", 1)).ok());
+  GraphDelta prune;
+  prune.map = "test";
+  prune.session_id = "prune";
+  prune.sequence = 1;
+  prune.is_forgetting = true;
+  for (const NodeId id : {NodeId('H', 1), NodeId('R', 0), NodeId('p', 1)}) {
+    prune.retirements.push_back({id, std::nullopt});
+  }
+  CrossedWriter writer(map->writer(), prune);
+  LogOptions options;
+  options.epoch_ns = map->spec().epoch_ns;
+  const auto log = OpenLog(folder_.Write("a.txt", WalkRows(100)), options);
+  ASSERT_TRUE(log.ok()) << log.status();
+  const auto view = MakeRemoteMapView(*map);
+  const auto summary = IngestLog(**log, options, {.poses_per_delta = 50}, *view, writer, {});
+  ASSERT_TRUE(summary.ok()) << summary.status();
+  // Two deltas of fifty poses of three agents were told before.
+  EXPECT_EQ((*map->FindTrack(NodeId('H', 1), std::nullopt))->pose_count, 100 - 34);
+  EXPECT_EQ((*map->FindTrack(NodeId('H', 2), std::nullopt))->pose_count, 100);
+  EXPECT_EQ((*map->FindTrack(NodeId('H', 3), std::nullopt))->pose_count, 100);
+  const auto rooms = map->ListNodes("rooms");
+  ASSERT_TRUE(rooms.ok()) << rooms.status();
+  EXPECT_EQ(rooms->size(), 1u);
+  const Node agent = map->ListAgents()->at(0);
+  EXPECT_EQ(agent.observation_count, 100 - 34);
+  EXPECT_EQ(agent.first_observed_ns, (*map->FindTrack(agent.id, std::nullopt))->first_ns);
+}
+
 TEST_F(RemoteMapTest, TakesALogAndItsContinuation) {
   StartServer();
   const auto map = OpenMap();
