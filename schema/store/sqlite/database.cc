@@ -35,6 +35,17 @@ constexpr char kWritePragmas[] =
 // Of SQLite's virtual machine; some tenths of a millisecond.
 constexpr int kStepsPerQuestion = 20'000;
 
+// The first table that a statement names, for messages; nothing where there is none.
+std::string TableOf(std::string_view sql) {
+  for (const std::string_view before : {" FROM ", " INTO ", "UPDATE "}) {
+    const size_t found = sql.find(before);
+    if (found == std::string_view::npos) continue;
+    const std::string_view rest = sql.substr(found + before.size());
+    return absl::StrCat(", table ", std::string(rest.substr(0, rest.find_first_of(" (,;"))));
+  }
+  return "";
+}
+
 int OnWalCommit(void* pages, sqlite3*, const char*, int wal_pages) {
   *static_cast<int*>(pages) = wal_pages;
   return SQLITE_OK;
@@ -132,9 +143,9 @@ int Database::error_code() const { return sqlite3_extended_errcode(db_); }
 
 absl::Status Database::Error(std::string_view doing) const {
   const int code = db_ == nullptr ? SQLITE_NOMEM : sqlite3_extended_errcode(db_);
-  // Users know files, not statements.
+  // Users know files and perhaps tables, not statements.
   const std::string text =
-      absl::StrCat("map \"", map_name_, "\" (", path_,
+      absl::StrCat("map \"", map_name_, "\" (", path_, TableOf(doing),
                    "): ", db_ == nullptr ? "out of memory" : sqlite3_errmsg(db_));
   const ErrorMetadata metadata = {
       {"map", map_name_}, {"sqlite", absl::StrCat(code)}, {"doing", std::string(doing)}};
