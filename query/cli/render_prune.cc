@@ -82,9 +82,11 @@ std::string ErasedText(const v1::PruneResponse& reply) {
                     NamesText(reply.rewritten_ids(), reply.rewritten_count()), "\n");
   }
   if (reply.erased()) {
-    absl::StrAppend(&text, "erased: no ", reply.rewritten_count() > 0 ? "older " : "",
-                    "revision knows it, and no byte of it is in the map's files; backups made "
-                    "before still have it\n");
+    // Of what was retired before, or by another policy of the same call, nothing is claimed.
+    absl::StrAppend(&text, "erased: what this call found to erase is in no ",
+                    reply.rewritten_count() > 0 ? "older " : "",
+                    "revision and in no byte of the map's files; backups made before still have "
+                    "it, and older revisions what was only retired\n");
     return text;
   }
   if (reply.left_count() == 0) {
