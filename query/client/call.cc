@@ -7,8 +7,8 @@
 #include <thread>
 
 #include "absl/strings/str_cat.h"
-#include "query/client/status_decode.h"
 #include "schema/base/status.h"
+#include "schema/codec/status_decode.h"
 
 namespace dsg::client {
 namespace {
@@ -98,11 +98,11 @@ absl::Status CallInFlight::Outcome(const grpc::Status& status) const {
                                                " gave no sign of life for too long; call again "
                                                "from where the stream ended"));
   }
-  absl::Status decoded =
-      DecodeStatus(status.error_code(), status.error_message(), Trailer(context_));
-  // Errors with a reason were made by the server; the others by the transport, which names neither
-  // the address nor a way out.
-  if (ReasonOf(decoded) != Reason::kUnspecified) return decoded;
+  const std::string_view detail = Trailer(context_);
+  absl::Status decoded = DecodeStatus(status.error_code(), status.error_message(), detail);
+  // Errors with a reason, known here or not, were made by the server; the others by the transport,
+  // which names neither the address nor a way out.
+  if (!detail.empty()) return decoded;
   switch (decoded.code()) {
     case absl::StatusCode::kUnavailable:
       return NoServer(address_, status.error_message());

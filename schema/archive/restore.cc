@@ -136,7 +136,7 @@ absl::StatusOr<VerifyReport> VerifyArchive(const std::string& path, const StopCh
   DSG_ASSIGN_OR_RETURN(const std::string database, place->MakeDatabasePath(head.spec.name));
   DSG_ASSIGN_OR_RETURN(const ArchiveManifest manifest, Unpack(path, database, stop, progress));
   DSG_ASSIGN_OR_RETURN(const auto map, OpenUnpacked(path, place->folder(), manifest));
-  return map->Verify([&](double fraction) {
+  return map->Verify(stop, [&](double fraction) {
     if (progress) progress(kReadShare + (1.0 - kReadShare) * fraction);
   });
 }

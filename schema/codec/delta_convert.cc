@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Whole deltas, model <-> protobuf and JSON.
+#include <google/protobuf/util/field_mask_util.h>
 #include <google/protobuf/util/json_util.h>
 
 #include "absl/strings/str_cat.h"
@@ -90,6 +91,46 @@ absl::Status RemovalsFromProto(const v1::GraphDelta& in, GraphDelta* delta) {
   return absl::OkStatus();
 }
 
+bool IsWhole(const google::protobuf::FieldMask& mask) {
+  return mask.paths_size() == 1 && mask.paths(0) == "*";
+}
+
+std::vector<std::string> PathsOf(const google::protobuf::FieldMask& mask) {
+  return {mask.paths().begin(), mask.paths().end()};
+}
+
+// Whether it is one of `in` that is to be written field by field.
+template <typename Proto>
+bool IsPatch(const Proto& in, Unmasked unmasked) {
+  return in.has_update_mask() ? !IsWhole(in.update_mask()) : unmasked == Unmasked::kPatch;
+}
+
+// The fields of a patch, serialized, and its paths.
+template <typename Proto, typename Patch>
+absl::Status FillPatch(Proto in, std::string_view field, Patch* patch) {
+  patch->mask = PathsOf(in.update_mask());
+  for (const std::string& path : patch->mask) {
+    if (!path.empty() && google::protobuf::util::FieldMaskUtil::IsValidPath<Proto>(path)) continue;
+    return MakeError(
+        Reason::kFieldInvalid,
+        absl::StrCat(std::string(field), ".update_mask has path \"", path,
+                     "\", which is no field of it; name fields as in graph.proto, or "
+                     "\"*\" alone for all"),
+        {{"field", absl::StrCat(std::string(field), ".update_mask")}, {"value", path}});
+  }
+  in.clear_update_mask();
+  in.clear_revision();
+  patch->fields = SerializeInOrder(in);
+  return absl::OkStatus();
+}
+
+template <typename Patch, typename Proto>
+void PatchToProto(const Patch& patch, Proto* out) {
+  // What was serialized here is read here.
+  DSG_CHECK(out->ParseFromString(patch.fields));
+  for (const std::string& path : patch.mask) out->mutable_update_mask()->add_paths(path);
+}
+
 void GraphToProto(const GraphDelta& delta, const LayerTable& layers, v1::GraphDelta* out) {
   for (const Layer& layer : delta.layers) {
     v1::Layer* to = out->add_layers();
@@ -103,12 +144,14 @@ void GraphToProto(const GraphDelta& delta, const LayerTable& layers, v1::GraphDe
     to->set_name(label.name);
   }
   for (const Node& node : delta.nodes) dsg::ToProto(node, layers, out->add_nodes());
+  for (const NodePatch& patch : delta.node_patches) PatchToProto(patch, out->add_nodes());
   for (const Retirement& item : delta.retirements) {
     v1::Retirement* to = out->add_retirements();
     to->set_id(ToString(item.id));
     if (item.valid_to_ns.has_value()) to->set_valid_to_ns(*item.valid_to_ns);
   }
   for (const Edge& edge : delta.edges) dsg::ToProto(edge, out->add_edges());
+  for (const EdgePatch& patch : delta.edge_patches) PatchToProto(patch, out->add_edges());
   for (const EdgeKey& key : delta.edge_removals) {
     v1::EdgeKey* to = out->add_edge_removals();
     to->set_source(ToString(key.source));
@@ -117,7 +160,8 @@ void GraphToProto(const GraphDelta& delta, const LayerTable& layers, v1::GraphDe
   }
 }
 
-absl::Status GraphFromProto(const v1::GraphDelta& in, LayerTable layers, GraphDelta* delta) {
+absl::Status GraphFromProto(const v1::GraphDelta& in, LayerTable layers, Unmasked unmasked,
+                            GraphDelta* delta) {
   for (const v1::Layer& layer : in.layers()) {
     delta->layers.push_back({layer.id(), layer.name(), layer.rank()});
     layers.Add(delta->layers.back());
@@ -126,6 +170,12 @@ absl::Status GraphFromProto(const v1::GraphDelta& in, LayerTable layers, GraphDe
     delta->labels.push_back({label.id(), label.name()});
   }
   for (const v1::Node& node : in.nodes()) {
+    if (IsPatch(node, unmasked)) {
+      NodePatch& patch = delta->node_patches.emplace_back();
+      DSG_ASSIGN_OR_RETURN(patch.id, ParseNodeId(node.id()));
+      DSG_RETURN_IF_ERROR(FillPatch(node, "nodes", &patch));
+      continue;
+    }
     DSG_ASSIGN_OR_RETURN(Node made, dsg::FromProto(node, layers));
     delta->nodes.push_back(std::move(made));
   }
@@ -136,6 +186,14 @@ absl::Status GraphFromProto(const v1::GraphDelta& in, LayerTable layers, GraphDe
     delta->retirements.push_back(made);
   }
   for (const v1::Edge& edge : in.edges()) {
+    if (IsPatch(edge, unmasked)) {
+      EdgePatch& patch = delta->edge_patches.emplace_back();
+      DSG_ASSIGN_OR_RETURN(patch.key.source, ParseNodeId(edge.source()));
+      DSG_ASSIGN_OR_RETURN(patch.key.target, ParseNodeId(edge.target()));
+      patch.key.relation = edge.relation();
+      DSG_RETURN_IF_ERROR(FillPatch(edge, "edges", &patch));
+      continue;
+    }
     DSG_ASSIGN_OR_RETURN(Edge made, dsg::FromProto(edge));
     delta->edges.push_back(std::move(made));
   }
@@ -278,10 +336,11 @@ void ToProto(const GraphDelta& delta, const LayerTable& layers, v1::GraphDelta* 
   BlobsToProto(delta, out);
 }
 
-absl::StatusOr<GraphDelta> FromProto(const v1::GraphDelta& in, const LayerTable& layers) {
+absl::StatusOr<GraphDelta> FromProto(const v1::GraphDelta& in, const LayerTable& layers,
+                                     Unmasked unmasked) {
   GraphDelta delta;
   HeaderFromProto(in, &delta);
-  DSG_RETURN_IF_ERROR(GraphFromProto(in, layers, &delta));
+  DSG_RETURN_IF_ERROR(GraphFromProto(in, layers, unmasked, &delta));
   DSG_RETURN_IF_ERROR(TracksFromProto(in, &delta));
   DSG_RETURN_IF_ERROR(RemovalsFromProto(in, &delta));
   DSG_RETURN_IF_ERROR(BlobsFromProto(in, &delta));

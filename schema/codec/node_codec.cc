@@ -2,11 +2,15 @@
 // A node as bytes: numbers without tags, and nothing for what is usual (no rotation, rotation about
 // z, a box around the origin), since a map has many nodes and keeps them for years. What few nodes
 // have is a protobuf message at the end. docs/storage_format.md gives the layout.
+#include "schema/codec/node_codec.h"
+
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <utility>
 
 #include "dsg/v1/graph.pb.h"
+#include "schema/codec/attribute_codec.h"
 #include "schema/codec/bit_stream.h"
 #include "schema/codec/proto_internal.h"
 
@@ -30,7 +34,8 @@ enum Flag : uint64_t {
   kHasObject = 1u << 10,
   kHasPlace = 1u << 11,
   kHasMore = 1u << 12,
-  kNodeFlags = (1u << 13) - 1,
+  kHasAttributes = 1u << 13,
+  kNodeFlags = (1u << 14) - 1,
 };
 enum ObjectFlag : uint64_t {
   kHasModel = 1u << 2,
@@ -171,8 +176,7 @@ bool ReadPlace(ByteReader* in, PlaceInfo* place) {
 }
 
 bool HasMore(const Node& node) {
-  return node.agent.has_value() || node.structure.has_value() || node.region.has_value() ||
-         !node.attributes.empty();
+  return node.agent.has_value() || node.structure.has_value() || node.region.has_value();
 }
 
 uint64_t FlagsOf(const Node& node) {
@@ -185,7 +189,7 @@ uint64_t FlagsOf(const Node& node) {
          FlagIf(node.last_observed_ns.has_value(), kHasLastObserved) |
          FlagIf(node.confidence.has_value(), kHasConfidence) |
          FlagIf(node.object.has_value(), kHasObject) | FlagIf(node.place.has_value(), kHasPlace) |
-         FlagIf(HasMore(node), kHasMore);
+         FlagIf(HasMore(node), kHasMore) | FlagIf(!node.attributes.empty(), kHasAttributes);
 }
 
 void AppendKind(const std::string& kind, std::string* out) {
@@ -226,11 +230,18 @@ void ReadTimes(uint64_t flags, ByteReader* in, Node* node) {
 bool ReadComponents(uint64_t flags, ByteReader* in, Node* node) {
   if (flags & kHasObject && !ReadObject(node->box_node, in, &node->object.emplace())) return false;
   if (flags & kHasPlace && !ReadPlace(in, &node->place.emplace())) return false;
-  if (!(flags & kHasMore)) return true;
-  const std::string_view rest = in->Bytes(in->remaining());
-  v1::Node message;
-  return message.ParseFromArray(rest.data(), static_cast<int>(rest.size())) &&
-         RareDetailsFromProto(message, node).ok();
+  Attributes attributes;
+  if (flags & kHasAttributes && !ReadAttributes(in, &attributes)) return false;
+  if (flags & kHasMore) {
+    const std::string_view rest = in->Bytes(in->remaining());
+    v1::Node message;
+    const bool is_read = message.ParseFromArray(rest.data(), static_cast<int>(rest.size())) &&
+                         RareDetailsFromProto(message, node).ok();
+    if (!is_read) return false;
+  }
+  // Format 2 wrote attributes with the rare details.
+  if (flags & kHasAttributes) node->attributes = std::move(attributes);
+  return true;
 }
 
 }  // namespace
@@ -255,36 +266,59 @@ std::string EncodeNodePayload(const Node& node) {
   AppendVarint(static_cast<uint64_t>(node.provenance), &out);
   if (node.object.has_value()) AppendObject(*node.object, node.box_node, &out);
   if (node.place.has_value()) AppendPlace(*node.place, &out);
+  if (flags & kHasAttributes) AppendAttributes(node.attributes, &out);
   if (flags & kHasMore) {
     v1::Node message;
-    RareDetailsToProto(node, &message);
+    ComponentsOfFewToProto(node, &message);
     out += SerializeInOrder(message);
   }
   return out;
 }
 
+namespace {
+
+// Up to where the components begin.
+bool ReadHead(ByteReader* in, uint64_t* flags, Node* node) {
+  *flags = in->Varint();
+  if ((*flags & ~uint64_t{kNodeFlags}) != 0 || !ReadKind(in, &node->kind)) return false;
+  node->name = ReadText(in);
+  if (*flags & kHasClass) {
+    node->class_id = static_cast<int32_t>(UnZigZag(in->Varint()));
+    node->class_name = ReadText(in);
+  }
+  node->map_T_node.position = ReadVector(in);
+  node->map_T_node.orientation = ReadRotation(Form(*flags >> kRotationShift & 3), in);
+  node->box_node = ReadBox(Form(*flags >> kBoxShift & 3), in);
+  ReadTimes(*flags, in, node);
+  node->observation_count = UnZigZag(in->Varint());
+  if (*flags & kHasConfidence) node->confidence = in->Fixed<double>();
+  node->provenance = static_cast<Provenance>(in->Varint());
+  return in->ok();
+}
+
+bool IsOfThisCodec(std::string_view bytes) {
+  return !bytes.empty() && static_cast<uint8_t>(bytes[0]) == kVersion;
+}
+
+}  // namespace
+
+bool DecodeNodePlacement(std::string_view bytes, Node* node) {
+  if (!IsOfThisCodec(bytes)) return DecodeNodePayload(bytes, node);
+  ByteReader in(bytes.substr(1));
+  uint64_t flags = 0;
+  return ReadHead(&in, &flags, node);
+}
+
 bool DecodeNodePayload(std::string_view bytes, Node* node) {
-  if (bytes.empty() || static_cast<uint8_t>(bytes[0]) != kVersion) {
+  if (!IsOfThisCodec(bytes)) {
     v1::Node message;
     return message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) &&
            NodeDetailsFromProto(message, node).ok();
   }
   ByteReader in(bytes.substr(1));
-  const uint64_t flags = in.Varint();
-  if ((flags & ~uint64_t{kNodeFlags}) != 0 || !ReadKind(&in, &node->kind)) return false;
-  node->name = ReadText(&in);
-  if (flags & kHasClass) {
-    node->class_id = static_cast<int32_t>(UnZigZag(in.Varint()));
-    node->class_name = ReadText(&in);
-  }
-  node->map_T_node.position = ReadVector(&in);
-  node->map_T_node.orientation = ReadRotation(Form(flags >> kRotationShift & 3), &in);
-  node->box_node = ReadBox(Form(flags >> kBoxShift & 3), &in);
-  ReadTimes(flags, &in, node);
-  node->observation_count = UnZigZag(in.Varint());
-  if (flags & kHasConfidence) node->confidence = in.Fixed<double>();
-  node->provenance = static_cast<Provenance>(in.Varint());
-  return ReadComponents(flags, &in, node) && in.ok() && in.remaining() == 0;
+  uint64_t flags = 0;
+  return ReadHead(&in, &flags, node) && ReadComponents(flags, &in, node) && in.ok() &&
+         in.remaining() == 0;
 }
 
 }  // namespace dsg

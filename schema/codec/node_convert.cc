@@ -132,10 +132,14 @@ absl::Status ComponentsFromProto(const v1::Node& in, Node* node) {
 
 }  // namespace
 
-void RareDetailsToProto(const Node& node, v1::Node* out) {
+void ComponentsOfFewToProto(const Node& node, v1::Node* out) {
   if (node.agent.has_value()) ToProto(*node.agent, out->mutable_agent());
   if (node.structure.has_value()) ToProto(*node.structure, out->mutable_structure());
   if (node.region.has_value()) ToProto(*node.region, out->mutable_region());
+}
+
+void RareDetailsToProto(const Node& node, v1::Node* out) {
+  ComponentsOfFewToProto(node, out);
   AttributesToProto(node.attributes, out->mutable_attributes());
 }
 

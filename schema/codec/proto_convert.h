@@ -62,8 +62,16 @@ absl::StatusOr<MapSpec> FromProto(const v1::MapSpec& in);
 void ToProto(const RevisionInfo& revision, v1::Revision* out);
 
 void ToProto(const GraphDelta& delta, const LayerTable& layers, v1::GraphDelta* out);
+/// How nodes and edges are meant that have no update mask.
+enum class Unmasked {
+  /// As they stand, whole.
+  kWhole,
+  /// Only what is set in them.
+  kPatch,
+};
 /// `layers`: the map's; layers that the delta itself adds are known too.
-absl::StatusOr<GraphDelta> FromProto(const v1::GraphDelta& in, const LayerTable& layers);
+absl::StatusOr<GraphDelta> FromProto(const v1::GraphDelta& in, const LayerTable& layers,
+                                     Unmasked unmasked = Unmasked::kWhole);
 
 /// A delta as protobuf JSON with proto field names: how the simulator writes its world.
 std::string DeltaToJson(const GraphDelta& delta);

@@ -32,6 +32,8 @@ void NodeDetailsToProto(const Node& node, v1::Node* out);
 absl::Status NodeDetailsFromProto(const v1::Node& in, Node* node);
 /// What few nodes have: all but the fields that schema/codec/node_codec.cc writes itself.
 void RareDetailsToProto(const Node& node, v1::Node* out);
+/// The same without attributes.
+void ComponentsOfFewToProto(const Node& node, v1::Node* out);
 absl::Status RareDetailsFromProto(const v1::Node& in, Node* node);
 /// Maps are written in order of their keys, so that equal content gives equal bytes and digests.
 std::string SerializeInOrder(const google::protobuf::MessageLite& message);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "schema/merge/plan_check.h"
 
+#include <algorithm>
 #include <map>
 #include <string>
 #include <vector>
@@ -119,7 +120,8 @@ class ContentLookup final : public GraphLookup {
     const Node& node = content_.nodes[static_cast<size_t>(index)];
     return std::optional<NodeFacts>(NodeFacts{node.layer, IsAgentKind(node.kind), node.valid,
                                               node.box_node.isEmpty() ? Box3d() : node.BoxMap(),
-                                              node.map_T_node.position});
+                                              node.map_T_node.position, node.first_observed_ns,
+                                              node.last_observed_ns});
   }
   absl::StatusOr<std::optional<Layer>> FindLayer(LayerId id) const override {
     for (const Layer& layer : content_.layers) {
@@ -139,6 +141,17 @@ class ContentLookup final : public GraphLookup {
   }
   // Those that the graph refers to are written before it.
   absl::StatusOr<bool> HasAsset(const Sha256& /*sha256*/) const override { return true; }
+  const MapSpec* FindSpec() const override { return &content_.spec; }
+  absl::StatusOr<std::optional<Interval>> FindSpan() const override {
+    std::optional<Interval> span;
+    for (const TrackInfo& track : content_.tracks) {
+      if (track.pose_count == 0) continue;
+      if (!span.has_value()) span = {track.first_ns, track.last_ns};
+      span->from_ns = std::min(span->from_ns, track.first_ns);
+      span->to_ns = std::max(span->to_ns, track.last_ns);
+    }
+    return span;
+  }
 
  private:
   using Family = std::map<NodeId, std::vector<NodeId>>;

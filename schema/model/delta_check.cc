@@ -68,6 +68,56 @@ absl::Status CheckBox(const Box3d& box, const std::string& what) {
   return absl::OkStatus();
 }
 
+// The limits of 64 bits mean an open end, which no instant is.
+absl::Status CheckInstant(TimeNs time_ns, const std::string& what) {
+  if (time_ns != kTimeMin && time_ns != kTimeMax) return absl::OkStatus();
+  return Invalid(absl::StrCat(what, " is ", time_ns,
+                              " ns, a limit of 64 bits, which means an open end; give an instant, "
+                              "or leave it out"));
+}
+
+absl::Status CheckNotNegative(double number, const std::string& what) {
+  if (!(number < 0.0)) return absl::OkStatus();
+  return Invalid(absl::StrCat(what, " is ", number, "; it must be 0 or more"));
+}
+
+// Twice the area of an outline; its sign tells the sense.
+double TwiceArea(const Polygon2d& outline) {
+  double twice = 0.0;
+  for (size_t i = 0; i < outline.size(); ++i) {
+    // From the first corner: far from the origin the products would swallow the area.
+    const Eigen::Vector2d a = outline[i] - outline[0];
+    const Eigen::Vector2d b = outline[(i + 1) % outline.size()] - outline[0];
+    twice += a.x() * b.y() - b.x() * a.y();
+  }
+  return twice;
+}
+
+// No outline means that it is not known. Either sense is taken: inside is told by even and odd.
+absl::Status CheckRegion(const RegionInfo& region, const std::string& what) {
+  for (const auto& [name, probability] : region.class_probabilities) {
+    DSG_RETURN_IF_ERROR(CheckText(name, kNameLengthMax, "a class of " + what));
+    if (!std::isfinite(probability)) return NotFinite("a class probability of " + what);
+  }
+  const Polygon2d& outline = region.footprint_map;
+  if (outline.size() > 65536)
+    return Invalid("footprint of " + what + " has more than 65536 corners");
+  for (const Eigen::Vector2d& corner : outline) {
+    if (!IsSane({corner.x(), corner.y(), 0.0})) return NotFinite("footprint of " + what);
+  }
+  if (!outline.empty() && (outline.size() < 3 || TwiceArea(outline) == 0.0)) {
+    return Invalid(absl::StrCat("footprint of ", what, " has ", outline.size(),
+                                " corners and no area; give at least 3 that are not on a line, or "
+                                "none if it is not known"));
+  }
+  if (!IsSane({region.z_min_m, region.z_max_m, 0.0})) {
+    return NotFinite(absl::StrCat("height ", region.z_min_m, " or ", region.z_max_m, " of ", what));
+  }
+  if (region.z_min_m <= region.z_max_m) return absl::OkStatus();
+  return Invalid(absl::StrCat("footprint of ", what, " is inverted: z_min_m ", region.z_min_m,
+                              " is above z_max_m ", region.z_max_m, "; swap them"));
+}
+
 absl::Status CheckInterval(const Interval& interval, const std::string& what) {
   if (interval.from_ns < interval.to_ns) return absl::OkStatus();
   return Invalid(absl::StrCat("validity [", interval.from_ns, ", ", interval.to_ns, ") of ", what,
@@ -123,7 +173,7 @@ class DeltaChecker {
     for (const ShapeAppend& item : delta_.shapes) DSG_RETURN_IF_ERROR(CheckShapes(item));
     for (const Stay& stay : delta_.stays) DSG_RETURN_IF_ERROR(CheckStay(stay));
     for (const MeshBlock& block : delta_.mesh_blocks) DSG_RETURN_IF_ERROR(CheckMesh(block));
-    return absl::OkStatus();
+    return delta_.is_forgetting ? absl::OkStatus() : CheckAgainstMap();
   }
 
  private:
@@ -226,10 +276,22 @@ class DeltaChecker {
       return Invalid(absl::StrCat("confidence of ", what, " is ", *node.confidence,
                                   "; it must be from 0 to 1"));
     }
+    if (node.first_observed_ns.has_value()) {
+      DSG_RETURN_IF_ERROR(CheckInstant(*node.first_observed_ns, "first_observed_ns of " + what));
+    }
+    if (node.last_observed_ns.has_value()) {
+      DSG_RETURN_IF_ERROR(CheckInstant(*node.last_observed_ns, "last_observed_ns of " + what));
+    }
+    DSG_RETURN_IF_ERROR(CheckNotNegative(static_cast<double>(node.observation_count),
+                                         "observation_count of " + what));
     DSG_RETURN_IF_ERROR(CheckComponents(node, what));
-    facts_[node.id] =
-        Facts{node.layer, IsAgentKind(node.kind), node.valid,
-              node.box_node.isEmpty() ? Box3d() : node.BoxMap(), node.map_T_node.position};
+    facts_[node.id] = Facts{node.layer,
+                            IsAgentKind(node.kind),
+                            node.valid,
+                            node.box_node.isEmpty() ? Box3d() : node.BoxMap(),
+                            node.map_T_node.position,
+                            node.first_observed_ns,
+                            node.last_observed_ns};
     return absl::OkStatus();
   }
 
@@ -239,7 +301,9 @@ class DeltaChecker {
       if (node.object->model.has_value()) {
         DSG_RETURN_IF_ERROR(CheckPose(node.object->map_T_model, "the model of " + what));
       }
-      if (!IsSane(node.object->size)) return NotFinite("size of " + what);
+      const Eigen::Vector3d& size = node.object->size;
+      if (!IsSane(size)) return NotFinite("size of " + what);
+      DSG_RETURN_IF_ERROR(CheckNotNegative(size.minCoeff(), "an edge length of " + what));
     }
     if (node.agent.has_value()) {
       DSG_RETURN_IF_ERROR(CheckAssetKnown(node.agent->body_model, what));
@@ -260,6 +324,8 @@ class DeltaChecker {
                                     " m; it is a distance, 0 or more"));
       }
       DSG_RETURN_IF_ERROR(CheckBox(node.place->free_box, what));
+      DSG_RETURN_IF_ERROR(
+          CheckNotNegative(node.place->basis_point_count, "basis_point_count of " + what));
     }
     if (node.structure.has_value()) {
       DSG_RETURN_IF_ERROR(
@@ -269,19 +335,7 @@ class DeltaChecker {
         return NotFinite("the plane of " + what);
       }
     }
-    if (node.region.has_value()) {
-      for (const auto& [name, probability] : node.region->class_probabilities) {
-        DSG_RETURN_IF_ERROR(CheckText(name, kNameLengthMax, "a class of " + what));
-        if (!std::isfinite(probability)) return NotFinite("a class probability of " + what);
-      }
-      if (node.region->footprint_map.size() > 65536) {
-        return Invalid("footprint of " + what + " has more than 65536 corners");
-      }
-      for (const Eigen::Vector2d& corner : node.region->footprint_map) {
-        if (!IsSane({corner.x(), corner.y(), 0.0})) return NotFinite("footprint of " + what);
-      }
-    }
-    return absl::OkStatus();
+    return node.region.has_value() ? CheckRegion(*node.region, what) : absl::OkStatus();
   }
 
   absl::StatusOr<std::optional<Facts>> Find(NodeId id) {
@@ -531,9 +585,6 @@ class DeltaChecker {
         absl::StrCat("stay of ", ToString(stay.agent), " from ", stay.enter_ns, " ns");
     DSG_RETURN_IF_ERROR(CheckAgent(stay.agent, what));
     DSG_RETURN_IF_ERROR(CheckInterval({stay.enter_ns, stay.exit_ns}, what));
-    if (stay.exit_ns != kTimeMax && stay.exit_ns - stay.enter_ns > kStayNsMax) {
-      return Invalid(what + " is longer than an hour; cut it");
-    }
     if (stay.place.empty() && stay.room.empty()) return Invalid(what + " is nowhere");
     for (const NodeId id : {stay.place, stay.room}) {
       if (!id.empty()) DSG_RETURN_IF_ERROR(FindEnd(id, what).status());
@@ -568,8 +619,155 @@ class DeltaChecker {
     return absl::OkStatus();
   }
 
+  // What can be judged only beside the map that the delta is for.
+  absl::Status CheckAgainstMap() {
+    const MapSpec* const spec = graph_.FindSpec();
+    if (spec == nullptr) return absl::OkStatus();
+    DSG_RETURN_IF_ERROR(CheckTimes(*spec));
+    for (const MeshBlock& block : delta_.mesh_blocks) {
+      DSG_RETURN_IF_ERROR(CheckVertices(block, spec->mesh_block_size_m));
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status CheckTimes(const MapSpec& spec) {
+    for (const Node& node : delta_.nodes) DSG_RETURN_IF_ERROR(CheckTimesOf(node, spec));
+    for (const Retirement& item : delta_.retirements) {
+      if (!item.valid_to_ns.has_value()) continue;
+      DSG_RETURN_IF_ERROR(CheckTime(*item.valid_to_ns, kValidFarMaxNs, spec,
+                                    absl::StrCat("valid_to_ns of node ", ToString(item.id))));
+    }
+    const auto check_ends = [&](const auto& list, NodeId agent, const char* of) -> absl::Status {
+      if (list.empty()) return absl::OkStatus();
+      // They grow.
+      for (const auto* item : {&list.front(), &list.back()}) {
+        DSG_RETURN_IF_ERROR(CheckTime(item->time_ns, kObservedFarMaxNs, spec,
+                                      absl::StrCat("time of a ", of, " of ", ToString(agent))));
+      }
+      return absl::OkStatus();
+    };
+    for (const TrajectoryAppend& item : delta_.appends) {
+      DSG_RETURN_IF_ERROR(check_ends(item.poses, item.agent, "pose"));
+    }
+    for (const TrajectoryCorrection& item : delta_.corrections) {
+      DSG_RETURN_IF_ERROR(check_ends(item.poses, item.agent, "pose"));
+    }
+    for (const ShapeAppend& item : delta_.shapes) {
+      DSG_RETURN_IF_ERROR(check_ends(item.shapes, item.agent, "shape"));
+    }
+    for (const FactorAppend& item : delta_.factors) {
+      for (const PoseFactor& factor : item.factors) {
+        for (const TimeNs time_ns : {factor.from_ns, factor.to_ns}) {
+          DSG_RETURN_IF_ERROR(
+              CheckTime(time_ns, kObservedFarMaxNs, spec,
+                        absl::StrCat("time of a factor of ", ToString(item.agent))));
+        }
+      }
+    }
+    for (const Stay& stay : delta_.stays) {
+      for (const TimeNs time_ns : {stay.enter_ns, stay.exit_ns}) {
+        DSG_RETURN_IF_ERROR(CheckTime(time_ns, kObservedFarMaxNs, spec,
+                                      absl::StrCat("time of a stay of ", ToString(stay.agent))));
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status CheckTimesOf(const Node& node, const MapSpec& spec) {
+    const absl::Status status = [&]() -> absl::Status {
+      const std::string of = " of node " + ToString(node.id);
+      if (node.first_observed_ns.has_value()) {
+        DSG_RETURN_IF_ERROR(
+            CheckTime(*node.first_observed_ns, kObservedFarMaxNs, spec, "first_observed_ns" + of));
+      }
+      if (node.last_observed_ns.has_value()) {
+        DSG_RETURN_IF_ERROR(
+            CheckTime(*node.last_observed_ns, kObservedFarMaxNs, spec, "last_observed_ns" + of));
+      }
+      DSG_RETURN_IF_ERROR(
+          CheckTime(node.valid.from_ns, kValidFarMaxNs, spec, "valid.from_ns" + of));
+      return CheckTime(node.valid.to_ns, kValidFarMaxNs, spec, "valid.to_ns" + of);
+    }();
+    if (status.ok() || ReasonOf(status) != Reason::kTimeImplausible) return status;
+    // What is stored may be written again, as when the node moves.
+    DSG_ASSIGN_OR_RETURN(const auto stored, graph_.FindNode(node.id));
+    const bool is_known =
+        stored.has_value() && stored->first_observed_ns == node.first_observed_ns &&
+        stored->last_observed_ns == node.last_observed_ns && stored->valid == node.valid;
+    return is_known ? absl::OkStatus() : status;
+  }
+
+  // Open ends say nothing.
+  absl::Status CheckTime(TimeNs time_ns, TimeNs far_max_ns, const MapSpec& spec,
+                         const std::string& what) {
+    if (time_ns == kTimeMin || time_ns == kTimeMax) return absl::OkStatus();
+    if (DistanceNs(time_ns, {spec.epoch_ns, spec.epoch_ns}) <= far_max_ns) return absl::OkStatus();
+    if (!span_.has_value()) {
+      DSG_ASSIGN_OR_RETURN(span_, FindKnownSpan(spec));
+    }
+    if (!span_->has_value() || DistanceNs(time_ns, **span_) <= far_max_ns) return absl::OkStatus();
+    constexpr int64_t kYearNs = 365 * 24 * 3600 * kNsPerSecond;
+    const std::string span = absl::StrCat("[", (*span_)->from_ns, ", ", (*span_)->to_ns, "]");
+    return MakeError(Reason::kTimeImplausible,
+                     absl::StrCat("delta refused: ", what, " is ", time_ns, " ns, more than ",
+                                  far_max_ns / kYearNs, " years from all that map \"", spec.name,
+                                  "\" knows, ", span, " ns; check the clock, or use another map"),
+                     {{"map", spec.name},
+                      {"item", what},
+                      {"time_ns", absl::StrCat(time_ns)},
+                      {"span_ns", span}});
+  }
+
+  // A difference of two times need not fit 64 bits with a sign.
+  static TimeNs DistanceNs(TimeNs time_ns, const Interval& span) {
+    if (time_ns >= span.from_ns && time_ns <= span.to_ns) return 0;
+    const bool is_before = time_ns < span.from_ns;
+    const uint64_t low = static_cast<uint64_t>(is_before ? time_ns : span.to_ns);
+    const uint64_t high = static_cast<uint64_t>(is_before ? span.from_ns : time_ns);
+    return static_cast<TimeNs>(std::min<uint64_t>(high - low, kTimeMax));
+  }
+
+  // The poses and the epoch; both ends belong to it. An epoch of 0 is what a map has that was not
+  // given one, and other clocks may begin anywhere.
+  absl::StatusOr<std::optional<Interval>> FindKnownSpan(const MapSpec& spec) const {
+    DSG_ASSIGN_OR_RETURN(std::optional<Interval> span, graph_.FindSpan());
+    if (!span.has_value() && (spec.clock != Clock::kUnix || spec.epoch_ns == 0)) return span;
+    if (!span.has_value()) return std::optional<Interval>({spec.epoch_ns, spec.epoch_ns});
+    span->from_ns = std::min(span->from_ns, spec.epoch_ns);
+    span->to_ns = std::max(span->to_ns, spec.epoch_ns);
+    return span;
+  }
+
+  // A face belongs to the block of its first corner, a vertex without faces to its own.
+  static absl::Status CheckVertices(const MeshBlock& block, double size_m) {
+    const Eigen::Vector3d low =
+        Eigen::Vector3d(block.index.x, block.index.y, block.index.z) * size_m;
+    const double far_m = low.cwiseAbs().maxCoeff() + size_m;
+    const double tolerance_m = kVertexToleranceM + kVertexTolerancePerM * far_m;
+    std::vector<bool> may_lie_outside(block.positions_map.size(), false);
+    for (const auto& face : block.faces) may_lie_outside[face[1]] = may_lie_outside[face[2]] = true;
+    for (const auto& face : block.faces) may_lie_outside[face[0]] = false;
+    for (size_t i = 0; i < block.positions_map.size(); ++i) {
+      const double reach_m = may_lie_outside[i] ? kFaceReachMaxM : tolerance_m;
+      const Eigen::Array3d at = block.positions_map[i].cast<double>().array();
+      const bool is_inside =
+          (at >= low.array() - reach_m).all() && (at <= low.array() + size_m + reach_m).all();
+      if (is_inside) continue;
+      return Invalid(absl::StrCat(
+          "vertex ", i, " of mesh block ", block.index.x, ",", block.index.y, ",", block.index.z,
+          " at (", at.x(), ", ", at.y(), ", ", at.z(),
+          ") is outside of the block, which begins at (", low.x(), ", ", low.y(), ", ", low.z(),
+          ") and is ", size_m,
+          " m wide; put each face into the block of its first corner, and each vertex without "
+          "faces into its own"));
+    }
+    return absl::OkStatus();
+  }
+
   const GraphDelta& delta_;
   const GraphLookup& graph_;
+  /// What FindKnownSpan has told, once it was asked.
+  std::optional<std::optional<Interval>> span_;
   std::unordered_map<LayerId, Layer> layers_;
   std::unordered_map<NodeId, Facts> facts_;
   std::set<NodeId> gone_;

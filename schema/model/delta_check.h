@@ -19,6 +19,8 @@ class GraphLookup {
     /// Empty when the node has no extent of its own.
     Box3d box_map;
     Eigen::Vector3d position_map = Eigen::Vector3d::Zero();
+    std::optional<TimeNs> first_observed_ns;
+    std::optional<TimeNs> last_observed_ns;
   };
 
   virtual ~GraphLookup() = default;
@@ -33,6 +35,14 @@ class GraphLookup {
   /// Time of the last stored pose; nullopt for an empty track.
   virtual absl::StatusOr<std::optional<TimeNs>> FindTrackEnd(NodeId agent) const = 0;
   virtual absl::StatusOr<bool> HasAsset(const Sha256& sha256) const = 0;
+  /// nullptr while there is no map yet, as for a file that is read: then neither the places of mesh
+  /// vertices nor the distance of times from the map's are checked.
+  virtual const MapSpec* FindSpec() const { return nullptr; }
+  /// From the first to the last pose that was ever stored; nullopt without poses. Asked only about
+  /// times that are far from the epoch.
+  virtual absl::StatusOr<std::optional<Interval>> FindSpan() const {
+    return std::optional<Interval>();
+  }
 };
 
 /// A child's box may stick out of its parent's by this much: boxes are fitted in doubles, and
@@ -42,6 +52,21 @@ inline constexpr double kBoxToleranceM = 1e-6;
 /// Coordinates beyond this are refused as absurd: 10,000 km is no building, and the spatial
 /// index counts millimetres in 32 bits from the map's origin (2,147 km).
 inline constexpr double kCoordinateMaxM = 2.0e6;
+
+/// What was observed further than this from all that a map knows is a wrong clock, and refused:
+/// maps are kept for years, and a robot that comes back after five of them is no error. The map
+/// knows its poses and, on a UNIX clock that was given one, its epoch; a map that knows neither
+/// takes any time. Clocks that are wrong by less are what retention minds (world_clock.h).
+inline constexpr TimeNs kObservedFarMaxNs = 3652 * 24 * 3600 * kNsPerSecond;
+/// As above, for when something existed in the world, which may be told from records.
+inline constexpr TimeNs kValidFarMaxNs = 10 * kObservedFarMaxNs;
+
+/// A mesh vertex may lie outside of its block by this much for each metre from the origin (floats
+/// have 24 bits), and by a tenth of a millimetre.
+inline constexpr double kVertexToleranceM = 1e-4;
+inline constexpr double kVertexTolerancePerM = 1.2e-7;
+/// The other corners of a face may lie outside of the block of the first, by no more than this.
+inline constexpr double kFaceReachMaxM = 1000.0;
 
 /// Limits that keep one delta, and every later answer about it, bounded.
 inline constexpr size_t kNameLengthMax = 1024;
@@ -56,11 +81,15 @@ inline constexpr size_t kAssetBytesMax = size_t{256} << 20;
 /// Proves the invariants of the data model against the graph at the head: ids exist and match
 /// their kind's layer; a parent's layer outranks its child's, so no containment cycle can form;
 /// boxes contain their children's boxes; quaternions are unit, numbers finite; intervals are
-/// ordered; trajectory times strictly grow per agent; edge ends live; sizes are bounded; assets
+/// ordered; trajectory times strictly grow per agent; edge ends live; sizes are bounded and not
+/// negative; outlines have corners and heights in order; vertices lie in their mesh block; assets
 /// match their hash and referenced ones exist. Each entity appears at most once (see Coalesce).
+/// What forgets (`is_forgetting`) writes parts of what is stored, so places and times that were
+/// taken before they were checked do not keep it from its work.
 ///
 /// Errors: INVALID_ARGUMENT/DELTA_INVALID or NUMBER_NOT_FINITE naming part, object and value;
-/// ALREADY_EXISTS/TRACK_CONFLICT when an append reaches back before the track's end.
+/// INVALID_ARGUMENT/TIME_IMPLAUSIBLE for times far from the map's, unless the node has them
+/// already; ALREADY_EXISTS/TRACK_CONFLICT when an append reaches back before the track's end.
 absl::Status CheckDelta(const GraphDelta& delta, const GraphLookup& graph);
 
 /// Sorts every part by key and keeps the last of entries with equal keys, so that an entity is

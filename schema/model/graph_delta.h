@@ -48,6 +48,24 @@ struct Retirement {
   std::optional<TimeNs> valid_to_ns;
 };
 
+/// Changes some fields of a node, or makes it; the others stay as they are stored. See
+/// schema/codec/patch.h.
+struct NodePatch {
+  NodeId id;
+  /// A dsg.v1.Node, serialized.
+  std::string fields;
+  /// Paths of dsg.v1.Node: what is written, also where `fields` does not set it. Empty = what
+  /// `fields` sets.
+  std::vector<std::string> mask;
+};
+
+struct EdgePatch {
+  EdgeKey key;
+  /// A dsg.v1.Edge, serialized.
+  std::string fields;
+  std::vector<std::string> mask;
+};
+
 /// A stretch of one agent's life, half-open.
 struct TrackSpan {
   NodeId agent;
@@ -61,7 +79,8 @@ struct StayKey {
   auto operator<=>(const StayKey&) const = default;
 };
 
-/// The identity of a delta is (session_id, sequence): committing it again changes nothing.
+/// The identity of a delta is (session_id, sequence): committing it again changes nothing, and
+/// another delta of that name is refused.
 struct GraphDelta {
   std::string map;
   std::string session_id;
@@ -76,6 +95,9 @@ struct GraphDelta {
   std::vector<Layer> layers;
   std::vector<SemanticLabel> labels;
   std::vector<Node> nodes;
+  /// Go after `nodes`, in order; edge patches after `edges`.
+  std::vector<NodePatch> node_patches;
+  std::vector<EdgePatch> edge_patches;
   std::vector<Retirement> retirements;
   std::vector<Edge> edges;
   std::vector<EdgeKey> edge_removals;

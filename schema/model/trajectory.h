@@ -80,7 +80,8 @@ struct Stay {
   bool operator==(const Stay&) const = default;
 };
 
-/// Stays are cut at this length, so that "who was here at t" looks back no further.
+/// "Who was here at t" looks back so far, and finds longer stays one by one: writers that know
+/// better cut theirs at this length, as ours do.
 inline constexpr TimeNs kStayNsMax = 3600 * kNsPerSecond;
 
 }  // namespace dsg

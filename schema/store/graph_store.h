@@ -12,7 +12,9 @@
 // Every call returns a Status or StatusOr; `*` above stands for a caller that has checked it.
 #pragma once
 
+#include <atomic>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -47,6 +49,15 @@ struct Touched {
   bool layers_or_labels = false;
 };
 
+/// What an erasure that was begun and cut off has still to wipe out, by what it is.
+struct PendingErasure {
+  int64_t node_count = 0;
+  int64_t edge_count = 0;
+  int64_t mesh_block_count = 0;
+  /// Stretches of tracks.
+  int64_t span_count = 0;
+};
+
 /// One map, open for reading.
 ///
 /// Threads: safe from many threads. Sees commits of other processes as they happen.
@@ -55,6 +66,12 @@ class MapReader {
   virtual ~MapReader() = default;
 
   virtual const MapSpec& spec() const = 0;
+  /// Tells this map from others of its name, before it and after it: those that it was restored
+  /// over or that were restored over it. Another one in each store.
+  virtual const std::string& incarnation() const = 0;
+  /// Tells what was opened: no other reader of this process has the same, nor will have. What is
+  /// kept of a map is kept under it.
+  uint64_t opening() const { return opening_; }
   /// False once the map's file was removed or replaced under it (a restore), or its past was
   /// rewritten (erased from): open it again.
   virtual bool IsCurrent() const = 0;
@@ -65,8 +82,9 @@ class MapReader {
   virtual absl::StatusOr<std::shared_ptr<const Snapshot>> At(Revision revision) = 0;
   /// From this revision on all can be read; of older ones those with a tag.
   virtual absl::StatusOr<Revision> OldestRevision() = 0;
-  /// Whether an erasure was begun and has not come to its end: MapWriter::Erase ends it.
-  virtual absl::StatusOr<bool> IsErasing() = 0;
+  /// Set from MapWriter::NoteErasure or Erase on until an Erase has wiped all of it; all zero when
+  /// only bytes of the log are left to wipe.
+  virtual absl::StatusOr<std::optional<PendingErasure>> GetPendingErasure() = 0;
   /// Order: by name.
   virtual absl::StatusOr<std::vector<Tag>> Tags() = 0;
   /// Newest first, below `before` (0 = from the newest), at most `limit`.
@@ -81,7 +99,9 @@ class MapReader {
   /// Reads everything: database structure, the log, payload checksums, the digest of every
   /// revision, the ends of edges. The other invariants are proven at each commit (CheckDelta).
   /// `progress` (may be empty) gets a fraction from 0 to 1.
-  virtual absl::StatusOr<VerifyReport> Verify(const std::function<void(double)>& progress) = 0;
+  /// Errors: what `stop` returned; it is asked also while SQLite checks the database's structure.
+  virtual absl::StatusOr<VerifyReport> Verify(const StopCheck& stop,
+                                              const std::function<void(double)>& progress) = 0;
   /// Writes the newest revision with all its history as a database file that needs no log beside
   /// it, while others read and write. The bytes depend on the content of the map alone. Nobody
   /// sees half a copy: it gets its name when it is whole and on the disk.
@@ -91,6 +111,10 @@ class MapReader {
   /// nothing left behind; DATA_LOSS/STORE_CORRUPT; what `stop` returned.
   virtual absl::Status CopyTo(const std::string& path, const StopCheck& stop,
                               const Progress& progress) = 0;
+
+ private:
+  static inline std::atomic<uint64_t> opening_count_{0};
+  const uint64_t opening_ = ++opening_count_;
 };
 
 /// Result of bringing a map to the newest format.
@@ -154,6 +178,6 @@ class GraphStore {
 };
 
 /// The number in every map file; opening never upgrades it silently.
-inline constexpr int kStoreFormatVersion = 2;
+inline constexpr int kStoreFormatVersion = 3;
 
 }  // namespace dsg

@@ -30,9 +30,12 @@ class GraphWriter {
 
   /// Applies the delta in one transaction and returns when it survives a power cut.
   ///
+  /// The same delta again, by session, sequence and content, is answered as the first time.
+  ///
   /// Errors: what CheckDelta returns; ABORTED/PARENT_REVISION_STALE; ABORTED/SEQUENCE_GAP;
-  /// RESOURCE_EXHAUSTED/DISK_FULL, nothing written; UNAVAILABLE/COMMIT_OUTCOME_UNKNOWN when the
-  /// disk failed in the very commit: ask again with the same session and sequence.
+  /// ALREADY_EXISTS/SEQUENCE_REUSED when another delta was committed under its session and
+  /// sequence; RESOURCE_EXHAUSTED/DISK_FULL, nothing written; UNAVAILABLE/COMMIT_OUTCOME_UNKNOWN
+  /// when the disk failed in the very commit: ask again with the same session and sequence.
   virtual absl::StatusOr<CommitResult> Commit(GraphDelta delta) = 0;
 
   /// How far a session got, so that an interrupted log can be resumed.

@@ -59,8 +59,10 @@ struct EraseReport {
   /// False when a reader kept the write-ahead log from being cut to nothing: it may hold the bytes
   /// until the same call is made again.
   bool is_clean = true;
-  /// An earlier erasure was cut off, and this call has ended it.
+  /// An earlier erasure was cut off, and this call has ended it, or went on with it.
   bool was_pending = false;
+  /// Of an earlier erasure something is believed still that its commits were to retire.
+  bool is_pending = false;
   /// Agents that such an erasure named and that are there again: nothing more of them was erased.
   std::vector<NodeId> left_agents;
   /// Paths in the store that this program does not write any more, such as copies that an upgrade
@@ -90,6 +92,11 @@ class MapWriter : public GraphWriter {
   /// Errors: OUT_OF_RANGE/REVISION_IN_FUTURE or REVISION_COMPACTED; what `stop` returned.
   virtual absl::StatusOr<CompactReport> Compact(Revision keep_from, const StopCheck& stop,
                                                 const Progress& progress) = 0;
+
+  /// Remembers that an erasure was begun, before the commits that retire what it names: the map
+  /// says so, and each Erase wipes what is retired of it, until nothing is left. What is written
+  /// anew of the named nodes, edges and mesh blocks after `planned_at` is kept.
+  virtual absl::Status NoteErasure(const Erasure& erasure, Revision planned_at) = 0;
 
   /// Wipes the past of what is named out of all revisions, so that neither the database nor its
   /// log holds the bytes, and counts and digests of the revisions are of what is left. Readers find

@@ -114,6 +114,9 @@ class Snapshot {
 
   virtual const MapSpec& spec() const = 0;
   virtual Revision revision() const = 0;
+  /// Of the map that was opened; see MapReader.
+  virtual uint64_t opening() const = 0;
+  virtual const std::string& incarnation() const = 0;
 
   /// Ascending by rank, then name.
   virtual absl::StatusOr<std::vector<Layer>> Layers() const = 0;

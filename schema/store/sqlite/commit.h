@@ -32,6 +32,7 @@ struct CommitContext {
   Database& db;
   const MapSpec& spec;
   Head head;
+  int64_t delta_checksum = 0;
   /// What has been touched so far.
   TouchedKeys touched = {};
 
@@ -55,8 +56,11 @@ class GraphRowsWriter {
   absl::Status EndEdgesOf(int64_t key);
   absl::Status WriteEdge(const Edge& edge);
   absl::StatusOr<bool> EndEdge(int64_t source, int64_t relation, int64_t target);
+  absl::StatusOr<int64_t> FindOrAddRelation(const std::string& name);
 
   CommitContext& commit_;
+  /// Ids of the relations that this commit has met.
+  std::map<std::string, int64_t> relations_;
 };
 
 /// Writes stays, mesh blocks, assets, factors and shapes.

@@ -64,14 +64,15 @@ absl::Status WriteCopy(Database& db, const std::string& path, const StopCheck& s
   const auto bytes = static_cast<double>(std::max<int64_t>(1, page_count - free_count)) *
                      static_cast<double>(kPageBytes);
   absl::Status told;
-  const absl::Status copied = db.CopyInto(path, [&] {
+  const StopCheck ask = [&] {
     struct stat info {};
     if (progress && stat(path.c_str(), &info) == 0) {
       progress(std::min(0.95, static_cast<double>(info.st_size) / bytes));
     }
-    told = AskStop(stop);
-    return told.ok();
-  });
+    return told = AskStop(stop);
+  };
+  const Database::StopScope scope(&db, ask);
+  const absl::Status copied = db.CopyInto(path);
   DSG_RETURN_IF_ERROR(told);
   return copied;
 }
@@ -84,7 +85,8 @@ absl::Status ForgetCounters(const std::string& path, const std::string& map) {
   return InTransaction(*db, [&]() -> absl::Status {
     DSG_RETURN_IF_ERROR(Query(*db,
                               "UPDATE map SET generation = 0,"
-                              " is_erasing = EXISTS (SELECT 1 FROM pending_erasure)")
+                              " is_erasing = EXISTS (SELECT 1 FROM pending_erasure)"
+                              " OR EXISTS (SELECT 1 FROM noted_erasure), incarnation = ''")
                             .Run());
     return db->SetSchemaVersion();
   });

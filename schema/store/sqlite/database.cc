@@ -113,20 +113,25 @@ absl::Status Database::WriteAnew() {
   return status;
 }
 
-absl::Status Database::CopyInto(const std::string& path, const std::function<bool()>& goes_on) {
+absl::Status Database::CopyInto(const std::string& path) {
   DSG_ASSIGN_OR_RETURN(const int64_t vacuum_mode, QueryInt("PRAGMA auto_vacuum"));
   // Of a database that has another mode already this one would be a change to itself.
   if (vacuum_mode == 0) DSG_RETURN_IF_ERROR(Execute("PRAGMA auto_vacuum=INCREMENTAL"));
   sqlite3_limit(db_, SQLITE_LIMIT_ATTACHED, 1);
-  sqlite3_progress_handler(
-      db_, kStepsPerQuestion,
-      [](void* ask) { return (*static_cast<const std::function<bool()>*>(ask))() ? 0 : 1; },
-      const_cast<std::function<bool()>*>(&goes_on));
   absl::Status status = Query(*this, "VACUUM INTO ?1").Bind(path).Run();
-  sqlite3_progress_handler(db_, 0, nullptr, nullptr);
   sqlite3_limit(db_, SQLITE_LIMIT_ATTACHED, 0);
   return status;
 }
+
+Database::StopScope::StopScope(Database* db, const StopCheck& stop) : db_(*db) {
+  if (!stop) return;
+  sqlite3_progress_handler(
+      db_.db_, kStepsPerQuestion,
+      [](void* ask) { return (*static_cast<const StopCheck*>(ask))().ok() ? 0 : 1; },
+      const_cast<StopCheck*>(&stop));
+}
+
+Database::StopScope::~StopScope() { sqlite3_progress_handler(db_.db_, 0, nullptr, nullptr); }
 
 absl::Status Database::SetSchemaVersion() {
   const OpenTables open(this);
@@ -143,9 +148,10 @@ int Database::error_code() const { return sqlite3_extended_errcode(db_); }
 
 absl::Status Database::Error(std::string_view doing) const {
   const int code = db_ == nullptr ? SQLITE_NOMEM : sqlite3_extended_errcode(db_);
-  // Users know files and perhaps tables, not statements.
+  // Users know files and perhaps tables, not statements. The folder is left out: the text also goes
+  // to remote callers.
   const std::string text =
-      absl::StrCat("map \"", map_name_, "\" (", path_, TableOf(doing),
+      absl::StrCat("map \"", map_name_, "\" (", path_.substr(path_.rfind('/') + 1), TableOf(doing),
                    "): ", db_ == nullptr ? "out of memory" : sqlite3_errmsg(db_));
   const ErrorMetadata metadata = {
       {"map", map_name_}, {"sqlite", absl::StrCat(code)}, {"doing", std::string(doing)}};

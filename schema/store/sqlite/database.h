@@ -13,6 +13,7 @@
 
 #include "absl/status/statusor.h"
 #include "schema/base/status.h"
+#include "schema/base/stop_check.h"
 
 struct sqlite3;
 struct sqlite3_stmt;
@@ -50,8 +51,20 @@ class Database {
   /// Needs room for a second copy while it runs.
   absl::Status WriteAnew();
   /// Writes all that is in the database now to a new file, without free pages and ready to shrink
-  /// in steps. Asks `goes_on` often, and gives up when it says false.
-  absl::Status CopyInto(const std::string& path, const std::function<bool()>& goes_on);
+  /// in steps. Within a StopScope it gives up when told.
+  absl::Status CopyInto(const std::string& path);
+  /// While it lives, statements are interrupted once `stop` says so; ask it what it said.
+  class StopScope {
+   public:
+    /// `stop` may be empty, and must outlive this.
+    StopScope(Database* db, const StopCheck& stop);
+    ~StopScope();
+    StopScope(const StopScope&) = delete;
+    StopScope& operator=(const StopScope&) = delete;
+
+   private:
+    Database& db_;
+  };
   /// While it lives, tables can be written that SQLite keeps for itself, such as the nodes of
   /// R*Trees.
   class OpenTables {

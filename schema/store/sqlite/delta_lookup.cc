@@ -1,24 +1,58 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "schema/store/sqlite/delta_lookup.h"
 
-#include "schema/codec/proto_convert.h"
+#include "schema/codec/node_codec.h"
 #include "schema/store/sqlite/commit.h"
+#include "schema/store/sqlite/graph_rows.h"
+#include "schema/store/sqlite/rows.h"
 
 namespace dsg::sqlite {
 
+absl::StatusOr<std::optional<Node>> DeltaLookup::ReadNode(NodeId id) const {
+  Query query(db_, "SELECT key, rev_from, layer, payload, checksum FROM node WHERE key = ?1");
+  const bool found = query.Bind(KeyOf(id)).Next();
+  DSG_RETURN_IF_ERROR(query.status());
+  if (!found) return std::optional<Node>();
+  return NodeFromRow(query, db_.map_name());
+}
+
+absl::StatusOr<std::optional<Edge>> DeltaLookup::ReadEdge(const EdgeKey& key) const {
+  Query query(db_,
+              "SELECT source, relation, target, rev_from, weight, payload, checksum FROM edge"
+              " WHERE source = ?1 AND target = ?2"
+              " AND relation = (SELECT id FROM relation WHERE name = ?3)");
+  const bool found = query.Bind(KeyOf(key.source), KeyOf(key.target), key.relation).Next();
+  DSG_RETURN_IF_ERROR(query.status());
+  if (!found) return std::optional<Edge>();
+  return EdgeFromRow(query, key.relation, db_.map_name());
+}
+
+absl::StatusOr<std::vector<Layer>> DeltaLookup::ReadLayers() const {
+  std::vector<Layer> layers;
+  Query query(db_, "SELECT id, name, rank FROM layer");
+  while (query.Next()) {
+    layers.push_back({static_cast<LayerId>(query.Int(0)), std::string(query.Text(1)),
+                      static_cast<int32_t>(query.Int(2))});
+  }
+  DSG_RETURN_IF_ERROR(query.status());
+  return layers;
+}
+
+// A large delta asks for many nodes, of which only the place counts.
 absl::StatusOr<std::optional<GraphLookup::NodeFacts>> DeltaLookup::FindNode(NodeId id) const {
-  Query query(db_, "SELECT rev_from, layer, payload, checksum FROM node WHERE key = ?1");
+  Query query(db_, "SELECT key, rev_from, layer, payload, checksum FROM node WHERE key = ?1");
   const bool found = query.Bind(KeyOf(id)).Next();
   DSG_RETURN_IF_ERROR(query.status());
   if (!found) return std::optional<NodeFacts>();
   Node node;
-  const bool sound =
-      query.Int(3) == RowChecksum({KeyOf(id), query.Int(0), query.Int(1)}, query.Blob(2)) &&
-      DecodeNodePayload(query.Blob(2), &node);
-  if (!sound) return CorruptRow(db_.map_name(), "node", ToString(id));
+  const auto checksum = RowChecksum({query.Int(0), query.Int(1), query.Int(2)}, query.Blob(3));
+  if (query.Int(4) != checksum || !DecodeNodePlacement(query.Blob(3), &node)) {
+    return CorruptRow(db_.map_name(), "node", ToString(id));
+  }
   return std::optional<NodeFacts>(
-      NodeFacts{static_cast<LayerId>(query.Int(1)), IsAgentKind(node.kind), node.valid,
-                node.box_node.isEmpty() ? Box3d() : node.BoxMap(), node.map_T_node.position});
+      NodeFacts{static_cast<LayerId>(query.Int(2)), IsAgentKind(node.kind), node.valid,
+                node.box_node.isEmpty() ? Box3d() : node.BoxMap(), node.map_T_node.position,
+                node.first_observed_ns, node.last_observed_ns});
 }
 
 absl::StatusOr<std::optional<Layer>> DeltaLookup::FindLayer(LayerId id) const {
@@ -70,6 +104,14 @@ absl::StatusOr<bool> DeltaLookup::HasAsset(const Sha256& sha256) const {
           .Next();
   DSG_RETURN_IF_ERROR(query.status());
   return found;
+}
+
+absl::StatusOr<std::optional<Interval>> DeltaLookup::FindSpan() const {
+  Query query(db_, "SELECT min(t0), max(t1), count(*) FROM trajectory_segment");
+  query.Next();
+  DSG_RETURN_IF_ERROR(query.status());
+  if (query.Int(2) == 0) return std::optional<Interval>();
+  return std::optional<Interval>({query.Int(0), query.Int(1)});
 }
 
 }  // namespace dsg::sqlite

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What CheckDelta asks of the graph, answered from the writer's own connection.
+// What a commit asks of the graph at the head, answered from the writer's own connection.
 #pragma once
 
 #include "schema/model/delta_check.h"
@@ -9,7 +9,8 @@ namespace dsg::sqlite {
 
 class DeltaLookup : public GraphLookup {
  public:
-  explicit DeltaLookup(Database* db) : db_(*db) {}
+  /// Both must outlive this.
+  DeltaLookup(Database* db, const MapSpec* spec) : db_(*db), spec_(*spec) {}
 
   absl::StatusOr<std::optional<NodeFacts>> FindNode(NodeId id) const override;
   absl::StatusOr<std::optional<Layer>> FindLayer(LayerId id) const override;
@@ -17,11 +18,20 @@ class DeltaLookup : public GraphLookup {
   absl::StatusOr<std::vector<NodeId>> FindChildren(NodeId id) const override;
   absl::StatusOr<std::optional<TimeNs>> FindTrackEnd(NodeId agent) const override;
   absl::StatusOr<bool> HasAsset(const Sha256& sha256) const override;
+  const MapSpec* FindSpec() const override { return &spec_; }
+  /// Cost: reads the begins and ends of all segments.
+  absl::StatusOr<std::optional<Interval>> FindSpan() const override;
+
+  /// Whole; nullopt when it is not believed in at the head.
+  absl::StatusOr<std::optional<Node>> ReadNode(NodeId id) const;
+  absl::StatusOr<std::optional<Edge>> ReadEdge(const EdgeKey& key) const;
+  absl::StatusOr<std::vector<Layer>> ReadLayers() const;
 
  private:
   absl::StatusOr<std::vector<NodeId>> ReadIds(const char* sql, NodeId id) const;
 
   Database& db_;
+  const MapSpec& spec_;
 };
 
 }  // namespace dsg::sqlite

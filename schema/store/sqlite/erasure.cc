@@ -11,6 +11,7 @@
 #include "schema/store/sqlite/erased_rows.h"
 #include "schema/store/sqlite/pending_erasure.h"
 #include "schema/store/sqlite/readable.h"
+#include "schema/store/sqlite/sessions.h"
 #include "schema/store/sqlite/space.h"
 
 namespace dsg::sqlite {
@@ -40,7 +41,7 @@ class Eraser {
     DSG_RETURN_IF_ERROR(GivePagesBack(db_, stop_));
     Tell(0.95);
     report_.is_clean = db_.Checkpoint(/*truncate=*/true);
-    if (report_.is_clean) {
+    if (report_.is_clean && !report_.is_pending) {
       DSG_RETURN_IF_ERROR(db_.Execute("UPDATE map SET is_erasing = 0 WHERE is_erasing"));
     }
     Tell(1.0);
@@ -58,20 +59,24 @@ class Eraser {
     DSG_ASSIGN_OR_RETURN(const int64_t is_erasing, db_.QueryInt("SELECT is_erasing FROM map"));
     report_.was_pending = is_erasing != 0;
     DSG_ASSIGN_OR_RETURN(list_, ListOf(db_, erasure_));
-    DSG_ASSIGN_OR_RETURN(const EraseList pending, ReadPendingErasure(db_));
-    list_.Add(pending);
-    if (list_.size() == 0) return absl::OkStatus();
+    EraseList earlier;
     const absl::Status noted = InTransaction(db_, [&]() -> absl::Status {
+      DSG_ASSIGN_OR_RETURN(earlier, TakeRipeErasures(db_, list_, &report_.is_pending));
+      DSG_ASSIGN_OR_RETURN(const EraseList pending, ReadPendingErasure(db_));
+      earlier.Add(pending);
+      list_.Add(earlier);
+      if (list_.size() == 0) return absl::OkStatus();
       DSG_RETURN_IF_ERROR(db_.Execute("UPDATE map SET is_erasing = 1 WHERE NOT is_erasing"));
+      DSG_RETURN_IF_ERROR(ForgetDeltaChecksums(db_));
       return WritePendingErasure(db_, list_);
     });
     DSG_RETURN_IF_ERROR(noted);
-    return LeaveAgentsThatAreBack(pending);
+    return LeaveAgentsThatAreBack(earlier);
   }
 
-  // Since the earlier erasure began.
-  absl::Status LeaveAgentsThatAreBack(const EraseList& pending) {
-    for (const NodeId id : pending.keys.nodes) {
+  // Since the earlier erasures began.
+  absl::Status LeaveAgentsThatAreBack(const EraseList& earlier) {
+    for (const NodeId id : earlier.keys.nodes) {
       DSG_ASSIGN_OR_RETURN(const bool is_agent, IsAgentThatIsThere(id));
       if (is_agent) report_.left_agents.push_back(id);
     }

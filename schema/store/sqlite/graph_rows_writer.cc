@@ -5,13 +5,27 @@
 #include "schema/store/sqlite/node_cells.h"
 
 namespace dsg::sqlite {
+
+absl::StatusOr<int64_t> GraphRowsWriter::FindOrAddRelation(const std::string& name) {
+  const auto known = relations_.find(name);
+  if (known != relations_.end()) return known->second;
+  DSG_ASSIGN_OR_RETURN(int64_t id, FindRelation(commit_.db, name));
+  if (id == 0) {
+    Query insert(commit_.db, "INSERT INTO relation (name) VALUES (?1)");
+    DSG_RETURN_IF_ERROR(insert.Bind(name).Run());
+    DSG_ASSIGN_OR_RETURN(id, FindRelation(commit_.db, name));
+  }
+  relations_[name] = id;
+  return id;
+}
+
 namespace {
 
-absl::StatusOr<int64_t> FindOrAddRelation(Database& db, const std::string& name) {
-  DSG_ASSIGN_OR_RETURN(const int64_t found, FindRelation(db, name));
-  if (found != 0) return found;
-  DSG_RETURN_IF_ERROR(Query(db, "INSERT INTO relation (name) VALUES (?1)").Bind(name).Run());
-  return FindRelation(db, name);
+// Older formats wrote some of a node in other bytes; what has not changed is no new version.
+bool IsSamePayload(std::string_view stored, const std::string& payload) {
+  if (stored == payload) return true;
+  Node node;
+  return DecodeNodePayload(stored, &node) && EncodeNodePayload(node) == payload;
 }
 
 }  // namespace
@@ -64,15 +78,16 @@ absl::Status GraphRowsWriter::WriteLabel(const SemanticLabel& label) {
 
 absl::Status GraphRowsWriter::WriteNode(const Node& node) {
   const std::string payload = EncodeNodePayload(node);
+  bool exists = false;
   {
     Query current(commit_.db, "SELECT layer, payload FROM node WHERE key = ?1");
-    const bool exists = current.Bind(KeyOf(node.id)).Next();
+    exists = current.Bind(KeyOf(node.id)).Next();
     DSG_RETURN_IF_ERROR(current.status());
-    if (exists && current.Int(0) == node.layer && current.Blob(1) == payload) {
+    if (exists && current.Int(0) == node.layer && IsSamePayload(current.Blob(1), payload)) {
       return absl::OkStatus();
     }
   }
-  DSG_RETURN_IF_ERROR(EndNode(KeyOf(node.id)).status());
+  if (exists) DSG_RETURN_IF_ERROR(EndNode(KeyOf(node.id)).status());
   DSG_RETURN_IF_ERROR(InsertNode(node, payload));
   return AddCell(commit_.db, node);
 }
@@ -159,21 +174,22 @@ absl::Status GraphRowsWriter::Retire(const Retirement& item) {
 }
 
 absl::Status GraphRowsWriter::WriteEdge(const Edge& edge) {
-  DSG_ASSIGN_OR_RETURN(const int64_t relation, FindOrAddRelation(commit_.db, edge.relation));
+  DSG_ASSIGN_OR_RETURN(const int64_t relation, FindOrAddRelation(edge.relation));
   const int64_t source = KeyOf(edge.source);
   const int64_t target = KeyOf(edge.target);
   const std::string payload = EncodeEdgePayload(edge);
+  bool exists = false;
   {
     Query current(commit_.db,
                   "SELECT weight, payload FROM edge"
                   " WHERE source = ?1 AND relation = ?2 AND target = ?3");
-    const bool exists = current.Bind(source, relation, target).Next();
+    exists = current.Bind(source, relation, target).Next();
     DSG_RETURN_IF_ERROR(current.status());
     if (exists && BitsOf(current.Real(0)) == BitsOf(edge.weight) && current.Blob(1) == payload) {
       return absl::OkStatus();
     }
   }
-  DSG_RETURN_IF_ERROR(EndEdge(source, relation, target).status());
+  if (exists) DSG_RETURN_IF_ERROR(EndEdge(source, relation, target).status());
   const std::initializer_list<int64_t> columns = {source, relation, target, commit_.revision(),
                                                   BitsOf(edge.weight)};
   commit_.touched.edges.push_back({edge.source, relation, edge.target});

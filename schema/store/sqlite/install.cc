@@ -40,7 +40,7 @@ absl::Status CheckFile(const std::string& file, const std::string& name) {
   DSG_RETURN_IF_ERROR(CheckSchema(*db, file));
   DSG_ASSIGN_OR_RETURN(const MapSpec spec, ReadMapSpec(*db));
   DSG_RETURN_IF_ERROR(spec.Validate());
-  DSG_ASSIGN_OR_RETURN(const VerifyReport report, VerifyMap(*db, spec, {}));
+  DSG_ASSIGN_OR_RETURN(const VerifyReport report, VerifyMap(*db, spec, {}, {}));
   if (report.problems.empty()) return absl::OkStatus();
   return MakeError(Reason::kStoreCorrupt,
                    absl::StrCat(file, " cannot become map \"", name,
@@ -67,8 +67,9 @@ absl::StatusOr<int64_t> CloseOldMap(const std::string& store_folder, const std::
 absl::Status PrepareFile(const std::string& file, const std::string& name, int64_t generation) {
   {
     DSG_ASSIGN_OR_RETURN(const auto db, Database::Open(file, Database::Mode::kWrite, name));
-    DSG_RETURN_IF_ERROR(
-        Query(*db, "UPDATE map SET name = ?1, generation = ?2").Bind(name, generation).Run());
+    DSG_RETURN_IF_ERROR(Query(*db, "UPDATE map SET name = ?1, generation = ?2, incarnation = ?3")
+                            .Bind(name, generation, NewIncarnation())
+                            .Run());
     DSG_RETURN_IF_ERROR(db->Execute("PRAGMA journal_mode=WAL"));
     if (!db->Checkpoint(/*truncate=*/true)) return db->Error("completing " + file);
   }

@@ -4,16 +4,21 @@
 #include <fcntl.h>
 #include <linux/magic.h>
 #include <sys/file.h>
+#include <sys/random.h>
 #include <sys/stat.h>
 #include <sys/vfs.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <filesystem>
+#include <thread>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "schema/base/time.h"
 #include "schema/model/edge.h"
 #include "schema/store/graph_store.h"
 #include "schema/store/log_bytes.h"
@@ -22,12 +27,26 @@ namespace dsg::sqlite {
 
 extern const char kInitSql[];
 extern const char kLongLivedSql[];
+extern const char kIdentitySql[];
 
 namespace {
 
 namespace fs = std::filesystem;
 
+// How those who make a map name themselves in its lock, and how long that takes at most.
+constexpr char kCreator[] = "create";
+constexpr std::chrono::seconds kCreationMax{10};
+
 std::string Errno() { return std::strerror(errno); }
+
+// Who holds the lock of that file; empty while it has not said so.
+std::string ReadHolder(int fd) {
+  char text[256] = {};
+  const ssize_t size = pread(fd, text, sizeof(text) - 1, 0);
+  std::string holder(text, static_cast<size_t>(size > 0 ? size : 0));
+  if (!holder.empty() && holder.back() == '\n') holder.pop_back();
+  return holder;
+}
 
 int64_t SizeOf(const std::string& path) {
   struct stat info {};
@@ -38,12 +57,14 @@ absl::Status FillNewDatabase(Database& db, const MapSpec& spec) {
   DSG_RETURN_IF_ERROR(db.Execute("BEGIN IMMEDIATE"));
   DSG_RETURN_IF_ERROR(db.Execute(kInitSql));
   DSG_RETURN_IF_ERROR(db.Execute(kLongLivedSql));
+  DSG_RETURN_IF_ERROR(db.Execute(kIdentitySql));
   DSG_RETURN_IF_ERROR(Query(db,
                             "INSERT INTO map (id, name, frame, epoch_ns, clock, codec, gap_ns_max,"
-                            " mesh_block_size_m) VALUES (1, ?1, ?2, ?3, ?4, ?5, ?6, ?7)")
+                            " mesh_block_size_m, incarnation)"
+                            " VALUES (1, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)")
                           .Bind(spec.name, spec.frame, spec.epoch_ns, static_cast<int>(spec.clock),
                                 static_cast<int>(spec.codec), spec.gap_ns_max,
-                                spec.mesh_block_size_m)
+                                spec.mesh_block_size_m, NewIncarnation())
                           .Run());
   for (const Layer& layer : DefaultLayers()) {
     DSG_RETURN_IF_ERROR(
@@ -150,13 +171,15 @@ absl::Status CreateMapFile(const std::string& store_folder, const MapSpec& spec)
   if (error) {
     return absl::InternalError(absl::StrCat("cannot make ", folder, ": ", error.message()));
   }
-  // Two processes may create the same map at once: the lock decides, the loser sees it exists.
-  DSG_ASSIGN_OR_RETURN(const auto lock, WriterLock::Acquire(store_folder, spec.name, "create"));
   const std::string path = DatabasePath(store_folder, spec.name);
-  if (fs::exists(path, error)) {
-    return MakeError(Reason::kMapExists, absl::StrCat("map \"", spec.name, "\" exists already"),
-                     {{"map", spec.name}});
-  }
+  const absl::Status exists =
+      MakeError(Reason::kMapExists, absl::StrCat("map \"", spec.name, "\" exists already"),
+                {{"map", spec.name}});
+  if (fs::exists(path, error)) return exists;
+  // Two processes may create the same map at once: the lock decides, the loser sees it exists.
+  const auto lock = WriterLock::Acquire(store_folder, spec.name, kCreator);
+  if (fs::exists(path, error)) return exists;
+  DSG_RETURN_IF_ERROR(lock.status());
   const std::string partial = path + ".new";
   for (const char* suffix : {"", "-wal", "-shm"}) fs::remove(partial + suffix, error);
   {
@@ -235,6 +258,21 @@ absl::StatusOr<MapSpec> ReadMapSpec(Database& db) {
   return spec;
 }
 
+std::string NewIncarnation() {
+  uint64_t bits[2] = {};
+  // Fails only before a machine has gathered any randomness; then the clock must do.
+  if (getrandom(bits, sizeof(bits), 0) != sizeof(bits))
+    bits[0] = static_cast<uint64_t>(WallClockNs());
+  return absl::StrFormat("%016x%016x", bits[0], bits[1]);
+}
+
+absl::StatusOr<std::string> ReadIncarnation(Database& db) {
+  Query query(db, "SELECT incarnation FROM map");
+  const bool found = query.Next();
+  DSG_RETURN_IF_ERROR(query.status());
+  return found ? std::string(query.Text(0)) : std::string();
+}
+
 std::optional<FileIdentity> IdentityOf(const std::string& store_folder, const std::string& map) {
   struct stat info {};
   if (stat(DatabasePath(store_folder, map).c_str(), &info) != 0) return std::nullopt;
@@ -275,17 +313,21 @@ absl::StatusOr<std::unique_ptr<WriterLock>> WriterLock::Acquire(const std::strin
                      {{"map", map}});
   }
   std::unique_ptr<WriterLock> lock(new WriterLock(fd));
-  if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
-    char text[256] = {};
-    const ssize_t size = pread(fd, text, sizeof(text) - 1, 0);
-    std::string holder(text, static_cast<size_t>(size > 0 ? size : 0));
-    if (!holder.empty() && holder.back() == '\n') holder.pop_back();
-    if (holder.empty()) holder = "another process";
+  const auto give_up = std::chrono::steady_clock::now() + kCreationMax;
+  while (flock(fd, LOCK_EX | LOCK_NB) != 0) {
+    const std::string holder = ReadHolder(fd);
+    // Who made the map at the same time is done in a moment; who has no name yet may be that one.
+    const bool is_brief = holder.empty() || holder.rfind(kCreator, 0) == 0;
+    if (is_brief && std::chrono::steady_clock::now() < give_up) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      continue;
+    }
+    const std::string named = holder.empty() ? "another process" : holder;
     return MakeError(Reason::kWriterLocked,
-                     absl::StrCat("map \"", map, "\" is being written by ", holder,
+                     absl::StrCat("map \"", map, "\" is being written by ", named,
                                   "; a map has one writer at a time: stop it, or write through it "
                                   "with --server"),
-                     {{"map", map}, {"holder", holder}});
+                     {{"map", map}, {"holder", named}});
   }
   const std::string holder = absl::StrCat(program, " (process ", getpid(), ")\n");
   const bool named = ftruncate(fd, 0) == 0 && pwrite(fd, holder.data(), holder.size(), 0) ==

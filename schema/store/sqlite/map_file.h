@@ -46,6 +46,10 @@ absl::Status SyncFolder(const std::string& folder);
 
 absl::StatusOr<MapSpec> ReadMapSpec(Database& db);
 
+/// Random text that no other map has; see MapReader::incarnation.
+std::string NewIncarnation();
+absl::StatusOr<std::string> ReadIncarnation(Database& db);
+
 /// Which file it is, whatever its name.
 struct FileIdentity {
   uint64_t device = 0;

@@ -3,6 +3,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "schema/store/sqlite/copy.h"
+#include "schema/store/sqlite/pending_erasure.h"
 #include "schema/store/sqlite/sessions.h"
 #include "schema/store/sqlite/tags.h"
 
@@ -29,6 +30,10 @@ absl::StatusOr<std::shared_ptr<SqliteMapReader>> SqliteMapReader::Open(
   reader->identity_ = IdentityOf(store_folder, map);
   DSG_ASSIGN_OR_RETURN(reader->watcher_, OpenMapFile(store_folder, map, Database::Mode::kRead));
   DSG_ASSIGN_OR_RETURN(reader->spec_, ReadMapSpec(*reader->watcher_));
+  DSG_ASSIGN_OR_RETURN(const std::string stored, ReadIncarnation(*reader->watcher_));
+  // A file that was put there by hand bears the text of the one that it was copied from.
+  const uint64_t inode = reader->identity_.has_value() ? reader->identity_->inode : 0;
+  reader->incarnation_ = absl::StrCat(stored, "-", absl::Hex(inode));
   DSG_ASSIGN_OR_RETURN(const Readable readable, LoadReadable(*reader->watcher_));
   reader->generation_ = readable.generation;
   return reader;
@@ -129,10 +134,10 @@ absl::StatusOr<Revision> SqliteMapReader::OldestRevision() {
   return state.readable->oldest;
 }
 
-absl::StatusOr<bool> SqliteMapReader::IsErasing() {
+absl::StatusOr<std::optional<PendingErasure>> SqliteMapReader::GetPendingErasure() {
   DSG_ASSIGN_OR_RETURN(Lease lease, LeaseConnection());
-  DSG_ASSIGN_OR_RETURN(const int64_t is_erasing, lease->QueryInt("SELECT is_erasing FROM map"));
-  return is_erasing != 0;
+  DSG_RETURN_IF_ERROR(lease.BeginTransaction());
+  return sqlite::GetPendingErasure(*lease);
 }
 
 absl::StatusOr<std::vector<Tag>> SqliteMapReader::Tags() {
@@ -160,9 +165,10 @@ absl::StatusOr<SessionState> SqliteMapReader::GetSession(const std::string& sess
   return ReadSession(*lease, session_id);
 }
 
-absl::StatusOr<VerifyReport> SqliteMapReader::Verify(const std::function<void(double)>& progress) {
+absl::StatusOr<VerifyReport> SqliteMapReader::Verify(const StopCheck& stop,
+                                                     const std::function<void(double)>& progress) {
   DSG_ASSIGN_OR_RETURN(Lease lease, LeaseConnection());
-  return VerifyMap(*lease, spec_, progress);
+  return VerifyMap(*lease, spec_, stop, progress);
 }
 
 absl::Status SqliteMapReader::CopyTo(const std::string& path, const StopCheck& stop,

@@ -24,18 +24,20 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
                                                                size_t cache_bytes);
 
   const MapSpec& spec() const override { return spec_; }
+  const std::string& incarnation() const override { return incarnation_; }
   bool IsCurrent() const override;
   absl::StatusOr<RevisionInfo> Head() override;
   absl::StatusOr<std::shared_ptr<const Snapshot>> Latest() override;
   absl::StatusOr<std::shared_ptr<const Snapshot>> At(Revision revision) override;
   absl::StatusOr<Revision> OldestRevision() override;
-  absl::StatusOr<bool> IsErasing() override;
+  absl::StatusOr<std::optional<PendingErasure>> GetPendingErasure() override;
   absl::StatusOr<std::vector<Tag>> Tags() override;
   absl::StatusOr<std::vector<RevisionInfo>> ListRevisions(Revision before, int limit) override;
   absl::StatusOr<Touched> TouchedBetween(Revision after, Revision until,
                                          const StopCheck& stop) override;
   absl::StatusOr<SessionState> GetSession(const std::string& session_id) override;
-  absl::StatusOr<VerifyReport> Verify(const std::function<void(double)>& progress) override;
+  absl::StatusOr<VerifyReport> Verify(const StopCheck& stop,
+                                      const std::function<void(double)>& progress) override;
   absl::Status CopyTo(const std::string& path, const StopCheck& stop,
                       const Progress& progress) override;
 
@@ -87,6 +89,7 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
 
   std::string store_folder_;
   MapSpec spec_;
+  std::string incarnation_;
   std::optional<FileIdentity> identity_;
 
   mutable std::mutex head_mutex_;
@@ -113,7 +116,7 @@ std::shared_ptr<const Snapshot> MakeSnapshot(std::shared_ptr<SqliteMapReader> re
                                              std::shared_ptr<const sqlite::Head> head);
 
 /// Reads the whole map; see MapReader::Verify.
-absl::StatusOr<VerifyReport> VerifyMap(Database& db, const MapSpec& spec,
+absl::StatusOr<VerifyReport> VerifyMap(Database& db, const MapSpec& spec, const StopCheck& stop,
                                        const std::function<void(double)>& progress);
 
 }  // namespace dsg::sqlite

@@ -95,16 +95,17 @@ absl::StatusOr<Head> LoadHead(Database& db) {
 
 absl::Status InsertRevision(const CommitContext& commit) {
   const RevisionInfo& info = commit.head.info;
-  DSG_RETURN_IF_ERROR(WriteSession(commit.db, info));
+  DSG_RETURN_IF_ERROR(WriteSession(commit.db, info, commit.delta_checksum));
   const std::string content = commit.head.content.bytes();
-  return Query(commit.db, "INSERT INTO revision (" DSG_REVISION_COLUMNS
-                          ") VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13,"
-                          " ?14, ?15, ?16, ?17, ?18)")
+  return Query(commit.db,
+               "INSERT INTO revision (" DSG_REVISION_COLUMNS
+               ", delta_checksum) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13,"
+               " ?14, ?15, ?16, ?17, ?18, ?19)")
       .Bind(info.revision, Query::BlobView{View(info.digest)}, Query::BlobView{content},
             info.committed_ns, info.author, info.message, info.session_id, info.sequence,
             info.config_digest, info.node_count, info.edge_count, info.agent_count, info.pose_count,
             info.stay_count, info.mesh_block_count, commit.head.first_pose_ns,
-            commit.head.last_pose_ns, FormatCounts(commit.head.layer_counts))
+            commit.head.last_pose_ns, FormatCounts(commit.head.layer_counts), commit.delta_checksum)
       .Run();
 }
 

@@ -19,6 +19,8 @@ class SqliteSnapshot : public Snapshot {
 
   const MapSpec& spec() const override { return reader_->spec(); }
   Revision revision() const override { return head_->info.revision; }
+  uint64_t opening() const override { return reader_->opening(); }
+  const std::string& incarnation() const override { return reader_->incarnation(); }
 
   absl::StatusOr<std::vector<Layer>> Layers() const override;
   absl::StatusOr<Layer> FindLayer(std::string_view name) const override;

@@ -35,6 +35,23 @@ absl::Status CorruptSegment(const std::string& map, const SegmentRef& segment) {
   return CorruptRow(map, "trajectory_segment", absl::StrCat(segment.id));
 }
 
+// Rows that may touch [?3, ?4) as of ?5. The lengths are written as the partial indices have them,
+// and SQLite computes them without overflow.
+#define DSG_STAY_COLUMNS "SELECT agent, place, room, enter_ns, exit_ns, rev_from, checksum FROM "
+#define DSG_SHORT_STAYS(column)                                        \
+  " WHERE " column                                                     \
+  " = ?1 AND enter_ns >= ?2 AND enter_ns < ?4 AND exit_ns - enter_ns " \
+  "<= " DSG_HOUR
+#define DSG_LONG_STAYS(column) \
+  " WHERE " column " = ?1 AND exit_ns > ?3 AND +enter_ns < ?4 AND exit_ns - enter_ns > " DSG_HOUR
+#define DSG_HOUR "3600000000000"
+#define DSG_STAYS_IN(column) \
+  DSG_STAY_COLUMNS "stay" DSG_SHORT_STAYS(column) " AND +rev_from <= ?5 UNION ALL "               \
+  DSG_STAY_COLUMNS "stay" DSG_LONG_STAYS(column) " AND +rev_from <= ?5 UNION ALL "                \
+  DSG_STAY_COLUMNS "stay_history" DSG_SHORT_STAYS(column)                                         \
+  " AND +rev_from <= ?5 AND +rev_to > ?5 UNION ALL "                                              \
+  DSG_STAY_COLUMNS "stay_history" DSG_LONG_STAYS(column) " AND +rev_from <= ?5 AND +rev_to > ?5"
+
 bool ByEnter(const Stay& a, const Stay& b) {
   return a.enter_ns != b.enter_ns ? a.enter_ns < b.enter_ns : a.agent < b.agent;
 }
@@ -268,10 +285,13 @@ absl::StatusOr<std::optional<Stay>> SqliteSnapshot::StayAt(NodeId agent, TimeNs 
   DSG_ASSIGN_OR_RETURN(const auto track, reader_->GetTrack(agent, revision()));
   const auto next = std::upper_bound(track->stays.begin(), track->stays.end(), at_ns,
                                      [](TimeNs t, const Stay& stay) { return t < stay.enter_ns; });
-  if (next == track->stays.begin()) return std::optional<Stay>();
-  const Stay stay = ClipToTrack(*(next - 1), track->info);
-  if (at_ns >= stay.exit_ns) return std::optional<Stay>();
-  return std::optional<Stay>(stay);
+  // A long stay may hold shorter ones, which are over; the last that began counts.
+  for (size_t i = static_cast<size_t>(next - track->stays.begin()); i-- > 0;) {
+    const Stay stay = ClipToTrack(track->stays[i], track->info);
+    if (at_ns < stay.exit_ns) return std::optional<Stay>(stay);
+    if (track->stays_end_ns[i] <= at_ns) break;
+  }
+  return std::optional<Stay>();
 }
 
 absl::StatusOr<std::vector<Stay>> SqliteSnapshot::StaysOfAgent(NodeId agent, TimeNs from_ns,
@@ -291,21 +311,12 @@ absl::StatusOr<std::vector<Stay>> SqliteSnapshot::StaysInNode(NodeId room_or_pla
   std::vector<Stay> stays;
   {
     DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
-    // No stay is longer than an hour, so none that entered earlier can reach from_ns.
+    // Of those up to an hour none that entered earlier can reach from_ns; the longer ones have
+    // indices of their own.
     const TimeNs enter_min = from_ns < kTimeMin + kStayNsMax ? kTimeMin : from_ns - kStayNsMax;
-    for (const char* sql :
-         {"SELECT agent, place, room, enter_ns, exit_ns, rev_from, checksum FROM stay"
-          " WHERE room = ?1 AND enter_ns >= ?2 AND enter_ns < ?3 AND rev_from <= ?4"
-          " UNION ALL SELECT agent, place, room, enter_ns, exit_ns, rev_from, checksum"
-          " FROM stay_history WHERE room = ?1 AND enter_ns >= ?2 AND enter_ns < ?3"
-          " AND +rev_from <= ?4 AND +rev_to > ?4",
-          "SELECT agent, place, room, enter_ns, exit_ns, rev_from, checksum FROM stay"
-          " WHERE place = ?1 AND enter_ns >= ?2 AND enter_ns < ?3 AND rev_from <= ?4"
-          " UNION ALL SELECT agent, place, room, enter_ns, exit_ns, rev_from, checksum"
-          " FROM stay_history WHERE place = ?1 AND enter_ns >= ?2 AND enter_ns < ?3"
-          " AND +rev_from <= ?4 AND +rev_to > ?4"}) {
+    for (const char* sql : {DSG_STAYS_IN("room"), DSG_STAYS_IN("place")}) {
       Query query(*lease, sql);
-      query.Bind(KeyOf(room_or_place), enter_min, to_ns, revision());
+      query.Bind(KeyOf(room_or_place), enter_min, from_ns, to_ns, revision());
       while (query.Next()) {
         const auto checksum = RowChecksum32(
             {query.Int(0), query.Int(3), query.Int(4), query.Int(1), query.Int(2), query.Int(5)},

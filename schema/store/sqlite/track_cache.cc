@@ -102,6 +102,10 @@ absl::Status LoadStays(Database& db, Revision revision, NodeId agent, Track* tra
   DSG_RETURN_IF_ERROR(query.status());
   std::sort(track->stays.begin(), track->stays.end(),
             [](const Stay& a, const Stay& b) { return a.enter_ns < b.enter_ns; });
+  TimeNs end_ns = kTimeMin;
+  for (const Stay& stay : track->stays) {
+    track->stays_end_ns.push_back(end_ns = std::max(end_ns, stay.exit_ns));
+  }
   return absl::OkStatus();
 }
 

@@ -31,12 +31,14 @@ struct Track {
   std::vector<SegmentRef> segments;
   /// Ascending by enter_ns; open ends are left open.
   std::vector<Stay> stays;
+  /// Of each stay, the largest exit_ns of it and those before.
+  std::vector<TimeNs> stays_end_ns;
 
   /// Index of the last segment with t0 <= t; -1 if none.
   int FindSegment(TimeNs t_ns) const;
   size_t memory_bytes() const {
     return sizeof(*this) + segments.capacity() * sizeof(SegmentRef) +
-           stays.capacity() * sizeof(Stay);
+           stays.capacity() * (sizeof(Stay) + sizeof(TimeNs));
   }
 };
 

@@ -15,6 +15,7 @@
 namespace dsg::sqlite {
 
 extern const char kLongLivedSql[];
+extern const char kIdentitySql[];
 
 namespace {
 
@@ -84,8 +85,14 @@ absl::Status FromFormat1(Database& db) {
     DSG_RETURN_IF_ERROR(FillTouched(db));
   }
   DSG_RETURN_IF_ERROR(db.Execute(kLongLivedSql));
-  DSG_RETURN_IF_ERROR(FillCells(db));
-  return db.Execute("PRAGMA user_version=2");
+  return FillCells(db);
+}
+
+absl::Status UpgradeFrom(int64_t format, Database& db) {
+  if (format < 2) DSG_RETURN_IF_ERROR(FromFormat1(db));
+  DSG_RETURN_IF_ERROR(db.Execute(kIdentitySql));
+  DSG_RETURN_IF_ERROR(Query(db, "UPDATE map SET incarnation = ?1").Bind(NewIncarnation()).Run());
+  return db.Execute(absl::StrCat("PRAGMA user_version=", kStoreFormatVersion).c_str());
 }
 
 // The whole map is in the file once its log has been copied back and nobody else writes.
@@ -129,7 +136,7 @@ absl::StatusOr<UpgradeReport> UpgradeMapFile(const std::string& store_folder,
   if (report.from_format == kStoreFormatVersion) return report;
   DSG_ASSIGN_OR_RETURN(report.copy, KeepCopy(*db, report.from_format));
   DSG_RETURN_IF_ERROR(db->Execute("BEGIN IMMEDIATE"));
-  absl::Status status = FromFormat1(*db);
+  absl::Status status = UpgradeFrom(report.from_format, *db);
   if (status.ok()) status = db->Execute("COMMIT");
   if (!status.ok()) db->Execute("ROLLBACK").IgnoreError();
   DSG_RETURN_IF_ERROR(status);

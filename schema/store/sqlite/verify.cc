@@ -29,12 +29,15 @@ bool HoldsTimes(std::string_view payload, TimeNs t0, TimeNs t1) {
 
 class Verifier {
  public:
-  Verifier(Database& db, const MapSpec& spec, const std::function<void(double)>& progress)
-      : db_(db), spec_(spec), progress_(progress) {}
+  Verifier(Database& db, const MapSpec& spec, const StopCheck& stop,
+           const std::function<void(double)>& progress)
+      : db_(db), spec_(spec), stop_(stop), progress_(progress) {}
 
   absl::StatusOr<VerifyReport> Run() {
     // One snapshot of everything; a writer may go on meanwhile.
-    DSG_RETURN_IF_ERROR(db_.Execute("BEGIN"));
+    const ReadTransaction transaction(&db_);
+    DSG_RETURN_IF_ERROR(transaction.status());
+    const Database::StopScope scope(&db_, stop_);
     using Step = void (Verifier::*)();
     const Step steps[] = {
         &Verifier::CheckStructure, &Verifier::CheckNodes,  &Verifier::CheckEdges,
@@ -45,10 +48,11 @@ class Verifier {
     for (const Step step : steps) {
       if (progress_) progress_(done / std::size(steps));
       (this->*step)();
+      // A statement that was stopped looks like a damaged table.
+      DSG_RETURN_IF_ERROR(AskStop(stop_));
       done += 1.0;
     }
     if (progress_) progress_(1.0);
-    db_.Execute("COMMIT").IgnoreError();
     return std::move(report_);
   }
 
@@ -309,15 +313,20 @@ class Verifier {
   }
 
   void CheckErasure() {
-    const auto is_erasing = db_.QueryInt("SELECT is_erasing FROM map");
-    const auto pending = ReadPendingErasure(db_);
+    const auto pending = GetPendingErasure(db_);
     if (!pending.ok()) return Problem(std::string(pending.status().message()));
-    if (!is_erasing.ok() || *is_erasing == 0) return;
+    if (!pending->has_value()) return;
+    const PendingErasure& left = **pending;
+    const int64_t count =
+        left.node_count + left.edge_count + left.mesh_block_count + left.span_count;
     report_.notes.push_back(
-        absl::StrCat("an erasure has not come to its end, ",
-                     pending->size() == 0 ? "and what it took out may still be in the file"
-                                          : absl::StrCat("and names ", pending->size(), " things"),
-                     "; the next `dsg prune --erase`, whatever it names, does the rest"));
+        count == 0 ? "an erasure has not come to its end, and what it took out may still be in the "
+                     "file; the next `dsg prune --erase`, whatever it names, does the rest"
+                   : absl::StrCat("an erasure has not come to its end, and names ", left.node_count,
+                                  " nodes, ", left.edge_count, " edges, ", left.mesh_block_count,
+                                  " mesh blocks and ", left.span_count,
+                                  " stretches of tracks; the same `dsg prune --erase` again does "
+                                  "the rest"));
   }
 
   void CheckHistory() {
@@ -327,6 +336,7 @@ class Verifier {
 
   Database& db_;
   const MapSpec& spec_;
+  const StopCheck& stop_;
   const std::function<void(double)>& progress_;
   VerifyReport report_;
   /// Current nodes that have a cell.
@@ -337,9 +347,9 @@ class Verifier {
 
 }  // namespace
 
-absl::StatusOr<VerifyReport> VerifyMap(Database& db, const MapSpec& spec,
+absl::StatusOr<VerifyReport> VerifyMap(Database& db, const MapSpec& spec, const StopCheck& stop,
                                        const std::function<void(double)>& progress) {
-  return Verifier(db, spec, progress).Run();
+  return Verifier(db, spec, stop, progress).Run();
 }
 
 }  // namespace dsg::sqlite

@@ -5,12 +5,16 @@
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/time.h"
+#include "schema/codec/delta_checksum.h"
+#include "schema/codec/patch.h"
 #include "schema/model/delta_check.h"
 #include "schema/store/sqlite/delta_lookup.h"
 #include "schema/store/sqlite/erasure.h"
 #include "schema/store/sqlite/page_checksum.h"
+#include "schema/store/sqlite/pending_erasure.h"
 #include "schema/store/sqlite/readable.h"
 #include "schema/store/sqlite/sessions.h"
+#include "schema/store/sqlite/space.h"
 #include "schema/store/sqlite/tags.h"
 
 namespace dsg::sqlite {
@@ -31,6 +35,7 @@ int CheckpointPages(int64_t quota_bytes) {
 
 absl::Status CheckForgetting(const GraphDelta& delta) {
   const bool brings_nothing = delta.layers.empty() && delta.labels.empty() && delta.nodes.empty() &&
+                              delta.node_patches.empty() && delta.edge_patches.empty() &&
                               delta.edges.empty() && delta.appends.empty() &&
                               delta.factors.empty() && delta.shapes.empty() && delta.assets.empty();
   if (!delta.is_forgetting || brings_nothing) return absl::OkStatus();
@@ -93,10 +98,20 @@ absl::Status SqliteWriter::CheckSequence(const GraphDelta& delta) {
        {"last_sequence", absl::StrCat(session.last_sequence)}});
 }
 
+namespace {
+
+const absl::Status& StatusOf(const absl::Status& status) { return status; }
+template <typename T>
+const absl::Status& StatusOf(const absl::StatusOr<T>& result) {
+  return result.status();
+}
+
+}  // namespace
+
 template <typename Work>
 auto SqliteWriter::WithReserve(const Work& work) -> decltype(work()) {
   auto result = work();
-  if (ReasonOf(result.status()) == Reason::kDiskFull && reserve_.Release()) {
+  if (ReasonOf(StatusOf(result)) == Reason::kDiskFull && reserve_.Release()) {
     is_on_reserve_ = true;
     // What the log took before is worth more than the pages that it adds to the map.
     if (db_ != nullptr) db_->Checkpoint(/*truncate=*/true);
@@ -115,7 +130,8 @@ absl::StatusOr<CommitResult> SqliteWriter::Commit(GraphDelta delta) {
 
 absl::StatusOr<CommitResult> SqliteWriter::CommitOnce(GraphDelta delta) {
   if (db_ == nullptr) DSG_RETURN_IF_ERROR(Reopen());
-  DSG_ASSIGN_OR_RETURN(const auto replay, FindCommitted(*db_, delta.session_id, delta.sequence));
+  const DeltaIdentity identity{delta.session_id, delta.sequence, DeltaChecksum(delta)};
+  DSG_ASSIGN_OR_RETURN(const auto replay, FindCommitted(*db_, identity));
   if (replay.has_value()) return *replay;
   DSG_RETURN_IF_ERROR(CheckSequence(delta));
   if (delta.parent_revision.has_value() && *delta.parent_revision != head_.info.revision) {
@@ -131,10 +147,11 @@ absl::StatusOr<CommitResult> SqliteWriter::CommitOnce(GraphDelta delta) {
                                   "\" and was sent to map \"", map_, "\""),
                      {{"map", map_}});
   }
+  DSG_RETURN_IF_ERROR(MakeWhole(&delta));
   Coalesce(&delta);
-  DSG_RETURN_IF_ERROR(CheckDelta(delta, DeltaLookup(db_.get())));
+  DSG_RETURN_IF_ERROR(CheckDelta(delta, DeltaLookup(db_.get(), &spec_)));
   DSG_RETURN_IF_ERROR(db_->Execute("BEGIN IMMEDIATE"));
-  CommitContext commit{*db_, spec_, head_};
+  CommitContext commit{*db_, spec_, head_, identity.checksum};
   const auto pages_before = db_->QueryInt("PRAGMA page_count");
   absl::Status applied = pages_before.ok() ? Apply(delta, &commit) : pages_before.status();
   if (applied.ok()) applied = CheckQuota(delta, *pages_before);
@@ -145,12 +162,24 @@ absl::StatusOr<CommitResult> SqliteWriter::CommitOnce(GraphDelta delta) {
     return applied;
   }
   const absl::Status committed = db_->Execute("COMMIT");
-  if (!committed.ok()) return Settle(delta, committed);
+  if (!committed.ok()) return Settle(identity, committed);
   head_ = commit.head;
   const bool is_log_long =
       db_->wal_pages() > (is_on_reserve_ ? kCheckpointPagesOnReserve : checkpoint_pages_);
   if (is_log_long) db_->Checkpoint(/*truncate=*/is_on_reserve_);
   return CommitResult{head_.info.revision, false};
+}
+
+// Patches change what is believed now.
+absl::Status SqliteWriter::MakeWhole(GraphDelta* delta) {
+  if (delta->node_patches.empty() && delta->edge_patches.empty()) return absl::OkStatus();
+  const DeltaLookup graph(db_.get(), &spec_);
+  DSG_ASSIGN_OR_RETURN(std::vector<Layer> layers, graph.ReadLayers());
+  const PatchSource source = {
+      [&](NodeId id) { return graph.ReadNode(id); },
+      [&](const EdgeKey& key) { return graph.ReadEdge(key); },
+  };
+  return ApplyPatches(LayerTable(std::move(layers)), source, delta);
 }
 
 absl::Status SqliteWriter::CheckQuota(const GraphDelta& delta, int64_t pages_before) {
@@ -205,7 +234,7 @@ absl::Status SqliteWriter::Apply(const GraphDelta& delta, CommitContext* commit)
 
 // A failed COMMIT says nothing about the disk: the row may be there after recovery. Only a fresh
 // connection that has read the log again can tell.
-absl::StatusOr<CommitResult> SqliteWriter::Settle(const GraphDelta& delta,
+absl::StatusOr<CommitResult> SqliteWriter::Settle(const DeltaIdentity& delta,
                                                   const absl::Status& failure) {
   const absl::Status reopened = Reopen();
   if (!reopened.ok()) {
@@ -217,7 +246,7 @@ absl::StatusOr<CommitResult> SqliteWriter::Settle(const GraphDelta& delta,
                      reopened.message(), "); send it again when the disk is back"),
         {{"map", map_}, {"sequence", absl::StrCat(delta.sequence)}});
   }
-  DSG_ASSIGN_OR_RETURN(const auto replay, FindCommitted(*db_, delta.session_id, delta.sequence));
+  DSG_ASSIGN_OR_RETURN(const auto replay, FindCommitted(*db_, delta));
   if (replay.has_value()) return CommitResult{replay->revision, false};
   return failure;
 }
@@ -268,6 +297,20 @@ absl::StatusOr<CompactReport> SqliteWriter::CompactOnce(Revision keep_from, cons
   compaction_.reset();
   report.bytes_after = BytesOnDisk(store_folder_, map_);
   return report;
+}
+
+absl::Status SqliteWriter::NoteErasure(const Erasure& erasure, Revision planned_at) {
+  return WithReserve([&] { return NoteErasureOnce(erasure, planned_at); });
+}
+
+absl::Status SqliteWriter::NoteErasureOnce(const Erasure& erasure, Revision planned_at) {
+  if (db_ == nullptr) DSG_RETURN_IF_ERROR(Reopen());
+  DSG_ASSIGN_OR_RETURN(const EraseList list, ListOf(*db_, erasure));
+  if (list.size() == 0) return absl::OkStatus();
+  return InTransaction(*db_, [&]() -> absl::Status {
+    DSG_RETURN_IF_ERROR(db_->Execute("UPDATE map SET is_erasing = 1 WHERE NOT is_erasing"));
+    return AddNotedErasure(*db_, planned_at, list);
+  });
 }
 
 absl::StatusOr<EraseReport> SqliteWriter::Erase(const Erasure& erasure, const StopCheck& stop,

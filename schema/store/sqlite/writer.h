@@ -11,6 +11,7 @@
 #include "schema/store/sqlite/compaction.h"
 #include "schema/store/sqlite/map_file.h"
 #include "schema/store/sqlite/reserve.h"
+#include "schema/store/sqlite/sessions.h"
 
 namespace dsg::sqlite {
 
@@ -28,6 +29,7 @@ class SqliteWriter : public MapWriter {
   absl::Status RemoveTag(const std::string& name) override;
   absl::StatusOr<CompactReport> Compact(Revision keep_from, const StopCheck& stop,
                                         const Progress& progress) override;
+  absl::Status NoteErasure(const Erasure& erasure, Revision planned_at) override;
   absl::StatusOr<EraseReport> Erase(const Erasure& erasure, const StopCheck& stop,
                                     const Progress& progress) override;
 
@@ -45,12 +47,14 @@ class SqliteWriter : public MapWriter {
   absl::Status CheckQuota(const GraphDelta& delta, int64_t pages_before);
   absl::StatusOr<CompactReport> CompactOnce(Revision keep_from, const StopCheck& stop,
                                             const Progress& progress);
+  absl::Status MakeWhole(GraphDelta* delta);
+  absl::Status NoteErasureOnce(const Erasure& erasure, Revision planned_at);
   absl::StatusOr<EraseReport> EraseOnce(const Erasure& erasure, const StopCheck& stop,
                                         const Progress& progress);
   /// Runs `work`, and when the disk is full once again without the reserve.
   template <typename Work>
   auto WithReserve(const Work& work) -> decltype(work());
-  absl::StatusOr<CommitResult> Settle(const GraphDelta& delta, const absl::Status& failure);
+  absl::StatusOr<CommitResult> Settle(const DeltaIdentity& delta, const absl::Status& failure);
 
   std::string store_folder_;
   std::string map_;

@@ -95,7 +95,7 @@ absl::StatusOr<int64_t> YearStore::PoseCount() const {
 
 absl::StatusOr<VerifyReport> YearStore::Verify() const {
   DSG_ASSIGN_OR_RETURN(const auto map, store_->OpenMap(kMap));
-  return map->Verify({});
+  return map->Verify({}, {});
 }
 
 }  // namespace dsg::test

@@ -17,8 +17,8 @@
 
 #include "dsg/v1/errors.pb.h"
 #include "dsg/v1/query_service.grpc.pb.h"
-#include "query/client/status_decode.h"
 #include "schema/base/status.h"
+#include "schema/codec/status_decode.h"
 
 namespace dsg::client {
 namespace {
@@ -146,6 +146,15 @@ TEST_F(RemoteApiTest, CarriesReasonAndMetadataOfErrors) {
   EXPECT_EQ(Locate(CallContext(), &reply),
             MakeError(Reason::kAgentUnknown, "agent H12 is unknown", {{"agent", "H12"}}));
   EXPECT_EQ(service_.call_count, 1);
+}
+
+TEST_F(RemoteApiTest, KeepsTheWordsOfANewerServersReason) {
+  service_.locate = [](grpc::ServerContext* context, v1::LocateAgentResponse*) {
+    return Fail(context, static_cast<v1::Reason>(139), grpc::StatusCode::UNAVAILABLE);
+  };
+  StartServer();
+  v1::LocateAgentResponse reply;
+  EXPECT_EQ(Locate(CallContext(), &reply), absl::UnavailableError("agent H12 is unknown"));
 }
 
 TEST_F(RemoteApiTest, RepeatsReadsThatAServerInShutdownRefused) {

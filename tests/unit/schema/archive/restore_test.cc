@@ -40,7 +40,7 @@ TEST_F(RestoreTest, EveryRevisionAnswersAsBefore) {
     EXPECT_EQ(OrDie(Dump(*OrDie(restored->At(r)))), OrDie(Dump(*map_->At(r)))) << r;
   }
   EXPECT_EQ(OrDie(restored->Tags()).size(), 2U);
-  EXPECT_TRUE(OrDie(restored->Verify(nullptr)).problems.empty());
+  EXPECT_TRUE(OrDie(restored->Verify({}, {})).problems.empty());
   EXPECT_EQ(NamesOf(store_->folder()), kMap);
 }
 

@@ -6,6 +6,7 @@
 
 #include "dsg/v1/graph.pb.h"
 #include "schema/base/random.h"
+#include "schema/codec/bit_stream.h"
 #include "schema/codec/checksum.h"
 #include "schema/codec/proto_convert.h"
 
@@ -140,6 +141,36 @@ TEST(NodeCodec, ReadsThePayloadsOfFormatOne) {
   }
 }
 
+// Format 2 kept attributes in the message of rare details.
+TEST(NodeCodec, ReadsAttributesWhereFormatTwoWroteThem) {
+  Random random(17, 4);
+  for (int i = 0; i < 1000; ++i) {
+    Node node = RandomNode(&random);
+    node.attributes = {{"n", 1.5}, {"spark_dsg", std::string(R"({"key":[3,0]})")}, {"yes", true}};
+    node.agent.reset();
+    node.structure.reset();
+    node.region.reset();
+    Node bare = node;
+    bare.attributes.clear();
+    const std::string payload = EncodeNodePayload(bare);
+    ByteReader in(std::string_view(payload).substr(1));
+    const uint64_t flags = in.Varint();
+    std::string old = payload.substr(0, 1);
+    AppendVarint(flags | 1u << 12, &old);
+    old += payload.substr(1 + in.position());
+    v1::Node message;
+    (*message.mutable_attributes())["n"].set_number(1.5);
+    (*message.mutable_attributes())["spark_dsg"].set_text(R"({"key":[3,0]})");
+    (*message.mutable_attributes())["yes"].set_flag(true);
+    old += message.SerializeAsString();
+    Node back;
+    back.id = node.id;
+    back.layer = node.layer;
+    ASSERT_TRUE(DecodeNodePayload(old, &back)) << i;
+    ASSERT_EQ(Wire(back), Wire(node)) << i;
+  }
+}
+
 TEST(NodeCodec, RefusesWhatIsCutOrTooLong) {
   Random random(17, 2);
   for (int i = 0; i < 300; ++i) {
@@ -148,7 +179,7 @@ TEST(NodeCodec, RefusesWhatIsCutOrTooLong) {
     node.agent.reset();
     node.structure.reset();
     node.region.reset();
-    node.attributes.clear();
+    node.attributes["kept"] = std::string(R"({"fields":{"distance":[7,0.25]}})");
     const std::string payload = EncodeNodePayload(node);
     for (size_t size = 1; size < payload.size(); ++size) {
       Node back;

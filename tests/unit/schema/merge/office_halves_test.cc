@@ -157,7 +157,7 @@ TEST(OfficeHalves, BecomeOneMapWithoutDuplicates) {
     EXPECT_EQ(figures.wrong_rooms, 0);
     EXPECT_EQ(figures.gone_count, 0);
     halves.Commit(*std::move(plan));
-    const auto report = (*halves.store()->OpenMap("west"))->Verify({});
+    const auto report = (*halves.store()->OpenMap("west"))->Verify({}, {});
     ASSERT_TRUE(report.ok()) << report.status();
     EXPECT_TRUE(report->problems.empty()) << report->problems.front();
   }

@@ -143,7 +143,7 @@ merge::MergePlan SmallMaps::Merge(const std::string& into, const std::string& ot
 }
 
 std::vector<std::string> SmallMaps::Problems(const std::string& map) {
-  return (*(*store_->OpenMap(map))->Verify({})).problems;
+  return (*(*store_->OpenMap(map))->Verify({}, {})).problems;
 }
 
 }  // namespace dsg::test

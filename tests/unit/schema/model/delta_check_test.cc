@@ -44,6 +44,14 @@ class SmallGraph : public GraphLookup {
     return std::optional<TimeNs>();
   }
   absl::StatusOr<bool> HasAsset(const Sha256&) const override { return false; }
+  const MapSpec* FindSpec() const override { return &spec_; }
+  absl::StatusOr<std::optional<Interval>> FindSpan() const override { return span; }
+
+  /// Of the poses.
+  std::optional<Interval> span = Interval{0, 1000};
+
+ private:
+  const MapSpec spec_;
 };
 
 Node Place(uint64_t index, double x) {
@@ -235,7 +243,7 @@ TEST(CheckDelta, RefusesTrajectoriesThatDoNotGrow) {
       Reason::kDeltaInvalid, "outside [100, 200)");
 }
 
-TEST(CheckDelta, RefusesStaysNowhereOrTooLong) {
+TEST(CheckDelta, RefusesStaysNowhereOrEmpty) {
   ExpectRefused(
       [](GraphDelta* d) {
         d->stays = {{NodeId('H', 0), NodeId(), NodeId(), 5}};
@@ -243,9 +251,9 @@ TEST(CheckDelta, RefusesStaysNowhereOrTooLong) {
       Reason::kDeltaInvalid, "nowhere");
   ExpectRefused(
       [](GraphDelta* d) {
-        d->stays = {{NodeId('H', 0), NodeId('p', 0), NodeId(), 0, kStayNsMax + 1}};
+        d->stays = {{NodeId('H', 0), NodeId('p', 0), NodeId(), kTimeMax - 1, kTimeMin}};
       },
-      Reason::kDeltaInvalid, "longer than an hour");
+      Reason::kDeltaInvalid, "is empty");
 }
 
 TEST(CheckDelta, RefusesComponentsThatAreNoNumbers) {
@@ -306,6 +314,117 @@ TEST(CheckDelta, RefusesMeshesAndAssetsThatContradictThemselves) {
         d->assets = {{Sha256{}, "model/ply", "content"}};
       },
       Reason::kDeltaInvalid, "does not match its sha256");
+}
+
+TEST(CheckDelta, RefusesVerticesOutsideOfTheirBlock) {
+  // Blocks are 2 m wide. The second and third corner of a face may lie elsewhere.
+  MeshBlock block;
+  block.index = {1, 0, -1};
+  block.positions_map = {{2.0f, 0.0f, -2.0f}, {9.0f, 0.5f, -1.0f}, {4.0f, 1.0f, 5.0f}};
+  block.faces = {{0, 1, 2}};
+  const auto check = [&] {
+    GraphDelta delta = Empty();
+    delta.mesh_blocks = {block};
+    return CheckDelta(delta, SmallGraph());
+  };
+  EXPECT_TRUE(check().ok()) << check();
+  block.positions_map[0].x() = 2.0f - 5e-5f;
+  EXPECT_TRUE(check().ok()) << check();
+  block.positions_map[0].x() = 1.99f;
+  EXPECT_EQ(ReasonOf(check()), Reason::kDeltaInvalid);
+  EXPECT_NE(check().message().find("vertex 0 of mesh block 1,0,-1 at (1.99"), std::string::npos)
+      << check();
+  block.positions_map[0].x() = 2.5f;
+  block.positions_map[1].x() = 5000.0f;
+  EXPECT_NE(check().message().find("vertex 1 of mesh block"), std::string::npos) << check();
+  // A vertex without faces belongs to its own block.
+  block.positions_map[1].x() = 9.0f;
+  block.faces.clear();
+  EXPECT_NE(check().message().find("vertex 1 of mesh block"), std::string::npos) << check();
+  // What forgets cuts blocks that were taken before this was checked.
+  GraphDelta cut = Empty();
+  cut.mesh_blocks = {block};
+  cut.is_forgetting = true;
+  EXPECT_TRUE(CheckDelta(cut, SmallGraph()).ok());
+}
+
+TEST(CheckDelta, RefusesFootprintsThatAreInvertedOrHaveNoArea) {
+  const auto with_room = [](Polygon2d footprint, double z_min_m, double z_max_m) {
+    return [=](GraphDelta* d) {
+      d->nodes = {Place(1, 1)};
+      d->nodes[0].region = RegionInfo{footprint, z_min_m, z_max_m, {}};
+    };
+  };
+  const Polygon2d square = {{0, 0}, {4, 0}, {4, 4}, {0, 4}};
+  for (const auto& sound :
+       {with_room(square, 0, 3), with_room({}, 0, 0), with_room({{0, 0}, {0, 4}, {4, 4}}, 1, 1)}) {
+    EXPECT_TRUE(CheckDelta(With(sound), SmallGraph()).ok());
+  }
+  ExpectRefused(with_room(square, 3, 0), Reason::kDeltaInvalid, "footprint of node p1 is inverted");
+  ExpectRefused(with_room({{0, 0}, {4, 0}}, 0, 3), Reason::kDeltaInvalid, "2 corners and no area");
+  ExpectRefused(with_room({{1e6, 0}, {1e6, 1}, {1e6, 2}}, 0, 3), Reason::kDeltaInvalid, "no area");
+  ExpectRefused(with_room(square, std::nan(""), 3), Reason::kNumberNotFinite, "height");
+}
+
+TEST(CheckDelta, RefusesTimesAtTheLimitsAndNegativeSizes) {
+  const auto with = [](const std::function<void(Node*)>& change) {
+    return [=](GraphDelta* d) {
+      d->nodes = {Place(1, 1)};
+      change(&d->nodes[0]);
+    };
+  };
+  for (const TimeNs limit_ns : {kTimeMin, kTimeMax}) {
+    ExpectRefused(with([&](Node* n) { n->first_observed_ns = limit_ns; }), Reason::kDeltaInvalid,
+                  "first_observed_ns of node p1");
+    ExpectRefused(with([&](Node* n) { n->last_observed_ns = limit_ns; }), Reason::kDeltaInvalid,
+                  "last_observed_ns of node p1");
+  }
+  ExpectRefused(with([](Node* n) { n->observation_count = -1; }), Reason::kDeltaInvalid,
+                "observation_count of node p1 is -1");
+  ExpectRefused(with([](Node* n) {
+                  n->object = ObjectInfo{.size = {1, -2, 1}};
+                }),
+                Reason::kDeltaInvalid, "an edge length of node p1 is -2");
+  ExpectRefused(with([](Node* n) { n->place = PlaceInfo{.basis_point_count = -3}; }),
+                Reason::kDeltaInvalid, "basis_point_count of node p1 is -3");
+}
+
+TEST(CheckDelta, RefusesTimesFarFromTheMap) {
+  constexpr TimeNs kFarNs = 1000 + kObservedFarMaxNs;
+  const auto observed = [](TimeNs time_ns) {
+    return [=](GraphDelta* d) {
+      d->nodes = {Place(1, 1)};
+      d->nodes[0].last_observed_ns = time_ns;
+    };
+  };
+  EXPECT_TRUE(CheckDelta(With(observed(kFarNs)), SmallGraph()).ok());
+  EXPECT_TRUE(CheckDelta(With(observed(-kObservedFarMaxNs)), SmallGraph()).ok());
+  for (const TimeNs time_ns : {kFarNs + 1, -kObservedFarMaxNs - 1, kTimeMax - 1, kTimeMin + 1}) {
+    ExpectRefused(observed(time_ns), Reason::kTimeImplausible, "last_observed_ns of node p1");
+  }
+  ExpectRefused(
+      [](GraphDelta* d) {
+        d->appends = {{NodeId('H', 0), {TimedPose{2000}, TimedPose{kFarNs + 1}}}};
+      },
+      Reason::kTimeImplausible, "time of a pose of H0");
+  ExpectRefused(
+      [](GraphDelta* d) {
+        d->stays = {{NodeId('H', 0), NodeId('p', 0), NodeId(), 5, kFarNs + 1}};
+      },
+      Reason::kTimeImplausible, "time of a stay of H0");
+  // Records may tell when something came into the world.
+  const auto valid_from = [](TimeNs from_ns) {
+    return [=](GraphDelta* d) {
+      d->nodes = {Place(1, 1)};
+      d->nodes[0].valid.from_ns = from_ns;
+    };
+  };
+  EXPECT_TRUE(CheckDelta(With(valid_from(-5 * kObservedFarMaxNs)), SmallGraph()).ok());
+  ExpectRefused(valid_from(kTimeMin + 1), Reason::kTimeImplausible, "valid.from_ns of node p1");
+  // Without poses a clock that is not UNIX may begin anywhere.
+  SmallGraph empty;
+  empty.span.reset();
+  EXPECT_TRUE(CheckDelta(With(observed(kTimeMax - 1)), empty).ok());
 }
 
 TEST(CheckDelta, RefusesARedefinedLayer) {

@@ -65,12 +65,45 @@ TEST(Commit, OfASequenceAgainIsAnsweredAndChangesNothing) {
   ASSERT_EQ(OrDie(map.writer().Commit(ObjectDelta("s", 1, 1))).revision, 1);
   ASSERT_EQ(OrDie(map.writer().Commit(ObjectDelta("s", 2, 2))).revision, 2);
   const Sha256 digest = OrDie(map.reader().Head()).digest;
-  // Also when the delta says something else: its identity is session and sequence.
-  const CommitResult again = OrDie(map.writer().Commit(ObjectDelta("s", 1, 77)));
+  const CommitResult again = OrDie(map.writer().Commit(ObjectDelta("s", 1, 1)));
   EXPECT_TRUE(again.replayed);
   EXPECT_EQ(again.revision, 1);
   EXPECT_EQ(OrDie(map.reader().Head()).revision, 2);
   EXPECT_EQ(OrDie(map.reader().Head()).digest, digest);
+}
+
+TEST(Commit, OfASequenceAgainWithOtherContentIsRefused) {
+  TestMap map;
+  ASSERT_EQ(OrDie(map.writer().Commit(ObjectDelta("s", 1, 1))).revision, 1);
+  ASSERT_EQ(OrDie(map.writer().Commit(ObjectDelta("s", 2, 2))).revision, 2);
+  const Sha256 digest = OrDie(map.reader().Head()).digest;
+  GraphDelta renamed = ObjectDelta("s", 2, 2);
+  renamed.nodes.front().name = "another";
+  GraphDelta unsaid = ObjectDelta("s", 2, 2);
+  unsaid.message = "what was done";
+  for (const GraphDelta& other : {ObjectDelta("s", 1, 77), renamed, unsaid}) {
+    const auto refused = map.writer().Commit(other);
+    EXPECT_EQ(ReasonOf(refused.status()), Reason::kSequenceReused) << refused.status();
+    EXPECT_EQ(MetadataOf(refused.status())["revision"], absl::StrCat(other.sequence));
+  }
+  EXPECT_EQ(OrDie(map.reader().Head()).digest, digest);
+  // Whether it is conditional does not count: the answer to the first try was lost, say.
+  GraphDelta conditional = ObjectDelta("s", 2, 2);
+  conditional.parent_revision = 1;
+  EXPECT_TRUE(OrDie(map.writer().Commit(conditional)).replayed);
+}
+
+TEST(Commit, KnowsTheContentOfASessionsLastDeltaAfterCompaction) {
+  TestMap map;
+  ASSERT_TRUE(map.writer().Commit(ObjectDelta("s", 1, 1)).ok());
+  ASSERT_TRUE(map.writer().Commit(ObjectDelta("s", 2, 2)).ok());
+  ASSERT_TRUE(map.writer().Commit(ObjectDelta("t", 1, 3)).ok());
+  ASSERT_TRUE(map.writer().Compact(3, {}, {}).ok());
+  EXPECT_TRUE(OrDie(map.writer().Commit(ObjectDelta("s", 2, 2))).replayed);
+  EXPECT_EQ(ReasonOf(map.writer().Commit(ObjectDelta("s", 2, 77)).status()),
+            Reason::kSequenceReused);
+  // What came before it is believed: nothing is left of it.
+  EXPECT_TRUE(OrDie(map.writer().Commit(ObjectDelta("s", 1, 77))).replayed);
 }
 
 TEST(Commit, OfASequenceAgainIsAnsweredByALaterWriter) {
@@ -193,13 +226,13 @@ TEST(FailedCommit, InTheMiddleOfWritingLeavesNothing) {
   for (int64_t s = 1; s <= 8; ++s) ASSERT_TRUE(map.writer().Commit(DeltaOfStream({}, s)).ok());
   Untouched untouched(&map);
   GraphDelta bad = DeltaOfStream({}, 9);
-  const TimeNs century_ns = 100LL * 365 * 86400 * kSecond;
+  const TimeNs late_ns = 8LL * 365 * 86400 * kSecond;
   bad.nodes.push_back(MakeHuman(50, "late"));
-  bad.appends.push_back({NodeId('H', 50), {PoseAt(century_ns, 0, 0, 0)}});
+  bad.appends.push_back({NodeId('H', 50), {PoseAt(late_ns, 0, 0, 0)}});
   const auto refused = map.writer().Commit(bad);
   EXPECT_EQ(ReasonOf(refused.status()), Reason::kTimeOutsideMap);
   EXPECT_EQ(refused.status().code(), absl::StatusCode::kOutOfRange);
-  EXPECT_EQ(MetadataOf(refused.status())["time_ns"], absl::StrCat(century_ns));
+  EXPECT_EQ(MetadataOf(refused.status())["time_ns"], absl::StrCat(late_ns));
   untouched.Check();
   for (int64_t s = 9; s <= 16; ++s) ASSERT_TRUE(map.writer().Commit(DeltaOfStream({}, s)).ok());
   EXPECT_EQ(map.Problems(), "");

@@ -42,7 +42,7 @@ class Compaction : public ::testing::Test {
   }
 
   void ExpectSound() {
-    const VerifyReport report = OrDie(map_.reader().Verify({}));
+    const VerifyReport report = OrDie(map_.reader().Verify({}, {}));
     EXPECT_TRUE(report.problems.empty()) << report.problems.front();
   }
 

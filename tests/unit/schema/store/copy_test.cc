@@ -45,7 +45,7 @@ class Copy : public testing::Test {
   }
   static std::string Problems(MapReader& map) {
     std::string text;
-    for (const std::string& problem : OrDie(map.Verify({})).problems) text += problem + "\n";
+    for (const std::string& problem : OrDie(map.Verify({}, {})).problems) text += problem + "\n";
     return text;
   }
 

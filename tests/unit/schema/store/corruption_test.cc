@@ -64,7 +64,7 @@ bool IsFoundByVerify(const std::string& folder) {
   const auto store = OrDie(GraphStore::Open(folder, {}));
   const auto map = store->OpenMap(kMap);
   if (!map.ok()) return true;
-  const auto report = (*map)->Verify({});
+  const auto report = (*map)->Verify({}, {});
   return !report.ok() || !report->problems.empty();
 }
 

@@ -169,7 +169,8 @@ void AddMesh(const DeltaStreamOptions& options, int64_t sequence, Dice* dice, Gr
     MeshBlock block;
     block.index = {static_cast<int32_t>(sequence % 12), 0, 0};
     for (size_t i = 0; i < options.mesh_vertex_count; ++i) {
-      block.positions_map.emplace_back(dice->Between(0, 2), dice->Between(0, 2),
+      const double x0_m = 2.0 * block.index.x;
+      block.positions_map.emplace_back(dice->Between(x0_m, x0_m + 2.0), dice->Between(0, 2),
                                        dice->Between(0, 2));
       block.instance_ids.push_back(static_cast<uint32_t>(dice->Below(100)));
     }

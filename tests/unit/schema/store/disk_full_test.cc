@@ -78,7 +78,7 @@ TEST(FullDisk, FailsCommitsCleanlyWhileReadsGoOnAndForgetsItOnceThereIsSpace) {
               Reason::kDiskFull);
     EXPECT_EQ(OrDie(reader->Head()).revision, sequence - 1);
     EXPECT_TRUE(Dump(*OrDie(reader->Latest())).ok());
-    EXPECT_TRUE(OrDie(reader->Verify({})).problems.empty());
+    EXPECT_TRUE(OrDie(reader->Verify({}, {})).problems.empty());
     disk.Free();
     for (const int64_t stop = sequence + 3; sequence < stop; ++sequence) {
       const auto committed = writer->Commit(DeltaOfStream(options, sequence));
@@ -86,7 +86,7 @@ TEST(FullDisk, FailsCommitsCleanlyWhileReadsGoOnAndForgetsItOnceThereIsSpace) {
       EXPECT_EQ(committed->revision, sequence);
     }
   }
-  EXPECT_TRUE(OrDie(reader->Verify({})).problems.empty());
+  EXPECT_TRUE(OrDie(reader->Verify({}, {})).problems.empty());
   writer.reset();
   // What was written around the full disk equals what an undisturbed writer writes.
   TestMap undisturbed(Spec(TrajectoryCodec::kQuantized));
@@ -159,7 +159,7 @@ class FullDiskWithReserve : public testing::Test {
     return delta;
   }
   void ExpectSound() {
-    EXPECT_TRUE(OrDie(OrDie(store_->OpenMap(kMap))->Verify({})).problems.empty());
+    EXPECT_TRUE(OrDie(OrDie(store_->OpenMap(kMap))->Verify({}, {})).problems.empty());
   }
   void ExpectGoesOnWithSpace() {
     disk_.Free();
@@ -265,7 +265,7 @@ TEST_F(FullDiskWithReserve, MakesNoHalfCopyAndInstallsNone) {
     disk_.Free();
     ASSERT_TRUE(store_->InstallMap("other", folder + "/copy", false).ok());
   }
-  EXPECT_TRUE(OrDie(OrDie(store_->OpenMap("other"))->Verify({})).problems.empty());
+  EXPECT_TRUE(OrDie(OrDie(store_->OpenMap("other"))->Verify({}, {})).problems.empty());
   ExpectSound();
 }
 
@@ -297,7 +297,7 @@ TEST(Quota, RefusesCommitsThatGrowAMapAndLetsItForget) {
   writer.reset();
   EXPECT_LE(std::filesystem::file_size(absl::StrCat(folder.path(), "/", kMap, "/graph.db")),
             static_cast<uint64_t>(options.quota_bytes));
-  EXPECT_TRUE(OrDie(reader->Verify({})).problems.empty());
+  EXPECT_TRUE(OrDie(reader->Verify({}, {})).problems.empty());
 }
 
 }  // namespace

@@ -311,7 +311,7 @@ TEST_P(EraseTest, GivesTheSameMapWhateverTheSteps) {
     }
     EXPECT_GT(report.row_count, 50);
     const auto map = OrDie(OrDie(GraphStore::Open(folder.path(), {}))->OpenMap(kMap));
-    const VerifyReport verified = OrDie(map->Verify({}));
+    const VerifyReport verified = OrDie(map->Verify({}, {}));
     EXPECT_TRUE(verified.problems.empty()) << verified.problems.front();
     for (const RevisionInfo& info : OrDie(map->ListRevisions(0, 1000))) {
       const std::string digest = ToHex(info.digest);

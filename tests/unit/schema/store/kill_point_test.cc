@@ -133,7 +133,7 @@ std::string StateOf(MapReader& map) {
 
 std::string ProblemsOf(MapReader& map) {
   std::string text;
-  for (const std::string& problem : OrDie(map.Verify({})).problems) text += problem + "\n";
+  for (const std::string& problem : OrDie(map.Verify({}, {})).problems) text += problem + "\n";
   return text;
 }
 

@@ -36,7 +36,7 @@ void WriteAndVanish(const std::string& folder) {
 
 std::vector<std::string> Problems(const std::string& folder) {
   const auto map = OrDie(OrDie(GraphStore::Open(folder, {}))->OpenMap(kMap));
-  return OrDie(map->Verify({})).problems;
+  return OrDie(map->Verify({}, {})).problems;
 }
 
 TEST(WriteAheadLog, OfAKilledWriterIsWholeAndVerifies) {
@@ -44,7 +44,7 @@ TEST(WriteAheadLog, OfAKilledWriterIsWholeAndVerifies) {
   WriteAndVanish(folder.path());
   const auto map = OrDie(OrDie(GraphStore::Open(folder.path(), {}))->OpenMap(kMap));
   EXPECT_EQ(OrDie(map->Head()).revision, kCommits);
-  EXPECT_TRUE(OrDie(map->Verify({})).problems.empty());
+  EXPECT_TRUE(OrDie(map->Verify({}, {})).problems.empty());
 }
 
 TEST(WriteAheadLog, DamagedInTheMiddleIsFoundByVerify) {

@@ -5,8 +5,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
@@ -62,6 +64,28 @@ TEST(GraphStore, RefusesAFileInPlaceOfAFolder) {
   StoreOptions options;
   options.create = true;
   EXPECT_FALSE(GraphStore::Open(folder.path() + "/file", options).ok());
+}
+
+TEST(GraphStore, OfThoseWhoMakeOneMapAtOnceOneMakesItAndOthersSeeThatItIsThere) {
+  for (int round = 0; round < 10; ++round) {
+    const TempFolder folder;
+    std::atomic<int> made_count = 0;
+    std::vector<std::thread> threads;
+    for (int i = 0; i < 8; ++i) {
+      threads.emplace_back([&] {
+        const auto store = OrDie(GraphStore::Open(folder.path(), {.create = true}));
+        const absl::Status created = store->CreateMap(Spec(TrajectoryCodec::kQuantized));
+        made_count += created.ok() ? 1 : 0;
+        EXPECT_TRUE(created.ok() || ReasonOf(created) == Reason::kMapExists) << created;
+        // Whoever sees the map can write it, also while another one is at the end of making it.
+        const absl::Status opened = store->OpenWriter(kMap).status();
+        EXPECT_TRUE(opened.ok() || MetadataOf(opened)["holder"].find("create") == std::string::npos)
+            << opened;
+      });
+    }
+    for (std::thread& thread : threads) thread.join();
+    EXPECT_EQ(made_count, 1);
+  }
 }
 
 TEST(GraphStore, ListsMapsByNameAndIgnoresWhatIsNone) {

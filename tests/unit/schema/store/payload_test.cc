@@ -15,8 +15,12 @@ MeshBlock FullBlock(BlockIndex index, size_t vertex_count, uint64_t seed) {
   MeshBlock block;
   block.index = index;
   for (size_t i = 0; i < vertex_count; ++i) {
-    const auto coordinate = [&] { return static_cast<float>(random() % 20'000) * 1e-4f; };
-    block.positions_map.emplace_back(coordinate(), coordinate(), coordinate());
+    const auto coordinate = [&](int32_t at) {
+      return 2.0f * static_cast<float>(at) + static_cast<float>(random() % 20'000) * 1e-4f;
+    };
+    const float x = coordinate(index.x);
+    const float y = coordinate(index.y);
+    block.positions_map.emplace_back(x, y, coordinate(index.z));
     block.normals_map.emplace_back(0.0f, -1.0f, 1.0f);
     block.colors.push_back(static_cast<uint32_t>(random() & 0xffffff));
     block.labels.push_back(static_cast<uint32_t>(random() % 30));
@@ -48,20 +52,20 @@ TEST(Mesh, ComesBackWithEveryChannelAndWithFew) {
   GraphDelta delta;
   delta.mesh_blocks = {FullBlock({-3, 0, 7}, 1000, 1), FullBlock({0, 0, 0}, 3, 2)};
   MeshBlock bare;
-  bare.index = {INT32_MAX, INT32_MIN, -1};
-  bare.positions_map = {{1, 2, 3}};
+  bare.index = {900'000, -900'000, -1};
+  bare.positions_map = {{1'800'001, -1'799'999, -1}};
   delta.mesh_blocks.push_back(bare);
   MeshBlock empty;
-  empty.index = {5, 5, 5};
+  empty.index = {INT32_MAX, INT32_MIN, -1};
   delta.mesh_blocks.push_back(empty);
   map.MustCommit(delta);
   const auto snapshot = map.Latest();
   for (const MeshBlock& block : delta.mesh_blocks) {
     ExpectEqual(OrDie(snapshot->ReadMeshBlock(block.index)), block);
   }
-  EXPECT_EQ(
-      OrDie(snapshot->MeshBlocks()),
-      (std::vector<BlockIndex>{{-3, 0, 7}, {0, 0, 0}, {5, 5, 5}, {INT32_MAX, INT32_MIN, -1}}));
+  EXPECT_EQ(OrDie(snapshot->MeshBlocks()),
+            (std::vector<BlockIndex>{
+                {-3, 0, 7}, {0, 0, 0}, {900'000, -900'000, -1}, {INT32_MAX, INT32_MIN, -1}}));
   EXPECT_EQ(map.Problems(), "");
 }
 

@@ -74,8 +74,8 @@ class PendingErasure : public testing::Test {
 
   static void ExpectSound(GraphStore& store, bool is_pending) {
     const auto map = OrDie(store.OpenMap(kMap));
-    EXPECT_EQ(OrDie(map->IsErasing()), is_pending);
-    const VerifyReport report = OrDie(map->Verify({}));
+    EXPECT_EQ(OrDie(map->GetPendingErasure()).has_value(), is_pending);
+    const VerifyReport report = OrDie(map->Verify({}, {}));
     EXPECT_TRUE(report.problems.empty()) << report.problems.front();
     EXPECT_EQ(report.notes.size(), is_pending ? 1u : 0u);
   }
@@ -203,7 +203,7 @@ TEST_F(PendingErasure, ThatIsDamagedIsFoundAndNotTakenForNone) {
     OrDie(db->Execute("UPDATE pending_erasure SET assets = 0"));
   }
   const auto store = OrDie(GraphStore::Open(path, {}));
-  const VerifyReport report = OrDie(OrDie(store->OpenMap(kMap))->Verify({}));
+  const VerifyReport report = OrDie(OrDie(store->OpenMap(kMap))->Verify({}, {}));
   ASSERT_EQ(report.problems.size(), 1u);
   EXPECT_TRUE(absl::StrContains(report.problems[0], "pending_erasure")) << report.problems[0];
   const auto erased = OrDie(store->OpenWriter(kMap))->Erase({}, {}, {});

@@ -52,7 +52,7 @@ Revision TestMap::MustCommit(GraphDelta delta) { return OrDie(Commit(std::move(d
 
 std::string TestMap::Problems() {
   std::string text;
-  for (const std::string& problem : OrDie(reader_->Verify({})).problems) text += problem + "\n";
+  for (const std::string& problem : OrDie(reader_->Verify({}, {})).problems) text += problem + "\n";
   return text;
 }
 

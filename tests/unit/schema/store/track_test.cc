@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <random>
+#include <tuple>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "schema/base/random.h"
 #include "schema/codec/trajectory_codec.h"
 #include "tests/unit/schema/store/store_test_util.h"
 
@@ -607,15 +610,79 @@ TEST(Stays, OfAnHourAreFoundFromTheirLastNanosecond) {
   EXPECT_EQ(OrDie(snapshot->StaysInNode(kRoom, kStayNsMax, kTimeMax, {})).size(), 0u);
 }
 
-TEST(Stays, LongerThanAnHourOrNowhereAreRefused) {
+TEST(Stays, NowhereOrEmptyOrOfNobodyAreRefused) {
   Tracks tracks;
   for (const Stay& stay :
-       {Stay{kAnn, kPlace, kRoom, 0, kStayNsMax + 1}, Stay{kAnn, NodeId(), NodeId(), 0, 10},
-        Stay{kAnn, kPlace, kRoom, 5, 5}, Stay{kRoom, kPlace, kRoom, 0, 10},
-        Stay{kAnn, NodeId('p', 9), kRoom, 0, 10}}) {
+       {Stay{kAnn, NodeId(), NodeId(), 0, 10}, Stay{kAnn, kPlace, kRoom, 5, 5},
+        Stay{kRoom, kPlace, kRoom, 0, 10}, Stay{kAnn, NodeId('p', 9), kRoom, 0, 10}}) {
     GraphDelta delta;
     delta.stays = {stay};
     EXPECT_EQ(ReasonOf(tracks.map().Commit(delta).status()), Reason::kDeltaInvalid);
+  }
+}
+
+// Times from all over 64 bits, close together and far apart.
+TimeNs AnyTime(Random* random) {
+  constexpr TimeNs kHour = 3600 * kNsPerSecond;
+  switch (random->Index(5)) {
+    case 0:
+      return kTimeMin + static_cast<TimeNs>(random->Index(5));
+    case 1:
+      return kTimeMax - 1 - static_cast<TimeNs>(random->Index(5));
+    case 2:
+      return static_cast<TimeNs>(random->Index(1000)) * kHour / 10;
+    case 3:
+      return kHour + static_cast<TimeNs>(random->Index(5)) - 2;
+    default:
+      return static_cast<TimeNs>(random->Uniform(-9.2e18, 9.2e18));
+  }
+}
+
+// Who was in the room, and where each was, say the same, whatever the lengths of the stays.
+TEST(Stays, OfEveryLengthAreFoundByRoomAndByAgent) {
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE(seed);
+    Random random(seed, 0);
+    Tracks tracks;
+    std::map<std::pair<NodeId, TimeNs>, Stay> stored;
+    for (int round = 0; round < 3; ++round) {
+      std::map<std::pair<NodeId, TimeNs>, Stay> added;
+      for (int i = 0; i < 12; ++i) {
+        Stay stay{random.Index(2) == 0 ? kAnn : kBob, kPlace, kRoom, AnyTime(&random),
+                  AnyTime(&random)};
+        if (stay.exit_ns < stay.enter_ns) std::swap(stay.enter_ns, stay.exit_ns);
+        if (stay.exit_ns == stay.enter_ns) continue;
+        added[{stay.agent, stay.enter_ns}] = stay;
+      }
+      std::vector<Stay> delta;
+      for (const auto& [key, stay] : added) delta.push_back(stored[key] = stay);
+      const Revision revision = tracks.AddStays(delta);
+      const auto snapshot = tracks.map().At(revision);
+      for (int i = 0; i < 50; ++i) {
+        TimeNs from_ns = AnyTime(&random);
+        TimeNs to_ns = AnyTime(&random);
+        if (to_ns < from_ns) std::swap(from_ns, to_ns);
+        std::vector<Stay> expected;
+        std::map<NodeId, Stay> at;
+        for (const auto& [key, stay] : stored) {
+          if (stay.enter_ns < to_ns && stay.exit_ns > from_ns) expected.push_back(stay);
+          if (stay.enter_ns <= from_ns && from_ns < stay.exit_ns) at[stay.agent] = stay;
+        }
+        std::sort(expected.begin(), expected.end(), [](const Stay& a, const Stay& b) {
+          return std::tie(a.enter_ns, a.agent) < std::tie(b.enter_ns, b.agent);
+        });
+        for (const NodeId node : {kRoom, kPlace}) {
+          EXPECT_EQ(OrDie(snapshot->StaysInNode(node, from_ns, to_ns, {})), expected);
+        }
+        for (const NodeId agent : {kAnn, kBob}) {
+          const auto found = OrDie(snapshot->StayAt(agent, from_ns));
+          ASSERT_EQ(found.has_value(), at.contains(agent)) << from_ns;
+          if (found.has_value()) {
+            EXPECT_EQ(*found, at[agent]);
+          }
+        }
+      }
+    }
   }
 }
 

@@ -64,7 +64,7 @@ class Format1 : public ::testing::Test {
               "c6dc36182990d8f519a2938a978b75c56c0b9171972744a82610312100bec41a");
     EXPECT_EQ(DigestAt(*map, 24),
               "0c3c38c0397be6112958784e0277bc33462d6da178e6c39b4a89c1e0d0ec6662");
-    const VerifyReport report = OrDie(map->Verify({}));
+    const VerifyReport report = OrDie(map->Verify({}, {}));
     EXPECT_TRUE(report.problems.empty()) << report.problems.front();
     EXPECT_EQ(report.revision_count, 24);
   }
@@ -119,7 +119,7 @@ TEST_F(Format1, GoesOnAfterItsUpgrade) {
   EXPECT_LT(report.bytes_after, report.bytes_before);
   const auto map = OrDie(store_->OpenMap(kMap));
   EXPECT_EQ(DigestAt(*map, 8), "c6dc36182990d8f519a2938a978b75c56c0b9171972744a82610312100bec41a");
-  EXPECT_TRUE(OrDie(map->Verify({})).problems.empty());
+  EXPECT_TRUE(OrDie(map->Verify({}, {})).problems.empty());
 }
 
 TEST_F(Format1, CanBeErasedFromAndSaysWhereTheOldCopyIs) {
@@ -136,7 +136,7 @@ TEST_F(Format1, CanBeErasedFromAndSaysWhereTheOldCopyIs) {
   EXPECT_EQ(report.other_files, std::vector<std::string>{upgraded.copy});
   const auto map = OrDie(store_->OpenMap(kMap));
   EXPECT_EQ(ReasonOf(OrDie(map->At(20))->GetNode(NodeId('O', 8)).status()), Reason::kNodeUnknown);
-  const VerifyReport verified = OrDie(map->Verify({}));
+  const VerifyReport verified = OrDie(map->Verify({}, {}));
   EXPECT_TRUE(verified.problems.empty()) << verified.problems.front();
   // From now on it shrinks in steps.
   const auto db = OrDie(sqlite::Database::Open(path(), sqlite::Database::Mode::kRead, kMap));
@@ -154,6 +154,61 @@ TEST_F(Format1, IsNotUpgradedWhileItIsWritten) {
   const auto holder = sqlite::WriterLock::Acquire(folder_.path(), kMap, "robot");
   ASSERT_TRUE(holder.ok());
   EXPECT_EQ(ReasonOf(store_->UpgradeMap(kMap).status()), Reason::kWriterLocked);
+}
+
+// A map as the programs of format 2 left it: what format 3 brought is taken away again.
+class Format2 : public ::testing::Test {
+ protected:
+  Format2() {
+    for (int64_t sequence = 1; sequence <= 12; ++sequence) {
+      map_.MustCommit(test::DeltaOfStream({.seed = 7}, sequence));
+    }
+    content_ = OrDie(test::Dump(*map_.Latest()));
+    map_.Close();
+    const auto db =
+        OrDie(sqlite::Database::Open(map_.database_path(), sqlite::Database::Mode::kWrite, kMap));
+    OrDie(
+        db->Execute("ALTER TABLE revision DROP COLUMN delta_checksum;"
+                    "ALTER TABLE session DROP COLUMN last_checksum;"
+                    "ALTER TABLE map DROP COLUMN incarnation;"
+                    "DROP TABLE noted_erasure;"
+                    "DROP INDEX stay_room_long; DROP INDEX stay_place_long;"
+                    "DROP INDEX stay_history_room_long; DROP INDEX stay_history_place_long;"
+                    "PRAGMA user_version=2"));
+    store_ = OrDie(GraphStore::Open(map_.folder(), {}));
+  }
+
+  test::TestMap map_{test::Spec(TrajectoryCodec::kQuantized)};
+  std::string content_;
+  std::unique_ptr<GraphStore> store_;
+};
+
+TEST_F(Format2, IsRefusedUntilItIsUpgradedAndIsTheSameMapThen) {
+  EXPECT_EQ(ReasonOf(store_->OpenMap(kMap).status()), Reason::kFormatTooOld);
+  const UpgradeReport report = OrDie(store_->UpgradeMap(kMap));
+  EXPECT_EQ(report.from_format, 2);
+  EXPECT_EQ(report.to_format, 3);
+  const auto map = OrDie(store_->OpenMap(kMap));
+  EXPECT_EQ(OrDie(test::Dump(*OrDie(map->Latest()))), content_);
+  EXPECT_TRUE(OrDie(map->Verify({}, {})).problems.empty());
+  EXPECT_NE(map->incarnation().front(), '-');
+}
+
+TEST_F(Format2, KnowsItsDeltasByTheirNamesAndNewOnesByTheirContentToo) {
+  OrDie(store_->UpgradeMap(kMap));
+  const auto writer = OrDie(store_->OpenWriter(kMap));
+  GraphDelta other = test::DeltaOfStream({.seed = 8}, 12);
+  other.session_id = "test";
+  EXPECT_TRUE(OrDie(writer->Commit(other)).replayed);
+  other.sequence = 13;
+  other.labels = {{900, "new"}};
+  GraphDelta plain;
+  plain.session_id = "test";
+  plain.sequence = 13;
+  plain.labels = {{900, "new"}};
+  OrDie(writer->Commit(plain));
+  EXPECT_TRUE(OrDie(writer->Commit(plain)).replayed);
+  EXPECT_EQ(ReasonOf(writer->Commit(other).status()), Reason::kSequenceReused);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/client/status_decode.h"
+#include "schema/codec/status_decode.h"
 
 #include <string>
 #include <utility>
@@ -7,7 +7,7 @@
 #include "dsg/v1/errors.pb.h"
 #include "schema/base/status.h"
 
-namespace dsg::client {
+namespace dsg {
 
 absl::Status DecodeStatus(int code, std::string_view message, std::string_view detail) {
   if (code == 0) return absl::OkStatus();
@@ -32,4 +32,4 @@ absl::Status DecodeStatus(int code, std::string_view message, std::string_view d
   return MakeError(reason, message, std::move(metadata));
 }
 
-}  // namespace dsg::client
+}  // namespace dsg

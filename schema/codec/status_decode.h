@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Turns the ending of a gRPC call back into the Status that the server made.
+// Turns the ending of a gRPC call back into the Status that the server made, for every client.
 // Refuses to trust a detail that contradicts the status code it came with.
 #pragma once
 
@@ -7,7 +7,7 @@
 
 #include "absl/status/status.h"
 
-namespace dsg::client {
+namespace dsg {
 
 /// The trailer that carries a serialized dsg.v1.ErrorDetail.
 inline constexpr char kErrorTrailer[] = "dsg-error-bin";
@@ -17,4 +17,4 @@ inline constexpr char kErrorTrailer[] = "dsg-error-bin";
 /// another code, are left out: the error then has code and message only.
 absl::Status DecodeStatus(int code, std::string_view message, std::string_view detail);
 
-}  // namespace dsg::client
+}  // namespace dsg

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/client/status_decode.h"
+#include "schema/codec/status_decode.h"
 
 #include <google/protobuf/stubs/logging.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include "dsg/v1/errors.pb.h"
 #include "schema/base/status.h"
 
-namespace dsg::client {
+namespace dsg {
 namespace {
 
 constexpr int kNotFound = 5;
@@ -82,4 +82,4 @@ TEST(StatusDecode, DamagedDetailNeverChangesCodeOrMessage) {
 }
 
 }  // namespace
-}  // namespace dsg::client
+}  // namespace dsg
