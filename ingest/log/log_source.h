@@ -126,6 +126,8 @@ struct LogOptions {
   std::string agent_prefix;
   /// Edge of the blocks that a mesh in the log is cut into: the map's.
   double mesh_block_size_m = 2.0;
+  /// Refuse a scene graph of which anything would be skipped.
+  bool is_strict = false;
   /// Of sensor logs.
   PoseSource poses = PoseSource::kAuto;
   /// Poses to read instead of the log's (EuRoC or TUM columns); empty = the log's own.

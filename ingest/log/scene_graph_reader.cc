@@ -16,7 +16,8 @@ constexpr TimeNs kFirstPlausibleUnixNs = 1'000'000'000 * kNsPerSecond;
 
 OpenedLog ReadSceneGraphLog(const LogFile& file, const LogOptions& options) {
   DSG_ASSIGN_OR_RETURN(ImportedGraph graph,
-                       ReadSceneGraph(file.bytes, file.path, options.mesh_block_size_m));
+                       ReadSceneGraph(file.bytes, file.path, options.mesh_block_size_m,
+                                      {.is_strict = options.is_strict}));
   if (options.format != "auto" && options.format != graph.format) {
     return MakeError(Reason::kFileMalformed,
                      absl::StrCat(file.path, ": is a ", graph.format, " file, not ", options.format,
@@ -31,6 +32,7 @@ OpenedLog ReadSceneGraphLog(const LogFile& file, const LogOptions& options) {
   info.first_ns = graph.first_ns;
   info.clock = graph.first_ns >= kFirstPlausibleUnixNs ? Clock::kUnix : Clock::kMonotonic;
   info.notes = std::move(graph.notes);
+  for (const Skipped& skipped : graph.skipped) info.notes.push_back(ToString(skipped));
   TrackTable no_tracks;
   no_tracks.file = file.path;
   return MakeTrackLog(std::move(no_tracks), GraphMeasurement{std::move(graph.delta)},

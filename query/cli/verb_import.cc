@@ -2,7 +2,6 @@
 // The verb import: a scene-graph file into a map of a store folder.
 // Creates nothing before the whole file has been read and understood.
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -11,41 +10,23 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "query/cli/file_text.h"
 #include "query/cli/progress.h"
 #include "query/cli/table.h"
 #include "query/cli/verbs.h"
 #include "schema/base/status.h"
 #include "schema/codec/checksum.h"
 #include "schema/interop/scene_graph_file.h"
+#include "schema/model/delta_parts.h"
 #include "schema/store/graph_store.h"
 
 namespace dsg::cli {
 namespace {
 
-constexpr int64_t kFileBytesMax = int64_t{512} << 20;
 // Rows of one commit: enough to spread its cost, few enough for its memory.
 constexpr size_t kItemsPerCommit = 20'000;
 // 2000-01-01: no log of a clock that counts from the start of a machine reaches it.
 constexpr TimeNs kFirstUnixNs = 946'684'800 * kNsPerSecond;
-
-absl::StatusOr<std::string> ReadFile(const std::string& path) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) {
-    return absl::NotFoundError(absl::StrCat(path, " is not a file; check the path"));
-  }
-  const uintmax_t size = std::filesystem::file_size(path, error);
-  if (error || size > static_cast<uintmax_t>(kFileBytesMax)) {
-    return MakeError(
-        Reason::kLimitExceeded,
-        absl::StrCat(path, " has ", size, " bytes; the largest file is ", kFileBytesMax, " bytes"));
-  }
-  std::string bytes(size, '\0');
-  std::ifstream file(path, std::ios::binary);
-  if (!file.read(bytes.data(), static_cast<std::streamsize>(size))) {
-    return absl::UnavailableError(absl::StrCat(path, " cannot be read; check its permissions"));
-  }
-  return bytes;
-}
 
 bool IsMissing(const absl::Status& status) { return ReasonOf(status) == Reason::kMapUnknown; }
 
@@ -81,18 +62,18 @@ struct Committed {
 absl::StatusOr<Committed> CommitAll(GraphWriter* writer, GraphDelta delta, Progress* progress) {
   DSG_ASSIGN_OR_RETURN(const SessionState session, writer->GetSession(delta.session_id));
   Committed committed{.last_revision = session.last_revision};
-  std::vector<GraphDelta> parts = SplitDelta(std::move(delta), kItemsPerCommit);
-  for (size_t i = 0; i < parts.size(); ++i) {
+  const auto commit = [&](GraphDelta part, double done) -> absl::Status {
+    const int64_t number = part.sequence;
     // Parts are the same in every run, so what an interrupted one committed is skipped.
-    if (parts[i].sequence <= session.last_sequence) continue;
-    const auto result = writer->Commit(std::move(parts[i]));
-    if (!result.ok()) {
-      return Annotate(result.status(), absl::StrCat("part ", i + 1, " of ", parts.size()));
-    }
+    if (number <= session.last_sequence) return absl::OkStatus();
+    const auto result = writer->Commit(std::move(part));
+    if (!result.ok()) return Annotate(result.status(), absl::StrCat("part ", number));
     committed.last_revision = result->revision;
     ++committed.part_count;
-    progress->Update(static_cast<double>(i + 1) / static_cast<double>(parts.size()));
-  }
+    progress->Update(done);
+    return absl::OkStatus();
+  };
+  DSG_RETURN_IF_ERROR(ForEachPart(std::move(delta), kItemsPerCommit, commit));
   return committed;
 }
 
@@ -117,6 +98,22 @@ absl::StatusOr<Committed> CommitToStore(const CommonOptions& common, bool map_ex
                    MetadataOf(committed.status()));
 }
 
+// To the error output, so that a script's answer stays what it is.
+void TellSkipped(const ImportedGraph& graph, std::ostream& out) {
+  for (const Skipped& skipped : graph.skipped)
+    out << "note: " << Printable(ToString(skipped)) << "\n";
+}
+
+nlohmann::ordered_json SkippedToJson(const std::vector<Skipped>& all) {
+  auto json = nlohmann::ordered_json::array();
+  for (const Skipped& skipped : all) {
+    json.push_back({{"what", skipped.what},
+                    {"count", std::to_string(skipped.count)},
+                    {"first", skipped.first}});
+  }
+  return json;
+}
+
 void PrintJson(const ImportedGraph& graph, const std::string& file, const std::string& map,
                const Committed& committed, std::ostream& out) {
   const nlohmann::ordered_json json = {
@@ -130,7 +127,8 @@ void PrintJson(const ImportedGraph& graph, const std::string& file, const std::s
       {"pose_count", std::to_string(graph.pose_count)},
       {"mesh_vertex_count", std::to_string(graph.mesh_vertex_count)},
       {"mesh_face_count", std::to_string(graph.mesh_face_count)},
-      {"notes", graph.notes}};
+      {"notes", graph.notes},
+      {"skipped", SkippedToJson(graph.skipped)}};
   out << json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << "\n";
 }
 
@@ -158,14 +156,20 @@ absl::Status RunImport(const CommonOptions& common, const ImportVerb& verb, std:
   }
   DSG_RETURN_IF_ERROR(CheckMapName(common.map));
   Progress progress("import", &progress_out);
-  DSG_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(verb.file));
+  DSG_ASSIGN_OR_RETURN(const FileText file, FileText::Read(verb.file));
   DSG_ASSIGN_OR_RETURN(const std::optional<MapSpec> found, FindMap(common.store, common.map));
   const std::string name = std::filesystem::path(verb.file).filename().string();
-  DSG_ASSIGN_OR_RETURN(ImportedGraph graph,
-                       ReadSceneGraph(bytes, name, found.value_or(MapSpec()).mesh_block_size_m));
+  // Before the text is read, and leaves memory.
+  const std::string digest = ToHex(ComputeSha256(file.text()));
+  const ReadOptions options = {.is_strict = verb.is_strict,
+                               .passed = [&file](std::string_view text) { file.Drop(text); }};
+  DSG_ASSIGN_OR_RETURN(
+      ImportedGraph graph,
+      ReadSceneGraph(file.text(), name, found.value_or(MapSpec()).mesh_block_size_m, options));
+  TellSkipped(graph, progress_out);
   GraphDelta delta = std::move(graph.delta);
   delta.map = common.map;
-  delta.session_id = "import-" + ToHex(ComputeSha256(bytes)).substr(0, 32);
+  delta.session_id = "import-" + digest.substr(0, 32);
   delta.sequence = 1;
   delta.author = "dsg import";
   delta.message = absl::StrCat("import of ", name, " (", graph.format, ")");

@@ -24,10 +24,23 @@ std::string Expected(const char* expected, const Json& value) {
                       "; expected ", expected);
 }
 
+// Where all is well no path is made, which would cost more than the value.
+bool IsUnsigned(const Json& value, uint64_t max) {
+  return value.is_number_unsigned() && value.get<uint64_t>() <= max;
+}
+
+bool IsPoint(const Json& value) {
+  return value.is_array() && value.size() == 3 && value[0].is_number() && value[1].is_number() &&
+         value[2].is_number();
+}
+
 }  // namespace
 
 void JsonSource::Fail(const std::string& where, const std::string& what) {
-  if (status.ok()) status = FileError(file, where, what);
+  if (!status.ok()) return;
+  status = FileError(file, where, what);
+  first_where = where;
+  first_what = what;
 }
 
 JsonFields::JsonFields(const Json& value, std::string where, JsonSource* source)
@@ -55,6 +68,7 @@ bool JsonFields::Has(const char* name) const { return Find(name) != nullptr; }
 uint64_t JsonFields::Unsigned(const char* name, uint64_t max,
                               std::optional<uint64_t> fallback) const {
   const Json* value = Find(name);
+  if (value != nullptr && IsUnsigned(*value, max)) return value->get<uint64_t>();
   if (value != nullptr) return UnsignedOf(*value, max, PathOf(name), source_);
   if (!fallback.has_value()) Fail(name, "is missing");
   return fallback.value_or(0);
@@ -76,6 +90,7 @@ int64_t JsonFields::Signed(const char* name, std::optional<int64_t> fallback) co
 
 double JsonFields::Number(const char* name, std::optional<double> fallback) const {
   const Json* value = Find(name);
+  if (value != nullptr && value->is_number()) return value->get<double>();
   if (value != nullptr) return NumberOf(*value, PathOf(name), source_);
   if (!fallback.has_value()) Fail(name, "is missing");
   return fallback.value_or(0.0);
@@ -99,6 +114,9 @@ std::string JsonFields::Text(const char* name, std::optional<std::string> fallba
 
 Eigen::Vector3d JsonFields::Vector(const char* name) const {
   const Json* value = Find(name);
+  if (value != nullptr && IsPoint(*value)) {
+    return {(*value)[0].get<double>(), (*value)[1].get<double>(), (*value)[2].get<double>()};
+  }
   if (value != nullptr) return VectorOf(*value, PathOf(name), source_);
   Fail(name, "is missing");
   return Eigen::Vector3d::Zero();
@@ -133,7 +151,7 @@ double NumberOf(const Json& value, const std::string& where, JsonSource* source)
 }
 
 uint64_t UnsignedOf(const Json& value, uint64_t max, const std::string& where, JsonSource* source) {
-  if (value.is_number_unsigned() && value.get<uint64_t>() <= max) return value.get<uint64_t>();
+  if (IsUnsigned(value, max)) return value.get<uint64_t>();
   source->Fail(where, Expected(absl::StrCat("an integer from 0 to ", max).c_str(), value));
   return 0;
 }

@@ -19,6 +19,9 @@ namespace dsg {
 struct JsonSource {
   std::string file;
   absl::Status status;
+  /// Of the first error.
+  std::string first_where = {};
+  std::string first_what = {};
 
   bool ok() const { return status.ok(); }
   /// Keeps the error if it is the first.

@@ -36,17 +36,14 @@ class KimeraReader {
     const JsonFields root(json, "", &source_);
     if (!root.Has("edges")) root.Fail("edges", "is missing; the file may be cut");
     const Json& nodes = root.Array("nodes");
-    for (size_t i = 0; i < nodes.size() && source_.ok(); ++i) {
-      ReadNode(JsonFields(nodes[i], absl::StrCat("nodes[", i, "]"), &source_));
-    }
+    for (size_t i = 0; i < nodes.size(); ++i) ReadNode(absl::StrCat("nodes[", i, "]"), nodes[i]);
     const Json& edges = root.Array("edges");
-    for (size_t i = 0; i < edges.size() && source_.ok(); ++i) {
-      ReadEdge(JsonFields(edges[i], absl::StrCat("edges[", i, "]"), &source_));
-    }
+    for (size_t i = 0; i < edges.size(); ++i) ReadEdge(absl::StrCat("edges[", i, "]"), edges[i]);
     if (!source_.ok()) return source_.status;
     result_.format = "kimera-json";
-    result_.node_count = static_cast<int64_t>(nodes.size());
-    result_.edge_count = static_cast<int64_t>(edges.size());
+    result_.node_count = static_cast<int64_t>(result_.delta.nodes.size());
+    result_.edge_count = static_cast<int64_t>(result_.delta.edges.size());
+    result_.skipped = skips_.all();
     result_.notes.push_back(
         "the file has no times; ids were made from the types and indices of its nodes");
     FitBoxesToChildren(&result_.delta);
@@ -59,23 +56,28 @@ class KimeraReader {
     const Type* type = nullptr;
   };
 
-  void ReadNode(const JsonFields& fields) {
+  void ReadNode(const std::string& where, const Json& record) {
+    JsonSource source{source_.file, absl::OkStatus()};
+    const JsonFields fields(record, where, &source);
     const Type* type = ReadType(fields);
     const uint64_t index = fields.Unsigned("index", NodeId::kIndexMax);
-    if (type == nullptr) return;
     Node node;
-    node.id = NodeId(type->letter, index);
-    node.layer = type->layer;
-    node.kind = type->name;
     node.provenance = Provenance::kImported;
     node.map_T_node.position = ReadPoint(fields, "centroid");
     if (fields.Has("node_id")) {
       node.attributes["node_id"] = static_cast<double>(fields.Signed("node_id"));
     }
-    ReadClass(fields, &node);
-    ReadSize(fields, &node);
+    if (type != nullptr) {
+      node.id = NodeId(type->letter, index);
+      node.layer = type->layer;
+      node.kind = type->name;
+      ReadClass(fields, &node);
+      ReadSize(fields, &node);
+    }
+    if (!source.ok()) return skips_.Add(SkipKind::kNode, source.first_where, source.first_what);
     if (!ends_.try_emplace(index, End{node.id, type}).second) {
-      fields.Fail("index", absl::StrCat(index, " appears twice"));
+      return skips_.Add(SkipKind::kRepeatedNode, absl::StrCat(where, ".index"),
+                        absl::StrCat(index, " appears twice"));
     }
     result_.delta.nodes.push_back(std::move(node));
   }
@@ -123,24 +125,37 @@ class KimeraReader {
     if (node->object.has_value()) node->object->size = size;
   }
 
-  End ReadEnd(const JsonFields& fields, const char* name) {
-    const uint64_t index = fields.Unsigned(name, NodeId::kIndexMax);
-    const auto found = ends_.find(index);
-    if (found != ends_.end()) return found->second;
-    fields.Fail(name, absl::StrCat("node ", index, " is not in the file"));
-    return {};
+  void ReadEdge(const std::string& where, const Json& record) {
+    JsonSource source{source_.file, absl::OkStatus()};
+    const JsonFields fields(record, where, &source);
+    const uint64_t start_index = fields.Unsigned("start", NodeId::kIndexMax);
+    const uint64_t end_index = fields.Unsigned("end", NodeId::kIndexMax);
+    const std::string word = fields.Text("rel");
+    const double weight = fields.Number("weight", 1.0);
+    if (word.empty() || word.size() > 64) fields.Fail("rel", "must have 1 to 64 characters");
+    if (!std::isfinite(weight)) fields.Fail("weight", "is not finite");
+    if (!source.ok()) return skips_.Add(SkipKind::kEdge, source.first_where, source.first_what);
+    const auto start = ends_.find(start_index);
+    const auto end = ends_.find(end_index);
+    if (start == ends_.end() || end == ends_.end()) {
+      const bool is_start = start == ends_.end();
+      return skips_.Add(
+          SkipKind::kDanglingEdge, where + (is_start ? ".start" : ".end"),
+          absl::StrCat("node ", is_start ? start_index : end_index, " is not in the file"));
+    }
+    if (start_index == end_index) {
+      return skips_.Add(SkipKind::kLoopEdge, absl::StrCat(where, ".end"), "is also the start");
+    }
+    Edge edge = MakeEdge(start->second, end->second, word);
+    edge.weight = weight;
+    if (!seen_.insert(edge.key()).second) {
+      return skips_.Add(SkipKind::kRepeatedEdge, absl::StrCat(where, ".start"), "repeats an edge");
+    }
+    result_.delta.edges.push_back(std::move(edge));
   }
 
-  void ReadEdge(const JsonFields& fields) {
-    const End start = ReadEnd(fields, "start");
-    const End end = ReadEnd(fields, "end");
-    const std::string word = fields.Text("rel");
+  static Edge MakeEdge(const End& start, const End& end, const std::string& word) {
     Edge edge;
-    edge.weight = fields.Number("weight", 1.0);
-    if (word.empty() || word.size() > 64) fields.Fail("rel", "must have 1 to 64 characters");
-    if (start.id == end.id) fields.Fail("end", "is also the start");
-    if (!std::isfinite(edge.weight)) fields.Fail("weight", "is not finite");
-    if (!source_.ok()) return;
     edge.source = start.id;
     edge.target = end.id;
     edge.relation = word;
@@ -149,8 +164,7 @@ class KimeraReader {
       edge.relation = relations::kContains;
       std::swap(edge.source, edge.target);
     }
-    if (!seen_.insert(edge.key()).second) fields.Fail("start", "repeats an edge");
-    result_.delta.edges.push_back(std::move(edge));
+    return edge;
   }
 
   static const char* RelationOfNear(const End& start, const End& end) {
@@ -161,19 +175,13 @@ class KimeraReader {
   }
 
   JsonSource source_;
+  Skips skips_;
   ImportedGraph result_;
   std::unordered_map<uint64_t, End> ends_;
   std::set<EdgeKey> seen_;
 };
 
 }  // namespace
-
-bool IsKimeraJson(const Json& root) {
-  if (!root.is_object()) return false;
-  const auto nodes = root.find("nodes");
-  if (nodes == root.end() || !nodes->is_array() || nodes->empty()) return false;
-  return nodes->front().is_object() && nodes->front().contains("index");
-}
 
 absl::StatusOr<ImportedGraph> ReadKimeraJson(const Json& root, const std::string& file) {
   return KimeraReader(file).Read(root);

@@ -10,9 +10,6 @@
 
 namespace dsg {
 
-/// The first node has an index, as this form's nodes have and Spark-DSG's have not.
-bool IsKimeraJson(const nlohmann::json& root);
-
 /// Ids are the type's letter (O, p, R, B) and the node's index; the file's node_id, which is not
 /// unique, becomes an attribute. "At Location" becomes CONTAINS from the end to the start; "Near"
 /// becomes TRAVERSABLE, ADJACENT or NEAR; another word stays as it is.

@@ -10,13 +10,21 @@
 
 namespace dsg {
 
+/// True if a map can hold a vertex there.
+bool IsSoundVertex(const Eigen::Vector3f& position);
+
+/// Takes out vertices that are not finite or too far away, faces at them, and faces of vertices
+/// that are not there; each counted in `skips`.
+void DropUnsound(Skips* skips, MeshBlock* mesh);
+
 class MeshNumbering {
  public:
   MeshNumbering(const SparkGraph& graph, double block_size_m);
 
   /// False if the numbers stay as they are.
   bool is_needed() const { return is_needed_; }
-  SparkNode Renumber(const SparkNode& node) const;
+  /// Numbers of vertices that DropUnsound takes out are left out.
+  void Renumber(nlohmann::json* fields) const;
 
  private:
   bool is_needed_ = false;

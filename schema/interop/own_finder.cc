@@ -69,7 +69,7 @@ class OwnFinder {
       again.id = node.id;
       again.key = node.key;
       again.type = node.type;
-      ReadSparkAttributes(JsonFields(node.fields, "", &source), &source, &read, &again);
+      ReadSparkAttributes(JsonFields(node.fields, "", &source), &source, &again);
       FinishNode(node.fields, &again);
       read.nodes.push_back(std::move(again));
     }

@@ -26,8 +26,8 @@ std::pair<uint64_t, uint64_t> Ends(uint64_t a, uint64_t b) { return std::minmax(
 class OwnParts {
  public:
   OwnParts(const SparkGraph& graph, const SparkLayers& layers, const std::string& file,
-           GraphDelta* delta)
-      : graph_(graph), layers_(layers), file_(file), delta_(*delta) {}
+           Skips* skips, GraphDelta* delta)
+      : graph_(graph), layers_(layers), file_(file), skips_(*skips), delta_(*delta) {}
 
   absl::Status Take() {
     DSG_RETURN_IF_ERROR(TakeNodes());
@@ -35,6 +35,7 @@ class OwnParts {
     DSG_RETURN_IF_ERROR(TakeRobots());
     TakeWalks();
     if (!is_changed_) return absl::OkStatus();
+    DropDanglingEdges();
     DropUnusedLayers();
     FitBoxesToChildren(&delta_);
     return absl::OkStatus();
@@ -171,7 +172,7 @@ class OwnParts {
     for (const Node& node : delta_.nodes) {
       const auto walker = walkers.find(node.id);
       if (walker == walkers.end() || !IsAgentKind(node.kind)) continue;
-      TrajectoryAppend append = {node.id, PosesOf(walker->second->fields)};
+      TrajectoryAppend append = {node.id, PosesOf(SparseFieldsOf(*walker->second))};
       if (append.poses.empty()) continue;
       is_changed_ = true;
       std::vector<Visit> visits;
@@ -206,6 +207,21 @@ class OwnParts {
     return poses;
   }
 
+  // The metadata of edges can name any node.
+  void DropDanglingEdges() {
+    std::unordered_set<NodeId> ids;
+    for (const Node& node : delta_.nodes) ids.insert(node.id);
+    std::erase_if(delta_.edges, [&](const Edge& edge) {
+      if (ids.contains(edge.source) && ids.contains(edge.target)) return false;
+      const NodeId missing = ids.contains(edge.source) ? edge.target : edge.source;
+      skips_.Add(SkipKind::kDanglingEdge,
+                 absl::StrCat("edge ", ToString(edge.source), " ", edge.relation, " ",
+                              ToString(edge.target)),
+                 absl::StrCat("node ", ToString(missing), " is not in the file"));
+      return true;
+    });
+  }
+
   void DropUnusedLayers() {
     std::set<LayerId> used;
     for (const Node& node : delta_.nodes) used.insert(node.layer);
@@ -222,6 +238,7 @@ class OwnParts {
   const SparkGraph& graph_;
   const SparkLayers& layers_;
   const std::string& file_;
+  Skips& skips_;
   GraphDelta& delta_;
   bool is_changed_ = false;
 };
@@ -229,8 +246,8 @@ class OwnParts {
 }  // namespace
 
 absl::Status TakeOwnParts(const SparkGraph& graph, const SparkLayers& layers,
-                          const std::string& file, GraphDelta* delta) {
-  return OwnParts(graph, layers, file, delta).Take();
+                          const std::string& file, Skips* skips, GraphDelta* delta) {
+  return OwnParts(graph, layers, file, skips, delta).Take();
 }
 
 }  // namespace dsg

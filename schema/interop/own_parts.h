@@ -14,8 +14,9 @@ namespace dsg {
 
 /// Nodes and edges become what the metadata says they were; people get their tracks back, robots
 /// their names, and poses that were no nodes of the map go. `delta` is the whole graph as
-/// converted. Errors: INVALID_ARGUMENT/FILE_MALFORMED naming `file` and what was wrong.
+/// converted; edges that name nodes it does not have are counted in `skips`. Errors:
+/// INVALID_ARGUMENT/FILE_MALFORMED naming `file` and what was wrong.
 absl::Status TakeOwnParts(const SparkGraph& graph, const SparkLayers& layers,
-                          const std::string& file, GraphDelta* delta);
+                          const std::string& file, Skips* skips, GraphDelta* delta);
 
 }  // namespace dsg

@@ -61,6 +61,7 @@ class RegionReader {
     result_.node_count = static_cast<int64_t>(delta.nodes.size());
     result_.edge_count = static_cast<int64_t>(delta.edges.size());
     result_.notes.push_back("the file has no heights, extents or times; z is 0");
+    result_.skipped = skips_.all();
     FitBoxesToChildren(&delta);
     return std::move(result_);
   }
@@ -107,7 +108,8 @@ class RegionReader {
     if (parent == nullptr || parent->is_null() || *parent == "none") return;
     const auto region = IdOf(fields.Text("parent_region"), 'R');
     if (!region.has_value() || !ids_.contains(*region)) {
-      return fields.Fail("parent_region", "is no region of the file");
+      return skips_.Add(SkipKind::kDanglingEdge, absl::StrCat(fields.where(), ".parent_region"),
+                        "is no region of the file");
     }
     Edge edge;
     edge.source = *region;
@@ -117,15 +119,12 @@ class RegionReader {
   }
 
   JsonSource source_;
+  Skips skips_;
   ImportedGraph result_;
   std::unordered_set<NodeId> ids_;
 };
 
 }  // namespace
-
-bool IsRegionJson(const Json& root) {
-  return root.is_object() && root.contains("regions") && root.contains("objects");
-}
 
 absl::StatusOr<ImportedGraph> ReadRegionJson(const Json& root, const std::string& file) {
   return RegionReader(file).Read(root);

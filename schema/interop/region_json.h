@@ -10,9 +10,6 @@
 
 namespace dsg {
 
-/// Has "regions" and "objects" by name.
-bool IsRegionJson(const nlohmann::json& root);
-
 /// Regions "R(1)" become rooms and objects "O(2)" objects, each under its parent region. Centres
 /// are "(x, y)"; z is 0, which a note says.
 ///

@@ -26,13 +26,42 @@ constexpr std::string_view kKnownKeys[] = {
     "\"layer_keys\"",       "\"regions\"", "\"has_colors\"", "\"has_labels\"", "\"points\"",
     "\"vertices\"",         "\"colors\"",  "\"faces\""};
 
+// The first of them names its number an index.
+absl::StatusOr<bool> IsKimeraJson(const JsonMembers& members, const std::string& name) {
+  const auto nodes = members.find("nodes");
+  if (nodes == members.end()) return false;
+  JsonCursor cursor(nodes->second.text, name, nodes->second.offset);
+  if (cursor.Peek() != '[') return false;
+  cursor.BeginArray();
+  if (!cursor.NextElement()) return false;
+  const nlohmann::json first = cursor.Value();
+  if (!cursor.ok()) return cursor.status();
+  return first.is_object() && first.contains("index");
+}
+
 absl::StatusOr<ImportedGraph> ReadJsonGraph(std::string_view bytes, const std::string& name,
-                                            double mesh_block_size_m) {
-  DSG_ASSIGN_OR_RETURN(nlohmann::json root, ParseJson(bytes, name));
-  if (IsKimeraJson(root)) return ReadKimeraJson(root, name);
-  if (IsRegionJson(root)) return ReadRegionJson(root, name);
-  DSG_ASSIGN_OR_RETURN(const SparkGraph graph, ReadSparkJson(std::move(root), name));
-  return SparkToDelta(graph, name, mesh_block_size_m);
+                                            double mesh_block_size_m, const ReadOptions& options) {
+  DSG_ASSIGN_OR_RETURN(const JsonMembers members, SplitJson(bytes, name));
+  DSG_ASSIGN_OR_RETURN(const bool is_kimera, IsKimeraJson(members, name));
+  const bool is_region = members.contains("regions") && members.contains("objects");
+  if (is_kimera || is_region) {
+    DSG_ASSIGN_OR_RETURN(const nlohmann::json root, ParseJson(bytes, name));
+    return is_kimera ? ReadKimeraJson(root, name) : ReadRegionJson(root, name);
+  }
+  DSG_ASSIGN_OR_RETURN(SparkGraph graph, ReadSparkJson(members, name, options.passed));
+  return SparkToDelta(std::move(graph), name, mesh_block_size_m);
+}
+
+absl::StatusOr<ImportedGraph> ReadAnyGraph(std::string_view bytes, const std::string& name,
+                                           double mesh_block_size_m, const ReadOptions& options) {
+  if (!LooksLikeSparkBinary(bytes)) return ReadJsonGraph(bytes, name, mesh_block_size_m, options);
+  DSG_ASSIGN_OR_RETURN(SparkGraph graph, ReadSparkBinary(bytes, name));
+  return SparkToDelta(std::move(graph), name, mesh_block_size_m);
+}
+
+// An empty file of a graph is one; a file of which nothing is left is some other.
+bool IsNothingLeft(const ImportedGraph& graph) {
+  return graph.node_count == 0 && graph.edge_count == 0 && graph.mesh_vertex_count == 0;
 }
 
 }  // namespace
@@ -49,7 +78,7 @@ bool LooksLikeSceneGraph(std::string_view bytes) {
 }
 
 absl::StatusOr<ImportedGraph> ReadSceneGraph(std::string_view bytes, const std::string& name,
-                                             double mesh_block_size_m) {
+                                             double mesh_block_size_m, const ReadOptions& options) {
   if (!(mesh_block_size_m >= 0.1 && mesh_block_size_m <= 100.0)) {
     return MakeError(
         Reason::kFieldInvalid,
@@ -64,9 +93,15 @@ absl::StatusOr<ImportedGraph> ReadSceneGraph(std::string_view bytes, const std::
   if (bytes.find_first_not_of(kBlank) == std::string_view::npos) {
     return FileError(name, "the file", "is empty");
   }
-  if (!LooksLikeSparkBinary(bytes)) return ReadJsonGraph(bytes, name, mesh_block_size_m);
-  DSG_ASSIGN_OR_RETURN(const SparkGraph graph, ReadSparkBinary(bytes, name));
-  return SparkToDelta(graph, name, mesh_block_size_m);
+  auto graph = ReadAnyGraph(bytes, name, mesh_block_size_m, options);
+  if (!graph.ok() || graph->skipped.empty()) return graph;
+  if (options.is_strict) {
+    return SkipError(name, graph->skipped, "refused, because the read is strict");
+  }
+  if (IsNothingLeft(*graph)) {
+    return SkipError(name, graph->skipped, "refused, because nothing of the file is left");
+  }
+  return graph;
 }
 
 }  // namespace dsg

@@ -2,16 +2,18 @@
 // Scene-graph files of other projects, read whole into one delta.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "schema/interop/skips.h"
 #include "schema/model/graph_delta.h"
 
 namespace dsg {
 
-/// What was in a file, counted in the file's own terms, and what became of it.
+/// What was taken from a file, counted in the file's own terms, and what became of it.
 struct ImportedGraph {
   /// Nodes, edges, trajectories of agents, stays, mesh blocks; boxes fitted; valid for CheckDelta
   /// on an empty map. Map, session and sequence are left for the caller.
@@ -28,6 +30,16 @@ struct ImportedGraph {
   TimeNs first_ns = 0;
   /// Sentences for the user about what was assumed, renamed or dropped (never silently).
   std::vector<std::string> notes;
+  /// What of the file is not in the delta, because no map can hold it.
+  std::vector<Skipped> skipped;
+};
+
+struct ReadOptions {
+  /// Refuse a file of which anything would be skipped.
+  bool is_strict = false;
+  /// Called with bytes that have been read and will not be read again, so that they need not stay
+  /// in memory while the graph grows; may be null.
+  std::function<void(std::string_view)> passed;
 };
 
 /// True if the bytes begin like a file that ReadSceneGraph understands.
@@ -41,11 +53,16 @@ bool LooksLikeSceneGraph(std::string_view bytes);
 /// "agent_poses" of id 20), so nothing of the file is lost; they are also the trajectory of a robot
 /// (r0 for the letter a, r1 for b, ...), whose stays follow from the poses' places.
 ///
+/// Single nodes, edges, fields and mesh faces that cannot be kept are skipped, counted and named;
+/// edges to nodes that are not there are common in the field.
+///
 /// Every length in the file is checked against the bytes that are left before anything is
 /// allocated; 512 MiB is the largest file.
-/// Errors: INVALID_ARGUMENT/FILE_MALFORMED naming file, field or byte offset;
+/// Errors: INVALID_ARGUMENT/FILE_MALFORMED naming file, field or byte offset for bytes that are cut
+/// or malformed, if everything would be skipped, and if anything would while `is_strict`;
 /// INVALID_ARGUMENT/FIELD_INVALID for a block size outside 0.1 to 100 m.
 absl::StatusOr<ImportedGraph> ReadSceneGraph(std::string_view bytes, const std::string& name,
-                                             double mesh_block_size_m);
+                                             double mesh_block_size_m,
+                                             const ReadOptions& options = {});
 
 }  // namespace dsg

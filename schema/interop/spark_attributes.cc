@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "schema/interop/spark_attributes.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "absl/strings/str_cat.h"
+#include "schema/interop/json_peek.h"
 #include "schema/interop/spark_metadata.h"
 
 namespace dsg {
@@ -16,7 +18,7 @@ constexpr uint64_t kUint64Max = std::numeric_limits<uint64_t>::max();
 
 class AttributesReader {
  public:
-  AttributesReader(JsonSource* source, SparkGraph* graph) : source_(*source), graph_(*graph) {}
+  explicit AttributesReader(JsonSource* source) : source_(*source) {}
 
   void ReadAttributes(const JsonFields& fields, SparkNode* node) {
     if (const Json* metadata = fields.Find("metadata")) {
@@ -62,7 +64,7 @@ class AttributesReader {
     const size_t length = feature->is_object()
                               ? fields.Object("semantic_feature", true).Array("data").size()
                               : fields.Array("semantic_feature").size();
-    AddLength("semantic_feature", length, &graph_, node);
+    AddLength("semantic_feature", length, node);
   }
 
   // {r, g, b, a}, or [r, g, b] before 1.0.3.
@@ -130,21 +132,20 @@ class AttributesReader {
     CountList(fields, "dynamic_object_points", node);
     if (fields.Has("details")) {
       fields.Object("details", true);
-      AddLength("details", fields.Find("details")->size(), &graph_, node);
+      AddLength("details", fields.Find("details")->size(), node);
     }
     // Before 1.0.2 the mesh was three flat lists beside the other fields.
     const bool is_flat = !fields.Has("mesh");
     const JsonFields mesh = is_flat ? fields : fields.Object("mesh", true);
     const size_t per_item = is_flat ? 3 : 1;
-    AddLength("mesh_vertices", mesh.Array(is_flat ? "vertices" : "points").size() / per_item,
-              &graph_, node);
-    AddLength("mesh_faces", mesh.Array("faces").size() / per_item, &graph_, node);
+    AddLength("mesh_vertices", mesh.Array(is_flat ? "vertices" : "points").size() / per_item, node);
+    AddLength("mesh_faces", mesh.Array("faces").size() / per_item, node);
   }
 
   void ReadTimes(const JsonFields& fields, const char* name, std::vector<uint64_t>* times) {
+    const std::string where = absl::StrCat(fields.where(), ".", name);
     for (const Json& time : fields.Array(name)) {
-      times->push_back(
-          UnsignedOf(time, kUint64Max, absl::StrCat(fields.where(), ".", name), &source_));
+      times->push_back(UnsignedOf(time, kUint64Max, where, &source_));
     }
   }
 
@@ -225,18 +226,54 @@ class AttributesReader {
   }
 
   void CountList(const JsonFields& fields, const char* name, SparkNode* node) {
-    AddLength(name, fields.Array(name).size(), &graph_, node);
+    AddLength(name, fields.Array(name).size(), node);
   }
 
   JsonSource& source_;
-  SparkGraph& graph_;
 };
+
+// "nodes[3].attributes.bounding_box.min" in "nodes[3].attributes": "bounding_box".
+std::string FieldOf(const std::string& path, const std::string& where) {
+  if (!path.starts_with(where)) return "";
+  const std::string rest = path.substr(std::min(path.size(), where.size() + 1));
+  return rest.substr(0, rest.find_first_of(".["));
+}
 
 }  // namespace
 
-void ReadSparkAttributes(const JsonFields& attributes, JsonSource* source, SparkGraph* graph,
-                         SparkNode* node) {
-  AttributesReader(source, graph).ReadAttributes(attributes, node);
+void ReadSparkAttributes(const JsonFields& attributes, JsonSource* source, SparkNode* node) {
+  AttributesReader(source).ReadAttributes(attributes, node);
+}
+
+absl::Status ReadWhatCanBeRead(const std::string& file, const std::string& where, Json* attributes,
+                               Skips* skips, SparkNode* node) {
+  const SparkNode head = *node;
+  for (;;) {
+    JsonSource source{file, absl::OkStatus()};
+    ReadSparkAttributes(JsonFields(*attributes, where, &source), &source, node);
+    if (source.ok()) return absl::OkStatus();
+    const std::string name = FieldOf(source.first_where, where);
+    // Nothing stands where nobody knows; and what is not there cannot be taken out.
+    if (name == "position" || !attributes->is_object() || attributes->erase(name) == 0) {
+      return source.status;
+    }
+    skips->Add(SkipKind::kNodeField, source.first_where, source.first_what);
+    *node = head;
+  }
+}
+
+SparkClass ReadSparkClass(const std::string& where, const Json& attributes, Skips* skips) {
+  const Json& type = Peek(attributes, "type");
+  const auto known =
+      type.is_string() ? SparkClassOf(type.get_ref<const std::string&>()) : std::nullopt;
+  if (known.has_value()) return *known;
+  skips->Add(SkipKind::kUnknownClass, absl::StrCat(where, ".type"),
+             type.is_string() ? absl::StrCat("\"", type.get<std::string>().substr(0, 64),
+                                             "\" is no known class of attributes")
+                              : absl::StrCat("is ", type.is_null() ? "missing" : type.type_name(),
+                                             "; expected the name of a class"));
+  const bool is_semantic = Peek(attributes, "semantic_label").is_number();
+  return is_semantic ? SparkClass::kSemantic : SparkClass::kNode;
 }
 
 }  // namespace dsg

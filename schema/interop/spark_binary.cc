@@ -145,12 +145,11 @@ class SparkBinaryReader {
     nlohmann::json fields = ReadBinaryFields(node->type, graph_.version, &in_);
     if (!in_.ok()) return;
     fields["metadata"] = std::move(metadata);
-    JsonSource source{file_, absl::OkStatus()};
-    const JsonFields attributes(fields, absl::StrCat("node ", ToString(NodeId(node->id))), &source);
-    ReadSparkAttributes(attributes, &source, &graph_, node);
-    if (!source.ok()) in_.Fail("attributes", std::string(source.status.message()));
-    if (!in_.ok()) return;
+    const std::string where = absl::StrCat("node ", ToString(NodeId(node->id)));
+    const absl::Status read = ReadWhatCanBeRead(file_, where, &fields, &graph_.skips, node);
+    if (!read.ok()) return in_.Fail("attributes", std::string(read.message()));
     FinishNode(std::move(fields), node);
+    PackFields(node);
   }
 
   void ReadEdge() {

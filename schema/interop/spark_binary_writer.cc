@@ -91,8 +91,8 @@ class GraphWriter {
   }
 
   void WriteNode(const SparkNode& node) {
-    const Json made = node.fields.is_null() ? MakeFields(node) : Json();
-    const Json& fields = node.fields.is_null() ? made : node.fields;
+    const Json read = AllFieldsOf(node);
+    const Json fields = read.is_null() ? MakeFields(node) : read;
     out_.Array(4);
     out_.Signed64(node.key.layer);
     out_.Unsigned64(node.id);

@@ -159,6 +159,10 @@ void UpgradeBox(Json* box) {
     *box = EmptyBox();
     return;
   }
+  const bool is_new = box->size() == 4 && Peek(*box, "type").is_string() &&
+                      box->contains("dimensions") && box->contains("world_P_center") &&
+                      box->contains("world_R_center");
+  if (is_new) return;
   const Json type = Peek(*box, "type");
   constexpr const char* kNames[] = {"INVALID", "AABB", "OBB", "RAABB"};
   if (type.is_number_unsigned() && type.get<size_t>() < 4) {
@@ -357,6 +361,50 @@ Json DefaultOf(SparkFieldType type, uint64_t node_id) {
   return nullptr;
 }
 
+namespace {
+
+using Defaults = std::map<std::string, Json, std::less<>>;
+
+// Sorted as the fields of a tree are.
+const Defaults& DefaultsOf(SparkClass type) {
+  static const auto* const all = [] {
+    auto* made = new std::array<Defaults, static_cast<size_t>(SparkClass::kTraversability) + 1>;
+    for (size_t i = 0; i < made->size(); ++i) {
+      (*made)[i]["metadata"] = Json::object();
+      for (const SparkField& field : FieldsOf(static_cast<SparkClass>(i))) {
+        const bool is_fixed = field.type != Type::kNodeId && field.type != Type::kTime;
+        if (is_fixed) (*made)[i][field.name] = DefaultOf(field.type, 0);
+      }
+    }
+    return made;
+  }();
+  return (*all)[static_cast<size_t>(type)];
+}
+
+}  // namespace
+
+const Json* DefaultFor(SparkClass type, const std::string& name) {
+  const Defaults& defaults = DefaultsOf(type);
+  const auto found = defaults.find(name);
+  return found == defaults.end() ? nullptr : &found->second;
+}
+
+Json WithoutDefaults(SparkClass type, uint64_t node_id, Json fields) {
+  if (!fields.is_object()) return fields;
+  const Defaults& defaults = DefaultsOf(type);
+  auto fallback = defaults.begin();
+  for (auto it = fields.begin(); it != fields.end();) {
+    const std::string& name = it.key();
+    int order = -1;
+    while (fallback != defaults.end() && (order = fallback->first.compare(name)) < 0) ++fallback;
+    const bool has_fallback = fallback != defaults.end() && order == 0;
+    const bool is_default = name == "type" || (has_fallback && *it == fallback->second) ||
+                            (name == "external_key" && *it == Json(node_id));
+    it = is_default ? fields.erase(it) : std::next(it);
+  }
+  return fields;
+}
+
 void UpgradeFields(SparkClass type, uint64_t node_id, Json* attributes) {
   if (type == SparkClass::kKhronosObject) UpgradeKhronosMesh(attributes);
   for (const SparkField& field : FieldsOf(type)) {
@@ -381,8 +429,14 @@ void UpgradeFields(SparkClass type, uint64_t node_id, Json* attributes) {
 }
 
 Json MakeFields(const SparkNode& node) {
-  Json out = {{"type", NameOf(node.type)},
-              {"position", VectorJson(node.position)},
+  Json out = MakeSparseFields(node);
+  out["type"] = NameOf(node.type);
+  UpgradeFields(node.type, node.id, &out);
+  return out;
+}
+
+Json MakeSparseFields(const SparkNode& node) {
+  Json out = {{"position", VectorJson(node.position)},
               {"last_update_time_ns", node.last_update_ns},
               {"is_predicted", node.is_predicted}};
   if (IsSemantic(node.type)) MakeSemantic(node, &out);
@@ -401,7 +455,6 @@ Json MakeFields(const SparkNode& node) {
       metadata == node.attributes.end() ? nullptr : std::get_if<std::string>(&metadata->second);
   if (text != nullptr) out["metadata"] = Json::parse(*text, nullptr, false);
   if (out.contains("metadata") && out["metadata"].is_discarded()) out.erase("metadata");
-  UpgradeFields(node.type, node.id, &out);
   return out;
 }
 

@@ -56,6 +56,14 @@ const std::vector<SparkField>& FieldsOf(SparkClass type);
 /// then left out.
 nlohmann::json DefaultOf(SparkFieldType type, uint64_t node_id);
 
+/// DefaultOf the field of that name, or an empty object for the metadata; nullptr for fields that
+/// the class does not have, and for those whose default depends on the node's id.
+const nlohmann::json* DefaultFor(SparkClass type, const std::string& name);
+
+/// `fields` but for the "type" and for those that are what UpgradeFields would add; null stays
+/// null.
+nlohmann::json WithoutDefaults(SparkClass type, uint64_t node_id, nlohmann::json fields);
+
 /// Turns the attributes of a node of any version into those of kSparkVersionNewest: old forms of
 /// colours, boxes and meshes are rewritten, missing fields added. What the format does not know is
 /// left alone. Requires: the attributes have been read without errors.
@@ -63,5 +71,7 @@ void UpgradeFields(SparkClass type, uint64_t node_id, nlohmann::json* attributes
 
 /// The attributes that the members of a node say; lists that it keeps as lengths are empty.
 nlohmann::json MakeFields(const SparkNode& node);
+/// The same without fields of which the members say nothing, and without the "type".
+nlohmann::json MakeSparseFields(const SparkNode& node);
 
 }  // namespace dsg

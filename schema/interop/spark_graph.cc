@@ -75,10 +75,29 @@ void FinishNode(nlohmann::json attributes, SparkNode* node) {
   node->fields = std::move(attributes);
 }
 
-void AddLength(const char* name, size_t length, SparkGraph* graph, SparkNode* node) {
-  if (length == 0) return;
-  node->attributes[name] = static_cast<double>(length);
-  ++graph->shortened_lists[name];
+void PackFields(SparkNode* node) {
+  if (node->fields.is_null()) return;
+  node->packed_fields =
+      nlohmann::json::to_cbor(WithoutDefaults(node->type, node->id, std::move(node->fields)));
+  node->packed_fields.shrink_to_fit();
+  node->fields = nullptr;
+}
+
+nlohmann::json SparseFieldsOf(const SparkNode& node) {
+  if (node.packed_fields.empty()) return WithoutDefaults(node.type, node.id, node.fields);
+  return nlohmann::json::from_cbor(node.packed_fields);
+}
+
+nlohmann::json AllFieldsOf(const SparkNode& node) {
+  if (node.packed_fields.empty()) return node.fields;
+  nlohmann::json fields = SparseFieldsOf(node);
+  fields["type"] = NameOf(node.type);
+  UpgradeFields(node.type, node.id, &fields);
+  return fields;
+}
+
+void AddLength(const char* name, size_t length, SparkNode* node) {
+  if (length != 0) node->attributes[name] = static_cast<double>(length);
 }
 
 void AddFlag(const char* name, bool value, SparkNode* node) {
@@ -86,7 +105,7 @@ void AddFlag(const char* name, bool value, SparkNode* node) {
 }
 
 void AddNumber(const std::string& name, double value, SparkNode* node) {
-  if (std::isfinite(value) && value != 0.0) node->attributes[name] = value;
+  if (std::isnormal(value)) node->attributes[name] = value;
 }
 
 TimeNs StampOrZero(uint64_t stamp_ns) {

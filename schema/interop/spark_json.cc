@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "schema/interop/spark_json.h"
 
+#include <algorithm>
+#include <iterator>
 #include <limits>
 #include <unordered_map>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
+#include "schema/interop/file_error.h"
+#include "schema/interop/json_cursor.h"
 #include "schema/interop/json_fields.h"
 #include "schema/interop/spark_attributes.h"
 #include "schema/interop/spark_json_mesh.h"
@@ -18,25 +22,89 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr uint64_t kUint32Max = std::numeric_limits<uint32_t>::max();
+// Often enough that little of a passed text stays, seldom enough to cost nothing.
+constexpr size_t kPassedBytes = size_t{4} << 20;
+// So many elements tell how long the others are; no more are expected, whatever they tell.
+constexpr size_t kSampleCount = 64;
+constexpr size_t kReserveMax = 500'000;
 constexpr uint64_t kUint64Max = std::numeric_limits<uint64_t>::max();
+
+// What a graph can have thousands of is not read with the rest.
+constexpr const char* kLongMembers[] = {"nodes", "edges"};
+
+bool IsLong(const std::string& name) {
+  return std::find(std::begin(kLongMembers), std::end(kLongMembers), name) !=
+         std::end(kLongMembers);
+}
 
 class SparkJsonReader {
  public:
-  explicit SparkJsonReader(const std::string& file) : source_{file, absl::OkStatus()} {}
+  SparkJsonReader(const std::string& file, const PassedText& passed)
+      : source_{file, absl::OkStatus()}, passed_(passed) {}
 
-  absl::StatusOr<SparkGraph> Read(Json json) {
+  absl::StatusOr<SparkGraph> Read(const JsonMembers& members) {
+    Json json = Json::object();
+    for (const auto& [name, text] : members) {
+      if (!source_.ok()) return source_.status;
+      const bool is_later = members.contains("nodes") && IsLong(name);
+      if (!is_later) json[name] = ValueOf(text);
+    }
     const JsonFields root(json, "", &source_);
-    ReadHeader(root.Object(IsSparkJsonMesh(json) ? "header" : "SPARK_DSG_header", false));
-    if (IsSparkJsonMesh(json)) {
+    const bool is_mesh = IsSparkJsonMesh(members);
+    ReadHeader(root.Object(is_mesh ? "header" : "SPARK_DSG_header", false));
+    if (is_mesh) {
       graph_.mesh = ReadSparkJsonMesh(root, &source_);
     } else {
-      ReadGraph(root, &json);
+      ReadGraph(root, members);
     }
     if (!source_.ok()) return source_.status;
     return std::move(graph_);
   }
 
  private:
+  Json ValueOf(const JsonText& member) {
+    JsonCursor cursor(member.text, source_.file, member.offset);
+    Json value = cursor.Value();
+    cursor.End();
+    if (!cursor.ok() && source_.ok()) source_.status = cursor.status();
+    return value;
+  }
+
+  // Calls `read` with the place and the value of each element, which puts it into `items`.
+  template <typename T, typename ReadOne>
+  void ForEach(const char* name, const JsonMembers& members, std::vector<T>* items,
+               const ReadOne& read) {
+    if (!source_.ok()) return;
+    const JsonText& member = members.at(name);
+    JsonCursor cursor(member.text, source_.file, member.offset);
+    if (cursor.Peek() != '[') {
+      const Json value = ValueOf(member);
+      if (source_.ok() && !value.is_null()) source_.Fail(name, ExpectedArray(value));
+      return;
+    }
+    size_t done = 0;
+    size_t count = 0;
+    for (cursor.BeginArray(); cursor.NextElement();) {
+      Json element = cursor.Value();
+      if (!cursor.ok()) break;
+      read(absl::StrCat(name, "[", count++, "]"), &element);
+      // A list that grows is in memory twice, and its items are copied.
+      if (count == kSampleCount) {
+        items->reserve(
+            std::min(kReserveMax, member.text.size() / (cursor.offset() / count) + count));
+      }
+      if (passed_ == nullptr || cursor.offset() - done < kPassedBytes) continue;
+      passed_(member.text.substr(done, cursor.offset() - done));
+      done = cursor.offset();
+    }
+    cursor.End();
+    if (!cursor.ok()) source_.status = cursor.status();
+  }
+
+  static std::string ExpectedArray(const Json& value) {
+    return absl::StrCat("is ", value.type_name(), "; expected an array");
+  }
+
   void ReadHeader(const JsonFields& header) {
     if (!header.Has("version")) return;
     const JsonFields version = header.Object("version", true);
@@ -50,28 +118,22 @@ class SparkJsonReader {
     }
   }
 
-  // Attributes are moved out of `json`, which `root` reads.
-  void ReadGraph(const JsonFields& root, Json* json) {
-    if (!root.Has("nodes")) root.Fail("nodes", "is missing; this is no scene graph");
-    if (!root.Has("edges")) root.Fail("edges", "is missing; the file may be cut");
+  void ReadGraph(const JsonFields& root, const JsonMembers& members) {
+    if (!members.contains("nodes")) root.Fail("nodes", "is missing; this is no scene graph");
+    if (!members.contains("edges")) root.Fail("edges", "is missing; the file may be cut");
     ReadLayerNames(root.Object("layer_names", false), root.Find("layer_names"));
     ReadLayerKeys(root);
     if (const Json* metadata = root.Find("metadata")) ReadGraphMetadata(*metadata, &graph_);
-    root.Array("nodes");
-    if (!source_.ok()) return;
-    for (Json& node : (*json)["nodes"]) {
-      if (!source_.ok()) return;
-      ReadNode(JsonFields(node, absl::StrCat("nodes[", graph_.nodes.size(), "]"), &source_), &node);
-    }
-    for (const Json& edge : root.Array("edges")) {
-      if (!source_.ok()) return;
-      ReadEdge(JsonFields(edge, absl::StrCat("edges[", graph_.edges.size(), "]"), &source_));
-    }
     const Json* mesh = root.Find("mesh");
     if (mesh != nullptr && !mesh->is_null()) {
       graph_.mesh = ReadSparkJsonMesh(root.Object("mesh", true), &source_);
     }
     ReadMeshEdges(root);
+    ForEach("nodes", members, &graph_.nodes,
+            [this](const std::string& where, Json* node) { ReadNode(where, node); });
+    NoteMeshEdges();
+    ForEach("edges", members, &graph_.edges,
+            [this](const std::string& where, Json* edge) { ReadEdge(where, *edge); });
   }
 
   // Bare layers before 1.1.2.
@@ -87,35 +149,37 @@ class SparkJsonReader {
 
   // Of old files; what an object lists as its mesh_connections since.
   void ReadMeshEdges(const JsonFields& root) {
-    const Json& edges = root.Array("mesh_edges");
-    if (edges.empty() || !source_.ok()) return;
-    std::unordered_map<uint64_t, SparkNode*> objects;
-    for (SparkNode& node : graph_.nodes) {
-      const bool is_bare =
-          node.fields.contains("mesh_connections") && node.fields["mesh_connections"].empty();
-      if (is_bare) objects[node.id] = &node;
-    }
-    int64_t left_count = 0;
-    for (const Json& edge : edges) {
-      const JsonFields ends(edge, "mesh_edges", &source_);
-      const auto object = objects.find(ends.Unsigned("source", kUint64Max));
+    for (const Json& edge : root.Array("mesh_edges")) {
+      JsonSource source{source_.file, absl::OkStatus()};
+      const JsonFields ends(edge, "mesh_edges", &source);
+      const uint64_t object = ends.Unsigned("source", kUint64Max);
       const uint64_t vertex = ends.Unsigned("target", kUint64Max);
-      if (!source_.ok()) return;
-      if (object == objects.end()) {
-        ++left_count;
-        continue;
+      if (!source.ok()) {
+        Skip(SkipKind::kEdge, source);
+      } else {
+        vertices_of_[object].push_back(vertex);
       }
-      object->second->fields["mesh_connections"].push_back(vertex);
     }
-    for (const auto& [id, object] : objects) {
-      AddLength("mesh_connections", object->fields["mesh_connections"].size(), &graph_, object);
-    }
-    if (left_count > 0) {
-      graph_.notes.push_back(
-          absl::StrCat(left_count,
-                       " edges to mesh vertices from what is no object, or lists such vertices "
-                       "itself, were not kept"));
-    }
+  }
+
+  void TakeMeshEdges(SparkNode* node) {
+    const auto vertices = vertices_of_.find(node->id);
+    if (vertices == vertices_of_.end()) return;
+    const auto list = node->fields.find("mesh_connections");
+    if (list == node->fields.end() || !list->empty()) return;
+    *list = vertices->second;
+    AddLength("mesh_connections", vertices->second.size(), node);
+    vertices_of_.erase(vertices);
+  }
+
+  void NoteMeshEdges() {
+    size_t left_count = 0;
+    for (const auto& [id, vertices] : vertices_of_) left_count += vertices.size();
+    if (left_count == 0) return;
+    graph_.notes.push_back(
+        absl::StrCat(left_count,
+                     " edges to mesh vertices from what is no object, or lists such vertices "
+                     "itself, were not kept"));
   }
 
   // Name to {layer, partition}, or to a bare layer before 1.1.1.
@@ -131,7 +195,10 @@ class SparkJsonReader {
     return {key.Signed("layer"), static_cast<uint32_t>(key.Unsigned("partition", kUint32Max, 0))};
   }
 
-  void ReadNode(const JsonFields& fields, Json* record) {
+  // One that is no node is counted, and the file is read on.
+  void ReadNode(const std::string& where, Json* record) {
+    JsonSource source{source_.file, absl::OkStatus()};
+    const JsonFields fields(*record, where, &source);
     SparkNode node;
     node.id = fields.Unsigned("id", kUint64Max);
     node.key = ReadLayerKey(fields);
@@ -141,23 +208,23 @@ class SparkJsonReader {
       // Before 1.1.0 the nodes of one robot shared a layer named by the letter of their ids.
       if (!fields.Has("partition")) node.key.partition = static_cast<uint32_t>(node.id >> 56);
     }
-    const JsonFields attributes = fields.Object("attributes", true);
-    const std::string class_name = attributes.Text("type");
-    const auto type = SparkClassOf(class_name);
-    if (!type.has_value()) {
-      attributes.Fail("type", absl::StrCat("\"", class_name.substr(0, 64),
-                                           "\" is no known class of attributes"));
-      return;
-    }
-    node.type = *type;
-    ReadSparkAttributes(attributes, &source_, &graph_, &node);
-    if (!source_.ok()) return;
-    // Moved, since a large file's tree is large.
-    FinishNode(std::move(record->at("attributes")), &node);
+    fields.Object("attributes", true);
+    if (!source.ok()) return Skip(SkipKind::kNode, source);
+    Json attributes = std::move(record->at("attributes"));
+    const std::string within = absl::StrCat(where, ".attributes");
+    node.type = ReadSparkClass(within, attributes, &graph_.skips);
+    const absl::Status read =
+        ReadWhatCanBeRead(source_.file, within, &attributes, &graph_.skips, &node);
+    if (!read.ok()) return graph_.skips.Add(SkipKind::kNode, within, std::string(read.message()));
+    FinishNode(std::move(attributes), &node);
+    TakeMeshEdges(&node);
+    PackFields(&node);
     graph_.nodes.push_back(std::move(node));
   }
 
-  void ReadEdge(const JsonFields& fields) {
+  void ReadEdge(const std::string& where, const Json& record) {
+    JsonSource source{source_.file, absl::OkStatus()};
+    const JsonFields fields(record, where, &source);
     SparkEdge edge;
     edge.source = fields.Unsigned("source", kUint64Max);
     edge.target = fields.Unsigned("target", kUint64Max);
@@ -167,6 +234,7 @@ class SparkJsonReader {
     }
     edge.weighted = info.Bool("weighted", false);
     edge.weight = info.Number("weight", 1.0);
+    if (!source.ok()) return Skip(SkipKind::kEdge, source);
     if (const Json* metadata = info.Find("metadata")) {
       Json kept = *metadata;
       edge.own = TakeOwn(&kept);
@@ -175,19 +243,51 @@ class SparkJsonReader {
     graph_.edges.push_back(std::move(edge));
   }
 
+  void Skip(SkipKind kind, const JsonSource& source) {
+    graph_.skips.Add(kind, source.first_where, source.first_what);
+  }
+
   JsonSource source_;
+  const PassedText& passed_;
+  /// Of objects that have not come yet.
+  std::unordered_map<uint64_t, std::vector<uint64_t>> vertices_of_;
   SparkGraph graph_;
 };
 
 }  // namespace
 
-bool IsSparkJsonMesh(const Json& root) {
-  return root.is_object() && !root.contains("nodes") &&
-         (root.contains("points") || root.contains("vertices") || root.contains("has_colors"));
+bool IsSparkJsonMesh(const JsonMembers& members) {
+  return !members.contains("nodes") &&
+         (members.contains("points") || members.contains("vertices") ||
+          members.contains("has_colors"));
 }
 
-absl::StatusOr<SparkGraph> ReadSparkJson(Json root, const std::string& file) {
-  return SparkJsonReader(file).Read(std::move(root));
+absl::StatusOr<JsonMembers> SplitJson(std::string_view text, const std::string& file) {
+  JsonCursor cursor(text, file);
+  JsonMembers members;
+  if (cursor.Peek() != '{') {
+    const Json value = cursor.Value();
+    if (!cursor.ok()) return cursor.status();
+    return FileError(file, "the file",
+                     absl::StrCat("is ", value.type_name(), "; expected an object"));
+  }
+  std::string key;
+  for (cursor.BeginObject(); cursor.NextKey(&key);) {
+    const std::string_view value = cursor.Skip();
+    const size_t offset = cursor.offset() - value.size();
+    if (!members.try_emplace(key, JsonText{value, offset}).second) {
+      return FileError(file, absl::StrCat("key \"", key.substr(0, 64), "\""),
+                       "appears twice in one object; remove one of the two");
+    }
+  }
+  cursor.End();
+  if (!cursor.ok()) return cursor.status();
+  return members;
+}
+
+absl::StatusOr<SparkGraph> ReadSparkJson(const JsonMembers& members, const std::string& file,
+                                         const PassedText& passed) {
+  return SparkJsonReader(file, passed).Read(members);
 }
 
 }  // namespace dsg

@@ -77,7 +77,8 @@ class JsonWriter {
   }
 
   void AddNode(const SparkNode& node) {
-    Json fields = node.fields.is_null() ? MakeFields(node) : node.fields;
+    Json fields = AllFieldsOf(node);
+    if (fields.is_null()) fields = MakeFields(node);
     if (!node.own.is_null()) fields["metadata"] = WithOwn(fields["metadata"], node.own);
     absl::StrAppend(&out_, "{\"id\":", node.id, ",\"layer\":", node.key.layer,
                     ",\"partition\":", node.key.partition, ",\"attributes\":", Dump(fields), "}");

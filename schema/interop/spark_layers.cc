@@ -6,7 +6,6 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
-#include "schema/interop/file_error.h"
 #include "schema/interop/json_peek.h"
 
 namespace dsg {
@@ -84,12 +83,13 @@ std::string SparkLayers::NameOfCustom(const SparkLayerKey& key) const {
   return absl::StrCat("layer_", key.layer, "_", key.partition);
 }
 
-absl::StatusOr<SparkPlacement> SparkLayers::Place(const SparkNode& node, const std::string& file) {
+std::optional<SparkPlacement> SparkLayers::Place(const SparkNode& node, Skips* skips) {
   const auto& [layer, partition] = node.key;
   if (layer < 0 || layer > kLayerMax || partition > kPartitionMax) {
-    return FileError(file, absl::StrCat("node ", ToString(NodeId(node.id))),
-                     absl::StrCat("layer ", layer, " partition ", partition, " is outside 0 to ",
-                                  kLayerMax, ", 0 to ", kPartitionMax));
+    skips->Add(SkipKind::kNode, absl::StrCat("node ", ToString(NodeId(node.id))),
+               absl::StrCat("layer ", layer, " partition ", partition, " is outside 0 to ",
+                            kLayerMax, ", 0 to ", kPartitionMax));
+    return std::nullopt;
   }
   const bool is_pose = node.type == SparkClass::kAgent;
   const auto own = own_.find(node.key);

@@ -3,10 +3,10 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "absl/status/statusor.h"
 #include "schema/interop/spark_graph.h"
 
 namespace dsg {
@@ -30,8 +30,8 @@ class SparkLayers {
  public:
   explicit SparkLayers(const SparkGraph& graph);
 
-  /// Errors: INVALID_ARGUMENT/FILE_MALFORMED when the key is outside what ids can express.
-  absl::StatusOr<SparkPlacement> Place(const SparkNode& node, const std::string& file);
+  /// nullopt, counted in `skips`, when the key is outside what ids can express.
+  std::optional<SparkPlacement> Place(const SparkNode& node, Skips* skips);
 
   /// The layers that an export of a map has besides the standard ones.
   const std::map<SparkLayerKey, Layer>& own_layers() const { return own_; }

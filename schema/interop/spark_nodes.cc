@@ -3,12 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
-#include "schema/base/status.h"
-#include "schema/interop/file_error.h"
 #include "schema/model/delta_check.h"
 
 namespace dsg {
@@ -73,39 +72,41 @@ std::string PresenceText(const SparkNode& in) {
 
 }  // namespace
 
-SparkNodeConverter::SparkNodeConverter(const SparkGraph& graph, std::string file)
-    : graph_(graph), file_(std::move(file)), plausible_(PlausibleTimes(graph)) {}
+SparkNodeConverter::SparkNodeConverter(const SparkGraph& graph, Skips* skips)
+    : graph_(graph), skips_(*skips), plausible_(PlausibleTimes(graph)) {}
 
-absl::Status SparkNodeConverter::Fail(const SparkNode& in, const std::string& what) const {
-  return FileError(file_, absl::StrCat("node ", ToString(NodeId(in.id))), what);
+void SparkNodeConverter::SkipField(const SparkNode& in, const std::string& what) {
+  skips_.Add(SkipKind::kNodeField, absl::StrCat("node ", ToString(NodeId(in.id))), what);
 }
 
-absl::StatusOr<Node> SparkNodeConverter::Convert(const SparkNode& in,
-                                                 const SparkPlacement& placement) {
+std::optional<Node> SparkNodeConverter::Convert(const SparkNode& in,
+                                                const SparkPlacement& placement) {
   Node out;
   out.id = NodeId(in.id);
   if (!out.id.IsValid()) {
-    return FileError(file_, absl::StrCat("node id ", in.id),
-                     "has no letter in its top 8 bits; ids are a letter and an index, as O42");
+    skips_.Add(SkipKind::kNode, absl::StrCat("node id ", in.id),
+               "has no letter in its top 8 bits; ids are a letter and an index, as O42");
+    return std::nullopt;
+  }
+  if (!IsSane(in.position)) {
+    skips_.Add(SkipKind::kNode, absl::StrCat("node ", ToString(out.id)),
+               absl::StrCat("position (", in.position.x(), ", ", in.position.y(), ", ",
+                            in.position.z(), ") is not finite or beyond ", kCoordinateMaxM, " m"));
+    return std::nullopt;
   }
   out.layer = placement.layer.id;
   out.kind = placement.kind;
   out.provenance = in.is_predicted ? Provenance::kPredicted : Provenance::kImported;
-  DSG_RETURN_IF_ERROR(ConvertPose(in, &out));
-  DSG_RETURN_IF_ERROR(ConvertBox(in, &out));
-  DSG_RETURN_IF_ERROR(ConvertClass(in, &out));
+  ConvertPose(in, &out);
+  ConvertBox(in, &out);
+  ConvertClass(in, &out);
   ConvertTimes(in, &out);
-  DSG_RETURN_IF_ERROR(ConvertComponents(in, &out));
+  ConvertComponents(in, &out);
   ConvertAttributes(in, &out);
   return out;
 }
 
-absl::Status SparkNodeConverter::ConvertPose(const SparkNode& in, Node* out) {
-  if (!IsSane(in.position)) {
-    return Fail(in,
-                absl::StrCat("position (", in.position.x(), ", ", in.position.y(), ", ",
-                             in.position.z(), ") is not finite or beyond ", kCoordinateMaxM, " m"));
-  }
+void SparkNodeConverter::ConvertPose(const SparkNode& in, Node* out) {
   out->map_T_node.position = in.position;
   const double norm = in.orientation.norm();
   if (std::isfinite(norm) && norm > 1e-6) {
@@ -113,29 +114,32 @@ absl::Status SparkNodeConverter::ConvertPose(const SparkNode& in, Node* out) {
   } else {
     ++left_out_["orientations that are no rotation"];
   }
-  return absl::OkStatus();
 }
 
-absl::Status SparkNodeConverter::ConvertBox(const SparkNode& in, Node* out) {
-  if (in.box.type == SparkBox::Type::kInvalid) return absl::OkStatus();
+void SparkNodeConverter::ConvertBox(const SparkNode& in, Node* out) {
+  if (in.box.type == SparkBox::Type::kInvalid) return;
   const Eigen::Vector3d center = in.box.center.cast<double>();
   const Eigen::Vector3d half = 0.5 * in.box.dimensions.cast<double>();
   const bool is_rotated = in.box.type != SparkBox::Type::kAligned;
+  const std::string insane = absl::StrCat("bounding_box has numbers that are not finite or beyond ",
+                                          kCoordinateMaxM, " m");
   if (!IsSane(center) || !IsSane(half) || (is_rotated && !in.box.rotation.allFinite())) {
-    return Fail(in, absl::StrCat("bounding_box has numbers that are not finite or beyond ",
-                                 kCoordinateMaxM, " m"));
+    return SkipField(in, insane);
   }
   if (half.minCoeff() < 0.0) {
     ++left_out_["boxes of negative size"];
-    return absl::OkStatus();
+    return;
   }
   Pose3d map_T_box = {center, Eigen::Quaterniond::Identity()};
   if (is_rotated) {
     map_T_box.orientation = Eigen::Quaterniond(in.box.rotation.cast<double>());
-    if (!(map_T_box.orientation.norm() > 1e-6)) return Fail(in, "bounding_box has no rotation");
+    if (!(map_T_box.orientation.norm() > 1e-6)) {
+      return SkipField(in, "bounding_box has no rotation");
+    }
     map_T_box.orientation.normalize();
   }
   const Box3d box = TransformBox(out->map_T_node.Inverse() * map_T_box, Box3d(-half, half));
+  if (!IsSane(box.min()) || !IsSane(box.max())) return SkipField(in, insane);
   // An object's box is measured from its points. Elsewhere boxes are often left at a default
   // around the origin, which would blow up every ancestor's box.
   const Eigen::Vector3d slack = Eigen::Vector3d::Constant(kBoxSlackM);
@@ -143,29 +147,28 @@ absl::Status SparkNodeConverter::ConvertBox(const SparkNode& in, Node* out) {
   if (!is_object &&
       !Box3d(box.min() - slack, box.max() + slack).contains(Eigen::Vector3d(0, 0, 0))) {
     ++left_out_["boxes that do not hold their own node"];
-    return absl::OkStatus();
+    return;
   }
   out->box_node = box;
-  return absl::OkStatus();
 }
 
-absl::Status SparkNodeConverter::ConvertClass(const SparkNode& in, Node* out) {
+void SparkNodeConverter::ConvertClass(const SparkNode& in, Node* out) {
   if (in.name.size() > kNameLengthMax) {
-    return Fail(in, absl::StrCat("name has ", in.name.size(), " bytes; at most ", kNameLengthMax,
-                                 " are kept"));
+    SkipField(in, absl::StrCat("name has ", in.name.size(), " bytes; at most ", kNameLengthMax,
+                               " are kept"));
+  } else {
+    out->name = in.name;
   }
-  out->name = in.name;
-  if (!in.label.has_value()) return absl::OkStatus();
+  if (!in.label.has_value()) return;
   if (*in.label > static_cast<uint32_t>(std::numeric_limits<int32_t>::max())) {
-    return Fail(in, absl::StrCat("semantic_label is ", *in.label, "; at most 2147483647"));
+    return SkipField(in, absl::StrCat("semantic_label is ", *in.label, "; at most 2147483647"));
   }
   out->class_id = static_cast<int32_t>(*in.label);
   const auto space = graph_.label_spaces.find(in.key);
-  if (space == graph_.label_spaces.end()) return absl::OkStatus();
+  if (space == graph_.label_spaces.end()) return;
   const auto label = std::find_if(space->second.begin(), space->second.end(),
                                   [&](const auto& item) { return item.id == out->class_id; });
   if (label != space->second.end()) out->class_name = label->name;
-  return absl::OkStatus();
 }
 
 void SparkNodeConverter::ConvertTimes(const SparkNode& in, Node* out) {
@@ -192,18 +195,47 @@ void SparkNodeConverter::ConvertTimes(const SparkNode& in, Node* out) {
   for (const uint64_t time : in.last_observed_ns) keep(time, false, &out->last_observed_ns);
 }
 
-absl::Status SparkNodeConverter::ConvertComponents(const SparkNode& in, Node* out) {
-  if (!std::isfinite(in.distance) || in.distance < 0.0) {
-    return Fail(in, absl::StrCat("distance ", in.distance, " is not 0 or more"));
-  }
+double SparkNodeConverter::DistanceOf(const SparkNode& in) {
+  if (std::isfinite(in.distance) && in.distance >= 0.0) return in.distance;
+  SkipField(in, absl::StrCat("distance ", in.distance, " is not 0 or more"));
+  return 0.0;
+}
+
+std::vector<Eigen::Vector3d> SparkNodeConverter::BoundaryOf(const SparkNode& in) {
   if (in.boundary.size() > kBoundaryCornersMax) {
-    return Fail(in, absl::StrCat("boundary has ", in.boundary.size(), " corners; at most ",
-                                 kBoundaryCornersMax));
+    SkipField(in, absl::StrCat("boundary has ", in.boundary.size(), " corners; at most ",
+                               kBoundaryCornersMax));
+    return {};
   }
-  if (!std::all_of(in.boundary.begin(), in.boundary.end(), IsSane)) {
-    return Fail(in,
-                absl::StrCat("boundary has a corner not finite or beyond ", kCoordinateMaxM, " m"));
+  if (std::all_of(in.boundary.begin(), in.boundary.end(), IsSane)) return in.boundary;
+  SkipField(in, absl::StrCat("boundary has a corner not finite or beyond ", kCoordinateMaxM, " m"));
+  return {};
+}
+
+RegionInfo SparkNodeConverter::RegionOf(const SparkNode& in,
+                                        const std::vector<Eigen::Vector3d>& boundary,
+                                        const Node& out) {
+  RegionInfo region;
+  if (!out.box_node.isEmpty()) {
+    const Box3d box_map = out.BoxMap();
+    region = {OutlineOf(box_map), box_map.min().z(), box_map.max().z(), {}};
+  } else if (!boundary.empty()) {
+    region = RegionOfBoundary(boundary);
   }
+  for (const auto& [name, probability] : in.class_probabilities) {
+    if (std::isfinite(probability) && name.size() <= kNameLengthMax) {
+      region.class_probabilities[name] = probability;
+    } else {
+      SkipField(in, absl::StrCat("probability of class \"", name.substr(0, 64),
+                                 "\" is not finite, or the name too long"));
+    }
+  }
+  return region;
+}
+
+void SparkNodeConverter::ConvertComponents(const SparkNode& in, Node* out) {
+  const double distance = DistanceOf(in);
+  const std::vector<Eigen::Vector3d> boundary = BoundaryOf(in);
   if (out->kind == kinds::kObject) {
     ObjectInfo object;
     if (in.color != kSparkNoColor) object.color = in.color;
@@ -211,34 +243,20 @@ absl::Status SparkNodeConverter::ConvertComponents(const SparkNode& in, Node* ou
     out->object = object;
   } else if (out->kind == kinds::kPlace) {
     out->place =
-        PlaceInfo{in.distance, out->box_node,
+        PlaceInfo{distance, out->box_node,
                   static_cast<int32_t>(std::min<uint32_t>(in.basis_point_count, INT32_MAX))};
-    if (!in.boundary.empty()) out->region = RegionOfBoundary(in.boundary);
+    if (!boundary.empty()) out->region = RegionOfBoundary(boundary);
   } else if (out->kind != kAgentPoseKind) {
-    RegionInfo region = RegionOfBoundary(in.boundary);
-    if (!out->box_node.isEmpty()) {
-      const Box3d box_map = out->BoxMap();
-      region = {OutlineOf(box_map), box_map.min().z(), box_map.max().z(), {}};
-    } else if (in.boundary.empty()) {
-      region = {};
-    }
-    for (const auto& [name, probability] : in.class_probabilities) {
-      if (!std::isfinite(probability)) {
-        return Fail(in, absl::StrCat("probability of class \"", name, "\" is not finite"));
-      }
-    }
-    region.class_probabilities = in.class_probabilities;
-    out->region = std::move(region);
+    out->region = RegionOf(in, boundary, *out);
   }
-  return absl::OkStatus();
+  if (!out->place.has_value() && distance != 0.0) out->attributes["distance"] = distance;
 }
 
 void SparkNodeConverter::ConvertAttributes(const SparkNode& in, Node* out) {
-  out->attributes = in.attributes;
+  for (const auto& [name, value] : in.attributes) out->attributes[name] = value;
   if (in.color.has_value() && in.color != kSparkNoColor && !out->object.has_value()) {
     out->attributes["color"] = ColorText(*in.color);
   }
-  if (!out->place.has_value() && in.distance != 0.0) out->attributes["distance"] = in.distance;
   if (in.type == SparkClass::kKhronosObject && !in.first_observed_ns.empty()) {
     out->attributes["presence_ns"] = PresenceText(in);
   }

@@ -3,10 +3,10 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "absl/status/statusor.h"
 #include "schema/interop/spark_graph.h"
 #include "schema/interop/spark_layers.h"
 #include "schema/model/node.h"
@@ -16,27 +16,32 @@ namespace dsg {
 /// Converts nodes and counts what it had to leave out.
 class SparkNodeConverter {
  public:
-  /// `graph` must outlive the converter.
-  SparkNodeConverter(const SparkGraph& graph, std::string file);
+  /// `graph` and `skips` must outlive the converter.
+  SparkNodeConverter(const SparkGraph& graph, Skips* skips);
 
-  /// Position, box in the node's frame, class, times, components and attributes.
-  /// Errors: INVALID_ARGUMENT/FILE_MALFORMED naming the node and the field.
-  absl::StatusOr<Node> Convert(const SparkNode& in, const SparkPlacement& placement);
+  /// Position, box in the node's frame, class, times, components and attributes. Fields that a map
+  /// cannot hold are left out and counted in `skips`; nullopt, counted too, if the id or the
+  /// position is such a field.
+  std::optional<Node> Convert(const SparkNode& in, const SparkPlacement& placement);
 
   /// One sentence for each thing left out, with its count.
   std::vector<std::string> notes() const;
 
  private:
-  absl::Status ConvertPose(const SparkNode& in, Node* out);
-  absl::Status ConvertBox(const SparkNode& in, Node* out);
-  absl::Status ConvertClass(const SparkNode& in, Node* out);
+  void ConvertPose(const SparkNode& in, Node* out);
+  void ConvertBox(const SparkNode& in, Node* out);
+  void ConvertClass(const SparkNode& in, Node* out);
   void ConvertTimes(const SparkNode& in, Node* out);
-  absl::Status ConvertComponents(const SparkNode& in, Node* out);
+  void ConvertComponents(const SparkNode& in, Node* out);
+  RegionInfo RegionOf(const SparkNode& in, const std::vector<Eigen::Vector3d>& boundary,
+                      const Node& out);
   void ConvertAttributes(const SparkNode& in, Node* out);
-  absl::Status Fail(const SparkNode& in, const std::string& what) const;
+  double DistanceOf(const SparkNode& in);
+  std::vector<Eigen::Vector3d> BoundaryOf(const SparkNode& in);
+  void SkipField(const SparkNode& in, const std::string& what);
 
   const SparkGraph& graph_;
-  std::string file_;
+  Skips& skips_;
   /// When the robots were there; stamps outside are not times.
   Interval plausible_;
   /// Reason -> count.

@@ -20,8 +20,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-// Shorter ones are not worth compressing, and can be read by people.
-constexpr size_t kPlainBytesMax = 300;
+// Shorter ones are packed where they are stored, and can be read by people.
+constexpr size_t kPlainBytesMax = 4096;
 constexpr size_t kPartBytes = 60'000;
 static_assert(kPartBytes <= kAttributeLengthMax);
 constexpr size_t kPartCountMax = 32;
@@ -39,19 +39,46 @@ std::string PartName(const char* name, size_t part) {
 // Short, since there is one a field; a chance of 1 in 4 billion that a change goes unnoticed.
 uint32_t Mark(const Json& value) { return static_cast<uint32_t>(Checksum(Dump(value))); }
 
-Json Difference(const Json& read, const Json& made) {
+// What a node of the class and id has under a name when nothing is known of it; nullptr for
+// nothing.
+const Json* Default(const SparkNode& node, const std::string& name, Json* scratch) {
+  if (name != "external_key" || node.type != SparkClass::kAgent) return DefaultFor(node.type, name);
+  *scratch = node.id;
+  return scratch;
+}
+
+// What the map has to say for a kept field to hold. `true`: what it says of any node of the class.
+Json MarkOf(const Json& made, const Json* fallback) {
+  return fallback != nullptr && made == *fallback ? Json(true) : Json(Mark(made));
+}
+
+// Of fields without their defaults: what stands in neither is the same in both.
+//
+//   [null, value]        the map has no such field
+//   [mark, value]        the value that was read
+//   [mark]               the field was not there
+//   [mark, null, true]   it was what it is in any node of the class
+Json Difference(const SparkNode& node, const Json& read, const Json& made) {
   Json kept = Json::object();
+  Json scratch;
   for (const auto& [name, value] : read.items()) {
-    if (name == "type") continue;
+    const Json* fallback = Default(node, name, &scratch);
     const auto found = made.find(name);
-    if (found == made.end()) {
+    const Json* other = found == made.end() ? fallback : &*found;
+    if (other == nullptr) {
       kept[name] = {nullptr, value};
-    } else if (*found != value) {
-      kept[name] = {Mark(*found), value};
+    } else if (*other != value) {
+      kept[name] = {MarkOf(*other, fallback), value};
     }
   }
   for (const auto& [name, value] : made.items()) {
-    if (!read.contains(name)) kept[name] = {Mark(value)};
+    if (read.contains(name)) continue;
+    const Json* fallback = Default(node, name, &scratch);
+    if (fallback == nullptr) {
+      kept[name] = Json::array({Mark(value)});
+    } else if (*fallback != value) {
+      kept[name] = {Mark(value), nullptr, true};
+    }
   }
   return kept;
 }
@@ -59,24 +86,28 @@ Json Difference(const Json& read, const Json& made) {
 // Attributes can be written by anybody; only what reads as a node of that class is believed.
 bool IsReadable(const SparkNode& node, const Json& fields) {
   JsonSource source{"", absl::OkStatus()};
-  SparkGraph graph;
   SparkNode scratch;
   scratch.id = node.id;
   scratch.type = node.type;
-  ReadSparkAttributes(JsonFields(fields, "", &source), &source, &graph, &scratch);
+  ReadSparkAttributes(JsonFields(fields, "", &source), &source, &scratch);
   return source.ok();
 }
 
-void Overlay(const Json& kept, Json* fields) {
+void Overlay(const SparkNode& node, const Json& kept, Json* fields) {
   if (!kept.is_object()) return;
+  Json scratch;
   for (const auto& [name, entry] : kept.items()) {
-    if (!entry.is_array() || entry.empty() || entry.size() > 2 || name == "type") continue;
+    if (!entry.is_array() || entry.empty() || entry.size() > 3 || name == "type") continue;
+    const Json* fallback = Default(node, name, &scratch);
     const auto found = fields->find(name);
+    const bool is_absent = found == fields->end();
     const bool is_unchanged =
-        found == fields->end() ? entry[0].is_null() : entry[0] == Json(Mark(*found));
+        is_absent ? entry[0].is_null()
+                  : entry[0] == MarkOf(*found, fallback) || entry[0] == Json(Mark(*found));
     if (!is_unchanged) continue;
     if (entry.size() == 1) fields->erase(name);
     if (entry.size() == 2) (*fields)[name] = entry[1];
+    if (entry.size() == 3 && fallback != nullptr) (*fields)[name] = *fallback;
   }
 }
 
@@ -118,12 +149,13 @@ Json KeptText(const char* name, const Attributes& attributes) {
   return parsed.ok() ? *std::move(parsed) : Json();
 }
 
-bool KeepRest(const SparkNode& read, bool keep_key, Node* node) {
-  if (read.fields.is_null()) return true;
+bool KeepRest(const SparkNode& read, const Json& sparse_fields, bool keep_key, Node* node) {
+  if (sparse_fields.is_null()) return true;
   Json rest = Json::object();
   if (ClassFor(*node) != read.type) rest["type"] = NameOf(read.type);
   if (keep_key && KeyFor(*node) != read.key) rest["key"] = {read.key.layer, read.key.partition};
-  Json fields = Difference(read.fields, MakeFields(ToSpark(*node, read.type, read.key)));
+  Json fields =
+      Difference(read, sparse_fields, MakeSparseFields(ToSpark(*node, read.type, read.key)));
   if (!fields.empty()) rest["fields"] = std::move(fields);
   return rest.empty() || KeepText(kRestAttribute, rest, &node->attributes);
 }
@@ -141,7 +173,7 @@ SparkNode ToSparkWithRest(const Node& node, const SparkLayerKey& fallback) {
   out.fields = MakeFields(out);
   if (rest.is_null()) return out;
   Json fields = out.fields;
-  Overlay(Peek(rest, "fields"), &fields);
+  Overlay(out, Peek(rest, "fields"), &fields);
   if (IsReadable(out, fields)) out.fields = std::move(fields);
   return out;
 }

@@ -18,10 +18,11 @@ inline constexpr char kRestAttribute[] = "spark_dsg";
 /// The rest of the graph as a whole, on one of its nodes.
 inline constexpr char kGraphRestAttribute[] = "spark_dsg_graph";
 
-/// Compares what was read with what an export of `node` would write, and keeps the difference in
-/// its attributes: none if there is none. `keep_key`: the layer too, since no layer of the map says
-/// it. False if the difference is too long to keep.
-bool KeepRest(const SparkNode& read, bool keep_key, Node* node);
+/// Compares what was read (the fields: SparseFieldsOf) with what an export of `node` would write,
+/// and keeps the difference in its attributes: none if there is none. `keep_key`: the layer too,
+/// since no layer of the map says it. False if the difference is too long to keep.
+bool KeepRest(const SparkNode& read, const nlohmann::json& sparse_fields, bool keep_key,
+              Node* node);
 
 /// The node as Spark-DSG, with what KeepRest kept. `fallback`: its layer if nothing was kept of it.
 SparkNode ToSparkWithRest(const Node& node, const SparkLayerKey& fallback);

@@ -2,13 +2,14 @@
 #include "schema/interop/spark_to_delta.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <set>
+#include <tuple>
 #include <unordered_map>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
-#include "schema/interop/file_error.h"
 #include "schema/interop/graph_rest.h"
 #include "schema/interop/mesh_numbering.h"
 #include "schema/interop/own_parts.h"
@@ -24,93 +25,174 @@ namespace {
 constexpr char kOdometry[] = "ODOMETRY";
 // Pose times this far from the ends of 64 bits leave room for sums with gaps and stays.
 constexpr TimeNs kStampMaxNs = kTimeMax / 2;
+// One a letter.
+constexpr size_t kRobotCountMax = 52;
 
 class SparkDeltaBuilder {
  public:
-  SparkDeltaBuilder(const SparkGraph& graph, const std::string& file, double mesh_block_size_m)
-      : graph_(graph), file_(file), mesh_block_size_m_(mesh_block_size_m), layers_(graph) {}
+  SparkDeltaBuilder(SparkGraph graph, const std::string& file, double mesh_block_size_m)
+      : graph_(std::move(graph)),
+        file_(file),
+        mesh_block_size_m_(mesh_block_size_m),
+        layers_(graph_) {}
 
   absl::StatusOr<ImportedGraph> Build() {
     result_.format = "spark-dsg";
     result_.notes = graph_.notes;
-    DSG_RETURN_IF_ERROR(AddNodes());
-    DSG_RETURN_IF_ERROR(AddEdges());
+    AddNodes();
+    AddEdges();
     result_.delta.layers = layers_.custom_layers();
     AddLabels();
     AddSparkAgents(graph_, &result_.delta, &result_.notes);
-    DSG_RETURN_IF_ERROR(AddMesh());
+    AddMesh();
     FitBoxesToChildren(&result_.delta);
-    DSG_RETURN_IF_ERROR(TakeOwnParts(graph_, layers_, file_, &result_.delta));
+    DSG_RETURN_IF_ERROR(TakeOwnParts(graph_, layers_, file_, &graph_.skips, &result_.delta));
     KeepRests();
     FindFirstTime();
+    result_.skipped = graph_.skips.all();
     return std::move(result_);
   }
 
  private:
   struct End {
-    const SparkNode* node = nullptr;
+    uint64_t id = 0;
+    SparkLayerKey key;
     LayerId layer = 0;
     bool is_pose = false;
   };
 
-  absl::Status AddNodes() {
-    SparkNodeConverter converter(graph_, file_);
-    for (const SparkNode& node : graph_.nodes) {
-      const std::string where = absl::StrCat("node ", ToString(NodeId(node.id)));
-      DSG_ASSIGN_OR_RETURN(const SparkPlacement placement, layers_.Place(node, file_));
-      DSG_ASSIGN_OR_RETURN(Node converted, converter.Convert(node, placement));
-      const bool is_pose = node.type == SparkClass::kAgent;
-      if (!ends_.try_emplace(node.id, End{&node, placement.layer.id, is_pose}).second) {
-        return FileError(file_, where, "appears twice");
-      }
+  static std::string NameOfNode(uint64_t id) { return absl::StrCat("node ", ToString(NodeId(id))); }
+
+  // Before anything is concluded from the times of the poses.
+  void DropAbsurdStamps() {
+    for (SparkNode& node : graph_.nodes) {
       const TimeNs stamp_ns = node.stamp_ns.value_or(0);
-      if (stamp_ns > kStampMaxNs || stamp_ns < -kStampMaxNs) {
-        return FileError(file_, where, absl::StrCat("timestamp ", stamp_ns, " is absurd"));
-      }
-      result_.pose_count += is_pose ? 1 : 0;
-      result_.delta.nodes.push_back(std::move(converted));
+      if (stamp_ns <= kStampMaxNs && stamp_ns >= -kStampMaxNs) continue;
+      graph_.skips.Add(SkipKind::kNodeField, NameOfNode(node.id),
+                       absl::StrCat("timestamp ", stamp_ns, " is absurd"));
+      node.stamp_ns.reset();
     }
+  }
+
+  // Afterwards the graph holds the nodes that the delta has, and in the same order.
+  void AddNodes() {
+    DropAbsurdStamps();
+    SparkNodeConverter converter(graph_, &graph_.skips);
+    result_.delta.nodes.reserve(graph_.nodes.size() + kRobotCountMax);
+    std::erase_if(graph_.nodes, [&](SparkNode& node) { return !AddNode(node, &converter); });
     result_.node_count = static_cast<int64_t>(graph_.nodes.size());
     for (std::string& note : converter.notes()) result_.notes.push_back(std::move(note));
-    return absl::OkStatus();
   }
 
-  absl::StatusOr<End> FindEnd(uint64_t id, const std::string& where) const {
-    const auto found = ends_.find(id);
-    if (found != ends_.end()) return found->second;
-    return FileError(file_, where,
-                     absl::StrCat("node ", id, " (", ToString(NodeId(id)), ") is not in the file"));
-  }
-
-  absl::Status AddEdges() {
-    std::set<std::pair<uint64_t, uint64_t>> seen;
-    for (const SparkEdge& in : graph_.edges) {
-      const std::string where =
-          absl::StrCat("edge ", ToString(NodeId(in.source)), " to ", ToString(NodeId(in.target)));
-      DSG_ASSIGN_OR_RETURN(const End source, FindEnd(in.source, where));
-      DSG_ASSIGN_OR_RETURN(const End target, FindEnd(in.target, where));
-      if (in.source == in.target) return FileError(file_, where, "ends where it begins");
-      if (!seen.insert(std::minmax(in.source, in.target)).second) {
-        return FileError(file_, where, "appears twice");
-      }
-      if (!std::isfinite(in.weight)) return FileError(file_, where, "weight is not finite");
-      Edge edge = Relate(source, target);
-      edge.weight = in.weight;
-      if (in.weighted) edge.attributes["weighted"] = true;
-      if (in.metadata.size() > kAttributeLengthMax) {
-        return FileError(file_, where, "metadata is longer than 64 KiB");
-      }
-      if (!in.metadata.empty()) edge.attributes["metadata"] = in.metadata;
-      result_.delta.edges.push_back(std::move(edge));
+  bool AddNode(SparkNode& node, SparkNodeConverter* converter) {
+    if (ends_.contains(node.id)) {
+      graph_.skips.Add(SkipKind::kRepeatedNode, NameOfNode(node.id), "appears twice");
+      return false;
     }
-    result_.edge_count = static_cast<int64_t>(graph_.edges.size());
-    return absl::OkStatus();
+    const auto placement = layers_.Place(node, &graph_.skips);
+    if (!placement.has_value()) return false;
+    auto converted = converter->Convert(node, *placement);
+    if (!converted.has_value()) return false;
+    const bool is_pose = node.type == SparkClass::kAgent;
+    ends_.try_emplace(node.id, End{node.id, node.key, placement->layer.id, is_pose});
+    result_.pose_count += is_pose ? 1 : 0;
+    result_.delta.nodes.push_back(*std::move(converted));
+    // They are the converted node's now.
+    node.attributes.clear();
+    node.boundary = {};
+    return true;
+  }
+
+  void AddEdges() {
+    result_.delta.edges.reserve(graph_.edges.size());
+    std::erase_if(graph_.edges, [&](SparkEdge& edge) { return !AddEdge(edge); });
+    ends_.clear();
+    SortEdges();
+    DropRepeatedEdges();
+    result_.edge_count = static_cast<int64_t>(result_.delta.edges.size());
+    // Of the others all has been said.
+    std::erase_if(graph_.edges, [](const SparkEdge& edge) { return !edge.own.is_array(); });
+    graph_.edges.shrink_to_fit();
+  }
+
+  // Source by source, as a store keeps them: an import is then checked and written in the order of
+  // its rows, and not all over the map.
+  void SortEdges() {
+    std::vector<Edge>& edges = result_.delta.edges;
+    std::vector<std::tuple<uint64_t, uint64_t, uint32_t>> order;
+    order.reserve(edges.size());
+    for (uint32_t i = 0; i < edges.size(); ++i) {
+      order.emplace_back(std::rotl(edges[i].source.value, 8), std::rotl(edges[i].target.value, 8),
+                         i);
+    }
+    std::sort(order.begin(), order.end());
+    // Round by round of the permutation, so that each edge, which is large, moves once.
+    for (uint32_t i = 0; i < edges.size(); ++i) {
+      if (std::get<2>(order[i]) == i) continue;
+      Edge first = std::move(edges[i]);
+      uint32_t to = i;
+      for (uint32_t from = std::get<2>(order[to]); from != i; from = std::get<2>(order[to])) {
+        edges[to] = std::move(edges[from]);
+        std::get<2>(order[to]) = to;
+        to = from;
+      }
+      edges[to] = std::move(first);
+      std::get<2>(order[to]) = to;
+    }
+  }
+
+  // Two edges between the same nodes have the same direction, and so stand together now; the first
+  // of the file comes first.
+  void DropRepeatedEdges() {
+    std::vector<Edge>& edges = result_.delta.edges;
+    const auto same = [this](const Edge& first, const Edge& next) {
+      if (first.source != next.source || first.target != next.target) return false;
+      const SparkEdge named = {next.source.value, next.target.value, false, 1.0, ""};
+      SkipEdge(SkipKind::kRepeatedEdge, named, "appears twice");
+      return true;
+    };
+    edges.erase(std::unique(edges.begin(), edges.end(), same), edges.end());
+  }
+
+  // False, and counted, if the edge cannot be kept.
+  bool AddEdge(SparkEdge& in) {
+    const auto source = ends_.find(in.source);
+    const auto target = ends_.find(in.target);
+    if (source == ends_.end() || target == ends_.end()) {
+      const uint64_t missing = source == ends_.end() ? in.source : in.target;
+      return SkipEdge(
+          SkipKind::kDanglingEdge, in,
+          absl::StrCat("node ", missing, " (", ToString(NodeId(missing)), ") is not in the file"));
+    }
+    if (in.source == in.target) return SkipEdge(SkipKind::kLoopEdge, in, "ends where it begins");
+    if (!std::isfinite(in.weight)) {
+      SkipEdge(SkipKind::kEdgeField, in, "weight is not finite; 1 stands in its stead");
+      in.weight = 1.0;
+    }
+    if (in.metadata.size() > kAttributeLengthMax) {
+      SkipEdge(SkipKind::kEdgeField, in, "metadata is longer than 64 KiB");
+      in.metadata.clear();
+    }
+    Edge edge = Relate(source->second, target->second);
+    edge.weight = in.weight;
+    if (in.weighted) edge.attributes["weighted"] = true;
+    if (!in.metadata.empty()) edge.attributes["metadata"] = std::move(in.metadata);
+    result_.delta.edges.push_back(std::move(edge));
+    return true;
+  }
+
+  bool SkipEdge(SkipKind kind, const SparkEdge& edge, const std::string& what) {
+    graph_.skips.Add(
+        kind,
+        absl::StrCat("edge ", ToString(NodeId(edge.source)), " to ", ToString(NodeId(edge.target))),
+        what);
+    return false;
   }
 
   // The file's edges have neither direction nor name; both follow from the layers of their ends.
   static Edge Relate(const End& a, const End& b) {
-    const int64_t layer_a = a.node->key.layer;
-    const int64_t layer_b = b.node->key.layer;
+    const int64_t layer_a = a.key.layer;
+    const int64_t layer_b = b.key.layer;
     if (layer_a != layer_b) {
       const End& parent = layer_a > layer_b ? a : b;
       const End& child = layer_a > layer_b ? b : a;
@@ -119,14 +201,14 @@ class SparkDeltaBuilder {
       return MakeEdge(child, parent.layer == layers::kPlaces ? relations::kNearestPlace : kPoseIn,
                       parent);
     }
-    const End& low = a.node->id < b.node->id ? a : b;
-    const End& high = a.node->id < b.node->id ? b : a;
+    const End& low = a.id < b.id ? a : b;
+    const End& high = a.id < b.id ? b : a;
     return MakeEdge(low, SiblingRelation(a, b), high);
   }
 
   static const char* SiblingRelation(const End& a, const End& b) {
     if (a.is_pose && b.is_pose) return kOdometry;
-    if (a.node->key != b.node->key) return relations::kNear;
+    if (a.key != b.key) return relations::kNear;
     if (a.layer == layers::kPlaces) return relations::kTraversable;
     if (a.layer == layers::kRooms) return relations::kAdjacent;
     return relations::kNear;
@@ -134,9 +216,9 @@ class SparkDeltaBuilder {
 
   static Edge MakeEdge(const End& source, const char* relation, const End& target) {
     Edge edge;
-    edge.source = NodeId(source.node->id);
+    edge.source = NodeId(source.id);
     edge.relation = relation;
-    edge.target = NodeId(target.node->id);
+    edge.target = NodeId(target.id);
     return edge;
   }
 
@@ -165,15 +247,16 @@ class SparkDeltaBuilder {
     std::unordered_map<NodeId, Node*> nodes;
     for (Node& node : result_.delta.nodes) nodes[node.id] = &node;
     int64_t lost_count = 0;
-    for (const SparkNode& read : graph_.nodes) {
+    for (SparkNode& read : graph_.nodes) {
       const auto node = nodes.find(NodeId(read.id));
       // An export says itself what the attributes were.
       if (node == nodes.end() || read.own.is_object()) continue;
       const bool keep_key = !layers_.own_layers().contains(read.key);
-      const bool is_kept = numbering.is_needed()
-                               ? KeepRest(numbering.Renumber(read), keep_key, node->second)
-                               : KeepRest(read, keep_key, node->second);
-      if (!is_kept) ++lost_count;
+      nlohmann::json fields = SparseFieldsOf(read);
+      if (numbering.is_needed()) numbering.Renumber(&fields);
+      if (!KeepRest(read, fields, keep_key, node->second)) ++lost_count;
+      // Each node is kept once: what was read of it goes as what is kept of it comes.
+      read.packed_fields = {};
     }
     if (!KeepGraphRest(graph_, &result_.delta)) ++lost_count;
     if (lost_count > 0) {
@@ -182,30 +265,18 @@ class SparkDeltaBuilder {
     }
   }
 
-  absl::Status AddMesh() {
-    if (!graph_.mesh.has_value()) return absl::OkStatus();
+  void AddMesh() {
+    if (!graph_.mesh.has_value()) return;
     MeshBlock mesh = *graph_.mesh;
     const size_t count = mesh.positions_map.size();
-    for (size_t i = 0; i < count; ++i) {
-      const auto& position = mesh.positions_map[i];
-      if (position.allFinite() && position.cwiseAbs().maxCoeff() <= kCoordinateMaxM) continue;
-      return FileError(file_, absl::StrCat("mesh vertex ", i),
-                       absl::StrCat("is not finite or beyond ", kCoordinateMaxM, " m"));
-    }
-    for (size_t i = 0; i < mesh.faces.size(); ++i) {
-      const uint32_t highest = *std::max_element(mesh.faces[i].begin(), mesh.faces[i].end());
-      if (highest < count) continue;
-      return FileError(file_, absl::StrCat("mesh face ", i),
-                       absl::StrCat("has vertex ", highest, "; there are ", count));
-    }
     DropUneven(count, "colors", &mesh.colors);
     DropUneven(count, "labels", &mesh.labels);
     DropUneven(count, "stamps", &mesh.last_seen_ns);
     DropUneven(count, "first_seen_stamps", &mesh.first_seen_ns);
-    result_.mesh_vertex_count = static_cast<int64_t>(count);
+    DropUnsound(&graph_.skips, &mesh);
+    result_.mesh_vertex_count = static_cast<int64_t>(mesh.positions_map.size());
     result_.mesh_face_count = static_cast<int64_t>(mesh.faces.size());
     result_.delta.mesh_blocks = SplitIntoBlocks(mesh, mesh_block_size_m_);
-    return absl::OkStatus();
   }
 
   template <typename T>
@@ -230,7 +301,7 @@ class SparkDeltaBuilder {
     result_.first_ns = first_ns.value_or(0);
   }
 
-  const SparkGraph& graph_;
+  SparkGraph graph_;
   const std::string& file_;
   double mesh_block_size_m_;
   SparkLayers layers_;
@@ -240,9 +311,9 @@ class SparkDeltaBuilder {
 
 }  // namespace
 
-absl::StatusOr<ImportedGraph> SparkToDelta(const SparkGraph& graph, const std::string& file,
+absl::StatusOr<ImportedGraph> SparkToDelta(SparkGraph graph, const std::string& file,
                                            double mesh_block_size_m) {
-  return SparkDeltaBuilder(graph, file, mesh_block_size_m).Build();
+  return SparkDeltaBuilder(std::move(graph), file, mesh_block_size_m).Build();
 }
 
 }  // namespace dsg

@@ -72,6 +72,44 @@ class RoundTrip(support.ProgramsTest):
                 self.assertEqual([], spark_content.differences(before, after)[:5])
 
 
+class Dangling(support.ProgramsTest):
+    """A file with edges that lead nowhere: read but for these, or refused if asked to."""
+
+    WORDS = ["skipped 2 edges to nodes that are not there",
+             "edge p0 to p7: node 8070450532247928839 (p7) is not in the file"]
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        place = ord("p") << 56
+        nodes = [{"id": place + i, "layer": 3, "partition": 0, "attributes": {
+            "type": "PlaceNodeAttributes", "position": [i, 0, 0]}} for i in range(3)]
+        ends = [(0, 1), (1, 2), (0, 7), (8, 2)]
+        edges = [{"source": place + a, "target": place + b, "info": {}} for a, b in ends]
+        cls.file = cls.path("dangling.json")
+        with open(cls.file, "w", encoding="utf-8") as file:
+            json.dump({"nodes": nodes, "edges": edges}, file)
+
+    def notes_of(self, *command):
+        done = support.run(*command, cwd=self.folder)
+        self.assertEqual(0, done.returncode, done.stderr)
+        return done.stderr
+
+    def test_import_skips_and_counts_them(self):
+        done = self.notes_of("dsg", "import", self.file, "--store", self.path("i"), "--map", "m")
+        for words in self.WORDS:
+            self.assertIn(words, done)
+        self.refused(2, self.WORDS, "dsg", "import", "--strict", self.file, "--store",
+                     self.path("s"), "--map", "m")
+
+    def test_ingest_skips_and_logs_them(self):
+        done = self.notes_of("dsg-ingest", self.file, "--store", self.path("g"), "--map", "m")
+        for words in self.WORDS:
+            self.assertIn(words, done)
+        self.refused(1, self.WORDS, "dsg-ingest", "--strict", self.file, "--store",
+                     self.path("gs"), "--map", "m")
+
+
 class OwnMap(support.ProgramsTest):
     """A map with rooms, people and a robot, out and in again."""
 

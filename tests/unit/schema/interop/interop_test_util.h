@@ -33,6 +33,9 @@ std::string ReadDataFile(const std::string& path);
 /// The error is FILE_MALFORMED and its message holds `part`.
 void ExpectMalformed(const absl::Status& status, const std::string& part);
 
+/// One of the sentences about what was skipped holds `part`.
+void ExpectSkipped(const std::vector<Skipped>& skipped, const std::string& part);
+
 const Node& NodeNamed(const ImportedGraph& imported, const std::string& id);
 
 /// Ten nodes of every class, with every kind of field set; seven edges; a mesh of one face.

@@ -22,9 +22,9 @@ namespace {
 using Json = nlohmann::json;
 
 SparkGraph ReadJson(const std::string& text) {
-  auto root = ParseJson(text, "g.json");
+  auto root = SplitJson(text, "g.json");
   EXPECT_TRUE(root.ok()) << root.status();
-  auto graph = ReadSparkJson(*std::move(root), "g.json");
+  auto graph = ReadSparkJson(*root, "g.json");
   EXPECT_TRUE(graph.ok()) << graph.status();
   return graph.ok() ? *std::move(graph) : SparkGraph();
 }
@@ -72,7 +72,7 @@ void ExpectSameContent(const SparkGraph& actual, const SparkGraph& expected) {
     ASSERT_TRUE(nodes.contains(node.id));
     EXPECT_EQ(nodes[node.id]->key, node.key);
     EXPECT_EQ(nodes[node.id]->type, node.type);
-    EXPECT_EQ(nodes[node.id]->fields.dump(), node.fields.dump());
+    EXPECT_EQ(AllFieldsOf(*nodes[node.id]).dump(), AllFieldsOf(node).dump());
     EXPECT_TRUE(nodes[node.id]->own.is_null()) << nodes[node.id]->own.dump();
   }
   std::map<std::pair<uint64_t, uint64_t>, const SparkEdge*> edges;

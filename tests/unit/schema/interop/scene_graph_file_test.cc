@@ -120,7 +120,13 @@ TEST(KimeraJson, NamesTheFieldThatIsWrong) {
   };
   for (const auto& [from, to, named] : cases) {
     SCOPED_TRACE(named);
-    ExpectMalformed(ReadSceneGraph(Replaced(kKimera, from, to), "k.json", 2.0).status(), named);
+    const std::string text = Replaced(kKimera, from, to);
+    const ReadOptions strict = {.is_strict = true};
+    ExpectMalformed(ReadSceneGraph(text, "k.json", 2.0, strict).status(), named);
+    const auto lenient = ReadSceneGraph(text, "k.json", 2.0);
+    ASSERT_TRUE(lenient.ok()) << lenient.status();
+    EXPECT_TRUE(CheckImport(*lenient).ok()) << CheckImport(*lenient);
+    ExpectSkipped(lenient->skipped, named);
   }
 }
 
@@ -141,13 +147,22 @@ TEST(RegionJson, NamesTheFieldThatIsWrong) {
       {"\"R(1)\":", "\"R1\":", "regions.R1: is not named R(n)"},
       {"(1, 2)", "(1, nan)", "objects.O(3).center"},
       {"(1, 2)", "(1)", "objects.O(3).center"},
-      {"\"parent_region\": \"R(1)\"", "\"parent_region\": \"R(8)\"",
-       "objects.O(2).parent_region: is no region"},
   };
   for (const auto& [from, to, named] : cases) {
     SCOPED_TRACE(named);
     ExpectMalformed(ReadSceneGraph(Replaced(kRegions, from, to), "r.json", 2.0).status(), named);
   }
+}
+
+TEST(RegionJson, SkipsAParentThatIsNotThere) {
+  const std::string text =
+      Replaced(kRegions, "\"parent_region\": \"R(1)\"", "\"parent_region\": \"R(8)\"");
+  const auto lenient = ReadSceneGraph(text, "r.json", 2.0);
+  ASSERT_TRUE(lenient.ok()) << lenient.status();
+  EXPECT_TRUE(lenient->delta.edges.empty());
+  ExpectSkipped(lenient->skipped, "objects.O(2).parent_region: is no region");
+  ExpectMalformed(ReadSceneGraph(text, "r.json", 2.0, {.is_strict = true}).status(),
+                  "objects.O(2).parent_region: is no region");
 }
 
 TEST(SceneGraphFile, SurvivesRandomDamageOfText) {

@@ -4,16 +4,15 @@
 
 #include <gtest/gtest.h>
 
-#include "schema/interop/json_document.h"
 #include "tests/unit/schema/interop/interop_test_util.h"
 
 namespace dsg {
 namespace {
 
 absl::StatusOr<SparkGraph> Read(const std::string& text) {
-  auto json = ParseJson(text, "g.json");
-  if (!json.ok()) return json.status();
-  return ReadSparkJson(*json, "g.json");
+  auto members = SplitJson(text, "g.json");
+  if (!members.ok()) return members.status();
+  return ReadSparkJson(*members, "g.json");
 }
 
 // A graph of one node: what stands in the node beside its attributes, and these.
@@ -118,10 +117,10 @@ struct BadField {
   const char* named;
 };
 
-TEST(SparkJson, NamesTheFieldThatIsWrong) {
+TEST(SparkJson, LeavesOutAndNamesTheFieldThatIsWrong) {
   const BadField cases[] = {
       {R"("type": "WallNodeAttributes")", "nodes[0].attributes.type: \"WallNodeAttributes\""},
-      {R"("type": 7)", "nodes[0].attributes.type: is a number"},
+      {R"("type": 7)", "nodes[0].attributes.type: is number"},
       {R"("type": "ObjectNodeAttributes", "name": 3)", "nodes[0].attributes.name"},
       {R"("type": "ObjectNodeAttributes", "color": [1, 2])", "nodes[0].attributes.color"},
       {R"("type": "ObjectNodeAttributes", "color": [1, 2, 256])", "nodes[0].attributes.color"},
@@ -141,7 +140,53 @@ TEST(SparkJson, NamesTheFieldThatIsWrong) {
   };
   for (const BadField& bad : cases) {
     SCOPED_TRACE(bad.attributes);
-    ExpectMalformed(Read(OneNode("", bad.attributes)).status(), bad.named);
+    const auto graph = Read(OneNode("", bad.attributes));
+    ASSERT_TRUE(graph.ok()) << graph.status();
+    ExpectSkipped(graph->skips.all(), bad.named);
+    ASSERT_EQ(graph->nodes.size(), 1u);
+    EXPECT_EQ(graph->nodes[0].position, Eigen::Vector3d(1, 2, 3));
+  }
+}
+
+TEST(SparkJson, ReadsTheOtherFieldsOfANodeWithTwoWrongOnes) {
+  const auto graph = Read(OneNode("", R"("type": "PlaceNodeAttributes", "distance": "far",
+      "name": "here", "color": {"r": 1}, "num_basis_points": 4)"));
+  ASSERT_TRUE(graph.ok()) << graph.status();
+  ASSERT_EQ(graph->nodes.size(), 1u);
+  EXPECT_EQ(graph->nodes[0].name, "here");
+  EXPECT_EQ(graph->nodes[0].basis_point_count, 4u);
+  EXPECT_FALSE(graph->nodes[0].color.has_value());
+  EXPECT_EQ(graph->nodes[0].distance, 0.0);
+  EXPECT_EQ(AllFieldsOf(graph->nodes[0])["distance"], 0.0);
+  ASSERT_EQ(graph->skips.all().size(), 1u);
+  EXPECT_EQ(graph->skips.all()[0].count, 2);
+}
+
+TEST(SparkJson, ReadsAClassThatItDoesNotKnowByTheFieldsItKnows) {
+  const auto graph = Read(OneNode("", R"("type": "MyObjectAttributes", "semantic_label": 7,
+      "name": "mug", "handle_count": 1)"));
+  ASSERT_TRUE(graph.ok()) << graph.status();
+  ASSERT_EQ(graph->nodes.size(), 1u);
+  EXPECT_EQ(graph->nodes[0].type, SparkClass::kSemantic);
+  EXPECT_EQ(graph->nodes[0].name, "mug");
+  EXPECT_EQ(AllFieldsOf(graph->nodes[0])["handle_count"], 1);
+}
+
+TEST(SparkJson, CountsNodesAndEdgesThatAreNone) {
+  const auto graph = Read(R"({"nodes": [3, {"id": -1, "layer": 2}, {"id": 5692549928996306945,
+      "layer": 2, "attributes": {"type": "ObjectNodeAttributes", "position": [1, 2]}}],
+      "edges": [7, {"source": 1, "target": 2, "info": {"weight": "heavy"}}, {"source": 1,
+      "target": 2, "info": {}}]})");
+  ASSERT_TRUE(graph.ok()) << graph.status();
+  EXPECT_TRUE(graph->nodes.empty());
+  EXPECT_EQ(graph->edges.size(), 1u);
+  const auto skipped = graph->skips.all();
+  ASSERT_EQ(skipped.size(), 2u);
+  EXPECT_EQ(skipped[0].count, 3);
+  EXPECT_EQ(skipped[1].count, 2);
+  for (const char* part : {"nodes[0]: is a number", "nodes[1].id", "nodes[2].attributes: ",
+                           "edges[0]: is a number", "edges[1].info.weight: is string"}) {
+    ExpectSkipped(skipped, part);
   }
 }
 
@@ -150,7 +195,6 @@ TEST(SparkJson, RefusesAFileWithoutNodesOrEdges) {
   ExpectMalformed(Read(R"({"nodes": []})").status(), "edges: is missing");
   ExpectMalformed(Read("[1]").status(), "the file: is array; expected an object");
   ExpectMalformed(Read(R"({"nodes": {}, "edges": []})").status(), "nodes: is object");
-  ExpectMalformed(Read(R"({"nodes": [3], "edges": []})").status(), "nodes[0]: is a number");
 }
 
 }  // namespace
