@@ -90,6 +90,11 @@ void PruneSchedule::RunOnce() {
 void PruneSchedule::RunMap(const std::string& map) {
   const absl::Status status = PruneMap(map, file_.policies);
   if (call_.cancelled()) return;
+  if (ReasonOf(status) == Reason::kPolicyTakesTooMuch) {
+    Log(LogLevel::kError, "policies not applied to map: they would take too much",
+        {{"map", map}, {"error", std::string(status.message())}});
+    return;
+  }
   const bool are_alone = !status.ok() && file_.policies.size() > 1;
   // One that cannot be applied must not keep the others from it.
   for (const PrunePolicy& policy : file_.policies) {
@@ -117,6 +122,7 @@ absl::Status PruneSchedule::PruneMap(const std::string& map,
   v1::PruneRequest request;
   request.set_map(map);
   request.set_author("dsg-server policies");
+  request.set_share_max(file_.share_max.value_or(kShareMaxDefault));
   for (const PrunePolicy& policy : policies) query::ToProto(policy, request.add_policies());
   DSG_ASSIGN_OR_RETURN(const std::unique_ptr<query::PruneCursor> cursor, core_->OpenPrune(request));
   v1::PruneResponse all;
@@ -134,6 +140,9 @@ absl::Status PruneSchedule::PruneMap(const std::string& map,
          {"rows", RowsOf(policy.matched())},
          {"revisions", absl::StrCat(policy.matched().revision_count())},
          {"bytes", absl::StrCat(policy.matched().byte_count())}});
+  }
+  for (const std::string& note : all.notes()) {
+    Log(LogLevel::kWarning, "clocks of the map disagree", {{"map", map}, {"note", note}});
   }
   if (all.left_count() > 0) {
     Log(LogLevel::kWarning,

@@ -42,6 +42,10 @@ std::unique_ptr<ScheduleClock> MakeScheduleClock();
 /// Runs the policies at start + first_after, and then every `file.every_ns` after the begin of the
 /// run before (at once if that took longer). A policy that cannot be applied to a map does not keep
 /// the others from it, nor the other maps; the log says so once, and again when the reason changes.
+/// Where the policies together would take more than `file.share_max` of a map (half of it unless
+/// the file says otherwise), a clock may be
+/// wrong: nothing of that map goes, also not by one policy after the other, and each run logs the
+/// error.
 ///
 /// Threads: Run blocks its thread until Stop, which any thread may call.
 class PruneSchedule {

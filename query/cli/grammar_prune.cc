@@ -41,7 +41,13 @@ void AddPruneVerb(Grammar* grammar) {
       "--erase", verb->erase, "No revision knows any more, and the bytes are wiped from the disk");
   erase->excludes(retire);
   for (CLI::Option* other : {simplify, only, retire, erase}) file->excludes(other);
-  app->add_flag("--dry-run", verb->dry_run, "Only say what would go");
+  app->add_option("--share-max", verb->share_max,
+                  "Refuse to take more than this share of the nodes or of the poses, up to 1; "
+                  "default that of the policy file, or no limit")
+      ->check(AboveZero())
+      ->check(Between(0.0, 1.0));
+  app->add_flag("--dry-run", verb->dry_run,
+                "Only say what would go, and whether the run would be refused");
   app->add_flag("--yes", verb->yes,
                 "Do not ask when a policy matches every node, every pose or the only building");
 }

@@ -28,6 +28,8 @@ struct PruneVerb {
   double simplify_m = 0.0;
   bool erase = false;
   bool dry_run = false;
+  /// Of the map; unset = that of the policy file, or no limit.
+  std::optional<double> share_max;
   /// Everything may go.
   bool yes = false;
 };

@@ -99,6 +99,15 @@ std::string ErasedText(const v1::PruneResponse& reply) {
   return text;
 }
 
+std::string DoubtsText(const v1::PruneResponse& reply) {
+  std::string text;
+  for (const std::string& note : reply.notes()) absl::StrAppend(&text, "clocks: ", note, "\n");
+  if (!reply.refusal().empty()) {
+    absl::StrAppend(&text, "the run would be refused: ", Printable(reply.refusal()), "\n");
+  }
+  return text;
+}
+
 // Something but history went.
 bool HasRows(const v1::PruneResponse& reply) {
   const v1::Amount& before = reply.map_before();
@@ -117,6 +126,7 @@ std::string RenderPrune(const v1::PruneResponse& reply, bool is_dry_run, bool is
   if (!is_dry_run) rows.emplace_back("map after", &reply.map_after());
   std::string text = TableOf(rows).Render();
   for (const v1::PolicyReport& policy : reply.policies()) text += StaysText(policy);
+  text += DoubtsText(reply);
   if (is_dry_run) return text + "nothing was changed\n";
   text += FilesText(reply);
   if (reply.revision() == 0) {

@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/maintenance_service.pb.h"
+#include "dsg/v1/map_service.pb.h"
 #include "query/cli/interrupt.h"
 #include "query/cli/json.h"
 #include "query/cli/progress.h"
@@ -22,7 +23,7 @@
 namespace dsg::cli {
 namespace {
 
-absl::StatusOr<PrunePolicy::What> WhatOf(const PruneVerb& verb, TimeNs epoch_ns) {
+absl::StatusOr<PrunePolicy::What> WhatOf(const PruneVerb& verb, const MapSpec& map) {
   if (!verb.branch.empty()) return PrunePolicy::Branch{verb.branch};
   if (!verb.layer.empty()) return PrunePolicy::WholeLayer{verb.layer};
   if (!verb.region.empty()) {
@@ -30,12 +31,12 @@ absl::StatusOr<PrunePolicy::What> WhatOf(const PruneVerb& verb, TimeNs epoch_ns)
     return PrunePolicy::Region{box};
   }
   if (!verb.before.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, ParseInstant("--before", verb.before, epoch_ns));
+    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, ParseInstant("--before", verb.before, map));
     return PrunePolicy::Before{at_ns};
   }
   if (!verb.unseen_since.empty()) {
     DSG_ASSIGN_OR_RETURN(const TimeNs at_ns,
-                         ParseInstant("--unseen-since", verb.unseen_since, epoch_ns));
+                         ParseInstant("--unseen-since", verb.unseen_since, map));
     return PrunePolicy::UnseenSince{at_ns};
   }
   if (!verb.older_than.empty()) {
@@ -54,13 +55,11 @@ absl::StatusOr<PrunePolicy::What> WhatOf(const PruneVerb& verb, TimeNs epoch_ns)
   return PrunePolicy::What();
 }
 
-absl::StatusOr<std::vector<PrunePolicy>> PoliciesOf(const PruneVerb& verb, TimeNs epoch_ns) {
-  if (!verb.policy_file.empty()) {
-    DSG_ASSIGN_OR_RETURN(PolicyFile file, ReadPolicyFile(verb.policy_file));
-    return std::move(file.policies);
-  }
+// What is said by options is a file of one policy.
+absl::StatusOr<PolicyFile> PoliciesOf(const PruneVerb& verb, const MapSpec& map) {
+  if (!verb.policy_file.empty()) return ReadPolicyFile(verb.policy_file);
   PrunePolicy policy;
-  DSG_ASSIGN_OR_RETURN(policy.what, WhatOf(verb, epoch_ns));
+  DSG_ASSIGN_OR_RETURN(policy.what, WhatOf(verb, map));
   policy.layers = verb.only;
   policy.simplify_m = verb.simplify_m;
   if (verb.erase) policy.strength = PruneStrength::kErase;
@@ -71,7 +70,9 @@ absl::StatusOr<std::vector<PrunePolicy>> PoliciesOf(const PruneVerb& verb, TimeN
                      "--simplify or --policy");
   }
   DSG_RETURN_IF_ERROR(policy.Validate());
-  return std::vector<PrunePolicy>{policy};
+  PolicyFile file;
+  file.policies = {std::move(policy)};
+  return file;
 }
 
 // What all messages say together: reports stand in the first, ends in the last.
@@ -98,30 +99,39 @@ bool AskPerson(const absl::Status& refusal, std::ostream& questions) {
 }
 
 // A script must not take for erased what is still there.
-absl::Status CheckErased(const std::string& map, const v1::PruneResponse& reply) {
+absl::Status CheckErased(Session* session, const v1::PruneResponse& reply) {
   if (reply.erased()) return absl::OkStatus();
+  const auto request = session->Begin<v1::GetMapStatsRequest>();
+  v1::GetMapStatsResponse stats;
+  DSG_RETURN_IF_ERROR(session->api().GetMapStats(session->NewCall(), request, &stats));
+  const v1::PendingErasure& pending = stats.pending_erasure();
+  const bool is_named = pending.node_count() + pending.edge_count() + pending.mesh_block_count() +
+                            pending.span_count() >
+                        0;
+  std::string why = "a reader kept its log; stop the readers and do the same again";
+  if (is_named) why = "an earlier prune that was cut off; run that one again (see dsg stats)";
+  if (reply.left_count() > 0) {
+    why = "others went on writing it; stop the writers and do the same again";
+  }
   return MakeError(
       Reason::kWriterLocked,
-      absl::StrCat("map \"", map, "\" still holds some of what was to be erased: ",
-                   reply.left_count() == 0 ? "a reader kept its log; stop the readers"
-                                           : "others went on writing it; stop the writers",
-                   " and do the same again"),
-      {{"map", map}, {"left_count", absl::StrCat(reply.left_count())}});
+      absl::StrCat("map \"", request.map(), "\" still holds some of what was to be erased: ", why),
+      {{"map", request.map()}, {"left_count", absl::StrCat(reply.left_count())}});
 }
 
 }  // namespace
 
 absl::Status RunPrune(Session* session, const PruneVerb& verb, std::ostream& out,
                       std::ostream& progress_out) {
-  DSG_ASSIGN_OR_RETURN(const std::vector<PrunePolicy> policies,
-                       PoliciesOf(verb, session->map().epoch_ns));
+  DSG_ASSIGN_OR_RETURN(const PolicyFile file, PoliciesOf(verb, session->map()));
   v1::PruneRequest request;
   request.set_map(session->map().name);
   request.set_author("dsg prune");
   request.set_dry_run(verb.dry_run);
   request.set_allow_everything(verb.yes);
+  request.set_share_max(verb.share_max.value_or(file.share_max.value_or(0.0)));
   bool is_erase = false;
-  for (const PrunePolicy& policy : policies) {
+  for (const PrunePolicy& policy : file.policies) {
     query::ToProto(policy, request.add_policies());
     is_erase |= policy.strength == PruneStrength::kErase && !policy.IsHistory();
   }
@@ -139,7 +149,7 @@ absl::Status RunPrune(Session* session, const PruneVerb& verb, std::ostream& out
   } else {
     out << RenderPrune(*reply, verb.dry_run, is_erase);
   }
-  return is_erase && !verb.dry_run ? CheckErased(request.map(), *reply) : absl::OkStatus();
+  return is_erase && !verb.dry_run ? CheckErased(session, *reply) : absl::OkStatus();
 }
 
 }  // namespace dsg::cli

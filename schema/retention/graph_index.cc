@@ -107,25 +107,12 @@ absl::Status GraphIndex::SortByRank(const Snapshot& map) {
   return absl::OkStatus();
 }
 
-void GraphIndex::FindNewest() {
-  const auto take = [this](TimeNs time_ns) {
-    newest_ns_ = std::max(newest_ns_.value_or(time_ns), time_ns);
-  };
-  for (const IndexedNode& node : nodes_) {
-    if (node.last_observed_ns.has_value()) take(*node.last_observed_ns);
-  }
-  for (const TrackInfo& track : tracks_) {
-    if (track.pose_count > 0) take(track.last_ns);
-  }
-}
-
 absl::StatusOr<GraphIndex> GraphIndex::Load(const Snapshot& map, const StopCheck& stop) {
   GraphIndex index;
   DSG_RETURN_IF_ERROR(index.LoadNodes(map, stop));
   DSG_RETURN_IF_ERROR(index.LoadHierarchy(map, stop));
   DSG_RETURN_IF_ERROR(index.SortByRank(map));
   DSG_ASSIGN_OR_RETURN(index.tracks_, map.Tracks(stop));
-  index.FindNewest();
   return index;
 }
 

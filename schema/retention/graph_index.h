@@ -9,6 +9,7 @@
 
 #include "absl/status/statusor.h"
 #include "schema/retention/mesh_cut.h"
+#include "schema/retention/world_clock.h"
 #include "schema/store/snapshot.h"
 
 namespace dsg {
@@ -48,8 +49,9 @@ class GraphIndex {
   const std::vector<uint32_t>& parents(uint32_t node) const { return parents_[node]; }
   /// -1 if there is no such node.
   int64_t Find(NodeId id) const;
-  /// The last instant at which anything of the map was seen.
-  std::optional<TimeNs> newest_observation_ns() const { return newest_ns_; }
+  /// What ages count back from. Nothing until it was set.
+  const WorldClock& clock() const { return clock_; }
+  void SetClock(WorldClock clock) { clock_ = std::move(clock); }
   /// Order: ascending by agent.
   const std::vector<TrackInfo>& tracks() const { return tracks_; }
 
@@ -58,7 +60,6 @@ class GraphIndex {
   absl::Status LoadHierarchy(const Snapshot& map, const StopCheck& stop);
   absl::Status SortByRank(const Snapshot& map);
   void Add(const Node& node);
-  void FindNewest();
 
   std::vector<IndexedNode> nodes_;
   std::vector<Sha256> assets_;
@@ -67,7 +68,7 @@ class GraphIndex {
   std::vector<std::vector<uint32_t>> children_;
   std::vector<std::vector<uint32_t>> parents_;
   std::vector<TrackInfo> tracks_;
-  std::optional<TimeNs> newest_ns_;
+  WorldClock clock_;
 };
 
 }  // namespace dsg

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <set>
 
+#include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
+#include "schema/retention/world_clock.h"
 
 namespace dsg {
 namespace {
@@ -28,6 +30,41 @@ absl::Status ForEachBefore(MapReader* reader, Revision before, const StopCheck& 
   return absl::OkStatus();
 }
 
+// Adds up the wall clock from commit to commit, backwards from now.
+class AgeOfRevisions {
+ public:
+  explicit AgeOfRevisions(int64_t wall_now_ns) : before_ns_(wall_now_ns) {}
+
+  /// The least that has passed since a revision, asked newest first.
+  int64_t Next(const RevisionInfo& info) {
+    // A stamp may be any number: the difference need not fit.
+    const bool is_back = info.committed_ns > before_ns_;
+    const uint64_t step_ns =
+        static_cast<uint64_t>(before_ns_) - static_cast<uint64_t>(info.committed_ns);
+    if (!is_back && step_ns <= static_cast<uint64_t>(kClockLeapMaxNs)) {
+      age_ns_ += static_cast<int64_t>(step_ns);
+    } else {
+      ++leap_count_;
+      leap_after_ = info.revision;
+    }
+    before_ns_ = info.committed_ns;
+    return age_ns_;
+  }
+
+  std::string Note() const {
+    if (leap_count_ == 0) return "";
+    return absl::StrCat("the wall clock went back, or on by more than a week, ", leap_count_,
+                        leap_count_ == 1 ? " time" : " times", ", first after revision ",
+                        leap_after_, "; ages of revisions count without that");
+  }
+
+ private:
+  int64_t before_ns_;
+  int64_t age_ns_ = 0;
+  int64_t leap_count_ = 0;
+  Revision leap_after_ = 0;
+};
+
 }  // namespace
 
 absl::StatusOr<HistoryCut> FindHistoryCut(MapReader* reader, Revision newest,
@@ -42,11 +79,13 @@ absl::StatusOr<HistoryCut> FindHistoryCut(MapReader* reader, Revision newest,
     cut.keep_from = std::min(before->revision, newest);
   } else {
     const auto& age = std::get<PrunePolicy::HistoryOlderThan>(policy.what);
+    AgeOfRevisions ages(wall_now_ns);
     DSG_RETURN_IF_ERROR(ForEachBefore(reader, newest + 1, stop, [&](const RevisionInfo& info) {
-      if (info.committed_ns < wall_now_ns - age.age_ns || info.revision < oldest) return false;
+      if (info.revision < oldest || ages.Next(info) > age.age_ns) return false;
       cut.keep_from = info.revision;
       return true;
     }));
+    cut.note = ages.Note();
   }
   // Nothing comes back.
   cut.keep_from = std::max(cut.keep_from, oldest);

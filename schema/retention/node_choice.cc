@@ -85,10 +85,15 @@ class NodeChooser {
     return std::max(node.last_observed_ns.value_or(track->last_ns), track->last_ns);
   }
 
+  std::optional<TimeNs> CutoffFor(const IndexedNode& node) const {
+    return node.is_agent ? CutoffOf(policy_, index_.clock(), node.id)
+                         : CutoffOf(policy_, index_.clock());
+  }
+
   absl::Status TakeEnded() {
-    const auto cutoff = CutoffOf(policy_, index_.newest_observation_ns());
-    if (!cutoff.has_value()) return absl::OkStatus();
+    if (!CutoffOf(policy_, index_.clock()).has_value()) return absl::OkStatus();
     return TakeIf([&](const IndexedNode& node) {
+      const auto cutoff = CutoffFor(node);
       if (node.valid_to_ns <= *cutoff) return true;
       // Of somebody all of whose poses go nothing is left to ask for.
       const auto seen = node.is_agent ? LastSeen(node) : std::nullopt;
@@ -99,8 +104,7 @@ class NodeChooser {
   // A node is seen when something in it is. What was never looked for itself, and holds what was
   // not, has no time: it goes only with all that contains it.
   absl::Status TakeUnseen() {
-    const auto cutoff = CutoffOf(policy_, index_.newest_observation_ns());
-    if (!cutoff.has_value()) return absl::OkStatus();
+    if (!CutoffOf(policy_, index_.clock()).has_value()) return absl::OkStatus();
     std::vector<std::optional<TimeNs>> seen(is_gone_.size());
     std::vector<bool> holds_undated(is_gone_.size(), false);
     std::vector<bool> is_dated(is_gone_.size(), false);
@@ -120,7 +124,7 @@ class NodeChooser {
       const auto& parents = index_.parents(*it);
       const auto is_gone = [this](uint32_t parent) { return is_gone_[parent]; };
       is_gone_[*it] =
-          is_dated[*it] ? *seen[*it] < *cutoff
+          is_dated[*it] ? *seen[*it] < *CutoffFor(index_.nodes()[*it])
                         : !parents.empty() && std::all_of(parents.begin(), parents.end(), is_gone);
     }
     return absl::OkStatus();

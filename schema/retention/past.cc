@@ -13,22 +13,6 @@ namespace {
 
 constexpr int kPage = 500;
 
-// Readable revisions, oldest first.
-absl::StatusOr<std::vector<Revision>> Readable(MapReader* reader, Revision newest,
-                                               const StopCheck& stop) {
-  std::vector<Revision> revisions;
-  for (Revision before = newest + 1; before > 1;) {
-    DSG_RETURN_IF_ERROR(AskStop(stop));
-    DSG_ASSIGN_OR_RETURN(const std::vector<RevisionInfo> page,
-                         reader->ListRevisions(before, kPage));
-    if (page.empty()) break;
-    for (const RevisionInfo& info : page) revisions.push_back(info.revision);
-    before = page.back().revision;
-  }
-  std::reverse(revisions.begin(), revisions.end());
-  return revisions;
-}
-
 // May something of a block be in a solid? Corners of its faces may lie one block further.
 bool IsNear(const BlockIndex& block, const Solid& solid, double size_m) {
   const Eigen::Vector3d low(block.x - 1.0, block.y - 1.0, block.z - 1.0);
@@ -45,13 +29,14 @@ class PastSearch {
         policy_(policy),
         stop_(stop),
         erasure_(*erasure),
-        cutoff_(CutoffOf(policy, index.newest_observation_ns())) {}
+        cutoff_(CutoffOf(policy, index.clock())) {}
 
   absl::Status Run() {
     DSG_ASSIGN_OR_RETURN(layers_, LayerSet::Of(policy_, head_));
     const auto* layer = std::get_if<PrunePolicy::WholeLayer>(&policy_.what);
     is_all_mesh_ = layer != nullptr && layer->name == "mesh";
-    DSG_ASSIGN_OR_RETURN(const auto revisions, Readable(&reader_, head_.revision(), stop_));
+    DSG_ASSIGN_OR_RETURN(const auto revisions,
+                         ReadableRevisions(&reader_, head_.revision(), stop_));
     if (const auto* region = std::get_if<PrunePolicy::Region>(&policy_.what)) {
       solids_.push_back({region->box_map, {}});
     }
@@ -115,7 +100,8 @@ class PastSearch {
       DSG_ASSIGN_OR_RETURN(const Layer found, head_.FindLayer(layer->name));
       return node.layer == found.id;
     }
-    if (!cutoff_.has_value()) return false;
+    const std::optional<TimeNs> cutoff = is_agent ? CutoffOfAgent(node.id) : cutoff_;
+    if (!cutoff.has_value()) return false;
     std::optional<TimeNs> seen = node.last_observed_ns;
     if (is_agent) {
       DSG_ASSIGN_OR_RETURN(const TrackInfo track, before.GetTrack(node.id));
@@ -123,8 +109,8 @@ class PastSearch {
     }
     const bool asks_seen = std::holds_alternative<PrunePolicy::UnseenSince>(policy_.what) ||
                            std::holds_alternative<PrunePolicy::UnseenFor>(policy_.what);
-    const bool is_unseen = seen.has_value() && *seen < *cutoff_;
-    return asks_seen ? is_unseen : node.valid.to_ns <= *cutoff_ || (is_agent && is_unseen);
+    const bool is_unseen = seen.has_value() && *seen < *cutoff;
+    return asks_seen ? is_unseen : node.valid.to_ns <= *cutoff || (is_agent && is_unseen);
   }
 
   // Nothing believed now contains it, so one way up to the root is enough.
@@ -157,17 +143,21 @@ class PastSearch {
            std::holds_alternative<PrunePolicy::OlderThan>(policy_.what);
   }
 
+  std::optional<TimeNs> CutoffOfAgent(NodeId agent) const {
+    return CutoffOf(policy_, index_.clock(), agent);
+  }
+
   void TakeSpansOfAll(const std::vector<TrackInfo>& tracks) {
     if (!layers_.Holds(layers::kAgents) || !IsTimed() || !cutoff_.has_value()) return;
     for (const TrackInfo& track : tracks) {
-      erasure_.tracks.push_back({track.agent, kTimeMin, *cutoff_});
+      erasure_.tracks.push_back({track.agent, kTimeMin, *CutoffOfAgent(track.agent)});
     }
   }
 
   absl::Status TakeSpans(const Snapshot& before, NodeId agent) {
     if (!layers_.Holds(layers::kAgents)) return absl::OkStatus();
     if (IsTimed() && cutoff_.has_value()) {
-      erasure_.tracks.push_back({agent, kTimeMin, *cutoff_});
+      erasure_.tracks.push_back({agent, kTimeMin, *CutoffOfAgent(agent)});
       return absl::OkStatus();
     }
     if (!std::holds_alternative<PrunePolicy::Region>(policy_.what)) return absl::OkStatus();
@@ -221,6 +211,21 @@ void SortUnique(std::vector<T>* items, const KeyOf& key_of) {
 
 }  // namespace
 
+absl::StatusOr<std::vector<Revision>> ReadableRevisions(MapReader* reader, Revision newest,
+                                                        const StopCheck& stop) {
+  std::vector<Revision> revisions;
+  for (Revision before = newest + 1; before > 1;) {
+    DSG_RETURN_IF_ERROR(AskStop(stop));
+    DSG_ASSIGN_OR_RETURN(const std::vector<RevisionInfo> page,
+                         reader->ListRevisions(before, kPage));
+    if (page.empty()) break;
+    for (const RevisionInfo& info : page) revisions.push_back(info.revision);
+    before = page.back().revision;
+  }
+  std::reverse(revisions.begin(), revisions.end());
+  return revisions;
+}
+
 void AddPresent(const GraphIndex& index, const Measured& measured, Erasure* erasure) {
   for (size_t i = 0; i < index.nodes().size(); ++i) {
     if (measured.selection.is_gone[i]) erasure->nodes.push_back(index.nodes()[i].id);
@@ -247,7 +252,7 @@ absl::StatusOr<bool> WasEverThere(MapReader* reader, const Snapshot& map, const 
                                   const StopCheck& stop) {
   const auto* branch = std::get_if<PrunePolicy::Branch>(&policy.what);
   if (branch == nullptr) return false;
-  DSG_ASSIGN_OR_RETURN(const auto revisions, Readable(reader, map.revision(), stop));
+  DSG_ASSIGN_OR_RETURN(const auto revisions, ReadableRevisions(reader, map.revision(), stop));
   for (auto it = revisions.rbegin(); it != revisions.rend(); ++it) {
     DSG_RETURN_IF_ERROR(AskStop(stop));
     DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> then, reader->At(*it));

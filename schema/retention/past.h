@@ -5,6 +5,8 @@
 // Refuses to touch the past of what is believed to be elsewhere now.
 #pragma once
 
+#include <vector>
+
 #include "absl/status/statusor.h"
 #include "schema/retention/measure.h"
 #include "schema/retention/policy.h"
@@ -19,6 +21,10 @@ void AddPresent(const GraphIndex& index, const Measured& measured, Erasure* eras
 /// Cost: looks at what each readable revision ended.
 absl::Status AddPast(MapReader* reader, const Snapshot& map, const GraphIndex& index,
                      const PrunePolicy& policy, const StopCheck& stop, Erasure* erasure);
+
+/// Oldest first, up to `newest`.
+absl::StatusOr<std::vector<Revision>> ReadableRevisions(MapReader* reader, Revision newest,
+                                                        const StopCheck& stop);
 
 /// Whether the node that a branch policy names was there at any readable revision.
 absl::StatusOr<bool> WasEverThere(MapReader* reader, const Snapshot& map, const PrunePolicy& policy,

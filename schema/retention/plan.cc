@@ -22,7 +22,8 @@ class Planner {
   absl::StatusOr<PrunePlan> Run() {
     plan_.revision = map_.revision();
     for (const PrunePolicy& policy : policies_) DSG_RETURN_IF_ERROR(policy.Validate());
-    DSG_ASSIGN_OR_RETURN(const GraphIndex index, GraphIndex::Load(map_, stop_));
+    DSG_ASSIGN_OR_RETURN(GraphIndex index, GraphIndex::Load(map_, stop_));
+    DSG_RETURN_IF_ERROR(FindClock(&index));
     // The union stands last.
     std::vector<Measured> all(policies_.size() + 1);
     all.back().selection.is_gone.assign(index.nodes().size(), false);
@@ -38,6 +39,32 @@ class Planner {
   }
 
  private:
+  // The least age by which a policy names something; nullopt if none does.
+  std::optional<TimeNs> FindLeastAge() const {
+    std::optional<TimeNs> least_ns;
+    const auto take = [&](TimeNs age_ns) {
+      least_ns = std::min(least_ns.value_or(age_ns), age_ns);
+    };
+    for (const PrunePolicy& policy : policies_) {
+      if (const auto* old = std::get_if<PrunePolicy::OlderThan>(&policy.what)) take(old->age_ns);
+      if (const auto* unseen = std::get_if<PrunePolicy::UnseenFor>(&policy.what)) {
+        take(unseen->age_ns);
+      }
+    }
+    return least_ns;
+  }
+
+  absl::Status FindClock(GraphIndex* index) {
+    const std::optional<TimeNs> age_min_ns = FindLeastAge();
+    if (!age_min_ns.has_value()) return absl::OkStatus();
+    DSG_ASSIGN_OR_RETURN(WorldClock clock, FindWorldClock(&reader_, map_, *index, *age_min_ns,
+                                                          options_.wall_now_ns, stop_));
+    plan_.implausible_agents = clock.ahead;
+    if (std::string note = NoteOf(clock); !note.empty()) plan_.notes.push_back(std::move(note));
+    index->SetClock(std::move(clock));
+    return absl::OkStatus();
+  }
+
   // What is to be erased need not be there any more: then the past is searched for it. One of
   // several policies that names what this map does not have (any more) matches nothing.
   absl::StatusOr<Selection> SelectOf(const GraphIndex& index, const PrunePolicy& policy) {
@@ -61,7 +88,8 @@ class Planner {
     for (size_t i = 0; i < all.size(); ++i) {
       const Measured& one = all[i];
       const bool is_union = i == policies_.size();
-      const std::string name = is_union ? "all policies together" : policies_[i].name;
+      std::string name = is_union ? "all policies together" : policies_[i].name;
+      if (name.empty()) name = absl::StrCat("policy ", i + 1);
       int64_t gone_count = 0;
       for (size_t n = 0; n < index.nodes().size(); ++n) {
         if (one.selection.is_gone[n] && !index.nodes()[n].is_agent) ++gone_count;
@@ -70,7 +98,13 @@ class Planner {
                                (pose_count > 0 && one.forgotten_pose_count == pose_count) ||
                                (!is_union && TakesOnlyBuilding(index, policies_[i], one.selection));
       if (matches_all && plan_.all_matching_policy.empty()) {
-        plan_.all_matching_policy = name.empty() ? absl::StrCat("policy ", i + 1) : name;
+        plan_.all_matching_policy = name;
+      }
+      const double share =
+          std::max(ShareOf(gone_count, fixed_count), ShareOf(one.forgotten_pose_count, pose_count));
+      if (share > plan_.share) {
+        plan_.share = share;
+        plan_.share_policy = name;
       }
       if (is_union) {
         const int64_t revision_count = plan_.total.revision_count;
@@ -81,6 +115,10 @@ class Planner {
       }
     }
     return absl::OkStatus();
+  }
+
+  static double ShareOf(int64_t part, int64_t whole) {
+    return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
   }
 
   // What is left of such a map has nothing that holds it together.
@@ -102,6 +140,7 @@ class Planner {
       DSG_ASSIGN_OR_RETURN(const HistoryCut cut, FindHistoryCut(&reader_, map_.revision(), policy,
                                                                 options_.wall_now_ns, stop_));
       amount.revision_count = cut.revision_count;
+      if (!cut.note.empty()) plan_.notes.push_back(cut.note);
       plan_.total.revision_count = std::max(plan_.total.revision_count, cut.revision_count);
       plan_.keep_from = std::max(plan_.keep_from.value_or(0), cut.keep_from);
     }

@@ -74,13 +74,22 @@ struct PrunePlan {
   /// A policy that matches every node that is no agent, or every pose, or the branch of the map's
   /// only building; empty = none does.
   std::string all_matching_policy;
+  /// The largest share, 0 to 1, of the nodes that are no agents or of the poses that goes by one
+  /// policy or by all together, and by which.
+  double share = 0.0;
+  std::string share_policy;
+  /// Agents that are ahead of what ages count back from (world_clock.h). Empty without ages.
+  std::vector<NodeId> implausible_agents;
+  /// What ages count without, in words.
+  std::vector<std::string> notes;
 
   /// There is nothing to commit.
   bool IsEmpty() const;
 };
 
 struct PlanOptions {
-  /// What ages of revisions count back from.
+  /// What ages of revisions count back from, and what on a UNIX clock nothing was observed after;
+  /// 0 = not known.
   int64_t wall_now_ns = 0;
 };
 

@@ -22,7 +22,7 @@ enum class PruneStrength {
 };
 
 /// One rule of forgetting. Instants are of world time; ages count back from the newest observation
-/// of the map.
+/// of the map that another one supports (world_clock.h).
 struct PrunePolicy {
   /// A node by id or name, and all that only it contains.
   struct Branch {
@@ -54,7 +54,8 @@ struct PrunePolicy {
   struct UnseenFor {
     TimeNs age_ns = 0;
   };
-  /// Revisions committed longer ago than this, by the wall clock, that have no tag.
+  /// Revisions committed longer ago than this, by the wall clock where it can be believed
+  /// (history_cut.h), that have no tag.
   struct HistoryOlderThan {
     TimeNs age_ns = 0;
   };

@@ -34,10 +34,16 @@ class Reader {
     PolicyFile file;
     file.every_ns = kNsPerDay;
     if (!root.IsMap()) return Wrong(root, "the file is no map; begin with \"policies:\"");
-    DSG_RETURN_IF_ERROR(CheckKeys(root, {"every", "policies"}));
+    DSG_RETURN_IF_ERROR(CheckKeys(root, {"every", "share_max", "policies"}));
     if (root["every"].IsDefined()) {
       DSG_ASSIGN_OR_RETURN(file.every_ns, Age(root["every"], "every"));
       if (file.every_ns < kEveryMin) return Wrong(root["every"], "every is below 1s");
+    }
+    if (root["share_max"].IsDefined()) {
+      DSG_ASSIGN_OR_RETURN(file.share_max, Number(root["share_max"], "share_max"));
+      if (!(*file.share_max > 0.0 && *file.share_max <= 1.0)) {
+        return Wrong(root["share_max"], "share_max is not above 0 and at most 1");
+      }
     }
     const YAML::Node list = root["policies"];
     if (!list.IsDefined() || !list.IsSequence() || list.size() == 0) {

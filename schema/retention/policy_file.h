@@ -3,6 +3,7 @@
 // Refuses unknown keys and anything half understood: a file is taken whole or not at all.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,11 +13,18 @@
 
 namespace dsg {
 
+/// More than half of a map at once is rather a wrong clock than a policy.
+inline constexpr double kShareMaxDefault = 0.5;
+
 struct PolicyFile {
   /// How often a server applies the policies.
   TimeNs every_ns = 0;
   /// Valid each, with names that differ.
   std::vector<PrunePolicy> policies;
+  /// The largest share of the nodes that are no agents, and of the poses, that a run may take from
+  /// a map; above 0, at most 1. An everyday run takes what has come of age since the run before.
+  /// Unset: kShareMaxDefault for a schedule, and no limit for a person who runs the file once.
+  std::optional<double> share_max;
 };
 
 /// Reads YAML. `name` stands in errors.

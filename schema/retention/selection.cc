@@ -28,6 +28,18 @@ TimeNs Back(TimeNs from_ns, TimeNs age_ns) {
   return from_ns < kTimeMin + age_ns ? kTimeMin : from_ns - age_ns;
 }
 
+std::optional<TimeNs> CutoffBefore(const PrunePolicy& policy, std::optional<TimeNs> now_ns) {
+  const auto back = [&](TimeNs age_ns) {
+    return now_ns.has_value() ? std::optional<TimeNs>(Back(*now_ns, age_ns)) : std::nullopt;
+  };
+  const auto& what = policy.what;
+  if (const auto* before = std::get_if<PrunePolicy::Before>(&what)) return before->at_ns;
+  if (const auto* unseen = std::get_if<PrunePolicy::UnseenSince>(&what)) return unseen->at_ns;
+  if (const auto* older = std::get_if<PrunePolicy::OlderThan>(&what)) return back(older->age_ns);
+  if (const auto* unseen = std::get_if<PrunePolicy::UnseenFor>(&what)) return back(unseen->age_ns);
+  return std::nullopt;
+}
+
 bool IsMeshWanted(const PrunePolicy& policy) {
   return policy.layers.empty() ||
          std::find(policy.layers.begin(), policy.layers.end(), "mesh") != policy.layers.end();
@@ -77,16 +89,13 @@ void Selection::Add(const Selection& other) {
   AddTracks(other.tracks, &tracks);
 }
 
-std::optional<TimeNs> CutoffOf(const PrunePolicy& policy, std::optional<TimeNs> newest_ns) {
-  const auto back = [&](TimeNs age_ns) {
-    return newest_ns.has_value() ? std::optional<TimeNs>(Back(*newest_ns, age_ns)) : std::nullopt;
-  };
-  const auto& what = policy.what;
-  if (const auto* before = std::get_if<PrunePolicy::Before>(&what)) return before->at_ns;
-  if (const auto* unseen = std::get_if<PrunePolicy::UnseenSince>(&what)) return unseen->at_ns;
-  if (const auto* older = std::get_if<PrunePolicy::OlderThan>(&what)) return back(older->age_ns);
-  if (const auto* unseen = std::get_if<PrunePolicy::UnseenFor>(&what)) return back(unseen->age_ns);
-  return std::nullopt;
+std::optional<TimeNs> CutoffOf(const PrunePolicy& policy, const WorldClock& clock) {
+  return CutoffBefore(policy, clock.now_ns);
+}
+
+std::optional<TimeNs> CutoffOf(const PrunePolicy& policy, const WorldClock& clock, NodeId agent) {
+  if (!clock.now_ns.has_value()) return CutoffBefore(policy, std::nullopt);
+  return CutoffBefore(policy, clock.NowOf(agent));
 }
 
 absl::StatusOr<LayerSet> LayerSet::Of(const PrunePolicy& policy, const Snapshot& map) {

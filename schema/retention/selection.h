@@ -50,9 +50,10 @@ std::vector<Interval> JoinIntervals(std::vector<Interval> intervals);
 absl::StatusOr<Selection> Select(const Snapshot& map, const GraphIndex& index,
                                  const PrunePolicy& policy, const StopCheck& stop);
 
-/// The instant before which an age or an instant of a policy lies; nullopt for policies without
-/// one, and for ages in a map in which nothing was observed.
-std::optional<TimeNs> CutoffOf(const PrunePolicy& policy, std::optional<TimeNs> newest_ns);
+/// The instant before which an age or an instant of a policy lies, for things and for the times of
+/// an agent; nullopt for policies without one, and for ages in a map in which nothing was observed.
+std::optional<TimeNs> CutoffOf(const PrunePolicy& policy, const WorldClock& clock);
+std::optional<TimeNs> CutoffOf(const PrunePolicy& policy, const WorldClock& clock, NodeId agent);
 
 /// Layers that a policy may touch.
 class LayerSet {

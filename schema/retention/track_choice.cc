@@ -29,16 +29,18 @@ absl::StatusOr<std::map<NodeId, std::vector<Interval>>> SpansOf(const Snapshot& 
     return SpansInBox(map, region->box_map, stop);
   }
   std::map<NodeId, std::vector<Interval>> spans;
-  Interval span;
-  if (std::holds_alternative<PrunePolicy::Before>(policy.what) ||
-      std::holds_alternative<PrunePolicy::OlderThan>(policy.what)) {
-    const auto cutoff = CutoffOf(policy, index.newest_observation_ns());
-    if (!cutoff.has_value()) return spans;
-    span.to_ns = *cutoff;
-  } else if (!policy.IsThinning()) {
-    return spans;
+  const bool is_time = std::holds_alternative<PrunePolicy::Before>(policy.what) ||
+                       std::holds_alternative<PrunePolicy::OlderThan>(policy.what);
+  if (!is_time && !policy.IsThinning()) return spans;
+  for (const TrackInfo& track : index.tracks()) {
+    Interval span;
+    if (is_time) {
+      const auto cutoff = CutoffOf(policy, index.clock(), track.agent);
+      if (!cutoff.has_value()) return spans;
+      span.to_ns = *cutoff;
+    }
+    spans[track.agent].push_back(span);
   }
-  for (const TrackInfo& track : index.tracks()) spans[track.agent].push_back(span);
   return spans;
 }
 

@@ -86,7 +86,7 @@ ComparedAnswer ScanNearest(const NaiveMap& map, const NearestQuestion& question)
   for (const auto& [id, stored] : map.nodes) {
     Node node = stored;
     if (node.layer == layers::kAgents) {
-      if (!question.AsksForAgents()) continue;
+      if (!question.wanted.at_ns.has_value()) continue;
       const auto at = LocateNaively(map, id, *question.wanted.at_ns);
       if (!at.has_value() || at->quality == v1::IN_GAP) continue;
       node.map_T_node = at->map_T_agent;
@@ -124,7 +124,7 @@ Question MakeNearest(const QuestionWorld& world, Random* random) {
   Question made;
   made.text = request.ShortDebugString();
   // Poses are not stored to the last digit, nodes are.
-  if (question.AsksForAgents()) made.tolerance = world.is_lossless() ? 1e-9 : 3e-4;
+  if (question.wanted.at_ns.has_value()) made.tolerance = world.is_lossless() ? 1e-9 : 3e-4;
   made.scan = [&map, question] { return ScanNearest(map, question); };
   made.ask = [request, revision](Asker* asker) {
     v1::ListNearestNodesRequest asked = request;
@@ -142,6 +142,38 @@ Question MakeNearest(const QuestionWorld& world, Random* random) {
   return made;
 }
 
+// A node of a list. Where an agent was at an instant is not stored to the last digit.
+void AddListed(v1::Node node, bool is_of_instant, ComparedAnswer* answer) {
+  const bool is_placed = is_of_instant && IsAgentKind(node.kind()) && node.has_map_t_node();
+  if (is_placed) {
+    const v1::Vector3& p = node.map_t_node().position();
+    answer->numbers.insert(answer->numbers.end(), {p.x(), p.y(), p.z()});
+    node.clear_map_t_node();
+  }
+  answer->words.push_back(TextOf(std::move(node)) + (is_placed ? " was there" : ""));
+}
+
+ComparedAnswer ScanNodes(const NaiveMap& map, const Wanted& wanted) {
+  ComparedAnswer answer;
+  for (const auto& [id, stored] : map.nodes) {
+    Node node = stored;
+    bool is_in_gap = false;
+    if (wanted.at_ns.has_value() && node.layer == layers::kAgents) {
+      const auto at = LocateNaively(map, id, *wanted.at_ns);
+      if (!at.has_value()) continue;
+      is_in_gap = at->quality == v1::IN_GAP;
+      if (is_in_gap && wanted.box_map.has_value()) continue;
+      node.map_T_node = at->map_T_agent;
+    }
+    if (!wanted.Holds(map, node)) continue;
+    v1::Node wire;
+    dsg::ToProto(node, LayerTable(), &wire);
+    if (is_in_gap) wire.clear_map_t_node();
+    AddListed(std::move(wire), wanted.at_ns.has_value(), &answer);
+  }
+  return answer;
+}
+
 Question MakeListNodes(const QuestionWorld& world, Random* random) {
   const Revision revision = world.AnyRevision(random);
   const NaiveMap& map = world.At(revision);
@@ -153,18 +185,14 @@ Question MakeListNodes(const QuestionWorld& world, Random* random) {
   *request.mutable_filter() = wanted.ToProto();
   Question made;
   made.text = request.ShortDebugString();
-  made.scan = [&map, wanted] {
-    ComparedAnswer answer;
-    for (const auto& [id, node] : map.nodes) {
-      if (wanted.Holds(map, node)) answer.words.push_back(TextOf(node));
-    }
-    return answer;
-  };
-  made.ask = [request, revision](Asker* asker) {
+  const bool is_of_instant = wanted.at_ns.has_value();
+  if (is_of_instant) made.tolerance = world.is_lossless() ? 1e-9 : 3e-4;
+  made.scan = [&map, wanted] { return ScanNodes(map, wanted); };
+  made.ask = [request, revision, is_of_instant](Asker* asker) {
     return AllPages<v1::ListNodesRequest, v1::ListNodesResponse>(
         asker, revision, request, &query::Api::ListNodes,
-        [](const v1::ListNodesResponse& page, ComparedAnswer* answer) {
-          for (const v1::Node& node : page.nodes()) answer->words.push_back(TextOf(node));
+        [is_of_instant](const v1::ListNodesResponse& page, ComparedAnswer* answer) {
+          for (const v1::Node& node : page.nodes()) AddListed(node, is_of_instant, answer);
         });
   };
   return made;

@@ -93,7 +93,7 @@ TEST(Revert, GoesBackOverEveryPartOfTheModel) {
       const auto reader = OrDie(OrDie(GraphStore::Open(map.folder(), {}))->OpenMap(kMap));
       SCOPED_TRACE(absl::StrCat("to ", to, ", codec ", static_cast<int>(codec)));
       ExpectSame(*OrDie(reader->Latest()), *OrDie(reader->At(to)));
-      EXPECT_TRUE(OrDie(reader->Verify(nullptr)).problems.empty());
+      EXPECT_TRUE(OrDie(reader->Verify({}, {})).problems.empty());
     }
   }
 }
@@ -120,7 +120,7 @@ TEST(Revert, OfRandomWorldsFromAnywhereToAnywhere) {
       SCOPED_TRACE(absl::StrCat("seed ", seed, " to ", to));
       ExpectSame(*OrDie(reader->Latest()), *OrDie(reader->At(to)));
     }
-    EXPECT_TRUE(OrDie(reader->Verify(nullptr)).problems.empty());
+    EXPECT_TRUE(OrDie(reader->Verify({}, {})).problems.empty());
   }
 }
 
@@ -135,13 +135,13 @@ TEST(Revert, InManyBatchesInterruptedAndBegunAgain) {
     const auto part = OrDie(Reverter(map.folder()).Revert(3, message_max));
     EXPECT_FALSE(part.done());
     EXPECT_GT(part.revision(), 0);
-    EXPECT_TRUE(OrDie(reader->Verify(nullptr)).problems.empty());
+    EXPECT_TRUE(OrDie(reader->Verify({}, {})).problems.empty());
   }
   const auto last = OrDie(Reverter(map.folder()).Revert(3));
   EXPECT_TRUE(last.done());
   EXPECT_EQ(last.progress(), 1.0);
   ExpectSame(*OrDie(reader->Latest()), *OrDie(reader->At(3)));
-  EXPECT_TRUE(OrDie(reader->Verify(nullptr)).problems.empty());
+  EXPECT_TRUE(OrDie(reader->Verify({}, {})).problems.empty());
   // And forth again.
   OrDie(Reverter(map.folder()).Revert(30));
   ExpectSame(*OrDie(reader->Latest()), *OrDie(reader->At(30)));
@@ -221,7 +221,7 @@ TEST(Revert, DoesNotMixWithTheWritesOfOthers) {
     ExpectSame(*OrDie(reader->Latest()), *OrDie(reader->At(2)));
     OrDie(reverter.Revert(30));
   }
-  EXPECT_TRUE(OrDie(reader->Verify(nullptr)).problems.empty());
+  EXPECT_TRUE(OrDie(reader->Verify({}, {})).problems.empty());
 }
 
 TEST(Revert, CountsARowThatChangesOnce) {

@@ -346,7 +346,7 @@ TEST_P(StoreModelTest, ReplayGivesTheSameDigestsAndVerifies) {
   ASSERT_EQ(second->size(), size_t{kRevisions});
   for (size_t i = 0; i < first->size(); ++i) EXPECT_EQ((*first)[i].digest, (*second)[i].digest);
   for (const auto& map : {map_, *replayed}) {
-    const auto report = map->Verify({});
+    const auto report = map->Verify({}, {});
     ASSERT_TRUE(report.ok()) << report.status();
     EXPECT_TRUE(report->problems.empty()) << report->problems.front();
     EXPECT_EQ(report->revision_count, kRevisions);

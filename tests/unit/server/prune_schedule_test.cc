@@ -67,6 +67,9 @@ class Core final : public PassingCore {
     last_ = request;
     absl::Status status;
     for (const auto& policy : request.policies()) {
+      if (policy.name() == "too much" && request.map() == "a") {
+        status = MakeError(Reason::kPolicyTakesTooMuch, "0.9 of a");
+      }
       if (policy.name() == "everything") status = MakeError(Reason::kPolicyMatchesAll, "all");
       if (policy.name() == "attics" && request.map() == "a") {
         status = MakeError(Reason::kLayerUnknown, "a has no layer attics");
@@ -130,6 +133,35 @@ TEST(PruneSchedule, SaysOnceThatAMapLacksALayerAndAppliesTheRest) {
   const size_t first = log.find("a has no layer attics");
   ASSERT_NE(first, std::string::npos) << log;
   EXPECT_EQ(log.find("a has no layer attics", first + 1), std::string::npos) << log;
+}
+
+TEST(PruneSchedule, WhatWouldTakeTooMuchOfAMapStopsThereAndIsAnError) {
+  Core core;
+  PolicyFile file = FileOf(3600 * kNsPerSecond);
+  file.policies.push_back(file.policies.front());
+  file.policies.front().name = "too much";
+  PruneSchedule schedule(&core, file, {.first_after = minutes(1)},
+                         std::make_unique<TestClock>(minutes(2)));
+  testing::internal::CaptureStderr();
+  schedule.Run();
+  const std::string log = testing::internal::GetCapturedStderr();
+  // Of a nothing, by no policy; b fails anyway.
+  EXPECT_EQ(core.count_of_["a"], 1);
+  EXPECT_EQ(core.applied_["mesh"], 1);
+  EXPECT_EQ(core.applied_["too much"], 1);
+  EXPECT_EQ(core.last_.share_max(), 0.5);
+  EXPECT_NE(log.find("error"), std::string::npos) << log;
+  EXPECT_NE(log.find("0.9 of a"), std::string::npos) << log;
+}
+
+TEST(PruneSchedule, TakesTheShareOfItsFile) {
+  Core core;
+  PolicyFile file = FileOf(3600 * kNsPerSecond);
+  file.share_max = 0.125;
+  PruneSchedule schedule(&core, file, {.first_after = minutes(1)},
+                         std::make_unique<TestClock>(minutes(2)));
+  schedule.Run();
+  EXPECT_EQ(core.last_.share_max(), 0.125);
 }
 
 TEST(PruneSchedule, DoesNothingBeforeItsFirstTime) {

@@ -103,6 +103,31 @@ TEST_F(PruneVerbTest, RefusesToForgetEverythingOfAScriptWithoutYes) {
   EXPECT_EQ(Json::parse(Dsg({"ls", "--json"}).out)["nodes"].size(), 0u);
 }
 
+TEST_F(PruneVerbTest, RefusesMoreThanTheShareAndADryRunSaysSo) {
+  const std::vector<std::string> kitchen = {"prune", "--branch", "kitchen", "--share-max"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), kitchen.begin(), kitchen.end());
+    return Dsg(more);
+  };
+  const Outcome dry = with({"0.5", "--dry-run"});
+  EXPECT_EQ(dry.code, 0) << dry.errors;
+  EXPECT_NE(dry.out.find("the run would be refused: "), std::string::npos) << dry.out;
+  const Outcome refused = with({"0.5"});
+  EXPECT_NE(refused.code, 0);
+  EXPECT_NE(refused.errors.find("POLICY_TAKES_TOO_MUCH"), std::string::npos) << refused.errors;
+  EXPECT_NE(refused.errors.find("0.75"), std::string::npos) << refused.errors;
+  for (const char* wrong : {"-1", "0", "1.5", "nan"}) EXPECT_EQ(with({wrong}).code, 2) << wrong;
+  EXPECT_EQ(with({"0.75"}).code, 0);
+}
+
+TEST_F(PruneVerbTest, AFileOfPoliciesMaySayWhichShareMayGo) {
+  const std::string path = store_.path() + ".yaml";
+  std::ofstream(path) << "share_max: 0.5\npolicies:\n  - {name: kitchen, branch: R1}\n";
+  const Outcome refused = Dsg({"prune", "--policy", path});
+  EXPECT_NE(refused.errors.find("POLICY_TAKES_TOO_MUCH"), std::string::npos) << refused.errors;
+  EXPECT_EQ(Dsg({"prune", "--policy", path, "--share-max", "0.8"}).code, 0);
+}
+
 TEST_F(PruneVerbTest, TakesAFileOfPolicies) {
   const std::string path = store_.path() + ".yaml";
   std::ofstream(path) << "policies:\n  - {name: quiet kitchen, branch: R1, strength: erase}\n";

@@ -122,7 +122,7 @@ class Damage : public testing::Test {
   bool IsFoundByVerify() {
     const auto store = OrDie(GraphStore::Open(folder_.path(), {}));
     const auto map = store->OpenMap(kMap);
-    const auto report = map.ok() ? (*map)->Verify({}) : map.status();
+    const auto report = map.ok() ? (*map)->Verify({}, {}) : map.status();
     return !report.ok() || !report->problems.empty();
   }
 

@@ -51,6 +51,16 @@ policies:
   EXPECT_EQ(std::get<PrunePolicy::UnseenSince>(file->policies[4].what).at_ns, 1000);
 }
 
+TEST(PolicyFile, SaysWhichShareMayGo) {
+  const std::string rest = "policies:\n  - {name: a, layer: mesh}\n";
+  EXPECT_EQ(ParsePolicyFile(rest, "p.yaml")->share_max, std::nullopt);
+  EXPECT_EQ(ParsePolicyFile("share_max: 0.25\n" + rest, "p.yaml")->share_max, 0.25);
+  for (const char* wrong : {"0", "-0.5", "1.5", "half"}) {
+    const std::string error = ErrorOf(std::string("share_max: ") + wrong + "\n" + rest);
+    EXPECT_EQ(error.substr(0, 21), "p.yaml:1:12: share_ma") << error;
+  }
+}
+
 TEST(PolicyFile, ErrorsNameLineAndColumn) {
   EXPECT_EQ(ErrorOf("policies:\n  - name: a\n    brunch: R3\n").substr(0, 33),
             "p.yaml:3:5: unknown key \"brunch\";");
