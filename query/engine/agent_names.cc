@@ -7,8 +7,7 @@
 namespace dsg::query {
 
 size_t AgentNames::KeyHash::operator()(const Key& key) const noexcept {
-  const std::hash<std::string> text_hash;
-  const size_t hash = text_hash(key.map) * 31 + text_hash(key.id_or_name);
+  const size_t hash = std::hash<std::string>()(key.id_or_name) * 31 + key.opening;
   return hash * 31 + static_cast<size_t>(key.revision);
 }
 
@@ -17,7 +16,7 @@ absl::StatusOr<NodeId> AgentNames::Resolve(const Snapshot& snapshot,
   if (id_or_name.empty()) {
     return FieldError("agent", "", "give a node id such as H12, or the name that the log gave");
   }
-  const Key key{snapshot.spec().name, snapshot.revision(), id_or_name};
+  const Key key{snapshot.opening(), snapshot.revision(), id_or_name};
   if (const auto known = entries_.Find(key)) return *known;
   DSG_ASSIGN_OR_RETURN(const NodeId id, snapshot.ResolveAgent(id_or_name));
   entries_.Insert(key, id);

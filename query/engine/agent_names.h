@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which agent a text names, remembered per revision: looking a name up in the store costs several
-// times as much as finding where the agent was.
+// Which agent a text names, remembered per opened map and revision: looking a name up in the store
+// costs several times as much as finding where the agent was.
 #pragma once
 
 #include <string>
@@ -20,7 +20,7 @@ class AgentNames {
 
  private:
   struct Key {
-    std::string map;
+    uint64_t opening = 0;
     Revision revision = 0;
     std::string id_or_name;
     bool operator==(const Key&) const = default;

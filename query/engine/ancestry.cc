@@ -35,14 +35,14 @@ absl::StatusOr<std::shared_ptr<const Ancestry>> Read(const Snapshot& snapshot, c
 
 size_t AncestryCache::KeyHash::operator()(const Key& key) const noexcept {
   const std::hash<NodeId> node_hash;
-  size_t hash = std::hash<std::string>()(key.map) + static_cast<size_t>(key.revision);
+  size_t hash = key.opening * 31 + static_cast<size_t>(key.revision);
   hash = hash * 31 + node_hash(key.place);
   return hash * 31 + node_hash(key.room);
 }
 
 absl::StatusOr<std::shared_ptr<const Ancestry>> AncestryCache::Find(const Snapshot& snapshot,
                                                                     const Stay& stay) {
-  const Key key{snapshot.spec().name, snapshot.revision(), stay.place, stay.room};
+  const Key key{snapshot.opening(), snapshot.revision(), stay.place, stay.room};
   if (auto known = entries_.Find(key)) return *std::move(known);
   DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Ancestry> read, Read(snapshot, stay));
   entries_.Insert(key, read);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What stands above a place or room, in the form that replies carry it, kept per revision because
-// every question "where was" asks for the same few places again and again.
+// What stands above a place or room, in the form that replies carry it, kept per opened map and
+// revision because every question "where was" asks for the same few places again and again.
 #pragma once
 
 #include <memory>
@@ -30,7 +30,7 @@ class AncestryCache {
 
  private:
   struct Key {
-    std::string map;
+    uint64_t opening = 0;
     Revision revision = 0;
     NodeId place;
     NodeId room;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What questions look up again and again, remembered. Keys name the revision, so nothing remembered
-// is ever wrong; a full cache forgets everything, which is rare and cheap to make good.
+// What questions look up again and again, remembered. Keys name what was opened
+// (MapReader::opening) and the revision, so nothing remembered is ever wrong; a full cache forgets
+// everything, which is rare and cheap to make good.
 #pragma once
 
 #include <mutex>

@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "query/engine/commit.h"
 
+#include <unistd.h>
+
+#include <atomic>
+
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/ingest_service.pb.h"
 #include "query/engine/nodes.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
+#include "schema/base/time.h"
 #include "schema/codec/proto_convert.h"
 
 namespace dsg::query {
@@ -24,13 +29,18 @@ absl::Status Commit(MapTable* maps, const CallContext& call, const v1::CommitReq
   DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> reader, maps->Reader(in.map()));
   DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> snapshot, reader->Latest());
   DSG_ASSIGN_OR_RETURN(const LayerTable layers, LayersOf(*snapshot));
-  DSG_ASSIGN_OR_RETURN(GraphDelta delta, FromProto(in, layers));
+  DSG_ASSIGN_OR_RETURN(GraphDelta delta, FromProto(in, layers, Unmasked::kPatch));
   // Past the quota, and into the reserve, goes only what the service itself forgets.
   delta.is_forgetting = false;
   DSG_ASSIGN_OR_RETURN(const CommitResult result, maps->Commit(std::move(delta), call.stop()));
   reply->set_revision(result.revision);
   reply->set_replayed(result.replayed);
   return absl::OkStatus();
+}
+
+std::string NewSessionId(std::string_view work) {
+  static std::atomic<int64_t> count{0};
+  return absl::StrCat(std::string(work), "-", WallClockNs(), "-", getpid(), "-", ++count);
 }
 
 absl::Status GetSession(MapTable* maps, const v1::GetSessionRequest& request,

@@ -23,16 +23,23 @@ absl::Status CheckRevision(std::string_view field, Revision revision) {
 }
 
 // Where a page begins, and the revision that was the newest on the first one.
-absl::StatusOr<PageToken> StartOf(MapTable* maps, const v1::DiffRevisionsRequest& request,
+absl::StatusOr<PageToken> StartOf(MapReader* map, const v1::DiffRevisionsRequest& request,
                                   uint64_t question) {
-  if (!request.page_token().empty()) return DecodePageToken(request.page_token(), question);
-  if (request.has_to_revision()) return PageToken{request.to_revision(), ""};
-  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> map, maps->Reader(request.map()));
+  PageToken start;
+  if (!request.page_token().empty()) {
+    DSG_ASSIGN_OR_RETURN(start, DecodePageToken(request.page_token(), question));
+    DSG_RETURN_IF_ERROR(CheckToken(start, *map));
+    return start;
+  }
+  start.incarnation = DigestOf(*map);
+  start.revision = request.to_revision();
+  if (request.has_to_revision()) return start;
   DSG_ASSIGN_OR_RETURN(const RevisionInfo head, map->Head());
-  return PageToken{head.revision, ""};
+  start.revision = head.revision;
+  return start;
 }
 
-uint64_t DigestOf(const v1::DiffRevisionsRequest& request) {
+uint64_t QuestionOf(const v1::DiffRevisionsRequest& request) {
   v1::DiffRevisionsRequest question = request;
   question.clear_page_size();
   question.clear_page_token();
@@ -48,23 +55,22 @@ absl::Status DiffRevisions(MapTable* maps, const CallContext& call,
   DSG_RETURN_IF_ERROR(CheckRevision("to_revision", request.to_revision()));
   DSG_RETURN_IF_ERROR(CheckNodeView(request.view()));
   DSG_ASSIGN_OR_RETURN(const int size, CheckPageSize(request.page_size()));
-  const uint64_t question = DigestOf(request);
-  DSG_ASSIGN_OR_RETURN(const PageToken start, StartOf(maps, request, question));
+  const uint64_t question = QuestionOf(request);
+  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> map, maps->Reader(request.map()));
+  DSG_ASSIGN_OR_RETURN(const PageToken start, StartOf(map.get(), request, question));
   const Revision from = request.from_revision();
   const Revision to = start.revision;
 
-  DSG_ASSIGN_OR_RETURN(const ReadView view,
-                       ReadView::OpenAt(maps, request.map(), std::max(from, to)));
-  DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> map, maps->Reader(request.map()));
+  DSG_ASSIGN_OR_RETURN(const ReadView view, ReadView::OpenAt(maps, map, std::max(from, to)));
   DSG_ASSIGN_OR_RETURN(
       const auto difference,
-      Difference::Open(std::move(map), from, to, {request.layer(), request.view()}, call.stop()));
+      Difference::Open(map, from, to, {request.layer(), request.view()}, call.stop()));
   view.FillHeader(reply->mutable_header());
   reply->set_from_revision(from);
   reply->set_to_revision(to);
   DSG_ASSIGN_OR_RETURN(std::string next, difference->AddPage(start.position, size, call, reply));
   if (!next.empty()) {
-    reply->set_next_page_token(EncodePageToken({to, std::move(next)}, question));
+    reply->set_next_page_token(EncodePageToken({start.incarnation, to, std::move(next)}, question));
   }
   return absl::OkStatus();
 }

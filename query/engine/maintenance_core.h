@@ -13,8 +13,10 @@ namespace dsg::query {
 class MaintenanceCore : public ServiceCore {
  public:
   MaintenanceCore(std::unique_ptr<GraphStore> store, const ServiceCoreOptions& options)
-      : maps_(std::move(store), options.view_cache_bytes, options.archives) {}
+      : maps_(std::move(store), options.view_cache_bytes, options.archives, options.open_maps_max) {
+  }
 
+  const std::string& store_folder() const override { return store_folder_; }
   absl::StatusOr<std::unique_ptr<PruneCursor>> OpenPrune(const v1::PruneRequest& request) override;
   absl::Status Prune(const CallContext& call, const v1::PruneRequest& request,
                      const std::function<bool(const v1::PruneResponse&)>& send) override;
@@ -44,6 +46,9 @@ class MaintenanceCore : public ServiceCore {
 
  protected:
   MapTable maps_;
+
+ private:
+  const std::string store_folder_ = maps_.store().folder();
 };
 
 }  // namespace dsg::query

@@ -59,6 +59,14 @@ absl::Status GetMapStats(const ReadView& view, v1::GetMapStatsResponse* reply) {
   if (stats.first_pose_ns.has_value()) reply->set_first_pose_ns(*stats.first_pose_ns);
   if (stats.last_pose_ns.has_value()) reply->set_last_pose_ns(*stats.last_pose_ns);
   reply->set_format_version(kStoreFormatVersion);
+  DSG_ASSIGN_OR_RETURN(const auto pending, view.map().GetPendingErasure());
+  if (pending.has_value()) {
+    v1::PendingErasure* out = reply->mutable_pending_erasure();
+    out->set_node_count(pending->node_count);
+    out->set_edge_count(pending->edge_count);
+    out->set_mesh_block_count(pending->mesh_block_count);
+    out->set_span_count(pending->span_count);
+  }
   return absl::OkStatus();
 }
 

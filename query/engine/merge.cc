@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "query/engine/merge.h"
 
-#include <unistd.h>
-
 #include <algorithm>
-#include <atomic>
 #include <map>
 #include <optional>
 #include <set>
@@ -14,6 +11,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/maintenance_service.pb.h"
+#include "query/engine/commit.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
@@ -25,13 +23,6 @@ namespace {
 
 // A message of so many pairs of ids stays below a megabyte.
 constexpr int kIdsAMessage = 20'000;
-
-// Deltas are known by session and sequence, and two merges of one pair of maps may meet.
-std::string NewSessionId(const merge::MergePlan& plan) {
-  static std::atomic<int64_t> count{0};
-  return absl::StrCat("merge/", plan.other_name, "@", plan.other_revision, "/", WallClockNs(), "-",
-                      getpid(), "-", ++count);
-}
 
 class Merge final : public MergeCursor {
  public:
@@ -85,7 +76,7 @@ class Merge final : public MergeCursor {
     added_node_count_ = std::max(added_node_count_, plan.counts.added_node_count);
     gone_.insert(plan.gone.begin(), plan.gone.end());
     for (const auto& [before, after] : plan.moved) moved_[before] = after;
-    if (session_id_.empty()) session_id_ = NewSessionId(plan);
+    if (session_id_.empty()) session_id_ = NewSessionId("merge");
     // Later plans meet what earlier ones have written.
     if (part_count_ == 0) evidence_ = plan.evidence;
     seen_ = plan.into_revision;

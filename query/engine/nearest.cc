@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <optional>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
+#include "query/engine/agents_at.h"
 #include "query/engine/nodes.h"
 #include "query/engine/request_check.h"
 #include "query/engine/view_filter.h"
@@ -17,12 +20,6 @@
 
 namespace dsg::query {
 namespace {
-
-struct NearestNode {
-  Node node;
-  /// From the point to the node's box, metres; 0 inside.
-  double distance_m = 0.0;
-};
 
 struct Question {
   Eigen::Vector3d point_map = Eigen::Vector3d::Zero();
@@ -54,56 +51,48 @@ bool AsksForAgents(const NodeFilter& filter) {
   return IsAgentKind(filter.kind) || filter.layer == layers::kAgents;
 }
 
-// There are as many agents as tracks, hundreds rather than millions, and each stands somewhere
-// else at every instant: no index helps, and none is needed.
-absl::StatusOr<std::vector<NearestNode>> NearestAgents(const Snapshot& snapshot,
-                                                       const Question& question,
-                                                       const StopCheck& stop) {
-  const TimeNs at_ns = *question.filter.at_ns;
-  DSG_ASSIGN_OR_RETURN(const std::vector<TrackInfo> tracks, snapshot.Tracks(stop));
-  std::vector<NearestNode> found;
-  for (const TrackInfo& track : tracks) {
-    DSG_RETURN_IF_ERROR(stop());
-    if (track.pose_count == 0 || at_ns < track.first_ns || at_ns > track.last_ns) continue;
-    if (!question.filter.kind.empty() && track.kind != question.filter.kind) continue;
-    DSG_ASSIGN_OR_RETURN(const LocatedPose located, snapshot.Locate(track.agent, at_ns));
-    if (located.quality == PoseQuality::kInGap) continue;
-    DSG_ASSIGN_OR_RETURN(Node node, snapshot.GetNode(track.agent));
-    node.map_T_node = located.map_T_agent;
-    if (!question.filter.Matches(node)) continue;
-    const double distance_m = node.DistanceTo(question.point_map);
-    if (distance_m <= question.max_distance_m) found.push_back({std::move(node), distance_m});
-  }
-  std::sort(found.begin(), found.end(), [](const NearestNode& a, const NearestNode& b) {
-    return a.distance_m != b.distance_m ? a.distance_m < b.distance_m : a.node.id < b.node.id;
-  });
-  if (found.size() > static_cast<size_t>(question.k)) {
-    found.resize(static_cast<size_t>(question.k));
+// A node of the graph, or an agent where it was at the instant.
+struct Found {
+  NodeId id;
+  /// To the node's box, metres; 0 inside.
+  double distance_m = 0.0;
+  const ViewNode* node = nullptr;
+  const Node* agent = nullptr;
+};
+
+// No index helps: each agent stands somewhere else at every instant.
+std::vector<Found> NearAgents(const std::vector<AgentAt>& agents, const Question& question) {
+  std::vector<Found> found;
+  for (const AgentAt& agent : agents) {
+    const double distance_m = agent.node.DistanceTo(question.point_map);
+    if (!agent.is_in_gap && distance_m <= question.max_distance_m) {
+      found.push_back({agent.node.id, distance_m, nullptr, &agent.node});
+    }
   }
   return found;
 }
 
-struct Found {
-  const ViewNode* node = nullptr;
-  double distance_m = 0.0;
-};
-
-absl::StatusOr<std::vector<Found>> NearestInView(const GraphView& graph, const Question& question,
-                                                 const StopCheck& stop) {
+// Without agents where an instant is asked about.
+absl::Status AddFromView(const GraphView& graph, const Question& question, const StopCheck& stop,
+                         std::vector<Found>* found) {
   constexpr int kStopEvery = 256;
   const ViewFilter filter(question.filter, graph);
-  std::vector<Found> found;
-  if (!filter.CanMatch()) return found;
+  if (!filter.CanMatch()) return absl::OkStatus();
   absl::Status status;
   int looked_at = 0;
+  size_t count = 0;
   graph.ForEachNearest(question.point_map, filter.space(), question.max_distance_m,
                        [&](const ViewNode& node, double distance_m) {
                          if (++looked_at % kStopEvery == 0) status = stop();
-                         if (filter.Matches(node)) found.push_back({&node, distance_m});
-                         return status.ok() && found.size() < static_cast<size_t>(question.k);
+                         const bool moves = question.filter.at_ns.has_value() &&
+                                            IsAgentKind(graph.symbols().Text(node.kind));
+                         if (!moves && filter.Matches(node)) {
+                           found->push_back({node.id, distance_m, &node, nullptr});
+                           ++count;
+                         }
+                         return status.ok() && count < static_cast<size_t>(question.k);
                        });
-  DSG_RETURN_IF_ERROR(status);
-  return found;
+  return status;
 }
 
 absl::Status ReplyTooLarge(const v1::ListNearestNodesRequest& request, int node_count) {
@@ -113,32 +102,35 @@ absl::Status ReplyTooLarge(const v1::ListNearestNodesRequest& request, int node_
                                  "view"));
 }
 
-absl::Status FillNearest(const ReadView& view, const GraphView& graph,
+void KeepNearest(int k, std::vector<Found>* found) {
+  std::sort(found->begin(), found->end(), [](const Found& a, const Found& b) {
+    return a.distance_m != b.distance_m ? a.distance_m < b.distance_m : a.id < b.id;
+  });
+  if (found->size() > static_cast<size_t>(k)) found->resize(static_cast<size_t>(k));
+}
+
+// `graph` may be null when all are agents.
+absl::Status FillNearest(const ReadView& view, const GraphView* graph,
                          const v1::ListNearestNodesRequest& request,
                          const std::vector<Found>& found, v1::ListNearestNodesResponse* reply) {
-  NodeFiller filler(view.snapshot(), graph, request.view());
+  DSG_ASSIGN_OR_RETURN(const LayerTable layers, LayersOf(view.snapshot()));
+  std::optional<NodeFiller> filler;
   std::vector<NodeId> ids;
-  for (const Found& nearest : found) ids.push_back(nearest.node->id);
-  filler.Expect(std::move(ids));
+  for (const Found& nearest : found) {
+    if (nearest.node != nullptr) ids.push_back(nearest.id);
+  }
+  if (graph != nullptr) {
+    filler.emplace(view.snapshot(), *graph, request.view());
+    filler->Expect(std::move(ids));
+  }
   size_t bytes = 0;
   for (const Found& nearest : found) {
     v1::NearestNode* out = reply->add_nodes();
-    DSG_RETURN_IF_ERROR(filler.Fill(*nearest.node, out->mutable_node()));
-    out->set_distance_m(nearest.distance_m);
-    bytes += out->ByteSizeLong();
-    if (bytes > kReplyBytesMax) return ReplyTooLarge(request, reply->nodes_size());
-  }
-  return absl::OkStatus();
-}
-
-absl::Status FillAgents(const ReadView& view, const v1::ListNearestNodesRequest& request,
-                        const std::vector<NearestNode>& found,
-                        v1::ListNearestNodesResponse* reply) {
-  DSG_ASSIGN_OR_RETURN(const LayerTable layers, LayersOf(view.snapshot()));
-  size_t bytes = 0;
-  for (const NearestNode& nearest : found) {
-    v1::NearestNode* out = reply->add_nodes();
-    FillNode(nearest.node, layers, request.view(), out->mutable_node());
+    if (nearest.agent != nullptr) {
+      FillNode(*nearest.agent, layers, request.view(), out->mutable_node());
+    } else {
+      DSG_RETURN_IF_ERROR(filler->Fill(*nearest.node, out->mutable_node()));
+    }
     out->set_distance_m(nearest.distance_m);
     bytes += out->ByteSizeLong();
     if (bytes > kReplyBytesMax) return ReplyTooLarge(request, reply->nodes_size());
@@ -155,19 +147,24 @@ absl::Status ListNearestNodes(const ReadView& view, const CallContext& call,
   DSG_RETURN_IF_ERROR(CheckNodeView(request.view()));
   DSG_ASSIGN_OR_RETURN(const Question question, ReadQuestion(request, snapshot));
   view.FillHeader(reply->mutable_header());
-  if (AsksForAgents(question.filter)) {
-    if (!question.filter.at_ns.has_value()) {
-      return FieldError("filter.at_ns", "",
-                        "agents move; say at which instant the nearest ones are wanted");
-    }
-    DSG_ASSIGN_OR_RETURN(const std::vector<NearestNode> agents,
-                         NearestAgents(snapshot, question, call.stop()));
-    return FillAgents(view, request, agents, reply);
+  const bool agents_only = AsksForAgents(question.filter);
+  if (agents_only && !question.filter.at_ns.has_value()) {
+    return FieldError("filter.at_ns", "",
+                      "agents move; say at which instant the nearest ones are wanted");
   }
   const StopCheck stop = call.stop();
-  DSG_ASSIGN_OR_RETURN(const auto graph, view.Graph(stop));
-  DSG_ASSIGN_OR_RETURN(const std::vector<Found> found, NearestInView(*graph, question, stop));
-  return FillNearest(view, *graph, request, found, reply);
+  std::vector<AgentAt> agents;
+  if (question.filter.at_ns.has_value()) {
+    DSG_ASSIGN_OR_RETURN(agents, AgentsAt(snapshot, question.filter, stop));
+  }
+  std::vector<Found> found = NearAgents(agents, question);
+  std::shared_ptr<const GraphView> graph;
+  if (!agents_only) {
+    DSG_ASSIGN_OR_RETURN(graph, view.Graph(stop));
+    DSG_RETURN_IF_ERROR(AddFromView(*graph, question, stop, &found));
+  }
+  KeepNearest(question.k, &found);
+  return FillNearest(view, graph.get(), request, found, reply);
 }
 
 }  // namespace dsg::query

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "query/engine/nodes.h"
 
+#include <algorithm>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
+#include "query/engine/agents_at.h"
 #include "query/engine/edges.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
@@ -115,7 +118,8 @@ absl::Status ListNodes(const Page& page, const CallContext& call,
     if (!TakeWord(&position, &last.value) || !position.empty()) return PageTokenError();
   }
   size_t bytes = 0;
-  const auto take = [&](const Node& node) {
+  // False once the page is full.
+  const auto add = [&](const Node& node, bool has_pose) {
     if (reply->nodes_size() == page.size || bytes > kPageBytesSoftMax) {
       std::string position;
       AppendWord(last.value, &position);
@@ -124,12 +128,36 @@ absl::Status ListNodes(const Page& page, const CallContext& call,
     }
     v1::Node* out = reply->add_nodes();
     FillNode(node, layers, request.view(), out);
+    if (!has_pose) out->clear_map_t_node();
     bytes += out->ByteSizeLong();
     last = node.id;
     return true;
   };
+  // Agents of an instant stand where they were then, which the order of ids knows nothing of.
+  std::vector<AgentAt> agents;
+  if (filter.at_ns.has_value()) {
+    DSG_ASSIGN_OR_RETURN(agents, AgentsAt(snapshot, filter, call.stop()));
+  }
+  auto next_agent =
+      std::upper_bound(agents.begin(), agents.end(), last,
+                       [](NodeId id, const AgentAt& agent) { return id < agent.node.id; });
+  bool is_full = false;
+  const auto add_agents_below = [&](std::optional<NodeId> bound) {
+    for (; next_agent != agents.end() && (!bound.has_value() || next_agent->node.id < *bound);
+         ++next_agent) {
+      if (is_full = !add(next_agent->node, !next_agent->is_in_gap); is_full) return false;
+    }
+    return true;
+  };
   page.view.FillHeader(reply->mutable_header());
-  return snapshot.ScanNodes(filter, last, call.stop(), take);
+  DSG_RETURN_IF_ERROR(snapshot.ScanNodes(filter, last, call.stop(), [&](const Node& node) {
+    if (filter.at_ns.has_value() && IsAgentKind(node.kind)) return true;
+    if (!add_agents_below(node.id)) return false;
+    is_full = !add(node, /*has_pose=*/true);
+    return !is_full;
+  }));
+  if (!is_full) add_agents_below(std::nullopt);
+  return absl::OkStatus();
 }
 
 }  // namespace dsg::query

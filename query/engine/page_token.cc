@@ -2,6 +2,7 @@
 #include "query/engine/page_token.h"
 
 #include "absl/strings/escaping.h"
+#include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
@@ -10,7 +11,7 @@ namespace dsg::query {
 namespace {
 
 // Stands first in every token; a later layout takes another.
-constexpr char kLayout = '1';
+constexpr char kLayout = '2';
 
 // FNV-1a. A token is no secret and guards against mistakes, not against forgery: whoever forges
 // one gets a page of a map that the same call could have read anyway.
@@ -26,6 +27,8 @@ uint64_t Fnv1a(std::string_view bytes, uint64_t hash = 0xcbf29ce484222325ull) {
 uint64_t QuestionDigest(std::string_view method, const google::protobuf::MessageLite& request) {
   return Fnv1a(request.SerializeAsString(), Fnv1a(method));
 }
+
+uint64_t DigestOf(const MapReader& map) { return Fnv1a(map.incarnation()); }
 
 void AppendWord(uint64_t word, std::string* position) {
   for (int shift = 56; shift >= 0; shift -= 8) {
@@ -52,6 +55,7 @@ absl::Status PageTokenError() {
 
 std::string EncodePageToken(const PageToken& token, uint64_t question) {
   std::string body(1, kLayout);
+  AppendWord(token.incarnation, &body);
   AppendWord(static_cast<uint64_t>(token.revision), &body);
   body += token.position;
   std::string bytes;
@@ -71,9 +75,23 @@ absl::StatusOr<PageToken> DecodePageToken(std::string_view text, uint64_t questi
   if (!TakeWord(&rest, &seal) || seal != Fnv1a(rest, question)) return PageTokenError();
   if (rest.empty() || rest.front() != kLayout) return PageTokenError();
   rest.remove_prefix(1);
+  PageToken token;
   uint64_t revision = 0;
-  if (!TakeWord(&rest, &revision) || rest.empty()) return PageTokenError();
-  return PageToken{static_cast<Revision>(revision), std::string(rest)};
+  if (!TakeWord(&rest, &token.incarnation) || !TakeWord(&rest, &revision) || rest.empty()) {
+    return PageTokenError();
+  }
+  token.revision = static_cast<Revision>(revision);
+  token.position = std::string(rest);
+  return token;
+}
+
+absl::Status CheckToken(const PageToken& token, const MapReader& map) {
+  if (token.incarnation == DigestOf(map)) return absl::OkStatus();
+  return MakeError(Reason::kMapReplaced,
+                   absl::StrCat("map \"", map.spec().name,
+                                "\" was replaced since the page token was given; begin again "
+                                "without it"),
+                   {{"map", map.spec().name}});
 }
 
 template <typename Request>
@@ -89,7 +107,9 @@ absl::StatusOr<Page> OpenPage(MapTable* maps, std::string_view method, const Req
     return page;
   }
   DSG_ASSIGN_OR_RETURN(PageToken token, DecodePageToken(request.page_token(), page.question));
-  DSG_ASSIGN_OR_RETURN(page.view, ReadView::OpenAt(maps, request.map(), token.revision));
+  DSG_ASSIGN_OR_RETURN(const auto reader, maps->Reader(request.map()));
+  DSG_RETURN_IF_ERROR(CheckToken(token, *reader));
+  DSG_ASSIGN_OR_RETURN(page.view, ReadView::OpenAt(maps, reader, token.revision));
   page.position = std::move(token.position);
   return page;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a list goes on: an opaque text bound to the revision that the first page read and to the
-// question. Refuses a token of another question, so that two lists cannot be mixed unnoticed.
+// Where a list goes on: an opaque text bound to the map and the revision that the first page
+// read and to the question. Refuses a token of another question or map, so that two lists cannot be
+// mixed unnoticed.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +21,11 @@ namespace dsg::query {
 /// `request` must have page_size and page_token cleared: both may change between pages.
 uint64_t QuestionDigest(std::string_view method, const google::protobuf::MessageLite& request);
 
+/// Of the map's incarnation, for a token.
+uint64_t DigestOf(const MapReader& map);
+
 struct PageToken {
+  uint64_t incarnation = 0;
   Revision revision = 0;
   /// The key of the last entry that was delivered, as bytes that only its question reads.
   std::string position;
@@ -31,6 +36,9 @@ std::string EncodePageToken(const PageToken& token, uint64_t question);
 /// Errors: PAGE_TOKEN_MISMATCH when the text is no token, was damaged, or belongs to another
 /// question.
 absl::StatusOr<PageToken> DecodePageToken(std::string_view text, uint64_t question);
+
+/// Errors: ABORTED/MAP_REPLACED when the token was given for another map of that name.
+absl::Status CheckToken(const PageToken& token, const MapReader& map);
 
 /// PAGE_TOKEN_MISMATCH, for a position that its question cannot read.
 absl::Status PageTokenError();
@@ -51,12 +59,15 @@ struct Page {
   bool is_first() const { return position.empty(); }
   /// The token of the page after the one that ends at `last_position`.
   std::string NextToken(std::string last_position) const {
-    return EncodePageToken({view.snapshot().revision(), std::move(last_position)}, question);
+    return EncodePageToken(
+        {DigestOf(view.map()), view.snapshot().revision(), std::move(last_position)}, question);
   }
 };
 
 /// Settles page size, token and revision of a list request. A later page reads the revision that
 /// the first one read, whatever has been committed since.
+/// Errors: as CheckPageSize, DecodePageToken, ReadView::Open; ABORTED/MAP_REPLACED when the map is
+/// another one than that of the first page.
 template <typename Request>
 absl::StatusOr<Page> OpenPage(MapTable* maps, std::string_view method, const Request& request);
 

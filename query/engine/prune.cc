@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "query/engine/prune.h"
 
-#include <unistd.h>
-
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <functional>
 #include <optional>
@@ -13,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/maintenance_service.pb.h"
+#include "query/engine/commit.h"
 #include "query/engine/compact.h"
 #include "query/engine/prune_convert.h"
 #include "query/engine/request_check.h"
@@ -39,12 +37,6 @@ constexpr size_t kNamedMax = 20;
 constexpr double kPlanned = 0.05;
 constexpr double kCommitted = 0.6;
 constexpr double kErased = 0.8;
-
-// Deltas are known by session and sequence, so each prune needs a session of its own.
-std::string NewSessionId() {
-  static std::atomic<int64_t> count{0};
-  return absl::StrCat("prune-", WallClockNs(), "-", getpid(), "-", ++count);
-}
 
 std::string MessageOf(const std::vector<PrunePolicy>& policies) {
   constexpr size_t kNamed = 3;
@@ -89,6 +81,7 @@ class Prune final : public PruneCursor {
         map_(request.map()),
         is_dry_run_(request.dry_run()),
         allow_everything_(request.allow_everything()),
+        share_max_(request.share_max()),
         author_(request.author()),
         policies_(std::move(policies)) {}
 
@@ -134,15 +127,10 @@ class Prune final : public PruneCursor {
         PlanPrune(reader.get(), *map, policies_, {.wall_now_ns = WallClockNs()}, call.stop());
     if (!planned.ok()) return EndErasure(call, opened, planned.status(), reply);
     PrunePlan& plan = *planned;
-    if (!is_dry_run_ && !allow_everything_ && !plan.all_matching_policy.empty()) {
-      return MakeError(
-          Reason::kPolicyMatchesAll,
-          absl::StrCat("map \"", map_, "\": ", plan.all_matching_policy,
-                       " matches every node, every pose or the only building; nothing was "
-                       "forgotten. Narrow it, or say that everything may go"),
-          {{"map", map_}, {"policy", plan.all_matching_policy}});
-    }
+    const absl::Status refusal = RefusalOf(plan);
+    if (!is_dry_run_) DSG_RETURN_IF_ERROR(refusal);
     DSG_RETURN_IF_ERROR(FillBefore(call, opened, reply));
+    FillDoubts(plan, refusal, reply);
     for (const PolicyMatch& match : plan.policies) {
       v1::PolicyReport* const report = reply->add_policies();
       report->set_name(match.name);
@@ -159,14 +147,45 @@ class Prune final : public PruneCursor {
     return absl::OkStatus();
   }
 
+  absl::Status RefusalOf(const PrunePlan& plan) const {
+    if (!allow_everything_ && !plan.all_matching_policy.empty()) {
+      return MakeError(
+          Reason::kPolicyMatchesAll,
+          absl::StrCat("map \"", map_, "\": ", plan.all_matching_policy,
+                       " matches every node, every pose or the only building; nothing was "
+                       "forgotten. Narrow it, or say that everything may go"),
+          {{"map", map_}, {"policy", plan.all_matching_policy}});
+    }
+    if (share_max_ == 0.0 || plan.share <= share_max_) return absl::OkStatus();
+    return MakeError(
+        Reason::kPolicyTakesTooMuch,
+        absl::StrCat("map \"", map_, "\": ", plan.share_policy, " takes ", plan.share,
+                     " of the nodes or of the poses, more than the share of ", share_max_,
+                     " that may go; nothing was forgotten. Look with a dry run whether the clocks "
+                     "of agents are right, narrow it, or allow a larger share"),
+        {{"map", map_},
+         {"policy", plan.share_policy},
+         {"share", absl::StrCat(plan.share)},
+         {"share_max", absl::StrCat(share_max_)}});
+  }
+
+  static void FillDoubts(const PrunePlan& plan, const absl::Status& refusal,
+                         v1::PruneResponse* reply) {
+    reply->set_refusal(std::string(refusal.message()));
+    reply->clear_implausible_ids();
+    reply->clear_notes();
+    for (const NodeId id : plan.implausible_agents) reply->add_implausible_ids(ToString(id));
+    for (const std::string& note : plan.notes) reply->add_notes(note);
+  }
+
   // Nor is nothing to erase a reason to end the archives that are being read.
   absl::Status TakeErasure(const OpenedMap& opened, PrunePlan* plan) {
     std::optional<Erasure> erasure;
     erasure.swap(plan->erasure);
     if (!erasure.has_value()) return absl::OkStatus();
     is_erase_ = true;
-    DSG_ASSIGN_OR_RETURN(const bool is_pending, opened.reader->IsErasing());
-    is_clean_ = IsEmpty(*erasure) && !has_changes_ && !is_pending;
+    DSG_ASSIGN_OR_RETURN(const auto pending, opened.reader->GetPendingErasure());
+    is_clean_ = IsEmpty(*erasure) && !has_changes_ && !pending.has_value();
     if (!is_clean_) erasure_ = std::move(erasure);
     return absl::OkStatus();
   }
@@ -179,8 +198,8 @@ class Prune final : public PruneCursor {
                                policies_.size() == 1 &&
                                policies_.front().strength == PruneStrength::kErase;
     if (!may_be_erased) return failure;
-    DSG_ASSIGN_OR_RETURN(const bool is_pending, opened.reader->IsErasing());
-    if (!is_pending) return failure;
+    DSG_ASSIGN_OR_RETURN(const auto pending, opened.reader->GetPendingErasure());
+    if (!pending.has_value()) return failure;
     DSG_RETURN_IF_ERROR(FillBefore(call, opened, reply));
     reply->add_policies()->set_name(policies_.front().name);
     is_erase_ = true;
@@ -206,8 +225,9 @@ class Prune final : public PruneCursor {
   void BeginRound(const std::shared_ptr<const Snapshot>& map, PrunePlan plan) {
     seen_ = plan.revision;
     others_ = {};
+    is_noted_ = false;
     batches_.emplace(map, std::move(plan),
-                     BatchHeader{map_, NewSessionId(), author_, MessageOf(policies_)});
+                     BatchHeader{map_, NewSessionId("prune"), author_, MessageOf(policies_)});
   }
 
   // What others wrote of agents, tracks and meshes would else be left for good. Other nodes keep
@@ -220,8 +240,8 @@ class Prune final : public PruneCursor {
                              {.wall_now_ns = WallClockNs()}, call.stop());
     if (ReasonOf(planned.status()) == Reason::kNodeUnknown) return absl::OkStatus();
     DSG_RETURN_IF_ERROR(planned.status());
-    // That everything may go was not said; then what is contested is left, and told.
-    if (!allow_everything_ && !planned->all_matching_policy.empty()) return absl::OkStatus();
+    // That so much may go was not said; then what is contested is left, and told.
+    if (!RefusalOf(*planned).ok()) return absl::OkStatus();
     if (planned->erasure.has_value()) Join(*planned->erasure, &*erasure_);
     planned->erasure.reset();
     const std::vector<NodeId> rewritten(rewritten_.begin(), rewritten_.end());
@@ -242,6 +262,7 @@ class Prune final : public PruneCursor {
     reply->mutable_header()->set_read_revision(map.revision());
     reply->mutable_header()->set_head_revision(map.revision());
     reply->mutable_header()->set_oldest_revision(oldest);
+    reply->mutable_header()->set_incarnation(reader->incarnation());
     return absl::OkStatus();
   }
 
@@ -261,6 +282,12 @@ class Prune final : public PruneCursor {
           DSG_ASSIGN_OR_RETURN(std::optional<GraphDelta> delta, batches_->Next(*head, call.stop()));
           is_over = !delta.has_value();
           if (is_over) return absl::OkStatus();
+          // A call that ends between here and the erasing has begun something that is to be ended.
+          if (erasure_.has_value() && !is_noted_) {
+            absl::Status noted = writer.NoteErasure(*erasure_, batches_->plan().revision);
+            if (!noted.ok()) return noted;
+            is_noted_ = true;
+          }
           DSG_ASSIGN_OR_RETURN(const CommitResult result, writer.Commit(*std::move(delta)));
           revision_ = seen_ = result.revision;
           return absl::OkStatus();
@@ -385,7 +412,9 @@ class Prune final : public PruneCursor {
     reply->set_file_bytes_after(stats.bytes_on_disk);
     reply->set_log_bytes_before(log_bytes_before_);
     reply->set_log_bytes_after(LogBytesOnDisk(maps_->store(), map_));
-    reply->set_erased(is_erase_ && !is_dry_run_ && is_clean_ && left_.empty());
+    DSG_ASSIGN_OR_RETURN(const auto pending, reader->GetPendingErasure());
+    reply->set_erased(is_erase_ && !is_dry_run_ && is_clean_ && left_.empty() &&
+                      !pending.has_value());
     if (erasure_.has_value() && !is_dry_run_) DSG_RETURN_IF_ERROR(FillLeft(call, reply));
     DSG_RETURN_IF_ERROR(FillHeader(reader.get(), *map, reply));
     progress_ = 1.0;
@@ -412,6 +441,8 @@ class Prune final : public PruneCursor {
   const std::string map_;
   const bool is_dry_run_;
   const bool allow_everything_;
+  /// 0 = no limit.
+  const double share_max_;
   const std::string author_;
   const std::vector<PrunePolicy> policies_;
   Phase phase_ = Phase::kPlan;
@@ -419,6 +450,8 @@ class Prune final : public PruneCursor {
   /// Whether a policy erases, also when there is nothing to erase.
   bool is_erase_ = false;
   std::optional<Erasure> erasure_;
+  /// The map remembers `erasure_`.
+  bool is_noted_ = false;
   int round_ = 1;
   /// What others touched since the plan of this round.
   Others others_;
@@ -448,6 +481,11 @@ absl::StatusOr<std::unique_ptr<PruneCursor>> OpenPrune(MapTable* maps,
   if (request.policies().empty() || request.policies_size() > kPolicyCountMax) {
     return FieldError("policies", absl::StrCat(request.policies_size()),
                       absl::StrCat("give 1 to ", kPolicyCountMax, " policies"));
+  }
+  // Not-a-number is in no range.
+  if (!(request.share_max() >= 0.0 && request.share_max() <= 1.0)) {
+    return FieldError("share_max", absl::StrCat(request.share_max()),
+                      "give a share from 0 (no limit) to 1");
   }
   std::vector<PrunePolicy> policies;
   for (const v1::PrunePolicy& policy : request.policies()) {

@@ -16,7 +16,8 @@ namespace dsg::query {
 /// with by asking for the same again; the map itself knows what an erasure has left.
 ///
 /// Errors: MAP_UNKNOWN, FIELD_INVALID, BOX_INVERTED, NUMBER_NOT_FINITE; in the stream NODE_UNKNOWN,
-/// LAYER_UNKNOWN, POLICY_MATCHES_ALL, REVISION_IN_FUTURE, WRITER_LOCKED, DISK_FULL.
+/// LAYER_UNKNOWN, POLICY_MATCHES_ALL, POLICY_TAKES_TOO_MUCH,
+/// REVISION_IN_FUTURE, WRITER_LOCKED, DISK_FULL.
 absl::StatusOr<std::unique_ptr<PruneCursor>> OpenPrune(MapTable* maps,
                                                        const v1::PruneRequest& request);
 

@@ -23,9 +23,8 @@ absl::StatusOr<ReadView> ReadView::Make(MapTable* maps, std::shared_ptr<MapReade
   return view;
 }
 
-absl::StatusOr<ReadView> ReadView::OpenAt(MapTable* maps, const std::string& map,
+absl::StatusOr<ReadView> ReadView::OpenAt(MapTable* maps, std::shared_ptr<MapReader> reader,
                                           Revision revision) {
-  DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> reader, maps->Reader(map));
   DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Snapshot> snapshot, reader->At(revision));
   DSG_ASSIGN_OR_RETURN(const RevisionInfo head, reader->Head());
   return Make(maps, std::move(reader), std::move(snapshot), head.revision);
@@ -33,17 +32,17 @@ absl::StatusOr<ReadView> ReadView::OpenAt(MapTable* maps, const std::string& map
 
 absl::StatusOr<ReadView> ReadView::Open(MapTable* maps, const std::string& map,
                                         const v1::ReadAt& read_at) {
-  if (read_at.has_exact_revision()) {
-    if (read_at.exact_revision() < 0) {
-      return FieldError("read_at.exact_revision", absl::StrCat(read_at.exact_revision()),
-                        "revisions count from 0, the empty map");
-    }
-    return OpenAt(maps, map, read_at.exact_revision());
+  if (read_at.has_exact_revision() && read_at.exact_revision() < 0) {
+    return FieldError("read_at.exact_revision", absl::StrCat(read_at.exact_revision()),
+                      "revisions count from 0, the empty map");
   }
   DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> reader, maps->Reader(map));
+  if (read_at.has_exact_revision()) {
+    return OpenAt(maps, std::move(reader), read_at.exact_revision());
+  }
   if (!read_at.tag().empty()) {
     DSG_ASSIGN_OR_RETURN(const Revision tagged, RevisionOfTag(reader.get(), read_at.tag()));
-    return OpenAt(maps, map, tagged);
+    return OpenAt(maps, std::move(reader), tagged);
   }
   DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Snapshot> snapshot, reader->Latest());
   // The newest revision is the head, so it need not be asked for again.
@@ -74,6 +73,7 @@ void ReadView::FillHeader(v1::ResponseHeader* header) const {
   header->set_read_revision(snapshot_->revision());
   header->set_head_revision(head_);
   header->set_oldest_revision(oldest_);
+  header->set_incarnation(map_->incarnation());
 }
 
 }  // namespace dsg::query

@@ -25,8 +25,9 @@ class ReadView {
   static absl::StatusOr<ReadView> Open(MapTable* maps, const std::string& map,
                                        const v1::ReadAt& read_at);
 
-  /// The same at exactly one revision, as a page token names it.
-  static absl::StatusOr<ReadView> OpenAt(MapTable* maps, const std::string& map, Revision revision);
+  /// The same of a map that is open, at exactly one revision.
+  static absl::StatusOr<ReadView> OpenAt(MapTable* maps, std::shared_ptr<MapReader> map,
+                                         Revision revision);
 
   MapReader& map() const { return *map_; }
   const Snapshot& snapshot() const { return *snapshot_; }

@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/maintenance_service.pb.h"
+#include "query/engine/commit.h"
 #include "query/engine/prune_convert.h"
 #include "query/engine/request_check.h"
 #include "query/engine/revert_plan.h"
@@ -54,6 +55,7 @@ class Reversion final : public RevertCursor {
     present_ = present;
     parent_ = present->revision();
     next_ = 0;
+    session_id_ = NewSessionId("revert");
     is_planned_ = true;
     return absl::OkStatus();
   }
@@ -80,8 +82,7 @@ class Reversion final : public RevertCursor {
                          MakeRevertDelta(plan_.batches[next_], head, *wanted_, call.stop()));
     ++next_;
     delta.map = map_->spec().name;
-    // Another run begins at another head, and so has another name.
-    delta.session_id = absl::StrCat("revert-", present_->revision(), "-to-", wanted_->revision());
+    delta.session_id = session_id_;
     delta.sequence = static_cast<int64_t>(next_);
     delta.parent_revision = parent_;
     delta.author = author_;
@@ -103,6 +104,8 @@ class Reversion final : public RevertCursor {
   Revision parent_;
   Revision written_ = 0;
   bool is_planned_ = false;
+  /// Of the plan.
+  std::string session_id_;
   RevertPlan plan_;
   size_t next_ = 0;
 };

@@ -45,6 +45,8 @@ using ArchiveCursor = StreamCursor<v1::ReadArchiveResponse>;
 /// An Api in this process.
 class ServiceCore : public Api {
  public:
+  /// Absolute, without links; stands in errors about files.
+  virtual const std::string& store_folder() const = 0;
   /// GetTrajectory by pulling. Errors: those of GetTrajectory.
   virtual absl::StatusOr<std::unique_ptr<TrajectoryCursor>> OpenTrajectory(
       const v1::GetTrajectoryRequest& request) = 0;
@@ -81,10 +83,13 @@ struct ServiceCoreOptions {
   /// million edges take half of it, and a quarter once paths are asked for.
   size_t view_cache_bytes = size_t{1} << 30;
   ArchiveLimits archives;
+  /// Maps kept open; those that were asked last. Each holds some file descriptors, and caches that
+  /// grow up to StoreOptions::cache_bytes.
+  size_t open_maps_max = 16;
 };
 
 /// Makes an Api that answers from `store`. Writers are opened at the first Commit to a map and kept
-/// (with their lock) until the Api is destroyed.
+/// (with their lock) as long as the map.
 std::unique_ptr<ServiceCore> MakeServiceCore(std::unique_ptr<GraphStore> store,
                                              const ServiceCoreOptions& options = {});
 

@@ -134,6 +134,7 @@ class Watch final : public WatchCursor {
     reply->mutable_header()->set_read_revision(after_);
     reply->mutable_header()->set_head_revision(head);
     reply->mutable_header()->set_oldest_revision(oldest);
+    reply->mutable_header()->set_incarnation(map_->incarnation());
     return absl::OkStatus();
   }
 

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "dsg/v1/ingest_service.pb.h"
+#include "schema/codec/patch.h"
 #include "schema/codec/proto_convert.h"
 #include "tests/unit/query/engine/two_halves.h"
 #include "tests/unit/schema/merge/small_map.h"
@@ -105,7 +106,7 @@ void ExpectThere(const Snapshot& map, const BusyRobot& robot, Revision after) {
 }
 
 void ExpectSound(const std::string& folder, const std::string& map) {
-  const auto report = (*(*GraphStore::Open(folder, {}))->OpenMap(map))->Verify(nullptr);
+  const auto report = (*(*GraphStore::Open(folder, {}))->OpenMap(map))->Verify({}, {});
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_TRUE(report->problems.empty());
 }
@@ -226,6 +227,7 @@ class LargeMerge : public testing::Test {
     delta.sequence = 1;
     v1::CommitRequest request;
     ToProto(delta, LayerTable(), request.mutable_delta());
+    MarkWhole(request.mutable_delta());
     v1::CommitResponse reply;
     const absl::Status status = core_->Commit(CallContext(), request, &reply);
     ASSERT_TRUE(status.ok()) << status;

@@ -14,6 +14,7 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/ingest_service.pb.h"
 #include "dsg/v1/maintenance_service.pb.h"
+#include "dsg/v1/map_service.pb.h"
 #include "dsg/v1/query_service.pb.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
@@ -126,6 +127,14 @@ class EraseMeanwhileTest : public testing::Test {
     Commit(delta);
   }
 
+  v1::GetMapStatsResponse Stats() {
+    v1::GetMapStatsRequest request;
+    request.set_map(kMap);
+    v1::GetMapStatsResponse reply;
+    EXPECT_TRUE(core_->GetMapStats(call_, request, &reply).ok());
+    return reply;
+  }
+
   bool Has(const std::string& id, Revision revision = 0) {
     v1::GetNodeRequest request;
     request.set_map(kMap);
@@ -149,7 +158,7 @@ class EraseMeanwhileTest : public testing::Test {
       });
       EXPECT_TRUE(read.ok() || ReasonOf(read) == Reason::kAgentUnknown) << read;
     }
-    const auto report = (*map)->Verify({});
+    const auto report = (*map)->Verify({}, {});
     EXPECT_TRUE(report.ok() && report->problems.empty() && report->notes.empty());
     return count;
   }
@@ -234,6 +243,51 @@ TEST_F(EraseMeanwhileTest, WhatWasOnlyRetiredIsFound) {
   EXPECT_TRUE(reply->erased());
   EXPECT_FALSE(Has("R1", 2));
   EXPECT_EQ(HitCount(folder_.path()), kCount / 2);
+}
+
+// Whatever another erasure says, something that was begun is done or remembered.
+TEST_F(EraseMeanwhileTest, IsNotForgottenWhenAnotherOneFollows) {
+  core_.reset();
+  bool was_pending = false;
+  bool was_ended_by_the_other = false;
+  for (int messages = 1; messages <= 8; ++messages) {
+    SCOPED_TRACE(absl::StrCat("cut off after ", messages, " messages"));
+    const TempFolder copy;
+    const std::string path = copy.path() + "/store";
+    fs::copy(folder_.path(), path, fs::copy_options::recursive);
+    Open(path);
+    {
+      auto cursor = core_->OpenPrune(EraseBranches({"R1"}));
+      ASSERT_TRUE(cursor.ok()) << cursor.status();
+      for (int i = 0; i < messages && !(*cursor)->done(); ++i) {
+        v1::PruneResponse message;
+        ASSERT_TRUE((*cursor)->Next(call_, &message).ok());
+      }
+    }
+    // Another process finds it, too.
+    Open(path);
+    const bool is_begun = Stats().has_pending_erasure();
+    const auto other = Prune(EraseBranches({"R2"}));
+    ASSERT_TRUE(other.ok()) << other.status();
+    EXPECT_EQ(other->erased(), !Stats().has_pending_erasure());
+    const bool is_gone = !Has("R1");
+    core_.reset();
+    const int left = HitCount(path);
+    // The names in R2 are gone. Those in R1 are believed still, or gone too, or it is not said.
+    EXPECT_LE(left, kCount / 2);
+    EXPECT_FALSE(is_gone && left > 0 && other->erased());
+    was_pending = was_pending || !other->erased();
+    was_ended_by_the_other = was_ended_by_the_other || (is_begun && other->erased());
+    Open(path);
+    const auto again = Prune(EraseBranches({"R1"}));
+    EXPECT_TRUE(again.ok() ? again->erased() : ReasonOf(again.status()) == Reason::kNodeUnknown)
+        << again.status();
+    EXPECT_FALSE(Stats().has_pending_erasure());
+    core_.reset();
+    EXPECT_EQ(HitCount(path), 0);
+  }
+  EXPECT_TRUE(was_ended_by_the_other);
+  EXPECT_TRUE(was_pending);
 }
 
 TEST_F(EraseMeanwhileTest, ANodeWrittenAgainIsThereWithoutItsPast) {

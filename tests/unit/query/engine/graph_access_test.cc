@@ -85,6 +85,57 @@ TEST_F(GraphAccess, GetsANodeByIdOrUniqueNameWithItsFamily) {
   }
 }
 
+TEST_F(GraphAccess, ListsTheAgentsOfAnInstantWhereTheyWereThen) {
+  v1::ListNodesRequest request;
+  request.set_map(kMap);
+  request.mutable_filter()->set_layer("agents");
+  EXPECT_EQ(AllNodes(request, 10), "H12 H13 r1 ");
+  request.mutable_filter()->set_at_ns(10 * kSecond);
+  EXPECT_EQ(AllNodes(request, 10), "H12 H13 ");
+  auto reply = ListNodes(request);
+  ASSERT_TRUE(reply.ok()) << reply.status();
+  EXPECT_EQ(reply->nodes(0).map_t_node().position().x(), 11.0);
+  EXPECT_EQ(reply->nodes(1).map_t_node().position().x(), 3.0);
+  // In the gap of its track nobody knows where it was; the others came later or had left.
+  request.mutable_filter()->set_at_ns(40 * kSecond);
+  reply = ListNodes(request);
+  ASSERT_TRUE(reply.ok()) << reply.status();
+  ASSERT_EQ(reply->nodes_size(), 1);
+  EXPECT_EQ(reply->nodes(0).id(), "H12");
+  EXPECT_FALSE(reply->nodes(0).has_map_t_node());
+}
+
+TEST_F(GraphAccess, ListsOfABoxAtAnInstantWhoWasInItThen) {
+  v1::ListNodesRequest request;
+  request.mutable_filter()->set_at_ns(10 * kSecond);
+  v1::Box* const box = request.mutable_filter()->mutable_box();
+  box->mutable_min()->set_x(10.5);
+  box->mutable_max()->set_x(18.5);
+  box->mutable_max()->set_y(10);
+  box->mutable_max()->set_z(3);
+  for (int page_size = 1; page_size <= 9; ++page_size) {
+    EXPECT_EQ(AllNodes(request, page_size), "B1 H12 O2 R2 p3 ") << page_size;
+  }
+  request.mutable_filter()->set_at_ns(5 * kSecond);
+  EXPECT_EQ(AllNodes(request, 3), "B1 O2 R2 p3 r1 ");
+  // It stands at x = 19 in the end.
+  box->mutable_min()->set_x(18.8);
+  box->mutable_max()->set_x(19.2);
+  EXPECT_EQ(AllNodes(request, 3), "B1 R2 ");
+}
+
+TEST_F(GraphAccess, FindsAmongAllTheNearestOfAnInstant) {
+  v1::ListNearestNodesRequest request;
+  request.mutable_filter()->set_at_ns(10 * kSecond);
+  request.set_k(4);
+  const auto near = Nearest(request, 11);
+  ASSERT_TRUE(near.ok()) << near.status();
+  EXPECT_NE(near->find("H12"), std::string::npos) << *near;
+  const auto far = Nearest(request, 19);
+  ASSERT_TRUE(far.ok()) << far.status();
+  EXPECT_EQ(far->find("H12"), std::string::npos) << *far;
+}
+
 TEST_F(GraphAccess, TellsTheSpanOfAnAgentsTrack) {
   const auto reply = GetNode("H12", v1::NODE_VIEW_FULL);
   ASSERT_TRUE(reply.ok()) << reply.status();

@@ -3,7 +3,9 @@
 
 #include <filesystem>
 #include <fstream>
+#include <set>
 
+#include "dsg/v1/ingest_service.pb.h"
 #include "dsg/v1/map_service.pb.h"
 #include "schema/base/status.h"
 #include "tests/unit/query/engine/office.h"
@@ -40,6 +42,46 @@ TEST_F(Maps, CreatesAMapWithDefaultsAndListsItByName) {
   ASSERT_EQ(reply.maps_size(), 2);
   EXPECT_EQ(reply.maps(0).name(), "attic");
   EXPECT_EQ(reply.maps(1).name(), "office");
+}
+
+// Maps of which this process has a file open.
+std::set<std::string> OpenMaps(const std::string& folder) {
+  std::set<std::string> maps;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+    const std::string path = std::filesystem::read_symlink(entry.path(), error).string();
+    if (error || path.rfind(folder + "/", 0) != 0) continue;
+    maps.insert(std::filesystem::path(path).parent_path().filename().string());
+  }
+  return maps;
+}
+
+TEST_F(Maps, AreClosedWhenOthersWereAskedSince) {
+  auto store = GraphStore::Open(folder_.path(), {});
+  ASSERT_TRUE(store.ok()) << store.status();
+  core_ = query::MakeServiceCore(*std::move(store), {.open_maps_max = 2});
+  for (int round = 1; round <= 2; ++round) {
+    for (const std::string name : {"a", "b", "c", "d", "e"}) {
+      if (round == 1) {
+        ASSERT_TRUE(Create(name).ok());
+      }
+      v1::CommitRequest commit;
+      commit.mutable_delta()->set_map(name);
+      commit.mutable_delta()->set_session_id("test");
+      commit.mutable_delta()->set_sequence(round);
+      v1::CommitResponse committed;
+      const absl::Status status = core_->Commit(call_, commit, &committed);
+      ASSERT_TRUE(status.ok()) << status;
+      v1::GetMapStatsRequest ask;
+      ask.set_map(name);
+      v1::GetMapStatsResponse stats;
+      ASSERT_TRUE(core_->GetMapStats(call_, ask, &stats).ok());
+      EXPECT_EQ(stats.head_revision(), round);
+      const std::set<std::string> open = OpenMaps(std::filesystem::canonical(folder_.path()));
+      EXPECT_TRUE(open.contains(name));
+      EXPECT_LE(open.size(), 2u);
+    }
+  }
 }
 
 TEST_F(Maps, NamesThoseThatCannotBeOpened) {

@@ -11,19 +11,19 @@ namespace {
 
 TEST(PageToken, ComesBackWithItsRevisionAndPosition) {
   const std::string position("\0key\xff", 5);
-  const auto token = DecodePageToken(EncodePageToken({7, position}, 42), 42);
+  const auto token = DecodePageToken(EncodePageToken({5, 7, position}, 42), 42);
   ASSERT_TRUE(token.ok()) << token.status();
   EXPECT_EQ(token->revision, 7);
   EXPECT_EQ(token->position, position);
 }
 
 TEST(PageToken, RefusesTheTokenOfAnotherQuestion) {
-  const auto token = DecodePageToken(EncodePageToken({7, "key"}, 42), 43);
+  const auto token = DecodePageToken(EncodePageToken({5, 7, "key"}, 42), 43);
   EXPECT_EQ(ReasonOf(token.status()), Reason::kPageTokenMismatch);
 }
 
 TEST(PageToken, RefusesEveryChangeOfOneCharacter) {
-  const std::string good = EncodePageToken({7, "position"}, 42);
+  const std::string good = EncodePageToken({5, 7, "position"}, 42);
   for (size_t i = 0; i < good.size(); ++i) {
     std::string bad = good;
     bad[i] = bad[i] == 'A' ? 'B' : 'A';

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -101,6 +102,73 @@ TEST_F(PruneCallTest, RefusesToForgetEverythingUnlessTold) {
   request_.set_allow_everything(true);
   ASSERT_TRUE(Prune().ok());
   EXPECT_FALSE(Has("H12"));
+}
+
+TEST_F(PruneCallTest, RefusesToTakeMoreThanTheShareAndADryRunSaysSo) {
+  request_.add_policies()->set_layer("objects");
+  const auto unlimited = [&] {
+    request_.set_dry_run(true);
+    auto reply = Prune();
+    request_.set_dry_run(false);
+    return reply;
+  };
+  EXPECT_EQ(unlimited()->refusal(), "");
+  request_.set_share_max(0.01);
+  const auto dry = unlimited();
+  ASSERT_TRUE(dry.ok()) << dry.status();
+  EXPECT_TRUE(Has("O1"));
+  const auto refused = Prune();
+  EXPECT_EQ(ReasonOf(refused.status()), Reason::kPolicyTakesTooMuch);
+  EXPECT_EQ(refused.status().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(std::string(refused.status().message()), dry->refusal());
+  auto metadata = MetadataOf(refused.status());
+  EXPECT_EQ(metadata["map"], kMap);
+  EXPECT_EQ(metadata["policy"], "layer objects");
+  EXPECT_EQ(metadata["share_max"], "0.01");
+  EXPECT_GT(std::stod(metadata["share"]), 0.01);
+  EXPECT_TRUE(Has("O1"));
+  request_.set_share_max(1.0);
+  const auto done = Prune();
+  ASSERT_TRUE(done.ok()) << done.status();
+  EXPECT_EQ(done->policies(0).matched().node_count(), dry->policies(0).matched().node_count());
+  EXPECT_FALSE(Has("O1"));
+}
+
+TEST_F(PruneCallTest, ADryRunSaysThatEverythingWouldGo) {
+  request_.add_policies()->set_before_ns(1000 * kSecond);
+  request_.set_dry_run(true);
+  const auto dry = Prune();
+  ASSERT_TRUE(dry.ok()) << dry.status();
+  request_.set_dry_run(false);
+  EXPECT_EQ(std::string(Prune().status().message()), dry->refusal());
+  request_.set_dry_run(true);
+  request_.set_allow_everything(true);
+  EXPECT_EQ(Prune()->refusal(), "");
+}
+
+TEST_F(PruneCallTest, RefusesSharesThatAreNone) {
+  request_.add_policies()->set_layer("objects");
+  for (const double share : {-0.1, 1.1, std::nan("")}) {
+    request_.set_share_max(share);
+    EXPECT_EQ(ReasonOf(Prune().status()), Reason::kFieldInvalid) << share;
+  }
+}
+
+TEST_F(PruneCallTest, NamesAgentsThatAreAhead) {
+  GraphDelta delta;
+  delta.nodes = {MakeNode(NodeId('H', 99), layers::kAgents, kinds::kHuman, "late", Box3d())};
+  TimedPose pose;
+  pose.time_ns = 5 * 365 * 86'400 * kSecond;
+  delta.appends = {{NodeId('H', 99), {pose}}};
+  CommitToOffice(folder_.path(), delta);
+  core_ = OpenCore(folder_.path());
+  request_.add_policies()->set_older_than_ns(86'400 * kSecond);
+  const auto reply = Prune();
+  ASSERT_TRUE(reply.ok()) << reply.status();
+  EXPECT_EQ(reply->policies(0).matched().pose_count(), 0);
+  ASSERT_EQ(reply->implausible_ids_size(), 1);
+  EXPECT_EQ(reply->implausible_ids(0), "H99");
+  ASSERT_EQ(reply->notes_size(), 1);
 }
 
 TEST_F(PruneCallTest, HistoryPoliciesCompact) {
@@ -229,7 +297,7 @@ TEST_F(PruneCallTest, EraseLeavesNoByteOfAHundredPlantedNamesInTheStoreOrACopyOf
   ASSERT_TRUE(map.ok()) << map.status();
   ASSERT_TRUE((*map)->CopyTo(copy.path() + "/copy.db", StopCheck(), Progress()).ok());
   EXPECT_EQ(HitCount(BytesOf(copy.path()), patterns), 0);
-  const auto verified = (*map)->Verify(Progress());
+  const auto verified = (*map)->Verify({}, {});
   ASSERT_TRUE(verified.ok()) << verified.status();
   EXPECT_TRUE(verified->problems.empty()) << verified->problems.front();
 }
@@ -253,7 +321,7 @@ TEST_F(PruneCallTest, EraseOfATimeLeavesNoRevisionThatKnowsWhereSomebodyWas) {
       EXPECT_TRUE(track.pose_count == 0 || track.first_ns >= 10 * kSecond);
     }
   }
-  const auto verified = (*map)->Verify(Progress());
+  const auto verified = (*map)->Verify({}, {});
   ASSERT_TRUE(verified.ok()) << verified.status();
   EXPECT_TRUE(verified->problems.empty()) << verified->problems.front();
 }

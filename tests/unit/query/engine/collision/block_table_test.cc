@@ -128,7 +128,7 @@ TEST(BlockTable, MeasuresABlockOnceForAllRevisions) {
   const int64_t block_count = static_cast<int64_t>(first.mesh_blocks.size());
   GraphDelta second;
   second.mesh_blocks = {first.mesh_blocks.front()};
-  second.mesh_blocks[0].positions_map[0].z() += 0.5f;
+  second.mesh_blocks[0].positions_map[0].z() -= 0.5f;
   const Revision before = scene.Commit(first);
   const Revision after = scene.Commit(second);
   const auto measured_count = [&](Revision revision) {
