@@ -19,6 +19,22 @@ class ArenaBlocks {
   using Block = std::unique_ptr<char[]>;
   static constexpr size_t kBlockBytes = size_t{32} << 10;
 
+  /// A block of kBlockBytes for as long as this lives, which must be longer than the arena.
+  class Lent {
+   public:
+    explicit Lent(ArenaBlocks* blocks) : blocks_(blocks), block_(blocks->Take()) {}
+    ~Lent() { blocks_->Give(std::move(block_)); }
+    Lent(const Lent&) = delete;
+    Lent& operator=(const Lent&) = delete;
+
+    char* bytes() const { return block_.get(); }
+
+   private:
+    ArenaBlocks* const blocks_;
+    Block block_;
+  };
+
+ private:
   Block Take() {
     {
       std::lock_guard lock(mutex_);
@@ -36,7 +52,6 @@ class ArenaBlocks {
     if (kept_.size() < kKeptMax) kept_.push_back(std::move(block));
   }
 
- private:
   static constexpr size_t kKeptMax = 64;
   std::mutex mutex_;
   std::vector<Block> kept_;

@@ -10,6 +10,10 @@
 
 #include "absl/status/status.h"
 
+namespace google::protobuf {
+class Message;
+}  // namespace google::protobuf
+
 namespace dsg::server {
 
 /// Calls that took longer are written at level info.
@@ -26,6 +30,10 @@ struct CallRecord {
   std::chrono::steady_clock::duration elapsed{};
   std::string peer;
 };
+
+/// Entries of a reply, or of one message of a stream: those of all its repeated messages. 1 for a
+/// reply that has none; repeated names and numbers belong to the one entry that the reply is.
+int64_t RowCountOf(const google::protobuf::Message& reply);
 
 class CallLog {
  public:

@@ -2,13 +2,8 @@
 #include "server/listen_address.h"
 
 #include <arpa/inet.h>
-#include <netdb.h>
 #include <sys/socket.h>
 #include <sys/un.h>
-#include <unistd.h>
-
-#include <cerrno>
-#include <cstring>
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
@@ -76,27 +71,6 @@ absl::StatusOr<ListenAddress> ParseListenAddress(std::string_view text, bool all
                         "or 127.0.0.1, or pass --allow-remote on a network that you trust");
   }
   return address;
-}
-
-std::string ExplainBindFailure(const ListenAddress& address) {
-  addrinfo hints{};
-  hints.ai_socktype = SOCK_STREAM;
-  hints.ai_flags = AI_PASSIVE;
-  addrinfo* found = nullptr;
-  const int error =
-      getaddrinfo(address.host.c_str(), std::to_string(address.port).c_str(), &hints, &found);
-  if (error != 0) return gai_strerror(error);
-  std::string reason;
-  for (const addrinfo* it = found; it != nullptr; it = it->ai_next) {
-    const int fd = socket(it->ai_family, it->ai_socktype | SOCK_CLOEXEC, it->ai_protocol);
-    if (fd < 0) continue;
-    const int yes = 1;
-    setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
-    if (bind(fd, it->ai_addr, it->ai_addrlen) != 0) reason = std::strerror(errno);
-    close(fd);
-  }
-  freeaddrinfo(found);
-  return reason;
 }
 
 }  // namespace dsg::server

@@ -18,7 +18,7 @@ struct ListenAddress {
   int port = 0;
 
   bool is_unix() const { return !socket_path.empty(); }
-  /// As gRPC takes it and a client dials it: "unix:/run/dsg.sock", "[::1]:4410".
+  /// As a client dials it: "unix:/run/dsg.sock", "[::1]:4410".
   std::string ToString() const;
 };
 
@@ -27,8 +27,5 @@ struct ListenAddress {
 /// Errors: INVALID_ARGUMENT/FIELD_INVALID for another form, a path too long for a socket, and for a
 /// host that is not loopback unless `allow_remote`.
 absl::StatusOr<ListenAddress> ParseListenAddress(std::string_view text, bool allow_remote);
-
-/// Why nothing can be bound to a host and port now, as the system says it; empty if it can be.
-std::string ExplainBindFailure(const ListenAddress& address);
 
 }  // namespace dsg::server

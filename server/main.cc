@@ -14,6 +14,7 @@
 
 #include "CLI/CLI.hpp"
 #include "grpc/support/log.h"
+#include "schema/base/byte_size.h"
 #include "schema/base/log.h"
 #include "schema/base/status.h"
 #include "schema/retention/policy_file.h"
@@ -30,6 +31,8 @@ struct Flags {
   std::string store;
   std::string log_level = "info";
   size_t view_cache_mb = 1024;
+  size_t open_maps_max = 16;
+  size_t call_memory_mb = dsg::server::ServerOptions().call_memory_bytes >> 20;
   dsg::StoreOptions limits;
   std::string policy_file;
   dsg::server::ServerOptions options;
@@ -51,17 +54,28 @@ void DeclareFlags(CLI::App* app, Flags* flags) {
   app->add_option("--max-watches", flags->options.open_watch_max,
                   "Watches of maps open at a time; more are refused")
       ->capture_default_str();
+  app->add_option("--max-connections", flags->options.connection_max,
+                  "Connections at a time; more are closed at once")
+      ->capture_default_str();
+  app->add_option("--call-memory-mb", flags->call_memory_mb,
+                  "Mebibytes of memory for requests and replies; calls beyond are refused")
+      ->check(CLI::Range(size_t{16}, size_t{1} << 20))
+      ->capture_default_str();
   app->add_option("--quota", flags->limits.quota_bytes,
                   "Refuse to let a map grow beyond (10GB, 500MiB); 0 = no limit")
-      ->transform(CLI::AsSizeValue(true));
+      ->transform(CLI::Validator(dsg::TakeByteSize, "SIZE"));
   app->add_option("--reserve", flags->limits.reserve_bytes,
                   "Space kept in each map so that forgetting works on a full disk; 0 = none")
-      ->transform(CLI::AsSizeValue(true));
+      ->transform(CLI::Validator(dsg::TakeByteSize, "SIZE"));
   app->add_option("--policy", flags->policy_file,
                   "Forget on a schedule what this file of policies names (docs/forgetting.md)");
   app->add_option("--view-cache-mb", flags->view_cache_mb,
                   "Mebibytes of memory for the graphs of all maps; a larger graph is refused")
       ->check(CLI::Range(size_t{1}, size_t{1} << 24))
+      ->capture_default_str();
+  app->add_option("--max-open-maps", flags->open_maps_max,
+                  "Maps kept open, those asked last; each may hold some hundred megabytes")
+      ->check(CLI::Range(size_t{1}, size_t{1000}))
       ->capture_default_str();
   app->add_option("--log-level", flags->log_level,
                   "debug (a line a call), info (errors and calls over 100 ms), warning, error")
@@ -152,9 +166,11 @@ int Serve(Flags flags) {
 
   if (flags.options.listen.empty())
     flags.options.listen = "unix:" + flags.store + "/dsg-server.sock";
+  flags.options.call_memory_bytes = flags.call_memory_mb << 20;
   flags.options.log_all_calls = flags.log_level == "debug";
   dsg::query::ServiceCoreOptions core_options;
   core_options.view_cache_bytes = flags.view_cache_mb << 20;
+  core_options.open_maps_max = flags.open_maps_max;
   auto core = dsg::query::MakeServiceCore(*std::move(store), core_options);
   dsg::query::ServiceCore* const kept_core = core.get();
   auto server = dsg::server::Server::Start(std::move(core), flags.options);

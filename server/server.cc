@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/server.h"
 
-#include <sys/stat.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <thread>
@@ -9,7 +10,9 @@
 #include "absl/strings/str_cat.h"
 #include "grpcpp/ext/health_check_service_server_builder_option.h"
 #include "grpcpp/grpcpp.h"
+#include "grpcpp/server_posix.h"
 #include "schema/base/status.h"
+#include "server/acceptor.h"
 #include "server/call_runtime.h"
 #include "server/listen_address.h"
 #include "server/services.h"
@@ -18,10 +21,13 @@
 namespace dsg::server {
 namespace {
 
-constexpr int kMessageBytesMaxOnWire = 4 << 20;
-// Commits wait for the disk and for each other; they must not take the workers of questions.
-constexpr int kCommitWorkerCount = 2;
+// Commits wait for the disk and for others to the same map; they must not take the workers of
+// questions. One each, so that those of one map, where an erasure goes on, keep none of another map
+// waiting.
 constexpr int kCommitsInFlightMax = 32;
+constexpr int kCommitWorkerCount = kCommitsInFlightMax;
+// Of 4 MiB each at most.
+constexpr int kArrivalsMax = 64;
 
 int WorkerCount(int asked) {
   if (asked > 0) return asked;
@@ -30,8 +36,6 @@ int WorkerCount(int asked) {
 
 // What a peer may do to us, bounded. gRPC 1.51 trusts its peers too much by default.
 void SetLimits(grpc::ServerBuilder* builder) {
-  // Otherwise a second server shares the port, and calls go to either.
-  builder->AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   builder->SetMaxReceiveMessageSize(kMessageBytesMaxOnWire);
   builder->SetMaxSendMessageSize(kMessageBytesMaxOnWire);
   // The message limit is checked after inflating: 1 MiB of gzip became 1 GiB of memory.
@@ -39,7 +43,6 @@ void SetLimits(grpc::ServerBuilder* builder) {
   builder->SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
   builder->AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, 64);
   builder->AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, 8 << 10);
-  builder->AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, 5'000);
   builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 30'000);
   builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10'000);
   builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
@@ -48,23 +51,26 @@ void SetLimits(grpc::ServerBuilder* builder) {
   builder->AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS, 600'000);
 }
 
-// Makes files of this process for its user only while it lives. The socket is made inside gRPC.
-class PrivateFiles {
- public:
-  PrivateFiles() : before_(umask(0177)) {}
-  ~PrivateFiles() { umask(before_); }
-  PrivateFiles(const PrivateFiles&) = delete;
-  PrivateFiles& operator=(const PrivateFiles&) = delete;
-
- private:
-  mode_t before_;
-};
-
 absl::Status CheckRange(const std::string& option, int value, int min, int max) {
   if (value >= min && value <= max) return absl::OkStatus();
   return MakeError(Reason::kFieldInvalid,
                    absl::StrCat(option, " is ", value, "; give ", min, " to ", max),
                    {{"field", option}, {"value", absl::StrCat(value)}});
+}
+
+// Half of the descriptors are left to the maps' files and to what gRPC opens for itself.
+int ConnectionMax(int asked) {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return asked;
+  return static_cast<int>(std::clamp<rlim_t>(limit.rlim_cur / 2, 1, static_cast<rlim_t>(asked)));
+}
+
+ConnectionLimits LimitsOfConnections(const ServerOptions& options) {
+  ConnectionLimits limits;
+  limits.connection_max = ConnectionMax(options.connection_max);
+  // A caller whose deadlines pass while its calls are queued has not misbehaved.
+  limits.call_max += options.in_flight_max;
+  return limits;
 }
 
 class RunningServer final : public Server {
@@ -74,14 +80,13 @@ class RunningServer final : public Server {
         workers_(WorkerCount(options.worker_count), options.in_flight_max),
         commit_workers_(kCommitWorkerCount, std::min(options.in_flight_max, kCommitsInFlightMax)),
         delays_(&workers_),
-        guard_(options.reader_stall_max) {
+        guard_(options.reader_stall_max),
+        connections_(LimitsOfConnections(options)),
+        arrivals_(kArrivalsMax),
+        memory_(options.call_memory_bytes) {
     Prepare(options, &workers_, &questions_);
     Prepare(options, &commit_workers_, &commits_);
-    services_.push_back(MakeQueryService(&questions_));
-    services_.push_back(MakeMapService(&questions_));
-    services_.push_back(MakeIngestService(&commits_));
-    // Beside the commits, as it writes too and may wait for them.
-    services_.push_back(MakeMaintenanceService(&commits_));
+    services_ = MakeServices(&questions_, &commits_);
   }
 
   ~RunningServer() override { Shutdown(std::chrono::seconds(1)); }
@@ -92,26 +97,23 @@ class RunningServer final : public Server {
     if (address.is_unix()) {
       DSG_ASSIGN_OR_RETURN(claim_, UnixSocketClaim::Take(address.socket_path));
     }
+    DSG_ASSIGN_OR_RETURN(acceptor_, Acceptor::Listen(address));
     grpc::EnableDefaultHealthCheckService(true);
     grpc::ServerBuilder builder;
     SetLimits(&builder);
-    for (const auto& service : services_) builder.RegisterService(service.get());
-    int port = 0;
-    builder.AddListeningPort(address.ToString(), grpc::InsecureServerCredentials(), &port);
-    {
-      const PrivateFiles private_files;
-      grpc_server_ = builder.BuildAndStart();
+    builder.RegisterCallbackGenericService(services_.get());
+    grpc_server_ = builder.BuildAndStart();
+    if (grpc_server_ == nullptr) {
+      return absl::InternalError("gRPC did not start; its log says why");
     }
-    if (grpc_server_ == nullptr || port == 0) {
-      grpc_server_ = nullptr;
-      const std::string why = address.is_unix() ? "" : ExplainBindFailure(address);
-      return absl::UnavailableError(
-          absl::StrCat("cannot listen on ", address.ToString(), ": ",
-                       why.empty() ? "the system refused it" : why,
-                       "; stop what listens there, or give another address"));
-    }
-    if (!address.is_unix()) address.port = port;
-    address_ = address.ToString();
+    acceptor_->Start([this](int fd, const std::string& peer) {
+      if (connections_.Add(fd, peer)) {
+        grpc::AddInsecureChannelFromFd(grpc_server_.get(), fd);
+      } else {
+        close(fd);
+      }
+    });
+    address_ = acceptor_->address().ToString();
     return absl::OkStatus();
   }
 
@@ -124,6 +126,7 @@ class RunningServer final : public Server {
 
   void Shutdown(std::chrono::milliseconds grace) override {
     if (grpc_server_ != nullptr) {
+      acceptor_->Stop();
       grpc_server_->GetHealthCheckService()->Shutdown();
       // Watches would use up the grace, since nothing else ends them.
       questions_.stopping = true;
@@ -146,10 +149,15 @@ class RunningServer final : public Server {
  private:
   void Prepare(const ServerOptions& options, WorkerPool* workers, CallRuntime* runtime) {
     runtime->core = core_.get();
+    runtime->store_folder = core_->store_folder();
     runtime->workers = workers;
     runtime->guard = &guard_;
     runtime->log = CallLog(options.log_all_calls);
     runtime->open_stream_max = options.open_stream_max;
+    runtime->connections = &connections_;
+    runtime->arrivals = &arrivals_;
+    runtime->memory = &memory_;
+    runtime->blocks = &blocks_;
     runtime->delays = &delays_;
     runtime->open_watch_max = options.open_watch_max;
   }
@@ -161,19 +169,28 @@ class RunningServer final : public Server {
   WorkerPool commit_workers_;
   DelayQueue delays_;
   CallGuard guard_;
+  Connections connections_;
+  Arrivals arrivals_;
+  CallMemory memory_;
+  ArenaBlocks blocks_;
   CallRuntime questions_;
   CallRuntime commits_;
-  std::vector<std::unique_ptr<grpc::Service>> services_;
+  std::unique_ptr<grpc::CallbackGenericService> services_;
+  std::unique_ptr<Acceptor> acceptor_;
   std::string address_;
   std::unique_ptr<grpc::Server> grpc_server_;
 };
 
 }  // namespace
 
-absl::Status OverloadedError() {
+absl::Status OverloadedError(std::string_view why) {
+  // Long enough for several calls to end.
+  constexpr int kRetryAfterMs = 200;
   return MakeError(Reason::kOverloaded,
-                   "the server has as many calls as it takes at a time; retry after a pause, and "
-                   "use the batch calls instead of many small ones");
+                   absl::StrCat(std::string(why), "; retry after a pause of ", kRetryAfterMs,
+                                " ms that grows, and use the batch calls instead of many small "
+                                "ones"),
+                   {{"retry_after_ms", absl::StrCat(kRetryAfterMs)}});
 }
 
 absl::Status TooManyWatchesError(int watch_max) {
@@ -195,6 +212,9 @@ absl::Status ServerOptions::Validate() const {
   DSG_RETURN_IF_ERROR(CheckRange("max-in-flight", in_flight_max, 1, 65536));
   DSG_RETURN_IF_ERROR(CheckRange("max-streams", open_stream_max, 1, 65536));
   DSG_RETURN_IF_ERROR(CheckRange("max-watches", open_watch_max, 0, 65536));
+  DSG_RETURN_IF_ERROR(CheckRange("max-connections", connection_max, 1, 65536));
+  DSG_RETURN_IF_ERROR(
+      CheckRange("call-memory-mb", static_cast<int>(call_memory_bytes >> 20), 16, 1 << 20));
   if (reader_stall_max >= std::chrono::milliseconds(1) &&
       reader_stall_max <= std::chrono::hours(1)) {
     return absl::OkStatus();

@@ -24,6 +24,12 @@ struct ServerOptions {
   /// Watches open at a time. A waiting one costs a look at the head each 50 ms; one that sends what
   /// changed holds the keys of one revision.
   int open_watch_max = 256;
+  /// Connections at a time, and never more than half of the descriptors that the process may have;
+  /// more are closed at once.
+  int connection_max = 1024;
+  /// Memory of the requests and replies of all calls; those that would take more are refused. One
+  /// call, or one connection, gets at most half of it.
+  size_t call_memory_bytes = size_t{256} << 20;
   /// A stream or watch whose reader takes no message for so long is ended.
   std::chrono::milliseconds reader_stall_max{30'000};
   /// Listen on addresses that other machines can reach.
@@ -31,8 +37,8 @@ struct ServerOptions {
   /// A log line for every call, not only for errors and slow ones.
   bool log_all_calls = false;
 
-  /// Errors: FIELD_INVALID; workers are 0 to 256, calls and streams 1 to 65536, watches from 0,
-  /// the stall is 1 ms to an hour.
+  /// Errors: FIELD_INVALID; workers are 0 to 256, calls, streams and connections 1 to 65536,
+  /// watches from 0, memory is from 16 MiB, the stall is 1 ms to an hour.
   absl::Status Validate() const;
 };
 

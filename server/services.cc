@@ -1,323 +1,165 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/services.h"
 
-#include <google/protobuf/arena.h>
+#include <functional>
+#include <string>
+#include <type_traits>
+#include <unordered_map>
+#include <utility>
 
-#include "dsg/v1/ingest_service.grpc.pb.h"
-#include "dsg/v1/maintenance_service.grpc.pb.h"
-#include "dsg/v1/map_service.grpc.pb.h"
-#include "dsg/v1/query_service.grpc.pb.h"
-#include "server/arena_blocks.h"
+#include "absl/strings/str_cat.h"
+#include "dsg/v1/ingest_service.pb.h"
+#include "dsg/v1/maintenance_service.pb.h"
+#include "dsg/v1/map_service.pb.h"
+#include "dsg/v1/query_service.pb.h"
+#include "schema/base/check.h"
 #include "server/stream_call.h"
-#include "server/unary_call.h"
+#include "server/unary_call_internal.h"
 
 namespace dsg::server {
 namespace {
 
-using grpc::CallbackServerContext;
-using grpc::ServerUnaryReactor;
+using Context = grpc::GenericCallbackServerContext;
 using query::Api;
+using query::ServiceCore;
 
-// Requests and replies on an arena, which whatever thread ends the call frees as one piece. Part by
-// part it would free what others have allocated: a fifth of the instructions of 20 nodes.
-template <typename Request, typename Reply>
-class ArenaMessages final : public grpc::MessageAllocator<Request, Reply> {
+class UnknownMethod final : public grpc::ServerGenericBidiReactor {
  public:
-  /// `blocks` must outlive this and all calls.
-  explicit ArenaMessages(ArenaBlocks* blocks) : blocks_(blocks) {}
+  explicit UnknownMethod(const std::string& path) {
+    Finish(grpc::Status(grpc::StatusCode::UNIMPLEMENTED,
+                        absl::StrCat("no method ", path, "; see proto/dsg/v1")));
+  }
+  void OnDone() override { delete this; }
+};
 
-  grpc::MessageHolder<Request, Reply>* AllocateMessages() override { return new Holder(blocks_); }
+class Services final : public grpc::CallbackGenericService {
+ public:
+  Services(CallRuntime* questions, CallRuntime* commits) {
+    AddQueries(questions);
+    AddMaps(questions);
+    AddIngest(commits);
+    // Beside the commits, as it writes too and may wait for them.
+    AddMaintenance(commits);
+  }
+
+  grpc::ServerGenericBidiReactor* CreateReactor(Context* context) override {
+    const auto found = methods_.find(context->method());
+    if (found == methods_.end()) return new UnknownMethod(context->method());
+    return found->second.begin(context);
+  }
 
  private:
-  class Holder final : public grpc::MessageHolder<Request, Reply> {
-   public:
-    explicit Holder(ArenaBlocks* blocks)
-        : blocks_(blocks),
-          block_(blocks->Take()),
-          arena_(std::make_unique<google::protobuf::Arena>(Options(block_.get()))) {
-      this->set_request(google::protobuf::Arena::CreateMessage<Request>(arena_.get()));
-      this->set_response(google::protobuf::Arena::CreateMessage<Reply>(arena_.get()));
-    }
-    void Release() override {
-      arena_ = nullptr;
-      blocks_->Give(std::move(block_));
-      delete this;
-    }
-
-   private:
-    static google::protobuf::ArenaOptions Options(char* block) {
-      google::protobuf::ArenaOptions options;
-      options.initial_block = block;
-      options.initial_block_size = ArenaBlocks::kBlockBytes;
-      // Below the size from which malloc asks the kernel for fresh, unmapped pages each time.
-      options.start_block_size = size_t{64} << 10;
-      options.max_block_size = size_t{64} << 10;
-      return options;
-    }
-
-    ArenaBlocks* const blocks_;
-    ArenaBlocks::Block block_;
-    std::unique_ptr<google::protobuf::Arena> arena_;
+  struct Entry {
+    std::unique_ptr<Method> method;
+    std::function<grpc::ServerGenericBidiReactor*(Context*)> begin;
+  };
+  // Where the methods of one service go.
+  struct Service {
+    std::string name;
+    CallRuntime* runtime = nullptr;
   };
 
-  ArenaBlocks* const blocks_;
+  // `begin` gets the method, whose address stays.
+  template <typename Begin>
+  void Add(const Service& service, std::unique_ptr<Method> method, const Begin& begin) {
+    const Method* const kept = method.get();
+    std::string path = absl::StrCat("/dsg.v1.", service.name, "/", method->name);
+    Entry entry{std::move(method),
+                [begin, kept](Context* context) { return begin(kept, context); }};
+    const bool is_new = methods_.emplace(std::move(path), std::move(entry)).second;
+    DSG_CHECK(is_new);
+  }
+
+  template <typename Request, typename Reply>
+  void AddUnary(const Service& service, const std::string& name,
+                absl::Status (Api::*ask)(const query::CallContext&, const Request&, Reply*)) {
+    CallRuntime* const runtime = service.runtime;
+    auto method = std::make_unique<Method>(name, Request::descriptor());
+    // Commits have workers of their own, one each, and keep nobody waiting while they wait.
+    method->may_wait = std::is_same_v<Request, v1::CommitRequest>;
+    Add(service, std::move(method), [=](const Method* kept, Context* context) {
+      return new UnaryCall<Request, Reply>(runtime, kept, ask, context);
+    });
+  }
+
+  template <typename Request, typename Reply>
+  void AddStream(const Service& service, const std::string& name, StreamKind kind,
+                 absl::StatusOr<std::unique_ptr<query::StreamCursor<Reply>>> (ServiceCore::*open)(
+                     const Request&)) {
+    CallRuntime* const runtime = service.runtime;
+    Add(service, std::make_unique<Method>(name, Request::descriptor()),
+        [=](const Method* kept, Context* context) {
+          return new StreamCall<Request, Reply>(runtime, kept, kind, open, context);
+        });
+  }
+
+  void AddQueries(CallRuntime* runtime);
+  void AddMaps(CallRuntime* runtime);
+  void AddIngest(CallRuntime* runtime);
+  void AddMaintenance(CallRuntime* runtime);
+
+  // By path: "/dsg.v1.MapService/ListMaps".
+  std::unordered_map<std::string, Entry> methods_;
 };
 
-class QueryService final : public v1::QueryService::CallbackService {
- public:
-  explicit QueryService(CallRuntime* runtime) : runtime_(runtime) {
-    SetMessageAllocatorFor_BatchLocateAgents(&locations_);
-    SetMessageAllocatorFor_BatchGetNodes(&batch_);
-    SetMessageAllocatorFor_ListNodes(&nodes_);
-    SetMessageAllocatorFor_ListEdges(&edges_);
-    SetMessageAllocatorFor_ListNearestNodes(&nearest_);
-    SetMessageAllocatorFor_GetNeighbors(&neighbors_);
-    SetMessageAllocatorFor_SearchNodes(&matches_);
-    SetMessageAllocatorFor_ListEncounters(&encounters_);
-    SetMessageAllocatorFor_ListInteractions(&interactions_);
-    SetMessageAllocatorFor_PlanPath(&path_);
-    SetMessageAllocatorFor_PlanPaths(&paths_);
-    SetMessageAllocatorFor_CheckCollision(&collisions_);
-    SetMessageAllocatorFor_PredictAgent(&predictions_);
-  }
+void Services::AddQueries(CallRuntime* runtime) {
+  const Service service{"QueryService", runtime};
+  AddUnary(service, "LocateAgent", &Api::LocateAgent);
+  AddUnary(service, "BatchLocateAgents", &Api::BatchLocateAgents);
+  AddStream(service, "GetTrajectory", StreamKind::kAnswer, &ServiceCore::OpenTrajectory);
+  AddUnary(service, "ListPresence", &Api::ListPresence);
+  AddUnary(service, "GetNode", &Api::GetNode);
+  AddUnary(service, "ListNodes", &Api::ListNodes);
+  AddUnary(service, "ListEdges", &Api::ListEdges);
+  AddUnary(service, "ListNearestNodes", &Api::ListNearestNodes);
+  AddStream(service, "GetMesh", StreamKind::kAnswer, &ServiceCore::OpenMesh);
+  AddStream(service, "GetAgentShape", StreamKind::kAnswer, &ServiceCore::OpenAgentShape);
+  AddUnary(service, "BatchGetNodes", &Api::BatchGetNodes);
+  AddUnary(service, "GetNeighbors", &Api::GetNeighbors);
+  AddStream(service, "GetSubgraph", StreamKind::kAnswer, &ServiceCore::OpenSubgraph);
+  AddUnary(service, "SearchNodes", &Api::SearchNodes);
+  AddUnary(service, "ListEncounters", &Api::ListEncounters);
+  AddUnary(service, "ListInteractions", &Api::ListInteractions);
+  AddUnary(service, "PlanPath", &Api::PlanPath);
+  AddUnary(service, "PlanPaths", &Api::PlanPaths);
+  AddUnary(service, "CheckCollision", &Api::CheckCollision);
+  AddUnary(service, "PredictAgent", &Api::PredictAgent);
+}
 
-  ServerUnaryReactor* LocateAgent(CallbackServerContext* context,
-                                  const v1::LocateAgentRequest* request,
-                                  v1::LocateAgentResponse* reply) override {
-    return StartUnary(runtime_, "LocateAgent", &Api::LocateAgent, context, request, reply);
-  }
-  ServerUnaryReactor* BatchLocateAgents(CallbackServerContext* context,
-                                        const v1::BatchLocateAgentsRequest* request,
-                                        v1::BatchLocateAgentsResponse* reply) override {
-    return StartUnary(runtime_, "BatchLocateAgents", &Api::BatchLocateAgents, context, request,
-                      reply);
-  }
-  grpc::ServerWriteReactor<v1::GetTrajectoryResponse>* GetTrajectory(
-      CallbackServerContext* context, const v1::GetTrajectoryRequest* request) override {
-    return StartStream(runtime_, "GetTrajectory", &query::ServiceCore::OpenTrajectory, context,
-                       request);
-  }
-  ServerUnaryReactor* ListPresence(CallbackServerContext* context,
-                                   const v1::ListPresenceRequest* request,
-                                   v1::ListPresenceResponse* reply) override {
-    return StartUnary(runtime_, "ListPresence", &Api::ListPresence, context, request, reply);
-  }
-  ServerUnaryReactor* GetNode(CallbackServerContext* context, const v1::GetNodeRequest* request,
-                              v1::GetNodeResponse* reply) override {
-    return StartUnary(runtime_, "GetNode", &Api::GetNode, context, request, reply);
-  }
-  ServerUnaryReactor* ListNodes(CallbackServerContext* context, const v1::ListNodesRequest* request,
-                                v1::ListNodesResponse* reply) override {
-    return StartUnary(runtime_, "ListNodes", &Api::ListNodes, context, request, reply);
-  }
-  ServerUnaryReactor* ListEdges(CallbackServerContext* context, const v1::ListEdgesRequest* request,
-                                v1::ListEdgesResponse* reply) override {
-    return StartUnary(runtime_, "ListEdges", &Api::ListEdges, context, request, reply);
-  }
-  ServerUnaryReactor* ListNearestNodes(CallbackServerContext* context,
-                                       const v1::ListNearestNodesRequest* request,
-                                       v1::ListNearestNodesResponse* reply) override {
-    return StartUnary(runtime_, "ListNearestNodes", &Api::ListNearestNodes, context, request,
-                      reply);
-  }
-  grpc::ServerWriteReactor<v1::GetMeshResponse>* GetMesh(
-      CallbackServerContext* context, const v1::GetMeshRequest* request) override {
-    return StartStream(runtime_, "GetMesh", &query::ServiceCore::OpenMesh, context, request);
-  }
-  grpc::ServerWriteReactor<v1::GetAgentShapeResponse>* GetAgentShape(
-      CallbackServerContext* context, const v1::GetAgentShapeRequest* request) override {
-    return StartStream(runtime_, "GetAgentShape", &query::ServiceCore::OpenAgentShape, context,
-                       request);
-  }
-  ServerUnaryReactor* BatchGetNodes(CallbackServerContext* context,
-                                    const v1::BatchGetNodesRequest* request,
-                                    v1::BatchGetNodesResponse* reply) override {
-    return StartUnary(runtime_, "BatchGetNodes", &Api::BatchGetNodes, context, request, reply);
-  }
-  ServerUnaryReactor* GetNeighbors(CallbackServerContext* context,
-                                   const v1::GetNeighborsRequest* request,
-                                   v1::GetNeighborsResponse* reply) override {
-    return StartUnary(runtime_, "GetNeighbors", &Api::GetNeighbors, context, request, reply);
-  }
-  ServerUnaryReactor* SearchNodes(CallbackServerContext* context,
-                                  const v1::SearchNodesRequest* request,
-                                  v1::SearchNodesResponse* reply) override {
-    return StartUnary(runtime_, "SearchNodes", &Api::SearchNodes, context, request, reply);
-  }
-  ServerUnaryReactor* ListEncounters(CallbackServerContext* context,
-                                     const v1::ListEncountersRequest* request,
-                                     v1::ListEncountersResponse* reply) override {
-    return StartUnary(runtime_, "ListEncounters", &Api::ListEncounters, context, request, reply);
-  }
-  ServerUnaryReactor* ListInteractions(CallbackServerContext* context,
-                                       const v1::ListInteractionsRequest* request,
-                                       v1::ListInteractionsResponse* reply) override {
-    return StartUnary(runtime_, "ListInteractions", &Api::ListInteractions, context, request,
-                      reply);
-  }
-  ServerUnaryReactor* PlanPath(CallbackServerContext* context, const v1::PlanPathRequest* request,
-                               v1::PlanPathResponse* reply) override {
-    return StartUnary(runtime_, "PlanPath", &Api::PlanPath, context, request, reply);
-  }
-  ServerUnaryReactor* PlanPaths(CallbackServerContext* context, const v1::PlanPathsRequest* request,
-                                v1::PlanPathsResponse* reply) override {
-    return StartUnary(runtime_, "PlanPaths", &Api::PlanPaths, context, request, reply);
-  }
-  ServerUnaryReactor* CheckCollision(CallbackServerContext* context,
-                                     const v1::CheckCollisionRequest* request,
-                                     v1::CheckCollisionResponse* reply) override {
-    return StartUnary(runtime_, "CheckCollision", &Api::CheckCollision, context, request, reply);
-  }
-  ServerUnaryReactor* PredictAgent(CallbackServerContext* context,
-                                   const v1::PredictAgentRequest* request,
-                                   v1::PredictAgentResponse* reply) override {
-    return StartUnary(runtime_, "PredictAgent", &Api::PredictAgent, context, request, reply);
-  }
-  grpc::ServerWriteReactor<v1::GetSubgraphResponse>* GetSubgraph(
-      CallbackServerContext* context, const v1::GetSubgraphRequest* request) override {
-    return StartStream(runtime_, "GetSubgraph", &query::ServiceCore::OpenSubgraph, context,
-                       request);
-  }
+void Services::AddMaps(CallRuntime* runtime) {
+  const Service service{"MapService", runtime};
+  AddUnary(service, "CreateMap", &Api::CreateMap);
+  AddUnary(service, "ListMaps", &Api::ListMaps);
+  AddUnary(service, "GetMapStats", &Api::GetMapStats);
+  AddUnary(service, "ListRevisions", &Api::ListRevisions);
+  AddUnary(service, "DiffRevisions", &Api::DiffRevisions);
+  AddStream(service, "WatchMap", StreamKind::kWatch, &ServiceCore::OpenWatch);
+  AddUnary(service, "GetServerInfo", &Api::GetServerInfo);
+}
 
- private:
-  // Of replies that have many parts. A small one gains nothing.
-  ArenaBlocks blocks_;
-  ArenaMessages<v1::BatchLocateAgentsRequest, v1::BatchLocateAgentsResponse> locations_{&blocks_};
-  ArenaMessages<v1::BatchGetNodesRequest, v1::BatchGetNodesResponse> batch_{&blocks_};
-  ArenaMessages<v1::ListNodesRequest, v1::ListNodesResponse> nodes_{&blocks_};
-  ArenaMessages<v1::ListEdgesRequest, v1::ListEdgesResponse> edges_{&blocks_};
-  ArenaMessages<v1::ListNearestNodesRequest, v1::ListNearestNodesResponse> nearest_{&blocks_};
-  ArenaMessages<v1::GetNeighborsRequest, v1::GetNeighborsResponse> neighbors_{&blocks_};
-  ArenaMessages<v1::SearchNodesRequest, v1::SearchNodesResponse> matches_{&blocks_};
-  ArenaMessages<v1::ListEncountersRequest, v1::ListEncountersResponse> encounters_{&blocks_};
-  ArenaMessages<v1::ListInteractionsRequest, v1::ListInteractionsResponse> interactions_{&blocks_};
-  ArenaMessages<v1::PlanPathRequest, v1::PlanPathResponse> path_{&blocks_};
-  ArenaMessages<v1::PlanPathsRequest, v1::PlanPathsResponse> paths_{&blocks_};
-  ArenaMessages<v1::CheckCollisionRequest, v1::CheckCollisionResponse> collisions_{&blocks_};
-  ArenaMessages<v1::PredictAgentRequest, v1::PredictAgentResponse> predictions_{&blocks_};
-  CallRuntime* runtime_;
-};
+void Services::AddIngest(CallRuntime* runtime) {
+  const Service service{"IngestService", runtime};
+  AddUnary(service, "Commit", &Api::Commit);
+  AddUnary(service, "GetSession", &Api::GetSession);
+}
 
-class MapService final : public v1::MapService::CallbackService {
- public:
-  explicit MapService(CallRuntime* runtime) : runtime_(runtime) {
-    SetMessageAllocatorFor_DiffRevisions(&difference_);
-  }
-
-  ServerUnaryReactor* CreateMap(CallbackServerContext* context, const v1::CreateMapRequest* request,
-                                v1::CreateMapResponse* reply) override {
-    return StartUnary(runtime_, "CreateMap", &Api::CreateMap, context, request, reply);
-  }
-  ServerUnaryReactor* ListMaps(CallbackServerContext* context, const v1::ListMapsRequest* request,
-                               v1::ListMapsResponse* reply) override {
-    return StartUnary(runtime_, "ListMaps", &Api::ListMaps, context, request, reply);
-  }
-  ServerUnaryReactor* GetMapStats(CallbackServerContext* context,
-                                  const v1::GetMapStatsRequest* request,
-                                  v1::GetMapStatsResponse* reply) override {
-    return StartUnary(runtime_, "GetMapStats", &Api::GetMapStats, context, request, reply);
-  }
-  ServerUnaryReactor* ListRevisions(CallbackServerContext* context,
-                                    const v1::ListRevisionsRequest* request,
-                                    v1::ListRevisionsResponse* reply) override {
-    return StartUnary(runtime_, "ListRevisions", &Api::ListRevisions, context, request, reply);
-  }
-  ServerUnaryReactor* DiffRevisions(CallbackServerContext* context,
-                                    const v1::DiffRevisionsRequest* request,
-                                    v1::DiffRevisionsResponse* reply) override {
-    return StartUnary(runtime_, "DiffRevisions", &Api::DiffRevisions, context, request, reply);
-  }
-  grpc::ServerWriteReactor<v1::WatchMapResponse>* WatchMap(
-      CallbackServerContext* context, const v1::WatchMapRequest* request) override {
-    return StartWatch(runtime_, "WatchMap", &query::ServiceCore::OpenWatch, context, request);
-  }
-  ServerUnaryReactor* GetServerInfo(CallbackServerContext* context,
-                                    const v1::GetServerInfoRequest* request,
-                                    v1::GetServerInfoResponse* reply) override {
-    return StartUnary(runtime_, "GetServerInfo", &Api::GetServerInfo, context, request, reply);
-  }
-
- private:
-  ArenaBlocks blocks_;
-  ArenaMessages<v1::DiffRevisionsRequest, v1::DiffRevisionsResponse> difference_{&blocks_};
-  CallRuntime* runtime_;
-};
-
-class IngestService final : public v1::IngestService::CallbackService {
- public:
-  explicit IngestService(CallRuntime* runtime) : runtime_(runtime) {}
-
-  ServerUnaryReactor* Commit(CallbackServerContext* context, const v1::CommitRequest* request,
-                             v1::CommitResponse* reply) override {
-    return StartUnary(runtime_, "Commit", &Api::Commit, context, request, reply);
-  }
-  ServerUnaryReactor* GetSession(CallbackServerContext* context,
-                                 const v1::GetSessionRequest* request,
-                                 v1::GetSessionResponse* reply) override {
-    return StartUnary(runtime_, "GetSession", &Api::GetSession, context, request, reply);
-  }
-
- private:
-  CallRuntime* runtime_;
-};
-
-class MaintenanceService final : public v1::MaintenanceService::CallbackService {
- public:
-  explicit MaintenanceService(CallRuntime* runtime) : runtime_(runtime) {}
-
-  grpc::ServerWriteReactor<v1::PruneResponse>* Prune(CallbackServerContext* context,
-                                                     const v1::PruneRequest* request) override {
-    return StartWork(runtime_, "Prune", &query::ServiceCore::OpenPrune, context, request);
-  }
-  grpc::ServerWriteReactor<v1::CompactResponse>* Compact(
-      CallbackServerContext* context, const v1::CompactRequest* request) override {
-    return StartWork(runtime_, "Compact", &query::ServiceCore::OpenCompact, context, request);
-  }
-  grpc::ServerWriteReactor<v1::RevertResponse>* Revert(CallbackServerContext* context,
-                                                       const v1::RevertRequest* request) override {
-    return StartWork(runtime_, "Revert", &query::ServiceCore::OpenRevert, context, request);
-  }
-  grpc::ServerWriteReactor<v1::MergeMapsResponse>* MergeMaps(
-      CallbackServerContext* context, const v1::MergeMapsRequest* request) override {
-    return StartWork(runtime_, "MergeMaps", &query::ServiceCore::OpenMerge, context, request);
-  }
-  grpc::ServerWriteReactor<v1::ReadArchiveResponse>* ReadArchive(
-      CallbackServerContext* context, const v1::ReadArchiveRequest* request) override {
-    return StartWork(runtime_, "ReadArchive", &query::ServiceCore::OpenArchive, context, request);
-  }
-  ServerUnaryReactor* SetTag(CallbackServerContext* context, const v1::SetTagRequest* request,
-                             v1::SetTagResponse* reply) override {
-    return StartUnary(runtime_, "SetTag", &Api::SetTag, context, request, reply);
-  }
-  ServerUnaryReactor* RemoveTag(CallbackServerContext* context, const v1::RemoveTagRequest* request,
-                                v1::RemoveTagResponse* reply) override {
-    return StartUnary(runtime_, "RemoveTag", &Api::RemoveTag, context, request, reply);
-  }
-  ServerUnaryReactor* ListTags(CallbackServerContext* context, const v1::ListTagsRequest* request,
-                               v1::ListTagsResponse* reply) override {
-    return StartUnary(runtime_, "ListTags", &Api::ListTags, context, request, reply);
-  }
-
- private:
-  CallRuntime* runtime_;
-};
+void Services::AddMaintenance(CallRuntime* runtime) {
+  const Service service{"MaintenanceService", runtime};
+  AddStream(service, "Prune", StreamKind::kWork, &ServiceCore::OpenPrune);
+  AddStream(service, "Compact", StreamKind::kWork, &ServiceCore::OpenCompact);
+  AddStream(service, "Revert", StreamKind::kWork, &ServiceCore::OpenRevert);
+  AddStream(service, "MergeMaps", StreamKind::kWork, &ServiceCore::OpenMerge);
+  AddStream(service, "ReadArchive", StreamKind::kWork, &ServiceCore::OpenArchive);
+  AddUnary(service, "SetTag", &Api::SetTag);
+  AddUnary(service, "RemoveTag", &Api::RemoveTag);
+  AddUnary(service, "ListTags", &Api::ListTags);
+}
 
 }  // namespace
 
-std::unique_ptr<grpc::Service> MakeQueryService(CallRuntime* runtime) {
-  return std::make_unique<QueryService>(runtime);
-}
-
-std::unique_ptr<grpc::Service> MakeMapService(CallRuntime* runtime) {
-  return std::make_unique<MapService>(runtime);
-}
-
-std::unique_ptr<grpc::Service> MakeIngestService(CallRuntime* runtime) {
-  return std::make_unique<IngestService>(runtime);
-}
-
-std::unique_ptr<grpc::Service> MakeMaintenanceService(CallRuntime* runtime) {
-  return std::make_unique<MaintenanceService>(runtime);
+std::unique_ptr<grpc::CallbackGenericService> MakeServices(CallRuntime* questions,
+                                                           CallRuntime* commits) {
+  return std::make_unique<Services>(questions, commits);
 }
 
 }  // namespace dsg::server

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// The services of dsg.v1 as gRPC sees them: every handler only starts a call.
+// The methods of dsg.v1 as gRPC sees them: each name begins a call. gRPC hands over bytes instead
+// of messages, so that nothing is parsed before it is paid for.
 #pragma once
 
 #include <memory>
 
-#include "grpcpp/impl/codegen/service_type.h"
+#include "grpcpp/generic/async_generic_service.h"
 #include "server/call_runtime.h"
 
 namespace dsg::server {
 
-/// `runtime` must outlive the service.
-std::unique_ptr<grpc::Service> MakeQueryService(CallRuntime* runtime);
-std::unique_ptr<grpc::Service> MakeMapService(CallRuntime* runtime);
-std::unique_ptr<grpc::Service> MakeIngestService(CallRuntime* runtime);
-std::unique_ptr<grpc::Service> MakeMaintenanceService(CallRuntime* runtime);
+/// `questions` for what reads, `commits` for what writes and may wait for the disk. Both must
+/// outlive the service and all calls.
+std::unique_ptr<grpc::CallbackGenericService> MakeServices(CallRuntime* questions,
+                                                           CallRuntime* commits);
 
 }  // namespace dsg::server

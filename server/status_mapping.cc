@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/status_mapping.h"
 
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
 #include "dsg/v1/errors.pb.h"
 #include "schema/base/status.h"
 
@@ -45,6 +49,21 @@ grpc::Status ToGrpc(const absl::Status& status) {
   const std::string_view message(status.message().data(), status.message().size());
   return grpc::Status(static_cast<grpc::StatusCode>(status.code()),
                       CutText(message, kMessageBytesMax));
+}
+
+absl::Status HideFolder(const absl::Status& status, std::string_view folder) {
+  if (status.ok() || folder.size() < 2) return status;
+  const std::string path(folder);
+  const auto hide = [&](absl::string_view text) {
+    return absl::StrReplaceAll(
+        text, {{"store " + path, "the store"}, {path + "/", std::string()}, {path, "the store"}});
+  };
+  const Reason reason = ReasonOf(status);
+  const std::string message = hide(status.message());
+  if (reason == Reason::kUnspecified) return absl::Status(status.code(), message);
+  ErrorMetadata metadata = MetadataOf(status);
+  for (auto& [key, value] : metadata) value = hide(value);
+  return MakeError(reason, message, std::move(metadata));
 }
 
 std::string EncodeErrorDetail(const absl::Status& status) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The right to listen on the path of a unix socket. gRPC replaces whatever socket it finds at a
-// path, so a second server would silently take the place of the first; this refuses it.
+// The right to listen on the path of a unix socket. What a killed server left there has to be
+// removed, and this refuses to remove the socket of one that lives.
 #pragma once
 
 #include <memory>

@@ -44,6 +44,33 @@ class Server(support.ProgramsTest):
         self.refused(2, ["--allow-remote"], "dsg-server", "--store", "store", "--listen",
                      "0.0.0.0:50051")
 
+    def test_more_connections_than_descriptors_harm_nobody(self):
+        address = "unix:few.sock"
+        process = support.start("sh", "-c", 'ulimit -n 64; exec "$0" "$@"',
+                                os.path.join(support.BIN, "dsg-server"), "--store", "store",
+                                "--listen", address, "--log-level", "error", cwd=self.folder)
+        try:
+            ready = lambda: support.run("dsg", "version", "--server", address,
+                                        cwd=self.folder).returncode == 0
+            support.wait_until(ready, "the server")
+            preface = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + b"\0\0\0\x04" + b"\0" * 5
+            held = []
+            for _ in range(300):
+                client = socket.socket(socket.AF_UNIX)
+                try:
+                    client.connect(os.path.join(self.folder, "few.sock"))
+                    client.sendall(preface)
+                except OSError:
+                    pass
+                held.append(client)
+            self.assertIsNone(process.poll())
+            for client in held:
+                client.close()
+            support.wait_until(ready, "the server after the flood")
+        finally:
+            process.terminate()
+            self.assertEqual(0, process.wait())
+
     def test_no_server_is_said_at_once(self):
         self.refused(3, ["unix:none.sock"], "dsg", "stats", "--server", "unix:none.sock",
                      "--map", "office", "--timeout", "2")

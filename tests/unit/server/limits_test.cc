@@ -63,6 +63,14 @@ TEST(ServerOptions, RefusesNumbersOutOfRange) {
   options.in_flight_max = 1;
   options.open_stream_max = 0;
   EXPECT_EQ(ReasonOf(options.Validate()), Reason::kFieldInvalid);
+  options.open_stream_max = 1;
+  options.connection_max = 0;
+  EXPECT_EQ(ReasonOf(options.Validate()), Reason::kFieldInvalid);
+  options.connection_max = 1;
+  options.call_memory_bytes = 1;
+  EXPECT_EQ(ReasonOf(options.Validate()), Reason::kFieldInvalid);
+  options.call_memory_bytes = size_t{16} << 20;
+  EXPECT_TRUE(options.Validate().ok());
 }
 
 }  // namespace

@@ -14,6 +14,8 @@ class PassingCore : public query::ServiceCore {
  public:
   explicit PassingCore(std::unique_ptr<query::ServiceCore> core) : core_(std::move(core)) {}
 
+  const std::string& store_folder() const override { return core_->store_folder(); }
+
   absl::StatusOr<std::unique_ptr<query::TrajectoryCursor>> OpenTrajectory(
       const v1::GetTrajectoryRequest& request) override {
     return core_->OpenTrajectory(request);

@@ -2,8 +2,12 @@
 // Every call of every service over a real socket, and what errors look like on the far side.
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
+
 #include "dsg/v1/errors.pb.h"
 #include "dsg/v1/ingest_service.grpc.pb.h"
+#include "dsg/v1/maintenance_service.pb.h"
 #include "dsg/v1/map_service.grpc.pb.h"
 #include "dsg/v1/query_service.grpc.pb.h"
 #include "grpcpp/generic/generic_stub.h"
@@ -325,6 +329,25 @@ TEST_F(Rpc, CarriesTheReasonOfAStreamThatFails) {
   EXPECT_EQ(context.GetServerTrailingMetadata().count(kErrorTrailer), 1u);
 }
 
+TEST_F(Rpc, TellsNobodyWhereTheStoreLies) {
+  std::filesystem::create_directory(folder_.path() + "/cellar");
+  std::ofstream(folder_.path() + "/cellar/graph.db") << "no database";
+  for (const std::string map : {"attic", "cellar"}) {
+    grpc::ClientContext context;
+    v1::LocateAgentRequest request = Where("12", 0);
+    request.set_map(map);
+    v1::LocateAgentResponse reply;
+    const grpc::Status status = query_->LocateAgent(&context, request, &reply);
+    EXPECT_FALSE(status.ok());
+    EXPECT_NE(status.error_message().find(map), std::string::npos) << status.error_message();
+    EXPECT_EQ(status.error_message().find(folder_.path()), std::string::npos)
+        << status.error_message();
+    for (const auto& [key, value] : context.GetServerTrailingMetadata()) {
+      EXPECT_EQ(std::string(value.data(), value.size()).find(folder_.path()), std::string::npos);
+    }
+  }
+}
+
 TEST_F(Rpc, AnswersAHugeNameWithAShortError) {
   grpc::ClientContext context;
   v1::LocateAgentResponse reply;
@@ -347,6 +370,23 @@ TEST_F(Rpc, RefusesMessagesOfMoreThanFourMebibytes) {
   v1::LocateAgentResponse reply;
   EXPECT_EQ(query_->LocateAgent(&context, Where(std::string(5 << 20, 'x'), 0), &reply).error_code(),
             grpc::StatusCode::RESOURCE_EXHAUSTED);
+}
+
+TEST_F(Rpc, ServesEveryMethodOfTheProtocol) {
+  int method_count = 0;
+  for (const auto* const file :
+       {v1::LocateAgentRequest::descriptor()->file(), v1::ListMapsRequest::descriptor()->file(),
+        v1::CommitRequest::descriptor()->file(), v1::PruneRequest::descriptor()->file()}) {
+    for (int i = 0; i < file->service_count(); ++i) {
+      for (int k = 0; k < file->service(i)->method_count(); ++k, ++method_count) {
+        const auto* const method = file->service(i)->method(k);
+        std::string reply;
+        const std::string path = "/" + file->service(i)->full_name() + "/" + method->name();
+        EXPECT_NE(CallByPath(path, &reply).error_code(), grpc::StatusCode::UNIMPLEMENTED) << path;
+      }
+    }
+  }
+  EXPECT_GE(method_count, 37);
 }
 
 TEST_F(Rpc, TellsItsHealthAndHidesItsInsides) {

@@ -42,6 +42,19 @@ TEST(StatusMapping, CutsLongTextSoThatTrailersStayBelowWhatPeersAccept) {
   EXPECT_LT(EncodeErrorDetail(status).size(), 1000u);
 }
 
+TEST(StatusMapping, LeavesTheFolderOfTheStoreOut) {
+  const std::string folder = "/var/lib/dsg";
+  const absl::Status missing =
+      MakeError(Reason::kMapUnknown, "map \"a\" does not exist in store /var/lib/dsg; list them",
+                {{"map", "a"}, {"folder", "/var/lib/dsg/a"}});
+  EXPECT_EQ(HideFolder(missing, folder),
+            MakeError(Reason::kMapUnknown, "map \"a\" does not exist in the store; list them",
+                      {{"map", "a"}, {"folder", "a"}}));
+  EXPECT_EQ(HideFolder(absl::InternalError("cannot sync /var/lib/dsg/a/graph.db"), folder),
+            absl::InternalError("cannot sync a/graph.db"));
+  EXPECT_EQ(HideFolder(missing, ""), missing);
+}
+
 TEST(StatusMapping, NeverCutsACharacterInTwo) {
   EXPECT_EQ(CutText("aüb", 2), "a");
   EXPECT_EQ(CutText("aüb", 3), "aü");

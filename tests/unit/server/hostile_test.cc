@@ -1,0 +1,366 @@
+// SPDX-License-Identifier: Apache-2.0
+// Clients that mean harm: they end, and neither the server nor anybody else does.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <condition_variable>
+#include <fstream>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "dsg/v1/errors.pb.h"
+#include "dsg/v1/ingest_service.grpc.pb.h"
+#include "dsg/v1/map_service.grpc.pb.h"
+#include "dsg/v1/query_service.grpc.pb.h"
+#include "grpcpp/generic/generic_stub.h"
+#include "grpcpp/grpcpp.h"
+#include "server/server.h"
+#include "server/status_mapping.h"
+#include "tests/support/raw_http2.h"
+#include "tests/unit/query/engine/office.h"
+#include "tests/unit/server/passing_core.h"
+
+namespace dsg::server {
+namespace {
+
+using query::CallContext;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using std::chrono::system_clock;
+
+constexpr int64_t kMebibyte = 1 << 20;
+constexpr char kLocate[] = "/dsg.v1.QueryService/LocateAgent";
+constexpr char kCommit[] = "/dsg.v1.IngestService/Commit";
+constexpr char kPlanPaths[] = "/dsg.v1.QueryService/PlanPaths";
+
+// Of both ends, which are in this process.
+int64_t ResidentBytes() {
+  std::ifstream file("/proc/self/statm");
+  int64_t whole = 0;
+  int64_t resident = 0;
+  file >> whole >> resident;
+  return resident * sysconf(_SC_PAGESIZE);
+}
+
+// Watches how much memory is resident until it is asked for the most.
+class Peak {
+ public:
+  Peak() : before_(ResidentBytes()), thread_([this] { Run(); }) {}
+  ~Peak() { Stop(); }
+  int64_t Growth() {
+    Stop();
+    return peak_ - before_;
+  }
+
+ private:
+  void Run() {
+    while (!stopped_) {
+      peak_ = std::max(peak_, ResidentBytes());
+      std::this_thread::sleep_for(milliseconds(2));
+    }
+  }
+  void Stop() {
+    stopped_ = true;
+    if (thread_.joinable()) thread_.join();
+  }
+
+  const int64_t before_;
+  int64_t peak_ = 0;
+  std::atomic<bool> stopped_{false};
+  std::thread thread_;
+};
+
+// ListMaps takes until the gate is opened.
+class GatedCore final : public PassingCore {
+ public:
+  struct Gate {
+    std::mutex mutex;
+    std::condition_variable changed;
+    bool open = false;
+    int running_count = 0;
+
+    void Open() {
+      std::lock_guard lock(mutex);
+      open = true;
+      changed.notify_all();
+    }
+    void WaitForRunning(int count) {
+      std::unique_lock lock(mutex);
+      changed.wait(lock, [&] { return running_count == count; });
+    }
+  };
+
+  GatedCore(std::unique_ptr<query::ServiceCore> core, std::shared_ptr<Gate> gate)
+      : PassingCore(std::move(core)), gate_(std::move(gate)) {}
+
+  absl::Status ListMaps(const CallContext& call, const v1::ListMapsRequest& request,
+                        v1::ListMapsResponse* reply) override {
+    {
+      std::unique_lock lock(gate_->mutex);
+      ++gate_->running_count;
+      gate_->changed.notify_all();
+      gate_->changed.wait(lock, [this] { return gate_->open; });
+    }
+    return PassingCore::ListMaps(call, request, reply);
+  }
+
+ private:
+  std::shared_ptr<Gate> gate_;
+};
+
+// `bytes` as the request of a call that is known by its path alone, on a connection of its own.
+class BytesCall {
+ public:
+  BytesCall(const std::string& address, const std::string& path, const grpc::ByteBuffer& bytes) {
+    grpc::ChannelArguments arguments;
+    arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+    stub_ = std::make_unique<grpc::GenericStub>(
+        grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments));
+    context_.set_deadline(system_clock::now() + seconds(60));
+    call_ = stub_->PrepareUnaryCall(&context_, path, bytes, &queue_);
+    call_->StartCall();
+    call_->Finish(&reply_, &status_, nullptr);
+  }
+
+  grpc::Status Wait() {
+    void* tag = nullptr;
+    bool ok = false;
+    queue_.Next(&tag, &ok);
+    return status_;
+  }
+  // Requires: Wait.
+  v1::Reason reason() const {
+    const auto& trailers = context_.GetServerTrailingMetadata();
+    const auto found = trailers.find(kErrorTrailer);
+    v1::ErrorDetail detail;
+    if (found == trailers.end()) return v1::REASON_UNSPECIFIED;
+    EXPECT_TRUE(detail.ParseFromString(std::string(found->second.data(), found->second.size())));
+    return detail.reason();
+  }
+
+ private:
+  std::unique_ptr<grpc::GenericStub> stub_;
+  grpc::ClientContext context_;
+  grpc::CompletionQueue queue_;
+  grpc::ByteBuffer reply_;
+  grpc::Status status_;
+  std::unique_ptr<grpc::GenericClientAsyncResponseReader> call_;
+};
+
+// Just under four mebibytes of empty messages in a list, within a message if `outer_tag` is given.
+grpc::ByteBuffer EmptyMessages(char tag, char outer_tag = 0) {
+  constexpr uint32_t kCount = 2'000'000;
+  std::string bytes;
+  if (outer_tag != 0) {
+    bytes.push_back(outer_tag);
+    for (uint32_t left = 2 * kCount; left > 0; left >>= 7) {
+      bytes.push_back(static_cast<char>((left & 0x7f) | (left >= 0x80 ? 0x80 : 0)));
+    }
+  }
+  for (uint32_t i = 0; i < kCount; ++i) bytes.append({tag, '\0'});
+  const grpc::Slice slice(bytes);
+  return grpc::ByteBuffer(&slice, 1);
+}
+
+// 2,000,000 nodes of a delta; as many paths.
+grpc::ByteBuffer EmptyNodes() { return EmptyMessages('\x52', '\x0a'); }
+grpc::ByteBuffer EmptyPaths() { return EmptyMessages('\x1a'); }
+
+class Hostile : public testing::Test {
+ protected:
+  Hostile() { test::MakeOffice(folder_.path()); }
+  ~Hostile() override {
+    gate_->Open();
+    stop_ = true;
+    if (bystander_.joinable()) bystander_.join();
+  }
+
+  void Start(ServerOptions options = {}) {
+    options.listen = "unix:" + folder_.path() + "/server.sock";
+    if (options.worker_count == 0) options.worker_count = 4;
+    auto server =
+        Server::Start(std::make_unique<GatedCore>(test::OpenCore(folder_.path()), gate_), options);
+    ASSERT_TRUE(server.ok()) << server.status();
+    server_ = *std::move(server);
+    maps_ = v1::MapService::NewStub(
+        grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials()));
+    ASSERT_TRUE(AskInfo());
+  }
+
+  bool AskInfo() {
+    grpc::ClientContext context;
+    context.set_deadline(system_clock::now() + seconds(20));
+    v1::GetServerInfoResponse reply;
+    const grpc::Status status = maps_->GetServerInfo(&context, {}, &reply);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    return status.ok();
+  }
+
+  // Somebody who asks all the time, on one connection, and is always answered.
+  void BeginBystander() {
+    bystander_ = std::thread([this] {
+      while (!stop_ && AskInfo()) ++answered_count_;
+    });
+  }
+  void EndBystander() {
+    const int before = answered_count_;
+    // It is still at it.
+    while (answered_count_ < before + 10 && bystander_.joinable() && !HasFailure()) {
+      std::this_thread::sleep_for(milliseconds(1));
+    }
+    stop_ = true;
+    bystander_.join();
+  }
+
+  test::TempFolder folder_;
+  std::shared_ptr<GatedCore::Gate> gate_ = std::make_shared<GatedCore::Gate>();
+  std::unique_ptr<Server> server_;
+  std::unique_ptr<v1::MapService::Stub> maps_;
+  std::atomic<bool> stop_{false};
+  std::atomic<int> answered_count_{0};
+  std::thread bystander_;
+};
+
+TEST_F(Hostile, AFloodOfResetsEndsItsOwnConnection) {
+  Start();
+  BeginBystander();
+  Peak peak;
+  test::RawHttp2 flooder(server_->address());
+  ASSERT_TRUE(flooder.SendPreface());
+  const int sent = test::FloodWithResets(&flooder, kLocate, 150'000);
+  EXPECT_TRUE(sent < 150'000 || flooder.IsClosedWithin(seconds(10)));
+  EndBystander();
+  EXPECT_LT(peak.Growth(), 300 * kMebibyte);
+}
+
+TEST_F(Hostile, AFloodOfWholeRequestsThatAreResetEndsItsOwnConnectionToo) {
+  Start();
+  BeginBystander();
+  Peak peak;
+  test::RawHttp2 flooder(server_->address());
+  ASSERT_TRUE(flooder.SendPreface());
+  bool is_open = true;
+  for (uint32_t stream = 1; stream < 200'000 && is_open; stream += 2) {
+    is_open =
+        flooder.Send(test::CallFrame(stream, kLocate) +
+                     test::DataFrame(stream, test::MessagePrefix(0)) + test::ResetFrame(stream));
+  }
+  EndBystander();
+  EXPECT_LT(peak.Growth(), 300 * kMebibyte);
+}
+
+TEST_F(Hostile, AFewResetsAreForgiven) {
+  Start();
+  test::RawHttp2 client(server_->address());
+  ASSERT_TRUE(client.SendPreface());
+  EXPECT_EQ(test::FloodWithResets(&client, kLocate, 300), 300);
+  EXPECT_FALSE(client.IsClosedWithin(milliseconds(300)));
+}
+
+TEST_F(Hostile, EmptyNodesAreRefusedBeforeTheyAreParsed) {
+  Start();
+  const grpc::ByteBuffer nodes = EmptyNodes();
+  BeginBystander();
+  Peak peak;
+  std::vector<std::unique_ptr<BytesCall>> calls;
+  for (int i = 0; i < 8; ++i) {
+    calls.push_back(std::make_unique<BytesCall>(server_->address(), kCommit, nodes));
+  }
+  for (const auto& call : calls) {
+    EXPECT_EQ(call->Wait().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+    EXPECT_EQ(call->reason(), v1::LIMIT_EXCEEDED);
+  }
+  EndBystander();
+  // One of them took 650 MB.
+  EXPECT_LT(peak.Growth(), 200 * kMebibyte);
+}
+
+TEST_F(Hostile, RequestsThatWaitForAWorkerHoldNoMoreThanTheirBytes) {
+  ServerOptions options;
+  options.worker_count = 2;
+  Start(options);
+  std::vector<std::future<grpc::Status>> held;
+  for (int i = 0; i < 2; ++i) {
+    held.push_back(std::async(std::launch::async, [this] {
+      grpc::ClientContext context;
+      context.set_deadline(system_clock::now() + seconds(60));
+      v1::ListMapsResponse reply;
+      return maps_->ListMaps(&context, {}, &reply);
+    }));
+  }
+  gate_->WaitForRunning(2);
+  const grpc::ByteBuffer paths = EmptyPaths();
+  Peak peak;
+  std::vector<std::unique_ptr<BytesCall>> calls;
+  for (int i = 0; i < 32; ++i) {
+    calls.push_back(std::make_unique<BytesCall>(server_->address(), kPlanPaths, paths));
+  }
+  // As many wait as may; the others are refused meanwhile.
+  while (server_->Load().queued_count < 14) std::this_thread::sleep_for(milliseconds(1));
+  std::this_thread::sleep_for(milliseconds(200));
+  gate_->Open();
+  for (auto& call : held) EXPECT_TRUE(call.get().ok());
+  int overloaded_count = 0;
+  for (const auto& call : calls) {
+    EXPECT_EQ(call->Wait().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+    if (call->reason() == v1::OVERLOADED) ++overloaded_count;
+  }
+  EXPECT_GT(overloaded_count, 8);
+  EXPECT_LT(peak.Growth(), 400 * kMebibyte);
+  EXPECT_TRUE(AskInfo());
+}
+
+TEST_F(Hostile, RequestsThatNeverEndGiveWayToOthers) {
+  Start();
+  BeginBystander();
+  std::vector<std::unique_ptr<test::RawHttp2>> clients;
+  for (int i = 0; i < 4; ++i) {
+    clients.push_back(std::make_unique<test::RawHttp2>(server_->address()));
+    ASSERT_TRUE(clients.back()->SendPreface());
+    for (uint32_t call = 0; call < 60; ++call) {
+      const uint32_t stream = 2 * call + 1;
+      ASSERT_TRUE(clients.back()->Send(
+          test::CallFrame(stream, kLocate) +
+          test::DataFrame(stream, test::MessagePrefix(1 << 20) + std::string(100, 'x'))));
+    }
+  }
+  EndBystander();
+}
+
+TEST_F(Hostile, BytesThatAreNoRequestAreCalledSo) {
+  Start();
+  const std::string bytes = "\xff\xff\xff";
+  const grpc::Slice slice(bytes);
+  BytesCall call(server_->address(), kLocate, grpc::ByteBuffer(&slice, 1));
+  EXPECT_EQ(call.Wait().error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(call.reason(), v1::FIELD_INVALID);
+}
+
+TEST_F(Hostile, ConnectionsBeyondTheBoundAreClosedAndThePlaceOfADeadOneIsTaken) {
+  ServerOptions options;
+  // The first is the fixture's own.
+  options.connection_max = 2;
+  Start(options);
+  auto second = std::make_unique<test::RawHttp2>(server_->address());
+  ASSERT_TRUE(second->SendPreface());
+  EXPECT_FALSE(second->IsClosedWithin(milliseconds(100)));
+  test::RawHttp2 third(server_->address());
+  third.SendPreface();
+  EXPECT_TRUE(third.IsClosedWithin(seconds(10)));
+  EXPECT_TRUE(AskInfo());
+  second = nullptr;
+  bool is_let_in = false;
+  for (int i = 0; i < 100 && !is_let_in; ++i) {
+    test::RawHttp2 later(server_->address());
+    later.SendPreface();
+    is_let_in = !later.IsClosedWithin(milliseconds(50));
+  }
+  EXPECT_TRUE(is_let_in);
+}
+
+}  // namespace
+}  // namespace dsg::server
