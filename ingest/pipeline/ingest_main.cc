@@ -26,6 +26,7 @@
 #include "ingest/pipeline/people_flags.h"
 #include "ingest/pipeline/progress.h"
 #include "ingest/pipeline/upright.h"
+#include "schema/base/byte_size.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
@@ -43,6 +44,7 @@ struct Flags {
   /// 0 = what the format is used to.
   double frame_period_s = 0.0;
   std::string agent_prefix;
+  bool is_strict = false;
   std::string epoch;
   std::string codec;
   std::string poses = "auto";
@@ -72,10 +74,10 @@ void AddFlags(CLI::App* app, Flags* flags) {
       ->capture_default_str();
   app->add_option("--quota", flags->limits.quota_bytes,
                   "With --store: refuse to let the map grow beyond (10GB, 500MiB); 0 = no limit")
-      ->transform(CLI::AsSizeValue(true));
+      ->transform(CLI::Validator(TakeByteSize, "SIZE"));
   app->add_option("--reserve", flags->limits.reserve_bytes,
                   "With --store: space kept so that forgetting works on a full disk; 0 = none")
-      ->transform(CLI::AsSizeValue(true));
+      ->transform(CLI::Validator(TakeByteSize, "SIZE"));
   app->add_option("--map", flags->map, "Name of the map; made if missing")
       ->envname("DSG_MAP")
       ->required();
@@ -88,6 +90,9 @@ void AddFlags(CLI::App* app, Flags* flags) {
                   "1/30 for images if not given");
   app->add_option("--agent-prefix", flags->agent_prefix,
                   "Put before every agent's name, to keep apart logs that reuse names");
+  app->add_flag("--strict", flags->is_strict,
+                "Refuse a scene graph with edges to nodes that are not there and the like; without "
+                "it they are skipped and counted");
   app->add_option("--epoch", flags->epoch,
                   "World time a new map begins at (nanoseconds or RFC 3339); default: the first "
                   "stamp of a log with a clock, else 0");
@@ -156,6 +161,7 @@ absl::StatusOr<LogOptions> MakeLogOptions(const Flags& flags) {
   options.loop_file = flags.loop_file;
   DSG_ASSIGN_OR_RETURN(options.poses, ParsePoseSource(flags.poses));
   options.agent_prefix = flags.agent_prefix;
+  options.is_strict = flags.is_strict;
   if (flags.frame_period_s != 0.0) DSG_RETURN_IF_ERROR(SetFramePeriod(flags, &options));
   if (!flags.epoch.empty()) {
     DSG_ASSIGN_OR_RETURN(options.epoch_ns, ParseTime(flags.epoch, 0));
@@ -163,12 +169,17 @@ absl::StatusOr<LogOptions> MakeLogOptions(const Flags& flags) {
   return options;
 }
 
+// Neither a number nor one relative to something.
+bool IsDate(const std::string& epoch) { return epoch.find('T') != std::string::npos; }
+
 MapSpec MakeSpec(const Flags& flags, const LogOptions& options, const LogInfo& info) {
   MapSpec spec;
   spec.name = flags.map;
   spec.epoch_ns = options.epoch_ns;
   if (flags.epoch.empty() && info.has_clock) spec.epoch_ns = info.first_ns;
-  spec.clock = info.has_clock ? info.clock : Clock::kMonotonic;
+  // A date as the begin of a log without a clock says which clock its times are to be read on.
+  const Clock clock = IsDate(flags.epoch) ? Clock::kUnix : Clock::kMonotonic;
+  spec.clock = info.has_clock ? info.clock : clock;
   if (flags.codec == "lossless") spec.codec = TrajectoryCodec::kLossless;
   return spec;
 }
@@ -274,6 +285,9 @@ void PrintSummary(const std::string& path, const LogInfo& info, const IngestSumm
   std::fflush(stdout);
 }
 
+// How often a log is begun again because others name agents in the map at the same time.
+constexpr int kConflictsMax = 100;
+
 absl::Status IngestOne(const Flags& flags, const std::string& path, LogOptions options,
                        const IngestOptions& ingest_options,
                        std::unique_ptr<Destination>* destination) {
@@ -301,18 +315,24 @@ absl::Status IngestOne(const Flags& flags, const std::string& path, LogOptions o
       std::fprintf(stderr, "%s: note: %s\n", path.c_str(), note.c_str());
     }
   }
-  std::string note;
-  DSG_ASSIGN_OR_RETURN(log, TurnUpright(std::move(log), path, options, flags.up, &note));
-  if (!flags.is_quiet && !note.empty()) {
-    std::fprintf(stderr, "%s: note: %s\n", path.c_str(), note.c_str());
-  }
-  DSG_ASSIGN_OR_RETURN(const std::unique_ptr<MapView> view, (*destination)->View());
   absl::StatusOr<IngestSummary> summary = absl::UnknownError("not run");
-  {
+  for (int tries = 0; tries < kConflictsMax; ++tries) {
+    if (tries > 0) {
+      DSG_ASSIGN_OR_RETURN(log, OpenLog(path, options));
+    }
+    std::string note;
+    DSG_ASSIGN_OR_RETURN(log, TurnUpright(std::move(log), path, options, flags.up, &note));
+    if (!flags.is_quiet && !note.empty() && tries == 0) {
+      std::fprintf(stderr, "%s: note: %s\n", path.c_str(), note.c_str());
+    }
+    DSG_ASSIGN_OR_RETURN(const std::unique_ptr<MapView> view, (*destination)->View());
     Progress progress(std::filesystem::path(path).filename().string(),
                       log->info().measurement_count, flags.is_quiet);
     summary = IngestLog(*log, options, ingest_options, *view, (*destination)->writer(),
                         [&progress](int64_t done) { progress.Update(done); });
+    // Another robot has given an id away that we had chosen for a new agent. What is committed of
+    // the log stays, and is passed over.
+    if (ReasonOf(summary.status()) != Reason::kParentRevisionStale) break;
   }
   if (!summary.ok()) return summary.status();
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;

@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "dsg/v1/errors.pb.h"
 #include "schema/base/status.h"
+#include "schema/codec/status_decode.h"
 
 namespace dsg::ingest {
 namespace {
@@ -18,7 +18,6 @@ namespace {
 using Clock = WaitNotes::Clock;
 using std::chrono::milliseconds;
 
-constexpr char kErrorTrailer[] = "dsg-error-bin";
 // Longer than any commit of 4 MiB takes on a slow disk; a slow link gets more with each attempt.
 constexpr std::chrono::seconds kAttemptTimeout(60);
 constexpr std::chrono::seconds kAttemptTimeoutMax(600);
@@ -93,18 +92,11 @@ std::shared_ptr<grpc::Channel> OpenChannel(const std::string& address) {
 }
 
 absl::Status ToStatus(const grpc::ClientContext& context, const grpc::Status& status) {
-  if (status.ok()) return absl::OkStatus();
   const auto& trailers = context.GetServerTrailingMetadata();
   const auto trailer = trailers.find(kErrorTrailer);
-  v1::ErrorDetail detail;
-  if (trailer != trailers.end() &&
-      detail.ParseFromArray(trailer->second.data(), static_cast<int>(trailer->second.size())) &&
-      detail.reason() != v1::REASON_UNSPECIFIED) {
-    const auto reason = static_cast<Reason>(static_cast<int>(detail.reason()));
-    return MakeError(reason, status.error_message(),
-                     {detail.metadata().begin(), detail.metadata().end()});
-  }
-  return absl::Status(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
+  std::string_view detail;
+  if (trailer != trailers.end()) detail = {trailer->second.data(), trailer->second.size()};
+  return DecodeStatus(status.error_code(), status.error_message(), detail);
 }
 
 ServerCaller::ServerCaller(std::string address, TimeNs retry_ns_max, TellWait tell)

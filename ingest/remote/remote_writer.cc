@@ -2,6 +2,7 @@
 #include "ingest/remote/remote_writer.h"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -10,12 +11,15 @@
 #include "dsg/v1/query_service.grpc.pb.h"
 #include "ingest/remote/remote_call.h"
 #include "schema/base/status.h"
+#include "schema/codec/patch.h"
 #include "schema/codec/proto_convert.h"
 
 namespace dsg::ingest {
 namespace {
 
 constexpr int kPageSize = 500;
+// Between a look at the agents and the commit others may write, again and again.
+constexpr int kGuardedTriesMax = 100;
 
 /// What all calls to one server share.
 struct Connection {
@@ -54,11 +58,40 @@ absl::Status Advise(const absl::Status& status, const std::string& address) {
   }
 }
 
+// All nodes of a layer, of one revision.
+absl::Status ListLayer(Connection& connection, v1::QueryService::Stub& query,
+                       const std::string& map, const std::string& layer, std::vector<Node>* nodes,
+                       Revision* revision) {
+  v1::ListNodesRequest request;
+  request.set_map(map);
+  request.mutable_filter()->set_layer(layer);
+  request.set_view(v1::NODE_VIEW_FULL);
+  request.set_page_size(kPageSize);
+  const LayerTable layers;
+  do {
+    v1::ListNodesResponse response;
+    DSG_RETURN_IF_ERROR(connection.Call([&](grpc::ClientContext* context) {
+      return query.ListNodes(context, request, &response);
+    }));
+    *revision = response.header().read_revision();
+    for (const v1::Node& proto : response.nodes()) {
+      DSG_ASSIGN_OR_RETURN(Node node, FromProto(proto, layers));
+      nodes->push_back(std::move(node));
+    }
+    // The token holds the revision of the first page.
+    request.set_page_token(response.next_page_token());
+  } while (!request.page_token().empty());
+  return absl::OkStatus();
+}
+
+// Robots that write one map at once choose ids for new agents of what they know of it; what one
+// brings first, the other must not write over.
 class RemoteWriter : public GraphWriter {
  public:
   RemoteWriter(Connection& connection, std::string map)
       : connection_(connection),
         stub_(v1::IngestService::NewStub(connection.channel)),
+        query_(v1::QueryService::NewStub(connection.channel)),
         map_(std::move(map)) {}
 
   absl::StatusOr<CommitResult> Commit(GraphDelta delta) override {
@@ -68,6 +101,8 @@ class RemoteWriter : public GraphWriter {
     }
     v1::CommitRequest request;
     ToProto(delta, layers_, request.mutable_delta());
+    // What a log says of a thing is all that is to be believed of it.
+    MarkWhole(request.mutable_delta());
     if (request.ByteSizeLong() > static_cast<size_t>(kSendBytesMax)) {
       return MakeError(
           Reason::kLimitExceeded,
@@ -77,9 +112,16 @@ class RemoteWriter : public GraphWriter {
           {{"sequence", absl::StrCat(delta.sequence)}});
     }
     v1::CommitResponse response;
-    const absl::Status status = connection_.Call(
-        [&](grpc::ClientContext* context) { return stub_->Commit(context, request, &response); });
+    absl::Status status = absl::OkStatus();
+    const std::vector<Node> agents = NewAgents(delta);
+    for (int tries = 0; tries < kGuardedTriesMax; ++tries) {
+      if (!agents.empty()) DSG_RETURN_IF_ERROR(Guard(agents, request.mutable_delta()));
+      status = connection_.Call(
+          [&](grpc::ClientContext* context) { return stub_->Commit(context, request, &response); });
+      if (agents.empty() || ReasonOf(status) != Reason::kParentRevisionStale) break;
+    }
     if (!status.ok()) return Advise(status, connection_.caller.address());
+    for (const Node& agent : agents) brought_.insert(agent.id);
     return CommitResult{response.revision(), response.replayed()};
   }
 
@@ -96,10 +138,42 @@ class RemoteWriter : public GraphWriter {
   }
 
  private:
+  std::vector<Node> NewAgents(const GraphDelta& delta) const {
+    std::vector<Node> agents;
+    for (const Node& node : delta.nodes) {
+      if (IsAgentKind(node.kind) && !brought_.contains(node.id)) agents.push_back(node);
+    }
+    return agents;
+  }
+
+  // Makes the delta one of the newest revision, in which the ids must be free, or of the same
+  // agents.
+  absl::Status Guard(const std::vector<Node>& agents, v1::GraphDelta* delta) {
+    std::vector<Node> known;
+    Revision revision = 0;
+    DSG_RETURN_IF_ERROR(ListLayer(connection_, *query_, map_, "agents", &known, &revision));
+    for (const Node& agent : agents) {
+      const auto same_id = std::find_if(known.begin(), known.end(),
+                                        [&](const Node& node) { return node.id == agent.id; });
+      if (same_id == known.end() || same_id->name == agent.name) continue;
+      return MakeError(
+          Reason::kParentRevisionStale,
+          absl::StrCat("map \"", map_, "\": ", ToString(agent.id), ", chosen for agent \"",
+                       agent.name, "\", has become the id of \"", same_id->name,
+                       "\"; read the map again and choose another"),
+          {{"map", map_}, {"agent", ToString(agent.id)}});
+    }
+    delta->set_parent_revision(revision);
+    return absl::OkStatus();
+  }
+
   Connection& connection_;
   std::unique_ptr<v1::IngestService::Stub> stub_;
+  std::unique_ptr<v1::QueryService::Stub> query_;
   std::string map_;
   LayerTable layers_;
+  /// Agents whose ids this writer has made its own.
+  std::set<NodeId> brought_;
 };
 
 class GrpcRemoteMap : public RemoteMap {
@@ -114,25 +188,9 @@ class GrpcRemoteMap : public RemoteMap {
   const MapSpec& spec() const override { return spec_; }
 
   absl::StatusOr<std::vector<Node>> ListNodes(const std::string& layer) override {
-    v1::ListNodesRequest request;
-    request.set_map(spec_.name);
-    request.mutable_filter()->set_layer(layer);
-    request.set_view(v1::NODE_VIEW_FULL);
-    request.set_page_size(kPageSize);
-    const LayerTable layers;
     std::vector<Node> nodes;
-    do {
-      v1::ListNodesResponse response;
-      DSG_RETURN_IF_ERROR(connection_->Call([&](grpc::ClientContext* context) {
-        return query_->ListNodes(context, request, &response);
-      }));
-      for (const v1::Node& proto : response.nodes()) {
-        DSG_ASSIGN_OR_RETURN(Node node, FromProto(proto, layers));
-        nodes.push_back(std::move(node));
-      }
-      // The token holds the revision of the first page, so the list is of one revision.
-      request.set_page_token(response.next_page_token());
-    } while (!request.page_token().empty());
+    Revision revision = 0;
+    DSG_RETURN_IF_ERROR(ListLayer(*connection_, *query_, spec_.name, layer, &nodes, &revision));
     return nodes;
   }
 

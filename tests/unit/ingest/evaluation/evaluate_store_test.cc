@@ -308,6 +308,14 @@ TEST_F(EvaluateStore, ScoresACorruptedGraphBadly) {
   std::swap(delta.factors[0].factors, delta.factors[1].factors);
   for (MeshBlock& block : delta.mesh_blocks) {
     block.faces.resize(block.faces.size() / 2);
+    // Vertices that no face uses any more belong to the block that they lie in.
+    std::vector<bool> is_used(block.positions_map.size(), false);
+    for (const auto& face : block.faces) {
+      for (const uint32_t vertex : face) is_used[vertex] = true;
+    }
+    for (size_t i = 0; i < is_used.size(); ++i) {
+      if (!is_used[i]) block.positions_map[i] = block.positions_map[0];
+    }
     for (uint32_t& label : block.labels) label = 11;
   }
   Coalesce(&delta);

@@ -118,7 +118,7 @@ class ForgottenTest : public testing::Test {
   }
 
   void ExpectSound() {
-    const auto report = reader_->Verify({});
+    const auto report = reader_->Verify({}, {});
     ASSERT_TRUE(report.ok()) << report.status();
     EXPECT_TRUE(report->problems.empty()) << report->problems.front();
   }

@@ -2,12 +2,20 @@
 // Which calls are repeated, and what their errors say.
 #include "ingest/remote/remote_call.h"
 
+#include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
+#include <stdlib.h>
 
 #include <algorithm>
 #include <condition_variable>
+#include <filesystem>
 #include <mutex>
 #include <vector>
+
+#include "dsg/v1/errors.pb.h"
+#include "dsg/v1/ingest_service.grpc.pb.h"
+#include "schema/base/status.h"
+#include "schema/codec/status_decode.h"
 
 namespace dsg::ingest {
 namespace {
@@ -67,6 +75,40 @@ TEST(ServerCaller, DoesNotRepeatForEverWhatMayBeTheServersOwnError) {
   EXPECT_EQ(CallAnswered({{grpc::StatusCode::INTERNAL, "a bug"}}, &attempt_count).code(),
             absl::StatusCode::kInternal);
   EXPECT_LE(attempt_count, 5);
+}
+
+// A server of a later version, which knows a reason that this build does not.
+class NewerServer final : public v1::IngestService::Service {
+ public:
+  grpc::Status GetSession(grpc::ServerContext* context, const v1::GetSessionRequest*,
+                          v1::GetSessionResponse*) override {
+    v1::ErrorDetail detail;
+    detail.set_reason(static_cast<v1::Reason>(199));
+    detail.set_domain("dsg");
+    context->AddTrailingMetadata(kErrorTrailer, detail.SerializeAsString());
+    return {grpc::StatusCode::FAILED_PRECONDITION, "session is sealed; begin another"};
+  }
+};
+
+TEST(ServerCaller, KeepsCodeAndMessageOfAReasonThatItDoesNotKnow) {
+  std::string folder = "/tmp/dsg_newer_XXXXXX";
+  ASSERT_NE(mkdtemp(folder.data()), nullptr);
+  const std::string address = "unix:" + folder + "/s";
+  NewerServer service;
+  grpc::ServerBuilder builder;
+  builder.AddListeningPort(address, grpc::InsecureServerCredentials());
+  builder.RegisterService(&service);
+  const std::unique_ptr<grpc::Server> server = builder.BuildAndStart();
+  const auto stub = v1::IngestService::NewStub(OpenChannel(address));
+  ServerCaller caller(address, kNsPerSecond, {});
+  const absl::Status status = caller.Call([&](grpc::ClientContext* context) {
+    v1::GetSessionResponse reply;
+    return stub->GetSession(context, {}, &reply);
+  });
+  EXPECT_EQ(status, absl::FailedPreconditionError("session is sealed; begin another"));
+  EXPECT_EQ(ReasonOf(status), Reason::kUnspecified);
+  server->Shutdown();
+  std::filesystem::remove_all(folder);
 }
 
 TEST(ServerCaller, SaysAtOnceThatItWaitsAndThatItIsOver) {

@@ -94,6 +94,58 @@ TEST_F(RemoteMapTest, CreatesAMissingMapAndFindsItAgain) {
   EXPECT_EQ((*again)->spec().epoch_ns, 77) << "the map's own spec holds";
 }
 
+TEST_F(RemoteMapTest, RobotsThatStartOneNewMapTogetherBothGoOn) {
+  StartServer();
+  for (int round = 0; round < 6; ++round) {
+    MapSpec spec;
+    spec.name = absl::StrCat("new", round);
+    std::vector<std::thread> robots;
+    for (int i = 0; i < 4; ++i) {
+      robots.emplace_back([&, i] {
+        const auto map = OpenRemoteMap(address(), spec);
+        ASSERT_TRUE(map.ok()) << map.status();
+        GraphDelta delta;
+        delta.map = spec.name;
+        delta.session_id = absl::StrCat("robot", i);
+        delta.sequence = 1;
+        delta.labels = {{100 + i, "label"}};
+        const auto result = (*map)->writer().Commit(delta);
+        EXPECT_TRUE(result.ok()) << result.status();
+      });
+    }
+    for (std::thread& robot : robots) robot.join();
+  }
+}
+
+TEST_F(RemoteMapTest, DoesNotWriteOverAnAgentThatAnotherRobotBroughtMeanwhile) {
+  StartServer();
+  const auto bring = [](const std::string& session, const std::string& name) {
+    GraphDelta delta;
+    delta.map = "test";
+    delta.session_id = session;
+    delta.sequence = 1;
+    Node node;
+    node.id = NodeId('H', 0);
+    node.layer = layers::kAgents;
+    node.kind = kinds::kHuman;
+    node.name = name;
+    delta.nodes = {node};
+    return delta;
+  };
+  const auto first = OpenMap();
+  const auto second = OpenMap();
+  ASSERT_TRUE(first->writer().Commit(bring("a", "ann")).ok());
+  const auto refused = second->writer().Commit(bring("b", "bob"));
+  EXPECT_EQ(ReasonOf(refused.status()), Reason::kParentRevisionStale);
+  EXPECT_EQ(MetadataOf(refused.status())["agent"], "H0");
+  // The same agent may come of two logs.
+  EXPECT_TRUE(second->writer().Commit(bring("b", "ann")).ok());
+  const auto agents = first->ListAgents();
+  ASSERT_TRUE(agents.ok()) << agents.status();
+  ASSERT_EQ(agents->size(), 1u);
+  EXPECT_EQ(agents->front().name, "ann");
+}
+
 TEST_F(RemoteMapTest, CommitsAndListsOverManyPages) {
   StartServer();
   const auto map = OpenMap();
