@@ -30,12 +30,12 @@ absl::StatusOr<Interval> AskedInterval(Session* session, const std::string& from
   if (from.empty() || to.empty()) {
     DSG_ASSIGN_OR_RETURN(asked, PoseSpan(session));
   }
-  const TimeNs epoch_ns = session->map().epoch_ns;
+  const MapSpec& map = session->map();
   if (!from.empty()) {
-    DSG_ASSIGN_OR_RETURN(asked.from_ns, ParseInstant("--from", from, epoch_ns));
+    DSG_ASSIGN_OR_RETURN(asked.from_ns, ParseInstant("--from", from, map));
   }
   if (!to.empty()) {
-    DSG_ASSIGN_OR_RETURN(asked.to_ns, ParseInstant("--to", to, epoch_ns));
+    DSG_ASSIGN_OR_RETURN(asked.to_ns, ParseInstant("--to", to, map));
   }
   return asked;
 }

@@ -7,12 +7,12 @@
 
 namespace dsg::cli {
 
-absl::Status FillFilter(const FilterOptions& options, TimeNs epoch_ns, v1::NodeFilter* filter) {
+absl::Status FillFilter(const FilterOptions& options, const MapSpec& map, v1::NodeFilter* filter) {
   filter->set_layer(options.layer);
   filter->set_kind(options.kind);
   filter->set_class_name(options.class_name);
   if (!options.at.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, ParseInstant("--at", options.at, epoch_ns));
+    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, ParseInstant("--at", options.at, map));
     filter->set_at_ns(at_ns);
   }
   return absl::OkStatus();

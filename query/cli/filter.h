@@ -4,7 +4,7 @@
 
 #include "absl/status/status.h"
 #include "query/cli/session.h"
-#include "schema/base/time.h"
+#include "schema/model/layer.h"
 
 namespace dsg::v1 {
 class NodeFilter;
@@ -13,7 +13,7 @@ class NodeFilter;
 namespace dsg::cli {
 
 /// Errors: INVALID_ARGUMENT naming --at.
-absl::Status FillFilter(const FilterOptions& options, TimeNs epoch_ns, v1::NodeFilter* filter);
+absl::Status FillFilter(const FilterOptions& options, const MapSpec& map, v1::NodeFilter* filter);
 
 /// For lists that came out empty: an error if a word that was asked for is none that the map knows;
 /// empty words are no question. Errors: NOT_FOUND/CLASS_UNKNOWN, RELATION_UNKNOWN, LAYER_UNKNOWN.

@@ -69,6 +69,9 @@ void AddFileVerbs(Grammar* grammar) {
   const auto [app, import] = grammar->Add<ImportVerb>(
       "import", "Add a scene-graph file (Spark-DSG, Kimera) to a map", kMap | kJson);
   app->add_option("FILE", import->file, "The file; a .dsgz is restored")->required();
+  app->add_flag("--strict", import->is_strict,
+                "Refuse a file with edges to nodes that are not there and the like; without it "
+                "they are skipped and counted");
   const auto [verify_app, verify] = grammar->Add<VerifyVerb>(
       "verify", "Check every page, row and revision of a map, an archive or a backup",
       kMap | kJson);

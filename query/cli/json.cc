@@ -9,7 +9,9 @@
 
 #include <string>
 
+#include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include "schema/base/status.h"
 
 namespace dsg::cli {
 namespace {
@@ -34,30 +36,53 @@ util::Status SortedJson(const google::protobuf::Message& reply,
                                   text, options);
 }
 
-absl::Status Write(const google::protobuf::Message& reply, bool on_one_line, std::ostream& out) {
+absl::StatusOr<std::string> ToText(const google::protobuf::Message& reply, bool on_one_line) {
   util::JsonPrintOptions options;
   options.add_whitespace = !on_one_line;
   options.always_print_primitive_fields = true;
   options.preserve_proto_field_names = true;
   std::string text;
   const auto status = SortedJson(reply, options, &text);
-  if (!status.ok()) {
-    return absl::InternalError(absl::StrCat("the reply ", reply.GetTypeName(),
-                                            " cannot be written as JSON: ", status.ToString()));
-  }
-  out << text;
-  if (on_one_line) out << "\n";
-  return absl::OkStatus();
+  if (status.ok()) return text;
+  return absl::InternalError(absl::StrCat("the reply ", reply.GetTypeName(),
+                                          " cannot be written as JSON: ", status.ToString()));
 }
 
 }  // namespace
 
 absl::Status WriteJson(const google::protobuf::Message& reply, std::ostream& out) {
-  return Write(reply, /*on_one_line=*/false, out);
+  DSG_ASSIGN_OR_RETURN(const std::string text, ToText(reply, /*on_one_line=*/false));
+  out << text;
+  return absl::OkStatus();
 }
 
 absl::Status WriteJsonLine(const google::protobuf::Message& reply, std::ostream& out) {
-  return Write(reply, /*on_one_line=*/true, out);
+  DSG_ASSIGN_OR_RETURN(const std::string text, ToText(reply, /*on_one_line=*/true));
+  out << text << "\n";
+  return absl::OkStatus();
+}
+
+absl::Status JsonListWriter::Add(const google::protobuf::Message& part) {
+  DSG_ASSIGN_OR_RETURN(const std::string text, ToText(part, /*on_one_line=*/false));
+  // Line ends stand between fields only, and what is deeper stands further to the right.
+  const std::string head = absl::StrCat("\n \"", list_, "\": [");
+  const size_t begin = text.find(head) + head.size();
+  const size_t end = text[begin] == ']' ? begin : text.find("\n ]", begin);
+  if (!has_begun_) {
+    out_ << text.substr(0, begin);
+    rest_ = text.substr(text.find(']', end));
+  }
+  has_begun_ = true;
+  if (end == begin) return absl::OkStatus();
+  if (has_entries_) out_ << ",";
+  out_.write(text.data() + begin, static_cast<std::streamsize>(end - begin));
+  has_entries_ = true;
+  return absl::OkStatus();
+}
+
+void JsonListWriter::End() {
+  if (has_entries_) out_ << "\n ";
+  out_ << rest_;
 }
 
 }  // namespace dsg::cli

@@ -18,10 +18,16 @@ std::vector<Column> NodeColumns() {
 }
 
 std::vector<std::string> NodeCells(const v1::Node& node) {
+  std::vector<std::string> cells = {node.id(), node.kind(), node.layer(), node.name(),
+                                    node.semantic_class().name()};
+  // An agent that nobody saw at the instant has none.
+  if (!node.has_map_t_node()) {
+    cells.insert(cells.end(), 3, "unknown");
+    return cells;
+  }
   const v1::Vector3& p = node.map_t_node().position();
-  return {
-      node.id(),       node.kind(),     node.layer(),   node.name(), node.semantic_class().name(),
-      Fixed(p.x(), 2), Fixed(p.y(), 2), Fixed(p.z(), 2)};
+  for (const double coordinate : {p.x(), p.y(), p.z()}) cells.push_back(Fixed(coordinate, 2));
+  return cells;
 }
 
 std::string Footer(int64_t count, const std::string& noun, int64_t revision, bool is_cut) {

@@ -38,6 +38,8 @@ struct WatchVerb {
 
 struct ImportVerb {
   std::string file;
+  /// Refuse a file of which anything would be skipped.
+  bool is_strict = false;
 };
 
 struct ExportVerb {

@@ -83,7 +83,7 @@ std::string RenderStats(const v1::GetMapStatsResponse& reply, const TimeText& ti
   if (reply.has_first_pose_ns() && reply.has_last_pose_ns()) {
     absl::StrAppend(&poses, ", ", times.Span(reply.first_pose_ns(), reply.last_pose_ns()));
   }
-  const std::vector<Field> fields{
+  std::vector<Field> fields{
       {"map", reply.map().name()},
       {"revision", absl::StrCat(reply.header().read_revision(), " (newest ", reply.head_revision(),
                                 ", oldest readable ", reply.header().oldest_revision(), ")")},
@@ -99,6 +99,14 @@ std::string RenderStats(const v1::GetMapStatsResponse& reply, const TimeText& ti
       {"on disk", BytesText(reply.bytes_on_disk())},
       {"format", absl::StrCat(reply.format_version())},
   };
+  if (reply.has_pending_erasure()) {
+    const v1::PendingErasure& left = reply.pending_erasure();
+    fields.push_back(
+        {"erasure",
+         absl::StrCat("begun and cut off; still names ", left.node_count(), " nodes, ",
+                      left.edge_count(), " edges, ", left.mesh_block_count(), " mesh blocks, ",
+                      left.span_count(), " stretches of tracks; run the same prune again")});
+  }
   Table layers({{"layer"}, {"rank", Align::kRight}, {"nodes", Align::kRight}});
   for (const v1::LayerStats& layer : reply.layers()) {
     layers.AddRow({layer.name(), absl::StrCat(layer.rank()), absl::StrCat(layer.node_count())});

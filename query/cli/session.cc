@@ -20,10 +20,13 @@ std::string PlaceOf(const CommonOptions& common) {
                                : absl::StrCat("server ", common.server);
 }
 
+// A program that asks one question has little use of what it keeps.
+constexpr size_t kCacheBytes = size_t{64} << 20;
+
 absl::StatusOr<std::unique_ptr<query::Api>> OpenApi(const CommonOptions& common) {
   if (!common.server.empty()) return client::Connect(common.server);
-  DSG_ASSIGN_OR_RETURN(std::unique_ptr<GraphStore> store,
-                       GraphStore::Open(common.store, {.program = "dsg"}));
+  const StoreOptions options{.cache_bytes = kCacheBytes, .program = "dsg"};
+  DSG_ASSIGN_OR_RETURN(std::unique_ptr<GraphStore> store, GraphStore::Open(common.store, options));
   return query::MakeServiceCore(std::move(store));
 }
 

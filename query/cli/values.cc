@@ -4,9 +4,11 @@
 #include <cmath>
 #include <vector>
 
+#include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "absl/strings/strip.h"
 #include "schema/base/status.h"
 
 namespace dsg::cli {
@@ -16,6 +18,17 @@ absl::Status BadValue(Reason reason, const std::string& option, const std::strin
                       const std::string& what) {
   return MakeError(reason, absl::StrCat(option, " \"", text, "\": ", what),
                    {{"field", option}, {"value", text}});
+}
+
+// Whether a number of nanoseconds is so small that seconds may be meant: less than a second, or, on
+// a map of our days, less than three years after 1970.
+bool MayBeSeconds(TimeNs number, const MapSpec& map) {
+  constexpr TimeNs kThreeYears = 100'000'000 * kNsPerSecond;
+  const auto is_within = [](TimeNs time_ns, TimeNs limit) {
+    return -limit < time_ns && time_ns < limit;
+  };
+  if (number == 0 && map.epoch_ns == 0) return false;
+  return is_within(number, is_within(map.epoch_ns, kThreeYears) ? kNsPerSecond : kThreeYears);
 }
 
 // As many as there are.
@@ -102,9 +115,31 @@ absl::StatusOr<TimeNs> ParseDuration(const std::string& option, const std::strin
 }
 
 absl::StatusOr<TimeNs> ParseInstant(const std::string& option, const std::string& text,
-                                    TimeNs epoch_ns) {
-  const auto time_ns = dsg::ParseTime(text, epoch_ns);
+                                    const MapSpec& map) {
+  const bool is_signed = absl::StartsWith(text, "+") || absl::StartsWith(text, "-");
+  absl::string_view digits = text;
+  TimeNs number = 0;
+  if (!is_signed && absl::ConsumeSuffix(&digits, "ns") && absl::SimpleAtoi(digits, &number)) {
+    return number;
+  }
+  const bool is_number = text[0] != '+' && absl::SimpleAtoi(text, &number);
+  const auto time_ns = dsg::ParseTime(text, map.epoch_ns);
   if (!time_ns.ok()) return Annotate(time_ns.status(), option);
+  if (is_number && MayBeSeconds(number, map)) {
+    return BadValue(Reason::kFieldInvalid, option, text,
+                    absl::StrCat("a number alone means nanoseconds on the map's clock, here ", text,
+                                 " ns; write \"", is_signed ? "" : "+", text,
+                                 "s\" for seconds from the map's begin",
+                                 is_signed ? "" : absl::StrCat(", or \"", text, "ns\"")));
+  }
+  if (!is_number && !is_signed && map.clock != Clock::kUnix) {
+    return BadValue(
+        Reason::kFieldInvalid, option, text,
+        absl::StrCat("the map's clock is ",
+                     map.clock == Clock::kPtpTai ? "TAI, some seconds ahead of UTC"
+                                                 : "that of its log, which has no dates",
+                     "; write \"+12.5s\" from the map's begin"));
+  }
   return *time_ns;
 }
 

@@ -9,6 +9,7 @@
 #include "absl/status/statusor.h"
 #include "schema/base/time.h"
 #include "schema/model/geometry.h"
+#include "schema/model/layer.h"
 
 namespace dsg::cli {
 
@@ -30,8 +31,11 @@ absl::StatusOr<Pose3d> ParsePose(const std::string& option, const std::string& t
 /// "0.5s", "200ms"; seconds without a unit. Errors: INVALID_ARGUMENT/FIELD_INVALID unless positive.
 absl::StatusOr<TimeNs> ParseDuration(const std::string& option, const std::string& text);
 
-/// dsg::ParseTime with the option's name in the error.
+/// An instant of the map's time: "+12.5s" from its epoch, nanoseconds on its clock, or a date where
+/// the clock is UTC. "30ns" says that a small number means nanoseconds.
+/// Errors: INVALID_ARGUMENT/FIELD_INVALID naming the option; a bare number that may be meant as
+/// seconds, and a date on another clock, are refused with what to write instead.
 absl::StatusOr<TimeNs> ParseInstant(const std::string& option, const std::string& text,
-                                    TimeNs epoch_ns);
+                                    const MapSpec& map);
 
 }  // namespace dsg::cli

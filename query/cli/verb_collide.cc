@@ -77,8 +77,7 @@ absl::StatusOr<v1::CheckCollisionRequest> RequestFor(Session* session, const Col
   DSG_RETURN_IF_ERROR(FillBody(verb, request.add_bodies()));
   FillScope(verb, request.mutable_scope());
   if (!verb.at.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns,
-                         ParseInstant("--at", verb.at, session->map().epoch_ns));
+    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, ParseInstant("--at", verb.at, session->map()));
     request.set_at_ns(at_ns);
   }
   request.set_margin_m(verb.margin_m);

@@ -38,8 +38,7 @@ absl::StatusOr<v1::SearchNodesRequest> RequestFor(Session* session, const FindVe
     ToProto(box, request.mutable_box());
   }
   if (!verb.at.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns,
-                         ParseInstant("--at", verb.at, session->map().epoch_ns));
+    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, ParseInstant("--at", verb.at, session->map()));
     request.set_at_ns(at_ns);
   }
   request.set_view(v1::NODE_VIEW_GEOMETRY);

@@ -79,8 +79,7 @@ absl::StatusOr<v1::PlanPathRequest> RequestFor(Session* session, const PathVerb&
   for (const std::string& node : verb.blocked) request.add_blocked(node);
   request.set_mode(verb.flat ? v1::FLAT : v1::HIERARCHICAL);
   if (!verb.at.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns,
-                         ParseInstant("--at", verb.at, session->map().epoch_ns));
+    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, ParseInstant("--at", verb.at, session->map()));
     request.set_at_ns(at_ns);
   }
   request.set_check_collision(verb.check);

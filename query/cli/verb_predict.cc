@@ -33,8 +33,7 @@ absl::StatusOr<v1::PredictAgentRequest> RequestFor(Session* session, const Predi
   request.set_path_count_max(verb.path_count);
   request.set_stop_at_walls(verb.stop_at_walls);
   if (!verb.at.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs from_ns,
-                         ParseInstant("--at", verb.at, session->map().epoch_ns));
+    DSG_ASSIGN_OR_RETURN(const TimeNs from_ns, ParseInstant("--at", verb.at, session->map()));
     request.set_from_ns(from_ns);
   }
   if (!verb.horizon.empty()) {

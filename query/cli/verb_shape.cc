@@ -26,13 +26,13 @@ namespace {
 absl::StatusOr<v1::GetAgentShapeRequest> RequestOf(const Session& session, const ShapeVerb& verb) {
   auto request = session.Begin<v1::GetAgentShapeRequest>();
   request.set_agent(verb.agent);
-  const TimeNs epoch_ns = session.map().epoch_ns;
+  const MapSpec& map = session.map();
   if (!verb.from.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs from_ns, ParseInstant("--from", verb.from, epoch_ns));
+    DSG_ASSIGN_OR_RETURN(const TimeNs from_ns, ParseInstant("--from", verb.from, map));
     request.set_from_ns(from_ns);
   }
   if (!verb.to.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs to_ns, ParseInstant("--to", verb.to, epoch_ns));
+    DSG_ASSIGN_OR_RETURN(const TimeNs to_ns, ParseInstant("--to", verb.to, map));
     request.set_to_ns(to_ns);
   }
   return request;

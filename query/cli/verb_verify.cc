@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "query/cli/interrupt.h"
 #include "query/cli/map_names.h"
 #include "query/cli/progress.h"
 #include "query/cli/table.h"
@@ -27,21 +28,21 @@ VerifyReport DamageOf(const absl::Status& status) {
 }
 
 absl::StatusOr<VerifyReport> VerifyMap(GraphStore* store, const std::string& name,
-                                       std::ostream& progress_out) {
+                                       const StopCheck& stop, std::ostream& progress_out) {
   DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> map, store->OpenMap(name));
   Progress progress(absl::StrCat("verify ", name), &progress_out);
-  return map->Verify([&progress](double fraction) { progress.Update(fraction); });
+  return map->Verify(stop, [&progress](double fraction) { progress.Update(fraction); });
 }
 
 // A map that is too damaged to be read is a finding about it, and the others are still checked.
 absl::StatusOr<VerifyReport> FindProblems(GraphStore* store, const std::string& name, bool is_asked,
-                                          std::ostream& progress_out) {
-  auto report = VerifyMap(store, name, progress_out);
+                                          const StopCheck& stop, std::ostream& progress_out) {
+  auto report = VerifyMap(store, name, stop, progress_out);
   const Reason reason = ReasonOf(report.status());
   const bool is_other_format = reason == Reason::kFormatTooNew || reason == Reason::kFormatTooOld;
   // A name that was given may be a wrong one.
   const bool is_damage = absl::IsDataLoss(report.status()) || (!is_asked && !is_other_format);
-  if (report.ok() || !is_damage) return report;
+  if (report.ok() || absl::IsCancelled(report.status()) || !is_damage) return report;
   return DamageOf(report.status());
 }
 
@@ -98,32 +99,32 @@ class Findings {
   absl::Status other_format_;
 };
 
-absl::Status AddArchive(const std::string& path, const std::string& name, Findings* findings,
-                        std::ostream& progress_out) {
+absl::Status AddArchive(const std::string& path, const std::string& name, const StopCheck& stop,
+                        Findings* findings, std::ostream& progress_out) {
   Progress progress(absl::StrCat("verify ", name), &progress_out);
   const auto report =
-      VerifyArchive(path, StopCheck(), [&progress](double fraction) { progress.Update(fraction); });
+      VerifyArchive(path, stop, [&progress](double fraction) { progress.Update(fraction); });
   if (!report.ok() && !absl::IsDataLoss(report.status())) return report.status();
   findings->Add(name, report.ok() ? *report : DamageOf(report.status()));
   return absl::OkStatus();
 }
 
-absl::Status VerifyFiles(const std::string& path, const CommonOptions& common, std::ostream& out,
-                         std::ostream& progress_out) {
+absl::Status VerifyFiles(const std::string& path, const CommonOptions& common,
+                         const StopCheck& stop, std::ostream& out, std::ostream& progress_out) {
   Findings findings(&out, common.json);
   std::error_code error;
   if (!std::filesystem::is_directory(path, error)) {
-    DSG_RETURN_IF_ERROR(AddArchive(path, path, &findings, progress_out));
+    DSG_RETURN_IF_ERROR(AddArchive(path, path, stop, &findings, progress_out));
     return findings.Verdict(absl::StrCat("archive ", path), "take another copy of it");
   }
   DSG_ASSIGN_OR_RETURN(const BackupManifest backup, ReadBackupManifest(path));
   for (const BackupEntry& entry : backup.maps) {
     if (!common.map.empty() && entry.map != common.map) continue;
-    const absl::Status intact = CheckBackupFile(path, entry, StopCheck(), nullptr);
+    const absl::Status intact = CheckBackupFile(path, entry, stop, nullptr);
     if (!intact.ok() && !absl::IsDataLoss(intact)) return intact;
     if (intact.ok()) {
       const std::string file = absl::StrCat(path, "/", entry.file);
-      DSG_RETURN_IF_ERROR(AddArchive(file, entry.map, &findings, progress_out));
+      DSG_RETURN_IF_ERROR(AddArchive(file, entry.map, stop, &findings, progress_out));
     } else {
       findings.Add(entry.map, DamageOf(intact));
     }
@@ -137,14 +138,17 @@ absl::Status VerifyFiles(const std::string& path, const CommonOptions& common, s
 
 absl::Status RunVerify(const CommonOptions& common, const VerifyVerb& verb, std::ostream& out,
                        std::ostream& progress_out) {
-  if (!verb.path.empty()) return VerifyFiles(verb.path, common, out, progress_out);
+  query::CallContext call;
+  const InterruptGuard guard(&call);
+  const StopCheck stop = call.stop();
+  if (!verb.path.empty()) return VerifyFiles(verb.path, common, stop, out, progress_out);
   DSG_ASSIGN_OR_RETURN(const std::unique_ptr<GraphStore> store,
                        GraphStore::Open(common.store, {.program = "dsg verify"}));
   DSG_ASSIGN_OR_RETURN(const std::vector<std::string> names, MapNames(store->folder(), common.map));
   Findings findings(&out, common.json);
   if (names.empty()) findings.AddNothing(absl::StrCat("store ", common.store));
   for (const std::string& name : names) {
-    const auto report = FindProblems(store.get(), name, !common.map.empty(), progress_out);
+    const auto report = FindProblems(store.get(), name, !common.map.empty(), stop, progress_out);
     if (report.ok()) {
       findings.Add(name, *report);
     } else if (common.map.empty() && absl::IsFailedPrecondition(report.status())) {

@@ -66,7 +66,7 @@ AnswerPicture DrawTrack(const v1::GetTrajectoryResponse& track, const Session& s
 absl::Status RunWhere(Session* session, const WhereVerb& verb, std::ostream& out) {
   auto request = session->Begin<v1::LocateAgentRequest>();
   request.set_agent(verb.agent);
-  DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, ParseInstant("--at", verb.at, session->map().epoch_ns));
+  DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, ParseInstant("--at", verb.at, session->map()));
   request.set_at_ns(at_ns);
   v1::LocateAgentResponse reply;
   DSG_RETURN_IF_ERROR(
@@ -81,37 +81,46 @@ absl::Status RunTrack(Session* session, const TrackVerb& verb, std::ostream& out
   DSG_RETURN_IF_ERROR(CheckPicture(verb.picture));
   auto request = session->Begin<v1::GetTrajectoryRequest>();
   request.set_agent(verb.agent);
-  const TimeNs epoch_ns = session->map().epoch_ns;
+  const MapSpec& map = session->map();
   if (!verb.from.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs from_ns, ParseInstant("--from", verb.from, epoch_ns));
+    DSG_ASSIGN_OR_RETURN(const TimeNs from_ns, ParseInstant("--from", verb.from, map));
     request.set_from_ns(from_ns);
   }
   if (!verb.to.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs to_ns, ParseInstant("--to", verb.to, epoch_ns));
+    DSG_ASSIGN_OR_RETURN(const TimeNs to_ns, ParseInstant("--to", verb.to, map));
     request.set_to_ns(to_ns);
   }
   if (!verb.every.empty()) {
     DSG_ASSIGN_OR_RETURN(const TimeNs period_ns, ParseDuration("--every", verb.every));
     request.set_resample_period_ns(period_ns);
   }
-  // The stream's messages as one: header and agent stand in the first, poses in all.
+  // JSON is written as it comes; a table or a picture is made of the whole.
+  const bool is_json = session->common().json;
+  const bool is_kept = !is_json || !verb.picture.png.empty();
+  JsonListWriter json("poses", &out);
   v1::GetTrajectoryResponse all;
-  const int64_t pose_count_max = EntriesLeft(session->common().limit);
-  const auto merge = [&](const v1::GetTrajectoryResponse& message) {
-    all.MergeFrom(message);
-    return all.poses_size() < pose_count_max;
+  int64_t poses_left = EntriesLeft(session->common().limit);
+  absl::Status written;
+  const auto take = [&](v1::GetTrajectoryResponse message) {
+    if (message.poses_size() > poses_left) {
+      message.mutable_poses()->DeleteSubrange(static_cast<int>(poses_left),
+                                              message.poses_size() - static_cast<int>(poses_left));
+    }
+    poses_left -= message.poses_size();
+    if (is_json) written = json.Add(message);
+    // Header and agent stand in the first, poses in all.
+    if (is_kept) all.MergeFrom(message);
+    return written.ok() && poses_left > 0;
   };
   DSG_RETURN_IF_ERROR(
-      session->times().Explain(session->api().GetTrajectory(session->NewCall(), request, merge)));
-  if (all.poses_size() > pose_count_max) {
-    all.mutable_poses()->DeleteSubrange(static_cast<int>(pose_count_max),
-                                        all.poses_size() - static_cast<int>(pose_count_max));
-  }
-  if (session->common().json) {
-    DSG_RETURN_IF_ERROR(WriteJson(all, out));
+      session->times().Explain(session->api().GetTrajectory(session->NewCall(), request, take)));
+  DSG_RETURN_IF_ERROR(written);
+  if (is_json) {
+    json.End();
   } else {
     out << RenderTrack(all, session->times());
   }
+  if (verb.picture.png.empty()) return absl::OkStatus();
   return WritePicture(session, verb.picture, DrawTrack(all, *session, verb.agent), out);
 }
 

@@ -20,8 +20,7 @@ absl::Status RunAround(Session* session, const AroundVerb& verb, std::ostream& o
   request.set_outgoing(verb.outgoing);
   request.set_incoming(verb.incoming);
   if (!verb.at.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns,
-                         ParseInstant("--at", verb.at, session->map().epoch_ns));
+    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, ParseInstant("--at", verb.at, session->map()));
     request.set_at_ns(at_ns);
   }
   request.set_view(v1::NODE_VIEW_BASIC);
@@ -46,7 +45,7 @@ absl::Status RunSubgraph(Session* session, const SubgraphVerb& verb, std::ostrea
   request.set_depth_max(verb.depth);
   request.set_tree_only(verb.tree_only);
   request.set_view(v1::NODE_VIEW_GEOMETRY);
-  DSG_RETURN_IF_ERROR(FillFilter(verb.filter, session->map().epoch_ns, request.mutable_filter()));
+  DSG_RETURN_IF_ERROR(FillFilter(verb.filter, session->map(), request.mutable_filter()));
   v1::GetSubgraphResponse all;
   const auto merge = [&](const v1::GetSubgraphResponse& message) {
     all.MergeFrom(message);

@@ -25,7 +25,7 @@ namespace {
 absl::StatusOr<ContentAnswer> Read(Session* session, const std::string& at,
                                    ContentOptions options) {
   if (!at.empty()) {
-    DSG_ASSIGN_OR_RETURN(options.at_ns, ParseInstant("--at", at, session->map().epoch_ns));
+    DSG_ASSIGN_OR_RETURN(options.at_ns, ParseInstant("--at", at, session->map()));
   }
   return ReadContent(*session, &session->api(), options);
 }
@@ -92,7 +92,7 @@ std::string TitleOf(const Session& session, const ContentAnswer& answer, const M
   std::string title =
       absl::StrCat(answer.content.spec.name, "  revision ", answer.content.revision);
   if (!verb.at.empty()) {
-    const auto at_ns = ParseInstant("--at", verb.at, session.map().epoch_ns);
+    const auto at_ns = ParseInstant("--at", verb.at, session.map());
     if (at_ns.ok()) absl::StrAppend(&title, "  at ", session.times().Full(*at_ns));
   } else if (answer.last_pose_ns.has_value()) {
     // To the millisecond, which is more than a picture shows.

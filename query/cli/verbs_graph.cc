@@ -16,7 +16,7 @@ namespace dsg::cli {
 absl::Status RunList(Session* session, const ListVerb& verb, std::ostream& out) {
   auto request = session->Begin<v1::ListNodesRequest>();
   v1::NodeFilter* filter = request.mutable_filter();
-  DSG_RETURN_IF_ERROR(FillFilter(verb.filter, session->map().epoch_ns, filter));
+  DSG_RETURN_IF_ERROR(FillFilter(verb.filter, session->map(), filter));
   filter->set_parent_id(verb.parent);
   filter->set_name(verb.name);
   if (!verb.box.empty()) {
@@ -46,8 +46,7 @@ absl::Status RunEdges(Session* session, const EdgesVerb& verb, std::ostream& out
   request.set_relation(verb.relation);
   request.set_target(verb.target);
   if (!verb.at.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns,
-                         ParseInstant("--at", verb.at, session->map().epoch_ns));
+    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, ParseInstant("--at", verb.at, session->map()));
     request.set_at_ns(at_ns);
   }
   v1::ListEdgesResponse all;
@@ -86,7 +85,7 @@ absl::Status RunNear(Session* session, const NearVerb& verb, std::ostream& out) 
   request.set_k(verb.k);
   request.set_max_distance_m(verb.max_distance_m);
   request.set_view(v1::NODE_VIEW_GEOMETRY);
-  DSG_RETURN_IF_ERROR(FillFilter(verb.filter, session->map().epoch_ns, request.mutable_filter()));
+  DSG_RETURN_IF_ERROR(FillFilter(verb.filter, session->map(), request.mutable_filter()));
   v1::ListNearestNodesResponse reply;
   DSG_RETURN_IF_ERROR(session->api().ListNearestNodes(session->NewCall(), request, &reply));
   if (reply.nodes().empty()) {

@@ -108,6 +108,7 @@ TEST(RenderHits, ShowsDistanceRoomAndWhatItStandsOn) {
   v1::SearchHit* hit = reply.add_hits();
   hit->mutable_node()->set_id("O8");
   hit->mutable_node()->set_kind("object");
+  hit->mutable_node()->mutable_map_t_node()->mutable_position();
   hit->mutable_node()->set_layer("objects");
   hit->mutable_node()->mutable_semantic_class()->set_name("plate");
   hit->set_distance_m(1.5);

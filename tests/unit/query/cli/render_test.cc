@@ -152,6 +152,7 @@ TEST(RenderNearest, BeginsWithTheDistance) {
   v1::NearestNode* nearest = reply.add_nodes();
   nearest->set_distance_m(1.25);
   nearest->mutable_node()->set_id("O1");
+  nearest->mutable_node()->mutable_map_t_node()->mutable_position();
   const std::string text = RenderNearest(reply);
   EXPECT_EQ(text.substr(0, text.find('\n')),
             "distance m  id  kind  layer  name  class   x m   y m   z m");

@@ -395,6 +395,41 @@ TEST_F(ImportTest, ATruncatedFileLeavesNoMapBehind) {
   EXPECT_EQ(AskJson({"maps"})["maps"].size(), 1u);
 }
 
+// A file of three nodes and three edges, of which one leads nowhere.
+constexpr char kDangling[] = R"({"nodes": [
+    {"id": 5908722711110090753, "layer": 4, "attributes": {"type": "RoomNodeAttributes",
+     "position": [0, 0, 0]}},
+    {"id": 5692549928996306945, "layer": 2, "attributes": {"type": "ObjectNodeAttributes",
+     "position": [1, 0, 0]}},
+    {"id": 5692549928996306946, "layer": 2, "attributes": {"type": "ObjectNodeAttributes",
+     "position": [2, 0, 0]}}], "edges": [
+    {"source": 5908722711110090753, "target": 5692549928996306945, "info": {}},
+    {"source": 5908722711110090753, "target": 5692549928996306946, "info": {}},
+    {"source": 5908722711110090753, "target": 5692549928996306999, "info": {}}]})";
+constexpr char kDanglingWords[] =
+    "skipped 1 edges to nodes that are not there: edge R1 to O55: node 5692549928996306999 (O55) "
+    "is not in the file";
+
+TEST_F(RunTest, ImportsAFileButForTheEdgesThatLeadNowhere) {
+  const std::string file = folder_ + "/dangling.json";
+  std::ofstream(file) << kDangling;
+  const Outcome done = Ask({"import", file, "--map", "lenient"});
+  ASSERT_EQ(done.code, 0) << done.errors;
+  EXPECT_NE(done.errors.find(kDanglingWords), std::string::npos) << done.errors;
+  EXPECT_NE(done.out.find("3 nodes, 2 edges"), std::string::npos) << done.out;
+  const Outcome again = Ask({"import", file, "--map", "lenient", "--json"});
+  EXPECT_EQ(Json::parse(again.out)["skipped"][0]["count"], "1") << again.out;
+}
+
+TEST_F(RunTest, RefusesAFileWithSuchEdgesIfStrict) {
+  const std::string file = folder_ + "/dangling.json";
+  std::ofstream(file) << kDangling;
+  const Outcome refused = Ask({"import", file, "--map", "strict", "--strict"});
+  EXPECT_EQ(refused.code, 2) << refused.errors;
+  EXPECT_NE(refused.errors.find(kDanglingWords), std::string::npos) << refused.errors;
+  EXPECT_EQ(Ask({"stats", "--map", "strict"}).code, 1);
+}
+
 TEST_F(ImportTest, RefusesMissingFilesAndWrongNames) {
   EXPECT_EQ(Import(folder_ + "/none.json", "spark").code, 1);
   EXPECT_EQ(Import(file_, "../x").code, 2);

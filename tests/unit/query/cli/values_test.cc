@@ -57,12 +57,47 @@ TEST(Values, RefusesDurationsThatAreNotAboveZero) {
   }
 }
 
+MapSpec MapWith(TimeNs epoch_ns, Clock clock) {
+  MapSpec map;
+  map.epoch_ns = epoch_ns;
+  map.clock = clock;
+  return map;
+}
+
+constexpr TimeNs kIn2014 = 1'403'715'524'907'143'168;
+
 TEST(Values, InstantsAreRelativeToTheEpochAndNameTheirOption) {
-  EXPECT_EQ(*ParseInstant("--at", "+12.5s", 100), 12'500'000'100);
-  EXPECT_EQ(*ParseInstant("--at", "77", 100), 77);
-  const auto bad = ParseInstant("--from", "soon", 0);
+  const MapSpec map = MapWith(100, Clock::kMonotonic);
+  EXPECT_EQ(*ParseInstant("--at", "+12.5s", map), 12'500'000'100);
+  EXPECT_EQ(*ParseInstant("--at", "+12.5", map), 12'500'000'100);
+  EXPECT_EQ(*ParseInstant("--at", "12500000100", map), 12'500'000'100);
+  const auto bad = ParseInstant("--from", "soon", map);
   EXPECT_EQ(ReasonOf(bad.status()), Reason::kFieldInvalid);
   EXPECT_EQ(bad.status().message().substr(0, 8), "--from: ");
+}
+
+TEST(Values, NumbersThatMayBeSecondsAreNoInstants) {
+  for (const char* text : {"30", "-30", "0", "1403715524", "1403715524907"}) {
+    const absl::Status status = ParseInstant("--at", text, MapWith(kIn2014, Clock::kUnix)).status();
+    EXPECT_EQ(ReasonOf(status), Reason::kFieldInvalid) << text;
+    EXPECT_NE(status.message().find(std::string(text) + "s\""), std::string::npos) << status;
+  }
+  const MapSpec simulated = MapWith(0, Clock::kUnix);
+  EXPECT_EQ(ReasonOf(ParseInstant("--at", "30", simulated).status()), Reason::kFieldInvalid);
+  EXPECT_EQ(*ParseInstant("--at", "30ns", simulated), 30);
+  EXPECT_EQ(*ParseInstant("--at", "0", simulated), 0);
+  EXPECT_EQ(*ParseInstant("--at", "30000000000", simulated), 30 * kNsPerSecond);
+  EXPECT_EQ(*ParseInstant("--at", "1403715524907143168", MapWith(kIn2014, Clock::kUnix)), kIn2014);
+}
+
+TEST(Values, DatesAreInstantsOnAClockThatIsUtcOnly) {
+  constexpr char kDate[] = "2014-06-25T16:58:44.907143168Z";
+  EXPECT_EQ(*ParseInstant("--at", kDate, MapWith(0, Clock::kUnix)), kIn2014);
+  for (const Clock clock : {Clock::kPtpTai, Clock::kMonotonic}) {
+    EXPECT_EQ(ReasonOf(ParseInstant("--at", kDate, MapWith(kIn2014, clock)).status()),
+              Reason::kFieldInvalid);
+    EXPECT_EQ(*ParseInstant("--at", "+1s", MapWith(kIn2014, clock)), kIn2014 + kNsPerSecond);
+  }
 }
 
 }  // namespace
