@@ -12,6 +12,7 @@
 #include <cinttypes>
 #include <cstdio>
 #include <cstring>
+#include <fstream>
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
@@ -77,6 +78,9 @@ absl::StatusOr<Usage> Measure(const std::vector<std::string>& command) {
   DSG_RETURN_IF_ERROR(pid.status());
   DSG_RETURN_IF_ERROR(CheckExit(command[0], state));
   usage.resident_bytes_max = int64_t{used.ru_maxrss} * 1024;
+  for (const timeval& time : {used.ru_utime, used.ru_stime}) {
+    usage.cpu_ns += int64_t{time.tv_sec} * 1'000'000'000 + int64_t{time.tv_usec} * 1'000;
+  }
   return usage;
 }
 
@@ -87,13 +91,13 @@ absl::StatusOr<Usage> RunAndMeasure(const std::vector<std::string>& command) {
   by_copy.insert(by_copy.end(), command.begin(), command.end());
   DSG_ASSIGN_OR_RETURN(const Started copy, SpawnAndListen(by_copy));
   Usage usage;
-  const int read =
-      fscanf(copy.output, "%" SCNd64 " %" SCNd64, &usage.wall_ns, &usage.resident_bytes_max);
+  const int read = fscanf(copy.output, "%" SCNd64 " %" SCNd64 " %" SCNd64, &usage.wall_ns,
+                          &usage.resident_bytes_max, &usage.cpu_ns);
   fclose(copy.output);
   int state = 0;
   waitpid(copy.pid, &state, 0);
   DSG_RETURN_IF_ERROR(CheckExit(command[0], state));
-  if (read == 2) return usage;
+  if (read == 3) return usage;
   return absl::InternalError(absl::StrCat("no figures came back from running ", command[0]));
 }
 
@@ -101,7 +105,8 @@ bool MeasureAsCopy(int argc, char** argv, int* exit_code) {
   if (argc < 3 || std::strcmp(argv[1], kMeasureFlag) != 0) return false;
   const absl::StatusOr<Usage> usage = Measure({argv + 2, argv + argc});
   if (usage.ok()) {
-    std::printf("%" PRId64 " %" PRId64 "\n", usage->wall_ns, usage->resident_bytes_max);
+    std::printf("%" PRId64 " %" PRId64 " %" PRId64 "\n", usage->wall_ns, usage->resident_bytes_max,
+                usage->cpu_ns);
   } else {
     std::fprintf(stderr, "%s\n", usage.status().ToString().c_str());
   }
@@ -127,6 +132,16 @@ int64_t ChildServer::CpuNs() const {
   timespec time{};
   if (clock_getcpuclockid(pid_, &clock) != 0 || clock_gettime(clock, &time) != 0) return 0;
   return int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
+}
+
+int64_t ChildServer::ResidentBytesMax() const {
+  std::ifstream file(absl::StrCat("/proc/", pid_, "/status"));
+  std::string word;
+  while (file >> word) {
+    int64_t kibibytes = 0;
+    if (word == "VmHWM:" && file >> kibibytes) return kibibytes * 1024;
+  }
+  return 0;
 }
 
 ChildServer::~ChildServer() {

@@ -19,6 +19,8 @@ struct Usage {
   int64_t wall_ns = 0;
   /// The most memory that was resident at once.
   int64_t resident_bytes_max = 0;
+  /// Of user and system together.
+  int64_t cpu_ns = 0;
 };
 
 /// Runs a program without input or output and waits for it.
@@ -49,6 +51,8 @@ class ChildServer {
   const std::string& first_line() const { return first_line_; }
   /// Processor time that all its threads have used.
   int64_t CpuNs() const;
+  /// The most memory that was resident at once; 0 once it has ended.
+  int64_t ResidentBytesMax() const;
 
  private:
   explicit ChildServer(pid_t pid) : pid_(pid) {}

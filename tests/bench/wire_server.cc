@@ -24,14 +24,16 @@ absl::StatusOr<std::string> AddressIn(const std::string& line) {
 }  // namespace
 
 absl::StatusOr<WireServer> StartWireServer(const WirePlace& place,
-                                           const std::vector<std::string>& options) {
-  std::vector<std::string> command = {absl::StrCat(DSG_BINARY_DIR, "/dsg-server"),
-                                      "--store",
-                                      place.store,
-                                      "--listen",
-                                      place.listen,
-                                      "--log-level",
-                                      "error"};
+                                           const std::vector<std::string>& options,
+                                           const std::string& program) {
+  std::vector<std::string> command = {
+      program.empty() ? absl::StrCat(DSG_BINARY_DIR, "/dsg-server") : program,
+      "--store",
+      place.store,
+      "--listen",
+      place.listen,
+      "--log-level",
+      "error"};
   command.insert(command.end(), options.begin(), options.end());
   WireServer server;
   DSG_ASSIGN_OR_RETURN(server.process, ChildServer::Start(command));

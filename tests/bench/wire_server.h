@@ -24,7 +24,9 @@ struct WireServer {
   std::string address;
 };
 
+/// `program`: the dsg-server to start; empty for the one that was built with the benchmark.
 absl::StatusOr<WireServer> StartWireServer(const WirePlace& place,
-                                           const std::vector<std::string>& options = {});
+                                           const std::vector<std::string>& options = {},
+                                           const std::string& program = "");
 
 }  // namespace dsg::bench

@@ -250,8 +250,8 @@ TEST(ServedMap, AnswersWholeRevisionsAtOnceWhileItIsIngested) {
   // A run without load proves nothing.
   EXPECT_GE(committed.size(), 20u);
   EXPECT_GE(clients.answer_count(), 10);
-  EXPECT_TRUE(
-      OrDie(OrDie(OrDie(GraphStore::Open(store, {}))->OpenMap(kMap))->Verify({})).problems.empty());
+  EXPECT_TRUE(OrDie(OrDie(OrDie(GraphStore::Open(store, {}))->OpenMap(kMap))->Verify({}, {}))
+                  .problems.empty());
 }
 
 }  // namespace

@@ -228,8 +228,9 @@ TEST(ConcurrentReaders, SeeWholeRevisionsAtOnceWhileAnotherProcessWrites) {
   // A run without load proves nothing.
   EXPECT_GE(acknowledged.size(), 20u);
   EXPECT_GE(readers.read_count(), 10);
-  EXPECT_TRUE(OrDie(OrDie(OrDie(GraphStore::Open(folder.path(), {}))->OpenMap(kMap))->Verify({}))
-                  .problems.empty());
+  EXPECT_TRUE(
+      OrDie(OrDie(OrDie(GraphStore::Open(folder.path(), {}))->OpenMap(kMap))->Verify({}, {}))
+          .problems.empty());
 }
 
 }  // namespace

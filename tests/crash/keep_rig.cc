@@ -69,7 +69,7 @@ MapContent ReadContent(const std::string& store, const std::string& map,
     absl::StrAppend(problems, "map ", map, " cannot be opened: ", opened.status().message(), "\n");
     return content;
   }
-  const auto report = (*opened)->Verify({});
+  const auto report = (*opened)->Verify({}, {});
   if (!report.ok()) {
     absl::StrAppend(problems, "verify of ", map, " failed: ", report.status().message(), "\n");
     return content;

@@ -48,7 +48,8 @@ std::string Problems(const std::string& folder) {
   const auto map = OpenStore(folder)->OpenMap(kMap);
   if (ReasonOf(map.status()) == Reason::kMapUnknown) return "";
   std::string text;
-  for (const std::string& problem : OrDie(OrDie(map)->Verify({})).problems) text += problem + "\n";
+  for (const std::string& problem : OrDie(OrDie(map)->Verify({}, {})).problems)
+    text += problem + "\n";
   return text;
 }
 

@@ -118,7 +118,7 @@ class Answers(support.ProgramsTest):
                                  *self.common)["intervals"]:
                 enter_ns, exit_ns = int(stay["enter_ns"]), int(stay["exit_ns"])
                 self.assertLess(enter_ns, exit_ns)
-                place = self.ask("where", stay["agent_id"], "--at", (enter_ns + exit_ns) // 2,
+                place = self.ask("where", stay["agent_id"], "--at", f"{(enter_ns + exit_ns) // 2}ns",
                                  *self.common)
                 self.assertEqual(room, place["room_id"])
                 checked += 1

@@ -8,6 +8,7 @@ import contextlib
 import csv
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -54,6 +55,11 @@ def wait_until(condition, what):
 def at(time_ns):
     """A time relative to the map's epoch, as the command line takes it."""
     return f"+{time_ns // NS_PER_S}.{time_ns % NS_PER_S:09d}s"
+
+
+def without_incarnation(text):
+    """JSON of a reply without what tells one map from another with the same content."""
+    return re.sub(r'"incarnation": "[^"]*"', '"incarnation": ""', text)
 
 
 def read_rows(path):
