@@ -32,6 +32,7 @@ struct Flags {
   std::string log_level = "info";
   size_t view_cache_mb = 1024;
   size_t open_maps_max = 16;
+  size_t map_cache_mb = 64;
   size_t call_memory_mb = dsg::server::ServerOptions().call_memory_bytes >> 20;
   dsg::StoreOptions limits;
   std::string policy_file;
@@ -73,9 +74,12 @@ void DeclareFlags(CLI::App* app, Flags* flags) {
                   "Mebibytes of memory for the graphs of all maps; a larger graph is refused")
       ->check(CLI::Range(size_t{1}, size_t{1} << 24))
       ->capture_default_str();
-  app->add_option("--max-open-maps", flags->open_maps_max,
-                  "Maps kept open, those asked last; each may hold some hundred megabytes")
+  app->add_option("--max-open-maps", flags->open_maps_max, "Maps kept open, those asked last")
       ->check(CLI::Range(size_t{1}, size_t{1000}))
+      ->capture_default_str();
+  app->add_option("--map-cache-mb", flags->map_cache_mb,
+                  "Mebibytes of memory for the tracks and shapes of each open map")
+      ->check(CLI::Range(size_t{1}, size_t{1} << 20))
       ->capture_default_str();
   app->add_option("--log-level", flags->log_level,
                   "debug (a line a call), info (errors and calls over 100 ms), warning, error")
@@ -159,6 +163,7 @@ int Serve(Flags flags) {
   dsg::StoreOptions store_options = flags.limits;
   store_options.create = true;
   store_options.program = "dsg-server";
+  store_options.cache_bytes = flags.map_cache_mb << 20;
   auto store = dsg::GraphStore::Open(flags.store, store_options);
   if (!store.ok()) return FailToStart(store.status());
   const auto maps = (*store)->ListMaps();

@@ -118,8 +118,8 @@ class Answers(support.ProgramsTest):
                                  *self.common)["intervals"]:
                 enter_ns, exit_ns = int(stay["enter_ns"]), int(stay["exit_ns"])
                 self.assertLess(enter_ns, exit_ns)
-                place = self.ask("where", stay["agent_id"], "--at", f"{(enter_ns + exit_ns) // 2}ns",
-                                 *self.common)
+                place = self.ask("where", stay["agent_id"], "--at",
+                                 f"{(enter_ns + exit_ns) // 2}ns", *self.common)
                 self.assertEqual(room, place["room_id"])
                 checked += 1
         self.assertGreater(checked, len(self.truth))
