@@ -6,6 +6,7 @@
 #include <google/protobuf/util/field_mask_util.h>
 
 #include <map>
+#include <string>
 #include <vector>
 
 #include "absl/strings/match.h"
@@ -133,9 +134,10 @@ absl::Status ApplyPatches(const LayerTable& layers, const PatchSource& source, G
 }
 
 void MarkWhole(v1::GraphDelta* delta) {
-  const auto mark = [](auto* items) {
+  const std::string all = "*";
+  const auto mark = [&all](auto* items) {
     for (auto& item : *items) {
-      if (!item.has_update_mask()) item.mutable_update_mask()->add_paths("*");
+      if (!item.has_update_mask()) item.mutable_update_mask()->add_paths(all);
     }
   };
   mark(delta->mutable_nodes());
