@@ -114,10 +114,11 @@ class Ripener {
     for (const TrackSpan& span : noted_.list.spans) {
       Query row(db_,
                 "SELECT 1 FROM track JOIN trajectory_segment"
-                " ON id BETWEEN slot << 42 AND (slot + 1 << 42) - 1"
+                " ON id BETWEEN slot << ?5 AND (slot + 1 << ?5) - 1"
                 " WHERE agent = ?1 AND t1 >= ?2 AND t0 < ?3 AND rev_from <= ?4");
       const bool is_believed =
-          row.Bind(KeyOf(span.agent), span.from_ns, span.to_ns, noted_.planned_at).Next();
+          row.Bind(KeyOf(span.agent), span.from_ns, span.to_ns, noted_.planned_at, kSegmentTimeBits)
+              .Next();
       DSG_RETURN_IF_ERROR(row.status());
       (is_believed && !Covers(named_.spans, span) ? rest : ripe).spans.push_back(span);
     }
