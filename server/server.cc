@@ -26,6 +26,8 @@ namespace {
 // waiting.
 constexpr int kCommitsInFlightMax = 32;
 constexpr int kCommitWorkerCount = kCommitsInFlightMax;
+// Robots wait for the disk anyway; people who ask wait for nothing but the processor.
+constexpr int kCommitNiceness = 5;
 // Of 4 MiB each at most.
 constexpr int kArrivalsMax = 64;
 
@@ -41,6 +43,8 @@ void SetLimits(grpc::ServerBuilder* builder) {
   // The message limit is checked after inflating: 1 MiB of gzip became 1 GiB of memory.
   builder->SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, false);
   builder->SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
+  // A long read holds a processor that shorter calls wait for.
+  builder->AddChannelArgument(GRPC_ARG_TCP_MAX_READ_CHUNK_SIZE, 32 << 10);
   builder->AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, 64);
   builder->AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, 8 << 10);
   builder->AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 30'000);
@@ -78,7 +82,8 @@ class RunningServer final : public Server {
   RunningServer(std::unique_ptr<query::ServiceCore> core, const ServerOptions& options)
       : core_(std::move(core)),
         workers_(WorkerCount(options.worker_count), options.in_flight_max),
-        commit_workers_(kCommitWorkerCount, std::min(options.in_flight_max, kCommitsInFlightMax)),
+        commit_workers_(kCommitWorkerCount, std::min(options.in_flight_max, kCommitsInFlightMax),
+                        kCommitNiceness),
         delays_(&workers_),
         guard_(options.reader_stall_max),
         connections_(LimitsOfConnections(options)),

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/worker_pool.h"
 
+#include <sys/resource.h>
+
 #include <algorithm>
 
 #include "schema/base/check.h"
 
 namespace dsg::server {
 
-WorkerPool::WorkerPool(int worker_count, int in_flight_max)
-    : in_flight_max_(static_cast<size_t>(in_flight_max)),
+WorkerPool::WorkerPool(int worker_count, int in_flight_max, int niceness)
+    : niceness_(niceness),
+      in_flight_max_(static_cast<size_t>(in_flight_max)),
       stream_worker_max_(static_cast<size_t>(std::max(1, worker_count / 2))) {
   DSG_CHECK(worker_count > 0 && in_flight_max > 0);
   for (int i = 0; i < worker_count; ++i) {
@@ -85,6 +88,8 @@ JobKind WorkerPool::ChooseKind() {
 }
 
 void WorkerPool::Work(Seat* seat) {
+  // Of Linux: 0 names the calling thread, not its process. Nothing is lost when it is refused.
+  if (niceness_ != 0) setpriority(PRIO_PROCESS, 0, niceness_);
   std::unique_lock lock(mutex_);
   while (true) {
     while (!stopped_ && !HasWork()) {

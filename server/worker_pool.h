@@ -36,8 +36,9 @@ class WorkerPool {
     int queued = 0;
   };
 
-  /// At most `in_flight_max` calls are queued and running at a time.
-  WorkerPool(int worker_count, int in_flight_max);
+  /// At most `in_flight_max` calls are queued and running at a time. `niceness` (0 to 19, see
+  /// setpriority(2)) lowers the workers' share of the processors while others want them.
+  WorkerPool(int worker_count, int in_flight_max, int niceness = 0);
   ~WorkerPool() { Stop(); }
 
   WorkerPool(const WorkerPool&) = delete;
@@ -71,6 +72,7 @@ class WorkerPool {
   // Requires: HasWork.
   JobKind ChooseKind();
 
+  const int niceness_;
   const size_t in_flight_max_;
   const size_t stream_worker_max_;
   mutable std::mutex mutex_;

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "query/cli/file_text.h"
 #include "query/cli/progress.h"
@@ -24,7 +25,10 @@ namespace dsg::cli {
 namespace {
 
 // Rows of one commit: enough to spread its cost, few enough for its memory.
-constexpr size_t kItemsPerCommit = 20'000;
+constexpr size_t kItemsPerCommit = 70'000;
+// Counts the ways in which a graph has been cut into parts: an import that another program began is
+// not gone on with by parts that are not its own.
+constexpr char kSessionPrefix[] = "import-2-";
 // 2000-01-01: no log of a clock that counts from the start of a machine reaches it.
 constexpr TimeNs kFirstUnixNs = 946'684'800 * kNsPerSecond;
 
@@ -160,7 +164,8 @@ absl::Status RunImport(const CommonOptions& common, const ImportVerb& verb, std:
   DSG_ASSIGN_OR_RETURN(const std::optional<MapSpec> found, FindMap(common.store, common.map));
   const std::string name = std::filesystem::path(verb.file).filename().string();
   // Before the text is read, and leaves memory.
-  const std::string digest = ToHex(ComputeSha256(file.text()));
+  ContentDigest content;
+  content.Add(file.text());
   const ReadOptions options = {.is_strict = verb.is_strict,
                                .passed = [&file](std::string_view text) { file.Drop(text); }};
   DSG_ASSIGN_OR_RETURN(
@@ -169,7 +174,7 @@ absl::Status RunImport(const CommonOptions& common, const ImportVerb& verb, std:
   TellSkipped(graph, progress_out);
   GraphDelta delta = std::move(graph.delta);
   delta.map = common.map;
-  delta.session_id = "import-" + digest.substr(0, 32);
+  delta.session_id = kSessionPrefix + absl::BytesToHexString(content.bytes());
   delta.sequence = 1;
   delta.author = "dsg import";
   delta.message = absl::StrCat("import of ", name, " (", graph.format, ")");

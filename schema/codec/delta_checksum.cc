@@ -7,7 +7,9 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <variant>
 
+#include "schema/codec/node_codec.h"
 #include "schema/codec/proto_convert.h"
 
 namespace dsg {
@@ -79,7 +81,11 @@ void AddGraph(const GraphDelta& delta, Hasher* hasher) {
   hasher->AddList(delta.labels,
                   [&](const SemanticLabel& label) { hasher->Add(label.id, label.name); });
   hasher->AddList(delta.nodes, [&](const Node& node) {
-    hasher->Add(node.id, node.layer, EncodeNodePayload(node));
+    hasher->Add(node.id, node.layer, EncodeAllButAttributes(node), node.attributes.size());
+    for (const auto& [name, value] : node.attributes) {
+      hasher->Add(name, value.index());
+      std::visit([&](const auto& held) { hasher->Add(held); }, value);
+    }
   });
   const auto add_patch = [&](const auto& patch) {
     hasher->Add(patch.fields);

@@ -246,7 +246,9 @@ bool ReadComponents(uint64_t flags, ByteReader* in, Node* node) {
 
 }  // namespace
 
-std::string EncodeNodePayload(const Node& node) {
+namespace {
+
+std::string Encode(const Node& node, bool with_attributes) {
   const uint64_t flags = FlagsOf(node);
   std::string out;
   AppendFixed(kVersion, &out);
@@ -266,7 +268,7 @@ std::string EncodeNodePayload(const Node& node) {
   AppendVarint(static_cast<uint64_t>(node.provenance), &out);
   if (node.object.has_value()) AppendObject(*node.object, node.box_node, &out);
   if (node.place.has_value()) AppendPlace(*node.place, &out);
-  if (flags & kHasAttributes) AppendAttributes(node.attributes, &out);
+  if (with_attributes && (flags & kHasAttributes)) AppendAttributes(node.attributes, &out);
   if (flags & kHasMore) {
     v1::Node message;
     ComponentsOfFewToProto(node, &message);
@@ -274,6 +276,12 @@ std::string EncodeNodePayload(const Node& node) {
   }
   return out;
 }
+
+}  // namespace
+
+std::string EncodeNodePayload(const Node& node) { return Encode(node, true); }
+
+std::string EncodeAllButAttributes(const Node& node) { return Encode(node, false); }
 
 namespace {
 

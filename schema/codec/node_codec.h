@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A part of a stored node, for who needs no more; all of it is DecodeNodePayload.
+// Parts of a stored node, where no more is needed; all of it: EncodeNodePayload, DecodeNodePayload.
 #pragma once
 
+#include <string>
 #include <string_view>
 
 #include "schema/model/node.h"
@@ -11,5 +12,8 @@ namespace dsg {
 /// As DecodeNodePayload, but what most nodes do not need to be placed may be left out: attributes,
 /// agent, structure and region.
 bool DecodeNodePlacement(std::string_view bytes, Node* node);
+
+/// As EncodeNodePayload without the attributes, which may be long texts that are packed.
+std::string EncodeAllButAttributes(const Node& node);
 
 }  // namespace dsg

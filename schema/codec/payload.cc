@@ -55,6 +55,8 @@ std::string SerializeInOrder(const google::protobuf::MessageLite& message) {
 }
 
 std::string EncodeEdgePayload(const Edge& edge) {
+  // Of nearly all edges.
+  if (edge.attributes.empty() && edge.valid == Interval()) return "";
   v1::Edge message;
   EdgeDetailsToProto(edge, &message);
   return SerializeInOrder(message);

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "schema/interop/json_cursor.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/utf8.h"
@@ -95,9 +97,10 @@ bool JsonCursor::NextKey(std::string* key) {
 
 bool JsonCursor::NextElement() { return Next(']'); }
 
-nlohmann::json JsonCursor::Value() {
+nlohmann::json JsonCursor::Value(const UsualMembers* usual) {
   Json value;
   value_count_ = 0;
+  usual_ = usual;
   if (ok()) Read(&value);
   return value;
 }
@@ -167,19 +170,41 @@ bool JsonCursor::ReadObject(Json* value) {
   }
   *value = Json::object();
   auto* members = value->get_ptr<Json::object_t*>();
+  const bool may_pass = std::exchange(may_pass_, false);
+  std::vector<std::string> passed;
   std::string key;
   for (BeginObject(); NextKey(&key);) {
+    if (std::find(passed.begin(), passed.end(), key) != passed.end()) return FailTwice(key);
+    if (may_pass && !members->contains(key) && PassUsual(key)) {
+      passed.push_back(std::move(key));
+      continue;
+    }
+    may_pass_ = usual_ != nullptr && depth_ == 1 && key == usual_->object;
     const size_t count = members->size();
     // Most writers sort their keys.
     const auto member = members->emplace_hint(members->end(), std::move(key), nullptr);
-    if (members->size() == count) {
-      return FailAt(absl::StrCat("key \"", member->first.substr(0, 64), "\""),
-                    "appears twice in one object; remove one of the two");
-    }
+    if (members->size() == count) return FailTwice(member->first);
     if (!Read(&member->second)) return false;
   }
   --depth_;
   return ok();
+}
+
+bool JsonCursor::FailTwice(const std::string& key) {
+  return FailAt(absl::StrCat("key \"", key.substr(0, 64), "\""),
+                "appears twice in one object; remove one of the two");
+}
+
+// Passes the value of `key` if it is the usual one, and all of the value.
+bool JsonCursor::PassUsual(const std::string& key) {
+  const auto usual = usual_->values.find(key);
+  if (usual == usual_->values.end()) return false;
+  SkipBlanks();
+  const size_t end = at_ + usual->second.size();
+  const bool is_usual = text_.substr(at_).starts_with(usual->second) && end < text_.size() &&
+                        (text_[end] == ',' || text_[end] == '}');
+  if (is_usual) at_ = end;
+  return is_usual;
 }
 
 bool JsonCursor::ReadArray(Json* value) {

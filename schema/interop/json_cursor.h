@@ -3,6 +3,8 @@
 // memory as one tree. Refuses what two readers could read differently.
 #pragma once
 
+#include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
@@ -16,6 +18,13 @@ inline constexpr size_t kJsonDepthMax = 64;
 
 /// More values than this would need several GiB as a tree.
 inline constexpr size_t kJsonValueCountMax = 50'000'000;
+
+/// Members of an object that is itself a member of what is read, and need no place in the tree when
+/// they have their usual value. By name; values as text without blanks.
+struct UsualMembers {
+  std::string_view object;
+  std::map<std::string, std::string, std::less<>> values;
+};
 
 /// Keeps the first error; after it every read returns nothing, so callers check once, and loops
 /// end.
@@ -48,8 +57,8 @@ class JsonCursor {
   bool NextKey(std::string* key);
   bool NextElement();
 
-  /// 64-bit integers stay exact.
-  nlohmann::json Value();
+  /// 64-bit integers stay exact. `usual` (may be null): members that are left out.
+  nlohmann::json Value(const UsualMembers* usual = nullptr);
   /// Passes a value whose brackets match and returns its text; nothing else of it is checked.
   std::string_view Skip();
   /// Only blanks may follow.
@@ -66,6 +75,8 @@ class JsonCursor {
 
   bool Read(Json* value);
   bool ReadObject(Json* value);
+  bool FailTwice(const std::string& key);
+  bool PassUsual(const std::string& key);
   bool ReadArray(Json* value);
   bool ReadWord(std::string_view word, Json meaning, Json* value);
   bool ReadNumber(Json* value);
@@ -81,6 +92,9 @@ class JsonCursor {
   bool is_fresh_ = false;
   size_t depth_ = 0;
   size_t value_count_ = 0;
+  const UsualMembers* usual_ = nullptr;
+  /// The object whose members are read is the one that `usual_` names.
+  bool may_pass_ = false;
   absl::Status status_;
 };
 

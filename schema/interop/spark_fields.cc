@@ -16,7 +16,8 @@ using Type = SparkFieldType;
 
 constexpr uint32_t kNoLabel = std::numeric_limits<uint32_t>::max();
 
-constexpr SparkField kNode[] = {{"position", Type::kVector3},
+constexpr std::string_view kPosition = "position";
+constexpr SparkField kNode[] = {{kPosition.data(), Type::kVector3},
                                 {"last_update_time_ns", Type::kUnsigned64},
                                 {"is_active", Type::kBool},
                                 {"is_predicted", Type::kBool, {1, 0, 4}}};
@@ -225,7 +226,6 @@ double NumberIn(const SparkNode& node, const std::string& name) {
 }
 
 Json BoxJson(const SparkBox& box) {
-  if (box.type == SparkBox::Type::kInvalid) return EmptyBox();
   constexpr const char* kNames[] = {"INVALID", "AABB", "OBB", "RAABB"};
   const Eigen::Quaternionf rotation(box.rotation);
   return {{"type", kNames[static_cast<int>(box.type)]},
@@ -235,20 +235,22 @@ Json BoxJson(const SparkBox& box) {
 }
 
 void MakeSemantic(const SparkNode& node, Json* out) {
-  (*out)["name"] = node.name;
+  if (!node.name.empty()) (*out)["name"] = node.name;
   if (node.color.has_value()) (*out)["color"] = ColorJson(*node.color);
-  (*out)["bounding_box"] = BoxJson(node.box);
+  if (node.box.type != SparkBox::Type::kInvalid) (*out)["bounding_box"] = BoxJson(node.box);
   if (node.label.has_value()) (*out)["semantic_label"] = *node.label;
 }
 
 void MakePlace(const SparkNode& node, Json* out) {
   (*out)["distance"] = node.distance;
   (*out)["num_basis_points"] = node.basis_point_count;
-  (*out)["frontier_scale"] = VectorJson(Eigen::Vector3d(NumberIn(node, "frontier_scale_x"),
-                                                        NumberIn(node, "frontier_scale_y"),
-                                                        NumberIn(node, "frontier_scale_z")));
+  const Eigen::Vector3d scale(NumberIn(node, "frontier_scale_x"),
+                              NumberIn(node, "frontier_scale_y"),
+                              NumberIn(node, "frontier_scale_z"));
+  if (!scale.isZero(0.0)) (*out)["frontier_scale"] = VectorJson(scale);
   (*out)["orientation"] = QuaternionJson(node.orientation);
-  (*out)["num_frontier_voxels"] = static_cast<uint64_t>(NumberIn(node, "num_frontier_voxels"));
+  const auto voxel_count = static_cast<uint64_t>(NumberIn(node, "num_frontier_voxels"));
+  if (voxel_count != 0) (*out)["num_frontier_voxels"] = voxel_count;
 }
 
 void MakeTraversability(const SparkNode& node, Json* out) {
@@ -405,15 +407,27 @@ Json WithoutDefaults(SparkClass type, uint64_t node_id, Json fields) {
   return fields;
 }
 
-void UpgradeFields(SparkClass type, uint64_t node_id, Json* attributes) {
+std::map<std::string, std::string, std::less<>> UsualTexts() {
+  std::map<std::string, std::string, std::less<>> texts = {{"metadata", "{}"}};
+  for (const SparkClass type : {SparkClass::kObject, SparkClass::kPlace}) {
+    for (const SparkField& field : FieldsOf(type)) {
+      // A position must be there, and no colour is not black.
+      const bool may_be_left_out = field.type != Type::kColor && field.name != kPosition;
+      if (may_be_left_out) texts[field.name] = DefaultOf(field.type, 0).dump();
+    }
+  }
+  return texts;
+}
+
+void UpgradeForms(SparkClass type, Json* attributes) {
+  Json& metadata = (*attributes)["metadata"];
+  if (metadata.is_null()) metadata = Json::object();
   if (type == SparkClass::kKhronosObject) UpgradeKhronosMesh(attributes);
   for (const SparkField& field : FieldsOf(type)) {
     const auto found = attributes->find(field.name);
-    const bool is_missing = found == attributes->end() || found->is_null();
-    if (is_missing) {
-      const Json fallback = DefaultOf(field.type, node_id);
-      const bool is_absent = fallback.is_null() && field.type == Type::kTime;
-      if (!is_absent) (*attributes)[field.name] = fallback;
+    if (found == attributes->end()) continue;
+    if (found->is_null()) {
+      if (field.type != Type::kTime) attributes->erase(found);
       continue;
     }
     if (field.type == Type::kColor) UpgradeColor(&*found);
@@ -423,8 +437,16 @@ void UpgradeFields(SparkClass type, uint64_t node_id, Json* attributes) {
       *found = {{"rows", found->size()}, {"cols", 1}, {"data", *found}};
     }
   }
-  if (!attributes->contains("metadata") || (*attributes)["metadata"].is_null()) {
-    (*attributes)["metadata"] = Json::object();
+}
+
+void UpgradeFields(SparkClass type, uint64_t node_id, Json* attributes) {
+  UpgradeForms(type, attributes);
+  for (const SparkField& field : FieldsOf(type)) {
+    const auto found = attributes->find(field.name);
+    if (found != attributes->end() && !found->is_null()) continue;
+    const Json fallback = DefaultOf(field.type, node_id);
+    const bool is_absent = fallback.is_null() && field.type == Type::kTime;
+    if (!is_absent) (*attributes)[field.name] = fallback;
   }
 }
 
@@ -436,9 +458,9 @@ Json MakeFields(const SparkNode& node) {
 }
 
 Json MakeSparseFields(const SparkNode& node) {
-  Json out = {{"position", VectorJson(node.position)},
-              {"last_update_time_ns", node.last_update_ns},
-              {"is_predicted", node.is_predicted}};
+  Json out = {{"position", VectorJson(node.position)}};
+  if (node.last_update_ns != 0) out["last_update_time_ns"] = node.last_update_ns;
+  if (node.is_predicted) out["is_predicted"] = true;
   if (IsSemantic(node.type)) MakeSemantic(node, &out);
   MakeOwn(node, &out);
   for (const SparkField& field : FieldsOf(node.type)) {

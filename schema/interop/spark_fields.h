@@ -64,6 +64,14 @@ const nlohmann::json* DefaultFor(SparkClass type, const std::string& name);
 /// null.
 nlohmann::json WithoutDefaults(SparkClass type, uint64_t node_id, nlohmann::json fields);
 
+/// Defaults of fields that need not be read where they have them, by name, as text without blanks.
+std::map<std::string, std::string, std::less<>> UsualTexts();
+
+/// Rewrites old forms of colours, boxes, features and meshes as those of kSparkVersionNewest, and
+/// takes out fields that are null.
+/// Requires: the attributes have been read without errors.
+void UpgradeForms(SparkClass type, nlohmann::json* attributes);
+
 /// Turns the attributes of a node of any version into those of kSparkVersionNewest: old forms of
 /// colours, boxes and meshes are rewritten, missing fields added. What the format does not know is
 /// left alone. Requires: the attributes have been read without errors.

@@ -64,7 +64,7 @@ void FinishNode(nlohmann::json attributes, SparkNode* node) {
   // On the node itself before 1.1.0.
   const bool is_timed = node->type == SparkClass::kAgent && node->stamp_ns.has_value();
   if (is_timed) attributes["timestamp"] = *node->stamp_ns;
-  UpgradeFields(node->type, node->id, &attributes);
+  UpgradeForms(node->type, &attributes);
   nlohmann::json& metadata = attributes["metadata"];
   node->own = TakeOwn(&metadata);
   if (!node->own.is_null()) {

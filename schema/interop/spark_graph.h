@@ -141,7 +141,7 @@ struct SparkGraph {
 };
 
 /// The last step of reading a node: its `fields` are those of `attributes` in their newest form,
-/// without what is our own.
+/// without what is our own. Fields that are missing may stay so.
 void FinishNode(nlohmann::json attributes, SparkNode* node);
 /// Turns `fields` into `packed_fields`.
 void PackFields(SparkNode* node);

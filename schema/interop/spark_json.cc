@@ -13,6 +13,7 @@
 #include "schema/interop/json_cursor.h"
 #include "schema/interop/json_fields.h"
 #include "schema/interop/spark_attributes.h"
+#include "schema/interop/spark_fields.h"
 #include "schema/interop/spark_json_mesh.h"
 #include "schema/interop/spark_metadata.h"
 
@@ -72,8 +73,8 @@ class SparkJsonReader {
 
   // Calls `read` with the place and the value of each element, which puts it into `items`.
   template <typename T, typename ReadOne>
-  void ForEach(const char* name, const JsonMembers& members, std::vector<T>* items,
-               const ReadOne& read) {
+  void ForEach(const char* name, const JsonMembers& members, const UsualMembers* usual,
+               std::vector<T>* items, const ReadOne& read) {
     if (!source_.ok()) return;
     const JsonText& member = members.at(name);
     JsonCursor cursor(member.text, source_.file, member.offset);
@@ -85,7 +86,7 @@ class SparkJsonReader {
     size_t done = 0;
     size_t count = 0;
     for (cursor.BeginArray(); cursor.NextElement();) {
-      Json element = cursor.Value();
+      Json element = cursor.Value(usual);
       if (!cursor.ok()) break;
       read(absl::StrCat(name, "[", count++, "]"), &element);
       // A list that grows is in memory twice, and its items are copied.
@@ -129,10 +130,12 @@ class SparkJsonReader {
       graph_.mesh = ReadSparkJsonMesh(root.Object("mesh", true), &source_);
     }
     ReadMeshEdges(root);
-    ForEach("nodes", members, &graph_.nodes,
+    // Most fields of most nodes say nothing.
+    const UsualMembers usual{"attributes", UsualTexts()};
+    ForEach("nodes", members, &usual, &graph_.nodes,
             [this](const std::string& where, Json* node) { ReadNode(where, node); });
     NoteMeshEdges();
-    ForEach("edges", members, &graph_.edges,
+    ForEach("edges", members, nullptr, &graph_.edges,
             [this](const std::string& where, Json* edge) { ReadEdge(where, *edge); });
   }
 
@@ -165,9 +168,10 @@ class SparkJsonReader {
   void TakeMeshEdges(SparkNode* node) {
     const auto vertices = vertices_of_.find(node->id);
     if (vertices == vertices_of_.end()) return;
-    const auto list = node->fields.find("mesh_connections");
-    if (list == node->fields.end() || !list->empty()) return;
-    *list = vertices->second;
+    if (node->type != SparkClass::kObject && node->type != SparkClass::kKhronosObject) return;
+    Json& list = node->fields["mesh_connections"];
+    if (!list.empty()) return;
+    list = vertices->second;
     AddLength("mesh_connections", vertices->second.size(), node);
     vertices_of_.erase(vertices);
   }

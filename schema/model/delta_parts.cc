@@ -2,6 +2,7 @@
 #include "schema/model/delta_parts.h"
 
 #include <algorithm>
+#include <bit>
 #include <numeric>
 #include <unordered_map>
 #include <utility>
@@ -48,6 +49,16 @@ std::vector<size_t> ParentsFirst(const GraphDelta& delta) {
   return order;
 }
 
+// Index before letter, as stores keep rows: what belongs together is looked up and written
+// together.
+std::vector<size_t> SourcesInOrder(const std::vector<Edge>& edges) {
+  std::vector<size_t> order(edges.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  const auto key = [&](size_t i) { return std::rotl(edges[i].source.value, 8); };
+  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return key(a) < key(b); });
+  return order;
+}
+
 // Fills one part after another, giving each away when the next begins.
 class DeltaSplitter {
  public:
@@ -70,9 +81,11 @@ class DeltaSplitter {
     }
   }
 
-  void AddNodes(std::vector<Node>& nodes, const std::vector<size_t>& order) {
+  template <typename T>
+  void Add(std::vector<T>& items, const std::vector<size_t>& order,
+           std::vector<T> GraphDelta::*part) {
     for (size_t i = 0; i < order.size() && status_.ok(); ++i) {
-      Push(std::move(nodes[order[i]]), order.size() - i, &Room(1).nodes);
+      Push(std::move(items[order[i]]), order.size() - i, &(Room(1).*part));
     }
   }
 
@@ -150,7 +163,8 @@ class DeltaSplitter {
 }  // namespace
 
 absl::Status ForEachPart(GraphDelta delta, size_t item_count_max, const TakePart& take) {
-  const std::vector<size_t> order = ParentsFirst(delta);
+  const std::vector<size_t> node_order = ParentsFirst(delta);
+  const std::vector<size_t> edge_order = SourcesInOrder(delta.edges);
   DeltaSplitter splitter(delta, item_count_max, take);
   splitter.Add(delta.layers, &GraphDelta::layers);
   splitter.Add(delta.labels, &GraphDelta::labels);
@@ -161,9 +175,9 @@ absl::Status ForEachPart(GraphDelta delta, size_t item_count_max, const TakePart
   splitter.Add(delta.edge_removals, &GraphDelta::edge_removals);
   splitter.Add(delta.mesh_removals, &GraphDelta::mesh_removals);
   splitter.Add(delta.retirements, &GraphDelta::retirements);
-  splitter.AddNodes(delta.nodes, order);
+  splitter.Add(delta.nodes, node_order, &GraphDelta::nodes);
   splitter.Add(delta.node_patches, &GraphDelta::node_patches);
-  splitter.Add(delta.edges, &GraphDelta::edges);
+  splitter.Add(delta.edges, edge_order, &GraphDelta::edges);
   splitter.Add(delta.edge_patches, &GraphDelta::edge_patches);
   for (const TrajectoryAppend& append : delta.appends) {
     splitter.AddSeries(append.poses, {append.agent, {}}, &TrajectoryAppend::poses,

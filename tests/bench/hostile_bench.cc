@@ -2,6 +2,7 @@
 // What hostile clients cost a dsg-server and everybody else: the most memory that it has, and the
 // latency of LocateAgent on another connection, in an attack and without. The server is started
 // anew for each, and the attackers are a process of their own. Refuses to go on without the server.
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -194,12 +195,27 @@ struct Flags {
   double seconds = 10.0;
   std::string only;
   std::string server;
+  bool with_control = false;
 };
 
 absl::StatusOr<std::unique_ptr<ChildServer>> StartAttackers(const std::string& name,
                                                             const std::string& address,
                                                             double time_s) {
   return ChildServer::Start({"/proc/self/exe", kAttackFlag, name, address, absl::StrCat(time_s)});
+}
+
+// Others' latency while the attack goes to a server that they do not ask: what remains of it is due
+// to the processors, which all of them share here.
+absl::StatusOr<Outcome> AskBesideAnother(const Attack& attack, const Flags& flags,
+                                         const WireServer& server) {
+  DSG_ASSIGN_OR_RETURN(const auto folder,
+                       ScratchFolder::Make(std::filesystem::temp_directory_path(), "dsg-bench"));
+  const WirePlace elsewhere{folder->path(), absl::StrCat("unix:", folder->path(), "/s.sock")};
+  DSG_RETURN_IF_ERROR(MakeWireWorld(elsewhere.store, 1));
+  DSG_ASSIGN_OR_RETURN(const WireServer attacked, StartWireServer(elsewhere, {}, flags.server));
+  DSG_ASSIGN_OR_RETURN(const auto attackers,
+                       StartAttackers(attack.name, attacked.address, flags.seconds));
+  return AskAWhile(server, flags.seconds, 4);
 }
 
 absl::Status MeasureAttack(const Attack& attack, const Flags& flags, const WirePlace& place,
@@ -213,10 +229,15 @@ absl::Status MeasureAttack(const Attack& attack, const Flags& flags, const WireP
   }
   DSG_ASSIGN_OR_RETURN(const Outcome alone, AskAWhile(server, flags.seconds, 2));
   slow = nullptr;
-  DSG_ASSIGN_OR_RETURN(const auto attackers,
-                       StartAttackers(attack.name, server.address, flags.seconds));
+  DSG_ASSIGN_OR_RETURN(auto attackers, StartAttackers(attack.name, server.address, flags.seconds));
   DSG_ASSIGN_OR_RETURN(const Outcome beside, AskAWhile(server, flags.seconds, 3));
   ReportOutcome(attack.what, alone, beside, report);
+  if (!flags.with_control) return absl::OkStatus();
+  attackers = nullptr;
+  DSG_ASSIGN_OR_RETURN(const Outcome elsewhere, AskBesideAnother(attack, flags, server));
+  report->Line(absl::StrCat("p99 of LocateAgent beside, on another server, ", attack.what), "us",
+               {*Microseconds(elsewhere.latency).p99, {}},
+               Rival{"without", {*Microseconds(alone.latency).p99, {}}}, {});
   return absl::OkStatus();
 }
 
@@ -242,6 +263,8 @@ absl::Status Run(const Flags& flags, const CommonOptions& common, Report* report
 // What the process does that is started with the flag, the attack, the address and a time.
 bool BeAttackers(int argc, char** argv) {
   if (argc != 5 || std::strcmp(argv[1], kAttackFlag) != 0) return false;
+  // Elsewhere attackers bring processors of their own; here they may have what others leave.
+  setpriority(PRIO_PROCESS, 0, 19);
   std::printf("ready\n");
   std::fflush(stdout);
   const std::chrono::duration<double> time(std::atof(argv[4]));
@@ -259,6 +282,9 @@ int main(int argc, char** argv) {
   app.add_option("--seconds", flags.seconds, "How long others ask, with the attack and without")
       ->capture_default_str();
   app.add_option("--only", flags.only, "commits, paths or resets; all if not given");
+  app.add_flag(
+      "--control", flags.with_control,
+      "Also ask while the attack goes to a second server, which shares only the processors");
   app.add_option("--server", flags.server, "The dsg-server to attack; default the one built here");
   return dsg::bench::RunBenchmark(
       &app, argc, argv, [&](const dsg::bench::CommonOptions& common, dsg::bench::Report* report) {

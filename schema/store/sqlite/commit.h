@@ -55,6 +55,8 @@ class GraphRowsWriter {
   absl::StatusOr<bool> EndNode(int64_t key);
   absl::Status EndEdgesOf(int64_t key);
   absl::Status WriteEdge(const Edge& edge);
+  /// False, and nothing done, if there is such an edge.
+  absl::StatusOr<bool> InsertEdge(const Edge& edge, int64_t relation, const std::string& payload);
   absl::StatusOr<bool> EndEdge(int64_t source, int64_t relation, int64_t target);
   absl::StatusOr<int64_t> FindOrAddRelation(const std::string& name);
 

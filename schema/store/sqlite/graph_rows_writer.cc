@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
 #include "absl/strings/str_cat.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/store/sqlite/commit.h"
@@ -38,17 +40,41 @@ absl::StatusOr<int64_t> FindRelation(Database& db, const std::string& name) {
   return found ? query.Int(0) : 0;
 }
 
+namespace {
+
+// In the order of their rows, so that a commit writes each page once.
+template <typename T, typename Key>
+std::vector<const T*> InRowOrder(const std::vector<T>& items, const Key& key) {
+  std::vector<const T*> sorted;
+  sorted.reserve(items.size());
+  for (const T& item : items) sorted.push_back(&item);
+  std::sort(sorted.begin(), sorted.end(),
+            [&](const T* a, const T* b) { return key(*a) < key(*b); });
+  return sorted;
+}
+
+}  // namespace
+
 absl::Status GraphRowsWriter::Apply(const GraphDelta& delta) {
   for (const Layer& layer : delta.layers) DSG_RETURN_IF_ERROR(WriteLayer(layer));
   for (const SemanticLabel& label : delta.labels) DSG_RETURN_IF_ERROR(WriteLabel(label));
-  for (const Node& node : delta.nodes) DSG_RETURN_IF_ERROR(WriteNode(node));
+  for (const Node* node : InRowOrder(delta.nodes, [](const Node& n) { return KeyOf(n.id); })) {
+    DSG_RETURN_IF_ERROR(WriteNode(*node));
+  }
   for (const EdgeKey& key : delta.edge_removals) {
     DSG_ASSIGN_OR_RETURN(const int64_t relation, FindRelation(commit_.db, key.relation));
     if (relation == 0) continue;
     DSG_RETURN_IF_ERROR(EndEdge(KeyOf(key.source), relation, KeyOf(key.target)).status());
   }
   for (const Retirement& item : delta.retirements) DSG_RETURN_IF_ERROR(Retire(item));
-  for (const Edge& edge : delta.edges) DSG_RETURN_IF_ERROR(WriteEdge(edge));
+  // Relations are numbered in the order of the delta: digests depend on it.
+  for (const Edge& edge : delta.edges) {
+    DSG_RETURN_IF_ERROR(FindOrAddRelation(edge.relation).status());
+  }
+  const auto key = [](const Edge& edge) {
+    return std::make_pair(KeyOf(edge.source), KeyOf(edge.target));
+  };
+  for (const Edge* edge : InRowOrder(delta.edges, key)) DSG_RETURN_IF_ERROR(WriteEdge(*edge));
   return absl::OkStatus();
 }
 
@@ -175,32 +201,45 @@ absl::Status GraphRowsWriter::Retire(const Retirement& item) {
 
 absl::Status GraphRowsWriter::WriteEdge(const Edge& edge) {
   DSG_ASSIGN_OR_RETURN(const int64_t relation, FindOrAddRelation(edge.relation));
+  const std::string payload = EncodeEdgePayload(edge);
+  DSG_ASSIGN_OR_RETURN(const bool is_new, InsertEdge(edge, relation, payload));
+  if (is_new) return absl::OkStatus();
   const int64_t source = KeyOf(edge.source);
   const int64_t target = KeyOf(edge.target);
-  const std::string payload = EncodeEdgePayload(edge);
-  bool exists = false;
   {
     Query current(commit_.db,
                   "SELECT weight, payload FROM edge"
                   " WHERE source = ?1 AND relation = ?2 AND target = ?3");
-    exists = current.Bind(source, relation, target).Next();
+    const bool is_same = current.Bind(source, relation, target).Next() &&
+                         BitsOf(current.Real(0)) == BitsOf(edge.weight) &&
+                         current.Blob(1) == payload;
     DSG_RETURN_IF_ERROR(current.status());
-    if (exists && BitsOf(current.Real(0)) == BitsOf(edge.weight) && current.Blob(1) == payload) {
-      return absl::OkStatus();
-    }
+    if (is_same) return absl::OkStatus();
   }
-  if (exists) DSG_RETURN_IF_ERROR(EndEdge(source, relation, target).status());
-  const std::initializer_list<int64_t> columns = {source, relation, target, commit_.revision(),
-                                                  BitsOf(edge.weight)};
+  DSG_RETURN_IF_ERROR(EndEdge(source, relation, target).status());
+  DSG_ASSIGN_OR_RETURN(const bool is_inserted, InsertEdge(edge, relation, payload));
+  if (is_inserted) return absl::OkStatus();
+  return CorruptRow(commit_.spec.name, "edge",
+                    absl::StrCat(ToString(edge.source), " ", ToString(edge.target)));
+}
+
+absl::StatusOr<bool> GraphRowsWriter::InsertEdge(const Edge& edge, int64_t relation,
+                                                 const std::string& payload) {
+  const std::initializer_list<int64_t> columns = {KeyOf(edge.source), relation, KeyOf(edge.target),
+                                                  commit_.revision(), BitsOf(edge.weight)};
+  // Most edges are new: to look first would take as long as to insert.
+  DSG_RETURN_IF_ERROR(
+      Query(commit_.db,
+            "INSERT INTO edge (source, relation, target, rev_from, weight, payload, checksum)"
+            " VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7) ON CONFLICT DO NOTHING")
+          .Bind(KeyOf(edge.source), relation, KeyOf(edge.target), commit_.revision(), edge.weight,
+                Query::BlobView{payload}, RowChecksum32(columns, payload))
+          .Run());
+  if (commit_.db.changed_row_count() == 0) return false;
   commit_.touched.edges.push_back({edge.source, relation, edge.target});
   commit_.head.content.Add(RowIdentity('E', columns, payload));
   ++commit_.head.info.edge_count;
-  return Query(commit_.db,
-               "INSERT INTO edge (source, relation, target, rev_from, weight, payload, checksum)"
-               " VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)")
-      .Bind(source, relation, target, commit_.revision(), edge.weight, Query::BlobView{payload},
-            RowChecksum32(columns, payload))
-      .Run();
+  return true;
 }
 
 absl::StatusOr<bool> GraphRowsWriter::EndEdge(int64_t source, int64_t relation, int64_t target) {

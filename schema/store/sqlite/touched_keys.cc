@@ -3,10 +3,18 @@
 
 #include <algorithm>
 
+#include "schema/codec/shuffle.h"
+
 namespace dsg::sqlite {
 namespace {
 
 constexpr char kLayout = 1;
+// The same behind this byte, compressed.
+constexpr char kLayoutPacked = 2;
+// Of shorter lists nothing is gained.
+constexpr size_t kPlainBytesMax = 1024;
+// Of a commit of a hundred million keys.
+constexpr size_t kUnpackedBytesMax = size_t{1} << 30;
 constexpr uint64_t kLayersOrLabels = 1;
 
 uint64_t Zigzag(int64_t value) {
@@ -147,10 +155,15 @@ std::string EncodeTouched(const TouchedKeys& keys) {
   PutEdges(keys.edges, &bytes);
   PutNodes(keys.tracks, &bytes);
   PutBlocks(keys.mesh_blocks, &bytes);
-  return bytes;
+  return bytes.size() <= kPlainBytesMax ? bytes : kLayoutPacked + Compress(bytes);
 }
 
 bool DecodeTouched(std::string_view bytes, TouchedKeys* keys) {
+  std::string unpacked;
+  if (bytes.starts_with(kLayoutPacked)) {
+    if (!Decompress(bytes.substr(1), kUnpackedBytesMax, &unpacked)) return false;
+    bytes = unpacked;
+  }
   if (bytes.empty() || bytes.front() != kLayout) return false;
   VarintReader in{bytes.substr(1)};
   if ((in.Take() & kLayersOrLabels) != 0) keys->layers_or_labels = true;

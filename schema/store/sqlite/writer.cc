@@ -147,14 +147,10 @@ absl::StatusOr<CommitResult> SqliteWriter::CommitOnce(GraphDelta delta) {
                                   "\" and was sent to map \"", map_, "\""),
                      {{"map", map_}});
   }
-  DSG_RETURN_IF_ERROR(MakeWhole(&delta));
-  Coalesce(&delta);
-  DSG_RETURN_IF_ERROR(CheckDelta(delta, DeltaLookup(db_.get(), &spec_)));
+  // Also around the checks: each question outside of a transaction would lock the file anew.
   DSG_RETURN_IF_ERROR(db_->Execute("BEGIN IMMEDIATE"));
   CommitContext commit{*db_, spec_, head_, identity.checksum};
-  const auto pages_before = db_->QueryInt("PRAGMA page_count");
-  absl::Status applied = pages_before.ok() ? Apply(delta, &commit) : pages_before.status();
-  if (applied.ok()) applied = CheckQuota(delta, *pages_before);
+  absl::Status applied = CheckAndApply(&delta, &commit);
   if (!applied.ok()) {
     // SQLite may have rolled back already; then this one has nothing to do.
     db_->Execute("ROLLBACK").IgnoreError();
@@ -168,6 +164,15 @@ absl::StatusOr<CommitResult> SqliteWriter::CommitOnce(GraphDelta delta) {
       db_->wal_pages() > (is_on_reserve_ ? kCheckpointPagesOnReserve : checkpoint_pages_);
   if (is_log_long) db_->Checkpoint(/*truncate=*/is_on_reserve_);
   return CommitResult{head_.info.revision, false};
+}
+
+absl::Status SqliteWriter::CheckAndApply(GraphDelta* delta, CommitContext* commit) {
+  DSG_RETURN_IF_ERROR(MakeWhole(delta));
+  Coalesce(delta);
+  DSG_RETURN_IF_ERROR(CheckDelta(*delta, DeltaLookup(db_.get(), &spec_)));
+  DSG_ASSIGN_OR_RETURN(const int64_t pages_before, db_->QueryInt("PRAGMA page_count"));
+  DSG_RETURN_IF_ERROR(Apply(*delta, commit));
+  return CheckQuota(*delta, pages_before);
 }
 
 // Patches change what is believed now.

@@ -42,6 +42,8 @@ class SqliteWriter : public MapWriter {
   absl::Status CheckRevision(Revision revision);
   absl::Status CheckSequence(const GraphDelta& delta);
   absl::StatusOr<CommitResult> CommitOnce(GraphDelta delta);
+  /// Within a transaction, which is to be rolled back after an error.
+  absl::Status CheckAndApply(GraphDelta* delta, CommitContext* commit);
   absl::Status Apply(const GraphDelta& delta, CommitContext* commit);
   /// Of a commit that has been applied and began with so many pages.
   absl::Status CheckQuota(const GraphDelta& delta, int64_t pages_before);

@@ -6,6 +6,7 @@
 
 #include "schema/base/utf8.h"
 #include "schema/interop/file_error.h"
+#include "schema/interop/json_cursor.h"
 #include "tests/unit/schema/interop/interop_test_util.h"
 
 namespace dsg {
@@ -52,6 +53,38 @@ TEST(JsonDocument, AllowsNestingUpToTheLimitAndRefusesOneMore) {
 TEST(JsonDocument, RefusesWhatIsNotJson) {
   for (const char* text : {"", "{]", "[1,]", "[NaN]", "[1e999]", "{} {}", "[\"\xff\"]"}) {
     EXPECT_FALSE(ParseJson(text, "f.json").ok()) << text;
+  }
+}
+
+std::string WithoutUsual(const std::string& text) {
+  const UsualMembers usual{"attributes", {{"list", "[]"}, {"flag", "false"}, {"size", "0.0"}}};
+  JsonCursor cursor(text, "f.json");
+  const nlohmann::json value = cursor.Value(&usual);
+  cursor.End();
+  return cursor.ok() ? value.dump() : std::string(cursor.status().message());
+}
+
+TEST(JsonCursor, LeavesOutUsualMembersOfTheNamedObjectOnly) {
+  EXPECT_EQ(WithoutUsual(R"({"attributes": {"flag":false, "list": [],"size":0.0}, "flag":false})"),
+            R"({"attributes":{},"flag":false})");
+  EXPECT_EQ(WithoutUsual(R"({"attributes":{"a":{"flag":false},"attributes":{"flag":false}}})"),
+            R"({"attributes":{"a":{"flag":false},"attributes":{"flag":false}}})");
+  EXPECT_EQ(WithoutUsual(R"({"x":{"attributes":{"flag":false}}})"),
+            R"({"x":{"attributes":{"flag":false}}})");
+}
+
+TEST(JsonCursor, KeepsMembersThatOnlyBeginAsUsual) {
+  const std::string other = R"({"attributes":{"flag":true,"list":[1],"size":0.05}})";
+  EXPECT_EQ(WithoutUsual(other), other);
+  EXPECT_EQ(WithoutUsual(R"({"attributes":{"list":[ ],"size":0.0 }})"),
+            R"({"attributes":{"list":[],"size":0.0}})");
+}
+
+TEST(JsonCursor, RefusesADuplicateOfWhatItLeftOut) {
+  for (const char* text : {R"({"attributes":{"flag":false,"flag":true}})",
+                           R"({"attributes":{"flag":true,"flag":false}})",
+                           R"({"attributes":{"flag":false,"list":[],"flag":false}})"}) {
+    EXPECT_NE(WithoutUsual(text).find("key \"flag\""), std::string::npos) << text;
   }
 }
 

@@ -47,6 +47,24 @@ TEST(TouchedKeys, ComeBackAsTheyWere) {
   EXPECT_TRUE(read.layers_or_labels);
 }
 
+TEST(TouchedKeys, AreShortAndWholeWhereThereAreMany) {
+  sqlite::TouchedKeys keys;
+  for (uint64_t i = 0; i < 20'000; ++i) {
+    keys.nodes.push_back(NodeId('p', i));
+    keys.edges.push_back({NodeId('p', i), 1, NodeId('p', i + 1)});
+  }
+  const std::string bytes = sqlite::EncodeTouched(keys);
+  EXPECT_LT(bytes.size(), 20'000u);
+  sqlite::TouchedKeys read;
+  ASSERT_TRUE(sqlite::DecodeTouched(bytes, &read));
+  EXPECT_EQ(read.nodes, keys.nodes);
+  EXPECT_EQ(read.edges, keys.edges);
+  for (const size_t size : {size_t{1}, size_t{2}, bytes.size() / 2, bytes.size() - 1}) {
+    sqlite::TouchedKeys cut;
+    EXPECT_FALSE(sqlite::DecodeTouched(bytes.substr(0, size), &cut)) << size;
+  }
+}
+
 TEST(TouchedKeys, AreRefusedWhenCutAnywhere) {
   sqlite::TouchedKeys keys;
   for (uint64_t i = 0; i < 20; ++i) keys.nodes.push_back(NodeId('p', i * 1000));
