@@ -5,13 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "absl/status/statusor.h"
+#include "schema/store/graph_store.h"
 
 namespace dsg::cli {
 
 /// The one asked for, or all of them, also those that cannot be opened. Order: by name.
-/// Errors: UNAVAILABLE for a folder that cannot be listed.
-absl::StatusOr<std::vector<std::string>> MapNames(const std::string& store_folder,
-                                                  const std::string& asked);
+/// Errors: UNAVAILABLE for a store that cannot be listed.
+absl::StatusOr<std::vector<std::string>> MapNames(GraphStore* store, const std::string& asked);
 
 }  // namespace dsg::cli

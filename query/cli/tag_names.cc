@@ -6,7 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/maintenance_service.pb.h"
 #include "schema/base/status.h"
-#include "schema/store/tag_list.h"
+#include "schema/store/tags.h"
 
 namespace dsg::cli {
 

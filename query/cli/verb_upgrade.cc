@@ -14,8 +14,8 @@ namespace dsg::cli {
 
 absl::Status RunUpgrade(const CommonOptions& common, std::ostream& out) {
   DSG_ASSIGN_OR_RETURN(const std::unique_ptr<GraphStore> store,
-                       GraphStore::Open(common.store, {.program = "dsg upgrade"}));
-  DSG_ASSIGN_OR_RETURN(const std::vector<std::string> names, MapNames(store->folder(), common.map));
+                       OpenStore(common.store, {.program = "dsg upgrade"}));
+  DSG_ASSIGN_OR_RETURN(const std::vector<std::string> names, MapNames(store.get(), common.map));
   if (names.empty() && !common.json) out << "store " << common.store << " has no maps\n";
   nlohmann::ordered_json json = {{"maps", nlohmann::ordered_json::array()}};
   for (const std::string& name : names) {

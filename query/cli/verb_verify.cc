@@ -143,8 +143,8 @@ absl::Status RunVerify(const CommonOptions& common, const VerifyVerb& verb, std:
   const StopCheck stop = call.stop();
   if (!verb.path.empty()) return VerifyFiles(verb.path, common, stop, out, progress_out);
   DSG_ASSIGN_OR_RETURN(const std::unique_ptr<GraphStore> store,
-                       GraphStore::Open(common.store, {.program = "dsg verify"}));
-  DSG_ASSIGN_OR_RETURN(const std::vector<std::string> names, MapNames(store->folder(), common.map));
+                       OpenStore(common.store, {.program = "dsg verify"}));
+  DSG_ASSIGN_OR_RETURN(const std::vector<std::string> names, MapNames(store.get(), common.map));
   Findings findings(&out, common.json);
   if (names.empty()) findings.AddNothing(absl::StrCat("store ", common.store));
   for (const std::string& name : names) {

@@ -7,7 +7,6 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/map_service.pb.h"
-#include "query/engine/map_names.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
@@ -31,7 +30,7 @@ absl::Status ListMaps(GraphStore* store, v1::ListMapsResponse* reply) {
     ToProto(spec, reply->add_maps());
     readable.insert(spec.name);
   }
-  DSG_ASSIGN_OR_RETURN(const std::vector<std::string> names, MapNamesIn(store->folder()));
+  DSG_ASSIGN_OR_RETURN(const std::vector<std::string> names, store->MapNames());
   for (const std::string& name : names) {
     if (!readable.contains(name)) reply->add_unreadable_maps(name);
   }

@@ -19,7 +19,6 @@
 #include "schema/retention/contested.h"
 #include "schema/retention/past.h"
 #include "schema/retention/plan.h"
-#include "schema/store/log_bytes.h"
 
 namespace dsg::query {
 namespace {
@@ -216,7 +215,7 @@ class Prune final : public PruneCursor {
     DSG_ASSIGN_OR_RETURN(const MapStats stats, map->Stats());
     before_.revision_count = stats.at.revision;
     file_bytes_before_ = stats.bytes_on_disk;
-    log_bytes_before_ = LogBytesOnDisk(maps_->store(), map_);
+    log_bytes_before_ = maps_->store().ReusedBytesOnDisk(map_);
     reply->clear_policies();
     ToProto(before_, reply->mutable_map_before());
     return FillHeader(reader.get(), *map, reply);
@@ -411,7 +410,7 @@ class Prune final : public PruneCursor {
     reply->set_file_bytes_before(file_bytes_before_);
     reply->set_file_bytes_after(stats.bytes_on_disk);
     reply->set_log_bytes_before(log_bytes_before_);
-    reply->set_log_bytes_after(LogBytesOnDisk(maps_->store(), map_));
+    reply->set_log_bytes_after(maps_->store().ReusedBytesOnDisk(map_));
     DSG_ASSIGN_OR_RETURN(const auto pending, reader->GetPendingErasure());
     reply->set_erased(is_erase_ && !is_dry_run_ && is_clean_ && left_.empty() &&
                       !pending.has_value());

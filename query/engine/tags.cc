@@ -9,7 +9,7 @@
 #include "dsg/v1/maintenance_service.pb.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
-#include "schema/store/tag_list.h"
+#include "schema/store/tags.h"
 
 namespace dsg::query {
 namespace {

@@ -14,7 +14,7 @@ constexpr char kProgram[] = "dsgdb " DSG_VERSION;
 // From the copy itself, so that what the manifest says is of the copy and of no later revision.
 absl::StatusOr<ArchiveManifest> DescribeCopy(const std::string& folder, const std::string& map) {
   DSG_ASSIGN_OR_RETURN(const std::unique_ptr<GraphStore> store,
-                       GraphStore::Open(folder, {.program = "dsg archive"}));
+                       OpenStore(folder, {.program = "dsg archive"}));
   DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> copy, store->OpenMap(map));
   return DescribeMap(copy.get());
 }

@@ -78,7 +78,7 @@ absl::StatusOr<std::shared_ptr<MapReader>> OpenUnpacked(const std::string& path,
                                                         const std::string& folder,
                                                         const ArchiveManifest& manifest) {
   DSG_ASSIGN_OR_RETURN(const std::unique_ptr<GraphStore> store,
-                       GraphStore::Open(folder, {.program = "dsg restore"}));
+                       OpenStore(folder, {.program = "dsg restore"}));
   auto map = store->OpenMap(manifest.spec.name);
   if (!map.ok()) return Annotate(map.status(), absl::StrCat("archive ", path));
   DSG_ASSIGN_OR_RETURN(const ArchiveManifest found, DescribeMap(map->get()));

@@ -51,9 +51,9 @@ absl::Status TooFarInTime(TimeNs time_ns, const MapSpec& into, const std::string
   return MakeError(
       Reason::kTimeOutsideMap,
       absl::StrCat("the track of ", agent, " has poses at ", time_ns,
-                   " ns, more than 6.8 years from the epoch ", into.epoch_ns, " ns of map \"",
+                   " ns, more than ten years from the epoch ", into.epoch_ns, " ns of map \"",
                    into.name, "\"; ingest the log of map \"", into.name,
-                   "\" again with an --epoch within 6.8 years of both, or mend the clock of the "
+                   "\" again with an --epoch within ten years of both, or mend the clock of the "
                    "other log"),
       {{"map", into.name}, {"time_ns", absl::StrCat(time_ns)}});
 }
@@ -64,7 +64,10 @@ absl::Status CheckTrack(const MapSpec& into, const Snapshot& other, const TrackI
       absl::StrCat("agent ", ToString(track.agent), " of map \"", other.spec().name, "\"");
   if (track.pose_count > 0) {
     for (const TimeNs time_ns : {track.first_ns, track.last_ns}) {
-      if (!CheckTimeInMap(time_ns, into).ok()) return TooFarInTime(time_ns, into, what);
+      // Nearer than a map takes poses, since both maps are to be one.
+      const bool is_near = CheckTimeInMap(time_ns, into).ok() &&
+                           std::abs(time_ns - into.epoch_ns) <= kObservedFarMaxNs;
+      if (!is_near) return TooFarInTime(time_ns, into, what);
     }
   }
   absl::Status status;

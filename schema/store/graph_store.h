@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// A store: a folder of maps, each one file with its history. Start reading here.
+// A store: maps, each with its history. Start reading here.
 //
-//   auto store  = *GraphStore::Open("/var/lib/dsg", {.create = true});
+//   auto store  = *OpenStore("/var/lib/dsg", {.create = true});
 //   store->CreateMap({.name = "office"});                  // once
 //   auto writer = *store->OpenWriter("office");            // takes the writer lock
-//   writer->Commit(delta);                                 // acknowledged = on disk
+//   writer->Commit(delta);                                 // acknowledged = safe
 //   auto map    = *store->OpenMap("office");               // any number of readers, no lock
 //   auto now    = *map->Latest();                          // a Snapshot at the newest revision
 //   auto then   = *map->At(17);                            // ... and as believed at revision 17
@@ -72,8 +72,8 @@ class MapReader {
   /// Tells what was opened: no other reader of this process has the same, nor will have. What is
   /// kept of a map is kept under it.
   uint64_t opening() const { return opening_; }
-  /// False once the map's file was removed or replaced under it (a restore), or its past was
-  /// rewritten (erased from): open it again.
+  /// False once the map was removed or replaced under it (a restore), or its past was rewritten
+  /// (erased from): open it again.
   virtual bool IsCurrent() const = 0;
   /// The newest revision; costs a few microseconds when nothing has changed.
   virtual absl::StatusOr<RevisionInfo> Head() = 0;
@@ -83,7 +83,7 @@ class MapReader {
   /// From this revision on all can be read; of older ones those with a tag.
   virtual absl::StatusOr<Revision> OldestRevision() = 0;
   /// Set from MapWriter::NoteErasure or Erase on until an Erase has wiped all of it; all zero when
-  /// only bytes of the log are left to wipe.
+  /// only bytes that the backend has given up are left to wipe.
   virtual absl::StatusOr<std::optional<PendingErasure>> GetPendingErasure() = 0;
   /// Order: by name.
   virtual absl::StatusOr<std::vector<Tag>> Tags() = 0;
@@ -96,19 +96,20 @@ class MapReader {
   virtual absl::StatusOr<Touched> TouchedBetween(Revision after, Revision until,
                                                  const StopCheck& stop) = 0;
   virtual absl::StatusOr<SessionState> GetSession(const std::string& session_id) = 0;
-  /// Reads everything: database structure, the log, payload checksums, the digest of every
+  /// Reads everything: what the backend keeps of its own, payload checksums, the digest of every
   /// revision, the ends of edges. The other invariants are proven at each commit (CheckDelta).
   /// `progress` (may be empty) gets a fraction from 0 to 1.
-  /// Errors: what `stop` returned; it is asked also while SQLite checks the database's structure.
+  /// Errors: what `stop` returned.
   virtual absl::StatusOr<VerifyReport> Verify(const StopCheck& stop,
                                               const std::function<void(double)>& progress) = 0;
-  /// Writes the newest revision with all its history as a database file that needs no log beside
-  /// it, while others read and write. The bytes depend on the content of the map alone. Nobody
-  /// sees half a copy: it gets its name when it is whole and on the disk.
+  /// Writes the newest revision with all its history as one file that the same backend can install
+  /// (InstallMap), while others read and write. The bytes depend on the content of the map alone.
+  /// Nobody sees half a copy: it gets its name when it is whole and on the disk.
   ///
-  /// Cost:   reads and writes the whole map; the write-ahead log grows meanwhile.
+  /// Cost:   reads and writes the whole map.
   /// Errors: INVALID_ARGUMENT/FIELD_INVALID if `path` exists; RESOURCE_EXHAUSTED/DISK_FULL, with
-  /// nothing left behind; DATA_LOSS/STORE_CORRUPT; what `stop` returned.
+  /// nothing left behind; DATA_LOSS/STORE_CORRUPT; UNIMPLEMENTED by a store without files; what
+  /// `stop` returned.
   virtual absl::Status CopyTo(const std::string& path, const StopCheck& stop,
                               const Progress& progress) = 0;
 
@@ -121,22 +122,22 @@ class MapReader {
 struct UpgradeReport {
   int64_t from_format = 0;
   int64_t to_format = 0;
-  /// The file as it was, beside the map; empty if nothing was to do. Delete it when content.
+  /// The map as it was, in a file beside it; empty if nothing was to do. Delete it when content.
   std::string copy;
 };
 
 struct StoreOptions {
-  /// Make the folder if it is missing.
+  /// Make the store if it is missing.
   bool create = false;
   /// Upper bound on the memory of decoded tracks and segments, per open map.
   size_t cache_bytes = size_t{256} << 20;
-  /// How writers and lock files name this process: "dsg-ingest", "dsg-server", ...
+  /// How writers name this process to others: "dsg-ingest", "dsg-server", ...
   std::string program = "dsg";
-  /// Each map keeps a file of this size while there is space, which is given up when the disk is
-  /// full, so that forgetting can go on; 0 = none.
+  /// Each map keeps so much space while there is some, which is given up when the disk is full, so
+  /// that forgetting can go on; 0 = none. Of no meaning without files, as the quota.
   int64_t reserve_bytes = int64_t{16} << 20;
-  /// Commits that would make a map larger are refused; 0 = no limit. The write-ahead log may stand
-  /// above it for the moment.
+  /// Commits that would make a map larger are refused; 0 = no limit. What the backend uses for the
+  /// moment may stand above it.
   int64_t quota_bytes = 0;
 };
 
@@ -145,16 +146,22 @@ class GraphStore {
  public:
   virtual ~GraphStore() = default;
 
-  /// Errors: NOT_FOUND/MAP_UNKNOWN naming the folder; FAILED_PRECONDITION/NETWORK_FILE_SYSTEM.
-  static absl::StatusOr<std::unique_ptr<GraphStore>> Open(const std::string& folder,
+  /// As OpenStore.
+  static absl::StatusOr<std::unique_ptr<GraphStore>> Open(const std::string& uri,
                                                           const StoreOptions& options);
 
-  /// Absolute, without links.
+  /// Absolute, without links; empty for a store that keeps no files.
   virtual const std::string& folder() const = 0;
 
   /// Maps that this program can read or upgrade; the others are logged and left out. Order: by
   /// name.
   virtual absl::StatusOr<std::vector<MapSpec>> ListMaps() = 0;
+  /// Names of all maps, also of those that this program cannot open. Order: ascending.
+  /// Errors: UNAVAILABLE if they cannot be listed.
+  virtual absl::StatusOr<std::vector<std::string>> MapNames() = 0;
+  /// Of MapStats::bytes_on_disk of a map, what the backend uses again and says nothing about the
+  /// map, such as a log, now; 0 when there is none.
+  virtual int64_t ReusedBytesOnDisk(const std::string& map) const = 0;
   /// Errors: ALREADY_EXISTS/MAP_EXISTS; what MapSpec::Validate returns.
   virtual absl::Status CreateMap(const MapSpec& spec) = 0;
   /// Errors: NOT_FOUND/MAP_UNKNOWN; FAILED_PRECONDITION/FORMAT_TOO_NEW or NOT_A_STORE.
@@ -164,20 +171,38 @@ class GraphStore {
   /// Errors: NOT_FOUND/MAP_UNKNOWN; UNAVAILABLE/WRITER_LOCKED; FAILED_PRECONDITION/FORMAT_TOO_NEW;
   /// RESOURCE_EXHAUSTED/DISK_FULL, nothing changed.
   virtual absl::StatusOr<UpgradeReport> UpgradeMap(const std::string& name) = 0;
-  /// Makes a database file, such as CopyTo writes, the map `name`, after reading it whole; the file
-  /// is gone then. It may bear another name inside. It must be on the store's file system.
+  /// Makes a file that CopyTo wrote the map `name`, after reading it whole; the file is gone then.
+  /// It may bear another name inside. It must be on the store's file system.
   /// Readers of a map that is replaced notice (IsCurrent).
   ///
   /// Errors: ALREADY_EXISTS/MAP_EXISTS unless `replace`; UNAVAILABLE/WRITER_LOCKED;
-  /// FAILED_PRECONDITION/FORMAT_TOO_NEW, FORMAT_TOO_OLD or NOT_A_STORE; DATA_LOSS/STORE_CORRUPT.
-  /// After an error the store is as it was, and the file still there.
+  /// FAILED_PRECONDITION/FORMAT_TOO_NEW, FORMAT_TOO_OLD or NOT_A_STORE; DATA_LOSS/STORE_CORRUPT;
+  /// UNIMPLEMENTED by a store without files. After an error the store is as it was, and the file
+  /// still there.
   virtual absl::Status InstallMap(const std::string& name, const std::string& file,
                                   bool replace) = 0;
   /// Errors: as OpenMap; UNAVAILABLE/WRITER_LOCKED naming who holds the lock.
   virtual absl::StatusOr<std::unique_ptr<MapWriter>> OpenWriter(const std::string& name) = 0;
 };
 
-/// The number in every map file; opening never upgrades it silently.
+/// Opens a store by where it is: "file:PATH" or a bare path is a folder, "memory:NAME" a store in
+/// the memory of this process, shared by all who open the name and gone with the last of them.
+/// Link dsg::stores, which knows the backends.
+/// Errors: NOT_FOUND/MAP_UNKNOWN naming the store if it is not there and not to be made;
+/// FAILED_PRECONDITION/NETWORK_FILE_SYSTEM.
+absl::StatusOr<std::unique_ptr<GraphStore>> OpenStore(const std::string& uri,
+                                                      const StoreOptions& options);
+
+inline absl::StatusOr<std::unique_ptr<GraphStore>> GraphStore::Open(const std::string& uri,
+                                                                    const StoreOptions& options) {
+  return OpenStore(uri, options);
+}
+
+/// ALREADY_EXISTS/MAP_EXISTS and NOT_FOUND/MAP_UNKNOWN, for backends.
+absl::Status MapExistsError(const std::string& map);
+absl::Status UnknownMapError(const std::string& map, const std::string& store);
+
+/// The format of what is on disk; opening never upgrades it silently.
 inline constexpr int kStoreFormatVersion = 3;
 
 }  // namespace dsg

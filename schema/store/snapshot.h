@@ -31,7 +31,7 @@ struct MapStats {
   RevisionInfo at;
   /// Ascending by rank, then name.
   std::vector<LayerCount> layers;
-  /// Database, write-ahead log and lock file, now (not as of the revision).
+  /// What the map takes on disk now, not as of the revision; 0 for a map without files.
   int64_t bytes_on_disk = 0;
   /// First and last pose of all agents.
   std::optional<TimeNs> first_pose_ns;
@@ -86,6 +86,8 @@ struct EdgeFilter {
   std::string relation;
   NodeId target;
   std::optional<TimeNs> at_ns;
+
+  bool Matches(const Edge& edge) const;
 };
 
 /// A piece of a track inside a box: the agent was in it during [enter_ns, exit_ns).
@@ -121,7 +123,7 @@ class Snapshot {
   /// Ascending by rank, then name.
   virtual absl::StatusOr<std::vector<Layer>> Layers() const = 0;
   /// Errors: NOT_FOUND/LAYER_UNKNOWN listing the known ones.
-  virtual absl::StatusOr<Layer> FindLayer(std::string_view name) const = 0;
+  absl::StatusOr<Layer> FindLayer(std::string_view name) const;
   virtual absl::StatusOr<std::vector<SemanticLabel>> Labels() const = 0;
   /// Reads counters only, whatever the size of the map.
   virtual absl::StatusOr<MapStats> Stats() const = 0;
@@ -131,10 +133,12 @@ class Snapshot {
   /// A node by id ("O42") or, failing that, by exact name; the lowest id when several share it
   /// (callers that need it to be the only one look with ScanNodes).
   /// Errors: NOT_FOUND/NODE_UNKNOWN.
-  virtual absl::StatusOr<NodeId> ResolveNode(std::string_view id_or_name) const = 0;
+  absl::StatusOr<NodeId> ResolveNode(std::string_view id_or_name) const;
   /// The same among humans and robots; an id goes before a name.
   /// Errors: NOT_FOUND/AGENT_UNKNOWN; INVALID_ARGUMENT/FIELD_INVALID when several share the name.
-  virtual absl::StatusOr<NodeId> ResolveAgent(std::string_view id_or_name) const = 0;
+  absl::StatusOr<NodeId> ResolveAgent(std::string_view id_or_name) const;
+  /// Nodes of exactly this name; none has the empty name. Order: ascending id.
+  virtual absl::StatusOr<std::vector<NodeId>> NodesNamed(const std::string& name) const = 0;
 
   /// Calls `visit` for each matching node with id > `after`, until it returns false.
   /// Order: ascending id.
@@ -201,7 +205,7 @@ class Snapshot {
                                                         TimeNs to_ns,
                                                         const StopCheck& stop) const = 0;
 
-  /// Order: ascending time of the first pose.
+  /// Order: ascending from_ns, then to_ns, type, to_agent.
   virtual absl::StatusOr<std::vector<PoseFactor>> Factors(NodeId agent, TimeNs from_ns,
                                                           TimeNs to_ns) const = 0;
   /// Calls `visit` for each body shape with from_ns <= time < to_ns, until it returns false. Of
@@ -222,6 +226,15 @@ class Snapshot {
   virtual absl::StatusOr<MeshBlock> ReadMeshBlock(BlockIndex index) const = 0;
   /// Errors: NOT_FOUND/ASSET_UNKNOWN.
   virtual absl::StatusOr<Asset> ReadAsset(const Sha256& sha256) const = 0;
+
+ protected:
+  /// NOT_FOUND, naming what was asked for.
+  absl::Status UnknownNode(NodeId id) const;
+  absl::Status UnknownMeshBlock(const BlockIndex& index) const;
+  absl::Status UnknownAsset(const Sha256& sha256) const;
+
+ private:
+  absl::StatusOr<bool> IsAgent(NodeId id) const;
 };
 
 }  // namespace dsg

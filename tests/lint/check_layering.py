@@ -29,6 +29,9 @@ ALLOWED = {
     "schema/codec": MODEL,
     "schema/store": CODEC,
     "schema/store/sqlite": STORE,
+    "schema/store/memory": STORE,
+    # The one place that knows all backends.
+    "schema/store/backends": STORE + ["schema/store/sqlite", "schema/store/memory"],
     "schema/archive": STORE + ["schema/files"],
     "schema/interop": STORE,
     "schema/picture": MODEL,

@@ -5,16 +5,12 @@
 
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
-#include "schema/codec/proto_convert.h"
 #include "schema/codec/shape_codec.h"
+#include "schema/store/sqlite/graph_rows.h"
 #include "schema/store/sqlite/rows.h"
 
 namespace dsg::sqlite {
 namespace {
-
-std::string_view View(const Sha256& sha256) {
-  return {reinterpret_cast<const char*>(sha256.data()), sha256.size()};
-}
 
 absl::StatusOr<Sha256> DigestIn(const Query& query, const std::string& map) {
   Sha256 sha256{};
@@ -27,12 +23,8 @@ absl::StatusOr<Sha256> DigestIn(const Query& query, const std::string& map) {
 absl::Status ReadNodes(Database& db, const char* sql, std::set<Sha256>* assets) {
   Query query(db, sql);
   while (query.Next()) {
-    Node node;
     // What a damaged row refers to would be taken for unused, and dropped.
-    if (query.Int(4) != RowChecksum({query.Int(0), query.Int(1), query.Int(2)}, query.Blob(3)) ||
-        !DecodeNodePayload(query.Blob(3), &node)) {
-      return CorruptRow(db.map_name(), "node", ToString(IdOf(query.Int(0))));
-    }
+    DSG_ASSIGN_OR_RETURN(const Node node, NodeFromRow(query, db.map_name()));
     CollectReferences(node, assets);
   }
   return query.status();
@@ -52,15 +44,6 @@ absl::Status ReadShapes(Database& db, const char* sql, std::set<Sha256>* assets)
 
 }  // namespace
 
-void CollectReferences(const Node& node, std::set<Sha256>* assets) {
-  if (node.object.has_value() && node.object->model.has_value()) {
-    assets->insert(*node.object->model);
-  }
-  if (node.agent.has_value() && node.agent->body_model.has_value()) {
-    assets->insert(*node.agent->body_model);
-  }
-}
-
 absl::StatusOr<std::set<Sha256>> ReadReferences(Database& db,
                                                 const std::vector<StoredAsset>& stored) {
   std::set<Sha256> assets;
@@ -76,7 +59,7 @@ absl::StatusOr<std::set<Sha256>> ReadReferences(Database& db,
   for (const StoredAsset& asset : stored) unknown.erase(asset.sha256);
   if (!unknown.empty()) {
     return CorruptRow(db.map_name(), "asset",
-                      absl::BytesToHexString(std::string(View(*unknown.begin()))));
+                      absl::BytesToHexString(std::string(BytesOf(*unknown.begin()))));
   }
   return assets;
 }
@@ -93,13 +76,15 @@ absl::StatusOr<std::vector<StoredAsset>> ListAssets(Database& db) {
 }
 
 absl::Status DeleteAsset(Database& db, const Sha256& sha256) {
-  return Query(db, "DELETE FROM asset WHERE sha256 = ?1").Bind(Query::BlobView{View(sha256)}).Run();
+  return Query(db, "DELETE FROM asset WHERE sha256 = ?1")
+      .Bind(Query::BlobView{BytesOf(sha256)})
+      .Run();
 }
 
 absl::Status DropAsset(Database& db, const StoredAsset& asset) {
   DSG_RETURN_IF_ERROR(
       Query(db, "INSERT OR IGNORE INTO dropped_asset (sha256, rev_from) VALUES (?1, ?2)")
-          .Bind(Query::BlobView{View(asset.sha256)}, asset.rev_from)
+          .Bind(Query::BlobView{BytesOf(asset.sha256)}, asset.rev_from)
           .Run());
   return DeleteAsset(db, asset.sha256);
 }
@@ -107,7 +92,7 @@ absl::Status DropAsset(Database& db, const StoredAsset& asset) {
 absl::Status AddDoubtfulAssets(Database& db, const std::set<Sha256>& assets) {
   for (const Sha256& sha256 : assets) {
     DSG_RETURN_IF_ERROR(Query(db, "INSERT OR IGNORE INTO doubtful_asset (sha256) VALUES (?1)")
-                            .Bind(Query::BlobView{View(sha256)})
+                            .Bind(Query::BlobView{BytesOf(sha256)})
                             .Run());
   }
   return absl::OkStatus();

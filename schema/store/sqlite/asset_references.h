@@ -4,12 +4,10 @@
 
 #include <set>
 
-#include "schema/model/node.h"
+#include "schema/store/erase_list.h"
 #include "schema/store/sqlite/database.h"
 
 namespace dsg::sqlite {
-
-void CollectReferences(const Node& node, std::set<Sha256>* assets);
 
 /// An asset, by its rows.
 struct StoredAsset {

@@ -1,33 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
-// Factors and shapes: batches of one agent, which are ended whole; what was not meant of an ended
-// batch is written anew.
+// Factors and shapes: batches of one agent; see schema/store/batches.h.
 #include <algorithm>
 #include <set>
 
-#include "absl/strings/str_cat.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/codec/shape_codec.h"
+#include "schema/store/batches.h"
 #include "schema/store/sqlite/commit.h"
+#include "schema/store/sqlite/graph_rows.h"
 
 namespace dsg::sqlite {
 namespace {
 
+// The statements of a table of current batches.
+template <typename Row>
 struct BatchTable {
-  char letter;
   const char* name;
   const char* insert;
-  /// Of one agent, touching a span.
+  /// Of one agent, touching a span; columns as BatchRowOf, then id.
   const char* select;
   const char* archive;
   const char* drop;
 };
 
-#define DSG_BATCH_TABLE(letter, table, history)                                          \
+#define DSG_BATCH_TABLE(table, history)                                                  \
   {                                                                                      \
-    letter, table,                                                                       \
+    table,                                                                               \
         "INSERT INTO " table                                                             \
         " (agent, rev_from, t0, t1, checksum, payload) VALUES (?1, ?2, ?3, ?4, ?5, ?6)", \
-        "SELECT id, rev_from, t0, t1, checksum, payload FROM " table                     \
+        "SELECT agent, rev_from, t0, t1, payload, checksum, id FROM " table              \
         " WHERE agent = ?1 AND t0 < ?3 AND t1 >= ?2 ORDER BY id",                        \
         "INSERT INTO " history                                                           \
         " (id, agent, rev_from, rev_to, t0, t1, checksum, payload)"                      \
@@ -36,120 +37,98 @@ struct BatchTable {
         "DELETE FROM " table " WHERE id = ?1"                                            \
   }
 
-constexpr BatchTable kFactors = DSG_BATCH_TABLE('F', "factor_segment", "factor_history");
-constexpr BatchTable kShapes = DSG_BATCH_TABLE('H', "shape_segment", "shape_history");
+constexpr BatchTable<FactorRow> kFactors = DSG_BATCH_TABLE("factor_segment", "factor_history");
+constexpr BatchTable<ShapeRow> kShapes = DSG_BATCH_TABLE("shape_segment", "shape_history");
 
 #undef DSG_BATCH_TABLE
 
-struct BatchRow {
+// A row and the bytes that it shows.
+template <typename Row>
+struct StoredBatch {
   int64_t id = 0;
-  Revision rev_from = 0;
-  TimeNs t0 = 0;
-  TimeNs t1 = 0;
+  Row row;
   std::string payload;
 
-  bool IsNewerThan(const BatchRow& other) const {
-    return rev_from != other.rev_from ? rev_from > other.rev_from : id > other.id;
+  bool IsNewerThan(const StoredBatch& other) const {
+    return row.rev_from != other.row.rev_from ? row.rev_from > other.row.rev_from : id > other.id;
+  }
+  Row Whole() const {
+    Row whole = row;
+    whole.payload = payload;
+    return whole;
   }
 };
 
-absl::Status InsertBatch(const BatchTable& table, NodeId agent, TimeNs t0, TimeNs t1,
+template <typename Row>
+absl::Status InsertBatch(const BatchTable<Row>& table, NodeId agent, TimeNs t0, TimeNs t1,
                          const std::string& payload, CommitContext* commit) {
-  const std::initializer_list<int64_t> columns = {KeyOf(agent), commit->revision(), t0, t1};
-  commit->head.content.Add(RowIdentity(table.letter, columns, payload));
+  const Row row{{agent, commit->revision(), t0, t1, payload}};
+  commit->head.sums.Add(row);
   return Query(commit->db, table.insert)
-      .Bind(KeyOf(agent), commit->revision(), t0, t1, RowChecksum(columns, payload),
-            Query::BlobView{payload})
+      .Bind(KeyOf(agent), row.rev_from, t0, t1, ChecksumOf(row), Query::BlobView{payload})
       .Run();
 }
 
-absl::StatusOr<std::vector<BatchRow>> ReadBatches(const BatchTable& table, const TrackSpan& span,
-                                                  CommitContext* commit) {
-  std::vector<BatchRow> rows;
+template <typename Row>
+absl::StatusOr<std::vector<StoredBatch<Row>>> ReadBatches(const BatchTable<Row>& table,
+                                                          const TrackSpan& span,
+                                                          CommitContext* commit) {
+  std::vector<StoredBatch<Row>> batches;
   Query query(commit->db, table.select);
   query.Bind(KeyOf(span.agent), span.from_ns, span.to_ns);
   while (query.Next()) {
-    BatchRow row{query.Int(0), query.Int(1), query.Int(2), query.Int(3),
-                 std::string(query.Blob(5))};
-    if (query.Int(4) !=
-        RowChecksum({KeyOf(span.agent), row.rev_from, row.t0, row.t1}, row.payload)) {
-      return CorruptRow(commit->spec.name, table.name, ToString(span.agent));
-    }
-    rows.push_back(std::move(row));
+    DSG_ASSIGN_OR_RETURN(Row row, BatchRowOf<Row>(query, commit->spec.name));
+    std::string payload(row.payload);
+    row.payload = {};
+    batches.push_back({query.Int(6), row, std::move(payload)});
   }
   DSG_RETURN_IF_ERROR(query.status());
-  return rows;
+  return batches;
 }
 
-absl::Status EndBatch(const BatchTable& table, NodeId agent, const BatchRow& row,
+template <typename Row>
+absl::Status EndBatch(const BatchTable<Row>& table, const StoredBatch<Row>& batch,
                       CommitContext* commit) {
-  commit->head.content.Remove(
-      RowIdentity(table.letter, {KeyOf(agent), row.rev_from, row.t0, row.t1}, row.payload));
-  DSG_RETURN_IF_ERROR(Query(commit->db, table.archive).Bind(row.id, commit->revision()).Run());
-  return Query(commit->db, table.drop).Bind(row.id).Run();
+  commit->head.sums.Remove(batch.Whole());
+  DSG_RETURN_IF_ERROR(Query(commit->db, table.archive).Bind(batch.id, commit->revision()).Run());
+  return Query(commit->db, table.drop).Bind(batch.id).Run();
 }
 
-// The shapes from `first` on that make one segment.
-ShapeAppend CutShapes(const ShapeAppend& item, size_t first) {
-  ShapeAppend segment{item.agent, item.topology, {}};
-  const TimeNs t0 = item.shapes[first].time_ns;
-  for (size_t i = first; i < item.shapes.size(); ++i) {
-    const BodyShape& shape = item.shapes[i];
-    // Times may lie further apart than 63 bits count.
-    const uint64_t length_ns = static_cast<uint64_t>(shape.time_ns) - static_cast<uint64_t>(t0);
-    if (segment.shapes.size() == kShapesPerSegmentMax ||
-        length_ns > static_cast<uint64_t>(kShapeSegmentNsMax)) {
-      break;
-    }
-    segment.shapes.push_back(shape);
-  }
-  return segment;
-}
-
-// Times of shapes that hide those of `row`: written anew, it must not come out on top of them.
-absl::StatusOr<std::set<TimeNs>> HiddenTimes(NodeId agent, const BatchRow& row,
+// Times of shapes that hide those of `batch`: written anew, it must not come out on top of them.
+absl::StatusOr<std::set<TimeNs>> HiddenTimes(const StoredBatch<ShapeRow>& batch,
                                              CommitContext* commit) {
+  const ShapeRow& row = batch.row;
   const TimeNs to_ns = row.t1 == kTimeMax ? kTimeMax : row.t1 + 1;
-  DSG_ASSIGN_OR_RETURN(const auto around, ReadBatches(kShapes, {agent, row.t0, to_ns}, commit));
+  DSG_ASSIGN_OR_RETURN(const auto around, ReadBatches(kShapes, {row.agent, row.t0, to_ns}, commit));
   std::set<TimeNs> hidden;
   std::vector<TimeNs> times;
-  for (const BatchRow& other : around) {
-    if (!other.IsNewerThan(row)) continue;
+  for (const auto& other : around) {
+    if (!other.IsNewerThan(batch)) continue;
     if (!DecodeShapeTimes(other.payload, &times)) {
-      return CorruptRow(commit->spec.name, kShapes.name, ToString(agent));
+      return CorruptRow(commit->spec.name, kShapes.name, ToString(row.agent));
     }
     hidden.insert(times.begin(), times.end());
   }
   return hidden;
 }
 
-// All of the row goes, whatever is in it.
-bool Covers(const TrackSpan& span, const BatchRow& row) {
-  return span.from_ns <= row.t0 && row.t1 < span.to_ns;
-}
-
-bool Touches(const PoseFactor& factor, const TrackSpan& span) {
-  const auto holds = [&](TimeNs t) { return span.from_ns <= t && t < span.to_ns; };
-  const bool ends_here = factor.to_agent.empty() || factor.to_agent == span.agent;
-  return holds(factor.from_ns) || (ends_here && holds(factor.to_ns));
-}
-
-absl::Status CutShapeRow(const TrackSpan& span, const BatchRow& row, CommitContext* commit) {
-  if (Covers(span, row)) return EndBatch(kShapes, span.agent, row, commit);
+absl::Status CutShapeBatch(const TrackSpan& span, const StoredBatch<ShapeRow>& batch,
+                           CommitContext* commit) {
+  if (Covers(span, batch.row.t0, batch.row.t1)) return EndBatch(kShapes, batch, commit);
   DecodedShapes decoded;
-  if (!DecodeShapes(row.payload, /*with_vertices=*/true, &decoded)) {
+  if (!DecodeShapes(batch.payload, /*with_vertices=*/true, &decoded)) {
     return CorruptRow(commit->spec.name, kShapes.name, ToString(span.agent));
   }
-  DSG_ASSIGN_OR_RETURN(const std::set<TimeNs> hidden, HiddenTimes(span.agent, row, commit));
+  DSG_ASSIGN_OR_RETURN(const std::set<TimeNs> hidden, HiddenTimes(batch, commit));
   ShapeAppend rest{span.agent, decoded.topology, {}};
   bool is_touched = false;
   for (BodyShape& shape : decoded.shapes) {
-    const bool goes = span.from_ns <= shape.time_ns && shape.time_ns < span.to_ns;
+    const bool goes = Holds(span, shape.time_ns);
     is_touched |= goes;
     if (!goes && !hidden.contains(shape.time_ns)) rest.shapes.push_back(std::move(shape));
   }
   if (!is_touched) return absl::OkStatus();
-  DSG_RETURN_IF_ERROR(EndBatch(kShapes, span.agent, row, commit));
+  DSG_RETURN_IF_ERROR(EndBatch(kShapes, batch, commit));
   return WriteShapes({rest}, commit);
 }
 
@@ -158,14 +137,9 @@ absl::Status CutShapeRow(const TrackSpan& span, const BatchRow& row, CommitConte
 absl::Status WriteFactors(const std::vector<FactorAppend>& factors, CommitContext* commit) {
   for (const FactorAppend& item : factors) {
     if (item.factors.empty()) continue;
-    TimeNs t0 = kTimeMax;
-    TimeNs t1 = kTimeMin;
-    for (const PoseFactor& factor : item.factors) {
-      t0 = std::min({t0, factor.from_ns, factor.to_ns});
-      t1 = std::max({t1, factor.from_ns, factor.to_ns});
-    }
+    const BatchTimes times = TimesOf(item.factors);
     DSG_RETURN_IF_ERROR(
-        InsertBatch(kFactors, item.agent, t0, t1, EncodeFactors(item.factors), commit));
+        InsertBatch(kFactors, item.agent, times.t0, times.t1, EncodeFactors(item.factors), commit));
   }
   return absl::OkStatus();
 }
@@ -173,38 +147,38 @@ absl::Status WriteFactors(const std::vector<FactorAppend>& factors, CommitContex
 absl::Status WriteShapes(const std::vector<ShapeAppend>& shapes, CommitContext* commit) {
   for (const ShapeAppend& item : shapes) {
     for (size_t first = 0; first < item.shapes.size();) {
-      const ShapeAppend segment = CutShapes(item, first);
-      first += segment.shapes.size();
-      DSG_RETURN_IF_ERROR(InsertBatch(kShapes, segment.agent, segment.shapes.front().time_ns,
-                                      segment.shapes.back().time_ns,
-                                      EncodeShapes(segment, commit->spec.codec), commit));
+      const ShapeAppend batch = CutBatch(item, first);
+      first += batch.shapes.size();
+      DSG_RETURN_IF_ERROR(InsertBatch(kShapes, batch.agent, batch.shapes.front().time_ns,
+                                      batch.shapes.back().time_ns,
+                                      EncodeShapes(batch, commit->spec.codec), commit));
     }
   }
   return absl::OkStatus();
 }
 
 absl::Status EndFactors(const TrackSpan& span, CommitContext* commit) {
-  DSG_ASSIGN_OR_RETURN(const auto rows, ReadBatches(kFactors, span, commit));
-  for (const BatchRow& row : rows) {
-    if (Covers(span, row)) {
-      DSG_RETURN_IF_ERROR(EndBatch(kFactors, span.agent, row, commit));
+  DSG_ASSIGN_OR_RETURN(const auto batches, ReadBatches(kFactors, span, commit));
+  for (const auto& batch : batches) {
+    if (Covers(span, batch.row.t0, batch.row.t1)) {
+      DSG_RETURN_IF_ERROR(EndBatch(kFactors, batch, commit));
       continue;
     }
     std::vector<PoseFactor> factors;
-    if (!DecodeFactors(row.payload, &factors)) {
+    if (!DecodeFactors(batch.payload, &factors)) {
       return CorruptRow(commit->spec.name, kFactors.name, ToString(span.agent));
     }
     const auto goes = [&](const PoseFactor& factor) { return Touches(factor, span); };
     if (std::erase_if(factors, goes) == 0) continue;
-    DSG_RETURN_IF_ERROR(EndBatch(kFactors, span.agent, row, commit));
+    DSG_RETURN_IF_ERROR(EndBatch(kFactors, batch, commit));
     DSG_RETURN_IF_ERROR(WriteFactors({{span.agent, std::move(factors)}}, commit));
   }
   return absl::OkStatus();
 }
 
 absl::Status EndShapes(const TrackSpan& span, CommitContext* commit) {
-  DSG_ASSIGN_OR_RETURN(const auto rows, ReadBatches(kShapes, span, commit));
-  for (const BatchRow& row : rows) DSG_RETURN_IF_ERROR(CutShapeRow(span, row, commit));
+  DSG_ASSIGN_OR_RETURN(const auto batches, ReadBatches(kShapes, span, commit));
+  for (const auto& batch : batches) DSG_RETURN_IF_ERROR(CutShapeBatch(span, batch, commit));
   return absl::OkStatus();
 }
 

@@ -1,26 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 // Stays, mesh blocks and assets.
-#include "absl/strings/str_cat.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/store/sqlite/commit.h"
+#include "schema/store/sqlite/graph_rows.h"
 
 namespace dsg::sqlite {
 namespace {
 
 constexpr size_t kAssetPartBytes = size_t{1} << 20;
 
-absl::Status EndStay(int64_t agent, int64_t enter_ns, Query& current, CommitContext* commit) {
-  const int64_t exit_ns = current.Int(0);
-  const int64_t place = current.Int(1);
-  const int64_t room = current.Int(2);
-  const int64_t rev_from = current.Int(3);
-  const std::initializer_list<int64_t> columns = {agent, enter_ns, exit_ns, place, room, rev_from};
-  if (current.Int(4) != RowChecksum32(columns, "")) {
-    return CorruptRow(commit->spec.name, "stay",
-                      absl::StrCat(ToString(IdOf(agent)), " ", enter_ns));
-  }
-  commit->head.content.Remove(RowIdentity('S', columns, ""));
-  --commit->head.info.stay_count;
+constexpr char kSelectStay[] =
+    "SELECT agent, enter_ns, exit_ns, place, room, rev_from, checksum FROM stay"
+    " WHERE agent = ?1 AND enter_ns = ?2";
+
+absl::Status EndStay(const StayRow& row, CommitContext* commit) {
+  const int64_t agent = KeyOf(row.agent);
+  const TimeNs enter_ns = row.enter_ns;
+  commit->head.sums.Remove(row);
   DSG_RETURN_IF_ERROR(
       Query(commit->db,
             "INSERT INTO stay_history"
@@ -36,48 +32,37 @@ absl::Status EndStay(int64_t agent, int64_t enter_ns, Query& current, CommitCont
 
 absl::Status WriteStay(const Stay& stay, CommitContext* commit) {
   const int64_t agent = KeyOf(stay.agent);
-  const int64_t place = KeyOf(stay.place);
-  const int64_t room = KeyOf(stay.room);
   {
-    Query current(commit->db,
-                  "SELECT exit_ns, place, room, rev_from, checksum FROM stay"
-                  " WHERE agent = ?1 AND enter_ns = ?2");
+    Query current(commit->db, kSelectStay);
     const bool exists = current.Bind(agent, stay.enter_ns).Next();
     DSG_RETURN_IF_ERROR(current.status());
     if (exists) {
-      if (current.Int(0) == stay.exit_ns && current.Int(1) == place && current.Int(2) == room) {
-        return absl::OkStatus();
-      }
-      DSG_RETURN_IF_ERROR(EndStay(agent, stay.enter_ns, current, commit));
+      DSG_ASSIGN_OR_RETURN(const StayRow known, StayRowOf(current, commit->spec.name));
+      if (known.stay() == stay) return absl::OkStatus();
+      DSG_RETURN_IF_ERROR(EndStay(known, commit));
     }
   }
-  const std::initializer_list<int64_t> columns = {agent, stay.enter_ns, stay.exit_ns,
-                                                  place, room,          commit->revision()};
-  commit->head.content.Add(RowIdentity('S', columns, ""));
-  ++commit->head.info.stay_count;
+  const StayRow row{stay.agent, stay.enter_ns, stay.exit_ns,
+                    stay.place, stay.room,     commit->revision()};
+  commit->head.sums.Add(row);
   return Query(commit->db,
                "INSERT INTO stay (agent, enter_ns, exit_ns, place, room, rev_from, checksum)"
                " VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)")
-      .Bind(agent, stay.enter_ns, stay.exit_ns, place, room, commit->revision(),
-            RowChecksum32(columns, ""))
+      .Bind(agent, stay.enter_ns, stay.exit_ns, KeyOf(stay.place), KeyOf(stay.room),
+            commit->revision(), ChecksumOf(row))
       .Run();
 }
 
-absl::StatusOr<bool> EndMeshBlock(const BlockIndex& index, CommitContext* commit) {
-  Query current(
-      commit->db,
-      "SELECT rev_from, payload, checksum FROM mesh_block WHERE x = ?1 AND y = ?2 AND z = ?3");
+absl::Status EndMeshBlock(const BlockIndex& index, CommitContext* commit) {
+  Query current(commit->db,
+                "SELECT x, y, z, rev_from, payload, checksum FROM mesh_block"
+                " WHERE x = ?1 AND y = ?2 AND z = ?3");
   const bool exists = current.Bind(index.x, index.y, index.z).Next();
   DSG_RETURN_IF_ERROR(current.status());
-  if (!exists) return false;
-  const std::initializer_list<int64_t> columns = {index.x, index.y, index.z, current.Int(0)};
-  if (current.Int(2) != RowChecksum(columns, current.Blob(1))) {
-    return CorruptRow(commit->spec.name, "mesh_block",
-                      absl::StrCat(index.x, ",", index.y, ",", index.z));
-  }
+  if (!exists) return absl::OkStatus();
+  DSG_ASSIGN_OR_RETURN(const MeshRow row, MeshRowOf(current, commit->spec.name));
   commit->touched.mesh_blocks.push_back(index);
-  commit->head.content.Remove(RowIdentity('M', columns, current.Blob(1)));
-  --commit->head.info.mesh_block_count;
+  commit->head.sums.Remove(row);
   DSG_RETURN_IF_ERROR(
       Query(commit->db,
             "INSERT INTO mesh_block_history (x, y, z, rev_from, rev_to, checksum, payload)"
@@ -85,10 +70,9 @@ absl::StatusOr<bool> EndMeshBlock(const BlockIndex& index, CommitContext* commit
             " WHERE x = ?1 AND y = ?2 AND z = ?3")
           .Bind(index.x, index.y, index.z, commit->revision())
           .Run());
-  DSG_RETURN_IF_ERROR(Query(commit->db, "DELETE FROM mesh_block WHERE x = ?1 AND y = ?2 AND z = ?3")
-                          .Bind(index.x, index.y, index.z)
-                          .Run());
-  return true;
+  return Query(commit->db, "DELETE FROM mesh_block WHERE x = ?1 AND y = ?2 AND z = ?3")
+      .Bind(index.x, index.y, index.z)
+      .Run();
 }
 
 absl::Status WriteMeshBlock(const MeshBlock& block, CommitContext* commit) {
@@ -101,15 +85,14 @@ absl::Status WriteMeshBlock(const MeshBlock& block, CommitContext* commit) {
     }
     DSG_RETURN_IF_ERROR(current.status());
   }
-  DSG_RETURN_IF_ERROR(EndMeshBlock(index, commit).status());
-  const std::initializer_list<int64_t> columns = {index.x, index.y, index.z, commit->revision()};
+  DSG_RETURN_IF_ERROR(EndMeshBlock(index, commit));
+  const MeshRow row{index, commit->revision(), payload};
   commit->touched.mesh_blocks.push_back(index);
-  commit->head.content.Add(RowIdentity('M', columns, payload));
-  ++commit->head.info.mesh_block_count;
+  commit->head.sums.Add(row);
   return Query(commit->db,
                "INSERT INTO mesh_block (x, y, z, rev_from, checksum, payload)"
                " VALUES (?1, ?2, ?3, ?4, ?5, ?6)")
-      .Bind(index.x, index.y, index.z, commit->revision(), RowChecksum(columns, payload),
+      .Bind(index.x, index.y, index.z, commit->revision(), ChecksumOf(row),
             Query::BlobView{payload})
       .Run();
 }
@@ -123,13 +106,12 @@ absl::Status WriteStays(const std::vector<Stay>& stays, CommitContext* commit) {
 
 absl::Status EndStays(const std::vector<StayKey>& keys, CommitContext* commit) {
   for (const StayKey& key : keys) {
-    Query current(commit->db,
-                  "SELECT exit_ns, place, room, rev_from, checksum FROM stay"
-                  " WHERE agent = ?1 AND enter_ns = ?2");
-    if (current.Bind(KeyOf(key.agent), key.enter_ns).Next()) {
-      DSG_RETURN_IF_ERROR(EndStay(KeyOf(key.agent), key.enter_ns, current, commit));
-    }
+    Query current(commit->db, kSelectStay);
+    const bool exists = current.Bind(KeyOf(key.agent), key.enter_ns).Next();
     DSG_RETURN_IF_ERROR(current.status());
+    if (!exists) continue;
+    DSG_ASSIGN_OR_RETURN(const StayRow row, StayRowOf(current, commit->spec.name));
+    DSG_RETURN_IF_ERROR(EndStay(row, commit));
   }
   return absl::OkStatus();
 }
@@ -145,24 +127,23 @@ absl::Status EndStaysOf(NodeId agent, CommitContext* commit) {
   return EndStays(keys, commit);
 }
 
-absl::Status WriteMesh(const GraphDelta& delta, CommitContext* commit) {
-  for (const BlockIndex& index : delta.mesh_removals) {
-    DSG_RETURN_IF_ERROR(EndMeshBlock(index, commit).status());
-  }
-  for (const MeshBlock& block : delta.mesh_blocks) {
-    DSG_RETURN_IF_ERROR(WriteMeshBlock(block, commit));
-  }
+absl::Status EndMeshBlocks(const std::vector<BlockIndex>& indices, CommitContext* commit) {
+  for (const BlockIndex& index : indices) DSG_RETURN_IF_ERROR(EndMeshBlock(index, commit));
+  return absl::OkStatus();
+}
+
+absl::Status WriteMeshBlocks(const std::vector<MeshBlock>& blocks, CommitContext* commit) {
+  for (const MeshBlock& block : blocks) DSG_RETURN_IF_ERROR(WriteMeshBlock(block, commit));
   return absl::OkStatus();
 }
 
 absl::Status WriteAssets(const std::vector<Asset>& assets, CommitContext* commit) {
   for (const Asset& asset : assets) {
-    const std::string_view sha256(reinterpret_cast<const char*>(asset.sha256.data()),
-                                  asset.sha256.size());
+    const std::string_view sha256 = BytesOf(asset.sha256);
     Query known(commit->db, "SELECT 1 FROM asset WHERE sha256 = ?1 AND part = 0");
     if (known.Bind(Query::BlobView{sha256}).Next()) continue;
     DSG_RETURN_IF_ERROR(known.status());
-    commit->head.content.Add(RowIdentity('A', {commit->revision()}, sha256));
+    commit->head.sums.Add(AssetRow{commit->revision(), sha256});
     const std::string_view content = asset.content;
     // An empty asset still needs its one row.
     for (size_t part = 0; part == 0 || part * kAssetPartBytes < content.size(); ++part) {

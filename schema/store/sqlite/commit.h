@@ -4,34 +4,23 @@
 
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <unordered_map>
 
-#include "schema/codec/checksum.h"
 #include "schema/codec/trajectory_codec.h"
 #include "schema/model/graph_delta.h"
-#include "schema/model/revision.h"
+#include "schema/store/revision_record.h"
 #include "schema/store/sqlite/database.h"
 #include "schema/store/sqlite/rows.h"
-#include "schema/store/sqlite/touched_keys.h"
+#include "schema/store/touched_keys.h"
 
 namespace dsg::sqlite {
-
-/// The newest revision and the sums that it carries.
-struct Head {
-  RevisionInfo info;
-  ContentDigest content;
-  std::map<LayerId, int64_t> layer_counts;
-  std::optional<TimeNs> first_pose_ns;
-  std::optional<TimeNs> last_pose_ns;
-};
 
 /// One commit. `head` begins as a copy of the newest revision, and becomes the next one.
 struct CommitContext {
   Database& db;
   const MapSpec& spec;
-  Head head;
+  RevisionRecord head;
   int64_t delta_checksum = 0;
   /// What has been touched so far.
   TouchedKeys touched = {};
@@ -43,14 +32,18 @@ struct CommitContext {
 class GraphRowsWriter {
  public:
   explicit GraphRowsWriter(CommitContext* commit) : commit_(*commit) {}
-  absl::Status Apply(const GraphDelta& delta);
+  absl::Status WriteLayers(const std::vector<Layer>& layers);
+  absl::Status WriteLabels(const std::vector<SemanticLabel>& labels);
+  absl::Status WriteNodes(const std::vector<Node>& nodes);
+  absl::Status EndEdges(const std::vector<EdgeKey>& keys);
+  absl::Status Retire(const Retirement& item);
+  absl::Status WriteEdges(const std::vector<Edge>& edges);
 
  private:
   absl::Status WriteLayer(const Layer& layer);
   absl::Status WriteLabel(const SemanticLabel& label);
   absl::Status WriteNode(const Node& node);
   absl::Status InsertNode(const Node& node, const std::string& payload);
-  absl::Status Retire(const Retirement& item);
   /// Moves the current row to the history. Returns false if there is none.
   absl::StatusOr<bool> EndNode(int64_t key);
   absl::Status EndEdgesOf(int64_t key);
@@ -69,12 +62,29 @@ class GraphRowsWriter {
 absl::Status WriteStays(const std::vector<Stay>& stays, CommitContext* commit);
 absl::Status EndStays(const std::vector<StayKey>& keys, CommitContext* commit);
 absl::Status EndStaysOf(NodeId agent, CommitContext* commit);
-absl::Status WriteMesh(const GraphDelta& delta, CommitContext* commit);
+absl::Status WriteMeshBlocks(const std::vector<MeshBlock>& blocks, CommitContext* commit);
+absl::Status EndMeshBlocks(const std::vector<BlockIndex>& indices, CommitContext* commit);
 absl::Status WriteAssets(const std::vector<Asset>& assets, CommitContext* commit);
 absl::Status WriteFactors(const std::vector<FactorAppend>& factors, CommitContext* commit);
 absl::Status WriteShapes(const std::vector<ShapeAppend>& shapes, CommitContext* commit);
 absl::Status EndFactors(const TrackSpan& span, CommitContext* commit);
 absl::Status EndShapes(const TrackSpan& span, CommitContext* commit);
+
+/// One row a key and revision that began or ended a row of that key, whatever the number of rows:
+/// kind (N, E, M, T, L), three numbers of its key, revision. What lists of touched keys must say.
+inline constexpr char kTouchedRows[] =
+    "SELECT 'N', key, 0, 0, rev_from FROM node"
+    " UNION SELECT 'N', key, 0, 0, rev_from FROM node_history"
+    " UNION SELECT 'N', key, 0, 0, rev_to FROM node_history"
+    " UNION SELECT 'E', source, relation, target, rev_from FROM edge"
+    " UNION SELECT 'E', source, relation, target, rev_from FROM edge_history"
+    " UNION SELECT 'E', source, relation, target, rev_to FROM edge_history"
+    " UNION SELECT 'M', x, y, z, rev_from FROM mesh_block"
+    " UNION SELECT 'M', x, y, z, rev_from FROM mesh_block_history"
+    " UNION SELECT 'M', x, y, z, rev_to FROM mesh_block_history"
+    " UNION SELECT 'T', agent, 0, 0, revision FROM track_mark JOIN track USING (slot)"
+    " UNION SELECT 'L', 0, 0, 0, rev_from FROM layer WHERE rev_from > 0"
+    " UNION SELECT 'L', 0, 0, 0, rev_from FROM label";
 
 /// Leaves the list of what the commit touched.
 absl::Status InsertTouched(CommitContext* commit);

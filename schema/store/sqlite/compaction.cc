@@ -5,10 +5,10 @@
 
 #include "absl/strings/str_cat.h"
 #include "schema/store/sqlite/asset_references.h"
-#include "schema/store/sqlite/readable.h"
+#include "schema/store/sqlite/readable_rows.h"
 #include "schema/store/sqlite/rows.h"
 #include "schema/store/sqlite/space.h"
-#include "schema/store/sqlite/touched_keys.h"
+#include "schema/store/touched_keys.h"
 
 namespace dsg::sqlite {
 namespace {

@@ -5,8 +5,18 @@
 #include "schema/store/sqlite/commit.h"
 #include "schema/store/sqlite/graph_rows.h"
 #include "schema/store/sqlite/rows.h"
+#include "schema/store/sqlite/sessions.h"
 
 namespace dsg::sqlite {
+
+absl::StatusOr<SessionState> DeltaLookup::ReadSession(const std::string& session_id) const {
+  return sqlite::ReadSession(db_, session_id);
+}
+
+absl::StatusOr<std::optional<CommittedDelta>> DeltaLookup::FindCommitted(
+    const std::string& session_id, int64_t sequence) const {
+  return sqlite::FindCommitted(db_, session_id, sequence);
+}
 
 absl::StatusOr<std::optional<Node>> DeltaLookup::ReadNode(NodeId id) const {
   Query query(db_, "SELECT key, rev_from, layer, payload, checksum FROM node WHERE key = ?1");
@@ -45,8 +55,8 @@ absl::StatusOr<std::optional<GraphLookup::NodeFacts>> DeltaLookup::FindNode(Node
   DSG_RETURN_IF_ERROR(query.status());
   if (!found) return std::optional<NodeFacts>();
   Node node;
-  const auto checksum = RowChecksum({query.Int(0), query.Int(1), query.Int(2)}, query.Blob(3));
-  if (query.Int(4) != checksum || !DecodeNodePlacement(query.Blob(3), &node)) {
+  const NodeRow row{id, query.Int(1), static_cast<LayerId>(query.Int(2)), query.Blob(3)};
+  if (query.Int(4) != ChecksumOf(row) || !DecodeNodePlacement(row.payload, &node)) {
     return CorruptRow(db_.map_name(), "node", ToString(id));
   }
   return std::optional<NodeFacts>(
@@ -99,9 +109,7 @@ absl::StatusOr<std::optional<TimeNs>> DeltaLookup::FindTrackEnd(NodeId agent) co
 
 absl::StatusOr<bool> DeltaLookup::HasAsset(const Sha256& sha256) const {
   Query query(db_, "SELECT 1 FROM asset WHERE sha256 = ?1 AND part = 0");
-  const bool found =
-      query.Bind(Query::BlobView{{reinterpret_cast<const char*>(sha256.data()), sha256.size()}})
-          .Next();
+  const bool found = query.Bind(Query::BlobView{BytesOf(sha256)}).Next();
   DSG_RETURN_IF_ERROR(query.status());
   return found;
 }

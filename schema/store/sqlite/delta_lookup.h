@@ -2,12 +2,12 @@
 // What a commit asks of the graph at the head, answered from the writer's own connection.
 #pragma once
 
-#include "schema/model/delta_check.h"
+#include "schema/store/commit_protocol.h"
 #include "schema/store/sqlite/database.h"
 
 namespace dsg::sqlite {
 
-class DeltaLookup : public GraphLookup {
+class DeltaLookup : public CommitSource {
  public:
   /// Both must outlive this.
   DeltaLookup(Database* db, const MapSpec* spec) : db_(*db), spec_(*spec) {}
@@ -22,10 +22,13 @@ class DeltaLookup : public GraphLookup {
   /// Cost: reads the begins and ends of all segments.
   absl::StatusOr<std::optional<Interval>> FindSpan() const override;
 
-  /// Whole; nullopt when it is not believed in at the head.
-  absl::StatusOr<std::optional<Node>> ReadNode(NodeId id) const;
-  absl::StatusOr<std::optional<Edge>> ReadEdge(const EdgeKey& key) const;
-  absl::StatusOr<std::vector<Layer>> ReadLayers() const;
+  const MapSpec& spec() const override { return spec_; }
+  absl::StatusOr<SessionState> ReadSession(const std::string& session_id) const override;
+  absl::StatusOr<std::optional<CommittedDelta>> FindCommitted(const std::string& session_id,
+                                                              int64_t sequence) const override;
+  absl::StatusOr<std::optional<Node>> ReadNode(NodeId id) const override;
+  absl::StatusOr<std::optional<Edge>> ReadEdge(const EdgeKey& key) const override;
+  absl::StatusOr<std::vector<Layer>> ReadLayers() const override;
 
  private:
   absl::StatusOr<std::vector<NodeId>> ReadIds(const char* sql, NodeId id) const;

@@ -5,30 +5,32 @@
 
 #include "schema/codec/proto_convert.h"
 #include "schema/codec/shape_codec.h"
+#include "schema/store/batches.h"
 #include "schema/store/sqlite/erased_rows.h"
+#include "schema/store/sqlite/graph_rows.h"
+#include "schema/store/sqlite/rows.h"
 
 namespace dsg::sqlite {
 namespace {
 
-struct BatchRow {
+// A row, its bytes, and how long it was believed.
+template <typename Row>
+struct StoredBatch {
   int64_t row_id = 0;
-  int64_t agent = 0;
-  Revision rev_from = 0;
   Revision rev_to = 0;
-  TimeNs t0 = 0;
-  TimeNs t1 = 0;
+  Row row;
   std::string payload;
 };
 
 // What is left of a batch; no bytes when nothing is.
 struct Rest {
-  TimeNs t0 = 0;
-  TimeNs t1 = 0;
+  BatchTimes times;
   std::string payload;
 };
 
+// The statements of a table of batches; columns as BatchRowOf, then rev_to and the id of the row.
+template <typename Row>
 struct BatchTable {
-  char letter;
   const char* name;
   const char* select_all;
   const char* select_span;
@@ -36,73 +38,66 @@ struct BatchTable {
   const char* drop;
 };
 
-#define DSG_PAST_BATCHES(letter, table)                                                        \
+#define DSG_PAST_BATCHES(table)                                                                \
   {                                                                                            \
-    letter, table,                                                                             \
-        "SELECT rowid, agent, rev_from, rev_to, t0, t1, checksum, payload FROM " table         \
+    table,                                                                                     \
+        "SELECT agent, rev_from, t0, t1, payload, checksum, rev_to, rowid FROM " table         \
         " WHERE agent = ?1",                                                                   \
-        "SELECT rowid, agent, rev_from, rev_to, t0, t1, checksum, payload FROM " table         \
+        "SELECT agent, rev_from, t0, t1, payload, checksum, rev_to, rowid FROM " table         \
         " WHERE agent = ?1 AND t0 < ?3 AND t1 >= ?2",                                          \
         "UPDATE " table " SET t0 = ?2, t1 = ?3, checksum = ?4, payload = ?5 WHERE rowid = ?1", \
         "DELETE FROM " table " WHERE rowid = ?1"                                               \
   }
-#define DSG_CURRENT_BATCHES(letter, table)                                              \
+#define DSG_CURRENT_BATCHES(table)                                                      \
   {                                                                                     \
-    letter, table,                                                                      \
-        "SELECT rowid, agent, rev_from, 9223372036854775807, t0, t1, checksum, payload" \
+    table,                                                                              \
+        "SELECT agent, rev_from, t0, t1, payload, checksum, 9223372036854775807, rowid" \
         " FROM " table " WHERE agent = ?1",                                             \
         nullptr, nullptr, "DELETE FROM " table " WHERE rowid = ?1"                      \
   }
 
-constexpr BatchTable kPastShapes = DSG_PAST_BATCHES('H', "shape_history");
-constexpr BatchTable kPastFactors = DSG_PAST_BATCHES('F', "factor_history");
-constexpr BatchTable kShapes = DSG_CURRENT_BATCHES('H', "shape_segment");
-constexpr BatchTable kFactors = DSG_CURRENT_BATCHES('F', "factor_segment");
+constexpr BatchTable<ShapeRow> kPastShapes = DSG_PAST_BATCHES("shape_history");
+constexpr BatchTable<FactorRow> kPastFactors = DSG_PAST_BATCHES("factor_history");
+constexpr BatchTable<ShapeRow> kShapes = DSG_CURRENT_BATCHES("shape_segment");
+constexpr BatchTable<FactorRow> kFactors = DSG_CURRENT_BATCHES("factor_segment");
 
 #undef DSG_PAST_BATCHES
 #undef DSG_CURRENT_BATCHES
 
-RowSums SumsOf(const BatchTable& table, const BatchRow& row) {
+template <typename Row>
+RowSums SumsOf(Row row, std::string_view payload) {
+  row.payload = payload;
   RowSums sums;
-  sums.content.Add(
-      RowIdentity(table.letter, {row.agent, row.rev_from, row.t0, row.t1}, row.payload));
+  sums.Add(row);
   return sums;
 }
 
-// Steps to the next row; false at the end or when `status` says why not.
-absl::StatusOr<bool> NextRow(const BatchTable& table, Query* query, BatchRow* row,
-                             const std::string& map) {
-  if (!query->Next()) {
-    DSG_RETURN_IF_ERROR(query->status());
-    return false;
+template <typename Row>
+absl::StatusOr<std::vector<StoredBatch<Row>>> ReadBatches(Query* query, const std::string& map) {
+  std::vector<StoredBatch<Row>> batches;
+  while (query->Next()) {
+    DSG_ASSIGN_OR_RETURN(const Row row, BatchRowOf<Row>(*query, map));
+    batches.push_back({query->Int(7), query->Int(6), row, std::string(row.payload)});
+    batches.back().row.payload = {};
   }
-  *row = {query->Int(0),
-          query->Int(1),
-          query->Int(2),
-          query->Int(3),
-          query->Int(4),
-          query->Int(5),
-          std::string(query->Blob(7))};
-  if (query->Int(6) == RowChecksum({row->agent, row->rev_from, row->t0, row->t1}, row->payload)) {
-    return true;
-  }
-  return CorruptRow(map, table.name, ToString(IdOf(row->agent)));
+  DSG_RETURN_IF_ERROR(query->status());
+  return batches;
 }
 
-void CollectTopology(const BatchTable& table, const BatchRow& row, ErasedRows* erased) {
+void CollectTopology(const StoredBatch<ShapeRow>& batch, ErasedRows* erased) {
   std::optional<Sha256> topology;
-  if (table.letter == 'H' && DecodeShapeTopology(row.payload, &topology) && topology.has_value()) {
+  if (DecodeShapeTopology(batch.payload, &topology) && topology.has_value()) {
     erased->assets.insert(*topology);
   }
 }
+void CollectTopology(const StoredBatch<FactorRow>& /*batch*/, ErasedRows* /*erased*/) {}
 
-bool Holds(const TrackSpan& span, TimeNs t) { return span.from_ns <= t && t < span.to_ns; }
-
-// Nullopt if nothing of the row lies in the span.
-absl::StatusOr<std::optional<Rest>> CutShapes(const TrackSpan& span, const BatchRow& row,
-                                              const MapSpec& spec) {
+// Nullopt if nothing of the batch lies in the span.
+absl::StatusOr<std::optional<Rest>> CutOut(const TrackSpan& span,
+                                           const StoredBatch<ShapeRow>& batch,
+                                           const MapSpec& spec) {
   DecodedShapes decoded;
-  if (!DecodeShapes(row.payload, /*with_vertices=*/true, &decoded)) {
+  if (!DecodeShapes(batch.payload, /*with_vertices=*/true, &decoded)) {
     return CorruptRow(spec.name, kPastShapes.name, ToString(span.agent));
   }
   ShapeAppend rest{span.agent, decoded.topology, std::move(decoded.shapes)};
@@ -110,82 +105,75 @@ absl::StatusOr<std::optional<Rest>> CutShapes(const TrackSpan& span, const Batch
       rest.shapes, [&](const BodyShape& shape) { return Holds(span, shape.time_ns); });
   if (gone == 0) return std::optional<Rest>();
   if (rest.shapes.empty()) return std::optional<Rest>(Rest());
-  return std::optional<Rest>(Rest{rest.shapes.front().time_ns, rest.shapes.back().time_ns,
+  return std::optional<Rest>(Rest{{rest.shapes.front().time_ns, rest.shapes.back().time_ns},
                                   EncodeShapes(rest, spec.codec)});
 }
 
-absl::StatusOr<std::optional<Rest>> CutFactors(const TrackSpan& span, const BatchRow& row,
-                                               const MapSpec& spec) {
+absl::StatusOr<std::optional<Rest>> CutOut(const TrackSpan& span,
+                                           const StoredBatch<FactorRow>& batch,
+                                           const MapSpec& spec) {
   std::vector<PoseFactor> factors;
-  if (!DecodeFactors(row.payload, &factors)) {
+  if (!DecodeFactors(batch.payload, &factors)) {
     return CorruptRow(spec.name, kPastFactors.name, ToString(span.agent));
   }
-  const auto gone = std::erase_if(factors, [&](const PoseFactor& factor) {
-    const bool ends_here = factor.to_agent.empty() || factor.to_agent == span.agent;
-    return Holds(span, factor.from_ns) || (ends_here && Holds(span, factor.to_ns));
-  });
+  const auto gone =
+      std::erase_if(factors, [&](const PoseFactor& factor) { return Touches(factor, span); });
   if (gone == 0) return std::optional<Rest>();
   if (factors.empty()) return std::optional<Rest>(Rest());
-  Rest rest{kTimeMax, kTimeMin, EncodeFactors(factors)};
-  for (const PoseFactor& factor : factors) {
-    rest.t0 = std::min({rest.t0, factor.from_ns, factor.to_ns});
-    rest.t1 = std::max({rest.t1, factor.from_ns, factor.to_ns});
-  }
-  return std::optional<Rest>(std::move(rest));
+  return std::optional<Rest>(Rest{TimesOf(factors), EncodeFactors(factors)});
 }
 
-absl::Status Replace(const BatchTable& table, const BatchRow& row, Rest rest, ErasedRows* erased) {
-  erased->Take(SumsOf(table, row), row.rev_from, row.rev_to, row.payload.size());
-  CollectTopology(table, row, erased);
-  if (rest.payload.empty()) return Query(erased->db, table.drop).Bind(row.row_id).Run();
-  BatchRow left = row;
-  left.t0 = rest.t0;
-  left.t1 = rest.t1;
-  left.payload = std::move(rest.payload);
-  erased->past.Put(SumsOf(table, left), left.rev_from, left.rev_to);
-  const int64_t checksum = RowChecksum({left.agent, left.rev_from, left.t0, left.t1}, left.payload);
+template <typename Row>
+void Take(const StoredBatch<Row>& batch, ErasedRows* erased) {
+  erased->Take(SumsOf(batch.row, batch.payload), batch.row.rev_from, batch.rev_to,
+               batch.payload.size());
+  CollectTopology(batch, erased);
+}
+
+template <typename Row>
+absl::Status Replace(const BatchTable<Row>& table, const StoredBatch<Row>& batch, const Rest& rest,
+                     ErasedRows* erased) {
+  Take(batch, erased);
+  if (rest.payload.empty()) return Query(erased->db, table.drop).Bind(batch.row_id).Run();
+  Row left = batch.row;
+  left.t0 = rest.times.t0;
+  left.t1 = rest.times.t1;
+  left.payload = rest.payload;
+  erased->past.Put(SumsOf(left, rest.payload), left.rev_from, batch.rev_to);
   return Query(erased->db, table.update)
-      .Bind(left.row_id, left.t0, left.t1, checksum, Query::BlobView{left.payload})
+      .Bind(batch.row_id, left.t0, left.t1, ChecksumOf(left), Query::BlobView{rest.payload})
       .Run();
 }
 
-template <typename Cut>
-absl::Status CutBatches(const BatchTable& table, const TrackSpan& span, const Cut& cut,
-                        ErasedRows* erased) {
-  std::vector<std::pair<BatchRow, Rest>> touched;
+template <typename Row>
+absl::Status CutBatches(const BatchTable<Row>& table, const TrackSpan& span, ErasedRows* erased) {
+  std::vector<std::pair<StoredBatch<Row>, Rest>> touched;
   {
     Query query(erased->db, table.select_span);
     query.Bind(KeyOf(span.agent), span.from_ns, span.to_ns);
-    BatchRow row;
-    for (;;) {
-      DSG_ASSIGN_OR_RETURN(const bool found, NextRow(table, &query, &row, erased->spec.name));
-      if (!found) break;
-      DSG_ASSIGN_OR_RETURN(std::optional<Rest> rest, cut(span, row, erased->spec));
-      if (rest.has_value()) touched.emplace_back(row, *std::move(rest));
+    DSG_ASSIGN_OR_RETURN(auto batches, ReadBatches<Row>(&query, erased->spec.name));
+    for (StoredBatch<Row>& batch : batches) {
+      DSG_ASSIGN_OR_RETURN(std::optional<Rest> rest, CutOut(span, batch, erased->spec));
+      if (rest.has_value()) touched.emplace_back(std::move(batch), *std::move(rest));
     }
   }
-  for (auto& [row, rest] : touched) {
-    DSG_RETURN_IF_ERROR(Replace(table, row, std::move(rest), erased));
+  for (const auto& [batch, rest] : touched) {
+    DSG_RETURN_IF_ERROR(Replace(table, batch, rest, erased));
   }
   return absl::OkStatus();
 }
 
-absl::Status TakeBatches(const BatchTable& table, NodeId agent, ErasedRows* erased) {
-  std::vector<int64_t> row_ids;
+template <typename Row>
+absl::Status TakeBatches(const BatchTable<Row>& table, NodeId agent, ErasedRows* erased) {
+  std::vector<StoredBatch<Row>> batches;
   {
     Query query(erased->db, table.select_all);
     query.Bind(KeyOf(agent));
-    BatchRow row;
-    for (;;) {
-      DSG_ASSIGN_OR_RETURN(const bool found, NextRow(table, &query, &row, erased->spec.name));
-      if (!found) break;
-      erased->Take(SumsOf(table, row), row.rev_from, row.rev_to, row.payload.size());
-      CollectTopology(table, row, erased);
-      row_ids.push_back(row.row_id);
-    }
+    DSG_ASSIGN_OR_RETURN(batches, ReadBatches<Row>(&query, erased->spec.name));
   }
-  for (const int64_t row_id : row_ids) {
-    DSG_RETURN_IF_ERROR(Query(erased->db, table.drop).Bind(row_id).Run());
+  for (const StoredBatch<Row>& batch : batches) {
+    Take(batch, erased);
+    DSG_RETURN_IF_ERROR(Query(erased->db, table.drop).Bind(batch.row_id).Run());
   }
   return absl::OkStatus();
 }
@@ -193,15 +181,15 @@ absl::Status TakeBatches(const BatchTable& table, NodeId agent, ErasedRows* eras
 }  // namespace
 
 absl::Status EraseBatchRows(const TrackSpan& span, ErasedRows* erased) {
-  DSG_RETURN_IF_ERROR(CutBatches(kPastShapes, span, CutShapes, erased));
-  return CutBatches(kPastFactors, span, CutFactors, erased);
+  DSG_RETURN_IF_ERROR(CutBatches(kPastShapes, span, erased));
+  return CutBatches(kPastFactors, span, erased);
 }
 
 absl::Status EraseAllBatches(NodeId agent, ErasedRows* erased) {
-  for (const BatchTable* table : {&kPastShapes, &kPastFactors, &kShapes, &kFactors}) {
-    DSG_RETURN_IF_ERROR(TakeBatches(*table, agent, erased));
-  }
-  return absl::OkStatus();
+  DSG_RETURN_IF_ERROR(TakeBatches(kPastShapes, agent, erased));
+  DSG_RETURN_IF_ERROR(TakeBatches(kPastFactors, agent, erased));
+  DSG_RETURN_IF_ERROR(TakeBatches(kShapes, agent, erased));
+  return TakeBatches(kFactors, agent, erased);
 }
 
 }  // namespace dsg::sqlite

@@ -2,10 +2,9 @@
 // Nodes, edges, stays and mesh blocks.
 #include "schema/store/sqlite/erased_rows.h"
 
-#include "absl/strings/str_cat.h"
-#include "schema/codec/proto_convert.h"
 #include "schema/store/sqlite/asset_references.h"
 #include "schema/store/sqlite/commit.h"
+#include "schema/store/sqlite/graph_rows.h"
 
 namespace dsg::sqlite {
 namespace {
@@ -17,7 +16,7 @@ struct Selection {
 
 #define DSG_EDGES_WHERE(condition)                                                 \
   {                                                                                \
-    "SELECT source, relation, target, rev_from, rev_to, weight, payload, checksum" \
+    "SELECT source, relation, target, rev_from, weight, payload, checksum, rev_to" \
     " FROM edge_history WHERE " condition,                                         \
         "DELETE FROM edge_history WHERE " condition                                \
   }
@@ -31,7 +30,7 @@ constexpr Selection kEdgesBetween =
 
 #define DSG_STAYS_WHERE(condition)                                             \
   {                                                                            \
-    "SELECT agent, enter_ns, exit_ns, place, room, rev_from, rev_to, checksum" \
+    "SELECT agent, enter_ns, exit_ns, place, room, rev_from, checksum, rev_to" \
     " FROM stay_history WHERE " condition,                                     \
         "DELETE FROM stay_history WHERE " condition                            \
   }
@@ -48,51 +47,25 @@ constexpr Selection kStaysOfAgent = DSG_STAYS_WHERE(
 
 #undef DSG_STAYS_WHERE
 
-// Columns: source, relation, target, rev_from, anything, weight, payload, checksum.
-absl::StatusOr<RowSums> SumsOfEdge(const Query& query, const std::string& map) {
-  const std::initializer_list<int64_t> columns = {query.Int(0), query.Int(1), query.Int(2),
-                                                  query.Int(3), BitsOf(query.Real(5))};
-  if (query.Int(7) != RowChecksum32(columns, query.Blob(6))) {
-    return CorruptRow(
-        map, "edge_history",
-        absl::StrCat(ToString(IdOf(query.Int(0))), " ", ToString(IdOf(query.Int(2)))));
-  }
+template <typename Row>
+RowSums SumsOf(const Row& row) {
   RowSums sums;
-  sums.content.Add(RowIdentity('E', columns, query.Blob(6)));
-  sums.edge_count = 1;
+  sums.Add(row);
   return sums;
 }
 
-template <typename... Values>
-absl::Status TakeEdges(const Selection& selection, ErasedRows* erased, const Values&... values) {
+// Takes out the rows of a selection. `read` reads them; behind its columns stands rev_to, in column
+// 7 of edges and stays and 6 of mesh blocks.
+template <typename Read, typename... Values>
+absl::Status TakeRows(const Selection& selection, const Read& read, int rev_to, ErasedRows* erased,
+                      const Values&... values) {
   {
     Query query(erased->db, selection.select);
     query.Bind(values...);
     while (query.Next()) {
-      DSG_ASSIGN_OR_RETURN(const RowSums sums, SumsOfEdge(query, erased->spec.name));
-      erased->Take(sums, query.Int(3), query.Int(4), query.Blob(6).size());
-    }
-    DSG_RETURN_IF_ERROR(query.status());
-  }
-  return Query(erased->db, selection.drop).Bind(values...).Run();
-}
-
-template <typename... Values>
-absl::Status TakeStays(const Selection& selection, ErasedRows* erased, const Values&... values) {
-  {
-    Query query(erased->db, selection.select);
-    query.Bind(values...);
-    while (query.Next()) {
-      const std::initializer_list<int64_t> columns = {query.Int(0), query.Int(1), query.Int(2),
-                                                      query.Int(3), query.Int(4), query.Int(5)};
-      if (query.Int(7) != RowChecksum32(columns, "")) {
-        return CorruptRow(erased->spec.name, "stay_history",
-                          absl::StrCat(ToString(IdOf(query.Int(0))), " ", query.Int(1)));
-      }
-      RowSums sums;
-      sums.content.Add(RowIdentity('S', columns, ""));
-      sums.stay_count = 1;
-      erased->Take(sums, query.Int(5), query.Int(6), 48);
+      DSG_ASSIGN_OR_RETURN(const auto row, read(query, erased->spec.name));
+      const size_t bytes = sizeof(row.columns()) + row.payload.size();
+      erased->Take(SumsOf(row), row.rev_from, query.Int(rev_to), bytes);
     }
     DSG_RETURN_IF_ERROR(query.status());
   }
@@ -102,24 +75,15 @@ absl::Status TakeStays(const Selection& selection, ErasedRows* erased, const Val
 absl::Status TakeVersions(int64_t key, ErasedRows* erased, bool* is_agent) {
   {
     Query query(erased->db,
-                "SELECT rev_from, rev_to, layer, payload, checksum FROM node_history"
+                "SELECT key, rev_from, layer, payload, checksum, rev_to FROM node_history"
                 " WHERE key = ?1");
     query.Bind(key);
     while (query.Next()) {
-      const std::initializer_list<int64_t> columns = {key, query.Int(0), query.Int(2)};
-      Node node;
-      if (query.Int(4) != RowChecksum(columns, query.Blob(3)) ||
-          !DecodeNodePayload(query.Blob(3), &node)) {
-        return CorruptRow(erased->spec.name, "node_history", ToString(IdOf(key)));
-      }
-      RowSums sums;
-      sums.content.Add(RowIdentity('N', columns, query.Blob(3)));
-      sums.node_count = 1;
-      sums.layer_counts[static_cast<LayerId>(query.Int(2))] = 1;
-      if (IsAgentKind(node.kind)) sums.agent_count = 1;
-      *is_agent = *is_agent || IsAgentKind(node.kind);
+      DSG_ASSIGN_OR_RETURN(const Node node, NodeFromRow(query, erased->spec.name));
+      const NodeRow row{node.id, node.revision, node.layer, query.Blob(3), IsAgentKind(node.kind)};
+      *is_agent = *is_agent || row.is_agent;
       CollectReferences(node, &erased->assets);
-      erased->Take(sums, query.Int(0), query.Int(1), query.Blob(3).size());
+      erased->Take(SumsOf(row), row.rev_from, query.Int(5), row.payload.size());
     }
     DSG_RETURN_IF_ERROR(query.status());
   }
@@ -128,29 +92,24 @@ absl::Status TakeVersions(int64_t key, ErasedRows* erased, bool* is_agent) {
 
 // Edges that stay were believed when the node was another: they begin with what it is now.
 absl::Status RaiseEdges(const char* sql, int64_t key, Revision since, ErasedRows* erased) {
-  struct Row {
+  struct Raised {
     EdgeRowKey key;
     int64_t checksum;
   };
-  std::vector<Row> raised;
+  std::vector<Raised> raised;
   {
     Query query(erased->db, sql);
     query.Bind(key, since);
     while (query.Next()) {
-      DSG_ASSIGN_OR_RETURN(const RowSums sums, SumsOfEdge(query, erased->spec.name));
-      erased->past.Take(sums, query.Int(3), kRevisionMax);
-      const std::initializer_list<int64_t> columns = {query.Int(0), query.Int(1), query.Int(2),
-                                                      since, BitsOf(query.Real(5))};
-      RowSums later;
-      later.content.Add(RowIdentity('E', columns, query.Blob(6)));
-      later.edge_count = 1;
-      erased->past.Put(later, since, kRevisionMax);
-      const EdgeRowKey edge{IdOf(query.Int(0)), query.Int(1), IdOf(query.Int(2))};
-      raised.push_back({edge, RowChecksum32(columns, query.Blob(6))});
+      DSG_ASSIGN_OR_RETURN(EdgeRow row, EdgeRowOf(query, erased->spec.name));
+      erased->past.Take(SumsOf(row), row.rev_from, kRevisionMax);
+      row.rev_from = since;
+      erased->past.Put(SumsOf(row), since, kRevisionMax);
+      raised.push_back({{row.source, row.relation, row.target}, ChecksumOf(row)});
     }
     DSG_RETURN_IF_ERROR(query.status());
   }
-  for (const Row& row : raised) {
+  for (const Raised& row : raised) {
     DSG_RETURN_IF_ERROR(Query(erased->db,
                               "UPDATE edge SET rev_from = ?4, checksum = ?5"
                               " WHERE source = ?1 AND relation = ?2 AND target = ?3")
@@ -166,7 +125,8 @@ absl::Status KeepEdges(const char* sql, int64_t key, ErasedRows* erased) {
   Query query(erased->db, sql);
   query.Bind(key);
   while (query.Next()) {
-    erased->past.ForgetEdge({IdOf(query.Int(0)), query.Int(1), IdOf(query.Int(2))}, query.Int(3));
+    erased->past.forgotten.ForgetEdge({IdOf(query.Int(0)), query.Int(1), IdOf(query.Int(2))},
+                                      query.Int(3));
   }
   return query.status();
 }
@@ -197,19 +157,19 @@ absl::Status EraseNodeRows(NodeId id, ErasedRows* erased) {
   bool is_agent = false;
   DSG_RETURN_IF_ERROR(TakeVersions(key, erased, &is_agent));
   DSG_ASSIGN_OR_RETURN(const Revision since, CurrentSince(erased->db, key));
-  erased->past.ForgetNode(id, since);
-  DSG_RETURN_IF_ERROR(TakeEdges(kEdgesFrom, erased, key));
-  DSG_RETURN_IF_ERROR(TakeEdges(kEdgesTo, erased, key));
-  DSG_RETURN_IF_ERROR(TakeStays(kStaysInRoom, erased, key));
-  DSG_RETURN_IF_ERROR(TakeStays(kStaysInPlace, erased, key));
+  erased->past.forgotten.ForgetNode(id, since);
+  DSG_RETURN_IF_ERROR(TakeRows(kEdgesFrom, EdgeRowOf, 7, erased, key));
+  DSG_RETURN_IF_ERROR(TakeRows(kEdgesTo, EdgeRowOf, 7, erased, key));
+  DSG_RETURN_IF_ERROR(TakeRows(kStaysInRoom, StayRowOf, 7, erased, key));
+  DSG_RETURN_IF_ERROR(TakeRows(kStaysInPlace, StayRowOf, 7, erased, key));
   if (since == 0) {
     // A track may outlive the versions, when the same call was stopped between the two.
     return EraseGoneAgent(id, erased);
   }
   for (const char* sql :
-       {"SELECT source, relation, target, rev_from, 0, weight, payload, checksum FROM edge"
+       {"SELECT source, relation, target, rev_from, weight, payload, checksum FROM edge"
         " WHERE source = ?1 AND rev_from < ?2",
-        "SELECT source, relation, target, rev_from, 0, weight, payload, checksum FROM edge"
+        "SELECT source, relation, target, rev_from, weight, payload, checksum FROM edge"
         " WHERE target = ?1 AND rev_from < ?2"}) {
     DSG_RETURN_IF_ERROR(RaiseEdges(sql, key, since, erased));
   }
@@ -224,47 +184,30 @@ absl::Status EraseNodeRows(NodeId id, ErasedRows* erased) {
 absl::Status EraseEdgeRows(const EdgeRowKey& key, ErasedRows* erased) {
   const int64_t source = KeyOf(key.source);
   const int64_t target = KeyOf(key.target);
-  DSG_RETURN_IF_ERROR(TakeEdges(kEdgesBetween, erased, source, key.relation, target));
+  DSG_RETURN_IF_ERROR(TakeRows(kEdgesBetween, EdgeRowOf, 7, erased, source, key.relation, target));
   Query query(erased->db,
               "SELECT rev_from FROM edge WHERE source = ?1 AND relation = ?2 AND target = ?3");
   const bool is_current = query.Bind(source, key.relation, target).Next();
   DSG_RETURN_IF_ERROR(query.status());
-  erased->past.ForgetEdge(key, is_current ? query.Int(0) : 0);
+  erased->past.forgotten.ForgetEdge(key, is_current ? query.Int(0) : 0);
   return absl::OkStatus();
 }
 
 absl::Status EraseMeshRows(const BlockIndex& index, ErasedRows* erased) {
-  {
-    Query query(erased->db,
-                "SELECT rev_from, rev_to, payload, checksum FROM mesh_block_history"
-                " WHERE x = ?1 AND y = ?2 AND z = ?3");
-    query.Bind(index.x, index.y, index.z);
-    while (query.Next()) {
-      const std::initializer_list<int64_t> columns = {index.x, index.y, index.z, query.Int(0)};
-      if (query.Int(3) != RowChecksum(columns, query.Blob(2))) {
-        return CorruptRow(erased->spec.name, "mesh_block_history",
-                          absl::StrCat(index.x, ",", index.y, ",", index.z));
-      }
-      RowSums sums;
-      sums.content.Add(RowIdentity('M', columns, query.Blob(2)));
-      sums.mesh_block_count = 1;
-      erased->Take(sums, query.Int(0), query.Int(1), query.Blob(2).size());
-    }
-    DSG_RETURN_IF_ERROR(query.status());
-  }
-  DSG_RETURN_IF_ERROR(
-      Query(erased->db, "DELETE FROM mesh_block_history WHERE x = ?1 AND y = ?2 AND z = ?3")
-          .Bind(index.x, index.y, index.z)
-          .Run());
+  constexpr Selection kBlock = {
+      "SELECT x, y, z, rev_from, payload, checksum, rev_to FROM mesh_block_history"
+      " WHERE x = ?1 AND y = ?2 AND z = ?3",
+      "DELETE FROM mesh_block_history WHERE x = ?1 AND y = ?2 AND z = ?3"};
+  DSG_RETURN_IF_ERROR(TakeRows(kBlock, MeshRowOf, 6, erased, index.x, index.y, index.z));
   Query current(erased->db, "SELECT rev_from FROM mesh_block WHERE x = ?1 AND y = ?2 AND z = ?3");
   const bool is_current = current.Bind(index.x, index.y, index.z).Next();
   DSG_RETURN_IF_ERROR(current.status());
-  erased->past.ForgetMeshBlock(index, is_current ? current.Int(0) : 0);
+  erased->past.forgotten.ForgetMeshBlock(index, is_current ? current.Int(0) : 0);
   return absl::OkStatus();
 }
 
 absl::Status EraseStayRows(const TrackSpan& span, ErasedRows* erased) {
-  return TakeStays(kStaysOfAgent, erased, KeyOf(span.agent), span.from_ns, span.to_ns);
+  return TakeRows(kStaysOfAgent, StayRowOf, 7, erased, KeyOf(span.agent), span.from_ns, span.to_ns);
 }
 
 }  // namespace dsg::sqlite

@@ -2,11 +2,12 @@
 // Poses of the past. A segment of which a part goes is written anew in its place, and the marks
 // that say how far the track reached are made right.
 #include <algorithm>
-#include <set>
+#include <map>
 
 #include "absl/strings/str_cat.h"
 #include "schema/codec/trajectory_codec.h"
 #include "schema/store/sqlite/erased_rows.h"
+#include "schema/store/sqlite/rows.h"
 
 namespace dsg::sqlite {
 namespace {
@@ -71,7 +72,7 @@ class TrackEraser {
                            ReadSegments(sql, kTimeMin, kTimeMax));
       for (const Segment& segment : segments) DSG_RETURN_IF_ERROR(Take(segment, segment.poses));
     }
-    erased_.past.ForgetTrack(agent_);
+    erased_.past.forgotten.ForgetTrack(agent_);
     for (const char* sql : {"DELETE FROM trajectory_history WHERE id BETWEEN ?1 AND ?2",
                             "DELETE FROM trajectory_segment WHERE id BETWEEN ?1 AND ?2",
                             "DELETE FROM segment_box WHERE id BETWEEN ?1 AND ?2"}) {
@@ -114,8 +115,7 @@ class TrackEraser {
         return CorruptRow(db_.map_name(), "track_mark", ToString(agent_));
       }
       RowSums& of_mark = sums[mark->revision];
-      of_mark.content.Add(PoseIdentity(agent_, pose, erased_.spec.codec, &scratch));
-      ++of_mark.pose_count;
+      of_mark.AddPose(PoseIdentity(agent_, pose, erased_.spec.codec, &scratch));
       gone_.emplace(pose.time_ns, Stretch{mark->revision, segment.rev_to});
     }
     for (const auto& [revision, of_mark] : sums) {

@@ -5,12 +5,11 @@
 
 #include <algorithm>
 
-#include "absl/strings/str_cat.h"
-#include "schema/codec/proto_convert.h"
 #include "schema/store/sqlite/asset_references.h"
 #include "schema/store/sqlite/erased_rows.h"
+#include "schema/store/sqlite/graph_rows.h"
 #include "schema/store/sqlite/pending_erasure.h"
-#include "schema/store/sqlite/readable.h"
+#include "schema/store/sqlite/readable_rows.h"
 #include "schema/store/sqlite/sessions.h"
 #include "schema/store/sqlite/space.h"
 
@@ -58,7 +57,7 @@ class Eraser {
   absl::Status Begin() {
     DSG_ASSIGN_OR_RETURN(const int64_t is_erasing, db_.QueryInt("SELECT is_erasing FROM map"));
     report_.was_pending = is_erasing != 0;
-    DSG_ASSIGN_OR_RETURN(list_, ListOf(db_, erasure_));
+    DSG_ASSIGN_OR_RETURN(list_, ListIn(db_, erasure_));
     EraseList earlier;
     const absl::Status noted = InTransaction(db_, [&]() -> absl::Status {
       DSG_ASSIGN_OR_RETURN(earlier, TakeRipeErasures(db_, list_, &report_.is_pending));
@@ -98,30 +97,18 @@ class Eraser {
   }
 
   absl::StatusOr<bool> IsAgentThatIsThere(NodeId id) {
-    Query query(db_, "SELECT rev_from, layer, payload, checksum FROM node WHERE key = ?1");
+    Query query(db_, "SELECT key, rev_from, layer, payload, checksum FROM node WHERE key = ?1");
     const bool is_there = query.Bind(KeyOf(id)).Next();
     DSG_RETURN_IF_ERROR(query.status());
     if (!is_there) return false;
-    Node node;
-    if (query.Int(3) != RowChecksum({KeyOf(id), query.Int(0), query.Int(1)}, query.Blob(2)) ||
-        !DecodeNodePayload(query.Blob(2), &node)) {
-      return CorruptRow(spec_.name, "node", ToString(id));
-    }
+    DSG_ASSIGN_OR_RETURN(const Node node, NodeFromRow(query, spec_.name));
     return IsAgentKind(node.kind);
   }
 
-  // Without its past an agent's track would belong to nobody there.
   absl::Status CheckAgents() {
     for (const NodeId id : erasure_.nodes) {
       DSG_ASSIGN_OR_RETURN(const bool is_agent, IsAgentThatIsThere(id));
-      if (is_agent) {
-        return MakeError(
-            Reason::kFieldInvalid,
-            absl::StrCat("cannot erase the past of agent ", ToString(id), " of map \"", spec_.name,
-                         "\": it is still there; retire it first, or name spans of "
-                         "its track"),
-            {{"field", "nodes"}, {"value", ToString(id)}});
-      }
+      if (is_agent) return AgentIsThereError(spec_.name, id);
     }
     return absl::OkStatus();
   }
@@ -186,9 +173,7 @@ class Eraser {
   absl::Status EraseAsset(const StoredAsset& asset) {
     ErasedRows erased{db_, spec_};
     RowSums sums;
-    sums.content.Add(
-        RowIdentity('A', {asset.rev_from},
-                    {reinterpret_cast<const char*>(asset.sha256.data()), asset.sha256.size()}));
+    sums.Add(AssetRow{asset.rev_from, BytesOf(asset.sha256)});
     erased.past.Take(sums, asset.rev_from, kRevisionMax);
     DSG_RETURN_IF_ERROR(DeleteAsset(db_, asset.sha256));
     return erased.past.Apply(db_);

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <bit>
 
 #include "absl/strings/str_cat.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/store/sqlite/commit.h"
+#include "schema/store/sqlite/graph_rows.h"
 #include "schema/store/sqlite/node_cells.h"
 
 namespace dsg::sqlite {
@@ -53,28 +55,43 @@ std::vector<const T*> InRowOrder(const std::vector<T>& items, const Key& key) {
   return sorted;
 }
 
+int64_t BitsOf(double value) { return std::bit_cast<int64_t>(value); }
+
 }  // namespace
 
-absl::Status GraphRowsWriter::Apply(const GraphDelta& delta) {
-  for (const Layer& layer : delta.layers) DSG_RETURN_IF_ERROR(WriteLayer(layer));
-  for (const SemanticLabel& label : delta.labels) DSG_RETURN_IF_ERROR(WriteLabel(label));
-  for (const Node* node : InRowOrder(delta.nodes, [](const Node& n) { return KeyOf(n.id); })) {
+absl::Status GraphRowsWriter::WriteLayers(const std::vector<Layer>& layers) {
+  for (const Layer& layer : layers) DSG_RETURN_IF_ERROR(WriteLayer(layer));
+  return absl::OkStatus();
+}
+
+absl::Status GraphRowsWriter::WriteLabels(const std::vector<SemanticLabel>& labels) {
+  for (const SemanticLabel& label : labels) DSG_RETURN_IF_ERROR(WriteLabel(label));
+  return absl::OkStatus();
+}
+
+absl::Status GraphRowsWriter::WriteNodes(const std::vector<Node>& nodes) {
+  for (const Node* node : InRowOrder(nodes, [](const Node& n) { return KeyOf(n.id); })) {
     DSG_RETURN_IF_ERROR(WriteNode(*node));
   }
-  for (const EdgeKey& key : delta.edge_removals) {
+  return absl::OkStatus();
+}
+
+absl::Status GraphRowsWriter::EndEdges(const std::vector<EdgeKey>& keys) {
+  for (const EdgeKey& key : keys) {
     DSG_ASSIGN_OR_RETURN(const int64_t relation, FindRelation(commit_.db, key.relation));
     if (relation == 0) continue;
     DSG_RETURN_IF_ERROR(EndEdge(KeyOf(key.source), relation, KeyOf(key.target)).status());
   }
-  for (const Retirement& item : delta.retirements) DSG_RETURN_IF_ERROR(Retire(item));
+  return absl::OkStatus();
+}
+
+absl::Status GraphRowsWriter::WriteEdges(const std::vector<Edge>& edges) {
   // Relations are numbered in the order of the delta: digests depend on it.
-  for (const Edge& edge : delta.edges) {
-    DSG_RETURN_IF_ERROR(FindOrAddRelation(edge.relation).status());
-  }
+  for (const Edge& edge : edges) DSG_RETURN_IF_ERROR(FindOrAddRelation(edge.relation).status());
   const auto key = [](const Edge& edge) {
     return std::make_pair(KeyOf(edge.source), KeyOf(edge.target));
   };
-  for (const Edge* edge : InRowOrder(delta.edges, key)) DSG_RETURN_IF_ERROR(WriteEdge(*edge));
+  for (const Edge* edge : InRowOrder(edges, key)) DSG_RETURN_IF_ERROR(WriteEdge(*edge));
   return absl::OkStatus();
 }
 
@@ -83,8 +100,7 @@ absl::Status GraphRowsWriter::WriteLayer(const Layer& layer) {
   if (known.Bind(layer.id).Next()) return absl::OkStatus();
   DSG_RETURN_IF_ERROR(known.status());
   commit_.touched.layers_or_labels = true;
-  commit_.head.content.Add(
-      RowIdentity('L', {layer.id, layer.rank, commit_.revision()}, layer.name));
+  commit_.head.sums.Add(LayerRow{layer.id, layer.rank, commit_.revision(), layer.name});
   return Query(commit_.db, "INSERT INTO layer (id, name, rank, rev_from) VALUES (?1, ?2, ?3, ?4)")
       .Bind(layer.id, layer.name, layer.rank, commit_.revision())
       .Run();
@@ -96,7 +112,7 @@ absl::Status GraphRowsWriter::WriteLabel(const SemanticLabel& label) {
   DSG_RETURN_IF_ERROR(known.status());
   commit_.touched.layers_or_labels = true;
   // Earlier names stay: a label's version is chosen by the reader's revision.
-  commit_.head.content.Add(RowIdentity('l', {label.id, commit_.revision()}, label.name));
+  commit_.head.sums.Add(LabelRow{label.id, commit_.revision(), label.name});
   return Query(commit_.db, "INSERT INTO label (id, rev_from, name) VALUES (?1, ?2, ?3)")
       .Bind(label.id, commit_.revision(), label.name)
       .Run();
@@ -119,41 +135,28 @@ absl::Status GraphRowsWriter::WriteNode(const Node& node) {
 }
 
 absl::Status GraphRowsWriter::InsertNode(const Node& node, const std::string& payload) {
-  const int64_t key = KeyOf(node.id);
-  const std::initializer_list<int64_t> columns = {key, commit_.revision(), node.layer};
+  const NodeRow row{node.id, commit_.revision(), node.layer, payload, IsAgentKind(node.kind)};
   commit_.touched.nodes.push_back(node.id);
-  commit_.head.content.Add(RowIdentity('N', columns, payload));
-  ++commit_.head.info.node_count;
-  ++commit_.head.layer_counts[node.layer];
-  if (IsAgentKind(node.kind)) ++commit_.head.info.agent_count;
+  commit_.head.sums.Add(row);
   return Query(commit_.db,
                "INSERT INTO node (key, rev_from, layer, name, payload, checksum)"
                " VALUES (?1, ?2, ?3, ?4, ?5, ?6)")
-      .Bind(key, commit_.revision(), node.layer, node.name, Query::BlobView{payload},
-            RowChecksum(columns, payload))
+      .Bind(KeyOf(node.id), commit_.revision(), node.layer, node.name, Query::BlobView{payload},
+            ChecksumOf(row))
       .Run();
 }
 
 absl::StatusOr<bool> GraphRowsWriter::EndNode(int64_t key) {
-  Query current(commit_.db, "SELECT rev_from, layer, payload, checksum FROM node WHERE key = ?1");
+  Query current(commit_.db,
+                "SELECT key, rev_from, layer, payload, checksum FROM node WHERE key = ?1");
   const bool exists = current.Bind(key).Next();
   DSG_RETURN_IF_ERROR(current.status());
   if (!exists) return false;
-  const int64_t rev_from = current.Int(0);
-  const auto layer = static_cast<LayerId>(current.Int(1));
-  const std::string payload(current.Blob(2));
-  Node node;
-  if (current.Int(3) != RowChecksum({key, rev_from, layer}, payload) ||
-      !DecodeNodePayload(payload, &node)) {
-    return CorruptRow(commit_.spec.name, "node", ToString(IdOf(key)));
-  }
-  node.id = IdOf(key);
+  DSG_ASSIGN_OR_RETURN(const Node node, NodeFromRow(current, commit_.spec.name));
+  commit_.touched.nodes.push_back(node.id);
+  commit_.head.sums.Remove(
+      NodeRow{node.id, node.revision, node.layer, current.Blob(3), IsAgentKind(node.kind)});
   DSG_RETURN_IF_ERROR(RemoveCell(commit_.db, node));
-  commit_.touched.nodes.push_back(IdOf(key));
-  commit_.head.content.Remove(RowIdentity('N', {key, rev_from, layer}, payload));
-  --commit_.head.info.node_count;
-  --commit_.head.layer_counts[layer];
-  if (IsAgentKind(node.kind)) --commit_.head.info.agent_count;
   DSG_RETURN_IF_ERROR(
       Query(commit_.db,
             "INSERT INTO node_history (key, rev_from, rev_to, layer, name, payload, checksum)"
@@ -187,13 +190,12 @@ absl::Status GraphRowsWriter::Retire(const Retirement& item) {
   }
   Node node;
   {
-    Query current(commit_.db, "SELECT layer, payload FROM node WHERE key = ?1");
-    if (!current.Bind(key).Next() || !DecodeNodePayload(current.Blob(1), &node)) {
-      DSG_RETURN_IF_ERROR(current.status());
-      return CorruptRow(commit_.spec.name, "node", ToString(item.id));
-    }
-    node.id = item.id;
-    node.layer = static_cast<LayerId>(current.Int(0));
+    Query current(commit_.db,
+                  "SELECT key, rev_from, layer, payload, checksum FROM node WHERE key = ?1");
+    const bool exists = current.Bind(key).Next();
+    DSG_RETURN_IF_ERROR(current.status());
+    if (!exists) return CorruptRow(commit_.spec.name, "node", ToString(item.id));
+    DSG_ASSIGN_OR_RETURN(node, NodeFromRow(current, commit_.spec.name));
   }
   node.valid.to_ns = *item.valid_to_ns;
   return WriteNode(node);
@@ -225,39 +227,31 @@ absl::Status GraphRowsWriter::WriteEdge(const Edge& edge) {
 
 absl::StatusOr<bool> GraphRowsWriter::InsertEdge(const Edge& edge, int64_t relation,
                                                  const std::string& payload) {
-  const std::initializer_list<int64_t> columns = {KeyOf(edge.source), relation, KeyOf(edge.target),
-                                                  commit_.revision(), BitsOf(edge.weight)};
+  const EdgeRow row{edge.source, relation, edge.target, commit_.revision(), edge.weight, payload};
   // Most edges are new: to look first would take as long as to insert.
   DSG_RETURN_IF_ERROR(
       Query(commit_.db,
             "INSERT INTO edge (source, relation, target, rev_from, weight, payload, checksum)"
             " VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7) ON CONFLICT DO NOTHING")
           .Bind(KeyOf(edge.source), relation, KeyOf(edge.target), commit_.revision(), edge.weight,
-                Query::BlobView{payload}, RowChecksum32(columns, payload))
+                Query::BlobView{payload}, ChecksumOf(row))
           .Run());
   if (commit_.db.changed_row_count() == 0) return false;
   commit_.touched.edges.push_back({edge.source, relation, edge.target});
-  commit_.head.content.Add(RowIdentity('E', columns, payload));
-  ++commit_.head.info.edge_count;
+  commit_.head.sums.Add(row);
   return true;
 }
 
 absl::StatusOr<bool> GraphRowsWriter::EndEdge(int64_t source, int64_t relation, int64_t target) {
   Query current(commit_.db,
-                "SELECT rev_from, weight, payload, checksum FROM edge"
+                "SELECT source, relation, target, rev_from, weight, payload, checksum FROM edge"
                 " WHERE source = ?1 AND relation = ?2 AND target = ?3");
   const bool exists = current.Bind(source, relation, target).Next();
   DSG_RETURN_IF_ERROR(current.status());
   if (!exists) return false;
-  const std::initializer_list<int64_t> columns = {source, relation, target, current.Int(0),
-                                                  BitsOf(current.Real(1))};
-  if (current.Int(3) != RowChecksum32(columns, current.Blob(2))) {
-    return CorruptRow(commit_.spec.name, "edge",
-                      absl::StrCat(ToString(IdOf(source)), " ", ToString(IdOf(target))));
-  }
-  commit_.touched.edges.push_back({IdOf(source), relation, IdOf(target)});
-  commit_.head.content.Remove(RowIdentity('E', columns, current.Blob(2)));
-  --commit_.head.info.edge_count;
+  DSG_ASSIGN_OR_RETURN(const EdgeRow row, EdgeRowOf(current, commit_.spec.name));
+  commit_.touched.edges.push_back({row.source, relation, row.target});
+  commit_.head.sums.Remove(row);
   DSG_RETURN_IF_ERROR(
       Query(commit_.db,
             "INSERT INTO edge_history"

@@ -21,7 +21,6 @@
 #include "schema/base/time.h"
 #include "schema/model/edge.h"
 #include "schema/store/graph_store.h"
-#include "schema/store/log_bytes.h"
 
 namespace dsg::sqlite {
 
@@ -172,9 +171,7 @@ absl::Status CreateMapFile(const std::string& store_folder, const MapSpec& spec)
     return absl::InternalError(absl::StrCat("cannot make ", folder, ": ", error.message()));
   }
   const std::string path = DatabasePath(store_folder, spec.name);
-  const absl::Status exists =
-      MakeError(Reason::kMapExists, absl::StrCat("map \"", spec.name, "\" exists already"),
-                {{"map", spec.name}});
+  const absl::Status exists = MapExistsError(spec.name);
   if (fs::exists(path, error)) return exists;
   // Two processes may create the same map at once: the lock decides, the loser sees it exists.
   const auto lock = WriterLock::Acquire(store_folder, spec.name, kCreator);
@@ -210,11 +207,7 @@ absl::StatusOr<std::unique_ptr<Database>> OpenAnyFormat(const std::string& store
   DSG_RETURN_IF_ERROR(CheckMapName(map));
   const std::string path = DatabasePath(store_folder, map);
   struct stat info {};
-  if (stat(path.c_str(), &info) != 0) {
-    return MakeError(Reason::kMapUnknown,
-                     absl::StrCat("map \"", map, "\" does not exist in store ", store_folder),
-                     {{"map", map}, {"store", store_folder}});
-  }
+  if (stat(path.c_str(), &info) != 0) return UnknownMapError(map, store_folder);
   if (!S_ISREG(info.st_mode)) {
     return MakeError(Reason::kNotAStore, absl::StrCat(path, " is not a file"), {{"map", map}});
   }
@@ -285,6 +278,10 @@ int64_t BytesOnDisk(const std::string& store_folder, const std::string& map) {
          SizeOf(folder + "/writer.lock");
 }
 
+int64_t LogBytesOnDisk(const std::string& store_folder, const std::string& map) {
+  return SizeOf(MapFolder(store_folder, map) + "/graph.db-wal");
+}
+
 std::vector<std::string> ListOtherFiles(const std::string& store_folder, const std::string& map) {
   constexpr std::string_view kOwn[] = {"graph.db", "graph.db-wal", "graph.db-shm", "writer.lock",
                                        "reserve"};
@@ -340,7 +337,3 @@ absl::StatusOr<std::unique_ptr<WriterLock>> WriterLock::Acquire(const std::strin
 WriterLock::~WriterLock() { close(fd_); }
 
 }  // namespace dsg::sqlite
-
-int64_t dsg::LogBytesOnDisk(const GraphStore& store, const std::string& map) {
-  return sqlite::SizeOf(sqlite::MapFolder(store.folder(), map) + "/graph.db-wal");
-}

@@ -63,6 +63,9 @@ std::optional<FileIdentity> IdentityOf(const std::string& store_folder, const st
 /// Bytes of the database, its write-ahead log and the lock file.
 int64_t BytesOnDisk(const std::string& store_folder, const std::string& map);
 
+/// Bytes of the write-ahead log alone; 0 when there is none.
+int64_t LogBytesOnDisk(const std::string& store_folder, const std::string& map);
+
 /// Files beside those of the map, and copies under way in the store's folder, whoever makes them.
 /// Order: by path.
 std::vector<std::string> ListOtherFiles(const std::string& store_folder, const std::string& map);

@@ -5,7 +5,7 @@
 #include "schema/store/sqlite/copy.h"
 #include "schema/store/sqlite/pending_erasure.h"
 #include "schema/store/sqlite/sessions.h"
-#include "schema/store/sqlite/tags.h"
+#include "schema/store/sqlite/tag_rows.h"
 
 namespace dsg::sqlite {
 namespace {
@@ -13,7 +13,7 @@ namespace {
 // Idle connections kept open; a burst above opens more and closes them after.
 constexpr size_t kPoolMax = 16;
 
-absl::StatusOr<sqlite::Head> LoadRevision(Database& db, Revision revision) {
+absl::StatusOr<RevisionRecord> LoadRevision(Database& db, Revision revision) {
   Query query(db, "SELECT " DSG_REVISION_COLUMNS " FROM revision WHERE revision = ?1");
   const bool found = query.Bind(revision).Next();
   DSG_RETURN_IF_ERROR(query.status());
@@ -56,7 +56,7 @@ absl::Status SqliteMapReader::Lease::BeginTransaction() {
 absl::StatusOr<SqliteMapReader::Lease> SqliteMapReader::LeaseAt(Revision revision) {
   DSG_ASSIGN_OR_RETURN(Lease lease, LeaseConnection());
   DSG_RETURN_IF_ERROR(lease.BeginTransaction());
-  DSG_RETURN_IF_ERROR(CheckReadable(*lease, revision, generation_));
+  DSG_RETURN_IF_ERROR(CheckStillReadable(*lease, revision, generation_));
   return lease;
 }
 
@@ -91,10 +91,10 @@ absl::StatusOr<SqliteMapReader::State> SqliteMapReader::Refresh() const {
   if (state_.head == nullptr || version != data_version_) {
     const ReadTransaction transaction(watcher_.get());
     DSG_RETURN_IF_ERROR(transaction.status());
-    DSG_ASSIGN_OR_RETURN(sqlite::Head head, LoadHead(*watcher_));
+    DSG_ASSIGN_OR_RETURN(RevisionRecord head, LoadHead(*watcher_));
     DSG_ASSIGN_OR_RETURN(Readable readable, LoadReadable(*watcher_));
     if (readable.generation != generation_) is_rewritten_ = true;
-    state_ = {std::make_shared<const sqlite::Head>(std::move(head)),
+    state_ = {std::make_shared<const RevisionRecord>(std::move(head)),
               std::make_shared<const Readable>(std::move(readable))};
     data_version_ = version;
   }
@@ -115,18 +115,13 @@ absl::StatusOr<std::shared_ptr<const Snapshot>> SqliteMapReader::At(Revision rev
   DSG_ASSIGN_OR_RETURN(State state, Refresh());
   const Revision newest = state.head->info.revision;
   if (revision == newest) return MakeSnapshot(shared_from_this(), std::move(state.head));
-  if (revision < 0 || revision > newest) {
-    return FutureError(spec_.name, revision, newest, *state.readable);
-  }
-  if (!state.readable->Holds(revision)) {
-    return CompactedError(spec_.name, revision, newest, *state.readable);
-  }
-  sqlite::Head at;
+  DSG_RETURN_IF_ERROR(CheckReadable(spec_.name, revision, newest, *state.readable));
+  RevisionRecord at;
   if (revision > 0) {
     DSG_ASSIGN_OR_RETURN(Lease lease, LeaseAt(revision));
     DSG_ASSIGN_OR_RETURN(at, LoadRevision(*lease, revision));
   }
-  return MakeSnapshot(shared_from_this(), std::make_shared<const sqlite::Head>(std::move(at)));
+  return MakeSnapshot(shared_from_this(), std::make_shared<const RevisionRecord>(std::move(at)));
 }
 
 absl::StatusOr<Revision> SqliteMapReader::OldestRevision() {
@@ -153,7 +148,7 @@ absl::StatusOr<std::vector<RevisionInfo>> SqliteMapReader::ListRevisions(Revisio
   query.Bind(before > 0 ? before : kRevisionMax, limit);
   std::vector<RevisionInfo> revisions;
   while (query.Next()) {
-    DSG_ASSIGN_OR_RETURN(sqlite::Head head, HeadFromRow(query, spec_.name));
+    DSG_ASSIGN_OR_RETURN(RevisionRecord head, HeadFromRow(query, spec_.name));
     revisions.push_back(std::move(head.info));
   }
   DSG_RETURN_IF_ERROR(query.status());

@@ -10,7 +10,7 @@
 
 #include "schema/store/graph_store.h"
 #include "schema/store/sqlite/map_file.h"
-#include "schema/store/sqlite/readable.h"
+#include "schema/store/sqlite/readable_rows.h"
 #include "schema/store/sqlite/shape_reader.h"
 #include "schema/store/sqlite/track_cache.h"
 #include "schema/store/sqlite/writer.h"
@@ -75,7 +75,7 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
  private:
   /// The newest revision and which others can be read, as of one instant.
   struct State {
-    std::shared_ptr<const sqlite::Head> head;
+    std::shared_ptr<const RevisionRecord> head;
     std::shared_ptr<const Readable> readable;
   };
   absl::StatusOr<State> Refresh() const;
@@ -113,7 +113,7 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
 
 /// Makes the snapshot of a revision that exists.
 std::shared_ptr<const Snapshot> MakeSnapshot(std::shared_ptr<SqliteMapReader> reader,
-                                             std::shared_ptr<const sqlite::Head> head);
+                                             std::shared_ptr<const RevisionRecord> head);
 
 /// Reads the whole map; see MapReader::Verify.
 absl::StatusOr<VerifyReport> VerifyMap(Database& db, const MapSpec& spec, const StopCheck& stop,

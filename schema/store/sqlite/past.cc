@@ -4,6 +4,8 @@
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
+#include "schema/store/revision_record.h"
+#include "schema/store/sqlite/rows.h"
 #include "schema/store/sqlite/writer.h"
 
 namespace dsg::sqlite {
@@ -13,43 +15,7 @@ constexpr char kSelectRevisions[] =
     "SELECT " DSG_REVISION_COLUMNS ", parent_digest FROM revision ORDER BY revision";
 constexpr int kParentColumn = 18;
 
-void AddTo(const RowSums& sums, Head* head) {
-  RevisionInfo& info = head->info;
-  head->content += sums.content;
-  info.node_count += sums.node_count;
-  info.edge_count += sums.edge_count;
-  info.agent_count += sums.agent_count;
-  info.pose_count += sums.pose_count;
-  info.stay_count += sums.stay_count;
-  info.mesh_block_count += sums.mesh_block_count;
-  for (const auto& [layer, count] : sums.layer_counts) head->layer_counts[layer] += count;
-}
-
 }  // namespace
-
-RowSums& RowSums::operator+=(const RowSums& other) {
-  content += other.content;
-  node_count += other.node_count;
-  edge_count += other.edge_count;
-  agent_count += other.agent_count;
-  pose_count += other.pose_count;
-  stay_count += other.stay_count;
-  mesh_block_count += other.mesh_block_count;
-  for (const auto& [layer, count] : other.layer_counts) layer_counts[layer] += count;
-  return *this;
-}
-
-RowSums& RowSums::operator-=(const RowSums& other) {
-  content -= other.content;
-  node_count -= other.node_count;
-  edge_count -= other.edge_count;
-  agent_count -= other.agent_count;
-  pose_count -= other.pose_count;
-  stay_count -= other.stay_count;
-  mesh_block_count -= other.mesh_block_count;
-  for (const auto& [layer, count] : other.layer_counts) layer_counts[layer] -= count;
-  return *this;
-}
 
 void PastChange::Take(const RowSums& row, Revision from, Revision to) {
   changes_[from] -= row;
@@ -77,10 +43,10 @@ absl::Status PastChange::ApplySums(Database& db) const {
   // As it stands there: a new digest over a record that is damaged would say that it is sound.
   Sha256 stored_parent{};
   Revision before = 0;
-  std::vector<Head> changed;
+  std::vector<RevisionRecord> changed;
   Query query(db, kSelectRevisions);
   while (query.Next()) {
-    DSG_ASSIGN_OR_RETURN(Head head, HeadFromRow(query, db.map_name()));
+    DSG_ASSIGN_OR_RETURN(RevisionRecord head, HeadFromRow(query, db.map_name()));
     const Revision revision = head.info.revision;
     if (revision != before + 1) {
       const std::string_view bytes = query.Blob(kParentColumn);
@@ -97,29 +63,16 @@ absl::Status PastChange::ApplySums(Database& db) const {
     before = revision;
     for (; change != changes_.end() && change->first <= revision; ++change) sums += change->second;
     if (revision >= changes_.begin()->first) {
-      AddTo(sums, &head);
-      head.info.digest = DigestOf(parent, head);
+      head.sums += sums;
+      Seal(parent, &head);
       changed.push_back(head);
     }
     parent = head.info.digest;
   }
   DSG_RETURN_IF_ERROR(query.status());
   query.Reset();
-  for (const Head& head : changed) DSG_RETURN_IF_ERROR(UpdateRevision(db, head));
+  for (const RevisionRecord& head : changed) DSG_RETURN_IF_ERROR(UpdateRevision(db, head));
   return absl::OkStatus();
-}
-
-bool PastChange::Edit(Revision before, Revision revision, TouchedKeys* keys) const {
-  bool is_changed = nodes_.Edit(before, revision, &keys->nodes);
-  const size_t edge_count = keys->edges.size();
-  std::erase_if(keys->edges, [&](const EdgeRowKey& key) {
-    return !edges_.contains(key) && (nodes_.contains(key.source) || nodes_.contains(key.target));
-  });
-  is_changed = edges_.Edit(before, revision, &keys->edges) || is_changed;
-  is_changed = mesh_blocks_.Edit(before, revision, &keys->mesh_blocks) || is_changed;
-  const size_t track_count = keys->tracks.size();
-  std::erase_if(keys->tracks, [&](NodeId agent) { return tracks_.contains(agent); });
-  return is_changed || keys->edges.size() != edge_count || keys->tracks.size() != track_count;
 }
 
 absl::StatusOr<bool> PastChange::ApplyToLists(Database& db) const {
@@ -137,8 +90,7 @@ absl::StatusOr<bool> PastChange::ApplyToLists(Database& db) const {
           !DecodeTouched(query.Blob(1), &keys)) {
         return CorruptRow(db.map_name(), "touched", absl::StrCat(revision));
       }
-      if (!Edit(before, revision, &keys)) continue;
-      keys.Normalize();
+      if (!forgotten.Edit(before, revision, &keys)) continue;
       changed.emplace_back(revision, EncodeTouched(keys));
     }
     DSG_RETURN_IF_ERROR(query.status());

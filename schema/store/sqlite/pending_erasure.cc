@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "schema/store/sqlite/pending_erasure.h"
 
-#include <algorithm>
-#include <tuple>
+#include <string>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "schema/codec/bit_stream.h"
@@ -79,120 +79,47 @@ absl::Status DropNotedErasure(Database& db, int64_t id) {
   return Query(db, "DELETE FROM noted_erasure WHERE id = ?1").Bind(id).Run();
 }
 
-bool Covers(const std::vector<TrackSpan>& spans, const TrackSpan& span) {
-  return std::any_of(spans.begin(), spans.end(), [&](const TrackSpan& other) {
-    return other.agent == span.agent && other.from_ns <= span.from_ns && other.to_ns >= span.to_ns;
-  });
+// Whether a statement finds anything.
+absl::StatusOr<bool> Finds(Query* query) {
+  const bool found = query->Next();
+  DSG_RETURN_IF_ERROR(query->status());
+  return found;
 }
 
-// Sorts what is noted into what is ripe and what its commits have yet to retire.
-class Ripener {
- public:
-  Ripener(Database* db, const EraseList& named, const NotedErasure& noted)
-      : db_(*db), named_(named), noted_(noted) {}
-
-  absl::Status Run() {
-    ripe.assets = rest.assets = noted_.list.assets;
-    for (const NodeId id : noted_.list.keys.nodes) {
-      Query row(db_, "SELECT 1 FROM node WHERE key = ?1 AND rev_from <= ?2");
-      row.Bind(KeyOf(id), noted_.planned_at);
-      DSG_RETURN_IF_ERROR(Sort(id, &TouchedKeys::nodes, &row));
-    }
-    for (const EdgeRowKey& edge : noted_.list.keys.edges) {
-      Query row(db_,
-                "SELECT 1 FROM edge WHERE source = ?1 AND relation = ?2 AND target = ?3"
-                " AND rev_from <= ?4");
-      row.Bind(KeyOf(edge.source), edge.relation, KeyOf(edge.target), noted_.planned_at);
-      DSG_RETURN_IF_ERROR(Sort(edge, &TouchedKeys::edges, &row));
-    }
-    for (const BlockIndex& index : noted_.list.keys.mesh_blocks) {
-      Query row(db_,
-                "SELECT 1 FROM mesh_block WHERE x = ?1 AND y = ?2 AND z = ?3 AND rev_from <= ?4");
-      row.Bind(index.x, index.y, index.z, noted_.planned_at);
-      DSG_RETURN_IF_ERROR(Sort(index, &TouchedKeys::mesh_blocks, &row));
-    }
-    for (const TrackSpan& span : noted_.list.spans) {
-      Query row(db_,
-                "SELECT 1 FROM track JOIN trajectory_segment"
-                " ON id BETWEEN slot << ?5 AND (slot + 1 << ?5) - 1"
-                " WHERE agent = ?1 AND t1 >= ?2 AND t0 < ?3 AND rev_from <= ?4");
-      const bool is_believed =
-          row.Bind(KeyOf(span.agent), span.from_ns, span.to_ns, noted_.planned_at, kSegmentTimeBits)
-              .Next();
-      DSG_RETURN_IF_ERROR(row.status());
-      (is_believed && !Covers(named_.spans, span) ? rest : ripe).spans.push_back(span);
-    }
-    return absl::OkStatus();
-  }
-
-  EraseList ripe;
-  EraseList rest;
-
- private:
-  template <typename Key>
-  absl::Status Sort(const Key& key, std::vector<Key> TouchedKeys::*part, Query* row) {
-    const bool is_believed = row->Next();
-    DSG_RETURN_IF_ERROR(row->status());
-    const std::vector<Key>& named = named_.keys.*part;
-    const bool is_named = std::binary_search(named.begin(), named.end(), key);
-    ((is_believed && !is_named ? rest : ripe).keys.*part).push_back(key);
-    return absl::OkStatus();
-  }
-
-  Database& db_;
-  const EraseList& named_;
-  const NotedErasure& noted_;
-};
-
-void JoinSpans(std::vector<TrackSpan>* spans) {
-  std::sort(spans->begin(), spans->end(), [](const TrackSpan& a, const TrackSpan& b) {
-    return std::tie(a.agent, a.from_ns, a.to_ns) < std::tie(b.agent, b.from_ns, b.to_ns);
-  });
-  std::vector<TrackSpan> joined;
-  for (const TrackSpan& span : *spans) {
-    const bool touches =
-        !joined.empty() && joined.back().agent == span.agent && span.from_ns <= joined.back().to_ns;
-    if (touches) {
-      joined.back().to_ns = std::max(joined.back().to_ns, span.to_ns);
-    } else {
-      joined.push_back(span);
-    }
-  }
-  *spans = std::move(joined);
+// Of what was there at `planned_at` and still is.
+BelievedSince BelievedIn(Database* database, Revision planned_at) {
+  Database& db = *database;
+  return {
+      [&db, planned_at](NodeId id) {
+        Query row(db, "SELECT 1 FROM node WHERE key = ?1 AND rev_from <= ?2");
+        return Finds(&row.Bind(KeyOf(id), planned_at));
+      },
+      [&db, planned_at](const EdgeRowKey& edge) {
+        Query row(db,
+                  "SELECT 1 FROM edge WHERE source = ?1 AND relation = ?2 AND target = ?3"
+                  " AND rev_from <= ?4");
+        return Finds(&row.Bind(KeyOf(edge.source), edge.relation, KeyOf(edge.target), planned_at));
+      },
+      [&db, planned_at](const BlockIndex& index) {
+        Query row(db,
+                  "SELECT 1 FROM mesh_block WHERE x = ?1 AND y = ?2 AND z = ?3 AND rev_from <= ?4");
+        return Finds(&row.Bind(index.x, index.y, index.z, planned_at));
+      },
+      [&db, planned_at](const TrackSpan& span) {
+        Query row(db,
+                  "SELECT 1 FROM track JOIN trajectory_segment"
+                  " ON id BETWEEN slot << ?5 AND (slot + 1 << ?5) - 1"
+                  " WHERE agent = ?1 AND t1 >= ?2 AND t0 < ?3 AND rev_from <= ?4");
+        return Finds(
+            &row.Bind(KeyOf(span.agent), span.from_ns, span.to_ns, planned_at, kSegmentTimeBits));
+      },
+  };
 }
 
 }  // namespace
 
-size_t EraseList::size() const {
-  return keys.nodes.size() + keys.edges.size() + keys.mesh_blocks.size() + spans.size();
-}
-
-void EraseList::Add(const EraseList& other) {
-  const auto append = [](const auto& from, auto* to) {
-    to->insert(to->end(), from.begin(), from.end());
-  };
-  append(other.keys.nodes, &keys.nodes);
-  append(other.keys.edges, &keys.edges);
-  append(other.keys.mesh_blocks, &keys.mesh_blocks);
-  append(other.spans, &spans);
-  assets = assets || other.assets;
-  keys.Normalize();
-  JoinSpans(&spans);
-}
-
-absl::StatusOr<EraseList> ListOf(Database& db, const Erasure& erasure) {
-  EraseList named;
-  named.keys.nodes = erasure.nodes;
-  named.keys.mesh_blocks = erasure.mesh_blocks;
-  named.spans = erasure.tracks;
-  named.assets = erasure.assets;
-  for (const EdgeKey& edge : erasure.edges) {
-    DSG_ASSIGN_OR_RETURN(const int64_t relation, FindRelation(db, edge.relation));
-    if (relation != 0) named.keys.edges.push_back({edge.source, relation, edge.target});
-  }
-  EraseList list;
-  list.Add(named);
-  return list;
+absl::StatusOr<EraseList> ListIn(Database& db, const Erasure& erasure) {
+  return ListOf(erasure, [&db](const std::string& name) { return FindRelation(db, name); });
 }
 
 absl::StatusOr<EraseList> ReadPendingErasure(Database& db) {
@@ -243,17 +170,17 @@ absl::StatusOr<EraseList> TakeRipeErasures(Database& db, const EraseList& named,
   *is_rest = false;
   DSG_ASSIGN_OR_RETURN(const std::vector<NotedErasure> all, ReadNotedErasures(db));
   for (const NotedErasure& noted : all) {
-    Ripener ripener(&db, named, noted);
-    DSG_RETURN_IF_ERROR(ripener.Run());
-    if (ripener.ripe.size() == 0) {
+    DSG_ASSIGN_OR_RETURN(const RipeAndRest sorted,
+                         SortByRipeness(noted.list, named, BelievedIn(&db, noted.planned_at)));
+    if (sorted.ripe.size() == 0) {
       *is_rest = true;
       continue;
     }
-    ripe.Add(ripener.ripe);
+    ripe.Add(sorted.ripe);
     DSG_RETURN_IF_ERROR(DropNotedErasure(db, noted.id));
-    if (ripener.rest.size() == 0) continue;
+    if (sorted.rest.size() == 0) continue;
     *is_rest = true;
-    DSG_RETURN_IF_ERROR(AddNotedErasure(db, noted.planned_at, ripener.rest));
+    DSG_RETURN_IF_ERROR(AddNotedErasure(db, noted.planned_at, sorted.rest));
   }
   return ripe;
 }
@@ -264,9 +191,7 @@ absl::StatusOr<std::optional<PendingErasure>> GetPendingErasure(Database& db) {
   DSG_ASSIGN_OR_RETURN(EraseList list, ReadPendingErasure(db));
   DSG_ASSIGN_OR_RETURN(const std::vector<NotedErasure> all, ReadNotedErasures(db));
   for (const NotedErasure& noted : all) list.Add(noted.list);
-  const auto count = [](const auto& items) { return static_cast<int64_t>(items.size()); };
-  return std::optional<PendingErasure>({count(list.keys.nodes), count(list.keys.edges),
-                                        count(list.keys.mesh_blocks), count(list.spans)});
+  return std::optional<PendingErasure>(CountsOf(list));
 }
 
 }  // namespace dsg::sqlite

@@ -1,32 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an erasure names, kept in the map from before its first commit to its last step: by then the
-// rows in which it was found are gone. It is noted first; what is no longer believed of it becomes
-// pending when rows are wiped. Refuses to hold anything but keys and times.
+// The tables of what erasures name. It is noted first; what is no longer believed of it becomes
+// pending when rows are wiped.
 #pragma once
 
 #include <optional>
-#include <string>
-#include <vector>
 
-#include "schema/store/graph_store.h"
+#include "schema/store/erase_list.h"
 #include "schema/store/sqlite/database.h"
-#include "schema/store/sqlite/touched_keys.h"
 
 namespace dsg::sqlite {
 
-struct EraseList {
-  /// Nodes, edges and mesh blocks; no tracks.
-  TouchedKeys keys;
-  std::vector<TrackSpan> spans;
-  bool assets = false;
-
-  size_t size() const;
-  /// Each thing stands once afterwards, in order, and spans of one agent do not touch.
-  void Add(const EraseList& other);
-};
-
-/// In order, without relations that the map does not know: there are no edges of them.
-absl::StatusOr<EraseList> ListOf(Database& db, const Erasure& erasure);
+/// As ListOf, with the relations of the map.
+absl::StatusOr<EraseList> ListIn(Database& db, const Erasure& erasure);
 
 /// Empty if no erasure is pending.
 /// Errors: DATA_LOSS/STORE_CORRUPT.

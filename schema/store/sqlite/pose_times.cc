@@ -68,11 +68,11 @@ absl::Status RepairPoseTimes(Database& db) {
   DSG_RETURN_IF_ERROR(ReadEnds(db, &ends));
   begins.Start();
   ends.Start();
-  std::vector<Head> wrong;
+  std::vector<RevisionRecord> wrong;
   {
     Query query(db, "SELECT " DSG_REVISION_COLUMNS " FROM revision ORDER BY revision");
     while (query.Next()) {
-      DSG_ASSIGN_OR_RETURN(Head head, HeadFromRow(query, db.map_name()));
+      DSG_ASSIGN_OR_RETURN(RevisionRecord head, HeadFromRow(query, db.map_name()));
       const auto& first = begins.At(head.info.revision);
       const auto& last = ends.At(head.info.revision);
       std::optional<TimeNs> first_ns;
@@ -86,7 +86,7 @@ absl::Status RepairPoseTimes(Database& db) {
     }
     DSG_RETURN_IF_ERROR(query.status());
   }
-  for (const Head& head : wrong) DSG_RETURN_IF_ERROR(UpdateRevision(db, head));
+  for (const RevisionRecord& head : wrong) DSG_RETURN_IF_ERROR(UpdateRevision(db, head));
   return absl::OkStatus();
 }
 

@@ -6,7 +6,6 @@
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
-#include "schema/store/time_range.h"
 
 namespace dsg::sqlite {
 namespace {
@@ -26,25 +25,10 @@ int64_t FloorDivide(Int128 value, int64_t divisor) {
 
 }  // namespace
 
-int64_t RowChecksum(std::initializer_list<int64_t> columns, std::string_view payload) {
-  const std::string_view head(reinterpret_cast<const char*>(columns.begin()),
-                              columns.size() * sizeof(int64_t));
+int64_t RowChecksum(std::span<const int64_t> columns, std::string_view payload) {
+  const std::string_view head(reinterpret_cast<const char*>(columns.data()), columns.size_bytes());
   return Checksum(payload, static_cast<uint64_t>(Checksum(head)));
 }
-
-int64_t RowChecksum32(std::initializer_list<int64_t> columns, std::string_view payload) {
-  return static_cast<int32_t>(RowChecksum(columns, payload));
-}
-
-std::string RowIdentity(char table, std::initializer_list<int64_t> columns,
-                        std::string_view payload) {
-  std::string identity(1, table);
-  identity.append(reinterpret_cast<const char*>(columns.begin()), columns.size() * sizeof(int64_t));
-  identity.append(payload);
-  return identity;
-}
-
-int64_t BitsOf(double value) { return std::bit_cast<int64_t>(value); }
 
 absl::Status CorruptRow(const std::string& map, std::string_view table, const std::string& key) {
   return MakeError(Reason::kStoreCorrupt,
@@ -61,18 +45,13 @@ IntBox ToMillimetres(const Box3d& box) {
           high(box.max().y()), low(box.min().z()),  high(box.max().z())};
 }
 
-absl::StatusOr<int64_t> ToTenthsFloor(TimeNs time_ns, const MapSpec& spec) {
-  DSG_RETURN_IF_ERROR(CheckTimeInMap(time_ns, spec));
-  return FloorDivide(static_cast<Int128>(time_ns) - spec.epoch_ns, kTenthNs);
-}
-
-absl::StatusOr<int64_t> ToTenthsCeil(TimeNs time_ns, const MapSpec& spec) {
-  DSG_RETURN_IF_ERROR(CheckTimeInMap(time_ns, spec));
-  return -FloorDivide(static_cast<Int128>(spec.epoch_ns) - time_ns, kTenthNs);
-}
-
-int64_t ClampToTenths(TimeNs time_ns, const MapSpec& spec) {
+int64_t ToTenthsFloor(TimeNs time_ns, const MapSpec& spec) {
   return std::clamp(FloorDivide(static_cast<Int128>(time_ns) - spec.epoch_ns, kTenthNs), kInt32Min,
+                    kInt32Max);
+}
+
+int64_t ToTenthsCeil(TimeNs time_ns, const MapSpec& spec) {
+  return std::clamp(-FloorDivide(static_cast<Int128>(spec.epoch_ns) - time_ns, kTenthNs), kInt32Min,
                     kInt32Max);
 }
 

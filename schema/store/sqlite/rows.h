@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// How model values stand in rows: keys, fixed-point boxes, checksums, and the bytes by which a row
-// counts in the content digest.
+// How model values stand in rows: checksums, fixed-point boxes, ids of segments.
 #pragma once
 
-#include <bit>
 #include <cstdint>
+#include <initializer_list>
+#include <span>
 #include <string>
 
 #include "absl/status/statusor.h"
@@ -13,23 +13,27 @@
 #include "schema/model/layer.h"
 #include "schema/model/node.h"
 #include "schema/model/trajectory.h"
+#include "schema/store/content_rows.h"
 
 namespace dsg::sqlite {
 
-/// See the head of 0001_init.sql.
-inline int64_t KeyOf(NodeId id) { return static_cast<int64_t>(std::rotl(id.value, 8)); }
-inline NodeId IdOf(int64_t key) { return NodeId(std::rotr(static_cast<uint64_t>(key), 8)); }
-
 /// Checksum of a row: columns and payload, so that a flipped bit in either is found.
-int64_t RowChecksum(std::initializer_list<int64_t> columns, std::string_view payload);
-/// The same in 32 bits, for narrow rows.
-int64_t RowChecksum32(std::initializer_list<int64_t> columns, std::string_view payload);
+int64_t RowChecksum(std::span<const int64_t> columns, std::string_view payload);
+inline int64_t RowChecksum(std::initializer_list<int64_t> columns, std::string_view payload) {
+  return RowChecksum(std::span(columns.begin(), columns.size()), payload);
+}
 
-/// Bytes that identify a row in the content digest: a letter for its table, columns, payload.
-std::string RowIdentity(char table, std::initializer_list<int64_t> columns,
-                        std::string_view payload);
-
-int64_t BitsOf(double value);
+/// Of a row that counts in digests. Narrow rows have 32 bits.
+template <typename Row>
+int64_t ChecksumOf(const Row& row) {
+  return RowChecksum(row.columns(), row.payload);
+}
+inline int64_t ChecksumOf(const EdgeRow& row) {
+  return static_cast<int32_t>(RowChecksum(row.columns(), row.payload));
+}
+inline int64_t ChecksumOf(const StayRow& row) {
+  return static_cast<int32_t>(RowChecksum(row.columns(), row.payload));
+}
 
 /// DATA_LOSS/STORE_CORRUPT for a row that is not what was written.
 absl::Status CorruptRow(const std::string& map, std::string_view table, const std::string& key);
@@ -41,17 +45,13 @@ struct IntBox {
 /// Requires: coordinates within kCoordinateMaxM.
 IntBox ToMillimetres(const Box3d& box);
 
-/// Tenths of a second from the map's epoch, rounded down or up.
-/// Errors: OUT_OF_RANGE/TIME_OUTSIDE_MAP when 32 bits cannot hold it (6.8 years).
-absl::StatusOr<int64_t> ToTenthsFloor(TimeNs time_ns, const MapSpec& spec);
-absl::StatusOr<int64_t> ToTenthsCeil(TimeNs time_ns, const MapSpec& spec);
-/// Clamped, for the ends of a question.
-int64_t ClampToTenths(TimeNs time_ns, const MapSpec& spec);
+/// Tenths of a second from the map's epoch, rounded down or up, as far as 32 bits reach (6.8
+/// years); times beyond stand at their ends, so that what touches in time touches in tenths too.
+int64_t ToTenthsFloor(TimeNs time_ns, const MapSpec& spec);
+int64_t ToTenthsCeil(TimeNs time_ns, const MapSpec& spec);
 
-/// Shape segments are cut at this length, so that a reader of an instant looks back no further.
-inline constexpr TimeNs kShapeSegmentNsMax = 60 * kNsPerSecond;
-
-/// Ids of trajectory segments: the track's slot above the milliseconds of the first pose.
+/// Ids of trajectory segments: the track's slot above the milliseconds of the first pose, which
+/// reach 69 years before and after the epoch; no pose lies further from it (time_range.h).
 inline constexpr int kSegmentTimeBits = 42;
 int64_t SegmentId(int64_t slot, TimeNs t0_ns, const MapSpec& spec);
 inline int64_t SlotOfSegment(int64_t id) { return id >> kSegmentTimeBits; }

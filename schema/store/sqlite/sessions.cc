@@ -2,7 +2,6 @@
 // How far each session got. Kept apart from the revisions, which may be compacted away.
 #include "schema/store/sqlite/sessions.h"
 
-#include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
 
 namespace dsg::sqlite {
@@ -29,30 +28,20 @@ absl::Status WriteSession(Database& db, const RevisionInfo& info, int64_t delta_
       .Run();
 }
 
-absl::StatusOr<std::optional<CommitResult>> FindCommitted(Database& db,
-                                                          const DeltaIdentity& delta) {
+absl::StatusOr<std::optional<CommittedDelta>> FindCommitted(Database& db,
+                                                            const std::string& session_id,
+                                                            int64_t sequence) {
   // The revision may be compacted away; the session's last one holds the delta as well.
   Query query(db,
               "SELECT revision, delta_checksum FROM revision WHERE session_id = ?1 AND"
               " sequence = ?2 UNION ALL SELECT last_revision, CASE WHEN last_sequence = ?2 THEN"
               " last_checksum END FROM session WHERE session_id = ?1 AND last_sequence >= ?2");
-  const bool found = query.Bind(delta.session_id, delta.sequence).Next();
+  const bool found = query.Bind(session_id, sequence).Next();
   DSG_RETURN_IF_ERROR(query.status());
-  if (!found) return std::optional<CommitResult>();
-  const Revision revision = query.Int(0);
-  if (query.IsNull(1) || query.Int(1) == delta.checksum) {
-    return std::optional<CommitResult>(CommitResult{revision, true});
-  }
-  return MakeError(
-      Reason::kSequenceReused,
-      absl::StrCat("sequence ", delta.sequence, " of session ", delta.session_id, " of map \"",
-                   db.map_name(), "\" was committed with other content, as revision ", revision,
-                   ", and nothing was written now; send what is new under the session's next "
-                   "sequence, or begin a session of another name"),
-      {{"map", db.map_name()},
-       {"session_id", delta.session_id},
-       {"sequence", absl::StrCat(delta.sequence)},
-       {"revision", absl::StrCat(revision)}});
+  if (!found) return std::optional<CommittedDelta>();
+  CommittedDelta committed{query.Int(0), std::nullopt};
+  if (!query.IsNull(1)) committed.checksum = query.Int(1);
+  return std::optional<CommittedDelta>(committed);
 }
 
 absl::Status ForgetDeltaChecksums(Database& db) {

@@ -5,13 +5,14 @@
 #include <string>
 #include <tuple>
 
+#include "schema/store/batches.h"
 #include "schema/store/sqlite/rows.h"
 
 namespace dsg::sqlite {
 namespace {
 
 TimeNs LookBack(TimeNs from_ns) {
-  return from_ns < kTimeMin + kShapeSegmentNsMax ? kTimeMin : from_ns - kShapeSegmentNsMax;
+  return from_ns < kTimeMin + kShapeBatchNsMax ? kTimeMin : from_ns - kShapeBatchNsMax;
 }
 
 }  // namespace
@@ -23,12 +24,11 @@ absl::StatusOr<std::string> ShapeReader::LoadPayload(const Segment& segment) {
               " WHERE id = ?1 AND rev_from = ?2");
   const bool found = query.Bind(segment.row_id, segment.rev_from).Next();
   DSG_RETURN_IF_ERROR(query.status());
-  const int64_t agent = KeyOf(question_.agent);
-  if (!found || query.Int(0) !=
-                    RowChecksum({agent, segment.rev_from, segment.t0, segment.t1}, query.Blob(1))) {
-    return CorruptRow(db_.map_name(), "shape_segment", ToString(question_.agent));
+  if (found) {
+    const ShapeRow row{{question_.agent, segment.rev_from, segment.t0, segment.t1, query.Blob(1)}};
+    if (query.Int(0) == ChecksumOf(row)) return std::string(row.payload);
   }
-  return std::string(query.Blob(1));
+  return CorruptRow(db_.map_name(), "shape_segment", ToString(question_.agent));
 }
 
 absl::Status ShapeReader::Reach(Segment segment) {

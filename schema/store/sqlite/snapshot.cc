@@ -2,16 +2,15 @@
 // The small answers of a snapshot: layers, counts, mesh, assets, factors.
 #include "schema/store/sqlite/snapshot.h"
 
-#include <algorithm>
-
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_join.h"
 #include "schema/codec/proto_convert.h"
+#include "schema/store/sqlite/graph_rows.h"
+#include "schema/store/track_rules.h"
 
 namespace dsg::sqlite {
 
 std::shared_ptr<const Snapshot> MakeSnapshot(std::shared_ptr<SqliteMapReader> reader,
-                                             std::shared_ptr<const sqlite::Head> head) {
+                                             std::shared_ptr<const RevisionRecord> head) {
   return std::make_shared<const SqliteSnapshot>(std::move(reader), std::move(head));
 }
 
@@ -26,19 +25,6 @@ absl::StatusOr<std::vector<Layer>> SqliteSnapshot::Layers() const {
   }
   DSG_RETURN_IF_ERROR(query.status());
   return layers;
-}
-
-absl::StatusOr<Layer> SqliteSnapshot::FindLayer(std::string_view name) const {
-  DSG_ASSIGN_OR_RETURN(const auto layers, Layers());
-  std::vector<std::string> names;
-  for (const Layer& layer : layers) {
-    if (layer.name == name) return layer;
-    names.push_back(layer.name);
-  }
-  return MakeError(Reason::kLayerUnknown,
-                   absl::StrCat("map \"", spec().name, "\" has no layer \"", std::string(name),
-                                "\"; it has ", absl::StrJoin(names, ", ")),
-                   {{"map", spec().name}, {"layer", std::string(name)}});
 }
 
 absl::StatusOr<std::vector<SemanticLabel>> SqliteSnapshot::Labels() const {
@@ -56,16 +42,9 @@ absl::StatusOr<std::vector<SemanticLabel>> SqliteSnapshot::Labels() const {
 }
 
 absl::StatusOr<MapStats> SqliteSnapshot::Stats() const {
-  MapStats stats;
-  stats.at = head_->info;
-  stats.first_pose_ns = head_->first_pose_ns;
-  stats.last_pose_ns = head_->last_pose_ns;
-  stats.bytes_on_disk = reader_->bytes_on_disk();
   DSG_ASSIGN_OR_RETURN(const auto layers, Layers());
-  for (const Layer& layer : layers) {
-    const auto count = head_->layer_counts.find(layer.id);
-    stats.layers.push_back({layer, count == head_->layer_counts.end() ? 0 : count->second});
-  }
+  MapStats stats = StatsOf(*head_, layers);
+  stats.bytes_on_disk = reader_->bytes_on_disk();
   return stats;
 }
 
@@ -73,18 +52,16 @@ absl::StatusOr<std::vector<PoseFactor>> SqliteSnapshot::Factors(NodeId agent, Ti
                                                                 TimeNs to_ns) const {
   DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
   Query query(*lease,
-              "SELECT rev_from, t0, t1, checksum, payload FROM factor_segment"
+              "SELECT agent, rev_from, t0, t1, payload, checksum FROM factor_segment"
               " WHERE agent = ?1 AND rev_from <= ?2 AND t0 < ?4 AND t1 >= ?3"
-              " UNION ALL SELECT rev_from, t0, t1, checksum, payload FROM factor_history"
+              " UNION ALL SELECT agent, rev_from, t0, t1, payload, checksum FROM factor_history"
               " WHERE agent = ?1 AND rev_from <= ?2 AND rev_to > ?2 AND t0 < ?4 AND t1 >= ?3");
   query.Bind(KeyOf(agent), revision(), from_ns, to_ns);
   std::vector<PoseFactor> factors;
   while (query.Next()) {
+    DSG_ASSIGN_OR_RETURN(const auto row, BatchRowOf<FactorRow>(query, spec().name));
     std::vector<PoseFactor> batch;
-    const std::string_view payload = query.Blob(4);
-    if (query.Int(3) !=
-            RowChecksum({KeyOf(agent), query.Int(0), query.Int(1), query.Int(2)}, payload) ||
-        !DecodeFactors(payload, &batch)) {
+    if (!DecodeFactors(row.payload, &batch)) {
       return CorruptRow(spec().name, "factor_segment", ToString(agent));
     }
     for (PoseFactor& factor : batch) {
@@ -92,24 +69,15 @@ absl::StatusOr<std::vector<PoseFactor>> SqliteSnapshot::Factors(NodeId agent, Ti
     }
   }
   DSG_RETURN_IF_ERROR(query.status());
-  std::stable_sort(factors.begin(), factors.end(),
-                   [](const PoseFactor& a, const PoseFactor& b) { return a.from_ns < b.from_ns; });
+  SortFactors(&factors);
   return factors;
 }
 
 absl::StatusOr<std::vector<BlockIndex>> SqliteSnapshot::MeshBlocks() const {
-  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
-  Query query(*lease,
-              "SELECT x, y, z FROM mesh_block WHERE rev_from <= ?1"
-              " UNION ALL SELECT x, y, z FROM mesh_block_history"
-              " WHERE rev_from <= ?1 AND rev_to > ?1 ORDER BY 1, 2, 3");
-  query.Bind(revision());
+  DSG_ASSIGN_OR_RETURN(const auto versions, MeshBlockVersions(StopCheck()));
   std::vector<BlockIndex> blocks;
-  while (query.Next()) {
-    blocks.push_back({static_cast<int32_t>(query.Int(0)), static_cast<int32_t>(query.Int(1)),
-                      static_cast<int32_t>(query.Int(2))});
-  }
-  DSG_RETURN_IF_ERROR(query.status());
+  blocks.reserve(versions.size());
+  for (const auto& [index, written] : versions) blocks.push_back(index);
   return blocks;
 }
 
@@ -136,24 +104,17 @@ absl::StatusOr<std::vector<std::pair<BlockIndex, Revision>>> SqliteSnapshot::Mes
 absl::StatusOr<MeshBlock> SqliteSnapshot::ReadMeshBlock(BlockIndex index) const {
   DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
   Query query(*lease,
-              "SELECT rev_from, checksum, payload FROM mesh_block"
+              "SELECT x, y, z, rev_from, payload, checksum FROM mesh_block"
               " WHERE x = ?1 AND y = ?2 AND z = ?3 AND rev_from <= ?4"
-              " UNION ALL SELECT rev_from, checksum, payload FROM mesh_block_history"
+              " UNION ALL SELECT x, y, z, rev_from, payload, checksum FROM mesh_block_history"
               " WHERE x = ?1 AND y = ?2 AND z = ?3 AND rev_from <= ?4 AND rev_to > ?4");
   const bool found = query.Bind(index.x, index.y, index.z, revision()).Next();
   DSG_RETURN_IF_ERROR(query.status());
-  const std::string key = absl::StrCat(index.x, ",", index.y, ",", index.z);
-  if (!found) {
-    return MakeError(Reason::kNodeUnknown,
-                     absl::StrCat("map \"", spec().name, "\" has no mesh block ", key),
-                     {{"map", spec().name}, {"block", key}});
-  }
+  if (!found) return UnknownMeshBlock(index);
+  DSG_ASSIGN_OR_RETURN(const MeshRow row, MeshRowOf(query, spec().name));
   MeshBlock block;
-  if (query.Int(1) != RowChecksum({index.x, index.y, index.z, query.Int(0)}, query.Blob(2)) ||
-      !DecodeMeshBlock(query.Blob(2), &block)) {
-    return CorruptRow(spec().name, "mesh_block", key);
-  }
-  return block;
+  if (DecodeMeshBlock(row.payload, &block)) return block;
+  return CorruptRow(spec().name, "mesh_block", absl::StrCat(index.x, ",", index.y, ",", index.z));
 }
 
 absl::StatusOr<Asset> SqliteSnapshot::ReadAsset(const Sha256& sha256) const {
@@ -161,8 +122,7 @@ absl::StatusOr<Asset> SqliteSnapshot::ReadAsset(const Sha256& sha256) const {
   Query query(*lease,
               "SELECT media_type, payload FROM asset WHERE sha256 = ?1 AND rev_from <= ?2"
               " ORDER BY part");
-  query.Bind(Query::BlobView{{reinterpret_cast<const char*>(sha256.data()), sha256.size()}},
-             revision());
+  query.Bind(Query::BlobView{BytesOf(sha256)}, revision());
   Asset asset;
   asset.sha256 = sha256;
   bool found = false;
@@ -172,11 +132,7 @@ absl::StatusOr<Asset> SqliteSnapshot::ReadAsset(const Sha256& sha256) const {
     asset.content += query.Blob(1);
   }
   DSG_RETURN_IF_ERROR(query.status());
-  if (!found) {
-    return MakeError(Reason::kAssetUnknown,
-                     absl::StrCat("map \"", spec().name, "\" has no asset ", ToHex(sha256)),
-                     {{"map", spec().name}, {"asset", ToHex(sha256)}});
-  }
+  if (!found) return UnknownAsset(sha256);
   if (ComputeSha256(asset.content) != sha256) {
     return CorruptRow(spec().name, "asset", ToHex(sha256));
   }

@@ -14,7 +14,8 @@ namespace dsg::sqlite {
 
 class SqliteSnapshot : public Snapshot {
  public:
-  SqliteSnapshot(std::shared_ptr<SqliteMapReader> reader, std::shared_ptr<const sqlite::Head> head)
+  SqliteSnapshot(std::shared_ptr<SqliteMapReader> reader,
+                 std::shared_ptr<const RevisionRecord> head)
       : reader_(std::move(reader)), head_(std::move(head)) {}
 
   const MapSpec& spec() const override { return reader_->spec(); }
@@ -23,13 +24,11 @@ class SqliteSnapshot : public Snapshot {
   const std::string& incarnation() const override { return reader_->incarnation(); }
 
   absl::StatusOr<std::vector<Layer>> Layers() const override;
-  absl::StatusOr<Layer> FindLayer(std::string_view name) const override;
   absl::StatusOr<std::vector<SemanticLabel>> Labels() const override;
   absl::StatusOr<MapStats> Stats() const override;
 
   absl::StatusOr<Node> GetNode(NodeId id) const override;
-  absl::StatusOr<NodeId> ResolveNode(std::string_view id_or_name) const override;
-  absl::StatusOr<NodeId> ResolveAgent(std::string_view id_or_name) const override;
+  absl::StatusOr<std::vector<NodeId>> NodesNamed(const std::string& name) const override;
   absl::Status ScanNodes(const NodeFilter& filter, NodeId after, const StopCheck& stop,
                          const std::function<bool(const Node&)>& visit) const override;
   absl::Status ScanEdges(const EdgeFilter& filter, const std::optional<EdgeKey>& after,
@@ -76,7 +75,6 @@ class SqliteSnapshot : public Snapshot {
   absl::StatusOr<Asset> ReadAsset(const Sha256& sha256) const override;
 
  private:
-  absl::StatusOr<std::vector<NodeId>> IdsNamed(const std::string& name) const;
   absl::StatusOr<std::vector<NodeId>> ChildrenOf(NodeId parent) const;
   /// Nodes whose boxes touch, at the head; nullopt when a later revision exists.
   absl::StatusOr<std::optional<std::vector<NodeId>>> IdsTouching(const Box3d& box_map) const;
@@ -96,15 +94,7 @@ class SqliteSnapshot : public Snapshot {
   absl::StatusOr<std::vector<StoredPose>> VisiblePoses(const Track& track, size_t segment) const;
 
   std::shared_ptr<SqliteMapReader> reader_;
-  std::shared_ptr<const sqlite::Head> head_;
+  std::shared_ptr<const RevisionRecord> head_;
 };
-
-/// An open stay ends where the track does; a closed one is as it is.
-Stay ClipToTrack(Stay stay, const TrackInfo& track);
-
-/// Visits of one track's stretch to a box. `positions` ascend in time; neighbours further apart
-/// than `gap_ns_max` are not joined. Appends to `visits`, joining with the last where they touch.
-void CollectVisits(NodeId agent, const std::vector<TimedPosition>& positions, TimeNs gap_ns_max,
-                   const Box3d& box, TimeNs from_ns, TimeNs to_ns, std::vector<BoxVisit>* visits);
 
 }  // namespace dsg::sqlite

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "absl/strings/str_cat.h"
-#include "schema/codec/proto_convert.h"
 #include "schema/store/sqlite/graph_rows.h"
 #include "schema/store/sqlite/node_cells.h"
 #include "schema/store/sqlite/snapshot.h"
@@ -34,47 +32,10 @@ constexpr char kEdgesTo[] =
     " WHERE target = ?1 AND rev_from <= ?2 AND rev_to > ?2";
 
 bool EdgeMatches(const EdgeFilter& filter, const std::optional<EdgeKey>& after, const Edge& edge) {
-  return (filter.relation.empty() || edge.relation == filter.relation) &&
-         (filter.source.empty() || edge.source == filter.source) &&
-         (filter.target.empty() || edge.target == filter.target) &&
-         (!filter.at_ns.has_value() || edge.valid.Contains(*filter.at_ns)) &&
-         (!after.has_value() || *after < edge.key());
+  return filter.Matches(edge) && (!after.has_value() || *after < edge.key());
 }
 
 }  // namespace
-
-absl::StatusOr<Node> NodeFromRow(const Query& query, const std::string& map) {
-  Node node;
-  const NodeId id = IdOf(query.Int(0));
-  if (query.Int(4) != RowChecksum({query.Int(0), query.Int(1), query.Int(2)}, query.Blob(3)) ||
-      !DecodeNodePayload(query.Blob(3), &node)) {
-    return CorruptRow(map, "node", ToString(id));
-  }
-  node.id = id;
-  node.revision = query.Int(1);
-  node.layer = static_cast<LayerId>(query.Int(2));
-  return node;
-}
-
-absl::StatusOr<Edge> EdgeFromRow(const Query& query, std::string_view relation,
-                                 const std::string& map) {
-  Edge edge;
-  edge.source = IdOf(query.Int(0));
-  edge.target = IdOf(query.Int(2));
-  edge.revision = query.Int(3);
-  edge.weight = query.Real(4);
-  edge.relation = relation;
-  const std::string_view payload = query.Blob(5);
-  const auto checksum = RowChecksum32(
-      {query.Int(0), query.Int(1), query.Int(2), query.Int(3), BitsOf(edge.weight)}, payload);
-  // Nearly all edges have nothing to decode.
-  if (checksum != query.Int(6) || (!payload.empty() && !DecodeEdgePayload(payload, &edge))) {
-    return CorruptRow(
-        map, "edge",
-        absl::StrCat(ToString(edge.source), " ", edge.relation, " ", ToString(edge.target)));
-  }
-  return edge;
-}
 
 absl::StatusOr<Node> SqliteSnapshot::GetNode(NodeId id) const {
   DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
@@ -86,13 +47,10 @@ absl::StatusOr<Node> SqliteSnapshot::GetNode(NodeId id) const {
   const bool found = query.Bind(KeyOf(id), revision()).Next();
   DSG_RETURN_IF_ERROR(query.status());
   if (found) return NodeFromRow(query, spec().name);
-  return MakeError(Reason::kNodeUnknown,
-                   absl::StrCat("node ", ToString(id), " is unknown in map \"", spec().name,
-                                "\" at revision ", revision()),
-                   {{"map", spec().name}, {"node", ToString(id)}});
+  return UnknownNode(id);
 }
 
-absl::StatusOr<std::vector<NodeId>> SqliteSnapshot::IdsNamed(const std::string& name) const {
+absl::StatusOr<std::vector<NodeId>> SqliteSnapshot::NodesNamed(const std::string& name) const {
   std::vector<NodeId> ids;
   if (name.empty()) return ids;
   DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
@@ -106,54 +64,6 @@ absl::StatusOr<std::vector<NodeId>> SqliteSnapshot::IdsNamed(const std::string& 
   DSG_RETURN_IF_ERROR(query.status());
   std::sort(ids.begin(), ids.end());
   return ids;
-}
-
-absl::StatusOr<NodeId> SqliteSnapshot::ResolveNode(std::string_view id_or_name) const {
-  const auto id = ParseNodeId(id_or_name);
-  if (id.ok()) {
-    const auto node = GetNode(*id);
-    if (node.ok()) return *id;
-    if (!absl::IsNotFound(node.status())) return node.status();
-  }
-  DSG_ASSIGN_OR_RETURN(const auto ids, IdsNamed(std::string(id_or_name)));
-  if (!ids.empty()) return ids.front();
-  return MakeError(Reason::kNodeUnknown,
-                   absl::StrCat("no node of map \"", spec().name, "\" has the id or name \"",
-                                std::string(id_or_name), "\" at revision ", revision()),
-                   {{"map", spec().name}, {"node", std::string(id_or_name)}});
-}
-
-absl::StatusOr<NodeId> SqliteSnapshot::ResolveAgent(std::string_view id_or_name) const {
-  const auto is_agent = [this](NodeId id) -> absl::StatusOr<bool> {
-    const auto track = reader_->GetTrack(id, revision());
-    if (absl::IsNotFound(track.status())) return false;
-    DSG_RETURN_IF_ERROR(track.status());
-    return true;
-  };
-  if (const auto id = ParseNodeId(id_or_name); id.ok()) {
-    DSG_ASSIGN_OR_RETURN(const bool found, is_agent(*id));
-    if (found) return *id;
-  }
-  DSG_ASSIGN_OR_RETURN(const auto named, IdsNamed(std::string(id_or_name)));
-  std::vector<NodeId> agents;
-  for (const NodeId id : named) {
-    DSG_ASSIGN_OR_RETURN(const bool found, is_agent(id));
-    if (found) agents.push_back(id);
-  }
-  if (agents.size() == 1) return agents.front();
-  if (agents.size() > 1) {
-    return MakeError(Reason::kFieldInvalid,
-                     absl::StrCat("several agents of map \"", spec().name, "\" are named \"",
-                                  std::string(id_or_name), "\", ", ToString(agents[0]), " and ",
-                                  ToString(agents[1]), " among them; ask by id"),
-                     {{"map", spec().name}, {"agent", std::string(id_or_name)}});
-  }
-  return MakeError(
-      Reason::kAgentUnknown,
-      absl::StrCat("no human or robot of map \"", spec().name, "\" has the id or name \"",
-                   std::string(id_or_name), "\" at revision ", revision(),
-                   "; `dsg ls --layer agents` lists the known ones"),
-      {{"map", spec().name}, {"agent", std::string(id_or_name)}});
 }
 
 absl::StatusOr<std::vector<NodeId>> SqliteSnapshot::ChildrenOf(NodeId parent) const {
@@ -193,7 +103,7 @@ absl::StatusOr<std::optional<std::vector<NodeId>>> SqliteSnapshot::Candidates(
     return Ids(std::move(ids));
   }
   if (!filter.name.empty()) {
-    DSG_ASSIGN_OR_RETURN(auto ids, IdsNamed(filter.name));
+    DSG_ASSIGN_OR_RETURN(auto ids, NodesNamed(filter.name));
     return Ids(std::move(ids));
   }
   // Agents have no box in the index, so a box narrows only where a layer leaves them out.

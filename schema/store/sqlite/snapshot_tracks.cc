@@ -6,30 +6,12 @@
 #include <memory>
 
 #include "absl/strings/str_cat.h"
+#include "schema/store/sqlite/graph_rows.h"
 #include "schema/store/sqlite/snapshot.h"
+#include "schema/store/track_rules.h"
 
 namespace dsg::sqlite {
 namespace {
-
-absl::Status OutsideTrack(const TrackInfo& track, TimeNs at_ns) {
-  const std::string who = track.name.empty()
-                              ? ToString(track.agent)
-                              : absl::StrCat(track.name, " (", ToString(track.agent), ")");
-  if (track.pose_count == 0) {
-    return MakeError(Reason::kTimeOutsideTrack,
-                     absl::StrCat("agent ", who, " has no poses at this revision"),
-                     {{"agent", ToString(track.agent)}});
-  }
-  return MakeError(
-      Reason::kTimeOutsideTrack,
-      absl::StrCat("time ", at_ns, " ns is ", at_ns < track.first_ns ? "before" : "after",
-                   " the track of agent ", who, ", which goes from ", track.first_ns, " to ",
-                   track.last_ns, " ns; ask for a time between these"),
-      {{"agent", ToString(track.agent)},
-       {"at_ns", absl::StrCat(at_ns)},
-       {"first_ns", absl::StrCat(track.first_ns)},
-       {"last_ns", absl::StrCat(track.last_ns)}});
-}
 
 absl::Status CorruptSegment(const std::string& map, const SegmentRef& segment) {
   return CorruptRow(map, "trajectory_segment", absl::StrCat(segment.id));
@@ -37,7 +19,7 @@ absl::Status CorruptSegment(const std::string& map, const SegmentRef& segment) {
 
 // Rows that may touch [?3, ?4) as of ?5. The lengths are written as the partial indices have them,
 // and SQLite computes them without overflow.
-#define DSG_STAY_COLUMNS "SELECT agent, place, room, enter_ns, exit_ns, rev_from, checksum FROM "
+#define DSG_STAY_COLUMNS "SELECT agent, enter_ns, exit_ns, place, room, rev_from, checksum FROM "
 #define DSG_SHORT_STAYS(column)                                        \
   " WHERE " column                                                     \
   " = ?1 AND enter_ns >= ?2 AND enter_ns < ?4 AND exit_ns - enter_ns " \
@@ -52,19 +34,7 @@ absl::Status CorruptSegment(const std::string& map, const SegmentRef& segment) {
   " AND +rev_from <= ?5 AND +rev_to > ?5 UNION ALL "                                              \
   DSG_STAY_COLUMNS "stay_history" DSG_LONG_STAYS(column) " AND +rev_from <= ?5 AND +rev_to > ?5"
 
-bool ByEnter(const Stay& a, const Stay& b) {
-  return a.enter_ns != b.enter_ns ? a.enter_ns < b.enter_ns : a.agent < b.agent;
-}
-
 }  // namespace
-
-Stay ClipToTrack(Stay stay, const TrackInfo& track) {
-  // One nanosecond past the last pose, so that the half-open stay holds it.
-  if (stay.exit_ns == kTimeMax && track.pose_count > 0) {
-    stay.exit_ns = std::max(stay.enter_ns, track.last_ns) + 1;
-  }
-  return stay;
-}
 
 // Kept by the reader: over the years there are far more agents than in the minute asked about.
 absl::StatusOr<std::shared_ptr<const std::vector<NodeId>>> SqliteSnapshot::AgentIds(
@@ -100,9 +70,7 @@ absl::StatusOr<TrackInfo> SqliteSnapshot::GetTrack(NodeId agent) const {
 absl::StatusOr<LocatedPose> SqliteSnapshot::Locate(NodeId agent, TimeNs at_ns) const {
   DSG_ASSIGN_OR_RETURN(const auto track, reader_->GetTrack(agent, revision()));
   const TrackInfo& info = track->info;
-  if (info.pose_count == 0 || at_ns < info.first_ns || at_ns > info.last_ns) {
-    return OutsideTrack(info, at_ns);
-  }
+  DSG_RETURN_IF_ERROR(CheckInTrack(info, at_ns));
   const auto at = static_cast<size_t>(track->FindSegment(at_ns));
   const SegmentRef& segment = track->segments[at];
   DSG_ASSIGN_OR_RETURN(const auto reader, reader_->GetSegment(segment, revision()));
@@ -112,14 +80,10 @@ absl::StatusOr<LocatedPose> SqliteSnapshot::Locate(NodeId agent, TimeNs at_ns) c
   if (!reader->FindBracket(at_ns, &index, &before, &after) || index < 0) {
     return CorruptSegment(spec().name, segment);
   }
-  LocatedPose located;
-  const TrajectoryCodec codec = spec().codec;
-  TimedPose from = FromStored(before, codec);
-  located.before_ns = located.after_ns = from.time_ns;
-  located.flags = from.flags;
-  located.covariance = from.covariance;
-  located.map_T_agent = from.map_T_agent;
-  if (from.time_ns == at_ns) return located;
+  // Only the pose of that very instant needs no other.
+  if (before.time_ns == at_ns) {
+    return LocateBetween(before, before, at_ns, info.gap_ns_max, spec().codec);
+  }
   // Past the segment's last pose, visible or stored, the next one begins the next segment.
   if (before.time_ns >= segment.t1 || index + 1 >= reader->count()) {
     if (at + 1 >= track->segments.size()) return CorruptSegment(spec().name, segment);
@@ -130,19 +94,7 @@ absl::StatusOr<LocatedPose> SqliteSnapshot::Locate(NodeId agent, TimeNs at_ns) c
       return CorruptSegment(spec().name, next);
     }
   }
-  located.after_ns = after.time_ns;
-  if (located.after_ns - located.before_ns > info.gap_ns_max) {
-    located.quality = PoseQuality::kInGap;
-    return located;
-  }
-  const TimedPose to = FromStored(after, codec);
-  const double fraction =
-      static_cast<double>(at_ns - from.time_ns) / static_cast<double>(to.time_ns - from.time_ns);
-  located.quality = PoseQuality::kInterpolated;
-  located.map_T_agent = Interpolate(from.map_T_agent, to.map_T_agent, fraction);
-  located.flags = from.flags | to.flags;
-  if (fraction > 0.5) located.covariance = to.covariance;
-  return located;
+  return LocateBetween(before, after, at_ns, info.gap_ns_max, spec().codec);
 }
 
 absl::StatusOr<std::vector<StoredPose>> SqliteSnapshot::VisiblePoses(const Track& track,
@@ -190,8 +142,8 @@ absl::StatusOr<std::map<NodeId, std::vector<int64_t>>> SqliteSnapshot::SegmentsT
               " UNION ALL SELECT id FROM trajectory_history"
               "  WHERE rev_to > ?9 AND +rev_from <= ?9)"
               " JOIN track ON slot = id >> 42");
-  query.Bind(box.x0, box.x1, box.y0, box.y1, box.z0, box.z1, ClampToTenths(from_ns, spec()),
-             ClampToTenths(to_ns, spec()) + 1, revision());
+  query.Bind(box.x0, box.x1, box.y0, box.y1, box.z0, box.z1, ToTenthsFloor(from_ns, spec()),
+             ToTenthsFloor(to_ns, spec()) + 1, revision());
   std::map<NodeId, std::vector<int64_t>> segments_of;
   while (query.Next()) segments_of[IdOf(query.Int(0))].push_back(query.Int(1));
   DSG_RETURN_IF_ERROR(query.status());
@@ -254,9 +206,7 @@ absl::StatusOr<std::vector<BoxVisit>> SqliteSnapshot::VisitsToBox(const Box3d& b
       CollectVisits(agent, positions, track.info.gap_ns_max, box_map, from_ns, to_ns, &visits);
     }
   }
-  std::sort(visits.begin(), visits.end(), [](const BoxVisit& a, const BoxVisit& b) {
-    return a.enter_ns != b.enter_ns ? a.enter_ns < b.enter_ns : a.agent < b.agent;
-  });
+  SortVisits(&visits);
   return visits;
 }
 
@@ -318,15 +268,8 @@ absl::StatusOr<std::vector<Stay>> SqliteSnapshot::StaysInNode(NodeId room_or_pla
       Query query(*lease, sql);
       query.Bind(KeyOf(room_or_place), enter_min, from_ns, to_ns, revision());
       while (query.Next()) {
-        const auto checksum = RowChecksum32(
-            {query.Int(0), query.Int(3), query.Int(4), query.Int(1), query.Int(2), query.Int(5)},
-            "");
-        const NodeId agent = IdOf(query.Int(0));
-        if (checksum != query.Int(6)) {
-          return CorruptRow(spec().name, "stay", absl::StrCat(ToString(agent), " ", query.Int(3)));
-        }
-        stays.push_back(
-            {agent, IdOf(query.Int(1)), IdOf(query.Int(2)), query.Int(3), query.Int(4)});
+        DSG_ASSIGN_OR_RETURN(const StayRow row, StayRowOf(query, spec().name));
+        stays.push_back(row.stay());
       }
       DSG_RETURN_IF_ERROR(query.status());
     }
@@ -341,7 +284,7 @@ absl::StatusOr<std::vector<Stay>> SqliteSnapshot::StaysInNode(NodeId room_or_pla
     }
     if (stay.exit_ns > from_ns) touching.push_back(stay);
   }
-  std::sort(touching.begin(), touching.end(), ByEnter);
+  SortStays(&touching);
   return touching;
 }
 

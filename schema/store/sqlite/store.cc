@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// GraphStore over a folder of SQLite files.
+#include "schema/store/sqlite/store.h"
+
 #include <algorithm>
 #include <filesystem>
 #include <mutex>
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/log.h"
-#include "schema/store/graph_store.h"
 #include "schema/store/sqlite/copy.h"
 #include "schema/store/sqlite/map_reader.h"
 #include "schema/store/sqlite/upgrade.h"
 
-namespace dsg {
+namespace dsg::sqlite {
 namespace {
 
 namespace fs = std::filesystem;
@@ -24,54 +24,62 @@ class SqliteStore : public GraphStore {
   const std::string& folder() const override { return folder_; }
 
   absl::StatusOr<std::vector<MapSpec>> ListMaps() override {
+    DSG_ASSIGN_OR_RETURN(const std::vector<std::string> names, MapNames());
     std::vector<MapSpec> maps;
-    std::error_code error;
-    for (fs::directory_iterator it(folder_, error), end; !error && it != end; it.increment(error)) {
-      const std::string name = it->path().filename().string();
-      std::error_code missing;
-      if (!IsValidMapName(name) || !fs::exists(sqlite::DatabasePath(folder_, name), missing)) {
-        continue;
-      }
+    for (const std::string& name : names) {
       // Those of older formats too: opening one says how to upgrade it.
-      const auto db = sqlite::OpenAnyFormat(folder_, name, sqlite::Database::Mode::kRead);
+      const auto db = OpenAnyFormat(folder_, name, Database::Mode::kRead);
       if (!db.ok()) {
         // One map that this program cannot read must not hide the others.
         Log(LogLevel::kWarning, "map-skipped",
             {{"map", name}, {"error", std::string(db.status().message())}});
         continue;
       }
-      auto spec = sqlite::ReadMapSpec(**db);
+      auto spec = ReadMapSpec(**db);
       if (spec.ok()) maps.push_back(*std::move(spec));
     }
-    if (error) {
-      return absl::InternalError(
-          absl::StrCat("cannot list store ", folder_, ": ", error.message()));
-    }
-    std::sort(maps.begin(), maps.end(),
-              [](const MapSpec& a, const MapSpec& b) { return a.name < b.name; });
     return maps;
   }
 
-  absl::Status CreateMap(const MapSpec& spec) override {
-    return sqlite::CreateMapFile(folder_, spec);
+  absl::StatusOr<std::vector<std::string>> MapNames() override {
+    std::vector<std::string> names;
+    std::error_code error;
+    for (fs::directory_iterator it(folder_, error), end; !error && it != end; it.increment(error)) {
+      std::string name = it->path().filename().string();
+      std::error_code missing;
+      if (IsValidMapName(name) && fs::exists(DatabasePath(folder_, name), missing)) {
+        names.push_back(std::move(name));
+      }
+    }
+    if (error) {
+      return absl::UnavailableError(
+          absl::StrCat("cannot list store ", folder_, ": ", error.message()));
+    }
+    std::sort(names.begin(), names.end());
+    return names;
   }
 
+  int64_t ReusedBytesOnDisk(const std::string& map) const override {
+    return LogBytesOnDisk(folder_, map);
+  }
+
+  absl::Status CreateMap(const MapSpec& spec) override { return CreateMapFile(folder_, spec); }
+
   absl::StatusOr<std::shared_ptr<MapReader>> OpenMap(const std::string& name) override {
-    DSG_ASSIGN_OR_RETURN(auto reader,
-                         sqlite::SqliteMapReader::Open(folder_, name, options_.cache_bytes));
+    DSG_ASSIGN_OR_RETURN(auto reader, SqliteMapReader::Open(folder_, name, options_.cache_bytes));
     return std::shared_ptr<MapReader>(std::move(reader));
   }
 
   absl::StatusOr<UpgradeReport> UpgradeMap(const std::string& name) override {
-    return sqlite::UpgradeMapFile(folder_, name, options_.program);
+    return UpgradeMapFile(folder_, name, options_.program);
   }
 
   absl::Status InstallMap(const std::string& name, const std::string& file, bool replace) override {
-    return sqlite::InstallMapFile(folder_, name, file, replace, options_.program);
+    return InstallMapFile(folder_, name, file, replace, options_.program);
   }
 
   absl::StatusOr<std::unique_ptr<MapWriter>> OpenWriter(const std::string& name) override {
-    DSG_ASSIGN_OR_RETURN(auto writer, sqlite::SqliteWriter::Open(folder_, name, options_));
+    DSG_ASSIGN_OR_RETURN(auto writer, SqliteWriter::Open(folder_, name, options_));
     return std::unique_ptr<MapWriter>(std::move(writer));
   }
 
@@ -82,8 +90,8 @@ class SqliteStore : public GraphStore {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<GraphStore>> GraphStore::Open(const std::string& folder,
-                                                             const StoreOptions& options) {
+absl::StatusOr<std::unique_ptr<GraphStore>> OpenSqliteStore(const std::string& folder,
+                                                            const StoreOptions& options) {
   std::error_code error;
   if (options.create) fs::create_directories(folder, error);
   if (!fs::is_directory(folder, error)) {
@@ -97,8 +105,8 @@ absl::StatusOr<std::unique_ptr<GraphStore>> GraphStore::Open(const std::string& 
   if (error) {
     return absl::InternalError(absl::StrCat("cannot resolve ", folder, ": ", error.message()));
   }
-  DSG_RETURN_IF_ERROR(sqlite::CheckFileSystem(canonical));
+  DSG_RETURN_IF_ERROR(CheckFileSystem(canonical));
   return std::unique_ptr<GraphStore>(std::make_unique<SqliteStore>(canonical, options));
 }
 
-}  // namespace dsg
+}  // namespace dsg::sqlite

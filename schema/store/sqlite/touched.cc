@@ -7,7 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "schema/store/sqlite/map_reader.h"
 #include "schema/store/sqlite/rows.h"
-#include "schema/store/sqlite/touched_keys.h"
+#include "schema/store/touched_keys.h"
 
 namespace dsg::sqlite {
 namespace {
@@ -77,7 +77,7 @@ absl::StatusOr<Touched> SqliteMapReader::TouchedBetween(Revision after, Revision
   Touched touched;
   if (after >= until) return touched;
   DSG_ASSIGN_OR_RETURN(Lease lease, LeaseAt(until));
-  DSG_RETURN_IF_ERROR(CheckReadable(*lease, after, generation_));
+  DSG_RETURN_IF_ERROR(CheckStillReadable(*lease, after, generation_));
   TouchedKeys keys;
   DSG_RETURN_IF_ERROR(ReadLists(*lease, after, until, stop, &keys));
   keys.Normalize();

@@ -4,40 +4,26 @@
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
-#include "schema/codec/proto_convert.h"
+#include "schema/store/sqlite/graph_rows.h"
 #include "schema/store/sqlite/rows.h"
+#include "schema/store/track_rules.h"
 
 namespace dsg::sqlite {
 namespace {
 
-absl::Status UnknownAgent(const std::string& map, NodeId agent) {
-  return MakeError(Reason::kAgentUnknown,
-                   absl::StrCat("agent ", ToString(agent), " is unknown in map \"", map,
-                                "\"; `dsg ls --layer agents` lists the known ones"),
-                   {{"map", map}, {"agent", ToString(agent)}});
-}
-
-absl::Status LoadInfo(Database& db, Revision revision, NodeId agent, Track* track) {
+absl::Status LoadInfo(Database& db, const MapSpec& spec, Revision revision, NodeId agent,
+                      Track* track) {
   Query query(db,
-              "SELECT rev_from, layer, payload, checksum FROM node"
+              "SELECT key, rev_from, layer, payload, checksum FROM node"
               " WHERE key = ?1 AND rev_from <= ?2"
-              " UNION ALL SELECT rev_from, layer, payload, checksum FROM node_history"
+              " UNION ALL SELECT key, rev_from, layer, payload, checksum FROM node_history"
               " WHERE key = ?1 AND rev_from <= ?2 AND rev_to > ?2");
   const bool found = query.Bind(KeyOf(agent), revision).Next();
   DSG_RETURN_IF_ERROR(query.status());
-  Node node;
-  if (found) {
-    const auto checksum = RowChecksum({KeyOf(agent), query.Int(0), query.Int(1)}, query.Blob(2));
-    if (checksum != query.Int(3) || !DecodeNodePayload(query.Blob(2), &node)) {
-      return CorruptRow(db.map_name(), "node", ToString(agent));
-    }
-  }
-  if (!found || !IsAgentKind(node.kind)) return UnknownAgent(db.map_name(), agent);
-  track->info.name = node.name;
-  track->info.kind = node.kind;
-  if (node.agent.has_value() && node.agent->gap_ns_max > 0) {
-    track->info.gap_ns_max = node.agent->gap_ns_max;
-  }
+  if (!found) return UnknownAgent(spec.name, agent);
+  DSG_ASSIGN_OR_RETURN(const Node node, NodeFromRow(query, spec.name));
+  if (!IsAgentKind(node.kind)) return UnknownAgent(spec.name, agent);
+  track->info = TrackInfoOf(node, spec);
   return absl::OkStatus();
 }
 
@@ -85,19 +71,14 @@ absl::Status LoadSegments(Database& db, Revision revision, int64_t slot, Track* 
 
 absl::Status LoadStays(Database& db, Revision revision, NodeId agent, Track* track) {
   Query query(db,
-              "SELECT enter_ns, exit_ns, place, room, rev_from, checksum FROM stay"
+              "SELECT agent, enter_ns, exit_ns, place, room, rev_from, checksum FROM stay"
               " WHERE agent = ?1 AND rev_from <= ?2"
-              " UNION ALL SELECT enter_ns, exit_ns, place, room, rev_from, checksum"
+              " UNION ALL SELECT agent, enter_ns, exit_ns, place, room, rev_from, checksum"
               " FROM stay_history WHERE agent = ?1 AND rev_from <= ?2 AND rev_to > ?2");
   query.Bind(KeyOf(agent), revision);
   while (query.Next()) {
-    const auto checksum = RowChecksum32(
-        {KeyOf(agent), query.Int(0), query.Int(1), query.Int(2), query.Int(3), query.Int(4)}, "");
-    if (checksum != query.Int(5)) {
-      return CorruptRow(db.map_name(), "stay", absl::StrCat(ToString(agent), " ", query.Int(0)));
-    }
-    track->stays.push_back(
-        {agent, IdOf(query.Int(2)), IdOf(query.Int(3)), query.Int(0), query.Int(1)});
+    DSG_ASSIGN_OR_RETURN(const StayRow row, StayRowOf(query, db.map_name()));
+    track->stays.push_back(row.stay());
   }
   DSG_RETURN_IF_ERROR(query.status());
   std::sort(track->stays.begin(), track->stays.end(),
@@ -109,8 +90,9 @@ absl::Status LoadStays(Database& db, Revision revision, NodeId agent, Track* tra
   return absl::OkStatus();
 }
 
-absl::Status LoadAll(Database& db, NodeId agent, Revision revision, Track* track) {
-  DSG_RETURN_IF_ERROR(LoadInfo(db, revision, agent, track));
+absl::Status LoadAll(Database& db, const MapSpec& spec, NodeId agent, Revision revision,
+                     Track* track) {
+  DSG_RETURN_IF_ERROR(LoadInfo(db, spec, revision, agent, track));
   DSG_ASSIGN_OR_RETURN(const int64_t slot, FindSlot(db, agent));
   if (slot != 0) DSG_RETURN_IF_ERROR(LoadSegments(db, revision, slot, track));
   return LoadStays(db, revision, agent, track);
@@ -128,9 +110,7 @@ int Track::FindSegment(TimeNs t_ns) const {
 absl::StatusOr<std::shared_ptr<const Track>> LoadTrack(Database& db, const MapSpec& spec,
                                                        NodeId agent, Revision revision) {
   auto track = std::make_shared<Track>();
-  track->info.agent = agent;
-  track->info.gap_ns_max = spec.gap_ns_max;
-  DSG_RETURN_IF_ERROR(LoadAll(db, agent, revision, track.get()));
+  DSG_RETURN_IF_ERROR(LoadAll(db, spec, agent, revision, track.get()));
   return std::shared_ptr<const Track>(std::move(track));
 }
 

@@ -74,7 +74,7 @@ absl::Status TrackWriter::ExtendBox(int64_t id, const StoredPose& before, Commit
   Box3d point;
   Grow(before, commit->spec.codec, &point);
   const IntBox box = ToMillimetres(point);
-  DSG_ASSIGN_OR_RETURN(const int64_t from_tenths, ToTenthsFloor(before.time_ns, commit->spec));
+  const int64_t from_tenths = ToTenthsFloor(before.time_ns, commit->spec);
   return Query(commit->db,
                "UPDATE segment_box SET x0 = min(x0, ?2), x1 = max(x1, ?3), y0 = min(y0, ?4),"
                " y1 = max(y1, ?5), z0 = min(z0, ?6), z1 = max(z1, ?7), t0 = min(t0, ?8)"
@@ -122,8 +122,7 @@ absl::Status TrackWriter::Correct(const TrajectoryCorrection& correction, Commit
   std::erase_if(poses, [&](const StoredPose& pose) {
     const bool replaced = correction.from_ns <= pose.time_ns && pose.time_ns < correction.to_ns;
     if (replaced) {
-      commit->head.content.Remove(PoseIdentity(correction.agent, pose, codec, &scratch));
-      --commit->head.info.pose_count;
+      commit->head.sums.RemovePose(PoseIdentity(correction.agent, pose, codec, &scratch));
       is_at_end |=
           pose.time_ns == commit->head.first_pose_ns || pose.time_ns == commit->head.last_pose_ns;
     }
@@ -131,8 +130,7 @@ absl::Status TrackWriter::Correct(const TrajectoryCorrection& correction, Commit
   });
   for (const TimedPose& pose : correction.poses) {
     poses.push_back(ToStored(pose, codec));
-    commit->head.content.Add(PoseIdentity(correction.agent, poses.back(), codec, &scratch));
-    ++commit->head.info.pose_count;
+    commit->head.sums.AddPose(PoseIdentity(correction.agent, poses.back(), codec, &scratch));
     is_at_end |=
         !commit->head.first_pose_ns.has_value() || pose.time_ns < *commit->head.first_pose_ns;
   }

@@ -131,8 +131,8 @@ absl::Status TrackWriter::WriteSegment(Tail* tail, CommitContext* commit) {
   const auto count = static_cast<int64_t>(tail->encoder.poses().size());
   const int64_t checksum =
       RowChecksum({tail->segment_id, tail->segment_rev_from, t0, t1, count}, payload);
-  DSG_ASSIGN_OR_RETURN(const int64_t from_tenths, ToTenthsFloor(tail->box_t0, commit->spec));
-  DSG_ASSIGN_OR_RETURN(const int64_t to_tenths, ToTenthsCeil(t1, commit->spec));
+  const int64_t from_tenths = ToTenthsFloor(tail->box_t0, commit->spec);
+  const int64_t to_tenths = ToTenthsCeil(t1, commit->spec);
   if (tail->segment_stored) {
     DSG_RETURN_IF_ERROR(Query(commit->db,
                               "UPDATE trajectory_segment SET t1 = ?2, pose_count = ?3,"
@@ -174,14 +174,13 @@ absl::Status TrackWriter::Append(const TrajectoryAppend& append, CommitContext* 
   std::string scratch;
   for (const TimedPose& pose : append.poses) {
     const StoredPose stored = ToStored(pose, commit->spec.codec);
-    commit->head.content.Add(PoseIdentity(append.agent, stored, commit->spec.codec, &scratch));
+    commit->head.sums.AddPose(PoseIdentity(append.agent, stored, commit->spec.codec, &scratch));
     DSG_RETURN_IF_ERROR(AppendPose(stored, tail, commit));
   }
   DSG_RETURN_IF_ERROR(WriteSegment(tail, commit));
-  commit->head.info.pose_count += static_cast<int64_t>(append.poses.size());
   const TimeNs first_ns = append.poses.front().time_ns;
   const TimeNs last_ns = append.poses.back().time_ns;
-  Head& head = commit->head;
+  RevisionRecord& head = commit->head;
   head.first_pose_ns = std::min(head.first_pose_ns.value_or(first_ns), first_ns);
   head.last_pose_ns = std::max(head.last_pose_ns.value_or(last_ns), last_ns);
   return WriteMark(*tail, commit);

@@ -6,11 +6,12 @@
 #include <map>
 
 #include "absl/strings/str_cat.h"
+#include "schema/store/sqlite/commit.h"
 #include "schema/store/sqlite/graph_rows.h"
 #include "schema/store/sqlite/map_file.h"
 #include "schema/store/sqlite/node_cells.h"
 #include "schema/store/sqlite/rows.h"
-#include "schema/store/sqlite/touched_keys.h"
+#include "schema/store/touched_keys.h"
 
 namespace dsg::sqlite {
 

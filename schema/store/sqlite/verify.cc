@@ -71,8 +71,11 @@ class Verifier {
           absl::StrCat("table ", std::string(table), ": ", std::string(query.status().message())));
     }
   }
-  void Count(const std::string& identity, Revision from, Revision to) {
-    changes_[from].Add(identity);
+  // What a row counts for, sound or not: a damaged one shows in the digest too.
+  template <typename Row>
+  void Count(const Row& row, Revision to) {
+    const std::string identity = IdentityOf(row);
+    changes_[row.rev_from].Add(identity);
     if (to != kRevisionMax) changes_[to].Remove(identity);
     ++report_.row_count;
   }
@@ -102,14 +105,15 @@ class Verifier {
                 " FROM node UNION ALL"
                 " SELECT key, rev_from, layer, payload, checksum, name, rev_to FROM node_history");
     while (query.Next()) {
-      const std::initializer_list<int64_t> columns = {query.Int(0), query.Int(1), query.Int(2)};
+      const NodeRow row{IdOf(query.Int(0)), query.Int(1), static_cast<LayerId>(query.Int(2)),
+                        query.Blob(3)};
       Node node;
-      const bool sound = query.Int(4) == RowChecksum(columns, query.Blob(3)) &&
-                         DecodeNodePayload(query.Blob(3), &node) && node.name == query.Text(5);
-      node.id = IdOf(query.Int(0));
+      const bool sound = query.Int(4) == ChecksumOf(row) && DecodeNodePayload(row.payload, &node) &&
+                         node.name == query.Text(5);
+      node.id = row.id;
       if (!sound) BadRow("node", ToString(node.id));
       if (sound && query.Int(6) == kRevisionMax && !IsAgentKind(node.kind)) CheckCell(node);
-      Count(RowIdentity('N', columns, query.Blob(3)), query.Int(1), query.Int(6));
+      Count(row, query.Int(6));
     }
     Finish(query, "node");
     Query cells(db_, "SELECT count(*) FROM node_cell");
@@ -136,13 +140,12 @@ class Verifier {
                 " SELECT source, relation, target, rev_from, weight, payload, checksum, rev_to"
                 " FROM edge_history");
     while (query.Next()) {
-      const std::initializer_list<int64_t> columns = {query.Int(0), query.Int(1), query.Int(2),
-                                                      query.Int(3), BitsOf(query.Real(4))};
-      if (query.Int(6) != RowChecksum32(columns, query.Blob(5))) {
-        BadRow("edge",
-               absl::StrCat(ToString(IdOf(query.Int(0))), " ", ToString(IdOf(query.Int(2)))));
+      const EdgeRow row{IdOf(query.Int(0)), query.Int(1),  IdOf(query.Int(2)),
+                        query.Int(3),       query.Real(4), query.Blob(5)};
+      if (query.Int(6) != ChecksumOf(row)) {
+        BadRow("edge", absl::StrCat(ToString(row.source), " ", ToString(row.target)));
       }
-      Count(RowIdentity('E', columns, query.Blob(5)), query.Int(3), query.Int(7));
+      Count(row, query.Int(7));
     }
     Finish(query, "edge");
     Query ends(db_,
@@ -163,12 +166,12 @@ class Verifier {
                 " SELECT agent, enter_ns, exit_ns, place, room, rev_from, checksum, rev_to"
                 " FROM stay_history");
     while (query.Next()) {
-      const std::initializer_list<int64_t> columns = {query.Int(0), query.Int(1), query.Int(2),
-                                                      query.Int(3), query.Int(4), query.Int(5)};
-      if (query.Int(6) != RowChecksum32(columns, "")) {
-        BadRow("stay", absl::StrCat(ToString(IdOf(query.Int(0))), " ", query.Int(1)));
+      const StayRow row{IdOf(query.Int(0)), query.Int(1),       query.Int(2),
+                        IdOf(query.Int(3)), IdOf(query.Int(4)), query.Int(5)};
+      if (query.Int(6) != ChecksumOf(row)) {
+        BadRow("stay", absl::StrCat(ToString(row.agent), " ", row.enter_ns));
       }
-      Count(RowIdentity('S', columns, ""), query.Int(5), query.Int(7));
+      Count(row, query.Int(7));
     }
     Finish(query, "stay");
   }
@@ -236,43 +239,46 @@ class Verifier {
   }
 
   void CheckBatches() {
-    for (const auto& [sql, table, name] :
-         {std::make_tuple("SELECT agent, rev_from, t0, t1, checksum, payload, 9223372036854775807"
-                          " FROM factor_segment UNION ALL"
-                          " SELECT agent, rev_from, t0, t1, checksum, payload, rev_to"
-                          " FROM factor_history",
-                          'F', "factor_segment"),
-          std::make_tuple("SELECT agent, rev_from, t0, t1, checksum, payload, 9223372036854775807"
-                          " FROM shape_segment UNION ALL"
-                          " SELECT agent, rev_from, t0, t1, checksum, payload, rev_to"
-                          " FROM shape_history",
-                          'H', "shape_segment")}) {
-      Query query(db_, sql);
-      while (query.Next()) {
-        const std::initializer_list<int64_t> columns = {query.Int(0), query.Int(1), query.Int(2),
-                                                        query.Int(3)};
-        const bool is_sound =
-            query.Int(4) == RowChecksum(columns, query.Blob(5)) &&
-            (table != 'H' || HoldsTimes(query.Blob(5), query.Int(2), query.Int(3)));
-        if (!is_sound) BadRow(name, ToString(IdOf(query.Int(0))));
-        Count(RowIdentity(table, columns, query.Blob(5)), query.Int(1), query.Int(6));
-      }
-      Finish(query, name);
+    CheckBatchesOf<FactorRow>(
+        "SELECT agent, rev_from, t0, t1, payload, checksum, 9223372036854775807"
+        " FROM factor_segment UNION ALL"
+        " SELECT agent, rev_from, t0, t1, payload, checksum, rev_to FROM factor_history",
+        "factor_segment");
+    CheckBatchesOf<ShapeRow>(
+        "SELECT agent, rev_from, t0, t1, payload, checksum, 9223372036854775807"
+        " FROM shape_segment UNION ALL"
+        " SELECT agent, rev_from, t0, t1, payload, checksum, rev_to FROM shape_history",
+        "shape_segment");
+  }
+
+  template <typename Row>
+  void CheckBatchesOf(const char* sql, const char* table) {
+    Query query(db_, sql);
+    while (query.Next()) {
+      const Row row{{IdOf(query.Int(0)), query.Int(1), query.Int(2), query.Int(3), query.Blob(4)}};
+      const bool is_sound =
+          query.Int(5) == ChecksumOf(row) &&
+          (Row::kLetter != ShapeRow::kLetter || HoldsTimes(row.payload, row.t0, row.t1));
+      if (!is_sound) BadRow(table, ToString(row.agent));
+      Count(row, query.Int(6));
     }
+    Finish(query, table);
   }
 
   void CheckMesh() {
     Query query(db_,
-                "SELECT x, y, z, rev_from, checksum, payload, 9223372036854775807 FROM mesh_block"
-                " UNION ALL SELECT x, y, z, rev_from, checksum, payload, rev_to"
+                "SELECT x, y, z, rev_from, payload, checksum, 9223372036854775807 FROM mesh_block"
+                " UNION ALL SELECT x, y, z, rev_from, payload, checksum, rev_to"
                 " FROM mesh_block_history");
     while (query.Next()) {
-      const std::initializer_list<int64_t> columns = {query.Int(0), query.Int(1), query.Int(2),
-                                                      query.Int(3)};
-      if (query.Int(4) != RowChecksum(columns, query.Blob(5))) {
-        BadRow("mesh_block", absl::StrCat(query.Int(0), ",", query.Int(1), ",", query.Int(2)));
+      const MeshRow row{{static_cast<int32_t>(query.Int(0)), static_cast<int32_t>(query.Int(1)),
+                         static_cast<int32_t>(query.Int(2))},
+                        query.Int(3),
+                        query.Blob(4)};
+      if (query.Int(5) != ChecksumOf(row)) {
+        BadRow("mesh_block", absl::StrCat(row.index.x, ",", row.index.y, ",", row.index.z));
       }
-      Count(RowIdentity('M', columns, query.Blob(5)), query.Int(3), query.Int(6));
+      Count(row, query.Int(6));
     }
     Finish(query, "mesh_block");
   }
@@ -286,13 +292,13 @@ class Verifier {
         BadRow("asset", absl::StrCat(query.Int(1)));
       }
       if (query.Int(1) == 0) {
-        Count(RowIdentity('A', {query.Int(2)}, query.Blob(0)), query.Int(2), kRevisionMax);
+        Count(AssetRow{query.Int(2), query.Blob(0)}, kRevisionMax);
       }
     }
     Finish(query, "asset");
     Query dropped(db_, "SELECT rev_from, sha256 FROM dropped_asset");
     while (dropped.Next()) {
-      Count(RowIdentity('A', {dropped.Int(0)}, dropped.Blob(1)), dropped.Int(0), kRevisionMax);
+      Count(AssetRow{dropped.Int(0), dropped.Blob(1)}, kRevisionMax);
     }
     Finish(dropped, "dropped_asset");
   }
@@ -300,13 +306,14 @@ class Verifier {
   void CheckLayers() {
     Query layers(db_, "SELECT id, rank, rev_from, name FROM layer WHERE rev_from > 0");
     while (layers.Next()) {
-      Count(RowIdentity('L', {layers.Int(0), layers.Int(1), layers.Int(2)}, layers.Text(3)),
-            layers.Int(2), kRevisionMax);
+      Count(LayerRow{static_cast<LayerId>(layers.Int(0)), static_cast<int32_t>(layers.Int(1)),
+                     layers.Int(2), layers.Text(3)},
+            kRevisionMax);
     }
     Finish(layers, "layer");
     Query labels(db_, "SELECT id, rev_from, name FROM label");
     while (labels.Next()) {
-      Count(RowIdentity('l', {labels.Int(0), labels.Int(1)}, labels.Text(2)), labels.Int(1),
+      Count(LabelRow{static_cast<int32_t>(labels.Int(0)), labels.Int(1), labels.Text(2)},
             kRevisionMax);
     }
     Finish(labels, "label");
@@ -316,17 +323,7 @@ class Verifier {
     const auto pending = GetPendingErasure(db_);
     if (!pending.ok()) return Problem(std::string(pending.status().message()));
     if (!pending->has_value()) return;
-    const PendingErasure& left = **pending;
-    const int64_t count =
-        left.node_count + left.edge_count + left.mesh_block_count + left.span_count;
-    report_.notes.push_back(
-        count == 0 ? "an erasure has not come to its end, and what it took out may still be in the "
-                     "file; the next `dsg prune --erase`, whatever it names, does the rest"
-                   : absl::StrCat("an erasure has not come to its end, and names ", left.node_count,
-                                  " nodes, ", left.edge_count, " edges, ", left.mesh_block_count,
-                                  " mesh blocks and ", left.span_count,
-                                  " stretches of tracks; the same `dsg prune --erase` again does "
-                                  "the rest"));
+    report_.notes.push_back(PendingErasureNote(**pending));
   }
 
   void CheckHistory() {

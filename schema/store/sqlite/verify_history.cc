@@ -2,14 +2,15 @@
 #include "schema/store/sqlite/verify_history.h"
 
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <unordered_set>
 
 #include "absl/strings/str_cat.h"
-#include "schema/store/sqlite/readable.h"
+#include "schema/store/sqlite/readable_rows.h"
 #include "schema/store/sqlite/rows.h"
-#include "schema/store/sqlite/touched_keys.h"
 #include "schema/store/sqlite/writer.h"
+#include "schema/store/touched_keys.h"
 
 namespace dsg::sqlite {
 namespace {
@@ -17,7 +18,7 @@ namespace {
 using KeySet = std::unordered_set<std::string>;
 
 std::string TouchedIdentity(char table, int64_t a, int64_t b, int64_t c) {
-  return RowIdentity(table, {a, b, c}, "");
+  return RowIdentity(table, std::array{a, b, c}, "");
 }
 
 KeySet SetOf(const TouchedKeys& keys) {
@@ -91,16 +92,16 @@ class HistoryChecker {
   }
 
   // Rows that began in revisions since compacted are still shown by later ones, and count there.
-  void CheckRevision(const Head& head, const Sha256& parent) {
+  void CheckRevision(const RevisionRecord& head, const Sha256& parent) {
     const Revision revision = head.info.revision;
     const auto end = changes_.upper_bound(revision);
     for (auto change = changes_.begin(); change != end; ++change) content_ += change->second;
     changes_.erase(changes_.begin(), end);
-    if (!(content_ == head.content)) {
+    if (!(content_ == head.sums.content)) {
       problem_(
           absl::StrCat("revision ", revision, ": its rows do not add up to its content digest"));
       // Report each break once: go on from what the revision says.
-      content_ = head.content;
+      content_ = head.sums.content;
     }
     if (DigestOf(parent, head) != head.info.digest) {
       problem_(absl::StrCat("revision ", revision, ": its digest does not follow"));

@@ -5,17 +5,14 @@
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/time.h"
-#include "schema/codec/delta_checksum.h"
-#include "schema/codec/patch.h"
-#include "schema/model/delta_check.h"
 #include "schema/store/sqlite/delta_lookup.h"
 #include "schema/store/sqlite/erasure.h"
 #include "schema/store/sqlite/page_checksum.h"
 #include "schema/store/sqlite/pending_erasure.h"
-#include "schema/store/sqlite/readable.h"
-#include "schema/store/sqlite/sessions.h"
+#include "schema/store/sqlite/readable_rows.h"
 #include "schema/store/sqlite/space.h"
-#include "schema/store/sqlite/tags.h"
+#include "schema/store/sqlite/tag_rows.h"
+#include "schema/store/tags.h"
 
 namespace dsg::sqlite {
 namespace {
@@ -31,17 +28,6 @@ int CheckpointPages(int64_t quota_bytes) {
   if (quota_bytes <= 0) return kCheckpointPages;
   return static_cast<int>(
       std::clamp(quota_bytes / kPageBytes / 4, kCheckpointPagesMin, kCheckpointPages));
-}
-
-absl::Status CheckForgetting(const GraphDelta& delta) {
-  const bool brings_nothing = delta.layers.empty() && delta.labels.empty() && delta.nodes.empty() &&
-                              delta.node_patches.empty() && delta.edge_patches.empty() &&
-                              delta.edges.empty() && delta.appends.empty() &&
-                              delta.factors.empty() && delta.shapes.empty() && delta.assets.empty();
-  if (!delta.is_forgetting || brings_nothing) return absl::OkStatus();
-  return MakeError(Reason::kDeltaInvalid,
-                   "delta refused: it says that it forgets, and brings layers, labels, nodes, "
-                   "edges, poses, factors, shapes or assets; commit these apart");
 }
 
 }  // namespace
@@ -84,20 +70,6 @@ absl::StatusOr<SessionState> SqliteWriter::GetSession(const std::string& session
   return ReadSession(*db_, session_id);
 }
 
-// A missing number means that a delta was lost on its way: what follows may build on it.
-absl::Status SqliteWriter::CheckSequence(const GraphDelta& delta) {
-  DSG_ASSIGN_OR_RETURN(const SessionState session, ReadSession(*db_, delta.session_id));
-  if (delta.sequence <= session.last_sequence + 1) return absl::OkStatus();
-  return MakeError(
-      Reason::kSequenceGap,
-      absl::StrCat("session ", delta.session_id, " of map \"", map_, "\" is at sequence ",
-                   session.last_sequence, ", so the next is ", session.last_sequence + 1, ", not ",
-                   delta.sequence, "; send the missing deltas first"),
-      {{"map", map_},
-       {"session_id", delta.session_id},
-       {"last_sequence", absl::StrCat(session.last_sequence)}});
-}
-
 namespace {
 
 const absl::Status& StatusOf(const absl::Status& status) { return status; }
@@ -130,32 +102,17 @@ absl::StatusOr<CommitResult> SqliteWriter::Commit(GraphDelta delta) {
 
 absl::StatusOr<CommitResult> SqliteWriter::CommitOnce(GraphDelta delta) {
   if (db_ == nullptr) DSG_RETURN_IF_ERROR(Reopen());
-  const DeltaIdentity identity{delta.session_id, delta.sequence, DeltaChecksum(delta)};
-  DSG_ASSIGN_OR_RETURN(const auto replay, FindCommitted(*db_, identity));
-  if (replay.has_value()) return *replay;
-  DSG_RETURN_IF_ERROR(CheckSequence(delta));
-  if (delta.parent_revision.has_value() && *delta.parent_revision != head_.info.revision) {
-    return MakeError(Reason::kParentRevisionStale,
-                     absl::StrCat("map \"", map_, "\" is at revision ", head_.info.revision,
-                                  ", not at the delta's parent ", *delta.parent_revision,
-                                  "; read the head again and rebuild the delta"),
-                     {{"map", map_}, {"head", absl::StrCat(head_.info.revision)}});
-  }
-  if (!delta.map.empty() && delta.map != map_) {
-    return MakeError(Reason::kDeltaInvalid,
-                     absl::StrCat("delta refused: it is for map \"", delta.map,
-                                  "\" and was sent to map \"", map_, "\""),
-                     {{"map", map_}});
-  }
+  const DeltaIdentity identity = IdentityOfDelta(delta);
   // Also around the checks: each question outside of a transaction would lock the file anew.
   DSG_RETURN_IF_ERROR(db_->Execute("BEGIN IMMEDIATE"));
-  CommitContext commit{*db_, spec_, head_, identity.checksum};
-  absl::Status applied = CheckAndApply(&delta, &commit);
-  if (!applied.ok()) {
+  CommitContext commit{*db_, spec_, NextRecord(head_, delta, WallClockNs()), identity.checksum};
+  const auto replay = PrepareAndApply(identity, &delta, &commit);
+  if (!replay.ok() || replay->has_value()) {
     // SQLite may have rolled back already; then this one has nothing to do.
     db_->Execute("ROLLBACK").IgnoreError();
     tracks_.Forget();
-    return applied;
+    DSG_RETURN_IF_ERROR(replay.status());
+    return **replay;
   }
   const absl::Status committed = db_->Execute("COMMIT");
   if (!committed.ok()) return Settle(identity, committed);
@@ -166,25 +123,15 @@ absl::StatusOr<CommitResult> SqliteWriter::CommitOnce(GraphDelta delta) {
   return CommitResult{head_.info.revision, false};
 }
 
-absl::Status SqliteWriter::CheckAndApply(GraphDelta* delta, CommitContext* commit) {
-  DSG_RETURN_IF_ERROR(MakeWhole(delta));
-  Coalesce(delta);
-  DSG_RETURN_IF_ERROR(CheckDelta(*delta, DeltaLookup(db_.get(), &spec_)));
+absl::StatusOr<std::optional<CommitResult>> SqliteWriter::PrepareAndApply(
+    const DeltaIdentity& identity, GraphDelta* delta, CommitContext* commit) {
+  DSG_ASSIGN_OR_RETURN(auto replay, PrepareCommit(DeltaLookup(db_.get(), &spec_), identity,
+                                                  head_.info.revision, delta));
+  if (replay.has_value()) return replay;
   DSG_ASSIGN_OR_RETURN(const int64_t pages_before, db_->QueryInt("PRAGMA page_count"));
   DSG_RETURN_IF_ERROR(Apply(*delta, commit));
-  return CheckQuota(*delta, pages_before);
-}
-
-// Patches change what is believed now.
-absl::Status SqliteWriter::MakeWhole(GraphDelta* delta) {
-  if (delta->node_patches.empty() && delta->edge_patches.empty()) return absl::OkStatus();
-  const DeltaLookup graph(db_.get(), &spec_);
-  DSG_ASSIGN_OR_RETURN(std::vector<Layer> layers, graph.ReadLayers());
-  const PatchSource source = {
-      [&](NodeId id) { return graph.ReadNode(id); },
-      [&](const EdgeKey& key) { return graph.ReadEdge(key); },
-  };
-  return ApplyPatches(LayerTable(std::move(layers)), source, delta);
+  DSG_RETURN_IF_ERROR(CheckQuota(*delta, pages_before));
+  return std::optional<CommitResult>();
 }
 
 absl::Status SqliteWriter::CheckQuota(const GraphDelta& delta, int64_t pages_before) {
@@ -200,40 +147,58 @@ absl::Status SqliteWriter::CheckQuota(const GraphDelta& delta, int64_t pages_bef
                    {{"map", map_}, {"quota_bytes", absl::StrCat(quota_bytes_)}});
 }
 
+namespace {
+
+// The parts of a commit; see ApplyInOrder.
+class CommitParts : public GraphRowsWriter {
+ public:
+  CommitParts(TrackWriter* tracks, CommitContext* commit)
+      : GraphRowsWriter(commit), tracks_(*tracks), commit_(*commit) {}
+
+  absl::Status WriteAssets(const std::vector<Asset>& assets) {
+    return sqlite::WriteAssets(assets, &commit_);
+  }
+  absl::Status EndAgent(NodeId id) {
+    DSG_RETURN_IF_ERROR(tracks_.End(id, &commit_));
+    DSG_RETURN_IF_ERROR(EndStaysOf(id, &commit_));
+    DSG_RETURN_IF_ERROR(EndFactors({id}));
+    return EndShapes({id});
+  }
+  absl::Status Correct(const TrajectoryCorrection& item) { return tracks_.Correct(item, &commit_); }
+  absl::Status Append(const TrajectoryAppend& item) { return tracks_.Append(item, &commit_); }
+  absl::Status EndFactors(const TrackSpan& span) { return sqlite::EndFactors(span, &commit_); }
+  absl::Status WriteFactors(const std::vector<FactorAppend>& factors) {
+    return sqlite::WriteFactors(factors, &commit_);
+  }
+  absl::Status EndShapes(const TrackSpan& span) { return sqlite::EndShapes(span, &commit_); }
+  absl::Status WriteShapes(const std::vector<ShapeAppend>& shapes) {
+    return sqlite::WriteShapes(shapes, &commit_);
+  }
+  absl::Status EndStays(const std::vector<StayKey>& keys) {
+    return sqlite::EndStays(keys, &commit_);
+  }
+  absl::Status WriteStays(const std::vector<Stay>& stays) {
+    return sqlite::WriteStays(stays, &commit_);
+  }
+  absl::Status EndMeshBlocks(const std::vector<BlockIndex>& indices) {
+    return sqlite::EndMeshBlocks(indices, &commit_);
+  }
+  absl::Status WriteMeshBlocks(const std::vector<MeshBlock>& blocks) {
+    return sqlite::WriteMeshBlocks(blocks, &commit_);
+  }
+
+ private:
+  TrackWriter& tracks_;
+  CommitContext& commit_;
+};
+
+}  // namespace
+
 absl::Status SqliteWriter::Apply(const GraphDelta& delta, CommitContext* commit) {
-  RevisionInfo& info = commit->head.info;
-  const Sha256 parent = info.digest;
-  ++info.revision;
-  info.committed_ns = WallClockNs();
-  info.author = delta.author;
-  info.message = delta.message;
-  info.session_id = delta.session_id;
-  info.sequence = delta.sequence;
-  info.config_digest = delta.config_digest;
-  DSG_RETURN_IF_ERROR(WriteAssets(delta.assets, commit));
-  for (const Retirement& item : delta.retirements) {
-    if (item.valid_to_ns.has_value()) continue;
-    DSG_RETURN_IF_ERROR(tracks_.End(item.id, commit));
-    DSG_RETURN_IF_ERROR(EndStaysOf(item.id, commit));
-    DSG_RETURN_IF_ERROR(EndFactors({item.id}, commit));
-    DSG_RETURN_IF_ERROR(EndShapes({item.id}, commit));
-  }
-  DSG_RETURN_IF_ERROR(GraphRowsWriter(commit).Apply(delta));
-  for (const auto& correction : delta.corrections) {
-    DSG_RETURN_IF_ERROR(tracks_.Correct(correction, commit));
-  }
-  for (const auto& append : delta.appends) DSG_RETURN_IF_ERROR(tracks_.Append(append, commit));
-  for (const TrackSpan& span : delta.factor_removals) {
-    DSG_RETURN_IF_ERROR(EndFactors(span, commit));
-  }
-  DSG_RETURN_IF_ERROR(WriteFactors(delta.factors, commit));
-  for (const TrackSpan& span : delta.shape_removals) DSG_RETURN_IF_ERROR(EndShapes(span, commit));
-  DSG_RETURN_IF_ERROR(WriteShapes(delta.shapes, commit));
-  DSG_RETURN_IF_ERROR(EndStays(delta.stay_removals, commit));
-  DSG_RETURN_IF_ERROR(WriteStays(delta.stays, commit));
-  DSG_RETURN_IF_ERROR(WriteMesh(delta, commit));
+  CommitParts parts(&tracks_, commit);
+  DSG_RETURN_IF_ERROR(ApplyInOrder(delta, &parts));
   DSG_RETURN_IF_ERROR(InsertTouched(commit));
-  info.digest = DigestOf(parent, commit->head);
+  Seal(head_.info.digest, &commit->head);
   return InsertRevision(*commit);
 }
 
@@ -251,17 +216,14 @@ absl::StatusOr<CommitResult> SqliteWriter::Settle(const DeltaIdentity& delta,
                      reopened.message(), "); send it again when the disk is back"),
         {{"map", map_}, {"sequence", absl::StrCat(delta.sequence)}});
   }
-  DSG_ASSIGN_OR_RETURN(const auto replay, FindCommitted(*db_, delta));
+  DSG_ASSIGN_OR_RETURN(const auto replay, FindReplay(DeltaLookup(db_.get(), &spec_), delta));
   if (replay.has_value()) return CommitResult{replay->revision, false};
   return failure;
 }
 
 absl::Status SqliteWriter::CheckRevision(Revision revision) {
-  const Revision newest = head_.info.revision;
   DSG_ASSIGN_OR_RETURN(const Readable readable, LoadReadable(*db_));
-  if (revision < 0 || revision > newest) return FutureError(map_, revision, newest, readable);
-  if (readable.Holds(revision)) return absl::OkStatus();
-  return CompactedError(map_, revision, newest, readable);
+  return CheckReadable(map_, revision, head_.info.revision, readable);
 }
 
 absl::StatusOr<Tag> SqliteWriter::SetTag(const std::string& name, Revision revision,
@@ -310,7 +272,7 @@ absl::Status SqliteWriter::NoteErasure(const Erasure& erasure, Revision planned_
 
 absl::Status SqliteWriter::NoteErasureOnce(const Erasure& erasure, Revision planned_at) {
   if (db_ == nullptr) DSG_RETURN_IF_ERROR(Reopen());
-  DSG_ASSIGN_OR_RETURN(const EraseList list, ListOf(*db_, erasure));
+  DSG_ASSIGN_OR_RETURN(const EraseList list, ListIn(*db_, erasure));
   if (list.size() == 0) return absl::OkStatus();
   return InTransaction(*db_, [&]() -> absl::Status {
     DSG_RETURN_IF_ERROR(db_->Execute("UPDATE map SET is_erasing = 1 WHERE NOT is_erasing"));

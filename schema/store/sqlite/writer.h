@@ -40,16 +40,17 @@ class SqliteWriter : public MapWriter {
   absl::Status Reopen();
   /// Unless the revision can be read.
   absl::Status CheckRevision(Revision revision);
-  absl::Status CheckSequence(const GraphDelta& delta);
   absl::StatusOr<CommitResult> CommitOnce(GraphDelta delta);
-  /// Within a transaction, which is to be rolled back after an error.
-  absl::Status CheckAndApply(GraphDelta* delta, CommitContext* commit);
+  /// Within a transaction, which is to be rolled back after an error, and after a replay, which is
+  /// returned.
+  absl::StatusOr<std::optional<CommitResult>> PrepareAndApply(const DeltaIdentity& identity,
+                                                              GraphDelta* delta,
+                                                              CommitContext* commit);
   absl::Status Apply(const GraphDelta& delta, CommitContext* commit);
   /// Of a commit that has been applied and began with so many pages.
   absl::Status CheckQuota(const GraphDelta& delta, int64_t pages_before);
   absl::StatusOr<CompactReport> CompactOnce(Revision keep_from, const StopCheck& stop,
                                             const Progress& progress);
-  absl::Status MakeWhole(GraphDelta* delta);
   absl::Status NoteErasureOnce(const Erasure& erasure, Revision planned_at);
   absl::StatusOr<EraseReport> EraseOnce(const Erasure& erasure, const StopCheck& stop,
                                         const Progress& progress);
@@ -69,24 +70,22 @@ class SqliteWriter : public MapWriter {
   /// Null after a COMMIT whose outcome is unknown, until reopened.
   std::unique_ptr<Database> db_;
   MapSpec spec_;
-  Head head_;
+  RevisionRecord head_;
   TrackWriter tracks_;
   /// One that was stopped.
   std::optional<Compaction> compaction_;
 };
 
 /// The head as stored; revision 0 for an empty map.
-absl::StatusOr<Head> LoadHead(Database& db);
+absl::StatusOr<RevisionRecord> LoadHead(Database& db);
 absl::Status InsertRevision(const CommitContext& commit);
 /// Writes digest, content, counts and times of a record that is there.
-absl::Status UpdateRevision(Database& db, const Head& head);
+absl::Status UpdateRevision(Database& db, const RevisionRecord& head);
 /// Columns of the revision table in the order that HeadFromRow reads.
 #define DSG_REVISION_COLUMNS                                                        \
   "revision, digest, content, committed_ns, author, message, session_id, sequence," \
   " config_digest, node_count, edge_count, agent_count, pose_count, stay_count,"    \
   " mesh_block_count, first_pose_ns, last_pose_ns, layer_counts"
-absl::StatusOr<Head> HeadFromRow(const Query& query, const std::string& map);
-/// What a revision's digest must be.
-Sha256 DigestOf(const Sha256& parent, const Head& head);
+absl::StatusOr<RevisionRecord> HeadFromRow(const Query& query, const std::string& map);
 
 }  // namespace dsg::sqlite

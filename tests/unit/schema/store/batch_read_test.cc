@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Many nodes and edges at once, by their keys or all of them: as if asked for one by one.
 #include <gtest/gtest.h>
-#include <sqlite3.h>
 
 #include <algorithm>
 #include <atomic>
@@ -85,7 +84,8 @@ std::vector<Key> SomeKeys(const std::map<Key, Value>& known, const std::vector<K
 
 class Stream {
  public:
-  Stream() : seed_(RecordSeed()), map_(Spec(TrajectoryCodec::kQuantized)) {
+  explicit Stream(const std::string& backend)
+      : seed_(RecordSeed()), map_(backend, Spec(TrajectoryCodec::kQuantized)) {
     while (sequence_ < kRevisions) Grow();
   }
   void Grow() { OrDie(map_.writer().Commit(DeltaOfStream({seed_}, ++sequence_))); }
@@ -98,8 +98,15 @@ class Stream {
   int64_t sequence_ = 0;
 };
 
-TEST(FindNodes, GivesWhatGetNodeGivesAtEveryRevision) {
-  Stream stream;
+class FindNodes : public OnEveryBackend {};
+class FindEdges : public OnEveryBackend {};
+class ReadAll : public OnEveryBackend {};
+DSG_ON_EVERY_BACKEND(FindNodes);
+DSG_ON_EVERY_BACKEND(FindEdges);
+DSG_ON_EVERY_BACKEND(ReadAll);
+
+TEST_P(FindNodes, GivesWhatGetNodeGivesAtEveryRevision) {
+  Stream stream(GetParam());
   std::mt19937_64 random(stream.seed());
   const auto known = ScannedNodes(*stream.map().Latest());
   ASSERT_GT(known.size(), 20U);
@@ -116,8 +123,8 @@ TEST(FindNodes, GivesWhatGetNodeGivesAtEveryRevision) {
   }
 }
 
-TEST(FindEdges, GivesWhatFindEdgeGivesAtEveryRevision) {
-  Stream stream;
+TEST_P(FindEdges, GivesWhatFindEdgeGivesAtEveryRevision) {
+  Stream stream(GetParam());
   std::mt19937_64 random(stream.seed());
   const auto known = ScannedEdges(*stream.map().Latest());
   ASSERT_GT(known.size(), 20U);
@@ -135,8 +142,8 @@ TEST(FindEdges, GivesWhatFindEdgeGivesAtEveryRevision) {
   }
 }
 
-TEST(FindNodes, AsksWhetherToStopBetweenBatches) {
-  TestMap map;
+TEST_P(FindNodes, AsksWhetherToStopBetweenBatches) {
+  TestMap map(GetParam());
   map.MustCommit(DeltaOfNodes({MakeObject(1, "cup", BoxOf(0, 0, 0, 1, 1, 1))}));
   const std::vector<NodeId> ids(2'000, NodeId('O', 1));
   int asked_count = 0;
@@ -149,37 +156,8 @@ TEST(FindNodes, AsksWhetherToStopBetweenBatches) {
   EXPECT_TRUE(OrDie(map.Latest()->FindNodes({}, {})).empty());
 }
 
-// Through the layer that seals pages, so that only the row is wrong.
-void Damage(TestMap* map, const char* sql) {
-  map->Close();
-  sqlite3* db = nullptr;
-  ASSERT_EQ(sqlite3_open_v2(map->database_path().c_str(), &db, SQLITE_OPEN_READWRITE, "dsg-sealed"),
-            SQLITE_OK);
-  EXPECT_EQ(sqlite3_exec(db, sql, nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(db);
-  sqlite3_close(db);
-  map->Reopen();
-}
-
-TEST(BatchReads, FindRowsThatAreNotWhatWasWritten) {
-  TestMap map;
-  const Node cup = MakeObject(1, "cup", BoxOf(0, 0, 0, 1, 1, 1));
-  const Node table = MakeObject(2, "table", BoxOf(0, 0, 0, 2, 2, 1));
-  GraphDelta delta = DeltaOfNodes({cup, table});
-  delta.edges.push_back(MakeEdge(cup.id, "ON", table.id));
-  map.MustCommit(std::move(delta));
-  ASSERT_TRUE(map.Latest()->FindNodes({cup.id}, {}).ok());
-  Damage(&map, "UPDATE node SET checksum = checksum + 1; UPDATE edge SET weight = 7.0");
-  const auto ignore = [](const auto&) {};
-  EXPECT_TRUE(absl::IsDataLoss(map.Latest()->FindNodes({cup.id}, {}).status()));
-  EXPECT_TRUE(absl::IsDataLoss(map.Latest()->FindEdges({{cup.id, "ON", table.id}}, {}).status()));
-  EXPECT_TRUE(absl::IsDataLoss(map.Latest()->ReadAllNodes({}, ignore)));
-  EXPECT_TRUE(absl::IsDataLoss(map.Latest()->ReadAllEdges({}, ignore)));
-  // What is sound next to it can be read, and the connection is of use again.
-  EXPECT_EQ(OrDie(map.Latest()->FindNodes({NodeId('O', 3)}, {})).front(), std::nullopt);
-}
-
-TEST(ReadAll, ShowsWhatAScanShowsAtEveryRevision) {
-  Stream stream;
+TEST_P(ReadAll, ShowsWhatAScanShowsAtEveryRevision) {
+  Stream stream(GetParam());
   for (Revision revision = 0; revision <= kRevisions; ++revision) {
     const auto snapshot = stream.map().At(revision);
     EXPECT_EQ(AllNodes(*snapshot), ScannedNodes(*snapshot)) << revision;
@@ -188,9 +166,9 @@ TEST(ReadAll, ShowsWhatAScanShowsAtEveryRevision) {
 }
 
 // More rows than a batch, so that commits fall between the statements of one reading.
-TEST(ReadAll, ShowsWhatAScanShowsWhileAWriterReplacesTheRows) {
+TEST_P(ReadAll, ShowsWhatAScanShowsWhileAWriterReplacesTheRows) {
   constexpr int kNodes = 5'000;
-  TestMap map;
+  TestMap map(GetParam());
   const auto delta_of_round = [](int round) {
     GraphDelta delta;
     for (int i = 0; i < kNodes; ++i) {

@@ -18,8 +18,17 @@ GraphDelta ObjectDelta(const std::string& session, int64_t sequence, uint64_t in
   return delta;
 }
 
-TEST(Commit, BeginsAtRevisionOneOfAnEmptyMap) {
-  TestMap map;
+class Commit : public OnEveryBackend {};
+class FailedCommit : public OnEveryBackend {};
+class Revisions : public OnEveryBackend {};
+class HeldSnapshot : public OnEveryBackend {};
+DSG_ON_EVERY_BACKEND(Commit);
+DSG_ON_EVERY_BACKEND(FailedCommit);
+DSG_ON_EVERY_BACKEND(Revisions);
+DSG_ON_EVERY_BACKEND(HeldSnapshot);
+
+TEST_P(Commit, BeginsAtRevisionOneOfAnEmptyMap) {
+  TestMap map(GetParam());
   EXPECT_EQ(OrDie(map.reader().Head()).revision, 0);
   EXPECT_EQ(map.Latest()->revision(), 0);
   EXPECT_EQ(OrDie(map.Latest()->Layers()).size(), DefaultLayers().size());
@@ -27,8 +36,8 @@ TEST(Commit, BeginsAtRevisionOneOfAnEmptyMap) {
   EXPECT_EQ(OrDie(map.reader().Head()).revision, 1);
 }
 
-TEST(Commit, RefusesADeltaThatIsForAnotherMap) {
-  TestMap map;
+TEST_P(Commit, RefusesADeltaThatIsForAnotherMap) {
+  TestMap map(GetParam());
   GraphDelta delta = ObjectDelta("s", 1, 1);
   delta.map = "elsewhere";
   const auto result = map.writer().Commit(delta);
@@ -37,8 +46,8 @@ TEST(Commit, RefusesADeltaThatIsForAnotherMap) {
   EXPECT_EQ(OrDie(map.reader().Head()).revision, 0);
 }
 
-TEST(Commit, RecordsWhoAndWhatAndHowMany) {
-  TestMap map;
+TEST_P(Commit, RecordsWhoAndWhatAndHowMany) {
+  TestMap map(GetParam());
   GraphDelta delta = DeltaOfStream({}, 1);
   delta.author = "a robot";
   delta.message = "first look";
@@ -60,8 +69,8 @@ TEST(Commit, RecordsWhoAndWhatAndHowMany) {
   EXPECT_EQ(info.stay_count, 10);
 }
 
-TEST(Commit, OfASequenceAgainIsAnsweredAndChangesNothing) {
-  TestMap map;
+TEST_P(Commit, OfASequenceAgainIsAnsweredAndChangesNothing) {
+  TestMap map(GetParam());
   ASSERT_EQ(OrDie(map.writer().Commit(ObjectDelta("s", 1, 1))).revision, 1);
   ASSERT_EQ(OrDie(map.writer().Commit(ObjectDelta("s", 2, 2))).revision, 2);
   const Sha256 digest = OrDie(map.reader().Head()).digest;
@@ -72,8 +81,8 @@ TEST(Commit, OfASequenceAgainIsAnsweredAndChangesNothing) {
   EXPECT_EQ(OrDie(map.reader().Head()).digest, digest);
 }
 
-TEST(Commit, OfASequenceAgainWithOtherContentIsRefused) {
-  TestMap map;
+TEST_P(Commit, OfASequenceAgainWithOtherContentIsRefused) {
+  TestMap map(GetParam());
   ASSERT_EQ(OrDie(map.writer().Commit(ObjectDelta("s", 1, 1))).revision, 1);
   ASSERT_EQ(OrDie(map.writer().Commit(ObjectDelta("s", 2, 2))).revision, 2);
   const Sha256 digest = OrDie(map.reader().Head()).digest;
@@ -93,8 +102,8 @@ TEST(Commit, OfASequenceAgainWithOtherContentIsRefused) {
   EXPECT_TRUE(OrDie(map.writer().Commit(conditional)).replayed);
 }
 
-TEST(Commit, KnowsTheContentOfASessionsLastDeltaAfterCompaction) {
-  TestMap map;
+TEST_P(Commit, KnowsTheContentOfASessionsLastDeltaAfterCompaction) {
+  TestMap map(GetParam());
   ASSERT_TRUE(map.writer().Commit(ObjectDelta("s", 1, 1)).ok());
   ASSERT_TRUE(map.writer().Commit(ObjectDelta("s", 2, 2)).ok());
   ASSERT_TRUE(map.writer().Commit(ObjectDelta("t", 1, 3)).ok());
@@ -106,8 +115,8 @@ TEST(Commit, KnowsTheContentOfASessionsLastDeltaAfterCompaction) {
   EXPECT_TRUE(OrDie(map.writer().Commit(ObjectDelta("s", 1, 77))).replayed);
 }
 
-TEST(Commit, OfASequenceAgainIsAnsweredByALaterWriter) {
-  TestMap map;
+TEST_P(Commit, OfASequenceAgainIsAnsweredByALaterWriter) {
+  TestMap map(GetParam());
   ASSERT_TRUE(map.writer().Commit(ObjectDelta("s", 1, 1)).ok());
   map.Close();
   map.Reopen();
@@ -116,29 +125,29 @@ TEST(Commit, OfASequenceAgainIsAnsweredByALaterWriter) {
   EXPECT_EQ(again.revision, 1);
 }
 
-TEST(Commit, OfTheSameSequenceInAnotherSessionIsAnotherCommit) {
-  TestMap map;
+TEST_P(Commit, OfTheSameSequenceInAnotherSessionIsAnotherCommit) {
+  TestMap map(GetParam());
   ASSERT_EQ(OrDie(map.writer().Commit(ObjectDelta("s", 1, 1))).revision, 1);
   const CommitResult other = OrDie(map.writer().Commit(ObjectDelta("t", 1, 2)));
   EXPECT_FALSE(other.replayed);
   EXPECT_EQ(other.revision, 2);
 }
 
-TEST(Commit, RefusesAGapInTheSequenceOfASession) {
-  TestMap map;
+TEST_P(Commit, RefusesAGapInTheSequenceOfASession) {
+  TestMap map(GetParam());
   ASSERT_TRUE(map.writer().Commit(ObjectDelta("s", 1, 1)).ok());
   const auto skipped = map.writer().Commit(ObjectDelta("s", 3, 3));
   EXPECT_EQ(ReasonOf(skipped.status()), Reason::kSequenceGap) << skipped.status();
   EXPECT_EQ(OrDie(map.reader().Head()).revision, 1);
 }
 
-TEST(Commit, RefusesASessionThatDoesNotBeginAtOne) {
-  TestMap map;
+TEST_P(Commit, RefusesASessionThatDoesNotBeginAtOne) {
+  TestMap map(GetParam());
   EXPECT_EQ(ReasonOf(map.writer().Commit(ObjectDelta("s", 2, 1)).status()), Reason::kSequenceGap);
 }
 
-TEST(Commit, TellsHowFarASessionGot) {
-  TestMap map;
+TEST_P(Commit, TellsHowFarASessionGot) {
+  TestMap map(GetParam());
   EXPECT_EQ(OrDie(map.writer().GetSession("s")).last_sequence, 0);
   ASSERT_TRUE(map.writer().Commit(ObjectDelta("s", 1, 1)).ok());
   ASSERT_TRUE(map.writer().Commit(ObjectDelta("t", 1, 2)).ok());
@@ -151,8 +160,8 @@ TEST(Commit, TellsHowFarASessionGot) {
   EXPECT_EQ(OrDie(map.reader().GetSession("t")).last_revision, 2);
 }
 
-TEST(Commit, WithAStaleParentIsRefusedNamingTheHead) {
-  TestMap map;
+TEST_P(Commit, WithAStaleParentIsRefusedNamingTheHead) {
+  TestMap map(GetParam());
   map.MustCommit(ObjectDelta("", 0, 1));
   map.MustCommit(ObjectDelta("", 0, 2));
   GraphDelta delta = ObjectDelta("s", 1, 3);
@@ -165,8 +174,8 @@ TEST(Commit, WithAStaleParentIsRefusedNamingTheHead) {
   EXPECT_EQ(OrDie(map.writer().Commit(delta)).revision, 3);
 }
 
-TEST(Commit, WithTheEmptyMapAsItsParentIsTakenOnce) {
-  TestMap map;
+TEST_P(Commit, WithTheEmptyMapAsItsParentIsTakenOnce) {
+  TestMap map(GetParam());
   GraphDelta delta = ObjectDelta("s", 1, 1);
   delta.parent_revision = 0;
   EXPECT_TRUE(map.writer().Commit(delta).ok());
@@ -174,8 +183,8 @@ TEST(Commit, WithTheEmptyMapAsItsParentIsTakenOnce) {
   EXPECT_TRUE(OrDie(map.writer().Commit(delta)).replayed);
 }
 
-TEST(Commit, OfAnEmptyDeltaIsARevisionThatChangesNothing) {
-  TestMap map;
+TEST_P(Commit, OfAnEmptyDeltaIsARevisionThatChangesNothing) {
+  TestMap map(GetParam());
   map.MustCommit(ObjectDelta("", 0, 1));
   const std::string before = OrDie(map.Latest()->GetNode(NodeId('O', 1))).name;
   EXPECT_EQ(map.MustCommit({}), 2);
@@ -183,8 +192,8 @@ TEST(Commit, OfAnEmptyDeltaIsARevisionThatChangesNothing) {
   EXPECT_EQ(map.Problems(), "");
 }
 
-TEST(Commit, OfWhatIsKnownWritesNoNewVersion) {
-  TestMap map;
+TEST_P(Commit, OfWhatIsKnownWritesNoNewVersion) {
+  TestMap map(GetParam());
   map.MustCommit(ObjectDelta("", 0, 1));
   map.MustCommit(ObjectDelta("", 0, 1));
   EXPECT_EQ(OrDie(map.Latest()->GetNode(NodeId('O', 1))).revision, 1);
@@ -206,8 +215,8 @@ struct Untouched {
   Sha256 digest;
 };
 
-TEST(FailedCommit, LeavesNothingAndLetsTheNextOneThrough) {
-  TestMap map;
+TEST_P(FailedCommit, LeavesNothingAndLetsTheNextOneThrough) {
+  TestMap map(GetParam());
   for (int64_t s = 1; s <= 8; ++s) ASSERT_TRUE(map.writer().Commit(DeltaOfStream({}, s)).ok());
   Untouched untouched(&map);
   GraphDelta bad = DeltaOfStream({}, 9);
@@ -220,27 +229,26 @@ TEST(FailedCommit, LeavesNothingAndLetsTheNextOneThrough) {
   EXPECT_EQ(map.Problems(), "");
 }
 
-// This one is found out in the middle of writing, after other rows are in the transaction.
-TEST(FailedCommit, InTheMiddleOfWritingLeavesNothing) {
-  TestMap map;
+// This one is found out last, after all the rest has been looked at.
+TEST_P(FailedCommit, ByTheLastOfItsPosesLeavesNothing) {
+  TestMap map(GetParam());
   for (int64_t s = 1; s <= 8; ++s) ASSERT_TRUE(map.writer().Commit(DeltaOfStream({}, s)).ok());
   Untouched untouched(&map);
   GraphDelta bad = DeltaOfStream({}, 9);
-  const TimeNs late_ns = 8LL * 365 * 86400 * kSecond;
+  const TimeNs late_ns = 80LL * 365 * 86400 * kSecond;
   bad.nodes.push_back(MakeHuman(50, "late"));
   bad.appends.push_back({NodeId('H', 50), {PoseAt(late_ns, 0, 0, 0)}});
   const auto refused = map.writer().Commit(bad);
-  EXPECT_EQ(ReasonOf(refused.status()), Reason::kTimeOutsideMap);
-  EXPECT_EQ(refused.status().code(), absl::StatusCode::kOutOfRange);
+  EXPECT_EQ(ReasonOf(refused.status()), Reason::kTimeImplausible);
   EXPECT_EQ(MetadataOf(refused.status())["time_ns"], absl::StrCat(late_ns));
   untouched.Check();
   for (int64_t s = 9; s <= 16; ++s) ASSERT_TRUE(map.writer().Commit(DeltaOfStream({}, s)).ok());
   EXPECT_EQ(map.Problems(), "");
 }
 
-TEST(FailedCommit, DoesNotShowInTheDigestsOfThoseAfter) {
-  TestMap clean;
-  TestMap disturbed;
+TEST_P(FailedCommit, DoesNotShowInTheDigestsOfThoseAfter) {
+  TestMap clean(GetParam());
+  TestMap disturbed(GetParam());
   for (int64_t s = 1; s <= 12; ++s) {
     ASSERT_TRUE(clean.writer().Commit(DeltaOfStream({}, s)).ok());
     GraphDelta bad = DeltaOfStream({}, s);
@@ -252,8 +260,8 @@ TEST(FailedCommit, DoesNotShowInTheDigestsOfThoseAfter) {
   EXPECT_EQ(OrDie(clean.reader().Head()).digest, OrDie(disturbed.reader().Head()).digest);
 }
 
-TEST(FailedCommit, NamesTheAgentWhosePosesReachBack) {
-  TestMap map;
+TEST_P(FailedCommit, NamesTheAgentWhosePosesReachBack) {
+  TestMap map(GetParam());
   map.MustCommit(DeltaOfNodes({MakeHuman(1, "ann")}));
   map.MustCommit(DeltaOfPoses(NodeId('H', 1), {PoseAt(5 * kSecond, 0, 0, 0)}));
   const auto refused = map.Commit(DeltaOfPoses(NodeId('H', 1), {PoseAt(5 * kSecond, 1, 0, 0)}));
@@ -262,8 +270,8 @@ TEST(FailedCommit, NamesTheAgentWhosePosesReachBack) {
   EXPECT_EQ(MetadataOf(refused.status())["stored_end_ns"], absl::StrCat(5 * kSecond));
 }
 
-TEST(Revisions, AreDenseAndListedNewestFirst) {
-  TestMap map;
+TEST_P(Revisions, AreDenseAndListedNewestFirst) {
+  TestMap map(GetParam());
   for (int64_t s = 1; s <= 9; ++s) ASSERT_TRUE(map.writer().Commit(DeltaOfStream({}, s)).ok());
   const auto all = OrDie(map.reader().ListRevisions(0, 100));
   ASSERT_EQ(all.size(), 9u);
@@ -276,8 +284,8 @@ TEST(Revisions, AreDenseAndListedNewestFirst) {
   EXPECT_EQ(page[1].revision, 3);
 }
 
-TEST(Revisions, OfTheFutureAreRefusedNamingWhatIsReadable) {
-  TestMap map;
+TEST_P(Revisions, OfTheFutureAreRefusedNamingWhatIsReadable) {
+  TestMap map(GetParam());
   map.MustCommit({});
   for (const Revision revision : {Revision{2}, Revision{-1}}) {
     const auto refused = map.reader().At(revision);
@@ -287,8 +295,8 @@ TEST(Revisions, OfTheFutureAreRefusedNamingWhatIsReadable) {
   }
 }
 
-TEST(Revisions, KeepAnsweringWhatTheyAnsweredWhenTheyWereNew) {
-  TestMap map;
+TEST_P(Revisions, KeepAnsweringWhatTheyAnsweredWhenTheyWereNew) {
+  TestMap map(GetParam());
   std::vector<std::string> dumps = {OrDie(Dump(*map.At(0)))};
   for (int64_t s = 1; s <= 40; ++s) {
     ASSERT_TRUE(map.writer().Commit(DeltaOfStream({}, s)).ok());
@@ -304,9 +312,9 @@ TEST(Revisions, KeepAnsweringWhatTheyAnsweredWhenTheyWereNew) {
   }
 }
 
-TEST(Revisions, OfEqualDeltasHaveEqualDigestsWhereverAndHoweverTheyWereWritten) {
-  TestMap in_one_go;
-  TestMap reopened_each_time;
+TEST_P(Revisions, OfEqualDeltasHaveEqualDigestsWhereverAndHoweverTheyWereWritten) {
+  TestMap in_one_go(GetParam());
+  TestMap reopened_each_time(GetParam());
   for (int64_t s = 1; s <= 20; ++s) {
     ASSERT_TRUE(in_one_go.writer().Commit(DeltaOfStream({}, s)).ok());
     ASSERT_TRUE(reopened_each_time.writer().Commit(DeltaOfStream({}, s)).ok());
@@ -317,16 +325,16 @@ TEST(Revisions, OfEqualDeltasHaveEqualDigestsWhereverAndHoweverTheyWereWritten) 
   }
 }
 
-TEST(Revisions, OfOtherDeltasHaveOtherDigests) {
-  TestMap one;
-  TestMap other;
+TEST_P(Revisions, OfOtherDeltasHaveOtherDigests) {
+  TestMap one(GetParam());
+  TestMap other(GetParam());
   one.MustCommit(DeltaOfNodes({MakeObject(1, "cup", BoxOf(0, 0, 0, 1, 1, 1))}));
   other.MustCommit(DeltaOfNodes({MakeObject(1, "cup", BoxOf(0, 0, 0, 1, 1, 1.001))}));
   EXPECT_NE(OrDie(one.reader().Head()).digest, OrDie(other.reader().Head()).digest);
 }
 
-TEST(Snapshot, StaysWhatItIsWhileCommitsGoOn) {
-  TestMap map;
+TEST_P(HeldSnapshot, StaysWhatItIsWhileCommitsGoOn) {
+  TestMap map(GetParam());
   for (int64_t s = 1; s <= 6; ++s) ASSERT_TRUE(map.writer().Commit(DeltaOfStream({}, s)).ok());
   const auto held = map.Latest();
   const std::string before = OrDie(Dump(*held));
@@ -334,8 +342,8 @@ TEST(Snapshot, StaysWhatItIsWhileCommitsGoOn) {
   EXPECT_TRUE(OrDie(Dump(*held)) == before);
 }
 
-TEST(Snapshot, StopsALongReadWhenTold) {
-  TestMap map;
+TEST_P(HeldSnapshot, StopsALongReadWhenTold) {
+  TestMap map(GetParam());
   for (int64_t s = 1; s <= 3; ++s) ASSERT_TRUE(map.writer().Commit(DeltaOfStream({}, s)).ok());
   const StopCheck stop = [] { return absl::CancelledError("enough"); };
   const auto snapshot = map.Latest();

@@ -2,16 +2,11 @@
 // Things wiped out of all revisions: they are gone, the rest is as it was, and the map is sound.
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <fstream>
 #include <functional>
 #include <map>
 #include <set>
 
 #include "absl/strings/str_cat.h"
-#include "schema/codec/checksum.h"
-#include "schema/store/sqlite/erasure.h"
-#include "schema/store/sqlite/map_file.h"
 #include "tests/support/random_world.h"
 #include "tests/unit/schema/store/delta_stream.h"
 #include "tests/unit/schema/store/everything.h"
@@ -25,9 +20,9 @@ using Texts = std::vector<std::string>;
 // What each revision says of that which is not left out.
 using Told = std::map<Revision, Texts>;
 
-class EraseTest : public testing::TestWithParam<TrajectoryCodec> {
+class EraseTest : public testing::TestWithParam<std::tuple<std::string, TrajectoryCodec>> {
  protected:
-  EraseTest() : map_(Spec(GetParam())) {}
+  EraseTest() : map_(std::get<0>(GetParam()), Spec(std::get<1>(GetParam()))) {}
 
   void WriteStream(int64_t from, int64_t to) {
     for (int64_t s = from; s <= to; ++s) map_.MustCommit(DeltaOfStream({.seed = 5}, s));
@@ -117,7 +112,9 @@ TEST_P(EraseTest, TakesNodesThatAreGoneOutOfAllRevisions) {
   const EraseReport report = Erase({.nodes = nodes});
   EXPECT_GT(report.row_count, 20);
   EXPECT_GT(report.pose_count, 300);
-  EXPECT_LT(report.bytes_after, report.bytes_before);
+  if (!map_.store().folder().empty()) {
+    EXPECT_LT(report.bytes_after, report.bytes_before);
+  }
   const Told after = Tell([](const Line&) { return false; });
   ExpectSame(before, after);
   for (const NodeId id : nodes) EXPECT_FALSE(Holds(after, " " + ToString(id) + " "));
@@ -285,41 +282,6 @@ TEST_P(EraseTest, IsSoundWhereverItIsStoppedAndGoesOn) {
   }
 }
 
-TEST_P(EraseTest, GivesTheSameMapWhateverTheSteps) {
-  WriteStream(1, 36);
-  GraphDelta delta = Retire({NodeId('O', 5), NodeId('H', 1), NodeId('p', 4)});
-  const TrackSpan span{NodeId('H', 2), 20 * kSecond, 50 * kSecond};
-  delta.corrections.push_back({span.agent, span.from_ns, span.to_ns, {}});
-  delta.is_forgetting = false;
-  map_.MustCommit(delta);
-  map_.Close();
-  const Erasure erasure{
-      .nodes = {NodeId('O', 5), NodeId('R', 1), NodeId('p', 4), NodeId('p', 3), NodeId('H', 1)},
-      .edges = {{NodeId('p', 1), relations::kTraversable, NodeId('p', 2)}},
-      .mesh_blocks = {{4, 0, 0}, {8, 0, 0}},
-      .tracks = {span, {NodeId('H', 4), 0, 10 * kSecond}},
-      .assets = true};
-  std::map<Revision, std::string> digests;
-  for (const int64_t rows : {int64_t{1'000'000}, int64_t{1}, int64_t{5}}) {
-    TempFolder folder;
-    std::filesystem::copy(map_.folder(), folder.path(), std::filesystem::copy_options::recursive);
-    EraseReport report;
-    {
-      const auto db =
-          OrDie(sqlite::OpenMapFile(folder.path(), kMap, sqlite::Database::Mode::kWrite));
-      OrDie(sqlite::EraseFromMap(*db, Spec(GetParam()), erasure, {}, {}, &report, {.rows = rows}));
-    }
-    EXPECT_GT(report.row_count, 50);
-    const auto map = OrDie(OrDie(GraphStore::Open(folder.path(), {}))->OpenMap(kMap));
-    const VerifyReport verified = OrDie(map->Verify({}, {}));
-    EXPECT_TRUE(verified.problems.empty()) << verified.problems.front();
-    for (const RevisionInfo& info : OrDie(map->ListRevisions(0, 1000))) {
-      const std::string digest = ToHex(info.digest);
-      EXPECT_EQ(digests.emplace(info.revision, digest).first->second, digest) << info.revision;
-    }
-  }
-}
-
 TEST_P(EraseTest, IsNoticedByReadersThatHoldASnapshot) {
   WriteStream(1, 10);
   map_.MustCommit(Retire({NodeId('O', 5)}));
@@ -351,12 +313,11 @@ TEST_P(EraseTest, OfNothingAndOfWhatNeverWasChangesNoAnswer) {
   ExpectSame(before, Tell([](const Line&) { return false; }));
 }
 
-INSTANTIATE_TEST_SUITE_P(Codecs, EraseTest,
-                         testing::Values(TrajectoryCodec::kLossless, TrajectoryCodec::kQuantized),
-                         [](const auto& codec) {
-                           return codec.param == TrajectoryCodec::kLossless ? "Lossless"
-                                                                            : "Quantized";
-                         });
+INSTANTIATE_TEST_SUITE_P(EveryBackend, EraseTest,
+                         testing::Combine(testing::ValuesIn(Backends()),
+                                          testing::Values(TrajectoryCodec::kLossless,
+                                                          TrajectoryCodec::kQuantized)),
+                         NameOfBackendAndCodec);
 
 }  // namespace
 }  // namespace dsg::test

@@ -31,7 +31,7 @@ Box3d RandomBox(Random* random) {
   return box.extend(box.min() + size_m * Eigen::Vector3d(random->Uniform(), random->Uniform(), 1));
 }
 
-class NodeCells : public ::testing::Test {
+class NodeCells : public OnEveryBackend {
  protected:
   void Put(NodeId id, const Box3d& box_map, GraphDelta* delta) {
     Node node = MakeNode(id, layers::kObjects, kinds::kObject, "", box_map);
@@ -60,10 +60,12 @@ class NodeCells : public ::testing::Test {
   }
 
   std::map<NodeId, Node> nodes_;
-  TestMap map_;
+  TestMap map_{GetParam()};
 };
 
-TEST_F(NodeCells, FindWhatALookAtEveryNodeFinds) {
+DSG_ON_EVERY_BACKEND(NodeCells);
+
+TEST_P(NodeCells, FindWhatALookAtEveryNodeFinds) {
   Random random(RecordSeed(), 0);
   for (int commit = 0; commit < 6; ++commit) {
     GraphDelta delta;
@@ -85,7 +87,7 @@ TEST_F(NodeCells, FindWhatALookAtEveryNodeFinds) {
   EXPECT_EQ(map_.Problems(), "");
 }
 
-TEST_F(NodeCells, FindAllThatTouchesTheWholeWorld) {
+TEST_P(NodeCells, FindAllThatTouchesTheWholeWorld) {
   Random random(RecordSeed(), 1);
   GraphDelta delta;
   for (uint64_t i = 1; i <= 500; ++i) Put(NodeId('O', i), RandomBox(&random), &delta);

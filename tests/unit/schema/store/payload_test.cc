@@ -47,8 +47,17 @@ void ExpectEqual(const MeshBlock& kept, const MeshBlock& block) {
   EXPECT_EQ(kept.faces, block.faces);
 }
 
-TEST(Mesh, ComesBackWithEveryChannelAndWithFew) {
-  TestMap map;
+class Mesh : public OnEveryBackend {};
+class Assets : public OnEveryBackend {};
+class FactorPayloads : public OnEveryBackend {};
+class ShapePayloads : public OnEveryBackend {};
+DSG_ON_EVERY_BACKEND(Mesh);
+DSG_ON_EVERY_BACKEND(Assets);
+DSG_ON_EVERY_BACKEND(FactorPayloads);
+DSG_ON_EVERY_BACKEND(ShapePayloads);
+
+TEST_P(Mesh, ComesBackWithEveryChannelAndWithFew) {
+  TestMap map(GetParam());
   GraphDelta delta;
   delta.mesh_blocks = {FullBlock({-3, 0, 7}, 1000, 1), FullBlock({0, 0, 0}, 3, 2)};
   MeshBlock bare;
@@ -69,8 +78,8 @@ TEST(Mesh, ComesBackWithEveryChannelAndWithFew) {
   EXPECT_EQ(map.Problems(), "");
 }
 
-TEST(Mesh, OfPastRevisionsIsAsItWas) {
-  TestMap map;
+TEST_P(Mesh, OfPastRevisionsIsAsItWas) {
+  TestMap map(GetParam());
   const BlockIndex index{1, 2, 3};
   GraphDelta delta;
   delta.mesh_blocks = {FullBlock(index, 50, 1)};
@@ -91,8 +100,8 @@ TEST(Mesh, OfPastRevisionsIsAsItWas) {
   EXPECT_EQ(map.Problems(), "");
 }
 
-TEST(Mesh, WithAFaceOfAVertexThatIsNotThereIsRefused) {
-  TestMap map;
+TEST_P(Mesh, WithAFaceOfAVertexThatIsNotThereIsRefused) {
+  TestMap map(GetParam());
   GraphDelta delta;
   delta.mesh_blocks = {FullBlock({0, 0, 0}, 3, 1)};
   delta.mesh_blocks[0].faces.push_back({0, 1, 3});
@@ -107,8 +116,8 @@ Asset MakeAsset(std::string content, const std::string& media_type) {
   return asset;
 }
 
-TEST(Assets, OfAnySizeComeBackInOnePiece) {
-  TestMap map;
+TEST_P(Assets, OfAnySizeComeBackInOnePiece) {
+  TestMap map(GetParam());
   std::mt19937_64 random(RecordSeed());
   constexpr size_t kMiB = size_t{1} << 20;
   GraphDelta delta;
@@ -127,8 +136,8 @@ TEST(Assets, OfAnySizeComeBackInOnePiece) {
   EXPECT_EQ(map.Problems(), "");
 }
 
-TEST(Assets, GivenTwiceAreStoredOnce) {
-  TestMap map;
+TEST_P(Assets, GivenTwiceAreStoredOnce) {
+  TestMap map(GetParam());
   GraphDelta delta;
   delta.assets = {MakeAsset("cube", "model/ply")};
   map.MustCommit(delta);
@@ -137,16 +146,16 @@ TEST(Assets, GivenTwiceAreStoredOnce) {
   EXPECT_EQ(map.Problems(), "");
 }
 
-TEST(Assets, OfAnotherContentThanTheirHashAreRefused) {
-  TestMap map;
+TEST_P(Assets, OfAnotherContentThanTheirHashAreRefused) {
+  TestMap map(GetParam());
   GraphDelta delta;
   delta.assets = {MakeAsset("cube", "model/ply")};
   delta.assets[0].content = "ball";
   EXPECT_EQ(ReasonOf(map.Commit(delta).status()), Reason::kDeltaInvalid);
 }
 
-TEST(Assets, AreUnknownBeforeTheirRevisionAndToNodesThatComeEarlier) {
-  TestMap map;
+TEST_P(Assets, AreUnknownBeforeTheirRevisionAndToNodesThatComeEarlier) {
+  TestMap map(GetParam());
   const Asset cube = MakeAsset("cube", "model/ply");
   Node node = MakeObject(1, "cup", BoxOf(0, 0, 0, 1, 1, 1));
   node.object.emplace().model = cube.sha256;
@@ -158,8 +167,8 @@ TEST(Assets, AreUnknownBeforeTheirRevisionAndToNodesThatComeEarlier) {
   EXPECT_EQ(OrDie(map.Latest()->GetNode(node.id)).object->model, cube.sha256);
 }
 
-TEST(Factors, ComeBackByAgentAndTime) {
-  TestMap map;
+TEST_P(FactorPayloads, ComeBackByAgentAndTime) {
+  TestMap map(GetParam());
   map.MustCommit(DeltaOfNodes({MakeHuman(1, "ann"), MakeHuman(2, "bob")}));
   PoseFactor odometry;
   odometry.type = "odometry";
@@ -198,8 +207,8 @@ TEST(Factors, ComeBackByAgentAndTime) {
   EXPECT_EQ(map.Problems(), "");
 }
 
-TEST(Shapes, ComeBackByAgentAndTime) {
-  TestMap map;
+TEST_P(ShapePayloads, ComeBackByAgentAndTime) {
+  TestMap map(GetParam());
   const Asset topology = MakeAsset("faces", "application/octet-stream");
   GraphDelta delta = DeltaOfNodes({MakeHuman(1, "ann")});
   delta.assets = {topology};

@@ -43,14 +43,19 @@ std::string Text(const Snapshot& snapshot, TimeNs from_ns = kTimeMin, TimeNs to_
   return text;
 }
 
-class Shapes : public testing::TestWithParam<TrajectoryCodec> {
+class Shapes : public testing::TestWithParam<std::tuple<std::string, TrajectoryCodec>> {
  protected:
-  Shapes() : map_(Spec(GetParam())) { map_.MustCommit(DeltaOfNodes({MakeHuman(1, "ann")})); }
+  Shapes() : map_(std::get<0>(GetParam()), Spec(std::get<1>(GetParam()))) {
+    map_.MustCommit(DeltaOfNodes({MakeHuman(1, "ann")}));
+  }
   TestMap map_;
 };
 
-INSTANTIATE_TEST_SUITE_P(BothCodecs, Shapes,
-                         testing::Values(TrajectoryCodec::kQuantized, TrajectoryCodec::kLossless));
+INSTANTIATE_TEST_SUITE_P(EveryBackend, Shapes,
+                         testing::Combine(testing::ValuesIn(Backends()),
+                                          testing::Values(TrajectoryCodec::kQuantized,
+                                                          TrajectoryCodec::kLossless)),
+                         NameOfBackendAndCodec);
 
 TEST_P(Shapes, OfALaterRevisionReplaceThoseOfTheSameTimeAndOldRevisionsKeepTheirs) {
   const Revision first = map_.MustCommit(
@@ -153,8 +158,13 @@ TEST_P(Shapes, WithoutVerticesStillSayHowManyThereAre) {
                                   }));
 }
 
-TEST(LosslessMap, KeepsEveryBitOfABody) {
-  TestMap map;
+class LosslessMap : public OnEveryBackend {};
+class ShapesRefused : public OnEveryBackend {};
+DSG_ON_EVERY_BACKEND(LosslessMap);
+DSG_ON_EVERY_BACKEND(ShapesRefused);
+
+TEST_P(LosslessMap, KeepsEveryBitOfABody) {
+  TestMap map(GetParam());
   map.MustCommit(DeltaOfNodes({MakeHuman(1, "ann")}));
   const BodyShape body = AnyCoefficients(10, RecordSeed());
   map.MustCommit(DeltaOfShapes({body}));
@@ -165,8 +175,8 @@ TEST(LosslessMap, KeepsEveryBitOfABody) {
   EXPECT_EQ(kept[0].joints, body.joints);
 }
 
-TEST(ShapesRefused, WithNumbersThatAreNoneOrTooMany) {
-  TestMap map;
+TEST_P(ShapesRefused, WithNumbersThatAreNoneOrTooMany) {
+  TestMap map(GetParam());
   map.MustCommit(DeltaOfNodes({MakeHuman(1, "ann")}));
   const auto reason_of = [&](const BodyShape& body) {
     return ReasonOf(map.Commit(DeltaOfShapes({body})).status());
@@ -185,50 +195,6 @@ TEST(ShapesRefused, WithNumbersThatAreNoneOrTooMany) {
   EXPECT_EQ(reason_of(body), Reason::kNumberNotFinite);
   EXPECT_EQ(ReasonOf(map.Commit(DeltaOfShapes({Estimate(2, 1), Estimate(2, 1)})).status()),
             Reason::kDeltaInvalid);
-}
-
-// How much the file grows by a body, committed in batches of `batch`.
-double BytesPerBody(const std::vector<BodyShape>& bodies, size_t batch) {
-  TestMap map(Spec(TrajectoryCodec::kQuantized));
-  map.MustCommit(DeltaOfNodes({MakeHuman(1, "ann")}));
-  const auto size = [&] {
-    map.Close();
-    map.Reopen();
-    return OrDie(map.Latest()->Stats()).bytes_on_disk;
-  };
-  const int64_t before = size();
-  for (size_t i = 0; i < bodies.size(); i += batch) {
-    const auto begin = bodies.begin() + static_cast<std::ptrdiff_t>(i);
-    const auto count = static_cast<std::ptrdiff_t>(std::min(batch, bodies.size() - i));
-    map.MustCommit(DeltaOfShapes({begin, begin + count}));
-  }
-  const double bytes = static_cast<double>(size() - before) / static_cast<double>(bodies.size());
-  std::printf("%zu bodies in batches of %zu: %.0f bytes of the file each\n", bodies.size(), batch,
-              bytes);
-  EXPECT_EQ(map.Problems(), "");
-  return bytes;
-}
-
-TEST(ShapesOnDisk, TakeAtMost25KiBABodyOf6890Vertices) {
-  std::vector<float> rest = RealBody();
-  if (rest.empty()) rest = MadeBody(6890);
-  std::vector<BodyShape> bodies(50);
-  for (int i = 0; i < 50; ++i) {
-    bodies[static_cast<size_t>(i)].time_ns = i * kPeriodNs;
-    bodies[static_cast<size_t>(i)].vertices = Walking(rest, i);
-  }
-  EXPECT_LE(BytesPerBody(bodies, 50), 25 * 1024);
-  EXPECT_LE(BytesPerBody(bodies, 1), 25 * 1024);
-}
-
-TEST(ShapesOnDisk, TakeAtMost400BytesABodyOfCoefficientsAndJoints) {
-  std::vector<BodyShape> bodies;
-  for (int i = 0; i < 500; ++i) {
-    bodies.push_back(AnyCoefficients(i * kPeriodNs, static_cast<uint64_t>(i)));
-  }
-  EXPECT_LE(BytesPerBody(bodies, 50), 400);
-  // A commit has a row of its own in the table of revisions, whatever else it holds.
-  EXPECT_LE(BytesPerBody(bodies, 1), 400 + 300);
 }
 
 }  // namespace

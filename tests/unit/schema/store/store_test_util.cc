@@ -21,11 +21,23 @@ MapSpec Spec(TrajectoryCodec codec) {
   return spec;
 }
 
-TestMap::TestMap(const MapSpec& spec) {
+std::vector<std::string> Backends() { return {"sqlite", "memory"}; }
+
+std::string UriOf(const std::string& backend, const std::string& folder) {
+  return (backend == "memory" ? "memory:" : "file:") + folder;
+}
+
+std::string NameOfBackendAndCodec(
+    const testing::TestParamInfo<std::tuple<std::string, TrajectoryCodec>>& info) {
+  const auto& [backend, codec] = info.param;
+  return backend + (codec == TrajectoryCodec::kLossless ? "Lossless" : "Quantized");
+}
+
+TestMap::TestMap(const std::string& backend, const MapSpec& spec) {
   StoreOptions options;
   options.create = true;
   options.program = "store-test";
-  store_ = OrDie(GraphStore::Open(folder_.path(), options));
+  store_ = OrDie(OpenStore(UriOf(backend, folder_.path()), options));
   OrDie(store_->CreateMap(spec));
   Reopen();
 }

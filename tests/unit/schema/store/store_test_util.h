@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// A temporary store with one map, builders for what goes into it, and everything a snapshot says
-// as text, so that two snapshots can be compared. Stops the program when the world cannot be built.
+// A store of any backend with one map, builders for what goes into it, and everything a snapshot
+// says as text, so that two snapshots can be compared. Stops the program when the world cannot be
+// built.
 #pragma once
 
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
+
+#include <gtest/gtest.h>
 
 #include "absl/status/statusor.h"
 #include "schema/base/status.h"
@@ -42,10 +46,30 @@ uint64_t RecordSeed();
 
 MapSpec Spec(TrajectoryCodec codec);
 
+/// Names of the backends that keep the contract of schema/store.
+std::vector<std::string> Backends();
+
+/// Where a store of the backend may be made: in `folder`, or in memory.
+std::string UriOf(const std::string& backend, const std::string& folder);
+
+/// A suite of tests of the contract, run on each backend: its name is the parameter.
+class OnEveryBackend : public testing::TestWithParam<std::string> {};
+#define DSG_ON_EVERY_BACKEND(suite)                                                         \
+  INSTANTIATE_TEST_SUITE_P(EveryBackend, suite, testing::ValuesIn(::dsg::test::Backends()), \
+                           [](const auto& backend) { return backend.param; })
+
+/// For suites that run on each backend with each codec.
+std::string NameOfBackendAndCodec(
+    const testing::TestParamInfo<std::tuple<std::string, TrajectoryCodec>>& info);
+
 /// One map in a store of its own, open for writing and reading.
 class TestMap {
  public:
-  explicit TestMap(const MapSpec& spec = Spec(TrajectoryCodec::kLossless));
+  explicit TestMap(const std::string& backend,
+                   const MapSpec& spec = Spec(TrajectoryCodec::kLossless));
+  /// In files.
+  explicit TestMap(const MapSpec& spec = Spec(TrajectoryCodec::kLossless))
+      : TestMap("sqlite", spec) {}
 
   const std::string& folder() const { return folder_.path(); }
   std::string database_path() const { return folder() + "/" + kMap + "/graph.db"; }

@@ -3,8 +3,7 @@
 
 #include <map>
 
-#include "schema/store/sqlite/database.h"
-#include "schema/store/sqlite/touched_keys.h"
+#include "schema/store/touched_keys.h"
 #include "tests/unit/schema/store/delta_stream.h"
 #include "tests/unit/schema/store/store_test_util.h"
 
@@ -13,12 +12,6 @@ namespace {
 
 constexpr Revision kRevisionCount = 40;
 
-// Runs SQL on the file of a map that is closed.
-void RunSql(const std::string& path, const char* sql) {
-  const auto db = OrDie(sqlite::Database::Open(path, sqlite::Database::Mode::kWrite, kMap));
-  OrDie(db->Execute(sql));
-}
-
 void FillFromStream(TestMap* map) {
   DeltaStreamOptions options;
   options.seed = RecordSeed();
@@ -26,8 +19,7 @@ void FillFromStream(TestMap* map) {
 }
 
 TEST(TouchedKeys, ComeBackAsTheyWere) {
-  using sqlite::EdgeRowKey;
-  sqlite::TouchedKeys keys;
+  TouchedKeys keys;
   keys.nodes = {NodeId('z', NodeId::kIndexMax), NodeId('A', 0), NodeId('A', 0), NodeId('p', 70000)};
   keys.edges = {EdgeRowKey{NodeId('p', 7), 3, NodeId('p', 6)},
                 EdgeRowKey{NodeId('p', 7), 3, NodeId('O', NodeId::kIndexMax)},
@@ -37,9 +29,9 @@ TEST(TouchedKeys, ComeBackAsTheyWere) {
   keys.layers_or_labels = true;
   keys.Normalize();
   EXPECT_EQ(keys.nodes.size(), 3u);
-  sqlite::TouchedKeys read;
-  const std::string bytes = sqlite::EncodeTouched(keys);
-  ASSERT_TRUE(sqlite::DecodeTouched(bytes, &read));
+  TouchedKeys read;
+  const std::string bytes = EncodeTouched(keys);
+  ASSERT_TRUE(DecodeTouched(bytes, &read));
   EXPECT_EQ(read.nodes, keys.nodes);
   EXPECT_EQ(read.edges, keys.edges);
   EXPECT_EQ(read.tracks, keys.tracks);
@@ -48,88 +40,70 @@ TEST(TouchedKeys, ComeBackAsTheyWere) {
 }
 
 TEST(TouchedKeys, AreShortAndWholeWhereThereAreMany) {
-  sqlite::TouchedKeys keys;
+  TouchedKeys keys;
   for (uint64_t i = 0; i < 20'000; ++i) {
     keys.nodes.push_back(NodeId('p', i));
     keys.edges.push_back({NodeId('p', i), 1, NodeId('p', i + 1)});
   }
-  const std::string bytes = sqlite::EncodeTouched(keys);
+  const std::string bytes = EncodeTouched(keys);
   EXPECT_LT(bytes.size(), 20'000u);
-  sqlite::TouchedKeys read;
-  ASSERT_TRUE(sqlite::DecodeTouched(bytes, &read));
+  TouchedKeys read;
+  ASSERT_TRUE(DecodeTouched(bytes, &read));
   EXPECT_EQ(read.nodes, keys.nodes);
   EXPECT_EQ(read.edges, keys.edges);
   for (const size_t size : {size_t{1}, size_t{2}, bytes.size() / 2, bytes.size() - 1}) {
-    sqlite::TouchedKeys cut;
-    EXPECT_FALSE(sqlite::DecodeTouched(bytes.substr(0, size), &cut)) << size;
+    TouchedKeys cut;
+    EXPECT_FALSE(DecodeTouched(bytes.substr(0, size), &cut)) << size;
   }
 }
 
 TEST(TouchedKeys, AreRefusedWhenCutAnywhere) {
-  sqlite::TouchedKeys keys;
+  TouchedKeys keys;
   for (uint64_t i = 0; i < 20; ++i) keys.nodes.push_back(NodeId('p', i * 1000));
   keys.edges = {{NodeId('p', 7), 3, NodeId('O', 6)}};
   keys.mesh_blocks = {{1, 2, 3}};
-  const std::string bytes = sqlite::EncodeTouched(keys);
+  const std::string bytes = EncodeTouched(keys);
   for (size_t size = 0; size < bytes.size(); ++size) {
-    sqlite::TouchedKeys read;
-    EXPECT_FALSE(sqlite::DecodeTouched(bytes.substr(0, size), &read)) << size;
+    TouchedKeys read;
+    EXPECT_FALSE(DecodeTouched(bytes.substr(0, size), &read)) << size;
   }
   // A count of thousands of millions must cost no memory.
-  sqlite::TouchedKeys read;
-  EXPECT_FALSE(sqlite::DecodeTouched(std::string("\1\0\xff\xff\xff\xff\x7f", 7), &read));
+  TouchedKeys read;
+  EXPECT_FALSE(DecodeTouched(std::string("\1\0\xff\xff\xff\xff\x7f", 7), &read));
 }
 
-TEST(TouchedBetween, IsNothingForAnEmptyOrTurnedSpan) {
-  TestMap map;
+class TouchedBetween : public OnEveryBackend {};
+class FindEdge : public OnEveryBackend {};
+class MeshBlockVersions : public OnEveryBackend {};
+DSG_ON_EVERY_BACKEND(TouchedBetween);
+DSG_ON_EVERY_BACKEND(FindEdge);
+DSG_ON_EVERY_BACKEND(MeshBlockVersions);
+
+TEST_P(TouchedBetween, IsNothingForAnEmptyOrTurnedSpan) {
+  TestMap map(GetParam());
   FillFromStream(&map);
   EXPECT_TRUE(OrDie(map.reader().TouchedBetween(7, 7, {})).nodes.empty());
   EXPECT_TRUE(OrDie(map.reader().TouchedBetween(9, 7, {})).nodes.empty());
 }
 
-TEST(TouchedBetween, RefusesRevisionsThatAreNotThere) {
-  TestMap map;
+TEST_P(TouchedBetween, RefusesRevisionsThatAreNotThere) {
+  TestMap map(GetParam());
   FillFromStream(&map);
   EXPECT_EQ(ReasonOf(map.reader().TouchedBetween(0, kRevisionCount + 1, {}).status()),
             Reason::kRevisionInFuture);
   EXPECT_EQ(ReasonOf(map.reader().TouchedBetween(-1, 2, {}).status()), Reason::kRevisionInFuture);
 }
 
-TEST(TouchedBetween, StopsWhenAsked) {
-  TestMap map;
+TEST_P(TouchedBetween, StopsWhenAsked) {
+  TestMap map(GetParam());
   FillFromStream(&map);
   const auto touched =
       map.reader().TouchedBetween(0, kRevisionCount, [] { return absl::CancelledError("enough"); });
   EXPECT_TRUE(absl::IsCancelled(touched.status()));
 }
 
-// Two ways to the same answer: the lists that commits leave, and the rows themselves.
-TEST(TouchedLists, AreCheckedByVerify) {
-  TestMap map;
-  FillFromStream(&map);
-  EXPECT_EQ(map.Problems(), "");
-  map.Close();
-  RunSql(map.database_path(), "DELETE FROM touched WHERE revision = 5");
-  map.Reopen();
-  EXPECT_NE(map.Problems().find("touched 5"), std::string::npos) << map.Problems();
-  EXPECT_EQ(ReasonOf(map.reader().TouchedBetween(3, 8, {}).status()), Reason::kStoreCorrupt);
-  EXPECT_TRUE(map.reader().TouchedBetween(5, 8, {}).ok());
-}
-
-TEST(TouchedLists, AreNotBelievedWhenOfAnotherRevision) {
-  TestMap map;
-  FillFromStream(&map);
-  map.Close();
-  RunSql(map.database_path(),
-         "UPDATE touched SET (payload, checksum) ="
-         " (SELECT payload, checksum FROM touched WHERE revision = 6) WHERE revision = 5");
-  map.Reopen();
-  EXPECT_EQ(ReasonOf(map.reader().TouchedBetween(4, 5, {}).status()), Reason::kStoreCorrupt);
-  EXPECT_NE(map.Problems().find("touched"), std::string::npos);
-}
-
-TEST(FindEdge, SeesTheEdgeOfItsRevision) {
-  TestMap map;
+TEST_P(FindEdge, SeesTheEdgeOfItsRevision) {
+  TestMap map(GetParam());
   map.MustCommit(DeltaOfNodes({MakeObject(1, "cup", BoxOf(0, 0, 0, 1, 1, 1)),
                                MakeObject(2, "table", BoxOf(0, 0, 0, 1, 1, 1))}));
   const EdgeKey key{NodeId('O', 1), "ON", NodeId('O', 2)};
@@ -154,8 +128,8 @@ TEST(FindEdge, SeesTheEdgeOfItsRevision) {
   EXPECT_FALSE(OrDie(map.At(3)->FindEdge({key.target, "ON", key.source})).has_value());
 }
 
-TEST(MeshBlockVersions, NameTheRevisionThatWroteEach) {
-  TestMap map;
+TEST_P(MeshBlockVersions, NameTheRevisionThatWroteEach) {
+  TestMap map(GetParam());
   FillFromStream(&map);
   std::map<BlockIndex, Revision> before;
   for (Revision r = 0; r <= kRevisionCount; ++r) {

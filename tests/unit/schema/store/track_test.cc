@@ -24,7 +24,8 @@ constexpr NodeId kPlace('p', 1);
 // A map with two people, a room and a place.
 class Tracks {
  public:
-  explicit Tracks(TrajectoryCodec codec = TrajectoryCodec::kLossless) : map_(Spec(codec)) {
+  explicit Tracks(const std::string& backend, TrajectoryCodec codec = TrajectoryCodec::kLossless)
+      : map_(backend, Spec(codec)) {
     GraphDelta delta = DeltaOfNodes({MakeHuman(1, "ann"), MakeHuman(2, "bob")});
     delta.nodes.push_back(MakeNode(kRoom, layers::kRooms, kinds::kRoom, "lab", Box3d()));
     delta.nodes.push_back(MakeNode(kPlace, layers::kPlaces, kinds::kPlace, "", Box3d()));
@@ -90,8 +91,27 @@ std::vector<TimedPose> RandomWalk(std::mt19937_64* random, int count, TimeNs beg
   return poses;
 }
 
-TEST(LosslessTrack, GivesBackEveryBit) {
-  Tracks tracks(TrajectoryCodec::kLossless);
+class LosslessTrack : public OnEveryBackend {};
+class QuantizedTrack : public OnEveryBackend {};
+class Track : public OnEveryBackend {};
+class Locate : public OnEveryBackend {};
+class Covariance : public OnEveryBackend {};
+class Correction : public OnEveryBackend {};
+class VisitsToBox : public OnEveryBackend {};
+class ObservedAgents : public OnEveryBackend {};
+class Stays : public OnEveryBackend {};
+DSG_ON_EVERY_BACKEND(LosslessTrack);
+DSG_ON_EVERY_BACKEND(QuantizedTrack);
+DSG_ON_EVERY_BACKEND(Track);
+DSG_ON_EVERY_BACKEND(Locate);
+DSG_ON_EVERY_BACKEND(Covariance);
+DSG_ON_EVERY_BACKEND(Correction);
+DSG_ON_EVERY_BACKEND(VisitsToBox);
+DSG_ON_EVERY_BACKEND(ObservedAgents);
+DSG_ON_EVERY_BACKEND(Stays);
+
+TEST_P(LosslessTrack, GivesBackEveryBit) {
+  Tracks tracks(GetParam(), TrajectoryCodec::kLossless);
   std::mt19937_64 random(RecordSeed());
   const auto poses = RandomWalk(&random, 1000, -500 * kSecond, kSecond);
   tracks.Append(kAnn, poses);
@@ -106,8 +126,8 @@ TEST(LosslessTrack, GivesBackEveryBit) {
   EXPECT_EQ(tracks.map().Problems(), "");
 }
 
-TEST(QuantizedTrack, KeepsTimesExactlyAndPosesWithinTheBound) {
-  Tracks tracks(TrajectoryCodec::kQuantized);
+TEST_P(QuantizedTrack, KeepsTimesExactlyAndPosesWithinTheBound) {
+  Tracks tracks(GetParam(), TrajectoryCodec::kQuantized);
   std::mt19937_64 random(RecordSeed());
   const auto poses = RandomWalk(&random, 3000, 0, kSecond / 7);
   tracks.Append(kAnn, poses);
@@ -123,13 +143,13 @@ TEST(QuantizedTrack, KeepsTimesExactlyAndPosesWithinTheBound) {
   }
 }
 
-TEST(Track, IsTheSameHoweverItIsCutIntoCommits) {
+TEST_P(Track, IsTheSameHoweverItIsCutIntoCommits) {
   std::mt19937_64 random(RecordSeed());
   for (const auto codec : {TrajectoryCodec::kQuantized, TrajectoryCodec::kLossless}) {
     const auto poses = RandomWalk(&random, 900, 0, kSecond);
-    Tracks whole(codec);
+    Tracks whole(GetParam(), codec);
     whole.Append(kAnn, poses);
-    Tracks cut(codec);
+    Tracks cut(GetParam(), codec);
     for (size_t i = 0; i < poses.size();) {
       const size_t n = std::min(poses.size() - i, size_t{1} + random() % 60);
       cut.Append(kAnn, {poses.begin() + static_cast<std::ptrdiff_t>(i),
@@ -151,8 +171,8 @@ TEST(Track, IsTheSameHoweverItIsCutIntoCommits) {
   }
 }
 
-TEST(Track, AtAPastRevisionEndsWhereItEndedThen) {
-  Tracks tracks;
+TEST_P(Track, AtAPastRevisionEndsWhereItEndedThen) {
+  Tracks tracks(GetParam());
   std::vector<Revision> revisions;
   for (int i = 0; i < 50; ++i) {
     revisions.push_back(tracks.Append(kAnn, {PoseAt(i * kSecond, i, 0, 0)}));
@@ -168,8 +188,8 @@ TEST(Track, AtAPastRevisionEndsWhereItEndedThen) {
   }
 }
 
-TEST(Track, IsReadBetweenHalfOpenEnds) {
-  Tracks tracks;
+TEST_P(Track, IsReadBetweenHalfOpenEnds) {
+  Tracks tracks(GetParam());
   tracks.Append(kAnn, {PoseAt(0, 0, 0, 0), PoseAt(10, 1, 0, 0), PoseAt(20, 2, 0, 0)});
   const auto snapshot = tracks.map().Latest();
   EXPECT_EQ(Read(*snapshot, kAnn, 0, 20).size(), 2u);
@@ -178,8 +198,8 @@ TEST(Track, IsReadBetweenHalfOpenEnds) {
   EXPECT_EQ(Read(*snapshot, kAnn, 21, kTimeMax).size(), 0u);
 }
 
-TEST(Track, OfAnUnknownAgentOrOfAThingIsRefused) {
-  Tracks tracks;
+TEST_P(Track, OfAnUnknownAgentOrOfAThingIsRefused) {
+  Tracks tracks(GetParam());
   tracks.map().MustCommit(DeltaOfNodes({MakeObject(1, "cup", BoxOf(0, 0, 0, 1, 1, 1))}));
   const auto snapshot = tracks.map().Latest();
   for (const NodeId id : {NodeId('H', 99), NodeId('O', 1)}) {
@@ -188,10 +208,10 @@ TEST(Track, OfAnUnknownAgentOrOfAThingIsRefused) {
   }
 }
 
-TEST(Track, RefusesTimesTooFarFromTheEpoch) {
-  Tracks tracks;
-  const TimeNs ten_years_ns = 10LL * 365 * 86400 * kSecond;
-  for (const TimeNs time_ns : {ten_years_ns, -ten_years_ns, kTimeMax, kTimeMin + 1}) {
+TEST_P(Track, RefusesTimesTooFarFromTheEpoch) {
+  Tracks tracks(GetParam());
+  const TimeNs century_ns = 100LL * 365 * 86400 * kSecond;
+  for (const TimeNs time_ns : {century_ns, -century_ns, kTimeMax, kTimeMin + 1}) {
     const auto refused = tracks.map().Commit(DeltaOfPoses(kAnn, {PoseAt(time_ns, 0, 0, 0)}));
     EXPECT_EQ(ReasonOf(refused.status()), Reason::kTimeOutsideMap) << time_ns;
   }
@@ -200,8 +220,31 @@ TEST(Track, RefusesTimesTooFarFromTheEpoch) {
   EXPECT_EQ(tracks.map().Problems(), "");
 }
 
-TEST(Locate, IsExactAtPosesAndStraightBetweenThem) {
-  Tracks tracks;
+TEST_P(Track, OfDecadesIsFoundInTimeAndPlace) {
+  Tracks tracks(GetParam());
+  constexpr TimeNs kYearNs = 365LL * 86400 * kSecond;
+  // Steps of nine years: a pose further from all others is taken for a wrong clock.
+  for (int year = -54; year <= 54; year += 9) {
+    const TimeNs begin_ns = year * kYearNs;
+    tracks.Append(kAnn, {PoseAt(begin_ns, year, 0, 1), PoseAt(begin_ns + kSecond, year + 1, 0, 1)});
+  }
+  const auto snapshot = tracks.map().Latest();
+  for (int year = -54; year <= 54; year += 9) {
+    const TimeNs at_ns = year * kYearNs + kSecond / 2;
+    EXPECT_NEAR(OrDie(snapshot->Locate(kAnn, at_ns)).map_T_agent.position.x(), year + 0.5, 1e-3);
+    const Box3d around = BoxOf(year - 0.5, -1, 0, year + 1.5, 1, 2);
+    const auto visits = OrDie(snapshot->VisitsToBox(around, at_ns - 1, at_ns + 1, {}));
+    ASSERT_EQ(visits.size(), 1u) << year;
+    EXPECT_EQ(visits[0].enter_ns, at_ns - 1);
+    EXPECT_EQ(visits[0].exit_ns, at_ns + 1);
+  }
+  ASSERT_TRUE(tracks.Correct(kAnn, 40 * kYearNs, 50 * kYearNs, {}).ok());
+  EXPECT_EQ(Times(*tracks.map().Latest(), kAnn).size(), 24u);
+  EXPECT_EQ(tracks.map().Problems(), "");
+}
+
+TEST_P(Locate, IsExactAtPosesAndStraightBetweenThem) {
+  Tracks tracks(GetParam());
   TimedPose from = PoseAt(0, 0, 0, 1);
   TimedPose to = PoseAt(2 * kSecond, 4, -2, 1);
   to.map_T_agent.orientation = Eigen::Quaterniond(Eigen::AngleAxisd(1.0, Eigen::Vector3d::UnitZ()));
@@ -221,8 +264,8 @@ TEST(Locate, IsExactAtPosesAndStraightBetweenThem) {
               1e-12);
 }
 
-TEST(Locate, SaysGapInsteadOfGuessing) {
-  Tracks tracks;
+TEST_P(Locate, SaysGapInsteadOfGuessing) {
+  Tracks tracks(GetParam());
   tracks.Append(
       kAnn, {PoseAt(0, 0, 0, 0), PoseAt(2 * kSecond, 1, 0, 0), PoseAt(4 * kSecond + 1, 2, 0, 0)});
   const auto snapshot = tracks.map().Latest();
@@ -234,8 +277,8 @@ TEST(Locate, SaysGapInsteadOfGuessing) {
   EXPECT_EQ(OrDie(snapshot->Locate(kAnn, 4 * kSecond + 1)).quality, PoseQuality::kExact);
 }
 
-TEST(Locate, OutsideTheTrackNamesBothEnds) {
-  Tracks tracks;
+TEST_P(Locate, OutsideTheTrackNamesBothEnds) {
+  Tracks tracks(GetParam());
   tracks.Append(kAnn, {PoseAt(100, 0, 0, 0), PoseAt(200, 1, 0, 0)});
   for (const TimeNs at_ns : {TimeNs{99}, TimeNs{201}, kTimeMin, kTimeMax}) {
     const auto refused = tracks.map().Latest()->Locate(kAnn, at_ns);
@@ -247,15 +290,15 @@ TEST(Locate, OutsideTheTrackNamesBothEnds) {
   }
 }
 
-TEST(Locate, OfAnAgentWithoutPosesSaysSo) {
-  Tracks tracks;
+TEST_P(Locate, OfAnAgentWithoutPosesSaysSo) {
+  Tracks tracks(GetParam());
   const auto refused = tracks.map().Latest()->Locate(kBob, 0);
   EXPECT_EQ(ReasonOf(refused.status()), Reason::kTimeOutsideTrack);
   EXPECT_TRUE(absl::StrContains(refused.status().message(), "no poses")) << refused.status();
 }
 
-TEST(Locate, TakesTheAgentsOwnGapLimit) {
-  Tracks tracks;
+TEST_P(Locate, TakesTheAgentsOwnGapLimit) {
+  Tracks tracks(GetParam());
   Node patient = MakeHuman(1, "ann");
   patient.agent.emplace().gap_ns_max = 10 * kSecond;
   tracks.map().MustCommit(DeltaOfNodes({patient}));
@@ -266,10 +309,10 @@ TEST(Locate, TakesTheAgentsOwnGapLimit) {
 }
 
 // Poses of one agent spread over many segments and blocks, asked at, before and after each.
-TEST(Locate, EqualsInterpolationOfAllPosesAtEveryBorder) {
+TEST_P(Locate, EqualsInterpolationOfAllPosesAtEveryBorder) {
   std::mt19937_64 random(RecordSeed());
   for (const auto codec : {TrajectoryCodec::kLossless, TrajectoryCodec::kQuantized}) {
-    Tracks tracks(codec);
+    Tracks tracks(GetParam(), codec);
     tracks.Append(kAnn, RandomWalk(&random, 1500, 0, 2 * kSecond));
     const auto snapshot = tracks.map().Latest();
     const auto poses = Read(*snapshot, kAnn);
@@ -299,9 +342,9 @@ TEST(Locate, EqualsInterpolationOfAllPosesAtEveryBorder) {
   }
 }
 
-TEST(Covariance, ComesBackOfTheNearerPose) {
+TEST_P(Covariance, ComesBackOfTheNearerPose) {
   for (const auto codec : {TrajectoryCodec::kLossless, TrajectoryCodec::kQuantized}) {
-    Tracks tracks(codec);
+    Tracks tracks(GetParam(), codec);
     std::vector<TimedPose> poses;
     for (int i = 0; i < 200; ++i) {
       poses.push_back(PoseAt(i * kSecond, i, 0, 0));
@@ -327,9 +370,9 @@ TEST(Covariance, ComesBackOfTheNearerPose) {
   }
 }
 
-TEST(Correction, IsNewInItsRevisionAndOldBefore) {
+TEST_P(Correction, IsNewInItsRevisionAndOldBefore) {
   for (const auto codec : {TrajectoryCodec::kLossless, TrajectoryCodec::kQuantized}) {
-    Tracks tracks(codec);
+    Tracks tracks(GetParam(), codec);
     std::vector<TimedPose> poses;
     for (int i = 0; i < 2000; ++i) poses.push_back(PoseAt(i * kSecond / 10, i, 0, 0));
     const Revision before = tracks.Append(kAnn, poses);
@@ -367,8 +410,8 @@ TEST(Correction, IsNewInItsRevisionAndOldBefore) {
   }
 }
 
-TEST(Correction, MayEmptyAnIntervalTheTailOrTheTrack) {
-  Tracks tracks;
+TEST_P(Correction, MayEmptyAnIntervalTheTailOrTheTrack) {
+  Tracks tracks(GetParam());
   std::vector<TimedPose> poses;
   for (int i = 0; i < 10; ++i) poses.push_back(PoseAt(i, i, 0, 0));
   tracks.Append(kAnn, poses);
@@ -385,8 +428,8 @@ TEST(Correction, MayEmptyAnIntervalTheTailOrTheTrack) {
   EXPECT_EQ(Times(*tracks.map().At(2), kAnn).size(), 10u);
 }
 
-TEST(Correction, BesideAnAppendOfTheSameDeltaAppliesFirst) {
-  Tracks tracks;
+TEST_P(Correction, BesideAnAppendOfTheSameDeltaAppliesFirst) {
+  Tracks tracks(GetParam());
   tracks.Append(kAnn, {PoseAt(0, 0, 0, 0), PoseAt(10, 1, 0, 0)});
   GraphDelta delta;
   delta.corrections.push_back({kAnn, 5, 15, {PoseAt(9, 7, 0, 0)}});
@@ -396,8 +439,8 @@ TEST(Correction, BesideAnAppendOfTheSameDeltaAppliesFirst) {
   EXPECT_EQ(tracks.map().Problems(), "");
 }
 
-TEST(Correction, AfterTheTracksEndOrOfAnEmptyTrackIsRefused) {
-  Tracks tracks;
+TEST_P(Correction, AfterTheTracksEndOrOfAnEmptyTrackIsRefused) {
+  Tracks tracks(GetParam());
   tracks.Append(kAnn, {PoseAt(0, 0, 0, 0)});
   EXPECT_EQ(ReasonOf(tracks.Correct(kAnn, 0, 100, {PoseAt(50, 0, 0, 0)}).status()),
             Reason::kDeltaInvalid);
@@ -407,8 +450,8 @@ TEST(Correction, AfterTheTracksEndOrOfAnEmptyTrackIsRefused) {
 }
 
 // Random appends and corrections against a plain map of poses per revision.
-TEST(Correction, InAnyOrderLeavesEveryRevisionAsItWas) {
-  Tracks tracks;
+TEST_P(Correction, InAnyOrderLeavesEveryRevisionAsItWas) {
+  Tracks tracks(GetParam());
   std::mt19937_64 random(RecordSeed());
   std::map<TimeNs, double> believed;
   std::vector<std::pair<Revision, std::map<TimeNs, double>>> history;
@@ -489,13 +532,13 @@ void ExpectVisitsEqualSamples(const Snapshot& snapshot, const Box3d& box, TimeNs
   }
 }
 
-TEST(VisitsToBox, EqualDenseSamplingAtAllRevisionsAlsoCorrectedOnes) {
+TEST_P(VisitsToBox, EqualDenseSamplingAtAllRevisionsAlsoCorrectedOnes) {
   std::mt19937_64 random(RecordSeed());
   const auto uniform = [&](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);
   };
   for (const auto codec : {TrajectoryCodec::kQuantized, TrajectoryCodec::kLossless}) {
-    Tracks tracks(codec);
+    Tracks tracks(GetParam(), codec);
     TimeNs end_ns = 0;
     for (int round = 0; round < 6; ++round) {
       const auto walk = RandomWalk(&random, 120, end_ns, kSecond * 3 / 2);
@@ -524,8 +567,8 @@ TEST(VisitsToBox, EqualDenseSamplingAtAllRevisionsAlsoCorrectedOnes) {
   }
 }
 
-TEST(VisitsToBox, SeesACrossingBetweenTwoPosesAndASinglePose) {
-  Tracks tracks;
+TEST_P(VisitsToBox, SeesACrossingBetweenTwoPosesAndASinglePose) {
+  Tracks tracks(GetParam());
   tracks.Append(kAnn, {PoseAt(0, -5, 0, 0), PoseAt(kSecond, 5, 0, 0)});
   tracks.Append(kBob, {PoseAt(7 * kSecond, 0, 0, 0)});
   const auto visits =
@@ -539,8 +582,8 @@ TEST(VisitsToBox, SeesACrossingBetweenTwoPosesAndASinglePose) {
   EXPECT_EQ(visits[1].exit_ns, 7 * kSecond + 1);
 }
 
-TEST(VisitsToBox, SeesACrossingFromOneSegmentToTheNext) {
-  Tracks tracks;
+TEST_P(VisitsToBox, SeesACrossingFromOneSegmentToTheNext) {
+  Tracks tracks(GetParam());
   std::vector<TimedPose> poses;
   // Far on one side, then far on the other; where segments end is the codec's secret, so the
   // crossing comes at every place in turn.
@@ -551,8 +594,8 @@ TEST(VisitsToBox, SeesACrossingFromOneSegmentToTheNext) {
   EXPECT_EQ(visits.size(), 499u);
 }
 
-TEST(VisitsToBox, TakesTheAgentsOwnGapLimit) {
-  Tracks tracks;
+TEST_P(VisitsToBox, TakesTheAgentsOwnGapLimit) {
+  Tracks tracks(GetParam());
   Node patient = MakeHuman(1, "ann");
   patient.agent.emplace().gap_ns_max = 10 * kSecond;
   tracks.map().MustCommit(DeltaOfNodes({patient}));
@@ -561,16 +604,16 @@ TEST(VisitsToBox, TakesTheAgentsOwnGapLimit) {
                            50'000'007);
 }
 
-TEST(VisitsToBox, DoesNotJoinAcrossAGap) {
-  Tracks tracks;
+TEST_P(VisitsToBox, DoesNotJoinAcrossAGap) {
+  Tracks tracks(GetParam());
   tracks.Append(kAnn, {PoseAt(0, -5, 0, 0), PoseAt(3 * kSecond, 5, 0, 0)});
   EXPECT_TRUE(
       OrDie(tracks.map().Latest()->VisitsToBox(BoxOf(-1, -1, -1, 1, 1, 1), kTimeMin, kTimeMax, {}))
           .empty());
 }
 
-TEST(ObservedAgents, AreThoseSeenOrInterpolatedInTheInterval) {
-  Tracks tracks;
+TEST_P(ObservedAgents, AreThoseSeenOrInterpolatedInTheInterval) {
+  Tracks tracks(GetParam());
   tracks.Append(kAnn, {PoseAt(0, 0, 0, 0), PoseAt(kSecond, 0, 0, 0)});
   tracks.Append(kBob, {PoseAt(0, 0, 0, 0), PoseAt(5 * kSecond, 0, 0, 0)});
   const auto snapshot = tracks.map().Latest();
@@ -580,8 +623,8 @@ TEST(ObservedAgents, AreThoseSeenOrInterpolatedInTheInterval) {
   EXPECT_EQ(OrDie(snapshot->CountObservedAgents(5 * kSecond, 6 * kSecond, {})), 1);
 }
 
-TEST(Stays, AreFoundByAgentByInstantAndByRoom) {
-  Tracks tracks;
+TEST_P(Stays, AreFoundByAgentByInstantAndByRoom) {
+  Tracks tracks(GetParam());
   tracks.Append(kAnn, {PoseAt(0, 0, 0, 0), PoseAt(50, 0, 0, 0)});
   tracks.AddStays({{kAnn, kPlace, kRoom, 0, 10}, {kAnn, NodeId(), kRoom, 20, kTimeMax}});
   const auto snapshot = tracks.map().Latest();
@@ -602,16 +645,16 @@ TEST(Stays, AreFoundByAgentByInstantAndByRoom) {
             std::vector<Stay>{clipped[0]});
 }
 
-TEST(Stays, OfAnHourAreFoundFromTheirLastNanosecond) {
-  Tracks tracks;
+TEST_P(Stays, OfAnHourAreFoundFromTheirLastNanosecond) {
+  Tracks tracks(GetParam());
   tracks.AddStays({{kAnn, kPlace, kRoom, 0, kStayNsMax}});
   const auto snapshot = tracks.map().Latest();
   EXPECT_EQ(OrDie(snapshot->StaysInNode(kRoom, kStayNsMax - 1, kTimeMax, {})).size(), 1u);
   EXPECT_EQ(OrDie(snapshot->StaysInNode(kRoom, kStayNsMax, kTimeMax, {})).size(), 0u);
 }
 
-TEST(Stays, NowhereOrEmptyOrOfNobodyAreRefused) {
-  Tracks tracks;
+TEST_P(Stays, NowhereOrEmptyOrOfNobodyAreRefused) {
+  Tracks tracks(GetParam());
   for (const Stay& stay :
        {Stay{kAnn, NodeId(), NodeId(), 0, 10}, Stay{kAnn, kPlace, kRoom, 5, 5},
         Stay{kRoom, kPlace, kRoom, 0, 10}, Stay{kAnn, NodeId('p', 9), kRoom, 0, 10}}) {
@@ -639,11 +682,11 @@ TimeNs AnyTime(Random* random) {
 }
 
 // Who was in the room, and where each was, say the same, whatever the lengths of the stays.
-TEST(Stays, OfEveryLengthAreFoundByRoomAndByAgent) {
+TEST_P(Stays, OfEveryLengthAreFoundByRoomAndByAgent) {
   for (uint64_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE(seed);
     Random random(seed, 0);
-    Tracks tracks;
+    Tracks tracks(GetParam());
     std::map<std::pair<NodeId, TimeNs>, Stay> stored;
     for (int round = 0; round < 3; ++round) {
       std::map<std::pair<NodeId, TimeNs>, Stay> added;
@@ -686,8 +729,8 @@ TEST(Stays, OfEveryLengthAreFoundByRoomAndByAgent) {
   }
 }
 
-TEST(Stays, OfPastRevisionsAreAsTheyWereBelieved) {
-  Tracks tracks;
+TEST_P(Stays, OfPastRevisionsAreAsTheyWereBelieved) {
+  Tracks tracks(GetParam());
   tracks.Append(kAnn, {PoseAt(0, 0, 0, 0), PoseAt(5, 0, 0, 0)});
   const Revision open = tracks.AddStays({{kAnn, kPlace, kRoom, 0, kTimeMax}});
   const Revision grown = tracks.Append(kAnn, {PoseAt(100, 0, 0, 0)});

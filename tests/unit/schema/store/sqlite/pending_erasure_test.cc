@@ -169,10 +169,10 @@ TEST_F(PendingErasure, IsWrittenOnceForAllSlicesAndJoinsWithAnother) {
   const std::string path = folder.path() + "/store";
   ASSERT_TRUE(CutOff(path, 2));
   const auto db = OrDie(sqlite::OpenMapFile(path, kMap, sqlite::Database::Mode::kWrite));
-  const auto write = [&](const sqlite::EraseList& list) {
+  const auto write = [&](const EraseList& list) {
     OrDie(sqlite::InTransaction(*db, [&] { return sqlite::WritePendingErasure(*db, list); }));
   };
-  sqlite::EraseList list = OrDie(sqlite::ReadPendingErasure(*db));
+  EraseList list = OrDie(sqlite::ReadPendingErasure(*db));
   EXPECT_EQ(list.size(), erasure_.nodes.size() + 1);
   const int64_t changes = OrDie(db->QueryInt("SELECT total_changes()"));
   write(list);
@@ -182,9 +182,9 @@ TEST_F(PendingErasure, IsWrittenOnceForAllSlicesAndJoinsWithAnother) {
                                {NodeId('p', 1), relations::kTraversable, NodeId('p', 2)}},
                      .mesh_blocks = {{-1, 2, -3}},
                      .tracks = {{NodeId('H', 2), 5 * kSecond, 9 * kSecond}}};
-  list.Add(OrDie(sqlite::ListOf(*db, more)));
+  list.Add(OrDie(sqlite::ListIn(*db, more)));
   write(list);
-  const sqlite::EraseList joined = OrDie(sqlite::ReadPendingErasure(*db));
+  const EraseList joined = OrDie(sqlite::ReadPendingErasure(*db));
   EXPECT_EQ(joined.keys.nodes.size(), erasure_.nodes.size() + 1);
   EXPECT_EQ(joined.keys.edges.size(), 1u);
   EXPECT_EQ(joined.keys.mesh_blocks, (std::vector<BlockIndex>{{-1, 2, -3}}));

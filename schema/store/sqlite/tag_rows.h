@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names for revisions.
+// The table of tags.
 #pragma once
 
 #include <string>
@@ -13,10 +13,7 @@ namespace dsg::sqlite {
 /// Order: by name.
 absl::StatusOr<std::vector<Tag>> ReadTags(Database& db);
 
-/// Errors: INVALID_ARGUMENT/FIELD_INVALID. The revision is not looked at.
-absl::Status CheckTag(const Tag& tag);
-
-/// Errors: RESOURCE_EXHAUSTED/QUOTA_EXCEEDED at 10,000 tags, or 2 MiB of notes, a map.
+/// Errors: as CheckTagBounds.
 absl::Status WriteTag(Database& db, const Tag& tag);
 
 /// Errors: NOT_FOUND/TAG_UNKNOWN.

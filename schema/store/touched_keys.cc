@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "schema/store/sqlite/touched_keys.h"
+#include "schema/store/touched_keys.h"
 
 #include <algorithm>
 
 #include "schema/codec/shuffle.h"
 
-namespace dsg::sqlite {
+namespace dsg {
 namespace {
 
 constexpr char kLayout = 1;
@@ -141,6 +141,14 @@ void TakeBlocks(VarintReader* in, std::vector<BlockIndex>* blocks) {
 
 }  // namespace
 
+void TouchedKeys::Add(const TouchedKeys& other) {
+  nodes.insert(nodes.end(), other.nodes.begin(), other.nodes.end());
+  edges.insert(edges.end(), other.edges.begin(), other.edges.end());
+  tracks.insert(tracks.end(), other.tracks.begin(), other.tracks.end());
+  mesh_blocks.insert(mesh_blocks.end(), other.mesh_blocks.begin(), other.mesh_blocks.end());
+  layers_or_labels = layers_or_labels || other.layers_or_labels;
+}
+
 void TouchedKeys::Normalize() {
   SortUnique(&nodes);
   SortUnique(&edges);
@@ -174,4 +182,4 @@ bool DecodeTouched(std::string_view bytes, TouchedKeys* keys) {
   return in.ok && in.bytes.empty();
 }
 
-}  // namespace dsg::sqlite
+}  // namespace dsg
