@@ -164,7 +164,7 @@ int Serve(Flags flags) {
   store_options.create = true;
   store_options.program = "dsg-server";
   store_options.cache_bytes = flags.map_cache_mb << 20;
-  auto store = dsg::GraphStore::Open(flags.store, store_options);
+  auto store = dsg::OpenStore(flags.store, store_options);
   if (!store.ok()) return FailToStart(store.status());
   const auto maps = (*store)->ListMaps();
   if (!maps.ok()) return FailToStart(maps.status());

@@ -80,7 +80,7 @@ class Status {
 
 absl::Status Run(const Flags& flags) {
   DSG_RETURN_IF_ERROR(CheckMapName(flags.map));
-  DSG_ASSIGN_OR_RETURN(const auto store, GraphStore::Open(flags.store, {.program = "dsg-eval"}));
+  DSG_ASSIGN_OR_RETURN(const auto store, OpenStore(flags.store, {.program = "dsg-eval"}));
   DSG_ASSIGN_OR_RETURN(const auto map, store->OpenMap(flags.map));
   Report report;
   {

@@ -50,7 +50,7 @@ absl::StatusOr<std::unique_ptr<Destination>> OpenLocal(const std::string& folder
   options.quota_bytes = limits.quota_bytes;
   options.create = true;
   options.program = "dsg-ingest";
-  DSG_ASSIGN_OR_RETURN(std::unique_ptr<GraphStore> store, GraphStore::Open(folder, options));
+  DSG_ASSIGN_OR_RETURN(std::unique_ptr<GraphStore> store, OpenStore(folder, options));
   absl::StatusOr<std::unique_ptr<GraphWriter>> writer = store->OpenWriter(spec.name);
   if (ReasonOf(writer.status()) == Reason::kMapUnknown) {
     const absl::Status created = store->CreateMap(spec);

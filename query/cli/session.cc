@@ -26,7 +26,7 @@ constexpr size_t kCacheBytes = size_t{64} << 20;
 absl::StatusOr<std::unique_ptr<query::Api>> OpenApi(const CommonOptions& common) {
   if (!common.server.empty()) return client::Connect(common.server);
   const StoreOptions options{.cache_bytes = kCacheBytes, .program = "dsg"};
-  DSG_ASSIGN_OR_RETURN(std::unique_ptr<GraphStore> store, GraphStore::Open(common.store, options));
+  DSG_ASSIGN_OR_RETURN(std::unique_ptr<GraphStore> store, OpenStore(common.store, options));
   return query::MakeServiceCore(std::move(store));
 }
 

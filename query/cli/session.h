@@ -18,7 +18,7 @@ namespace dsg::cli {
 
 class Session {
  public:
-  /// Errors: as GraphStore::Open and client::Connect.
+  /// Errors: as OpenStore and client::Connect.
   static absl::StatusOr<std::unique_ptr<Session>> Open(const CommonOptions& common);
 
   /// Settles the map: the one named, or else the only one there is. To be called before map(),

@@ -36,7 +36,7 @@ bool IsMissing(const absl::Status& status) { return ReasonOf(status) == Reason::
 
 // The spec of a map that is there already; nullopt if map or store are still to be made.
 absl::StatusOr<std::optional<MapSpec>> FindMap(const std::string& folder, const std::string& name) {
-  const auto store = GraphStore::Open(folder, {});
+  const auto store = OpenStore(folder, {});
   if (!store.ok()) {
     if (IsMissing(store.status())) return std::optional<MapSpec>();
     return store.status();
@@ -84,7 +84,7 @@ absl::StatusOr<Committed> CommitAll(GraphWriter* writer, GraphDelta delta, Progr
 absl::StatusOr<Committed> CommitToStore(const CommonOptions& common, bool map_exists,
                                         TimeNs first_ns, GraphDelta delta, Progress* progress) {
   DSG_ASSIGN_OR_RETURN(const std::unique_ptr<GraphStore> store,
-                       GraphStore::Open(common.store, {.create = true, .program = "dsg import"}));
+                       OpenStore(common.store, {.create = true, .program = "dsg import"}));
   if (!map_exists) DSG_RETURN_IF_ERROR(store->CreateMap(SpecOfNewMap(common.map, first_ns)));
   DSG_ASSIGN_OR_RETURN(const std::unique_ptr<GraphWriter> writer, store->OpenWriter(common.map));
   const auto committed = CommitAll(writer.get(), std::move(delta), progress);

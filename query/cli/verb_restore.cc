@@ -72,9 +72,8 @@ class Restorer {
 
  private:
   absl::Status RestoreAll() {
-    DSG_ASSIGN_OR_RETURN(
-        const std::unique_ptr<GraphStore> store,
-        GraphStore::Open(common_.store, {.create = true, .program = "dsg restore"}));
+    DSG_ASSIGN_OR_RETURN(const std::unique_ptr<GraphStore> store,
+                         OpenStore(common_.store, {.create = true, .program = "dsg restore"}));
     for (const Wanted& wanted : wanted_) DSG_RETURN_IF_ERROR(CheckMayRestore(wanted, store.get()));
     for (const Wanted& wanted : wanted_) DSG_RETURN_IF_ERROR(Restore(wanted, store.get()));
     return absl::OkStatus();
