@@ -49,8 +49,7 @@ class GraphLookup {
 /// rotating a box into the map and back costs a few ulps at kilometre coordinates.
 inline constexpr double kBoxToleranceM = 1e-6;
 
-/// Coordinates beyond this are refused as absurd: 10,000 km is no building, and the spatial
-/// index counts millimetres in 32 bits from the map's origin (2,147 km).
+/// Coordinates beyond this are refused as absurd: 2,000 km is no building.
 inline constexpr double kCoordinateMaxM = 2.0e6;
 
 /// What was observed further than this from all that a map knows is a wrong clock, and refused:

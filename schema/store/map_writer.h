@@ -32,7 +32,7 @@ struct CompactReport {
   int64_t asset_count = 0;
   int64_t bytes_before = 0;
   int64_t bytes_after = 0;
-  /// False when a reader kept the log from being copied back: the file shrinks at a later time.
+  /// False when a reader kept space from being given back: the map shrinks at a later time.
   bool is_shrunk = true;
 };
 
@@ -56,8 +56,8 @@ struct EraseReport {
   int64_t asset_count = 0;
   int64_t bytes_before = 0;
   int64_t bytes_after = 0;
-  /// False when a reader kept the write-ahead log from being cut to nothing: it may hold the bytes
-  /// until the same call is made again.
+  /// False when a reader kept the backend from giving up all bytes: some may be left until the same
+  /// call is made again.
   bool is_clean = true;
   /// An earlier erasure was cut off, and this call has ended it, or went on with it.
   bool was_pending = false;
@@ -98,8 +98,8 @@ class MapWriter : public GraphWriter {
   /// anew of the named nodes, edges and mesh blocks after `planned_at` is kept.
   virtual absl::Status NoteErasure(const Erasure& erasure, Revision planned_at) = 0;
 
-  /// Wipes the past of what is named out of all revisions, so that neither the database nor its
-  /// log holds the bytes, and counts and digests of the revisions are of what is left. Readers find
+  /// Wipes the past of what is named out of all revisions, so that nothing that the store keeps
+  /// holds the bytes, and counts and digests of the revisions are of what is left. Readers find
   /// the map replaced. Done in steps: when stopped or killed, the map is sound and remembers what
   /// is left, and the next call does that too, whatever it names. Messages of revisions stay.
   ///
