@@ -5,7 +5,7 @@
 
 #include <chrono>
 
-#include "query/engine/call_context.h"
+#include "query/api/call_context.h"
 
 namespace dsg::server {
 

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "absl/status/status.h"
-#include "query/engine/call_context.h"
+#include "query/api/call_context.h"
 #include "server/connections.h"
 
 namespace dsg::server {

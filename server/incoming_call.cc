@@ -103,8 +103,8 @@ absl::Status IncomingCall::Parse(Message* request) {
   constexpr size_t kShares = 2;
   // One byte more than would be let in is enough to know.
   const size_t bytes = EstimateBytes(runtime_->memory->bytes_max_of_call() / kShares + 1) * kShares;
-  DSG_RETURN_IF_ERROR(method_->may_wait ? memory_.AwaitResize(bytes, call_)
-                                        : memory_.Resize(bytes));
+  DSG_RETURN_IF_ERROR(method_->info.waits_for_memory ? memory_.AwaitResize(bytes, call_)
+                                                     : memory_.Resize(bytes));
   const grpc::Status parsed =
       grpc::GenericDeserialize<grpc::ProtoBufferReader, Message>(&wire_, request);
   wire_.Clear();
@@ -140,7 +140,7 @@ void IncomingCall::LogEnd(std::string_view map, const absl::Status& status, int6
   const auto elapsed = query::CallContext::Clock::now() - begin_;
   if (!runtime_->log.Wants(status, elapsed)) return;
   runtime_->log.Write(
-      {method_->name, map, status, revision, row_count, elapsed, connection_->peer});
+      {method_->info.name, map, status, revision, row_count, elapsed, connection_->peer});
 }
 
 }  // namespace dsg::server

@@ -4,13 +4,12 @@
 #pragma once
 
 #include <memory>
-#include <string>
 #include <string_view>
-#include <utility>
 
 #include "absl/status/status.h"
 #include "grpcpp/generic/async_generic_service.h"
 #include "grpcpp/grpcpp.h"
+#include "query/api/method_info.h"
 #include "server/call_runtime.h"
 #include "server/request_cost.h"
 
@@ -22,14 +21,11 @@ namespace dsg::server {
 
 /// A method of the protocol; lives as long as the server.
 struct Method {
-  Method(std::string method_name, const google::protobuf::Descriptor* request)
-      : name(std::move(method_name)), cost(request) {}
+  Method(const query::MethodInfo& method, const google::protobuf::Descriptor* request)
+      : info(method), cost(request) {}
 
-  /// As the log names it.
-  std::string name;
+  const query::MethodInfo info;
   RequestCost cost;
-  /// A worker may wait for memory, since nobody else needs it meanwhile.
-  bool may_wait = false;
 };
 
 class IncomingCall : public grpc::ServerGenericBidiReactor, public Job {

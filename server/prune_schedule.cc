@@ -124,11 +124,11 @@ absl::Status PruneSchedule::PruneMap(const std::string& map,
   request.set_author("dsg-server policies");
   request.set_share_max(file_.share_max.value_or(kShareMaxDefault));
   for (const PrunePolicy& policy : policies) query::ToProto(policy, request.add_policies());
-  DSG_ASSIGN_OR_RETURN(const std::unique_ptr<query::PruneCursor> cursor, core_->OpenPrune(request));
+  DSG_ASSIGN_OR_RETURN(const auto cursor, core_->Prune(call_, request));
   v1::PruneResponse all;
   do {
     v1::PruneResponse message;
-    DSG_RETURN_IF_ERROR(cursor->Next(call_, &message));
+    DSG_RETURN_IF_ERROR(cursor->Next(call_, &message).status());
     all.MergeFrom(message);
     if (cursor->done()) break;
   } while (clock_->WaitUntil(clock_->Now() + options_.pause));

@@ -12,32 +12,23 @@
 
 namespace dsg::server {
 
-/// The method of ServiceCore that opens the stream.
+/// The method of Api that opens the stream.
 template <typename Request, typename Reply>
-using OpenStream = absl::StatusOr<std::unique_ptr<query::StreamCursor<Reply>>> (
-    query::ServiceCore::*)(const Request&);
-
-/// What bounds a stream.
-enum class StreamKind {
-  /// Ends by itself, and within kDeadlineMax.
-  kAnswer,
-  /// Lasts as long as its reader wants, and takes what it is told.
-  kWatch,
-  /// Ends by itself, whenever that is.
-  kWork,
-};
+using OpenStream = query::CursorOr<Reply> (query::Api::*)(const query::CallContext&,
+                                                          const Request&);
 
 // Run, the wait for news and OnWriteDone take turns, so one message is in flight at most, and
 // Finish comes once.
 template <typename Request, typename Reply>
 class StreamCall final : public IncomingCall {
  public:
-  StreamCall(CallRuntime* runtime, const Method* method, StreamKind kind,
-             OpenStream<Request, Reply> open, grpc::GenericCallbackServerContext* context)
+  StreamCall(CallRuntime* runtime, const Method* method, OpenStream<Request, Reply> open,
+             grpc::GenericCallbackServerContext* context)
       : IncomingCall(runtime, method, context,
-                     kind == StreamKind::kAnswer ? BoundDeadline(context->deadline())
-                                                 : WatchDeadline(context->deadline())),
-        kind_(kind),
+                     method->info.lifetime == query::Lifetime::kAnswer
+                         ? BoundDeadline(context->deadline())
+                         : WatchDeadline(context->deadline())),
+        lifetime_(method->info.lifetime),
         open_(open),
         place_(runtime->guard->Guard(context->c_call(), call().deadline())) {
     Receive();
@@ -75,7 +66,7 @@ class StreamCall final : public IncomingCall {
   }
 
  private:
-  bool is_watch() const { return kind_ == StreamKind::kWatch; }
+  bool is_watch() const { return lifetime_ == query::Lifetime::kWatch; }
   std::atomic<int>& open_count() {
     return is_watch() ? runtime().open_watch_count : runtime().open_stream_count;
   }
@@ -99,37 +90,39 @@ class StreamCall final : public IncomingCall {
   // How long until there is something to tell.
   absl::StatusOr<std::chrono::nanoseconds> Prepare() {
     DSG_RETURN_IF_ERROR(call().Check());
-    if (kind_ != StreamKind::kAnswer && runtime().stopping) return ShuttingDownError();
+    if (lifetime_ != query::Lifetime::kAnswer && runtime().stopping) return ShuttingDownError();
     if (cursor_ == nullptr) {
       DSG_RETURN_IF_ERROR(Parse(&request_));
-      DSG_ASSIGN_OR_RETURN(cursor_, (runtime().core->*open_)(request_));
+      DSG_ASSIGN_OR_RETURN(cursor_, (runtime().core->*open_)(call(), request_));
     }
     return cursor_->Wait();
   }
 
   void Write() {
-    const absl::Status status = ReadNext();
-    if (!status.ok()) {
-      Finish(LastWords(status));
+    const absl::StatusOr<bool> has_message = ReadNext();
+    if (!has_message.ok() || !*has_message) {
+      Finish(LastWords(has_message.status()));
       return;
     }
     place_->BeginWrite();
     if (cursor_->done()) {
-      StartWriteAndFinish(&packed(), grpc::WriteOptions(), LastWords(status));
+      StartWriteAndFinish(&packed(), grpc::WriteOptions(), LastWords(absl::OkStatus()));
     } else {
       StartWrite(&packed());
     }
   }
 
-  // While its reader takes it, a message is only what is sent.
-  absl::Status ReadNext() {
+  // While its reader takes it, a message is only what is sent. False: the stream has ended.
+  absl::StatusOr<bool> ReadNext() {
     Reply message;
-    DSG_RETURN_IF_ERROR(cursor_->Next(call(), &message));
+    DSG_ASSIGN_OR_RETURN(const bool has_message, cursor_->Next(call(), &message));
+    if (!has_message) return false;
     if constexpr (requires { message.has_header(); }) {
       if (message.has_header()) revision_ = message.header().read_revision();
     }
     row_count_ += RowCountOf(message);
-    return Pack(message);
+    DSG_RETURN_IF_ERROR(Pack(message));
+    return true;
   }
 
   // Logs the call and prepares its trailers. A call that was ended for its reader's sake looks
@@ -140,7 +133,7 @@ class StreamCall final : public IncomingCall {
     return ForCaller(status);
   }
 
-  const StreamKind kind_;
+  const query::Lifetime lifetime_;
   const OpenStream<Request, Reply> open_;
   const std::unique_ptr<CallGuard::Place> place_;
   bool is_counted_ = false;

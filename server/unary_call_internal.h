@@ -50,14 +50,16 @@ inline google::protobuf::ArenaOptions ArenaOptionsOn(const ArenaBlocks::Lent& bl
   return options;
 }
 
+/// The method of Api that answers.
+template <typename Request, typename Reply>
+using AskUnary = absl::Status (query::Api::*)(const query::CallContext&, const Request&, Reply*);
+
 /// Deletes itself once gRPC is done with it. A worker finishes it exactly once, also when it was
 /// cancelled.
 template <typename Request, typename Reply>
 class UnaryCall final : public IncomingCall {
  public:
-  using Ask = absl::Status (query::Api::*)(const query::CallContext&, const Request&, Reply*);
-
-  UnaryCall(CallRuntime* runtime, const Method* method, Ask ask,
+  UnaryCall(CallRuntime* runtime, const Method* method, AskUnary<Request, Reply> ask,
             grpc::GenericCallbackServerContext* context)
       : IncomingCall(runtime, method, context, BoundDeadline(context->deadline())), ask_(ask) {
     Receive();
@@ -107,7 +109,7 @@ class UnaryCall final : public IncomingCall {
     return memory().Resize(packed().Length());
   }
 
-  const Ask ask_;
+  const AskUnary<Request, Reply> ask_;
   std::unique_ptr<CallGuard::Place> reply_guard_;
 };
 

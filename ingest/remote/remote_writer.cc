@@ -6,10 +6,12 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "dsg/v1/ingest_service.grpc.pb.h"
-#include "dsg/v1/map_service.grpc.pb.h"
-#include "dsg/v1/query_service.grpc.pb.h"
-#include "ingest/remote/remote_call.h"
+#include "dsg/v1/ingest_service.pb.h"
+#include "dsg/v1/map_service.pb.h"
+#include "dsg/v1/query_service.pb.h"
+#include "query/api/api.h"
+#include "query/client/remote_api.h"
+#include "query/client/retry.h"
 #include "schema/base/status.h"
 #include "schema/codec/patch.h"
 #include "schema/codec/proto_convert.h"
@@ -18,20 +20,28 @@ namespace dsg::ingest {
 namespace {
 
 constexpr int kPageSize = 500;
+// An answer may be so long: a page of nodes, or 1000 poses.
+constexpr int kReceiveBytesMax = 64 << 20;
 // Between a look at the agents and the commit others may write, again and again.
 constexpr int kGuardedTriesMax = 100;
 
 /// What all calls to one server share.
 struct Connection {
-  Connection(const std::string& address, const RemoteOptions& options)
-      : channel(OpenChannel(address)), caller(address, options.retry_ns_max, options.tell) {}
+  Connection(std::unique_ptr<query::Api> connected, const std::string& address,
+             const RemoteOptions& options)
+      : api(std::move(connected)), caller(address, options.retry_ns_max, options.tell) {}
 
-  absl::Status Call(const std::function<grpc::Status(grpc::ClientContext*)>& attempt) {
-    return caller.Call(attempt);
+  /// Makes one call of the api until it is answered.
+  template <class Request, class Reply>
+  absl::Status Call(absl::Status (query::Api::*method)(const query::CallContext&, const Request&,
+                                                       Reply*),
+                    const Request& request, Reply* reply) {
+    return caller.Call(
+        [&](const query::CallContext& call) { return (api.get()->*method)(call, request, reply); });
   }
 
-  std::shared_ptr<grpc::Channel> channel;
-  ServerCaller caller;
+  const std::unique_ptr<query::Api> api;
+  client::PatientCaller caller;
 };
 
 // What a robot, or who looks after it, can do about a commit that the server refused.
@@ -59,9 +69,8 @@ absl::Status Advise(const absl::Status& status, const std::string& address) {
 }
 
 // All nodes of a layer, of one revision.
-absl::Status ListLayer(Connection& connection, v1::QueryService::Stub& query,
-                       const std::string& map, const std::string& layer, std::vector<Node>* nodes,
-                       Revision* revision) {
+absl::Status ListLayer(Connection& connection, const std::string& map, const std::string& layer,
+                       std::vector<Node>* nodes, Revision* revision) {
   v1::ListNodesRequest request;
   request.set_map(map);
   request.mutable_filter()->set_layer(layer);
@@ -70,9 +79,7 @@ absl::Status ListLayer(Connection& connection, v1::QueryService::Stub& query,
   const LayerTable layers;
   do {
     v1::ListNodesResponse response;
-    DSG_RETURN_IF_ERROR(connection.Call([&](grpc::ClientContext* context) {
-      return query.ListNodes(context, request, &response);
-    }));
+    DSG_RETURN_IF_ERROR(connection.Call(&query::Api::ListNodes, request, &response));
     *revision = response.header().read_revision();
     for (const v1::Node& proto : response.nodes()) {
       DSG_ASSIGN_OR_RETURN(Node node, FromProto(proto, layers));
@@ -89,10 +96,7 @@ absl::Status ListLayer(Connection& connection, v1::QueryService::Stub& query,
 class RemoteWriter : public GraphWriter {
  public:
   RemoteWriter(Connection& connection, std::string map)
-      : connection_(connection),
-        stub_(v1::IngestService::NewStub(connection.channel)),
-        query_(v1::QueryService::NewStub(connection.channel)),
-        map_(std::move(map)) {}
+      : connection_(connection), map_(std::move(map)) {}
 
   absl::StatusOr<CommitResult> Commit(GraphDelta delta) override {
     // The wire names layers; those of earlier deltas must be known by then.
@@ -103,21 +107,20 @@ class RemoteWriter : public GraphWriter {
     ToProto(delta, layers_, request.mutable_delta());
     // What a log says of a thing is all that is to be believed of it.
     MarkWhole(request.mutable_delta());
-    if (request.ByteSizeLong() > static_cast<size_t>(kSendBytesMax)) {
-      return MakeError(
-          Reason::kLimitExceeded,
-          absl::StrCat("part ", delta.sequence, " of session ", delta.session_id, " is ",
-                       request.ByteSizeLong(), " bytes long, a server takes ", kSendBytesMax,
-                       "; ingest into the store's folder with --store instead"),
-          {{"sequence", absl::StrCat(delta.sequence)}});
+    if (request.ByteSizeLong() > static_cast<size_t>(client::kMessageBytesMax)) {
+      return MakeError(Reason::kLimitExceeded,
+                       absl::StrCat("part ", delta.sequence, " of session ", delta.session_id,
+                                    " is ", request.ByteSizeLong(), " bytes long, a server takes ",
+                                    client::kMessageBytesMax,
+                                    "; ingest into the store's folder with --store instead"),
+                       {{"sequence", absl::StrCat(delta.sequence)}});
     }
     v1::CommitResponse response;
     absl::Status status = absl::OkStatus();
     const std::vector<Node> agents = NewAgents(delta);
     for (int tries = 0; tries < kGuardedTriesMax; ++tries) {
       if (!agents.empty()) DSG_RETURN_IF_ERROR(Guard(agents, request.mutable_delta()));
-      status = connection_.Call(
-          [&](grpc::ClientContext* context) { return stub_->Commit(context, request, &response); });
+      status = connection_.Call(&query::Api::Commit, request, &response);
       if (agents.empty() || ReasonOf(status) != Reason::kParentRevisionStale) break;
     }
     if (!status.ok()) return Advise(status, connection_.caller.address());
@@ -130,9 +133,7 @@ class RemoteWriter : public GraphWriter {
     request.set_map(map_);
     request.set_session_id(session_id);
     v1::GetSessionResponse response;
-    DSG_RETURN_IF_ERROR(connection_.Call([&](grpc::ClientContext* context) {
-      return stub_->GetSession(context, request, &response);
-    }));
+    DSG_RETURN_IF_ERROR(connection_.Call(&query::Api::GetSession, request, &response));
     return SessionState{response.last_sequence(), response.last_revision(),
                         response.first_revision()};
   }
@@ -151,7 +152,7 @@ class RemoteWriter : public GraphWriter {
   absl::Status Guard(const std::vector<Node>& agents, v1::GraphDelta* delta) {
     std::vector<Node> known;
     Revision revision = 0;
-    DSG_RETURN_IF_ERROR(ListLayer(connection_, *query_, map_, "agents", &known, &revision));
+    DSG_RETURN_IF_ERROR(ListLayer(connection_, map_, "agents", &known, &revision));
     for (const Node& agent : agents) {
       const auto same_id = std::find_if(known.begin(), known.end(),
                                         [&](const Node& node) { return node.id == agent.id; });
@@ -168,8 +169,6 @@ class RemoteWriter : public GraphWriter {
   }
 
   Connection& connection_;
-  std::unique_ptr<v1::IngestService::Stub> stub_;
-  std::unique_ptr<v1::QueryService::Stub> query_;
   std::string map_;
   LayerTable layers_;
   /// Agents whose ids this writer has made its own.
@@ -180,7 +179,6 @@ class GrpcRemoteMap : public RemoteMap {
  public:
   GrpcRemoteMap(std::unique_ptr<Connection> connection, MapSpec spec)
       : connection_(std::move(connection)),
-        query_(v1::QueryService::NewStub(connection_->channel)),
         spec_(std::move(spec)),
         writer_(*connection_, spec_.name) {}
 
@@ -190,7 +188,7 @@ class GrpcRemoteMap : public RemoteMap {
   absl::StatusOr<std::vector<Node>> ListNodes(const std::string& layer) override {
     std::vector<Node> nodes;
     Revision revision = 0;
-    DSG_RETURN_IF_ERROR(ListLayer(*connection_, *query_, spec_.name, layer, &nodes, &revision));
+    DSG_RETURN_IF_ERROR(ListLayer(*connection_, spec_.name, layer, &nodes, &revision));
     return nodes;
   }
 
@@ -203,9 +201,7 @@ class GrpcRemoteMap : public RemoteMap {
     std::vector<NodeId> children;
     do {
       v1::ListEdgesResponse response;
-      DSG_RETURN_IF_ERROR(connection_->Call([&](grpc::ClientContext* context) {
-        return query_->ListEdges(context, request, &response);
-      }));
+      DSG_RETURN_IF_ERROR(connection_->Call(&query::Api::ListEdges, request, &response));
       for (const v1::Edge& edge : response.edges()) {
         DSG_ASSIGN_OR_RETURN(const NodeId child, ParseNodeId(edge.target()));
         children.push_back(child);
@@ -229,8 +225,7 @@ class GrpcRemoteMap : public RemoteMap {
     request.set_id(ToString(agent));
     request.set_view(v1::NODE_VIEW_BASIC);
     v1::GetNodeResponse response;
-    const absl::Status status = connection_->Call(
-        [&](grpc::ClientContext* context) { return query_->GetNode(context, request, &response); });
+    const absl::Status status = connection_->Call(&query::Api::GetNode, request, &response);
     if (ReasonOf(status) == Reason::kNodeUnknown) return std::nullopt;
     DSG_RETURN_IF_ERROR(status);
     // An unknown id may be another node's name.
@@ -252,14 +247,14 @@ class GrpcRemoteMap : public RemoteMap {
     request.set_from_ns(from_ns);
     request.set_to_ns(to_ns);
     std::vector<v1::TimedPose> received;
-    const absl::Status status = connection_->Call([&](grpc::ClientContext* context) {
+    const absl::Status status = connection_->caller.Call([&](const query::CallContext& call) {
       received.clear();
-      const auto reader = query_->GetTrajectory(context, request);
-      v1::GetTrajectoryResponse response;
-      while (reader->Read(&response)) {
-        received.insert(received.end(), response.poses().begin(), response.poses().end());
-      }
-      return reader->Finish();
+      return query::ReadStream(call, connection_->api->GetTrajectory(call, request),
+                               [&](const v1::GetTrajectoryResponse& response) {
+                                 received.insert(received.end(), response.poses().begin(),
+                                                 response.poses().end());
+                                 return true;
+                               });
     });
     const Reason reason = ReasonOf(status);
     if (reason == Reason::kTimeOutsideTrack || reason == Reason::kAgentUnknown) {
@@ -277,17 +272,13 @@ class GrpcRemoteMap : public RemoteMap {
 
  private:
   std::unique_ptr<Connection> connection_;
-  std::unique_ptr<v1::QueryService::Stub> query_;
   MapSpec spec_;
   RemoteWriter writer_;
 };
 
-absl::StatusOr<std::optional<MapSpec>> FindMap(Connection& connection, v1::MapService::Stub& maps,
-                                               const std::string& name) {
+absl::StatusOr<std::optional<MapSpec>> FindMap(Connection& connection, const std::string& name) {
   v1::ListMapsResponse response;
-  DSG_RETURN_IF_ERROR(connection.Call([&](grpc::ClientContext* context) {
-    return maps.ListMaps(context, v1::ListMapsRequest(), &response);
-  }));
+  DSG_RETURN_IF_ERROR(connection.Call(&query::Api::ListMaps, v1::ListMapsRequest(), &response));
   for (const v1::MapSpec& map : response.maps()) {
     if (map.name() != name) continue;
     DSG_ASSIGN_OR_RETURN(MapSpec spec, FromProto(map));
@@ -296,12 +287,11 @@ absl::StatusOr<std::optional<MapSpec>> FindMap(Connection& connection, v1::MapSe
   return std::nullopt;
 }
 
-absl::Status CreateMap(Connection& connection, v1::MapService::Stub& maps, const MapSpec& spec) {
+absl::Status CreateMap(Connection& connection, const MapSpec& spec) {
   v1::CreateMapRequest request;
   ToProto(spec, request.mutable_map());
   v1::CreateMapResponse response;
-  const absl::Status status = connection.Call(
-      [&](grpc::ClientContext* context) { return maps.CreateMap(context, request, &response); });
+  const absl::Status status = connection.Call(&query::Api::CreateMap, request, &response);
   // A repeated call, or another client that was faster; its map serves as well.
   return ReasonOf(status) == Reason::kMapExists ? absl::OkStatus() : status;
 }
@@ -311,12 +301,17 @@ absl::Status CreateMap(Connection& connection, v1::MapService::Stub& maps, const
 absl::StatusOr<std::unique_ptr<RemoteMap>> OpenRemoteMap(const std::string& address,
                                                          const MapSpec& spec,
                                                          const RemoteOptions& options) {
-  auto connection = std::make_unique<Connection>(address, options);
-  const std::unique_ptr<v1::MapService::Stub> maps = v1::MapService::NewStub(connection->channel);
-  DSG_ASSIGN_OR_RETURN(std::optional<MapSpec> found, FindMap(*connection, *maps, spec.name));
+  DSG_ASSIGN_OR_RETURN(
+      std::unique_ptr<query::Api> api,
+      client::Connect(client::ServerAddress{.address = address,
+                                            .repeats = false,
+                                            .keeps_alive = true,
+                                            .receive_bytes_max = kReceiveBytesMax}));
+  auto connection = std::make_unique<Connection>(std::move(api), address, options);
+  DSG_ASSIGN_OR_RETURN(std::optional<MapSpec> found, FindMap(*connection, spec.name));
   if (!found.has_value()) {
-    DSG_RETURN_IF_ERROR(CreateMap(*connection, *maps, spec));
-    DSG_ASSIGN_OR_RETURN(found, FindMap(*connection, *maps, spec.name));
+    DSG_RETURN_IF_ERROR(CreateMap(*connection, spec));
+    DSG_ASSIGN_OR_RETURN(found, FindMap(*connection, spec.name));
   }
   if (!found.has_value()) {
     return MakeError(Reason::kMapUnknown,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A GraphWriter that commits through a dsg-server; the only gRPC in ingest.
+// A map on a dsg-server, and a GraphWriter that commits to it.
 #pragma once
 
 #include <memory>
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "ingest/remote/wait_notes.h"
+#include "query/client/wait_notes.h"
 #include "schema/model/layer.h"
 #include "schema/model/node.h"
 #include "schema/store/graph_writer.h"
@@ -44,7 +44,7 @@ struct RemoteOptions {
   TimeNs retry_ns_max = 600 * kNsPerSecond;
   /// Gets a sentence when a server does not answer, every few seconds while it does not, and when
   /// it does again. May be empty.
-  TellWait tell;
+  client::TellWait tell;
 };
 
 /// Opens a map on the server at `address` ("unix:PATH" or "HOST:PORT"), creating it from `spec`

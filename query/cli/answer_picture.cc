@@ -73,7 +73,7 @@ absl::StatusOr<std::vector<std::vector<Eigen::Vector3d>>> WayOf(Session* session
     }
     return true;
   };
-  DSG_RETURN_IF_ERROR(session->api().GetTrajectory(session->NewCall(), request, take));
+  DSG_RETURN_IF_ERROR(session->Read(&query::Api::GetTrajectory, request, take));
   return pieces;
 }
 

@@ -59,12 +59,12 @@ absl::Status CopyArchive(Session* session, const std::string& map, const query::
   v1::ReadArchiveRequest request;
   request.set_map(map);
   absl::Status written;
-  DSG_RETURN_IF_ERROR(
-      session->api().ReadArchive(call, request, [&](const v1::ReadArchiveResponse& message) {
-        written = write(message.content());
-        progress(message.progress());
-        return written.ok();
-      }));
+  DSG_RETURN_IF_ERROR(query::ReadStream(call, session->api().ReadArchive(call, request),
+                                        [&](const v1::ReadArchiveResponse& message) {
+                                          written = write(message.content());
+                                          progress(message.progress());
+                                          return written.ok();
+                                        }));
   return written;
 }
 

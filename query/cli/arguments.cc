@@ -5,8 +5,8 @@
 #include <iterator>
 
 #include "absl/strings/str_cat.h"
-#include "query/cli/grammar.h"
 #include "query/cli/spark_export.h"
+#include "query/cli/verb_list.h"
 #include "schema/base/status.h"
 
 namespace dsg::cli {
@@ -128,6 +128,7 @@ absl::StatusOr<Command> ParseArguments(const std::vector<std::string>& arguments
   AddKeepVerbs(&grammar);
   AddMergeVerb(&grammar);
   AddPruneVerb(&grammar);
+  for (const auto add : kOwnVerbs) add(&grammar);
   DSG_RETURN_IF_ERROR(grammar.Parse(arguments));
   Command command = grammar.command();
   if (std::holds_alternative<HelpVerb>(command.verb)) return command;

@@ -4,7 +4,9 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
+#include <ostream>
 #include <string>
 #include <variant>
 #include <vector>
@@ -47,17 +49,26 @@ struct CommonOptions {
   double timeout_s = 0.0;
 };
 
+class Session;
+
+/// A verb that stands in one file, with its options and what it does; see verb_list.h. It asks
+/// about one map.
+struct OwnVerb {
+  /// Asks, then writes the answer to `out`; nothing on an error.
+  std::function<absl::Status(Session* session, std::ostream& out)> run;
+};
+
 /// The user asked how to use the program.
 struct HelpVerb {
   std::string text;
 };
 
-using Verb =
-    std::variant<WhereVerb, TrackVerb, ShapeVerb, WhoVerb, MetVerb, PickedVerb, PredictVerb,
-                 ListVerb, EdgesVerb, ShowVerb, NearVerb, FindVerb, AroundVerb, SubgraphVerb,
-                 PathVerb, CollideVerb, LogVerb, DiffVerb, WatchVerb, StatsVerb, MapsVerb,
-                 VersionVerb, VerifyVerb, UpgradeVerb, TagVerb, CompactVerb, RevertVerb, BackupVerb,
-                 RestoreVerb, MergeVerb, PruneVerb, ImportVerb, ExportVerb, MapVerb, HelpVerb>;
+using Verb = std::variant<WhereVerb, TrackVerb, ShapeVerb, WhoVerb, MetVerb, PickedVerb,
+                          PredictVerb, ListVerb, EdgesVerb, ShowVerb, NearVerb, FindVerb,
+                          AroundVerb, SubgraphVerb, PathVerb, CollideVerb, LogVerb, DiffVerb,
+                          WatchVerb, StatsVerb, MapsVerb, VersionVerb, VerifyVerb, UpgradeVerb,
+                          TagVerb, CompactVerb, RevertVerb, BackupVerb, RestoreVerb, MergeVerb,
+                          PruneVerb, ImportVerb, ExportVerb, MapVerb, OwnVerb, HelpVerb>;
 
 struct Command {
   CommonOptions common;

@@ -48,6 +48,24 @@ class Grammar {
     return {app, verb.get()};
   }
 
+  /// A verb that asks about one map by `run(session, options, out)`. `example` is its command line
+  /// without "dsg" and its name.
+  template <class Options>
+  std::pair<CLI::App*, Options*> AddOwn(
+      const std::string& name, const std::string& what, const std::string& example,
+      absl::Status (*run)(Session* session, const Options& options, std::ostream& out),
+      unsigned takes = kQuestion) {
+    CLI::App* app = AddApp(name, what, takes);
+    app->footer("Example: dsg " + name + " " + example + "\n" + kTimeHelp);
+    const auto options = std::make_shared<Options>();
+    app->callback([this, options, run] {
+      command_.verb = OwnVerb{[options, run](Session* session, std::ostream& out) {
+        return run(session, *options, out);
+      }};
+    });
+    return {app, options.get()};
+  }
+
   CommonOptions* common() { return &command_.common; }
 
   absl::Status Parse(std::vector<std::string> arguments);

@@ -148,12 +148,12 @@ class Reader {
       last_ns = in.time_ns();
       last_map = point_map;
     };
-    DSG_RETURN_IF_ERROR(api_.GetTrajectory(session_.NewCall(), request,
-                                           [&](const v1::GetTrajectoryResponse& message) {
-                                             for (const v1::TimedPose& pose : message.poses())
-                                               take(pose);
-                                             return broken.ok();
-                                           }));
+    DSG_RETURN_IF_ERROR(session_.Read(&query::Api::GetTrajectory, request,
+                                      [&](const v1::GetTrajectoryResponse& message) {
+                                        for (const v1::TimedPose& pose : message.poses())
+                                          take(pose);
+                                        return broken.ok();
+                                      }));
     DSG_RETURN_IF_ERROR(broken);
     // The very last position is shown as such, however short the step to it.
     if (last_ns.has_value() && track.pieces.back().back() != last_map) {
@@ -189,7 +189,7 @@ class Reader {
       }
       return true;
     };
-    DSG_RETURN_IF_ERROR(api_.GetMesh(session_.NewCall(), request, take));
+    DSG_RETURN_IF_ERROR(session_.Read(&query::Api::GetMesh, request, take));
     return broken;
   }
 

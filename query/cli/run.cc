@@ -114,6 +114,7 @@ class Dispatcher {
     return RunExport(session, verb, out_, errors_);
   }
   absl::Status Ask(Session* session, const MapVerb& verb) { return RunMap(session, verb, out_); }
+  absl::Status Ask(Session* session, const OwnVerb& verb) { return verb.run(session, out_); }
 
   const Command& command_;
   const Environment& environment_;

@@ -9,9 +9,9 @@
 #include <utility>
 
 #include "absl/status/statusor.h"
+#include "query/api/api.h"
 #include "query/cli/arguments.h"
 #include "query/cli/time_text.h"
-#include "query/engine/api.h"
 #include "schema/model/layer.h"
 
 namespace dsg::cli {
@@ -33,6 +33,15 @@ class Session {
 
   /// Bounds of the next call, from now.
   query::CallContext NewCall() const;
+
+  /// Reads a stream of the api with NewCall(); see query::ReadStream.
+  template <class Request, class Reply, class Take>
+  absl::Status Read(query::CursorOr<Reply> (query::Api::*method)(const query::CallContext&,
+                                                                 const Request&),
+                    const Request& request, const Take& take) const {
+    const query::CallContext call = NewCall();
+    return query::ReadStream(call, (api_.get()->*method)(call, request), take);
+  }
 
   /// A request about the map, at the revision asked for.
   template <class Request>

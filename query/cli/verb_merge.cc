@@ -159,14 +159,15 @@ absl::StatusOr<v1::MergeMapsResponse> Call(Session* session, const v1::MergeMaps
   query::CallContext call = session->NewCall();
   const InterruptGuard guard(&call);
   v1::MergeMapsResponse last;
-  DSG_RETURN_IF_ERROR(
-      session->api().MergeMaps(call, request, [&](const v1::MergeMapsResponse& message) {
-        progress.Update(message.progress());
-        auto ids = std::move(*last.mutable_node_ids());
-        last = message;
-        for (const auto& [before, after] : ids) (*last.mutable_node_ids())[before] = after;
-        return true;
-      }));
+  DSG_RETURN_IF_ERROR(query::ReadStream(call, session->api().MergeMaps(call, request),
+                                        [&](const v1::MergeMapsResponse& message) {
+                                          progress.Update(message.progress());
+                                          auto ids = std::move(*last.mutable_node_ids());
+                                          last = message;
+                                          for (const auto& [before, after] : ids)
+                                            (*last.mutable_node_ids())[before] = after;
+                                          return true;
+                                        }));
   return last;
 }
 

@@ -82,11 +82,12 @@ absl::StatusOr<v1::PruneResponse> Run(Session* session, const v1::PruneRequest& 
   query::CallContext call = session->NewCall();
   const InterruptGuard guard(&call);
   v1::PruneResponse all;
-  DSG_RETURN_IF_ERROR(session->api().Prune(call, request, [&](const v1::PruneResponse& message) {
-    progress.Update(message.progress());
-    all.MergeFrom(message);
-    return true;
-  }));
+  DSG_RETURN_IF_ERROR(query::ReadStream(call, session->api().Prune(call, request),
+                                        [&](const v1::PruneResponse& message) {
+                                          progress.Update(message.progress());
+                                          all.MergeFrom(message);
+                                          return true;
+                                        }));
   return all;
 }
 

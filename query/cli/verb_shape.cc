@@ -48,7 +48,7 @@ absl::Status ListBodies(Session* session, v1::GetAgentShapeRequest request, std:
     all.MergeFrom(message);
     return all.shapes_size() < count_max;
   };
-  DSG_RETURN_IF_ERROR(session->api().GetAgentShape(session->NewCall(), request, merge));
+  DSG_RETURN_IF_ERROR(session->Read(&query::Api::GetAgentShape, request, merge));
   if (all.shapes_size() > count_max) {
     all.mutable_shapes()->DeleteSubrange(static_cast<int>(count_max),
                                          all.shapes_size() - static_cast<int>(count_max));
@@ -156,8 +156,8 @@ absl::Status WriteBodies(Session* session, v1::GetAgentShapeRequest request, con
   request.add_parts(v1::SHAPE_PART_VERTICES);
   request.add_parts(v1::SHAPE_PART_TOPOLOGY);
   BodyWriter writer(*session, verb);
-  DSG_RETURN_IF_ERROR(session->api().GetAgentShape(
-      session->NewCall(), request,
+  DSG_RETURN_IF_ERROR(session->Read(
+      &query::Api::GetAgentShape, request,
       [&](const v1::GetAgentShapeResponse& message) { return writer.Take(message); }));
   DSG_RETURN_IF_ERROR(writer.status());
   if (writer.files().empty()) {

@@ -131,8 +131,8 @@ absl::Status RunWatch(Session* session, const WatchVerb& verb, std::ostream& out
     return goes_on;
   };
   while (true) {
-    const absl::Status status =
-        session->api().WatchMap(call, RequestFor(*session, verb, printer), take);
+    const absl::Status status = query::ReadStream(
+        call, session->api().WatchMap(call, RequestFor(*session, verb, printer)), take);
     DSG_RETURN_IF_ERROR(printer.status());
     if (printer.IsDone() || call.cancelled()) return absl::OkStatus();
     // A server that was restarted is asked to go on from where the watch was. While it shuts down

@@ -113,7 +113,7 @@ absl::Status RunTrack(Session* session, const TrackVerb& verb, std::ostream& out
     return written.ok() && poses_left > 0;
   };
   DSG_RETURN_IF_ERROR(
-      session->times().Explain(session->api().GetTrajectory(session->NewCall(), request, take)));
+      session->times().Explain(session->Read(&query::Api::GetTrajectory, request, take)));
   DSG_RETURN_IF_ERROR(written);
   if (is_json) {
     json.End();

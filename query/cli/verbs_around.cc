@@ -51,7 +51,7 @@ absl::Status RunSubgraph(Session* session, const SubgraphVerb& verb, std::ostrea
     all.MergeFrom(message);
     return true;
   };
-  DSG_RETURN_IF_ERROR(session->api().GetSubgraph(session->NewCall(), request, merge));
+  DSG_RETURN_IF_ERROR(session->Read(&query::Api::GetSubgraph, request, merge));
   // The root alone: perhaps nothing could pass the filter.
   if (all.nodes_size() <= 1) {
     DSG_RETURN_IF_ERROR(CheckWords(session, "", verb.filter.class_name, ""));

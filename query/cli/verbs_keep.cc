@@ -66,12 +66,12 @@ absl::Status RunCompact(Session* session, const CompactVerb& verb, std::ostream&
   query::CallContext call = session->NewCall();
   const InterruptGuard guard(&call);
   v1::CompactResponse last;
-  DSG_RETURN_IF_ERROR(
-      session->api().Compact(call, request, [&](const v1::CompactResponse& message) {
-        progress.Update(message.progress());
-        last = message;
-        return true;
-      }));
+  DSG_RETURN_IF_ERROR(query::ReadStream(call, session->api().Compact(call, request),
+                                        [&](const v1::CompactResponse& message) {
+                                          progress.Update(message.progress());
+                                          last = message;
+                                          return true;
+                                        }));
   if (session->common().json) return WriteJson(last, out);
   out << RenderCompact(last);
   return absl::OkStatus();
@@ -92,11 +92,12 @@ absl::Status RunRevert(Session* session, const RevertVerb& verb, std::ostream& o
   query::CallContext call = session->NewCall();
   const InterruptGuard guard(&call);
   v1::RevertResponse last;
-  DSG_RETURN_IF_ERROR(session->api().Revert(call, request, [&](const v1::RevertResponse& message) {
-    progress.Update(message.progress());
-    last = message;
-    return true;
-  }));
+  DSG_RETURN_IF_ERROR(query::ReadStream(call, session->api().Revert(call, request),
+                                        [&](const v1::RevertResponse& message) {
+                                          progress.Update(message.progress());
+                                          last = message;
+                                          return true;
+                                        }));
   if (session->common().json) return WriteJson(last, out);
   const std::string to =
       verb.to.tag.empty() ? absl::StrCat("revision ", request.revision()) : "tag " + verb.to.tag;

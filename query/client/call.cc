@@ -2,9 +2,7 @@
 #include "query/client/call.h"
 
 #include <algorithm>
-#include <array>
 #include <string_view>
-#include <thread>
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
@@ -18,8 +16,9 @@ using query::CallContext;
 // How soon a cancellation is noticed.
 constexpr std::chrono::milliseconds kPollPeriod{20};
 
-constexpr std::array<std::chrono::milliseconds, 3> kBackoffs{
-    std::chrono::milliseconds{100}, std::chrono::milliseconds{300}, std::chrono::milliseconds{900}};
+// Signs of life of a watch; see map_service.proto.
+constexpr int64_t kWatchIdleDefaultNs = 5'000'000'000;
+constexpr int64_t kWatchIdleMaxNs = 86'400'000'000'000;
 
 std::chrono::system_clock::time_point WallDeadline(const CallContext& call,
                                                    std::chrono::seconds timeout) {
@@ -29,17 +28,6 @@ std::chrono::system_clock::time_point WallDeadline(const CallContext& call,
   }
   return now + std::chrono::duration_cast<std::chrono::system_clock::duration>(
                    call.deadline() - CallContext::Clock::now());
-}
-
-// False if the call must not be tried again.
-bool Pause(const CallContext& call, std::chrono::milliseconds length) {
-  const auto end = CallContext::Clock::now() + length;
-  if (end >= call.deadline()) return false;
-  for (auto now = CallContext::Clock::now(); now < end; now = CallContext::Clock::now()) {
-    if (call.cancelled()) return false;
-    std::this_thread::sleep_for(std::min<CallContext::Clock::duration>(kPollPeriod, end - now));
-  }
-  return !call.cancelled();
 }
 
 std::string_view Trailer(const grpc::ClientContext& context) {
@@ -57,9 +45,27 @@ absl::Status NoServer(const std::string& address, const std::string& why) {
 
 }  // namespace
 
-CallInFlight::CallInFlight(const CallContext& call, const std::string& address,
+CallLimits LimitsOf(query::Lifetime lifetime, int64_t idle_ns) {
+  constexpr std::chrono::seconds kForEver(0);
+  switch (lifetime) {
+    case query::Lifetime::kAnswer:
+      return {};
+    case query::Lifetime::kWatch: {
+      // Lasts until its reader has enough, or nothing is heard for three signs of life.
+      const int64_t period_ns = idle_ns > 0 ? idle_ns : kWatchIdleDefaultNs;
+      return {kForEver, std::chrono::seconds(10) +
+                            3 * std::chrono::nanoseconds(std::min(period_ns, kWatchIdleMaxNs))};
+    }
+    case query::Lifetime::kWork:
+      // Takes as long as it takes; the keepalive of the channel finds a server that is gone.
+      return {kForEver, std::chrono::nanoseconds(0)};
+  }
+  return {};
+}
+
+CallInFlight::CallInFlight(const CallContext& call, const ServerAddress& server,
                            const CallLimits& limits)
-    : call_(call), address_(address), limits_(limits) {
+    : server_(server), limits_(limits) {
   context_.set_deadline(WallDeadline(call, limits.timeout));
 }
 
@@ -71,7 +77,7 @@ CallInFlight::~CallInFlight() {
   }
 }
 
-bool CallInFlight::Wait() {
+bool CallInFlight::Wait(const CallContext& call) {
   void* event_tag = nullptr;
   bool ok = false;
   const auto begin = CallContext::Clock::now();
@@ -85,16 +91,22 @@ bool CallInFlight::Wait() {
       case grpc::CompletionQueue::TIMEOUT:
         was_silent_ = was_silent_ || (limits_.silence_max.count() > 0 &&
                                       CallContext::Clock::now() - begin > limits_.silence_max);
-        if (was_silent_ || call_.cancelled()) context_.TryCancel();
+        if (was_silent_ || call.cancelled()) context_.TryCancel();
         break;
     }
   }
 }
 
+bool CallInFlight::WaitForEnd() {
+  void* event_tag = nullptr;
+  bool ok = false;
+  return queue_.Next(&event_tag, &ok) && ok;
+}
+
 absl::Status CallInFlight::Outcome(const grpc::Status& status) const {
   if (status.ok()) return absl::OkStatus();
   if (was_silent_) {
-    return absl::UnavailableError(absl::StrCat("dsg-server at ", address_,
+    return absl::UnavailableError(absl::StrCat("dsg-server at ", server_.address,
                                                " gave no sign of life for too long; call again "
                                                "from where the stream ended"));
   }
@@ -102,27 +114,19 @@ absl::Status CallInFlight::Outcome(const grpc::Status& status) const {
   absl::Status decoded = DecodeStatus(status.error_code(), status.error_message(), detail);
   // Errors with a reason, known here or not, were made by the server; the others by the transport,
   // which names neither the address nor a way out.
-  if (!detail.empty()) return decoded;
+  if (!detail.empty() || !server_.repeats) return decoded;
   switch (decoded.code()) {
     case absl::StatusCode::kUnavailable:
-      return NoServer(address_, status.error_message());
+      return NoServer(server_.address, status.error_message());
     case absl::StatusCode::kDeadlineExceeded:
-      return absl::DeadlineExceededError(absl::StrCat(
-          "dsg-server at ", address_, " did not answer in time; ask for less or allow more time"));
+      return absl::DeadlineExceededError(
+          absl::StrCat("dsg-server at ", server_.address,
+                       " did not answer in time; ask for less or allow more time"));
     case absl::StatusCode::kCancelled:
-      return absl::CancelledError(absl::StrCat("call to ", address_, " cancelled"));
+      return absl::CancelledError(absl::StrCat("call to ", server_.address, " cancelled"));
     default:
       return decoded;
   }
-}
-
-absl::Status RetryRead(const CallContext& call, const std::function<absl::Status()>& attempt) {
-  absl::Status status = attempt();
-  for (const auto backoff : kBackoffs) {
-    if (!absl::IsUnavailable(status) || !Pause(call, backoff)) break;
-    status = attempt();
-  }
-  return status;
 }
 
 }  // namespace dsg::client

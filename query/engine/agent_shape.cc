@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/agent_shape.h"
-
+// The body of one agent over an interval, one message at a time.
+// Refuses to hold more than a message and the shapes that are decoded together.
 #include <set>
 #include <string>
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/engine/agent_names.h"
+#include "query/engine/engine.h"
+#include "query/engine/engine_cursor.h"
 #include "query/engine/read_view.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
@@ -65,13 +67,15 @@ std::string BytesOf(const Sha256& digest) {
   return std::string(reinterpret_cast<const char*>(digest.data()), digest.size());
 }
 
-class Cursor final : public AgentShapeCursor {
+class Cursor final : public EngineCursor<v1::GetAgentShapeResponse> {
  public:
   Cursor(const ReadView& view, NodeId agent, const Parts& parts, TimeNs from_ns, TimeNs to_ns)
       : view_(view), agent_(agent), parts_(parts), next_ns_(from_ns), to_ns_(to_ns) {}
 
-  absl::Status Next(const CallContext& call, v1::GetAgentShapeResponse* reply) override {
-    DSG_RETURN_IF_ERROR(call.Check());
+  bool done() const override { return done_; }
+
+ private:
+  absl::Status Fill(const CallContext& call, v1::GetAgentShapeResponse* reply) override {
     if (is_first_) {
       view_.FillHeader(reply->mutable_header());
       reply->set_agent_id(ToString(agent_));
@@ -84,9 +88,6 @@ class Cursor final : public AgentShapeCursor {
     return may_join ? SendTopology(reply) : absl::OkStatus();
   }
 
-  bool done() const override { return done_; }
-
- private:
   absl::Status ReadShapes(const CallContext& call, v1::GetAgentShapeResponse* reply) {
     bool is_full = false;
     size_t bytes = 0;
@@ -177,15 +178,15 @@ class Cursor final : public AgentShapeCursor {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<AgentShapeCursor>> OpenAgentShape(
-    const ReadView& view, AgentNames* names, const v1::GetAgentShapeRequest& request) {
+CursorOr<v1::GetAgentShapeResponse> GetAgentShape(Engine* engine, const CallContext&,
+                                                  const v1::GetAgentShapeRequest& request) {
+  DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
   DSG_ASSIGN_OR_RETURN(const Parts parts, PartsOf(request));
   const TimeNs from_ns = request.has_from_ns() ? request.from_ns() : kTimeMin;
   const TimeNs to_ns = request.has_to_ns() ? request.to_ns() : kTimeMax;
   DSG_RETURN_IF_ERROR(CheckTimeRange(from_ns, to_ns));
-  DSG_ASSIGN_OR_RETURN(const NodeId agent, names->Resolve(view.snapshot(), request.agent()));
-  return std::unique_ptr<AgentShapeCursor>(
-      std::make_unique<Cursor>(view, agent, parts, from_ns, to_ns));
+  DSG_ASSIGN_OR_RETURN(const NodeId agent, engine->names.Resolve(view.snapshot(), request.agent()));
+  return std::make_unique<Cursor>(view, agent, parts, from_ns, to_ns);
 }
 
 }  // namespace dsg::query

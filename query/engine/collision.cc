@@ -13,6 +13,7 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/engine/collision/collision_world.h"
+#include "query/engine/engine.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
@@ -231,15 +232,17 @@ void FillCollision(const CollisionHit& hit, v1::CollisionResult* out) {
   out->mutable_point()->set_z(hit.point_map.z());
 }
 
-absl::Status CheckCollision(const ReadView& view, CollisionCache* collisions,
-                            const CallContext& call, const v1::CheckCollisionRequest& request,
+absl::Status CheckCollision(Engine* engine, const CallContext& call,
+                            const v1::CheckCollisionRequest& request,
                             v1::CheckCollisionResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
   DSG_ASSIGN_OR_RETURN(const std::vector<Body> bodies, ReadBodies(request));
   DSG_ASSIGN_OR_RETURN(CollisionScope scope, ReadScope(request));
   std::optional<TimeNs> at_ns;
   if (request.has_at_ns()) at_ns = request.at_ns();
   DSG_ASSIGN_OR_RETURN(const auto graph, view.Graph(call.stop()));
-  CollisionWorld world = CollisionWorld::Create(graph, view.shared_snapshot(), at_ns, collisions);
+  CollisionWorld world =
+      CollisionWorld::Create(graph, view.shared_snapshot(), at_ns, &engine->collisions);
   for (const std::string& name : request.scope().ignored()) {
     DSG_ASSIGN_OR_RETURN(const NodeId node, view.snapshot().ResolveNode(name));
     DSG_RETURN_IF_ERROR(world.Ignore(node, call.stop(), &scope));

@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/ingest_service.pb.h"
+#include "query/engine/engine.h"
 #include "query/engine/nodes.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
@@ -15,7 +16,7 @@
 
 namespace dsg::query {
 
-absl::Status Commit(MapTable* maps, const CallContext& call, const v1::CommitRequest& request,
+absl::Status Commit(Engine* engine, const CallContext& call, const v1::CommitRequest& request,
                     v1::CommitResponse* reply) {
   const v1::GraphDelta& in = request.delta();
   if (in.session_id().empty()) {
@@ -26,13 +27,14 @@ absl::Status Commit(MapTable* maps, const CallContext& call, const v1::CommitReq
     return FieldError("delta.sequence", absl::StrCat(in.sequence()),
                       "count the deltas of a session from 1");
   }
-  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> reader, maps->Reader(in.map()));
+  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> reader, engine->maps.Reader(in.map()));
   DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> snapshot, reader->Latest());
   DSG_ASSIGN_OR_RETURN(const LayerTable layers, LayersOf(*snapshot));
   DSG_ASSIGN_OR_RETURN(GraphDelta delta, FromProto(in, layers, Unmasked::kPatch));
   // Past the quota, and into the reserve, goes only what the service itself forgets.
   delta.is_forgetting = false;
-  DSG_ASSIGN_OR_RETURN(const CommitResult result, maps->Commit(std::move(delta), call.stop()));
+  DSG_ASSIGN_OR_RETURN(const CommitResult result,
+                       engine->maps.Commit(std::move(delta), call.stop()));
   reply->set_revision(result.revision);
   reply->set_replayed(result.replayed);
   return absl::OkStatus();
@@ -43,12 +45,12 @@ std::string NewSessionId(std::string_view work) {
   return absl::StrCat(std::string(work), "-", WallClockNs(), "-", getpid(), "-", ++count);
 }
 
-absl::Status GetSession(MapTable* maps, const v1::GetSessionRequest& request,
+absl::Status GetSession(Engine* engine, const CallContext&, const v1::GetSessionRequest& request,
                         v1::GetSessionResponse* reply) {
   if (request.session_id().empty()) {
     return FieldError("session_id", "", "name the session to look up");
   }
-  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> reader, maps->Reader(request.map()));
+  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> reader, engine->maps.Reader(request.map()));
   DSG_ASSIGN_OR_RETURN(const SessionState state, reader->GetSession(request.session_id()));
   reply->set_last_sequence(state.last_sequence);
   reply->set_last_revision(state.last_revision);

@@ -9,6 +9,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/maintenance_service.pb.h"
+#include "query/engine/engine.h"
+#include "query/engine/engine_cursor.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
 
@@ -18,13 +20,15 @@ namespace {
 // How long commits to the map wait, about.
 constexpr std::chrono::milliseconds kSlice{200};
 
-class Compaction final : public CompactCursor {
+class Compaction final : public EngineCursor<v1::CompactResponse> {
  public:
   Compaction(MapTable* maps, std::string map, std::optional<Revision> keep_from)
       : maps_(maps), map_(std::move(map)), keep_from_(keep_from) {}
 
-  absl::Status Next(const CallContext& call, v1::CompactResponse* reply) override {
-    DSG_RETURN_IF_ERROR(call.Check());
+  bool done() const override { return is_done_; }
+
+ private:
+  absl::Status Fill(const CallContext& call, v1::CompactResponse* reply) override {
     DSG_RETURN_IF_ERROR(maps_->WithWriter(
         map_, call.stop(), [&](MapWriter& writer) { return RunSlice(call, &writer, reply); }));
     reply->set_progress(progress_);
@@ -32,9 +36,6 @@ class Compaction final : public CompactCursor {
     return absl::OkStatus();
   }
 
-  bool done() const override { return is_done_; }
-
- private:
   absl::Status RunSlice(const CallContext& call, MapWriter* writer, v1::CompactResponse* reply) {
     DSG_RETURN_IF_ERROR(SettleKeepFrom());
     const auto slice_end = CallContext::Clock::now() + kSlice;
@@ -80,8 +81,7 @@ class Compaction final : public CompactCursor {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<CompactCursor>> OpenCompact(MapTable* maps,
-                                                           const v1::CompactRequest& request) {
+CursorOr<v1::CompactResponse> OpenCompact(MapTable* maps, const v1::CompactRequest& request) {
   if (request.keep_from_revision() < 0) {
     return FieldError("keep_from_revision", absl::StrCat(request.keep_from_revision()),
                       "give a revision, or none for the newest");
@@ -90,6 +90,11 @@ absl::StatusOr<std::unique_ptr<CompactCursor>> OpenCompact(MapTable* maps,
   std::optional<Revision> keep_from;
   if (request.has_keep_from_revision()) keep_from = request.keep_from_revision();
   return std::make_unique<Compaction>(maps, request.map(), keep_from);
+}
+
+CursorOr<v1::CompactResponse> Compact(Engine* engine, const CallContext&,
+                                      const v1::CompactRequest& request) {
+  return OpenCompact(&engine->maps, request);
 }
 
 }  // namespace dsg::query

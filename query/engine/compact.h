@@ -3,15 +3,13 @@
 // Refuses to keep commits waiting until all is done.
 #pragma once
 
-#include <memory>
-
+#include "query/api/api.h"
 #include "query/engine/map_table.h"
-#include "query/engine/service_core.h"
 
 namespace dsg::query {
 
-/// Errors: MAP_UNKNOWN, FIELD_INVALID; in the stream those of MapWriter::Compact.
-absl::StatusOr<std::unique_ptr<CompactCursor>> OpenCompact(MapTable* maps,
-                                                           const v1::CompactRequest& request);
+/// Compact for callers inside the engine. Errors: MAP_UNKNOWN, FIELD_INVALID; in the stream those
+/// of MapWriter::Compact.
+CursorOr<v1::CompactResponse> OpenCompact(MapTable* maps, const v1::CompactRequest& request);
 
 }  // namespace dsg::query

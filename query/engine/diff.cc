@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/diff.h"
-
+// What differs between two revisions of a map: nodes, edges, tracks, mesh blocks.
+// Refuses to tell the steps between them: a node that came and went is not there.
 #include <algorithm>
 #include <memory>
 #include <string>
@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/map_service.pb.h"
 #include "query/engine/difference.h"
+#include "query/engine/engine.h"
 #include "query/engine/nodes.h"
 #include "query/engine/page_token.h"
 #include "query/engine/read_view.h"
@@ -48,7 +49,7 @@ uint64_t QuestionOf(const v1::DiffRevisionsRequest& request) {
 
 }  // namespace
 
-absl::Status DiffRevisions(MapTable* maps, const CallContext& call,
+absl::Status DiffRevisions(Engine* engine, const CallContext& call,
                            const v1::DiffRevisionsRequest& request,
                            v1::DiffRevisionsResponse* reply) {
   DSG_RETURN_IF_ERROR(CheckRevision("from_revision", request.from_revision()));
@@ -56,12 +57,13 @@ absl::Status DiffRevisions(MapTable* maps, const CallContext& call,
   DSG_RETURN_IF_ERROR(CheckNodeView(request.view()));
   DSG_ASSIGN_OR_RETURN(const int size, CheckPageSize(request.page_size()));
   const uint64_t question = QuestionOf(request);
-  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> map, maps->Reader(request.map()));
+  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> map, engine->maps.Reader(request.map()));
   DSG_ASSIGN_OR_RETURN(const PageToken start, StartOf(map.get(), request, question));
   const Revision from = request.from_revision();
   const Revision to = start.revision;
 
-  DSG_ASSIGN_OR_RETURN(const ReadView view, ReadView::OpenAt(maps, map, std::max(from, to)));
+  DSG_ASSIGN_OR_RETURN(const ReadView view,
+                       ReadView::OpenAt(&engine->maps, map, std::max(from, to)));
   DSG_ASSIGN_OR_RETURN(
       const auto difference,
       Difference::Open(map, from, to, {request.layer(), request.view()}, call.stop()));

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "query/engine/call_context.h"
+#include "query/api/call_context.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/store/graph_store.h"
 

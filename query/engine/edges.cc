@@ -5,6 +5,7 @@
 #include <string>
 
 #include "dsg/v1/query_service.pb.h"
+#include "query/engine/engine.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
@@ -51,8 +52,9 @@ EdgeFilter ChildrenOf(NodeId parent) {
   return filter;
 }
 
-absl::Status ListEdges(const Page& page, const CallContext& call,
-                       const v1::ListEdgesRequest& request, v1::ListEdgesResponse* reply) {
+absl::Status ListEdges(Engine* engine, const CallContext& call, const v1::ListEdgesRequest& request,
+                       v1::ListEdgesResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const Page page, engine->ReadPage("ListEdges", request));
   const Snapshot& snapshot = page.view.snapshot();
   DSG_ASSIGN_OR_RETURN(const EdgeFilter filter, EdgeFilterFromProto(request, snapshot));
   std::optional<EdgeKey> after;

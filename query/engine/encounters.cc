@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/encounters.h"
-
+// Who was within a distance of whom, from the exact roots of the distance between two moving
+// points. Refuses to bridge gaps: where one of the two was not seen nothing is claimed.
 #include <cmath>
 #include <map>
 #include <memory>
@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/meetings.pb.h"
+#include "query/engine/engine.h"
 #include "query/engine/interaction/encounter_search.h"
 #include "query/engine/interaction/sight.h"
 #include "query/engine/request_check.h"
@@ -122,12 +123,14 @@ class Writer {
 
 }  // namespace
 
-absl::Status ListEncounters(const Page& page, AgentNames* names, const CallContext& call,
+absl::Status ListEncounters(Engine* engine, const CallContext& call,
                             const v1::ListEncountersRequest& request,
                             v1::ListEncountersResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const Page page, engine->ReadPage("ListEncounters", request));
   const Snapshot& snapshot = page.view.snapshot();
   const StopCheck stop = call.stop();
-  DSG_ASSIGN_OR_RETURN(EncounterQuestion question, QuestionFromProto(page, names, request));
+  DSG_ASSIGN_OR_RETURN(EncounterQuestion question,
+                       QuestionFromProto(page, &engine->names, request));
   std::unique_ptr<Sight> sight;
   if (request.line_of_sight()) {
     DSG_ASSIGN_OR_RETURN(sight, Sight::Make(snapshot, stop));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/interactions.h"
-
+// Who picked or put which object, with the evidence for each candidate.
+// Abstains where the evidence is weak: a guess would be worse than no answer.
 #include <algorithm>
 #include <memory>
 #include <string>
@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/meetings.pb.h"
+#include "query/engine/engine.h"
 #include "query/engine/interaction/evidence.h"
 #include "query/engine/interaction/object_change.h"
 #include "query/engine/interaction/observed_time.h"
@@ -143,13 +144,15 @@ bool IsShown(const Question& question, const Verdict& verdict) {
 
 }  // namespace
 
-absl::Status ListInteractions(const Page& page, AgentNames* names, const CallContext& call,
+absl::Status ListInteractions(Engine* engine, const CallContext& call,
                               const v1::ListInteractionsRequest& request,
                               v1::ListInteractionsResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const Page page, engine->ReadPage("ListInteractions", request));
   const Snapshot& snapshot = page.view.snapshot();
   const StopCheck stop = call.stop();
   DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const GraphView> graph, page.view.Graph(stop));
-  DSG_ASSIGN_OR_RETURN(const Question question, QuestionFromProto(page, names, *graph, request));
+  DSG_ASSIGN_OR_RETURN(const Question question,
+                       QuestionFromProto(page, &engine->names, *graph, request));
   // Where a thing went may be outside the interval and the room that are asked for.
   DSG_ASSIGN_OR_RETURN(const std::vector<ObjectChange> all,
                        FindChanges(snapshot, *graph, ChangeFilter(), stop));

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/locate.h"
-
+// Where was an agent at an instant. Interpolated by the store, never extrapolated; nothing is
+// added here but the stay that holds the instant and what stands above it.
 #include <string>
 #include <string_view>
 #include <unordered_map>
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
+#include "query/engine/engine.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
@@ -77,11 +78,12 @@ void FillError(const absl::Status& status, v1::LocateResult* result) {
 
 }  // namespace
 
-absl::Status LocateAgent(const ReadView& view, AgentNames* names, AncestryCache* ancestries,
-                         const v1::LocateAgentRequest& request, v1::LocateAgentResponse* reply) {
+absl::Status LocateAgent(Engine* engine, const CallContext&, const v1::LocateAgentRequest& request,
+                         v1::LocateAgentResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
   const Snapshot& snapshot = view.snapshot();
   const TimeNs at_ns = request.at_ns();
-  DSG_ASSIGN_OR_RETURN(const NodeId agent, names->Resolve(snapshot, request.agent()));
+  DSG_ASSIGN_OR_RETURN(const NodeId agent, engine->names.Resolve(snapshot, request.agent()));
   DSG_ASSIGN_OR_RETURN(const LocatedPose located, snapshot.Locate(agent, at_ns));
   DSG_ASSIGN_OR_RETURN(const std::optional<Stay> stay, snapshot.StayAt(agent, at_ns));
   DSG_ASSIGN_OR_RETURN(TrackInfo track, snapshot.GetTrack(agent));
@@ -99,15 +101,17 @@ absl::Status LocateAgent(const ReadView& view, AgentNames* names, AncestryCache*
   }
   if (!stay.has_value()) return absl::OkStatus();
   DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Ancestry> ancestry,
-                       ancestries->Find(snapshot, *stay));
+                       engine->ancestries.Find(snapshot, *stay));
   reply->set_building_id(ancestry->building_id);
   reply->mutable_ancestor_ids()->Add(ancestry->ids.begin(), ancestry->ids.end());
   return absl::OkStatus();
 }
 
-absl::Status BatchLocateAgents(const ReadView& view, AgentNames* names, const CallContext& call,
+// Names are resolved once a batch.
+absl::Status BatchLocateAgents(Engine* engine, const CallContext& call,
                                const v1::BatchLocateAgentsRequest& request,
                                v1::BatchLocateAgentsResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
   const int count = request.instants_size();
   if (count > kBatchSizeMax) {
     return FieldError("instants", absl::StrCat(count, " pairs"), "ask for at most 10000 a call");
@@ -122,7 +126,8 @@ absl::Status BatchLocateAgents(const ReadView& view, AgentNames* names, const Ca
     auto found = agents.find(instant.agent());
     if (found == agents.end()) {
       found =
-          agents.emplace(instant.agent(), Resolve(view.snapshot(), names, instant.agent())).first;
+          agents.emplace(instant.agent(), Resolve(view.snapshot(), &engine->names, instant.agent()))
+              .first;
     }
     v1::LocateResult* result = reply->add_results();
     const absl::Status status = LocateOne(view.snapshot(), found->second, instant.at_ns(), result);

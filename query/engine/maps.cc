@@ -1,43 +1,46 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/maps.h"
-
+// Maps as a whole: create, list, measure, look back.
 #include <set>
 #include <string>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/map_service.pb.h"
+#include "query/engine/engine.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 
 namespace dsg::query {
 
-absl::Status CreateMap(GraphStore* store, const v1::CreateMapRequest& request,
+absl::Status CreateMap(Engine* engine, const CallContext&, const v1::CreateMapRequest& request,
                        v1::CreateMapResponse* reply) {
   DSG_RETURN_IF_ERROR(CheckMapName(request.map().name()));
   DSG_ASSIGN_OR_RETURN(const MapSpec spec, FromProto(request.map()));
   DSG_RETURN_IF_ERROR(spec.Validate());
-  DSG_RETURN_IF_ERROR(store->CreateMap(spec));
+  DSG_RETURN_IF_ERROR(engine->maps.store().CreateMap(spec));
   ToProto(spec, reply->mutable_map());
   return absl::OkStatus();
 }
 
-absl::Status ListMaps(GraphStore* store, v1::ListMapsResponse* reply) {
-  DSG_ASSIGN_OR_RETURN(const std::vector<MapSpec> specs, store->ListMaps());
+absl::Status ListMaps(Engine* engine, const CallContext&, const v1::ListMapsRequest&,
+                      v1::ListMapsResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const std::vector<MapSpec> specs, engine->maps.store().ListMaps());
   std::set<std::string> readable;
   for (const MapSpec& spec : specs) {
     ToProto(spec, reply->add_maps());
     readable.insert(spec.name);
   }
-  DSG_ASSIGN_OR_RETURN(const std::vector<std::string> names, store->MapNames());
+  DSG_ASSIGN_OR_RETURN(const std::vector<std::string> names, engine->maps.store().MapNames());
   for (const std::string& name : names) {
     if (!readable.contains(name)) reply->add_unreadable_maps(name);
   }
   return absl::OkStatus();
 }
 
-absl::Status GetMapStats(const ReadView& view, v1::GetMapStatsResponse* reply) {
+absl::Status GetMapStats(Engine* engine, const CallContext&, const v1::GetMapStatsRequest& request,
+                         v1::GetMapStatsResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
   DSG_ASSIGN_OR_RETURN(const MapStats stats, view.snapshot().Stats());
   view.FillHeader(reply->mutable_header());
   ToProto(view.snapshot().spec(), reply->mutable_map());
@@ -69,8 +72,11 @@ absl::Status GetMapStats(const ReadView& view, v1::GetMapStatsResponse* reply) {
   return absl::OkStatus();
 }
 
-absl::Status ListRevisions(const ReadView& view, const v1::ListRevisionsRequest& request,
+absl::Status ListRevisions(Engine* engine, const CallContext&,
+                           const v1::ListRevisionsRequest& request,
                            v1::ListRevisionsResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const ReadView view, ReadView::Open(&engine->maps, request.map(),
+                                                           v1::ReadAt::default_instance()));
   DSG_ASSIGN_OR_RETURN(const int page_size, CheckPageSize(request.page_size()));
   if (request.before_revision() < 0) {
     return FieldError("before_revision", absl::StrCat(request.before_revision()),
@@ -90,9 +96,11 @@ absl::Status ListRevisions(const ReadView& view, const v1::ListRevisionsRequest&
   return absl::OkStatus();
 }
 
-void GetServerInfo(v1::GetServerInfoResponse* reply) {
+absl::Status GetServerInfo(Engine*, const CallContext&, const v1::GetServerInfoRequest&,
+                           v1::GetServerInfoResponse* reply) {
   reply->set_version(DSG_VERSION);
   reply->set_store_format_version(kStoreFormatVersion);
+  return absl::OkStatus();
 }
 
 }  // namespace dsg::query

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/merge.h"
-
+// Another map taken into this one, a batch a message.
+// Refuses to guess a transform that the maps do not tell.
 #include <algorithm>
 #include <map>
 #include <optional>
@@ -12,6 +12,8 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/maintenance_service.pb.h"
 #include "query/engine/commit.h"
+#include "query/engine/engine.h"
+#include "query/engine/engine_cursor.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
@@ -24,7 +26,7 @@ namespace {
 // A message of so many pairs of ids stays below a megabyte.
 constexpr int kIdsAMessage = 20'000;
 
-class Merge final : public MergeCursor {
+class Merge final : public EngineCursor<v1::MergeMapsResponse> {
  public:
   Merge(MapTable* maps, std::shared_ptr<MapReader> into, std::shared_ptr<MapReader> other,
         std::optional<Pose3d> map_T_other, bool is_dry_run, std::string author)
@@ -35,8 +37,10 @@ class Merge final : public MergeCursor {
         is_dry_run_(is_dry_run),
         author_(std::move(author)) {}
 
-  absl::Status Next(const CallContext& call, v1::MergeMapsResponse* reply) override {
-    DSG_RETURN_IF_ERROR(call.Check());
+  bool done() const override { return is_done_; }
+
+ private:
+  absl::Status Fill(const CallContext& call, v1::MergeMapsResponse* reply) override {
     if (deltas_ == nullptr) {
       DSG_RETURN_IF_ERROR(Plan(call));
     } else if (!is_written_) {
@@ -47,9 +51,6 @@ class Merge final : public MergeCursor {
     return absl::OkStatus();
   }
 
-  bool done() const override { return is_done_; }
-
- private:
   absl::Status Plan(const CallContext& call) {
     DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> into, into_->Latest());
     DSG_ASSIGN_OR_RETURN(other_now_, other_->Latest());
@@ -207,17 +208,19 @@ class Merge final : public MergeCursor {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<MergeCursor>> OpenMerge(MapTable* maps,
-                                                       const v1::MergeMapsRequest& request) {
-  DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> into, maps->Reader(request.map()));
-  DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> other, maps->Reader(request.other()));
+// The first message has the transform and what will become of the nodes, as counts; then each has
+// one more batch on disk, and the last ones the ids.
+CursorOr<v1::MergeMapsResponse> MergeMaps(Engine* engine, const CallContext&,
+                                          const v1::MergeMapsRequest& request) {
+  DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> into, engine->maps.Reader(request.map()));
+  DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> other, engine->maps.Reader(request.other()));
   if (request.map() == request.other()) {
     return FieldError("other", request.other(),
                       "a map cannot be merged with itself; name another map");
   }
   std::optional<Pose3d> map_T_other;
   if (request.has_map_t_other()) map_T_other = FromProto(request.map_t_other());
-  return std::make_unique<Merge>(maps, std::move(into), std::move(other), map_T_other,
+  return std::make_unique<Merge>(&engine->maps, std::move(into), std::move(other), map_T_other,
                                  request.dry_run(), request.author());
 }
 

@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "dsg/v1/query_service.pb.h"
+#include "query/engine/engine.h"
+#include "query/engine/engine_cursor.h"
 #include "query/engine/read_view.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
@@ -99,13 +101,17 @@ Box3d CubeOf(BlockIndex index, double size_m) {
   return Box3d(low, low + Eigen::Vector3d::Constant(size_m));
 }
 
-class Cursor final : public MeshCursor {
+class Cursor final : public EngineCursor<v1::GetMeshResponse> {
  public:
   Cursor(const ReadView& view, std::vector<BlockIndex> blocks)
       : view_(view), blocks_(std::move(blocks)) {}
 
-  absl::Status Next(const CallContext& call, v1::GetMeshResponse* reply) override {
-    DSG_RETURN_IF_ERROR(call.Check());
+  bool done() const override {
+    return next_block_ == blocks_.size() && next_piece_ == pieces_.size();
+  }
+
+ private:
+  absl::Status Fill(const CallContext& call, v1::GetMeshResponse* reply) override {
     if (is_first_) view_.FillHeader(reply->mutable_header());
     is_first_ = false;
     size_t bytes = 0;
@@ -120,11 +126,6 @@ class Cursor final : public MeshCursor {
     return absl::OkStatus();
   }
 
-  bool done() const override {
-    return next_block_ == blocks_.size() && next_piece_ == pieces_.size();
-  }
-
- private:
   absl::Status ReadBlock() {
     DSG_ASSIGN_OR_RETURN(MeshBlock block, view_.snapshot().ReadMeshBlock(blocks_[next_block_]));
     ++next_block_;
@@ -153,8 +154,9 @@ std::vector<MeshBlock> CutBlock(MeshBlock block, size_t vertex_count_max) {
   return whole;
 }
 
-absl::StatusOr<std::unique_ptr<MeshCursor>> OpenMesh(const ReadView& view,
-                                                     const v1::GetMeshRequest& request) {
+CursorOr<v1::GetMeshResponse> GetMesh(Engine* engine, const CallContext&,
+                                      const v1::GetMeshRequest& request) {
+  DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
   std::optional<Box3d> box_map;
   if (request.has_box()) {
     DSG_ASSIGN_OR_RETURN(box_map, BoxFromProto(request.box(), "box"));
@@ -164,7 +166,7 @@ absl::StatusOr<std::unique_ptr<MeshCursor>> OpenMesh(const ReadView& view,
   std::erase_if(blocks, [&](const BlockIndex& index) {
     return box_map.has_value() && !box_map->intersects(CubeOf(index, size_m));
   });
-  return std::unique_ptr<MeshCursor>(std::make_unique<Cursor>(view, std::move(blocks)));
+  return std::make_unique<Cursor>(view, std::move(blocks));
 }
 
 }  // namespace dsg::query

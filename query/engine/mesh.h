@@ -3,19 +3,11 @@
 // piece.
 #pragma once
 
-#include <memory>
 #include <vector>
 
-#include "query/engine/service_core.h"
 #include "schema/model/mesh.h"
 
 namespace dsg::query {
-
-class ReadView;
-
-/// Errors: BOX_INVERTED, NUMBER_NOT_FINITE.
-absl::StatusOr<std::unique_ptr<MeshCursor>> OpenMesh(const ReadView& view,
-                                                     const v1::GetMeshRequest& request);
 
 /// Cuts a block into pieces of at most `vertex_count_max` vertices, each with the faces that it
 /// holds. Together they have every face once and every vertex at least once, with all channels; a

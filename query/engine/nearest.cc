@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/nearest.h"
-
+// The nodes nearest to a point. Agents move, so they are looked at only when they are asked for
+// together with an instant, and then stand where their track puts them.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/engine/agents_at.h"
+#include "query/engine/engine.h"
 #include "query/engine/nodes.h"
 #include "query/engine/request_check.h"
 #include "query/engine/view_filter.h"
@@ -140,9 +141,13 @@ absl::Status FillNearest(const ReadView& view, const GraphView* graph,
 
 }  // namespace
 
-absl::Status ListNearestNodes(const ReadView& view, const CallContext& call,
+// Cost: an index lookup in the revision's view, which the first question of a revision has to make
+// (about a second for 100,000 nodes, a few milliseconds from the view of a revision close by); for
+// agents, one Locate an agent and no view.
+absl::Status ListNearestNodes(Engine* engine, const CallContext& call,
                               const v1::ListNearestNodesRequest& request,
                               v1::ListNearestNodesResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
   const Snapshot& snapshot = view.snapshot();
   DSG_RETURN_IF_ERROR(CheckNodeView(request.view()));
   DSG_ASSIGN_OR_RETURN(const Question question, ReadQuestion(request, snapshot));

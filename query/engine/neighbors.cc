@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/neighbors.h"
-
+// A node's edges with the nodes at their other ends, and many nodes by id in one call.
+// Refuses to walk further: GetSubgraph does.
 #include <algorithm>
 #include <optional>
 #include <string>
@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
+#include "query/engine/engine.h"
 #include "query/engine/in_turn.h"
 #include "query/engine/nodes.h"
 #include "query/engine/request_check.h"
@@ -154,8 +155,9 @@ absl::StatusOr<Node> ReadNode(const Snapshot& snapshot, const std::string& id_or
 
 }  // namespace
 
-absl::Status GetNeighbors(const Page& page, const CallContext& call,
+absl::Status GetNeighbors(Engine* engine, const CallContext& call,
                           const v1::GetNeighborsRequest& request, v1::GetNeighborsResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const Page page, engine->ReadPage("GetNeighbors", request));
   DSG_RETURN_IF_ERROR(CheckNodeView(request.view()));
   std::optional<NeighborKey> after;
   if (!page.is_first()) {
@@ -194,9 +196,10 @@ absl::Status GetNeighbors(const Page& page, const CallContext& call,
   return absl::OkStatus();
 }
 
-absl::Status BatchGetNodes(const ReadView& view, const CallContext& call,
+absl::Status BatchGetNodes(Engine* engine, const CallContext& call,
                            const v1::BatchGetNodesRequest& request,
                            v1::BatchGetNodesResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
   DSG_RETURN_IF_ERROR(CheckNodeView(request.view()));
   if (request.ids_size() > kBatchNodesMax) {
     return FieldError("ids", absl::StrCat(request.ids_size(), " long"),

@@ -10,6 +10,7 @@
 #include "dsg/v1/query_service.pb.h"
 #include "query/engine/agents_at.h"
 #include "query/engine/edges.h"
+#include "query/engine/engine.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
 
@@ -82,8 +83,9 @@ absl::StatusOr<LayerTable> LayersOf(const Snapshot& snapshot) {
   return LayerTable(std::move(layers));
 }
 
-absl::Status GetNode(const ReadView& view, const CallContext& call,
-                     const v1::GetNodeRequest& request, v1::GetNodeResponse* reply) {
+absl::Status GetNode(Engine* engine, const CallContext& call, const v1::GetNodeRequest& request,
+                     v1::GetNodeResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
   const Snapshot& snapshot = view.snapshot();
   DSG_RETURN_IF_ERROR(CheckNodeView(request.view()));
   DSG_ASSIGN_OR_RETURN(const NodeId id, ResolveOne(snapshot, request.id(), "id", call.stop()));
@@ -106,8 +108,9 @@ absl::Status GetNode(const ReadView& view, const CallContext& call,
   return absl::OkStatus();
 }
 
-absl::Status ListNodes(const Page& page, const CallContext& call,
-                       const v1::ListNodesRequest& request, v1::ListNodesResponse* reply) {
+absl::Status ListNodes(Engine* engine, const CallContext& call, const v1::ListNodesRequest& request,
+                       v1::ListNodesResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const Page page, engine->ReadPage("ListNodes", request));
   const Snapshot& snapshot = page.view.snapshot();
   DSG_RETURN_IF_ERROR(CheckNodeView(request.view()));
   DSG_ASSIGN_OR_RETURN(const NodeFilter filter, FilterFromProto(request.filter(), snapshot));

@@ -6,16 +6,8 @@
 #include <string_view>
 
 #include "absl/status/statusor.h"
-#include "query/engine/call_context.h"
-#include "query/engine/page_token.h"
 #include "schema/codec/proto_convert.h"
-
-namespace dsg::v1 {
-class GetNodeRequest;
-class GetNodeResponse;
-class ListNodesRequest;
-class ListNodesResponse;
-}  // namespace dsg::v1
+#include "schema/store/snapshot.h"
 
 namespace dsg::query {
 
@@ -31,11 +23,5 @@ absl::StatusOr<NodeId> ResolveOne(const Snapshot& snapshot, const std::string& i
                                   std::string_view field, const StopCheck& stop);
 
 absl::StatusOr<LayerTable> LayersOf(const Snapshot& snapshot);
-
-absl::Status GetNode(const ReadView& view, const CallContext& call,
-                     const v1::GetNodeRequest& request, v1::GetNodeResponse* reply);
-
-absl::Status ListNodes(const Page& page, const CallContext& call,
-                       const v1::ListNodesRequest& request, v1::ListNodesResponse* reply);
 
 }  // namespace dsg::query

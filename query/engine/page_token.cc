@@ -94,34 +94,4 @@ absl::Status CheckToken(const PageToken& token, const MapReader& map) {
                    {{"map", map.spec().name}});
 }
 
-template <typename Request>
-absl::StatusOr<Page> OpenPage(MapTable* maps, std::string_view method, const Request& request) {
-  Page page;
-  DSG_ASSIGN_OR_RETURN(page.size, CheckPageSize(request.page_size()));
-  Request question = request;
-  question.clear_page_size();
-  question.clear_page_token();
-  page.question = QuestionDigest(method, question);
-  if (request.page_token().empty()) {
-    DSG_ASSIGN_OR_RETURN(page.view, ReadView::Open(maps, request.map(), request.read_at()));
-    return page;
-  }
-  DSG_ASSIGN_OR_RETURN(PageToken token, DecodePageToken(request.page_token(), page.question));
-  DSG_ASSIGN_OR_RETURN(const auto reader, maps->Reader(request.map()));
-  DSG_RETURN_IF_ERROR(CheckToken(token, *reader));
-  DSG_ASSIGN_OR_RETURN(page.view, ReadView::OpenAt(maps, reader, token.revision));
-  page.position = std::move(token.position);
-  return page;
-}
-
-template absl::StatusOr<Page> OpenPage(MapTable*, std::string_view, const v1::GetNeighborsRequest&);
-template absl::StatusOr<Page> OpenPage(MapTable*, std::string_view,
-                                       const v1::ListEncountersRequest&);
-template absl::StatusOr<Page> OpenPage(MapTable*, std::string_view,
-                                       const v1::ListInteractionsRequest&);
-template absl::StatusOr<Page> OpenPage(MapTable*, std::string_view, const v1::SearchNodesRequest&);
-template absl::StatusOr<Page> OpenPage(MapTable*, std::string_view, const v1::ListNodesRequest&);
-template absl::StatusOr<Page> OpenPage(MapTable*, std::string_view, const v1::ListEdgesRequest&);
-template absl::StatusOr<Page> OpenPage(MapTable*, std::string_view, const v1::ListPresenceRequest&);
-
 }  // namespace dsg::query

@@ -7,9 +7,12 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "absl/status/statusor.h"
 #include "query/engine/read_view.h"
+#include "query/engine/request_check.h"
+#include "schema/base/status.h"
 
 namespace google::protobuf {
 class MessageLite;
@@ -69,6 +72,23 @@ struct Page {
 /// Errors: as CheckPageSize, DecodePageToken, ReadView::Open; ABORTED/MAP_REPLACED when the map is
 /// another one than that of the first page.
 template <typename Request>
-absl::StatusOr<Page> OpenPage(MapTable* maps, std::string_view method, const Request& request);
+absl::StatusOr<Page> OpenPage(MapTable* maps, std::string_view method, const Request& request) {
+  Page page;
+  DSG_ASSIGN_OR_RETURN(page.size, CheckPageSize(request.page_size()));
+  Request question = request;
+  question.clear_page_size();
+  question.clear_page_token();
+  page.question = QuestionDigest(method, question);
+  if (request.page_token().empty()) {
+    DSG_ASSIGN_OR_RETURN(page.view, ReadView::Open(maps, request.map(), request.read_at()));
+    return page;
+  }
+  DSG_ASSIGN_OR_RETURN(PageToken token, DecodePageToken(request.page_token(), page.question));
+  DSG_ASSIGN_OR_RETURN(const auto reader, maps->Reader(request.map()));
+  DSG_RETURN_IF_ERROR(CheckToken(token, *reader));
+  DSG_ASSIGN_OR_RETURN(page.view, ReadView::OpenAt(maps, reader, token.revision));
+  page.position = std::move(token.position);
+  return page;
+}
 
 }  // namespace dsg::query

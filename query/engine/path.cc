@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/path.h"
-
+// The way from here to there over the places.
+// Refuses ways that are narrower than the robot, and ways nobody has seen to be free.
 #include <algorithm>
 #include <optional>
 #include <string>
@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/engine/collision/collision_world.h"
+#include "query/engine/engine.h"
 #include "query/engine/path_question.h"
 #include "query/engine/planning/attach.h"
 #include "query/engine/planning/no_path.h"
@@ -205,21 +206,23 @@ absl::StatusOr<PathAnswerer> MakeAnswerer(const ReadView& view, CollisionCache* 
 
 }  // namespace
 
-absl::Status PlanPath(const ReadView& view, CollisionCache* collisions, const CallContext& call,
-                      const v1::PlanPathRequest& request, v1::PlanPathResponse* reply) {
-  DSG_ASSIGN_OR_RETURN(PathAnswerer answerer, MakeAnswerer(view, collisions, call));
+absl::Status PlanPath(Engine* engine, const CallContext& call, const v1::PlanPathRequest& request,
+                      v1::PlanPathResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
+  DSG_ASSIGN_OR_RETURN(PathAnswerer answerer, MakeAnswerer(view, &engine->collisions, call));
   DSG_RETURN_IF_ERROR(answerer.Answer(request, reply));
   view.FillHeader(reply->mutable_header());
   return absl::OkStatus();
 }
 
-absl::Status PlanPaths(const ReadView& view, CollisionCache* collisions, const CallContext& call,
-                       const v1::PlanPathsRequest& request, v1::PlanPathsResponse* reply) {
+absl::Status PlanPaths(Engine* engine, const CallContext& call, const v1::PlanPathsRequest& request,
+                       v1::PlanPathsResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
   if (request.paths_size() > kPathsMax) {
     return FieldError("paths", absl::StrCat(request.paths_size(), " paths"),
                       "ask for at most 1000 a call");
   }
-  DSG_ASSIGN_OR_RETURN(PathAnswerer answerer, MakeAnswerer(view, collisions, call));
+  DSG_ASSIGN_OR_RETURN(PathAnswerer answerer, MakeAnswerer(view, &engine->collisions, call));
   view.FillHeader(reply->mutable_header());
   size_t bytes = 0;
   for (const v1::PlanPathRequest& path : request.paths()) {

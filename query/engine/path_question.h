@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "query/engine/call_context.h"
+#include "query/api/call_context.h"
 #include "query/engine/planning/attach.h"
 #include "query/engine/planning/limits.h"
 #include "query/engine/read_view.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/predict.h"
-
+// Where an agent will be, from its track and the places that people walk to.
+// Refuses to look at anything after the instant that it predicts from.
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/space.pb.h"
+#include "query/engine/engine.h"
 #include "query/engine/request_check.h"
 #include "query/engine/walk_area.h"
 #include "query/prediction/path_check.h"
@@ -248,16 +249,17 @@ void FillPaths(const Foreseen& foreseen, const std::vector<TimeNs>& at_ns,
 
 }  // namespace
 
-absl::Status PredictAgent(const ReadView& view, AgentNames* names, WalkAreaCache* areas,
-                          const CallContext& call, const v1::PredictAgentRequest& request,
-                          v1::PredictAgentResponse* reply) {
+absl::Status PredictAgent(Engine* engine, const CallContext& call,
+                          const v1::PredictAgentRequest& request, v1::PredictAgentResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
   const Snapshot& snapshot = view.snapshot();
-  DSG_ASSIGN_OR_RETURN(const NodeId agent, names->Resolve(snapshot, request.agent()));
+  DSG_ASSIGN_OR_RETURN(const NodeId agent, engine->names.Resolve(snapshot, request.agent()));
   DSG_ASSIGN_OR_RETURN(const TrackInfo track, snapshot.GetTrack(agent));
   DSG_ASSIGN_OR_RETURN(const Question question, ReadQuestion(request, track));
   DSG_ASSIGN_OR_RETURN(const std::vector<PathPoint> path,
                        ReadTrack(snapshot, track, question.from_ns, call.stop()));
-  DSG_ASSIGN_OR_RETURN(const Foreseen foreseen, Foresee(view, areas, call, path, question));
+  DSG_ASSIGN_OR_RETURN(const Foreseen foreseen,
+                       Foresee(view, &engine->walk_areas, call, path, question));
   view.FillHeader(reply->mutable_header());
   reply->set_agent_id(ToString(agent));
   reply->set_observed_ns(path.back().time_ns);

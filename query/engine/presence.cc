@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/presence.h"
-
+// Who was in a room, a place, a region or a box during an interval. Absence is only reported for
+// agents that were observed at all, which is why their number stands beside the answer.
 #include <algorithm>
 #include <compare>
 #include <set>
@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/engine/edges.h"
+#include "query/engine/engine.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
@@ -157,17 +158,19 @@ absl::StatusOr<std::vector<Presence>> FindPresence(const Snapshot& snapshot,
   return found;
 }
 
-}  // namespace
-
-absl::Status CheckListPresence(const v1::ListPresenceRequest& request) {
+absl::Status CheckRequest(const v1::ListPresenceRequest& request) {
   DSG_RETURN_IF_ERROR(CheckTimeRange(request.from_ns(), request.to_ns()));
   if (request.has_box()) return BoxFromProto(request.box(), "box").status();
   if (!request.node_id().empty()) return absl::OkStatus();
   return FieldError("node_id", "", "give a room, a place, a node of a layer above rooms, or a box");
 }
 
-absl::Status ListPresence(const Page& page, const CallContext& call,
+}  // namespace
+
+absl::Status ListPresence(Engine* engine, const CallContext& call,
                           const v1::ListPresenceRequest& request, v1::ListPresenceResponse* reply) {
+  DSG_RETURN_IF_ERROR(CheckRequest(request));
+  DSG_ASSIGN_OR_RETURN(const Page page, engine->ReadPage("ListPresence", request));
   const Snapshot& snapshot = page.view.snapshot();
   PresenceKey after;
   if (!page.is_first()) {

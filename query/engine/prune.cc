@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/prune.h"
-
+// Forgetting by policy, a batch a message.
+// Refuses to forget all of a map unless it is told that it may.
 #include <algorithm>
 #include <chrono>
 #include <functional>
@@ -12,6 +12,8 @@
 #include "dsg/v1/maintenance_service.pb.h"
 #include "query/engine/commit.h"
 #include "query/engine/compact.h"
+#include "query/engine/engine.h"
+#include "query/engine/engine_cursor.h"
 #include "query/engine/prune_convert.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
@@ -73,9 +75,9 @@ absl::Status WithoutOldReaders(const std::function<absl::Status()>& work) {
   return status;
 }
 
-class Prune final : public PruneCursor {
+class Pruning final : public EngineCursor<v1::PruneResponse> {
  public:
-  Prune(MapTable* maps, const v1::PruneRequest& request, std::vector<PrunePolicy> policies)
+  Pruning(MapTable* maps, const v1::PruneRequest& request, std::vector<PrunePolicy> policies)
       : maps_(maps),
         map_(request.map()),
         is_dry_run_(request.dry_run()),
@@ -84,8 +86,10 @@ class Prune final : public PruneCursor {
         author_(request.author()),
         policies_(std::move(policies)) {}
 
-  absl::Status Next(const CallContext& call, v1::PruneResponse* reply) override {
-    DSG_RETURN_IF_ERROR(call.Check());
+  bool done() const override { return is_done_; }
+
+ private:
+  absl::Status Fill(const CallContext& call, v1::PruneResponse* reply) override {
     switch (phase_) {
       case Phase::kPlan:
         DSG_RETURN_IF_ERROR(WithoutOldReaders([&] { return Plan(call, reply); }));
@@ -114,9 +118,6 @@ class Prune final : public PruneCursor {
     return absl::OkStatus();
   }
 
-  bool done() const override { return is_done_; }
-
- private:
   enum class Phase { kPlan, kPlanAgain, kCommit, kErase, kCompact, kEnd };
 
   absl::Status Plan(const CallContext& call, v1::PruneResponse* reply) {
@@ -391,7 +392,7 @@ class Prune final : public PruneCursor {
 
   absl::Status CompactSlice(const CallContext& call) {
     v1::CompactResponse slice;
-    DSG_RETURN_IF_ERROR(compaction_->Next(call, &slice));
+    DSG_RETURN_IF_ERROR(compaction_->Next(call, &slice).status());
     progress_ = std::max(progress_, kErased + (1.0 - kErased) * slice.progress());
     if (compaction_->done()) phase_ = Phase::kEnd;
     return absl::OkStatus();
@@ -458,7 +459,7 @@ class Prune final : public PruneCursor {
   std::set<NodeId> rewritten_;
   Contested left_;
   std::optional<Revision> keep_from_;
-  std::unique_ptr<CompactCursor> compaction_;
+  std::unique_ptr<StreamCursor<v1::CompactResponse>> compaction_;
   std::chrono::milliseconds erase_slice_ = kEraseSlice;
   Amount before_;
   int64_t file_bytes_before_ = 0;
@@ -474,9 +475,13 @@ class Prune final : public PruneCursor {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<PruneCursor>> OpenPrune(MapTable* maps,
-                                                       const v1::PruneRequest& request) {
-  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> map, maps->Reader(request.map()));
+// The first message says what will go; the others that a batch of it is gone and on disk. Commits
+// of others go in between; what they change meanwhile is left as it is, but where it is to be
+// erased: there its past goes, and what cannot go is named. A prune that ended early resumes when
+// the same request is repeated; the map itself knows what an erasure has left.
+CursorOr<v1::PruneResponse> Prune(Engine* engine, const CallContext&,
+                                  const v1::PruneRequest& request) {
+  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> map, engine->maps.Reader(request.map()));
   if (request.policies().empty() || request.policies_size() > kPolicyCountMax) {
     return FieldError("policies", absl::StrCat(request.policies_size()),
                       absl::StrCat("give 1 to ", kPolicyCountMax, " policies"));
@@ -491,7 +496,7 @@ absl::StatusOr<std::unique_ptr<PruneCursor>> OpenPrune(MapTable* maps,
     DSG_ASSIGN_OR_RETURN(PrunePolicy made, FromProto(policy, map->spec()));
     policies.push_back(std::move(made));
   }
-  return std::make_unique<Prune>(maps, request, std::move(policies));
+  return std::make_unique<Pruning>(&engine->maps, request, std::move(policies));
 }
 
 }  // namespace dsg::query

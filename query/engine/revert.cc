@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/revert.h"
-
+// A map made what it was at a revision, as new revisions, a batch a message.
+// Refuses to lose what was believed since: the revisions between stay readable.
 #include <string>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/maintenance_service.pb.h"
 #include "query/engine/commit.h"
+#include "query/engine/engine.h"
+#include "query/engine/engine_cursor.h"
 #include "query/engine/prune_convert.h"
 #include "query/engine/request_check.h"
 #include "query/engine/revert_plan.h"
@@ -16,7 +18,7 @@
 namespace dsg::query {
 namespace {
 
-class Reversion final : public RevertCursor {
+class Reversion final : public EngineCursor<v1::RevertResponse> {
  public:
   Reversion(MapTable* maps, std::shared_ptr<MapReader> map, std::shared_ptr<const Snapshot> present,
             std::shared_ptr<const Snapshot> wanted, const v1::RevertRequest& request)
@@ -28,9 +30,13 @@ class Reversion final : public RevertCursor {
         is_dry_run_(request.dry_run()),
         parent_(present_->revision()) {}
 
+  bool done() const override {
+    return is_planned_ && (is_dry_run_ || next_ == plan_.batches.size());
+  }
+
+ private:
   // The first message has what will change; each later one a batch.
-  absl::Status Next(const CallContext& call, v1::RevertResponse* reply) override {
-    DSG_RETURN_IF_ERROR(call.Check());
+  absl::Status Fill(const CallContext& call, v1::RevertResponse* reply) override {
     if (!is_planned_) {
       DSG_RETURN_IF_ERROR(PlanFrom(present_, call));
     } else {
@@ -45,11 +51,6 @@ class Reversion final : public RevertCursor {
     return absl::OkStatus();
   }
 
-  bool done() const override {
-    return is_planned_ && (is_dry_run_ || next_ == plan_.batches.size());
-  }
-
- private:
   absl::Status PlanFrom(const std::shared_ptr<const Snapshot>& present, const CallContext& call) {
     DSG_ASSIGN_OR_RETURN(plan_, PlanRevert(map_.get(), *present, *wanted_, call.stop()));
     present_ = present;
@@ -119,14 +120,15 @@ absl::StatusOr<Revision> WantedRevision(MapReader* map, const v1::RevertRequest&
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<RevertCursor>> OpenRevert(MapTable* maps,
-                                                         const v1::RevertRequest& request) {
-  DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> map, maps->Reader(request.map()));
+// Layers and labels that came later stay, without nodes; assets stay too.
+CursorOr<v1::RevertResponse> Revert(Engine* engine, const CallContext&,
+                                    const v1::RevertRequest& request) {
+  DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> map, engine->maps.Reader(request.map()));
   DSG_ASSIGN_OR_RETURN(const Revision wanted_revision, WantedRevision(map.get(), request));
   DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Snapshot> wanted, map->At(wanted_revision));
   DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Snapshot> present, map->Latest());
-  return std::make_unique<Reversion>(maps, std::move(map), std::move(present), std::move(wanted),
-                                     request);
+  return std::make_unique<Reversion>(&engine->maps, std::move(map), std::move(present),
+                                     std::move(wanted), request);
 }
 
 }  // namespace dsg::query

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/search.h"
-
+// Nodes by class, name, colour, attribute, relation and containment. Refuses to guess: a word that
+// the map does not know is an error that lists what is near in spelling.
 #include <bit>
 #include <cmath>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
+#include "query/engine/engine.h"
 #include "query/engine/nodes.h"
 #include "query/engine/request_check.h"
 #include "query/engine/search/compiled_pattern.h"
@@ -117,8 +118,9 @@ void FillPlan(const std::vector<PlanStep>& steps, v1::SearchNodesResponse* reply
 
 }  // namespace
 
-absl::Status SearchNodes(const Page& page, const CallContext& call,
+absl::Status SearchNodes(Engine* engine, const CallContext& call,
                          const v1::SearchNodesRequest& request, v1::SearchNodesResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const Page page, engine->ReadPage("SearchNodes", request));
   DSG_RETURN_IF_ERROR(CheckNodeView(request.view()));
   DSG_ASSIGN_OR_RETURN(const NodePattern pattern, ReadPattern(request));
   DSG_ASSIGN_OR_RETURN(SearchQuestion question, ReadQuestion(page, request));

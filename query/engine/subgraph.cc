@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/subgraph.h"
-
+// All that can be reached from a node, as a stream: nodes by distance, then the edges between them.
+// Refuses to hold a filled message longer than it takes to send it.
 #include <algorithm>
 #include <functional>
 #include <string>
@@ -11,6 +11,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
+#include "query/engine/engine.h"
+#include "query/engine/engine_cursor.h"
 #include "query/engine/in_turn.h"
 #include "query/engine/nodes.h"
 #include "query/engine/read_view.h"
@@ -46,12 +48,16 @@ struct Step {
   Symbol relation = 0;
 };
 
-class Cursor final : public SubgraphCursor {
+class Cursor final : public EngineCursor<v1::GetSubgraphResponse> {
  public:
   Cursor(const ReadView& view, Question question) : view_(view), question_(std::move(question)) {}
 
-  absl::Status Next(const CallContext& call, v1::GetSubgraphResponse* reply) override {
-    DSG_RETURN_IF_ERROR(call.Check());
+  bool done() const override {
+    return graph_ != nullptr && level_.empty() && edges_.done() && next_source_ == sources_.size();
+  }
+
+ private:
+  absl::Status Fill(const CallContext& call, v1::GetSubgraphResponse* reply) override {
     if (graph_ == nullptr) {
       DSG_RETURN_IF_ERROR(Begin(call));
       view_.FillHeader(reply->mutable_header());
@@ -72,11 +78,6 @@ class Cursor final : public SubgraphCursor {
     return absl::OkStatus();
   }
 
-  bool done() const override {
-    return graph_ != nullptr && level_.empty() && edges_.done() && next_source_ == sources_.size();
-  }
-
- private:
   absl::Status Begin(const CallContext& call) {
     DSG_ASSIGN_OR_RETURN(auto graph, view_.Graph(call.stop()));
     DSG_ASSIGN_OR_RETURN(relations_,
@@ -225,8 +226,9 @@ class Cursor final : public SubgraphCursor {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<SubgraphCursor>> OpenSubgraph(
-    const ReadView& view, const v1::GetSubgraphRequest& request) {
+CursorOr<v1::GetSubgraphResponse> GetSubgraph(Engine* engine, const CallContext& call,
+                                              const v1::GetSubgraphRequest& request) {
+  DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
   Question question;
   DSG_RETURN_IF_ERROR(CheckNodeView(request.view()));
   if (request.depth_max() < 0) {
@@ -239,14 +241,14 @@ absl::StatusOr<std::unique_ptr<SubgraphCursor>> OpenSubgraph(
   }
   DSG_ASSIGN_OR_RETURN(question.filter, FilterFromProto(request.filter(), view.snapshot()));
   DSG_ASSIGN_OR_RETURN(question.root,
-                       ResolveOne(view.snapshot(), request.root(), "root", StopCheck()));
+                       ResolveOne(view.snapshot(), request.root(), "root", call.stop()));
   question.relations.assign(request.relations().begin(), request.relations().end());
   if (question.relations.empty()) question.relations = {relations::kContains};
   question.both_directions = request.both_directions();
   question.depth_max = request.depth_max();
   question.node_view = request.view();
   question.tree_only = request.tree_only();
-  return std::unique_ptr<SubgraphCursor>(std::make_unique<Cursor>(view, std::move(question)));
+  return std::make_unique<Cursor>(view, std::move(question));
 }
 
 }  // namespace dsg::query

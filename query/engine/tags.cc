@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/maintenance_service.pb.h"
+#include "query/engine/engine.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
 #include "schema/store/tags.h"
@@ -33,39 +34,42 @@ absl::StatusOr<std::string> NoteOf(MapTable* maps, const std::string& map,
 
 }  // namespace
 
-absl::Status SetTag(MapTable* maps, const CallContext& call, const v1::SetTagRequest& request,
+absl::Status SetTag(Engine* engine, const CallContext& call, const v1::SetTagRequest& request,
                     v1::SetTagResponse* reply) {
   if (request.revision() < 0) {
     return FieldError("revision", absl::StrCat(request.revision()),
                       "give a revision, or none for the newest");
   }
-  return maps->WithWriter(request.map(), call.stop(), [&](MapWriter& writer) -> absl::Status {
-    Revision revision = request.revision();
-    if (!request.has_revision()) {
-      // Read under the writer's lock, so that nothing is newer when the tag is set.
-      DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> map, maps->Reader(request.map()));
-      DSG_ASSIGN_OR_RETURN(const RevisionInfo head, map->Head());
-      revision = head.revision;
-    }
-    std::string note = request.note();
-    if (!request.has_note()) {
-      DSG_ASSIGN_OR_RETURN(note, NoteOf(maps, request.map(), request.name()));
-    }
-    DSG_ASSIGN_OR_RETURN(const Tag tag, writer.SetTag(request.name(), revision, note));
-    ToProto(tag, reply->mutable_tag());
-    return absl::OkStatus();
+  return engine->maps.WithWriter(
+      request.map(), call.stop(), [&](MapWriter& writer) -> absl::Status {
+        Revision revision = request.revision();
+        if (!request.has_revision()) {
+          // Read under the writer's lock, so that nothing is newer when the tag is set.
+          DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> map,
+                               engine->maps.Reader(request.map()));
+          DSG_ASSIGN_OR_RETURN(const RevisionInfo head, map->Head());
+          revision = head.revision;
+        }
+        std::string note = request.note();
+        if (!request.has_note()) {
+          DSG_ASSIGN_OR_RETURN(note, NoteOf(&engine->maps, request.map(), request.name()));
+        }
+        DSG_ASSIGN_OR_RETURN(const Tag tag, writer.SetTag(request.name(), revision, note));
+        ToProto(tag, reply->mutable_tag());
+        return absl::OkStatus();
+      });
+}
+
+absl::Status RemoveTag(Engine* engine, const CallContext& call, const v1::RemoveTagRequest& request,
+                       v1::RemoveTagResponse*) {
+  return engine->maps.WithWriter(request.map(), call.stop(), [&](MapWriter& writer) {
+    return writer.RemoveTag(request.name());
   });
 }
 
-absl::Status RemoveTag(MapTable* maps, const CallContext& call,
-                       const v1::RemoveTagRequest& request) {
-  return maps->WithWriter(request.map(), call.stop(),
-                          [&](MapWriter& writer) { return writer.RemoveTag(request.name()); });
-}
-
-absl::Status ListTags(MapTable* maps, const v1::ListTagsRequest& request,
+absl::Status ListTags(Engine* engine, const CallContext&, const v1::ListTagsRequest& request,
                       v1::ListTagsResponse* reply) {
-  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> map, maps->Reader(request.map()));
+  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> map, engine->maps.Reader(request.map()));
   DSG_ASSIGN_OR_RETURN(const std::vector<Tag> tags, map->Tags());
   for (const Tag& tag : tags) ToProto(tag, reply->add_tags());
   return absl::OkStatus();

@@ -6,25 +6,9 @@
 #include <string>
 
 #include "absl/status/statusor.h"
-#include "query/engine/call_context.h"
-#include "query/engine/map_table.h"
-
-namespace dsg::v1 {
-class ListTagsRequest;
-class ListTagsResponse;
-class RemoveTagRequest;
-class SetTagRequest;
-class SetTagResponse;
-}  // namespace dsg::v1
+#include "schema/store/graph_store.h"
 
 namespace dsg::query {
-
-absl::Status SetTag(MapTable* maps, const CallContext& call, const v1::SetTagRequest& request,
-                    v1::SetTagResponse* reply);
-absl::Status RemoveTag(MapTable* maps, const CallContext& call,
-                       const v1::RemoveTagRequest& request);
-absl::Status ListTags(MapTable* maps, const v1::ListTagsRequest& request,
-                      v1::ListTagsResponse* reply);
 
 /// Errors: NOT_FOUND/TAG_UNKNOWN.
 absl::StatusOr<Revision> RevisionOfTag(MapReader* map, const std::string& tag);

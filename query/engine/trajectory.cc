@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/trajectory.h"
-
+// The poses of one agent over an interval, one message at a time, so that a slow reader holds
+// neither a thread nor more memory than one message.
 #include <algorithm>
 #include <string>
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/engine/agent_names.h"
+#include "query/engine/engine.h"
+#include "query/engine/engine_cursor.h"
 #include "query/engine/read_view.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
@@ -30,7 +32,7 @@ TimeNs NextOnGrid(TimeNs from_ns, TimeNs period_ns, TimeNs at_ns) {
   return wait > room ? kTimeMax : at_ns + static_cast<TimeNs>(wait);
 }
 
-class Cursor final : public TrajectoryCursor {
+class Cursor final : public EngineCursor<v1::GetTrajectoryResponse> {
  public:
   Cursor(const ReadView& view, TrackInfo track, const v1::GetTrajectoryRequest& request)
       : view_(view),
@@ -45,8 +47,10 @@ class Cursor final : public TrajectoryCursor {
     }
   }
 
-  absl::Status Next(const CallContext& call, v1::GetTrajectoryResponse* reply) override {
-    DSG_RETURN_IF_ERROR(call.Check());
+  bool done() const override { return done_; }
+
+ private:
+  absl::Status Fill(const CallContext& call, v1::GetTrajectoryResponse* reply) override {
     if (is_first_) {
       view_.FillHeader(reply->mutable_header());
       reply->set_agent_id(ToString(track_.agent));
@@ -56,9 +60,6 @@ class Cursor final : public TrajectoryCursor {
     return period_ns_ > 0 ? Resample(call, reply) : ReadStored(call, reply);
   }
 
-  bool done() const override { return done_; }
-
- private:
   absl::Status ReadStored(const CallContext& call, v1::GetTrajectoryResponse* reply) {
     bool is_full = false;
     const auto take = [&](const TimedPose& pose) {
@@ -112,8 +113,9 @@ class Cursor final : public TrajectoryCursor {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<TrajectoryCursor>> OpenTrajectory(
-    const ReadView& view, AgentNames* names, const v1::GetTrajectoryRequest& request) {
+CursorOr<v1::GetTrajectoryResponse> GetTrajectory(Engine* engine, const CallContext&,
+                                                  const v1::GetTrajectoryRequest& request) {
+  DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
   const TimeNs period_ns = request.resample_period_ns();
   if (period_ns != 0 && period_ns < kPeriodNsMin) {
     return FieldError("resample_period_ns", absl::StrCat(period_ns),
@@ -122,10 +124,9 @@ absl::StatusOr<std::unique_ptr<TrajectoryCursor>> OpenTrajectory(
   if (request.has_from_ns() && request.has_to_ns()) {
     DSG_RETURN_IF_ERROR(CheckTimeRange(request.from_ns(), request.to_ns()));
   }
-  DSG_ASSIGN_OR_RETURN(const NodeId agent, names->Resolve(view.snapshot(), request.agent()));
+  DSG_ASSIGN_OR_RETURN(const NodeId agent, engine->names.Resolve(view.snapshot(), request.agent()));
   DSG_ASSIGN_OR_RETURN(TrackInfo track, view.snapshot().GetTrack(agent));
-  return std::unique_ptr<TrajectoryCursor>(
-      std::make_unique<Cursor>(view, std::move(track), request));
+  return std::make_unique<Cursor>(view, std::move(track), request);
 }
 
 }  // namespace dsg::query

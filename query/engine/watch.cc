@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/watch.h"
-
+// The revisions of a map as they come, from where the caller left off.
+// Refuses to keep a thread while nothing happens.
 #include <algorithm>
 #include <chrono>
 #include <string>
@@ -10,6 +10,8 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/map_service.pb.h"
 #include "query/engine/difference.h"
+#include "query/engine/engine.h"
+#include "query/engine/engine_cursor.h"
 #include "query/engine/nodes.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
@@ -50,7 +52,7 @@ absl::Status CompactedError(const std::string& map, Revision after, Revision old
       {{"map", map}, {"oldest", absl::StrCat(oldest)}, {"newest", absl::StrCat(newest)}});
 }
 
-class Watch final : public WatchCursor {
+class Watch final : public EngineCursor<v1::WatchMapResponse> {
  public:
   Watch(std::shared_ptr<MapReader> map, Revision after, const v1::WatchMapRequest& request)
       : map_(std::move(map)),
@@ -71,8 +73,11 @@ class Watch final : public WatchCursor {
     return std::min<std::chrono::nanoseconds>(kPollPeriod, idle_until_ - now);
   }
 
-  absl::Status Next(const CallContext& call, v1::WatchMapResponse* reply) override {
-    DSG_RETURN_IF_ERROR(call.Check());
+  // Only its caller ends a watch.
+  bool done() const override { return false; }
+
+ private:
+  absl::Status Fill(const CallContext& call, v1::WatchMapResponse* reply) override {
     const absl::StatusOr<RevisionInfo> looked = map_->Head();
     if (!map_->IsCurrent()) return ReplacedError(map_->spec().name);
     DSG_RETURN_IF_ERROR(looked.status());
@@ -95,10 +100,6 @@ class Watch final : public WatchCursor {
     return absl::OkStatus();
   }
 
-  // Only its caller ends a watch.
-  bool done() const override { return false; }
-
- private:
   // Makes the revision after `after_` the current one.
   absl::Status TakeRevision(Revision head) {
     if (backlog_.empty()) {
@@ -167,10 +168,10 @@ absl::Status CheckRequest(const v1::WatchMapRequest& request) {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<WatchCursor>> OpenWatch(MapTable* maps,
-                                                       const v1::WatchMapRequest& request) {
+CursorOr<v1::WatchMapResponse> WatchMap(Engine* engine, const CallContext&,
+                                        const v1::WatchMapRequest& request) {
   DSG_RETURN_IF_ERROR(CheckRequest(request));
-  DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> map, maps->Reader(request.map()));
+  DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> map, engine->maps.Reader(request.map()));
   DSG_ASSIGN_OR_RETURN(const RevisionInfo head, map->Head());
   const Revision after = request.has_after_revision() ? request.after_revision() : head.revision;
   DSG_ASSIGN_OR_RETURN(const Revision oldest, map->OldestRevision());

@@ -47,6 +47,9 @@ absl::StatusOr<Box3d> BoxFromProto(const v1::Box& in, std::string_view field);
 void ToProto(const TimedPose& pose, v1::TimedPose* out);
 absl::StatusOr<TimedPose> FromProto(const v1::TimedPose& in);
 
+void ToProto(const PoseFactor& factor, v1::PoseFactor* out);
+absl::StatusOr<PoseFactor> FromProto(const v1::PoseFactor& in);
+
 void ToProto(const BodyShape& shape, v1::BodyShape* out);
 BodyShape FromProto(const v1::BodyShape& in);
 

@@ -41,7 +41,4 @@ std::string SerializeInOrder(const google::protobuf::MessageLite& message);
 void EdgeDetailsToProto(const Edge& edge, v1::Edge* out);
 void EdgeDetailsFromProto(const v1::Edge& in, Edge* edge);
 
-void ToProto(const PoseFactor& factor, v1::PoseFactor* out);
-absl::StatusOr<PoseFactor> FromProto(const v1::PoseFactor& in);
-
 }  // namespace dsg

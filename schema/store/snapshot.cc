@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "schema/store/snapshot.h"
 
+#include <algorithm>
+
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "schema/base/status.h"
@@ -113,6 +115,25 @@ absl::Status Snapshot::UnknownAsset(const Sha256& sha256) const {
   return MakeError(Reason::kAssetUnknown,
                    absl::StrCat("map \"", spec().name, "\" has no asset ", ToHex(sha256)),
                    {{"map", spec().name}, {"asset", ToHex(sha256)}});
+}
+
+absl::StatusOr<AssetPart> Snapshot::ReadAssetPart(const Sha256& sha256, int64_t index) const {
+  DSG_ASSIGN_OR_RETURN(const Asset asset, ReadAsset(sha256));
+  const size_t size = asset.content.size();
+  AssetPart part;
+  part.media_type = asset.media_type;
+  part.size_bytes = static_cast<int64_t>(size);
+  part.part_count =
+      static_cast<int64_t>(std::max<size_t>(1, (size + kAssetPartBytes - 1) / kAssetPartBytes));
+  if (index < 0 || index >= part.part_count) {
+    return MakeError(Reason::kAssetUnknown,
+                     absl::StrCat("asset ", ToHex(sha256), " has ", part.part_count,
+                                  " parts and no part ", index, "; ask for one of these"),
+                     {{"asset", ToHex(sha256)}});
+  }
+  part.content =
+      asset.content.substr(static_cast<size_t>(index) * kAssetPartBytes, kAssetPartBytes);
+  return part;
 }
 
 }  // namespace dsg

@@ -97,6 +97,19 @@ struct BoxVisit {
   TimeNs exit_ns = 0;
 };
 
+/// Size of all parts of an asset but the last.
+inline constexpr size_t kAssetPartBytes = size_t{1} << 20;
+
+/// A part of an asset; all parts, joined in order, are its content.
+struct AssetPart {
+  std::string media_type;
+  /// How many parts the asset has; at least 1, since an empty asset has an empty part.
+  int64_t part_count = 0;
+  /// Of the whole asset.
+  int64_t size_bytes = 0;
+  std::string content;
+};
+
 /// A body shape as a reader is shown it; lives as long as the call that shows it.
 struct ShownShape {
   const BodyShape& shape;
@@ -226,6 +239,11 @@ class Snapshot {
   virtual absl::StatusOr<MeshBlock> ReadMeshBlock(BlockIndex index) const = 0;
   /// Errors: NOT_FOUND/ASSET_UNKNOWN.
   virtual absl::StatusOr<Asset> ReadAsset(const Sha256& sha256) const = 0;
+  /// Part `index` (from 0) of an asset, so that a large asset need not be in memory whole. The
+  /// bytes of the part are checked, the digest of the whole is not.
+  /// Cost:   that of one part; a backend that stores no parts reads the whole asset.
+  /// Errors: NOT_FOUND/ASSET_UNKNOWN, also for an index past the last part.
+  virtual absl::StatusOr<AssetPart> ReadAssetPart(const Sha256& sha256, int64_t index) const;
 
  protected:
   /// NOT_FOUND, naming what was asked for.

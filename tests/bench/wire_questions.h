@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "query/engine/api.h"
+#include "query/api/api.h"
 #include "schema/base/random.h"
 #include "tests/bench/wire_client.h"
 

@@ -239,11 +239,14 @@ Question MakeSubgraph(const QuestionWorld& world, Random* random) {
     *asked.mutable_read_at() = asker->ReadAt(revision);
     ComparedAnswer answer;
     const absl::Status status =
-        asker->core()->GetSubgraph(asker->call, asked, [&](const v1::GetSubgraphResponse& part) {
-          for (const v1::Node& node : part.nodes()) answer.words.push_back(TextOf(node));
-          for (const v1::Edge& edge : part.edges()) answer.words.push_back(TextOf(edge));
-          return true;
-        });
+        query::ReadStream(asker->call, asker->core()->GetSubgraph(asker->call, asked),
+                          [&](const v1::GetSubgraphResponse& part) {
+                            for (const v1::Node& node : part.nodes())
+                              answer.words.push_back(TextOf(node));
+                            for (const v1::Edge& edge : part.edges())
+                              answer.words.push_back(TextOf(edge));
+                            return true;
+                          });
     return status.ok() ? answer : ErrorAnswer(status);
   };
   return made;

@@ -64,11 +64,12 @@ class Reverter {
     request.set_map(kMap);
     request.set_revision(to);
     v1::RevertResponse last;
-    DSG_RETURN_IF_ERROR(
-        core_->Revert(query::CallContext(), request, [&](const v1::RevertResponse& message) {
-          last = message;
-          return --message_max > 0;
-        }));
+    DSG_RETURN_IF_ERROR(query::ReadStream(query::CallContext(),
+                                          core_->Revert(query::CallContext(), request),
+                                          [&](const v1::RevertResponse& message) {
+                                            last = message;
+                                            return --message_max > 0;
+                                          }));
     return last;
   }
 
@@ -204,18 +205,18 @@ TEST(Revert, DoesNotMixWithTheWritesOfOthers) {
     v1::RevertRequest request;
     request.set_map(kMap);
     request.set_revision(2);
-    const auto cursor = OrDie(reverter.core().OpenRevert(request));
+    const auto cursor = OrDie(reverter.core().Revert(query::CallContext(), request));
     v1::RevertResponse message;
     for (int i = 0; i <= batch_count; ++i) {
       message.Clear();
-      OrDie(cursor->Next(query::CallContext(), &message));
+      ASSERT_TRUE(OrDie(cursor->Next(query::CallContext(), &message)));
       ASSERT_FALSE(message.done());
     }
     OrDie(reverter.Revert(30));
     const Revision others = OrDie(reader->Head()).revision;
     while (!cursor->done()) {
       message.Clear();
-      OrDie(cursor->Next(query::CallContext(), &message));
+      ASSERT_TRUE(OrDie(cursor->Next(query::CallContext(), &message)));
     }
     EXPECT_GT(message.revision(), others);
     ExpectSame(*OrDie(reader->Latest()), *OrDie(reader->At(2)));

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Stays, mesh blocks and assets.
 #include "schema/codec/proto_convert.h"
+#include "schema/store/snapshot.h"
 #include "schema/store/sqlite/commit.h"
 #include "schema/store/sqlite/graph_rows.h"
 
 namespace dsg::sqlite {
 namespace {
-
-constexpr size_t kAssetPartBytes = size_t{1} << 20;
 
 constexpr char kSelectStay[] =
     "SELECT agent, enter_ns, exit_ns, place, room, rev_from, checksum FROM stay"

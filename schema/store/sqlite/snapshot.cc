@@ -139,4 +139,32 @@ absl::StatusOr<Asset> SqliteSnapshot::ReadAsset(const Sha256& sha256) const {
   return asset;
 }
 
+absl::StatusOr<AssetPart> SqliteSnapshot::ReadAssetPart(const Sha256& sha256, int64_t index) const {
+  DSG_ASSIGN_OR_RETURN(auto lease, reader_->LeaseAt(revision()));
+  const Query::BlobView key{{reinterpret_cast<const char*>(sha256.data()), sha256.size()}};
+  // The length of a blob is read without the blob.
+  Query query(*lease,
+              "SELECT checksum, payload, media_type,"
+              "  (SELECT count(*) FROM asset WHERE sha256 = ?1),"
+              "  (SELECT sum(length(payload)) FROM asset WHERE sha256 = ?1)"
+              " FROM asset WHERE sha256 = ?1 AND part = ?2 AND rev_from <= ?3");
+  query.Bind(key, index, revision());
+  if (!query.Next()) {
+    DSG_RETURN_IF_ERROR(query.status());
+    return MakeError(
+        Reason::kAssetUnknown,
+        absl::StrCat("map \"", spec().name, "\" has no part ", index, " of asset ", ToHex(sha256)),
+        {{"map", spec().name}, {"asset", ToHex(sha256)}});
+  }
+  AssetPart part;
+  part.content = query.Blob(1);
+  if (query.Int(0) != Checksum(part.content, static_cast<uint64_t>(index))) {
+    return CorruptRow(spec().name, "asset", ToHex(sha256));
+  }
+  part.media_type = query.Text(2);
+  part.part_count = query.Int(3);
+  part.size_bytes = query.Int(4);
+  return part;
+}
+
 }  // namespace dsg::sqlite

@@ -73,6 +73,7 @@ class SqliteSnapshot : public Snapshot {
       const StopCheck& stop) const override;
   absl::StatusOr<MeshBlock> ReadMeshBlock(BlockIndex index) const override;
   absl::StatusOr<Asset> ReadAsset(const Sha256& sha256) const override;
+  absl::StatusOr<AssetPart> ReadAssetPart(const Sha256& sha256, int64_t index) const override;
 
  private:
   absl::StatusOr<std::vector<NodeId>> ChildrenOf(NodeId parent) const;

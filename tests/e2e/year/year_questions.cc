@@ -84,8 +84,9 @@ absl::Status ReadMinute(const Day& day, Random* random) {
   request.set_agent(day.SomeAgent(random));
   request.set_from_ns(day.begin_ns() + 600 * kNsPerSecond);
   request.set_to_ns(day.begin_ns() + 660 * kNsPerSecond);
-  return day.core->GetTrajectory(query::CallContext(), request,
-                                 [](const v1::GetTrajectoryResponse&) { return true; });
+  return query::ReadStream(query::CallContext(),
+                           day.core->GetTrajectory(query::CallContext(), request),
+                           [](const v1::GetTrajectoryResponse&) { return true; });
 }
 
 absl::Status ReadMesh(const Day& day, Random* random) {
@@ -94,7 +95,7 @@ absl::Status ReadMesh(const Day& day, Random* random) {
   day.SomePoint(random, request.mutable_box()->mutable_min());
   *request.mutable_box()->mutable_max() = request.box().min();
   request.mutable_box()->mutable_min()->set_z(0.0);
-  return day.core->GetMesh(query::CallContext(), request,
+  return query::ReadStream(query::CallContext(), day.core->GetMesh(query::CallContext(), request),
                            [](const v1::GetMeshResponse&) { return true; });
 }
 

@@ -24,17 +24,17 @@ namespace {
 using test::kMap;
 
 // A compaction that is never done, and tells so as fast as it is read.
-class EndlessCompaction final : public query::CompactCursor {
+class EndlessCompaction final : public query::StreamCursor<v1::CompactResponse> {
  public:
   explicit EndlessCompaction(std::atomic<int>* open_count) : open_count_(open_count) {
     ++*open_count_;
   }
   ~EndlessCompaction() override { --*open_count_; }
-  absl::Status Next(const query::CallContext& call, v1::CompactResponse* reply) override {
+  absl::StatusOr<bool> Next(const query::CallContext& call, v1::CompactResponse* reply) override {
     reply->set_progress(0.5);
-    return call.Check();
+    DSG_RETURN_IF_ERROR(call.Check());
+    return true;
   }
-  bool done() const override { return false; }
 
  private:
   std::atomic<int>* const open_count_;
@@ -44,8 +44,8 @@ class EndlessCore final : public PassingCore {
  public:
   EndlessCore(std::unique_ptr<query::ServiceCore> core, std::atomic<int>* open_count)
       : PassingCore(std::move(core)), open_count_(open_count) {}
-  absl::StatusOr<std::unique_ptr<query::CompactCursor>> OpenCompact(
-      const v1::CompactRequest&) override {
+  query::CursorOr<v1::CompactResponse> Compact(const query::CallContext&,
+                                               const v1::CompactRequest&) override {
     return std::make_unique<EndlessCompaction>(open_count_);
   }
 

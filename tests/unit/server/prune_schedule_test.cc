@@ -37,13 +37,14 @@ class TestClock final : public ScheduleClock {
   TimePoint end_;
 };
 
-class Pruned final : public query::PruneCursor {
+class Pruned final : public query::StreamCursor<v1::PruneResponse> {
  public:
   explicit Pruned(int message_count, absl::Status status)
       : left_(message_count), status_(std::move(status)) {}
-  absl::Status Next(const query::CallContext&, v1::PruneResponse*) override {
+  absl::StatusOr<bool> Next(const query::CallContext&, v1::PruneResponse*) override {
     --left_;
-    return status_;
+    DSG_RETURN_IF_ERROR(status_);
+    return true;
   }
   bool done() const override { return left_ <= 0; }
 
@@ -61,8 +62,8 @@ class Core final : public PassingCore {
     for (const char* name : {"a", "b", "c"}) reply->add_maps()->set_name(name);
     return absl::OkStatus();
   }
-  absl::StatusOr<std::unique_ptr<query::PruneCursor>> OpenPrune(
-      const v1::PruneRequest& request) override {
+  query::CursorOr<v1::PruneResponse> Prune(const query::CallContext&,
+                                           const v1::PruneRequest& request) override {
     ++count_of_[request.map()];
     last_ = request;
     absl::Status status;

@@ -32,27 +32,27 @@ class CountingCore final : public PassingCore {
   CountingCore(std::unique_ptr<query::ServiceCore> core, std::atomic<int>* message_count)
       : PassingCore(std::move(core)), message_count_(message_count) {}
 
-  absl::StatusOr<std::unique_ptr<query::MeshCursor>> OpenMesh(
-      const v1::GetMeshRequest& request) override {
-    auto cursor = PassingCore::OpenMesh(request);
+  query::CursorOr<v1::GetMeshResponse> GetMesh(const query::CallContext& call,
+                                               const v1::GetMeshRequest& request) override {
+    auto cursor = PassingCore::GetMesh(call, request);
     if (!cursor.ok()) return cursor;
-    return std::unique_ptr<query::MeshCursor>(
-        std::make_unique<Cursor>(*std::move(cursor), message_count_));
+    return std::make_unique<Cursor>(*std::move(cursor), message_count_);
   }
 
  private:
-  class Cursor final : public query::MeshCursor {
+  class Cursor final : public query::StreamCursor<v1::GetMeshResponse> {
    public:
-    Cursor(std::unique_ptr<query::MeshCursor> cursor, std::atomic<int>* message_count)
+    Cursor(std::unique_ptr<query::StreamCursor<v1::GetMeshResponse>> cursor,
+           std::atomic<int>* message_count)
         : cursor_(std::move(cursor)), message_count_(message_count) {}
-    absl::Status Next(const query::CallContext& call, v1::GetMeshResponse* reply) override {
+    absl::StatusOr<bool> Next(const query::CallContext& call, v1::GetMeshResponse* reply) override {
       ++*message_count_;
       return cursor_->Next(call, reply);
     }
     bool done() const override { return cursor_->done(); }
 
    private:
-    std::unique_ptr<query::MeshCursor> cursor_;
+    std::unique_ptr<query::StreamCursor<v1::GetMeshResponse>> cursor_;
     std::atomic<int>* message_count_;
   };
 

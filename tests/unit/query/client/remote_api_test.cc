@@ -128,11 +128,12 @@ TEST_F(RemoteApiTest, CarriesBodyShapesUntilTheCallerHasEnough) {
   request.set_agent("H12");
   std::vector<int64_t> times;
   const absl::Status status =
-      Api()->GetAgentShape(CallContext(), request, [&](const v1::GetAgentShapeResponse& message) {
-        EXPECT_EQ(message.agent_id(), "H12");
-        times.push_back(message.shapes(0).shape().time_ns());
-        return times.size() < 3;
-      });
+      query::ReadStream(CallContext(), Api()->GetAgentShape(CallContext(), request),
+                        [&](const v1::GetAgentShapeResponse& message) {
+                          EXPECT_EQ(message.agent_id(), "H12");
+                          times.push_back(message.shapes(0).shape().time_ns());
+                          return times.size() < 3;
+                        });
   EXPECT_TRUE(status.ok()) << status;
   EXPECT_EQ(times, (std::vector<int64_t>{0, 1, 2}));
 }
@@ -235,8 +236,9 @@ TEST_F(RemoteApiTest, StreamsMessagesInOrder) {
   };
   StartServer();
   int64_t next_ns = 0;
-  const absl::Status status = Api()->GetTrajectory(
-      CallContext(), v1::GetTrajectoryRequest(), [&](const v1::GetTrajectoryResponse& message) {
+  const absl::Status status = query::ReadStream(
+      CallContext(), Api()->GetTrajectory(CallContext(), v1::GetTrajectoryRequest()),
+      [&](const v1::GetTrajectoryResponse& message) {
         EXPECT_EQ(message.poses(0).time_ns(), next_ns++);
         return true;
       });
@@ -253,9 +255,9 @@ TEST_F(RemoteApiTest, ACallerThatHasEnoughStopsTheStreamWithoutAnError) {
   };
   StartServer();
   int message_count = 0;
-  const absl::Status status =
-      Api()->GetTrajectory(CallContext(), v1::GetTrajectoryRequest(),
-                           [&](const v1::GetTrajectoryResponse&) { return ++message_count < 2; });
+  const absl::Status status = query::ReadStream(
+      CallContext(), Api()->GetTrajectory(CallContext(), v1::GetTrajectoryRequest()),
+      [&](const v1::GetTrajectoryResponse&) { return ++message_count < 2; });
   EXPECT_TRUE(status.ok()) << status;
   EXPECT_EQ(message_count, 2);
 }
@@ -268,11 +270,12 @@ TEST_F(RemoteApiTest, AStreamThatBreaksIsNotStartedAgain) {
   };
   StartServer();
   int message_count = 0;
-  const absl::Status status = Api()->GetTrajectory(CallContext(), v1::GetTrajectoryRequest(),
-                                                   [&](const v1::GetTrajectoryResponse&) {
-                                                     ++message_count;
-                                                     return true;
-                                                   });
+  const absl::Status status = query::ReadStream(
+      CallContext(), Api()->GetTrajectory(CallContext(), v1::GetTrajectoryRequest()),
+      [&](const v1::GetTrajectoryResponse&) {
+        ++message_count;
+        return true;
+      });
   EXPECT_EQ(ReasonOf(status), Reason::kShuttingDown);
   EXPECT_EQ(message_count, 1);
   EXPECT_EQ(service_.call_count, 1);
@@ -289,11 +292,12 @@ TEST_F(RemoteApiTest, AStreamRefusedAtOnceIsTriedAgain) {
   };
   StartServer();
   int message_count = 0;
-  const absl::Status status = Api()->GetTrajectory(CallContext(), v1::GetTrajectoryRequest(),
-                                                   [&](const v1::GetTrajectoryResponse&) {
-                                                     ++message_count;
-                                                     return true;
-                                                   });
+  const absl::Status status = query::ReadStream(
+      CallContext(), Api()->GetTrajectory(CallContext(), v1::GetTrajectoryRequest()),
+      [&](const v1::GetTrajectoryResponse&) {
+        ++message_count;
+        return true;
+      });
   EXPECT_TRUE(status.ok()) << status;
   EXPECT_EQ(message_count, 1);
 }

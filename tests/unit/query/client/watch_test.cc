@@ -80,10 +80,10 @@ TEST_F(WatchClientTest, GivesAWatchNoDeadlineOfItsOwn) {
   const auto api = Connect(address_);
   ASSERT_TRUE(api.ok()) << api.status();
   const auto send = [](const v1::WatchMapResponse&) { return true; };
-  EXPECT_TRUE((*api)->WatchMap(CallContext(), {}, send).ok());
+  EXPECT_TRUE(query::ReadStream(CallContext(), (*api)->WatchMap(CallContext(), {}), send).ok());
   EXPECT_EQ(deadline, system_clock::time_point::max());
   const CallContext bounded(CallContext::Clock::now() + std::chrono::hours(1));
-  EXPECT_TRUE((*api)->WatchMap(bounded, {}, send).ok());
+  EXPECT_TRUE(query::ReadStream(bounded, (*api)->WatchMap(bounded, {}), send).ok());
   EXPECT_LT(deadline, system_clock::now() + std::chrono::hours(2));
 }
 
@@ -92,31 +92,35 @@ TEST_F(WatchClientTest, EndsAWatchWhenItsCallerHasEnoughOrCancels) {
   const auto api = Connect(address_);
   ASSERT_TRUE(api.ok()) << api.status();
   CallContext call;
-  EXPECT_TRUE((*api)->WatchMap(call, {}, [](const v1::WatchMapResponse&) { return false; }).ok());
-  const absl::Status cancelled = (*api)->WatchMap(call, {}, [&](const v1::WatchMapResponse&) {
-    call.Cancel();
-    return true;
-  });
+  EXPECT_TRUE(query::ReadStream(call, (*api)->WatchMap(call, {}), [](const v1::WatchMapResponse&) {
+                return false;
+              }).ok());
+  const absl::Status cancelled =
+      query::ReadStream(call, (*api)->WatchMap(call, {}), [&](const v1::WatchMapResponse&) {
+        call.Cancel();
+        return true;
+      });
   EXPECT_TRUE(absl::IsCancelled(cancelled)) << cancelled;
 }
 
 TEST_F(WatchClientTest, GivesUpAStreamThatGivesNoSignOfLife) {
   FallSilent();
   const CallContext call;
-  const auto channel = MakeChannel(address_);
+  const ServerAddress server{.address = address_};
+  const auto channel = MakeChannel(server);
   v1::MapService::Stub stub(channel);
-  CallInFlight flight(call, address_, {std::chrono::seconds(0), milliseconds(150)});
+  CallInFlight flight(call, server, {std::chrono::seconds(0), milliseconds(150)});
   const auto rpc = stub.PrepareAsyncWatchMap(flight.context(), {}, flight.queue());
   rpc->StartCall(flight.tag());
-  ASSERT_TRUE(flight.Wait());
+  ASSERT_TRUE(flight.Wait(call));
   v1::WatchMapResponse message;
   rpc->Read(&message, flight.tag());
-  EXPECT_TRUE(flight.Wait());
+  EXPECT_TRUE(flight.Wait(call));
   rpc->Read(&message, flight.tag());
-  EXPECT_FALSE(flight.Wait());
+  EXPECT_FALSE(flight.Wait(call));
   grpc::Status status;
   rpc->Finish(&status, flight.tag());
-  flight.Wait();
+  flight.Wait(call);
   const absl::Status outcome = flight.Outcome(status);
   EXPECT_TRUE(absl::IsUnavailable(outcome)) << outcome;
   EXPECT_NE(outcome.message().find("sign of life"), absl::string_view::npos);

@@ -57,10 +57,11 @@ class AgentShape : public testing::Test {
   absl::StatusOr<Messages> Ask(const CallContext& call = CallContext()) {
     if (core_ == nullptr) core_ = OpenCore(folder_.path());
     Messages messages;
-    const absl::Status status = core_->GetAgentShape(call, request_, [&](const auto& message) {
-      messages.push_back(message);
-      return true;
-    });
+    const absl::Status status =
+        query::ReadStream(call, core_->GetAgentShape(call, request_), [&](const auto& message) {
+          messages.push_back(message);
+          return true;
+        });
     if (!status.ok()) return status;
     return messages;
   }
@@ -212,19 +213,20 @@ TEST_F(AgentShape, StopsAtTheDeadlineAndWhenTheCallerHasEnough) {
   core_ = OpenCore(folder_.path());
   CallContext call;
   int count = 0;
-  const absl::Status cancelled =
-      core_->GetAgentShape(call, request_, [&](const v1::GetAgentShapeResponse&) {
-        call.Cancel();
-        ++count;
-        return true;
-      });
+  const absl::Status cancelled = query::ReadStream(call, core_->GetAgentShape(call, request_),
+                                                   [&](const v1::GetAgentShapeResponse&) {
+                                                     call.Cancel();
+                                                     ++count;
+                                                     return true;
+                                                   });
   EXPECT_TRUE(absl::IsCancelled(cancelled)) << cancelled;
   EXPECT_EQ(count, 1);
   const absl::Status enough =
-      core_->GetAgentShape(CallContext(), request_, [&](const v1::GetAgentShapeResponse&) {
-        ++count;
-        return false;
-      });
+      query::ReadStream(CallContext(), core_->GetAgentShape(CallContext(), request_),
+                        [&](const v1::GetAgentShapeResponse&) {
+                          ++count;
+                          return false;
+                        });
   EXPECT_TRUE(enough.ok()) << enough;
   EXPECT_EQ(count, 2);
 }

@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-using query::ArchiveCursor;
+using ArchiveCursor = query::StreamCursor<v1::ReadArchiveResponse>;
 using query::CallContext;
 
 // Copies of maps that this process holds open, though no name is left of them.
@@ -63,10 +63,10 @@ class ArchiveCopiesTest : public testing::Test {
     core_ = query::MakeServiceCore(*std::move(store), {.archives = limits_});
   }
 
-  absl::StatusOr<std::unique_ptr<ArchiveCursor>> Open() {
+  query::CursorOr<v1::ReadArchiveResponse> Open() {
     v1::ReadArchiveRequest request;
     request.set_map(kMap);
-    return core_->OpenArchive(request);
+    return core_->ReadArchive(call_, request);
   }
 
   // One that has given its first piece, and has others.
@@ -80,7 +80,7 @@ class ArchiveCopiesTest : public testing::Test {
 
   absl::Status Next(ArchiveCursor* cursor) {
     v1::ReadArchiveResponse piece;
-    return cursor->Next(call_, &piece);
+    return cursor->Next(call_, &piece).status();
   }
 
   absl::StatusOr<bool> EraseCup() {
@@ -90,10 +90,11 @@ class ArchiveCopiesTest : public testing::Test {
     policy->set_branch("O1");
     policy->set_strength(v1::ERASE);
     bool is_erased = false;
-    DSG_RETURN_IF_ERROR(core_->Prune(call_, request, [&](const v1::PruneResponse& message) {
-      is_erased = message.erased();
-      return true;
-    }));
+    DSG_RETURN_IF_ERROR(query::ReadStream(call_, core_->Prune(call_, request),
+                                          [&](const v1::PruneResponse& message) {
+                                            is_erased = message.erased();
+                                            return true;
+                                          }));
     return is_erased;
   }
 
@@ -183,13 +184,11 @@ TEST_F(ArchiveCopiesTest, AnErasureOfNothingLeavesArchivesAlone) {
     policy->set_strength(v1::ERASE);
   }
   v1::PruneResponse last;
-  ASSERT_TRUE(core_
-                  ->Prune(call_, request,
-                          [&](const v1::PruneResponse& message) {
-                            last = message;
-                            return true;
-                          })
-                  .ok());
+  ASSERT_TRUE(
+      query::ReadStream(call_, core_->Prune(call_, request), [&](const v1::PruneResponse& message) {
+        last = message;
+        return true;
+      }).ok());
   EXPECT_TRUE(last.done());
   EXPECT_TRUE(last.erased());
   while (!cursor->done()) ASSERT_TRUE(Next(cursor.get()).ok());
@@ -201,7 +200,9 @@ TEST_F(ArchiveCopiesTest, RetiringLeavesArchivesAlone) {
   v1::PruneRequest request;
   request.set_map(kMap);
   request.add_policies()->set_branch("O1");
-  ASSERT_TRUE(core_->Prune(call_, request, [](const v1::PruneResponse&) { return true; }).ok());
+  ASSERT_TRUE(query::ReadStream(call_, core_->Prune(call_, request), [](const v1::PruneResponse&) {
+                return true;
+              }).ok());
   EXPECT_TRUE(Next(cursor.get()).ok());
 }
 

@@ -141,7 +141,7 @@ TEST(BusyMap, IsMergedAndLosesNothingOfTheRobot) {
 TEST(BusyMap, IsMergedByANewPlanWhenTheRobotWritesWhatTheOldOneChanges) {
   test::TwoHalves halves;
   const auto core = test::OpenCore(halves.folder());
-  const auto cursor = core->OpenMerge(WestWithEast());
+  const auto cursor = core->MergeMaps(CallContext(), WestWithEast());
   ASSERT_TRUE(cursor.ok());
   v1::MergeMapsResponse message;
   ASSERT_TRUE((*cursor)->Next(CallContext(), &message).ok());
@@ -200,7 +200,7 @@ class LargeMerge : public testing::Test {
     request.set_map("a");
     request.set_other("b");
     ToProto(Pose3d(), request.mutable_map_t_other());
-    cursor_ = *core_->OpenMerge(request);
+    cursor_ = *core_->MergeMaps(CallContext(), request);
   }
 
   static Node Room(uint64_t index, double x) {
@@ -211,7 +211,7 @@ class LargeMerge : public testing::Test {
 
   void Next() {
     v1::MergeMapsResponse message;
-    const absl::Status status = cursor_->Next(CallContext(), &message);
+    const absl::Status status = cursor_->Next(CallContext(), &message).status();
     ASSERT_TRUE(status.ok()) << status;
   }
   void ToTheEnd() {
@@ -245,7 +245,7 @@ class LargeMerge : public testing::Test {
 
   test::TempFolder folder_;
   std::unique_ptr<ServiceCore> core_;
-  std::unique_ptr<MergeCursor> cursor_;
+  std::unique_ptr<StreamCursor<v1::MergeMapsResponse>> cursor_;
 };
 
 TEST_F(LargeMerge, LeavesWhatOthersWriteOfTheNodesThatItHasBrought) {
@@ -327,15 +327,15 @@ TEST(BusyMap, IsMergedTwiceAtOnceAndHasAllOfTheMeshWhenOneOfThemIsCancelled) {
   request.set_map("a");
   request.set_other("b");
   ToProto(Pose3d(), request.mutable_map_t_other());
-  auto one = *core->OpenMerge(request);
-  const auto two = *core->OpenMerge(request);
+  auto one = *core->MergeMaps(CallContext(), request);
+  const auto two = *core->MergeMaps(CallContext(), request);
   v1::MergeMapsResponse message;
   ASSERT_TRUE(one->Next(CallContext(), &message).ok());
   ASSERT_TRUE(two->Next(CallContext(), &message).ok());
   ASSERT_TRUE(one->Next(CallContext(), &message).ok());
   one.reset();
   while (!two->done()) {
-    const absl::Status status = two->Next(CallContext(), &message);
+    const absl::Status status = two->Next(CallContext(), &message).status();
     ASSERT_TRUE(status.ok()) << status;
   }
   const auto merged = test::Newest(store.get(), "a");
@@ -357,10 +357,11 @@ TEST(BusyMap, IsRevertedAndKeepsWhatTheRobotWritesAfterwards) {
   Revision reverted = 0;
   for (int i = 0; i < 3; ++i) {
     const absl::Status status =
-        core->Revert(CallContext(), request, [&](const v1::RevertResponse& message) {
-          reverted = message.revision();
-          return true;
-        });
+        query::ReadStream(CallContext(), core->Revert(CallContext(), request),
+                          [&](const v1::RevertResponse& message) {
+                            reverted = message.revision();
+                            return true;
+                          });
     ASSERT_TRUE(status.ok()) << status;
     ASSERT_GT(reverted, 0);
     robot.Await(2);

@@ -87,13 +87,13 @@ class EraseMeanwhileTest : public testing::Test {
   // Calls `meanwhile` after each message but the last, with the number of the message.
   absl::StatusOr<v1::PruneResponse> Prune(const v1::PruneRequest& request,
                                           const std::function<void(int)>& meanwhile = {}) {
-    DSG_ASSIGN_OR_RETURN(const auto cursor, core_->OpenPrune(request));
+    DSG_ASSIGN_OR_RETURN(const auto cursor, core_->Prune(call_, request));
     v1::PruneResponse all;
     double progress = 0.0;
     for (int count = 0; !cursor->done(); ++count) {
       if (count > 0 && meanwhile) meanwhile(count);
       v1::PruneResponse message;
-      DSG_RETURN_IF_ERROR(cursor->Next(call_, &message));
+      DSG_RETURN_IF_ERROR(cursor->Next(call_, &message).status());
       EXPECT_GE(message.progress(), progress);
       progress = message.progress();
       all.MergeFrom(message);
@@ -228,7 +228,7 @@ TEST_F(EraseMeanwhileTest, WhatWasOnlyRetiredIsFound) {
   v1::PruneRequest request = EraseBranches({"R1"});
   // Cut off after each of its messages but for the erasing ones.
   for (int messages = 1; messages <= 3; ++messages) {
-    auto cursor = core_->OpenPrune(request);
+    auto cursor = core_->Prune(call_, request);
     ASSERT_TRUE(cursor.ok()) << cursor.status();
     for (int i = 0; i < messages; ++i) {
       v1::PruneResponse message;
@@ -257,7 +257,7 @@ TEST_F(EraseMeanwhileTest, IsNotForgottenWhenAnotherOneFollows) {
     fs::copy(folder_.path(), path, fs::copy_options::recursive);
     Open(path);
     {
-      auto cursor = core_->OpenPrune(EraseBranches({"R1"}));
+      auto cursor = core_->Prune(call_, EraseBranches({"R1"}));
       ASSERT_TRUE(cursor.ok()) << cursor.status();
       for (int i = 0; i < messages && !(*cursor)->done(); ++i) {
         v1::PruneResponse message;

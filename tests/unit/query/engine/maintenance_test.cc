@@ -57,11 +57,12 @@ class MaintenanceTest : public testing::Test {
     request.set_map(kMap);
     if (keep_from.has_value()) request.set_keep_from_revision(*keep_from);
     v1::CompactResponse last;
-    DSG_RETURN_IF_ERROR(core_->Compact(call_, request, [&](const v1::CompactResponse& message) {
-      EXPECT_GE(message.progress(), last.progress());
-      last = message;
-      return true;
-    }));
+    DSG_RETURN_IF_ERROR(query::ReadStream(call_, core_->Compact(call_, request),
+                                          [&](const v1::CompactResponse& message) {
+                                            EXPECT_GE(message.progress(), last.progress());
+                                            last = message;
+                                            return true;
+                                          }));
     return last;
   }
 
@@ -168,7 +169,7 @@ TEST_F(MaintenanceTest, CommitsGetBetweenTheSlicesOfACompaction) {
   v1::CompactRequest request;
   request.set_map(kMap);
   request.set_keep_from_revision(5);
-  const auto cursor = core_->OpenCompact(request);
+  const auto cursor = core_->Compact(call_, request);
   ASSERT_TRUE(cursor.ok());
   ASSERT_TRUE(SetTag("between", std::nullopt).ok());
   v1::CompactResponse message;
@@ -186,8 +187,8 @@ TEST_F(MaintenanceTest, WorkThatIsCancelledEnds) {
   v1::RevertRequest revert;
   revert.set_map(kMap);
   revert.set_revision(1);
-  EXPECT_TRUE(absl::IsCancelled(
-      core_->Revert(call_, revert, [](const v1::RevertResponse&) { return true; })));
+  EXPECT_TRUE(absl::IsCancelled(query::ReadStream(call_, core_->Revert(call_, revert),
+                                                  [](const v1::RevertResponse&) { return true; })));
 }
 
 TEST_F(MaintenanceTest, AnotherWriterIsNamed) {
@@ -206,25 +207,26 @@ TEST_F(MaintenanceTest, RevertTellsFirstWhatItWillDo) {
   request.set_revision(4);
   request.set_dry_run(true);
   v1::RevertResponse message;
-  ASSERT_TRUE(core_
-                  ->Revert(call_, request,
-                           [&](const v1::RevertResponse& reply) {
-                             message = reply;
-                             return true;
-                           })
-                  .ok());
+  ASSERT_TRUE(
+      query::ReadStream(call_, core_->Revert(call_, request), [&](const v1::RevertResponse& reply) {
+        message = reply;
+        return true;
+      }).ok());
   EXPECT_TRUE(message.done());
   EXPECT_EQ(message.revision(), 0);
   EXPECT_EQ(message.removed().node_count(), 6);
   EXPECT_EQ(message.added().node_count(), 0);
   request.set_tag("none");
-  EXPECT_EQ(ReasonOf(core_->Revert(call_, request, [](const auto&) { return true; })),
+  EXPECT_EQ(ReasonOf(query::ReadStream(call_, core_->Revert(call_, request),
+                                       [](const auto&) { return true; })),
             Reason::kTagUnknown);
   request.clear_to();
-  EXPECT_EQ(ReasonOf(core_->Revert(call_, request, [](const auto&) { return true; })),
+  EXPECT_EQ(ReasonOf(query::ReadStream(call_, core_->Revert(call_, request),
+                                       [](const auto&) { return true; })),
             Reason::kFieldInvalid);
   request.set_revision(11);
-  EXPECT_EQ(ReasonOf(core_->Revert(call_, request, [](const auto&) { return true; })),
+  EXPECT_EQ(ReasonOf(query::ReadStream(call_, core_->Revert(call_, request),
+                                       [](const auto&) { return true; })),
             Reason::kRevisionInFuture);
 }
 
@@ -233,8 +235,7 @@ TEST_F(MaintenanceTest, AnArchiveComesInPiecesThatFitAMessage) {
   request.set_map(kMap);
   std::string bytes;
   double progress = 0.0;
-  ASSERT_TRUE(core_
-                  ->ReadArchive(call_, request,
+  ASSERT_TRUE(query::ReadStream(call_, core_->ReadArchive(call_, request),
                                 [&](const v1::ReadArchiveResponse& message) {
                                   EXPECT_LE(message.content().size(), size_t{1} << 20);
                                   bytes += message.content();
@@ -245,7 +246,8 @@ TEST_F(MaintenanceTest, AnArchiveComesInPiecesThatFitAMessage) {
   EXPECT_EQ(progress, 1.0);
   EXPECT_EQ(bytes.substr(0, 4), "DSGZ");
   request.set_map("attic");
-  EXPECT_EQ(ReasonOf(core_->ReadArchive(call_, request, [](const auto&) { return true; })),
+  EXPECT_EQ(ReasonOf(query::ReadStream(call_, core_->ReadArchive(call_, request),
+                                       [](const auto&) { return true; })),
             Reason::kMapUnknown);
 }
 

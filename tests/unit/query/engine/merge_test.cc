@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // MergeMaps of the service, and the verb that asks for it.
-#include "query/engine/merge.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>

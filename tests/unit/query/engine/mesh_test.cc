@@ -90,10 +90,11 @@ class Mesh : public testing::Test {
   absl::StatusOr<std::vector<v1::GetMeshResponse>> Ask(const v1::GetMeshRequest& request) {
     std::vector<v1::GetMeshResponse> messages;
     const absl::Status status =
-        core_->GetMesh(CallContext(), request, [&](const v1::GetMeshResponse& message) {
-          messages.push_back(message);
-          return true;
-        });
+        query::ReadStream(CallContext(), core_->GetMesh(CallContext(), request),
+                          [&](const v1::GetMeshResponse& message) {
+                            messages.push_back(message);
+                            return true;
+                          });
     if (!status.ok()) return status;
     return messages;
   }

@@ -29,16 +29,17 @@ class PruneCallTest : public testing::Test {
   absl::StatusOr<v1::PruneResponse> Prune() {
     v1::PruneResponse all;
     double progress = 0.0;
-    DSG_RETURN_IF_ERROR(core_->Prune(call_, request_, [&](const v1::PruneResponse& message) {
-      EXPECT_GE(message.progress(), progress);
-      progress = message.progress();
-      if (message_count_++ == 0) {
-        EXPECT_EQ(message.policies_size(), request_.policies_size());
-        EXPECT_GT(message.map_before().node_count(), 0);
-      }
-      all.MergeFrom(message);
-      return true;
-    }));
+    DSG_RETURN_IF_ERROR(query::ReadStream(
+        call_, core_->Prune(call_, request_), [&](const v1::PruneResponse& message) {
+          EXPECT_GE(message.progress(), progress);
+          progress = message.progress();
+          if (message_count_++ == 0) {
+            EXPECT_EQ(message.policies_size(), request_.policies_size());
+            EXPECT_GT(message.map_before().node_count(), 0);
+          }
+          all.MergeFrom(message);
+          return true;
+        }));
     EXPECT_EQ(all.done(), true);
     return all;
   }

@@ -312,7 +312,8 @@ TEST_F(Stop, EndsAMesh) {
   ExpectStops([](ServiceCore* core, const CallContext& call) {
     v1::GetMeshRequest request;
     request.set_map(test::kMap);
-    return core->GetMesh(call, request, [](const v1::GetMeshResponse&) { return true; });
+    return query::ReadStream(call, core->GetMesh(call, request),
+                             [](const v1::GetMeshResponse&) { return true; });
   });
 }
 
@@ -325,7 +326,8 @@ TEST_F(Stop, EndsASubgraph) {
     request.add_relations("CONTAINS");
     request.set_both_directions(true);
     request.set_depth_max(1000);
-    return core->GetSubgraph(call, request, [](const v1::GetSubgraphResponse&) { return true; });
+    return query::ReadStream(call, core->GetSubgraph(call, request),
+                             [](const v1::GetSubgraphResponse&) { return true; });
   };
   ExpectStops(ask);
 }

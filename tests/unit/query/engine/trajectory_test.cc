@@ -22,8 +22,9 @@ class Trajectory : public testing::Test {
   absl::StatusOr<std::vector<v1::GetTrajectoryResponse>> Get() {
     if (core_ == nullptr) core_ = OpenCore(folder_.path());
     std::vector<v1::GetTrajectoryResponse> messages;
-    const absl::Status status =
-        core_->GetTrajectory(query::CallContext(), request_, [&](const auto& message) {
+    const absl::Status status = query::ReadStream(
+        query::CallContext(), core_->GetTrajectory(query::CallContext(), request_),
+        [&](const auto& message) {
           messages.push_back(message);
           return true;
         });
@@ -108,8 +109,8 @@ TEST_F(Trajectory, StopsWhenTheReaderHasEnough) {
   AddDensePoses(2500);
   core_ = OpenCore(folder_.path());
   int count = 0;
-  const absl::Status status =
-      core_->GetTrajectory(query::CallContext(), request_, [&](const auto&) {
+  const absl::Status status = query::ReadStream(
+      query::CallContext(), core_->GetTrajectory(query::CallContext(), request_), [&](const auto&) {
         ++count;
         return false;
       });
@@ -120,7 +121,7 @@ TEST_F(Trajectory, StopsWhenTheReaderHasEnough) {
 TEST_F(Trajectory, ReadsOneRevisionToTheEndThoughOthersCommit) {
   AddDensePoses(1500);
   core_ = OpenCore(folder_.path());
-  const auto cursor = core_->OpenTrajectory(request_);
+  const auto cursor = core_->GetTrajectory(query::CallContext(), request_);
   ASSERT_TRUE(cursor.ok()) << cursor.status();
   v1::GetTrajectoryResponse message;
   ASSERT_TRUE((*cursor)->Next(query::CallContext(), &message).ok());
@@ -183,11 +184,12 @@ TEST_F(Trajectory, StopsWhenCancelled) {
   query::CallContext call;
   request_.set_resample_period_ns(1'000'000);
   int count = 0;
-  const absl::Status status = core_->GetTrajectory(call, request_, [&](const auto&) {
-    ++count;
-    call.Cancel();
-    return true;
-  });
+  const absl::Status status =
+      query::ReadStream(call, core_->GetTrajectory(call, request_), [&](const auto&) {
+        ++count;
+        call.Cancel();
+        return true;
+      });
   EXPECT_EQ(status.code(), absl::StatusCode::kCancelled);
   EXPECT_EQ(count, 1);
 }

@@ -38,11 +38,12 @@ class TwoHalves {
   absl::StatusOr<std::vector<v1::MergeMapsResponse>> Merge(const v1::MergeMapsRequest& request) {
     const auto core = OpenCore(folder());
     std::vector<v1::MergeMapsResponse> messages;
-    DSG_RETURN_IF_ERROR(
-        core->MergeMaps(query::CallContext(), request, [&](const v1::MergeMapsResponse& message) {
-          messages.push_back(message);
-          return true;
-        }));
+    DSG_RETURN_IF_ERROR(query::ReadStream(query::CallContext(),
+                                          core->MergeMaps(query::CallContext(), request),
+                                          [&](const v1::MergeMapsResponse& message) {
+                                            messages.push_back(message);
+                                            return true;
+                                          }));
     return messages;
   }
 

@@ -103,12 +103,11 @@ class StopInW2 : public testing::Test {
   }
 
   template <typename Request, typename Reply>
-  static Ask Stream(absl::Status (Api::*method)(const CallContext&, const Request&,
-                                                const std::function<bool(const Reply&)>&),
+  static Ask Stream(CursorOr<Reply> (Api::*method)(const CallContext&, const Request&),
                     Request request) {
     request.set_map(test::kMap);
     return [method, request](ServiceCore* core, const CallContext& call) {
-      return (core->*method)(call, request, [](const Reply&) { return true; });
+      return ReadStream(call, (core->*method)(call, request), [](const Reply&) { return true; });
     };
   }
 

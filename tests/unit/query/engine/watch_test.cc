@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/watch.h"
-
 #include <gtest/gtest.h>
 
 #include <functional>
 #include <thread>
 
 #include "dsg/v1/map_service.pb.h"
+#include "query/engine/engine.h"
 #include "schema/base/status.h"
 #include "tests/unit/query/engine/office.h"
 
@@ -14,8 +13,7 @@ namespace dsg::test {
 namespace {
 
 using query::CallContext;
-using query::MapTable;
-using query::WatchCursor;
+using WatchCursor = query::StreamCursor<v1::WatchMapResponse>;
 
 GraphDelta DeltaOfObjects(uint64_t first, uint64_t count) {
   GraphDelta delta;
@@ -32,7 +30,7 @@ class WatchTest : public testing::Test {
     MakeOffice(folder_.path());
     auto store = GraphStore::Open(folder_.path(), {});
     EXPECT_TRUE(store.ok()) << store.status();
-    maps_ = std::make_unique<MapTable>(*std::move(store));
+    engine_ = std::make_unique<query::Engine>(*std::move(store));
     request_.set_map(kMap);
   }
 
@@ -54,7 +52,7 @@ class WatchTest : public testing::Test {
   }
 
   std::unique_ptr<WatchCursor> Open() {
-    auto cursor = OpenWatch(maps_.get(), request_);
+    auto cursor = WatchMap(engine_.get(), call_, request_);
     EXPECT_TRUE(cursor.ok()) << cursor.status();
     return *std::move(cursor);
   }
@@ -62,14 +60,14 @@ class WatchTest : public testing::Test {
   v1::WatchMapResponse Next(WatchCursor* cursor) {
     v1::WatchMapResponse message;
     EXPECT_EQ(cursor->Wait().count(), 0);
-    const absl::Status status = cursor->Next(call_, &message);
+    const absl::Status status = cursor->Next(call_, &message).status();
     EXPECT_TRUE(status.ok()) << status;
     EXPECT_FALSE(cursor->done());
     return message;
   }
 
   TempFolder folder_;
-  std::unique_ptr<MapTable> maps_;
+  std::unique_ptr<query::Engine> engine_;
   CallContext call_;
   v1::WatchMapRequest request_;
 };
@@ -139,7 +137,7 @@ TEST_F(WatchTest, SaysWhereToBeginAgainWhenItsStartWasCompacted) {
   for (uint64_t i = 0; i < 8; ++i) Commit(100 + i);
   Compact(5);
   request_.set_after_revision(3);
-  const auto refused = OpenWatch(maps_.get(), request_);
+  const auto refused = WatchMap(engine_.get(), call_, request_);
   EXPECT_EQ(ReasonOf(refused.status()), Reason::kRevisionCompacted);
   EXPECT_EQ(MetadataOf(refused.status())["oldest"], "5");
   EXPECT_EQ(MetadataOf(refused.status())["newest"], "9");
@@ -154,7 +152,7 @@ TEST_F(WatchTest, SaysWhereToBeginAgainWhenCompactionOvertakesIt) {
   for (uint64_t i = 0; i < 8; ++i) Commit(100 + i);
   Compact(6);
   v1::WatchMapResponse message;
-  const absl::Status status = cursor->Next(call_, &message);
+  const absl::Status status = cursor->Next(call_, &message).status();
   EXPECT_EQ(ReasonOf(status), Reason::kRevisionCompacted);
   EXPECT_EQ(MetadataOf(status)["newest"], "9");
 }
@@ -187,29 +185,29 @@ TEST_F(WatchTest, EndsWhenThePastIsErased) {
 
 TEST_F(WatchTest, RefusesFieldsOutOfRange) {
   request_.set_after_revision(-1);
-  EXPECT_EQ(ReasonOf(OpenWatch(maps_.get(), request_).status()), Reason::kFieldInvalid);
+  EXPECT_EQ(ReasonOf(WatchMap(engine_.get(), call_, request_).status()), Reason::kFieldInvalid);
   request_.set_after_revision(2);
-  EXPECT_EQ(ReasonOf(OpenWatch(maps_.get(), request_).status()), Reason::kRevisionInFuture);
+  EXPECT_EQ(ReasonOf(WatchMap(engine_.get(), call_, request_).status()), Reason::kRevisionInFuture);
   request_.clear_after_revision();
   for (const int64_t idle_ns : {int64_t{-1}, int64_t{1}, int64_t{99'999'999}}) {
     request_.set_idle_period_ns(idle_ns);
-    EXPECT_EQ(ReasonOf(OpenWatch(maps_.get(), request_).status()), Reason::kFieldInvalid);
+    EXPECT_EQ(ReasonOf(WatchMap(engine_.get(), call_, request_).status()), Reason::kFieldInvalid);
   }
   request_.set_idle_period_ns(INT64_MAX);
   Next(Open().get());
   request_.set_map("attic");
-  EXPECT_EQ(ReasonOf(OpenWatch(maps_.get(), request_).status()), Reason::kMapUnknown);
+  EXPECT_EQ(ReasonOf(WatchMap(engine_.get(), call_, request_).status()), Reason::kMapUnknown);
 }
 
 TEST_F(WatchTest, InProcessEndsWhenItsCallerHasEnough) {
   const auto core = OpenCore(folder_.path());
   int message_count = 0;
   request_.set_idle_period_ns(100'000'000);
-  const absl::Status status =
-      core->WatchMap(call_, request_, [&](const v1::WatchMapResponse& message) {
-        EXPECT_TRUE(message.has_header());
-        return ++message_count < 3;
-      });
+  const absl::Status status = query::ReadStream(call_, core->WatchMap(call_, request_),
+                                                [&](const v1::WatchMapResponse& message) {
+                                                  EXPECT_TRUE(message.has_header());
+                                                  return ++message_count < 3;
+                                                });
   EXPECT_TRUE(status.ok()) << status;
   EXPECT_EQ(message_count, 3);
 }
@@ -217,11 +215,12 @@ TEST_F(WatchTest, InProcessEndsWhenItsCallerHasEnough) {
 TEST_F(WatchTest, InProcessEndsWhenCancelledWhileItWaits) {
   const auto core = OpenCore(folder_.path());
   std::thread canceller;
-  const absl::Status status = core->WatchMap(call_, request_, [&](const v1::WatchMapResponse&) {
-    // The next message would come in five seconds.
-    canceller = std::thread([&] { call_.Cancel(); });
-    return true;
-  });
+  const absl::Status status =
+      query::ReadStream(call_, core->WatchMap(call_, request_), [&](const v1::WatchMapResponse&) {
+        // The next message would come in five seconds.
+        canceller = std::thread([&] { call_.Cancel(); });
+        return true;
+      });
   canceller.join();
   EXPECT_TRUE(absl::IsCancelled(status));
 }

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/path.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -48,8 +48,8 @@ class Neighborhood : public testing::Test {
     std::string nodes;
     std::string edges;
     request.set_map(kMap);
-    const absl::Status status =
-        core_->GetSubgraph(call_, request, [&](const v1::GetSubgraphResponse& reply) {
+    const absl::Status status = query::ReadStream(
+        call_, core_->GetSubgraph(call_, request), [&](const v1::GetSubgraphResponse& reply) {
           if (message_count != nullptr) ++*message_count;
           EXPECT_LT(reply.ByteSizeLong(), size_t{4} << 20);
           // No node after the first edge.
@@ -66,8 +66,8 @@ class Neighborhood : public testing::Test {
 
   Reason ReasonOfSubgraph(v1::GetSubgraphRequest request) {
     request.set_map(kMap);
-    return ReasonOf(
-        core_->GetSubgraph(call_, request, [](const v1::GetSubgraphResponse&) { return true; }));
+    return ReasonOf(query::ReadStream(call_, core_->GetSubgraph(call_, request),
+                                      [](const v1::GetSubgraphResponse&) { return true; }));
   }
 
   static v1::GetSubgraphRequest From(const std::string& root) {
@@ -265,8 +265,7 @@ TEST_F(Neighborhood, StopsWhenTheReaderGoesAway) {
   int message_count = 0;
   auto request = From("B1");
   request.set_map(kMap);
-  EXPECT_TRUE(core_
-                  ->GetSubgraph(call_, request,
+  EXPECT_TRUE(query::ReadStream(call_, core_->GetSubgraph(call_, request),
                                 [&](const v1::GetSubgraphResponse&) {
                                   ++message_count;
                                   call_.Cancel();
@@ -274,8 +273,9 @@ TEST_F(Neighborhood, StopsWhenTheReaderGoesAway) {
                                 })
                   .ok());
   EXPECT_EQ(message_count, 1);
-  EXPECT_TRUE(absl::IsCancelled(
-      core_->GetSubgraph(call_, request, [](const v1::GetSubgraphResponse&) { return true; })));
+  EXPECT_TRUE(
+      absl::IsCancelled(query::ReadStream(call_, core_->GetSubgraph(call_, request),
+                                          [](const v1::GetSubgraphResponse&) { return true; })));
 }
 
 }  // namespace

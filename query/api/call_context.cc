@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/call_context.h"
+#include "query/api/call_context.h"
 
 namespace dsg::query {
 

@@ -10,7 +10,7 @@
 #include <string>
 #include <thread>
 
-namespace dsg::ingest {
+namespace dsg::client {
 
 /// Gets one sentence; called from any thread, one at a time.
 using TellWait = std::function<void(const std::string&)>;
@@ -59,4 +59,4 @@ class WaitNotes {
   std::thread thread_;
 };
 
-}  // namespace dsg::ingest
+}  // namespace dsg::client

@@ -4,10 +4,9 @@
 
 #include <atomic>
 #include <chrono>
-#include <memory>
 
 #include "absl/status/status.h"
-#include "schema/store/snapshot.h"
+#include "schema/base/stop_check.h"
 
 namespace dsg::query {
 
@@ -27,7 +26,7 @@ class CallContext {
   /// OK, CANCELLED or DEADLINE_EXCEEDED.
   absl::Status Check() const;
 
-  /// For Snapshot's long reads; must not outlive this context.
+  /// For long reads of the store; must not outlive this context.
   StopCheck stop() const {
     return [this] { return Check(); };
   }

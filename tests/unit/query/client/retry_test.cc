@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which calls are repeated, and what their errors say.
-#include "ingest/remote/remote_call.h"
+#include "query/client/retry.h"
 
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
@@ -14,65 +14,68 @@
 
 #include "dsg/v1/errors.pb.h"
 #include "dsg/v1/ingest_service.grpc.pb.h"
+#include "query/client/remote_api.h"
 #include "schema/base/status.h"
 #include "schema/codec/status_decode.h"
 
-namespace dsg::ingest {
+namespace dsg::client {
 namespace {
 
+using query::CallContext;
+
 // Runs a call whose attempts end as `answers` say, the last one for ever after.
-absl::Status CallAnswered(const std::vector<grpc::Status>& answers, int* attempt_count) {
+absl::Status CallAnswered(const std::vector<absl::Status>& answers, int* attempt_count) {
   *attempt_count = 0;
-  ServerCaller caller("unix:/nowhere", kNsPerSecond / 5, {});
-  return caller.Call([&](grpc::ClientContext*) {
+  PatientCaller caller("unix:/nowhere", kNsPerSecond / 5, {});
+  return caller.Call([&](const CallContext&) {
     const size_t i = std::min(static_cast<size_t>(*attempt_count), answers.size() - 1);
     ++*attempt_count;
     return answers[i];
   });
 }
 
-TEST(ServerCaller, RepeatsTransportFailures) {
+TEST(PatientCaller, RepeatsTransportFailures) {
   int attempt_count = 0;
   EXPECT_TRUE(
-      CallAnswered({{grpc::StatusCode::UNAVAILABLE, "connection refused"}, grpc::Status::OK},
-                   &attempt_count)
+      CallAnswered({absl::UnavailableError("connection refused"), absl::OkStatus()}, &attempt_count)
           .ok());
   EXPECT_EQ(attempt_count, 2);
 }
 
-TEST(ServerCaller, GivesUpInTimeNamingTheAddress) {
+TEST(PatientCaller, GivesUpInTimeNamingTheAddress) {
   int attempt_count = 0;
   const absl::Status status =
-      CallAnswered({{grpc::StatusCode::UNAVAILABLE, "connection refused"}}, &attempt_count);
+      CallAnswered({absl::UnavailableError("connection refused")}, &attempt_count);
   EXPECT_EQ(status.code(), absl::StatusCode::kUnavailable);
   EXPECT_GE(attempt_count, 2);
   EXPECT_NE(std::string(status.message()).find("unix:/nowhere"), std::string::npos);
 }
 
-TEST(ServerCaller, DoesNotRepeatWhatTheServerAnswered) {
+TEST(PatientCaller, DoesNotRepeatWhatTheServerAnswered) {
   int attempt_count = 0;
-  for (const grpc::StatusCode code :
-       {grpc::StatusCode::INVALID_ARGUMENT, grpc::StatusCode::ALREADY_EXISTS,
-        grpc::StatusCode::DATA_LOSS, grpc::StatusCode::RESOURCE_EXHAUSTED}) {
-    EXPECT_EQ(static_cast<int>(CallAnswered({{code, "no"}}, &attempt_count).code()),
-              static_cast<int>(code));
+  for (const absl::StatusCode code :
+       {absl::StatusCode::kInvalidArgument, absl::StatusCode::kAlreadyExists,
+        absl::StatusCode::kDataLoss, absl::StatusCode::kResourceExhausted}) {
+    EXPECT_EQ(CallAnswered({absl::Status(code, "no")}, &attempt_count).code(), code);
     EXPECT_EQ(attempt_count, 1);
   }
 }
 
-TEST(ServerCaller, RepeatsWhatABrokenLinkOrAnEndingServerMakesOfACall) {
+TEST(PatientCaller, RepeatsWhatABrokenLinkOrAnEndingServerMakesOfACall) {
   int attempt_count = 0;
-  for (const grpc::StatusCode code :
-       {grpc::StatusCode::DEADLINE_EXCEEDED, grpc::StatusCode::CANCELLED,
-        grpc::StatusCode::INTERNAL, grpc::StatusCode::UNKNOWN}) {
-    EXPECT_TRUE(CallAnswered({{code, "stream removed"}, grpc::Status::OK}, &attempt_count).ok());
+  for (const absl::StatusCode code :
+       {absl::StatusCode::kDeadlineExceeded, absl::StatusCode::kCancelled,
+        absl::StatusCode::kInternal, absl::StatusCode::kUnknown}) {
+    EXPECT_TRUE(
+        CallAnswered({absl::Status(code, "stream removed"), absl::OkStatus()}, &attempt_count)
+            .ok());
     EXPECT_EQ(attempt_count, 2);
   }
 }
 
-TEST(ServerCaller, DoesNotRepeatForEverWhatMayBeTheServersOwnError) {
+TEST(PatientCaller, DoesNotRepeatForEverWhatMayBeTheServersOwnError) {
   int attempt_count = 0;
-  EXPECT_EQ(CallAnswered({{grpc::StatusCode::INTERNAL, "a bug"}}, &attempt_count).code(),
+  EXPECT_EQ(CallAnswered({absl::InternalError("a bug")}, &attempt_count).code(),
             absl::StatusCode::kInternal);
   EXPECT_LE(attempt_count, 5);
 }
@@ -90,7 +93,7 @@ class NewerServer final : public v1::IngestService::Service {
   }
 };
 
-TEST(ServerCaller, KeepsCodeAndMessageOfAReasonThatItDoesNotKnow) {
+TEST(PatientCaller, KeepsCodeAndMessageOfAReasonThatItDoesNotKnow) {
   std::string folder = "/tmp/dsg_newer_XXXXXX";
   ASSERT_NE(mkdtemp(folder.data()), nullptr);
   const std::string address = "unix:" + folder + "/s";
@@ -99,11 +102,12 @@ TEST(ServerCaller, KeepsCodeAndMessageOfAReasonThatItDoesNotKnow) {
   builder.AddListeningPort(address, grpc::InsecureServerCredentials());
   builder.RegisterService(&service);
   const std::unique_ptr<grpc::Server> server = builder.BuildAndStart();
-  const auto stub = v1::IngestService::NewStub(OpenChannel(address));
-  ServerCaller caller(address, kNsPerSecond, {});
-  const absl::Status status = caller.Call([&](grpc::ClientContext* context) {
+  const auto api = Connect(ServerAddress{.address = address, .repeats = false});
+  ASSERT_TRUE(api.ok()) << api.status();
+  PatientCaller caller(address, kNsPerSecond, {});
+  const absl::Status status = caller.Call([&](const CallContext& call) {
     v1::GetSessionResponse reply;
-    return stub->GetSession(context, {}, &reply);
+    return (*api)->GetSession(call, {}, &reply);
   });
   EXPECT_EQ(status, absl::FailedPreconditionError("session is sealed; begin another"));
   EXPECT_EQ(ReasonOf(status), Reason::kUnspecified);
@@ -111,15 +115,14 @@ TEST(ServerCaller, KeepsCodeAndMessageOfAReasonThatItDoesNotKnow) {
   std::filesystem::remove_all(folder);
 }
 
-TEST(ServerCaller, SaysAtOnceThatItWaitsAndThatItIsOver) {
+TEST(PatientCaller, SaysAtOnceThatItWaitsAndThatItIsOver) {
   std::vector<std::string> told;
   int attempt_count = 0;
   {
-    ServerCaller caller("unix:/nowhere", kNsPerSecond,
-                        [&](const std::string& sentence) { told.push_back(sentence); });
-    const auto answer = [&](grpc::ClientContext*) {
-      return ++attempt_count < 3 ? grpc::Status(grpc::StatusCode::UNAVAILABLE, "refused")
-                                 : grpc::Status::OK;
+    PatientCaller caller("unix:/nowhere", kNsPerSecond,
+                         [&](const std::string& sentence) { told.push_back(sentence); });
+    const auto answer = [&](const CallContext&) {
+      return ++attempt_count < 3 ? absl::UnavailableError("refused") : absl::OkStatus();
     };
     EXPECT_TRUE(caller.Call(answer).ok());
     EXPECT_TRUE(caller.Call(answer).ok());
@@ -164,4 +167,4 @@ TEST(WaitNotes, SpeaksAgainAndAgainOfACallThatHangs) {
 }
 
 }  // namespace
-}  // namespace dsg::ingest
+}  // namespace dsg::client

@@ -1,34 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ingest/remote/remote_call.h"
+#include "query/client/retry.h"
 
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <thread>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
-#include "schema/codec/status_decode.h"
 
-namespace dsg::ingest {
+namespace dsg::client {
 namespace {
 
+using query::CallContext;
 using Clock = WaitNotes::Clock;
 using std::chrono::milliseconds;
 
 // Longer than any commit of 4 MiB takes on a slow disk; a slow link gets more with each attempt.
 constexpr std::chrono::seconds kAttemptTimeout(60);
 constexpr std::chrono::seconds kAttemptTimeoutMax(600);
+constexpr std::array<milliseconds, 3> kReadPauses{milliseconds(100), milliseconds(300),
+                                                  milliseconds(900)};
+// How soon a cancellation is noticed.
+constexpr milliseconds kPollPeriod(20);
 constexpr milliseconds kFirstPause(50);
 constexpr milliseconds kLongestPause(5000);
-// Routers forget a connection after some minutes, some after 30 s. The server refuses pings that
-// come more often than every 10 s.
-constexpr int kKeepaliveMs = 20'000;
-constexpr int kKeepaliveTimeoutMs = 10'000;
-// Connecting takes two round trips; the first packet of it may be lost twice.
-constexpr int kConnectTimeoutMs = 5'000;
 // What gRPC makes of a broken link is not always UNAVAILABLE; a bug of the server looks alike.
 constexpr int kOddAnswersMax = 5;
 
@@ -70,42 +69,35 @@ uint64_t SeedOfThisProcess() {
   return static_cast<uint64_t>(now.count()) ^ (static_cast<uint64_t>(getpid()) << 40);
 }
 
+// False if the call must not be tried again.
+bool Pause(const CallContext& call, milliseconds length) {
+  const auto end = Clock::now() + length;
+  if (end >= call.deadline()) return false;
+  for (auto now = Clock::now(); now < end; now = Clock::now()) {
+    if (call.cancelled()) return false;
+    std::this_thread::sleep_for(std::min<Clock::duration>(kPollPeriod, end - now));
+  }
+  return !call.cancelled();
+}
+
 }  // namespace
 
-std::shared_ptr<grpc::Channel> OpenChannel(const std::string& address) {
-  grpc::ChannelArguments arguments;
-  arguments.SetMaxSendMessageSize(kSendBytesMax);
-  arguments.SetMaxReceiveMessageSize(kReceiveBytesMax);
-  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
-  arguments.SetInt(GRPC_ARG_SERVICE_CONFIG_DISABLE_RESOLUTION, 1);
-  // gRPC's own second of patience would swallow most of our repetitions.
-  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
-  // In spite of its name the time that one attempt to connect may take.
-  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, kConnectTimeoutMs);
-  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
-  arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
-  arguments.SetCompressionAlgorithm(GRPC_COMPRESS_NONE);
-  return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+absl::Status RetryRead(const CallContext& call, const std::function<absl::Status()>& attempt) {
+  absl::Status status = attempt();
+  for (const auto pause : kReadPauses) {
+    if (!absl::IsUnavailable(status) || !Pause(call, pause)) break;
+    status = attempt();
+  }
+  return status;
 }
 
-absl::Status ToStatus(const grpc::ClientContext& context, const grpc::Status& status) {
-  const auto& trailers = context.GetServerTrailingMetadata();
-  const auto trailer = trailers.find(kErrorTrailer);
-  std::string_view detail;
-  if (trailer != trailers.end()) detail = {trailer->second.data(), trailer->second.size()};
-  return DecodeStatus(status.error_code(), status.error_message(), detail);
-}
-
-ServerCaller::ServerCaller(std::string address, TimeNs retry_ns_max, TellWait tell)
+PatientCaller::PatientCaller(std::string address, TimeNs retry_ns_max, TellWait tell)
     : address_(std::move(address)),
       retry_ns_max_(retry_ns_max),
       random_(SeedOfThisProcess(), 0),
       notes_(address_, std::move(tell)) {}
 
-absl::Status ServerCaller::Call(const std::function<grpc::Status(grpc::ClientContext*)>& attempt) {
+absl::Status PatientCaller::Call(const std::function<absl::Status(const CallContext&)>& attempt) {
   const Clock::time_point give_up = Clock::now() + std::chrono::nanoseconds(retry_ns_max_);
   notes_.CallBegins(give_up);
   const absl::Status status = Repeat(attempt, give_up);
@@ -113,16 +105,13 @@ absl::Status ServerCaller::Call(const std::function<grpc::Status(grpc::ClientCon
   return status;
 }
 
-absl::Status ServerCaller::Repeat(const std::function<grpc::Status(grpc::ClientContext*)>& attempt,
-                                  Clock::time_point give_up) {
+absl::Status PatientCaller::Repeat(const std::function<absl::Status(const CallContext&)>& attempt,
+                                   Clock::time_point give_up) {
   milliseconds pause = kFirstPause;
   std::chrono::seconds timeout = kAttemptTimeout;
   int odd_count = 0;
   while (true) {
-    grpc::ClientContext context;
-    context.set_deadline(std::chrono::system_clock::now() + timeout);
-    const grpc::Status answer = attempt(&context);
-    const absl::Status status = ToStatus(context, answer);
+    const absl::Status status = attempt(CallContext(Clock::now() + timeout));
     const Outcome outcome = status.ok() ? Outcome::kAnswered : OutcomeOf(status);
     if (outcome == Outcome::kAnswered) return status;
     if (outcome == Outcome::kOdd && ++odd_count >= kOddAnswersMax) return status;
@@ -142,4 +131,4 @@ absl::Status ServerCaller::Repeat(const std::function<grpc::Status(grpc::ClientC
   }
 }
 
-}  // namespace dsg::ingest
+}  // namespace dsg::client

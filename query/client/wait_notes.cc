@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ingest/remote/wait_notes.h"
+#include "query/client/wait_notes.h"
 
 #include <algorithm>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 
-namespace dsg::ingest {
+namespace dsg::client {
 namespace {
 
 // Idle, the thread looks so often whether there is something to say: a wake-up of it for each call
@@ -80,4 +80,4 @@ void WaitNotes::Run() {
   }
 }
 
-}  // namespace dsg::ingest
+}  // namespace dsg::client
