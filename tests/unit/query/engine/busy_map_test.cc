@@ -125,10 +125,11 @@ TEST(BusyMap, IsMergedAndLosesNothingOfTheRobot) {
   robot.Start();
   v1::MergeMapsResponse last;
   const absl::Status merged =
-      core->MergeMaps(CallContext(), WestWithEast(), [&](const v1::MergeMapsResponse& message) {
-        last = message;
-        return true;
-      });
+      query::ReadStream(CallContext(), core->MergeMaps(CallContext(), WestWithEast()),
+                        [&](const v1::MergeMapsResponse& message) {
+                          last = message;
+                          return true;
+                        });
   robot.Stop();
   ASSERT_TRUE(merged.ok()) << merged;
   EXPECT_TRUE(last.done());

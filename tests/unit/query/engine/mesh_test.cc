@@ -158,8 +158,8 @@ TEST_F(Mesh, RefusesBoxesThatAreNone) {
 
 TEST_F(Mesh, StopsWhenTheCallerHasEnough) {
   int message_count = 0;
-  const absl::Status status =
-      core_->GetMesh(CallContext(), OfMap(), [&](const v1::GetMeshResponse&) {
+  const absl::Status status = query::ReadStream(
+      CallContext(), core_->GetMesh(CallContext(), OfMap()), [&](const v1::GetMeshResponse&) {
         ++message_count;
         return false;
       });

@@ -165,7 +165,7 @@ TEST_F(WatchTest, TellsATaggedRevisionThatIsLeftThenWhereToBeginAgain) {
   Compact(6);
   EXPECT_EQ(Next(cursor.get()).revision().revision(), 2);
   v1::WatchMapResponse message;
-  EXPECT_EQ(ReasonOf(cursor->Next(call_, &message)), Reason::kRevisionCompacted);
+  EXPECT_EQ(ReasonOf(cursor->Next(call_, &message).status()), Reason::kRevisionCompacted);
 }
 
 TEST_F(WatchTest, EndsWhenThePastIsErased) {
@@ -180,7 +180,7 @@ TEST_F(WatchTest, EndsWhenThePastIsErased) {
   });
   EXPECT_EQ(cursor->Wait().count(), 0);
   v1::WatchMapResponse message;
-  EXPECT_EQ(ReasonOf(cursor->Next(call_, &message)), Reason::kMapReplaced);
+  EXPECT_EQ(ReasonOf(cursor->Next(call_, &message).status()), Reason::kMapReplaced);
 }
 
 TEST_F(WatchTest, RefusesFieldsOutOfRange) {
