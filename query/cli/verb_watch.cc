@@ -64,19 +64,20 @@ class Patience {
 
   void Heard(int64_t revision) {
     if (is_lost_) {
-      notes_ << "dsg: the server is back; watching on after revision " << *revision_ << "\n"
+      notes_ << "dsg: the server is back; watching on after revision " << revision_ << "\n"
              << std::flush;
     }
     is_lost_ = false;
+    has_heard_ = true;
     revision_ = revision;
   }
 
   /// False if it is not to be asked again: nothing was ever heard, or not for too long.
   bool Wait(const query::CallContext& call) {
-    if (!revision_.has_value()) return false;
+    if (!has_heard_) return false;
     const auto now = Clock::now();
     if (!is_lost_) {
-      notes_ << "dsg: the server went away after revision " << *revision_
+      notes_ << "dsg: the server went away after revision " << revision_
              << "; asking for a minute whether it is back\n"
              << std::flush;
       is_lost_ = true;
@@ -94,7 +95,8 @@ class Patience {
 
   std::ostream& notes_;
   // The last one that was told.
-  std::optional<int64_t> revision_;
+  int64_t revision_ = 0;
+  bool has_heard_ = false;
   bool is_lost_ = false;
   Clock::time_point lost_at_;
 };

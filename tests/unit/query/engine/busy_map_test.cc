@@ -170,7 +170,7 @@ TEST(BusyMap, IsMergedByANewPlanWhenTheRobotWritesWhatTheOldOneChanges) {
   std::set<std::string> ids;
   while (!(*cursor)->done()) {
     message.Clear();
-    const absl::Status status = (*cursor)->Next(CallContext(), &message);
+    const absl::Status status = (*cursor)->Next(CallContext(), &message).status();
     ASSERT_TRUE(status.ok()) << status;
     for (const auto& [theirs, mine] : message.node_ids()) ids.insert(mine);
   }
