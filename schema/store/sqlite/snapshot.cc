@@ -151,10 +151,10 @@ absl::StatusOr<AssetPart> SqliteSnapshot::ReadAssetPart(const Sha256& sha256, in
   query.Bind(key, index, revision());
   if (!query.Next()) {
     DSG_RETURN_IF_ERROR(query.status());
-    return MakeError(
-        Reason::kAssetUnknown,
-        absl::StrCat("map \"", spec().name, "\" has no part ", index, " of asset ", ToHex(sha256)),
-        {{"map", spec().name}, {"asset", ToHex(sha256)}});
+    return MakeError(Reason::kAssetUnknown,
+                     absl::StrCat("map \"", spec().name, "\" has no asset ", ToHex(sha256),
+                                  index == 0 ? "" : absl::StrCat(" with a part ", index)),
+                     {{"map", spec().name}, {"asset", ToHex(sha256)}});
   }
   AssetPart part;
   part.content = query.Blob(1);
