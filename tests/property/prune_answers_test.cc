@@ -76,7 +76,8 @@ TEST(Pruning, ChangesNoAnswerThatHasNothingToDoWithIt) {
   request.set_map(QuestionWorld::kMap);
   request.add_policies()->set_branch("R1");
   const absl::Status pruned =
-      world.core()->Prune(asker.call, request, [](const v1::PruneResponse&) { return true; });
+      query::ReadStream(asker.call, world.core()->Prune(asker.call, request),
+                        [](const v1::PruneResponse&) { return true; });
   ASSERT_TRUE(pruned.ok()) << pruned;
 
   int same_count = 0;
