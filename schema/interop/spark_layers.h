@@ -8,12 +8,9 @@
 #include <vector>
 
 #include "schema/interop/spark_graph.h"
+#include "schema/model/agent_pose.h"
 
 namespace dsg {
-
-/// The layer that keeps a robot's poses as nodes, beside its trajectory.
-inline constexpr LayerId kAgentPoseLayer = 20;
-inline constexpr char kAgentPoseKind[] = "agent_pose";
 
 /// Where a node goes.
 struct SparkPlacement {

@@ -7,6 +7,7 @@
 
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
+#include "schema/model/agent_pose.h"
 
 namespace dsg {
 namespace {
@@ -49,6 +50,7 @@ void GraphIndex::Add(const Node& node) {
   made.id = node.id;
   made.layer = node.layer;
   made.is_agent = IsAgentKind(node.kind);
+  made.is_pose = node.kind == kAgentPoseKind;
   made.may_hold_stays = node.kind == kinds::kRoom || node.kind == kinds::kPlace;
   made.position_map = node.map_T_node.position;
   made.valid_to_ns = node.valid.to_ns;

@@ -18,6 +18,8 @@ struct IndexedNode {
   NodeId id;
   LayerId layer = 0;
   bool is_agent = false;
+  /// Also a pose of a track.
+  bool is_pose = false;
   /// A stay may name it.
   bool may_hold_stays = false;
   Eigen::Vector3d position_map = Eigen::Vector3d::Zero();

@@ -49,8 +49,8 @@ class NowFinder {
       : map_(map), stop_(stop) {
     std::vector<Witness> all;
     for (const IndexedNode& node : index.nodes()) {
-      // Agents speak by their tracks.
-      if (node.is_agent || !node.last_observed_ns.has_value()) continue;
+      // Agents speak by their tracks, of which a pose is no second witness.
+      if (node.is_agent || node.is_pose || !node.last_observed_ns.has_value()) continue;
       all.push_back({*node.last_observed_ns, node.id, nullptr});
     }
     for (const TrackInfo& track : index.tracks()) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "absl/strings/match.h"
+#include "schema/model/agent_pose.h"
 #include "schema/retention/duration.h"
 #include "schema/retention/world_clock.h"
 #include "tests/unit/schema/retention/prune_test_util.h"
@@ -69,6 +70,22 @@ TEST_F(ClockTest, OnePoseFiveYearsAheadTakesNobodysTrack) {
   ASSERT_EQ(plan_.notes.size(), 1u);
   EXPECT_TRUE(absl::StrContains(plan_.notes[0], "H8")) << plan_.notes[0];
   EXPECT_EQ(PosesTaken(kNsPerDay * 100), 0);
+}
+
+TEST_F(ClockTest, APoseThatIsAlsoANodeIsNoSecondWitness) {
+  const TimeNs ahead_ns = Day(99) + 5 * kYear;
+  GraphDelta delta;
+  delta.layers = {{kAgentPoseLayer, "agent_poses", 200}};
+  Node pose = MakeObject(3, "", BoxOf(0, 0, 0, 1, 1, 1));
+  pose.object.reset();
+  pose.kind = kAgentPoseKind;
+  pose.layer = kAgentPoseLayer;
+  pose.last_observed_ns = ahead_ns;
+  delta.nodes = {pose};
+  delta.appends = {{kGuest, {PoseAt(ahead_ns, 2, 1, 0)}}};
+  map_.MustCommit(std::move(delta));
+  EXPECT_EQ(PosesTaken(kNsPerDay * 30), 2 * 69);
+  EXPECT_EQ(plan_.implausible_agents, std::vector<NodeId>{kGuest});
 }
 
 TEST_F(ClockTest, OneThingSeenFiveYearsAheadTakesNothing) {
