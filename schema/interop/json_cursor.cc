@@ -263,7 +263,8 @@ bool JsonCursor::ReadNumber(Json* value) {
       *value = number;
       return true;
     }
-  } else if (is_whole) {
+  } else if (is_whole && !begins_with_zero) {
+    // -0 is a double, whose sign counts.
     int64_t number = 0;
     if (std::from_chars(from, to, number).ec == std::errc()) {
       *value = number;

@@ -407,14 +407,13 @@ Json WithoutDefaults(SparkClass type, uint64_t node_id, Json fields) {
   return fields;
 }
 
-std::map<std::string, std::string, std::less<>> UsualTexts() {
+std::map<std::string, std::string, std::less<>> UsualTexts(SparkClass type) {
   std::map<std::string, std::string, std::less<>> texts = {{"metadata", "{}"}};
-  for (const SparkClass type : {SparkClass::kObject, SparkClass::kPlace}) {
-    for (const SparkField& field : FieldsOf(type)) {
-      // A position must be there, and no colour is not black.
-      const bool may_be_left_out = field.type != Type::kColor && field.name != kPosition;
-      if (may_be_left_out) texts[field.name] = DefaultOf(field.type, 0).dump();
-    }
+  for (const SparkField& field : FieldsOf(type)) {
+    // A position must be there, and no colour is not black.
+    const bool must_be_read = field.name == kPosition || field.type == Type::kColor ||
+                              field.type == Type::kTime || field.type == Type::kNodeId;
+    if (!must_be_read) texts[field.name] = DefaultOf(field.type, 0).dump();
   }
   return texts;
 }

@@ -64,8 +64,9 @@ const nlohmann::json* DefaultFor(SparkClass type, const std::string& name);
 /// null.
 nlohmann::json WithoutDefaults(SparkClass type, uint64_t node_id, nlohmann::json fields);
 
-/// Defaults of fields that need not be read where they have them, by name, as text without blanks.
-std::map<std::string, std::string, std::less<>> UsualTexts();
+/// Defaults of the fields that a node of the class reads the same without, by name, as text without
+/// blanks.
+std::map<std::string, std::string, std::less<>> UsualTexts(SparkClass type);
 
 /// Rewrites old forms of colours, boxes, features and meshes as those of kSparkVersionNewest, and
 /// takes out fields that are null.

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <iterator>
 #include <limits>
+#include <map>
+#include <optional>
 #include <unordered_map>
 #include <utility>
 
@@ -12,6 +14,7 @@
 #include "schema/interop/file_error.h"
 #include "schema/interop/json_cursor.h"
 #include "schema/interop/json_fields.h"
+#include "schema/interop/json_peek.h"
 #include "schema/interop/spark_attributes.h"
 #include "schema/interop/spark_fields.h"
 #include "schema/interop/spark_json_mesh.h"
@@ -71,10 +74,34 @@ class SparkJsonReader {
     return value;
   }
 
+  // A node without the fields that have the defaults of its class: most fields of most nodes. The
+  // class stands behind most fields, so that of the node before is tried.
+  Json NodeValue(const JsonText& member, JsonCursor* cursor) {
+    const size_t begin = cursor->offset();
+    Json node = cursor->Value(usual_);
+    const UsualMembers* const own = UsualOf(Peek(Peek(node, "attributes"), "type"));
+    if (own == usual_) return node;
+    usual_ = own;
+    if (!cursor->ok()) return node;
+    JsonCursor again(member.text.substr(begin, cursor->offset() - begin), source_.file,
+                     member.offset + begin);
+    return again.Value();
+  }
+
+  // nullptr for a name that is none.
+  const UsualMembers* UsualOf(const Json& name) {
+    if (!name.is_string()) return nullptr;
+    const auto type = SparkClassOf(name.get_ref<const std::string&>());
+    if (!type.has_value()) return nullptr;
+    const auto known = classes_.find(*type);
+    if (known != classes_.end()) return &known->second;
+    return &classes_.emplace(*type, UsualMembers{"attributes", UsualTexts(*type)}).first->second;
+  }
+
   // Calls `read` with the place and the value of each element, which puts it into `items`.
   template <typename T, typename ReadOne>
-  void ForEach(const char* name, const JsonMembers& members, const UsualMembers* usual,
-               std::vector<T>* items, const ReadOne& read) {
+  void ForEach(const char* name, const JsonMembers& members, std::vector<T>* items,
+               const ReadOne& read) {
     if (!source_.ok()) return;
     const JsonText& member = members.at(name);
     JsonCursor cursor(member.text, source_.file, member.offset);
@@ -86,7 +113,7 @@ class SparkJsonReader {
     size_t done = 0;
     size_t count = 0;
     for (cursor.BeginArray(); cursor.NextElement();) {
-      Json element = cursor.Value(usual);
+      Json element = std::is_same_v<T, SparkNode> ? NodeValue(member, &cursor) : cursor.Value();
       if (!cursor.ok()) break;
       read(absl::StrCat(name, "[", count++, "]"), &element);
       // A list that grows is in memory twice, and its items are copied.
@@ -130,12 +157,10 @@ class SparkJsonReader {
       graph_.mesh = ReadSparkJsonMesh(root.Object("mesh", true), &source_);
     }
     ReadMeshEdges(root);
-    // Most fields of most nodes say nothing.
-    const UsualMembers usual{"attributes", UsualTexts()};
-    ForEach("nodes", members, &usual, &graph_.nodes,
+    ForEach("nodes", members, &graph_.nodes,
             [this](const std::string& where, Json* node) { ReadNode(where, node); });
     NoteMeshEdges();
-    ForEach("edges", members, nullptr, &graph_.edges,
+    ForEach("edges", members, &graph_.edges,
             [this](const std::string& where, Json* edge) { ReadEdge(where, *edge); });
   }
 
@@ -255,6 +280,9 @@ class SparkJsonReader {
   const PassedText& passed_;
   /// Of objects that have not come yet.
   std::unordered_map<uint64_t, std::vector<uint64_t>> vertices_of_;
+  std::map<SparkClass, UsualMembers> classes_;
+  /// Of the class of the node that was read last; nullptr if that is not known.
+  const UsualMembers* usual_ = nullptr;
   SparkGraph graph_;
 };
 

@@ -65,11 +65,27 @@ class SparkDeltaBuilder {
 
   // Before anything is concluded from the times of the poses.
   void DropAbsurdStamps() {
+    DropStampsOutside({-kStampMaxNs, kStampMaxNs}, "is absurd");
+    std::vector<TimeNs> stamps;
+    for (const SparkNode& node : graph_.nodes) {
+      if (node.stamp_ns.has_value()) stamps.push_back(*node.stamp_ns);
+    }
+    if (stamps.empty()) return;
+    const auto middle = stamps.begin() + static_cast<std::ptrdiff_t>(stamps.size() / 2);
+    std::nth_element(stamps.begin(), middle, stamps.end());
+    // So near to each other that a map holds all of them.
+    constexpr TimeNs kReachNs = kObservedFarMaxNs / 2;
+    DropStampsOutside({*middle - kReachNs, *middle + kReachNs},
+                      "is more than 5 years from that of most poses");
+  }
+
+  // Of an interval both ends of which count.
+  void DropStampsOutside(const Interval& times, const char* what) {
     for (SparkNode& node : graph_.nodes) {
-      const TimeNs stamp_ns = node.stamp_ns.value_or(0);
-      if (stamp_ns <= kStampMaxNs && stamp_ns >= -kStampMaxNs) continue;
+      const TimeNs stamp_ns = node.stamp_ns.value_or(times.from_ns);
+      if (times.from_ns <= stamp_ns && stamp_ns <= times.to_ns) continue;
       graph_.skips.Add(SkipKind::kNodeField, NameOfNode(node.id),
-                       absl::StrCat("timestamp ", stamp_ns, " is absurd"));
+                       absl::StrCat("timestamp ", stamp_ns, " ns ", what));
       node.stamp_ns.reset();
     }
   }

@@ -58,6 +58,16 @@ class SparkAgents : public testing::Test {
   uint64_t next_pose_ = 0;
 };
 
+TEST_F(SparkAgents, ATimeThatNoMapHoldsBesideTheOthersIsLeftOut) {
+  for (int i = 1; i <= 5; ++i) AddPose(i * kSecond, p0_);
+  AddPose(int64_t{11} * 365 * 86400 * kSecond, p0_);
+  const ImportedGraph imported = Import();
+  ASSERT_EQ(imported.delta.appends.size(), 1u);
+  EXPECT_EQ(imported.delta.appends[0].poses.size(), 5u);
+  ASSERT_EQ(imported.skipped.size(), 1u);
+  EXPECT_EQ(imported.skipped[0].count, 1);
+}
+
 TEST_F(SparkAgents, MergesEqualPlacesAndEndsAStayWhereTheNextBegins) {
   AddPose(10 * kSecond, p0_);
   AddPose(11 * kSecond, p0_);

@@ -4,6 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <map>
+
+#include "schema/interop/spark_fields.h"
 #include "tests/unit/schema/interop/interop_test_util.h"
 
 namespace dsg {
@@ -44,6 +48,48 @@ TEST(SparkJson, TakesTheAgentsTimeFromItsAttributesSince110) {
   EXPECT_EQ(graph->version, kSparkVersionNewest);
   EXPECT_EQ(graph->layer_names.at("AGENTS"), (SparkLayerKey{2, 97}));
   EXPECT_EQ(graph->layer_names.at("OLD"), (SparkLayerKey{7, 0}));
+}
+
+// All defaults of all classes in a node, so that most are of other classes than its own.
+std::string TwoNodesOfDefaults(const std::string& type, const std::string& blank) {
+  std::map<std::string, std::string> fields;
+  for (int i = 0; i <= static_cast<int>(SparkClass::kTraversability); ++i) {
+    for (const auto& [name, text] : UsualTexts(static_cast<SparkClass>(i))) fields[name] = text;
+  }
+  fields["name"] = "\"extinguisher\"";
+  fields["position"] = "[1.0,2.0,0.5]";
+  fields["bounding_box"] = R"({"type":"AABB","dimensions":[1.0,1.0,1.0],"world_P_center":)"
+                           R"([1.0,2.0,0.5],"world_R_center":{"w":1.0,"x":0.0,"y":0.0,"z":0.0}})";
+  if (!type.empty()) fields["type"] = "\"" + type + "\"";
+  std::string attributes;
+  for (const auto& [name, text] : fields) {
+    attributes += (attributes.empty() ? "\"" : ",\"") + name + "\":" + text + blank;
+  }
+  const std::string node = R"("layer":2,"partition":0,"attributes":{)" + attributes + "}}";
+  return R"({"nodes":[{"id":5692549928996306945,)" + node + R"(,{"id":5692549928996306946,)" +
+         node + R"(],"edges":[]})";
+}
+
+TEST(SparkJson, ReadsTheSameWhateverBlanksStandBehindDefaults) {
+  for (const char* type :
+       {"NodeAttributes", "SemanticNodeAttributes", "ObjectNodeAttributes", "RoomNodeAttributes",
+        "PlaceNodeAttributes", "Place2dNodeAttributes", "AgentNodeAttributes",
+        "TraversabilityNodeAttributes", "MyNodeAttributes", ""}) {
+    const auto dense = Read(TwoNodesOfDefaults(type, ""));
+    const auto spaced = Read(TwoNodesOfDefaults(type, " "));
+    ASSERT_TRUE(dense.ok() && spaced.ok()) << type << dense.status() << spaced.status();
+    ExpectSameGraph(*dense, *spaced);
+    for (const size_t i : {0, 1}) {
+      EXPECT_EQ(SparseFieldsOf(dense->nodes[i]), SparseFieldsOf(spaced->nodes[i])) << type << i;
+    }
+    EXPECT_EQ(dense->skips.all().size(), spaced->skips.all().size()) << type;
+  }
+}
+
+TEST(SparkJson, KeepsTheSignOfZero) {
+  const auto graph = Read(OneNode("", R"("type": "NodeAttributes", "other": -0)"));
+  ASSERT_TRUE(graph.ok()) << graph.status();
+  EXPECT_TRUE(std::signbit(SparseFieldsOf(graph->nodes[0]).at("other").get<double>()));
 }
 
 TEST(SparkJson, ReadsColorsAndBoxesOfBothForms) {
