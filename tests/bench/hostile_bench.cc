@@ -2,7 +2,6 @@
 // What hostile clients cost a dsg-server and everybody else: the most memory that it has, and the
 // latency of LocateAgent on another connection, in an attack and without. The server is started
 // anew for each, and the attackers are a process of their own. Refuses to go on without the server.
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -263,8 +262,6 @@ absl::Status Run(const Flags& flags, const CommonOptions& common, Report* report
 // What the process does that is started with the flag, the attack, the address and a time.
 bool BeAttackers(int argc, char** argv) {
   if (argc != 5 || std::strcmp(argv[1], kAttackFlag) != 0) return false;
-  // Elsewhere attackers bring processors of their own; here they may have what others leave.
-  setpriority(PRIO_PROCESS, 0, 19);
   std::printf("ready\n");
   std::fflush(stdout);
   const std::chrono::duration<double> time(std::atof(argv[4]));
