@@ -79,6 +79,17 @@ void Connections::CountReset(Connection* connection) {
   if (resets > limits_.reset_burst) Close(connection, "calls given up before they were asked");
 }
 
+std::chrono::steady_clock::time_point Connections::RefusalDue(Connection* connection,
+                                                              size_t bytes) const {
+  using Clock = std::chrono::steady_clock;
+  const std::chrono::duration<double> pause(static_cast<double>(bytes) /
+                                            limits_.refused_bytes_per_s);
+  std::lock_guard lock(connection->mutex);
+  connection->refused_until = std::max(connection->refused_until, Clock::now()) +
+                              std::chrono::duration_cast<Clock::duration>(pause);
+  return connection->refused_until;
+}
+
 void Connections::Close(Connection* connection, const std::string& why) {
   if (connection == nobody_.get() || connection->closed.exchange(true)) return;
   Log(LogLevel::kWarning, "closing a connection", {{"peer", connection->peer}, {"why", why}});

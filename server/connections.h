@@ -31,6 +31,8 @@ struct Connection {
   /// Resets that are not forgiven yet, as of `resets_at`. Guarded by `mutex`.
   double resets = 0.0;
   std::chrono::steady_clock::time_point resets_at{};
+  /// When the last of its long requests that were refused is answered. Guarded by `mutex`.
+  std::chrono::steady_clock::time_point refused_until{};
 };
 
 struct ConnectionLimits {
@@ -43,6 +45,9 @@ struct ConnectionLimits {
   /// so many a second.
   double reset_burst = 1000.0;
   double resets_per_s = 100.0;
+  /// How much one connection may send in requests that are refused. Reading four mebibytes costs
+  /// several milliseconds of a processor, and whoever asks in vain asks again at once.
+  double refused_bytes_per_s = 2 << 20;
 };
 
 /// Threads: safe from any thread.
@@ -61,6 +66,8 @@ class Connections {
   void EndCall(Connection* connection) { --connection->call_count; }
   /// A call, which has begun, will get no request. Closes the connection if that is too often.
   void CountReset(Connection* connection);
+  /// When a refusal of a request of `bytes` is due. One connection's come one after another.
+  std::chrono::steady_clock::time_point RefusalDue(Connection* connection, size_t bytes) const;
 
   int open_count() const;
 

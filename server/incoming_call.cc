@@ -19,6 +19,9 @@ namespace {
 
 using google::protobuf::Message;
 
+// Requests that are longer are counted, and refused, one after another.
+constexpr size_t kLongBytes = size_t{64} << 10;
+
 absl::Status UnreadableError(const Message& request, size_t bytes) {
   return MakeError(Reason::kFieldInvalid,
                    absl::StrCat("the ", bytes, " bytes of the request are no ",
@@ -73,31 +76,59 @@ void IncomingCall::OnReadDone(bool ok) {
     Finish(ForCaller(MakeError(Reason::kFieldInvalid,
                                "the call ended before its request had come whole; send one message",
                                {{"field", ""}})));
-  } else if (const absl::Status charged = memory_.Wait(wire_.Length()); !charged.ok()) {
-    wire_.Clear();
+    return;
+  }
+  wire_bytes_ = wire_.Length();
+  if (const absl::Status charged = memory_.Wait(wire_bytes_); !charged.ok()) {
     Refuse(charged);
   } else {
     Queue();
   }
 }
 
+void IncomingCall::OnCancel() {
+  call_.Cancel();
+  if (refusal_waits_) runtime_->delays->Hurry(this);
+}
+
+void IncomingCall::Run() {
+  if (refusal_.has_value()) {
+    Finish(*refusal_);
+  } else {
+    Work();
+  }
+}
+
 void IncomingCall::Refuse(const absl::Status& status) {
   LogEnd("", status, 0, 0);
-  // After that another thread may have deleted this.
-  Finish(ForCaller(status));
+  FinishRefused(ForCaller(status));
+}
+
+void IncomingCall::FinishRefused(const grpc::Status& status) {
+  // After Finish or Add another thread may have deleted this.
+  if (wire_bytes_ <= kLongBytes || call_.cancelled()) {
+    Finish(status);
+    return;
+  }
+  // What waits holds nothing.
+  wire_.Clear();
+  memory_.StopWaiting();
+  memory_.Resize(0).IgnoreError();
+  refusal_ = status;
+  refusal_waits_ = true;
+  runtime_->delays->Add(this, std::min(call_.deadline(), runtime_->connections->RefusalDue(
+                                                             connection_.get(), wire_bytes_)));
 }
 
 size_t IncomingCall::EstimateBytes(size_t bytes_max) {
-  // Large requests one at a time, so that a flood of them keeps one core busy and not all.
-  static std::mutex large_requests;
-  constexpr size_t kLargeBytes = size_t{64} << 10;
-  std::unique_lock lock(large_requests, std::defer_lock);
-  if (wire_.Length() > kLargeBytes) lock.lock();
+  // Long requests one at a time, so that a flood of them keeps one core busy and not all.
+  static std::mutex long_requests;
+  std::unique_lock lock(long_requests, std::defer_lock);
+  if (wire_bytes_ > kLongBytes) lock.lock();
   return method_->cost.Bytes(&wire_, bytes_max);
 }
 
 absl::Status IncomingCall::Parse(Message* request) {
-  const size_t wire_bytes = wire_.Length();
   // As messages, and as what the engine makes of them: a commit of 4 MB of objects took 1.4 times
   // its messages' estimate in all.
   constexpr size_t kShares = 2;
@@ -109,7 +140,7 @@ absl::Status IncomingCall::Parse(Message* request) {
       grpc::GenericDeserialize<grpc::ProtoBufferReader, Message>(&wire_, request);
   wire_.Clear();
   memory_.StopWaiting();
-  return parsed.ok() ? absl::OkStatus() : UnreadableError(*request, wire_bytes);
+  return parsed.ok() ? absl::OkStatus() : UnreadableError(*request, wire_bytes_);
 }
 
 absl::Status IncomingCall::Pack(const Message& message) {

@@ -3,7 +3,9 @@
 // parsed before a worker takes the call, so that waiting costs no more than what was sent.
 #pragma once
 
+#include <atomic>
 #include <memory>
+#include <optional>
 #include <string_view>
 
 #include "absl/status/status.h"
@@ -31,7 +33,8 @@ struct Method {
 class IncomingCall : public grpc::ServerGenericBidiReactor, public Job {
  public:
   void OnReadDone(bool ok) final;
-  void OnCancel() override { call_.Cancel(); }
+  void OnCancel() override;
+  void Run() final;
   void OnDone() override { delete this; }
 
  protected:
@@ -44,8 +47,13 @@ class IncomingCall : public grpc::ServerGenericBidiReactor, public Job {
   void Receive();
   /// The request has come; wire() is charged for.
   virtual void Queue() = 0;
+  /// What a worker does with the call.
+  virtual void Work() = 0;
   /// Ends the call before any of it was answered.
   void Refuse(const absl::Status& status);
+  /// The same with what ForCaller gave. A long request is refused late, since those who send such
+  /// requests again and again would keep the processors busy with receiving them.
+  void FinishRefused(const grpc::Status& status);
 
   /// Charges for the parsed request, parses it, and frees its bytes.
   ///
@@ -85,7 +93,11 @@ class IncomingCall : public grpc::ServerGenericBidiReactor, public Job {
   std::unique_ptr<CallGuard::Place> arrival_guard_;
   std::unique_ptr<Arrivals::Place> arrival_;
   grpc::ByteBuffer wire_;
+  size_t wire_bytes_ = 0;
   grpc::ByteBuffer packed_;
+  // What the call ends with when Run comes again.
+  std::optional<grpc::Status> refusal_;
+  std::atomic<bool> refusal_waits_{false};
 };
 
 }  // namespace dsg::server

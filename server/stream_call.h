@@ -37,10 +37,12 @@ class StreamCall final : public IncomingCall {
     if (is_counted_) open_count().fetch_sub(1);
   }
 
-  void Run() override {
+  void Work() override {
     const absl::StatusOr<std::chrono::nanoseconds> wait = Prepare();
     // After each of these another thread may have deleted this.
-    if (!wait.ok()) {
+    if (!wait.ok() && cursor_ == nullptr) {
+      FinishRefused(LastWords(wait.status()));
+    } else if (!wait.ok()) {
       Finish(LastWords(wait.status()));
     } else if (wait->count() > 0) {
       runtime().delays->Add(this, DelayQueue::Clock::now() + *wait);

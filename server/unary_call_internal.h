@@ -65,20 +65,20 @@ class UnaryCall final : public IncomingCall {
     Receive();
   }
 
-  void Run() override {
+  void Work() override {
     const absl::Status status = Answer();
+    if (!status.ok()) {
+      FinishRefused(ForCaller(status));
+      return;
+    }
     // A reply that nobody takes would be kept for ever.
     if (OutlastsBound(context()->deadline())) {
       reply_guard_ =
           runtime().guard->Guard(context()->c_call(), CallGuard::Clock::time_point::max());
       reply_guard_->BeginWrite();
     }
-    // After Finish another thread may have deleted this.
-    if (status.ok()) {
-      StartWriteAndFinish(&packed(), grpc::WriteOptions(), ForCaller(status));
-    } else {
-      Finish(ForCaller(status));
-    }
+    // After that another thread may have deleted this.
+    StartWriteAndFinish(&packed(), grpc::WriteOptions(), ForCaller(status));
   }
 
  private:

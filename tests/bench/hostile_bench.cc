@@ -96,8 +96,6 @@ void SendBytes(const std::string& address, const std::string& path, const std::s
     void* tag = nullptr;
     bool ok = false;
     queue.Next(&tag, &ok);
-    // An attacker that is told to come back later does; one that asks at once only burns its own.
-    if (!status.ok()) std::this_thread::sleep_for(std::chrono::milliseconds(200));
   }
 }
 

@@ -18,6 +18,7 @@
 #include "dsg/v1/query_service.grpc.pb.h"
 #include "grpcpp/generic/generic_stub.h"
 #include "grpcpp/grpcpp.h"
+#include "server/connections.h"
 #include "server/server.h"
 #include "server/status_mapping.h"
 #include "tests/support/raw_http2.h"
@@ -277,6 +278,45 @@ TEST_F(Hostile, EmptyNodesAreRefusedBeforeTheyAreParsed) {
   EndBystander();
   // One of them took 650 MB.
   EXPECT_LT(peak.Growth(), 200 * kMebibyte);
+}
+
+TEST_F(Hostile, ALongRequestIsRefusedLateAndAShortOneAtOnce) {
+  Start();
+  const auto begin = std::chrono::steady_clock::now();
+  const auto elapsed = [begin] { return std::chrono::steady_clock::now() - begin; };
+  BytesCall long_call(server_->address(), kCommit, EmptyNodes());
+  BytesCall long_stream(server_->address(), "/dsg.v1.QueryService/GetMesh", EmptyNodes());
+  const grpc::Slice slice("\xff\xff\xff");
+  EXPECT_FALSE(BytesCall(server_->address(), kLocate, {&slice, 1}).Wait().ok());
+  EXPECT_LT(elapsed(), seconds(1));
+  EXPECT_TRUE(AskInfo());
+  EXPECT_FALSE(long_stream.Wait().ok());
+  EXPECT_GT(elapsed(), milliseconds(1800));
+  EXPECT_EQ(long_call.Wait().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_GT(elapsed(), milliseconds(1800));
+}
+
+TEST_F(Hostile, AServerThatStopsWaitsForNoRefusal) {
+  Start();
+  BytesCall call(server_->address(), kCommit, EmptyNodes());
+  std::this_thread::sleep_for(milliseconds(500));
+  const auto begin = std::chrono::steady_clock::now();
+  server_->Shutdown(seconds(10));
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, seconds(1));
+  EXPECT_EQ(call.Wait().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+}
+
+TEST(ConnectionsTest, RefusesLongRequestsOfOneConnectionOneAfterAnother) {
+  ConnectionLimits limits;
+  limits.refused_bytes_per_s = 1e6;
+  const Connections connections(limits);
+  Connection one;
+  Connection other;
+  const auto now = std::chrono::steady_clock::now();
+  const auto first = connections.RefusalDue(&one, 2'000'000);
+  EXPECT_GE(first, now + seconds(2));
+  EXPECT_EQ(connections.RefusalDue(&one, 500'000), first + milliseconds(500));
+  EXPECT_LT(connections.RefusalDue(&other, 500'000), first);
 }
 
 TEST_F(Hostile, RequestsThatWaitForAWorkerHoldNoMoreThanTheirBytes) {
