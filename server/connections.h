@@ -47,7 +47,7 @@ struct ConnectionLimits {
   double resets_per_s = 100.0;
   /// How much one connection may send in requests that are refused. Reading four mebibytes costs
   /// several milliseconds of a processor, and whoever asks in vain asks again at once.
-  double refused_bytes_per_s = 2 << 20;
+  double refused_bytes_per_s = 1 << 20;
 };
 
 /// Threads: safe from any thread.
