@@ -5,6 +5,7 @@
 #include <set>
 #include <string>
 
+#include "schema/base/disjoint_sets.h"
 #include "schema/matching/assignment.h"
 #include "schema/merge/match_nodes.h"
 #include "schema/merge/point_grid.h"
@@ -66,33 +67,23 @@ struct Option {
   double containment = 0.0;
 };
 
-int RootOf(std::vector<int>* parent, int node) {
-  while ((*parent)[static_cast<size_t>(node)] != node) {
-    int& up = (*parent)[static_cast<size_t>(node)];
-    up = (*parent)[static_cast<size_t>(up)];
-    node = up;
-  }
-  return node;
-}
-
 // Cuts the options into groups that share no object, so that assignments stay small.
 std::vector<std::vector<Option>> GroupsOf(const std::vector<Option>& options) {
   std::map<int, int> slot_of_into;
   std::map<int, int> slot_of_other;
-  std::vector<int> parent;
+  DisjointSets sets;
   const auto slot = [&](std::map<int, int>* slots, int node) {
-    const auto [found, is_new] = slots->try_emplace(node, static_cast<int>(parent.size()));
-    if (is_new) parent.push_back(found->second);
+    const auto [found, is_new] = slots->try_emplace(node, 0);
+    if (is_new) found->second = sets.Add();
     return found->second;
   };
   for (const Option& option : options) {
-    const int a = RootOf(&parent, slot(&slot_of_into, option.into));
-    const int b = RootOf(&parent, slot(&slot_of_other, option.other));
-    parent[static_cast<size_t>(std::max(a, b))] = std::min(a, b);
+    const int a = slot(&slot_of_into, option.into);
+    sets.Merge(a, slot(&slot_of_other, option.other));
   }
   std::map<int, std::vector<Option>> groups;
   for (const Option& option : options) {
-    groups[RootOf(&parent, slot_of_into[option.into])].push_back(option);
+    groups[sets.Find(slot_of_into[option.into])].push_back(option);
   }
   std::vector<std::vector<Option>> list;
   for (auto& [root, group] : groups) list.push_back(std::move(group));
