@@ -7,7 +7,7 @@
 #include <tuple>
 
 #include "schema/base/status.h"
-#include "schema/merge/transform_node.h"
+#include "schema/model/rigid_motion.h"
 
 namespace dsg::merge {
 namespace {

@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "schema/base/status.h"
-#include "schema/merge/transform_node.h"
+#include "schema/model/rigid_motion.h"
 
 namespace dsg::merge {
 

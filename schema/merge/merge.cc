@@ -14,11 +14,14 @@
 #include "schema/merge/origins.h"
 #include "schema/merge/plan_check.h"
 #include "schema/merge/track_history.h"
-#include "schema/merge/transform_node.h"
 #include "schema/merge/vocabulary.h"
+#include "schema/model/rigid_motion.h"
 
 namespace dsg::merge {
 namespace {
+
+// Beyond this one of the maps has not z up, or the transform is wrong.
+constexpr double kTiltMaxRad = 0.1;
 
 absl::Status CheckTransform(const Pose3d& map_T_other) {
   if (!IsValidPose(map_T_other)) {

@@ -10,7 +10,7 @@
 #include "schema/base/status.h"
 #include "schema/merge/agent_copy.h"
 #include "schema/merge/merge.h"
-#include "schema/merge/transform_node.h"
+#include "schema/model/rigid_motion.h"
 
 namespace dsg::merge {
 namespace {

@@ -10,7 +10,7 @@
 #include "schema/merge/block_patch.h"
 #include "schema/merge/block_span.h"
 #include "schema/merge/surface_index.h"
-#include "schema/merge/transform_node.h"
+#include "schema/model/rigid_motion.h"
 
 namespace dsg::merge {
 namespace {

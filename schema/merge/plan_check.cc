@@ -9,8 +9,8 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "schema/base/status.h"
-#include "schema/merge/transform_node.h"
 #include "schema/model/delta_check.h"
+#include "schema/model/rigid_motion.h"
 #include "schema/store/time_range.h"
 
 namespace dsg::merge {

@@ -11,7 +11,7 @@
 #include "schema/merge/block_cache.h"
 #include "schema/merge/merge.h"
 #include "schema/merge/surface_index.h"
-#include "schema/merge/transform_node.h"
+#include "schema/model/rigid_motion.h"
 
 namespace dsg::merge {
 namespace {

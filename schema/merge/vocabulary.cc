@@ -7,7 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
 #include "schema/merge/free_number.h"
-#include "schema/merge/transform_node.h"
+#include "schema/model/rigid_motion.h"
 
 namespace dsg::merge {
 

@@ -16,7 +16,8 @@
 
 namespace dsg {
 
-/// Upper triangle of a 6x6 covariance, row by row, translation before rotation.
+/// Upper triangle of a 6x6 covariance, row by row: translation (metres, axes of the map) before
+/// rotation (a small turn on the right of the orientation: radians, axes of the agent).
 using Covariance6 = std::array<float, 21>;
 
 namespace pose_flags {
