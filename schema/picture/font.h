@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Letters of 5 x 7 dots for pictures: ASCII, and Latin letters without their accents.
-// Refuses no text: what it has no letter for is a small box.
+// Text in pictures: letters of 5 x 7 dots, and where labels find room. ASCII, and Latin letters
+// without their accents; any other character is a small box.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
 #include <string_view>
@@ -26,5 +27,27 @@ struct Glyph {
 
 /// One glyph a character. Bytes that are no UTF-8 are a box each.
 std::vector<const Glyph*> GlyphsOf(std::string_view text);
+
+/// Cost: a spot is compared with its neighbourhood, whatever the number of labels.
+class LabelLayout {
+ public:
+  /// `area`: where labels may be, pixels.
+  explicit LabelLayout(const Eigen::AlignedBox2d& area);
+
+  bool IsFree(const Eigen::AlignedBox2d& spot) const;
+  /// Takes the spot whatever is there.
+  void Block(const Eigen::AlignedBox2d& spot);
+
+ private:
+  template <class Visit>
+  void VisitCells(const Eigen::AlignedBox2d& spot, const Visit& visit) const;
+
+  Eigen::AlignedBox2d area_;
+  int column_count_;
+  int row_count_;
+  /// Indices into spots_, by cell.
+  std::vector<std::vector<size_t>> cells_;
+  std::vector<Eigen::AlignedBox2d> spots_;
+};
 
 }  // namespace dsg::picture

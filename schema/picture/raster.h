@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// A plain picture: filled shapes, thick lines and small text.
-// Refuses to know what it shows.
+// A plain picture: filled shapes, thick lines and small text; and its bytes as PNG.
 #pragma once
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <string>
 #include <string_view>
 #include <vector>
+
+#include "absl/status/statusor.h"
 
 namespace dsg::picture {
 
@@ -60,5 +62,8 @@ class Canvas {
   int height_;
   std::vector<float> pixels_;
 };
+
+/// Errors: INTERNAL with what the library says.
+absl::StatusOr<std::string> EncodePng(const Picture& picture);
 
 }  // namespace dsg::picture

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Spots are given once, whatever their size and order.
-#include "schema/picture/label_layout.h"
+#include "schema/picture/font.h"
 
 #include <gtest/gtest.h>
 
