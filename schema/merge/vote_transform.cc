@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "schema/base/status.h"
-#include "schema/matching/adaptive_voting.h"
+#include "schema/matching/robust_estimators.h"
 
 namespace dsg::merge {
 namespace {

@@ -1,11 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rotation between pairs of vectors, some of which are wrong.
-// Refuses a first guess: it starts from a convex problem and makes it truncated step by step.
+// A number and a rotation from measurements of which most may be wrong. Neither needs a first
+// guess: adaptive voting tries every consensus set, and the rotation begins with a convex problem
+// that is made truncated step by step.
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 namespace dsg {
+
+struct Measurement {
+  double value = 0.0;
+  /// A true measurement misses by no more than this. Requires: above zero.
+  double bound = 1.0;
+};
+
+struct Vote {
+  double value = 0.0;
+  /// Sum over measurements of min((miss / bound)^2, 1).
+  double cost = 0.0;
+};
+
+/// Minimises the truncated least squares exactly: the consensus set changes only where the interval
+/// of a measurement begins or ends, so every set there can be is tried. {0, 0} without any.
+///
+/// Requires: finite values and bounds.
+/// Cost: n log n.
+/// Source: Yang, Shi and Carlone, 2021, adaptive voting.
+Vote VoteAdaptively(const std::vector<Measurement>& measurements);
 
 /// Vectors as columns.
 using Columns = Eigen::Matrix3Xd;
