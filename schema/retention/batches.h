@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Makes the changes of a plan: deltas of bounded size, each of which leaves a sound map.
-// Refuses to overwrite what others have changed since the plan was made: that is left as it is.
+// The changes of a plan as deltas of bounded size, each of which leaves a sound map. What others
+// have changed since the plan was made stays as it is; Others tells what of an erasure has to be
+// planned again for that.
 #pragma once
 
-#include <deque>
 #include <memory>
 #include <optional>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "schema/model/graph_delta.h"
@@ -50,6 +51,32 @@ class PruneBatches {
  private:
   class Impl;
   std::unique_ptr<Impl> impl_;
+};
+
+struct Contested {
+  /// Whose tracks were corrected, or who are there again.
+  std::set<NodeId> agents;
+  std::set<BlockIndex> mesh_blocks;
+
+  bool empty() const { return agents.empty() && mesh_blocks.empty(); }
+  size_t size() const { return agents.size() + mesh_blocks.size(); }
+  /// Names of at most so many: ids, and x,y,z of blocks.
+  std::vector<std::string> Names(size_t count_max) const;
+};
+
+/// Gathers what others touch from the revision of a plan on.
+class Others {
+ public:
+  void Add(const Touched& touched);
+  /// What of it the plan was to change, as far as it is to be erased.
+  Contested FindContested(const PrunePlan& plan, const Erasure& erasure) const;
+
+  const std::set<NodeId>& nodes() const { return nodes_; }
+
+ private:
+  std::set<NodeId> nodes_;
+  std::set<NodeId> tracks_;
+  std::set<BlockIndex> mesh_blocks_;
 };
 
 }  // namespace dsg

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds what exactly a selection takes from a map, and counts it.
-// Refuses to decide what is selected.
+// What exactly a selection takes from a map, and how much that is.
 #pragma once
 
-#include <set>
 
 #include "absl/status/status.h"
 #include "schema/retention/plan.h"
@@ -31,13 +29,5 @@ absl::Status Measure(const Snapshot& map, const GraphIndex& index, const StopChe
 
 /// What was clipped to the end of a track gets its open end back.
 Stay WithOpenEnd(Stay stay, const TrackInfo& track);
-
-// Parts of Measure: measure_tracks.cc, measure_stays.cc.
-
-/// Also collects the topologies of shapes that go.
-absl::Status MeasureTracks(const Snapshot& map, const GraphIndex& index, const StopCheck& stop,
-                           Measured* measured, std::set<Sha256>* topologies);
-absl::Status MeasureStays(const Snapshot& map, const GraphIndex& index, const StopCheck& stop,
-                          Measured* measured);
 
 }  // namespace dsg

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a policy that erases means in the past: entities that are gone already, as they were last
-// believed, and older beliefs about tracks and meshes. That is also how a prune that was cut off
-// between retiring and erasing finds what is left to do.
-// Refuses to touch the past of what is believed to be elsewhere now.
+// What policies mean in the past: which revisions a policy about history lets go, and what one that
+// erases takes from older revisions. Entities that are gone count as they were last believed, and
+// beliefs about tracks and meshes as they stood; so a prune that was cut off between retiring and
+// erasing finds what is left to do. The past of what is believed to be elsewhere now stays.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -13,6 +14,26 @@
 #include "schema/store/graph_store.h"
 
 namespace dsg {
+
+struct HistoryCut {
+  /// The oldest revision to keep, at most the newest.
+  Revision keep_from = 0;
+  /// How many readable ones are before it and have no tag.
+  int64_t revision_count = 0;
+  /// Says where the wall clock was not believed; empty if it was.
+  std::string note;
+};
+
+/// The age of a revision is the sum of the steps of the wall clock from commit to commit, and from
+/// the newest to `wall_now_ns`. A step back, or one by more than kClockLeapMaxNs, counts as no
+/// time: the clock may have been set, and what went too early would not come back. So a revision
+/// counts as younger than it is by the pauses of more than a week after it, and never as older.
+///
+/// Requires: policy.IsHistory().
+/// Errors: OUT_OF_RANGE/REVISION_IN_FUTURE; what `stop` returned.
+absl::StatusOr<HistoryCut> FindHistoryCut(MapReader* reader, Revision newest,
+                                          const PrunePolicy& policy, int64_t wall_now_ns,
+                                          const StopCheck& stop);
 
 /// Adds what the policy matches at the revision of the plan.
 void AddPresent(const GraphIndex& index, const Measured& measured, Erasure* erasure);

@@ -5,7 +5,6 @@
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
-#include "schema/retention/history_cut.h"
 #include "schema/retention/measure.h"
 #include "schema/retention/past.h"
 #include "schema/retention/selection.h"

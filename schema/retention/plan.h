@@ -78,7 +78,7 @@ struct PrunePlan {
   /// policy or by all together, and by which.
   double share = 0.0;
   std::string share_policy;
-  /// Agents that are ahead of what ages count back from (world_clock.h). Empty without ages.
+  /// Agents that are ahead of what ages count back from (WorldClock). Empty without ages.
   std::vector<NodeId> implausible_agents;
   /// What ages count without, in words.
   std::vector<std::string> notes;

@@ -1,18 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
-// What to forget of a map that is kept for years, and how thoroughly.
-// Refuses to look into a map: what a policy matches there is plan.h's question.
+// Policies: what to forget of a map that is kept for years, how thoroughly, and ages as people
+// write them ("90s", "15m", "24h", "30d"; a number needs its unit). What a policy matches in a map
+// is selection.h.
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "schema/base/time.h"
 #include "schema/model/geometry.h"
 #include "schema/model/ids.h"
 
 namespace dsg {
+
+inline constexpr TimeNs kNsPerDay = 24 * 3600 * kNsPerSecond;
+
+/// A positive number and one of ms, s, m, h, d.
+/// Errors: INVALID_ARGUMENT/FIELD_INVALID, also beyond 100 years.
+absl::StatusOr<TimeNs> ParseAge(std::string_view text);
+
+/// As ParseAge reads it back, in the largest unit that is exact.
+std::string FormatAge(TimeNs age_ns);
 
 enum class PruneStrength {
   /// New revisions are without it; older ones still know.
@@ -22,7 +34,7 @@ enum class PruneStrength {
 };
 
 /// One rule of forgetting. Instants are of world time; ages count back from the newest observation
-/// of the map that another one supports (world_clock.h).
+/// of the map that another one supports (WorldClock).
 struct PrunePolicy {
   /// A node by id or name, and all that only it contains.
   struct Branch {
@@ -55,7 +67,7 @@ struct PrunePolicy {
     TimeNs age_ns = 0;
   };
   /// Revisions committed longer ago than this, by the wall clock where it can be believed
-  /// (history_cut.h), that have no tag.
+  /// (past.h), that have no tag.
   struct HistoryOlderThan {
     TimeNs age_ns = 0;
   };

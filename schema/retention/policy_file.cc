@@ -14,8 +14,6 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
-#include "schema/retention/duration.h"
-#include "schema/retention/yaml_documents.h"
 
 namespace dsg {
 namespace {
@@ -26,9 +24,36 @@ constexpr size_t kPolicyCountMax = 100;
 constexpr size_t kBracketsMax = 1000;
 constexpr TimeNs kEveryMin = kNsPerSecond;
 
-class Reader {
+bool IsMarker(std::string_view line, std::string_view marker) {
+  if (!line.starts_with(marker)) return false;
+  const std::string_view rest = line.substr(marker.size());
+  return rest.empty() || rest.front() == ' ' || rest.front() == '\t' || rest.front() == '\r';
+}
+
+// The line, counted from 0, at which a second document begins; nullopt if none does. YAML::Load
+// reads the first document and ignores what follows; YAML::LoadAll does not end on all texts.
+std::optional<int> FindSecondDocument(std::string_view text) {
+  bool has_content = false;
+  bool has_ended = false;
+  int number = 0;
+  for (size_t begin = 0; begin < text.size(); ++number) {
+    const size_t end = std::min(text.find('\n', begin), text.size());
+    const std::string_view line = text.substr(begin, end - begin);
+    begin = end + 1;
+    const bool begins = IsMarker(line, "---");
+    const bool ends = IsMarker(line, "...");
+    const size_t first = line.find_first_not_of(" \t\r");
+    const bool says_nothing = first == std::string_view::npos || line[first] == '#' || ends;
+    if ((begins && has_content) || (has_ended && !says_nothing)) return number;
+    has_ended = has_ended || ends;
+    has_content = has_content || begins || (!says_nothing && line.front() != '%');
+  }
+  return std::nullopt;
+}
+
+class PolicyReader {
  public:
-  explicit Reader(std::string name) : name_(std::move(name)) {}
+  explicit PolicyReader(std::string name) : name_(std::move(name)) {}
 
   absl::StatusOr<PolicyFile> Read(const YAML::Node& root) {
     PolicyFile file;
@@ -267,7 +292,7 @@ class Reader {
 }  // namespace
 
 absl::StatusOr<PolicyFile> ParsePolicyFile(std::string_view text, const std::string& name) {
-  Reader reader(name);
+  PolicyReader reader(name);
   const auto brackets =
       std::count_if(text.begin(), text.end(), [](char c) { return c == '[' || c == '{'; });
   if (text.size() > kFileBytesMax || static_cast<size_t>(brackets) > kBracketsMax) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What policies match in one map at one revision, before it is known what that amounts to.
-// Refuses to look into tracks and meshes: it names spans and spaces.
+// What policies match in one map at one revision: nodes, spans of tracks and parts of space. What
+// that amounts to is measure.h.
 #pragma once
 
 #include <optional>
@@ -66,11 +66,5 @@ class LayerSet {
   bool is_all_ = true;
   std::vector<LayerId> layers_;
 };
-
-// Parts of Select: node_choice.cc, track_choice.cc.
-absl::Status ChooseNodes(const Snapshot& map, const GraphIndex& index, const PrunePolicy& policy,
-                         const LayerSet& layers, Selection* selection);
-absl::Status ChooseTracks(const Snapshot& map, const GraphIndex& index, const PrunePolicy& policy,
-                          const StopCheck& stop, Selection* selection);
 
 }  // namespace dsg
