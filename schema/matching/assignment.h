@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One-to-one assignment of the least total cost.
-// Refuses to know what is assigned.
+// One-to-one assignment of least total cost.
 #pragma once
 
 #include <Eigen/Core>

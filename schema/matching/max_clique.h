@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Undirected graphs with bit rows of neighbours, and the largest clique of one: the largest set of
-// vertices that are all joined to each other. Memory is quadratic in the vertices. The search
-// counts its steps, ends at a limit, and says so.
+// Undirected graphs as bit rows of neighbours, and their largest clique: the largest set of
+// vertices that are pairwise adjacent. Memory is quadratic in the vertices. The search is bounded
+// in steps and says when it was cut off.
 #pragma once
 
 #include <cstddef>

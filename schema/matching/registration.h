@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rigid motion between two sets of points, most of whose pairs may be wrong.
-// Refuses to hide doubt: the answer carries its inliers, and may be "no fit".
+// The rigid motion between two point sets, most of whose correspondences may be wrong. The result
+// lists its inliers; without enough of them there is none.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A number and a rotation from measurements of which most may be wrong. Neither needs a first
-// guess: adaptive voting tries every consensus set, and the rotation begins with a convex problem
-// that is made truncated step by step.
+// Robust estimates from measurements most of which may be wrong: a scalar by adaptive voting, a
+// rotation by graduated non-convexity. Neither needs an initial guess.
 #pragma once
 
 #include <Eigen/Core>

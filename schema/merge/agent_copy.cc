@@ -22,14 +22,14 @@ FactorKey KeyOf(const PoseFactor& factor) {
 }
 
 // Through a codec, and through a transform told from nodes that went through it.
-constexpr double kSameM = 1e-3;
-constexpr double kSameRad = 1e-3;
+constexpr double kSamePoseM = 1e-3;
+constexpr double kSamePoseRad = 1e-3;
 
 bool IsSame(const TimedPose& a, const TimedPose& b) {
   if (a.time_ns != b.time_ns || a.flags != b.flags) return false;
-  if ((a.map_T_agent.position - b.map_T_agent.position).norm() > kSameM) return false;
+  if ((a.map_T_agent.position - b.map_T_agent.position).norm() > kSamePoseM) return false;
   return (a.flags & pose_flags::kNoOrientation) != 0 ||
-         AngleBetween(a.map_T_agent.orientation, b.map_T_agent.orientation) <= kSameRad;
+         AngleBetween(a.map_T_agent.orientation, b.map_T_agent.orientation) <= kSamePoseRad;
 }
 
 using Poses = std::vector<TimedPose>;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an agent of the other map did, carried into this one piece by piece.
-// Refuses to repeat: what an earlier merge brought is left out.
+// Copies what an agent of the other map did into this map, one delta at a time: poses, corrections,
+// stays, factors, body shapes. Skips what an earlier merge has copied.
 #pragma once
 
 #include <memory>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where another map lies in the frame of this one, from what both have seen.
-// Refuses to choose between two answers that are as good as each other: buildings repeat.
+// Estimates the transform from another map to this one from what both have seen. Buildings repeat,
+// so there is no answer when two transforms explain the maps equally well.
 #pragma once
 
 #include <string>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Outlines from above: how much two overlap, and one around both.
-// Refuses to fail: an outline that crosses itself is mended or replaced by its hull.
+// Floor plans as polygons: shared area, union, heights. Self-intersecting outlines are repaired or
+// replaced by their convex hull.
 #pragma once
 
 #include "schema/model/node.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is believed of a thing that two maps have seen.
-// Refuses to average: geometry is that of the better look, grown where the other saw more.
+// Fuses two nodes that stand for one thing. Geometry is not averaged: the better observed one wins
+// and grows where the other reaches further.
 #pragma once
 
 #include <string>

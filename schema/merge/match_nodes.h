@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which nodes of two maps in one frame stand for the same things.
-// Refuses to change a node: what becomes of pairs is decided elsewhere.
+// Finds the nodes of two maps, given in one frame, that stand for the same things. Nodes do not
+// change here.
 #pragma once
 
 #include <string>

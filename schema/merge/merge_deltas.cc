@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "schema/merge/merge_deltas.h"
+
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -9,7 +11,6 @@
 #include "absl/strings/str_format.h"
 #include "schema/base/status.h"
 #include "schema/merge/agent_copy.h"
-#include "schema/merge/merge.h"
 #include "schema/model/rigid_motion.h"
 
 namespace dsg::merge {
@@ -28,12 +29,12 @@ std::set<Sha256> AssetsOf(const GraphDelta& graph) {
   return assets;
 }
 
-std::string NameOf(const MergePlan& plan) {
+std::string TitleOf(const MergePlan& plan) {
   return absl::StrCat("merge of ", plan.other_name, " revision ", plan.other_revision);
 }
 
 // As `dsg merge --transform` takes it.
-std::string Describe(const Pose3d& pose) {
+std::string DescribeForCommand(const Pose3d& pose) {
   const Eigen::Vector3d& p = pose.position;
   const Eigen::Quaterniond& q = pose.orientation;
   const std::string position = absl::StrFormat("%.4f,%.4f,%.4f", p.x(), p.y(), p.z());
@@ -92,7 +93,7 @@ class MergeDeltas::Impl {
     header_.session_id = absl::StrCat("merge/", plan_.other_name, "@", plan_.other_revision, "/",
                                       plan_.into_revision);
     header_.author = std::move(author);
-    header_.message = NameOf(plan_);
+    header_.message = TitleOf(plan_);
     header_.parent_revision = plan_.into_revision;
     for (const auto& [theirs, mine] : plan_.node_ids) agents_left_.emplace_back(theirs, mine);
   }
@@ -112,7 +113,7 @@ class MergeDeltas::Impl {
     delta.message = absl::StrCat(header_.message, ", part ", ++part_count_);
     // Once is enough to repeat the merge by hand.
     if (part_count_ == 1)
-      absl::StrAppend(&delta.message, " at ", Describe(plan_.map_T_other), Kept());
+      absl::StrAppend(&delta.message, " at ", DescribeForCommand(plan_.map_T_other), Kept());
     delta.parent_revision = header_.parent_revision;
     delta.sequence = ++sequence_;
     // Only the first can know its parent; who commits sets those of the others.

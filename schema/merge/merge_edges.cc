@@ -105,10 +105,6 @@ class EdgeJoiner {
   std::map<EdgeKey, Edge> added_;
 };
 
-double ClearanceOf(const Node& node) {
-  return node.place.has_value() ? node.place->clearance_m : 0.0;
-}
-
 // Places of `other` that a way leads from into a place that both maps have.
 std::set<int> JoinedPlaces(const MapContent& other, const std::vector<int>& pair_of) {
   std::set<int> joined;

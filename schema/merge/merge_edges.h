@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The edges of a merged graph: carried over, joined where both maps have them.
-// Refuses a second parent, and a second nearest place or support.
+// The edges of a merged graph. A node keeps one parent, one nearest place and one support.
 #pragma once
 
 #include <set>

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The nodes and edges of a merge: what is new, what is fused, what is closed.
-// Refuses to decide who is who: pairs and changes are given.
+// The nodes and edges that a merge writes: new, fused, closed. Takes pairs and changes as given.
 #pragma once
 
 #include <vector>
 
-#include "schema/merge/known_pairs.h"
 #include "schema/merge/merge.h"
-#include "schema/merge/track_history.h"
+#include "schema/merge/origins.h"
 
 namespace dsg::merge {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The mesh of another map carried into this one, without a second skin where both have a surface.
-// Refuses to weld: surfaces that meet end side by side.
+// Copies the mesh of another map into this one, without a second layer where both have the surface.
+// Does not weld: surfaces that meet end side by side.
 #pragma once
 
 #include <functional>

@@ -1,14 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a node of a merged map came from, kept as attributes of the node.
-// Refuses to guess: a text that this did not write is no origin.
+// Where the nodes of a merged map came from. Origins are attributes of the nodes. When the same
+// maps are merged again, origins tell which nodes are the same, and what the tracks of copied
+// agents were when they were copied. They hold by content and not by name alone: a map can be
+// rebuilt under an old name.
 #pragma once
 
+#include <cstdint>
+#include <map>
+#include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "absl/status/statusor.h"
+#include "schema/base/stop_check.h"
+#include "schema/merge/map_content.h"
 #include "schema/model/node.h"
+#include "schema/store/graph_store.h"
 
 namespace dsg::merge {
 
@@ -56,5 +66,45 @@ int64_t OwnCount(const Node& node);
 
 /// As large as it may be if the sum is larger.
 int64_t AddCounts(int64_t a, int64_t b);
+
+struct KnownPairs {
+  /// For each node of `other` the index of the node of `into` that it is, -1 where not known.
+  std::vector<int> pair_of;
+  /// Where the node of `into` has that one as an origin: what is said of it there.
+  std::vector<std::optional<Origin>> origin_of;
+  /// MarkOf each node of `other`.
+  std::vector<uint64_t> mark_of;
+};
+
+/// Neither map is carried anywhere yet. An origin holds if its map, at the revision that it names,
+/// has that node as it was taken. Where that revision cannot be read any more and the node has
+/// changed since, the other origins of that map decide. The readers may be null: then no past
+/// revision is read.
+/// Errors: those of reading; what `stop` returned.
+absl::StatusOr<KnownPairs> FindKnownPairs(const MapContent& into, const MapContent& other,
+                                          MapReader* into_map, MapReader* other_map,
+                                          const StopCheck& stop);
+
+/// As far as the newest revision of `source` tells: nullopt if it does not.
+std::optional<bool> HoldsNow(const Origin& origin, const MapContent& source);
+
+/// By node of the other map.
+struct TrackHistory {
+  /// Only of agents that were copied whole, and of which an older revision was merged; null stands
+  /// for the revision that is merged now.
+  std::map<int, std::vector<std::shared_ptr<const Snapshot>>> bases;
+  /// Agents whose poses may have changed since they were taken.
+  std::set<int> changed;
+};
+
+/// `other_map` may be null: then no older revision can be read.
+/// Errors: those of reading; what `stop` returned.
+absl::StatusOr<TrackHistory> ReadTrackHistory(const MapContent& content, const KnownPairs& known,
+                                              const Snapshot& other, MapReader* other_map,
+                                              const StopCheck& stop);
+
+/// Where the other map was put when it was merged before; nullopt if it was not, or has been
+/// rebuilt since. Neither map is carried anywhere yet.
+std::optional<Pose3d> TransformOfLastMerge(const MapContent& into, const MapContent& other);
 
 }  // namespace dsg::merge

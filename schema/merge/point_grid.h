@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points in cells of a grid seen from above, to find those near a point.
-// Refuses to change after it is made.
+// Points in the cells of a horizontal grid, for lookups by distance. Immutable.
 #pragma once
 
 #include <Eigen/Core>

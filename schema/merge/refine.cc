@@ -8,9 +8,9 @@
 #include <memory>
 
 #include "schema/base/status.h"
-#include "schema/merge/block_cache.h"
 #include "schema/merge/merge.h"
-#include "schema/merge/surface_index.h"
+#include "schema/merge/mesh_surface.h"
+#include "schema/merge/origins.h"
 #include "schema/model/rigid_motion.h"
 
 namespace dsg::merge {
@@ -31,7 +31,7 @@ using Vector4 = Eigen::Matrix<double, 4, 1>;
 using Matrix4 = Eigen::Matrix<double, 4, 4>;
 
 // Weights of a Cauchy loss, and the share of a sighting's own precision.
-double WeightOf(double miss_m, double sigma_m) {
+double CauchyWeight(double miss_m, double sigma_m) {
   const double relative = miss_m / (2.0 * sigma_m);
   return 1.0 / (sigma_m * sigma_m * (1.0 + relative * relative));
 }
@@ -46,14 +46,14 @@ void AddTo(const Sighting& sighting, const Pose3d& pose, const Eigen::Vector3d& 
   jacobian.col(0) = Eigen::Vector3d::UnitZ().cross(at - center);
   jacobian.rightCols<3>() = Eigen::Matrix3d::Identity();
   if (sighting.normal_into.isZero()) {
-    const double weight = WeightOf(miss.norm(), sighting.sigma_m);
+    const double weight = CauchyWeight(miss.norm(), sighting.sigma_m);
     *information += weight * jacobian.transpose() * jacobian;
     *gradient += weight * jacobian.transpose() * miss;
     return;
   }
   const double across = sighting.normal_into.dot(miss);
   const Vector4 row = jacobian.transpose() * sighting.normal_into;
-  const double weight = WeightOf(across, sighting.sigma_m);
+  const double weight = CauchyWeight(across, sighting.sigma_m);
   *information += weight * row * row.transpose();
   *gradient += weight * across * row;
 }
@@ -63,12 +63,7 @@ bool IsWall(const Node& node) {
          !node.structure->plane_normal_map.isZero();
 }
 
-Eigen::Vector3d MiddleOf(const Node& node) {
-  return node.box_node.isEmpty() ? node.map_T_node.position
-                                 : Eigen::Vector3d(node.map_T_node * node.box_node.center());
-}
-
-Eigen::Vector3d MiddleOf(const MapContent& content) {
+Eigen::Vector3d MeanPositionOf(const MapContent& content) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const Node& node : content.nodes) sum += node.map_T_node.position;
   return sum / std::max<double>(1.0, static_cast<double>(content.nodes.size()));
@@ -202,7 +197,7 @@ absl::StatusOr<Alignment> FindTransform(const Snapshot& into, const Snapshot& ot
     sightings.insert(sightings.end(), surface.begin(), surface.end());
     pose = FitSightings(sightings, pose);
   }
-  const Eigen::Vector3d middle = MiddleOf(theirs);
+  const Eigen::Vector3d middle = MeanPositionOf(theirs);
   if ((pose * middle - before * middle).norm() < kStrayMaxM &&
       AngleBetween(pose.orientation, before.orientation) < 0.05) {
     alignment.map_T_other = pose;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The transform between two maps made exact on surfaces: walls, floors and mesh.
-// Refuses to go far: it mends decimetres, and leaves a transform alone that surfaces do not fit.
+// Refines the transform between two maps on surfaces: walls, floors and mesh. Corrects decimetres,
+// and returns the transform unchanged where surfaces do not fit.
 #pragma once
 
 #include <vector>

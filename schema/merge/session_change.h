@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a later session contradicts: things that stood where it saw free space, and where they went.
-// Refuses to take silence for absence: what the session did not look at stays as it was.
+// Changes between two sessions: things that are gone because the later session saw free space
+// there, and where they went. What the later session did not look at stays.
 #pragma once
 
 #include <functional>
@@ -59,6 +59,12 @@ struct BoxSurface {
 /// inside. May be empty.
 using SurfaceProbe = std::function<absl::StatusOr<BoxSurface>(const Pose3d& map_T_box,
                                                               const Box3d& box, double slack_m)>;
+
+/// Looks into the mesh of `other`, which `map_T_other` carries into the frame of the boxes. A box
+/// of more than some hundred blocks counts as full of matter.
+///
+/// Threads: one caller at a time. `other` must outlive the probe.
+SurfaceProbe ProbeMesh(const Snapshot& other, const Pose3d& map_T_other);
 
 struct SessionChanges {
   /// Ascending by `into`.

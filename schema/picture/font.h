@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Text in pictures: letters of 5 x 7 dots, and where labels find room. ASCII, and Latin letters
-// without their accents; any other character is a small box.
+// Text in pictures: glyphs of 5 x 7 dots, and free spots for labels. ASCII and Latin letters
+// without accents; any other character is a small box.
 #pragma once
 
 #include <Eigen/Geometry>

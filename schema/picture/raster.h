@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A plain picture: filled shapes, thick lines and small text; and its bytes as PNG.
+// A raster image: filled shapes, thick lines, small text, and PNG encoding.
 #pragma once
 
 #include <Eigen/Core>

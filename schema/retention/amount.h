@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How much something is: rows by kind, and the bytes of their payloads.
-// Refuses to speak of files: indexes, page tails and history are the store's.
+// Counts rows by kind and the bytes of their payloads. Indexes, page tails and history are not
+// counted.
 #pragma once
 
 #include <cstdint>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The changes of a plan as deltas of bounded size, each of which leaves a sound map. What others
-// have changed since the plan was made stays as it is; Others tells what of an erasure has to be
-// planned again for that.
+// The changes of a prune plan as deltas of bounded size, each of which leaves a consistent map.
+// Changes that others have made since the plan win; Others finds what of an erasure has to be
+// planned again because of them.
 #pragma once
 
 #include <memory>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What policies ask of a map at one revision: its nodes and their hierarchy, in memory (a million
-// of them take some hundred megabytes), and the time that ages count back from.
+// What policies ask of a map at one revision: nodes and hierarchy, in memory (some hundred
+// megabytes for a million nodes), and the time from which ages count back.
 #pragma once
 
 #include <map>

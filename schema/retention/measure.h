@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What exactly a selection takes from a map, and how much that is.
+// What exactly a selection removes from a map, and how much that is.
 #pragma once
-
 
 #include "absl/status/status.h"
 #include "schema/retention/plan.h"

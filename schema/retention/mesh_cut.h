@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Takes a part of space out of a mesh block.
-// Refuses to cut triangles: each goes whole or stays whole.
+// Removes a part of space from a mesh block. Triangles are removed whole.
 #pragma once
 
 #include <vector>

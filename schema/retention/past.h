@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What policies mean in the past: which revisions a policy about history lets go, and what one that
-// erases takes from older revisions. Entities that are gone count as they were last believed, and
-// beliefs about tracks and meshes as they stood; so a prune that was cut off between retiring and
-// erasing finds what is left to do. The past of what is believed to be elsewhere now stays.
+// Policies and the past: the revisions that a history policy drops, and what an erasing policy
+// removes from older revisions. Gone entities match by their last state; tracks and meshes by their
+// state in each revision. So a prune that stopped between retiring and erasing finds the rest. The
+// past of an entity that is elsewhere now stays.
 #pragma once
 
 #include <string>

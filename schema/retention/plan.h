@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a set of policies would take from a map as it is at one revision, and how much that is.
-// Refuses to change anything: batches.h makes the changes of it.
+// What a set of policies would remove from a map at one revision, and how much that is. Changes
+// nothing; batches.h makes the deltas.
 #pragma once
 
 #include <optional>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Policies: what to forget of a map that is kept for years, how thoroughly, and ages as people
-// write them ("90s", "15m", "24h", "30d"; a number needs its unit). What a policy matches in a map
-// is selection.h.
+// Retention policies: what to forget of a map that is kept for years, and how thoroughly. Also ages
+// as text: "90s", "15m", "24h", "30d". selection.h tells what a policy matches in a map.
 #pragma once
 
 #include <string>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads a file of policies: what to forget, and how often to look (docs/forgetting.md).
-// Refuses unknown keys and anything half understood: a file is taken whole or not at all.
+// Reads a file of policies: what to forget, and how often (docs/forgetting.md). Unknown keys are
+// errors; a file applies as a whole or not at all.
 #pragma once
 
 #include <optional>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What policies match in one map at one revision: nodes, spans of tracks and parts of space. What
-// that amounts to is measure.h.
+// What policies match in a map at one revision: nodes, spans of tracks, parts of space.
 #pragma once
 
 #include <optional>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Thins a track: drops poses that interpolation in time gives back.
-// Refuses to bridge: gaps stay gaps, and what is kept stays bit for bit what it was.
+// Thins a track: drops poses that interpolation in time restores. Gaps stay gaps, and kept poses do
+// not change.
 #pragma once
 
 #include <cstdint>
