@@ -46,7 +46,7 @@ class BitsetGraph {
 
   /// Requires: a and b differ.
   void AddEdge(int a, int b);
-  /// Leaves the vertex in place, without neighbours.
+  /// Removes all edges of the vertex.
   void Isolate(int vertex);
 
  private:
@@ -67,11 +67,11 @@ void ForEachBit(const Word* row, int word_count, Visit visit) {
   }
 }
 
-/// Vertices in the order in which the one with the fewest neighbours left is taken away.
+/// The degeneracy order: repeatedly removes the vertex with the fewest remaining neighbours.
 struct Degeneracy {
   std::vector<int> order;
-  /// By vertex: the largest k such that the vertex survives in the subgraph of degrees >= k. No
-  /// clique that holds the vertex has more than core + 1 members.
+  /// By vertex: the largest k such that the vertex is in a subgraph of degrees >= k. A clique that
+  /// contains the vertex has at most core + 1 members.
   std::vector<int> core;
 };
 
@@ -80,7 +80,7 @@ struct Degeneracy {
 Degeneracy FindDegeneracy(const BitsetGraph& graph);
 
 struct CliqueOptions {
-  /// A step is one vertex given a colour or one row of neighbours copied.
+  /// A step is one vertex coloured or one row of neighbours copied.
   int64_t step_count_max = 20'000'000;
   /// Only cliques larger than this count.
   int size_above = 0;
@@ -89,7 +89,7 @@ struct CliqueOptions {
 struct Clique {
   /// Ascending; empty when the graph has no clique of more than `size_above`.
   std::vector<int> vertices;
-  /// False when the search was cut off; a larger one may exist.
+  /// False when the search was cut off; a larger clique may exist.
   bool is_maximal = true;
   int64_t step_count = 0;
 };

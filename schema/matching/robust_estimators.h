@@ -10,7 +10,7 @@ namespace dsg {
 
 struct Measurement {
   double value = 0.0;
-  /// A true measurement misses by no more than this. Requires: above zero.
+  /// Largest error of a true measurement. Requires: above zero.
   double bound = 1.0;
 };
 
@@ -21,7 +21,7 @@ struct Vote {
 };
 
 /// Minimises the truncated least squares exactly: the consensus set changes only where the interval
-/// of a measurement begins or ends, so every set there can be is tried. {0, 0} without any.
+/// of a measurement begins or ends, so all possible sets are tried. {0, 0} without measurements.
 ///
 /// Requires: finite values and bounds.
 /// Cost: n log n.
@@ -32,11 +32,11 @@ Vote VoteAdaptively(const std::vector<Measurement>& measurements);
 using Columns = Eigen::Matrix3Xd;
 
 struct GncOptions {
-  /// A true pair misses by no more than this.
+  /// Largest error of a true pair.
   double bound = 0.1;
   double factor = 1.4;
   int iteration_count_max = 100;
-  /// Relative change of the cost at which the rotation has settled.
+  /// Relative change of the cost at convergence.
   double tolerance = 1e-6;
   /// About z only.
   bool is_upright = false;

@@ -20,14 +20,14 @@ struct Landmark {
   double size_m = 0.0;
 };
 
-/// Things with a class that are believed to be there still. Where there are few (`few` or less),
-/// rooms with a class and places too.
+/// Things with a class that are still there; `with_regions`: rooms and places too. Things without a
+/// class are left out: they would match everything.
 std::vector<Landmark> LandmarksOf(const MapContent& content, bool with_regions);
 
-/// Lengths differ by less than a factor of two, or one is not known.
+/// Sizes differ by less than a factor of two, or one is unknown.
 bool AreAlike(const Landmark& a, const Landmark& b);
 
-/// Indices of pairs by kind: what the landmarks of one map could be in the other.
+/// The landmarks of one kind in both maps, by index.
 struct KindPair {
   std::vector<int> into;
   std::vector<int> other;
@@ -36,7 +36,7 @@ struct KindPair {
 std::vector<KindPair> PairKinds(const std::vector<Landmark>& into,
                                 const std::vector<Landmark>& other);
 
-/// into = Rz(yaw) other + shift, to about a metre and the step of the yaw.
+/// into = Rz(yaw) other + shift; accurate to about a metre and a yaw step.
 struct Guess {
   double yaw_rad = 0.0;
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();
@@ -49,7 +49,7 @@ struct VoteOptions {
   int guess_count_max = 40;
 };
 
-/// The guesses with the most votes, best first, no two of them near each other.
+/// The guesses with the most votes, best first, no two of them close to each other.
 ///
 /// Cost: pairs of the same kind times steps of the yaw.
 /// Errors: what `stop` returned.

@@ -17,18 +17,17 @@
 
 namespace dsg::merge {
 
-/// What a node is to a merge.
+/// The role of a node in a merge.
 enum class NodeClass { kObject, kPlace, kStructure, kAgent, kRegion };
 
-/// The class by name, or "#7" where a map numbers classes without naming them; empty = could be
-/// anything.
+/// The class name, or "#7" where a map numbers classes without names; empty = unknown.
 std::string ClassKey(const Node& node);
 
-/// The middle of its box; a node's own position may be a foot or a corner, and stands in without a
+/// The centre of the node's box, map frame; the node's position, which may be a corner, without a
 /// box.
 Eigen::Vector3d MiddleOf(const Node& node);
 
-/// Of a place, metres; 0 when unknown.
+/// Clearance of a place, metres; 0 when unknown.
 double ClearanceOf(const Node& node);
 
 struct MapContent {
@@ -48,7 +47,7 @@ struct MapContent {
   /// By node: its parent by CONTAINS with the lowest id; -1 without.
   std::vector<int> parent;
   std::unordered_map<LayerId, int32_t> rank_of;
-  /// From the first to the last time that anything was observed, the end exclusive.
+  /// From the first to the last observation of anything; the end is exclusive.
   std::optional<Interval> observed;
 
   void Index();
@@ -63,8 +62,7 @@ struct MapContent {
 /// Errors: as Snapshot's; what `stop` returned.
 absl::StatusOr<MapContent> ReadContent(const Snapshot& snapshot, const StopCheck& stop);
 
-/// Above all that are used or, where those reach up to the largest number, the least that is free;
-/// from 1.
+/// A number above all used ones, or the lowest free one where the largest is used; from 1.
 template <typename Number>
 Number FreeNumber(const std::set<Number>& used) {
   if (used.empty()) return 1;
@@ -76,7 +74,7 @@ Number FreeNumber(const std::set<Number>& used) {
   return free;
 }
 
-/// Numbers of the other map's layers and classes here, with what is new.
+/// Layers and classes of the other map by their numbers here, and those that are new here.
 struct Vocabulary {
   std::map<LayerId, LayerId> layer_of;
   std::map<int32_t, int32_t> class_of;
@@ -84,10 +82,10 @@ struct Vocabulary {
   std::vector<SemanticLabel> new_labels;
 };
 
-/// By name. Errors: FAILED_PRECONDITION/FRAMES_INCOMPATIBLE when a layer has two ranks.
+/// Joins by name. Errors: FAILED_PRECONDITION/FRAMES_INCOMPATIBLE when a layer has two ranks.
 absl::StatusOr<Vocabulary> JoinVocabularies(const MapContent& into, const MapContent& other);
 
-/// Carries the content into the frame and the numbers of the other map.
+/// Transforms `other` into the frame of this map, and renumbers its layers and classes.
 void Adopt(const Pose3d& map_T_other, const Vocabulary& vocabulary, MapContent* other);
 
 }  // namespace dsg::merge

@@ -20,19 +20,19 @@ namespace dsg::merge {
 
 Box3d BoxOf(BlockIndex index, double block_size_m);
 
-/// All blocks that touch a box. Order: ascending. Cost: that of the volume of the box.
+/// All blocks that touch a box. Order: ascending. Cost: proportional to the volume of the box.
 std::vector<BlockIndex> BlocksIn(const Box3d& box, double block_size_m);
 
 /// Threads: one caller at a time.
 class BlockCache {
  public:
-  /// Blocks come carried by `map_T_stored`.
+  /// Blocks are returned transformed by `map_T_stored`.
   BlockCache(std::shared_ptr<const Snapshot> map, const Pose3d& map_T_stored, size_t count_max)
       : map_(std::move(map)), map_T_stored_(map_T_stored), count_max_(count_max) {}
 
   absl::StatusOr<std::shared_ptr<const MeshBlock>> Read(BlockIndex index);
 
-  /// From now on this block is read from `map`, and the others from where they were.
+  /// Reads this block from `map` from now on; other blocks are not affected.
   void ReadAnew(BlockIndex index, std::shared_ptr<const Snapshot> map);
 
  private:
@@ -53,14 +53,14 @@ struct SurfacePoint {
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
 };
 
-/// Normals as stored, or from the faces. One a vertex.
+/// Stored normals, or normals from the faces; one per vertex.
 std::vector<Eigen::Vector3f> NormalsOf(const MeshBlock& block);
 
 class SurfaceIndex {
  public:
   SurfaceIndex(std::vector<SurfacePoint> points, const MeshJoinOptions& options);
 
-  /// The nearest point of the surface that `point` lies on, -1 if on none.
+  /// Index of the nearest point whose surface holds `point`; -1 if there is none.
   int Find(const SurfacePoint& point) const;
 
  private:

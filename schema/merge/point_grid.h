@@ -21,7 +21,8 @@ class PointGrid {
     std::sort(entries_.begin(), entries_.end());
   }
 
-  /// Calls `visit(index)` for all points within `reach_m` of a point on both axes, and some more.
+  /// Calls `visit(index)` for all points within `reach_m` of a point on both axes, and for some
+  /// beyond.
   template <typename Visit>
   void ForEachNear(const Eigen::Vector3d& point, double reach_m, Visit visit) const {
     const int64_t y_min = CellOf(point.y() - reach_m);

@@ -13,7 +13,7 @@ namespace dsg::picture {
 
 inline constexpr int kGlyphWidthDots = 5;
 inline constexpr int kGlyphHeightDots = 7;
-/// From the left of one letter to the left of the next.
+/// Distance between the left edges of neighbouring letters.
 inline constexpr int kAdvanceDots = 6;
 /// How far g, p, q, y and the like reach below the line.
 inline constexpr int kDescentDots = 2;
@@ -25,17 +25,18 @@ struct Glyph {
   int drop = 0;
 };
 
-/// One glyph a character. Bytes that are no UTF-8 are a box each.
+/// One glyph per character. Bytes that are not UTF-8 are a box each.
 std::vector<const Glyph*> GlyphsOf(std::string_view text);
 
-/// Cost: a spot is compared with its neighbourhood, whatever the number of labels.
+/// Assigns spots for labels, each once: a spot must not touch an earlier one or leave the picture.
+/// Cost: a spot is compared with its neighbourhood only.
 class LabelLayout {
  public:
-  /// `area`: where labels may be, pixels.
+  /// `area`: where labels may stand, pixels.
   explicit LabelLayout(const Eigen::AlignedBox2d& area);
 
   bool IsFree(const Eigen::AlignedBox2d& spot) const;
-  /// Takes the spot whatever is there.
+  /// Blocks the spot, whether it is free or not.
   void Block(const Eigen::AlignedBox2d& spot);
 
  private:

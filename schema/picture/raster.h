@@ -43,7 +43,7 @@ class Canvas {
   /// Inside by the even-odd rule. Fewer than three corners fill nothing.
   void FillPolygon(const std::vector<Eigen::Vector2d>& corners, const Paint& paint);
   void FillCircle(const Eigen::Vector2d& center, double radius, const Paint& paint);
-  /// One stroke through all points with round joints; it does not darken where it crosses itself.
+  /// One stroke through all points with round joints. It does not darken where it crosses itself.
   void DrawPolyline(const std::vector<Eigen::Vector2d>& points, double width, const Paint& paint);
   /// As DrawPolyline, back to the first point.
   void DrawOutline(std::vector<Eigen::Vector2d> corners, double width, const Paint& paint);
@@ -52,7 +52,7 @@ class Canvas {
   void DrawText(const Eigen::Vector2d& low, std::string_view text, double dot, const Paint& paint);
   static double TextWidth(std::string_view text, double dot);
 
-  /// Two by two pixels averaged to one, which smooths the edges.
+  /// Averages two by two pixels to one, which smooths the edges.
   Picture Halved() const;
 
  private:
@@ -63,7 +63,7 @@ class Canvas {
   std::vector<float> pixels_;
 };
 
-/// Errors: INTERNAL with what the library says.
+/// Encodes as PNG. Errors: INTERNAL with the message of the library.
 absl::StatusOr<std::string> EncodePng(const Picture& picture);
 
 }  // namespace dsg::picture

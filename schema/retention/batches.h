@@ -18,18 +18,18 @@ namespace dsg {
 
 struct BatchHeader {
   std::string map;
-  /// Must be new with each plan.
+  /// Unique per plan.
   std::string session_id;
   std::string author;
-  /// "prune NAME"; ", part 1" and so on is added.
+  /// "prune NAME"; each delta appends ", part 1" and so on.
   std::string message;
 };
 
 /// Rows of one delta.
 inline constexpr size_t kPruneBatchRows = 5'000;
 
-/// Order: meshes; then agent by agent shapes, factors and poses; stays; nodes, children before
-/// parents, each with its edges. Cut off at any point, the same policies find the rest.
+/// Order: meshes; then shapes, factors and poses by agent; stays; nodes, children before parents,
+/// each with its edges. After an interruption at any point the same policies find the rest.
 ///
 /// Threads: one caller at a time.
 class PruneBatches {
@@ -38,10 +38,10 @@ class PruneBatches {
   PruneBatches(std::shared_ptr<const Snapshot> at_plan, PrunePlan plan, BatchHeader header);
   ~PruneBatches();
 
-  /// The next delta; nullopt when all is done. `head`: the map as it is now.
+  /// The next delta; nullopt at the end. `head`: the present map.
   absl::StatusOr<std::optional<GraphDelta>> Next(const Snapshot& head, const StopCheck& stop);
 
-  /// Others have changed these: what is left of the plan for them is dropped.
+  /// Drops the rest of the plan for what others have changed.
   void Avoid(const Touched& touched);
 
   /// From 0 to 1.
@@ -54,21 +54,22 @@ class PruneBatches {
 };
 
 struct Contested {
-  /// Whose tracks were corrected, or who are there again.
+  /// Agents whose tracks were corrected, or who were created again.
   std::set<NodeId> agents;
   std::set<BlockIndex> mesh_blocks;
 
   bool empty() const { return agents.empty() && mesh_blocks.empty(); }
   size_t size() const { return agents.size() + mesh_blocks.size(); }
-  /// Names of at most so many: ids, and x,y,z of blocks.
+  /// Names of at most `count_max` of them: ids, and x,y,z of blocks.
   std::vector<std::string> Names(size_t count_max) const;
 };
 
-/// Gathers what others touch from the revision of a plan on.
+/// Collects what others have changed since the revision of a plan.
 class Others {
  public:
   void Add(const Touched& touched);
-  /// What of it the plan was to change, as far as it is to be erased.
+  /// The part of it that the plan changes and `erasure` erases. Not nodes other than agents: their
+  /// past is erased in any case.
   Contested FindContested(const PrunePlan& plan, const Erasure& erasure) const;
 
   const std::set<NodeId>& nodes() const { return nodes_; }

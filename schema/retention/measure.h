@@ -8,7 +8,7 @@
 
 namespace dsg {
 
-/// One selection with what comes of it.
+/// One selection and its effects.
 struct Measured {
   Selection selection;
   Amount amount;
@@ -16,17 +16,18 @@ struct Measured {
   std::vector<StayKey> stay_removals;
   std::vector<StayEdit> stay_edits;
   MeshPlan mesh;
-  /// Edges by the first node of the selection at them, in the order of GraphIndex::bottom_up.
+  /// Number of removed edges per node, each edge counted at its first selected node in the order of
+  /// GraphIndex::bottom_up.
   std::vector<int32_t> edge_counts;
-  /// Poses that are forgotten, thinned ones not counted.
+  /// Forgotten poses; thinned ones are not counted.
   int64_t forgotten_pose_count = 0;
 };
 
-/// Fills all but `selection` of each.
+/// Fills all fields except `selection`.
 absl::Status Measure(const Snapshot& map, const GraphIndex& index, const StopCheck& stop,
                      std::vector<Measured>* all);
 
-/// What was clipped to the end of a track gets its open end back.
+/// Restores the open end of a stay that readers see clipped to the end of the track.
 Stay WithOpenEnd(Stay stay, const TrackInfo& track);
 
 }  // namespace dsg
