@@ -88,6 +88,10 @@ Covariance6 TransformCovariance(const Eigen::Quaterniond& new_R_old,
 void TransformFactor(const Pose3d& new_T_old, PoseFactor* factor) {
   if (factor->from_ns == factor->to_ns && factor->to_agent.empty()) {
     factor->relative_pose = Moved(new_T_old, factor->relative_pose);
+    // The inverse of a covariance turns as the covariance, because turns are orthogonal.
+    if (factor->information.has_value()) {
+      factor->information = TransformCovariance(new_T_old.orientation, *factor->information);
+    }
   }
 }
 

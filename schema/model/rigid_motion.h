@@ -26,7 +26,8 @@ void TransformPose(const Pose3d& new_T_old, TimedPose* pose);
 /// rotation is in the axes of the agent and stays. See Covariance6.
 Covariance6 TransformCovariance(const Eigen::Quaterniond& new_R_old, const Covariance6& covariance);
 
-/// Moves a prior on one pose (from == to), which is a pose in the map. Relative poses stay.
+/// Moves a prior on one pose (from == to), which is a pose in the map, with its information.
+/// Relative poses stay.
 void TransformFactor(const Pose3d& new_T_old, PoseFactor* factor);
 
 /// Moves vertices and normals. Index and faces stay: the caller cuts the mesh into blocks anew.

@@ -50,6 +50,7 @@ struct PoseFactor {
   /// The other agent of an inter-robot factor; empty = the same agent.
   NodeId to_agent;
   Pose3d relative_pose;
+  /// Inverse covariance. Of a prior in the axes of Covariance6.
   std::optional<Covariance6> information;
 };
 

@@ -121,15 +121,25 @@ TEST(TransformNode, MovesFloorPlansWithTheirNode) {
 }
 
 TEST(TransformFactor, MovesPriorsAndLeavesRelativePoses) {
-  const Pose3d motion = Turn(1.0, {1.0, 2.0, 0.0});
+  const Pose3d motion = Turn(std::numbers::pi / 2.0, {1.0, 2.0, 0.0});
+  Covariance6 information{};
+  information[0] = 1.0f;   // x
+  information[6] = 25.0f;  // y
+  information[15] = 9.0f;  // roll
   PoseFactor prior;
   prior.from_ns = prior.to_ns = 5;
+  prior.information = information;
   TransformFactor(motion, &prior);
   EXPECT_EQ(prior.relative_pose.position, motion.position);
+  EXPECT_NEAR((*prior.information)[0], 25.0f, 1e-5f);
+  EXPECT_NEAR((*prior.information)[6], 1.0f, 1e-5f);
+  EXPECT_EQ((*prior.information)[15], 9.0f);
   PoseFactor step;
   step.to_ns = 5;
+  step.information = information;
   TransformFactor(motion, &step);
   EXPECT_EQ(step.relative_pose.position, Eigen::Vector3d::Zero());
+  EXPECT_EQ(*step.information, information);
 }
 
 TEST(TiltOf, IsTheAngleOfTheVerticals) {
