@@ -98,7 +98,7 @@ constexpr int kGreedyStartCount = 50;
 // Counting the neighbours of a vertex takes as long as colouring several.
 constexpr int kDegreeStepCount = 4;
 
-/// Counts work down to nothing, so that a search ends at the same place on every machine.
+/// A budget in steps, so that a search ends at the same place on every machine.
 class StepBudget {
  public:
   explicit StepBudget(int64_t step_count_max) : left_(step_count_max), max_(step_count_max) {}
@@ -293,7 +293,7 @@ class MaxCliqueFinder {
     int best = -1;
     int best_degree = -1;
     ForEachBit(candidates.data(), word_count, [&](int vertex) {
-      // Nobody has more neighbours than all the others.
+      // No vertex has more neighbours than that.
       if (best_degree == candidate_count - 1) return;
       const Word* row = graph_.Row(vertex);
       int degree = 0;
@@ -362,7 +362,7 @@ class MaxCliqueFinder {
     return false;
   }
 
-  // Takes away candidates with too few neighbours among the candidates, once through; returns the
+  // Removes candidates with too few neighbours among the candidates, in one pass. Returns the
   // others by falling degree.
   std::vector<int> PruneByDegree(std::vector<Word>* candidates) {
     const int word_count = graph_.word_count();

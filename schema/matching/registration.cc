@@ -39,7 +39,7 @@ Row Lengths(const Columns& differences, bool is_horizontal) {
   return differences.topRows(is_horizontal ? 2 : 3).colwise().norm().array();
 }
 
-// Whether the last correspondence that was looked at agrees with each of those after it.
+// Whether correspondence `first` agrees with each later one.
 Flags AgreesWithLater(const Columns& sources, const Columns& targets, int first,
                       const ConsistencyOptions& options) {
   const Eigen::Index count = sources.cols() - first - 1;
@@ -72,9 +72,8 @@ BitsetGraph MakeConsistencyGraph(const Columns& sources, const Columns& targets,
   return graph;
 }
 
-// The scale most pairs of correspondences agree on, 1 without any pair.
-//
-// Cost: n^2 log n; of many correspondences a regular part of the pairs is used.
+// The scale on which most pairs of correspondences agree; 1 without pairs.
+// Cost: n^2 log n; subsamples the pairs of many correspondences.
 double VoteOnScale(const Columns& sources, const Columns& targets, double noise_bound_m) {
   const int64_t count = sources.cols();
   const int64_t pair_count = count * (count - 1) / 2;
@@ -116,7 +115,7 @@ Eigen::Matrix3d CrossMatrix(const Eigen::Vector3d& v) {
   return cross;
 }
 
-// Of a predicted target: columns are the free turns, the shift and, last, the scale when free.
+// Jacobian of a predicted target; columns: free turns, shift and, if free, scale.
 Eigen::Matrix3Xd Jacobian(const Eigen::Vector3d& source, const Motion& motion,
                           const MotionKind& kind) {
   const int turn_count = kind.is_upright ? 1 : 3;
@@ -148,8 +147,8 @@ Motion FitMotion(const Columns& sources, const Columns& targets, const MotionKin
   return motion;
 }
 
-// Of a small turn of the body (rad, applied before the rotation) and a shift (m); zero where the
-// kind leaves no freedom. The variance of the noise comes from the misses.
+// Covariance of a small turn of the source (rad, applied before the rotation) and a shift (m); zero
+// where the kind has no freedom. The residuals give the noise variance.
 //
 // Requires: at least three columns, two if upright.
 Eigen::Matrix<double, 6, 6> MotionCovariance(const Columns& sources, const Columns& targets,
@@ -291,7 +290,7 @@ Eigen::Vector3d VoteOnTranslation(const Columns& differences, double bound) {
   return translation;
 }
 
-// The nearest first, each point of either cloud once; indices ascending.
+// Selects pairs by distance, each point of either cloud once. Order: ascending indices.
 std::vector<int> SelectInliers(const Problem& problem, const Motion& motion) {
   const std::vector<double> misses = Misses(problem.sources, problem.targets, motion);
   std::vector<std::pair<double, int>> near;
@@ -319,7 +318,7 @@ std::vector<int> SelectInliers(const Problem& problem, const Motion& motion) {
   return inliers;
 }
 
-// Fits and selects in turn until the inliers stay the same. A step that loses inliers is undone.
+// Alternates fitting and selection until the inliers are stable. Undoes a step that loses inliers.
 void Refine(const Problem& problem, Fit* fit) {
   for (int round = 0; round < kRefineRoundCountMax; ++round) {
     if (fit->inliers.size() < problem.InlierCountMin()) return;

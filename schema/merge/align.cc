@@ -17,37 +17,38 @@
 namespace dsg::merge {
 namespace {
 
-// A map has been where one of its places is this near beyond its clearance, or a landmark is.
+// A map has observed what is this close to one of its places beyond its clearance, or to a
+// landmark.
 constexpr double kSeenBeyondM = 0.5;
 constexpr double kSeenAroundM = 1.5;
 // Walls are thick, and clearances are measured on a grid.
 constexpr double kWallSlackM = 0.35;
 constexpr double kClearanceMaxM = 4.0;
 
-/// One map, ready to be compared under many transforms.
+/// One map, prepared for comparison under many transforms.
 struct AlignSide {
   std::vector<Landmark> landmarks;
-  /// x, y, z and clearance of places; a place without one has 0.
+  /// x, y, z and clearance of places; 0 without a clearance.
   std::vector<Eigen::Vector4d> places;
-  /// Upright faces: walls with the box in their frame.
+  /// Walls, with their boxes in their frames.
   std::vector<std::pair<Pose3d, Box3d>> walls;
-  /// Of its places near a wall of its own, those that stand in one: walls are drawn across doors.
+  /// Share of its own places near walls that stand in one: mapped walls cross doors.
   double own_blocked_share = 0.0;
 };
 
 struct AlignScore {
-  /// Index in the landmarks of `into`, of `other`.
+  /// Indices of landmarks of `into` and of `other`.
   std::vector<std::pair<int, int>> matches;
-  /// Landmarks of both that match nothing, though they lie where the other map has been.
+  /// Landmarks of both that have no match although the other map has observed their place.
   int missing_count = 0;
-  /// Those, and those that match.
+  /// Those, and the matched ones.
   int shared_count = 0;
-  /// Places near a wall of the other map, and those that such a wall stands in.
+  /// Places near a wall of the other map, and those of them that stand in one.
   int walled_count = 0;
   int blocked_count = 0;
-  /// Of the former, beyond what walls of one's own would do; 0 to 1.
+  /// Share of blocked places beyond what a map's own walls block; 0 to 1.
   double blocked_share = 0.0;
-  /// Of what both maps could have seen, what both did see; 0 to 1.
+  /// Share of matched landmarks among those that both maps could have seen; 0 to 1.
   double agreeing_share = 0.0;
   double score = 0.0;
 };
@@ -66,7 +67,7 @@ std::vector<Eigen::Vector3d> PositionsOf(const std::vector<Eigen::Vector4d>& pla
   return positions;
 }
 
-// The landmark of `side` that is nearest to each point, of the point's kind and within the gate.
+// For each point the nearest landmark of `side` of its kind within the gate; -1 if there is none.
 std::vector<int> NearestOf(const std::vector<Landmark>& points, const AlignSide& side,
                            const Pose3d& side_T_points, double gate_m) {
   const PointGrid grid(PositionsOf(side.landmarks), std::max(gate_m, 0.25));
@@ -86,7 +87,7 @@ std::vector<int> NearestOf(const std::vector<Landmark>& points, const AlignSide&
   return nearest;
 }
 
-// How many of `points` match nothing, though they lie where `side` has been.
+// Number of `points` without a match although `side` has observed their place.
 int CountMissing(const std::vector<Landmark>& points, const std::vector<char>& is_matched,
                  const AlignSide& side, const Pose3d& side_T_points) {
   const PointGrid places(PositionsOf(side.places), 1.0);
@@ -117,7 +118,7 @@ struct Blocked {
   int blocked_count = 0;
 };
 
-// Places of `free` that have a wall of `side` near, and those that such a wall stands in.
+// Counts places of `free` near walls of `side`, and those of them that stand in one.
 Blocked CountBlocked(const AlignSide& free, const AlignSide& side, const Pose3d& side_T_free) {
   std::vector<Eigen::Vector3d> places;
   places.reserve(free.places.size());
@@ -130,7 +131,7 @@ Blocked CountBlocked(const AlignSide& free, const AlignSide& side, const Pose3d&
     const double reach = 0.5 * box.diagonal().norm() + 1.0;
     grid.ForEachNear(pose * box.center(), reach, [&](int i) {
       const size_t place = static_cast<size_t>(i);
-      // What stands at the height of a body only: places are on the floor or in the air.
+      // Compares heights of a body only: places are on the floor or in the air.
       Eigen::Vector3d at = wall_T_side * places[place];
       at.z() = std::clamp(at.z(), box.min().z() - 0.5, box.max().z());
       const double distance = DistanceToBox(at, box);
@@ -146,7 +147,7 @@ Blocked CountBlocked(const AlignSide& free, const AlignSide& side, const Pose3d&
 
 double ShareOf(double part, double whole) { return part / std::max(1.0, whole); }
 
-// `center` is taken off all positions, so that far frames cost no precision.
+// Subtracts `center` from all positions, to keep precision far from the origin.
 AlignSide MakeSide(const MapContent& content, bool with_regions, const Eigen::Vector3d& center) {
   AlignSide side;
   side.landmarks = LandmarksOf(content, with_regions);
@@ -168,7 +169,7 @@ AlignSide MakeSide(const MapContent& content, bool with_regions, const Eigen::Ve
   return side;
 }
 
-// Each landmark with at most one, the nearest that is nearest to each other.
+// Mutually nearest pairs; each landmark is in at most one.
 std::vector<std::pair<int, int>> MatchLandmarks(const AlignSide& into, const AlignSide& other,
                                                 const Pose3d& into_T_other, double gate_m) {
   const std::vector<int> forward = NearestOf(other.landmarks, into, into_T_other, gate_m);
@@ -183,8 +184,8 @@ std::vector<std::pair<int, int>> MatchLandmarks(const AlignSide& into, const Ali
   return matches;
 }
 
-// About how many transforms between maps of so many things, strewn at random, would let so many
-// agree. Two pairs settle a transform; the others meet by chance (Poisson).
+// Expected number of transforms between two random maps of these sizes under which as many
+// landmarks agree. Two pairs determine a transform; the others agree by chance (Poisson).
 double ChanceOf(const AlignSide& into, const AlignSide& other, const AlignScore& score,
                 double gate_m) {
   Box3d box;
@@ -198,11 +199,12 @@ double ChanceOf(const AlignSide& into, const AlignSide& other, const AlignScore&
   const double landmark_count = static_cast<double>(into.landmarks.size() + other.landmarks.size());
   const double shared = std::min(1.0, score.shared_count / std::max(1.0, landmark_count));
   const double expected = pair_count * shared * std::numbers::pi * gate_m * gate_m / area;
-  // Of two pairs the distances must agree: one in so many does, by the size of the map.
+  // The distances of the two pairs must agree; the share of such pairs depends on the size of the
+  // map.
   const double alike = std::min(1.0, 4.0 * gate_m / std::sqrt(area));
   const double guess_count = std::max(1.0, pair_count * pair_count * alike);
   const int free = std::max(0, static_cast<int>(score.matches.size()) - 2);
-  // The tail of Poisson is at most that of its first term times a geometric series.
+  // The Poisson tail is at most its first term times a geometric series.
   const double first =
       free * std::log(std::max(expected, 1e-12)) - expected - std::lgamma(free + 1.0);
   const double ratio = expected / (free + 1.0);
@@ -262,7 +264,7 @@ Eigen::Vector3d CenterOf(const MapContent& content) {
   return box.isEmpty() ? Eigen::Vector3d::Zero().eval() : Eigen::Vector3d(box.center());
 }
 
-// All pairs that could be under a coarse pose; the registration tells which are.
+// Candidate pairs under a coarse pose; the registration selects among them.
 std::vector<Correspondence> PairsNear(const AlignSide& into, const AlignSide& other,
                                       const Pose3d& into_T_other, double gate_m) {
   std::vector<Correspondence> pairs;
@@ -292,7 +294,7 @@ class Aligner {
   }
 
  private:
-  // The gate narrows as the pose gets better.
+  // The gate narrows as the pose improves.
   std::optional<Candidate> Improve(Pose3d pose) const {
     Candidate candidate;
     for (const double gate_m : {2.0, 1.0, 0.7, 0.7}) {
@@ -337,7 +339,7 @@ std::string DescribeForPeople(const Pose3d& pose) {
                          std::atan2(x.y(), x.x()) * 57.29577951308232);
 }
 
-// Undoes the centring of both sides.
+// Reverts the centring of both sides.
 Pose3d WithCenters(const Pose3d& pose, const Eigen::Vector3d& into_center,
                    const Eigen::Vector3d& other_center) {
   return {into_center + pose.position - pose.orientation * other_center, pose.orientation};
@@ -366,7 +368,7 @@ absl::Status JudgeAlone(const Candidate& best, const AlignOptions& options) {
   return absl::OkStatus();
 }
 
-// Nothing speaks against it.
+// Nothing contradicts the transform.
 bool IsClean(const AlignScore& score, const AlignOptions& options) {
   return score.agreeing_share >= options.clean_agreeing_share_min &&
          score.walled_count >= options.clean_walled_count_min &&

@@ -17,9 +17,9 @@ double DiagonalOf(const Node& node) {
   return node.box_node.isEmpty() ? 0.0 : node.box_node.sizes().norm();
 }
 
-// Above this a kind tells little and costs much: every so many pairs is enough.
+// Kinds with more pairs are subsampled: they are expensive and discriminate little.
 constexpr size_t kPairCountMax = 60'000;
-// Cells on a side of the grid of shifts; larger worlds get larger cells.
+// Most cells per side of the grid of shifts; larger maps get larger cells.
 constexpr int kGridSideMax = 1500;
 
 struct Pair {
@@ -29,8 +29,8 @@ struct Pair {
   double dz = 0.0;
 };
 
-// Common kinds have many wrong pairs to each right one, so a pair of a rare kind counts more; but
-// rare kinds are often mistakes, so not by all of that.
+// Common kinds have many wrong pairs per right one, so pairs of rare kinds count more; less than
+// proportionally, because rare kinds are often misclassified.
 double WeightOfPairs(size_t pair_count) { return std::pow(static_cast<double>(pair_count), -0.25); }
 
 std::vector<Pair> ListPairs(const std::vector<Landmark>& into, const std::vector<Landmark>& other) {
@@ -58,8 +58,8 @@ double ReachOf(const std::vector<Landmark>& landmarks) {
   return radius;
 }
 
-// Votes for shifts at one yaw. A cell's sum is taken with its eight neighbours, because the true
-// shift is smeared by noise and by the step of the yaw.
+// Votes for shifts at one yaw. Sums cover a cell and its eight neighbours, because noise and the
+// yaw step spread the true shift.
 class ShiftGrid {
  public:
   ShiftGrid(double radius_m, double cell_m)
@@ -114,7 +114,7 @@ double YawDifference(double a, double b) {
   return std::abs(std::remainder(a - b, 2.0 * std::numbers::pi));
 }
 
-// Best first; what is near a better one is that one again.
+// Best first; drops guesses close to a better one.
 std::vector<Guess> Distinct(std::vector<Guess> guesses, double near_m, double near_rad,
                             int count_max) {
   std::stable_sort(guesses.begin(), guesses.end(),
@@ -157,7 +157,7 @@ std::vector<Landmark> LandmarksOf(const MapContent& content, bool with_regions) 
       landmarks.push_back({"r " + ClassKey(node), MiddleOf(node), DiagonalOf(node)});
     } else if (with_regions && node_class == NodeClass::kPlace) {
       const double clearance_m = ClearanceOf(node);
-      // Bins a quarter of a metre wide: a corridor's place is not that of a hall.
+      // Bins of 0.25 m, which separate corridors from halls.
       const int width = static_cast<int>(clearance_m / 0.25);
       landmarks.push_back({absl::StrCat("p ", width), node.map_T_node.position, clearance_m});
     }

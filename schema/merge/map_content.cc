@@ -18,7 +18,7 @@ void Widen(TimeNs first_ns, TimeNs last_ns, std::optional<Interval>* observed) {
   (*observed)->to_ns = std::max((*observed)->to_ns, last_ns + 1);
 }
 
-// A node that a commit replaces meanwhile may have been shown twice.
+// A node that a concurrent commit replaces may be shown twice.
 template <typename T, typename KeyOf>
 void SortUnique(std::vector<T>* items, KeyOf key_of) {
   std::sort(items->begin(), items->end(),

@@ -24,7 +24,7 @@ double SizeOf(const Node& node) {
   return node.box_node.isEmpty() ? 0.0 : node.box_node.sizes().norm();
 }
 
-// Custom kinds without a class, such as the poses of an imported robot, tell nothing of themselves.
+// Custom kinds without a class, such as the poses of an imported robot, cannot be told apart.
 bool CouldMeet(const Node& a, const Node& b) {
   if (a.kind != kinds::kObject && ClassKey(a).empty()) return false;
   return a.kind == b.kind && a.layer == b.layer && a.valid.Overlaps(b.valid);
@@ -36,7 +36,7 @@ bool AreCompatible(const Node& a, const Node& b) {
   return key_a.empty() || key_b.empty() || key_a == key_b;
 }
 
-// Shared volume by that of the smaller; thin boxes are given a little depth.
+// Shared volume over the smaller volume; thin boxes get a little depth.
 double Containment(const Node& a, const Node& b) {
   if (a.box_node.isEmpty() || b.box_node.isEmpty()) return 0.0;
   const auto thick = [](const Node& node) {
@@ -50,7 +50,7 @@ double Containment(const Node& a, const Node& b) {
   return shared.volume() / std::min(box_a.volume(), box_b.volume());
 }
 
-// Shared volume by that of both together.
+// Intersection over union.
 double Sameness(const Node& a, const Node& b) {
   if (a.box_node.isEmpty() || b.box_node.isEmpty()) return 0.0;
   const Box3d box_a = a.BoxMap();
@@ -67,7 +67,7 @@ struct Option {
   double containment = 0.0;
 };
 
-// Cuts the options into groups that share no object, so that assignments stay small.
+// Splits the options into groups that share no object, which keeps assignments small.
 std::vector<std::vector<Option>> GroupsOf(const std::vector<Option>& options) {
   std::map<int, int> slot_of_into;
   std::map<int, int> slot_of_other;
@@ -90,7 +90,7 @@ std::vector<std::vector<Option>> GroupsOf(const std::vector<Option>& options) {
   return list;
 }
 
-// Nearest first, for crowds in which the best assignment would take too long.
+// Greedy, for groups that are too large for the optimal assignment.
 void AssignGreedily(std::vector<Option> group, std::vector<int>* pair_of) {
   std::stable_sort(group.begin(), group.end(),
                    [](const Option& a, const Option& b) { return a.cost < b.cost; });
@@ -129,7 +129,7 @@ void AssignGroup(const std::vector<Option>& group, std::vector<int>* pair_of) {
   }
 }
 
-// What is left and lies inside a thing of its class is a fragment of it.
+// Unmatched objects inside an object of their class are fragments of it.
 void TakeFragments(const std::vector<Option>& options, double containment_min,
                    std::vector<int>* pair_of) {
   std::map<int, Option> best;
@@ -142,7 +142,7 @@ void TakeFragments(const std::vector<Option>& options, double containment_min,
   for (const auto& [other, option] : best) (*pair_of)[static_cast<size_t>(other)] = option.into;
 }
 
-// Pairs worth a thought, among what has no partner yet.
+// Finds candidate pairs among objects without a partner.
 class OptionFinder {
  public:
   OptionFinder(const MapContent& into, const MapContent& other, const MatchOptions& options)
@@ -158,7 +158,7 @@ class OptionFinder {
     size_max_ = std::min(size_max_, 6.0);
   }
 
-  // Of one class, near each other or one inside the other.
+  // Candidates of one class that are close or contain each other.
   std::vector<Option> Alike(const std::vector<int>& pair_of) const {
     return Find(pair_of, [&](const Node& known, const Node& node, double distance) {
       Option option;
@@ -174,7 +174,7 @@ class OptionFinder {
     });
   }
 
-  // Two things cannot fill the same space: one of the maps is wrong about the class.
+  // Candidates in the same space whatever their classes: one of the maps has the wrong class.
   std::vector<Option> InOnePlace(const std::vector<int>& pair_of) const {
     return Find(pair_of, [&](const Node& known, const Node& node, double) {
       Option option;
@@ -240,7 +240,7 @@ void MatchObjects(const MapContent& into, const MapContent& other, const MatchOp
 
 namespace {
 
-// Half of the narrower clearance keeps the straight line between both free of obstacles.
+// Within half of the smaller clearance the straight line between both is free of obstacles.
 double RadiusOf(const Node& a, const Node& b, const MatchOptions& options) {
   const double half = 0.5 * std::min(ClearanceOf(a), ClearanceOf(b));
   return std::clamp(half, options.place_radius_min_m, options.place_radius_max_m);
@@ -257,7 +257,7 @@ bool AreCoplanar(const Node& a, const Node& b, const MatchOptions& options) {
   return std::abs(normal.dot(middle) + a.structure->plane_offset_m) < options.plane_distance_max_m;
 }
 
-// Of the smaller box's largest side, in the frame of a.
+// Shared volume over the smaller volume, in the frame of `a`.
 double SharedExtent(const Node& a, const Node& b) {
   Box3d box_b = TransformBox(a.map_T_node.Inverse() * b.map_T_node, b.box_node);
   Box3d box_a = a.box_node;
@@ -325,10 +325,10 @@ void MatchStructures(const MapContent& into, const MapContent& other, const Matc
 
 namespace {
 
-// Regions whose heights share less than this of the lower one are on different storeys.
+// Regions whose heights overlap by less than this share of the lower one are on different storeys.
 constexpr double kHeightShareMin = 0.5;
 constexpr double kChildShareMin = 0.5;
-// A building that touches another one by a tenth is the same building.
+// Buildings that overlap by a tenth are one building.
 constexpr double kBuildingOverlapMin = 0.1;
 
 bool AreOnOneStorey(const Node& a, const Node& b) {
@@ -340,7 +340,7 @@ bool AreOnOneStorey(const Node& a, const Node& b) {
   return shared > kHeightShareMin * lower;
 }
 
-// By pair of regions: how many children of the one became children of the other.
+// Number of matched children by pair of parents (into, other).
 using SharedChildren = std::map<std::pair<int, int>, int>;
 
 struct Children {
@@ -377,7 +377,7 @@ double OverlapNeeded(const Node& a, const Node& b, int32_t rank, const MatchOpti
   return is_same_class ? options.room_overlap_min_same_class : options.room_overlap_min;
 }
 
-// From 0 to 1, and up to 2 where what they contain is shared too; 0 for strangers.
+// Floor plan overlap plus share of common children, 0 to 2; 0 if neither suffices.
 double Likeness(const Node& known, const Node& node, double child_share, double overlap_needed) {
   if (known.layer != node.layer || known.kind != node.kind) return 0.0;
   const Polygon2d a = FootprintOf(known);
@@ -405,7 +405,7 @@ void MatchRegions(const MapContent& into, const MapContent& other, const MatchOp
   int32_t counted_rank = 0;
   for (const int i : theirs) {
     if (rank(other, i) != counted_rank) {
-      // What was paired on the layer below counts as shared on this one.
+      // Pairs of the layer below count as common children here.
       children = CountChildren(into, other, *pair_of);
       counted_rank = rank(other, i);
     }
@@ -460,7 +460,7 @@ void PairAgents(const MapContent& into, const MapContent& other, std::vector<int
     const NodeId same = into.nodes[static_cast<size_t>(found->second)].id;
     if (!IsLater(TrackOf(other, node.id), TrackOf(into, same))) continue;
     (*pair_of)[static_cast<size_t>(i)] = found->second;
-    // Two of one name in the other map are two.
+    // Two agents of one name in the other map stay two.
     by_name.erase(found);
   }
 }

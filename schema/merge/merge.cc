@@ -20,7 +20,7 @@
 namespace dsg::merge {
 namespace {
 
-// Beyond this one of the maps has not z up, or the transform is wrong.
+// With a larger tilt one of the maps is not z-up, or the transform is wrong.
 constexpr double kTiltMaxRad = 0.1;
 
 absl::Status CheckTransform(const Pose3d& map_T_other) {
@@ -62,7 +62,7 @@ absl::Status CountNodesAt(MapReader* map, Revision revision, const StopCheck& st
   return snapshot->ReadAllNodes(stop, [&](const Node& node) { Count(node.id, used); });
 }
 
-// What this merge has written and others have retired since does not come again.
+// Removes nodes that this merge has written and others have retired since.
 void LeaveOutRetired(const Written& written, const MapContent& mine, MapContent* theirs) {
   const auto is_retired = [&](NodeId id) {
     const auto found = written.nodes.find(id);
@@ -76,7 +76,7 @@ void LeaveOutRetired(const Written& written, const MapContent& mine, MapContent*
   theirs->Index();
 }
 
-// Others may have taken the origins off.
+// Pairs by what was written, because others may have removed the origins.
 void PairWritten(const Written& written, const MapContent& mine, const MapContent& theirs,
                  std::vector<int>* pair_of) {
   for (const auto& [theirs_id, mine_id] : written.nodes) {
@@ -155,7 +155,7 @@ absl::Status CheckTrack(const MapSpec& into, const Snapshot& other, const TrackI
       absl::StrCat("agent ", ToString(track.agent), " of map \"", other.spec().name, "\"");
   if (track.pose_count > 0) {
     for (const TimeNs time_ns : {track.first_ns, track.last_ns}) {
-      // Nearer than a map takes poses, since both maps are to be one.
+      // Stricter than the limit for poses, because both maps become one.
       const bool is_near = CheckTimeInMap(time_ns, into).ok() &&
                            std::abs(time_ns - into.epoch_ns) <= kObservedFarMaxNs;
       if (!is_near) return TooFarInTime(time_ns, into, what);
@@ -194,7 +194,7 @@ absl::Status CheckMesh(const Snapshot& other, const Pose3d& map_T_other, const S
   return absl::OkStatus();
 }
 
-// What CheckDelta asks of the map, told from its content in memory.
+// Answers CheckDelta from the content in memory.
 class ContentLookup final : public GraphLookup {
  public:
   explicit ContentLookup(const MapContent& content) : content_(content) {
@@ -233,7 +233,7 @@ class ContentLookup final : public GraphLookup {
     const auto found = track_ends_.find(agent);
     return found == track_ends_.end() ? std::optional<TimeNs>() : found->second;
   }
-  // Those that the graph refers to are written before it.
+  // Assets of the graph are written before it.
   absl::StatusOr<bool> HasAsset(const Sha256& /*sha256*/) const override { return true; }
   const MapSpec* FindSpec() const override { return &content_.spec; }
   absl::StatusOr<std::optional<Interval>> FindSpan() const override {
@@ -261,10 +261,9 @@ class ContentLookup final : public GraphLookup {
   std::map<NodeId, TimeNs> track_ends_;
 };
 
-// Whether what the other map holds stays within coordinates and times of this one. `theirs` is
-// adopted already.
-//
-// Errors: INVALID_ARGUMENT/FIELD_INVALID naming the transform, what it carries away and the bound;
+// Checks that the content of the other map stays within the coordinates and times of this one.
+// `theirs` is adopted (see Adopt).
+// Errors: INVALID_ARGUMENT/FIELD_INVALID naming the transform, the thing and the bound;
 // OUT_OF_RANGE/TIME_OUTSIDE_MAP naming an agent; what `stop` returned.
 // Cost: reads all poses and mesh blocks of the other map.
 absl::Status CheckReach(const MapSpec& into, const Snapshot& other, const MapContent& theirs,
@@ -276,7 +275,7 @@ absl::Status CheckReach(const MapSpec& into, const Snapshot& other, const MapCon
   return CheckMesh(other, map_T_other, stop);
 }
 
-// Whether the graph of a plan is a delta that map `mine` would take, whole. Fills in its header.
+// Checks that `mine` accepts the graph of a plan as one delta. Fills in its header.
 // Errors: as CheckDelta.
 absl::Status CheckGraph(const MapContent& mine, MergePlan* plan) {
   plan->graph.session_id = "merge";
@@ -347,7 +346,7 @@ absl::StatusOr<MergePlan> PlanMerge(const Snapshot& into, const Snapshot& other,
   plan.into_revision = mine.revision;
   plan.other_revision = theirs.revision;
   plan.map_T_other = map_T_other;
-  // By now the other map lies in the frame of this one.
+  // The other map is in the frame of this one by now.
   plan.evidence = EvidenceFor(mine, theirs, Pose3d(), {});
   plan.map_T_other_before = before.value_or(map_T_other);
   plan.mesh = options.mesh;

@@ -22,14 +22,14 @@ uint32_t Mapped(const std::map<uint32_t, uint32_t>& numbers, uint32_t theirs) {
   return found == numbers.end() ? 0 : found->second;
 }
 
-// One mesh block with what the other map adds to it.
+// One mesh block and the additions of the other map.
 class BlockPatch {
  public:
-  /// The first points of `surface` are the vertices of `known`. All must outlive this.
+  /// The first points of `surface` are the vertices of `known`. The arguments must outlive this.
   BlockPatch(MeshBlock known, double block_size_m, const MeshIds& ids, const SurfaceIndex& surface);
 
-  /// Takes from `sources`, blocks of the other map in the frame of this one, the faces that begin
-  /// in this block, and vertices in it that belong to no face. To be called once.
+  /// Adds faces that begin in this block, and vertices in it without faces, from `sources`: blocks
+  /// of the other map in the frame of this one. Call once.
   void Add(const std::vector<std::shared_ptr<const MeshBlock>>& sources);
 
   bool is_changed() const { return is_changed_; }
@@ -41,14 +41,14 @@ class BlockPatch {
   struct Source {
     const MeshBlock& block;
     std::vector<Eigen::Vector3f> normals;
-    /// By vertex: not looked at, on no surface, or the point of the surface that it lies on.
+    /// By vertex: kNotLooked, -1 for no surface, or the index of its surface point.
     std::vector<int> on;
-    /// By vertex: its index here, -1 while it has none.
+    /// By vertex: its index in the patch, -1 without one.
     std::vector<int> copied;
   };
 
-  /// Marks our vertices that an earlier merge copied from there: what the other map saw there they
-  /// have, and what is near them is not news.
+  /// Marks vertices here that an earlier merge copied from `source`: the surface near them is no
+  /// new observation.
   void NoteCopies(Source* source);
   void AddFaces(Source* source);
   bool IsInside(const Eigen::Vector3f& position) const;
@@ -174,8 +174,7 @@ uint32_t BlockPatch::Copy(size_t vertex, Source* source) {
   return static_cast<uint32_t>(copied);
 }
 
-// Channels that one of both has are filled for the other, but for times: none is better than a
-// wrong one.
+// Fills channels that only one of both has, except times: no time is better than a wrong one.
 void BlockPatch::MatchChannels(const MeshBlock& source) {
   const size_t count = block_.positions_map.size();
   if (count == 0) return;
@@ -189,7 +188,7 @@ void BlockPatch::MatchChannels(const MeshBlock& source) {
   if (source.last_seen_ns.empty()) block_.last_seen_ns.clear();
 }
 
-// The surface was seen again: it may be known now whose it is, and when it was seen last.
+// The surface was seen again: updates its instance and its last observation.
 void BlockPatch::MarkSeen(size_t vertex, const Source& source) {
   const size_t mine = static_cast<size_t>(source.on[vertex]);
   if (mine >= known_count_ || is_copy_[mine] != 0) return;
@@ -276,7 +275,7 @@ class MeshJoin::Impl {
     return absl::OkStatus();
   }
 
-  // Bounds of a turned block are wider than the block, so most that it may touch it does not.
+  // The bounds of a rotated block exceed the block, so it does not touch most of the listed ones.
   absl::StatusOr<bool> IsTouched(BlockIndex target, const std::vector<BlockIndex>& sources) {
     for (const BlockIndex source : sources) {
       DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const MeshBlock> block, theirs_.Read(source));

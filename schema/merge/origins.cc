@@ -33,7 +33,7 @@ uint64_t HexNumber(absl::string_view text) {
   return absl::SimpleHexAtoi(text, &number) ? number : 0;
 }
 
-// "new:57@12,15:<seen>:<written>"; what is missing or is no number stays as it is.
+// "new:57@12,15:<seen>:<written>"; missing or malformed parts keep their defaults.
 void ReadCount(absl::string_view text, Origin* origin) {
   origin->is_copy = absl::ConsumePrefix(&text, kCopy);
   const std::vector<absl::string_view> parts = absl::StrSplit(text, ':');
@@ -111,7 +111,7 @@ uint64_t MarkOf(const Node& node) {
   bare.attributes.erase(kMergedFrom);
   bare.attributes.erase(kMergedCounts);
   if (bare.place.has_value() || bare.region.has_value()) bare.box_node.setEmpty();
-  // As the store gives it back.
+  // Checksum of what the store returns, after one round trip through the codec.
   Node stored;
   std::string bytes = EncodeNodePayload(bare);
   if (DecodeNodePayload(bytes, &stored)) bytes = EncodeNodePayload(stored);
@@ -159,7 +159,7 @@ std::vector<Claim> ClaimsOf(const MapContent& holder, const MapContent& source) 
   return claims;
 }
 
-// Claims on nodes that have changed since their revision, as that revision tells.
+// Decides claims on nodes that have changed since their revision, by that revision.
 absl::Status AskRevision(MapReader* map, Revision revision, const std::vector<Claim*>& claims,
                          const StopCheck& stop) {
   const auto then = map->At(revision);
@@ -241,7 +241,7 @@ class HistoryReader {
   HistoryReader(const Snapshot& other, MapReader* other_map)
       : other_(other), other_map_(other_map) {}
 
-  // Null if the revision cannot be read any more.
+  // Null if the revision is not readable any more.
   absl::StatusOr<std::shared_ptr<const Snapshot>> At(Revision revision) {
     std::shared_ptr<const Snapshot> none;
     if (other_map_ == nullptr) return none;
@@ -252,7 +252,7 @@ class HistoryReader {
     return snapshots_[revision] = then.ok() ? *std::move(then) : none;
   }
 
-  // Agents whose tracks were written after a revision.
+  // Whether the track of an agent was written after a revision.
   absl::StatusOr<bool> HasChanged(NodeId agent, Revision since, const StopCheck& stop) {
     if (since == other_.revision()) return false;
     DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> then, At(since));
@@ -286,7 +286,7 @@ absl::StatusOr<TrackHistory> ReadTrackHistory(const MapContent& content, const K
     const NodeId id = content.nodes[static_cast<size_t>(agent)].id;
     DSG_ASSIGN_OR_RETURN(const bool has_changed, reader.HasChanged(id, revisions.back(), stop));
     if (has_changed) history.changed.insert(agent);
-    // Nothing to correct where only what is believed now was ever taken.
+    // If only the present state was ever copied, nothing needs a correction.
     if (!has_changed && revisions.size() == 1) continue;
     auto& bases = history.bases[agent];
     for (const Revision revision : revisions) {
@@ -315,7 +315,7 @@ std::optional<Pose3d> TransformOfLastMerge(const MapContent& into, const MapCont
     transform.orientation.normalize();
     transforms.push_back(transform);
   }
-  // Copies that moved in a later revision of the other map disagree, each in its own way.
+  // Copies that moved in a later revision of the other map are outliers.
   const auto agreeing = [&](const Pose3d& pose) {
     return std::count_if(transforms.begin(), transforms.end(), [&](const Pose3d& each) {
       return (each.position - pose.position).norm() < 0.01 &&

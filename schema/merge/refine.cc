@@ -21,16 +21,16 @@ constexpr int kStepCount = 10;
 constexpr double kThingSigmaM = 0.1;
 constexpr double kPlaneSigmaM = 0.04;
 constexpr double kMeshSigmaM = 0.04;
-// Neighbouring points of a mesh err together, so a thousand of them are worth a few.
+// Errors of neighbouring mesh points are correlated, so many of them count as few.
 constexpr double kMeshWeight = 0.02;
 constexpr int kMeshPointCount = 8000;
-// A refinement that goes further has found something else.
+// A larger correction is a wrong fit.
 constexpr double kStrayMaxM = 0.5;
 
 using Vector4 = Eigen::Matrix<double, 4, 1>;
 using Matrix4 = Eigen::Matrix<double, 4, 4>;
 
-// Weights of a Cauchy loss, and the share of a sighting's own precision.
+// Weight of a Cauchy loss, times the precision of the sighting.
 double CauchyWeight(double miss_m, double sigma_m) {
   const double relative = miss_m / (2.0 * sigma_m);
   return 1.0 / (sigma_m * sigma_m * (1.0 + relative * relative));
@@ -69,7 +69,7 @@ Eigen::Vector3d MeanPositionOf(const MapContent& content) {
   return sum / std::max<double>(1.0, static_cast<double>(content.nodes.size()));
 }
 
-// Every so many of the other map's vertices in blocks that this map has surface around.
+// Samples vertices of the other map in blocks that this map has.
 absl::Status SampleBlock(const MeshBlock& theirs, const Snapshot& into, int stride,
                          BlockCache* mine, const std::vector<BlockIndex>& known,
                          std::vector<Sighting>* sightings) {
@@ -159,7 +159,7 @@ absl::StatusOr<std::vector<Sighting>> CollectSurface(const Snapshot& into, const
   if (known.empty() || theirs.empty()) return sightings;
   const std::shared_ptr<const Snapshot> into_ref(std::shared_ptr<const Snapshot>(), &into);
   BlockCache mine(into_ref, Pose3d(), 64);
-  // Enough blocks for the whole map to be felt, and from each about the same.
+  // Enough blocks to cover the whole map, and about the same number of points from each.
   const size_t block_stride = theirs.size() / 400 + 1;
   const int per_block = std::max(1, count_max / static_cast<int>(theirs.size() / block_stride + 1));
   for (size_t i = 0; i < theirs.size(); i += block_stride) {
@@ -170,7 +170,7 @@ absl::StatusOr<std::vector<Sighting>> CollectSurface(const Snapshot& into, const
     const int stride = std::max(1, static_cast<int>(stored.size()) / per_block);
     DSG_RETURN_IF_ERROR(SampleBlock(block, into, stride, &mine, known, &sightings));
   }
-  // The fit wants the points where the other map has them.
+  // The fit needs the points in the frame of the other map.
   const Pose3d other_T_map = map_T_other.Inverse();
   for (Sighting& sighting : sightings) sighting.other = other_T_map * sighting.other;
   return sightings;

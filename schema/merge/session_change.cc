@@ -20,7 +20,7 @@ namespace dsg::merge {
 namespace {
 
 constexpr int kSamplesASide = 4;
-// Free space further from a place than this is not looked up.
+// Free space further from a place is not considered.
 constexpr double kReachMaxM = 6.0;
 
 std::vector<Eigen::Vector3d> SamplesOf(const Node& node, double slack_m) {
@@ -40,7 +40,7 @@ std::vector<Eigen::Vector3d> SamplesOf(const Node& node, double slack_m) {
   return samples;
 }
 
-// Heights of a body, between which the clearance of a place on the floor is measured.
+// Height range of a body, in which the clearance of a place on the floor is measured.
 constexpr double kBodyHeightM = 1.8;
 constexpr double kFloorSlackM = 0.15;
 constexpr int kMatterVertexCountMin = 10;
@@ -102,7 +102,7 @@ std::vector<char> SeenAgain(const MapContent& into, const MapContent& other,
   for (const int pair : pair_of) {
     if (pair >= 0) is_seen[static_cast<size_t>(pair)] = 1;
   }
-  // What an earlier merge of the same map brought is no older belief to be contradicted by it.
+  // Copies from the same map are not older beliefs that it could contradict.
   for (size_t i = 0; i < into.nodes.size(); ++i) {
     const auto copy = CopiedFrom(into.nodes[i]);
     if (copy.has_value() && copy->map == other.spec.name) is_seen[i] = 1;
@@ -110,7 +110,7 @@ std::vector<char> SeenAgain(const MapContent& into, const MapContent& other,
   return is_seen;
 }
 
-// What stood on or in a thing that is gone, and was not seen again, went with it.
+// Things on or in a thing that is gone went with it, unless they were seen again.
 void AddCarried(const MapContent& into, const std::vector<char>& is_seen,
                 std::map<int, TimeNs>* gone) {
   bool is_growing = true;
@@ -133,7 +133,7 @@ void AddCarried(const MapContent& into, const std::vector<char>& is_seen,
   }
 }
 
-// Colours vary with the light, but not from red to blue.
+// Colours vary with the light, but do not change from red to blue.
 bool AreColorsAlike(const Node& a, const Node& b) {
   constexpr int kDifferenceMax = 80;
   if (!a.object.has_value() || !b.object.has_value()) return true;
@@ -156,7 +156,7 @@ bool CouldBeSame(const Node& before, const Node& after) {
   return a < 1.3 * b + 0.1 && b < 1.3 * a + 0.1;
 }
 
-// Least cost of a row or column besides one entry.
+// Least cost of a row or column, except one entry.
 double Rival(const Eigen::VectorXd& costs, Eigen::Index besides) {
   double least = std::numeric_limits<double>::infinity();
   for (Eigen::Index i = 0; i < costs.size(); ++i) {
@@ -165,7 +165,7 @@ double Rival(const Eigen::VectorXd& costs, Eigen::Index besides) {
   return least;
 }
 
-// Things that are believed to be there still, by class.
+// Things that are still there, by class.
 std::map<std::string, int> CountClasses(const MapContent& content) {
   std::map<std::string, int> counts;
   for (const int i : content.OfClass(NodeClass::kObject)) {
@@ -180,7 +180,7 @@ std::vector<std::pair<int, int>> PairMoved(const MapContent& into, const MapCont
                                            const std::vector<int>& arrived,
                                            const ChangeOptions& options) {
   std::vector<std::pair<int, int>> moved;
-  // Where everything is new nothing is known again.
+  // If everything is new, nothing has moved.
   constexpr size_t kPairsMax = 4'000'000;
   if (gone.empty() || arrived.empty() || gone.size() * arrived.size() > kPairsMax) return moved;
   Eigen::MatrixXd cost = Eigen::MatrixXd::Constant(static_cast<Eigen::Index>(gone.size()),
@@ -225,7 +225,7 @@ class AbsenceJudge {
   absl::StatusOr<std::optional<TimeNs>> GoneAt(const Node& node) const {
     TimeNs first_ns = kTimeMax;
     const bool is_free = later_.Share(node, &first_ns) >= options_.free_share_min;
-    // Nothing to see, nothing to read the mesh for.
+    // No free space, so the mesh need not be read.
     if (LastSeen(into_, node) >= std::max(session_ns_, is_free ? first_ns : session_ns_)) {
       return std::optional<TimeNs>();
     }
@@ -255,17 +255,17 @@ class AbsenceJudge {
 
 constexpr double kBlocksOfBoxMax = 512.0;
 constexpr double kCellM = 0.1;
-// Surfaces are this far off at most.
+// Largest error of surfaces.
 constexpr double kGroundSlackM = 0.08;
 constexpr size_t kProbeCachedBlocks = 64;
 
-// The inside of a box, sides and underside left out: walls and floors that it touches are not it.
+// The inside of a box without its sides and underside, because walls and floors touch those.
 Box3d CoreOf(const Box3d& box, double slack_m) {
   const Eigen::Vector3d slack = (0.25 * box.sizes()).cwiseMin(Eigen::Vector3d::Constant(slack_m));
   return Box3d(box.min() + slack, box.max() - slack);
 }
 
-// Marks cells of the underside of a box on which there is surface.
+// The cells of the underside of a box where there is surface.
 class Ground {
  public:
   explicit Ground(const Box3d& box) : box_(box) {
@@ -294,11 +294,11 @@ class Ground {
   std::set<std::pair<int, int>> marked_;
 };
 
-// What the mesh of a map shows of a box: matter in it, and what it would stand on. Boxes of a whole
-// storey count as full of matter.
+// What the mesh of a map shows at a box: surface in it, and surface to stand on. Boxes of a whole
+// storey count as full.
 class MeshProbe {
  public:
-  /// `map_T_other` carries the mesh into the frame of the boxes.
+  /// `map_T_other` takes the mesh to the frame of the boxes.
   MeshProbe(const Snapshot& other, const Pose3d& map_T_other);
 
   absl::StatusOr<BoxSurface> Look(const Pose3d& map_T_box, const Box3d& box, double slack_m);

@@ -11,10 +11,10 @@
 namespace dsg {
 namespace {
 
-// Vertices and faces of a block that count as one row.
+// Number of vertices and faces of a block that count as one row.
 constexpr size_t kMeshPartsPerRow = 100;
 
-// A correction ends where so many poses in a row are kept: they need not be written anew.
+// A correction ends where this many consecutive poses are kept, so that they are not rewritten.
 constexpr size_t kKeptRunMax = 500;
 
 }  // namespace
@@ -25,7 +25,7 @@ class TrackBatches {
   /// `plan` must outlive this.
   TrackBatches(const Snapshot& map, const TrackPlan& plan) : map_(map), plan_(plan) {}
 
-  /// Adds the next piece, of about `row_count_max` rows. Returns how many; 0 = nothing is left.
+  /// Adds the next piece, of about `row_count_max` rows. Returns its number of rows; 0 at the end.
   absl::StatusOr<size_t> AddTo(size_t row_count_max, const StopCheck& stop, GraphDelta* delta);
 
  private:
@@ -78,7 +78,7 @@ absl::StatusOr<size_t> TrackBatches::AddShapes(size_t row_count_max, const StopC
   return std::max<size_t>(count, 1);
 }
 
-// All of a span: factors stand in batches of one row each, hundreds together.
+// A whole span at once: the store keeps hundreds of factors per row.
 absl::StatusOr<size_t> TrackBatches::AddFactors(size_t row_count_max, GraphDelta* delta) {
   const Interval& span = plan_.factor_spans[factor_span_++];
   DSG_ASSIGN_OR_RETURN(const std::vector<PoseFactor> factors,
@@ -96,11 +96,11 @@ bool TrackBatches::Goes(TimeNs time_ns) {
   return next_thinned_ < thinned.size() && thinned[next_thinned_] == time_ns;
 }
 
-// From the first pose that goes to the last, with those between that stay.
+// From the first to the last dropped pose, with the kept ones between.
 struct TrackBatches::Piece {
   TrajectoryCorrection correction;
   size_t row_count = 0;
-  /// Kept poses since the last one that goes.
+  /// Kept poses since the last dropped one.
   std::vector<TimedPose> kept;
 
   void Drop(NodeId agent, TimeNs time_ns) {
@@ -165,8 +165,8 @@ class PruneBatches::Impl {
     DSG_RETURN_IF_ERROR(AddMesh(stop, &delta));
     DSG_RETURN_IF_ERROR(AddTracks(stop, &delta));
     AddStays(&delta);
-    // Nodes go last: until then the branch is found again by its root. They look at the stays as
-    // these are in `head`, so not in one delta with changes of them.
+    // Nodes go last, so that an interrupted prune finds the branch again by its root. Their
+    // retirement reads the stays in `head`, so it cannot share a delta with changes of stays.
     const bool has_stays = !delta.stays.empty() || !delta.stay_removals.empty();
     if (!IsFull() && !has_stays && !ChangesGoneAgents(delta)) {
       DSG_RETURN_IF_ERROR(AddNodes(head, stop, &delta));
@@ -195,7 +195,7 @@ class PruneBatches::Impl {
  private:
   bool IsFull() const { return rows_ >= kPruneBatchRows; }
 
-  // A delta that retires an agent cannot correct its track as well.
+  // A delta cannot retire an agent and correct its track.
   bool ChangesGoneAgents(const GraphDelta& delta) const {
     const auto is_gone = [this](const auto& change) { return gone_.contains(change.agent); };
     const auto any = [&](const auto& changes) {
@@ -217,7 +217,7 @@ class PruneBatches::Impl {
       DSG_ASSIGN_OR_RETURN(const MeshBlock block, at_plan_->ReadMeshBlock(mesh.cut[next_cut_]));
       bool is_cut = false;
       delta->mesh_blocks.push_back(CutMesh(block, mesh.solids, &is_cut));
-      // A transaction is to have a bounded number of bytes too.
+      // Bounds the bytes of a transaction too.
       rows_ += 1 + (block.positions_map.size() + block.faces.size()) / kMeshPartsPerRow;
     }
     return absl::OkStatus();
@@ -247,14 +247,14 @@ class PruneBatches::Impl {
     }
     for (; !IsFull() && next_edit_ < plan_.stay_edits.size(); ++next_edit_, ++step_, ++rows_) {
       const StayEdit& edit = plan_.stay_edits[next_edit_];
-      // Its beginning is part of its key.
+      // The beginning is part of the key.
       if (edit.stay.enter_ns != edit.key.enter_ns) delta->stay_removals.push_back(edit.key);
       delta->stays.push_back(edit.stay);
     }
   }
 
   absl::Status AddNodes(const Snapshot& head, const StopCheck& stop, GraphDelta* delta) {
-    // The nodes of one delta are gone for each other only once it is committed.
+    // Changes of a delta take effect only when it is committed.
     const bool has_others = !delta->empty();
     for (; !IsFull() && next_node_ < plan_.nodes.size(); ++next_node_, ++step_) {
       DSG_RETURN_IF_ERROR(AskStop(stop));
@@ -274,7 +274,7 @@ class PruneBatches::Impl {
     return absl::OkStatus();
   }
 
-  // Edges of a hub, but for those that hold it in its branch. True if no more were left.
+  // Edges of a hub, except those to its parents. Returns true if no more are left.
   absl::StatusOr<bool> AddEdges(NodeId id, const Snapshot& head, const StopCheck& stop,
                                 GraphDelta* delta) {
     const auto take = [&](const Edge& edge) {
@@ -294,7 +294,7 @@ class PruneBatches::Impl {
     return !IsFull();
   }
 
-  // Stays that came after the plan: no stay may name a node that is gone.
+  // Stays that were written after the plan: no stay may refer to a retired node.
   absl::Status AddLateStays(NodeId id, const Snapshot& head, const StopCheck& stop,
                             GraphDelta* delta) {
     DSG_ASSIGN_OR_RETURN(const std::vector<Stay> stays,

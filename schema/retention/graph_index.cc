@@ -28,7 +28,7 @@ std::optional<Sha256> AssetOf(const Node& node) {
 std::optional<Solid> SpaceOf(const Node& node) {
   if (node.kind != kinds::kRoom) return std::nullopt;
   const bool has_plan = node.region.has_value() && node.region->footprint_map.size() >= 3;
-  // Without a floor plan it is the room's box.
+  // Without a floor plan: the box of the room.
   if (!has_plan) {
     if (node.box_node.isEmpty()) return std::nullopt;
     return Solid{node.BoxMap(), {}};
@@ -38,7 +38,7 @@ std::optional<Solid> SpaceOf(const Node& node) {
   double z_min = node.region->z_min_m;
   double z_max = node.region->z_max_m;
   if (!(z_min < z_max)) {
-    // The height is unknown: that of the box, or all.
+    // Unknown height: that of the box, or unbounded.
     const Box3d box = node.box_node.isEmpty() ? Box3d() : node.BoxMap();
     z_min = box.isEmpty() ? -std::numeric_limits<double>::max() : box.min().z();
     z_max = box.isEmpty() ? std::numeric_limits<double>::max() : box.max().z();
@@ -76,7 +76,7 @@ absl::Status GraphIndex::LoadNodes(const Snapshot& map, const StopCheck& stop) {
   DSG_RETURN_IF_ERROR(map.ReadAllNodes(stop, [this](const Node& node) { Add(node); }));
   std::sort(nodes_.begin(), nodes_.end(),
             [](const IndexedNode& a, const IndexedNode& b) { return a.id < b.id; });
-  // One that a commit replaced meanwhile was shown twice.
+  // A node that a concurrent commit replaces is shown twice.
   const auto same = [](const IndexedNode& a, const IndexedNode& b) { return a.id == b.id; };
   nodes_.erase(std::unique(nodes_.begin(), nodes_.end(), same), nodes_.end());
   return absl::OkStatus();
@@ -132,7 +132,7 @@ int64_t GraphIndex::Find(NodeId id) const {
 
 namespace {
 
-// An island of poses that is shorter does not speak for its agent where nothing supports it.
+// Shorter islands of poses do not count as the last word of an agent that nothing supports.
 constexpr TimeNs kIslandMinNs = 3600 * kNsPerSecond;
 
 TimeNs Sooner(TimeNs time_ns, TimeNs by_ns) {
@@ -141,11 +141,11 @@ TimeNs Sooner(TimeNs time_ns, TimeNs by_ns) {
 
 bool IsLater(TimeNs time_ns, TimeNs than_ns) { return Sooner(time_ns, kClockLeapMaxNs) > than_ns; }
 
-// Somebody, or something, was seen at a time.
+// An agent or a thing was seen at this time.
 struct Witness {
   TimeNs time_ns = 0;
   NodeId who;
-  /// The track goes on before; null for what has one time only.
+  /// The track that continues before this time; null for things.
   const TrackInfo* track = nullptr;
 
   bool operator<(const Witness& other) const {
@@ -160,14 +160,14 @@ struct Island {
   std::optional<TimeNs> end_before_ns;
 };
 
-// Walks down from the newest time until one is supported.
+// Searches from the newest time backwards for a supported one.
 class NowFinder {
  public:
   NowFinder(const Snapshot& map, const GraphIndex& index, const StopCheck& stop)
       : map_(map), stop_(stop) {
     std::vector<Witness> all;
     for (const IndexedNode& node : index.nodes()) {
-      // Agents speak by their tracks, of which a pose is no second witness.
+      // Agents count by their tracks; poses kept as nodes are no second witness.
       if (node.is_agent || node.is_pose || !node.last_observed_ns.has_value()) continue;
       all.push_back({*node.last_observed_ns, node.id, nullptr});
     }
@@ -235,33 +235,33 @@ class NowFinder {
   const Snapshot& map_;
   const StopCheck& stop_;
   std::priority_queue<Witness> open_;
-  /// Of those whom nothing supports.
+  /// By agent or thing without support.
   std::map<NodeId, TimeNs> last_word_;
 };
 
-// Compares when a track ended with how far the map was when it learnt that.
+// Compares the end of a track with the time of the map when the end was committed.
 class LagFinder {
  public:
-  // `seen_ns`: now by what was observed alone. `now_ns`: the same, bounded by the wall clock.
+  // `seen_ns`: now by observations alone. `now_ns`: the same, bounded by the wall clock.
   LagFinder(MapReader* reader, Revision head, TimeNs seen_ns, TimeNs now_ns, const StopCheck& stop)
       : reader_(*reader), head_(head), seen_ns_(seen_ns), now_ns_(now_ns), stop_(stop) {}
 
-  // Of an agent the newest pose of whose track, but for those that are ahead, is at `end_ns`. 0 if
-  // the clock was not behind, or nothing tells.
+  // The lag of an agent whose newest pose that is not ahead is at `end_ns`. 0 if the clock was not
+  // behind or this is unknown.
   absl::StatusOr<TimeNs> LagOf(NodeId agent, TimeNs end_ns) {
     if (revisions_.empty()) {
       DSG_ASSIGN_OR_RETURN(revisions_, ReadableRevisions(&reader_, head_, stop_));
     }
     size_t low = 0;
     size_t high = revisions_.size();
-    // The first revision that had the whole of the track.
+    // The first revision that had the end of the track.
     while (low < high) {
       DSG_RETURN_IF_ERROR(AskStop(stop_));
       const size_t middle = low + (high - low) / 2;
       DSG_ASSIGN_OR_RETURN(const bool has_end, HasEnd(revisions_[middle], agent, end_ns));
       (has_end ? high : low) = has_end ? middle : middle + 1;
     }
-    // It may have come with a revision that was compacted, as between two tags.
+    // The end may have been committed in a compacted revision, as between two tags.
     const bool is_known =
         low > 0 && low < revisions_.size() && revisions_[low] == revisions_[low - 1] + 1;
     if (!is_known) return 0;
@@ -279,7 +279,7 @@ class LagFinder {
     return known->pose_count > 0 && known->last_ns >= end_ns;
   }
 
-  // Ends that are ahead do not speak of how far the map was.
+  // Tracks that are ahead do not count.
   absl::StatusOr<std::optional<TimeNs>> NowAt(Revision revision) {
     const auto found = now_at_.find(revision);
     if (found != now_at_.end()) return found->second;
@@ -304,7 +304,7 @@ class LagFinder {
   std::map<Revision, std::optional<TimeNs>> now_at_;
 };
 
-// The newest pose that is not ahead of now by a leap; nullopt if all are.
+// Time of the newest pose that is not more than a leap after now; nullopt if all are.
 absl::StatusOr<std::optional<TimeNs>> EndOf(const Snapshot& map, const TrackInfo& track,
                                             TimeNs now_ns, const StopCheck& stop) {
   std::optional<TimeNs> end_ns;
@@ -340,7 +340,7 @@ absl::StatusOr<WorldClock> FindWorldClock(MapReader* reader, const Snapshot& map
   WorldClock clock;
   DSG_ASSIGN_OR_RETURN(const std::optional<TimeNs> seen_ns, NowFinder(map, index, stop).Find());
   if (!seen_ns.has_value()) return clock;
-  // What is later was not observed yet. A map that begins later is of simulated time, or the wall
+  // Later times cannot have been observed yet. If the epoch is later, time is simulated or the wall
   // clock is wrong.
   const bool has_wall =
       map.spec().clock == Clock::kUnix && wall_now_ns > 0 && wall_now_ns >= map.spec().epoch_ns;

@@ -11,10 +11,10 @@
 namespace dsg {
 namespace {
 
-// Dropped poses closer together than this are of one stretch, which loses its factors whole.
+// Dropped poses closer than this form one stretch, which loses all its factors.
 constexpr TimeNs kStretchNs = 120 * kNsPerSecond;
 
-// Ascending times against ascending spans.
+// Looks up ascending times in ascending spans.
 class SpanWalk {
  public:
   explicit SpanWalk(const std::vector<Interval>& spans) : spans_(spans) {}
@@ -70,14 +70,14 @@ class TrackMeasurer {
     return absl::OkStatus();
   }
 
-  // Of an agent that goes the last pose goes with the node: cut off in between, the prune knows by
-  // it next time when the agent was seen last.
+  // The last pose of a removed agent goes with its node, so that an interrupted prune still knows
+  // when the agent was seen last.
   void LeaveLastPose() {
     const bool is_all = plan_.forgotten.size() == 1 && plan_.forgotten[0] == Interval();
     if (is_all && track_.pose_count > 0) plan_.forgotten[0].to_ns = track_.last_ns;
   }
 
-  // What is left after forgetting and the thinnings before.
+  // Thins what forgetting and earlier thinnings left.
   absl::Status Thin(const Thinning& thinning) {
     SimplifyOptions options;
     options.position_m = thinning.position_m;
@@ -136,7 +136,7 @@ class TrackMeasurer {
     return CountFactors();
   }
 
-  // The factors of a thinned stretch tie poses that are not there any more.
+  // Factors of a thinned stretch refer to poses that do not exist any more.
   absl::Status CountFactors() {
     std::vector<Interval> stretches;
     for (const TimeNs time_ns : plan_.thinned_ns) {
@@ -170,7 +170,7 @@ class TrackMeasurer {
   int64_t pose_count_ = 0;
 };
 
-// Also collects the topologies of shapes that go.
+// Also collects the topologies of removed shapes.
 absl::Status MeasureTracks(const Snapshot& map, const GraphIndex& index, const StopCheck& stop,
                            Measured* measured, std::set<Sha256>* topologies) {
   const std::vector<TrackChoice>& choices = measured->selection.tracks;
@@ -246,7 +246,7 @@ class StayMeasurer {
       if (stay.exit_ns <= until_ns) {
         removals_.push_back(key);
       } else if (stay.enter_ns < until_ns) {
-        // Its end is as readers are shown it: where the track ends, at the latest.
+        // The end is the one that readers see, at most the end of the track.
         edits_[key] = stay;
         edits_[key].enter_ns = until_ns;
       }
@@ -288,13 +288,14 @@ absl::Status MeasureStays(const Snapshot& map, const GraphIndex& index, const St
   return StayMeasurer(map, index, stop, measured).Run();
 }
 
-// One pass over the edges for all selections.
+// Counts edges in one pass for all selections.
 absl::Status MeasureEdges(const Snapshot& map, const GraphIndex& index, const StopCheck& stop,
                           std::vector<Measured>* all) {
   std::vector<uint32_t> position(index.nodes().size());
   for (uint32_t i = 0; i < index.bottom_up().size(); ++i) position[index.bottom_up()[i]] = i;
   for (Measured& one : *all) one.edge_counts.assign(index.nodes().size(), 0);
-  // One that a commit replaces meanwhile may be shown twice; the counts are for reports and sizes.
+  // An edge that a concurrent commit replaces may count twice, which is acceptable for reports and
+  // sizes.
   return map.ReadAllEdges(stop, [&](const Edge& edge) {
     const int64_t source = index.Find(edge.source);
     const int64_t target = index.Find(edge.target);
@@ -348,7 +349,7 @@ absl::Status MeasureMesh(const Snapshot& map, const StopCheck& stop, Measured* m
   return absl::OkStatus();
 }
 
-// Topologies of shapes that stay.
+// Removes topologies that remaining shapes use.
 absl::Status DropKeptTopologies(const Snapshot& map, const GraphIndex& index, const StopCheck& stop,
                                 const Measured& measured, std::set<Sha256>* assets) {
   for (const TrackInfo& track : index.tracks()) {
@@ -371,7 +372,7 @@ absl::Status DropKeptTopologies(const Snapshot& map, const GraphIndex& index, co
   return absl::OkStatus();
 }
 
-// Assets to which only what goes refers.
+// Counts assets to which only removed nodes and shapes refer.
 absl::Status MeasureAssets(const Snapshot& map, const GraphIndex& index, const StopCheck& stop,
                            std::set<Sha256> assets, Measured* measured) {
   const bool has_topologies = !assets.empty();
@@ -401,7 +402,7 @@ absl::Status MeasureAssets(const Snapshot& map, const GraphIndex& index, const S
 }  // namespace
 
 Stay WithOpenEnd(Stay stay, const TrackInfo& track) {
-  // How readers are shown a stay that nobody was seen to leave.
+  // Readers see a stay without an end clipped to the end of the track.
   const bool was_clipped =
       track.pose_count > 0 && stay.exit_ns == std::max(stay.enter_ns, track.last_ns) + 1;
   if (was_clipped) stay.exit_ns = kTimeMax;

@@ -37,9 +37,9 @@ class AgeOfRevisions {
  public:
   explicit AgeOfRevisions(int64_t wall_now_ns) : before_ns_(wall_now_ns) {}
 
-  /// The least that has passed since a revision, asked newest first.
+  /// The least age of a revision. Call in order, newest first.
   int64_t Next(const RevisionInfo& info) {
-    // A stamp may be any number: the difference need not fit.
+    // Unsigned, because stamps are arbitrary and the signed difference may overflow.
     const bool is_back = info.committed_ns > before_ns_;
     const uint64_t step_ns =
         static_cast<uint64_t>(before_ns_) - static_cast<uint64_t>(info.committed_ns);
@@ -67,7 +67,7 @@ class AgeOfRevisions {
   Revision leap_after_ = 0;
 };
 
-// May something of a block be in a solid? Corners of its faces may lie one block further.
+// Whether something of a block may be in a solid. Faces may reach into the next block.
 bool IsNear(const BlockIndex& block, const Solid& solid, double size_m) {
   const Eigen::Vector3d low(block.x - 1.0, block.y - 1.0, block.z - 1.0);
   return solid.box_map.intersects(Box3d(low * size_m, (low.array() + 3.0).matrix() * size_m));
@@ -125,7 +125,7 @@ class PastSearch {
     return asks_region ? TakeVisits(*before, touched.corrected_tracks) : absl::OkStatus();
   }
 
-  // As they were last believed: what is there before a revision and not after it ended with it.
+  // Nodes by their last state: those before a revision that are missing after it.
   absl::Status TakeDead(const Snapshot& before, const std::vector<NodeId>& dead) {
     if (dead.empty()) return absl::OkStatus();
     DSG_ASSIGN_OR_RETURN(const auto nodes, before.FindNodes(dead, stop_));
@@ -167,7 +167,7 @@ class PastSearch {
     return asks_seen ? is_unseen : node.valid.to_ns <= *cutoff || (is_agent && is_unseen);
   }
 
-  // Nothing believed now contains it, so one way up to the root is enough.
+  // No present node contains it, so one path to the root is enough.
   absl::StatusOr<bool> IsInBranch(const Snapshot& before, const Node& node,
                                   const std::string& id_or_name) {
     const auto root = before.ResolveNode(id_or_name);
@@ -272,7 +272,7 @@ absl::StatusOr<HistoryCut> FindHistoryCut(MapReader* reader, Revision newest,
   HistoryCut cut;
   cut.keep_from = newest;
   if (const auto* before = std::get_if<PrunePolicy::HistoryBefore>(&policy.what)) {
-    // Gives the error for what is not there yet.
+    // Returns the error for a future revision.
     if (before->revision > newest) DSG_RETURN_IF_ERROR(reader->At(before->revision).status());
     cut.keep_from = std::min(before->revision, newest);
   } else {
@@ -285,7 +285,7 @@ absl::StatusOr<HistoryCut> FindHistoryCut(MapReader* reader, Revision newest,
     }));
     cut.note = ages.Note();
   }
-  // Nothing comes back.
+  // Compacted revisions do not come back.
   cut.keep_from = std::max(cut.keep_from, oldest);
   DSG_ASSIGN_OR_RETURN(const std::vector<Tag> tags, reader->Tags());
   std::set<Revision> tagged;

@@ -81,7 +81,7 @@ class Checker {
                        " bytes, none of them 0",
                    "name", "");
     }
-    // First: without it a policy that says nothing else would be blamed for that.
+    // Checked first, because a wrong value here would be reported as a missing `what`.
     DSG_RETURN_IF_ERROR(CheckMetres());
     DSG_RETURN_IF_ERROR(
         std::visit([this](const auto& what) { return CheckWhat(what); }, policy_.what));
@@ -102,14 +102,14 @@ class Checker {
  private:
   static bool HasNul(const std::string& text) { return text.find('\0') != std::string::npos; }
 
-  // Those of the command line have no names.
+  // Policies of the command line have no names.
   std::string Who() const {
     return policy_.name.empty() ? "the policy" : absl::StrCat("policy \"", policy_.name, "\"");
   }
 
   absl::Status Error(const std::string& what, std::string_view field,
                      const std::string& value) const {
-    // A name that is refused itself would not make a message.
+    // An invalid name cannot be part of a message.
     const bool has_name = field != "name";
     return MakeError(Reason::kFieldInvalid,
                      absl::StrCat(has_name ? Who() : "the policy", ": ", what),
@@ -177,7 +177,7 @@ class Checker {
 
   absl::Status CheckMetres() const {
     const double metres = policy_.simplify_m;
-    // 0 forgets; -0 is a slip of whoever made it.
+    // 0 forgets; -0 is an error of the caller.
     if (std::isfinite(metres) && !std::signbit(metres) && metres <= kSimplifyMaxM) {
       return absl::OkStatus();
     }

@@ -20,7 +20,7 @@ namespace {
 
 constexpr size_t kFileBytesMax = size_t{1} << 20;
 constexpr size_t kPolicyCountMax = 100;
-// The parser's own recursion must stay far from the stack's end; a policy nests three deep.
+// Bounds the recursion of the parser; a policy nests three levels.
 constexpr size_t kBracketsMax = 1000;
 constexpr TimeNs kEveryMin = kNsPerSecond;
 
@@ -148,7 +148,8 @@ class PolicyReader {
     return Wrong(node, absl::StrCat(key, " is \"", text, "\", which is no whole number"));
   }
 
-  // Nanoseconds or RFC 3339: a file is for many maps, so times relative to an epoch say nothing.
+  // Nanoseconds or RFC 3339. A file serves many maps, so times relative to an epoch are not
+  // allowed.
   absl::StatusOr<TimeNs> Instant(const YAML::Node& node, const std::string& key) const {
     DSG_ASSIGN_OR_RETURN(const std::string text, Text(node, key));
     if (text.starts_with("+") || text.starts_with("-")) {
@@ -181,7 +182,7 @@ class PolicyReader {
     return words;
   }
 
-  // The keys of which a policy has one.
+  // The keys of which a policy has exactly one.
   std::map<std::string, Take> Whats() const {
     using P = PrunePolicy;
     const auto age = [this](const std::string& key, auto make) -> Take {
@@ -318,7 +319,7 @@ absl::StatusOr<PolicyFile> ReadPolicyFile(const std::string& path) {
                                             error ? error.message() : "it is no plain file"));
   }
   std::ifstream in(path, std::ios::binary);
-  // One byte more than may be, so that ParsePolicyFile sees that it is too large.
+  // Reads one byte above the limit, so that ParsePolicyFile sees that the file is too large.
   std::string text(kFileBytesMax + 1, '\0');
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (!in.is_open() || in.bad()) {

@@ -46,7 +46,7 @@ bool IsMeshWanted(const PrunePolicy& policy) {
          std::find(policy.layers.begin(), policy.layers.end(), "mesh") != policy.layers.end();
 }
 
-// Rooms that go take the mesh in them along; a region is a space itself.
+// Removed rooms take their mesh along; a region is a space itself.
 void ChooseMesh(const GraphIndex& index, const PrunePolicy& policy, Selection* selection) {
   if (!IsMeshWanted(policy) || policy.IsThinning()) return;
   if (const auto* layer = std::get_if<PrunePolicy::WholeLayer>(&policy.what)) {
@@ -78,7 +78,7 @@ class NodeChooser {
 
   absl::Status Choose(const PrunePolicy::Region& what) {
     return TakeIf([&](const IndexedNode& node) {
-      // Agents are where their tracks say.
+      // Positions of agents are in their tracks.
       return !node.is_agent && what.box_map.contains(node.position_map);
     });
   }
@@ -93,7 +93,7 @@ class NodeChooser {
   absl::Status Choose(const PrunePolicy::UnseenSince&) { return TakeUnseen(); }
   absl::Status Choose(const PrunePolicy::UnseenFor&) { return TakeUnseen(); }
 
-  // Nothing, or history.
+  // No selection, or history.
   template <class Other>
   absl::Status Choose(const Other&) {
     return absl::OkStatus();
@@ -108,7 +108,7 @@ class NodeChooser {
     return absl::OkStatus();
   }
 
-  // A node that something outside of the branch contains too stays.
+  // A node that also has a parent outside the branch stays.
   void TakeBranch(uint32_t root) {
     std::vector<uint32_t> gone_parent_count(is_gone_.size(), 0);
     std::deque<uint32_t> open = {root};
@@ -133,7 +133,7 @@ class NodeChooser {
     return at == tracks.end() || at->agent != agent || at->pose_count == 0 ? nullptr : &*at;
   }
 
-  // When an agent was seen last, as far as is known.
+  // When a node was last seen; agents by their tracks too.
   std::optional<TimeNs> LastSeen(const IndexedNode& node) const {
     const TrackInfo* const track = node.is_agent ? TrackOf(node.id) : nullptr;
     if (track == nullptr) return node.last_observed_ns;
@@ -150,14 +150,14 @@ class NodeChooser {
     return TakeIf([&](const IndexedNode& node) {
       const auto cutoff = CutoffFor(node);
       if (node.valid_to_ns <= *cutoff) return true;
-      // Of somebody all of whose poses go nothing is left to ask for.
+      // An agent that loses all its poses goes too.
       const auto seen = node.is_agent ? LastSeen(node) : std::nullopt;
       return seen.has_value() && *seen < *cutoff;
     });
   }
 
-  // A node is seen when something in it is. What was never looked for itself, and holds what was
-  // not, has no time: it goes only with all that contains it.
+  // A node counts as seen when one of its descendants is. A node without a time of its own that
+  // contains nodes without times has no time; it goes only with all its parents.
   absl::Status TakeUnseen() {
     if (!CutoffOf(policy_, index_.clock()).has_value()) return absl::OkStatus();
     std::vector<std::optional<TimeNs>> seen(is_gone_.size());
@@ -215,7 +215,7 @@ absl::StatusOr<std::map<NodeId, std::vector<Interval>>> SpansInBox(const Snapsho
   return spans;
 }
 
-// The spans of each track that the policy names.
+// The spans of tracks that the policy names.
 absl::StatusOr<std::map<NodeId, std::vector<Interval>>> SpansOf(const Snapshot& map,
                                                                 const GraphIndex& index,
                                                                 const PrunePolicy& policy,
