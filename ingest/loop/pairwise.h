@@ -8,7 +8,7 @@
 
 #include "ingest/loop/odometry_tree.h"
 #include "ingest/loop/pose_graph.h"
-#include "schema/matching/bitset_graph.h"
+#include "schema/matching/max_clique.h"
 
 namespace dsg::ingest {
 

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ingest/loop/parts.h"
-
 #include "ingest/loop/optimize.h"
 #include "ingest/loop/start.h"
+#include "schema/base/disjoint_sets.h"
 
 namespace dsg::ingest {
 

@@ -7,8 +7,8 @@
 #include <cstdint>
 
 #include "ingest/loop/optimize.h"
-#include "ingest/loop/parts.h"
 #include "ingest/loop/residual.h"
+#include "schema/base/disjoint_sets.h"
 
 namespace dsg::ingest {
 namespace {

@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <map>
-#include <numeric>
 #include <utility>
 
 #include "ingest/objects/euclidean_clusters.h"
 #include "ingest/objects/point_index.h"
+#include "schema/base/disjoint_sets.h"
 #include "schema/model/geometry.h"
 
 namespace dsg::ingest {
@@ -124,14 +124,6 @@ std::vector<CellGroup> SeedsOf(const std::vector<SurfaceCell>& cells, const Cell
   return seeds;
 }
 
-int RootOf(std::vector<int>& parents, int index) {
-  while (parents[static_cast<size_t>(index)] != index) {
-    index = parents[static_cast<size_t>(index)] =
-        parents[static_cast<size_t>(parents[static_cast<size_t>(index)])];
-  }
-  return index;
-}
-
 bool AreWithin(const std::vector<Eigen::Vector3f>& a, const std::vector<Eigen::Vector3f>& b,
                double gap_m) {
   const auto& fewer = a.size() < b.size() ? a : b;
@@ -143,7 +135,7 @@ bool AreWithin(const std::vector<Eigen::Vector3f>& a, const std::vector<Eigen::V
 
 /// Which groups of one instance are one; `members` are indices of groups, the largest first.
 void JoinNear(const std::vector<SurfaceCell>& cells, const std::vector<CellGroup>& groups,
-              const std::vector<int>& members, double gap_m, std::vector<int>* parents) {
+              const std::vector<int>& members, double gap_m, DisjointSets* sets) {
   const size_t largest = groups[static_cast<size_t>(members.front())].size();
   const auto speck =
       std::max(kSpeckCells, static_cast<size_t>(kSpeckShare * static_cast<double>(largest)));
@@ -154,9 +146,9 @@ void JoinNear(const std::vector<SurfaceCell>& cells, const std::vector<CellGroup
     for (size_t j = i + 1; j < members.size(); ++j) {
       const CellGroup& b = groups[static_cast<size_t>(members[j])];
       if (b.size() < speck) break;
-      if (RootOf(*parents, members[i]) == RootOf(*parents, members[j])) continue;
+      if (sets->Find(members[i]) == sets->Find(members[j])) continue;
       if (!AreWithin(points, PointsOf(cells, b), gap_m)) continue;
-      (*parents)[static_cast<size_t>(RootOf(*parents, members[j]))] = RootOf(*parents, members[i]);
+      sets->Merge(members[i], members[j]);
     }
   }
 }
@@ -225,17 +217,16 @@ std::vector<CellGroup> MergeByInstance(const std::vector<SurfaceCell>& cells,
     const InstanceKey key = KeyOf(cells, groups[i]);
     if (key.second != 0) by_instance[key].push_back(static_cast<int>(i));
   }
-  std::vector<int> parents(groups.size());
-  std::iota(parents.begin(), parents.end(), 0);
+  DisjointSets sets(groups.size());
   for (auto& [key, members] : by_instance) {
     std::stable_sort(members.begin(), members.end(), [&](int a, int b) {
       return groups[static_cast<size_t>(a)].size() > groups[static_cast<size_t>(b)].size();
     });
-    if (members.size() > 1) JoinNear(cells, groups, members, gap_m, &parents);
+    if (members.size() > 1) JoinNear(cells, groups, members, gap_m, &sets);
   }
   std::map<int, CellGroup> joined;
   for (size_t i = 0; i < groups.size(); ++i) {
-    CellGroup& whole = joined[RootOf(parents, static_cast<int>(i))];
+    CellGroup& whole = joined[sets.Find(static_cast<int>(i))];
     whole.insert(whole.end(), groups[i].begin(), groups[i].end());
   }
   std::vector<CellGroup> result;

@@ -6,13 +6,15 @@
 #include <map>
 #include <utility>
 
+#include "schema/base/disjoint_sets.h"
+
 namespace dsg::ingest {
 namespace {
 
 struct LabelRun {
   PixelRun pixels;
   uint16_t label = 0;
-  /// Index of a run of the same part, itself at the root.
+  /// Index of the first run of the same part.
   int parent = 0;
 };
 
@@ -32,13 +34,11 @@ class RunFinder {
       Join(above_begin, begin);
       above_begin = begin;
     }
-    for (size_t i = 0; i < runs_.size(); ++i) runs_[i].parent = RootOf(static_cast<int>(i));
+    for (size_t i = 0; i < runs_.size(); ++i) runs_[i].parent = parts_.Find(static_cast<int>(i));
     return std::move(runs_);
   }
 
  private:
-  LabelRun& RunAt(int index) { return runs_[static_cast<size_t>(index)]; }
-
   void AddRow(int row) {
     const int width = frame_.camera.width;
     const uint16_t* labels =
@@ -48,7 +48,7 @@ class RunFinder {
       int end = begin + 1;
       while (end < width && labels[end] == label) ++end;
       if (is_wanted_[label >> 8]) {
-        runs_.push_back({{row, begin, end}, label, static_cast<int>(runs_.size())});
+        runs_.push_back({{row, begin, end}, label, parts_.Add()});
       }
       begin = end;
     }
@@ -62,24 +62,15 @@ class RunFinder {
       while (above < above_end && runs_[above].pixels.end < pixels.begin) ++above;
       for (size_t j = above; j < above_end && runs_[j].pixels.begin <= pixels.end; ++j) {
         if (runs_[j].label != runs_[i].label) continue;
-        const int a = RootOf(static_cast<int>(j));
-        const int b = RootOf(static_cast<int>(i));
-        RunAt(std::max(a, b)).parent = std::min(a, b);
+        parts_.Merge(static_cast<int>(j), static_cast<int>(i));
       }
     }
-  }
-
-  int RootOf(int run) {
-    while (RunAt(run).parent != run) {
-      RunAt(run).parent = RunAt(RunAt(run).parent).parent;
-      run = RunAt(run).parent;
-    }
-    return run;
   }
 
   const DepthFrame& frame_;
   std::array<bool, 256> is_wanted_{};
   std::vector<LabelRun> runs_;
+  DisjointSets parts_;
 };
 
 void Extend(const PixelRun& run, LabelPart* part) {

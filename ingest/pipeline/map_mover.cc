@@ -7,6 +7,8 @@
 #include <map>
 #include <optional>
 
+#include "schema/model/rigid_motion.h"
+
 namespace dsg::ingest {
 namespace {
 
@@ -35,27 +37,6 @@ Pose3d ShiftAsRobot(const Eigen::Vector3d& at_map, const TrajectoryChange& chang
   }
   if (robot.empty()) return {};
   return Levelled(change.At(time_ns), at_map);
-}
-
-void MoveComponents(const Pose3d& new_T_old, Node* node) {
-  if (node->object.has_value() && node->object->model.has_value()) {
-    node->object->map_T_model = new_T_old * node->object->map_T_model;
-    node->object->map_T_model.orientation.normalize();
-  }
-  if (node->structure.has_value()) {
-    StructureInfo& plane = *node->structure;
-    plane.plane_normal_map = new_T_old.orientation * plane.plane_normal_map;
-    plane.plane_offset_m -= plane.plane_normal_map.dot(new_T_old.position);
-  }
-  if (node->region.has_value()) {
-    const double shift_z_m =
-        (new_T_old * node->map_T_node.position - node->map_T_node.position).z();
-    for (Eigen::Vector2d& corner : node->region->footprint_map) {
-      corner = (new_T_old * Eigen::Vector3d(corner.x(), corner.y(), 0.0)).head<2>();
-    }
-    node->region->z_min_m += shift_z_m;
-    node->region->z_max_m += shift_z_m;
-  }
 }
 
 // new_T_old of one node.
@@ -99,29 +80,6 @@ void BoxHolders(std::vector<Node>* nodes) {
                                   {box.max().x(), box.max().y()},
                                   {box.min().x(), box.max().y()}};
   }
-}
-
-// Positions add in the map, rotations on the right in the body: only the former turn with the map.
-std::shared_ptr<const Covariance6> Turned(const Covariance6& covariance,
-                                          const Eigen::Quaterniond& new_R_old) {
-  Matrix6d matrix;
-  size_t next = 0;
-  for (int row = 0; row < 6; ++row) {
-    for (int column = row; column < 6; ++column) {
-      matrix(row, column) = matrix(column, row) = static_cast<double>(covariance[next++]);
-    }
-  }
-  Matrix6d turn = Matrix6d::Identity();
-  turn.topLeftCorner<3, 3>() = new_R_old.toRotationMatrix();
-  const Matrix6d turned = turn * matrix * turn.transpose();
-  auto result = std::make_shared<Covariance6>();
-  next = 0;
-  for (int row = 0; row < 6; ++row) {
-    for (int column = row; column < 6; ++column) {
-      (*result)[next++] = static_cast<float>(turned(row, column));
-    }
-  }
-  return result;
 }
 
 // Covariances by keyframe, shared by the poses around it.
@@ -168,10 +126,7 @@ LayerGraph MoveGraph(LayerGraph graph, const TrajectoryChange& change, const Map
                      const std::vector<TimedPose>& robot) {
   if (change.IsIdentity()) return graph;
   for (Node& node : graph.nodes) {
-    const Pose3d new_T_old = ShiftOf(node, change, shift, robot);
-    MoveComponents(new_T_old, &node);
-    node.map_T_node = new_T_old * node.map_T_node;
-    node.map_T_node.orientation.normalize();
+    TransformNode(ShiftOf(node, change, shift, robot), &node);
   }
   BoxHolders(&graph.nodes);
   // Children moved apart from their parents.
@@ -187,17 +142,12 @@ std::vector<TimedPose> MovePoses(std::vector<TimedPose> poses, const TrajectoryC
   if (change.IsIdentity()) return poses;
   const KeyframeCovariances covariances(options);
   for (TimedPose& pose : poses) {
-    const Pose3d new_T_old = change.At(pose.time_ns);
     const Pose3d old_pose = pose.map_T_agent;
-    pose.map_T_agent = new_T_old * old_pose;
+    if (!covariances.empty()) pose.covariance = nullptr;
+    TransformPose(change.At(pose.time_ns), &pose);
     if (options.is_kept_upright) pose.map_T_agent = KeepUpright(old_pose, pose.map_T_agent);
-    pose.map_T_agent.orientation.normalize();
     pose.flags |= pose_flags::kCorrected;
-    if (!covariances.empty()) {
-      pose.covariance = covariances.Nearest(pose.time_ns);
-    } else if (pose.covariance != nullptr) {
-      pose.covariance = Turned(*pose.covariance, new_T_old.orientation);
-    }
+    if (!covariances.empty()) pose.covariance = covariances.Nearest(pose.time_ns);
   }
   return poses;
 }

@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <functional>
-#include <numeric>
 #include <queue>
 #include <unordered_map>
 
 #include "ingest/places/ways.h"
+#include "schema/base/disjoint_sets.h"
 
 namespace dsg::ingest {
 namespace {
@@ -19,21 +19,14 @@ class Parts {
     for (const auto& [a, b] : roadmap.links()) Join(a, b);
   }
   void Grow(int count) {
-    for (int i = static_cast<int>(parents_.size()); i < count; ++i) parents_.push_back(i);
+    while (static_cast<int>(sets_.size()) < count) sets_.Add();
   }
-  int Root(int spot) const {
-    while (parents_[static_cast<size_t>(spot)] != spot) spot = parents_[static_cast<size_t>(spot)];
-    return spot;
-  }
-  void Join(int a, int b) {
-    const int root_a = Root(a);
-    const int root_b = Root(b);
-    parents_[static_cast<size_t>(std::max(root_a, root_b))] = std::min(root_a, root_b);
-  }
+  int Root(int spot) { return sets_.Find(spot); }
+  void Join(int a, int b) { sets_.Merge(a, b); }
   /// Spots of each part, the smallest part first, then the one of the lowest spot.
-  std::vector<std::vector<int>> List() const {
-    std::vector<std::vector<int>> by_root(parents_.size());
-    for (int i = 0; i < static_cast<int>(parents_.size()); ++i) {
+  std::vector<std::vector<int>> List() {
+    std::vector<std::vector<int>> by_root(sets_.size());
+    for (int i = 0; i < static_cast<int>(sets_.size()); ++i) {
       by_root[static_cast<size_t>(Root(i))].push_back(i);
     }
     std::vector<std::vector<int>> parts;
@@ -46,13 +39,13 @@ class Parts {
   }
 
  private:
-  std::vector<int> parents_;
+  DisjointSets sets_;
 };
 
 // Cheapest way from any spot of a part to a spot of another one.
 class Search {
  public:
-  Search(const Roadmap& roadmap, const Parts& parts) : roadmap_(roadmap), parts_(parts) {}
+  Search(const Roadmap& roadmap, Parts* parts) : roadmap_(roadmap), parts_(*parts) {}
 
   /// Cells from start to goal; empty when there is no way.
   std::vector<int64_t> Run(const std::vector<int>& part) {
@@ -102,7 +95,7 @@ class Search {
   }
 
   const Roadmap& roadmap_;
-  const Parts& parts_;
+  Parts& parts_;
   // Looked up only, never listed: its order does not matter.
   std::unordered_map<int64_t, Reached> reached_;
   using Entry = std::pair<double, int64_t>;
@@ -115,7 +108,7 @@ void ConnectParts(Roadmap* roadmap) {
   Parts parts(*roadmap);
   const std::vector<std::vector<int>> list = parts.List();
   for (size_t i = 0; i + 1 < list.size(); ++i) {
-    const std::vector<int64_t> way = Search(*roadmap, parts).Run(list[i]);
+    const std::vector<int64_t> way = Search(*roadmap, &parts).Run(list[i]);
     if (way.empty()) continue;
     const int known = roadmap->spot_count();
     AddWay(Straighten(roadmap->space(), way), roadmap);

@@ -7,6 +7,8 @@
 #include <map>
 #include <numeric>
 
+#include "schema/base/disjoint_sets.h"
+
 namespace dsg::ingest {
 namespace {
 
@@ -69,9 +71,8 @@ struct Border {
 
 class Diagram {
  public:
-  explicit Diagram(const OpenSpace& space) : space_(space), cells_(FindDiagram(space)) {
-    parents_.resize(cells_.size());
-    std::iota(parents_.begin(), parents_.end(), 0);
+  explicit Diagram(const OpenSpace& space)
+      : space_(space), cells_(FindDiagram(space)), sets_(cells_.size()) {
     JoinParts();
     CollectParts();
     CollectBorders();
@@ -85,15 +86,6 @@ class Diagram {
   Eigen::Vector3i BlockOf(int64_t cell) const {
     const Eigen::Vector3d block = (space_.CenterOf(cell) / kBlockM).array().floor();
     return block.cast<int>();
-  }
-
-  int Root(int i) {
-    while (parents_[static_cast<size_t>(i)] != i) {
-      int& parent = parents_[static_cast<size_t>(i)];
-      parent = parents_[static_cast<size_t>(parent)];
-      i = parent;
-    }
-    return i;
   }
 
   int Find(int64_t cell) const {
@@ -123,9 +115,7 @@ class Diagram {
     for (const int64_t cell : cells_) blocks.push_back(BlockOf(cell));
     ForEachPair([&](int a, int b) {
       if (blocks[static_cast<size_t>(a)] != blocks[static_cast<size_t>(b)]) return;
-      const int root_a = Root(a);
-      const int root_b = Root(b);
-      parents_[static_cast<size_t>(std::max(root_a, root_b))] = std::min(root_a, root_b);
+      sets_.Merge(a, b);
     });
   }
 
@@ -136,7 +126,7 @@ class Diagram {
   void CollectParts() {
     part_of_.assign(cells_.size(), -1);
     for (int i = 0; i < static_cast<int>(cells_.size()); ++i) {
-      const int root = Root(i);
+      const int root = sets_.Find(i);
       if (root == i) {
         part_of_[static_cast<size_t>(i)] = static_cast<int>(parts_.size());
         parts_.emplace_back();
@@ -164,7 +154,7 @@ class Diagram {
 
   const OpenSpace& space_;
   std::vector<int64_t> cells_;
-  std::vector<int> parents_;
+  DisjointSets sets_;
   std::vector<int> part_of_;
   std::vector<Part> parts_;
   std::map<std::pair<int, int>, Border> borders_;

@@ -3,40 +3,37 @@
 
 #include <algorithm>
 #include <map>
-#include <numeric>
 #include <optional>
+
+#include "schema/base/disjoint_sets.h"
 
 namespace dsg::ingest {
 namespace {
 
-// Union-find that counts the parts which are large enough.
+// Parts of the place graph, and how many of them are large enough.
 class Parts {
  public:
-  Parts(size_t count, int size_min) : parent_(count), size_(count, 1), size_min_(size_min) {
-    std::iota(parent_.begin(), parent_.end(), 0);
+  Parts(size_t count, int size_min) : sets_(count), size_(count, 1), size_min_(size_min) {
     large_count_ = size_min <= 1 ? static_cast<int>(count) : 0;
   }
 
-  int Root(int place) {
-    while (parent_[place] != place) place = parent_[place] = parent_[parent_[place]];
-    return place;
-  }
+  int Root(int place) { return sets_.Find(place); }
 
   void Join(int a, int b) {
     a = Root(a);
     b = Root(b);
-    if (a == b) return;
+    if (!sets_.Merge(a, b)) return;
     large_count_ -= IsLarge(a) + IsLarge(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-    size_[std::min(a, b)] += size_[std::max(a, b)];
-    large_count_ += IsLarge(std::min(a, b));
+    const int whole = Root(a);
+    size_[whole] = size_[a] + size_[b];
+    large_count_ += IsLarge(whole);
   }
 
   int IsLarge(int root) const { return size_[root] >= size_min_ ? 1 : 0; }
   int large_count() const { return large_count_; }
 
  private:
-  std::vector<int> parent_;
+  DisjointSets sets_;
   std::vector<int> size_;
   int size_min_;
   int large_count_ = 0;

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
 #include <tuple>
 #include <utility>
 
 #include "ingest/volume/cube_table.h"
+#include "schema/base/disjoint_sets.h"
 
 namespace dsg::ingest {
 namespace {
@@ -27,14 +27,6 @@ const std::array<Eigen::Vector3i, 8>& Corners() {
     return made;
   }();
   return corners;
-}
-
-uint32_t FindRoot(std::vector<uint32_t>* parent, uint32_t at) {
-  while ((*parent)[at] != at) {
-    (*parent)[at] = (*parent)[(*parent)[at]];
-    at = (*parent)[at];
-  }
-  return at;
 }
 
 }  // namespace
@@ -233,25 +225,25 @@ void BlockMesher::AddMeaningAround(const Eigen::Vector3i& voxel, uint32_t* class
 }
 
 void BlockMesher::DropSpecks() {
-  std::vector<uint32_t> parent(mesh_.positions_map.size());
-  std::iota(parent.begin(), parent.end(), 0u);
+  DisjointSets parts(mesh_.positions_map.size());
   for (const auto& face : mesh_.faces) {
     for (size_t i = 1; i < 3; ++i) {
-      const uint32_t a = FindRoot(&parent, face[0]);
-      const uint32_t b = FindRoot(&parent, face[i]);
-      parent[std::max(a, b)] = std::min(a, b);
+      parts.Merge(static_cast<int>(face[0]), static_cast<int>(face[i]));
     }
   }
-  std::vector<int> face_count(parent.size(), 0);
-  for (const auto& face : mesh_.faces) ++face_count[FindRoot(&parent, face[0])];
+  const auto part_of = [&](size_t face) {
+    return static_cast<size_t>(parts.Find(static_cast<int>(mesh_.faces[face][0])));
+  };
+  std::vector<int> face_count(parts.size(), 0);
+  for (size_t i = 0; i < mesh_.faces.size(); ++i) ++face_count[part_of(i)];
   // Small here may be large beyond the block's border.
-  std::map<uint32_t, bool> is_speck;
+  std::map<size_t, bool> is_speck;
   std::vector<uint8_t> is_kept(mesh_.faces.size(), 1);
   bool drops_some = false;
   for (size_t i = 0; i < mesh_.faces.size(); ++i) {
-    const uint32_t root = FindRoot(&parent, mesh_.faces[i][0]);
-    if (face_count[root] >= kSpeckFaces) continue;
-    auto [found, is_new] = is_speck.try_emplace(root, false);
+    const size_t part = part_of(i);
+    if (face_count[part] >= kSpeckFaces) continue;
+    auto [found, is_new] = is_speck.try_emplace(part, false);
     if (is_new) found->second = field_.IsSpeck(cell_of_face_[i], kSpeckFaces);
     if (!found->second) continue;
     is_kept[i] = 0;

@@ -13,7 +13,7 @@
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/files/atomic_file.h"
-#include "schema/picture/png_file.h"
+#include "schema/picture/raster.h"
 
 namespace dsg::cli {
 

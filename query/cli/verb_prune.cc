@@ -17,7 +17,7 @@
 #include "query/cli/verbs.h"
 #include "query/engine/prune_convert.h"
 #include "schema/base/status.h"
-#include "schema/retention/duration.h"
+#include "schema/retention/policy.h"
 #include "schema/retention/policy_file.h"
 
 namespace dsg::cli {

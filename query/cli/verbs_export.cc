@@ -17,7 +17,7 @@
 #include "query/cli/written.h"
 #include "schema/base/status.h"
 #include "schema/files/atomic_file.h"
-#include "schema/picture/png_file.h"
+#include "schema/picture/raster.h"
 
 namespace dsg::cli {
 namespace {

@@ -18,6 +18,7 @@
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/merge/merge.h"
+#include "schema/merge/merge_deltas.h"
 #include "schema/merge/refine.h"
 
 namespace dsg::query {

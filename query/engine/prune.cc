@@ -18,7 +18,6 @@
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
 #include "schema/retention/batches.h"
-#include "schema/retention/contested.h"
 #include "schema/retention/past.h"
 #include "schema/retention/plan.h"
 

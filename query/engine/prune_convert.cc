@@ -6,7 +6,7 @@
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
-#include "schema/retention/duration.h"
+#include "schema/retention/policy.h"
 
 namespace dsg::query {
 namespace {

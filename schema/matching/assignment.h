@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One-to-one assignment of the least total cost.
-// Refuses to know what is assigned.
+// One-to-one assignment of least total cost.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,19 +7,19 @@
 
 namespace dsg {
 
-/// For each row its column, -1 for rows that are left over when there are fewer columns.
+/// For each row its column; -1 for rows without one when there are fewer columns.
 ///
 /// Requires: finite costs.
 /// Cost:   O(rows^2 columns) for the smaller side as rows.
 /// Source: Kuhn 1955, by shortest augmenting paths (Jonker and Volgenant 1987).
 std::vector<int> MinimumAssignment(const Eigen::MatrixXd& cost);
 
-/// The same among pairs whose cost is at most `gate`: as many pairs as possible first, then the
-/// least cost. Rows without a partner get -1.
+/// Only pairs whose cost is at most `gate`: first as many pairs as possible, then the least cost.
+/// Rows without a partner get -1.
 /// Requires: 0 <= cost.
 std::vector<int> GatedAssignment(const Eigen::MatrixXd& cost, double gate);
 
-/// Pairs of the largest total weight; pairs of weight 0 stay apart. Requires: 0 <= weight.
+/// Pairs of the largest total weight; pairs of weight 0 are not made. Requires: 0 <= weight.
 std::vector<int> MaximumAssignment(const Eigen::MatrixXd& weight);
 
 }  // namespace dsg

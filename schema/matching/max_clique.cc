@@ -2,17 +2,218 @@
 #include "schema/matching/max_clique.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <numeric>
 #include <utility>
+#include <vector>
 
-#include "schema/matching/clique_search.h"
+#include "schema/base/check.h"
 
 namespace dsg {
+namespace {
+
+// Vertices sorted by the degree they have left, one bucket per degree, in one array.
+class DegreeBuckets {
+ public:
+  explicit DegreeBuckets(const BitsetGraph& graph)
+      : degree_(graph.vertex_count()),
+        order_(graph.vertex_count()),
+        position_(graph.vertex_count()),
+        begin_(graph.vertex_count() + 1, 0) {
+    const int count = graph.vertex_count();
+    for (int v = 0; v < count; ++v) {
+      degree_[v] = graph.Degree(v);
+      ++begin_[degree_[v] + 1];
+    }
+    for (int d = 1; d <= count; ++d) begin_[d] += begin_[d - 1];
+    std::vector<int> next(begin_.begin(), begin_.end() - 1);
+    for (int v = 0; v < count; ++v) {
+      position_[v] = next[degree_[v]]++;
+      order_[position_[v]] = v;
+    }
+  }
+
+  int VertexAt(int position) const { return order_[position]; }
+  int DegreeOf(int vertex) const { return degree_[vertex]; }
+  std::vector<int> TakeOrder() { return std::move(order_); }
+
+  // Swaps the vertex with the first of its bucket, then lets the bucket begin one later.
+  void Decrement(int vertex) {
+    const int degree = degree_[vertex];
+    const int from = position_[vertex];
+    const int to = begin_[degree];
+    const int other = order_[to];
+    std::swap(order_[from], order_[to]);
+    std::swap(position_[vertex], position_[other]);
+    ++begin_[degree];
+    --degree_[vertex];
+  }
+
+ private:
+  std::vector<int> degree_;
+  std::vector<int> order_;
+  std::vector<int> position_;
+  std::vector<int> begin_;
+};
+
+}  // namespace
+
+int64_t BitsetGraph::EdgeCount() const {
+  int64_t twice = 0;
+  for (int v = 0; v < vertex_count_; ++v) twice += Degree(v);
+  return twice / 2;
+}
+
+void BitsetGraph::AddEdge(int a, int b) {
+  DSG_CHECK(a != b);
+  SetBit(words_.data() + Offset(a), b);
+  SetBit(words_.data() + Offset(b), a);
+}
+
+void BitsetGraph::Isolate(int vertex) {
+  Word* row = words_.data() + Offset(vertex);
+  ForEachBit(row, word_count_, [&](int other) { ClearBit(words_.data() + Offset(other), vertex); });
+  std::fill(row, row + word_count_, 0);
+}
+
+Degeneracy FindDegeneracy(const BitsetGraph& graph) {
+  DegreeBuckets buckets(graph);
+  Degeneracy result;
+  result.core.resize(graph.vertex_count());
+  for (int i = 0; i < graph.vertex_count(); ++i) {
+    const int vertex = buckets.VertexAt(i);
+    const int degree = buckets.DegreeOf(vertex);
+    result.core[vertex] = degree;
+    ForEachBit(graph.Row(vertex), graph.word_count(), [&](int other) {
+      if (buckets.DegreeOf(other) > degree) buckets.Decrement(other);
+    });
+  }
+  result.order = buckets.TakeOrder();
+  return result;
+}
+
 namespace {
 
 constexpr int kGreedyStartCount = 50;
 // Counting the neighbours of a vertex takes as long as colouring several.
 constexpr int kDegreeStepCount = 4;
+
+/// A budget in steps, so that a search ends at the same place on every machine.
+class StepBudget {
+ public:
+  explicit StepBudget(int64_t step_count_max) : left_(step_count_max), max_(step_count_max) {}
+  void Spend(int64_t step_count) { left_ -= step_count; }
+  bool IsSpent() const { return left_ < 0; }
+  int64_t spent() const { return max_ - left_; }
+
+ private:
+  int64_t left_;
+  int64_t max_;
+};
+
+/// Looks for a clique of more than `size_above` vertices. Vertices coloured first are those of low
+/// number, so that the best order is by falling degree.
+class CliqueSearch {
+ public:
+  CliqueSearch(const BitsetGraph& graph, int size_above, StepBudget* budget)
+      : graph_(graph), best_size_(size_above), budget_(budget) {}
+
+  /// The largest clique of more than `size_above` vertices, or nothing.
+  std::vector<int> Run();
+
+ private:
+  // One depth of the search: candidates, and those worth trying with their colours, ascending.
+  struct Level {
+    std::vector<Word> candidates;
+    std::vector<int> vertices;
+    std::vector<int> colors;
+  };
+
+  void Expand(size_t depth);
+  void Color(Level* level, int color_min);
+  Level& LevelAt(size_t depth);
+
+  const BitsetGraph& graph_;
+  int best_size_;
+  StepBudget* budget_;
+  std::vector<Level> levels_;
+  std::vector<Word> uncolored_;
+  std::vector<Word> color_class_;
+  std::vector<int> current_;
+  std::vector<int> best_;
+};
+
+std::vector<int> CliqueSearch::Run() {
+  const int count = graph_.vertex_count();
+  // A clique has at most as many members as there are vertices, and a level is one member.
+  levels_.resize(static_cast<size_t>(count) + 1);
+  uncolored_.resize(graph_.word_count());
+  color_class_.resize(graph_.word_count());
+  Level& root = LevelAt(0);
+  for (int v = 0; v < count; ++v) SetBit(root.candidates.data(), v);
+  Expand(0);
+  return best_;
+}
+
+CliqueSearch::Level& CliqueSearch::LevelAt(size_t depth) {
+  Level& level = levels_[depth];
+  level.candidates.assign(graph_.word_count(), 0);
+  return level;
+}
+
+// Greedy colouring. A set that takes k colours holds no clique of more than k, so vertices of
+// colours below `color_min` cannot lead to a better clique and are left out.
+void CliqueSearch::Color(Level* level, int color_min) {
+  const int word_count = graph_.word_count();
+  level->vertices.clear();
+  level->colors.clear();
+  uncolored_ = level->candidates;
+  int first_word = 0;
+  for (int color = 1;; ++color) {
+    while (first_word < word_count && uncolored_[first_word] == 0) ++first_word;
+    if (first_word == word_count) return;
+    std::copy(uncolored_.begin() + first_word, uncolored_.end(), color_class_.begin() + first_word);
+    for (int w = first_word; w < word_count; ++w) {
+      while (color_class_[w] != 0) {
+        const int vertex = w * kWordBits + LowestBit(color_class_[w]);
+        ClearBit(uncolored_.data(), vertex);
+        ClearBit(color_class_.data(), vertex);
+        const Word* row = graph_.Row(vertex);
+        for (int i = w; i < word_count; ++i) color_class_[i] &= ~row[i];
+        budget_->Spend(1);
+        if (color < color_min) continue;
+        level->vertices.push_back(vertex);
+        level->colors.push_back(color);
+      }
+    }
+  }
+}
+
+void CliqueSearch::Expand(size_t depth) {
+  Level& level = levels_[depth];
+  Color(&level, best_size_ - static_cast<int>(current_.size()) + 1);
+  for (size_t i = level.vertices.size(); i-- > 0;) {
+    if (budget_->IsSpent()) return;
+    if (static_cast<int>(current_.size()) + level.colors[i] <= best_size_) return;
+    const int vertex = level.vertices[i];
+    current_.push_back(vertex);
+    Level& next = LevelAt(depth + 1);
+    const Word* row = graph_.Row(vertex);
+    Word any = 0;
+    for (int w = 0; w < graph_.word_count(); ++w) {
+      next.candidates[w] = level.candidates[w] & row[w];
+      any |= next.candidates[w];
+    }
+    if (any != 0) {
+      Expand(depth + 1);
+    } else if (static_cast<int>(current_.size()) > best_size_) {
+      best_ = current_;
+      best_size_ = static_cast<int>(best_.size());
+    }
+    current_.pop_back();
+    ClearBit(level.candidates.data(), vertex);
+  }
+}
 
 // Members of `row` that are in `set` too, as numbers within the set.
 class Ranks {
@@ -92,7 +293,7 @@ class MaxCliqueFinder {
     int best = -1;
     int best_degree = -1;
     ForEachBit(candidates.data(), word_count, [&](int vertex) {
-      // Nobody has more neighbours than all the others.
+      // No vertex has more neighbours than that.
       if (best_degree == candidate_count - 1) return;
       const Word* row = graph_.Row(vertex);
       int degree = 0;
@@ -161,7 +362,7 @@ class MaxCliqueFinder {
     return false;
   }
 
-  // Takes away candidates with too few neighbours among the candidates, once through; returns the
+  // Removes candidates with too few neighbours among the candidates, in one pass. Returns the
   // others by falling degree.
   std::vector<int> PruneByDegree(std::vector<Word>* candidates) {
     const int word_count = graph_.word_count();

@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "schema/matching/registration.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
-#include "schema/matching/adaptive_voting.h"
-#include "schema/matching/consistency.h"
-#include "schema/matching/gnc_rotation.h"
 #include "schema/matching/max_clique.h"
-#include "schema/matching/rigid_refine.h"
+#include "schema/matching/robust_estimators.h"
 
 namespace dsg {
 namespace {
@@ -23,6 +22,169 @@ constexpr int kAttemptCountMax = 8;
 // Differences among the members of a clique; beyond, some of them are as good as all.
 constexpr int64_t kDifferenceCountMax = 20'000;
 constexpr int kRefineRoundCountMax = 20;
+
+// Two million intervals take half a second and 50 MB.
+constexpr int64_t kScalePairCountMax = 1'000'000;
+
+struct ConsistencyOptions {
+  double noise_bound_m = 0.05;
+  /// Horizontal lengths and vertical differences are kept apart.
+  bool is_upright = false;
+};
+
+using Row = Eigen::Array<double, 1, Eigen::Dynamic>;
+using Flags = Eigen::Array<bool, 1, Eigen::Dynamic>;
+
+Row Lengths(const Columns& differences, bool is_horizontal) {
+  return differences.topRows(is_horizontal ? 2 : 3).colwise().norm().array();
+}
+
+// Whether correspondence `first` agrees with each later one.
+Flags AgreesWithLater(const Columns& sources, const Columns& targets, int first,
+                      const ConsistencyOptions& options) {
+  const Eigen::Index count = sources.cols() - first - 1;
+  const Columns a = sources.rightCols(count).colwise() - sources.col(first);
+  const Columns b = targets.rightCols(count).colwise() - targets.col(first);
+  const double bound = 2.0 * options.noise_bound_m;
+  Flags agrees = (Lengths(a, options.is_upright) - Lengths(b, options.is_upright)).abs() <= bound;
+  if (options.is_upright) agrees = agrees && (a.row(2) - b.row(2)).array().abs() <= bound;
+  // A point has one partner, and points at one place count as one point.
+  return agrees && a.colwise().squaredNorm().array() > 0.0 &&
+         b.colwise().squaredNorm().array() > 0.0;
+}
+
+// Two correspondences are joined when the distance of their sources and that of their targets
+// differ by no more than twice the noise bound. Correspondences that share a source or target
+// point are not joined.
+//
+// Requires: one column per correspondence; sources scaled already.
+// Cost: quadratic.
+BitsetGraph MakeConsistencyGraph(const Columns& sources, const Columns& targets,
+                                 const ConsistencyOptions& options) {
+  const int count = static_cast<int>(sources.cols());
+  BitsetGraph graph(count);
+  for (int i = 0; i + 1 < count; ++i) {
+    const Flags agrees = AgreesWithLater(sources, targets, i, options);
+    for (int j = i + 1; j < count; ++j) {
+      if (agrees(j - i - 1)) graph.AddEdge(i, j);
+    }
+  }
+  return graph;
+}
+
+// The scale on which most pairs of correspondences agree; 1 without pairs.
+// Cost: n^2 log n; subsamples the pairs of many correspondences.
+double VoteOnScale(const Columns& sources, const Columns& targets, double noise_bound_m) {
+  const int64_t count = sources.cols();
+  const int64_t pair_count = count * (count - 1) / 2;
+  const int64_t stride = std::max<int64_t>(1, pair_count / kScalePairCountMax);
+  std::vector<Measurement> ratios;
+  int64_t pair = 0;
+  for (int64_t i = 0; i < count; ++i) {
+    for (int64_t j = i + 1; j < count; ++j) {
+      if (pair++ % stride != 0) continue;
+      const double from = (sources.col(j) - sources.col(i)).norm();
+      const double to = (targets.col(j) - targets.col(i)).norm();
+      if (from <= 0.0 || to <= 0.0) continue;
+      ratios.push_back({to / from, 2.0 * noise_bound_m / from});
+    }
+  }
+  return ratios.empty() ? 1.0 : VoteAdaptively(ratios).value;
+}
+
+struct Motion {
+  double scale = 1.0;
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+
+  Columns operator*(const Columns& points) const {
+    return (scale * (rotation * points)).colwise() + translation;
+  }
+};
+
+/// Which parts of a motion are free.
+struct MotionKind {
+  bool is_scaled = false;
+  /// Turns about z only.
+  bool is_upright = false;
+};
+
+Eigen::Matrix3d CrossMatrix(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d cross;
+  cross << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
+  return cross;
+}
+
+// Jacobian of a predicted target; columns: free turns, shift and, if free, scale.
+Eigen::Matrix3Xd Jacobian(const Eigen::Vector3d& source, const Motion& motion,
+                          const MotionKind& kind) {
+  const int turn_count = kind.is_upright ? 1 : 3;
+  Eigen::Matrix3Xd jacobian(3, turn_count + 3 + (kind.is_scaled ? 1 : 0));
+  const Eigen::Matrix3d turn = -motion.scale * motion.rotation * CrossMatrix(source);
+  jacobian.leftCols(turn_count) = turn.rightCols(turn_count);
+  jacobian.middleCols<3>(turn_count) = Eigen::Matrix3d::Identity();
+  if (kind.is_scaled) jacobian.rightCols<1>() = motion.rotation * source;
+  return jacobian;
+}
+
+// Least squares over all columns; `scale` when the kind's scale is not free.
+//
+// Source: Umeyama, 1991.
+Motion FitMotion(const Columns& sources, const Columns& targets, const MotionKind& kind,
+                 double scale) {
+  Motion motion;
+  motion.scale = scale;
+  const Eigen::Vector3d source_mean = sources.rowwise().mean();
+  const Eigen::Vector3d target_mean = targets.rowwise().mean();
+  const Columns a = sources.colwise() - source_mean;
+  const Columns b = targets.colwise() - target_mean;
+  motion.rotation = WeightedRotation(a, b, Eigen::VectorXd::Ones(a.cols()), kind.is_upright);
+  if (kind.is_scaled && a.squaredNorm() > 0.0) {
+    const double fitted = (motion.rotation * a).cwiseProduct(b).sum() / a.squaredNorm();
+    if (fitted > 0.0) motion.scale = fitted;
+  }
+  motion.translation = target_mean - motion.scale * (motion.rotation * source_mean);
+  return motion;
+}
+
+// Covariance of a small turn of the source (rad, applied before the rotation) and a shift (m); zero
+// where the kind has no freedom. The residuals give the noise variance.
+//
+// Requires: at least three columns, two if upright.
+Eigen::Matrix<double, 6, 6> MotionCovariance(const Columns& sources, const Columns& targets,
+                                             const Motion& motion, const MotionKind& kind) {
+  const int turn_count = kind.is_upright ? 1 : 3;
+  const int size = turn_count + 3 + (kind.is_scaled ? 1 : 0);
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(size, size);
+  for (Eigen::Index i = 0; i < sources.cols(); ++i) {
+    const Eigen::Matrix3Xd jacobian = Jacobian(sources.col(i), motion, kind);
+    information += jacobian.transpose() * jacobian;
+  }
+  const double freedom = static_cast<double>(std::max<Eigen::Index>(1, 3 * sources.cols() - size));
+  const double variance = (targets - motion * sources).squaredNorm() / freedom;
+  const Eigen::MatrixXd full =
+      variance * information.completeOrthogonalDecomposition().pseudoInverse();
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  covariance.bottomRightCorner(turn_count + 3, turn_count + 3) =
+      full.topLeftCorner(turn_count + 3, turn_count + 3);
+  return covariance;
+}
+
+// Root mean square distance from the mean, in the direction in which the points spread least among
+// those the rotation needs: across their main line, or horizontally when upright.
+double SpreadForRotation(const Columns& points, bool is_upright) {
+  const Columns centred = points.colwise() - points.rowwise().mean();
+  const Eigen::Matrix3d scatter =
+      centred * centred.transpose() / static_cast<double>(points.cols());
+  if (is_upright) return std::sqrt(scatter(0, 0) + scatter(1, 1));
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(scatter);
+  return std::sqrt(std::max(0.0, solver.eigenvalues()(1)));
+}
+
+std::vector<double> Misses(const Columns& sources, const Columns& targets, const Motion& motion) {
+  const Eigen::VectorXd misses = (targets - motion * sources).colwise().norm().transpose();
+  return {misses.begin(), misses.end()};
+}
 
 struct Problem {
   const std::vector<Correspondence>& correspondences;
@@ -128,7 +290,7 @@ Eigen::Vector3d VoteOnTranslation(const Columns& differences, double bound) {
   return translation;
 }
 
-// The nearest first, each point of either cloud once; indices ascending.
+// Selects pairs by distance, each point of either cloud once. Order: ascending indices.
 std::vector<int> SelectInliers(const Problem& problem, const Motion& motion) {
   const std::vector<double> misses = Misses(problem.sources, problem.targets, motion);
   std::vector<std::pair<double, int>> near;
@@ -156,7 +318,7 @@ std::vector<int> SelectInliers(const Problem& problem, const Motion& motion) {
   return inliers;
 }
 
-// Fits and selects in turn until the inliers stay the same. A step that loses inliers is undone.
+// Alternates fitting and selection until the inliers are stable. Undoes a step that loses inliers.
 void Refine(const Problem& problem, Fit* fit) {
   for (int round = 0; round < kRefineRoundCountMax; ++round) {
     if (fit->inliers.size() < problem.InlierCountMin()) return;

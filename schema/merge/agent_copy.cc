@@ -7,7 +7,7 @@
 #include <tuple>
 
 #include "schema/base/status.h"
-#include "schema/merge/transform_node.h"
+#include "schema/model/rigid_motion.h"
 
 namespace dsg::merge {
 namespace {
@@ -21,15 +21,15 @@ FactorKey KeyOf(const PoseFactor& factor) {
   return {factor.type, factor.from_ns, factor.to_ns, factor.to_agent};
 }
 
-// Through a codec, and through a transform told from nodes that went through it.
-constexpr double kSameM = 1e-3;
-constexpr double kSameRad = 1e-3;
+// Tolerances for poses that went through the codec, and for a transform estimated from such nodes.
+constexpr double kSamePoseM = 1e-3;
+constexpr double kSamePoseRad = 1e-3;
 
 bool IsSame(const TimedPose& a, const TimedPose& b) {
   if (a.time_ns != b.time_ns || a.flags != b.flags) return false;
-  if ((a.map_T_agent.position - b.map_T_agent.position).norm() > kSameM) return false;
+  if ((a.map_T_agent.position - b.map_T_agent.position).norm() > kSamePoseM) return false;
   return (a.flags & pose_flags::kNoOrientation) != 0 ||
-         AngleBetween(a.map_T_agent.orientation, b.map_T_agent.orientation) <= kSameRad;
+         AngleBetween(a.map_T_agent.orientation, b.map_T_agent.orientation) <= kSamePoseRad;
 }
 
 using Poses = std::vector<TimedPose>;
@@ -41,10 +41,10 @@ const TimedPose* Find(const Poses& poses, TimeNs time_ns) {
   return found == poses.end() || found->time_ns != time_ns ? nullptr : &*found;
 }
 
-// What is believed after three have spoken: the other map now, this one, and the other map as it
-// was when this one followed it. A pose that is here as it was there follows; one that others have
-// written, and one that they have removed, stays so. What only `known` has is nobody's correction:
-// the other map may have forgotten it. `has_own`: others go on with the track.
+// A three-way merge of poses: `wanted` is the other map now, `known` this map, `bases` the other
+// map when it was copied. A pose that is unchanged since the copy follows the other map; one that
+// others have written or removed here stays so. Poses that only `known` has stay, because the other
+// map may have forgotten them. `has_own`: others extend the track here.
 Poses Reconcile(const Poses& wanted, const Poses& known, const std::vector<Poses>& bases,
                 bool has_own) {
   const auto was_in_all = [&](TimeNs time_ns) {
@@ -76,7 +76,7 @@ Poses Reconcile(const Poses& wanted, const Poses& known, const std::vector<Poses
   return believed;
 }
 
-// From the first to the last of `wanted` that `known` has not: an empty span if it has all.
+// From the first to the last pose of `wanted` that `known` lacks; empty if it has all.
 std::span<const TimedPose> PartThatDiffers(const Poses& wanted, const Poses& known) {
   size_t first = wanted.size();
   size_t last = 0;
@@ -184,7 +184,7 @@ absl::StatusOr<std::vector<std::vector<TimedPose>>> AgentCopy::CarriedBefore(
               TransformPose(plan_.map_T_other_before, &poses.back());
               return true;
             });
-    // Not all of them had it.
+    // Not every base has the agent.
     if (ReasonOf(read) != Reason::kAgentUnknown) DSG_RETURN_IF_ERROR(read);
   }
   return all;

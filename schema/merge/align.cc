@@ -3,16 +3,240 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "schema/base/status.h"
 #include "schema/matching/registration.h"
-#include "schema/merge/align_score.h"
-#include "schema/merge/vote_transform.h"
+#include "schema/merge/landmarks.h"
+#include "schema/merge/point_grid.h"
 
 namespace dsg::merge {
 namespace {
+
+// A map has observed what is this close to one of its places beyond its clearance, or to a
+// landmark.
+constexpr double kSeenBeyondM = 0.5;
+constexpr double kSeenAroundM = 1.5;
+// Walls are thick, and clearances are measured on a grid.
+constexpr double kWallSlackM = 0.35;
+constexpr double kClearanceMaxM = 4.0;
+
+/// One map, prepared for comparison under many transforms.
+struct AlignSide {
+  std::vector<Landmark> landmarks;
+  /// x, y, z and clearance of places; 0 without a clearance.
+  std::vector<Eigen::Vector4d> places;
+  /// Walls, with their boxes in their frames.
+  std::vector<std::pair<Pose3d, Box3d>> walls;
+  /// Share of its own places near walls that stand in one: mapped walls cross doors.
+  double own_blocked_share = 0.0;
+};
+
+struct AlignScore {
+  /// Indices of landmarks of `into` and of `other`.
+  std::vector<std::pair<int, int>> matches;
+  /// Landmarks of both that have no match although the other map has observed their place.
+  int missing_count = 0;
+  /// Those, and the matched ones.
+  int shared_count = 0;
+  /// Places near a wall of the other map, and those of them that stand in one.
+  int walled_count = 0;
+  int blocked_count = 0;
+  /// Share of blocked places beyond what a map's own walls block; 0 to 1.
+  double blocked_share = 0.0;
+  /// Share of matched landmarks among those that both maps could have seen; 0 to 1.
+  double agreeing_share = 0.0;
+  double score = 0.0;
+};
+
+std::vector<Eigen::Vector3d> PositionsOf(const std::vector<Landmark>& landmarks) {
+  std::vector<Eigen::Vector3d> positions;
+  positions.reserve(landmarks.size());
+  for (const Landmark& landmark : landmarks) positions.push_back(landmark.position);
+  return positions;
+}
+
+std::vector<Eigen::Vector3d> PositionsOf(const std::vector<Eigen::Vector4d>& places) {
+  std::vector<Eigen::Vector3d> positions;
+  positions.reserve(places.size());
+  for (const Eigen::Vector4d& place : places) positions.push_back(place.head<3>());
+  return positions;
+}
+
+// For each point the nearest landmark of `side` of its kind within the gate; -1 if there is none.
+std::vector<int> NearestOf(const std::vector<Landmark>& points, const AlignSide& side,
+                           const Pose3d& side_T_points, double gate_m) {
+  const PointGrid grid(PositionsOf(side.landmarks), std::max(gate_m, 0.25));
+  std::vector<int> nearest(points.size(), -1);
+  for (size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d at = side_T_points * points[i].position;
+    double best = gate_m;
+    grid.ForEachNear(at, gate_m, [&](int candidate) {
+      const Landmark& landmark = side.landmarks[static_cast<size_t>(candidate)];
+      const double distance = (landmark.position - at).norm();
+      const bool is_better = distance < best || (distance == best && candidate < nearest[i]);
+      if (!is_better || landmark.kind != points[i].kind || !AreAlike(landmark, points[i])) return;
+      best = distance;
+      nearest[i] = candidate;
+    });
+  }
+  return nearest;
+}
+
+// Number of `points` without a match although `side` has observed their place.
+int CountMissing(const std::vector<Landmark>& points, const std::vector<char>& is_matched,
+                 const AlignSide& side, const Pose3d& side_T_points) {
+  const PointGrid places(PositionsOf(side.places), 1.0);
+  const PointGrid things(PositionsOf(side.landmarks), 1.0);
+  int count = 0;
+  for (size_t k = 0; k < points.size(); ++k) {
+    if (is_matched[k] != 0) continue;
+    const Eigen::Vector3d at = side_T_points * points[k].position;
+    bool is_seen = false;
+    places.ForEachNear(at, kClearanceMaxM + kSeenBeyondM, [&](int i) {
+      const Eigen::Vector4d& place = side.places[static_cast<size_t>(i)];
+      const double reach = std::min(place.w(), kClearanceMaxM) + kSeenBeyondM;
+      const Eigen::Vector3d offset = at - place.head<3>();
+      is_seen |= offset.head<2>().norm() < reach && std::abs(offset.z()) < 3.0;
+    });
+    if (!is_seen && side.places.empty()) {
+      things.ForEachNear(at, kSeenAroundM, [&](int i) {
+        is_seen |= (side.landmarks[static_cast<size_t>(i)].position - at).norm() < kSeenAroundM;
+      });
+    }
+    count += is_seen ? 1 : 0;
+  }
+  return count;
+}
+
+struct Blocked {
+  int walled_count = 0;
+  int blocked_count = 0;
+};
+
+// Counts places of `free` near walls of `side`, and those of them that stand in one.
+Blocked CountBlocked(const AlignSide& free, const AlignSide& side, const Pose3d& side_T_free) {
+  std::vector<Eigen::Vector3d> places;
+  places.reserve(free.places.size());
+  for (const Eigen::Vector4d& place : free.places) places.push_back(side_T_free * place.head<3>());
+  const PointGrid grid(places, 1.0);
+  std::vector<char> is_near(places.size(), 0);
+  std::vector<char> is_blocked(places.size(), 0);
+  for (const auto& [pose, box] : side.walls) {
+    const Pose3d wall_T_side = pose.Inverse();
+    const double reach = 0.5 * box.diagonal().norm() + 1.0;
+    grid.ForEachNear(pose * box.center(), reach, [&](int i) {
+      const size_t place = static_cast<size_t>(i);
+      // Compares heights of a body only: places are on the floor or in the air.
+      Eigen::Vector3d at = wall_T_side * places[place];
+      at.z() = std::clamp(at.z(), box.min().z() - 0.5, box.max().z());
+      const double distance = DistanceToBox(at, box);
+      if (distance > 1.0) return;
+      is_near[place] = 1;
+      const double clearance = std::min(free.places[place].w(), 1.0);
+      if (distance < clearance - kWallSlackM) is_blocked[place] = 1;
+    });
+  }
+  return {static_cast<int>(std::count(is_near.begin(), is_near.end(), 1)),
+          static_cast<int>(std::count(is_blocked.begin(), is_blocked.end(), 1))};
+}
+
+double ShareOf(double part, double whole) { return part / std::max(1.0, whole); }
+
+// Subtracts `center` from all positions, to keep precision far from the origin.
+AlignSide MakeSide(const MapContent& content, bool with_regions, const Eigen::Vector3d& center) {
+  AlignSide side;
+  side.landmarks = LandmarksOf(content, with_regions);
+  for (Landmark& landmark : side.landmarks) landmark.position -= center;
+  for (const Node& node : content.nodes) {
+    if (node.kind == kinds::kPlace) {
+      Eigen::Vector4d place;
+      place << node.map_T_node.position - center, ClearanceOf(node);
+      side.places.push_back(place);
+    } else if (node.structure.has_value() && !node.box_node.isEmpty() &&
+               node.structure->structure_type == "wall") {
+      Pose3d pose = node.map_T_node;
+      pose.position -= center;
+      side.walls.emplace_back(pose, node.box_node);
+    }
+  }
+  const Blocked own = CountBlocked(side, side, Pose3d());
+  side.own_blocked_share = ShareOf(own.blocked_count, own.walled_count);
+  return side;
+}
+
+// Mutually nearest pairs; each landmark is in at most one.
+std::vector<std::pair<int, int>> MatchLandmarks(const AlignSide& into, const AlignSide& other,
+                                                const Pose3d& into_T_other, double gate_m) {
+  const std::vector<int> forward = NearestOf(other.landmarks, into, into_T_other, gate_m);
+  const std::vector<int> backward =
+      NearestOf(into.landmarks, other, into_T_other.Inverse(), gate_m);
+  std::vector<std::pair<int, int>> matches;
+  for (size_t i = 0; i < forward.size(); ++i) {
+    const int partner = forward[i];
+    if (partner < 0 || backward[static_cast<size_t>(partner)] != static_cast<int>(i)) continue;
+    matches.emplace_back(partner, static_cast<int>(i));
+  }
+  return matches;
+}
+
+// Expected number of transforms between two random maps of these sizes under which as many
+// landmarks agree. Two pairs determine a transform; the others agree by chance (Poisson).
+double ChanceOf(const AlignSide& into, const AlignSide& other, const AlignScore& score,
+                double gate_m) {
+  Box3d box;
+  for (const Landmark& landmark : into.landmarks) box.extend(landmark.position);
+  if (box.isEmpty()) return 1.0;
+  const double area = std::max(1.0, (box.sizes().x() + 1.0) * (box.sizes().y() + 1.0));
+  double pair_count = 0.0;
+  for (const KindPair& kind : PairKinds(into.landmarks, other.landmarks)) {
+    pair_count += static_cast<double>(kind.into.size() * kind.other.size());
+  }
+  const double landmark_count = static_cast<double>(into.landmarks.size() + other.landmarks.size());
+  const double shared = std::min(1.0, score.shared_count / std::max(1.0, landmark_count));
+  const double expected = pair_count * shared * std::numbers::pi * gate_m * gate_m / area;
+  // The distances of the two pairs must agree; the share of such pairs depends on the size of the
+  // map.
+  const double alike = std::min(1.0, 4.0 * gate_m / std::sqrt(area));
+  const double guess_count = std::max(1.0, pair_count * pair_count * alike);
+  const int free = std::max(0, static_cast<int>(score.matches.size()) - 2);
+  // The Poisson tail is at most its first term times a geometric series.
+  const double first =
+      free * std::log(std::max(expected, 1e-12)) - expected - std::lgamma(free + 1.0);
+  const double ratio = expected / (free + 1.0);
+  if (ratio >= 0.9) return guess_count;
+  return std::exp(std::log(guess_count) + first - std::log1p(-ratio));
+}
+
+AlignScore ScoreTransform(const AlignSide& into, const AlignSide& other, const Pose3d& into_T_other,
+                          double gate_m) {
+  AlignScore score;
+  const Pose3d other_T_into = into_T_other.Inverse();
+  score.matches = MatchLandmarks(into, other, into_T_other, gate_m);
+  std::vector<char> mine(into.landmarks.size(), 0);
+  std::vector<char> theirs(other.landmarks.size(), 0);
+  for (const auto& [a, b] : score.matches) {
+    mine[static_cast<size_t>(a)] = theirs[static_cast<size_t>(b)] = 1;
+  }
+  const int match_count = static_cast<int>(score.matches.size());
+  score.missing_count = CountMissing(other.landmarks, theirs, into, into_T_other) +
+                        CountMissing(into.landmarks, mine, other, other_T_into);
+  score.shared_count = 2 * match_count + score.missing_count;
+  const Blocked there = CountBlocked(other, into, into_T_other);
+  const Blocked here = CountBlocked(into, other, other_T_into);
+  score.walled_count = there.walled_count + here.walled_count;
+  score.blocked_count = there.blocked_count + here.blocked_count;
+  const double expected =
+      there.walled_count * other.own_blocked_share + here.walled_count * into.own_blocked_share;
+  score.blocked_share = ShareOf(std::max(0.0, score.blocked_count - expected), score.walled_count);
+  score.agreeing_share = ShareOf(2.0 * match_count, score.shared_count);
+  score.score = match_count * score.agreeing_share * std::max(0.0, 1.0 - 3.0 * score.blocked_share);
+  return score;
+}
 
 struct Candidate {
   Pose3d into_T_other;
@@ -40,13 +264,7 @@ Eigen::Vector3d CenterOf(const MapContent& content) {
   return box.isEmpty() ? Eigen::Vector3d::Zero().eval() : Eigen::Vector3d(box.center());
 }
 
-std::vector<Eigen::Vector3d> PositionsOf(const AlignSide& side) {
-  std::vector<Eigen::Vector3d> positions;
-  for (const Landmark& landmark : side.landmarks) positions.push_back(landmark.position);
-  return positions;
-}
-
-// All pairs that could be under a coarse pose; the registration tells which are.
+// Candidate pairs under a coarse pose; the registration selects among them.
 std::vector<Correspondence> PairsNear(const AlignSide& into, const AlignSide& other,
                                       const Pose3d& into_T_other, double gate_m) {
   std::vector<Correspondence> pairs;
@@ -76,7 +294,7 @@ class Aligner {
   }
 
  private:
-  // The gate narrows as the pose gets better.
+  // The gate narrows as the pose improves.
   std::optional<Candidate> Improve(Pose3d pose) const {
     Candidate candidate;
     for (const double gate_m : {2.0, 1.0, 0.7, 0.7}) {
@@ -96,8 +314,8 @@ class Aligner {
     options.noise_bound_m = options_.noise_bound_m;
     options.is_upright = true;
     options.clique_step_count_max = 300'000;
-    return Register(PositionsOf(other_), PositionsOf(into_), PairsNear(into_, other_, pose, gate_m),
-                    options);
+    return Register(PositionsOf(other_.landmarks), PositionsOf(into_.landmarks),
+                    PairsNear(into_, other_, pose, gate_m), options);
   }
 
   AlignSide into_;
@@ -115,13 +333,13 @@ absl::Status NoRegistration(const std::string& why) {
                                 "; give one with --transform X,Y,Z,YAW"));
 }
 
-std::string Describe(const Pose3d& pose) {
+std::string DescribeForPeople(const Pose3d& pose) {
   const Eigen::Vector3d x = pose.orientation * Eigen::Vector3d::UnitX();
   return absl::StrFormat("(%.1f m, %.1f m, %.0f degrees)", pose.position.x(), pose.position.y(),
                          std::atan2(x.y(), x.x()) * 57.29577951308232);
 }
 
-// Undoes the centring of both sides.
+// Reverts the centring of both sides.
 Pose3d WithCenters(const Pose3d& pose, const Eigen::Vector3d& into_center,
                    const Eigen::Vector3d& other_center) {
   return {into_center + pose.position - pose.orientation * other_center, pose.orientation};
@@ -150,7 +368,7 @@ absl::Status JudgeAlone(const Candidate& best, const AlignOptions& options) {
   return absl::OkStatus();
 }
 
-// Nothing speaks against it.
+// Nothing contradicts the transform.
 bool IsClean(const AlignScore& score, const AlignOptions& options) {
   return score.agreeing_share >= options.clean_agreeing_share_min &&
          score.walled_count >= options.clean_walled_count_min &&
@@ -172,7 +390,8 @@ absl::Status JudgeAgainst(const Candidate& rival, const Candidate& best,
       "the other",
       is_alike ? "two answers are as good as each other"
                : "the best answer is hardly better than any other",
-      agreeing, rival_agreeing, Describe(best.into_T_other), Describe(rival.into_T_other)));
+      agreeing, rival_agreeing, DescribeForPeople(best.into_T_other),
+      DescribeForPeople(rival.into_T_other)));
 }
 
 absl::Status Judge(const std::vector<Candidate>& candidates, const AlignOptions& options,

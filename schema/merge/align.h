@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where another map lies in the frame of this one, from what both have seen.
-// Refuses to choose between two answers that are as good as each other: buildings repeat.
+// Estimates the transform from another map to this one from what both have seen. Buildings repeat,
+// so there is no answer when two transforms explain the maps equally well.
 #pragma once
 
 #include <string>
@@ -13,27 +13,27 @@
 namespace dsg::merge {
 
 struct AlignOptions {
-  /// Two sightings of one thing are no further apart than this, metres.
+  /// Largest distance between two sightings of one thing, metres.
   double noise_bound_m = 0.35;
-  /// Fewer landmarks that agree are no proof.
+  /// Fewest agreeing landmarks.
   int agreeing_count_min = 4;
-  /// Where maps have fewer things than this, rooms and places help.
+  /// Below this number of things in either map, rooms and places count as landmarks too.
   int few_things = 12;
-  /// Whatever lies elsewhere must score less than this share of the best, and fewer things than
-  /// this share of its may agree: maps of strangers have many answers that are alike.
+  /// Limits for the best other transform, relative to the best one: its score, and its number of
+  /// agreeing things. Maps of different buildings have many transforms of similar score.
   double rival_share_max = 0.75;
   double rival_count_share_max = 0.6;
-  /// Where nothing speaks against an answer, that is where so many of what both could have seen are
-  /// found and next to no places stand in walls, more things may agree elsewhere.
+  /// A looser limit on agreeing things where nothing contradicts the best transform: most landmarks
+  /// that both maps could have seen agree, and hardly any places stand in walls.
   double clean_agreeing_share_min = 0.6;
   double clean_blocked_share_max = 0.05;
   int clean_walled_count_min = 20;
   double clean_rival_count_share_max = 0.9;
-  /// How often maps of strangers may agree as well as these do.
+  /// Largest probability that unrelated maps agree as well as these do.
   double chance_max = 0.001;
-  /// Of what both maps could have seen, at least this share was found in both.
+  /// Least share of agreeing landmarks among those that both maps could have seen.
   double agreeing_share_min = 0.25;
-  /// Of the places near walls of the other map, no more than this share stand in them.
+  /// Largest share of places that stand in walls, among those near walls of the other map.
   double blocked_share_max = 0.15;
 };
 
@@ -43,30 +43,32 @@ struct Alignment {
   /// Root mean square distance of the landmarks that agree, metres.
   double residual_m = 0.0;
   int agreeing_count = 0;
-  /// Landmarks of either map that lie where the other has been too.
+  /// Landmarks of either map that lie where the other map has been.
   int shared_count = 0;
-  /// Score of the best answer elsewhere, against this one; 0 = there is none.
+  /// Score of the best transform elsewhere, relative to this one; 0 = there is none.
   double rival_share = 0.0;
-  /// Of rotation (rad) and translation (m), small turns of the other frame's axes; tilts are 0.
+  /// Rotation (rad, small turns about the axes of the other frame) before translation (m); tilts
+  /// are 0.
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
 };
 
-/// Votes of pairs of landmarks give guesses, registration makes each of them exact, and what agrees
-/// against what does not (things missing where both maps looked, places inside walls) chooses.
+/// Votes of landmark pairs give candidates, and registration refines each. The score compares
+/// agreeing landmarks with contradictions: things missing where both maps looked, places inside
+/// walls.
 ///
 /// Requires: z is up in both frames.
-/// Errors: NOT_FOUND/NO_REGISTRATION saying how many agreed or which two answers are alike; what
+/// Errors: NOT_FOUND/NO_REGISTRATION saying how many agreed or which two transforms are alike; what
 /// `stop` returned.
-/// Source: TEASER (Yang, Shi and Carlone, 2021) for the registration of each guess.
+/// Source: TEASER (Yang, Shi and Carlone, 2021) for the registration of each candidate.
 absl::StatusOr<Alignment> EstimateTransform(const MapContent& into, const MapContent& other,
                                             const AlignOptions& options, const StopCheck& stop);
 
-/// What speaks for a transform, whoever gave it, and what against it.
+/// Evidence for and against a transform, whatever its origin.
 struct Evidence {
   int agreeing_count = 0;
-  /// Landmarks of either map that the other does not have though it has been there.
+  /// Landmarks of either map that the other lacks although it has been there.
   int missing_count = 0;
-  /// Of the places near walls of the other map, those that stand in them; 0 to 1.
+  /// Share of places that stand in walls, among those near walls of the other map; 0 to 1.
   double blocked_share = 0.0;
 };
 

@@ -16,7 +16,7 @@ using Point = bg::model::d2::point_xy<double>;
 using Polygon = bg::model::polygon<Point>;
 using MultiPolygon = bg::model::multi_polygon<Polygon>;
 
-// A millimetre grid keeps nearly parallel sides from confusing the overlay.
+// Snapping to millimetres makes the overlay robust to nearly parallel sides.
 double Snapped(double metres) { return std::round(metres * 1000.0) / 1000.0; }
 
 Polygon Hull(const Polygon& polygon) {
@@ -49,7 +49,7 @@ Polygon2d RectangleOf(const Box3d& box) {
   return {low.head<2>(), {high.x(), low.y()}, high.head<2>(), {low.x(), high.y()}};
 }
 
-// nullopt for outlines that the overlay cannot take.
+// nullopt for outlines that the overlay rejects.
 std::optional<double> TryShared(const Polygon& a, const Polygon& b) {
   try {
     MultiPolygon shared;
@@ -93,7 +93,7 @@ Polygon2d UnionOf(const Polygon2d& a, const Polygon2d& b) {
       return FromBoost(bg::is_valid(slim) && slim.outer().size() > 3 ? slim : both.front());
     }
   } catch (const bg::exception&) {
-    // The hull below holds both.
+    // Falls through to the hull of both.
   }
   Polygon corners;
   for (const Polygon2d* outline : {&a, &b}) {

@@ -10,7 +10,7 @@
 namespace dsg::merge {
 namespace {
 
-// Boxes that differ by less differ by noise, and uniting them would only ever grow them.
+// Smaller differences of boxes are noise; uniting such boxes would grow them again and again.
 constexpr double kBoxNoiseM = 0.1;
 constexpr double kSameM = 1e-6;
 
@@ -27,7 +27,7 @@ void WidenObserved(const Node& seen, Node* known) {
   }
 }
 
-// One that had left and was seen again later is back.
+// A node that had ended and is seen again later continues.
 void WidenValidity(const Node& seen, Node* known) {
   known->valid.from_ns = std::min(known->valid.from_ns, seen.valid.from_ns);
   if (known->valid.to_ns == kTimeMax || seen.valid.to_ns <= known->valid.to_ns) return;
@@ -40,7 +40,7 @@ bool ReachesOut(const Box3d& inner, const Box3d& outer) {
          ((inner.max() - outer.max()).array() > kBoxNoiseM).any();
 }
 
-// Grows the box of `node` over that of `more`, if that reaches out of it by more than noise.
+// Extends the box of `node` to that of `more`, if it reaches out by more than noise.
 void GrowOver(const Node& more, Node* node) {
   if (more.box_node.isEmpty()) return;
   if (node->box_node.isEmpty()) {
@@ -50,7 +50,7 @@ void GrowOver(const Node& more, Node* node) {
   if (ReachesOut(box, node->box_node)) node->box_node.extend(box);
 }
 
-// The whole shape is known from a model, so its box outweighs any number of looks.
+// A model gives the whole shape, so its box wins over any number of observations.
 bool IsBetterSeen(const Node& seen, int64_t seen_count, const Node& known) {
   const bool seen_model = seen.object.has_value() && seen.object->model.has_value();
   const bool known_model = known.object.has_value() && known.object->model.has_value();
@@ -70,7 +70,7 @@ void TakeGeometry(const Node& seen, Node* known) {
       known->object->registration_residual_m = seen.object->registration_residual_m;
     }
   }
-  // A model shows the whole thing; otherwise the other side of it may have been seen before.
+  // A model covers the whole thing; without one, earlier observations may have seen another side.
   if (!known->object.has_value() || !known->object->model.has_value()) GrowOver(before, known);
 }
 
@@ -98,7 +98,7 @@ void FuseRegion(const Node& seen, Node* known) {
   }
   const double area = AreaOf(known->region->footprint_map);
   const Polygon2d both = UnionOf(known->region->footprint_map, seen.region->footprint_map);
-  // Slivers along a wall are noise, and would be added again and again.
+  // Slivers along a wall are noise and would accumulate.
   if (AreaOf(both) > 1.01 * area) {
     known->region->footprint_map = both;
     const auto noted = known->attributes.find("area_m2");
@@ -119,8 +119,8 @@ void FuseClass(const Node& seen, Node* known) {
   known->class_name = seen.class_name;
 }
 
-// Each map's own observations count once, by whatever way they came: the larger of two counts of
-// one origin is the later one.
+// Counts the own observations of each map once, over whichever maps they came. Of two counts of one
+// origin the larger is the later.
 void CountObservations(const std::string& into, Origin origin, bool is_known, const Node& seen,
                        Node* known) {
   int64_t own_count = OwnCount(*known);
@@ -137,7 +137,7 @@ void CountObservations(const std::string& into, Origin origin, bool is_known, co
     for (const Origin& before : OriginsOf(*known)) {
       if (before.map != each.map || before.id != each.id) continue;
       if (is_seen && !is_known) {
-        // Another map had this name; what it observed has been observed.
+        // Another map had this name before; its observations still count.
         own_count = AddCounts(own_count, before.observation_count);
         continue;
       }
@@ -168,7 +168,7 @@ bool AreClose(const Polygon2d& a, const Polygon2d& b) {
   });
 }
 
-// What was written in the frame of the map stays to the bit where it is the same.
+// Keeps the bits of numbers that are equal within tolerance.
 void KeepNumbers(const Node& known, Node* fresh) {
   if (!IsSameGeometry(known, *fresh)) return;
   fresh->map_T_node = known.map_T_node;
@@ -219,7 +219,7 @@ void FuseNode(const std::string& into, Origin origin, bool is_known, const Node&
   }
   FuseClass(seen, known);
   if (IsAgentKind(known->kind)) {
-    // An agent is where its track ends.
+    // The position of an agent is the end of its track.
     if (is_later) known->map_T_node = seen.map_T_node;
     return;
   }
@@ -247,7 +247,7 @@ void RefreshCopy(Origin origin, const Node& seen, Node* known) {
     fresh.valid.to_ns = known->valid.to_ns;
   }
   KeepNumbers(*known, &fresh);
-  // Its box may have been grown over children that this map alone knows.
+  // Its box may cover children that only this map has.
   if (!fresh.box_node.isEmpty() && AreClose(known->map_T_node, fresh.map_T_node) &&
       !known->box_node.isEmpty()) {
     fresh.box_node.extend(known->box_node);

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points of a map that another map of the same place would hold too.
-// Refuses what has no class: a thing that could be anything matches everything.
+// Landmarks that another map of the same place should contain too, and votes of their pairs for
+// coarse transforms between two upright maps. The best vote may be wrong; align.h decides.
 #pragma once
 
 #include <string>
 #include <vector>
 
+#include "absl/status/statusor.h"
+#include "schema/base/stop_check.h"
 #include "schema/merge/map_content.h"
 
 namespace dsg::merge {
@@ -18,14 +20,14 @@ struct Landmark {
   double size_m = 0.0;
 };
 
-/// Things with a class that are believed to be there still. Where there are few (`few` or less),
-/// rooms with a class and places too.
+/// Things with a class that are still there; `with_regions`: rooms and places too. Things without a
+/// class are left out: they would match everything.
 std::vector<Landmark> LandmarksOf(const MapContent& content, bool with_regions);
 
-/// Lengths differ by less than a factor of two, or one is not known.
+/// Sizes differ by less than a factor of two, or one is unknown.
 bool AreAlike(const Landmark& a, const Landmark& b);
 
-/// Indices of pairs by kind: what the landmarks of one map could be in the other.
+/// The landmarks of one kind in both maps, by index.
 struct KindPair {
   std::vector<int> into;
   std::vector<int> other;
@@ -33,5 +35,27 @@ struct KindPair {
 /// Ascending by kind; only kinds that both have.
 std::vector<KindPair> PairKinds(const std::vector<Landmark>& into,
                                 const std::vector<Landmark>& other);
+
+/// into = Rz(yaw) other + shift; accurate to about a metre and a yaw step.
+struct Guess {
+  double yaw_rad = 0.0;
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();
+  double votes = 0.0;
+};
+
+struct VoteOptions {
+  double yaw_step_rad = 0.0349;
+  double cell_m = 0.5;
+  int guess_count_max = 40;
+};
+
+/// The guesses with the most votes, best first, no two of them close to each other.
+///
+/// Cost: pairs of the same kind times steps of the yaw.
+/// Errors: what `stop` returned.
+absl::StatusOr<std::vector<Guess>> VoteOnTransform(const std::vector<Landmark>& into,
+                                                   const std::vector<Landmark>& other,
+                                                   const VoteOptions& options,
+                                                   const StopCheck& stop);
 
 }  // namespace dsg::merge

@@ -2,9 +2,12 @@
 #include "schema/merge/map_content.h"
 
 #include <algorithm>
+#include <set>
+#include <string>
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
+#include "schema/model/rigid_motion.h"
 
 namespace dsg::merge {
 namespace {
@@ -15,7 +18,7 @@ void Widen(TimeNs first_ns, TimeNs last_ns, std::optional<Interval>* observed) {
   (*observed)->to_ns = std::max((*observed)->to_ns, last_ns + 1);
 }
 
-// A node that a commit replaces meanwhile may have been shown twice.
+// A node that a concurrent commit replaces may be shown twice.
 template <typename T, typename KeyOf>
 void SortUnique(std::vector<T>* items, KeyOf key_of) {
   std::sort(items->begin(), items->end(),
@@ -26,6 +29,15 @@ void SortUnique(std::vector<T>* items, KeyOf key_of) {
 }
 
 }  // namespace
+
+Eigen::Vector3d MiddleOf(const Node& node) {
+  return node.box_node.isEmpty() ? node.map_T_node.position
+                                 : Eigen::Vector3d(node.map_T_node * node.box_node.center());
+}
+
+double ClearanceOf(const Node& node) {
+  return node.place.has_value() ? node.place->clearance_m : 0.0;
+}
 
 std::string ClassKey(const Node& node) {
   if (node.class_name == "unknown" || node.class_name == "undefined") return "";
@@ -99,6 +111,66 @@ absl::StatusOr<MapContent> ReadContent(const Snapshot& snapshot, const StopCheck
   SortUnique(&content.edges, [](const Edge& edge) { return edge.key(); });
   content.Index();
   return content;
+}
+
+absl::StatusOr<Vocabulary> JoinVocabularies(const MapContent& into, const MapContent& other) {
+  Vocabulary vocabulary;
+  std::map<std::string, Layer> layer_by_name;
+  std::set<LayerId> layer_ids;
+  for (const Layer& layer : into.layers) {
+    layer_by_name[layer.name] = layer;
+    layer_ids.insert(layer.id);
+  }
+  for (Layer layer : other.layers) {
+    const auto known = layer_by_name.find(layer.name);
+    if (known != layer_by_name.end() && known->second.rank != layer.rank) {
+      return MakeError(
+          Reason::kFramesIncompatible,
+          absl::StrCat("layer \"", layer.name, "\" has rank ", known->second.rank, " in map \"",
+                       into.spec.name, "\" and ", layer.rank, " in \"", other.spec.name,
+                       "\"; maps are merged only when their layers mean the same"),
+          {{"layer", layer.name}});
+    }
+    LayerId& mine = vocabulary.layer_of[layer.id];
+    if (known != layer_by_name.end()) {
+      mine = known->second.id;
+      continue;
+    }
+    if (layer_ids.contains(layer.id)) layer.id = FreeNumber(layer_ids);
+    layer_ids.insert(layer.id);
+    mine = layer.id;
+    vocabulary.new_layers.push_back(layer);
+  }
+  std::map<std::string, int32_t> class_by_name;
+  std::set<int32_t> class_ids;
+  for (const SemanticLabel& label : into.labels) {
+    class_by_name.try_emplace(label.name, label.id);
+    class_ids.insert(label.id);
+  }
+  for (SemanticLabel label : other.labels) {
+    const auto known = class_by_name.find(label.name);
+    if (known != class_by_name.end()) {
+      vocabulary.class_of[label.id] = known->second;
+      continue;
+    }
+    const int32_t theirs = label.id;
+    if (class_ids.contains(label.id)) label.id = FreeNumber(class_ids);
+    class_ids.insert(label.id);
+    vocabulary.class_of[theirs] = label.id;
+    vocabulary.new_labels.push_back(label);
+  }
+  return vocabulary;
+}
+
+void Adopt(const Pose3d& map_T_other, const Vocabulary& vocabulary, MapContent* other) {
+  for (Node& node : other->nodes) {
+    TransformNode(map_T_other, &node);
+    node.layer = vocabulary.layer_of.at(node.layer);
+    const auto mine = vocabulary.class_of.find(node.class_id);
+    if (mine != vocabulary.class_of.end()) node.class_id = mine->second;
+  }
+  for (Layer& layer : other->layers) layer.id = vocabulary.layer_of.at(layer.id);
+  other->Index();
 }
 
 }  // namespace dsg::merge

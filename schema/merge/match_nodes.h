@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which nodes of two maps in one frame stand for the same things.
-// Refuses to change a node: what becomes of pairs is decided elsewhere.
+// Finds the nodes of two maps, given in one frame, that stand for the same things. Nodes do not
+// change here.
 #pragma once
 
 #include <string>
@@ -13,48 +13,48 @@
 namespace dsg::merge {
 
 struct MatchOptions {
-  /// Two sightings of a thing are this far apart and a quarter of its size.
+  /// Largest distance between two sightings of a thing, plus a quarter of its size.
   double object_noise_m = 0.25;
-  /// Boxes that share this much of the smaller are one thing, however far their middles are apart.
+  /// Boxes that share this part of the smaller one are one thing, whatever the distance of their
+  /// centres.
   double object_containment_min = 0.6;
-  /// Boxes that share this much of both together are one thing, whatever the classes say.
+  /// Boxes with this intersection over union are one thing, whatever their classes.
   double object_sameness_min = 0.45;
-  /// A place takes in others within half of the clearance of the narrower of both, between these.
+  /// Places are one within half of the smaller clearance, clamped to these bounds.
   double place_radius_min_m = 0.3;
   double place_radius_max_m = 0.8;
-  /// Of the smaller outline: shared by both rooms; of rooms of one class less is enough.
+  /// Share of the smaller floor plan that both rooms cover; less is enough for rooms of one class.
   double room_overlap_min = 0.5;
   double room_overlap_min_same_class = 0.3;
   double plane_angle_max_rad = 0.17;
   double plane_distance_max_m = 0.2;
 };
 
-/// For each node of `other` the index of the node of `into` that it is, -1 for new ones. Several
-/// places, rooms or structures of `other` may be one of `into`; objects pair one to one, but for
-/// fragments inside another's box. Agents are paired by origins and PairAgents only.
-///
-/// `other` is in the frame of `into`, its layers numbered as there. `known`: pairs that are certain
-/// already, as long as other.nodes, -1 where not; those are kept.
+/// For each node of `other` the index of the same node in `into`, -1 if it is new. Several places,
+/// rooms or structures of `other` may match one of `into`. Objects match one to one, except for
+/// fragments inside the box of another. Agents match by origins and PairAgents only.
+/// `other` is in the frame of `into` and has its layer numbers. `known`: certain pairs, by node of
+/// `other`, -1 where unknown; they are kept.
 /// Errors: what `stop` returned.
 absl::StatusOr<std::vector<int>> MatchNodes(const MapContent& into, const MapContent& other,
                                             std::vector<int> known, const MatchOptions& options,
                                             const StopCheck& stop);
 
-/// A name that a program counted ("", "person 12", "robot" of a robot) tells nobody from another.
+/// Whether a program made the name ("", "person 12", "robot" of a robot): it identifies nobody.
 bool IsGeneratedName(const Node& agent);
 
-/// Humans and robots that have the same name, not a generated one, and whose track in `other`
-/// begins after the one in `into` ends: the same one in a later session.
+/// Pairs humans and robots of one name that is not generated, if the track in `other` begins after
+/// the track in `into` ends: the same agent in a later session.
 void PairAgents(const MapContent& into, const MapContent& other, std::vector<int>* pair_of);
 
-// Parts of MatchNodes, each for one class of nodes; they fill what is -1 in `pair_of`.
+// The steps of MatchNodes, one per class of nodes. They fill entries of `pair_of` that are -1.
 void MatchObjects(const MapContent& into, const MapContent& other, const MatchOptions& options,
                   std::vector<int>* pair_of);
 void MatchPlaces(const MapContent& into, const MapContent& other, const MatchOptions& options,
                  std::vector<int>* pair_of);
 void MatchStructures(const MapContent& into, const MapContent& other, const MatchOptions& options,
                      std::vector<int>* pair_of);
-/// Uses the pairs of what the regions contain besides their outlines. From the lowest layer up.
+/// Uses floor plans, and pairs among what the regions contain. From the lowest layer up.
 void MatchRegions(const MapContent& into, const MapContent& other, const MatchOptions& options,
                   std::vector<int>* pair_of);
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two maps of one world into one: what becomes of each node of the other map, and the deltas that
-// do it. Refuses to write: a plan can be shown, and its deltas committed by whoever has the writer.
+// Plans the merge of another map into this one: what becomes of each of its nodes. Writes nothing;
+// a plan can be shown first. merge_deltas.h makes the deltas.
 //
 //   auto plan = *PlanMerge(*into, *other, map_T_other, {.used_ids = ...}, stop);
-//   MergeDeltas deltas(*into, *other, std::move(plan), "author");
+//   MergeDeltas deltas(into, other, std::move(plan), "author");
 //   while (auto delta = *deltas.Next(stop)) writer->Commit(*delta);
 #pragma once
 
@@ -28,16 +28,16 @@
 
 namespace dsg::merge {
 
-/// By letter: the largest index that a map ever used.
+/// The largest index that a map ever used, by letter.
 using UsedIds = std::map<char, uint64_t>;
 
-/// Looks through all readable revisions. Ids that only revisions compacted or erased away have
-/// shown are known to nobody.
+/// Looks through all readable revisions. Ids that only compacted or erased revisions had are
+/// unknown.
 absl::StatusOr<UsedIds> FindUsedIds(MapReader* map, const StopCheck& stop);
 
-/// What earlier plans of one merge have committed. What became of it since is for others to say.
+/// What earlier plans of one merge have committed. Others may have changed it since.
 struct Written {
-  /// Nodes of the other map, and what they are here.
+  /// Ids of the other map, and their ids here.
   std::map<NodeId, NodeId> nodes;
   std::set<EdgeKey> edges;
 };
@@ -46,20 +46,19 @@ struct MergeOptions {
   MatchOptions match;
   ChangeOptions change;
   MeshJoinOptions mesh;
-  /// What is believed at the head of `into` counts as used in any case.
+  /// Ids at the head of `into` always count as used.
   UsedIds used_ids;
-  /// To look up what maps were when they were merged before. Where one is null, only the newest
-  /// revision of that map tells.
+  /// For the state of the maps at earlier merges. Null: only the newest revision of that map is
+  /// consulted.
   MapReader* into_map = nullptr;
   MapReader* other_map = nullptr;
   /// Empty for the first plan of a merge.
   Written written;
-  /// Look for what the other map's session contradicts; see session_change.h.
+  /// Look for changes that the session of the other map shows; see session_change.h.
   bool find_changes = true;
-  /// Read the whole other map to see that all of it fits into this one; a plan that is made anew
-  /// need not.
+  /// Read the whole other map to check that it fits into this one. Not needed when planning again.
   bool check_reach = true;
-  /// Rows of one delta, about.
+  /// Approximate rows per delta.
   size_t batch_row_count = 4000;
 };
 
@@ -68,11 +67,11 @@ struct MergeCounts {
   int64_t fused_place_count = 0;
   int64_t fused_room_count = 0;
   int64_t fused_structure_count = 0;
-  /// Nodes that are new, agents too.
+  /// New nodes, agents included.
   int64_t added_node_count = 0;
   int64_t gone_count = 0;
   int64_t moved_count = 0;
-  /// Copies that others have changed here, and that do not follow the other map therefore.
+  /// Copies that others have changed here, so that they do not follow the other map.
   int64_t kept_count = 0;
 };
 
@@ -83,76 +82,40 @@ struct MergePlan {
   Revision other_revision = 0;
   Pose3d map_T_other;
   Evidence evidence;
-  /// Every node of `other`, and what it is in `into`.
+  /// Every id of `other`, and its id in `into`.
   std::map<NodeId, NodeId> node_ids;
   MergeCounts counts;
-  /// Root mean square distance of objects fused, metres; 0 without any.
+  /// Root mean square distance of fused objects, metres; 0 without any.
   double residual_m = 0.0;
-  /// Ids in `into`, ascending: closed, and where they went: (old, new).
+  /// Ids in `into`, ascending: nodes that ended, and (old, new) of those that moved.
   std::vector<NodeId> gone;
   std::vector<std::pair<NodeId, NodeId>> moved;
-  /// Nodes and edges to write, whole; may be empty when nothing is new.
+  /// Complete nodes and edges to write; may be empty when nothing is new.
   GraphDelta graph;
-  /// Agents in `into` that were copied whole by earlier merges: the other map as it was then, as
-  /// far as it can be read (null: as it is now), and where it was put.
+  /// Agents in `into` that earlier merges copied: the readable revisions of the other map from
+  /// which they were copied (null: the present one), and the transform of the last merge.
   std::map<NodeId, std::vector<std::shared_ptr<const Snapshot>>> track_bases;
   Pose3d map_T_other_before;
-  /// All of them, with or without such a past.
+  /// All copied agents, with or without such revisions.
   std::set<NodeId> copied_agents;
-  /// Class and mesh instance of the other map's vertices, here.
+  /// Class and mesh instance numbers of the other map's vertices, and their numbers here.
   std::map<uint32_t, uint32_t> class_of;
   std::map<uint32_t, uint32_t> instance_of;
   MeshJoinOptions mesh;
   size_t batch_row_count = 0;
 };
 
-/// Errors: INVALID_ARGUMENT/FIELD_INVALID for a map with itself, or a transform that is none, tilts
-/// or leads beyond the coordinates of a map; FAILED_PRECONDITION/FRAMES_INCOMPATIBLE when clocks
-/// differ or a layer has another rank; OUT_OF_RANGE/TIME_OUTSIDE_MAP for tracks too far from the
-/// epoch of `into`; RESOURCE_EXHAUSTED/LIMIT_EXCEEDED when ids have come to their end; as
-/// CheckDelta for nodes that it could not hold; what `stop` returned. Cost: both graphs in memory;
-/// reads poses and mesh of `other`.
+/// Errors: INVALID_ARGUMENT/FIELD_INVALID for a map with itself, and for a transform that is
+/// invalid, tilts, or leads out of the coordinate range; FAILED_PRECONDITION/FRAMES_INCOMPATIBLE
+/// when clocks or ranks of layers differ; OUT_OF_RANGE/TIME_OUTSIDE_MAP for tracks too far from the
+/// epoch of `into`; RESOURCE_EXHAUSTED/LIMIT_EXCEEDED when ids run out; those of CheckDelta for
+/// nodes that `into` cannot hold; what `stop` returned.
+/// Cost: both graphs in memory; reads poses and mesh of `other`.
 absl::StatusOr<MergePlan> PlanMerge(const Snapshot& into, const Snapshot& other,
                                     const Pose3d& map_T_other, const MergeOptions& options,
                                     const StopCheck& stop);
 
-/// What makes maps impossible to merge, whatever the transform.
-/// Errors: as PlanMerge.
+/// Checks what does not depend on the transform. Errors: as PlanMerge.
 absl::Status CheckMergeable(const Snapshot& into, const Snapshot& other);
-
-/// Where the other map was put when it was merged before; nullopt if it was not, or has been
-/// rebuilt since. Neither map is carried anywhere yet.
-std::optional<Pose3d> TransformOfLastMerge(const MapContent& into, const MapContent& other);
-
-/// The deltas of a plan, one at a time: assets, graph, tracks, stays and factors, shapes, mesh.
-/// Poses and blocks are read as they are needed. A merge that was cut short goes on with a new
-/// plan: what has been written is known by its origins.
-///
-/// Threads: one caller at a time.
-class MergeDeltas {
- public:
-  /// `part_count`: how many parts of the merge an earlier plan has written, for messages.
-  MergeDeltas(std::shared_ptr<const Snapshot> into, std::shared_ptr<const Snapshot> other,
-              MergePlan plan, std::string author, int64_t part_count = 0);
-  ~MergeDeltas();
-
-  const MergePlan& plan() const;
-  /// nullopt at the end. Sequences count from 1 in a session named after both revisions: who may
-  /// meet another merge of the same maps names a session of his own.
-  absl::StatusOr<std::optional<GraphDelta>> Next(const StopCheck& stop);
-  /// Others have changed `into`, which is now `head`. False if what is left of the plan does not
-  /// hold any more: then what was not written has to be planned anew.
-  /// Errors: ABORTED/PARENT_REVISION_STALE when an agent whose track is to go on with that of the
-  /// other map has gone on already.
-  absl::StatusOr<bool> Follow(const std::shared_ptr<const Snapshot>& head, const Touched& touched);
-  /// From 0 to 1.
-  double progress() const;
-  /// Blocks that both maps had, so far.
-  int64_t fused_mesh_block_count() const;
-
- private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
-};
 
 }  // namespace dsg::merge

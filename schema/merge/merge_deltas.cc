@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "schema/merge/merge_deltas.h"
+
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -9,8 +11,7 @@
 #include "absl/strings/str_format.h"
 #include "schema/base/status.h"
 #include "schema/merge/agent_copy.h"
-#include "schema/merge/merge.h"
-#include "schema/merge/transform_node.h"
+#include "schema/model/rigid_motion.h"
 
 namespace dsg::merge {
 namespace {
@@ -28,12 +29,12 @@ std::set<Sha256> AssetsOf(const GraphDelta& graph) {
   return assets;
 }
 
-std::string NameOf(const MergePlan& plan) {
+std::string TitleOf(const MergePlan& plan) {
   return absl::StrCat("merge of ", plan.other_name, " revision ", plan.other_revision);
 }
 
-// As `dsg merge --transform` takes it.
-std::string Describe(const Pose3d& pose) {
+// In the format of `dsg merge --transform`.
+std::string DescribeForCommand(const Pose3d& pose) {
   const Eigen::Vector3d& p = pose.position;
   const Eigen::Quaterniond& q = pose.orientation;
   const std::string position = absl::StrFormat("%.4f,%.4f,%.4f", p.x(), p.y(), p.z());
@@ -43,7 +44,7 @@ std::string Describe(const Pose3d& pose) {
   return absl::StrFormat("%s,%.8f,%.8f,%.8f,%.8f", position, q.x(), q.y(), q.z(), q.w());
 }
 
-// Whether a delta builds on what others have changed.
+// Finds out whether a delta depends on what others have changed.
 class ConflictFinder {
  public:
   explicit ConflictFinder(const Touched& touched)
@@ -70,7 +71,7 @@ class ConflictFinder {
  private:
   std::set<NodeId> nodes_;
   std::set<EdgeKey> edges_;
-  /// That got or lost a parent.
+  /// Nodes that gained or lost a parent.
   std::set<NodeId> children_;
   bool has_new_numbers_;
 };
@@ -92,7 +93,7 @@ class MergeDeltas::Impl {
     header_.session_id = absl::StrCat("merge/", plan_.other_name, "@", plan_.other_revision, "/",
                                       plan_.into_revision);
     header_.author = std::move(author);
-    header_.message = NameOf(plan_);
+    header_.message = TitleOf(plan_);
     header_.parent_revision = plan_.into_revision;
     for (const auto& [theirs, mine] : plan_.node_ids) agents_left_.emplace_back(theirs, mine);
   }
@@ -110,12 +111,12 @@ class MergeDeltas::Impl {
     delta.session_id = header_.session_id;
     delta.author = header_.author;
     delta.message = absl::StrCat(header_.message, ", part ", ++part_count_);
-    // Once is enough to repeat the merge by hand.
+    // Stated once, so that the merge can be repeated by hand.
     if (part_count_ == 1)
-      absl::StrAppend(&delta.message, " at ", Describe(plan_.map_T_other), Kept());
+      absl::StrAppend(&delta.message, " at ", DescribeForCommand(plan_.map_T_other), Kept());
     delta.parent_revision = header_.parent_revision;
     delta.sequence = ++sequence_;
-    // Only the first can know its parent; who commits sets those of the others.
+    // Only the first delta knows its parent; the caller sets those of the others.
     header_.parent_revision.reset();
     return std::optional<GraphDelta>(std::move(delta));
   }
@@ -160,7 +161,7 @@ class MergeDeltas::Impl {
     return absl::OkStatus();
   }
 
-  // Of an agent that others have gone on with: has the other map more of it that is to be written?
+  // Fails if others have extended an agent of which the other map has more poses to write.
   absl::Status CheckTrackOf(NodeId mine) const {
     const auto known = into_->GetTrack(mine);
     if (!known.ok()) return absl::OkStatus();
@@ -181,7 +182,7 @@ class MergeDeltas::Impl {
     return absl::OkStatus();
   }
 
-  // Assets may be large, so each goes alone.
+  // Assets may be large, so each has its own delta.
   absl::Status QueueAsset(const Sha256& sha256) {
     if (into_->ReadAsset(sha256).ok()) return absl::OkStatus();
     DSG_ASSIGN_OR_RETURN(Asset asset, other_->ReadAsset(sha256));
@@ -191,7 +192,7 @@ class MergeDeltas::Impl {
     return absl::OkStatus();
   }
 
-  // True when nothing is left.
+  // Returns true when nothing is left.
   absl::StatusOr<bool> ReadMore(const StopCheck& stop) {
     if (agent_ != nullptr) {
       DSG_ASSIGN_OR_RETURN(std::optional<GraphDelta> delta, agent_->Next(stop));

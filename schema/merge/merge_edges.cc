@@ -11,20 +11,20 @@
 namespace dsg::merge {
 namespace {
 
-// Written once, from either end.
+// Relations without direction, which are written once.
 bool IsSymmetric(const std::string& relation) {
   return relation == relations::kTraversable || relation == relations::kAdjacent ||
          relation == relations::kNear || relation == relations::kCoVisible ||
          relation == relations::kSameAs;
 }
 
-// A node has one of each of these; of two beliefs the one of this map stays.
+// A node has at most one edge of each of these relations; that of this map wins.
 bool IsSingle(const std::string& relation) {
   return relation == relations::kNearestPlace || relation == relations::kOn ||
          relation == relations::kIn || relation == relations::kHeldBy;
 }
 
-// By such an edge a node hangs on another one: its parent, or the one that it has.
+// Relations that attach a node: to its parent, or by a single edge.
 bool HangsOn(const std::string& relation) {
   return relation == relations::kContains || IsSingle(relation);
 }
@@ -90,7 +90,7 @@ class EdgeJoiner {
            (IsSymmetric(edge.relation) && Has({edge.target, edge.relation, edge.source}));
   }
 
-  // Of a node that stood in this map before the merge.
+  // Whether a node that was in this map before the merge has a parent.
   bool HasParent(int child) const {
     const auto i = static_cast<size_t>(child);
     return pair_of_[i] >= 0 && has_parent_.contains(id_of_[i]);
@@ -105,11 +105,7 @@ class EdgeJoiner {
   std::map<EdgeKey, Edge> added_;
 };
 
-double ClearanceOf(const Node& node) {
-  return node.place.has_value() ? node.place->clearance_m : 0.0;
-}
-
-// Places of `other` that a way leads from into a place that both maps have.
+// Places of `other` with a TRAVERSABLE edge to a place that both maps have.
 std::set<int> JoinedPlaces(const MapContent& other, const std::vector<int>& pair_of) {
   std::set<int> joined;
   for (const Edge& edge : other.edges) {
@@ -129,7 +125,7 @@ std::vector<EdgeKey> ReplacedEdges(const MapContent& into, const MapContent& oth
                                    const std::vector<NodeId>& id_of,
                                    const std::vector<char>& is_copy) {
   const std::set<NodeId> images(id_of.begin(), id_of.end());
-  // By node and relation: the other ends that the other map names.
+  // The other ends that the other map has, by node and relation.
   std::map<std::pair<NodeId, std::string>, std::set<NodeId>> wanted;
   for (const Edge& edge : other.edges) {
     const int source = other.IndexOf(edge.source);

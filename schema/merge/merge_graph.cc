@@ -4,12 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <unordered_map>
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
-#include "schema/merge/fit_boxes.h"
-#include "schema/merge/free_number.h"
 #include "schema/merge/fuse.h"
 #include "schema/merge/merge_edges.h"
 #include "schema/model/delta_check.h"
@@ -17,7 +16,7 @@
 namespace dsg::merge {
 namespace {
 
-// Agents keep so many revisions of their origin.
+// Revisions of the origin that agents keep.
 constexpr size_t kRevisionsKept = 4;
 
 uint32_t InstanceOf(const Node& node) {
@@ -31,7 +30,49 @@ void SetInstance(uint32_t instance, Node* node) {
   if (node->structure.has_value()) node->structure->mesh_instance_id = instance;
 }
 
-// Puts together what the map will hold, and at the end lists what differs from what it holds.
+struct ParentLink {
+  int32_t child_rank = 0;
+  size_t parent = 0;
+  size_t child = 0;
+};
+
+void GrowOverChild(const Node& child, Node* parent) {
+  if (parent->box_node.isEmpty() || IsAgentKind(child.kind)) return;
+  const Box3d inner = child.BoxMap();
+  const Box3d outer = parent->BoxMap();
+  // Half of the store's tolerance, so that existing boxes do not change.
+  constexpr double kSlack = 0.5 * kBoxToleranceM;
+  if (((outer.min() - inner.min()).array() <= kSlack).all() &&
+      ((inner.max() - outer.max()).array() <= kSlack).all()) {
+    return;
+  }
+  parent->box_node.extend(TransformBox(parent->map_T_node.Inverse(), inner));
+}
+
+// Extends boxes of parents over their children, as the store requires. Nodes without an extent keep
+// none.
+void FitParents(const std::vector<Layer>& layers, const std::vector<Edge>& edges,
+                std::vector<Node>* nodes) {
+  std::unordered_map<LayerId, int32_t> rank_of;
+  for (const Layer& layer : layers) rank_of[layer.id] = layer.rank;
+  std::unordered_map<NodeId, size_t> index_of;
+  for (size_t i = 0; i < nodes->size(); ++i) index_of[(*nodes)[i].id] = i;
+  std::vector<ParentLink> links;
+  for (const Edge& edge : edges) {
+    if (edge.relation != relations::kContains) continue;
+    const auto parent = index_of.find(edge.source);
+    const auto child = index_of.find(edge.target);
+    if (parent == index_of.end() || child == index_of.end()) continue;
+    links.push_back({rank_of[(*nodes)[child->second].layer], parent->second, child->second});
+  }
+  // Parents have higher ranks than children, so a child is complete before its parent is.
+  std::stable_sort(links.begin(), links.end(), [](const ParentLink& a, const ParentLink& b) {
+    return a.child_rank < b.child_rank;
+  });
+  for (const ParentLink& link : links) GrowOverChild((*nodes)[link.child], &(*nodes)[link.parent]);
+}
+
+// Builds the merged graph, and lists its differences to the present one.
 class GraphBuilder {
  public:
   GraphBuilder(const MapContent& into, const MapContent& other, const Findings& findings,
@@ -85,7 +126,7 @@ class GraphBuilder {
   absl::StatusOr<NodeId> FreshId(NodeId theirs) {
     const char letter = theirs.letter();
     const auto [found, is_new] = used_ids_.try_emplace(letter, 0);
-    // A letter that nobody has used may begin at 0, as those of the robots do.
+    // An unused letter begins at 0, like those of robots.
     if (is_new) return NodeId(letter, found->second);
     if (found->second < NodeId::kIndexMax) return NodeId(letter, ++found->second);
     const std::string last = ToString(NodeId(letter, found->second));
@@ -125,12 +166,12 @@ class GraphBuilder {
     }
   }
 
-  // Whether what is believed of the node here is not to be touched by what the other map says.
+  // Whether the node stays as it is here, whatever the other map has.
   bool Stays(size_t i, const Node& known, bool is_copy) {
     if (written_.nodes.contains(other_.nodes[i].id)) return true;
     const std::optional<Origin>& origin = known_.origin_of[i];
     const bool is_news = !origin.has_value() || origin->seen_mark != known_.mark_of[i];
-    // Here since it was changed by others, who know better than what was seen before them.
+    // Others have changed the copy here, and their change wins.
     if (is_copy && !IsAsWritten(known, *origin)) {
       if (is_news) ++plan_.counts.kept_count;
       return true;
@@ -138,7 +179,7 @@ class GraphBuilder {
     return !is_copy && !is_news;
   }
 
-  // What is said of node `i` once it is taken.
+  // The origin to note for node `i`.
   Origin OriginNow(size_t i) const {
     Origin origin;
     origin.map = plan_.other_name;
@@ -173,7 +214,7 @@ class GraphBuilder {
     node.attributes.erase(kMergedFrom);
     node.attributes.erase(kMergedCounts);
     SetOrigin(std::move(origin), &node);
-    // What the other map took from third ones is known to have come from there.
+    // Keeps the origins in third maps.
     for (Origin each : older) {
       each.is_copy = false;
       if (each.map != plan_.into_name) SetOrigin(std::move(each), &node);
@@ -187,7 +228,7 @@ class GraphBuilder {
     ++plan_.counts.added_node_count;
   }
 
-  // Mesh instances are numbered by each map for itself.
+  // Each map numbers its mesh instances on its own.
   void TakeInstance(int pair, Node* seen) {
     const uint32_t theirs = InstanceOf(*seen);
     if (theirs == 0) return;
@@ -249,7 +290,7 @@ class GraphBuilder {
       same.source = id_of_[static_cast<size_t>(after)];
       same.relation = relations::kSameAs;
       same.target = into_.nodes[static_cast<size_t>(before)].id;
-      // A guess among things that look alike; in tests half of them are right.
+      // A guess among similar things; half of them are right in tests.
       same.weight = 0.5;
       plan_.moved.emplace_back(same.target, same.source);
       plan_.graph.edges.push_back(std::move(same));
@@ -257,7 +298,7 @@ class GraphBuilder {
     plan_.counts.moved_count = static_cast<int64_t>(plan_.moved.size());
   }
 
-  // Last of all, when nothing is changed in them any more.
+  // Runs last, when the nodes do not change any more.
   void MarkCopies() {
     for (const size_t i : copies_) {
       Node& node = whole_.nodes[i];
@@ -288,14 +329,14 @@ class GraphBuilder {
   const TrackHistory& tracks_;
   const Written& written_;
   UsedIds used_ids_;
-  /// By node of `into`: copied from the other map whole.
+  /// By node of `into`: it is a copy from the other map.
   std::vector<char> is_copy_;
   MergePlan& plan_;
   GraphDelta whole_;
   std::vector<NodeId> id_of_;
   std::set<std::string> agent_names_;
   std::set<uint32_t> instances_;
-  /// In `whole_`: nodes that are, from now on, as this plan says.
+  /// Indices in `whole_` of copies that this plan writes.
   std::set<size_t> copies_;
   double squared_sum_ = 0.0;
 };

@@ -3,12 +3,15 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
+#include <utility>
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
 #include "absl/strings/strip.h"
+#include "schema/base/status.h"
 #include "schema/codec/checksum.h"
 #include "schema/codec/proto_convert.h"
 
@@ -30,7 +33,7 @@ uint64_t HexNumber(absl::string_view text) {
   return absl::SimpleHexAtoi(text, &number) ? number : 0;
 }
 
-// "new:57@12,15:<seen>:<written>"; what is missing or is no number stays as it is.
+// "new:57@12,15:<seen>:<written>"; missing or malformed parts keep their defaults.
 void ReadCount(absl::string_view text, Origin* origin) {
   origin->is_copy = absl::ConsumePrefix(&text, kCopy);
   const std::vector<absl::string_view> parts = absl::StrSplit(text, ':');
@@ -108,7 +111,7 @@ uint64_t MarkOf(const Node& node) {
   bare.attributes.erase(kMergedFrom);
   bare.attributes.erase(kMergedCounts);
   if (bare.place.has_value() || bare.region.has_value()) bare.box_node.setEmpty();
-  // As the store gives it back.
+  // Checksum of what the store returns, after one round trip through the codec.
   Node stored;
   std::string bytes = EncodeNodePayload(bare);
   if (DecodeNodePayload(bytes, &stored)) bytes = EncodeNodePayload(stored);
@@ -131,6 +134,201 @@ int64_t AddCounts(int64_t a, int64_t b) {
   b = std::max<int64_t>(0, b);
   constexpr int64_t kMax = std::numeric_limits<int64_t>::max();
   return a > kMax - b ? kMax : a + b;
+}
+
+namespace {
+
+struct Claim {
+  int holder = 0;
+  int source = 0;
+  Origin origin;
+  std::optional<bool> holds;
+};
+
+std::vector<Claim> ClaimsOf(const MapContent& holder, const MapContent& source) {
+  std::vector<Claim> claims;
+  for (size_t i = 0; i < holder.nodes.size(); ++i) {
+    for (Origin& origin : OriginsOf(holder.nodes[i])) {
+      if (origin.map != source.spec.name) continue;
+      const int index = source.IndexOf(origin.id);
+      if (index < 0) continue;
+      const std::optional<bool> holds = HoldsNow(origin, source);
+      claims.push_back({static_cast<int>(i), index, std::move(origin), holds});
+    }
+  }
+  return claims;
+}
+
+// Decides claims on nodes that have changed since their revision, by that revision.
+absl::Status AskRevision(MapReader* map, Revision revision, const std::vector<Claim*>& claims,
+                         const StopCheck& stop) {
+  const auto then = map->At(revision);
+  if (ReasonOf(then.status()) == Reason::kRevisionCompacted) return absl::OkStatus();
+  DSG_RETURN_IF_ERROR(then.status());
+  std::vector<NodeId> ids;
+  for (const Claim* claim : claims) ids.push_back(claim->origin.id);
+  DSG_ASSIGN_OR_RETURN(const std::vector<std::optional<Node>> nodes, (*then)->FindNodes(ids, stop));
+  for (size_t i = 0; i < claims.size(); ++i) {
+    claims[i]->holds = nodes[i].has_value() && MarkOf(*nodes[i]) == claims[i]->origin.seen_mark;
+  }
+  return absl::OkStatus();
+}
+
+absl::Status AskPast(MapReader* map, std::vector<Claim>* claims, const StopCheck& stop) {
+  std::map<Revision, std::vector<Claim*>> open;
+  for (Claim& claim : *claims) {
+    const bool can_tell = claim.origin.seen_mark != 0 && !claim.origin.revisions.empty();
+    if (!claim.holds.has_value() && can_tell) {
+      open[claim.origin.revisions.back()].push_back(&claim);
+    }
+  }
+  for (const auto& [revision, those] : open) {
+    DSG_RETURN_IF_ERROR(AskRevision(map, revision, those, stop));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<Claim>> HoldingClaims(const MapContent& holder, const MapContent& source,
+                                                 MapReader* source_map, const StopCheck& stop) {
+  std::vector<Claim> claims = ClaimsOf(holder, source);
+  if (source_map != nullptr) DSG_RETURN_IF_ERROR(AskPast(source_map, &claims, stop));
+  int64_t balance = 0;
+  for (const Claim& claim : claims) {
+    if (claim.holds.has_value()) balance += *claim.holds ? 1 : -1;
+  }
+  std::erase_if(claims, [&](const Claim& claim) { return !claim.holds.value_or(balance >= 0); });
+  return claims;
+}
+
+}  // namespace
+
+std::optional<bool> HoldsNow(const Origin& origin, const MapContent& source) {
+  if (origin.seen_mark == 0 || origin.revisions.empty()) return std::nullopt;
+  const Revision taken_at = origin.revisions.back();
+  if (taken_at > source.revision) return false;
+  const int index = source.IndexOf(origin.id);
+  if (index < 0) return std::nullopt;
+  const Node& node = source.nodes[static_cast<size_t>(index)];
+  if (node.revision > taken_at) return std::nullopt;
+  return MarkOf(node) == origin.seen_mark;
+}
+
+absl::StatusOr<KnownPairs> FindKnownPairs(const MapContent& into, const MapContent& other,
+                                          MapReader* into_map, MapReader* other_map,
+                                          const StopCheck& stop) {
+  KnownPairs known;
+  known.pair_of.assign(other.nodes.size(), -1);
+  known.origin_of.resize(other.nodes.size());
+  for (const Node& node : other.nodes) known.mark_of.push_back(MarkOf(node));
+  DSG_ASSIGN_OR_RETURN(const std::vector<Claim> from_here,
+                       HoldingClaims(other, into, into_map, stop));
+  for (const Claim& claim : from_here) {
+    known.pair_of[static_cast<size_t>(claim.holder)] = claim.source;
+  }
+  DSG_ASSIGN_OR_RETURN(const std::vector<Claim> from_there,
+                       HoldingClaims(into, other, other_map, stop));
+  for (const Claim& claim : from_there) {
+    known.pair_of[static_cast<size_t>(claim.source)] = claim.holder;
+    known.origin_of[static_cast<size_t>(claim.source)] = claim.origin;
+  }
+  return known;
+}
+
+namespace {
+
+class HistoryReader {
+ public:
+  HistoryReader(const Snapshot& other, MapReader* other_map)
+      : other_(other), other_map_(other_map) {}
+
+  // Null if the revision is not readable any more.
+  absl::StatusOr<std::shared_ptr<const Snapshot>> At(Revision revision) {
+    std::shared_ptr<const Snapshot> none;
+    if (other_map_ == nullptr) return none;
+    const auto known = snapshots_.find(revision);
+    if (known != snapshots_.end()) return known->second;
+    auto then = other_map_->At(revision);
+    if (!then.ok() && ReasonOf(then.status()) != Reason::kRevisionCompacted) return then.status();
+    return snapshots_[revision] = then.ok() ? *std::move(then) : none;
+  }
+
+  // Whether the track of an agent was written after a revision.
+  absl::StatusOr<bool> HasChanged(NodeId agent, Revision since, const StopCheck& stop) {
+    if (since == other_.revision()) return false;
+    DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> then, At(since));
+    if (then == nullptr) return true;
+    auto [touched, is_new] = touched_.try_emplace(since);
+    if (is_new) {
+      DSG_ASSIGN_OR_RETURN(Touched all, other_map_->TouchedBetween(since, other_.revision(), stop));
+      touched->second = std::move(all.tracks);
+    }
+    return std::binary_search(touched->second.begin(), touched->second.end(), agent);
+  }
+
+ private:
+  const Snapshot& other_;
+  MapReader* const other_map_;
+  std::map<Revision, std::shared_ptr<const Snapshot>> snapshots_;
+  std::map<Revision, std::vector<NodeId>> touched_;
+};
+
+}  // namespace
+
+absl::StatusOr<TrackHistory> ReadTrackHistory(const MapContent& content, const KnownPairs& known,
+                                              const Snapshot& other, MapReader* other_map,
+                                              const StopCheck& stop) {
+  TrackHistory history;
+  HistoryReader reader(other, other_map);
+  for (const int agent : content.OfClass(NodeClass::kAgent)) {
+    const std::optional<Origin>& origin = known.origin_of[static_cast<size_t>(agent)];
+    if (!origin.has_value() || !origin->is_copy || origin->revisions.empty()) continue;
+    const std::vector<Revision>& revisions = origin->revisions;
+    const NodeId id = content.nodes[static_cast<size_t>(agent)].id;
+    DSG_ASSIGN_OR_RETURN(const bool has_changed, reader.HasChanged(id, revisions.back(), stop));
+    if (has_changed) history.changed.insert(agent);
+    // If only the present state was ever copied, nothing needs a correction.
+    if (!has_changed && revisions.size() == 1) continue;
+    auto& bases = history.bases[agent];
+    for (const Revision revision : revisions) {
+      if (revision == other.revision()) {
+        bases.push_back(nullptr);
+        continue;
+      }
+      DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Snapshot> then, reader.At(revision));
+      if (then != nullptr) bases.push_back(std::move(then));
+    }
+  }
+  return history;
+}
+
+std::optional<Pose3d> TransformOfLastMerge(const MapContent& into, const MapContent& other) {
+  std::vector<Pose3d> transforms;
+  for (const Node& node : into.nodes) {
+    const auto copy = CopiedFrom(node);
+    if (!copy.has_value() || copy->map != other.spec.name) continue;
+    const int index = other.IndexOf(copy->id);
+    if (index < 0) continue;
+    const bool is_other = !HoldsNow(*copy, other).value_or(true);
+    if (is_other || !IsAsWritten(node, *copy)) continue;
+    const Node& theirs = other.nodes[static_cast<size_t>(index)];
+    Pose3d transform = node.map_T_node * theirs.map_T_node.Inverse();
+    transform.orientation.normalize();
+    transforms.push_back(transform);
+  }
+  // Copies that moved in a later revision of the other map are outliers.
+  const auto agreeing = [&](const Pose3d& pose) {
+    return std::count_if(transforms.begin(), transforms.end(), [&](const Pose3d& each) {
+      return (each.position - pose.position).norm() < 0.01 &&
+             AngleBetween(each.orientation, pose.orientation) < 0.001;
+    });
+  };
+  const size_t tried = std::min<size_t>(transforms.size(), 20);
+  for (size_t i = 0; i < tried; ++i) {
+    if (agreeing(transforms[i]) * 2 > static_cast<int64_t>(transforms.size())) {
+      return transforms[i];
+    }
+  }
+  return std::nullopt;
 }
 
 }  // namespace dsg::merge

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points in cells of a grid seen from above, to find those near a point.
-// Refuses to change after it is made.
+// Points in the cells of a horizontal grid, for lookups by distance. Immutable.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,7 +21,8 @@ class PointGrid {
     std::sort(entries_.begin(), entries_.end());
   }
 
-  /// Calls `visit(index)` for all points within `reach_m` of a point on both axes, and some more.
+  /// Calls `visit(index)` for all points within `reach_m` of a point on both axes, and for some
+  /// beyond.
   template <typename Visit>
   void ForEachNear(const Eigen::Vector3d& point, double reach_m, Visit visit) const {
     const int64_t y_min = CellOf(point.y() - reach_m);

@@ -8,10 +8,10 @@
 #include <memory>
 
 #include "schema/base/status.h"
-#include "schema/merge/block_cache.h"
 #include "schema/merge/merge.h"
-#include "schema/merge/surface_index.h"
-#include "schema/merge/transform_node.h"
+#include "schema/merge/mesh_surface.h"
+#include "schema/merge/origins.h"
+#include "schema/model/rigid_motion.h"
 
 namespace dsg::merge {
 namespace {
@@ -21,17 +21,17 @@ constexpr int kStepCount = 10;
 constexpr double kThingSigmaM = 0.1;
 constexpr double kPlaneSigmaM = 0.04;
 constexpr double kMeshSigmaM = 0.04;
-// Neighbouring points of a mesh err together, so a thousand of them are worth a few.
+// Errors of neighbouring mesh points are correlated, so many of them count as few.
 constexpr double kMeshWeight = 0.02;
 constexpr int kMeshPointCount = 8000;
-// A refinement that goes further has found something else.
+// A larger correction is a wrong fit.
 constexpr double kStrayMaxM = 0.5;
 
 using Vector4 = Eigen::Matrix<double, 4, 1>;
 using Matrix4 = Eigen::Matrix<double, 4, 4>;
 
-// Weights of a Cauchy loss, and the share of a sighting's own precision.
-double WeightOf(double miss_m, double sigma_m) {
+// Weight of a Cauchy loss, times the precision of the sighting.
+double CauchyWeight(double miss_m, double sigma_m) {
   const double relative = miss_m / (2.0 * sigma_m);
   return 1.0 / (sigma_m * sigma_m * (1.0 + relative * relative));
 }
@@ -46,14 +46,14 @@ void AddTo(const Sighting& sighting, const Pose3d& pose, const Eigen::Vector3d& 
   jacobian.col(0) = Eigen::Vector3d::UnitZ().cross(at - center);
   jacobian.rightCols<3>() = Eigen::Matrix3d::Identity();
   if (sighting.normal_into.isZero()) {
-    const double weight = WeightOf(miss.norm(), sighting.sigma_m);
+    const double weight = CauchyWeight(miss.norm(), sighting.sigma_m);
     *information += weight * jacobian.transpose() * jacobian;
     *gradient += weight * jacobian.transpose() * miss;
     return;
   }
   const double across = sighting.normal_into.dot(miss);
   const Vector4 row = jacobian.transpose() * sighting.normal_into;
-  const double weight = WeightOf(across, sighting.sigma_m);
+  const double weight = CauchyWeight(across, sighting.sigma_m);
   *information += weight * row * row.transpose();
   *gradient += weight * across * row;
 }
@@ -63,18 +63,13 @@ bool IsWall(const Node& node) {
          !node.structure->plane_normal_map.isZero();
 }
 
-Eigen::Vector3d MiddleOf(const Node& node) {
-  return node.box_node.isEmpty() ? node.map_T_node.position
-                                 : Eigen::Vector3d(node.map_T_node * node.box_node.center());
-}
-
-Eigen::Vector3d MiddleOf(const MapContent& content) {
+Eigen::Vector3d MeanPositionOf(const MapContent& content) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const Node& node : content.nodes) sum += node.map_T_node.position;
   return sum / std::max<double>(1.0, static_cast<double>(content.nodes.size()));
 }
 
-// Every so many of the other map's vertices in blocks that this map has surface around.
+// Samples vertices of the other map in blocks that this map has.
 absl::Status SampleBlock(const MeshBlock& theirs, const Snapshot& into, int stride,
                          BlockCache* mine, const std::vector<BlockIndex>& known,
                          std::vector<Sighting>* sightings) {
@@ -164,7 +159,7 @@ absl::StatusOr<std::vector<Sighting>> CollectSurface(const Snapshot& into, const
   if (known.empty() || theirs.empty()) return sightings;
   const std::shared_ptr<const Snapshot> into_ref(std::shared_ptr<const Snapshot>(), &into);
   BlockCache mine(into_ref, Pose3d(), 64);
-  // Enough blocks for the whole map to be felt, and from each about the same.
+  // Enough blocks to cover the whole map, and about the same number of points from each.
   const size_t block_stride = theirs.size() / 400 + 1;
   const int per_block = std::max(1, count_max / static_cast<int>(theirs.size() / block_stride + 1));
   for (size_t i = 0; i < theirs.size(); i += block_stride) {
@@ -175,7 +170,7 @@ absl::StatusOr<std::vector<Sighting>> CollectSurface(const Snapshot& into, const
     const int stride = std::max(1, static_cast<int>(stored.size()) / per_block);
     DSG_RETURN_IF_ERROR(SampleBlock(block, into, stride, &mine, known, &sightings));
   }
-  // The fit wants the points where the other map has them.
+  // The fit needs the points in the frame of the other map.
   const Pose3d other_T_map = map_T_other.Inverse();
   for (Sighting& sighting : sightings) sighting.other = other_T_map * sighting.other;
   return sightings;
@@ -202,7 +197,7 @@ absl::StatusOr<Alignment> FindTransform(const Snapshot& into, const Snapshot& ot
     sightings.insert(sightings.end(), surface.begin(), surface.end());
     pose = FitSightings(sightings, pose);
   }
-  const Eigen::Vector3d middle = MiddleOf(theirs);
+  const Eigen::Vector3d middle = MeanPositionOf(theirs);
   if ((pose * middle - before * middle).norm() < kStrayMaxM &&
       AngleBetween(pose.orientation, before.orientation) < 0.05) {
     alignment.map_T_other = pose;

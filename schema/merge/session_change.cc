@@ -5,10 +5,14 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <memory>
 #include <optional>
+#include <set>
 #include <string>
+#include <utility>
 
 #include "schema/base/status.h"
+#include "schema/merge/mesh_surface.h"
 #include "schema/merge/origins.h"
 #include "schema/merge/point_grid.h"
 
@@ -16,7 +20,7 @@ namespace dsg::merge {
 namespace {
 
 constexpr int kSamplesASide = 4;
-// Free space further from a place than this is not looked up.
+// Free space further from a place is not considered.
 constexpr double kReachMaxM = 6.0;
 
 std::vector<Eigen::Vector3d> SamplesOf(const Node& node, double slack_m) {
@@ -36,7 +40,7 @@ std::vector<Eigen::Vector3d> SamplesOf(const Node& node, double slack_m) {
   return samples;
 }
 
-// Heights of a body, between which the clearance of a place on the floor is measured.
+// Height range of a body, in which the clearance of a place on the floor is measured.
 constexpr double kBodyHeightM = 1.8;
 constexpr double kFloorSlackM = 0.15;
 constexpr int kMatterVertexCountMin = 10;
@@ -98,7 +102,7 @@ std::vector<char> SeenAgain(const MapContent& into, const MapContent& other,
   for (const int pair : pair_of) {
     if (pair >= 0) is_seen[static_cast<size_t>(pair)] = 1;
   }
-  // What an earlier merge of the same map brought is no older belief to be contradicted by it.
+  // Copies from the same map are not older beliefs that it could contradict.
   for (size_t i = 0; i < into.nodes.size(); ++i) {
     const auto copy = CopiedFrom(into.nodes[i]);
     if (copy.has_value() && copy->map == other.spec.name) is_seen[i] = 1;
@@ -106,7 +110,7 @@ std::vector<char> SeenAgain(const MapContent& into, const MapContent& other,
   return is_seen;
 }
 
-// What stood on or in a thing that is gone, and was not seen again, went with it.
+// Things on or in a thing that is gone went with it, unless they were seen again.
 void AddCarried(const MapContent& into, const std::vector<char>& is_seen,
                 std::map<int, TimeNs>* gone) {
   bool is_growing = true;
@@ -129,7 +133,7 @@ void AddCarried(const MapContent& into, const std::vector<char>& is_seen,
   }
 }
 
-// Colours vary with the light, but not from red to blue.
+// Colours vary with the light, but do not change from red to blue.
 bool AreColorsAlike(const Node& a, const Node& b) {
   constexpr int kDifferenceMax = 80;
   if (!a.object.has_value() || !b.object.has_value()) return true;
@@ -152,7 +156,7 @@ bool CouldBeSame(const Node& before, const Node& after) {
   return a < 1.3 * b + 0.1 && b < 1.3 * a + 0.1;
 }
 
-// Least cost of a row or column besides one entry.
+// Least cost of a row or column, except one entry.
 double Rival(const Eigen::VectorXd& costs, Eigen::Index besides) {
   double least = std::numeric_limits<double>::infinity();
   for (Eigen::Index i = 0; i < costs.size(); ++i) {
@@ -161,7 +165,7 @@ double Rival(const Eigen::VectorXd& costs, Eigen::Index besides) {
   return least;
 }
 
-// Things that are believed to be there still, by class.
+// Things that are still there, by class.
 std::map<std::string, int> CountClasses(const MapContent& content) {
   std::map<std::string, int> counts;
   for (const int i : content.OfClass(NodeClass::kObject)) {
@@ -176,7 +180,7 @@ std::vector<std::pair<int, int>> PairMoved(const MapContent& into, const MapCont
                                            const std::vector<int>& arrived,
                                            const ChangeOptions& options) {
   std::vector<std::pair<int, int>> moved;
-  // Where everything is new nothing is known again.
+  // If everything is new, nothing has moved.
   constexpr size_t kPairsMax = 4'000'000;
   if (gone.empty() || arrived.empty() || gone.size() * arrived.size() > kPairsMax) return moved;
   Eigen::MatrixXd cost = Eigen::MatrixXd::Constant(static_cast<Eigen::Index>(gone.size()),
@@ -221,7 +225,7 @@ class AbsenceJudge {
   absl::StatusOr<std::optional<TimeNs>> GoneAt(const Node& node) const {
     TimeNs first_ns = kTimeMax;
     const bool is_free = later_.Share(node, &first_ns) >= options_.free_share_min;
-    // Nothing to see, nothing to read the mesh for.
+    // No free space, so the mesh need not be read.
     if (LastSeen(into_, node) >= std::max(session_ns_, is_free ? first_ns : session_ns_)) {
       return std::optional<TimeNs>();
     }
@@ -248,6 +252,98 @@ class AbsenceJudge {
   TimeNs session_ns_;
   FreeSpace later_;
 };
+
+constexpr double kBlocksOfBoxMax = 512.0;
+constexpr double kCellM = 0.1;
+// Largest error of surfaces.
+constexpr double kGroundSlackM = 0.08;
+constexpr size_t kProbeCachedBlocks = 64;
+
+// The inside of a box without its sides and underside, because walls and floors touch those.
+Box3d CoreOf(const Box3d& box, double slack_m) {
+  const Eigen::Vector3d slack = (0.25 * box.sizes()).cwiseMin(Eigen::Vector3d::Constant(slack_m));
+  return Box3d(box.min() + slack, box.max() - slack);
+}
+
+// The cells of the underside of a box where there is surface.
+class Ground {
+ public:
+  explicit Ground(const Box3d& box) : box_(box) {
+    columns_ = std::max(1, static_cast<int>(std::ceil(box.sizes().x() / kCellM)));
+    rows_ = std::max(1, static_cast<int>(std::ceil(box.sizes().y() / kCellM)));
+  }
+
+  bool Mark(const Eigen::Vector3d& at_box) {
+    if (std::abs(at_box.z() - box_.min().z()) > kGroundSlackM) return false;
+    const Eigen::Vector3d offset = at_box - box_.min();
+    const int column = static_cast<int>(std::floor(offset.x() / kCellM));
+    const int row = static_cast<int>(std::floor(offset.y() / kCellM));
+    if (column < 0 || row < 0 || column >= columns_ || row >= rows_) return false;
+    marked_.insert({column, row});
+    return true;
+  }
+
+  double Share() const {
+    return static_cast<double>(marked_.size()) / (static_cast<double>(columns_) * rows_);
+  }
+
+ private:
+  Box3d box_;
+  int columns_;
+  int rows_;
+  std::set<std::pair<int, int>> marked_;
+};
+
+// What the mesh of a map shows at a box: surface in it, and surface to stand on. Boxes of a whole
+// storey count as full.
+class MeshProbe {
+ public:
+  /// `map_T_other` takes the mesh to the frame of the boxes.
+  MeshProbe(const Snapshot& other, const Pose3d& map_T_other);
+
+  absl::StatusOr<BoxSurface> Look(const Pose3d& map_T_box, const Box3d& box, double slack_m);
+
+ private:
+  Pose3d other_T_map_;
+  double block_size_m_;
+  BlockCache blocks_;
+};
+
+MeshProbe::MeshProbe(const Snapshot& other, const Pose3d& map_T_other)
+    : other_T_map_(map_T_other.Inverse()),
+      block_size_m_(other.spec().mesh_block_size_m),
+      blocks_(std::shared_ptr<const Snapshot>(std::shared_ptr<const Snapshot>(), &other), Pose3d(),
+              kProbeCachedBlocks) {}
+
+absl::StatusOr<BoxSurface> MeshProbe::Look(const Pose3d& map_T_box, const Box3d& box,
+                                           double slack_m) {
+  BoxSurface surface;
+  const Pose3d other_T_box = other_T_map_ * map_T_box;
+  Box3d around = TransformBox(other_T_box, box);
+  around = Box3d(around.min().array() - kGroundSlackM, around.max().array() + kGroundSlackM);
+  if (((around.sizes() / block_size_m_).array() + 2.0).prod() > kBlocksOfBoxMax) {
+    surface.inside_count = std::numeric_limits<int>::max();
+    return surface;
+  }
+  const Pose3d box_T_other = other_T_box.Inverse();
+  const Box3d core = CoreOf(box, slack_m);
+  Ground ground(box);
+  TimeNs first_ns = kTimeMax;
+  for (const BlockIndex index : BlocksIn(around, block_size_m_)) {
+    const auto block = blocks_.Read(index);
+    if (absl::IsNotFound(block.status())) continue;
+    DSG_RETURN_IF_ERROR(block.status());
+    const std::vector<TimeNs>& times = (*block)->first_seen_ns;
+    for (size_t i = 0; i < (*block)->positions_map.size(); ++i) {
+      const Eigen::Vector3d at = box_T_other * (*block)->positions_map[i].cast<double>();
+      if (core.contains(at)) ++surface.inside_count;
+      if (ground.Mark(at) && !times.empty()) first_ns = std::min(first_ns, times[i]);
+    }
+  }
+  surface.ground_share = ground.Share();
+  if (first_ns != kTimeMax) surface.ground_first_ns = first_ns;
+  return surface;
+}
 
 }  // namespace
 
@@ -291,6 +387,13 @@ absl::StatusOr<SessionChanges> FindChanges(const MapContent& into, const MapCont
   }
   changes.moved = PairMoved(into, other, changes.gone, arrived, options);
   return changes;
+}
+
+SurfaceProbe ProbeMesh(const Snapshot& other, const Pose3d& map_T_other) {
+  return [mesh = std::make_shared<MeshProbe>(other, map_T_other)](
+             const Pose3d& map_T_box, const Box3d& box, double slack_m) {
+    return mesh->Look(map_T_box, box, slack_m);
+  };
 }
 
 }  // namespace dsg::merge

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a later session contradicts: things that stood where it saw free space, and where they went.
-// Refuses to take silence for absence: what the session did not look at stays as it was.
+// Changes between two sessions: things that are gone because the later session saw free space
+// there, and where they went. What the later session did not look at stays.
 #pragma once
 
 #include <functional>
@@ -14,18 +14,18 @@
 namespace dsg::merge {
 
 struct ChangeOptions {
-  /// Boxes shrink by this on each side before they are compared with free space: maps are noisy.
+  /// Boxes shrink by this on each side before the comparison with free space, because maps are
+  /// noisy.
   double slack_m = 0.1;
-  /// Of sample points of a box: at least this share must lie in free space.
+  /// Least share of sample points of a box that lie in free space.
   double free_share_min = 0.5;
-  /// What a thing stood on, seen where it stood: at least this share of its underside.
+  /// Least share of the underside of a thing where the surface that it stood on was seen.
   double ground_share_min = 0.6;
-  /// A thing that left its spot is looked for as far away as this, if either map has only one of
-  /// its class.
+  /// Search distance for a thing that moved, if either map has only one of its class.
   double move_max_m = 30.0;
-  /// Nearer than this it is known again among others of its class...
+  /// Search distance among several things of its class...
   double nudge_max_m = 4.0;
-  /// ... if those are this many times as far away.
+  /// ... provided the others are this many times as far away.
   double nudge_ratio_min = 3.0;
 };
 
@@ -39,42 +39,47 @@ struct FreeSpot {
   TimeNs from_ns = 0;
 };
 
-/// A thing of `into` that is gone, and when that was seen first.
+/// A thing of `into` that is gone, and when its absence was first seen.
 struct Gone {
   int into = 0;
   TimeNs at_ns = 0;
 };
 
-/// What a mesh shows of a box.
+/// What the mesh of a map shows at a box.
 struct BoxSurface {
   /// Vertices well inside.
   int inside_count = 0;
-  /// Of the underside (in cells of a decimetre) the share on which there is surface.
+  /// Share of the underside (cells of a decimetre) on which there is surface.
   double ground_share = 0.0;
-  /// When that was first seen; kTimeMin without a time.
+  /// When that surface was first seen; kTimeMin if unknown.
   TimeNs ground_first_ns = kTimeMin;
 };
 
-/// Looks at a box in the mesh of the other map; `slack_m` is taken off its sides for what is
-/// inside. May be empty.
+/// Looks at a box in the mesh of the other map. The inside begins `slack_m` within its sides. May
+/// be empty.
 using SurfaceProbe = std::function<absl::StatusOr<BoxSurface>(const Pose3d& map_T_box,
                                                               const Box3d& box, double slack_m)>;
+
+/// A probe of the mesh of `other`, for boxes in the frame that `map_T_other` leads to. A box that
+/// touches more than some hundred blocks counts as full.
+///
+/// Threads: one caller at a time. `other` must outlive the probe.
+SurfaceProbe ProbeMesh(const Snapshot& other, const Pose3d& map_T_other);
 
 struct SessionChanges {
   /// Ascending by `into`.
   std::vector<Gone> gone;
-  /// Index in `into` of one that is gone, index in `other` of the same thing at its new spot.
+  /// Index in `into` of a thing that is gone, index in `other` of the same thing at its new place.
   std::vector<std::pair<int, int>> moved;
 };
 
-/// Free space as the places of a map know it.
-/// `default_ns`: for places without a time of their own.
+/// Free space around the places of a map. `default_ns`: time for places without one.
 std::vector<FreeSpot> FreeSpaceOf(const MapContent& content, TimeNs default_ns);
 
-/// `other` is in the frame of `into`, and `pair_of` says which of its nodes are in `into` already.
-/// Only objects that were last seen before the session looked can be gone; what is carried by such
-/// a one (ON, IN) goes with it. A thing has moved when it is gone here, one of its class, size and
-/// colour is new where `into` knew free space, and neither has a rival nearly as near.
+/// `other` is in the frame of `into`; `pair_of` tells which of its nodes `into` has. Only objects
+/// that were last seen before the session looked can be gone; what they carry (ON, IN) goes with
+/// them. A thing has moved when it is gone, one of its class, size and colour is new where `into`
+/// had free space, and neither has another candidate nearly as close.
 /// Errors: what `stop` and `probe` returned.
 absl::StatusOr<SessionChanges> FindChanges(const MapContent& into, const MapContent& other,
                                            const std::vector<int>& pair_of,

@@ -55,7 +55,7 @@ inline constexpr double kCoordinateMaxM = 2.0e6;
 /// What was observed further than this from all that a map knows is a wrong clock, and refused:
 /// maps are kept for years, and a robot that comes back after five of them is no error. The map
 /// knows its poses and, on a UNIX clock that was given one, its epoch; a map that knows neither
-/// takes any time. Clocks that are wrong by less are what retention minds (world_clock.h).
+/// takes any time. Clocks that are wrong by less are what retention minds.
 inline constexpr TimeNs kObservedFarMaxNs = 3652 * 24 * 3600 * kNsPerSecond;
 /// As above, for when something existed in the world, which may be told from records.
 inline constexpr TimeNs kValidFarMaxNs = 10 * kObservedFarMaxNs;

@@ -16,7 +16,8 @@
 
 namespace dsg {
 
-/// Upper triangle of a 6x6 covariance, row by row, translation before rotation.
+/// Upper triangle of a 6x6 covariance, row by row: translation (metres, axes of the map) before
+/// rotation (a small turn on the right of the orientation: radians, axes of the agent).
 using Covariance6 = std::array<float, 21>;
 
 namespace pose_flags {
@@ -49,6 +50,7 @@ struct PoseFactor {
   /// The other agent of an inter-robot factor; empty = the same agent.
   NodeId to_agent;
   Pose3d relative_pose;
+  /// Inverse covariance. Of a prior in the axes of Covariance6.
   std::optional<Covariance6> information;
 };
 

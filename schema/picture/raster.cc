@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "schema/picture/raster.h"
 
-#include <Eigen/Geometry>
+#include <png.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
+#include "absl/strings/str_cat.h"
 #include "schema/base/check.h"
 #include "schema/picture/font.h"
 
@@ -180,6 +183,23 @@ Picture Canvas::Halved() const {
       }
     }
   }
+  return out;
+}
+
+absl::StatusOr<std::string> EncodePng(const Picture& picture) {
+  png_image image;
+  std::memset(&image, 0, sizeof(image));
+  image.version = PNG_IMAGE_VERSION;
+  image.width = static_cast<png_uint_32>(picture.width);
+  image.height = static_cast<png_uint_32>(picture.height);
+  image.format = PNG_FORMAT_RGB;
+  std::string out(PNG_IMAGE_PNG_SIZE_MAX(image), '\0');
+  png_alloc_size_t size = out.size();
+  if (png_image_write_to_memory(&image, out.data(), &size, 0, picture.rgb.data(), 0, nullptr) ==
+      0) {
+    return absl::InternalError(absl::StrCat("cannot encode a picture as PNG: ", image.message));
+  }
+  out.resize(size);
   return out;
 }
 

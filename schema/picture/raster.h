@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// A plain picture: filled shapes, thick lines and small text.
-// Refuses to know what it shows.
+// A raster image: filled shapes, thick lines, small text, and PNG encoding.
 #pragma once
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <string>
 #include <string_view>
 #include <vector>
+
+#include "absl/status/statusor.h"
 
 namespace dsg::picture {
 
@@ -41,7 +43,7 @@ class Canvas {
   /// Inside by the even-odd rule. Fewer than three corners fill nothing.
   void FillPolygon(const std::vector<Eigen::Vector2d>& corners, const Paint& paint);
   void FillCircle(const Eigen::Vector2d& center, double radius, const Paint& paint);
-  /// One stroke through all points with round joints; it does not darken where it crosses itself.
+  /// One stroke through all points with round joints. It does not darken where it crosses itself.
   void DrawPolyline(const std::vector<Eigen::Vector2d>& points, double width, const Paint& paint);
   /// As DrawPolyline, back to the first point.
   void DrawOutline(std::vector<Eigen::Vector2d> corners, double width, const Paint& paint);
@@ -50,7 +52,7 @@ class Canvas {
   void DrawText(const Eigen::Vector2d& low, std::string_view text, double dot, const Paint& paint);
   static double TextWidth(std::string_view text, double dot);
 
-  /// Two by two pixels averaged to one, which smooths the edges.
+  /// Averages two by two pixels to one, which smooths the edges.
   Picture Halved() const;
 
  private:
@@ -60,5 +62,8 @@ class Canvas {
   int height_;
   std::vector<float> pixels_;
 };
+
+/// Encodes as PNG. Errors: INTERNAL with the message of the library.
+absl::StatusOr<std::string> EncodePng(const Picture& picture);
 
 }  // namespace dsg::picture

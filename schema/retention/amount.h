@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How much something is: rows by kind, and the bytes of their payloads.
-// Refuses to speak of files: indexes, page tails and history are the store's.
+// Counts rows by kind and the bytes of their payloads. Indexes, page tails and history are not
+// counted.
 #pragma once
 
 #include <cstdint>
@@ -19,12 +19,12 @@ struct Amount {
   int64_t shape_count = 0;
   int64_t factor_count = 0;
   int64_t stay_count = 0;
-  /// Stays that are kept, and only lose their room, place or beginning; no rows that go.
+  /// Stays that stay as rows and lose only their room, place or beginning.
   int64_t stay_edit_count = 0;
   int64_t mesh_block_count = 0;
   int64_t asset_count = 0;
   int64_t revision_count = 0;
-  /// Of payloads, as stored. Edges and stays without attributes have none.
+  /// Bytes of payloads, as stored. Edges and stays without attributes have no payload.
   int64_t byte_count = 0;
 
   int64_t RowCount() const;
@@ -32,13 +32,13 @@ struct Amount {
   bool operator==(const Amount&) const = default;
 };
 
-/// Counts the poses of one track and the bytes that they take in segments.
+/// Counts the poses of one track and their bytes in segments.
 class PoseBytes {
  public:
   explicit PoseBytes(TrajectoryCodec codec) : codec_(codec), encoder_(codec) {}
 
   void Add(const TimedPose& pose);
-  /// Adds what was counted since the last time.
+  /// Adds what was counted since the last call.
   void FlushTo(Amount* amount);
 
  private:
@@ -59,10 +59,10 @@ absl::StatusOr<Amount> CountMap(const Snapshot& map, const StopCheck& stop);
 absl::Status CountBatches(const Snapshot& map, NodeId agent, const Interval& span,
                           const StopCheck& stop, Amount* amount, std::vector<Sha256>* topologies);
 
-/// Of factors as one batch.
+/// Bytes of the factors as one batch.
 int64_t BytesOf(const std::vector<PoseFactor>& factors);
 
-/// Whether a factor of an agent has an end in a span, as GraphDelta::factor_removals means it.
+/// Whether a factor has an end in a span, as defined for GraphDelta::factor_removals.
 bool HasEndIn(const PoseFactor& factor, NodeId agent, const Interval& span);
 
 }  // namespace dsg

@@ -7,16 +7,148 @@
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
 #include "schema/retention/measure.h"
-#include "schema/retention/track_batches.h"
 
 namespace dsg {
-
 namespace {
 
-// Vertices and faces of a block that count as one row.
+// Number of vertices and faces of a block that count as one row.
 constexpr size_t kMeshPartsPerRow = 100;
 
+// A correction ends where this many consecutive poses are kept, so that they are not rewritten.
+constexpr size_t kKeptRunMax = 500;
+
 }  // namespace
+
+/// The changes of one track, in pieces of bounded size.
+class TrackBatches {
+ public:
+  /// `plan` must outlive this.
+  TrackBatches(const Snapshot& map, const TrackPlan& plan) : map_(map), plan_(plan) {}
+
+  /// Adds the next piece, of about `row_count_max` rows. Returns its number of rows; 0 at the end.
+  absl::StatusOr<size_t> AddTo(size_t row_count_max, const StopCheck& stop, GraphDelta* delta);
+
+ private:
+  struct Piece;
+  absl::StatusOr<size_t> AddShapes(size_t row_count_max, const StopCheck& stop, GraphDelta* delta);
+  absl::StatusOr<size_t> AddFactors(size_t row_count_max, GraphDelta* delta);
+  absl::StatusOr<size_t> AddPoses(size_t row_count_max, const StopCheck& stop, GraphDelta* delta);
+  bool Goes(TimeNs time_ns);
+
+  const Snapshot& map_;
+  const TrackPlan& plan_;
+  size_t shape_span_ = 0;
+  TimeNs shapes_from_ns_ = kTimeMin;
+  size_t factor_span_ = 0;
+  bool poses_are_done_ = false;
+  TimeNs poses_from_ns_ = kTimeMin;
+  size_t next_span_ = 0;
+  size_t next_thinned_ = 0;
+};
+
+absl::StatusOr<size_t> TrackBatches::AddTo(size_t row_count_max, const StopCheck& stop,
+                                           GraphDelta* delta) {
+  if (shape_span_ < plan_.shape_spans.size()) return AddShapes(row_count_max, stop, delta);
+  if (factor_span_ < plan_.factor_spans.size()) return AddFactors(row_count_max, delta);
+  if (poses_are_done_) return size_t{0};
+  return AddPoses(row_count_max, stop, delta);
+}
+
+absl::StatusOr<size_t> TrackBatches::AddShapes(size_t row_count_max, const StopCheck& stop,
+                                               GraphDelta* delta) {
+  const Interval& span = plan_.shape_spans[shape_span_];
+  const TimeNs from_ns = std::max(span.from_ns, shapes_from_ns_);
+  size_t count = 0;
+  TimeNs to_ns = span.to_ns;
+  DSG_RETURN_IF_ERROR(map_.ReadShapes(plan_.agent, from_ns, span.to_ns, /*with_vertices=*/false,
+                                      stop, [&](const ShownShape& shown) {
+                                        if (count == row_count_max) {
+                                          to_ns = shown.shape.time_ns;
+                                          return false;
+                                        }
+                                        ++count;
+                                        return true;
+                                      }));
+  delta->shape_removals.push_back({plan_.agent, from_ns, to_ns});
+  shapes_from_ns_ = to_ns;
+  if (to_ns == span.to_ns) {
+    ++shape_span_;
+    shapes_from_ns_ = kTimeMin;
+  }
+  return std::max<size_t>(count, 1);
+}
+
+// A whole span at once: the store keeps hundreds of factors per row.
+absl::StatusOr<size_t> TrackBatches::AddFactors(size_t row_count_max, GraphDelta* delta) {
+  const Interval& span = plan_.factor_spans[factor_span_++];
+  DSG_ASSIGN_OR_RETURN(const std::vector<PoseFactor> factors,
+                       map_.Factors(plan_.agent, span.from_ns, span.to_ns));
+  delta->factor_removals.push_back({plan_.agent, span.from_ns, span.to_ns});
+  return std::clamp<size_t>(factors.size(), 1, row_count_max);
+}
+
+bool TrackBatches::Goes(TimeNs time_ns) {
+  const auto& spans = plan_.forgotten;
+  while (next_span_ < spans.size() && spans[next_span_].to_ns <= time_ns) ++next_span_;
+  if (next_span_ < spans.size() && spans[next_span_].Contains(time_ns)) return true;
+  const auto& thinned = plan_.thinned_ns;
+  while (next_thinned_ < thinned.size() && thinned[next_thinned_] < time_ns) ++next_thinned_;
+  return next_thinned_ < thinned.size() && thinned[next_thinned_] == time_ns;
+}
+
+// From the first to the last dropped pose, with the kept ones between.
+struct TrackBatches::Piece {
+  TrajectoryCorrection correction;
+  size_t row_count = 0;
+  /// Kept poses since the last dropped one.
+  std::vector<TimedPose> kept;
+
+  void Drop(NodeId agent, TimeNs time_ns) {
+    if (row_count == 0) {
+      correction.agent = agent;
+      correction.from_ns = time_ns;
+    } else {
+      row_count += kept.size();
+      correction.poses.insert(correction.poses.end(), kept.begin(), kept.end());
+    }
+    kept.clear();
+    ++row_count;
+    correction.to_ns = time_ns + 1;
+  }
+};
+
+absl::StatusOr<size_t> TrackBatches::AddPoses(size_t row_count_max, const StopCheck& stop,
+                                              GraphDelta* delta) {
+  TimeNs from_ns = kTimeMax;
+  TimeNs to_ns = kTimeMin;
+  if (!plan_.forgotten.empty()) {
+    from_ns = plan_.forgotten.front().from_ns;
+    to_ns = plan_.forgotten.back().to_ns;
+  }
+  if (!plan_.thinned_ns.empty()) {
+    from_ns = std::min(from_ns, plan_.thinned_ns.front());
+    to_ns = std::max(to_ns, plan_.thinned_ns.back() + 1);
+  }
+  Piece piece;
+  poses_are_done_ = true;
+  const auto take = [&](const TimedPose& pose) {
+    if (Goes(pose.time_ns)) {
+      piece.Drop(plan_.agent, pose.time_ns);
+    } else if (piece.row_count > 0) {
+      piece.kept.push_back(pose);
+    }
+    const bool is_full = piece.row_count + piece.kept.size() >= row_count_max;
+    if (piece.row_count == 0 || (!is_full && piece.kept.size() < kKeptRunMax)) return true;
+    poses_from_ns_ = pose.time_ns + 1;
+    poses_are_done_ = false;
+    return false;
+  };
+  DSG_RETURN_IF_ERROR(
+      map_.ReadPoses(plan_.agent, std::max(from_ns, poses_from_ns_), to_ns, stop, take));
+  if (piece.row_count == 0) return size_t{0};
+  delta->corrections.push_back(std::move(piece.correction));
+  return piece.row_count;
+}
 
 class PruneBatches::Impl {
  public:
@@ -33,8 +165,8 @@ class PruneBatches::Impl {
     DSG_RETURN_IF_ERROR(AddMesh(stop, &delta));
     DSG_RETURN_IF_ERROR(AddTracks(stop, &delta));
     AddStays(&delta);
-    // Nodes go last: until then the branch is found again by its root. They look at the stays as
-    // these are in `head`, so not in one delta with changes of them.
+    // Nodes go last, so that an interrupted prune finds the branch again by its root. Their
+    // retirement reads the stays in `head`, so it cannot share a delta with changes of stays.
     const bool has_stays = !delta.stays.empty() || !delta.stay_removals.empty();
     if (!IsFull() && !has_stays && !ChangesGoneAgents(delta)) {
       DSG_RETURN_IF_ERROR(AddNodes(head, stop, &delta));
@@ -63,7 +195,7 @@ class PruneBatches::Impl {
  private:
   bool IsFull() const { return rows_ >= kPruneBatchRows; }
 
-  // A delta that retires an agent cannot correct its track as well.
+  // A delta cannot retire an agent and correct its track.
   bool ChangesGoneAgents(const GraphDelta& delta) const {
     const auto is_gone = [this](const auto& change) { return gone_.contains(change.agent); };
     const auto any = [&](const auto& changes) {
@@ -85,7 +217,7 @@ class PruneBatches::Impl {
       DSG_ASSIGN_OR_RETURN(const MeshBlock block, at_plan_->ReadMeshBlock(mesh.cut[next_cut_]));
       bool is_cut = false;
       delta->mesh_blocks.push_back(CutMesh(block, mesh.solids, &is_cut));
-      // A transaction is to have a bounded number of bytes too.
+      // Bounds the bytes of a transaction too.
       rows_ += 1 + (block.positions_map.size() + block.faces.size()) / kMeshPartsPerRow;
     }
     return absl::OkStatus();
@@ -115,14 +247,14 @@ class PruneBatches::Impl {
     }
     for (; !IsFull() && next_edit_ < plan_.stay_edits.size(); ++next_edit_, ++step_, ++rows_) {
       const StayEdit& edit = plan_.stay_edits[next_edit_];
-      // Its beginning is part of its key.
+      // The beginning is part of the key.
       if (edit.stay.enter_ns != edit.key.enter_ns) delta->stay_removals.push_back(edit.key);
       delta->stays.push_back(edit.stay);
     }
   }
 
   absl::Status AddNodes(const Snapshot& head, const StopCheck& stop, GraphDelta* delta) {
-    // The nodes of one delta are gone for each other only once it is committed.
+    // Changes of a delta take effect only when it is committed.
     const bool has_others = !delta->empty();
     for (; !IsFull() && next_node_ < plan_.nodes.size(); ++next_node_, ++step_) {
       DSG_RETURN_IF_ERROR(AskStop(stop));
@@ -142,7 +274,7 @@ class PruneBatches::Impl {
     return absl::OkStatus();
   }
 
-  // Edges of a hub, but for those that hold it in its branch. True if no more were left.
+  // Edges of a hub, except those to its parents. Returns true if no more are left.
   absl::StatusOr<bool> AddEdges(NodeId id, const Snapshot& head, const StopCheck& stop,
                                 GraphDelta* delta) {
     const auto take = [&](const Edge& edge) {
@@ -162,7 +294,7 @@ class PruneBatches::Impl {
     return !IsFull();
   }
 
-  // Stays that came after the plan: no stay may name a node that is gone.
+  // Stays that were written after the plan: no stay may refer to a retired node.
   absl::Status AddLateStays(NodeId id, const Snapshot& head, const StopCheck& stop,
                             GraphDelta* delta) {
     DSG_ASSIGN_OR_RETURN(const std::vector<Stay> stays,
@@ -219,5 +351,49 @@ void PruneBatches::Avoid(const Touched& touched) { impl_->Avoid(touched); }
 double PruneBatches::progress() const { return impl_->progress(); }
 
 const PrunePlan& PruneBatches::plan() const { return impl_->plan(); }
+
+std::vector<std::string> Contested::Names(size_t count_max) const {
+  std::vector<std::string> names;
+  for (const NodeId agent : agents) {
+    if (names.size() == count_max) return names;
+    names.push_back(ToString(agent));
+  }
+  for (const BlockIndex& block : mesh_blocks) {
+    if (names.size() == count_max) return names;
+    names.push_back(absl::StrCat(block.x, ",", block.y, ",", block.z));
+  }
+  return names;
+}
+
+void Others::Add(const Touched& touched) {
+  nodes_.insert(touched.nodes.begin(), touched.nodes.end());
+  tracks_.insert(touched.corrected_tracks.begin(), touched.corrected_tracks.end());
+  mesh_blocks_.insert(touched.mesh_blocks.begin(), touched.mesh_blocks.end());
+}
+
+Contested Others::FindContested(const PrunePlan& plan, const Erasure& erasure) const {
+  std::set<NodeId> erased_agents(erasure.nodes.begin(), erasure.nodes.end());
+  for (const TrackSpan& span : erasure.tracks) erased_agents.insert(span.agent);
+  Contested contested;
+  for (const TrackPlan& track : plan.tracks) {
+    if (tracks_.contains(track.agent) && erased_agents.contains(track.agent)) {
+      contested.agents.insert(track.agent);
+    }
+  }
+  for (const NodePlan& node : plan.nodes) {
+    if (node.is_agent && nodes_.contains(node.id) && erased_agents.contains(node.id)) {
+      contested.agents.insert(node.id);
+    }
+  }
+  const std::set<BlockIndex> erased(erasure.mesh_blocks.begin(), erasure.mesh_blocks.end());
+  for (const auto* blocks : {&plan.mesh.removed, &plan.mesh.cut}) {
+    for (const BlockIndex& block : *blocks) {
+      if (mesh_blocks_.contains(block) && erased.contains(block)) {
+        contested.mesh_blocks.insert(block);
+      }
+    }
+  }
+  return contested;
+}
 
 }  // namespace dsg

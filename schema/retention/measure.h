@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds what exactly a selection takes from a map, and counts it.
-// Refuses to decide what is selected.
+// What exactly a selection removes from a map, and how much that is.
 #pragma once
-
-#include <set>
 
 #include "absl/status/status.h"
 #include "schema/retention/plan.h"
@@ -11,7 +8,7 @@
 
 namespace dsg {
 
-/// One selection with what comes of it.
+/// One selection and its effects.
 struct Measured {
   Selection selection;
   Amount amount;
@@ -19,25 +16,18 @@ struct Measured {
   std::vector<StayKey> stay_removals;
   std::vector<StayEdit> stay_edits;
   MeshPlan mesh;
-  /// Edges by the first node of the selection at them, in the order of GraphIndex::bottom_up.
+  /// Number of removed edges per node, each edge counted at its first selected node in the order of
+  /// GraphIndex::bottom_up.
   std::vector<int32_t> edge_counts;
-  /// Poses that are forgotten, thinned ones not counted.
+  /// Forgotten poses; thinned ones are not counted.
   int64_t forgotten_pose_count = 0;
 };
 
-/// Fills all but `selection` of each.
+/// Fills all fields except `selection`.
 absl::Status Measure(const Snapshot& map, const GraphIndex& index, const StopCheck& stop,
                      std::vector<Measured>* all);
 
-/// What was clipped to the end of a track gets its open end back.
+/// Restores the open end of a stay that readers see clipped to the end of the track.
 Stay WithOpenEnd(Stay stay, const TrackInfo& track);
-
-// Parts of Measure: measure_tracks.cc, measure_stays.cc.
-
-/// Also collects the topologies of shapes that go.
-absl::Status MeasureTracks(const Snapshot& map, const GraphIndex& index, const StopCheck& stop,
-                           Measured* measured, std::set<Sha256>* topologies);
-absl::Status MeasureStays(const Snapshot& map, const GraphIndex& index, const StopCheck& stop,
-                          Measured* measured);
 
 }  // namespace dsg

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Takes a part of space out of a mesh block.
-// Refuses to cut triangles: each goes whole or stays whole.
+// Removes a part of space from a mesh block. Triangles are removed whole.
 #pragma once
 
 #include <vector>
@@ -10,7 +9,7 @@
 
 namespace dsg {
 
-/// A part of the map's space: a box, or what stands on a floor plan.
+/// A part of the space of a map: a box, or a prism over a floor plan.
 struct Solid {
   Box3d box_map;
   /// Corners of the floor plan, inside the box; empty = the whole box.
@@ -19,13 +18,15 @@ struct Solid {
   bool Contains(const Eigen::Vector3d& point_map) const;
 };
 
-/// The faces with their centre in a solid go, and the vertices that only they used; so do vertices
-/// of no face inside. Face and vertex order stay. `is_cut`: something went.
+/// Removes faces with their centre in a solid, vertices that only such faces use, and vertices
+/// without faces in a solid. Keeps the order of faces and vertices. `is_cut`: something was
+/// removed.
 ///
 /// Requires: the block satisfies CheckDelta.
 MeshBlock CutMesh(const MeshBlock& block, const std::vector<Solid>& solids, bool* is_cut);
 
-/// May the block have something in a solid? Vertices of faces may lie outside of the block's cube.
+/// Whether the block may have something in a solid. Vertices of faces may lie outside the block's
+/// cube.
 bool MayTouch(const MeshBlock& block, const std::vector<Solid>& solids);
 
 }  // namespace dsg

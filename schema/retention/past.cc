@@ -5,7 +5,9 @@
 #include <set>
 #include <tuple>
 
+#include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
+#include "schema/retention/graph_index.h"
 #include "schema/retention/selection.h"
 
 namespace dsg {
@@ -13,7 +15,59 @@ namespace {
 
 constexpr int kPage = 500;
 
-// May something of a block be in a solid? Corners of its faces may lie one block further.
+// Calls `visit` for readable revisions below `before`, newest first, until it returns false.
+template <class Visit>
+absl::Status ForEachBefore(MapReader* reader, Revision before, const StopCheck& stop,
+                           const Visit& visit) {
+  while (before > 1) {
+    DSG_RETURN_IF_ERROR(AskStop(stop));
+    DSG_ASSIGN_OR_RETURN(const std::vector<RevisionInfo> page,
+                         reader->ListRevisions(before, kPage));
+    if (page.empty()) return absl::OkStatus();
+    for (const RevisionInfo& info : page) {
+      if (!visit(info)) return absl::OkStatus();
+    }
+    before = page.back().revision;
+  }
+  return absl::OkStatus();
+}
+
+// Adds up the wall clock from commit to commit, backwards from now.
+class AgeOfRevisions {
+ public:
+  explicit AgeOfRevisions(int64_t wall_now_ns) : before_ns_(wall_now_ns) {}
+
+  /// The least age of a revision. Call in order, newest first.
+  int64_t Next(const RevisionInfo& info) {
+    // Unsigned, because stamps are arbitrary and the signed difference may overflow.
+    const bool is_back = info.committed_ns > before_ns_;
+    const uint64_t step_ns =
+        static_cast<uint64_t>(before_ns_) - static_cast<uint64_t>(info.committed_ns);
+    if (!is_back && step_ns <= static_cast<uint64_t>(kClockLeapMaxNs)) {
+      age_ns_ += static_cast<int64_t>(step_ns);
+    } else {
+      ++leap_count_;
+      leap_after_ = info.revision;
+    }
+    before_ns_ = info.committed_ns;
+    return age_ns_;
+  }
+
+  std::string Note() const {
+    if (leap_count_ == 0) return "";
+    return absl::StrCat("the wall clock went back, or on by more than a week, ", leap_count_,
+                        leap_count_ == 1 ? " time" : " times", ", first after revision ",
+                        leap_after_, "; ages of revisions count without that");
+  }
+
+ private:
+  int64_t before_ns_;
+  int64_t age_ns_ = 0;
+  int64_t leap_count_ = 0;
+  Revision leap_after_ = 0;
+};
+
+// Whether something of a block may be in a solid. Faces may reach into the next block.
 bool IsNear(const BlockIndex& block, const Solid& solid, double size_m) {
   const Eigen::Vector3d low(block.x - 1.0, block.y - 1.0, block.z - 1.0);
   return solid.box_map.intersects(Box3d(low * size_m, (low.array() + 3.0).matrix() * size_m));
@@ -71,7 +125,7 @@ class PastSearch {
     return asks_region ? TakeVisits(*before, touched.corrected_tracks) : absl::OkStatus();
   }
 
-  // As they were last believed: what is there before a revision and not after it ended with it.
+  // Nodes by their last state: those before a revision that are missing after it.
   absl::Status TakeDead(const Snapshot& before, const std::vector<NodeId>& dead) {
     if (dead.empty()) return absl::OkStatus();
     DSG_ASSIGN_OR_RETURN(const auto nodes, before.FindNodes(dead, stop_));
@@ -113,7 +167,7 @@ class PastSearch {
     return asks_seen ? is_unseen : node.valid.to_ns <= *cutoff || (is_agent && is_unseen);
   }
 
-  // Nothing believed now contains it, so one way up to the root is enough.
+  // No present node contains it, so one path to the root is enough.
   absl::StatusOr<bool> IsInBranch(const Snapshot& before, const Node& node,
                                   const std::string& id_or_name) {
     const auto root = before.ResolveNode(id_or_name);
@@ -211,17 +265,46 @@ void SortUnique(std::vector<T>* items, const KeyOf& key_of) {
 
 }  // namespace
 
+absl::StatusOr<HistoryCut> FindHistoryCut(MapReader* reader, Revision newest,
+                                          const PrunePolicy& policy, int64_t wall_now_ns,
+                                          const StopCheck& stop) {
+  DSG_ASSIGN_OR_RETURN(const Revision oldest, reader->OldestRevision());
+  HistoryCut cut;
+  cut.keep_from = newest;
+  if (const auto* before = std::get_if<PrunePolicy::HistoryBefore>(&policy.what)) {
+    // Returns the error for a future revision.
+    if (before->revision > newest) DSG_RETURN_IF_ERROR(reader->At(before->revision).status());
+    cut.keep_from = std::min(before->revision, newest);
+  } else {
+    const auto& age = std::get<PrunePolicy::HistoryOlderThan>(policy.what);
+    AgeOfRevisions ages(wall_now_ns);
+    DSG_RETURN_IF_ERROR(ForEachBefore(reader, newest + 1, stop, [&](const RevisionInfo& info) {
+      if (info.revision < oldest || ages.Next(info) > age.age_ns) return false;
+      cut.keep_from = info.revision;
+      return true;
+    }));
+    cut.note = ages.Note();
+  }
+  // Compacted revisions do not come back.
+  cut.keep_from = std::max(cut.keep_from, oldest);
+  DSG_ASSIGN_OR_RETURN(const std::vector<Tag> tags, reader->Tags());
+  std::set<Revision> tagged;
+  for (const Tag& tag : tags) tagged.insert(tag.revision);
+  DSG_RETURN_IF_ERROR(ForEachBefore(reader, cut.keep_from, stop, [&](const RevisionInfo& info) {
+    if (info.revision < oldest) return false;
+    if (!tagged.contains(info.revision)) ++cut.revision_count;
+    return true;
+  }));
+  return cut;
+}
+
 absl::StatusOr<std::vector<Revision>> ReadableRevisions(MapReader* reader, Revision newest,
                                                         const StopCheck& stop) {
   std::vector<Revision> revisions;
-  for (Revision before = newest + 1; before > 1;) {
-    DSG_RETURN_IF_ERROR(AskStop(stop));
-    DSG_ASSIGN_OR_RETURN(const std::vector<RevisionInfo> page,
-                         reader->ListRevisions(before, kPage));
-    if (page.empty()) break;
-    for (const RevisionInfo& info : page) revisions.push_back(info.revision);
-    before = page.back().revision;
-  }
+  DSG_RETURN_IF_ERROR(ForEachBefore(reader, newest + 1, stop, [&](const RevisionInfo& info) {
+    revisions.push_back(info.revision);
+    return true;
+  }));
   std::reverse(revisions.begin(), revisions.end());
   return revisions;
 }

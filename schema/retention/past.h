@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a policy that erases means in the past: entities that are gone already, as they were last
-// believed, and older beliefs about tracks and meshes. That is also how a prune that was cut off
-// between retiring and erasing finds what is left to do.
-// Refuses to touch the past of what is believed to be elsewhere now.
+// Policies and the past: the revisions that a history policy drops, and what an erasing policy
+// removes from older revisions. Gone entities match by their last state; tracks and meshes by their
+// state in each revision. So a prune that stopped between retiring and erasing finds the rest. The
+// past of an entity that is elsewhere now stays.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -14,27 +15,47 @@
 
 namespace dsg {
 
+struct HistoryCut {
+  /// The oldest revision to keep, at most the newest.
+  Revision keep_from = 0;
+  /// Number of readable revisions before it that have no tag.
+  int64_t revision_count = 0;
+  /// Where the wall clock was not trusted, in words; empty if nowhere.
+  std::string note;
+};
+
+/// The age of a revision is the sum of the steps of the wall clock from commit to commit, up to
+/// `wall_now_ns`. A step back, or one of more than kClockLeapMaxNs, counts as zero: the clock may
+/// have been set, and dropped revisions do not come back. So pauses of more than a week make a
+/// revision count as younger than it is, never as older.
+///
+/// Requires: policy.IsHistory().
+/// Errors: OUT_OF_RANGE/REVISION_IN_FUTURE; what `stop` returned.
+absl::StatusOr<HistoryCut> FindHistoryCut(MapReader* reader, Revision newest,
+                                          const PrunePolicy& policy, int64_t wall_now_ns,
+                                          const StopCheck& stop);
+
 /// Adds what the policy matches at the revision of the plan.
 void AddPresent(const GraphIndex& index, const Measured& measured, Erasure* erasure);
 
-/// Adds what it matched before.
+/// Adds what the policy matches in older revisions.
 /// Cost: looks at what each readable revision ended.
 absl::Status AddPast(MapReader* reader, const Snapshot& map, const GraphIndex& index,
                      const PrunePolicy& policy, const StopCheck& stop, Erasure* erasure);
 
-/// Oldest first, up to `newest`.
+/// The readable revisions up to `newest`. Order: oldest first.
 absl::StatusOr<std::vector<Revision>> ReadableRevisions(MapReader* reader, Revision newest,
                                                         const StopCheck& stop);
 
-/// Whether the node that a branch policy names was there at any readable revision.
+/// Whether the node of a branch policy existed at any readable revision.
 absl::StatusOr<bool> WasEverThere(MapReader* reader, const Snapshot& map, const PrunePolicy& policy,
                                   const StopCheck& stop);
 
-/// Sorts, and leaves out what stands twice.
+/// Sorts, and removes duplicates.
 void Normalize(Erasure* erasure);
-/// Names also what `other` names.
+/// Adds `other`.
 void Join(const Erasure& other, Erasure* erasure);
-/// Names nothing.
+/// Whether it erases nothing.
 bool IsEmpty(const Erasure& erasure);
 
 }  // namespace dsg

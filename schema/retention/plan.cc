@@ -5,7 +5,6 @@
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
-#include "schema/retention/history_cut.h"
 #include "schema/retention/measure.h"
 #include "schema/retention/past.h"
 #include "schema/retention/selection.h"
@@ -24,7 +23,7 @@ class Planner {
     for (const PrunePolicy& policy : policies_) DSG_RETURN_IF_ERROR(policy.Validate());
     DSG_ASSIGN_OR_RETURN(GraphIndex index, GraphIndex::Load(map_, stop_));
     DSG_RETURN_IF_ERROR(FindClock(&index));
-    // The union stands last.
+    // The union is the last element.
     std::vector<Measured> all(policies_.size() + 1);
     all.back().selection.is_gone.assign(index.nodes().size(), false);
     for (size_t i = 0; i < policies_.size(); ++i) {
@@ -39,7 +38,7 @@ class Planner {
   }
 
  private:
-  // The least age by which a policy names something; nullopt if none does.
+  // The least age of all policies; nullopt without ages.
   std::optional<TimeNs> FindLeastAge() const {
     std::optional<TimeNs> least_ns;
     const auto take = [&](TimeNs age_ns) {
@@ -65,8 +64,8 @@ class Planner {
     return absl::OkStatus();
   }
 
-  // What is to be erased need not be there any more: then the past is searched for it. One of
-  // several policies that names what this map does not have (any more) matches nothing.
+  // A node to erase may be gone already; then the past is searched for it. A policy among several
+  // that names an unknown node matches nothing.
   absl::StatusOr<Selection> SelectOf(const GraphIndex& index, const PrunePolicy& policy) {
     auto selection = Select(map_, index, policy, stop_);
     if (ReasonOf(selection.status()) != Reason::kNodeUnknown) return selection;
@@ -121,7 +120,7 @@ class Planner {
     return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
   }
 
-  // What is left of such a map has nothing that holds it together.
+  // Without its only building the rest of a map has no root.
   static bool TakesOnlyBuilding(const GraphIndex& index, const PrunePolicy& policy,
                                 const Selection& selection) {
     if (!std::holds_alternative<PrunePolicy::Branch>(policy.what)) return false;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a set of policies would take from a map as it is at one revision, and how much that is.
-// Refuses to change anything: batches.h makes the changes of it.
+// What a set of policies would remove from a map at one revision, and how much that is. Changes
+// nothing; batches.h makes the deltas.
 #pragma once
 
 #include <optional>
@@ -22,7 +22,7 @@ struct PolicyMatch {
 
 struct NodePlan {
   NodeId id;
-  /// Edges that end with it, those of nodes before it in the plan excepted.
+  /// Edges that end with it, except those of earlier nodes of the plan.
   int32_t edge_count = 0;
   bool may_hold_stays = false;
   bool is_agent = false;
@@ -30,35 +30,35 @@ struct NodePlan {
 
 struct TrackPlan {
   NodeId agent;
-  /// Poses inside go. Ascending, disjoint.
+  /// Spans of poses to remove. Ascending, disjoint.
   std::vector<Interval> forgotten;
-  /// Times of poses that go because the others tell them. Ascending, outside of `forgotten`.
+  /// Times of poses to drop because interpolation restores them. Ascending, outside `forgotten`.
   std::vector<TimeNs> thinned_ns;
-  /// Spans out of which shapes and factors go, where there are any.
+  /// Spans of shapes and factors to remove; empty without any.
   std::vector<Interval> shape_spans;
   std::vector<Interval> factor_spans;
 };
 
 struct StayEdit {
-  /// As it is stored.
+  /// The key as stored.
   StayKey key;
-  /// As it is to be: without room or place, or with a later beginning.
+  /// The new stay: without room or place, or with a later beginning.
   Stay stay;
 };
 
 struct MeshPlan {
-  /// Go whole.
+  /// Blocks to remove.
   std::vector<BlockIndex> removed;
-  /// Lose what is in `solids`.
+  /// Blocks that lose what is in `solids`.
   std::vector<BlockIndex> cut;
   std::vector<Solid> solids;
 };
 
 struct PrunePlan {
   Revision revision = 0;
-  /// One a policy, in order.
+  /// One per policy, in order.
   std::vector<PolicyMatch> policies;
-  /// What the policies match together, each row once.
+  /// What all policies match together; each row counts once.
   Amount total;
   /// Children before parents.
   std::vector<NodePlan> nodes;
@@ -67,39 +67,40 @@ struct PrunePlan {
   /// Stays that lose their room, their place or their beginning.
   std::vector<StayEdit> stay_edits;
   MeshPlan mesh;
-  /// Of policies with kErase: what to wipe out of the past, also where nothing is left of it now.
+  /// For policies with kErase: what to erase from all revisions, even if nothing of it is left now.
   std::optional<Erasure> erasure;
-  /// Revisions before are to be compacted; nullopt without a history policy.
+  /// Revisions before this one are compacted; nullopt without a history policy.
   std::optional<Revision> keep_from;
-  /// A policy that matches every node that is no agent, or every pose, or the branch of the map's
-  /// only building; empty = none does.
+  /// A policy that matches all nodes other than agents, all poses, or the branch of the only
+  /// building; empty = none.
   std::string all_matching_policy;
-  /// The largest share, 0 to 1, of the nodes that are no agents or of the poses that goes by one
-  /// policy or by all together, and by which.
+  /// The largest share (0 to 1) of the nodes other than agents, or of the poses, that one policy or
+  /// all together remove, and the name of that policy.
   double share = 0.0;
   std::string share_policy;
-  /// Agents that are ahead of what ages count back from (world_clock.h). Empty without ages.
+  /// Agents that are ahead of the time from which ages count back (WorldClock). Empty without ages.
   std::vector<NodeId> implausible_agents;
-  /// What ages count without, in words.
+  /// What ages leave out, in words.
   std::vector<std::string> notes;
 
-  /// There is nothing to commit.
+  /// Whether there is nothing to commit.
   bool IsEmpty() const;
 };
 
 struct PlanOptions {
-  /// What ages of revisions count back from, and what on a UNIX clock nothing was observed after;
-  /// 0 = not known.
+  /// The wall clock: ages of revisions count back from it, and on a UNIX clock no observation is
+  /// later. 0 = unknown.
   int64_t wall_now_ns = 0;
 };
 
-/// Order:  policies count in order; where two thin one track, the later thins what the earlier
-/// left. Cost:   reads all nodes and edges, the tracks and meshes that are matched; with kErase
-/// also what
-///         each revision changed.
-/// Errors: what PrunePolicy::Validate returns; NOT_FOUND/NODE_UNKNOWN (of a policy that stands
-///         alone; among others it matches nothing), LAYER_UNKNOWN; OUT_OF_RANGE/REVISION_IN_FUTURE;
-///         what `stop` returned.
+/// Applies the policies in order: where two thin one track, the later one thins what the earlier
+/// one left.
+///
+/// Errors: those of PrunePolicy::Validate; NOT_FOUND/NODE_UNKNOWN if the only policy names an
+/// unknown node (among several policies such a one matches nothing), LAYER_UNKNOWN;
+/// OUT_OF_RANGE/REVISION_IN_FUTURE; what `stop` returned.
+/// Cost: reads all nodes and edges, and the matched tracks and meshes; with kErase also what each
+/// revision changed.
 absl::StatusOr<PrunePlan> PlanPrune(MapReader* reader, const Snapshot& map,
                                     const std::vector<PrunePolicy>& policies,
                                     const PlanOptions& options, const StopCheck& stop);

@@ -1,15 +1,71 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "schema/retention/policy.h"
 
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <utility>
 
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
 #include "schema/base/utf8.h"
 
 namespace dsg {
+namespace {
+
+using Unit = std::pair<std::string_view, TimeNs>;
+
+// Largest first; "ms" before "m" and "s" when reading.
+constexpr std::array<Unit, 5> kUnits = {{{"d", kNsPerDay},
+                                         {"h", 3600 * kNsPerSecond},
+                                         {"m", 60 * kNsPerSecond},
+                                         {"s", kNsPerSecond},
+                                         {"ms", kNsPerSecond / 1000}}};
+constexpr double kAgeMaxNs = 36'525.0 * static_cast<double>(kNsPerDay);
+
+const Unit* UnitOf(std::string_view text) {
+  if (text.ends_with("ms")) return &kUnits.back();
+  for (const Unit& unit : kUnits) {
+    if (text.ends_with(unit.first)) return &unit;
+  }
+  return nullptr;
+}
+
+absl::Status Refuse(std::string_view text) {
+  return MakeError(Reason::kFieldInvalid,
+                   absl::StrCat("\"", std::string(text),
+                                "\" is no length of time; write a number above 0 and its unit: "
+                                "90s, 15m, 24h, 30d"),
+                   {{"value", std::string(text)}});
+}
+
+}  // namespace
+
+absl::StatusOr<TimeNs> ParseAge(std::string_view text) {
+  const Unit* const unit = UnitOf(text);
+  if (unit == nullptr) return Refuse(text);
+  const std::string number(text.substr(0, text.size() - unit->first.size()));
+  // Only digits and a point: no signs, exponents, blanks or "inf".
+  if (number.empty() || number.find_first_not_of("0123456789.") != std::string::npos) {
+    return Refuse(text);
+  }
+  double count = 0.0;
+  if (!absl::SimpleAtod(number, &count)) return Refuse(text);
+  const double age_ns = std::round(count * static_cast<double>(unit->second));
+  if (!(age_ns >= 1.0 && age_ns <= kAgeMaxNs)) return Refuse(text);
+  return static_cast<TimeNs>(age_ns);
+}
+
+std::string FormatAge(TimeNs age_ns) {
+  for (const Unit& unit : kUnits) {
+    if (age_ns % unit.second == 0) {
+      return absl::StrCat(age_ns / unit.second, std::string(unit.first));
+    }
+  }
+  return absl::StrCat(static_cast<double>(age_ns) / 1e6, "ms");
+}
+
 namespace {
 
 constexpr size_t kNameBytesMax = 200;
@@ -25,7 +81,7 @@ class Checker {
                        " bytes, none of them 0",
                    "name", "");
     }
-    // First: without it a policy that says nothing else would be blamed for that.
+    // Checked first, because a wrong value here would be reported as a missing `what`.
     DSG_RETURN_IF_ERROR(CheckMetres());
     DSG_RETURN_IF_ERROR(
         std::visit([this](const auto& what) { return CheckWhat(what); }, policy_.what));
@@ -46,14 +102,14 @@ class Checker {
  private:
   static bool HasNul(const std::string& text) { return text.find('\0') != std::string::npos; }
 
-  // Those of the command line have no names.
+  // Policies of the command line have no names.
   std::string Who() const {
     return policy_.name.empty() ? "the policy" : absl::StrCat("policy \"", policy_.name, "\"");
   }
 
   absl::Status Error(const std::string& what, std::string_view field,
                      const std::string& value) const {
-    // A name that is refused itself would not make a message.
+    // An invalid name cannot be part of a message.
     const bool has_name = field != "name";
     return MakeError(Reason::kFieldInvalid,
                      absl::StrCat(has_name ? Who() : "the policy", ": ", what),
@@ -121,7 +177,7 @@ class Checker {
 
   absl::Status CheckMetres() const {
     const double metres = policy_.simplify_m;
-    // 0 forgets; -0 is a slip of whoever made it.
+    // 0 forgets; -0 is an error of the caller.
     if (std::isfinite(metres) && !std::signbit(metres) && metres <= kSimplifyMaxM) {
       return absl::OkStatus();
     }

@@ -14,21 +14,46 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
-#include "schema/retention/duration.h"
-#include "schema/retention/yaml_documents.h"
 
 namespace dsg {
 namespace {
 
 constexpr size_t kFileBytesMax = size_t{1} << 20;
 constexpr size_t kPolicyCountMax = 100;
-// The parser's own recursion must stay far from the stack's end; a policy nests three deep.
+// Bounds the recursion of the parser; a policy nests three levels.
 constexpr size_t kBracketsMax = 1000;
 constexpr TimeNs kEveryMin = kNsPerSecond;
 
-class Reader {
+bool IsMarker(std::string_view line, std::string_view marker) {
+  if (!line.starts_with(marker)) return false;
+  const std::string_view rest = line.substr(marker.size());
+  return rest.empty() || rest.front() == ' ' || rest.front() == '\t' || rest.front() == '\r';
+}
+
+// The line, counted from 0, at which a second document begins; nullopt if none does. YAML::Load
+// reads the first document and ignores what follows; YAML::LoadAll does not end on all texts.
+std::optional<int> FindSecondDocument(std::string_view text) {
+  bool has_content = false;
+  bool has_ended = false;
+  int number = 0;
+  for (size_t begin = 0; begin < text.size(); ++number) {
+    const size_t end = std::min(text.find('\n', begin), text.size());
+    const std::string_view line = text.substr(begin, end - begin);
+    begin = end + 1;
+    const bool begins = IsMarker(line, "---");
+    const bool ends = IsMarker(line, "...");
+    const size_t first = line.find_first_not_of(" \t\r");
+    const bool says_nothing = first == std::string_view::npos || line[first] == '#' || ends;
+    if ((begins && has_content) || (has_ended && !says_nothing)) return number;
+    has_ended = has_ended || ends;
+    has_content = has_content || begins || (!says_nothing && line.front() != '%');
+  }
+  return std::nullopt;
+}
+
+class PolicyReader {
  public:
-  explicit Reader(std::string name) : name_(std::move(name)) {}
+  explicit PolicyReader(std::string name) : name_(std::move(name)) {}
 
   absl::StatusOr<PolicyFile> Read(const YAML::Node& root) {
     PolicyFile file;
@@ -123,7 +148,8 @@ class Reader {
     return Wrong(node, absl::StrCat(key, " is \"", text, "\", which is no whole number"));
   }
 
-  // Nanoseconds or RFC 3339: a file is for many maps, so times relative to an epoch say nothing.
+  // Nanoseconds or RFC 3339. A file serves many maps, so times relative to an epoch are not
+  // allowed.
   absl::StatusOr<TimeNs> Instant(const YAML::Node& node, const std::string& key) const {
     DSG_ASSIGN_OR_RETURN(const std::string text, Text(node, key));
     if (text.starts_with("+") || text.starts_with("-")) {
@@ -156,7 +182,7 @@ class Reader {
     return words;
   }
 
-  // The keys of which a policy has one.
+  // The keys of which a policy has exactly one.
   std::map<std::string, Take> Whats() const {
     using P = PrunePolicy;
     const auto age = [this](const std::string& key, auto make) -> Take {
@@ -267,7 +293,7 @@ class Reader {
 }  // namespace
 
 absl::StatusOr<PolicyFile> ParsePolicyFile(std::string_view text, const std::string& name) {
-  Reader reader(name);
+  PolicyReader reader(name);
   const auto brackets =
       std::count_if(text.begin(), text.end(), [](char c) { return c == '[' || c == '{'; });
   if (text.size() > kFileBytesMax || static_cast<size_t>(brackets) > kBracketsMax) {
@@ -293,7 +319,7 @@ absl::StatusOr<PolicyFile> ReadPolicyFile(const std::string& path) {
                                             error ? error.message() : "it is no plain file"));
   }
   std::ifstream in(path, std::ios::binary);
-  // One byte more than may be, so that ParsePolicyFile sees that it is too large.
+  // Reads one byte above the limit, so that ParsePolicyFile sees that the file is too large.
   std::string text(kFileBytesMax + 1, '\0');
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (!in.is_open() || in.bad()) {

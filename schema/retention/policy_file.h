@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads a file of policies: what to forget, and how often to look (docs/forgetting.md).
-// Refuses unknown keys and anything half understood: a file is taken whole or not at all.
+// Reads a file of policies: what to forget, and how often (docs/forgetting.md). Unknown keys are
+// errors; a file applies as a whole or not at all.
 #pragma once
 
 #include <optional>
@@ -13,22 +13,21 @@
 
 namespace dsg {
 
-/// More than half of a map at once is rather a wrong clock than a policy.
+/// A run that takes more than half of a map indicates a wrong clock.
 inline constexpr double kShareMaxDefault = 0.5;
 
 struct PolicyFile {
   /// How often a server applies the policies.
   TimeNs every_ns = 0;
-  /// Valid each, with names that differ.
+  /// Each is valid; names are unique.
   std::vector<PrunePolicy> policies;
-  /// The largest share of the nodes that are no agents, and of the poses, that a run may take from
-  /// a map; above 0, at most 1. An everyday run takes what has come of age since the run before.
-  /// Unset: kShareMaxDefault for a schedule, and no limit for a person who runs the file once.
+  /// The largest share of the nodes other than agents, and of the poses, that one run may remove
+  /// from a map; above 0, at most 1. Unset: kShareMaxDefault for a schedule, no limit for a single
+  /// run.
   std::optional<double> share_max;
 };
 
-/// Reads YAML. `name` stands in errors.
-/// Errors: INVALID_ARGUMENT/FILE_MALFORMED with line and column.
+/// Parses YAML. Errors name `name`. Errors: INVALID_ARGUMENT/FILE_MALFORMED with line and column.
 absl::StatusOr<PolicyFile> ParsePolicyFile(std::string_view text, const std::string& name);
 
 /// As ParsePolicyFile. Errors: also NOT_FOUND without the file.

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What policies match in one map at one revision, before it is known what that amounts to.
-// Refuses to look into tracks and meshes: it names spans and spaces.
+// What policies match in a map at one revision: nodes, spans of tracks, parts of space.
 #pragma once
 
 #include <optional>
@@ -15,7 +14,7 @@ namespace dsg {
 /// Thinning of one track (simplify.h).
 struct Thinning {
   Interval span;
-  /// The ends of the span lie in the world, not at an age: they will be the same next time.
+  /// The ends of the span are fixed in the world, not ages: the next run has the same ends.
   bool ends_are_fixed = false;
   double position_m = 0.0;
   double rotation_rad = 0.0;
@@ -23,9 +22,9 @@ struct Thinning {
 
 struct TrackChoice {
   NodeId agent;
-  /// Poses, shapes and factors inside go. Ascending, disjoint.
+  /// Spans of poses, shapes and factors to remove. Ascending, disjoint.
   std::vector<Interval> forgotten;
-  /// Stays that end until then go.
+  /// Stays that end by then are removed.
   TimeNs stays_until_ns = kTimeMin;
   std::vector<Thinning> thinnings;
 };
@@ -38,20 +37,20 @@ struct Selection {
   /// Ascending by agent.
   std::vector<TrackChoice> tracks;
 
-  /// What either matches.
+  /// Adds what `other` selects.
   void Add(const Selection& other);
 };
 
-/// Joins what touches or overlaps. Order: ascending.
+/// Joins intervals that touch or overlap. Order: ascending.
 std::vector<Interval> JoinIntervals(std::vector<Interval> intervals);
 
-/// What one policy matches; of a history policy nothing.
+/// What one policy matches; nothing for a history policy.
 /// Errors: NOT_FOUND/NODE_UNKNOWN, LAYER_UNKNOWN.
 absl::StatusOr<Selection> Select(const Snapshot& map, const GraphIndex& index,
                                  const PrunePolicy& policy, const StopCheck& stop);
 
-/// The instant before which an age or an instant of a policy lies, for things and for the times of
-/// an agent; nullopt for policies without one, and for ages in a map in which nothing was observed.
+/// The instant before which a policy applies, for things and for the times of an agent; nullopt for
+/// policies without one, and for ages in a map without observations.
 std::optional<TimeNs> CutoffOf(const PrunePolicy& policy, const WorldClock& clock);
 std::optional<TimeNs> CutoffOf(const PrunePolicy& policy, const WorldClock& clock, NodeId agent);
 
@@ -66,11 +65,5 @@ class LayerSet {
   bool is_all_ = true;
   std::vector<LayerId> layers_;
 };
-
-// Parts of Select: node_choice.cc, track_choice.cc.
-absl::Status ChooseNodes(const Snapshot& map, const GraphIndex& index, const PrunePolicy& policy,
-                         const LayerSet& layers, Selection* selection);
-absl::Status ChooseTracks(const Snapshot& map, const GraphIndex& index, const PrunePolicy& policy,
-                          const StopCheck& stop, Selection* selection);
 
 }  // namespace dsg

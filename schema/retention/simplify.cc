@@ -7,12 +7,12 @@
 namespace dsg {
 namespace {
 
-// Two poses a minute are kept at least; a window of a person at 10 Hz is 600 poses.
+// Keeps at least two poses a minute; a window of a person at 10 Hz is 600 poses.
 constexpr TimeNs kWindowNs = 60 * kNsPerSecond;
-// Where gaps are long, so are windows: else each pose would begin one.
+// Long gaps need long windows: otherwise each pose would begin one.
 constexpr TimeNs kGapsPerWindow = 16;
 
-// How far a pose is from the way between two others, 1 being just as far as is allowed.
+// Distance of a pose from the interpolation between two others, relative to the bounds.
 double ErrorOf(const TimedPose& pose, const TimedPose& from, const TimedPose& to,
                const SimplifyOptions& options) {
   const double fraction = static_cast<double>(pose.time_ns - from.time_ns) /
@@ -26,8 +26,8 @@ double ErrorOf(const TimedPose& pose, const TimedPose& from, const TimedPose& to
   return std::max(position, rotation);
 }
 
-// Where to split the poses from `first` to `last`; `first` if nowhere. The choice is the same when
-// some of the poses that are not kept are missing, which is why thinning twice changes nothing.
+// Index at which to split the poses from `first` to `last`; `first` for no split. The choice does
+// not depend on poses that are not kept, so thinning twice changes nothing.
 size_t SplitAt(const std::vector<TimedPose>& poses, size_t first, size_t last,
                const SimplifyOptions& options) {
   double worst = 1.0;
@@ -84,7 +84,7 @@ int64_t TrackThinner::WindowOf(TimeNs time_ns) const {
 void TrackThinner::Add(const TimedPose& pose) {
   if (!window_.empty()) {
     const TimedPose& last = window_.back();
-    // Times may lie further apart than 63 bits count.
+    // Unsigned, because the difference of times may exceed 63 bits.
     const auto way_ns = static_cast<uint64_t>(pose.time_ns) - static_cast<uint64_t>(last.time_ns);
     if (way_ns > static_cast<uint64_t>(options_.gap_ns_max) || !AreAlike(last, pose)) {
       Close();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Thins a track: drops poses that interpolation in time gives back.
-// Refuses to bridge: gaps stay gaps, and what is kept stays bit for bit what it was.
+// Thins a track: drops poses that interpolation in time restores. Gaps stay gaps, and kept poses do
+// not change.
 #pragma once
 
 #include <cstdint>
@@ -13,29 +13,25 @@
 namespace dsg {
 
 struct SimplifyOptions {
-  /// Bounds of what Interpolate() gives at the time of a dropped pose, against that pose.
+  /// Bounds of the difference between a dropped pose and Interpolate() at its time.
   double position_m = 0.05;
   double rotation_rad = 0.1;
-  /// Of the agent's track.
+  /// Gap length of the track.
   TimeNs gap_ns_max = 2 * kNsPerSecond;
-  /// Only poses inside are dropped; the poses beside a dropped one are inside too.
+  /// Only poses inside are dropped; the neighbours of a dropped pose are inside too.
   Interval span;
 };
 
-/// Takes the poses of a track one after the other and tells which to drop.
-///
-/// The bound: at the time of each dropped pose, linear interpolation between the kept poses on both
-/// sides is within `position_m` of its position, and slerp within `rotation_rad` of its orientation
-/// (which poses with kNoOrientation do not have). Both sides are at most `gap_ns_max` apart, so
-/// what was interpolated before is interpolated still, and what was a gap still is one. In between
-/// the stored poses nothing is promised beyond that of the poses themselves.
-///
-/// How: top-down Douglas-Peucker with the time-synchronised distance (Meratnia and de By, 2004,
-/// TD-TR) in windows of fixed instants, the first pose of each being kept. Windows make it a
-/// stream, and thinning what is thin drops nothing: the bound does not grow from day to day. Kept
-/// are also the poses on both sides of a gap, of a change of flags, and of a change from poses with
-/// a covariance to such without. (Where forgetting cuts a window in two after it was thinned, what
-/// is left of it may be thinned once more, and the bound doubles there.)
+/// Takes the poses of a track one by one and reports those to drop.
+/// Bound: at the time of each dropped pose, linear interpolation between its kept neighbours is
+/// within `position_m` of its position, and slerp within `rotation_rad` of its orientation (if it
+/// has one). The kept neighbours are at most `gap_ns_max` apart, so gaps stay gaps and no new ones
+/// appear. The bound holds at the times of the dropped poses only.
+/// Method: top-down Douglas-Peucker with the time-synchronised distance (TD-TR), in windows at
+/// fixed instants, whose first poses are kept. Windows allow streaming, and thinning a thinned
+/// track drops nothing, so the bound does not grow with repetition. Poses beside a gap, beside a
+/// change of flags, and where covariances begin or end are kept too. (If forgetting cuts a thinned
+/// window in two, its rest may be thinned once more, and the bound doubles there.)
 ///
 /// Order:   Add by growing time, then Finish.
 /// Threads: one caller at a time.
@@ -48,10 +44,10 @@ class TrackThinner {
   TrackThinner(const SimplifyOptions& options, Drop drop);
 
   void Add(const TimedPose& pose);
-  /// What follows has no connection to what was: poses between are forgotten.
+  /// Poses between the last one and the next are forgotten, so the two are not connected.
   void Break() { Close(); }
-  /// No pose follows. `is_whole`: the last one ends the track; else it ends what was asked for, and
-  /// the window that it is in is left as it is.
+  /// No pose follows. `is_whole`: the last pose ends the track. Otherwise the track goes on, and
+  /// the last window is not thinned.
   void Finish(bool is_whole);
 
  private:
@@ -64,8 +60,8 @@ class TrackThinner {
   std::vector<TimedPose> window_;
 };
 
-/// Which of the poses to keep, as TrackThinner has it for one window without gaps. The first and
-/// the last are kept. Order: as `poses`.
+/// Which poses TrackThinner keeps in one window without gaps, by index. Always the first and the
+/// last.
 std::vector<bool> KeepInWindow(const std::vector<TimedPose>& poses, const SimplifyOptions& options);
 
 }  // namespace dsg

@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "schema/base/random.h"
-#include "schema/retention/duration.h"
-#include "schema/retention/history_cut.h"
+#include "schema/retention/graph_index.h"
+#include "schema/retention/past.h"
 #include "schema/retention/plan.h"
-#include "schema/retention/world_clock.h"
+#include "schema/retention/policy.h"
 #include "tests/property/revision_log.h"
 #include "tests/unit/schema/store/store_test_util.h"
 

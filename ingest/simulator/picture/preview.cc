@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 
-#include "schema/picture/png_file.h"
 #include "schema/picture/raster.h"
 
 namespace dsg::simulator {

@@ -10,7 +10,7 @@
 
 #include "query/cli/export/floor_view.h"
 #include "query/cli/export/map_content.h"
-#include "schema/picture/label_layout.h"
+#include "schema/picture/font.h"
 #include "schema/picture/raster.h"
 
 namespace dsg::cli {

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "absl/strings/str_format.h"
-#include "schema/picture/png_file.h"
 #include "schema/picture/raster.h"
 
 namespace dsg::test {

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
-#include <numeric>
 
 #include "ingest/grid/distance_field.h"
+#include "schema/base/disjoint_sets.h"
 #include "schema/base/random.h"
 #include "tests/unit/ingest/places/plan_map.h"
 
@@ -49,17 +49,9 @@ OccupancyGrid TwoRooms(double door_m) {
 
 // Parts of the graph that links join; places without links are parts of their own.
 int CountParts(const PlaceGraph& graph) {
-  std::vector<int> parents(graph.places.size());
-  std::iota(parents.begin(), parents.end(), 0);
-  const auto root = [&](int i) {
-    while (parents[static_cast<size_t>(i)] != i) i = parents[static_cast<size_t>(i)];
-    return i;
-  };
-  for (const PlaceLink& link : graph.links) {
-    parents[static_cast<size_t>(root(link.to))] = root(link.from);
-  }
-  int count = 0;
-  for (int i = 0; i < static_cast<int>(parents.size()); ++i) count += root(i) == i ? 1 : 0;
+  DisjointSets sets(graph.places.size());
+  int count = static_cast<int>(graph.places.size());
+  for (const PlaceLink& link : graph.links) count -= sets.Merge(link.from, link.to) ? 1 : 0;
   return count;
 }
 

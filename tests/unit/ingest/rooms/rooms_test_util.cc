@@ -11,7 +11,6 @@
 #include "ingest/rooms/wall_gaps.h"
 #include "schema/base/check.h"
 #include "schema/base/random.h"
-#include "schema/picture/png_file.h"
 #include "schema/picture/raster.h"
 
 namespace dsg::ingest {

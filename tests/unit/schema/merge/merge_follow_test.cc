@@ -4,6 +4,7 @@
 
 #include "schema/base/status.h"
 #include "schema/merge/merge.h"
+#include "schema/merge/merge_deltas.h"
 #include "tests/unit/schema/merge/small_map.h"
 
 namespace dsg::merge {

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "schema/merge/merge.h"
+#include "schema/merge/merge_deltas.h"
 #include "schema/merge/refine.h"
 #include "tests/support/temp_folder.h"
 #include "tests/unit/schema/merge/perceived_half.h"

@@ -8,7 +8,6 @@
 #include "schema/merge/footprint.h"
 #include "schema/merge/fuse.h"
 #include "schema/merge/origins.h"
-#include "schema/merge/transform_node.h"
 #include "schema/model/edge.h"
 #include "tests/unit/schema/merge/small_map.h"
 
@@ -125,38 +124,6 @@ TEST(Fuse, CountsUpToTheEndOfNumbers) {
   seen.observation_count = std::numeric_limits<int64_t>::max() - 5;
   FuseNode("a", Of(seen), false, seen, &known);
   EXPECT_EQ(known.observation_count, std::numeric_limits<int64_t>::max());
-}
-
-TEST(Transform, TurnsCovariancesPlanesAndOutlines) {
-  const Pose3d turn{{1, 0, 2},
-                    Eigen::Quaterniond(Eigen::AngleAxisd(M_PI_2, Eigen::Vector3d::UnitZ()))};
-  TimedPose pose;
-  Covariance6 covariance{};
-  covariance[0] = 4.0f;
-  covariance[6] = 1.0f;
-  pose.covariance = std::make_shared<const Covariance6>(covariance);
-  TransformPose(turn, &pose);
-  EXPECT_NEAR((*pose.covariance)[0], 1.0f, 1e-6f);
-  EXPECT_NEAR((*pose.covariance)[6], 4.0f, 1e-6f);
-  Node wall;
-  wall.structure = StructureInfo{"wall", Eigen::Vector3d::UnitX(), -3.0, 0};
-  TransformNode(turn, &wall);
-  const Eigen::Vector3d on_wall = turn * Eigen::Vector3d(3, 7, 1);
-  EXPECT_NEAR(wall.structure->plane_normal_map.dot(on_wall) + wall.structure->plane_offset_m, 0.0,
-              1e-12);
-  Node room = test::MakeRoom(0, {0, 0, 0}, {4, 2, 3});
-  TransformNode(turn, &room);
-  EXPECT_NEAR(room.region->z_min_m, 2.0, 1e-12);
-  EXPECT_NEAR(AreaOf(room.region->footprint_map), 8.0, 1e-9);
-}
-
-TEST(Transform, LeavesPosesWithoutOrientationWithoutOne) {
-  const Pose3d turn{{1, 0, 2},
-                    Eigen::Quaterniond(Eigen::AngleAxisd(1.0, Eigen::Vector3d::UnitZ()))};
-  TimedPose pose;
-  pose.flags = pose_flags::kNoOrientation;
-  TransformPose(turn, &pose);
-  EXPECT_EQ(pose.map_T_agent.orientation.coeffs(), Eigen::Quaterniond::Identity().coeffs());
 }
 
 }  // namespace

@@ -12,7 +12,7 @@
 #include "ingest/simulator/world/catalogue.h"
 #include "ingest/simulator/world/world_graph.h"
 #include "schema/base/random.h"
-#include "schema/merge/transform_node.h"
+#include "schema/model/rigid_motion.h"
 
 namespace dsg::test {
 namespace {
@@ -42,7 +42,7 @@ class Perceiver {
     }
     AddRobot();
     CarryEdges();
-    for (Node& node : half_.delta.nodes) merge::TransformNode(options_.map_T_world, &node);
+    for (Node& node : half_.delta.nodes) TransformNode(options_.map_T_world, &node);
     FitBoxesToChildren(&half_.delta);
     return std::move(half_);
   }
@@ -185,7 +185,7 @@ class Perceiver {
       pose.time_ns = options_.begin_ns + i * kNsPerSecond;
       const double share = i / 99.0;
       pose.map_T_agent.position = Eigen::Vector3d(min_x_ + share * (max_x_ - min_x_), 5.0, 0.5);
-      merge::TransformPose(options_.map_T_world, &pose);
+      TransformPose(options_.map_T_world, &pose);
       track.poses.push_back(std::move(pose));
     }
     half_.delta.appends.push_back(std::move(track));

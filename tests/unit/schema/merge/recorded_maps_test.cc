@@ -9,7 +9,7 @@
 
 #include "schema/interop/scene_graph_file.h"
 #include "schema/merge/refine.h"
-#include "schema/merge/transform_node.h"
+#include "schema/model/rigid_motion.h"
 #include "tests/unit/schema/merge/perceived_half.h"
 #include "tests/unit/schema/merge/small_map.h"
 

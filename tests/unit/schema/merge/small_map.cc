@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "schema/merge/merge_deltas.h"
+
 namespace dsg::test {
 namespace {
 

@@ -7,8 +7,6 @@
 #include <algorithm>
 #include <array>
 
-#include "schema/picture/png_file.h"
-
 namespace dsg::picture {
 namespace {
 

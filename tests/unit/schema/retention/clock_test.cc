@@ -4,8 +4,8 @@
 
 #include "absl/strings/match.h"
 #include "schema/model/agent_pose.h"
-#include "schema/retention/duration.h"
-#include "schema/retention/world_clock.h"
+#include "schema/retention/graph_index.h"
+#include "schema/retention/policy.h"
 #include "tests/unit/schema/retention/prune_test_util.h"
 
 namespace dsg::test {

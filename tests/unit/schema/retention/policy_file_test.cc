@@ -8,7 +8,7 @@
 
 #include "schema/base/random.h"
 #include "schema/base/status.h"
-#include "schema/retention/duration.h"
+#include "schema/retention/policy.h"
 #include "tests/support/temp_folder.h"
 
 namespace dsg {

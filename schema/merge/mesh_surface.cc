@@ -1,10 +1,58 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "schema/merge/surface_index.h"
+#include "schema/merge/mesh_surface.h"
 
 #include <cmath>
 #include <limits>
+#include <utility>
+
+#include "schema/base/status.h"
+#include "schema/model/rigid_motion.h"
 
 namespace dsg::merge {
+
+Box3d BoxOf(BlockIndex index, double block_size_m) {
+  const Eigen::Vector3d low(index.x * block_size_m, index.y * block_size_m, index.z * block_size_m);
+  return Box3d(low, low.array() + block_size_m);
+}
+
+std::vector<BlockIndex> BlocksIn(const Box3d& box, double block_size_m) {
+  const BlockIndex low = BlockOf(box.min().cast<float>(), block_size_m);
+  const BlockIndex high = BlockOf(box.max().cast<float>(), block_size_m);
+  std::vector<BlockIndex> blocks;
+  for (int32_t x = low.x; x <= high.x; ++x) {
+    for (int32_t y = low.y; y <= high.y; ++y) {
+      for (int32_t z = low.z; z <= high.z; ++z) blocks.push_back({x, y, z});
+    }
+  }
+  return blocks;
+}
+
+absl::StatusOr<std::shared_ptr<const MeshBlock>> BlockCache::Read(BlockIndex index) {
+  const auto found = by_index_.find(index);
+  if (found != by_index_.end()) {
+    entries_.splice(entries_.begin(), entries_, found->second);
+    return entries_.front().second;
+  }
+  const auto anew = read_anew_.find(index);
+  const Snapshot& map = anew == read_anew_.end() ? *map_ : *anew->second;
+  DSG_ASSIGN_OR_RETURN(MeshBlock block, map.ReadMeshBlock(index));
+  TransformMesh(map_T_stored_, &block);
+  entries_.emplace_front(index, std::make_shared<const MeshBlock>(std::move(block)));
+  by_index_[index] = entries_.begin();
+  if (entries_.size() > count_max_) {
+    by_index_.erase(entries_.back().first);
+    entries_.pop_back();
+  }
+  return entries_.front().second;
+}
+
+void BlockCache::ReadAnew(BlockIndex index, std::shared_ptr<const Snapshot> map) {
+  read_anew_[index] = std::move(map);
+  const auto found = by_index_.find(index);
+  if (found == by_index_.end()) return;
+  entries_.erase(found->second);
+  by_index_.erase(found);
+}
 
 std::vector<Eigen::Vector3f> NormalsOf(const MeshBlock& block) {
   if (!block.normals_map.empty()) return block.normals_map;

@@ -2,8 +2,7 @@
 // Adaptive voting and the rotation by graduated non-convexity, each on its own.
 #include <gtest/gtest.h>
 
-#include "schema/matching/adaptive_voting.h"
-#include "schema/matching/gnc_rotation.h"
+#include "schema/matching/robust_estimators.h"
 #include "tests/unit/schema/matching/registration_test_util.h"
 
 namespace dsg {

@@ -1,21 +1,42 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rotation between pairs of vectors, some of which are wrong.
-// Refuses a first guess: it starts from a convex problem and makes it truncated step by step.
+// Robust estimates from measurements most of which may be wrong: a scalar by adaptive voting, a
+// rotation by graduated non-convexity. Neither needs an initial guess.
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 namespace dsg {
+
+struct Measurement {
+  double value = 0.0;
+  /// Largest error of a true measurement. Requires: above zero.
+  double bound = 1.0;
+};
+
+struct Vote {
+  double value = 0.0;
+  /// Sum over measurements of min((miss / bound)^2, 1).
+  double cost = 0.0;
+};
+
+/// Minimises the truncated least squares exactly: the consensus set changes only where the interval
+/// of a measurement begins or ends, so all possible sets are tried. {0, 0} without measurements.
+///
+/// Requires: finite values and bounds.
+/// Cost: n log n.
+/// Source: Yang, Shi and Carlone, 2021, adaptive voting.
+Vote VoteAdaptively(const std::vector<Measurement>& measurements);
 
 /// Vectors as columns.
 using Columns = Eigen::Matrix3Xd;
 
 struct GncOptions {
-  /// A true pair misses by no more than this.
+  /// Largest error of a true pair.
   double bound = 0.1;
   double factor = 1.4;
   int iteration_count_max = 100;
-  /// Relative change of the cost at which the rotation has settled.
+  /// Relative change of the cost at convergence.
   double tolerance = 1e-6;
   /// About z only.
   bool is_upright = false;
