@@ -22,22 +22,6 @@ bool IsDigit(char c) { return c >= '0' && c <= '9'; }
 // Of a text, what neither ends it nor needs a look.
 bool IsPlain(char c) { return c >= 0x20 && c != '"' && c != '\\'; }
 
-void AppendUtf8(uint32_t code, std::string* text) {
-  const auto add = [text](uint32_t byte) { text->push_back(static_cast<char>(byte)); };
-  if (code < 0x80) return add(code);
-  if (code < 0x800) {
-    add(0xc0 | code >> 6);
-  } else if (code < 0x10000) {
-    add(0xe0 | code >> 12);
-    add(0x80 | (code >> 6 & 0x3f));
-  } else {
-    add(0xf0 | code >> 18);
-    add(0x80 | (code >> 12 & 0x3f));
-    add(0x80 | (code >> 6 & 0x3f));
-  }
-  add(0x80 | (code & 0x3f));
-}
-
 }  // namespace
 
 JsonCursor::JsonCursor(std::string_view text, std::string file, size_t offset)
