@@ -93,7 +93,7 @@ bool ReadValue(ByteReader* in, AttributeValue* value) {
 void AppendAttributes(const Attributes& attributes, std::string* out) {
   AppendVarint(attributes.size(), out);
   for (const auto& [name, value] : attributes) {
-    if (const auto number = NumberOfName(name)) {
+    if (const auto number = attributes::NumberOf(name)) {
       out->push_back(static_cast<char>(*number + 1));
     } else {
       out->push_back(static_cast<char>(kNameText));
@@ -109,7 +109,7 @@ bool ReadAttributes(ByteReader* in, Attributes* attributes) {
     const auto number = in->Fixed<uint8_t>();
     const std::string_view name = number == kNameText
                                       ? in->Bytes(in->Varint())
-                                      : NameOfNumber(static_cast<uint8_t>(number - 1));
+                                      : attributes::NameOf(static_cast<uint8_t>(number - 1));
     if (!in->ok() || (number != kNameText && name.empty())) return false;
     AttributeValue value;
     if (!ReadValue(in, &value) || !in->ok()) return false;

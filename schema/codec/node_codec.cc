@@ -4,9 +4,8 @@
 // have is a protobuf message at the end. docs/storage_format.md gives the layout.
 #include "schema/codec/node_codec.h"
 
-#include <algorithm>
-#include <array>
 #include <bit>
+#include <iterator>
 #include <utility>
 
 #include "dsg/v1/graph.pb.h"
@@ -45,11 +44,6 @@ enum ObjectFlag : uint64_t {
   kSizeIsBox = 1u << 6,
   kObjectFlags = (1u << 7) - 1,
 };
-
-// Their places in the list are written, so it only grows.
-constexpr std::array kKnownKinds = {kinds::kObject,  kinds::kHuman,     kinds::kRobot,
-                                    kinds::kPlace,   kinds::kStructure, kinds::kRoom,
-                                    kinds::kBuilding};
 
 // Equal as bytes: 0 and -0 differ, so that nothing is lost.
 bool IsSame(double a, double b) { return std::bit_cast<uint64_t>(a) == std::bit_cast<uint64_t>(b); }
@@ -193,16 +187,15 @@ uint64_t FlagsOf(const Node& node) {
 }
 
 void AppendKind(const std::string& kind, std::string* out) {
-  const auto known = std::find(kKnownKinds.begin(), kKnownKinds.end(), kind);
-  const bool is_known = known != kKnownKinds.end();
-  AppendVarint(is_known ? static_cast<uint64_t>(known - kKnownKinds.begin()) + 1 : 0, out);
-  if (!is_known) AppendText(kind, out);
+  const kinds::Kind* const known = kinds::Find(kind);
+  AppendVarint(known == nullptr ? 0 : static_cast<uint64_t>(known - kinds::kAll) + 1, out);
+  if (known == nullptr) AppendText(kind, out);
 }
 
 bool ReadKind(ByteReader* in, std::string* kind) {
   const uint64_t number = in->Varint();
-  if (number > kKnownKinds.size()) return false;
-  *kind = number == 0 ? ReadText(in) : kKnownKinds[number - 1];
+  if (number > std::size(kinds::kAll)) return false;
+  *kind = number == 0 ? ReadText(in) : kinds::kAll[number - 1].name;
   return true;
 }
 

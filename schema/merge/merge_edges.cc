@@ -11,18 +11,18 @@
 namespace dsg::merge {
 namespace {
 
+bool HasEnds(const std::string& relation, relations::Ends ends) {
+  const relations::Relation* const known = relations::Find(relation);
+  return known != nullptr && known->ends == ends;
+}
+
 // Written once, from either end.
 bool IsSymmetric(const std::string& relation) {
-  return relation == relations::kTraversable || relation == relations::kAdjacent ||
-         relation == relations::kNear || relation == relations::kCoVisible ||
-         relation == relations::kSameAs;
+  return HasEnds(relation, relations::Ends::kEither);
 }
 
 // A node has one of each of these; of two beliefs the one of this map stays.
-bool IsSingle(const std::string& relation) {
-  return relation == relations::kNearestPlace || relation == relations::kOn ||
-         relation == relations::kIn || relation == relations::kHeldBy;
-}
+bool IsSingle(const std::string& relation) { return HasEnds(relation, relations::Ends::kOne); }
 
 // By such an edge a node hangs on another one: its parent, or the one that it has.
 bool HangsOn(const std::string& relation) {

@@ -13,6 +13,7 @@
 #include "schema/base/time.h"
 #include "schema/model/geometry.h"
 #include "schema/model/ids.h"
+#include "schema/model/known_names.h"
 #include "schema/model/layer.h"
 
 namespace dsg {
@@ -23,23 +24,6 @@ using Attributes = std::map<std::string, AttributeValue>;
 
 /// SHA-256 of an asset's content.
 using Sha256 = std::array<uint8_t, 32>;
-
-/// The kinds that the model knows; any other name is a custom kind.
-namespace kinds {
-inline constexpr char kObject[] = "object";
-inline constexpr char kHuman[] = "human";
-inline constexpr char kRobot[] = "robot";
-inline constexpr char kPlace[] = "place";
-inline constexpr char kStructure[] = "structure";
-inline constexpr char kRoom[] = "room";
-inline constexpr char kBuilding[] = "building";
-}  // namespace kinds
-
-/// Humans and robots: the kinds that have a trajectory.
-bool IsAgentKind(std::string_view kind);
-
-/// The layer that nodes of a known kind live in; nullopt for custom kinds.
-std::optional<LayerId> LayerOfKind(std::string_view kind);
 
 /// Red, green, blue, alpha.
 using Color = std::array<uint8_t, 4>;

@@ -7,7 +7,7 @@
 
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
-#include "schema/model/agent_pose.h"
+#include "schema/model/known_names.h"
 
 namespace dsg {
 namespace {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "absl/strings/match.h"
-#include "schema/model/agent_pose.h"
+#include "schema/model/known_names.h"
 #include "schema/retention/duration.h"
 #include "schema/retention/world_clock.h"
 #include "tests/unit/schema/retention/prune_test_util.h"
