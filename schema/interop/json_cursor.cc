@@ -10,7 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/utf8.h"
-#include "schema/interop/file_error.h"
+#include "schema/interop/file_errors.h"
 
 namespace dsg {
 namespace {
@@ -323,6 +323,14 @@ bool JsonCursor::ReadEscape(std::string* text) {
   }
   AppendUtf8(code, text);
   return true;
+}
+
+absl::StatusOr<nlohmann::json> ParseJson(std::string_view bytes, const std::string& file) {
+  JsonCursor cursor(bytes, file);
+  nlohmann::json root = cursor.Value();
+  cursor.End();
+  if (!cursor.ok()) return cursor.status();
+  return root;
 }
 
 }  // namespace dsg

@@ -22,6 +22,13 @@ namespace dsg {
 using AttributeValue = std::variant<double, std::string, bool>;
 using Attributes = std::map<std::string, AttributeValue>;
 
+/// The value of an attribute, or nullptr if there is none of that name and type.
+template <typename T>
+const T* FindAttribute(const Attributes& attributes, const std::string& name) {
+  const auto found = attributes.find(name);
+  return found == attributes.end() ? nullptr : std::get_if<T>(&found->second);
+}
+
 /// SHA-256 of an asset's content.
 using Sha256 = std::array<uint8_t, 32>;
 
