@@ -5,7 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "ingest/truth/truth_parts_internal.h"
 #include "schema/base/status.h"
-#include "schema/interop/json_document.h"
+#include "schema/interop/json_cursor.h"
 #include "schema/interop/json_fields.h"
 
 namespace dsg::truth {

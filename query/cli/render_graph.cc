@@ -13,6 +13,7 @@
 #include "query/cli/node_cells.h"
 #include "query/cli/render_agents.h"
 #include "query/cli/table.h"
+#include "schema/base/utf8.h"
 
 namespace dsg::cli {
 namespace {
@@ -30,10 +31,8 @@ constexpr size_t kShownBytesMax = 120;
 
 std::string Shown(const std::string& text) {
   if (text.size() <= kShownBytesMax) return absl::StrCat("\"", text, "\"");
-  size_t end = kShownBytesMax;
-  // Not within a character.
-  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;
-  return absl::StrCat("\"", text.substr(0, end), "...\" (", text.size(), " bytes)");
+  return absl::StrCat("\"", std::string(Utf8Prefix(text, kShownBytesMax)), "...\" (", text.size(),
+                      " bytes)");
 }
 
 std::string AttributeText(const v1::AttributeValue& value) {

@@ -7,18 +7,13 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "schema/base/check.h"
+#include "schema/base/utf8.h"
 
 namespace dsg::cli {
 namespace {
 
-// Code points, so that columns after a UTF-8 name still line up.
-size_t Width(const std::string& text) {
-  return static_cast<size_t>(std::count_if(
-      text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) >> 6) != 2; }));
-}
-
 void AppendCell(const std::string& text, size_t width, Align align, std::string* line) {
-  const std::string padding(width - Width(text), ' ');
+  const std::string padding(width - CountUtf8(text), ' ');
   if (align == Align::kRight) line->append(padding);
   line->append(text);
   if (align == Align::kLeft) line->append(padding);
@@ -56,8 +51,8 @@ std::string Table::Render() const {
   std::vector<size_t> widths;
   for (size_t i = 0; i < columns_.size(); ++i) {
     headings.push_back(columns_[i].heading);
-    widths.push_back(Width(columns_[i].heading));
-    for (const auto& row : rows_) widths[i] = std::max(widths[i], Width(row[i]));
+    widths.push_back(CountUtf8(columns_[i].heading));
+    for (const auto& row : rows_) widths[i] = std::max(widths[i], CountUtf8(row[i]));
   }
   std::string text;
   const auto append_line = [&](const std::vector<std::string>& cells) {
@@ -77,7 +72,7 @@ std::string Table::Render() const {
 std::string RenderFields(const std::vector<Field>& fields) {
   size_t width = 0;
   for (const auto& [name, value] : fields) {
-    if (!value.empty()) width = std::max(width, Width(name));
+    if (!value.empty()) width = std::max(width, CountUtf8(name));
   }
   std::string text;
   for (const auto& [name, value] : fields) {

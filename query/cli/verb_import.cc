@@ -18,7 +18,7 @@
 #include "schema/base/status.h"
 #include "schema/codec/checksum.h"
 #include "schema/interop/scene_graph_file.h"
-#include "schema/model/delta_parts.h"
+#include "schema/model/graph_delta.h"
 #include "schema/store/graph_store.h"
 
 namespace dsg::cli {

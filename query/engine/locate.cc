@@ -10,6 +10,7 @@
 #include "query/engine/engine.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
+#include "schema/base/utf8.h"
 #include "schema/codec/proto_convert.h"
 
 namespace dsg::query {
@@ -67,12 +68,8 @@ absl::Status LocateOne(const Snapshot& snapshot, const ResolvedAgent& agent, Tim
 void FillError(const absl::Status& status, v1::LocateResult* result) {
   result->set_status_code(static_cast<int32_t>(status.code()));
   std::string message(status.message());
-  if (message.size() > kItemMessageLengthMax) {
-    size_t end = kItemMessageLengthMax;
-    // Never in the middle of a character: protobuf refuses text that is not UTF-8.
-    while (end > 0 && (static_cast<unsigned char>(message[end]) & 0xc0) == 0x80) --end;
-    message.resize(end);
-  }
+  // Protobuf refuses text that ends within a character.
+  message.resize(Utf8Prefix(message, kItemMessageLengthMax).size());
   result->set_status_message(std::move(message));
 }
 

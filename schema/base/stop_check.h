@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // How long work is told to stop: a question that it asks now and then.
-// Refuses to interrupt anything: who does not ask is not stopped.
+// Nothing is interrupted: only work that asks is stopped.
 #pragma once
 
 #include <cstdint>

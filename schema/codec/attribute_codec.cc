@@ -11,15 +11,15 @@
 namespace dsg {
 namespace {
 
-// Written, so it only grows. A double's is kNumber plus its DoubleForm.
-enum Kind : uint8_t {
-  kFalse = 0,
-  kTrue = 1,
-  kNumber = 2,
-  kText = 5,
-  kJson = 6,
+// Written, so it only grows. A double's is kAttributeNumber plus its DoubleForm.
+enum AttributeForm : uint8_t {
+  kAttributeFalse = 0,
+  kAttributeTrue = 1,
+  kAttributeNumber = 2,
+  kAttributeText = 5,
+  kAttributeJson = 6,
   /// A letter and base64: the letter, and the bytes that base64 stands for.
-  kBase64 = 7,
+  kAttributeBase64 = 7,
 };
 
 constexpr uint8_t kNameText = 0;
@@ -30,51 +30,51 @@ void AppendBytes(std::string_view bytes, std::string* out) {
   out->append(bytes);
 }
 
-bool AppendBase64(const std::string& text, std::string* out) {
+bool AppendBase64Attribute(const std::string& text, std::string* out) {
   std::string bytes;
   if (text.empty() || text.front() != kCompressed) return false;
   if (!absl::Base64Unescape(absl::string_view(text).substr(1), &bytes)) return false;
   if (absl::Base64Escape(bytes) != absl::string_view(text).substr(1)) return false;
-  out->push_back(static_cast<char>(kBase64));
+  out->push_back(static_cast<char>(kAttributeBase64));
   out->push_back(text.front());
   AppendBytes(bytes, out);
   return true;
 }
 
-void AppendText(const std::string& text, std::string* out) {
+void AppendTextAttribute(const std::string& text, std::string* out) {
   const size_t before = out->size();
-  out->push_back(static_cast<char>(kJson));
+  out->push_back(static_cast<char>(kAttributeJson));
   if (PackJson(text, out)) return;
   out->resize(before);
-  if (AppendBase64(text, out)) return;
-  out->push_back(static_cast<char>(kText));
+  if (AppendBase64Attribute(text, out)) return;
+  out->push_back(static_cast<char>(kAttributeText));
   AppendBytes(text, out);
 }
 
-void AppendValue(const AttributeValue& value, std::string* out) {
-  if (const auto* text = std::get_if<std::string>(&value)) return AppendText(*text, out);
+void AppendAttribute(const AttributeValue& value, std::string* out) {
+  if (const auto* text = std::get_if<std::string>(&value)) return AppendTextAttribute(*text, out);
   if (const auto* flag = std::get_if<bool>(&value)) {
-    return out->push_back(static_cast<char>(*flag ? kTrue : kFalse));
+    return out->push_back(static_cast<char>(*flag ? kAttributeTrue : kAttributeFalse));
   }
   const double number = std::get<double>(value);
   const DoubleForm form = ShortestForm(number);
-  out->push_back(static_cast<char>(kNumber + static_cast<uint8_t>(form)));
+  out->push_back(static_cast<char>(kAttributeNumber + static_cast<uint8_t>(form)));
   AppendDouble(form, number, out);
 }
 
-bool ReadValue(ByteReader* in, AttributeValue* value) {
+bool ReadAttribute(ByteReader* in, AttributeValue* value) {
   const auto kind = in->Fixed<uint8_t>();
   switch (kind) {
-    case kFalse:
-    case kTrue:
-      *value = kind == kTrue;
+    case kAttributeFalse:
+    case kAttributeTrue:
+      *value = kind == kAttributeTrue;
       return true;
-    case kText:
+    case kAttributeText:
       *value = std::string(in->Bytes(in->Varint()));
       return true;
-    case kJson:
+    case kAttributeJson:
       return UnpackJson(in, &value->emplace<std::string>());
-    case kBase64: {
+    case kAttributeBase64: {
       std::string text(1, in->Fixed<char>());
       const std::string_view bytes = in->Bytes(in->Varint());
       text += absl::Base64Escape(absl::string_view(bytes.data(), bytes.size()));
@@ -82,8 +82,8 @@ bool ReadValue(ByteReader* in, AttributeValue* value) {
       return true;
     }
     default:
-      if (kind > kNumber + static_cast<uint8_t>(DoubleForm::kSwappedVarint)) return false;
-      *value = ReadDouble(static_cast<DoubleForm>(kind - kNumber), in);
+      if (kind > kAttributeNumber + static_cast<uint8_t>(DoubleForm::kSwappedVarint)) return false;
+      *value = ReadDouble(static_cast<DoubleForm>(kind - kAttributeNumber), in);
       return true;
   }
 }
@@ -93,13 +93,13 @@ bool ReadValue(ByteReader* in, AttributeValue* value) {
 void AppendAttributes(const Attributes& attributes, std::string* out) {
   AppendVarint(attributes.size(), out);
   for (const auto& [name, value] : attributes) {
-    if (const auto number = NumberOfName(name)) {
+    if (const auto number = attributes::NumberOf(name)) {
       out->push_back(static_cast<char>(*number + 1));
     } else {
       out->push_back(static_cast<char>(kNameText));
       AppendBytes(name, out);
     }
-    AppendValue(value, out);
+    AppendAttribute(value, out);
   }
 }
 
@@ -109,10 +109,10 @@ bool ReadAttributes(ByteReader* in, Attributes* attributes) {
     const auto number = in->Fixed<uint8_t>();
     const std::string_view name = number == kNameText
                                       ? in->Bytes(in->Varint())
-                                      : NameOfNumber(static_cast<uint8_t>(number - 1));
+                                      : attributes::NameOf(static_cast<uint8_t>(number - 1));
     if (!in->ok() || (number != kNameText && name.empty())) return false;
     AttributeValue value;
-    if (!ReadValue(in, &value) || !in->ok()) return false;
+    if (!ReadAttribute(in, &value) || !in->ok()) return false;
     attributes->insert_or_assign(attributes->end(), std::string(name), std::move(value));
   }
   return in->ok();

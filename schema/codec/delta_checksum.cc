@@ -9,7 +9,7 @@
 #include <type_traits>
 #include <variant>
 
-#include "schema/codec/node_codec.h"
+#include "schema/codec/payload.h"
 #include "schema/codec/proto_convert.h"
 
 namespace dsg {

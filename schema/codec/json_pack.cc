@@ -6,9 +6,11 @@
 #include <bit>
 #include <charconv>
 #include <cmath>
-#include <unordered_map>
+#include <optional>
 #include <utility>
 #include <vector>
+
+#include "schema/model/known_names.h"
 
 namespace dsg {
 namespace {
@@ -45,7 +47,7 @@ enum Op : uint8_t {
   kSmall = 0x80,
 };
 
-// What a key begins with, besides kEnd; from here a name of kNames.
+// What a key begins with, besides kEnd; from here the number of a name; see attributes::NumberOf.
 constexpr uint8_t kKeyText = 1;
 constexpr uint8_t kKeyKnown = 2;
 
@@ -68,104 +70,7 @@ constexpr std::array<std::string_view, 14> kKnownTexts = {
     R"("RAABB")",
 };
 
-constexpr std::array<std::string_view, 97> kNames = {"spark_dsg",
-                                                     "spark_dsg_graph",
-                                                     "spark_dsg_2",
-                                                     "spark_dsg_3",
-                                                     "spark_dsg_poses",
-                                                     "fields",
-                                                     "key",
-                                                     "type",
-                                                     "metadata",
-                                                     "color",
-                                                     "distance",
-                                                     "presence_ns",
-                                                     "weighted",
-                                                     "w",
-                                                     "x",
-                                                     "y",
-                                                     "z",
-                                                     "r",
-                                                     "g",
-                                                     "b",
-                                                     "a",
-                                                     "rows",
-                                                     "cols",
-                                                     "data",
-                                                     "dimensions",
-                                                     "world_P_center",
-                                                     "world_R_center",
-                                                     "min",
-                                                     "max",
-                                                     "position",
-                                                     "last_update_time_ns",
-                                                     "is_active",
-                                                     "is_predicted",
-                                                     "name",
-                                                     "bounding_box",
-                                                     "semantic_label",
-                                                     "semantic_feature",
-                                                     "mesh_connections",
-                                                     "registered",
-                                                     "world_R_object",
-                                                     "first_observed_ns",
-                                                     "last_observed_ns",
-                                                     "trajectory_positions",
-                                                     "trajectory_timestamps",
-                                                     "dynamic_object_points",
-                                                     "details",
-                                                     "mesh",
-                                                     "semantic_class_probabilities",
-                                                     "num_basis_points",
-                                                     "voxblox_mesh_connections",
-                                                     "pcl_mesh_connections",
-                                                     "mesh_vertex_labels",
-                                                     "deformation_connections",
-                                                     "real_place",
-                                                     "active_frontier",
-                                                     "frontier_scale",
-                                                     "orientation",
-                                                     "need_cleanup",
-                                                     "num_frontier_voxels",
-                                                     "anti_frontier",
-                                                     "boundary",
-                                                     "ellipse_centroid",
-                                                     "ellipse_matrix_compress",
-                                                     "ellipse_matrix_expand",
-                                                     "pcl_boundary_connections",
-                                                     "need_cleanup_splitting",
-                                                     "has_active_mesh_indices",
-                                                     "timestamp",
-                                                     "world_R_body",
-                                                     "external_key",
-                                                     "dbow_ids",
-                                                     "dbow_values",
-                                                     "states_0",
-                                                     "states_1",
-                                                     "states_2",
-                                                     "states_3",
-                                                     "frontier_scale_x",
-                                                     "frontier_scale_y",
-                                                     "frontier_scale_z",
-                                                     "min_x",
-                                                     "min_y",
-                                                     "max_x",
-                                                     "max_y",
-                                                     "mesh_vertices",
-                                                     "mesh_faces",
-                                                     "block",
-                                                     "voxel_pos",
-                                                     "vertex",
-                                                     "label",
-                                                     "points",
-                                                     "colors",
-                                                     "labels",
-                                                     "stamps",
-                                                     "first_seen_stamps",
-                                                     "faces",
-                                                     "has_colors",
-                                                     "node_id"};
-static_assert(kNames.size() + kKeyKnown <= 256);
+static_assert(attributes::kNumberEnd + kKeyKnown <= 256);
 static_assert(kKnownTexts.size() + kKnown <= kSmall);
 
 constexpr std::array<std::string_view, 4> kQuaternionKeys = {R"({"w":)", R"(,"x":)", R"(,"y":)",
@@ -269,7 +174,7 @@ class Packer {
     do {
       std::string_view key;
       if (!Text(&key) || !Take(':')) return false;
-      if (const auto number = NumberOfName(key)) {
+      if (const auto number = attributes::NumberOf(key)) {
         Put(static_cast<uint8_t>(*number + kKeyKnown));
       } else {
         Put(kKeyText);
@@ -541,7 +446,7 @@ class Unpacker {
       if (key == kEnd) return Append("}");
       const std::string_view name = key == kKeyText
                                         ? in_.Bytes(in_.Varint())
-                                        : NameOfNumber(static_cast<uint8_t>(key - kKeyKnown));
+                                        : attributes::NameOf(static_cast<uint8_t>(key - kKeyKnown));
       if (key != kKeyText && name.empty()) return false;
       Append(is_first ? "\"" : ",\"");
       Append(name);
@@ -594,20 +499,6 @@ bool PackJson(std::string_view text, std::string* out) {
 }
 
 bool UnpackJson(ByteReader* in, std::string* text) { return Unpacker(in, text).Value(0); }
-
-std::optional<uint8_t> NumberOfName(std::string_view name) {
-  static const auto* const numbers = [] {
-    auto* made = new std::unordered_map<std::string_view, uint8_t>;
-    for (size_t i = 0; i < kNames.size(); ++i) (*made)[kNames[i]] = static_cast<uint8_t>(i);
-    return made;
-  }();
-  const auto found = numbers->find(name);
-  return found == numbers->end() ? std::nullopt : std::optional<uint8_t>(found->second);
-}
-
-std::string_view NameOfNumber(uint8_t number) {
-  return number < kNames.size() ? kNames[number] : std::string_view();
-}
 
 DoubleForm ShortestForm(double value) {
   const auto bits = std::bit_cast<uint64_t>(value);

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <string_view>
 
@@ -20,12 +19,6 @@ bool PackJson(std::string_view text, std::string* out);
 /// have written, and beyond kUnpackedJsonMax bytes.
 bool UnpackJson(ByteReader* in, std::string* text);
 inline constexpr size_t kUnpackedJsonMax = size_t{1} << 20;
-
-/// A number of a name that scene graphs have, and back. docs/storage_format.md lists them. Their
-/// places are written, so the list only grows.
-std::optional<uint8_t> NumberOfName(std::string_view name);
-/// "" for a number that no name has.
-std::string_view NameOfNumber(uint8_t number);
 
 /// A double in as few bytes as its bits allow; the form must be kept beside.
 enum class DoubleForm : uint8_t { kFixed, kVarint, kSwappedVarint };

@@ -30,7 +30,7 @@ absl::StatusOr<NodeId> OptionalNodeId(const std::string& text);
 /// All of a node but id, layer and revision.
 void NodeDetailsToProto(const Node& node, v1::Node* out);
 absl::Status NodeDetailsFromProto(const v1::Node& in, Node* node);
-/// What few nodes have: all but the fields that schema/codec/node_codec.cc writes itself.
+/// What few nodes have: all but the fields that schema/codec/payload.cc writes itself.
 void RareDetailsToProto(const Node& node, v1::Node* out);
 /// The same without attributes.
 void ComponentsOfFewToProto(const Node& node, v1::Node* out);

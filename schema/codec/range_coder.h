@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // An adaptive binary range coder: bits that are easy to foretell take a fraction of a bit.
-// Refuses to know what the bits mean.
+// The coder that uses it gives the bits their meaning.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Columns of whole numbers that resemble the number before, or the column before.
-// Refuses to choose what a step means; that is the shape codec's.
+// The shape codec gives them their meaning.
 #pragma once
 
 #include <array>

@@ -14,7 +14,7 @@
 namespace dsg {
 namespace {
 
-constexpr uint8_t kVersion = 1;
+constexpr uint8_t kShapeVersion = 1;
 
 // One list of numbers of a body.
 struct Part {
@@ -167,7 +167,7 @@ bool DecodeParts(size_t first, size_t last, std::string_view bytes, TrajectoryCo
 }
 
 void AppendHeader(const ShapeAppend& item, TrajectoryCodec codec, std::string* out) {
-  out->push_back(static_cast<char>(kVersion));
+  out->push_back(static_cast<char>(kShapeVersion));
   out->push_back(static_cast<char>(codec));
   out->push_back(item.topology.has_value() ? 1 : 0);
   if (item.topology.has_value()) {
@@ -187,7 +187,7 @@ void AppendHeader(const ShapeAppend& item, TrajectoryCodec codec, std::string* o
 }
 
 bool ReadHeader(ByteReader* reader, Header* header) {
-  if (reader->Fixed<uint8_t>() != kVersion) return false;
+  if (reader->Fixed<uint8_t>() != kShapeVersion) return false;
   const auto codec = reader->Fixed<uint8_t>();
   if (codec != static_cast<uint8_t>(TrajectoryCodec::kQuantized) &&
       codec != static_cast<uint8_t>(TrajectoryCodec::kLossless)) {
@@ -265,7 +265,7 @@ bool DecodeShapeTimes(std::string_view bytes, std::vector<TimeNs>* times) {
 
 bool DecodeShapeTopology(std::string_view bytes, std::optional<Sha256>* topology) {
   ByteReader reader(bytes);
-  if (reader.Fixed<uint8_t>() != kVersion) return false;
+  if (reader.Fixed<uint8_t>() != kShapeVersion) return false;
   reader.Fixed<uint8_t>();
   const auto has_topology = reader.Fixed<uint8_t>();
   if (has_topology > 1) return false;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Body shapes of one agent on one topology as one blob: a segment of the store.
-// Refuses to know revisions, and where a segment ends; the store decides both.
+// The store decides where a segment ends, and of which revision it is.
 //
 // Layout, little-endian (docs/storage_format.md):
 //   header      u8 version, u8 codec, u8 1 with a topology or 0, 32 bytes of its SHA-256, varint

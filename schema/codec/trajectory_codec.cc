@@ -9,12 +9,13 @@
 #include <cstring>
 
 #include "schema/codec/bit_stream.h"
+#include "schema/codec/column_plan.h"
 #include "schema/codec/shuffle.h"
 
 namespace dsg {
 namespace {
 
-constexpr uint8_t kVersion = 1;
+constexpr uint8_t kTrajectoryVersion = 1;
 constexpr size_t kBlockPoses = 64;
 constexpr size_t kHeaderBytes = 10;
 constexpr size_t kDirectoryEntryBytes = 11;
@@ -25,105 +26,6 @@ constexpr size_t kLosslessPosesMax = 80;
 constexpr int kColumnCount = 8;  // time and the seven of StoredPose
 
 using BlockColumns = std::array<std::array<int64_t, kBlockPoses>, kColumnCount>;
-
-// How a column is predicted: by the line through its two ends, or by the value before.
-struct ColumnPlan {
-  bool delta = false;
-  int width = 0;
-  int64_t first = 0;
-  int64_t last_minus_first = 0;
-  int64_t residual_min = 0;
-  /// Of the line, in 1/65536 a row.
-  int64_t slope = 0;
-
-  int64_t Line(size_t row) const {
-    return first + ((slope * static_cast<int64_t>(row) + 0x8000) >> 16);
-  }
-};
-
-// A line's slope must not overflow when it is scaled; wider columns are stored as differences.
-constexpr int64_t kLineSpanMax = int64_t{1} << 40;
-
-int64_t SlopeOf(int64_t last_minus_first, size_t count) {
-  return count < 2 ? 0 : last_minus_first * 65536 / static_cast<int64_t>(count - 1);
-}
-
-int64_t Wrap(uint64_t v) { return static_cast<int64_t>(v); }
-uint64_t Subtract(int64_t a, int64_t b) {
-  return static_cast<uint64_t>(a) - static_cast<uint64_t>(b);
-}
-
-// Bits that hold every number from `low` to `high` as a distance from `low`.
-int WidthOf(int64_t low, int64_t high) {
-  return static_cast<int>(std::bit_width(Subtract(high, low)));
-}
-
-ColumnPlan PlanDeltas(const int64_t* values, size_t count) {
-  int64_t low = values[1] - values[0];
-  int64_t high = low;
-  for (size_t i = 2; i < count; ++i) {
-    low = std::min(low, values[i] - values[i - 1]);
-    high = std::max(high, values[i] - values[i - 1]);
-  }
-  ColumnPlan plan;
-  plan.delta = true;
-  plan.first = values[0];
-  plan.width = WidthOf(low, high);
-  plan.residual_min = low;
-  return plan;
-}
-
-ColumnPlan PlanColumn(const int64_t* values, size_t count) {
-  ColumnPlan plan;
-  plan.first = values[0];
-  if (count == 1) return plan;
-  plan.last_minus_first = values[count - 1] - values[0];
-  const ColumnPlan deltas = PlanDeltas(values, count);
-  if (std::abs(plan.last_minus_first) >= kLineSpanMax) return deltas;
-  plan.slope = SlopeOf(plan.last_minus_first, count);
-  int64_t high = 0;
-  for (size_t i = 1; i < count; ++i) {
-    const int64_t residual = values[i] - plan.Line(i);
-    plan.residual_min = std::min(plan.residual_min, residual);
-    high = std::max(high, residual);
-  }
-  plan.width = WidthOf(plan.residual_min, high);
-  // At equal width the line wins: any of its rows can be read without those before.
-  return deltas.width < plan.width ? deltas : plan;
-}
-
-size_t PackedBytes(const ColumnPlan& plan, size_t count) {
-  return (static_cast<size_t>(plan.width) * count + 7) / 8;
-}
-
-size_t PlanBytes(const ColumnPlan& plan, size_t count) {
-  const int header = 1 + VarintSize(ZigZag(plan.first)) + VarintSize(ZigZag(plan.residual_min)) +
-                     (plan.delta ? 0 : VarintSize(ZigZag(plan.last_minus_first)));
-  return static_cast<size_t>(header) + PackedBytes(plan, count);
-}
-
-void AppendPlan(const ColumnPlan& plan, std::string* out) {
-  out->push_back(static_cast<char>(plan.width << 1 | (plan.delta ? 1 : 0)));
-  AppendVarint(ZigZag(plan.first), out);
-  AppendVarint(ZigZag(plan.residual_min), out);
-  if (!plan.delta) AppendVarint(ZigZag(plan.last_minus_first), out);
-}
-
-void AppendResiduals(const ColumnPlan& plan, const int64_t* values, size_t count,
-                     std::string* out) {
-  BitWriter bits(out);
-  for (size_t i = 0; i < count; ++i) {
-    // The first row of a delta column is the base itself; its field is zero.
-    int64_t residual = plan.residual_min;
-    if (!plan.delta) {
-      residual = values[i] - plan.Line(i);
-    } else if (i > 0) {
-      residual = values[i] - values[i - 1];
-    }
-    bits.Append(Subtract(residual, plan.residual_min), plan.width);
-  }
-  bits.Flush();
-}
 
 // Largest unit that divides all times of a block: stamps stay exact, microsecond logs stay small.
 uint8_t TimeUnitCode(const StoredPose* poses, size_t count) {
@@ -182,7 +84,7 @@ size_t BlockBytes(const StoredPose* poses, size_t count) {
   FillColumns(poses, count, &columns);
   size_t bytes = 2 + (SameFlags(poses, count) ? 0 : count);
   for (size_t c = 0; c < kColumnCount; ++c) {
-    bytes += PlanBytes(PlanColumn(columns[c].data(), count), count);
+    bytes += ColumnBytes(PlanColumn(columns[c].data(), count), count);
   }
   return bytes;
 }
@@ -357,7 +259,7 @@ std::string SegmentEncoder::Encode() const {
     body.append(kBitPadding, '\0');
   }
   std::string out;
-  out.push_back(static_cast<char>(kVersion));
+  out.push_back(static_cast<char>(kTrajectoryVersion));
   out.push_back(static_cast<char>(codec_));
   AppendFixed(static_cast<uint16_t>(count), &out);
   AppendFixed(static_cast<uint16_t>(block_count), &out);
@@ -382,8 +284,7 @@ struct SegmentReader::Block {
   std::array<Column, kColumnCount> columns;
 
   int64_t Residual(const Column& column, int row) const {
-    return Wrap(ReadBits(column.bits, static_cast<size_t>(row), column.plan.width)) +
-           column.plan.residual_min;
+    return column.plan.Residual(column.bits, static_cast<size_t>(row));
   }
   // One value; a delta column must be summed from its start.
   int64_t Value(const Column& column, int row) const {
@@ -461,7 +362,7 @@ std::shared_ptr<const SegmentReader> SegmentReader::Parse(std::string bytes) {
   reader->count_ = in.Fixed<uint16_t>();
   reader->block_count_ = in.Fixed<uint16_t>();
   const auto covariance_at = in.Fixed<uint32_t>();
-  if (!in.ok() || version != kVersion || reader->count_ == 0 ||
+  if (!in.ok() || version != kTrajectoryVersion || reader->count_ == 0 ||
       covariance_at > reader->bytes_.size()) {
     return nullptr;
   }
@@ -516,16 +417,7 @@ bool SegmentReader::ParseBlock(int block, Block* out) const {
   ByteReader in(std::string_view(bytes_).substr(offset));
   const auto unit = in.Fixed<uint8_t>();
   for (Block::Column& column : out->columns) {
-    const auto tag = in.Fixed<uint8_t>();
-    column.plan.delta = (tag & 1) != 0;
-    column.plan.width = tag >> 1;
-    column.plan.first = UnZigZag(in.Varint());
-    column.plan.residual_min = UnZigZag(in.Varint());
-    column.plan.last_minus_first = column.plan.delta ? 0 : UnZigZag(in.Varint());
-    if (column.plan.width > 64 || std::abs(column.plan.last_minus_first) >= kLineSpanMax) {
-      return false;
-    }
-    column.plan.slope = SlopeOf(column.plan.last_minus_first, static_cast<size_t>(out->count));
+    if (!ReadPlan(static_cast<size_t>(out->count), &in, &column.plan)) return false;
   }
   const auto flags = in.Fixed<uint8_t>();
   if (!in.ok() || unit > 2) return false;
@@ -536,7 +428,7 @@ bool SegmentReader::ParseBlock(int block, Block* out) const {
   if (out->mixed_flags) at += static_cast<size_t>(out->count);
   for (Block::Column& column : out->columns) {
     column.bits = bytes_.data() + at;
-    at += PackedBytes(column.plan, static_cast<size_t>(out->count));
+    at += column.plan.ResidualBytes(static_cast<size_t>(out->count));
   }
   return at + kBitPadding <= bytes_.size();
 }

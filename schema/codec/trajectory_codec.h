@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Trajectory segments: a few hundred poses of one agent as one blob that fills a database page.
-// Refuses to know about agents, revisions or gaps; the store decides where a segment ends.
+// The store decides where a segment ends, and knows agents, revisions and gaps.
 //
 // Quantised layout, little-endian (docs/storage_format.md has a worked example):
 //   header     u8 version, u8 codec, u16 pose count, u16 block count, u32 covariance offset or 0

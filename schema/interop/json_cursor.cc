@@ -10,7 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/utf8.h"
-#include "schema/interop/file_error.h"
+#include "schema/interop/file_errors.h"
 
 namespace dsg {
 namespace {
@@ -21,22 +21,6 @@ bool IsBlank(char c) { return c == ' ' || c == '\n' || c == '\r' || c == '\t'; }
 bool IsDigit(char c) { return c >= '0' && c <= '9'; }
 // Of a text, what neither ends it nor needs a look.
 bool IsPlain(char c) { return c >= 0x20 && c != '"' && c != '\\'; }
-
-void AppendUtf8(uint32_t code, std::string* text) {
-  const auto add = [text](uint32_t byte) { text->push_back(static_cast<char>(byte)); };
-  if (code < 0x80) return add(code);
-  if (code < 0x800) {
-    add(0xc0 | code >> 6);
-  } else if (code < 0x10000) {
-    add(0xe0 | code >> 12);
-    add(0x80 | (code >> 6 & 0x3f));
-  } else {
-    add(0xf0 | code >> 18);
-    add(0x80 | (code >> 12 & 0x3f));
-    add(0x80 | (code >> 6 & 0x3f));
-  }
-  add(0x80 | (code & 0x3f));
-}
 
 }  // namespace
 
@@ -339,6 +323,14 @@ bool JsonCursor::ReadEscape(std::string* text) {
   }
   AppendUtf8(code, text);
   return true;
+}
+
+absl::StatusOr<nlohmann::json> ParseJson(std::string_view bytes, const std::string& file) {
+  JsonCursor cursor(bytes, file);
+  nlohmann::json root = cursor.Value();
+  cursor.End();
+  if (!cursor.ok()) return cursor.status();
+  return root;
 }
 
 }  // namespace dsg

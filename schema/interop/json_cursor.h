@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// JSON text read from its begin to its end, a value at a time, so that a large file never stands in
-// memory as one tree. Refuses what two readers could read differently.
+// JSON text read from begin to end, a value at a time, so that a large file is never in memory as
+// one tree. Refuses what two readers could read differently.
 #pragma once
 
 #include <functional>
@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 
 namespace dsg {
 
@@ -97,5 +98,10 @@ class JsonCursor {
   bool may_pass_ = false;
   absl::Status status_;
 };
+
+/// Parses one JSON value that spans all of `bytes`. 64-bit integers stay exact.
+///
+/// Errors: as JsonCursor.
+absl::StatusOr<nlohmann::json> ParseJson(std::string_view bytes, const std::string& file);
 
 }  // namespace dsg

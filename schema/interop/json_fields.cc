@@ -2,7 +2,7 @@
 #include "schema/interop/json_fields.h"
 
 #include "absl/strings/str_cat.h"
-#include "schema/interop/file_error.h"
+#include "schema/interop/file_errors.h"
 
 namespace dsg {
 namespace {
@@ -142,6 +142,14 @@ JsonFields JsonFields::Object(const char* name, bool required) const {
   if (value != nullptr) return {*value, PathOf(name), source_};
   if (required) Fail(name, "is missing");
   return {EmptyObject(), PathOf(name), source_};
+}
+
+std::string DumpJson(const Json& value) {
+  return value.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+Json QuaternionJson(const Eigen::Quaterniond& q) {
+  return {{"w", q.w()}, {"x", q.x()}, {"y", q.y()}, {"z", q.z()}};
 }
 
 double NumberOf(const Json& value, const std::string& where, JsonSource* source) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Typed reads from a JSON object that remember the first thing that was wrong.
-// Callers read on and check once, so that readers of formats stay as plain as the formats.
+// Reads from parsed JSON. JsonFields reads typed members and remembers the first error, so that
+// callers read on and check once. The Peek functions never fail: what is not there is null, 0 or
+// NaN.
 #pragma once
 
 #include <Eigen/Core>
@@ -72,5 +73,49 @@ double NumberOf(const nlohmann::json& value, const std::string& where, JsonSourc
 uint64_t UnsignedOf(const nlohmann::json& value, uint64_t max, const std::string& where,
                     JsonSource* source);
 Eigen::Vector3d VectorOf(const nlohmann::json& value, const std::string& where, JsonSource* source);
+
+inline const nlohmann::json& NullJson() {
+  static const nlohmann::json null;
+  return null;
+}
+
+inline const nlohmann::json& Peek(const nlohmann::json& value, const char* name) {
+  const auto found = value.is_object() ? value.find(name) : value.end();
+  return value.is_object() && found != value.end() ? *found : NullJson();
+}
+
+inline const nlohmann::json& PeekAt(const nlohmann::json& value, size_t index) {
+  return value.is_array() && index < value.size() ? value[index] : NullJson();
+}
+
+inline double PeekNumber(const nlohmann::json& value) {
+  return value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN();
+}
+
+inline uint64_t PeekUnsigned(const nlohmann::json& value) {
+  const bool is_natural =
+      value.is_number_unsigned() || (value.is_number_integer() && value.get<int64_t>() >= 0);
+  return is_natural ? value.get<uint64_t>() : 0;
+}
+
+inline int64_t PeekSigned(const nlohmann::json& value) {
+  return value.is_number_integer() ? value.get<int64_t>() : 0;
+}
+
+inline bool PeekBool(const nlohmann::json& value) {
+  return value.is_boolean() && value.get<bool>();
+}
+
+/// Text without blanks; bytes that are not UTF-8 are replaced.
+std::string DumpJson(const nlohmann::json& value);
+
+/// [x, y, z].
+template <typename V>
+nlohmann::json VectorJson(const V& v) {
+  return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
+}
+
+/// {w, x, y, z}.
+nlohmann::json QuaternionJson(const Eigen::Quaterniond& q);
 
 }  // namespace dsg

@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// A map, at one instant of one revision, as a Spark-DSG graph that its own readers and viewers
-// open. Refuses to lose in silence: what the format has no words for goes into metadata, or is
-// counted in a note.
+// A map, at one instant of one revision, as a Spark-DSG graph. Nothing is lost in silence: what the
+// format has no words for goes into metadata, or is counted in a note.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "schema/interop/pose_thinning.h"
 #include "schema/interop/spark_graph.h"
 #include "schema/model/graph_delta.h"
+#include "schema/model/trajectory.h"
 
 namespace dsg {
 
@@ -34,6 +33,15 @@ struct SparkExport {
   int64_t pose_count = 0;
   /// Sentences for the user about what the file lacks.
   std::vector<std::string> notes;
+};
+
+/// Which poses of a track are written: nodes are dear. The ends of a track and of its gaps always
+/// are.
+struct PoseStep {
+  /// A pose this far from the last one kept is kept; 0 = every pose.
+  double distance_m = 0.5;
+  /// And one this much later.
+  TimeNs time_ns = kNsPerSecond;
 };
 
 /// Objects, places, rooms and buildings have the classes of the format; structures, levels and

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "schema/interop/skips.h"
+#include "schema/interop/file_errors.h"
 #include "schema/model/graph_delta.h"
 
 namespace dsg {

@@ -5,16 +5,13 @@
 #include <limits>
 
 #include "absl/strings/str_cat.h"
-#include "schema/interop/json_peek.h"
-#include "schema/interop/spark_metadata.h"
+#include "schema/interop/json_fields.h"
+#include "schema/interop/spark_graph.h"
 
 namespace dsg {
 namespace {
 
 using Json = nlohmann::json;
-
-constexpr uint64_t kUint32Max = std::numeric_limits<uint32_t>::max();
-constexpr uint64_t kUint64Max = std::numeric_limits<uint64_t>::max();
 
 class AttributesReader {
  public:
@@ -26,7 +23,7 @@ class AttributesReader {
       if (!text.empty()) node->attributes["metadata"] = std::move(text);
     }
     node->position = fields.Vector("position");
-    node->last_update_ns = fields.Unsigned("last_update_time_ns", kUint64Max, 0);
+    node->last_update_ns = fields.Unsigned("last_update_time_ns", UINT64_MAX, 0);
     AddFlag("is_active", fields.Bool("is_active", false), node);
     node->is_predicted = fields.Bool("is_predicted", false);
     if (IsSemantic(node->type)) ReadSemantic(fields, node);
@@ -57,8 +54,8 @@ class AttributesReader {
     node->name = fields.Text("name", "");
     ReadColor(fields, node);
     if (fields.Has("bounding_box")) ReadBox(fields.Object("bounding_box", true), &node->box);
-    const uint64_t label = fields.Unsigned("semantic_label", kUint32Max, kUint32Max);
-    if (label != kUint32Max) node->label = static_cast<uint32_t>(label);
+    const uint64_t label = fields.Unsigned("semantic_label", UINT32_MAX, UINT32_MAX);
+    if (label != UINT32_MAX) node->label = static_cast<uint32_t>(label);
     const Json* feature = fields.Find("semantic_feature");
     if (feature == nullptr || feature->is_null()) return;
     const size_t length = feature->is_object()
@@ -109,10 +106,9 @@ class AttributesReader {
     const Json* type = fields.Find("type");
     if (type == nullptr || type->is_null()) return SparkBox::Type::kInvalid;
     if (type->is_number()) return static_cast<SparkBox::Type>(fields.Unsigned("type", 3));
-    constexpr const char* kNames[] = {"INVALID", "AABB", "OBB", "RAABB"};
     const std::string name = fields.Text("type");
     for (int i = 0; i < 4; ++i) {
-      if (name == kNames[i]) return static_cast<SparkBox::Type>(i);
+      if (name == kSparkBoxNames[i]) return static_cast<SparkBox::Type>(i);
     }
     fields.Fail("type", absl::StrCat("\"", name.substr(0, 64), "\" is no type of box"));
     return SparkBox::Type::kInvalid;
@@ -145,7 +141,7 @@ class AttributesReader {
   void ReadTimes(const JsonFields& fields, const char* name, std::vector<uint64_t>* times) {
     const std::string where = absl::StrCat(fields.where(), ".", name);
     for (const Json& time : fields.Array(name)) {
-      times->push_back(UnsignedOf(time, kUint64Max, where, &source_));
+      times->push_back(UnsignedOf(time, UINT64_MAX, where, &source_));
     }
   }
 
@@ -162,7 +158,7 @@ class AttributesReader {
   void ReadPlace(const JsonFields& fields, SparkNode* node) {
     node->distance = fields.Number("distance", 0.0);
     node->basis_point_count =
-        static_cast<uint32_t>(fields.Unsigned("num_basis_points", kUint32Max, 0));
+        static_cast<uint32_t>(fields.Unsigned("num_basis_points", UINT32_MAX, 0));
     AddPlaceLists(fields, node);
     AddFlag("real_place", fields.Bool("real_place", false), node);
     AddFlag("active_frontier", fields.Bool("active_frontier", false), node);
@@ -170,7 +166,7 @@ class AttributesReader {
     node->orientation = fields.Quaternion("orientation");
     AddFlag("need_cleanup", fields.Bool("need_cleanup", false), node);
     AddNumber("num_frontier_voxels",
-              static_cast<double>(fields.Unsigned("num_frontier_voxels", kUint64Max, 0)), node);
+              static_cast<double>(fields.Unsigned("num_frontier_voxels", UINT64_MAX, 0)), node);
     AddFlag("anti_frontier", fields.Bool("anti_frontier", false), node);
   }
 
@@ -202,15 +198,15 @@ class AttributesReader {
   void ReadAgent(const JsonFields& fields, SparkNode* node) {
     if (fields.Has("timestamp")) node->stamp_ns = fields.Signed("timestamp");
     node->orientation = fields.Quaternion("world_R_body");
-    const uint64_t key = fields.Unsigned("external_key", kUint64Max, node->id);
+    const uint64_t key = fields.Unsigned("external_key", UINT64_MAX, node->id);
     if (key != node->id) node->attributes["external_key"] = absl::StrCat(key);
     CountList(fields, "dbow_ids", node);
     CountList(fields, "dbow_values", node);
   }
 
   void ReadTraversability(const JsonFields& fields, SparkNode* node) {
-    node->first_observed_ns = {fields.Unsigned("first_observed_ns", kUint64Max, 0)};
-    node->last_observed_ns = {fields.Unsigned("last_observed_ns", kUint64Max, 0)};
+    node->first_observed_ns = {fields.Unsigned("first_observed_ns", UINT64_MAX, 0)};
+    node->last_observed_ns = {fields.Unsigned("last_observed_ns", UINT64_MAX, 0)};
     node->distance = fields.Number("distance", 0.0);
     for (const char* name : {"min", "max"}) {
       const Json& corner = fields.Array(name);

@@ -6,7 +6,7 @@
 #include <map>
 #include <utility>
 
-#include "schema/interop/json_peek.h"
+#include "schema/interop/json_fields.h"
 
 namespace dsg {
 namespace {
@@ -14,7 +14,7 @@ namespace {
 using Json = nlohmann::json;
 using Type = SparkFieldType;
 
-constexpr uint32_t kNoLabel = std::numeric_limits<uint32_t>::max();
+constexpr uint32_t kNoLabel = UINT32_MAX;
 
 constexpr std::string_view kPosition = "position";
 constexpr SparkField kNode[] = {{kPosition.data(), Type::kVector3},
@@ -115,15 +115,6 @@ std::vector<SparkField> Collect(SparkClass type) {
   return fields;
 }
 
-Json QuaternionJson(const Eigen::Quaterniond& q) {
-  return {{"w", q.w()}, {"x", q.x()}, {"y", q.y()}, {"z", q.z()}};
-}
-
-template <typename V>
-Json VectorJson(const V& v) {
-  return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
-}
-
 Json ColorJson(const Color& color) {
   return {{"r", color[0]}, {"g", color[1]}, {"b", color[2]}, {"a", color[3]}};
 }
@@ -165,11 +156,10 @@ void UpgradeBox(Json* box) {
                       box->contains("world_R_center");
   if (is_new) return;
   const Json type = Peek(*box, "type");
-  constexpr const char* kNames[] = {"INVALID", "AABB", "OBB", "RAABB"};
-  if (type.is_number_unsigned() && type.get<size_t>() < 4) {
-    (*box)["type"] = kNames[type.get<size_t>()];
+  if (type.is_number_unsigned() && type.get<size_t>() < std::size(kSparkBoxNames)) {
+    (*box)["type"] = kSparkBoxNames[type.get<size_t>()];
   }
-  if (type.is_null()) (*box)["type"] = "INVALID";
+  if (type.is_null()) (*box)["type"] = kSparkBoxNames[0];
   const bool is_old = !box->contains("dimensions") && box->contains("min") && box->contains("max");
   if (is_old) {
     Json dimensions = Json::array();
@@ -213,22 +203,18 @@ void UpgradeKhronosMesh(Json* attributes) {
 }
 
 bool HasFlag(const SparkNode& node, const char* name) {
-  const auto found = node.attributes.find(name);
-  const bool* flag = found == node.attributes.end() ? nullptr : std::get_if<bool>(&found->second);
+  const auto* flag = FindAttribute<bool>(node.attributes, name);
   return flag != nullptr && *flag;
 }
 
 double NumberIn(const SparkNode& node, const std::string& name) {
-  const auto found = node.attributes.find(name);
-  const auto* number =
-      found == node.attributes.end() ? nullptr : std::get_if<double>(&found->second);
+  const auto* number = FindAttribute<double>(node.attributes, name);
   return number == nullptr ? 0.0 : *number;
 }
 
 Json BoxJson(const SparkBox& box) {
-  constexpr const char* kNames[] = {"INVALID", "AABB", "OBB", "RAABB"};
   const Eigen::Quaternionf rotation(box.rotation);
-  return {{"type", kNames[static_cast<int>(box.type)]},
+  return {{"type", kSparkBoxNames[static_cast<int>(box.type)]},
           {"dimensions", VectorJson(box.dimensions)},
           {"world_P_center", VectorJson(box.center)},
           {"world_R_center", QuaternionJson(rotation.cast<double>())}};
@@ -465,16 +451,13 @@ Json MakeSparseFields(const SparkNode& node) {
   for (const SparkField& field : FieldsOf(node.type)) {
     if (field.type == Type::kBool && HasFlag(node, field.name)) out[field.name] = true;
   }
-  const auto key = node.attributes.find("external_key");
-  if (node.type == SparkClass::kAgent && key != node.attributes.end()) {
-    const auto* text = std::get_if<std::string>(&key->second);
-    const Json parsed = text == nullptr ? Json() : Json::parse(*text, nullptr, false);
+  const auto* key = FindAttribute<std::string>(node.attributes, "external_key");
+  if (node.type == SparkClass::kAgent && key != nullptr) {
+    const Json parsed = Json::parse(*key, nullptr, false);
     if (parsed.is_number_unsigned()) out["external_key"] = parsed;
   }
-  const auto metadata = node.attributes.find("metadata");
-  const auto* text =
-      metadata == node.attributes.end() ? nullptr : std::get_if<std::string>(&metadata->second);
-  if (text != nullptr) out["metadata"] = Json::parse(*text, nullptr, false);
+  const auto* metadata = FindAttribute<std::string>(node.attributes, "metadata");
+  if (metadata != nullptr) out["metadata"] = Json::parse(*metadata, nullptr, false);
   if (out.contains("metadata") && out["metadata"].is_discarded()) out.erase("metadata");
   return out;
 }

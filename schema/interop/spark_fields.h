@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The fields of Spark-DSG's attribute classes, as tables that all readers and writers walk.
-// Refuses to know what a field means in a map: that is spark_nodes.h and node_to_spark.h.
+// What a field means in a map is in spark_nodes.h.
 #pragma once
 
 #include <cstdint>

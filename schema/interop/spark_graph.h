@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a Spark-DSG file says, in the file's own terms: readers fill it, writers write it.
-// Refuses to judge it: what no map can hold is found when it is turned into one.
+// What a Spark-DSG file says, in the file's own terms: readers fill it, writers write it. What no
+// map can hold is found later, in spark_to_delta.h.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,7 +14,7 @@
 #include <string_view>
 #include <vector>
 
-#include "schema/interop/skips.h"
+#include "schema/interop/file_errors.h"
 #include "schema/model/layer.h"
 #include "schema/model/mesh.h"
 #include "schema/model/node.h"
@@ -69,6 +69,9 @@ struct SparkBox {
   /// From the box's frame to the world.
   Eigen::Matrix3f rotation = Eigen::Matrix3f::Identity();
 };
+
+/// In JSON, by SparkBox::Type.
+inline constexpr const char* kSparkBoxNames[] = {"INVALID", "AABB", "OBB", "RAABB"};
 
 /// Opaque black, which the format has where nobody gave a colour.
 inline constexpr Color kSparkNoColor = {0, 0, 0, 255};
@@ -149,8 +152,6 @@ void PackFields(SparkNode* node);
 nlohmann::json AllFieldsOf(const SparkNode& node);
 /// The same, but for the "type" and fields that hold what DefaultOf says.
 nlohmann::json SparseFieldsOf(const SparkNode& node);
-/// Takes what is our own out of metadata; null if nothing is.
-nlohmann::json TakeOwn(nlohmann::json* metadata);
 
 /// Keeps the length of a list that is not empty.
 void AddLength(const char* name, size_t length, SparkNode* node);
@@ -160,8 +161,22 @@ void AddFlag(const char* name, bool value, SparkNode* node);
 /// memory that nobody filled in.
 void AddNumber(const std::string& name, double value, SparkNode* node);
 
-/// Spark-DSG counts mesh stamps in 64 unsigned bits; what does not fit is not a time and reads as
-/// 0.
+/// Stamps are unsigned in Spark-DSG; one that does not fit a TimeNs is not a time and reads as 0.
 TimeNs StampOrZero(uint64_t stamp_ns);
+/// 0 for times before 1970.
+uint64_t SparkStampOf(TimeNs time_ns);
+
+/// Metadata as text and back: "" for null and {}; an object also for text that is none.
+std::string MetadataText(const nlohmann::json& metadata);
+nlohmann::json MetadataJson(const std::string& text);
+
+/// Takes what is under kOwnMetadata out of metadata, null if there is nothing, and puts it back;
+/// the result is an object also when `metadata` is not.
+nlohmann::json TakeOwn(nlohmann::json* metadata);
+nlohmann::json WithOwn(nlohmann::json metadata, const nlohmann::json& own);
+
+/// Reads the metadata of a graph and its label spaces ("labelspaces": {"_l2p0": [[0, "chair"],
+/// ...]}). Keys that are not understood are named in the graph's notes.
+void ReadGraphMetadata(const nlohmann::json& metadata, SparkGraph* graph);
 
 }  // namespace dsg

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <iterator>
-#include <limits>
 #include <map>
 #include <optional>
 #include <unordered_map>
@@ -11,27 +10,24 @@
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
-#include "schema/interop/file_error.h"
+#include "schema/interop/file_errors.h"
 #include "schema/interop/json_cursor.h"
 #include "schema/interop/json_fields.h"
-#include "schema/interop/json_peek.h"
 #include "schema/interop/spark_attributes.h"
 #include "schema/interop/spark_fields.h"
-#include "schema/interop/spark_json_mesh.h"
-#include "schema/interop/spark_metadata.h"
+#include "schema/interop/spark_graph.h"
+#include "schema/interop/spark_mesh.h"
 
 namespace dsg {
 namespace {
 
 using Json = nlohmann::json;
 
-constexpr uint64_t kUint32Max = std::numeric_limits<uint32_t>::max();
 // Often enough that little of a passed text stays, seldom enough to cost nothing.
 constexpr size_t kPassedBytes = size_t{4} << 20;
 // So many elements tell how long the others are; no more are expected, whatever they tell.
 constexpr size_t kSampleCount = 64;
 constexpr size_t kReserveMax = 500'000;
-constexpr uint64_t kUint64Max = std::numeric_limits<uint64_t>::max();
 
 // What a graph can have thousands of is not read with the rest.
 constexpr const char* kLongMembers[] = {"nodes", "edges"};
@@ -180,8 +176,8 @@ class SparkJsonReader {
     for (const Json& edge : root.Array("mesh_edges")) {
       JsonSource source{source_.file, absl::OkStatus()};
       const JsonFields ends(edge, "mesh_edges", &source);
-      const uint64_t object = ends.Unsigned("source", kUint64Max);
-      const uint64_t vertex = ends.Unsigned("target", kUint64Max);
+      const uint64_t object = ends.Unsigned("source", UINT64_MAX);
+      const uint64_t vertex = ends.Unsigned("target", UINT64_MAX);
       if (!source.ok()) {
         Skip(SkipKind::kEdge, source);
       } else {
@@ -221,7 +217,7 @@ class SparkJsonReader {
   }
 
   static SparkLayerKey ReadLayerKey(const JsonFields& key) {
-    return {key.Signed("layer"), static_cast<uint32_t>(key.Unsigned("partition", kUint32Max, 0))};
+    return {key.Signed("layer"), static_cast<uint32_t>(key.Unsigned("partition", UINT32_MAX, 0))};
   }
 
   // One that is no node is counted, and the file is read on.
@@ -229,7 +225,7 @@ class SparkJsonReader {
     JsonSource source{source_.file, absl::OkStatus()};
     const JsonFields fields(*record, where, &source);
     SparkNode node;
-    node.id = fields.Unsigned("id", kUint64Max);
+    node.id = fields.Unsigned("id", UINT64_MAX);
     node.key = ReadLayerKey(fields);
     const Json* stamp = fields.Find("timestamp");
     if (stamp != nullptr && !stamp->is_null()) {
@@ -255,8 +251,8 @@ class SparkJsonReader {
     JsonSource source{source_.file, absl::OkStatus()};
     const JsonFields fields(record, where, &source);
     SparkEdge edge;
-    edge.source = fields.Unsigned("source", kUint64Max);
-    edge.target = fields.Unsigned("target", kUint64Max);
+    edge.source = fields.Unsigned("source", UINT64_MAX);
+    edge.target = fields.Unsigned("target", UINT64_MAX);
     const JsonFields info = fields.Object("info", true);
     if (info.Text("type", "EdgeAttributes") != "EdgeAttributes") {
       info.Fail("type", "is no known class of edge attributes");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the layers of a Spark-DSG file go in a map.
+// Layers of Spark-DSG and of a map, in both directions.
 #pragma once
 
 #include <map>
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "schema/interop/spark_graph.h"
-#include "schema/model/agent_pose.h"
+#include "schema/model/node.h"
 
 namespace dsg {
 
@@ -43,5 +43,36 @@ class SparkLayers {
   std::map<SparkLayerKey, Layer> own_;
   std::map<LayerId, Layer> custom_;
 };
+
+/// Where the layers of a map go in a Spark-DSG file: 2 objects, 3 places, 4 rooms, 5 buildings.
+/// Their order stays: where a map has a layer between two of these, the ones above it move up, and
+/// their names tell.
+class SparkLayerKeys {
+ public:
+  /// Only layers that have nodes count.
+  SparkLayerKeys(const std::vector<Layer>& layers, const std::vector<Node>& nodes);
+
+  SparkLayerKey KeyOf(const Node& node) const;
+
+  /// For the metadata: [{"name", "rank", "layer", "partition"}] of those of `used` that an import
+  /// could not tell by itself.
+  nlohmann::json OwnLayers(const std::vector<SparkLayerKey>& used) const;
+  void AddStandardNames(SparkGraph* graph) const;
+  /// Names those of `used` that have no name yet.
+  void AddOtherNames(const std::vector<SparkLayerKey>& used, SparkGraph* graph) const;
+
+ private:
+  std::map<LayerId, Layer> layers_;
+  std::map<LayerId, SparkLayerKey> keys_;
+};
+
+/// Where nodes of the model's kinds, and poses, are in Spark-DSG; nullopt for others.
+std::optional<SparkLayerKey> StandardKeyOf(const Node& node);
+
+/// "OBJECTS" and the like, of those layers that are among `keys`.
+std::map<std::string, SparkLayerKey> StandardLayerNames(const std::vector<SparkLayerKey>& keys);
+
+/// What an edge between two nodes of a layer means in files that do not name it.
+const char* SiblingRelation(LayerId layer);
 
 }  // namespace dsg

@@ -2,13 +2,14 @@
 #include "schema/interop/spark_nodes.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
-#include <limits>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 #include "schema/model/delta_check.h"
+#include "schema/model/value_check.h"
 
 namespace dsg {
 namespace {
@@ -20,10 +21,6 @@ constexpr TimeNs kPlausibleEndNs = 4'102'444'800 * kNsPerSecond;
 constexpr size_t kBoundaryCornersMax = 65536;
 // The peer keeps boxes in single precision.
 constexpr double kBoxSlackM = 1e-3;
-
-bool IsSane(const Eigen::Vector3d& point) {
-  return point.allFinite() && point.cwiseAbs().maxCoeff() <= kCoordinateMaxM;
-}
 
 Interval PlausibleTimes(const SparkGraph& graph) {
   Interval times = {kTimeMax, kTimeMin};
@@ -70,6 +67,45 @@ std::string PresenceText(const SparkNode& in) {
   return absl::StrJoin(spans, " ");
 }
 
+bool IsIdentity(const Eigen::Quaterniond& q) {
+  return q.coeffs() == Eigen::Quaterniond::Identity().coeffs();
+}
+
+SparkBox BoxOf(const Node& node) {
+  SparkBox box;
+  if (node.box_node.isEmpty()) return box;
+  const Pose3d& pose = node.map_T_node;
+  box.type = IsIdentity(pose.orientation) ? SparkBox::Type::kAligned : SparkBox::Type::kOriented;
+  box.dimensions = node.box_node.sizes().cast<float>();
+  box.center = (pose * node.box_node.center()).cast<float>();
+  if (box.type == SparkBox::Type::kOriented) {
+    box.rotation = pose.orientation.toRotationMatrix().cast<float>();
+  }
+  return box;
+}
+
+// "#rrggbbaa", as imports write it.
+std::optional<Color> ColorFromText(const Attributes& attributes) {
+  const auto* text = FindAttribute<std::string>(attributes, "color");
+  if (text == nullptr || text->size() != 9 || text->front() != '#') return std::nullopt;
+  Color color;
+  for (size_t i = 0; i < 4; ++i) {
+    const char* const begin = text->data() + 1 + 2 * i;
+    const auto [end, error] = std::from_chars(begin, begin + 2, color[i], 16);
+    if (error != std::errc() || end != begin + 2) return std::nullopt;
+  }
+  return color;
+}
+
+void AddPresence(const Node& node, SparkNode* out) {
+  const bool has_begin = node.valid.from_ns != kTimeMin;
+  const bool has_end = node.valid.to_ns != kTimeMax;
+  const TimeNs first_ns = has_begin ? node.valid.from_ns : node.first_observed_ns.value_or(0);
+  const TimeNs last_ns = has_end ? node.valid.to_ns : node.last_observed_ns.value_or(first_ns);
+  out->first_observed_ns = {SparkStampOf(first_ns)};
+  out->last_observed_ns = {SparkStampOf(std::max(first_ns, last_ns))};
+}
+
 }  // namespace
 
 SparkNodeConverter::SparkNodeConverter(const SparkGraph& graph, Skips* skips)
@@ -88,7 +124,7 @@ std::optional<Node> SparkNodeConverter::Convert(const SparkNode& in,
                "has no letter in its top 8 bits; ids are a letter and an index, as O42");
     return std::nullopt;
   }
-  if (!IsSane(in.position)) {
+  if (!values::IsSane(in.position)) {
     skips_.Add(SkipKind::kNode, absl::StrCat("node ", ToString(out.id)),
                absl::StrCat("position (", in.position.x(), ", ", in.position.y(), ", ",
                             in.position.z(), ") is not finite or beyond ", kCoordinateMaxM, " m"));
@@ -123,7 +159,8 @@ void SparkNodeConverter::ConvertBox(const SparkNode& in, Node* out) {
   const bool is_rotated = in.box.type != SparkBox::Type::kAligned;
   const std::string insane = absl::StrCat("bounding_box has numbers that are not finite or beyond ",
                                           kCoordinateMaxM, " m");
-  if (!IsSane(center) || !IsSane(half) || (is_rotated && !in.box.rotation.allFinite())) {
+  if (!values::IsSane(center) || !values::IsSane(half) ||
+      (is_rotated && !in.box.rotation.allFinite())) {
     return SkipField(in, insane);
   }
   if (half.minCoeff() < 0.0) {
@@ -139,7 +176,7 @@ void SparkNodeConverter::ConvertBox(const SparkNode& in, Node* out) {
     map_T_box.orientation.normalize();
   }
   const Box3d box = TransformBox(out->map_T_node.Inverse() * map_T_box, Box3d(-half, half));
-  if (!IsSane(box.min()) || !IsSane(box.max())) return SkipField(in, insane);
+  if (!values::IsSane(box.min()) || !values::IsSane(box.max())) return SkipField(in, insane);
   // An object's box is measured from its points. Elsewhere boxes are often left at a default
   // around the origin, which would blow up every ancestor's box.
   const Eigen::Vector3d slack = Eigen::Vector3d::Constant(kBoxSlackM);
@@ -160,7 +197,7 @@ void SparkNodeConverter::ConvertClass(const SparkNode& in, Node* out) {
     out->name = in.name;
   }
   if (!in.label.has_value()) return;
-  if (*in.label > static_cast<uint32_t>(std::numeric_limits<int32_t>::max())) {
+  if (*in.label > uint32_t{INT32_MAX}) {
     return SkipField(in, absl::StrCat("semantic_label is ", *in.label, "; at most 2147483647"));
   }
   out->class_id = static_cast<int32_t>(*in.label);
@@ -207,7 +244,7 @@ std::vector<Eigen::Vector3d> SparkNodeConverter::BoundaryOf(const SparkNode& in)
                                kBoundaryCornersMax));
     return {};
   }
-  if (std::all_of(in.boundary.begin(), in.boundary.end(), IsSane)) return in.boundary;
+  if (std::all_of(in.boundary.begin(), in.boundary.end(), values::IsSane)) return in.boundary;
   SkipField(in, absl::StrCat("boundary has a corner not finite or beyond ", kCoordinateMaxM, " m"));
   return {};
 }
@@ -274,6 +311,51 @@ std::vector<std::string> SparkNodeConverter::notes() const {
     notes.push_back(absl::StrCat("left out: ", count, " ", reason));
   }
   return notes;
+}
+
+SparkClass ClassFor(const Node& node) {
+  if (node.kind == kAgentPoseKind) return SparkClass::kAgent;
+  if (IsAgentKind(node.kind)) return SparkClass::kKhronosObject;
+  if (node.kind == kinds::kObject) {
+    const bool is_lasting = node.valid.from_ns == kTimeMin && node.valid.to_ns == kTimeMax;
+    return is_lasting ? SparkClass::kObject : SparkClass::kKhronosObject;
+  }
+  if (node.kind == kinds::kPlace) return SparkClass::kPlace;
+  if (node.kind == kinds::kRoom) return SparkClass::kRoom;
+  return SparkClass::kSemantic;
+}
+
+SparkNode ToSpark(const Node& node, SparkClass type, SparkLayerKey key) {
+  SparkNode out;
+  out.id = node.id.value;
+  out.key = key;
+  out.type = type;
+  out.position = node.map_T_node.position;
+  out.orientation = node.map_T_node.orientation;
+  out.is_predicted = node.provenance == Provenance::kPredicted;
+  out.attributes = node.attributes;
+  if (type == SparkClass::kAgent) {
+    out.stamp_ns = node.first_observed_ns;
+    return out;
+  }
+  out.last_update_ns = SparkStampOf(node.last_observed_ns.value_or(0));
+  out.name = node.name;
+  out.color = node.object.has_value() && node.object->color.has_value()
+                  ? node.object->color
+                  : ColorFromText(node.attributes);
+  out.box = BoxOf(node);
+  if (node.class_id >= 0) out.label = static_cast<uint32_t>(node.class_id);
+  if (node.place.has_value()) {
+    out.distance = node.place->clearance_m;
+    out.basis_point_count = static_cast<uint32_t>(std::max(0, node.place->basis_point_count));
+  } else if (const auto* distance = FindAttribute<double>(node.attributes, "distance")) {
+    out.distance = *distance;
+  }
+  if (node.region.has_value()) out.class_probabilities = node.region->class_probabilities;
+  if (type == SparkClass::kKhronosObject || type == SparkClass::kTraversability) {
+    AddPresence(node, &out);
+  }
+  return out;
 }
 
 }  // namespace dsg

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One node of a Spark-DSG file as a node of a map.
+// Nodes of Spark-DSG and nodes of a map, in both directions.
 #pragma once
 
 #include <map>
@@ -47,5 +47,12 @@ class SparkNodeConverter {
   /// Reason -> count.
   std::map<std::string, int64_t> left_out_;
 };
+
+/// The class for a node that does not remember one. Things whose validity begins or ends are
+/// Khronos objects, which have presence; so are humans, whose viewer shows their ways.
+SparkClass ClassFor(const Node& node);
+
+/// Pose, box, name, class, times and components in the format's terms; `fields` stays null.
+SparkNode ToSpark(const Node& node, SparkClass type, SparkLayerKey key);
 
 }  // namespace dsg

@@ -2,17 +2,18 @@
 #include "schema/interop/spark_rest.h"
 
 #include <algorithm>
+#include <set>
 
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "schema/codec/checksum.h"
 #include "schema/codec/shuffle.h"
-#include "schema/interop/json_document.h"
+#include "schema/interop/json_cursor.h"
 #include "schema/interop/json_fields.h"
-#include "schema/interop/json_peek.h"
-#include "schema/interop/node_to_spark.h"
 #include "schema/interop/spark_attributes.h"
 #include "schema/interop/spark_fields.h"
+#include "schema/interop/spark_layers.h"
+#include "schema/interop/spark_nodes.h"
 #include "schema/model/delta_check.h"
 
 namespace dsg {
@@ -28,16 +29,12 @@ constexpr size_t kPartCountMax = 32;
 constexpr size_t kUnpackedBytesMax = size_t{64} << 20;
 constexpr char kPacked = 'z';
 
-std::string Dump(const Json& value) {
-  return value.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
 std::string PartName(const char* name, size_t part) {
   return part == 0 ? std::string(name) : absl::StrCat(name, "_", part + 1);
 }
 
 // Short, since there is one a field; a chance of 1 in 4 billion that a change goes unnoticed.
-uint32_t Mark(const Json& value) { return static_cast<uint32_t>(Checksum(Dump(value))); }
+uint32_t Mark(const Json& value) { return static_cast<uint32_t>(Checksum(DumpJson(value))); }
 
 // What a node of the class and id has under a name when nothing is known of it; nullptr for
 // nothing.
@@ -111,10 +108,86 @@ void Overlay(const SparkNode& node, const Json& kept, Json* fields) {
   }
 }
 
+constexpr char kLabelSpaces[] = "labelspaces";
+
+Json PairJson(const SparkLayerKey& key) { return {key.layer, key.partition}; }
+
+SparkLayerKey KeyOfPair(const Json& value) {
+  return {PeekSigned(PeekAt(value, 0)), static_cast<uint32_t>(PeekUnsigned(PeekAt(value, 1)))};
+}
+
+bool HasSpace(const Json& spaces, const std::string& name, const Json& space) {
+  const auto found = spaces.find(name);
+  return found != spaces.end() && *found == space;
+}
+
+// Metadata without the label spaces that the nodes give again.
+Json MetadataRest(const SparkGraph& graph, const GraphDelta& delta) {
+  if (!graph.metadata.is_object()) return Json::object();
+  Json rest = graph.metadata;
+  if (!Peek(rest, kLabelSpaces).is_object()) return rest;
+  std::map<NodeId, SparkLayerKey> keys;
+  for (const SparkNode& node : graph.nodes) keys[NodeId(node.id)] = node.key;
+  const Json made = LabelSpacesOf(delta.nodes, keys);
+  Json& spaces = rest[kLabelSpaces];
+  for (auto it = spaces.begin(); it != spaces.end();) {
+    it = HasSpace(made, it.key(), it.value()) ? spaces.erase(it) : std::next(it);
+  }
+  if (spaces.empty()) rest.erase(kLabelSpaces);
+  return rest;
+}
+
+Json RestOf(const SparkGraph& graph, const GraphDelta& delta) {
+  std::set<SparkLayerKey> used;
+  for (const SparkNode& node : graph.nodes) used.insert(node.key);
+  const std::set<SparkLayerKey> listed(graph.layer_keys.begin(), graph.layer_keys.end());
+  Json rest = Json::object();
+  for (const SparkLayerKey& key : listed) {
+    if (!used.contains(key)) rest["layer_keys"].push_back(PairJson(key));
+  }
+  std::vector<SparkLayerKey> all(listed.begin(), listed.end());
+  all.insert(all.end(), used.begin(), used.end());
+  const auto standard = StandardLayerNames(all);
+  for (const auto& [name, key] : graph.layer_names) {
+    const auto found = standard.find(name);
+    const bool is_made = found != standard.end() && found->second == key;
+    if (!is_made) rest["layer_names"][name] = PairJson(key);
+  }
+  Json metadata = MetadataRest(graph, delta);
+  if (!metadata.empty()) rest["metadata"] = std::move(metadata);
+  return rest;
+}
+
+void AddMetadata(const Json& kept, Json* metadata) {
+  if (!kept.is_object()) return;
+  if (!metadata->is_object()) *metadata = Json::object();
+  for (const auto& [name, value] : kept.items()) {
+    if (name != kLabelSpaces) (*metadata)[name] = value;
+  }
+  const Json& spaces = Peek(kept, kLabelSpaces);
+  if (!spaces.is_object()) return;
+  for (const auto& [name, space] : spaces.items()) {
+    Json& made = (*metadata)[kLabelSpaces][name];
+    if (!space.is_array()) {
+      made = space;
+      continue;
+    }
+    // The kept space first, then what nodes have beyond it.
+    Json merged = space;
+    for (const Json& label : made) {
+      const bool is_known = std::any_of(space.begin(), space.end(), [&](const Json& known) {
+        return PeekAt(known, 0) == PeekAt(label, 0);
+      });
+      if (!is_known) merged.push_back(label);
+    }
+    made = std::move(merged);
+  }
+}
+
 }  // namespace
 
 bool KeepText(const char* name, const Json& value, Attributes* attributes) {
-  std::string text = Dump(value);
+  std::string text = DumpJson(value);
   if (text.size() > kPlainBytesMax) {
     text = absl::StrCat(std::string(1, kPacked), absl::Base64Escape(Compress(text)));
   }
@@ -153,22 +226,19 @@ bool KeepRest(const SparkNode& read, const Json& sparse_fields, bool keep_key, N
   if (sparse_fields.is_null()) return true;
   Json rest = Json::object();
   if (ClassFor(*node) != read.type) rest["type"] = NameOf(read.type);
-  if (keep_key && KeyFor(*node) != read.key) rest["key"] = {read.key.layer, read.key.partition};
+  if (keep_key && StandardKeyOf(*node) != read.key) rest["key"] = PairJson(read.key);
   Json fields =
       Difference(read, sparse_fields, MakeSparseFields(ToSpark(*node, read.type, read.key)));
   if (!fields.empty()) rest["fields"] = std::move(fields);
-  return rest.empty() || KeepText(kRestAttribute, rest, &node->attributes);
+  return rest.empty() || KeepText(attributes::kSparkRest, rest, &node->attributes);
 }
 
 SparkNode ToSparkWithRest(const Node& node, const SparkLayerKey& fallback) {
-  const Json rest = KeptText(kRestAttribute, node.attributes);
+  const Json rest = KeptText(attributes::kSparkRest, node.attributes);
   const Json& type = Peek(rest, "type");
   const auto named = type.is_string() ? SparkClassOf(type.get<std::string>()) : std::nullopt;
   SparkLayerKey key = fallback;
-  if (Peek(rest, "key").is_array()) {
-    key.layer = PeekSigned(PeekAt(rest["key"], 0));
-    key.partition = static_cast<uint32_t>(PeekUnsigned(PeekAt(rest["key"], 1)));
-  }
+  if (Peek(rest, "key").is_array()) key = KeyOfPair(rest["key"]);
   SparkNode out = ToSpark(node, named.value_or(ClassFor(node)), key);
   out.fields = MakeFields(out);
   if (rest.is_null()) return out;
@@ -176,6 +246,64 @@ SparkNode ToSparkWithRest(const Node& node, const SparkLayerKey& fallback) {
   Overlay(out, Peek(rest, "fields"), &fields);
   if (IsReadable(out, fields)) out.fields = std::move(fields);
   return out;
+}
+
+Json LabelSpacesOf(const std::vector<Node>& nodes, const std::map<NodeId, SparkLayerKey>& keys) {
+  std::map<SparkLayerKey, std::map<int32_t, std::string>> names;
+  for (const Node& node : nodes) {
+    const auto key = keys.find(node.id);
+    if (key == keys.end() || node.class_id < 0 || node.class_name.empty()) continue;
+    names[key->second].try_emplace(node.class_id, node.class_name);
+  }
+  Json spaces = Json::object();
+  for (const auto& [key, labels] : names) {
+    Json& space = spaces[absl::StrCat("_l", key.layer, "p", key.partition)];
+    space = Json::array();
+    for (const auto& [id, name] : labels) space.push_back({static_cast<uint32_t>(id), name});
+  }
+  return spaces;
+}
+
+bool KeepGraphRest(const SparkGraph& graph, GraphDelta* delta) {
+  const Json rest = RestOf(graph, *delta);
+  if (rest.empty()) return true;
+  const SparkNode* keeper = nullptr;
+  for (const SparkNode& node : graph.nodes) {
+    const bool is_better = keeper == nullptr || node.key.layer > keeper->key.layer ||
+                           (node.key.layer == keeper->key.layer && node.id < keeper->id);
+    if (is_better && node.type != SparkClass::kAgent) keeper = &node;
+  }
+  if (keeper == nullptr) return false;
+  // An export says itself what the attributes were.
+  if (keeper->own.is_object()) return true;
+  for (Node& node : delta->nodes) {
+    if (node.id.value != keeper->id) continue;
+    return KeepText(attributes::kSparkGraphRest, rest, &node.attributes);
+  }
+  return false;
+}
+
+void AddGraphRest(const std::vector<Node>& nodes, SparkGraph* graph) {
+  std::set<SparkLayerKey> keys(graph->layer_keys.begin(), graph->layer_keys.end());
+  for (const Node& node : nodes) {
+    const Json rest = KeptText(attributes::kSparkGraphRest, node.attributes);
+    if (!rest.is_object()) continue;
+    const Json& kept_keys = Peek(rest, "layer_keys");
+    for (size_t i = 0; kept_keys.is_array() && i < kept_keys.size(); ++i) {
+      keys.insert(KeyOfPair(kept_keys[i]));
+    }
+    const Json& kept_names = Peek(rest, "layer_names");
+    if (kept_names.is_object()) {
+      for (const auto& [name, key] : kept_names.items()) {
+        graph->layer_names[name] = KeyOfPair(key);
+      }
+    }
+    AddMetadata(Peek(rest, "metadata"), &graph->metadata);
+  }
+  graph->layer_keys.assign(keys.begin(), keys.end());
+  for (const auto& [name, key] : StandardLayerNames(graph->layer_keys)) {
+    graph->layer_names.try_emplace(name, key);
+  }
 }
 
 }  // namespace dsg

@@ -10,12 +10,11 @@
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
-#include "schema/interop/graph_rest.h"
-#include "schema/interop/mesh_numbering.h"
-#include "schema/interop/own_parts.h"
 #include "schema/interop/spark_agents.h"
 #include "schema/interop/spark_layers.h"
+#include "schema/interop/spark_mesh.h"
 #include "schema/interop/spark_nodes.h"
+#include "schema/interop/spark_own.h"
 #include "schema/interop/spark_rest.h"
 #include "schema/model/delta_check.h"
 
@@ -219,15 +218,12 @@ class SparkDeltaBuilder {
     }
     const End& low = a.id < b.id ? a : b;
     const End& high = a.id < b.id ? b : a;
-    return MakeEdge(low, SiblingRelation(a, b), high);
+    return MakeEdge(low, RelationWithin(a, b), high);
   }
 
-  static const char* SiblingRelation(const End& a, const End& b) {
+  static const char* RelationWithin(const End& a, const End& b) {
     if (a.is_pose && b.is_pose) return kOdometry;
-    if (a.key != b.key) return relations::kNear;
-    if (a.layer == layers::kPlaces) return relations::kTraversable;
-    if (a.layer == layers::kRooms) return relations::kAdjacent;
-    return relations::kNear;
+    return a.key == b.key ? SiblingRelation(a.layer) : relations::kNear;
   }
 
   static Edge MakeEdge(const End& source, const char* relation, const End& target) {

@@ -11,18 +11,18 @@
 namespace dsg::merge {
 namespace {
 
-// Relations without direction, which are written once.
-bool IsSymmetric(const std::string& relation) {
-  return relation == relations::kTraversable || relation == relations::kAdjacent ||
-         relation == relations::kNear || relation == relations::kCoVisible ||
-         relation == relations::kSameAs;
+bool HasEnds(const std::string& relation, relations::Ends ends) {
+  const relations::Relation* const known = relations::Find(relation);
+  return known != nullptr && known->ends == ends;
 }
 
-// A node has at most one edge of each of these relations; that of this map wins.
-bool IsSingle(const std::string& relation) {
-  return relation == relations::kNearestPlace || relation == relations::kOn ||
-         relation == relations::kIn || relation == relations::kHeldBy;
+// Written once, from either end.
+bool IsSymmetric(const std::string& relation) {
+  return HasEnds(relation, relations::Ends::kEither);
 }
+
+// A node has one of each of these; of two beliefs the one of this map stays.
+bool IsSingle(const std::string& relation) { return HasEnds(relation, relations::Ends::kOne); }
 
 // Relations that attach a node: to its parent, or by a single edge.
 bool HangsOn(const std::string& relation) {

@@ -91,9 +91,4 @@ inline constexpr size_t kAssetBytesMax = size_t{256} << 20;
 /// already; ALREADY_EXISTS/TRACK_CONFLICT when an append reaches back before the track's end.
 absl::Status CheckDelta(const GraphDelta& delta, const GraphLookup& graph);
 
-/// Sorts every part by key and keeps the last of entries with equal keys, so that an entity is
-/// written once per revision; merges appends to one agent. An edge both upserted and removed is
-/// removed. Deltas that say the same become byte-equal.
-void Coalesce(GraphDelta* delta);
-
 }  // namespace dsg

@@ -2,10 +2,12 @@
 // The only way into a store: one change of one map, applied whole or not at all.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "schema/model/edge.h"
 #include "schema/model/layer.h"
 #include "schema/model/mesh.h"
@@ -130,9 +132,22 @@ struct GraphDelta {
 /// CONTAINS edges. Nodes that the delta does not hold are left alone.
 void FitBoxesToChildren(GraphDelta* delta);
 
+/// Sorts every part by key and keeps the last of entries with equal keys, so that an entity is
+/// written once per revision; merges appends to one agent. An edge both upserted and removed is
+/// removed. Deltas that say the same become byte-equal.
+void Coalesce(GraphDelta* delta);
+
 /// Cuts a large delta into ones of at most `item_count_max` rows (poses and shapes count one each),
 /// parents before children and nodes before their edges, so that each is valid when applied in
 /// order. Session and message are copied; sequences count from `delta.sequence`.
 std::vector<GraphDelta> SplitDelta(GraphDelta delta, size_t item_count_max);
+
+/// Takes a part; `done` is the share of the rows that are in this part and those before, 0 to 1.
+using TakePart = std::function<absl::Status(GraphDelta part, double done)>;
+
+/// The parts of SplitDelta, in their order, each made when it is its turn: of an import of a
+/// hundred thousand nodes only one part is in memory beside the rest of the delta. Errors: the
+/// first one of `take`, which ends the walk.
+absl::Status ForEachPart(GraphDelta delta, size_t item_count_max, const TakePart& take);
 
 }  // namespace dsg

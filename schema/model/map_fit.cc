@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
+#include "schema/model/value_check.h"
 
 namespace dsg {
 namespace {
@@ -132,10 +133,6 @@ class TimeChecker {
   std::optional<std::optional<Interval>> span_;
 };
 
-absl::Status Outside(const std::string& what) {
-  return MakeError(Reason::kDeltaInvalid, "delta refused: " + what);
-}
-
 // A face belongs to the block of its first corner, a vertex without faces to its own.
 absl::Status CheckVertices(const MeshBlock& block, double size_m) {
   const Eigen::Vector3d low = Eigen::Vector3d(block.index.x, block.index.y, block.index.z) * size_m;
@@ -150,7 +147,7 @@ absl::Status CheckVertices(const MeshBlock& block, double size_m) {
     const bool is_inside =
         (at >= low.array() - reach_m).all() && (at <= low.array() + size_m + reach_m).all();
     if (is_inside) continue;
-    return Outside(absl::StrCat(
+    return values::Invalid(absl::StrCat(
         "vertex ", i, " of mesh block ", block.index.x, ",", block.index.y, ",", block.index.z,
         " at (", at.x(), ", ", at.y(), ", ", at.z(), ") is outside of the block, which begins at (",
         low.x(), ", ", low.y(), ", ", low.z(), ") and is ", size_m,

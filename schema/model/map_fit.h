@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Whether a delta can be of the map that it is for: its times and places are near what the map
-// holds. Refuses to judge what a delta says of itself: delta_check.h does.
+// holds. What a delta says of itself is checked in delta_check.h.
 #pragma once
 
 #include "absl/status/status.h"

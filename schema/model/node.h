@@ -13,6 +13,7 @@
 #include "schema/base/time.h"
 #include "schema/model/geometry.h"
 #include "schema/model/ids.h"
+#include "schema/model/known_names.h"
 #include "schema/model/layer.h"
 
 namespace dsg {
@@ -21,25 +22,15 @@ namespace dsg {
 using AttributeValue = std::variant<double, std::string, bool>;
 using Attributes = std::map<std::string, AttributeValue>;
 
+/// The value of an attribute, or nullptr if there is none of that name and type.
+template <typename T>
+const T* FindAttribute(const Attributes& attributes, const std::string& name) {
+  const auto found = attributes.find(name);
+  return found == attributes.end() ? nullptr : std::get_if<T>(&found->second);
+}
+
 /// SHA-256 of an asset's content.
 using Sha256 = std::array<uint8_t, 32>;
-
-/// The kinds that the model knows; any other name is a custom kind.
-namespace kinds {
-inline constexpr char kObject[] = "object";
-inline constexpr char kHuman[] = "human";
-inline constexpr char kRobot[] = "robot";
-inline constexpr char kPlace[] = "place";
-inline constexpr char kStructure[] = "structure";
-inline constexpr char kRoom[] = "room";
-inline constexpr char kBuilding[] = "building";
-}  // namespace kinds
-
-/// Humans and robots: the kinds that have a trajectory.
-bool IsAgentKind(std::string_view kind);
-
-/// The layer that nodes of a known kind live in; nullopt for custom kinds.
-std::optional<LayerId> LayerOfKind(std::string_view kind);
 
 /// Red, green, blue, alpha.
 using Color = std::array<uint8_t, 4>;

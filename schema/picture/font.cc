@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include "schema/base/utf8.h"
 
 namespace dsg::picture {
 namespace {
@@ -125,33 +126,15 @@ const Glyph& GlyphOf(char32_t c) {
   return kBox;
 }
 
-// How many bytes the character that begins with `lead` has; 1 for bytes that begin none.
-size_t LengthAfter(unsigned char lead) {
-  if (lead >= 0xf0) return 4;
-  if (lead >= 0xe0) return 3;
-  return lead >= 0xc0 ? 2 : 1;
-}
-
-// Takes one character off `text`, which is not empty. Nothing if it is not well formed.
-char32_t TakeCharacter(std::string_view* text) {
-  const auto lead = static_cast<unsigned char>(text->front());
-  const size_t length = LengthAfter(lead);
-  char32_t code = length == 1 ? lead : static_cast<char32_t>(lead & (0x7f >> length));
-  size_t taken = 1;
-  for (; taken < length && taken < text->size(); ++taken) {
-    const auto next = static_cast<unsigned char>((*text)[taken]);
-    if ((next & 0xc0) != 0x80) break;
-    code = code << 6 | (next & 0x3f);
-  }
-  text->remove_prefix(taken);
-  return taken == length && (length > 1 || lead < 0x80) ? code : 0;
-}
-
 }  // namespace
 
 std::vector<const Glyph*> GlyphsOf(std::string_view text) {
   std::vector<const Glyph*> glyphs;
-  while (!text.empty()) glyphs.push_back(&GlyphOf(TakeCharacter(&text)));
+  while (!text.empty()) {
+    const Utf8Character next = FirstUtf8(text);
+    glyphs.push_back(&GlyphOf(next.code));
+    text.remove_prefix(next.size);
+  }
   return glyphs;
 }
 

@@ -29,17 +29,6 @@ bool IsOperator(std::string_view text) {
   return text == "=" || text == "!=" || text == "<" || text == "<=" || text == ">" || text == ">=";
 }
 
-// Where the first byte is that belongs to no well-formed character.
-size_t FirstBadByte(std::string_view text) {
-  size_t good = 0;
-  for (size_t size = 1; size <= text.size(); ++size) {
-    if (IsUtf8(text.substr(good, size - good))) good = size;
-    // No character is longer.
-    if (size - good >= 4) break;
-  }
-  return good;
-}
-
 class Lexer {
  public:
   explicit Lexer(std::string_view text) : text_(text) {}
@@ -128,12 +117,6 @@ class Lexer {
   size_t at_ = 0;
 };
 
-size_t CountCharacters(std::string_view text) {
-  size_t count = 0;
-  for (const char c : text) count += (static_cast<unsigned char>(c) & 0xc0) != 0x80 ? 1 : 0;
-  return count;
-}
-
 // The line around a position, cut to what a terminal shows, with a caret below it.
 std::string ShowPosition(std::string_view text, size_t position) {
   constexpr size_t kShownBytes = 60;
@@ -143,14 +126,14 @@ std::string ShowPosition(std::string_view text, size_t position) {
   if (position - begin > kShownBytes) begin = position - kShownBytes;
   size_t end = std::min(line_end, position + kShownBytes);
   // Never in the middle of a character.
-  while (begin < position && (static_cast<unsigned char>(text[begin]) & 0xc0) == 0x80) ++begin;
-  while (end < line_end && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80) ++end;
+  while (begin < position && IsUtf8Tail(text[begin])) ++begin;
+  while (end < line_end && IsUtf8Tail(text[end])) ++end;
   std::string shown(text.substr(begin, end - begin));
   for (char& c : shown) {
     if (static_cast<unsigned char>(c) < 0x20) c = ' ';
   }
   if (!IsUtf8(shown)) return "";
-  const size_t caret = CountCharacters(text.substr(begin, position - begin));
+  const size_t caret = CountUtf8(text.substr(begin, position - begin));
   return absl::StrCat("\n  ", shown, "\n  ", std::string(caret, ' '), "^");
 }
 
@@ -168,7 +151,8 @@ absl::StatusOr<std::vector<Token>> Tokenize(std::string_view text) {
   if (text.size() > kQueryBytesMax) {
     return QueryError(text, kQueryBytesMax, absl::StrCat("at most ", kQueryBytesMax, " bytes"));
   }
-  if (!IsUtf8(text)) return QueryError(text, FirstBadByte(text), "well-formed UTF-8");
+  const size_t bad = FindBadUtf8(text);
+  if (bad < text.size()) return QueryError(text, bad, "well-formed UTF-8");
   return Lexer(text).Run();
 }
 

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "query/engine/search/relation_words.h"
 
-#include <algorithm>
 #include <array>
 
 #include "query/engine/search/pattern.h"
 #include "query/engine/search/text_match.h"
-#include "schema/model/edge.h"
+#include "schema/model/known_names.h"
 
 namespace dsg::query {
 namespace {
@@ -71,25 +70,19 @@ std::optional<RelationWord> FindRelationWord(const std::vector<std::string_view>
   return std::nullopt;
 }
 
-const std::vector<std::string>& ModelRelations() {
-  static const auto* relations = new std::vector<std::string>{
-      relations::kAdjacent, relations::kAttachedTo,   relations::kCoVisible,
-      relations::kContains, relations::kEncloses,     relations::kHeldBy,
-      relations::kIn,       kInsideRelation,          relations::kLargerThan,
-      relations::kNear,     relations::kNearestPlace, relations::kOn,
-      relations::kSameAs,   relations::kTraversable};
-  return *relations;
+std::vector<std::string> ModelRelations() {
+  std::vector<std::string> names = {kInsideRelation};
+  for (const relations::Relation& relation : relations::kAll) names.emplace_back(relation.name);
+  return names;
 }
 
-bool IsModelRelation(std::string_view relation) {
-  const std::vector<std::string>& known = ModelRelations();
-  return std::find(known.begin(), known.end(), relation) != known.end();
+bool IsModelRelation(std::string_view name) {
+  return name == kInsideRelation || relations::Find(name) != nullptr;
 }
 
-bool IsSymmetricRelation(std::string_view relation) {
-  return relation == relations::kAdjacent || relation == relations::kNear ||
-         relation == relations::kCoVisible || relation == relations::kSameAs ||
-         relation == relations::kTraversable;
+bool IsSymmetricRelation(std::string_view name) {
+  const relations::Relation* const known = relations::Find(name);
+  return known != nullptr && known->ends == relations::Ends::kEither;
 }
 
 }  // namespace dsg::query

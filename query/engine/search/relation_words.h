@@ -24,12 +24,12 @@ std::optional<RelationWord> FindRelationWord(const std::vector<std::string_view>
 /// Words of the longest phrase.
 inline constexpr size_t kRelationWordsMax = 3;
 
-/// Relations of the model and INSIDE, upper case.
-const std::vector<std::string>& ModelRelations();
-bool IsModelRelation(std::string_view relation);
+/// Relations of the model (schema/model/known_names.h) and INSIDE, upper case.
+std::vector<std::string> ModelRelations();
+bool IsModelRelation(std::string_view name);
 
 /// True where it does not matter at which end of the edge a node stands: "near", "adjacent to".
 /// Such an edge is kept once, in one direction.
-bool IsSymmetricRelation(std::string_view relation);
+bool IsSymmetricRelation(std::string_view name);
 
 }  // namespace dsg::query

@@ -9,15 +9,12 @@
 #include "absl/strings/str_cat.h"
 #include "query/engine/search/relation_words.h"
 #include "schema/base/status.h"
+#include "schema/model/known_names.h"
 
 namespace dsg::query {
 namespace {
 
 constexpr int kStopEvery = 512;
-
-constexpr std::string_view kModelKinds[] = {kinds::kObject,  kinds::kHuman,     kinds::kRobot,
-                                            kinds::kPlace,   kinds::kStructure, kinds::kRoom,
-                                            kinds::kBuilding};
 
 bool EndsWith(std::string_view text, std::string_view end) {
   return text.size() > end.size() && text.substr(text.size() - end.size()) == end;
@@ -42,8 +39,8 @@ std::vector<std::string> SingularsOf(std::string_view word) {
 }
 
 std::string Vocabulary::ModelKind(std::string_view word) {
-  for (const std::string_view kind : kModelKinds) {
-    if (EqualsIgnoringCase(kind, word)) return std::string(kind);
+  for (const kinds::Kind& kind : kinds::kAll) {
+    if (EqualsIgnoringCase(kind.name, word)) return std::string(kind.name);
   }
   return "";
 }
@@ -167,7 +164,7 @@ absl::Status Vocabulary::ClassUnknown(std::string_view word, bool is_noun) const
   DSG_ASSIGN_OR_RETURN(const std::vector<std::string> labels, Labels());
   known.insert(known.end(), labels.begin(), labels.end());
   if (is_noun) {
-    for (const std::string_view kind : kModelKinds) known.emplace_back(kind);
+    for (const kinds::Kind& kind : kinds::kAll) known.emplace_back(kind.name);
     for (const Layer& layer : view_.layers()) known.push_back(layer.name);
   }
   const std::string text(word);
@@ -205,7 +202,8 @@ absl::Status Vocabulary::RelationUnknown(std::string_view word) const {
 }
 
 absl::Status Vocabulary::KindUnknown(std::string_view word) const {
-  std::vector<std::string> known(std::begin(kModelKinds), std::end(kModelKinds));
+  std::vector<std::string> known;
+  for (const kinds::Kind& kind : kinds::kAll) known.emplace_back(kind.name);
   const std::string text(word);
   return MakeError(Reason::kFieldInvalid,
                    absl::StrCat("pattern.kind is ", text, "; no node of the map is of this kind",

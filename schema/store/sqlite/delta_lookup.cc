@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "schema/store/sqlite/delta_lookup.h"
 
-#include "schema/codec/node_codec.h"
+#include "schema/codec/payload.h"
 #include "schema/store/sqlite/commit.h"
 #include "schema/store/sqlite/graph_rows.h"
 #include "schema/store/sqlite/rows.h"

@@ -6,7 +6,6 @@
 
 #include <cmath>
 #include <limits>
-#include <set>
 
 #include "schema/base/random.h"
 #include "schema/codec/attribute_codec.h"
@@ -100,19 +99,6 @@ TEST(JsonPack, WritesWhatIsKeptOfAPlaceInFewBytes) {
   std::string packed;
   ASSERT_TRUE(PackJson(R"({"fields":{"bounding_box":[3486761403,null,true]}})", &packed));
   EXPECT_LE(packed.size(), 16u);
-}
-
-// Texts are stored under these numbers: none may move.
-TEST(JsonPack, NamesKeepTheirNumbers) {
-  EXPECT_EQ(NumberOfName("spark_dsg"), 0);
-  EXPECT_EQ(NumberOfName("bounding_box"), 34);
-  EXPECT_EQ(NumberOfName("orientation"), 56);
-  EXPECT_EQ(NumberOfName("node_id"), 96);
-  EXPECT_EQ(NameOfNumber(97), "");
-  EXPECT_FALSE(NumberOfName("of my own").has_value());
-  std::set<std::string_view> names;
-  for (uint8_t i = 0; !NameOfNumber(i).empty(); ++i)
-    EXPECT_TRUE(names.insert(NameOfNumber(i)).second);
 }
 
 TEST(JsonPack, WritesRoundAndTinyDoublesShorter) {

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <map>
 
-#include "schema/interop/json_document.h"
+#include "schema/interop/json_cursor.h"
 #include "schema/interop/spark_binary.h"
 #include "schema/interop/spark_json.h"
 #include "schema/interop/spark_own.h"

@@ -8,7 +8,7 @@
 #include <iostream>
 #include <random>
 
-#include "schema/interop/json_document.h"
+#include "schema/interop/json_cursor.h"
 #include "schema/interop/spark_json.h"
 #include "tests/unit/schema/interop/interop_test_util.h"
 #include "tests/unit/schema/interop/spark_binary_writer.h"

@@ -7,8 +7,8 @@
 #include <algorithm>
 
 #include "schema/base/random.h"
-#include "schema/interop/mesh_join.h"
 #include "schema/interop/spark_fields.h"
+#include "schema/interop/spark_mesh.h"
 #include "schema/interop/spark_to_delta.h"
 #include "tests/unit/schema/interop/interop_test_util.h"
 
@@ -63,7 +63,7 @@ TEST(SparkRest, CostsNothingWhereNothingIsLeftOver) {
   graph.nodes = {chair};
   const auto imported = SparkToDelta(graph, "g.json", 2.0);
   ASSERT_TRUE(imported.ok()) << imported.status();
-  EXPECT_FALSE(imported->delta.nodes[0].attributes.contains(kRestAttribute));
+  EXPECT_FALSE(imported->delta.nodes[0].attributes.contains(attributes::kSparkRest));
 }
 
 TEST(SparkRest, SplitsLongTextsAndRefusesOnesThatAreTooLong) {
@@ -71,18 +71,18 @@ TEST(SparkRest, SplitsLongTextsAndRefusesOnesThatAreTooLong) {
   Json numbers = Json::array();
   for (int i = 0; i < 60'000; ++i) numbers.push_back(random.Index(1 << 30));
   Attributes attributes;
-  ASSERT_TRUE(KeepText(kRestAttribute, numbers, &attributes));
+  ASSERT_TRUE(KeepText(attributes::kSparkRest, numbers, &attributes));
   EXPECT_GT(attributes.size(), 1u);
   for (const auto& [name, value] : attributes) {
     EXPECT_LE(std::get<std::string>(value).size(), kAttributeLengthMax) << name;
   }
-  EXPECT_EQ(KeptText(kRestAttribute, attributes), numbers);
+  EXPECT_EQ(KeptText(attributes::kSparkRest, attributes), numbers);
   attributes.erase("spark_dsg_2");
-  EXPECT_TRUE(KeptText(kRestAttribute, attributes).is_null());
+  EXPECT_TRUE(KeptText(attributes::kSparkRest, attributes).is_null());
 
   for (int i = 0; i < 600'000; ++i) numbers.push_back(random.Index(1 << 30));
   Attributes none;
-  EXPECT_FALSE(KeepText(kRestAttribute, numbers, &none));
+  EXPECT_FALSE(KeepText(attributes::kSparkRest, numbers, &none));
   EXPECT_TRUE(none.empty());
 }
 
@@ -161,6 +161,15 @@ TEST(MeshNumbers, FollowTheVerticesTheyNamed) {
   for (size_t i = 0; i < 4; ++i) {
     EXPECT_EQ(after.at(back.fields["mesh_connections"][i].get<size_t>()),
               before.at(fields["mesh_connections"][i].get<size_t>()));
+  }
+}
+
+// Stores write them as a byte; see attributes::NumberOf.
+TEST(SparkRest, TheNamesOfAllFieldsHaveANumber) {
+  for (int type = 0; type <= static_cast<int>(SparkClass::kTraversability); ++type) {
+    for (const SparkField& field : FieldsOf(static_cast<SparkClass>(type))) {
+      EXPECT_TRUE(attributes::NumberOf(field.name).has_value()) << field.name;
+    }
   }
 }
 

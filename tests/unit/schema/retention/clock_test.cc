@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "absl/strings/match.h"
-#include "schema/model/agent_pose.h"
+#include "schema/model/known_names.h"
 #include "schema/retention/graph_index.h"
 #include "schema/retention/policy.h"
 #include "tests/unit/schema/retention/prune_test_util.h"

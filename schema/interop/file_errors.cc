@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "schema/interop/skips.h"
+#include "schema/interop/file_errors.h"
 
 #include <algorithm>
 
@@ -8,6 +8,12 @@
 #include "schema/base/status.h"
 
 namespace dsg {
+
+absl::Status FileError(const std::string& file, const std::string& where, std::string_view what) {
+  return MakeError(Reason::kFileMalformed, absl::StrCat(file, ": ", where, ": ", std::string(what)),
+                   {{"file", file}, {"where", where}});
+}
+
 namespace {
 
 constexpr size_t kNamedMax = 3;

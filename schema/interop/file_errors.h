@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// What of a file could not be kept, counted by kind: a file of 2,241 edges is worth reading when 6
-// of them lead nowhere.
+// How readers of files say what is wrong: errors that name the place, and what was skipped, counted
+// by kind. A file of 2,241 edges is worth reading when 6 of them lead nowhere.
 #pragma once
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "absl/status/status.h"
 
 namespace dsg {
+
+/// INVALID_ARGUMENT/FILE_MALFORMED "`file`: `where`: `what`"; `where` is a field or a byte offset.
+absl::Status FileError(const std::string& file, const std::string& where, std::string_view what);
 
 enum class SkipKind {
   kNode,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Files with edges that lead nowhere and the like: read but for these, or refused if asked to.
-#include "schema/interop/skips.h"
+#include "schema/interop/file_errors.h"
 
 #include <gtest/gtest.h>
 

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "schema/interop/spark_byte_reader.h"
+#include "schema/interop/spark_bytes.h"
 
 #include <bit>
-#include <limits>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "schema/base/utf8.h"
-#include "schema/interop/file_error.h"
+#include "schema/interop/file_errors.h"
 
 namespace dsg {
 namespace {
@@ -110,7 +109,7 @@ int64_t SparkByteReader::Signed(const char* field) {
   }
   const uint64_t word = TakeWord(field, WidthOf(tag));
   if (IsSignedTag(tag)) return SignExtend(word, WidthOf(tag));
-  if (word > static_cast<uint64_t>(std::numeric_limits<int64_t>::max())) {
+  if (word > static_cast<uint64_t>(INT64_MAX)) {
     Fail(field, "does not fit in 64 signed bits");
     return 0;
   }

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The JSON tree builder's limits and the UTF-8 check.
-#include "schema/interop/json_document.h"
+#include "schema/interop/json_cursor.h"
 
 #include <gtest/gtest.h>
 
 #include "schema/base/utf8.h"
-#include "schema/interop/file_error.h"
-#include "schema/interop/json_cursor.h"
+#include "schema/interop/file_errors.h"
 #include "tests/unit/schema/interop/interop_test_util.h"
 
 namespace dsg {

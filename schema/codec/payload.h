@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parts of a stored node, where no more is needed; all of it: EncodeNodePayload, DecodeNodePayload.
+// Bytes that stores keep: parts of a node, where no more is needed. The whole ones are declared in
+// proto_convert.h: EncodeNodePayload, DecodeNodePayload and those of edges, mesh blocks and
+// factors.
 #pragma once
 
 #include <string>
