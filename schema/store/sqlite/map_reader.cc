@@ -174,32 +174,29 @@ absl::Status SqliteMapReader::CopyTo(const std::string& path, const StopCheck& s
   return CopyMap(*db, path, stop, progress);
 }
 
-absl::StatusOr<std::shared_ptr<const Track>> SqliteMapReader::GetTrack(NodeId agent,
-                                                                       Revision revision) {
-  const TrackKey key{agent, revision};
-  if (auto cached = tracks_.Find(key)) return cached;
-  DSG_ASSIGN_OR_RETURN(Lease lease, LeaseAt(revision));
-  // What is cached for the revision before is still true if the agent has not changed since.
-  if (auto before = tracks_.Find({agent, revision - 1})) {
-    DSG_ASSIGN_OR_RETURN(const Revision changed, LastChangeOfTrack(*lease, agent));
-    if (changed < revision) {
-      tracks_.Insert(key, before, 64);
-      return before;
+absl::StatusOr<TrackPtr> SqliteMapReader::GetTrack(NodeId agent, Revision revision) {
+  return tracks_.Get({agent, revision}, {}, [&]() -> absl::StatusOr<Costed<TrackPtr>> {
+    DSG_ASSIGN_OR_RETURN(Lease lease, LeaseAt(revision));
+    // What is cached for the revision before is still true if the agent has not changed since.
+    if (const auto before = tracks_.Find({agent, revision - 1})) {
+      DSG_ASSIGN_OR_RETURN(const Revision changed, LastChangeOfTrack(*lease, agent));
+      if (changed < revision) return Costed<TrackPtr>{*before, 64};
     }
-  }
-  DSG_ASSIGN_OR_RETURN(auto track, LoadTrack(*lease, spec_, agent, revision));
-  tracks_.Insert(key, track, track->memory_bytes());
-  return track;
+    DSG_ASSIGN_OR_RETURN(TrackPtr track, LoadTrack(*lease, spec_, agent, revision));
+    const size_t bytes = track->memory_bytes();
+    return Costed<TrackPtr>{std::move(track), bytes};
+  });
 }
 
-absl::StatusOr<std::shared_ptr<const SegmentReader>> SqliteMapReader::GetSegment(
-    const SegmentRef& segment, Revision revision) {
+absl::StatusOr<SegmentPtr> SqliteMapReader::GetSegment(const SegmentRef& segment,
+                                                       Revision revision) {
   const SegmentKey key{segment.id, segment.rev_from, segment.pose_count};
-  if (auto cached = segments_.Find(key)) return cached;
-  DSG_ASSIGN_OR_RETURN(Lease lease, LeaseAt(revision));
-  DSG_ASSIGN_OR_RETURN(auto reader, LoadSegment(*lease, segment));
-  segments_.Insert(key, reader, reader->memory_bytes());
-  return reader;
+  return segments_.Get(key, {}, [&]() -> absl::StatusOr<Costed<SegmentPtr>> {
+    DSG_ASSIGN_OR_RETURN(Lease lease, LeaseAt(revision));
+    DSG_ASSIGN_OR_RETURN(SegmentPtr reader, LoadSegment(*lease, segment));
+    const size_t bytes = reader->memory_bytes();
+    return Costed<SegmentPtr>{std::move(reader), bytes};
+  });
 }
 
 }  // namespace dsg::sqlite

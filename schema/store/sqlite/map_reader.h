@@ -63,9 +63,8 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
   /// Errors: OUT_OF_RANGE/REVISION_COMPACTED; ABORTED/MAP_REPLACED.
   absl::StatusOr<Lease> LeaseAt(Revision revision);
 
-  absl::StatusOr<std::shared_ptr<const Track>> GetTrack(NodeId agent, Revision revision);
-  absl::StatusOr<std::shared_ptr<const SegmentReader>> GetSegment(const SegmentRef& segment,
-                                                                  Revision revision);
+  absl::StatusOr<TrackPtr> GetTrack(NodeId agent, Revision revision);
+  absl::StatusOr<SegmentPtr> GetSegment(const SegmentRef& segment, Revision revision);
   AncestorCache& ancestors() { return ancestors_; }
   ShapeCache& shapes() { return shapes_; }
   /// Ids of humans and robots, by revision.

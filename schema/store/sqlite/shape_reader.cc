@@ -65,17 +65,17 @@ const ShapeReader::Segment& ShapeReader::Pass(TimeNs time_ns, size_t* index) {
   return *believed;
 }
 
-absl::StatusOr<std::shared_ptr<const DecodedShapes>> ShapeReader::Decode(const Segment& segment) {
+absl::StatusOr<ShapesPtr> ShapeReader::Decode(const Segment& segment) {
   const ShapeKey key{segment.row_id, segment.rev_from, question_.with_vertices};
-  auto cached = cache_.Find(key);
-  if (cached != nullptr) return cached;
-  DSG_ASSIGN_OR_RETURN(const std::string payload, LoadPayload(segment));
-  auto decoded = std::make_shared<DecodedShapes>();
-  if (!DecodeShapes(payload, question_.with_vertices, decoded.get())) {
-    return CorruptRow(db_.map_name(), "shape_segment", ToString(question_.agent));
-  }
-  cache_.Insert(key, decoded, decoded->memory_bytes());
-  return std::shared_ptr<const DecodedShapes>(std::move(decoded));
+  return cache_.Get(key, {}, [&]() -> absl::StatusOr<Costed<ShapesPtr>> {
+    DSG_ASSIGN_OR_RETURN(const std::string payload, LoadPayload(segment));
+    auto decoded = std::make_shared<DecodedShapes>();
+    if (!DecodeShapes(payload, question_.with_vertices, decoded.get())) {
+      return CorruptRow(db_.map_name(), "shape_segment", ToString(question_.agent));
+    }
+    const size_t bytes = decoded->memory_bytes();
+    return Costed<ShapesPtr>{std::move(decoded), bytes};
+  });
 }
 
 absl::StatusOr<bool> ShapeReader::Show(const Segment& segment, size_t index, const Visit& visit) {

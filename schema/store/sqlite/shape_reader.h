@@ -8,10 +8,10 @@
 #include <memory>
 #include <vector>
 
+#include "schema/base/cache.h"
 #include "schema/codec/shape_codec.h"
 #include "schema/store/snapshot.h"
 #include "schema/store/sqlite/database.h"
-#include "schema/store/sqlite/lru_cache.h"
 
 namespace dsg::sqlite {
 
@@ -30,7 +30,8 @@ struct ShapeKeyHash {
 };
 
 /// Rows are never changed, so what was decoded once stays right.
-using ShapeCache = LruCache<ShapeKey, DecodedShapes, ShapeKeyHash>;
+using ShapesPtr = std::shared_ptr<const DecodedShapes>;
+using ShapeCache = Cache<ShapeKey, ShapesPtr, ShapeKeyHash>;
 
 struct ShapeQuestion {
   NodeId agent;
@@ -71,7 +72,7 @@ class ShapeReader {
   const Segment& Pass(TimeNs time_ns, size_t* index);
   absl::StatusOr<bool> Show(const Segment& segment, size_t index, const Visit& visit);
   absl::StatusOr<std::string> LoadPayload(const Segment& segment);
-  absl::StatusOr<std::shared_ptr<const DecodedShapes>> Decode(const Segment& segment);
+  absl::StatusOr<ShapesPtr> Decode(const Segment& segment);
 
   Database& db_;
   ShapeCache& cache_;
@@ -80,7 +81,7 @@ class ShapeReader {
   /// The segment shown last.
   int64_t decoded_id_ = -1;
   Revision decoded_rev_from_ = 0;
-  std::shared_ptr<const DecodedShapes> decoded_;
+  ShapesPtr decoded_;
 };
 
 }  // namespace dsg::sqlite

@@ -256,17 +256,20 @@ absl::StatusOr<NodeId> SqliteSnapshot::FindParent(NodeId id) const {
 }
 
 absl::StatusOr<std::vector<NodeId>> SqliteSnapshot::Ancestors(NodeId id) const {
-  const TrackKey key{id, revision()};
-  if (const auto cached = reader_->ancestors().Find(key)) return *cached;
-  std::vector<NodeId> ancestors;
-  // Ranks grow from child to parent, so the chain ends.
-  for (NodeId at = id; !at.empty();) {
-    DSG_ASSIGN_OR_RETURN(at, FindParent(at));
-    if (!at.empty()) ancestors.push_back(at);
-  }
-  reader_->ancestors().Insert(key, std::make_shared<const std::vector<NodeId>>(ancestors),
-                              64 + ancestors.size() * sizeof(NodeId));
-  return ancestors;
+  const auto read = [&]() -> absl::StatusOr<Costed<NodeIdsPtr>> {
+    std::vector<NodeId> ancestors;
+    // Ranks grow from child to parent, so the chain ends.
+    for (NodeId at = id; !at.empty();) {
+      DSG_ASSIGN_OR_RETURN(at, FindParent(at));
+      if (!at.empty()) ancestors.push_back(at);
+    }
+    const size_t bytes = 64 + ancestors.size() * sizeof(NodeId);
+    return Costed<NodeIdsPtr>{std::make_shared<const std::vector<NodeId>>(std::move(ancestors)),
+                              bytes};
+  };
+  DSG_ASSIGN_OR_RETURN(const NodeIdsPtr ancestors,
+                       reader_->ancestors().Get({id, revision()}, {}, read));
+  return *ancestors;
 }
 
 }  // namespace dsg::sqlite

@@ -37,18 +37,18 @@ absl::Status CorruptSegment(const std::string& map, const SegmentRef& segment) {
 }  // namespace
 
 // Kept by the reader: over the years there are far more agents than in the minute asked about.
-absl::StatusOr<std::shared_ptr<const std::vector<NodeId>>> SqliteSnapshot::AgentIds(
-    const StopCheck& stop) const {
-  if (auto known = reader_->agents().Find(revision())) return known;
-  auto ids = std::make_shared<std::vector<NodeId>>();
-  NodeFilter filter;
-  filter.layer = layers::kAgents;
-  DSG_RETURN_IF_ERROR(ScanNodes(filter, NodeId(), stop, [&](const Node& node) {
-    if (IsAgentKind(node.kind)) ids->push_back(node.id);
-    return true;
-  }));
-  reader_->agents().Insert(revision(), ids, sizeof(NodeId) * ids->capacity());
-  return ids;
+absl::StatusOr<NodeIdsPtr> SqliteSnapshot::AgentIds(const StopCheck& stop) const {
+  return reader_->agents().Get(revision(), stop, [&]() -> absl::StatusOr<Costed<NodeIdsPtr>> {
+    auto ids = std::make_shared<std::vector<NodeId>>();
+    NodeFilter filter;
+    filter.layer = layers::kAgents;
+    DSG_RETURN_IF_ERROR(ScanNodes(filter, NodeId(), stop, [&](const Node& node) {
+      if (IsAgentKind(node.kind)) ids->push_back(node.id);
+      return true;
+    }));
+    const size_t bytes = sizeof(NodeId) * ids->capacity();
+    return Costed<NodeIdsPtr>{std::move(ids), bytes};
+  });
 }
 
 absl::StatusOr<std::vector<TrackInfo>> SqliteSnapshot::Tracks(const StopCheck& stop) const {

@@ -107,11 +107,11 @@ int Track::FindSegment(TimeNs t_ns) const {
   return static_cast<int>(next - segments.begin()) - 1;
 }
 
-absl::StatusOr<std::shared_ptr<const Track>> LoadTrack(Database& db, const MapSpec& spec,
-                                                       NodeId agent, Revision revision) {
+absl::StatusOr<TrackPtr> LoadTrack(Database& db, const MapSpec& spec, NodeId agent,
+                                   Revision revision) {
   auto track = std::make_shared<Track>();
   DSG_RETURN_IF_ERROR(LoadAll(db, spec, agent, revision, track.get()));
-  return std::shared_ptr<const Track>(std::move(track));
+  return TrackPtr(std::move(track));
 }
 
 absl::StatusOr<Revision> LastChangeOfTrack(Database& db, NodeId agent) {
@@ -128,8 +128,7 @@ absl::StatusOr<Revision> LastChangeOfTrack(Database& db, NodeId agent) {
   return found ? query.Int(0) : kRevisionMax;
 }
 
-absl::StatusOr<std::shared_ptr<const SegmentReader>> LoadSegment(Database& db,
-                                                                 const SegmentRef& segment) {
+absl::StatusOr<SegmentPtr> LoadSegment(Database& db, const SegmentRef& segment) {
   Query query(db,
               "SELECT t0, t1, pose_count, checksum, payload FROM trajectory_segment"
               " WHERE id = ?1 AND rev_from = ?2"
@@ -137,7 +136,7 @@ absl::StatusOr<std::shared_ptr<const SegmentReader>> LoadSegment(Database& db,
               " WHERE id = ?1 AND rev_from = ?2");
   const bool found = query.Bind(segment.id, segment.rev_from).Next();
   DSG_RETURN_IF_ERROR(query.status());
-  std::shared_ptr<const SegmentReader> reader;
+  SegmentPtr reader;
   if (found) {
     std::string payload(query.Blob(4));
     const auto checksum = RowChecksum(
