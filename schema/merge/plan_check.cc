@@ -11,7 +11,7 @@
 #include "schema/base/status.h"
 #include "schema/merge/transform_node.h"
 #include "schema/model/delta_check.h"
-#include "schema/store/time_range.h"
+#include "schema/store/commit_protocol.h"
 
 namespace dsg::merge {
 namespace {

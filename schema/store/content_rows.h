@@ -76,7 +76,7 @@ struct MeshRow {
   std::array<int64_t, 4> columns() const { return {index.x, index.y, index.z, rev_from}; }
 };
 
-/// Factors or shapes of one agent that were committed together; see batches.h.
+/// Factors or shapes of one agent that were committed together; see track_rules.h.
 struct BatchRow {
   NodeId agent;
   Revision rev_from = 0;

@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "schema/store/graph_store.h"
+#include "schema/store/readable.h"
+#include "schema/store/revision_record.h"
+#include "schema/store/sqlite/batch_rows.h"
 #include "schema/store/sqlite/map_file.h"
-#include "schema/store/sqlite/readable_rows.h"
-#include "schema/store/sqlite/shape_reader.h"
 #include "schema/store/sqlite/track_cache.h"
-#include "schema/store/sqlite/writer.h"
 
 namespace dsg::sqlite {
 
@@ -113,9 +113,5 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
 /// Makes the snapshot of a revision that exists.
 std::shared_ptr<const Snapshot> MakeSnapshot(std::shared_ptr<SqliteMapReader> reader,
                                              std::shared_ptr<const RevisionRecord> head);
-
-/// Reads the whole map; see MapReader::Verify.
-absl::StatusOr<VerifyReport> VerifyMap(Database& db, const MapSpec& spec, const StopCheck& stop,
-                                       const std::function<void(double)>& progress);
 
 }  // namespace dsg::sqlite

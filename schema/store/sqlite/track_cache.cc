@@ -27,25 +27,10 @@ absl::Status LoadInfo(Database& db, const MapSpec& spec, Revision revision, Node
   return absl::OkStatus();
 }
 
-absl::StatusOr<int64_t> FindSlot(Database& db, NodeId agent) {
-  Query query(db, "SELECT slot FROM track WHERE agent = ?1");
-  const bool found = query.Bind(KeyOf(agent)).Next();
-  DSG_RETURN_IF_ERROR(query.status());
-  return found ? query.Int(0) : 0;
-}
-
 absl::Status LoadSegments(Database& db, Revision revision, int64_t slot, Track* track) {
-  TimeNs end_ns = kTimeMin;
-  {
-    Query mark(db,
-               "SELECT last_ns, pose_count FROM track_mark WHERE slot = ?1 AND revision <= ?2"
-               " ORDER BY revision DESC LIMIT 1");
-    if (mark.Bind(slot, revision).Next()) {
-      end_ns = mark.Int(0);
-      track->info.pose_count = mark.Int(1);
-    }
-    DSG_RETURN_IF_ERROR(mark.status());
-  }
+  DSG_ASSIGN_OR_RETURN(const auto mark, FindMark(db, slot, revision));
+  if (mark.has_value()) track->info.pose_count = mark->pose_count;
+  const TimeNs end_ns = mark.has_value() ? mark->last_ns : kTimeMin;
   Query query(db,
               "SELECT id, rev_from, t0, t1, pose_count FROM trajectory_segment"
               " WHERE id BETWEEN ?1 AND ?2 AND rev_from <= ?3"
@@ -129,24 +114,17 @@ absl::StatusOr<Revision> LastChangeOfTrack(Database& db, NodeId agent) {
 }
 
 absl::StatusOr<SegmentPtr> LoadSegment(Database& db, const SegmentRef& segment) {
-  Query query(db,
-              "SELECT t0, t1, pose_count, checksum, payload FROM trajectory_segment"
-              " WHERE id = ?1 AND rev_from = ?2"
-              " UNION ALL SELECT t0, t1, pose_count, checksum, payload FROM trajectory_history"
-              " WHERE id = ?1 AND rev_from = ?2");
+  Query query(db, "SELECT " DSG_SEGMENT_COLUMNS
+                  " FROM trajectory_segment WHERE id = ?1 AND rev_from = ?2"
+                  " UNION ALL SELECT " DSG_SEGMENT_COLUMNS
+                  " FROM trajectory_history WHERE id = ?1 AND rev_from = ?2");
   const bool found = query.Bind(segment.id, segment.rev_from).Next();
   DSG_RETURN_IF_ERROR(query.status());
-  SegmentPtr reader;
   if (found) {
-    std::string payload(query.Blob(4));
-    const auto checksum = RowChecksum(
-        {segment.id, segment.rev_from, query.Int(0), query.Int(1), query.Int(2)}, payload);
-    if (checksum == query.Int(3)) reader = SegmentReader::Parse(std::move(payload));
+    DSG_ASSIGN_OR_RETURN(SegmentPtr reader, SegmentReaderOf(query, db.map_name()));
+    if (reader->count() >= segment.pose_count) return reader;
   }
-  if (reader == nullptr || reader->count() < segment.pose_count) {
-    return CorruptRow(db.map_name(), "trajectory_segment", absl::StrCat(segment.id));
-  }
-  return reader;
+  return CorruptRow(db.map_name(), "trajectory_segment", absl::StrCat(segment.id));
 }
 
 }  // namespace dsg::sqlite

@@ -6,9 +6,8 @@
 #include <vector>
 
 #include "schema/base/cache.h"
-#include "schema/codec/trajectory_codec.h"
 #include "schema/store/snapshot.h"
-#include "schema/store/sqlite/database.h"
+#include "schema/store/sqlite/track_rows.h"
 
 namespace dsg::sqlite {
 
@@ -42,7 +41,6 @@ struct Track {
 };
 
 using TrackPtr = std::shared_ptr<const Track>;
-using SegmentPtr = std::shared_ptr<const SegmentReader>;
 using NodeIdsPtr = std::shared_ptr<const std::vector<NodeId>>;
 
 /// Reads a track as of `revision` in one read transaction.
