@@ -7,7 +7,7 @@
 #include <string>
 
 #include "absl/status/statusor.h"
-#include "schema/archive/archive_encoder.h"
+#include "schema/archive/archive_file.h"
 #include "schema/base/stop_check.h"
 #include "schema/store/graph_store.h"
 

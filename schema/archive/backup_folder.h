@@ -3,19 +3,46 @@
 // It is at any instant the old backup, whole, or the new one; refuses folders of anything else.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "schema/archive/archive_format.h"
-#include "schema/archive/backup_manifest.h"
-#include "schema/archive/sha256_stream.h"
+#include "schema/archive/file_io.h"
 #include "schema/base/stop_check.h"
 #include "schema/files/atomic_file.h"
+#include "schema/model/node.h"
+#include "schema/model/revision.h"
 #include "schema/store/map_writer.h"
 
 namespace dsg {
+
+struct BackupEntry {
+  std::string map;
+  /// In the folder of the manifest.
+  std::string file;
+  int64_t byte_count = 0;
+  /// Of the file.
+  Sha256 sha256{};
+  Revision newest_revision = 0;
+  Sha256 newest_digest{};
+  /// As the archive's manifest has it.
+  Sha256 state{};
+};
+
+struct BackupManifest {
+  /// Order: by map, each once.
+  std::vector<BackupEntry> maps;
+
+  const BackupEntry* Find(std::string_view map) const;
+};
+
+/// JSON, and a last line with its SHA-256.
+std::string EncodeBackupManifest(const BackupManifest& manifest);
+/// `path` is for errors. Errors: DATA_LOSS/STORE_CORRUPT; FAILED_PRECONDITION/FORMAT_TOO_NEW.
+absl::StatusOr<BackupManifest> DecodeBackupManifest(const std::string& path, std::string_view text);
 
 /// Errors: NOT_FOUND without the folder, or MANIFEST in it: such a backup was never finished;
 /// DATA_LOSS/STORE_CORRUPT.

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files that are read in pieces. Refuses to wait on what is no plain file.
+// Files that are read in pieces, and digests of bytes that come in pieces. Refuses to wait on what
+// is no plain file.
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 
 #include "absl/status/statusor.h"
+#include "schema/model/node.h"
 
 namespace dsg {
 
@@ -40,5 +43,24 @@ class InputFile {
 
 /// RESOURCE_EXHAUSTED/DISK_FULL if `error` (an errno) says so, else UNAVAILABLE.
 absl::Status SystemError(const std::string& what, const std::string& path, int error);
+
+/// SHA-256 of bytes that come piece by piece.
+///
+/// Threads: one caller at a time.
+class Sha256Stream {
+ public:
+  Sha256Stream();
+  ~Sha256Stream();
+  Sha256Stream(Sha256Stream&&) noexcept;
+  Sha256Stream& operator=(Sha256Stream&&) noexcept;
+
+  void Add(std::string_view bytes);
+  /// Of all that was added. The last call.
+  Sha256 Finish();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 
 }  // namespace dsg

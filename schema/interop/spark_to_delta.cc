@@ -2,7 +2,6 @@
 #include "schema/interop/spark_to_delta.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <tuple>
 #include <unordered_map>
@@ -134,11 +133,10 @@ class SparkDeltaBuilder {
   // its rows, and not all over the map.
   void SortEdges() {
     std::vector<Edge>& edges = result_.delta.edges;
-    std::vector<std::tuple<uint64_t, uint64_t, uint32_t>> order;
+    std::vector<std::tuple<int64_t, int64_t, uint32_t>> order;
     order.reserve(edges.size());
     for (uint32_t i = 0; i < edges.size(); ++i) {
-      order.emplace_back(std::rotl(edges[i].source.value, 8), std::rotl(edges[i].target.value, 8),
-                         i);
+      order.emplace_back(KeyOf(edges[i].source), KeyOf(edges[i].target), i);
     }
     std::sort(order.begin(), order.end());
     // Round by round of the permutation, so that each edge, which is large, moves once.

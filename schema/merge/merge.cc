@@ -15,7 +15,7 @@
 #include "schema/merge/origins.h"
 #include "schema/model/delta_check.h"
 #include "schema/model/rigid_motion.h"
-#include "schema/store/time_range.h"
+#include "schema/store/commit_protocol.h"
 
 namespace dsg::merge {
 namespace {

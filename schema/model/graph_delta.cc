@@ -2,7 +2,6 @@
 #include "schema/model/graph_delta.h"
 
 #include <algorithm>
-#include <bit>
 #include <iterator>
 #include <numeric>
 #include <tuple>
@@ -118,7 +117,7 @@ std::vector<size_t> ParentsFirst(const GraphDelta& delta) {
 std::vector<size_t> SourcesInOrder(const std::vector<Edge>& edges) {
   std::vector<size_t> order(edges.size());
   std::iota(order.begin(), order.end(), size_t{0});
-  const auto key = [&](size_t i) { return std::rotl(edges[i].source.value, 8); };
+  const auto key = [&](size_t i) { return KeyOf(edges[i].source); };
   std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return key(a) < key(b); });
   return order;
 }

@@ -2,6 +2,7 @@
 // The names of things: nodes, layers, revisions.
 #pragma once
 
+#include <bit>
 #include <compare>
 #include <cstdint>
 #include <functional>
@@ -37,6 +38,12 @@ struct NodeId {
 
   constexpr auto operator<=>(const NodeId&) const = default;
 };
+
+/// An id as a key of rows, and in what digests count: rotated left by 8 bits (index * 256 +
+/// letter), so that small indices make small integers. In the order of keys, nodes that were added
+/// together stand together whatever their letter.
+constexpr int64_t KeyOf(NodeId id) { return static_cast<int64_t>(std::rotl(id.value, 8)); }
+constexpr NodeId IdOf(int64_t key) { return NodeId(std::rotr(static_cast<uint64_t>(key), 8)); }
 
 /// "O42"; "" for the empty id.
 std::string ToString(NodeId id);

@@ -4,7 +4,6 @@
 #include "absl/strings/str_cat.h"
 #include "schema/codec/delta_checksum.h"
 #include "schema/codec/patch.h"
-#include "schema/store/time_range.h"
 
 namespace dsg {
 namespace {
@@ -54,7 +53,33 @@ absl::Status MakeWhole(const CommitSource& source, GraphDelta* delta) {
   return ApplyPatches(LayerTable(std::move(layers)), stored, delta);
 }
 
+// Of all poses that a delta brings. Requires: those of an agent ascend in time.
+absl::Status CheckPosesInMap(const GraphDelta& delta, const MapSpec& spec) {
+  const auto check = [&](const auto& items) -> absl::Status {
+    for (const auto& item : items) {
+      if (item.poses.empty()) continue;
+      DSG_RETURN_IF_ERROR(CheckTimeInMap(item.poses.front().time_ns, spec));
+      DSG_RETURN_IF_ERROR(CheckTimeInMap(item.poses.back().time_ns, spec));
+    }
+    return absl::OkStatus();
+  };
+  DSG_RETURN_IF_ERROR(check(delta.corrections));
+  return check(delta.appends);
+}
+
 }  // namespace
+
+absl::Status CheckTimeInMap(TimeNs time_ns, const MapSpec& spec) {
+  __extension__ using Int128 = __int128;
+  constexpr Int128 kMaxNs = kFromEpochYearsMax * 365 * 24 * 3600 * Int128{kNsPerSecond};
+  const Int128 from_epoch_ns = static_cast<Int128>(time_ns) - spec.epoch_ns;
+  if (from_epoch_ns >= -kMaxNs && from_epoch_ns <= kMaxNs) return absl::OkStatus();
+  return MakeError(Reason::kTimeOutsideMap,
+                   absl::StrCat("time ", time_ns, " ns is more than ", kFromEpochYearsMax,
+                                " years from the epoch ", spec.epoch_ns, " ns of map \"", spec.name,
+                                "\"; check the clock, or use a map with another epoch"),
+                   {{"map", spec.name}, {"time_ns", absl::StrCat(time_ns)}});
+}
 
 DeltaIdentity IdentityOfDelta(const GraphDelta& delta) {
   return {delta.session_id, delta.sequence, DeltaChecksum(delta)};

@@ -10,10 +10,18 @@
 
 #include "absl/status/statusor.h"
 #include "schema/base/status.h"
+#include "schema/base/time.h"
 #include "schema/model/delta_check.h"
 #include "schema/store/graph_writer.h"
 
 namespace dsg {
+
+/// Poses lie no further from the epoch of their map, before or after it: 68 years. What lies beyond
+/// is a wrong clock, and sums of such times need not fit 64 bits.
+inline constexpr int64_t kFromEpochYearsMax = 68;
+
+/// Errors: OUT_OF_RANGE/TIME_OUTSIDE_MAP.
+absl::Status CheckTimeInMap(TimeNs time_ns, const MapSpec& spec);
 
 /// What a delta is known by. `checksum` is its DeltaChecksum.
 struct DeltaIdentity {

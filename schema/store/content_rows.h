@@ -22,11 +22,6 @@
 
 namespace dsg {
 
-/// An id in an identity: rotated left by 8 bits (index * 256 + letter), so that small indices make
-/// small integers. Backends may use it as a key.
-inline int64_t KeyOf(NodeId id) { return static_cast<int64_t>(std::rotl(id.value, 8)); }
-inline NodeId IdOf(int64_t key) { return NodeId(std::rotr(static_cast<uint64_t>(key), 8)); }
-
 /// Each row has a letter, columns and a payload. Payloads are views: whoever makes a row keeps the
 /// bytes. `rev_from` is the revision that wrote the row.
 struct NodeRow {
@@ -81,7 +76,7 @@ struct MeshRow {
   std::array<int64_t, 4> columns() const { return {index.x, index.y, index.z, rev_from}; }
 };
 
-/// Factors or shapes of one agent that were committed together; see batches.h.
+/// Factors or shapes of one agent that were committed together; see track_rules.h.
 struct BatchRow {
   NodeId agent;
   Revision rev_from = 0;

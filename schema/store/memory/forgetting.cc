@@ -7,8 +7,8 @@
 #include "absl/strings/str_cat.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/codec/shape_codec.h"
-#include "schema/store/batches.h"
 #include "schema/store/memory/memory_writer.h"
+#include "schema/store/track_rules.h"
 
 namespace dsg::memory {
 namespace {

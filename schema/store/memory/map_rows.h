@@ -31,7 +31,7 @@ struct StoredEdge {
   int64_t relation = 0;
   std::string payload;
 };
-/// Factors or shapes; see batches.h.
+/// Factors or shapes; see track_rules.h.
 struct StoredBatch {
   NodeId agent;
   TimeNs t0 = 0;

@@ -5,7 +5,6 @@
 
 #include "schema/codec/proto_convert.h"
 #include "schema/codec/shape_codec.h"
-#include "schema/store/batches.h"
 #include "schema/store/memory/memory_reader.h"
 #include "schema/store/track_rules.h"
 

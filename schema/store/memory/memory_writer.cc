@@ -8,8 +8,8 @@
 #include "schema/base/time.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/codec/shape_codec.h"
-#include "schema/store/batches.h"
 #include "schema/store/tags.h"
+#include "schema/store/track_rules.h"
 
 namespace dsg::memory {
 namespace {

@@ -3,10 +3,10 @@
 // that nobody sees, and goes in small steps.
 #include "schema/store/sqlite/compaction.h"
 
-#include "absl/strings/str_cat.h"
-#include "schema/store/sqlite/asset_references.h"
-#include "schema/store/sqlite/readable_rows.h"
-#include "schema/store/sqlite/rows.h"
+#include <algorithm>
+
+#include "schema/store/sqlite/blob_rows.h"
+#include "schema/store/sqlite/revision_rows.h"
 #include "schema/store/sqlite/space.h"
 #include "schema/store/touched_keys.h"
 
@@ -70,15 +70,10 @@ class RevisionDropper {
 
  private:
   absl::Status TakeTouched(Revision revision) {
-    Query query(db_, "SELECT payload, checksum FROM touched WHERE revision = ?1");
+    Query query(db_, "SELECT revision, payload, checksum FROM touched WHERE revision = ?1");
     const bool found = query.Bind(revision).Next();
     DSG_RETURN_IF_ERROR(query.status());
-    if (!found) return absl::OkStatus();
-    if (query.Int(1) == RowChecksum({revision}, query.Blob(0)) &&
-        DecodeTouched(query.Blob(0), &touched_)) {
-      return absl::OkStatus();
-    }
-    return CorruptRow(db_.map_name(), "touched", absl::StrCat(revision));
+    return found ? TouchedFromRow(query, db_.map_name(), &touched_) : absl::OkStatus();
   }
 
   absl::Status Drop(Revision revision, const std::string& digest) {
@@ -98,7 +93,7 @@ class RevisionDropper {
                               .Bind(revision, Query::BlobView{digest_})
                               .Run());
       DSG_RETURN_IF_ERROR(
-          has_kept_ ? WriteTouched(revision)
+          has_kept_ ? WriteTouchedSinceKept(revision)
                     : Query(db_, "DELETE FROM touched WHERE revision = ?1").Bind(revision).Run());
     }
     digest_.clear();
@@ -108,13 +103,9 @@ class RevisionDropper {
   }
 
   // Everything since the last revision that is kept.
-  absl::Status WriteTouched(Revision revision) {
+  absl::Status WriteTouchedSinceKept(Revision revision) {
     DSG_RETURN_IF_ERROR(TakeTouched(revision));
-    touched_.Normalize();
-    const std::string payload = EncodeTouched(touched_);
-    return Query(db_, "UPDATE touched SET payload = ?2, checksum = ?3 WHERE revision = ?1")
-        .Bind(revision, Query::BlobView{payload}, RowChecksum({revision}, payload))
-        .Run();
+    return UpdateTouched(db_, revision, &touched_);
   }
 
   Database& db_;

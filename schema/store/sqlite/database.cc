@@ -3,8 +3,12 @@
 
 #include <sqlite3.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "schema/store/sqlite/page_checksum.h"
@@ -44,6 +48,77 @@ std::string TableOf(std::string_view sql) {
     return absl::StrCat(", table ", std::string(rest.substr(0, rest.find_first_of(" (,;"))));
   }
   return "";
+}
+
+// The layout of a write-ahead log is SQLite's: a header of 32 bytes, then frames of 24 bytes and a
+// page each. Numbers are big-endian; the magic number tells the byte order of the words that are
+// summed.
+constexpr size_t kLogHeaderBytes = 32;
+constexpr size_t kLogFrameHeadBytes = 24;
+constexpr uint32_t kLogMagic = 0x377f0682;
+constexpr uint32_t kLogPageBytesMax = 65536;
+
+uint32_t BigEndian(const char* at) {
+  uint32_t value = 0;
+  for (int i = 0; i < 4; ++i) value = value << 8 | static_cast<uint8_t>(at[i]);
+  return value;
+}
+
+uint32_t LittleEndian(const char* at) {
+  uint32_t value = 0;
+  for (int i = 3; i >= 0; --i) value = value << 8 | static_cast<uint8_t>(at[i]);
+  return value;
+}
+
+// The running sum over all that came before, as SQLite keeps it.
+class LogSum {
+ public:
+  explicit LogSum(bool is_big_endian) : is_big_endian_(is_big_endian) {}
+  void Add(const char* bytes, size_t size) {
+    for (size_t i = 0; i + 8 <= size; i += 8) {
+      first_ += Word(bytes + i) + second_;
+      second_ += Word(bytes + i + 4) + first_;
+    }
+  }
+  bool Equals(const char* stored) const {
+    return BigEndian(stored) == first_ && BigEndian(stored + 4) == second_;
+  }
+
+ private:
+  uint32_t Word(const char* at) const { return is_big_endian_ ? BigEndian(at) : LittleEndian(at); }
+
+  bool is_big_endian_;
+  uint32_t first_ = 0;
+  uint32_t second_ = 0;
+};
+
+// Number, from 1, of a bad frame that whole commits of the same log follow; 0 if there is none.
+int64_t FindBadLogFrame(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::array<char, kLogHeaderBytes> header{};
+  if (!file.read(header.data(), kLogHeaderBytes)) return 0;
+  const uint32_t magic = BigEndian(header.data());
+  const uint32_t page_bytes = BigEndian(header.data() + 8);
+  if ((magic & ~1u) != kLogMagic || page_bytes == 0 || page_bytes > kLogPageBytesMax) return 1;
+  LogSum sum((magic & 1) != 0);
+  sum.Add(header.data(), 24);
+  if (!sum.Equals(header.data() + 24)) return 1;
+  int64_t bad = 0;
+  std::vector<char> frame(kLogFrameHeadBytes + page_bytes);
+  for (int64_t number = 1; file.read(frame.data(), static_cast<std::streamsize>(frame.size()));
+       ++number) {
+    const bool is_of_this_log = std::equal(frame.data() + 8, frame.data() + 16, &header[16]);
+    const bool is_commit = BigEndian(frame.data() + 4) != 0;
+    if (bad != 0) {
+      // Frames of earlier logs may stand here; they bear other salts.
+      if (is_of_this_log && is_commit) return bad;
+      continue;
+    }
+    sum.Add(frame.data(), 8);
+    sum.Add(frame.data() + kLogFrameHeadBytes, page_bytes);
+    if (!is_of_this_log || !sum.Equals(frame.data() + 16)) bad = number;
+  }
+  return 0;
 }
 
 int OnWalCommit(void* pages, sqlite3*, const char*, int wal_pages) {
@@ -103,6 +178,19 @@ bool Database::Checkpoint(bool truncate) {
   }
   wal_pages_ = 0;
   return log_pages == copied_pages;
+}
+
+std::optional<std::string> Database::FindLogDamage() const {
+  const std::string path = path_ + "-wal";
+  // A frame that was read while it was being written is whole the next time; a log that was begun
+  // anew has another bad frame, or none.
+  int64_t bad = FindBadLogFrame(path);
+  for (int tries = 0; bad != 0 && tries < 3; ++tries) {
+    bad = FindBadLogFrame(path);
+  }
+  if (bad == 0) return std::nullopt;
+  return absl::StrCat("write-ahead log: frame ", bad,
+                      " is not what was written, and the commits after it are lost");
 }
 
 absl::Status Database::WriteAnew() {

@@ -47,6 +47,11 @@ class Database {
   /// Copies the write-ahead log into the database as far as readers allow; false if not all of it.
   /// For a map in use that is no error: the log only grows.
   bool Checkpoint(bool truncate);
+  /// What damaged the write-ahead log after it was written, in a sentence; nullopt when nothing
+  /// did, or when there is no log. SQLite takes the first bad frame for the torn end of a crash and
+  /// forgets all that follows; but no crash leaves whole commits behind it. Safe while a writer
+  /// appends.
+  std::optional<std::string> FindLogDamage() const;
   /// Writes the whole file anew, so that it holds no free pages and can shrink in steps later.
   /// Needs room for a second copy while it runs.
   absl::Status WriteAnew();

@@ -1,14 +1,37 @@
 // SPDX-License-Identifier: Apache-2.0
-// Takes rows of the past out of their tables, and notes what the records of revisions lose by it.
-// Refuses to decide what is to go.
+// Takes rows of the past out of their tables, and makes right what the records of revisions say:
+// sums, digests, lists of what was touched. Refuses to decide what is to go.
 #pragma once
 
+#include <map>
 #include <set>
 
 #include "schema/model/graph_delta.h"
-#include "schema/store/sqlite/past.h"
+#include "schema/store/content_rows.h"
+#include "schema/store/erase_list.h"
+#include "schema/store/sqlite/database.h"
 
 namespace dsg::sqlite {
+
+/// How the past of a map differs from what its records say.
+class PastChange {
+ public:
+  /// A row that was shown from revision `from` on, until before `to`.
+  void Take(const RowSums& row, Revision from, Revision to);
+  void Put(const RowSums& row, Revision from, Revision to);
+
+  /// Keys whose rows of the past are gone.
+  ForgottenKeys forgotten;
+
+  /// Writes the records anew. Within a transaction.
+  absl::Status Apply(Database& db) const;
+
+ private:
+  absl::Status ApplySums(Database& db) const;
+  absl::StatusOr<bool> ApplyToLists(Database& db) const;
+
+  std::map<Revision, RowSums> changes_;
+};
 
 /// What has been taken out since the records were last made right.
 struct ErasedRows {

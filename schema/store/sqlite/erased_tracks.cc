@@ -3,46 +3,38 @@
 // that say how far the track reached are made right.
 #include <algorithm>
 #include <map>
+#include <set>
 
-#include "absl/strings/str_cat.h"
 #include "schema/codec/trajectory_codec.h"
 #include "schema/store/sqlite/erased_rows.h"
+#include "schema/store/sqlite/revision_rows.h"
 #include "schema/store/sqlite/rows.h"
+#include "schema/store/sqlite/track_rows.h"
 
 namespace dsg::sqlite {
 namespace {
 
-struct Mark {
-  Revision revision = 0;
-  TimeNs last_ns = kTimeMin;
-  int64_t pose_count = 0;
-};
-
-struct Segment {
-  int64_t id = 0;
-  Revision rev_from = 0;
-  Revision rev_to = kRevisionMax;
-  TimeNs t0 = 0;
-  TimeNs t1 = 0;
-  std::vector<StoredPose> poses;
-  size_t payload_bytes = 0;
-};
-
-constexpr char kSelectPast[] =
-    "SELECT id, rev_from, t0, t1, pose_count, checksum, payload, rev_to FROM trajectory_history"
-    " WHERE id BETWEEN ?1 AND ?2 AND t0 < ?4 AND t1 >= ?3";
-constexpr char kSelectCurrent[] =
-    "SELECT id, rev_from, t0, t1, pose_count, checksum, payload, 9223372036854775807"
+constexpr char kPastSegments[] =
+    "SELECT " DSG_SEGMENT_COLUMNS
+    ", rev_to"
+    " FROM trajectory_history WHERE id BETWEEN ?1 AND ?2 AND t0 < ?4 AND t1 >= ?3";
+constexpr char kCurrentSegments[] =
+    "SELECT " DSG_SEGMENT_COLUMNS
+    ", 9223372036854775807"
     " FROM trajectory_segment WHERE id BETWEEN ?1 AND ?2 AND t0 < ?4 AND t1 >= ?3";
+// The last segments that a mark may reach into.
+constexpr char kLastPastSegment[] =
+    "SELECT " DSG_SEGMENT_COLUMNS
+    " FROM trajectory_history WHERE id BETWEEN ?1 AND ?2 AND rev_from <= ?3 AND rev_to > ?3"
+    " AND t0 <= ?4 ORDER BY id DESC LIMIT 1";
+constexpr char kLastCurrentSegment[] =
+    "SELECT " DSG_SEGMENT_COLUMNS
+    " FROM trajectory_segment WHERE id BETWEEN ?1 AND ?2 AND rev_from <= ?3 AND t0 <= ?4"
+    " ORDER BY id DESC LIMIT 1";
 
-// Columns: id, rev_from, t0, t1, pose_count, checksum. False if the row is not what was written.
-bool DecodeRow(const Query& query, const std::string& payload, std::vector<StoredPose>* poses) {
-  const int64_t checksum =
-      RowChecksum({query.Int(0), query.Int(1), query.Int(2), query.Int(3), query.Int(4)}, payload);
-  if (checksum != query.Int(5)) return false;
-  const auto reader = SegmentReader::Parse(payload);
-  return reader != nullptr && reader->DecodeAll(poses);
-}
+struct PastSegment : SegmentRow {
+  Revision rev_to = kRevisionMax;
+};
 
 // One agent's track while poses are taken out of it.
 class TrackEraser {
@@ -51,26 +43,22 @@ class TrackEraser {
       : agent_(agent), slot_(slot), erased_(*erased), db_(erased->db) {}
 
   absl::Status Load() {
-    Query query(db_,
-                "SELECT revision, last_ns, pose_count FROM track_mark WHERE slot = ?1"
-                " ORDER BY revision");
-    query.Bind(slot_);
-    while (query.Next()) marks_.push_back({query.Int(0), query.Int(1), query.Int(2)});
-    return query.status();
+    DSG_ASSIGN_OR_RETURN(marks_, ReadMarks(db_, slot_));
+    return absl::OkStatus();
   }
 
   absl::Status ErasePast(const TrackSpan& span) {
-    DSG_ASSIGN_OR_RETURN(std::vector<Segment> segments,
-                         ReadSegments(kSelectPast, span.from_ns, span.to_ns));
-    for (Segment& segment : segments) DSG_RETURN_IF_ERROR(Cut(span, std::move(segment)));
+    DSG_ASSIGN_OR_RETURN(std::vector<PastSegment> segments,
+                         ReadSegments(kPastSegments, span.from_ns, span.to_ns));
+    for (PastSegment& segment : segments) DSG_RETURN_IF_ERROR(Cut(span, std::move(segment)));
     return RepairMarks();
   }
 
   absl::Status EraseAll() {
-    for (const char* sql : {kSelectPast, kSelectCurrent}) {
-      DSG_ASSIGN_OR_RETURN(const std::vector<Segment> segments,
+    for (const char* sql : {kPastSegments, kCurrentSegments}) {
+      DSG_ASSIGN_OR_RETURN(const std::vector<PastSegment> segments,
                            ReadSegments(sql, kTimeMin, kTimeMax));
-      for (const Segment& segment : segments) DSG_RETURN_IF_ERROR(Take(segment, segment.poses));
+      for (const PastSegment& segment : segments) DSG_RETURN_IF_ERROR(Take(segment, segment.poses));
     }
     erased_.past.forgotten.ForgetTrack(agent_);
     for (const char* sql : {"DELETE FROM trajectory_history WHERE id BETWEEN ?1 AND ?2",
@@ -86,27 +74,23 @@ class TrackEraser {
   }
 
  private:
-  absl::StatusOr<std::vector<Segment>> ReadSegments(const char* sql, TimeNs from_ns, TimeNs to_ns) {
-    std::vector<Segment> segments;
+  absl::StatusOr<std::vector<PastSegment>> ReadSegments(const char* sql, TimeNs from_ns,
+                                                        TimeNs to_ns) {
+    std::vector<PastSegment> segments;
     Query query(db_, sql);
     query.Bind(FirstSegmentId(slot_), LastSegmentId(slot_), from_ns, to_ns);
     while (query.Next()) {
-      Segment segment{query.Int(0), query.Int(1), query.Int(7), query.Int(2), query.Int(3), {}, 0};
-      const std::string payload(query.Blob(6));
-      segment.payload_bytes = payload.size();
-      if (!DecodeRow(query, payload, &segment.poses)) {
-        return CorruptRow(db_.map_name(), "trajectory_history", absl::StrCat(segment.id));
-      }
-      segments.push_back(std::move(segment));
+      DSG_ASSIGN_OR_RETURN(SegmentRow row, SegmentRowOf(query, db_.map_name()));
+      segments.push_back({std::move(row), query.Int(7)});
     }
     DSG_RETURN_IF_ERROR(query.status());
     return segments;
   }
 
   // A pose came with the first mark that reaches it, but not before its segment.
-  absl::Status Take(const Segment& segment, const std::vector<StoredPose>& poses) {
+  absl::Status Take(const PastSegment& segment, const std::vector<StoredPose>& poses) {
     auto mark = std::lower_bound(marks_.begin(), marks_.end(), segment.rev_from,
-                                 [](const Mark& a, Revision b) { return a.revision < b; });
+                                 [](const TrackMark& a, Revision b) { return a.revision < b; });
     std::map<Revision, RowSums> sums;
     std::string scratch;
     for (const StoredPose& pose : poses) {
@@ -129,7 +113,7 @@ class TrackEraser {
     return absl::OkStatus();
   }
 
-  absl::Status Cut(const TrackSpan& span, Segment segment) {
+  absl::Status Cut(const TrackSpan& span, PastSegment segment) {
     std::vector<StoredPose> out;
     std::vector<StoredPose> rest;
     for (StoredPose& pose : segment.poses) {
@@ -145,7 +129,7 @@ class TrackEraser {
   }
 
   // With a hole in it a segment may not fit its size any more; then it becomes two.
-  absl::Status WriteRest(const Segment& segment, const std::vector<StoredPose>& rest) {
+  absl::Status WriteRest(const PastSegment& segment, const std::vector<StoredPose>& rest) {
     SegmentEncoder encoder(erased_.spec.codec);
     int64_t id = segment.id;
     for (const StoredPose& pose : rest) {
@@ -169,25 +153,15 @@ class TrackEraser {
     }
   }
 
-  absl::Status Insert(const Segment& segment, int64_t id, const SegmentEncoder& encoder) {
-    const std::string payload = encoder.Encode();
-    const TimeNs t0 = encoder.poses().front().time_ns;
-    const TimeNs t1 = encoder.poses().back().time_ns;
-    const auto count = static_cast<int64_t>(encoder.poses().size());
-    return Query(db_,
-                 "INSERT INTO trajectory_history"
-                 " (id, rev_from, rev_to, t0, t1, pose_count, checksum, payload)"
-                 " VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)")
-        .Bind(id, segment.rev_from, segment.rev_to, t0, t1, count,
-              RowChecksum({id, segment.rev_from, t0, t1, count}, payload), Query::BlobView{payload})
-        .Run();
+  absl::Status Insert(const PastSegment& segment, int64_t id, const SegmentEncoder& encoder) {
+    return InsertPastSegment(db_, id, segment.rev_from, segment.rev_to, encoder);
   }
 
   absl::Status RepairMarks() {
     if (gone_.empty()) return absl::OkStatus();
     int64_t fewer = 0;
     auto change = fewer_.begin();
-    for (const Mark& mark : marks_) {
+    for (const TrackMark& mark : marks_) {
       for (; change != fewer_.end() && change->first <= mark.revision; ++change) {
         fewer += change->second;
       }
@@ -196,11 +170,7 @@ class TrackEraser {
         DSG_ASSIGN_OR_RETURN(last_ns, LastTime(mark));
       }
       if (fewer == 0 && last_ns == mark.last_ns) continue;
-      DSG_RETURN_IF_ERROR(Query(db_,
-                                "UPDATE track_mark SET last_ns = ?3, pose_count = ?4"
-                                " WHERE slot = ?1 AND revision = ?2")
-                              .Bind(slot_, mark.revision, last_ns, mark.pose_count - fewer)
-                              .Run());
+      DSG_RETURN_IF_ERROR(WriteMark(db_, slot_, {mark.revision, last_ns, mark.pose_count - fewer}));
     }
     return absl::OkStatus();
   }
@@ -213,24 +183,16 @@ class TrackEraser {
   }
 
   // Of the last pose that is left of what the mark reached.
-  absl::StatusOr<TimeNs> LastTime(const Mark& mark) {
+  absl::StatusOr<TimeNs> LastTime(const TrackMark& mark) {
     TimeNs last_ns = kTimeMin;
-    for (const char* sql :
-         {"SELECT id, rev_from, t0, t1, pose_count, checksum, payload FROM trajectory_segment"
-          " WHERE id BETWEEN ?1 AND ?2 AND rev_from <= ?3 AND t0 <= ?4 ORDER BY id DESC LIMIT 1",
-          "SELECT id, rev_from, t0, t1, pose_count, checksum, payload FROM trajectory_history"
-          " WHERE id BETWEEN ?1 AND ?2 AND rev_from <= ?3 AND rev_to > ?3 AND t0 <= ?4"
-          " ORDER BY id DESC LIMIT 1"}) {
+    for (const char* sql : {kLastCurrentSegment, kLastPastSegment}) {
       Query query(db_, sql);
       query.Bind(FirstSegmentId(slot_), LastSegmentId(slot_), mark.revision, mark.last_ns);
       const bool found = query.Next();
       DSG_RETURN_IF_ERROR(query.status());
       if (!found) continue;
-      std::vector<StoredPose> poses;
-      if (!DecodeRow(query, std::string(query.Blob(6)), &poses)) {
-        return CorruptRow(db_.map_name(), "trajectory_segment", ToString(agent_));
-      }
-      for (const StoredPose& pose : poses) {
+      DSG_ASSIGN_OR_RETURN(const SegmentRow row, SegmentRowOf(query, db_.map_name()));
+      for (const StoredPose& pose : row.poses) {
         if (pose.time_ns <= mark.last_ns) last_ns = std::max(last_ns, pose.time_ns);
       }
     }
@@ -246,18 +208,64 @@ class TrackEraser {
   const int64_t slot_;
   ErasedRows& erased_;
   Database& db_;
-  std::vector<Mark> marks_;
+  std::vector<TrackMark> marks_;
   /// By time: poses that went, and the revisions that showed them.
   std::multimap<TimeNs, Stretch> gone_;
   /// By how much the numbers of poses shrink at each revision.
   std::map<Revision, int64_t> fewer_;
 };
 
-absl::StatusOr<int64_t> FindSlot(Database& db, NodeId agent) {
-  Query query(db, "SELECT slot FROM track WHERE agent = ?1");
-  const bool found = query.Bind(KeyOf(agent)).Next();
-  DSG_RETURN_IF_ERROR(query.status());
-  return found ? query.Int(0) : 0;
+// Values that begin and end with revisions, and the least or largest of those there are.
+class Lifetimes {
+ public:
+  void Add(TimeNs value, Revision from, Revision to) {
+    begins_.emplace(from, value);
+    if (to != kRevisionMax) ends_.emplace(to, value);
+  }
+
+  /// Of revisions that only grow from call to call.
+  const std::multiset<TimeNs>& At(Revision revision) {
+    for (; next_begin_ != begins_.end() && next_begin_->first <= revision; ++next_begin_) {
+      now_.insert(next_begin_->second);
+    }
+    for (; next_end_ != ends_.end() && next_end_->first <= revision; ++next_end_) {
+      now_.erase(now_.find(next_end_->second));
+    }
+    return now_;
+  }
+
+  void Start() {
+    next_begin_ = begins_.begin();
+    next_end_ = ends_.begin();
+  }
+
+ private:
+  std::multimap<Revision, TimeNs> begins_;
+  std::multimap<Revision, TimeNs> ends_;
+  std::multimap<Revision, TimeNs>::const_iterator next_begin_;
+  std::multimap<Revision, TimeNs>::const_iterator next_end_;
+  std::multiset<TimeNs> now_;
+};
+
+// A segment is seen from the revision on that wrote it, with its first pose.
+absl::Status ReadPoseBegins(Database& db, Lifetimes* begins) {
+  Query query(db,
+              "SELECT rev_from, 9223372036854775807, t0 FROM trajectory_segment"
+              " UNION ALL SELECT rev_from, rev_to, t0 FROM trajectory_history");
+  while (query.Next()) begins->Add(query.Int(2), query.Int(0), query.Int(1));
+  return query.status();
+}
+
+absl::Status ReadPoseEnds(Database& db, Lifetimes* ends) {
+  Query query(db,
+              "SELECT revision, last_ns, pose_count, lead(revision) OVER"
+              " (PARTITION BY slot ORDER BY revision) FROM track_mark");
+  while (query.Next()) {
+    const TrackMark mark = MarkFromRow(query);
+    if (mark.pose_count == 0) continue;
+    ends->Add(mark.last_ns, mark.revision, query.IsNull(3) ? kRevisionMax : query.Int(3));
+  }
+  return query.status();
 }
 
 }  // namespace
@@ -276,6 +284,35 @@ absl::Status EraseTrack(NodeId agent, ErasedRows* erased) {
   TrackEraser eraser(agent, slot, erased);
   DSG_RETURN_IF_ERROR(eraser.Load());
   return eraser.EraseAll();
+}
+
+absl::Status RepairPoseTimes(Database& db) {
+  Lifetimes begins;
+  Lifetimes ends;
+  DSG_RETURN_IF_ERROR(ReadPoseBegins(db, &begins));
+  DSG_RETURN_IF_ERROR(ReadPoseEnds(db, &ends));
+  begins.Start();
+  ends.Start();
+  std::vector<RevisionRecord> wrong;
+  {
+    Query query(db, "SELECT " DSG_REVISION_COLUMNS " FROM revision ORDER BY revision");
+    while (query.Next()) {
+      DSG_ASSIGN_OR_RETURN(RevisionRecord head, HeadFromRow(query, db.map_name()));
+      const auto& first = begins.At(head.info.revision);
+      const auto& last = ends.At(head.info.revision);
+      std::optional<TimeNs> first_ns;
+      std::optional<TimeNs> last_ns;
+      if (!first.empty()) first_ns = *first.begin();
+      if (!last.empty()) last_ns = *last.rbegin();
+      if (head.first_pose_ns == first_ns && head.last_pose_ns == last_ns) continue;
+      head.first_pose_ns = first_ns;
+      head.last_pose_ns = last_ns;
+      wrong.push_back(std::move(head));
+    }
+    DSG_RETURN_IF_ERROR(query.status());
+  }
+  for (const RevisionRecord& head : wrong) DSG_RETURN_IF_ERROR(UpdateRevision(db, head));
+  return absl::OkStatus();
 }
 
 }  // namespace dsg::sqlite

@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rows as statements give them, their checksums proven: the one place that knows the columns.
+// Rows of layers, labels, relations, nodes and edges: the one place that knows their columns.
 // Payloads are views of the statement's row, which the next step ends.
 #pragma once
 
+#include <map>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "absl/status/statusor.h"
-#include "schema/model/edge.h"
-#include "schema/model/node.h"
+#include "schema/model/graph_delta.h"
 #include "schema/store/content_rows.h"
-#include "schema/store/sqlite/database.h"
+#include "schema/store/sqlite/commit.h"
 
 namespace dsg::sqlite {
 
@@ -23,14 +25,37 @@ absl::StatusOr<EdgeRow> EdgeRowOf(const Query& query, const std::string& map);
 absl::StatusOr<Edge> EdgeFromRow(const Query& query, std::string_view relation,
                                  const std::string& map);
 
-/// Columns: agent, enter_ns, exit_ns, place, room, rev_from, checksum.
-absl::StatusOr<StayRow> StayRowOf(const Query& query, const std::string& map);
+/// Id of a relation's name, 0 if the map has never seen it.
+absl::StatusOr<int64_t> FindRelation(Database& db, const std::string& name);
 
-/// Columns: x, y, z, rev_from, payload, checksum.
-absl::StatusOr<MeshRow> MeshRowOf(const Query& query, const std::string& map);
+/// Writes layers, labels, nodes, edges.
+class GraphRowsWriter {
+ public:
+  explicit GraphRowsWriter(CommitContext* commit) : commit_(*commit) {}
+  absl::Status WriteLayers(const std::vector<Layer>& layers);
+  absl::Status WriteLabels(const std::vector<SemanticLabel>& labels);
+  absl::Status WriteNodes(const std::vector<Node>& nodes);
+  absl::Status EndEdges(const std::vector<EdgeKey>& keys);
+  absl::Status Retire(const Retirement& item);
+  absl::Status WriteEdges(const std::vector<Edge>& edges);
 
-/// Columns: agent, rev_from, t0, t1, payload, checksum. Row: FactorRow or ShapeRow.
-template <typename Row>
-absl::StatusOr<Row> BatchRowOf(const Query& query, const std::string& map);
+ private:
+  absl::Status WriteLayer(const Layer& layer);
+  absl::Status WriteLabel(const SemanticLabel& label);
+  absl::Status WriteNode(const Node& node);
+  absl::Status InsertNode(const Node& node, const std::string& payload);
+  /// Moves the current row to the history. Returns false if there is none.
+  absl::StatusOr<bool> EndNode(int64_t key);
+  absl::Status EndEdgesOf(int64_t key);
+  absl::Status WriteEdge(const Edge& edge);
+  /// False, and nothing done, if there is such an edge.
+  absl::StatusOr<bool> InsertEdge(const Edge& edge, int64_t relation, const std::string& payload);
+  absl::StatusOr<bool> EndEdge(int64_t source, int64_t relation, int64_t target);
+  absl::StatusOr<int64_t> FindOrAddRelation(const std::string& name);
+
+  CommitContext& commit_;
+  /// Ids of the relations that this commit has met.
+  std::map<std::string, int64_t> relations_;
+};
 
 }  // namespace dsg::sqlite

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "schema/store/sqlite/map_reader.h"
 
+#include <algorithm>
+#include <unordered_map>
+
 #include "absl/strings/str_cat.h"
 #include "schema/store/sqlite/copy.h"
-#include "schema/store/sqlite/pending_erasure.h"
-#include "schema/store/sqlite/sessions.h"
-#include "schema/store/sqlite/tag_rows.h"
+#include "schema/store/sqlite/erasure.h"
+#include "schema/store/sqlite/revision_rows.h"
+#include "schema/store/sqlite/rows.h"
+#include "schema/store/sqlite/verify.h"
 
 namespace dsg::sqlite {
 namespace {
@@ -13,12 +17,57 @@ namespace {
 // Idle connections kept open; a burst above opens more and closes them after.
 constexpr size_t kPoolMax = 16;
 
-absl::StatusOr<RevisionRecord> LoadRevision(Database& db, Revision revision) {
-  Query query(db, "SELECT " DSG_REVISION_COLUMNS " FROM revision WHERE revision = ?1");
-  const bool found = query.Bind(revision).Next();
+// Of compacted revisions the next one that is kept has the list.
+absl::Status ReadTouchedLists(Database& db, Revision after, Revision until, const StopCheck& stop,
+                              TouchedKeys* keys) {
+  Query query(db,
+              "SELECT revision.revision, payload, checksum FROM revision LEFT JOIN touched"
+              " USING (revision) WHERE revision.revision > ?1 AND revision.revision <= ?2");
+  query.Bind(after, until);
+  while (query.Next()) {
+    DSG_RETURN_IF_ERROR(AskStop(stop));
+    DSG_RETURN_IF_ERROR(TouchedFromRow(query, db.map_name(), keys));
+  }
+  return query.status();
+}
+
+// Tracks of which a segment that the reader at `after` could see has ended.
+absl::StatusOr<std::vector<NodeId>> ReadCorrected(Database& db, Revision after, Revision until) {
+  Query query(db,
+              "SELECT DISTINCT agent FROM trajectory_history JOIN track ON slot = id >> 42"
+              " WHERE rev_to > ?1 AND rev_to <= ?2 AND +rev_from <= ?1");
+  query.Bind(after, until);
+  std::vector<NodeId> agents;
+  while (query.Next()) agents.push_back(IdOf(query.Int(0)));
   DSG_RETURN_IF_ERROR(query.status());
-  if (!found) return CorruptRow(db.map_name(), "revision", absl::StrCat(revision));
-  return HeadFromRow(query, db.map_name());
+  std::sort(agents.begin(), agents.end());
+  return agents;
+}
+
+// Edges go by the names of their relations, in whose order the answer stands.
+absl::StatusOr<std::vector<EdgeKey>> NameEdges(Database& db, std::vector<EdgeRowKey> edges) {
+  std::vector<std::string> names;
+  std::unordered_map<int64_t, int64_t> rank_of;
+  Query query(db, "SELECT id, name FROM relation ORDER BY name");
+  while (query.Next()) {
+    rank_of[query.Int(0)] = std::ssize(names);
+    names.emplace_back(query.Text(1));
+  }
+  DSG_RETURN_IF_ERROR(query.status());
+  for (EdgeRowKey& edge : edges) {
+    const auto rank = rank_of.find(edge.relation);
+    if (rank == rank_of.end()) {
+      return CorruptRow(db.map_name(), "relation", absl::StrCat(edge.relation));
+    }
+    edge.relation = rank->second;
+  }
+  std::sort(edges.begin(), edges.end());
+  std::vector<EdgeKey> named;
+  named.reserve(edges.size());
+  for (const EdgeRowKey& edge : edges) {
+    named.push_back({edge.source, names[static_cast<size_t>(edge.relation)], edge.target});
+  }
+  return named;
 }
 
 }  // namespace
@@ -143,16 +192,29 @@ absl::StatusOr<std::vector<Tag>> SqliteMapReader::Tags() {
 absl::StatusOr<std::vector<RevisionInfo>> SqliteMapReader::ListRevisions(Revision before,
                                                                          int limit) {
   DSG_ASSIGN_OR_RETURN(Lease lease, LeaseConnection());
-  Query query(*lease, "SELECT " DSG_REVISION_COLUMNS
-                      " FROM revision WHERE revision < ?1 ORDER BY revision DESC LIMIT ?2");
-  query.Bind(before > 0 ? before : kRevisionMax, limit);
-  std::vector<RevisionInfo> revisions;
-  while (query.Next()) {
-    DSG_ASSIGN_OR_RETURN(RevisionRecord head, HeadFromRow(query, spec_.name));
-    revisions.push_back(std::move(head.info));
+  return ReadRevisions(*lease, before > 0 ? before : kRevisionMax, limit);
+}
+
+absl::StatusOr<Touched> SqliteMapReader::TouchedBetween(Revision after, Revision until,
+                                                        const StopCheck& stop) {
+  DSG_RETURN_IF_ERROR(At(after).status());
+  DSG_RETURN_IF_ERROR(At(until).status());
+  Touched touched;
+  if (after >= until) return touched;
+  DSG_ASSIGN_OR_RETURN(Lease lease, LeaseAt(until));
+  DSG_RETURN_IF_ERROR(CheckStillReadable(*lease, after, generation_));
+  TouchedKeys keys;
+  DSG_RETURN_IF_ERROR(ReadTouchedLists(*lease, after, until, stop, &keys));
+  keys.Normalize();
+  touched.nodes = std::move(keys.nodes);
+  DSG_ASSIGN_OR_RETURN(touched.edges, NameEdges(*lease, std::move(keys.edges)));
+  touched.tracks = std::move(keys.tracks);
+  if (!touched.tracks.empty()) {
+    DSG_ASSIGN_OR_RETURN(touched.corrected_tracks, ReadCorrected(*lease, after, until));
   }
-  DSG_RETURN_IF_ERROR(query.status());
-  return revisions;
+  touched.mesh_blocks = std::move(keys.mesh_blocks);
+  touched.layers_or_labels = keys.layers_or_labels;
+  return touched;
 }
 
 absl::StatusOr<SessionState> SqliteMapReader::GetSession(const std::string& session_id) {
@@ -174,32 +236,29 @@ absl::Status SqliteMapReader::CopyTo(const std::string& path, const StopCheck& s
   return CopyMap(*db, path, stop, progress);
 }
 
-absl::StatusOr<std::shared_ptr<const Track>> SqliteMapReader::GetTrack(NodeId agent,
-                                                                       Revision revision) {
-  const TrackKey key{agent, revision};
-  if (auto cached = tracks_.Find(key)) return cached;
-  DSG_ASSIGN_OR_RETURN(Lease lease, LeaseAt(revision));
-  // What is cached for the revision before is still true if the agent has not changed since.
-  if (auto before = tracks_.Find({agent, revision - 1})) {
-    DSG_ASSIGN_OR_RETURN(const Revision changed, LastChangeOfTrack(*lease, agent));
-    if (changed < revision) {
-      tracks_.Insert(key, before, 64);
-      return before;
+absl::StatusOr<TrackPtr> SqliteMapReader::GetTrack(NodeId agent, Revision revision) {
+  return tracks_.Get({agent, revision}, {}, [&]() -> absl::StatusOr<Costed<TrackPtr>> {
+    DSG_ASSIGN_OR_RETURN(Lease lease, LeaseAt(revision));
+    // What is cached for the revision before is still true if the agent has not changed since.
+    if (const auto before = tracks_.Find({agent, revision - 1})) {
+      DSG_ASSIGN_OR_RETURN(const Revision changed, LastChangeOfTrack(*lease, agent));
+      if (changed < revision) return Costed<TrackPtr>{*before, 64};
     }
-  }
-  DSG_ASSIGN_OR_RETURN(auto track, LoadTrack(*lease, spec_, agent, revision));
-  tracks_.Insert(key, track, track->memory_bytes());
-  return track;
+    DSG_ASSIGN_OR_RETURN(TrackPtr track, LoadTrack(*lease, spec_, agent, revision));
+    const size_t bytes = track->memory_bytes();
+    return Costed<TrackPtr>{std::move(track), bytes};
+  });
 }
 
-absl::StatusOr<std::shared_ptr<const SegmentReader>> SqliteMapReader::GetSegment(
-    const SegmentRef& segment, Revision revision) {
+absl::StatusOr<SegmentPtr> SqliteMapReader::GetSegment(const SegmentRef& segment,
+                                                       Revision revision) {
   const SegmentKey key{segment.id, segment.rev_from, segment.pose_count};
-  if (auto cached = segments_.Find(key)) return cached;
-  DSG_ASSIGN_OR_RETURN(Lease lease, LeaseAt(revision));
-  DSG_ASSIGN_OR_RETURN(auto reader, LoadSegment(*lease, segment));
-  segments_.Insert(key, reader, reader->memory_bytes());
-  return reader;
+  return segments_.Get(key, {}, [&]() -> absl::StatusOr<Costed<SegmentPtr>> {
+    DSG_ASSIGN_OR_RETURN(Lease lease, LeaseAt(revision));
+    DSG_ASSIGN_OR_RETURN(SegmentPtr reader, LoadSegment(*lease, segment));
+    const size_t bytes = reader->memory_bytes();
+    return Costed<SegmentPtr>{std::move(reader), bytes};
+  });
 }
 
 }  // namespace dsg::sqlite

@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "schema/store/graph_store.h"
+#include "schema/store/readable.h"
+#include "schema/store/revision_record.h"
+#include "schema/store/sqlite/batch_rows.h"
 #include "schema/store/sqlite/map_file.h"
-#include "schema/store/sqlite/readable_rows.h"
-#include "schema/store/sqlite/shape_reader.h"
 #include "schema/store/sqlite/track_cache.h"
-#include "schema/store/sqlite/writer.h"
 
 namespace dsg::sqlite {
 
@@ -63,9 +63,8 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
   /// Errors: OUT_OF_RANGE/REVISION_COMPACTED; ABORTED/MAP_REPLACED.
   absl::StatusOr<Lease> LeaseAt(Revision revision);
 
-  absl::StatusOr<std::shared_ptr<const Track>> GetTrack(NodeId agent, Revision revision);
-  absl::StatusOr<std::shared_ptr<const SegmentReader>> GetSegment(const SegmentRef& segment,
-                                                                  Revision revision);
+  absl::StatusOr<TrackPtr> GetTrack(NodeId agent, Revision revision);
+  absl::StatusOr<SegmentPtr> GetSegment(const SegmentRef& segment, Revision revision);
   AncestorCache& ancestors() { return ancestors_; }
   ShapeCache& shapes() { return shapes_; }
   /// Ids of humans and robots, by revision.
@@ -114,9 +113,5 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
 /// Makes the snapshot of a revision that exists.
 std::shared_ptr<const Snapshot> MakeSnapshot(std::shared_ptr<SqliteMapReader> reader,
                                              std::shared_ptr<const RevisionRecord> head);
-
-/// Reads the whole map; see MapReader::Verify.
-absl::StatusOr<VerifyReport> VerifyMap(Database& db, const MapSpec& spec, const StopCheck& stop,
-                                       const std::function<void(double)>& progress);
 
 }  // namespace dsg::sqlite

@@ -51,7 +51,7 @@ int64_t ToTenthsFloor(TimeNs time_ns, const MapSpec& spec);
 int64_t ToTenthsCeil(TimeNs time_ns, const MapSpec& spec);
 
 /// Ids of trajectory segments: the track's slot above the milliseconds of the first pose, which
-/// reach 69 years before and after the epoch; no pose lies further from it (time_range.h).
+/// reach 69 years before and after the epoch; no pose lies further from it (commit_protocol.h).
 inline constexpr int kSegmentTimeBits = 42;
 int64_t SegmentId(int64_t slot, TimeNs t0_ns, const MapSpec& spec);
 inline int64_t SlotOfSegment(int64_t id) { return id >> kSegmentTimeBits; }

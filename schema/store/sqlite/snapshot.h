@@ -83,7 +83,7 @@ class SqliteSnapshot : public Snapshot {
   absl::StatusOr<std::vector<Node>> ReadBatch(const NodeFilter& filter, NodeId after) const;
   absl::StatusOr<std::vector<Edge>> EdgesAt(NodeId end, bool outgoing) const;
   absl::StatusOr<NodeId> FindParent(NodeId id) const;
-  absl::StatusOr<std::shared_ptr<const std::vector<NodeId>>> AgentIds(const StopCheck& stop) const;
+  absl::StatusOr<NodeIdsPtr> AgentIds(const StopCheck& stop) const;
   /// Segments whose boxes in space and time touch, by agent; ascending ids.
   absl::StatusOr<std::map<NodeId, std::vector<int64_t>>> SegmentsTouching(const Box3d& box_map,
                                                                           TimeNs from_ns,

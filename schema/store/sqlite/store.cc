@@ -10,6 +10,7 @@
 #include "schema/store/sqlite/copy.h"
 #include "schema/store/sqlite/map_reader.h"
 #include "schema/store/sqlite/upgrade.h"
+#include "schema/store/sqlite/writer.h"
 
 namespace dsg::sqlite {
 namespace {

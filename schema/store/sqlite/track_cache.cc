@@ -27,25 +27,10 @@ absl::Status LoadInfo(Database& db, const MapSpec& spec, Revision revision, Node
   return absl::OkStatus();
 }
 
-absl::StatusOr<int64_t> FindSlot(Database& db, NodeId agent) {
-  Query query(db, "SELECT slot FROM track WHERE agent = ?1");
-  const bool found = query.Bind(KeyOf(agent)).Next();
-  DSG_RETURN_IF_ERROR(query.status());
-  return found ? query.Int(0) : 0;
-}
-
 absl::Status LoadSegments(Database& db, Revision revision, int64_t slot, Track* track) {
-  TimeNs end_ns = kTimeMin;
-  {
-    Query mark(db,
-               "SELECT last_ns, pose_count FROM track_mark WHERE slot = ?1 AND revision <= ?2"
-               " ORDER BY revision DESC LIMIT 1");
-    if (mark.Bind(slot, revision).Next()) {
-      end_ns = mark.Int(0);
-      track->info.pose_count = mark.Int(1);
-    }
-    DSG_RETURN_IF_ERROR(mark.status());
-  }
+  DSG_ASSIGN_OR_RETURN(const auto mark, FindMark(db, slot, revision));
+  if (mark.has_value()) track->info.pose_count = mark->pose_count;
+  const TimeNs end_ns = mark.has_value() ? mark->last_ns : kTimeMin;
   Query query(db,
               "SELECT id, rev_from, t0, t1, pose_count FROM trajectory_segment"
               " WHERE id BETWEEN ?1 AND ?2 AND rev_from <= ?3"
@@ -107,11 +92,11 @@ int Track::FindSegment(TimeNs t_ns) const {
   return static_cast<int>(next - segments.begin()) - 1;
 }
 
-absl::StatusOr<std::shared_ptr<const Track>> LoadTrack(Database& db, const MapSpec& spec,
-                                                       NodeId agent, Revision revision) {
+absl::StatusOr<TrackPtr> LoadTrack(Database& db, const MapSpec& spec, NodeId agent,
+                                   Revision revision) {
   auto track = std::make_shared<Track>();
   DSG_RETURN_IF_ERROR(LoadAll(db, spec, agent, revision, track.get()));
-  return std::shared_ptr<const Track>(std::move(track));
+  return TrackPtr(std::move(track));
 }
 
 absl::StatusOr<Revision> LastChangeOfTrack(Database& db, NodeId agent) {
@@ -128,26 +113,18 @@ absl::StatusOr<Revision> LastChangeOfTrack(Database& db, NodeId agent) {
   return found ? query.Int(0) : kRevisionMax;
 }
 
-absl::StatusOr<std::shared_ptr<const SegmentReader>> LoadSegment(Database& db,
-                                                                 const SegmentRef& segment) {
-  Query query(db,
-              "SELECT t0, t1, pose_count, checksum, payload FROM trajectory_segment"
-              " WHERE id = ?1 AND rev_from = ?2"
-              " UNION ALL SELECT t0, t1, pose_count, checksum, payload FROM trajectory_history"
-              " WHERE id = ?1 AND rev_from = ?2");
+absl::StatusOr<SegmentPtr> LoadSegment(Database& db, const SegmentRef& segment) {
+  Query query(db, "SELECT " DSG_SEGMENT_COLUMNS
+                  " FROM trajectory_segment WHERE id = ?1 AND rev_from = ?2"
+                  " UNION ALL SELECT " DSG_SEGMENT_COLUMNS
+                  " FROM trajectory_history WHERE id = ?1 AND rev_from = ?2");
   const bool found = query.Bind(segment.id, segment.rev_from).Next();
   DSG_RETURN_IF_ERROR(query.status());
-  std::shared_ptr<const SegmentReader> reader;
   if (found) {
-    std::string payload(query.Blob(4));
-    const auto checksum = RowChecksum(
-        {segment.id, segment.rev_from, query.Int(0), query.Int(1), query.Int(2)}, payload);
-    if (checksum == query.Int(3)) reader = SegmentReader::Parse(std::move(payload));
+    DSG_ASSIGN_OR_RETURN(SegmentPtr reader, SegmentReaderOf(query, db.map_name()));
+    if (reader->count() >= segment.pose_count) return reader;
   }
-  if (reader == nullptr || reader->count() < segment.pose_count) {
-    return CorruptRow(db.map_name(), "trajectory_segment", absl::StrCat(segment.id));
-  }
-  return reader;
+  return CorruptRow(db.map_name(), "trajectory_segment", absl::StrCat(segment.id));
 }
 
 }  // namespace dsg::sqlite

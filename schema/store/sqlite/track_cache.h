@@ -2,14 +2,12 @@
 // Tracks as of a revision: which segments they are made of, and the stays along them.
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <vector>
 
-#include "schema/codec/trajectory_codec.h"
+#include "schema/base/cache.h"
 #include "schema/store/snapshot.h"
-#include "schema/store/sqlite/database.h"
-#include "schema/store/sqlite/lru_cache.h"
+#include "schema/store/sqlite/track_rows.h"
 
 namespace dsg::sqlite {
 
@@ -42,17 +40,19 @@ struct Track {
   }
 };
 
+using TrackPtr = std::shared_ptr<const Track>;
+using NodeIdsPtr = std::shared_ptr<const std::vector<NodeId>>;
+
 /// Reads a track as of `revision` in one read transaction.
 /// Errors: NOT_FOUND/AGENT_UNKNOWN.
-absl::StatusOr<std::shared_ptr<const Track>> LoadTrack(Database& db, const MapSpec& spec,
-                                                       NodeId agent, Revision revision);
+absl::StatusOr<TrackPtr> LoadTrack(Database& db, const MapSpec& spec, NodeId agent,
+                                   Revision revision);
 
 /// The newest revision in which the agent's node, poses or stays changed, at the head.
 absl::StatusOr<Revision> LastChangeOfTrack(Database& db, NodeId agent);
 
 /// Reads and checks one segment, whether it is current or was corrected since.
-absl::StatusOr<std::shared_ptr<const SegmentReader>> LoadSegment(Database& db,
-                                                                 const SegmentRef& segment);
+absl::StatusOr<SegmentPtr> LoadSegment(Database& db, const SegmentRef& segment);
 
 struct TrackKey {
   NodeId agent;
@@ -78,10 +78,10 @@ struct PairHash {
   }
 };
 
-using TrackCache = LruCache<TrackKey, Track, PairHash>;
-using SegmentCache = LruCache<SegmentKey, SegmentReader, PairHash>;
-using AncestorCache = LruCache<TrackKey, std::vector<NodeId>, PairHash>;
+using TrackCache = Cache<TrackKey, TrackPtr, PairHash>;
+using SegmentCache = Cache<SegmentKey, SegmentPtr, PairHash>;
+using AncestorCache = Cache<TrackKey, NodeIdsPtr, PairHash>;
 /// Humans and robots at a revision; ascending.
-using AgentCache = LruCache<Revision, std::vector<NodeId>, std::hash<Revision>>;
+using AgentCache = Cache<Revision, NodeIdsPtr>;
 
 }  // namespace dsg::sqlite

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tracks that grow at their ends. Corrections: track_correction.cc.
+#include "schema/store/sqlite/track_writer.h"
+
 #include <algorithm>
+#include <iterator>
+#include <optional>
 
 #include "absl/strings/str_cat.h"
-#include "schema/store/sqlite/track_writer_internal.h"
+#include "schema/store/sqlite/rows.h"
+#include "schema/store/sqlite/track_rows.h"
 
 namespace dsg::sqlite {
 namespace {
@@ -11,21 +15,41 @@ namespace {
 // Tracks kept open between commits; beyond, all are reloaded when needed.
 constexpr size_t kOpenTracksMax = 2000;
 
+void Grow(const StoredPose& pose, TrajectoryCodec codec, Box3d* box) {
+  box->extend(PositionOf(pose, codec));
+}
+
+// First and last pose of all tracks, by one seek to each end of each.
+absl::Status FindTrackEnds(CommitContext* commit) {
+  Query span(commit->db,
+             "SELECT min((SELECT t0 FROM trajectory_segment WHERE id BETWEEN slot << 42 AND"
+             "  ((slot + 1) << 42) - 1 ORDER BY id LIMIT 1)),"
+             " max((SELECT t1 FROM trajectory_segment WHERE id BETWEEN slot << 42 AND"
+             "  ((slot + 1) << 42) - 1 ORDER BY id DESC LIMIT 1)) FROM track");
+  const bool any = span.Next() && !span.IsNull(0);
+  DSG_RETURN_IF_ERROR(span.status());
+  commit->head.first_pose_ns = any ? std::optional<TimeNs>(span.Int(0)) : std::nullopt;
+  commit->head.last_pose_ns = any ? std::optional<TimeNs>(span.Int(1)) : std::nullopt;
+  return absl::OkStatus();
+}
+
 }  // namespace
 
-absl::StatusOr<SegmentRow> DecodeSegmentRow(Query& query, const MapSpec& spec) {
-  SegmentRow row;
-  row.id = query.Int(0);
-  row.rev_from = query.Int(1);
-  const std::string payload(query.Blob(6));
-  const auto checksum =
-      RowChecksum({row.id, row.rev_from, query.Int(2), query.Int(3), query.Int(4)}, payload);
-  const auto reader = checksum == query.Int(5) ? SegmentReader::Parse(payload) : nullptr;
-  if (reader == nullptr || !reader->DecodeAll(&row.poses)) {
-    return CorruptRow(spec.name, "trajectory_segment", absl::StrCat(row.id));
-  }
-  return row;
-}
+/// The open end of a track.
+struct TrackWriter::Tail {
+  NodeId agent;
+  int64_t slot = 0;
+  int64_t pose_count = 0;
+  /// The last pose of the track, if there is one.
+  std::optional<StoredPose> last;
+  SegmentEncoder encoder{TrajectoryCodec::kQuantized};
+  /// Row of the segment in `encoder`; 0 until it has one.
+  int64_t segment_id = 0;
+  bool segment_stored = false;
+  Revision segment_rev_from = 0;
+  int64_t previous_segment_id = 0;
+  SegmentBox box;
+};
 
 TrackWriter::TrackWriter() = default;
 TrackWriter::~TrackWriter() = default;
@@ -40,60 +64,33 @@ absl::StatusOr<TrackWriter::Tail*> TrackWriter::LoadTail(NodeId agent, CommitCon
   Tail& tail = *made;
   tail.agent = agent;
   tail.encoder = SegmentEncoder(commit->spec.codec);
-  bool known = false;
-  {
-    Query query(commit->db, "SELECT slot FROM track WHERE agent = ?1");
-    known = query.Bind(KeyOf(agent)).Next();
-    DSG_RETURN_IF_ERROR(query.status());
-    if (known) tail.slot = query.Int(0);
-  }
-  if (known) {
-    Query query(commit->db,
-                "SELECT pose_count FROM track_mark WHERE slot = ?1 ORDER BY revision DESC LIMIT 1");
-    if (query.Bind(tail.slot).Next()) tail.pose_count = query.Int(0);
-    DSG_RETURN_IF_ERROR(query.status());
-    DSG_RETURN_IF_ERROR(LoadOpenSegment(&tail, commit));
+  DSG_ASSIGN_OR_RETURN(tail.slot, FindSlot(commit->db, agent));
+  if (tail.slot == 0) {
+    DSG_ASSIGN_OR_RETURN(tail.slot, AddSlot(commit->db, agent));
   } else {
-    DSG_ASSIGN_OR_RETURN(const int64_t last_slot,
-                         commit->db.QueryInt("SELECT coalesce(max(slot), 0) FROM track"));
-    tail.slot = last_slot + 1;
-    if (tail.slot >= int64_t{1} << (63 - kSegmentTimeBits)) {
-      return MakeError(Reason::kLimitExceeded, "a map holds at most two million tracks",
-                       {{"map", commit->spec.name}});
-    }
-    DSG_RETURN_IF_ERROR(Query(commit->db, "INSERT INTO track (slot, agent) VALUES (?1, ?2)")
-                            .Bind(tail.slot, KeyOf(agent))
-                            .Run());
+    DSG_ASSIGN_OR_RETURN(const auto mark, FindMark(commit->db, tail.slot, kRevisionMax));
+    if (mark.has_value()) tail.pose_count = mark->pose_count;
+    DSG_RETURN_IF_ERROR(LoadOpenSegment(&tail, commit));
   }
   return (tails_[agent] = std::move(made)).get();
 }
 
 absl::Status TrackWriter::LoadOpenSegment(Tail* tail, CommitContext* commit) {
-  Query query(commit->db, kSelectLast);
-  const bool found = query.Bind(FirstSegmentId(tail->slot), LastSegmentId(tail->slot)).Next();
-  DSG_RETURN_IF_ERROR(query.status());
-  if (!found) return absl::OkStatus();
-  DSG_ASSIGN_OR_RETURN(const SegmentRow row, DecodeSegmentRow(query, commit->spec));
-  tail->segment_id = row.id;
+  DSG_ASSIGN_OR_RETURN(const auto row, FindLastSegment(commit->db, FirstSegmentId(tail->slot),
+                                                       LastSegmentId(tail->slot)));
+  if (!row.has_value()) return absl::OkStatus();
+  tail->segment_id = row->id;
   tail->segment_stored = true;
-  tail->segment_rev_from = row.rev_from;
-  tail->box_t0 = row.poses.front().time_ns;
-  tail->last = row.poses.back();
-  for (const StoredPose& pose : row.poses) {
+  tail->segment_rev_from = row->rev_from;
+  tail->last = row->poses.back();
+  for (const StoredPose& pose : row->poses) {
     // What fitted once fits again: the encoder is deterministic.
     if (!tail->encoder.Add(pose)) {
-      return CorruptRow(commit->spec.name, "trajectory_segment", absl::StrCat(row.id));
+      return CorruptRow(commit->spec.name, "trajectory_segment", absl::StrCat(row->id));
     }
   }
-  Query box(commit->db, "SELECT x0, x1, y0, y1, z0, z1, t0 FROM segment_box WHERE id = ?1");
-  if (!box.Bind(row.id).Next()) {
-    DSG_RETURN_IF_ERROR(box.status());
-    return CorruptRow(commit->spec.name, "segment_box", absl::StrCat(row.id));
-  }
-  const auto metres = [&](int column) { return static_cast<double>(box.Int(column)) / 1000.0; };
-  tail->box.extend(Eigen::Vector3d(metres(0), metres(2), metres(4)));
-  tail->box.extend(Eigen::Vector3d(metres(1), metres(3), metres(5)));
-  tail->box_t0 = std::min(tail->box_t0, commit->spec.epoch_ns + box.Int(6) * (kNsPerSecond / 10));
+  DSG_ASSIGN_OR_RETURN(tail->box, ReadSegmentBox(commit->db, commit->spec, row->id));
+  tail->box.t0 = std::min(tail->box.t0, row->poses.front().time_ns);
   return absl::OkStatus();
 }
 
@@ -110,63 +107,33 @@ absl::Status TrackWriter::AppendPose(const StoredPose& pose, Tail* tail, CommitC
         std::max(SegmentId(tail->slot, pose.time_ns, commit->spec), tail->previous_segment_id + 1);
     tail->segment_stored = false;
     tail->segment_rev_from = commit->revision();
-    tail->box.setEmpty();
-    tail->box_t0 = pose.time_ns;
+    tail->box.box_map.setEmpty();
+    tail->box.t0 = pose.time_ns;
     // Also across what is a gap here: an agent may have a longer limit of its own.
     if (tail->last.has_value()) {
-      Grow(*tail->last, commit->spec.codec, &tail->box);
-      tail->box_t0 = tail->last->time_ns;
+      Grow(*tail->last, commit->spec.codec, &tail->box.box_map);
+      tail->box.t0 = tail->last->time_ns;
     }
   }
-  Grow(pose, commit->spec.codec, &tail->box);
+  Grow(pose, commit->spec.codec, &tail->box.box_map);
   tail->last = pose;
   ++tail->pose_count;
   return absl::OkStatus();
 }
 
 absl::Status TrackWriter::WriteSegment(Tail* tail, CommitContext* commit) {
-  const std::string payload = tail->encoder.Encode();
-  const TimeNs t0 = tail->encoder.poses().front().time_ns;
-  const TimeNs t1 = tail->encoder.poses().back().time_ns;
-  const auto count = static_cast<int64_t>(tail->encoder.poses().size());
-  const int64_t checksum =
-      RowChecksum({tail->segment_id, tail->segment_rev_from, t0, t1, count}, payload);
-  const int64_t from_tenths = ToTenthsFloor(tail->box_t0, commit->spec);
-  const int64_t to_tenths = ToTenthsCeil(t1, commit->spec);
-  if (tail->segment_stored) {
-    DSG_RETURN_IF_ERROR(Query(commit->db,
-                              "UPDATE trajectory_segment SET t1 = ?2, pose_count = ?3,"
-                              " checksum = ?4, payload = ?5 WHERE id = ?1")
-                            .Bind(tail->segment_id, t1, count, checksum, Query::BlobView{payload})
-                            .Run());
-  } else {
-    DSG_RETURN_IF_ERROR(Query(commit->db,
-                              "INSERT INTO trajectory_segment"
-                              " (id, rev_from, t0, t1, pose_count, checksum, payload)"
-                              " VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)")
-                            .Bind(tail->segment_id, tail->segment_rev_from, t0, t1, count, checksum,
-                                  Query::BlobView{payload})
-                            .Run());
-  }
+  const auto write = tail->segment_stored ? UpdateSegment : InsertSegment;
+  DSG_RETURN_IF_ERROR(write(commit->db, tail->segment_id, tail->segment_rev_from, tail->encoder));
   tail->segment_stored = true;
-  const IntBox box = ToMillimetres(tail->box);
-  return Query(commit->db,
-               "INSERT OR REPLACE INTO segment_box"
-               " VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)")
-      .Bind(tail->segment_id, box.x0, box.x1, box.y0, box.y1, box.z0, box.z1, from_tenths,
-            to_tenths)
-      .Run();
+  tail->box.t1 = tail->encoder.poses().back().time_ns;
+  return WriteSegmentBox(commit->db, commit->spec, tail->segment_id, tail->box);
 }
 
-absl::Status TrackWriter::WriteMark(const Tail& tail, CommitContext* commit) {
+absl::Status TrackWriter::EndAtMark(const Tail& tail, CommitContext* commit) {
   commit->touched.tracks.push_back(tail.agent);
   // An emptied track ends before all time.
   const TimeNs last_ns = tail.last.has_value() ? tail.last->time_ns : kTimeMin;
-  return Query(commit->db,
-               "INSERT OR REPLACE INTO track_mark (slot, revision, last_ns, pose_count)"
-               " VALUES (?1, ?2, ?3, ?4)")
-      .Bind(tail.slot, commit->revision(), last_ns, tail.pose_count)
-      .Run();
+  return WriteMark(commit->db, tail.slot, {commit->revision(), last_ns, tail.pose_count});
 }
 
 absl::Status TrackWriter::Append(const TrajectoryAppend& append, CommitContext* commit) {
@@ -183,7 +150,123 @@ absl::Status TrackWriter::Append(const TrajectoryAppend& append, CommitContext* 
   RevisionRecord& head = commit->head;
   head.first_pose_ns = std::min(head.first_pose_ns.value_or(first_ns), first_ns);
   head.last_pose_ns = std::max(head.last_pose_ns.value_or(last_ns), last_ns);
-  return WriteMark(*tail, commit);
+  return EndAtMark(*tail, commit);
+}
+
+// Moves the segments that touch [from_ns, to_ns) to the history and hands out their poses.
+// `next_id` becomes the segment after them, 0 if there is none.
+absl::Status TrackWriter::TakeSegments(TimeNs from_ns, TimeNs to_ns, Tail* tail,
+                                       std::vector<StoredPose>* poses, int64_t* next_id,
+                                       CommitContext* commit) {
+  std::vector<SegmentRow> rows;
+  *next_id = 0;
+  {
+    // Ids hardly run ahead of times, so what touches the span begins at most a few segments before
+    // the id that its begin would have.
+    Query query(commit->db,
+                "SELECT " DSG_SEGMENT_COLUMNS
+                " FROM trajectory_segment WHERE id BETWEEN"
+                "  coalesce((SELECT id FROM trajectory_segment WHERE id BETWEEN ?1 AND ?3"
+                "   ORDER BY id DESC LIMIT 1 OFFSET 8), ?1)"
+                " AND ?2 AND t1 >= ?4 ORDER BY id");
+    query.Bind(FirstSegmentId(tail->slot), LastSegmentId(tail->slot),
+               SegmentId(tail->slot, from_ns, commit->spec), from_ns);
+    while (query.Next()) {
+      if (query.Int(2) >= to_ns) {
+        *next_id = query.Int(0);
+        break;
+      }
+      DSG_ASSIGN_OR_RETURN(SegmentRow row, SegmentRowOf(query, commit->spec.name));
+      rows.push_back(std::move(row));
+    }
+    DSG_RETURN_IF_ERROR(query.status());
+  }
+  for (SegmentRow& row : rows) {
+    DSG_RETURN_IF_ERROR(EndSegment(commit->db, row.id, commit->revision()));
+    tail->pose_count -= std::ssize(row.poses);
+    poses->insert(poses->end(), std::make_move_iterator(row.poses.begin()),
+                  std::make_move_iterator(row.poses.end()));
+  }
+  return absl::OkStatus();
+}
+
+// The end of the track before segment `next_id` (0 = of the whole track), to be gone on from.
+absl::Status TrackWriter::LoadSegmentBefore(int64_t next_id, Tail* tail, CommitContext* commit) {
+  const int64_t last_id = next_id == 0 ? LastSegmentId(tail->slot) : next_id - 1;
+  DSG_ASSIGN_OR_RETURN(const auto row,
+                       FindLastSegment(commit->db, FirstSegmentId(tail->slot), last_id));
+  if (!row.has_value()) return absl::OkStatus();
+  tail->segment_id = row->id;
+  tail->last = row->poses.back();
+  return absl::OkStatus();
+}
+
+// Puts `poses` between the segment before and segment `next_id`.
+absl::Status TrackWriter::WriteBetween(std::vector<StoredPose> poses, int64_t next_id, Tail* tail,
+                                       CommitContext* commit) {
+  DSG_RETURN_IF_ERROR(LoadSegmentBefore(next_id, tail, commit));
+  // The segment before stays as it is: begin a new one.
+  tail->encoder = SegmentEncoder(commit->spec.codec);
+  for (size_t i = 0; i < poses.size(); ++i) {
+    DSG_RETURN_IF_ERROR(AppendPose(poses[i], tail, commit));
+    if (next_id == 0 || tail->segment_id < next_id) continue;
+    // No id is left before the next segment: write the rest of the track anew.
+    DSG_RETURN_IF_ERROR(
+        TakeSegments(poses.back().time_ns, kTimeMax, tail, &poses, &next_id, commit));
+  }
+  if (!tail->encoder.empty()) DSG_RETURN_IF_ERROR(WriteSegment(tail, commit));
+  if (next_id == 0) return absl::OkStatus();
+  // The way to that segment begins at another pose than before. For readers of older revisions its
+  // box still covers the old way.
+  if (tail->last.has_value()) {
+    DSG_RETURN_IF_ERROR(ExtendSegmentBox(commit->db, commit->spec, next_id, *tail->last));
+  }
+  // The mark tells of the end of the whole track.
+  return LoadSegmentBefore(0, tail, commit);
+}
+
+// Rewrites the segments that the correction touches, and no others.
+absl::Status TrackWriter::Correct(const TrajectoryCorrection& correction, CommitContext* commit) {
+  tails_.erase(correction.agent);
+  const TrajectoryCodec codec = commit->spec.codec;
+  DSG_ASSIGN_OR_RETURN(const Tail* const loaded, LoadTail(correction.agent, commit));
+  Tail tail;
+  tail.agent = correction.agent;
+  tail.slot = loaded->slot;
+  tail.pose_count = loaded->pose_count;
+  tails_.erase(correction.agent);
+  std::vector<StoredPose> poses;
+  int64_t next_id = 0;
+  DSG_RETURN_IF_ERROR(
+      TakeSegments(correction.from_ns, correction.to_ns, &tail, &poses, &next_id, commit));
+  bool is_at_end = false;
+  std::string scratch;
+  std::erase_if(poses, [&](const StoredPose& pose) {
+    const bool replaced = correction.from_ns <= pose.time_ns && pose.time_ns < correction.to_ns;
+    if (replaced) {
+      commit->head.sums.RemovePose(PoseIdentity(correction.agent, pose, codec, &scratch));
+      is_at_end |=
+          pose.time_ns == commit->head.first_pose_ns || pose.time_ns == commit->head.last_pose_ns;
+    }
+    return replaced;
+  });
+  for (const TimedPose& pose : correction.poses) {
+    poses.push_back(ToStored(pose, codec));
+    commit->head.sums.AddPose(PoseIdentity(correction.agent, poses.back(), codec, &scratch));
+    is_at_end |=
+        !commit->head.first_pose_ns.has_value() || pose.time_ns < *commit->head.first_pose_ns;
+  }
+  std::sort(poses.begin(), poses.end(),
+            [](const StoredPose& a, const StoredPose& b) { return a.time_ns < b.time_ns; });
+  DSG_RETURN_IF_ERROR(WriteBetween(std::move(poses), next_id, &tail, commit));
+  DSG_RETURN_IF_ERROR(EndAtMark(tail, commit));
+  return is_at_end ? FindTrackEnds(commit) : absl::OkStatus();
+}
+
+absl::Status TrackWriter::End(NodeId agent, CommitContext* commit) {
+  DSG_ASSIGN_OR_RETURN(const int64_t slot, FindSlot(commit->db, agent));
+  if (slot == 0) return absl::OkStatus();
+  return Correct({agent, kTimeMin, kTimeMax, {}}, commit);
 }
 
 }  // namespace dsg::sqlite

@@ -6,11 +6,10 @@
 #include <map>
 
 #include "absl/strings/str_cat.h"
-#include "schema/store/sqlite/commit.h"
 #include "schema/store/sqlite/graph_rows.h"
 #include "schema/store/sqlite/map_file.h"
 #include "schema/store/sqlite/node_cells.h"
-#include "schema/store/sqlite/rows.h"
+#include "schema/store/sqlite/revision_rows.h"
 #include "schema/store/touched_keys.h"
 
 namespace dsg::sqlite {
@@ -26,14 +25,6 @@ namespace fs = std::filesystem;
 constexpr char kMakeTouched[] =
     "CREATE TABLE IF NOT EXISTS touched (revision INTEGER PRIMARY KEY, payload BLOB NOT NULL,"
     " checksum INTEGER NOT NULL) STRICT";
-
-absl::Status WriteTouched(Database& db, Revision revision, TouchedKeys* keys) {
-  keys->Normalize();
-  const std::string payload = EncodeTouched(*keys);
-  return Query(db, "INSERT INTO touched (revision, payload, checksum) VALUES (?1, ?2, ?3)")
-      .Bind(revision, Query::BlobView{payload}, RowChecksum({revision}, payload))
-      .Run();
-}
 
 // What each revision touched, from the rows that begin or end in it.
 absl::Status FillTouched(Database& db) {
@@ -64,11 +55,11 @@ absl::Status FillTouched(Database& db) {
     }
   }
   DSG_RETURN_IF_ERROR(rows.status());
-  for (auto& [revision, keys] : touched) DSG_RETURN_IF_ERROR(WriteTouched(db, revision, &keys));
+  for (auto& [revision, keys] : touched) DSG_RETURN_IF_ERROR(InsertTouched(db, revision, &keys));
   return absl::OkStatus();
 }
 
-absl::Status FillCells(Database& db) {
+absl::Status FillNodeCells(Database& db) {
   Query query(db, "SELECT key, rev_from, layer, payload, checksum FROM node");
   while (query.Next()) {
     DSG_ASSIGN_OR_RETURN(const Node node, NodeFromRow(query, db.map_name()));
@@ -86,7 +77,7 @@ absl::Status FromFormat1(Database& db) {
     DSG_RETURN_IF_ERROR(FillTouched(db));
   }
   DSG_RETURN_IF_ERROR(db.Execute(kLongLivedSql));
-  return FillCells(db);
+  return FillNodeCells(db);
 }
 
 absl::Status UpgradeFrom(int64_t format, Database& db) {

@@ -1,21 +1,199 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads a whole map: SQLite's structure and every checksum, and what each row adds to the digests
-// of the revisions.
+#include "schema/store/sqlite/verify.h"
+
 #include <algorithm>
+#include <array>
 #include <map>
+#include <optional>
+#include <unordered_set>
 
 #include "absl/strings/str_cat.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/codec/shape_codec.h"
-#include "schema/store/sqlite/log_check.h"
-#include "schema/store/sqlite/map_reader.h"
+#include "schema/store/sqlite/blob_rows.h"
+#include "schema/store/sqlite/erasure.h"
 #include "schema/store/sqlite/node_cells.h"
-#include "schema/store/sqlite/pending_erasure.h"
+#include "schema/store/sqlite/revision_rows.h"
 #include "schema/store/sqlite/rows.h"
-#include "schema/store/sqlite/verify_history.h"
+#include "schema/store/sqlite/track_rows.h"
 
 namespace dsg::sqlite {
 namespace {
+
+using KeySet = std::unordered_set<std::string>;
+
+std::string TouchedIdentity(char table, int64_t a, int64_t b, int64_t c) {
+  return RowIdentity(table, std::array{a, b, c}, "");
+}
+
+KeySet SetOf(const TouchedKeys& keys) {
+  KeySet set;
+  for (const NodeId id : keys.nodes) set.insert(TouchedIdentity('N', KeyOf(id), 0, 0));
+  for (const EdgeRowKey& edge : keys.edges) {
+    set.insert(TouchedIdentity('E', KeyOf(edge.source), edge.relation, KeyOf(edge.target)));
+  }
+  for (const BlockIndex& block : keys.mesh_blocks) {
+    set.insert(TouchedIdentity('M', block.x, block.y, block.z));
+  }
+  for (const NodeId id : keys.tracks) set.insert(TouchedIdentity('T', KeyOf(id), 0, 0));
+  if (keys.layers_or_labels) set.insert(TouchedIdentity('L', 0, 0, 0));
+  return set;
+}
+
+ContentDigest SumOf(const KeySet& keys) {
+  ContentDigest sum;
+  for (const std::string& key : keys) sum.Add(key);
+  return sum;
+}
+
+// Whether the records of revisions, and the lists of what they touched, are what their rows add up
+// to, and none is missing. Run returns the number of revisions.
+class HistoryChecker {
+ public:
+  /// `changes` is what the rows add to and take from the content at each revision.
+  HistoryChecker(Database* db, const std::string& map, std::map<Revision, ContentDigest> changes,
+                 const std::function<void(std::string)>& problem)
+      : db_(*db), map_(map), changes_(std::move(changes)), problem_(problem) {}
+
+  int64_t Run() {
+    const auto readable = LoadReadable(db_);
+    if (readable.ok()) readable_ = *readable;
+    CheckChain();
+    CheckTouched();
+    return std::ssize(is_after_gap_);
+  }
+
+ private:
+  void Finish(const Query& query, std::string_view table) {
+    if (query.status().ok()) return;
+    problem_(
+        absl::StrCat("table ", std::string(table), ": ", std::string(query.status().message())));
+  }
+
+  void CheckChain() {
+    Query query(db_,
+                "SELECT " DSG_REVISION_COLUMNS ", parent_digest FROM revision ORDER BY revision");
+    Sha256 parent{};
+    Revision last = 0;
+    while (query.Next()) {
+      const auto head = HeadFromRow(query, map_);
+      if (!head.ok()) {
+        problem_(std::string(head.status().message()));
+        continue;
+      }
+      const Revision revision = head->info.revision;
+      const bool is_after_gap = revision != last + 1;
+      if (is_after_gap) {
+        CheckGap(last, revision);
+        const std::optional<Sha256> stored = ParentFromRow(query);
+        parent = stored.value_or(Sha256{});
+        if (!stored.has_value()) {
+          problem_(
+              absl::StrCat("revision ", revision, ": the digest of the one before is not known"));
+        }
+      }
+      CheckRevision(*head, parent);
+      parent = head->info.digest;
+      last = revision;
+      is_after_gap_.emplace(revision, is_after_gap);
+    }
+    Finish(query, "revision");
+    if (last < readable_.oldest) problem_("revision: those that can be read are missing");
+    for (const auto& [revision, unused] : changes_) {
+      problem_(absl::StrCat("rows name revision ", revision, ", which does not exist"));
+    }
+  }
+
+  // Rows that began in revisions since compacted are still shown by later ones, and count there.
+  void CheckRevision(const RevisionRecord& head, const Sha256& parent) {
+    const Revision revision = head.info.revision;
+    const auto end = changes_.upper_bound(revision);
+    for (auto change = changes_.begin(); change != end; ++change) content_ += change->second;
+    changes_.erase(changes_.begin(), end);
+    if (!(content_ == head.sums.content)) {
+      problem_(
+          absl::StrCat("revision ", revision, ": its rows do not add up to its content digest"));
+      // Report each break once: go on from what the revision says.
+      content_ = head.sums.content;
+    }
+    if (DigestOf(parent, head) != head.info.digest) {
+      problem_(absl::StrCat("revision ", revision, ": its digest does not follow"));
+    }
+  }
+
+  void CheckGap(Revision last, Revision next) {
+    // Revision 0, the empty map, has no record.
+    const Revision first_readable = std::max(last + 1, readable_.oldest);
+    if (first_readable < next) {
+      problem_(absl::StrCat("revision ", first_readable, " is missing"));
+    }
+    for (const Revision tagged : readable_.tagged) {
+      if (tagged > last && tagged < std::min(next, readable_.oldest)) {
+        problem_(absl::StrCat("revision ", tagged, ", which has a tag, is missing"));
+      }
+    }
+  }
+
+  // Each revision's list against the rows that begin or end in it. A list after a gap may have
+  // more: keys of rows that nothing shows any more.
+  void CheckTouched() {
+    std::map<Revision, ContentDigest> sums;
+    std::map<Revision, KeySet> after_gaps;
+    Query rows(db_, kTouchedRows);
+    while (rows.Next()) {
+      const auto at = is_after_gap_.lower_bound(rows.Int(4));
+      if (at == is_after_gap_.end()) continue;
+      std::string key =
+          TouchedIdentity(rows.Text(0).front(), rows.Int(1), rows.Int(2), rows.Int(3));
+      if (at->second) {
+        after_gaps[at->first].insert(std::move(key));
+      } else {
+        sums[at->first].Add(key);
+      }
+    }
+    Finish(rows, "touched");
+    for (const auto& [revision, is_after_gap] : is_after_gap_) {
+      const auto list = ReadList(revision);
+      if (!list.has_value()) continue;
+      const KeySet& said = after_gaps[revision];
+      const bool agrees = is_after_gap
+                              ? std::all_of(said.begin(), said.end(),
+                                            [&](const auto& key) { return list->contains(key); })
+                              : SumOf(*list) == sums[revision];
+      if (!agrees) {
+        problem_(absl::StrCat("touched ", revision, ": not what the rows of the revision say"));
+      }
+    }
+  }
+
+  // Nullopt if there is no list to look at, which is a problem but for the first revision of a
+  // compacted map: nothing can be compared with it from before.
+  std::optional<KeySet> ReadList(Revision revision) {
+    Query query(db_, "SELECT revision, payload, checksum FROM touched WHERE revision = ?1");
+    const bool found = query.Bind(revision).Next();
+    Finish(query, "touched");
+    if (!found) {
+      const auto first = is_after_gap_.begin();
+      if (revision != first->first || !first->second) {
+        problem_(absl::StrCat("touched ", revision, ": there is no list of what it touched"));
+      }
+      return std::nullopt;
+    }
+    TouchedKeys keys;
+    if (TouchedFromRow(query, map_, &keys).ok()) return SetOf(keys);
+    problem_(absl::StrCat("table touched, row ", revision, ": the bytes are not what was written"));
+    return std::nullopt;
+  }
+
+  Database& db_;
+  const std::string& map_;
+  std::map<Revision, ContentDigest> changes_;
+  const std::function<void(std::string)>& problem_;
+  Readable readable_;
+  ContentDigest content_;
+  /// Each revision that has a record, and whether the one before has none.
+  std::map<Revision, bool> is_after_gap_;
+};
 
 // A damaged map may have millions of bad rows; the first ones say enough.
 constexpr size_t kProblemsMax = 100;
@@ -81,7 +259,7 @@ class Verifier {
   }
 
   void CheckStructure() {
-    if (const auto damage = FindLogDamage(db_.path() + "-wal")) Problem(*damage);
+    if (const auto damage = db_.FindLogDamage()) Problem(*damage);
     Query query(db_, "PRAGMA integrity_check(20)");
     while (query.Next()) {
       if (query.Text(0) != "ok") Problem(absl::StrCat("database: ", std::string(query.Text(0))));
@@ -181,25 +359,19 @@ class Verifier {
     Query tracks(db_, "SELECT slot, agent FROM track");
     while (tracks.Next()) agent_of[tracks.Int(0)] = IdOf(tracks.Int(1));
     Finish(tracks, "track");
-    Query query(db_,
-                "SELECT id, rev_from, t0, t1, pose_count, checksum, payload, 9223372036854775807"
-                " FROM trajectory_segment UNION ALL"
-                " SELECT id, rev_from, t0, t1, pose_count, checksum, payload, rev_to"
-                " FROM trajectory_history");
+    Query query(
+        db_, "SELECT " DSG_SEGMENT_COLUMNS
+             ", 9223372036854775807 FROM trajectory_segment UNION ALL SELECT " DSG_SEGMENT_COLUMNS
+             ", rev_to FROM trajectory_history");
     while (query.Next()) {
       const int64_t slot = SlotOfSegment(query.Int(0));
-      const std::string payload(query.Blob(6));
-      const auto checksum = RowChecksum(
-          {query.Int(0), query.Int(1), query.Int(2), query.Int(3), query.Int(4)}, payload);
-      const auto reader = SegmentReader::Parse(payload);
-      std::vector<StoredPose> poses;
-      if (checksum != query.Int(5) || reader == nullptr || !reader->DecodeAll(&poses) ||
-          !agent_of.contains(slot)) {
+      const auto row = SegmentRowOf(query, spec_.name);
+      if (!row.ok() || !agent_of.contains(slot)) {
         BadRow("trajectory_segment", absl::StrCat(query.Int(0)));
         continue;
       }
       ++report_.row_count;
-      CountPoses(agent_of[slot], slot, poses, query.Int(1), query.Int(7));
+      CountPoses(agent_of[slot], slot, row->poses, row->rev_from, query.Int(7));
     }
     Finish(query, "trajectory_segment");
     Query boxes(db_,
@@ -212,27 +384,27 @@ class Verifier {
   // A pose came with the first mark that reaches it, but not before its segment.
   void CountPoses(NodeId agent, int64_t slot, const std::vector<StoredPose>& poses,
                   Revision rev_from, Revision rev_to) {
-    std::vector<std::pair<Revision, TimeNs>> marks;
+    std::vector<TrackMark> marks;
     Query query(db_,
-                "SELECT revision, last_ns FROM track_mark WHERE slot = ?1 AND revision >= ?2"
-                " ORDER BY revision");
+                "SELECT revision, last_ns, pose_count FROM track_mark"
+                " WHERE slot = ?1 AND revision >= ?2 ORDER BY revision");
     query.Bind(slot, rev_from);
     while (query.Next()) {
-      marks.emplace_back(query.Int(0), query.Int(1));
-      if (query.Int(1) >= poses.back().time_ns) break;
+      marks.push_back(MarkFromRow(query));
+      if (marks.back().last_ns >= poses.back().time_ns) break;
     }
     Finish(query, "track_mark");
     size_t mark = 0;
     std::string scratch;
     for (const StoredPose& pose : poses) {
-      while (mark < marks.size() && marks[mark].second < pose.time_ns) ++mark;
+      while (mark < marks.size() && marks[mark].last_ns < pose.time_ns) ++mark;
       if (mark == marks.size()) {
         Problem(absl::StrCat("track of ", ToString(agent), ": no mark reaches the pose at ",
                              pose.time_ns, " ns"));
         return;
       }
       const auto identity = PoseIdentity(agent, pose, spec_.codec, &scratch);
-      changes_[marks[mark].first].Add(identity);
+      changes_[marks[mark].revision].Add(identity);
       if (rev_to != kRevisionMax) changes_[rev_to].Remove(identity);
       ++report_.pose_count;
     }
@@ -271,10 +443,7 @@ class Verifier {
                 " UNION ALL SELECT x, y, z, rev_from, payload, checksum, rev_to"
                 " FROM mesh_block_history");
     while (query.Next()) {
-      const MeshRow row{{static_cast<int32_t>(query.Int(0)), static_cast<int32_t>(query.Int(1)),
-                         static_cast<int32_t>(query.Int(2))},
-                        query.Int(3),
-                        query.Blob(4)};
+      const MeshRow row{BlockIndexOf(query), query.Int(3), query.Blob(4)};
       if (query.Int(5) != ChecksumOf(row)) {
         BadRow("mesh_block", absl::StrCat(row.index.x, ",", row.index.y, ",", row.index.z));
       }
@@ -327,8 +496,8 @@ class Verifier {
   }
 
   void CheckHistory() {
-    report_.revision_count = CheckRevisions(db_, spec_.name, std::move(changes_),
-                                            [this](std::string text) { Problem(std::move(text)); });
+    const auto problem = [this](std::string text) { Problem(std::move(text)); };
+    report_.revision_count = HistoryChecker(&db_, spec_.name, std::move(changes_), problem).Run();
   }
 
   Database& db_;

@@ -6,12 +6,13 @@
 #include <optional>
 #include <string>
 
+#include "schema/store/commit_protocol.h"
 #include "schema/store/graph_store.h"
-#include "schema/store/sqlite/commit.h"
+#include "schema/store/revision_record.h"
 #include "schema/store/sqlite/compaction.h"
 #include "schema/store/sqlite/map_file.h"
-#include "schema/store/sqlite/reserve.h"
-#include "schema/store/sqlite/sessions.h"
+#include "schema/store/sqlite/space.h"
+#include "schema/store/sqlite/track_writer.h"
 
 namespace dsg::sqlite {
 
@@ -75,17 +76,5 @@ class SqliteWriter : public MapWriter {
   /// One that was stopped.
   std::optional<Compaction> compaction_;
 };
-
-/// The head as stored; revision 0 for an empty map.
-absl::StatusOr<RevisionRecord> LoadHead(Database& db);
-absl::Status InsertRevision(const CommitContext& commit);
-/// Writes digest, content, counts and times of a record that is there.
-absl::Status UpdateRevision(Database& db, const RevisionRecord& head);
-/// Columns of the revision table in the order that HeadFromRow reads.
-#define DSG_REVISION_COLUMNS                                                        \
-  "revision, digest, content, committed_ns, author, message, session_id, sequence," \
-  " config_digest, node_count, edge_count, agent_count, pose_count, stay_count,"    \
-  " mesh_block_count, first_pose_ns, last_pose_ns, layer_counts"
-absl::StatusOr<RevisionRecord> HeadFromRow(const Query& query, const std::string& map);
 
 }  // namespace dsg::sqlite

@@ -6,7 +6,6 @@
 
 #include <filesystem>
 
-#include "schema/archive/archive_encoder.h"
 #include "schema/archive/archive_map.h"
 #include "schema/base/random.h"
 #include "tests/unit/schema/archive/archive_test_util.h"

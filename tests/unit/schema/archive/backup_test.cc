@@ -7,7 +7,6 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
 #include "schema/archive/backup_folder.h"
-#include "schema/archive/backup_manifest.h"
 #include "schema/codec/checksum.h"
 #include "tests/unit/schema/archive/archive_test_util.h"
 

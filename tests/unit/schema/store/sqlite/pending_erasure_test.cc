@@ -10,7 +10,6 @@
 #include "absl/strings/str_cat.h"
 #include "schema/store/sqlite/erasure.h"
 #include "schema/store/sqlite/map_file.h"
-#include "schema/store/sqlite/pending_erasure.h"
 #include "schema/store/sqlite/space.h"
 #include "tests/unit/schema/store/delta_stream.h"
 #include "tests/unit/schema/store/store_test_util.h"

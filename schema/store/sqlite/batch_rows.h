@@ -1,19 +1,50 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads the body shapes of an agent as of a revision, one at a time.
-// Refuses to decode a segment of which nothing is shown.
+// Rows of factors and shapes, batches of one agent: how they are read, written and ended, and how
+// overlapping batches of shapes are merged for a reader. See schema/store/track_rules.h.
 #pragma once
 
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
+#include "schema/base/cache.h"
 #include "schema/codec/shape_codec.h"
+#include "schema/model/graph_delta.h"
 #include "schema/store/snapshot.h"
-#include "schema/store/sqlite/database.h"
-#include "schema/store/sqlite/lru_cache.h"
+#include "schema/store/sqlite/commit.h"
 
 namespace dsg::sqlite {
+
+/// Columns: agent, rev_from, t0, t1, payload, checksum. Row: FactorRow or ShapeRow. The payload is
+/// a view of the statement's row. Errors: DATA_LOSS/STORE_CORRUPT.
+template <typename Row>
+absl::StatusOr<Row> BatchRowOf(const Query& query, const std::string& map);
+
+/// A row that outlives its statement.
+template <typename Row>
+struct StoredBatch {
+  int64_t row_id = 0;
+  Revision rev_to = kRevisionMax;
+  /// Without its payload.
+  Row row;
+  std::string payload;
+
+  Row Whole() const {
+    Row whole = row;
+    whole.payload = payload;
+    return whole;
+  }
+};
+/// All rows of a statement. Columns: as BatchRowOf, then the id of the row and rev_to.
+template <typename Row>
+absl::StatusOr<std::vector<StoredBatch<Row>>> ReadBatches(Query* query, const std::string& map);
+
+absl::Status WriteFactors(const std::vector<FactorAppend>& factors, CommitContext* commit);
+absl::Status WriteShapes(const std::vector<ShapeAppend>& shapes, CommitContext* commit);
+absl::Status EndFactors(const TrackSpan& span, CommitContext* commit);
+absl::Status EndShapes(const TrackSpan& span, CommitContext* commit);
 
 /// Row ids are given again once their rows are history.
 struct ShapeKey {
@@ -30,7 +61,8 @@ struct ShapeKeyHash {
 };
 
 /// Rows are never changed, so what was decoded once stays right.
-using ShapeCache = LruCache<ShapeKey, DecodedShapes, ShapeKeyHash>;
+using ShapesPtr = std::shared_ptr<const DecodedShapes>;
+using ShapeCache = Cache<ShapeKey, ShapesPtr, ShapeKeyHash>;
 
 struct ShapeQuestion {
   NodeId agent;
@@ -71,7 +103,7 @@ class ShapeReader {
   const Segment& Pass(TimeNs time_ns, size_t* index);
   absl::StatusOr<bool> Show(const Segment& segment, size_t index, const Visit& visit);
   absl::StatusOr<std::string> LoadPayload(const Segment& segment);
-  absl::StatusOr<std::shared_ptr<const DecodedShapes>> Decode(const Segment& segment);
+  absl::StatusOr<ShapesPtr> Decode(const Segment& segment);
 
   Database& db_;
   ShapeCache& cache_;
@@ -80,7 +112,7 @@ class ShapeReader {
   /// The segment shown last.
   int64_t decoded_id_ = -1;
   Revision decoded_rev_from_ = 0;
-  std::shared_ptr<const DecodedShapes> decoded_;
+  ShapesPtr decoded_;
 };
 
 }  // namespace dsg::sqlite
