@@ -6,7 +6,6 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/engine/engine.h"
-#include "query/engine/engine_cursor.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
 #include "schema/store/snapshot.h"

@@ -7,7 +7,6 @@
 
 #include "dsg/v1/query_service.pb.h"
 #include "query/engine/engine.h"
-#include "query/engine/engine_cursor.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
 #include "schema/base/time.h"

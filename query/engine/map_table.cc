@@ -100,14 +100,4 @@ absl::Status MapTable::WithWriter(const std::string& name, const StopCheck& stop
   return status;
 }
 
-absl::StatusOr<CommitResult> MapTable::Commit(GraphDelta delta, const StopCheck& stop) {
-  CommitResult result;
-  const std::string name = delta.map;
-  DSG_RETURN_IF_ERROR(WithWriter(name, stop, [&](MapWriter& writer) -> absl::Status {
-    DSG_ASSIGN_OR_RETURN(result, writer.Commit(std::move(delta)));
-    return absl::OkStatus();
-  }));
-  return result;
-}
-
 }  // namespace dsg::query

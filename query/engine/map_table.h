@@ -15,7 +15,6 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "query/engine/archive_copies.h"
 #include "query/view/view_cache.h"
 #include "schema/store/graph_store.h"
 
@@ -25,30 +24,21 @@ namespace dsg::query {
 class MapTable {
  public:
   explicit MapTable(std::unique_ptr<GraphStore> store, size_t view_cache_bytes = size_t{1} << 30,
-                    const ArchiveLimits& archive_limits = {}, size_t open_maps_max = 16)
-      : open_maps_max_(open_maps_max),
-        store_(std::move(store)),
-        views_(view_cache_bytes),
-        archives_(store_->folder(), archive_limits) {}
+                    size_t open_maps_max = 16)
+      : open_maps_max_(open_maps_max), store_(std::move(store)), views_(view_cache_bytes) {}
 
   GraphStore& store() { return *store_; }
   ViewCache& views() { return views_; }
-  ArchiveCopies& archives() { return archives_; }
 
   /// Opened at the first call and kept until as many others were asked for since as are kept; who
   /// holds it may go on with it.
   /// Errors: MAP_NAME_INVALID; MAP_UNKNOWN; what GraphStore::OpenMap returns.
   absl::StatusOr<std::shared_ptr<MapReader>> Reader(const std::string& name);
 
-  /// Commits with the map's writer, which is opened at the first commit and kept, with its lock, as
-  /// long as the reader.
-  /// Commits to one map wait for each other. `stop` is asked once the wait is over.
-  /// Errors: as Reader; WRITER_LOCKED while another process holds the lock.
-  absl::StatusOr<CommitResult> Commit(GraphDelta delta, const StopCheck& stop);
-
-  /// The same for other work of the map's writer. Commits wait meanwhile, so long work is to be
-  /// done in pieces, a call each.
-  /// Errors: as Commit; what `work` returns.
+  /// Runs `work` with the map's writer, which is opened at the first call and kept, with its lock,
+  /// as long as the reader. Calls for one map wait for each other, commits too, so long work is
+  /// done in pieces, a call each. `stop` is asked once the wait is over.
+  /// Errors: as Reader; WRITER_LOCKED while another process holds the lock; what `work` returns.
   absl::Status WithWriter(const std::string& name, const StopCheck& stop,
                           const std::function<absl::Status(MapWriter&)>& work);
 
@@ -99,7 +89,6 @@ class MapTable {
   // First, so that it is destroyed after the readers and writers that it opened.
   std::unique_ptr<GraphStore> store_;
   ViewCache views_;
-  ArchiveCopies archives_;
   std::atomic<uint64_t> use_count_ = 0;
   std::shared_mutex readers_mutex_;
   std::unordered_map<std::string, OpenMap> readers_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Maps as a whole: create, list, measure, look back.
+// Maps as a whole: list, measure, look back.
 #include <set>
 #include <string>
 #include <vector>
@@ -12,16 +12,6 @@
 #include "schema/codec/proto_convert.h"
 
 namespace dsg::query {
-
-absl::Status CreateMap(Engine* engine, const CallContext&, const v1::CreateMapRequest& request,
-                       v1::CreateMapResponse* reply) {
-  DSG_RETURN_IF_ERROR(CheckMapName(request.map().name()));
-  DSG_ASSIGN_OR_RETURN(const MapSpec spec, FromProto(request.map()));
-  DSG_RETURN_IF_ERROR(spec.Validate());
-  DSG_RETURN_IF_ERROR(engine->maps.store().CreateMap(spec));
-  ToProto(spec, reply->mutable_map());
-  return absl::OkStatus();
-}
 
 absl::Status ListMaps(Engine* engine, const CallContext&, const v1::ListMapsRequest&,
                       v1::ListMapsResponse* reply) {

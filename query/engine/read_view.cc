@@ -6,10 +6,21 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/engine/request_check.h"
-#include "query/engine/tags.h"
 #include "schema/base/status.h"
+#include "schema/store/tags.h"
 
 namespace dsg::query {
+
+absl::StatusOr<Revision> RevisionOfTag(MapReader* map, const std::string& tag) {
+  DSG_ASSIGN_OR_RETURN(const std::vector<Tag> tags, map->Tags());
+  for (const Tag& one : tags) {
+    if (one.name == tag) return one.revision;
+  }
+  return MakeError(Reason::kTagUnknown,
+                   absl::StrCat("map \"", map->spec().name, "\" has no tag \"", tag, "\"; it has ",
+                                TagNames(tags)),
+                   {{"map", map->spec().name}, {"tag", tag}});
+}
 
 absl::StatusOr<ReadView> ReadView::Make(MapTable* maps, std::shared_ptr<MapReader> map,
                                         std::shared_ptr<const Snapshot> snapshot, Revision head) {

@@ -17,6 +17,9 @@ class ResponseHeader;
 
 namespace dsg::query {
 
+/// Errors: NOT_FOUND/TAG_UNKNOWN, which lists the tags that there are.
+absl::StatusOr<Revision> RevisionOfTag(MapReader* map, const std::string& tag);
+
 /// Threads: safe from many threads; holds no lock.
 class ReadView {
  public:

@@ -12,7 +12,6 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/engine/engine.h"
-#include "query/engine/engine_cursor.h"
 #include "query/engine/in_turn.h"
 #include "query/engine/nodes.h"
 #include "query/engine/read_view.h"

@@ -8,7 +8,6 @@
 #include "dsg/v1/query_service.pb.h"
 #include "query/engine/agent_names.h"
 #include "query/engine/engine.h"
-#include "query/engine/engine_cursor.h"
 #include "query/engine/read_view.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"

@@ -11,7 +11,6 @@
 #include "dsg/v1/map_service.pb.h"
 #include "query/engine/difference.h"
 #include "query/engine/engine.h"
-#include "query/engine/engine_cursor.h"
 #include "query/engine/nodes.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The archives that are being read, each of which keeps a copy of its map on the disk.
-// Refuses to keep more than a few, to wait for an idle reader, and to outlive an erasure.
+// Archives on their way to readers: each keeps a copy of its map on the disk, under a bound of
+// number and of idle time. An erasure ends the archives of its map, so that no copy outlives it.
 #pragma once
 
 #include <atomic>

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/commit.h"
+#include "query/maintenance/commit.h"
 
 #include <unistd.h>
 
 #include <atomic>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/ingest_service.pb.h"
+#include "dsg/v1/map_service.pb.h"
 #include "query/engine/engine.h"
 #include "query/engine/nodes.h"
 #include "query/engine/request_check.h"
@@ -15,6 +17,16 @@
 #include "schema/codec/proto_convert.h"
 
 namespace dsg::query {
+
+absl::Status CreateMap(Engine* engine, const CallContext&, const v1::CreateMapRequest& request,
+                       v1::CreateMapResponse* reply) {
+  DSG_RETURN_IF_ERROR(CheckMapName(request.map().name()));
+  DSG_ASSIGN_OR_RETURN(const MapSpec spec, FromProto(request.map()));
+  DSG_RETURN_IF_ERROR(spec.Validate());
+  DSG_RETURN_IF_ERROR(engine->maps.store().CreateMap(spec));
+  ToProto(spec, reply->mutable_map());
+  return absl::OkStatus();
+}
 
 absl::Status Commit(Engine* engine, const CallContext& call, const v1::CommitRequest& request,
                     v1::CommitResponse* reply) {
@@ -33,11 +45,12 @@ absl::Status Commit(Engine* engine, const CallContext& call, const v1::CommitReq
   DSG_ASSIGN_OR_RETURN(GraphDelta delta, FromProto(in, layers, Unmasked::kPatch));
   // Past the quota, and into the reserve, goes only what the service itself forgets.
   delta.is_forgetting = false;
-  DSG_ASSIGN_OR_RETURN(const CommitResult result,
-                       engine->maps.Commit(std::move(delta), call.stop()));
-  reply->set_revision(result.revision);
-  reply->set_replayed(result.replayed);
-  return absl::OkStatus();
+  return engine->maps.WithWriter(in.map(), call.stop(), [&](MapWriter& writer) -> absl::Status {
+    DSG_ASSIGN_OR_RETURN(const CommitResult result, writer.Commit(std::move(delta)));
+    reply->set_revision(result.revision);
+    reply->set_replayed(result.replayed);
+    return absl::OkStatus();
+  });
 }
 
 std::string NewSessionId(std::string_view work) {

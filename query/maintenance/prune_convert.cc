@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/prune_convert.h"
+#include "query/maintenance/prune_convert.h"
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/maintenance_service.pb.h"

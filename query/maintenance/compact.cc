@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/compact.h"
-
+// Drops old revisions and gives their bytes back, a slice of time a message, so that commits wait
+// for one slice at most.
 #include <algorithm>
 #include <chrono>
 #include <optional>
@@ -10,7 +10,6 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/maintenance_service.pb.h"
 #include "query/engine/engine.h"
-#include "query/engine/engine_cursor.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
 
@@ -18,7 +17,7 @@ namespace dsg::query {
 namespace {
 
 // How long commits to the map wait, about.
-constexpr std::chrono::milliseconds kSlice{200};
+constexpr std::chrono::milliseconds kCompactSlice{200};
 
 class Compaction final : public EngineCursor<v1::CompactResponse> {
  public:
@@ -38,7 +37,7 @@ class Compaction final : public EngineCursor<v1::CompactResponse> {
 
   absl::Status RunSlice(const CallContext& call, MapWriter* writer, v1::CompactResponse* reply) {
     DSG_RETURN_IF_ERROR(SettleKeepFrom());
-    const auto slice_end = CallContext::Clock::now() + kSlice;
+    const auto slice_end = CallContext::Clock::now() + kCompactSlice;
     bool slice_is_over = false;
     const StopCheck stop = [&]() -> absl::Status {
       DSG_RETURN_IF_ERROR(call.Check());
@@ -81,20 +80,16 @@ class Compaction final : public EngineCursor<v1::CompactResponse> {
 
 }  // namespace
 
-CursorOr<v1::CompactResponse> OpenCompact(MapTable* maps, const v1::CompactRequest& request) {
+CursorOr<v1::CompactResponse> Compact(Engine* engine, const CallContext&,
+                                      const v1::CompactRequest& request) {
   if (request.keep_from_revision() < 0) {
     return FieldError("keep_from_revision", absl::StrCat(request.keep_from_revision()),
                       "give a revision, or none for the newest");
   }
-  DSG_RETURN_IF_ERROR(maps->Reader(request.map()).status());
+  DSG_RETURN_IF_ERROR(engine->maps.Reader(request.map()).status());
   std::optional<Revision> keep_from;
   if (request.has_keep_from_revision()) keep_from = request.keep_from_revision();
-  return std::make_unique<Compaction>(maps, request.map(), keep_from);
-}
-
-CursorOr<v1::CompactResponse> Compact(Engine* engine, const CallContext&,
-                                      const v1::CompactRequest& request) {
-  return OpenCompact(&engine->maps, request);
+  return std::make_unique<Compaction>(&engine->maps, request.map(), keep_from);
 }
 
 }  // namespace dsg::query

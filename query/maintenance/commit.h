@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The way in over the service: one delta, translated with the map's own layers and handed to the
-// map's writer, which alone decides whether it is valid.
+// What comes into the store over the service: new maps, and deltas, which are translated with the
+// map's own layers and handed to its writer, which alone decides whether they are valid.
 #pragma once
 
 #include <string>

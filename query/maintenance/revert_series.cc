@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/revert_series.h"
+#include "query/maintenance/revert_series.h"
 
 #include <algorithm>
 #include <cmath>
@@ -23,9 +23,9 @@ struct StoredShape {
 TimeNs TimeOf(const TimedPose& pose) { return pose.time_ns; }
 TimeNs TimeOf(const StoredShape& stored) { return stored.shape.time_ns; }
 
-bool IsSame(const TimedPose& a, const TimedPose& b) { return IsSamePose(a, b); }
+bool IsSameRow(const TimedPose& a, const TimedPose& b) { return IsSamePose(a, b); }
 
-bool IsSame(const StoredShape& a, const StoredShape& b) {
+bool IsSameRow(const StoredShape& a, const StoredShape& b) {
   return a.shape.time_ns == b.shape.time_ns && a.topology == b.topology &&
          a.shape.pose_coefficients == b.shape.pose_coefficients &&
          a.shape.shape_coefficients == b.shape.shape_coefficients &&
@@ -69,7 +69,7 @@ void CutAt(TimeNs to_ns, std::vector<Row>* chunk) {
 template <typename Row>
 std::optional<SeriesDifference> Compare(NodeId agent, const std::vector<Row>& present,
                                         const std::vector<Row>& wanted) {
-  const auto is_same = [](const Row& a, const Row& b) { return IsSame(a, b); };
+  const auto is_same = [](const Row& a, const Row& b) { return IsSameRow(a, b); };
   const auto [a, b] =
       std::mismatch(present.begin(), present.end(), wanted.begin(), wanted.end(), is_same);
   if (a == present.end() && b == wanted.end()) return std::nullopt;

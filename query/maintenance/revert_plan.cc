@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/revert_plan.h"
+#include "query/maintenance/revert_plan.h"
 
 #include <algorithm>
 #include <bit>
@@ -8,7 +8,7 @@
 #include <set>
 #include <utility>
 
-#include "query/engine/revert_series.h"
+#include "query/maintenance/revert_series.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 

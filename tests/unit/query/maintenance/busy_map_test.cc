@@ -10,7 +10,7 @@
 #include "dsg/v1/ingest_service.pb.h"
 #include "schema/codec/patch.h"
 #include "schema/codec/proto_convert.h"
-#include "tests/unit/query/engine/two_halves.h"
+#include "tests/unit/query/maintenance/two_halves.h"
 #include "tests/unit/schema/merge/small_map.h"
 
 namespace dsg::query {

@@ -11,7 +11,7 @@
 
 #include "absl/strings/match.h"
 #include "dsg/v1/maintenance_service.pb.h"
-#include "query/engine/archive_copies.h"
+#include "query/maintenance/archives.h"
 #include "schema/base/random.h"
 #include "schema/base/status.h"
 #include "schema/codec/checksum.h"

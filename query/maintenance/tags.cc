@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/tags.h"
-
+// Names for revisions: set, removed, listed.
 #include <memory>
 #include <string>
 #include <vector>
@@ -10,12 +9,11 @@
 #include "query/engine/engine.h"
 #include "query/engine/request_check.h"
 #include "schema/base/status.h"
-#include "schema/store/tags.h"
 
 namespace dsg::query {
 namespace {
 
-void ToProto(const Tag& tag, v1::Tag* out) {
+void FillTag(const Tag& tag, v1::Tag* out) {
   out->set_name(tag.name);
   out->set_revision(tag.revision);
   out->set_created_ns(tag.created_ns);
@@ -55,7 +53,7 @@ absl::Status SetTag(Engine* engine, const CallContext& call, const v1::SetTagReq
           DSG_ASSIGN_OR_RETURN(note, NoteOf(&engine->maps, request.map(), request.name()));
         }
         DSG_ASSIGN_OR_RETURN(const Tag tag, writer.SetTag(request.name(), revision, note));
-        ToProto(tag, reply->mutable_tag());
+        FillTag(tag, reply->mutable_tag());
         return absl::OkStatus();
       });
 }
@@ -71,19 +69,8 @@ absl::Status ListTags(Engine* engine, const CallContext&, const v1::ListTagsRequ
                       v1::ListTagsResponse* reply) {
   DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> map, engine->maps.Reader(request.map()));
   DSG_ASSIGN_OR_RETURN(const std::vector<Tag> tags, map->Tags());
-  for (const Tag& tag : tags) ToProto(tag, reply->add_tags());
+  for (const Tag& tag : tags) FillTag(tag, reply->add_tags());
   return absl::OkStatus();
-}
-
-absl::StatusOr<Revision> RevisionOfTag(MapReader* map, const std::string& tag) {
-  DSG_ASSIGN_OR_RETURN(const std::vector<Tag> tags, map->Tags());
-  for (const Tag& one : tags) {
-    if (one.name == tag) return one.revision;
-  }
-  return MakeError(Reason::kTagUnknown,
-                   absl::StrCat("map \"", map->spec().name, "\" has no tag \"", tag, "\"; it has ",
-                                TagNames(tags)),
-                   {{"map", map->spec().name}, {"tag", tag}});
 }
 
 }  // namespace dsg::query

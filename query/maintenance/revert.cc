@@ -6,13 +6,12 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/maintenance_service.pb.h"
-#include "query/engine/commit.h"
 #include "query/engine/engine.h"
-#include "query/engine/engine_cursor.h"
-#include "query/engine/prune_convert.h"
+#include "query/engine/read_view.h"
 #include "query/engine/request_check.h"
-#include "query/engine/revert_plan.h"
-#include "query/engine/tags.h"
+#include "query/maintenance/commit.h"
+#include "query/maintenance/prune_convert.h"
+#include "query/maintenance/revert_plan.h"
 #include "schema/base/status.h"
 
 namespace dsg::query {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// The Api without the network: checks requests, opens maps, asks the engine, fills replies. Which
-// function answers which call: see query/engine/engine.h.
+// The Api in this process: questions of query/engine and changes of query/maintenance behind one
+// interface, without a network.
 #pragma once
 
 #include <memory>
 #include <string>
 
 #include "query/api/api.h"
-#include "query/engine/archive_copies.h"
+#include "query/maintenance/archives.h"
 #include "schema/store/graph_store.h"
 
 namespace dsg::query {

@@ -11,7 +11,7 @@
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 #include "tests/unit/query/engine/office.h"
-#include "tests/unit/query/engine/two_halves.h"
+#include "tests/unit/query/maintenance/two_halves.h"
 #include "tests/unit/schema/merge/perceived_half.h"
 
 namespace dsg::query {
