@@ -14,13 +14,11 @@
 
 #include "absl/status/statusor.h"
 #include "query/api/generated/engine_api.h"
-#include "query/engine/agent_names.h"
-#include "query/engine/ancestry.h"
+#include "query/engine/agents.h"
 #include "query/engine/collision/collision_cache.h"
-#include "query/engine/map_table.h"
-#include "query/engine/page_token.h"
-#include "query/engine/read_view.h"
-#include "query/engine/walk_area_cache.h"
+#include "query/engine/maps.h"
+#include "query/engine/request.h"
+#include "query/engine/walk_area.h"
 
 namespace dsg::query {
 

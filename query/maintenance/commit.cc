@@ -11,7 +11,7 @@
 #include "dsg/v1/map_service.pb.h"
 #include "query/engine/engine.h"
 #include "query/engine/nodes.h"
-#include "query/engine/request_check.h"
+#include "query/engine/request.h"
 #include "schema/base/status.h"
 #include "schema/base/time.h"
 #include "schema/codec/proto_convert.h"

@@ -11,7 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/maintenance_service.pb.h"
 #include "query/engine/engine.h"
-#include "query/engine/request_check.h"
+#include "query/engine/request.h"
 #include "query/maintenance/archives.h"
 #include "query/maintenance/commit.h"
 #include "query/maintenance/prune_convert.h"

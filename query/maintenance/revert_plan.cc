@@ -2,12 +2,12 @@
 #include "query/maintenance/revert_plan.h"
 
 #include <algorithm>
-#include <bit>
 #include <iterator>
 #include <map>
 #include <set>
 #include <utility>
 
+#include "query/engine/diff.h"
 #include "query/maintenance/revert_series.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
@@ -20,17 +20,6 @@ constexpr int64_t kBatchWeightMax = 5'000;
 constexpr int64_t kBlockWeight = 100;
 constexpr int64_t kShapeWeight = 30;
 constexpr size_t kReadBatch = 256;
-
-bool IsSame(const Node& a, const Node& b) {
-  return a.revision == b.revision ||
-         (a.layer == b.layer && EncodeNodePayload(a) == EncodeNodePayload(b));
-}
-
-bool IsSame(const Edge& a, const Edge& b) {
-  return a.revision == b.revision ||
-         (std::bit_cast<uint64_t>(a.weight) == std::bit_cast<uint64_t>(b.weight) &&
-          EncodeEdgePayload(a) == EncodeEdgePayload(b));
-}
 
 // Whether parents or children may not fit any more.
 bool IsElsewhere(const Node& a, const Node& b) {
@@ -91,7 +80,7 @@ class Planner {
 
   void PlanNode(NodeId id, const std::optional<Node>& now, const std::optional<Node>& then) {
     if (now.has_value() && then.has_value()) {
-      if (IsSame(*now, *then)) return;
+      if (SameContent(*now, *then)) return;
       if (IsElsewhere(*now, *then)) moved_.insert(id);
     }
     if (!then.has_value()) {
@@ -118,7 +107,7 @@ class Planner {
 
   void PlanEdge(const EdgeKey& key, const std::optional<Edge>& now,
                 const std::optional<Edge>& then) {
-    if (now.has_value() && then.has_value() && IsSame(*now, *then)) return;
+    if (now.has_value() && then.has_value() && SameContent(*now, *then)) return;
     if (!then.has_value()) {
       if (!now.has_value()) return;
       ++plan_.removed.edge_count;

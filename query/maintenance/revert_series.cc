@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-#include "query/engine/pose_difference.h"
+#include "query/engine/diff.h"
 #include "schema/base/status.h"
 #include "schema/codec/trajectory_codec.h"
 

@@ -6,7 +6,7 @@
 #include "dsg/v1/maintenance_service.pb.h"
 #include "dsg/v1/map_service.pb.h"
 #include "dsg/v1/query_service.pb.h"
-#include "query/engine/map_table.h"
+#include "query/engine/maps.h"
 #include "schema/base/status.h"
 #include "tests/unit/query/engine/office.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The open maps of a store, by name, at most so many: of those the ones that were asked last. A
-// name is checked before anything is made of it, so that no request can reach outside the store's
-// folder.
+// The open maps of a store, by name, the last used ones. A name is checked before anything is made
+// of it, so that no request can reach outside the store's folder. The .cc file answers ListMaps,
+// GetMapStats, ListRevisions and GetServerInfo.
 #pragma once
 
 #include <atomic>

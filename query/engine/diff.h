@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The changes between two snapshots of a map as pages, for one answer or for a stream of them.
-// Refuses to look at what no revision between the two touched.
+// The changes between two snapshots of a map as pages, for DiffRevisions and WatchMap. Reads only
+// what some revision between the two touched; a node that came and went is no change.
 #pragma once
 
 #include <memory>
@@ -13,12 +13,20 @@
 #include "query/api/call_context.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/store/graph_store.h"
+#include "schema/store/snapshot.h"
 
 namespace dsg::v1 {
 class DiffRevisionsResponse;
 }  // namespace dsg::v1
 
 namespace dsg::query {
+
+/// Equal to the last bit; the revision does not count.
+bool SameContent(const Node& a, const Node& b);
+bool SameContent(const Edge& a, const Edge& b);
+/// Equal to the last bit, but that q and -q are one rotation: which of them is stored depends on
+/// the poses before it.
+bool IsSamePose(const TimedPose& a, const TimedPose& b);
 
 /// What a difference shows.
 struct DifferenceOptions {
