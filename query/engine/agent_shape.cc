@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The body of one agent over an interval, one message at a time.
-// Refuses to hold more than a message and the shapes that are decoded together.
+// Answers GetAgentShape: the body of one agent over an interval, one message at a time. Memory
+// holds one message and the shapes that are decoded together.
 #include <set>
 #include <string>
 

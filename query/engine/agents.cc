@@ -43,7 +43,7 @@ absl::StatusOr<NodeId> AgentNames::Resolve(const Snapshot& snapshot,
   const Key key{snapshot.opening(), snapshot.revision(), id_or_name};
   if (const auto known = entries_.Find(key)) return *known;
   DSG_ASSIGN_OR_RETURN(const NodeId id, snapshot.ResolveAgent(id_or_name));
-  entries_.Insert(key, id);
+  entries_.Insert(key, id, 1);
   return id;
 }
 
@@ -113,7 +113,7 @@ absl::StatusOr<std::shared_ptr<const Ancestry>> AncestryCache::Find(const Snapsh
   const Key key{snapshot.opening(), snapshot.revision(), stay.place, stay.room};
   if (auto known = entries_.Find(key)) return *std::move(known);
   DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Ancestry> read, Read(snapshot, stay));
-  entries_.Insert(key, read);
+  entries_.Insert(key, read, 1);
   return read;
 }
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "query/engine/bounded_cache.h"
+#include "schema/base/cache.h"
 #include "schema/store/snapshot.h"
 
 namespace dsg::v1 {
@@ -19,6 +19,9 @@ namespace dsg::query {
 
 v1::PoseQuality QualityToProto(PoseQuality quality);
 
+/// The agent that a text names, kept per opened map and revision: a look-up in the store costs
+/// several times as much as finding where the agent was.
+///
 /// Threads: safe from many threads.
 class AgentNames {
  public:
@@ -37,9 +40,11 @@ class AgentNames {
     size_t operator()(const Key& key) const noexcept;
   };
 
-  BoundedCache<Key, NodeId, KeyHash> entries_{65'536};
+  // Entries.
+  Cache<Key, NodeId, KeyHash> entries_{65'536};
 };
 
+/// An agent at one instant; its node alone knows only where it was last.
 struct AgentAt {
   /// Posed as its track has it then.
   Node node;
@@ -62,6 +67,9 @@ struct Ancestry {
   std::string building_id;
 };
 
+/// What stands above a place or room, in the form of replies, kept per opened map and revision:
+/// questions about the past ask for the same few places again and again.
+///
 /// Threads: safe from many threads.
 class AncestryCache {
  public:
@@ -82,8 +90,9 @@ class AncestryCache {
     size_t operator()(const Key& key) const noexcept;
   };
 
-  // About 20 MB; a building has some thousand places, of which one revision is asked at a time.
-  BoundedCache<Key, std::shared_ptr<const Ancestry>, KeyHash> entries_{65'536};
+  // Entries, about 20 MB; a building has some thousand places, of which one revision is asked at a
+  // time.
+  Cache<Key, std::shared_ptr<const Ancestry>, KeyHash> entries_{65'536};
 };
 
 }  // namespace dsg::query

@@ -233,32 +233,12 @@ absl::StatusOr<std::optional<v1::MeshChange>> ChangeOf(const BlockIndex& index, 
   return std::optional<v1::MeshChange>(std::move(change));
 }
 
-std::string PositionOf(NodeId id) {
-  std::string position;
-  AppendWord(id.value, &position);
-  return position;
-}
-
-std::string PositionOf(const EdgeKey& key) {
-  return PositionOf(key.source) + PositionOf(key.target) + key.relation;
-}
-
 std::string PositionOf(const BlockIndex& index) {
   std::string position;
   for (const int64_t axis : {index.x, index.y, index.z}) {
     AppendWord(static_cast<uint64_t>(axis), &position);
   }
   return position;
-}
-
-bool ReadPosition(std::string_view text, NodeId* id) {
-  return TakeWord(&text, &id->value) && text.empty();
-}
-
-bool ReadPosition(std::string_view text, EdgeKey* key) {
-  const bool ok = TakeWord(&text, &key->source.value) && TakeWord(&text, &key->target.value);
-  key->relation = std::string(text);
-  return ok;
 }
 
 bool ReadPosition(std::string_view text, BlockIndex* index) {

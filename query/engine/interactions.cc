@@ -13,11 +13,11 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/meetings.pb.h"
 #include "query/engine/engine.h"
-#include "query/engine/interaction/encounter_search.h"
+#include "query/engine/interaction/encounters.h"
 #include "query/engine/interaction/evidence.h"
 #include "query/engine/interaction/object_change.h"
-#include "query/engine/interaction/observed_time.h"
 #include "query/engine/interaction/sight.h"
+#include "query/engine/interaction/track_path.h"
 #include "query/engine/request.h"
 #include "schema/base/status.h"
 

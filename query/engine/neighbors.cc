@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A node's edges with the nodes at their other ends, and many nodes by id in one call.
-// Refuses to walk further: GetSubgraph does.
+// Answers GetNeighbors, a node's edges with the nodes at their other ends, and BatchGetNodes.
 #include <algorithm>
 #include <optional>
 #include <string>
@@ -12,7 +11,7 @@
 #include "query/engine/engine.h"
 #include "query/engine/nodes.h"
 #include "query/engine/request.h"
-#include "query/engine/search/relation_set.h"
+#include "query/engine/search/vocabulary.h"
 #include "query/engine/view_nodes.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"

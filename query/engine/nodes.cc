@@ -17,22 +17,6 @@
 namespace dsg::query {
 namespace {
 
-std::string EdgePositionOf(const EdgeKey& key) {
-  std::string position;
-  AppendWord(key.source.value, &position);
-  AppendWord(key.target.value, &position);
-  return position + key.relation;
-}
-
-absl::StatusOr<EdgeKey> EdgeKeyOf(std::string_view position) {
-  EdgeKey key;
-  if (!TakeWord(&position, &key.source.value) || !TakeWord(&position, &key.target.value)) {
-    return PageTokenError();
-  }
-  key.relation = std::string(position);
-  return key;
-}
-
 absl::StatusOr<EdgeFilter> EdgeFilterFromProto(const v1::ListEdgesRequest& in,
                                                const Snapshot& snapshot) {
   EdgeFilter filter;
@@ -63,13 +47,13 @@ absl::Status ListEdges(Engine* engine, const CallContext& call, const v1::ListEd
   DSG_ASSIGN_OR_RETURN(const EdgeFilter filter, EdgeFilterFromProto(request, snapshot));
   std::optional<EdgeKey> after;
   if (!page.is_first()) {
-    DSG_ASSIGN_OR_RETURN(after, EdgeKeyOf(page.position));
+    if (!ReadPosition(page.position, &after.emplace())) return PageTokenError();
   }
   EdgeKey last;
   size_t bytes = 0;
   const auto take = [&](const Edge& edge) {
     if (reply->edges_size() == page.size || bytes > kPageBytesSoftMax) {
-      reply->set_next_page_token(page.NextToken(EdgePositionOf(last)));
+      reply->set_next_page_token(page.NextToken(PositionOf(last)));
       return false;
     }
     v1::Edge* out = reply->add_edges();
@@ -184,16 +168,13 @@ absl::Status ListNodes(Engine* engine, const CallContext& call, const v1::ListNo
   DSG_ASSIGN_OR_RETURN(const LayerTable layers, LayersOf(snapshot));
   NodeId last;
   if (!page.is_first()) {
-    std::string_view position = page.position;
-    if (!TakeWord(&position, &last.value) || !position.empty()) return PageTokenError();
+    if (!ReadPosition(page.position, &last)) return PageTokenError();
   }
   size_t bytes = 0;
   // False once the page is full.
   const auto add = [&](const Node& node, bool has_pose) {
     if (reply->nodes_size() == page.size || bytes > kPageBytesSoftMax) {
-      std::string position;
-      AppendWord(last.value, &position);
-      reply->set_next_page_token(page.NextToken(std::move(position)));
+      reply->set_next_page_token(page.NextToken(PositionOf(last)));
       return false;
     }
     v1::Node* out = reply->add_nodes();

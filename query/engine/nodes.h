@@ -35,6 +35,9 @@ absl::StatusOr<NodeId> ResolveOne(const Snapshot& snapshot, const std::string& i
 
 absl::StatusOr<LayerTable> LayersOf(const Snapshot& snapshot);
 
+/// Nodes or edges with keys that are known beforehand: read from the store many at a time, handed
+/// out one by one. Reads no more than one batch ahead.
+///
 /// `Key` is NodeId or EdgeKey. The keys must outlive this.
 ///
 /// Threads: one caller at a time.

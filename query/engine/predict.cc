@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where an agent will be, from its track and the places that people walk to.
-// Refuses to look at anything after the instant that it predicts from.
+// Answers PredictAgent: where an agent will be, from its track and the places that people walk to.
+// Uses nothing after the instant that it predicts from.
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -13,10 +13,9 @@
 #include "query/engine/engine.h"
 #include "query/engine/request.h"
 #include "query/engine/walk_area.h"
-#include "query/prediction/path_check.h"
-#include "query/prediction/prediction.h"
+#include "query/prediction/goal_prediction.h"
 #include "query/prediction/route.h"
-#include "query/prediction/track.h"
+#include "query/prediction/velocity.h"
 #include "query/view/place_graph.h"
 #include "schema/base/status.h"
 

@@ -185,6 +185,26 @@ bool TakeWord(std::string_view* position, uint64_t* word) {
   return true;
 }
 
+std::string PositionOf(NodeId id) {
+  std::string position;
+  AppendWord(id.value, &position);
+  return position;
+}
+
+std::string PositionOf(const EdgeKey& key) {
+  return PositionOf(key.source) + PositionOf(key.target) + key.relation;
+}
+
+bool ReadPosition(std::string_view text, NodeId* id) {
+  return TakeWord(&text, &id->value) && text.empty();
+}
+
+bool ReadPosition(std::string_view text, EdgeKey* key) {
+  const bool ok = TakeWord(&text, &key->source.value) && TakeWord(&text, &key->target.value);
+  key->relation = std::string(text);
+  return ok;
+}
+
 absl::Status PageTokenError() {
   return MakeError(Reason::kPageTokenMismatch,
                    "the page token was not given for this question, or was changed; repeat the "

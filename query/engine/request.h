@@ -64,6 +64,8 @@ absl::StatusOr<NodeFilter> FilterFromProto(const v1::NodeFilter& in, const Snaps
 /// Errors: NOT_FOUND/TAG_UNKNOWN, which lists the tags that there are.
 absl::StatusOr<Revision> RevisionOfTag(MapReader* map, const std::string& tag);
 
+/// What a ReadAt resolves to: a snapshot, and the revisions that the header of the reply names.
+///
 /// Threads: safe from many threads; holds no lock.
 class ReadView {
  public:
@@ -105,6 +107,9 @@ uint64_t QuestionDigest(std::string_view method, const google::protobuf::Message
 /// Of the map's incarnation, for a token.
 uint64_t DigestOf(const MapReader& map);
 
+/// Where a list goes on: bound to the map and the revision that the first page read, and to the
+/// question. A token of another question or map is refused, so that two lists cannot be mixed
+/// unnoticed.
 struct PageToken {
   uint64_t incarnation = 0;
   Revision revision = 0;
@@ -128,6 +133,11 @@ absl::Status PageTokenError();
 void AppendWord(uint64_t word, std::string* position);
 /// Takes them off its front. False if there are fewer than 64 bits.
 bool TakeWord(std::string_view* position, uint64_t* word);
+/// Keys as positions, and back. False if the text is no position of such a key.
+std::string PositionOf(NodeId id);
+std::string PositionOf(const EdgeKey& key);
+bool ReadPosition(std::string_view text, NodeId* id);
+bool ReadPosition(std::string_view text, EdgeKey* key);
 
 /// One page of a list: what to read, from where on, and how much.
 struct Page {

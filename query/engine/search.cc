@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nodes by class, name, colour, attribute, relation and containment. Refuses to guess: a word that
-// the map does not know is an error that lists what is near in spelling.
+// Answers SearchNodes: nodes by class, name, colour, attribute, relation and containment. A word
+// that the map does not know is an error that lists what is near in spelling.
 #include <bit>
 #include <cmath>
 #include <utility>
@@ -10,7 +10,8 @@
 #include "query/engine/engine.h"
 #include "query/engine/nodes.h"
 #include "query/engine/request.h"
-#include "query/engine/search/compiled_pattern.h"
+#include "query/engine/search/pattern.h"
+#include "query/engine/search/query_language.h"
 #include "query/engine/search/search_run.h"
 #include "query/engine/view_nodes.h"
 #include "schema/base/status.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// All that can be reached from a node, as a stream: nodes by distance, then the edges between them.
-// Refuses to hold a filled message longer than it takes to send it.
+// Answers GetSubgraph: all that can be reached from a node, as a stream of nodes by distance, then
+// the edges between them.
 #include <algorithm>
 #include <functional>
 #include <string>
@@ -14,7 +14,7 @@
 #include "query/engine/engine.h"
 #include "query/engine/nodes.h"
 #include "query/engine/request.h"
-#include "query/engine/search/relation_set.h"
+#include "query/engine/search/vocabulary.h"
 #include "query/engine/view_nodes.h"
 #include "query/view/stoppable_sort.h"
 #include "schema/base/status.h"

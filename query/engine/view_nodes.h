@@ -19,6 +19,7 @@ class Node;
 
 namespace dsg::query {
 
+/// A NodeFilter in the symbols of a view; it admits what NodeFilter::Matches admits.
 class ViewFilter {
  public:
   /// `graph` must outlive this.
@@ -41,6 +42,9 @@ class ViewFilter {
   std::optional<Symbol> name_;
 };
 
+/// Writes nodes of a view into replies: from memory if it holds the asked-for part of a node, else
+/// from the store. Both give the same bytes.
+///
 /// Threads: one caller at a time.
 class NodeFiller {
  public:

@@ -9,7 +9,7 @@
 #include <mutex>
 #include <vector>
 
-#include "query/prediction/prediction.h"
+#include "query/prediction/goal_prediction.h"
 #include "query/view/graph_view.h"
 #include "query/view/place_graph.h"
 
@@ -71,6 +71,9 @@ absl::StatusOr<WalkArea> MakeWalkArea(const GraphView& view, const PlaceGraph& a
                                       const WalkGrounds& grounds, const WalkTile& tile,
                                       TimeNs at_ns, const StopCheck& stop);
 
+/// The walk areas that predictions used last, under a bound of memory. Keeps no graph alive: areas
+/// of graphs that are gone go too.
+///
 /// Threads: safe from many threads; areas are made outside the lock, so two that ask for the same
 /// one at once may both make it.
 class WalkAreaCache {

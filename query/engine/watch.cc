@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The revisions of a map as they come, from where the caller left off.
-// Refuses to keep a thread while nothing happens.
+// Answers WatchMap: the revisions of a map as they come, from where the caller left off. Holds no
+// thread while nothing happens.
 #include <algorithm>
 #include <chrono>
 #include <string>

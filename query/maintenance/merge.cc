@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Another map taken into this one, a batch a message.
-// Refuses to guess a transform that the maps do not tell.
+// Answers MergeMaps: takes another map into this one, a batch a message. Refuses to guess a
+// transform that the maps do not tell.
 #include <algorithm>
 #include <map>
 #include <optional>

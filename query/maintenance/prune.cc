@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Forgets by policy, a step a message: plan, check, commit in batches, erase, compact, report.
-// Refuses to forget all of a map unless it is told that it may.
+// Answers Prune: forgets by policy, a step a message: plan, check, commit in batches, erase,
+// compact, report. Refuses to forget all of a map unless it is told that it may.
 #include <algorithm>
 #include <chrono>
 #include <functional>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Policies and amounts as messages and back. Refuses to judge a policy: that is Validate.
+// Policies and amounts as messages and back. PrunePolicy::Validate judges a policy.
 #pragma once
 
 #include "absl/status/statusor.h"

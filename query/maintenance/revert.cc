@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A map made what it was at a revision, as new revisions, a batch a message.
-// Refuses to lose what was believed since: the revisions between stay readable.
+// Answers Revert: makes a map what it was at a revision, as new revisions, a batch a message. The
+// revisions between stay readable.
 #include <string>
 #include <utility>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What has to be written so that a map is again what it was: keys only, cut into batches that are
-// valid deltas in their order. Refuses to look at what no revision between touched, but for the
-// shapes, factors and stays of agents, which no list of touched keys names.
+// valid deltas in their order. Reads only what some revision between touched, and the shapes,
+// factors and stays of agents, which no list of touched keys names.
 #pragma once
 
 #include <memory>
