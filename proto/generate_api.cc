@@ -200,7 +200,8 @@ void WriteEngineApi(const std::vector<Method>& methods, const std::string& folde
   out.Raw(
       "#include \"query/api/api.h\"\n#include \"schema/base/status.h\"\n\n"
       "namespace dsg::query {\n\nstruct Engine;\n\n"
-      "// The functions that answer, one a method, all defined in query/engine.\n");
+      "// The functions that answer, one a method, defined in query/engine and\n"
+      "// query/maintenance.\n");
   out.Each(methods,
            "absl::Status $Name$(Engine* engine, const CallContext& call,\n"
            "    const v1::$Request$& request, v1::$Reply$* reply);\n",

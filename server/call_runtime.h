@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "query/engine/service_core.h"
+#include "query/service/service_core.h"
 #include "server/arena_blocks.h"
 #include "server/arrivals.h"
 #include "server/call_guard.h"

@@ -11,7 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/maintenance_service.pb.h"
 #include "dsg/v1/map_service.pb.h"
-#include "query/engine/prune_convert.h"
+#include "query/maintenance/prune_convert.h"
 #include "schema/base/log.h"
 #include "schema/base/status.h"
 

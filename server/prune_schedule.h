@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "query/engine/service_core.h"
+#include "query/service/service_core.h"
 #include "schema/retention/policy_file.h"
 
 namespace dsg::server {

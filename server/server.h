@@ -7,7 +7,7 @@
 #include <string>
 
 #include "absl/status/statusor.h"
-#include "query/engine/service_core.h"
+#include "query/service/service_core.h"
 
 namespace dsg::server {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "query/client/wait_notes.h"
+#include "query/client/retry.h"
 #include "schema/model/layer.h"
 #include "schema/model/node.h"
 #include "schema/store/graph_writer.h"

@@ -7,7 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/map_service.pb.h"
 #include "query/client/remote_api.h"
-#include "query/engine/service_core.h"
+#include "query/service/service_core.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/store/graph_store.h"

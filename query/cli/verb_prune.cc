@@ -15,7 +15,7 @@
 #include "query/cli/render_prune.h"
 #include "query/cli/values.h"
 #include "query/cli/verbs.h"
-#include "query/engine/prune_convert.h"
+#include "query/maintenance/prune_convert.h"
 #include "schema/base/status.h"
 #include "schema/retention/policy.h"
 #include "schema/retention/policy_file.h"

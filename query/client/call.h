@@ -18,7 +18,7 @@
 #include "absl/status/status.h"
 #include "query/api/method_info.h"
 #include "query/api/stream_cursor.h"
-#include "query/client/channel.h"
+#include "query/client/remote_api.h"
 #include "query/client/retry.h"
 #include "schema/base/status.h"
 

@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The body of one agent over an interval, one message at a time.
-// Refuses to hold more than a message and the shapes that are decoded together.
+// Answers GetAgentShape: the body of one agent over an interval, one message at a time. Memory
+// holds one message and the shapes that are decoded together.
 #include <set>
 #include <string>
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
-#include "query/engine/agent_names.h"
+#include "query/engine/agents.h"
 #include "query/engine/engine.h"
-#include "query/engine/engine_cursor.h"
-#include "query/engine/read_view.h"
-#include "query/engine/request_check.h"
+#include "query/engine/request.h"
 #include "schema/base/status.h"
 #include "schema/codec/checksum.h"
 #include "schema/codec/proto_convert.h"
@@ -51,25 +49,13 @@ absl::StatusOr<Parts> PartsOf(const v1::GetAgentShapeRequest& request) {
   return parts;
 }
 
-v1::PoseQuality QualityOf(PoseQuality quality) {
-  switch (quality) {
-    case PoseQuality::kExact:
-      return v1::EXACT;
-    case PoseQuality::kInterpolated:
-      return v1::INTERPOLATED;
-    case PoseQuality::kInGap:
-      return v1::IN_GAP;
-  }
-  return v1::POSE_QUALITY_UNSPECIFIED;
-}
-
 std::string BytesOf(const Sha256& digest) {
   return std::string(reinterpret_cast<const char*>(digest.data()), digest.size());
 }
 
-class Cursor final : public EngineCursor<v1::GetAgentShapeResponse> {
+class ShapeCursor final : public EngineCursor<v1::GetAgentShapeResponse> {
  public:
-  Cursor(const ReadView& view, NodeId agent, const Parts& parts, TimeNs from_ns, TimeNs to_ns)
+  ShapeCursor(const ReadView& view, NodeId agent, const Parts& parts, TimeNs from_ns, TimeNs to_ns)
       : view_(view), agent_(agent), parts_(parts), next_ns_(from_ns), to_ns_(to_ns) {}
 
   bool done() const override { return done_; }
@@ -157,7 +143,7 @@ class Cursor final : public EngineCursor<v1::GetAgentShapeResponse> {
           absl::IsOutOfRange(located.status()) || absl::IsNotFound(located.status());
       return is_outside ? absl::OkStatus() : located.status();
     }
-    out->set_quality(QualityOf(located->quality));
+    out->set_quality(QualityToProto(located->quality));
     if (located->quality != PoseQuality::kInGap) {
       ToProto(located->map_T_agent, out->mutable_pose());
     }
@@ -186,7 +172,7 @@ CursorOr<v1::GetAgentShapeResponse> GetAgentShape(Engine* engine, const CallCont
   const TimeNs to_ns = request.has_to_ns() ? request.to_ns() : kTimeMax;
   DSG_RETURN_IF_ERROR(CheckTimeRange(from_ns, to_ns));
   DSG_ASSIGN_OR_RETURN(const NodeId agent, engine->names.Resolve(view.snapshot(), request.agent()));
-  return std::make_unique<Cursor>(view, agent, parts, from_ns, to_ns);
+  return std::make_unique<ShapeCursor>(view, agent, parts, from_ns, to_ns);
 }
 
 }  // namespace dsg::query

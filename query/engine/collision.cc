@@ -14,7 +14,7 @@
 #include "dsg/v1/query_service.pb.h"
 #include "query/engine/collision/collision_world.h"
 #include "query/engine/engine.h"
-#include "query/engine/request_check.h"
+#include "query/engine/request.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 

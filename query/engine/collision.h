@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a body touches at a pose or on its way, and how far away everything else is.
-// Refuses to call free what nobody has looked at: such answers are marked.
+// Answers CheckCollision: what a body touches at a pose or on its way, and its clearance to
+// everything else.
 #pragma once
 
 namespace dsg::v1 {

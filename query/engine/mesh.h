@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The mesh of a map, a few blocks a message. Refuses to send a block that outgrows a message in one
-// piece.
+// Answers GetMesh, a few blocks a message, and GetAsset. A block that outgrows a message is cut
+// into pieces.
 #pragma once
 
 #include <vector>

@@ -10,11 +10,10 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
-#include "query/engine/agents_at.h"
+#include "query/engine/agents.h"
 #include "query/engine/engine.h"
 #include "query/engine/nodes.h"
-#include "query/engine/request_check.h"
-#include "query/engine/view_filter.h"
+#include "query/engine/request.h"
 #include "query/engine/view_nodes.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
@@ -22,16 +21,16 @@
 namespace dsg::query {
 namespace {
 
-struct Question {
+struct NearestQuestion {
   Eigen::Vector3d point_map = Eigen::Vector3d::Zero();
   int k = 1;
   double max_distance_m = std::numeric_limits<double>::infinity();
   NodeFilter filter;
 };
 
-absl::StatusOr<Question> ReadQuestion(const v1::ListNearestNodesRequest& request,
-                                      const Snapshot& snapshot) {
-  Question question;
+absl::StatusOr<NearestQuestion> ReadNearestQuestion(const v1::ListNearestNodesRequest& request,
+                                                    const Snapshot& snapshot) {
+  NearestQuestion question;
   if (!request.has_position()) return FieldError("position", "", "give a point of the map frame");
   DSG_ASSIGN_OR_RETURN(question.point_map, PointFromProto(request.position(), "position"));
   if (request.k() < 0 || request.k() > kPageSizeMax) {
@@ -62,7 +61,7 @@ struct Found {
 };
 
 // No index helps: each agent stands somewhere else at every instant.
-std::vector<Found> NearAgents(const std::vector<AgentAt>& agents, const Question& question) {
+std::vector<Found> NearAgents(const std::vector<AgentAt>& agents, const NearestQuestion& question) {
   std::vector<Found> found;
   for (const AgentAt& agent : agents) {
     const double distance_m = agent.node.DistanceTo(question.point_map);
@@ -74,8 +73,8 @@ std::vector<Found> NearAgents(const std::vector<AgentAt>& agents, const Question
 }
 
 // Without agents where an instant is asked about.
-absl::Status AddFromView(const GraphView& graph, const Question& question, const StopCheck& stop,
-                         std::vector<Found>* found) {
+absl::Status AddFromView(const GraphView& graph, const NearestQuestion& question,
+                         const StopCheck& stop, std::vector<Found>* found) {
   constexpr int kStopEvery = 256;
   const ViewFilter filter(question.filter, graph);
   if (!filter.CanMatch()) return absl::OkStatus();
@@ -150,7 +149,7 @@ absl::Status ListNearestNodes(Engine* engine, const CallContext& call,
   DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
   const Snapshot& snapshot = view.snapshot();
   DSG_RETURN_IF_ERROR(CheckNodeView(request.view()));
-  DSG_ASSIGN_OR_RETURN(const Question question, ReadQuestion(request, snapshot));
+  DSG_ASSIGN_OR_RETURN(const NearestQuestion question, ReadNearestQuestion(request, snapshot));
   view.FillHeader(reply->mutable_header());
   const bool agents_only = AsksForAgents(question.filter);
   if (agents_only && !question.filter.at_ns.has_value()) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A node's edges with the nodes at their other ends, and many nodes by id in one call.
-// Refuses to walk further: GetSubgraph does.
+// Answers GetNeighbors, a node's edges with the nodes at their other ends, and BatchGetNodes.
 #include <algorithm>
 #include <optional>
 #include <string>
@@ -10,10 +9,9 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/engine/engine.h"
-#include "query/engine/in_turn.h"
 #include "query/engine/nodes.h"
-#include "query/engine/request_check.h"
-#include "query/engine/search/relation_set.h"
+#include "query/engine/request.h"
+#include "query/engine/search/vocabulary.h"
 #include "query/engine/view_nodes.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
@@ -35,14 +33,14 @@ struct NeighborKey {
   }
 };
 
-std::string EncodePosition(const NeighborKey& key) {
+std::string PositionOf(const NeighborKey& key) {
   std::string position;
   AppendWord(key.is_incoming ? 1 : 0, &position);
   AppendWord(key.other.value, &position);
   return position + key.relation;
 }
 
-absl::StatusOr<NeighborKey> DecodePosition(std::string_view position) {
+absl::StatusOr<NeighborKey> NeighborKeyOf(std::string_view position) {
   uint64_t is_incoming = 0;
   NeighborKey key;
   if (!TakeWord(&position, &is_incoming) || is_incoming > 1 ||
@@ -54,7 +52,7 @@ absl::StatusOr<NeighborKey> DecodePosition(std::string_view position) {
   return key;
 }
 
-struct Question {
+struct NeighborQuestion {
   NodeId node;
   RelationSet relations;
   bool outgoing = true;
@@ -64,7 +62,7 @@ struct Question {
 
 // Keys after `after`, the first `limit` of them ascending.
 absl::StatusOr<std::vector<NeighborKey>> FindNeighbors(const GraphView& graph,
-                                                       const Question& question,
+                                                       const NeighborQuestion& question,
                                                        const std::optional<NeighborKey>& after,
                                                        size_t limit, const CallContext& call) {
   constexpr size_t kStopEvery = 256;
@@ -115,10 +113,10 @@ absl::Status FillNeighbor(const Snapshot& snapshot, const GraphView& graph, Node
   return filler->Fill(*graph.FindNode(key.other), out->mutable_node());
 }
 
-absl::StatusOr<Question> ReadQuestion(const ReadView& view, const GraphView& graph,
-                                      const v1::GetNeighborsRequest& request,
-                                      const StopCheck& stop) {
-  Question question;
+absl::StatusOr<NeighborQuestion> ReadNeighborQuestion(const ReadView& view, const GraphView& graph,
+                                                      const v1::GetNeighborsRequest& request,
+                                                      const StopCheck& stop) {
+  NeighborQuestion question;
   DSG_ASSIGN_OR_RETURN(question.node, ResolveOne(view.snapshot(), request.id(), "id", stop));
   DSG_ASSIGN_OR_RETURN(
       question.relations,
@@ -161,11 +159,12 @@ absl::Status GetNeighbors(Engine* engine, const CallContext& call,
   DSG_RETURN_IF_ERROR(CheckNodeView(request.view()));
   std::optional<NeighborKey> after;
   if (!page.is_first()) {
-    DSG_ASSIGN_OR_RETURN(after, DecodePosition(page.position));
+    DSG_ASSIGN_OR_RETURN(after, NeighborKeyOf(page.position));
   }
   const StopCheck stop = call.stop();
   DSG_ASSIGN_OR_RETURN(const auto graph, page.view.Graph(stop));
-  DSG_ASSIGN_OR_RETURN(const Question question, ReadQuestion(page.view, *graph, request, stop));
+  DSG_ASSIGN_OR_RETURN(const NeighborQuestion question,
+                       ReadNeighborQuestion(page.view, *graph, request, stop));
   const auto size = static_cast<size_t>(page.size);
   DSG_ASSIGN_OR_RETURN(const std::vector<NeighborKey> found,
                        FindNeighbors(*graph, question, after, size + 1, call));
@@ -189,7 +188,7 @@ absl::Status GetNeighbors(Engine* engine, const CallContext& call,
         FillNeighbor(snapshot, *graph, question.node, found[i], &edges, &filler, out));
     bytes += out->ByteSizeLong();
     if (i + 1 < found.size() && (i + 1 == size || bytes > kPageBytesSoftMax)) {
-      reply->set_next_page_token(page.NextToken(EncodePosition(found[i])));
+      reply->set_next_page_token(page.NextToken(PositionOf(found[i])));
       break;
     }
   }

@@ -8,13 +8,64 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
-#include "query/engine/agents_at.h"
-#include "query/engine/edges.h"
+#include "query/engine/agents.h"
 #include "query/engine/engine.h"
-#include "query/engine/request_check.h"
+#include "query/engine/request.h"
 #include "schema/base/status.h"
+#include "schema/codec/proto_convert.h"
 
 namespace dsg::query {
+namespace {
+
+absl::StatusOr<EdgeFilter> EdgeFilterFromProto(const v1::ListEdgesRequest& in,
+                                               const Snapshot& snapshot) {
+  EdgeFilter filter;
+  if (!in.source().empty()) {
+    DSG_ASSIGN_OR_RETURN(filter.source, snapshot.ResolveNode(in.source()));
+  }
+  if (!in.target().empty()) {
+    DSG_ASSIGN_OR_RETURN(filter.target, snapshot.ResolveNode(in.target()));
+  }
+  filter.relation = in.relation();
+  if (in.has_at_ns()) filter.at_ns = in.at_ns();
+  return filter;
+}
+
+}  // namespace
+
+EdgeFilter ChildrenOf(NodeId parent) {
+  EdgeFilter filter;
+  filter.source = parent;
+  filter.relation = relations::kContains;
+  return filter;
+}
+
+absl::Status ListEdges(Engine* engine, const CallContext& call, const v1::ListEdgesRequest& request,
+                       v1::ListEdgesResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const Page page, engine->ReadPage("ListEdges", request));
+  const Snapshot& snapshot = page.view.snapshot();
+  DSG_ASSIGN_OR_RETURN(const EdgeFilter filter, EdgeFilterFromProto(request, snapshot));
+  std::optional<EdgeKey> after;
+  if (!page.is_first()) {
+    if (!ReadPosition(page.position, &after.emplace())) return PageTokenError();
+  }
+  EdgeKey last;
+  size_t bytes = 0;
+  const auto take = [&](const Edge& edge) {
+    if (reply->edges_size() == page.size || bytes > kPageBytesSoftMax) {
+      reply->set_next_page_token(page.NextToken(PositionOf(last)));
+      return false;
+    }
+    v1::Edge* out = reply->add_edges();
+    ToProto(edge, out);
+    bytes += out->ByteSizeLong();
+    last = edge.key();
+    return true;
+  };
+  page.view.FillHeader(reply->mutable_header());
+  return snapshot.ScanEdges(filter, after, call.stop(), take);
+}
+
 namespace {
 
 // A node asked for by a name that several share would be an arbitrary one of them.
@@ -117,16 +168,13 @@ absl::Status ListNodes(Engine* engine, const CallContext& call, const v1::ListNo
   DSG_ASSIGN_OR_RETURN(const LayerTable layers, LayersOf(snapshot));
   NodeId last;
   if (!page.is_first()) {
-    std::string_view position = page.position;
-    if (!TakeWord(&position, &last.value) || !position.empty()) return PageTokenError();
+    if (!ReadPosition(page.position, &last)) return PageTokenError();
   }
   size_t bytes = 0;
   // False once the page is full.
   const auto add = [&](const Node& node, bool has_pose) {
     if (reply->nodes_size() == page.size || bytes > kPageBytesSoftMax) {
-      std::string position;
-      AppendWord(last.value, &position);
-      reply->set_next_page_token(page.NextToken(std::move(position)));
+      reply->set_next_page_token(page.NextToken(PositionOf(last)));
       return false;
     }
     v1::Node* out = reply->add_nodes();

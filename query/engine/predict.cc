@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where an agent will be, from its track and the places that people walk to.
-// Refuses to look at anything after the instant that it predicts from.
+// Answers PredictAgent: where an agent will be, from its track and the places that people walk to.
+// Uses nothing after the instant that it predicts from.
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -11,12 +11,11 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/space.pb.h"
 #include "query/engine/engine.h"
-#include "query/engine/request_check.h"
+#include "query/engine/request.h"
 #include "query/engine/walk_area.h"
-#include "query/prediction/path_check.h"
-#include "query/prediction/prediction.h"
+#include "query/prediction/goal_prediction.h"
 #include "query/prediction/route.h"
-#include "query/prediction/track.h"
+#include "query/prediction/velocity.h"
 #include "query/view/place_graph.h"
 #include "schema/base/status.h"
 
@@ -37,7 +36,7 @@ constexpr double kGoalReachMMax = 40.0;
 // Of the velocity that the reply shows.
 constexpr double kDecayShown = 0.4;
 
-struct Question {
+struct PredictQuestion {
   NodeId agent;
   v1::PredictionModel model = v1::GOALS;
   int path_count_max = kPathCountDefault;
@@ -82,9 +81,9 @@ absl::Status OutsideTrack(const TrackInfo& track, TimeNs from_ns, std::string_vi
                    std::move(metadata));
 }
 
-absl::StatusOr<Question> ReadQuestion(const v1::PredictAgentRequest& request,
-                                      const TrackInfo& track) {
-  Question question;
+absl::StatusOr<PredictQuestion> ReadPredictQuestion(const v1::PredictAgentRequest& request,
+                                                    const TrackInfo& track) {
+  PredictQuestion question;
   question.agent = track.agent;
   if (request.model() != v1::PREDICTION_MODEL_UNSPECIFIED) question.model = request.model();
   if (!v1::PredictionModel_IsValid(request.model())) {
@@ -154,17 +153,17 @@ struct Foreseen {
   std::vector<NodeId> goal_nodes;
 };
 
-double ReachM(const std::vector<PathPoint>& path, const Question& question) {
+double ReachM(const std::vector<PathPoint>& path, const PredictQuestion& question) {
   const double speed_m_s = SmoothedVelocity(path, kDecayShown).velocity_map.norm();
   return question.at_ns.empty() ? 0.0 : speed_m_s * SecondsAhead(path, question.at_ns.back());
 }
 
 // Of the walk areas, so that few differ.
-double WantedReachM(const std::vector<PathPoint>& path, const Question& question) {
+double WantedReachM(const std::vector<PathPoint>& path, const PredictQuestion& question) {
   return 10.0 + 1.5 * ReachM(path, question) > kGoalReachMMin ? kGoalReachMMax : kGoalReachMMin;
 }
 
-Foreseen Straight(const std::vector<PathPoint>& path, const Question& question,
+Foreseen Straight(const std::vector<PathPoint>& path, const PredictQuestion& question,
                   v1::PredictionModel model) {
   PredictedPath path_ahead = model == v1::WEIGHTED_VELOCITY
                                  ? PredictWeightedVelocity(path, question.at_ns, {})
@@ -174,7 +173,7 @@ Foreseen Straight(const std::vector<PathPoint>& path, const Question& question,
 
 // Of who is far from all places, what weighted velocity says.
 absl::StatusOr<Foreseen> ToGoals(const WalkArea& area, const std::vector<PathPoint>& path,
-                                 const Question& question, const StopCheck& stop) {
+                                 const PredictQuestion& question, const StopCheck& stop) {
   GoalOptions options;
   options.path_count_max = question.path_count_max;
   options.way_m_max = std::max(options.way_m_max, WantedReachM(path, question));
@@ -188,7 +187,7 @@ absl::StatusOr<Foreseen> ToGoals(const WalkArea& area, const std::vector<PathPoi
 
 // Straight walks are not bound to an area, however far they lead.
 absl::Status StopAtWalls(const PlaceGraph& places, const std::vector<PathPoint>& path,
-                         const Question& question, const StopCheck& stop,
+                         const PredictQuestion& question, const StopCheck& stop,
                          std::vector<PredictedPath>* paths) {
   const WalkTile tile = TileOf(path.back().position_map, kGoalReachMMin + ReachM(path, question));
   DSG_ASSIGN_OR_RETURN(const WalkGraph graph, PlacesOfTile(places, tile, question.from_ns, stop));
@@ -200,7 +199,7 @@ absl::Status StopAtWalls(const PlaceGraph& places, const std::vector<PathPoint>&
 
 absl::StatusOr<Foreseen> Foresee(const ReadView& view, WalkAreaCache* areas,
                                  const CallContext& call, const std::vector<PathPoint>& path,
-                                 const Question& question) {
+                                 const PredictQuestion& question) {
   const bool is_straight = question.model != v1::GOALS;
   if (is_straight && !question.stop_at_walls) return Straight(path, question, question.model);
   const StopCheck stop = call.stop();
@@ -255,7 +254,7 @@ absl::Status PredictAgent(Engine* engine, const CallContext& call,
   const Snapshot& snapshot = view.snapshot();
   DSG_ASSIGN_OR_RETURN(const NodeId agent, engine->names.Resolve(snapshot, request.agent()));
   DSG_ASSIGN_OR_RETURN(const TrackInfo track, snapshot.GetTrack(agent));
-  DSG_ASSIGN_OR_RETURN(const Question question, ReadQuestion(request, track));
+  DSG_ASSIGN_OR_RETURN(const PredictQuestion question, ReadPredictQuestion(request, track));
   DSG_ASSIGN_OR_RETURN(const std::vector<PathPoint> path,
                        ReadTrack(snapshot, track, question.from_ns, call.stop()));
   DSG_ASSIGN_OR_RETURN(const Foreseen foreseen,

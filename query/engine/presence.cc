@@ -10,9 +10,9 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
-#include "query/engine/edges.h"
 #include "query/engine/engine.h"
-#include "query/engine/request_check.h"
+#include "query/engine/nodes.h"
+#include "query/engine/request.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 
@@ -32,7 +32,7 @@ struct Presence {
   TimeNs exit_ns = 0;
 };
 
-std::string EncodePosition(const PresenceKey& key) {
+std::string PositionOf(const PresenceKey& key) {
   std::string position;
   AppendWord(static_cast<uint64_t>(key.enter_ns), &position);
   AppendWord(key.agent.value, &position);
@@ -40,7 +40,7 @@ std::string EncodePosition(const PresenceKey& key) {
   return position;
 }
 
-absl::StatusOr<PresenceKey> DecodePosition(std::string_view position) {
+absl::StatusOr<PresenceKey> PresenceKeyOf(std::string_view position) {
   uint64_t enter = 0;
   PresenceKey key;
   if (!TakeWord(&position, &enter) || !TakeWord(&position, &key.agent.value) ||
@@ -158,7 +158,7 @@ absl::StatusOr<std::vector<Presence>> FindPresence(const Snapshot& snapshot,
   return found;
 }
 
-absl::Status CheckRequest(const v1::ListPresenceRequest& request) {
+absl::Status CheckPresenceRequest(const v1::ListPresenceRequest& request) {
   DSG_RETURN_IF_ERROR(CheckTimeRange(request.from_ns(), request.to_ns()));
   if (request.has_box()) return BoxFromProto(request.box(), "box").status();
   if (!request.node_id().empty()) return absl::OkStatus();
@@ -169,12 +169,12 @@ absl::Status CheckRequest(const v1::ListPresenceRequest& request) {
 
 absl::Status ListPresence(Engine* engine, const CallContext& call,
                           const v1::ListPresenceRequest& request, v1::ListPresenceResponse* reply) {
-  DSG_RETURN_IF_ERROR(CheckRequest(request));
+  DSG_RETURN_IF_ERROR(CheckPresenceRequest(request));
   DSG_ASSIGN_OR_RETURN(const Page page, engine->ReadPage("ListPresence", request));
   const Snapshot& snapshot = page.view.snapshot();
   PresenceKey after;
   if (!page.is_first()) {
-    DSG_ASSIGN_OR_RETURN(after, DecodePosition(page.position));
+    DSG_ASSIGN_OR_RETURN(after, PresenceKeyOf(page.position));
   }
   DSG_ASSIGN_OR_RETURN(const std::vector<Presence> found,
                        FindPresence(snapshot, request, after, call.stop()));
@@ -183,7 +183,7 @@ absl::Status ListPresence(Engine* engine, const CallContext& call,
   for (const Presence& presence : found) {
     if (reply->intervals_size() == page.size || bytes > kPageBytesSoftMax) {
       const Presence& last = found[static_cast<size_t>(reply->intervals_size()) - 1];
-      reply->set_next_page_token(page.NextToken(EncodePosition(last.key)));
+      reply->set_next_page_token(page.NextToken(PositionOf(last.key)));
       break;
     }
     DSG_ASSIGN_OR_RETURN(TrackInfo track, snapshot.GetTrack(presence.key.agent));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nodes by class, name, colour, attribute, relation and containment. Refuses to guess: a word that
-// the map does not know is an error that lists what is near in spelling.
+// Answers SearchNodes: nodes by class, name, colour, attribute, relation and containment. A word
+// that the map does not know is an error that lists what is near in spelling.
 #include <bit>
 #include <cmath>
 #include <utility>
@@ -9,8 +9,9 @@
 #include "dsg/v1/query_service.pb.h"
 #include "query/engine/engine.h"
 #include "query/engine/nodes.h"
-#include "query/engine/request_check.h"
-#include "query/engine/search/compiled_pattern.h"
+#include "query/engine/request.h"
+#include "query/engine/search/pattern.h"
+#include "query/engine/search/query_language.h"
 #include "query/engine/search/search_run.h"
 #include "query/engine/view_nodes.h"
 #include "schema/base/status.h"
@@ -18,14 +19,14 @@
 namespace dsg::query {
 namespace {
 
-std::string EncodePosition(const HitKey& key) {
+std::string PositionOf(const HitKey& key) {
   std::string position;
   AppendWord(std::bit_cast<uint64_t>(key.distance_m), &position);
   AppendWord(key.id.value, &position);
   return position;
 }
 
-absl::StatusOr<HitKey> DecodePosition(std::string_view position) {
+absl::StatusOr<HitKey> HitKeyOf(std::string_view position) {
   uint64_t distance_bits = 0;
   HitKey key;
   if (!TakeWord(&position, &distance_bits) || !TakeWord(&position, &key.id.value) ||
@@ -52,8 +53,8 @@ absl::StatusOr<NodePattern> ReadPattern(const v1::SearchNodesRequest& request) {
 }
 
 // Checks that need no map.
-absl::StatusOr<SearchQuestion> ReadQuestion(const Page& page,
-                                            const v1::SearchNodesRequest& request) {
+absl::StatusOr<SearchQuestion> ReadSearchQuestion(const Page& page,
+                                                  const v1::SearchNodesRequest& request) {
   SearchQuestion question;
   if (request.has_near()) {
     DSG_ASSIGN_OR_RETURN(question.near_map, PointFromProto(request.near(), "near"));
@@ -75,7 +76,7 @@ absl::StatusOr<SearchQuestion> ReadQuestion(const Page& page,
   }
   if (request.has_at_ns()) question.at_ns = request.at_ns();
   if (!page.is_first()) {
-    DSG_ASSIGN_OR_RETURN(question.after, DecodePosition(page.position));
+    DSG_ASSIGN_OR_RETURN(question.after, HitKeyOf(page.position));
   }
   question.limit = page.size;
   question.explain = request.explain();
@@ -123,7 +124,7 @@ absl::Status SearchNodes(Engine* engine, const CallContext& call,
   DSG_ASSIGN_OR_RETURN(const Page page, engine->ReadPage("SearchNodes", request));
   DSG_RETURN_IF_ERROR(CheckNodeView(request.view()));
   DSG_ASSIGN_OR_RETURN(const NodePattern pattern, ReadPattern(request));
-  DSG_ASSIGN_OR_RETURN(SearchQuestion question, ReadQuestion(page, request));
+  DSG_ASSIGN_OR_RETURN(SearchQuestion question, ReadSearchQuestion(page, request));
   const StopCheck stop = call.stop();
   DSG_ASSIGN_OR_RETURN(const auto graph, page.view.Graph(stop));
   const Snapshot& snapshot = page.view.snapshot();
@@ -148,7 +149,7 @@ absl::Status SearchNodes(Engine* engine, const CallContext& call,
     bytes += out->ByteSizeLong();
     const bool is_last = i + 1 == answer.hits.size();
     if ((is_last && answer.has_more) || (!is_last && bytes > kPageBytesSoftMax)) {
-      reply->set_next_page_token(page.NextToken(EncodePosition(answer.hits[i].key)));
+      reply->set_next_page_token(page.NextToken(PositionOf(answer.hits[i].key)));
       break;
     }
   }

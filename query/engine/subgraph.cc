@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// All that can be reached from a node, as a stream: nodes by distance, then the edges between them.
-// Refuses to hold a filled message longer than it takes to send it.
+// Answers GetSubgraph: all that can be reached from a node, as a stream of nodes by distance, then
+// the edges between them.
 #include <algorithm>
 #include <functional>
 #include <string>
@@ -12,13 +12,9 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/engine/engine.h"
-#include "query/engine/engine_cursor.h"
-#include "query/engine/in_turn.h"
 #include "query/engine/nodes.h"
-#include "query/engine/read_view.h"
-#include "query/engine/request_check.h"
-#include "query/engine/search/relation_set.h"
-#include "query/engine/view_filter.h"
+#include "query/engine/request.h"
+#include "query/engine/search/vocabulary.h"
 #include "query/engine/view_nodes.h"
 #include "query/view/stoppable_sort.h"
 #include "schema/base/status.h"
@@ -30,7 +26,7 @@ namespace {
 // Edges that are looked at between two looks at the deadline.
 constexpr size_t kStopEvery = 256;
 
-struct Question {
+struct SubgraphQuestion {
   NodeId root;
   std::vector<std::string> relations;
   bool both_directions = false;
@@ -48,9 +44,10 @@ struct Step {
   Symbol relation = 0;
 };
 
-class Cursor final : public EngineCursor<v1::GetSubgraphResponse> {
+class SubgraphCursor final : public EngineCursor<v1::GetSubgraphResponse> {
  public:
-  Cursor(const ReadView& view, Question question) : view_(view), question_(std::move(question)) {}
+  SubgraphCursor(const ReadView& view, SubgraphQuestion question)
+      : view_(view), question_(std::move(question)) {}
 
   bool done() const override {
     return graph_ != nullptr && level_.empty() && edges_.done() && next_source_ == sources_.size();
@@ -204,7 +201,7 @@ class Cursor final : public EngineCursor<v1::GetSubgraphResponse> {
   }
 
   const ReadView view_;
-  const Question question_;
+  const SubgraphQuestion question_;
   // Set by the first Next, which has a deadline to make them in.
   std::shared_ptr<const GraphView> graph_;
   RelationSet relations_;
@@ -229,7 +226,7 @@ class Cursor final : public EngineCursor<v1::GetSubgraphResponse> {
 CursorOr<v1::GetSubgraphResponse> GetSubgraph(Engine* engine, const CallContext& call,
                                               const v1::GetSubgraphRequest& request) {
   DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
-  Question question;
+  SubgraphQuestion question;
   DSG_RETURN_IF_ERROR(CheckNodeView(request.view()));
   if (request.depth_max() < 0) {
     return FieldError("depth_max", absl::StrCat(request.depth_max()),
@@ -248,7 +245,7 @@ CursorOr<v1::GetSubgraphResponse> GetSubgraph(Engine* engine, const CallContext&
   question.depth_max = request.depth_max();
   question.node_view = request.view();
   question.tree_only = request.tree_only();
-  return std::make_unique<Cursor>(view, std::move(question));
+  return std::make_unique<SubgraphCursor>(view, std::move(question));
 }
 
 }  // namespace dsg::query

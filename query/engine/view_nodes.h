@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nodes of a view as replies carry them: from memory where the asked-for part of a node is there,
-// from the store otherwise. Refuses to differ: both ways give the same bytes.
+// Nodes of a view in memory: filtered as the store filters them, and written into replies with the
+// bytes that the store would give.
 #pragma once
 
 #include <optional>
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "query/engine/in_turn.h"
-#include "query/engine/read_view.h"
+#include "query/engine/nodes.h"
+#include "query/engine/request.h"
 #include "query/view/graph_view.h"
 #include "schema/codec/proto_convert.h"
+#include "schema/store/snapshot.h"
 
 namespace dsg::v1 {
 class Node;
@@ -18,6 +19,32 @@ class Node;
 
 namespace dsg::query {
 
+/// A NodeFilter in the symbols of a view; it admits what NodeFilter::Matches admits.
+class ViewFilter {
+ public:
+  /// `graph` must outlive this.
+  ViewFilter(const NodeFilter& filter, const GraphView& graph);
+
+  /// Also whether it is a child of the filter's parent.
+  bool Matches(const ViewNode& node) const;
+  /// False if no node can match.
+  bool CanMatch() const { return can_match_; }
+  SpaceFilter space() const { return {filter_.layer, class_name_}; }
+
+ private:
+  bool IsChild(NodeId node) const;
+
+  NodeFilter filter_;
+  const GraphView& graph_;
+  bool can_match_ = true;
+  std::optional<Symbol> kind_;
+  std::optional<Symbol> class_name_;
+  std::optional<Symbol> name_;
+};
+
+/// Writes nodes of a view into replies: from memory if it holds the asked-for part of a node, else
+/// from the store. Both give the same bytes.
+///
 /// Threads: one caller at a time.
 class NodeFiller {
  public:

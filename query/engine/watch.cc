@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The revisions of a map as they come, from where the caller left off.
-// Refuses to keep a thread while nothing happens.
+// Answers WatchMap: the revisions of a map as they come, from where the caller left off. Holds no
+// thread while nothing happens.
 #include <algorithm>
 #include <chrono>
 #include <string>
@@ -9,11 +9,10 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/map_service.pb.h"
-#include "query/engine/difference.h"
+#include "query/engine/diff.h"
 #include "query/engine/engine.h"
-#include "query/engine/engine_cursor.h"
 #include "query/engine/nodes.h"
-#include "query/engine/request_check.h"
+#include "query/engine/request.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 
@@ -154,7 +153,7 @@ class Watch final : public EngineCursor<v1::WatchMapResponse> {
   std::string position_;
 };
 
-absl::Status CheckRequest(const v1::WatchMapRequest& request) {
+absl::Status CheckWatchRequest(const v1::WatchMapRequest& request) {
   DSG_RETURN_IF_ERROR(CheckNodeView(request.view()));
   if (request.after_revision() < 0) {
     return FieldError("after_revision", absl::StrCat(request.after_revision()),
@@ -170,7 +169,7 @@ absl::Status CheckRequest(const v1::WatchMapRequest& request) {
 
 CursorOr<v1::WatchMapResponse> WatchMap(Engine* engine, const CallContext&,
                                         const v1::WatchMapRequest& request) {
-  DSG_RETURN_IF_ERROR(CheckRequest(request));
+  DSG_RETURN_IF_ERROR(CheckWatchRequest(request));
   DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> map, engine->maps.Reader(request.map()));
   DSG_ASSIGN_OR_RETURN(const RevisionInfo head, map->Head());
   const Revision after = request.has_after_revision() ? request.after_revision() : head.revision;

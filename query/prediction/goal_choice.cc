@@ -9,8 +9,8 @@
 #include <unordered_map>
 #include <utility>
 
-#include "query/prediction/cell_map.h"
 #include "query/prediction/route.h"
+#include "query/prediction/walk_space.h"
 #include "schema/base/check.h"
 #include "schema/base/status.h"
 
@@ -19,13 +19,9 @@ namespace {
 
 using Square = std::tuple<int64_t, int64_t, int64_t>;
 
-constexpr double kCellM = 1.0;
+constexpr double kChoiceCellM = 1.0;
 /// Places or attractions between two questions to the stop check.
-constexpr int64_t kStopPeriod = 256;
-
-double Horizontal(const Eigen::Vector3d& a_map, const Eigen::Vector3d& b_map) {
-  return (a_map - b_map).head<2>().norm();
-}
+constexpr int64_t kChoicePlacesPerStop = 256;
 
 /// Of the storey, nearer than `reach_m`; of equals the lowest; -1 = none. `places` are those of the
 /// graph.
@@ -77,7 +73,7 @@ struct SquareHash {
 /// The place with the most room around it stands for its square.
 absl::Status AppendAnywhere(const WalkGraph& graph, const GoalChoiceOptions& options,
                             const StopCheck& stop, std::vector<ChosenGoal>* goals) {
-  StopCounter counter(stop, kStopPeriod);
+  StopCounter counter(stop, kChoicePlacesPerStop);
   std::unordered_map<Square, int, SquareHash> best;
   for (size_t i = 0; i < graph.places_map.size(); ++i) {
     DSG_RETURN_IF_ERROR(counter.Check());
@@ -103,13 +99,13 @@ absl::StatusOr<std::vector<ChosenGoal>> ChooseGoals(const WalkGraph& graph,
                                                     const GoalChoiceOptions& options,
                                                     const StopCheck& stop) {
   DSG_CHECK(options.anywhere_m > 0.0 && options.anywhere_prior >= 0.0);
-  StopCounter counter(stop, kStopPeriod);
-  CellMap places(kCellM);
+  StopCounter counter(stop, kChoicePlacesPerStop);
+  CellMap places(kChoiceCellM);
   for (size_t i = 0; i < graph.places_map.size(); ++i) {
     DSG_RETURN_IF_ERROR(counter.Check());
     places.Add(graph.places_map[i], 0.0, static_cast<int>(i));
   }
-  CellMap chosen(kCellM);
+  CellMap chosen(kChoiceCellM);
   std::vector<ChosenGoal> goals;
   for (size_t i = 0; i < attractions.size(); ++i) {
     DSG_RETURN_IF_ERROR(counter.Check());

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which places people may be on their way to.
-// Refuses to know maps: what draws people comes as points, with what each is worth.
+// The places that people may be on their way to. What draws people comes as points with weights;
+// maps stay unknown.
 #pragma once
 
 #include <Eigen/Core>
 #include <string_view>
 #include <vector>
 
-#include "query/prediction/prediction.h"
+#include "query/prediction/goal_prediction.h"
 
 namespace dsg::query {
 

@@ -1,22 +1,170 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "query/prediction/goal_prediction.h"
+
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <numeric>
+#include <utility>
+#include <vector>
 
-#include "query/prediction/future_merging.h"
-#include "query/prediction/pace.h"
-#include "query/prediction/path_check.h"
-#include "query/prediction/prediction.h"
 #include "query/prediction/route.h"
-#include "query/prediction/route_walk.h"
+#include "query/prediction/velocity.h"
 #include "query/prediction/ways.h"
 #include "schema/base/check.h"
 #include "schema/base/status.h"
 
 namespace dsg::query {
 namespace {
+
+/// Links between two questions to the stop check.
+constexpr int64_t kLinksPerStop = 4096;
+
+bool IsPlace(int place, const WalkGraph& graph) {
+  return place >= 0 && static_cast<size_t>(place) < graph.places_map.size();
+}
+
+void CheckGraph(const WalkGraph& graph) {
+  DSG_CHECK(graph.clearance_m.size() == graph.places_map.size());
+  DSG_CHECK(graph.link_clearance_m.empty() || graph.link_clearance_m.size() == graph.links.size());
+  for (const Eigen::Vector3d& place_map : graph.places_map) DSG_CHECK(place_map.allFinite());
+  for (const double clearance_m : graph.clearance_m) {
+    DSG_CHECK(clearance_m >= 0.0 && std::isfinite(clearance_m));
+  }
+  for (const double clearance_m : graph.link_clearance_m) DSG_CHECK(clearance_m >= 0.0);
+  for (const auto& [a, b] : graph.links) DSG_CHECK(IsPlace(a, graph) && IsPlace(b, graph));
+}
+
+void CheckGoals(const std::vector<Goal>& goals, const WalkGraph& graph) {
+  for (const Goal& goal : goals) {
+    DSG_CHECK(IsPlace(goal.place, graph));
+    DSG_CHECK(goal.prior >= 0.0 && std::isfinite(goal.prior));
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<GoalField> GoalField::Make(WalkGraph graph, std::vector<Goal> goals,
+                                          const StopCheck& stop) {
+  CheckGraph(graph);
+  CheckGoals(goals, graph);
+  DSG_ASSIGN_OR_RETURN(FreeSpace free_space, FreeSpace::Make(graph, stop));
+  DSG_ASSIGN_OR_RETURN(WalkIndex index, WalkIndex::Make(graph, stop));
+  const auto ground = std::make_shared<Ground>(
+      Ground{std::move(graph), std::move(free_space), std::move(index), {}, {}});
+  const std::vector<Eigen::Vector3d>& places_map = ground->graph.places_map;
+  std::vector<size_t>& offsets = ground->offsets;
+  offsets.assign(places_map.size() + 1, 0);
+  for (const auto& [a, b] : ground->graph.links) {
+    ++offsets[a + 1];
+    ++offsets[b + 1];
+  }
+  for (size_t i = 1; i < offsets.size(); ++i) offsets[i] += offsets[i - 1];
+  ground->neighbours.resize(offsets.back());
+  std::vector<size_t> next(offsets.begin(), offsets.end() - 1);
+  StopCounter counter(stop, kLinksPerStop);
+  for (const auto& [a, b] : ground->graph.links) {
+    DSG_RETURN_IF_ERROR(counter.Check());
+    const double way_m = (places_map[a] - places_map[b]).norm();
+    ground->neighbours[next[a]++] = {b, way_m};
+    ground->neighbours[next[b]++] = {a, way_m};
+  }
+  GoalField field;
+  field.ground_ = ground;
+  field.goals_ = std::move(goals);
+  return field;
+}
+
+GoalField::GoalField(WalkGraph graph, std::vector<Goal> goals)
+    : GoalField(*Make(std::move(graph), std::move(goals), StopCheck())) {}
+
+GoalField GoalField::WithGoals(std::vector<Goal> goals) const {
+  CheckGoals(goals, graph());
+  GoalField field;
+  field.ground_ = ground_;
+  field.goals_ = std::move(goals);
+  return field;
+}
+
+size_t GoalField::memory_bytes() const {
+  const WalkGraph& walk = graph();
+  return sizeof(Ground) + goals_.capacity() * sizeof(Goal) + free_space().memory_bytes() +
+         index().memory_bytes() + walk.places_map.capacity() * sizeof(Eigen::Vector3d) +
+         (walk.clearance_m.capacity() + walk.link_clearance_m.capacity()) * sizeof(double) +
+         walk.links.capacity() * sizeof(std::pair<int, int>) +
+         ground_->offsets.capacity() * sizeof(size_t) +
+         ground_->neighbours.capacity() * sizeof(Neighbour);
+}
+
+namespace {
+
+/// Instants at which two futures are compared.
+constexpr size_t kComparedCount = 6;
+
+/// How far apart two futures ever are.
+double ApartM(const PredictedPath& a, const PredictedPath& b) {
+  const size_t count = a.positions_map.size();
+  const size_t step = 1 + (count - std::min(count, size_t{1})) / kComparedCount;
+  double apart_m = 0.0;
+  for (size_t back = 0; back < count; back += step) {
+    const size_t i = count - 1 - back;
+    apart_m = std::max(apart_m, (a.positions_map[i] - b.positions_map[i]).norm());
+  }
+  return apart_m;
+}
+
+/// How much probability is around a future, by how near the others are.
+double WeightAround(size_t i, const std::vector<size_t>& others,
+                    const std::vector<PredictedPath>& paths, const Eigen::MatrixXd& apart_m,
+                    double merge_m) {
+  const Eigen::Index row = static_cast<Eigen::Index>(i);
+  double weight = 0.0;
+  for (const size_t j : others) {
+    const double way_m = apart_m(row, static_cast<Eigen::Index>(j));
+    if (way_m < merge_m) weight += paths[j].probability * (1.0 - way_m / merge_m);
+  }
+  return weight;
+}
+
+// Futures within `merge_m` of the best one go into it, then the same with the rest. The best one
+// has most probability around it, so that of many goals that lead much the same way the middle one
+// stays. In the order in which they were found.
+// Requires: all at the same times. Cost: square of the number of futures.
+std::vector<PredictedPath> Merged(const std::vector<PredictedPath>& paths, double merge_m) {
+  const Eigen::Index count = static_cast<Eigen::Index>(paths.size());
+  Eigen::MatrixXd apart_m = Eigen::MatrixXd::Zero(count, count);
+  for (size_t i = 0; i < paths.size(); ++i) {
+    for (size_t j = 0; j < i; ++j) {
+      const double way_m = ApartM(paths[i], paths[j]);
+      apart_m(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = way_m;
+      apart_m(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(i)) = way_m;
+    }
+  }
+  std::vector<size_t> left(paths.size());
+  std::iota(left.begin(), left.end(), size_t{0});
+  std::vector<PredictedPath> merged;
+  while (!left.empty()) {
+    size_t best = left.front();
+    double best_weight = -1.0;
+    for (const size_t i : left) {
+      const double weight = WeightAround(i, left, paths, apart_m, merge_m);
+      if (weight <= best_weight) continue;
+      best_weight = weight;
+      best = i;
+    }
+    merged.push_back(paths[best]);
+    merged.back().probability = 0.0;
+    std::erase_if(left, [&](size_t i) {
+      const double way_m = apart_m(static_cast<Eigen::Index>(best), static_cast<Eigen::Index>(i));
+      if (i != best && way_m > merge_m) return false;
+      merged.back().probability += paths[i].probability;
+      return true;
+    });
+  }
+  return merged;
+}
 
 /// People do not run faster than detections that jump; Rosinol et al. 2020 use the same bound.
 constexpr double kSpeedMaxMS = 3.0;
@@ -265,6 +413,73 @@ std::vector<PredictedPath> PredictToGoals(const std::vector<PathPoint>& path,
                                           const std::vector<Goal>& goals,
                                           const GoalOptions& options) {
   return PredictToGoals(path, at_ns, GoalField(graph, goals), options);
+}
+
+namespace {
+
+constexpr double kEdgeStepM = 0.1;
+
+struct Ball {
+  Eigen::Vector2d centre;
+  double radius_m = 0.0;
+};
+
+/// Clearances of the storey that reach into what the path covers.
+std::vector<Ball> BallsAround(const PathPoint& last, const PredictedPath& predicted,
+                              const WalkGraph& graph) {
+  Eigen::AlignedBox2d covered(last.position_map.head<2>().eval());
+  for (const Eigen::Vector3d& position_map : predicted.positions_map) {
+    covered.extend(position_map.head<2>().eval());
+  }
+  std::vector<Ball> balls;
+  for (size_t i = 0; i < graph.places_map.size(); ++i) {
+    const Eigen::Vector2d centre = graph.places_map[i].head<2>();
+    if (std::abs(graph.places_map[i].z() - last.position_map.z()) > kStoreyHeightM) continue;
+    if (covered.exteriorDistance(centre) > graph.clearance_m[i]) continue;
+    balls.push_back({centre, graph.clearance_m[i]});
+  }
+  return balls;
+}
+
+/// Whether one ball holds both points, so that the line between is free.
+bool InOneBall(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const std::vector<Ball>& balls) {
+  return std::any_of(balls.begin(), balls.end(), [&](const Ball& ball) {
+    return (a - ball.centre).norm() <= ball.radius_m && (b - ball.centre).norm() <= ball.radius_m;
+  });
+}
+
+/// How far towards `to_map` all is known to be free.
+absl::StatusOr<Eigen::Vector3d> LastFree(const Eigen::Vector3d& from_map,
+                                         const Eigen::Vector3d& to_map,
+                                         const std::vector<Ball>& balls, const StopCheck& stop) {
+  const Eigen::Vector3d way = to_map - from_map;
+  const int part_count = 1 + static_cast<int>(std::min(way.norm() / kEdgeStepM, 1e6));
+  Eigen::Vector3d reached_map = from_map;
+  for (int part = 1; part <= part_count; ++part) {
+    const Eigen::Vector3d next_map =
+        part == part_count ? to_map : (from_map + way * part / part_count).eval();
+    DSG_RETURN_IF_ERROR(AskStop(stop));
+    if (!InOneBall(reached_map.head<2>(), next_map.head<2>(), balls)) break;
+    reached_map = next_map;
+  }
+  return reached_map;
+}
+
+}  // namespace
+
+absl::Status StopAtEdge(const PathPoint& last, const WalkGraph& graph, const StopCheck& stop,
+                        PredictedPath* predicted) {
+  const std::vector<Ball> balls = BallsAround(last, *predicted, graph);
+  Eigen::Vector3d reached_map = last.position_map;
+  bool waits = false;
+  for (Eigen::Vector3d& position_map : predicted->positions_map) {
+    if (!waits) {
+      DSG_ASSIGN_OR_RETURN(reached_map, LastFree(reached_map, position_map, balls, stop));
+    }
+    waits = waits || reached_map != position_map;
+    position_map = reached_map;
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace dsg::query

@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// How someone gets from where they stand onto the graph, and from there to a goal.
-// Refuses to know time and speed.
+// How someone gets from where they stand onto the graph and to a goal, how fast they walk on, and
+// where along the route they are at which time.
 #pragma once
 
 #include <Eigen/Core>
 #include <vector>
 
-#include "query/prediction/prediction.h"
+#include "query/prediction/goal_prediction.h"
 
 namespace dsg::query {
-
-/// Torso and place of one storey differ by less than this.
-inline constexpr double kStoreyHeightM = 1.5;
 
 /// A way onto the graph: straight to `via_map`, then straight to the place.
 struct Attachment {
@@ -47,5 +44,31 @@ Route BuildRoute(const Eigen::Vector3d& position_map, const Attachment& attachme
 /// The same way with corners cut where `space` proves that free, with a point at least every
 /// quarter of a metre.
 Route Straightened(const Route& route, const FreeSpace& space, double margin_m);
+
+/// Who slows down comes to rest; who sets out reaches the pace of a walk.
+///
+/// A speed that changes evenly until it is `end_m_s`, and stays so.
+struct Pace {
+  double speed_m_s = 0.0;
+  double end_m_s = 0.0;
+  /// Not negative; 0 = the speed stays as it is.
+  double change_m_s2 = 0.0;
+
+  double SpeedAt(double seconds) const;
+  /// Walked after `seconds`.
+  double WayM(double seconds) const;
+  double peak_m_s() const { return speed_m_s > end_m_s ? speed_m_s : end_m_s; }
+};
+
+/// Even, at `speed_m_s`, unless the last three steps tell of a change. Steps that turn tell
+/// nothing: around a corner they look short.
+Pace PaceOf(const std::vector<PathPoint>& path, double speed_m_s, const GoalOptions& options);
+
+/// Positions after `seconds` (ascending, from 0 on), setting out in the direction `heading_map`, a
+/// unit vector.
+/// Source: Coulter 1992 (pure pursuit).
+std::vector<Eigen::Vector3d> WalkRoute(const Route& route, const Eigen::Vector3d& heading_map,
+                                       const Pace& pace, const std::vector<double>& seconds,
+                                       const GoalOptions& options);
 
 }  // namespace dsg::query

@@ -12,7 +12,7 @@ namespace dsg::query {
 namespace {
 
 /// Places between two questions to the stop check.
-constexpr int64_t kStopPeriod = 1024;
+constexpr int64_t kWayPlacesPerStop = 1024;
 constexpr std::ptrdiff_t kPrefetchCount = 4;
 
 /// Hands out places by way, then number: from buckets of a few centimetres of ways, each sorted
@@ -122,7 +122,7 @@ absl::StatusOr<Ways> Ways::Search(const std::vector<Attachment>& from, const Goa
     queue.Push(from[i].way_m, place);
   }
   Wanted left(wanted == nullptr ? std::vector<int>() : *wanted, place_count);
-  StopCounter counter(stop, kStopPeriod);
+  StopCounter counter(stop, kWayPlacesPerStop);
   while (const WayQueue::Entry* const popped = queue.Pop()) {
     const WayQueue::Entry entry = *popped;
     if (const WayQueue::Entry* const ahead = queue.Ahead(kPrefetchCount)) {

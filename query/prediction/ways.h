@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shortest ways from where somebody is to all places within reach.
-// Refuses to know goals: one search serves as many of them as there are.
+// Shortest ways from where somebody is to all places within reach. One search serves any number of
+// goals.
 #pragma once
 
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "query/prediction/prediction.h"
+#include "query/prediction/goal_prediction.h"
 #include "query/prediction/route.h"
 #include "schema/base/stop_check.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The edges of a view, found from both of their ends. Refuses to hold attributes.
+// The edges of a view, found from both of their ends, without attributes.
 #pragma once
 
 #include <functional>

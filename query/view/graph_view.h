@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The graph of one revision in memory, with the indexes that questions need: by id, by name, by
-// class, by place in space, by edge in both directions, by hierarchy. Refuses to hold what grows
-// with time (poses, stays, shapes) or is large (mesh): those are asked of the Snapshot.
+// class, by place in space, by edge in both directions, by hierarchy. What grows with time (poses,
+// stays, shapes) or is large (mesh) stays in the Snapshot.
 #pragma once
 
 #include <cstdint>
@@ -14,13 +14,40 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "query/view/symbols.h"
 #include "schema/model/edge.h"
 #include "schema/model/layer.h"
 #include "schema/model/node.h"
 #include "schema/store/graph_store.h"
 
 namespace dsg::query {
+
+/// 0 is the empty text.
+using Symbol = uint32_t;
+
+/// Names as small numbers: every kind, class, relation and node name of a map once, shared by all
+/// its views. Never forgets, so a number means the same in every revision.
+///
+/// Threads: safe from many threads; Text waits for nobody.
+class SymbolTable {
+ public:
+  SymbolTable();
+  ~SymbolTable();
+
+  /// The number of a text, a new one if it has none yet.
+  Symbol Intern(std::string_view text);
+  /// nullopt if no view of this map has ever held the text.
+  std::optional<Symbol> Find(std::string_view text) const;
+  /// The texts that are equal to this one but for the case of the letters A to Z. Ascending.
+  std::vector<Symbol> FindIgnoringCase(std::string_view text) const;
+  /// Valid as long as the table. Requires: `symbol` came from here.
+  const std::string& Text(Symbol symbol) const;
+
+  size_t memory_bytes() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
 
 class PlaceGraph;
 

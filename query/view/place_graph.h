@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Places and the links between them as flat arrays, for walks that visit thousands of them.
-// Refuses to know robots and goals: planning and prediction bring their own.
+// Places and the links between them as flat arrays, for walks that visit thousands of them. Robots
+// and goals are those of planning and prediction.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "query/view/graph_view.h"
-#include "query/view/make_once.h"
+#include "schema/base/cache.h"
 
 namespace dsg::query {
 

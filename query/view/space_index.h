@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Nodes by layer, class and place in space: an R-tree packed along a space-filling curve, one
-// stretch of it for each class of each layer. Refuses to give distances: its boxes are rounded
-// outward to single precision, so they choose candidates only.
+// stretch of it for each class of each layer. Its boxes are rounded outward to single precision, so
+// they choose candidates only.
 #pragma once
 
 #include <array>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sorting that can be given up half way, for the millions of entries of a large map. Refuses to
-// leave anything useful behind when it was.
+// Sorts that can be stopped half way, for the millions of entries of a large map. A stopped sort
+// leaves its input in no useful order.
 #pragma once
 
 #include <algorithm>

@@ -2,23 +2,21 @@
 #include "query/view/view_cache.h"
 
 #include <algorithm>
-#include <chrono>
-#include <condition_variable>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "query/view/indexed_view.h"
+#include "schema/base/cache.h"
 #include "schema/base/status.h"
 
 namespace dsg::query {
 namespace {
 
-// How long a waiter sleeps between two looks at its own deadline.
-constexpr std::chrono::milliseconds kWaitSlice{5};
 // Above this share of a map, reading what was touched one by one costs more than reading all.
 constexpr double kDeriveShareMax = 0.25;
 constexpr size_t kMebibyte = size_t{1} << 20;
@@ -37,7 +35,6 @@ struct Slot {
 struct MapViews {
   std::shared_ptr<SymbolTable> symbols = std::make_shared<SymbolTable>();
   std::map<Revision, Slot> slots;
-  std::set<Revision> being_made;
 
   // Views derived from each other share their pages: the largest counts whole, of the others only
   // what each does not share. They share their places wholly or not at all.
@@ -82,6 +79,9 @@ struct ViewCache::Impl {
 
   absl::StatusOr<View> Get(const std::shared_ptr<MapReader>& map, const Snapshot& snapshot,
                            const StopCheck& stop);
+  std::optional<View> Find(const std::shared_ptr<MapReader>& map, Revision revision);
+  absl::StatusOr<View> MakeAndKeep(const std::shared_ptr<MapReader>& map, const Snapshot& snapshot,
+                                   const StopCheck& stop);
   absl::StatusOr<MadeView> Make(MapReader* map, const Snapshot& snapshot, const View& nearest,
                                 std::shared_ptr<SymbolTable> symbols, const StopCheck& stop) const;
   // Requires of these: the lock is held. What they put into `evicted` is to be freed without it.
@@ -93,11 +93,12 @@ struct ViewCache::Impl {
 
   const size_t bytes_max;
   mutable std::mutex mutex;
-  std::condition_variable made_or_given_up;
   // By what the pointers own, so that a new map at an old address is another one.
   std::map<std::weak_ptr<MapReader>, MapViews, std::owner_less<>> maps;
   uint64_t use_count = 0;
   Stats counts;
+  // Callers hold their map, so its address is its own as long as they make a view of it.
+  SingleFlight<std::pair<const MapReader*, Revision>> flights;
 };
 
 size_t ViewCache::Impl::Bytes() const {
@@ -108,7 +109,7 @@ size_t ViewCache::Impl::Bytes() const {
 
 void ViewCache::Impl::ForgetClosedMaps(std::vector<View>* evicted) {
   for (auto map = maps.begin(); map != maps.end();) {
-    if (!map->first.expired() || !map->second.being_made.empty()) {
+    if (!map->first.expired()) {
       ++map;
       continue;
     }
@@ -179,43 +180,49 @@ absl::Status ViewCache::Impl::Keep(const std::shared_ptr<MapReader>& map, const 
   return absl::OkStatus();
 }
 
-absl::StatusOr<View> ViewCache::Impl::Get(const std::shared_ptr<MapReader>& map,
-                                          const Snapshot& snapshot, const StopCheck& stop) {
-  const Revision revision = snapshot.revision();
+std::optional<View> ViewCache::Impl::Find(const std::shared_ptr<MapReader>& map,
+                                          Revision revision) {
   // Before the lock, so that it is freed after it.
   std::vector<View> evicted;
-  std::unique_lock lock(mutex);
-  for (;;) {
-    MapViews& views = maps[map];
-    if (const auto slot = views.slots.find(revision); slot != views.slots.end()) {
-      slot->second.last_use = ++use_count;
-      ++counts.hit_count;
-      const View view = slot->second.view;
-      // Planning may have kept more beside the places since.
-      const size_t place_bytes = view->shared_places()->memory_bytes();
-      if (std::exchange(slot->second.place_bytes, place_bytes) < place_bytes) {
-        EvictTo(bytes_max, view, &evicted);
-      }
-      return view;
-    }
-    if (views.being_made.insert(revision).second) break;
-    made_or_given_up.wait_for(lock, kWaitSlice);
-    lock.unlock();
-    if (stop) DSG_RETURN_IF_ERROR(stop());
-    lock.lock();
+  const std::lock_guard lock(mutex);
+  const auto views = maps.find(map);
+  if (views == maps.end()) return std::nullopt;
+  const auto slot = views->second.slots.find(revision);
+  if (slot == views->second.slots.end()) return std::nullopt;
+  slot->second.last_use = ++use_count;
+  ++counts.hit_count;
+  const View view = slot->second.view;
+  // Planning may have kept more beside the places since.
+  const size_t place_bytes = view->shared_places()->memory_bytes();
+  if (std::exchange(slot->second.place_bytes, place_bytes) < place_bytes) {
+    EvictTo(bytes_max, view, &evicted);
   }
-  // The maker, from here on: whatever happens, those who wait must be told. If it fails, the next
-  // of them tries for itself.
-  const View nearest = maps[map].Nearest(revision);
-  const std::shared_ptr<SymbolTable> symbols = maps[map].symbols;
-  lock.unlock();
-  auto made = Make(map.get(), snapshot, nearest, symbols, stop);
-  lock.lock();
-  absl::Status status = made.ok() ? Keep(map, *made, &evicted) : made.status();
-  maps[map].being_made.erase(revision);
-  made_or_given_up.notify_all();
-  DSG_RETURN_IF_ERROR(status);
-  return made->view;
+  return view;
+}
+
+absl::StatusOr<View> ViewCache::Impl::MakeAndKeep(const std::shared_ptr<MapReader>& map,
+                                                  const Snapshot& snapshot, const StopCheck& stop) {
+  View nearest;
+  std::shared_ptr<SymbolTable> symbols;
+  {
+    const std::lock_guard lock(mutex);
+    const MapViews& views = maps[map];
+    nearest = views.Nearest(snapshot.revision());
+    symbols = views.symbols;
+  }
+  DSG_ASSIGN_OR_RETURN(const MadeView made, Make(map.get(), snapshot, nearest, symbols, stop));
+  // Before the lock, so that it is freed after it.
+  std::vector<View> evicted;
+  const std::lock_guard lock(mutex);
+  DSG_RETURN_IF_ERROR(Keep(map, made, &evicted));
+  return made.view;
+}
+
+absl::StatusOr<View> ViewCache::Impl::Get(const std::shared_ptr<MapReader>& map,
+                                          const Snapshot& snapshot, const StopCheck& stop) {
+  return flights.Run(
+      {map.get(), snapshot.revision()}, stop, [&] { return Find(map, snapshot.revision()); },
+      [&] { return MakeAndKeep(map, snapshot, stop); });
 }
 
 ViewCache::ViewCache(size_t bytes_max) : impl_(std::make_unique<Impl>(bytes_max)) {}

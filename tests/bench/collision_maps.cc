@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include "query/engine/collision/convex.h"
+#include "query/engine/collision/shapes.h"
 #include "schema/base/status.h"
 #include "schema/store/graph_store.h"
 #include "tests/bench/w2_graph.h"

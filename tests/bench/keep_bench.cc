@@ -8,7 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/map_service.pb.h"
 #include "dsg/v1/query_service.pb.h"
-#include "query/engine/service_core.h"
+#include "query/service/service_core.h"
 #include "schema/archive/archive_map.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"

@@ -11,7 +11,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "query/engine/search/search_run.h"
-#include "query/engine/search/text_match.h"
+#include "query/engine/search/words.h"
 #include "query/view/graph_view.h"
 #include "schema/base/random.h"
 #include "schema/base/status.h"

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
-#include "query/engine/service_core.h"
+#include "query/service/service_core.h"
 #include "schema/base/status.h"
 #include "schema/store/graph_store.h"
 

@@ -12,7 +12,7 @@
 
 #include "dsg/v1/meetings.pb.h"
 #include "ingest/truth/truth.h"
-#include "query/engine/service_core.h"
+#include "query/service/service_core.h"
 #include "schema/base/status.h"
 #include "schema/store/graph_store.h"
 

@@ -6,7 +6,7 @@
 
 #include "absl/strings/str_format.h"
 #include "query/engine/interaction/verdict.h"
-#include "query/engine/service_core.h"
+#include "query/service/service_core.h"
 #include "schema/base/status.h"
 #include "schema/store/graph_store.h"
 #include "tests/support/temp_folder.h"

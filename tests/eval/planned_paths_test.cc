@@ -11,7 +11,7 @@
 #include "dsg/v1/query_service.pb.h"
 #include "ingest/simulator/world/world.h"
 #include "ingest/simulator/world/world_graph.h"
-#include "query/engine/service_core.h"
+#include "query/service/service_core.h"
 #include "schema/base/random.h"
 #include "schema/base/status.h"
 #include "schema/store/graph_store.h"

@@ -53,11 +53,13 @@ ALLOWED = {
     "query/client": CODEC + ["query/api"],
     "query/view": SCHEMA,
     "query/prediction": MODEL,
-    "query/engine": SCHEMA + ["query/api", "query/view", "query/prediction", "schema/archive",
-                             "schema/merge", "schema/retention"],
-    "query/cli": SCHEMA + ["schema/archive", "schema/retention", "query/api", "query/view",
-                           "query/engine", "query/client"],
-    "server": SCHEMA + ["schema/retention", "query/api", "query/view", "query/engine"],
+    "query/engine": SCHEMA + ["query/api", "query/view", "query/prediction"],
+    "query/maintenance": SCHEMA + ["query/api", "query/engine", "schema/archive", "schema/merge",
+                                   "schema/retention"],
+    "query/service": STORE + ["query/api", "query/engine", "query/maintenance"],
+    "query/cli": SCHEMA + ["schema/archive", "schema/retention", "query/api", "query/maintenance",
+                           "query/service", "query/client"],
+    "server": SCHEMA + ["schema/retention", "query/api", "query/maintenance", "query/service"],
     "tests": SCHEMA + ["ingest", "query", "server"],
 }
 # What users of the client library would include.

@@ -7,7 +7,7 @@
 
 #include "dsg/v1/map_service.pb.h"
 #include "dsg/v1/query_service.pb.h"
-#include "query/engine/service_core.h"
+#include "query/service/service_core.h"
 #include "schema/store/graph_store.h"
 #include "tests/support/random_world.h"
 #include "tests/support/temp_folder.h"

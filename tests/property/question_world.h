@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "query/engine/service_core.h"
+#include "query/service/service_core.h"
 #include "schema/base/random.h"
 #include "tests/support/random_world.h"
 #include "tests/support/temp_folder.h"

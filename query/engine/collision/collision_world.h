@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a body would touch in a map as it was believed at one revision and stood at one instant:
-// boxes first, then the triangles of the mesh. Refuses to call free what nobody has looked at: such
+// What a body touches in a map as it was believed at one revision and stood at one instant: boxes
+// first, then the triangles of the mesh. Where nobody has looked nothing is called free: such
 // answers are marked.
 #pragma once
 
@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "query/engine/collision/body.h"
 #include "query/engine/collision/collision_cache.h"
+#include "query/engine/collision/shapes.h"
 #include "query/view/graph_view.h"
 #include "schema/base/time.h"
 #include "schema/store/snapshot.h"

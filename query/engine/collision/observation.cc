@@ -15,7 +15,7 @@ using Eigen::Vector3d;
 
 // A place is asked for its clearance up to here.
 constexpr double kPlaceReachM = 3.0;
-constexpr double kStepM = 0.5;
+constexpr double kObservedStepM = 0.5;
 constexpr double kPointsApartM = 1.0;
 constexpr int kPointsOnEdgeMax = 8;
 
@@ -137,7 +137,7 @@ absl::StatusOr<bool> Observation::IsObserved(const Body& body, double until_pose
   for (size_t i = 0; i < body.poses.size() && static_cast<double>(i) <= until_pose; ++i) {
     const Pose3d& begin = body.poses[i];
     const Pose3d& end = body.poses[std::min(i + 1, body.poses.size() - 1)];
-    const double steps = std::max(1.0, std::ceil(TravelM(body, begin, end) / kStepM));
+    const double steps = std::max(1.0, std::ceil(TravelM(body, begin, end) / kObservedStepM));
     for (double step = 0.0; step < steps; step += 1.0) {
       if (stop) DSG_RETURN_IF_ERROR(stop());
       const double fraction = step / steps;

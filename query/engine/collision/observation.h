@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether the map knows anything around a body: where nobody has looked, no obstacle proves
-// nothing. Refuses to say what is there.
+// Whether the map knows anything around a body. Where nobody has looked, a missing obstacle proves
+// nothing.
 #pragma once
 
 #include <Eigen/Core>
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "query/engine/collision/body.h"
 #include "query/engine/collision/obstacles.h"
+#include "query/engine/collision/shapes.h"
 #include "schema/store/snapshot.h"
 
 namespace dsg::query {

@@ -4,12 +4,36 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 
-#include "query/engine/collision/patience.h"
+#include "absl/status/status.h"
 #include "schema/base/status.h"
+#include "schema/store/snapshot.h"
 
 namespace dsg::query {
 namespace {
+
+class Patience {
+ public:
+  /// `stop` outlives it.
+  explicit Patience(const StopCheck& stop) : stop_(stop) {}
+
+  /// To be called at each pair of shapes, which takes a few microseconds at most. False for good
+  /// once it must stop.
+  bool GoOn() {
+    if (++count_ % kAskEvery == 0 && stop_ && status_.ok()) status_ = stop_();
+    return status_.ok();
+  }
+  /// What `stop` returned.
+  const absl::Status& status() const { return status_; }
+
+ private:
+  static constexpr int64_t kAskEvery = 256;
+
+  const StopCheck& stop_;
+  int64_t count_ = 0;
+  absl::Status status_;
+};
 
 using Eigen::Vector3d;
 
@@ -18,8 +42,6 @@ constexpr double kStepM = 1e-4;
 // How much too large the clearance of such a body may be.
 constexpr double kClearanceErrorM = 5e-3;
 constexpr double kClearanceErrorShare = 0.05;
-// A reach below zero ends a walk.
-constexpr double kEndWalk = -1.0;
 // More than distances are wrong by.
 constexpr double kRoundingM = 1e-9;
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Distances between a body at a pose, or on a straight piece of its way, and the obstacles near.
-// Refuses to fetch obstacles: they are given, as many as the reach demands.
+// Distances between a body, at a pose or on a straight piece of its way, and the obstacles near.
+// Callers give the obstacles, all within the reach.
 #pragma once
 
 #include <functional>
 #include <limits>
 
-#include "query/engine/collision/body.h"
 #include "query/engine/collision/obstacles.h"
+#include "query/engine/collision/shapes.h"
 
 namespace dsg::query {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who may have changed an object, with what the map says for and against each.
-// Refuses to weigh what is not in the map; the weights are in weights.h.
+// Who may have changed an object, with the evidence of the map for and against each. The weights
+// are in weights.h.
 #pragma once
 
 #include <map>
@@ -8,9 +8,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "query/engine/interaction/carried.h"
 #include "query/engine/interaction/hands.h"
-#include "query/engine/interaction/held.h"
 #include "query/engine/interaction/object_change.h"
 #include "query/engine/interaction/verdict.h"
 #include "query/view/graph_view.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // When an agent was within reach of an object, or may have been while nobody looked, and how near
-// its hands came. Refuses to guess hands that nobody saw.
+// its hands came. Hands count only where they were seen.
 #pragma once
 
 #include <optional>

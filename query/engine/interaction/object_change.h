@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Objects that left a spot or appeared on one, and when at the earliest and at the latest.
-// Refuses to say who did it.
+// Objects that left a spot or appeared on one: when at the earliest and at the latest, with whom
+// they were seen on their way, and where they may have appeared again.
 #pragma once
 
 #include <compare>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -69,5 +70,50 @@ absl::StatusOr<std::vector<ObjectChange>> FindChanges(const Snapshot& snapshot,
                                                       const GraphView& view,
                                                       const ChangeFilter& filter,
                                                       const StopCheck& stop);
+
+struct Hold {
+  NodeId agent;
+  /// The object of the change, or what that was before by SAME_AS.
+  NodeId object;
+  /// That the thing was this object, above 0.5.
+  double probability = 0.0;
+  Interval during;
+};
+
+/// Of a picked object: holds that began while it went, or until 30 s after it was missed. Of a put
+/// one: holds that ended while it came, or at most 30 s before. The likeliest of each agent.
+/// Order: by agent.
+std::vector<Hold> FindHolds(const GraphView& view, const ObjectChange& change);
+
+/// The other end of a change: where it appeared, for a picked object; where it left, for a put one.
+struct OtherEnd {
+  NodeId object;
+  Box3d box_map;
+  /// First there, or last there.
+  TimeNs at_ns = 0;
+  /// When the mapper knew of it.
+  TimeNs noticed_ns = 0;
+  NodeId room;
+  /// A SAME_AS edge says so; class and size alone otherwise.
+  bool is_same_as = false;
+  /// Somebody was seen with it in hand, before it came or when it went.
+  bool is_held = false;
+  /// Between the boxes.
+  double distance_m = 0.0;
+  /// Who was within a metre of the box along the floor, between the change and this.
+  std::vector<BoxVisit> visits;
+};
+
+/// Among `all` changes of the other type, by SAME_AS first, then by time apart; the first few.
+/// Sizes may differ by half, since a view shows only a part. Left out: what came from, or became,
+/// another object by SAME_AS.
+absl::StatusOr<std::vector<OtherEnd>> FindOtherEnds(const Snapshot& snapshot, const GraphView& view,
+                                                    const ObjectChange& change,
+                                                    const std::vector<ObjectChange>& all,
+                                                    const StopCheck& stop);
+
+/// When the agent was first there, from `after_ns` to `until_ns`; nullopt if it never was.
+std::optional<TimeNs> FirstVisit(const OtherEnd& end, NodeId agent, TimeNs after_ns,
+                                 TimeNs until_ns);
 
 }  // namespace dsg::query

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Whether a wall stands between two points: by the mesh where there is one, else by the boxes of
-// walls. Refuses to take furniture, glass and people for walls.
+// walls. Furniture, glass and people are no walls.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A stretch of a track as plain points, for questions about two tracks at once.
-// Refuses to bridge gaps: a step longer than the track allows belongs to nothing.
+// A stretch of a track as plain points, for questions about two tracks at once, and how much of an
+// interval was observed. Gaps stay gaps: a step longer than the track allows joins nothing.
 #pragma once
 
 #include <Eigen/Core>
@@ -39,5 +39,10 @@ uint64_t TimeApart(TimeNs from_ns, TimeNs to_ns);
 
 /// Sum that stops at the ends of time.
 TimeNs AddTime(TimeNs time_ns, TimeNs span_ns);
+
+/// 0 to 1: the union of all tracks without their gaps. An observed robot observes objects.
+/// Cost: the poses of as many tracks as it takes to cover the interval, robots first.
+absl::StatusOr<double> ObservedShare(const Snapshot& snapshot, const Interval& during,
+                                     const StopCheck& stop);
 
 }  // namespace dsg::query

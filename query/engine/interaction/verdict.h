@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From evidence to probabilities, or to no answer.
-// Refuses to name anybody when the best is not clearly better than the rest.
+// From evidence to probabilities. Names nobody unless the best candidate is clearly better than the
+// rest.
 #pragma once
 
 #include <string>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The numbers of the evidence model, natural logarithms of odds unless they have a unit.
-// Refuses to pass for measured on real people: they were fitted to simulated ones.
+// They were fitted to simulated people, not measured on real ones.
 //
 // Source: conditional logit (McFadden, 1974) by tests/eval/interactions_fit.cc over 1375 changes of
 // simulated worlds of seeds 1 to 5: apartments, wings and offices with 3 to 24 people, watched by

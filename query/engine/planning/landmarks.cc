@@ -2,7 +2,6 @@
 #include "query/engine/planning/landmarks.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -17,7 +16,6 @@ namespace {
 constexpr double kRadiusClassM = 0.0625;
 constexpr size_t kSetCountMax = 4;
 constexpr int kCornerCount = 8;
-constexpr int64_t kStopPeriod = 1024;
 // Of a float, relative.
 constexpr double kRounding = 6e-8;
 
@@ -45,7 +43,7 @@ class LandmarkBuilder {
 
  private:
   absl::Status FindComponents() {
-    StopCounter counter(stop_, kStopPeriod);
+    StopCounter counter(stop_, kPlacesPerStop);
     std::vector<int32_t>& component = landmarks_->components_;
     component.assign(static_cast<size_t>(graph_.size()), -1);
     std::vector<PlaceIndex> pending;
@@ -119,7 +117,7 @@ class LandmarkBuilder {
     }
     double farthest_m = 0.0;
     for (int64_t count = 0; !queue->empty(); ++count) {
-      if (count % kStopPeriod == 0) DSG_RETURN_IF_ERROR(AskStop(stop_));
+      if (count % kPlacesPerStop == 0) DSG_RETURN_IF_ERROR(AskStop(stop_));
       const SearchScratch::Entry entry = queue->Pop();
       const PlaceIndex place = entry.place();
       if (entry.total_m > way_m_[static_cast<size_t>(place)]) continue;
@@ -165,28 +163,18 @@ absl::StatusOr<std::shared_ptr<const Landmarks>> LandmarkCache::Get(const PlaceG
   const double radius_m = std::min(limits.radius_m, 1000.0);
   const Key key{static_cast<int64_t>(std::floor(radius_m / kRadiusClassM)),
                 limits.at_ns == kPresent};
-  {
-    std::unique_lock lock(mutex_);
-    while (true) {
-      for (Entry& entry : entries_) {
-        if (entry.key != key) continue;
-        entry.used = ++use_count_;
-        return entry.landmarks;
-      }
-      if (!building_) break;
-      built_.wait_for(lock, std::chrono::milliseconds(10));
-      if (stop) DSG_RETURN_IF_ERROR(stop());
-    }
-    building_ = true;
+  return flights_.Run(
+      key, stop, [&] { return Find(key); }, [&] { return Build(graph, key, stop); });
+}
+
+std::optional<std::shared_ptr<const Landmarks>> LandmarkCache::Find(const Key& key) {
+  const std::lock_guard lock(mutex_);
+  for (Entry& entry : entries_) {
+    if (entry.key != key) continue;
+    entry.used = ++use_count_;
+    return entry.landmarks;
   }
-  absl::StatusOr<std::shared_ptr<const Landmarks>> landmarks = Build(graph, key, stop);
-  {
-    const std::lock_guard lock(mutex_);
-    building_ = false;
-    if (landmarks.ok()) Keep({key, *landmarks, ++use_count_});
-  }
-  built_.notify_all();
-  return landmarks;
+  return std::nullopt;
 }
 
 absl::StatusOr<std::shared_ptr<const Landmarks>> LandmarkCache::Build(const PlaceGraph& graph,
@@ -196,16 +184,16 @@ absl::StatusOr<std::shared_ptr<const Landmarks>> LandmarkCache::Build(const Plac
   limits.radius_m = static_cast<double>(key.radius_class) * kRadiusClassM;
   // All instants of the past share one set.
   limits.any_time = !key.present;
-  return Landmarks::Build(graph, limits, stop);
-}
-
-void LandmarkCache::Keep(Entry entry) {
+  DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Landmarks> landmarks,
+                       Landmarks::Build(graph, limits, stop));
+  const std::lock_guard lock(mutex_);
   if (entries_.size() >= kSetCountMax) {
     entries_.erase(
         std::min_element(entries_.begin(), entries_.end(),
                          [](const Entry& a, const Entry& b) { return a.used < b.used; }));
   }
-  entries_.push_back(std::move(entry));
+  entries_.push_back({key, landmarks, ++use_count_});
+  return landmarks;
 }
 
 size_t LandmarkCache::memory_bytes() const {
@@ -213,6 +201,78 @@ size_t LandmarkCache::memory_bytes() const {
   size_t bytes = sizeof(LandmarkCache);
   for (const Entry& entry : entries_) bytes += entry.landmarks->memory_bytes();
   return bytes;
+}
+
+namespace {
+
+// So few goals are each bounded for themselves; more cost more than they save.
+constexpr size_t kSingleGoalsMax = 4;
+
+}  // namespace
+
+Guide::Guide(const PlaceGraph& graph, const std::vector<Anchor>& goals, const Landmarks* landmarks)
+    : graph_(graph), landmarks_(landmarks) {
+  std::vector<const Anchor*> sorted;
+  for (const Anchor& goal : goals) sorted.push_back(&goal);
+  std::stable_sort(sorted.begin(), sorted.end(), [&](const Anchor* a, const Anchor* b) {
+    return ComponentOf(a->place) < ComponentOf(b->place);
+  });
+  for (const Anchor* goal : sorted) {
+    const int32_t component = ComponentOf(goal->place);
+    const bool is_new =
+        goals.size() <= kSingleGoalsMax || groups_.empty() || groups_.back().component != component;
+    if (is_new) {
+      Group& group = groups_.emplace_back();
+      group.component = component;
+      group.way_m = goal->way_m;
+      if (landmarks_ != nullptr) group.low = group.high = landmarks_->of(goal->place);
+    }
+    Extend(*goal, &groups_.back());
+  }
+}
+
+void Guide::Extend(const Anchor& goal, Group* group) const {
+  group->box.extend(graph_.position_map(goal.place));
+  group->way_m = std::min(group->way_m, goal.way_m);
+  if (landmarks_ == nullptr) return;
+  const Landmarks::Distances& known = landmarks_->of(goal.place);
+  for (size_t i = 0; i < known.size(); ++i) {
+    group->low[i] = std::min(group->low[i], known[i]);
+    group->high[i] = std::max(group->high[i], known[i]);
+  }
+}
+
+bool Guide::MayReach(PlaceIndex place) const {
+  if (landmarks_ == nullptr) return true;
+  const int32_t component = landmarks_->component(place);
+  return std::any_of(groups_.begin(), groups_.end(),
+                     [&](const Group& group) { return group.component == component; });
+}
+
+double Guide::StraightFrom(PlaceIndex place, const Group& group) const {
+  return group.box.exteriorDistance(graph_.position_map(place));
+}
+
+double Guide::AtLeast(PlaceIndex place) const {
+  double nearest_m = std::numeric_limits<double>::infinity();
+  if (landmarks_ == nullptr) {
+    for (const Group& group : groups_) {
+      nearest_m = std::min(nearest_m, StraightFrom(place, group) + group.way_m);
+    }
+    return nearest_m;
+  }
+  const int32_t component = landmarks_->component(place);
+  const Landmarks::Distances& known = landmarks_->of(place);
+  for (const Group& group : groups_) {
+    if (group.component != component) continue;
+    float bound_m = 0.0F;
+    for (size_t i = 0; i < known.size(); ++i) {
+      bound_m = std::max({bound_m, group.low[i] - known[i], known[i] - group.high[i]});
+    }
+    const double around_m = static_cast<double>(bound_m) - landmarks_->slack_m();
+    nearest_m = std::min(nearest_m, std::max(around_m, StraightFrom(place, group)) + group.way_m);
+  }
+  return nearest_m;
 }
 
 }  // namespace dsg::query

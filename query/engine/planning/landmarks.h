@@ -1,22 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 // Distances from a dozen far places to all others, so that a search knows how far a goal is around
-// the walls and not only through them. Refuses to be exact: they bound ways from below.
+// the walls and not only through them. They bound ways from below.
 //
 // Source: Goldberg, Harrelson, "Computing the shortest path: A* search meets graph theory", SODA
 // 2005: by the triangle inequality no way is shorter than the difference of the distances of its
 // ends to any third place.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
-#include <condition_variable>
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "query/engine/planning/limits.h"
+#include "query/engine/planning/ends.h"
 #include "query/view/place_graph.h"
+#include "schema/base/cache.h"
 
 namespace dsg::query {
 
@@ -79,15 +81,52 @@ class LandmarkCache {
     uint64_t used = 0;
   };
 
+  std::optional<std::shared_ptr<const Landmarks>> Find(const Key& key);
+  /// Keeps what it builds, in place of the set that was not used for the longest.
   absl::StatusOr<std::shared_ptr<const Landmarks>> Build(const PlaceGraph& graph, const Key& key,
                                                          const StopCheck& stop);
-  void Keep(Entry entry);
 
+  SingleFlight<Key> flights_;
   mutable std::mutex mutex_;
-  std::condition_variable built_;
-  bool building_ = false;
   uint64_t use_count_ = 0;
   std::vector<Entry> entries_;
+};
+
+/// How far it is at least from a place to the nearest goal. Never overestimates, and what it says
+/// of two neighbours never differs by more than the length of the link between them.
+///
+/// Threads: one search at a time.
+class Guide {
+ public:
+  /// Straight lines only if `landmarks` is null. The arguments must outlive it.
+  /// Requires: at least one goal, and only goals that landmarks have a component for.
+  Guide(const PlaceGraph& graph, const std::vector<Anchor>& goals, const Landmarks* landmarks);
+
+  /// False if the place is in no component of a goal. Always true without landmarks.
+  bool MayReach(PlaceIndex place) const;
+  /// Metres. Requires: MayReach.
+  double AtLeast(PlaceIndex place) const;
+
+ private:
+  // Goals that are bounded together: exact for one, looser the further apart they are.
+  struct Group {
+    int32_t component = 0;
+    Box3d box;
+    double way_m = 0.0;
+    Landmarks::Distances low;
+    Landmarks::Distances high;
+  };
+
+  double StraightFrom(PlaceIndex place, const Group& group) const;
+  void Extend(const Anchor& goal, Group* group) const;
+  int32_t ComponentOf(PlaceIndex place) const {
+    return landmarks_ == nullptr ? 0 : landmarks_->component(place);
+  }
+
+  const PlaceGraph& graph_;
+  const Landmarks* landmarks_;
+  // Ascending component.
+  std::vector<Group> groups_;
 };
 
 }  // namespace dsg::query

@@ -12,8 +12,6 @@
 namespace dsg::query {
 namespace {
 
-constexpr int64_t kStopPeriod = 1024;
-
 std::string RoomText(NodeId room) { return room.empty() ? "no room" : ToString(room); }
 
 }  // namespace
@@ -38,7 +36,7 @@ absl::StatusOr<std::optional<double>> WidestRadius(const PlaceGraph& graph, cons
   };
   for (const Anchor& anchor : from) reach(anchor.place, graph.clearance_m(anchor.place));
   for (int64_t count = 0; !scratch->empty(); ++count) {
-    if (count % kStopPeriod == 0 && stop) DSG_RETURN_IF_ERROR(stop());
+    if (count % kPlacesPerStop == 0 && stop) DSG_RETURN_IF_ERROR(stop());
     const SearchScratch::Entry entry = scratch->Pop();
     SearchScratch::Cell& cell = scratch->at(entry.place());
     if (cell.settled) continue;

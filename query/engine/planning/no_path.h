@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Why there is no way, in a form that says what to change. Refuses to look for a way: it is asked
-// after planning has found none.
+// Why there is no path, in a form that says what to change. Runs after planning has found none.
 #pragma once
 
 #include <optional>
@@ -8,8 +7,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "query/engine/planning/attach.h"
-#include "query/engine/planning/limits.h"
+#include "query/engine/planning/ends.h"
 #include "query/view/place_graph.h"
 #include "schema/base/status.h"
 

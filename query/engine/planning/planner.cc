@@ -5,10 +5,8 @@
 #include <memory>
 #include <tuple>
 
-#include "query/engine/planning/guide.h"
 #include "query/engine/planning/landmarks.h"
 #include "query/engine/planning/planning_annex.h"
-#include "query/engine/planning/room_graph.h"
 #include "query/engine/planning/search_scratch.h"
 #include "schema/base/check.h"
 #include "schema/base/status.h"
@@ -16,7 +14,6 @@
 namespace dsg::query {
 namespace {
 
-constexpr int64_t kStopPeriod = 1024;
 // Below the bound that is promised by more than rounding can add up to.
 constexpr double kWeight = 1.0299;
 
@@ -63,7 +60,7 @@ class Search {
       SearchScratch::Cell& cell = scratch_->at(entry.place());
       if (cell.settled) continue;
       cell.settled = true;
-      if (result.expanded_count++ % kStopPeriod == 0 && stop) DSG_RETURN_IF_ERROR(stop());
+      if (result.expanded_count++ % kPlacesPerStop == 0 && stop) DSG_RETURN_IF_ERROR(stop());
       Expand(entry.place(), cell);
     }
     return result;
@@ -126,15 +123,6 @@ class Search {
 };
 
 }  // namespace
-
-void SortAnchors(std::vector<Anchor>* anchors) {
-  std::sort(anchors->begin(), anchors->end(), [](const Anchor& a, const Anchor& b) {
-    return std::tie(a.place, a.way_m, a.node) < std::tie(b.place, b.way_m, b.node);
-  });
-  anchors->erase(std::unique(anchors->begin(), anchors->end(),
-                             [](const Anchor& a, const Anchor& b) { return a.place == b.place; }),
-                 anchors->end());
-}
 
 absl::StatusOr<PlanResult> PlanFlat(const PlaceGraph& graph, const Limits& limits,
                                     const std::vector<Anchor>& from, const std::vector<Anchor>& to,

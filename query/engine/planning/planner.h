@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The shortest way over the places from any of some to any of others, exactly or nearly.
-// Refuses to explain why there is none: see no_path.h.
+// The shortest way over the places from any of some to any of others, exactly or nearly. no_path.h
+// explains why there is none.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "query/engine/planning/anchor.h"
-#include "query/engine/planning/limits.h"
+#include "query/engine/planning/ends.h"
 #include "query/view/place_graph.h"
 
 namespace dsg::query {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <unordered_set>
 
-#include "query/engine/search/color_name.h"
+#include "query/engine/search/words.h"
 
 namespace dsg::query {
 namespace {

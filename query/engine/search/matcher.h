@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether nodes are what a pattern says, for many nodes of one view. Refuses to find them: the plan
-// does that.
+// Whether nodes are what a pattern says, for many nodes of one view.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "query/engine/search/compiled_pattern.h"
+#include "query/engine/search/pattern.h"
 #include "query/view/graph_view.h"
 
 namespace dsg::query {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a node that is looked for is like: as programs and the query language say it (NodePattern),
-// and as one revision understands it (Pattern). Refuses to guess what an unknown word means.
+// and as one revision understands it (Pattern). A word that the map does not know is an error.
 #pragma once
 
 #include <cstddef>
@@ -8,9 +8,11 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "query/engine/search/words.h"
 #include "query/view/graph_view.h"
 #include "schema/model/node.h"
 
@@ -81,13 +83,6 @@ inline constexpr int kPatternConditionsMax = 64;
 /// The relation that no edge has: below the other in the hierarchy, however many layers down.
 inline constexpr char kInsideRelation[] = "INSIDE";
 
-/// Reads the query language of docs/search.md.
-/// Errors: QUERY_MALFORMED with `position` (bytes) and `expected`; the message shows the line.
-absl::StatusOr<NodePattern> ParseQuery(std::string_view text);
-
-/// The one way to write a pattern; parses back to the same.
-std::string FormatQuery(const NodePattern& pattern);
-
 /// Errors: FIELD_INVALID for a comparison, a value or a colour that there is not, and for patterns
 /// that are too deep or too long.
 absl::StatusOr<NodePattern> NodePatternFromProto(const v1::NodePattern& in);
@@ -122,14 +117,47 @@ absl::StatusOr<Pattern> ResolvePattern(const NodePattern& pattern, const GraphVi
 absl::StatusOr<Pattern> PatternFromProto(const v1::NodePattern& in, const GraphView& view,
                                          const Snapshot* snapshot, const StopCheck& stop);
 
-/// True if the node is what the pattern says at an instant; nullopt: at any time, each condition
-/// for itself. For the present give kTimeMax - 1. For many nodes, a Matcher remembers more.
-bool Matches(const GraphView& view, const Pattern& pattern, const ViewNode& node,
-             std::optional<TimeNs> at_ns);
+/// Nodes of one class in one layer.
+struct ClassRange {
+  LayerId layer = 0;
+  Symbol class_name = 0;
+  int64_t node_count = 0;
+};
 
-/// All nodes that match, agents included. Ascending id.
-/// Errors: what `stop` returned.
-absl::StatusOr<std::vector<NodeId>> FindMatches(const GraphView& view, const Pattern& pattern,
-                                                std::optional<TimeNs> at_ns, const StopCheck& stop);
+struct CompiledRelation {
+  enum class How { kEdge, kInside, kEdgeOrInside };
+  How how = How::kEdge;
+  /// nullopt: the map has no such edge.
+  std::optional<Symbol> symbol;
+  /// Either end of the edge will do.
+  bool symmetric = false;
+  bool reversed = false;
+  bool negated = false;
+  std::shared_ptr<const CompiledPattern> other;
+};
+
+/// A pattern with the symbols of a view in place of names. For this folder only.
+struct CompiledPattern {
+  NodePattern source;
+  /// Counts the patterns inside a pattern, from 0, for whoever keeps something of each.
+  int index = 0;
+  /// The map has no node that could match.
+  bool is_never = false;
+  std::optional<NodeId> id;
+  std::optional<Symbol> kind;
+  /// Asked for, or the one that the kind lives in.
+  std::optional<LayerId> layer;
+  /// Meaningful if source.class_name is set.
+  std::vector<ClassRange> classes;
+  NameMatcher name;
+  /// Only nodes that have a track, or only in their layer.
+  bool asks_for_agents = false;
+  std::vector<CompiledRelation> relations;
+  /// CONTAINS; nullopt if the map has no such edge.
+  std::optional<Symbol> contains;
+
+  bool has_class() const { return !source.class_name.empty(); }
+  bool has_name() const { return !source.name.empty(); }
+};
 
 }  // namespace dsg::query

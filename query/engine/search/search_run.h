@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A search from start to end: one page of nodes, by id or nearest first, with the steps it took.
-// Refuses to remember anything between pages: where a page begins is all that the next one needs.
+// Nothing is kept between pages: where a page begins is all that the next one needs.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,11 +8,11 @@
 #include <functional>
 #include <limits>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "absl/status/statusor.h"
 #include "query/engine/search/pattern.h"
-#include "query/engine/search/search_plan.h"
 
 namespace dsg::query {
 
@@ -45,6 +45,14 @@ struct SearchQuestion {
   bool explain = false;
 };
 
+/// A step that was done. Same meaning as v1.SearchStep.
+struct PlanStep {
+  std::string operation;
+  std::string detail;
+  int64_t in_count = 0;
+  int64_t out_count = 0;
+};
+
 struct SearchAnswer {
   /// Ascending by key.
   std::vector<Hit> hits;
@@ -59,5 +67,15 @@ struct SearchAnswer {
 /// Errors: those of `locate`; what `stop` returned.
 absl::StatusOr<SearchAnswer> RunSearch(const GraphView& view, const SearchQuestion& question,
                                        const StopCheck& stop);
+
+/// True if the node is what the pattern says at an instant; nullopt: at any time, each condition
+/// for itself. For the present give kTimeMax - 1. For many nodes, a Matcher remembers more.
+bool Matches(const GraphView& view, const Pattern& pattern, const ViewNode& node,
+             std::optional<TimeNs> at_ns);
+
+/// All nodes that match, agents included. Ascending id.
+/// Errors: what `stop` returned.
+absl::StatusOr<std::vector<NodeId>> FindMatches(const GraphView& view, const Pattern& pattern,
+                                                std::optional<TimeNs> at_ns, const StopCheck& stop);
 
 }  // namespace dsg::query

@@ -7,14 +7,14 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
-#include "query/engine/search/relation_words.h"
+#include "query/engine/search/words.h"
 #include "schema/base/status.h"
 #include "schema/model/known_names.h"
 
 namespace dsg::query {
 namespace {
 
-constexpr int kStopEvery = 512;
+constexpr int kNodesPerStop = 512;
 
 bool EndsWith(std::string_view text, std::string_view end) {
   return text.size() > end.size() && text.substr(text.size() - end.size()) == end;
@@ -87,7 +87,7 @@ absl::StatusOr<std::vector<Symbol>> Vocabulary::RelationSymbols(
   absl::Status status;
   int64_t node_count = 0;
   view_.ForEachNode(NodeId(), [&](const ViewNode& node) {
-    if (++node_count % kStopEvery == 0 && stop_) status = stop_();
+    if (++node_count % kNodesPerStop == 0 && stop_) status = stop_();
     view_.ForEachEdgeFrom(node.id, [&](const ViewEdge& edge) {
       found.insert(edge.relation);
       is_found = wanted.has_value() && edge.relation == *wanted;
@@ -119,7 +119,7 @@ absl::StatusOr<bool> Vocabulary::HasNode(const std::function<bool(const ViewNode
   absl::Status status;
   int64_t node_count = 0;
   view_.ForEachNode(NodeId(), [&](const ViewNode& node) {
-    if (++node_count % kStopEvery == 0 && stop_) status = stop_();
+    if (++node_count % kNodesPerStop == 0 && stop_) status = stop_();
     is_found = is_it(node);
     return status.ok() && !is_found;
   });
@@ -209,6 +209,26 @@ absl::Status Vocabulary::KindUnknown(std::string_view word) const {
                    absl::StrCat("pattern.kind is ", text, "; no node of the map is of this kind",
                                 SpellingHint(word, std::move(known))),
                    {{"field", "pattern.kind"}, {"value", text}});
+}
+
+absl::StatusOr<RelationSet> RelationSet::Resolve(const std::vector<std::string>& names,
+                                                 const GraphView& view, const StopCheck& stop) {
+  RelationSet set;
+  set.has_all_ = names.empty();
+  const Vocabulary vocabulary(view, nullptr, stop);
+  for (const std::string& name : names) {
+    DSG_ASSIGN_OR_RETURN(const std::string known, vocabulary.FindRelation(name));
+    // No edge is called INSIDE.
+    if (known.empty() || known == kInsideRelation) return vocabulary.RelationUnknown(name);
+    const std::optional<Symbol> symbol = view.symbols().Find(known);
+    if (symbol.has_value()) set.symbols_.push_back(*symbol);
+  }
+  std::sort(set.symbols_.begin(), set.symbols_.end());
+  return set;
+}
+
+bool RelationSet::Has(Symbol relation) const {
+  return has_all_ || std::binary_search(symbols_.begin(), symbols_.end(), relation);
 }
 
 }  // namespace dsg::query

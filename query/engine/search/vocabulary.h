@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "query/engine/search/compiled_pattern.h"
+#include "query/engine/search/pattern.h"
 #include "query/view/graph_view.h"
 
 namespace dsg::query {
@@ -57,5 +57,21 @@ class Vocabulary {
 
 /// Singular forms that an English plural may have: "cups": "cup"; "benches": "benche", "bench".
 std::vector<std::string> SingularsOf(std::string_view word);
+
+/// The relations that a question follows, as symbols of a view.
+class RelationSet {
+ public:
+  /// No names: all relations.
+  /// Errors: RELATION_UNKNOWN with those near in spelling; what `stop` returned.
+  static absl::StatusOr<RelationSet> Resolve(const std::vector<std::string>& names,
+                                             const GraphView& view, const StopCheck& stop);
+
+  bool Has(Symbol relation) const;
+
+ private:
+  bool has_all_ = true;
+  // Ascending.
+  std::vector<Symbol> symbols_;
+};
 
 }  // namespace dsg::query

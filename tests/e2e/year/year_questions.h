@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "query/engine/service_core.h"
+#include "query/service/service_core.h"
 #include "schema/base/random.h"
 #include "tests/e2e/year/year_world.h"
 

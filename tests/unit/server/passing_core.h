@@ -5,7 +5,7 @@
 #include <string>
 
 #include "query/api/generated/passing_api.h"
-#include "query/engine/service_core.h"
+#include "query/service/service_core.h"
 
 namespace dsg::server {
 

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/client/channel.h"
+#include "query/client/remote_api.h"
 
 #include <gtest/gtest.h>
 
-#include "query/client/remote_api.h"
 #include "schema/base/status.h"
 
 namespace dsg::client {

@@ -13,7 +13,6 @@
 
 #include "dsg/v1/map_service.grpc.pb.h"
 #include "query/client/call.h"
-#include "query/client/channel.h"
 #include "query/client/remote_api.h"
 
 namespace dsg::client {

@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "absl/status/status.h"
-#include "query/engine/service_core.h"
+#include "query/service/service_core.h"
 
 namespace dsg::test {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "query/engine/service_core.h"
+#include "query/service/service_core.h"
 #include "schema/model/graph_delta.h"
 #include "schema/store/graph_store.h"
 #include "tests/support/temp_folder.h"

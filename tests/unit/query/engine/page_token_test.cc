@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/page_token.h"
+#include "query/engine/request.h"
 
 #include <gtest/gtest.h>
 

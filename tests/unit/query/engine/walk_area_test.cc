@@ -12,7 +12,6 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/read.pb.h"
 #include "dsg/v1/space.pb.h"
-#include "query/engine/walk_area_cache.h"
 #include "schema/base/random.h"
 #include "tests/unit/query/engine/office.h"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "query/prediction/prediction.h"
+#include "query/prediction/velocity.h"
 
 namespace dsg::query {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/prediction/free_space.h"
+#include "query/prediction/walk_space.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <iostream>
 
-#include "query/prediction/prediction.h"
+#include "query/prediction/goal_prediction.h"
 #include "schema/base/random.h"
 
 namespace dsg::query {

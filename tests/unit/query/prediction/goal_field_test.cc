@@ -5,7 +5,7 @@
 #include <iostream>
 #include <limits>
 
-#include "query/prediction/prediction.h"
+#include "query/prediction/goal_prediction.h"
 #include "query/prediction/ways.h"
 #include "schema/base/random.h"
 

@@ -6,7 +6,7 @@
 #include <limits>
 #include <numeric>
 
-#include "query/prediction/prediction.h"
+#include "query/prediction/goal_prediction.h"
 
 namespace dsg::query {
 namespace {

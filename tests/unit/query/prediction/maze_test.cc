@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "query/prediction/goal_choice.h"
-#include "query/prediction/prediction.h"
+#include "query/prediction/goal_prediction.h"
 #include "schema/base/random.h"
 #include "tests/unit/query/prediction/mazes.h"
 

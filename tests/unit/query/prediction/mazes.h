@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "query/prediction/prediction.h"
+#include "query/prediction/goal_prediction.h"
 #include "schema/base/random.h"
 
 namespace dsg::query {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/prediction/pace.h"
+#include "query/prediction/route.h"
 
 #include <gtest/gtest.h>
 

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "query/prediction/prediction.h"
+#include "query/prediction/goal_prediction.h"
 
 namespace dsg::query {
 

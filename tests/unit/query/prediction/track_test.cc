@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/prediction/track.h"
+#include "query/prediction/velocity.h"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,7 @@
 
 #include "ingest/grid/distance_field.h"
 #include "ingest/truth/truth.h"
-#include "query/prediction/prediction.h"
+#include "query/prediction/goal_prediction.h"
 
 namespace dsg::query {
 

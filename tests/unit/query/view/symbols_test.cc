@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/view/symbols.h"
+#include "query/view/graph_view.h"
 
 #include <gtest/gtest.h>
 

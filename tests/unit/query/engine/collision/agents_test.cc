@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // People in the way: where they were, where they are, where they are foreseen to be.
-#include "query/engine/collision/agent_obstacles.h"
+#include "query/engine/collision/obstacles.h"
 
 #include <gtest/gtest.h>
 

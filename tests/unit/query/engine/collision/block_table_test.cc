@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Faces of any length are found, however far they reach out of their blocks.
-#include "query/engine/collision/block_table.h"
+#include "query/engine/collision/collision_cache.h"
 
 #include <gtest/gtest.h>
 

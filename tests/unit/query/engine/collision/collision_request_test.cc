@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "dsg/v1/query_service.pb.h"
-#include "query/engine/service_core.h"
+#include "query/service/service_core.h"
 #include "schema/base/status.h"
 #include "tests/unit/query/engine/office.h"
 

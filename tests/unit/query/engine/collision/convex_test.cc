@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Distances are right because their answers prove it: a plane between the two nearest points keeps
 // both sets apart, so that nothing can be nearer.
-#include "query/engine/collision/convex.h"
+#include "query/engine/collision/shapes.h"
 
 #include <gtest/gtest.h>
 

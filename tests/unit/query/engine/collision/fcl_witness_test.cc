@@ -15,7 +15,7 @@
 #include <memory>
 #include <string>
 
-#include "query/engine/collision/agent_obstacles.h"
+#include "query/engine/collision/obstacles.h"
 #include "tests/unit/query/engine/collision/scene.h"
 
 namespace dsg::query {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Whose triangles are whose, and what counts in place of a box.
-#include "query/engine/collision/mesh_owners.h"
+#include "query/engine/collision/collision_cache.h"
 
 #include <gtest/gtest.h>
 

@@ -6,9 +6,8 @@
 #include <optional>
 #include <vector>
 
-#include "query/engine/collision/body.h"
 #include "query/engine/collision/collision_world.h"
-#include "query/engine/collision/convex.h"
+#include "query/engine/collision/shapes.h"
 #include "schema/base/random.h"
 #include "schema/model/graph_delta.h"
 #include "schema/store/graph_store.h"

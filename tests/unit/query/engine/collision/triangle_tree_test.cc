@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The tree finds what looking at every triangle finds.
-#include "query/engine/collision/triangle_tree.h"
+#include "query/engine/collision/shapes.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/interaction/encounter_scan.h"
+#include "query/engine/interaction/encounters.h"
 
 #include <gtest/gtest.h>
 

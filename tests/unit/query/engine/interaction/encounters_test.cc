@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "dsg/v1/meetings.pb.h"
-#include "query/engine/interaction/encounter_search.h"
+#include "query/engine/interaction/encounters.h"
 #include "schema/base/random.h"
 #include "schema/base/status.h"
 #include "tests/unit/query/engine/office.h"

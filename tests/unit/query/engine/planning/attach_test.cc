@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/engine/planning/attach.h"
+#include "query/engine/planning/ends.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "query/engine/planning/place_locator.h"
+#include "query/engine/planning/planning_annex.h"
 #include "tests/unit/query/engine/planning/random_places.h"
 
 namespace dsg::query {

@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "query/engine/planning/guide.h"
 #include "query/engine/planning/planning_annex.h"
 #include "tests/unit/query/engine/planning/random_places.h"
 

@@ -7,8 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "query/engine/planning/anchor.h"
-#include "query/engine/planning/limits.h"
+#include "query/engine/planning/ends.h"
 #include "query/view/place_graph.h"
 #include "schema/base/random.h"
 

@@ -3,7 +3,7 @@
 #include <cctype>
 #include <set>
 
-#include "query/engine/search/color_name.h"
+#include "query/engine/search/words.h"
 #include "tests/unit/query/engine/search/furnished_map.h"
 
 namespace dsg::test {

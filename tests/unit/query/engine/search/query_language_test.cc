@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "query/engine/search/pattern.h"
+#include "query/engine/search/query_language.h"
 #include "schema/base/random.h"
 #include "schema/base/status.h"
 #include "tests/unit/query/engine/search/furnished_map.h"

@@ -5,10 +5,8 @@
 #include <set>
 #include <string>
 
-#include "query/engine/search/color_name.h"
-#include "query/engine/search/relation_words.h"
-#include "query/engine/search/text_match.h"
 #include "query/engine/search/vocabulary.h"
+#include "query/engine/search/words.h"
 
 namespace dsg::query {
 namespace {
