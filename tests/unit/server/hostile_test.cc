@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Clients that mean harm: they end, and neither the server nor anybody else does.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
-#include <condition_variable>
-#include <fstream>
 #include <future>
 #include <memory>
-#include <mutex>
 #include <thread>
 #include <vector>
 
@@ -19,15 +16,13 @@
 #include "grpcpp/generic/generic_stub.h"
 #include "grpcpp/grpcpp.h"
 #include "server/server.h"
-#include "server/status_mapping.h"
 #include "tests/support/raw_http2.h"
 #include "tests/unit/query/engine/office.h"
-#include "tests/unit/server/passing_core.h"
+#include "tests/unit/server/server_test_util.h"
 
 namespace dsg::server {
 namespace {
 
-using query::CallContext;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 using std::chrono::system_clock;
@@ -37,16 +32,7 @@ constexpr char kLocate[] = "/dsg.v1.QueryService/LocateAgent";
 constexpr char kCommit[] = "/dsg.v1.IngestService/Commit";
 constexpr char kPlanPaths[] = "/dsg.v1.QueryService/PlanPaths";
 
-// Of both ends, which are in this process.
-int64_t ResidentBytes() {
-  std::ifstream file("/proc/self/statm");
-  int64_t whole = 0;
-  int64_t resident = 0;
-  file >> whole >> resident;
-  return resident * sysconf(_SC_PAGESIZE);
-}
-
-// Watches how much memory is resident until it is asked for the most.
+// Samples resident memory until Growth is called.
 class Peak {
  public:
   Peak() : before_(ResidentBytes()), thread_([this] { Run(); }) {}
@@ -74,52 +60,11 @@ class Peak {
   std::thread thread_;
 };
 
-// ListMaps takes until the gate is opened.
-class GatedCore final : public PassingCore {
- public:
-  struct Gate {
-    std::mutex mutex;
-    std::condition_variable changed;
-    bool open = false;
-    int running_count = 0;
-
-    void Open() {
-      std::lock_guard lock(mutex);
-      open = true;
-      changed.notify_all();
-    }
-    void WaitForRunning(int count) {
-      std::unique_lock lock(mutex);
-      changed.wait(lock, [&] { return running_count == count; });
-    }
-  };
-
-  GatedCore(std::unique_ptr<query::ServiceCore> core, std::shared_ptr<Gate> gate)
-      : PassingCore(std::move(core)), gate_(std::move(gate)) {}
-
-  absl::Status ListMaps(const CallContext& call, const v1::ListMapsRequest& request,
-                        v1::ListMapsResponse* reply) override {
-    {
-      std::unique_lock lock(gate_->mutex);
-      ++gate_->running_count;
-      gate_->changed.notify_all();
-      gate_->changed.wait(lock, [this] { return gate_->open; });
-    }
-    return PassingCore::ListMaps(call, request, reply);
-  }
-
- private:
-  std::shared_ptr<Gate> gate_;
-};
-
-// `bytes` as the request of a call that is known by its path alone, on a connection of its own.
+// A call by path with `bytes` as its request, on its own connection.
 class BytesCall {
  public:
   BytesCall(const std::string& address, const std::string& path, const grpc::ByteBuffer& bytes) {
-    grpc::ChannelArguments arguments;
-    arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-    stub_ = std::make_unique<grpc::GenericStub>(
-        grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments));
+    stub_ = std::make_unique<grpc::GenericStub>(ConnectAlone(address));
     context_.set_deadline(system_clock::now() + seconds(60));
     call_ = stub_->PrepareUnaryCall(&context_, path, bytes, &queue_);
     call_->StartCall();
@@ -133,14 +78,7 @@ class BytesCall {
     return status_;
   }
   // Requires: Wait.
-  v1::Reason reason() const {
-    const auto& trailers = context_.GetServerTrailingMetadata();
-    const auto found = trailers.find(kErrorTrailer);
-    v1::ErrorDetail detail;
-    if (found == trailers.end()) return v1::REASON_UNSPECIFIED;
-    EXPECT_TRUE(detail.ParseFromString(std::string(found->second.data(), found->second.size())));
-    return detail.reason();
-  }
+  v1::Reason reason() const { return DetailOf(context_).reason(); }
 
  private:
   std::unique_ptr<grpc::GenericStub> stub_;
@@ -183,7 +121,7 @@ class Hostile : public testing::Test {
     options.listen = "unix:" + folder_.path() + "/server.sock";
     if (options.worker_count == 0) options.worker_count = 4;
     auto server =
-        Server::Start(std::make_unique<GatedCore>(test::OpenCore(folder_.path()), gate_), options);
+        Server::Start(std::make_unique<HeldCore>(test::OpenCore(folder_.path()), gate_), options);
     ASSERT_TRUE(server.ok()) << server.status();
     server_ = *std::move(server);
     maps_ = v1::MapService::NewStub(
@@ -217,7 +155,7 @@ class Hostile : public testing::Test {
   }
 
   test::TempFolder folder_;
-  std::shared_ptr<GatedCore::Gate> gate_ = std::make_shared<GatedCore::Gate>();
+  std::shared_ptr<Gate> gate_ = std::make_shared<Gate>();
   std::unique_ptr<Server> server_;
   std::unique_ptr<v1::MapService::Stub> maps_;
   std::atomic<bool> stop_{false};

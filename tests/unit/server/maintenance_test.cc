@@ -14,9 +14,8 @@
 #include "schema/base/status.h"
 #include "schema/codec/checksum.h"
 #include "server/server.h"
-#include "server/status_mapping.h"
 #include "tests/unit/query/engine/office.h"
-#include "tests/unit/server/passing_core.h"
+#include "tests/unit/server/server_test_util.h"
 
 namespace dsg::server {
 namespace {
@@ -65,16 +64,6 @@ class MaintenanceRpc : public testing::Test {
     server_ = *std::move(server);
     channel_ = grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials());
     stub_ = v1::MaintenanceService::NewStub(channel_);
-  }
-
-  static v1::Reason ReasonIn(const grpc::ClientContext& context) {
-    const auto& trailers = context.GetServerTrailingMetadata();
-    const auto found = trailers.find(kErrorTrailer);
-    v1::ErrorDetail detail;
-    if (found != trailers.end()) {
-      detail.ParseFromString(std::string(found->second.data(), found->second.size()));
-    }
-    return detail.reason();
   }
 
   bool AnswersQuestions() {
@@ -136,7 +125,7 @@ TEST_F(MaintenanceRpc, ErrorsCarryTheirReason) {
   v1::ReadArchiveResponse message;
   EXPECT_FALSE(reader->Read(&message));
   EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::NOT_FOUND);
-  EXPECT_EQ(ReasonIn(context), v1::MAP_UNKNOWN);
+  EXPECT_EQ(DetailOf(context).reason(), v1::MAP_UNKNOWN);
 }
 
 TEST_F(MaintenanceRpc, AnArchiveComesWhole) {
@@ -245,7 +234,7 @@ TEST_F(MaintenanceRpc, AServerThatStopsEndsWorkAndSaysSo) {
   while (reader->Read(&message)) {
   }
   EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
-  EXPECT_EQ(ReasonIn(context), v1::SHUTTING_DOWN);
+  EXPECT_EQ(DetailOf(context).reason(), v1::SHUTTING_DOWN);
   stopper.join();
   EXPECT_EQ(open_count, 0);
 }

@@ -12,7 +12,7 @@
 #include "dsg/v1/map_service.pb.h"
 #include "schema/base/status.h"
 #include "tests/unit/query/engine/office.h"
-#include "tests/unit/server/passing_core.h"
+#include "tests/unit/server/server_test_util.h"
 
 namespace dsg::server {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Readers that open a stream and then never read: counted is what they hold, not how long others
-// wait.
+// Readers that open a stream and then do not read. The tests count the messages that these hold,
+// not the time that others wait.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -14,7 +14,7 @@
 #include "schema/base/random.h"
 #include "server/server.h"
 #include "tests/unit/query/engine/office.h"
-#include "tests/unit/server/passing_core.h"
+#include "tests/unit/server/server_test_util.h"
 
 namespace dsg::server {
 namespace {
@@ -57,43 +57,6 @@ class CountingCore final : public PassingCore {
   };
 
   std::atomic<int>* message_count_;
-};
-
-// On a connection of its own.
-class MeshReader {
- public:
-  explicit MeshReader(const std::string& address) {
-    grpc::ChannelArguments arguments;
-    arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-    stub_ = v1::QueryService::NewStub(
-        grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments));
-    // Only so that a test that goes wrong ends.
-    context_.set_deadline(system_clock::now() + seconds(60));
-    v1::GetMeshRequest request;
-    request.set_map(test::kMap);
-    reader_ = stub_->GetMesh(&context_, request);
-  }
-  ~MeshReader() {
-    context_.TryCancel();
-    if (!is_finished_) Finish();
-  }
-
-  bool Read() {
-    v1::GetMeshResponse reply;
-    return reader_->Read(&reply);
-  }
-  grpc::Status Finish() {
-    is_finished_ = true;
-    while (Read()) {
-    }
-    return reader_->Finish();
-  }
-
- private:
-  std::unique_ptr<v1::QueryService::Stub> stub_;
-  grpc::ClientContext context_;
-  std::unique_ptr<grpc::ClientReader<v1::GetMeshResponse>> reader_;
-  bool is_finished_ = false;
 };
 
 class SilentReader : public testing::Test {

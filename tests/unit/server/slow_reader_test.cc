@@ -2,10 +2,8 @@
 // Readers of a large mesh that do not read, vanish or cancel cost others neither a worker nor
 // memory.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <fstream>
 #include <memory>
 #include <vector>
 
@@ -15,6 +13,7 @@
 #include "schema/base/random.h"
 #include "server/server.h"
 #include "tests/unit/query/engine/office.h"
+#include "tests/unit/server/server_test_util.h"
 
 namespace dsg::server {
 namespace {
@@ -42,45 +41,6 @@ void AddMesh(GraphDelta* delta) {
     delta->mesh_blocks.push_back(std::move(block));
   }
 }
-
-int64_t ResidentBytes() {
-  std::ifstream file("/proc/self/statm");
-  int64_t whole = 0;
-  int64_t resident = 0;
-  file >> whole >> resident;
-  return resident * sysconf(_SC_PAGESIZE);
-}
-
-// A stream on a connection of its own.
-class MeshReader {
- public:
-  explicit MeshReader(const std::string& address) {
-    grpc::ChannelArguments arguments;
-    arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-    stub_ = v1::QueryService::NewStub(
-        grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments));
-    context_.set_deadline(system_clock::now() + seconds(60));
-    v1::GetMeshRequest request;
-    request.set_map(test::kMap);
-    reader_ = stub_->GetMesh(&context_, request);
-  }
-  ~MeshReader() {
-    context_.TryCancel();
-    if (!is_finished_) reader_->Finish();
-  }
-
-  bool Read(v1::GetMeshResponse* reply) { return reader_->Read(reply); }
-  grpc::Status Finish() {
-    is_finished_ = true;
-    return reader_->Finish();
-  }
-
- private:
-  bool is_finished_ = false;
-  grpc::ClientContext context_;
-  std::unique_ptr<v1::QueryService::Stub> stub_;
-  std::unique_ptr<grpc::ClientReader<v1::GetMeshResponse>> reader_;
-};
 
 class SlowReader : public testing::Test {
  protected:

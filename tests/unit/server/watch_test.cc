@@ -13,8 +13,8 @@
 #include "grpcpp/grpcpp.h"
 #include "server/call_deadline.h"
 #include "server/server.h"
-#include "server/status_mapping.h"
 #include "tests/unit/query/engine/office.h"
+#include "tests/unit/server/server_test_util.h"
 
 namespace dsg::server {
 namespace {
@@ -37,10 +37,7 @@ class Watcher {
  public:
   Watcher(const std::string& address, const v1::WatchMapRequest& request,
           milliseconds deadline = seconds(60)) {
-    grpc::ChannelArguments arguments;
-    arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-    channel_ = grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
-    stub_ = v1::MapService::NewStub(channel_);
+    stub_ = v1::MapService::NewStub(ConnectAlone(address));
     // Only so that a test that goes wrong ends.
     context_.set_deadline(system_clock::now() + deadline);
     reader_ = stub_->WatchMap(&context_, request);
@@ -63,22 +60,11 @@ class Watcher {
   grpc::ClientContext& context() { return context_; }
 
  private:
-  std::shared_ptr<grpc::Channel> channel_;
   std::unique_ptr<v1::MapService::Stub> stub_;
   grpc::ClientContext context_;
   std::unique_ptr<grpc::ClientReader<v1::WatchMapResponse>> reader_;
   bool is_finished_ = false;
 };
-
-v1::ErrorDetail DetailOf(grpc::ClientContext& context) {
-  v1::ErrorDetail detail;
-  const auto& trailers = context.GetServerTrailingMetadata();
-  const auto found = trailers.find(kErrorTrailer);
-  if (found != trailers.end()) {
-    detail.ParseFromString(std::string(found->second.data(), found->second.size()));
-  }
-  return detail;
-}
 
 class WatchTest : public testing::Test {
  protected:
