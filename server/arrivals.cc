@@ -22,7 +22,7 @@ std::unique_ptr<Arrivals::Place> Arrivals::Enter(grpc_call* call, const Connecti
       Place* const longest = Longest();
       places_.erase(longest->at_);
       longest->is_listed_ = false;
-      // Keeps the call beyond the lock, which its end will take.
+      // The end of the call takes the lock, so cancel it without; the reference keeps it alive.
       ended = longest->call_;
       grpc_call_ref(ended);
     }

@@ -82,8 +82,7 @@ void Connections::CountReset(Connection* connection) {
 void Connections::Close(Connection* connection, const std::string& why) {
   if (connection == nobody_.get() || connection->closed.exchange(true)) return;
   Log(LogLevel::kWarning, "closing a connection", {{"peer", connection->peer}, {"why", why}});
-  // gRPC keeps the descriptor as long as a call of the connection lives, and so one of the
-  // caller's.
+  // gRPC keeps the descriptor open while a call of the connection exists, and the caller holds one.
   if (CookieOf(connection->fd) == connection->cookie) shutdown(connection->fd, SHUT_RDWR);
 }
 
