@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a server does with callers that wait, leave, do not read, or are too many.
+// How a server treats callers that wait, leave, do not read, or are too many.
 #include <gtest/gtest.h>
 
 #include <future>
@@ -52,7 +52,7 @@ class Bounds : public testing::Test {
     return maps_->GetServerInfo(context, {}, &reply);
   }
 
-  // A stream of 300,000 poses, about 20 MB: more than sockets and flow control swallow.
+  // A stream of 300,000 poses, about 20 MB: more than sockets and flow control buffer.
   std::unique_ptr<grpc::ClientReader<v1::GetTrajectoryResponse>> OpenBigStream(
       grpc::ClientContext* context) {
     v1::GetTrajectoryRequest request;
@@ -91,7 +91,7 @@ TEST_F(Bounds, RefusesCallsBeyondTheBoundAtOnceAndRecovers) {
   EXPECT_EQ(DetailOf(context).reason(), v1::OVERLOADED);
   gate_->Open();
   EXPECT_TRUE(held.get().ok());
-  // The worker counts the call as running until a moment after the caller has its answer.
+  // The worker counts the call as running until shortly after the caller has its answer.
   bool recovered = false;
   for (int i = 0; i < 1000 && !recovered; ++i) {
     grpc::ClientContext later;
@@ -141,7 +141,7 @@ TEST_F(Bounds, KeepsAnsweringWhileAReaderDoesNotRead) {
   const auto reader = OpenBigStream(&stream_context);
   v1::GetTrajectoryResponse message;
   ASSERT_TRUE(reader->Read(&message));
-  // The only worker must be free each time, though the stream is not over.
+  // The only worker must be free each time, although the stream is open.
   for (int i = 0; i < 100; ++i) {
     grpc::ClientContext context;
     context.set_deadline(system_clock::now() + std::chrono::seconds(10));
@@ -198,8 +198,8 @@ TEST_F(Bounds, EndsAStreamOfACallerThatGaveNoDeadlineAndDoesNotRead) {
   const auto reader = OpenBigStream(&context);
   v1::GetTrajectoryResponse message;
   ASSERT_TRUE(reader->Read(&message));
-  // Shutdown waits for the stream, which must end by its own default deadline of 5 s and not by
-  // being cancelled after the long grace. Nobody reads meanwhile.
+  // Shutdown waits for the stream, which must end by its default deadline of 5 s and not by being
+  // cancelled after the long grace. The reader does not read meanwhile.
   const auto begin = std::chrono::steady_clock::now();
   server_->Shutdown(std::chrono::seconds(40));
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(20));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Clients that mean harm: they end, and neither the server nor anybody else does.
+// Hostile clients: their connections end, and neither the server nor other clients are affected.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -89,7 +89,7 @@ class BytesCall {
   std::unique_ptr<grpc::GenericClientAsyncResponseReader> call_;
 };
 
-// Just under four mebibytes of empty messages in a list, within a message if `outer_tag` is given.
+// Just under 4 MiB of empty messages in a list, within a message if `outer_tag` is given.
 grpc::ByteBuffer EmptyMessages(char tag, char outer_tag = 0) {
   constexpr uint32_t kCount = 2'000'000;
   std::string bytes;
@@ -138,7 +138,7 @@ class Hostile : public testing::Test {
     return status.ok();
   }
 
-  // Somebody who asks all the time, on one connection, and is always answered.
+  // A client that calls continuously on one connection and must always be answered.
   void BeginBystander() {
     bystander_ = std::thread([this] {
       while (!stop_ && AskInfo()) ++answered_count_;
@@ -146,7 +146,7 @@ class Hostile : public testing::Test {
   }
   void EndBystander() {
     const int before = answered_count_;
-    // It is still at it.
+    // It must still be answered now.
     while (answered_count_ < before + 10 && bystander_.joinable() && !HasFailure()) {
       std::this_thread::sleep_for(milliseconds(1));
     }
@@ -213,7 +213,7 @@ TEST_F(Hostile, EmptyNodesAreRefusedBeforeTheyAreParsed) {
     EXPECT_EQ(call->reason(), v1::LIMIT_EXCEEDED);
   }
   EndBystander();
-  // One of them took 650 MB.
+  // Parsing one of them would take 650 MB.
   EXPECT_LT(peak.Growth(), 200 * kMebibyte);
 }
 
@@ -237,7 +237,7 @@ TEST_F(Hostile, RequestsThatWaitForAWorkerHoldNoMoreThanTheirBytes) {
   for (int i = 0; i < 32; ++i) {
     calls.push_back(std::make_unique<BytesCall>(server_->address(), kPlanPaths, paths));
   }
-  // As many wait as may; the others are refused meanwhile.
+  // The queue fills up; the other calls are refused meanwhile.
   while (server_->Load().queued_count < 14) std::this_thread::sleep_for(milliseconds(1));
   std::this_thread::sleep_for(milliseconds(200));
   gate_->Open();
@@ -280,7 +280,7 @@ TEST_F(Hostile, BytesThatAreNoRequestAreCalledSo) {
 
 TEST_F(Hostile, ConnectionsBeyondTheBoundAreClosedAndThePlaceOfADeadOneIsTaken) {
   ServerOptions options;
-  // The first is the fixture's own.
+  // One for the fixture's own connection.
   options.connection_max = 2;
   Start(options);
   auto second = std::make_unique<test::RawHttp2>(server_->address());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Maintenance over the wire: streams that work beside commits and questions, and end with the
-// caller, the map or the server.
+// Maintenance over the wire: streams that run next to commits and queries, and end with the caller,
+// the map or the server.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -22,7 +22,7 @@ namespace {
 
 using test::kMap;
 
-// A compaction that is never done, and tells so as fast as it is read.
+// A compaction that never ends and reports progress as fast as it is read.
 class EndlessCompaction final : public query::StreamCursor<v1::CompactResponse> {
  public:
   explicit EndlessCompaction(std::atomic<int>* open_count) : open_count_(open_count) {
@@ -142,7 +142,7 @@ TEST_F(MaintenanceRpc, AnArchiveComesWhole) {
   EXPECT_EQ(bytes.substr(bytes.size() - 40, 4), "DSGE");
 }
 
-// Of more pieces than a connection takes from us unread.
+// More messages than a connection buffers for a reader that does not read.
 GraphDelta DeltaWithALargeAsset() {
   Random random(1, 0);
   Asset asset;
@@ -160,7 +160,7 @@ TEST_F(MaintenanceRpc, ArchivesThatNobodyReadsLeaveRoomForOtherWork) {
   test::CommitToOffice(folder_.path(), DeltaWithALargeAsset());
   constexpr int kStreamCount = 40;
   Start(test::OpenCore(folder_.path()), {.open_stream_max = 32});
-  // Takes nothing ahead of its reader.
+  // The client buffers as little as possible.
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
   arguments.SetInt(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, 64 << 10);
@@ -174,10 +174,10 @@ TEST_F(MaintenanceRpc, ArchivesThatNobodyReadsLeaveRoomForOtherWork) {
   for (int i = 0; i < kStreamCount; ++i) {
     contexts.push_back(std::make_unique<grpc::ClientContext>());
     readers.push_back(stub_->ReadArchive(contexts.back().get(), request));
-    // It has been opened, or refused.
+    // The stream has been opened or refused.
     readers.back()->WaitForInitialMetadata();
   }
-  // A stream that was refused counts until the server has seen the last of it.
+  // A refused stream counts until the server has finished it.
   grpc::Status compacted;
   do {
     grpc::ClientContext context;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every call of every service over a real socket, and what errors look like on the far side.
+// Calls of every service over a real socket, and their errors as the client sees them.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -46,7 +46,7 @@ class Rpc : public testing::Test {
     return request;
   }
 
-  // A call by its path, without a stub; the reply's bytes.
+  // A call by path, without a stub; returns the bytes of the reply.
   grpc::Status CallByPath(const std::string& path, std::string* reply_bytes) {
     grpc::GenericStub stub(channel_);
     grpc::CompletionQueue queue;

@@ -9,6 +9,7 @@
 
 #include "dsg/v1/map_service.pb.h"
 #include "grpc/grpc.h"
+#include "schema/base/random.h"
 #include "schema/codec/status_decode.h"
 #include "tests/unit/query/engine/office.h"
 
@@ -67,6 +68,25 @@ absl::Status HeldCore::ListMaps(const query::CallContext& call, const v1::ListMa
                                 v1::ListMapsResponse* reply) {
   if (absl::Status stop = gate_->Pass(call); !stop.ok()) return stop;
   return PassingCore::ListMaps(call, request, reply);
+}
+
+GraphDelta MeshDelta() {
+  GraphDelta delta;
+  Random random(21, 0);
+  for (int i = 0; i < kMeshBlockCount; ++i) {
+    MeshBlock block;
+    block.index = {i % 20, i / 20, 0};
+    for (uint32_t k = 0; k < kMeshVertexCount; ++k) {
+      block.positions_map.emplace_back(2.0 * block.index.x + random.Uniform(0, 2),
+                                       2.0 * block.index.y + random.Uniform(0, 2),
+                                       random.Uniform(0, 2));
+      block.normals_map.emplace_back(random.Uniform(), random.Uniform(), random.Uniform());
+      block.last_seen_ns.push_back(1'700'000'000 * kNsPerSecond + random.Index(1 << 30));
+      block.first_seen_ns.push_back(block.last_seen_ns.back());
+    }
+    delta.mesh_blocks.push_back(std::move(block));
+  }
+  return delta;
 }
 
 MeshReader::MeshReader(const std::string& address)

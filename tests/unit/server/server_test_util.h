@@ -13,6 +13,7 @@
 #include "grpcpp/grpcpp.h"
 #include "query/api/generated/passing_api.h"
 #include "query/engine/service_core.h"
+#include "schema/model/graph_delta.h"
 
 namespace dsg::server {
 
@@ -57,6 +58,13 @@ class HeldCore final : public PassingCore {
  private:
   std::shared_ptr<Gate> gate_;
 };
+
+/// Blocks of MeshDelta, and vertices of each.
+inline constexpr int kMeshBlockCount = 400;
+inline constexpr uint32_t kMeshVertexCount = 3000;
+
+/// A mesh of about 40 MB on the wire, 100 kB per block, that is hard to compress.
+GraphDelta MeshDelta();
 
 /// A stream of the whole mesh of test::kMap on its own connection, cancelled when destroyed.
 class MeshReader {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Readers of a large mesh that do not read, vanish or cancel cost others neither a worker nor
-// memory.
+// Readers of a large mesh that do not read, vanish or cancel must not occupy workers or memory.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,34 +20,11 @@ namespace {
 using std::chrono::seconds;
 using std::chrono::system_clock;
 
-constexpr int kBlockCount = 400;
-constexpr uint32_t kVertexCount = 3000;
-
-// About 100 kB each on the wire, and hard to compress.
-void AddMesh(GraphDelta* delta) {
-  Random random(21, 0);
-  for (int i = 0; i < kBlockCount; ++i) {
-    MeshBlock block;
-    block.index = {i % 20, i / 20, 0};
-    for (uint32_t k = 0; k < kVertexCount; ++k) {
-      block.positions_map.emplace_back(2.0 * block.index.x + random.Uniform(0, 2),
-                                       2.0 * block.index.y + random.Uniform(0, 2),
-                                       random.Uniform(0, 2));
-      block.normals_map.emplace_back(random.Uniform(), random.Uniform(), random.Uniform());
-      block.last_seen_ns.push_back(1'700'000'000 * kNsPerSecond + random.Index(1 << 30));
-      block.first_seen_ns.push_back(block.last_seen_ns.back());
-    }
-    delta->mesh_blocks.push_back(std::move(block));
-  }
-}
-
 class SlowReader : public testing::Test {
  protected:
   SlowReader() {
     test::MakeOffice(folder_.path());
-    GraphDelta delta;
-    AddMesh(&delta);
-    test::CommitToOffice(folder_.path(), std::move(delta));
+    test::CommitToOffice(folder_.path(), MeshDelta());
   }
 
   void Start(int open_stream_max) {
@@ -70,7 +46,7 @@ class SlowReader : public testing::Test {
     return maps_->GetServerInfo(&context, {}, &reply);
   }
 
-  // The server may learn a moment later that a reader left.
+  // The server may notice the departure of a reader a little later.
   bool IsLetIn() {
     for (int i = 0; i < 2000; ++i) {
       MeshReader reader(server_->address());
@@ -94,7 +70,7 @@ TEST_F(SlowReader, GetsEveryBlockOnceAndInOrderHoweverSlow) {
   while (reader.Read(&reply)) {
     EXPECT_EQ(reply.has_header(), message_count++ == 0);
     for (const v1::MeshBlock& block : reply.blocks()) {
-      EXPECT_EQ(block.positions_size(), 3 * static_cast<int>(kVertexCount));
+      EXPECT_EQ(block.positions_size(), 3 * static_cast<int>(kMeshVertexCount));
       blocks.emplace_back(block.x(), block.y());
     }
     if (message_count % 8 == 0) {
@@ -102,7 +78,7 @@ TEST_F(SlowReader, GetsEveryBlockOnceAndInOrderHoweverSlow) {
     }
   }
   EXPECT_TRUE(reader.Finish().ok());
-  EXPECT_EQ(blocks.size(), static_cast<size_t>(kBlockCount));
+  EXPECT_EQ(blocks.size(), static_cast<size_t>(kMeshBlockCount));
   EXPECT_TRUE(std::is_sorted(blocks.begin(), blocks.end()));
   EXPECT_EQ(std::adjacent_find(blocks.begin(), blocks.end()), blocks.end());
 }
@@ -120,7 +96,7 @@ TEST_F(SlowReader, LeavesTheOnlyWorkerAndTheMemoryToOthers) {
     ASSERT_TRUE(readers.back()->Read(&reply));
   }
   for (int i = 0; i < 500; ++i) ASSERT_TRUE(AskInfo().ok());
-  // Both ends are in this process. Each stream is of 40 MB.
+  // Both ends are in this process. Each stream has 40 MB.
   EXPECT_LT(ResidentBytes() - before, kReaderCount * kBytesPerReaderMax);
 }
 
