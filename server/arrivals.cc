@@ -30,11 +30,11 @@ std::unique_ptr<Arrivals::Place> Arrivals::Enter(grpc_call* call, const Connecti
     place->is_listed_ = true;
   }
   if (ended != nullptr) {
-    grpc_call_cancel_with_status(
-        ended, GRPC_STATUS_RESOURCE_EXHAUSTED,
-        "the server receives as many requests as it takes at a time, and this one has come slowest "
-        "of those on its connection; send it again after a pause",
-        nullptr);
+    grpc_call_cancel_with_status(ended, GRPC_STATUS_RESOURCE_EXHAUSTED,
+                                 "the server receives too many requests at once, and this is the "
+                                 "oldest of the connection with the most; send it again after a "
+                                 "pause",
+                                 nullptr);
     grpc_call_unref(ended);
   }
   return place;

@@ -83,12 +83,12 @@ void IncomingCall::OnReadDone(bool ok) {
 
 void IncomingCall::Refuse(const absl::Status& status) {
   LogEnd("", status, 0, 0);
-  // After Finish another thread may have deleted this.
+  // After that another thread may have deleted this.
   Finish(ForCaller(status));
 }
 
 size_t IncomingCall::EstimateBytes(size_t bytes_max) {
-  // Large requests are counted one at a time, so that a flood of them occupies only one core.
+  // Large requests one at a time, so that a flood of them keeps one core busy and not all.
   static std::mutex large_requests;
   constexpr size_t kLargeBytes = size_t{64} << 10;
   std::unique_lock lock(large_requests, std::defer_lock);
@@ -98,8 +98,8 @@ size_t IncomingCall::EstimateBytes(size_t bytes_max) {
 
 absl::Status IncomingCall::Parse(Message* request) {
   const size_t wire_bytes = wire_.Length();
-  // One share for the messages, one for what the engine makes of them: a commit of 4 MB of objects
-  // took 1.4 times the estimate for its messages in total.
+  // As messages, and as what the engine makes of them: a commit of 4 MB of objects took 1.4 times
+  // its messages' estimate in all.
   constexpr size_t kShares = 2;
   // One byte above the limit is enough to refuse the call.
   const size_t bytes = EstimateBytes(runtime_->memory->bytes_max_of_call() / kShares + 1) * kShares;

@@ -46,7 +46,7 @@ class IncomingCall : public grpc::ServerGenericBidiReactor, public Job {
   void Receive();
   /// Called when the request has arrived and its bytes are charged.
   virtual void Queue() = 0;
-  /// Ends the call with an error before any answer.
+  /// Ends the call before any of it was answered.
   void Refuse(const absl::Status& status);
 
   /// Charges for the parsed request, parses it, and frees its bytes.

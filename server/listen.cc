@@ -93,7 +93,7 @@ absl::Status RemoveDeadSocket(const std::string& path) {
     return PathError(path, std::strerror(errno));
   }
   if (!S_ISSOCK(found.st_mode)) {
-    return PathError(path, "something that is no socket is there; remove it, or give another path");
+    return PathError(path, "the path exists and is not a socket; remove it, or give another path");
   }
   if (IsAnswered(path)) return TakenError(path);
   if (unlink(path.c_str()) != 0 && errno != ENOENT) return PathError(path, std::strerror(errno));
@@ -200,9 +200,9 @@ absl::StatusOr<ListenAddress> ParseListenAddress(std::string_view text, bool all
   }
   if (!allow_remote && !IsLoopback(address.host)) {
     return AddressError(text,
-                        "other machines could reach it, and there is no authentication yet: "
-                        "whoever connects may read and write every map. Listen on a unix socket "
-                        "or 127.0.0.1, or pass --allow-remote on a network that you trust");
+                        "other machines could reach it, and there is no authentication: every "
+                        "client can read and write every map. Listen on a unix socket or "
+                        "127.0.0.1, or pass --allow-remote on a trusted network");
   }
   return address;
 }

@@ -55,8 +55,8 @@ class UnixSocketClaim {
   int lock_fd_;
 };
 
-/// Accepts connections and hands each over at once: in HTTP/2 as gRPC uses it the server sends
-/// first.
+/// Accepts connections and hands each over at once, so that the server can send its HTTP/2 settings
+/// before the client sends anything.
 class Acceptor {
  public:
   using Clock = std::chrono::steady_clock;

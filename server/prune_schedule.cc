@@ -146,7 +146,7 @@ absl::Status PruneSchedule::PruneMap(const std::string& map,
   }
   if (all.left_count() > 0) {
     Log(LogLevel::kWarning,
-        "not all was erased: others went on writing it; the next run tries again",
+        "erasure incomplete: other clients kept writing the data; the next run tries again",
         {{"map", map}, {"left", absl::StrCat(all.left_count())}, {"first", all.left_ids(0)}});
   }
   Log(LogLevel::kInfo, "policies applied to map",

@@ -188,7 +188,7 @@ class RunningServer final : public Server {
     builder.RegisterCallbackGenericService(&services_);
     grpc_server_ = builder.BuildAndStart();
     if (grpc_server_ == nullptr) {
-      return absl::InternalError("gRPC did not start; its log says why");
+      return absl::InternalError("gRPC did not start; see its log");
     }
     acceptor_->Start([this](int fd, const std::string& peer) {
       if (connections_.Add(fd, peer)) {
@@ -270,25 +270,25 @@ class RunningServer final : public Server {
 absl::Status OverloadedError(std::string_view why) {
   // Long enough for several calls to finish.
   constexpr int kRetryAfterMs = 200;
-  return MakeError(Reason::kOverloaded,
-                   absl::StrCat(std::string(why), "; retry after a pause of ", kRetryAfterMs,
-                                " ms that grows, and use the batch calls instead of many small "
-                                "ones"),
-                   {{"retry_after_ms", absl::StrCat(kRetryAfterMs)}});
+  return MakeError(
+      Reason::kOverloaded,
+      absl::StrCat(std::string(why), "; retry after a growing pause from ", kRetryAfterMs,
+                   " ms, and use batch calls instead of many small ones"),
+      {{"retry_after_ms", absl::StrCat(kRetryAfterMs)}});
 }
 
 absl::Status TooManyWatchesError(int watch_max) {
   return MakeError(Reason::kOverloaded,
                    absl::StrCat("the server keeps ", watch_max,
-                                " watches at a time, and all are taken; end one, ask with "
+                                " watches at a time, and all are in use; end one, use "
                                 "ListRevisions instead, or start the server with --max-watches"),
                    {{"watches", absl::StrCat(watch_max)}});
 }
 
 absl::Status ShuttingDownError() {
   return MakeError(Reason::kShuttingDown,
-                   "the server is stopping; call again when it is back: a watch goes on from "
-                   "the last read_revision, and maintenance does what is left");
+                   "the server is stopping; call again when it is back: resume a watch from the "
+                   "last read_revision, and repeat maintenance to do the rest");
 }
 
 absl::Status ServerOptions::Validate() const {

@@ -39,7 +39,7 @@ class StreamCall final : public IncomingCall {
 
   void Run() override {
     const absl::StatusOr<std::chrono::nanoseconds> wait = Prepare();
-    // After each of these branches another thread may have deleted this.
+    // After each of these another thread may have deleted this.
     if (!wait.ok()) {
       Finish(LastWords(wait.status()));
     } else if (wait->count() > 0) {

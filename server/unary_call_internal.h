@@ -67,7 +67,7 @@ class UnaryCall final : public IncomingCall {
 
   void Run() override {
     const absl::Status status = Answer();
-    // Without a deadline, gRPC would keep a reply for ever that its reader does not take.
+    // A reply that nobody takes would be kept for ever.
     if (OutlastsBound(context()->deadline())) {
       reply_guard_ =
           runtime().guard->Guard(context()->c_call(), CallGuard::Clock::time_point::max());
