@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes the C++ side of the services from their protos: generate_api SERVICES.pb FOLDER.
+// Generates the C++ API of the services from their protos: generate_api SERVICES.pb FOLDER.
 //
-// SERVICES.pb is what `protoc --include_imports --include_source_info --descriptor_set_out` makes.
-// FOLDER gets api.h (the abstract Api and the table of methods), engine_api.h (an Api of one
-// function a method), remote_api.h (an Api over gRPC) and passing_api.h (an Api that calls
-// another). A program on libprotobuf instead of a plugin of protoc: that needs no libprotoc.
+// SERVICES.pb is the output of `protoc --include_imports --include_source_info
+// --descriptor_set_out`.
+// FOLDER gets api.h (the abstract Api and the table of methods), engine_api.h (an Api that calls
+// one function per method), remote_api.h (an Api over gRPC) and passing_api.h (an Api that forwards
+// to another). This is a program on libprotobuf and not a plugin of protoc, which would need
+// libprotoc.
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/descriptor.pb.h>
 #include <google/protobuf/io/printer.h>
@@ -48,11 +50,11 @@ std::string WordOf(dsg::v1::Lifetime lifetime) {
   }
 }
 
-// The comment above a method in its proto, as a docstring inside a class.
+// The comment of a method in its proto, as a docstring inside a class.
 std::string CommentOf(const pb::MethodDescriptor& method) {
   pb::SourceLocation location;
   if (!method.GetSourceLocation(&location) || location.leading_comments.empty()) {
-    Fail(method.full_name() + " has no comment; say what it answers, and its errors");
+    Fail(method.full_name() + " has no comment; document its answer and its errors");
   }
   std::istringstream lines(location.leading_comments);
   std::string comment;
@@ -64,7 +66,7 @@ std::string CommentOf(const pb::MethodDescriptor& method) {
 std::string StemOf(const std::string& file) { return file.substr(0, file.rfind('.')); }
 
 Method ReadMethod(const pb::MethodDescriptor& method) {
-  if (method.client_streaming()) Fail(method.full_name() + ": streams of requests are not known");
+  if (method.client_streaming()) Fail(method.full_name() + ": client streams are not supported");
   const pb::MethodOptions& options = method.options();
   Method made;
   made.is_stream = method.server_streaming();
@@ -82,12 +84,12 @@ Method ReadMethod(const pb::MethodDescriptor& method) {
   return made;
 }
 
-// In the order of the file names, then as in the file, so that the same protos give the same bytes.
+// Sorted by file name, then in the order of the file, so that the same protos give the same bytes.
 std::vector<Method> ReadMethods(const std::string& path) {
   pb::FileDescriptorSet files;
   std::ifstream in(path, std::ios::binary);
   if (!in || !files.ParseFromIstream(&in)) Fail("cannot read the descriptors in " + path);
-  // Of the process, since it stays until the end.
+  // Static, because the methods refer to it until the end.
   static pb::DescriptorPool pool;
   std::map<std::string, const pb::FileDescriptor*> sorted;
   for (const pb::FileDescriptorProto& file : files.file()) {
@@ -108,14 +110,14 @@ std::vector<Method> ReadMethods(const std::string& path) {
   return methods;
 }
 
-// One header: opened, filled with Line and ForEach, checked and closed.
+// Writes one header and checks it when closed.
 class Header {
  public:
   Header(const std::string& folder, const std::string& name)
       : path_(folder + "/" + name), file_(path_), stream_(&file_), printer_(&stream_, '$') {
     printer_.PrintRaw(
         "// SPDX-License-Identifier: Apache-2.0\n"
-        "// Generated from proto/dsg/v1/*.proto by proto/generate_api.cc; change those.\n"
+        "// Generated from proto/dsg/v1/*.proto by proto/generate_api.cc; edit those.\n"
         "#pragma once\n\n");
   }
   ~Header() {
@@ -164,14 +166,12 @@ void WriteApi(const std::vector<Method>& methods, const std::string& folder) {
   for (const std::string& message : messages) out.Raw("class " + message + ";\n");
   out.Raw(
       "}  // namespace dsg::v1\n\nnamespace dsg::query {\n\n"
-      "/// Every call of the services as a C++ function. The engine answers from a store folder, "
-      "a\n"
-      "/// RemoteApi asks a dsg-server; callers cannot tell them apart.\n"
+      "/// All RPCs of the services as C++ functions. The engine answers from a store folder, a\n"
+      "/// RemoteApi calls a dsg-server; both give the same answers.\n"
       "///\n"
-      "/// Threads: safe from many threads. It must outlive the cursors that it returns.\n"
-      "/// Errors: the codes and reasons below; what `call.Check()` returns. Those of a stream "
-      "come\n"
-      "/// when it is opened or from its cursor.\n"
+      "/// Threads: safe from any thread. Must outlive the cursors that it returns.\n"
+      "/// Errors: the codes and reasons below, and those of `call.Check()`. A stream\n"
+      "/// returns errors when it is opened or from its cursor.\n"
       "class Api {\n public:\n  virtual ~Api() = default;\n\n");
   out.Each(methods,
            "$comment$"
@@ -208,7 +208,7 @@ void WriteEngineApi(const std::vector<Method>& methods, const std::string& folde
            "CursorOr<v1::$Reply$> $Name$(Engine* engine, const CallContext& call,\n"
            "    const v1::$Request$& request);\n");
   out.Raw(
-      "\n/// A Base, which is an Api, that answers with these functions.\n"
+      "\n/// Implements Api with these functions. Base derives from Api.\n"
       "template <class Base>\nclass EngineApi : public Base {\n public:\n"
       "  /// `engine` must outlive this.\n"
       "  explicit EngineApi(Engine* engine) : engine_(engine) {}\n\n");
@@ -232,7 +232,7 @@ void WriteRemoteApi(const std::vector<Method>& methods, const std::string& folde
   for (const std::string& stem : stems) out.Raw("#include \"" + stem + ".grpc.pb.h\"\n");
   out.Raw(
       "#include \"query/api/api.h\"\n\nnamespace dsg::query {\n\n"
-      "/// Asks a server. `Caller` makes each call: Ask a unary one, Open a stream.\n"
+      "/// Implements Api with gRPC. `Caller` has Ask for unary calls and Open for streams.\n"
       "template <class Caller>\nclass RemoteApi final : public Api {\n public:\n"
       "  explicit RemoteApi(std::unique_ptr<Caller> caller) : caller_(std::move(caller)) {}\n\n");
   out.Overrides(methods,
@@ -252,7 +252,8 @@ void WritePassingApi(const std::vector<Method>& methods, const std::string& fold
   out.Raw(
       "#include <memory>\n#include <utility>\n\n#include \"query/api/api.h\"\n\n"
       "namespace dsg::query {\n\n"
-      "/// Passes every call on to another Base, which is an Api: for classes that change a few.\n"
+      "/// Forwards every call to another Base, for classes that override a few. Base derives from "
+      "Api.\n"
       "template <class Base>\nclass PassingApi : public Base {\n public:\n"
       "  explicit PassingApi(std::unique_ptr<Base> next) : next_(std::move(next)) {}\n\n");
   out.Overrides(methods, "    return next_->$Name$(call, request, reply);\n",

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Memory for the messages of calls, handed from one call to the next while it is in the caches.
-// Refuses to keep more than a few calls need at a time.
+// Memory for the messages of calls. Blocks are reused by the next calls while they are still in the
+// processor's caches; at most 64 unused blocks are kept.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 
 namespace dsg::server {
 
-/// The first block of each call's arena; most messages need no other.
+/// Lends the first block of each call's arena. Most messages need no further block.
 ///
 /// Threads: safe from any thread.
 class ArenaBlocks {
@@ -19,7 +19,7 @@ class ArenaBlocks {
   using Block = std::unique_ptr<char[]>;
   static constexpr size_t kBlockBytes = size_t{32} << 10;
 
-  /// A block of kBlockBytes for as long as this lives, which must be longer than the arena.
+  /// Holds a block of kBlockBytes until destroyed. Must outlive the arena on it.
   class Lent {
    public:
     explicit Lent(ArenaBlocks* blocks) : blocks_(blocks), block_(blocks->Take()) {}

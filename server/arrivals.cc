@@ -22,7 +22,7 @@ std::unique_ptr<Arrivals::Place> Arrivals::Enter(grpc_call* call, const Connecti
       Place* const longest = Longest();
       places_.erase(longest->at_);
       longest->is_listed_ = false;
-      // Keeps the call beyond the lock, which its end will take.
+      // The end of the call takes the lock, so cancel it without; the reference keeps it alive.
       ended = longest->call_;
       grpc_call_ref(ended);
     }
@@ -30,11 +30,11 @@ std::unique_ptr<Arrivals::Place> Arrivals::Enter(grpc_call* call, const Connecti
     place->is_listed_ = true;
   }
   if (ended != nullptr) {
-    grpc_call_cancel_with_status(
-        ended, GRPC_STATUS_RESOURCE_EXHAUSTED,
-        "the server receives as many requests as it takes at a time, and this one has come slowest "
-        "of those on its connection; send it again after a pause",
-        nullptr);
+    grpc_call_cancel_with_status(ended, GRPC_STATUS_RESOURCE_EXHAUSTED,
+                                 "the server receives too many requests at once, and this is the "
+                                 "oldest of the connection with the most; send it again after a "
+                                 "pause",
+                                 nullptr);
     grpc_call_unref(ended);
   }
   return place;

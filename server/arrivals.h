@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requests that are being received. Nobody knows how long one will be, and gRPC keeps what has come
-// of each, so their number is bounded; the connection that has most of them gives way.
+// Requests that are being received. Their final size is unknown and gRPC buffers what has arrived
+// of each, so their number is bounded. At the bound, the connection with the most such requests
+// loses its oldest.
 #pragma once
 
 #include <list>
@@ -16,7 +17,7 @@ namespace dsg::server {
 /// Threads: safe from any thread.
 class Arrivals {
  public:
-  /// A request that is being received, until destroyed.
+  /// Counts one request as being received until destroyed.
   class Place {
    public:
     ~Place();
@@ -31,19 +32,19 @@ class Arrivals {
     Arrivals* const arrivals_;
     grpc_call* const call_;
     const Connection* const connection_;
-    // Where it stands, unless it had to give way.
+    // Position in the list, if it is listed; a cancelled request is not.
     std::list<Place*>::iterator at_;
     bool is_listed_ = false;
   };
 
   explicit Arrivals(int count_max) : count_max_(static_cast<size_t>(count_max)) {}
 
-  /// Ends another call with RESOURCE_EXHAUSTED when there are too many. `call` and `connection`
-  /// must live as long as what is returned.
+  /// Counts a request. When there are too many, cancels another call with RESOURCE_EXHAUSTED.
+  /// `call` and `connection` must outlive the returned place.
   std::unique_ptr<Place> Enter(grpc_call* call, const Connection* connection);
 
  private:
-  // The oldest of the connection that has most. Requires: the lock, and some.
+  // The oldest request of the connection that has the most. Requires: mutex_ held, and a request.
   Place* Longest() const;
 
   const size_t count_max_;

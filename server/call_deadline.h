@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How long a call may take: what the caller gave, within bounds.
-// Only watches and maintenance may last for ever.
+// How long a call may take: the caller's deadline, up to a maximum. Watches and maintenance have no
+// maximum.
 #pragma once
 
 #include <chrono>
@@ -9,19 +9,20 @@
 
 namespace dsg::server {
 
-/// For callers that gave no deadline.
+/// Deadline of calls whose caller set none.
 inline constexpr std::chrono::seconds kDeadlineDefault{5};
-/// No call takes longer, whatever the caller gave.
+/// Upper bound for every caller's deadline.
 inline constexpr std::chrono::seconds kDeadlineMax{300};
 
-/// `deadline` as gRPC reports it: the largest time point when the caller gave none.
+/// When a call must end. `deadline` is as gRPC reports it: the largest time point if the caller set
+/// none.
 query::CallContext::Clock::time_point BoundDeadline(std::chrono::system_clock::time_point deadline);
 
-/// Whether gRPC would let a call with that deadline last longer.
+/// Whether gRPC alone would let a call with that deadline run longer than BoundDeadline.
 bool OutlastsBound(std::chrono::system_clock::time_point deadline);
 
-/// BoundDeadline for watches and maintenance, which may take any time: none unless the caller gave
-/// one.
+/// The same for watches and maintenance, which have no maximum: the caller's deadline, or the
+/// largest time point if the caller set none.
 query::CallContext::Clock::time_point WatchDeadline(std::chrono::system_clock::time_point deadline);
 
 }  // namespace dsg::server

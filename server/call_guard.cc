@@ -39,7 +39,7 @@ CallGuard::CallGuard(Clock::duration stall_max)
 
 std::unique_ptr<CallGuard::Place> CallGuard::Guard(grpc_call* call, Clock::time_point deadline) {
   std::unique_ptr<Place> place(new Place(this, call, deadline));
-  // Before that no write can be overdue.
+  // No write can be overdue before that.
   place->next_look_ = std::min(deadline, Clock::now() + stall_max_);
   std::lock_guard lock(mutex_);
   DSG_CHECK(!stopped_);
@@ -50,7 +50,7 @@ std::unique_ptr<CallGuard::Place> CallGuard::Guard(grpc_call* call, Clock::time_
 
 void CallGuard::Insert(Place* place) {
   const auto at = looks_.emplace(place->next_look_, place);
-  // Only what comes first changes how long the thread sleeps.
+  // Only the earliest entry determines how long the thread sleeps.
   if (at == looks_.begin()) wakeup_.notify_one();
 }
 
@@ -93,15 +93,15 @@ void CallGuard::LookAt(Place* place, std::unique_lock<std::mutex>* lock) {
   const auto now = Clock::now();
   const auto stall_end = place->StallEnd();
   if (const auto due = std::min(place->deadline_, stall_end); due > now) {
-    // A write that begins after this look is not overdue before the next.
+    // A write that begins after this look cannot be overdue before the next look.
     place->next_look_ = std::min(due, now + stall_max_);
     Insert(place);
     return;
   }
   place->verdict_ = place->deadline_ <= now ? Place::Verdict::kDeadline : Place::Verdict::kStall;
   const absl::Status verdict = place->verdict();
-  // Ending a call may run the end of its reactor in this thread, and so the destructor of its
-  // place, which takes the lock. The reference keeps the call until that is over.
+  // Cancelling a call may run OnDone of its reactor in this thread, and with it the destructor of
+  // its place, which takes the lock. The reference keeps the call alive until then.
   grpc_call* const call = place->call_;
   grpc_call_ref(call);
   lock->unlock();

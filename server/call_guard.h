@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Ends calls that outlast their deadline or whose reader takes nothing for too long. gRPC ends only
-// those whose caller gave a deadline, and no handler runs while a message waits for its reader.
+// Ends calls that outlast their deadline or whose reader takes no message for too long. gRPC itself
+// ends only calls whose caller set a deadline, and no handler runs while a message waits for its
+// reader.
 #pragma once
 
 #include <atomic>
@@ -17,28 +18,29 @@ struct grpc_call;
 
 namespace dsg::server {
 
-/// One thread, which looks at each call when it may be due, so that a message costs two stores.
+/// One thread looks at each call when it may be due, so that a message costs only two atomic
+/// stores.
 ///
 /// Threads: safe from any thread.
 class CallGuard {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// A guarded call, from its begin until OnDone.
+  /// Guards a call from its begin until OnDone.
   ///
-  /// Threads: those of one call, in turn; verdict is safe from any.
+  /// Threads: one at a time; verdict is safe from any.
   class Place {
    public:
-    /// The call is no longer ended once this returns.
+    /// After this the guard no longer ends the call.
     ~Place();
     Place(const Place&) = delete;
     Place& operator=(const Place&) = delete;
 
-    /// A message is handed to gRPC, and taken from it by the reader.
+    /// To be called when a message is handed to gRPC and when the reader has taken it.
     void BeginWrite() { write_began_.store(Clock::now().time_since_epoch().count()); }
     void EndWrite() { write_began_.store(kNoWrite); }
     /// Why the guard ended the call: DEADLINE_EXCEEDED, or RESOURCE_EXHAUSTED for a reader that
-    /// took nothing; OK if it did not.
+    /// took no message; OK if the guard did not end it.
     absl::Status verdict() const;
 
    private:
@@ -48,7 +50,7 @@ class CallGuard {
 
     Place(CallGuard* guard, grpc_call* call, Clock::time_point deadline)
         : guard_(guard), call_(call), deadline_(deadline) {}
-    /// When the reader has stalled for too long, the largest time point if nothing is written.
+    /// When the reader will have stalled for too long; the largest time point if no write is open.
     Clock::time_point StallEnd() const;
 
     CallGuard* const guard_;
@@ -56,17 +58,17 @@ class CallGuard {
     const Clock::time_point deadline_;
     std::atomic<Clock::rep> write_began_{kNoWrite};
     std::atomic<Verdict> verdict_{Verdict::kNone};
-    // When the guard looks next. Guarded by its mutex, as is where the place stands.
+    // When the guard looks next. Guarded by the guard's mutex.
     Clock::time_point next_look_;
   };
 
-  /// A reader that takes no message for `stall_max` is given up.
+  /// `stall_max`: a call ends when its reader takes no message for this long.
   explicit CallGuard(Clock::duration stall_max);
   ~CallGuard() { Stop(); }
   CallGuard(const CallGuard&) = delete;
   CallGuard& operator=(const CallGuard&) = delete;
 
-  /// Begins to guard `call`, which must live as long as what is returned.
+  /// Begins to guard `call`, which must outlive the returned place.
   std::unique_ptr<Place> Guard(grpc_call* call, Clock::time_point deadline);
 
   /// Joins the thread. Further calls do nothing. Requires: no places.

@@ -28,7 +28,7 @@ void CallLog::Write(const CallRecord& record) const {
   const bool is_debug = record.status.ok() && record.elapsed <= kSlowCall;
   const auto us = std::chrono::duration_cast<std::chrono::microseconds>(record.elapsed).count();
   const std::string_view message(record.status.message().data(), record.status.message().size());
-  // A map's name has at most 64 characters, but this is what the caller sent.
+  // Valid names have at most 64 characters; the caller may have sent any text.
   Log(is_debug ? LogLevel::kDebug : LogLevel::kInfo, "rpc",
       {{"method", std::string(record.method)},
        {"map", CutText(record.map, 64)},

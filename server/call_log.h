@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One structured line a call: errors and calls slower than 100 ms at level info, all others at
-// level debug and only if that is on, since a line costs as much as a hundred lookups.
+// One structured log line per call: errors and calls slower than 100 ms at level info, all others
+// at level debug and only if that level is on, because a line costs as much as a hundred lookups.
 #pragma once
 
 #include <chrono>
@@ -16,7 +16,7 @@ class Message;
 
 namespace dsg::server {
 
-/// Calls that took longer are written at level info.
+/// Calls slower than this are logged at level info.
 inline constexpr std::chrono::milliseconds kSlowCall{100};
 
 struct CallRecord {
@@ -31,16 +31,16 @@ struct CallRecord {
   std::string peer;
 };
 
-/// Entries of a reply, or of one message of a stream: those of all its repeated messages. 1 for a
-/// reply that has none; repeated names and numbers belong to the one entry that the reply is.
+/// Number of entries in a reply or in one message of a stream: the elements of all its repeated
+/// message fields. 1 if it has no such field; repeated scalars and strings do not count.
 int64_t RowCountOf(const google::protobuf::Message& reply);
 
 class CallLog {
  public:
-  /// `log_all`: the log's level is debug.
+  /// `log_all`: log every call; set when the log level is debug.
   explicit CallLog(bool log_all) : log_all_(log_all) {}
 
-  /// Whether such a call gets a line; asked first, so that the others cost nothing.
+  /// Whether a call gets a line. Callers ask before they build a record.
   bool Wants(const absl::Status& status, std::chrono::steady_clock::duration elapsed) const {
     return log_all_ || !status.ok() || elapsed > kSlowCall;
   }

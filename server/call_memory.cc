@@ -10,7 +10,8 @@
 namespace dsg::server {
 namespace {
 
-// Below these a call is let in where a large one is not, so that large calls shut no others out.
+// Requests and calls up to these sizes are admitted where larger ones are refused, so that large
+// calls cannot shut out small ones.
 constexpr size_t kSmallRequestBytes = size_t{64} << 10;
 constexpr size_t kSmallCallBytes = size_t{8} << 20;
 
@@ -50,7 +51,7 @@ absl::Status CallMemory::Charge(std::atomic<size_t>* of_connection, size_t conne
 
 CallMemory::Hold::~Hold() {
   StopWaiting();
-  // Holding less is never refused.
+  // Shrinking is never refused.
   (void)Resize(0);
 }
 
@@ -80,7 +81,7 @@ absl::Status CallMemory::Hold::Resize(size_t bytes) {
   } else if (bytes < bytes_) {
     connection_->held_bytes -= bytes_ - bytes;
     memory_->bytes_ -= bytes_ - bytes;
-    // Without the lock: who misses this looks again by itself.
+    // Without the lock: a waiter that misses this looks again after kLook.
     memory_->released_.notify_all();
   }
   bytes_ = bytes;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The memory that requests and replies may take together, and how much of it one connection may.
-// A call is charged before it allocates, and refused when there is no more.
+// Bounds the memory that the requests and replies of all calls, and of one connection, take. A call
+// is charged before it allocates, and refused when no memory is left.
 #pragma once
 
 #include <atomic>
@@ -16,13 +16,14 @@
 
 namespace dsg::server {
 
-/// Two shares, since calls that wait for a worker must not take what those that run need to end: a
-/// quarter for requests that wait, as bytes, and the rest for messages and replies.
+/// Two shares: a quarter for the bytes of requests that wait for a worker, the rest for parsed
+/// messages and replies. Waiting calls thus cannot take the memory that running calls need to
+/// finish.
 ///
 /// Threads: safe from any thread.
 class CallMemory {
  public:
-  /// What one call holds, given back when destroyed.
+  /// The memory that one call holds; released when destroyed.
   ///
   /// Threads: one caller at a time.
   class Hold {
@@ -33,19 +34,19 @@ class CallMemory {
     Hold(const Hold&) = delete;
     Hold& operator=(const Hold&) = delete;
 
-    /// Holds a request of `bytes` until StopWaiting. Small ones are free: how many calls may wait
-    /// bounds them, and they are not to suffer from large ones.
+    /// Charges a waiting request of `bytes` until StopWaiting. Requests of at most 64 KiB are free:
+    /// the number of waiting calls bounds them, and large requests must not shut them out.
     ///
-    /// Errors: RESOURCE_EXHAUSTED/OVERLOADED while others hold too much.
+    /// Errors: RESOURCE_EXHAUSTED/OVERLOADED while other calls hold too much.
     absl::Status Wait(size_t bytes);
     void StopWaiting();
 
-    /// Holds `bytes` of messages instead of what it held of them. What it held stays on errors.
+    /// Sets the bytes that the call's messages hold. Unchanged on errors.
     ///
-    /// Errors: RESOURCE_EXHAUSTED/LIMIT_EXCEEDED above bytes_max_of_call(), which no pause helps;
-    /// RESOURCE_EXHAUSTED/OVERLOADED while others hold too much.
+    /// Errors: RESOURCE_EXHAUSTED/LIMIT_EXCEEDED above bytes_max_of_call(), where a retry cannot
+    /// help; RESOURCE_EXHAUSTED/OVERLOADED while other calls hold too much.
     absl::Status Resize(size_t bytes);
-    /// The same, but sleeps until others hold less or the call must stop.
+    /// The same, but sleeps until other calls hold less or the call must stop.
     ///
     /// Errors: LIMIT_EXCEEDED as above; those of `call`.
     absl::Status AwaitResize(size_t bytes, const query::CallContext& call);
@@ -60,11 +61,11 @@ class CallMemory {
   explicit CallMemory(size_t bytes_max) : bytes_max_(bytes_max) {}
 
   size_t bytes_max_of_call() const { return bytes_max_ / 2; }
-  /// Of all calls, as of now.
+  /// Bytes that all calls hold now.
   size_t bytes() const { return waiting_bytes_ + bytes_; }
 
  private:
-  // Adds to what a connection and what all of them hold, unless either would be too much.
+  // Adds to the sums of a connection and of all calls, unless either would exceed its limit.
   static absl::Status Charge(std::atomic<size_t>* of_connection, size_t connection_max,
                              std::atomic<size_t>* of_all, size_t max, size_t bytes);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every call needs: the engine, threads to run on, memory, the log.
+// What every call uses: the engine, workers, limits, the log.
 #pragma once
 
 #include <atomic>
@@ -18,43 +18,44 @@
 
 namespace dsg::server {
 
-/// No request and no message of a reply is longer.
+/// Largest request and largest message of a reply, in bytes.
 inline constexpr int kMessageBytesMaxOnWire = 4 << 20;
 
 /// Owned by the server; outlives all calls.
 struct CallRuntime {
   query::ServiceCore* core = nullptr;
-  /// Stands in no error that callers see.
+  /// Removed from every error that callers see.
   std::string store_folder;
   WorkerPool* workers = nullptr;
   CallGuard* guard = nullptr;
   CallLog log{false};
   Connections* connections = nullptr;
-  /// Requests that have not come whole yet.
+  /// Requests that have not arrived completely.
   Arrivals* arrivals = nullptr;
-  /// Of requests that have, and of replies.
+  /// For requests that have arrived, and for replies.
   CallMemory* memory = nullptr;
   ArenaBlocks* blocks = nullptr;
-  /// Streams that have begun and not ended, whether a worker is at them or their reader is slow.
+  /// Streams that have begun and not ended, whether a worker runs them or they wait for their
+  /// reader.
   std::atomic<int> open_stream_count{0};
   int open_stream_max = 0;
-  /// Where streams wait that have nothing to tell yet.
+  /// Streams that have nothing to send yet wait here.
   DelayQueue* delays = nullptr;
-  /// Watches, which are not counted among the streams.
+  /// Watches; they do not count as streams.
   std::atomic<int> open_watch_count{0};
   int open_watch_max = 0;
-  /// No call is begun any more, and watches end.
+  /// The server accepts no more calls, and watches end.
   std::atomic<bool> stopping{false};
 };
 
-/// RESOURCE_EXHAUSTED/OVERLOADED; `why` says of what the server has too much.
+/// RESOURCE_EXHAUSTED/OVERLOADED; `why` names the exceeded limit.
 absl::Status OverloadedError(std::string_view why);
-/// The same, for a watch too many.
+/// RESOURCE_EXHAUSTED/OVERLOADED for a watch above the limit.
 absl::Status TooManyWatchesError(int watch_max);
 /// UNAVAILABLE/SHUTTING_DOWN.
 absl::Status ShuttingDownError();
 
-/// What OverloadedError says when calls are refused for their number.
+/// The `why` of OverloadedError when there are too many calls.
 inline constexpr std::string_view kTooManyCalls =
     "the server has as many calls as it takes at a time";
 

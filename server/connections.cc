@@ -93,8 +93,7 @@ std::chrono::steady_clock::time_point Connections::RefusalDue(Connection* connec
 void Connections::Close(Connection* connection, const std::string& why) {
   if (connection == nobody_.get() || connection->closed.exchange(true)) return;
   Log(LogLevel::kWarning, "closing a connection", {{"peer", connection->peer}, {"why", why}});
-  // gRPC keeps the descriptor as long as a call of the connection lives, and so one of the
-  // caller's.
+  // gRPC keeps the descriptor open while a call of the connection exists, and the caller holds one.
   if (CookieOf(connection->fd) == connection->cookie) shutdown(connection->fd, SHUT_RDWR);
 }
 

@@ -14,7 +14,7 @@ void DelayQueue::Add(Job* job, Clock::time_point due) {
     std::lock_guard lock(mutex_);
     if (!hurried_) {
       const auto at = waiting_.emplace(due, job);
-      // Only what is due first changes how long the thread sleeps.
+      // Only the earliest job determines how long the thread sleeps.
       if (at != waiting_.begin()) return;
       wakeup_.notify_one();
       return;
@@ -48,7 +48,7 @@ void DelayQueue::Stop() {
   {
     std::lock_guard lock(mutex_);
     if (stopped_) return;
-    // A job lost here would be a call that never ends.
+    // A call whose job is lost here would never end.
     DSG_CHECK(waiting_.empty());
     stopped_ = true;
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Jobs that have nothing to do until some time: one thread hands them back to the workers, so that
-// any number of them waits at the cost of one.
+// Jobs that wait for a point in time. One thread hands them back to the workers when they are due,
+// however many wait.
 #pragma once
 
 #include <chrono>
@@ -28,11 +28,11 @@ class DelayQueue {
   /// Runs a job on a worker at `due`, or at once after HurryAll. The job must have been submitted
   /// to the pool before; see WorkerPool::Resubmit.
   void Add(Job* job, Clock::time_point due);
-  /// Runs a job at once if it waits here; else does nothing.
+  /// Runs a job at once if it waits here; otherwise does nothing.
   void Hurry(Job* job);
-  /// Lets nothing wait from now on.
+  /// Runs all waiting jobs at once, and later ones without delay.
   void HurryAll();
-  /// Joins the thread. Further calls do nothing. Requires: nothing waits.
+  /// Joins the thread. Further calls do nothing. Requires: no waiting jobs.
   void Stop();
 
  private:

@@ -58,7 +58,7 @@ void IncomingCall::Receive() {
     Refuse(OverloadedError("the connection has more calls than it may have, and was closed"));
     return;
   }
-  // gRPC ends only calls whose callers gave a deadline, and no handler runs meanwhile.
+  // gRPC ends only calls whose caller set a deadline, and no handler runs meanwhile.
   if (OutlastsBound(context_->deadline())) {
     arrival_guard_ =
         runtime_->guard->Guard(context_->c_call(), BoundDeadline(context_->deadline()));
@@ -71,7 +71,7 @@ void IncomingCall::OnReadDone(bool ok) {
   arrival_guard_ = nullptr;
   arrival_ = nullptr;
   if (!ok) {
-    // Without a line in the log, which a flood of them would fill.
+    // Not logged: a flood of resets would fill the log.
     runtime_->connections->CountReset(connection_.get());
     Finish(ForCaller(MakeError(Reason::kFieldInvalid,
                                "the call ended before its request had come whole; send one message",
@@ -132,7 +132,7 @@ absl::Status IncomingCall::Parse(Message* request) {
   // As messages, and as what the engine makes of them: a commit of 4 MB of objects took 1.4 times
   // its messages' estimate in all.
   constexpr size_t kShares = 2;
-  // One byte more than would be let in is enough to know.
+  // One byte above the limit is enough to refuse the call.
   const size_t bytes = EstimateBytes(runtime_->memory->bytes_max_of_call() / kShares + 1) * kShares;
   DSG_RETURN_IF_ERROR(method_->info.waits_for_memory ? memory_.AwaitResize(bytes, call_)
                                                      : memory_.Resize(bytes));

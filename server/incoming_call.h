@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A call from the moment gRPC names its method until its request has come, as bytes. Nothing is
-// parsed before a worker takes the call, so that waiting costs no more than what was sent.
+// A call from the moment gRPC names its method until its request has arrived as bytes. The request
+// is parsed only when a worker takes the call, so that a waiting call costs no more memory than its
+// bytes.
 #pragma once
 
 #include <atomic>
@@ -21,7 +22,7 @@ class Message;
 
 namespace dsg::server {
 
-/// A method of the protocol; lives as long as the server.
+/// A method of the protocol. Lives as long as the server.
 struct Method {
   Method(const query::MethodInfo& method, const google::protobuf::Descriptor* request)
       : info(method), cost(request) {}
@@ -43,9 +44,10 @@ class IncomingCall : public grpc::ServerGenericBidiReactor, public Job {
                query::CallContext::Clock::time_point deadline);
   ~IncomingCall() override;
 
-  /// The last step of a constructor. The call may be refused at once.
+  /// Starts to receive the request. To be called last in a constructor; may refuse the call at
+  /// once.
   void Receive();
-  /// The request has come; wire() is charged for.
+  /// Called when the request has arrived and its bytes are charged.
   virtual void Queue() = 0;
   /// What a worker does with the call.
   virtual void Work() = 0;
@@ -57,16 +59,16 @@ class IncomingCall : public grpc::ServerGenericBidiReactor, public Job {
 
   /// Charges for the parsed request, parses it, and frees its bytes.
   ///
-  /// Errors: those of CallMemory; INVALID_ARGUMENT/FIELD_INVALID for bytes that are no request.
+  /// Errors: those of CallMemory; INVALID_ARGUMENT/FIELD_INVALID if the bytes do not parse.
   absl::Status Parse(google::protobuf::Message* request);
-  /// A message of the reply as bytes.
+  /// Serializes a message of the reply into packed().
   ///
-  /// Errors: RESOURCE_EXHAUSTED/LIMIT_EXCEEDED for one that no client would take.
+  /// Errors: RESOURCE_EXHAUSTED/LIMIT_EXCEEDED above kMessageBytesMaxOnWire.
   absl::Status Pack(const google::protobuf::Message& message);
 
-  /// What Finish is to be called with; adds the reason's trailer.
+  /// The argument for Finish. Adds the trailer with the reason.
   grpc::Status ForCaller(const absl::Status& status);
-  /// Writes the line of a call that ended with `status`, if it gets one.
+  /// Logs a call that ended with `status`, if CallLog wants it.
   void LogEnd(std::string_view map, const absl::Status& status, int64_t revision,
               int64_t row_count) const;
   bool WantsLog(const absl::Status& status) const;
@@ -75,11 +77,11 @@ class IncomingCall : public grpc::ServerGenericBidiReactor, public Job {
   grpc::GenericCallbackServerContext* context() { return context_; }
   query::CallContext& call() { return call_; }
   CallMemory::Hold& memory() { return memory_; }
-  /// Of the message that Pack made.
+  /// The bytes that Pack made.
   const grpc::ByteBuffer& packed() const { return packed_; }
 
  private:
-  // What the request will take when parsed, or more than `bytes_max`.
+  // Memory of the parsed request in bytes; counting stops above `bytes_max`.
   size_t EstimateBytes(size_t bytes_max);
 
   CallRuntime* const runtime_;
@@ -89,7 +91,7 @@ class IncomingCall : public grpc::ServerGenericBidiReactor, public Job {
   query::CallContext call_;
   const std::shared_ptr<Connection> connection_;
   CallMemory::Hold memory_;
-  // While the request comes.
+  // Set while the request is being received.
   std::unique_ptr<CallGuard::Place> arrival_guard_;
   std::unique_ptr<Arrivals::Place> arrival_;
   grpc::ByteBuffer wire_;

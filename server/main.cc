@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// dsg-server: serves the maps of one store folder over gRPC until it is told to stop.
-// Exits 0 after an orderly stop, 2 when it could not start, 3 when it could not stop in time.
+// dsg-server: serves the maps of one store folder over gRPC until SIGTERM or SIGINT.
+// Exits with 0 after an orderly stop, 2 if it could not start, 3 if it could not stop in time.
 #include <signal.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -40,11 +40,11 @@ struct Flags {
 };
 
 void DeclareFlags(CLI::App* app, Flags* flags) {
-  app->add_option("--store", flags->store, "Folder of the maps; made if missing")->required();
+  app->add_option("--store", flags->store, "Folder of the maps; created if missing")->required();
   app->add_option("--listen", flags->options.listen,
                   "unix:PATH or HOST:PORT; default unix:<store>/dsg-server.sock");
   app->add_option("--workers", flags->options.worker_count,
-                  "Threads that answer calls; 0 = two a core, at least four")
+                  "Threads that answer calls; 0 = two per core, at least four")
       ->capture_default_str();
   app->add_option("--max-in-flight", flags->options.in_flight_max,
                   "Calls at a time; more are refused with RESOURCE_EXHAUSTED")
@@ -59,33 +59,33 @@ void DeclareFlags(CLI::App* app, Flags* flags) {
                   "Connections at a time; more are closed at once")
       ->capture_default_str();
   app->add_option("--call-memory-mb", flags->call_memory_mb,
-                  "Mebibytes of memory for requests and replies; calls beyond are refused")
+                  "Memory for requests and replies, MiB; calls that need more are refused")
       ->check(CLI::Range(size_t{16}, size_t{1} << 20))
       ->capture_default_str();
   app->add_option("--quota", flags->limits.quota_bytes,
-                  "Refuse to let a map grow beyond (10GB, 500MiB); 0 = no limit")
+                  "Largest size of a map (10GB, 500MiB); larger commits are refused; 0 = no limit")
       ->transform(CLI::Validator(dsg::TakeByteSize, "SIZE"));
   app->add_option("--reserve", flags->limits.reserve_bytes,
-                  "Space kept in each map so that forgetting works on a full disk; 0 = none")
+                  "Space reserved in each map for pruning on a full disk; 0 = none")
       ->transform(CLI::Validator(dsg::TakeByteSize, "SIZE"));
   app->add_option("--policy", flags->policy_file,
-                  "Forget on a schedule what this file of policies names (docs/forgetting.md)");
+                  "File of prune policies to apply on a schedule (docs/forgetting.md)");
   app->add_option("--view-cache-mb", flags->view_cache_mb,
-                  "Mebibytes of memory for the graphs of all maps; a larger graph is refused")
+                  "Memory for the graphs of all maps, MiB; a larger graph is refused")
       ->check(CLI::Range(size_t{1}, size_t{1} << 24))
       ->capture_default_str();
-  app->add_option("--max-open-maps", flags->open_maps_max, "Maps kept open, those asked last")
+  app->add_option("--max-open-maps", flags->open_maps_max, "Maps kept open, the most recently used")
       ->check(CLI::Range(size_t{1}, size_t{1000}))
       ->capture_default_str();
   app->add_option("--map-cache-mb", flags->map_cache_mb,
-                  "Mebibytes of memory for the tracks and shapes of each open map")
+                  "Memory for the tracks and shapes of each open map, MiB")
       ->check(CLI::Range(size_t{1}, size_t{1} << 20))
       ->capture_default_str();
   app->add_option("--log-level", flags->log_level,
-                  "debug (a line a call), info (errors and calls over 100 ms), warning, error")
+                  "debug (every call), info (errors and calls over 100 ms), warning, error")
       ->capture_default_str();
   app->add_flag("--allow-remote", flags->options.allow_remote,
-                "Listen on addresses that other machines reach, though nothing authenticates them");
+                "Listen on addresses that other machines reach; callers are not authenticated");
   app->set_version_flag("--version", DSG_VERSION);
 }
 
@@ -110,7 +110,7 @@ int FailToStart(const absl::Status& status) {
   return 2;
 }
 
-// Blocked in every thread made later, so that only sigwait sees them.
+// Blocks the signals in all threads created later, so that only sigwait receives them.
 sigset_t BlockStopSignals() {
   sigset_t signals;
   sigemptyset(&signals);
@@ -121,7 +121,7 @@ sigset_t BlockStopSignals() {
   return signals;
 }
 
-// A call that ignores its cancellation must not keep the process for ever.
+// Ends the process if a call ignores its cancellation.
 void StartWatchdog() {
   std::thread([] {
     std::this_thread::sleep_for(kStopTimeMax);
@@ -130,14 +130,14 @@ void StartWatchdog() {
   }).detach();
 }
 
-// Applies a file of policies on a thread of its own, until it is destroyed.
-class Forgetting {
+// Runs a PruneSchedule on a thread until destroyed.
+class PruneThread {
  public:
-  Forgetting(dsg::query::ServiceCore* core, dsg::PolicyFile file)
+  PruneThread(dsg::query::ServiceCore* core, dsg::PolicyFile file)
       : schedule_(core, std::move(file), dsg::server::PruneScheduleOptions(),
                   dsg::server::MakeScheduleClock()),
         thread_([this] { schedule_.Run(); }) {}
-  ~Forgetting() {
+  ~PruneThread() {
     schedule_.Stop();
     thread_.join();
   }
@@ -147,7 +147,7 @@ class Forgetting {
   std::thread thread_;
 };
 
-// No file, no policies.
+// No value if `path` is empty.
 absl::StatusOr<std::optional<dsg::PolicyFile>> ReadPolicies(const std::string& path) {
   if (path.empty()) return std::optional<dsg::PolicyFile>();
   DSG_ASSIGN_OR_RETURN(dsg::PolicyFile file, dsg::ReadPolicyFile(path));
@@ -180,8 +180,8 @@ int Serve(Flags flags) {
   dsg::query::ServiceCore* const kept_core = core.get();
   auto server = dsg::server::Server::Start(std::move(core), flags.options);
   if (!server.ok()) return FailToStart(server.status());
-  std::optional<Forgetting> forgetting;
-  if (policies->has_value()) forgetting.emplace(kept_core, **std::move(policies));
+  std::optional<PruneThread> pruning;
+  if (policies->has_value()) pruning.emplace(kept_core, **std::move(policies));
   std::printf("dsg-server: listening on %s, store %s, %zu maps\n", (*server)->address().c_str(),
               flags.store.c_str(), maps->size());
   std::fflush(stdout);
@@ -190,9 +190,9 @@ int Serve(Flags flags) {
   sigwait(&signals, &received);
   dsg::Log(dsg::LogLevel::kInfo, "stopping", {{"signal", strsignal(received)}});
   StartWatchdog();
-  forgetting.reset();
+  pruning.reset();
   (*server)->Shutdown(kGrace);
-  // Closes the store; its writers give up their locks.
+  // Closes the store and releases its writer locks.
   server->reset();
   dsg::Log(dsg::LogLevel::kInfo, "stopped");
   return 0;

@@ -96,11 +96,11 @@ void PruneSchedule::RunMap(const std::string& map) {
     return;
   }
   const bool are_alone = !status.ok() && file_.policies.size() > 1;
-  // One that cannot be applied must not keep the others from it.
+  // A policy that cannot be applied must not stop the others.
   for (const PrunePolicy& policy : file_.policies) {
     absl::Status result = are_alone ? PruneMap(map, {policy}) : status;
     if (call_.cancelled()) return;
-    // Among others a branch that is gone matches nothing.
+    // When applied together with others, a policy for a removed branch matches nothing.
     if (are_alone && ReasonOf(result) == Reason::kNodeUnknown) result = absl::OkStatus();
     Report(map, policy, result);
   }
@@ -146,7 +146,7 @@ absl::Status PruneSchedule::PruneMap(const std::string& map,
   }
   if (all.left_count() > 0) {
     Log(LogLevel::kWarning,
-        "not all was erased: others went on writing it; the next run tries again",
+        "erasure incomplete: other clients kept writing the data; the next run tries again",
         {{"map", map}, {"left", absl::StrCat(all.left_count())}, {"first", all.left_ids(0)}});
   }
   Log(LogLevel::kInfo, "policies applied to map",

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Applies a file of policies to every map of a server, again and again.
-// Refuses to hurry: one map at a time, a pause after each batch, so that commits and questions go
-// first.
+// Applies a file of prune policies to every map of a server on a schedule. It prunes one map at a
+// time and pauses after each batch, so that commits and questions have priority.
 #pragma once
 
 #include <chrono>
@@ -24,7 +23,7 @@ struct PruneScheduleOptions {
   std::chrono::nanoseconds pause{std::chrono::milliseconds(50)};
 };
 
-/// What a schedule waits with, so that tests can move time.
+/// The clock of a schedule; tests replace it to control time.
 class ScheduleClock {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
@@ -33,19 +32,18 @@ class ScheduleClock {
   virtual TimePoint Now() = 0;
   /// Waits until `until` or Interrupt; false once interrupted.
   virtual bool WaitUntil(TimePoint until) = 0;
-  /// Ends all waits, for ever. Threads: from any.
+  /// Ends all present and future waits. Threads: safe from any thread.
   virtual void Interrupt() = 0;
 };
 
 std::unique_ptr<ScheduleClock> MakeScheduleClock();
 
-/// Runs the policies at start + first_after, and then every `file.every_ns` after the begin of the
-/// run before (at once if that took longer). A policy that cannot be applied to a map does not keep
-/// the others from it, nor the other maps; the log says so once, and again when the reason changes.
-/// Where the policies together would take more than `file.share_max` of a map (half of it unless
-/// the file says otherwise), a clock may be
-/// wrong: nothing of that map goes, also not by one policy after the other, and each run logs the
-/// error.
+/// Runs the policies at start + first_after and then every `file.every_ns`, measured between the
+/// begins of runs; a run that takes longer is followed by the next at once. A policy that cannot be
+/// applied to a map stops neither the other policies nor the other maps; the log reports it once,
+/// and again when the reason changes. If the policies together would erase more than
+/// `file.share_max` of a map (default one half), a clock may be wrong: the run erases nothing of
+/// that map, does not try the policies one by one, and logs the error each time.
 ///
 /// Threads: Run blocks its thread until Stop, which any thread may call.
 class PruneSchedule {
@@ -62,7 +60,7 @@ class PruneSchedule {
   void RunOnce();
   void RunMap(const std::string& map);
   absl::Status PruneMap(const std::string& map, const std::vector<PrunePolicy>& policies);
-  /// Warns of a failure that is not the one of the run before.
+  /// Logs a failure unless the run before failed for the same reason.
   void Report(const std::string& map, const PrunePolicy& policy, const absl::Status& status);
 
   query::ServiceCore* const core_;
@@ -70,7 +68,7 @@ class PruneSchedule {
   const PruneScheduleOptions options_;
   const std::unique_ptr<ScheduleClock> clock_;
   query::CallContext call_;
-  /// By map and policy: how the run before ended.
+  /// Result of the run before, by map and policy.
   std::map<std::pair<std::string, std::string>, absl::Status> told_;
 };
 

@@ -17,23 +17,24 @@ namespace {
 namespace pb = google::protobuf;
 using Wire = pb::internal::WireFormatLite;
 
-// An array that grows by doubling is at most twice as long as needed, and an arena keeps what it
-// outgrew: as much again.
+// An array that grows by doubling has at most twice the needed capacity, and an arena also keeps
+// the smaller arrays that it replaced, which together are as large.
 constexpr size_t kGrowth = 4;
-// Where a list has its messages or texts.
+// Pointer to an element of a repeated message or string field.
 constexpr size_t kListedBytes = kGrowth * sizeof(void*);
-// Where an arena has the destructor of a message.
+// Entry for a message in the arena's list of destructors.
 constexpr size_t kDestructorBytes = 16;
 // A string, its entry in the arena's list of destructors, and the heap's own header.
 constexpr size_t kTextBytes = sizeof(std::string) + 16 + 16;
-// An entry of a hash table with its share of the buckets.
+// Entry of a map field with its share of the hash buckets.
 constexpr size_t kMapEntryBytes = 160;
-// An unknown field with its share of an array that doubles, and the set that holds it.
+// An unknown field with its share of a doubling array and of the set that holds it.
 constexpr size_t kUnknownBytes = 160;
-// The last block of an arena, which is not filled; and those before, where a long array came next.
+// The unfilled rest of an arena's last block, and the share left empty in earlier blocks when a
+// long array came next.
 constexpr size_t kArenaBytes = size_t{64} << 10;
 constexpr size_t kUnfilledShare = 8;
-// Parsing refuses what is nested deeper.
+// Parsing refuses deeper nesting.
 constexpr int kDepthMax = 100;
 
 size_t ElementBytes(pb::FieldDescriptor::CppType type) {
@@ -56,7 +57,7 @@ class RequestCost::Count {
  public:
   Count(pb::io::CodedInputStream* input, size_t bytes_max) : input_(input), bytes_max_(bytes_max) {}
 
-  // False where the walk is to end: at bytes that are no message, or above the limit.
+  // False where the walk must stop: at malformed bytes, or above the limit.
   bool Walk(const Type* type, int depth);
   size_t bytes() const { return kArenaBytes + bytes_ + bytes_ / kUnfilledShare; }
 
@@ -80,14 +81,14 @@ bool RequestCost::Count::Walk(const Type* type, int depth) {
     const bool is_known = type != nullptr && number < type->fields.size();
     if (!WalkField(is_known ? type->fields[number] : kNoField, tag, depth)) return false;
   }
-  // The end of the message, or a tag that is none.
+  // The end of the message, or an invalid tag.
   return input_->ConsumedEntireMessage();
 }
 
 bool RequestCost::Count::WalkField(const Field& field, uint32_t tag, int depth) {
   uint64_t number = 0;
   uint32_t word = 0;
-  // A field that comes in another form than its type's is kept as unknown.
+  // A field whose wire type does not match its declared type is kept as unknown.
   const auto bytes_if = [&](Kind kind) { return field.kind == kind ? field.bytes : kUnknownBytes; };
   switch (Wire::GetTagWireType(tag)) {
     case Wire::WIRETYPE_VARINT:
@@ -154,7 +155,7 @@ const RequestCost::Type* RequestCost::Add(const pb::Descriptor* descriptor) {
   const Type*& known = type_of_[descriptor];
   if (known != nullptr) return known;
   Type& type = types_.emplace_back();
-  // Before its fields, which may be of its own type.
+  // Registered before its fields, which may be of the same type.
   known = &type;
   if (descriptor->options().map_entry()) {
     type.bytes = kMapEntryBytes;

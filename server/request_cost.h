@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a request will take in memory, found from its bytes before it is parsed. Two bytes, an empty
-// sub-message, become hundreds when parsed, so that a size on the wire bounds nothing.
+// Computes from the bytes of a request how much memory it takes when parsed. The size on the wire
+// is no bound: an empty sub-message has two bytes on the wire and takes hundreds when parsed.
 #pragma once
 
 #include <cstddef>
@@ -21,7 +21,7 @@ class CodedInputStream;
 
 namespace dsg::server {
 
-/// The costs of one type of requests and of all types within it.
+/// The costs of one request type and of all message types within it.
 ///
 /// Threads: const after construction.
 class RequestCost {
@@ -30,10 +30,10 @@ class RequestCost {
   RequestCost(const RequestCost&) = delete;
   RequestCost& operator=(const RequestCost&) = delete;
 
-  /// Never less than what parsing `wire` on an arena allocates, and seldom twice as much. Counting
-  /// ends above `bytes_max`, and where the bytes are no message, as parsing will.
+  /// At least the bytes that parsing `wire` on an arena allocates, and rarely twice as many.
+  /// Counting stops above `bytes_max`, and where the bytes are malformed, as parsing will.
   ///
-  /// Cost: linear in the bytes, about as long as parsing them.
+  /// Cost: linear in the bytes, about the time to parse them.
   size_t Bytes(grpc::ByteBuffer* wire, size_t bytes_max) const;
 
  private:
@@ -41,13 +41,13 @@ class RequestCost {
   struct Type;
   struct Field {
     Kind kind = Kind::kUnknown;
-    /// Of one element of a repeated field; 0 for a single number, which its message contains.
+    /// Bytes of one element of a repeated field; 0 for a single number, which its message contains.
     size_t bytes = 0;
     const Type* type = nullptr;
   };
   struct Type {
     size_t bytes = 0;
-    /// By number.
+    /// By field number.
     std::vector<Field> fields;
   };
   class Count;

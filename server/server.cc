@@ -5,30 +5,41 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <functional>
+#include <memory>
+#include <string>
 #include <thread>
+#include <unordered_map>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "dsg/v1/ingest_service.pb.h"
+#include "dsg/v1/maintenance_service.pb.h"
+#include "dsg/v1/map_service.pb.h"
+#include "dsg/v1/query_service.pb.h"
 #include "grpcpp/ext/health_check_service_server_builder_option.h"
+#include "grpcpp/generic/async_generic_service.h"
 #include "grpcpp/grpcpp.h"
 #include "grpcpp/server_posix.h"
+#include "query/api/api.h"
+#include "schema/base/check.h"
 #include "schema/base/status.h"
-#include "server/acceptor.h"
 #include "server/call_runtime.h"
-#include "server/listen_address.h"
-#include "server/services.h"
-#include "server/unix_socket.h"
+#include "server/listen.h"
+#include "server/stream_call.h"
+#include "server/unary_call_internal.h"
 
 namespace dsg::server {
 namespace {
 
-// Commits wait for the disk and for others to the same map; they must not take the workers of
-// questions. One each, so that those of one map, where an erasure goes on, keep none of another map
-// waiting.
+// Commits wait for the disk and for other commits to the same map; they must not take the workers
+// of questions. Each has its own worker, so that commits to a map under erasure do not delay
+// commits to another map.
 constexpr int kCommitsInFlightMax = 32;
 constexpr int kCommitWorkerCount = kCommitsInFlightMax;
-// Robots wait for the disk anyway; people who ask wait for nothing but the processor.
+// Commits wait for the disk anyway; questions wait for the processor only.
 constexpr int kCommitNiceness = 5;
-// Of 4 MiB each at most.
+// At most 4 MiB each.
 constexpr int kArrivalsMax = 64;
 
 int WorkerCount(int asked) {
@@ -36,14 +47,14 @@ int WorkerCount(int asked) {
   return std::max(4, 2 * static_cast<int>(std::thread::hardware_concurrency()));
 }
 
-// What a peer may do to us, bounded. gRPC 1.51 trusts its peers too much by default.
+// Limits what a peer may do. The defaults of gRPC 1.51 trust peers too much.
 void SetLimits(grpc::ServerBuilder* builder) {
   builder->SetMaxReceiveMessageSize(kMessageBytesMaxOnWire);
   builder->SetMaxSendMessageSize(kMessageBytesMaxOnWire);
-  // The message limit is checked after inflating: 1 MiB of gzip became 1 GiB of memory.
+  // gRPC checks the message limit after inflating: 1 MiB of gzip can become 1 GiB of memory.
   builder->SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, false);
   builder->SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
-  // A long read holds a processor that shorter calls wait for.
+  // A long read keeps a processor from shorter calls.
   builder->AddChannelArgument(GRPC_ARG_TCP_MAX_READ_CHUNK_SIZE, 32 << 10);
   builder->AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, 64);
   builder->AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, 8 << 10);
@@ -62,7 +73,7 @@ absl::Status CheckRange(const std::string& option, int value, int min, int max) 
                    {{"field", option}, {"value", absl::StrCat(value)}});
 }
 
-// Half of the descriptors are left to the maps' files and to what gRPC opens for itself.
+// Half of the descriptors are left for the files of maps and for gRPC.
 int ConnectionMax(int asked) {
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return asked;
@@ -72,10 +83,78 @@ int ConnectionMax(int asked) {
 ConnectionLimits LimitsOfConnections(const ServerOptions& options) {
   ConnectionLimits limits;
   limits.connection_max = ConnectionMax(options.connection_max);
-  // A caller whose deadlines pass while its calls are queued has not misbehaved.
+  // Calls whose deadlines pass in the queue must not close their connection.
   limits.call_max += options.in_flight_max;
   return limits;
 }
+
+class UnknownMethod final : public grpc::ServerGenericBidiReactor {
+ public:
+  explicit UnknownMethod(const std::string& path) {
+    Finish(grpc::Status(grpc::StatusCode::UNIMPLEMENTED,
+                        absl::StrCat("no method ", path, "; see proto/dsg/v1")));
+  }
+  void OnDone() override { delete this; }
+};
+
+// The methods of dsg.v1 as gRPC sees them: each path begins a call. gRPC hands over bytes instead
+// of messages, so that a request is charged for before it is parsed.
+class Services final : public grpc::CallbackGenericService {
+ public:
+  using Context = grpc::GenericCallbackServerContext;
+
+  /// `questions` serves the methods that read, `commits` those that write and may wait for the
+  /// disk. Both must outlive the service and all calls.
+  Services(CallRuntime* questions, CallRuntime* commits) {
+    query::ForEachMethod([&](const query::MethodInfo& info, auto ask) {
+      // Maintenance shares the workers of commits: it writes too and may wait for commits.
+      Add(info, ask, info.writes ? commits : questions);
+    });
+  }
+
+  grpc::ServerGenericBidiReactor* CreateReactor(Context* context) override {
+    const auto found = methods_.find(context->method());
+    if (found == methods_.end()) return new UnknownMethod(context->method());
+    return found->second.begin(context);
+  }
+
+ private:
+  struct Entry {
+    std::unique_ptr<Method> method;
+    std::function<grpc::ServerGenericBidiReactor*(Context*)> begin;
+  };
+
+  template <typename Request, typename Reply>
+  void Add(const query::MethodInfo& info, AskUnary<Request, Reply> ask, CallRuntime* runtime) {
+    Add(std::make_unique<Method>(info, Request::descriptor()),
+        [=](const Method* method, Context* context) {
+          return new UnaryCall<Request, Reply>(runtime, method, ask, context);
+        });
+  }
+
+  template <typename Request, typename Reply>
+  void Add(const query::MethodInfo& info, OpenStream<Request, Reply> open, CallRuntime* runtime) {
+    Add(std::make_unique<Method>(info, Request::descriptor()),
+        [=](const Method* method, Context* context) {
+          return new StreamCall<Request, Reply>(runtime, method, open, context);
+        });
+  }
+
+  // `begin` gets the method, whose address is stable.
+  template <typename Begin>
+  void Add(std::unique_ptr<Method> method, const Begin& begin) {
+    const Method* const kept = method.get();
+    std::string path = absl::StrCat("/dsg.v1.", std::string(kept->info.service), "/",
+                                    std::string(kept->info.name));
+    Entry entry{std::move(method),
+                [begin, kept](Context* context) { return begin(kept, context); }};
+    const bool is_new = methods_.emplace(std::move(path), std::move(entry)).second;
+    DSG_CHECK(is_new);
+  }
+
+  // By path: "/dsg.v1.MapService/ListMaps".
+  std::unordered_map<std::string, Entry> methods_;
+};
 
 class RunningServer final : public Server {
  public:
@@ -88,10 +167,10 @@ class RunningServer final : public Server {
         guard_(options.reader_stall_max),
         connections_(LimitsOfConnections(options)),
         arrivals_(kArrivalsMax),
-        memory_(options.call_memory_bytes) {
+        memory_(options.call_memory_bytes),
+        services_(&questions_, &commits_) {
     Prepare(options, &workers_, &questions_);
     Prepare(options, &commit_workers_, &commits_);
-    services_ = MakeServices(&questions_, &commits_);
   }
 
   ~RunningServer() override { Shutdown(std::chrono::seconds(1)); }
@@ -106,10 +185,10 @@ class RunningServer final : public Server {
     grpc::EnableDefaultHealthCheckService(true);
     grpc::ServerBuilder builder;
     SetLimits(&builder);
-    builder.RegisterCallbackGenericService(services_.get());
+    builder.RegisterCallbackGenericService(&services_);
     grpc_server_ = builder.BuildAndStart();
     if (grpc_server_ == nullptr) {
-      return absl::InternalError("gRPC did not start; its log says why");
+      return absl::InternalError("gRPC did not start; see its log");
     }
     acceptor_->Start([this](int fd, const std::string& peer) {
       if (connections_.Add(fd, peer)) {
@@ -133,14 +212,14 @@ class RunningServer final : public Server {
     if (grpc_server_ != nullptr) {
       acceptor_->Stop();
       grpc_server_->GetHealthCheckService()->Shutdown();
-      // Watches would use up the grace, since nothing else ends them.
+      // Nothing else ends watches, which would use up the grace.
       questions_.stopping = true;
       commits_.stopping = true;
       delays_.HurryAll();
-      // Waits for every call: those that run past the grace are cancelled, see it, and finish.
+      // Waits for every call. Calls that run past the grace are cancelled and then finish.
       grpc_server_->Shutdown(std::chrono::system_clock::now() + grace);
       grpc_server_->Wait();
-      // It may still hold a call that it has just ended.
+      // The guard may still hold a call that it has just ended.
       guard_.Stop();
       grpc_server_ = nullptr;
     }
@@ -167,7 +246,7 @@ class RunningServer final : public Server {
     runtime->open_watch_max = options.open_watch_max;
   }
 
-  // In the order of need: what stands lower is destroyed first.
+  // Ordered by dependence: later members use earlier ones and are destroyed first.
   std::unique_ptr<query::ServiceCore> core_;
   std::unique_ptr<UnixSocketClaim> claim_;
   WorkerPool workers_;
@@ -180,7 +259,7 @@ class RunningServer final : public Server {
   ArenaBlocks blocks_;
   CallRuntime questions_;
   CallRuntime commits_;
-  std::unique_ptr<grpc::CallbackGenericService> services_;
+  Services services_;
   std::unique_ptr<Acceptor> acceptor_;
   std::string address_;
   std::unique_ptr<grpc::Server> grpc_server_;
@@ -189,27 +268,27 @@ class RunningServer final : public Server {
 }  // namespace
 
 absl::Status OverloadedError(std::string_view why) {
-  // Long enough for several calls to end.
+  // Long enough for several calls to finish.
   constexpr int kRetryAfterMs = 200;
-  return MakeError(Reason::kOverloaded,
-                   absl::StrCat(std::string(why), "; retry after a pause of ", kRetryAfterMs,
-                                " ms that grows, and use the batch calls instead of many small "
-                                "ones"),
-                   {{"retry_after_ms", absl::StrCat(kRetryAfterMs)}});
+  return MakeError(
+      Reason::kOverloaded,
+      absl::StrCat(std::string(why), "; retry after a growing pause from ", kRetryAfterMs,
+                   " ms, and use batch calls instead of many small ones"),
+      {{"retry_after_ms", absl::StrCat(kRetryAfterMs)}});
 }
 
 absl::Status TooManyWatchesError(int watch_max) {
   return MakeError(Reason::kOverloaded,
                    absl::StrCat("the server keeps ", watch_max,
-                                " watches at a time, and all are taken; end one, ask with "
+                                " watches at a time, and all are in use; end one, use "
                                 "ListRevisions instead, or start the server with --max-watches"),
                    {{"watches", absl::StrCat(watch_max)}});
 }
 
 absl::Status ShuttingDownError() {
   return MakeError(Reason::kShuttingDown,
-                   "the server is stopping; call again when it is back: a watch goes on from "
-                   "the last read_revision, and maintenance does what is left");
+                   "the server is stopping; call again when it is back: resume a watch from the "
+                   "last read_revision, and repeat maintenance to do the rest");
 }
 
 absl::Status ServerOptions::Validate() const {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A running server: it binds, bounds what it accepts, and stops in order. Domain logic is not here.
+// A running server: it listens, bounds what it accepts, and stops in order. It has no domain logic.
 #pragma once
 
 #include <chrono>
@@ -14,64 +14,64 @@ namespace dsg::server {
 struct ServerOptions {
   /// "unix:PATH" or "HOST:PORT".
   std::string listen;
-  /// Threads that answer calls; 0 = two a core, at least four.
+  /// Threads that answer calls; 0 = two per core, at least four.
   int worker_count = 0;
   /// Calls queued and running at a time; more are refused at once.
   int in_flight_max = 256;
-  /// Streams open at a time, whether they are written to or wait for their reader. Each holds one
-  /// message of at most 1000 poses or a mesh block, and what gRPC buffers.
+  /// Streams open at a time, whether they are being written or wait for their reader. Each holds
+  /// one message of at most 1000 poses or a mesh block, and what gRPC buffers.
   int open_stream_max = 128;
-  /// Watches open at a time. A waiting one costs a look at the head each 50 ms; one that sends what
-  /// changed holds the keys of one revision.
+  /// Watches open at a time. A waiting watch polls the head revision every 50 ms; a watch that
+  /// sends changes holds the keys of one revision.
   int open_watch_max = 256;
-  /// Connections at a time, and never more than half of the descriptors that the process may have;
-  /// more are closed at once.
+  /// Connections at a time, at most half of the process's descriptor limit; more are closed at
+  /// once.
   int connection_max = 1024;
-  /// Memory of the requests and replies of all calls; those that would take more are refused. One
-  /// call, or one connection, gets at most half of it.
+  /// Memory for the requests and replies of all calls, in bytes; calls that need more are refused.
+  /// One call or one connection gets at most half of it.
   size_t call_memory_bytes = size_t{256} << 20;
-  /// A stream or watch whose reader takes no message for so long is ended.
+  /// A stream or watch ends when its reader takes no message for this long.
   std::chrono::milliseconds reader_stall_max{30'000};
   /// Listen on addresses that other machines can reach.
   bool allow_remote = false;
   /// A log line for every call, not only for errors and slow ones.
   bool log_all_calls = false;
 
-  /// Errors: FIELD_INVALID; workers are 0 to 256, calls, streams and connections 1 to 65536,
-  /// watches from 0, memory is from 16 MiB, the stall is 1 ms to an hour.
+  /// Errors: FIELD_INVALID outside of these ranges: workers 0 to 256; calls, streams and
+  /// connections 1 to 65536; watches 0 to 65536; memory from 16 MiB; stall 1 ms to 1 h.
   absl::Status Validate() const;
 };
 
-/// What the workers of questions are at, at one instant.
+/// Load of the workers for questions at one instant.
 struct ServerLoad {
-  /// Workers that are at a call or at a message of a stream.
+  /// Workers that run a call or make a message of a stream.
   int running_count = 0;
   /// Calls and streams that wait for a worker.
   int queued_count = 0;
-  /// Streams, watches excepted, that have begun and not ended.
+  /// Open streams without watches.
   int open_stream_count = 0;
   int open_watch_count = 0;
 };
 
 class Server {
  public:
-  /// Listens when it returns.
+  /// Starts a server, which listens when this returns.
   ///
-  /// Errors: what ParseListenAddress and UnixSocketClaim::Take return; UNAVAILABLE when the address
-  /// is taken, naming it and the system's reason.
+  /// Errors: those of ServerOptions::Validate, ParseListenAddress and UnixSocketClaim::Take;
+  /// UNAVAILABLE with the address and the system's reason when the server cannot listen there.
   static absl::StatusOr<std::unique_ptr<Server>> Start(std::unique_ptr<query::ServiceCore> core,
                                                        const ServerOptions& options);
 
-  /// As Shutdown with a grace of a second.
+  /// Shuts down with a grace of one second.
   virtual ~Server() = default;
 
-  /// What a client dials, with the port that was taken.
+  /// The address that clients dial, with the actual port.
   virtual const std::string& address() const = 0;
 
   virtual ServerLoad Load() const = 0;
 
-  /// Reports not-ready, accepts no more calls, lets the running ones end within `grace`, cancels
-  /// the rest, joins the workers. Further calls do nothing. Never from a handler.
+  /// Reports not-ready, accepts no more calls, lets running calls end within `grace`, cancels the
+  /// rest and joins the workers. Further calls do nothing. Must not be called from a handler.
   virtual void Shutdown(std::chrono::milliseconds grace) = 0;
 };
 

@@ -1,33 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/status_mapping.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
 #include "dsg/v1/errors.pb.h"
 #include "schema/base/status.h"
+#include "schema/base/utf8.h"
 
 namespace dsg::server {
 namespace {
 
-// Bytes of the UTF-8 character that begins at `at`, 0 if there is none.
+// Bytes of the UTF-8 character at `at`, 0 if there is none.
 size_t CharacterLength(std::string_view text, size_t at) {
-  const auto byte = [&](size_t i) { return static_cast<unsigned char>(text[i]); };
-  const unsigned char lead = byte(at);
-  if (lead < 0x80) return 1;
-  const size_t length = lead >= 0xf0 ? 4 : lead >= 0xe0 ? 3 : 2;
-  if (lead < 0xc2 || lead > 0xf4 || at + length > text.size()) return 0;
-  for (size_t i = at + 1; i < at + length; ++i) {
-    if ((byte(i) & 0xc0) != 0x80) return 0;
+  for (size_t length = 1; length <= std::min<size_t>(4, text.size() - at); ++length) {
+    if (IsUtf8(text.substr(at, length))) return length;
   }
-  // Overlong forms, surrogates, and what lies beyond Unicode.
-  const unsigned char second = byte(at + 1);
-  if (lead == 0xe0 && second < 0xa0) return 0;
-  if (lead == 0xed && second > 0x9f) return 0;
-  if (lead == 0xf0 && second < 0x90) return 0;
-  if (lead == 0xf4 && second > 0x8f) return 0;
-  return length;
+  return 0;
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Errors on their way out: absl codes become gRPC's, which are the same numbers, and the reason
-// with its facts goes into a trailer. Nothing that goes out is longer than a peer must accept.
+// Turns a Status into what a gRPC caller gets: the code (absl and gRPC use the same numbers), the
+// message, and a trailer with the reason and its metadata. All of it fits the size that a gRPC peer
+// accepts.
 #pragma once
 
 #include <string>
@@ -12,20 +13,21 @@
 
 namespace dsg::server {
 
-/// Longer messages are cut here, longer values in the metadata at half of it: a peer refuses
-/// trailers of more than 8 KiB altogether, and the caller sent us the long text anyway.
+/// Messages are cut to this size and values of the metadata to half of it: a peer refuses trailers
+/// of more than 8 KiB in total, and long text in an error comes from the caller's own request.
 inline constexpr size_t kMessageBytesMax = 512;
 
 grpc::Status ToGrpc(const absl::Status& status);
 
-/// The same error, with paths given relative to the store's folder: remote callers know maps, and
-/// where they lie is not for them to know. `folder` is absolute; empty hides nothing.
+/// The same error with paths relative to the store's folder: remote callers must not learn where
+/// the server keeps its maps. `folder` is absolute; an empty one changes nothing.
 absl::Status HideFolder(const absl::Status& status, std::string_view folder);
 
 /// The bytes for kErrorTrailer; empty when the error has no reason.
 std::string EncodeErrorDetail(const absl::Status& status);
 
-/// At most `bytes_max` bytes of `text`, never half a character; what is not UTF-8 becomes '?'.
+/// At most `bytes_max` bytes of `text`, in whole characters. Each byte that is not part of valid
+/// UTF-8 becomes '?'.
 std::string CutText(std::string_view text, size_t bytes_max);
 
 }  // namespace dsg::server

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One call that answers with a stream. Between two messages it is only memory: no worker waits for
-// a reader, nor for news.
+// A call that answers with a stream. Between two messages it occupies no worker, whether it waits
+// for its reader or for new revisions.
 #pragma once
 
 #include <chrono>
@@ -17,8 +17,8 @@ template <typename Request, typename Reply>
 using OpenStream = query::CursorOr<Reply> (query::Api::*)(const query::CallContext&,
                                                           const Request&);
 
-// Run, the wait for news and OnWriteDone take turns, so one message is in flight at most, and
-// Finish comes once.
+// Run, the delay queue and OnWriteDone alternate, so that at most one message is in flight and
+// Finish is called once.
 template <typename Request, typename Reply>
 class StreamCall final : public IncomingCall {
  public:
@@ -53,7 +53,7 @@ class StreamCall final : public IncomingCall {
 
   void OnWriteDone(bool ok) override {
     place_->EndWrite();
-    // StartWriteAndFinish has already said the last word.
+    // StartWriteAndFinish has already sent the status.
     if (cursor_->done()) return;
     if (ok) {
       runtime().workers->Resubmit(this);
@@ -89,7 +89,7 @@ class StreamCall final : public IncomingCall {
                                                                 : OverloadedError(kTooManyCalls);
   }
 
-  // How long until there is something to tell.
+  // Time until there may be something to send; 0 for now.
   absl::StatusOr<std::chrono::nanoseconds> Prepare() {
     DSG_RETURN_IF_ERROR(call().Check());
     if (lifetime_ != query::Lifetime::kAnswer && runtime().stopping) return ShuttingDownError();
@@ -114,7 +114,8 @@ class StreamCall final : public IncomingCall {
     }
   }
 
-  // While its reader takes it, a message is only what is sent. False: the stream has ended.
+  // Packs the next message; the message itself is freed before it is sent. False: the stream has
+  // ended.
   absl::StatusOr<bool> ReadNext() {
     Reply message;
     DSG_ASSIGN_OR_RETURN(const bool has_message, cursor_->Next(call(), &message));
@@ -127,8 +128,8 @@ class StreamCall final : public IncomingCall {
     return true;
   }
 
-  // Logs the call and prepares its trailers. A call that was ended for its reader's sake looks
-  // cancelled from inside.
+  // Logs the call and prepares its status and trailers. A call that the guard ended looks cancelled
+  // from inside, so the guard's verdict replaces the status.
   grpc::Status LastWords(absl::Status status) {
     if (const absl::Status verdict = place_->verdict(); !verdict.ok()) status = verdict;
     LogEnd(request_.map(), status, revision_, row_count_);

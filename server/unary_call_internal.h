@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One call with one reply. A worker parses the request, asks the engine and packs the reply; the
-// messages live no longer than that, so neither waiting calls nor slow readers hold any.
+// A call with one reply. A worker parses the request, calls the engine and serializes the reply.
+// The messages are freed right after, so that neither waiting calls nor slow readers hold any.
 #pragma once
 
 #include <google/protobuf/arena.h>
@@ -15,7 +15,7 @@
 
 namespace dsg::server {
 
-/// The map that a request names, whichever way it does.
+/// The map that a request names; empty if it names none.
 template <typename Request>
 std::string_view MapOf(const Request& request) {
   if constexpr (requires { request.delta().map(); }) {
@@ -44,7 +44,7 @@ inline google::protobuf::ArenaOptions ArenaOptionsOn(const ArenaBlocks::Lent& bl
   google::protobuf::ArenaOptions options;
   options.initial_block = block.bytes();
   options.initial_block_size = ArenaBlocks::kBlockBytes;
-  // Below the size from which malloc asks the kernel for fresh, unmapped pages each time.
+  // Below the size from which malloc maps fresh pages for each block.
   options.start_block_size = size_t{64} << 10;
   options.max_block_size = size_t{64} << 10;
   return options;
@@ -54,7 +54,7 @@ inline google::protobuf::ArenaOptions ArenaOptionsOn(const ArenaBlocks::Lent& bl
 template <typename Request, typename Reply>
 using AskUnary = absl::Status (query::Api::*)(const query::CallContext&, const Request&, Reply*);
 
-/// Deletes itself once gRPC is done with it. A worker finishes it exactly once, also when it was
+/// Deletes itself when gRPC is done with it. A worker finishes it exactly once, even if it was
 /// cancelled.
 template <typename Request, typename Reply>
 class UnaryCall final : public IncomingCall {
@@ -86,8 +86,8 @@ class UnaryCall final : public IncomingCall {
     if (!runtime().workers->TrySubmit(this)) Refuse(OverloadedError(kTooManyCalls));
   }
 
-  // Messages on an arena are freed as one piece. Part by part it would free what others have
-  // allocated: a fifth of the instructions of 20 nodes.
+  // Messages on an arena are freed in one piece. Freeing them one by one took a fifth of the
+  // instructions of a reply with 20 nodes.
   absl::Status Answer() {
     const ArenaBlocks::Lent block(runtime().blocks);
     google::protobuf::Arena arena(ArenaOptionsOn(block));
@@ -101,7 +101,7 @@ class UnaryCall final : public IncomingCall {
   }
 
   absl::Status AnswerOn(Request* request, Reply* reply) {
-    // A call that has waited past its deadline, or whose caller has left, is not begun.
+    // Do not begin a call whose deadline has passed or whose caller has left.
     DSG_RETURN_IF_ERROR(call().Check());
     DSG_RETURN_IF_ERROR(Parse(request));
     DSG_RETURN_IF_ERROR((runtime().core->*ask_)(call(), *request, reply));

@@ -24,14 +24,14 @@ bool WorkerPool::TrySubmit(Job* job, JobKind kind) {
   Seat* called = nullptr;
   {
     std::lock_guard lock(mutex_);
-    // Streams are bounded by how many may be open. Their messages come again and again, and must
-    // not count as calls, or many watches would shut calls out.
+    // The limit on open streams bounds their messages. These must not count as calls, or many
+    // watches would shut out calls.
     const size_t call_count = calls_.size() + running_count_ - running_stream_count_;
     if (stopped_ || (kind == JobKind::kCall && call_count >= in_flight_max_)) return false;
     (kind == JobKind::kStream ? streams_ : calls_).push_back(job);
     if (HasWork()) called = CallOne();
   }
-  // Not before, or it would wake only to wait for the lock.
+  // After the lock is released; otherwise the worker would wake only to wait for the lock.
   if (called != nullptr) called->wakeup.notify_one();
   return true;
 }
@@ -40,10 +40,10 @@ void WorkerPool::Resubmit(Job* job) {
   Seat* called = nullptr;
   {
     std::lock_guard lock(mutex_);
-    // Streams end before the pool does; a job lost here would be a call that never ends.
+    // Streams end before the pool stops; a call whose job is lost here would never end.
     DSG_CHECK(!stopped_);
     streams_.push_back(job);
-    // Otherwise whoever ends a stream's message takes this one.
+    // Otherwise a worker takes it when it has finished another stream's message.
     if (MayTakeStream()) called = CallOne();
   }
   if (called != nullptr) called->wakeup.notify_one();
@@ -88,7 +88,7 @@ JobKind WorkerPool::ChooseKind() {
 }
 
 void WorkerPool::Work(Seat* seat) {
-  // Of Linux: 0 names the calling thread, not its process. Nothing is lost when it is refused.
+  // On Linux, 0 means the calling thread, not the process. A failure is harmless.
   if (niceness_ != 0) setpriority(PRIO_PROCESS, 0, niceness_);
   std::unique_lock lock(mutex_);
   while (true) {
@@ -110,7 +110,7 @@ void WorkerPool::Work(Seat* seat) {
     --running_count_;
     if (!is_stream) continue;
     --running_stream_count_;
-    // This worker may turn to a call now, and leave the stream that waits to another.
+    // This worker may take a call next, so wake another one for the waiting stream.
     if (calls_.empty() || !MayTakeStream()) continue;
     if (Seat* const called = CallOne(); called != nullptr) called->wakeup.notify_one();
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The threads that answer calls. gRPC's own threads are few and must not block, so handlers only
-// put jobs here; what would have to wait too long is refused at once instead of queued, and streams
-// never take all of them.
+// submit jobs here. Calls above the limit are refused at once instead of queued, and streams never
+// occupy all workers.
 #pragma once
 
 #include <condition_variable>
@@ -13,7 +13,7 @@
 
 namespace dsg::server {
 
-/// Something to do on a worker. Owned by itself: nothing touches it after Run.
+/// A piece of work. Owns itself: the pool does not touch it after Run.
 class Job {
  public:
   virtual void Run() = 0;
@@ -22,11 +22,11 @@ class Job {
   ~Job() = default;
 };
 
-/// What a job belongs to. Messages of streams are long and many, calls short and waited for.
+/// What a job belongs to. Messages of streams are many and long; calls are short and urgent.
 enum class JobKind { kCall, kStream };
 
-/// Calls go before messages of streams, three to one when both wait, and no more than half of the
-/// workers (one of one) are at streams.
+/// Calls have priority over messages of streams, three to one when both wait. At most half of the
+/// workers (at least one) run streams.
 ///
 /// Threads: safe from any thread.
 class WorkerPool {
@@ -47,25 +47,25 @@ class WorkerPool {
   /// False when the pool is full of calls or stopped; the job is then not run.
   [[nodiscard]] bool TrySubmit(Job* job, JobKind kind = JobKind::kCall);
 
-  /// For a stream that was submitted before and has more to do, such as one whose reader is ready
-  /// again. Never refused: what has been begun is finished. Requires: not stopped.
+  /// Continues a stream that was submitted before, for example when its reader is ready again.
+  /// Never refused: a begun stream must be able to finish. Requires: not stopped.
   void Resubmit(Job* job);
 
   Counts Load() const;
 
-  /// Runs what is queued and joins the workers. Further calls do nothing.
+  /// Runs the queued jobs and joins the workers. Further calls do nothing.
   void Stop();
 
  private:
-  // Where an idle worker waits to be called.
+  // An idle worker waits on its seat.
   struct Seat {
     std::condition_variable wakeup;
     bool called = false;
   };
 
   void Work(Seat* seat);
-  // The rest needs the lock.
-  // Takes a worker that is idle, to be notified without the lock; nullptr if there is none.
+  // The functions below require mutex_ held.
+  // Takes an idle worker, to be notified after the lock is released; nullptr if there is none.
   Seat* CallOne();
   bool MayTakeStream() const;
   bool HasWork() const { return !calls_.empty() || MayTakeStream(); }
@@ -76,14 +76,14 @@ class WorkerPool {
   const size_t in_flight_max_;
   const size_t stream_worker_max_;
   mutable std::mutex mutex_;
-  // Whoever sat down last is called first: its stack and its part of the heap are still in the
-  // caches, so that a lone caller is not served by all workers in turn.
+  // The last idle worker is called first: its stack and heap are still in the caches, so a single
+  // client is not served by all workers in turn.
   std::vector<Seat*> idle_;
   std::deque<Job*> calls_;
   std::deque<Job*> streams_;
   size_t running_count_ = 0;
   size_t running_stream_count_ = 0;
-  // Calls taken while a stream waited.
+  // Calls taken in a row while a stream waited.
   int calls_in_a_row_ = 0;
   bool stopped_ = false;
   std::vector<std::unique_ptr<Seat>> seats_;

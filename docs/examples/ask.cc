@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// An example of the C++ client: connects to a dsg-server and asks it four things about one agent.
+// An example of the C++ client: connects to a dsg-server and runs four queries about one agent.
 //
 //   ask ADDRESS MAP AGENT SECONDS        e.g. ask unix:dsg.sock office carol 30
 //
 // Link dsg::client and dsg::proto. Every call takes a CallContext (its deadline, and a way to
-// cancel it), tries again by itself while the server cannot be reached, and gives errors as the
-// server made them. Whoever would call in a loop uses the batch forms: one round trip instead of
-// many.
+// cancel it), retries while the server cannot be reached, and returns the errors of the server. Use
+// the batch calls instead of loops: one round trip instead of many.
 #include <chrono>
 #include <cstdlib>
 #include <iostream>
@@ -30,7 +29,7 @@ CallContext WithinFiveSeconds() {
   return CallContext(CallContext::Clock::now() + std::chrono::seconds(5));
 }
 
-// Where was the agent, each second for ten seconds? One call for all instants.
+// The agent's pose every second for ten seconds, in one call.
 absl::Status AskWhere(Api* api, const std::string& map, const std::string& agent, int64_t at_ns) {
   v1::BatchLocateAgentsRequest request;
   request.set_map(map);
@@ -70,7 +69,7 @@ absl::Status AskFind(Api* api, const std::string& map) {
   return absl::OkStatus();
 }
 
-// The way from where the agent was to the nearest chair.
+// The path from the agent's position to the nearest chair.
 absl::Status AskPath(Api* api, const std::string& map, const std::string& agent, int64_t at_ns) {
   v1::PlanPathRequest request;
   request.set_map(map);

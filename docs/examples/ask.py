@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""An example in Python: connects to a dsg-server and asks it four things about one agent.
+"""An example in Python: connects to a dsg-server and runs four queries about one agent.
 
     ask.py ADDRESS MAP AGENT SECONDS        e.g. ask.py unix:dsg.sock office carol 30
 
@@ -11,7 +11,7 @@ Needs python3-grpcio and python3-protobuf, and stubs generated from the .proto f
     PYTHONPATH=stubs python3 docs/examples/ask.py unix:dsg.sock office carol 30
 
 Always give a deadline (timeout=): without one gRPC waits for ever.
-Whoever would call in a loop uses the batch forms: one round trip instead of many.
+Use the batch calls instead of loops: one round trip instead of many.
 """
 
 import sys
@@ -49,9 +49,9 @@ def ask_find(stub, name):
 
 
 def ask_path(stub, name, agent, at_ns):
-    """From where the agent was to the nearest chair."""
+    """The path from the agent to the nearest chair."""
     request = space.PlanPathRequest(map=name, at_ns=at_ns)
-    # "from" is a word of Python.
+    # "from" is a keyword of Python.
     getattr(request, "from").node = agent
     request.to.nearest.class_name = "chair"
     reply = stub.PlanPath(request, timeout=TIMEOUT_S)

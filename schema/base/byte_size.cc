@@ -17,7 +17,7 @@ absl::Status BadSize(std::string_view text, std::string_view rule) {
                    {{"value", std::string(text)}});
 }
 
-// 0 for what is no unit.
+// 0 for an unknown unit.
 int64_t BytesOfUnit(std::string unit) {
   if (unit.ends_with('b')) unit.pop_back();
   const bool is_binary = unit.size() == 2 && unit[1] == 'i';

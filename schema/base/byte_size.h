@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How programs read options that are sizes in bytes.
+// Sizes in bytes as program options.
 #pragma once
 
 #include <cstdint>
@@ -10,13 +10,13 @@
 
 namespace dsg {
 
-/// A whole number of bytes, or of one of kB, MB, GB, TB (powers of 1000) and KiB, MiB, GiB, TiB
-/// (of 1024); the B may be left out, and large and small letters mean the same.
-/// Errors: INVALID_ARGUMENT/FIELD_INVALID, also with a sign and beyond 64 bits.
+/// Parses an integer number of bytes, or of kB, MB, GB, TB (powers of 1000) or KiB, MiB, GiB, TiB
+/// (powers of 1024). The B is optional and letter case is ignored.
+/// Errors: INVALID_ARGUMENT/FIELD_INVALID, also for a sign and above 63 bits.
 absl::StatusOr<int64_t> ParseByteSize(std::string_view text);
 
-/// ParseByteSize in the form that option parsers call: the text becomes bytes. Returns what is
-/// wrong with it; empty if nothing is.
+/// ParseByteSize for option parsers: replaces the text by the number of bytes. Returns an error
+/// message, empty on success.
 std::string TakeByteSize(std::string& text);
 
 }  // namespace dsg

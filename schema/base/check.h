@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Always-on checks for broken invariants of our own. Input from outside never reaches one.
+// Checks of internal invariants, active in all builds. External input never reaches one.
 #pragma once
 
 #include <cstdio>
 #include <cstdlib>
 
-/// Stops the process when an invariant that protects data is broken.
+/// Aborts the process if an invariant that protects data is broken.
 #define DSG_CHECK(condition)                                                                 \
   do {                                                                                       \
     if (!(condition)) {                                                                      \

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Structured log lines on stderr: one line an event, "time level event key=value ...".
+// Structured log lines on stderr, one per event: "time level event key=value ...".
 #pragma once
 
 #include <initializer_list>
@@ -21,7 +21,7 @@ void Log(LogLevel level, std::string_view event, std::initializer_list<LogField>
 /// Lines below `level` are dropped. Default kInfo.
 void SetLogLevel(LogLevel level);
 
-/// "debug", "info", "warning" or "error"; false for any other word.
+/// Sets the level by name: "debug", "info", "warning" or "error". False for any other name.
 bool SetLogLevel(std::string_view name);
 
 }  // namespace dsg

@@ -7,8 +7,8 @@
 namespace dsg {
 namespace {
 
-// Source: Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014; the
-// finalizer turns neighbouring seeds into unrelated ones.
+// Source: Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014. The
+// finalizer maps neighbouring seeds to unrelated ones.
 uint64_t Mix(uint64_t value) {
   value += 0x9e3779b97f4a7c15ull;
   value = (value ^ (value >> 30)) * 0xbf58476d1ce4e5b9ull;

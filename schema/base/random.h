@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Random numbers that are the same on every machine and with every standard library.
-// Refuses to use the distributions of <random>, whose results the standard leaves open.
+// Random numbers that are the same on every machine and with every standard library. The
+// distributions of <random> are not used, because the standard does not define their results.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace dsg {
 
-/// One stream of random numbers. Streams of one seed are independent of each other, so that a
+/// A stream of random numbers. Streams with the same seed are independent, so that for example a
 /// tenth walker does not change the paths of the first nine.
 ///
 /// Threads: one caller at a time.
@@ -17,18 +17,18 @@ class Random {
  public:
   Random(uint64_t seed, uint64_t stream);
 
-  /// In [0, 1), 53 bits.
+  /// Uniform in [0, 1), 53 bits.
   double Uniform();
-  /// In [low, high).
+  /// Uniform in [low, high).
   double Uniform(double low, double high);
-  /// In [0, count). Requires: count > 0.
+  /// Uniform in [0, count). Requires: count > 0.
   int Index(int count);
-  /// In [low, high], both included. Requires: low <= high.
+  /// Uniform in [low, high], both included. Requires: low <= high.
   int Integer(int low, int high);
   bool Chance(double probability) { return Uniform() < probability; }
-  /// Mean 0, standard deviation 1.
+  /// Normal with mean 0, standard deviation 1.
   double Normal();
-  /// Mean 1.
+  /// Exponential with mean 1.
   double Exponential();
 
  private:

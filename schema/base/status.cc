@@ -9,8 +9,8 @@
 namespace dsg {
 namespace {
 
-// Payload: lines "reason\n", then "key\tvalue\n". Keys are ours and hold neither tab nor newline;
-// values have both replaced, since they may come from a caller.
+// Payload: lines "reason\n", then "key\tvalue\n". Keys are our own and contain neither tab nor
+// newline; in values both are replaced, since values may come from a caller.
 constexpr char kPayloadUrl[] = "dsg/error";
 
 std::string Clean(std::string value) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Errors as values: absl::Status with a machine-readable reason and the facts a caller acts on.
-// Refuses to know about gRPC or protobuf; the numbers equal dsg.v1.Reason and a test keeps them so.
+// Errors as values: absl::Status with a machine-readable reason and metadata. Independent of gRPC
+// and protobuf; the numbers equal those of dsg.v1.Reason, which a test checks.
 #pragma once
 
 #include <initializer_list>
@@ -14,7 +14,7 @@
 
 namespace dsg {
 
-/// Why a call failed, when a caller can act on it. Same numbers as dsg.v1.Reason.
+/// Why a call failed, where a caller can act on it. Same numbers as dsg.v1.Reason.
 enum class Reason {
   kUnspecified = 0,
   kFieldInvalid = 1,
@@ -68,20 +68,20 @@ enum class Reason {
 
 using ErrorMetadata = std::map<std::string, std::string>;
 
-/// Makes an error. `message` says what failed, on which object, with which value, what to do.
-/// The status code follows from the reason.
+/// Makes an error. `message` says what failed, for which object and value, and what to do. The
+/// reason determines the status code.
 absl::Status MakeError(Reason reason, std::string_view message, ErrorMetadata metadata = {});
 
-/// The status code that `reason` always travels with.
+/// The status code of `reason`.
 absl::StatusCode CodeOf(Reason reason);
 
-/// The reason of an error; kUnspecified for OK and for errors made elsewhere.
+/// The reason of an error; kUnspecified for OK and for errors without a reason.
 Reason ReasonOf(const absl::Status& status);
 
-/// The facts that came with the reason; empty for OK and for errors made elsewhere.
+/// The metadata of an error; empty for OK and for errors without a reason.
 ErrorMetadata MetadataOf(const absl::Status& status);
 
-/// The same error, its message prefixed by "`context`: ".
+/// The same error with "`context`: " before its message.
 absl::Status Annotate(const absl::Status& status, std::string_view context);
 
 }  // namespace dsg

@@ -10,14 +10,14 @@
 
 namespace dsg {
 
-/// Tells long work to stop: returns CANCELLED or DEADLINE_EXCEEDED once it must. May be empty.
-/// Called often (every few hundred rows or poses) and from the calling thread only.
+/// Returns CANCELLED or DEADLINE_EXCEEDED when the work must stop. May be empty. Called often
+/// (every few hundred rows or poses) and only from the calling thread.
 using StopCheck = std::function<absl::Status()>;
 
-/// What `stop` says, OK if it is empty.
+/// The result of `stop`; OK if it is empty.
 inline absl::Status AskStop(const StopCheck& stop) { return stop ? stop() : absl::OkStatus(); }
 
-/// Asks a stop check once in so many steps, from loops that are too short to ask each time round.
+/// Calls a stop check once every `period` steps, for loops with short iterations.
 class StopCounter {
  public:
   /// `stop` may be empty, and must outlive this.

@@ -32,7 +32,7 @@ int64_t UnitNs(std::string_view unit) {
   return 0;
 }
 
-// Exact for up to nine decimals of any unit: whole part and fraction are kept as integers.
+// Exact for up to nine decimals of any unit: whole part and fraction are integers.
 absl::StatusOr<TimeNs> ParseOffset(std::string_view text) {
   const bool negative = text[0] == '-';
   size_t at = 1;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// World time: signed 64-bit nanoseconds on a map's clock, and how people write it.
+// World time: signed 64-bit nanoseconds on a map's clock, and its text forms.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ inline constexpr TimeNs kTimeMax = std::numeric_limits<TimeNs>::max();
 
 inline constexpr TimeNs kNsPerSecond = 1'000'000'000;
 
-/// A span of world time, half-open: `from_ns` belongs to it, `to_ns` does not.
+/// An interval of world time, half-open: `from_ns` belongs to it, `to_ns` does not.
 struct Interval {
   TimeNs from_ns = kTimeMin;
   TimeNs to_ns = kTimeMax;
@@ -31,19 +31,19 @@ struct Interval {
   bool operator==(const Interval&) const = default;
 };
 
-/// Reads a time as people write it: nanoseconds ("1403715524907143168"), relative to the map's
-/// epoch ("+12.5s", "-200ms", "+3m", "+1.5h"), or RFC 3339 ("2014-06-25T16:58:44.9Z").
+/// Parses nanoseconds ("1403715524907143168"), a time relative to the map's epoch ("+12.5s",
+/// "-200ms", "+3m", "+1.5h"), or RFC 3339 ("2014-06-25T16:58:44.9Z").
 ///
-/// Errors: INVALID_ARGUMENT/FIELD_INVALID, also when the result does not fit in 64 bits.
+/// Errors: INVALID_ARGUMENT/FIELD_INVALID, also if the result does not fit in 64 bits.
 absl::StatusOr<TimeNs> ParseTime(std::string_view text, TimeNs epoch_ns);
 
-/// RFC 3339 in UTC with as many decimals as are needed: "2014-06-25T16:58:44.907143168Z".
+/// RFC 3339 in UTC with as many decimals as needed: "2014-06-25T16:58:44.907143168Z".
 std::string FormatRfc3339(TimeNs time_ns);
 
-/// Relative to `epoch_ns`, as ParseTime reads it back: "+12.5s".
+/// Relative to `epoch_ns`, in the form that ParseTime accepts: "+12.5s".
 std::string FormatRelative(TimeNs time_ns, TimeNs epoch_ns);
 
-/// The wall clock, nanoseconds since 1970 UTC. For records of commits, never for world time.
+/// The wall clock, nanoseconds since 1970 UTC. For commit records, never for world time.
 int64_t WallClockNs();
 
 }  // namespace dsg

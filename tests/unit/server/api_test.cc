@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every method of the protos over the wire, by the table that server and client are made from: the
-// client's Api of a server must answer as the engine does.
+// Calls every method of the protos over the wire, from the table that server and client are
+// generated from: the client's Api of a server must answer like the engine.
 #include "query/api/api.h"
 
 #include <gtest/gtest.h>
@@ -98,7 +98,7 @@ class ApiOverTheWire : public testing::Test {
     const Answer local = Ask(engine_.get(), method, request);
     const Answer remote = Ask(remote_.get(), method, request);
     EXPECT_EQ(local.status, remote.status);
-    // The incarnation is made anew with each opening only of a map that was replaced.
+    // The incarnation changes only when a map is replaced.
     EXPECT_EQ(local.messages, remote.messages);
   }
 

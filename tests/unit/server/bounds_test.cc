@@ -1,78 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a server does with callers that wait, leave, do not read, or are too many.
+// How a server treats callers that wait, leave, do not read, or are too many.
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <condition_variable>
 #include <future>
-#include <mutex>
 
-#include "dsg/v1/errors.pb.h"
 #include "dsg/v1/map_service.grpc.pb.h"
 #include "dsg/v1/query_service.grpc.pb.h"
 #include "grpcpp/grpcpp.h"
 #include "server/server.h"
-#include "server/status_mapping.h"
 #include "tests/unit/query/engine/office.h"
-#include "tests/unit/server/passing_core.h"
+#include "tests/unit/server/server_test_util.h"
 
 namespace dsg::server {
 namespace {
 
-using query::CallContext;
 using std::chrono::milliseconds;
 using std::chrono::system_clock;
 using test::kMap;
 using test::kSecond;
-
-// The real core, except that ListMaps takes as long as the test wants or until it must stop.
-// Only this way a test decides, rather than a clock, how long a call runs.
-class HeldCore final : public PassingCore {
- public:
-  // Shared with the test, since the server owns the core.
-  struct Gate {
-    std::mutex mutex;
-    std::condition_variable changed;
-    bool open = false;
-    int running_count = 0;
-    absl::Status last_stop;
-
-    void Open() {
-      std::lock_guard lock(mutex);
-      open = true;
-      changed.notify_all();
-    }
-    void WaitForRunning(int count) {
-      std::unique_lock lock(mutex);
-      changed.wait(lock, [&] { return running_count == count; });
-    }
-  };
-
-  HeldCore(std::unique_ptr<query::ServiceCore> core, std::shared_ptr<Gate> gate)
-      : PassingCore(std::move(core)), gate_(std::move(gate)) {}
-
-  absl::Status ListMaps(const CallContext& call, const v1::ListMapsRequest& request,
-                        v1::ListMapsResponse* reply) override {
-    {
-      std::unique_lock lock(gate_->mutex);
-      ++gate_->running_count;
-      gate_->changed.notify_all();
-      absl::Status stop;
-      while (!gate_->open && stop.ok()) {
-        gate_->changed.wait_for(lock, milliseconds(1));
-        stop = call.Check();
-      }
-      --gate_->running_count;
-      gate_->last_stop = stop;
-      gate_->changed.notify_all();
-      if (!stop.ok()) return stop;
-    }
-    return PassingCore::ListMaps(call, request, reply);
-  }
-
- private:
-  std::shared_ptr<Gate> gate_;
-};
 
 class Bounds : public testing::Test {
  protected:
@@ -107,7 +52,7 @@ class Bounds : public testing::Test {
     return maps_->GetServerInfo(context, {}, &reply);
   }
 
-  // A stream of 300,000 poses, about 20 MB: more than sockets and flow control swallow.
+  // A stream of 300,000 poses, about 20 MB: more than sockets and flow control buffer.
   std::unique_ptr<grpc::ClientReader<v1::GetTrajectoryResponse>> OpenBigStream(
       grpc::ClientContext* context) {
     v1::GetTrajectoryRequest request;
@@ -129,7 +74,7 @@ class Bounds : public testing::Test {
   }
 
   test::TempFolder folder_;
-  std::shared_ptr<HeldCore::Gate> gate_ = std::make_shared<HeldCore::Gate>();
+  std::shared_ptr<Gate> gate_ = std::make_shared<Gate>();
   std::unique_ptr<Server> server_;
   std::shared_ptr<grpc::Channel> channel_;
   std::unique_ptr<v1::MapService::Stub> maps_;
@@ -143,15 +88,10 @@ TEST_F(Bounds, RefusesCallsBeyondTheBoundAtOnceAndRecovers) {
   gate_->WaitForRunning(1);
   grpc::ClientContext context;
   EXPECT_EQ(AskInfo(&context).error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
-  const auto& trailers = context.GetServerTrailingMetadata();
-  const auto found = trailers.find(kErrorTrailer);
-  ASSERT_NE(found, trailers.end());
-  v1::ErrorDetail detail;
-  ASSERT_TRUE(detail.ParseFromString(std::string(found->second.data(), found->second.size())));
-  EXPECT_EQ(detail.reason(), v1::OVERLOADED);
+  EXPECT_EQ(DetailOf(context).reason(), v1::OVERLOADED);
   gate_->Open();
   EXPECT_TRUE(held.get().ok());
-  // The worker counts the call as running until a moment after the caller has its answer.
+  // The worker counts the call as running until shortly after the caller has its answer.
   bool recovered = false;
   for (int i = 0; i < 1000 && !recovered; ++i) {
     grpc::ClientContext later;
@@ -168,7 +108,7 @@ TEST_F(Bounds, StopsTheWorkWhenTheCallerCancels) {
   context.TryCancel();
   EXPECT_EQ(held.get().error_code(), grpc::StatusCode::CANCELLED);
   gate_->WaitForRunning(0);
-  EXPECT_EQ(gate_->last_stop.code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(gate_->last_stop().code(), absl::StatusCode::kCancelled);
 }
 
 TEST_F(Bounds, StopsTheWorkAtTheCallersDeadline) {
@@ -178,7 +118,7 @@ TEST_F(Bounds, StopsTheWorkAtTheCallersDeadline) {
   auto held = Hold(&context);
   EXPECT_EQ(held.get().error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
   gate_->WaitForRunning(0);
-  EXPECT_FALSE(gate_->open);
+  EXPECT_FALSE(gate_->is_open());
 }
 
 TEST_F(Bounds, DoesNotBeginACallWhoseDeadlinePassedInTheQueue) {
@@ -201,7 +141,7 @@ TEST_F(Bounds, KeepsAnsweringWhileAReaderDoesNotRead) {
   const auto reader = OpenBigStream(&stream_context);
   v1::GetTrajectoryResponse message;
   ASSERT_TRUE(reader->Read(&message));
-  // The only worker must be free each time, though the stream is not over.
+  // The only worker must be free each time, although the stream is open.
   for (int i = 0; i < 100; ++i) {
     grpc::ClientContext context;
     context.set_deadline(system_clock::now() + std::chrono::seconds(10));
@@ -258,8 +198,8 @@ TEST_F(Bounds, EndsAStreamOfACallerThatGaveNoDeadlineAndDoesNotRead) {
   const auto reader = OpenBigStream(&context);
   v1::GetTrajectoryResponse message;
   ASSERT_TRUE(reader->Read(&message));
-  // Shutdown waits for the stream, which must end by its own default deadline of 5 s and not by
-  // being cancelled after the long grace. Nobody reads meanwhile.
+  // Shutdown waits for the stream, which must end by its default deadline of 5 s and not by being
+  // cancelled after the long grace. The reader does not read meanwhile.
   const auto begin = std::chrono::steady_clock::now();
   server_->Shutdown(std::chrono::seconds(40));
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(20));

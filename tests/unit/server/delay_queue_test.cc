@@ -12,7 +12,7 @@ namespace {
 using std::chrono::hours;
 using std::chrono::milliseconds;
 
-/// Notes the order in which jobs ran.
+/// Records the order in which jobs ran.
 struct Ran {
   std::mutex mutex;
   std::condition_variable changed;
@@ -62,7 +62,7 @@ TEST(DelayQueue, HurriesOneJobOnly) {
   delays.Add(&second, DelayQueue::Clock::now() + hours(1));
   delays.Hurry(&second);
   EXPECT_EQ(ran.WaitFor(1), (std::vector<int>{2}));
-  // Waits no longer, so this is no second run.
+  // The job no longer waits, so it must not run again.
   delays.Hurry(&second);
   delays.Hurry(&first);
   EXPECT_EQ(ran.WaitFor(2), (std::vector<int>{2, 1}));

@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Clients that mean harm: they end, and neither the server nor anybody else does.
+// Hostile clients: their connections end, and neither the server nor other clients are affected.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
-#include <condition_variable>
-#include <fstream>
 #include <future>
 #include <memory>
-#include <mutex>
 #include <thread>
 #include <vector>
 
@@ -20,15 +17,13 @@
 #include "grpcpp/grpcpp.h"
 #include "server/connections.h"
 #include "server/server.h"
-#include "server/status_mapping.h"
 #include "tests/support/raw_http2.h"
 #include "tests/unit/query/engine/office.h"
-#include "tests/unit/server/passing_core.h"
+#include "tests/unit/server/server_test_util.h"
 
 namespace dsg::server {
 namespace {
 
-using query::CallContext;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 using std::chrono::system_clock;
@@ -38,16 +33,7 @@ constexpr char kLocate[] = "/dsg.v1.QueryService/LocateAgent";
 constexpr char kCommit[] = "/dsg.v1.IngestService/Commit";
 constexpr char kPlanPaths[] = "/dsg.v1.QueryService/PlanPaths";
 
-// Of both ends, which are in this process.
-int64_t ResidentBytes() {
-  std::ifstream file("/proc/self/statm");
-  int64_t whole = 0;
-  int64_t resident = 0;
-  file >> whole >> resident;
-  return resident * sysconf(_SC_PAGESIZE);
-}
-
-// Watches how much memory is resident until it is asked for the most.
+// Samples resident memory until Growth is called.
 class Peak {
  public:
   Peak() : before_(ResidentBytes()), thread_([this] { Run(); }) {}
@@ -75,52 +61,11 @@ class Peak {
   std::thread thread_;
 };
 
-// ListMaps takes until the gate is opened.
-class GatedCore final : public PassingCore {
- public:
-  struct Gate {
-    std::mutex mutex;
-    std::condition_variable changed;
-    bool open = false;
-    int running_count = 0;
-
-    void Open() {
-      std::lock_guard lock(mutex);
-      open = true;
-      changed.notify_all();
-    }
-    void WaitForRunning(int count) {
-      std::unique_lock lock(mutex);
-      changed.wait(lock, [&] { return running_count == count; });
-    }
-  };
-
-  GatedCore(std::unique_ptr<query::ServiceCore> core, std::shared_ptr<Gate> gate)
-      : PassingCore(std::move(core)), gate_(std::move(gate)) {}
-
-  absl::Status ListMaps(const CallContext& call, const v1::ListMapsRequest& request,
-                        v1::ListMapsResponse* reply) override {
-    {
-      std::unique_lock lock(gate_->mutex);
-      ++gate_->running_count;
-      gate_->changed.notify_all();
-      gate_->changed.wait(lock, [this] { return gate_->open; });
-    }
-    return PassingCore::ListMaps(call, request, reply);
-  }
-
- private:
-  std::shared_ptr<Gate> gate_;
-};
-
-// `bytes` as the request of a call that is known by its path alone, on a connection of its own.
+// A call by path with `bytes` as its request, on its own connection.
 class BytesCall {
  public:
   BytesCall(const std::string& address, const std::string& path, const grpc::ByteBuffer& bytes) {
-    grpc::ChannelArguments arguments;
-    arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-    stub_ = std::make_unique<grpc::GenericStub>(
-        grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments));
+    stub_ = std::make_unique<grpc::GenericStub>(ConnectAlone(address));
     context_.set_deadline(system_clock::now() + seconds(60));
     call_ = stub_->PrepareUnaryCall(&context_, path, bytes, &queue_);
     call_->StartCall();
@@ -134,14 +79,7 @@ class BytesCall {
     return status_;
   }
   // Requires: Wait.
-  v1::Reason reason() const {
-    const auto& trailers = context_.GetServerTrailingMetadata();
-    const auto found = trailers.find(kErrorTrailer);
-    v1::ErrorDetail detail;
-    if (found == trailers.end()) return v1::REASON_UNSPECIFIED;
-    EXPECT_TRUE(detail.ParseFromString(std::string(found->second.data(), found->second.size())));
-    return detail.reason();
-  }
+  v1::Reason reason() const { return DetailOf(context_).reason(); }
 
  private:
   std::unique_ptr<grpc::GenericStub> stub_;
@@ -152,7 +90,7 @@ class BytesCall {
   std::unique_ptr<grpc::GenericClientAsyncResponseReader> call_;
 };
 
-// Just under four mebibytes of empty messages in a list, within a message if `outer_tag` is given.
+// Just under 4 MiB of empty messages in a list, within a message if `outer_tag` is given.
 grpc::ByteBuffer EmptyMessages(char tag, char outer_tag = 0) {
   constexpr uint32_t kCount = 2'000'000;
   std::string bytes;
@@ -184,7 +122,7 @@ class Hostile : public testing::Test {
     options.listen = "unix:" + folder_.path() + "/server.sock";
     if (options.worker_count == 0) options.worker_count = 4;
     auto server =
-        Server::Start(std::make_unique<GatedCore>(test::OpenCore(folder_.path()), gate_), options);
+        Server::Start(std::make_unique<HeldCore>(test::OpenCore(folder_.path()), gate_), options);
     ASSERT_TRUE(server.ok()) << server.status();
     server_ = *std::move(server);
     maps_ = v1::MapService::NewStub(
@@ -201,7 +139,7 @@ class Hostile : public testing::Test {
     return status.ok();
   }
 
-  // Somebody who asks all the time, on one connection, and is always answered.
+  // A client that calls continuously on one connection and must always be answered.
   void BeginBystander() {
     bystander_ = std::thread([this] {
       while (!stop_ && AskInfo()) ++answered_count_;
@@ -209,7 +147,7 @@ class Hostile : public testing::Test {
   }
   void EndBystander() {
     const int before = answered_count_;
-    // It is still at it.
+    // It must still be answered now.
     while (answered_count_ < before + 10 && bystander_.joinable() && !HasFailure()) {
       std::this_thread::sleep_for(milliseconds(1));
     }
@@ -218,7 +156,7 @@ class Hostile : public testing::Test {
   }
 
   test::TempFolder folder_;
-  std::shared_ptr<GatedCore::Gate> gate_ = std::make_shared<GatedCore::Gate>();
+  std::shared_ptr<Gate> gate_ = std::make_shared<Gate>();
   std::unique_ptr<Server> server_;
   std::unique_ptr<v1::MapService::Stub> maps_;
   std::atomic<bool> stop_{false};
@@ -276,7 +214,7 @@ TEST_F(Hostile, EmptyNodesAreRefusedBeforeTheyAreParsed) {
     EXPECT_EQ(call->reason(), v1::LIMIT_EXCEEDED);
   }
   EndBystander();
-  // One of them took 650 MB.
+  // Parsing one of them would take 650 MB.
   EXPECT_LT(peak.Growth(), 200 * kMebibyte);
 }
 
@@ -339,7 +277,7 @@ TEST_F(Hostile, RequestsThatWaitForAWorkerHoldNoMoreThanTheirBytes) {
   for (int i = 0; i < 32; ++i) {
     calls.push_back(std::make_unique<BytesCall>(server_->address(), kPlanPaths, paths));
   }
-  // As many wait as may; the others are refused meanwhile.
+  // The queue fills up; the other calls are refused meanwhile.
   while (server_->Load().queued_count < 14) std::this_thread::sleep_for(milliseconds(1));
   std::this_thread::sleep_for(milliseconds(200));
   gate_->Open();
@@ -382,7 +320,7 @@ TEST_F(Hostile, BytesThatAreNoRequestAreCalledSo) {
 
 TEST_F(Hostile, ConnectionsBeyondTheBoundAreClosedAndThePlaceOfADeadOneIsTaken) {
   ServerOptions options;
-  // The first is the fixture's own.
+  // One for the fixture's own connection.
   options.connection_max = 2;
   Start(options);
   auto second = std::make_unique<test::RawHttp2>(server_->address());

@@ -21,7 +21,7 @@ TEST(CallDeadline, GivesFiveSecondsToCallersThatGaveNone) {
 }
 
 TEST(CallDeadline, KeepsTheCallersUpToTheCap) {
-  // The two clocks are not read at the same instant, so their difference is allowed a second.
+  // The two clocks are not read at the same time, so a second of difference is allowed.
   const auto before = Steady::now();
   const auto minute = BoundDeadline(system_clock::now() + seconds(60)) - before;
   EXPECT_GT(minute, seconds(59));

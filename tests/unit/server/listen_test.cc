@@ -9,9 +9,8 @@
 #include <fstream>
 
 #include "schema/base/status.h"
-#include "server/listen_address.h"
+#include "server/listen.h"
 #include "server/server.h"
-#include "server/unix_socket.h"
 #include "tests/unit/query/engine/office.h"
 
 namespace dsg::server {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Maintenance over the wire: streams that work beside commits and questions, and end with the
-// caller, the map or the server.
+// Maintenance over the wire: streams that run next to commits and queries, and end with the caller,
+// the map or the server.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -14,16 +14,15 @@
 #include "schema/base/status.h"
 #include "schema/codec/checksum.h"
 #include "server/server.h"
-#include "server/status_mapping.h"
 #include "tests/unit/query/engine/office.h"
-#include "tests/unit/server/passing_core.h"
+#include "tests/unit/server/server_test_util.h"
 
 namespace dsg::server {
 namespace {
 
 using test::kMap;
 
-// A compaction that is never done, and tells so as fast as it is read.
+// A compaction that never ends and reports progress as fast as it is read.
 class EndlessCompaction final : public query::StreamCursor<v1::CompactResponse> {
  public:
   explicit EndlessCompaction(std::atomic<int>* open_count) : open_count_(open_count) {
@@ -65,16 +64,6 @@ class MaintenanceRpc : public testing::Test {
     server_ = *std::move(server);
     channel_ = grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials());
     stub_ = v1::MaintenanceService::NewStub(channel_);
-  }
-
-  static v1::Reason ReasonIn(const grpc::ClientContext& context) {
-    const auto& trailers = context.GetServerTrailingMetadata();
-    const auto found = trailers.find(kErrorTrailer);
-    v1::ErrorDetail detail;
-    if (found != trailers.end()) {
-      detail.ParseFromString(std::string(found->second.data(), found->second.size()));
-    }
-    return detail.reason();
   }
 
   bool AnswersQuestions() {
@@ -136,7 +125,7 @@ TEST_F(MaintenanceRpc, ErrorsCarryTheirReason) {
   v1::ReadArchiveResponse message;
   EXPECT_FALSE(reader->Read(&message));
   EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::NOT_FOUND);
-  EXPECT_EQ(ReasonIn(context), v1::MAP_UNKNOWN);
+  EXPECT_EQ(DetailOf(context).reason(), v1::MAP_UNKNOWN);
 }
 
 TEST_F(MaintenanceRpc, AnArchiveComesWhole) {
@@ -153,7 +142,7 @@ TEST_F(MaintenanceRpc, AnArchiveComesWhole) {
   EXPECT_EQ(bytes.substr(bytes.size() - 40, 4), "DSGE");
 }
 
-// Of more pieces than a connection takes from us unread.
+// More messages than a connection buffers for a reader that does not read.
 GraphDelta DeltaWithALargeAsset() {
   Random random(1, 0);
   Asset asset;
@@ -171,7 +160,7 @@ TEST_F(MaintenanceRpc, ArchivesThatNobodyReadsLeaveRoomForOtherWork) {
   test::CommitToOffice(folder_.path(), DeltaWithALargeAsset());
   constexpr int kStreamCount = 40;
   Start(test::OpenCore(folder_.path()), {.open_stream_max = 32});
-  // Takes nothing ahead of its reader.
+  // The client buffers as little as possible.
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
   arguments.SetInt(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, 64 << 10);
@@ -185,10 +174,10 @@ TEST_F(MaintenanceRpc, ArchivesThatNobodyReadsLeaveRoomForOtherWork) {
   for (int i = 0; i < kStreamCount; ++i) {
     contexts.push_back(std::make_unique<grpc::ClientContext>());
     readers.push_back(stub_->ReadArchive(contexts.back().get(), request));
-    // It has been opened, or refused.
+    // The stream has been opened or refused.
     readers.back()->WaitForInitialMetadata();
   }
-  // A stream that was refused counts until the server has seen the last of it.
+  // A refused stream counts until the server has finished it.
   grpc::Status compacted;
   do {
     grpc::ClientContext context;
@@ -245,7 +234,7 @@ TEST_F(MaintenanceRpc, AServerThatStopsEndsWorkAndSaysSo) {
   while (reader->Read(&message)) {
   }
   EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
-  EXPECT_EQ(ReasonIn(context), v1::SHUTTING_DOWN);
+  EXPECT_EQ(DetailOf(context).reason(), v1::SHUTTING_DOWN);
   stopper.join();
   EXPECT_EQ(open_count, 0);
 }

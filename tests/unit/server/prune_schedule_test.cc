@@ -12,7 +12,7 @@
 #include "dsg/v1/map_service.pb.h"
 #include "schema/base/status.h"
 #include "tests/unit/query/engine/office.h"
-#include "tests/unit/server/passing_core.h"
+#include "tests/unit/server/server_test_util.h"
 
 namespace dsg::server {
 namespace {
@@ -20,7 +20,7 @@ namespace {
 using std::chrono::hours;
 using std::chrono::minutes;
 
-// Time stands still but for waits, and ends at some instant.
+// Time advances only in waits, and ends at a given time.
 class TestClock final : public ScheduleClock {
  public:
   explicit TestClock(std::chrono::nanoseconds length) : end_(TimePoint() + length) {}
@@ -53,7 +53,7 @@ class Pruned final : public query::StreamCursor<v1::PruneResponse> {
   absl::Status status_;
 };
 
-// Three maps, of which one always fails.
+// Three maps; pruning one of them always fails.
 class Core final : public PassingCore {
  public:
   Core() : PassingCore(nullptr) {}
@@ -128,7 +128,7 @@ TEST(PruneSchedule, SaysOnceThatAMapLacksALayerAndAppliesTheRest) {
   testing::internal::CaptureStderr();
   schedule.Run();
   const std::string log = testing::internal::GetCapturedStderr();
-  // Of three maps one lacks the layer, and one is never to be had.
+  // Of three maps, one lacks the layer, and one always fails.
   EXPECT_EQ(core.applied_["mesh"], 5 * 2);
   EXPECT_EQ(core.applied_["attics"], 5 * 1);
   const size_t first = log.find("a has no layer attics");
@@ -146,7 +146,7 @@ TEST(PruneSchedule, WhatWouldTakeTooMuchOfAMapStopsThereAndIsAnError) {
   testing::internal::CaptureStderr();
   schedule.Run();
   const std::string log = testing::internal::GetCapturedStderr();
-  // Of a nothing, by no policy; b fails anyway.
+  // Nothing of map a, by no policy; b fails anyway.
   EXPECT_EQ(core.count_of_["a"], 1);
   EXPECT_EQ(core.applied_["mesh"], 1);
   EXPECT_EQ(core.applied_["too much"], 1);
@@ -175,7 +175,7 @@ TEST(PruneSchedule, DoesNothingBeforeItsFirstTime) {
 
 TEST(PruneSchedule, OverdueRunsAreNotMadeUpFor) {
   Core core;
-  // Each of the maps takes two pauses of ten minutes, so a run is longer than its period.
+  // Each map takes two pauses of ten minutes, so a run is longer than its period.
   PruneSchedule schedule(&core, FileOf(60 * kNsPerSecond),
                          {.first_after = minutes(0), .pause = minutes(10)},
                          std::make_unique<TestClock>(hours(2)));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a request is said to take is not less than what it takes, however it is made.
+// The estimated memory of a request is never less than the actual one, for any request.
 #include "server/request_cost.h"
 
 #include <google/protobuf/arena.h>
@@ -30,7 +30,7 @@ size_t Estimate(const std::string& bytes, size_t bytes_max = kNoLimit) {
   return cost.Bytes(&wire, bytes_max);
 }
 
-// What parsing takes of the heap, on an arena as the server's.
+// Heap bytes of parsing on an arena like the server's.
 template <typename Request>
 size_t Measure(const std::string& bytes) {
   google::protobuf::ArenaOptions options;
@@ -57,7 +57,7 @@ std::string Repeat(const std::string& bytes, int count) {
   return out;
 }
 
-// A field of the delta in a commit: `inner` as often as given.
+// A field of the delta in a commit that repeats `inner` `count` times.
 std::string DeltaWith(const std::string& inner, int count) {
   v1::CommitRequest request;
   EXPECT_TRUE(request.mutable_delta()->ParseFromString(Repeat(inner, count)));
@@ -131,7 +131,7 @@ TEST(RequestCost, IsNotFarAboveWhatAnHonestDeltaTakes) {
   const std::string bytes = request.SerializeAsString();
   const size_t estimate = Estimate<v1::CommitRequest>(bytes);
   EXPECT_GE(estimate, Measure<v1::CommitRequest>(bytes));
-  // So that four mebibytes of poses are let in by far.
+  // So that 4 MiB of poses are well within the limit.
   EXPECT_LT(estimate, 6 * bytes.size());
 }
 
@@ -154,7 +154,7 @@ TEST(RequestCost, SurvivesAnyBytes) {
     grpc::ByteBuffer wire = BufferOf(bytes);
     EXPECT_LT(cost.Bytes(&wire, kNoLimit), size_t{1} << 20);
   }
-  // Deeper than parsing goes.
+  // Deeper than parsing allows.
   grpc::ByteBuffer wire = BufferOf(std::string(3'000'000, '\x0b'));
   EXPECT_LT(cost.Bytes(&wire, kNoLimit), size_t{1} << 20);
 }

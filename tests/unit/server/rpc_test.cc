@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every call of every service over a real socket, and what errors look like on the far side.
+// Calls of every service over a real socket, and their errors as the client sees them.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -15,6 +15,7 @@
 #include "server/server.h"
 #include "server/status_mapping.h"
 #include "tests/unit/query/engine/office.h"
+#include "tests/unit/server/server_test_util.h"
 
 namespace dsg::server {
 namespace {
@@ -45,7 +46,7 @@ class Rpc : public testing::Test {
     return request;
   }
 
-  // A call by its path, without a stub; the reply's bytes.
+  // A call by path, without a stub; returns the bytes of the reply.
   grpc::Status CallByPath(const std::string& path, std::string* reply_bytes) {
     grpc::GenericStub stub(channel_);
     grpc::CompletionQueue queue;
@@ -307,11 +308,7 @@ TEST_F(Rpc, CarriesTheReasonAndItsFactsInTheTrailer) {
   v1::LocateAgentResponse reply;
   const grpc::Status status = query_->LocateAgent(&context, Where("12", 999 * kSecond), &reply);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::OUT_OF_RANGE);
-  const auto& trailers = context.GetServerTrailingMetadata();
-  const auto found = trailers.find(kErrorTrailer);
-  ASSERT_NE(found, trailers.end());
-  v1::ErrorDetail detail;
-  ASSERT_TRUE(detail.ParseFromString(std::string(found->second.data(), found->second.size())));
+  const v1::ErrorDetail detail = DetailOf(context);
   EXPECT_EQ(detail.reason(), v1::TIME_OUTSIDE_TRACK);
   EXPECT_EQ(detail.domain(), "dsg");
   EXPECT_EQ(detail.metadata().at("last_ns"), "62000000000");

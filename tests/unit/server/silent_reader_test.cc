@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Readers that open a stream and then never read: counted is what they hold, not how long others
-// wait.
+// Readers that open a stream and then do not read. The tests count the messages that these hold,
+// not the time that others wait.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -11,10 +11,9 @@
 #include "dsg/v1/map_service.grpc.pb.h"
 #include "dsg/v1/query_service.grpc.pb.h"
 #include "grpcpp/grpcpp.h"
-#include "schema/base/random.h"
 #include "server/server.h"
 #include "tests/unit/query/engine/office.h"
-#include "tests/unit/server/passing_core.h"
+#include "tests/unit/server/server_test_util.h"
 
 namespace dsg::server {
 namespace {
@@ -23,10 +22,7 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 using std::chrono::system_clock;
 
-constexpr int kBlockCount = 600;
-constexpr uint32_t kVertexCount = 3000;
-
-// Counts the messages that streams of the mesh were asked for.
+// Counts the messages produced for streams of the mesh.
 class CountingCore final : public PassingCore {
  public:
   CountingCore(std::unique_ptr<query::ServiceCore> core, std::atomic<int>* message_count)
@@ -59,61 +55,11 @@ class CountingCore final : public PassingCore {
   std::atomic<int>* message_count_;
 };
 
-// On a connection of its own.
-class MeshReader {
- public:
-  explicit MeshReader(const std::string& address) {
-    grpc::ChannelArguments arguments;
-    arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-    stub_ = v1::QueryService::NewStub(
-        grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments));
-    // Only so that a test that goes wrong ends.
-    context_.set_deadline(system_clock::now() + seconds(60));
-    v1::GetMeshRequest request;
-    request.set_map(test::kMap);
-    reader_ = stub_->GetMesh(&context_, request);
-  }
-  ~MeshReader() {
-    context_.TryCancel();
-    if (!is_finished_) Finish();
-  }
-
-  bool Read() {
-    v1::GetMeshResponse reply;
-    return reader_->Read(&reply);
-  }
-  grpc::Status Finish() {
-    is_finished_ = true;
-    while (Read()) {
-    }
-    return reader_->Finish();
-  }
-
- private:
-  std::unique_ptr<v1::QueryService::Stub> stub_;
-  grpc::ClientContext context_;
-  std::unique_ptr<grpc::ClientReader<v1::GetMeshResponse>> reader_;
-  bool is_finished_ = false;
-};
-
 class SilentReader : public testing::Test {
  protected:
   SilentReader() {
     test::MakeOffice(folder_.path());
-    GraphDelta delta;
-    Random random(23, 0);
-    for (int i = 0; i < kBlockCount; ++i) {
-      MeshBlock block;
-      block.index = {i % 20, i / 20, 0};
-      for (uint32_t k = 0; k < kVertexCount; ++k) {
-        block.positions_map.emplace_back(2.0 * block.index.x + random.Uniform(0, 2),
-                                         2.0 * block.index.y + random.Uniform(0, 2),
-                                         random.Uniform(0, 2));
-        block.normals_map.emplace_back(random.Uniform(), random.Uniform(), random.Uniform());
-      }
-      delta.mesh_blocks.push_back(std::move(block));
-    }
-    test::CommitToOffice(folder_.path(), std::move(delta));
+    test::CommitToOffice(folder_.path(), MeshDelta());
   }
 
   void Start(milliseconds reader_stall_max = seconds(30)) {
@@ -135,7 +81,7 @@ class SilentReader : public testing::Test {
     return v1::MapService::NewStub(channel_)->GetServerInfo(&context, {}, &reply);
   }
 
-  // Asks one question after the other, until the streams have got on no further for a hundred of
+  // Sends calls one after the other until the streams have made no progress during a hundred of
   // them and no worker is busy.
   bool ComesToRest() {
     constexpr int kQuietCount = 100;
@@ -150,7 +96,7 @@ class SilentReader : public testing::Test {
     return false;
   }
 
-  // Unlike other waits this has no count of questions: it ends with the readers' deadline.
+  // Ends at the latest with the deadline of the readers.
   bool AllStreamsEnd() {
     while (server_->Load().open_stream_count > 0) std::this_thread::yield();
     return true;
@@ -175,7 +121,7 @@ TEST_F(SilentReader, HoldsNoWorkerAndFewMessages) {
   EXPECT_EQ(load.running_count, 0);
   EXPECT_EQ(load.queued_count, 0);
   EXPECT_EQ(load.open_stream_count, kReaderCount);
-  // What gRPC and the kernel take unread, of a stream of some sixty messages.
+  // What gRPC and the kernel buffer of a stream of about forty messages.
   EXPECT_LT(message_count_, 16 * kReaderCount);
   readers.clear();
   EXPECT_TRUE(AllStreamsEnd());

@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Readers of a large mesh that do not read, vanish or cancel cost others neither a worker nor
-// memory.
+// Readers of a large mesh that do not read, vanish or cancel must not occupy workers or memory.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <fstream>
 #include <memory>
 #include <vector>
 
@@ -15,6 +12,7 @@
 #include "schema/base/random.h"
 #include "server/server.h"
 #include "tests/unit/query/engine/office.h"
+#include "tests/unit/server/server_test_util.h"
 
 namespace dsg::server {
 namespace {
@@ -22,73 +20,11 @@ namespace {
 using std::chrono::seconds;
 using std::chrono::system_clock;
 
-constexpr int kBlockCount = 400;
-constexpr uint32_t kVertexCount = 3000;
-
-// About 100 kB each on the wire, and hard to compress.
-void AddMesh(GraphDelta* delta) {
-  Random random(21, 0);
-  for (int i = 0; i < kBlockCount; ++i) {
-    MeshBlock block;
-    block.index = {i % 20, i / 20, 0};
-    for (uint32_t k = 0; k < kVertexCount; ++k) {
-      block.positions_map.emplace_back(2.0 * block.index.x + random.Uniform(0, 2),
-                                       2.0 * block.index.y + random.Uniform(0, 2),
-                                       random.Uniform(0, 2));
-      block.normals_map.emplace_back(random.Uniform(), random.Uniform(), random.Uniform());
-      block.last_seen_ns.push_back(1'700'000'000 * kNsPerSecond + random.Index(1 << 30));
-      block.first_seen_ns.push_back(block.last_seen_ns.back());
-    }
-    delta->mesh_blocks.push_back(std::move(block));
-  }
-}
-
-int64_t ResidentBytes() {
-  std::ifstream file("/proc/self/statm");
-  int64_t whole = 0;
-  int64_t resident = 0;
-  file >> whole >> resident;
-  return resident * sysconf(_SC_PAGESIZE);
-}
-
-// A stream on a connection of its own.
-class MeshReader {
- public:
-  explicit MeshReader(const std::string& address) {
-    grpc::ChannelArguments arguments;
-    arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-    stub_ = v1::QueryService::NewStub(
-        grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments));
-    context_.set_deadline(system_clock::now() + seconds(60));
-    v1::GetMeshRequest request;
-    request.set_map(test::kMap);
-    reader_ = stub_->GetMesh(&context_, request);
-  }
-  ~MeshReader() {
-    context_.TryCancel();
-    if (!is_finished_) reader_->Finish();
-  }
-
-  bool Read(v1::GetMeshResponse* reply) { return reader_->Read(reply); }
-  grpc::Status Finish() {
-    is_finished_ = true;
-    return reader_->Finish();
-  }
-
- private:
-  bool is_finished_ = false;
-  grpc::ClientContext context_;
-  std::unique_ptr<v1::QueryService::Stub> stub_;
-  std::unique_ptr<grpc::ClientReader<v1::GetMeshResponse>> reader_;
-};
-
 class SlowReader : public testing::Test {
  protected:
   SlowReader() {
     test::MakeOffice(folder_.path());
-    GraphDelta delta;
-    AddMesh(&delta);
-    test::CommitToOffice(folder_.path(), std::move(delta));
+    test::CommitToOffice(folder_.path(), MeshDelta());
   }
 
   void Start(int open_stream_max) {
@@ -110,7 +46,7 @@ class SlowReader : public testing::Test {
     return maps_->GetServerInfo(&context, {}, &reply);
   }
 
-  // The server may learn a moment later that a reader left.
+  // The server may notice the departure of a reader a little later.
   bool IsLetIn() {
     for (int i = 0; i < 2000; ++i) {
       MeshReader reader(server_->address());
@@ -134,7 +70,7 @@ TEST_F(SlowReader, GetsEveryBlockOnceAndInOrderHoweverSlow) {
   while (reader.Read(&reply)) {
     EXPECT_EQ(reply.has_header(), message_count++ == 0);
     for (const v1::MeshBlock& block : reply.blocks()) {
-      EXPECT_EQ(block.positions_size(), 3 * static_cast<int>(kVertexCount));
+      EXPECT_EQ(block.positions_size(), 3 * static_cast<int>(kMeshVertexCount));
       blocks.emplace_back(block.x(), block.y());
     }
     if (message_count % 8 == 0) {
@@ -142,7 +78,7 @@ TEST_F(SlowReader, GetsEveryBlockOnceAndInOrderHoweverSlow) {
     }
   }
   EXPECT_TRUE(reader.Finish().ok());
-  EXPECT_EQ(blocks.size(), static_cast<size_t>(kBlockCount));
+  EXPECT_EQ(blocks.size(), static_cast<size_t>(kMeshBlockCount));
   EXPECT_TRUE(std::is_sorted(blocks.begin(), blocks.end()));
   EXPECT_EQ(std::adjacent_find(blocks.begin(), blocks.end()), blocks.end());
 }
@@ -160,7 +96,7 @@ TEST_F(SlowReader, LeavesTheOnlyWorkerAndTheMemoryToOthers) {
     ASSERT_TRUE(readers.back()->Read(&reply));
   }
   for (int i = 0; i < 500; ++i) ASSERT_TRUE(AskInfo().ok());
-  // Both ends are in this process. Each stream is of 40 MB.
+  // Both ends are in this process. Each stream has 40 MB.
   EXPECT_LT(ResidentBytes() - before, kReaderCount * kBytesPerReaderMax);
 }
 

@@ -64,7 +64,7 @@ TEST(StatusMapping, NeverCutsACharacterInTwo) {
 
 TEST(StatusMapping, ReplacesWhatIsNotUtf8) {
   EXPECT_EQ(CutText("a\xFF\xC3", 10), "a??");
-  // Overlong, surrogate, beyond Unicode: three ways that a strict reader refuses.
+  // Overlong, surrogate, beyond Unicode: invalid UTF-8 that lax decoders accept.
   EXPECT_EQ(CutText("\xC0\xAF", 10), "??");
   EXPECT_EQ(CutText("\xED\xA0\x80", 10), "???");
   EXPECT_EQ(CutText("\xF4\x90\x80\x80", 10), "????");

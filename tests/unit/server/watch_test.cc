@@ -13,8 +13,8 @@
 #include "grpcpp/grpcpp.h"
 #include "server/call_deadline.h"
 #include "server/server.h"
-#include "server/status_mapping.h"
 #include "tests/unit/query/engine/office.h"
+#include "tests/unit/server/server_test_util.h"
 
 namespace dsg::server {
 namespace {
@@ -32,16 +32,13 @@ GraphDelta DeltaOfObject(uint64_t index) {
   return delta;
 }
 
-/// One watch on a connection of its own.
+/// A watch on its own connection.
 class Watcher {
  public:
   Watcher(const std::string& address, const v1::WatchMapRequest& request,
           milliseconds deadline = seconds(60)) {
-    grpc::ChannelArguments arguments;
-    arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-    channel_ = grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
-    stub_ = v1::MapService::NewStub(channel_);
-    // Only so that a test that goes wrong ends.
+    stub_ = v1::MapService::NewStub(ConnectAlone(address));
+    // Ends a test that goes wrong.
     context_.set_deadline(system_clock::now() + deadline);
     reader_ = stub_->WatchMap(&context_, request);
   }
@@ -63,22 +60,11 @@ class Watcher {
   grpc::ClientContext& context() { return context_; }
 
  private:
-  std::shared_ptr<grpc::Channel> channel_;
   std::unique_ptr<v1::MapService::Stub> stub_;
   grpc::ClientContext context_;
   std::unique_ptr<grpc::ClientReader<v1::WatchMapResponse>> reader_;
   bool is_finished_ = false;
 };
-
-v1::ErrorDetail DetailOf(grpc::ClientContext& context) {
-  v1::ErrorDetail detail;
-  const auto& trailers = context.GetServerTrailingMetadata();
-  const auto found = trailers.find(kErrorTrailer);
-  if (found != trailers.end()) {
-    detail.ParseFromString(std::string(found->second.data(), found->second.size()));
-  }
-  return detail;
-}
 
 class WatchTest : public testing::Test {
  protected:
@@ -101,7 +87,7 @@ class WatchTest : public testing::Test {
     return request;
   }
 
-  // A second watch is let in, within bounded time.
+  // A second watch is accepted within bounded time.
   bool IsLetIn() {
     const auto give_up = std::chrono::steady_clock::now() + seconds(20);
     while (std::chrono::steady_clock::now() < give_up) {
@@ -167,7 +153,7 @@ TEST_F(WatchTest, TellsAHundredWatchersEveryRevisionInOrder) {
       if (expected != kLast + 1) ++failure_count;
     });
   }
-  // Some begin before the first commit, and all catch up.
+  // Some begin before the first commit; all catch up.
   while (begun_count < kWatcherCount / 2) std::this_thread::yield();
   for (Revision r = 2; r <= kLast; ++r) {
     test::CommitToOffice(folder_.path(), DeltaOfObject(static_cast<uint64_t>(1000 + r)));
@@ -220,7 +206,7 @@ TEST_F(WatchTest, TellsOthersWhileAReaderDoesNotRead) {
     if (message.revision().revision() != 2) continue;
     EXPECT_LE(message.changes().nodes_size(), 1000);
     node_count += message.changes().nodes_size();
-    // Not to be resumed behind what was not told.
+    // The read revision must not pass what has been sent.
     EXPECT_EQ(message.header().read_revision(), message.complete() ? 2 : 1);
     if (message.complete()) break;
   }

@@ -20,7 +20,7 @@ class CountJob final : public Job {
   std::atomic<int>* count_;
 };
 
-// Says that it runs, then runs until it is let go.
+// Reports that it runs, then runs until it is released.
 class HeldJob final : public Job {
  public:
   void Run() override {
@@ -35,7 +35,7 @@ class HeldJob final : public Job {
   std::promise<void> release_;
 };
 
-// Only for a single worker.
+// For a pool with a single worker.
 class NoteJob final : public Job {
  public:
   NoteJob(char name, std::vector<char>* order) : name_(name), order_(order) {}
