@@ -192,7 +192,7 @@ CollisionQuestion AnyCollision(const NaiveMap& map, Random* random) {
   return question;
 }
 
-v1::CheckCollisionRequest ToRequest(const CollisionQuestion& question) {
+v1::CheckCollisionRequest CollisionRequestOf(const CollisionQuestion& question) {
   v1::CheckCollisionRequest request;
   request.set_map(QuestionWorld::kMap);
   v1::CollisionBody* body = request.add_bodies();
@@ -224,7 +224,7 @@ Question MakeCollision(const QuestionWorld& world, Random* random) {
   const Revision revision = world.AnyRevision(random);
   const NaiveMap& map = world.At(revision);
   const CollisionQuestion question = AnyCollision(map, random);
-  const v1::CheckCollisionRequest request = ToRequest(question);
+  const v1::CheckCollisionRequest request = CollisionRequestOf(question);
   Question made;
   made.text = request.ShortDebugString();
   made.tolerance = question.agents && !world.is_lossless() ? 3e-4 : 1e-7;

@@ -24,7 +24,7 @@ void AddDifferences(const Map& from, const Map& to, ComparedAnswer* answer) {
   }
 }
 
-bool IsSame(const TimedPose& a, const TimedPose& b) {
+bool IsSamePose(const TimedPose& a, const TimedPose& b) {
   return a.time_ns == b.time_ns && a.flags == b.flags &&
          a.map_T_agent.position == b.map_T_agent.position;
 }
@@ -41,7 +41,7 @@ void AddTracks(const NaiveMap& from, const NaiveMap& to, ComparedAnswer* answer)
     const Track after = read(to);
     const bool same =
         std::equal(before.begin(), before.end(), after.begin(), after.end(),
-                   [](const auto& a, const auto& b) { return IsSame(a.second, b.second); });
+                   [](const auto& a, const auto& b) { return IsSamePose(a.second, b.second); });
     if (same) continue;
     const auto last = [](const Track& track) { return track.empty() ? 0 : track.rbegin()->first; };
     for (const int64_t number : {static_cast<int64_t>(before.size()),

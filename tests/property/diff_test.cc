@@ -18,7 +18,7 @@ namespace {
 using test::NaiveMap;
 using test::RandomWorld;
 
-constexpr Revision kRevisionCount = 30;
+constexpr Revision kDiffRevisionCount = 30;
 constexpr char kMap[] = "world";
 
 /// What a map holds at a revision, as text.
@@ -71,7 +71,7 @@ class DiffModelTest : public testing::Test {
     auto writer = (*store)->OpenWriter(kMap);
     ASSERT_TRUE(writer.ok()) << writer.status();
     NaiveMap naive;
-    for (Revision r = 1; r <= kRevisionCount; ++r) {
+    for (Revision r = 1; r <= kDiffRevisionCount; ++r) {
       const GraphDelta delta = r == 1 ? world.First() : world.Next(naive);
       ASSERT_TRUE((*writer)->Commit(delta).ok());
       naive.Apply(delta);
@@ -80,7 +80,7 @@ class DiffModelTest : public testing::Test {
     ASSERT_TRUE(map.ok()) << map.status();
     map_ = *map;
     core_ = query::MakeServiceCore(*std::move(store));
-    for (Revision r = 0; r <= kRevisionCount; ++r) contents_.push_back(Read(r));
+    for (Revision r = 0; r <= kDiffRevisionCount; ++r) contents_.push_back(Read(r));
   }
 
   Content Read(Revision revision) {
@@ -163,9 +163,9 @@ class DiffModelTest : public testing::Test {
 };
 
 TEST_F(DiffModelTest, LeadsFromAnyRevisionToAnyOther) {
-  for (Revision from = 0; from <= kRevisionCount && !HasFailure(); ++from) {
+  for (Revision from = 0; from <= kDiffRevisionCount && !HasFailure(); ++from) {
     // 0 would stand for the newest.
-    for (Revision to = 1; to <= kRevisionCount && !HasFailure(); ++to) {
+    for (Revision to = 1; to <= kDiffRevisionCount && !HasFailure(); ++to) {
       SCOPED_TRACE(std::to_string(from) + " to " + std::to_string(to));
       Content content = contents_[static_cast<size_t>(from)];
       Apply(Diff(from, to, 1000), &content);
@@ -175,7 +175,7 @@ TEST_F(DiffModelTest, LeadsFromAnyRevisionToAnyOther) {
 }
 
 TEST_F(DiffModelTest, IsTheSameInPagesOfAnySize) {
-  for (const auto& [from, to] : {std::pair<Revision, Revision>{0, kRevisionCount}, {20, 9}}) {
+  for (const auto& [from, to] : {std::pair<Revision, Revision>{0, kDiffRevisionCount}, {20, 9}}) {
     const std::string whole = Diff(from, to, 1000).SerializeAsString();
     for (const int size : {1, 2, 7, 64}) {
       EXPECT_EQ(Diff(from, to, size).SerializeAsString(), whole) << "pages of " << size;

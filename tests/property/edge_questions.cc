@@ -197,7 +197,7 @@ ComparedAnswer ScanSubgraph(const NaiveMap& map, const SubgraphQuestion& questio
   return answer;
 }
 
-v1::GetSubgraphRequest ToRequest(const SubgraphQuestion& question) {
+v1::GetSubgraphRequest SubgraphRequestOf(const SubgraphQuestion& question) {
   v1::GetSubgraphRequest request;
   request.set_map(QuestionWorld::kMap);
   request.set_root(ToString(question.root));
@@ -229,7 +229,7 @@ Question MakeSubgraph(const QuestionWorld& world, Random* random) {
     question.box_map = Box3d(low, low + Eigen::Vector3d::Constant(random->Integer(1, 8)));
   }
   question.tree_only = random->Chance(0.3);
-  const v1::GetSubgraphRequest request = ToRequest(question);
+  const v1::GetSubgraphRequest request = SubgraphRequestOf(question);
   if (question.relations.empty()) question.relations = {relations::kContains};
   Question made;
   made.text = request.ShortDebugString();

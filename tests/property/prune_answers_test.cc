@@ -13,7 +13,7 @@
 namespace dsg::test {
 namespace {
 
-constexpr int kQuestionCount = 1'000;
+constexpr int kPruneQuestionCount = 1'000;
 
 struct Asked {
   Question question;
@@ -53,7 +53,7 @@ std::vector<Asked> AskSome(const QuestionWorld& world, Asker* asker, uint64_t se
   }
   Random random(seed, 900);
   std::vector<Asked> asked;
-  while (asked.size() < kQuestionCount) {
+  while (asked.size() < kPruneQuestionCount) {
     const QuestionKind& kind =
         kinds[static_cast<size_t>(random.Index(static_cast<int>(kinds.size())))];
     if (kind.needs_lossless && !world.is_lossless()) continue;
@@ -92,9 +92,9 @@ TEST(Pruning, ChangesNoAnswerThatHasNothingToDoWithIt) {
       ADD_FAILURE() << one.question.text << " was answered otherwise";
     }
   }
-  std::printf("%d questions: %d answered as before, %d name what is gone\n", kQuestionCount,
+  std::printf("%d questions: %d answered as before, %d name what is gone\n", kPruneQuestionCount,
               same_count, named_count);
-  EXPECT_GT(same_count, kQuestionCount / 3);
+  EXPECT_GT(same_count, kPruneQuestionCount / 3);
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ namespace {
 
 // 2024-01-01.
 constexpr TimeNs kEpochNs = 1'704'067'200 * kNsPerSecond;
-constexpr int kWorldCount = 60;
+constexpr int kClockWorldCount = 60;
 constexpr int kRoundCount = 25;
 constexpr uint64_t kThing = 1;
 
@@ -187,7 +187,7 @@ Counts CheckWorld(ClockWorld* world, TimeNs age_ns, TimeNs wall_now_ns) {
 TEST(PruneClocks, NoAgeTakesWhatIsYoungerByTheTruth) {
   const uint64_t seed = TestSeed(77);
   int64_t taken = 0;
-  for (uint64_t i = 0; i < kWorldCount; ++i) {
+  for (uint64_t i = 0; i < kClockWorldCount; ++i) {
     SCOPED_TRACE(i);
     ClockWorld world(seed + i, /*are_right=*/false);
     for (int ask = 0; ask < 4; ++ask) {

@@ -41,8 +41,8 @@ std::string Print(const ComparedAnswer& answer) {
   return text;
 }
 
-testing::AssertionResult IsSame(const ComparedAnswer& got, const ComparedAnswer& expected,
-                                const Question& question) {
+testing::AssertionResult IsSameAnswer(const ComparedAnswer& got, const ComparedAnswer& expected,
+                                      const Question& question) {
   bool same = got.words == expected.words && got.numbers.size() == expected.numbers.size();
   for (size_t i = 0; same && i < got.numbers.size(); ++i) {
     same = IsClose(got.numbers[i], expected.numbers[i], question);
@@ -82,7 +82,7 @@ TEST(Questions, AreAnsweredAsByAScanAtAnyRevisionInPagesOfAnySize) {
       const Question question = kind.make(world, &random);
       Asker asker{&world, AnyPageSize(&random)};
       const ComparedAnswer expected = question.scan();
-      const testing::AssertionResult same = IsSame(question.ask(&asker), expected, question);
+      const testing::AssertionResult same = IsSameAnswer(question.ask(&asker), expected, question);
       EXPECT_TRUE(same) << "question " << i;
       if (!same) ++wrong_count;
       if (IsEmpty(expected)) ++empty_count;
@@ -109,7 +109,8 @@ TEST(Questions, AreAnsweredTheSameHoweverTheMapWasWritten) {
       question.stretch = 0.0;
       Asker one{&plain, AnyPageSize(&random)};
       Asker other{&mixed, AnyPageSize(&random)};
-      EXPECT_TRUE(IsSame(question.ask(&other), question.ask(&one), question)) << "question " << i;
+      EXPECT_TRUE(IsSameAnswer(question.ask(&other), question.ask(&one), question))
+          << "question " << i;
     }
   }
 }

@@ -31,7 +31,7 @@ std::string Answers(const Snapshot& snapshot) {
   return std::regex_replace(all, kWrittenBy, "");
 }
 
-std::vector<int64_t> Counts(const Snapshot& snapshot) {
+std::vector<int64_t> CountsOf(const Snapshot& snapshot) {
   const RevisionInfo at = OrDie(snapshot.Stats()).at;
   return {at.node_count, at.edge_count, at.agent_count,
           at.pose_count, at.stay_count, at.mesh_block_count};
@@ -39,7 +39,7 @@ std::vector<int64_t> Counts(const Snapshot& snapshot) {
 
 // The first line that differs, for people.
 void ExpectSame(const Snapshot& now, const Snapshot& then) {
-  EXPECT_EQ(Counts(now), Counts(then));
+  EXPECT_EQ(CountsOf(now), CountsOf(then));
   const std::string a = Answers(now);
   const std::string b = Answers(then);
   if (a == b) return;

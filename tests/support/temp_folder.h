@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A folder that a test may fill and that is gone afterwards.
+// A folder that a test may fill and that is gone afterwards, the bytes of files, and seeds.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 namespace dsg::test {
@@ -18,6 +19,12 @@ class TempFolder {
  private:
   std::string path_;
 };
+
+/// The bytes of a file; empty if it cannot be read.
+std::string ReadFile(const std::string& path);
+
+/// The bytes of all files of a folder and of those in it, one after the other, in any order.
+std::string ReadFolder(const std::string& folder);
 
 /// The seed of random tests: DSG_SEED, or `fallback`. Printed, so that a failure can be repeated.
 uint64_t TestSeed(uint64_t fallback);

@@ -3,33 +3,16 @@
 #include <gtest/gtest.h>
 
 #include <string>
-#include <variant>
-#include <vector>
 
 #include "query/cli/arguments.h"
+#include "tests/unit/query/cli/cli_test_util.h"
 
 namespace dsg::cli {
 namespace {
 
-using Arguments = std::vector<std::string>;
-
-template <class V>
-V ParseAs(const Arguments& arguments) {
-  const auto command = ParseArguments(arguments, {.store = "s"});
-  EXPECT_TRUE(command.ok()) << command.status();
-  if (!command.ok() || !std::holds_alternative<V>(command->verb)) {
-    ADD_FAILURE() << "another verb than asked for";
-    return V();
-  }
-  return std::get<V>(command->verb);
-}
-
-std::string Refusal(const Arguments& arguments) {
-  const auto command = ParseArguments(arguments, {.store = "s"});
-  EXPECT_FALSE(command.ok());
-  EXPECT_TRUE(absl::IsInvalidArgument(command.status())) << command.status();
-  return std::string(command.status().message());
-}
+using test::Arguments;
+using test::ParseAs;
+using test::Refusal;
 
 TEST(MetArguments, NeedNobodyOneOrTwo) {
   EXPECT_EQ(ParseAs<MetVerb>({"met"}).agent, "");

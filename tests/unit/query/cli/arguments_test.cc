@@ -8,33 +8,19 @@
 #include <variant>
 #include <vector>
 
+#include "tests/unit/query/cli/cli_test_util.h"
+
 namespace dsg::cli {
 namespace {
 
-using Arguments = std::vector<std::string>;
-
-template <class V>
-V ParseAs(const Arguments& arguments, const Environment& environment = {.store = "s"}) {
-  const auto command = ParseArguments(arguments, environment);
-  EXPECT_TRUE(command.ok()) << command.status();
-  if (!command.ok() || !std::holds_alternative<V>(command->verb)) {
-    ADD_FAILURE() << "another verb than asked for";
-    return V();
-  }
-  return std::get<V>(command->verb);
-}
+using test::Arguments;
+using test::ParseAs;
+using test::Refusal;
 
 CommonOptions ParseCommon(const Arguments& arguments, const Environment& environment) {
   const auto command = ParseArguments(arguments, environment);
   EXPECT_TRUE(command.ok()) << command.status();
   return command.ok() ? command->common : CommonOptions();
-}
-
-std::string Refusal(const Arguments& arguments, const Environment& environment = {.store = "s"}) {
-  const auto command = ParseArguments(arguments, environment);
-  EXPECT_FALSE(command.ok());
-  EXPECT_TRUE(absl::IsInvalidArgument(command.status())) << command.status();
-  return std::string(command.status().message());
 }
 
 TEST(Arguments, TakesTimesWithEitherSign) {

@@ -1,30 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/unit/query/cli/example_content.h"
 
-namespace dsg::cli::test {
-namespace {
+#include "tests/unit/query/cli/cli_test_util.h"
 
-Node MakeNode(NodeId id, const char* kind, const std::string& name, const Eigen::Vector3d& at) {
-  Node node;
-  node.id = id;
-  node.kind = kind;
-  node.layer = *LayerOfKind(kind);
-  node.name = name;
-  node.map_T_node.position = at;
-  return node;
-}
+namespace dsg::test {
+namespace {
 
 Box3d BoxAround(double x_m, double y_m, double z_m) {
   const Eigen::Vector3d half = 0.5 * Eigen::Vector3d(x_m, y_m, z_m);
   return Box3d(-half, half);
-}
-
-Edge MakeEdge(NodeId source, const char* relation, NodeId target) {
-  Edge edge;
-  edge.source = source;
-  edge.relation = relation;
-  edge.target = target;
-  return edge;
 }
 
 }  // namespace
@@ -41,8 +25,8 @@ MeshBlock FlatBlock(int32_t x) {
   return block;
 }
 
-MapContent ExampleContent() {
-  MapContent content;
+cli::MapContent ExampleContent() {
+  cli::MapContent content;
   content.spec.name = "example";
   content.revision = 5;
   content.layers = DefaultLayers();
@@ -75,4 +59,4 @@ MapContent ExampleContent() {
   return content;
 }
 
-}  // namespace dsg::cli::test
+}  // namespace dsg::test

@@ -4,33 +4,23 @@
 
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "query/cli/run.h"
 #include "schema/store/graph_store.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/temp_folder.h"
+#include "tests/unit/query/cli/cli_test_util.h"
 #include "tests/unit/query/cli/example_content.h"
 
 namespace dsg::cli {
 namespace {
 
 namespace fs = std::filesystem;
-using Arguments = std::vector<std::string>;
 using Json = nlohmann::json;
-
-struct Outcome {
-  int code = -1;
-  std::string out;
-  std::string errors;
-};
-
-std::string Read(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
+using test::Arguments;
+using test::Outcome;
+using test::ReadFile;
 
 class ExportVerbs : public testing::Test {
  protected:
@@ -81,12 +71,7 @@ class ExportVerbs : public testing::Test {
 
   Outcome Ask(Arguments arguments) {
     arguments.insert(arguments.end(), {"--store", store_});
-    std::ostringstream out, errors;
-    Outcome outcome;
-    outcome.code = cli::Run(arguments, {.version = "0.1.0"}, out, errors);
-    outcome.out = out.str();
-    outcome.errors = errors.str();
-    return outcome;
+    return test::RunDsg(arguments);
   }
   std::string Path(const std::string& name) const { return folder_.path() + "/" + name; }
 
@@ -95,10 +80,10 @@ class ExportVerbs : public testing::Test {
     arguments.insert(arguments.begin(), {"export", "--gltf", Path("a.glb"), "--force"});
     const Outcome outcome = Ask(arguments);
     EXPECT_EQ(outcome.code, 0) << outcome.errors;
-    return Read(Path("a.glb"));
+    return ReadFile(Path("a.glb"));
   }
 
-  dsg::test::TempFolder folder_;
+  test::TempFolder folder_;
   const std::string store_ = folder_.path() + "/store";
 };
 
@@ -140,12 +125,12 @@ TEST_F(ExportVerbs, RefusesToReplaceFilesAndWritesNoneThen) {
   EXPECT_EQ(refused.code, 2);
   EXPECT_NE(refused.errors.find("--force"), std::string::npos);
   EXPECT_TRUE(refused.out.empty());
-  EXPECT_EQ(Read(Path("g.ply")), "mine");
+  EXPECT_EQ(ReadFile(Path("g.ply")), "mine");
   EXPECT_FALSE(fs::exists(Path("a.glb")));
   Arguments forced = arguments;
   forced.push_back("--force");
   EXPECT_EQ(Ask(forced).code, 0);
-  EXPECT_NE(Read(Path("g.ply")), "mine");
+  EXPECT_NE(ReadFile(Path("g.ply")), "mine");
 }
 
 TEST_F(ExportVerbs, SayWhatIsMissingOrWrong) {
@@ -183,12 +168,12 @@ TEST_F(ExportVerbs, DrawsAPicture) {
   const Outcome outcome = Ask({"map", "--png", Path("a.png"), "--width", "640"});
   ASSERT_EQ(outcome.code, 0) << outcome.errors;
   EXPECT_EQ(outcome.out.find("wrote " + Path("a.png") + ": 640 columns, "), 0u) << outcome.out;
-  const std::string png = Read(Path("a.png"));
+  const std::string png = ReadFile(Path("a.png"));
   EXPECT_EQ(png.substr(0, 8), "\x89PNG\r\n\x1a\n");
   EXPECT_EQ(png.substr(16, 4), std::string("\0\0\x02\x80", 4));
   // A floor is another picture.
   ASSERT_EQ(Ask({"map", "--png", Path("b.png"), "--width", "640", "--floor", "40"}).code, 0);
-  EXPECT_NE(Read(Path("b.png")), png);
+  EXPECT_NE(ReadFile(Path("b.png")), png);
 }
 
 }  // namespace

@@ -5,33 +5,24 @@
 
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "query/cli/run.h"
 #include "schema/base/status.h"
 #include "schema/codec/checksum.h"
 #include "schema/store/graph_store.h"
 #include "tests/support/temp_folder.h"
+#include "tests/unit/query/cli/cli_test_util.h"
 
 namespace dsg::cli {
 namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
-using Arguments = std::vector<std::string>;
-
-struct Outcome {
-  int code = -1;
-  std::string out;
-  std::string errors;
-};
-
-std::string ReadBytes(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
+using test::Arguments;
+using test::Outcome;
+using test::ReadFile;
+using test::RunDsg;
 
 void WriteBytes(const std::string& path, const std::string& bytes) {
   std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;
@@ -69,18 +60,9 @@ class KeepVerbs : public testing::Test {
     ASSERT_TRUE(committed.ok()) << committed.status();
   }
 
-  Outcome Dsg(Arguments arguments, const Environment& environment = {.version = "0.1.0"}) {
-    std::ostringstream out;
-    std::ostringstream errors;
-    Outcome outcome;
-    outcome.code = cli::Run(arguments, environment, out, errors);
-    outcome.out = out.str();
-    outcome.errors = errors.str();
-    return outcome;
-  }
   Outcome Ask(Arguments arguments) {
     arguments.insert(arguments.end(), {"--store", store_});
-    return Dsg(arguments);
+    return RunDsg(arguments);
   }
   void ExpectRefused(int code, const std::string& what, Arguments arguments) {
     const Outcome outcome = Ask(std::move(arguments));
@@ -89,7 +71,7 @@ class KeepVerbs : public testing::Test {
     EXPECT_NE(outcome.errors.find(what), std::string::npos) << outcome.errors;
   }
   size_t NodeCount(const std::string& store, const std::string& map) {
-    const Outcome outcome = Dsg({"ls", "--json", "--store", store, "--map", map});
+    const Outcome outcome = RunDsg({"ls", "--json", "--store", store, "--map", map});
     EXPECT_EQ(outcome.code, 0) << outcome.errors;
     return Json::parse(outcome.out)["nodes"].size();
   }
@@ -146,7 +128,7 @@ TEST_F(KeepVerbs, ABackupRestoresAllMapsAndIsRenewed) {
   const Outcome first = Ask({"backup", out_});
   ASSERT_EQ(first.code, 0) << first.errors;
   EXPECT_NE(first.out.find("backup of 2 maps"), std::string::npos);
-  EXPECT_EQ(Dsg({"verify", out_}).code, 0);
+  EXPECT_EQ(RunDsg({"verify", out_}).code, 0);
   const auto attic = fs::last_write_time(out_ + "/MANIFEST");
   Ask({"tag", "two", "--revision", "2", "--map", "office"});
   const Outcome second = Ask({"backup", out_});
@@ -157,10 +139,10 @@ TEST_F(KeepVerbs, ABackupRestoresAllMapsAndIsRenewed) {
   EXPECT_EQ(json["maps"].size(), 2U);
   EXPECT_FALSE(json["maps"][1]["copied"].get<bool>());
   const std::string other = folder_.path() + "/other";
-  EXPECT_EQ(Dsg({"restore", out_, "--store", other}).code, 0);
+  EXPECT_EQ(RunDsg({"restore", out_, "--store", other}).code, 0);
   EXPECT_EQ(NodeCount(other, "office"), 4U);
   EXPECT_EQ(NodeCount(other, "attic"), 1U);
-  EXPECT_EQ(Dsg({"verify", "--store", other}).code, 0);
+  EXPECT_EQ(RunDsg({"verify", "--store", other}).code, 0);
 }
 
 TEST_F(KeepVerbs, ABackupOfOneMapKeepsTheOthersThatWereThere) {
@@ -168,7 +150,8 @@ TEST_F(KeepVerbs, ABackupOfOneMapKeepsTheOthersThatWereThere) {
   const Outcome one = Ask({"backup", out_, "--map", "office"});
   EXPECT_NE(one.out.find("attic: kept"), std::string::npos) << one.out;
   // A variable must not leave maps out unseen.
-  const Outcome all = Dsg({"backup", folder_.path() + "/all"}, {.store = store_, .map = "office"});
+  const Outcome all =
+      RunDsg({"backup", folder_.path() + "/all"}, {.store = store_, .map = "office"});
   EXPECT_NE(all.out.find("backup of 2 maps"), std::string::npos) << all.out;
 }
 
@@ -186,7 +169,7 @@ TEST_F(KeepVerbs, RestoreRefusesWhatItCannotDoAndChangesNothing) {
     const auto writer = (*store)->OpenWriter("attic");
     ExpectRefused(3, "a robot", {"restore", out_, "--map", "attic", "--force"});
   }
-  EXPECT_EQ(Dsg({"restore", out_}).code, 2);
+  EXPECT_EQ(RunDsg({"restore", out_}).code, 2);
 }
 
 TEST_F(KeepVerbs, ADamagedBackupIsFoundBeforeAnythingIsRestored) {
@@ -196,22 +179,22 @@ TEST_F(KeepVerbs, ADamagedBackupIsFoundBeforeAnythingIsRestored) {
     const std::string name = entry.path().filename().string();
     if (name.substr(0, 6) == "office") office = entry.path().string();
   }
-  std::string bytes = ReadBytes(office);
+  std::string bytes = ReadFile(office);
   bytes[bytes.size() / 2] ^= 1;
   WriteBytes(office, bytes);
-  const Outcome verified = Dsg({"verify", out_});
+  const Outcome verified = RunDsg({"verify", out_});
   EXPECT_EQ(verified.code, 4);
   EXPECT_NE(verified.out.find("office: 0 revisions"), std::string::npos) << verified.out;
   EXPECT_NE(verified.out.find("attic: 1 revision,"), std::string::npos) << verified.out;
   const std::string other = folder_.path() + "/other";
-  EXPECT_EQ(Dsg({"restore", out_, "--store", other}).code, 4);
+  EXPECT_EQ(RunDsg({"restore", out_, "--store", other}).code, 4);
   EXPECT_FALSE(fs::exists(other));
   // The next backup puts it right.
   EXPECT_NE(Ask({"backup", out_}).out.find("office: copied"), std::string::npos);
-  EXPECT_EQ(Dsg({"verify", out_}).code, 0);
+  EXPECT_EQ(RunDsg({"verify", out_}).code, 0);
   // Without a manifest it is none.
   fs::remove(out_ + "/MANIFEST");
-  EXPECT_EQ(Dsg({"restore", out_, "--store", other}).code, 1);
+  EXPECT_EQ(RunDsg({"restore", out_, "--store", other}).code, 1);
 }
 
 TEST_F(KeepVerbs, ABackupNamesMapsThatCannotBeOpenedAndHoldsTheOthers) {
@@ -232,7 +215,7 @@ TEST_F(KeepVerbs, ABackupNamesMapsThatCannotBeOpenedAndHoldsTheOthers) {
   ASSERT_EQ(json["left_out"].size(), 2U);
   EXPECT_EQ(json["left_out"][1]["map"], "office");
   EXPECT_EQ(json["maps"].size(), 2U);
-  EXPECT_EQ(Dsg({"verify", out_}).code, 0);
+  EXPECT_EQ(RunDsg({"verify", out_}).code, 0);
   // One that was asked for is an error of its own.
   ExpectRefused(outcome.code, "backup of map \"cellar\"", {"backup", out_, "--map", "cellar"});
   EXPECT_NE(Ask({"maps"}).out.find("map cellar cannot be opened"), std::string::npos);
@@ -256,7 +239,7 @@ TEST_F(KeepVerbs, VerifyNamesMapsThatCannotBeOpenedAndLooksAtTheOthers) {
 
 TEST_F(KeepVerbs, VerifyLooksAtTheOthersWhereOneIsOfANewerFormat) {
   // Where SQLite keeps user_version, in the head of the database.
-  std::string bytes = ReadBytes(store_ + "/attic/graph.db");
+  std::string bytes = ReadFile(store_ + "/attic/graph.db");
   bytes[63] = static_cast<char>(kStoreFormatVersion + 1);
   WriteBytes(store_ + "/attic/graph.db", bytes);
   const Outcome outcome = Ask({"verify"});
@@ -271,7 +254,7 @@ TEST_F(KeepVerbs, UpgradeSpeaksToScriptsAndOfItself) {
   ASSERT_EQ(json["maps"].size(), 2U);
   EXPECT_EQ(json["maps"][0]["from_format"], kStoreFormatVersion);
   EXPECT_EQ(json["maps"][0]["copy"], "");
-  const Outcome remote = Dsg({"upgrade"}, {.server = "unix:/nowhere"});
+  const Outcome remote = RunDsg({"upgrade"}, {.server = "unix:/nowhere"});
   EXPECT_EQ(remote.code, 2);
   EXPECT_NE(remote.errors.find("upgrade works on a store folder"), std::string::npos)
       << remote.errors;
@@ -281,14 +264,14 @@ TEST_F(KeepVerbs, ARestoreThatFailsLeavesNoFolder) {
   ASSERT_EQ(Ask({"backup", out_}).code, 0);
   const std::string file = folder_.path() + "/attic.dsgz";
   ASSERT_EQ(Ask({"export", file, "--map", "attic"}).code, 0);
-  std::string bytes = ReadBytes(file);
+  std::string bytes = ReadFile(file);
   bytes[bytes.size() - 100] ^= 1;
   WriteBytes(file, bytes);
-  EXPECT_EQ(Dsg({"restore", file, "--store", folder_.path() + "/new/deep"}).code, 4);
+  EXPECT_EQ(RunDsg({"restore", file, "--store", folder_.path() + "/new/deep"}).code, 4);
   EXPECT_FALSE(fs::exists(folder_.path() + "/new"));
   // One that was there stays.
   fs::create_directories(folder_.path() + "/empty");
-  EXPECT_EQ(Dsg({"restore", file, "--store", folder_.path() + "/empty"}).code, 4);
+  EXPECT_EQ(RunDsg({"restore", file, "--store", folder_.path() + "/empty"}).code, 4);
   EXPECT_TRUE(fs::exists(folder_.path() + "/empty"));
 }
 
@@ -310,17 +293,17 @@ TEST_F(KeepVerbs, ARestoreLooksAtAllMapsBeforeItReplacesOne) {
 TEST_F(KeepVerbs, ABackupWithItsArchivesExchangedIsRefused) {
   ASSERT_EQ(Ask({"backup", out_}).code, 0);
   // As by somebody who knows how the manifest is sealed.
-  std::string text = ReadBytes(out_ + "/MANIFEST");
+  std::string text = ReadFile(out_ + "/MANIFEST");
   text = text.substr(0, text.rfind("sha256 "));
   Json json = Json::parse(text);
   std::swap(json["maps"][0]["map"], json["maps"][1]["map"]);
   std::swap(json["maps"][0], json["maps"][1]);
   text = json.dump();
   WriteBytes(out_ + "/MANIFEST", text + "sha256 " + ToHex(ComputeSha256(text)) + "\n");
-  const Outcome outcome = Dsg({"restore", out_, "--store", folder_.path() + "/other"});
+  const Outcome outcome = RunDsg({"restore", out_, "--store", folder_.path() + "/other"});
   EXPECT_EQ(outcome.code, 4);
   EXPECT_NE(outcome.errors.find("its map is"), std::string::npos) << outcome.errors;
-  EXPECT_EQ(Dsg({"verify", out_}).code, 4);
+  EXPECT_EQ(RunDsg({"verify", out_}).code, 4);
 }
 
 TEST_F(KeepVerbs, AnArchiveGoesOutAndComesBackWithTheSameBytes) {
@@ -333,15 +316,15 @@ TEST_F(KeepVerbs, AnArchiveGoesOutAndComesBackWithTheSameBytes) {
   ExpectRefused(2, "is there already", {"export", file, "--map", "office"});
   const Json told = Json::parse(Ask({"export", file, "--map", "office", "--force", "--json"}).out);
   EXPECT_TRUE(told["files"][0].contains("database_bytes")) << told;
-  EXPECT_EQ(Dsg({"verify", file}).code, 0);
-  EXPECT_EQ(Dsg({"import", file, "--store", other}).code, 0);
-  EXPECT_EQ(Dsg({"export", again, "--store", other}).code, 0);
-  EXPECT_TRUE(ReadBytes(file) == ReadBytes(again));
+  EXPECT_EQ(RunDsg({"verify", file}).code, 0);
+  EXPECT_EQ(RunDsg({"import", file, "--store", other}).code, 0);
+  EXPECT_EQ(RunDsg({"export", again, "--store", other}).code, 0);
+  EXPECT_TRUE(ReadFile(file) == ReadFile(again));
   // Only a name on the command line is a new name.
   const Outcome copy =
-      Dsg({"import", file, "--store", other, "--map", "copy"}, {.map = "elsewhere"});
+      RunDsg({"import", file, "--store", other, "--map", "copy"}, {.map = "elsewhere"});
   EXPECT_EQ(copy.out, "copy: restored at revision 4, readable from 0 on; it was called office\n");
-  EXPECT_EQ(Dsg({"restore", file, "--store", other, "--force"}, {.map = "elsewhere"}).code, 0);
+  EXPECT_EQ(RunDsg({"restore", file, "--store", other, "--force"}, {.map = "elsewhere"}).code, 0);
   EXPECT_FALSE(fs::exists(other + "/elsewhere"));
 }
 
@@ -353,14 +336,14 @@ TEST_F(KeepVerbs, FilesThatAreNoArchivesAreRefused) {
   ExpectRefused(2, "cannot create",
                 {"export", folder_.path() + "/none/office.dsgz", "--map", "office"});
   ASSERT_EQ(Ask({"export", file, "--map", "office"}).code, 0);
-  const std::string bytes = ReadBytes(file);
+  const std::string bytes = ReadFile(file);
   WriteBytes(file, bytes.substr(0, bytes.size() - 7));
-  EXPECT_EQ(Dsg({"restore", file, "--store", folder_.path() + "/other"}).code, 4);
-  EXPECT_EQ(Dsg({"verify", file}).code, 4);
+  EXPECT_EQ(RunDsg({"restore", file, "--store", folder_.path() + "/other"}).code, 4);
+  EXPECT_EQ(RunDsg({"verify", file}).code, 4);
   WriteBytes(file, "no archive");
-  EXPECT_EQ(Dsg({"verify", file}).code, 2);
-  EXPECT_EQ(Dsg({"import", file, "--store", folder_.path() + "/other"}).code, 2);
-  EXPECT_EQ(Dsg({"verify", folder_.path() + "/none"}).code, 1);
+  EXPECT_EQ(RunDsg({"verify", file}).code, 2);
+  EXPECT_EQ(RunDsg({"import", file, "--store", folder_.path() + "/other"}).code, 2);
+  EXPECT_EQ(RunDsg({"verify", folder_.path() + "/none"}).code, 1);
 }
 
 TEST_F(KeepVerbs, ABackupGoesNeitherIntoItsStoreNorAmongOtherThings) {
@@ -368,7 +351,7 @@ TEST_F(KeepVerbs, ABackupGoesNeitherIntoItsStoreNorAmongOtherThings) {
   fs::create_directories(out_);
   WriteBytes(out_ + "/letter.txt", "dear");
   ExpectRefused(2, "letter.txt", {"backup", out_});
-  EXPECT_EQ(ReadBytes(out_ + "/letter.txt"), "dear");
+  EXPECT_EQ(ReadFile(out_ + "/letter.txt"), "dear");
 }
 
 }  // namespace

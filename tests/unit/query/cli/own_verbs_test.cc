@@ -3,9 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -13,19 +11,17 @@
 #include "schema/codec/checksum.h"
 #include "schema/store/graph_store.h"
 #include "tests/support/temp_folder.h"
+#include "tests/unit/query/cli/cli_test_util.h"
 
 namespace dsg::cli {
 namespace {
 
 using Json = nlohmann::json;
+using test::Arguments;
+using test::Outcome;
+using test::ReadFile;
 
 constexpr char kContent[] = "ply\nformat ascii 1.0\n";
-
-struct Outcome {
-  int code = -1;
-  std::string out;
-  std::string errors;
-};
 
 class OwnVerbs : public testing::Test {
  protected:
@@ -63,15 +59,9 @@ class OwnVerbs : public testing::Test {
     ASSERT_TRUE(committed.ok()) << committed.status();
   }
 
-  Outcome Dsg(std::vector<std::string> arguments) const {
+  Outcome Dsg(Arguments arguments) const {
     arguments.insert(arguments.end(), {"--store", store_});
-    std::ostringstream out;
-    std::ostringstream errors;
-    Outcome outcome;
-    outcome.code = cli::Run(arguments, {.version = "0.1.0"}, out, errors);
-    outcome.out = out.str();
-    outcome.errors = errors.str();
-    return outcome;
+    return test::RunDsg(arguments);
   }
 
   test::TempFolder folder_;
@@ -124,8 +114,7 @@ TEST_F(OwnVerbs, AnAssetIsWrittenWhole) {
   const Outcome outcome = Dsg({"asset", sha256_, "--out", path});
   ASSERT_EQ(outcome.code, 0) << outcome.errors;
   EXPECT_NE(outcome.out.find(path), std::string::npos) << outcome.out;
-  std::ifstream in(path, std::ios::binary);
-  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), kContent);
+  EXPECT_EQ(ReadFile(path), kContent);
   EXPECT_EQ(Dsg({"asset", sha256_, "--out", path}).code, 2);
   EXPECT_EQ(Dsg({"asset", sha256_, "--out", path, "--force"}).code, 0);
 }

@@ -5,22 +5,19 @@
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "query/cli/run.h"
 #include "schema/store/graph_store.h"
 #include "tests/support/temp_folder.h"
+#include "tests/unit/query/cli/cli_test_util.h"
 
 namespace dsg::cli {
 namespace {
 
 using Json = nlohmann::json;
-
-struct Outcome {
-  int code = -1;
-  std::string out;
-  std::string errors;
-};
+using test::Arguments;
+using test::MakeNode;
+using test::Outcome;
 
 class PruneVerbTest : public testing::Test {
  protected:
@@ -36,10 +33,10 @@ class PruneVerbTest : public testing::Test {
     GraphDelta delta;
     delta.session_id = "test";
     delta.sequence = 1;
-    delta.nodes = {MakeNode(NodeId('R', 1), layers::kRooms, kinds::kRoom, "kitchen"),
-                   MakeNode(NodeId('O', 1), layers::kObjects, kinds::kObject, "cup"),
-                   MakeNode(NodeId('O', 2), layers::kObjects, kinds::kObject, "pan"),
-                   MakeNode(NodeId('O', 3), layers::kObjects, kinds::kObject, "bed")};
+    delta.nodes = {MakeNode(NodeId('R', 1), kinds::kRoom, "kitchen", 0.0),
+                   MakeNode(NodeId('O', 1), kinds::kObject, "cup", 0.0),
+                   MakeNode(NodeId('O', 2), kinds::kObject, "pan", 0.0),
+                   MakeNode(NodeId('O', 3), kinds::kObject, "bed", 0.0)};
     for (uint64_t i = 1; i <= 2; ++i) {
       delta.edges.push_back(
           {NodeId('R', 1), relations::kContains, NodeId('O', i), 1.0, Interval(), {}, 0});
@@ -49,26 +46,11 @@ class PruneVerbTest : public testing::Test {
     ASSERT_TRUE(committed.ok()) << committed.status();
   }
 
-  static Node MakeNode(NodeId id, LayerId layer, const char* kind, const char* name) {
-    Node node;
-    node.id = id;
-    node.layer = layer;
-    node.kind = kind;
-    node.name = name;
-    return node;
-  }
-
-  Outcome Dsg(std::vector<std::string> arguments) {
+  Outcome Dsg(Arguments arguments) {
     for (const char* more : {"--store", store_.path().c_str(), "--map", "office"}) {
       arguments.emplace_back(more);
     }
-    std::ostringstream out;
-    std::ostringstream errors;
-    Outcome outcome;
-    outcome.code = cli::Run(arguments, Environment(), out, errors);
-    outcome.out = out.str();
-    outcome.errors = errors.str();
-    return outcome;
+    return test::RunDsg(arguments, {});
   }
 
   test::TempFolder store_;

@@ -14,23 +14,17 @@
 #include "query/cli/run.h"
 #include "schema/base/status.h"
 #include "schema/store/graph_store.h"
+#include "tests/unit/query/cli/cli_test_util.h"
 
 namespace dsg::cli {
 namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
-using Arguments = std::vector<std::string>;
-
-Node MakeNode(NodeId id, const std::string& kind, const std::string& name, double x_m) {
-  Node node;
-  node.id = id;
-  node.kind = kind;
-  node.layer = *LayerOfKind(kind);
-  node.name = name;
-  node.map_T_node.position = Eigen::Vector3d(x_m, 0.0, 0.0);
-  return node;
-}
+using test::Arguments;
+using test::MakeEdge;
+using test::MakeNode;
+using test::Outcome;
 
 Node Thing(NodeId id, int32_t class_id, const std::string& class_name, double x_m, double z_m) {
   Node node = MakeNode(id, kinds::kObject, class_name, x_m);
@@ -41,16 +35,7 @@ Node Thing(NodeId id, int32_t class_id, const std::string& class_name, double x_
   return node;
 }
 
-Edge MakeEdge(NodeId source, const char* relation, NodeId target) {
-  Edge edge;
-  edge.source = source;
-  edge.relation = relation;
-  edge.target = target;
-  edge.weight = 1.0;
-  return edge;
-}
-
-TrajectoryAppend Walk(NodeId agent, double from_x_m, double speed_m_s) {
+TrajectoryAppend WalkAlongX(NodeId agent, double from_x_m, double speed_m_s) {
   TrajectoryAppend walk{.agent = agent, .poses = {}};
   for (int i = 0; i <= 20; ++i) {
     TimedPose pose;
@@ -94,7 +79,7 @@ GraphDelta House() {
       delta.edges.push_back(MakeEdge(NodeId('p', i - 1), relations::kTraversable, place.id));
     }
   }
-  delta.appends = {Walk(NodeId('H', 1), 0.0, 0.9), Walk(NodeId('H', 2), 9.0, -0.9)};
+  delta.appends = {WalkAlongX(NodeId('H', 1), 0.0, 0.9), WalkAlongX(NodeId('H', 2), 9.0, -0.9)};
   FitBoxesToChildren(&delta);
   return delta;
 }
@@ -111,12 +96,6 @@ GraphDelta TableWithCup() {
                  MakeEdge(kCup, relations::kOn, kTable)};
   return delta;
 }
-
-struct Outcome {
-  int code = -1;
-  std::string out;
-  std::string errors;
-};
 
 class QuestionsRun : public testing::Test {
  protected:
@@ -139,13 +118,7 @@ class QuestionsRun : public testing::Test {
   void TearDown() override { fs::remove_all(folder_); }
 
   Outcome Ask(const Arguments& arguments) const {
-    std::ostringstream out;
-    std::ostringstream errors;
-    Outcome outcome;
-    outcome.code = dsg::cli::Run(arguments, {.store = folder_ + "/store"}, out, errors);
-    outcome.out = out.str();
-    outcome.errors = errors.str();
-    return outcome;
+    return test::RunDsg(arguments, {.store = folder_ + "/store"});
   }
   Json AskJson(Arguments arguments, int code = 0) const {
     arguments.push_back("--json");

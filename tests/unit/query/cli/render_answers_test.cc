@@ -11,11 +11,12 @@
 #include "query/cli/render_meetings.h"
 #include "query/cli/render_search.h"
 #include "query/cli/render_space.h"
+#include "tests/unit/query/cli/cli_test_util.h"
 
 namespace dsg::cli {
 namespace {
 
-TimeText Monotonic() { return TimeText(MapSpec()); }
+using test::Monotonic;
 
 NodeNames Names() {
   return NodeNames({{"R9", "kitchen"}, {"O7", "cup"}, {"H1", "carol"}, {"p3", ""}});

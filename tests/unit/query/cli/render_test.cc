@@ -9,11 +9,12 @@
 #include "query/cli/render_agents.h"
 #include "query/cli/render_graph.h"
 #include "query/cli/render_maps.h"
+#include "tests/unit/query/cli/cli_test_util.h"
 
 namespace dsg::cli {
 namespace {
 
-TimeText Monotonic() { return TimeText(MapSpec()); }
+using test::Monotonic;
 
 TimeText Unix() {
   MapSpec map;

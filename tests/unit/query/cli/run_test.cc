@@ -9,59 +9,31 @@
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "schema/base/status.h"
 #include "schema/store/graph_store.h"
+#include "tests/unit/query/cli/cli_test_util.h"
 
 namespace dsg::cli {
 namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
-using Arguments = std::vector<std::string>;
+using test::Arguments;
+using test::MakeEdge;
+using test::MakeNode;
+using test::Outcome;
+using test::RunDsg;
 
 constexpr TimeNs kEpoch = 100 * kNsPerSecond;
 constexpr NodeId kHuman('H', 12);
 
-struct Outcome {
-  int code = -1;
-  std::string out;
-  std::string errors;
-};
-
-Outcome Dsg(const Arguments& arguments, const Environment& environment = {.version = "0.1.0"}) {
-  std::ostringstream out;
-  std::ostringstream errors;
-  Outcome outcome;
-  outcome.code = Run(arguments, environment, out, errors);
-  outcome.out = out.str();
-  outcome.errors = errors.str();
-  return outcome;
-}
-
-Node MakeNode(NodeId id, const std::string& kind, const std::string& name, double x_m) {
-  Node node;
-  node.id = id;
-  node.kind = kind;
-  node.layer = *LayerOfKind(kind);
-  node.name = name;
-  node.map_T_node.position = Eigen::Vector3d(x_m, 0.0, 0.0);
-  return node;
-}
-
-Edge Contains(NodeId parent, NodeId child) {
-  Edge edge;
-  edge.source = parent;
-  edge.relation = relations::kContains;
-  edge.target = child;
-  return edge;
-}
+Edge Contains(NodeId parent, NodeId child) { return MakeEdge(parent, relations::kContains, child); }
 
 // One metre a second along x for ten seconds, then nothing seen until the twentieth.
-TrajectoryAppend Walk() {
+TrajectoryAppend WalkWithGap() {
   TrajectoryAppend walk{.agent = kHuman, .poses = {}};
   for (const int second : {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 20}) {
     TimedPose pose;
@@ -87,7 +59,7 @@ GraphDelta Office() {
       MakeNode(place2, kinds::kPlace, "", 7.5),        MakeNode(kHuman, kinds::kHuman, "12", 0.0)};
   delta.edges = {Contains(building, hall), Contains(building, kitchen), Contains(hall, place1),
                  Contains(kitchen, place2)};
-  delta.appends = {Walk()};
+  delta.appends = {WalkWithGap()};
   const TimeNs door_ns = kEpoch + 5 * kNsPerSecond;
   delta.stays = {{kHuman, place1, hall, kEpoch, door_ns},
                  {kHuman, place2, kitchen, door_ns, kEpoch + 10 * kNsPerSecond}};
@@ -96,7 +68,7 @@ GraphDelta Office() {
 }
 
 // A second revision: somebody put down a cup.
-GraphDelta Cup() {
+GraphDelta CupDelta() {
   GraphDelta delta;
   delta.map = "office";
   delta.session_id = "test";
@@ -123,7 +95,7 @@ class RunTest : public testing::Test {
     ASSERT_TRUE((*store)->CreateMap(spec).ok());
     const auto writer = (*store)->OpenWriter("office");
     ASSERT_TRUE(writer.ok()) << writer.status();
-    for (const GraphDelta& delta : {Office(), Cup()}) {
+    for (const GraphDelta& delta : {Office(), CupDelta()}) {
       const auto committed = (*writer)->Commit(delta);
       ASSERT_TRUE(committed.ok()) << committed.status();
     }
@@ -132,7 +104,7 @@ class RunTest : public testing::Test {
 
   Outcome Ask(Arguments arguments) {
     arguments.insert(arguments.end(), {"--store", store_});
-    return Dsg(arguments);
+    return RunDsg(arguments);
   }
   Json AskJson(Arguments arguments) {
     arguments.push_back("--json");
@@ -213,7 +185,7 @@ TEST_F(RunTest, WhatIsAskedWronglyExitsWithTwo) {
 }
 
 TEST_F(RunTest, NoServerExitsWithThree) {
-  const Outcome outcome = Dsg({"stats", "--server", "unix:" + folder_ + "/none", "--map", "m"});
+  const Outcome outcome = RunDsg({"stats", "--server", "unix:" + folder_ + "/none", "--map", "m"});
   EXPECT_EQ(outcome.code, 3);
   EXPECT_NE(outcome.errors.find("dsg-server --store"), std::string::npos) << outcome.errors;
 }
@@ -336,7 +308,7 @@ TEST_F(RunTest, SeveralMapsMustBeTold) {
 TEST_F(RunTest, EnvironmentNamesStoreAndMap) {
   AddMap("attic");
   const Outcome outcome =
-      Dsg({"stats", "--json"}, {.store = store_, .map = "office", .version = "0.1.0"});
+      RunDsg({"stats", "--json"}, {.store = store_, .map = "office", .version = "0.1.0"});
   EXPECT_EQ(outcome.code, 0) << outcome.errors;
 }
 
@@ -348,7 +320,7 @@ TEST_F(RunTest, VerifyFindsNothingInASoundStore) {
 }
 
 TEST_F(RunTest, VersionNeedsNoStore) {
-  const Outcome outcome = Dsg({"version", "--json"});
+  const Outcome outcome = RunDsg({"version", "--json"});
   EXPECT_EQ(outcome.code, 0) << outcome.errors;
   EXPECT_EQ(Json::parse(outcome.out)["version"], "0.1.0");
 }

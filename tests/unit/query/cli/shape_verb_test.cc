@@ -5,35 +5,25 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "query/cli/run.h"
 #include "schema/codec/checksum.h"
 #include "schema/codec/topology.h"
 #include "schema/store/graph_store.h"
 #include "tests/support/temp_folder.h"
+#include "tests/unit/query/cli/cli_test_util.h"
 
 namespace dsg::cli {
 namespace {
 
 namespace fs = std::filesystem;
-using Arguments = std::vector<std::string>;
 using Json = nlohmann::json;
+using test::Arguments;
+using test::Outcome;
+using test::ReadFile;
 
-constexpr NodeId kHuman('H', 12);
-
-struct Outcome {
-  int code = -1;
-  std::string out;
-  std::string errors;
-};
-
-std::string Read(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
+constexpr NodeId kAnn('H', 12);
 
 // A tetrahedron with hands, a second apart.
 BodyShape BodyAt(TimeNs time_ns) {
@@ -69,15 +59,15 @@ class ShapeVerbs : public testing::Test {
     delta.session_id = "test";
     delta.sequence = 1;
     Node human;
-    human.id = kHuman;
+    human.id = kAnn;
     human.kind = kinds::kHuman;
     human.layer = layers::kAgents;
     human.name = "ann";
     delta.nodes = {human};
     const std::string faces = EncodeTopology({4, {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}});
     delta.assets = {{ComputeSha256(faces), kTopologyMediaType, faces}};
-    delta.shapes = {{kHuman, delta.assets[0].sha256, {}}};
-    delta.appends = {{kHuman, {}}};
+    delta.shapes = {{kAnn, delta.assets[0].sha256, {}}};
+    delta.appends = {{kAnn, {}}};
     for (int second = 0; second <= 3; ++second) {
       TimedPose pose;
       pose.time_ns = second * kNsPerSecond;
@@ -93,13 +83,7 @@ class ShapeVerbs : public testing::Test {
   Outcome Dsg(Arguments arguments) const {
     arguments.insert(arguments.begin(), "shape");
     arguments.insert(arguments.end(), {"--store", store_});
-    std::ostringstream out;
-    std::ostringstream errors;
-    Outcome outcome;
-    outcome.code = cli::Run(arguments, {.version = "0.1.0"}, out, errors);
-    outcome.out = out.str();
-    outcome.errors = errors.str();
-    return outcome;
+    return test::RunDsg(arguments);
   }
 
   test::TempFolder folder_;
@@ -134,7 +118,7 @@ TEST_F(ShapeVerbs, WriteTheFirstBodyAsPlyInTheFrameOfTheMap) {
   const std::string path = folder_.path() + "/body.ply";
   const Outcome outcome = Dsg({"ann", "--from", "+1s", "--ply", path});
   ASSERT_EQ(outcome.code, 0) << outcome.errors;
-  const std::string ply = Read(path);
+  const std::string ply = ReadFile(path);
   EXPECT_EQ(outcome.out, "wrote " + path + ": 4 vertices, 4 faces, " + std::to_string(ply.size()) +
                              " bytes (revision 1)\n");
   EXPECT_NE(ply.find("element vertex 4\n"), std::string::npos);
@@ -152,7 +136,7 @@ TEST_F(ShapeVerbs, WriteAnObjABodyThatHasAPose) {
   const Outcome outcome = Dsg({"ann", "--obj", folder, "--json"});
   ASSERT_EQ(outcome.code, 0) << outcome.errors;
   EXPECT_EQ(Json::parse(outcome.out)["files"].size(), 3u);
-  const std::string obj = Read(folder + "/H12_2000000000.obj");
+  const std::string obj = ReadFile(folder + "/H12_2000000000.obj");
   EXPECT_NE(obj.find("\nv 10.0000 1.0000 0.0000\n"), std::string::npos) << obj;
   EXPECT_NE(obj.find("\nf 1 3 2\n"), std::string::npos) << obj;
   EXPECT_FALSE(fs::exists(folder + "/H12_3000000000.obj"));
@@ -162,9 +146,9 @@ TEST_F(ShapeVerbs, RefuseToReplaceFilesUnlessTold) {
   const std::string path = folder_.path() + "/body.ply";
   std::ofstream(path) << "mine";
   EXPECT_EQ(Dsg({"ann", "--ply", path}).code, 2);
-  EXPECT_EQ(Read(path), "mine");
+  EXPECT_EQ(ReadFile(path), "mine");
   EXPECT_EQ(Dsg({"ann", "--ply", path, "--force"}).code, 0);
-  EXPECT_NE(Read(path), "mine");
+  EXPECT_NE(ReadFile(path), "mine");
 }
 
 TEST_F(ShapeVerbs, SayWhenThereIsNoBodyToWrite) {

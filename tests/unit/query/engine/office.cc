@@ -113,6 +113,20 @@ GraphDelta OfficeDelta() {
   return delta;
 }
 
+void AddRandomMesh(int side, Random* random, GraphDelta* delta) {
+  for (int i = 0; i < side * side; ++i) {
+    MeshBlock block;
+    block.index = {i % side, i / side, 0};
+    for (uint32_t k = 0; k < 3000; ++k) {
+      block.positions_map.emplace_back(2.0 * block.index.x + random->Uniform(0, 2),
+                                       2.0 * block.index.y + random->Uniform(0, 2),
+                                       random->Uniform(0, 2));
+      if (k % 3 == 2) block.faces.push_back({k - 2, k - 1, k});
+    }
+    delta->mesh_blocks.push_back(std::move(block));
+  }
+}
+
 void MakeOffice(const std::string& folder) {
   StoreOptions options;
   options.create = true;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "query/service/service_core.h"
+#include "schema/base/random.h"
 #include "schema/model/graph_delta.h"
 #include "schema/store/graph_store.h"
 #include "tests/support/temp_folder.h"
@@ -36,6 +37,8 @@ void CommitToOffice(const std::string& folder, GraphDelta delta);
 std::unique_ptr<query::ServiceCore> OpenCore(const std::string& folder);
 
 TimedPose PoseAt(TimeNs time_ns, double x, double y, double z);
+/// Adds `side` x `side` mesh blocks of 1,000 triangles each, with vertices anywhere in their block.
+void AddRandomMesh(int side, Random* random, GraphDelta* delta);
 Node MakeNode(NodeId id, LayerId layer, const std::string& kind, const std::string& name,
               const Box3d& box_map);
 

@@ -28,9 +28,9 @@ using test::kSecond;
 
 constexpr milliseconds kStopMax{50};
 constexpr int kSide = 100;
-constexpr int kPersonCount = 16;
-constexpr int kPoseCount = 2000;
-constexpr TimeNs kEndNs = kPoseCount * (kSecond / 10);
+constexpr int kHallWalkerCount = 16;
+constexpr int kWalkPoseCount = 2000;
+constexpr TimeNs kWalkEndNs = kWalkPoseCount * (kSecond / 10);
 constexpr int kObjectCount = 5000;
 
 NodeId Place(int x, int y) { return NodeId('p', static_cast<uint64_t>(1000 + y * kSide + x)); }
@@ -79,33 +79,19 @@ void AddObjects(Random* random, GraphDelta* delta) {
   }
 }
 
-void AddPeople(Random* random, GraphDelta* delta) {
-  for (int i = 0; i < kPersonCount; ++i) {
+void AddWalkers(Random* random, GraphDelta* delta) {
+  for (int i = 0; i < kHallWalkerCount; ++i) {
     const NodeId id('H', static_cast<uint64_t>(100 + i));
     delta->nodes.push_back(
         test::MakeNode(id, layers::kAgents, kinds::kHuman, "walker " + std::to_string(i), Box3d()));
     TrajectoryAppend track{id, {}};
     const double radius_m = random->Uniform(3, 20);
-    for (int k = 0; k < kPoseCount; ++k) {
+    for (int k = 0; k < kWalkPoseCount; ++k) {
       const double angle = i + 0.1 * k / radius_m;
       track.poses.push_back(test::PoseAt(k * (kSecond / 10), 25 + radius_m * std::cos(angle),
                                          25 + radius_m * std::sin(angle), 1));
     }
     delta->appends.push_back(std::move(track));
-  }
-}
-
-void AddMesh(Random* random, GraphDelta* delta) {
-  for (int i = 0; i < 100; ++i) {
-    MeshBlock block;
-    block.index = {i % 10, i / 10, 0};
-    for (uint32_t k = 0; k < 3000; ++k) {
-      block.positions_map.emplace_back(2.0 * block.index.x + random->Uniform(0, 2),
-                                       2.0 * block.index.y + random->Uniform(0, 2),
-                                       random->Uniform(0, 2));
-      if (k % 3 == 2) block.faces.push_back({k - 2, k - 1, k});
-    }
-    delta->mesh_blocks.push_back(std::move(block));
   }
 }
 
@@ -118,8 +104,8 @@ class Stop : public testing::Test {
     GraphDelta delta;
     AddHall(&delta);
     AddObjects(&random, &delta);
-    AddPeople(&random, &delta);
-    AddMesh(&random, &delta);
+    AddWalkers(&random, &delta);
+    test::AddRandomMesh(10, &random, &delta);
     test::CommitToOffice(folder_->path(), std::move(delta));
   }
   static void TearDownTestSuite() { folder_ = nullptr; }
@@ -196,16 +182,14 @@ class Stop : public testing::Test {
   static Ask LongPrediction() {
     v1::PredictAgentRequest request;
     request.set_agent("H100");
-    request.set_from_ns(kEndNs / 2);
+    request.set_from_ns(kWalkEndNs / 2);
     request.set_horizon_ns(400 * kSecond);
     request.set_path_count_max(20);
     return Unary(&Api::PredictAgent, request);
   }
 
-  static std::unique_ptr<test::TempFolder> folder_;
+  static inline std::unique_ptr<test::TempFolder> folder_;
 };
-
-std::unique_ptr<test::TempFolder> Stop::folder_;
 
 TEST_F(Stop, EndsTheReadingOfAGraph) {
   v1::SearchNodesRequest request;
@@ -265,7 +249,7 @@ TEST_F(Stop, EndsOneLongStepThatMightCollide) {
 
 TEST_F(Stop, EndsEncountersOfAll) {
   v1::ListEncountersRequest request;
-  request.set_to_ns(kEndNs);
+  request.set_to_ns(kWalkEndNs);
   request.set_distance_m(20);
   request.set_page_size(1000);
   ExpectStops(Unary(&Api::ListEncounters, request));
@@ -273,7 +257,7 @@ TEST_F(Stop, EndsEncountersOfAll) {
 
 TEST_F(Stop, EndsInteractionsOfAll) {
   v1::ListInteractionsRequest request;
-  request.set_to_ns(kEndNs);
+  request.set_to_ns(kWalkEndNs);
   request.set_include_abstained(true);
   ExpectStops(Unary(&Api::ListInteractions, request));
 }

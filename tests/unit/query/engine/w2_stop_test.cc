@@ -51,20 +51,6 @@ void AddPeople(Random* random, GraphDelta* delta) {
   }
 }
 
-void AddMesh(Random* random, GraphDelta* delta) {
-  for (int i = 0; i < 64; ++i) {
-    MeshBlock block;
-    block.index = {i % 8, i / 8, 0};
-    for (uint32_t k = 0; k < 3000; ++k) {
-      block.positions_map.emplace_back(2.0 * block.index.x + random->Uniform(0, 2),
-                                       2.0 * block.index.y + random->Uniform(0, 2),
-                                       random->Uniform(0, 2));
-      if (k % 3 == 2) block.faces.push_back({k - 2, k - 1, k});
-    }
-    delta->mesh_blocks.push_back(std::move(block));
-  }
-}
-
 class StopInW2 : public testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -84,7 +70,7 @@ class StopInW2 : public testing::Test {
       node.valid = {0, static_cast<TimeNs>(1 + node.id.index() % 95) * kSecond};
     }
     AddPeople(&random, &delta);
-    AddMesh(&random, &delta);
+    test::AddRandomMesh(8, &random, &delta);
     delta.map = test::kMap;
     delta.session_id = "w2";
     delta.sequence = 1;
@@ -251,10 +237,8 @@ class StopInW2 : public testing::Test {
     return Unary(&Api::ListInteractions, request);
   }
 
-  static std::unique_ptr<test::TempFolder> folder_;
+  static inline std::unique_ptr<test::TempFolder> folder_;
 };
-
-std::unique_ptr<test::TempFolder> StopInW2::folder_;
 
 TEST_F(StopInW2, EndsTheReadingOfTheGraph) {
   const auto begin = CallContext::Clock::now();

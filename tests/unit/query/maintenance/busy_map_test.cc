@@ -111,13 +111,6 @@ void ExpectSound(const std::string& folder, const std::string& map) {
   EXPECT_TRUE(report->problems.empty());
 }
 
-v1::MergeMapsRequest WestWithEast() {
-  v1::MergeMapsRequest request;
-  request.set_map("west");
-  request.set_other("east");
-  return request;
-}
-
 TEST(BusyMap, IsMergedAndLosesNothingOfTheRobot) {
   test::TwoHalves halves;
   const auto core = test::OpenCore(halves.folder());
@@ -125,7 +118,7 @@ TEST(BusyMap, IsMergedAndLosesNothingOfTheRobot) {
   robot.Start();
   v1::MergeMapsResponse last;
   const absl::Status merged =
-      query::ReadStream(CallContext(), core->MergeMaps(CallContext(), WestWithEast()),
+      query::ReadStream(CallContext(), core->MergeMaps(CallContext(), test::WestWithEast()),
                         [&](const v1::MergeMapsResponse& message) {
                           last = message;
                           return true;
@@ -142,7 +135,7 @@ TEST(BusyMap, IsMergedAndLosesNothingOfTheRobot) {
 TEST(BusyMap, IsMergedByANewPlanWhenTheRobotWritesWhatTheOldOneChanges) {
   test::TwoHalves halves;
   const auto core = test::OpenCore(halves.folder());
-  const auto cursor = core->MergeMaps(CallContext(), WestWithEast());
+  const auto cursor = core->MergeMaps(CallContext(), test::WestWithEast());
   ASSERT_TRUE(cursor.ok());
   v1::MergeMapsResponse message;
   ASSERT_TRUE((*cursor)->Next(CallContext(), &message).ok());

@@ -5,9 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <filesystem>
-#include <fstream>
 #include <functional>
-#include <iterator>
 #include <thread>
 
 #include "absl/strings/match.h"
@@ -35,13 +33,8 @@ constexpr int kCount = 6;
 NodeId PlantedId(int i) { return NodeId('O', kFirst + static_cast<uint64_t>(i)); }
 std::string SecretOf(int i) { return absl::StrCat("planted-secret-", 7919 * i); }
 
-int HitCount(const std::string& folder) {
-  std::string bytes;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    if (!entry.is_regular_file()) continue;
-    std::ifstream in(entry.path(), std::ios::binary);
-    bytes.append(std::istreambuf_iterator<char>(in), {});
-  }
+int SecretCount(const std::string& folder) {
+  const std::string bytes = ReadFolder(folder);
   int count = 0;
   for (int i = 0; i < kCount; ++i) count += absl::StrContains(bytes, SecretOf(i)) ? 1 : 0;
   return count;
@@ -178,7 +171,7 @@ TEST_F(EraseMeanwhileTest, TheSameRequestDoesTheRestWhereverItWasCutOff) {
                   .ok());
   core_.reset();
   const std::string base = folder_.path();
-  EXPECT_EQ(HitCount(base), kCount);
+  EXPECT_EQ(SecretCount(base), kCount);
   // Sorted as the engine has it: rooms stand after what they hold, and before places.
   Erasure erasure;
   for (const char* id : {"O1", "O2", "R1", "R2", "p1", "p2", "p3"}) {
@@ -212,7 +205,7 @@ TEST_F(EraseMeanwhileTest, TheSameRequestDoesTheRestWhereverItWasCutOff) {
       Open(path);
       const auto reply = Prune(is_file ? EraseBranches({"R1", "R2"}) : EraseBranches({"R1"}));
       core_.reset();
-      EXPECT_EQ(HitCount(path), 0);
+      EXPECT_EQ(SecretCount(path), 0);
       if (!was_cut_off) {
         EXPECT_EQ(reply.ok(), is_file) << "there was something left";
         break;
@@ -242,7 +235,7 @@ TEST_F(EraseMeanwhileTest, WhatWasOnlyRetiredIsFound) {
   ASSERT_TRUE(reply.ok()) << reply.status();
   EXPECT_TRUE(reply->erased());
   EXPECT_FALSE(Has("R1", 2));
-  EXPECT_EQ(HitCount(folder_.path()), kCount / 2);
+  EXPECT_EQ(SecretCount(folder_.path()), kCount / 2);
 }
 
 // Whatever another erasure says, something that was begun is done or remembered.
@@ -272,7 +265,7 @@ TEST_F(EraseMeanwhileTest, IsNotForgottenWhenAnotherOneFollows) {
     EXPECT_EQ(other->erased(), !Stats().has_pending_erasure());
     const bool is_gone = !Has("R1");
     core_.reset();
-    const int left = HitCount(path);
+    const int left = SecretCount(path);
     // The names in R2 are gone. Those in R1 are believed still, or gone too, or it is not said.
     EXPECT_LE(left, kCount / 2);
     EXPECT_FALSE(is_gone && left > 0 && other->erased());
@@ -284,7 +277,7 @@ TEST_F(EraseMeanwhileTest, IsNotForgottenWhenAnotherOneFollows) {
         << again.status();
     EXPECT_FALSE(Stats().has_pending_erasure());
     core_.reset();
-    EXPECT_EQ(HitCount(path), 0);
+    EXPECT_EQ(SecretCount(path), 0);
   }
   EXPECT_TRUE(was_ended_by_the_other);
   EXPECT_TRUE(was_pending);
@@ -306,7 +299,7 @@ TEST_F(EraseMeanwhileTest, ANodeWrittenAgainIsThereWithoutItsPast) {
   EXPECT_FALSE(Has("O7002", 2));
   EXPECT_FALSE(Has("O7000"));
   core_.reset();
-  EXPECT_EQ(HitCount(folder_.path()), kCount / 2);
+  EXPECT_EQ(SecretCount(folder_.path()), kCount / 2);
   EXPECT_GT(PoseCountBefore(NodeId('H', 12), kTimeMax), 0);
 }
 
@@ -321,7 +314,7 @@ TEST_F(EraseMeanwhileTest, NoSecretStaysOfNodesThatARobotWritesAllTheTime) {
   ASSERT_TRUE(reply.ok()) << reply.status();
   EXPECT_TRUE(reply->erased());
   core_.reset();
-  EXPECT_EQ(HitCount(folder_.path()), kCount / 2);
+  EXPECT_EQ(SecretCount(folder_.path()), kCount / 2);
 }
 
 TEST_F(EraseMeanwhileTest, ATrackCorrectedMeanwhileIsPlannedAgain) {

@@ -18,13 +18,7 @@ namespace dsg::query {
 namespace {
 
 using test::TwoHalves;
-
-v1::MergeMapsRequest WestWithEast() {
-  v1::MergeMapsRequest request;
-  request.set_map("west");
-  request.set_other("east");
-  return request;
-}
+using test::WestWithEast;
 
 TEST(MergeMaps, FindsTheTransformAndTellsWhatBecameOfEachNode) {
   TwoHalves halves;

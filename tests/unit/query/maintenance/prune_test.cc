@@ -4,9 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 
 #include "dsg/v1/maintenance_service.pb.h"
 #include "dsg/v1/query_service.pb.h"
@@ -243,17 +240,6 @@ TEST_F(PruneCallTest, EraseLeavesNoRevisionThatKnows) {
   EXPECT_EQ(ReasonOf(Prune().status()), Reason::kNodeUnknown);
 }
 
-// Every file of a folder, one after the other.
-std::string BytesOf(const std::string& folder) {
-  std::string bytes;
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
-    if (!entry.is_regular_file()) continue;
-    std::ifstream in(entry.path(), std::ios::binary);
-    bytes.append(std::istreambuf_iterator<char>(in), {});
-  }
-  return bytes;
-}
-
 int HitCount(const std::string& bytes, const std::vector<std::string>& patterns) {
   return static_cast<int>(std::count_if(
       patterns.begin(), patterns.end(),
@@ -280,7 +266,7 @@ TEST_F(PruneCallTest, EraseLeavesNoByteOfAHundredPlantedNamesInTheStoreOrACopyOf
   GraphDelta gone;
   for (uint64_t i = 0; i < 10; ++i) gone.retirements.push_back({NodeId('O', 500 + i), {}});
   CommitToOffice(folder_.path(), gone);
-  EXPECT_EQ(HitCount(BytesOf(folder_.path()), patterns), 100);
+  EXPECT_EQ(HitCount(ReadFolder(folder_.path()), patterns), 100);
 
   core_ = OpenCore(folder_.path());
   v1::PrunePolicy* const policy = request_.add_policies();
@@ -289,7 +275,7 @@ TEST_F(PruneCallTest, EraseLeavesNoByteOfAHundredPlantedNamesInTheStoreOrACopyOf
   const auto reply = Prune();
   ASSERT_TRUE(reply.ok()) << reply.status();
   EXPECT_TRUE(reply->erased());
-  EXPECT_EQ(HitCount(BytesOf(folder_.path()), patterns), 0);
+  EXPECT_EQ(HitCount(ReadFolder(folder_.path()), patterns), 0);
   core_.reset();
   const TempFolder copy;
   auto store = GraphStore::Open(folder_.path(), {});
@@ -297,7 +283,7 @@ TEST_F(PruneCallTest, EraseLeavesNoByteOfAHundredPlantedNamesInTheStoreOrACopyOf
   auto map = (*store)->OpenMap(kMap);
   ASSERT_TRUE(map.ok()) << map.status();
   ASSERT_TRUE((*map)->CopyTo(copy.path() + "/copy.db", StopCheck(), Progress()).ok());
-  EXPECT_EQ(HitCount(BytesOf(copy.path()), patterns), 0);
+  EXPECT_EQ(HitCount(ReadFolder(copy.path()), patterns), 0);
   const auto verified = (*map)->Verify({}, {});
   ASSERT_TRUE(verified.ok()) << verified.status();
   EXPECT_TRUE(verified->problems.empty()) << verified->problems.front();

@@ -62,4 +62,11 @@ class TwoHalves {
   Pose3d truth_;
 };
 
+inline v1::MergeMapsRequest WestWithEast() {
+  v1::MergeMapsRequest request;
+  request.set_map("west");
+  request.set_other("east");
+  return request;
+}
+
 }  // namespace dsg::test

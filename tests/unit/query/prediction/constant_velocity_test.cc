@@ -5,15 +5,10 @@
 #include <limits>
 
 #include "query/prediction/velocity.h"
+#include "tests/unit/query/prediction/path_points.h"
 
 namespace dsg::query {
 namespace {
-
-constexpr TimeNs kSecond = 1'000'000'000;
-
-PathPoint At(double seconds, double x_m, double y_m) {
-  return {static_cast<TimeNs>(seconds * 1e9), Eigen::Vector3d(x_m, y_m, 0.9)};
-}
 
 TEST(Velocity, OfNobodyIsNotKnown) {
   EXPECT_EQ(LastVelocity({}).step_count, 0);

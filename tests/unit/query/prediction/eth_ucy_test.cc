@@ -19,8 +19,8 @@ std::string DataFolder() {
   return data + "/people-eth-ucy/";
 }
 
-void Print(const std::string& name, const WindowScore& last, const WindowScore& weighted,
-           const WindowScore& adaptive) {
+void PrintScores(const std::string& name, const WindowScore& last, const WindowScore& weighted,
+                 const WindowScore& adaptive) {
   std::cout << std::fixed << std::setprecision(3) << std::left << std::setw(14) << name
             << " last step " << last.ade_m << " / " << last.fde_m << "  weighted " << weighted.ade_m
             << " / " << weighted.fde_m << "  adaptive " << adaptive.ade_m << " / " << adaptive.fde_m
@@ -49,8 +49,8 @@ TEST_P(RecordedScene, IsPredictedAsWellAsComputedElsewhere) {
       ReadPedestrians(DataFolder() + scene.file, scene.x_column, scene.y_column);
   if (pedestrians.empty()) GTEST_SKIP() << "the recorded pedestrians are not there; set DSG_DATA";
   const WindowScore last = Scored(pedestrians, scene.frame_step, LastStep());
-  Print(scene.file, last, Scored(pedestrians, scene.frame_step, Weighted()),
-        Scored(pedestrians, scene.frame_step, Adaptive({})));
+  PrintScores(scene.file, last, Scored(pedestrians, scene.frame_step, Weighted()),
+              Scored(pedestrians, scene.frame_step, Adaptive({})));
   EXPECT_EQ(last.window_count, scene.expected.window_count);
   EXPECT_NEAR(last.ade_m, scene.expected.ade_m, 1e-3);
   EXPECT_NEAR(last.fde_m, scene.expected.fde_m, 1e-3);
@@ -74,8 +74,8 @@ TEST(PublishedRow, OfEthFollowsFromTheAuthorsOwnFile) {
   if (authors.empty()) GTEST_SKIP() << "the recorded pedestrians are not there; set DSG_DATA";
   const Pedestrians pedestrians = Resample(authors, 10);
   const WindowScore last = Scored(pedestrians, 10, LastStep());
-  Print("eth by tens", last, Scored(pedestrians, 10, Weighted()),
-        Scored(pedestrians, 10, Adaptive({})));
+  PrintScores("eth by tens", last, Scored(pedestrians, 10, Weighted()),
+              Scored(pedestrians, 10, Adaptive({})));
   EXPECT_EQ(last.window_count, 364);
   EXPECT_NEAR(last.ade_m, 1.075, 1e-3);
   EXPECT_NEAR(last.fde_m, 2.282, 1e-3);
@@ -203,7 +203,8 @@ TEST(PublishedRow, IsReproducedFromTheCommunitysFiles) {
     }
     ASSERT_FALSE(column.files.empty()) << folder;
     const WindowScore last = ScoredColumn(column, LastStep());
-    Print(scene.folder, last, ScoredColumn(column, Weighted()), ScoredColumn(column, Adaptive({})));
+    PrintScores(scene.folder, last, ScoredColumn(column, Weighted()),
+                ScoredColumn(column, Adaptive({})));
     EXPECT_NEAR(last.ade_m, scene.ade_m, 1e-3) << scene.folder;
     EXPECT_NEAR(last.fde_m, scene.fde_m, 1e-3) << scene.folder;
     columns.push_back(std::move(column));

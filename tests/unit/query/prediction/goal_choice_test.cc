@@ -7,7 +7,7 @@ namespace dsg::query {
 namespace {
 
 /// A place at every metre along x, 0 to 9.
-WalkGraph Row() {
+WalkGraph TenPlaces() {
   WalkGraph graph;
   for (int i = 0; i < 10; ++i) graph.places_map.emplace_back(i, 0.5, 1.0);
   graph.clearance_m.assign(10, 0.5);
@@ -21,7 +21,7 @@ GoalChoiceOptions NowhereElse() {
 }
 
 TEST(ChooseGoals, TakesTheNearestPlaceOfTheStorey) {
-  WalkGraph graph = Row();
+  WalkGraph graph = TenPlaces();
   graph.places_map.emplace_back(3.1, 0.5, 4.0);
   graph.clearance_m.push_back(0.5);
   const auto goals = ChooseGoals(graph, {{{3.1, 0.5, 0.5}}, {{50, 0, 1}}}, NowhereElse());
@@ -32,7 +32,7 @@ TEST(ChooseGoals, TakesTheNearestPlaceOfTheStorey) {
 
 TEST(ChooseGoals, LetsTheFirstOfNeighboursStandForAll) {
   const auto goals =
-      ChooseGoals(Row(), {{{3, 0.5, 1}}, {{4, 0.5, 1}}, {{6, 0.5, 1}, 2.0}}, NowhereElse());
+      ChooseGoals(TenPlaces(), {{{3, 0.5, 1}}, {{4, 0.5, 1}}, {{6, 0.5, 1}, 2.0}}, NowhereElse());
   ASSERT_EQ(goals.size(), 2u);
   EXPECT_EQ(goals[0].attraction, 0);
   EXPECT_EQ(goals[1].attraction, 2);
@@ -42,7 +42,7 @@ TEST(ChooseGoals, LetsTheFirstOfNeighboursStandForAll) {
 TEST(ChooseGoals, FillsTheRestWithPlacesAnywhere) {
   GoalChoiceOptions options;
   options.anywhere_m = 5.0;
-  const auto goals = ChooseGoals(Row(), {{{1, 0.5, 1}}}, options);
+  const auto goals = ChooseGoals(TenPlaces(), {{{1, 0.5, 1}}}, options);
   ASSERT_EQ(goals.size(), 2u);
   EXPECT_EQ(goals[1].attraction, -1);
   EXPECT_GE(goals[1].goal.place, 5) << "the first square has a goal already";

@@ -13,7 +13,7 @@ namespace dsg::query {
 namespace {
 
 /// 0 - 1 - 2 in a row, 3 alone.
-WalkGraph Row() {
+WalkGraph RowAndIsland() {
   WalkGraph graph;
   graph.places_map = {{0, 0, 0}, {1, 0, 0}, {3, 0, 0}, {9, 9, 0}};
   graph.clearance_m = {1, 1, 1, 1};
@@ -27,7 +27,7 @@ Ways WaysFrom(int place, const GoalField& field, double way_m_max = 1e9) {
 }
 
 TEST(Ways, KnowTheirLengthAndPlaces) {
-  const GoalField field(Row(), {});
+  const GoalField field(RowAndIsland(), {});
   const Ways ways = WaysFrom(2, field);
   EXPECT_EQ(ways.WayM(0), 3.0);
   EXPECT_EQ(ways.PlacesTo(0), (std::vector<int>{2, 1, 0}));
@@ -36,21 +36,21 @@ TEST(Ways, KnowTheirLengthAndPlaces) {
 }
 
 TEST(Ways, SayWhereThereIsNone) {
-  const GoalField field(Row(), {});
+  const GoalField field(RowAndIsland(), {});
   EXPECT_TRUE(std::isinf(WaysFrom(3, field).WayM(0)));
   EXPECT_FALSE(WaysFrom(3, field).Reaches(0));
   EXPECT_EQ(WaysFrom(3, field).WayM(3), 0.0);
 }
 
 TEST(Ways, EndWhereTheyGrowTooLong) {
-  const GoalField field(Row(), {});
+  const GoalField field(RowAndIsland(), {});
   const Ways ways = WaysFrom(0, field, 2.5);
   EXPECT_TRUE(ways.Reaches(1));
   EXPECT_FALSE(ways.Reaches(2));
 }
 
 TEST(Ways, BeginWhereTheWholeIsShortest) {
-  const GoalField field(Row(), {});
+  const GoalField field(RowAndIsland(), {});
   const Ways ways = *Ways::Find({{0, {0, 0, 0}, 1.5}, {2, {3, 0, 0}, 0.1}}, field, 1e9, {});
   EXPECT_EQ(ways.Origin(0), 0);
   EXPECT_EQ(ways.Origin(1), 1);
@@ -101,14 +101,14 @@ TEST(Ways, AgreeWithEveryPairTriedByForce) {
 }
 
 TEST(GoalFieldDeathTest, RefusesLinksAndGoalsOutsideThePlaces) {
-  WalkGraph graph = Row();
+  WalkGraph graph = RowAndIsland();
   EXPECT_DEATH(GoalField(graph, {{4}}), "IsPlace");
   graph.links.emplace_back(0, -1);
   EXPECT_DEATH(GoalField(graph, {}), "IsPlace");
-  graph = Row();
+  graph = RowAndIsland();
   graph.clearance_m.pop_back();
   EXPECT_DEATH(GoalField(graph, {}), "clearance");
-  graph = Row();
+  graph = RowAndIsland();
   graph.places_map[0].x() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_DEATH(GoalField(graph, {}), "allFinite");
 }

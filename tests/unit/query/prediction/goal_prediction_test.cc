@@ -7,15 +7,10 @@
 #include <numeric>
 
 #include "query/prediction/goal_prediction.h"
+#include "tests/unit/query/prediction/path_points.h"
 
 namespace dsg::query {
 namespace {
-
-constexpr TimeNs kSecond = 1'000'000'000;
-
-PathPoint At(double seconds, double x_m, double y_m) {
-  return {static_cast<TimeNs>(std::llround(seconds * 1e9)), Eigen::Vector3d(x_m, y_m, 0.9)};
-}
 
 /// From one second on, ten times a second.
 std::vector<TimeNs> Tenths(int count) {

@@ -10,11 +10,10 @@
 #include "query/prediction/goal_prediction.h"
 #include "schema/base/random.h"
 #include "tests/unit/query/prediction/mazes.h"
+#include "tests/unit/query/prediction/path_points.h"
 
 namespace dsg::query {
 namespace {
-
-constexpr TimeNs kSecond = 1'000'000'000;
 
 /// Along a link of the maze, beside it by up to 0.2 m, at a walking pace.
 std::vector<PathPoint> WalkOnALink(const Maze& maze, Random* random) {

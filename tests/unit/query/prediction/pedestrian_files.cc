@@ -12,7 +12,7 @@
 namespace dsg::query {
 namespace {
 
-constexpr TimeNs kStepNs = 400'000'000;
+constexpr TimeNs kFrameNs = 400'000'000;
 
 Eigen::Vector3d Raised(const Eigen::Vector2d& position) {
   return {position.x(), position.y(), 0.0};
@@ -21,9 +21,9 @@ Eigen::Vector3d Raised(const Eigen::Vector2d& position) {
 void ScoreWindow(const std::vector<Eigen::Vector2d>& window, const Predictor& predictor,
                  WindowScore* score) {
   std::vector<PathPoint> path;
-  for (int i = 0; i < kSeenCount; ++i) path.push_back({i * kStepNs, Raised(window[i])});
+  for (int i = 0; i < kSeenCount; ++i) path.push_back({i * kFrameNs, Raised(window[i])});
   std::vector<TimeNs> at_ns;
-  for (int i = 0; i < kPredictedCount; ++i) at_ns.push_back((kSeenCount + i) * kStepNs);
+  for (int i = 0; i < kPredictedCount; ++i) at_ns.push_back((kSeenCount + i) * kFrameNs);
   const PredictedPath predicted = predictor(path, at_ns);
   double error_m = 0.0;
   for (int i = 0; i < kPredictedCount; ++i) {

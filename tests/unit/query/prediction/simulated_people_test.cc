@@ -183,7 +183,7 @@ void CountDestinations(const World& world, int* walk_count, int* hit_count) {
   }
 }
 
-void Print(const Tally& tally, int window_count) {
+void PrintTally(const Tally& tally, int window_count) {
   std::cout << "  " << std::left << std::setw(10) << tally.name << std::fixed
             << std::setprecision(2);
   for (size_t i = 0; i < kHorizons.size(); ++i) {
@@ -214,7 +214,7 @@ TEST_P(SimulatedPeople, AreForeseenBetterOnPlacesThanStraightOn) {
   std::cout << GetParam() << ": " << graph.places_map.size() << " places, "
             << world.goals.goals().size() << " goals, " << window_count
             << " windows; ADE / FDE in metres after 2, 4.8 and 8 s\n";
-  for (const Tally& tally : tallies) Print(tally, window_count);
+  for (const Tally& tally : tallies) PrintTally(tally, window_count);
   std::cout << "  destination among three at half way: " << hit_count << " of " << walk_count
             << "\n";
   ASSERT_GT(window_count, 0);

@@ -3,14 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/unit/query/prediction/path_points.h"
+
 namespace dsg::query {
 namespace {
 
 constexpr TimeNs kGapNs = 1'500'000'000;
-
-PathPoint At(double seconds, double x_m) {
-  return {static_cast<TimeNs>(seconds * 1e9), Eigen::Vector3d(x_m, 0, 0.9)};
-}
 
 std::vector<PathPoint> Walk(double from_s, double to_s, double step_s) {
   std::vector<PathPoint> poses;

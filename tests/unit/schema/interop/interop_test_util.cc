@@ -64,7 +64,7 @@ const Node& NodeNamed(const ImportedGraph& imported, const std::string& id) {
 
 namespace {
 
-SparkNode NodeOf(SparkClass type, char letter, uint64_t index, SparkLayerKey key) {
+SparkNode SparkNodeOf(SparkClass type, char letter, uint64_t index, SparkLayerKey key) {
   SparkNode node;
   node.type = type;
   node.id = NodeId(letter, index).value;
@@ -79,7 +79,7 @@ SparkNode NodeOf(SparkClass type, char letter, uint64_t index, SparkLayerKey key
 }
 
 void AddSampleObjects(SparkGraph* graph) {
-  SparkNode object = NodeOf(SparkClass::kObject, 'O', 1, {2, 0});
+  SparkNode object = SparkNodeOf(SparkClass::kObject, 'O', 1, {2, 0});
   object.attributes = {{"mesh_connections", 3.0},
                        {"registered", true},
                        {"semantic_feature", 2.0},
@@ -90,7 +90,7 @@ void AddSampleObjects(SparkGraph* graph) {
                 {1.5f, -2.0f, 1.0f},
                 Eigen::Matrix3f::Identity()};
   object.last_update_ns = 1'500'000'000;
-  SparkNode khronos = NodeOf(SparkClass::kKhronosObject, 'O', 2, {2, 0});
+  SparkNode khronos = SparkNodeOf(SparkClass::kKhronosObject, 'O', 2, {2, 0});
   khronos.first_observed_ns = {1'000'000'000, 3'000'000'000};
   khronos.last_observed_ns = {2'000'000'000, 4'000'000'000};
   khronos.attributes = {{"trajectory_positions", 2.0},  {"trajectory_timestamps", 2.0},
@@ -100,17 +100,17 @@ void AddSampleObjects(SparkGraph* graph) {
 }
 
 void AddSamplePoses(SparkGraph* graph) {
-  SparkNode pose = NodeOf(SparkClass::kAgent, 'a', 0, {2, 97});
+  SparkNode pose = SparkNodeOf(SparkClass::kAgent, 'a', 0, {2, 97});
   pose.stamp_ns = 1'000'000'000;
   pose.orientation = {0.6, 0.0, 0.0, 0.8};
   pose.attributes = {{"external_key", std::string("77")}, {"dbow_ids", 1.0}, {"dbow_values", 1.0}};
-  SparkNode later_pose = NodeOf(SparkClass::kAgent, 'a', 1, {2, 97});
+  SparkNode later_pose = SparkNodeOf(SparkClass::kAgent, 'a', 1, {2, 97});
   later_pose.stamp_ns = 2'000'000'000;
   graph->nodes.insert(graph->nodes.end(), {pose, later_pose});
 }
 
 void AddSamplePlaces(SparkGraph* graph) {
-  SparkNode place = NodeOf(SparkClass::kPlace, 'p', 0, {3, 0});
+  SparkNode place = SparkNodeOf(SparkClass::kPlace, 'p', 0, {3, 0});
   place.distance = 0.75;
   place.basis_point_count = 4;
   place.is_predicted = true;
@@ -118,22 +118,22 @@ void AddSamplePlaces(SparkGraph* graph) {
       {"voxblox_mesh_connections", 2.0}, {"pcl_mesh_connections", 1.0}, {"mesh_vertex_labels", 1.0},
       {"deformation_connections", 1.0},  {"real_place", true},          {"active_frontier", true},
       {"frontier_scale_y", 0.5},         {"num_frontier_voxels", 12.0}};
-  SparkNode place_2d = NodeOf(SparkClass::kPlace2d, 'P', 7, {3, 1});
+  SparkNode place_2d = SparkNodeOf(SparkClass::kPlace2d, 'P', 7, {3, 1});
   place_2d.boundary = {{0, 0, 0.1}, {1, 0, 0.2}, {0, 1, 0.3}};
   place_2d.attributes = {{"pcl_boundary_connections", 2.0}, {"need_cleanup_splitting", true}};
   graph->nodes.insert(graph->nodes.end(), {place, place_2d});
 }
 
 void AddSampleRegions(SparkGraph* graph) {
-  SparkNode room = NodeOf(SparkClass::kRoom, 'R', 0, {4, 0});
+  SparkNode room = SparkNodeOf(SparkClass::kRoom, 'R', 0, {4, 0});
   room.class_probabilities = {{"kitchen", 0.25}, {"office", 0.75}};
-  SparkNode ground = NodeOf(SparkClass::kTraversability, 't', 0, {3, 2});
+  SparkNode ground = SparkNodeOf(SparkClass::kTraversability, 't', 0, {3, 2});
   ground.first_observed_ns = {1'000'000'000};
   ground.last_observed_ns = {2'000'000'000};
   ground.distance = 0.5;
   ground.attributes = {{"min_x", -1.0}, {"max_y", 2.0}, {"states_2", 4.0}};
-  graph->nodes.insert(graph->nodes.end(), {room, NodeOf(SparkClass::kSemantic, 'B', 0, {5, 0}),
-                                           NodeOf(SparkClass::kNode, 'C', 0, {9, 4}), ground});
+  graph->nodes.insert(graph->nodes.end(), {room, SparkNodeOf(SparkClass::kSemantic, 'B', 0, {5, 0}),
+                                           SparkNodeOf(SparkClass::kNode, 'C', 0, {9, 4}), ground});
 }
 
 MeshBlock SampleMesh() {

@@ -13,6 +13,7 @@
 namespace dsg::merge {
 namespace {
 
+using test::kAnna;
 using test::MakeAgent;
 using test::MakeEdge;
 using test::MakeObject;
@@ -20,17 +21,10 @@ using test::MakePlace;
 using test::MakeRoom;
 using test::MakeTrack;
 using test::O;
+using test::OfNode;
 using test::P;
 using test::R;
 using test::SmallMaps;
-
-constexpr NodeId kAnna('H', 1);
-
-GraphDelta OfNode(Node node) {
-  GraphDelta delta;
-  delta.nodes = {std::move(node)};
-  return delta;
-}
 
 Node Widely(Node place) {
   place.box_node = Box3d(Eigen::Vector3d(-9, -9, -2), Eigen::Vector3d(9, 9, 4));

@@ -10,13 +10,13 @@
 namespace dsg::merge {
 namespace {
 
+using test::kAnna;
 using test::MakeAgent;
 using test::MakeObject;
 using test::MakeTrack;
 using test::O;
+using test::OfNode;
 using test::SmallMaps;
-
-constexpr NodeId kAnna('H', 1);
 
 MeshBlock Triangle(float x) {
   MeshBlock block;
@@ -70,12 +70,6 @@ class MergeFollow : public testing::Test {
   NodeId fresh_;
   std::optional<MergeDeltas> deltas_;
 };
-
-GraphDelta OfNode(Node node) {
-  GraphDelta delta;
-  delta.nodes = {std::move(node)};
-  return delta;
-}
 
 TEST_F(MergeFollow, GoesOnWhenOthersWroteWhatItDoesNotTouch) {
   EXPECT_TRUE(*Meanwhile(OfNode(MakeObject(70, "cup", {1, 3, 0.4}))));

@@ -11,6 +11,7 @@
 namespace dsg::merge {
 namespace {
 
+using test::kAnna;
 using test::MakeAgent;
 using test::MakeEdge;
 using test::MakeObject;
@@ -289,7 +290,6 @@ std::vector<double> TrackOf(SmallMaps* maps, const std::string& map, NodeId agen
 }
 
 TEST(Merge, CarriesCorrectionsOfATrackThatItCopied) {
-  constexpr NodeId kAnna('H', 1);
   SmallMaps maps;
   maps.Commit("a", Home());
   GraphDelta b = HomeAgain();

@@ -77,6 +77,12 @@ TrajectoryAppend MakeTrack(NodeId agent, TimeNs from_ns, int pose_count) {
   return track;
 }
 
+GraphDelta OfNode(Node node) {
+  GraphDelta delta;
+  delta.nodes = {std::move(node)};
+  return delta;
+}
+
 SmallMaps::SmallMaps() : store_(*GraphStore::Open(folder_.path(), {})) {}
 
 Revision SmallMaps::Commit(const std::string& map, GraphDelta delta) {

@@ -26,6 +26,10 @@ inline NodeId O(uint64_t index) { return NodeId('O', index); }
 inline NodeId P(uint64_t index) { return NodeId('p', index); }
 inline NodeId R(uint64_t index) { return NodeId('R', index); }
 
+inline constexpr NodeId kAnna('H', 1);
+
+GraphDelta OfNode(Node node);
+
 class SmallMaps {
  public:
   SmallMaps();

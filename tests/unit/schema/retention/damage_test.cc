@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
-#include <iterator>
 #include <map>
 #include <random>
 #include <set>
@@ -21,11 +20,6 @@ namespace dsg::test {
 namespace {
 
 constexpr char kBranch[] = "R1";
-
-std::string ReadFile(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 // What a reader of the map says of each of its revisions, by revision.
 using Told = std::map<Revision, absl::StatusOr<std::string>>;

@@ -18,7 +18,7 @@ namespace dsg::test {
 namespace {
 
 // When a commit was made differs from store to store, and nothing else may.
-std::string TextOf(const Snapshot& snapshot) {
+std::string DumpOf(const Snapshot& snapshot) {
   const std::string committed = absl::StrCat(OrDie(snapshot.Stats()).at.committed_ns);
   return absl::StrReplaceAll(OrDie(Dump(snapshot)), {{committed, "T"}});
 }
@@ -104,7 +104,7 @@ class Twins {
   }
 
   static void ExpectEqualAnswers(const Snapshot& one, const Snapshot& other) {
-    ASSERT_EQ(TextOf(one), TextOf(other)) << "revision " << one.revision();
+    ASSERT_EQ(DumpOf(one), DumpOf(other)) << "revision " << one.revision();
     for (const TrackInfo& track : OrDie(one.Tracks())) {
       for (int i = 0; i < 5 && track.pose_count > 0; ++i) {
         const TimeNs from_ns = track.first_ns + (track.last_ns - track.first_ns) / 5 * i;

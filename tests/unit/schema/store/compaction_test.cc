@@ -14,13 +14,13 @@ namespace {
 using test::OrDie;
 using test::TestMap;
 
-constexpr int kRevisionCount = 60;
+constexpr int kWrittenCount = 60;
 
 // A map of the delta stream, and what each of its revisions says.
 class Compaction : public test::OnEveryBackend {
  protected:
   Compaction() {
-    for (int sequence = 1; sequence <= kRevisionCount; ++sequence) Write(sequence);
+    for (int sequence = 1; sequence <= kWrittenCount; ++sequence) Write(sequence);
   }
 
   void Write(int sequence) {
@@ -94,7 +94,7 @@ TEST_P(Compaction, ReachesReadersThatHoldAnOldSnapshot) {
 TEST_P(Compaction, LetsTheMapGoOnAndBeCompactedAgain) {
   OrDie(map_.writer().SetTag("summer", 23, ""));
   Compact(40);
-  for (int sequence = kRevisionCount + 1; sequence <= kRevisionCount + 20; ++sequence) {
+  for (int sequence = kWrittenCount + 1; sequence <= kWrittenCount + 20; ++sequence) {
     Write(sequence);
   }
   for (const Revision revision : {23, 40, 60, 61, 80}) ExpectSays(revision);

@@ -80,7 +80,7 @@ std::function<bool(const Line&)> Names(std::set<NodeId> nodes) {
   };
 }
 
-GraphDelta Retire(const std::vector<NodeId>& nodes) {
+GraphDelta Forget(const std::vector<NodeId>& nodes) {
   GraphDelta delta;
   for (const NodeId id : nodes) delta.retirements.push_back({id, std::nullopt});
   delta.is_forgetting = true;
@@ -98,7 +98,7 @@ TEST_P(EraseTest, TakesNodesThatAreGoneOutOfAllRevisions) {
   WriteStream(1, 36);
   const std::vector<NodeId> nodes = {NodeId('O', 5), NodeId('O', 7), NodeId('H', 3), NodeId('p', 4),
                                      NodeId('O', 1005)};
-  GraphDelta delta = Retire({NodeId('O', 5), NodeId('O', 7), NodeId('H', 3), NodeId('p', 4)});
+  GraphDelta delta = Forget({NodeId('O', 5), NodeId('O', 7), NodeId('H', 3), NodeId('p', 4)});
   for (const NodeId agent : {NodeId('H', 0), NodeId('H', 1), NodeId('H', 2), NodeId('H', 4)}) {
     for (Stay stay : OrDie(map_.Latest()->StaysOfAgent(agent, kTimeMin, kTimeMax))) {
       if (stay.place != NodeId('p', 4)) continue;
@@ -203,7 +203,7 @@ TEST_P(EraseTest, WorksOnACompactedMapWithTagsAndBothGoOn) {
   WriteStream(1, 36);
   OrDie(map_.writer().SetTag("summer", 17, ""));
   OrDie(map_.writer().Compact(28, {}, {}));
-  map_.MustCommit(Retire({NodeId('O', 5), NodeId('H', 1)}));
+  map_.MustCommit(Forget({NodeId('O', 5), NodeId('H', 1)}));
   const std::set<NodeId> nodes = {NodeId('O', 5), NodeId('H', 1)};
   const Told before = Tell(Names(nodes));
   Erase({.nodes = {nodes.begin(), nodes.end()}, .assets = true});
@@ -242,7 +242,7 @@ TEST_P(EraseTest, OfRandomThingsInRandomWorldsLeavesTheRest) {
     named.insert(id);
     if (is_agent || world.Int(0, 1) == 0) gone.push_back(id);
   }
-  GraphDelta delta = Retire(gone);
+  GraphDelta delta = Forget(gone);
   TrackSpan span{RandomWorld::Person(0), kTimeMin, kTimeMax};
   const TrackInfo track = OrDie(map_.Latest()->GetTrack(span.agent));
   if (track.pose_count > 0) {
@@ -268,7 +268,7 @@ TEST_P(EraseTest, IsSoundWhereverItIsStoppedAndGoesOn) {
   WriteStream(1, 40);
   std::vector<NodeId> nodes = {NodeId('H', 3)};
   for (uint64_t i = 0; i < 30; ++i) nodes.push_back(NodeId('O', i));
-  map_.MustCommit(Retire(nodes));
+  map_.MustCommit(Forget(nodes));
   for (int steps = 0;; ++steps) {
     int left = steps;
     const auto report = map_.writer().Erase(
@@ -284,7 +284,7 @@ TEST_P(EraseTest, IsSoundWhereverItIsStoppedAndGoesOn) {
 
 TEST_P(EraseTest, IsNoticedByReadersThatHoldASnapshot) {
   WriteStream(1, 10);
-  map_.MustCommit(Retire({NodeId('O', 5)}));
+  map_.MustCommit(Forget({NodeId('O', 5)}));
   const auto old = map_.At(9);
   const auto newest = map_.Latest();
   OrDie(map_.writer().Erase({.nodes = {NodeId('O', 5)}}, {}, {}));

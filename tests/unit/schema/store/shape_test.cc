@@ -14,7 +14,6 @@
 namespace dsg::test {
 namespace {
 
-constexpr NodeId kAnn('H', 1);
 constexpr TimeNs kPeriodNs = 200'000'000;
 
 // A body whose one joint says which estimate it is.
@@ -32,7 +31,8 @@ GraphDelta DeltaOfShapes(std::vector<BodyShape> shapes) {
 }
 
 // "10=1 20=2": times and numbers.
-std::string Text(const Snapshot& snapshot, TimeNs from_ns = kTimeMin, TimeNs to_ns = kTimeMax) {
+std::string NumbersOf(const Snapshot& snapshot, TimeNs from_ns = kTimeMin,
+                      TimeNs to_ns = kTimeMax) {
   std::string text;
   OrDie(snapshot.ReadShapes(kAnn, from_ns, to_ns, true, StopCheck(), [&](const ShownShape& shown) {
     if (!text.empty()) text += ' ';
@@ -62,12 +62,12 @@ TEST_P(Shapes, OfALaterRevisionReplaceThoseOfTheSameTimeAndOldRevisionsKeepTheir
       DeltaOfShapes({Estimate(10, 1), Estimate(20, 1), Estimate(30, 1), Estimate(40, 1)}));
   const Revision second = map_.MustCommit(DeltaOfShapes({Estimate(20, 2), Estimate(30, 2)}));
   const Revision third = map_.MustCommit(DeltaOfShapes({Estimate(25, 3), Estimate(30, 3)}));
-  EXPECT_EQ(Text(*map_.At(first - 1)), "");
-  EXPECT_EQ(Text(*map_.At(first)), "10=1 20=1 30=1 40=1");
-  EXPECT_EQ(Text(*map_.At(second)), "10=1 20=2 30=2 40=1");
-  EXPECT_EQ(Text(*map_.At(third)), "10=1 20=2 25=3 30=3 40=1");
-  EXPECT_EQ(Text(*map_.Latest(), 20, 30), "20=2 25=3");
-  EXPECT_EQ(Text(*map_.Latest(), 21, 25), "");
+  EXPECT_EQ(NumbersOf(*map_.At(first - 1)), "");
+  EXPECT_EQ(NumbersOf(*map_.At(first)), "10=1 20=1 30=1 40=1");
+  EXPECT_EQ(NumbersOf(*map_.At(second)), "10=1 20=2 30=2 40=1");
+  EXPECT_EQ(NumbersOf(*map_.At(third)), "10=1 20=2 25=3 30=3 40=1");
+  EXPECT_EQ(NumbersOf(*map_.Latest(), 20, 30), "20=2 25=3");
+  EXPECT_EQ(NumbersOf(*map_.Latest(), 21, 25), "");
   EXPECT_EQ(map_.Problems(), "");
 }
 
@@ -75,7 +75,7 @@ TEST_P(Shapes, SaidTwiceInOneDeltaAreThoseSaidLast) {
   GraphDelta delta = DeltaOfShapes({Estimate(10, 1), Estimate(20, 1)});
   delta.shapes.push_back({kAnn, std::nullopt, {Estimate(5, 2), Estimate(20, 2)}});
   map_.MustCommit(delta);
-  EXPECT_EQ(Text(*map_.Latest()), "5=2 10=1 20=2");
+  EXPECT_EQ(NumbersOf(*map_.Latest()), "5=2 10=1 20=2");
 }
 
 TEST_P(Shapes, OnTwoTopologiesKeepEachItsOwn) {
@@ -122,7 +122,7 @@ TEST_P(Shapes, AreFoundAtEveryTimeHoweverTheyWereCommitted) {
       if (!wanted.empty()) wanted += ' ';
       wanted += std::to_string(time_ns) + "=" + std::to_string(round);
     }
-    ASSERT_EQ(Text(*snapshot, from_ns, to_ns), wanted);
+    ASSERT_EQ(NumbersOf(*snapshot, from_ns, to_ns), wanted);
   }
   EXPECT_EQ(map_.Problems(), "");
 }

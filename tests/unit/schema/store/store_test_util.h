@@ -23,6 +23,7 @@ namespace dsg::test {
 
 inline constexpr char kMap[] = "office";
 inline constexpr TimeNs kSecond = kNsPerSecond;
+inline constexpr NodeId kAnn('H', 1);
 
 /// The value; stops the whole program when there is none, since nothing after would prove anything.
 template <typename T>

@@ -16,7 +16,6 @@
 namespace dsg::test {
 namespace {
 
-constexpr NodeId kAnn('H', 1);
 constexpr NodeId kBob('H', 2);
 constexpr NodeId kRoom('R', 1);
 constexpr NodeId kPlace('p', 1);

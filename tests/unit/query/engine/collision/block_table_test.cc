@@ -31,8 +31,8 @@ std::vector<Convex> TrianglesOfAllLengths(Random* random, int count) {
   return triangles;
 }
 
-double SlowClearance(const Vector3d& center, double radius_m,
-                     const std::vector<Convex>& triangles) {
+double SlowSphereClearance(const Vector3d& center, double radius_m,
+                           const std::vector<Convex>& triangles) {
   double nearest_m = std::numeric_limits<double>::infinity();
   for (const Convex& triangle : triangles) {
     nearest_m = std::min(nearest_m, (NearestPoint(triangle, center) - center).norm());
@@ -111,8 +111,8 @@ TEST(BlockTable, FacesOfAnyLengthAnswerAsLookingAtAllOfThemDoes) {
   for (int i = 0; i < 400; ++i) {
     SCOPED_TRACE(i);
     const Vector3d center = test::RandomPose(&random, 25.0).position;
-    const double before_m = SlowClearance(center, 0.3, triangles);
-    const double after_m = SlowClearance(center, 0.3, with_added);
+    const double before_m = SlowSphereClearance(center, 0.3, triangles);
+    const double after_m = SlowSphereClearance(center, 0.3, with_added);
     EXPECT_NEAR(Clearance(scene.World(after), center).clearance_m, std::min(after_m, 2.0), 1e-6);
     EXPECT_NEAR(Clearance(scene.World(before), center).clearance_m, std::min(before_m, 2.0), 1e-6);
     near_count += after_m < 2.0 ? 1 : 0;

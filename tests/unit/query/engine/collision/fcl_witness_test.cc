@@ -26,7 +26,7 @@ using test::Ask;
 using test::Scene;
 
 // Where nothing is round both are exact to rounding of doubles.
-constexpr double kExactM = 1e-9;
+constexpr double kFclExactM = 1e-9;
 // FCL follows round sides of capsules by iteration, which ends up to 1 mm too early, and thus
 // with a distance that is too large.
 constexpr double kIteratedM = 3e-3;
@@ -149,7 +149,7 @@ Kind Mesh(Random* random) {
   return kind;
 }
 
-Body RandomBody(Random* random, int kind) {
+Body BodyOfKind(Random* random, int kind) {
   Body body;
   body.poses = {test::RandomPose(random, 2.5)};
   body.kind = static_cast<Body::Kind>(kind);
@@ -194,11 +194,11 @@ void Compare(const Body& body, const Kind& kind, const CollisionHit& ours, Tally
   tally->hit_count += ours.hit ? 1 : 0;
   tally->worst_m = std::max(tally->worst_m, std::abs(fcl_m - ours.clearance_m));
   const bool iterates = IsIterated(body, kind);
-  EXPECT_LE(ours.clearance_m, fcl_m + kExactM);
-  EXPECT_GE(ours.clearance_m, fcl_m - (iterates ? kIteratedM : kExactM));
+  EXPECT_LE(ours.clearance_m, fcl_m + kFclExactM);
+  EXPECT_GE(ours.clearance_m, fcl_m - (iterates ? kIteratedM : kFclExactM));
   // Whatever all but touches may be seen either way.
   if (ours.hit != fcl_touches) {
-    EXPECT_LT(std::max(ours.clearance_m, fcl_m), iterates ? kIteratedM : kExactM);
+    EXPECT_LT(std::max(ours.clearance_m, fcl_m), iterates ? kIteratedM : kFclExactM);
   }
 }
 
@@ -213,7 +213,7 @@ TEST(FclWitness, SaysTheSameOfEveryKindOfBodyAndObstacle) {
       for (int i = 0; i < 250; ++i) {
         SCOPED_TRACE(kind.name + ", body kind " + std::to_string(body_kind) + ", question " +
                      std::to_string(i));
-        const Body body = RandomBody(&random, body_kind);
+        const Body body = BodyOfKind(&random, body_kind);
         CollisionScope scope;
         scope.clearance_m_max = kFarM;
         Compare(body, kind, Ask(scene.World(revision, kAtNs), body, scope), &tally);

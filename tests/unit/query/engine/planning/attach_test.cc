@@ -11,8 +11,8 @@
 namespace dsg::query {
 namespace {
 
-PlaceGraph::Place At(uint64_t number, const Eigen::Vector3d& position_map, double clearance_m,
-                     uint64_t room = 1) {
+PlaceGraph::Place PlaceAt(uint64_t number, const Eigen::Vector3d& position_map, double clearance_m,
+                          uint64_t room = 1) {
   return {NodeId('p', number), position_map, clearance_m, {}, NodeId('R', room)};
 }
 
@@ -40,38 +40,42 @@ PathTarget Position(double x, double y, double z) {
 using Indices = std::vector<PlaceIndex>;
 
 TEST(Attach, PrefersAWideFarPlaceToANearOneThatDoesNotReach) {
-  const auto graph = PlaceGraph::Make({At(0, {0, 0, 0}, 0.25), At(1, {3, 0, 0}, 3.0)}, {});
+  const auto graph =
+      PlaceGraph::Make({PlaceAt(0, {0, 0, 0}, 0.25), PlaceAt(1, {3, 0, 0}, 3.0)}, {});
   EXPECT_EQ(PlacesOf(AttachTo(*graph, Position(0.5, 0, 0))), Indices{1});
   EXPECT_EQ(AttachTo(*graph, Position(0.5, 0, 0)).front().way_m, 2.5);
 }
 
 TEST(Attach, TakesBothEndsOfALinkThatPassesBeside) {
-  const auto graph = PlaceGraph::Make({At(0, {0, 0, 0}, 0.5), At(1, {8, 0, 0}, 0.5)},
+  const auto graph = PlaceGraph::Make({PlaceAt(0, {0, 0, 0}, 0.5), PlaceAt(1, {8, 0, 0}, 0.5)},
                                       {{NodeId('p', 0), NodeId('p', 1), 0.5, {}}});
   EXPECT_EQ(PlacesOf(AttachTo(*graph, Position(4, 0.25, 0), 0.25)), (Indices{0, 1}));
   EXPECT_TRUE(AttachTo(*graph, Position(4, 0.26, 0), 0.25).empty());
 }
 
 TEST(Attach, ReachesNoFurtherThanItsBoundWithoutClearance) {
-  const auto graph = PlaceGraph::Make({At(0, {0, 0, 0}, 0.25), At(1, {0, 2.0, 0}, 0.25)}, {});
+  const auto graph =
+      PlaceGraph::Make({PlaceAt(0, {0, 0, 0}, 0.25), PlaceAt(1, {0, 2.0, 0}, 0.25)}, {});
   EXPECT_EQ(PlacesOf(AttachTo(*graph, Position(0, 0.9, 0))), Indices{0});
   EXPECT_EQ(PlacesOf(AttachTo(*graph, Position(1.5, 0, 0))), Indices{0});
   EXPECT_TRUE(AttachTo(*graph, Position(1.51, 0, 0)).empty());
 }
 
 TEST(Attach, FindsTheFloorBelowATorsoButNotTheStoreyBelow) {
-  const auto graph = PlaceGraph::Make({At(0, {0, 0, 0}, 0.5)}, {});
+  const auto graph = PlaceGraph::Make({PlaceAt(0, {0, 0, 0}, 0.5)}, {});
   EXPECT_EQ(PlacesOf(AttachTo(*graph, Position(0.3, 0, 1.1))), Indices{0});
   EXPECT_TRUE(AttachTo(*graph, Position(0.3, 0, 3.1)).empty());
 }
 
 TEST(Attach, LeavesOutPlacesThatAreTooNarrowForTheRobot) {
-  const auto graph = PlaceGraph::Make({At(0, {0, 0, 0}, 0.25), At(1, {1, 0, 0}, 0.5)}, {});
+  const auto graph =
+      PlaceGraph::Make({PlaceAt(0, {0, 0, 0}, 0.25), PlaceAt(1, {1, 0, 0}, 0.5)}, {});
   EXPECT_EQ(PlacesOf(AttachTo(*graph, Position(0.1, 0, 0), 0.4)), Indices{1});
 }
 
 TEST(Attach, GoesToAThingFromItsOwnRoom) {
-  const auto graph = PlaceGraph::Make({At(0, {0, 0, 0}, 0.25, 1), At(1, {2, 0, 0}, 0.25, 2)}, {});
+  const auto graph =
+      PlaceGraph::Make({PlaceAt(0, {0, 0, 0}, 0.25, 1), PlaceAt(1, {2, 0, 0}, 0.25, 2)}, {});
   PathTarget cup;
   cup.node = NodeId('O', 1);
   cup.box_map = Box3d(Eigen::Vector3d(0.8, -0.1, 0.7), Eigen::Vector3d(0.9, 0.1, 0.8));

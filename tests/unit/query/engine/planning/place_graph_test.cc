@@ -10,7 +10,7 @@
 namespace dsg::query {
 namespace {
 
-PlaceGraph::Place At(uint64_t number, double x, double clearance_m) {
+PlaceGraph::Place PlaceOnX(uint64_t number, double x, double clearance_m) {
   PlaceGraph::Place place;
   place.id = NodeId('p', number);
   place.position_map = {x, 0.0, 0.0};
@@ -20,7 +20,7 @@ PlaceGraph::Place At(uint64_t number, double x, double clearance_m) {
 
 TEST(PlaceGraph, LinksAreAsNarrowAsTheirNarrowestPart) {
   const auto graph = PlaceGraph::Make(
-      {At(1, 0.0, 0.5), At(2, 3.0, 0.25), At(3, 4.0, 2.0)},
+      {PlaceOnX(1, 0.0, 0.5), PlaceOnX(2, 3.0, 0.25), PlaceOnX(3, 4.0, 2.0)},
       {{NodeId('p', 1), NodeId('p', 2), 1.0, {}}, {NodeId('p', 3), NodeId('p', 1), 0.125, {}}});
   ASSERT_EQ(graph->links_end(0) - graph->links_begin(0), 2);
   const PlaceGraph::Link* link = graph->links_begin(0);
@@ -32,7 +32,7 @@ TEST(PlaceGraph, LinksAreAsNarrowAsTheirNarrowestPart) {
 }
 
 TEST(PlaceGraph, LeavesOutLinksToItselfAndToNowhere) {
-  const auto graph = PlaceGraph::Make({At(1, 0.0, 0.5), At(2, 3.0, 0.25)},
+  const auto graph = PlaceGraph::Make({PlaceOnX(1, 0.0, 0.5), PlaceOnX(2, 3.0, 0.25)},
                                       {{NodeId('p', 1), NodeId('p', 1), 1.0, {}},
                                        {NodeId('p', 1), NodeId('p', 7), 1.0, {}},
                                        {NodeId('O', 1), NodeId('p', 2), 1.0, {}}});
@@ -40,8 +40,9 @@ TEST(PlaceGraph, LeavesOutLinksToItselfAndToNowhere) {
 }
 
 TEST(PlaceGraph, FindsPlacesWhateverGapsTheirIdsHave) {
-  const auto graph = PlaceGraph::Make(
-      {At(9, 0.0, 1.0), At(2, 1.0, 1.0), At(3, 2.0, 1.0), At(1'000'000, 3.0, 1.0)}, {});
+  const auto graph = PlaceGraph::Make({PlaceOnX(9, 0.0, 1.0), PlaceOnX(2, 1.0, 1.0),
+                                       PlaceOnX(3, 2.0, 1.0), PlaceOnX(1'000'000, 3.0, 1.0)},
+                                      {});
   ASSERT_EQ(graph->size(), 4);
   for (PlaceIndex place = 0; place < graph->size(); ++place) {
     EXPECT_EQ(graph->Find(graph->id(place)), place);

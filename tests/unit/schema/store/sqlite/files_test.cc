@@ -19,7 +19,6 @@
 namespace dsg::test {
 namespace {
 
-constexpr NodeId kAnn('H', 1);
 constexpr TimeNs kPeriodNs = 200'000'000;
 constexpr int kRevisionCount = 60;
 

@@ -3,8 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
@@ -60,12 +58,7 @@ class PendingErasure : public testing::Test {
   }
 
   static int HitCount(const std::string& folder) {
-    std::string bytes;
-    for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-      if (!entry.is_regular_file()) continue;
-      std::ifstream in(entry.path(), std::ios::binary);
-      bytes.append(std::istreambuf_iterator<char>(in), {});
-    }
+    const std::string bytes = ReadFolder(folder);
     int count = 0;
     for (int i = 0; i < kCount; ++i) count += absl::StrContains(bytes, SecretOf(i)) ? 1 : 0;
     return count;

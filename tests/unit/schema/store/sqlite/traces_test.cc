@@ -23,11 +23,6 @@ namespace fs = std::filesystem;
 
 constexpr size_t kPatternBytes = 20;
 
-std::string ReadFile(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 class Traces : public testing::Test {
  protected:
   std::string Random(size_t size, bool is_text) {

@@ -5,7 +5,6 @@
 
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 
 #include "absl/strings/match.h"
 #include "schema/codec/checksum.h"
@@ -20,13 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 using test::kMap;
 using test::OrDie;
-
-std::string ReadFile(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream bytes;
-  bytes << file.rdbuf();
-  return bytes.str();
-}
+using test::ReadFile;
 
 // A store that holds the map of format 1: 24 deltas of the delta stream with these options.
 class Format1 : public ::testing::Test {

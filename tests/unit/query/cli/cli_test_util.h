@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the tests of this folder share: runs of the program in this process, and parts of small
+// maps.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "query/cli/run.h"
+#include "query/cli/time_text.h"
+#include "schema/model/graph_delta.h"
+
+namespace dsg::test {
+
+using Arguments = std::vector<std::string>;
+
+/// A run of the program: its exit code and what it printed.
+struct Outcome {
+  int code = -1;
+  std::string out;
+  std::string errors;
+};
+Outcome RunDsg(const Arguments& arguments,
+               const cli::Environment& environment = {.version = "0.1.0"});
+
+/// The verb of a command line; fails the test when it is refused or another verb's.
+template <class V>
+V ParseAs(const Arguments& arguments, const cli::Environment& environment = {.store = "s"}) {
+  const auto command = cli::ParseArguments(arguments, environment);
+  EXPECT_TRUE(command.ok()) << command.status();
+  if (!command.ok() || !std::holds_alternative<V>(command->verb)) {
+    ADD_FAILURE() << "another verb than asked for";
+    return V();
+  }
+  return std::get<V>(command->verb);
+}
+/// What is said of a command line that is refused; fails the test when it is not.
+std::string Refusal(const Arguments& arguments,
+                    const cli::Environment& environment = {.store = "s"});
+
+/// The times of a map with a monotonic clock.
+cli::TimeText Monotonic();
+
+Node MakeNode(NodeId id, const std::string& kind, const std::string& name,
+              const Eigen::Vector3d& position_map);
+/// At y = z = 0.
+Node MakeNode(NodeId id, const std::string& kind, const std::string& name, double x_m);
+Edge MakeEdge(NodeId source, const std::string& relation, NodeId target);
+
+}  // namespace dsg::test
