@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/cli/flag_names.h"
+#include "query/cli/errors.h"
 
 #include <array>
 #include <string>
@@ -8,15 +8,17 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "dsg/v1/errors.pb.h"
+#include "query/cli/table.h"
 #include "schema/base/status.h"
 
 namespace dsg::cli {
 namespace {
 
-using Pair = std::pair<absl::string_view, absl::string_view>;
+using FieldFlag = std::pair<absl::string_view, absl::string_view>;
 
-// Where a message begins with one of these; longer ones go first.
-constexpr std::array<Pair, 28> kFirstWords = {{
+// Fields at the beginning of a message; the first match counts, so longer names come first.
+constexpr std::array<FieldFlag, 28> kFirstWords = {{
     {"bodies[0].sphere.", "--sphere: "},
     {"bodies[0].cuboid.", "--box: "},
     {"bodies[0].capsule.", "--capsule: "},
@@ -47,8 +49,8 @@ constexpr std::array<Pair, 28> kFirstWords = {{
     {"target", "--target"},
 }};
 
-// No words of plain English: these are told apart wherever they stand.
-constexpr std::array<Pair, 16> kAnywhere = {{
+// Fields anywhere in a message: none of them is an English word.
+constexpr std::array<FieldFlag, 16> kAnywhere = {{
     {"from_ns", "--from"},
     {"to_ns", "--to"},
     {"at_ns", "--at"},
@@ -95,13 +97,42 @@ void ReplaceAnywhere(std::string* message) {
 void AddHint(Reason reason, const ErrorMetadata& metadata, std::string* message) {
   if (absl::StrContains(*message, "dsg ")) return;
   if (reason == Reason::kNodeUnknown) {
-    absl::StrAppend(message, "; `dsg ls` and `dsg find` list those that there are");
+    absl::StrAppend(message, "; `dsg ls` and `dsg find` list the nodes");
   } else if (reason == Reason::kMapUnknown && metadata.contains("map")) {
-    absl::StrAppend(message, "; `dsg maps` lists those that do");
+    absl::StrAppend(message, "; `dsg maps` lists the maps");
   }
 }
 
 }  // namespace
+
+ExitCode ExitCodeOf(const absl::Status& status) {
+  switch (status.code()) {
+    case absl::StatusCode::kOk:
+      return kFound;
+    case absl::StatusCode::kNotFound:
+    case absl::StatusCode::kOutOfRange:
+      return kNotFound;
+    case absl::StatusCode::kInvalidArgument:
+    case absl::StatusCode::kAlreadyExists:
+    case absl::StatusCode::kFailedPrecondition:
+    case absl::StatusCode::kUnimplemented:
+    case absl::StatusCode::kPermissionDenied:
+    case absl::StatusCode::kUnauthenticated:
+      return kUsage;
+    case absl::StatusCode::kDataLoss:
+      return kDataLoss;
+    default:
+      return kUnavailable;
+  }
+}
+
+std::string ErrorLine(const absl::Status& status) {
+  const Reason reason = ReasonOf(status);
+  const std::string message = Printable(std::string(status.message()));
+  if (reason == Reason::kUnspecified) return absl::StrCat("dsg: ", message, "\n");
+  return absl::StrCat("dsg: ", message, " [", v1::Reason_Name(static_cast<v1::Reason>(reason)),
+                      "]\n");
+}
 
 absl::Status InFlags(const absl::Status& status) {
   const Reason reason = ReasonOf(status);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/cli/time_text.h"
+#include "query/cli/answer_text.h"
 
 #include <gtest/gtest.h>
 

@@ -2,11 +2,17 @@
 // The grammar of the verbs that ask about meetings, search, ways, obstacles, the future and change.
 #include <gtest/gtest.h>
 
+#include <any>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "query/cli/arguments.h"
+#include "query/cli/verb_predict.h"
+#include "query/cli/verbs_agents.h"
+#include "query/cli/verbs_changes.h"
+#include "query/cli/verbs_meetings.h"
+#include "query/cli/verbs_search.h"
+#include "query/cli/verbs_space.h"
 
 namespace dsg::cli {
 namespace {
@@ -17,11 +23,10 @@ template <class V>
 V ParseAs(const Arguments& arguments) {
   const auto command = ParseArguments(arguments, {.store = "s"});
   EXPECT_TRUE(command.ok()) << command.status();
-  if (!command.ok() || !std::holds_alternative<V>(command->verb)) {
-    ADD_FAILURE() << "another verb than asked for";
-    return V();
-  }
-  return std::get<V>(command->verb);
+  const V* verb = command.ok() ? std::any_cast<V>(&command->verb) : nullptr;
+  if (verb != nullptr) return *verb;
+  ADD_FAILURE() << "another verb than asked for";
+  return V();
 }
 
 std::string Refusal(const Arguments& arguments) {

@@ -27,7 +27,7 @@ struct Outcome {
   std::string errors;
 };
 
-class OwnVerbs : public testing::Test {
+class ContentVerbs : public testing::Test {
  protected:
   void SetUp() override {
     const auto store = GraphStore::Open(store_, {.create = true});
@@ -79,7 +79,7 @@ class OwnVerbs : public testing::Test {
   const std::string sha256_ = ToHex(ComputeSha256(kContent));
 };
 
-TEST_F(OwnVerbs, FactorsAreListed) {
+TEST_F(ContentVerbs, FactorsAreListed) {
   const Outcome all = Dsg({"factors", "body"});
   ASSERT_EQ(all.code, 0) << all.errors;
   EXPECT_EQ(all.out,
@@ -92,7 +92,7 @@ TEST_F(OwnVerbs, FactorsAreListed) {
   EXPECT_NE(Dsg({"factors", "r0", "--limit", "1"}).out.find("1 factor of"), std::string::npos);
 }
 
-TEST_F(OwnVerbs, FactorsAreGivenAsJson) {
+TEST_F(ContentVerbs, FactorsAreGivenAsJson) {
   const Outcome outcome = Dsg({"factors", "body", "--json"});
   ASSERT_EQ(outcome.code, 0) << outcome.errors;
   const Json reply = Json::parse(outcome.out);
@@ -102,7 +102,7 @@ TEST_F(OwnVerbs, FactorsAreGivenAsJson) {
   EXPECT_EQ(reply["factors"][1]["to_time_ns"], "9000000000");
 }
 
-TEST_F(OwnVerbs, FactorsOfNobodyAreNotFound) {
+TEST_F(ContentVerbs, FactorsOfNobodyAreNotFound) {
   const Outcome outcome = Dsg({"factors", "nobody"});
   EXPECT_EQ(outcome.code, 1);
   EXPECT_NE(outcome.errors.find("AGENT_UNKNOWN"), std::string::npos) << outcome.errors;
@@ -110,7 +110,7 @@ TEST_F(OwnVerbs, FactorsOfNobodyAreNotFound) {
   EXPECT_EQ(Dsg({"factors"}).code, 2);
 }
 
-TEST_F(OwnVerbs, AnAssetIsDescribed) {
+TEST_F(ContentVerbs, AnAssetIsDescribed) {
   const Outcome outcome = Dsg({"asset", sha256_});
   ASSERT_EQ(outcome.code, 0) << outcome.errors;
   EXPECT_EQ(outcome.out, sha256_ + ": model/ply, 21 bytes (revision 1)\n");
@@ -119,7 +119,7 @@ TEST_F(OwnVerbs, AnAssetIsDescribed) {
   EXPECT_EQ(reply["size_bytes"], "21");
 }
 
-TEST_F(OwnVerbs, AnAssetIsWrittenWhole) {
+TEST_F(ContentVerbs, AnAssetIsWrittenWhole) {
   const std::string path = folder_.path() + "/couch.ply";
   const Outcome outcome = Dsg({"asset", sha256_, "--out", path});
   ASSERT_EQ(outcome.code, 0) << outcome.errors;
@@ -130,7 +130,7 @@ TEST_F(OwnVerbs, AnAssetIsWrittenWhole) {
   EXPECT_EQ(Dsg({"asset", sha256_, "--out", path, "--force"}).code, 0);
 }
 
-TEST_F(OwnVerbs, AnUnknownAssetIsNotFoundAndLeavesNoFile) {
+TEST_F(ContentVerbs, AnUnknownAssetIsNotFoundAndLeavesNoFile) {
   const std::string path = folder_.path() + "/none.ply";
   const Outcome outcome = Dsg({"asset", std::string(64, '0'), "--out", path});
   EXPECT_EQ(outcome.code, 1);
@@ -141,7 +141,7 @@ TEST_F(OwnVerbs, AnUnknownAssetIsNotFoundAndLeavesNoFile) {
   EXPECT_NE(malformed.errors.find("64 hexadecimal digits"), std::string::npos);
 }
 
-TEST_F(OwnVerbs, HelpShowsAnExample) {
+TEST_F(ContentVerbs, HelpShowsAnExample) {
   EXPECT_NE(Dsg({"factors", "--help"}).out.find("Example: dsg factors body"), std::string::npos);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/cli/exit_code.h"
+#include "query/cli/errors.h"
 
 #include <gtest/gtest.h>
 
