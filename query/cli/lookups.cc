@@ -148,10 +148,7 @@ absl::Status FillFilter(const FilterOptions& options, const MapSpec& map, v1::No
   filter->set_layer(options.layer);
   filter->set_kind(options.kind);
   filter->set_class_name(options.class_name);
-  if (!options.at.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, ParseInstant("--at", options.at, map));
-    filter->set_at_ns(at_ns);
-  }
+  DSG_RETURN_IF_ERROR(SetInstant("--at", options.at, map, filter, &v1::NodeFilter::set_at_ns));
   return absl::OkStatus();
 }
 

@@ -3,9 +3,11 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <string>
 
 #include "absl/status/statusor.h"
+#include "schema/base/status.h"
 #include "schema/base/time.h"
 #include "schema/model/geometry.h"
 #include "schema/model/layer.h"
@@ -36,5 +38,25 @@ absl::StatusOr<TimeNs> ParseDuration(const std::string& option, const std::strin
 /// seconds, and for a date on another clock.
 absl::StatusOr<TimeNs> ParseInstant(const std::string& option, const std::string& text,
                                     const MapSpec& map);
+
+/// Sets a field of a request to the instant, if `text` is not empty. Errors: as ParseInstant.
+template <class Request>
+absl::Status SetInstant(const std::string& option, const std::string& text, const MapSpec& map,
+                        Request* request, void (Request::*set)(int64_t)) {
+  if (text.empty()) return absl::OkStatus();
+  DSG_ASSIGN_OR_RETURN(const TimeNs time_ns, ParseInstant(option, text, map));
+  (request->*set)(time_ns);
+  return absl::OkStatus();
+}
+
+/// The same for a duration. Errors: as ParseDuration.
+template <class Request>
+absl::Status SetDuration(const std::string& option, const std::string& text, Request* request,
+                         void (Request::*set)(int64_t)) {
+  if (text.empty()) return absl::OkStatus();
+  DSG_ASSIGN_OR_RETURN(const TimeNs duration_ns, ParseDuration(option, text));
+  (request->*set)(duration_ns);
+  return absl::OkStatus();
+}
 
 }  // namespace dsg::cli

@@ -46,14 +46,10 @@ std::string RenderFactors(const v1::ListFactorsResponse& reply, const TimeText& 
 absl::Status RunFactors(Session* session, const FactorsVerb& verb, std::ostream& out) {
   auto request = session->Begin<v1::ListFactorsRequest>();
   request.set_agent(verb.agent);
-  if (!verb.from.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs from_ns, ParseInstant("--from", verb.from, session->map()));
-    request.set_from_ns(from_ns);
-  }
-  if (!verb.to.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs to_ns, ParseInstant("--to", verb.to, session->map()));
-    request.set_to_ns(to_ns);
-  }
+  DSG_RETURN_IF_ERROR(SetInstant("--from", verb.from, session->map(), &request,
+                                 &v1::ListFactorsRequest::set_from_ns));
+  DSG_RETURN_IF_ERROR(
+      SetInstant("--to", verb.to, session->map(), &request, &v1::ListFactorsRequest::set_to_ns));
   const int64_t count_max = EntriesLeft(session->common().limit);
   v1::ListFactorsResponse all;
   DSG_RETURN_IF_ERROR(

@@ -102,18 +102,12 @@ absl::StatusOr<v1::PredictAgentRequest> RequestFor(Session* session, const Predi
   request.set_model(ModelOf(verb.model));
   request.set_path_count_max(verb.path_count);
   request.set_stop_at_walls(verb.stop_at_walls);
-  if (!verb.at.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs from_ns, ParseInstant("--at", verb.at, session->map()));
-    request.set_from_ns(from_ns);
-  }
-  if (!verb.horizon.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs horizon_ns, ParseDuration("--horizon", verb.horizon));
-    request.set_horizon_ns(horizon_ns);
-  }
-  if (!verb.every.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs period_ns, ParseDuration("--every", verb.every));
-    request.set_period_ns(period_ns);
-  }
+  DSG_RETURN_IF_ERROR(
+      SetInstant("--at", verb.at, session->map(), &request, &v1::PredictAgentRequest::set_from_ns));
+  DSG_RETURN_IF_ERROR(
+      SetDuration("--horizon", verb.horizon, &request, &v1::PredictAgentRequest::set_horizon_ns));
+  DSG_RETURN_IF_ERROR(
+      SetDuration("--every", verb.every, &request, &v1::PredictAgentRequest::set_period_ns));
   return request;
 }
 

@@ -79,14 +79,10 @@ absl::StatusOr<v1::GetAgentShapeRequest> RequestFor(const Session& session, cons
   auto request = session.Begin<v1::GetAgentShapeRequest>();
   request.set_agent(verb.agent);
   const MapSpec& map = session.map();
-  if (!verb.from.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs from_ns, ParseInstant("--from", verb.from, map));
-    request.set_from_ns(from_ns);
-  }
-  if (!verb.to.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs to_ns, ParseInstant("--to", verb.to, map));
-    request.set_to_ns(to_ns);
-  }
+  DSG_RETURN_IF_ERROR(
+      SetInstant("--from", verb.from, map, &request, &v1::GetAgentShapeRequest::set_from_ns));
+  DSG_RETURN_IF_ERROR(
+      SetInstant("--to", verb.to, map, &request, &v1::GetAgentShapeRequest::set_to_ns));
   return request;
 }
 

@@ -186,18 +186,12 @@ absl::Status RunTrack(Session* session, const TrackVerb& verb, std::ostream& out
   auto request = session->Begin<v1::GetTrajectoryRequest>();
   request.set_agent(verb.agent);
   const MapSpec& map = session->map();
-  if (!verb.from.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs from_ns, ParseInstant("--from", verb.from, map));
-    request.set_from_ns(from_ns);
-  }
-  if (!verb.to.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs to_ns, ParseInstant("--to", verb.to, map));
-    request.set_to_ns(to_ns);
-  }
-  if (!verb.every.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs period_ns, ParseDuration("--every", verb.every));
-    request.set_resample_period_ns(period_ns);
-  }
+  DSG_RETURN_IF_ERROR(
+      SetInstant("--from", verb.from, map, &request, &v1::GetTrajectoryRequest::set_from_ns));
+  DSG_RETURN_IF_ERROR(
+      SetInstant("--to", verb.to, map, &request, &v1::GetTrajectoryRequest::set_to_ns));
+  DSG_RETURN_IF_ERROR(SetDuration("--every", verb.every, &request,
+                                  &v1::GetTrajectoryRequest::set_resample_period_ns));
   // JSON is written as it arrives; a table or a picture needs all poses.
   const bool is_json = session->common().json;
   const bool is_kept = !is_json || !verb.picture.png.empty();

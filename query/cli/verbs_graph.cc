@@ -237,10 +237,8 @@ absl::Status RunEdges(Session* session, const EdgesVerb& verb, std::ostream& out
   request.set_source(verb.source);
   request.set_relation(verb.relation);
   request.set_target(verb.target);
-  if (!verb.at.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, ParseInstant("--at", verb.at, session->map()));
-    request.set_at_ns(at_ns);
-  }
+  DSG_RETURN_IF_ERROR(
+      SetInstant("--at", verb.at, session->map(), &request, &v1::ListEdgesRequest::set_at_ns));
   v1::ListEdgesResponse all;
   DSG_RETURN_IF_ERROR(session->ReadPages(&query::Api::ListEdges, request, session->common().limit,
                                          &v1::ListEdgesResponse::edges_size, &all));

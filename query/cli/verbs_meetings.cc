@@ -193,15 +193,11 @@ absl::StatusOr<v1::ListEncountersRequest> RequestFor(Session* session, const Met
   request.set_from_ns(asked.from_ns);
   request.set_to_ns(asked.to_ns);
   request.set_distance_m(verb.within_m);
-  if (!verb.for_at_least.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs duration_ns, ParseDuration("--for", verb.for_at_least));
-    request.set_duration_ns_min(duration_ns);
-  }
+  DSG_RETURN_IF_ERROR(SetDuration("--for", verb.for_at_least, &request,
+                                  &v1::ListEncountersRequest::set_duration_ns_min));
   request.set_line_of_sight(verb.line_of_sight);
-  if (!verb.sight_gap.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs gap_ns, ParseDuration("--sight-gap", verb.sight_gap));
-    request.set_sight_gap_ns_max(gap_ns);
-  }
+  DSG_RETURN_IF_ERROR(SetDuration("--sight-gap", verb.sight_gap, &request,
+                                  &v1::ListEncountersRequest::set_sight_gap_ns_max));
   return request;
 }
 

@@ -132,10 +132,8 @@ absl::StatusOr<v1::SearchNodesRequest> RequestFor(Session* session, const FindVe
     DSG_ASSIGN_OR_RETURN(const Box3d box, ParseBox("--box", verb.box));
     ToProto(box, request.mutable_box());
   }
-  if (!verb.at.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, ParseInstant("--at", verb.at, session->map()));
-    request.set_at_ns(at_ns);
-  }
+  DSG_RETURN_IF_ERROR(
+      SetInstant("--at", verb.at, session->map(), &request, &v1::SearchNodesRequest::set_at_ns));
   request.set_view(v1::NODE_VIEW_GEOMETRY);
   request.set_explain(verb.explain);
   return request;
@@ -224,10 +222,8 @@ absl::Status RunAround(Session* session, const AroundVerb& verb, std::ostream& o
   for (const std::string& relation : verb.relations) request.add_relations(relation);
   request.set_outgoing(verb.outgoing);
   request.set_incoming(verb.incoming);
-  if (!verb.at.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, ParseInstant("--at", verb.at, session->map()));
-    request.set_at_ns(at_ns);
-  }
+  DSG_RETURN_IF_ERROR(
+      SetInstant("--at", verb.at, session->map(), &request, &v1::GetNeighborsRequest::set_at_ns));
   request.set_view(v1::NODE_VIEW_BASIC);
   v1::GetNeighborsResponse all;
   DSG_RETURN_IF_ERROR(session->ReadPages(&query::Api::GetNeighbors, request,

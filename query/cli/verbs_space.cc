@@ -157,10 +157,8 @@ absl::StatusOr<v1::PlanPathRequest> RequestFor(Session* session, const PathVerb&
   request.set_robot_radius_m(verb.radius_m);
   for (const std::string& node : verb.blocked) request.add_blocked(node);
   request.set_mode(verb.flat ? v1::FLAT : v1::HIERARCHICAL);
-  if (!verb.at.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, ParseInstant("--at", verb.at, session->map()));
-    request.set_at_ns(at_ns);
-  }
+  DSG_RETURN_IF_ERROR(
+      SetInstant("--at", verb.at, session->map(), &request, &v1::PlanPathRequest::set_at_ns));
   request.set_check_collision(verb.check);
   return request;
 }
@@ -265,10 +263,8 @@ absl::StatusOr<v1::CheckCollisionRequest> RequestFor(Session* session, const Col
   auto request = session->Begin<v1::CheckCollisionRequest>();
   DSG_RETURN_IF_ERROR(FillBody(verb, request.add_bodies()));
   FillScope(verb, request.mutable_scope());
-  if (!verb.at.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, ParseInstant("--at", verb.at, session->map()));
-    request.set_at_ns(at_ns);
-  }
+  DSG_RETURN_IF_ERROR(
+      SetInstant("--at", verb.at, session->map(), &request, &v1::CheckCollisionRequest::set_at_ns));
   request.set_margin_m(verb.margin_m);
   request.set_clearance_m_max(verb.clearance_max_m);
   return request;
