@@ -335,7 +335,7 @@ void AddPruneVerb(Grammar* grammar) {
                       "Thin tracks instead of forgetting them: drop poses that interpolation "
                       "reproduces within this distance, metres")
           ->check(AboveZero());
-  CLI::Option* only = app->add_option("--only", verb->only, "Only nodes of this layer; repeatable");
+  CLI::Option* only = app->add_option("--only", verb->only, "Only this layer; repeatable");
   CLI::Option* retire = app->add_flag_callback(
       "--retire", [] {}, "Remove it from new revisions; older revisions keep it; the default");
   CLI::Option* erase = app->add_flag(

@@ -38,7 +38,7 @@ struct ExportVerb {
   std::string gltf;
   /// Spark-DSG, JSON or binary by its ending.
   std::string spark;
-  /// Smallest distance between its poses, metres; 0 = all poses.
+  /// Distance between its poses, metres; 0 = all poses.
   double pose_step_m = 0.5;
   /// "rgb", "label", "instance"; empty = rgb if the mesh has it, else label.
   std::string color;
@@ -310,7 +310,7 @@ void AddExport(Grammar* grammar) {
   app->add_option("--gltf", verb->gltf, "Mesh and graph, binary glTF 2.0 (.glb)");
   app->add_option("--spark", verb->spark, "A Spark-DSG graph, .json, or binary .sparkdsg or .bin");
   app->add_option("--pose-step", verb->pose_step_m,
-                  "Smallest distance between the poses that --spark writes, metres; 0 = all poses")
+                  "Distance between the poses that --spark writes, metres; 0 = all poses")
       ->check(ZeroOrMore())
       ->capture_default_str();
   app->add_option(
