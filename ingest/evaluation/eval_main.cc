@@ -14,13 +14,12 @@
 #include "ingest/evaluation/evaluate.h"
 #include "ingest/evaluation/store_reader.h"
 #include "ingest/truth/truth.h"
+#include "schema/base/exit_code.h"
 #include "schema/base/status.h"
 #include "schema/store/graph_store.h"
 
 namespace dsg::evaluation {
 namespace {
-
-enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2, kUnavailable = 3, kDataLoss = 4 };
 
 struct Flags {
   std::string store;
@@ -104,19 +103,10 @@ absl::Status Run(const Flags& flags) {
 
 ExitCode ReportError(const absl::Status& status) {
   if (status.ok()) return kDone;
-  const Reason reason = ReasonOf(status);
   std::fprintf(stderr, "dsg-eval: %s: %s\n",
                std::string(absl::StatusCodeToString(status.code())).c_str(),
                std::string(status.message()).c_str());
-  if (reason == Reason::kFieldInvalid || reason == Reason::kMapNameInvalid) return kUsage;
-  switch (status.code()) {
-    case absl::StatusCode::kUnavailable:
-      return kUnavailable;
-    case absl::StatusCode::kDataLoss:
-      return kDataLoss;
-    default:
-      return kFailed;
-  }
+  return ExitCodeOf(status);
 }
 
 int Main(int argc, char** argv) {

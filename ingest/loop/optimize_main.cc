@@ -20,14 +20,13 @@
 #include "ingest/loop/g2o_file.h"
 #include "ingest/loop/optimize.h"
 #include "ingest/loop/robust.h"
+#include "schema/base/exit_code.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
 namespace {
 
 using SteadyClock = std::chrono::steady_clock;
-
-enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2, kUnavailable = 3, kDataLoss = 4 };
 
 struct Flags {
   std::string file;
@@ -243,15 +242,7 @@ ExitCode ReportError(const absl::Status& status) {
   std::fprintf(stderr, "dsg-optimize: %s: %s\n",
                std::string(absl::StatusCodeToString(status.code())).c_str(),
                std::string(status.message()).c_str());
-  if (ReasonOf(status) == Reason::kFieldInvalid) return kUsage;
-  switch (status.code()) {
-    case absl::StatusCode::kUnavailable:
-      return kUnavailable;
-    case absl::StatusCode::kDataLoss:
-      return kDataLoss;
-    default:
-      return kFailed;
-  }
+  return ExitCodeOf(status);
 }
 
 int Main(int argc, char** argv) {

@@ -27,12 +27,11 @@
 #include "ingest/pipeline/progress.h"
 #include "ingest/pipeline/upright.h"
 #include "schema/base/byte_size.h"
+#include "schema/base/exit_code.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
 namespace {
-
-enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2, kUnavailable = 3, kDataLoss = 4 };
 
 struct Flags {
   std::string store;
@@ -369,20 +368,10 @@ absl::Status Run(const Flags& flags) {
 
 ExitCode Report(const absl::Status& status) {
   if (status.ok()) return kDone;
-  const Reason reason = ReasonOf(status);
   std::fprintf(stderr, "dsg-ingest: %s: %s\n",
                std::string(absl::StatusCodeToString(status.code())).c_str(),
                std::string(status.message()).c_str());
-  if (reason == Reason::kFieldInvalid || reason == Reason::kMapNameInvalid) return kUsage;
-  switch (status.code()) {
-    case absl::StatusCode::kUnavailable:
-    case absl::StatusCode::kDeadlineExceeded:
-      return kUnavailable;
-    case absl::StatusCode::kDataLoss:
-      return kDataLoss;
-    default:
-      return kFailed;
-  }
+  return ExitCodeOf(status);
 }
 
 int Main(int argc, char** argv) {

@@ -5,11 +5,11 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
-#include "query/cli/export/floor_choice.h"
+#include "query/cli/export/map_content.h"
 #include "query/cli/export/outline.h"
 #include "query/cli/export/top_view.h"
+#include "query/cli/json.h"
 #include "query/cli/read_content.h"
-#include "query/cli/written.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/files/atomic_file.h"
@@ -24,10 +24,9 @@ absl::Status CheckPicture(const PictureOptions& options) {
 absl::Status WritePicture(Session* session, const PictureOptions& options,
                           const AnswerPicture& picture, std::ostream& out) {
   if (options.png.empty()) return absl::OkStatus();
-  DSG_ASSIGN_OR_RETURN(
-      ContentAnswer answer,
-      ReadContent(*session, &session->api(),
-                  {.at_ns = picture.at_ns, .with_agents = false, .revision = picture.revision}));
+  DSG_ASSIGN_OR_RETURN(ContentAnswer answer, ReadContent(session, {.at_ns = picture.at_ns,
+                                                                   .with_agents = false,
+                                                                   .revision = picture.revision}));
   TopViewOptions top{.width_px = options.width_px,
                      .title = absl::StrCat(answer.content.spec.name, "  revision ",
                                            picture.revision, "  ", picture.title),
@@ -80,7 +79,7 @@ absl::StatusOr<std::vector<std::vector<Eigen::Vector3d>>> WayOf(Session* session
 Eigen::Vector3d PointOf(const v1::Vector3& point) { return {point.x(), point.y(), point.z()}; }
 
 Polygon2d OutlineOf(const v1::Node& node) {
-  // Outlines are the same in all layers, and the map's own ones are not known here.
+  // The outline does not depend on the layer, and layers of the map are unknown here.
   v1::Node bare = node;
   bare.set_layer("objects");
   const auto plain = FromProto(bare, LayerTable());

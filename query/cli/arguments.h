@@ -1,28 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a command line says, as plain values. Times and names stay text here: what they mean depends
-// on the map, which nobody has opened yet.
+// What a command line says, as plain values. Times and names stay text here: their meaning depends
+// on the map, which is not open yet.
 #pragma once
 
+#include <any>
 #include <cstdint>
 #include <functional>
 #include <optional>
 #include <ostream>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "query/cli/options_agents.h"
-#include "query/cli/options_graph.h"
-#include "query/cli/options_keep.h"
-#include "query/cli/options_maps.h"
-#include "query/cli/options_merge.h"
-#include "query/cli/options_prune.h"
-#include "query/cli/options_space.h"
 
 namespace dsg::cli {
 
-/// What the surroundings of the process give; options on the command line win over it.
+/// The environment of the process; options on the command line override it.
 struct Environment {
   /// DSG_STORE, DSG_SERVER, DSG_MAP; empty = not set.
   std::string store{};
@@ -32,52 +25,82 @@ struct Environment {
   std::string version{};
 };
 
-/// What several verbs share.
+/// Options that several verbs share.
 struct CommonOptions {
-  /// At most one of both is set.
+  /// At most one of the two is set.
   std::string store;
   std::string server;
-  /// Empty = the store's only map.
+  /// Empty = the only map of the store.
   std::string map;
+  /// `map` comes from DSG_MAP.
+  bool map_is_default = false;
   std::optional<int64_t> revision;
-  /// The revision by its name; with `revision` unset.
+  /// The revision by its tag; then `revision` is unset.
   std::string tag;
   bool json = false;
-  /// Most entries listed; 0 = all.
+  /// Maximum number of entries; 0 = all.
   int64_t limit = 0;
-  /// Bound on each call, seconds; 0 = none on a store, the client's default on a server.
+  /// Deadline of each call, seconds; 0 = none on a store, the client's default on a server.
   double timeout_s = 0.0;
+};
+
+/// The parts of a node filter; empty = any.
+struct FilterOptions {
+  std::string layer;
+  std::string kind;
+  std::string class_name;
+  std::string at;
+};
+
+/// Where the picture of an answer goes.
+struct PictureOptions {
+  /// Empty = no picture.
+  std::string png;
+  /// A level or room by id or name, or a height; empty = all floors.
+  std::string floor;
+  int width_px = 1600;
+  /// Replace an existing file.
+  bool force = false;
+};
+
+/// A revision by number or by tag; neither = the default of the verb.
+struct RevisionOption {
+  std::optional<int64_t> number;
+  std::string tag;
+
+  bool is_set() const { return number.has_value() || !tag.empty(); }
 };
 
 class Session;
 
-/// A verb that stands in one file, with its options and what it does; see verb_list.h. It asks
-/// about one map.
-struct OwnVerb {
-  /// Asks, then writes the answer to `out`; nothing on an error.
-  std::function<absl::Status(Session* session, std::ostream& out)> run;
+/// What a verb needs open before it runs.
+enum class Opens {
+  /// The verb opens files and stores itself, or needs none.
+  kNothing,
+  /// A store or a server.
+  kPlace,
+  /// A store or a server, and one map of it.
+  kMap,
 };
-
-/// The user asked how to use the program.
-struct HelpVerb {
-  std::string text;
-};
-
-using Verb = std::variant<WhereVerb, TrackVerb, ShapeVerb, WhoVerb, MetVerb, PickedVerb,
-                          PredictVerb, ListVerb, EdgesVerb, ShowVerb, NearVerb, FindVerb,
-                          AroundVerb, SubgraphVerb, PathVerb, CollideVerb, LogVerb, DiffVerb,
-                          WatchVerb, StatsVerb, MapsVerb, VersionVerb, VerifyVerb, UpgradeVerb,
-                          TagVerb, CompactVerb, RevertVerb, BackupVerb, RestoreVerb, MergeVerb,
-                          PruneVerb, ImportVerb, ExportVerb, MapVerb, OwnVerb, HelpVerb>;
 
 struct Command {
   CommonOptions common;
-  Verb verb;
+  /// Text to print instead of running a verb; empty = run.
+  std::string help;
+  Opens opens = Opens::kNothing;
+  /// DSG_MAP is the default of --map.
+  bool uses_map_variable = true;
+  /// The options of the verb, of its own type.
+  std::any verb;
+  /// Checks options that depend on each other; may be empty.
+  std::function<absl::Status(const CommonOptions& common)> check;
+  /// Writes the answer to `out`; nothing on an error.
+  std::function<absl::Status(Session* session, std::ostream& out)> run;
 };
 
 /// Reads a command line without the program's name.
 ///
-/// Errors: INVALID_ARGUMENT naming the option and what to do.
+/// Errors: INVALID_ARGUMENT with the option and what to do.
 absl::StatusOr<Command> ParseArguments(const std::vector<std::string>& arguments,
                                        const Environment& environment);
 

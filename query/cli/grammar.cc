@@ -2,13 +2,54 @@
 #include "query/cli/grammar.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <functional>
 
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "query/cli/export/top_view.h"
-#include "query/cli/number_checks.h"
 
 namespace dsg::cli {
+namespace {
+
+// Empty if the text is a revision or may be a tag; else what is wrong.
+std::string RevisionProblem(const std::string& text) {
+  int64_t number = 0;
+  if (absl::SimpleAtoi(text, &number) && number >= 0) return "";
+  const bool is_number =
+      !text.empty() && text.find_first_not_of("+-.0123456789") == std::string::npos;
+  if (!text.empty() && !is_number) return "";
+  return absl::StrCat("\"", text, "\" is neither a revision number, from 0 on, nor a tag");
+}
+
+// CLI11 puts the option's name before what a check says; empty means that the text passes.
+CLI::Validator NumberCheck(const std::string& form, const std::string& what,
+                           const std::function<bool(const std::string&)>& passes) {
+  return CLI::Validator(
+      [what, passes](const std::string& text) {
+        return passes(text) ? std::string() : absl::StrCat("\"", text, "\" is not ", what);
+      },
+      form);
+}
+
+CLI::Validator RealCheck(const std::string& form, const std::string& what,
+                         const std::function<bool(double)>& passes) {
+  return NumberCheck(form, what, [passes](const std::string& text) {
+    double number = 0.0;
+    return absl::SimpleAtod(text, &number) && std::isfinite(number) && passes(number);
+  });
+}
+
+CLI::Validator WholeCheck(const std::string& form, const std::string& what, int64_t low) {
+  return NumberCheck(form, what, [low](const std::string& text) {
+    int64_t number = 0;
+    return absl::SimpleAtoi(text, &number) && number >= low;
+  });
+}
+
+}  // namespace
 
 absl::Status Usage(const std::string& message, const std::string& verb) {
   return absl::InvalidArgumentError(
@@ -21,34 +62,38 @@ Grammar::Grammar() {
   app_.footer(kTimeHelp);
 }
 
-CLI::App* Grammar::AddApp(const std::string& name, const std::string& what, unsigned takes) {
+CLI::App* Grammar::AddApp(const std::string& name, const std::string& what,
+                          const std::string& example, const std::string& footer, unsigned takes) {
   CLI::App* app = app_.add_subcommand(name, what);
-  app->footer(ExampleOf(name) + kTimeHelp);
+  app->footer(
+      absl::StrCat("Example: dsg ", name, example.empty() ? "" : " ", example, "\n", footer));
   CommonOptions& common = command_.common;
   app->add_option("--store", common.store, "Folder of the store (or DSG_STORE)");
   if (takes & kServer) {
     app->add_option("--server", common.server,
                     "unix:PATH or HOST:PORT of a dsg-server (or DSG_SERVER)");
-    app->add_option("--timeout", common.timeout_s, "Bound on each call, seconds")
+    app->add_option("--timeout", common.timeout_s, "Deadline of each call, seconds")
         ->check(Between(0.001, 86400.0));
   }
   if (takes & kMap) {
-    app->add_option("--map", common.map, "Name of the map (or DSG_MAP); may be left out if alone");
+    app->add_option("--map", common.map,
+                    "Name of the map (or DSG_MAP); default the only map of the store");
   }
+  if (takes & kMapFilter) app->add_option("--map", common.map, "Only this map; default all");
   if (takes & kRevision) {
-    AddRevision(app, "--revision", "As believed at this revision or tag; default newest",
-                &revision_);
+    AddRevision(app, "--revision", "Read at this revision or tag; default the newest", &revision_);
   }
   if (takes & kJson) app->add_flag("--json", common.json, "Print the reply as protobuf JSON");
   if (takes & kLimit) {
-    app->add_option("--limit", common.limit, "List at most this many")->check(WholeAboveZero());
+    app->add_option("--limit", common.limit, "List at most this many entries")
+        ->check(WholeAboveZero());
   }
   return app;
 }
 
 absl::Status Grammar::Parse(std::vector<std::string> arguments) {
   // CLI11 would only say that a subcommand is missing.
-  if (arguments.empty()) return Usage("say what is wanted: where, who, find, path, ...", "");
+  if (arguments.empty()) return Usage("name a verb: where, who, find, path, ...", "");
   if (arguments[0] == "--version") arguments[0] = "version";
   const std::string first = arguments[0];
   const auto is_first = [&](const CLI::App* verb) { return verb->check_name(first); };
@@ -61,8 +106,8 @@ absl::Status Grammar::Parse(std::vector<std::string> arguments) {
   try {
     app_.parse(std::move(arguments));
   } catch (const CLI::CallForHelp&) {
-    // Help of the verb that was named, if one was.
-    command_.verb = HelpVerb{app_.help()};
+    // The help of the verb, if one is named.
+    command_.help = app_.help();
   } catch (const CLI::ExtrasError&) {
     return Usage(absl::StrCat("not understood: ", absl::StrJoin(app_.remaining(true), " ")),
                  is_verb ? first : "");
@@ -82,13 +127,49 @@ void AddFilter(CLI::App* app, FilterOptions* filter) {
 }
 
 void AddPicture(CLI::App* app, const std::string& what, PictureOptions* picture) {
-  CLI::Option* png = app->add_option("--png", picture->png, "Also draw " + what + " on the map");
+  CLI::Option* png =
+      app->add_option("--png", picture->png, "Also draw " + what + " on the map, to this PNG file");
   app->add_option("--floor", picture->floor, kFloorHelp)->needs(png);
-  app->add_option("--width", picture->width_px, "Pixels of the picture; the height follows")
+  app->add_option("--width", picture->width_px, "Width of the picture, pixels")
       ->check(Between(kTopViewWidthMin, kTopViewWidthMax))
       ->capture_default_str()
       ->needs(png);
-  app->add_flag("--force", picture->force, "Replace a picture that is there")->needs(png);
+  app->add_flag("--force", picture->force, "Replace an existing picture")->needs(png);
+}
+
+CLI::Option* AddRevision(CLI::App* app, const std::string& name, const std::string& what,
+                         RevisionOption* revision) {
+  const auto take = [revision](const std::string& text) {
+    int64_t number = 0;
+    if (absl::SimpleAtoi(text, &number)) {
+      revision->number = number;
+    } else {
+      revision->tag = text;
+    }
+  };
+  return app->add_option_function<std::string>(name, take, what)
+      ->check(CLI::Validator(RevisionProblem, "REVISION|TAG"));
+}
+
+CLI::Validator AboveZero() {
+  return RealCheck("POSITIVE", "a number above zero", [](double number) { return number > 0.0; });
+}
+
+CLI::Validator ZeroOrMore() {
+  return RealCheck("NONNEGATIVE", "a number of at least zero",
+                   [](double number) { return number >= 0.0; });
+}
+
+CLI::Validator WholeAboveZero() { return WholeCheck("POSITIVE", "a whole number above zero", 1); }
+
+CLI::Validator WholeZeroOrMore() {
+  return WholeCheck("NONNEGATIVE", "a whole number of at least zero", 0);
+}
+
+CLI::Validator Between(double low, double high) {
+  return RealCheck(absl::StrCat("in [", low, " - ", high, "]"),
+                   absl::StrCat("a number from ", low, " to ", high),
+                   [low, high](double number) { return number >= low && number <= high; });
 }
 
 }  // namespace dsg::cli

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parser of command lines, to which each family of verbs adds its own.
-// Refuses to judge what options mean together: that is arguments.cc.
+// The parser of command lines. Each verb describes itself to it; see verb_factors.cc.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -14,56 +13,73 @@
 
 namespace dsg::cli {
 
-/// Which of the common options a verb takes; --store goes with all of them.
+/// Which of the common options a verb takes; all verbs take --store.
 enum Takes : unsigned {
   kServer = 1,
   kMap = 2,
-  kRevision = 4,
-  kJson = 8,
-  kLimit = 16,
+  /// --map without DSG_MAP as its default: for verbs that by default work on all maps.
+  kMapFilter = 4,
+  kRevision = 8,
+  kJson = 16,
+  kLimit = 32,
   kQuestion = kServer | kMap | kRevision | kJson,
 };
 
 inline constexpr char kTimeHelp[] =
     "TIME is +12.5s from the map's epoch, RFC 3339, or nanoseconds.\n"
     "Exit codes: 0 found, 1 not found, 2 usage, 3 unavailable, 4 data loss.";
+inline constexpr char kAgentHelp[] = "Node id (H12) or the name in the log (12)";
+inline constexpr char kNodeHelp[] = "Node id (O42) or a unique name";
+inline constexpr char kMapFromHelp[] = "First TIME; default the first pose of the map";
+inline constexpr char kMapToHelp[] = "TIME to stop before; default after the last pose";
+inline constexpr char kFloorHelp[] =
+    "Draw only this floor: a level or room by id or name, or a height in metres";
 
-/// INVALID_ARGUMENT that says where help is; `verb` may be empty.
+/// A verb. `V` holds its own options.
+template <class V>
+struct VerbSpec {
+  std::string name{};
+  /// One line for the list of verbs.
+  std::string what{};
+  /// Arguments of an example that works in the world of ./dev demo.
+  std::string example{};
+  unsigned takes = kQuestion;
+  Opens opens = Opens::kMap;
+  /// Writes the answer to `out`; nothing on an error.
+  absl::Status (*run)(Session* session, const V& verb, std::ostream& out) = nullptr;
+  /// Checks options that depend on each other, before anything is opened.
+  absl::Status (*check)(const V& verb, const CommonOptions& common) = nullptr;
+  /// The end of the help, after the example.
+  std::string footer = kTimeHelp;
+};
+
+/// INVALID_ARGUMENT that refers to the help; `verb` may be empty.
 absl::Status Usage(const std::string& message, const std::string& verb);
-
-/// A command line of the verb to begin with, on its own line.
-std::string ExampleOf(const std::string& verb);
 
 class Grammar {
  public:
   Grammar();
 
-  /// A verb with the common options it takes. The second is what its own options may write to; it
-  /// lives as long as the first, and becomes the command's verb if this verb is named.
+  /// Adds a verb. The verb's own options are added to the first, and write to the second, which
+  /// lives as long as the first.
   template <class V>
-  std::pair<CLI::App*, V*> Add(const std::string& name, const std::string& what, unsigned takes) {
-    CLI::App* app = AddApp(name, what, takes);
+  std::pair<CLI::App*, V*> Add(const VerbSpec<V>& spec) {
+    CLI::App* app = AddApp(spec.name, spec.what, spec.example, spec.footer, spec.takes);
     const auto verb = std::make_shared<V>();
-    app->callback([this, verb] { command_.verb = *verb; });
-    return {app, verb.get()};
-  }
-
-  /// A verb that asks about one map by `run(session, options, out)`. `example` is its command line
-  /// without "dsg" and its name.
-  template <class Options>
-  std::pair<CLI::App*, Options*> AddOwn(
-      const std::string& name, const std::string& what, const std::string& example,
-      absl::Status (*run)(Session* session, const Options& options, std::ostream& out),
-      unsigned takes = kQuestion) {
-    CLI::App* app = AddApp(name, what, takes);
-    app->footer("Example: dsg " + name + " " + example + "\n" + kTimeHelp);
-    const auto options = std::make_shared<Options>();
-    app->callback([this, options, run] {
-      command_.verb = OwnVerb{[options, run](Session* session, std::ostream& out) {
-        return run(session, *options, out);
-      }};
+    app->callback([this, verb, spec] {
+      command_.opens = spec.opens;
+      command_.uses_map_variable = (spec.takes & kMap) != 0;
+      command_.verb = *verb;
+      if (spec.check != nullptr) {
+        command_.check = [verb, check = spec.check](const CommonOptions& common) {
+          return check(*verb, common);
+        };
+      }
+      command_.run = [verb, run = spec.run](Session* session, std::ostream& out) {
+        return run(session, *verb, out);
+      };
     });
-    return {app, options.get()};
+    return {app, verb.get()};
   }
 
   CommonOptions* common() { return &command_.common; }
@@ -72,15 +88,13 @@ class Grammar {
   const Command& command() const { return command_; }
 
  private:
-  CLI::App* AddApp(const std::string& name, const std::string& what, unsigned takes);
+  CLI::App* AddApp(const std::string& name, const std::string& what, const std::string& example,
+                   const std::string& footer, unsigned takes);
 
-  CLI::App app_{"Asks a store of dynamic scene graphs, or a server, where and when."};
+  CLI::App app_{"Asks a store of dynamic scene graphs, or a server."};
   Command command_;
   RevisionOption revision_;
 };
-
-inline constexpr char kFloorHelp[] =
-    "Draw only this floor: a level or room by id or name, or a height in metres";
 
 // Options that several verbs have.
 void AddFilter(CLI::App* app, FilterOptions* filter);
@@ -89,17 +103,13 @@ void AddPicture(CLI::App* app, const std::string& what, PictureOptions* picture)
 CLI::Option* AddRevision(CLI::App* app, const std::string& name, const std::string& what,
                          RevisionOption* revision);
 
-// The families of verbs: grammar_*.cc.
-void AddAgentVerbs(Grammar* grammar);
-void AddMeetingVerbs(Grammar* grammar);
-void AddGraphVerbs(Grammar* grammar);
-void AddSearchVerbs(Grammar* grammar);
-void AddSpaceVerbs(Grammar* grammar);
-void AddMapVerbs(Grammar* grammar);
-void AddRevisionVerbs(Grammar* grammar);
-void AddFileVerbs(Grammar* grammar);
-void AddKeepVerbs(Grammar* grammar);
-void AddMergeVerb(Grammar* grammar);
-void AddPruneVerb(Grammar* grammar);
+// Checks of numbers. They refuse NaN and infinities, which the checks of CLI11 let through or print
+// with 309 digits.
+CLI::Validator AboveZero();
+CLI::Validator ZeroOrMore();
+CLI::Validator WholeAboveZero();
+CLI::Validator WholeZeroOrMore();
+/// Both ends are allowed.
+CLI::Validator Between(double low, double high);
 
 }  // namespace dsg::cli

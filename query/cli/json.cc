@@ -7,6 +7,8 @@
 #include <google/protobuf/util/json_util.h>
 #include <google/protobuf/util/type_resolver_util.h>
 
+#include <algorithm>
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "absl/status/statusor.h"
@@ -18,8 +20,8 @@ namespace {
 
 namespace util = google::protobuf::util;
 
-// MessageToJsonString would print maps in the order in which they lie in memory, which is another
-// one for a reply that came over the wire.
+// MessageToJsonString prints maps in their order in memory, which differs for a reply that came
+// over the wire.
 util::Status SortedJson(const google::protobuf::Message& reply,
                         const util::JsonPrintOptions& options, std::string* text) {
   std::string bytes;
@@ -64,7 +66,7 @@ absl::Status WriteJsonLine(const google::protobuf::Message& reply, std::ostream&
 
 absl::Status JsonListWriter::Add(const google::protobuf::Message& part) {
   DSG_ASSIGN_OR_RETURN(const std::string text, ToText(part, /*on_one_line=*/false));
-  // Line ends stand between fields only, and what is deeper stands further to the right.
+  // Newlines stand between fields only, and deeper fields are indented further.
   const std::string head = absl::StrCat("\n \"", list_, "\": [");
   const size_t begin = text.find(head) + head.size();
   const size_t end = text[begin] == ']' ? begin : text.find("\n ]", begin);
@@ -83,6 +85,29 @@ absl::Status JsonListWriter::Add(const google::protobuf::Message& part) {
 void JsonListWriter::End() {
   if (has_entries_) out_ << "\n ";
   out_ << rest_;
+}
+
+void TellWritten(const std::vector<Written>& files, Revision revision, bool as_json,
+                 std::ostream& out) {
+  // Numbers are strings, like the 64-bit integers of protobuf JSON.
+  nlohmann::ordered_json json = {{"read_revision", std::to_string(revision)},
+                                 {"files", nlohmann::ordered_json::array()}};
+  for (const Written& file : files) {
+    std::string text = absl::StrCat("wrote ", file.path, ": ");
+    nlohmann::ordered_json one = {{"format", file.format}, {"path", file.path}};
+    for (const auto& [what, count] : file.counts) {
+      absl::StrAppend(&text, count, " ", what, ", ");
+      std::string key = what;
+      std::replace(key.begin(), key.end(), ' ', '_');
+      one[key] = std::to_string(count);
+    }
+    one["byte_count"] = std::to_string(file.byte_count);
+    json["files"].push_back(std::move(one));
+    if (!as_json) out << text << file.byte_count << " bytes (revision " << revision << ")\n";
+  }
+  if (as_json) {
+    out << json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << "\n";
+  }
 }
 
 }  // namespace dsg::cli

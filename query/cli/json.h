@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// Replies for machines: protobuf JSON with the field names of the .proto files.
+// Answers for programs: protobuf JSON with the field names of the .proto files, and reports of the
+// files that a verb has written.
 #pragma once
 
+#include <cstdint>
 #include <ostream>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/status/status.h"
+#include "schema/model/revision.h"
 
 namespace google::protobuf {
 class Message;
@@ -14,22 +18,22 @@ class Message;
 
 namespace dsg::cli {
 
-/// One JSON object and a line end. Zeros and empty strings are written too, so that scripts may
-/// count on every field that is not a message; 64-bit integers are strings, as protobuf has it.
+/// One JSON object and a newline. Fields with zeros and empty strings are written too, so every
+/// field that is not a message is there; 64-bit integers are strings, as in protobuf JSON.
 absl::Status WriteJson(const google::protobuf::Message& reply, std::ostream& out);
 
-/// The same on one line, for answers that come one after the other.
+/// The same on one line, for streams of answers.
 absl::Status WriteJsonLine(const google::protobuf::Message& reply, std::ostream& out);
 
-/// Writes a reply that comes in parts as WriteJson would write it whole, and keeps none of them:
-/// one list of it grows from part to part, all else stands in the first.
+/// Writes a reply that arrives in parts, with the bytes that WriteJson writes for the whole,
+/// without keeping the parts: one list grows from part to part, everything else is in the first.
 class JsonListWriter {
  public:
   /// `list` is a repeated message field of the reply. `out` must outlive this.
   JsonListWriter(std::string list, std::ostream* out) : list_(std::move(list)), out_(*out) {}
 
   absl::Status Add(const google::protobuf::Message& part);
-  /// Writes what stands after the list; nothing if there was no part.
+  /// Writes what follows the list; nothing if there was no part.
   void End();
 
  private:
@@ -37,8 +41,21 @@ class JsonListWriter {
   std::ostream& out_;
   bool has_begun_ = false;
   bool has_entries_ = false;
-  /// From the end of the list on.
+  /// What follows the list.
   std::string rest_;
 };
+
+/// A file that a verb has written. Reported at the end, since a later file may fail.
+struct Written {
+  std::string format;
+  std::string path;
+  int64_t byte_count = 0;
+  /// Counts of its contents: "vertices", "faces", ...
+  std::vector<std::pair<std::string, int64_t>> counts;
+};
+
+/// One line per file, or one JSON object.
+void TellWritten(const std::vector<Written>& files, Revision revision, bool as_json,
+                 std::ostream& out);
 
 }  // namespace dsg::cli

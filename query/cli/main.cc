@@ -18,7 +18,7 @@ std::string FromEnvironment(const char* name) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  // A file over the limit of the shell is a failed write with a message, not a sudden end.
+  // Beyond the file-size limit of the shell a write fails with a message, instead of a signal.
   std::signal(SIGXFSZ, SIG_IGN);
   const dsg::cli::Environment environment{.store = FromEnvironment("DSG_STORE"),
                                           .server = FromEnvironment("DSG_SERVER"),

@@ -8,23 +8,23 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/map_service.pb.h"
 #include "dsg/v1/query_service.pb.h"
-#include "query/cli/paging.h"
+#include "query/cli/session.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 
 namespace dsg::cli {
 namespace {
 
-// Closer to the last pose kept than this, a pose changes no picture.
+// Poses closer to the last kept pose than this do not change a picture.
 constexpr double kStepM = 0.02;
 
-// Ids that no map gives to its own layers' names; they only tell layers apart here.
+// Ids for layers that the map added. No map uses them; here they only need to differ.
 constexpr LayerId kFirstMadeUpLayer = 1'000'000;
 
-class Reader {
+class ContentReader {
  public:
-  Reader(const Session& session, query::Api* api, const ContentOptions& options)
-      : session_(session), api_(*api), options_(options) {}
+  ContentReader(Session* session, const ContentOptions& options)
+      : session_(*session), options_(options) {}
 
   absl::StatusOr<ContentAnswer> Read() {
     DSG_RETURN_IF_ERROR(ReadStats());
@@ -36,7 +36,7 @@ class Reader {
   }
 
  private:
-  // Later requests name the revision that the first answer was read at.
+  // Later requests read at the revision of the first answer.
   template <class Request>
   Request Begin() const {
     Request request;
@@ -51,7 +51,7 @@ class Reader {
       request.mutable_read_at()->set_exact_revision(*options_.revision);
     }
     v1::GetMapStatsResponse reply;
-    DSG_RETURN_IF_ERROR(api_.GetMapStats(session_.NewCall(), request, &reply));
+    DSG_RETURN_IF_ERROR(session_.api().GetMapStats(session_.NewCall(), request, &reply));
     MapContent& content = answer_.content;
     content.spec = session_.map();
     content.revision = reply.header().read_revision();
@@ -75,12 +75,9 @@ class Reader {
     auto request = Begin<v1::ListNodesRequest>();
     if (options_.at_ns.has_value()) request.mutable_filter()->set_at_ns(*options_.at_ns);
     const LayerTable layers(answer_.content.layers);
-    const auto fetch = [&](const v1::ListNodesRequest& next, v1::ListNodesResponse* page) {
-      return api_.ListNodes(session_.NewCall(), next, page);
-    };
-    const auto count = [](const v1::ListNodesResponse& page) { return page.nodes_size(); };
     v1::ListNodesResponse all;
-    DSG_RETURN_IF_ERROR(FetchPages(request, 0, count, fetch, &all));
+    DSG_RETURN_IF_ERROR(session_.ReadPages(&query::Api::ListNodes, request, 0,
+                                           &v1::ListNodesResponse::nodes_size, &all));
     for (const v1::Node& in : all.nodes()) {
       DSG_ASSIGN_OR_RETURN(Node node, FromProto(in, layers));
       if (IsAgentKind(node.kind) && !options_.with_agents) continue;
@@ -92,12 +89,9 @@ class Reader {
   absl::Status ReadEdges() {
     auto request = Begin<v1::ListEdgesRequest>();
     if (options_.at_ns.has_value()) request.set_at_ns(*options_.at_ns);
-    const auto fetch = [&](const v1::ListEdgesRequest& next, v1::ListEdgesResponse* page) {
-      return api_.ListEdges(session_.NewCall(), next, page);
-    };
-    const auto count = [](const v1::ListEdgesResponse& page) { return page.edges_size(); };
     v1::ListEdgesResponse all;
-    DSG_RETURN_IF_ERROR(FetchPages(request, 0, count, fetch, &all));
+    DSG_RETURN_IF_ERROR(session_.ReadPages(&query::Api::ListEdges, request, 0,
+                                           &v1::ListEdgesResponse::edges_size, &all));
     const auto nodes = NodesById(answer_.content);
     for (const v1::Edge& in : all.edges()) {
       DSG_ASSIGN_OR_RETURN(Edge edge, FromProto(in));
@@ -155,14 +149,14 @@ class Reader {
                                         return broken.ok();
                                       }));
     DSG_RETURN_IF_ERROR(broken);
-    // The very last position is shown as such, however short the step to it.
+    // The last position is kept, however close it is to the one before.
     if (last_ns.has_value() && track.pieces.back().back() != last_map) {
       track.pieces.back().push_back(last_map);
     }
     return track;
   }
 
-  // A server of another make must not lead us out of our own lists.
+  // Indices from a faulty server must not lead outside the lists.
   static absl::Status CheckBlock(const MeshBlock& block) {
     const size_t count = block.positions_map.size();
     const auto fits = [count](size_t size) { return size == 0 || size == count; };
@@ -193,17 +187,15 @@ class Reader {
     return broken;
   }
 
-  const Session& session_;
-  query::Api& api_;
+  Session& session_;
   const ContentOptions options_;
   ContentAnswer answer_;
 };
 
 }  // namespace
 
-absl::StatusOr<ContentAnswer> ReadContent(const Session& session, query::Api* api,
-                                          const ContentOptions& options) {
-  return Reader(session, api, options).Read();
+absl::StatusOr<ContentAnswer> ReadContent(Session* session, const ContentOptions& options) {
+  return ContentReader(session, options).Read();
 }
 
 }  // namespace dsg::cli

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Asks a store or a server for all of a map at once.
-// Refuses to mix revisions: everything is read at the revision of the first answer.
+// Reads the whole content of a map from a store or a server, all at one revision.
 #pragma once
 
 #include <optional>
@@ -14,26 +13,25 @@
 namespace dsg::cli {
 
 struct ContentOptions {
-  /// The world at this instant, tracks up to it; unset = what has not ended, whole tracks.
+  /// The world at this instant, with tracks up to it; unset = all that has not ended, whole tracks.
   std::optional<TimeNs> at_ns{};
   bool with_mesh = true;
-  /// False: without agents, as they are no part of the building.
+  /// False: only the building, without agents.
   bool with_agents = true;
   /// Also every pose of the tracks.
   bool with_poses = false;
-  /// As believed then; unset = as the session asks.
+  /// Unset = the revision that the session asks for.
   std::optional<Revision> revision{};
 };
 
 struct ContentAnswer {
   MapContent content;
-  /// The last pose of all agents, where there is any.
+  /// The time of the last pose of all agents; unset without poses.
   std::optional<TimeNs> last_pose_ns;
 };
 
 /// Requires: the session's map is chosen.
 /// Errors: of the calls; DATA_LOSS when the answers contradict each other.
-absl::StatusOr<ContentAnswer> ReadContent(const Session& session, query::Api* api,
-                                          const ContentOptions& options);
+absl::StatusOr<ContentAnswer> ReadContent(Session* session, const ContentOptions& options);
 
 }  // namespace dsg::cli

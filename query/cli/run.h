@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The whole program but for its surroundings: a command line in, text and an exit code out.
+// The program dsg without its process: a command line in, text and an exit code out.
 #pragma once
 
 #include <ostream>
@@ -11,7 +11,7 @@
 namespace dsg::cli {
 
 /// `arguments` without the program's name. Answers go to `out`; errors and progress to `errors`.
-/// Returns the exit code, see exit_code.h.
+/// Returns the exit code, see errors.h.
 int Run(const std::vector<std::string>& arguments, const Environment& environment,
         std::ostream& out, std::ostream& errors);
 

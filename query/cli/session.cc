@@ -20,7 +20,7 @@ std::string PlaceOf(const CommonOptions& common) {
                                : absl::StrCat("server ", common.server);
 }
 
-// A program that asks one question has little use of what it keeps.
+// One question gains little from a large cache.
 constexpr size_t kCacheBytes = size_t{64} << 20;
 
 absl::StatusOr<std::unique_ptr<query::Api>> OpenApi(const CommonOptions& common) {
@@ -47,9 +47,9 @@ absl::StatusOr<v1::MapSpec> OnlyMap(const v1::ListMapsResponse& reply, const std
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<Session>> Session::Open(const CommonOptions& common) {
-  DSG_ASSIGN_OR_RETURN(std::unique_ptr<query::Api> api, OpenApi(common));
-  return std::unique_ptr<Session>(new Session(common, std::move(api)));
+absl::Status Session::Open() {
+  DSG_ASSIGN_OR_RETURN(api_, OpenApi(common_));
+  return absl::OkStatus();
 }
 
 absl::Status Session::ChooseMap() {
@@ -71,10 +71,11 @@ absl::Status Session::ChooseMap() {
 }
 
 query::CallContext Session::NewCall() const {
-  using Clock = query::CallContext::Clock;
+  using CallClock = query::CallContext::Clock;
   if (common_.timeout_s <= 0.0) return query::CallContext();
-  return query::CallContext(Clock::now() + std::chrono::duration_cast<Clock::duration>(
-                                               std::chrono::duration<double>(common_.timeout_s)));
+  return query::CallContext(CallClock::now() +
+                            std::chrono::duration_cast<CallClock::duration>(
+                                std::chrono::duration<double>(common_.timeout_s)));
 }
 
 }  // namespace dsg::cli

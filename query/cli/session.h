@@ -1,37 +1,84 @@
 // SPDX-License-Identifier: Apache-2.0
-// One run's way to its answers: the store or server asked, the map and the revision meant.
+// One run of the program: the store or server it asks, the map and revision it means; reading
+// streams and pages.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <functional>
+#include <limits>
 #include <memory>
-#include <optional>
+#include <ostream>
 #include <string>
 #include <utility>
 
 #include "absl/status/statusor.h"
 #include "query/api/api.h"
+#include "query/cli/answer_text.h"
 #include "query/cli/arguments.h"
-#include "query/cli/time_text.h"
+#include "schema/base/status.h"
 #include "schema/model/layer.h"
 
 namespace dsg::cli {
 
+/// Largest page of the services.
+inline constexpr int64_t kPageSizeMax = 1000;
+
+/// The maximum number of entries; `limit` 0 = no maximum.
+inline int64_t EntriesLeft(int64_t limit) {
+  return limit == 0 ? std::numeric_limits<int64_t>::max() : limit;
+}
+
+/// Calls `fetch(request, &page)` page by page, until the list ends or `all` has `limit` entries
+/// (0 = all). The next_page_token of `all` is set only if entries are left out. `count(page)` is
+/// the number of entries of a page.
+template <class Request, class Reply, class Count, class Fetch>
+absl::Status FetchPages(Request request, int64_t limit, const Count& count, const Fetch& fetch,
+                        Reply* all) {
+  for (int64_t left = EntriesLeft(limit);;) {
+    request.set_page_size(static_cast<int32_t>(std::min(left, kPageSizeMax)));
+    Reply page;
+    DSG_RETURN_IF_ERROR(fetch(request, &page));
+    const std::string token = page.next_page_token();
+    left -= std::invoke(count, page);
+    all->MergeFrom(page);
+    all->set_next_page_token(token);
+    if (token.empty() || left <= 0) return absl::OkStatus();
+    request.set_page_token(token);
+  }
+}
+
 class Session {
  public:
-  /// Errors: as OpenStore and client::Connect.
-  static absl::StatusOr<std::unique_ptr<Session>> Open(const CommonOptions& common);
+  /// Opens nothing. `notes` takes what is for people only: progress, warnings, questions. It must
+  /// outlive this.
+  Session(CommonOptions common, std::string program_version, std::ostream* notes)
+      : common_(std::move(common)),
+        program_version_(std::move(program_version)),
+        notes_(*notes),
+        times_(map_) {}
 
-  /// Settles the map: the one named, or else the only one there is. To be called before map(),
-  /// times() and Begin().
-  /// Errors: NOT_FOUND/MAP_UNKNOWN; INVALID_ARGUMENT listing the maps when there are several.
+  /// Opens the store, or connects to the server. Call it before api().
+  /// Errors: as OpenStore and client::Connect.
+  absl::Status Open();
+
+  /// Chooses the map: the one named, or the only one there is. Call it before map(), times() and
+  /// Begin(). Requires: Open().
+  /// Errors: NOT_FOUND/MAP_UNKNOWN; INVALID_ARGUMENT with the names if there are several maps.
   absl::Status ChooseMap();
 
   query::Api& api() { return *api_; }
   const CommonOptions& common() const { return common_; }
+  const std::string& program_version() const { return program_version_; }
   const MapSpec& map() const { return map_; }
   const TimeText& times() const { return times_; }
+  std::ostream& notes() const { return notes_; }
 
-  /// Bounds of the next call, from now.
+  /// The answer is "no", which is not an error but has the exit code of NOT_FOUND.
+  void set_found(bool found) { found_ = found; }
+  bool found() const { return found_; }
+
+  /// Deadline of the next call, from now.
   query::CallContext NewCall() const;
 
   /// Reads a stream of the api with NewCall(); see query::ReadStream.
@@ -41,6 +88,18 @@ class Session {
                     const Request& request, const Take& take) const {
     const query::CallContext call = NewCall();
     return query::ReadStream(call, (api_.get()->*method)(call, request), take);
+  }
+
+  /// Reads all pages of a list, at most `limit` entries (0 = all); see FetchPages.
+  template <class Request, class Reply, class Count>
+  absl::Status ReadPages(absl::Status (query::Api::*method)(const query::CallContext&,
+                                                            const Request&, Reply*),
+                         const Request& request, int64_t limit, const Count& count,
+                         Reply* all) const {
+    const auto fetch = [&](const Request& next, Reply* page) {
+      return (api_.get()->*method)(NewCall(), next, page);
+    };
+    return FetchPages(request, limit, count, fetch, all);
   }
 
   /// A request about the map, at the revision asked for.
@@ -57,13 +116,13 @@ class Session {
   }
 
  private:
-  Session(const CommonOptions& common, std::unique_ptr<query::Api> api)
-      : common_(common), api_(std::move(api)), times_(map_) {}
-
   CommonOptions common_;
+  std::string program_version_;
+  std::ostream& notes_;
   std::unique_ptr<query::Api> api_;
   MapSpec map_;
   TimeText times_;
+  bool found_ = true;
 };
 
 }  // namespace dsg::cli

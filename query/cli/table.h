@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Columns of text for people: a heading line, then one line a row, each column as wide as its
-// widest cell. Refuses to let a name from a log write control codes to the terminal.
+// Tables of text for people: a heading line, then one line per row, each column as wide as its
+// widest cell. Control characters are replaced, so names from a log cannot control the terminal.
 #pragma once
 
 #include <cstdint>
@@ -30,12 +30,12 @@ class Table {
  public:
   explicit Table(std::vector<Column> columns) : columns_(std::move(columns)) {}
 
-  /// Cells that are missing at the end are empty. Requires: no more cells than columns.
+  /// Missing cells at the end are empty. Requires: no more cells than columns.
   void AddRow(std::vector<std::string> cells);
 
   size_t row_count() const { return rows_.size(); }
 
-  /// Lines end with '\n' and have no blanks at their end; two blanks part the columns.
+  /// Lines end with '\n', without trailing blanks; two blanks separate the columns.
   std::string Render() const;
 
  private:
@@ -45,7 +45,7 @@ class Table {
 
 using Field = std::pair<std::string, std::string>;
 
-/// One line a field, values aligned; fields without a value are left out.
+/// One line per field, values aligned; fields without a value are left out.
 std::string RenderFields(const std::vector<Field>& fields);
 
 }  // namespace dsg::cli

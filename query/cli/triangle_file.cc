@@ -45,7 +45,7 @@ std::optional<Type> TypeNamed(const std::string& name) {
 struct Property {
   std::string name;
   Type type = Type::kFloat;
-  // Of a list: what its length is written as.
+  // The type of the length; lists only.
   std::optional<Type> length_type;
 };
 
@@ -61,7 +61,7 @@ struct Header {
   size_t body_begin = 0;
 };
 
-// One word or one binary number after the other.
+// Reads one word or one binary number after the other.
 class Values {
  public:
   Values(const std::string& bytes, const Header& header)

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bodies that people bring as PLY files, for collision questions.
-// Refuses what is no mesh of triangles, and what is larger than the service takes.
+// Reads meshes of triangles from PLY files, as bodies of collision questions.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,9 +17,9 @@ struct Triangles {
   std::vector<std::array<uint32_t, 3>> faces;
 };
 
-/// ASCII or binary little-endian PLY with x, y, z a vertex and a list of indices a face; faces of
-/// more corners become fans.
-/// Errors: NOT_FOUND without the file; INVALID_ARGUMENT/FILE_MALFORMED saying what is wrong.
+/// ASCII or binary little-endian PLY with x, y, z per vertex and a list of indices per face; faces
+/// with more corners become fans of triangles. At most 64 MiB.
+/// Errors: NOT_FOUND without the file; INVALID_ARGUMENT/FILE_MALFORMED with the reason.
 absl::StatusOr<Triangles> ReadTriangles(const std::string& path);
 
 /// The same from the bytes of a file; `name` is for errors.

@@ -20,8 +20,8 @@ absl::Status BadValue(Reason reason, const std::string& option, const std::strin
                    {{"field", option}, {"value", text}});
 }
 
-// Whether a number of nanoseconds is so small that seconds may be meant: less than a second, or, on
-// a map of our days, less than three years after 1970.
+// True if a number is so small that it may mean seconds: less than a second in nanoseconds or, on a
+// map with a present-day epoch, less than three years after 1970.
 bool MayBeSeconds(TimeNs number, const MapSpec& map) {
   constexpr TimeNs kThreeYears = 100'000'000 * kNsPerSecond;
   const auto is_within = [](TimeNs time_ns, TimeNs limit) {
@@ -31,7 +31,7 @@ bool MayBeSeconds(TimeNs number, const MapSpec& map) {
   return is_within(number, is_within(map.epoch_ns, kThreeYears) ? kNsPerSecond : kThreeYears);
 }
 
-// As many as there are.
+// Any number of them.
 absl::StatusOr<std::vector<double>> SplitNumbers(const std::string& option, const std::string& text,
                                                  const std::string& form) {
   std::vector<double> numbers;
@@ -73,8 +73,9 @@ absl::StatusOr<Box3d> ParseBox(const std::string& option, const std::string& tex
                        ParseNumbers(option, text, 6, "X0,Y0,Z0,X1,Y1,Z1"));
   const Box3d box(Eigen::Vector3d(n[0], n[1], n[2]), Eigen::Vector3d(n[3], n[4], n[5]));
   if (box.isEmpty()) {
-    return BadValue(Reason::kBoxInverted, option, text,
-                    "the first corner is above the second; write the lower corner first");
+    return BadValue(
+        Reason::kBoxInverted, option, text,
+        "the first corner has a larger coordinate than the second; write the lower corner first");
   }
   return box;
 }
@@ -99,7 +100,7 @@ absl::StatusOr<Pose3d> ParsePose(const std::string& option, const std::string& t
   const Eigen::Quaterniond orientation(n[6], n[3], n[4], n[5]);
   if (!(orientation.norm() > kLengthMin)) {
     return BadValue(Reason::kFieldInvalid, option, text,
-                    "the quaternion has no length; write 0,0,0,1 for no rotation");
+                    "the quaternion has length zero; write 0,0,0,1 for no rotation");
   }
   pose.orientation = orientation.normalized();
   return pose;
@@ -109,7 +110,7 @@ absl::StatusOr<TimeNs> ParseDuration(const std::string& option, const std::strin
   const auto duration_ns = dsg::ParseTime(absl::StrCat("+", text), 0);
   if (!duration_ns.ok() || *duration_ns <= 0) {
     return BadValue(Reason::kFieldInvalid, option, text,
-                    "is not a duration above zero; write 0.5s or 200ms");
+                    "is not a positive duration; write 0.5s or 200ms");
   }
   return *duration_ns;
 }
@@ -126,11 +127,12 @@ absl::StatusOr<TimeNs> ParseInstant(const std::string& option, const std::string
   const auto time_ns = dsg::ParseTime(text, map.epoch_ns);
   if (!time_ns.ok()) return Annotate(time_ns.status(), option);
   if (is_number && MayBeSeconds(number, map)) {
-    return BadValue(Reason::kFieldInvalid, option, text,
-                    absl::StrCat("a number alone means nanoseconds on the map's clock, here ", text,
-                                 " ns; write \"", is_signed ? "" : "+", text,
-                                 "s\" for seconds from the map's begin",
-                                 is_signed ? "" : absl::StrCat(", or \"", text, "ns\"")));
+    return BadValue(
+        Reason::kFieldInvalid, option, text,
+        absl::StrCat("a number without a unit means nanoseconds on the map's clock, here ", text,
+                     " ns; write \"", is_signed ? "" : "+", text,
+                     "s\" for seconds from the epoch of the map",
+                     is_signed ? "" : absl::StrCat(", or \"", text, "ns\"")));
   }
   if (!is_number && !is_signed && map.clock != Clock::kUnix) {
     return BadValue(
@@ -138,7 +140,7 @@ absl::StatusOr<TimeNs> ParseInstant(const std::string& option, const std::string
         absl::StrCat("the map's clock is ",
                      map.clock == Clock::kPtpTai ? "TAI, some seconds ahead of UTC"
                                                  : "that of its log, which has no dates",
-                     "; write \"+12.5s\" from the map's begin"));
+                     "; write \"+12.5s\", from the epoch of the map"));
   }
   return *time_ns;
 }

@@ -10,7 +10,6 @@
 #include "query/cli/session.h"
 #include "query/cli/table.h"
 #include "query/cli/verb_list.h"
-#include "query/cli/written.h"
 #include "schema/archive/file_io.h"
 #include "schema/base/status.h"
 #include "schema/codec/checksum.h"
@@ -19,9 +18,9 @@
 namespace dsg::cli {
 namespace {
 
-struct AssetOptions {
+struct AssetVerb {
   std::string sha256;
-  /// Empty = only what the asset is.
+  /// Empty = only describe the asset.
   std::string out_file;
   bool force = false;
 };
@@ -43,9 +42,9 @@ std::string RenderAsset(const v1::GetAssetResponse& asset, const std::string& sh
                       asset.header().read_revision(), ")\n");
 }
 
-// The first message without content: all that is known of the asset beside its bytes.
-absl::Status Describe(Session* session, const v1::GetAssetRequest& request,
-                      const std::string& sha256, std::ostream& out) {
+// The first message without content describes the asset.
+absl::Status DescribeAsset(Session* session, const v1::GetAssetRequest& request,
+                           const std::string& sha256, std::ostream& out) {
   v1::GetAssetResponse first;
   DSG_RETURN_IF_ERROR(
       session->Read(&query::Api::GetAsset, request, [&](const v1::GetAssetResponse& message) {
@@ -58,10 +57,10 @@ absl::Status Describe(Session* session, const v1::GetAssetRequest& request,
   return absl::OkStatus();
 }
 
-// The file appears whole, and only if its bytes have the digest that was asked for.
-absl::Status Save(Session* session, const v1::GetAssetRequest& request, const AssetOptions& options,
-                  std::ostream& out) {
-  DSG_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(options.out_file, options.force));
+// The file appears only if all its bytes have the digest asked for.
+absl::Status SaveAsset(Session* session, const v1::GetAssetRequest& request, const AssetVerb& verb,
+                       std::ostream& out) {
+  DSG_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(verb.out_file, verb.force));
   Sha256Stream digest;
   int64_t revision = 0;
   absl::Status written;
@@ -75,35 +74,38 @@ absl::Status Save(Session* session, const v1::GetAssetRequest& request, const As
         return written.ok();
       }));
   DSG_RETURN_IF_ERROR(written);
-  if (ToHex(digest.Finish()) != absl::AsciiStrToLower(options.sha256)) {
+  if (ToHex(digest.Finish()) != absl::AsciiStrToLower(verb.sha256)) {
     return MakeError(Reason::kStoreCorrupt,
-                     absl::StrCat("the content of asset ", options.sha256,
+                     absl::StrCat("the content of asset ", verb.sha256,
                                   " does not have this SHA-256; verify the map with dsg verify"),
-                     {{"map", request.map()}, {"table", "asset"}, {"key", options.sha256}});
+                     {{"map", request.map()}, {"table", "asset"}, {"key", verb.sha256}});
   }
   DSG_RETURN_IF_ERROR(file.Commit());
-  TellWritten({{.format = "asset", .path = options.out_file, .byte_count = file.byte_count()}},
+  TellWritten({{.format = "asset", .path = verb.out_file, .byte_count = file.byte_count()}},
               revision, session->common().json, out);
   return absl::OkStatus();
 }
 
-absl::Status RunAsset(Session* session, const AssetOptions& options, std::ostream& out) {
+absl::Status RunAsset(Session* session, const AssetVerb& verb, std::ostream& out) {
   auto request = session->Begin<v1::GetAssetRequest>();
-  DSG_ASSIGN_OR_RETURN(*request.mutable_sha256(), DigestFromHex(options.sha256));
-  return options.out_file.empty() ? Describe(session, request, options.sha256, out)
-                                  : Save(session, request, options, out);
+  DSG_ASSIGN_OR_RETURN(*request.mutable_sha256(), DigestFromHex(verb.sha256));
+  return verb.out_file.empty() ? DescribeAsset(session, request, verb.sha256, out)
+                               : SaveAsset(session, request, verb, out);
 }
 
 }  // namespace
 
 void AddAssetVerb(Grammar* grammar) {
-  const auto [app, options] = grammar->AddOwn<AssetOptions>(
-      "asset", "What an asset (CAD model, topology) is; its content as a file",
-      "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad --out couch.ply", RunAsset);
-  app->add_option("SHA256", options->sha256, "SHA-256 of the content, 64 hexadecimal digits")
+  const auto [app, verb] = grammar->Add<AssetVerb>(
+      {.name = "asset",
+       .what = "Describe an asset (CAD model, topology), or write its content to a file",
+       .example =
+           "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad --out couch.ply",
+       .run = RunAsset});
+  app->add_option("SHA256", verb->sha256, "SHA-256 of the content, 64 hexadecimal digits")
       ->required();
-  CLI::Option* file = app->add_option("--out", options->out_file, "Write the content to this file");
-  app->add_flag("--force", options->force, "Replace a file that is there")->needs(file);
+  CLI::Option* file = app->add_option("--out", verb->out_file, "Write the content to this file");
+  app->add_flag("--force", verb->force, "Replace an existing file")->needs(file);
 }
 
 }  // namespace dsg::cli

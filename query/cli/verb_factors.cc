@@ -4,9 +4,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
+#include "query/cli/answer_text.h"
 #include "query/cli/json.h"
-#include "query/cli/paging.h"
-#include "query/cli/render_agents.h"
 #include "query/cli/session.h"
 #include "query/cli/table.h"
 #include "query/cli/values.h"
@@ -16,7 +15,7 @@
 namespace dsg::cli {
 namespace {
 
-struct FactorsOptions {
+struct FactorsVerb {
   std::string agent;
   std::string from;
   std::string to;
@@ -44,18 +43,13 @@ std::string RenderFactors(const v1::ListFactorsResponse& reply, const TimeText& 
                       reply.agent_id(), " (revision ", reply.header().read_revision(), ")\n");
 }
 
-absl::Status RunFactors(Session* session, const FactorsOptions& options, std::ostream& out) {
+absl::Status RunFactors(Session* session, const FactorsVerb& verb, std::ostream& out) {
   auto request = session->Begin<v1::ListFactorsRequest>();
-  request.set_agent(options.agent);
-  if (!options.from.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs from_ns,
-                         ParseInstant("--from", options.from, session->map()));
-    request.set_from_ns(from_ns);
-  }
-  if (!options.to.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs to_ns, ParseInstant("--to", options.to, session->map()));
-    request.set_to_ns(to_ns);
-  }
+  request.set_agent(verb.agent);
+  DSG_RETURN_IF_ERROR(SetInstant("--from", verb.from, session->map(), &request,
+                                 &v1::ListFactorsRequest::set_from_ns));
+  DSG_RETURN_IF_ERROR(
+      SetInstant("--to", verb.to, session->map(), &request, &v1::ListFactorsRequest::set_to_ns));
   const int64_t count_max = EntriesLeft(session->common().limit);
   v1::ListFactorsResponse all;
   DSG_RETURN_IF_ERROR(
@@ -75,12 +69,14 @@ absl::Status RunFactors(Session* session, const FactorsOptions& options, std::os
 }  // namespace
 
 void AddFactorsVerb(Grammar* grammar) {
-  const auto [app, options] =
-      grammar->AddOwn<FactorsOptions>("factors", "The pose-graph factors of an agent",
-                                      "body --from +10s --to +20s", RunFactors, kQuestion | kLimit);
-  app->add_option("AGENT", options->agent, "Node id (r0) or the log's name (body)")->required();
-  app->add_option("--from", options->from, "Factors that begin at this TIME or later");
-  app->add_option("--to", options->to, "Factors that begin before this TIME");
+  const auto [app, verb] = grammar->Add<FactorsVerb>({.name = "factors",
+                                                      .what = "The pose-graph factors of an agent",
+                                                      .example = "body --from +10s --to +20s",
+                                                      .takes = kQuestion | kLimit,
+                                                      .run = RunFactors});
+  app->add_option("AGENT", verb->agent, "Node id (r0) or the name in the log (body)")->required();
+  app->add_option("--from", verb->from, "Factors that begin at this TIME or later");
+  app->add_option("--to", verb->to, "Factors that begin before this TIME");
 }
 
 }  // namespace dsg::cli

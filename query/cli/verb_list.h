@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The verbs that stand each in one file, verb_NAME.cc: options, help, what they ask and print. A
-// new verb is added here.
+// The list of verbs, in the order of `dsg --help`. A new verb is added here.
 #pragma once
 
 #include <array>
@@ -9,9 +8,30 @@
 
 namespace dsg::cli {
 
+// Each stands in verb_NAME.cc or verbs_NAME.cc: options, help, request and text of the verb.
+void AddAgentVerbs(Grammar* grammar);
+void AddShapeVerb(Grammar* grammar);
+void AddMeetingVerbs(Grammar* grammar);
+void AddPredictVerb(Grammar* grammar);
+void AddGraphVerbs(Grammar* grammar);
+void AddSearchVerbs(Grammar* grammar);
+void AddSpaceVerbs(Grammar* grammar);
+void AddChangeVerbs(Grammar* grammar);
+void AddMapVerbs(Grammar* grammar);
+void AddImportVerb(Grammar* grammar);
+void AddStoreVerbs(Grammar* grammar);
+void AddExportVerbs(Grammar* grammar);
+void AddKeepVerbs(Grammar* grammar);
+void AddBackupVerbs(Grammar* grammar);
+void AddMergeVerb(Grammar* grammar);
+void AddPruneVerb(Grammar* grammar);
 void AddAssetVerb(Grammar* grammar);
 void AddFactorsVerb(Grammar* grammar);
 
-inline constexpr std::array kOwnVerbs = {&AddAssetVerb, &AddFactorsVerb};
+inline constexpr std::array kVerbs = {
+    &AddAgentVerbs,  &AddShapeVerb,   &AddMeetingVerbs, &AddPredictVerb, &AddGraphVerbs,
+    &AddSearchVerbs, &AddSpaceVerbs,  &AddChangeVerbs,  &AddMapVerbs,    &AddImportVerb,
+    &AddStoreVerbs,  &AddExportVerbs, &AddKeepVerbs,    &AddBackupVerbs, &AddMergeVerb,
+    &AddPruneVerb,   &AddAssetVerb,   &AddFactorsVerb};
 
 }  // namespace dsg::cli

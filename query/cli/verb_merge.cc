@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// The verb merge: another map of the same place, taken into this one.
+#include "query/cli/verb_merge.h"
+
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <iostream>
+#include <numbers>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/numbers.h"
@@ -14,17 +18,117 @@
 #include "dsg/v1/maintenance_service.pb.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/cli/answer_picture.h"
-#include "query/cli/interrupt.h"
 #include "query/cli/json.h"
-#include "query/cli/paging.h"
 #include "query/cli/progress.h"
-#include "query/cli/render_merge.h"
+#include "query/cli/session.h"
+#include "query/cli/table.h"
 #include "query/cli/values.h"
-#include "query/cli/verbs.h"
+#include "query/cli/verb_list.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 
 namespace dsg::cli {
+namespace {
+
+struct MergeVerb {
+  /// Name of the map to merge in.
+  std::string other;
+  /// Empty = estimate it.
+  std::string transform;
+  bool dry_run = false;
+  /// Also with a doubtful transform.
+  bool yes = false;
+  PictureOptions picture;
+};
+
+std::string TransformText(const v1::Pose& pose) {
+  const Pose3d plain = FromProto(pose);
+  const Eigen::Vector3d x = plain.orientation * Eigen::Vector3d::UnitX();
+  const double yaw_degrees = std::atan2(x.y(), x.x()) * 180.0 / std::numbers::pi;
+  return absl::StrCat(Fixed(plain.position.x(), 3), ",", Fixed(plain.position.y(), 3), ",",
+                      Fixed(plain.position.z(), 3), " turned by ", Fixed(yaw_degrees, 2),
+                      " degrees");
+}
+
+std::string MergeEndText(const v1::MergeMapsResponse& reply, bool is_dry_run) {
+  if (is_dry_run) return "nothing was written (--dry-run)\n";
+  if (reply.revision() == 0) return "nothing is new: the map has everything already\n";
+  return absl::StrCat("revision ", reply.revision(), "\n");
+}
+
+// A wrong transform can make fewer things than this agree by chance.
+constexpr int kFewThings = 8;
+// Limits beyond which a transform is doubtful; see schema/merge/align.h.
+constexpr double kAgreeingShareMin = 0.25;
+constexpr double kBlockedShareMax = 0.15;
+
+constexpr char kWhatToDo[] =
+    "; draw both with --dry-run --png FILE, and give the transform with --transform X,Y,Z,YAW "
+    "(metres, radians)";
+
+// The share that both maps have of what both could have observed.
+double AgreeingShare(const v1::MergeMapsResponse& plan) {
+  const double agreeing = plan.agreeing_count();
+  return agreeing / std::max(1.0, agreeing + 0.5 * plan.missing_count());
+}
+
+}  // namespace
+
+std::string DoubtsOf(const v1::MergeMapsResponse& plan, const MergeAsked& asked) {
+  // Without new nodes nothing can be duplicated.
+  if (plan.added_node_count() == 0) return "";
+  const std::string agreeing = Counted(plan.agreeing_count(), "thing");
+  if (plan.agreeing_count() == 0) {
+    return absl::StrCat("nothing in ", asked.other, " agrees with ", asked.map,
+                        ": the maps do not overlap, or the transform is wrong", kWhatToDo);
+  }
+  if (AgreeingShare(plan) < kAgreeingShareMin) {
+    return absl::StrCat("there is little evidence for the transform: ", agreeing,
+                        " of both maps agree, and ", plan.missing_count(),
+                        " are missing where both maps have observed", kWhatToDo);
+  }
+  if (plan.blocked_share() > kBlockedShareMax) {
+    return absl::StrCat(
+        "there is strong evidence against the transform: of the places near walls of the other "
+        "map, ",
+        Fixed(100.0 * plan.blocked_share(), 0), " % stand in them", kWhatToDo);
+  }
+  if (asked.has_transform || plan.agreeing_count() >= kFewThings) return "";
+  return absl::StrCat("the transform rests on ", agreeing, " only", kWhatToDo);
+}
+
+std::string RenderMerge(const v1::MergeMapsResponse& reply, const MergeAsked& asked) {
+  const bool has_pairs = reply.fused_object_count() > 0;
+  std::string text = RenderFields(
+      {{"map", asked.map},
+       {"other", asked.other},
+       {"other lies at", TransformText(reply.map_t_other())},
+       {"things agreeing", absl::StrCat(reply.agreeing_count())},
+       {"they differ by",
+        has_pairs ? absl::StrCat(Fixed(reply.residual_m(), 3), " m (root mean square)") : "-"}});
+  Table table({{"", Align::kLeft}, {absl::StrCat("nodes of ", asked.other), Align::kRight}});
+  const auto row = [&](const char* what, int64_t count) {
+    table.AddRow({what, absl::StrCat(count)});
+  };
+  row("objects in both", reply.fused_object_count());
+  row("places in both", reply.fused_place_count());
+  row("rooms in both", reply.fused_room_count());
+  row("structures in both", reply.fused_structure_count());
+  row("added", reply.added_node_count());
+  absl::StrAppend(&text, "\n", table.Render());
+  if (reply.gone_count() > 0) {
+    absl::StrAppend(&text, "\n", Counted(reply.gone_count(), "node"), " of ", asked.map,
+                    " gone, and ", reply.moved_ids().size(), " of these moved\n");
+  }
+  // Blocks that were not changed are not worth a line.
+  if (reply.fused_mesh_block_count() > 0 && reply.revision() > 0) {
+    absl::StrAppend(&text, "\n", reply.fused_mesh_block_count(), " mesh blocks joined\n");
+  }
+  absl::StrAppend(&text, "\n", MergeEndText(reply, asked.is_dry_run));
+  const std::string doubts = asked.is_dry_run ? DoubtsOf(reply, asked) : "";
+  return doubts.empty() ? text : absl::StrCat(text, "\nwarning: ", doubts, "\n");
+}
+
 namespace {
 
 constexpr uint32_t kFusedRgb = 0x2a8c4a;
@@ -35,7 +139,7 @@ constexpr uint32_t kMovedRgb = 0xc87a1e;
 constexpr uint32_t kMineRgb = 0x303030;
 constexpr uint32_t kTheirsRgb = 0x8a2bb0;
 
-// "X,Y,Z,YAW" besides what ParsePose takes.
+// "X,Y,Z,YAW", or a pose with a quaternion.
 absl::StatusOr<Pose3d> ParseTransform(const std::string& text) {
   const std::vector<std::string> parts = absl::StrSplit(text, ',');
   if (parts.size() == 7) return ParsePose("--transform", text);
@@ -54,38 +158,34 @@ absl::StatusOr<Pose3d> ParseTransform(const std::string& text) {
   return Pose3d{shift, Eigen::Quaterniond(Eigen::AngleAxisd(yaw.x(), Eigen::Vector3d::UnitZ()))};
 }
 
-absl::StatusOr<v1::ListNodesResponse> NodesOf(Session* session, const std::string& map,
-                                              const char* kind) {
+absl::StatusOr<v1::ListNodesResponse> NodesOfKind(Session* session, const std::string& map,
+                                                  const char* kind) {
   v1::ListNodesRequest request;
   request.set_map(map);
   request.mutable_filter()->set_kind(kind);
   v1::ListNodesResponse all;
-  DSG_RETURN_IF_ERROR(FetchPages(
-      request, 0, [](const v1::ListNodesResponse& page) { return page.nodes_size(); },
-      [&](const v1::ListNodesRequest& ask, v1::ListNodesResponse* page) {
-        return session->api().ListNodes(session->NewCall(), ask, page);
-      },
-      &all));
+  DSG_RETURN_IF_ERROR(session->ReadPages(&query::Api::ListNodes, request, 0,
+                                         &v1::ListNodesResponse::nodes_size, &all));
   return all;
 }
 
 struct SeenNodes {
   v1::ListNodesResponse objects;
-  /// Rooms, or places of a map without rooms: where it has been.
+  /// The area that the map covers: rooms, or places of a map without rooms.
   v1::ListNodesResponse spaces;
 };
 
 absl::StatusOr<SeenNodes> SeenBy(Session* session, const std::string& map) {
   SeenNodes seen;
-  DSG_ASSIGN_OR_RETURN(seen.objects, NodesOf(session, map, "object"));
-  DSG_ASSIGN_OR_RETURN(seen.spaces, NodesOf(session, map, "room"));
+  DSG_ASSIGN_OR_RETURN(seen.objects, NodesOfKind(session, map, "object"));
+  DSG_ASSIGN_OR_RETURN(seen.spaces, NodesOfKind(session, map, "room"));
   if (seen.spaces.nodes().empty()) {
-    DSG_ASSIGN_OR_RETURN(seen.spaces, NodesOf(session, map, "place"));
+    DSG_ASSIGN_OR_RETURN(seen.spaces, NodesOfKind(session, map, "place"));
   }
   return seen;
 }
 
-// Rooms of both maps, and their objects by what became of them.
+// Rooms of both maps, and their objects by what the merge does with them.
 class MergePicture {
  public:
   MergePicture(SeenNodes mine, SeenNodes theirs)
@@ -151,59 +251,50 @@ class MergePicture {
   Overlay overlay_;
 };
 
-// The last message, with the ids of all.
-absl::StatusOr<v1::MergeMapsResponse> Call(Session* session, const v1::MergeMapsRequest& request,
-                                           std::ostream& progress_out) {
-  Progress progress(absl::StrCat("merge ", request.other(), " into ", request.map()),
-                    &progress_out);
-  query::CallContext call = session->NewCall();
-  const InterruptGuard guard(&call);
+// The last message, with the ids of all messages.
+absl::StatusOr<v1::MergeMapsResponse> CallMerge(Session* session,
+                                                const v1::MergeMapsRequest& request) {
   v1::MergeMapsResponse last;
-  DSG_RETURN_IF_ERROR(query::ReadStream(call, session->api().MergeMaps(call, request),
-                                        [&](const v1::MergeMapsResponse& message) {
-                                          progress.Update(message.progress());
-                                          auto ids = std::move(*last.mutable_node_ids());
-                                          last = message;
-                                          for (const auto& [before, after] : ids)
-                                            (*last.mutable_node_ids())[before] = after;
-                                          return true;
-                                        }));
+  DSG_RETURN_IF_ERROR(
+      ReadLong(session, absl::StrCat("merge ", request.other(), " into ", request.map()),
+               &query::Api::MergeMaps, request, [&](const v1::MergeMapsResponse& message) {
+                 auto ids = std::move(*last.mutable_node_ids());
+                 last = message;
+                 for (const auto& [before, after] : ids) (*last.mutable_node_ids())[before] = after;
+               }));
   return last;
 }
 
-// A person says whether a doubtful transform is meant; nobody is there to ask a script.
-absl::Status Confirm(const std::string& doubts, bool is_meant, std::ostream& questions) {
+// Asks on a terminal whether to use a doubtful transform; a script gets an error.
+absl::Status ConfirmMerge(const std::string& doubts, bool is_confirmed, std::ostream& questions) {
   if (doubts.empty()) return absl::OkStatus();
-  if (!is_meant && isatty(STDIN_FILENO) == 0) {
+  if (!is_confirmed && isatty(STDIN_FILENO) == 0) {
     return MakeError(Reason::kNoRegistration, absl::StrCat("refused without --yes: ", doubts));
   }
   questions << "dsg: warning: " << doubts << "\n" << std::flush;
-  if (is_meant) return absl::OkStatus();
-  questions << "Merge all the same? [y/N] " << std::flush;
+  if (is_confirmed) return absl::OkStatus();
+  questions << "Merge anyway? [y/N] " << std::flush;
   std::string answer;
   if (std::getline(std::cin, answer) && (answer == "y" || answer == "yes")) return absl::OkStatus();
-  return MakeError(Reason::kNoRegistration, "nothing was written: the transform is not meant");
+  return MakeError(Reason::kNoRegistration, "nothing was written: the transform was not confirmed");
 }
 
-// What would become of it is looked at first: what is written stays.
+// A dry run comes first, so that doubts are known before anything is written.
 absl::StatusOr<v1::MergeMapsResponse> PlanAndWrite(Session* session, const MergeAsked& asked,
-                                                   bool is_meant, v1::MergeMapsRequest request,
-                                                   std::ostream& progress_out) {
+                                                   bool is_confirmed,
+                                                   v1::MergeMapsRequest request) {
   request.set_dry_run(true);
-  DSG_ASSIGN_OR_RETURN(v1::MergeMapsResponse plan, Call(session, request, progress_out));
+  DSG_ASSIGN_OR_RETURN(v1::MergeMapsResponse plan, CallMerge(session, request));
   if (asked.is_dry_run) return plan;
-  DSG_RETURN_IF_ERROR(Confirm(DoubtsOf(plan, asked), is_meant, progress_out));
+  DSG_RETURN_IF_ERROR(ConfirmMerge(DoubtsOf(plan, asked), is_confirmed, session->notes()));
   request.set_dry_run(false);
   *request.mutable_map_t_other() = plan.map_t_other();
-  DSG_ASSIGN_OR_RETURN(v1::MergeMapsResponse last, Call(session, request, progress_out));
+  DSG_ASSIGN_OR_RETURN(v1::MergeMapsResponse last, CallMerge(session, request));
   last.set_agreeing_count(plan.agreeing_count());
   return last;
 }
 
-}  // namespace
-
-absl::Status RunMerge(Session* session, const MergeVerb& verb, std::ostream& out,
-                      std::ostream& progress_out) {
+absl::Status RunMerge(Session* session, const MergeVerb& verb, std::ostream& out) {
   DSG_RETURN_IF_ERROR(CheckPicture(verb.picture));
   v1::MergeMapsRequest request;
   request.set_map(session->map().name);
@@ -221,10 +312,10 @@ absl::Status RunMerge(Session* session, const MergeVerb& verb, std::ostream& out
   }
   const MergeAsked asked{session->map().name, verb.other, !verb.transform.empty(), verb.dry_run};
   DSG_ASSIGN_OR_RETURN(const v1::MergeMapsResponse last,
-                       PlanAndWrite(session, asked, verb.yes, request, progress_out));
+                       PlanAndWrite(session, asked, verb.yes, request));
   if (session->common().json) {
     if (verb.dry_run && !DoubtsOf(last, asked).empty()) {
-      progress_out << "dsg: warning: " << DoubtsOf(last, asked) << "\n";
+      session->notes() << "dsg: warning: " << DoubtsOf(last, asked) << "\n";
     }
     DSG_RETURN_IF_ERROR(WriteJson(last, out));
   } else {
@@ -234,6 +325,24 @@ absl::Status RunMerge(Session* session, const MergeVerb& verb, std::ostream& out
   MergePicture picture(std::move(mine), std::move(theirs));
   return WritePicture(session, verb.picture, picture.Draw(last, session->map().name, verb.other),
                       out);
+}
+
+}  // namespace
+
+void AddMergeVerb(Grammar* grammar) {
+  const auto [app, verb] =
+      grammar->Add<MergeVerb>({.name = "merge",
+                               .what = "Merge another map of the same place into this one",
+                               .example = "office-later --dry-run --png both.png",
+                               .takes = kServer | kMap | kJson,
+                               .run = RunMerge});
+  app->add_option("OTHER", verb->other, "The map to merge in; it does not change")->required();
+  app->add_option("--transform", verb->transform,
+                  "X,Y,Z,YAW or X,Y,Z,QX,QY,QZ,QW: takes points of OTHER into the map, metres and "
+                  "radians; default estimated from what both maps have observed");
+  app->add_flag("--dry-run", verb->dry_run, "Only report what would change");
+  app->add_flag("--yes", verb->yes, "Do not ask about a doubtful transform");
+  AddPicture(app, "what is in both maps, added and gone", &verb->picture);
 }
 
 }  // namespace dsg::cli

@@ -1,22 +1,92 @@
 // SPDX-License-Identifier: Apache-2.0
-// The verb predict: where an agent will be.
+#include "query/cli/verb_predict.h"
+
+#include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
+#include "dsg/v1/space.pb.h"
 #include "query/cli/answer_picture.h"
-#include "query/cli/export/palette.h"
+#include "query/cli/export/look.h"
 #include "query/cli/json.h"
-#include "query/cli/node_names.h"
-#include "query/cli/render_space.h"
+#include "query/cli/lookups.h"
 #include "query/cli/table.h"
 #include "query/cli/values.h"
-#include "query/cli/verbs.h"
+#include "query/cli/verb_list.h"
 #include "schema/base/status.h"
 
 namespace dsg::cli {
+namespace {
+
+// Standard deviation of a predicted position on the floor, metres; 0 without a covariance.
+double FloorSigmaM(const v1::PredictedPose& pose) {
+  // Upper triangle: xx, xy, xz, yy, yz, zz.
+  if (pose.covariance_size() != 6) return 0.0;
+  return std::sqrt(std::max(0.0, 0.5 * (pose.covariance(0) + pose.covariance(3))));
+}
+
+std::string ModelText(v1::PredictionModel model) {
+  switch (model) {
+    case v1::CONSTANT_VELOCITY:
+      return "constant velocity";
+    case v1::WEIGHTED_VELOCITY:
+      return "weighted velocity";
+    default:
+      return "goals";
+  }
+}
+
+std::vector<std::string> WayCells(const v1::PredictedPath& path, int number,
+                                  const NodeNames& names) {
+  std::vector<std::string> cells{absl::StrCat(number), Fixed(path.probability(), 3),
+                                 names.Text(path.goal_node_id())};
+  if (path.poses().empty()) return cells;
+  const v1::PredictedPose& last = path.poses(path.poses_size() - 1);
+  cells.insert(cells.end(), {Fixed(last.position().x(), 2), Fixed(last.position().y(), 2),
+                             Fixed(FloorSigmaM(last), 2)});
+  return cells;
+}
+
+std::string RenderSteps(const v1::PredictedPath& path, const TimeText& times) {
+  Table table({{"time", Align::kRight},
+               {"x m", Align::kRight},
+               {"y m", Align::kRight},
+               {"z m", Align::kRight},
+               {"sd m", Align::kRight}});
+  for (const v1::PredictedPose& pose : path.poses()) {
+    table.AddRow({times.Relative(pose.time_ns()), Fixed(pose.position().x(), 2),
+                  Fixed(pose.position().y(), 2), Fixed(pose.position().z(), 2),
+                  Fixed(FloorSigmaM(pose), 2)});
+  }
+  return table.Render();
+}
+
+}  // namespace
+
+std::string RenderPrediction(const v1::PredictAgentResponse& reply, const TimeText& times,
+                             const NodeNames& names) {
+  const double speed = std::hypot(reply.velocity().x(), reply.velocity().y());
+  Table ways({{"way", Align::kRight},
+              {"p", Align::kRight},
+              {"towards"},
+              {"end x m", Align::kRight},
+              {"end y m", Align::kRight},
+              {"sd m", Align::kRight}});
+  for (int i = 0; i < reply.paths_size(); ++i) {
+    ways.AddRow(WayCells(reply.paths(i), i + 1, names));
+  }
+  std::string text = absl::StrCat(Printable(names.Text(reply.agent_id())), " seen until ",
+                                  times.Full(reply.observed_ns()), ", ", Fixed(speed, 2),
+                                  " m/s, by ", ModelText(reply.model()), " (revision ",
+                                  reply.header().read_revision(), ")\n", ways.Render());
+  if (reply.paths().empty()) return text;
+  return absl::StrCat(text, "\nway 1\n", RenderSteps(reply.paths(0), times));
+}
+
 namespace {
 
 constexpr uint32_t kPastRgb = 0x555b6b;
@@ -32,22 +102,16 @@ absl::StatusOr<v1::PredictAgentRequest> RequestFor(Session* session, const Predi
   request.set_model(ModelOf(verb.model));
   request.set_path_count_max(verb.path_count);
   request.set_stop_at_walls(verb.stop_at_walls);
-  if (!verb.at.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs from_ns, ParseInstant("--at", verb.at, session->map()));
-    request.set_from_ns(from_ns);
-  }
-  if (!verb.horizon.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs horizon_ns, ParseDuration("--horizon", verb.horizon));
-    request.set_horizon_ns(horizon_ns);
-  }
-  if (!verb.every.empty()) {
-    DSG_ASSIGN_OR_RETURN(const TimeNs period_ns, ParseDuration("--every", verb.every));
-    request.set_period_ns(period_ns);
-  }
+  DSG_RETURN_IF_ERROR(
+      SetInstant("--at", verb.at, session->map(), &request, &v1::PredictAgentRequest::set_from_ns));
+  DSG_RETURN_IF_ERROR(
+      SetDuration("--horizon", verb.horizon, &request, &v1::PredictAgentRequest::set_horizon_ns));
+  DSG_RETURN_IF_ERROR(
+      SetDuration("--every", verb.every, &request, &v1::PredictAgentRequest::set_period_ns));
   return request;
 }
 
-// The last seconds that were seen and the ways that are foreseen, the likelier ones thicker.
+// The last observed seconds and the predicted paths; more probable paths are thicker.
 absl::StatusOr<AnswerPicture> Draw(Session* session, const v1::PredictAgentResponse& reply,
                                    const std::string& agent) {
   constexpr TimeNs kPastNs = 10 * kNsPerSecond;
@@ -61,7 +125,7 @@ absl::StatusOr<AnswerPicture> Draw(Session* session, const v1::PredictAgentRespo
   if (reply.observed_ns() < kTimeMax) past.to_ns = reply.observed_ns() + 1;
   DSG_ASSIGN_OR_RETURN(const auto pieces, WayOf(session, reply.agent_id(), picture.revision, past));
   overlay.legend.push_back({"seen", kPastRgb});
-  // From the least likely on, so that the likeliest lies on top.
+  // The most probable path is drawn last, on top.
   for (int i = reply.paths_size() - 1; i >= 0; --i) {
     const v1::PredictedPath& path = reply.paths(i);
     const uint32_t rgb = AgentColor(static_cast<size_t>(i) + 1);
@@ -90,8 +154,6 @@ absl::StatusOr<AnswerPicture> Draw(Session* session, const v1::PredictAgentRespo
   return picture;
 }
 
-}  // namespace
-
 absl::Status RunPredict(Session* session, const PredictVerb& verb, std::ostream& out) {
   DSG_RETURN_IF_ERROR(CheckPicture(verb.picture));
   DSG_ASSIGN_OR_RETURN(const v1::PredictAgentRequest request, RequestFor(session, verb));
@@ -112,6 +174,29 @@ absl::Status RunPredict(Session* session, const PredictVerb& verb, std::ostream&
     out << RenderPrediction(reply, session->times(), names);
   }
   return WritePicture(session, verb.picture, picture, out);
+}
+
+}  // namespace
+
+void AddPredictVerb(Grammar* grammar) {
+  const auto [app, verb] = grammar->Add<PredictVerb>({.name = "predict",
+                                                      .what = "Where an agent will be",
+                                                      .example = "carol --at +84s --horizon 2s",
+                                                      .run = RunPredict});
+  app->add_option("AGENT", verb->agent, kAgentHelp)->required();
+  app->add_option("--at", verb->at,
+                  "Predict from this TIME, without later observations; default the end of the "
+                  "track");
+  app->add_option("--horizon", verb->horizon, "How far to predict; default 4.8s");
+  app->add_option("--every", verb->every, "Period of the steps; default 400ms");
+  app->add_option("--model", verb->model,
+                  "goals: along the places; cv: constant velocity; weighted: weighted mean of the "
+                  "last velocities; default goals")
+      ->check(CLI::IsMember({"goals", "cv", "weighted"}));
+  app->add_option("--paths", verb->path_count, "Maximum number of paths; default 6")
+      ->check(Between(1, 20));
+  app->add_flag("--stop-at-walls", verb->stop_at_walls, "Cut straight predictions at walls");
+  AddPicture(app, "the predicted paths", &verb->picture);
 }
 
 }  // namespace dsg::cli

@@ -1,33 +1,154 @@
 // SPDX-License-Identifier: Apache-2.0
-// The verbs that turn a map into files to look at: export, map.
+// The verbs that write a map to files: export, map.
+#include <cstdio>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "query/cli/export/floor_choice.h"
 #include "query/cli/export/gltf_scene.h"
-#include "query/cli/export/ply.h"
+#include "query/cli/export/map_content.h"
+#include "query/cli/export/mesh_file.h"
 #include "query/cli/export/top_view.h"
+#include "query/cli/json.h"
+#include "query/cli/progress.h"
 #include "query/cli/read_content.h"
-#include "query/cli/spark_export.h"
+#include "query/cli/session.h"
 #include "query/cli/table.h"
 #include "query/cli/values.h"
-#include "query/cli/verbs.h"
-#include "query/cli/written.h"
+#include "query/cli/verb_list.h"
+#include "query/cli/verbs_backup.h"
+#include "schema/archive/archive_file.h"
 #include "schema/base/status.h"
 #include "schema/files/atomic_file.h"
+#include "schema/interop/map_to_spark.h"
+#include "schema/interop/spark_writer.h"
 #include "schema/picture/raster.h"
 
 namespace dsg::cli {
 namespace {
 
-absl::StatusOr<ContentAnswer> Read(Session* session, const std::string& at,
-                                   ContentOptions options) {
+struct ExportVerb {
+  /// An archive of all of the map (.dsgz).
+  std::string archive;
+  /// Files to write; at least one is set, or `archive` is.
+  std::string ply;
+  std::string graph_ply;
+  std::string gltf;
+  /// Spark-DSG, JSON or binary by its ending.
+  std::string spark;
+  /// Distance between its poses, metres; 0 = all poses.
+  double pose_step_m = 0.5;
+  /// "rgb", "label", "instance"; empty = rgb if the mesh has it, else label.
+  std::string color;
+  std::string at;
+  bool force = false;
+};
+
+struct MapVerb {
+  std::string png;
+  /// A level or room by id or name, or a height; empty = all floors.
+  std::string floor;
+  int width_px = 1600;
+  std::string at;
+  bool force = false;
+};
+
+// Rough share of the conversion in the total time.
+constexpr double kConverted = 0.6;
+
+MapContents ContentsOf(MapContent content) {
+  MapContents map;
+  map.spec = std::move(content.spec);
+  map.revision = content.revision;
+  map.layers = std::move(content.layers);
+  map.nodes = std::move(content.nodes);
+  map.edges = std::move(content.edges);
+  map.mesh = std::move(content.mesh);
+  for (Track& track : content.tracks) map.tracks.push_back({track.agent, std::move(track.poses)});
+  return map;
+}
+
+// By the ending of the name: .json; .sparkdsg or .bin.
+std::optional<SparkForm> SparkFormOf(const std::string& path) {
+  if (path.ends_with(".json")) return SparkForm::kJson;
+  if (path.ends_with(".sparkdsg") || path.ends_with(".bin")) return SparkForm::kBinary;
+  return std::nullopt;
+}
+
+// `content` has poses and mesh; notes and progress go to `progress_out`.
+absl::StatusOr<Written> WriteSparkExport(MapContent content, const ExportVerb& verb,
+                                         std::ostream* progress_out) {
+  Progress progress("export to Spark-DSG", progress_out);
+  const SparkForm form = SparkFormOf(verb.spark).value_or(SparkForm::kJson);
+  DSG_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(verb.spark, verb.force));
+  DSG_ASSIGN_OR_RETURN(const SparkExport made, MapToSpark(ContentsOf(std::move(content)),
+                                                          {.distance_m = verb.pose_step_m}));
+  progress.Update(kConverted);
+  DSG_RETURN_IF_ERROR(
+      WriteSpark(made.graph, form, [&file](std::string_view bytes) { return file.Write(bytes); }));
+  DSG_RETURN_IF_ERROR(file.Commit());
+  for (const std::string& note : made.notes) *progress_out << "note: " << Printable(note) << "\n";
+  const MeshBlock mesh = made.graph.mesh.value_or(MeshBlock());
+  return Written{.format = form == SparkForm::kJson ? "spark-json" : "spark-binary",
+                 .path = verb.spark,
+                 .byte_count = file.byte_count(),
+                 .counts = {{"nodes", static_cast<int64_t>(made.graph.nodes.size())},
+                            {"edges", static_cast<int64_t>(made.graph.edges.size())},
+                            {"poses", made.pose_count},
+                            {"vertices", static_cast<int64_t>(mesh.positions_map.size())},
+                            {"faces", static_cast<int64_t>(mesh.faces.size())}}};
+}
+
+absl::Status CheckAlone(const Session& session, const ExportVerb& verb) {
+  const CommonOptions& common = session.common();
+  if (common.revision.has_value() || !common.tag.empty() || !verb.at.empty()) {
+    return MakeError(Reason::kFieldInvalid,
+                     "an archive has all revisions and all times; remove --revision and --at",
+                     {{"field", "--revision"}});
+  }
+  const bool is_alone =
+      verb.ply.empty() && verb.graph_ply.empty() && verb.gltf.empty() && verb.spark.empty();
+  if (is_alone) return absl::OkStatus();
+  return MakeError(
+      Reason::kFieldInvalid,
+      "an archive is the only file of its call; export the other files in another call",
+      {{"field", "FILE"}});
+}
+
+absl::Status WriteArchive(Session* session, const ExportVerb& verb, std::ostream& out) {
+  DSG_RETURN_IF_ERROR(CheckAlone(*session, verb));
+  DSG_RETURN_IF_ERROR(CheckMayWrite(verb.archive, verb.force));
+  const std::string& map = session->map().name;
+  Progress progress(absl::StrCat("export ", map), &session->notes());
+  query::CallContext call = session->NewCall();
+  const InterruptGuard guard(&call);
+  DSG_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(verb.archive));
+  DSG_RETURN_IF_ERROR(CopyArchive(
+      session, map, call, [&](std::string_view bytes) { return file.Write(bytes); },
+      [&](double fraction) { progress.Update(fraction); }));
+  DSG_RETURN_IF_ERROR(file.Commit());
+  // The archive may come over a network, so it is verified.
+  const auto manifest = ReadArchiveFile(verb.archive, nullptr, call.stop(), nullptr);
+  if (!manifest.ok()) {
+    std::remove(verb.archive.c_str());
+    return manifest.status();
+  }
+  const Written written{.format = "dsgz",
+                        .path = verb.archive,
+                        .byte_count = file.byte_count(),
+                        .counts = {{"database bytes", manifest->database_bytes}}};
+  TellWritten({written}, manifest->newest_revision, session->common().json, out);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<ContentAnswer> ReadMapAt(Session* session, const std::string& at,
+                                        ContentOptions options) {
   if (!at.empty()) {
     DSG_ASSIGN_OR_RETURN(options.at_ns, ParseInstant("--at", at, session->map()));
   }
-  return ReadContent(*session, &session->api(), options);
+  return ReadContent(session, options);
 }
 
 absl::StatusOr<MeshColor> ParseColor(const std::string& text) {
@@ -40,7 +161,7 @@ absl::StatusOr<MeshColor> ParseColor(const std::string& text) {
                    {{"field", "--color"}, {"value", text}});
 }
 
-// Writes the files of one run and remembers what is in them.
+// Writes the files of one run and counts what is in them.
 class Exporter {
  public:
   Exporter(const MapContent& content, MeshColor color, bool force)
@@ -87,7 +208,7 @@ class Exporter {
   std::vector<Written> files_;
 };
 
-// Map, revision and instant, as a picture's title.
+// The title of the picture: map, revision and instant.
 std::string TitleOf(const Session& session, const ContentAnswer& answer, const MapVerb& verb) {
   std::string title =
       absl::StrCat(answer.content.spec.name, "  revision ", answer.content.revision);
@@ -95,7 +216,7 @@ std::string TitleOf(const Session& session, const ContentAnswer& answer, const M
     const auto at_ns = ParseInstant("--at", verb.at, session.map());
     if (at_ns.ok()) absl::StrAppend(&title, "  at ", session.times().Full(*at_ns));
   } else if (answer.last_pose_ns.has_value()) {
-    // To the millisecond, which is more than a picture shows.
+    // A millisecond is finer than the picture.
     constexpr TimeNs kMillisecond = 1'000'000;
     const TimeNs last_ns = *answer.last_pose_ns / kMillisecond * kMillisecond;
     absl::StrAppend(&title, "  up to ", session.times().Full(last_ns));
@@ -104,19 +225,17 @@ std::string TitleOf(const Session& session, const ContentAnswer& answer, const M
   return title;
 }
 
-}  // namespace
-
-absl::Status RunExport(Session* session, const ExportVerb& verb, std::ostream& out,
-                       std::ostream& progress) {
-  if (!verb.archive.empty()) return RunExportArchive(session, verb, out, progress);
+absl::Status RunExport(Session* session, const ExportVerb& verb, std::ostream& out) {
+  if (!verb.archive.empty()) return WriteArchive(session, verb, out);
   DSG_ASSIGN_OR_RETURN(const MeshColor color, ParseColor(verb.color));
   for (const std::string* path : {&verb.ply, &verb.graph_ply, &verb.gltf, &verb.spark}) {
     if (!path->empty()) DSG_RETURN_IF_ERROR(CheckMayWrite(*path, verb.force));
   }
   const bool with_spark = !verb.spark.empty();
   const bool with_mesh = !verb.ply.empty() || !verb.gltf.empty() || with_spark;
-  DSG_ASSIGN_OR_RETURN(ContentAnswer answer,
-                       Read(session, verb.at, {.with_mesh = with_mesh, .with_poses = with_spark}));
+  DSG_ASSIGN_OR_RETURN(
+      ContentAnswer answer,
+      ReadMapAt(session, verb.at, {.with_mesh = with_mesh, .with_poses = with_spark}));
   Exporter exporter(answer.content, color, verb.force);
   if (!verb.ply.empty()) DSG_RETURN_IF_ERROR(exporter.WriteMesh(verb.ply));
   if (!verb.graph_ply.empty()) DSG_RETURN_IF_ERROR(exporter.WriteGraph(verb.graph_ply));
@@ -125,7 +244,7 @@ absl::Status RunExport(Session* session, const ExportVerb& verb, std::ostream& o
   const Revision revision = answer.content.revision;
   if (with_spark) {
     DSG_ASSIGN_OR_RETURN(Written file,
-                         WriteSparkExport(std::move(answer.content), verb, &progress));
+                         WriteSparkExport(std::move(answer.content), verb, &session->notes()));
     files.push_back(std::move(file));
   }
   TellWritten(files, revision, session->common().json, out);
@@ -134,7 +253,7 @@ absl::Status RunExport(Session* session, const ExportVerb& verb, std::ostream& o
 
 absl::Status RunMap(Session* session, const MapVerb& verb, std::ostream& out) {
   DSG_RETURN_IF_ERROR(CheckMayWrite(verb.png, verb.force));
-  DSG_ASSIGN_OR_RETURN(ContentAnswer answer, Read(session, verb.at, {}));
+  DSG_ASSIGN_OR_RETURN(ContentAnswer answer, ReadMapAt(session, verb.at, {}));
   MapContent& content = answer.content;
   if (!verb.floor.empty()) {
     DSG_ASSIGN_OR_RETURN(const HeightRange floor, ChooseFloor(content, verb.floor));
@@ -152,6 +271,75 @@ absl::Status RunMap(Session* session, const MapVerb& verb, std::ostream& out) {
                         .counts = {{"columns", picture.width}, {"rows", picture.height}}};
   TellWritten({written}, content.revision, session->common().json, out);
   return absl::OkStatus();
+}
+
+constexpr char kContentAtHelp[] = "The world at this TIME; default all that has not ended";
+
+absl::Status CheckExport(const ExportVerb& verb, const CommonOptions&) {
+  if (!verb.archive.empty()) {
+    if (IsArchivePath(verb.archive)) return absl::OkStatus();
+    return Usage(
+        absl::StrCat("\"", verb.archive, "\" does not end in .dsgz; other formats have options"),
+        "export");
+  }
+  if (!verb.spark.empty() && !SparkFormOf(verb.spark).has_value()) {
+    return Usage(absl::StrCat("--spark \"", verb.spark,
+                              "\": end the name in .json, or in .sparkdsg or .bin for the binary "
+                              "form"),
+                 "export");
+  }
+  for (const std::string* path : {&verb.ply, &verb.graph_ply, &verb.gltf, &verb.spark}) {
+    if (!path->empty()) return absl::OkStatus();
+  }
+  return Usage(
+      "export writes files: give FILE.dsgz, --ply FILE, --graph-ply FILE, --gltf FILE or --spark "
+      "FILE",
+      "export");
+}
+
+void AddExport(Grammar* grammar) {
+  const auto [app, verb] =
+      grammar->Add<ExportVerb>({.name = "export",
+                                .what = "Write mesh and graph to files, or an archive of the map",
+                                .example = "--gltf office.glb",
+                                .run = RunExport,
+                                .check = CheckExport});
+  app->add_option("FILE", verb->archive, "Archive of the whole map with its history, FILE.dsgz");
+  app->add_option("--ply", verb->ply, "The mesh, binary PLY");
+  app->add_option("--graph-ply", verb->graph_ply, "The graph, PLY of points and lines");
+  app->add_option("--gltf", verb->gltf, "Mesh and graph, binary glTF 2.0 (.glb)");
+  app->add_option("--spark", verb->spark, "A Spark-DSG graph, .json, or binary .sparkdsg or .bin");
+  app->add_option("--pose-step", verb->pose_step_m,
+                  "Distance between the poses that --spark writes, metres; 0 = all poses")
+      ->check(ZeroOrMore())
+      ->capture_default_str();
+  app->add_option(
+         "--color", verb->color,
+         "Mesh colours: rgb, label or instance; default rgb if the mesh has it, else label")
+      ->check(CLI::IsMember({"rgb", "label", "instance"}));
+  app->add_option("--at", verb->at, kContentAtHelp);
+  app->add_flag("--force", verb->force, "Replace existing files");
+}
+
+void AddMap(Grammar* grammar) {
+  const auto [app, verb] = grammar->Add<MapVerb>({.name = "map",
+                                                  .what = "Draw a map from above",
+                                                  .example = "--png office.png",
+                                                  .run = RunMap});
+  app->add_option("--png", verb->png, "The picture to write")->required();
+  app->add_option("--floor", verb->floor, kFloorHelp);
+  app->add_option("--width", verb->width_px, "Width of the picture, pixels")
+      ->check(Between(kTopViewWidthMin, kTopViewWidthMax))
+      ->capture_default_str();
+  app->add_option("--at", verb->at, kContentAtHelp);
+  app->add_flag("--force", verb->force, "Replace an existing file");
+}
+
+}  // namespace
+
+void AddExportVerbs(Grammar* grammar) {
+  AddExport(grammar);
+  AddMap(grammar);
 }
 
 }  // namespace dsg::cli

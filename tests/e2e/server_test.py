@@ -116,7 +116,7 @@ class Server(support.ProgramsTest):
                 support.wait_until(lambda: os.path.getsize(seen) > 0, "the first revision")
             support.wait_until(lambda: says("went away"), "the watch to miss the server")
             with self.server("watched", "unix:watch.sock"):
-                support.wait_until(lambda: says(f"watching on after revision {before}"),
+                support.wait_until(lambda: says(f"watching again after revision {before}"),
                                    "the watch to go on")
                 self.ok("dsg-ingest", "--store", "watched", "--map", "office", "--agent-prefix",
                         "c", self.small)

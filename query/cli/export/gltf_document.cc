@@ -30,7 +30,7 @@ constexpr int kVertices = 34962;
 constexpr int kIndices = 34963;
 constexpr char kUnlit[] = "KHR_materials_unlit";
 
-// Screens show colours by the sRGB curve (IEC 61966-2-1); glTF wants light.
+// Colours are sRGB (IEC 61966-2-1); glTF stores linear light.
 double LightOf(uint32_t rgb, int shift) {
   const double shown = static_cast<double>(rgb >> shift & 0xff) / 255.0;
   return shown <= 0.04045 ? shown / 12.92 : std::pow((shown + 0.055) / 1.055, 2.4);
@@ -85,7 +85,7 @@ Json JsonOf(const GltfMaterial& material) {
   return out;
 }
 
-// Left out when there is nothing in it, since the format has no empty lists.
+// Leaves out empty lists, which the format forbids.
 template <class T>
 void AddList(const char* name, const std::vector<T>& parts, Json* document) {
   for (const T& part : parts) (*document)[name].push_back(JsonOf(part));
@@ -148,7 +148,7 @@ int GltfDocument::AddNormals(const std::vector<Eigen::Vector3f>& normals) {
 }
 
 int GltfDocument::AddColors(const std::vector<uint32_t>& colors) {
-  // Two bytes a channel: in light, the dark colours lie too close for one.
+  // Two bytes per channel: one byte cannot separate dark colours in linear light.
   std::array<uint16_t, 256> light_of{};
   for (uint32_t i = 0; i < light_of.size(); ++i) {
     light_of[i] = static_cast<uint16_t>(std::lround(65535.0 * LightOf(i, 0)));
@@ -210,7 +210,7 @@ std::string GltfDocument::MakeJson() const {
   if (!buffer_.empty()) {
     document["buffers"] = Json::array({{{"byteLength", buffer_.size()}}});
   }
-  // Texts of a map are UTF-8; should one not be, the file stays readable.
+  // Invalid UTF-8 in the texts of a map is replaced, so that the file stays readable.
   return document.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A glTF 2.0 file in the making, and its binary form (.glb).
-// Refuses to know what it shows; only what the format needs of it is here.
+// Builds a glTF 2.0 document and writes its binary form (.glb). Knows the format only, not its
+// content.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,7 +18,7 @@ namespace dsg::cli {
 
 // Source: Khronos glTF 2.0 specification, sections 3.6 (buffers), 3.7 (geometry), 4.4 (.glb).
 
-/// What indices of the document's parts are when there is none.
+/// The index of a missing part.
 inline constexpr int kNone = -1;
 
 enum class GltfMode { kLines = 1, kTriangles = 4 };
@@ -42,7 +42,7 @@ struct GltfMaterial {
   std::string name;
   /// 0xRRGGBB as seen on a screen.
   uint32_t rgb = 0xffffff;
-  /// Shown in just this colour, whatever the light: for lines.
+  /// Shown in this colour under any light; for lines.
   bool is_unlit = false;
 };
 
@@ -53,17 +53,17 @@ struct GltfNode {
   std::optional<Eigen::Vector3d> translation;
   std::optional<Eigen::Quaterniond> rotation;
   std::optional<Eigen::Vector3d> scale;
-  /// Texts beside the name.
+  /// Further texts by name.
   std::vector<std::pair<std::string, std::string>> extras;
 };
 
-/// The parts may be changed freely before Write; geometry is only added.
+/// Nodes, meshes and materials may change before Write; geometry is only added.
 class GltfDocument {
  public:
   std::vector<GltfNode> nodes;
   std::vector<GltfMesh> meshes;
   std::vector<GltfMaterial> materials;
-  /// The nodes that are no other's children.
+  /// The nodes without a parent.
   std::vector<int> roots;
 
   int AddNode(GltfNode node);
@@ -92,7 +92,7 @@ class GltfDocument {
     bool is_normalized = false;
     /// 34962 = vertices, 34963 = indices.
     int target = 0;
-    /// Of positions only; empty for others.
+    /// Bounds of positions; empty for other accessors.
     std::vector<float> low;
     std::vector<float> high;
   };

@@ -6,8 +6,8 @@
 #include <unordered_map>
 #include <utility>
 
+#include "query/cli/export/look.h"
 #include "query/cli/export/outline.h"
-#include "query/cli/export/palette.h"
 
 namespace dsg::cli {
 namespace {
@@ -19,7 +19,7 @@ constexpr double kAgentRadiusM = 0.2;
 using Indices = std::vector<uint32_t>;
 using Points = std::vector<Eigen::Vector3f>;
 
-// A ball of radius 1: an octahedron whose faces are cut in four.
+// A ball of radius 1: an octahedron with each face split in four.
 struct Ball {
   Ball() {
     const std::array<Eigen::Vector3f, 6> tips = {
@@ -62,7 +62,7 @@ class SceneBuilder {
   GltfDocument Build() {
     GltfNode top;
     top.name = content_.spec.name;
-    // A quarter turn about x: the map's z becomes the format's y.
+    // A quarter turn about x takes the map's z to the format's y.
     top.rotation = Eigen::Quaterniond(std::sqrt(0.5), -std::sqrt(0.5), 0.0, 0.0);
     top.extras = {{"revision", std::to_string(content_.revision)}, {"frame", content_.spec.frame}};
     const int root = document_.AddNode(std::move(top));
@@ -94,7 +94,7 @@ class SceneBuilder {
     groups->push_back(document->AddNode(std::move(group)));
   }
 
-  // The mesh, blocks joined until a primitive is full.
+  // The mesh; blocks are joined up to the size of a primitive.
   void AddMesh(std::vector<int>* groups) {
     GltfMesh mesh{.name = "mesh", .primitives = {}};
     Points points;
@@ -145,7 +145,7 @@ class SceneBuilder {
     return document_.AddMesh({.name = name, .primitives = {lines}});
   }
 
-  // One ball a colour, with its geometry shared by all.
+  // One ball per colour; all share their geometry.
   int BallMesh(uint32_t rgb) {
     const auto [it, is_new] = balls_.try_emplace(rgb, kNone);
     if (!is_new) return it->second;
@@ -162,7 +162,7 @@ class SceneBuilder {
     return it->second;
   }
 
-  // One cube of lines a colour, edges of length 1 around the origin.
+  // One cube of lines per colour, with edges of length 1 around the origin.
   int CubeMesh(uint32_t rgb) {
     const auto [it, is_new] = cubes_.try_emplace(rgb, kNone);
     if (!is_new) return it->second;
@@ -228,7 +228,7 @@ class SceneBuilder {
       out->mesh = CubeMesh(rgb);
       out->translation = MiddleOf(node);
       out->rotation = node.map_T_node.orientation;
-      // A wall without thickness would leave viewers without an inverse.
+      // A scale of zero, as of a wall without thickness, has no inverse in viewers.
       out->scale = node.box_node.sizes().cwiseMax(1e-4);
     } else {
       PutBall(node.map_T_node.position, kPointRadiusM, rgb, out);
@@ -241,7 +241,7 @@ class SceneBuilder {
     out->scale = Eigen::Vector3d::Constant(radius_m);
   }
 
-  // An agent's node has no shape of its own; below it are where it was last and its track.
+  // The node of an agent has no shape; its children are its last position and its track.
   void ShapeAgent(const Node& node, GltfNode* out) {
     const auto it = track_of_.find(node.id);
     if (it == track_of_.end()) return;

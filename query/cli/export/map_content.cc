@@ -1,7 +1,58 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "query/cli/export/map_content.h"
 
+#include <algorithm>
+#include <cmath>
+#include <unordered_set>
+#include <utility>
+
+#include "absl/status/statusor.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "schema/base/status.h"
+
 namespace dsg::cli {
+namespace {
+
+constexpr double kFloorReachM = 1.5;
+
+HeightRange HeightsOf(const Node& node) {
+  if (node.region.has_value() && node.region->z_max_m > node.region->z_min_m) {
+    return {node.region->z_min_m, node.region->z_max_m};
+  }
+  const Box3d box = node.BoxMap();
+  return {box.min().z(), box.max().z()};
+}
+
+HeightRange HeightsAround(const MapContent& content, double z_m) {
+  HeightRange around{z_m, z_m};
+  bool has_room = false;
+  for (const Node& node : content.nodes) {
+    if (node.kind != kinds::kRoom) continue;
+    const HeightRange heights = HeightsOf(node);
+    if (heights.high_m <= heights.low_m || !heights.Contains(z_m)) continue;
+    around = {std::min(around.low_m, heights.low_m), std::max(around.high_m, heights.high_m)};
+    has_room = true;
+  }
+  return has_room ? around : HeightRange{z_m - kFloorReachM, z_m + kFloorReachM};
+}
+
+double MiddleHeight(const Node& node) {
+  if (!node.region.has_value()) return MiddleOf(node).z();
+  const HeightRange heights = HeightsOf(node);
+  return 0.5 * (heights.low_m + heights.high_m);
+}
+
+Track TrackOn(const HeightRange& floor, const Track& track) {
+  Track kept{.agent = track.agent, .pieces = {}};
+  for (const std::vector<Eigen::Vector3d>& piece : track.pieces) {
+    for (std::vector<Eigen::Vector3d>& part : PiecesOnFloor(floor, piece))
+      kept.pieces.push_back(std::move(part));
+  }
+  return kept;
+}
+
+}  // namespace
 
 std::string NameOf(const Node& node) { return node.name.empty() ? ToString(node.id) : node.name; }
 
@@ -18,5 +69,59 @@ Eigen::Vector3d MiddleOf(const Node& node) {
 }
 
 const Eigen::Vector3d& LastOf(const Track& track) { return track.pieces.back().back(); }
+
+HeightRange StandingHeights(const HeightRange& floor) {
+  constexpr double kErrorM = 0.3;
+  return {floor.low_m - kErrorM, floor.high_m};
+}
+
+std::vector<std::vector<Eigen::Vector3d>> PiecesOnFloor(const HeightRange& floor,
+                                                        const std::vector<Eigen::Vector3d>& track) {
+  std::vector<std::vector<Eigen::Vector3d>> pieces;
+  bool is_inside = false;
+  for (const Eigen::Vector3d& point : track) {
+    const bool was_inside = is_inside;
+    is_inside = StandingHeights(floor).Contains(point.z());
+    if (is_inside && !was_inside) pieces.emplace_back();
+    if (is_inside) pieces.back().push_back(point);
+  }
+  return pieces;
+}
+
+absl::StatusOr<HeightRange> ChooseFloor(const MapContent& content, const std::string& floor) {
+  for (const Node& node : content.nodes) {
+    if (ToString(node.id) == floor || node.name == floor) return HeightsOf(node);
+  }
+  double z_m = 0.0;
+  if (absl::SimpleAtod(floor, &z_m) && std::isfinite(z_m)) return HeightsAround(content, z_m);
+  return MakeError(Reason::kNodeUnknown,
+                   absl::StrCat("--floor \"", floor,
+                                "\": no node has this id or name; give a level or room (dsg ls "
+                                "--kind room) or a height in metres"),
+                   {{"field", "--floor"}, {"value", floor}});
+}
+
+void KeepFloor(const HeightRange& floor, MapContent* content) {
+  std::unordered_set<NodeId> kept;
+  for (const Track& track : content->tracks) kept.insert(track.agent);
+  std::erase_if(content->nodes, [&](const Node& node) {
+    if (kept.contains(node.id)) return false;
+    if (!floor.Contains(MiddleHeight(node))) return true;
+    kept.insert(node.id);
+    return false;
+  });
+  std::erase_if(content->edges, [&](const Edge& edge) {
+    return !kept.contains(edge.source) || !kept.contains(edge.target);
+  });
+  for (Track& track : content->tracks) track = TrackOn(floor, track);
+  std::erase_if(content->tracks, [](const Track& track) { return track.pieces.empty(); });
+  for (MeshBlock& block : content->mesh) {
+    std::erase_if(block.faces, [&](const std::array<uint32_t, 3>& face) {
+      return std::none_of(face.begin(), face.end(), [&](uint32_t vertex) {
+        return floor.Contains(static_cast<double>(block.positions_map[vertex].z()));
+      });
+    });
+  }
+}
 
 }  // namespace dsg::cli

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// All of a map that is drawn or written to a file, as plain values.
-// Refuses to know where it came from: a store, a server or a test.
+// The content of a map that is drawn or written to a file, as plain values, and the part of it on
+// one floor. It may come from a store, a server or a test.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,6 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "absl/status/statusor.h"
 #include "schema/model/edge.h"
 #include "schema/model/layer.h"
 #include "schema/model/mesh.h"
@@ -16,19 +17,19 @@
 
 namespace dsg::cli {
 
-/// Where an agent went.
+/// The track of an agent.
 struct Track {
   NodeId agent;
-  /// Without standstill; a new piece begins after each gap. Map frame.
+  /// Without standstill; a new piece begins after each gap. Map frame, metres.
   std::vector<std::vector<Eigen::Vector3d>> pieces;
-  /// All of it, if asked for.
+  /// All poses, if asked for.
   std::vector<TimedPose> poses;
 };
 
 struct MapContent {
   MapSpec spec;
   Revision revision = 0;
-  /// Ascending by rank. Ids of layers that the map added are made up; they tell layers apart.
+  /// Ascending by rank. Ids of layers that the map added are arbitrary, but differ.
   std::vector<Layer> layers;
   /// Ascending by id.
   std::vector<Node> nodes;
@@ -39,17 +40,40 @@ struct MapContent {
   std::vector<MeshBlock> mesh;
 };
 
-/// "office 4", or the id of a node without a name.
+/// "office 4"; the id of a node without a name.
 std::string NameOf(const Node& node);
 
 /// Nodes by id; points into `content`.
 std::unordered_map<NodeId, const Node*> NodesById(const MapContent& content);
 
-/// Where a node stands: the middle of its box; its position when it has none, and for places, whose
-/// box is the free space around them.
+/// The centre of the node's box; its position without a box, and for places, whose box is the free
+/// space around them. Map frame.
 Eigen::Vector3d MiddleOf(const Node& node);
 
-/// Where an agent was last. Requires: no piece is empty, and there is one.
+/// The last position of an agent. Requires: at least one piece, and no piece is empty.
 const Eigen::Vector3d& LastOf(const Track& track);
+
+/// Heights in the map frame, metres; includes both ends.
+struct HeightRange {
+  double low_m = 0.0;
+  double high_m = 0.0;
+  bool Contains(double z_m) const { return low_m <= z_m && z_m <= high_m; }
+};
+
+/// `floor` is a node's id or name (a level, a room, a building), which gives the node's heights; or
+/// a height in metres, which gives the heights of the rooms that contain it, or 1.5 m around it
+/// without a room. Errors: NOT_FOUND/NODE_UNKNOWN.
+absl::StatusOr<HeightRange> ChooseFloor(const MapContent& content, const std::string& floor);
+
+/// The floor extended 0.3 m down: heights of tracks on the floor have errors.
+HeightRange StandingHeights(const HeightRange& floor);
+
+/// The pieces of a track within StandingHeights.
+std::vector<std::vector<Eigen::Vector3d>> PiecesOnFloor(const HeightRange& floor,
+                                                        const std::vector<Eigen::Vector3d>& track);
+
+/// Drops nodes whose middle is outside, edges that lost an end, and faces outside. Tracks keep
+/// PiecesOnFloor.
+void KeepFloor(const HeightRange& floor, MapContent* content);
 
 }  // namespace dsg::cli

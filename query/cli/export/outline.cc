@@ -22,11 +22,11 @@ void AddChain(Iterator begin, Iterator end, Polygon2d* hull) {
     }
     hull->push_back(*it);
   }
-  // It begins the next chain.
+  // The last point begins the next chain.
   hull->pop_back();
 }
 
-// Floor, ceiling, and a line up at each corner.
+// Floor, ceiling, and a vertical line at each corner.
 Wire PrismWire(const RegionInfo& region) {
   Wire wire;
   const auto count = static_cast<uint32_t>(region.footprint_map.size());

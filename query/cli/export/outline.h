@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The outlines of nodes: corners of their boxes in space, and their shapes on the floor.
+// Shapes of nodes, in space and seen from above, and where they lie in a picture.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
 #include <utility>
 #include <vector>
 
+#include "schema/model/geometry.h"
 #include "schema/model/node.h"
 
 namespace dsg::cli {
@@ -15,7 +17,7 @@ namespace dsg::cli {
 /// Requires: the box is not empty.
 std::array<Eigen::Vector3d, 8> BoxCorners(const Node& node);
 
-/// Lines in space.
+/// Lines in space, map frame, metres.
 struct Wire {
   std::vector<Eigen::Vector3d> points;
   /// Indices into `points`.
@@ -32,7 +34,42 @@ Polygon2d ConvexHull(Polygon2d points);
 /// Seen from above: the footprint of a region, otherwise the box; empty without either.
 Polygon2d FloorOutline(const Node& node);
 
-/// Without sign, whichever way the corners go.
+/// Unsigned area, for either order of the corners.
 double AreaOf(const Polygon2d& polygon);
+
+/// Maps a region seen from above to a picture: north (y) up, one scale.
+class FloorView {
+ public:
+  /// Fits `bounds_map` into `area_px`, with the same scale for both axes. Requires: neither is
+  /// empty or flat.
+  FloorView(const Eigen::AlignedBox2d& bounds_map, const Eigen::AlignedBox2d& area_px)
+      : bounds_map_(bounds_map),
+        px_per_m_((area_px.sizes().array() / bounds_map.sizes().array()).minCoeff()),
+        low_px_(area_px.min()) {
+    low_px_.x() += 0.5 * (area_px.sizes().x() - px_per_m_ * bounds_map.sizes().x());
+  }
+
+  double px_per_m() const { return px_per_m_; }
+  Eigen::Vector2d ToPixel(const Eigen::Vector2d& point_map) const {
+    return low_px_ + px_per_m_ * Eigen::Vector2d(point_map.x() - bounds_map_.min().x(),
+                                                 bounds_map_.max().y() - point_map.y());
+  }
+  Eigen::Vector2d ToPixel(const Eigen::Vector3d& point_map) const {
+    return ToPixel(Eigen::Vector2d(point_map.head<2>()));
+  }
+  Polygon2d ToPixels(const Polygon2d& polygon_map) const {
+    Polygon2d pixels;
+    pixels.reserve(polygon_map.size());
+    for (const Eigen::Vector2d& corner : polygon_map) pixels.push_back(ToPixel(corner));
+    return pixels;
+  }
+  /// The pixel row below the southern edge of the region.
+  double bottom_px() const { return low_px_.y() + px_per_m_ * bounds_map_.sizes().y(); }
+
+ private:
+  Eigen::AlignedBox2d bounds_map_;
+  double px_per_m_;
+  Eigen::Vector2d low_px_;
+};
 
 }  // namespace dsg::cli

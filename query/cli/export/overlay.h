@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an answer adds to a picture of a map: ways, marks and outlines, and what they stand for.
-// Refuses to know the question.
+// What an answer adds to a picture of a map: paths, marks and outlines, and a legend. The map below
+// is paled, and no name covers a path.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,12 +9,17 @@
 #include <string>
 #include <vector>
 
+#include "query/cli/export/map_content.h"
+#include "query/cli/export/outline.h"
 #include "schema/model/geometry.h"
 #include "schema/model/ids.h"
+#include "schema/picture/font.h"
+#include "schema/picture/raster.h"
 
 namespace dsg::cli {
 
-// Colours are 0xRRGGBB; map frame throughout; pixels of a picture twice as wide as asked for.
+// Colours are 0xRRGGBB; positions are in the map frame, metres; pixels are those of a picture twice
+// as wide as asked for.
 
 struct OverlayLine {
   std::vector<Eigen::Vector3d> points_map;
@@ -29,14 +34,14 @@ struct OverlayMark {
   uint32_t rgb = 0;
   Shape shape = Shape::kDot;
   double radius_px = 14.0;
-  /// Written beside the mark if there is room.
+  /// Written beside the mark if there is space.
   std::string label;
 };
 
 struct OverlayOutline {
   Polygon2d corners_map;
   uint32_t rgb = 0;
-  /// Which floor it belongs to, metres.
+  /// Height that decides its floor, metres.
   double height_m = 0.0;
 };
 
@@ -45,18 +50,36 @@ struct OverlayKey {
   uint32_t rgb = 0;
 };
 
-/// Later ones of a list are drawn over earlier ones; marks over lines over outlines.
+/// Later entries of a list are drawn over earlier ones; marks over lines over outlines.
 struct Overlay {
   std::vector<OverlayOutline> outlines;
   std::vector<OverlayLine> lines;
   std::vector<OverlayMark> marks;
   std::vector<OverlayKey> legend;
-  /// Nodes that marks name: the map does not name them again.
+  /// Nodes that marks name; the map does not name them again.
   std::set<NodeId> named;
 
   bool empty() const {
     return outlines.empty() && lines.empty() && marks.empty() && legend.empty();
   }
 };
+
+/// Keeps what lies within StandingHeights of the floor; lines are cut where they leave it.
+void KeepFloor(const HeightRange& floor, Overlay* overlay);
+
+/// Bounds of all that is drawn, seen from above; empty without content.
+Eigen::AlignedBox2d BoundsOf(const Overlay& overlay);
+
+/// Lines, outlines and marks, without their labels; reserves their space in `layout`.
+void DrawOverlay(const Overlay& overlay, const FloorView& view, picture::LabelLayout* layout,
+                 picture::Canvas* canvas);
+
+/// Labels of the marks, in their order; call before writing other names.
+void DrawOverlayLabels(const Overlay& overlay, const FloorView& view, picture::LabelLayout* layout,
+                       picture::Canvas* canvas);
+
+/// One row; keys that do not fit before `x_end` are left out.
+void DrawOverlayLegend(const Overlay& overlay, const Eigen::Vector2d& low, double x_end,
+                       picture::Canvas* canvas);
 
 }  // namespace dsg::cli

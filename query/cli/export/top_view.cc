@@ -2,16 +2,16 @@
 #include "query/cli/export/top_view.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <map>
 
 #include "absl/strings/str_cat.h"
-#include "query/cli/export/floor_view.h"
+#include "query/cli/export/look.h"
 #include "query/cli/export/outline.h"
-#include "query/cli/export/palette.h"
+#include "query/cli/export/overlay.h"
 #include "query/cli/export/top_view_labels.h"
-#include "query/cli/export/top_view_mesh.h"
-#include "query/cli/export/top_view_overlay.h"
 #include "query/cli/table.h"
 #include "schema/base/check.h"
 #include "schema/picture/font.h"
@@ -19,20 +19,14 @@
 namespace dsg::cli {
 namespace {
 
-using Box2d = Eigen::AlignedBox2d;
-using picture::Canvas;
-using picture::LabelLayout;
-using picture::MakePaint;
-using picture::Paint;
-
-// Pixels of the canvas, which is halved at the end.
+// Pixels of the canvas, which is twice the size of the picture.
 constexpr double kMarginPx = 60.0;
 constexpr double kTitlePx = 70.0;
 constexpr double kFooterPx = 80.0;
 constexpr double kKeyRowPx = 52.0;
 constexpr double kTextDotPx = 4.0;
 constexpr double kTextHeightPx = kTextDotPx * picture::kGlyphHeightDots;
-// What is smaller than this is drawn as large as this.
+// A smaller map is drawn with this size.
 constexpr double kMapSizeMinM = 2.0;
 
 constexpr uint32_t kPaperRgb = 0xfbfaf7;
@@ -41,6 +35,79 @@ constexpr uint32_t kWallRgb = 0x3d4250;
 constexpr uint32_t kGlassRgb = 0x8fd0ea;
 constexpr uint32_t kGroundRgb = 0xefede6;
 
+constexpr float kCutAboveFloorM = 1.4f;
+// Share of the paper's colour in the mesh's.
+constexpr float kPaleness = 0.45f;
+constexpr float kPaper = 0.98f;
+
+struct DrawnFace {
+  float height_m = 0.0f;
+  std::array<Eigen::Vector2f, 3> corners_map;
+  picture::Paint paint;
+};
+
+// The lowest points of a mesh are often outliers below the floor.
+float FloorHeight(const std::vector<MeshBlock>& mesh) {
+  constexpr size_t kStride = 7;
+  constexpr size_t kPart = 50;
+  std::vector<float> heights;
+  for (const MeshBlock& block : mesh) {
+    for (size_t i = 0; i < block.faces.size(); i += kStride) {
+      heights.push_back(block.positions_map[block.faces[i][0]].z());
+    }
+  }
+  if (heights.empty()) return 0.0f;
+  const auto low = heights.begin() + static_cast<ptrdiff_t>(heights.size() / kPart);
+  std::nth_element(heights.begin(), low, heights.end());
+  return *low;
+}
+
+picture::Paint PaintOf(const MeshBlock& block, const std::array<uint32_t, 3>& face,
+                       MeshColor color) {
+  picture::Paint paint;
+  std::array<float*, 3> channels = {&paint.red, &paint.green, &paint.blue};
+  for (const uint32_t vertex : face) {
+    const picture::Paint corner = picture::MakePaint(VertexColor(block, vertex, color));
+    const std::array<float, 3> parts = {corner.red, corner.green, corner.blue};
+    for (size_t i = 0; i < 3; ++i) *channels[i] += parts[i] / 3.0f;
+  }
+  for (float* channel : channels) *channel += kPaleness * (kPaper - *channel);
+  return paint;
+}
+
+// The mesh as a pale background, cut 1.4 m above its floor, so that neither ceilings nor lamps hide
+// the rooms.
+void DrawMesh(const std::vector<MeshBlock>& mesh, const FloorView& view, picture::Canvas* canvas) {
+  const MeshColor color = SettleColor(mesh, MeshColor::kAuto);
+  const float cut_m = FloorHeight(mesh) + kCutAboveFloorM;
+  std::vector<DrawnFace> faces;
+  for (const MeshBlock& block : mesh) {
+    for (const auto& face : block.faces) {
+      DrawnFace out;
+      float sum_m = 0.0f;
+      for (size_t i = 0; i < 3; ++i) {
+        const Eigen::Vector3f& corner = block.positions_map[face[i]];
+        out.corners_map[i] = corner.head<2>();
+        sum_m += corner.z();
+      }
+      out.height_m = sum_m / 3.0f;
+      if (out.height_m > cut_m) continue;
+      out.paint = PaintOf(block, face, color);
+      faces.push_back(out);
+    }
+  }
+  // Lower faces first; stable, so that the same map gives the same bytes.
+  std::stable_sort(faces.begin(), faces.end(),
+                   [](const DrawnFace& a, const DrawnFace& b) { return a.height_m < b.height_m; });
+  for (const DrawnFace& face : faces) {
+    Polygon2d corners;
+    for (const Eigen::Vector2f& corner : face.corners_map) {
+      corners.push_back(view.ToPixel(Eigen::Vector2d(corner.cast<double>())));
+    }
+    canvas->FillPolygon(corners, face.paint);
+  }
+}
+
 std::string StructureType(const Node& node) {
   if (node.structure.has_value() && !node.structure->structure_type.empty()) {
     return node.structure->structure_type;
@@ -48,9 +115,9 @@ std::string StructureType(const Node& node) {
   return node.class_name;
 }
 
-// Everything that is drawn at its own place.
-Box2d BoundsOf(const MapContent& content, const Overlay& overlay) {
-  Box2d bounds = BoundsOf(overlay);
+// Bounds of all that is drawn.
+Eigen::AlignedBox2d MapBounds(const MapContent& content, const Overlay& overlay) {
+  Eigen::AlignedBox2d bounds = BoundsOf(overlay);
   for (const Node& node : content.nodes) {
     if (IsAgentKind(node.kind)) continue;
     bounds.extend(Eigen::Vector2d(MiddleOf(node).head<2>()));
@@ -71,48 +138,51 @@ Box2d BoundsOf(const MapContent& content, const Overlay& overlay) {
   if (bounds.isEmpty()) bounds.extend(Eigen::Vector2d::Zero());
   const Eigen::Vector2d lack =
       (Eigen::Vector2d::Constant(kMapSizeMinM) - bounds.sizes()).cwiseMax(0.0);
-  return Box2d(bounds.min() - 0.5 * lack, bounds.max() + 0.5 * lack);
+  return Eigen::AlignedBox2d(bounds.min() - 0.5 * lack, bounds.max() + 0.5 * lack);
 }
 
-// The part of the canvas that the map may fill: all of its width, and a height that fits.
-Box2d AreaFor(const Box2d& bounds_map, int width_px) {
+// The part of the canvas for the map: the full width, and a height that fits.
+Eigen::AlignedBox2d AreaFor(const Eigen::AlignedBox2d& bounds_map, int width_px) {
   const double width = 2.0 * width_px - 2.0 * kMarginPx;
   const double height_max =
       std::min(4.0 * width_px, 2.0 * kTopViewWidthMax) - 2.0 * kMarginPx - kTitlePx - kFooterPx;
   const double height = width * bounds_map.sizes().y() / bounds_map.sizes().x();
   const Eigen::Vector2d low(kMarginPx, kMarginPx + kTitlePx);
-  return Box2d(low, low + Eigen::Vector2d(width, std::clamp(height, 60.0, height_max)));
+  return Eigen::AlignedBox2d(low,
+                             low + Eigen::Vector2d(width, std::clamp(height, 60.0, height_max)));
 }
 
-void DrawGround(const MapContent& content, const FloorView& view, Canvas* canvas) {
+void DrawGround(const MapContent& content, const FloorView& view, picture::Canvas* canvas) {
   for (const Node& node : content.nodes) {
     if (node.kind != kinds::kStructure || StructureType(node) != "floor") continue;
-    canvas->FillPolygon(view.ToPixels(FloorOutline(node)), MakePaint(kGroundRgb));
+    canvas->FillPolygon(view.ToPixels(FloorOutline(node)), picture::MakePaint(kGroundRgb));
   }
 }
 
-void DrawRooms(const MapContent& content, const FloorView& view, Canvas* canvas) {
-  // Half transparent, since boxes of rooms without an outline overlap, and for a mesh below.
+void DrawRooms(const MapContent& content, const FloorView& view, picture::Canvas* canvas) {
+  // Half transparent: boxes of rooms without an outline overlap, and a mesh may be below.
   const float opacity = content.mesh.empty() ? 0.8f : 0.35f;
   for (const Node& node : content.nodes) {
     if (node.kind != kinds::kRoom) continue;
     const Polygon2d outline = view.ToPixels(FloorOutline(node));
     if (outline.size() < 3) {
-      canvas->FillCircle(view.ToPixel(MiddleOf(node)), 14.0, MakePaint(FloorColor(node)));
-      canvas->FillCircle(view.ToPixel(MiddleOf(node)), 6.0, MakePaint(LayerColor(node.layer)));
+      canvas->FillCircle(view.ToPixel(MiddleOf(node)), 14.0, picture::MakePaint(FloorColor(node)));
+      canvas->FillCircle(view.ToPixel(MiddleOf(node)), 6.0,
+                         picture::MakePaint(LayerColor(node.layer)));
       continue;
     }
-    canvas->FillPolygon(outline, MakePaint(FloorColor(node), opacity));
-    canvas->DrawOutline(outline, 2.0, MakePaint(kWallRgb, 0.35f));
+    canvas->FillPolygon(outline, picture::MakePaint(FloorColor(node), opacity));
+    canvas->DrawOutline(outline, 2.0, picture::MakePaint(kWallRgb, 0.35f));
   }
 }
 
-void DrawStructures(const MapContent& content, const FloorView& view, Canvas* canvas) {
+void DrawStructures(const MapContent& content, const FloorView& view, picture::Canvas* canvas) {
   for (const Node& node : content.nodes) {
     if (node.kind != kinds::kStructure) continue;
     const std::string type = StructureType(node);
     if (type == "floor" || type == "ceiling") continue;
-    const Paint paint = MakePaint(type == "glass" || type == "window" ? kGlassRgb : kWallRgb);
+    const picture::Paint paint =
+        picture::MakePaint(type == "glass" || type == "window" ? kGlassRgb : kWallRgb);
     const Polygon2d outline = view.ToPixels(FloorOutline(node));
     canvas->FillPolygon(outline, paint);
     // Walls may be planes without thickness.
@@ -120,63 +190,64 @@ void DrawStructures(const MapContent& content, const FloorView& view, Canvas* ca
   }
 }
 
-void DrawPlaces(const MapContent& content, const FloorView& view, Canvas* canvas) {
+void DrawPlaces(const MapContent& content, const FloorView& view, picture::Canvas* canvas) {
   const auto nodes = NodesById(content);
   for (const Edge& edge : content.edges) {
     if (edge.relation != relations::kTraversable) continue;
     canvas->DrawPolyline({view.ToPixel(MiddleOf(*nodes.at(edge.source))),
                           view.ToPixel(MiddleOf(*nodes.at(edge.target)))},
-                         2.0, MakePaint(LayerColor(layers::kPlaces), 0.35f));
+                         2.0, picture::MakePaint(LayerColor(layers::kPlaces), 0.35f));
   }
   for (const Node& node : content.nodes) {
     if (node.kind != kinds::kPlace) continue;
     canvas->FillCircle(view.ToPixel(MiddleOf(node)), 5.0,
-                       MakePaint(LayerColor(layers::kPlaces), 0.7f));
+                       picture::MakePaint(LayerColor(layers::kPlaces), 0.7f));
   }
 }
 
-// Kinds that the picture has no shape for: a dot each, so that nothing is left out unseen.
-void DrawOthers(const MapContent& content, const FloorView& view, Canvas* canvas) {
+// Kinds without a shape of their own are dots, so that nothing is missing.
+void DrawOthers(const MapContent& content, const FloorView& view, picture::Canvas* canvas) {
   for (const Node& node : content.nodes) {
     if (LayerOfKind(node.kind).has_value() || node.region.has_value()) continue;
-    canvas->FillCircle(view.ToPixel(MiddleOf(node)), 3.0, MakePaint(LayerColor(node.layer), 0.5f));
+    canvas->FillCircle(view.ToPixel(MiddleOf(node)), 3.0,
+                       picture::MakePaint(LayerColor(node.layer), 0.5f));
   }
 }
 
-void DrawObjects(const MapContent& content, const FloorView& view, Canvas* canvas) {
+void DrawObjects(const MapContent& content, const FloorView& view, picture::Canvas* canvas) {
   std::vector<const Node*> objects;
   for (const Node& node : content.nodes) {
     if (node.kind == kinds::kObject) objects.push_back(&node);
   }
-  // What stands on a table is drawn over the table.
+  // Higher objects are drawn over lower ones, as a cup over its table.
   const auto top_of = [](const Node* node) { return node->BoxMap().max().z(); };
   std::stable_sort(objects.begin(), objects.end(),
                    [&](const Node* a, const Node* b) { return top_of(a) < top_of(b); });
   for (const Node* node : objects) {
     const Polygon2d outline = view.ToPixels(FloorOutline(*node));
     if (outline.size() < 3 || AreaOf(outline) < 64.0) {
-      canvas->FillCircle(view.ToPixel(MiddleOf(*node)), 6.0, MakePaint(kInkRgb));
-      canvas->FillCircle(view.ToPixel(MiddleOf(*node)), 4.0, MakePaint(ClassColor(*node)));
+      canvas->FillCircle(view.ToPixel(MiddleOf(*node)), 6.0, picture::MakePaint(kInkRgb));
+      canvas->FillCircle(view.ToPixel(MiddleOf(*node)), 4.0, picture::MakePaint(ClassColor(*node)));
       continue;
     }
-    canvas->FillPolygon(outline, MakePaint(ClassColor(*node), 0.6f));
-    canvas->DrawOutline(outline, 2.5, MakePaint(kInkRgb, 0.25f));
-    canvas->DrawOutline(outline, 2.5, MakePaint(ClassColor(*node), 0.7f));
+    canvas->FillPolygon(outline, picture::MakePaint(ClassColor(*node), 0.6f));
+    canvas->DrawOutline(outline, 2.5, picture::MakePaint(kInkRgb, 0.25f));
+    canvas->DrawOutline(outline, 2.5, picture::MakePaint(ClassColor(*node), 0.7f));
   }
 }
 
-void DrawTracks(const MapContent& content, const FloorView& view, Canvas* canvas) {
+void DrawTracks(const MapContent& content, const FloorView& view, picture::Canvas* canvas) {
   for (size_t i = 0; i < content.tracks.size(); ++i) {
     for (const auto& piece : content.tracks[i].pieces) {
       std::vector<Eigen::Vector2d> pixels;
       for (const Eigen::Vector3d& point : piece) pixels.push_back(view.ToPixel(point));
-      canvas->DrawPolyline(pixels, 3.0, MakePaint(AgentColor(i), 0.65f));
+      canvas->DrawPolyline(pixels, 3.0, picture::MakePaint(AgentColor(i), 0.65f));
     }
   }
   for (size_t i = 0; i < content.tracks.size(); ++i) {
     const Eigen::Vector2d last = view.ToPixel(LastOf(content.tracks[i]));
-    canvas->FillCircle(last, 14.0, MakePaint(0xffffff));
-    canvas->FillCircle(last, 11.0, MakePaint(AgentColor(i)));
+    canvas->FillCircle(last, 14.0, picture::MakePaint(0xffffff));
+    canvas->FillCircle(last, 11.0, picture::MakePaint(AgentColor(i)));
   }
 }
 
@@ -189,8 +260,8 @@ double RoundLength(double length_m) {
   return power;
 }
 
-/// Returns where it begins.
-double DrawScaleBar(const FloorView& view, double y, Canvas* canvas) {
+// Returns its left end, pixels.
+double DrawScaleBar(const FloorView& view, double y, picture::Canvas* canvas) {
   constexpr int kParts = 5;
   const double length_m = RoundLength(0.25 * canvas->width() / view.px_per_m());
   const double part_px = length_m * view.px_per_m() / kParts;
@@ -199,15 +270,15 @@ double DrawScaleBar(const FloorView& view, double y, Canvas* canvas) {
   for (int i = 0; i < kParts; ++i) {
     const Eigen::Vector2d low = begin + Eigen::Vector2d(i * part_px, 0.0);
     canvas->FillRect(low, low + Eigen::Vector2d(part_px, 12.0),
-                     MakePaint(i % 2 == 0 ? kInkRgb : 0xc4c6cc));
+                     picture::MakePaint(i % 2 == 0 ? kInkRgb : 0xc4c6cc));
   }
   const std::string text = absl::StrCat(length_m, " m");
-  const double x = begin.x() - Canvas::TextWidth(text, kTextDotPx) - 16.0;
-  canvas->DrawText(Eigen::Vector2d(x, y), text, kTextDotPx, MakePaint(kInkRgb));
+  const double x = begin.x() - picture::Canvas::TextWidth(text, kTextDotPx) - 16.0;
+  canvas->DrawText(Eigen::Vector2d(x, y), text, kTextDotPx, picture::MakePaint(kInkRgb));
   return x;
 }
 
-// Agents have a colour each: that of the first of the kind.
+// Each agent has its own colour; the legend shows the colour of the first.
 uint32_t ColorOfKind(const MapContent& content, const char* kind) {
   for (size_t i = 0; i < content.tracks.size(); ++i) {
     const auto node = std::find_if(content.nodes.begin(), content.nodes.end(),
@@ -217,18 +288,19 @@ uint32_t ColorOfKind(const MapContent& content, const char* kind) {
   return LayerColor(layers::kAgents);
 }
 
-// How many of what, each with the colour it is drawn in.
-void DrawLegend(const MapContent& content, double y, double x_end, Canvas* canvas) {
+// Counts of nodes by kind, with the colour of the kind.
+void DrawLegend(const MapContent& content, double y, double x_end, picture::Canvas* canvas) {
   std::map<std::string, int64_t> count_of;
   for (const Node& node : content.nodes) ++count_of[node.kind];
   double x = kMarginPx;
   const auto add = [&](const char* kind, const std::string& noun, uint32_t rgb) {
     if (count_of[kind] == 0) return;
     const std::string text = Counted(count_of[kind], noun);
-    const double end = x + 40.0 + Canvas::TextWidth(text, kTextDotPx);
+    const double end = x + 40.0 + picture::Canvas::TextWidth(text, kTextDotPx);
     if (end > x_end) return;
-    canvas->FillCircle(Eigen::Vector2d(x + 12.0, y + 0.5 * kTextHeightPx), 11.0, MakePaint(rgb));
-    canvas->DrawText(Eigen::Vector2d(x + 40.0, y), text, kTextDotPx, MakePaint(kInkRgb));
+    canvas->FillCircle(Eigen::Vector2d(x + 12.0, y + 0.5 * kTextHeightPx), 11.0,
+                       picture::MakePaint(rgb));
+    canvas->DrawText(Eigen::Vector2d(x + 40.0, y), text, kTextDotPx, picture::MakePaint(kInkRgb));
     x = end + 44.0;
   };
   add(kinds::kRoom, "room", 0xcfe0cf);
@@ -239,11 +311,12 @@ void DrawLegend(const MapContent& content, double y, double x_end, Canvas* canva
   add(kinds::kHuman, "human", ColorOfKind(content, kinds::kHuman));
 }
 
-void DrawTitle(const std::string& title, Canvas* canvas) {
+void DrawTitle(const std::string& title, picture::Canvas* canvas) {
   double dot = 6.0;
   const double width = canvas->width() - 2.0 * kMarginPx;
-  while (dot > 2.0 && Canvas::TextWidth(title, dot) > width) dot -= 1.0;
-  canvas->DrawText(Eigen::Vector2d(kMarginPx, kMarginPx - 10.0), title, dot, MakePaint(kInkRgb));
+  while (dot > 2.0 && picture::Canvas::TextWidth(title, dot) > width) dot -= 1.0;
+  canvas->DrawText(Eigen::Vector2d(kMarginPx, kMarginPx - 10.0), title, dot,
+                   picture::MakePaint(kInkRgb));
 }
 
 }  // namespace
@@ -251,13 +324,13 @@ void DrawTitle(const std::string& title, Canvas* canvas) {
 picture::Picture DrawTopView(const MapContent& content, const TopViewOptions& options) {
   DSG_CHECK(options.width_px >= kTopViewWidthMin && options.width_px <= kTopViewWidthMax);
   const Overlay& overlay = options.overlay;
-  const Box2d bounds_map = BoundsOf(content, overlay);
-  const Box2d area = AreaFor(bounds_map, options.width_px);
+  const Eigen::AlignedBox2d bounds_map = MapBounds(content, overlay);
+  const Eigen::AlignedBox2d area = AreaFor(bounds_map, options.width_px);
   const FloorView view(bounds_map, area);
   const double key_height = overlay.legend.empty() ? 0.0 : kKeyRowPx;
   const double height = area.max().y() + kMarginPx + kFooterPx + key_height;
-  Canvas canvas(2 * options.width_px, 2 * static_cast<int>(std::ceil(0.5 * height)),
-                MakePaint(kPaperRgb));
+  picture::Canvas canvas(2 * options.width_px, 2 * static_cast<int>(std::ceil(0.5 * height)),
+                         picture::MakePaint(kPaperRgb));
   DrawMesh(content.mesh, view, &canvas);
   DrawGround(content, view, &canvas);
   DrawRooms(content, view, &canvas);
@@ -268,9 +341,10 @@ picture::Picture DrawTopView(const MapContent& content, const TopViewOptions& op
   DrawTracks(content, view, &canvas);
   const double margin = 0.5 * kMarginPx;
   const Eigen::Vector2d around(margin, margin);
-  LabelLayout layout(Box2d(area.min() - around, area.max() + around));
+  picture::LabelLayout layout(Eigen::AlignedBox2d(area.min() - around, area.max() + around));
   if (!overlay.empty()) {
-    canvas.FillRect({0.0, 0.0}, {canvas.width(), canvas.height()}, MakePaint(kPaperRgb, 0.4f));
+    canvas.FillRect({0.0, 0.0}, {canvas.width(), canvas.height()},
+                    picture::MakePaint(kPaperRgb, 0.4f));
     DrawOverlay(overlay, view, &layout, &canvas);
     DrawOverlayLabels(overlay, view, &layout, &canvas);
   }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A map from above, as a picture for people: floors, walls, places, objects, tracks, names.
-// Refuses to be exact to the pixel, and to let names cover each other: what has no room has no
-// name.
+// A map from above, as a picture for people: floors, walls, places, objects, tracks, names. Names
+// do not overlap: a name without free space is left out.
 #pragma once
 
 #include <string>
@@ -20,11 +19,11 @@ struct TopViewOptions {
   /// kTopViewWidthMax.
   int width_px = 1600;
   std::string title;
-  /// Drawn over the map, which is paled then.
+  /// Drawn over the map, which is then paled.
   Overlay overlay{};
 };
 
-/// Draws what there is; an empty map is a title on empty paper.
+/// An empty map gives a title on empty paper.
 picture::Picture DrawTopView(const MapContent& content, const TopViewOptions& options);
 
 }  // namespace dsg::cli

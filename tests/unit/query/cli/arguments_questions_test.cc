@@ -2,9 +2,16 @@
 // The grammar of the verbs that ask about meetings, search, ways, obstacles, the future and change.
 #include <gtest/gtest.h>
 
+#include <any>
 #include <string>
 
 #include "query/cli/arguments.h"
+#include "query/cli/verb_predict.h"
+#include "query/cli/verbs_agents.h"
+#include "query/cli/verbs_changes.h"
+#include "query/cli/verbs_meetings.h"
+#include "query/cli/verbs_search.h"
+#include "query/cli/verbs_space.h"
 #include "tests/unit/query/cli/cli_test_util.h"
 
 namespace dsg::cli {

@@ -3,11 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <any>
 #include <sstream>
 #include <string>
-#include <variant>
 #include <vector>
 
+#include "query/cli/verbs_agents.h"
+#include "query/cli/verbs_graph.h"
 #include "tests/unit/query/cli/cli_test_util.h"
 
 namespace dsg::cli {
@@ -21,6 +23,13 @@ CommonOptions ParseCommon(const Arguments& arguments, const Environment& environ
   const auto command = ParseArguments(arguments, environment);
   EXPECT_TRUE(command.ok()) << command.status();
   return command.ok() ? command->common : CommonOptions();
+}
+
+std::string HelpOf(Arguments arguments) {
+  arguments.push_back("--help");
+  const auto command = ParseArguments(arguments, {});
+  EXPECT_TRUE(command.ok()) << command.status();
+  return command.ok() ? command->help : "";
 }
 
 TEST(Arguments, TakesTimesWithEitherSign) {
@@ -103,7 +112,7 @@ TEST(Arguments, ImportAndVerifyNeedAStore) {
   EXPECT_NE(Refusal({"verify"}, server).find("--store DIR"), std::string::npos);
   EXPECT_NE(Refusal({"import", "f.json", "--store", "s"}, {}).find("--map NAME"),
             std::string::npos);
-  EXPECT_EQ(ParseAs<ImportVerb>({"import", "f.json", "--map", "m"}).file, "f.json");
+  EXPECT_EQ(ParseCommon({"import", "f.json", "--map", "m"}, {.store = "s"}).map, "m");
 }
 
 TEST(Arguments, RefusesWhatItDoesNotKnow) {
@@ -128,12 +137,12 @@ TEST(Arguments, WhoNeedsExactlyOnePlace) {
 }
 
 TEST(Arguments, HelpIsAnAnswer) {
-  const std::string all = ParseAs<HelpVerb>({"--help"}, {}).text;
+  const std::string all = HelpOf({});
   for (const char* verb : {"where", "track", "who", "ls", "edges", "show", "near", "log", "stats",
                            "maps", "import", "verify", "version"}) {
     EXPECT_NE(all.find(std::string("  ") + verb), std::string::npos) << verb;
   }
-  const std::string where = ParseAs<HelpVerb>({"where", "--help"}, {}).text;
+  const std::string where = HelpOf({"where"});
   EXPECT_NE(where.find("--at"), std::string::npos) << where;
 }
 
@@ -157,14 +166,14 @@ Arguments WordsOf(const std::string& line) {
 }
 
 TEST(Arguments, HelpOfEachVerbHasAnExampleThatCanBeTyped) {
-  const std::string all = ParseAs<HelpVerb>({"--help"}, {}).text;
+  const std::string all = HelpOf({});
   std::istringstream lines(all.substr(all.find("Subcommands:")));
   std::string line;
   std::getline(lines, line);
   int count = 0;
   while (std::getline(lines, line) && line.substr(0, 2) == "  ") {
     const std::string verb = WordsOf(line)[0];
-    const std::string help = ParseAs<HelpVerb>({verb, "--help"}, {}).text;
+    const std::string help = HelpOf({verb});
     const size_t at = help.find("Example: dsg ");
     ASSERT_NE(at, std::string::npos) << help;
     Arguments words = WordsOf(help.substr(at + 13, help.find('\n', at) - at - 13));
@@ -193,8 +202,8 @@ TEST(Arguments, MistakesNameTheOptionAndWhereHelpIs) {
 }
 
 TEST(Arguments, VersionNeedsNoPlace) {
-  ParseAs<VersionVerb>({"version"}, {});
-  ParseAs<VersionVerb>({"--version"}, {});
+  EXPECT_TRUE(ParseArguments({"version"}, {}).ok());
+  EXPECT_TRUE(ParseArguments({"--version"}, {}).ok());
 }
 
 }  // namespace

@@ -5,12 +5,12 @@
 
 #include <gtest/gtest.h>
 
+#include <any>
 #include <string>
-#include <variant>
 #include <vector>
 
+#include "query/cli/answer_text.h"
 #include "query/cli/run.h"
-#include "query/cli/time_text.h"
 #include "schema/model/graph_delta.h"
 
 namespace dsg::test {
@@ -31,11 +31,10 @@ template <class V>
 V ParseAs(const Arguments& arguments, const cli::Environment& environment = {.store = "s"}) {
   const auto command = cli::ParseArguments(arguments, environment);
   EXPECT_TRUE(command.ok()) << command.status();
-  if (!command.ok() || !std::holds_alternative<V>(command->verb)) {
-    ADD_FAILURE() << "another verb than asked for";
-    return V();
-  }
-  return std::get<V>(command->verb);
+  const V* verb = command.ok() ? std::any_cast<V>(&command->verb) : nullptr;
+  if (verb != nullptr) return *verb;
+  ADD_FAILURE() << "another verb than asked for";
+  return V();
 }
 /// What is said of a command line that is refused; fails the test when it is not.
 std::string Refusal(const Arguments& arguments,

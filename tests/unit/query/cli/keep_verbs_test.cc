@@ -111,7 +111,7 @@ TEST_F(KeepVerbs, CompactAndRevertSayWhatTheyDid) {
             "went back to tag two as revision 5: restored nothing; gone 2 nodes\n");
   EXPECT_EQ(NodeCount(store_, "office"), 2U);
   EXPECT_EQ(Ask({"revert", "2", "--map", "office"}).out,
-            "the map is what it was at revision 2 already; nothing written\n");
+            "the map already has the content of revision 2; nothing written\n");
   const Outcome compacted = Ask({"compact", "--map", "office"});
   EXPECT_EQ(compacted.code, 0) << compacted.errors;
   EXPECT_EQ(compacted.out.substr(0, 19), "dropped 3 revisions");
@@ -208,7 +208,8 @@ TEST_F(KeepVerbs, ABackupNamesMapsThatCannotBeOpenedAndHoldsTheOthers) {
   EXPECT_NE(outcome.out.find("cellar: left out: "), std::string::npos) << outcome.out;
   EXPECT_NE(outcome.out.find("office: left out: "), std::string::npos) << outcome.out;
   EXPECT_NE(outcome.out.find("office: kept from the last backup"), std::string::npos);
-  EXPECT_NE(outcome.errors.find("2 maps that could not be read, \"cellar\""), std::string::npos)
+  EXPECT_NE(outcome.errors.find("2 maps that could not be read, first \"cellar\""),
+            std::string::npos)
       << outcome.errors;
   EXPECT_NE(outcome.errors.find("["), std::string::npos) << outcome.errors;
   const Json json = Json::parse(Ask({"backup", out_, "--json"}).out);
@@ -323,16 +324,18 @@ TEST_F(KeepVerbs, AnArchiveGoesOutAndComesBackWithTheSameBytes) {
   // Only a name on the command line is a new name.
   const Outcome copy =
       RunDsg({"import", file, "--store", other, "--map", "copy"}, {.map = "elsewhere"});
-  EXPECT_EQ(copy.out, "copy: restored at revision 4, readable from 0 on; it was called office\n");
+  EXPECT_EQ(
+      copy.out,
+      "copy: restored at revision 4, readable from 0 on; its name in the archive is office\n");
   EXPECT_EQ(RunDsg({"restore", file, "--store", other, "--force"}, {.map = "elsewhere"}).code, 0);
   EXPECT_FALSE(fs::exists(other + "/elsewhere"));
 }
 
 TEST_F(KeepVerbs, FilesThatAreNoArchivesAreRefused) {
   const std::string file = folder_.path() + "/office.dsgz";
-  ExpectRefused(2, "is no .dsgz file", {"export", "office.zip", "--map", "office"});
-  ExpectRefused(2, "leave --revision", {"export", file, "--revision", "2", "--map", "office"});
-  ExpectRefused(2, "written alone", {"export", file, "--gltf", "x.glb", "--map", "office"});
+  ExpectRefused(2, "does not end in .dsgz", {"export", "office.zip", "--map", "office"});
+  ExpectRefused(2, "remove --revision", {"export", file, "--revision", "2", "--map", "office"});
+  ExpectRefused(2, "only file of its call", {"export", file, "--gltf", "x.glb", "--map", "office"});
   ExpectRefused(2, "cannot create",
                 {"export", folder_.path() + "/none/office.dsgz", "--map", "office"});
   ASSERT_EQ(Ask({"export", file, "--map", "office"}).code, 0);
@@ -347,7 +350,7 @@ TEST_F(KeepVerbs, FilesThatAreNoArchivesAreRefused) {
 }
 
 TEST_F(KeepVerbs, ABackupGoesNeitherIntoItsStoreNorAmongOtherThings) {
-  ExpectRefused(2, "inside of the store", {"backup", store_ + "/backup"});
+  ExpectRefused(2, "inside the store", {"backup", store_ + "/backup"});
   fs::create_directories(out_);
   WriteBytes(out_ + "/letter.txt", "dear");
   ExpectRefused(2, "letter.txt", {"backup", out_});

@@ -5,8 +5,8 @@
 #include <array>
 #include <cstdlib>
 
+#include "query/cli/export/overlay.h"
 #include "query/cli/export/top_view.h"
-#include "query/cli/export/top_view_overlay.h"
 #include "tests/unit/query/cli/example_content.h"
 
 namespace dsg::cli {

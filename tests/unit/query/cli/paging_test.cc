@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/cli/paging.h"
+#include "query/cli/session.h"
 
 #include <gtest/gtest.h>
 

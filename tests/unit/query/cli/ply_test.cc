@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // PLY files are read back by a reader of our own that follows their headers.
-#include "query/cli/export/ply.h"
+#include "query/cli/export/mesh_file.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <map>
 #include <sstream>
 
-#include "query/cli/export/palette.h"
+#include "query/cli/export/look.h"
 #include "tests/support/temp_folder.h"
 #include "tests/unit/query/cli/example_content.h"
 

@@ -118,7 +118,8 @@ TEST_F(PruneVerbTest, TakesAFileOfPolicies) {
   EXPECT_NE(done.out.find("quiet kitchen"), std::string::npos) << done.out;
   EXPECT_NE(done.out.find("erased:"), std::string::npos) << done.out;
   // Another policy of the same file may have retired only.
-  EXPECT_NE(done.out.find("older revisions what was only retired"), std::string::npos) << done.out;
+  EXPECT_NE(done.out.find("older revisions still have what was only retired"), std::string::npos)
+      << done.out;
   std::ofstream(path) << "policies:\n  - {name: a, brunch: R1}\n";
   const Outcome wrong = Dsg({"prune", "--policy", path});
   EXPECT_EQ(wrong.code, 2);

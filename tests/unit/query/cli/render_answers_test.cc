@@ -7,10 +7,11 @@
 
 #include "dsg/v1/map_service.pb.h"
 #include "dsg/v1/query_service.pb.h"
-#include "query/cli/render_changes.h"
-#include "query/cli/render_meetings.h"
-#include "query/cli/render_search.h"
-#include "query/cli/render_space.h"
+#include "query/cli/verb_predict.h"
+#include "query/cli/verbs_changes.h"
+#include "query/cli/verbs_meetings.h"
+#include "query/cli/verbs_search.h"
+#include "query/cli/verbs_space.h"
 #include "tests/unit/query/cli/cli_test_util.h"
 
 namespace dsg::cli {
@@ -187,7 +188,7 @@ TEST(CollisionText, TellsHitFreeAndUnknown) {
   EXPECT_EQ(CollisionText(result, Names()), "free, nothing within 2.00 m");
   result.set_observed(false);
   EXPECT_EQ(CollisionText(result, Names()),
-            "free, nothing within 2.00 m; part of the body is outside of what the map knows");
+            "free, nothing within 2.00 m; part of the body is in unobserved space");
   result.set_observed(true);
   result.set_hit(true);
   result.set_what("predicted_agent");

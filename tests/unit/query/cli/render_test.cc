@@ -6,9 +6,9 @@
 
 #include "dsg/v1/map_service.pb.h"
 #include "dsg/v1/query_service.pb.h"
-#include "query/cli/render_agents.h"
-#include "query/cli/render_graph.h"
-#include "query/cli/render_maps.h"
+#include "query/cli/answer_text.h"
+#include "query/cli/verbs_agents.h"
+#include "query/cli/verbs_graph.h"
 #include "tests/unit/query/cli/cli_test_util.h"
 
 namespace dsg::cli {

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <array>
 
-#include "query/cli/export/floor_choice.h"
+#include "query/cli/export/map_content.h"
 #include "query/cli/export/outline.h"
 #include "schema/base/random.h"
 #include "schema/base/status.h"

@@ -7,7 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/maintenance_service.pb.h"
-#include "query/cli/render_merge.h"
+#include "query/cli/verb_merge.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 #include "tests/unit/query/engine/office.h"

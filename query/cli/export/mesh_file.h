@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// Meshes, graphs and bodies as files: PLY, and Wavefront OBJ for bodies. Frames and units are those
+// of the map (z up, metres).
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "query/cli/export/look.h"
+#include "query/cli/export/map_content.h"
+#include "schema/files/atomic_file.h"
+
+namespace dsg::cli {
+
+/// Binary PLY, little endian: vertices with normal, colour, label and instance; faces.
+/// Errors: as AtomicFile::Write; RESOURCE_EXHAUSTED/LIMIT_EXCEEDED from 2^31 vertices on, beyond
+/// the 32-bit counts of readers.
+absl::Status WriteMeshPly(const MapContent& content, MeshColor color, AtomicFile* file);
+
+struct GraphPlyCounts {
+  size_t vertices = 0;
+  size_t edges = 0;
+};
+
+/// Binary PLY: a point per node, in the colour of its class or layer; a line per edge; boxes and
+/// tracks as lines between further points. The property `layer` is the layer's id; comments name
+/// the layers. Errors: as WriteMeshPly.
+absl::StatusOr<GraphPlyCounts> WriteGraphPly(const MapContent& content, AtomicFile* file);
+
+struct BodyMesh {
+  std::vector<Eigen::Vector3f> points_map;
+  /// Empty without a topology; the files then have points only.
+  std::vector<std::array<uint32_t, 3>> faces;
+  /// One line: the agent and the time.
+  std::string comment;
+};
+
+/// Binary PLY. Errors: DATA_LOSS for a face with an unknown vertex; as AtomicFile::Write.
+absl::Status WriteBodyPly(const BodyMesh& body, AtomicFile* file);
+/// Wavefront OBJ. Errors: as WriteBodyPly.
+absl::Status WriteBodyObj(const BodyMesh& body, AtomicFile* file);
+
+}  // namespace dsg::cli

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// What words of the command line stand for in the map: names, tags, intervals, filters. The map is
+// asked; a word that fits several things is an error.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "query/cli/session.h"
+#include "schema/base/time.h"
+#include "schema/model/layer.h"
+#include "schema/model/revision.h"
+
+namespace dsg::v1 {
+class ListTagsResponse;
+class NodeFilter;
+}  // namespace dsg::v1
+
+namespace dsg::cli {
+
+// All functions require that the session's map is chosen.
+
+/// Names of nodes by id.
+class NodeNames {
+ public:
+  NodeNames() = default;
+  explicit NodeNames(std::map<std::string, std::string> names) : names_(std::move(names)) {}
+
+  /// "kitchen (R9)"; only the id of a node without a name; empty without an id.
+  std::string Text(const std::string& id) const;
+
+ private:
+  std::map<std::string, std::string> names_;
+};
+
+/// Reads the names of all ids in one call, at `revision`. Ids may repeat, be empty or be unknown.
+absl::StatusOr<NodeNames> NamesOf(Session* session, int64_t revision,
+                                  const std::vector<std::string>& ids);
+
+/// The id of a node by id or unique name. Errors: of GetNode.
+absl::StatusOr<std::string> NodeIdOf(Session* session, const std::string& id_or_name);
+
+/// The id of a room, place or region by id or name, or of the only room of a class. If a room and
+/// its furniture share a name, the room is meant. Errors: NOT_FOUND/NODE_UNKNOWN; FIELD_INVALID if
+/// several rooms have the name or the class.
+absl::StatusOr<std::string> RegionId(Session* session, const std::string& id_or_name);
+
+/// The number of a revision, if the option is set. Errors: NOT_FOUND/TAG_UNKNOWN.
+absl::StatusOr<std::optional<Revision>> NumberOf(const RevisionOption& revision, Session* session);
+
+/// The tags of the map; none from a server that does not know tags.
+absl::StatusOr<v1::ListTagsResponse> ReadTags(Session* session);
+
+/// The interval of --from and --to. An end that is not given is that of all poses of the map.
+/// Errors: INVALID_ARGUMENT with the option; of the calls.
+absl::StatusOr<Interval> AskedInterval(Session* session, const std::string& from,
+                                       const std::string& to);
+
+/// Errors: INVALID_ARGUMENT with --at.
+absl::Status FillFilter(const FilterOptions& options, const MapSpec& map, v1::NodeFilter* filter);
+
+/// For lists that came out empty: an error if the map does not know one of the words; empty words
+/// are not checked. Errors: NOT_FOUND/CLASS_UNKNOWN, RELATION_UNKNOWN, LAYER_UNKNOWN.
+absl::Status CheckWords(Session* session, const std::string& layer, const std::string& class_name,
+                        const std::string& relation);
+
+}  // namespace dsg::cli

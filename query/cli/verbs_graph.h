@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// The verbs about nodes and edges: ls, edges, show, near.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "query/cli/answer_text.h"
+#include "query/cli/arguments.h"
+
+namespace dsg::v1 {
+class GetNodeResponse;
+class ListEdgesResponse;
+class ListNearestNodesResponse;
+}  // namespace dsg::v1
+
+namespace dsg::cli {
+
+struct ListVerb {
+  FilterOptions filter;
+  std::string parent;
+  std::string name;
+  std::string box;
+};
+
+struct EdgesVerb {
+  std::string source;
+  std::string relation;
+  std::string target;
+  std::string at;
+};
+
+struct ShowVerb {
+  std::string id;
+};
+
+struct NearVerb {
+  std::string position;
+  int32_t k = 5;
+  FilterOptions filter;
+  /// Metres; 0 = no limit.
+  double max_distance_m = 0.0;
+};
+
+std::string RenderEdges(const v1::ListEdgesResponse& reply, const TimeText& times);
+std::string RenderNearest(const v1::ListNearestNodesResponse& reply);
+/// One line per field; fields that the node does not have are left out.
+std::string RenderNode(const v1::GetNodeResponse& reply, const TimeText& times);
+
+}  // namespace dsg::cli

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "schema/base/exit_code.h"
+
+#include "schema/base/status.h"
+
+namespace dsg {
+
+ExitCode ExitCodeOf(const absl::Status& status) {
+  const Reason reason = ReasonOf(status);
+  if (reason == Reason::kFieldInvalid || reason == Reason::kMapNameInvalid) return kUsage;
+  switch (status.code()) {
+    case absl::StatusCode::kOk:
+      return kDone;
+    case absl::StatusCode::kUnavailable:
+    case absl::StatusCode::kDeadlineExceeded:
+      return kUnavailable;
+    case absl::StatusCode::kDataLoss:
+      return kDataLoss;
+    default:
+      return kFailed;
+  }
+}
+
+}  // namespace dsg
