@@ -30,6 +30,10 @@ bool SameContent(const Edge& a, const Edge& b) {
          EncodeEdgePayload(a) == EncodeEdgePayload(b);
 }
 
+bool SameContent(const MeshBlock& a, const MeshBlock& b) {
+  return EncodeMeshBlock(a) == EncodeMeshBlock(b);
+}
+
 bool IsSamePose(const TimedPose& a, const TimedPose& b) {
   if ((a.covariance == nullptr) != (b.covariance == nullptr)) return false;
   const Eigen::Vector4d& q = a.map_T_agent.orientation.coeffs();
@@ -96,10 +100,6 @@ absl::StatusOr<std::optional<T>> IfFound(absl::StatusOr<T> value) {
   if (value.ok()) return std::optional<T>(*std::move(value));
   if (absl::IsNotFound(value.status())) return std::optional<T>();
   return value.status();
-}
-
-bool SameContent(const MeshBlock& a, const MeshBlock& b) {
-  return EncodeMeshBlock(a) == EncodeMeshBlock(b);
 }
 
 // Nothing if both are absent or equal.
@@ -233,23 +233,6 @@ absl::StatusOr<std::optional<v1::MeshChange>> ChangeOf(const BlockIndex& index, 
   return std::optional<v1::MeshChange>(std::move(change));
 }
 
-std::string PositionOf(const BlockIndex& index) {
-  std::string position;
-  for (const int64_t axis : {index.x, index.y, index.z}) {
-    AppendWord(static_cast<uint64_t>(axis), &position);
-  }
-  return position;
-}
-
-bool ReadPosition(std::string_view text, BlockIndex* index) {
-  for (int32_t* axis : {&index->x, &index->y, &index->z}) {
-    uint64_t word = 0;
-    if (!TakeWord(&text, &word)) return false;
-    *axis = static_cast<int32_t>(word);
-  }
-  return text.empty();
-}
-
 /// A page that is being filled. Kinds of changes follow one another as in kKinds; each has a
 /// letter, which begins a position.
 class ChangePage {
@@ -269,7 +252,7 @@ class ChangePage {
       if (kKinds.find(kind) < kKinds.find(position_.front())) return absl::OkStatus();
       Key last{};
       if (kind == position_.front()) {
-        if (!ReadPosition(position_.substr(1), &last)) return PageTokenError();
+        if (!ReadKey(position_.substr(1), &last)) return PageTokenError();
         next = std::upper_bound(keys.begin(), keys.end(), last);
       }
     }
@@ -284,7 +267,7 @@ class ChangePage {
       if (has_more_) break;
       ++count_;
       bytes_ += change->ByteSizeLong();
-      last_ = kind + PositionOf(*next);
+      last_ = kind + KeyPosition(*next);
       *changes->Add() = *std::move(change);
     }
     return absl::OkStatus();

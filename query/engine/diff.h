@@ -24,6 +24,7 @@ namespace dsg::query {
 /// Equal to the last bit; the revision does not count.
 bool SameContent(const Node& a, const Node& b);
 bool SameContent(const Edge& a, const Edge& b);
+bool SameContent(const MeshBlock& a, const MeshBlock& b);
 /// Equal to the last bit, but that q and -q are one rotation: which of them is stored depends on
 /// the poses before it.
 bool IsSamePose(const TimedPose& a, const TimedPose& b);

@@ -47,13 +47,13 @@ absl::Status ListEdges(Engine* engine, const CallContext& call, const v1::ListEd
   DSG_ASSIGN_OR_RETURN(const EdgeFilter filter, EdgeFilterFromProto(request, snapshot));
   std::optional<EdgeKey> after;
   if (!page.is_first()) {
-    if (!ReadPosition(page.position, &after.emplace())) return PageTokenError();
+    if (!ReadKey(page.position, &after.emplace())) return PageTokenError();
   }
   EdgeKey last;
   size_t bytes = 0;
   const auto take = [&](const Edge& edge) {
     if (reply->edges_size() == page.size || bytes > kPageBytesSoftMax) {
-      reply->set_next_page_token(page.NextToken(PositionOf(last)));
+      reply->set_next_page_token(page.NextToken(KeyPosition(last)));
       return false;
     }
     v1::Edge* out = reply->add_edges();
@@ -168,13 +168,13 @@ absl::Status ListNodes(Engine* engine, const CallContext& call, const v1::ListNo
   DSG_ASSIGN_OR_RETURN(const LayerTable layers, LayersOf(snapshot));
   NodeId last;
   if (!page.is_first()) {
-    if (!ReadPosition(page.position, &last)) return PageTokenError();
+    if (!ReadKey(page.position, &last)) return PageTokenError();
   }
   size_t bytes = 0;
   // False once the page is full.
   const auto add = [&](const Node& node, bool has_pose) {
     if (reply->nodes_size() == page.size || bytes > kPageBytesSoftMax) {
-      reply->set_next_page_token(page.NextToken(PositionOf(last)));
+      reply->set_next_page_token(page.NextToken(KeyPosition(last)));
       return false;
     }
     v1::Node* out = reply->add_nodes();

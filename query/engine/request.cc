@@ -185,24 +185,41 @@ bool TakeWord(std::string_view* position, uint64_t* word) {
   return true;
 }
 
-std::string PositionOf(NodeId id) {
+std::string KeyPosition(NodeId id) {
   std::string position;
   AppendWord(id.value, &position);
   return position;
 }
 
-std::string PositionOf(const EdgeKey& key) {
-  return PositionOf(key.source) + PositionOf(key.target) + key.relation;
+std::string KeyPosition(const EdgeKey& key) {
+  return KeyPosition(key.source) + KeyPosition(key.target) + key.relation;
 }
 
-bool ReadPosition(std::string_view text, NodeId* id) {
+std::string KeyPosition(const BlockIndex& index) {
+  std::string position;
+  for (const int64_t axis : {index.x, index.y, index.z}) {
+    AppendWord(static_cast<uint64_t>(axis), &position);
+  }
+  return position;
+}
+
+bool ReadKey(std::string_view text, NodeId* id) {
   return TakeWord(&text, &id->value) && text.empty();
 }
 
-bool ReadPosition(std::string_view text, EdgeKey* key) {
+bool ReadKey(std::string_view text, EdgeKey* key) {
   const bool ok = TakeWord(&text, &key->source.value) && TakeWord(&text, &key->target.value);
   key->relation = std::string(text);
   return ok;
+}
+
+bool ReadKey(std::string_view text, BlockIndex* index) {
+  for (int32_t* axis : {&index->x, &index->y, &index->z}) {
+    uint64_t word = 0;
+    if (!TakeWord(&text, &word)) return false;
+    *axis = static_cast<int32_t>(word);
+  }
+  return text.empty();
 }
 
 absl::Status PageTokenError() {

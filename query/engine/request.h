@@ -134,10 +134,12 @@ void AppendWord(uint64_t word, std::string* position);
 /// Takes them off its front. False if there are fewer than 64 bits.
 bool TakeWord(std::string_view* position, uint64_t* word);
 /// Keys as positions, and back. False if the text is no position of such a key.
-std::string PositionOf(NodeId id);
-std::string PositionOf(const EdgeKey& key);
-bool ReadPosition(std::string_view text, NodeId* id);
-bool ReadPosition(std::string_view text, EdgeKey* key);
+std::string KeyPosition(NodeId id);
+std::string KeyPosition(const EdgeKey& key);
+std::string KeyPosition(const BlockIndex& index);
+bool ReadKey(std::string_view text, NodeId* id);
+bool ReadKey(std::string_view text, EdgeKey* key);
+bool ReadKey(std::string_view text, BlockIndex* index);
 
 /// One page of a list: what to read, from where on, and how much.
 struct Page {

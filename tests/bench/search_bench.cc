@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "query/engine/search/query_language.h"
 #include "query/engine/search/search_run.h"
 #include "query/engine/search/words.h"
 #include "query/view/graph_view.h"

@@ -18,6 +18,7 @@ constexpr size_t kAnchorsMax = 4;
 constexpr size_t kProvenTiers = 2;
 // Looking for obstacles is costly: so many lines to a position are tried.
 constexpr size_t kLinesMax = 8;
+constexpr int64_t kEndPlacesPerStop = 256;
 
 void KeepNearest(size_t count_max, std::vector<Anchor>* anchors) {
   std::sort(anchors->begin(), anchors->end(), [](const Anchor& a, const Anchor& b) {
@@ -176,9 +177,6 @@ absl::StatusOr<std::vector<Anchor>> Attach(const PlaceGraph& graph, const Limits
 }
 
 namespace {
-
-// Nodes between two questions to the stop check.
-constexpr int64_t kEndPlacesPerStop = 256;
 
 absl::StatusOr<std::vector<PlaceIndex>> PlacesBelow(const PathWorld& world, NodeId top) {
   std::vector<PlaceIndex> below;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include "query/engine/search/query_language.h"
 #include "tests/unit/query/engine/search/furnished_map.h"
 
 namespace dsg::test {
