@@ -26,9 +26,7 @@
 namespace dsg::test {
 namespace {
 
-constexpr int64_t kVisibleNs = 200'000'000;
-
-std::string Program(const char* name) { return std::string(DSG_BINARY_DIR) + "/" + name; }
+std::string Binary(const char* name) { return std::string(DSG_BINARY_DIR) + "/" + name; }
 
 query::CallContext Within(int seconds) {
   return query::CallContext(query::CallContext::Clock::now() + std::chrono::seconds(seconds));
@@ -180,11 +178,6 @@ class Clients {
   std::vector<std::string> failures_;
 };
 
-std::string ReadText(const std::string& path) {
-  std::ifstream file(path);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 // Ingests one made-up log after another until the time is up; how many.
 int IngestUntil(const std::string& folder, const std::string& store, int64_t end_ns) {
   int log_count = 0;
@@ -192,7 +185,7 @@ int IngestUntil(const std::string& folder, const std::string& store, int64_t end
     const std::string log = absl::StrCat(folder, "/people-", log_count, ".txt");
     std::ofstream(log) << PeopleLog(100 + static_cast<uint64_t>(log_count), 20'000);
     Process ingest = Process::Run(
-        {Program("dsg-ingest"), "--store", store, "--map", kMap, "--format", "trajnet",
+        {Binary("dsg-ingest"), "--store", store, "--map", kMap, "--format", "trajnet",
          "--agent-prefix", absl::StrCat(log_count, "-"), "--commit-poses", "100", "--quiet", log},
         folder + "/ingest.log");
     // The last log is cut off when the time is up: the store must bear it.
@@ -201,15 +194,15 @@ int IngestUntil(const std::string& folder, const std::string& store, int64_t end
       ingest.Kill();
       ingest.Wait();
     } else {
-      EXPECT_EQ(ingest.Wait().exit_code, 0) << ReadText(folder + "/ingest.log");
+      EXPECT_EQ(ingest.Wait().exit_code, 0) << ReadFile(folder + "/ingest.log");
     }
   }
   return log_count;
 }
 
 TEST(ServedMap, AnswersWholeRevisionsAtOnceWhileItIsIngested) {
-  if (!std::filesystem::exists(Program("dsg-ingest")) ||
-      !std::filesystem::exists(Program("dsg-server"))) {
+  if (!std::filesystem::exists(Binary("dsg-ingest")) ||
+      !std::filesystem::exists(Binary("dsg-server"))) {
     GTEST_SKIP() << "dsg-ingest and dsg-server are not built";
   }
   const uint64_t seed = RecordSeed();
@@ -224,10 +217,10 @@ TEST(ServedMap, AnswersWholeRevisionsAtOnceWhileItIsIngested) {
     OrDie(OrDie(made->OpenWriter(kMap))->Commit(DeltaOfStream({}, 1)));
   }
   const std::string address = "unix:" + folder.path() + "/s";
-  Process server = Process::Run({Program("dsg-server"), "--store", store, "--listen", address},
+  Process server = Process::Run({Binary("dsg-server"), "--store", store, "--listen", address},
                                 folder.path() + "/server.log");
   Clients clients(address, store, seed);
-  ASSERT_TRUE(clients.Connect()) << ReadText(folder.path() + "/server.log");
+  ASSERT_TRUE(clients.Connect()) << ReadFile(folder.path() + "/server.log");
 
   std::vector<std::thread> threads;
   threads.emplace_back([&] { clients.WatchStore(); });
@@ -237,7 +230,7 @@ TEST(ServedMap, AnswersWholeRevisionsAtOnceWhileItIsIngested) {
   clients.Stop();
   for (std::thread& thread : threads) thread.join();
   server.Terminate();
-  EXPECT_EQ(server.Wait().exit_code, 0) << ReadText(folder.path() + "/server.log");
+  EXPECT_EQ(server.Wait().exit_code, 0) << ReadFile(folder.path() + "/server.log");
 
   EXPECT_EQ(clients.failures(), std::vector<std::string>());
   const auto committed = clients.store_looks().FirstSights();

@@ -21,8 +21,6 @@
 namespace dsg::test {
 namespace {
 
-constexpr int64_t kVisibleNs = 200'000'000;
-
 DeltaStreamOptions LightStream() {
   DeltaStreamOptions options;
   options.poses_per_append = 4;
@@ -38,7 +36,7 @@ void WriteUntil(const std::string& folder, int64_t end_ns,
 }
 
 // A fingerprint of all rows and versions, gathered while they are counted.
-class Tally {
+class ReadTally {
  public:
   void Add(uint64_t a, uint64_t b) {
     hash_ = (hash_ ^ a) * 0x9e3779b97f4a7c15ull;
@@ -56,7 +54,7 @@ absl::Status Differs(const std::string& what, int64_t counted, int64_t recorded)
       absl::StrCat("torn: ", counted, " ", what, " where the revision has ", recorded));
 }
 
-absl::Status TallyTracks(const Snapshot& snapshot, const RevisionInfo& at, Tally* tally) {
+absl::Status TallyTracks(const Snapshot& snapshot, const RevisionInfo& at, ReadTally* tally) {
   int64_t pose_count = 0;
   int64_t stay_count = 0;
   DSG_ASSIGN_OR_RETURN(const auto tracks, snapshot.Tracks());
@@ -87,7 +85,7 @@ absl::Status TallyTracks(const Snapshot& snapshot, const RevisionInfo& at, Tally
 // Counts everything of a snapshot against the record of its revision; the fingerprint.
 absl::StatusOr<uint64_t> TallySnapshot(const Snapshot& snapshot) {
   DSG_ASSIGN_OR_RETURN(const MapStats stats, snapshot.Stats());
-  Tally tally;
+  ReadTally tally;
   std::map<LayerId, int64_t> layer_counts;
   int64_t node_count = 0;
   DSG_RETURN_IF_ERROR(snapshot.ScanNodes({}, NodeId(), {}, [&](const Node& node) {

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
-#include <fstream>
 #include <random>
 #include <thread>
 
@@ -62,14 +61,8 @@ void FillStore(const std::string& folder) {
   OrDie(writer->Commit(delta));
 }
 
-bool Holds(const std::string& store, const std::string& text) {
-  for (const auto& entry : fs::recursive_directory_iterator(store)) {
-    if (!entry.is_regular_file()) continue;
-    std::ifstream file(entry.path(), std::ios::binary);
-    const std::string bytes{std::istreambuf_iterator<char>(file), {}};
-    if (absl::StrContains(bytes, text)) return true;
-  }
-  return false;
+bool StoreHolds(const std::string& store, const std::string& text) {
+  return absl::StrContains(ReadFolder(store), text);
 }
 
 class KilledErasure : public testing::Test {
@@ -98,10 +91,7 @@ class KilledErasure : public testing::Test {
             "--yes"};
   }
 
-  static std::string OutputOf(const std::string& place) {
-    std::ifstream file(place + "/output");
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
+  static std::string OutputOf(const std::string& place) { return ReadFile(place + "/output"); }
 
   // Its output alone, in the place. The exit code.
   static int RunAlone(const std::vector<std::string>& command, const std::string& place) {
@@ -147,8 +137,8 @@ TEST_F(KilledErasure, IsRememberedUntilItEndsWhateverOthersErase) {
   const int64_t begin_ns = SteadyNs();
   ASSERT_TRUE(SaysErased(EraseRoom(first, 1), first)) << OutputOf(first);
   const int64_t length_ns = SteadyNs() - begin_ns;
-  ASSERT_FALSE(Holds(first + "/store", SecretOf(1)));
-  ASSERT_TRUE(Holds(first + "/store", SecretOf(2)));
+  ASSERT_FALSE(StoreHolds(first + "/store", SecretOf(1)));
+  ASSERT_TRUE(StoreHolds(first + "/store", SecretOf(2)));
 
   int kill_count = 0;
   int pending_count = 0;
@@ -168,16 +158,16 @@ TEST_F(KilledErasure, IsRememberedUntilItEndsWhateverOthersErase) {
     pending_count += was_pending ? 1 : 0;
     // Once its room is not believed any more, an erasure was begun.
     const bool was_begun = !IsBelieved(place, 1);
-    EXPECT_TRUE(was_pending || !was_begun || !Holds(place + "/store", SecretOf(1)));
+    EXPECT_TRUE(was_pending || !was_begun || !StoreHolds(place + "/store", SecretOf(1)));
 
     const bool says_erased = SaysErased(EraseRoom(place, 2), place);
     const std::string of_other = OutputOf(place);
     const bool is_pending = IsPending(place);
     EXPECT_EQ(says_erased, !is_pending);
-    EXPECT_FALSE(Holds(place + "/store", SecretOf(2)));
+    EXPECT_FALSE(StoreHolds(place + "/store", SecretOf(2)));
     if (was_pending && says_erased) {
       ++ended_by_other_count;
-      EXPECT_FALSE(Holds(place + "/store", SecretOf(1)));
+      EXPECT_FALSE(StoreHolds(place + "/store", SecretOf(1)));
     }
     pending_after_other_count += is_pending ? 1 : 0;
     ExpectSound(place, is_pending);
@@ -186,7 +176,7 @@ TEST_F(KilledErasure, IsRememberedUntilItEndsWhateverOthersErase) {
     const bool is_ended = SaysErased(EraseRoom(place, 1), place);
     const std::string of_same = OutputOf(place);
     EXPECT_TRUE(is_ended || absl::StrContains(of_same, "NODE_UNKNOWN")) << of_same;
-    EXPECT_FALSE(Holds(place + "/store", SecretOf(1)));
+    EXPECT_FALSE(StoreHolds(place + "/store", SecretOf(1)));
     EXPECT_FALSE(IsPending(place))
         << "the other said: " << of_other << "\nthe same again: " << of_same;
     ExpectSound(place, false);

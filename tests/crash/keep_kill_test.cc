@@ -31,10 +31,7 @@ struct Tally {
   double length_s = 0.0;
 };
 
-std::string OutputOf(const std::string& place) {
-  std::ifstream file(place + "/output");
-  return {std::istreambuf_iterator<char>(file), {}};
-}
+std::string OutputOf(const std::string& place) { return ReadFile(place + "/output"); }
 
 // One operation, killed over and over.
 class Killing {

@@ -33,7 +33,7 @@ std::string EndViolation(const Aftermath& after) {
 }
 
 // Whether the files of the main map have a text in them.
-bool Holds(const std::string& place, const std::string& text) {
+bool MainMapHolds(const std::string& place, const std::string& text) {
   for (const char* name : {"graph.db", "graph.db-wal"}) {
     std::ifstream file(absl::StrCat(place, "/store/", kMain, "/", name), std::ios::binary);
     const std::string bytes((std::istreambuf_iterator<char>(file)), {});
@@ -133,7 +133,7 @@ KeepOperation Prune(const std::string& name, Command policy, const std::string& 
                 const bool is_past_kept = erased.empty();
                 return PastViolation(after, is_past_kept ? AllLooked() : std::vector<Revision>()) +
                        EndViolation(after) +
-                       (!is_past_kept && after.is_done && Holds(after.place, erased)
+                       (!is_past_kept && after.is_done && MainMapHolds(after.place, erased)
                             ? "the file still holds names of what was erased"
                             : "");
               },

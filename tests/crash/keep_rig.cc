@@ -5,7 +5,6 @@
 
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 
 #include "absl/strings/str_cat.h"
 #include "schema/codec/checksum.h"
@@ -38,14 +37,9 @@ void FillMap(GraphStore* store, const std::string& name, uint64_t seed, int64_t 
   OrDie(writer->SetTag(KeepRig::kTag, KeepRig::kTagged, "before the move"));
 }
 
-std::string ReadAll(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 // Without the counters of the file, and without the revision that wrote each row: in how many
 // steps an operation came to its end is its own business.
-std::string DumpOf(const Snapshot& snapshot) {
+std::string TextOf(const Snapshot& snapshot) {
   constexpr std::string_view kMark = " revision ";
   const std::string text = OrDie(Dump(snapshot));
   std::string out;
@@ -82,7 +76,7 @@ MapContent ReadContent(const std::string& store, const std::string& map,
   for (const Revision revision : revisions) {
     const auto snapshot = (*opened)->At(revision);
     if (!snapshot.ok()) continue;
-    content.dumps[revision] = DumpOf(**snapshot);
+    content.dumps[revision] = TextOf(**snapshot);
     content.digests[revision] = ToHex(OrDie((*snapshot)->Stats()).at.digest);
   }
   return content;
@@ -116,7 +110,7 @@ std::string KeepRig::MakeOldPlace() {
   const std::string place = absl::StrCat(folder_.path(), "/place-", ++place_count_);
   fs::create_directories(absl::StrCat(place, "/store/", kMain));
   const std::string packed =
-      ReadAll(std::string(DSG_SOURCE_DIR) + "/tests/data/store_format_1.db.zst");
+      ReadFile(std::string(DSG_SOURCE_DIR) + "/tests/data/store_format_1.db.zst");
   std::string bytes(ZSTD_getFrameContentSize(packed.data(), packed.size()), '\0');
   if (ZSTD_decompress(bytes.data(), bytes.size(), packed.data(), packed.size()) != bytes.size()) {
     OrDie(absl::InternalError("the map of format 1 cannot be unpacked"));

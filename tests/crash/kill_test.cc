@@ -117,10 +117,7 @@ class IngestRig {
   const std::vector<Sha256>& oracle(bool has_rooms) const { return oracles_[has_rooms]; }
   const std::string& dump(bool has_rooms) const { return dumps_[has_rooms]; }
   std::string log_path() const { return folder_.path() + "/people.txt"; }
-  std::string Output() const {
-    std::ifstream file(folder_.path() + "/output");
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
+  std::string Output() const { return ReadFile(folder_.path() + "/output"); }
 
   /// A store without a map, or with a map that has rooms and places already.
   std::string NewStore(bool has_rooms) {

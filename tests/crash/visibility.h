@@ -10,6 +10,9 @@
 
 namespace dsg::test {
 
+/// A revision is visible at the latest this long after its acknowledgement.
+inline constexpr int64_t kVisibleNs = 200'000'000;
+
 /// Looks of one watcher, in the order of time.
 ///
 /// Threads: one caller at a time.

@@ -22,7 +22,7 @@ VALUE = re.compile(r"(\w+)\s*(?:\[[^\]]*\]\s*)*(?:=|$)")
 # Test cases are named by their suite; macros name nothing.
 MACRO = re.compile(r"^\s*[A-Z][A-Z0-9_]+\s*\(")
 # Each file of these is a program of its own.
-PROGRAMS = ("tests/bench/", "tests/crash/", "tests/eval/", "tests/e2e/", "docs/")
+PROGRAMS = ("tests/bench/", "tests/eval/", "docs/")
 
 
 def name_of(head):

@@ -181,7 +181,7 @@ std::vector<Kind> GraphKinds() {
               })};
 }
 
-double MedianOf(std::vector<int64_t> ns) {
+double MedianUs(std::vector<int64_t> ns) {
   const auto middle = ns.begin() + static_cast<std::ptrdiff_t>(ns.size() / 2);
   std::nth_element(ns.begin(), middle, ns.end());
   return static_cast<double>(*middle) * 1e-3;
@@ -205,7 +205,7 @@ absl::StatusOr<YearLatency> AskTheDay(query::ServiceCore* core, const YearWorld&
       if (!status.ok()) return Annotate(status, absl::StrCat(kind.name, ", day ", day_number));
       if (i > 0) taken_ns.push_back(end_ns - begin_ns);
     }
-    const double median_us = MedianOf(std::move(taken_ns));
+    const double median_us = MedianUs(std::move(taken_ns));
     latency.round_us += median_us;
     if (median_us <= latency.slowest_us) continue;
     latency.slowest_us = median_us;

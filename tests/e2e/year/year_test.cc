@@ -50,7 +50,7 @@ struct Year {
   std::string slowest;
 };
 
-double MedianOf(const std::vector<double>& values, size_t from, size_t to) {
+double MedianOfDays(const std::vector<double>& values, size_t from, size_t to) {
   std::vector<double> some(values.begin() + static_cast<std::ptrdiff_t>(from),
                            values.begin() + static_cast<std::ptrdiff_t>(to));
   std::sort(some.begin(), some.end());
@@ -125,19 +125,19 @@ TEST(Year, StopsGrowingWithTheDefaultPolicyAndStaysAsQuick) {
   const size_t span = std::max<size_t>(3, days / 12);
   // The oldest age of the policies is half a year.
   const size_t warm = days * 6 / 10;
-  const double warm_mib = MedianOf(forgotten.file_mib, warm, warm + span);
-  const double end_mib = MedianOf(forgotten.file_mib, days - span, days);
+  const double warm_mib = MedianOfDays(forgotten.file_mib, warm, warm + span);
+  const double end_mib = MedianOfDays(forgotten.file_mib, days - span, days);
   std::printf("with the policy: %.1f MiB after warm-up, %.1f MiB at the end (%.2fx)\n", warm_mib,
               end_mib, end_mib / warm_mib);
   EXPECT_LT(end_mib, 1.1 * warm_mib) << "it still grows";
-  const double half_mib = MedianOf(kept.file_mib, days / 2 - span, days / 2);
-  const double whole_mib = MedianOf(kept.file_mib, days - span, days);
+  const double half_mib = MedianOfDays(kept.file_mib, days / 2 - span, days / 2);
+  const double whole_mib = MedianOfDays(kept.file_mib, days - span, days);
   std::printf("without: %.1f MiB at half-time, %.1f MiB at the end (%.2fx)\n", half_mib, whole_mib,
               whole_mib / half_mib);
   // Both hold the log too, which does not grow.
   EXPECT_GT(whole_mib, 1.3 * half_mib) << "nothing shows that the policy does anything";
-  const double begin_ms = MedianOf(forgotten.round_ms, span, 2 * span);
-  const double end_ms = MedianOf(forgotten.round_ms, days - span, days);
+  const double begin_ms = MedianOfDays(forgotten.round_ms, span, 2 * span);
+  const double end_ms = MedianOfDays(forgotten.round_ms, days - span, days);
   std::printf("a round of questions: %.2f ms at the beginning, %.2f ms at the end (%.2fx)\n",
               begin_ms, end_ms, end_ms / begin_ms);
   EXPECT_LT(end_ms, 1.2 * begin_ms);
