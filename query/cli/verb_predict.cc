@@ -96,7 +96,8 @@ v1::PredictionModel ModelOf(const std::string& word) {
   return word == "weighted" ? v1::WEIGHTED_VELOCITY : v1::GOALS;
 }
 
-absl::StatusOr<v1::PredictAgentRequest> RequestFor(Session* session, const PredictVerb& verb) {
+absl::StatusOr<v1::PredictAgentRequest> PredictionRequest(Session* session,
+                                                          const PredictVerb& verb) {
   auto request = session->Begin<v1::PredictAgentRequest>();
   request.set_agent(verb.agent);
   request.set_model(ModelOf(verb.model));
@@ -112,8 +113,9 @@ absl::StatusOr<v1::PredictAgentRequest> RequestFor(Session* session, const Predi
 }
 
 // The last observed seconds and the predicted paths; more probable paths are thicker.
-absl::StatusOr<AnswerPicture> Draw(Session* session, const v1::PredictAgentResponse& reply,
-                                   const std::string& agent) {
+absl::StatusOr<AnswerPicture> DrawPrediction(Session* session,
+                                             const v1::PredictAgentResponse& reply,
+                                             const std::string& agent) {
   constexpr TimeNs kPastNs = 10 * kNsPerSecond;
   AnswerPicture picture{
       .title = absl::StrCat(agent, " after ", session->times().Tenth(reply.observed_ns())),
@@ -156,13 +158,13 @@ absl::StatusOr<AnswerPicture> Draw(Session* session, const v1::PredictAgentRespo
 
 absl::Status RunPredict(Session* session, const PredictVerb& verb, std::ostream& out) {
   DSG_RETURN_IF_ERROR(CheckPicture(verb.picture));
-  DSG_ASSIGN_OR_RETURN(const v1::PredictAgentRequest request, RequestFor(session, verb));
+  DSG_ASSIGN_OR_RETURN(const v1::PredictAgentRequest request, PredictionRequest(session, verb));
   v1::PredictAgentResponse reply;
   DSG_RETURN_IF_ERROR(
       session->times().Explain(session->api().PredictAgent(session->NewCall(), request, &reply)));
   AnswerPicture picture;
   if (!verb.picture.png.empty()) {
-    DSG_ASSIGN_OR_RETURN(picture, Draw(session, reply, verb.agent));
+    DSG_ASSIGN_OR_RETURN(picture, DrawPrediction(session, reply, verb.agent));
   }
   if (session->common().json) {
     DSG_RETURN_IF_ERROR(WriteJson(reply, out));

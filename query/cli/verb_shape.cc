@@ -75,7 +75,8 @@ std::string RenderShapes(const v1::GetAgentShapeResponse& reply, const TimeText&
                       reply.agent_id(), " (revision ", reply.header().read_revision(), ")\n");
 }
 
-absl::StatusOr<v1::GetAgentShapeRequest> RequestFor(const Session& session, const ShapeVerb& verb) {
+absl::StatusOr<v1::GetAgentShapeRequest> ShapeRequest(const Session& session,
+                                                      const ShapeVerb& verb) {
   auto request = session.Begin<v1::GetAgentShapeRequest>();
   request.set_agent(verb.agent);
   const MapSpec& map = session.map();
@@ -219,7 +220,7 @@ absl::Status WriteBodies(Session* session, v1::GetAgentShapeRequest request, con
 }
 
 absl::Status RunShape(Session* session, const ShapeVerb& verb, std::ostream& out) {
-  DSG_ASSIGN_OR_RETURN(v1::GetAgentShapeRequest request, RequestFor(*session, verb));
+  DSG_ASSIGN_OR_RETURN(v1::GetAgentShapeRequest request, ShapeRequest(*session, verb));
   if (verb.ply.empty() && verb.obj_folder.empty()) {
     return ListBodies(session, std::move(request), out);
   }

@@ -119,7 +119,7 @@ void AddNodes(const v1::DiffRevisionsResponse& reply, const TimeText& times, Tab
   }
 }
 
-void AddEdges(const v1::DiffRevisionsResponse& reply, Table* table) {
+void AddEdgeChanges(const v1::DiffRevisionsResponse& reply, Table* table) {
   for (const v1::EdgeChange& change : reply.edges()) {
     const v1::Edge& edge = change.has_after() ? change.after() : change.before();
     std::string detail;
@@ -143,7 +143,7 @@ std::string MeshText(const v1::DiffRevisionsResponse& reply) {
 std::string RenderChanges(const v1::DiffRevisionsResponse& reply, const TimeText& times) {
   Table table({{""}, {"what"}, {"id"}, {"detail"}});
   AddNodes(reply, times, &table);
-  AddEdges(reply, &table);
+  AddEdgeChanges(reply, &table);
   for (const v1::TrackChange& track : reply.tracks()) {
     table.AddRow({"~", "track", track.agent_id(), TrackText(track, times)});
   }
@@ -332,8 +332,8 @@ class Patience {
   CallClock::time_point lost_at_;
 };
 
-v1::WatchMapRequest RequestFor(const Session& session, const WatchVerb& verb,
-                               const WatchPrinter& printer) {
+v1::WatchMapRequest WatchRequest(const Session& session, const WatchVerb& verb,
+                                 const WatchPrinter& printer) {
   v1::WatchMapRequest request;
   request.set_map(session.map().name);
   if (printer.after().has_value()) request.set_after_revision(*printer.after());
@@ -361,7 +361,7 @@ absl::Status RunWatch(Session* session, const WatchVerb& verb, std::ostream& out
   };
   while (true) {
     const absl::Status status = query::ReadStream(
-        call, session->api().WatchMap(call, RequestFor(*session, verb, printer)), take);
+        call, session->api().WatchMap(call, WatchRequest(*session, verb, printer)), take);
     DSG_RETURN_IF_ERROR(printer.status());
     if (printer.IsDone() || call.cancelled()) return absl::OkStatus();
     // A restarted server continues from the last revision heard of. A server that shuts down may

@@ -140,7 +140,7 @@ std::string ShortName(const std::string& id, const std::string& name) {
 }
 
 // Both names, or only the other one if the question names one.
-std::string LabelOf(const v1::Encounter& meeting, const MetVerb& verb) {
+std::string MeetingLabel(const v1::Encounter& meeting, const MetVerb& verb) {
   const std::string name = ShortName(meeting.agent_id(), meeting.agent_name());
   const std::string other = ShortName(meeting.other_agent_id(), meeting.other_agent_name());
   if (verb.agent == meeting.agent_id() || verb.agent == meeting.agent_name()) return other;
@@ -150,8 +150,9 @@ std::string LabelOf(const v1::Encounter& meeting, const MetVerb& verb) {
 }
 
 // The tracks of both agents during the meeting, and the point where they were closest.
-absl::StatusOr<AnswerPicture> Draw(Session* session, const v1::ListEncountersResponse& reply,
-                                   const MetVerb& verb) {
+absl::StatusOr<AnswerPicture> DrawMeetings(Session* session,
+                                           const v1::ListEncountersResponse& reply,
+                                           const MetVerb& verb) {
   // More tracks would be unreadable; later meetings are only marks.
   constexpr int kTrackCountMax = 20;
   AnswerPicture picture{.title = absl::StrCat(reply.encounters_size(), " meetings"),
@@ -180,12 +181,12 @@ absl::StatusOr<AnswerPicture> Draw(Session* session, const v1::ListEncountersRes
     picture.overlay.marks.push_back({.position_map = PointOf(meeting.position()),
                                      .rgb = rgb,
                                      .shape = OverlayMark::Shape::kRing,
-                                     .label = LabelOf(meeting, verb)});
+                                     .label = MeetingLabel(meeting, verb)});
   }
   return picture;
 }
 
-absl::StatusOr<v1::ListEncountersRequest> RequestFor(Session* session, const MetVerb& verb) {
+absl::StatusOr<v1::ListEncountersRequest> MeetingsRequest(Session* session, const MetVerb& verb) {
   auto request = session->Begin<v1::ListEncountersRequest>();
   request.set_agent(verb.agent);
   request.set_other_agent(verb.other_agent);
@@ -203,14 +204,14 @@ absl::StatusOr<v1::ListEncountersRequest> RequestFor(Session* session, const Met
 
 absl::Status RunMet(Session* session, const MetVerb& verb, std::ostream& out) {
   DSG_RETURN_IF_ERROR(CheckPicture(verb.picture));
-  DSG_ASSIGN_OR_RETURN(const v1::ListEncountersRequest request, RequestFor(session, verb));
+  DSG_ASSIGN_OR_RETURN(const v1::ListEncountersRequest request, MeetingsRequest(session, verb));
   v1::ListEncountersResponse all;
   DSG_RETURN_IF_ERROR(session->ReadPages(&query::Api::ListEncounters, request,
                                          session->common().limit,
                                          &v1::ListEncountersResponse::encounters_size, &all));
   AnswerPicture picture;
   if (!verb.picture.png.empty()) {
-    DSG_ASSIGN_OR_RETURN(picture, Draw(session, all, verb));
+    DSG_ASSIGN_OR_RETURN(picture, DrawMeetings(session, all, verb));
   }
   if (session->common().json) {
     DSG_RETURN_IF_ERROR(WriteJson(all, out));
@@ -226,7 +227,8 @@ absl::Status RunMet(Session* session, const MetVerb& verb, std::ostream& out) {
   return WritePicture(session, verb.picture, picture, out);
 }
 
-absl::StatusOr<v1::ListInteractionsRequest> RequestFor(Session* session, const PickedVerb& verb) {
+absl::StatusOr<v1::ListInteractionsRequest> PickedRequest(Session* session,
+                                                          const PickedVerb& verb) {
   auto request = session->Begin<v1::ListInteractionsRequest>();
   request.set_agent(verb.agent);
   request.set_class_name(verb.class_name);
@@ -244,7 +246,7 @@ absl::StatusOr<v1::ListInteractionsRequest> RequestFor(Session* session, const P
   return request;
 }
 
-std::string LabelOf(const v1::Interaction& interaction) {
+std::string PickedLabel(const v1::Interaction& interaction) {
   const std::string& object =
       interaction.object_name().empty() ? interaction.object_id() : interaction.object_name();
   if (interaction.abstained() || interaction.candidates().empty()) return object + "?";
@@ -255,7 +257,8 @@ std::string LabelOf(const v1::Interaction& interaction) {
 }
 
 // The objects, and the track of the most probable agent around the time of the interaction.
-absl::StatusOr<AnswerPicture> Draw(Session* session, const v1::ListInteractionsResponse& reply) {
+absl::StatusOr<AnswerPicture> DrawPicked(Session* session,
+                                         const v1::ListInteractionsResponse& reply) {
   constexpr TimeNs kAroundNs = 5 * kNsPerSecond;
   AnswerPicture picture{.title = absl::StrCat(reply.interactions_size(), " objects"),
                         .revision = reply.header().read_revision()};
@@ -268,7 +271,7 @@ absl::StatusOr<AnswerPicture> Draw(Session* session, const v1::ListInteractionsR
     v1::GetNodeResponse object;
     DSG_RETURN_IF_ERROR(session->api().GetNode(session->NewCall(), request, &object));
     const uint32_t rgb = AgentColor(static_cast<size_t>(i));
-    MarkNode(object.node(), rgb, LabelOf(interaction), &picture.overlay);
+    MarkNode(object.node(), rgb, PickedLabel(interaction), &picture.overlay);
     if (interaction.candidates().empty() || interaction.abstained()) continue;
     const v1::InteractionCandidate& best = interaction.candidates(0);
     if (best.agent_id().empty() || best.at_ns() < kTimeMin + kAroundNs ||
@@ -285,7 +288,7 @@ absl::StatusOr<AnswerPicture> Draw(Session* session, const v1::ListInteractionsR
 
 absl::Status RunPicked(Session* session, const PickedVerb& verb, std::ostream& out) {
   DSG_RETURN_IF_ERROR(CheckPicture(verb.picture));
-  DSG_ASSIGN_OR_RETURN(const v1::ListInteractionsRequest request, RequestFor(session, verb));
+  DSG_ASSIGN_OR_RETURN(const v1::ListInteractionsRequest request, PickedRequest(session, verb));
   v1::ListInteractionsResponse all;
   DSG_RETURN_IF_ERROR(session->ReadPages(&query::Api::ListInteractions, request,
                                          session->common().limit,
@@ -295,7 +298,7 @@ absl::Status RunPicked(Session* session, const PickedVerb& verb, std::ostream& o
   }
   AnswerPicture picture;
   if (!verb.picture.png.empty()) {
-    DSG_ASSIGN_OR_RETURN(picture, Draw(session, all));
+    DSG_ASSIGN_OR_RETURN(picture, DrawPicked(session, all));
   }
   if (session->common().json) {
     DSG_RETURN_IF_ERROR(WriteJson(all, out));

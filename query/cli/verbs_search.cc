@@ -118,7 +118,7 @@ std::string RenderSubgraph(const v1::GetSubgraphResponse& reply, const TimeText&
 constexpr uint32_t kFoundRgb = 0xc8321e;
 constexpr uint32_t kNearRgb = 0x1f5fbf;
 
-absl::StatusOr<v1::SearchNodesRequest> RequestFor(Session* session, const FindVerb& verb) {
+absl::StatusOr<v1::SearchNodesRequest> SearchRequest(Session* session, const FindVerb& verb) {
   auto request = session->Begin<v1::SearchNodesRequest>();
   request.set_query(absl::StrJoin(verb.words, " "));
   if (!verb.near.empty()) {
@@ -157,14 +157,14 @@ absl::Status ShowMistake(const absl::Status& status, const std::string& query) {
                    metadata);
 }
 
-std::string LabelOf(const v1::Node& node) {
+std::string FoundLabel(const v1::Node& node) {
   if (!node.name().empty()) return node.name();
   const std::string& class_name = node.semantic_class().name();
   return class_name.empty() ? node.id() : absl::StrCat(class_name, " ", node.id());
 }
 
-AnswerPicture Draw(const v1::SearchNodesRequest& request, const v1::SearchNodesResponse& reply,
-                   const FindVerb& verb) {
+AnswerPicture DrawFound(const v1::SearchNodesRequest& request, const v1::SearchNodesResponse& reply,
+                        const FindVerb& verb) {
   AnswerPicture picture{
       .title = absl::StrCat("find ", absl::StrJoin(verb.words, " "), ": ", reply.hits_size()),
       .revision = reply.header().read_revision()};
@@ -177,7 +177,7 @@ AnswerPicture Draw(const v1::SearchNodesRequest& request, const v1::SearchNodesR
   }
   for (const v1::SearchHit& hit : reply.hits()) {
     const v1::Node& node = hit.node();
-    MarkNode(node, kFoundRgb, LabelOf(node), &picture.overlay);
+    MarkNode(node, kFoundRgb, FoundLabel(node), &picture.overlay);
   }
   return picture;
 }
@@ -196,7 +196,7 @@ absl::Status PrintHits(Session* session, const v1::SearchNodesResponse& reply, s
 
 absl::Status RunFind(Session* session, const FindVerb& verb, std::ostream& out) {
   DSG_RETURN_IF_ERROR(CheckPicture(verb.picture));
-  DSG_ASSIGN_OR_RETURN(const v1::SearchNodesRequest request, RequestFor(session, verb));
+  DSG_ASSIGN_OR_RETURN(const v1::SearchNodesRequest request, SearchRequest(session, verb));
   v1::SearchNodesResponse all;
   const absl::Status found = FetchPages(
       request, session->common().limit,
@@ -213,7 +213,7 @@ absl::Status RunFind(Session* session, const FindVerb& verb, std::ostream& out) 
   } else {
     DSG_RETURN_IF_ERROR(PrintHits(session, all, out));
   }
-  return WritePicture(session, verb.picture, Draw(request, all, verb), out);
+  return WritePicture(session, verb.picture, DrawFound(request, all, verb), out);
 }
 
 absl::Status RunAround(Session* session, const AroundVerb& verb, std::ostream& out) {

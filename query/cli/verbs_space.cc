@@ -150,7 +150,7 @@ absl::Status FillEnd(const std::string& option, const std::string& text, v1::Pat
   return absl::OkStatus();
 }
 
-absl::StatusOr<v1::PlanPathRequest> RequestFor(Session* session, const PathVerb& verb) {
+absl::StatusOr<v1::PlanPathRequest> PathRequest(Session* session, const PathVerb& verb) {
   auto request = session->Begin<v1::PlanPathRequest>();
   DSG_RETURN_IF_ERROR(FillEnd("FROM", verb.from, request.mutable_from()));
   DSG_RETURN_IF_ERROR(FillEnd("TO", verb.to, request.mutable_to()));
@@ -163,8 +163,8 @@ absl::StatusOr<v1::PlanPathRequest> RequestFor(Session* session, const PathVerb&
   return request;
 }
 
-AnswerPicture Draw(const v1::PlanPathRequest& request, const v1::PlanPathResponse& reply,
-                   const PathVerb& verb) {
+AnswerPicture DrawPath(const v1::PlanPathRequest& request, const v1::PlanPathResponse& reply,
+                       const PathVerb& verb) {
   AnswerPicture picture{.title = absl::StrCat("from ", verb.from, " to ", verb.to, ": ",
                                               Fixed(reply.length_m(), 1), " m"),
                         .revision = reply.header().read_revision()};
@@ -192,7 +192,7 @@ AnswerPicture Draw(const v1::PlanPathRequest& request, const v1::PlanPathRespons
 
 absl::Status RunPath(Session* session, const PathVerb& verb, std::ostream& out) {
   DSG_RETURN_IF_ERROR(CheckPicture(verb.picture));
-  DSG_ASSIGN_OR_RETURN(const v1::PlanPathRequest request, RequestFor(session, verb));
+  DSG_ASSIGN_OR_RETURN(const v1::PlanPathRequest request, PathRequest(session, verb));
   v1::PlanPathResponse reply;
   DSG_RETURN_IF_ERROR(
       session->times().Explain(session->api().PlanPath(session->NewCall(), request, &reply)));
@@ -205,7 +205,7 @@ absl::Status RunPath(Session* session, const PathVerb& verb, std::ostream& out) 
                          NamesOf(session, reply.header().read_revision(), ids));
     out << RenderPath(reply, names);
   }
-  return WritePicture(session, verb.picture, Draw(request, reply, verb), out);
+  return WritePicture(session, verb.picture, DrawPath(request, reply, verb), out);
 }
 
 constexpr uint32_t kBodyRgb = 0x1f5fbf;
@@ -259,7 +259,8 @@ void FillScope(const CollideVerb& verb, v1::CollisionScope* scope) {
   for (const std::string& node : verb.ignored) scope->add_ignored(node);
 }
 
-absl::StatusOr<v1::CheckCollisionRequest> RequestFor(Session* session, const CollideVerb& verb) {
+absl::StatusOr<v1::CheckCollisionRequest> CollisionRequest(Session* session,
+                                                           const CollideVerb& verb) {
   auto request = session->Begin<v1::CheckCollisionRequest>();
   DSG_RETURN_IF_ERROR(FillBody(verb, request.add_bodies()));
   FillScope(verb, request.mutable_scope());
@@ -297,8 +298,9 @@ std::vector<Polygon2d> OutlinesOf(const v1::CollisionBody& body, const Pose3d& m
   return {FloorOutline(node)};
 }
 
-AnswerPicture Draw(const v1::CheckCollisionRequest& request,
-                   const v1::CheckCollisionResponse& reply, const NodeNames& names, bool is_hit) {
+AnswerPicture DrawCollision(const v1::CheckCollisionRequest& request,
+                            const v1::CheckCollisionResponse& reply, const NodeNames& names,
+                            bool is_hit) {
   AnswerPicture picture{.title = is_hit ? "the body hits" : "the body is free",
                         .revision = reply.header().read_revision()};
   if (request.has_at_ns()) picture.at_ns = request.at_ns();
@@ -328,7 +330,7 @@ AnswerPicture Draw(const v1::CheckCollisionRequest& request,
 
 absl::Status RunCollide(Session* session, const CollideVerb& verb, std::ostream& out) {
   DSG_RETURN_IF_ERROR(CheckPicture(verb.picture));
-  DSG_ASSIGN_OR_RETURN(const v1::CheckCollisionRequest request, RequestFor(session, verb));
+  DSG_ASSIGN_OR_RETURN(const v1::CheckCollisionRequest request, CollisionRequest(session, verb));
   v1::CheckCollisionResponse reply;
   DSG_RETURN_IF_ERROR(session->api().CheckCollision(session->NewCall(), request, &reply));
   bool is_hit = false;
@@ -343,7 +345,7 @@ absl::Status RunCollide(Session* session, const CollideVerb& verb, std::ostream&
   } else {
     out << RenderCollisions(reply, names);
   }
-  return WritePicture(session, verb.picture, Draw(request, reply, names, is_hit), out);
+  return WritePicture(session, verb.picture, DrawCollision(request, reply, names, is_hit), out);
 }
 
 absl::Status CheckCollide(const CollideVerb& verb, const CommonOptions&) {

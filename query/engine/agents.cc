@@ -13,8 +13,8 @@
 #include "query/engine/engine.h"
 #include "query/engine/request.h"
 #include "schema/base/status.h"
-#include "schema/base/utf8.h"
 #include "schema/base/time.h"
+#include "schema/base/utf8.h"
 #include "schema/codec/proto_convert.h"
 
 namespace dsg::query {

@@ -26,7 +26,7 @@ namespace {
 
 constexpr double kEncounterDistanceM = 2.0;
 
-std::string PositionOf(const EncounterKey& key) {
+std::string EncounterPosition(const EncounterKey& key) {
   std::string position;
   AppendWord(static_cast<uint64_t>(key.from_ns), &position);
   AppendWord(key.agent.value, &position);
@@ -149,7 +149,7 @@ absl::Status ListEncounters(Engine* engine, const CallContext& call,
   size_t bytes = 0;
   for (size_t i = 0; i < found.size(); ++i) {
     if (reply->encounters_size() == page.size || bytes > kPageBytesSoftMax) {
-      reply->set_next_page_token(page.NextToken(PositionOf(found[i - 1].key())));
+      reply->set_next_page_token(page.NextToken(EncounterPosition(found[i - 1].key())));
       break;
     }
     v1::Encounter* encounter = reply->add_encounters();
@@ -167,7 +167,7 @@ namespace {
 // More are too many of one answer, and of what a person reads.
 constexpr size_t kCandidatesShownMax = 10;
 
-std::string PositionOf(const ChangeKey& key) {
+std::string InteractionPosition(const ChangeKey& key) {
   std::string position;
   AppendWord(static_cast<uint64_t>(key.earliest_ns), &position);
   AppendWord(key.object.value, &position);
@@ -313,7 +313,7 @@ absl::Status ListInteractions(Engine* engine, const CallContext& call,
     DSG_ASSIGN_OR_RETURN(const Verdict verdict, finder.Examine(change, stop));
     if (!IsShown(question, verdict)) continue;
     if (reply->interactions_size() == page.size || bytes > kPageBytesSoftMax) {
-      reply->set_next_page_token(page.NextToken(PositionOf(last)));
+      reply->set_next_page_token(page.NextToken(InteractionPosition(last)));
       break;
     }
     v1::Interaction* interaction = reply->add_interactions();

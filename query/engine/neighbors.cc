@@ -33,7 +33,7 @@ struct NeighborKey {
   }
 };
 
-std::string PositionOf(const NeighborKey& key) {
+std::string NeighborPosition(const NeighborKey& key) {
   std::string position;
   AppendWord(key.is_incoming ? 1 : 0, &position);
   AppendWord(key.other.value, &position);
@@ -188,7 +188,7 @@ absl::Status GetNeighbors(Engine* engine, const CallContext& call,
         FillNeighbor(snapshot, *graph, question.node, found[i], &edges, &filler, out));
     bytes += out->ByteSizeLong();
     if (i + 1 < found.size() && (i + 1 == size || bytes > kPageBytesSoftMax)) {
-      reply->set_next_page_token(page.NextToken(PositionOf(found[i])));
+      reply->set_next_page_token(page.NextToken(NeighborPosition(found[i])));
       break;
     }
   }

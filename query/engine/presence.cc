@@ -32,7 +32,7 @@ struct Presence {
   TimeNs exit_ns = 0;
 };
 
-std::string PositionOf(const PresenceKey& key) {
+std::string PresencePosition(const PresenceKey& key) {
   std::string position;
   AppendWord(static_cast<uint64_t>(key.enter_ns), &position);
   AppendWord(key.agent.value, &position);
@@ -183,7 +183,7 @@ absl::Status ListPresence(Engine* engine, const CallContext& call,
   for (const Presence& presence : found) {
     if (reply->intervals_size() == page.size || bytes > kPageBytesSoftMax) {
       const Presence& last = found[static_cast<size_t>(reply->intervals_size()) - 1];
-      reply->set_next_page_token(page.NextToken(PositionOf(last.key)));
+      reply->set_next_page_token(page.NextToken(PresencePosition(last.key)));
       break;
     }
     DSG_ASSIGN_OR_RETURN(TrackInfo track, snapshot.GetTrack(presence.key.agent));

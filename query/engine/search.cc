@@ -19,7 +19,7 @@
 namespace dsg::query {
 namespace {
 
-std::string PositionOf(const HitKey& key) {
+std::string HitPosition(const HitKey& key) {
   std::string position;
   AppendWord(std::bit_cast<uint64_t>(key.distance_m), &position);
   AppendWord(key.id.value, &position);
@@ -149,7 +149,7 @@ absl::Status SearchNodes(Engine* engine, const CallContext& call,
     bytes += out->ByteSizeLong();
     const bool is_last = i + 1 == answer.hits.size();
     if ((is_last && answer.has_more) || (!is_last && bytes > kPageBytesSoftMax)) {
-      reply->set_next_page_token(page.NextToken(PositionOf(answer.hits[i].key)));
+      reply->set_next_page_token(page.NextToken(HitPosition(answer.hits[i].key)));
       break;
     }
   }

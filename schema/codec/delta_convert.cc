@@ -34,7 +34,7 @@ void HeaderFromProto(const v1::GraphDelta& in, GraphDelta* delta) {
   delta->is_forgetting = in.is_forgetting();
 }
 
-void ToProto(const Stay& stay, v1::Stay* out) {
+void StayToProto(const Stay& stay, v1::Stay* out) {
   out->set_agent(ToString(stay.agent));
   out->set_place(ToString(stay.place));
   out->set_room(ToString(stay.room));
@@ -42,7 +42,7 @@ void ToProto(const Stay& stay, v1::Stay* out) {
   out->set_exit_ns(stay.exit_ns);
 }
 
-absl::StatusOr<Stay> FromProto(const v1::Stay& in) {
+absl::StatusOr<Stay> StayFromProto(const v1::Stay& in) {
   Stay stay;
   DSG_ASSIGN_OR_RETURN(stay.agent, ParseNodeId(in.agent()));
   DSG_ASSIGN_OR_RETURN(stay.place, OptionalNodeId(in.place()));
@@ -143,14 +143,14 @@ void GraphToProto(const GraphDelta& delta, const LayerTable& layers, v1::GraphDe
     to->set_id(label.id);
     to->set_name(label.name);
   }
-  for (const Node& node : delta.nodes) dsg::ToProto(node, layers, out->add_nodes());
+  for (const Node& node : delta.nodes) ToProto(node, layers, out->add_nodes());
   for (const NodePatch& patch : delta.node_patches) PatchToProto(patch, out->add_nodes());
   for (const Retirement& item : delta.retirements) {
     v1::Retirement* to = out->add_retirements();
     to->set_id(ToString(item.id));
     if (item.valid_to_ns.has_value()) to->set_valid_to_ns(*item.valid_to_ns);
   }
-  for (const Edge& edge : delta.edges) dsg::ToProto(edge, out->add_edges());
+  for (const Edge& edge : delta.edges) ToProto(edge, out->add_edges());
   for (const EdgePatch& patch : delta.edge_patches) PatchToProto(patch, out->add_edges());
   for (const EdgeKey& key : delta.edge_removals) {
     v1::EdgeKey* to = out->add_edge_removals();
@@ -176,7 +176,7 @@ absl::Status GraphFromProto(const v1::GraphDelta& in, LayerTable layers, Unmaske
       DSG_RETURN_IF_ERROR(FillPatch(node, "nodes", &patch));
       continue;
     }
-    DSG_ASSIGN_OR_RETURN(Node made, dsg::FromProto(node, layers));
+    DSG_ASSIGN_OR_RETURN(Node made, FromProto(node, layers));
     delta->nodes.push_back(std::move(made));
   }
   for (const v1::Retirement& item : in.retirements()) {
@@ -194,7 +194,7 @@ absl::Status GraphFromProto(const v1::GraphDelta& in, LayerTable layers, Unmaske
       DSG_RETURN_IF_ERROR(FillPatch(edge, "edges", &patch));
       continue;
     }
-    DSG_ASSIGN_OR_RETURN(Edge made, dsg::FromProto(edge));
+    DSG_ASSIGN_OR_RETURN(Edge made, FromProto(edge));
     delta->edges.push_back(std::move(made));
   }
   for (const v1::EdgeKey& key : in.edge_removals()) {
@@ -210,14 +210,14 @@ absl::Status GraphFromProto(const v1::GraphDelta& in, LayerTable layers, Unmaske
 void PosesToProto(const std::vector<TimedPose>& poses,
                   google::protobuf::RepeatedPtrField<v1::TimedPose>* out) {
   out->Reserve(static_cast<int>(poses.size()));
-  for (const TimedPose& pose : poses) dsg::ToProto(pose, out->Add());
+  for (const TimedPose& pose : poses) ToProto(pose, out->Add());
 }
 
 absl::Status PosesFromProto(const google::protobuf::RepeatedPtrField<v1::TimedPose>& in,
                             std::vector<TimedPose>* poses) {
   poses->reserve(static_cast<size_t>(in.size()));
   for (const v1::TimedPose& pose : in) {
-    DSG_ASSIGN_OR_RETURN(TimedPose made, dsg::FromProto(pose));
+    DSG_ASSIGN_OR_RETURN(TimedPose made, FromProto(pose));
     poses->push_back(std::move(made));
   }
   return absl::OkStatus();
@@ -239,15 +239,15 @@ void TracksToProto(const GraphDelta& delta, v1::GraphDelta* out) {
   for (const FactorAppend& item : delta.factors) {
     v1::FactorAppend* to = out->add_factors();
     to->set_agent(ToString(item.agent));
-    for (const PoseFactor& factor : item.factors) dsg::ToProto(factor, to->add_factors());
+    for (const PoseFactor& factor : item.factors) ToProto(factor, to->add_factors());
   }
   for (const ShapeAppend& item : delta.shapes) {
     v1::ShapeAppend* to = out->add_shapes();
     to->set_agent(ToString(item.agent));
     if (item.topology.has_value()) to->set_topology_sha256(BytesOf(*item.topology));
-    for (const BodyShape& shape : item.shapes) dsg::ToProto(shape, to->add_shapes());
+    for (const BodyShape& shape : item.shapes) ToProto(shape, to->add_shapes());
   }
-  for (const Stay& stay : delta.stays) ToProto(stay, out->add_stays());
+  for (const Stay& stay : delta.stays) StayToProto(stay, out->add_stays());
 }
 
 absl::Status TracksFromProto(const v1::GraphDelta& in, GraphDelta* delta) {
@@ -269,7 +269,7 @@ absl::Status TracksFromProto(const v1::GraphDelta& in, GraphDelta* delta) {
     FactorAppend made;
     DSG_ASSIGN_OR_RETURN(made.agent, ParseNodeId(item.agent()));
     for (const v1::PoseFactor& factor : item.factors()) {
-      DSG_ASSIGN_OR_RETURN(PoseFactor one, dsg::FromProto(factor));
+      DSG_ASSIGN_OR_RETURN(PoseFactor one, FromProto(factor));
       made.factors.push_back(std::move(one));
     }
     delta->factors.push_back(std::move(made));
@@ -279,18 +279,18 @@ absl::Status TracksFromProto(const v1::GraphDelta& in, GraphDelta* delta) {
     DSG_ASSIGN_OR_RETURN(made.agent, ParseNodeId(item.agent()));
     DSG_ASSIGN_OR_RETURN(made.topology,
                          Sha256FromProto(item.topology_sha256(), "shapes.topology_sha256"));
-    for (const v1::BodyShape& shape : item.shapes()) made.shapes.push_back(dsg::FromProto(shape));
+    for (const v1::BodyShape& shape : item.shapes()) made.shapes.push_back(FromProto(shape));
     delta->shapes.push_back(std::move(made));
   }
   for (const v1::Stay& stay : in.stays()) {
-    DSG_ASSIGN_OR_RETURN(const Stay made, FromProto(stay));
+    DSG_ASSIGN_OR_RETURN(const Stay made, StayFromProto(stay));
     delta->stays.push_back(made);
   }
   return absl::OkStatus();
 }
 
 void BlobsToProto(const GraphDelta& delta, v1::GraphDelta* out) {
-  for (const MeshBlock& block : delta.mesh_blocks) dsg::ToProto(block, out->add_mesh_blocks());
+  for (const MeshBlock& block : delta.mesh_blocks) ToProto(block, out->add_mesh_blocks());
   for (const BlockIndex& index : delta.mesh_removals) {
     v1::MeshBlockIndex* to = out->add_mesh_removals();
     to->set_x(index.x);
@@ -307,7 +307,7 @@ void BlobsToProto(const GraphDelta& delta, v1::GraphDelta* out) {
 
 absl::Status BlobsFromProto(const v1::GraphDelta& in, GraphDelta* delta) {
   for (const v1::MeshBlock& block : in.mesh_blocks()) {
-    DSG_ASSIGN_OR_RETURN(MeshBlock made, dsg::FromProto(block));
+    DSG_ASSIGN_OR_RETURN(MeshBlock made, FromProto(block));
     delta->mesh_blocks.push_back(std::move(made));
   }
   for (const v1::MeshBlockIndex& index : in.mesh_removals()) {

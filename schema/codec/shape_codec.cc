@@ -112,7 +112,7 @@ uint32_t ForetoldBits(const std::vector<float>& numbers, const std::vector<float
 }
 
 // Parts [first, last) of all shapes, bit for bit.
-std::string EncodeLossless(size_t first, size_t last, const std::vector<BodyShape>& shapes) {
+std::string EncodeLosslessShapes(size_t first, size_t last, const std::vector<BodyShape>& shapes) {
   std::string bits;
   for (size_t s = 0; s < shapes.size(); ++s) {
     for (size_t part = first; part < last; ++part) {
@@ -155,7 +155,7 @@ bool DecodeLossless(size_t first, size_t last, std::string_view bytes,
 
 std::string EncodeParts(size_t first, size_t last, const std::vector<BodyShape>& shapes,
                         TrajectoryCodec codec) {
-  return codec == TrajectoryCodec::kLossless ? EncodeLossless(first, last, shapes)
+  return codec == TrajectoryCodec::kLossless ? EncodeLosslessShapes(first, last, shapes)
                                              : QuantizedParts(first, last).Encode(shapes);
 }
 
