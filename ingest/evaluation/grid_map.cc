@@ -11,8 +11,6 @@
 namespace dsg::evaluation {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 // Lower envelope of parabolas f(q) + (x - q)^2, sampled at whole x.
 void TransformLine(const std::vector<double>& f, std::vector<double>* out) {
   const size_t count = f.size();

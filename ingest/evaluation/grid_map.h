@@ -5,12 +5,15 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
 #include "ingest/truth/truth.h"
 
 namespace dsg::evaluation {
+
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Exact Euclidean distances on a grid: from each cell's middle to the middle of the nearest cell
 /// that is set, in cells. Infinite when none is set.

@@ -5,12 +5,11 @@
 #include <cmath>
 #include <map>
 
+#include "ingest/evaluation/rigid_fit.h"
 #include "schema/matching/assignment.h"
 
 namespace dsg::evaluation {
 namespace {
-
-constexpr double kDegreesPerRadian = 180.0 / M_PI;
 
 // Where the object stood when it was nearest to `point`.
 Pose3d NearestPose(const TrueObject& object, const Eigen::Vector3d& point) {

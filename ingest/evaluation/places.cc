@@ -14,8 +14,6 @@
 namespace dsg::evaluation {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 /// Places by square of the floor, to find those near a point.
 class PlaceFinder {
  public:

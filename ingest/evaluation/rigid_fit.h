@@ -4,11 +4,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <vector>
 
 #include "schema/model/geometry.h"
 
 namespace dsg::evaluation {
+
+inline constexpr double kDegreesPerRadian = 180.0 / M_PI;
 
 enum class Alignment {
   kNone,

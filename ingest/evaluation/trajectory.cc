@@ -8,7 +8,6 @@ namespace dsg::evaluation {
 namespace {
 
 constexpr size_t kPairCountMin = 3;
-constexpr double kDegreesPerRadian = 180.0 / M_PI;
 
 }  // namespace
 

@@ -16,7 +16,7 @@ namespace {
 // No LZ4 stream grows more than this; checked before memory is asked for.
 constexpr size_t kLz4RatioMax = 256;
 
-absl::Status Fail(const std::string& origin, const std::string& message) {
+absl::Status DamagedChunk(const std::string& origin, const std::string& message) {
   return MakeError(Reason::kFileMalformed,
                    absl::StrCat(origin, ": ", message, "; the bag is damaged: copy it again"),
                    {{"file", origin}});
@@ -26,8 +26,8 @@ absl::Status Fail(const std::string& origin, const std::string& message) {
 absl::StatusOr<std::string> FromBz2(std::string_view bytes, size_t size,
                                     const std::string& origin) {
   const auto fail = [&] {
-    return Fail(origin, absl::StrCat("the bz2 chunk does not decompress to the ", size,
-                                     " bytes that it declares"));
+    return DamagedChunk(origin, absl::StrCat("the bz2 chunk does not decompress to the ", size,
+                                             " bytes that it declares"));
   };
   bz_stream stream = {};
   if (BZ2_bzDecompressInit(&stream, 0, 0) != BZ_OK) return fail();
@@ -60,8 +60,8 @@ absl::StatusOr<std::string> FromBz2(std::string_view bytes, size_t size,
 absl::StatusOr<std::string> FromLz4(std::string_view bytes, size_t size,
                                     const std::string& origin) {
   const auto fail = [&] {
-    return Fail(origin, absl::StrCat("the lz4 chunk does not decompress to the ", size,
-                                     " bytes that it declares"));
+    return DamagedChunk(origin, absl::StrCat("the lz4 chunk does not decompress to the ", size,
+                                             " bytes that it declares"));
   };
   if (size / kLz4RatioMax > bytes.size()) return fail();
   LZ4F_dctx* raw = nullptr;
@@ -92,19 +92,19 @@ absl::StatusOr<std::string> FromLz4(std::string_view bytes, size_t size,
 absl::StatusOr<std::string> DecompressChunk(std::string_view compression, std::string_view bytes,
                                             size_t declared_size, const std::string& origin) {
   if (declared_size > kBagChunkBytesMax || bytes.size() > kBagChunkBytesMax) {
-    return Fail(origin, absl::StrCat("the chunk declares ", declared_size, " bytes; at most ",
-                                     kBagChunkBytesMax, " are read"));
+    return DamagedChunk(origin, absl::StrCat("the chunk declares ", declared_size,
+                                             " bytes; at most ", kBagChunkBytesMax, " are read"));
   }
   if (compression == "bz2") return FromBz2(bytes, declared_size, origin);
   if (compression == "lz4") return FromLz4(bytes, declared_size, origin);
   if (compression != "none") {
-    return Fail(origin, absl::StrCat("the chunk's compression is \"",
-                                     std::string(compression.substr(0, 16)),
-                                     "\"; none, bz2 and lz4 are known"));
+    return DamagedChunk(origin, absl::StrCat("the chunk's compression is \"",
+                                             std::string(compression.substr(0, 16)),
+                                             "\"; none, bz2 and lz4 are known"));
   }
   if (bytes.size() != declared_size) {
-    return Fail(origin, absl::StrCat("the chunk declares ", declared_size, " bytes and has ",
-                                     bytes.size()));
+    return DamagedChunk(origin, absl::StrCat("the chunk declares ", declared_size,
+                                             " bytes and has ", bytes.size()));
   }
   return std::string(bytes);
 }

@@ -20,7 +20,7 @@ namespace dsg::ingest {
 namespace {
 
 // Headers hold a few numbers and names; definitions of messages are data.
-constexpr uint64_t kHeaderBytesMax = 65536;
+constexpr uint64_t kRecordHeaderBytesMax = 65536;
 constexpr uint64_t kConnectionBytesMax = uint64_t{16} << 20;
 // The chunks of a second of stereo and colour, so that images that were put in order are not
 // decompressed a second time.
@@ -82,7 +82,7 @@ class BagFile::Builder {
   absl::StatusOr<std::unique_ptr<Record>> ReadRecord(uint64_t at, BagOp op) const {
     DSG_ASSIGN_OR_RETURN(const std::string size_bytes, bag_.ReadBytes(at, 4));
     const uint64_t size = LittleEndian(size_bytes, 0, 4);
-    if (size > kHeaderBytesMax) {
+    if (size > kRecordHeaderBytesMax) {
       return bag_.Fail(at, absl::StrCat("a record's header claims ", size, " bytes"));
     }
     auto record = std::make_unique<Record>();
@@ -300,7 +300,7 @@ absl::StatusOr<BagMessage> BagFile::ReadPlain(const BagMessageRef& message,
   if (end - at < 8) return Fail(at, "a message reaches past its chunk");
   DSG_ASSIGN_OR_RETURN(const std::string size_bytes, ReadBytes(at, 4));
   const uint64_t header_size = LittleEndian(size_bytes, 0, 4);
-  if (header_size > kHeaderBytesMax || header_size + 8 > end - at) {
+  if (header_size > kRecordHeaderBytesMax || header_size + 8 > end - at) {
     return Fail(at, "a message reaches past its chunk");
   }
   DSG_ASSIGN_OR_RETURN(const std::string header, ReadBytes(at + 4, header_size + 4));

@@ -30,7 +30,6 @@ constexpr TimeNs kHorizonNs = kNsPerSecond;
 constexpr size_t kWaitingMax = 200'000;
 // The head of an image: stamp, frame, size, encoding.
 constexpr size_t kImageHeadBytes = 4096;
-constexpr TimeNs kFirstPlausibleUnixNs = 1'000'000'000 * kNsPerSecond;
 
 struct Key {
   TimeNs time_ns = 0;
@@ -87,7 +86,7 @@ class BagLog : public LogSource {
     }
     if (first_ns == kTimeMax) first_ns = 0;
     info_.first_ns = first_ns;
-    info_.clock = first_ns >= kFirstPlausibleUnixNs ? Clock::kUnix : Clock::kMonotonic;
+    info_.clock = ClockOf(first_ns);
     return absl::OkStatus();
   }
 

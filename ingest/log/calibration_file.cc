@@ -14,9 +14,9 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr size_t kFileBytesMax = size_t{1} << 20;
+constexpr size_t kCalibrationBytesMax = size_t{1} << 20;
 // A calibration nests four deep; the parser's own recursion must stay far from the stack's end.
-constexpr int kDepthMax = 32;
+constexpr int kYamlDepthMax = 32;
 
 // One map of a file, with errors that name the file and the line.
 class Section {
@@ -89,7 +89,7 @@ class Section {
 };
 
 // Brackets and indentation alone can nest; both are seen without parsing.
-bool NestsTooDeep(std::string_view text) {
+bool YamlNestsTooDeep(std::string_view text) {
   int depth = 0;
   int line_depth = 0;
   bool at_line_start = true;
@@ -104,19 +104,19 @@ bool NestsTooDeep(std::string_view text) {
     if (c != ' ' && c != '-' && c != '?') at_line_start = false;
     if (c == '[' || c == '{') ++depth;
     if ((c == ']' || c == '}') && depth > 0) --depth;
-    if (depth > kDepthMax || line_depth > kDepthMax) return true;
+    if (depth > kYamlDepthMax || line_depth > kYamlDepthMax) return true;
   }
   return false;
 }
 
-absl::StatusOr<Section> Parse(const LogFile& file) {
+absl::StatusOr<Section> ParseYaml(const LogFile& file) {
   const LinePosition at{file.path, 1};
-  if (file.bytes.size() > kFileBytesMax) {
+  if (file.bytes.size() > kCalibrationBytesMax) {
     return at.Error(absl::StrCat("holds ", file.bytes.size(), " bytes; a calibration has at most ",
-                                 kFileBytesMax));
+                                 kCalibrationBytesMax));
   }
   std::string text = file.bytes;
-  if (NestsTooDeep(text)) return at.Error("nests too deep for a calibration");
+  if (YamlNestsTooDeep(text)) return at.Error("nests too deep for a calibration");
   // OpenCV writes a directive that YAML does not know: as a comment it keeps its line.
   if (text.starts_with("%YAML")) text[0] = '#';
   YAML::Node root = YAML::Load(text);
@@ -130,7 +130,7 @@ absl::StatusOr<T> Guarded(const LogFile& file,
                           absl::StatusOr<T> (*read)(const Section&, const std::string&),
                           const std::string& name) {
   try {
-    DSG_ASSIGN_OR_RETURN(const Section section, Parse(file));
+    DSG_ASSIGN_OR_RETURN(const Section section, ParseYaml(file));
     return read(section, name);
   } catch (const YAML::Exception& error) {
     return LinePosition{file.path, error.mark.line + 1}.Error(

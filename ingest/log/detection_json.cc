@@ -13,8 +13,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr size_t kLineBytesMax = size_t{1} << 20;
-constexpr int kDepthMax = 8;
+constexpr size_t kDetectionBytesMax = size_t{1} << 20;
+constexpr int kJsonDepthMax = 8;
 constexpr double kPixelMax = 1e6;
 // A joint is on its own body.
 constexpr double kJointMaxM = 10.0;
@@ -24,7 +24,7 @@ constexpr size_t kVertexCountMax = 20'000;
 constexpr double kAngleMax = 10.0;
 constexpr double kShapeMax = 50.0;
 
-bool NestsTooDeep(std::string_view text) {
+bool JsonNestsTooDeep(std::string_view text) {
   int depth = 0;
   bool is_in_string = false;
   for (size_t i = 0; i < text.size(); ++i) {
@@ -37,7 +37,7 @@ bool NestsTooDeep(std::string_view text) {
     if (is_in_string) continue;
     if (c == '[' || c == '{') ++depth;
     if (c == ']' || c == '}') --depth;
-    if (depth > kDepthMax) return true;
+    if (depth > kJsonDepthMax) return true;
   }
   return false;
 }
@@ -209,7 +209,7 @@ absl::Status ReadJoints(const LinePosition& at, const Fields& fields, HumanDetec
 absl::Status ReadBody(const Fields& fields, HumanDetection* detection) {
   if (fields.Has("pose")) {
     DSG_ASSIGN_OR_RETURN(const std::vector<double> pose,
-                         fields.List("pose", 3 * kJointCount, kAngleMax));
+                         fields.List("pose", kPoseCoefficientCount, kAngleMax));
     detection->pose_coefficients.assign(pose.begin(), pose.end());
   }
   if (fields.Has("shape")) {
@@ -248,7 +248,8 @@ absl::Status ReadWeakCamera(const LinePosition& at, const Json& value, HumanDete
 }
 
 // A box alone is placed by its height; joints need a camera of one kind.
-absl::Status ReadCamera(const LinePosition& at, const Fields& fields, HumanDetection* detection) {
+absl::Status ReadPlacement(const LinePosition& at, const Fields& fields,
+                           HumanDetection* detection) {
   const bool has_pelvis = fields.Has("pelvis");
   if (has_pelvis) DSG_RETURN_IF_ERROR(ReadPelvis(at, fields, detection));
   const bool may_be_missing = has_pelvis || !detection->has_joints;
@@ -260,12 +261,12 @@ absl::Status ReadCamera(const LinePosition& at, const Fields& fields, HumanDetec
 }  // namespace
 
 absl::StatusOr<HumanDetection> ParseDetection(const LinePosition& at, std::string_view line) {
-  if (line.size() > kLineBytesMax) {
+  if (line.size() > kDetectionBytesMax) {
     return at.Error(absl::StrCat("the line has ", line.size(), " bytes; a detection has at most ",
-                                 kLineBytesMax));
+                                 kDetectionBytesMax));
   }
   if (!IsUtf8(line)) return at.Error("the line is not UTF-8; is this a table of detections?");
-  if (NestsTooDeep(line)) return at.Error("the line nests too deep for a detection");
+  if (JsonNestsTooDeep(line)) return at.Error("the line nests too deep for a detection");
   const Json object = Json::parse(line, nullptr, false);
   if (!object.is_object()) {
     return at.Error("is no JSON object; was the line cut? Correct or remove it");
@@ -275,7 +276,7 @@ absl::StatusOr<HumanDetection> ParseDetection(const LinePosition& at, std::strin
   DSG_RETURN_IF_ERROR(ReadHead(at, fields, &detection));
   DSG_RETURN_IF_ERROR(ReadJoints(at, fields, &detection));
   DSG_RETURN_IF_ERROR(ReadBody(fields, &detection));
-  DSG_RETURN_IF_ERROR(ReadCamera(at, fields, &detection));
+  DSG_RETURN_IF_ERROR(ReadPlacement(at, fields, &detection));
   return detection;
 }
 

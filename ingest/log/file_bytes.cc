@@ -5,7 +5,6 @@
 
 #include <cerrno>
 #include <cstring>
-#include <filesystem>
 #include <fstream>
 
 #include "absl/strings/escaping.h"
@@ -15,6 +14,15 @@
 
 namespace dsg::ingest {
 
+absl::Status MalformedFile(const std::string& path, const std::string& message) {
+  return MakeError(Reason::kFileMalformed, absl::StrCat(path, ": ", message), {{"file", path}});
+}
+
+bool IsFile(const std::filesystem::path& path) {
+  std::error_code error;
+  return std::filesystem::is_regular_file(path, error);
+}
+
 absl::StatusOr<LogFile> ReadLogFile(const std::string& path) {
   namespace fs = std::filesystem;
   std::error_code error;
@@ -23,9 +31,7 @@ absl::StatusOr<LogFile> ReadLogFile(const std::string& path) {
     return absl::NotFoundError(absl::StrCat("\"", path, "\" does not exist; check the path"));
   }
   if (status.type() != fs::file_type::regular) {
-    return MakeError(Reason::kFileMalformed,
-                     absl::StrCat(path, ": is not a regular file; give a log file or folder"),
-                     {{"file", path}});
+    return MalformedFile(path, "is not a regular file; give a log file or folder");
   }
   std::ifstream in(path, std::ios::binary);
   LogFile file{.path = path, .name = fs::path(path).filename().string(), .bytes = {}};
@@ -41,9 +47,7 @@ absl::StatusOr<LogFile> ReadLogFile(const std::string& path) {
                      {{"field", "log"}, {"value", path}});
   }
   if (file.bytes.empty()) {
-    return MakeError(Reason::kFileMalformed,
-                     absl::StrCat(path, ": is empty; was the recording or the copy cut short?"),
-                     {{"file", path}});
+    return MalformedFile(path, "is empty; was the recording or the copy cut short?");
   }
   return file;
 }

@@ -3,6 +3,7 @@
 // Refuses anything but regular files: a pipe or device has no end that can be checked.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -20,6 +21,12 @@ struct LogFile {
   std::string name;
   std::string bytes;
 };
+
+/// INVALID_ARGUMENT/FILE_MALFORMED: "path: message".
+absl::Status MalformedFile(const std::string& path, const std::string& message);
+
+/// Whether `path` is a regular file; false when it cannot be told.
+bool IsFile(const std::filesystem::path& path);
 
 /// Reads a file whole.
 ///

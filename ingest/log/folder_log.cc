@@ -31,22 +31,10 @@ constexpr char kImu[] = "imu0";
 constexpr char kDetections[] = "detections0";
 constexpr char kLoops[] = "loop_closures0";
 constexpr int64_t kManifestVersion = 1;
-// 2001-09-09: no clock of a robot shows less, and no simulation lasts that long.
-constexpr TimeNs kFirstPlausibleUnixNs = 1'000'000'000 * kNsPerSecond;
-
-bool IsFile(const fs::path& path) {
-  std::error_code error;
-  return fs::is_regular_file(path, error);
-}
 
 bool IsFolder(const fs::path& path) {
   std::error_code error;
   return fs::is_directory(path, error);
-}
-
-absl::Status Malformed(const fs::path& path, const std::string& message) {
-  return MakeError(Reason::kFileMalformed, absl::StrCat(path.string(), ": ", message),
-                   {{"file", path.string()}});
 }
 
 std::vector<std::string> FoldersIn(const fs::path& root) {
@@ -112,9 +100,9 @@ class FolderReader {
                             fs::exists(root_ / ".rendering", error) ||
                             folder.extension() == ".rendering";
     if (!has_marker) return absl::OkStatus();
-    return Malformed(folder,
-                     "is a simulation that is not finished; run the same dsg-simulate "
-                     "again, which goes on where it was cut off");
+    return MalformedFile(folder,
+                         "is a simulation that is not finished; run the same dsg-simulate "
+                         "again, which goes on where it was cut off");
   }
 
   fs::path ManifestPath() const {
@@ -127,10 +115,11 @@ class FolderReader {
     if (!IsFile(path)) return absl::OkStatus();
     DSG_ASSIGN_OR_RETURN(const LogFile file, ReadLogFile(path.string()));
     // The bound keeps the parser's own depth and memory small.
-    if (file.bytes.size() > (size_t{1} << 20))
-      return Malformed(path, "is too large for a log.json");
+    if (file.bytes.size() > (size_t{1} << 20)) {
+      return MalformedFile(path, "is too large for a log.json");
+    }
     manifest_ = nlohmann::json::parse(file.bytes, nullptr, false);
-    if (!manifest_.is_object()) return Malformed(path, "is no JSON object; copy the log again");
+    if (!manifest_.is_object()) return MalformedFile(path, "is no JSON object; copy the log again");
     const auto format = manifest_.find("format");
     const auto version = manifest_.find("version");
     // Another program's log.json beside a EuRoC folder is none of our business.
@@ -143,8 +132,9 @@ class FolderReader {
           version == manifest_.end() || version->is_structured()
               ? "missing"
               : version->dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
-      return Malformed(path, absl::StrCat("its version is ", found, ", this build reads ",
-                                          kManifestVersion, "; use the build that wrote the log"));
+      return MalformedFile(
+          path, absl::StrCat("its version is ", found, ", this build reads ", kManifestVersion,
+                             "; use the build that wrote the log"));
     }
     digest_.Add("log.json", file.bytes);
     const fs::path labels = path.parent_path() / "labels.csv";
@@ -159,9 +149,10 @@ class FolderReader {
   absl::Status ReadCamera(const std::string& name) {
     const fs::path folder = root_ / name;
     if (!IsFile(folder / "sensor.yaml")) {
-      return Malformed(folder / "sensor.yaml",
-                       absl::StrCat("the calibration of channel ", name,
-                                    " is missing; copy it, or remove the folder of the channel"));
+      return MalformedFile(
+          folder / "sensor.yaml",
+          absl::StrCat("the calibration of channel ", name,
+                       " is missing; copy it, or remove the folder of the channel"));
     }
     DSG_ASSIGN_OR_RETURN(const LogFile yaml, ReadLogFile((folder / "sensor.yaml").string()));
     digest_.Add(absl::StrCat(name, "/sensor.yaml"), yaml.bytes);
@@ -179,7 +170,7 @@ class FolderReader {
     const std::string path = (fs::path(list.folder) / list.names.front()).string();
     DSG_ASSIGN_OR_RETURN(const ImageHeader header, LoadImageHeader(path));
     if (header.width == camera.width && header.height == camera.height) return absl::OkStatus();
-    return Malformed(
+    return MalformedFile(
         path, absl::StrCat("the image is ", header.width, " x ", header.height,
                            " pixels, the calibration of ", camera.name, " says ", camera.width,
                            " x ", camera.height, "; correct sensor.yaml"));
@@ -259,12 +250,12 @@ class FolderReader {
       const auto count = counts->find(channel.name);
       if (count == counts->end() || !count->is_number_integer()) continue;
       if (count->get<int64_t>() == static_cast<int64_t>(channel.times.size())) continue;
-      return Malformed(
+      return MalformedFile(
           ManifestPath(),
           absl::StrCat("counts ", count->get<int64_t>(), " measurements of channel ", channel.name,
                        ", the log holds ", channel.times.size(), "; copy the log again"));
     }
-    if (first_ns < kFirstPlausibleUnixNs) info_.clock = Clock::kMonotonic;
+    info_.clock = ClockOf(first_ns);
     return absl::OkStatus();
   }
 

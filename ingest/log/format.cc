@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "ingest/log/file_bytes.h"
 #include "ingest/log/folder_log.h"
 #include "ingest/log/rgbd_layout.h"
 #include "ingest/log/text_table.h"
@@ -89,11 +90,6 @@ absl::Status Unknown(const std::string& path, std::string_view what) {
                    absl::StrCat(path, ": ", std::string(what),
                                 "; name the format with --format: ", FormatList()),
                    {{"file", path}, {"formats", FormatList()}});
-}
-
-bool IsFile(const std::filesystem::path& path) {
-  std::error_code error;
-  return std::filesystem::is_regular_file(path, error);
 }
 
 bool IsEurocTable(const std::filesystem::path& path) {

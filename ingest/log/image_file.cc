@@ -17,13 +17,9 @@ namespace dsg::ingest {
 namespace {
 
 // 16 Mpx of floats, not compressed, and their header.
-constexpr uintmax_t kFileBytesMax = 80'000'000;
+constexpr uintmax_t kImageBytesMax = 80'000'000;
 // JPEGs may carry a thumbnail and colour profiles before their size.
-constexpr size_t kHeaderBytesMax = size_t{1} << 20;
-
-absl::Status Fail(const std::string& origin, const std::string& message) {
-  return MakeError(Reason::kFileMalformed, absl::StrCat(origin, ": ", message), {{"file", origin}});
-}
+constexpr size_t kImageHeaderBytesMax = size_t{1} << 20;
 
 int FlagsOf(ImageRole role) {
   switch (role) {
@@ -88,8 +84,8 @@ absl::StatusOr<Image> Convert(const cv::Mat& mat, const std::string& origin,
       if (mat.type() == CV_16UC1) return Copy(mat, PixelFormat::kLabel16);
       break;
   }
-  return Fail(origin,
-              absl::StrCat("the image has ", mat.channels(), " channels of ", mat.elemSize1() * 8,
+  return MalformedFile(
+      origin, absl::StrCat("the image has ", mat.channels(), " channels of ", mat.elemSize1() * 8,
                            " bits, which is not what its channel has: depth is 16 bit or "
                            "float, labels are 16 bit, grey and colour 8 bit"));
 }
@@ -100,10 +96,10 @@ absl::StatusOr<std::string> ReadBytes(const std::string& path, size_t byte_count
   const uintmax_t size = std::filesystem::file_size(path, error);
   std::ifstream in;
   if (!error) in.open(path, std::ios::binary);
-  if (!in.is_open()) return Fail(path, "the image cannot be read; was it moved?");
-  if (size > kFileBytesMax) {
-    return Fail(path, absl::StrCat("the image file has ", size, " bytes; at most ", kFileBytesMax,
-                                   " are read"));
+  if (!in.is_open()) return MalformedFile(path, "the image cannot be read; was it moved?");
+  if (size > kImageBytesMax) {
+    return MalformedFile(path, absl::StrCat("the image file has ", size, " bytes; at most ",
+                                            kImageBytesMax, " are read"));
   }
   std::string bytes(std::min<size_t>(size, byte_count_max), '\0');
   in.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
@@ -137,26 +133,29 @@ Image ScaleDepth(const Image& image, const ImageDecoding& decoding) {
 absl::StatusOr<Image> DecodeImage(std::string_view bytes, const std::string& origin,
                                   const ImageDecoding& decoding) {
   DSG_ASSIGN_OR_RETURN(const ImageHeader header, ReadImageHeader(bytes, origin));
-  if (bytes.size() > kFileBytesMax) return Fail(origin, "the compressed image is too large");
+  if (bytes.size() > kImageBytesMax) {
+    return MalformedFile(origin, "the compressed image is too large");
+  }
   const bool is_eight_bit = decoding.role == ImageRole::kGray || decoding.role == ImageRole::kColor;
   if (is_eight_bit && header.bits_per_channel > 8) {
-    return Fail(origin, absl::StrCat("the image has ", header.bits_per_channel,
-                                     " bits a channel; grey and colour have 8"));
+    return MalformedFile(origin, absl::StrCat("the image has ", header.bits_per_channel,
+                                              " bits a channel; grey and colour have 8"));
   }
   const cv::Mat mat = Decode(bytes, decoding.role);
   if (mat.empty() || mat.cols != header.width || mat.rows != header.height) {
-    return Fail(origin, "the image does not decode; it is damaged or cut short: copy it again");
+    return MalformedFile(origin,
+                         "the image does not decode; it is damaged or cut short: copy it again");
   }
   return Convert(mat, origin, decoding);
 }
 
 absl::StatusOr<Image> LoadImageFile(const std::string& path, const ImageDecoding& decoding) {
-  DSG_ASSIGN_OR_RETURN(const std::string bytes, ReadBytes(path, kFileBytesMax));
+  DSG_ASSIGN_OR_RETURN(const std::string bytes, ReadBytes(path, kImageBytesMax));
   return DecodeImage(bytes, path, decoding);
 }
 
 absl::StatusOr<ImageHeader> LoadImageHeader(const std::string& path) {
-  DSG_ASSIGN_OR_RETURN(const std::string bytes, ReadBytes(path, kHeaderBytesMax));
+  DSG_ASSIGN_OR_RETURN(const std::string bytes, ReadBytes(path, kImageHeaderBytesMax));
   return ReadImageHeader(bytes, path);
 }
 

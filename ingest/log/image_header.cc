@@ -23,8 +23,8 @@ std::optional<uint32_t> Integer(std::string_view bytes, size_t at, size_t size, 
   return value;
 }
 
-std::optional<ImageHeader> Make(std::optional<uint32_t> width, std::optional<uint32_t> height,
-                                int channel_count, int bits) {
+std::optional<ImageHeader> HeaderOf(std::optional<uint32_t> width, std::optional<uint32_t> height,
+                                    int channel_count, int bits) {
   // Larger ones fail the bound on pixels; here they must not wrap.
   constexpr uint32_t kSideMax = 1 << 24;
   if (!width || !height || *width > kSideMax || *height > kSideMax) return std::nullopt;
@@ -51,8 +51,8 @@ std::optional<ImageHeader> OfPng(std::string_view bytes) {
     default:
       return std::nullopt;
   }
-  return Make(Integer(bytes, 16, 4, true), Integer(bytes, 20, 4, true), channel_count,
-              Byte(bytes, 24));
+  return HeaderOf(Integer(bytes, 16, 4, true), Integer(bytes, 20, 4, true), channel_count,
+                  Byte(bytes, 24));
 }
 
 std::optional<ImageHeader> OfJpeg(std::string_view bytes) {
@@ -66,8 +66,8 @@ std::optional<ImageHeader> OfJpeg(std::string_view bytes) {
     const bool is_frame =
         marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
     if (is_frame && at + 10 <= bytes.size()) {
-      return Make(Integer(bytes, at + 7, 2, true), Integer(bytes, at + 5, 2, true),
-                  Byte(bytes, at + 9), Byte(bytes, at + 4));
+      return HeaderOf(Integer(bytes, at + 7, 2, true), Integer(bytes, at + 5, 2, true),
+                      Byte(bytes, at + 9), Byte(bytes, at + 4));
     }
     // Markers without a length, and the pixels, come after the frame's header.
     if (marker == 0xda || marker == 0xd9) return std::nullopt;
@@ -100,7 +100,7 @@ std::optional<ImageHeader> OfTiff(std::string_view bytes) {
     if (*tag == 277) samples = *value;
   }
   if (bits > 64 || samples == 0 || samples > 4) return std::nullopt;
-  return Make(width, height, static_cast<int>(samples), static_cast<int>(bits));
+  return HeaderOf(width, height, static_cast<int>(samples), static_cast<int>(bits));
 }
 
 }  // namespace

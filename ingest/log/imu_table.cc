@@ -11,11 +11,11 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr char kColumns[] = "timestamp, w x y z [rad/s], a x y z [m/s^2]";
+constexpr char kImuColumns[] = "timestamp, w x y z [rad/s], a x y z [m/s^2]";
 constexpr std::string_view kNames[] = {"w_x", "w_y", "w_z", "a_x", "a_y", "a_z"};
 
-absl::StatusOr<ImuMeasurement> ReadRow(const LinePosition& at,
-                                       const std::vector<std::string_view>& fields) {
+absl::StatusOr<ImuMeasurement> ReadImuRow(const LinePosition& at,
+                                          const std::vector<std::string_view>& fields) {
   ImuMeasurement sample;
   DSG_ASSIGN_OR_RETURN(sample.time_ns, ParseInteger(at, "timestamp", fields[0]));
   if (sample.time_ns == kTimeMin || sample.time_ns == kTimeMax) {
@@ -43,8 +43,8 @@ absl::StatusOr<SensorChannel> ReadImuTable(const LogFile& file, const std::strin
     if (line.text.starts_with('#')) continue;
     const LinePosition at{file.path, line.number};
     SplitAtCommas(line.text, &fields);
-    DSG_RETURN_IF_ERROR(CheckFieldCount(at, line, fields.size(), 7, kColumns));
-    DSG_ASSIGN_OR_RETURN(const ImuMeasurement sample, ReadRow(at, fields));
+    DSG_RETURN_IF_ERROR(CheckFieldCount(at, line, fields.size(), 7, kImuColumns));
+    DSG_ASSIGN_OR_RETURN(const ImuMeasurement sample, ReadImuRow(at, fields));
     DSG_RETURN_IF_ERROR(CheckGrows(file.path, line.number, channel, result.times, sample.time_ns));
     result.times.push_back(sample.time_ns);
     samples->push_back(sample);

@@ -9,7 +9,7 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr char kHeader[] = "name,red,green,blue,alpha,id";
+constexpr char kLabelHeader[] = "name,red,green,blue,alpha,id";
 // Label images keep a class in eight bits.
 constexpr int64_t kClassMax = 255;
 
@@ -22,8 +22,8 @@ absl::StatusOr<uint32_t> ReadBounded(const LinePosition& at, std::string_view fi
   return static_cast<uint32_t>(value);
 }
 
-absl::StatusOr<LabelRow> ReadRow(const LinePosition& at,
-                                 const std::vector<std::string_view>& fields) {
+absl::StatusOr<LabelRow> ReadLabelRow(const LinePosition& at,
+                                      const std::vector<std::string_view>& fields) {
   LabelRow row;
   row.name = std::string(fields[0]);
   if (row.name.empty() || row.name.size() > 1024 || !IsUtf8(row.name)) {
@@ -65,14 +65,14 @@ absl::StatusOr<LabelTable> ReadLabelTable(const LogFile& file) {
     const LinePosition at{file.path, line.number};
     SplitAtCommas(line.text, &fields);
     if (!has_header) {
-      if (line.text != kHeader) {
-        return at.FieldError("header", line.text, absl::StrCat("\"", kHeader, "\" is due"));
+      if (line.text != kLabelHeader) {
+        return at.FieldError("header", line.text, absl::StrCat("\"", kLabelHeader, "\" is due"));
       }
       has_header = true;
       continue;
     }
-    DSG_RETURN_IF_ERROR(CheckFieldCount(at, line, fields.size(), 6, kHeader));
-    DSG_ASSIGN_OR_RETURN(LabelRow row, ReadRow(at, fields));
+    DSG_RETURN_IF_ERROR(CheckFieldCount(at, line, fields.size(), 6, kLabelHeader));
+    DSG_ASSIGN_OR_RETURN(LabelRow row, ReadLabelRow(at, fields));
     table.rows.push_back(std::move(row));
   }
   return table;

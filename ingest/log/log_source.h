@@ -103,6 +103,12 @@ struct LogInfo {
   std::vector<std::string> notes;
 };
 
+/// The clock of a log that begins at `first_ns`: before 2001-09-09 there is no clock of a robot,
+/// and no simulation lasts that long.
+inline Clock ClockOf(TimeNs first_ns) {
+  return first_ns >= 1'000'000'000 * kNsPerSecond ? Clock::kUnix : Clock::kMonotonic;
+}
+
 /// Where the robot's poses come from.
 enum class PoseSource {
   /// External poses if the log holds some, ground truth otherwise; LogInfo::notes says which.

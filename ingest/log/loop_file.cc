@@ -25,7 +25,7 @@ namespace {
 using Json = nlohmann::json;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-constexpr size_t kLineBytesMax = size_t{1} << 16;
+constexpr size_t kLoopLineBytesMax = size_t{1} << 16;
 // Bounds the depth of what the parser builds.
 constexpr int64_t kBracketsMax = 1024;
 constexpr size_t kKeysNamedMax = 8;
@@ -44,9 +44,9 @@ bool HasTooManyBrackets(std::string_view text) {
 }
 
 absl::StatusOr<Json> ParseObject(const LinePosition& at, std::string_view line) {
-  if (line.size() > kLineBytesMax) {
+  if (line.size() > kLoopLineBytesMax) {
     return at.Error(absl::StrCat("the line has ", line.size(),
-                                 " bytes; a loop closure has at most ", kLineBytesMax));
+                                 " bytes; a loop closure has at most ", kLoopLineBytesMax));
   }
   if (!IsUtf8(line)) return at.Error("the line is not UTF-8; is this a table of loop closures?");
   if (HasTooManyBrackets(line)) {

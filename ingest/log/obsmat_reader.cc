@@ -9,12 +9,12 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr char kColumns[] = "frame person x z y vx vz vy";
+constexpr char kObsmatColumns[] = "frame person x z y vx vz vy";
 
-absl::Status AddRow(const LogOptions& options, const TextLine& line,
-                    const std::vector<std::string_view>& fields, TrackTable* table) {
+absl::Status AddObsmatRow(const LogOptions& options, const TextLine& line,
+                          const std::vector<std::string_view>& fields, TrackTable* table) {
   const LinePosition at{table->file, line.number};
-  DSG_RETURN_IF_ERROR(CheckFieldCount(at, line, fields.size(), 8, kColumns));
+  DSG_RETURN_IF_ERROR(CheckFieldCount(at, line, fields.size(), 8, kObsmatColumns));
   DSG_ASSIGN_OR_RETURN(const int64_t frame, ParseFrame(at, fields[0]));
   DSG_ASSIGN_OR_RETURN(const std::string person, ParsePersonName(at, fields[1]));
   Eigen::Vector3d position;
@@ -40,7 +40,7 @@ OpenedLog ReadObsmat(const LogFile& file, const LogOptions& options) {
   std::vector<std::string_view> fields;
   while (lines.Next(&line)) {
     SplitAtBlanks(line.text, &fields);
-    DSG_RETURN_IF_ERROR(AddRow(options, line, fields, &table));
+    DSG_RETURN_IF_ERROR(AddObsmatRow(options, line, fields, &table));
   }
   LogInfo info = DescribeTextLog("obsmat", file);
   return MakeFrameLog(std::move(table), options, std::move(info));

@@ -8,28 +8,28 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr char kColumns[] = "timestamp, p x y z, q w x y z, then nothing or v, b_w, b_a";
+constexpr char kPoseColumns[] = "timestamp, p x y z, q w x y z, then nothing or v, b_w, b_a";
 
 // A header that names other columns must not be read as if it named ours.
 absl::Status CheckHeader(const LinePosition& at, const std::vector<std::string_view>& fields) {
   constexpr std::string_view kMarks[] = {"timestamp", "_x", "_y", "_z", "_w", "_x", "_y", "_z"};
   if (fields.size() != 8 && fields.size() != 17) {
     return at.Error(absl::StrCat("the header names ", fields.size(), " columns, expected 8 or 17 (",
-                                 kColumns, "); is this a state_groundtruth_estimate0?"));
+                                 kPoseColumns, "); is this a state_groundtruth_estimate0?"));
   }
   for (size_t i = 0; i < std::size(kMarks); ++i) {
     const bool is_group_right = i == 0 || fields[i].starts_with(i < 4 ? "p_" : "q_");
     if (!is_group_right || fields[i].find(kMarks[i]) == std::string_view::npos) {
-      return at.FieldError(
-          "header", fields[i],
-          absl::StrCat("columns must be ", kColumns, "; is this a state_groundtruth_estimate0?"));
+      return at.FieldError("header", fields[i],
+                           absl::StrCat("columns must be ", kPoseColumns,
+                                        "; is this a state_groundtruth_estimate0?"));
     }
   }
   return absl::OkStatus();
 }
 
-absl::Status AddRow(const LinePosition& at, const std::vector<std::string_view>& fields,
-                    int32_t agent, TrackTable* table) {
+absl::Status AddPoseRow(const LinePosition& at, const std::vector<std::string_view>& fields,
+                        int32_t agent, TrackTable* table) {
   DSG_ASSIGN_OR_RETURN(const int64_t stamp, ParseInteger(at, "timestamp", fields[0]));
   if (stamp == kTimeMax || stamp == kTimeMin) {
     return at.FieldError("timestamp", fields[0], "nanoseconds since 1970 are due");
@@ -109,8 +109,8 @@ absl::StatusOr<TrackTable> ReadEurocPoses(const LogFile& file, const std::string
       continue;
     }
     if (column_count == 0) column_count = fields.size() == 8 ? 8 : 17;
-    DSG_RETURN_IF_ERROR(CheckFieldCount(at, line, fields.size(), column_count, kColumns));
-    DSG_RETURN_IF_ERROR(AddRow(at, fields, agent, &table));
+    DSG_RETURN_IF_ERROR(CheckFieldCount(at, line, fields.size(), column_count, kPoseColumns));
+    DSG_RETURN_IF_ERROR(AddPoseRow(at, fields, agent, &table));
   }
   return table;
 }

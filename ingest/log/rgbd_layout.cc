@@ -23,11 +23,6 @@ using Names = std::map<int64_t, std::string>;
 // A rotation that is further off than this was not merely printed with few digits.
 constexpr double kNotedDeviation = 1e-3;
 
-bool IsFile(const fs::path& path) {
-  std::error_code error;
-  return fs::is_regular_file(path, error);
-}
-
 // "frame-000008.color.jpg" with what stands around the number; nullopt for other names.
 std::optional<int64_t> FrameNumber(std::string_view name, std::string_view prefix,
                                    std::string_view suffix) {

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/log/file_bytes.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
@@ -41,21 +42,18 @@ std::optional<Encoding> FindEncoding(const std::string& name) {
   return std::nullopt;
 }
 
-absl::Status Fail(const std::string& origin, const std::string& message) {
-  return MakeError(Reason::kFileMalformed, absl::StrCat(origin, ": ", message), {{"file", origin}});
-}
-
 absl::Status CheckSize(const RosImage& image, const Encoding& encoding, const std::string& origin) {
   const uint64_t pixel_count = uint64_t{image.width} * image.height;
   if (pixel_count < 1 || pixel_count > static_cast<uint64_t>(kImagePixelsMax)) {
-    return Fail(origin, absl::StrCat("the image is ", image.width, " x ", image.height,
-                                     " pixels; 1 to ", kImagePixelsMax, " are read"));
+    return MalformedFile(origin, absl::StrCat("the image is ", image.width, " x ", image.height,
+                                              " pixels; 1 to ", kImagePixelsMax, " are read"));
   }
   const uint64_t row_bytes = uint64_t{image.width} * static_cast<uint64_t>(encoding.byte_count);
   if (image.step < row_bytes || uint64_t{image.step} * image.height != image.data.size()) {
-    return Fail(origin, absl::StrCat("the image has ", image.data.size(), " bytes and rows of ",
-                                     image.step, "; ", image.width, " x ", image.height, " ",
-                                     image.encoding, " needs others"));
+    return MalformedFile(
+        origin,
+        absl::StrCat("the image has ", image.data.size(), " bytes and rows of ", image.step, "; ",
+                     image.width, " x ", image.height, " ", image.encoding, " needs others"));
   }
   return absl::OkStatus();
 }
@@ -73,7 +71,7 @@ void ForEachPixel(const RosImage& image, const Encoding& encoding, const Visit& 
   }
 }
 
-Image Make(const RosImage& image, PixelFormat format) {
+Image EmptyImage(const RosImage& image, PixelFormat format) {
   Image result{.width = static_cast<int>(image.width),
                .height = static_cast<int>(image.height),
                .format = format,
@@ -83,7 +81,7 @@ Image Make(const RosImage& image, PixelFormat format) {
 }
 
 Image CopyRows(const RosImage& image, const Encoding& encoding, PixelFormat format) {
-  Image result = Make(image, format);
+  Image result = EmptyImage(image, format);
   const size_t row_bytes = size_t{image.width} * static_cast<size_t>(encoding.byte_count);
   for (uint32_t row = 0; row < image.height; ++row) {
     std::memcpy(result.bytes.data() + row * row_bytes, image.data.data() + size_t{row} * image.step,
@@ -102,7 +100,7 @@ Image CopyRows(const RosImage& image, const Encoding& encoding, PixelFormat form
 // The weights of ITU-R BT.601, which OpenCV has too.
 Image ToGray(const RosImage& image, const Encoding& e) {
   if (!e.is_color) return CopyRows(image, e, PixelFormat::kGray8);
-  Image result = Make(image, PixelFormat::kGray8);
+  Image result = EmptyImage(image, PixelFormat::kGray8);
   ForEachPixel(image, e, [&](const uint8_t* pixel, size_t i) {
     const int sum = 299 * pixel[e.red] + 587 * pixel[e.green] + 114 * pixel[e.blue];
     result.bytes[i] = static_cast<uint8_t>((sum + 500) / 1000);
@@ -111,7 +109,7 @@ Image ToGray(const RosImage& image, const Encoding& e) {
 }
 
 Image ToColor(const RosImage& image, const Encoding& e) {
-  Image result = Make(image, PixelFormat::kRgb8);
+  Image result = EmptyImage(image, PixelFormat::kRgb8);
   ForEachPixel(image, e, [&](const uint8_t* pixel, size_t i) {
     result.bytes[3 * i] = pixel[e.red];
     result.bytes[3 * i + 1] = pixel[e.green];
@@ -122,7 +120,7 @@ Image ToColor(const RosImage& image, const Encoding& e) {
 
 Image ToLabel(const RosImage& image, const Encoding& e,
               const std::map<uint32_t, int32_t>& class_of_color) {
-  Image result = Make(image, PixelFormat::kLabel16);
+  Image result = EmptyImage(image, PixelFormat::kLabel16);
   // Neighbours mostly have one colour.
   uint32_t last_rgb = UINT32_MAX;
   uint8_t last_class = 0;
@@ -147,9 +145,10 @@ absl::StatusOr<Image> ToImage(const RosImage& image, const ImageDecoding& decodi
                               const std::string& origin) {
   const std::optional<Encoding> encoding = FindEncoding(image.encoding);
   if (!encoding.has_value()) {
-    return Fail(origin, absl::StrCat("the image's encoding is \"", image.encoding.substr(0, 32),
-                                     "\"; mono8, rgb8, bgr8, rgba8, bgra8, 16UC1, mono16 and "
-                                     "32FC1 are known"));
+    return MalformedFile(origin,
+                         absl::StrCat("the image's encoding is \"", image.encoding.substr(0, 32),
+                                      "\"; mono8, rgb8, bgr8, rgba8, bgra8, 16UC1, mono16 and "
+                                      "32FC1 are known"));
   }
   DSG_RETURN_IF_ERROR(CheckSize(image, *encoding, origin));
   const bool is_eight_bit = encoding->byte_count == 1 || encoding->is_color;
@@ -172,8 +171,8 @@ absl::StatusOr<Image> ToImage(const RosImage& image, const ImageDecoding& decodi
       if (encoding->is_color) return ToLabel(image, *encoding, class_of_color);
       break;
   }
-  return Fail(origin, absl::StrCat("the image's encoding ", image.encoding,
-                                   " does not fit what its channel measures"));
+  return MalformedFile(origin, absl::StrCat("the image's encoding ", image.encoding,
+                                            " does not fit what its channel measures"));
 }
 
 }  // namespace dsg::ingest

@@ -6,13 +6,13 @@
 
 #include "absl/strings/str_cat.h"
 #include "ingest/log/bag_record.h"
+#include "ingest/log/file_bytes.h"
+#include "ingest/log/text_table.h"
 #include "schema/base/status.h"
 #include "schema/model/delta_check.h"
 
 namespace dsg::ingest {
 namespace {
-
-constexpr double kQuaternionNormTolerance = 1e-3;
 
 // Reads on; past the end it gives zeros and remembers.
 class Cursor {
@@ -67,15 +67,14 @@ class Cursor {
   bool is_cut_ = false;
 };
 
-absl::Status Fail(const std::string& origin, const std::string& message) {
-  return MakeError(Reason::kFileMalformed, absl::StrCat(origin, ": ", message), {{"file", origin}});
-}
-
 absl::Status CheckEnd(const Cursor& cursor, const char* type, const std::string& origin) {
-  if (cursor.is_cut()) return Fail(origin, absl::StrCat("the message is too short for ", type));
+  if (cursor.is_cut()) {
+    return MalformedFile(origin, absl::StrCat("the message is too short for ", type));
+  }
   if (cursor.rest() != 0) {
-    return Fail(origin, absl::StrCat("the message is ", cursor.rest(), " bytes too long for ", type,
-                                     "; is the type another one?"));
+    return MalformedFile(
+        origin, absl::StrCat("the message is ", cursor.rest(), " bytes too long for ", type,
+                             "; is the type another one?"));
   }
   return absl::OkStatus();
 }
@@ -105,10 +104,11 @@ RosPose ReadTransform(Cursor* cursor) {
 absl::StatusOr<Pose3d> RosPose::ToPose(const std::string& origin) const {
   if (!position.allFinite() || !xyzw.allFinite() ||
       position.cwiseAbs().maxCoeff() > kCoordinateMaxM) {
-    return Fail(origin, "the pose holds a number that is not finite or beyond 2000 km");
+    return MalformedFile(origin, "the pose holds a number that is not finite or beyond 2000 km");
   }
   if (std::abs(xyzw.norm() - 1.0) > kQuaternionNormTolerance) {
-    return Fail(origin, absl::StrCat("the quaternion's norm is ", xyzw.norm(), ", 1 is due"));
+    return MalformedFile(origin,
+                         absl::StrCat("the quaternion's norm is ", xyzw.norm(), ", 1 is due"));
   }
   Pose3d pose;
   pose.position = position;
@@ -119,14 +119,16 @@ absl::StatusOr<Pose3d> RosPose::ToPose(const std::string& origin) const {
 absl::StatusOr<RosHeader> ParseRosHeader(std::string_view bytes, const std::string& origin) {
   Cursor cursor(bytes);
   RosHeader header = cursor.Header();
-  if (cursor.is_cut()) return Fail(origin, "the message is too short for a header");
+  if (cursor.is_cut()) return MalformedFile(origin, "the message is too short for a header");
   return header;
 }
 
 absl::StatusOr<RosImage> ParseRosImageHead(std::string_view bytes, const std::string& origin) {
   Cursor cursor(bytes);
   RosImage image = ReadImageHead(&cursor);
-  if (cursor.is_cut()) return Fail(origin, "the message is too short for sensor_msgs/Image");
+  if (cursor.is_cut()) {
+    return MalformedFile(origin, "the message is too short for sensor_msgs/Image");
+  }
   return image;
 }
 
@@ -159,7 +161,8 @@ absl::StatusOr<RosCameraInfo> ParseRosCameraInfo(std::string_view bytes,
   info.distortion_model = std::string(cursor.String());
   const uint32_t count = cursor.U32();
   if (count > cursor.rest() / 8) {
-    return Fail(origin, absl::StrCat("sensor_msgs/CameraInfo claims ", count, " coefficients"));
+    return MalformedFile(origin,
+                         absl::StrCat("sensor_msgs/CameraInfo claims ", count, " coefficients"));
   }
   for (uint32_t i = 0; i < count; ++i) info.d.push_back(cursor.F64());
   for (double& value : info.k) value = cursor.F64();
@@ -182,7 +185,7 @@ absl::StatusOr<RosImu> ParseRosImu(std::string_view bytes, const std::string& or
   cursor.SkipDoubles(9);
   DSG_RETURN_IF_ERROR(CheckEnd(cursor, "sensor_msgs/Imu", origin));
   if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite()) {
-    return Fail(origin, "the inertial sample holds a number that is not finite");
+    return MalformedFile(origin, "the inertial sample holds a number that is not finite");
   }
   return imu;
 }

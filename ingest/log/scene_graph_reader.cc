@@ -7,12 +7,6 @@
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
-namespace {
-
-// 2001-09-09: no robot of ours drove before, and no simulator's clock gets that far.
-constexpr TimeNs kFirstPlausibleUnixNs = 1'000'000'000 * kNsPerSecond;
-
-}  // namespace
 
 OpenedLog ReadSceneGraphLog(const LogFile& file, const LogOptions& options) {
   DSG_ASSIGN_OR_RETURN(ImportedGraph graph,
@@ -30,7 +24,7 @@ OpenedLog ReadSceneGraphLog(const LogFile& file, const LogOptions& options) {
   LogInfo info = DescribeLog(graph.format, file);
   info.has_clock = graph.first_ns != 0;
   info.first_ns = graph.first_ns;
-  info.clock = graph.first_ns >= kFirstPlausibleUnixNs ? Clock::kUnix : Clock::kMonotonic;
+  info.clock = ClockOf(graph.first_ns);
   info.notes = std::move(graph.notes);
   for (const Skipped& skipped : graph.skipped) info.notes.push_back(ToString(skipped));
   TrackTable no_tracks;

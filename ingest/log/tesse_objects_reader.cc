@@ -32,8 +32,8 @@ std::string WithoutCopyNumber(const std::string& name) {
   return name.substr(0, open);
 }
 
-absl::StatusOr<Node> ReadRow(const LinePosition& at, const std::vector<std::string_view>& fields,
-                             uint64_t index) {
+absl::StatusOr<Node> ReadObjectRow(const LinePosition& at,
+                                   const std::vector<std::string_view>& fields, uint64_t index) {
   Node node;
   node.id = NodeId('O', index);
   node.layer = *LayerOfKind(kinds::kObject);
@@ -123,7 +123,7 @@ OpenedLog ReadTesseObjects(const LogFile& file, const LogOptions&) {
     DSG_RETURN_IF_ERROR(
         CheckFieldCount(at, line, fields.size(), is_unity ? 9 : 8,
                         is_unity ? "name,x,y,z,qx,qy,qz,qw,comment" : "name,x,y,z,qx,qy,qz,qw"));
-    DSG_ASSIGN_OR_RETURN(Node node, ReadRow(at, fields, delta.nodes.size()));
+    DSG_ASSIGN_OR_RETURN(Node node, ReadObjectRow(at, fields, delta.nodes.size()));
     if (is_unity) node.map_T_node = FromUnity(node.map_T_node);
     delta.nodes.push_back(std::move(node));
   }

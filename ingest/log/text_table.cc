@@ -15,8 +15,6 @@ namespace {
 constexpr size_t kQuotedLengthMax = 80;
 // Doubles count integers one by one up to here.
 constexpr double kExactIntegerMax = 9007199254740992.0;
-// Six printed digits leave a norm within 1e-5 of one; 1e-3 still cannot be another quantity.
-constexpr double kQuaternionNormTolerance = 1e-3;
 
 // Binary garbage and endless lines must not reach a terminal as they are.
 std::string Quote(std::string_view value) {

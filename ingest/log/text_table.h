@@ -14,6 +14,9 @@
 
 namespace dsg::ingest {
 
+/// Six printed digits leave a norm within 1e-5 of one; 1e-3 still cannot be another quantity.
+inline constexpr double kQuaternionNormTolerance = 1e-3;
+
 /// One line of a text file, without its line end.
 struct TextLine {
   /// From 1.
@@ -73,7 +76,8 @@ absl::StatusOr<std::string> ParsePersonName(const LinePosition& at, std::string_
 /// Decimal seconds as nanoseconds, exactly; digits beyond the ninth decimal are rounded.
 absl::StatusOr<TimeNs> ParseSeconds(const LinePosition& at, std::string_view field,
                                     std::string_view text);
-/// A quaternion made unit. Errors: FILE_MALFORMED when its norm is not within 1e-3 of 1.
+/// A quaternion made unit. Errors: FILE_MALFORMED when its norm is not within
+/// kQuaternionNormTolerance of 1.
 absl::StatusOr<Eigen::Quaterniond> Normalize(const LinePosition& at, const Eigen::Quaterniond& q);
 /// `epoch_ns` + `offset_ns`. Errors: FILE_MALFORMED when the sum does not fit.
 absl::StatusOr<TimeNs> AddToEpoch(const LinePosition& at, TimeNs epoch_ns, TimeNs offset_ns);

@@ -48,9 +48,10 @@ absl::StatusOr<Columns> ReadHeader(const LinePosition& at,
   return columns;
 }
 
-absl::StatusOr<int32_t> FindAgent(const LinePosition& at, const LogOptions& options,
-                                  const Columns& columns,
-                                  const std::vector<std::string_view>& fields, TrackTable* table) {
+absl::StatusOr<int32_t> FindThorAgent(const LinePosition& at, const LogOptions& options,
+                                      const Columns& columns,
+                                      const std::vector<std::string_view>& fields,
+                                      TrackTable* table) {
   const std::string_view helmet = fields[columns.helmet];
   if (helmet.empty()) return at.FieldError("ag_id", helmet, "a name is due; correct the line");
   DSG_ASSIGN_OR_RETURN(const int64_t tracklet,
@@ -63,15 +64,15 @@ absl::StatusOr<int32_t> FindAgent(const LinePosition& at, const LogOptions& opti
   return table->FindOrAdd(name, kinds::kHuman);
 }
 
-absl::Status AddRow(const LinePosition& at, const LogOptions& options, const Columns& columns,
-                    const std::vector<std::string_view>& fields, TrackTable* table) {
+absl::Status AddThorRow(const LinePosition& at, const LogOptions& options, const Columns& columns,
+                        const std::vector<std::string_view>& fields, TrackTable* table) {
   DSG_ASSIGN_OR_RETURN(const TimeNs offset, ParseSeconds(at, "Time", fields[columns.time]));
   DSG_ASSIGN_OR_RETURN(const TimeNs time, AddToEpoch(at, options.epoch_ns, offset));
   Eigen::Vector3d position;
   DSG_ASSIGN_OR_RETURN(position.x(), ParseCoordinate(at, "x", fields[columns.x]));
   DSG_ASSIGN_OR_RETURN(position.y(), ParseCoordinate(at, "y", fields[columns.y]));
   DSG_ASSIGN_OR_RETURN(position.z(), ParseCoordinate(at, "z", fields[columns.z]));
-  DSG_ASSIGN_OR_RETURN(const int32_t agent, FindAgent(at, options, columns, fields, table));
+  DSG_ASSIGN_OR_RETURN(const int32_t agent, FindThorAgent(at, options, columns, fields, table));
   table->AddPosition(time, at.line, agent, position);
   return absl::OkStatus();
 }
@@ -105,7 +106,7 @@ OpenedLog ReadThor(const LogFile& file, const LogOptions& options) {
     const LinePosition at{file.path, line.number};
     DSG_RETURN_IF_ERROR(
         CheckFieldCount(at, line, fields.size(), columns.count, "as in the header"));
-    DSG_RETURN_IF_ERROR(AddRow(at, options, columns, fields, &table));
+    DSG_RETURN_IF_ERROR(AddThorRow(at, options, columns, fields, &table));
     agents_of_role[std::string(fields[columns.role])].insert(table.rows.back().agent);
   }
   LogInfo info = DescribeTextLog("thor", file);

@@ -9,7 +9,7 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr char kHeader[] = "time_ns,agent,kind,x,y,z,qx,qy,qz,qw";
+constexpr char kTracksHeader[] = "time_ns,agent,kind,x,y,z,qx,qy,qz,qw";
 constexpr size_t kColumnCount = 10;
 
 absl::Status ShiftTime(const std::string& file, TimeNs epoch_ns, TimeNs* time_ns) {
@@ -49,8 +49,9 @@ absl::StatusOr<GraphMeasurement> ReadWorld(const LogFile& file, const LogOptions
   return GraphMeasurement{*std::move(world)};
 }
 
-absl::StatusOr<int32_t> FindAgent(const LinePosition& at, const LogOptions& options,
-                                  std::string_view name, std::string_view kind, TrackTable* table) {
+absl::StatusOr<int32_t> FindTracksAgent(const LinePosition& at, const LogOptions& options,
+                                        std::string_view name, std::string_view kind,
+                                        TrackTable* table) {
   if (name.empty()) return at.FieldError("agent", name, "a name is due; correct the line");
   if (!IsAgentKind(kind)) {
     return at.FieldError("kind", kind, "\"human\" or \"robot\" is due; correct the line");
@@ -75,15 +76,15 @@ absl::Status ReadOrientation(const LinePosition& at, const std::vector<std::stri
   return absl::OkStatus();
 }
 
-absl::Status AddRow(const LogOptions& options, const TextLine& line,
-                    const std::vector<std::string_view>& fields, TrackTable* table) {
+absl::Status AddTracksRow(const LogOptions& options, const TextLine& line,
+                          const std::vector<std::string_view>& fields, TrackTable* table) {
   const LinePosition at{table->file, line.number};
-  DSG_RETURN_IF_ERROR(CheckFieldCount(at, line, fields.size(), kColumnCount, kHeader));
+  DSG_RETURN_IF_ERROR(CheckFieldCount(at, line, fields.size(), kColumnCount, kTracksHeader));
   TrackRow row;
   row.line = line.number;
   DSG_ASSIGN_OR_RETURN(const int64_t offset, ParseInteger(at, "time_ns", fields[0]));
   DSG_ASSIGN_OR_RETURN(row.time_ns, AddToEpoch(at, options.epoch_ns, offset));
-  DSG_ASSIGN_OR_RETURN(row.agent, FindAgent(at, options, fields[1], fields[2], table));
+  DSG_ASSIGN_OR_RETURN(row.agent, FindTracksAgent(at, options, fields[1], fields[2], table));
   constexpr std::string_view kNames[] = {"x", "y", "z"};
   for (size_t i = 0; i < 3; ++i) {
     DSG_ASSIGN_OR_RETURN(row.map_T_agent.position[static_cast<Eigen::Index>(i)],
@@ -110,14 +111,14 @@ OpenedLog ReadTracks(const std::optional<LogFile>& world, const LogFile& tracks,
   table.file = tracks.path;
   LineReader lines(tracks.bytes);
   TextLine line;
-  if (!lines.Next(&line) || line.text != kHeader) {
+  if (!lines.Next(&line) || line.text != kTracksHeader) {
     return LinePosition{tracks.path, 1}.FieldError("header", line.text,
-                                                   absl::StrCat("\"", kHeader, "\" is due"));
+                                                   absl::StrCat("\"", kTracksHeader, "\" is due"));
   }
   std::vector<std::string_view> fields;
   while (lines.Next(&line)) {
     SplitAtCommas(line.text, &fields);
-    DSG_RETURN_IF_ERROR(AddRow(options, line, fields, &table));
+    DSG_RETURN_IF_ERROR(AddTracksRow(options, line, fields, &table));
   }
   return MakeClockLog(std::move(table), std::move(graph), std::move(info));
 }

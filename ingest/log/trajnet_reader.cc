@@ -9,8 +9,8 @@
 namespace dsg::ingest {
 namespace {
 
-absl::Status AddRow(const LogOptions& options, const TextLine& line,
-                    const std::vector<std::string_view>& fields, TrackTable* table) {
+absl::Status AddTrajnetRow(const LogOptions& options, const TextLine& line,
+                           const std::vector<std::string_view>& fields, TrackTable* table) {
   const LinePosition at{table->file, line.number};
   DSG_RETURN_IF_ERROR(CheckFieldCount(at, line, fields.size(), 4, "frame person x y"));
   DSG_ASSIGN_OR_RETURN(const int64_t frame, ParseFrame(at, fields[0]));
@@ -33,7 +33,7 @@ OpenedLog ReadTrajnet(const LogFile& file, const LogOptions& options) {
   std::vector<std::string_view> fields;
   while (lines.Next(&line)) {
     SplitAtBlanks(line.text, &fields);
-    DSG_RETURN_IF_ERROR(AddRow(options, line, fields, &table));
+    DSG_RETURN_IF_ERROR(AddTrajnetRow(options, line, fields, &table));
   }
   LogInfo info = DescribeTextLog("trajnet", file);
   return MakeFrameLog(std::move(table), options, std::move(info));

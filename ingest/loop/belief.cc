@@ -19,8 +19,6 @@ constexpr double kNoiseMargin = 4.0;
 // Degrees of freedom; fewer measurements say nothing about the noise.
 constexpr int kNoiseFreedomMin = 30;
 
-size_t Index(int i) { return static_cast<size_t>(i); }
-
 }  // namespace
 
 double NoiseScaleOf(const PoseGraph& graph, const std::vector<Pose3d>& map_T_pose,

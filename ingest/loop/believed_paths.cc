@@ -11,8 +11,6 @@
 namespace dsg::ingest {
 namespace {
 
-size_t Index(int i) { return static_cast<size_t>(i); }
-
 // Errors of turn count by what they do at this distance, which ranks paths; any choice is sound.
 double LeverOf(const std::vector<Pose3d>& map_T_pose) {
   Eigen::AlignedBox3d box;

@@ -20,7 +20,7 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr size_t kPoseCountMax = 1'000'000;
+constexpr size_t kFilePoseCountMax = 1'000'000;
 constexpr size_t kEdgeCountMax = 2'000'000;
 // An edge has 31 fields; whatever is longer is no text file.
 constexpr size_t kLineLengthMax = 8192;
@@ -126,13 +126,13 @@ absl::Status G2oReader::Take(const G2oPosition& at, const G2oLine& line, const s
       return absl::OkStatus();
     case G2oLine::Kind::kFix:
       // One is enough to hold a graph.
-      if (fixes_.size() < kPoseCountMax) fixes_.emplace_back(line.ids[0], at.line);
+      if (fixes_.size() < kFilePoseCountMax) fixes_.emplace_back(line.ids[0], at.line);
       return absl::OkStatus();
     case G2oLine::Kind::kVertex:
       DSG_RETURN_IF_ERROR(CheckKind(at, line));
-      if (vertices_.size() == kPoseCountMax) {
+      if (vertices_.size() == kFilePoseCountMax) {
         return MakeError(Reason::kLimitExceeded,
-                         absl::StrCat(path_, ":", at.line, ": more than ", kPoseCountMax,
+                         absl::StrCat(path_, ":", at.line, ": more than ", kFilePoseCountMax,
                                       " poses; thin the graph out"));
       }
       vertices_.push_back({line.ids[0], at.line, line.pose});

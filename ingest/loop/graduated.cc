@@ -10,13 +10,13 @@
 namespace dsg::ingest {
 namespace {
 
-double SquaredResidualOf(const PoseGraph& graph, const RelativePose& edge) {
+double SquaredResidualIn(const PoseGraph& graph, const RelativePose& edge) {
   return SquaredResidual(edge, graph.is_planar, graph.poses[static_cast<size_t>(edge.from)],
                          graph.poses[static_cast<size_t>(edge.to)]);
 }
 
 // The weight of a loop of squared residual `squared` at the hardness `mu`.
-double WeightAt(double mu, double gate, double squared) {
+double TruncatedWeight(double mu, double gate, double squared) {
   if (squared <= mu / (mu + 1.0) * gate) return 1.0;
   if (squared >= (mu + 1.0) / mu * gate) return 0.0;
   return std::clamp(std::sqrt(gate * mu * (mu + 1.0) / squared) - mu, 0.0, 1.0);
@@ -38,7 +38,7 @@ absl::StatusOr<Graduation> Graduate(const PoseGraph& graph, const std::vector<Po
   for (size_t e = 0; e < graph.edges.size(); ++e) {
     if (!graph.edges[e].is_loop) continue;
     if (is_candidate[e]) {
-      largest = std::max(largest, SquaredResidualOf(moved, moved.edges[e]));
+      largest = std::max(largest, SquaredResidualIn(moved, moved.edges[e]));
     } else {
       result.weights[e] = 0.0;
     }
@@ -49,7 +49,8 @@ absl::StatusOr<Graduation> Graduate(const PoseGraph& graph, const std::vector<Po
     result.is_converged = true;
     for (size_t e = 0; e < graph.edges.size(); ++e) {
       if (!graph.edges[e].is_loop || !is_candidate[e]) continue;
-      const double weight = WeightAt(mu, options.gate, SquaredResidualOf(moved, moved.edges[e]));
+      const double weight =
+          TruncatedWeight(mu, options.gate, SquaredResidualIn(moved, moved.edges[e]));
       result.weights[e] = weight;
       result.is_converged = result.is_converged && (weight == 0.0 || weight == 1.0);
     }

@@ -14,8 +14,6 @@ constexpr double kSupportMin = 14.0;
 // liars, and not for losing one right loop in a hundred from every comparison.
 constexpr double kDisagreementFactor = 4.0;
 
-size_t Index(int i) { return static_cast<size_t>(i); }
-
 // Odometry, and the largest set of `vertices` of `agreement` that agree in pairs.
 std::vector<bool> LargestAgreeing(const PoseGraph& graph, const LoopAgreement& agreement,
                                   const std::vector<int>& vertices) {

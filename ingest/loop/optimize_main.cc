@@ -113,7 +113,7 @@ absl::StatusOr<RobustResult> SolveRobustly(const PoseGraph& graph, RobustOptions
   return result;
 }
 
-absl::StatusOr<RobustResult> Solve(const Flags& flags, const G2oFile& file) {
+absl::StatusOr<RobustResult> SolveRobustly(const Flags& flags, const G2oFile& file) {
   Progress progress;
   RobustOptions options;
   options.optimize.objective = ObjectiveOf(flags.objective);
@@ -201,7 +201,7 @@ absl::Status WriteResult(const std::string& path, PoseGraph graph, const RobustR
   return WriteG2o(graph, path);
 }
 
-absl::Status Run(const Flags& flags) {
+absl::Status OptimizeFile(const Flags& flags) {
   DSG_ASSIGN_OR_RETURN(const G2oFile file, ReadG2o(flags.file));
   for (const std::string& note : file.notes) {
     std::fprintf(stderr, "%s: note: %s\n", flags.file.c_str(), note.c_str());
@@ -224,7 +224,7 @@ absl::Status Run(const Flags& flags) {
                      {{"field", "out"}, {"value", flags.out}});
   }
   const auto begin = SteadyClock::now();
-  DSG_ASSIGN_OR_RETURN(const RobustResult result, Solve(flags, file));
+  DSG_ASSIGN_OR_RETURN(const RobustResult result, SolveRobustly(flags, file));
   const std::chrono::duration<double> elapsed = SteadyClock::now() - begin;
   if (!flags.out.empty()) DSG_RETURN_IF_ERROR(WriteResult(flags.out, file.graph, result));
   Report report = ReportOf(flags, file.graph, result);
@@ -255,7 +255,7 @@ int Main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kDone : kUsage;
   }
-  return ReportError(Run(flags));
+  return ReportError(OptimizeFile(flags));
 }
 
 }  // namespace

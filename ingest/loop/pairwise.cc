@@ -18,8 +18,6 @@ constexpr double kTellingChance = 3e-3;
 // Chances below this are not trusted: wrong loops are not that random.
 constexpr double kLeastChance = 1e-9;
 
-size_t Index(int i) { return static_cast<size_t>(i); }
-
 // A loop, turned so that it leads from the part and pose of lower number.
 struct Loop {
   int from = 0;

@@ -39,4 +39,7 @@ struct PoseGraph {
   std::vector<RelativePose> edges;
 };
 
+/// A number of a pose, edge or set as an index; requires i >= 0.
+inline size_t Index(int i) { return static_cast<size_t>(i); }
+
 }  // namespace dsg::ingest

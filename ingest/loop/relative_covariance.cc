@@ -13,8 +13,6 @@
 namespace dsg::ingest {
 namespace {
 
-size_t Index(int i) { return static_cast<size_t>(i); }
-
 // Rows of a twist that the graph moves in.
 std::vector<int> RowsOf(bool is_planar) {
   return is_planar ? std::vector<int>{0, 1, 5} : std::vector<int>{0, 1, 2, 3, 4, 5};

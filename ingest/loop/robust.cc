@@ -27,8 +27,6 @@ constexpr int kGraduationRoundCountMax = 4;
 constexpr double kRoughTolerance = 1e-4;
 constexpr int kRoughIterationCountMax = 8;
 
-size_t Index(int i) { return static_cast<size_t>(i); }
-
 std::vector<double> WeightsFor(const std::vector<bool>& is_kept) {
   std::vector<double> weights;
   for (const bool is_one : is_kept) weights.push_back(is_one ? 1.0 : 0.0);

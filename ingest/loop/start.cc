@@ -17,7 +17,7 @@ using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using SparseMatrix = Eigen::SparseMatrix<double>;
 
-double WeightAt(const std::vector<double>& weights, size_t edge) {
+double EdgeWeight(const std::vector<double>& weights, size_t edge) {
   return weights.empty() ? 1.0 : weights[edge];
 }
 
@@ -128,7 +128,7 @@ bool SolveRotations(const PoseGraph& graph, const std::vector<double>& weights,
   const MatrixXd nothing = MatrixXd::Zero(size, size);
   for (size_t i = 0; i < graph.edges.size(); ++i) {
     const RelativePose& edge = graph.edges[i];
-    const double weight = WeightAt(weights, i) * WeightsOf(edge, graph.is_planar).kappa;
+    const double weight = EdgeWeight(weights, i) * WeightsOf(edge, graph.is_planar).kappa;
     if (weight == 0.0) continue;
     const Matrix3d turn = edge.from_T_to.orientation.toRotationMatrix();
     equations.Add(weight, edge, turn.topLeftCorner(size, size), nothing);
@@ -154,7 +154,7 @@ bool SolveTranslations(const PoseGraph& graph, const std::vector<double>& weight
   const MatrixXd one = MatrixXd::Identity(1, 1);
   for (size_t i = 0; i < graph.edges.size(); ++i) {
     const RelativePose& edge = graph.edges[i];
-    const double weight = WeightAt(weights, i) * WeightsOf(edge, graph.is_planar).tau;
+    const double weight = EdgeWeight(weights, i) * WeightsOf(edge, graph.is_planar).tau;
     if (weight == 0.0) continue;
     const Eigen::Vector3d way = rotations[static_cast<size_t>(edge.from)] * edge.from_T_to.position;
     equations.Add(weight, edge, one, way.transpose());
@@ -177,7 +177,7 @@ std::vector<std::vector<int>> TreeOf(const PoseGraph& graph, const std::vector<d
   for (const bool is_loop : {false, true}) {
     for (size_t i = 0; i < graph.edges.size(); ++i) {
       const RelativePose& edge = graph.edges[i];
-      if (edge.is_loop != is_loop || WeightAt(weights, i) == 0.0) continue;
+      if (edge.is_loop != is_loop || EdgeWeight(weights, i) == 0.0) continue;
       if (!sets.Merge(edge.from, edge.to)) continue;
       tree[static_cast<size_t>(edge.from)].push_back(static_cast<int>(i));
       tree[static_cast<size_t>(edge.to)].push_back(static_cast<int>(i));

@@ -8,7 +8,7 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kBinM = 0.05;
+constexpr double kHeightBinM = 0.05;
 // Of a vertex's normal, to count as looking up.
 constexpr float kUpMin = 0.8f;
 // A storey has this share of the largest storey's vertices.
@@ -37,7 +37,7 @@ std::map<int64_t, Bin> Histogram(const std::vector<const MeshBlock*>& mesh,
                              static_cast<int32_t>(block->labels[i]))) {
         continue;
       }
-      Bin& bin = bins[static_cast<int64_t>(std::floor(static_cast<double>(z) / kBinM))];
+      Bin& bin = bins[static_cast<int64_t>(std::floor(static_cast<double>(z) / kHeightBinM))];
       ++bin.count;
       // Whole micrometres: sums do not depend on the order of the blocks.
       bin.z_sum += std::round(static_cast<double>(z) * 1e6);

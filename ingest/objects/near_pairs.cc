@@ -13,7 +13,7 @@ constexpr double kCellM = 2.0;
 // A box of more cells than this is compared with all others.
 constexpr double kCellCountMax = 1024.0;
 // Beyond, cells have no exact numbers.
-constexpr double kFarM = 1e9;
+constexpr double kCoordinateMaxM = 1e9;
 
 struct Entry {
   int64_t x = 0;
@@ -21,17 +21,20 @@ struct Entry {
   int box = 0;
 };
 
-int64_t CellOf(double value) { return static_cast<int64_t>(std::floor(value / kCellM)); }
+int64_t GridCell(double value) { return static_cast<int64_t>(std::floor(value / kCellM)); }
 
 bool IsTooLarge(const Box3d& box) {
   const Eigen::Vector3d sizes = box.sizes() / kCellM;
   return !((sizes.x() + 2.0) * (sizes.y() + 2.0) <= kCellCountMax) ||
-         !(box.min().cwiseAbs().maxCoeff() < kFarM && box.max().cwiseAbs().maxCoeff() < kFarM);
+         !(box.min().cwiseAbs().maxCoeff() < kCoordinateMaxM &&
+           box.max().cwiseAbs().maxCoeff() < kCoordinateMaxM);
 }
 
 void AddEntries(const Box3d& box, double margin_m, int index, std::vector<Entry>* entries) {
-  for (int64_t x = CellOf(box.min().x() - margin_m); x <= CellOf(box.max().x() + margin_m); ++x) {
-    for (int64_t y = CellOf(box.min().y() - margin_m); y <= CellOf(box.max().y() + margin_m); ++y) {
+  for (int64_t x = GridCell(box.min().x() - margin_m); x <= GridCell(box.max().x() + margin_m);
+       ++x) {
+    for (int64_t y = GridCell(box.min().y() - margin_m); y <= GridCell(box.max().y() + margin_m);
+         ++y) {
       entries->push_back({x, y, index});
     }
   }

@@ -16,8 +16,8 @@ constexpr double kSideMaxM = 0.6;
 constexpr size_t kSamplesMax = 40;
 // Of the way from the middle to the surface.
 constexpr double kInside = 0.4;
-constexpr double kNearM = 0.4;
-constexpr double kFarM = 5.0;
+constexpr double kWatchNearM = 0.4;
+constexpr double kWatchFarM = 5.0;
 // A reading nearer than the sample by more hides it; metres a metre.
 constexpr double kHiddenPerM = 0.015;
 // A thing of the class that is further behind is another one.
@@ -44,7 +44,7 @@ struct Projection {
 Projection Project(const DepthFrame& frame, const Eigen::Vector3d& point_camera) {
   Projection result;
   result.depth_m = point_camera.z();
-  if (result.depth_m < kNearM || result.depth_m > kFarM) return result;
+  if (result.depth_m < kWatchNearM || result.depth_m > kWatchFarM) return result;
   const CameraCalibration& camera = frame.camera;
   const double u = camera.fx * point_camera.x() / result.depth_m + camera.cx;
   const double v = camera.fy * point_camera.y() / result.depth_m + camera.cy;

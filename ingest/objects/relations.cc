@@ -13,7 +13,7 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kNearM = 0.5;
+constexpr double kNextToM = 0.5;
 constexpr double kLargerMin = 1.5;
 // Voxels round both the lower side of one and the upper side of the other.
 constexpr double kContactM = 0.12;
@@ -123,11 +123,11 @@ std::vector<ObjectRelation> FindRelations(const std::vector<TrackedObject>& obje
   for (const TrackedObject& object : objects) boxes.push_back(SolidBox(object.cluster));
   std::vector<ObjectRelation> relations;
   std::vector<std::optional<std::pair<Support, int64_t>>> support(objects.size());
-  for (const auto& [low, high] : NearPairs(boxes, kNearM)) {
+  for (const auto& [low, high] : NearPairs(boxes, kNextToM)) {
     const auto i = static_cast<size_t>(low);
     const auto j = static_cast<size_t>(high);
     const double distance_m = DistanceBetween(boxes[i], boxes[j]);
-    if (distance_m < kNearM) {
+    if (distance_m < kNextToM) {
       relations.push_back({std::min(objects[i].id, objects[j].id), relations::kNear,
                            std::max(objects[i].id, objects[j].id), distance_m});
       AddComparison(objects[i], objects[j], &relations);

@@ -19,17 +19,17 @@ constexpr double kReadShareMin = 0.15;
 // Enough to tell where a large thing is.
 constexpr size_t kReadingsMax = 1500;
 constexpr size_t kPointsMax = 64;
-constexpr double kNearM = 0.3;
-constexpr double kFarM = 6.0;
+constexpr double kSightingNearM = 0.3;
+constexpr double kSightingFarM = 6.0;
 // Standard deviation of a reading: a depth camera, and a stereo pair at 0.1 m.
 constexpr double kNoiseM = 0.0025;
 constexpr double kNoisePerM = 0.002;
 constexpr double kStereoNoisePerM = 0.01;
 // Depths that fewer readings share than this part of the most frequent one are of something else.
-constexpr double kBinM = 0.02;
+constexpr double kDepthBinM = 0.02;
 constexpr double kRareShare = 0.2;
 // Ends of each axis that labels which bled may reach.
-constexpr double kTrimShare = 0.04;
+constexpr double kLabelTrimShare = 0.04;
 // Lower things, seen from above, show all of themselves; by their width.
 constexpr double kHighMin = 0.3;
 // A label's outline is off by so many pixels.
@@ -111,14 +111,14 @@ class Part {
       return false;
     }
     KeepSharedDepths();
-    return readings_.size() >= kReadingsMin && low_m_ >= kNearM && high_m_ <= kFarM;
+    return readings_.size() >= kReadingsMin && low_m_ >= kSightingNearM && high_m_ <= kSightingFarM;
   }
 
   void KeepSharedDepths() {
     std::vector<double> depths;
     for (const Reading& reading : readings_) depths.push_back(reading.depth_m);
     std::nth_element(depths.begin(), depths.begin() + std::ssize(depths) / 2, depths.end());
-    const double bin_m = std::max(kBinM, 1.5 * NoiseAt(depths[depths.size() / 2]));
+    const double bin_m = std::max(kDepthBinM, 1.5 * NoiseAt(depths[depths.size() / 2]));
     const auto bin_of = [bin_m](double depth_m) { return static_cast<int>(depth_m / bin_m); };
     int first = bin_of(readings_.front().depth_m), last = first;
     for (const Reading& reading : readings_) {
@@ -160,7 +160,7 @@ class Part {
     for (const Eigen::Vector3d& point : points_map_) values.push_back(axis.dot(point));
     std::sort(values.begin(), values.end());
     const auto cut =
-        static_cast<size_t>(std::ceil(kTrimShare * static_cast<double>(values.size())));
+        static_cast<size_t>(std::ceil(kLabelTrimShare * static_cast<double>(values.size())));
     const size_t low = std::min(cut, (values.size() - 1) / 2);
     return {values[low], values[values.size() - 1 - low]};
   }

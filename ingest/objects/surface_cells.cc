@@ -14,7 +14,7 @@ namespace {
 // 21 bits an axis: 50 km of 5 cm voxels either way.
 constexpr int64_t kCellLimit = int64_t{1} << 20;
 
-std::optional<uint64_t> CellOf(const Eigen::Vector3f& point, double voxel_m) {
+std::optional<uint64_t> PackedCell(const Eigen::Vector3f& point, double voxel_m) {
   if (!point.allFinite()) return std::nullopt;
   uint64_t packed = 0;
   for (int axis = 2; axis >= 0; --axis) {
@@ -102,7 +102,7 @@ std::vector<SurfaceVertex> GatherVertices(const std::vector<const MeshBlock*>& m
     for (size_t i = 0; i < block->labels.size(); ++i) {
       SurfaceVertex vertex;
       if (!classifier.Classify(block->labels[i], InstanceAt(*block, i), &vertex)) continue;
-      const auto cell = CellOf(block->positions_map[i], voxel_m);
+      const auto cell = PackedCell(block->positions_map[i], voxel_m);
       if (!cell.has_value()) continue;
       vertex.cell = *cell;
       vertex.position_map = block->positions_map[i];

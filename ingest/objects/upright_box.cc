@@ -8,7 +8,7 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kTrimShare = 0.01;
+constexpr double kBoxTrimShare = 0.01;
 constexpr double kGainMin = 0.1;
 constexpr int kCoarseSteps = 45;
 constexpr double kCoarseRad = 0.5 * M_PI / kCoarseSteps;
@@ -19,7 +19,7 @@ constexpr double kThicknessMinM = 0.02;
 
 /// Low and high end without the outermost share.
 std::pair<double, double> TrimmedRange(std::vector<double>* values) {
-  const auto cut = static_cast<int64_t>(kTrimShare * static_cast<double>(values->size()));
+  const auto cut = static_cast<int64_t>(kBoxTrimShare * static_cast<double>(values->size()));
   const auto low = values->begin() + cut;
   const auto high = values->end() - 1 - cut;
   std::nth_element(values->begin(), low, values->end());
@@ -59,7 +59,7 @@ std::pair<double, double> WeightedRange(const std::vector<WeightedPoint>& points
     total += static_cast<double>(point.weight);
   }
   std::sort(values.begin(), values.end());
-  const double cut = kTrimShare * total;
+  const double cut = kBoxTrimShare * total;
   size_t low = 0;
   for (double sum = values[low].second; sum <= cut; sum += values[low].second) ++low;
   size_t high = values.size() - 1;

@@ -19,7 +19,7 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kStoreyM = 2.5;
+constexpr double kPathHeightM = 2.5;
 // A body whose height varies less than this stands on wheels.
 constexpr double kWheelsM = 0.1;
 constexpr double kWheelsShare = 0.95;
@@ -49,7 +49,7 @@ FloorPath OnFloor(const Path& path_map, double floor_z_m) {
   FloorPath path;
   std::vector<double> heights;
   for (const Eigen::Vector3d& point : path_map) {
-    if (point.z() < floor_z_m - 0.3 || point.z() > floor_z_m + kStoreyM) continue;
+    if (point.z() < floor_z_m - 0.3 || point.z() > floor_z_m + kPathHeightM) continue;
     path.points.push_back(point);
     heights.push_back(point.z());
   }

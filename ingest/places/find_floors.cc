@@ -9,7 +9,7 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kStoreyM = 2.0;
+constexpr double kStoreyMinM = 2.0;
 // So much must be empty, half of it seen, above something to stand on.
 constexpr double kHeadroomM = 1.5;
 constexpr double kAreaM2Min = 1.0;
@@ -69,7 +69,7 @@ std::vector<Level> PickLevels(const std::vector<int64_t>& counts, const GridFram
     const auto largest = static_cast<double>(levels.front().count);
     if (static_cast<double>(level.count) < kShareMin * largest) break;
     const bool is_far = std::all_of(picked.begin(), picked.end(), [&](const Level& other) {
-      return frame.cell_m * std::abs(level.layer - other.layer) >= kStoreyM - 1e-6;
+      return frame.cell_m * std::abs(level.layer - other.layer) >= kStoreyMinM - 1e-6;
     });
     if (is_far) picked.push_back(level);
   }
@@ -87,7 +87,7 @@ int TopLayer(const std::vector<int64_t>& counts, const Level& level) {
 
 bool IsVisited(double floor_z_m, const std::vector<Eigen::Vector3d>& path) {
   return std::any_of(path.begin(), path.end(), [&](const Eigen::Vector3d& point) {
-    return point.z() > floor_z_m - 0.3 && point.z() < floor_z_m + kStoreyM;
+    return point.z() > floor_z_m - 0.3 && point.z() < floor_z_m + kStoreyMinM;
   });
 }
 

@@ -4,7 +4,7 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kLinkM = 3.5;
+constexpr double kPlaceLinkM = 3.5;
 // Links of one place are at least 40 degrees apart.
 constexpr double kApartCosine = 0.866;
 constexpr size_t kLinksPerPlace = 12;
@@ -12,7 +12,7 @@ constexpr size_t kLinksPerPlace = 12;
 void LinkAround(int spot, Roadmap* roadmap) {
   const Eigen::Vector3d at = roadmap->position_map(spot);
   std::vector<Eigen::Vector3d> directions;
-  for (const auto& [distance_m, other] : roadmap->Near(at, kLinkM)) {
+  for (const auto& [distance_m, other] : roadmap->Near(at, kPlaceLinkM)) {
     if (other == spot || directions.size() >= kLinksPerPlace) continue;
     const Eigen::Vector3d direction = (roadmap->position_map(other) - at) / distance_m;
     bool is_taken = false;

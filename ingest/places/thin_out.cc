@@ -7,7 +7,7 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kBesideM = 0.45;
+constexpr double kSuccessorM = 0.45;
 
 using Neighbours = std::vector<std::set<int>>;
 
@@ -22,7 +22,7 @@ Neighbours NeighboursOf(const Roadmap& roadmap) {
 
 // The nearest neighbour from which one gets to all the others; -1 = none.
 int Successor(const Roadmap& roadmap, int spot, const std::set<int>& neighbours) {
-  for (const auto& [distance_m, other] : roadmap.Near(roadmap.position_map(spot), kBesideM)) {
+  for (const auto& [distance_m, other] : roadmap.Near(roadmap.position_map(spot), kSuccessorM)) {
     if (neighbours.count(other) == 0) continue;
     const bool can_serve =
         std::all_of(neighbours.begin(), neighbours.end(), [&, heir = other](int neighbour) {

@@ -6,13 +6,13 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kLinkM = 4.0;
-constexpr double kBesideM = 0.5;
+constexpr double kWayLinkM = 4.0;
+constexpr double kBesideBendM = 0.5;
 
 // A spot near a bend that can take its part; -1 = none.
 int SpotBeside(const Roadmap& roadmap, int from, int64_t bend, int64_t next) {
   const OpenSpace& space = roadmap.space();
-  for (const auto& [distance_m, spot] : roadmap.Near(space.CenterOf(bend), kBesideM)) {
+  for (const auto& [distance_m, spot] : roadmap.Near(space.CenterOf(bend), kBesideBendM)) {
     const int64_t cell = roadmap.cell(spot);
     const bool can_serve =
         spot != from && space.IsOpenWay(roadmap.cell(from), cell) && space.IsOpenWay(cell, next);
@@ -35,7 +35,7 @@ bool CanStep(const OpenSpace& space, const Eigen::Vector3i& cell, const Eigen::V
 }
 
 std::vector<int64_t> Straighten(const OpenSpace& space, const std::vector<int64_t>& way) {
-  const auto far = std::max<size_t>(1, static_cast<size_t>(kLinkM / space.frame().cell_m));
+  const auto far = std::max<size_t>(1, static_cast<size_t>(kWayLinkM / space.frame().cell_m));
   std::vector<int64_t> bends;
   if (!way.empty()) bends.push_back(way.front());
   size_t at = 0;

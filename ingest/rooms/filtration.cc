@@ -11,9 +11,9 @@ namespace dsg::ingest {
 namespace {
 
 // Parts of the place graph, and how many of them are large enough.
-class Parts {
+class LargeParts {
  public:
-  Parts(size_t count, int size_min) : sets_(count), size_(count, 1), size_min_(size_min) {
+  LargeParts(size_t count, int size_min) : sets_(count), size_(count, 1), size_min_(size_min) {
     large_count_ = size_min <= 1 ? static_cast<int>(count) : 0;
   }
 
@@ -62,7 +62,7 @@ struct Step {
 // The clearance at which ways are cut: the low end of the longest range over which the count holds.
 std::optional<double> CutAt(size_t place_count, const std::vector<RoomLink>& sorted,
                             const FiltrationOptions& options) {
-  Parts parts(place_count, options.place_count_min);
+  LargeParts parts(place_count, options.place_count_min);
   std::vector<Step> steps;
   for (const RoomLink& link : sorted) {
     parts.Join(link.from, link.to);
@@ -93,7 +93,7 @@ std::vector<int> FiltrationRooms(size_t place_count, const std::vector<RoomLink>
                                  const FiltrationOptions& options) {
   const std::vector<RoomLink> sorted = WidestFirst(place_count, links);
   const std::optional<double> cut_m = CutAt(place_count, sorted, options);
-  Parts parts(place_count, options.place_count_min);
+  LargeParts parts(place_count, options.place_count_min);
   for (const RoomLink& link : sorted) {
     if (cut_m.has_value() && link.clearance_m <= *cut_m) continue;
     parts.Join(link.from, link.to);

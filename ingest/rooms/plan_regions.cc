@@ -40,7 +40,7 @@ int RegionBeside(const PlanRegions& regions, const WallGap& gap, double side) {
   return -1;
 }
 
-bool Parts(const PlanRegions& regions, const WallGap& gap) {
+bool PartsRegions(const PlanRegions& regions, const WallGap& gap) {
   const int before = RegionBeside(regions, gap, 1.0);
   const int behind = RegionBeside(regions, gap, -1.0);
   return before >= 0 && behind >= 0 && before != behind;
@@ -96,7 +96,7 @@ DividedPlan DivideAtGaps(const OccupancyGrid& plan, const DivideOptions& options
   OccupancyGrid closed = plan;
   size_t kept_count = 0;
   for (const WallGap& gap : gaps) {
-    if (!Parts(divided.regions, gap)) continue;
+    if (!PartsRegions(divided.regions, gap)) continue;
     CloseGap(gap, &closed);
     ++kept_count;
   }

@@ -18,6 +18,8 @@ namespace dsg::ingest {
 /// 6 spine, 7-8 ankles, 9 spine, 10-11 feet, 12 neck, 13-14 collars, 15 head, 16-17 shoulders,
 /// 18-19 elbows, 20-21 wrists, 22-23 hands; left before right.
 inline constexpr int kJointCount = 24;
+/// Axis times angle of each joint.
+inline constexpr size_t kPoseCoefficientCount = 3 * kJointCount;
 inline constexpr int kPelvis = 0;
 inline constexpr int kLeftHand = 22;
 inline constexpr int kRightHand = 23;

@@ -72,10 +72,8 @@ absl::StatusOr<std::string> ReadWhole(const std::string& path) {
 
 absl::Status CheckCount(const std::string& path, uint64_t found, uint64_t promised) {
   if (found == promised) return absl::OkStatus();
-  return MakeError(Reason::kFileMalformed,
-                   absl::StrCat(path, ": has ", found, " rows where ", kWorldFile, " promises ",
-                                promised, "; the file was cut, or is of another log"),
-                   {{"path", path}});
+  return Malformed(path, absl::StrCat("has ", found, " rows where ", kWorldFile, " promises ",
+                                      promised, "; the file was cut, or is of another log"));
 }
 
 template <typename Read>
@@ -104,6 +102,10 @@ absl::Status ReadGrid(const std::string& folder, FreeGrid* grid) {
 }
 
 }  // namespace
+
+absl::Status Malformed(const std::string& file, const std::string& what) {
+  return MakeError(Reason::kFileMalformed, absl::StrCat(file, ": ", what), {{"path", file}});
+}
 
 absl::Status WriteTruth(const Truth& truth, const std::string& folder) {
   DSG_RETURN_IF_ERROR(CheckTruth(truth));

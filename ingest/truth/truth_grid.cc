@@ -20,10 +20,6 @@ png_image EmptyImage() {
   return image;
 }
 
-absl::Status Malformed(const std::string& file, const std::string& what) {
-  return MakeError(Reason::kFileMalformed, absl::StrCat(file, ": ", what), {{"path", file}});
-}
-
 // Row `y` of the grid is this row of the picture.
 size_t PixelRow(const FreeGrid& grid, int y) { return static_cast<size_t>(grid.height - 1 - y); }
 

@@ -43,10 +43,6 @@ T Take(const char** at) {
   return value;
 }
 
-absl::Status Malformed(const std::string& file, const std::string& what) {
-  return MakeError(Reason::kFileMalformed, absl::StrCat(file, ": ", what), {{"path", file}});
-}
-
 // The number after `name` in the header; 0 when there is none, which the comparison of the whole
 // header then finds.
 uint64_t CountOf(std::string_view bytes, std::string_view name) {

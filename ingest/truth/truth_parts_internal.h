@@ -21,6 +21,9 @@ struct RowCounts {
   uint64_t faces = 0;
 };
 
+/// INVALID_ARGUMENT/FILE_MALFORMED: "file: what".
+absl::Status Malformed(const std::string& file, const std::string& what);
+
 /// What world.json says: everything but the rows of the other files. Units and names as in Truth.
 std::string TruthToJson(const Truth& truth);
 /// Errors: INVALID_ARGUMENT/FILE_MALFORMED naming file and field.

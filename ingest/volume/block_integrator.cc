@@ -7,7 +7,7 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr float kNearM = 0.05f;
+constexpr float kReadingNearM = 0.05f;
 // Readings nearer than this are not better for it.
 constexpr float kFullWeightM = 1.0f;
 // About 35 looks from three metres: enough to average noise away, few enough to forget what has
@@ -61,7 +61,7 @@ void BlockIntegrator::FuseRow(const Eigen::Vector3f& start, const Eigen::Vector3
                               VoxelBlock* block) const {
   for (int i = 0; i < VoxelBlock::kSide; ++i) {
     const Eigen::Vector3f p = start + step * static_cast<float>(i);
-    if (p.z() < kNearM) continue;
+    if (p.z() < kReadingNearM) continue;
     const float inverse = 1.0f / p.z();
     const float x = p.x() * inverse;
     const float y = p.y() * inverse;

@@ -7,7 +7,7 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kNearM = 0.05;
+constexpr double kBlockNearM = 0.05;
 // Corners of wide images look further than the range along the axis; not without end, though.
 constexpr double kRayRanges = 2.0;
 
@@ -52,7 +52,7 @@ class Search {
   // `center` of a ball, in the camera's frame.
   bool MaySee(const Eigen::Vector3d& center, double radius) const {
     const double near_m = center.z() - radius;
-    if (center.z() + radius < kNearM) return false;
+    if (center.z() + radius < kBlockNearM) return false;
     if (center.norm() - radius > kRayRanges * range_m_) return false;
     const CameraCalibration& camera = view_.frame().camera;
     const auto [left, right] =
@@ -68,7 +68,7 @@ class Search {
                                   double principal, int size) {
     const double low = side - radius;
     const double high = side + radius;
-    const double front = std::max(z - radius, kNearM);
+    const double front = std::max(z - radius, kBlockNearM);
     const double back = z + radius;
     const double first = focal * low / (low < 0.0 ? front : back) + principal;
     const double last = focal * high / (high < 0.0 ? back : front) + principal;

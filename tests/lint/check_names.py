@@ -40,7 +40,9 @@ def name_of(head):
     before_value = head.split("=", 1)[0]
     match = FUNCTION.search(before_value)
     if match:
-        return None if match.group(1).startswith("operator") else match.group(1)
+        # What a class declares is defined by its own name.
+        is_member = before_value[:match.start()].endswith("::")
+        return None if is_member or match.group(1).startswith("operator") else match.group(1)
     match = VALUE.search(before_value.strip())
     return match.group(1) if match and match.group(1) else None
 

@@ -18,7 +18,6 @@ constexpr double kSamePictureS = 0.02;
 // Half the reach of an adult's arms.
 constexpr float kBodyReachM = 0.6f;
 constexpr int kPixelsMin = 12;
-constexpr double kVisibilityMin = 0.25;
 constexpr int kPatchPx = 2;
 
 // Hips, spine, neck, shoulders: what an arm in front of the camera does not show.
@@ -139,7 +138,8 @@ std::vector<PixelRange> TrunkPatches(const PlacedBody& body, const PixelRange& r
                                      const PixelMapper& map) {
   std::vector<PixelRange> patches;
   for (const size_t joint : kTorsoJoints) {
-    if (!body.detection->has_joints || body.detection->joint_visibility[joint] < kVisibilityMin) {
+    if (!body.detection->has_joints ||
+        body.detection->joint_visibility[joint] < kJointVisibilityMin) {
       continue;
     }
     const auto pixel = map(body.detection->joints_px[joint]);

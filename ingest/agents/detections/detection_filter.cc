@@ -7,8 +7,6 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr size_t kPoseCount = 3 * kJointCount;
-
 bool AllFinite(const std::vector<float>& numbers) {
   return std::all_of(numbers.begin(), numbers.end(), [](float x) { return std::isfinite(x); });
 }
@@ -38,7 +36,7 @@ bool IsFinite(const HumanDetection& detection) {
 bool CountsAreRight(const HumanDetection& detection) {
   const size_t pose_count = detection.pose_coefficients.size();
   const size_t shape_count = detection.shape_coefficients.size();
-  return (pose_count == 0 || pose_count == kPoseCount) &&
+  return (pose_count == 0 || pose_count == kPoseCoefficientCount) &&
          (shape_count == 0 || shape_count == size_t{kShapeCount}) &&
          detection.vertices_root.size() % 3 == 0;
 }

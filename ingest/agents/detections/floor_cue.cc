@@ -13,7 +13,6 @@ namespace {
 // SMPL's order. The ankles alone do not do: a doorstep hides the soles and makes metres of it.
 constexpr std::array<size_t, 2> kFootJoints = {10, 11};
 constexpr size_t kHead = 15;
-constexpr double kVisibilityMin = 0.25;
 constexpr double kBorderPx = 3.0;
 constexpr double kContactPx = 3.0;
 constexpr double kContactM = 0.05;
@@ -44,7 +43,7 @@ bool FeetAreSeen(const HumanDetection& detection) {
     return box[3] - box[1] >= kStandingAspectMin * (box[2] - box[0]);
   }
   return std::any_of(kFootJoints.begin(), kFootJoints.end(), [&](size_t joint) {
-    return detection.joint_visibility[joint] >= kVisibilityMin;
+    return detection.joint_visibility[joint] >= kJointVisibilityMin;
   });
 }
 
@@ -54,7 +53,7 @@ double ContactColumn(const HumanDetection& detection) {
   double sum = 0.0;
   int count = 0;
   for (const size_t joint : kFootJoints) {
-    if (detection.joint_visibility[joint] < kVisibilityMin) continue;
+    if (detection.joint_visibility[joint] < kJointVisibilityMin) continue;
     sum += detection.joints_px[joint].x();
     ++count;
   }
@@ -131,7 +130,7 @@ std::optional<PositionCue> FloorContactCue(const PlacedBody& body, double floor_
 
 std::optional<PositionCue> HeadTopCue(const PlacedBody& body, double floor_z_map) {
   const HumanDetection& detection = *body.detection;
-  if (!detection.has_joints || detection.joint_visibility[kHead] < kVisibilityMin ||
+  if (!detection.has_joints || detection.joint_visibility[kHead] < kJointVisibilityMin ||
       detection.box_px[1] <= kBorderPx) {
     return std::nullopt;
   }

@@ -14,6 +14,9 @@
 
 namespace dsg::ingest {
 
+/// Joints that are less visible say nothing of where the body is.
+inline constexpr double kJointVisibilityMin = 0.25;
+
 /// A detection with what it says of the map's axes.
 struct PlacedBody {
   const HumanDetection* detection = nullptr;

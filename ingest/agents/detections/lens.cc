@@ -7,7 +7,7 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr int kRoundCount = 30;
+constexpr int kNewtonStepCount = 30;
 constexpr double kDoneJustPx = 1e-6;
 constexpr double kDonePx = 1e-3;
 constexpr double kDifference = 1e-6;
@@ -36,7 +36,7 @@ std::optional<Eigen::Vector3d> RayThrough(const CameraCalibration& camera,
   Eigen::Vector2d ray((pixel.x() - camera.cx) / camera.fx, (pixel.y() - camera.cy) / camera.fy);
   if (camera.distortion == Distortion::kNone) return Eigen::Vector3d(ray.x(), ray.y(), 1.0);
   Eigen::Matrix2d jacobian = PixelPerRay(camera, ray);
-  for (int round = 0; round < kRoundCount; ++round) {
+  for (int round = 0; round < kNewtonStepCount; ++round) {
     const Eigen::Vector2d left_px = pixel - PixelOf(camera, ray);
     if (left_px.norm() < kDoneJustPx) break;
     // Beyond the fold pixels run backwards, and one belongs to two rays.

@@ -16,7 +16,6 @@ namespace {
 
 // Of somebody who lies or bends far, the horizontal part of "forward" is noise.
 constexpr double kForwardMin = 0.2;
-constexpr double kNoHeadingSigmaRad = 3.0;
 
 void SetTorso(const PersonInCamera& person, const Pose3d& map_T_camera,
               PersonObservation* observation) {

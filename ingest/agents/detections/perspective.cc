@@ -14,9 +14,9 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kDepthMinM = 0.1;
-constexpr double kDepthMaxM = 200.0;
-constexpr double kVisibilityMin = 0.05;
+constexpr double kPersonDepthMinM = 0.1;
+constexpr double kPersonDepthMaxM = 200.0;
+constexpr double kFittedVisibilityMin = 0.05;
 constexpr double kReprojectionGoodPx = 8.0;
 constexpr double kBodyHeightM = 1.7;
 // Of the pelvis above the soles, of the body's height.
@@ -30,7 +30,6 @@ constexpr double kLateralShare = 0.02;
 constexpr double kLateralM = 0.08;
 // Of the hidden part of a body its place is guessed.
 constexpr double kHiddenLateralM = 0.3;
-constexpr double kNoHeadingSigmaRad = 3.0;
 
 double FocalPx(const CameraCalibration& camera) { return std::sqrt(camera.fx * camera.fy); }
 
@@ -47,7 +46,7 @@ std::vector<SeenJoint> SeenJoints(const HumanDetection& detection,
   if (!detection.has_joints) return seen;
   for (size_t j = 0; j < size_t{kJointCount}; ++j) {
     const double visibility = detection.joint_visibility[j];
-    if (!(visibility >= kVisibilityMin) || !detection.joints_root[j].allFinite()) continue;
+    if (!(visibility >= kFittedVisibilityMin) || !detection.joints_root[j].allFinite()) continue;
     const std::optional<Eigen::Vector3d> ray = RayThrough(camera, detection.joints_px[j]);
     if (!ray.has_value()) continue;
     seen.push_back({detection.joints_root[j], ray->head<2>(), visibility});
@@ -114,11 +113,12 @@ absl::StatusOr<Placement> Place(const HumanDetection& detection, const CameraCal
                "weak camera, a pelvis or a box; leave it out");
   }
   const double depth_m = body.root_camera.z();
-  if (!body.root_camera.allFinite() || !(depth_m >= kDepthMinM && depth_m <= kDepthMaxM)) {
-    return Bad(
-        detection,
-        absl::StrCat("puts the person at a depth of ", depth_m, " m; ", kDepthMinM, " to ",
-                     kDepthMaxM, " m before the camera is due; check joints and calibration"));
+  if (!body.root_camera.allFinite() ||
+      !(depth_m >= kPersonDepthMinM && depth_m <= kPersonDepthMaxM)) {
+    return Bad(detection,
+               absl::StrCat("puts the person at a depth of ", depth_m, " m; ", kPersonDepthMinM,
+                            " to ", kPersonDepthMaxM,
+                            " m before the camera is due; check joints and calibration"));
   }
   if (!body.covariance.allFinite()) return Bad(detection, "has joints beyond all bounds");
   const double reprojection_px = ReprojectionPx(seen, focal_px, body.root_camera, body.turn);
@@ -135,7 +135,9 @@ std::optional<Eigen::Vector3d> PlaceByWeakCamera(const HumanDetection& detection
   const double depth_m = 2.0 * FocalPx(camera) / scale_px;
   const std::optional<Eigen::Vector3d> ray =
       RayThrough(camera, detection.crop_center_px + 0.5 * scale_px * detection.weak_translation);
-  if (!ray.has_value() || !(depth_m >= kDepthMinM && depth_m <= kDepthMaxM)) return std::nullopt;
+  if (!ray.has_value() || !(depth_m >= kPersonDepthMinM && depth_m <= kPersonDepthMaxM)) {
+    return std::nullopt;
+  }
   return *ray * depth_m;
 }
 

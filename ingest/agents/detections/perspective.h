@@ -13,6 +13,9 @@
 
 namespace dsg::ingest {
 
+/// Of a heading that nothing tells, radians.
+inline constexpr double kNoHeadingSigmaRad = 3.0;
+
 /// Where a detection puts its torso, camera frame.
 struct PersonInCamera {
   Pose3d camera_T_torso;

@@ -10,18 +10,18 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr int kRoundCount = 3;
+constexpr int kReweightCount = 3;
 constexpr double kHuberPx = 4.0;
 constexpr double kNoisePxMin = 1.0;
 // Nearer joints have no sensible pixel.
-constexpr double kDepthMinM = 0.05;
+constexpr double kJointDepthMinM = 0.05;
 constexpr double kConditionMin = 1e-9;
 // Further, it is another body or a mirrored one.
 constexpr double kTurnMaxRad = 0.8;
 constexpr int kSixDofJointsMin = 6;
 
 double ErrorPx(const SeenJoint& joint, double focal_px, const Eigen::Vector3d& at) {
-  if (at.z() < kDepthMinM) return std::numeric_limits<double>::infinity();
+  if (at.z() < kJointDepthMinM) return std::numeric_limits<double>::infinity();
   return focal_px * (at.head<2>() / at.z() - joint.ray).norm();
 }
 
@@ -59,7 +59,7 @@ std::optional<BodyPlacement> PlaceByTranslation(const std::vector<SeenJoint>& jo
   if (std::ssize(joints) < kPnpJointsMin) return std::nullopt;
   BodyPlacement placement;
   NormalEquations equations;
-  for (int round = 0; round <= kRoundCount; ++round) {
+  for (int round = 0; round <= kReweightCount; ++round) {
     equations = NormalEquations();
     for (const SeenJoint& joint : joints) {
       double weight = joint.weight;
@@ -68,7 +68,7 @@ std::optional<BodyPlacement> PlaceByTranslation(const std::vector<SeenJoint>& jo
         const Eigen::Vector3d at = placement.root_camera + joint.root;
         const double error_px = ErrorPx(joint, focal_px, at);
         weight *= error_px > kHuberPx ? kHuberPx / error_px : 1.0;
-        px_per_m /= std::max(at.z(), kDepthMinM);
+        px_per_m /= std::max(at.z(), kJointDepthMinM);
       }
       Add(joint, weight, px_per_m, &equations);
     }
@@ -81,7 +81,7 @@ std::optional<BodyPlacement> PlaceByTranslation(const std::vector<SeenJoint>& jo
     placement.covariance = solver.solve(Eigen::Matrix3d::Identity());
     if (!placement.root_camera.allFinite()) return std::nullopt;
     // Behind the camera no joint has a pixel to be wrong about; the caller refuses it.
-    if (placement.root_camera.z() < kDepthMinM) return placement;
+    if (placement.root_camera.z() < kJointDepthMinM) return placement;
   }
   placement.reprojection_px =
       ReprojectionPx(joints, focal_px, placement.root_camera, placement.turn);
@@ -92,7 +92,7 @@ std::optional<BodyPlacement> PlaceByTranslation(const std::vector<SeenJoint>& jo
 
 std::optional<BodyPlacement> RefineSixDof(const std::vector<SeenJoint>& joints, double focal_px,
                                           const BodyPlacement& start) {
-  if (std::ssize(joints) < kSixDofJointsMin || start.root_camera.z() < kDepthMinM) {
+  if (std::ssize(joints) < kSixDofJointsMin || start.root_camera.z() < kJointDepthMinM) {
     return std::nullopt;
   }
   std::vector<cv::Point3d> points;

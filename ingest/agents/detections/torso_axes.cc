@@ -14,7 +14,6 @@ constexpr int kRightHip = 2;
 constexpr int kNeck = 12;
 constexpr int kLeftShoulder = 16;
 constexpr int kRightShoulder = 17;
-constexpr size_t kPoseCount = 3 * kJointCount;
 constexpr double kLengthMinM = 0.02;
 constexpr double kLengthMaxM = 10.0;
 
@@ -41,7 +40,7 @@ std::optional<Eigen::Quaterniond> FromJoints(const HumanDetection& detection) {
 }
 
 std::optional<Eigen::Quaterniond> FromPose(const HumanDetection& detection) {
-  if (detection.pose_coefficients.size() != kPoseCount) return std::nullopt;
+  if (detection.pose_coefficients.size() != kPoseCoefficientCount) return std::nullopt;
   const auto& pose = detection.pose_coefficients;
   const Eigen::Vector3d turn(pose[0], pose[1], pose[2]);
   if (!turn.allFinite()) return std::nullopt;

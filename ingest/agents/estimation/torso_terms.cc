@@ -18,7 +18,7 @@ constexpr int kLasting = 6;
 // Velocities up and down are forgotten sooner than those of a walk.
 constexpr double kVerticalMemoryS = 1.0;
 // Keeps a chain solvable that nothing ties to the map; far below any detection.
-constexpr double kNoInformation = 1e-8;
+constexpr double kWeakInformation = 1e-8;
 constexpr double kRayLengthMinM = 0.1;
 // A belief further off the detection's ray says nothing of the ray.
 constexpr double kRayCosineMin = 0.9;
@@ -158,10 +158,10 @@ ChainLink<1> TurningLink(const TorsoOptions& options, double step_s) {
   return link;
 }
 
-Eigen::Matrix3d StandingStart() { return kNoInformation * Eigen::Matrix3d::Identity(); }
+Eigen::Matrix3d StandingStart() { return kWeakInformation * Eigen::Matrix3d::Identity(); }
 
 WalkMatrix WalkingStart(const TorsoOptions& options) {
-  WalkMatrix information = kNoInformation * WalkMatrix::Identity();
+  WalkMatrix information = kWeakInformation * WalkMatrix::Identity();
   for (int axis = 0; axis < 3; ++axis) {
     // A long time after anything was known.
     const double variance = WalkAxis(options, axis, 1e3).velocity_variance;

@@ -16,7 +16,7 @@ namespace dsg::ingest {
 namespace {
 
 // Less than this and no normal can be told.
-constexpr size_t kPointCountMin = 8;
+constexpr size_t kNormalPointCountMin = 8;
 
 std::vector<Eigen::Vector3d> FindCorners(const std::vector<Eigen::Vector3d>& points,
                                          const KeypointOptions& options) {
@@ -71,7 +71,7 @@ std::vector<Eigen::Vector3d> SpreadPoints(const std::vector<Eigen::Vector3d>& po
 std::vector<Eigen::Vector3d> FindKeypoints(const std::vector<Eigen::Vector3d>& points,
                                            const KeypointOptions& options) {
   const auto count_max = static_cast<size_t>(std::max(options.count_max, 1));
-  if (points.size() < kPointCountMin) return points;
+  if (points.size() < kNormalPointCountMin) return points;
   std::vector<Eigen::Vector3d> corners = FindCorners(points, options);
   if (corners.size() < static_cast<size_t>(options.count_min)) {
     return SpreadPoints(points, count_max);

@@ -25,8 +25,8 @@ constexpr double kOuterCellM = 0.04;
 constexpr double kOuterCellCountMax = 2e6;
 // The distance of the inlier share, and of the cost that ranks poses.
 constexpr double kInlierM = 0.1;
-constexpr size_t kPointCountMin = 10;
-constexpr size_t kPointCountMax = 4000;
+constexpr size_t kFitPointCountMin = 10;
+constexpr size_t kFitPointCountMax = 4000;
 constexpr double kCoordinateMaxM = 1e6;
 constexpr size_t kStartCount = 40;
 constexpr size_t kCandidateCount = 8;
@@ -105,7 +105,7 @@ std::vector<Eigen::Vector3d> CleanPoints(const std::vector<Eigen::Vector3f>& poi
     const Eigen::Vector3d wide = point.cast<double>();
     if (wide.allFinite() && wide.cwiseAbs().maxCoeff() < kCoordinateMaxM) finite.push_back(wide);
   }
-  return EveryNth(ThinPoints(finite, distance_m), kPointCountMax);
+  return EveryNth(ThinPoints(finite, distance_m), kFitPointCountMax);
 }
 
 bool IsFreeAround(const FreeTest& is_free, const Eigen::Vector3d& point_map) {
@@ -146,7 +146,7 @@ class ShapeFitter::Impl {
     }
     if (models.empty()) return std::nullopt;
     const std::vector<Eigen::Vector3d> points = CleanPoints(points_map, options_.point_distance_m);
-    if (points.size() < kPointCountMin) return std::nullopt;
+    if (points.size() < kFitPointCountMin) return std::nullopt;
     const std::vector<Eigen::Vector3d> keypoints = FindKeypoints(points, KeypointsOf(options_));
     std::optional<ShapeFit> best;
     double best_score = 0.0;

@@ -14,7 +14,6 @@ constexpr double kMeanHeightM = 1.72;
 /// Three of them keep a body between 1.45 and 2.05 m.
 constexpr double kHeightPerCoefficientM = 0.087;
 constexpr double kHeadJointToTopM = 0.17;
-constexpr double kAnkleHeightM = 0.08;
 
 // Our own mean body, standing, arms hanging: metres, x forward, y left, z up.
 Offsets MeanOffsets() {

@@ -14,6 +14,9 @@
 
 namespace dsg::simulator {
 
+/// Of the ankle joints above the soles.
+inline constexpr double kAnkleHeightM = 0.08;
+
 /// Standard deviations from the mean body: height, girths, limb ratios; normal, mean 0.
 using ShapeCoefficients = std::array<double, ingest::kShapeCount>;
 

@@ -169,7 +169,6 @@ Limb Foot(int side) {
   const int ankle = 7 + side;
   const int toes = 10 + side;
   Limb limb = {Direction::kForward, GirthKind::kExtremity, 14, {}};
-  constexpr double kAnkleHeightM = 0.08;
   const auto add = [&](double x, double half_height, double width, const SkinBinding& binding) {
     // The sole is flat on the floor; the ends are half way up.
     const double above = half_height > 0.0 ? half_height : 0.018;

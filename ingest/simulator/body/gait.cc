@@ -9,7 +9,6 @@
 namespace dsg::simulator {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 /// Steps of this share of the leg's length are those of an easy walk.
 constexpr double kStepPerLeg = 0.76;
 /// Share of a cycle in which a foot is on the floor.
@@ -18,17 +17,10 @@ constexpr double kHeelRiseM = 0.07;
 constexpr double kSwingLiftM = 0.06;
 constexpr double kTurnLiftM = 0.05;
 
-double SmoothStep(double t) {
-  if (t <= 0.0) return 0.0;
-  if (t >= 1.0) return 1.0;
-  return t * t * (3.0 - 2.0 * t);
-}
-
 Eigen::Quaterniond About(const Eigen::Vector3d& axis, double angle_rad) {
   return Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, axis));
 }
 
-Eigen::Quaterniond Pitch(double angle_rad) { return About(Eigen::Vector3d::UnitY(), angle_rad); }
 Eigen::Quaterniond Yaw(double angle_rad) { return About(Eigen::Vector3d::UnitZ(), angle_rad); }
 Eigen::Quaterniond Roll(double angle_rad) { return About(Eigen::Vector3d::UnitX(), angle_rad); }
 
@@ -54,7 +46,8 @@ FootStep StepAt(double cycle) {
   }
   const double share = (cycle - kStance) / (1.0 - kStance);
   step.forward = kStance * (SmoothStep(share) - 0.5);
-  step.lift_m = kHeelRiseM * (1.0 - SmoothStep(share)) + kSwingLiftM * std::sin(kPi * share);
+  step.lift_m =
+      kHeelRiseM * (1.0 - SmoothStep(share)) + kSwingLiftM * std::sin(std::numbers::pi * share);
   step.pitch_rad = 0.45 - 0.65 * SmoothStep(share);
   return step;
 }
@@ -63,7 +56,7 @@ double Fraction(double value) { return value - std::floor(value); }
 
 // Smooth, never repeating within a log, in [-1, 1].
 double Drift(double time_s, double period_s) {
-  const double a = 2.0 * kPi * time_s / period_s;
+  const double a = 2.0 * std::numbers::pi * time_s / period_s;
   return 0.6 * std::sin(a) + 0.4 * std::sin(1.618 * a + 1.0);
 }
 
@@ -122,16 +115,24 @@ void PlantFeet(const BodyModel& body, const GaitState& gait, Posture* posture) {
   const double stride_m = StrideLengthM(body);
   for (const Side side : {Side::kLeft, Side::kRight}) {
     const int i = static_cast<int>(side);
-    const FootStep step = StepAt(Fraction(gait.phase_rad / (2.0 * kPi) + 0.5 * i));
+    const FootStep step = StepAt(Fraction(gait.phase_rad / (2.0 * std::numbers::pi) + 0.5 * i));
     // Upright, the ankle is straight below the hip but for the bones' small bends.
     Eigen::Vector3d ankle = body.offset(1 + i) + body.offset(4 + i) + body.offset(7 + i);
     ankle.x() += gait.stride * stride_m * step.forward;
     ankle.z() += gait.stride * step.lift_m;
     // Left and right foot take turns.
-    const double turn = std::sin(gait.turn_phase_rad + kPi * i);
+    const double turn = std::sin(gait.turn_phase_rad + std::numbers::pi * i);
     ankle.z() += kTurnLiftM * gait.turn_lift * std::max(0.0, turn);
     PutAnkle(body, side, ankle, gait.stride * step.pitch_rad, posture);
   }
 }
+
+double SmoothStep(double t) {
+  if (t <= 0.0) return 0.0;
+  if (t >= 1.0) return 1.0;
+  return t * t * (3.0 - 2.0 * t);
+}
+
+Eigen::Quaterniond Pitch(double angle_rad) { return About(Eigen::Vector3d::UnitY(), angle_rad); }
 
 }  // namespace dsg::simulator

@@ -30,4 +30,10 @@ Posture TrunkPosture(const BodyModel& body, const GaitState& gait);
 /// Puts the feet on the floor, wherever the pelvis of `posture` is.
 void PlantFeet(const BodyModel& body, const GaitState& gait, Posture* posture);
 
+/// 0 up to t = 0, 1 from t = 1 on, between them a cubic with flat ends.
+double SmoothStep(double t);
+
+/// A rotation about y: forwards and down.
+Eigen::Quaterniond Pitch(double angle_rad);
+
 }  // namespace dsg::simulator

@@ -8,7 +8,6 @@
 namespace dsg::simulator {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kYawStepS = 0.05;
 /// The heading is averaged over this many steps to each side.
 constexpr int kYawReach = 7;
@@ -18,12 +17,7 @@ constexpr double kTurnRateRadS = 1.6;
 /// Turned by two small steps.
 constexpr double kTurnPerCycleRad = 1.2;
 
-double WrapAngle(double angle) { return std::remainder(angle, 2.0 * kPi); }
-
-double SmoothStep(double t) {
-  const double u = std::clamp(t, 0.0, 1.0);
-  return u * u * (3.0 - 2.0 * u);
-}
+double WrapAngle(double angle) { return std::remainder(angle, 2.0 * std::numbers::pi); }
 
 const LifeSegment& SegmentAt(const std::vector<LifeSegment>& segments, TimeNs time_ns) {
   const auto after = std::upper_bound(
@@ -36,7 +30,7 @@ GaitState WalkingGait(const BodyModel& body, const Walk& walk, double time_s) {
   const double distance = walk.DistanceAt(time_s);
   const double left = walk.path().length_m() - distance;
   GaitState gait;
-  gait.phase_rad = 2.0 * kPi * distance / StrideLengthM(body);
+  gait.phase_rad = 2.0 * std::numbers::pi * distance / StrideLengthM(body);
   gait.stride = SmoothStep(distance / kFirstStepM) * SmoothStep(left / kFirstStepM);
   return gait;
 }
@@ -98,7 +92,7 @@ FloorState Life::FloorAt(const BodyModel& body, TimeNs time_ns) const {
     const double turn = WrapAngle(segment.yaw_end - segment.yaw_begin);
     state.position = segment.position;
     state.yaw = segment.yaw_begin + turned * turn;
-    state.gait.turn_phase_rad = 2.0 * kPi * turned * std::abs(turn) / kTurnPerCycleRad;
+    state.gait.turn_phase_rad = 2.0 * std::numbers::pi * turned * std::abs(turn) / kTurnPerCycleRad;
     state.gait.turn_lift = SmoothStep(4.0 * turned) * SmoothStep(4.0 * (1.0 - turned)) *
                            SmoothStep(std::abs(turn) / 0.5);
   }

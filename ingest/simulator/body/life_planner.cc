@@ -9,7 +9,6 @@ namespace dsg::simulator {
 namespace {
 
 constexpr uint64_t kLifeStream = uint64_t{3} << 32;
-constexpr double kPi = std::numbers::pi;
 constexpr double kGoalRangeM = 25.0;
 constexpr double kGoalNearM = 2.5;
 constexpr int kGoalTries = 20;
@@ -106,7 +105,7 @@ std::optional<ObjectChoice> LifePlanner::TakeFirstObject() {
 
 void LifePlanner::Start(const std::vector<double>& errand_times_s) {
   cruise_m_s_ = random_.Uniform(1.0, 1.4);
-  yaw_ = random_.Uniform(-kPi, kPi);
+  yaw_ = random_.Uniform(-std::numbers::pi, std::numbers::pi);
   hand_ = random_.Chance(kLeftHanded) ? Side::kLeft : Side::kRight;
   out_.life.idle_offset_s = random_.Uniform(0.0, 1000.0);
   if (!errand_times_s.empty() && errand_times_s.front() < kEarlyErrandS) {

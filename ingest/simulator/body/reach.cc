@@ -14,10 +14,6 @@ constexpr std::array<double, 5> kDropsM = {0.0, 0.12, 0.24, 0.36, 0.48};
 constexpr double kReachMax = 0.96;
 constexpr double kReachMin = 0.4;
 
-Eigen::Quaterniond Pitch(double angle_rad) {
-  return Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitY()));
-}
-
 // The trunk sways a little all the time, hence the margins.
 bool IsTouchable(const BodyModel& body, const Eigen::Vector3d& target, const ReachPlan& plan) {
   Posture posture;

@@ -19,7 +19,7 @@ struct DriftArguments {
   DriftOptions options;
 };
 
-absl::Status Run(DriftArguments& arguments) {
+absl::Status RunDrift(DriftArguments& arguments) {
   arguments.options.loop_period_ns =
       static_cast<TimeNs>(std::llround(arguments.loop_period_s * 1e9));
   DSG_ASSIGN_OR_RETURN(const DriftSummary summary,
@@ -57,7 +57,7 @@ Command AddDriftCommand(CLI::App* app) {
                   "share of wrong ones among all loop closures, 0 to 0.95")
       ->check(CLI::Range(0.0, 0.95))
       ->capture_default_str();
-  return [arguments] { return Run(*arguments); };
+  return [arguments] { return RunDrift(*arguments); };
 }
 
 }  // namespace dsg::simulator

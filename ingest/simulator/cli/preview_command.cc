@@ -16,7 +16,7 @@ struct PreviewArguments {
   int count = 4;
 };
 
-absl::Status Run(const PreviewArguments& arguments) {
+absl::Status RunPreview(const PreviewArguments& arguments) {
   const std::string out = arguments.out.empty() ? arguments.folder + "/preview" : arguments.out;
   DSG_ASSIGN_OR_RETURN(const std::vector<std::string> paths,
                        WriteContactSheet(arguments.folder, arguments.count, out));
@@ -34,7 +34,7 @@ Command AddPreviewCommand(CLI::App* app) {
   app->add_option("--count", arguments->count, "instants to show, 1 to 20")
       ->check(CLI::Range(1, 20))
       ->capture_default_str();
-  return [arguments] { return Run(*arguments); };
+  return [arguments] { return RunPreview(*arguments); };
 }
 
 }  // namespace dsg::simulator

@@ -48,7 +48,7 @@ void AddOptions(CLI::App* app, SensorsArguments* arguments) {
       ->capture_default_str();
 }
 
-void PrintSummary(const SensorsArguments& arguments, const SensorsSummary& summary) {
+void PrintSensorsSummary(const SensorsArguments& arguments, const SensorsSummary& summary) {
   const std::string& out = arguments.run.out;
   if (summary.is_bag_only) {
     std::cout << "the log was finished before; wrote " << out << "/log.bag\n";
@@ -74,7 +74,7 @@ void PrintSummary(const SensorsArguments& arguments, const SensorsSummary& summa
       out, out, out);
 }
 
-absl::Status Run(SensorsArguments arguments) {
+absl::Status RunSensors(SensorsArguments arguments) {
   DSG_ASSIGN_OR_RETURN(arguments.options.world.kind, ParseWorldKind(arguments.world));
   if (!arguments.frames.empty()) {
     DSG_ASSIGN_OR_RETURN(arguments.run.frames, ParseFrameRange(arguments.frames));
@@ -86,7 +86,7 @@ absl::Status Run(SensorsArguments arguments) {
                            [&line](const char* step, double share) { line.Show(step, share); });
   }
   if (!summary.ok()) return summary.status();
-  PrintSummary(arguments, *summary);
+  PrintSensorsSummary(arguments, *summary);
   return absl::OkStatus();
 }
 
@@ -95,7 +95,7 @@ absl::Status Run(SensorsArguments arguments) {
 Command AddSensorsCommand(CLI::App* app) {
   auto arguments = std::make_shared<SensorsArguments>();
   AddOptions(app, arguments.get());
-  return [arguments] { return Run(*arguments); };
+  return [arguments] { return RunSensors(*arguments); };
 }
 
 }  // namespace dsg::simulator

@@ -47,7 +47,7 @@ void AddTracks(CLI::App* app, TracksOptions* options, std::string* world) {
       ->capture_default_str();
 }
 
-void PrintSummary(const TracksOptions& options, const TracksSummary& summary) {
+void PrintTracksSummary(const TracksOptions& options, const TracksSummary& summary) {
   std::cout << absl::StreamFormat(
       "%d rooms, %d objects, %d places\n"
       "%d people and a robot for %g s: %d poses, %d gaps, %d room visits\n"
@@ -65,7 +65,7 @@ absl::Status RunTracks(TracksOptions options, const std::string& world) {
     summary = WriteTracks(options, [&line](double fraction) { line.Show("simulating", fraction); });
   }
   if (!summary.ok()) return summary.status();
-  PrintSummary(options, *summary);
+  PrintTracksSummary(options, *summary);
   return absl::OkStatus();
 }
 

@@ -4,20 +4,11 @@
 #include <cmath>
 
 #include "schema/base/check.h"
-#include "schema/base/random.h"
 
 namespace dsg::simulator {
 namespace {
 
 constexpr uint64_t kImuStream = 0x696d75;  // "imu"
-
-Eigen::Vector3d NormalVector(double sigma, Random* random) {
-  // One statement each: the order of evaluation decides which number goes where.
-  const double x = random->Normal();
-  const double y = random->Normal();
-  const double z = random->Normal();
-  return sigma * Eigen::Vector3d(x, y, z);
-}
 
 Eigen::Matrix3d DrawMisalignment(double sigma, Random* random) {
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
@@ -30,6 +21,14 @@ Eigen::Vector3d Cut(const Eigen::Vector3d& value, double bound) {
 }
 
 }  // namespace
+
+Eigen::Vector3d NormalVector(double sigma, Random* random) {
+  // One statement each: the order of evaluation decides which number goes where.
+  const double x = random->Normal();
+  const double y = random->Normal();
+  const double z = random->Normal();
+  return sigma * Eigen::Vector3d(x, y, z);
+}
 
 ImuModel ImuModel::Perfect() {
   ImuModel model;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ingest/simulator/motion/robot_motion.h"
+#include "schema/base/random.h"
 
 namespace dsg::simulator {
 
@@ -49,5 +50,8 @@ struct ImuSample {
 /// Source: Forster, Carlone, Dellaert, Scaramuzza, T-RO 2017, equations 27 and 28.
 std::vector<ImuSample> SimulateImu(const RobotMotion& motion, const ImuModel& model, double rate_hz,
                                    uint64_t seed);
+
+/// Three normal numbers of standard deviation `sigma`.
+Eigen::Vector3d NormalVector(double sigma, Random* random);
 
 }  // namespace dsg::simulator

@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/simulator/motion/imu.h"
 #include "schema/base/random.h"
 #include "schema/base/status.h"
 
@@ -21,12 +22,6 @@ constexpr TimeNs kSearchStepNs = 200'000'000;
 // A loop that says nearly the truth is not wrong.
 constexpr double kWrongMinM = 1.0;
 constexpr int kTriesMax = 1000;
-
-Eigen::Vector3d NormalVector(Random* random) {
-  const double x = random->Normal();
-  const double y = random->Normal();
-  return {x, y, random->Normal()};
-}
 
 Eigen::Quaterniond TurnBy(const Eigen::Vector3d& rotation) {
   const double angle_rad = rotation.norm();
@@ -75,9 +70,9 @@ std::vector<SimulatedLoop> DrawRight(const std::vector<Sample>& samples,
     if (known.empty()) continue;
     const StampedPose& from = known[random.Index(static_cast<int>(known.size()))]->pose;
     Pose3d from_T_to = from.map_T_body.Inverse() * to.pose.map_T_body;
-    from_T_to.position += options.loop_sigma_m * NormalVector(&random);
+    from_T_to.position += NormalVector(options.loop_sigma_m, &random);
     from_T_to.orientation =
-        (from_T_to.orientation * TurnBy(options.loop_sigma_rad * NormalVector(&random)))
+        (from_T_to.orientation * TurnBy(NormalVector(options.loop_sigma_rad, &random)))
             .normalized();
     loops.push_back({from.time_ns, to.pose.time_ns, from_T_to, true});
   }
@@ -137,7 +132,7 @@ std::vector<StampedPose> AddDrift(const std::vector<StampedPose>& truth,
       const Eigen::Vector3d step_map = pose.map_T_body.position - from.position;
       const double way_m = step_map.norm();
       const double walk = std::sqrt(way_m);
-      const Eigen::Vector3d noise = options.drift_m_per_m * walk * NormalVector(&random);
+      const Eigen::Vector3d noise = NormalVector(options.drift_m_per_m * walk, &random);
       const Eigen::Quaterniond turned = TurnBy({0.0, 0.0, yaw_rad});
       pose.map_T_body.position = odometry.back().map_T_body.position + turned * (step_map + noise);
       yaw_rad += options.drift_rad_per_m * walk * random.Normal();

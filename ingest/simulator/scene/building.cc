@@ -16,7 +16,7 @@ namespace dsg::simulator {
 namespace {
 
 /// Of the triangles of walls and floors, so that light changes smoothly over them.
-constexpr float kEdgeM = 0.7f;
+constexpr float kBuildingEdgeM = 0.7f;
 constexpr double kTinyM = 1e-4;
 constexpr size_t kWallsPerBlank = 14;
 
@@ -114,7 +114,7 @@ class Builder {
     Part* part = AddPart("floor", structure.room, look.floor, look.floor_color);
     part->texture_seed |= 1u;
     AddLevel(structure.rect, structure.z_max_m, true, &part->mesh);
-    Subdivide(kEdgeM, &part->mesh);
+    Subdivide(kBuildingEdgeM, &part->mesh);
   }
 
   void AddCeiling(const Structure& structure) {
@@ -122,7 +122,7 @@ class Builder {
         AddPart("ceiling", structure.room, Look(structure.room).ceiling, {226, 226, 222, 255});
     part->texture_seed |= 3u;
     AddLevel(structure.rect, structure.z_min_m, false, &part->mesh);
-    Subdivide(kEdgeM, &part->mesh);
+    Subdivide(kBuildingEdgeM, &part->mesh);
   }
 
   void AddWall(const Structure& structure, bool is_blank) {
@@ -132,7 +132,7 @@ class Builder {
     AddFront(structure, structure.z_min_m, structure.z_max_m, &part->mesh);
     AddEnds(structure, &part->mesh);
     if (structure.z_min_m > kTinyM) AddLevel(structure.rect, structure.z_min_m, false, &part->mesh);
-    Subdivide(kEdgeM, &part->mesh);
+    Subdivide(kBuildingEdgeM, &part->mesh);
     if (structure.z_min_m < kTinyM) AddSkirting(structure);
   }
 
@@ -206,7 +206,7 @@ class Builder {
       normal[along] = end == from ? -1.0 : 1.0;
       AddUpright(end, end + depth, 0.0, kSkirtHeightM, normal, &part->mesh);
     }
-    Subdivide(kEdgeM, &part->mesh);
+    Subdivide(kBuildingEdgeM, &part->mesh);
   }
 
   // A pane on the room's face, held by bars.
@@ -234,7 +234,7 @@ class Builder {
   void AddPillar(const Structure& structure) {
     Part* part = AddPart("pillar", structure.room, Material::kPlaster, {188, 186, 180, 255});
     AddBlock(structure.rect, structure.z_min_m, structure.z_max_m, &part->mesh);
-    Subdivide(kEdgeM, &part->mesh);
+    Subdivide(kBuildingEdgeM, &part->mesh);
   }
 
   void AddFrame(int index) {

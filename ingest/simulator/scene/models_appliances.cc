@@ -105,13 +105,14 @@ void DrawLamp(Model* m) {
             Vector3f::Zero(), Vector2f::Ones(), 8, m->mesh());
 }
 
-constexpr ModelMaker kModels[] = {
-    {"fridge", DrawFridge},   {"microwave", DrawMicrowave}, {"coffee machine", DrawCoffeeMachine},
-    {"printer", DrawPrinter}, {"tv", DrawScreen},           {"monitor", DrawScreen},
-    {"lamp", DrawLamp}};
-
 }  // namespace
 
-std::span<const ModelMaker> ApplianceModels() { return kModels; }
+std::span<const ModelMaker> ApplianceModels() {
+  static constexpr ModelMaker kModels[] = {
+      {"fridge", DrawFridge},   {"microwave", DrawMicrowave}, {"coffee machine", DrawCoffeeMachine},
+      {"printer", DrawPrinter}, {"tv", DrawScreen},           {"monitor", DrawScreen},
+      {"lamp", DrawLamp}};
+  return kModels;
+}
 
 }  // namespace dsg::simulator

@@ -76,11 +76,12 @@ void DrawBathtub(Model* m) {
   m->Box({-x + 0.02f, -0.02f, m->height - 0.03f}, {-x + 0.2f, 0.02f, m->height});
 }
 
-constexpr ModelMaker kModels[] = {
-    {"toilet", DrawToilet}, {"washbasin", DrawWashbasin}, {"bathtub", DrawBathtub}};
-
 }  // namespace
 
-std::span<const ModelMaker> BathModels() { return kModels; }
+std::span<const ModelMaker> BathModels() {
+  static constexpr ModelMaker kModels[] = {
+      {"toilet", DrawToilet}, {"washbasin", DrawWashbasin}, {"bathtub", DrawBathtub}};
+  return kModels;
+}
 
 }  // namespace dsg::simulator

@@ -92,12 +92,13 @@ void DrawBench(Model* m) {
   }
 }
 
-constexpr ModelMaker kModels[] = {{"chair", DrawChair},       {"couch", DrawCouch},
-                                  {"armchair", DrawArmchair}, {"bed", DrawBed},
-                                  {"stool", DrawStool},       {"bench", DrawBench}};
-
 }  // namespace
 
-std::span<const ModelMaker> SeatModels() { return kModels; }
+std::span<const ModelMaker> SeatModels() {
+  static constexpr ModelMaker kModels[] = {{"chair", DrawChair},       {"couch", DrawCouch},
+                                           {"armchair", DrawArmchair}, {"bed", DrawBed},
+                                           {"stool", DrawStool},       {"bench", DrawBench}};
+  return kModels;
+}
 
 }  // namespace dsg::simulator

@@ -170,14 +170,15 @@ void DrawPlant(Model* m) {
   }
 }
 
-constexpr ModelMaker kModels[] = {
-    {"cup", DrawCup},        {"bowl", DrawBowl},   {"bottle", DrawBottle},
-    {"vase", DrawVase},      {"phone", DrawPhone}, {"book", DrawBook},
-    {"laptop", DrawLaptop},  {"plant", DrawPlant}, {"whiteboard", DrawWhiteboard},
-    {"picture", DrawPicture}};
-
 }  // namespace
 
-std::span<const ModelMaker> SmallModels() { return kModels; }
+std::span<const ModelMaker> SmallModels() {
+  static constexpr ModelMaker kModels[] = {
+      {"cup", DrawCup},        {"bowl", DrawBowl},   {"bottle", DrawBottle},
+      {"vase", DrawVase},      {"phone", DrawPhone}, {"book", DrawBook},
+      {"laptop", DrawLaptop},  {"plant", DrawPlant}, {"whiteboard", DrawWhiteboard},
+      {"picture", DrawPicture}};
+  return kModels;
+}
 
 }  // namespace dsg::simulator

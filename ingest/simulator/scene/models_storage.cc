@@ -90,14 +90,15 @@ void DrawBag(Model* m) {
   m->Box({-0.25f * x, -0.3f * y, 0.96f * m->height}, {0.25f * x, 0.1f * y, m->height});
 }
 
-constexpr ModelMaker kModels[] = {{"shelf", DrawShelf},
-                                  {"bin", DrawBin},
-                                  {"box", DrawCarton},
-                                  {"backpack", DrawBag},
-                                  {"bag", DrawBag}};
-
 }  // namespace
 
-std::span<const ModelMaker> StorageModels() { return kModels; }
+std::span<const ModelMaker> StorageModels() {
+  static constexpr ModelMaker kModels[] = {{"shelf", DrawShelf},
+                                           {"bin", DrawBin},
+                                           {"box", DrawCarton},
+                                           {"backpack", DrawBag},
+                                           {"bag", DrawBag}};
+  return kModels;
+}
 
 }  // namespace dsg::simulator

@@ -141,13 +141,14 @@ void DrawWardrobe(Model* m) {
   DrawFronts(m, 0.3f * m->height, m->height - 0.03f, 3, 1);
 }
 
-constexpr ModelMaker kModels[] = {
-    {"desk", DrawDesk},       {"table", DrawTable},      {"coffee table", DrawCoffeeTable},
-    {"counter", DrawCounter}, {"tv stand", DrawTvStand}, {"nightstand", DrawNightstand},
-    {"cabinet", DrawCabinet}, {"wardrobe", DrawWardrobe}};
-
 }  // namespace
 
-std::span<const ModelMaker> TableModels() { return kModels; }
+std::span<const ModelMaker> TableModels() {
+  static constexpr ModelMaker kModels[] = {
+      {"desk", DrawDesk},       {"table", DrawTable},      {"coffee table", DrawCoffeeTable},
+      {"counter", DrawCounter}, {"tv stand", DrawTvStand}, {"nightstand", DrawNightstand},
+      {"cabinet", DrawCabinet}, {"wardrobe", DrawWardrobe}};
+  return kModels;
+}
 
 }  // namespace dsg::simulator

@@ -12,7 +12,7 @@ namespace dsg::simulator {
 namespace {
 
 /// Of the triangles of furniture.
-constexpr float kEdgeM = 1.0f;
+constexpr float kFurnitureEdgeM = 1.0f;
 constexpr int kInstanceMax = 255;
 
 void AddFurniture(const Furniture& item, int index, int instance, Scene* scene) {
@@ -25,7 +25,7 @@ void AddFurniture(const Furniture& item, int index, int instance, Scene* scene) 
     Part part;
     part.mesh = std::move(model.mesh);
     Transform(transform, &part.mesh);
-    Subdivide(kEdgeM, &part.mesh);
+    Subdivide(kFurnitureEdgeM, &part.mesh);
     part.material = model.material;
     part.color = model.color;
     part.class_id = ClassId(item.class_name);

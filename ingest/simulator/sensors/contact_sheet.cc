@@ -32,7 +32,7 @@ using ingest::PixelFormat;
 
 constexpr double kDepthShownM = 10.0;
 
-const ImageChannel& Channel(std::string_view name) {
+const ImageChannel& ChannelNamed(std::string_view name) {
   const auto& channels = ImageChannels();
   return *std::find_if(channels.begin(), channels.end(),
                        [&](const ImageChannel& channel) { return channel.name == name; });
@@ -141,13 +141,13 @@ absl::StatusOr<Columns> ReadColumns(const std::string& log_folder,
   for (const TimeNs stamp : stamps) {
     DSG_ASSIGN_OR_RETURN(
         Image color,
-        DecodeFile(ImagePath(log_folder, Channel(kColorChannel), stamp), PixelFormat::kRgb8));
-    DSG_ASSIGN_OR_RETURN(
-        Image depth,
-        DecodeFile(ImagePath(log_folder, Channel(kDepthChannel), stamp), PixelFormat::kDepth16));
-    DSG_ASSIGN_OR_RETURN(
-        const Image labels,
-        DecodeFile(ImagePath(log_folder, Channel(kLabelsChannel), stamp), PixelFormat::kLabel16));
+        DecodeFile(ImagePath(log_folder, ChannelNamed(kColorChannel), stamp), PixelFormat::kRgb8));
+    DSG_ASSIGN_OR_RETURN(Image depth,
+                         DecodeFile(ImagePath(log_folder, ChannelNamed(kDepthChannel), stamp),
+                                    PixelFormat::kDepth16));
+    DSG_ASSIGN_OR_RETURN(const Image labels,
+                         DecodeFile(ImagePath(log_folder, ChannelNamed(kLabelsChannel), stamp),
+                                    PixelFormat::kLabel16));
     DSG_RETURN_IF_ERROR(CheckSize(depth, color, stamp));
     DSG_RETURN_IF_ERROR(CheckSize(labels, color, stamp));
     cv::Mat camera = ToMat(color).clone();

@@ -10,6 +10,7 @@
 #include "ingest/simulator/scene/image_effects.h"
 #include "ingest/simulator/sensors/image_codec.h"
 #include "ingest/simulator/sensors/instance_shuffle.h"
+#include "ingest/simulator/sensors/label_colors.h"
 #include "ingest/simulator/sensors/streams.h"
 #include "ingest/simulator/world/catalogue.h"
 #include "schema/base/check.h"
@@ -22,8 +23,6 @@ using ingest::CameraCalibration;
 using ingest::Image;
 
 constexpr int kJpegQuality = 92;
-// Structures and objects; rooms and buildings have classes above.
-constexpr int kSurfaceClassMax = 99;
 
 const CameraCalibration& CameraOf(const SensorSession& session, const char* channel) {
   const CameraCalibration* camera = session.rig().FindCamera(channel);

@@ -11,8 +11,8 @@ namespace {
 using truth::FreeGrid;
 
 constexpr double kCellM = 0.1;
-constexpr float kLowM = 0.1f;
-constexpr float kHighM = 1.8f;
+constexpr float kBodyLowM = 0.1f;
+constexpr float kBodyHighM = 1.8f;
 constexpr double kDoorBandM = 0.4;
 
 struct Cell {
@@ -40,7 +40,7 @@ void MarkTriangle(const FreeGrid& grid, const Eigen::Vector3f& a, const Eigen::V
                   const Eigen::Vector3f& c, std::vector<uint8_t>* occupied) {
   const float top = std::max({a.z(), b.z(), c.z()});
   const float bottom = std::min({a.z(), b.z(), c.z()});
-  if (top < kLowM || bottom > kHighM) return;
+  if (top < kBodyLowM || bottom > kBodyHighM) return;
   const float longest = std::max({(b - a).norm(), (c - a).norm(), (c - b).norm()});
   const int steps = std::max(1, static_cast<int>(std::ceil(longest / (0.5f * 0.9f * kCellM))));
   for (int i = 0; i <= steps; ++i) {
@@ -48,7 +48,7 @@ void MarkTriangle(const FreeGrid& grid, const Eigen::Vector3f& a, const Eigen::V
       const float u = static_cast<float>(i) / static_cast<float>(steps);
       const float v = static_cast<float>(j) / static_cast<float>(steps);
       const Eigen::Vector3f point = a + u * (b - a) + v * (c - a);
-      if (point.z() < kLowM || point.z() > kHighM) continue;
+      if (point.z() < kBodyLowM || point.z() > kBodyHighM) continue;
       const Cell cell = CellOf(grid, point.x(), point.y());
       if (Holds(grid, cell)) (*occupied)[IndexOf(grid, cell)] = 1;
     }

@@ -10,9 +10,6 @@
 namespace dsg::simulator {
 namespace {
 
-// A room's class never appears in an image.
-constexpr int kSurfaceClassMax = 99;
-
 // The large surfaces are calm, so that people and things stand out.
 struct FixedColor {
   const char* class_name;
@@ -24,7 +21,7 @@ constexpr FixedColor kFixedColors[] = {{"wall", {168, 170, 178, 255}},
                                        {"glass", {150, 210, 226, 255}},
                                        {"human", {228, 26, 60, 255}}};
 
-uint8_t Channel(double hue, double shift, double low, double high) {
+uint8_t ColorPart(double hue, double shift, double low, double high) {
   const double wave = 0.5 + 0.5 * std::cos(6.283185307179586 * (hue + shift));
   return static_cast<uint8_t>(std::lround(low + wave * (high - low)));
 }
@@ -40,8 +37,8 @@ Color LabelColor(int class_id) {
   const double hue = std::fmod(class_id * 0.6180339887498949, 1.0);
   const double high = 255.0 - 50.0 * (class_id % 3);
   const double low = 20.0 + 25.0 * (class_id % 2);
-  return {Channel(hue, 0.0, low, high), Channel(hue, -1.0 / 3.0, low, high),
-          Channel(hue, 1.0 / 3.0, low, high), 255};
+  return {ColorPart(hue, 0.0, low, high), ColorPart(hue, -1.0 / 3.0, low, high),
+          ColorPart(hue, 1.0 / 3.0, low, high), 255};
 }
 
 std::string LabelTable(const std::vector<SemanticLabel>& labels) {

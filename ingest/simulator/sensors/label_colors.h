@@ -11,6 +11,9 @@
 
 namespace dsg::simulator {
 
+/// Of structures and objects; rooms and buildings have classes above, which no image shows.
+inline constexpr int kSurfaceClassMax = 99;
+
 /// Differs from class to class; black for 0. Requires: 0 <= class_id <= 255.
 Color LabelColor(int class_id);
 

@@ -12,8 +12,8 @@
 namespace dsg::simulator {
 namespace {
 
-constexpr double kLowM = 0.1;
-constexpr double kHighM = 1.8;
+constexpr double kSeenLowM = 0.1;
+constexpr double kSeenHighM = 1.8;
 // Of the depth camera: what is farther counts as not seen.
 constexpr double kRangeM = 10.0;
 // Every so many pixels a ray marks free cells; they are a tenth of a metre wide.
@@ -47,7 +47,7 @@ class GridMarker {
     const double step = 0.5 * grid_.cell_m / std::max(1.0, direction.norm());
     for (double z = 0.0; z < depth_m; z += step) {
       const Eigen::Vector3d point = origin + z * direction;
-      if (point.z() < kLowM || point.z() > kHighM) continue;
+      if (point.z() < kSeenLowM || point.z() > kSeenHighM) continue;
       const auto column =
           static_cast<int>(std::floor((point.x() - grid_.origin_map.x()) / grid_.cell_m));
       const auto row =

@@ -10,7 +10,7 @@
 namespace dsg::simulator {
 namespace {
 
-constexpr int kTryCount = 20;
+constexpr int kPieceTryCount = 20;
 
 Box3d BoxOf(const Furniture& item) {
   const Rect footprint = item.Footprint();
@@ -95,7 +95,7 @@ class Decorator {
     constexpr double kGapM = 0.1;
     Furniture item =
         MakePiece(piece.class_name, room, {piece.size_u, piece.size_v, piece.size_z}, random_);
-    for (int i = 0; i < kTryCount; ++i) {
+    for (int i = 0; i < kPieceTryCount; ++i) {
       const Structure& wall = *walls[random_->Index(static_cast<int>(walls.size()))];
       const int along = std::abs(wall.normal.x()) > 0.5 ? 1 : 0;
       const Rect inside = wall.rect.intersection(plan_.rooms[room].cell);
@@ -122,7 +122,7 @@ class Decorator {
         MakePiece(loose.class_name, room, {loose.size_u, loose.size_v, loose.size_z}, random_);
     item.on = static_cast<int>(carrier);
     const double top = under.center.z() + 0.5 * under.size.z();
-    for (int i = 0; i < kTryCount; ++i) {
+    for (int i = 0; i < kPieceTryCount; ++i) {
       item.quarter_turns = random_->Index(4);
       const Rect inside =
           Inflate(under.Footprint(), -kEdgeM - 0.5 * item.size.head<2>().maxCoeff());

@@ -12,7 +12,7 @@
 namespace dsg::simulator {
 namespace {
 
-constexpr int kTryCount = 40;
+constexpr int kGroupTryCount = 40;
 /// Between groups, so that boxes never touch.
 constexpr double kGroupGapM = 0.06;
 /// Kept free on both sides of a door, beyond its width to each side and in depth.
@@ -121,7 +121,7 @@ class RoomFurnisher {
   /// False if no try found a spot that leaves the room walkable.
   bool Place(const GroupCount& entry, Random* random) {
     const Rect interior = plan_.rooms[room_].Interior();
-    for (int i = 0; i < kTryCount; ++i) {
+    for (int i = 0; i < kGroupTryCount; ++i) {
       const Spot spot = DrawSpot(interior, entry, random);
       const std::vector<Furniture> group =
           MakeGroup(entry, spot, room_, static_cast<int>(all_->size()), random);

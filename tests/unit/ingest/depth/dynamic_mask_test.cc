@@ -16,7 +16,7 @@ constexpr uint16_t kWall = 1;
 bool IsPerson(int u, int v) { return u >= 60 && u < 90 && v >= 20 && v < 110; }
 
 // A person 2 m away in front of a wall at 4 m, a table at 2 m beside it.
-DepthFrame Scene() {
+DepthFrame PlainScene() {
   DepthFrame frame;
   frame.camera = TestCamera("depth0", kWidth, kHeight);
   for (int v = 0; v < kHeight; ++v) {
@@ -29,7 +29,7 @@ DepthFrame Scene() {
 }
 
 DepthFrame LabelledScene() {
-  DepthFrame frame = Scene();
+  DepthFrame frame = PlainScene();
   for (int v = 0; v < kHeight; ++v) {
     for (int u = 0; u < kWidth; ++u) {
       frame.labels.push_back(
@@ -64,7 +64,7 @@ bool MaskAt(const std::vector<uint8_t>& mask, int u, int v) {
 }
 
 TEST(DynamicMask, IsEmptyWhereNobodyIs) {
-  DepthFrame frame = Scene();
+  DepthFrame frame = PlainScene();
   EXPECT_TRUE(MaskPeople(frame, {}, Options(3)).empty());
   frame.labels.assign(frame.depth_m.size(), kWall << 8);
   EXPECT_TRUE(MaskPeople(frame, {}, Options(3)).empty());
@@ -98,7 +98,7 @@ TEST(DynamicMask, GrowsByThePixelsAskedFor) {
 
 TEST(DynamicMask, OutlineThatTheLabelsMissedIsFoundByItsDepthEdge) {
   // Labels that end 5 pixels inside the person: 3 are grown, the edge is within 3 more.
-  DepthFrame frame = Scene();
+  DepthFrame frame = PlainScene();
   for (int v = 0; v < kHeight; ++v) {
     for (int u = 0; u < kWidth; ++u) {
       frame.labels.push_back(
@@ -115,7 +115,7 @@ TEST(DynamicMask, OutlineThatTheLabelsMissedIsFoundByItsDepthEdge) {
 
 TEST(DynamicMask, BoxesAloneMaskWhatIsAsFarAsTheTorso) {
   for (const bool has_joints : {true, false}) {
-    const std::vector<uint8_t> mask = MaskPeople(Scene(), {Detection(has_joints)}, Options(0));
+    const std::vector<uint8_t> mask = MaskPeople(PlainScene(), {Detection(has_joints)}, Options(0));
     ASSERT_FALSE(mask.empty());
     EXPECT_TRUE(MaskAt(mask, 62, 25));
     EXPECT_TRUE(MaskAt(mask, 75, 105));
@@ -141,8 +141,8 @@ TEST(DynamicMask, BoxesOutsideTheImageOrWithoutDepthDoNothing) {
   broken.box_px[2] = NAN;
   HumanDetection inverted = Detection(false);
   inverted.box_px = {90.0, 100.0, 20.0, 10.0};
-  EXPECT_TRUE(MaskPeople(Scene(), {outside, broken, inverted}, Options(3)).empty());
-  DepthFrame blind = Scene();
+  EXPECT_TRUE(MaskPeople(PlainScene(), {outside, broken, inverted}, Options(3)).empty());
+  DepthFrame blind = PlainScene();
   blind.depth_m.assign(blind.depth_m.size(), 0.0f);
   EXPECT_TRUE(MaskPeople(blind, {Detection(true)}, Options(3)).empty());
 }

@@ -10,6 +10,9 @@
 
 namespace dsg::test {
 
+inline constexpr uint32_t kWall = 1;
+inline constexpr uint32_t kFloor = 2;
+
 /// Two triangles a, b, c, d with a label; vertices of their own.
 inline void AddQuad(const std::array<Eigen::Vector3f, 4>& corners, uint32_t label,
                     MeshBlock* mesh) {

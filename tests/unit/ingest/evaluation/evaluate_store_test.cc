@@ -18,8 +18,6 @@ namespace {
 
 constexpr TimeNs kFrame = 50'000'000;
 constexpr int kFrames = 200;
-constexpr uint32_t kWall = 1;
-constexpr uint32_t kFloor = 2;
 
 Pose3d At(double x, double y, double z, double yaw = 0.0) {
   return {{x, y, z}, Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()))};
@@ -43,8 +41,8 @@ void AddBuilding(truth::Truth* truth) {
     }
   }
   for (double x : {0.0, 4.0}) {
-    test::AddBox(Box3d(Eigen::Vector3d(x, 0, 0), Eigen::Vector3d(x + 4, 4, 2.5)), kWall, kFloor,
-                 &truth->mesh);
+    test::AddBox(Box3d(Eigen::Vector3d(x, 0, 0), Eigen::Vector3d(x + 4, 4, 2.5)), test::kWall,
+                 test::kFloor, &truth->mesh);
   }
   truth->face_observed.assign(truth->mesh.faces.size(), 1);
   truth->labels = {{1, "wall"}, {2, "floor"}};

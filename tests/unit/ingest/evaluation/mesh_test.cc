@@ -11,8 +11,9 @@
 namespace dsg::evaluation {
 namespace {
 
-constexpr uint32_t kWall = 1;
-constexpr uint32_t kFloor = 2;
+using test::kFloor;
+using test::kWall;
+
 constexpr uint32_t kTable = 3;
 
 const MeshOptions& Options() {
@@ -33,7 +34,7 @@ MeshBlock Room() {
   return mesh;
 }
 
-MeshResult Evaluate(const MeshBlock& estimate, std::vector<uint8_t> observed = {}) {
+MeshResult EvaluateRoom(const MeshBlock& estimate, std::vector<uint8_t> observed = {}) {
   const MeshBlock truth = Room();
   if (observed.empty()) observed.assign(truth.faces.size(), 1);
   return EvaluateMesh(estimate, truth, observed, {}, Options());
@@ -64,7 +65,7 @@ TEST(Surface, FindsTheNearestPointOfATriangle) {
 }
 
 TEST(MeshMetric, IsPerfectForTheTruthItself) {
-  const MeshResult result = Evaluate(Room());
+  const MeshResult result = EvaluateRoom(Room());
   EXPECT_LT(*result.rmse_m, 1e-5);
   EXPECT_LT(*result.rmse_no_icp_m, 1e-5);
   EXPECT_DOUBLE_EQ(*result.completeness, 1.0);
@@ -80,7 +81,7 @@ TEST(MeshMetric, ShowsAShiftThatIcpHides) {
   for (const SurfaceSample& sample : SampleSurface(room, 20'000, 9)) {
     shifted.positions_map.push_back(sample.point_map + Eigen::Vector3f(0.3f, 0.0f, 0.0f));
   }
-  const MeshResult result = Evaluate(shifted);
+  const MeshResult result = EvaluateRoom(shifted);
   EXPECT_LT(*result.rmse_m, 0.05);
   EXPECT_GT(*result.rmse_no_icp_m, 0.12);
   EXPECT_FALSE(result.ghost_m2.has_value());
@@ -91,7 +92,7 @@ TEST(MeshMetric, ShowsARotationInEveryNumberThatDoesNotAlign) {
   MeshBlock turned = Room();
   const Eigen::AngleAxisf turn(0.3f, Eigen::Vector3f::UnitZ());
   for (auto& point : turned.positions_map) point = turn * point;
-  const MeshResult result = Evaluate(turned);
+  const MeshResult result = EvaluateRoom(turned);
   EXPECT_GT(*result.rmse_no_icp_m, 0.3);
   EXPECT_LT(*result.completeness, 0.8);
   EXPECT_LT(*result.miou, 0.7);
@@ -101,7 +102,7 @@ TEST(MeshMetric, MeasuresAGhostWall) {
   MeshBlock haunted = Room();
   test::AddQuad({Eigen::Vector3f(4, 1, 0.5f), {4, 2, 0.5f}, {4, 2, 2.5f}, {4, 1, 2.5f}}, kWall,
                 &haunted);
-  const MeshResult result = Evaluate(haunted);
+  const MeshResult result = EvaluateRoom(haunted);
   EXPECT_NEAR(*result.ghost_m2, 2.0, 0.05);
   EXPECT_GT(*result.rmse_no_icp_m, 0.1);
   EXPECT_DOUBLE_EQ(*result.completeness, 1.0);
@@ -111,7 +112,7 @@ TEST(MeshMetric, TellsGhostsInTheBuildingFromThoseOutside) {
   MeshBlock haunted = Room();
   test::AddQuad({Eigen::Vector3f(9, 1, 0.5f), {9, 2, 0.5f}, {9, 2, 2.5f}, {9, 1, 2.5f}}, kWall,
                 &haunted);
-  const MeshResult result = Evaluate(haunted);
+  const MeshResult result = EvaluateRoom(haunted);
   EXPECT_EQ(*result.ghost_m2, 0.0);
   EXPECT_NEAR(*result.stray_m2, 2.0, 0.05);
   EXPECT_GT(*result.rmse_no_icp_m, 0.5);
@@ -122,7 +123,7 @@ TEST(MeshMetric, ShowsWhatIsMissingThroughCompleteness) {
   std::erase_if(half.faces, [&half](const auto& face) {
     return half.labels[face[0]] == kFloor || half.labels[face[0]] == kTable;
   });
-  const MeshResult result = Evaluate(half);
+  const MeshResult result = EvaluateRoom(half);
   // 24 m^2 of floor and 5.5 of table less the strip of floor near the walls.
   EXPECT_NEAR(*result.completeness, 1.0 - 29.5 / AreaOf(Room()), 0.04);
   EXPECT_LT(*result.miou, 0.4);
@@ -133,21 +134,22 @@ TEST(MeshMetric, AsksOnlyForWhatWasSeen) {
   std::vector<uint8_t> observed;
   for (const auto& face : half.faces) observed.push_back(half.labels[face[0]] == kWall ? 1 : 0);
   std::erase_if(half.faces, [&half](const auto& face) { return half.labels[face[0]] != kWall; });
-  EXPECT_DOUBLE_EQ(*Evaluate(half, observed).completeness, 1.0);
-  EXPECT_FALSE(Evaluate(half, std::vector<uint8_t>(observed.size(), 0)).completeness.has_value());
+  EXPECT_DOUBLE_EQ(*EvaluateRoom(half, observed).completeness, 1.0);
+  EXPECT_FALSE(
+      EvaluateRoom(half, std::vector<uint8_t>(observed.size(), 0)).completeness.has_value());
 }
 
 TEST(MeshMetric, ShowsAWrongClass) {
   MeshBlock wrong = Room();
   for (uint32_t& label : wrong.labels) label = label == kTable ? kWall : label;
-  const MeshResult result = Evaluate(wrong);
+  const MeshResult result = EvaluateRoom(wrong);
   // The table is lost, and walls gain what was the table.
   EXPECT_LT(*result.miou, 0.67);
   EXPECT_GT(*result.miou, 0.55);
 }
 
 TEST(MeshMetric, LeavesEverythingEmptyWithoutAMesh) {
-  const MeshResult result = Evaluate(MeshBlock());
+  const MeshResult result = EvaluateRoom(MeshBlock());
   EXPECT_FALSE(result.rmse_m.has_value());
   EXPECT_FALSE(result.completeness.has_value());
   EXPECT_FALSE(result.ghost_m2.has_value());

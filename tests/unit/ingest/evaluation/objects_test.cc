@@ -8,14 +8,14 @@
 namespace dsg::evaluation {
 namespace {
 
-Pose3d At(double x, double y, double yaw = 0.0) {
+Pose3d StandingAt(double x, double y, double yaw = 0.0) {
   return {{x, y, 0.4}, Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()))};
 }
 
 TrueObject Chair(double x, double y) {
   TrueObject object;
   object.class_name = "chair";
-  object.map_T_object = At(x, y);
+  object.map_T_object = StandingAt(x, y);
   object.size = {0.5, 0.5, 0.8};
   return object;
 }
@@ -23,7 +23,7 @@ TrueObject Chair(double x, double y) {
 TrueObject Couch(double x, double y, double yaw) {
   TrueObject object = Chair(x, y);
   object.class_name = "couch";
-  object.map_T_object = At(x, y, yaw);
+  object.map_T_object = StandingAt(x, y, yaw);
   object.size = {2.0, 1.0, 0.8};
   object.has_cad = true;
   return object;
@@ -41,22 +41,22 @@ EstimatedObject NodeOf(const TrueObject& object) {
   return node;
 }
 
-std::vector<TrueObject> Truth() {
+std::vector<TrueObject> ObjectTruth() {
   return {Chair(0, 0), Chair(0.8, 0), Chair(5, 5), Couch(3, 0, 0.5), Couch(3, 4, 2.0)};
 }
 
-std::vector<EstimatedObject> Perfect() {
+std::vector<EstimatedObject> PerfectObjects() {
   std::vector<EstimatedObject> nodes;
-  for (const TrueObject& object : Truth()) nodes.push_back(NodeOf(object));
+  for (const TrueObject& object : ObjectTruth()) nodes.push_back(NodeOf(object));
   return nodes;
 }
 
-ObjectResult Score(const std::vector<EstimatedObject>& nodes) {
-  return EvaluateObjects(nodes, Truth(), {});
+ObjectResult ScoreObjects(const std::vector<EstimatedObject>& nodes) {
+  return EvaluateObjects(nodes, ObjectTruth(), {});
 }
 
 TEST(ObjectMetric, IsPerfectForTheTruthItself) {
-  const ObjectResult result = Score(Perfect());
+  const ObjectResult result = ScoreObjects(PerfectObjects());
   for (const ObjectScore& score : {result.unknown, result.known}) {
     EXPECT_NEAR(*score.mean_error_m, 0.0, 1e-12);
     EXPECT_DOUBLE_EQ(*score.found_ratio, 1.0);
@@ -70,7 +70,7 @@ TEST(ObjectMetric, IsPerfectForTheTruthItself) {
 }
 
 TEST(ObjectMetric, MeasuresAShiftAndATurn) {
-  std::vector<EstimatedObject> nodes = Perfect();
+  std::vector<EstimatedObject> nodes = PerfectObjects();
   for (EstimatedObject& node : nodes) {
     node.position_map.x() += 0.3;
     if (!node.map_T_model.has_value()) continue;
@@ -78,7 +78,7 @@ TEST(ObjectMetric, MeasuresAShiftAndATurn) {
     node.map_T_model->orientation =
         Eigen::AngleAxisd(M_PI / 18.0, Eigen::Vector3d::UnitZ()) * node.map_T_model->orientation;
   }
-  const ObjectResult result = Score(nodes);
+  const ObjectResult result = ScoreObjects(nodes);
   EXPECT_NEAR(*result.unknown.mean_error_m, 0.3, 1e-9);
   EXPECT_NEAR(*result.known.mean_error_m, 0.2, 1e-9);
   EXPECT_NEAR(*result.known.mean_yaw_deg, 10.0, 1e-6);
@@ -95,17 +95,17 @@ TEST(ObjectMetric, ForgivesATurnThatNobodyCanSee) {
 }
 
 TEST(ObjectMetric, HoldsTheModelsOriginToTheMiddleOfTheFloorFace) {
-  std::vector<EstimatedObject> nodes = Perfect();
+  std::vector<EstimatedObject> nodes = PerfectObjects();
   for (EstimatedObject& node : nodes) {
     if (node.map_T_model.has_value()) node.map_T_model->position.z() += 0.4;
   }
-  EXPECT_NEAR(*Score(nodes).known.mean_error_m, 0.4, 1e-9);
+  EXPECT_NEAR(*ScoreObjects(nodes).known.mean_error_m, 0.4, 1e-9);
 }
 
 TEST(ObjectMetric, FindsNothingOfAWrongClass) {
-  std::vector<EstimatedObject> nodes = Perfect();
+  std::vector<EstimatedObject> nodes = PerfectObjects();
   for (EstimatedObject& node : nodes) node.class_name = "plant";
-  const ObjectResult result = Score(nodes);
+  const ObjectResult result = ScoreObjects(nodes);
   EXPECT_DOUBLE_EQ(*result.unknown.found_ratio, 0.0);
   EXPECT_DOUBLE_EQ(*result.unknown.f1, 0.0);
   EXPECT_DOUBLE_EQ(*result.known.found_ratio, 0.0);
@@ -113,11 +113,11 @@ TEST(ObjectMetric, FindsNothingOfAWrongClass) {
 }
 
 TEST(ObjectMetric, SeesTwoChairsMergedToOne) {
-  std::vector<EstimatedObject> nodes = Perfect();
+  std::vector<EstimatedObject> nodes = PerfectObjects();
   nodes[0].position_map = {0.4, 0, 0.4};
   nodes[0].box_map.extend(nodes[1].box_map);
   nodes.erase(nodes.begin() + 1);
-  const ObjectResult result = Score(nodes);
+  const ObjectResult result = ScoreObjects(nodes);
   EXPECT_NEAR(*result.unknown.found_ratio, 2.0 / 3.0, 1e-12);
   EXPECT_DOUBLE_EQ(*result.unknown.precision, 1.0);
   EXPECT_DOUBLE_EQ(*result.merge_rate, 0.2);
@@ -125,42 +125,42 @@ TEST(ObjectMetric, SeesTwoChairsMergedToOne) {
 }
 
 TEST(ObjectMetric, SeesAChairSplitInTwo) {
-  std::vector<EstimatedObject> nodes = Perfect();
+  std::vector<EstimatedObject> nodes = PerfectObjects();
   nodes.push_back(nodes[2]);
   nodes.back().position_map.x() += 0.2;
-  const ObjectResult result = Score(nodes);
+  const ObjectResult result = ScoreObjects(nodes);
   EXPECT_DOUBLE_EQ(*result.unknown.found_ratio, 1.0);
   EXPECT_DOUBLE_EQ(*result.unknown.precision, 0.75);
   EXPECT_DOUBLE_EQ(*result.split_rate, 0.2);
 }
 
 TEST(ObjectMetric, NeitherAsksForNorPunishesWhatWasHardlySeen) {
-  std::vector<TrueObject> truth = Truth();
+  std::vector<TrueObject> truth = ObjectTruth();
   truth[2].observed = 0.1;
-  std::vector<EstimatedObject> nodes = Perfect();
+  std::vector<EstimatedObject> nodes = PerfectObjects();
   EXPECT_DOUBLE_EQ(*EvaluateObjects(nodes, truth, {}).unknown.precision, 1.0);
   nodes.erase(nodes.begin() + 2);
   EXPECT_DOUBLE_EQ(*EvaluateObjects(nodes, truth, {}).unknown.found_ratio, 1.0);
 }
 
 TEST(ObjectMetric, TakesACarriedObjectWhereItStoodBeforeOrAfter) {
-  std::vector<TrueObject> truth = Truth();
-  truth[2].later_map_T_object = {At(9, 9)};
-  std::vector<EstimatedObject> nodes = Perfect();
+  std::vector<TrueObject> truth = ObjectTruth();
+  truth[2].later_map_T_object = {StandingAt(9, 9)};
+  std::vector<EstimatedObject> nodes = PerfectObjects();
   nodes[2].position_map = {9, 9, 0.4};
   EXPECT_NEAR(*EvaluateObjects(nodes, truth, {}).unknown.mean_error_m, 0.0, 1e-12);
   // One node for each is no mistake either.
-  nodes.push_back(Perfect()[2]);
+  nodes.push_back(PerfectObjects()[2]);
   EXPECT_DOUBLE_EQ(*EvaluateObjects(nodes, truth, {}).unknown.f1, 1.0);
 }
 
 TEST(ObjectMetric, LeavesKnownShapesEmptyWhenNoModelWasFitted) {
-  std::vector<EstimatedObject> nodes = Perfect();
+  std::vector<EstimatedObject> nodes = PerfectObjects();
   for (EstimatedObject& node : nodes) node.map_T_model.reset();
-  const ObjectResult result = Score(nodes);
+  const ObjectResult result = ScoreObjects(nodes);
   EXPECT_FALSE(result.known.found_ratio.has_value());
   EXPECT_DOUBLE_EQ(*result.unknown.f1, 1.0);
-  EXPECT_FALSE(Score({}).unknown.found_ratio.has_value());
+  EXPECT_FALSE(ScoreObjects({}).unknown.found_ratio.has_value());
 }
 
 }  // namespace

@@ -48,14 +48,14 @@ Graph Lattice() {
   return graph;
 }
 
-PlaceResult Score(const Graph& graph) {
+PlaceResult ScorePlaces(const Graph& graph) {
   const truth::FreeGrid grid = TwoRooms();
   const GridMap map(&grid);
   return EvaluatePlaces(graph.places, graph.edges, map, {});
 }
 
 TEST(PlaceMetric, IsGoodForADenseLattice) {
-  const PlaceResult result = Score(Lattice());
+  const PlaceResult result = ScorePlaces(Lattice());
   EXPECT_DOUBLE_EQ(*result.collision_free_ratio, 1.0);
   EXPECT_DOUBLE_EQ(*result.coverage, 1.0);
   EXPECT_DOUBLE_EQ(*result.connectivity, 1.0);
@@ -74,7 +74,7 @@ TEST(PlaceMetric, CountsEdgesThroughWallsOnceAndDoesNotWalkThem) {
     graph.edges.emplace_back(12 + j, 16 + j);
     graph.edges.emplace_back(16 + j, 12 + j);
   }
-  const PlaceResult result = Score(graph);
+  const PlaceResult result = ScorePlaces(graph);
   EXPECT_EQ(result.edge_count, static_cast<int64_t>(before - 4 + 2));
   EXPECT_NEAR(*result.collision_free_ratio, 1.0 - 2.0 / static_cast<double>(before - 2), 1e-12);
   EXPECT_LT(*result.connectivity, 0.85);
@@ -85,7 +85,7 @@ TEST(PlaceMetric, ShowsThatARoomHasNoPlaces) {
   graph.places.resize(16);
   std::erase_if(graph.edges,
                 [](const PlaceEdge& edge) { return edge.first >= 16 || edge.second >= 16; });
-  const PlaceResult result = Score(graph);
+  const PlaceResult result = ScorePlaces(graph);
   EXPECT_LT(*result.coverage, 0.8);
   EXPECT_GT(*result.coverage, 0.45);
   EXPECT_LT(*result.connectivity, 0.75);
@@ -102,14 +102,14 @@ TEST(PlaceMetric, ShowsDetours) {
     const bool at_bottom = edge.first % 4 == 0 && edge.second % 4 == 0;
     return column % 2 == 1 ? !at_top : !at_bottom;
   });
-  EXPECT_GT(*Score(snake).stretch_median, *Score(Lattice()).stretch_median + 0.05);
+  EXPECT_GT(*ScorePlaces(snake).stretch_median, *ScorePlaces(Lattice()).stretch_median + 0.05);
 }
 
 TEST(PlaceMetric, IsEmptyWithoutPlacesAndHasNoWaysWithoutEdges) {
-  EXPECT_FALSE(Score({}).coverage.has_value());
+  EXPECT_FALSE(ScorePlaces({}).coverage.has_value());
   Graph graph = Lattice();
   graph.edges.clear();
-  const PlaceResult result = Score(graph);
+  const PlaceResult result = ScorePlaces(graph);
   EXPECT_DOUBLE_EQ(*result.coverage, 1.0);
   EXPECT_FALSE(result.collision_free_ratio.has_value());
   EXPECT_FALSE(result.stretch_median.has_value());
@@ -119,7 +119,7 @@ TEST(PlaceMetric, IsEmptyWithoutPlacesAndHasNoWaysWithoutEdges) {
 TEST(PlaceMetric, TakesPlacesInWallsForUseless) {
   Graph graph = Lattice();
   for (EstimatedPlace& place : graph.places) place.position_map.x() += 100.0;
-  const PlaceResult result = Score(graph);
+  const PlaceResult result = ScorePlaces(graph);
   EXPECT_DOUBLE_EQ(*result.collision_free_ratio, 0.0);
   EXPECT_DOUBLE_EQ(*result.coverage, 0.0);
   EXPECT_FALSE(result.stretch_median.has_value());

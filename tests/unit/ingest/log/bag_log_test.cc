@@ -12,7 +12,6 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr TimeNs kT0 = 1'600'000'000 * kNsPerSecond;
 constexpr char kImage[] = "sensor_msgs/Image";
 
 bool HasNote(const LogInfo& info, const std::string& part) {
@@ -20,14 +19,6 @@ bool HasNote(const LogInfo& info, const std::string& part) {
     if (note.find(part) != std::string::npos) return true;
   }
   return false;
-}
-
-void ExpectError(const absl::Status& status, const std::vector<std::string>& parts) {
-  EXPECT_EQ(ReasonOf(status), Reason::kFileMalformed) << status;
-  for (const std::string& part : parts) {
-    EXPECT_NE(std::string(status.message()).find(part), std::string::npos)
-        << "no \"" << part << "\" in: " << status.message();
-  }
 }
 
 std::string Floats(const std::vector<float>& values) {
@@ -140,11 +131,11 @@ TEST(BagLog, NamesTopicMessageAndStampsThatStepBack) {
   for (const TimeNs t : {10, 30, 20}) {
     bag.Add("/imu0", "sensor_msgs/Imu", 100, ImuMessage(kT0 + t, 0, 0));
   }
-  ExpectError(ReadAll(folder.Write("log.bag", bag.Finish())).status(),
-              {"/imu0", "message 3", absl::StrCat(kT0 + 20), absl::StrCat(kT0 + 30)});
+  ExpectMalformedFile(ReadAll(folder.Write("log.bag", bag.Finish())).status(),
+                      {"/imu0", "message 3", absl::StrCat(kT0 + 20), absl::StrCat(kT0 + 30)});
   BagWriter repeat;
   for (int i = 0; i < 2; ++i) repeat.Add("/imu0", "sensor_msgs/Imu", 1, ImuMessage(kT0, 0, 0));
-  ExpectError(ReadAll(folder.Write("log.bag", repeat.Finish())).status(), {"message 2"});
+  ExpectMalformedFile(ReadAll(folder.Write("log.bag", repeat.Finish())).status(), {"message 2"});
 }
 
 TEST(BagLog, MergesTopicsThatAreLateByLessThanASecond) {
@@ -160,7 +151,7 @@ TEST(BagLog, MergesTopicsThatAreLateByLessThanASecond) {
     }
     const auto log = ReadAll(folder.Write("log.bag", bag.Finish()));
     if (is_too_late) {
-      ExpectError(log.status(), {"/cam0/image_raw", "more than a second", "clock"});
+      ExpectMalformedFile(log.status(), {"/cam0/image_raw", "more than a second", "clock"});
       continue;
     }
     ASSERT_TRUE(log.ok()) << log.status();
@@ -238,7 +229,7 @@ TEST(BagLog, RefusesBadImagesOnlyWhenTheyAreAskedFor) {
     bag.Add("/cam0/image_raw", kImage, 1, message);
     const auto log = ReadAll(folder.Write("log.bag", bag.Finish()));
     ASSERT_TRUE(log.ok()) << log.status();
-    ExpectError(log->images.at(0).load().status(), {part, "/cam0/image_raw message 1"});
+    ExpectMalformedFile(log->images.at(0).load().status(), {part, "/cam0/image_raw message 1"});
   }
 }
 

@@ -17,6 +17,9 @@
 
 namespace dsg::ingest {
 
+/// When the bags of the tests begin.
+inline constexpr TimeNs kT0 = 1'600'000'000 * kNsPerSecond;
+
 /// Little-endian bytes, one field after another.
 class ByteWriter {
  public:

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "schema/base/status.h"
+#include "tests/unit/ingest/log/log_test_util.h"
 
 namespace dsg::ingest {
 namespace {
@@ -38,20 +39,8 @@ constexpr char kImu[] =
 
 LogFile File(const std::string& bytes) { return {"sensor.yaml", "sensor.yaml", bytes}; }
 
-std::string Changed(const std::string& text, const std::string& from, const std::string& to) {
-  std::string result = text;
-  const size_t at = result.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return result.replace(at, from.size(), to);
-}
-
-void ExpectError(const std::string& bytes, const std::vector<std::string>& parts) {
-  const absl::Status status = ReadCameraYaml(File(bytes), "cam0").status();
-  EXPECT_EQ(ReasonOf(status), Reason::kFileMalformed) << bytes;
-  for (const std::string& part : parts) {
-    EXPECT_NE(std::string(status.message()).find(part), std::string::npos)
-        << "no \"" << part << "\" in: " << status.message();
-  }
+void ExpectCameraError(const std::string& bytes, const std::vector<std::string>& parts) {
+  ExpectMalformedFile(ReadCameraYaml(File(bytes), "cam0").status(), parts);
 }
 
 TEST(CalibrationFile, ReadsACamera) {
@@ -101,35 +90,36 @@ TEST(CalibrationFile, ReadsAnInertialUnit) {
 }
 
 TEST(CalibrationFile, NamesFileLineFieldAndValue) {
-  ExpectError(Changed(kCamera, "458.654", "-458.654"), {"sensor.yaml", "fx", "-458.654"});
-  ExpectError(Changed(kCamera, "458.654", "many"), {"sensor.yaml:12", "intrinsics", "many"});
-  ExpectError(Changed(kCamera, "458.654, ", ""), {"intrinsics", "3 numbers"});
-  ExpectError(Changed(kCamera, "752", "0"), {"width", "0"});
-  ExpectError(Changed(kCamera, "752", "1e9"), {"resolution"});
-  ExpectError(Changed(kCamera, "752", ".nan"), {"resolution"});
-  ExpectError(Changed(kCamera, "pinhole", "omni"), {"camera_model", "omni"});
-  ExpectError(Changed(kCamera, "radial-tangential", "fov"), {"distortion_model", "fov"});
-  ExpectError(Changed(kCamera, ", 1.76187114e-05", ""), {"distortion_coefficients"});
-  ExpectError(Changed(kCamera, "sensor_type: camera", "sensor_type: imu"), {"sensor_type", "imu"});
-  ExpectError(Changed(kCamera, "T_BS", "T_SB"), {"T_BS", "missing"});
-  ExpectError(Changed(kCamera, "-1.0", "-1.5"), {"T_BS", "rotation"});
-  ExpectError(Changed(kCamera, "-1.0", "1.0"), {"T_BS", "rotation"});
-  ExpectError(Changed(kCamera, "0.0, 0.0, 0.0, 1.0]", "0.0, 0.0, 0.0]"), {"T_BS", "15"});
-  ExpectError("just text", {"no map"});
-  ExpectError("a: [1, 2", {"YAML"});
-  ExpectError("a: *nobody", {"YAML"});
+  ExpectCameraError(Changed(kCamera, "458.654", "-458.654"), {"sensor.yaml", "fx", "-458.654"});
+  ExpectCameraError(Changed(kCamera, "458.654", "many"), {"sensor.yaml:12", "intrinsics", "many"});
+  ExpectCameraError(Changed(kCamera, "458.654, ", ""), {"intrinsics", "3 numbers"});
+  ExpectCameraError(Changed(kCamera, "752", "0"), {"width", "0"});
+  ExpectCameraError(Changed(kCamera, "752", "1e9"), {"resolution"});
+  ExpectCameraError(Changed(kCamera, "752", ".nan"), {"resolution"});
+  ExpectCameraError(Changed(kCamera, "pinhole", "omni"), {"camera_model", "omni"});
+  ExpectCameraError(Changed(kCamera, "radial-tangential", "fov"), {"distortion_model", "fov"});
+  ExpectCameraError(Changed(kCamera, ", 1.76187114e-05", ""), {"distortion_coefficients"});
+  ExpectCameraError(Changed(kCamera, "sensor_type: camera", "sensor_type: imu"),
+                    {"sensor_type", "imu"});
+  ExpectCameraError(Changed(kCamera, "T_BS", "T_SB"), {"T_BS", "missing"});
+  ExpectCameraError(Changed(kCamera, "-1.0", "-1.5"), {"T_BS", "rotation"});
+  ExpectCameraError(Changed(kCamera, "-1.0", "1.0"), {"T_BS", "rotation"});
+  ExpectCameraError(Changed(kCamera, "0.0, 0.0, 0.0, 1.0]", "0.0, 0.0, 0.0]"), {"T_BS", "15"});
+  ExpectCameraError("just text", {"no map"});
+  ExpectCameraError("a: [1, 2", {"YAML"});
+  ExpectCameraError("a: *nobody", {"YAML"});
 }
 
 TEST(CalibrationFile, RefusesLargeAndDeepFiles) {
-  ExpectError(std::string((size_t{1} << 20) + 1, 'a'), {"bytes"});
-  ExpectError("a: " + std::string(200'000, '['), {"deep"});
-  ExpectError("a:\n" + std::string(20'000, '-') + " 1", {});
+  ExpectCameraError(std::string((size_t{1} << 20) + 1, 'a'), {"bytes"});
+  ExpectCameraError("a: " + std::string(200'000, '['), {"deep"});
+  ExpectCameraError("a:\n" + std::string(20'000, '-') + " 1", {});
   std::string dashes = "a:\n";
   for (int i = 0; i < 5000; ++i) dashes += "- ";
-  ExpectError(dashes, {"deep"});
+  ExpectCameraError(dashes, {"deep"});
   std::string steps;
   for (int i = 0; i < 600; ++i) steps += std::string(static_cast<size_t>(i), ' ') + "a:\n";
-  ExpectError(steps, {});
+  ExpectCameraError(steps, {});
 }
 
 TEST(CalibrationFile, ReadsListsOfPoses) {

@@ -8,34 +8,27 @@
 
 #include "schema/base/status.h"
 #include "tests/unit/ingest/log/detection_lines.h"
+#include "tests/unit/ingest/log/log_test_util.h"
 
 namespace dsg::ingest {
 namespace {
 
-absl::StatusOr<HumanDetection> Parse(const std::string& line) {
+absl::StatusOr<HumanDetection> ParseLine(const std::string& line) {
   const std::string file = "data.jsonl";
   return ParseDetection(LinePosition{file, 4}, line);
 }
 
 // The line with one piece replaced.
-std::string Changed(const std::string& from, const std::string& to) {
-  std::string line = DetectionLine(1000, 7);
-  const size_t at = line.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return line.replace(at, from.size(), to);
+std::string LineWith(const std::string& from, const std::string& to) {
+  return Changed(DetectionLine(1000, 7), from, to);
 }
 
-void ExpectError(const std::string& line, const std::string& field) {
-  const absl::Status status = Parse(line).status();
-  EXPECT_EQ(ReasonOf(status), Reason::kFileMalformed) << status;
-  for (const std::string& part : {std::string("data.jsonl:4"), field}) {
-    EXPECT_NE(std::string(status.message()).find(part), std::string::npos)
-        << "no \"" << part << "\" in: " << status.message();
-  }
+void ExpectLineError(const std::string& line, const std::string& field) {
+  ExpectMalformedFile(ParseLine(line).status(), {"data.jsonl:4", field});
 }
 
 TEST(DetectionJson, ReadsEveryField) {
-  const auto detection = Parse(DetectionLine(1000, 7));
+  const auto detection = ParseLine(DetectionLine(1000, 7));
   ASSERT_TRUE(detection.ok()) << detection.status();
   EXPECT_EQ(detection->time_ns, 1000);
   EXPECT_EQ(detection->id, 7);
@@ -55,84 +48,85 @@ TEST(DetectionJson, ReadsEveryField) {
 }
 
 TEST(DetectionJson, LetsPoseAndShapeBeMissing) {
-  EXPECT_TRUE(Parse(Changed("\"pose\"", "\"pose_\"")).ok());
-  EXPECT_TRUE(Parse(Changed("\"shape\"", "\"shape_\"")).ok());
+  EXPECT_TRUE(ParseLine(LineWith("\"pose\"", "\"pose_\"")).ok());
+  EXPECT_TRUE(ParseLine(LineWith("\"shape\"", "\"shape_\"")).ok());
 }
 
 TEST(DetectionJson, ReadsABoxAlone) {
-  const auto detection = Parse(
+  const auto detection = ParseLine(
       "{\"time_ns\":5,\"camera\":\"cam0\",\"id\":1,\"score\":0.5,\"box\":[1,2,3,4],"
       "\"mask_instance\":0}");
   ASSERT_TRUE(detection.ok()) << detection.status();
   EXPECT_FALSE(detection->has_joints);
   EXPECT_EQ(detection->joints_root[5], Eigen::Vector3d::Zero());
   EXPECT_EQ(detection->joint_visibility[5], 0.0);
-  EXPECT_TRUE(Parse(DetectionLine(1000, 7))->has_joints);
-  ExpectError(Changed("\"joints\"", "\"joints_\""), "joints_px");
-  ExpectError(Changed("\"joints_px\"", "\"joints_px_\""), "joints_px");
+  EXPECT_TRUE(ParseLine(DetectionLine(1000, 7))->has_joints);
+  ExpectLineError(LineWith("\"joints\"", "\"joints_\""), "joints_px");
+  ExpectLineError(LineWith("\"joints_px\"", "\"joints_px_\""), "joints_px");
 }
 
 TEST(DetectionJson, TakesThePelvisForTheWeakCamera) {
-  const auto detection = Parse(Changed("\"weak_camera\":", "\"pelvis\":[0.5,-1,4],\"weak_\":"));
+  const auto detection =
+      ParseLine(LineWith("\"weak_camera\":", "\"pelvis\":[0.5,-1,4],\"weak_\":"));
   ASSERT_TRUE(detection.ok()) << detection.status();
   EXPECT_EQ(detection->pelvis_camera, Eigen::Vector3d(0.5, -1, 4));
-  EXPECT_FALSE(Parse(DetectionLine(1000, 7))->pelvis_camera.has_value());
-  ExpectError(Changed("\"weak_camera\":", "\"pelvis\":[0.5,-1,-4],\"weak_\":"), "pelvis");
-  ExpectError(Changed("\"weak_camera\":", "\"pelvis\":[0.5,-1],\"weak_\":"), "pelvis");
-  ExpectError(Changed("\"weak_camera\":", "\"pelvis\":[0,0,1e9],\"weak_\":"), "pelvis");
+  EXPECT_FALSE(ParseLine(DetectionLine(1000, 7))->pelvis_camera.has_value());
+  ExpectLineError(LineWith("\"weak_camera\":", "\"pelvis\":[0.5,-1,-4],\"weak_\":"), "pelvis");
+  ExpectLineError(LineWith("\"weak_camera\":", "\"pelvis\":[0.5,-1],\"weak_\":"), "pelvis");
+  ExpectLineError(LineWith("\"weak_camera\":", "\"pelvis\":[0,0,1e9],\"weak_\":"), "pelvis");
 }
 
 TEST(DetectionJson, ReadsVerticesFlatOrInThrees) {
   const auto with = [](const std::string& vertices) {
-    return Changed("\"shape\"", "\"vertices\":" + vertices + ",\"shape\"");
+    return LineWith("\"shape\"", "\"vertices\":" + vertices + ",\"shape\"");
   };
   const std::vector<float> expected = {0.5f, 1.0f, -2.0f, 3.0f, 4.0f, 5.0f};
-  const auto threes = Parse(with("[[0.5,1,-2],[3,4,5]]"));
+  const auto threes = ParseLine(with("[[0.5,1,-2],[3,4,5]]"));
   ASSERT_TRUE(threes.ok()) << threes.status();
   EXPECT_EQ(threes->vertices_root, expected);
-  const auto flat = Parse(with("[0.5,1,-2,3,4,5]"));
+  const auto flat = ParseLine(with("[0.5,1,-2,3,4,5]"));
   ASSERT_TRUE(flat.ok()) << flat.status();
   EXPECT_EQ(flat->vertices_root, expected);
-  EXPECT_TRUE(Parse(with("[]"))->vertices_root.empty());
-  EXPECT_TRUE(Parse(with(Repeated("0.5", 60'000))).ok());
-  ExpectError(with(Repeated("0.5", 60'003)), "vertices");
-  ExpectError(with(Repeated("[0,0,0]", 20'001)), "vertices");
-  ExpectError(with("[0.5,1]"), "vertices");
-  ExpectError(with("[[0.5,1]]"), "vertices");
-  ExpectError(with("[[0.5,1,null]]"), "vertices");
-  ExpectError(with("[0.5,1,[2,3,4]]"), "vertices");
-  ExpectError(with("[0.5,1,200]"), "vertices");
-  ExpectError(with("7"), "vertices");
+  EXPECT_TRUE(ParseLine(with("[]"))->vertices_root.empty());
+  EXPECT_TRUE(ParseLine(with(Repeated("0.5", 60'000))).ok());
+  ExpectLineError(with(Repeated("0.5", 60'003)), "vertices");
+  ExpectLineError(with(Repeated("[0,0,0]", 20'001)), "vertices");
+  ExpectLineError(with("[0.5,1]"), "vertices");
+  ExpectLineError(with("[[0.5,1]]"), "vertices");
+  ExpectLineError(with("[[0.5,1,null]]"), "vertices");
+  ExpectLineError(with("[0.5,1,[2,3,4]]"), "vertices");
+  ExpectLineError(with("[0.5,1,200]"), "vertices");
+  ExpectLineError(with("7"), "vertices");
 }
 
 TEST(DetectionJson, NamesTheFieldThatIsWrong) {
-  ExpectError("", "JSON");
-  ExpectError("[1]", "JSON");
-  ExpectError("{\"time_ns\":1", "JSON");
-  ExpectError("{}", "time_ns");
-  ExpectError(Changed("\"time_ns\":1000", "\"time_ns\":1000.5"), "time_ns");
-  ExpectError(Changed("\"time_ns\":1000", "\"time_ns\":-1"), "time_ns");
-  ExpectError(Changed("\"time_ns\":1000", "\"time_ns\":99999999999999999999"), "time_ns");
-  ExpectError(Changed("\"cam0\"", "7"), "camera");
-  ExpectError(Changed("\"score\":0.9", "\"score\":1.01"), "score");
-  ExpectError(Changed("\"score\":0.9", "\"score\":null"), "score");
-  ExpectError(Changed("[10.5,20,30,60]", "[30,20,10,60]"), "box");
-  ExpectError(Changed("[10.5,20,30,60]", "[10.5,20,30]"), "box");
-  ExpectError(Changed("\"mask_instance\":3", "\"mask_instance\":-3"), "mask_instance");
-  ExpectError(Changed("[0.1,-0.2,0.3]", "[0.1,-0.2]"), "joints");
-  ExpectError(Changed("[0.1,-0.2,0.3],", ""), "joints");
-  ExpectError(Changed("[0.1,-0.2,0.3]", "[0.1,-200,0.3]"), "joints");
-  ExpectError(Changed("[20,40.5,1]", "[20,40.5,2]"), "joints_px");
-  ExpectError(Changed("0.25,", ""), "pose");
-  ExpectError(Changed("\"weak_camera\":{", "\"weak\":{"), "weak_camera");
-  ExpectError(Changed("\"t\":[0.1,0.2]", "\"t\":[0.1]"), "field t");
+  ExpectLineError("", "JSON");
+  ExpectLineError("[1]", "JSON");
+  ExpectLineError("{\"time_ns\":1", "JSON");
+  ExpectLineError("{}", "time_ns");
+  ExpectLineError(LineWith("\"time_ns\":1000", "\"time_ns\":1000.5"), "time_ns");
+  ExpectLineError(LineWith("\"time_ns\":1000", "\"time_ns\":-1"), "time_ns");
+  ExpectLineError(LineWith("\"time_ns\":1000", "\"time_ns\":99999999999999999999"), "time_ns");
+  ExpectLineError(LineWith("\"cam0\"", "7"), "camera");
+  ExpectLineError(LineWith("\"score\":0.9", "\"score\":1.01"), "score");
+  ExpectLineError(LineWith("\"score\":0.9", "\"score\":null"), "score");
+  ExpectLineError(LineWith("[10.5,20,30,60]", "[30,20,10,60]"), "box");
+  ExpectLineError(LineWith("[10.5,20,30,60]", "[10.5,20,30]"), "box");
+  ExpectLineError(LineWith("\"mask_instance\":3", "\"mask_instance\":-3"), "mask_instance");
+  ExpectLineError(LineWith("[0.1,-0.2,0.3]", "[0.1,-0.2]"), "joints");
+  ExpectLineError(LineWith("[0.1,-0.2,0.3],", ""), "joints");
+  ExpectLineError(LineWith("[0.1,-0.2,0.3]", "[0.1,-200,0.3]"), "joints");
+  ExpectLineError(LineWith("[20,40.5,1]", "[20,40.5,2]"), "joints_px");
+  ExpectLineError(LineWith("0.25,", ""), "pose");
+  ExpectLineError(LineWith("\"weak_camera\":{", "\"weak\":{"), "weak_camera");
+  ExpectLineError(LineWith("\"t\":[0.1,0.2]", "\"t\":[0.1]"), "field t");
 }
 
 TEST(DetectionJson, RefusesLinesThatAreTooLongOrTooDeep) {
-  ExpectError(std::string((size_t{1} << 20) + 1, ' '), "bytes");
-  ExpectError(std::string(100'000, '['), "deep");
-  ExpectError("{\"a\":\"\xff\"}", "UTF-8");
-  EXPECT_TRUE(Parse(Changed("\"cam0\"", "\"[[[[[[[[[[[[\"")).ok()) << "brackets in text";
+  ExpectLineError(std::string((size_t{1} << 20) + 1, ' '), "bytes");
+  ExpectLineError(std::string(100'000, '['), "deep");
+  ExpectLineError("{\"a\":\"\xff\"}", "UTF-8");
+  EXPECT_TRUE(ParseLine(LineWith("\"cam0\"", "\"[[[[[[[[[[[[\"")).ok()) << "brackets in text";
 }
 
 TEST(DetectionJson, SurvivesAnyCutAndAnyChangedByte) {
@@ -140,11 +134,13 @@ TEST(DetectionJson, SurvivesAnyCutAndAnyChangedByte) {
   SCOPED_TRACE(testing::Message() << "seed " << kSeed);
   std::mt19937 random(kSeed);
   const std::string line = DetectionLine(1000, 7);
-  for (size_t size = 0; size < line.size(); ++size) EXPECT_FALSE(Parse(line.substr(0, size)).ok());
+  for (size_t size = 0; size < line.size(); ++size) {
+    EXPECT_FALSE(ParseLine(line.substr(0, size)).ok());
+  }
   for (int i = 0; i < 3000; ++i) {
     std::string changed = line;
     changed[random() % changed.size()] = static_cast<char>(random() % 256);
-    const auto detection = Parse(changed);
+    const auto detection = ParseLine(changed);
     EXPECT_TRUE(detection.ok() || ReasonOf(detection.status()) == Reason::kFileMalformed);
   }
 }

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "ingest/log/log_source.h"
+#include "schema/base/status.h"
 
 namespace dsg::ingest {
 
@@ -102,6 +103,24 @@ inline absl::StatusOr<WholeLog> ReadAll(const std::string& path, const LogOption
     if (!next.ok()) return next.status();
     if (!next->has_value()) return whole;
     Keep(**std::move(next), &whole);
+  }
+}
+
+/// `text` with one piece replaced.
+inline std::string Changed(const std::string& text, const std::string& from,
+                           const std::string& to) {
+  std::string result = text;
+  const size_t at = result.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return result.replace(at, from.size(), to);
+}
+
+/// A malformed file whose message holds all of `parts`.
+inline void ExpectMalformedFile(const absl::Status& status, const std::vector<std::string>& parts) {
+  EXPECT_EQ(ReasonOf(status), Reason::kFileMalformed) << status;
+  for (const std::string& part : parts) {
+    EXPECT_NE(std::string(status.message()).find(part), std::string::npos)
+        << "no \"" << part << "\" in: " << status.message();
   }
 }
 

@@ -24,7 +24,7 @@ std::string Line(TimeNs from_ns, TimeNs to_ns, const std::string& more = "") {
                       ", \"sigma_m\": 0.1, \"sigma_rad\": 0.01", more, "}\n");
 }
 
-absl::StatusOr<LoopMeasurement> Parse(const std::string& line) {
+absl::StatusOr<LoopMeasurement> ParseLoop(const std::string& line) {
   LoopLines loops;
   const std::string file = "loops.jsonl";
   const absl::Status status = loops.Add(LinePosition{file, 7}, line);
@@ -34,7 +34,7 @@ absl::StatusOr<LoopMeasurement> Parse(const std::string& line) {
 }
 
 void ExpectRefused(const std::string& line, const std::string& part) {
-  const auto loop = Parse(line);
+  const auto loop = ParseLoop(line);
   EXPECT_EQ(ReasonOf(loop.status()), Reason::kFileMalformed) << line;
   const std::string message(loop.status().message());
   EXPECT_NE(message.find(part), std::string::npos) << message;
@@ -46,7 +46,7 @@ std::string Replace(const std::string& from, const std::string& to) {
 }
 
 TEST(LoopFile, ReadsPoseAndDeviations) {
-  const auto loop = Parse(Line(100, 300, ", \"score\": 0.5"));
+  const auto loop = ParseLoop(Line(100, 300, ", \"score\": 0.5"));
   ASSERT_TRUE(loop.ok()) << loop.status();
   EXPECT_EQ(loop->from_ns, 100);
   EXPECT_EQ(loop->time_ns, 300);
@@ -72,7 +72,7 @@ TEST(LoopFile, AnyLoopIsReadBackAsItWasWritten) {
     for (double& value : root.reshaped()) value = random.Normal();
     loop.information = root * root.transpose() + Eigen::Matrix<double, 6, 6>::Identity();
     if (random.Chance(0.5)) loop.score = random.Uniform();
-    const auto again = Parse(FormatLoop(loop));
+    const auto again = ParseLoop(FormatLoop(loop));
     ASSERT_TRUE(again.ok()) << again.status();
     EXPECT_EQ(again->from_ns, loop.from_ns);
     EXPECT_EQ(again->time_ns, loop.time_ns);
@@ -106,7 +106,7 @@ TEST(LoopFile, RefusesInformationThatIsNotPositiveDefinite) {
   loop.information(2, 2) = -1.0;
   ExpectRefused(FormatLoop(loop), "positive definite");
   loop.information.setIdentity();
-  ASSERT_TRUE(Parse(FormatLoop(loop)).ok());
+  ASSERT_TRUE(ParseLoop(FormatLoop(loop)).ok());
   ExpectRefused(absl::StrReplaceAll(FormatLoop(loop), {{"\"information\"",
                                                         "\"sigma_m\": 1, "
                                                         "\"information\""}}),
@@ -180,7 +180,6 @@ TEST_F(LoopLogTest, LogsOfTracksTakeNoLoops) {
 }
 
 TEST(LoopBag, LoopsFoundLateAreGivenAtTheirStamps) {
-  constexpr TimeNs kT0 = 1'600'000'000 * kNsPerSecond;
   BagWriter bag("none");
   for (int i = 0; i < 20; ++i) {
     const TimeNs t = kT0 + i * kNsPerSecond;
@@ -210,7 +209,6 @@ TEST(LoopBag, LoopsFoundLateAreGivenAtTheirStamps) {
 }
 
 TEST(LoopBag, ABrokenMessageIsNamed) {
-  constexpr TimeNs kT0 = 1'600'000'000 * kNsPerSecond;
   BagWriter bag("none");
   bag.Add("/dsg/loop_closures", "std_msgs/String", kT0, StringMessage("{}"));
   const TempFolder folder;

@@ -6,21 +6,23 @@
 namespace dsg::ingest {
 namespace {
 
-std::string FormatOf(const TempFolder& folder, const std::string& bytes) {
+std::string FormatOrError(const TempFolder& folder, const std::string& bytes) {
   const absl::StatusOr<WholeLog> log = ReadAll(folder.Write("log.bin", bytes));
   return log.ok() ? log->info.format : std::string(log.status().message());
 }
 
 TEST(OpenLog, TellsFormatsByContentNotByName) {
   const TempFolder folder;
-  EXPECT_EQ(FormatOf(folder, "0 1 0 0 0 0 0 0\n"), "obsmat");
-  EXPECT_EQ(FormatOf(folder, "  0.0\t1.0\t2.5\t3\r\n"), "trajnet");
-  EXPECT_EQ(FormatOf(folder, "{\"track\": {\"f\": 0, \"p\": 1, \"x\": 0, \"y\": 0}}\n"),
+  EXPECT_EQ(FormatOrError(folder, "0 1 0 0 0 0 0 0\n"), "obsmat");
+  EXPECT_EQ(FormatOrError(folder, "  0.0\t1.0\t2.5\t3\r\n"), "trajnet");
+  EXPECT_EQ(FormatOrError(folder, "{\"track\": {\"f\": 0, \"p\": 1, \"x\": 0, \"y\": 0}}\n"),
             "trajnet-ndjson");
-  EXPECT_EQ(FormatOf(folder, "Time,x,y,z,ag_id,data_label,tracklet_id\n0,0,0,0,H,a,1\n"), "thor");
-  EXPECT_EQ(FormatOf(folder, "1403636584263555584,4,1,0,1,0,0,0\n"), "euroc");
-  EXPECT_EQ(FormatOf(folder, "time_ns,agent,kind,x,y,z,qx,qy,qz,qw\n0,a,human,0,0,0,0,0,0,1\n"),
-            "dsg-tracks");
+  EXPECT_EQ(FormatOrError(folder, "Time,x,y,z,ag_id,data_label,tracklet_id\n0,0,0,0,H,a,1\n"),
+            "thor");
+  EXPECT_EQ(FormatOrError(folder, "1403636584263555584,4,1,0,1,0,0,0\n"), "euroc");
+  EXPECT_EQ(
+      FormatOrError(folder, "time_ns,agent,kind,x,y,z,qx,qy,qz,qw\n0,a,human,0,0,0,0,0,0,1\n"),
+      "dsg-tracks");
 }
 
 TEST(OpenLog, ListsTheFormatsWhenNoneFits) {

@@ -34,7 +34,7 @@ int RankOf(const std::string& channel) {
   return channel == "detections0" ? 3 : 2;
 }
 
-PixelFormat FormatOf(const std::string& channel, const std::string& path) {
+PixelFormat PixelFormatOf(const std::string& channel, const std::string& path) {
   if (channel.starts_with("cam")) return PixelFormat::kGray8;
   if (channel.starts_with("color")) return PixelFormat::kRgb8;
   const bool is_float =
@@ -68,7 +68,8 @@ TEST_P(RealSensorLogTest, HasTheCountsOfItsReadmeAndDecodes) {
     ASSERT_TRUE(image.ok()) << image.status();
     EXPECT_EQ(image->width, expected.width) << measurement.origin;
     EXPECT_EQ(image->height, expected.height) << measurement.origin;
-    EXPECT_EQ(image->format, FormatOf(measurement.channel, expected.path)) << measurement.origin;
+    EXPECT_EQ(image->format, PixelFormatOf(measurement.channel, expected.path))
+        << measurement.origin;
     EXPECT_EQ(image->bytes.size(), image->Offset(0, image->height));
   }
 }

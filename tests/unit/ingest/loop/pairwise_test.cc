@@ -16,14 +16,10 @@
 #include "ingest/loop/relative_covariance.h"
 #include "ingest/loop/twist.h"
 #include "schema/base/random.h"
+#include "tests/unit/ingest/loop/random_graph.h"
 
 namespace dsg::ingest {
 namespace {
-
-Pose3d Planar(double x_m, double y_m, double yaw_rad) {
-  return {Eigen::Vector3d(x_m, y_m, 0.0),
-          Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()))};
-}
 
 Pose3d RandomPose(Random* random, double turn_rad) {
   const Eigen::Vector3d axis(random->Normal(), random->Normal(), random->Normal());
@@ -32,7 +28,7 @@ Pose3d RandomPose(Random* random, double turn_rad) {
               Eigen::AngleAxisd(random->Uniform(-turn_rad, turn_rad), axis.normalized()))};
 }
 
-RelativePose Edge(int from, int to, const Pose3d& from_T_to, bool is_loop) {
+RelativePose CoarseEdge(int from, int to, const Pose3d& from_T_to, bool is_loop) {
   RelativePose edge;
   edge.from = from;
   edge.to = to;
@@ -53,7 +49,8 @@ PoseGraph OutAndBack(int half_count) {
   }
   for (int i = 0; i + 1 < 2 * half_count; ++i) {
     const size_t k = static_cast<size_t>(i);
-    graph.edges.push_back(Edge(i, i + 1, graph.poses[k].Inverse() * graph.poses[k + 1], false));
+    graph.edges.push_back(
+        CoarseEdge(i, i + 1, graph.poses[k].Inverse() * graph.poses[k + 1], false));
   }
   return graph;
 }
@@ -94,8 +91,8 @@ TEST(OdometryTree, AddsCovariancesAlongTheWayWhicheverWayItIsWalked) {
     const int parent = random.Index(i);
     parents[static_cast<size_t>(i)] = parent;
     const Pose3d step = RandomPose(&random, 2.0);
-    graph.edges.push_back(random.Chance(0.5) ? Edge(parent, i, step, false)
-                                             : Edge(i, parent, step, false));
+    graph.edges.push_back(random.Chance(0.5) ? CoarseEdge(parent, i, step, false)
+                                             : CoarseEdge(i, parent, step, false));
   }
   const OdometryTree tree(graph);
   for (size_t i = 0; i < graph.poses.size(); ++i) {
@@ -172,10 +169,10 @@ TEST(CompareLoops, FindsTheLiarAmongLoopsInEitherDirection) {
     for (const int i : {1, 3, 5, 7}) {
       const int j = 19 - i;
       const Pose3d i_T_j = Planar(0.0, 0.0, std::numbers::pi);
-      graph.edges.push_back(i % 4 == 1 ? Edge(i, j, i_T_j, true)
-                                       : Edge(j, i, i_T_j.Inverse(), true));
+      graph.edges.push_back(i % 4 == 1 ? CoarseEdge(i, j, i_T_j, true)
+                                       : CoarseEdge(j, i, i_T_j.Inverse(), true));
     }
-    graph.edges.push_back(Edge(4, 15, Planar(4.0, 1.0, 0.5), true));
+    graph.edges.push_back(CoarseEdge(4, 15, Planar(4.0, 1.0, 0.5), true));
     PairwiseOptions options;
     const LoopAgreement agreement = CompareLoops(graph, OdometryTree(graph), options);
     ASSERT_EQ(agreement.edges.size(), 5u);
@@ -199,7 +196,7 @@ TEST(CompareLoops, PassesRightLoopsOfNoisyOdometryAsOftenAsItShould) {
     PoseGraph graph = OutAndBack(12);
     const std::vector<Pose3d> poses = graph.poses;
     for (const int i : {2, 9}) {
-      graph.edges.push_back(Edge(i, 23 - i, Planar(0.0, 0.0, std::numbers::pi), true));
+      graph.edges.push_back(CoarseEdge(i, 23 - i, Planar(0.0, 0.0, std::numbers::pi), true));
     }
     for (RelativePose& edge : graph.edges) {
       Eigen::Vector3d turn;
@@ -226,7 +223,7 @@ TEST(CompareLoops, ComparesTheNearestPairsWhenThereAreTooMany) {
   PoseGraph graph = OutAndBack(30);
   for (int i = 0; i < 28; ++i) {
     graph.edges.push_back(
-        Edge(i, 59 - i, Planar(i % 2 == 0 ? 0.0 : 3.0, 0.0, std::numbers::pi), true));
+        CoarseEdge(i, 59 - i, Planar(i % 2 == 0 ? 0.0 : 3.0, 0.0, std::numbers::pi), true));
   }
   PairwiseOptions options;
   options.pair_count_max = 60;

@@ -20,6 +20,12 @@ struct RandomGraphOptions {
   double noise_rad = 0.0;
 };
 
+/// Of x, y and yaw.
+inline Pose3d Planar(double x_m, double y_m, double yaw_rad) {
+  return {Eigen::Vector3d(x_m, y_m, 0.0),
+          Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()))};
+}
+
 Pose3d RandomPose(bool is_planar, double range_m, double range_rad, Random* random);
 
 /// A rotation about each axis in turn has no place here: planar information is of x, y and yaw and

@@ -15,7 +15,7 @@ namespace {
 constexpr double kPi = 3.14159265358979;
 constexpr TimeNs kStepNs = 200'000'000;
 
-Pose3d Planar(double x, double y, double yaw_rad) {
+Pose3d RobotPose(double x, double y, double yaw_rad) {
   Pose3d pose;
   pose.position = {x, y, 1.0};
   pose.orientation = Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ());
@@ -24,10 +24,10 @@ Pose3d Planar(double x, double y, double yaw_rad) {
 
 // Three times around a square of 8 m, a step of 0.2 m each 0.2 s, turning on the spot at corners.
 std::vector<Pose3d> SquareWay() {
-  std::vector<Pose3d> way = {Planar(0.0, 0.0, 0.0)};
+  std::vector<Pose3d> way = {RobotPose(0.0, 0.0, 0.0)};
   for (int side = 0; side < 12; ++side) {
-    for (int i = 0; i < 40; ++i) way.push_back(way.back() * Planar(0.2, 0.0, 0.0));
-    for (int i = 0; i < 9; ++i) way.push_back(way.back() * Planar(0.0, 0.0, kPi / 18.0));
+    for (int i = 0; i < 40; ++i) way.push_back(way.back() * RobotPose(0.2, 0.0, 0.0));
+    for (int i = 0; i < 9; ++i) way.push_back(way.back() * RobotPose(0.0, 0.0, kPi / 18.0));
   }
   for (Pose3d& pose : way) pose.position.z() = 1.0;
   return way;
@@ -129,7 +129,7 @@ TEST_F(RobotGraphTest, LoopsThatLieAreToldAsRejected) {
   const size_t right_count = (way_.size() - 11 - kRound) / 49 + 1;
   for (size_t i = 20; i < 200; i += 40) {
     LoopClosure wrong = MakeLoop(way_, i, i + 90);
-    wrong.from_T_to = Planar(0.3, 0.2, 0.5);
+    wrong.from_T_to = RobotPose(0.3, 0.2, 0.5);
     graph_.AddLoop(wrong);
   }
   const auto solution = graph_.Solve();
@@ -167,7 +167,7 @@ TEST_F(RobotGraphTest, LoopsMayComeBeforeTheirPosesAndBetweenThem) {
     LoopClosure loop = MakeLoop(way_, i, i + kRound);
     // Between two poses of a robot that drives straight on: 0.08 m further.
     loop.to_ns += 2 * kStepNs / 5;
-    loop.from_T_to = loop.from_T_to * Planar(0.08, 0.0, 0.0);
+    loop.from_T_to = loop.from_T_to * RobotPose(0.08, 0.0, 0.0);
     loop.from_T_to.position.z() = 0.0;
     graph.AddLoop(loop);
   }
@@ -235,8 +235,8 @@ TEST(RobotGraph, IsEmptyWithoutPoses) {
 
 TEST(TrajectoryChange, TurnsAroundTheRobotBetweenKeyframes) {
   // Far from the origin, where interpolated transforms would swing things aside.
-  const std::vector<Pose3d> before = {Planar(1000.0, 0.0, 0.0), Planar(1001.0, 0.0, 0.0)};
-  const std::vector<Pose3d> after = {Planar(1000.0, 0.0, 0.0), Planar(1001.0, 0.0, 0.4)};
+  const std::vector<Pose3d> before = {RobotPose(1000.0, 0.0, 0.0), RobotPose(1001.0, 0.0, 0.0)};
+  const std::vector<Pose3d> after = {RobotPose(1000.0, 0.0, 0.0), RobotPose(1001.0, 0.0, 0.4)};
   const TrajectoryChange change({0, 1000}, before, after);
   const Eigen::Vector3d robot(1000.5, 0.0, 1.0);
   EXPECT_LT((change.At(500) * robot - robot).norm(), 1e-9);
@@ -244,7 +244,7 @@ TEST(TrajectoryChange, TurnsAroundTheRobotBetweenKeyframes) {
 }
 
 TEST(TrajectoryChange, HoldsAtItsEndsAndIsIdentityWithoutKeyframes) {
-  const TrajectoryChange change({10, 20}, {Planar(1.0, 0.0, 0.0), Planar(3.0, 0.0, 0.0)});
+  const TrajectoryChange change({10, 20}, {RobotPose(1.0, 0.0, 0.0), RobotPose(3.0, 0.0, 0.0)});
   EXPECT_EQ(change.At(0).position.x(), 1.0);
   EXPECT_EQ(change.At(15).position.x(), 2.0);
   EXPECT_EQ(change.At(99).position.x(), 3.0);

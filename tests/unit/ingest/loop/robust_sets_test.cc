@@ -111,7 +111,7 @@ absl::StatusOr<CleanSet> SolveClean(const std::string& name) {
   return clean;
 }
 
-absl::StatusOr<Outcome> Measure(const CleanSet& clean, const Case& spoilt_case) {
+absl::StatusOr<Outcome> MeasureCase(const CleanSet& clean, const Case& spoilt_case) {
   const double gate = ChiSquareGate(RobustOptions().confidence, clean.graph.is_planar);
   WrongLoopOptions wrong;
   wrong.share = spoilt_case.share;
@@ -163,7 +163,7 @@ void RunCases(const std::vector<std::string>& names, const std::vector<std::stri
     for (const std::string& share : shares) {
       for (const std::string& seed : seeds) {
         const Case spoilt{name, std::stod(share), std::stoull(seed), group_size};
-        const absl::StatusOr<Outcome> outcome = Measure(*clean, spoilt);
+        const absl::StatusOr<Outcome> outcome = MeasureCase(*clean, spoilt);
         ASSERT_TRUE(outcome.ok()) << outcome.status();
         std::printf(
             "%s wrong %.2f seed %s: precision %.4f recall %.4f error %.4f m (clean %.4f) cost x "

@@ -13,17 +13,13 @@
 #include "ingest/loop/graduated.h"
 #include "schema/base/random.h"
 #include "schema/base/status.h"
+#include "tests/unit/ingest/loop/random_graph.h"
 #include "tests/unit/ingest/loop/wrong_loops.h"
 
 namespace dsg::ingest {
 namespace {
 
-Pose3d Planar(double x_m, double y_m, double yaw_rad) {
-  return {Eigen::Vector3d(x_m, y_m, 0.0),
-          Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ()))};
-}
-
-RelativePose Edge(int from, int to, const Pose3d& from_T_to, bool is_loop) {
+RelativePose FineEdge(int from, int to, const Pose3d& from_T_to, bool is_loop) {
   RelativePose edge;
   edge.from = from;
   edge.to = to;
@@ -47,7 +43,7 @@ PoseGraph Measured(const std::vector<Pose3d>& poses, const std::vector<std::pair
   const auto add = [&](int from, int to, bool is_loop) {
     const Pose3d from_T_to =
         poses[static_cast<size_t>(from)].Inverse() * poses[static_cast<size_t>(to)];
-    graph.edges.push_back(Edge(from, to, WithNoise(from_T_to, random), is_loop));
+    graph.edges.push_back(FineEdge(from, to, WithNoise(from_T_to, random), is_loop));
   };
   for (int i = 0; i + 1 < static_cast<int>(poses.size()); ++i) add(i, i + 1, false);
   for (const auto& [from, to] : loops) add(from, to, true);
@@ -93,7 +89,7 @@ TEST(OptimizeRobustly, BelievesTwoLoopsThatAgreeAndNotTheLiar) {
     Random random(1, 0);
     const std::vector<Pose3d> poses = Rounds();
     PoseGraph graph = Measured(poses, {{2, 42}, {8, 48}}, is_planar, &random);
-    graph.edges.push_back(Edge(5, 70, Planar(0.5, 0.0, 0.0), true));
+    graph.edges.push_back(FineEdge(5, 70, Planar(0.5, 0.0, 0.0), true));
     const absl::StatusOr<RobustResult> result = OptimizeRobustly(graph, {});
     ASSERT_TRUE(result.ok()) << result.status();
     EXPECT_EQ(result->loop_count, 3);
@@ -118,7 +114,7 @@ TEST(OptimizeRobustly, TellsTheLobesOfAnEightApartWithThreeInTenLoopsAliased) {
     while (graph.edges.size() < true_end + 15) {
       // The same place of the other lobe, mirrored, and far from where the two meet.
       const int i = random.Integer(8, 32);
-      graph.edges.push_back(Edge(i, i + 120, WithNoise(Pose3d(), &random), true));
+      graph.edges.push_back(FineEdge(i, i + 120, WithNoise(Pose3d(), &random), true));
     }
     const absl::StatusOr<RobustResult> result = OptimizeRobustly(graph, {});
     ASSERT_TRUE(result.ok()) << result.status();

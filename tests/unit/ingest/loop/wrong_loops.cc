@@ -15,8 +15,6 @@
 namespace dsg::ingest {
 namespace {
 
-size_t Index(int i) { return static_cast<size_t>(i); }
-
 Eigen::Quaterniond RandomRotation(bool is_planar, Random* random) {
   if (is_planar) {
     const double angle = random->Uniform(-std::numbers::pi, std::numbers::pi);

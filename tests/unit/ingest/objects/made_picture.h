@@ -7,12 +7,10 @@
 #include <vector>
 
 #include "ingest/sensor/depth_frame.h"
+#include "tests/unit/ingest/objects/objects_test_util.h"
 
 namespace dsg::ingest {
 
-inline constexpr int32_t kFloor = 2;
-inline constexpr int32_t kTable = 12;
-inline constexpr int32_t kCup = 20;
 inline constexpr int32_t kBook = 23;
 inline constexpr int32_t kPerson = 90;
 

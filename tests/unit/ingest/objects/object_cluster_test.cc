@@ -16,8 +16,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-const Vector3d kChairSize(0.45, 0.45, 0.9);
-
 // The steps of the test meshes and the mean of a voxel move a centre by less than this.
 constexpr double kExactM = 0.02;
 
@@ -29,7 +27,7 @@ TEST(FindClusters, PutsThePositionIntoTheMiddleOfTheBoxAndNotOfTheVisibleSide) {
   mesh.AddBox({0.0, 0.0, 0.0}, {1.9, 0.1, 0.8}, {kCouch, 5}, 0.01);
   const auto clusters = ClustersOf(mesh.block());
   ASSERT_EQ(clusters.size(), 1u);
-  EXPECT_EQ(clusters[0].class_id, static_cast<int32_t>(kCouch));
+  EXPECT_EQ(clusters[0].class_id, kCouch);
   EXPECT_EQ(clusters[0].instance_id, 5u);
   EXPECT_LT((clusters[0].center_map - Vector3d(0.95, 0.425, 0.4)).norm(), kExactM);
   EXPECT_LT((clusters[0].size - Vector3d(1.9, 0.85, 0.8)).cwiseAbs().maxCoeff(), 2.0 * kExactM);
@@ -112,7 +110,7 @@ TEST(FindClusters, CorrectsLabelsByTheMajorityOfTheirInstance) {
   }
   const auto clusters = ClustersOf(mesh.block());
   ASSERT_EQ(clusters.size(), 1u);
-  EXPECT_EQ(clusters[0].class_id, static_cast<int32_t>(kCouch));
+  EXPECT_EQ(clusters[0].class_id, kCouch);
   EXPECT_LT((clusters[0].center_map - Vector3d(0.95, 0.425, 0.4)).norm(), kExactM);
 }
 
@@ -122,7 +120,7 @@ TEST(FindClusters, IgnoresTheInstancesOfWalls) {
   mesh.AddBox({1.0, 0.15, 0.0}, kChairSize, {kChair, 9});
   const auto clusters = ClustersOf(mesh.block());
   ASSERT_EQ(clusters.size(), 1u);
-  EXPECT_EQ(clusters[0].class_id, static_cast<int32_t>(kChair));
+  EXPECT_EQ(clusters[0].class_id, kChair);
   EXPECT_EQ(clusters[0].instance_id, 0u);
 }
 
@@ -168,7 +166,7 @@ TEST(FindClusters, FindsASmallCupOnATable) {
   mesh.AddBox({0.61, 0.41, 0.75}, {0.08, 0.08, 0.1}, {kCup, 2});
   const auto clusters = ClustersOf(mesh.block());
   ASSERT_EQ(clusters.size(), 2u);
-  EXPECT_EQ(clusters[1].class_id, static_cast<int32_t>(kCup));
+  EXPECT_EQ(clusters[1].class_id, kCup);
   EXPECT_LT((clusters[1].center_map - Vector3d(0.65, 0.45, 0.8)).norm(), 0.02);
 }
 
@@ -189,7 +187,7 @@ TEST(FindClusters, LeavesAWorktopOnTheCabinetThatCarriesIt) {
   mesh.AddBox({0.0, 0.0, 0.87}, {1.4, 0.8, 0.04}, {kTable, 2});
   const auto clusters = ClustersOf(mesh.block());
   ASSERT_EQ(clusters.size(), 2u);
-  EXPECT_EQ(clusters[0].class_id, static_cast<int32_t>(kTable));
+  EXPECT_EQ(clusters[0].class_id, kTable);
   EXPECT_LT(clusters[0].size.z(), 0.1);
 }
 

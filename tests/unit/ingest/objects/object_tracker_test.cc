@@ -14,8 +14,6 @@ namespace {
 using Eigen::Vector3d;
 using Clusters = std::vector<ObjectCluster>;
 
-const Vector3d kChairSize(0.45, 0.45, 0.9);
-
 bool Nowhere(const Eigen::Vector3f&) { return false; }
 bool Everywhere(const Eigen::Vector3f&) { return true; }
 

@@ -10,8 +10,8 @@ namespace {
 
 constexpr int kWidth = 160;
 constexpr int kHeight = 120;
-constexpr uint16_t kCup = 20;
-constexpr uint16_t kTable = 16;
+constexpr uint16_t kWatchedCup = 20;
+constexpr uint16_t kBehindCup = 16;
 
 // A camera at the origin looks along z at a table 2 m away; the cup stands 10 cm before it in the
 // middle of the picture.
@@ -24,11 +24,11 @@ DepthFrame Picture(TimeNs time_ns, bool with_cup) {
   frame.camera.cx = kWidth / 2;
   frame.camera.cy = kHeight / 2;
   frame.depth_m.assign(kWidth * kHeight, 2.0F);
-  frame.labels.assign(kWidth * kHeight, kTable << 8 | 1);
+  frame.labels.assign(kWidth * kHeight, kBehindCup << 8 | 1);
   for (int y = 54; with_cup && y < 66; ++y) {
     for (int x = 74; x < 86; ++x) {
       frame.depth_m[static_cast<size_t>(y * kWidth + x)] = 1.9F;
-      frame.labels[static_cast<size_t>(y * kWidth + x)] = kCup << 8 | 1;
+      frame.labels[static_cast<size_t>(y * kWidth + x)] = kWatchedCup << 8 | 1;
     }
   }
   return frame;
@@ -37,7 +37,7 @@ DepthFrame Picture(TimeNs time_ns, bool with_cup) {
 TrackedObject Cup() {
   TrackedObject cup;
   cup.id = 7;
-  cup.cluster.class_id = kCup;
+  cup.cluster.class_id = kWatchedCup;
   cup.cluster.center_map = Eigen::Vector3d(0, 0, 1.9);
   cup.cluster.size = Eigen::Vector3d(0.1, 0.1, 0.1);
   cup.cluster.map_T_box.position = cup.cluster.center_map;

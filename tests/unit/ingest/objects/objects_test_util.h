@@ -13,20 +13,20 @@
 
 namespace dsg::ingest {
 
-inline constexpr uint32_t kWall = 1;
-inline constexpr uint32_t kFloor = 2;
-inline constexpr uint32_t kChair = 11;
-inline constexpr uint32_t kTable = 12;
-inline constexpr uint32_t kCouch = 13;
-inline constexpr uint32_t kCup = 20;
-inline constexpr uint32_t kShelf = 24;
+inline constexpr int32_t kWall = 1;
+inline constexpr int32_t kFloor = 2;
+inline constexpr int32_t kChair = 11;
+inline constexpr int32_t kTable = 12;
+inline constexpr int32_t kCouch = 13;
+inline constexpr int32_t kCup = 20;
+inline constexpr int32_t kShelf = 24;
+
+inline const Eigen::Vector3d kChairSize(0.45, 0.45, 0.9);
 
 inline ClusterOptions FiveCentimetres() {
   ClusterOptions options;
   options.voxel_m = 0.05;
-  options.class_ids = {static_cast<int32_t>(kCup), static_cast<int32_t>(kChair),
-                       static_cast<int32_t>(kTable), static_cast<int32_t>(kCouch),
-                       static_cast<int32_t>(kShelf)};
+  options.class_ids = {kCup, kChair, kTable, kCouch, kShelf};
   return options;
 }
 

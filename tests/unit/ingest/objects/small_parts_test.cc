@@ -132,7 +132,7 @@ TEST(FloorLevels, FindTheFloorOfEachStoreyButNoTableTops) {
   mesh.AddFloor(3.0, 0.02);
   mesh.AddFloor(2.0, 3.02);
   mesh.AddBox({0.0, 0.0, 0.0}, {3.0, 3.0, 0.75}, {kTable, 1});
-  const std::vector<int32_t> classes{static_cast<int32_t>(kTable)};
+  const std::vector<int32_t> classes{kTable};
   const auto levels = FindFloorLevels({&mesh.block(), nullptr}, classes);
   ASSERT_EQ(levels.size(), 2u);
   EXPECT_NEAR(levels[0], 0.02, 1e-3);

@@ -20,7 +20,6 @@ namespace {
 constexpr TimeNs kStepNs = 400'000'000;
 constexpr int kStepCount = 100;
 constexpr int kNever = std::numeric_limits<int>::max();
-constexpr NodeId kAnna('H', 1);
 constexpr NodeId kBert('H', 2);
 
 // Forgets before one commit, and breaks down before another.

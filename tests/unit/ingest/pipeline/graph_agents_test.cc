@@ -18,7 +18,7 @@ Node Robot(uint64_t index, const std::string& name) {
   return node;
 }
 
-GraphDelta RobotGraph() {
+GraphDelta RobotDelta() {
   GraphDelta delta;
   delta.nodes = {Robot(0, "a")};
   delta.appends.push_back({NodeId('r', 0), {TimedPose{}}});
@@ -29,14 +29,14 @@ GraphDelta RobotGraph() {
 
 TEST(RenameAgents, KeepsFreeIds) {
   AgentNamer namer({});
-  GraphDelta delta = RobotGraph();
+  GraphDelta delta = RobotDelta();
   ASSERT_TRUE(RenameAgents(&namer, &delta).ok());
   EXPECT_EQ(delta.nodes[0].id, NodeId('r', 0));
 }
 
 TEST(RenameAgents, MovesAnAgentWhoseIdIsAnothers) {
   AgentNamer namer({Robot(0, "b"), Robot(4, "c")});
-  GraphDelta delta = RobotGraph();
+  GraphDelta delta = RobotDelta();
   ASSERT_TRUE(RenameAgents(&namer, &delta).ok());
   EXPECT_EQ(delta.nodes[0].id, NodeId('r', 5));
   EXPECT_EQ(delta.appends[0].agent, NodeId('r', 5));
@@ -47,14 +47,14 @@ TEST(RenameAgents, MovesAnAgentWhoseIdIsAnothers) {
 
 TEST(RenameAgents, FindsTheSameAgentByName) {
   AgentNamer namer({Robot(7, "a")});
-  GraphDelta delta = RobotGraph();
+  GraphDelta delta = RobotDelta();
   ASSERT_TRUE(RenameAgents(&namer, &delta).ok());
   EXPECT_EQ(delta.nodes[0].id, NodeId('r', 7));
 }
 
 TEST(RenameAgents, RefusesTwoAgentsOfOneName) {
   AgentNamer namer({});
-  GraphDelta delta = RobotGraph();
+  GraphDelta delta = RobotDelta();
   delta.nodes.push_back(Robot(1, "a"));
   EXPECT_EQ(ReasonOf(RenameAgents(&namer, &delta)), Reason::kFileMalformed);
 }

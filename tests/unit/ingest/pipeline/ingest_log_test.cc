@@ -17,30 +17,7 @@
 namespace dsg::ingest {
 namespace {
 
-// Passes commits on, keeps a copy of each, and breaks down after a given count of them.
-class FragileWriter : public GraphWriter {
- public:
-  FragileWriter(GraphWriter& writer, int commit_count_max)
-      : writer_(writer), commits_left_(commit_count_max) {}
-
-  absl::StatusOr<CommitResult> Commit(GraphDelta delta) override {
-    if (commits_left_-- == 0) return absl::InternalError("the power went out");
-    deltas_.push_back(DeltaToJson(delta));
-    return writer_.Commit(std::move(delta));
-  }
-  absl::StatusOr<SessionState> GetSession(const std::string& session_id) override {
-    return writer_.GetSession(session_id);
-  }
-
-  const std::vector<std::string>& deltas() const { return deltas_; }
-
- private:
-  GraphWriter& writer_;
-  int commits_left_;
-  std::vector<std::string> deltas_;
-};
-
-constexpr int kNever = -1;
+constexpr int kAllCommits = -1;
 
 // The value itself, so that it outlives the StatusOr in a range-for.
 template <typename T>
@@ -66,7 +43,7 @@ class TestMap {
   }
 
   absl::StatusOr<IngestSummary> Ingest(const std::string& path, int64_t poses_per_delta = 100,
-                                       int commit_count_max = kNever,
+                                       int commit_count_max = kAllCommits,
                                        const LogOptions& log_options = {}) {
     DSG_ASSIGN_OR_RETURN(const std::unique_ptr<LogSource> log, OpenLog(path, log_options));
     DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> latest, reader_->Latest());
@@ -126,7 +103,7 @@ class TestMap {
   int hand_count_ = 0;
 };
 
-GraphDelta TwoRooms() {
+GraphDelta TwoRoomWorld() {
   GraphDelta world;
   for (Node node : {MakeRoom(1, 0, 0, 5, 5), MakeRoom(2, 5, 0, 10, 5)}) world.nodes.push_back(node);
   for (Node node : {MakePlace(1, 1, 2), MakePlace(2, 4, 2), MakePlace(3, 7, 2)}) {
@@ -157,27 +134,27 @@ std::string WalkRows(int from_step, int to_step) {
   return rows;
 }
 
-constexpr int kStepCount = 120;
+constexpr int kWalkStepCount = 120;
 
 class IngestLogTest : public testing::Test {
  protected:
-  std::string WalkLog() { return folder_.Write("walk.txt", WalkRows(0, kStepCount)); }
+  std::string WalkLog() { return folder_.Write("walk.txt", WalkRows(0, kWalkStepCount)); }
 
   TempFolder folder_;
 };
 
 TEST_F(IngestLogTest, BringsAgentsPosesAndStays) {
   TestMap map;
-  map.Commit(TwoRooms());
+  map.Commit(TwoRoomWorld());
   const auto summary = map.Ingest(WalkLog());
   ASSERT_TRUE(summary.ok()) << summary.status();
   EXPECT_EQ(summary->agent_count, 4);
-  EXPECT_EQ(summary->committed.pose_count, 4 * kStepCount - 30 - 70);
+  EXPECT_EQ(summary->committed.pose_count, 4 * kWalkStepCount - 30 - 70);
   const auto snapshot = map.Latest();
   EXPECT_EQ(*snapshot->ResolveAgent("3"), NodeId('H', 3));
   const Node anna = *snapshot->GetNode(NodeId('H', 1));
-  EXPECT_EQ(anna.observation_count, kStepCount);
-  EXPECT_EQ(*anna.last_observed_ns, (kStepCount - 1) * TimeNs{400'000'000});
+  EXPECT_EQ(anna.observation_count, kWalkStepCount);
+  EXPECT_EQ(*anna.last_observed_ns, (kWalkStepCount - 1) * TimeNs{400'000'000});
   const std::vector<Stay> stays = *snapshot->StaysOfAgent(NodeId('H', 3), kTimeMin, kTimeMax);
   ASSERT_FALSE(stays.empty());
   bool ends_at_gap = false;
@@ -190,22 +167,22 @@ TEST_F(IngestLogTest, BringsAgentsPosesAndStays) {
 
 TEST_F(IngestLogTest, AddsNothingTheSecondTime) {
   TestMap map;
-  map.Commit(TwoRooms());
+  map.Commit(TwoRoomWorld());
   ASSERT_TRUE(map.Ingest(WalkLog()).ok());
   const Revision head = map.head();
   const auto again = map.Ingest(WalkLog());
   ASSERT_TRUE(again.ok()) << again.status();
   EXPECT_EQ(again->committed.revision_count, 0);
-  EXPECT_EQ(again->committed.skipped_pose_count, 4 * kStepCount - 30 - 70);
+  EXPECT_EQ(again->committed.skipped_pose_count, 4 * kWalkStepCount - 30 - 70);
   EXPECT_EQ(map.head(), head);
 }
 
 TEST_F(IngestLogTest, AddsNothingWhenTheSamePosesComeInAnotherLog) {
   TestMap map;
-  map.Commit(TwoRooms());
+  map.Commit(TwoRoomWorld());
   ASSERT_TRUE(map.Ingest(WalkLog()).ok());
   const Revision head = map.head();
-  const std::string copy = folder_.Write("copy.txt", WalkRows(0, kStepCount) + "\n");
+  const std::string copy = folder_.Write("copy.txt", WalkRows(0, kWalkStepCount) + "\n");
   for (const int64_t poses_per_delta : {100, 37, 5000}) {
     const auto again = map.Ingest(copy, poses_per_delta);
     ASSERT_TRUE(again.ok()) << again.status();
@@ -217,8 +194,8 @@ TEST_F(IngestLogTest, AddsNothingWhenTheSamePosesComeInAnotherLog) {
 TEST_F(IngestLogTest, GivesTheSameDeltasForTheSameLogAndMap) {
   TestMap a;
   TestMap b;
-  a.Commit(TwoRooms());
-  b.Commit(TwoRooms());
+  a.Commit(TwoRoomWorld());
+  b.Commit(TwoRoomWorld());
   ASSERT_TRUE(a.Ingest(WalkLog()).ok());
   ASSERT_TRUE(b.Ingest(WalkLog()).ok());
   EXPECT_GE(a.deltas().size(), 5u);
@@ -227,12 +204,12 @@ TEST_F(IngestLogTest, GivesTheSameDeltasForTheSameLogAndMap) {
 
 TEST_F(IngestLogTest, ContinuesAfterAnyInterruptionToTheSameDeltas) {
   TestMap undisturbed;
-  undisturbed.Commit(TwoRooms());
+  undisturbed.Commit(TwoRoomWorld());
   ASSERT_TRUE(undisturbed.Ingest(WalkLog()).ok());
   const int commit_count = static_cast<int>(undisturbed.deltas().size());
   for (int cut = 0; cut < commit_count; ++cut) {
     TestMap map;
-    map.Commit(TwoRooms());
+    map.Commit(TwoRoomWorld());
     EXPECT_FALSE(map.Ingest(WalkLog(), 100, cut).ok());
     EXPECT_FALSE(map.Ingest(WalkLog(), 100, cut == 0 ? 0 : 1).ok() && cut + 1 < commit_count);
     const auto resumed = map.Ingest(WalkLog());
@@ -244,11 +221,11 @@ TEST_F(IngestLogTest, ContinuesAfterAnyInterruptionToTheSameDeltas) {
 
 TEST_F(IngestLogTest, GivesTheSameMapWhateverThePosesOfADelta) {
   TestMap expected;
-  expected.Commit(TwoRooms());
+  expected.Commit(TwoRoomWorld());
   ASSERT_TRUE(expected.Ingest(WalkLog(), 5000).ok());
   for (const int64_t poses_per_delta : {1, 3, 50, 333}) {
     TestMap map;
-    map.Commit(TwoRooms());
+    map.Commit(TwoRoomWorld());
     ASSERT_TRUE(map.Ingest(WalkLog(), poses_per_delta).ok());
     EXPECT_EQ(map.Content(), expected.Content()) << poses_per_delta;
   }
@@ -256,11 +233,11 @@ TEST_F(IngestLogTest, GivesTheSameMapWhateverThePosesOfADelta) {
 
 TEST_F(IngestLogTest, TakesTheRestOfALogThatWasCutShort) {
   TestMap expected;
-  expected.Commit(TwoRooms());
+  expected.Commit(TwoRoomWorld());
   ASSERT_TRUE(expected.Ingest(WalkLog()).ok());
   for (const int cut_step : {1, 65, 80, 110}) {
     TestMap map;
-    map.Commit(TwoRooms());
+    map.Commit(TwoRoomWorld());
     ASSERT_TRUE(map.Ingest(folder_.Write("head.txt", WalkRows(0, cut_step))).ok());
     const int64_t known_count = map.Latest()->Stats()->at.pose_count;
     const auto summary = map.Ingest(WalkLog());
@@ -275,12 +252,12 @@ TEST_F(IngestLogTest, TakesTheRestOfALogThatWasCutShort) {
 
 TEST_F(IngestLogTest, TakesTheRestAlsoWhenInterrupted) {
   TestMap expected;
-  expected.Commit(TwoRooms());
+  expected.Commit(TwoRoomWorld());
   ASSERT_TRUE(expected.Ingest(WalkLog()).ok());
   const std::string head = folder_.Write("head.txt", WalkRows(0, 80));
   for (int cut = 0; cut < 6; ++cut) {
     TestMap map;
-    map.Commit(TwoRooms());
+    map.Commit(TwoRoomWorld());
     EXPECT_FALSE(map.Ingest(head, 50, cut % 4).ok());
     const bool is_done = map.Ingest(WalkLog(), 100, cut).ok();
     const auto resumed = map.Ingest(WalkLog());
@@ -305,15 +282,15 @@ TEST_F(IngestLogTest, RefusesALogThatContradictsStoredPoses) {
       map.Ingest(folder_.Write("c.txt", "0 1 1.0 2.0\n1 2 0 0\n2 2 0 0\n3 2 0 0\n4 1 9 9\n"))
           .status();
   EXPECT_TRUE(between.ok()) << "a log with fewer of the poses says nothing else: " << between;
-  EXPECT_EQ(
-      ReasonOf(map.Ingest(folder_.Write("d.txt", "0 1 1.0 2.0\n3 1 1 1\n6 1 1 1\n"), 100, kNever,
-                          {.format = "auto",
-                           .epoch_ns = 0,
-                           .frame_period_ns = 500'000'000,
-                           .agent_prefix = "",
-                           .mesh_block_size_m = 2.0})
-                   .status()),
-      Reason::kTrackConflict)
+  EXPECT_EQ(ReasonOf(map.Ingest(folder_.Write("d.txt", "0 1 1.0 2.0\n3 1 1 1\n6 1 1 1\n"), 100,
+                                kAllCommits,
+                                {.format = "auto",
+                                 .epoch_ns = 0,
+                                 .frame_period_ns = 500'000'000,
+                                 .agent_prefix = "",
+                                 .mesh_block_size_m = 2.0})
+                         .status()),
+            Reason::kTrackConflict)
       << "no pose is stored at 0.5 s";
   EXPECT_EQ(map.head(), head + 1);
 }
@@ -324,7 +301,7 @@ TEST_F(IngestLogTest, KeepsLogsApartByPrefix) {
   LogOptions options;
   options.agent_prefix = "b/";
   const auto summary =
-      map.Ingest(folder_.Write("b.txt", "0 1 9.0 2.0\n1 1 9.5 2.0\n"), 100, kNever, options);
+      map.Ingest(folder_.Write("b.txt", "0 1 9.0 2.0\n1 1 9.5 2.0\n"), 100, kAllCommits, options);
   ASSERT_TRUE(summary.ok()) << summary.status();
   EXPECT_EQ(*map.Latest()->ResolveAgent("1"), NodeId('H', 1));
   EXPECT_EQ(*map.Latest()->ResolveAgent("b/1"), NodeId('H', 2));
@@ -342,7 +319,7 @@ TEST_F(IngestLogTest, ComparesBitByBitInALosslessMap) {
 }
 
 TEST_F(IngestLogTest, TakesRoomsFromTheLogItself) {
-  GraphDelta world = TwoRooms();
+  GraphDelta world = TwoRoomWorld();
   folder_.Write("sim/map.json", DeltaToJson(world));
   std::string rows = "time_ns,agent,kind,x,y,z,qx,qy,qz,qw\n";
   for (int i = 0; i < 50; ++i) {
@@ -371,13 +348,13 @@ TEST_F(IngestLogTest, TakesRoomsFromTheLogItself) {
 
 TEST_F(IngestLogTest, EndsStaysThatAnAbandonedRunLeftOpen) {
   TestMap map;
-  map.Commit(TwoRooms());
+  map.Commit(TwoRoomWorld());
   EXPECT_FALSE(map.Ingest(WalkLog(), 50, 1).ok());
   // Another log, much later, goes on with the same person elsewhere.
   LogOptions later;
   later.epoch_ns = 1000 * kNsPerSecond;
   ASSERT_TRUE(
-      map.Ingest(folder_.Write("later.txt", "0 1 8 2\n1 1 8 2\n"), 100, kNever, later).ok());
+      map.Ingest(folder_.Write("later.txt", "0 1 8 2\n1 1 8 2\n"), 100, kAllCommits, later).ok());
   TimeNs last_exit_ns = kTimeMin;
   const auto snapshot = map.Latest();
   for (const Stay& stay : Value(snapshot->StaysOfAgent(NodeId('H', 1), kTimeMin, kTimeMax))) {
@@ -402,12 +379,12 @@ TEST_F(IngestLogTest, CountsSensorsThatItDoesNotUseYetAndTakesThePosesAskedFor) 
   TestMap map;
   LogOptions options;
   options.poses = PoseSource::kGroundTruth;
-  const auto truth = map.Ingest(folder_.Path("rig"), 100, kNever, options);
+  const auto truth = map.Ingest(folder_.Path("rig"), 100, kAllCommits, options);
   ASSERT_TRUE(truth.ok()) << truth.status();
   EXPECT_EQ(truth->committed.pose_count, 1);
   EXPECT_EQ(truth->unused, (std::map<std::string, int64_t>{{"imu0", 2}}));
   options.poses = PoseSource::kExternal;
-  EXPECT_EQ(ReasonOf(map.Ingest(folder_.Path("rig"), 100, kNever, options).status()),
+  EXPECT_EQ(ReasonOf(map.Ingest(folder_.Path("rig"), 100, kAllCommits, options).status()),
             Reason::kTrackConflict)
       << "other poses are another session, not a repetition";
 }

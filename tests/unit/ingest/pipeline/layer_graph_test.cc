@@ -9,9 +9,9 @@
 namespace dsg::ingest {
 namespace {
 
-const std::vector<SemanticLabel> kLabels = {{7, "couch"}, {8, "cup"}};
+const std::vector<SemanticLabel> kLayerLabels = {{7, "couch"}, {8, "cup"}};
 
-TrackedObject MakeObject(int64_t id, int32_t class_id, double x, double z) {
+TrackedObject MakeTracked(int64_t id, int32_t class_id, double x, double z) {
   TrackedObject object;
   object.id = id;
   object.cluster.class_id = class_id;
@@ -42,9 +42,9 @@ FoundRoom MakeRoomAt(int64_t id, double x0, double x1, std::vector<int> places) 
 }
 
 // Two rooms, a place in each, a couch in the first.
-LayerParts TwoRooms() {
+LayerParts TwoRoomParts() {
   LayerParts parts;
-  parts.objects = {MakeObject(4, 7, 1.0, 0.4)};
+  parts.objects = {MakeTracked(4, 7, 1.0, 0.4)};
   parts.places.places = {MakePlaceAt(10, 1.0, 0.0), MakePlaceAt(11, 5.0, 0.0)};
   parts.places.links = {{0, 1, 0.4}};
   parts.place_of_object = {0};
@@ -72,7 +72,7 @@ const Edge* Find(const LayerGraph& graph, NodeId source, const char* relation, N
 
 TEST(LayerGraph, HangsObjectsUnderPlacesUnderRoomsUnderTheBuilding) {
   const std::vector<CadModel> no_models;
-  const LayerGraph graph = LayerGraphMaker({"s", 0}, kLabels, no_models).Make(TwoRooms());
+  const LayerGraph graph = LayerGraphMaker({"s", 0}, kLayerLabels, no_models).Make(TwoRoomParts());
   EXPECT_NE(Find(graph, NodeId('B', 0), relations::kContains, NodeId('R', 0)), nullptr);
   EXPECT_NE(Find(graph, NodeId('R', 0), relations::kContains, NodeId('p', 10)), nullptr);
   EXPECT_NE(Find(graph, NodeId('p', 10), relations::kContains, NodeId('O', 4)), nullptr);
@@ -86,10 +86,10 @@ TEST(LayerGraph, HangsObjectsUnderPlacesUnderRoomsUnderTheBuilding) {
 
 TEST(LayerGraph, BoxesHoldTheirChildren) {
   const std::vector<CadModel> no_models;
-  LayerParts parts = TwoRooms();
+  LayerParts parts = TwoRoomParts();
   // Reaches out of its room.
   parts.objects[0].cluster.map_T_box.position.x() = -3.0;
-  const LayerGraph graph = LayerGraphMaker({"s", 0}, kLabels, no_models).Make(parts);
+  const LayerGraph graph = LayerGraphMaker({"s", 0}, kLayerLabels, no_models).Make(parts);
   for (const Edge& edge : graph.edges) {
     if (edge.relation != relations::kContains) continue;
     const Box3d parent = Find(graph, edge.source)->BoxMap();
@@ -100,11 +100,11 @@ TEST(LayerGraph, BoxesHoldTheirChildren) {
 
 TEST(LayerGraph, TwoStoreysGetLevels) {
   const std::vector<CadModel> no_models;
-  LayerParts parts = TwoRooms();
+  LayerParts parts = TwoRoomParts();
   parts.places.places[1].floor_z_m = 3.0;
   parts.rooms[1].storey = 1;
   parts.storeys = {{0.0, 2.5, true, {0}}, {3.0, 5.5, true, {1}}};
-  const LayerGraph graph = LayerGraphMaker({"s", 0}, kLabels, no_models).Make(parts);
+  const LayerGraph graph = LayerGraphMaker({"s", 0}, kLayerLabels, no_models).Make(parts);
   EXPECT_NE(Find(graph, NodeId('B', 0), relations::kContains, NodeId('L', 1)), nullptr);
   EXPECT_NE(Find(graph, NodeId('L', 1), relations::kContains, NodeId('R', 1)), nullptr);
   EXPECT_EQ(Find(graph, NodeId('B', 0), relations::kContains, NodeId('R', 1)), nullptr);
@@ -113,10 +113,10 @@ TEST(LayerGraph, TwoStoreysGetLevels) {
 
 TEST(LayerGraph, WhatLeftTheWorldStaysWithItsEnd) {
   const std::vector<CadModel> no_models;
-  LayerParts parts = TwoRooms();
-  parts.gone = {{MakeObject(5, 8, 1.5, 0.9), std::nullopt, 300}};
+  LayerParts parts = TwoRoomParts();
+  parts.gone = {{MakeTracked(5, 8, 1.5, 0.9), std::nullopt, 300}};
   parts.place_of_object = {0, 0};
-  const LayerGraph graph = LayerGraphMaker({"s", 0}, kLabels, no_models).Make(parts);
+  const LayerGraph graph = LayerGraphMaker({"s", 0}, kLayerLabels, no_models).Make(parts);
   const Node* cup = Find(graph, NodeId('O', 5));
   ASSERT_NE(cup, nullptr);
   EXPECT_EQ(cup->valid.from_ns, 100);
@@ -132,13 +132,13 @@ TEST(LayerGraph, AKnownShapeBringsItsModelAndItsWholeBox) {
   model.vertices = {{-1.0, -0.5, 0.0}, {1.0, 0.5, 0.9}};
   model.asset.sha256.fill(7);
   const std::vector<CadModel> models = {model};
-  LayerParts parts = TwoRooms();
+  LayerParts parts = TwoRoomParts();
   ShapeFit fit;
   fit.model = 0;
   fit.map_T_model.position = {2.0, 1.0, 0.1};
   fit.inlier_share = 0.8;
   parts.fits.emplace(4, fit);
-  const LayerGraph graph = LayerGraphMaker({"s", 0}, kLabels, models).Make(parts);
+  const LayerGraph graph = LayerGraphMaker({"s", 0}, kLayerLabels, models).Make(parts);
   const Node* couch = Find(graph, NodeId('O', 4));
   ASSERT_TRUE(couch->object->model.has_value());
   EXPECT_EQ((*couch->object->model)[0], 7);
@@ -149,7 +149,7 @@ TEST(LayerGraph, AKnownShapeBringsItsModelAndItsWholeBox) {
 
 TEST(LayerGraph, SessionsKeepApart) {
   const std::vector<CadModel> no_models;
-  const LayerGraph graph = LayerGraphMaker({"s", 3}, kLabels, no_models).Make(TwoRooms());
+  const LayerGraph graph = LayerGraphMaker({"s", 3}, kLayerLabels, no_models).Make(TwoRoomParts());
   EXPECT_NE(Find(graph, NodeId('O', 3'000'004)), nullptr);
   const Node* building = Find(graph, NodeId('B', 3'000'000));
   ASSERT_NE(building, nullptr);
@@ -158,7 +158,7 @@ TEST(LayerGraph, SessionsKeepApart) {
 
 TEST(LayerGraph, IsEmptyWithoutParts) {
   const std::vector<CadModel> no_models;
-  const LayerGraph graph = LayerGraphMaker({"s", 0}, kLabels, no_models).Make(LayerParts());
+  const LayerGraph graph = LayerGraphMaker({"s", 0}, kLayerLabels, no_models).Make(LayerParts());
   EXPECT_TRUE(graph.nodes.empty());
   EXPECT_TRUE(graph.edges.empty());
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <set>
 
+#include "ingest/pipeline/map_things.h"
 #include "schema/base/random.h"
 #include "tests/unit/ingest/pipeline/pipeline_test_util.h"
 
@@ -45,12 +46,6 @@ std::vector<MeshBlock> Wall(double y, TimeNs time_ns, const Pose3d& map_T_wall =
     }
   }
   return SplitIntoBlocks(whole, kBlockM);
-}
-
-std::vector<const MeshBlock*> Pointers(const std::vector<MeshBlock>& blocks) {
-  std::vector<const MeshBlock*> pointers;
-  for (const MeshBlock& block : blocks) pointers.push_back(&block);
-  return pointers;
 }
 
 size_t FaceCount(const std::vector<MeshBlock>& blocks) {
@@ -158,7 +153,7 @@ TEST(MoveMesh, IsDeterministic) {
   }
 }
 
-Node MakeObject(const Pose3d& pose, TimeNs first_ns, TimeNs last_ns) {
+Node MakeObjectNode(const Pose3d& pose, TimeNs first_ns, TimeNs last_ns) {
   Node node;
   node.id = NodeId('O', 1);
   node.layer = layers::kObjects;
@@ -177,7 +172,7 @@ TEST(MoveGraph, AnObjectAndItsModelMoveByWhenItWasSeen) {
   const Pose3d move = Turn(0.2, {1.0, 2.0, 0.1});
   const TrajectoryChange change({0, 1000}, {Pose3d(), move});
   const Pose3d pose = Turn(1.0, {3.0, 4.0, 0.5});
-  const LayerGraph moved = MoveGraph({{MakeObject(pose, 1000, 1000)}, {}}, change, {}, {});
+  const LayerGraph moved = MoveGraph({{MakeObjectNode(pose, 1000, 1000)}, {}}, change, {}, {});
   const Node& node = moved.nodes.front();
   EXPECT_LT((node.map_T_node.position - move * pose.position).norm(), 1e-12);
   EXPECT_LT(AngleBetween(node.map_T_node.orientation, (move * pose).orientation), 1e-12);
@@ -186,7 +181,7 @@ TEST(MoveGraph, AnObjectAndItsModelMoveByWhenItWasSeen) {
   EXPECT_LT((node_T_model.position - Eigen::Vector3d(0.0, 0.0, -0.5)).norm(), 1e-12);
   EXPECT_EQ(node.box_node.sizes(), Eigen::Vector3d::Ones());
 
-  const LayerGraph still = MoveGraph({{MakeObject(pose, 0, 0)}, {}}, change, {}, {});
+  const LayerGraph still = MoveGraph({{MakeObjectNode(pose, 0, 0)}, {}}, change, {}, {});
   EXPECT_EQ(still.nodes.front().map_T_node.position, pose.position);
 }
 
@@ -194,13 +189,13 @@ TEST(MoveGraph, UprightThingsStayUprightAndOthersTilt) {
   const Pose3d tilt = {{0.0, 0.0, 0.3},
                        Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX()))};
   const LayerGraph upright =
-      MoveGraph({{MakeObject(Turn(1.0, {3.0, 4.0, 0.5}), 0, 0)}, {}}, Rigid(tilt), {}, {});
+      MoveGraph({{MakeObjectNode(Turn(1.0, {3.0, 4.0, 0.5}), 0, 0)}, {}}, Rigid(tilt), {}, {});
   const Pose3d& stands = upright.nodes.front().map_T_node;
   EXPECT_NEAR((stands.orientation * Eigen::Vector3d::UnitZ()).z(), 1.0, 1e-12);
   EXPECT_LT((stands.position - tilt * Eigen::Vector3d(3.0, 4.0, 0.5)).norm(), 1e-9);
   Pose3d lying = Turn(0.0, {3.0, 4.0, 0.5});
   lying.orientation = Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitY());
-  const LayerGraph leaning = MoveGraph({{MakeObject(lying, 0, 0)}, {}}, Rigid(tilt), {}, {});
+  const LayerGraph leaning = MoveGraph({{MakeObjectNode(lying, 0, 0)}, {}}, Rigid(tilt), {}, {});
   EXPECT_LT(AngleBetween(leaning.nodes.front().map_T_node.orientation,
                          tilt.orientation * lying.orientation),
             1e-9);

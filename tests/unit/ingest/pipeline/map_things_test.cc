@@ -7,7 +7,7 @@
 namespace dsg::ingest {
 namespace {
 
-const std::vector<SemanticLabel> kLabels = {
+const std::vector<SemanticLabel> kThingLabels = {
     {1, "wall"}, {2, "floor"}, {4, "glass"}, {11, "Chair"}, {90, "human"}};
 
 StructurePiece Level(const char* type, double z, double width) {
@@ -21,9 +21,9 @@ StructurePiece Level(const char* type, double z, double width) {
 }
 
 TEST(MapThings, ObjectsAreNeitherStructuresNorPeople) {
-  const std::vector<int32_t> people = DynamicClasses(kLabels);
+  const std::vector<int32_t> people = DynamicClasses(kThingLabels);
   EXPECT_EQ(people, std::vector<int32_t>{90});
-  EXPECT_EQ(ObjectClasses(kLabels, StructureClasses::FromLabels(kLabels), people),
+  EXPECT_EQ(ObjectClasses(kThingLabels, StructureClasses::FromLabels(kThingLabels), people),
             std::vector<int32_t>{11});
   EXPECT_EQ(ObjectClasses({}, {}, {}), std::vector<int32_t>{kThingClass});
   EXPECT_EQ(NamesOf({})[0].name, kThingName);
@@ -60,7 +60,7 @@ TEST(MapThings, GlassClosesItsColumnsAndNoOthers) {
   // The bottom rail of a pane, and a wall.
   block.positions_map = {{0.55f, 0.55f, 0.05f}, {0.25f, 0.25f, 0.05f}};
   block.labels = {4, 1};
-  CloseGlass({&block}, GlassClasses(kLabels), {0.0}, 1.8, &grid);
+  CloseGlass({&block}, GlassClasses(kThingLabels), {0.0}, 1.8, &grid);
   EXPECT_EQ(grid.AtPoint({0.55, 0.55, 0.05}), Occupancy::kOccupied);
   EXPECT_EQ(grid.AtPoint({0.55, 0.55, 1.75}), Occupancy::kOccupied);
   EXPECT_EQ(grid.AtPoint({0.55, 0.55, 2.5}), Occupancy::kFree);

@@ -12,11 +12,12 @@
 #include "schema/base/status.h"
 #include "schema/store/graph_store.h"
 #include "tests/unit/ingest/log/log_test_util.h"
+#include "tests/unit/ingest/pipeline/pipeline_test_util.h"
 
 namespace dsg::ingest {
 namespace {
 
-constexpr TimeNs kStepNs = 200'000'000;
+constexpr TimeNs kImageStepNs = 200'000'000;
 constexpr TimeNs kBeginNs = 1'000'000'000'000;
 
 // A log held in memory.
@@ -98,10 +99,10 @@ HumanDetection Seen(TimeNs time_ns, int64_t id, double ahead_m, double left_m, f
 }
 
 // Somebody walks to the left for `step_count` images, a little over half a metre a second.
-std::vector<Measurement> Walk(int step_count) {
+std::vector<Measurement> WalkLeft(int step_count) {
   std::vector<Measurement> log;
   for (int i = 0; i < step_count; ++i) {
-    const TimeNs time_ns = kBeginNs + i * kStepNs;
+    const TimeNs time_ns = kBeginNs + i * kImageStepNs;
     log.emplace_back(RobotAt(time_ns));
     log.emplace_back(Seen(time_ns, i, 4.0, -1.5 + 0.12 * i, 0.5F));
   }
@@ -154,20 +155,20 @@ class PeopleLog : public testing::Test {
 };
 
 TEST_F(PeopleLog, MakesOneTrackOfOneWalker) {
-  const auto summary = Ingest(Walk(20));
+  const auto summary = Ingest(WalkLeft(20));
   ASSERT_TRUE(summary.ok()) << summary.status();
   const std::vector<TrackInfo> people = People();
   ASSERT_EQ(people.size(), 1U);
   EXPECT_EQ(people[0].name, "person-1");
   EXPECT_EQ(people[0].pose_count, 20);
-  const auto there = Latest()->Locate(people[0].agent, kBeginNs + 10 * kStepNs);
+  const auto there = Latest()->Locate(people[0].agent, kBeginNs + 10 * kImageStepNs);
   ASSERT_TRUE(there.ok()) << there.status();
   EXPECT_NEAR(there->map_T_agent.position.x(), 4.0, 0.3);
   EXPECT_NEAR(there->map_T_agent.position.y(), -0.3, 0.15);
 }
 
 TEST_F(PeopleLog, KeepsFactorsAndShapesOfEachDetection) {
-  ASSERT_TRUE(Ingest(Walk(20)).ok());
+  ASSERT_TRUE(Ingest(WalkLeft(20)).ok());
   const NodeId agent = People().at(0).agent;
   const auto factors = Latest()->Factors(agent, kTimeMin, kTimeMax);
   ASSERT_TRUE(factors.ok());
@@ -183,16 +184,16 @@ TEST_F(PeopleLog, KeepsFactorsAndShapesOfEachDetection) {
 }
 
 TEST_F(PeopleLog, AddsNothingWhenRepeated) {
-  ASSERT_TRUE(Ingest(Walk(20)).ok());
+  ASSERT_TRUE(Ingest(WalkLeft(20)).ok());
   const Revision before = Latest()->revision();
-  const auto again = Ingest(Walk(20));
+  const auto again = Ingest(WalkLeft(20));
   ASSERT_TRUE(again.ok()) << again.status();
   EXPECT_EQ(Latest()->revision(), before);
 }
 
 TEST_F(PeopleLog, KeepsThePeopleOfTwoLogsApart) {
-  ASSERT_TRUE(Ingest(Walk(20), "one").ok());
-  std::vector<Measurement> later = Walk(20);
+  ASSERT_TRUE(Ingest(WalkLeft(20), "one").ok());
+  std::vector<Measurement> later = WalkLeft(20);
   for (Measurement& measurement : later) {
     if (auto* pose = std::get_if<PoseMeasurement>(&measurement))
       pose->pose.time_ns += 60 * kNsPerSecond;
@@ -208,13 +209,13 @@ TEST_F(PeopleLog, KeepsThePeopleOfTwoLogsApart) {
 }
 
 TEST_F(PeopleLog, LeavesOutWhatItCannotUseAndSaysHowMuch) {
-  std::vector<Measurement> log = Walk(20);
+  std::vector<Measurement> log = WalkLeft(20);
   // Before the robot's first pose, at the border, and of another camera.
-  log.insert(log.begin(), Measurement(Seen(kBeginNs - kStepNs, 100, 4.0, 0.0, 0.5F)));
-  HumanDetection at_border = Seen(kBeginNs + 19 * kStepNs, 101, 4.0, 0.0, 0.5F);
+  log.insert(log.begin(), Measurement(Seen(kBeginNs - kImageStepNs, 100, 4.0, 0.0, 0.5F)));
+  HumanDetection at_border = Seen(kBeginNs + 19 * kImageStepNs, 101, 4.0, 0.0, 0.5F);
   at_border.box_px[0] = 2.0;
   log.emplace_back(at_border);
-  HumanDetection unknown = Seen(kBeginNs + 19 * kStepNs, 102, 4.0, 0.0, 0.5F);
+  HumanDetection unknown = Seen(kBeginNs + 19 * kImageStepNs, 102, 4.0, 0.0, 0.5F);
   unknown.camera = "cam7";
   log.emplace_back(unknown);
   const auto summary = Ingest(std::move(log));
@@ -229,7 +230,7 @@ TEST_F(PeopleLog, LeavesOutWhatItCannotUseAndSaysHowMuch) {
 TEST_F(PeopleLog, MakesNoTracksWhenSwitchedOff) {
   IngestOptions options;
   options.people.is_on = false;
-  const auto summary = Ingest(Walk(20), "one", options);
+  const auto summary = Ingest(WalkLeft(20), "one", options);
   ASSERT_TRUE(summary.ok()) << summary.status();
   EXPECT_FALSE(summary->people.has_value());
   EXPECT_TRUE(People().empty());
@@ -239,7 +240,7 @@ TEST_F(PeopleLog, MakesNoTracksWhenSwitchedOff) {
 TEST_F(PeopleLog, TellsAnEncounterOfTwoPeople) {
   std::vector<Measurement> log;
   for (int i = 0; i < 25; ++i) {
-    const TimeNs time_ns = kBeginNs + i * kStepNs;
+    const TimeNs time_ns = kBeginNs + i * kImageStepNs;
     log.emplace_back(RobotAt(time_ns));
     log.emplace_back(Seen(time_ns, 2 * i, 4.0, -1.9 + 0.12 * i, -1.0F));
     log.emplace_back(Seen(time_ns, 2 * i + 1, 6.0, 1.9 - 0.12 * i, 2.0F));
@@ -266,9 +267,10 @@ TEST_F(PeopleLog, TellsAnEncounterOfTwoPeople) {
 }
 
 TEST_F(PeopleLog, KeepsAStrayDetectionAsEvidenceOnly) {
-  std::vector<Measurement> log = Walk(20);
+  std::vector<Measurement> log = WalkLeft(20);
   // Far from the walker, once, with another body.
-  log.insert(log.begin() + 10, Measurement(Seen(kBeginNs + 4 * kStepNs, 100, 9.0, 3.0, -2.0F)));
+  log.insert(log.begin() + 10,
+             Measurement(Seen(kBeginNs + 4 * kImageStepNs, 100, 9.0, 3.0, -2.0F)));
   ASSERT_TRUE(Ingest(std::move(log)).ok());
   const std::vector<TrackInfo> people = People();
   ASSERT_EQ(people.size(), 2U);
@@ -281,26 +283,10 @@ TEST_F(PeopleLog, KeepsAStrayDetectionAsEvidenceOnly) {
   EXPECT_EQ(Latest()->Factors(people[1].agent, kTimeMin, kTimeMax)->size(), 1U);
 }
 
-// Breaks down after some commits.
-class FragileWriter : public GraphWriter {
- public:
-  FragileWriter(GraphWriter& writer, int commit_count) : writer_(writer), left_(commit_count) {}
-  absl::StatusOr<CommitResult> Commit(GraphDelta delta) override {
-    if (left_-- == 0) return absl::InternalError("the power went out");
-    return writer_.Commit(std::move(delta));
-  }
-  absl::StatusOr<SessionState> GetSession(const std::string& session_id) override {
-    return writer_.GetSession(session_id);
-  }
-
- private:
-  GraphWriter& writer_;
-  int left_;
-};
-
 TEST_F(PeopleLog, EndsTheSameAfterAnInterruption) {
-  std::vector<Measurement> log = Walk(30);
-  log.insert(log.begin() + 10, Measurement(Seen(kBeginNs + 4 * kStepNs, 100, 9.0, 3.0, -2.0F)));
+  std::vector<Measurement> log = WalkLeft(30);
+  log.insert(log.begin() + 10,
+             Measurement(Seen(kBeginNs + 4 * kImageStepNs, 100, 9.0, 3.0, -2.0F)));
   ASSERT_TRUE(Ingest(log).ok());
   const std::vector<TrackInfo> whole = People();
   const Revision whole_revision = Latest()->revision();
@@ -325,27 +311,27 @@ TEST_F(PeopleLog, EndsTheSameAfterAnInterruption) {
 TEST_F(PeopleLog, AddsNothingWhenASecondSessionIsRepeated) {
   IngestOptions paper;
   paper.people = PeopleOptions::Paper();
-  ASSERT_TRUE(Ingest(Walk(20)).ok());
-  ASSERT_TRUE(Ingest(Walk(20), "one", paper).ok());
+  ASSERT_TRUE(Ingest(WalkLeft(20)).ok());
+  ASSERT_TRUE(Ingest(WalkLeft(20), "one", paper).ok());
   const Revision before = Latest()->revision();
-  ASSERT_TRUE(Ingest(Walk(20), "one", paper).ok());
-  ASSERT_TRUE(Ingest(Walk(20)).ok());
+  ASSERT_TRUE(Ingest(WalkLeft(20), "one", paper).ok());
+  ASSERT_TRUE(Ingest(WalkLeft(20)).ok());
   EXPECT_EQ(Latest()->revision(), before);
 }
 
 TEST_F(PeopleLog, ASecondSessionEndsTheSameAfterAnInterruption) {
   IngestOptions paper;
   paper.people = PeopleOptions::Paper();
-  ASSERT_TRUE(Ingest(Walk(20)).ok());
-  ASSERT_TRUE(Ingest(Walk(20), "one", paper).ok());
+  ASSERT_TRUE(Ingest(WalkLeft(20)).ok());
+  ASSERT_TRUE(Ingest(WalkLeft(20), "one", paper).ok());
   const Revision whole_revision = Latest()->revision();
   const size_t whole_count = People().size();
   for (int commits = 0; commits < 5; ++commits) {
     SetUpStore(absl::StrCat("second", commits));
-    ASSERT_TRUE(Ingest(Walk(20)).ok());
+    ASSERT_TRUE(Ingest(WalkLeft(20)).ok());
     FragileWriter fragile(*writer_, commits);
-    EXPECT_FALSE(IngestWith(Walk(20), fragile, "one", paper).ok());
-    ASSERT_TRUE(Ingest(Walk(20), "one", paper).ok());
+    EXPECT_FALSE(IngestWith(WalkLeft(20), fragile, "one", paper).ok());
+    ASSERT_TRUE(Ingest(WalkLeft(20), "one", paper).ok());
     EXPECT_EQ(Latest()->revision(), whole_revision) << commits;
     EXPECT_EQ(People().size(), whole_count) << commits;
   }

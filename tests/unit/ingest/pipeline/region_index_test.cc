@@ -10,7 +10,7 @@ namespace dsg::ingest {
 namespace {
 
 // The rooms that a walk over `points` is in, as printed ids.
-std::string Walk(const RegionIndex& index, const std::vector<Eigen::Vector3d>& points) {
+std::string RoomsOfWalk(const RegionIndex& index, const std::vector<Eigen::Vector3d>& points) {
   std::string rooms;
   RegionState state;
   for (const Eigen::Vector3d& point : points) {
@@ -24,41 +24,45 @@ std::string Walk(const RegionIndex& index, const std::vector<Eigen::Vector3d>& p
 TEST(RegionIndex, KeepsARoomUntilItIsClearlyLeft) {
   const RegionIndex index({MakeRoom(1, 0, 0, 5, 5), MakeRoom(2, 5, 0, 10, 5)}, {}, {});
   EXPECT_EQ(
-      Walk(index, {{4, 2, 0}, {5.1, 2, 0}, {5.29, 2, 0}, {5.31, 2, 0}, {4.8, 2, 0}, {4.69, 2, 0}}),
+      RoomsOfWalk(index,
+                  {{4, 2, 0}, {5.1, 2, 0}, {5.29, 2, 0}, {5.31, 2, 0}, {4.8, 2, 0}, {4.69, 2, 0}}),
       "R1 R1 R1 R2 R2 R1 ");
 }
 
 TEST(RegionIndex, EntersFromNowhereAtOnceAndLeavesToNowhereClearly) {
   const RegionIndex index({MakeRoom(1, 0, 0, 5, 5)}, {}, {});
-  EXPECT_EQ(Walk(index, {{-1, 2, 0}, {-0.1, 2, 0}, {0.01, 2, 0}, {-0.29, 2, 0}, {-0.31, 2, 0}}),
-            "- - R1 R1 - ");
+  EXPECT_EQ(
+      RoomsOfWalk(index, {{-1, 2, 0}, {-0.1, 2, 0}, {0.01, 2, 0}, {-0.29, 2, 0}, {-0.31, 2, 0}}),
+      "- - R1 R1 - ");
 }
 
 TEST(RegionIndex, DoesNotFlipBetweenRoomsThatOverlap) {
   const RegionIndex index({MakeRoom(1, 0, 0, 6, 5), MakeRoom(2, 4, 0, 10, 5)}, {}, {});
-  EXPECT_EQ(Walk(index, {{3, 2.5, 0}, {4.9, 2.5, 0}, {5.1, 2.5, 0}, {4.9, 2.5, 0}, {5.1, 2.5, 0}}),
-            "R1 R1 R1 R1 R1 ");
-  EXPECT_EQ(Walk(index, {{3, 2.5, 0}, {5.4, 2.5, 0}, {5.1, 2.5, 0}, {4.9, 2.5, 0}, {4.6, 2.5, 0}}),
-            "R1 R2 R2 R2 R1 ");
+  EXPECT_EQ(
+      RoomsOfWalk(index, {{3, 2.5, 0}, {4.9, 2.5, 0}, {5.1, 2.5, 0}, {4.9, 2.5, 0}, {5.1, 2.5, 0}}),
+      "R1 R1 R1 R1 R1 ");
+  EXPECT_EQ(
+      RoomsOfWalk(index, {{3, 2.5, 0}, {5.4, 2.5, 0}, {5.1, 2.5, 0}, {4.9, 2.5, 0}, {4.6, 2.5, 0}}),
+      "R1 R2 R2 R2 R1 ");
 }
 
 TEST(RegionIndex, TellsStoreysApart) {
   const RegionIndex index({MakeRoom(1, 0, 0, 5, 5, 0, 3), MakeRoom(2, 0, 0, 5, 5, 3, 6)}, {}, {});
-  EXPECT_EQ(Walk(index, {{2, 2, 3.0}}), "R2 ");
-  EXPECT_EQ(Walk(index, {{2, 2, 2.99}}), "R1 ");
-  EXPECT_EQ(Walk(index, {{2, 2, 0}, {2, 2, 1.5}, {2, 2, 3.31}, {2, 2, 3}}), "R1 R1 R2 R2 ");
+  EXPECT_EQ(RoomsOfWalk(index, {{2, 2, 3.0}}), "R2 ");
+  EXPECT_EQ(RoomsOfWalk(index, {{2, 2, 2.99}}), "R1 ");
+  EXPECT_EQ(RoomsOfWalk(index, {{2, 2, 0}, {2, 2, 1.5}, {2, 2, 3.31}, {2, 2, 3}}), "R1 R1 R2 R2 ");
 }
 
 TEST(RegionIndex, HoldsFeetMeasuredJustBelowTheFloor) {
   const RegionIndex index({MakeRoom(1, 0, 0, 5, 5)}, {}, {});
-  EXPECT_EQ(Walk(index, {{2, 2, -0.02}}), "R1 ");
-  EXPECT_EQ(Walk(index, {{2, 2, -0.5}}), "- ");
+  EXPECT_EQ(RoomsOfWalk(index, {{2, 2, -0.02}}), "R1 ");
+  EXPECT_EQ(RoomsOfWalk(index, {{2, 2, -0.5}}), "- ");
 }
 
 TEST(RegionIndex, CountsTheLowEdgesAsInside) {
   const RegionIndex index({MakeRoom(1, 0, 0, 5, 5)}, {}, {});
-  EXPECT_EQ(Walk(index, {{0, 2, 0}}), "R1 ");
-  EXPECT_EQ(Walk(index, {{5, 2, 0}}), "- ");
+  EXPECT_EQ(RoomsOfWalk(index, {{0, 2, 0}}), "R1 ");
+  EXPECT_EQ(RoomsOfWalk(index, {{5, 2, 0}}), "- ");
 }
 
 TEST(RegionIndex, TakesTheBoxOfARoomWithoutOutline) {
@@ -68,14 +72,14 @@ TEST(RegionIndex, TakesTheBoxOfARoomWithoutOutline) {
   empty_room.region.reset();
   empty_room.box_node = Box3d();
   const RegionIndex index({empty_room, box_room}, {}, {});
-  EXPECT_EQ(Walk(index, {{2, 2, 1}}), "R1 ");
+  EXPECT_EQ(RoomsOfWalk(index, {{2, 2, 1}}), "R1 ");
 }
 
 TEST(RegionIndex, FollowsAnOutlineThatIsNoBox) {
   Node room = MakeRoom(1, 0, 0, 4, 4);
   room.region->footprint_map = {{0, 0}, {4, 0}, {4, 1}, {1, 1}, {1, 4}, {0, 4}};
   const RegionIndex index({room}, {}, {});
-  EXPECT_EQ(Walk(index, {{3, 3, 1}, {3, 0.5, 1}, {0.5, 3, 1}, {1.2, 2, 1}, {1.4, 2, 1}}),
+  EXPECT_EQ(RoomsOfWalk(index, {{3, 3, 1}, {3, 0.5, 1}, {0.5, 3, 1}, {1.2, 2, 1}, {1.4, 2, 1}}),
             "- R1 R1 R1 - ");
 }
 

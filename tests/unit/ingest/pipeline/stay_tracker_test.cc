@@ -12,10 +12,9 @@
 namespace dsg::ingest {
 namespace {
 
-const NodeId kAnna('H', 1);
 const NodeId kBerta('H', 2);
 
-RegionIndex TwoRooms() {
+RegionIndex TwoRoomRegions() {
   return RegionIndex({MakeRoom(1, 0, 0, 5, 5), MakeRoom(2, 5, 0, 10, 5)}, {}, {});
 }
 
@@ -24,7 +23,7 @@ Stay InRoom(NodeId agent, uint64_t room, TimeNs enter_ns, TimeNs exit_ns) {
 }
 
 TEST(StayTracker, EndsAndBeginsStaysAtThePoseThatIsFirstElsewhere) {
-  StayTracker tracker(TwoRooms(), 2 * kNsPerSecond);
+  StayTracker tracker(TwoRoomRegions(), 2 * kNsPerSecond);
   tracker.Observe(kAnna, 100, {4, 2, 0});
   tracker.Observe(kAnna, 200, {5.1, 2, 0});
   tracker.Observe(kAnna, 300, {6, 2, 0});
@@ -35,7 +34,7 @@ TEST(StayTracker, EndsAndBeginsStaysAtThePoseThatIsFirstElsewhere) {
 }
 
 TEST(StayTracker, TellsAnOpenStayOnceAndItsEndLater) {
-  StayTracker tracker(TwoRooms(), 2 * kNsPerSecond);
+  StayTracker tracker(TwoRoomRegions(), 2 * kNsPerSecond);
   tracker.Observe(kAnna, 100, {4, 2, 0});
   EXPECT_EQ(tracker.TakeChanges(), std::vector<Stay>{InRoom(kAnna, 1, 100, kTimeMax)});
   tracker.Observe(kAnna, 200, {4, 2, 0});
@@ -46,7 +45,7 @@ TEST(StayTracker, TellsAnOpenStayOnceAndItsEndLater) {
 }
 
 TEST(StayTracker, EndsAStayAfterTheLastPoseBeforeAGap) {
-  StayTracker tracker(TwoRooms(), 2 * kNsPerSecond);
+  StayTracker tracker(TwoRoomRegions(), 2 * kNsPerSecond);
   tracker.Observe(kAnna, 0, {4, 2, 0});
   tracker.Observe(kAnna, 2 * kNsPerSecond, {4, 2, 0});
   tracker.Observe(kAnna, 4 * kNsPerSecond + 1, {4, 2, 0});
@@ -57,7 +56,7 @@ TEST(StayTracker, EndsAStayAfterTheLastPoseBeforeAGap) {
 }
 
 TEST(StayTracker, KeepsStaysInRoomsThatAreStillThereWhenTheMapGrows) {
-  StayTracker tracker(TwoRooms(), 2 * kNsPerSecond);
+  StayTracker tracker(TwoRoomRegions(), 2 * kNsPerSecond);
   tracker.Observe(kAnna, 100, {4, 2, 0});
   tracker.SetRegions(RegionIndex({MakeRoom(0, -5, 0, 0, 5), MakeRoom(1, 0, 0, 5, 5)}, {}, {}));
   tracker.Observe(kAnna, 200, {4, 2, 0});
@@ -66,7 +65,7 @@ TEST(StayTracker, KeepsStaysInRoomsThatAreStillThereWhenTheMapGrows) {
 }
 
 TEST(StayTracker, EndsStaysInRoomsThatAreNoMore) {
-  StayTracker tracker(TwoRooms(), 2 * kNsPerSecond);
+  StayTracker tracker(TwoRoomRegions(), 2 * kNsPerSecond);
   tracker.Observe(kAnna, 100, {4, 2, 0});
   tracker.SetRegions(RegionIndex({MakeRoom(7, 0, 0, 10, 5)}, {}, {}));
   EXPECT_EQ(tracker.TakeChanges(), std::vector<Stay>{InRoom(kAnna, 1, 100, 101)});
@@ -76,7 +75,7 @@ TEST(StayTracker, EndsStaysInRoomsThatAreNoMore) {
 }
 
 TEST(StayTracker, ForgetsTheRoomOverAGap) {
-  StayTracker tracker(TwoRooms(), 2 * kNsPerSecond);
+  StayTracker tracker(TwoRoomRegions(), 2 * kNsPerSecond);
   tracker.Observe(kAnna, 0, {4, 2, 0});
   // Within the hysteresis of room 1, but nothing says that it was left lately.
   tracker.Observe(kAnna, 10 * kNsPerSecond, {5.1, 2, 0});
@@ -86,7 +85,7 @@ TEST(StayTracker, ForgetsTheRoomOverAGap) {
 }
 
 TEST(StayTracker, MakesNoStayNowhere) {
-  StayTracker tracker(TwoRooms(), 2 * kNsPerSecond);
+  StayTracker tracker(TwoRoomRegions(), 2 * kNsPerSecond);
   tracker.Observe(kAnna, 0, {-4, 2, 0});
   tracker.Observe(kAnna, 100, {1, 2, 0});
   tracker.Observe(kAnna, 200, {-4, 2, 0});
@@ -96,7 +95,7 @@ TEST(StayTracker, MakesNoStayNowhere) {
 }
 
 TEST(StayTracker, CutsStaysAtTheLongestLength) {
-  StayTracker tracker(TwoRooms(), 3600 * kNsPerSecond);
+  StayTracker tracker(TwoRoomRegions(), 3600 * kNsPerSecond);
   const TimeNs step = kStayNsMax / 2;
   for (int i = 0; i <= 5; ++i) tracker.Observe(kAnna, i * step, {4, 2, 0});
   tracker.Finish();
@@ -114,7 +113,7 @@ TEST(StayTracker, SaysNothingInAMapWithoutRoomsAndPlaces) {
 }
 
 TEST(StayTracker, WorksAtTheEndsOfTime) {
-  StayTracker tracker(TwoRooms(), 2 * kNsPerSecond);
+  StayTracker tracker(TwoRoomRegions(), 2 * kNsPerSecond);
   tracker.Observe(kAnna, kTimeMin + 1, {4, 2, 0});
   tracker.Observe(kAnna, kTimeMax - 2, {4, 2, 0});
   tracker.Finish();
@@ -129,7 +128,7 @@ using StayTable = std::map<std::pair<NodeId, TimeNs>, Stay>;
 StayTable WalkAskingEvery(int ask_every, unsigned seed) {
   std::mt19937 random(seed);
   std::normal_distribution<double> step(0.0, 0.8);
-  StayTracker tracker(TwoRooms(), 2 * kNsPerSecond);
+  StayTracker tracker(TwoRoomRegions(), 2 * kNsPerSecond);
   StayTable table;
   const auto ask = [&] {
     for (const Stay& stay : tracker.TakeChanges()) table[{stay.agent, stay.enter_ns}] = stay;

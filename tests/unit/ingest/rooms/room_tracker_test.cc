@@ -13,7 +13,7 @@ std::vector<RoomPlace> Places(int count, double shift_m = 0.0) {
   return places;
 }
 
-FoundRoom Room(int begin, int end) {
+FoundRoom RoomOfPlaces(int begin, int end) {
   FoundRoom room;
   for (int i = begin; i < end; ++i) room.places.push_back(i);
   return room;
@@ -21,12 +21,12 @@ FoundRoom Room(int begin, int end) {
 
 TEST(RoomTracker, KeepsIdsWhileTheMapGrows) {
   RoomTracker tracker;
-  std::vector<FoundRoom> rooms = {Room(0, 4), Room(4, 6)};
+  std::vector<FoundRoom> rooms = {RoomOfPlaces(0, 4), RoomOfPlaces(4, 6)};
   tracker.Track(Places(6), &rooms);
   EXPECT_EQ(rooms[0].id, 0);
   EXPECT_EQ(rooms[1].id, 1);
   // More of the second room, a third one, everything a little moved, in another order.
-  std::vector<FoundRoom> grown = {Room(12, 15), Room(4, 12), Room(0, 4)};
+  std::vector<FoundRoom> grown = {RoomOfPlaces(12, 15), RoomOfPlaces(4, 12), RoomOfPlaces(0, 4)};
   tracker.Track(Places(15, 0.2), &grown);
   EXPECT_EQ(grown[0].id, 2);
   EXPECT_EQ(grown[1].id, 1);
@@ -35,9 +35,9 @@ TEST(RoomTracker, KeepsIdsWhileTheMapGrows) {
 
 TEST(RoomTracker, GivesTheLargerPartOfASplitTheId) {
   RoomTracker tracker;
-  std::vector<FoundRoom> rooms = {Room(0, 10)};
+  std::vector<FoundRoom> rooms = {RoomOfPlaces(0, 10)};
   tracker.Track(Places(10), &rooms);
-  std::vector<FoundRoom> parts = {Room(0, 3), Room(3, 10)};
+  std::vector<FoundRoom> parts = {RoomOfPlaces(0, 3), RoomOfPlaces(3, 10)};
   tracker.Track(Places(10), &parts);
   EXPECT_EQ(parts[0].id, 1);
   EXPECT_EQ(parts[1].id, 0);
@@ -45,12 +45,12 @@ TEST(RoomTracker, GivesTheLargerPartOfASplitTheId) {
 
 TEST(RoomTracker, GivesMergedRoomsTheIdOfTheLargerOneAndNeverTheOtherAgain) {
   RoomTracker tracker;
-  std::vector<FoundRoom> rooms = {Room(0, 3), Room(3, 10)};
+  std::vector<FoundRoom> rooms = {RoomOfPlaces(0, 3), RoomOfPlaces(3, 10)};
   tracker.Track(Places(10), &rooms);
-  std::vector<FoundRoom> merged = {Room(0, 10)};
+  std::vector<FoundRoom> merged = {RoomOfPlaces(0, 10)};
   tracker.Track(Places(10), &merged);
   EXPECT_EQ(merged[0].id, 1);
-  std::vector<FoundRoom> apart = {Room(0, 3), Room(3, 10)};
+  std::vector<FoundRoom> apart = {RoomOfPlaces(0, 3), RoomOfPlaces(3, 10)};
   tracker.Track(Places(10), &apart);
   EXPECT_EQ(apart[0].id, 2);
   EXPECT_EQ(apart[1].id, 1);
@@ -59,9 +59,9 @@ TEST(RoomTracker, GivesMergedRoomsTheIdOfTheLargerOneAndNeverTheOtherAgain) {
 TEST(RoomTracker, TakesRoomsOneAboveTheOtherForTwo) {
   RoomTracker tracker;
   std::vector<RoomPlace> places = {{{0.0, 0.0, 0.0}, 1.0}, {{0.0, 0.0, 3.0}, 1.0}};
-  std::vector<FoundRoom> rooms = {Room(0, 1), Room(1, 2)};
+  std::vector<FoundRoom> rooms = {RoomOfPlaces(0, 1), RoomOfPlaces(1, 2)};
   tracker.Track(places, &rooms);
-  std::vector<FoundRoom> swapped = {Room(1, 2), Room(0, 1)};
+  std::vector<FoundRoom> swapped = {RoomOfPlaces(1, 2), RoomOfPlaces(0, 1)};
   tracker.Track(places, &swapped);
   EXPECT_EQ(swapped[0].id, rooms[1].id);
   EXPECT_EQ(swapped[1].id, rooms[0].id);
@@ -69,11 +69,11 @@ TEST(RoomTracker, TakesRoomsOneAboveTheOtherForTwo) {
 
 TEST(RoomTracker, ForgetsRoomsThatAreGone) {
   RoomTracker tracker;
-  std::vector<FoundRoom> rooms = {Room(0, 3)};
+  std::vector<FoundRoom> rooms = {RoomOfPlaces(0, 3)};
   tracker.Track(Places(3), &rooms);
   std::vector<FoundRoom> none;
   tracker.Track({}, &none);
-  std::vector<FoundRoom> again = {Room(0, 3)};
+  std::vector<FoundRoom> again = {RoomOfPlaces(0, 3)};
   tracker.Track(Places(3), &again);
   EXPECT_EQ(again[0].id, 1);
 }

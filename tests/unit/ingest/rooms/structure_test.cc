@@ -49,7 +49,7 @@ void AddSheet(const Eigen::Vector3d& corner, const Eigen::Vector3d& u, const Eig
 }
 
 /// The inside of a box; five metres by four.
-MeshBlock Room(double noise_m = 0.0, double step_m = 0.1) {
+MeshBlock BoxRoom(double noise_m = 0.0, double step_m = 0.1) {
   const Eigen::Vector3d x(5, 0, 0);
   const Eigen::Vector3d y(0, 4, 0);
   const Eigen::Vector3d z(0, 0, 2.5);
@@ -110,7 +110,7 @@ TEST(StructureClasses, AreToldFromTheTablesOfOtherDataSets) {
 }
 
 TEST(Structures, OfABoxAreItsSixSides) {
-  const MeshBlock room = Room();
+  const MeshBlock room = BoxRoom();
   const std::vector<StructurePiece> pieces = FindStructures({&room}, Classes());
   ASSERT_EQ(pieces.size(), 6u);
   EXPECT_EQ(CountOf(pieces, "wall"), 4);
@@ -126,7 +126,7 @@ TEST(Structures, OfABoxAreItsSixSides) {
 
 TEST(Structures, AreWholeAcrossBlocks) {
   for (const double noise_m : {0.0, 0.003}) {
-    const std::vector<MeshBlock> blocks = SplitIntoBlocks(Room(noise_m), 1.0);
+    const std::vector<MeshBlock> blocks = SplitIntoBlocks(BoxRoom(noise_m), 1.0);
     ASSERT_GT(blocks.size(), 20u);
     std::vector<const MeshBlock*> mesh;
     for (const MeshBlock& block : blocks) mesh.push_back(&block);
@@ -135,7 +135,7 @@ TEST(Structures, AreWholeAcrossBlocks) {
 }
 
 TEST(Structures, WithoutLabelsAreToldByNormalsAndHeight) {
-  MeshBlock room = Room();
+  MeshBlock room = BoxRoom();
   // A table top, and a picture's worth of an upright face.
   AddSheet({1, 1, 0.75}, {1.5, 0, 0}, {0, 1.5, 0}, 10, &room);
   AddSheet({1, 1, 0.0}, {1.5, 0, 0}, {0, 0, 0.7}, 10, &room);
@@ -179,7 +179,7 @@ TEST(Structures, OfNothingOrOfBrokenBlocksAreNone) {
 }
 
 TEST(Structures, OfAMillionVerticesAreStillTheSixSides) {
-  const MeshBlock room = Room(0.002, 0.0095);
+  const MeshBlock room = BoxRoom(0.002, 0.0095);
   const auto start = std::chrono::steady_clock::now();
   const std::vector<StructurePiece> pieces = FindStructures({&room}, Classes());
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
@@ -228,7 +228,7 @@ TEST(StructureHeights, AddUpWhatIsLevel) {
 }
 
 TEST(StructureRooms, AWallBoundsTheRoomItFaces) {
-  MeshBlock mesh = Room();
+  MeshBlock mesh = BoxRoom();
   // The other side of the wall at x = 5, in the next room.
   AddSheet({5.15, 0, 0}, {0, 4, 0}, {0, 0, 2.5}, kWall, &mesh);
   const std::vector<StructurePiece> pieces = FindStructures({&mesh}, Classes());
@@ -251,7 +251,7 @@ TEST(StructureRooms, AWallBoundsTheRoomItFaces) {
 }
 
 TEST(StructureRooms, AThingHangsOnTheWallThatItTouches) {
-  const MeshBlock mesh = Room();
+  const MeshBlock mesh = BoxRoom();
   const std::vector<StructurePiece> pieces = FindStructures({&mesh}, Classes());
   const Box3d board(Eigen::Vector3d(1.0, 0.02, 0.9), Eigen::Vector3d(2.8, 0.06, 2.1));
   const std::optional<int> wall = AttachedTo(board, 0.0, false, pieces);

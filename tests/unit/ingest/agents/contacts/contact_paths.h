@@ -12,6 +12,7 @@
 namespace dsg::ingest {
 
 inline constexpr TimeNs kSecond = 1'000'000'000;
+inline constexpr NodeId kAda('h', 1);
 
 TimedPoint At(double seconds, double x, double y, double z = 0.0);
 

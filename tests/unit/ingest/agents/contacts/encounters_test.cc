@@ -14,7 +14,6 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr NodeId kAda('h', 1);
 constexpr NodeId kBen('h', 2);
 
 AgentPath Walker(NodeId agent, std::vector<TimedPoint> torso) {

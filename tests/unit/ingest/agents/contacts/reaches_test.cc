@@ -14,7 +14,6 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr NodeId kAda('h', 1);
 constexpr NodeId kCup('O', 7);
 
 ThingBox Thing(NodeId object, const Eigen::Vector3d& low, const Eigen::Vector3d& high) {

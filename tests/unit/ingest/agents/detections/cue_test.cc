@@ -11,7 +11,7 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr uint64_t kSeed = 20200514;
+constexpr uint64_t kCueSeed = 20200514;
 constexpr uint16_t kPerson = 60 << 8 | 5;
 
 /// A person before a camera, with a detection whose own depth is wrong.
@@ -110,8 +110,8 @@ int Rank(const Eigen::Matrix3d& information) {
 }
 
 TEST(FloorCue, FindsTheDistanceWhateverTheDetectionSays) {
-  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
-  Random random(kSeed, 1);
+  SCOPED_TRACE(testing::Message() << "seed " << kCueSeed);
+  Random random(kCueSeed, 1);
   for (int i = 0; i < 100; ++i) {
     const Scene scene(random.Uniform(3.0, 8.0), random.Uniform(-1.5, 1.5),
                       random.Uniform(-3.0, 3.0));
@@ -187,8 +187,8 @@ TEST(FloorCue, KnowsTheHeightOfStandingAndOfBentLegs) {
 }
 
 TEST(DepthCue, FindsDistanceAndSideWhateverTheDetectionSays) {
-  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
-  Random random(kSeed, 2);
+  SCOPED_TRACE(testing::Message() << "seed " << kCueSeed);
+  Random random(kCueSeed, 2);
   for (int i = 0; i < 12; ++i) {
     const Scene scene(random.Uniform(2.5, 8.0), random.Uniform(-1.5, 1.5),
                       random.Uniform(-3.0, 3.0));
@@ -262,8 +262,8 @@ TEST(DepthCue, StaysSilentWithoutReadings) {
 }
 
 TEST(DepthCue, NeverCrashesOnBoxesOfAnyKind) {
-  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
-  Random random(kSeed, 3);
+  SCOPED_TRACE(testing::Message() << "seed " << kCueSeed);
+  Random random(kCueSeed, 3);
   const double wild[] = {NAN, INFINITY, -1e300, 1e300, -50.0, 719.0, 479.0, 1e6};
   const Scene scene(5.0, 0.5);
   const DepthFrame frame = scene.Depth();

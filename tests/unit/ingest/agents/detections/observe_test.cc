@@ -9,7 +9,7 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr uint64_t kSeed = 20200515;
+constexpr uint64_t kObserveSeed = 20200515;
 
 class ObserveTest : public testing::Test {
  protected:
@@ -130,8 +130,8 @@ TEST_F(ObserveTest, ObservesABoxWithoutJoints) {
 }
 
 TEST_F(ObserveTest, SaysTheSameAgain) {
-  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
-  Random random(kSeed, 1);
+  SCOPED_TRACE(testing::Message() << "seed " << kObserveSeed);
+  Random random(kObserveSeed, 1);
   context_.floor_z_map = 0.0;
   for (auto& pixel : detection_.joints_px) pixel.x() += 3.0 * random.Normal();
   const PersonObservation first = Seen();

@@ -11,7 +11,7 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr uint64_t kSeed = 20200513;
+constexpr uint64_t kPerspectiveSeed = 20200513;
 
 Pose3d RandomPerson(Random* random) {
   const double range_m = random->Uniform(2.0, 9.0);
@@ -34,8 +34,8 @@ double PositionErrorM(const PersonInCamera& person, const Pose3d& map_T_camera,
 }
 
 TEST(Perspective, FindsPlaceAndHeadingOfAPerfectDetection) {
-  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
-  Random random(kSeed, 1);
+  SCOPED_TRACE(testing::Message() << "seed " << kPerspectiveSeed);
+  Random random(kPerspectiveSeed, 1);
   const Pose3d map_T_camera = LookAlongX(1.2, 0.1);
   for (int i = 0; i < 200; ++i) {
     const Pose3d torso = RandomPerson(&random);
@@ -52,10 +52,10 @@ TEST(Perspective, FindsPlaceAndHeadingOfAPerfectDetection) {
 }
 
 TEST(Perspective, TakesDistortionOff) {
-  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
+  SCOPED_TRACE(testing::Message() << "seed " << kPerspectiveSeed);
   const Pose3d map_T_camera = LookAlongX(1.2);
   for (const Distortion kind : {Distortion::kRadialTangential, Distortion::kEquidistant}) {
-    Random random(kSeed, 2);
+    Random random(kPerspectiveSeed, 2);
     const CameraCalibration camera = Distorted(kind);
     for (int i = 0; i < 50; ++i) {
       const Pose3d torso = RandomPerson(&random);
@@ -84,8 +84,8 @@ TEST(Perspective, InvertsTheLensAndKnowsItsEnd) {
 }
 
 TEST(Perspective, StandsAFewWildJoints) {
-  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
-  Random random(kSeed, 3);
+  SCOPED_TRACE(testing::Message() << "seed " << kPerspectiveSeed);
+  Random random(kPerspectiveSeed, 3);
   const Pose3d map_T_camera = LookAlongX(1.2);
   double sum_m = 0.0;
   for (int i = 0; i < 100; ++i) {
@@ -224,8 +224,8 @@ TEST(Perspective, NamesTheDetectionThatItCannotPlace) {
 }
 
 TEST(Perspective, NeverCrashesOnNumbersOfAnyKind) {
-  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
-  Random random(kSeed, 4);
+  SCOPED_TRACE(testing::Message() << "seed " << kPerspectiveSeed);
+  Random random(kPerspectiveSeed, 4);
   const double wild[] = {NAN, INFINITY, -INFINITY, 0.0, 1e300, -1e300, 1e-300, -5.0};
   const HumanDetection whole =
       PerfectDetection(TestCamera(), LookAlongX(1.2), Upright({4.0, 0.0, 0.93}, 0.0));

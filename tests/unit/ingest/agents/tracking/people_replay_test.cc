@@ -20,7 +20,7 @@ namespace dsg::ingest {
 namespace {
 
 constexpr uint64_t kSeed = 1;
-constexpr double kSigmaM = 0.15;
+constexpr double kReplaySigmaM = 0.15;
 constexpr double kMissRate = 0.1;
 constexpr double kFalsePerImage = 0.2;
 constexpr double kTorsoM = 0.95;
@@ -55,8 +55,9 @@ Paths ReadPaths(const std::string& path) {
 }
 
 PersonObservation Noisy(const Eigen::Vector3d& torso, Random* random) {
-  const Eigen::Vector3d noise(kSigmaM * random->Normal(), kSigmaM * random->Normal(), 0.0);
-  return ObservationAt(torso + noise, kSigmaM);
+  const Eigen::Vector3d noise(kReplaySigmaM * random->Normal(), kReplaySigmaM * random->Normal(),
+                              0.0);
+  return ObservationAt(torso + noise, kReplaySigmaM);
 }
 
 Box3d Area(const Paths& paths) {
@@ -82,7 +83,7 @@ PeopleLog MakeDetections(const Paths& paths) {
     if (random.Chance(kFalsePerImage)) {
       const Eigen::Vector3d at(random.Uniform(area.min().x(), area.max().x()),
                                random.Uniform(area.min().y(), area.max().y()), kTorsoM);
-      AddDetection(time_ns, -1, at, ObservationAt(at, kSigmaM), &log);
+      AddDetection(time_ns, -1, at, ObservationAt(at, kReplaySigmaM), &log);
     }
     // Ids in the order of the table would be half an identity.
     std::vector<PersonObservation>& image = log.images[time_ns];

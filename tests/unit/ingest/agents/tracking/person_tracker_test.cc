@@ -12,7 +12,7 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kSigmaM = 0.1;
+constexpr double kSeenSigmaM = 0.1;
 
 struct Walker {
   Eigen::Vector3d from = Eigen::Vector3d::Zero();
@@ -25,7 +25,7 @@ struct Walker {
 
 void AddFalse(double t_s, Random* random, PeopleLog* log) {
   const Eigen::Vector3d at(random->Uniform(-8.0, 8.0), random->Uniform(-8.0, 8.0), 0.95);
-  AddDetection(AtS(t_s), -1, at, ObservationAt(at, kSigmaM), log);
+  AddDetection(AtS(t_s), -1, at, ObservationAt(at, kSeenSigmaM), log);
 }
 
 // 5 Hz; people without a shape of their own (all zero) have none.
@@ -37,8 +37,9 @@ PeopleLog Walk(const std::vector<Walker>& walkers, double from_s, double to_s, R
       const Walker& walker = walkers[i];
       if (t_s >= walker.gone_s && t_s < walker.back_s) continue;
       const Eigen::Vector3d torso = walker.from + t_s * walker.velocity;
-      const Eigen::Vector3d noise(kSigmaM * random->Normal(), kSigmaM * random->Normal(), 0.0);
-      PersonObservation observation = ObservationAt(torso + noise, kSigmaM);
+      const Eigen::Vector3d noise(kSeenSigmaM * random->Normal(), kSeenSigmaM * random->Normal(),
+                                  0.0);
+      PersonObservation observation = ObservationAt(torso + noise, kSeenSigmaM);
       if (!walker.shape.isZero()) {
         observation.shape_coefficients = NoisyShape(walker.shape, 0.4, random);
       }
@@ -117,7 +118,7 @@ TEST(PersonTracker, GoesThroughItsStates) {
 
 TEST(PersonTracker, DropsFalseTracksAndKeepsTheirEvidence) {
   PersonTracker tracker({});
-  tracker.Observe(AtS(0.0), {ObservationAt({1.0, 2.0, 0.95}, kSigmaM)});
+  tracker.Observe(AtS(0.0), {ObservationAt({1.0, 2.0, 0.95}, kSeenSigmaM)});
   EXPECT_TRUE(tracker.TakeChanges().empty());
   tracker.Observe(AtS(2.0), {});
   const std::vector<TrackChange> changes = tracker.TakeChanges();
@@ -144,7 +145,7 @@ TEST(PersonTracker, RandomFalseDetectionsRarelyBecomePeople) {
 
 TEST(PersonTracker, RefusesImagesOutOfOrder) {
   PersonTracker tracker({});
-  const PersonObservation observation = ObservationAt({0.0, 0.0, 0.95}, kSigmaM);
+  const PersonObservation observation = ObservationAt({0.0, 0.0, 0.95}, kSeenSigmaM);
   EXPECT_TRUE(tracker.Observe(AtS(1.0), {observation}));
   EXPECT_FALSE(tracker.Observe(AtS(0.8), {observation}));
   EXPECT_EQ(tracker.counts().refused_image_count, 1);
@@ -155,9 +156,9 @@ TEST(PersonTracker, RefusesImagesOutOfOrder) {
 TEST(PersonTracker, SurvivesNumbersThatAreNone) {
   PersonTracker tracker({});
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  PersonObservation broken = ObservationAt({0.0, nan, 0.95}, kSigmaM);
+  PersonObservation broken = ObservationAt({0.0, nan, 0.95}, kSeenSigmaM);
   PersonObservation flat = ObservationAt({0.0, 0.0, 0.95}, 0.0);
-  PersonObservation limp = ObservationAt({0.0, 0.0, 0.95}, kSigmaM);
+  PersonObservation limp = ObservationAt({0.0, 0.0, 0.95}, kSeenSigmaM);
   limp.has_joints = true;
   for (Eigen::Vector3d& joint : limp.joints_torso) joint.setZero();
   limp.joints_torso[3].x() = nan;
@@ -171,8 +172,8 @@ TEST(PersonTracker, TwoCamerasAtOneStampAreTwoImages) {
   PersonTracker tracker({});
   for (int i = 0; i < 4; ++i) {
     const double t_s = 0.2 * i;
-    EXPECT_TRUE(tracker.Observe(AtS(t_s), {ObservationAt({0.0, 0.0, 0.95}, kSigmaM)}));
-    EXPECT_TRUE(tracker.Observe(AtS(t_s), {ObservationAt({3.5, 0.0, 0.95}, kSigmaM)}));
+    EXPECT_TRUE(tracker.Observe(AtS(t_s), {ObservationAt({0.0, 0.0, 0.95}, kSeenSigmaM)}));
+    EXPECT_TRUE(tracker.Observe(AtS(t_s), {ObservationAt({3.5, 0.0, 0.95}, kSeenSigmaM)}));
   }
   EXPECT_EQ(tracker.counts().track_count, 2);
 }
@@ -253,7 +254,7 @@ TEST(PersonTracker, AReopenedTrackIsToldOnlyWhatIsNew) {
 
 TEST(PersonTracker, WeakObservationsCarryOnButOpenNothing) {
   PersonTracker tracker({});
-  PersonObservation weak = ObservationAt({0.0, 0.0, 0.95}, kSigmaM);
+  PersonObservation weak = ObservationAt({0.0, 0.0, 0.95}, kSeenSigmaM);
   weak.is_weak = true;
   tracker.Observe(AtS(0.0), {weak});
   EXPECT_EQ(tracker.counts().weak_unused_count, 1);
@@ -319,13 +320,13 @@ TEST(PersonTracker, TheOrderWithinAnImageDoesNotMatter) {
 
 TEST(PersonTracker, InThePapersModeTheFirstConsistentTrackWins) {
   PersonTracker tracker(PaperTrackerOptions());
-  tracker.Observe(AtS(0.0), {ObservationAt({0.0, 0.0, 0.95}, kSigmaM)});
+  tracker.Observe(AtS(0.0), {ObservationAt({0.0, 0.0, 0.95}, kSeenSigmaM)});
   EXPECT_EQ(tracker.counts().track_count, 0) << "one detection is no track yet";
-  tracker.Observe(AtS(0.2), {ObservationAt({2.9, 0.0, 0.95}, kSigmaM)});
+  tracker.Observe(AtS(0.2), {ObservationAt({2.9, 0.0, 0.95}, kSeenSigmaM)});
   EXPECT_EQ(tracker.counts().track_count, 1);
-  tracker.Observe(AtS(0.4), {ObservationAt({-4.0, 0.0, 0.95}, kSigmaM)});
+  tracker.Observe(AtS(0.4), {ObservationAt({-4.0, 0.0, 0.95}, kSeenSigmaM)});
   EXPECT_EQ(tracker.counts().track_count, 1) << "6.9 m away: another track begins";
-  tracker.Observe(AtS(0.6), {ObservationAt({-4.0, 0.0, 0.95}, kSigmaM)});
+  tracker.Observe(AtS(0.6), {ObservationAt({-4.0, 0.0, 0.95}, kSeenSigmaM)});
   EXPECT_EQ(tracker.counts().track_count, 2);
 }
 
