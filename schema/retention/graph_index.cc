@@ -11,8 +11,8 @@
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
-#include "schema/retention/past.h"
 #include "schema/model/known_names.h"
+#include "schema/retention/past.h"
 
 namespace dsg {
 namespace {

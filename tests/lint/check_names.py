@@ -77,20 +77,24 @@ def is_one_alias(uses):
     return len(texts) == 1 and ALIAS.match(texts.pop()) is not None
 
 
-def find_problems():
-    files_of = collections.defaultdict(lambda: collections.defaultdict(list))
-    paths = [p for p in tree.files((".cc",)) if not p.startswith(PROGRAMS)]
-    for path in paths:
-        folder, name = os.path.split(path)
-        for declared in unnamed_names(tree.read(path)):
+def problems_of(texts):
+    """`texts`: contents by path."""
+    uses_in = collections.defaultdict(lambda: collections.defaultdict(list))
+    for path, text in texts.items():
+        folder, file = os.path.split(path)
+        for declared in unnamed_names(text):
             alias = ALIAS.match(declared)
-            files_of[folder][alias.group(1) if alias else declared].append((name, declared))
-    problems = [f"{folder}: '{name}' is in {', '.join(sorted(f for f, _ in uses))}; "
-                "share one, or rename"
-                for folder, uses_of in sorted(files_of.items())
-                for name, uses in sorted(uses_of.items())
-                if len(uses) > 1 and not is_one_alias(uses)]
-    return problems, f"{len(paths)} files"
+            uses_in[folder][alias.group(1) if alias else declared].append((file, declared))
+    return [f"{folder}: '{name}' is in {', '.join(sorted(file for file, _ in uses))}; "
+            "share one, or rename"
+            for folder, uses_of in sorted(uses_in.items())
+            for name, uses in sorted(uses_of.items())
+            if len(uses) > 1 and not is_one_alias(uses)]
+
+
+def find_problems():
+    paths = [p for p in tree.files((".cc",)) if not p.startswith(PROGRAMS)]
+    return problems_of({path: tree.read(path) for path in paths}), f"{len(paths)} files"
 
 
 if __name__ == "__main__":

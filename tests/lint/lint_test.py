@@ -6,6 +6,7 @@ import unittest
 
 import check_docs
 import check_layering
+import check_names
 import check_packages
 import check_proto
 import check_tidy
@@ -125,6 +126,22 @@ class Types(unittest.TestCase):
             {"a.h": type_in("Way"), "b.h": type_in("Path"), "c.cc": hidden}))
         self.assertEqual(1, len(check_types.problems_of(
             {"a.h": type_in("Way"), "b.h": type_in("Way")})))
+
+
+class Names(unittest.TestCase):
+    def test_unnamed_names_differ_within_a_folder(self):
+        file = "namespace dsg {{\nnamespace {{\n{}\n}}  // namespace\n}}\n".format
+        one = file("constexpr int kCount = 3;\nint Add(int a) {\n  return a;\n}")
+        self.assertEqual([], check_names.problems_of(
+            {"a/one.cc": one, "b/one.cc": one, "a/two.cc": file("double Sum(double a) {\n}")}))
+        self.assertEqual(2, len(check_names.problems_of({"a/one.cc": one, "a/two.cc": one})))
+        self.assertEqual(1, len(check_names.problems_of(
+            {"a/one.cc": one, "a/two.cc": file("double Add(double a) {\n}")})))
+
+    def test_one_alias_of_one_type_may_repeat(self):
+        file = "namespace {{\nusing Json = {};\n}}\n".format
+        self.assertEqual([], check_names.problems_of({"a.cc": file("A"), "b.cc": file("A")}))
+        self.assertEqual(1, len(check_names.problems_of({"a.cc": file("A"), "b.cc": file("B")})))
 
 
 class Pages(unittest.TestCase):
