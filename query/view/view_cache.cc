@@ -23,50 +23,6 @@ constexpr size_t kMebibyte = size_t{1} << 20;
 
 using View = std::shared_ptr<const IndexedView>;
 
-struct Slot {
-  View view;
-  // Grows with every use.
-  uint64_t last_use = 0;
-  // Of its places when it was last looked at: they grow while questions fill them.
-  size_t place_bytes = 0;
-};
-
-// The views of one open map.
-struct MapViews {
-  std::shared_ptr<SymbolTable> symbols = std::make_shared<SymbolTable>();
-  std::map<Revision, Slot> slots;
-
-  // Views derived from each other share their pages: the largest counts whole, of the others only
-  // what each does not share. They share their places wholly or not at all.
-  size_t Bytes() const {
-    size_t sum = symbols->memory_bytes();
-    size_t largest = 0;
-    size_t fresh_of_largest = 0;
-    std::set<const SharedPlaces*> places;
-    for (const auto& [revision, slot] : slots) {
-      const SharedPlaces* of_view = slot.view->shared_places().get();
-      if (places.insert(of_view).second) sum += of_view->memory_bytes();
-      const size_t whole = slot.view->parts().memory_bytes();
-      sum += slot.view->fresh_bytes();
-      if (whole > largest) {
-        largest = whole;
-        fresh_of_largest = slot.view->fresh_bytes();
-      }
-    }
-    return sum + largest - fresh_of_largest;
-  }
-
-  View Nearest(Revision revision) const {
-    if (slots.empty()) return nullptr;
-    const auto above = slots.lower_bound(revision);
-    if (above == slots.begin()) return above->second.view;
-    const auto below = std::prev(above);
-    if (above == slots.end()) return below->second.view;
-    return above->first - revision < revision - below->first ? above->second.view
-                                                             : below->second.view;
-  }
-};
-
 struct MadeView {
   View view;
   bool was_derived = false;
@@ -75,6 +31,50 @@ struct MadeView {
 }  // namespace
 
 struct ViewCache::Impl {
+  struct Slot {
+    View view;
+    // Grows with every use.
+    uint64_t last_use = 0;
+    // Of its places when it was last looked at: they grow while questions fill them.
+    size_t place_bytes = 0;
+  };
+
+  // The views of one open map.
+  struct MapViews {
+    std::shared_ptr<SymbolTable> symbols = std::make_shared<SymbolTable>();
+    std::map<Revision, Slot> slots;
+
+    // Views derived from each other share their pages: the largest counts whole, of the others only
+    // what each does not share. They share their places wholly or not at all.
+    size_t Bytes() const {
+      size_t sum = symbols->memory_bytes();
+      size_t largest = 0;
+      size_t fresh_of_largest = 0;
+      std::set<const SharedPlaces*> places;
+      for (const auto& [revision, slot] : slots) {
+        const SharedPlaces* of_view = slot.view->shared_places().get();
+        if (places.insert(of_view).second) sum += of_view->memory_bytes();
+        const size_t whole = slot.view->parts().memory_bytes();
+        sum += slot.view->fresh_bytes();
+        if (whole > largest) {
+          largest = whole;
+          fresh_of_largest = slot.view->fresh_bytes();
+        }
+      }
+      return sum + largest - fresh_of_largest;
+    }
+
+    View Nearest(Revision revision) const {
+      if (slots.empty()) return nullptr;
+      const auto above = slots.lower_bound(revision);
+      if (above == slots.begin()) return above->second.view;
+      const auto below = std::prev(above);
+      if (above == slots.end()) return below->second.view;
+      return above->first - revision < revision - below->first ? above->second.view
+                                                               : below->second.view;
+    }
+  };
+
   explicit Impl(size_t bound) : bytes_max(bound) {}
 
   absl::StatusOr<View> Get(const std::shared_ptr<MapReader>& map, const Snapshot& snapshot,

@@ -137,22 +137,21 @@ std::optional<PlanStart> Planner::BoxStart(const CompiledPattern& pattern,
 
 PlanStart Planner::ChooseStart(const CompiledPattern& pattern,
                                const std::optional<Box3d>& box_map) const {
-  using Kind = PlanStart::Kind;
-  if (pattern.is_never) return {Kind::kNothing, 0, 0.0};
-  if (pattern.id.has_value()) return {Kind::kId, 0, 1.0};
-  PlanStart best{Kind::kScan, 0, static_cast<double>(view_.node_count())};
+  if (pattern.is_never) return {PlanStart::Kind::kNothing, 0, 0.0};
+  if (pattern.id.has_value()) return {PlanStart::Kind::kId, 0, 1.0};
+  PlanStart best{PlanStart::Kind::kScan, 0, static_cast<double>(view_.node_count())};
   const auto consider = [&best](const PlanStart& start) {
     if (start.cost < best.cost) best = start;
   };
   if (pattern.has_class()) {
     double count = 0.0;
     for (const ClassRange& range : pattern.classes) count += static_cast<double>(range.node_count);
-    consider({Kind::kClass, 0, count});
+    consider({PlanStart::Kind::kClass, 0, count});
   } else if (pattern.layer.has_value()) {
-    consider({Kind::kLayer, 0, static_cast<double>(CountInLayer(*pattern.layer))});
+    consider({PlanStart::Kind::kLayer, 0, static_cast<double>(CountInLayer(*pattern.layer))});
   }
   if (pattern.has_name() && IsLiteral(pattern.source.name)) {
-    consider({Kind::kName, 0, kNamesakes});
+    consider({PlanStart::Kind::kName, 0, kNamesakes});
   }
   for (size_t i = 0; i < pattern.relations.size(); ++i) {
     const CompiledRelation& relation = pattern.relations[i];
@@ -161,7 +160,7 @@ PlanStart Planner::ChooseStart(const CompiledPattern& pattern,
     if (others * kJoinCost >= best.cost) continue;
     const double cost =
         ChooseStart(*relation.other, std::nullopt).cost + kJoinCost * others * FanOut(relation);
-    consider({Kind::kJoin, i, cost});
+    consider({PlanStart::Kind::kJoin, i, cost});
   }
   if (const auto box = BoxStart(pattern, box_map, best.cost)) consider(*box);
   return best;
