@@ -14,6 +14,14 @@
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
+
+// Lookup tables of cv::remap from a rectified camera to the real one.
+struct StereoLookup {
+  cv::Mat1f u;
+  cv::Mat1f v;
+  cv::Mat1b inside;
+};
+
 namespace {
 
 constexpr double kRangeDefaultM = 5.0;
@@ -30,16 +38,9 @@ constexpr double kTextureMin = 0.8;
 // Bytes hold the gradients in halves; Sobel's kernel gives eight of one.
 constexpr double kGradientScale = 2.0;
 
-// Lookup tables of cv::remap from a rectified camera to the real one.
-struct Lookup {
-  cv::Mat1f u;
-  cv::Mat1f v;
-  cv::Mat1b inside;
-};
-
-Lookup MakeLookup(const CameraCalibration& rectified, const CameraCalibration& real) {
+StereoLookup MakeLookup(const CameraCalibration& rectified, const CameraCalibration& real) {
   const cv::Size size(rectified.width, rectified.height);
-  Lookup lookup{cv::Mat1f(size, -1e4f), cv::Mat1f(size, -1e4f), cv::Mat1b(size, uint8_t{0})};
+  StereoLookup lookup{cv::Mat1f(size, -1e4f), cv::Mat1f(size, -1e4f), cv::Mat1b(size, uint8_t{0})};
   const Eigen::Matrix3d real_R_rectified =
       (real.body_T_camera.orientation.conjugate() * rectified.body_T_camera.orientation)
           .toRotationMatrix();
@@ -64,7 +65,7 @@ Lookup MakeLookup(const CameraCalibration& rectified, const CameraCalibration& r
   return lookup;
 }
 
-cv::Mat1b Rectified(const Image& image, const Lookup& lookup) {
+cv::Mat1b Rectified(const Image& image, const StereoLookup& lookup) {
   const cv::Mat1b real(image.height, image.width, const_cast<uint8_t*>(image.bytes.data()));
   cv::Mat1b rectified;
   cv::remap(real, rectified, lookup.u, lookup.v, cv::INTER_LINEAR, cv::BORDER_CONSTANT, 0);
@@ -171,8 +172,8 @@ class StereoDepth::Impl {
 
   RectifiedPair pair_;
   double range_m_;
-  Lookup left_lookup_;
-  Lookup right_lookup_;
+  StereoLookup left_lookup_;
+  StereoLookup right_lookup_;
 };
 
 StereoDepth::StereoDepth(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

@@ -10,25 +10,25 @@ namespace {
 
 constexpr size_t kLeafPoints = 16;
 
-struct Points {
-  std::vector<Eigen::Vector3f> points;
-  // The names are nanoflann's.
-  size_t kdtree_get_point_count() const { return points.size(); }
-  float kdtree_get_pt(size_t index, size_t axis) const {
-    return points[index][static_cast<Eigen::Index>(axis)];
-  }
-  template <typename Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-
-using Metric = nanoflann::L2_Simple_Adaptor<float, Points, double, uint32_t>;
-using KdTree = nanoflann::KDTreeSingleIndexAdaptor<Metric, Points, 3, uint32_t>;
-
 }  // namespace
 
 struct PointIndex::Tree {
+  struct Points {
+    std::vector<Eigen::Vector3f> points;
+    // The names are nanoflann's.
+    size_t kdtree_get_point_count() const { return points.size(); }
+    float kdtree_get_pt(size_t index, size_t axis) const {
+      return points[index][static_cast<Eigen::Index>(axis)];
+    }
+    template <typename Box>
+    bool kdtree_get_bbox(Box&) const {
+      return false;
+    }
+  };
+
+  using Metric = nanoflann::L2_Simple_Adaptor<float, Points, double, uint32_t>;
+  using KdTree = nanoflann::KDTreeSingleIndexAdaptor<Metric, Points, 3, uint32_t>;
+
   explicit Tree(std::vector<Eigen::Vector3f> in)
       : points{std::move(in)}, tree(3, points, {kLeafPoints}) {}
   Points points;

@@ -6,26 +6,6 @@
 #include <utility>
 
 namespace dsg::ingest {
-namespace {
-
-/// What nanoflann asks of a set of points; the names are its own.
-struct PointSet {
-  std::vector<Eigen::Vector3f> points;
-
-  size_t kdtree_get_point_count() const { return points.size(); }
-  float kdtree_get_pt(size_t index, size_t axis) const {
-    return points[index][static_cast<Eigen::Index>(axis)];
-  }
-  template <class Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-
-using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, PointSet>,
-                                                   PointSet, 3, size_t>;
-
-}  // namespace
 
 class PointIndex::Tree {
  public:
@@ -43,6 +23,23 @@ class PointIndex::Tree {
   }
 
  private:
+  /// What nanoflann asks of a set of points; the names are its own.
+  struct PointSet {
+    std::vector<Eigen::Vector3f> points;
+
+    size_t kdtree_get_point_count() const { return points.size(); }
+    float kdtree_get_pt(size_t index, size_t axis) const {
+      return points[index][static_cast<Eigen::Index>(axis)];
+    }
+    template <class Box>
+    bool kdtree_get_bbox(Box&) const {
+      return false;
+    }
+  };
+
+  using KdTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, PointSet>,
+                                                     PointSet, 3, size_t>;
+
   PointSet set_;
   KdTree tree_;
 };

@@ -17,6 +17,16 @@
 #include "schema/base/check.h"
 
 namespace dsg::ingest {
+
+/// What the graph keeps of an observation.
+struct TorsoDetection {
+  TimeNs time_ns = 0;
+  Pose3d map_T_torso;
+  Eigen::Matrix3d position_covariance_map;
+  /// 0 = it gives none.
+  double heading_sigma_rad = 0.0;
+};
+
 namespace {
 
 using StandingChain = StateChain<3>;
@@ -53,15 +63,6 @@ ChainLink<kSmoothStateCount> LinkOf(const TorsoOptions& options, const WalkingCh
   return WalkingLink(options, step_s);
 }
 
-/// What the graph keeps of an observation.
-struct Detection {
-  TimeNs time_ns = 0;
-  Pose3d map_T_torso;
-  Eigen::Matrix3d position_covariance_map;
-  /// 0 = it gives none.
-  double heading_sigma_rad = 0.0;
-};
-
 /// The detection's orientation turned about the vertical to the heading that is believed.
 Eigen::Quaterniond Turned(const Eigen::Quaterniond& map_Q_torso, double heading) {
   const double turn = heading - HeadingOf(map_Q_torso);
@@ -87,7 +88,7 @@ struct TorsoGraph::Impl {
   TorsoOptions options;
   PositionChain position;
   StateChain<1> heading;
-  std::vector<Detection> detections;
+  std::vector<TorsoDetection> detections;
   /// kSmooth only: the first two terms of each position.
   std::vector<RayDetection> rays;
   std::vector<TorsoEstimate> estimates;
@@ -240,7 +241,7 @@ TorsoPrediction TorsoGraph::Predict(TimeNs time_ns) const {
 std::vector<PoseFactor> TorsoGraph::Factors(size_t first) const {
   std::vector<PoseFactor> factors;
   for (size_t i = first; i < impl_->detections.size(); ++i) {
-    const Detection& detection = impl_->detections[i];
+    const TorsoDetection& detection = impl_->detections[i];
     if (i > 0) factors.push_back(impl_->LinkBefore(i));
     factors.push_back(DetectionFactor(detection.time_ns, detection.map_T_torso,
                                       detection.position_covariance_map,

@@ -16,25 +16,25 @@ constexpr double kTableCellM = 0.04;
 constexpr double kTableCellCountMax = 200'000.0;
 constexpr double kPatchM = 0.1;
 
-struct Points {
-  const std::vector<Eigen::Vector3d>& points;
-  // The names are nanoflann's.
-  size_t kdtree_get_point_count() const { return points.size(); }
-  double kdtree_get_pt(size_t index, size_t axis) const {
-    return points[index][static_cast<Eigen::Index>(axis)];
-  }
-  template <typename Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-
-using Metric = nanoflann::L2_Simple_Adaptor<double, Points, double, uint32_t>;
-using KdTree = nanoflann::KDTreeSingleIndexAdaptor<Metric, Points, 3, uint32_t>;
-
 }  // namespace
 
 struct ModelIndex::Tree {
+  struct Points {
+    const std::vector<Eigen::Vector3d>& points;
+    // The names are nanoflann's.
+    size_t kdtree_get_point_count() const { return points.size(); }
+    double kdtree_get_pt(size_t index, size_t axis) const {
+      return points[index][static_cast<Eigen::Index>(axis)];
+    }
+    template <typename Box>
+    bool kdtree_get_bbox(Box&) const {
+      return false;
+    }
+  };
+
+  using Metric = nanoflann::L2_Simple_Adaptor<double, Points, double, uint32_t>;
+  using KdTree = nanoflann::KDTreeSingleIndexAdaptor<Metric, Points, 3, uint32_t>;
+
   explicit Tree(std::vector<Eigen::Vector3d> in)
       : own(std::move(in)), points{own}, tree(3, points, {kLeafPoints}) {}
   std::vector<Eigen::Vector3d> own;

@@ -15,6 +15,16 @@
 #include "schema/matching/registration.h"
 
 namespace dsg::ingest {
+
+struct FittedModel {
+  int index = -1;
+  std::string class_name;
+  ModelIndex surface;
+  std::vector<Eigen::Vector3d> keypoints;
+  // For the test of free space.
+  std::vector<Eigen::Vector3d> probes;
+};
+
 namespace {
 
 using FreeTest = std::function<bool(const Eigen::Vector3d&)>;
@@ -48,15 +58,6 @@ constexpr double kFloorToleranceM = 0.05;
 constexpr double kFreeWeight = 1.0;
 constexpr double kCoveredWeight = 0.1;
 
-struct Model {
-  int index = -1;
-  std::string class_name;
-  ModelIndex surface;
-  std::vector<Eigen::Vector3d> keypoints;
-  // For the test of free space.
-  std::vector<Eigen::Vector3d> probes;
-};
-
 // A pose with all that speaks for and against it.
 struct Candidate {
   Pose3d map_T_model;
@@ -89,9 +90,9 @@ KeypointOptions KeypointsOf(const ShapeOptions& options) {
   return out;
 }
 
-Model MakeModel(int index, const CadModel& cad, const ShapeOptions& options) {
+FittedModel MakeModel(int index, const CadModel& cad, const ShapeOptions& options) {
   const Surface outer = KeepOuter(SampleFaces(cad, kSampleCount), OuterCell(cad));
-  Model model{index, cad.class_name, ModelIndex(ThinSurface(outer, kSurfaceM)), {}, {}};
+  FittedModel model{index, cad.class_name, ModelIndex(ThinSurface(outer, kSurfaceM)), {}, {}};
   model.keypoints =
       FindKeypoints(ThinPoints(outer.points, options.point_distance_m), KeypointsOf(options));
   model.probes = EveryNth(ThinSurface(outer, options.point_distance_m).points, kFreeTestCount);
@@ -140,8 +141,8 @@ class ShapeFitter::Impl {
   std::optional<ShapeFit> Fit(const std::string& class_name,
                               const std::vector<Eigen::Vector3f>& points_map,
                               const FreeTest& is_free, std::optional<double> floor_z_map) const {
-    std::vector<const Model*> models;
-    for (const Model& model : models_) {
+    std::vector<const FittedModel*> models;
+    for (const FittedModel& model : models_) {
       if (absl::EqualsIgnoreCase(model.class_name, class_name)) models.push_back(&model);
     }
     if (models.empty()) return std::nullopt;
@@ -150,7 +151,7 @@ class ShapeFitter::Impl {
     const std::vector<Eigen::Vector3d> keypoints = FindKeypoints(points, KeypointsOf(options_));
     std::optional<ShapeFit> best;
     double best_score = 0.0;
-    for (const Model* model : models) {
+    for (const FittedModel* model : models) {
       for (const Candidate& candidate :
            FindCandidates(*model, points, keypoints, is_free, floor_z_map)) {
         if (!IsAccepted(candidate) || (best && candidate.score() >= best_score)) continue;
@@ -169,7 +170,8 @@ class ShapeFitter::Impl {
   }
 
   // The paper's step: all keypoints of the one with all of the other.
-  std::optional<Pose3d> Match(const Model& model, const std::vector<Eigen::Vector3d>& keypoints,
+  std::optional<Pose3d> Match(const FittedModel& model,
+                              const std::vector<Eigen::Vector3d>& keypoints,
                               double floor_z_map) const {
     std::vector<Correspondence> pairs =
         AllToAll(static_cast<int>(model.keypoints.size()), static_cast<int>(keypoints.size()));
@@ -190,7 +192,7 @@ class ShapeFitter::Impl {
     return Pose3d{found->translation, Eigen::Quaterniond(found->rotation).normalized()};
   }
 
-  Candidate Judge(const Model& model, const std::vector<Eigen::Vector3d>& points,
+  Candidate Judge(const FittedModel& model, const std::vector<Eigen::Vector3d>& points,
                   const Pose3d& map_T_model, const FreeTest& is_free, bool is_exact) const {
     Candidate out;
     out.map_T_model = map_T_model;
@@ -203,7 +205,7 @@ class ShapeFitter::Impl {
     return out;
   }
 
-  std::vector<Candidate> FindCandidates(const Model& model,
+  std::vector<Candidate> FindCandidates(const FittedModel& model,
                                         const std::vector<Eigen::Vector3d>& points,
                                         const std::vector<Eigen::Vector3d>& keypoints,
                                         const FreeTest& is_free,
@@ -220,7 +222,8 @@ class ShapeFitter::Impl {
     return Refine(model, points, rough, is_free, floor_z_map);
   }
 
-  std::vector<Start> AlignRoughly(const Model& model, const std::vector<Eigen::Vector3d>& points,
+  std::vector<Start> AlignRoughly(const FittedModel& model,
+                                  const std::vector<Eigen::Vector3d>& points,
                                   std::vector<Start> starts) const {
     const std::vector<Eigen::Vector3d> few = EveryNth(points, kRoughPointCount);
     AlignmentOptions options;
@@ -235,7 +238,7 @@ class ShapeFitter::Impl {
   }
 
   // Leaves the starts ascending by cost.
-  static void AlignAll(const Model& model, const std::vector<Eigen::Vector3d>& points,
+  static void AlignAll(const FittedModel& model, const std::vector<Eigen::Vector3d>& points,
                        const AlignmentOptions& options, std::vector<Start>* starts) {
     for (Start& start : *starts) {
       start.map_T_model = Align(model.surface, points, start.map_T_model, options);
@@ -260,7 +263,8 @@ class ShapeFitter::Impl {
     }
   }
 
-  std::vector<Candidate> Refine(const Model& model, const std::vector<Eigen::Vector3d>& points,
+  std::vector<Candidate> Refine(const FittedModel& model,
+                                const std::vector<Eigen::Vector3d>& points,
                                 const std::vector<Start>& starts, const FreeTest& is_free,
                                 std::optional<double> floor_z_map) const {
     std::vector<Candidate> candidates;
@@ -288,7 +292,7 @@ class ShapeFitter::Impl {
   }
 
   ShapeOptions options_;
-  std::vector<Model> models_;
+  std::vector<FittedModel> models_;
 };
 
 ShapeFitter::ShapeFitter(const std::vector<CadModel>& catalogue, const ShapeOptions& options)
