@@ -28,6 +28,24 @@ absl::Status CreateMap(Engine* engine, const CallContext&, const v1::CreateMapRe
   return absl::OkStatus();
 }
 
+namespace {
+
+// The newest layers. An erasure may rewrite the past of a snapshot while it is read; the next one
+// is of what it left.
+absl::StatusOr<LayerTable> NewestLayers(Engine* engine, const std::string& map) {
+  constexpr int kTries = 4;
+  for (int tries = 1;; ++tries) {
+    DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> reader, engine->maps.Reader(map));
+    DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> snapshot, reader->Latest());
+    absl::StatusOr<LayerTable> layers = LayersOf(*snapshot);
+    if (layers.ok() || tries == kTries || ReasonOf(layers.status()) != Reason::kMapReplaced) {
+      return layers;
+    }
+  }
+}
+
+}  // namespace
+
 absl::Status Commit(Engine* engine, const CallContext& call, const v1::CommitRequest& request,
                     v1::CommitResponse* reply) {
   const v1::GraphDelta& in = request.delta();
@@ -39,9 +57,7 @@ absl::Status Commit(Engine* engine, const CallContext& call, const v1::CommitReq
     return FieldError("delta.sequence", absl::StrCat(in.sequence()),
                       "count the deltas of a session from 1");
   }
-  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> reader, engine->maps.Reader(in.map()));
-  DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> snapshot, reader->Latest());
-  DSG_ASSIGN_OR_RETURN(const LayerTable layers, LayersOf(*snapshot));
+  DSG_ASSIGN_OR_RETURN(const LayerTable layers, NewestLayers(engine, in.map()));
   DSG_ASSIGN_OR_RETURN(GraphDelta delta, FromProto(in, layers, Unmasked::kPatch));
   // Past the quota, and into the reserve, goes only what the service itself forgets.
   delta.is_forgetting = false;
