@@ -9,6 +9,8 @@
 namespace dsg::ingest {
 namespace {
 
+using Output = TinyDetector::Output;
+
 constexpr int kStridePx = 4;
 constexpr int kGrid = kTinyInputPx / kStridePx;
 constexpr int kBoxWidthPx = 8;
@@ -126,8 +128,7 @@ void AddSsd(OnnxWriter* onnx) {
   AddReshape("table", "output", {1, 1, kTinyBoxCount, 7}, onnx);
 }
 
-void AddHead(TinyDetector::Output output, OnnxWriter* onnx) {
-  using Output = TinyDetector::Output;
+void AddHead(Output output, OnnxWriter* onnx) {
   switch (output) {
     case Output::kRows:
       AddRows(onnx);
