@@ -37,7 +37,7 @@ constexpr char kRange[] =
     "SELECT t, x, y, z, qx, qy, qz, qw FROM pose"
     " WHERE agent = ?1 AND t >= ?2 AND t <= ?3 ORDER BY t";
 
-int64_t KeyOf(NodeId agent) { return static_cast<int64_t>(agent.index()); }
+int64_t AgentKey(NodeId agent) { return static_cast<int64_t>(agent.index()); }
 
 TimedPose PoseOf(sqlite3_stmt* row) {
   TimedPose pose;
@@ -129,7 +129,7 @@ absl::Status RowTable::Insert(const std::vector<TrajectoryAppend>& appends) {
     for (const TimedPose& pose : append.poses) {
       const Eigen::Vector3d& p = pose.map_T_agent.position;
       const Eigen::Quaterniond& q = pose.map_T_agent.orientation;
-      BindAll(insert_, KeyOf(append.agent), pose.time_ns, p.x(), p.y(), p.z(), q.x(), q.y(), q.z(),
+      BindAll(insert_, AgentKey(append.agent), pose.time_ns, p.x(), p.y(), p.z(), q.x(), q.y(), q.z(),
               q.w());
       const int code = sqlite3_step(insert_);
       sqlite3_reset(insert_);
@@ -148,7 +148,7 @@ absl::Status RowTable::Checkpoint() {
 }
 
 absl::Status RowTable::Touch(NodeId agent, TimeNs time_ns) {
-  BindAll(touch_, KeyOf(agent), time_ns);
+  BindAll(touch_, AgentKey(agent), time_ns);
   const int code = sqlite3_step(touch_);
   sqlite3_reset(touch_);
   return code == SQLITE_DONE && sqlite3_changes(db_) == 1 ? absl::OkStatus() : Error(kTouch);
@@ -164,7 +164,7 @@ absl::StatusOr<int64_t> RowTable::ReadAll() {
 }
 
 absl::StatusOr<LocatedPose> RowTable::Locate(NodeId agent, TimeNs at_ns) {
-  BindAll(bracket_, KeyOf(agent), at_ns);
+  BindAll(bracket_, AgentKey(agent), at_ns);
   TimedPose ends[2];
   int found = 0;
   while (found < 2 && sqlite3_step(bracket_) == SQLITE_ROW) ends[found++] = PoseOf(bracket_);
@@ -200,7 +200,7 @@ absl::StatusOr<std::vector<NodeId>> RowTable::AgentsInBox(const Box3d& box, Time
 }
 
 absl::StatusOr<std::vector<TimedPose>> RowTable::Poses(NodeId agent, TimeNs from_ns, TimeNs to_ns) {
-  BindAll(range_, KeyOf(agent), from_ns, to_ns);
+  BindAll(range_, AgentKey(agent), from_ns, to_ns);
   std::vector<TimedPose> poses;
   int code = SQLITE_ROW;
   while ((code = sqlite3_step(range_)) == SQLITE_ROW) poses.push_back(PoseOf(range_));
