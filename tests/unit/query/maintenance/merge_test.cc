@@ -104,7 +104,7 @@ TEST(MergeVerb, WarnsWhenNothingAgreesWithTheTransform) {
       << errors;
   EXPECT_NE(out.find("things agreeing  0\n"), std::string::npos) << out;
   EXPECT_NE(out.find("they differ by   -\n"), std::string::npos) << out;
-  EXPECT_NE(out.find("warning: no thing of east is one of west"), std::string::npos) << out;
+  EXPECT_NE(out.find("warning: nothing in east agrees with west"), std::string::npos) << out;
   EXPECT_NE(out.find("--transform X,Y,Z,YAW"), std::string::npos) << out;
   EXPECT_EQ(halves.Run({"merge", "--map", "west", "east"}, &out, &errors), 0) << errors;
   EXPECT_EQ(out.find("warning"), std::string::npos) << out;
