@@ -129,8 +129,8 @@ absl::Status RowTable::Insert(const std::vector<TrajectoryAppend>& appends) {
     for (const TimedPose& pose : append.poses) {
       const Eigen::Vector3d& p = pose.map_T_agent.position;
       const Eigen::Quaterniond& q = pose.map_T_agent.orientation;
-      BindAll(insert_, AgentKey(append.agent), pose.time_ns, p.x(), p.y(), p.z(), q.x(), q.y(), q.z(),
-              q.w());
+      BindAll(insert_, AgentKey(append.agent), pose.time_ns, p.x(), p.y(), p.z(), q.x(), q.y(),
+              q.z(), q.w());
       const int code = sqlite3_step(insert_);
       sqlite3_reset(insert_);
       if (code != SQLITE_DONE) return Error(kInsert);
