@@ -28,23 +28,15 @@ absl::Status CreateMap(Engine* engine, const CallContext&, const v1::CreateMapRe
   return absl::OkStatus();
 }
 
-namespace {
-
-// The newest layers. An erasure may rewrite the past of a snapshot while it is read; the next one
-// is of what it left.
-absl::StatusOr<LayerTable> NewestLayers(Engine* engine, const std::string& map) {
-  constexpr int kTries = 4;
-  for (int tries = 1;; ++tries) {
-    DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> reader, engine->maps.Reader(map));
-    DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> snapshot, reader->Latest());
-    absl::StatusOr<LayerTable> layers = LayersOf(*snapshot);
-    if (layers.ok() || tries == kTries || ReasonOf(layers.status()) != Reason::kMapReplaced) {
-      return layers;
-    }
+absl::Status WithoutOldReaders(const std::function<absl::Status()>& work) {
+  constexpr int kTries = 3;
+  absl::Status status;
+  for (int i = 0; i < kTries; ++i) {
+    status = work();
+    if (ReasonOf(status) != Reason::kMapReplaced) return status;
   }
+  return status;
 }
-
-}  // namespace
 
 absl::Status Commit(Engine* engine, const CallContext& call, const v1::CommitRequest& request,
                     v1::CommitResponse* reply) {
@@ -57,7 +49,13 @@ absl::Status Commit(Engine* engine, const CallContext& call, const v1::CommitReq
     return FieldError("delta.sequence", absl::StrCat(in.sequence()),
                       "count the deltas of a session from 1");
   }
-  DSG_ASSIGN_OR_RETURN(const LayerTable layers, NewestLayers(engine, in.map()));
+  LayerTable layers;
+  DSG_RETURN_IF_ERROR(WithoutOldReaders([&]() -> absl::Status {
+    DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> reader, engine->maps.Reader(in.map()));
+    DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> snapshot, reader->Latest());
+    DSG_ASSIGN_OR_RETURN(layers, LayersOf(*snapshot));
+    return absl::OkStatus();
+  }));
   DSG_ASSIGN_OR_RETURN(GraphDelta delta, FromProto(in, layers, Unmasked::kPatch));
   // Past the quota, and into the reserve, goes only what the service itself forgets.
   delta.is_forgetting = false;

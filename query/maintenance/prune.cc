@@ -3,7 +3,6 @@
 // compact, report. Refuses to forget all of a map unless it is told that it may.
 #include <algorithm>
 #include <chrono>
-#include <functional>
 #include <optional>
 #include <set>
 #include <utility>
@@ -60,18 +59,6 @@ absl::StatusOr<OpenedMap> OpenNewest(MapTable* maps, const std::string& name) {
   DSG_ASSIGN_OR_RETURN(opened.reader, maps->Reader(name));
   DSG_ASSIGN_OR_RETURN(opened.map, opened.reader->Latest());
   return opened;
-}
-
-// A reader notices only when it reads that an erasure has rewritten its past; then the map is
-// opened anew.
-absl::Status WithoutOldReaders(const std::function<absl::Status()>& work) {
-  constexpr int kTries = 3;
-  absl::Status status;
-  for (int i = 0; i < kTries; ++i) {
-    status = work();
-    if (ReasonOf(status) != Reason::kMapReplaced) return status;
-  }
-  return status;
 }
 
 // Whether the request allows all that the plan takes.
