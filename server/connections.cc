@@ -84,9 +84,11 @@ std::chrono::steady_clock::time_point Connections::RefusalDue(Connection* connec
   using Clock = std::chrono::steady_clock;
   const std::chrono::duration<double> pause(static_cast<double>(bytes) /
                                             limits_.refused_bytes_per_s);
+  const Clock::time_point now = Clock::now();
   std::lock_guard lock(connection->mutex);
-  connection->refused_until = std::max(connection->refused_until, Clock::now()) +
-                              std::chrono::duration_cast<Clock::duration>(pause);
+  connection->refused_until = std::min(
+      std::max(connection->refused_until, now) + std::chrono::duration_cast<Clock::duration>(pause),
+      now + limits_.refusal_pause_max);
   return connection->refused_until;
 }
 

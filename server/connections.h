@@ -48,6 +48,9 @@ struct ConnectionLimits {
   /// How much one connection may send in requests that are refused. Reading four mebibytes costs
   /// several milliseconds of a processor, and whoever asks in vain asks again at once.
   double refused_bytes_per_s = 1 << 20;
+  /// The longest that a refusal waits, whatever was refused before it. Many clients may share the
+  /// connection of a proxy.
+  std::chrono::milliseconds refusal_pause_max{10'000};
 };
 
 /// Threads: safe from any thread.

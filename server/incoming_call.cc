@@ -110,14 +110,18 @@ void IncomingCall::FinishRefused(const grpc::Status& status) {
     Finish(status);
     return;
   }
-  // What waits holds nothing.
+  DropWork();
   wire_.Clear();
+  packed_.Clear();
   memory_.StopWaiting();
   memory_.Resize(0).IgnoreError();
   refusal_ = status;
   refusal_waits_ = true;
-  runtime_->delays->Add(this, std::min(call_.deadline(), runtime_->connections->RefusalDue(
-                                                             connection_.get(), wire_bytes_)));
+  // In time for the caller to learn why, and not only that its deadline has passed.
+  constexpr std::chrono::milliseconds kBeforeDeadline{100};
+  runtime_->delays->Add(
+      this, std::min(call_.deadline() - kBeforeDeadline,
+                     runtime_->connections->RefusalDue(connection_.get(), wire_bytes_)));
 }
 
 size_t IncomingCall::EstimateBytes(size_t bytes_max) {

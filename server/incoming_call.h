@@ -56,6 +56,8 @@ class IncomingCall : public grpc::ServerGenericBidiReactor, public Job {
   /// The same with what ForCaller gave. A long request is refused late, since those who send such
   /// requests again and again would keep the processors busy with receiving them.
   void FinishRefused(const grpc::Status& status);
+  /// Frees what only an answer needs: a refusal that waits holds nothing.
+  virtual void DropWork() = 0;
 
   /// Charges for the parsed request, parses it, and frees its bytes.
   ///

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <memory>
+#include <utility>
 
 #include "schema/base/status.h"
 #include "server/call_deadline.h"
@@ -33,9 +34,7 @@ class StreamCall final : public IncomingCall {
         place_(runtime->guard->Guard(context->c_call(), call().deadline())) {
     Receive();
   }
-  ~StreamCall() override {
-    if (is_counted_) open_count().fetch_sub(1);
-  }
+  ~StreamCall() override { DropWork(); }
 
   void Work() override {
     const absl::StatusOr<std::chrono::nanoseconds> wait = Prepare();
@@ -71,6 +70,11 @@ class StreamCall final : public IncomingCall {
   bool is_watch() const { return lifetime_ == query::Lifetime::kWatch; }
   std::atomic<int>& open_count() {
     return is_watch() ? runtime().open_watch_count : runtime().open_stream_count;
+  }
+
+  void DropWork() override {
+    Request().Swap(&request_);
+    if (std::exchange(is_counted_, false)) open_count().fetch_sub(1);
   }
 
   void Queue() override {

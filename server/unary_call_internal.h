@@ -82,6 +82,9 @@ class UnaryCall final : public IncomingCall {
   }
 
  private:
+  // Its messages went with Answer.
+  void DropWork() override {}
+
   void Queue() override {
     if (!runtime().workers->TrySubmit(this)) Refuse(OverloadedError(kTooManyCalls));
   }

@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
 #include "query/api/method_info.h"
 #include "query/api/stream_cursor.h"
 #include "query/client/remote_api.h"
@@ -187,8 +188,13 @@ class Caller {
     auto rpc = (stub->*prepare)(flight.context(), request, flight.queue());
     rpc->StartCall();
     rpc->Finish(reply, &status, flight.tag());
-    flight.Wait(call);
-    return flight.Outcome(status);
+    const bool is_whole = flight.Wait(call);
+    DSG_RETURN_IF_ERROR(flight.Outcome(status));
+    // gRPC calls it OK when the bytes came and are no message.
+    if (is_whole) return absl::OkStatus();
+    return absl::InternalError(absl::StrCat(
+        "the reply of the server is no ", reply->GetTypeName(),
+        "; is the server of another version, or its map damaged? dsg verify looks at the map"));
   }
 
   const ServerAddress server_;

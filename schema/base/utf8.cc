@@ -9,7 +9,8 @@ namespace dsg {
 Utf8Character FirstUtf8(std::string_view text) {
   const auto lead = static_cast<uint8_t>(text.front());
   if (lead < 0x80) return {lead, 1, true};
-  const size_t size = lead >= 0xF0 ? 4 : lead >= 0xE0 ? 3 : lead >= 0xC0 ? 2 : 1;
+  // No character begins with a byte above 0xF4; those above 0xF7 would not even fit the mask.
+  const size_t size = lead >= 0xF8 ? 1 : lead >= 0xF0 ? 4 : lead >= 0xE0 ? 3 : lead >= 0xC0 ? 2 : 1;
   char32_t code = lead & (0x7Fu >> size);
   size_t read = 1;
   for (; read < size && read < text.size() && IsUtf8Tail(text[read]); ++read) {

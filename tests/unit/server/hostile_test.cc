@@ -255,6 +255,9 @@ TEST(ConnectionsTest, RefusesLongRequestsOfOneConnectionOneAfterAnother) {
   EXPECT_GE(first, now + seconds(2));
   EXPECT_EQ(connections.RefusalDue(&one, 500'000), first + milliseconds(500));
   EXPECT_LT(connections.RefusalDue(&other, 500'000), first);
+  for (int i = 0; i < 20; ++i) connections.RefusalDue(&one, 2'000'000);
+  const auto last = connections.RefusalDue(&one, 2'000'000);
+  EXPECT_LE(last, std::chrono::steady_clock::now() + limits.refusal_pause_max);
 }
 
 TEST_F(Hostile, RequestsThatWaitForAWorkerHoldNoMoreThanTheirBytes) {

@@ -33,6 +33,15 @@ TEST(Utf8, FindsWhereMalformedBytesBegin) {
   }
 }
 
+TEST(Utf8, TakesNoLeadThatTextNeverHas) {
+  for (int lead = 0xF5; lead <= 0xFF; ++lead) {
+    for (int second = 0x80; second <= 0xBF; ++second) {
+      const std::string bad = {static_cast<char>(lead), static_cast<char>(second), '\x80', '\x80'};
+      EXPECT_EQ(FindBadUtf8(bad), 0u) << lead << " " << second;
+    }
+  }
+}
+
 TEST(Utf8, PassesABrokenCharacterAsOne) {
   EXPECT_EQ(FirstUtf8("\xE5\x8E"
                       "a")

@@ -24,7 +24,7 @@ MapSpec Spec(TrajectoryCodec codec) {
 std::vector<std::string> Backends() { return {"sqlite", "memory"}; }
 
 std::string UriOf(const std::string& backend, const std::string& folder) {
-  return (backend == "memory" ? "memory:" : "file:") + folder;
+  return (backend == "sqlite" ? "file" : backend) + ":" + folder;
 }
 
 std::string NameOfBackendAndCodec(
