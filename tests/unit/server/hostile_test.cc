@@ -234,6 +234,19 @@ TEST_F(Hostile, ALongRequestIsRefusedLateAndAShortOneAtOnce) {
   EXPECT_GT(elapsed(), milliseconds(3500));
 }
 
+TEST_F(Hostile, AStreamWhoseRefusalWaitsTakesNoPlaceOfAnother) {
+  ServerOptions options;
+  options.open_stream_max = 1;
+  Start(options);
+  BytesCall long_stream(server_->address(), "/dsg.v1.QueryService/GetMesh", EmptyNodes());
+  std::this_thread::sleep_for(milliseconds(500));
+  const grpc::Slice nothing("");
+  BytesCall short_stream(server_->address(), "/dsg.v1.QueryService/GetMesh", {&nothing, 1});
+  EXPECT_FALSE(short_stream.Wait().ok());
+  EXPECT_NE(short_stream.reason(), v1::OVERLOADED);
+  EXPECT_FALSE(long_stream.Wait().ok());
+}
+
 TEST_F(Hostile, AServerThatStopsWaitsForNoRefusal) {
   Start();
   BytesCall call(server_->address(), kCommit, EmptyNodes());
