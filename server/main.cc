@@ -30,7 +30,7 @@ constexpr std::chrono::seconds kStopTimeMax{10};
 struct Flags {
   std::string store;
   std::string log_level = "info";
-  size_t view_cache_mb = 1024;
+  size_t view_cache_mb = 512;
   size_t open_maps_max = 16;
   size_t map_cache_mb = 64;
   size_t call_memory_mb = dsg::server::ServerOptions().call_memory_bytes >> 20;

@@ -23,7 +23,7 @@ namespace dsg::query {
 /// Threads: safe from many threads.
 class MapTable {
  public:
-  explicit MapTable(std::unique_ptr<GraphStore> store, size_t view_cache_bytes = size_t{1} << 30,
+  explicit MapTable(std::unique_ptr<GraphStore> store, size_t view_cache_bytes = size_t{512} << 20,
                     size_t open_maps_max = 16)
       : open_maps_max_(open_maps_max), store_(std::move(store)), views_(view_cache_bytes) {}
 

@@ -22,7 +22,7 @@ class ServiceCore : public Api {
 struct ServiceCoreOptions {
   /// Bound of the graphs kept in memory, all maps and revisions together. A million nodes and 3.5
   /// million edges take half of it, and a quarter once paths are asked for.
-  size_t view_cache_bytes = size_t{1} << 30;
+  size_t view_cache_bytes = size_t{512} << 20;
   ArchiveLimits archives;
   /// Maps kept open; those that were asked last. Each holds some file descriptors, and caches that
   /// grow up to StoreOptions::cache_bytes.

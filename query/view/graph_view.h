@@ -9,6 +9,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -51,6 +52,11 @@ class SymbolTable {
 
 class PlaceGraph;
 
+struct ViewAttribute {
+  Symbol name = 0;
+  AttributeValue value;
+};
+
 /// What a view keeps of a node. The rest (observations, assets, footprints) is in the Snapshot.
 struct ViewNode {
   NodeId id;
@@ -67,8 +73,13 @@ struct ViewNode {
   Interval valid;
   /// Of places, metres; 0 for all others.
   double clearance_m = 0.0;
-  /// Null = none.
-  std::shared_ptr<const Attributes> attributes;
+  std::shared_ptr<const ViewAttribute[]> attribute_array;
+  uint32_t attribute_count = 0;
+
+  /// Without those of attributes::IsFileRest.
+  std::span<const ViewAttribute> attributes() const {
+    return {attribute_array.get(), attribute_count};
+  }
 
   /// As Node::BoxMap.
   Box3d BoxMap() const {

@@ -9,21 +9,21 @@
 #include "query/view/stoppable_sort.h"
 #include "schema/base/check.h"
 #include "schema/base/status.h"
+#include "schema/model/known_names.h"
 
 namespace dsg::query {
 namespace {
 
-// What a node's attributes take beside the node: entries of the map, and texts too long for it.
-int64_t BytesOf(const std::shared_ptr<const Attributes>& attributes) {
-  if (attributes == nullptr) return 0;
+// What a node's attributes take beside the node: the array with its counts, and texts that do not
+// fit into it.
+int64_t AttributeBytesOf(const ViewNode& node) {
+  if (node.attribute_count == 0) return 0;
+  constexpr size_t kArrayHead = 24;
   constexpr size_t kShortText = 15;
-  const auto text_bytes = [](const std::string& text) {
-    return text.size() > kShortText ? text.size() + 1 : 0;
-  };
-  size_t bytes = 16 + sizeof(Attributes);
-  for (const auto& [name, value] : *attributes) {
-    bytes += 32 + sizeof(Attributes::value_type) + text_bytes(name);
-    if (const auto* text = std::get_if<std::string>(&value)) bytes += text_bytes(*text);
+  size_t bytes = kArrayHead + node.attribute_count * sizeof(ViewAttribute);
+  for (const ViewAttribute& attribute : node.attributes()) {
+    const auto* const text = std::get_if<std::string>(&attribute.value);
+    if (text != nullptr && text->size() > kShortText) bytes += text->size() + 1;
   }
   return static_cast<int64_t>(bytes);
 }
@@ -37,22 +37,6 @@ ViewParts::ViewParts(std::shared_ptr<SymbolTable> symbols)
       robot_(symbols_->Intern(kinds::kRobot)) {}
 
 ViewNode ViewParts::ToView(const Node& node) {
-  ViewNode view = WithoutAttributes(node);
-  if (!node.attributes.empty()) {
-    view.attributes = std::make_shared<const Attributes>(node.attributes);
-  }
-  return view;
-}
-
-ViewNode ViewParts::ToView(Node&& node) {
-  ViewNode view = WithoutAttributes(node);
-  if (!node.attributes.empty()) {
-    view.attributes = std::make_shared<const Attributes>(std::move(node.attributes));
-  }
-  return view;
-}
-
-ViewNode ViewParts::WithoutAttributes(const Node& node) {
   ViewNode view;
   view.id = node.id;
   view.layer = node.layer;
@@ -65,7 +49,21 @@ ViewNode ViewParts::WithoutAttributes(const Node& node) {
   view.box_node = node.box_node;
   view.valid = node.valid;
   if (node.place.has_value()) view.clearance_m = node.place->clearance_m;
+  SetAttributes(node.attributes, &view);
   return view;
+}
+
+// What a file said besides is long, and of no use to a question.
+void ViewParts::SetAttributes(const Attributes& attributes, ViewNode* view) {
+  view->attribute_count = static_cast<uint32_t>(std::ranges::count_if(
+      attributes, [](const auto& entry) { return !attributes::IsFileRest(entry.first); }));
+  if (view->attribute_count == 0) return;
+  auto array = std::make_shared<ViewAttribute[]>(view->attribute_count);
+  size_t filled = 0;
+  for (const auto& [name, value] : attributes) {
+    if (!attributes::IsFileRest(name)) array[filled++] = {symbols_->Intern(name), value};
+  }
+  view->attribute_array = std::move(array);
 }
 
 ViewEdge ViewParts::ToView(const Edge& edge) {
@@ -150,7 +148,7 @@ void ViewParts::CountNode(const ViewNode& node, int64_t change) {
   const auto count = class_counts_.try_emplace({node.layer, node.class_name}, 0).first;
   count->second += change;
   if (count->second == 0) class_counts_.erase(count);
-  attribute_bytes_ += change * BytesOf(node.attributes);
+  attribute_bytes_ += change * AttributeBytesOf(node);
 }
 
 size_t ViewParts::memory_bytes() const {
@@ -360,7 +358,7 @@ class Update {
                      layer_after == layers::kPlaces ||
                      (before != nullptr && node.has_value() && layer_before != layer_after);
     if (node.has_value()) {
-      parts_.PutNode(parts_.ToView(*std::move(node)));
+      parts_.PutNode(parts_.ToView(*node));
     } else {
       parts_.EraseNode(id);
     }
@@ -399,11 +397,14 @@ absl::StatusOr<std::shared_ptr<const IndexedView>> IndexedView::Load(
   ViewParts parts(std::move(symbols));
   DSG_ASSIGN_OR_RETURN(auto layers, snapshot.Layers());
   parts.SetLayers(std::move(layers));
+  DSG_ASSIGN_OR_RETURN(const MapStats stats, snapshot.Stats());
   std::vector<ViewNode> nodes;
+  nodes.reserve(static_cast<size_t>(stats.at.node_count));
   DSG_RETURN_IF_ERROR(
       snapshot.ReadAllNodes(stop, [&](const Node& node) { nodes.push_back(parts.ToView(node)); }));
   DSG_RETURN_IF_ERROR(parts.FillNodes(std::move(nodes), stop));
   std::vector<ViewEdge> edges;
+  edges.reserve(static_cast<size_t>(stats.at.edge_count));
   DSG_RETURN_IF_ERROR(
       snapshot.ReadAllEdges(stop, [&](const Edge& edge) { edges.push_back(parts.ToView(edge)); }));
   DSG_RETURN_IF_ERROR(CheckStop(stop));

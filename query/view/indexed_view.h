@@ -43,8 +43,6 @@ class ViewParts {
   explicit ViewParts(std::shared_ptr<SymbolTable> symbols);
 
   ViewNode ToView(const Node& node);
-  /// Takes its attributes.
-  ViewNode ToView(Node&& node);
   ViewEdge ToView(const Edge& edge);
 
   /// Replaces all nodes; in any order, of several with the same id any is kept.
@@ -76,7 +74,7 @@ class ViewParts {
   size_t fresh_bytes() const;
 
  private:
-  ViewNode WithoutAttributes(const Node& node);
+  void SetAttributes(const Attributes& attributes, ViewNode* view);
   bool IsAgent(const ViewNode& node) const { return node.kind == human_ || node.kind == robot_; }
   void CountNode(const ViewNode& node, int64_t change);
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "query/view/view_cache.h"
 
+#include <malloc.h>
+
 #include <algorithm>
 #include <map>
 #include <mutex>
@@ -20,12 +22,37 @@ namespace {
 // Above this share of a map, reading what was touched one by one costs more than reading all.
 constexpr double kDeriveShareMax = 0.25;
 constexpr size_t kMebibyte = size_t{1} << 20;
+// So much is evicted before the allocator is told to give free memory back: it takes a few
+// milliseconds, and a view that is derived from another frees little.
+constexpr size_t kTrimBytes = 32 * kMebibyte;
 
 using View = std::shared_ptr<const IndexedView>;
 
 struct MadeView {
   View view;
   bool was_derived = false;
+};
+
+// Views on their way out, freed with it: it stands before the lock, so that this happens after it.
+class Evicted {
+ public:
+  Evicted() = default;
+  Evicted(const Evicted&) = delete;
+  Evicted& operator=(const Evicted&) = delete;
+  ~Evicted() {
+    views_.clear();
+    // Each worker makes views in an arena of its own, which would keep what others cannot use.
+    if (bytes_ >= kTrimBytes) malloc_trim(0);
+  }
+
+  void Add(View view) {
+    bytes_ += view->fresh_bytes();
+    views_.push_back(std::move(view));
+  }
+
+ private:
+  std::vector<View> views_;
+  size_t bytes_ = 0;
 };
 
 }  // namespace
@@ -84,11 +111,10 @@ struct ViewCache::Impl {
                                    const StopCheck& stop);
   absl::StatusOr<MadeView> Make(MapReader* map, const Snapshot& snapshot, const View& nearest,
                                 std::shared_ptr<SymbolTable> symbols, const StopCheck& stop) const;
-  // Requires of these: the lock is held. What they put into `evicted` is to be freed without it.
-  absl::Status Keep(const std::shared_ptr<MapReader>& map, const MadeView& made,
-                    std::vector<View>* evicted);
-  void ForgetClosedMaps(std::vector<View>* evicted);
-  void EvictTo(size_t bound, const View& spared, std::vector<View>* evicted);
+  // Requires of these: the lock is held.
+  absl::Status Keep(const std::shared_ptr<MapReader>& map, const MadeView& made, Evicted* evicted);
+  void ForgetClosedMaps(Evicted* evicted);
+  void EvictTo(size_t bound, const View& spared, Evicted* evicted);
   size_t Bytes() const;
 
   const size_t bytes_max;
@@ -107,18 +133,18 @@ size_t ViewCache::Impl::Bytes() const {
   return sum;
 }
 
-void ViewCache::Impl::ForgetClosedMaps(std::vector<View>* evicted) {
+void ViewCache::Impl::ForgetClosedMaps(Evicted* evicted) {
   for (auto map = maps.begin(); map != maps.end();) {
     if (!map->first.expired()) {
       ++map;
       continue;
     }
-    for (auto& [revision, slot] : map->second.slots) evicted->push_back(std::move(slot.view));
+    for (auto& [revision, slot] : map->second.slots) evicted->Add(std::move(slot.view));
     map = maps.erase(map);
   }
 }
 
-void ViewCache::Impl::EvictTo(size_t bound, const View& spared, std::vector<View>* evicted) {
+void ViewCache::Impl::EvictTo(size_t bound, const View& spared, Evicted* evicted) {
   while (Bytes() > bound) {
     MapViews* oldest_map = nullptr;
     std::map<Revision, Slot>::iterator oldest;
@@ -131,7 +157,7 @@ void ViewCache::Impl::EvictTo(size_t bound, const View& spared, std::vector<View
       }
     }
     if (oldest_map == nullptr) return;
-    evicted->push_back(std::move(oldest->second.view));
+    evicted->Add(std::move(oldest->second.view));
     oldest_map->slots.erase(oldest);
   }
 }
@@ -162,7 +188,7 @@ absl::StatusOr<MadeView> ViewCache::Impl::Make(MapReader* map, const Snapshot& s
 }
 
 absl::Status ViewCache::Impl::Keep(const std::shared_ptr<MapReader>& map, const MadeView& made,
-                                   std::vector<View>* evicted) {
+                                   Evicted* evicted) {
   ++(made.was_derived ? counts.derived_count : counts.loaded_count);
   const size_t bytes = made.view->memory_bytes();
   if (bytes > bytes_max) {
@@ -182,8 +208,7 @@ absl::Status ViewCache::Impl::Keep(const std::shared_ptr<MapReader>& map, const 
 
 std::optional<View> ViewCache::Impl::Find(const std::shared_ptr<MapReader>& map,
                                           Revision revision) {
-  // Before the lock, so that it is freed after it.
-  std::vector<View> evicted;
+  Evicted evicted;
   const std::lock_guard lock(mutex);
   const auto views = maps.find(map);
   if (views == maps.end()) return std::nullopt;
@@ -211,8 +236,7 @@ absl::StatusOr<View> ViewCache::Impl::MakeAndKeep(const std::shared_ptr<MapReade
     symbols = views.symbols;
   }
   DSG_ASSIGN_OR_RETURN(const MadeView made, Make(map.get(), snapshot, nearest, symbols, stop));
-  // Before the lock, so that it is freed after it.
-  std::vector<View> evicted;
+  Evicted evicted;
   const std::lock_guard lock(mutex);
   DSG_RETURN_IF_ERROR(Keep(map, made, &evicted));
   return made.view;

@@ -133,6 +133,10 @@ std::optional<LayerId> LayerOfKind(std::string_view kind) {
 
 const relations::Relation* relations::Find(std::string_view name) { return FindNamed(kAll, name); }
 
+bool attributes::IsFileRest(std::string_view name) {
+  return name == kSparkRest || name.starts_with("spark_dsg_");
+}
+
 std::optional<uint8_t> attributes::NumberOf(std::string_view name) {
   static const auto* const numbers = [] {
     auto* made = new std::unordered_map<std::string_view, uint8_t>;

@@ -117,6 +117,9 @@ inline constexpr char kSparkGraphRest[] = "spark_dsg_graph";
 /// Of a robot whose poses are also nodes: the letter of their ids.
 inline constexpr char kSparkPoses[] = "spark_dsg_poses";
 
+/// Of those above, and their parts: kept for an export, shown, and no word to search for.
+bool IsFileRest(std::string_view name);
+
 /// Names of attributes that scene graphs have, and of keys in those that hold JSON, have a number
 /// that stores write in their stead. nullopt for any other name.
 std::optional<uint8_t> NumberOf(std::string_view name);

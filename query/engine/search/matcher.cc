@@ -34,18 +34,18 @@ bool Compares(const T& left, Comparison comparison, const T& right) {
   return false;
 }
 
-bool HasAttribute(const Attributes* attributes, const AttributeCondition& condition) {
-  if (attributes == nullptr) return false;
-  const auto found = attributes->find(condition.name);
-  if (found == attributes->end()) return false;
+bool HasAttribute(const ViewNode& node, Symbol name, const AttributeCondition& condition) {
+  const auto attributes = node.attributes();
+  const auto found = std::ranges::find(attributes, name, &ViewAttribute::name);
+  if (found == attributes.end()) return false;
   if (condition.comparison == Comparison::kExists) return true;
-  if (found->second.index() != condition.value.index()) return false;
+  if (found->value.index() != condition.value.index()) return false;
   return std::visit(
       [&](const auto& value) {
         using Value = std::decay_t<decltype(value)>;
         return Compares(value, condition.comparison, std::get<Value>(condition.value));
       },
-      found->second);
+      found->value);
 }
 
 }  // namespace
@@ -74,10 +74,10 @@ bool Matcher::MatchesAlone(const CompiledPattern& pattern, const ViewNode& node)
       (!node.color.has_value() || NameOfColor(*node.color) != pattern.source.color)) {
     return false;
   }
-  return std::all_of(pattern.source.attributes.begin(), pattern.source.attributes.end(),
-                     [&](const AttributeCondition& condition) {
-                       return HasAttribute(node.attributes.get(), condition);
-                     });
+  for (size_t i = 0; i < pattern.attribute_names.size(); ++i) {
+    if (!HasAttribute(node, pattern.attribute_names[i], pattern.source.attributes[i])) return false;
+  }
+  return true;
 }
 
 bool Matcher::Matches(const CompiledPattern& pattern, const ViewNode& node) {

@@ -9,6 +9,7 @@
 #include "query/engine/search/vocabulary.h"
 #include "query/engine/search/words.h"
 #include "schema/base/status.h"
+#include "schema/model/known_names.h"
 
 namespace dsg::query {
 
@@ -237,6 +238,7 @@ class Compiler {
     DSG_RETURN_IF_ERROR(CompileKindAndLayer(out.get()));
     DSG_RETURN_IF_ERROR(CompileClass(out.get()));
     DSG_RETURN_IF_ERROR(CompileId(out.get()));
+    DSG_RETURN_IF_ERROR(CompileAttributes(out.get()));
     out->name = NameMatcher(out->source.name);
     out->contains = view_.symbols().Find(relations::kContains);
     for (RelationCondition& relation : out->source.relations) {
@@ -297,6 +299,23 @@ class Compiler {
     }
     out->id = id;
     out->asks_for_agents = out->asks_for_agents || IsAgentKind(view_.symbols().Text(node->kind));
+    return absl::OkStatus();
+  }
+
+  absl::Status CompileAttributes(CompiledPattern* out) {
+    for (const AttributeCondition& condition : out->source.attributes) {
+      if (attributes::IsFileRest(condition.name)) {
+        return PatternFieldError("attributes.name", condition.name,
+                                 "it holds what an imported file said besides, for an export; "
+                                 "search for another attribute, or read it with dsg show");
+      }
+      const auto name = view_.symbols().Find(condition.name);
+      if (!name.has_value()) {
+        out->is_never = true;
+      } else {
+        out->attribute_names.push_back(*name);
+      }
+    }
     return absl::OkStatus();
   }
 

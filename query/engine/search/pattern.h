@@ -150,6 +150,8 @@ struct CompiledPattern {
   /// Meaningful if source.class_name is set.
   std::vector<ClassRange> classes;
   NameMatcher name;
+  /// Of source.attributes; fewer if one is in no view of the map, which is never a match.
+  std::vector<Symbol> attribute_names;
   /// Only nodes that have a track, or only in their layer.
   bool asks_for_agents = false;
   std::vector<CompiledRelation> relations;

@@ -82,6 +82,8 @@ class Database {
    private:
     Database& db_;
   };
+  /// Gives back the memory of pages that it keeps and does not use.
+  void ReleaseMemory();
   /// Sets the counter of changes to the tables back, so that equal content is equal bytes.
   absl::Status SetSchemaVersion();
   /// Pages in the write-ahead log after the last commit.

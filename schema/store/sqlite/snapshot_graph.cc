@@ -84,6 +84,7 @@ constexpr int64_t kHighest = std::numeric_limits<int64_t>::max();
 
 // Runs a statement again and again, each time after the last row of the time before, until it
 // gives no full batch. `bind` binds where to go on; `take` takes a row and notes where it was.
+// Nobody asks for the last pages of a table because they were read last, so they are not kept.
 template <typename Bind, typename Take>
 absl::Status RunInBatches(SqliteMapReader* reader, Revision revision, const char* sql,
                           const StopCheck& stop, const Bind& bind, const Take& take) {
@@ -95,7 +96,10 @@ absl::Status RunInBatches(SqliteMapReader* reader, Revision revision, const char
     int row_count = 0;
     for (; query.Next(); ++row_count) DSG_RETURN_IF_ERROR(take(query));
     DSG_RETURN_IF_ERROR(query.status());
-    if (row_count < kRowsAtOnce) return absl::OkStatus();
+    if (row_count < kRowsAtOnce) {
+      lease->ReleaseMemory();
+      return absl::OkStatus();
+    }
   }
 }
 

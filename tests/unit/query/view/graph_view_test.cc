@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "query/view/indexed_view.h"
+#include "schema/model/known_names.h"
 #include "tests/unit/query/view/changing_map.h"
 
 namespace dsg::query {
@@ -155,6 +156,21 @@ TEST(GraphView, TakesAtMost400BytesANodeAnd60AnEdge) {
   const auto whole = GraphView::Load(*steps.map().At(steps.map().reader()->Head()->revision),
                                      std::make_shared<SymbolTable>(), {});
   EXPECT_LE((*whole)->memory_bytes() - of_nodes, 60U * 60'000U);
+}
+
+TEST(GraphView, KeepsNoAttributeThatIsForAnExportOnly) {
+  StepByStep steps;
+  GraphDelta delta;
+  delta.nodes.push_back(MakeNode(NodeId('p', 1), layers::kPlaces, kinds::kPlace));
+  delta.nodes.back().attributes["real_place"] = true;
+  delta.nodes.back().attributes[attributes::kSparkRest] = std::string(10'000, 'x');
+  delta.nodes.back().attributes["spark_dsg_2"] = std::string(10'000, 'y');
+  const ViewPtr view = steps.Next(std::move(delta));
+  const auto kept = view->FindNode(NodeId('p', 1))->attributes();
+  ASSERT_EQ(kept.size(), 1U);
+  EXPECT_EQ(view->symbols().Text(kept[0].name), "real_place");
+  EXPECT_EQ(kept[0].value, AttributeValue(true));
+  EXPECT_LT(view->memory_bytes(), 15'000U);
 }
 
 }  // namespace

@@ -173,10 +173,11 @@ class Comparison {
     EXPECT_EQ(node.BoxMap().max(), expected.BoxMap().max());
     EXPECT_EQ(node.valid, expected.valid);
     EXPECT_EQ(node.clearance_m, expected.place.has_value() ? expected.place->clearance_m : 0.0);
-    EXPECT_EQ(node.attributes == nullptr, expected.attributes.empty());
-    if (node.attributes != nullptr) {
-      EXPECT_EQ(*node.attributes, expected.attributes);
+    Attributes attributes;
+    for (const ViewAttribute& attribute : node.attributes()) {
+      attributes[view_.symbols().Text(attribute.name)] = attribute.value;
     }
+    EXPECT_EQ(attributes, expected.attributes);
   }
 
   void CompareClasses() {

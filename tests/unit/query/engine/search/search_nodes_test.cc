@@ -254,6 +254,7 @@ TEST_F(SearchNodes, RefusesWhatItCannotAnswer) {
   EXPECT_EQ(ReasonOfAsking(Query("id = O99")), Reason::kNodeUnknown);
   EXPECT_EQ(ReasonOfAsking(Query("id = x")), Reason::kNodeIdInvalid);
   EXPECT_EQ(ReasonOfAsking(Query("kind = humna")), Reason::kFieldInvalid);
+  EXPECT_EQ(ReasonOfAsking(Query("any and has spark_dsg")), Reason::kFieldInvalid);
   EXPECT_EQ(ReasonOfAsking(Query("cup and class = \"dining table\"")), Reason::kQueryMalformed);
   request = Query("any");
   request.mutable_near()->set_x(nan);
