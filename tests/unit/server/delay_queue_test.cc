@@ -4,11 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <condition_variable>
 #include <deque>
-#include <mutex>
 #include <thread>
 #include <vector>
+
+#include "tests/unit/server/server_test_util.h"
 
 namespace dsg::server {
 namespace {
@@ -17,35 +17,18 @@ using std::chrono::hours;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// Records the order in which jobs ran.
-struct Ran {
-  std::mutex mutex;
-  std::condition_variable changed;
-  std::vector<int> order;
-
-  std::vector<int> WaitFor(size_t count) {
-    std::unique_lock lock(mutex);
-    changed.wait(lock, [&] { return order.size() >= count; });
-    return order;
-  }
-};
-
 class Note final : public Job {
  public:
-  Note(int number, Ran* ran) : number_(number), ran_(ran) {}
-  void Run() override {
-    std::lock_guard lock(ran_->mutex);
-    ran_->order.push_back(number_);
-    ran_->changed.notify_all();
-  }
+  Note(int number, Record* ran) : number_(number), ran_(ran) {}
+  void Run() override { ran_->Add(number_); }
 
  private:
   int number_;
-  Ran* ran_;
+  Record* ran_;
 };
 
 TEST(DelayQueue, RunsJobsInTheOrderOfTheirTimes) {
-  Ran ran;
+  Record ran;
   WorkerPool workers(1, 8);
   Timer timer;
   DelayQueue delays(&timer, &workers);
@@ -59,7 +42,7 @@ TEST(DelayQueue, RunsJobsInTheOrderOfTheirTimes) {
 }
 
 TEST(DelayQueue, HurriesOneJobOnly) {
-  Ran ran;
+  Record ran;
   WorkerPool workers(1, 8);
   Timer timer;
   DelayQueue delays(&timer, &workers);
@@ -76,7 +59,7 @@ TEST(DelayQueue, HurriesOneJobOnly) {
 }
 
 TEST(DelayQueue, LetsNothingWaitOnceAllAreHurried) {
-  Ran ran;
+  Record ran;
   WorkerPool workers(1, 8);
   Timer timer;
   DelayQueue delays(&timer, &workers);
@@ -91,7 +74,7 @@ TEST(DelayQueue, LetsNothingWaitOnceAllAreHurried) {
 // A search through the list takes minutes here.
 TEST(DelayQueue, HurriesOneOfManyFast) {
   constexpr size_t kCount = 200'000;
-  Ran ran;
+  Record ran;
   WorkerPool workers(1, 8);
   Timer timer;
   DelayQueue delays(&timer, &workers);
@@ -108,7 +91,7 @@ TEST(DelayQueue, HurriesOneOfManyFast) {
 // The timer and this thread end the waits of the same jobs in the same order.
 TEST(DelayQueue, RunsAJobOnceForEachWaitWhoeverEndsIt) {
   constexpr size_t kCount = 50'000;
-  Ran ran;
+  Record ran;
   WorkerPool workers(1, 8);
   Timer timer;
   DelayQueue delays(&timer, &workers);
@@ -122,9 +105,10 @@ TEST(DelayQueue, RunsAJobOnceForEachWaitWhoeverEndsIt) {
   ran.WaitFor(kCount);
   timer.Stop();
   workers.Stop();
-  std::sort(ran.order.begin(), ran.order.end());
-  ASSERT_EQ(ran.order.size(), kCount);
-  for (size_t i = 0; i < kCount; ++i) ASSERT_EQ(ran.order[i], static_cast<int>(i));
+  std::vector<int> numbers = ran.WaitFor(kCount);
+  std::sort(numbers.begin(), numbers.end());
+  ASSERT_EQ(numbers.size(), kCount);
+  for (size_t i = 0; i < kCount; ++i) ASSERT_EQ(numbers[i], static_cast<int>(i));
 }
 
 }  // namespace

@@ -3,10 +3,11 @@
 
 #include <gtest/gtest.h>
 
-#include <condition_variable>
 #include <memory>
 #include <mutex>
 #include <vector>
+
+#include "tests/unit/server/server_test_util.h"
 
 namespace dsg::server {
 namespace {
@@ -15,47 +16,25 @@ using std::chrono::hours;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// What callbacks tell, in the order in which they tell it.
-class Told {
- public:
-  void Tell(int number) {
-    std::lock_guard lock(mutex_);
-    numbers_.push_back(number);
-    changed_.notify_all();
-  }
-  /// Empty if it takes longer than a test may wait.
-  std::vector<int> WaitFor(size_t count) {
-    std::unique_lock lock(mutex_);
-    const bool came =
-        changed_.wait_for(lock, seconds(20), [&] { return numbers_.size() >= count; });
-    return came ? numbers_ : std::vector<int>();
-  }
-
- private:
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::vector<int> numbers_;
-};
-
 TEST(Timer, RunsCallbacksInTheOrderOfTheirInstantsAndThenOfTheirComing) {
-  Told told;
+  Record told;
   Timer timer;
   const auto now = Timer::Clock::now();
-  timer.At(now + milliseconds(40), [&] { told.Tell(4); });
-  timer.At(now + milliseconds(20), [&] { told.Tell(2); });
-  timer.At(now + milliseconds(20), [&] { told.Tell(3); });
-  timer.At(now + milliseconds(5), [&] { told.Tell(1); });
+  timer.At(now + milliseconds(40), [&] { told.Add(4); });
+  timer.At(now + milliseconds(20), [&] { told.Add(2); });
+  timer.At(now + milliseconds(20), [&] { told.Add(3); });
+  timer.At(now + milliseconds(5), [&] { told.Add(1); });
   EXPECT_EQ(told.WaitFor(4), (std::vector<int>{1, 2, 3, 4}));
   EXPECT_GE(Timer::Clock::now(), now + milliseconds(40));
 }
 
 TEST(Timer, ACancelledCallbackIsDestroyedAndDoesNotRun) {
-  Told told;
+  Record told;
   Timer timer;
   const auto due = Timer::Clock::now() + milliseconds(50);
   auto held = std::make_shared<int>(1);
-  const Timer::Handle cancelled = timer.At(due, [&told, held] { told.Tell(*held); });
-  timer.At(due, [&] { told.Tell(2); });
+  const Timer::Handle cancelled = timer.At(due, [&told, held] { told.Add(*held); });
+  timer.At(due, [&] { told.Add(2); });
   EXPECT_TRUE(timer.Cancel(cancelled));
   EXPECT_EQ(held.use_count(), 1);
   EXPECT_FALSE(timer.Cancel(cancelled));
@@ -64,28 +43,28 @@ TEST(Timer, ACancelledCallbackIsDestroyedAndDoesNotRun) {
 }
 
 TEST(Timer, ACallbackMayUseTheTimer) {
-  Told told;
+  Record told;
   Timer timer;
   const auto now = Timer::Clock::now();
-  const Timer::Handle last = timer.At(now + hours(1), [&] { told.Tell(9); });
+  const Timer::Handle last = timer.At(now + hours(1), [&] { told.Add(9); });
   timer.At(now, [&] {
-    if (timer.Cancel(last)) told.Tell(1);
-    timer.At(now, [&] { told.Tell(2); });
+    if (timer.Cancel(last)) told.Add(1);
+    timer.At(now, [&] { told.Add(2); });
   });
   EXPECT_EQ(told.WaitFor(2), (std::vector<int>{1, 2}));
 }
 
 TEST(Timer, OthersNeedNotWaitForACallbackThatRuns) {
-  Told told;
+  Record told;
   Timer timer;
   std::mutex gate;
   Timer::Handle running;
   {
     std::lock_guard closed(gate);
     running = timer.At(Timer::Clock::now(), [&] {
-      told.Tell(1);
+      told.Add(1);
       std::lock_guard wait(gate);
-      told.Tell(2);
+      told.Add(2);
     });
     ASSERT_EQ(told.WaitFor(1), (std::vector<int>{1}));
     EXPECT_FALSE(timer.Cancel(running));
