@@ -237,6 +237,10 @@ class Compiler {
     DSG_RETURN_IF_ERROR(CompileKindAndLayer(out.get()));
     DSG_RETURN_IF_ERROR(CompileClass(out.get()));
     DSG_RETURN_IF_ERROR(CompileId(out.get()));
+    for (const AttributeCondition& condition : out->source.attributes) {
+      DSG_ASSIGN_OR_RETURN(const bool is_known, vocabulary_.HasAttribute(condition.name));
+      if (!is_known) return vocabulary_.AttributeUnknown(condition.name);
+    }
     out->name = NameMatcher(out->source.name);
     out->contains = view_.symbols().Find(relations::kContains);
     for (RelationCondition& relation : out->source.relations) {

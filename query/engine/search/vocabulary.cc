@@ -149,6 +149,14 @@ absl::StatusOr<bool> Vocabulary::HasName(std::string_view name) const {
   });
 }
 
+absl::StatusOr<bool> Vocabulary::HasAttribute(std::string_view name) const {
+  if (attributes::NumberOf(name).has_value()) return true;
+  const std::string wanted(name);
+  return HasNode([&](const ViewNode& node) {
+    return node.attributes != nullptr && node.attributes->contains(wanted);
+  });
+}
+
 std::vector<std::string> Vocabulary::ClassNames() const {
   std::vector<std::string> names;
   for (const Layer& layer : view_.layers()) {
@@ -209,6 +217,22 @@ absl::Status Vocabulary::KindUnknown(std::string_view word) const {
                    absl::StrCat("pattern.kind is ", text, "; no node of the map is of this kind",
                                 SpellingHint(word, std::move(known))),
                    {{"field", "pattern.kind"}, {"value", text}});
+}
+
+absl::Status Vocabulary::AttributeUnknown(std::string_view name) const {
+  // What a slip of the fingers in `class = cup` leaves is read as an attribute.
+  std::set<std::string> known = {"kind", "layer", "class", "name", "color", "id"};
+  const auto note_names = [&](const ViewNode& node) {
+    if (node.attributes == nullptr) return false;
+    for (const auto& [one, value] : *node.attributes) known.insert(one);
+    return false;
+  };
+  DSG_RETURN_IF_ERROR(HasNode(note_names).status());
+  const std::string text(name);
+  return MakeError(Reason::kFieldInvalid,
+                   absl::StrCat("no node of the map has an attribute \"", text, "\" at revision ",
+                                view_.revision(), SpellingHint(name, {known.begin(), known.end()})),
+                   {{"field", "pattern.attributes.name"}, {"value", text}});
 }
 
 absl::StatusOr<RelationSet> RelationSet::Resolve(const std::vector<std::string>& names,
