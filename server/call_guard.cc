@@ -2,24 +2,75 @@
 #include "server/call_guard.h"
 
 #include <algorithm>
+#include <atomic>
+#include <mutex>
 #include <string>
 
 #include "absl/strings/str_cat.h"
 #include "grpc/grpc.h"
-#include "schema/base/check.h"
 
 namespace dsg::server {
 
-CallGuard::Place::~Place() { guard_->Remove(this); }
+struct CallGuard::Watched : std::enable_shared_from_this<Watched> {
+  enum class Verdict { kNone, kDeadline, kStall };
+  static constexpr Clock::rep kNoWrite = Clock::duration::max().count();
 
-CallGuard::Clock::time_point CallGuard::Place::StallEnd() const {
-  const Clock::rep began = write_began_.load();
+  Watched(Timer* timer_in, Clock::duration stall_max_in, Clock::time_point deadline_in)
+      : timer(timer_in), stall_max(stall_max_in), deadline(deadline_in) {}
+
+  /// When the reader will have stalled for too long; the largest time point if no write is open.
+  Clock::time_point StallEnd() const;
+  /// Lets the timer look at the call at `due`, or earlier. Requires: mutex held.
+  void LookAgain(Clock::time_point now, Clock::time_point due);
+  /// Ends the call if it is due.
+  void Look();
+  absl::Status Reason() const;
+
+  Timer* const timer;
+  const Clock::duration stall_max;
+  const Clock::time_point deadline;
+  std::atomic<Clock::rep> write_began{kNoWrite};
+  std::atomic<Verdict> verdict{Verdict::kNone};
+  std::mutex mutex;
+  // These are guarded by the mutex. Null once the place has gone, and the call maybe with it.
+  grpc_call* call = nullptr;
+  Timer::Handle alarm;
+};
+
+CallGuard::Clock::time_point CallGuard::Watched::StallEnd() const {
+  const Clock::rep began = write_began.load();
   if (began == kNoWrite) return Clock::time_point::max();
-  return Clock::time_point(Clock::duration(began)) + guard_->stall_max_;
+  return Clock::time_point(Clock::duration(began)) + stall_max;
 }
 
-absl::Status CallGuard::Place::verdict() const {
-  switch (verdict_.load()) {
+void CallGuard::Watched::LookAgain(Clock::time_point now, Clock::time_point due) {
+  // A write that begins after this look cannot be overdue before the next look.
+  alarm = timer->At(std::min(due, now + stall_max), [self = shared_from_this()] { self->Look(); });
+}
+
+void CallGuard::Watched::Look() {
+  std::unique_lock lock(mutex);
+  if (call == nullptr) return;
+  const auto now = Clock::now();
+  const auto stall_end = StallEnd();
+  if (const auto due = std::min(deadline, stall_end); due > now) {
+    LookAgain(now, due);
+    return;
+  }
+  verdict = deadline <= now ? Verdict::kDeadline : Verdict::kStall;
+  const absl::Status reason = Reason();
+  // Cancelling a call may run OnDone of its reactor in this thread, and with it the destructor of
+  // its place, which takes the lock. The reference keeps the call alive until then.
+  grpc_call* const ended = call;
+  grpc_call_ref(ended);
+  lock.unlock();
+  grpc_call_cancel_with_status(ended, static_cast<grpc_status_code>(reason.code()),
+                               std::string(reason.message()).c_str(), nullptr);
+  grpc_call_unref(ended);
+}
+
+absl::Status CallGuard::Watched::Reason() const {
+  switch (verdict.load()) {
     case Verdict::kNone:
       return absl::OkStatus();
     case Verdict::kDeadline:
@@ -28,87 +79,38 @@ absl::Status CallGuard::Place::verdict() const {
     case Verdict::kStall:
       break;
   }
-  const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(guard_->stall_max_).count();
+  const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(stall_max).count();
   return absl::ResourceExhaustedError(absl::StrCat(
       "the reader took no message of the stream for ", ms,
       " ms; ask again from where it ended, and read what is sent at once or ask for less"));
 }
 
-CallGuard::CallGuard(Clock::duration stall_max)
-    : stall_max_(stall_max), thread_([this] { Run(); }) {}
-
 std::unique_ptr<CallGuard::Place> CallGuard::Guard(grpc_call* call, Clock::time_point deadline) {
-  std::unique_ptr<Place> place(new Place(this, call, deadline));
-  // No write can be overdue before that.
-  place->next_look_ = std::min(deadline, Clock::now() + stall_max_);
-  std::lock_guard lock(mutex_);
-  DSG_CHECK(!stopped_);
-  ++place_count_;
-  Insert(place.get());
-  return place;
-}
-
-void CallGuard::Insert(Place* place) {
-  const auto at = looks_.emplace(place->next_look_, place);
-  // Only the earliest entry determines how long the thread sleeps.
-  if (at == looks_.begin()) wakeup_.notify_one();
-}
-
-void CallGuard::Remove(Place* place) {
-  std::lock_guard lock(mutex_);
-  --place_count_;
-  const auto [begin, end] = looks_.equal_range(place->next_look_);
-  const auto found =
-      std::find_if(begin, end, [place](const auto& entry) { return entry.second == place; });
-  if (found != end) looks_.erase(found);
-}
-
-void CallGuard::Stop() {
+  auto watched = std::make_shared<Watched>(timer_, stall_max_, deadline);
   {
-    std::lock_guard lock(mutex_);
-    if (stopped_) return;
-    DSG_CHECK(place_count_ == 0);
-    stopped_ = true;
+    std::lock_guard lock(watched->mutex);
+    watched->call = call;
+    watched->LookAgain(Clock::now(), deadline);
   }
-  wakeup_.notify_one();
-  thread_.join();
+  return std::unique_ptr<Place>(new Place(std::move(watched)));
 }
 
-void CallGuard::Run() {
-  std::unique_lock lock(mutex_);
-  while (!stopped_) {
-    if (looks_.empty()) {
-      wakeup_.wait(lock);
-    } else if (const auto next = looks_.begin()->first; next > Clock::now()) {
-      wakeup_.wait_until(lock, next);
-    } else {
-      Place* const place = looks_.begin()->second;
-      looks_.erase(looks_.begin());
-      LookAt(place, &lock);
-    }
+CallGuard::Place::~Place() {
+  Timer::Handle alarm;
+  {
+    std::lock_guard lock(watched_->mutex);
+    watched_->call = nullptr;
+    alarm = watched_->alarm;
   }
+  watched_->timer->Cancel(alarm);
 }
 
-void CallGuard::LookAt(Place* place, std::unique_lock<std::mutex>* lock) {
-  const auto now = Clock::now();
-  const auto stall_end = place->StallEnd();
-  if (const auto due = std::min(place->deadline_, stall_end); due > now) {
-    // A write that begins after this look cannot be overdue before the next look.
-    place->next_look_ = std::min(due, now + stall_max_);
-    Insert(place);
-    return;
-  }
-  place->verdict_ = place->deadline_ <= now ? Place::Verdict::kDeadline : Place::Verdict::kStall;
-  const absl::Status verdict = place->verdict();
-  // Cancelling a call may run OnDone of its reactor in this thread, and with it the destructor of
-  // its place, which takes the lock. The reference keeps the call alive until then.
-  grpc_call* const call = place->call_;
-  grpc_call_ref(call);
-  lock->unlock();
-  grpc_call_cancel_with_status(call, static_cast<grpc_status_code>(verdict.code()),
-                               std::string(verdict.message()).c_str(), nullptr);
-  grpc_call_unref(call);
-  lock->lock();
+void CallGuard::Place::BeginWrite() {
+  watched_->write_began.store(Clock::now().time_since_epoch().count());
 }
+
+void CallGuard::Place::EndWrite() { watched_->write_began.store(Watched::kNoWrite); }
+
+absl::Status CallGuard::Place::verdict() const { return watched_->Reason(); }
 
 }  // namespace dsg::server

@@ -39,7 +39,7 @@ struct CallRuntime {
   /// reader.
   std::atomic<int> open_stream_count{0};
   int open_stream_max = 0;
-  /// Streams that have nothing to send yet wait here.
+  /// Streams that have nothing to send yet, and refusals of long requests, wait here.
   DelayQueue* delays = nullptr;
   /// Watches; they do not count as streams.
   std::atomic<int> open_watch_count{0};

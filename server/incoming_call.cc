@@ -88,7 +88,7 @@ void IncomingCall::OnReadDone(bool ok) {
 
 void IncomingCall::OnCancel() {
   call_.Cancel();
-  if (refusal_waits_) runtime_->delays->Hurry(this);
+  runtime_->delays->Hurry(this);
 }
 
 void IncomingCall::Run() {
@@ -116,7 +116,6 @@ void IncomingCall::FinishRefused(const grpc::Status& status) {
   memory_.StopWaiting();
   memory_.Resize(0).IgnoreError();
   refusal_ = status;
-  refusal_waits_ = true;
   // In time for the caller to learn why, and not only that its deadline has passed.
   constexpr std::chrono::milliseconds kBeforeDeadline{100};
   runtime_->delays->Add(

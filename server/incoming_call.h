@@ -4,7 +4,6 @@
 // bytes.
 #pragma once
 
-#include <atomic>
 #include <memory>
 #include <optional>
 #include <string_view>
@@ -34,7 +33,7 @@ struct Method {
 class IncomingCall : public grpc::ServerGenericBidiReactor, public Job {
  public:
   void OnReadDone(bool ok) final;
-  void OnCancel() override;
+  void OnCancel() final;
   void Run() final;
   void OnDone() override { delete this; }
 
@@ -101,7 +100,6 @@ class IncomingCall : public grpc::ServerGenericBidiReactor, public Job {
   grpc::ByteBuffer packed_;
   // What the call ends with when Run comes again.
   std::optional<grpc::Status> refusal_;
-  std::atomic<bool> refusal_waits_{false};
 };
 
 }  // namespace dsg::server

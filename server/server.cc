@@ -163,8 +163,8 @@ class RunningServer final : public Server {
         workers_(WorkerCount(options.worker_count), options.in_flight_max),
         commit_workers_(kCommitWorkerCount, std::min(options.in_flight_max, kCommitsInFlightMax),
                         kCommitNiceness),
-        delays_(&workers_),
-        guard_(options.reader_stall_max),
+        delays_(&timer_, &workers_),
+        guard_(&timer_, options.reader_stall_max),
         connections_(LimitsOfConnections(options)),
         arrivals_(kArrivalsMax),
         memory_(options.call_memory_bytes),
@@ -219,12 +219,11 @@ class RunningServer final : public Server {
       // Waits for every call. Calls that run past the grace are cancelled and then finish.
       grpc_server_->Shutdown(std::chrono::system_clock::now() + grace);
       grpc_server_->Wait();
-      // The guard may still hold a call that it has just ended.
-      guard_.Stop();
+      // The timer may still hold a call that the guard has just ended.
+      timer_.Stop();
       grpc_server_ = nullptr;
     }
-    guard_.Stop();
-    delays_.Stop();
+    timer_.Stop();
     workers_.Stop();
     commit_workers_.Stop();
     claim_ = nullptr;
@@ -251,6 +250,7 @@ class RunningServer final : public Server {
   std::unique_ptr<UnixSocketClaim> claim_;
   WorkerPool workers_;
   WorkerPool commit_workers_;
+  Timer timer_;
   DelayQueue delays_;
   CallGuard guard_;
   Connections connections_;

@@ -3,6 +3,7 @@
 // for its reader or for new revisions.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <memory>
 #include <utility>
@@ -44,7 +45,7 @@ class StreamCall final : public IncomingCall {
     } else if (!wait.ok()) {
       Finish(LastWords(wait.status()));
     } else if (wait->count() > 0) {
-      runtime().delays->Add(this, DelayQueue::Clock::now() + *wait);
+      runtime().delays->Add(this, Timer::Clock::now() + *wait);
     } else {
       Write();
     }
@@ -59,11 +60,6 @@ class StreamCall final : public IncomingCall {
     } else {
       Finish(LastWords(absl::CancelledError("the reader left, or the deadline passed")));
     }
-  }
-
-  void OnCancel() override {
-    call().Cancel();
-    runtime().delays->Hurry(this);
   }
 
  private:

@@ -275,6 +275,32 @@ bool HasUse(const BagPlan& plan, TopicUse use) {
                      [use](const BagTopic& topic) { return topic.use == use; });
 }
 
+bool IsSensor(TopicUse use) {
+  return use == TopicUse::kImu || use == TopicUse::kImage || use == TopicUse::kCompressedImage;
+}
+
+// By the headers of the first and last message of each sensor; what cannot be read is left for the
+// reader of the log to report.
+StampSpan SensorSpan(const BagFile& bag, const BagPlan& plan) {
+  std::vector<std::pair<const BagMessageRef*, const BagMessageRef*>> ends(plan.topics.size());
+  for (const BagMessageRef& ref : bag.messages()) {
+    auto& [first, last] = ends[plan.topic_of_connection[ref.connection]];
+    if (first == nullptr) first = &ref;
+    last = &ref;
+  }
+  StampSpan span;
+  for (size_t i = 0; i < ends.size(); ++i) {
+    if (!IsSensor(plan.topics[i].use) || ends[i].first == nullptr) continue;
+    for (const BagMessageRef* const ref : {ends[i].first, ends[i].second}) {
+      const auto message = bag.Read(*ref, kImageHeadBytes);
+      if (!message.ok()) continue;
+      const auto header = ParseRosHeader(message->data, plan.topics[i].name);
+      if (header.ok()) span.Add(header->stamp_ns);
+    }
+  }
+  return span;
+}
+
 // Leaves one source of poses in the plan; gives the table of a pose file.
 absl::StatusOr<std::optional<TrackTable>> PlanPoses(const LogOptions& options, BagPlan* plan,
                                                     LogDigest* digest, LogInfo* info) {
@@ -367,7 +393,12 @@ OpenedLog OpenBag(const std::string& path, const LogOptions& options) {
     info.measurement_count += topic.message_count;
   }
   std::vector<SensorChannel> known;
-  if (poses.has_value()) known.push_back(MakePoseChannel(*std::move(poses)));
+  if (poses.has_value()) {
+    known.push_back(MakePoseChannel(*std::move(poses)));
+    StampSpan span;
+    for (const TimeNs time_ns : known.back().times) span.Add(time_ns);
+    DSG_RETURN_IF_ERROR(CheckSharesTime(options, span, path, SensorSpan(*bag, plan)));
+  }
   if (loops.has_value()) known.push_back(*std::move(loops));
   for (const SensorChannel& channel : known) Count(channel, &info);
   auto log = std::make_unique<BagLog>(std::move(bag), std::move(plan), RobotName(options),

@@ -86,7 +86,7 @@ class FolderReader {
     DSG_RETURN_IF_ERROR(CheckCounts());
     info_.content_sha256 = digest_.Hex();
     DSG_ASSIGN_OR_RETURN(std::unique_ptr<LogSource> log,
-                         MakeSensorLog(std::move(channels_), std::move(info_)));
+                         MakeSensorLog(std::move(channels_), options_, std::move(info_)));
     return log;
   }
 

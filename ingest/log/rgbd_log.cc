@@ -105,7 +105,7 @@ OpenedLog OpenRgbdFolder(const std::string& folder, const LogOptions& options) {
                        ReadLoopChannel(options, /*log_path=*/"", &digest, &info));
   if (loops.has_value()) channels.push_back(*std::move(loops));
   info.content_sha256 = digest.Hex();
-  return MakeSensorLog(std::move(channels), std::move(info));
+  return MakeSensorLog(std::move(channels), options, std::move(info));
 }
 
 }  // namespace dsg::ingest

@@ -2,6 +2,7 @@
 #include "ingest/log/sensor_log.h"
 
 #include <algorithm>
+#include <initializer_list>
 #include <tuple>
 #include <utility>
 
@@ -9,6 +10,7 @@
 #include "ingest/log/pose_table.h"
 #include "ingest/log/text_table.h"
 #include "schema/base/status.h"
+#include "schema/base/time.h"
 
 namespace dsg::ingest {
 namespace {
@@ -45,10 +47,52 @@ absl::Status NoPoses(const std::string& value, const std::string& message) {
   return MakeError(Reason::kFieldInvalid, message, {{"field", "poses"}, {"value", value}});
 }
 
+std::string SpanText(const StampSpan& span) {
+  return absl::StrCat(FormatRfc3339(span.first_ns), " to ", FormatRfc3339(span.last_ns), " (",
+                      span.first_ns, " to ", span.last_ns, " ns)");
+}
+
+StampSpan SpanOf(const std::vector<SensorChannel>& channels,
+                 std::initializer_list<ChannelRank> ranks) {
+  StampSpan span;
+  for (const SensorChannel& channel : channels) {
+    if (channel.times.empty() || std::count(ranks.begin(), ranks.end(), channel.rank) == 0) {
+      continue;
+    }
+    span.Add(channel.times.front());
+    span.Add(channel.times.back());
+  }
+  return span;
+}
+
 }  // namespace
 
+void StampSpan::Add(TimeNs time_ns) {
+  first_ns = std::min(first_ns, time_ns);
+  last_ns = std::max(last_ns, time_ns);
+}
+
+absl::Status CheckSharesTime(const LogOptions& options, const StampSpan& poses,
+                             const std::string& path, const StampSpan& sensors) {
+  if (options.pose_file.empty() || poses.is_empty() || sensors.is_empty()) return absl::OkStatus();
+  if (poses.first_ns <= sensors.last_ns && sensors.first_ns <= poses.last_ns) {
+    return absl::OkStatus();
+  }
+  return MakeError(
+      Reason::kFieldInvalid,
+      absl::StrCat("--pose-file ", options.pose_file, " holds poses from ", SpanText(poses),
+                   ", but the sensors of ", path, " measured from ", SpanText(sensors),
+                   "; give the poses of this log, by its clock (EuRoC stamps are nanoseconds, TUM "
+                   "stamps seconds)"),
+      {{"field", "pose_file"}, {"value", options.pose_file}});
+}
+
 absl::StatusOr<std::unique_ptr<LogSource>> MakeSensorLog(std::vector<SensorChannel> channels,
-                                                         LogInfo info) {
+                                                         const LogOptions& options, LogInfo info) {
+  StampSpan sensors = SpanOf(channels, {ChannelRank::kImu, ChannelRank::kImages});
+  if (sensors.is_empty()) sensors = SpanOf(channels, {ChannelRank::kDetections});
+  DSG_RETURN_IF_ERROR(
+      CheckSharesTime(options, SpanOf(channels, {ChannelRank::kPoses}), info.path, sensors));
   std::sort(channels.begin(), channels.end(), [](const SensorChannel& a, const SensorChannel& b) {
     return std::tie(a.rank, a.name) < std::tie(b.rank, b.name);
   });

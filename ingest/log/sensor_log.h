@@ -29,9 +29,24 @@ struct SensorChannel {
 };
 
 /// Merges the channels; fills in the counts and the first stamp of `info`.
-/// Errors: FILE_MALFORMED when there is not one measurement.
+/// Errors: FILE_MALFORMED when there is not one measurement; of CheckSharesTime.
 absl::StatusOr<std::unique_ptr<LogSource>> MakeSensorLog(std::vector<SensorChannel> channels,
-                                                         LogInfo info);
+                                                         const LogOptions& options, LogInfo info);
+
+/// The first stamp and the last.
+struct StampSpan {
+  TimeNs first_ns = kTimeMax;
+  TimeNs last_ns = kTimeMin;
+
+  bool is_empty() const { return last_ns < first_ns; }
+  void Add(TimeNs time_ns);
+};
+
+/// Checks that the poses of LogOptions::pose_file are of the same time as the sensors of the log at
+/// `path`. OK without a pose file, and if one of the spans is empty.
+/// Errors: FIELD_INVALID naming both files and both spans.
+absl::Status CheckSharesTime(const LogOptions& options, const StampSpan& poses,
+                             const std::string& path, const StampSpan& sensors);
 
 /// Errors: FILE_MALFORMED naming line, channel and both stamps when `time_ns` is not after the
 /// channel's last one.

@@ -16,14 +16,10 @@
 #include "schema/picture/raster.h"
 
 namespace dsg::cli {
+namespace {
 
-absl::Status CheckPicture(const PictureOptions& options) {
-  return options.png.empty() ? absl::OkStatus() : CheckMayWrite(options.png, options.force);
-}
-
-absl::Status WritePicture(Session* session, const PictureOptions& options,
-                          const AnswerPicture& picture, std::ostream& out) {
-  if (options.png.empty()) return absl::OkStatus();
+absl::Status DrawToFile(Session* session, const PictureOptions& options,
+                        const AnswerPicture& picture, std::ostream& out) {
   DSG_ASSIGN_OR_RETURN(ContentAnswer answer, ReadContent(session, {.at_ns = picture.at_ns,
                                                                    .with_agents = false,
                                                                    .revision = picture.revision}));
@@ -49,6 +45,23 @@ absl::Status WritePicture(Session* session, const PictureOptions& options,
                 .counts = {{"columns", drawn.width}, {"rows", drawn.height}}}},
               picture.revision, /*as_json=*/false, out);
   return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status CheckPicture(const PictureOptions& options) {
+  if (options.png.empty()) return absl::OkStatus();
+  // The file is begun and dropped, which also finds missing folders and rights.
+  return AtomicFile::Create(options.png, options.force).status();
+}
+
+absl::Status WritePicture(Session* session, const PictureOptions& options,
+                          const AnswerPicture& picture, std::ostream& out) {
+  if (options.png.empty()) return absl::OkStatus();
+  const absl::Status written = DrawToFile(session, options, picture, out);
+  if (written.ok()) return absl::OkStatus();
+  return Annotate(written, absl::StrCat("the answer is complete, but its picture ", options.png,
+                                        " was not written"));
 }
 
 absl::StatusOr<std::vector<std::vector<Eigen::Vector3d>>> WayOf(Session* session,

@@ -30,11 +30,14 @@ struct AnswerPicture {
   Overlay overlay{};
 };
 
-/// Checks, before the question is asked, that the picture can be written. OK without a picture.
+/// Checks, before the question is asked, that the file of the picture can be created. OK without a
+/// picture. Errors: of AtomicFile::Create.
 absl::Status CheckPicture(const PictureOptions& options);
 
 /// Writes the picture and, unless the answer is JSON, a line about it. Does nothing without a
-/// picture. Errors: of the calls; RESOURCE_EXHAUSTED/DISK_FULL.
+/// picture. To be called after the answer was printed: errors say that only the picture is missing.
+///
+/// Errors: of the calls; of AtomicFile, naming the file.
 absl::Status WritePicture(Session* session, const PictureOptions& options,
                           const AnswerPicture& picture, std::ostream& out);
 

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "query/client/call.h"
 
+#include <google/protobuf/message.h>
+#include <google/protobuf/unknown_field_set.h>
+
 #include <algorithm>
+#include <string>
 #include <string_view>
 
 #include "absl/strings/str_cat.h"
@@ -19,6 +23,9 @@ constexpr std::chrono::milliseconds kPollPeriod{20};
 // Signs of life of a watch; see map_service.proto.
 constexpr int64_t kWatchIdleDefaultNs = 5'000'000'000;
 constexpr int64_t kWatchIdleMaxNs = 86'400'000'000'000;
+
+// The largest number of a field; the protocol has none so large.
+constexpr int kUnreadMark = 536'870'911;
 
 std::chrono::system_clock::time_point WallDeadline(const CallContext& call,
                                                    std::chrono::seconds timeout) {
@@ -61,6 +68,22 @@ CallLimits LimitsOf(query::Lifetime lifetime, int64_t idle_ns) {
       return {kForEver, std::chrono::nanoseconds(0)};
   }
   return {};
+}
+
+void MarkUnread(google::protobuf::Message* reply) {
+  reply->GetReflection()->MutableUnknownFields(reply)->AddVarint(kUnreadMark, 0);
+}
+
+bool IsMarkedUnread(const google::protobuf::Message& reply) {
+  const auto& fields = reply.GetReflection()->GetUnknownFields(reply);
+  return fields.field_count() == 1 && fields.field(0).number() == kUnreadMark;
+}
+
+absl::Status UnreadableReplyError(const query::MethodInfo& method,
+                                  const google::protobuf::Message& reply) {
+  return absl::InternalError(absl::StrCat(
+      "what the server sent in reply to ", std::string(method.name), " is no ", reply.GetTypeName(),
+      "; is the server of another version, or its map damaged? dsg verify looks at the map"));
 }
 
 CallInFlight::CallInFlight(const CallContext& call, const ServerAddress& server,

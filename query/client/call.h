@@ -8,20 +8,21 @@
 #include <grpcpp/support/async_stream.h>
 #include <grpcpp/support/async_unary_call.h>
 
-#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <optional>
-#include <string>
 #include <utility>
 
 #include "absl/status/status.h"
-#include "absl/strings/str_cat.h"
 #include "query/api/method_info.h"
 #include "query/api/stream_cursor.h"
 #include "query/client/remote_api.h"
 #include "query/client/retry.h"
 #include "schema/base/status.h"
+
+namespace google::protobuf {
+class Message;
+}  // namespace google::protobuf
 
 namespace dsg::client {
 
@@ -73,6 +74,16 @@ class CallInFlight {
   grpc::CompletionQueue queue_;
 };
 
+/// Marks a message that is about to be read. gRPC reports bytes that do not parse in the same way
+/// as the end of a stream, even with the status OK; but it clears a message before it parses it,
+/// and does not touch it at the end.
+void MarkUnread(google::protobuf::Message* reply);
+/// True if gRPC has not touched the message since MarkUnread.
+bool IsMarkedUnread(const google::protobuf::Message& reply);
+/// INTERNAL: the server sent bytes that are no message of the type of `reply`.
+absl::Status UnreadableReplyError(const query::MethodInfo& method,
+                                  const google::protobuf::Message& reply);
+
 /// A stub's PrepareAsync method of a unary RPC, and of a streamed one.
 template <class Stub, class Request, class Reply>
 using PrepareUnary = std::unique_ptr<grpc::ClientAsyncResponseReader<Reply>> (Stub::*)(
@@ -86,9 +97,11 @@ template <class Stub, class Request, class Reply>
 class RemoteCursor final : public query::StreamCursor<Reply> {
  public:
   /// `server` and `stub` must outlive this.
-  RemoteCursor(const ServerAddress& server, Stub* stub, PrepareStream<Stub, Request, Reply> prepare,
-               Request request, const CallLimits& limits)
+  RemoteCursor(const ServerAddress& server, const query::MethodInfo& method, Stub* stub,
+               PrepareStream<Stub, Request, Reply> prepare, Request request,
+               const CallLimits& limits)
       : server_(server),
+        method_(method),
         stub_(stub),
         prepare_(prepare),
         request_(std::move(request)),
@@ -122,9 +135,16 @@ class RemoteCursor final : public query::StreamCursor<Reply> {
   }
 
   absl::StatusOr<bool> ReadOn(const query::CallContext& call, Reply* reply) {
+    MarkUnread(reply);
     rpc_->Read(reply, flight_->tag());
     if (flight_->Wait(call)) return true;
-    return End();
+    const bool has_ended = IsMarkedUnread(*reply);
+    reply->Clear();
+    if (has_ended) return End();
+    flight_->context()->TryCancel();
+    // The cancellation is ours.
+    (void)Finish();
+    return UnreadableReplyError(method_, *reply);
   }
 
   absl::StatusOr<bool> End() {
@@ -141,6 +161,7 @@ class RemoteCursor final : public query::StreamCursor<Reply> {
   }
 
   const ServerAddress& server_;
+  const query::MethodInfo method_;
   Stub* const stub_;
   const PrepareStream<Stub, Request, Reply> prepare_;
   const Request request_;
@@ -163,7 +184,7 @@ class Caller {
   absl::Status Ask(const query::MethodInfo& method, Stub* stub,
                    PrepareUnary<Stub, Request, Reply> prepare, const query::CallContext& call,
                    const Request& request, Reply* reply) {
-    const auto once = [&] { return AskOnce(stub, prepare, call, request, reply); };
+    const auto once = [&] { return AskOnce(method, stub, prepare, call, request, reply); };
     // A writer that repeats a call settles its outcome first, so it is not repeated here.
     return server_.repeats && method.may_repeat ? RetryRead(call, once) : once();
   }
@@ -174,14 +195,15 @@ class Caller {
                               const query::CallContext&, const Request& request) {
     int64_t idle_ns = 0;
     if constexpr (requires { request.idle_period_ns(); }) idle_ns = request.idle_period_ns();
-    return std::make_unique<RemoteCursor<Stub, Request, Reply>>(server_, stub, prepare, request,
-                                                                LimitsOf(method.lifetime, idle_ns));
+    return std::make_unique<RemoteCursor<Stub, Request, Reply>>(
+        server_, method, stub, prepare, request, LimitsOf(method.lifetime, idle_ns));
   }
 
  private:
   template <class Stub, class Request, class Reply>
-  absl::Status AskOnce(Stub* stub, PrepareUnary<Stub, Request, Reply> prepare,
-                       const query::CallContext& call, const Request& request, Reply* reply) {
+  absl::Status AskOnce(const query::MethodInfo& method, Stub* stub,
+                       PrepareUnary<Stub, Request, Reply> prepare, const query::CallContext& call,
+                       const Request& request, Reply* reply) {
     CallInFlight flight(call, server_);
     reply->Clear();
     grpc::Status status;
@@ -191,10 +213,7 @@ class Caller {
     const bool is_whole = flight.Wait(call);
     DSG_RETURN_IF_ERROR(flight.Outcome(status));
     // gRPC calls it OK when the bytes came and are no message.
-    if (is_whole) return absl::OkStatus();
-    return absl::InternalError(absl::StrCat(
-        "the reply of the server is no ", reply->GetTypeName(),
-        "; is the server of another version, or its map damaged? dsg verify looks at the map"));
+    return is_whole ? absl::OkStatus() : UnreadableReplyError(method, *reply);
   }
 
   const ServerAddress server_;

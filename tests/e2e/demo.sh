@@ -4,7 +4,7 @@
 # Takes the programs from DSG_BIN; leaves nothing behind unless a folder to keep is given.
 set -euo pipefail
 
-readonly SEED=12 PEOPLE=12 SECONDS_SIMULATED=300 PICKS=6
+readonly SEED=12 PEOPLE=12 SECONDS_SIMULATED=300 PICKS=2
 : "${DSG_BIN:?names the folder of the programs; ./dev demo sets it}"
 PATH=$(cd "$DSG_BIN" && pwd):$PATH
 server_pid=

@@ -57,6 +57,14 @@ void PrintTracksSummary(const TracksOptions& options, const TracksSummary& summa
       static_cast<double>(summary.byte_count) * 1e-6, options.out, options.out);
 }
 
+void NoteMissingPicks(const TracksOptions& options, const TracksSummary& summary) {
+  if (summary.pick_count >= options.pick_count) return;
+  std::cerr << absl::StreamFormat(
+      "dsg-simulate: note: people take %d things away, not the %d of --picks: they stand beside no "
+      "more small ones for long enough; give more --people or --seconds\n",
+      summary.pick_count, options.pick_count);
+}
+
 absl::Status RunTracks(TracksOptions options, const std::string& world) {
   DSG_ASSIGN_OR_RETURN(options.world.kind, ParseWorldKind(world));
   absl::StatusOr<TracksSummary> summary;
@@ -66,6 +74,7 @@ absl::Status RunTracks(TracksOptions options, const std::string& world) {
   }
   if (!summary.ok()) return summary.status();
   PrintTracksSummary(options, *summary);
+  NoteMissingPicks(options, *summary);
   return absl::OkStatus();
 }
 

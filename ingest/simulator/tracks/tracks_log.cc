@@ -265,6 +265,7 @@ absl::StatusOr<TracksSummary> WriteTracks(const TracksOptions& options, const Pr
   summary.people_count = options.crowd.people_count;
   const std::vector<Pick> picks =
       DrawPicks(world, planner, crowd, scene.seed(), duration_ns, options.pick_count);
+  summary.pick_count = static_cast<int64_t>(picks.size());
   GraphDelta graph = WorldGraph(world);
   ApplyPicks(picks, &graph);
   files.map.buffer() = DeltaToJson(graph);

@@ -26,6 +26,8 @@ struct TracksSummary {
   int64_t gap_count = 0;
   /// Rooms entered, over all agents.
   int64_t visit_count = 0;
+  /// Things that people take away; fewer than asked for if they stand beside too few small ones.
+  int64_t pick_count = 0;
   int64_t byte_count = 0;
 };
 

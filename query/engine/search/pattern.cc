@@ -309,12 +309,9 @@ class Compiler {
                                  "it holds what an imported file said besides, for an export; "
                                  "search for another attribute, or read it with dsg show");
       }
-      const auto name = view_.symbols().Find(condition.name);
-      if (!name.has_value()) {
-        out->is_never = true;
-      } else {
-        out->attribute_names.push_back(*name);
-      }
+      DSG_ASSIGN_OR_RETURN(const auto name, vocabulary_.FindAttribute(condition.name));
+      if (!name.has_value()) return vocabulary_.AttributeUnknown(condition.name);
+      out->attribute_names.push_back(*name);
     }
     return absl::OkStatus();
   }

@@ -109,7 +109,8 @@ class Pattern {
 /// Explains a pattern by a map. `snapshot`, of the view's revision, may be null: then a class that
 /// has a label but no node counts as unknown.
 /// Errors: CLASS_UNKNOWN, RELATION_UNKNOWN or LAYER_UNKNOWN with those that are near in spelling;
-/// NODE_ID_INVALID; NODE_UNKNOWN; FIELD_INVALID; what `stop` returned.
+/// NODE_ID_INVALID; NODE_UNKNOWN; FIELD_INVALID, also for an attribute that no node has; what
+/// `stop` returned.
 absl::StatusOr<Pattern> ResolvePattern(const NodePattern& pattern, const GraphView& view,
                                        const Snapshot* snapshot, const StopCheck& stop);
 
@@ -150,7 +151,7 @@ struct CompiledPattern {
   /// Meaningful if source.class_name is set.
   std::vector<ClassRange> classes;
   NameMatcher name;
-  /// Of source.attributes; fewer if one is in no view of the map, which is never a match.
+  /// Of source.attributes.
   std::vector<Symbol> attribute_names;
   /// Only nodes that have a track, or only in their layer.
   bool asks_for_agents = false;

@@ -149,6 +149,17 @@ absl::StatusOr<bool> Vocabulary::HasName(std::string_view name) const {
   });
 }
 
+absl::StatusOr<std::optional<Symbol>> Vocabulary::FindAttribute(std::string_view name) const {
+  const std::optional<Symbol> symbol = view_.symbols().Find(name);
+  if (!symbol.has_value()) return symbol;
+  DSG_ASSIGN_OR_RETURN(const bool is_known, HasNode([&](const ViewNode& node) {
+                         return std::ranges::any_of(node.attributes(), [&](const auto& one) {
+                           return one.name == *symbol;
+                         });
+                       }));
+  return is_known ? symbol : std::nullopt;
+}
+
 std::vector<std::string> Vocabulary::ClassNames() const {
   std::vector<std::string> names;
   for (const Layer& layer : view_.layers()) {
@@ -209,6 +220,23 @@ absl::Status Vocabulary::KindUnknown(std::string_view word) const {
                    absl::StrCat("pattern.kind is ", text, "; no node of the map is of this kind",
                                 SpellingHint(word, std::move(known))),
                    {{"field", "pattern.kind"}, {"value", text}});
+}
+
+absl::Status Vocabulary::AttributeUnknown(std::string_view name) const {
+  // What a slip of the fingers in `class = cup` leaves is read as an attribute.
+  std::set<std::string> known = {"kind", "layer", "class", "name", "color", "id"};
+  const auto note_names = [&](const ViewNode& node) {
+    for (const ViewAttribute& one : node.attributes()) {
+      known.insert(view_.symbols().Text(one.name));
+    }
+    return false;
+  };
+  DSG_RETURN_IF_ERROR(HasNode(note_names).status());
+  const std::string text(name);
+  return MakeError(Reason::kFieldInvalid,
+                   absl::StrCat("no node of the map has an attribute \"", text, "\" at revision ",
+                                view_.revision(), SpellingHint(name, {known.begin(), known.end()})),
+                   {{"field", "pattern.attributes.name"}, {"value", text}});
 }
 
 absl::StatusOr<RelationSet> RelationSet::Resolve(const std::vector<std::string>& names,

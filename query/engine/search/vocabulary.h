@@ -37,11 +37,15 @@ class Vocabulary {
   absl::StatusOr<bool> HasKind(std::string_view kind) const;
   /// Some node has this name, case ignored.
   absl::StatusOr<bool> HasName(std::string_view name) const;
+  /// nullopt if no node has this attribute.
+  /// Cost: a walk over the nodes up to the first that has it.
+  absl::StatusOr<std::optional<Symbol>> FindAttribute(std::string_view name) const;
 
   absl::Status ClassUnknown(std::string_view word, bool is_noun) const;
   absl::Status LayerUnknown(std::string_view word) const;
   absl::Status RelationUnknown(std::string_view word) const;
   absl::Status KindUnknown(std::string_view word) const;
+  absl::Status AttributeUnknown(std::string_view name) const;
 
  private:
   absl::StatusOr<std::vector<std::string>> Labels() const;

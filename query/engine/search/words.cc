@@ -112,9 +112,10 @@ std::string SpellingHint(std::string_view word, std::vector<std::string> known) 
   std::sort(known.begin(), known.end());
   known.erase(std::unique(known.begin(), known.end()), known.end());
   if (known.empty()) return "";
-  const bool is_cut = known.size() > kListedMax;
-  if (is_cut) known.resize(kListedMax);
-  return "; known: " + Quoted(known) + (is_cut ? ", ..." : "");
+  const size_t left_count = known.size() - std::min(known.size(), kListedMax);
+  known.resize(known.size() - left_count);
+  return "; known: " + Quoted(known) +
+         (left_count > 0 ? " and " + std::to_string(left_count) + " more" : "");
 }
 
 namespace {

@@ -39,7 +39,7 @@ std::vector<std::string> NearInSpelling(std::string_view word,
                                         const std::vector<std::string>& known);
 
 /// `; near in spelling: "cup", "cap"`, or, when nothing is near, `; known: ...` with the first ten
-/// in spelling, or nothing when none is known.
+/// in spelling and how many more there are, or nothing when none is known.
 std::string SpellingHint(std::string_view word, std::vector<std::string> known);
 
 /// All names, in the order in which people are told them.

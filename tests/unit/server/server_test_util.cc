@@ -61,6 +61,18 @@ absl::Status Gate::Pass(const query::CallContext& call) {
   return stop;
 }
 
+void Record::Add(int number) {
+  std::lock_guard lock(mutex_);
+  numbers_.push_back(number);
+  changed_.notify_all();
+}
+
+std::vector<int> Record::WaitFor(size_t count) {
+  std::unique_lock lock(mutex_);
+  changed_.wait_for(lock, std::chrono::seconds(20), [&] { return numbers_.size() >= count; });
+  return numbers_;
+}
+
 HeldCore::HeldCore(std::unique_ptr<query::ServiceCore> core, std::shared_ptr<Gate> gate)
     : PassingCore(std::move(core)), gate_(std::move(gate)) {}
 

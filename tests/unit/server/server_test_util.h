@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shared by the tests of the server: cores that change or hold single calls, a reader of a large
-// stream, errors as a gRPC client sees them, and the memory of the process.
+// Shared by the tests of the server: cores that change or hold single calls, a record of what other
+// threads do, a reader of a large stream, errors as a gRPC client sees them, and the memory of the
+// process.
 #pragma once
 
 #include <condition_variable>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "dsg/v1/errors.pb.h"
 #include "dsg/v1/query_service.grpc.pb.h"
@@ -45,6 +47,19 @@ class Gate {
   bool open_ = false;
   int running_count_ = 0;
   absl::Status last_stop_;
+};
+
+/// Numbers in the order in which other threads add them.
+class Record {
+ public:
+  void Add(int number);
+  /// Waits for so many numbers, and returns all. Fewer if it takes 20 s: the test fails then.
+  std::vector<int> WaitFor(size_t count);
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<int> numbers_;
 };
 
 /// The real core, except that the gate holds ListMaps.

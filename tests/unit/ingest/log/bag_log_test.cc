@@ -217,6 +217,19 @@ TEST(BagLog, ChoosesPosesAsAsked) {
   EXPECT_NE(log->info.content_sha256, OpenLog(path, {}).value()->info().content_sha256);
 }
 
+TEST(BagLog, RefusesAPoseFileOfAnotherTime) {
+  const TempFolder folder;
+  const std::string path = folder.Write("log.bag", FullBag().Finish());
+  for (const std::string stamp : {"1500000000.0", "1600003600.0"}) {
+    LogOptions options;
+    options.pose_file = folder.Write("poses.tum", stamp + " 7 8 9 0 0 0 1\n");
+    const absl::Status status = ReadAll(path, options).status();
+    EXPECT_EQ(ReasonOf(status), Reason::kFieldInvalid) << stamp;
+    EXPECT_NE(status.message().find(path + " measured from 2020-09-13T12:26:40"), std::string::npos)
+        << status;
+  }
+}
+
 TEST(BagLog, RefusesBadImagesOnlyWhenTheyAreAskedFor) {
   const TempFolder folder;
   const std::pair<std::string, std::string> bad[] = {

@@ -261,6 +261,25 @@ TEST_F(FolderLogTest, ChoosesPosesAsAsked) {
   EXPECT_EQ(ReasonOf(Read(truth).status()), Reason::kFieldInvalid);
 }
 
+TEST_F(FolderLogTest, RefusesAPoseFileOfAnotherTime) {
+  // EuRoC stamps as if they were seconds.
+  LogOptions options;
+  options.pose_file = folder_.Write("late.txt", "100 1 2 3 0 0 0 1\n300 1 2 3 0 0 0 1\n");
+  const absl::Status status = Read(options).status();
+  EXPECT_EQ(ReasonOf(status), Reason::kFieldInvalid);
+  for (const std::string part : {"late.txt", "1970-01-01T00:01:40Z to 1970-01-01T00:05:00Z",
+                                 "100000000000 to 300000000000 ns", "(50 to 300 ns)"}) {
+    EXPECT_NE(status.message().find(part), std::string::npos) << part << ": " << status;
+  }
+  // One stamp at the edge is enough.
+  options.pose_file = folder_.Write("edge.txt",
+                                    "0.000000000 1 2 3 0 0 0 1\n"
+                                    "0.000000050 1 2 3 0 0 0 1\n");
+  EXPECT_TRUE(Read(options).ok()) << Read(options).status();
+  options.pose_file = folder_.Write("early.txt", "0.000000049 1 2 3 0 0 0 1\n");
+  EXPECT_EQ(ReasonOf(Read(options).status()), Reason::kFieldInvalid);
+}
+
 TEST_F(FolderLogTest, PointsFromASimulationToItsLog) {
   const TempFolder outer;
   outer.Write("out/log/mav0/imu0/data.csv", "#\n100,0,0,0,0,0,0\n");

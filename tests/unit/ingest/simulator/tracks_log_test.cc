@@ -177,7 +177,9 @@ TEST_F(TracksLog, PeopleTakeThingsAwayOnlyIfAsked) {
 
   options.out = (folder_ / "some").string();
   options.pick_count = 3;
-  ASSERT_TRUE(WriteTracks(options, nullptr).ok());
+  const auto some = WriteTracks(options, nullptr);
+  ASSERT_TRUE(some.ok()) << some.status();
+  EXPECT_EQ(some->pick_count, 3);
   const auto rows = ReadRows("some", "truth/picks.csv");
   ASSERT_EQ(rows.size(), 4u);
   const std::string map = Read("some", "log/map.json");
@@ -190,6 +192,14 @@ TEST_F(TracksLog, PeopleTakeThingsAwayOnlyIfAsked) {
     EXPECT_NE(map.find(rows[i][6]), std::string::npos) << rows[i][6];
   }
   EXPECT_EQ(objects.size(), 3u);
+  // More than people stand beside.
+  options.out = (folder_ / "many").string();
+  options.pick_count = 1000;
+  const auto many = WriteTracks(options, nullptr);
+  ASSERT_TRUE(many.ok()) << many.status();
+  EXPECT_GT(many->pick_count, 3);
+  EXPECT_LT(many->pick_count, 1000);
+  EXPECT_EQ(ReadRows("many", "truth/picks.csv").size(), static_cast<size_t>(many->pick_count) + 1);
   // Who walks where is the same as without.
   EXPECT_EQ(Read("none", "log/tracks.csv"), Read("some", "log/tracks.csv"));
 }

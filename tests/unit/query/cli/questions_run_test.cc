@@ -298,7 +298,35 @@ TEST_F(QuestionsRun, AnswersCanBeDrawn) {
     png.read(magic.data(), 4);
     EXPECT_EQ(magic, "\x89PNG") << question[0];
     ExpectRefused(2, "--force", arguments);
+    EXPECT_FALSE(std::filesystem::exists(file + ".part"));
   }
+}
+
+TEST_F(QuestionsRun, NoQuestionIsAskedWhosePictureCannotBeWritten) {
+  const std::string file = folder_ + "/no/picture.png";
+  for (const Arguments& question :
+       std::vector<Arguments>{{"track", "ann"}, {"met"}, {"find", "cup"}, {"path", "p0", "cup"}}) {
+    Arguments arguments = question;
+    arguments.insert(arguments.end(), {"--png", file});
+    const Outcome outcome = Ask(arguments);
+    EXPECT_EQ(outcome.code, 2) << question[0];
+    EXPECT_EQ(outcome.out, "") << question[0];
+    EXPECT_NE(outcome.errors.find(file), std::string::npos) << outcome.errors;
+    EXPECT_NE(outcome.errors.find("No such file or directory"), std::string::npos)
+        << outcome.errors;
+  }
+}
+
+TEST_F(QuestionsRun, AnAnswerWithoutItsPictureIsAnError) {
+  const std::string file = folder_ + "/attic.png";
+  const Outcome plain = Ask({"track", "ann"});
+  const Outcome outcome = Ask({"track", "ann", "--png", file, "--floor", "attic"});
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_EQ(outcome.out, plain.out);
+  EXPECT_NE(outcome.errors.find("its picture " + file + " was not written: "), std::string::npos)
+      << outcome.errors;
+  EXPECT_NE(outcome.errors.find("attic"), std::string::npos) << outcome.errors;
+  EXPECT_FALSE(std::filesystem::exists(file));
 }
 
 }  // namespace

@@ -13,6 +13,7 @@ namespace {
 using query::GraphView;
 using query::SpaceFilter;
 using query::Symbol;
+using query::ViewAttribute;
 using query::ViewEdge;
 using query::ViewNode;
 

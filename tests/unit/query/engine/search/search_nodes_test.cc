@@ -243,6 +243,26 @@ TEST_F(SearchNodes, ListsWhatIsNearInSpelling) {
   EXPECT_NE(layer.status().message().find("\"objects\""), std::string::npos) << layer.status();
 }
 
+TEST_F(SearchNodes, RefusesAnAttributeThatNoNodeHas) {
+  for (const std::string query :
+       {"wieght > 2", "has wieght", "cup on (\"dining table\" and wieght = 2)",
+        "cup not on (any and wieght = 2)"}) {
+    const auto reply = Ask(Query(query));
+    EXPECT_EQ(ReasonOf(reply.status()), Reason::kFieldInvalid) << query;
+    EXPECT_NE(reply.status().message().find("\"wieght\" at revision"), std::string::npos)
+        << reply.status();
+    EXPECT_NE(reply.status().message().find("near in spelling: \"weight\""), std::string::npos)
+        << reply.status();
+  }
+  // A field in the spelling of an attribute.
+  const auto field = Ask(Query("clas = cup"));
+  EXPECT_NE(field.status().message().find("\"class\""), std::string::npos) << field.status();
+  // The table that names what scene graphs have knows it.
+  EXPECT_EQ(Hits("has real_place"), "");
+  // Some node has it, though none with this value.
+  EXPECT_EQ(Hits("weight = heavy"), "");
+}
+
 TEST_F(SearchNodes, RefusesWhatItCannotAnswer) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   v1::SearchNodesRequest request;

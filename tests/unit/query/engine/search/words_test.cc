@@ -65,6 +65,10 @@ TEST(Spelling, ListsTheNearestFirst) {
   EXPECT_EQ(NearInSpelling("tabel", known), (std::vector<std::string>{"table"}));
   EXPECT_EQ(NearInSpelling("TABLE", known).front(), "table");
   EXPECT_EQ(SpellingHint("zzzzz", {"b", "a"}), "; known: \"a\", \"b\"");
+  std::vector<std::string> many;
+  for (char c = 'a'; c <= 'm'; ++c) many.emplace_back(3, c);
+  const std::string hint = SpellingHint("zzzzz", many);
+  EXPECT_EQ(hint.substr(hint.find("\"jjj\"")), "\"jjj\" and 3 more") << hint;
 }
 
 TEST(RelationWords, TakeTheLongestPhrase) {
