@@ -257,8 +257,6 @@ TEST_F(SearchNodes, RefusesAnAttributeThatNoNodeHas) {
   // A field in the spelling of an attribute.
   const auto field = Ask(Query("clas = cup"));
   EXPECT_NE(field.status().message().find("\"class\""), std::string::npos) << field.status();
-  // The table that names what scene graphs have knows it.
-  EXPECT_EQ(Hits("has real_place"), "");
   // Some node has it, though none with this value.
   EXPECT_EQ(Hits("weight = heavy"), "");
 }
