@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "schema/store/sqlite/copy.h"
 #include "schema/store/sqlite/erasure.h"
+#include "schema/store/sqlite/map_stream.h"
 #include "schema/store/sqlite/revision_rows.h"
 #include "schema/store/sqlite/rows.h"
 #include "schema/store/sqlite/verify.h"
@@ -234,6 +235,11 @@ absl::Status SqliteMapReader::CopyTo(const std::string& path, const StopCheck& s
   DSG_ASSIGN_OR_RETURN(const auto db,
                        OpenMapFile(store_folder_, spec_.name, Database::Mode::kRead));
   return CopyMap(*db, path, stop, progress);
+}
+
+absl::Status SqliteMapReader::ReadRows(const RowSink& sink, const StopCheck& stop) {
+  DSG_ASSIGN_OR_RETURN(Lease lease, LeaseConnection());
+  return StreamRows(*lease, spec_, sink, stop);
 }
 
 absl::StatusOr<TrackPtr> SqliteMapReader::GetTrack(NodeId agent, Revision revision) {
