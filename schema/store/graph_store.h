@@ -195,7 +195,7 @@ class GraphStore {
   /// store's file system for what is under way, which the caller removes; a store without files
   /// ignores it. Readers of a map that is replaced notice (IsCurrent).
   ///
-  /// Errors: as InstallMap, but UNIMPLEMENTED; what `rows` and `stop` returned.
+  /// Errors: as InstallMap, without UNIMPLEMENTED; what `rows` and `stop` returned.
   virtual absl::Status InstallRows(const MapSpec& spec, const RowSource& rows,
                                    const std::string& scratch, bool replace,
                                    const StopCheck& stop) = 0;

@@ -21,7 +21,7 @@
 #include "schema/base/time.h"
 #include "schema/model/edge.h"
 #include "schema/store/graph_store.h"
-#include "schema/store/sqlite/map_stream.h"
+#include "schema/store/sqlite/stream_in.h"
 
 namespace dsg::sqlite {
 

@@ -7,9 +7,9 @@
 #include "absl/strings/str_cat.h"
 #include "schema/store/sqlite/copy.h"
 #include "schema/store/sqlite/erasure.h"
-#include "schema/store/sqlite/map_stream.h"
 #include "schema/store/sqlite/revision_rows.h"
 #include "schema/store/sqlite/rows.h"
+#include "schema/store/sqlite/stream_out.h"
 #include "schema/store/sqlite/verify.h"
 
 namespace dsg::sqlite {

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // From rows to tables, and to what SQLite keeps of its own: cells, boxes, marks, ids of segments.
+#include "schema/store/sqlite/stream_in.h"
+
 #include <algorithm>
 #include <bit>
 #include <map>
@@ -9,7 +11,6 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "schema/store/sqlite/map_stream.h"
 #include "schema/store/sqlite/node_cells.h"
 #include "schema/store/sqlite/revision_rows.h"
 #include "schema/store/sqlite/rows.h"

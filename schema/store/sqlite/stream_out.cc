@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // From tables to rows: current ones and those of the history in one order. Each row is read by who
 // knows its columns and its checksum.
+#include "schema/store/sqlite/stream_out.h"
+
 #include <algorithm>
+#include <array>
 #include <map>
 #include <optional>
 #include <utility>
@@ -13,7 +16,6 @@
 #include "schema/store/sqlite/blob_rows.h"
 #include "schema/store/sqlite/erasure.h"
 #include "schema/store/sqlite/graph_rows.h"
-#include "schema/store/sqlite/map_stream.h"
 #include "schema/store/sqlite/revision_rows.h"
 #include "schema/store/sqlite/rows.h"
 #include "schema/store/sqlite/track_rows.h"

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Maps in files as streams of rows, and the way back. Refuses to keep more than one track's
-// directory in memory.
+// A map in files as a stream of rows. Refuses to keep more than one track's directory in memory.
 #pragma once
-
-#include <string>
 
 #include "schema/base/stop_check.h"
 #include "schema/model/layer.h"
@@ -15,10 +12,5 @@ namespace dsg::sqlite {
 /// See MapReader::ReadRows. `db` must have no statements running.
 absl::Status StreamRows(Database& db, const MapSpec& spec, const RowSink& sink,
                         const StopCheck& stop);
-
-/// Fills a new map, as CreateMapFile leaves it before its rows, from a stream. What it holds is
-/// not proven, and after an error it is half a map.
-absl::Status CollectRows(Database& db, const MapSpec& spec, const RowSource& rows,
-                         const StopCheck& stop);
 
 }  // namespace dsg::sqlite
