@@ -20,6 +20,7 @@
 #include "query/cli/verb_list.h"
 #include "query/cli/verbs_backup.h"
 #include "schema/archive/archive_file.h"
+#include "schema/archive/archive_map.h"
 #include "schema/base/status.h"
 #include "schema/files/atomic_file.h"
 #include "schema/interop/map_to_spark.h"
@@ -32,6 +33,8 @@ namespace {
 struct ExportVerb {
   /// An archive of all of the map (.dsgz).
   std::string archive;
+  /// The archive holds rows, which every backend reads, instead of a database.
+  bool with_rows = false;
   /// Files to write; at least one is set, or `archive` is.
   std::string ply;
   std::string graph_ply;
@@ -117,6 +120,21 @@ absl::Status CheckAlone(const Session& session, const ExportVerb& verb) {
       {{"field", "FILE"}});
 }
 
+// Gives the archive of a map of the local store to `write`, piece by piece.
+absl::Status CopyRows(const std::string& folder, const std::string& map, const StopCheck& stop,
+                      const std::function<absl::Status(std::string_view)>& write,
+                      const dsg::Progress& progress) {
+  DSG_ASSIGN_OR_RETURN(const auto store, OpenStore(folder, {.program = "dsg export"}));
+  DSG_ASSIGN_OR_RETURN(const auto reader, store->OpenMap(map));
+  DSG_ASSIGN_OR_RETURN(const auto encoder, ArchiveRows(reader.get(), store->folder(), stop));
+  while (!encoder->done()) {
+    DSG_ASSIGN_OR_RETURN(const std::string piece, encoder->Next(stop));
+    DSG_RETURN_IF_ERROR(write(piece));
+    progress(encoder->progress());
+  }
+  return absl::OkStatus();
+}
+
 absl::Status WriteArchive(Session* session, const ExportVerb& verb, std::ostream& out) {
   DSG_RETURN_IF_ERROR(CheckAlone(*session, verb));
   DSG_RETURN_IF_ERROR(CheckMayWrite(verb.archive, verb.force));
@@ -125,9 +143,11 @@ absl::Status WriteArchive(Session* session, const ExportVerb& verb, std::ostream
   query::CallContext call = session->NewCall();
   const InterruptGuard guard(&call);
   DSG_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(verb.archive));
-  DSG_RETURN_IF_ERROR(CopyArchive(
-      session, map, call, [&](std::string_view bytes) { return file.Write(bytes); },
-      [&](double fraction) { progress.Update(fraction); }));
+  const auto write = [&](std::string_view bytes) { return file.Write(bytes); };
+  const auto tell = [&](double fraction) { progress.Update(fraction); };
+  DSG_RETURN_IF_ERROR(verb.with_rows
+                          ? CopyRows(session->common().store, map, call.stop(), write, tell)
+                          : CopyArchive(session, map, call, write, tell));
   DSG_RETURN_IF_ERROR(file.Commit());
   // The archive may come over a network, so it is verified.
   const auto manifest = ReadArchiveFile(verb.archive, nullptr, call.stop(), nullptr);
@@ -135,10 +155,11 @@ absl::Status WriteArchive(Session* session, const ExportVerb& verb, std::ostream
     std::remove(verb.archive.c_str());
     return manifest.status();
   }
-  const Written written{.format = "dsgz",
-                        .path = verb.archive,
-                        .byte_count = file.byte_count(),
-                        .counts = {{"database bytes", manifest->database_bytes}}};
+  const Written written{
+      .format = "dsgz",
+      .path = verb.archive,
+      .byte_count = file.byte_count(),
+      .counts = {{verb.with_rows ? "row bytes" : "database bytes", manifest->database_bytes}}};
   TellWritten({written}, manifest->newest_revision, session->common().json, out);
   return absl::OkStatus();
 }
@@ -275,7 +296,16 @@ absl::Status RunMap(Session* session, const MapVerb& verb, std::ostream& out) {
 
 constexpr char kContentAtHelp[] = "The world at this TIME; default all that has not ended";
 
-absl::Status CheckExport(const ExportVerb& verb, const CommonOptions&) {
+absl::Status CheckExport(const ExportVerb& verb, const CommonOptions& common) {
+  if (verb.with_rows && verb.archive.empty()) {
+    return Usage("--rows is of an archive: give FILE.dsgz", "export");
+  }
+  if (verb.with_rows && common.store.empty()) {
+    return Usage(
+        "--rows reads a store folder: give --store DIR, or export through the server "
+        "without --rows, restore that archive and export it from there",
+        "export");
+  }
   if (!verb.archive.empty()) {
     if (IsArchivePath(verb.archive)) return absl::OkStatus();
     return Usage(
@@ -305,6 +335,8 @@ void AddExport(Grammar* grammar) {
                                 .run = RunExport,
                                 .check = CheckExport});
   app->add_option("FILE", verb->archive, "Archive of the whole map with its history, FILE.dsgz");
+  app->add_flag("--rows", verb->with_rows,
+                "An archive of rows, which programs with another store or a newer format read too");
   app->add_option("--ply", verb->ply, "The mesh, binary PLY");
   app->add_option("--graph-ply", verb->graph_ply, "The graph, PLY of points and lines");
   app->add_option("--gltf", verb->gltf, "Mesh and graph, binary glTF 2.0 (.glb)");

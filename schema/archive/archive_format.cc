@@ -20,6 +20,7 @@ using Json = nlohmann::ordered_json;
 constexpr std::string_view kMagic("DSGZ\r\n\x1a\n", 8);
 constexpr std::string_view kEndMagic("DSGE", 4);
 constexpr int kCompressionLevel = 3;
+constexpr char kRowsContent[] = "rows";
 // Of the head; frames count from 0.
 constexpr uint64_t kHeadSeed = ~uint64_t{0};
 
@@ -57,7 +58,7 @@ uint64_t FrameChecksum(int64_t index, uint32_t size, std::string_view bytes) {
 
 std::string TextOf(const ArchiveManifest& manifest) {
   const MapSpec& spec = manifest.spec;
-  const Json json = {
+  Json json = {
       {"map", spec.name},
       {"frame", spec.frame},
       {"epoch_ns", std::to_string(spec.epoch_ns)},
@@ -73,11 +74,16 @@ std::string TextOf(const ArchiveManifest& manifest) {
       {"database_bytes", std::to_string(manifest.database_bytes)},
       {"program", manifest.program},
   };
+  if (manifest.content == ArchiveContent::kRows) json["content"] = kRowsContent;
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-ArchiveManifest ManifestOf(ManifestFields* json) {
+ArchiveManifest ManifestOf(uint32_t version, ManifestFields* json) {
   ArchiveManifest manifest;
+  if (version > 1) {
+    manifest.content = ArchiveContent::kRows;
+    if (json->Text("content") != kRowsContent) json->Refuse("content", "is not \"rows\"");
+  }
   MapSpec& spec = manifest.spec;
   spec.name = json->Text("map");
   spec.frame = json->Text("frame");
@@ -106,7 +112,7 @@ absl::Status CheckManifest(const std::string& path, const ArchiveManifest& manif
   }
   DSG_RETURN_IF_ERROR(CheckMapName(manifest.spec.name));
   DSG_RETURN_IF_ERROR(manifest.spec.Validate());
-  if (manifest.database_bytes <= 0) return NoArchive(path, "declares a database of no bytes");
+  if (manifest.database_bytes <= 0) return NoArchive(path, "declares a content of no bytes");
   return absl::OkStatus();
 }
 
@@ -146,7 +152,7 @@ std::string EncodeArchiveHead(const ArchiveManifest& manifest) {
   const std::string text = TextOf(manifest);
   DSG_CHECK(text.size() <= kArchiveManifestBytesMax);
   std::string head(kMagic);
-  AppendNumber(kArchiveVersion, &head);
+  AppendNumber(manifest.content == ArchiveContent::kRows ? kArchiveVersion : uint32_t{1}, &head);
   AppendNumber(static_cast<uint32_t>(text.size()), &head);
   AppendNumber(HeadChecksum(head, text), &head);
   return head + text;
@@ -162,7 +168,7 @@ absl::StatusOr<size_t> ManifestBytes(const std::string& path, std::string_view h
                      kArchiveVersion, "; use a newer dsgdb"),
         {{"path", path}, {"format", absl::StrCat(version)}});
   }
-  if (version < kArchiveVersion) return NoArchive(path, absl::StrCat("has version ", version));
+  if (version < 1) return NoArchive(path, absl::StrCat("has version ", version));
   const size_t size = NumberAt<uint32_t>(header, 12);
   if (size > kArchiveManifestBytesMax) {
     return NoArchive(path, absl::StrCat("declares ", size, " bytes of manifest"));
@@ -176,7 +182,7 @@ absl::StatusOr<ArchiveManifest> DecodeArchiveHead(const std::string& path, std::
     return DamagedArchive(path, 0, "the checksum of its header and manifest is another");
   }
   ManifestFields json(manifest);
-  ArchiveManifest decoded = ManifestOf(&json);
+  ArchiveManifest decoded = ManifestOf(NumberAt<uint32_t>(header, 8), &json);
   if (!json.problem().empty()) {
     return NoArchive(path,
                      absl::StrCat("has a manifest that cannot be read (", json.problem(), ")"));

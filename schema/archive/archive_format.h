@@ -4,7 +4,8 @@
 //
 //   header    "DSGZ" 0d 0a 1a 0a, version (u32), size of the manifest (u32), checksum (u64)
 //   manifest  JSON, one object
-//   frames    of 1 MiB of the database each, the last one shorter:
+//   frames    of 1 MiB of the content each, the last one shorter; the content is a database
+//             (version 1), or the rows of the map (version 2, row_file.h):
 //             size as stored (u32), checksum (u64), bytes (zstd; as they are if nothing is saved)
 //   end       "DSGE", number of frames (u32), SHA-256 of all bytes before it
 //
@@ -23,7 +24,8 @@
 
 namespace dsg {
 
-inline constexpr uint32_t kArchiveVersion = 1;
+/// The newest; an archive of a database has version 1, so that older programs read it.
+inline constexpr uint32_t kArchiveVersion = 2;
 inline constexpr size_t kArchiveHeaderBytes = 24;
 inline constexpr size_t kArchiveManifestBytesMax = size_t{1} << 20;
 inline constexpr size_t kArchiveFrameBytes = size_t{1} << 20;
@@ -33,8 +35,12 @@ inline constexpr size_t kArchiveEndBytes = 40;
 /// unfolds to a huge one.
 inline constexpr size_t kArchiveRatioMax = 100;
 
+/// A database of the backend that wrote it, or rows that every backend reads.
+enum class ArchiveContent { kDatabase, kRows };
+
 /// What an archive says of itself before its first frame.
 struct ArchiveManifest {
+  ArchiveContent content = ArchiveContent::kDatabase;
   MapSpec spec;
   int store_format = 0;
   Revision newest_revision = 0;
@@ -42,6 +48,7 @@ struct ArchiveManifest {
   Revision oldest_revision = 0;
   /// See StateDigest.
   Sha256 state{};
+  /// Of the content, whatever it is.
   int64_t database_bytes = 0;
   /// "dsg 0.1.0"
   std::string program;

@@ -3,8 +3,10 @@
 
 #include <utility>
 
+#include "schema/archive/row_file.h"
 #include "schema/archive/scratch_store.h"
 #include "schema/base/status.h"
+#include "schema/files/atomic_file.h"
 
 namespace dsg {
 namespace {
@@ -49,6 +51,31 @@ absl::StatusOr<std::unique_ptr<ArchiveEncoder>> ArchiveMap(MapReader* map,
   DSG_ASSIGN_OR_RETURN(InputFile database, InputFile::Open(path));
   manifest.database_bytes = database.byte_count();
   return std::make_unique<ArchiveEncoder>(std::move(database), std::move(manifest));
+}
+
+absl::StatusOr<std::unique_ptr<ArchiveEncoder>> ArchiveRows(MapReader* map,
+                                                            const std::string& scratch,
+                                                            const StopCheck& stop) {
+  DSG_ASSIGN_OR_RETURN(const auto place, ScratchStore::Make(scratch, "archive"));
+  const std::string path = place->folder() + "/rows";
+  RowsSummary summary;
+  {
+    DSG_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(path));
+    std::string bytes;
+    const auto write = [&](const StreamRow& row) {
+      summary.Take(row);
+      bytes.clear();
+      AppendRow(row, &bytes);
+      return file.Write(bytes);
+    };
+    DSG_RETURN_IF_ERROR(map->ReadRows(write, stop));
+    DSG_RETURN_IF_ERROR(file.Commit());
+  }
+  ArchiveManifest manifest = summary.Describe(map->spec());
+  manifest.program = kProgram;
+  DSG_ASSIGN_OR_RETURN(InputFile rows, InputFile::Open(path));
+  manifest.database_bytes = rows.byte_count();
+  return std::make_unique<ArchiveEncoder>(std::move(rows), std::move(manifest));
 }
 
 }  // namespace dsg

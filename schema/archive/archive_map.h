@@ -22,6 +22,13 @@ absl::StatusOr<std::unique_ptr<ArchiveEncoder>> ArchiveMap(MapReader* map,
                                                            const StopCheck& stop,
                                                            const Progress& progress);
 
+/// The same for an archive of rows, which every backend can read. The rows are in that folder, for
+/// as long as the encoder is.
+/// Errors: as MapReader::ReadRows; RESOURCE_EXHAUSTED/DISK_FULL.
+absl::StatusOr<std::unique_ptr<ArchiveEncoder>> ArchiveRows(MapReader* map,
+                                                            const std::string& scratch,
+                                                            const StopCheck& stop);
+
 /// What the archive of a map says of it.
 absl::StatusOr<ArchiveManifest> DescribeMap(MapReader* map);
 

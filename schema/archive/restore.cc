@@ -5,9 +5,11 @@
 #include <filesystem>
 #include <memory>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "schema/archive/archive_file.h"
 #include "schema/archive/archive_map.h"
+#include "schema/archive/row_file.h"
 #include "schema/archive/scratch_store.h"
 #include "schema/base/status.h"
 #include "schema/codec/checksum.h"
@@ -57,7 +59,10 @@ absl::Status CheckManifestIs(const std::string& path, const ArchiveManifest& sai
       {"gap_ns_max", number(said.spec.gap_ns_max), number(found.spec.gap_ns_max)},
       {"mesh_block_size_m", ExactText(said.spec.mesh_block_size_m),
        ExactText(found.spec.mesh_block_size_m)},
-      {"store_format", number(said.store_format), number(found.store_format)},
+      // Rows have no format but that of their payloads, of which all older ones are read.
+      {"store_format",
+       number(said.content == ArchiveContent::kRows ? found.store_format : said.store_format),
+       number(found.store_format)},
       {"newest_revision", number(said.newest_revision), number(found.newest_revision)},
       {"newest_digest", ToHex(said.newest_digest), ToHex(found.newest_digest)},
       {"oldest_revision", number(said.oldest_revision), number(found.oldest_revision)},
@@ -86,6 +91,51 @@ absl::StatusOr<std::shared_ptr<MapReader>> OpenUnpacked(const std::string& path,
   return *std::move(map);
 }
 
+// Makes the rows of an archive the map `name`. `place` takes what is under way.
+absl::StatusOr<ArchiveManifest> InstallArchivedRows(const std::string& path,
+                                                    const ScratchStore& place, GraphStore* store,
+                                                    const std::string& name, bool replace,
+                                                    const StopCheck& stop,
+                                                    const Progress& progress) {
+  const std::string unpacked = place.folder() + "/rows";
+  DSG_ASSIGN_OR_RETURN(const ArchiveManifest manifest, Unpack(path, unpacked, stop, progress));
+  DSG_ASSIGN_OR_RETURN(InputFile file, InputFile::Open(unpacked));
+  RowFileReader reader(std::move(file), manifest.spec.name);
+  RowsSummary summary;
+  const RowSource rows = [&](StreamRow* row) -> absl::StatusOr<bool> {
+    DSG_ASSIGN_OR_RETURN(const bool has_row, reader.Next(row));
+    if (has_row) {
+      summary.Take(*row);
+    } else {
+      DSG_RETURN_IF_ERROR(CheckManifestIs(path, manifest, summary.Describe(manifest.spec)));
+    }
+    return has_row;
+  };
+  MapSpec spec = manifest.spec;
+  spec.name = name;
+  DSG_RETURN_IF_ERROR(store->InstallRows(spec, rows, place.folder(), replace, stop));
+  return manifest;
+}
+
+std::string TemporaryFolder() {
+  std::error_code error;
+  const std::string folder = std::filesystem::temp_directory_path(error).string();
+  return error ? std::string("/tmp") : folder;
+}
+
+// Unpacks a database, and installs it.
+absl::StatusOr<ArchiveManifest> InstallDatabase(const std::string& path, const ScratchStore& place,
+                                                const ArchiveManifest& head, GraphStore* store,
+                                                const std::string& name, bool replace,
+                                                const StopCheck& stop, const Progress& progress) {
+  DSG_ASSIGN_OR_RETURN(const std::string database, place.MakeDatabasePath(head.spec.name));
+  DSG_ASSIGN_OR_RETURN(const ArchiveManifest manifest, Unpack(path, database, stop, progress));
+  DSG_RETURN_IF_ERROR(OpenUnpacked(path, place.folder(), manifest).status());
+  DSG_RETURN_IF_ERROR(AskStop(stop));
+  DSG_RETURN_IF_ERROR(store->InstallMap(name, database, replace));
+  return manifest;
+}
+
 }  // namespace
 
 absl::Status CheckNameIsFree(GraphStore* store, const std::string& name) {
@@ -112,33 +162,40 @@ absl::StatusOr<ArchiveManifest> RestoreArchive(const std::string& path, GraphSto
   const std::string name = options.name.empty() ? head.spec.name : options.name;
   DSG_RETURN_IF_ERROR(CheckMapName(name));
   if (!options.replace) DSG_RETURN_IF_ERROR(CheckNameIsFree(store, name));
-  DSG_ASSIGN_OR_RETURN(const auto place, ScratchStore::Make(store->folder(), "restore"));
-  DSG_ASSIGN_OR_RETURN(const std::string database, place->MakeDatabasePath(head.spec.name));
-  DSG_ASSIGN_OR_RETURN(const ArchiveManifest manifest, Unpack(path, database, stop, progress));
-  DSG_RETURN_IF_ERROR(OpenUnpacked(path, place->folder(), manifest).status());
-  DSG_RETURN_IF_ERROR(AskStop(stop));
-  const absl::Status installed = store->InstallMap(name, database, options.replace);
+  const std::string folder = store->folder().empty() ? TemporaryFolder() : store->folder();
+  DSG_ASSIGN_OR_RETURN(const auto place, ScratchStore::Make(folder, "restore"));
+  auto manifest =
+      head.content == ArchiveContent::kRows
+          ? InstallArchivedRows(path, *place, store, name, options.replace, stop, progress)
+          : InstallDatabase(path, *place, head, store, name, options.replace, stop, progress);
+  const absl::Status& status = manifest.status();
   // The file that such an error names is gone by the time it is read.
-  const bool is_of_file = absl::IsDataLoss(installed) || absl::IsFailedPrecondition(installed);
-  if (is_of_file) return Annotate(installed, absl::StrCat("archive ", path));
-  DSG_RETURN_IF_ERROR(installed);
-  if (progress) progress(1.0);
+  const bool is_of_file = (absl::IsDataLoss(status) || absl::IsFailedPrecondition(status)) &&
+                          !absl::StrContains(status.message(), path);
+  if (is_of_file) return Annotate(status, absl::StrCat("archive ", path));
+  if (progress && manifest.ok()) progress(1.0);
   return manifest;
 }
 
 absl::StatusOr<VerifyReport> VerifyArchive(const std::string& path, const StopCheck& stop,
                                            const Progress& progress) {
   DSG_ASSIGN_OR_RETURN(const ArchiveManifest head, ReadArchiveManifest(path));
-  std::error_code error;
-  const std::string folder = std::filesystem::temp_directory_path(error).string();
-  DSG_ASSIGN_OR_RETURN(const auto place,
-                       ScratchStore::Make(error ? std::string("/tmp") : folder, "dsg-verify"));
+  DSG_ASSIGN_OR_RETURN(const auto place, ScratchStore::Make(TemporaryFolder(), "dsg-verify"));
+  const auto tell = [&](double fraction) {
+    if (progress) progress(kReadShare + (1.0 - kReadShare) * fraction);
+  };
+  if (head.content == ArchiveContent::kRows) {
+    DSG_ASSIGN_OR_RETURN(const auto store, OpenStore(place->folder(), {.program = "dsg verify"}));
+    DSG_RETURN_IF_ERROR(InstallArchivedRows(path, *place, store.get(), head.spec.name,
+                                            /*replace=*/false, stop, progress)
+                            .status());
+    DSG_ASSIGN_OR_RETURN(const auto map, store->OpenMap(head.spec.name));
+    return map->Verify(stop, tell);
+  }
   DSG_ASSIGN_OR_RETURN(const std::string database, place->MakeDatabasePath(head.spec.name));
   DSG_ASSIGN_OR_RETURN(const ArchiveManifest manifest, Unpack(path, database, stop, progress));
   DSG_ASSIGN_OR_RETURN(const auto map, OpenUnpacked(path, place->folder(), manifest));
-  return map->Verify(stop, [&](double fraction) {
-    if (progress) progress(kReadShare + (1.0 - kReadShare) * fraction);
-  });
+  return map->Verify(stop, tell);
 }
 
 }  // namespace dsg

@@ -20,6 +20,7 @@
 
 #include "absl/status/statusor.h"
 #include "schema/store/map_writer.h"
+#include "schema/store/row_stream.h"
 #include "schema/store/snapshot.h"
 
 namespace dsg {
@@ -112,6 +113,14 @@ class MapReader {
   /// `stop` returned.
   virtual absl::Status CopyTo(const std::string& path, const StopCheck& stop,
                               const Progress& progress) = 0;
+  /// Shows the newest revision with all its history as rows that any backend can install
+  /// (InstallRows), of one state, while others read and write. The rows and their order depend on
+  /// the content of the map alone.
+  ///
+  /// Memory: some rows, and what is kept of the segments of one track.
+  /// Errors: FAILED_PRECONDITION while something is to be erased still (GetPendingErasure);
+  /// DATA_LOSS/STORE_CORRUPT; what `sink` and `stop` returned.
+  virtual absl::Status ReadRows(const RowSink& sink, const StopCheck& stop) = 0;
 
  private:
   static inline std::atomic<uint64_t> opening_count_{0};
@@ -181,6 +190,15 @@ class GraphStore {
   /// still there.
   virtual absl::Status InstallMap(const std::string& name, const std::string& file,
                                   bool replace) = 0;
+  /// Makes the rows that ReadRows showed a map of that spec, in which each revision is proven to
+  /// have its digest. The map appears whole, or not at all. `scratch` is an empty folder on the
+  /// store's file system for what is under way, which the caller removes; a store without files
+  /// ignores it. Readers of a map that is replaced notice (IsCurrent).
+  ///
+  /// Errors: as InstallMap, without UNIMPLEMENTED; what `rows` and `stop` returned.
+  virtual absl::Status InstallRows(const MapSpec& spec, const RowSource& rows,
+                                   const std::string& scratch, bool replace,
+                                   const StopCheck& stop) = 0;
   /// Errors: as OpenMap; UNAVAILABLE/WRITER_LOCKED naming who holds the lock.
   virtual absl::StatusOr<std::unique_ptr<MapWriter>> OpenWriter(const std::string& name) = 0;
 };

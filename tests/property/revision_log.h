@@ -44,6 +44,7 @@ class RevisionLog final : public MapReader {
   absl::Status CopyTo(const std::string&, const StopCheck&, const Progress&) override {
     return NotThere();
   }
+  absl::Status ReadRows(const RowSink&, const StopCheck&) override { return NotThere(); }
 
  private:
   static absl::Status NotThere() { return absl::UnimplementedError("a log of revisions only"); }

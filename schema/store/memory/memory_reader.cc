@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
+#include "schema/store/memory/map_stream.h"
 
 namespace dsg::memory {
 
@@ -140,10 +141,16 @@ absl::StatusOr<VerifyReport> MemoryReader::Verify(const StopCheck& stop,
     RevisionRecord record = commit.record;
     record.sums = sums;
     Seal(commit.parent, &record);
-    if (record.info.digest != commit.record.info.digest) {
+    // The stored record has counts of its own.
+    const Sha256& digest = commit.record.info.digest;
+    if (record.info.digest != digest || DigestOf(commit.parent, commit.record) != digest) {
       report.problems.push_back(
           absl::StrCat("revision ", revision, ": its digest does not follow from its rows"));
     }
+  }
+  if (change != changes.end()) {
+    report.problems.push_back(
+        absl::StrCat("rows name revision ", change->first, ", which does not exist"));
   }
   if (progress) progress(1.0);
   return report;
@@ -154,6 +161,11 @@ absl::Status MemoryReader::CopyTo(const std::string& path, const StopCheck& /*st
   return absl::UnimplementedError(
       absl::StrCat("cannot copy map \"", rows_->spec.name, "\" to ", path,
                    ": it is in memory and has no file; ingest into a store folder instead"));
+}
+
+absl::Status MemoryReader::ReadRows(const RowSink& sink, const StopCheck& stop) {
+  const std::lock_guard lock(rows_->mutex);
+  return StreamRows(*rows_, stop, sink);
 }
 
 }  // namespace dsg::memory

@@ -32,6 +32,7 @@ class MemoryReader : public MapReader {
                                       const std::function<void(double)>& progress) override;
   absl::Status CopyTo(const std::string& path, const StopCheck& stop,
                       const Progress& progress) override;
+  absl::Status ReadRows(const RowSink& sink, const StopCheck& stop) override;
 
  private:
   const std::shared_ptr<const MapRows> rows_;

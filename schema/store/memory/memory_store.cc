@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
+#include "schema/store/memory/map_stream.h"
 #include "schema/store/memory/memory_reader.h"
 #include "schema/store/memory/memory_writer.h"
 
@@ -97,6 +98,30 @@ class MemoryStore : public GraphStore {
     return absl::UnimplementedError(
         absl::StrCat("cannot install ", file, " as map \"", name, "\" of store ", location_,
                      ": it is in memory and takes no files; restore into a store folder instead"));
+  }
+
+  absl::Status InstallRows(const MapSpec& spec, const RowSource& source,
+                           const std::string& /*scratch*/, bool replace,
+                           const StopCheck& stop) override {
+    DSG_ASSIGN_OR_RETURN(const auto rows, CollectRows(spec, source, stop));
+    DSG_ASSIGN_OR_RETURN(const VerifyReport report, MemoryReader(rows).Verify(stop, {}));
+    if (!report.problems.empty()) {
+      return MakeError(Reason::kStoreCorrupt,
+                       absl::StrCat("rows cannot become map \"", spec.name, "\" of store ",
+                                    location_, ", they are damaged: ", report.problems.front()),
+                       {{"map", spec.name}});
+    }
+    const std::lock_guard lock(maps_->mutex);
+    auto& there = maps_->by_name[spec.name];
+    if (there != nullptr) {
+      if (!replace) return MapExistsError(spec.name);
+      DSG_ASSIGN_OR_RETURN(const auto writer, MemoryWriter::Open(there, options_.program));
+      // Who reads the old one is to notice.
+      const std::lock_guard old(there->mutex);
+      ++there->generation;
+    }
+    there = rows;
+    return absl::OkStatus();
   }
 
  private:

@@ -2,6 +2,7 @@
 // Things by their keys, with all that was ever believed of them.
 #pragma once
 
+#include <algorithm>
 #include <map>
 #include <utility>
 #include <vector>
@@ -47,6 +48,19 @@ class Versions {
     last.to = now;
     if (last.from == now) found->second.pop_back();
     if (found->second.empty()) all_.erase(found);
+  }
+
+  /// Any version, current or past. False, and nothing done, if it overlaps with another.
+  bool Insert(const Key& key, Version version) {
+    std::vector<Version>& versions = all_[key];
+    const auto next =
+        std::upper_bound(versions.begin(), versions.end(), version.from,
+                         [](Revision from, const Version& other) { return from < other.from; });
+    const bool is_free = version.from < version.to &&
+                         (next == versions.begin() || (next - 1)->to <= version.from) &&
+                         (next == versions.end() || version.to <= next->from);
+    if (is_free) versions.insert(next, std::move(version));
+    return is_free;
   }
 
   /// Calls `visit(key, version)` for each version, ascending by key and then by revision.

@@ -95,7 +95,9 @@ class TrackEraser {
     std::string scratch;
     for (const StoredPose& pose : poses) {
       while (mark != marks_.end() && mark->last_ns < pose.time_ns) ++mark;
-      if (mark == marks_.end()) {
+      if (mark == marks_.end() || mark->revision >= segment.rev_to) {
+        // Its mark is compacted away: no revision shows the pose, so none counts it.
+        if (segment.rev_to != kRevisionMax) break;
         return CorruptRow(db_.map_name(), "track_mark", ToString(agent_));
       }
       RowSums& of_mark = sums[mark->revision];

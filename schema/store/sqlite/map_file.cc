@@ -21,6 +21,7 @@
 #include "schema/base/time.h"
 #include "schema/model/edge.h"
 #include "schema/store/graph_store.h"
+#include "schema/store/sqlite/stream_in.h"
 
 namespace dsg::sqlite {
 
@@ -192,6 +193,16 @@ absl::Status CreateMapFile(const std::string& store_folder, const MapSpec& spec)
   }
   DSG_RETURN_IF_ERROR(SyncFolder(folder));
   return SyncFolder(store_folder);
+}
+
+absl::Status MakeMapOfRows(const std::string& file, const MapSpec& spec, const RowSource& rows,
+                           const StopCheck& stop) {
+  DSG_RETURN_IF_ERROR(spec.Validate());
+  DSG_ASSIGN_OR_RETURN(const auto db, Database::Open(file, Database::Mode::kCreate, spec.name));
+  DSG_RETURN_IF_ERROR(FillNewDatabase(*db, spec));
+  DSG_RETURN_IF_ERROR(CollectRows(*db, spec, rows, stop));
+  if (db->Checkpoint(/*truncate=*/true)) return absl::OkStatus();
+  return db->Error("completing the map of rows");
 }
 
 absl::StatusOr<std::unique_ptr<Database>> OpenMapFile(const std::string& store_folder,

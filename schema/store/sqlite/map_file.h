@@ -10,7 +10,9 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "schema/base/stop_check.h"
 #include "schema/model/layer.h"
+#include "schema/store/row_stream.h"
 #include "schema/store/sqlite/database.h"
 
 namespace dsg::sqlite {
@@ -26,6 +28,10 @@ absl::Status CheckFileSystem(const std::string& folder);
 
 /// Makes the folder and database of a new map; nobody sees it half made.
 absl::Status CreateMapFile(const std::string& store_folder, const MapSpec& spec);
+
+/// Makes the file of a map of rows, which nobody has proven.
+absl::Status MakeMapOfRows(const std::string& file, const MapSpec& spec, const RowSource& rows,
+                           const StopCheck& stop);
 
 /// Opens a map's database after checking that it is one, of a format that this build reads.
 /// Errors: NOT_FOUND/MAP_UNKNOWN; FAILED_PRECONDITION/NOT_A_STORE or FORMAT_TOO_NEW.

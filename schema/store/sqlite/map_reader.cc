@@ -9,6 +9,7 @@
 #include "schema/store/sqlite/erasure.h"
 #include "schema/store/sqlite/revision_rows.h"
 #include "schema/store/sqlite/rows.h"
+#include "schema/store/sqlite/stream_out.h"
 #include "schema/store/sqlite/verify.h"
 
 namespace dsg::sqlite {
@@ -234,6 +235,11 @@ absl::Status SqliteMapReader::CopyTo(const std::string& path, const StopCheck& s
   DSG_ASSIGN_OR_RETURN(const auto db,
                        OpenMapFile(store_folder_, spec_.name, Database::Mode::kRead));
   return CopyMap(*db, path, stop, progress);
+}
+
+absl::Status SqliteMapReader::ReadRows(const RowSink& sink, const StopCheck& stop) {
+  DSG_ASSIGN_OR_RETURN(Lease lease, LeaseConnection());
+  return StreamRows(*lease, spec_, sink, stop);
 }
 
 absl::StatusOr<TrackPtr> SqliteMapReader::GetTrack(NodeId agent, Revision revision) {

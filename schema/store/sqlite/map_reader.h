@@ -40,6 +40,7 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
                                       const std::function<void(double)>& progress) override;
   absl::Status CopyTo(const std::string& path, const StopCheck& stop,
                       const Progress& progress) override;
+  absl::Status ReadRows(const RowSink& sink, const StopCheck& stop) override;
 
   /// A connection for the length of one call; goes back to the pool when dropped.
   class Lease {

@@ -92,19 +92,27 @@ absl::StatusOr<std::vector<RevisionInfo>> ReadRevisions(Database& db, Revision b
 }
 
 absl::Status InsertRevision(const CommitContext& commit) {
-  const RevisionInfo& info = commit.head.info;
-  DSG_RETURN_IF_ERROR(WriteSession(commit.db, info, commit.delta_checksum));
-  const std::string content = commit.head.sums.content.bytes();
-  return Query(commit.db,
+  DSG_RETURN_IF_ERROR(WriteSession(commit.db, commit.head.info, commit.delta_checksum));
+  return InsertRecord(commit.db, commit.head, commit.delta_checksum, std::nullopt);
+}
+
+absl::Status InsertRecord(Database& db, const RevisionRecord& record,
+                          std::optional<int64_t> delta_checksum,
+                          const std::optional<Sha256>& parent) {
+  const RevisionInfo& info = record.info;
+  const std::string content = record.sums.content.bytes();
+  const std::string layer_counts = FormatLayerCounts(record.sums.layer_counts);
+  std::optional<Query::BlobView> parent_digest;
+  if (parent.has_value()) parent_digest = Query::BlobView{BytesOf(*parent)};
+  return Query(db,
                "INSERT INTO revision (" DSG_REVISION_COLUMNS
-               ", delta_checksum) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13,"
-               " ?14, ?15, ?16, ?17, ?18, ?19)")
+               ", delta_checksum, parent_digest) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10,"
+               " ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20)")
       .Bind(info.revision, Query::BlobView{BytesOf(info.digest)}, Query::BlobView{content},
             info.committed_ns, info.author, info.message, info.session_id, info.sequence,
             info.config_digest, info.node_count, info.edge_count, info.agent_count, info.pose_count,
-            info.stay_count, info.mesh_block_count, commit.head.first_pose_ns,
-            commit.head.last_pose_ns, FormatLayerCounts(commit.head.sums.layer_counts),
-            commit.delta_checksum)
+            info.stay_count, info.mesh_block_count, record.first_pose_ns, record.last_pose_ns,
+            layer_counts, delta_checksum, parent_digest)
       .Run();
 }
 

@@ -34,6 +34,10 @@ absl::StatusOr<RevisionRecord> LoadRevision(Database& db, Revision revision);
 absl::StatusOr<std::vector<RevisionInfo>> ReadRevisions(Database& db, Revision before, int limit);
 /// The record and its session.
 absl::Status InsertRevision(const CommitContext& commit);
+/// The record alone. `parent` is set where the revision before has no record.
+absl::Status InsertRecord(Database& db, const RevisionRecord& record,
+                          std::optional<int64_t> delta_checksum,
+                          const std::optional<Sha256>& parent);
 /// Writes digest, content, counts and times of a record that is there.
 absl::Status UpdateRevision(Database& db, const RevisionRecord& head);
 

@@ -79,6 +79,13 @@ class SqliteStore : public GraphStore {
     return InstallMapFile(folder_, name, file, replace, options_.program);
   }
 
+  absl::Status InstallRows(const MapSpec& spec, const RowSource& rows, const std::string& scratch,
+                           bool replace, const StopCheck& stop) override {
+    const std::string file = scratch + "/graph.db";
+    DSG_RETURN_IF_ERROR(MakeMapOfRows(file, spec, rows, stop));
+    return InstallMapFile(folder_, spec.name, file, replace, options_.program);
+  }
+
   absl::StatusOr<std::unique_ptr<MapWriter>> OpenWriter(const std::string& name) override {
     DSG_ASSIGN_OR_RETURN(auto writer, SqliteWriter::Open(folder_, name, options_));
     return std::unique_ptr<MapWriter>(std::move(writer));

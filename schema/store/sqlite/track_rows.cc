@@ -129,6 +129,13 @@ absl::StatusOr<std::optional<TrackMark>> FindLastMark(Database& db, NodeId agent
   return found ? std::optional(MarkFromRow(query)) : std::nullopt;
 }
 
+absl::StatusOr<TimeNs> FurthestMark(Database& db, int64_t slot, Revision revision) {
+  Query query(db, "SELECT max(last_ns) FROM track_mark WHERE slot = ?1 AND revision >= ?2");
+  const bool found = query.Bind(slot, revision).Next() && !query.IsNull(0);
+  DSG_RETURN_IF_ERROR(query.status());
+  return found ? query.Int(0) : kTimeMin;
+}
+
 absl::StatusOr<std::vector<TrackMark>> ReadMarks(Database& db, int64_t slot) {
   std::vector<TrackMark> marks;
   Query query(db,

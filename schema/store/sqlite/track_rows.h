@@ -34,6 +34,8 @@ TrackMark MarkFromRow(const Query& query);
 absl::StatusOr<std::optional<TrackMark>> FindMark(Database& db, int64_t slot, Revision revision);
 /// The newest mark of an agent; nullopt if it has no track.
 absl::StatusOr<std::optional<TrackMark>> FindLastMark(Database& db, NodeId agent);
+/// The latest end of a track in any of the revisions since `revision`; kTimeMin if none is marked.
+absl::StatusOr<TimeNs> FurthestMark(Database& db, int64_t slot, Revision revision);
 /// Order: by revision.
 absl::StatusOr<std::vector<TrackMark>> ReadMarks(Database& db, int64_t slot);
 /// Replaces the mark of that revision, if there is one.

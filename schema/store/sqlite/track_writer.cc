@@ -80,9 +80,14 @@ absl::Status TrackWriter::LoadOpenSegment(Tail* tail, CommitContext* commit) {
                                                        LastSegmentId(tail->slot)));
   if (!row.has_value()) return absl::OkStatus();
   tail->segment_id = row->id;
+  tail->last = row->poses.back();
+  DSG_ASSIGN_OR_RETURN(const TimeNs reached_ns,
+                       FurthestMark(commit->db, tail->slot, row->rev_from));
+  // The track has lost its end since: in the revisions of then a pose that is appended in place
+  // would be one of theirs. The encoder stays empty, and the next pose begins a segment.
+  if (reached_ns > tail->last->time_ns) return absl::OkStatus();
   tail->segment_stored = true;
   tail->segment_rev_from = row->rev_from;
-  tail->last = row->poses.back();
   for (const StoredPose& pose : row->poses) {
     // What fitted once fits again: the encoder is deterministic.
     if (!tail->encoder.Add(pose)) {

@@ -398,7 +398,9 @@ class Verifier {
     std::string scratch;
     for (const StoredPose& pose : poses) {
       while (mark < marks.size() && marks[mark].last_ns < pose.time_ns) ++mark;
-      if (mark == marks.size()) {
+      if (mark == marks.size() || marks[mark].revision >= rev_to) {
+        // Its mark is compacted away: what is left of an ended segment shows the pose nowhere.
+        if (rev_to != kRevisionMax) return;
         Problem(absl::StrCat("track of ", ToString(agent), ": no mark reaches the pose at ",
                              pose.time_ns, " ns"));
         return;

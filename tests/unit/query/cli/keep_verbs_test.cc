@@ -331,6 +331,26 @@ TEST_F(KeepVerbs, AnArchiveGoesOutAndComesBackWithTheSameBytes) {
   EXPECT_FALSE(fs::exists(other + "/elsewhere"));
 }
 
+TEST_F(KeepVerbs, AnArchiveOfRowsIsAnArchiveToo) {
+  const std::string file = folder_.path() + "/rows.dsgz";
+  const std::string again = folder_.path() + "/again.dsgz";
+  const std::string other = folder_.path() + "/other";
+  const Json told = Json::parse(Ask({"export", file, "--rows", "--map", "office", "--json"}).out);
+  EXPECT_TRUE(told["files"][0].contains("row_bytes")) << told;
+  EXPECT_EQ(RunDsg({"verify", file}).code, 0);
+  const Outcome restored = RunDsg({"restore", file, "--store", other});
+  EXPECT_EQ(restored.out, "office: restored at revision 4, readable from 0 on\n");
+  EXPECT_EQ(RunDsg({"export", again, "--rows", "--store", other}).code, 0);
+  EXPECT_TRUE(ReadFile(file) == ReadFile(again));
+  EXPECT_EQ(RunDsg({"import", file, "--store", other, "--map", "copy"}).code, 0);
+  ExpectRefused(2, "--rows is of an archive",
+                {"export", "--gltf", "x.glb", "--rows", "--map", "office"});
+  const Outcome remote =
+      RunDsg({"export", again, "--rows", "--map", "office"}, {.server = "unix:/nowhere"});
+  EXPECT_EQ(remote.code, 2);
+  EXPECT_NE(remote.errors.find("reads a store folder"), std::string::npos) << remote.errors;
+}
+
 TEST_F(KeepVerbs, FilesThatAreNoArchivesAreRefused) {
   const std::string file = folder_.path() + "/office.dsgz";
   ExpectRefused(2, "does not end in .dsgz", {"export", "office.zip", "--map", "office"});

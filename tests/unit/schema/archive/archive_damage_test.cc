@@ -78,8 +78,8 @@ TEST_F(DamagedArchiveTest, OfANewerVersionSaysWhichAndWhatIsKnown) {
   bytes[8] = static_cast<char>(kArchiveVersion + 1);
   const absl::Status newer = Read(bytes);
   EXPECT_EQ(ReasonOf(newer), Reason::kFormatTooNew);
-  EXPECT_TRUE(absl::StrContains(newer.message(), "version 2")) << newer;
-  EXPECT_TRUE(absl::StrContains(newer.message(), "reads up to 1")) << newer;
+  EXPECT_TRUE(absl::StrContains(newer.message(), "version 3")) << newer;
+  EXPECT_TRUE(absl::StrContains(newer.message(), "reads up to 2")) << newer;
   bytes[8] = 0;
   EXPECT_EQ(ReasonOf(Read(bytes)), Reason::kFileMalformed);
 }

@@ -22,8 +22,9 @@ std::unique_ptr<TestMap> MakeArchivedMap(int64_t revision_count, uint64_t seed) 
   return map;
 }
 
-absl::StatusOr<std::string> ArchiveBytes(MapReader* map, const std::string& scratch) {
-  DSG_ASSIGN_OR_RETURN(const auto encoder, ArchiveMap(map, scratch, nullptr, nullptr));
+namespace {
+
+absl::StatusOr<std::string> BytesOf(ArchiveEncoder* encoder) {
   std::string all;
   while (!encoder->done()) {
     DSG_ASSIGN_OR_RETURN(const std::string piece, encoder->Next(nullptr));
@@ -31,6 +32,18 @@ absl::StatusOr<std::string> ArchiveBytes(MapReader* map, const std::string& scra
     all += piece;
   }
   return all;
+}
+
+}  // namespace
+
+absl::StatusOr<std::string> ArchiveBytes(MapReader* map, const std::string& scratch) {
+  DSG_ASSIGN_OR_RETURN(const auto encoder, ArchiveMap(map, scratch, nullptr, nullptr));
+  return BytesOf(encoder.get());
+}
+
+absl::StatusOr<std::string> RowArchiveBytes(MapReader* map, const std::string& scratch) {
+  DSG_ASSIGN_OR_RETURN(const auto encoder, ArchiveRows(map, scratch, nullptr));
+  return BytesOf(encoder.get());
 }
 
 absl::StatusOr<std::string> ArchiveBytes(GraphStore* store, const std::string& map) {

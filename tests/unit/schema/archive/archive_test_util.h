@@ -13,6 +13,9 @@ namespace dsg::test {
 /// `revision_count` deltas of the stream that uses every part of the model, two of them tagged.
 std::unique_ptr<TestMap> MakeArchivedMap(int64_t revision_count, uint64_t seed = 1);
 
+/// The archive of rows. Errors: of ArchiveRows and ArchiveEncoder.
+absl::StatusOr<std::string> RowArchiveBytes(MapReader* map, const std::string& scratch);
+
 /// Errors: of ArchiveMap and ArchiveEncoder.
 absl::StatusOr<std::string> ArchiveBytes(MapReader* map, const std::string& scratch);
 absl::StatusOr<std::string> ArchiveBytes(GraphStore* store, const std::string& map);

@@ -1,6 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/unit/schema/store/store_test_util.h"
 
+#include <filesystem>
+
+#include "absl/strings/escaping.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+
 namespace dsg::test {
 
 int64_t EnvNumber(const char* name, int64_t fallback) {
@@ -66,6 +72,74 @@ std::string TestMap::Problems() {
   std::string text;
   for (const std::string& problem : OrDie(reader_->Verify({}, {})).problems) text += problem + "\n";
   return text;
+}
+
+absl::StatusOr<std::vector<StreamRow>> ReadAllRows(MapReader* map) {
+  std::vector<StreamRow> rows;
+  DSG_RETURN_IF_ERROR(map->ReadRows(
+      [&](const StreamRow& row) {
+        rows.push_back(row);
+        return absl::OkStatus();
+      },
+      {}));
+  return rows;
+}
+
+RowSource SourceOf(const std::vector<StreamRow>& rows) {
+  return [&rows, next = size_t{0}](StreamRow* row) mutable -> absl::StatusOr<bool> {
+    if (next == rows.size()) return false;
+    *row = rows[next++];
+    return true;
+  };
+}
+
+std::string TextOf(const StreamRow& row) {
+  std::string text = absl::StrCat(std::string(1, row.kind), " ", absl::StrJoin(row.numbers, " "));
+  for (const std::string& part : row.texts) {
+    absl::StrAppend(&text, " ", absl::BytesToHexString(part));
+  }
+  return text;
+}
+
+std::string TimelessText(std::vector<StreamRow> rows) {
+  std::string text;
+  for (StreamRow& row : rows) {
+    if (row.kind == row_kinds::kRevision || row.kind == row_kinds::kTag) row.numbers[1] = 0;
+    absl::StrAppend(&text, TextOf(row), "\n");
+  }
+  return text;
+}
+
+MapOfRows::MapOfRows(const std::string& backend, const MapSpec& spec,
+                     const std::vector<StreamRow>& rows) {
+  store_ = OrDie(OpenStore(UriOf(backend, folder_.path()), {.create = true}));
+  const std::string scratch = folder_.path() + "/.scratch";
+  std::filesystem::create_directories(scratch);
+  OrDie(store_->InstallRows(spec, SourceOf(rows), scratch, /*replace=*/false, {}));
+  writer_ = OrDie(store_->OpenWriter(spec.name));
+  reader_ = OrDie(store_->OpenMap(spec.name));
+}
+
+void ExpectEqualMaps(MapReader* map, MapReader* copy, bool answers) {
+  EXPECT_EQ(OrDie(copy->Verify({}, {})).problems, std::vector<std::string>());
+  const auto rows = OrDie(ReadAllRows(map));
+  const auto again = OrDie(ReadAllRows(copy));
+  for (size_t i = 0; i < std::min(rows.size(), again.size()); ++i) {
+    ASSERT_EQ(TextOf(rows[i]), TextOf(again[i]));
+  }
+  ASSERT_EQ(rows.size(), again.size());
+  EXPECT_EQ(OrDie(map->OldestRevision()), OrDie(copy->OldestRevision()));
+  const Revision newest = OrDie(map->Head()).revision;
+  for (Revision revision = 0; revision <= newest; ++revision) {
+    const auto at = map->At(revision);
+    const auto other = copy->At(revision);
+    ASSERT_EQ(at.status(), other.status()) << revision;
+    if (!at.ok()) continue;
+    EXPECT_EQ(OrDie((*at)->Stats()).at.digest, OrDie((*other)->Stats()).at.digest) << revision;
+    if (!answers || revision % 6 != newest % 6) continue;
+    const bool is_equal = OrDie(Dump(**at)) == OrDie(Dump(**other));
+    ASSERT_TRUE(is_equal) << "other answers at revision " << revision;
+  }
 }
 
 Box3d BoxOf(double x0, double y0, double z0, double x1, double y1, double z1) {

@@ -98,6 +98,34 @@ class TestMap {
   std::shared_ptr<MapReader> reader_;
 };
 
+/// Everything that ReadRows shows, kept in memory.
+absl::StatusOr<std::vector<StreamRow>> ReadAllRows(MapReader* map);
+/// Gives rows that were kept.
+RowSource SourceOf(const std::vector<StreamRow>& rows);
+/// For messages.
+std::string TextOf(const StreamRow& row);
+
+/// All of them, but for when something was committed or tagged, which differs from store to store.
+std::string TimelessText(std::vector<StreamRow> rows);
+
+/// A map of those rows in a store of its own, open for writing and reading.
+class MapOfRows {
+ public:
+  MapOfRows(const std::string& backend, const MapSpec& spec, const std::vector<StreamRow>& rows);
+  MapReader& reader() { return *reader_; }
+  MapWriter& writer() { return *writer_; }
+
+ private:
+  TempFolder folder_;
+  std::unique_ptr<GraphStore> store_;
+  std::unique_ptr<MapWriter> writer_;
+  std::shared_ptr<MapReader> reader_;
+};
+
+/// Whether a map that is a copy by rows is sound, shows the same rows and has the same digests;
+/// with `answers` some of its revisions are asked everything, too.
+void ExpectEqualMaps(MapReader* map, MapReader* copy, bool answers = true);
+
 Box3d BoxOf(double x0, double y0, double z0, double x1, double y1, double z1);
 TimedPose PoseAt(TimeNs time_ns, double x, double y, double z);
 /// With the box's centre as its position; an empty box is no extent.

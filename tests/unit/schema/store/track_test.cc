@@ -427,6 +427,41 @@ TEST_P(Correction, MayEmptyAnIntervalTheTailOrTheTrack) {
   EXPECT_EQ(Times(*tracks.map().At(2), kAnn).size(), 10u);
 }
 
+// A gap keeps the correction away from the first poses, which a backend may go on appending to.
+TEST_P(Correction, ThatTookTheEndKeepsWhatIsAppendedThenOutOfThePast) {
+  Tracks tracks(GetParam());
+  tracks.Append(kAnn, {PoseAt(0, 0, 0, 0), PoseAt(kSecond, 1, 0, 0)});
+  const Revision whole = tracks.Append(kAnn, {PoseAt(10 * kSecond, 10, 0, 0)});
+  const Revision cut = OrDie(tracks.Correct(kAnn, 9 * kSecond, kTimeMax, {})).revision;
+  const Revision longer = tracks.Append(kAnn, {PoseAt(2 * kSecond, 2, 0, 0)});
+  EXPECT_EQ(Times(*tracks.map().At(whole), kAnn), (std::vector<TimeNs>{0, kSecond, 10 * kSecond}));
+  EXPECT_EQ(Times(*tracks.map().At(cut), kAnn), (std::vector<TimeNs>{0, kSecond}));
+  EXPECT_EQ(Times(*tracks.map().At(longer), kAnn), (std::vector<TimeNs>{0, kSecond, 2 * kSecond}));
+  EXPECT_EQ(tracks.map().Problems(), "");
+}
+
+// Of the ended segment only the tag shows some poses; a pose that was appended after the tag is
+// still in it, and no mark reaches it any more.
+TEST_P(Correction, ThatTookTheEndIsSoundWhenCompactedBesideATag) {
+  Tracks tracks(GetParam());
+  const Revision tagged = tracks.Append(kAnn, {PoseAt(0, 0, 0, 0), PoseAt(kSecond, 1, 0, 0)});
+  tracks.Append(kAnn, {PoseAt(2 * kSecond, 2, 0, 0)});
+  OrDie(tracks.Correct(kAnn, kSecond, kTimeMax, {}));
+  tracks.Append(kBob, {PoseAt(0, 0, 0, 0)});
+  const Revision newest = tracks.Append(kBob, {PoseAt(kSecond, 0, 0, 0)});
+  OrDie(tracks.map().writer().SetTag("whole", tagged, ""));
+  OrDie(tracks.map().writer().Compact(newest, {}, {}));
+  EXPECT_EQ(tracks.map().Problems(), "");
+  const TrackSpan span{kAnn, kSecond, kTimeMax};
+  const absl::Status erased = tracks.map().writer().Erase({.tracks = {span}}, {}, {}).status();
+  EXPECT_TRUE(erased.ok()) << erased;
+  tracks.map().Close();
+  tracks.map().Reopen();
+  EXPECT_EQ(tracks.map().Problems(), "");
+  EXPECT_EQ(Times(*tracks.map().At(tagged), kAnn), (std::vector<TimeNs>{0}));
+  EXPECT_EQ(Times(*tracks.map().At(newest), kAnn), (std::vector<TimeNs>{0}));
+}
+
 TEST_P(Correction, BesideAnAppendOfTheSameDeltaAppliesFirst) {
   Tracks tracks(GetParam());
   tracks.Append(kAnn, {PoseAt(0, 0, 0, 0), PoseAt(10, 1, 0, 0)});
