@@ -7,6 +7,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <thread>
@@ -164,6 +165,7 @@ int Serve(Flags flags) {
   store_options.create = true;
   store_options.program = "dsg-server";
   store_options.cache_bytes = flags.map_cache_mb << 20;
+  const bool is_new = !std::filesystem::exists(flags.store);
   auto store = dsg::OpenStore(flags.store, store_options);
   if (!store.ok()) return FailToStart(store.status());
   const auto maps = (*store)->ListMaps();
@@ -182,8 +184,8 @@ int Serve(Flags flags) {
   if (!server.ok()) return FailToStart(server.status());
   std::optional<PruneThread> pruning;
   if (policies->has_value()) pruning.emplace(kept_core, **std::move(policies));
-  std::printf("dsg-server: listening on %s, store %s, %zu maps\n", (*server)->address().c_str(),
-              flags.store.c_str(), maps->size());
+  std::printf("dsg-server: listening on %s, store %s%s, %zu maps\n", (*server)->address().c_str(),
+              flags.store.c_str(), is_new ? " (new: it did not exist)" : "", maps->size());
   std::fflush(stdout);
 
   int received = 0;

@@ -100,6 +100,8 @@ Polygon2d OutlineOf(const v1::Node& node) {
 }
 
 void MarkNode(const v1::Node& node, uint32_t rgb, const std::string& label, Overlay* overlay) {
+  // In a gap of its track nobody knows where an agent was.
+  if (!node.has_map_t_node()) return;
   OverlayMark mark{.position_map = PointOf(node.map_t_node().position()),
                    .rgb = rgb,
                    .radius_px = 10.0,

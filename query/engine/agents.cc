@@ -48,6 +48,16 @@ absl::StatusOr<NodeId> AgentNames::Resolve(const Snapshot& snapshot,
   return id;
 }
 
+absl::StatusOr<std::optional<LocatedPose>> LocateAt(const Snapshot& snapshot, NodeId agent,
+                                                    TimeNs at_ns) {
+  DSG_ASSIGN_OR_RETURN(const TrackInfo track, snapshot.GetTrack(agent));
+  if (track.pose_count == 0 || at_ns < track.first_ns || at_ns > track.last_ns) {
+    return std::optional<LocatedPose>();
+  }
+  DSG_ASSIGN_OR_RETURN(LocatedPose located, snapshot.Locate(agent, at_ns));
+  return std::optional(std::move(located));
+}
+
 absl::StatusOr<std::vector<AgentAt>> AgentsAt(const Snapshot& snapshot, NodeFilter filter,
                                               const StopCheck& stop) {
   std::vector<AgentAt> agents;
@@ -64,11 +74,10 @@ absl::StatusOr<std::vector<AgentAt>> AgentsAt(const Snapshot& snapshot, NodeFilt
   }));
   for (Node& node : known) {
     DSG_RETURN_IF_ERROR(AskStop(stop));
-    DSG_ASSIGN_OR_RETURN(const TrackInfo track, snapshot.GetTrack(node.id));
-    if (track.pose_count == 0 || at_ns < track.first_ns || at_ns > track.last_ns) continue;
-    DSG_ASSIGN_OR_RETURN(const LocatedPose located, snapshot.Locate(node.id, at_ns));
-    const bool is_in_gap = located.quality == PoseQuality::kInGap;
-    if (!is_in_gap) node.map_T_node = located.map_T_agent;
+    DSG_ASSIGN_OR_RETURN(const auto located, LocateAt(snapshot, node.id, at_ns));
+    if (!located.has_value()) continue;
+    const bool is_in_gap = located->quality == PoseQuality::kInGap;
+    if (!is_in_gap) node.map_T_node = located->map_T_agent;
     if (box_map.has_value() && (is_in_gap || !box_map->intersects(node.BoxMap()))) continue;
     agents.push_back({std::move(node), is_in_gap});
   }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -43,6 +44,12 @@ class AgentNames {
   // Entries.
   Cache<Key, NodeId, KeyHash> entries_{65'536};
 };
+
+/// Where an agent was; nullopt before its first pose and after its last. In a gap of its track
+/// (PoseQuality::kInGap) it was there, and nobody knows where.
+/// Errors: of the store.
+absl::StatusOr<std::optional<LocatedPose>> LocateAt(const Snapshot& snapshot, NodeId agent,
+                                                    TimeNs at_ns);
 
 /// An agent at one instant; its node alone knows only where it was last.
 struct AgentAt {

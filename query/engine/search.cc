@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
+#include "query/engine/agents.h"
 #include "query/engine/engine.h"
 #include "query/engine/nodes.h"
 #include "query/engine/request.h"
@@ -83,22 +84,11 @@ absl::StatusOr<SearchQuestion> ReadSearchQuestion(const Page& page,
   return question;
 }
 
-// Agents stand where their track puts them, and nowhere outside of it or in its gaps.
-absl::StatusOr<std::optional<Pose3d>> LocateAt(const Snapshot& snapshot, NodeId agent,
-                                               TimeNs at_ns) {
-  DSG_ASSIGN_OR_RETURN(const TrackInfo track, snapshot.GetTrack(agent));
-  if (track.pose_count == 0 || at_ns < track.first_ns || at_ns > track.last_ns) {
-    return std::optional<Pose3d>();
-  }
-  DSG_ASSIGN_OR_RETURN(const LocatedPose located, snapshot.Locate(agent, at_ns));
-  if (located.quality == PoseQuality::kInGap) return std::optional<Pose3d>();
-  return std::optional<Pose3d>(located.map_T_agent);
-}
-
 absl::Status FillHit(const Hit& hit, const GraphView& graph, bool has_near, NodeFiller* filler,
                      v1::SearchHit* out) {
   DSG_RETURN_IF_ERROR(
       filler->Fill(*graph.FindNode(hit.key.id), hit.map_T_agent, out->mutable_node()));
+  if (hit.is_in_gap) out->mutable_node()->clear_map_t_node();
   if (has_near) out->set_distance_m(hit.key.distance_m);
   for (const NodeId ancestor : graph.Ancestors(hit.key.id)) {
     out->add_ancestor_ids(ToString(ancestor));

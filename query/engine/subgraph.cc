@@ -11,6 +11,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
+#include "query/engine/agents.h"
 #include "query/engine/engine.h"
 #include "query/engine/nodes.h"
 #include "query/engine/request.h"
@@ -89,9 +90,17 @@ class SubgraphCursor final : public EngineCursor<v1::GetSubgraphResponse> {
   }
 
   absl::Status SendNode(v1::GetSubgraphResponse* reply, size_t* bytes) {
+    const ViewNode& node = *graph_->FindNode(level_[next_in_level_++]);
     v1::Node* out = reply->add_nodes();
-    DSG_RETURN_IF_ERROR(filler_->Fill(*graph_->FindNode(level_[next_in_level_]), out));
-    ++next_in_level_;
+    if (MovesWithTime(node)) {
+      DSG_ASSIGN_OR_RETURN(const auto located, LocateAgent(node.id));
+      const bool is_known = located.has_value() && located->quality != PoseQuality::kInGap;
+      DSG_RETURN_IF_ERROR(
+          filler_->Fill(node, is_known ? std::optional(located->map_T_agent) : std::nullopt, out));
+      if (!is_known) out->clear_map_t_node();
+    } else {
+      DSG_RETURN_IF_ERROR(filler_->Fill(node, out));
+    }
     *bytes += out->ByteSizeLong();
     return absl::OkStatus();
   }
@@ -137,10 +146,11 @@ class SubgraphCursor final : public EngineCursor<v1::GetSubgraphResponse> {
         return true;
       }
       const ViewNode* node = graph_->FindNode(other);
-      if (node != nullptr && filter_->Matches(*node)) {
-        steps.push_back({other, is_incoming, edge.relation});
-      }
-      return true;
+      if (node == nullptr) return true;
+      const absl::StatusOr<bool> matches = Matches(*node);
+      status = matches.status();
+      if (status.ok() && *matches) steps.push_back({other, is_incoming, edge.relation});
+      return status.ok();
     };
     graph_->ForEachEdgeFrom(from, [&](const ViewEdge& edge) { return visit(edge, false); });
     if (question_.both_directions && status.ok()) {
@@ -156,6 +166,27 @@ class SubgraphCursor final : public EngineCursor<v1::GetSubgraphResponse> {
     const auto same_node = [](const Step& a, const Step& b) { return a.node == b.node; };
     steps.erase(std::unique(steps.begin(), steps.end(), same_node), steps.end());
     return steps;
+  }
+
+  // Agents of an instant stand where their tracks put them.
+  bool MovesWithTime(const ViewNode& node) const {
+    return question_.filter.at_ns.has_value() && IsAgentKind(graph_->symbols().Text(node.kind));
+  }
+
+  absl::StatusOr<std::optional<LocatedPose>> LocateAgent(NodeId agent) const {
+    return LocateAt(view_.snapshot(), agent, *question_.filter.at_ns);
+  }
+
+  absl::StatusOr<bool> Matches(const ViewNode& node) const {
+    if (!MovesWithTime(node)) return filter_->Matches(node);
+    DSG_ASSIGN_OR_RETURN(const auto located, LocateAgent(node.id));
+    if (!located.has_value()) return false;
+    if (located->quality == PoseQuality::kInGap) {
+      return !question_.filter.box_map.has_value() && filter_->Matches(node);
+    }
+    ViewNode placed = node;
+    placed.map_T_node = located->map_T_agent;
+    return filter_->Matches(placed);
   }
 
   bool HoldsNow(const Interval& valid) const {

@@ -6,6 +6,8 @@ set -euo pipefail
 
 readonly SEED=12 PEOPLE=12 SECONDS_SIMULATED=300 PICKS=2
 : "${DSG_BIN:?names the folder of the programs; ./dev demo sets it}"
+# What the caller's shell names is another store.
+unset DSG_STORE DSG_SERVER DSG_MAP
 PATH=$(cd "$DSG_BIN" && pwd):$PATH
 server_pid=
 
@@ -54,6 +56,11 @@ stop_server() {
 kept=${1:-}
 folder=${kept:-$(mktemp -d "${TMPDIR:-/tmp}/dsg-demo.XXXXXX")}
 mkdir -p "$folder"
+if [[ -n $(ls -A "$folder") ]]; then
+  printf 'demo: the folder %s holds something already; name a new one\n' "$folder" >&2
+  kept=$folder
+  exit 2
+fi
 trap clean_up EXIT
 cd "$folder"
 

@@ -93,7 +93,16 @@ absl::StatusOr<HeightRange> ChooseFloor(const MapContent& content, const std::st
     if (ToString(node.id) == floor || node.name == floor) return HeightsOf(node);
   }
   double z_m = 0.0;
-  if (absl::SimpleAtod(floor, &z_m) && std::isfinite(z_m)) return HeightsAround(content, z_m);
+  if (absl::SimpleAtod(floor, &z_m) && std::isfinite(z_m)) {
+    const HeightRange heights = HeightsAround(content, z_m);
+    const auto is_there = [&](const Node& node) { return heights.Contains(MiddleHeight(node)); };
+    if (content.nodes.empty() || std::ranges::any_of(content.nodes, is_there)) return heights;
+    return MakeError(
+        Reason::kFieldInvalid,
+        absl::StrCat("--floor ", floor, ": the map has nothing between ", heights.low_m, " and ",
+                     heights.high_m, " m; give a height of one of its floors, or a level or room"),
+        {{"field", "--floor"}, {"value", floor}});
+  }
   return MakeError(Reason::kNodeUnknown,
                    absl::StrCat("--floor \"", floor,
                                 "\": no node has this id or name; give a level or room (dsg ls "

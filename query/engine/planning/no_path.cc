@@ -127,7 +127,8 @@ std::string Explain(const NoPath& reason, double radius_m, const std::string& fr
   }
   return absl::StrCat("the places of the start (", RoomText(reason.from_room), ") and of the end (",
                       RoomText(reason.to_room),
-                      ") are not linked: nobody has been seen or driven between them");
+                      ") are not linked: the map has no chain of places between them, which comes "
+                      "from mapping the way or from seeing somebody walk it");
 }
 
 }  // namespace dsg::query

@@ -313,16 +313,20 @@ class Runner {
   std::optional<Hit> Place(const ViewNode& node) {
     Hit hit;
     hit.key.id = node.id;
-    if (!question_.near_map.has_value() && !question_.box_map.has_value()) return hit;
+    const bool is_in_space = question_.near_map.has_value() || question_.box_map.has_value();
     ViewNode placed = node;
     if (IsAgentKind(view_.symbols().Text(node.kind))) {
-      if (!pattern_.asks_for_agents) return std::nullopt;
-      absl::StatusOr<std::optional<Pose3d>> located = question_.locate(node.id);
-      if (!located.ok()) locate_status_ = located.status();
-      if (!located.ok() || !located->has_value()) return std::nullopt;
-      hit.map_T_agent = *located;
-      placed.map_T_node = **located;
+      if (is_in_space && !pattern_.asks_for_agents) return std::nullopt;
+      if (question_.at_ns.has_value()) {
+        const absl::StatusOr<std::optional<LocatedPose>> located = question_.locate(node.id);
+        if (!located.ok()) locate_status_ = located.status();
+        if (!located.ok() || !located->has_value()) return std::nullopt;
+        hit.is_in_gap = (*located)->quality == PoseQuality::kInGap;
+        if (hit.is_in_gap) return is_in_space ? std::nullopt : std::optional(hit);
+        hit.map_T_agent = placed.map_T_node = (*located)->map_T_agent;
+      }
     }
+    if (!is_in_space) return hit;
     if (question_.box_map.has_value() && !question_.box_map->intersects(placed.BoxMap())) {
       return std::nullopt;
     }

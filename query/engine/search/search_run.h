@@ -25,8 +25,10 @@ struct HitKey {
 
 struct Hit {
   HitKey key;
-  /// Of agents in a search with a point or a box: where they were.
+  /// Of agents in a search at an instant: where they were then.
   std::optional<Pose3d> map_T_agent;
+  /// Of an agent then in a gap of its track: nobody knows where.
+  bool is_in_gap = false;
   std::vector<NodeId> related;
 };
 
@@ -37,9 +39,8 @@ struct SearchQuestion {
   std::optional<Eigen::Vector3d> near_map;
   double distance_m_max = std::numeric_limits<double>::infinity();
   std::optional<Box3d> box_map;
-  /// Where an agent was at at_ns; nullopt if nobody knows. Asked only where there is a point or a
-  /// box, the pattern asks for agents, and at_ns is set.
-  std::function<absl::StatusOr<std::optional<Pose3d>>(NodeId agent)> locate;
+  /// Where an agent was at at_ns; nullopt if it was not there. Asked only if at_ns is set.
+  std::function<absl::StatusOr<std::optional<LocatedPose>>(NodeId agent)> locate;
   std::optional<HitKey> after;
   int limit = 1;
   bool explain = false;
@@ -61,8 +62,9 @@ struct SearchAnswer {
   std::vector<PlanStep> steps;
 };
 
-/// Agents have no place of their own, so with a point or a box only patterns that ask for agents
-/// find them, where their tracks put them at at_ns.
+/// Agents have no place of their own: at an instant they are where their tracks put them, or not
+/// found. With a point or a box only patterns that ask for agents find them.
+/// Requires: at_ns is set if such a pattern has a point or a box.
 ///
 /// Errors: those of `locate`; what `stop` returned.
 absl::StatusOr<SearchAnswer> RunSearch(const GraphView& view, const SearchQuestion& question,

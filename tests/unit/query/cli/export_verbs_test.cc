@@ -171,9 +171,11 @@ TEST_F(ExportVerbs, DrawsAPicture) {
   const std::string png = ReadFile(Path("a.png"));
   EXPECT_EQ(png.substr(0, 8), "\x89PNG\r\n\x1a\n");
   EXPECT_EQ(png.substr(16, 4), std::string("\0\0\x02\x80", 4));
-  // A floor is another picture.
-  ASSERT_EQ(Ask({"map", "--png", Path("b.png"), "--width", "640", "--floor", "40"}).code, 0);
-  EXPECT_NE(ReadFile(Path("b.png")), png);
+  // A height without a floor is no picture.
+  const Outcome nothing = Ask({"map", "--png", Path("b.png"), "--width", "640", "--floor", "40"});
+  EXPECT_EQ(nothing.code, 2);
+  EXPECT_NE(nothing.errors.find("--floor 40: the map has nothing between"), std::string::npos)
+      << nothing.errors;
 }
 
 }  // namespace

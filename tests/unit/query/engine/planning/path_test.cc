@@ -195,8 +195,9 @@ TEST_F(PlanPath, SaysWhatIsInTheWay) {
   request.set_blocked(0, "kitchen");
   EXPECT_EQ(Places(request), "blocked nodes cut all ways");
   EXPECT_EQ(Places(Ask(Node("p1"), Node("attic"))),
-            "the places of the start (R1) and of the end (R3) are not linked: nobody has been seen "
-            "or driven between them");
+            "the places of the start (R1) and of the end (R3) are not linked: the map has no "
+            "chain of places between them, which comes from mapping the way or from seeing "
+            "somebody walk it");
   EXPECT_EQ(Places(Ask(Node("p1"), At(90, 0, 0))), "no place is near the end (90.00, 0.00, 0.00)");
   EXPECT_EQ(Places(Ask(Node("p1"), Node("O8"))), "it is not in the world at that time");
   const auto status = Plan(Ask(Node("p1"), Node("p3"), 0.7)).status();

@@ -136,9 +136,10 @@ std::vector<query::HitKey> Scan(const Belief& belief, const ScanQuestion& questi
   for (const Node& node : belief.nodes) {
     if (!scanner.Matches(node, question.pattern)) continue;
     query::HitKey key{0.0, node.id};
-    // No one of these maps has a track, so that in space there are no agents at all.
-    const bool is_in_space = question.near_map.has_value() || question.box_map.has_value();
-    if (is_in_space && IsAgentKind(node.kind)) continue;
+    // No one of these maps has a track, so that in space and at an instant there are no agents.
+    const bool is_somewhere =
+        question.near_map.has_value() || question.box_map.has_value() || question.at_ns.has_value();
+    if (is_somewhere && IsAgentKind(node.kind)) continue;
     if (question.box_map.has_value() && !question.box_map->intersects(node.BoxMap())) continue;
     if (question.near_map.has_value()) {
       key.distance_m = node.DistanceTo(*question.near_map);

@@ -213,6 +213,44 @@ TEST_F(Neighborhood, HonoursTheInstantOnEveryHop) {
   EXPECT_EQ(Subgraph(request), "p1 O1 | p1-C-O1 ");
 }
 
+TEST_F(Neighborhood, ReachesAgentsWhereTheyWereAtTheInstant) {
+  GraphDelta delta;
+  for (const uint64_t human : {12, 13}) {
+    delta.edges.push_back({NodeId('H', human), relations::kSameAs, NodeId('O', 1), 1.0});
+  }
+  CommitToOffice(folder_.path(), std::move(delta));
+  auto request = From("O1");
+  request.set_map(kMap);
+  request.add_relations(relations::kSameAs);
+  request.set_both_directions(true);
+  const auto x_of_last = [&] {
+    double x = -1.0;
+    EXPECT_TRUE(query::ReadStream(call_, core_->GetSubgraph(call_, request),
+                                  [&](const v1::GetSubgraphResponse& reply) {
+                                    const v1::Node& last = reply.nodes(reply.nodes_size() - 1);
+                                    if (last.has_map_t_node()) x = last.map_t_node().position().x();
+                                    return true;
+                                  })
+                    .ok());
+    return x;
+  };
+  request.mutable_filter()->set_at_ns(10 * kSecond);
+  EXPECT_EQ(Subgraph(request), "O1 H12 H13 | H12-S-O1 H13-S-O1 ");
+  EXPECT_EQ(x_of_last(), 3.0);
+  // H13 has left; H12 is in a gap of its track, and so in no box.
+  request.mutable_filter()->set_at_ns(40 * kSecond);
+  EXPECT_EQ(Subgraph(request), "O1 H12 | H12-S-O1 ");
+  EXPECT_EQ(x_of_last(), -1.0);
+  v1::Box* const box = request.mutable_filter()->mutable_box();
+  box->mutable_min()->set_x(10.5);
+  box->mutable_max()->set_x(11.5);
+  box->mutable_max()->set_y(10.0);
+  box->mutable_max()->set_z(3.0);
+  EXPECT_EQ(Subgraph(request), "O1 | ");
+  request.mutable_filter()->set_at_ns(10 * kSecond);
+  EXPECT_EQ(Subgraph(request), "O1 H12 | H12-S-O1 ");
+}
+
 TEST_F(Neighborhood, CutsLargeSubgraphsIntoMessages) {
   GraphDelta delta;
   for (uint64_t i = 10; i < 60; ++i) {

@@ -39,7 +39,7 @@ query::SearchQuestion Ask(const ScanQuestion& question, const query::Pattern& pa
   asked.near_map = question.near_map;
   if (question.distance_m_max > 0.0) asked.distance_m_max = question.distance_m_max;
   asked.box_map = question.box_map;
-  asked.locate = [](NodeId) { return std::optional<Pose3d>(); };
+  asked.locate = [](NodeId) { return std::optional<LocatedPose>(); };
   return asked;
 }
 

@@ -205,6 +205,31 @@ TEST_F(SearchNodes, FindsAgentsNearAPointOnlyAtAnInstant) {
   EXPECT_EQ(Hits(request), "");
 }
 
+TEST_F(SearchNodes, FindsAgentsWhereTheyWereAtTheInstant) {
+  auto request = Query("human");
+  EXPECT_EQ(Hits(request), "H12 H13 ");
+  request.set_at_ns(10 * kSecond + kSecond / 2);
+  const auto there = Ask(request);
+  ASSERT_TRUE(there.ok()) << there.status();
+  ASSERT_EQ(there->hits_size(), 2);
+  EXPECT_EQ(there->hits(0).node().map_t_node().position().x(), 11.5);
+  EXPECT_EQ(there->hits(1).node().map_t_node().position().x(), 3.0);
+  // H13 has left; H12 is in a gap of its track.
+  request.set_at_ns(40 * kSecond);
+  const auto gap = Ask(request);
+  ASSERT_TRUE(gap.ok()) << gap.status();
+  ASSERT_EQ(gap->hits_size(), 1);
+  EXPECT_EQ(gap->hits(0).node().id(), "H12");
+  EXPECT_FALSE(gap->hits(0).node().has_map_t_node());
+  request.set_at_ns(63 * kSecond);
+  EXPECT_EQ(Hits(request), "");
+  request = Query("any");
+  request.set_at_ns(5 * kSecond);
+  EXPECT_EQ(Hits(request), "B1 H12 H13 O1 O2 O10 O11 O12 R1 R2 p1 p2 p3 r1 ");
+  request.set_at_ns(6 * kSecond);
+  EXPECT_EQ(Hits(request), "B1 H12 H13 O1 O2 O10 O11 O12 R1 R2 p1 p2 p3 ");
+}
+
 TEST_F(SearchNodes, TakesAPatternFromPrograms) {
   v1::SearchNodesRequest request;
   request.set_map(kMap);
