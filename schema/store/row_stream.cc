@@ -50,17 +50,18 @@ std::optional<Sha256> DigestOfText(std::string_view text) {
 StreamRow RowOfRevision(const StreamedRevision& revision) {
   const RevisionInfo& info = revision.record.info;
   const RowSums& sums = revision.record.sums;
-  const bool has_poses = revision.record.first_pose_ns.has_value();
-  return {
-      row_kinds::kRevision,
-      {info.revision, info.committed_ns, info.sequence, sums.node_count, sums.edge_count,
-       sums.agent_count, sums.pose_count, sums.stay_count, sums.mesh_block_count, has_poses ? 1 : 0,
-       revision.record.first_pose_ns.value_or(0), revision.record.last_pose_ns.value_or(0),
-       revision.delta_checksum.has_value() ? 1 : 0, revision.delta_checksum.value_or(0)},
-      {std::string(BytesOf(info.digest)), sums.content.bytes(),
-       revision.parent.has_value() ? std::string(BytesOf(*revision.parent)) : "", info.author,
-       info.message, info.session_id, info.config_digest, FormatLayerCounts(sums.layer_counts),
-       revision.touched.has_value() ? EncodeTouched(*revision.touched) : ""}};
+  const bool has_poses =
+      revision.record.first_pose_ns.has_value() && revision.record.last_pose_ns.has_value();
+  return {row_kinds::kRevision,
+          {info.revision, info.committed_ns, info.sequence, sums.node_count, sums.edge_count,
+           sums.agent_count, sums.pose_count, sums.stay_count, sums.mesh_block_count,
+           has_poses ? 1 : 0, has_poses ? *revision.record.first_pose_ns : 0,
+           has_poses ? *revision.record.last_pose_ns : 0,
+           revision.delta_checksum.has_value() ? 1 : 0, revision.delta_checksum.value_or(0)},
+          {std::string(BytesOf(info.digest)), sums.content.bytes(),
+           revision.parent.has_value() ? std::string(BytesOf(*revision.parent)) : "", info.author,
+           info.message, info.session_id, info.config_digest, FormatLayerCounts(sums.layer_counts),
+           revision.touched.has_value() ? EncodeTouched(*revision.touched) : ""}};
 }
 
 absl::StatusOr<StreamedRevision> RevisionOfRow(const std::string& map, const StreamRow& row) {

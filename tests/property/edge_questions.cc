@@ -147,9 +147,10 @@ struct SubgraphQuestion {
   std::optional<Box3d> box_map;
   bool tree_only = false;
 
-  bool Admits(const Node& node) const {
-    return (kind.empty() || node.kind == kind) && Holds(node.valid, at_ns) &&
-           (!box_map.has_value() || node.BoxMap().intersects(*box_map));
+  bool Admits(const NodeThen& then) const {
+    return then.is_there && (kind.empty() || then.node.kind == kind) &&
+           Holds(then.node.valid, at_ns) &&
+           (!box_map.has_value() || (then.has_pose && then.node.BoxMap().intersects(*box_map)));
   }
 };
 
@@ -176,11 +177,12 @@ ComparedAnswer ScanSubgraph(const NaiveMap& map, const SubgraphQuestion& questio
   for (int depth = 0; !level.empty(); ++depth) {
     std::set<NodeId> deeper;
     for (const NodeId from : level) {
-      answer.words.push_back(TextOf(map.nodes.at(from)));
+      AddNode(NodeAt(map, map.nodes.at(from), question.at_ns), question.at_ns.has_value(), &answer);
       if (question.depth_max > 0 && depth == question.depth_max) continue;
       for (const auto& [step, edge] : StepsFrom(map, question, from)) {
         const NodeId to = std::get<0>(step);
-        if (!question.Admits(map.nodes.at(to)) || !reached.insert(to).second) continue;
+        if (!question.Admits(NodeAt(map, map.nodes.at(to), question.at_ns))) continue;
+        if (!reached.insert(to).second) continue;
         deeper.insert(to);
         walked[edge->key()] = edge;
       }
@@ -233,6 +235,7 @@ Question MakeSubgraph(const QuestionWorld& world, Random* random) {
   if (question.relations.empty()) question.relations = {relations::kContains};
   Question made;
   made.text = request.ShortDebugString();
+  if (question.at_ns.has_value()) made.tolerance = world.is_lossless() ? 1e-9 : 3e-4;
   made.scan = [&map, question] { return ScanSubgraph(map, question); };
   made.ask = [request, revision](Asker* asker) {
     v1::GetSubgraphRequest asked = request;
@@ -242,7 +245,7 @@ Question MakeSubgraph(const QuestionWorld& world, Random* random) {
         query::ReadStream(asker->call, asker->core()->GetSubgraph(asker->call, asked),
                           [&](const v1::GetSubgraphResponse& part) {
                             for (const v1::Node& node : part.nodes())
-                              answer.words.push_back(TextOf(node));
+                              AddNode(node, request.filter().has_at_ns(), &answer);
                             for (const v1::Edge& edge : part.edges())
                               answer.words.push_back(TextOf(edge));
                             return true;

@@ -84,13 +84,9 @@ ComparedAnswer ScanNearest(const NaiveMap& map, const NearestQuestion& question)
   }
   std::vector<Near> found;
   for (const auto& [id, stored] : map.nodes) {
-    Node node = stored;
-    if (node.layer == layers::kAgents) {
-      if (!question.wanted.at_ns.has_value()) continue;
-      const auto at = LocateNaively(map, id, *question.wanted.at_ns);
-      if (!at.has_value() || at->quality == v1::IN_GAP) continue;
-      node.map_T_node = at->map_T_agent;
-    }
+    if (stored.layer == layers::kAgents && !question.wanted.at_ns.has_value()) continue;
+    const auto [node, is_there, has_pose] = NodeAt(map, stored, question.wanted.at_ns);
+    if (!is_there || !has_pose) continue;
     if (!question.wanted.Holds(map, node)) continue;
     const double distance_m = node.DistanceTo(question.point_map);
     if (question.distance_m_max > 0.0 && distance_m > question.distance_m_max) continue;
@@ -142,34 +138,12 @@ Question MakeNearest(const QuestionWorld& world, Random* random) {
   return made;
 }
 
-// A node of a list. Where an agent was at an instant is not stored to the last digit.
-void AddListed(v1::Node node, bool is_of_instant, ComparedAnswer* answer) {
-  const bool is_placed = is_of_instant && IsAgentKind(node.kind()) && node.has_map_t_node();
-  if (is_placed) {
-    const v1::Vector3& p = node.map_t_node().position();
-    answer->numbers.insert(answer->numbers.end(), {p.x(), p.y(), p.z()});
-    node.clear_map_t_node();
-  }
-  answer->words.push_back(TextOf(std::move(node)) + (is_placed ? " was there" : ""));
-}
-
 ComparedAnswer ScanNodes(const NaiveMap& map, const Wanted& wanted) {
   ComparedAnswer answer;
   for (const auto& [id, stored] : map.nodes) {
-    Node node = stored;
-    bool is_in_gap = false;
-    if (wanted.at_ns.has_value() && node.layer == layers::kAgents) {
-      const auto at = LocateNaively(map, id, *wanted.at_ns);
-      if (!at.has_value()) continue;
-      is_in_gap = at->quality == v1::IN_GAP;
-      if (is_in_gap && wanted.box_map.has_value()) continue;
-      node.map_T_node = at->map_T_agent;
-    }
-    if (!wanted.Holds(map, node)) continue;
-    v1::Node wire;
-    dsg::ToProto(node, LayerTable(), &wire);
-    if (is_in_gap) wire.clear_map_t_node();
-    AddListed(std::move(wire), wanted.at_ns.has_value(), &answer);
+    const NodeThen then = NodeAt(map, stored, wanted.at_ns);
+    if (!then.is_there || (!then.has_pose && wanted.box_map.has_value())) continue;
+    if (wanted.Holds(map, then.node)) AddNode(then, wanted.at_ns.has_value(), &answer);
   }
   return answer;
 }
@@ -192,7 +166,7 @@ Question MakeListNodes(const QuestionWorld& world, Random* random) {
     return AllPages<v1::ListNodesRequest, v1::ListNodesResponse>(
         asker, revision, request, &query::Api::ListNodes,
         [is_of_instant](const v1::ListNodesResponse& page, ComparedAnswer* answer) {
-          for (const v1::Node& node : page.nodes()) AddListed(node, is_of_instant, answer);
+          for (const v1::Node& node : page.nodes()) AddNode(node, is_of_instant, answer);
         });
   };
   return made;

@@ -151,4 +151,31 @@ std::optional<NaiveLocation> LocateNaively(const NaiveMap& map, NodeId agent, Ti
   return at;
 }
 
+NodeThen NodeAt(const NaiveMap& map, const Node& node, std::optional<TimeNs> at_ns) {
+  NodeThen then{.node = node};
+  if (!at_ns.has_value() || node.layer != layers::kAgents) return then;
+  const auto at = LocateNaively(map, node.id, *at_ns);
+  then.is_there = at.has_value();
+  then.has_pose = at.has_value() && at->quality != v1::IN_GAP;
+  if (then.has_pose) then.node.map_T_node = at->map_T_agent;
+  return then;
+}
+
+void AddNode(v1::Node node, bool is_of_instant, ComparedAnswer* answer) {
+  const bool is_placed = is_of_instant && IsAgentKind(node.kind()) && node.has_map_t_node();
+  if (is_placed) {
+    const v1::Vector3& p = node.map_t_node().position();
+    answer->numbers.insert(answer->numbers.end(), {p.x(), p.y(), p.z()});
+    node.clear_map_t_node();
+  }
+  answer->words.push_back(TextOf(std::move(node)) + (is_placed ? " was there" : ""));
+}
+
+void AddNode(const NodeThen& then, bool is_of_instant, ComparedAnswer* answer) {
+  v1::Node wire;
+  dsg::ToProto(then.node, LayerTable(), &wire);
+  if (!then.has_pose) wire.clear_map_t_node();
+  AddNode(std::move(wire), is_of_instant, answer);
+}
+
 }  // namespace dsg::test

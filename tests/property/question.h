@@ -90,6 +90,19 @@ struct NaiveLocation {
 /// nullopt outside the track.
 std::optional<NaiveLocation> LocateNaively(const NaiveMap& map, NodeId agent, TimeNs at_ns);
 
+/// A node of an answer about an instant, if one is given: agents are where their tracks put them.
+struct NodeThen {
+  Node node;
+  bool is_there = true;
+  /// False outside the track and in its gaps.
+  bool has_pose = true;
+};
+NodeThen NodeAt(const NaiveMap& map, const Node& node, std::optional<TimeNs> at_ns);
+
+/// Adds a node of an answer. Where an agent was at an instant is not stored to the last digit.
+void AddNode(v1::Node node, bool is_of_instant, ComparedAnswer* answer);
+void AddNode(const NodeThen& then, bool is_of_instant, ComparedAnswer* answer);
+
 /// All pages as one answer.
 template <typename Request, typename Response>
 ComparedAnswer AllPages(Asker* asker, Revision revision, Request request,

@@ -317,7 +317,7 @@ class Runner {
     ViewNode placed = node;
     if (IsAgentKind(view_.symbols().Text(node.kind))) {
       if (is_in_space && !pattern_.asks_for_agents) return std::nullopt;
-      if (question_.at_ns.has_value()) {
+      if (is_in_space || question_.at_ns.has_value()) {
         const absl::StatusOr<std::optional<LocatedPose>> located = question_.locate(node.id);
         if (!located.ok()) locate_status_ = located.status();
         if (!located.ok() || !located->has_value()) return std::nullopt;

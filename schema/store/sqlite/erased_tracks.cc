@@ -304,8 +304,11 @@ absl::Status RepairPoseTimes(Database& db) {
       const auto& last = ends.At(head.info.revision);
       std::optional<TimeNs> first_ns;
       std::optional<TimeNs> last_ns;
-      if (!first.empty()) first_ns = *first.begin();
-      if (!last.empty()) last_ns = *last.rbegin();
+      // A segment may begin where no mark shows its poses any more.
+      if (!first.empty() && !last.empty()) {
+        first_ns = *first.begin();
+        last_ns = *last.rbegin();
+      }
       if (head.first_pose_ns == first_ns && head.last_pose_ns == last_ns) continue;
       head.first_pose_ns = first_ns;
       head.last_pose_ns = last_ns;

@@ -110,7 +110,7 @@ TEST(FloorChoice, TakesANodesHeightsOrThoseOfTheRoomsAround) {
   EXPECT_EQ(by_id->high_m, 3.0);
   EXPECT_EQ(ChooseFloor(content, "Küche \"Süd\"")->low_m, 0.0);
   EXPECT_EQ(ChooseFloor(content, "2.9")->high_m, 3.0);
-  EXPECT_EQ(ChooseFloor(content, "10")->low_m, 8.5);
+  EXPECT_EQ(ReasonOf(ChooseFloor(content, "10").status()), Reason::kFieldInvalid);
   EXPECT_EQ(ReasonOf(ChooseFloor(content, "attic").status()), Reason::kNodeUnknown);
   EXPECT_EQ(ReasonOf(ChooseFloor(content, "nan").status()), Reason::kNodeUnknown);
 }

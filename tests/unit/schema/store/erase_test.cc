@@ -178,6 +178,34 @@ TEST_P(EraseTest, TakesSpansOfTracksOutOfThePast) {
   EXPECT_EQ(all, rest);
 }
 
+TEST_P(EraseTest, LeavesARevisionThatLosesAllItsPosesWithoutTheirTimes) {
+  const NodeId agent('H', 1);
+  GraphDelta first;
+  first.nodes.push_back(MakeNode(agent, layers::kAgents, kinds::kHuman, "ann", Box3d()));
+  GraphDelta second;
+  for (int t = 0; t <= 20; ++t) {
+    GraphDelta& delta = t <= 10 ? first : second;
+    if (delta.appends.empty()) delta.appends.push_back({agent, {}});
+    delta.appends.back().poses.push_back(PoseAt(t * kSecond, t, 0, 0));
+  }
+  map_.MustCommit(first);
+  map_.MustCommit(second);
+  // What is left begins in the segment that the first revision began.
+  const TrackSpan span{agent, 0, 15 * kSecond};
+  GraphDelta third;
+  third.corrections.push_back({agent, span.from_ns, span.to_ns, {}});
+  map_.MustCommit(third);
+  Erase({.tracks = {span}});
+  const MapStats lost = OrDie(map_.At(1)->Stats());
+  EXPECT_EQ(lost.at.pose_count, 0);
+  EXPECT_EQ(lost.first_pose_ns, std::nullopt);
+  EXPECT_EQ(lost.last_pose_ns, std::nullopt);
+  const MapStats kept = OrDie(map_.At(2)->Stats());
+  EXPECT_EQ(kept.at.pose_count, 6);
+  EXPECT_EQ(kept.first_pose_ns, 15 * kSecond);
+  EXPECT_EQ(kept.last_pose_ns, 20 * kSecond);
+}
+
 TEST_P(EraseTest, TakesEdgesAndMeshBlocksOutOfThePast) {
   WriteStream(1, 36);
   GraphDelta delta;
