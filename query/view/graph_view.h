@@ -67,6 +67,9 @@ struct ViewNode {
   Symbol name = 0;
   /// Only objects have one, and not all.
   std::optional<Color> color;
+  /// Here it fills a gap before the pose: the smaller a node, the more of them are in the
+  /// processor's cache.
+  uint32_t attribute_count = 0;
   Pose3d map_T_node;
   /// Empty = no extent.
   Box3d box_node;
@@ -74,7 +77,6 @@ struct ViewNode {
   /// Of places, metres; 0 for all others.
   double clearance_m = 0.0;
   std::shared_ptr<const ViewAttribute[]> attribute_array;
-  uint32_t attribute_count = 0;
 
   /// Without those of attributes::IsFileRest.
   std::span<const ViewAttribute> attributes() const {
