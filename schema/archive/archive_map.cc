@@ -44,7 +44,7 @@ absl::StatusOr<std::unique_ptr<ArchiveEncoder>> ArchiveMap(MapReader* map,
                                                            const Progress& progress) {
   const std::string name = map->spec().name;
   DSG_ASSIGN_OR_RETURN(const auto place, ScratchStore::Make(scratch, "archive"));
-  DSG_ASSIGN_OR_RETURN(const std::string path, place->MakeDatabasePath(name));
+  DSG_ASSIGN_OR_RETURN(const std::string path, place->MakeMapPath(name));
   DSG_RETURN_IF_ERROR(map->CopyTo(path, stop, progress));
   DSG_ASSIGN_OR_RETURN(ArchiveManifest manifest, DescribeCopy(place->folder(), name));
   // Open files outlive their names, so that nothing is left of the copy even after kill -9.

@@ -128,7 +128,7 @@ absl::StatusOr<ArchiveManifest> InstallDatabase(const std::string& path, const S
                                                 const ArchiveManifest& head, GraphStore* store,
                                                 const std::string& name, bool replace,
                                                 const StopCheck& stop, const Progress& progress) {
-  DSG_ASSIGN_OR_RETURN(const std::string database, place.MakeDatabasePath(head.spec.name));
+  DSG_ASSIGN_OR_RETURN(const std::string database, place.MakeMapPath(head.spec.name));
   DSG_ASSIGN_OR_RETURN(const ArchiveManifest manifest, Unpack(path, database, stop, progress));
   DSG_RETURN_IF_ERROR(OpenUnpacked(path, place.folder(), manifest).status());
   DSG_RETURN_IF_ERROR(AskStop(stop));
@@ -192,7 +192,7 @@ absl::StatusOr<VerifyReport> VerifyArchive(const std::string& path, const StopCh
     DSG_ASSIGN_OR_RETURN(const auto map, store->OpenMap(head.spec.name));
     return map->Verify(stop, tell);
   }
-  DSG_ASSIGN_OR_RETURN(const std::string database, place->MakeDatabasePath(head.spec.name));
+  DSG_ASSIGN_OR_RETURN(const std::string database, place->MakeMapPath(head.spec.name));
   DSG_ASSIGN_OR_RETURN(const ArchiveManifest manifest, Unpack(path, database, stop, progress));
   DSG_ASSIGN_OR_RETURN(const auto map, OpenUnpacked(path, place->folder(), manifest));
   return map->Verify(stop, tell);

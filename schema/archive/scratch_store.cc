@@ -18,6 +18,7 @@
 #include "absl/strings/str_cat.h"
 #include "schema/archive/file_io.h"
 #include "schema/base/status.h"
+#include "schema/store/graph_store.h"
 
 namespace dsg {
 namespace {
@@ -96,10 +97,10 @@ ScratchStore::~ScratchStore() {
   close(lock_fd_);
 }
 
-absl::StatusOr<std::string> ScratchStore::MakeDatabasePath(const std::string& map) const {
+absl::StatusOr<std::string> ScratchStore::MakeMapPath(const std::string& map) const {
   const std::string folder = absl::StrCat(folder_, "/", map);
   if (mkdir(folder.c_str(), 0700) != 0) return SystemError("make folder", folder, errno);
-  return folder + "/graph.db";
+  return MapFilePath(folder_, map);
 }
 
 }  // namespace dsg

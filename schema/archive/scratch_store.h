@@ -25,8 +25,8 @@ class ScratchStore {
   ScratchStore& operator=(const ScratchStore&) = delete;
 
   const std::string& folder() const { return folder_; }
-  /// The path of a map's database, in a folder that is made for it.
-  absl::StatusOr<std::string> MakeDatabasePath(const std::string& map) const;
+  /// The path of a map's file, in a folder that is made for it.
+  absl::StatusOr<std::string> MakeMapPath(const std::string& map) const;
 
  private:
   ScratchStore(std::string folder, int lock_fd) : folder_(std::move(folder)), lock_fd_(lock_fd) {}

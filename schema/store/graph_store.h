@@ -211,6 +211,10 @@ class GraphStore {
 absl::StatusOr<std::unique_ptr<GraphStore>> OpenStore(const std::string& uri,
                                                       const StoreOptions& options);
 
+/// Where a store in a folder keeps the file of a map: a file of MapReader::CopyTo that stands there
+/// is a map of that store.
+std::string MapFilePath(const std::string& store_folder, const std::string& map);
+
 inline absl::StatusOr<std::unique_ptr<GraphStore>> GraphStore::Open(const std::string& uri,
                                                                     const StoreOptions& options) {
   return OpenStore(uri, options);

@@ -2,6 +2,7 @@
 // The one place that knows all backends.
 #include "schema/store/graph_store.h"
 #include "schema/store/memory/memory_store.h"
+#include "schema/store/sqlite/map_file.h"
 #include "schema/store/sqlite/store.h"
 
 namespace dsg {
@@ -14,6 +15,10 @@ absl::StatusOr<std::unique_ptr<GraphStore>> OpenStore(const std::string& uri,
     return memory::OpenMemoryStore(uri.substr(kMemory.size()), options);
   }
   return sqlite::OpenSqliteStore(uri.starts_with(kFile) ? uri.substr(kFile.size()) : uri, options);
+}
+
+std::string MapFilePath(const std::string& store_folder, const std::string& map) {
+  return sqlite::DatabasePath(store_folder, map);
 }
 
 }  // namespace dsg
