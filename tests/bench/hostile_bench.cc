@@ -2,6 +2,7 @@
 // What hostile clients cost a dsg-server and everybody else: the most memory that it has, and the
 // latency of LocateAgent on another connection, in an attack and without. The server is started
 // anew for each, and the attackers are a process of their own. Refuses to go on without the server.
+#include <sched.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -193,12 +194,25 @@ struct Flags {
   std::string only;
   std::string server;
   bool with_control = false;
+  bool is_apart = false;
 };
+
+// Binds this process, and those that it starts, to the first processor or to all but the first.
+// Attackers on a processor of their own stand for attackers on a machine of their own.
+absl::Status Bind(bool to_first) {
+  cpu_set_t processors;
+  CPU_ZERO(&processors);
+  const long count = sysconf(_SC_NPROCESSORS_ONLN);
+  for (long i = to_first ? 0 : 1; i < (to_first ? 1 : count); ++i) CPU_SET(i, &processors);
+  if (sched_setaffinity(0, sizeof processors, &processors) == 0) return absl::OkStatus();
+  return absl::FailedPreconditionError("--apart needs two processors");
+}
 
 absl::StatusOr<std::unique_ptr<ChildServer>> StartAttackers(const std::string& name,
                                                             const std::string& address,
-                                                            double time_s) {
-  return ChildServer::Start({"/proc/self/exe", kAttackFlag, name, address, absl::StrCat(time_s)});
+                                                            const Flags& flags) {
+  return ChildServer::Start({"/proc/self/exe", kAttackFlag, name, address,
+                             absl::StrCat(flags.seconds), flags.is_apart ? "apart" : "beside"});
 }
 
 // Others' latency while the attack goes to a server that they do not ask: what remains of it is due
@@ -210,8 +224,7 @@ absl::StatusOr<Outcome> AskBesideAnother(const Attack& attack, const Flags& flag
   const WirePlace elsewhere{folder->path(), absl::StrCat("unix:", folder->path(), "/s.sock")};
   DSG_RETURN_IF_ERROR(MakeWireWorld(elsewhere.store, 1));
   DSG_ASSIGN_OR_RETURN(const WireServer attacked, StartWireServer(elsewhere, {}, flags.server));
-  DSG_ASSIGN_OR_RETURN(const auto attackers,
-                       StartAttackers(attack.name, attacked.address, flags.seconds));
+  DSG_ASSIGN_OR_RETURN(const auto attackers, StartAttackers(attack.name, attacked.address, flags));
   return AskAWhile(server, flags.seconds, 4);
 }
 
@@ -222,11 +235,11 @@ absl::Status MeasureAttack(const Attack& attack, const Flags& flags, const WireP
   // The slow calls are everyday work: others are compared with what they see beside those.
   std::unique_ptr<ChildServer> slow;
   if (std::strcmp(attack.name, "paths") == 0) {
-    DSG_ASSIGN_OR_RETURN(slow, StartAttackers("slow", server.address, flags.seconds));
+    DSG_ASSIGN_OR_RETURN(slow, StartAttackers("slow", server.address, flags));
   }
   DSG_ASSIGN_OR_RETURN(const Outcome alone, AskAWhile(server, flags.seconds, 2));
   slow = nullptr;
-  DSG_ASSIGN_OR_RETURN(auto attackers, StartAttackers(attack.name, server.address, flags.seconds));
+  DSG_ASSIGN_OR_RETURN(auto attackers, StartAttackers(attack.name, server.address, flags));
   DSG_ASSIGN_OR_RETURN(const Outcome beside, AskAWhile(server, flags.seconds, 3));
   ReportOutcome(attack.what, alone, beside, report);
   if (!flags.with_control) return absl::OkStatus();
@@ -239,6 +252,7 @@ absl::Status MeasureAttack(const Attack& attack, const Flags& flags, const WireP
 }
 
 absl::Status Run(const Flags& flags, const CommonOptions& common, Report* report) {
+  if (flags.is_apart) DSG_RETURN_IF_ERROR(Bind(/*to_first=*/false));
   DSG_ASSIGN_OR_RETURN(const auto folder, ScratchFolder::Make(common.folder, "hostile"));
   DSG_ASSIGN_OR_RETURN(const auto socket_folder,
                        ScratchFolder::Make(std::filesystem::temp_directory_path(), "dsg-bench"));
@@ -257,9 +271,11 @@ absl::Status Run(const Flags& flags, const CommonOptions& common, Report* report
   return absl::OkStatus();
 }
 
-// What the process does that is started with the flag, the attack, the address and a time.
+// What the process does that is started with the flag, the attack, the address, a time, and
+// whether it has a processor of its own.
 bool BeAttackers(int argc, char** argv) {
-  if (argc != 5 || std::strcmp(argv[1], kAttackFlag) != 0) return false;
+  if (argc != 6 || std::strcmp(argv[1], kAttackFlag) != 0) return false;
+  if (std::strcmp(argv[5], "apart") == 0 && !Bind(/*to_first=*/true).ok()) return true;
   std::printf("ready\n");
   std::fflush(stdout);
   const std::chrono::duration<double> time(std::atof(argv[4]));
@@ -280,6 +296,9 @@ int main(int argc, char** argv) {
   app.add_flag(
       "--control", flags.with_control,
       "Also ask while the attack goes to a second server, which shares only the processors");
+  app.add_flag("--apart", flags.is_apart,
+               "Give attackers the first processor, and the server and others the rest, with the "
+               "attack and without: what attackers on another machine cost");
   app.add_option("--server", flags.server, "The dsg-server to attack; default the one built here");
   return dsg::bench::RunBenchmark(
       &app, argc, argv, [&](const dsg::bench::CommonOptions& common, dsg::bench::Report* report) {
