@@ -198,7 +198,8 @@ struct Flags {
 };
 
 // Binds this process, and those that it starts, to the first processor or to all but the first.
-// Attackers on a processor of their own stand for attackers on a machine of their own.
+// Apart, attackers take no processor time from the server; but on two processors the server and
+// those who ask it beside the attack share one.
 absl::Status Bind(bool to_first) {
   cpu_set_t processors;
   CPU_ZERO(&processors);
@@ -297,8 +298,8 @@ int main(int argc, char** argv) {
       "--control", flags.with_control,
       "Also ask while the attack goes to a second server, which shares only the processors");
   app.add_flag("--apart", flags.is_apart,
-               "Give attackers the first processor, and the server and others the rest, with the "
-               "attack and without: what attackers on another machine cost");
+               "Give attackers and slow calls the first processor, and the server and others the "
+               "rest, with the attack and without");
   app.add_option("--server", flags.server, "The dsg-server to attack; default the one built here");
   return dsg::bench::RunBenchmark(
       &app, argc, argv, [&](const dsg::bench::CommonOptions& common, dsg::bench::Report* report) {
