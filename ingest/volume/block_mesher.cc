@@ -10,6 +10,7 @@
 
 #include "ingest/volume/cube_table.h"
 #include "schema/base/disjoint_sets.h"
+#include "schema/model/mesh_grid.h"
 
 namespace dsg::ingest {
 namespace {
@@ -118,7 +119,7 @@ Eigen::Vector3f BlockMesher::PointOn(const Eigen::Vector3i& voxel, int axis) con
   const Eigen::Vector3i next = voxel + Eigen::Vector3i::Unit(axis);
   Eigen::Vector3d at = (voxel + low_).cast<double>().array() + 0.5;
   at[axis] += static_cast<double>(FractionOn(Offset(voxel), Offset(next)));
-  return (at * blocks_.voxel_m()).cast<float>();
+  return RoundToMeshGrid(at * blocks_.voxel_m());
 }
 
 uint32_t BlockMesher::VertexOf(const Eigen::Vector3i& voxel, int axis) {
@@ -136,7 +137,7 @@ uint32_t BlockMesher::VertexOf(const Eigen::Vector3i& voxel, int axis) {
   } else {
     normal = Eigen::Vector3f::Unit(axis) * (is_first_inside ? 1.0f : -1.0f);
   }
-  mesh_.normals_map.push_back(normal);
+  mesh_.normals_map.push_back(NormalOf(NormalCodeOf(normal)));
   AddMeaning(is_first_inside ? next : voxel, is_first_inside ? voxel : next);
   AddTimes(is_first_inside ? next : voxel, is_first_inside ? voxel : next);
   return static_cast<uint32_t>(vertex);

@@ -12,7 +12,8 @@
 namespace dsg::ingest {
 
 /// Marching cubes over the centres of voxels. Positions depend on the two voxels of an edge alone,
-/// so neighbouring blocks make the same bits of them.
+/// so neighbouring blocks make the same bits of them. Positions are rounded to 0.1 mm and normals
+/// to within 0.7 degrees (schema/model/mesh_grid.h), which the store keeps in few bytes.
 ///
 /// Threads: one caller at a time; many of these may work at once.
 /// Source: Lorensen and Cline, 1987.

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A node is numbers without tags, and nothing for what is usual (no rotation, rotation about z, a
 // box around the origin), since a map has many nodes and keeps them for years. What few nodes have
-// is a protobuf message at the end. Edges, mesh blocks and factors are protobuf messages without
-// what stands in columns. docs/storage_format.md gives the layout.
+// is a protobuf message at the end. Edges, factors and mesh blocks from elsewhere are protobuf
+// messages without what stands in columns. docs/storage_format.md gives the layout.
 #include "schema/codec/payload.h"
 
 #include <google/protobuf/io/coded_stream.h>
@@ -10,11 +10,13 @@
 
 #include <bit>
 #include <iterator>
+#include <optional>
 #include <utility>
 
 #include "dsg/v1/graph.pb.h"
 #include "schema/codec/attribute_codec.h"
 #include "schema/codec/bit_stream.h"
+#include "schema/codec/mesh_codec.h"
 #include "schema/codec/proto_internal.h"
 #include "schema/codec/shuffle.h"
 
@@ -355,12 +357,15 @@ bool DecodeEdgePayload(std::string_view bytes, Edge* edge) {
 }
 
 std::string EncodeMeshBlock(const MeshBlock& block) {
+  std::optional<std::string> bytes = EncodeLatticeMesh(block);
+  if (bytes.has_value()) return *std::move(bytes);
   v1::MeshBlock message;
   ToProto(block, &message);
   return Compress(SerializeInOrder(message));
 }
 
 bool DecodeMeshBlock(std::string_view bytes, MeshBlock* block) {
+  if (IsLatticeMesh(bytes)) return DecodeLatticeMesh(bytes, block);
   v1::MeshBlock message;
   if (!Unpack(bytes, &message)) return false;
   auto decoded = FromProto(message);

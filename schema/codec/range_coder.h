@@ -60,6 +60,8 @@ class RangeDecoder {
   uint64_t DecodeRaw(int width);
   /// False once more was read than any encoder wrote.
   bool ok() const { return at_ <= bytes_.size() + kOverrunMax; }
+  /// Whether the bytes end where an encoder that wrote what was read has ended them.
+  bool IsAtEnd() const { return at_ == bytes_.size() + kOverrunMax - (low_ > 0 ? 1 : 0); }
 
  private:
   /// The four bytes that the decoder holds, of which the encoder may have left out all.
