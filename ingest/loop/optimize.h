@@ -24,6 +24,9 @@ enum class PoseObjective {
   kQuaternion,
 };
 
+/// Covariances of a larger graph with many loops may not fit into memory.
+inline constexpr size_t kCovariancePosesMax = 20'000;
+
 struct OptimizeOptions {
   PoseObjective objective = PoseObjective::kGeodesic;
   int iteration_count_max = 100;
@@ -58,7 +61,7 @@ struct Optimized {
 /// Errors: INVALID_ARGUMENT/FIELD_INVALID for weights of another count, indices outside the graph,
 /// an edge from a pose to itself, information that is not positive definite, numbers that are not
 /// finite or too large to be squared; RESOURCE_EXHAUSTED/LIMIT_EXCEEDED for covariances of more
-/// than 20 000 poses. Deterministic: one thread, no BLAS. Threads: safe.
+/// than kCovariancePosesMax poses. Deterministic: one thread, no BLAS. Threads: safe.
 absl::StatusOr<Optimized> Optimize(const PoseGraph& graph, const OptimizeOptions& options);
 
 /// Half the sum of squared whitened residuals of `poses`. kSeSync: half of SE-Sync's F.

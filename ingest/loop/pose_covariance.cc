@@ -15,8 +15,6 @@ using Eigen::MatrixXd;
 using SparseMatrix = Eigen::SparseMatrix<double>;
 using Solver = Eigen::SimplicialLDLT<SparseMatrix, Eigen::Lower>;
 
-constexpr size_t kInvertedPoseCountMax = 20'000;
-
 // The part of the inverse of L D L' that has the pattern of L: diagonal, and values below it.
 struct SelectedInverse {
   const SparseMatrix& factor;
@@ -166,10 +164,10 @@ absl::StatusOr<std::vector<Matrix6d>> CovariancesOf(const PoseGraph& graph,
                                                     const std::vector<Pose3d>& poses,
                                                     const std::vector<int>& anchors,
                                                     const OptimizeOptions& options) {
-  if (poses.size() > kInvertedPoseCountMax) {
+  if (poses.size() > kCovariancePosesMax) {
     return MakeError(Reason::kLimitExceeded,
                      absl::StrCat("covariances of ", poses.size(), " poses; at most ",
-                                  kInvertedPoseCountMax, ", take fewer keyframes"));
+                                  kCovariancePosesMax, ", take fewer keyframes"));
   }
   std::vector<int> unknowns(poses.size(), 0);
   for (const int anchor : anchors) unknowns[static_cast<size_t>(anchor)] = -1;

@@ -20,6 +20,7 @@ namespace dsg::ingest {
 std::vector<Eigen::MatrixXd> DiagonalOfInverse(const Eigen::SparseMatrix<double>& normal, int size);
 
 /// As Optimized::covariances. `anchors` have none.
+/// Errors: RESOURCE_EXHAUSTED/LIMIT_EXCEEDED for more poses than kCovariancePosesMax.
 absl::StatusOr<std::vector<Matrix6d>> CovariancesOf(const PoseGraph& graph,
                                                     const std::vector<Pose3d>& poses,
                                                     const std::vector<int>& anchors,

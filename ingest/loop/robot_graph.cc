@@ -12,6 +12,10 @@
 namespace dsg::ingest {
 namespace {
 
+// Keyframes that are too many are taken further apart in steps, up to where only loops make them.
+constexpr double kKeyframeSpreadStep = 1.5;
+constexpr double kKeyframeSpreadMax = 1e6;
+
 // Between samples at either side of an instant.
 Pose3d InterpolateAt(const std::vector<TimeNs>& times, const std::vector<Pose3d>& poses,
                      TimeNs time_ns) {
@@ -128,7 +132,8 @@ std::vector<RobotGraph::BoundLoop> RobotGraph::BindLoops() const {
   return bound;
 }
 
-std::vector<size_t> RobotGraph::ChooseKeyframes(const std::vector<BoundLoop>& loops) const {
+std::vector<size_t> RobotGraph::ChooseKeyframes(const std::vector<BoundLoop>& loops,
+                                                double spread) const {
   std::vector<size_t> bound;
   for (const BoundLoop& loop : loops) bound.insert(bound.end(), {loop.from, loop.to});
   std::sort(bound.begin(), bound.end());
@@ -139,9 +144,10 @@ std::vector<size_t> RobotGraph::ChooseKeyframes(const std::vector<BoundLoop>& lo
     if (!is_keyframe) {
       const Pose3d& last = poses_[keyframes.back()];
       is_keyframe =
-          (poses_[i].position - last.position).norm() >= options_.keyframe_m ||
-          AngleBetween(last.orientation, poses_[i].orientation) >= options_.keyframe_rad ||
-          times_[i] - times_[keyframes.back()] >= options_.keyframe_ns_max;
+          (poses_[i].position - last.position).norm() >= spread * options_.keyframe_m ||
+          AngleBetween(last.orientation, poses_[i].orientation) >= spread * options_.keyframe_rad ||
+          static_cast<double>(times_[i] - times_[keyframes.back()]) >=
+              spread * static_cast<double>(options_.keyframe_ns_max);
     }
     if (is_keyframe) keyframes.push_back(i);
   }
@@ -198,7 +204,12 @@ PoseGraph RobotGraph::MakeGraph(const std::vector<size_t>& keyframes,
 absl::StatusOr<RobotGraph::Solution> RobotGraph::Solve() const {
   Solution solution;
   const std::vector<BoundLoop> loops = BindLoops();
-  const std::vector<size_t> keyframes = ChooseKeyframes(loops);
+  std::vector<size_t> keyframes = ChooseKeyframes(loops, solution.keyframe_spread);
+  while (keyframes.size() > options_.keyframe_count_max &&
+         solution.keyframe_spread < kKeyframeSpreadMax) {
+    solution.keyframe_spread *= kKeyframeSpreadStep;
+    keyframes = ChooseKeyframes(loops, solution.keyframe_spread);
+  }
   for (const size_t keyframe : keyframes) solution.keyframe_times.push_back(times_[keyframe]);
   solution.loop_count = static_cast<int64_t>(loops_.size());
   solution.unusable_count = static_cast<int64_t>(loops_.size() - loops.size());
@@ -208,7 +219,7 @@ absl::StatusOr<RobotGraph::Solution> RobotGraph::Solve() const {
   const PoseGraph graph = MakeGraph(keyframes, loops);
   RobustOptions robust = options_.robust;
   robust.optimize.fixed_pose = 0;
-  robust.optimize.has_covariance = true;
+  robust.optimize.has_covariance = keyframes.size() <= options_.covariance_count_max;
   DSG_ASSIGN_OR_RETURN(const RobustResult result, OptimizeRobustly(graph, robust));
   for (size_t i = 0; i < loops.size(); ++i) {
     const bool is_kept = result.is_kept[keyframes.size() - 1 + i];

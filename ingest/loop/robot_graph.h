@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "ingest/loop/optimize.h"
 #include "ingest/loop/pose_graph.h"
 #include "ingest/loop/robust.h"
 #include "schema/model/trajectory.h"
@@ -30,6 +31,12 @@ struct RobotGraphOptions {
   double keyframe_m = 0.5;
   double keyframe_rad = 0.35;
   TimeNs keyframe_ns_max = 5'000'000'000;
+  /// A log that would have more takes them further apart, at the same rate everywhere. The poses
+  /// that loops bind are keyframes in any case.
+  size_t keyframe_count_max = 20'000;
+  /// Covariances are found of at most so many keyframes, and of none if loops bind more. At most
+  /// kCovariancePosesMax.
+  size_t covariance_count_max = kCovariancePosesMax;
   /// Errors of odometry are a random walk: so large a standard deviation after one metre or radian,
   /// and twice that after four, however many keyframes lie between...
   double odometry_m_per_m = 0.02;
@@ -87,7 +94,10 @@ class RobotGraph {
     /// Loops whose stamps are outside the trajectory, and such that join a keyframe to itself.
     int64_t unusable_count = 0;
     std::vector<TimeNs> keyframe_times;
-    /// By keyframe, of the pose against the first one (TimedPose::covariance); empty without loops.
+    /// How many times as far apart keyframes are as the options say, because of their number.
+    double keyframe_spread = 1.0;
+    /// By keyframe, of the pose against the first one (TimedPose::covariance); empty without loops,
+    /// and of more keyframes than covariance_count_max.
     std::vector<Covariance6> covariances;
     /// By loop as added: whether it was believed. False for unusable ones.
     std::vector<bool> is_kept;
@@ -104,7 +114,7 @@ class RobotGraph {
  private:
   struct BoundLoop;
   std::vector<BoundLoop> BindLoops() const;
-  std::vector<size_t> ChooseKeyframes(const std::vector<BoundLoop>& loops) const;
+  std::vector<size_t> ChooseKeyframes(const std::vector<BoundLoop>& loops, double spread) const;
   Pose3d PoseAt(TimeNs time_ns) const;
   RelativePose Odometry(size_t from, size_t to) const;
   PoseGraph MakeGraph(const std::vector<size_t>& keyframes,

@@ -212,6 +212,43 @@ TEST_F(RobotGraphTest, IsMoreCertainNearTheStartAndAfterALoop) {
   EXPECT_LT(solution->covariances[1][0], solution->covariances.back()[0]);
 }
 
+TEST_F(RobotGraphTest, ALongLogTakesKeyframesFurtherApartAndDoesNotFail) {
+  RobotGraphOptions options;
+  options.keyframe_count_max = 60;
+  RobotGraph graph(options);
+  for (size_t i = 0; i < odometry_.size(); ++i) {
+    graph.AddPose(static_cast<TimeNs>(i) * kStepNs, odometry_[i]);
+  }
+  for (size_t i = 10; i + kRound < way_.size(); i += 49) {
+    graph.AddLoop(MakeLoop(way_, i, i + kRound));
+  }
+  const auto solution = graph.Solve();
+  ASSERT_TRUE(solution.ok()) << solution.status();
+  EXPECT_GT(solution->keyframe_spread, 1.0);
+  EXPECT_LE(solution->keyframe_times.size(), 60u);
+  EXPECT_EQ(solution->kept_count, solution->loop_count);
+  EXPECT_LT(RmsM(Corrected(solution->change), way_), 0.5 * RmsM(odometry_, way_));
+}
+
+// Loops may bind more poses than covariances are found of: the correction comes without them.
+TEST_F(RobotGraphTest, MorePosesThanHaveCovariancesAreSolved) {
+  AddRightLoops();
+  const auto with = graph_.Solve();
+  ASSERT_TRUE(with.ok()) << with.status();
+  RobotGraphOptions options;
+  options.covariance_count_max = with->keyframe_times.size() - 1;
+  graph_ = RobotGraph(options);
+  for (size_t i = 0; i < odometry_.size(); ++i) {
+    graph_.AddPose(static_cast<TimeNs>(i) * kStepNs, odometry_[i]);
+  }
+  AddRightLoops();
+  const auto without = graph_.Solve();
+  ASSERT_TRUE(without.ok()) << without.status();
+  EXPECT_EQ(with->covariances.size(), with->keyframe_times.size());
+  EXPECT_TRUE(without->covariances.empty());
+  EXPECT_EQ(RmsM(Corrected(without->change), Corrected(with->change)), 0.0);
+}
+
 TEST_F(RobotGraphTest, TheSameInputGivesTheSameBits) {
   AddRightLoops();
   const auto a = graph_.Solve();
