@@ -3,7 +3,9 @@
 // Refuses to change when a stay began and ended: only where it was.
 #pragma once
 
+#include <deque>
 #include <map>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -12,13 +14,17 @@
 
 namespace dsg::ingest {
 
+/// Of an ended stay it keeps one position, in the middle, and no poses before its end: some 150
+/// bytes a stay.
+///
 /// Threads: one caller at a time.
 class StayMender {
  public:
   /// Requires: times strictly grow per agent.
   void Observe(NodeId agent, TimeNs time_ns, const Eigen::Vector3d& position_map);
 
-  /// Takes note of stays that were told.
+  /// Takes note of stays that were told. Requires: the poses of ended ones were observed, and the
+  /// stays of an agent end in order.
   void Remember(const std::vector<Stay>& stays);
 
   /// The ended stays whose room or place is not in `regions` any more, or which had no room: where
@@ -30,10 +36,17 @@ class StayMender {
     TimeNs time_ns;
     Eigen::Vector3d position_map;
   };
-  const Eigen::Vector3d* MiddleOf(const Stay& stay) const;
+  struct Told {
+    Stay stay;
+    /// Of the agent in the middle of the stay, once that has ended; unset when it was not seen.
+    std::optional<Eigen::Vector3d> middle_map;
+  };
+  std::optional<Eigen::Vector3d> MiddleOf(const Stay& stay) const;
+  void ForgetBefore(NodeId agent, TimeNs time_ns);
 
-  std::map<NodeId, std::vector<Seen>> seen_;
-  std::map<std::pair<NodeId, TimeNs>, Stay> told_;
+  /// Since the end of each agent's last stay.
+  std::map<NodeId, std::deque<Seen>> seen_;
+  std::map<std::pair<NodeId, TimeNs>, Told> told_;
 };
 
 }  // namespace dsg::ingest

@@ -41,6 +41,22 @@ TEST_F(StayMenderTest, GivesARoomToStaysThatHadNone) {
   EXPECT_EQ(mended[0].room, NodeId('R', 3));
 }
 
+// The poses of a stay go when it has ended, those of the next one remain.
+TEST_F(StayMenderTest, MendsAgainAndAgainWhatEndedLongAgo) {
+  mender_.Remember({{kRobot, NodeId(), NodeId('R', 1), 0, 501}});
+  mender_.Remember({{kRobot, NodeId(), NodeId('R', 1), 501, 1001}});
+  for (int i = 11; i <= 5000; ++i) mender_.Observe(kRobot, 100 * i, {900.0, 2.0, 0.0});
+  mender_.Remember({{kRobot, NodeId(), NodeId('R', 1), 1001, 500'001}});
+  for (const uint64_t room : {2, 3}) {
+    const RegionIndex regions({MakeRoom(room, 0, 0, 5, 5), MakeRoom(room + 10, 5, 0, 11, 5)}, {},
+                              {});
+    const std::vector<Stay> mended = mender_.Mend(regions);
+    ASSERT_EQ(mended.size(), 2u);
+    EXPECT_EQ(mended[0], (Stay{kRobot, NodeId(), NodeId('R', room), 0, 501}));
+    EXPECT_EQ(mended[1], (Stay{kRobot, NodeId(), NodeId('R', room + 10), 501, 1001}));
+  }
+}
+
 TEST_F(StayMenderTest, LeavesOpenStaysAndThoseThatAreNowhereNow) {
   mender_.Remember({{kRobot, NodeId(), NodeId('R', 1), 0, 501},
                     {kRobot, NodeId(), NodeId('R', 1), 501, kTimeMax}});
