@@ -107,6 +107,10 @@ void PrintMapping(const std::string& path, const MappingSummary& summary, bool h
     std::printf("; %lld blocks of space left out, the map is too large for its voxels",
                 static_cast<long long>(volume.refused_block_count));
   }
+  if (volume.cut_block_count > 0) {
+    std::printf("; %lld blocks too far from the others for places and rooms",
+                static_cast<long long>(volume.cut_block_count));
+  }
   std::printf("\n");
   if (!summary.note.empty()) {
     std::fprintf(stderr, "%s: note: %s\n", path.c_str(), summary.note.c_str());

@@ -97,6 +97,12 @@ class SemanticVolume::Impl {
     return meshes;
   }
 
+  OccupancyGrid MakeOccupancy(double cell_m) {
+    OccupancyGrid grid = MakeVolumeOccupancy(blocks_, cell_m);
+    counts_.cut_block_count = CountBlocksOutside(blocks_, grid.frame);
+    return grid;
+  }
+
  private:
   // Blocks of the map that the frame concerns, and fresh ones for those it has not got yet.
   std::vector<VoxelBlock*> CollectBlocks(const FrameView& view) {
@@ -199,9 +205,7 @@ std::vector<MeshBlock> SemanticVolume::TakeChangedMesh(double block_size_m) {
   return impl_->TakeChangedMesh(block_size_m);
 }
 
-OccupancyGrid SemanticVolume::MakeOccupancy(double cell_m) const {
-  return MakeVolumeOccupancy(impl_->blocks(), cell_m);
-}
+OccupancyGrid SemanticVolume::MakeOccupancy(double cell_m) { return impl_->MakeOccupancy(cell_m); }
 
 Occupancy SemanticVolume::At(const Eigen::Vector3d& point_map) const {
   const BlockMap& blocks = impl_->blocks();

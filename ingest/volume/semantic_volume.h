@@ -52,6 +52,8 @@ struct VolumeCounts {
   int64_t block_count = 0;
   /// Blocks that were not made because of block_count_max.
   int64_t refused_block_count = 0;
+  /// Blocks that the last occupancy grid left out: so far from most that no grid could hold all.
+  int64_t cut_block_count = 0;
 };
 
 /// Threads: one caller at a time.
@@ -84,8 +86,9 @@ class SemanticVolume {
   /// What has been seen of the space that holds all blocks, in cells of `cell_m` (a whole
   /// multiple of the voxel, or the voxel itself). A voxel is occupied where a surface passes
   /// through it or it is inside one: below half a voxel, nearer than At() asks for. A cell is
-  /// occupied if one of its voxels is, free if at least half of them are, else unknown.
-  OccupancyGrid MakeOccupancy(double cell_m) const;
+  /// occupied if one of its voxels is, free if at least half of them are, else unknown. What is
+  /// too far from the rest for one grid is left out, and counted (cut_block_count).
+  OccupancyGrid MakeOccupancy(double cell_m);
 
   /// What has been seen at a point: free where the distance is above one voxel, occupied where
   /// it is less and not far behind a surface.

@@ -64,6 +64,17 @@ Occupancy StateOf(const Voxel& voxel, float occupied_m) {
 
 }  // namespace
 
+int64_t CountBlocksOutside(const BlockMap& blocks, const GridFrame& frame) {
+  int64_t count = 0;
+  for (int64_t i = 0; i < blocks.size(); ++i) {
+    const BlockKey& key = blocks.block(i).key;
+    const Eigen::Vector3d middle_map =
+        (Eigen::Vector3d(key.x, key.y, key.z).array() + 0.5) * VoxelBlock::kSide * blocks.voxel_m();
+    if (!frame.Holds(frame.CellOf(middle_map))) ++count;
+  }
+  return count;
+}
+
 OccupancyGrid MakeVolumeOccupancy(const BlockMap& blocks, double cell_m) {
   OccupancyGrid grid;
   const int per_cell = std::max(1, static_cast<int>(std::lround(cell_m / blocks.voxel_m())));

@@ -13,4 +13,7 @@ namespace dsg::ingest {
 /// several voxels is occupied if one of them is, free if at least half of them are, else unknown.
 OccupancyGrid MakeVolumeOccupancy(const BlockMap& blocks, double cell_m);
 
+/// Blocks whose middle is not in `frame`.
+int64_t CountBlocksOutside(const BlockMap& blocks, const GridFrame& frame);
+
 }  // namespace dsg::ingest

@@ -111,6 +111,28 @@ TEST(VolumeBounds, GarbageMakesNoMoreBlocksThanAllowed) {
   EXPECT_LE(volume.MakeOccupancy(0.1).frame.CellCount(), int64_t{300'000'000});
 }
 
+// A jump of the pose leaves blocks at the other end of the world.
+TEST(VolumeBounds, BlocksThatNoGridCanHoldAreCounted) {
+  SemanticVolume volume((VolumeOptions()));
+  for (int i = 0; i < 6; ++i) {
+    DepthFrame frame = GoodFrame();
+    frame.map_T_camera.position.x() += 6.0 * i;
+    ASSERT_TRUE(volume.Integrate(frame).ok());
+  }
+  EXPECT_GT(volume.MakeOccupancy(0.1).frame.CellCount(), 0);
+  EXPECT_EQ(volume.counts().cut_block_count, 0);
+  const int64_t near_count = volume.counts().block_count;
+  DepthFrame far = GoodFrame();
+  far.map_T_camera.position += Eigen::Vector3d(5e4, 5e4, 0.0);
+  ASSERT_TRUE(volume.Integrate(far).ok());
+  const int64_t far_count = volume.counts().block_count - near_count;
+  ASSERT_GT(far_count, 0);
+  const OccupancyGrid grid = volume.MakeOccupancy(0.1);
+  EXPECT_EQ(grid.AtPoint({18.0, 0.0, 0.0}), Occupancy::kFree);
+  EXPECT_GE(volume.counts().cut_block_count, far_count);
+  EXPECT_LT(volume.counts().cut_block_count, near_count);
+}
+
 TEST(VolumeBounds, ReadingsBeyondTheRangeClearFreeSpaceOnly) {
   VolumeOptions options;
   options.range_m = 3.0;

@@ -41,7 +41,7 @@ int OccupiedAcross(const OccupancyGrid& grid, double y) {
 
 TEST(VolumeOccupancy, ThinWallsAreClosedAndDoorsAreOpen) {
   const TestScene scene = WallWithDoor();
-  const SemanticVolume volume = SeenFromBothSides(scene);
+  SemanticVolume volume = SeenFromBothSides(scene);
   for (const double cell_m : {0.1, 0.2}) {
     SCOPED_TRACE(cell_m);
     const OccupancyGrid grid = volume.MakeOccupancy(cell_m);
@@ -57,7 +57,7 @@ TEST(VolumeOccupancy, ThinWallsAreClosedAndDoorsAreOpen) {
 
 TEST(VolumeOccupancy, CellsAreMultiplesFromTheOriginAndAgreeWithTheScene) {
   const TestScene scene = WallWithDoor();
-  const SemanticVolume volume = SeenFromBothSides(scene);
+  SemanticVolume volume = SeenFromBothSides(scene);
   const OccupancyGrid grid = volume.MakeOccupancy(0.1);
   ASSERT_EQ(static_cast<int64_t>(grid.cells.size()), grid.frame.CellCount());
   for (int axis = 0; axis < 3; ++axis) {
