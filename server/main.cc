@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "CLI/CLI.hpp"
+#include "grpc/grpc.h"
 #include "grpc/support/log.h"
 #include "schema/base/byte_size.h"
 #include "schema/base/log.h"
@@ -159,6 +160,9 @@ int Serve(Flags flags) {
   const sigset_t signals = BlockStopSignals();
   RaiseDescriptorLimit();
   gpr_set_log_function(LogOfGrpc);
+  // Has no grpc_shutdown: the last one waits up to 10 s for a poller that gRPC 1.51 starts when a
+  // reader is slow, and the process ends anyway.
+  grpc_init();
   auto policies = ReadPolicies(flags.policy_file);
   if (!policies.ok()) return FailToStart(policies.status());
   dsg::StoreOptions store_options = flags.limits;

@@ -6,6 +6,7 @@ import os
 import signal
 import socket
 import subprocess
+import time
 import unittest
 
 import support
@@ -129,6 +130,20 @@ class Server(support.ProgramsTest):
         with self.server("store", "unix:int.sock") as process:
             process.send_signal(signal.SIGINT)
             self.assertEqual(0, process.wait(timeout=support.TIMEOUT_S))
+
+    def test_stops_at_once_after_large_replies(self):
+        with open(self.path("long.csv"), "w", encoding="utf-8") as f:
+            f.write("time_ns,agent,kind,x,y,z,qx,qy,qz,qw\n")
+            for i in range(60_000):
+                f.write(f"{i * 10_000_000},robot,robot,{i * 0.01:.2f},{i % 7},0,0,0,0,1\n")
+        self.ingest("large", "long.csv")
+        with self.server("large", "unix:large.sock") as process:
+            # A reply that does not fit a socket at once.
+            self.ok("dsg", "track", "robot", "--json", "--server", "unix:large.sock")
+            begin = time.monotonic()
+            process.send_signal(signal.SIGTERM)
+            self.assertEqual(0, process.wait(timeout=support.TIMEOUT_S))
+            self.assertLess(time.monotonic() - begin, 5)
 
 
 if __name__ == "__main__":
