@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
@@ -10,6 +11,7 @@
 #include "absl/strings/str_join.h"
 #include "ingest/log/file_bytes.h"
 #include "ingest/log/folder_log.h"
+#include "ingest/log/readers.h"
 #include "ingest/log/rgbd_layout.h"
 #include "ingest/log/text_table.h"
 #include "schema/base/status.h"
@@ -18,6 +20,7 @@
 namespace dsg::ingest {
 namespace {
 
+constexpr std::string_view kMcapBegin = "\x89MCAP0\r\n";
 // A header or a first row is far shorter; what is longer is no table.
 constexpr size_t kFirstLineMax = 65536;
 
@@ -63,6 +66,34 @@ std::string FormatOfCommaTable(const std::vector<std::string_view>& fields) {
   return "";
 }
 
+bool IsWhole(std::string_view field) {
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
+  return error == std::errc() && end == field.data() + field.size() && value == std::floor(value);
+}
+
+// Both have eight numbers between blanks. Frames and persons of obsmat are whole numbers, which
+// seconds and metres are only by chance, not ten times in a row, and no frame counts as far as
+// Unix time; and TUM files often begin with a remark, obsmat has none.
+std::string FormatOfEightColumns(std::string_view bytes, bool has_remark) {
+  if (has_remark) return "tum";
+  constexpr int kRowsMax = 10;
+  constexpr double kUnixTimeMin = 1e9;
+  LineReader lines(bytes);
+  TextLine line;
+  std::vector<std::string_view> fields;
+  for (int i = 0; i < kRowsMax && lines.Next(&line); ++i) {
+    SplitAtBlanks(line.text, &fields);
+    // The last line may be cut off here.
+    if (fields.size() < 2) break;
+    double first = 0.0;
+    std::from_chars(fields[0].data(), fields[0].data() + fields[0].size(), first);
+    if (!IsWhole(fields[0]) || first >= kUnixTimeMin) return "tum";
+    if (!IsWhole(fields[1]) && line.has_line_end) return "tum";
+  }
+  return "obsmat";
+}
+
 std::string FormatOfBytes(std::string_view bytes) {
   // Before the scene graphs, which are JSON objects too.
   const std::string begin = WithoutBlanks(bytes);
@@ -77,10 +108,22 @@ std::string FormatOfBytes(std::string_view bytes) {
   if (line.text.starts_with("#NOTE") && !lines.Next(&line)) return "";
   std::vector<std::string_view> fields;
   SplitAtCommas(line.text, &fields);
-  if (fields.size() > 1) return FormatOfCommaTable(fields);
+  if (fields.size() > 1) {
+    const std::string format = FormatOfCommaTable(fields);
+    // EuRoC calls its positions "p_RS_R_x [m]".
+    const bool has_other_names = !fields[1].starts_with("p_") && IsCsvHeader(line.text);
+    if (format == "euroc" && has_other_names) return "csv";
+    if (!format.empty()) return format;
+  }
+  if (IsCsvHeader(line.text)) return "csv";
+  const bool has_remark = line.text.starts_with('#');
+  while (line.text.starts_with('#')) {
+    if (!lines.Next(&line)) return "";
+  }
   SplitAtBlanks(line.text, &fields);
   if (!BeginsWithNumber(fields[0])) return "";
-  if (fields.size() == 8) return "obsmat";
+  if (fields.size() == 8) return FormatOfEightColumns(bytes.substr(0, kFirstLineMax), has_remark);
+  if (has_remark) return "";
   if (fields.size() == 4) return "trajnet";
   return "";
 }
@@ -106,7 +149,8 @@ bool IsEurocTable(const std::filesystem::path& path) {
 const std::vector<std::string>& FormatNames() {
   static const auto* const names = new std::vector<std::string>{
       "obsmat",      "trajnet",     "trajnet-ndjson", "thor", "euroc",  "spark-dsg",
-      "kimera-json", "region-json", "dsg-tracks",     "rgbd", "rosbag", "tesse-objects"};
+      "kimera-json", "region-json", "dsg-tracks",     "rgbd", "rosbag", "tesse-objects",
+      "tum",         "csv"};
   return *names;
 }
 
@@ -131,6 +175,11 @@ std::string FindEurocFile(const std::string& folder) {
   return "";
 }
 
+bool IsBagBegin(std::string_view bytes) {
+  return bytes.starts_with(kMcapBegin) || bytes.starts_with("#ROSBAG") ||
+         bytes.starts_with("#ROSRECORD");
+}
+
 absl::StatusOr<bool> IsBag(const std::string& path) {
   // Opening a pipe would wait for its other end.
   if (!IsFile(path)) return false;
@@ -138,7 +187,7 @@ absl::StatusOr<bool> IsBag(const std::string& path) {
   std::string begin(16, '\0');
   in.read(begin.data(), static_cast<std::streamsize>(begin.size()));
   begin.resize(static_cast<size_t>(in.gcount()));
-  if (begin.starts_with("\x89MCAP0\r\n")) {
+  if (begin.starts_with(kMcapBegin)) {
     return MakeError(Reason::kFileMalformed,
                      absl::StrCat(path,
                                   ": is an MCAP file, which is not supported; convert it to a "

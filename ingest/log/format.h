@@ -25,6 +25,9 @@ absl::StatusOr<std::string> DetectFolderFormat(const std::string& folder);
 /// Errors: INVALID_ARGUMENT/FILE_MALFORMED for bags that are not read: version 1, MCAP.
 absl::StatusOr<bool> IsBag(const std::string& path);
 
+/// Whether bytes begin like a bag of any version or kind.
+bool IsBagBegin(std::string_view bytes);
+
 /// The ground truth inside an EuRoC folder ("mav0", its parent, or
 /// "state_groundtruth_estimate0"); empty when the folder is none.
 std::string FindEurocFile(const std::string& folder);

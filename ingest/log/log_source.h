@@ -76,7 +76,7 @@ using Measurement = std::variant<PoseMeasurement, GraphMeasurement, ImuMeasureme
 /// What a reader knows of its log before the first measurement.
 struct LogInfo {
   /// "obsmat", "trajnet", "trajnet-ndjson", "thor", "euroc", "spark-dsg", "kimera-json",
-  /// "region-json", "dsg-tracks", "rgbd", "rosbag", "tesse-objects".
+  /// "region-json", "dsg-tracks", "rgbd", "rosbag", "tesse-objects", "tum", "csv".
   std::string format;
   std::string path;
   /// SHA-256 of the log's bytes, hexadecimal: the identity of the log. Of image files only names
@@ -132,7 +132,7 @@ struct LogOptions {
   std::string agent_prefix;
   /// Edge of the blocks that a mesh in the log is cut into: the map's.
   double mesh_block_size_m = 2.0;
-  /// Refuse a scene graph of which anything would be skipped.
+  /// Refuse a scene graph or trajectory of which anything would be skipped.
   bool is_strict = false;
   /// Of sensor logs.
   PoseSource poses = PoseSource::kAuto;
@@ -157,7 +157,8 @@ class LogSource {
   virtual absl::StatusOr<std::optional<Measurement>> Next() = 0;
 };
 
-/// Opens a log file or folder, finding out its format unless told.
+/// Opens a log file or folder, finding out its format unless told. "-" is standard input, for
+/// logs of text and scene graphs; these may also be packed by gzip or Zstandard.
 ///
 /// Errors: NOT_FOUND for a missing path; INVALID_ARGUMENT/FILE_MALFORMED when the format cannot be
 /// told or the file is empty, truncated or not what it claims to be.

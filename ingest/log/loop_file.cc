@@ -14,7 +14,7 @@
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
-#include "ingest/log/file_bytes.h"
+#include "ingest/log/log_input.h"
 #include "schema/base/status.h"
 #include "schema/base/utf8.h"
 #include "schema/model/delta_check.h"
@@ -226,7 +226,7 @@ absl::StatusOr<std::optional<SensorChannel>> ReadLoopChannel(const LogOptions& o
     digest->AddSize(name, 0);
     return loops.TakeChannel(&info->notes);
   }
-  DSG_ASSIGN_OR_RETURN(const LogFile file, ReadLogFile(path));
+  DSG_ASSIGN_OR_RETURN(const LogFile file, ReadInput(path));
   digest->Add(name, file.bytes);
   LineReader lines(file.bytes);
   TextLine line;

@@ -6,6 +6,7 @@
 #include "ingest/log/bag_log.h"
 #include "ingest/log/folder_log.h"
 #include "ingest/log/format.h"
+#include "ingest/log/log_input.h"
 #include "ingest/log/log_source.h"
 #include "ingest/log/readers.h"
 #include "ingest/log/rgbd_layout.h"
@@ -78,9 +79,27 @@ OpenedLog OpenFile(const LogFile& file, const std::string& format, const LogOpti
   if (format == "trajnet-ndjson") return ReadTrajnetNdjson(file, options);
   if (format == "thor") return ReadThor(file, options);
   if (format == "euroc") return ReadEuroc(file, options);
+  if (format == "tum") return ReadTum(file, options);
+  if (format == "csv") return ReadCsv(file, options);
   if (format == "dsg-tracks") return ReadTracks(std::nullopt, file, options);
   if (format == "tesse-objects") return ReadTesseObjects(file, options);
   return ReadSceneGraphLog(file, options);
+}
+
+// A log that is read whole.
+OpenedLog OpenInput(const std::string& path, const LogOptions& options) {
+  DSG_ASSIGN_OR_RETURN(const LogFile file, ReadInput(path));
+  if (IsBagBegin(file.bytes)) {
+    return MalformedFile(file.path,
+                         "is a bag, of which single messages are read where they lie; unpack or "
+                         "save it to a file and give that");
+  }
+  std::string format = options.format;
+  if (format == "auto") {
+    DSG_ASSIGN_OR_RETURN(format, DetectFileFormat(file.bytes, file.path));
+  }
+  DSG_RETURN_IF_ERROR(CheckPoseOptions(file.path, format, options));
+  return OpenFile(file, format, options);
 }
 
 OpenedLog OpenEuroc(const std::string& folder, const LogOptions& options) {
@@ -120,6 +139,7 @@ OpenedLog OpenFolder(const std::string& folder, const LogOptions& options) {
 absl::StatusOr<std::unique_ptr<LogSource>> OpenLog(const std::string& path,
                                                    const LogOptions& options) {
   DSG_RETURN_IF_ERROR(CheckOptions(options));
+  if (path == kStandardInput) return OpenInput(path, options);
   std::error_code error;
   if (fs::is_directory(path, error)) return OpenFolder(path, options);
   // Bags may be larger than the memory.
@@ -132,13 +152,7 @@ absl::StatusOr<std::unique_ptr<LogSource>> OpenLog(const std::string& path,
                      {{"file", path}});
   }
   if (is_bag) return OpenBag(path, options);
-  DSG_ASSIGN_OR_RETURN(const LogFile file, ReadLogFile(path));
-  std::string format = options.format;
-  if (format == "auto") {
-    DSG_ASSIGN_OR_RETURN(format, DetectFileFormat(file.bytes, path));
-  }
-  DSG_RETURN_IF_ERROR(CheckPoseOptions(path, format, options));
-  return OpenFile(file, format, options);
+  return OpenInput(path, options);
 }
 
 }  // namespace dsg::ingest

@@ -72,23 +72,6 @@ absl::Status AddTumRow(const LinePosition& at, const std::vector<std::string_vie
   return absl::OkStatus();
 }
 
-absl::StatusOr<TrackTable> ReadTumPoses(const LogFile& file, const std::string& robot_name) {
-  TrackTable table;
-  table.file = file.path;
-  const int32_t agent = table.FindOrAdd(robot_name, kinds::kRobot);
-  LineReader lines(file.bytes);
-  TextLine line;
-  std::vector<std::string_view> fields;
-  while (lines.Next(&line)) {
-    if (line.text.starts_with('#')) continue;
-    const LinePosition at{file.path, line.number};
-    SplitAtBlanks(line.text, &fields);
-    DSG_RETURN_IF_ERROR(CheckFieldCount(at, line, fields.size(), 8, "timestamp x y z qx qy qz qw"));
-    DSG_RETURN_IF_ERROR(AddTumRow(at, fields, agent, &table));
-  }
-  return table;
-}
-
 }  // namespace
 
 absl::StatusOr<TrackTable> ReadEurocPoses(const LogFile& file, const std::string& robot_name) {
@@ -111,6 +94,23 @@ absl::StatusOr<TrackTable> ReadEurocPoses(const LogFile& file, const std::string
     if (column_count == 0) column_count = fields.size() == 8 ? 8 : 17;
     DSG_RETURN_IF_ERROR(CheckFieldCount(at, line, fields.size(), column_count, kPoseColumns));
     DSG_RETURN_IF_ERROR(AddPoseRow(at, fields, agent, &table));
+  }
+  return table;
+}
+
+absl::StatusOr<TrackTable> ReadTumPoses(const LogFile& file, const std::string& robot_name) {
+  TrackTable table;
+  table.file = file.path;
+  const int32_t agent = table.FindOrAdd(robot_name, kinds::kRobot);
+  LineReader lines(file.bytes);
+  TextLine line;
+  std::vector<std::string_view> fields;
+  while (lines.Next(&line)) {
+    if (line.text.starts_with('#')) continue;
+    const LinePosition at{file.path, line.number};
+    SplitAtBlanks(line.text, &fields);
+    DSG_RETURN_IF_ERROR(CheckFieldCount(at, line, fields.size(), 8, "timestamp x y z qx qy qz qw"));
+    DSG_RETURN_IF_ERROR(AddTumRow(at, fields, agent, &table));
   }
   return table;
 }

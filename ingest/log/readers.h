@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "absl/status/statusor.h"
 #include "ingest/log/file_bytes.h"
@@ -31,6 +32,15 @@ OpenedLog ReadThor(const LogFile& file, const LogOptions& options);
 
 /// EuRoC state_groundtruth_estimate0/data.csv: stamp [ns, UNIX], p x y z, q w x y z, ...
 OpenedLog ReadEuroc(const LogFile& file, const LogOptions& options);
+
+/// TUM: t [s], x y z, q x y z w between blanks: one robot's poses.
+OpenedLog ReadTum(const LogFile& file, const LogOptions& options);
+
+/// A table with a header that names its columns: a time, x, y, and perhaps z, qx qy qz qw, an
+/// agent's name and its kind. docs/sensor_logs.md, "Tables of poses".
+OpenedLog ReadCsv(const LogFile& file, const LogOptions& options);
+/// Whether a line is such a header.
+bool IsCsvHeader(std::string_view line);
 
 /// Spark-DSG, Kimera and region files. `format` is "auto" or what the file must turn out to be.
 OpenedLog ReadSceneGraphLog(const LogFile& file, const LogOptions& options);

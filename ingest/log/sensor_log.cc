@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/log/log_input.h"
 #include "ingest/log/pose_table.h"
 #include "ingest/log/text_table.h"
 #include "schema/base/status.h"
@@ -162,7 +163,7 @@ absl::StatusOr<std::optional<TrackTable>> ChoosePoses(const LogOptions& options,
       return NoPoses("gt", absl::StrCat("--pose-file ", options.pose_file,
                                         " is not the log's ground truth; give --poses external"));
     }
-    DSG_ASSIGN_OR_RETURN(const LogFile file, ReadLogFile(options.pose_file));
+    DSG_ASSIGN_OR_RETURN(const LogFile file, ReadInput(options.pose_file));
     digest->Add("--pose-file", file.bytes);
     DSG_ASSIGN_OR_RETURN(tables.external, ReadPoseTable(file, RobotName(options)));
   }
@@ -180,6 +181,7 @@ absl::StatusOr<std::optional<TrackTable>> ChoosePoses(const LogOptions& options,
       "the robot's poses are ",
       choice == PoseChoice::kExternal ? "external: " : "the log's ground truth: ", table.file));
   DSG_RETURN_IF_ERROR(CheckHasRows(table));
+  DropRepeats(options.is_strict, &table, &info->notes);
   DSG_RETURN_IF_ERROR(CheckOrder(table, "time"));
   return table;
 }

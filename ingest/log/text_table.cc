@@ -48,7 +48,7 @@ bool ScaleToNs(__int128 mantissa, int exponent, TimeNs* result) {
   return mantissa <= kTimeMax;
 }
 
-bool ReadSeconds(std::string_view text, TimeNs* result) {
+bool ReadSeconds(std::string_view text, int power, TimeNs* result) {
   const bool negative = !text.empty() && text[0] == '-';
   if (!text.empty() && (text[0] == '-' || text[0] == '+')) text.remove_prefix(1);
   __int128 mantissa = 0;
@@ -74,16 +74,16 @@ bool ReadSeconds(std::string_view text, TimeNs* result) {
   if (!has_digit) return false;
   if (at < text.size()) {
     if (text[at] != 'e' && text[at] != 'E') return false;
-    std::string_view power = text.substr(at + 1);
-    if (!power.empty() && power[0] == '+') power.remove_prefix(1);
+    std::string_view digits = text.substr(at + 1);
+    if (!digits.empty() && digits[0] == '+') digits.remove_prefix(1);
     int shift = 0;
-    const auto [end, error] = std::from_chars(power.data(), power.data() + power.size(), shift);
-    if (error != std::errc() || end != power.data() + power.size() || std::abs(shift) > 99) {
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), shift);
+    if (error != std::errc() || end != digits.data() + digits.size() || std::abs(shift) > 99) {
       return false;
     }
     exponent += shift;
   }
-  if (!ScaleToNs(mantissa, exponent, result)) return false;
+  if (!ScaleToNs(mantissa, exponent + power, result)) return false;
   if (negative) *result = -*result;
   return true;
 }
@@ -114,11 +114,11 @@ void SplitAtBlanks(std::string_view text, std::vector<std::string_view>* fields)
   }
 }
 
-void SplitAtCommas(std::string_view text, std::vector<std::string_view>* fields) {
+void SplitAtCommas(std::string_view text, std::vector<std::string_view>* fields, char comma) {
   fields->clear();
   size_t begin = 0;
   while (true) {
-    const size_t end = text.find(',', begin);
+    const size_t end = text.find(comma, begin);
     fields->push_back(Trim(text.substr(begin, end - begin)));
     if (end == std::string_view::npos) return;
     begin = end + 1;
@@ -215,11 +215,13 @@ absl::StatusOr<std::string> ParsePersonName(const LinePosition& at, std::string_
 }
 
 absl::StatusOr<TimeNs> ParseSeconds(const LinePosition& at, std::string_view field,
-                                    std::string_view text) {
+                                    std::string_view text, int power) {
   TimeNs value = 0;
-  if (!ReadSeconds(text, &value)) {
-    return at.FieldError(field, text,
-                         "decimal seconds within +-292 years are due; correct or remove the line");
+  if (!ReadSeconds(text, power, &value)) {
+    const std::string unit = power == 0 ? "seconds" : absl::StrCat("seconds times 1e", power);
+    return at.FieldError(
+        field, text,
+        absl::StrCat("decimal ", unit, " within +-292 years are due; correct or remove the line"));
   }
   return value;
 }

@@ -40,8 +40,8 @@ class LineReader {
 
 /// Fields between runs of blanks and tabs.
 void SplitAtBlanks(std::string_view text, std::vector<std::string_view>* fields);
-/// Fields between commas, blanks around them removed.
-void SplitAtCommas(std::string_view text, std::vector<std::string_view>* fields);
+/// Fields between commas, or another character, blanks around them removed.
+void SplitAtCommas(std::string_view text, std::vector<std::string_view>* fields, char comma = ',');
 
 /// A line of a file, for messages.
 struct LinePosition {
@@ -73,9 +73,10 @@ absl::StatusOr<int64_t> ParseInteger(const LinePosition& at, std::string_view fi
 absl::StatusOr<int64_t> ParseFrame(const LinePosition& at, std::string_view text);
 /// A person's number as an agent name: an integer >= 0, printed without decimals.
 absl::StatusOr<std::string> ParsePersonName(const LinePosition& at, std::string_view text);
-/// Decimal seconds as nanoseconds, exactly; digits beyond the ninth decimal are rounded.
+/// Decimal seconds as nanoseconds, exactly; digits beyond the ninth decimal are rounded. Other
+/// units by their power of ten: -3 = milliseconds, -6, -9.
 absl::StatusOr<TimeNs> ParseSeconds(const LinePosition& at, std::string_view field,
-                                    std::string_view text);
+                                    std::string_view text, int power = 0);
 /// A quaternion made unit. Errors: FILE_MALFORMED when its norm is not within
 /// kQuaternionNormTolerance of 1.
 absl::StatusOr<Eigen::Quaterniond> Normalize(const LinePosition& at, const Eigen::Quaterniond& q);

@@ -106,6 +106,45 @@ absl::Status CheckOrder(const TrackTable& table, std::string_view unit) {
   return absl::OkStatus();
 }
 
+void DropRepeats(bool is_strict, TrackTable* table, std::vector<std::string>* notes) {
+  if (is_strict) return;
+  std::vector<TrackRow> kept;
+  kept.reserve(table->rows.size());
+  std::vector<std::optional<TimeNs>> last(table->agents.size());
+  int64_t first_line = 0;
+  for (const TrackRow& row : table->rows) {
+    std::optional<TimeNs>& last_ns = last[static_cast<size_t>(row.agent)];
+    if (last_ns == row.time_ns) {
+      if (first_line == 0) first_line = row.line;
+      continue;
+    }
+    last_ns = row.time_ns;
+    kept.push_back(row);
+  }
+  const size_t count = table->rows.size() - kept.size();
+  if (count == 0 || count * 100 > table->rows.size()) return;
+  table->rows = std::move(kept);
+  notes->push_back(absl::StrCat(count, " of ", table->rows.size() + count, " rows of ", table->file,
+                                " repeat the stamp of the row before (first in line ", first_line,
+                                "): the first row of a stamp counts; --strict refuses them"));
+}
+
+absl::Status SetClock(const LogOptions& options, TrackTable* table, LogInfo* info) {
+  if (table->rows.empty()) return absl::OkStatus();
+  info->clock = ClockOf(table->rows.front().time_ns);
+  info->has_clock = info->clock == Clock::kUnix;
+  const TimeNs epoch_ns = info->has_clock ? 0 : options.epoch_ns;
+  for (TrackRow& row : table->rows) {
+    DSG_ASSIGN_OR_RETURN(row.time_ns,
+                         AddToEpoch(LinePosition{table->file, row.line}, epoch_ns, row.time_ns));
+  }
+  if (!info->has_clock) {
+    info->notes.push_back(
+        "the stamps are before 2001-09-09, so they count from the epoch of the map (--epoch)");
+  }
+  return absl::OkStatus();
+}
+
 std::unique_ptr<LogSource> MakeTrackLog(TrackTable table, std::optional<GraphMeasurement> graph,
                                         LogInfo info) {
   std::sort(table.rows.begin(), table.rows.end(), [&table](const TrackRow& a, const TrackRow& b) {

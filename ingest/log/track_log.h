@@ -52,6 +52,16 @@ absl::Status CheckHasRows(const TrackTable& table);
 /// Errors: FILE_MALFORMED naming file, line, agent, both times and what to do.
 absl::Status CheckOrder(const TrackTable& table, std::string_view unit);
 
+/// Removes rows that give an agent a second position at a stamp, if they are at most one of a
+/// hundred rows: motion capture and recorders do that now and then. The first one stays; `notes`
+/// says how many went. With `is_strict`, nothing. For CheckOrder to judge what is left.
+void DropRepeats(bool is_strict, TrackTable* table, std::vector<std::string>* notes);
+
+/// Rows whose stamps may be of any clock: from 2001-09-09 on they are Unix time, before they count
+/// from the epoch of the map, which is added to them. Says in `info` which.
+/// Errors: FILE_MALFORMED naming the line when a sum does not fit in 64 bits.
+absl::Status SetClock(const LogOptions& options, TrackTable* table, LogInfo* info);
+
 /// A log that yields `graph` (if any), then the rows by time and agent name. Fills in what
 /// `info` has of counts and first stamp. Requires: CheckOrder holds for nanoseconds.
 std::unique_ptr<LogSource> MakeTrackLog(TrackTable table, std::optional<GraphMeasurement> graph,

@@ -124,4 +124,13 @@ inline void ExpectMalformedFile(const absl::Status& status, const std::vector<st
   }
 }
 
+/// The same of the file "log.txt" with these bytes, read as `format`.
+inline void ExpectMalformed(const std::string& bytes, const std::string& format,
+                            const std::vector<std::string>& parts) {
+  const TempFolder folder;
+  LogOptions options;
+  options.format = format;
+  ExpectMalformedFile(ReadAll(folder.Write("log.txt", bytes), options).status(), parts);
+}
+
 }  // namespace dsg::ingest

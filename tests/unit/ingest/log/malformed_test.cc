@@ -9,20 +9,6 @@
 namespace dsg::ingest {
 namespace {
 
-// Reads `bytes` as `format` and expects FILE_MALFORMED whose message holds all of `parts`.
-void ExpectMalformed(const std::string& bytes, const std::string& format,
-                     const std::vector<std::string>& parts) {
-  const TempFolder folder;
-  LogOptions options;
-  options.format = format;
-  const absl::Status status = ReadAll(folder.Write("log.txt", bytes), options).status();
-  EXPECT_EQ(ReasonOf(status), Reason::kFileMalformed) << bytes;
-  for (const std::string& part : parts) {
-    EXPECT_NE(std::string(status.message()).find(part), std::string::npos)
-        << "no \"" << part << "\" in: " << status.message();
-  }
-}
-
 TEST(ObsmatReader, RejectsBackwardTimeNamingTheLine) {
   ExpectMalformed("10 1 0 0 0 0 0 0\n0 2 0 0 0 0 0 0\n0 1 1 0 0 0 0 0\n", "obsmat",
                   {"log.txt:3", "\"1\"", "frame 10", "line 1", "frame 0", "sort the log"});

@@ -20,6 +20,9 @@ TEST(OpenLog, TellsFormatsByContentNotByName) {
   EXPECT_EQ(FormatOrError(folder, "Time,x,y,z,ag_id,data_label,tracklet_id\n0,0,0,0,H,a,1\n"),
             "thor");
   EXPECT_EQ(FormatOrError(folder, "1403636584263555584,4,1,0,1,0,0,0\n"), "euroc");
+  EXPECT_EQ(FormatOrError(folder, "# one\n# two\n0 0 0 0 0 0 0 1\n"), "tum");
+  EXPECT_EQ(FormatOrError(folder, "time,id,x,y,z\n0,1,0,0,0\n"), "csv");
+  EXPECT_EQ(FormatOrError(folder, "#timestamp [s],x,y,z,qx,qy,qz,qw\n0,1,0,0,0,0,0,1\n"), "csv");
   EXPECT_EQ(
       FormatOrError(folder, "time_ns,agent,kind,x,y,z,qx,qy,qz,qw\n0,a,human,0,0,0,0,0,0,1\n"),
       "dsg-tracks");

@@ -56,7 +56,11 @@ INSTANTIATE_TEST_SUITE_P(
         RealLog{"people-lcas/lcas.ndjson", "trajnet-ndjson", 9610, 304, 362'400'000'000},
         RealLog{"people-thor-magni/Scenario_5.csv", "thor", 10040, 502, 333'200'000'000},
         RealLog{"euroc-imu-groundtruth/V1_02_medium", "euroc", 16702, 1, 83'504'999'936},
-        RealLog{"euroc-mh01-stereo", "euroc", 1791, 1, 8'949'999'872}));
+        RealLog{"euroc-mh01-stereo", "euroc", 1791, 1, 8'949'999'872},
+        // One stamp of the 20957 comes twice.
+        RealLog{"trajectories/fr2_desk_groundtruth.txt", "tum", 20956, 1, 99'364'500'000},
+        RealLog{"trajectories/fr2_desk_ORB.txt", "tum", 2893, 1, 98'822'348'000},
+        RealLog{"trajectories/fr2_desk_ORB_kf_mono.txt", "tum", 157, 1, 91'019'051'000}));
 
 TEST(RealLogs, FirstPoseOfEthIsItsFirstRow) {
   if (DataFolder().empty()) GTEST_SKIP() << "the real data is not there; set DSG_DATA";

@@ -21,6 +21,14 @@ TEST(ParseSeconds, IsExactToTheNanosecond) {
   EXPECT_EQ(*ParseSeconds(kAt, "Time", "125e-3"), 125'000'000);
 }
 
+TEST(ParseSeconds, TakesOtherUnits) {
+  EXPECT_EQ(*ParseSeconds(kAt, "Time", "1600000000000.5", -3), 1'600'000'000'000'500'000);
+  EXPECT_EQ(*ParseSeconds(kAt, "Time", "7", -6), 7'000);
+  EXPECT_EQ(*ParseSeconds(kAt, "Time", "1403715524907143168", -9), 1'403'715'524'907'143'168);
+  EXPECT_EQ(*ParseSeconds(kAt, "Time", "1.5", -9), 2);
+  EXPECT_FALSE(ParseSeconds(kAt, "Time", "9300000000000", -3).ok());
+}
+
 TEST(ParseSeconds, RoundsDigitsBeyondTheNinthDecimal) {
   EXPECT_EQ(*ParseSeconds(kAt, "Time", "0.1234567894"), 123'456'789);
   EXPECT_EQ(*ParseSeconds(kAt, "Time", "0.1234567895"), 123'456'790);
