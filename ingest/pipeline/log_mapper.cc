@@ -69,7 +69,8 @@ LogMapper::LogMapper(const LogInfo& info, const MappingOptions& options,
       has_depth_camera_(info.channel_counts.contains("depth0")),
       has_color_camera_(info.channel_counts.contains("color0")),
       frames_(info.rig, WithClasses(options, labels_).depth),
-      layers_(WithClasses(options, labels_), labels_, numbering) {}
+      layers_(WithClasses(options, labels_), labels_, numbering),
+      mesh_told_(options.mesh_wait_max_ns) {}
 
 bool LogMapper::Uses(std::string_view channel) const {
   if (channel == "label0") return true;
@@ -108,14 +109,15 @@ absl::Status LogMapper::Advance() {
   }
 }
 
-GraphDelta LogMapper::TakeMesh() {
+GraphDelta LogMapper::TakeMesh(TimeNs now_ns, bool is_last) {
+  for (const BlockIndex& index : layers_.UpdateMesh(mesh_block_size_m_)) {
+    mesh_told_.Note(index, layers_.FindBlock(index) != nullptr, now_ns);
+  }
+  MeshTold::Due due = mesh_told_.TakeDue(now_ns, is_last);
   GraphDelta delta;
-  for (MeshBlock& block : layers_.TakeMesh(mesh_block_size_m_)) {
-    if (block.positions_map.empty()) {
-      delta.mesh_removals.push_back(block.index);
-    } else {
-      delta.mesh_blocks.push_back(std::move(block));
-    }
+  delta.mesh_removals = std::move(due.removed);
+  for (const BlockIndex& index : due.written) {
+    delta.mesh_blocks.push_back(*layers_.FindBlock(index));
   }
   return delta;
 }

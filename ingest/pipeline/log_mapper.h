@@ -16,6 +16,7 @@
 #include "ingest/log/log_source.h"
 #include "ingest/pipeline/map_view.h"
 #include "ingest/pipeline/mapping_options.h"
+#include "ingest/pipeline/mesh_told.h"
 #include "ingest/pipeline/region_index.h"
 #include "ingest/pipeline/static_layers.h"
 
@@ -67,8 +68,8 @@ class LogMapper {
     GraphDelta regions;
   };
   LayerChange TakeLayers(TimeNs now_ns);
-  /// Mesh blocks that changed.
-  GraphDelta TakeMesh();
+  /// Mesh blocks that changed and are due (MeshTold); with `is_last` all that changed.
+  GraphDelta TakeMesh(TimeNs now_ns, bool is_last);
 
   /// Of the last TakeLayers: heights of floors, the layers, the mesh, and whether nothing stands
   /// between a point and a place.
@@ -94,6 +95,7 @@ class LogMapper {
   FrameMaker frames_;
   StaticLayers layers_;
   GraphTold told_;
+  MeshTold mesh_told_;
   LayerGraph graph_;
   std::function<void(const DepthFrame&)> on_frame_;
 };

@@ -221,7 +221,7 @@ absl::Status LogRun::CommitIfDue(TimeNs now_ns) {
 // Stays end before what they are in is retired, and begin after what they are in is there.
 absl::Status LogRun::Commit(TimeNs now_ns, bool is_update, bool is_last) {
   GraphDelta delta;
-  if (mapper_ != nullptr) delta = mapper_->TakeMesh();
+  if (mapper_ != nullptr) delta = mapper_->TakeMesh(now_ns, is_last);
   if (is_update) {
     GraphDelta layers = TakeLayers(now_ns);
     layers.mesh_blocks = std::move(delta.mesh_blocks);

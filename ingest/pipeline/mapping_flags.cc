@@ -59,6 +59,10 @@ void AddMappingFlags(CLI::App* app, MappingFlags* flags) {
   app->add_option("--commit-seconds", flags->commit_s, "Log time between commits")
       ->capture_default_str()
       ->group(group);
+  app->add_option("--mesh-seconds", flags->mesh_s,
+                  "Log time that a change of the mesh waits for its commit at most, 2 to 3600")
+      ->capture_default_str()
+      ->group(group);
   app->add_option("--layers-seconds", flags->layers_s,
                   "Least log time between updates of objects, places and rooms")
       ->capture_default_str()
@@ -84,6 +88,7 @@ absl::StatusOr<MappingOptions> MakeMappingOptions(const MappingFlags& flags) {
   if (flags.places == "volume") options.places.mode = PlaceMode::kVolume;
   options.places.robot_radius_m = flags.robot_radius_m;
   DSG_ASSIGN_OR_RETURN(options.commit_period_ns, Nanoseconds("commit-seconds", flags.commit_s));
+  DSG_ASSIGN_OR_RETURN(options.mesh_wait_max_ns, Nanoseconds("mesh-seconds", flags.mesh_s));
   DSG_ASSIGN_OR_RETURN(options.layers_period_ns, Nanoseconds("layers-seconds", flags.layers_s));
   DSG_RETURN_IF_ERROR(options.Validate());
   if (!flags.cad_folder.empty()) {

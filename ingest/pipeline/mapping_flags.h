@@ -24,6 +24,7 @@ struct MappingFlags {
   std::string places = "ground";
   double robot_radius_m = PlaceOptions().robot_radius_m;
   double commit_s = 1.0;
+  double mesh_s = 32.0;
   double layers_s = 5.0;
   int thread_count = VolumeOptions().thread_count;
   bool has_timings = false;

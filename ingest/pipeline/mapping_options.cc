@@ -25,6 +25,7 @@ absl::Status MappingOptions::Validate() const {
     return static_cast<double>(time_ns) / static_cast<double>(kNsPerSecond);
   };
   DSG_RETURN_IF_ERROR(CheckRange("commit period", seconds(commit_period_ns), 0.1, 3600.0));
+  DSG_RETURN_IF_ERROR(CheckRange("mesh wait", seconds(mesh_wait_max_ns), 2.0, 3600.0));
   return CheckRange("layers period", seconds(layers_period_ns), 0.1, 86400.0);
 }
 
@@ -40,7 +41,7 @@ std::string MappingOptions::Digest() const {
       " blocks=", volume.block_count_max, " places=", static_cast<int>(places.mode),
       " radius=", places.robot_radius_m, " rooms=", static_cast<int>(rooms.method),
       " upright=", shapes.is_upright, " shapes=", shapes_digest, " commit=", commit_period_ns,
-      " layers=", layers_period_ns, " cell=", grid_cell_m);
+      " mesh_wait=", mesh_wait_max_ns, " layers=", layers_period_ns, " cell=", grid_cell_m);
 }
 
 }  // namespace dsg::ingest

@@ -27,6 +27,9 @@ struct MappingOptions {
   std::vector<CadModel> catalogue;
   /// Log time between two commits of poses and mesh.
   TimeNs commit_period_ns = kNsPerSecond;
+  /// Log time that a change of the mesh may wait for its commit (MeshTold): each version of a block
+  /// stays in the history.
+  TimeNs mesh_wait_max_ns = 32 * kNsPerSecond;
   /// Least log time between two updates of objects, places, structures and rooms. A large map is
   /// updated less often, by its size.
   TimeNs layers_period_ns = 5 * kNsPerSecond;

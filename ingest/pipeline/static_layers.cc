@@ -66,17 +66,24 @@ absl::Status StaticLayers::Integrate(const DepthFrame& frame) {
   return absl::OkStatus();
 }
 
-std::vector<MeshBlock> StaticLayers::TakeMesh(double block_size_m) {
+std::vector<BlockIndex> StaticLayers::UpdateMesh(double block_size_m) {
   const StageClock::Span span(&clock_, "mesh");
-  std::vector<MeshBlock> changed = volume_.TakeChangedMesh(block_size_m);
-  for (const MeshBlock& block : changed) {
+  std::vector<BlockIndex> changed;
+  for (MeshBlock& block : volume_.TakeChangedMesh(block_size_m)) {
+    const BlockIndex index = block.index;
+    changed.push_back(index);
     if (block.positions_map.empty()) {
-      mesh_.erase(block.index);
+      mesh_.erase(index);
     } else {
-      mesh_[block.index] = block;
+      mesh_[index] = std::move(block);
     }
   }
   return changed;
+}
+
+const MeshBlock* StaticLayers::FindBlock(const BlockIndex& index) const {
+  const auto found = mesh_.find(index);
+  return found == mesh_.end() ? nullptr : &found->second;
 }
 
 std::vector<const MeshBlock*> StaticLayers::Mesh() const {

@@ -45,13 +45,15 @@ class StaticLayers {
   /// Errors: of SemanticVolume::Integrate; nothing has changed then.
   absl::Status Integrate(const DepthFrame& frame);
 
-  /// Blocks that changed since the last call.
-  std::vector<MeshBlock> TakeMesh(double block_size_m);
+  /// Makes the mesh anew where the volume has changed. Returns the blocks that changed, ascending.
+  std::vector<BlockIndex> UpdateMesh(double block_size_m);
 
-  /// All blocks, ascending by index, until the next call of TakeMesh.
+  /// Until the next call of UpdateMesh: all blocks, ascending by index, and one, nullptr without a
+  /// surface.
   std::vector<const MeshBlock*> Mesh() const;
+  const MeshBlock* FindBlock(const BlockIndex& index) const;
 
-  /// Finds all layers above the mesh anew. Call TakeMesh before.
+  /// Finds all layers above the mesh anew. Call UpdateMesh before.
   LayerGraph Update(TimeNs now_ns, bool is_last);
 
   /// CAD models that nodes refer to for the first time since the last call.

@@ -131,6 +131,7 @@ class StaticLayers(support.ProgramsTest):
                              (["--range", "-1"], ["range"]),
                              (["--masking", "melt"], ["masking", "melt"]),
                              (["--commit-seconds", "0"], ["commit"]),
+                             (["--mesh-seconds", "1"], ["mesh", "1"]),
                              (["--robot-radius", "99"], ["robot", "99"])):
             with self.subTest(flags=flags):
                 self.refused(2, words, "dsg-ingest", "--store", "bad", "--map", "home", "--poses",
