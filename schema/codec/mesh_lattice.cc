@@ -16,7 +16,8 @@ namespace {
 
 using Steps = std::array<int64_t, 3>;
 
-// The distance of two points is what coordinates of one face differ by most often.
+// The distance of two points is what coordinates of one face differ by most often. In a block of
+// few faces something else may be; such blocks are small in any form.
 constexpr size_t kFacesForPitch = 256;
 // Coordinates beyond are no steps of the grid: a float is coarser.
 constexpr double kCoordinateMaxM = 1e5;
