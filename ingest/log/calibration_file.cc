@@ -157,6 +157,14 @@ absl::Status CheckType(const Section& section, const std::string& type) {
       .FieldError("sensor_type", found, absl::StrCat(type, " is due here"));
 }
 
+// Of the coefficients that the camera has; all zero is none.
+void KeepDistortion(Distortion distortion, CameraCalibration* camera) {
+  const std::vector<double>& k = camera->distortion_coefficients;
+  const bool is_none = std::all_of(k.begin(), k.end(), [](double value) { return value == 0.0; });
+  camera->distortion = is_none ? Distortion::kNone : distortion;
+  if (is_none) camera->distortion_coefficients.clear();
+}
+
 absl::Status ReadDistortion(const Section& section, CameraCalibration* camera) {
   if (!section.Has("distortion_model")) return section.Missing("distortion_model");
   DSG_ASSIGN_OR_RETURN(const std::string model, section.Text("distortion_model"));
@@ -170,11 +178,7 @@ absl::Status ReadDistortion(const Section& section, CameraCalibration* camera) {
         .FieldError("distortion_model", model, "use radial-tangential, equidistant or none");
   }
   DSG_ASSIGN_OR_RETURN(camera->distortion_coefficients, section.Numbers("distortion_coefficients"));
-  const std::vector<double>& k = camera->distortion_coefficients;
-  if (std::all_of(k.begin(), k.end(), [](double value) { return value == 0.0; })) {
-    camera->distortion = Distortion::kNone;
-    camera->distortion_coefficients.clear();
-  }
+  KeepDistortion(camera->distortion, camera);
   return absl::OkStatus();
 }
 
@@ -230,6 +234,29 @@ absl::StatusOr<ImuCalibration> ReadImu(const Section& section, const std::string
   return imu;
 }
 
+absl::StatusOr<RgbdSettings> ReadSettings(const Section& section, const std::string&) {
+  RgbdSettings settings;
+  CameraCalibration& camera = settings.camera;
+  DSG_ASSIGN_OR_RETURN(camera.fx, section.Number("Camera.fx"));
+  DSG_ASSIGN_OR_RETURN(camera.fy, section.Number("Camera.fy"));
+  DSG_ASSIGN_OR_RETURN(camera.cx, section.Number("Camera.cx"));
+  DSG_ASSIGN_OR_RETURN(camera.cy, section.Number("Camera.cy"));
+  for (const char* const name : {"Camera.k1", "Camera.k2", "Camera.p1", "Camera.p2", "Camera.k3"}) {
+    double value = 0.0;
+    if (section.Has(name)) {
+      DSG_ASSIGN_OR_RETURN(value, section.Number(name));
+    }
+    camera.distortion_coefficients.push_back(value);
+  }
+  KeepDistortion(Distortion::kRadialTangential, &camera);
+  if (!section.Has("DepthMapFactor")) return settings;
+  DSG_ASSIGN_OR_RETURN(settings.depth_units_per_m, section.Number("DepthMapFactor"));
+  if (settings.depth_units_per_m >= 1.0 && settings.depth_units_per_m <= 65536.0) return settings;
+  return section.At(section.node())
+      .FieldError("DepthMapFactor", absl::StrCat(settings.depth_units_per_m),
+                  "1 to 65536 units a metre are due");
+}
+
 absl::StatusOr<std::vector<NumberedPose>> ReadPoses(const Section& section, const std::string&) {
   std::vector<NumberedPose> poses;
   for (const auto& entry : section.node()) {
@@ -260,6 +287,10 @@ absl::StatusOr<std::vector<NumberedPose>> ReadPoses(const Section& section, cons
 
 absl::StatusOr<CameraCalibration> ReadCameraYaml(const LogFile& file, const std::string& name) {
   return Guarded<CameraCalibration>(file, &ReadCamera, name);
+}
+
+absl::StatusOr<RgbdSettings> ReadRgbdSettings(const LogFile& file) {
+  return Guarded<RgbdSettings>(file, &ReadSettings, "");
 }
 
 absl::StatusOr<ImuCalibration> ReadImuYaml(const LogFile& file, const std::string& name) {

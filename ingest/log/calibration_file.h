@@ -17,6 +17,17 @@ namespace dsg::ingest {
 /// Errors of all: INVALID_ARGUMENT/FILE_MALFORMED naming file, line, field and value.
 absl::StatusOr<CameraCalibration> ReadCameraYaml(const LogFile& file, const std::string& name);
 
+/// What programs of RGB-D odometry are set up with.
+struct RgbdSettings {
+  /// Without name and size.
+  CameraCalibration camera;
+  double depth_units_per_m = 1000.0;
+};
+
+/// Camera.fx, .fy, .cx, .cy, .k1, .k2, .p1, .p2, .k3 (zero if missing) and DepthMapFactor: the
+/// settings of ORB-SLAM2.
+absl::StatusOr<RgbdSettings> ReadRgbdSettings(const LogFile& file);
+
 /// T_BS (identity if missing), rate_hz, noise densities and random walks.
 absl::StatusOr<ImuCalibration> ReadImuYaml(const LogFile& file, const std::string& name);
 

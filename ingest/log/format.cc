@@ -14,6 +14,7 @@
 #include "ingest/log/readers.h"
 #include "ingest/log/rgbd_layout.h"
 #include "ingest/log/text_table.h"
+#include "ingest/log/tum_folder.h"
 #include "schema/base/status.h"
 #include "schema/interop/scene_graph_file.h"
 
@@ -147,10 +148,12 @@ bool IsEurocTable(const std::filesystem::path& path) {
 }  // namespace
 
 const std::vector<std::string>& FormatNames() {
-  static const auto* const names = new std::vector<std::string>{
-      "obsmat",      "trajnet",     "trajnet-ndjson", "thor", "euroc",  "spark-dsg",
-      "kimera-json", "region-json", "dsg-tracks",     "rgbd", "rosbag", "tesse-objects",
-      "tum",         "csv"};
+  static const auto* const names =
+      new std::vector<std::string>{"obsmat",      "trajnet",     "trajnet-ndjson",
+                                   "thor",        "euroc",       "spark-dsg",
+                                   "kimera-json", "region-json", "dsg-tracks",
+                                   "rgbd",        "rosbag",      "tesse-objects",
+                                   "tum",         "tum-rgbd",    "csv"};
   return *names;
 }
 
@@ -206,6 +209,7 @@ absl::StatusOr<std::string> DetectFolderFormat(const std::string& folder) {
   if (IsFile(root / "tracks.csv")) return "dsg-tracks";
   if (!FindSensorRoot(folder).empty() || !FindEurocFile(folder).empty()) return "euroc";
   if (FindRgbdLayout(folder) != RgbdLayout::kNone) return "rgbd";
+  if (IsTumFolder(folder)) return "tum-rgbd";
   if (!FindSensorRoot((root / "log").string()).empty()) {
     return Unknown(folder,
                    absl::StrCat("holds a simulation; give its log: ", (root / "log").string()));
@@ -213,7 +217,7 @@ absl::StatusOr<std::string> DetectFolderFormat(const std::string& folder) {
   return Unknown(folder,
                  "holds neither tracks.csv (dsg-tracks) nor mav0/ with sensors or "
                  "mav0/state_groundtruth_estimate0/data.csv (euroc), nor frames of a known RGB-D "
-                 "dataset (rgbd); give the log file itself");
+                 "dataset (rgbd, tum-rgbd); give the log file itself");
 }
 
 }  // namespace dsg::ingest

@@ -76,7 +76,8 @@ using Measurement = std::variant<PoseMeasurement, GraphMeasurement, ImuMeasureme
 /// What a reader knows of its log before the first measurement.
 struct LogInfo {
   /// "obsmat", "trajnet", "trajnet-ndjson", "thor", "euroc", "spark-dsg", "kimera-json",
-  /// "region-json", "dsg-tracks", "rgbd", "rosbag", "tesse-objects", "tum", "csv".
+  /// "region-json", "dsg-tracks", "rgbd", "rosbag", "tesse-objects", "tum", "tum-rgbd",
+  /// "csv".
   std::string format;
   std::string path;
   /// SHA-256 of the log's bytes, hexadecimal: the identity of the log. Of image files only names

@@ -11,6 +11,7 @@
 #include "ingest/log/readers.h"
 #include "ingest/log/rgbd_layout.h"
 #include "ingest/log/rgbd_log.h"
+#include "ingest/log/tum_folder.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
@@ -42,7 +43,9 @@ absl::Status CheckOptions(const LogOptions& options) {
 // A log that has no robot of its own would leave poses of another out without a word.
 absl::Status CheckPoseOptions(const std::string& path, const std::string& format,
                               const LogOptions& options) {
-  if (format == "euroc" || format == "rgbd" || format == "rosbag") return absl::OkStatus();
+  const bool has_sensors =
+      format == "euroc" || format == "rgbd" || format == "tum-rgbd" || format == "rosbag";
+  if (has_sensors) return absl::OkStatus();
   if (!options.loop_file.empty()) {
     return MakeError(Reason::kFieldInvalid,
                      absl::StrCat(path, ": a ", format,
@@ -131,6 +134,7 @@ OpenedLog OpenFolder(const std::string& folder, const LogOptions& options) {
   if (format == "rgbd" && FindRgbdLayout(folder) != RgbdLayout::kNone) {
     return OpenRgbdFolder(folder, options);
   }
+  if (format == "tum-rgbd" && IsTumFolder(folder)) return OpenTumFolder(folder, options);
   return NoSuchLog(folder, format);
 }
 

@@ -37,8 +37,9 @@ int RankOf(const std::string& channel) {
 PixelFormat PixelFormatOf(const std::string& channel, const std::string& path) {
   if (channel.starts_with("cam")) return PixelFormat::kGray8;
   if (channel.starts_with("color")) return PixelFormat::kRgb8;
-  const bool is_float =
-      path.find("replica") != std::string::npos || path.find("uhumans2") != std::string::npos;
+  const bool is_float = path.find("replica") != std::string::npos ||
+                        path.find("uhumans2") != std::string::npos ||
+                        path.find("rgbd-tum") != std::string::npos;
   return is_float ? PixelFormat::kDepth32 : PixelFormat::kDepth16;
 }
 
@@ -108,6 +109,18 @@ INSTANTIATE_TEST_SUITE_P(
                       {{"color0", 2}, {"depth0", 2}, {"poses", 2000}},
                       1200,
                       680,
+                      2},
+        RealSensorLog{"rgbd-tum/freiburg1_rpy",
+                      "tum-rgbd",
+                      {{"color0", 18}, {"depth0", 18}, {"poses", 313}},
+                      640,
+                      480,
+                      2},
+        RealSensorLog{"rgbd-tum/freiburg3_cabinet",
+                      "tum-rgbd",
+                      {{"color0", 58}, {"depth0", 58}, {"poses", 58}},
+                      640,
+                      480,
                       2},
         RealSensorLog{"uhumans2-tesse/rgbd", "rgbd", {{"color0", 2}, {"depth0", 2}}, 720, 480, 2},
         RealSensorLog{"uhumans2-tesse/loop_pair",
@@ -256,6 +269,56 @@ TEST_F(RealSensorLogs, ReplicaDepthIsMetresAndThePathIsAsLongAsStated) {
     EXPECT_GT(depth, 0.5f);
     EXPECT_LT(depth, 6.0f);
   }
+}
+
+TEST_F(RealSensorLogs, TumDepthHasTheRangeOfItsReadme) {
+  const auto log = ReadAll(Path("rgbd-tum/freiburg1_rpy"));
+  ASSERT_TRUE(log.ok()) << log.status();
+  EXPECT_EQ(log->info.rig.FindCamera("depth0")->fx, 517.3);
+  const auto first =
+      std::find_if(log->images.begin(), log->images.end(),
+                   [](const ImageMeasurement& image) { return image.channel == "depth0"; });
+  const Image image = *first->load();
+  std::vector<float> depths;
+  for (int v = 0; v < image.height; ++v) {
+    for (int u = 0; u < image.width; ++u) {
+      if (DepthAt(image, u, v) > 0.0f) depths.push_back(DepthAt(image, u, v));
+    }
+  }
+  EXPECT_NEAR(static_cast<double>(depths.size()) / (640.0 * 480.0), 0.80, 0.01);
+  EXPECT_NEAR(*std::min_element(depths.begin(), depths.end()), 0.58f, 0.01f);
+  EXPECT_NEAR(*std::max_element(depths.begin(), depths.end()), 1.54f, 0.01f);
+}
+
+// Stamps, poses, intrinsics and the unit of depth together: a face of the cabinet is where its
+// README measured it.
+TEST_F(RealSensorLogs, TumDepthLiesOnTheCabinet) {
+  const auto log = ReadAll(Path("rgbd-tum/freiburg3_cabinet"));
+  ASSERT_TRUE(log.ok()) << log.status();
+  const CameraCalibration& camera = *log->info.rig.FindCamera("depth0");
+  const auto world_point = [&](size_t frame) {
+    char name[64];
+    std::snprintf(name, sizeof(name), "rgbd-tum/freiburg3_cabinet/bbox_2d_yolov2/%04zu", frame);
+    double x = 0.0, y = 0.0, width = 0.0, height = 0.0;
+    for (const auto& entry :
+         std::filesystem::directory_iterator(std::filesystem::path(Path(name)).parent_path())) {
+      if (!entry.path().string().starts_with(Path(name))) continue;
+      std::ifstream(entry.path()) >> x >> y >> width >> height;
+    }
+    std::vector<const ImageMeasurement*> depths;
+    for (const ImageMeasurement& image : log->images) {
+      if (image.channel == "depth0") depths.push_back(&image);
+    }
+    EXPECT_EQ(depths[frame]->time_ns, log->poses[frame].pose.time_ns);
+    const double u = x + width / 2.0;
+    const double v = y + height / 2.0;
+    const double z = DepthAt(*depths[frame]->load(), static_cast<int>(u), static_cast<int>(v));
+    return Eigen::Vector3d(
+        log->poses[frame].pose.map_T_agent *
+        Eigen::Vector3d((u - camera.cx) / camera.fx * z, (v - camera.cy) / camera.fy * z, z));
+  };
+  EXPECT_NEAR(world_point(10).y(), 0.679, 0.01);
+  EXPECT_NEAR(world_point(50).x(), -1.926, 0.02);
 }
 
 TEST_F(RealSensorLogs, LoopPairsHaveTheRelativeMotionOfTheirReadme) {
