@@ -28,7 +28,7 @@ std::string WithoutSlash(const std::string& frame) {
   return frame.starts_with('/') ? frame.substr(1) : frame;
 }
 
-absl::StatusOr<Transforms> ReadTransforms(const BagFile& bag, const BagPlan& plan) {
+absl::StatusOr<Transforms> ReadTransforms(const Bag& bag, const BagPlan& plan) {
   Transforms transforms;
   int64_t number = 0;
   for (const BagMessageRef& ref : bag.messages()) {
@@ -88,7 +88,7 @@ std::string FindInfoTopic(const BagPlan& plan, const BagTopic& image) {
   return is_tie ? "" : best;
 }
 
-absl::StatusOr<RosCameraInfo> ReadInfo(const BagFile& bag, const BagPlan& plan,
+absl::StatusOr<RosCameraInfo> ReadInfo(const Bag& bag, const BagPlan& plan,
                                        const std::string& name) {
   for (const BagMessageRef& ref : bag.messages()) {
     if (plan.topics[plan.topic_of_connection[ref.connection]].name != name) continue;
@@ -139,7 +139,7 @@ std::optional<CameraCalibration> ToCalibration(const RosCameraInfo& info,
   return camera;
 }
 
-absl::Status AddCamera(const BagFile& bag, const Transforms& transforms, const BagTopic& image,
+absl::Status AddCamera(const Bag& bag, const Transforms& transforms, const BagTopic& image,
                        BagPlan* plan) {
   const std::string name = FindInfoTopic(*plan, image);
   if (name.empty()) return absl::OkStatus();
@@ -180,7 +180,7 @@ void ShareLeftCamera(const std::set<std::string>& channels, RigCalibration* rig)
 
 }  // namespace
 
-absl::Status ReadBagCalibration(const BagFile& bag, BagPlan* plan) {
+absl::Status ReadBagCalibration(const Bag& bag, BagPlan* plan) {
   DSG_ASSIGN_OR_RETURN(const Transforms transforms, ReadTransforms(bag, *plan));
   std::set<std::string> channels;
   for (const BagTopic& topic : plan->topics) {

@@ -10,6 +10,6 @@ namespace dsg::ingest {
 
 /// Fills in the rig of `plan` for its image channels, with notes for those without calibration.
 /// Errors: INVALID_ARGUMENT/FILE_MALFORMED naming the topic and what is wrong.
-absl::Status ReadBagCalibration(const BagFile& bag, BagPlan* plan);
+absl::Status ReadBagCalibration(const Bag& bag, BagPlan* plan);
 
 }  // namespace dsg::ingest

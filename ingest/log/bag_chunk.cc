@@ -3,6 +3,7 @@
 
 #include <bzlib.h>
 #include <lz4frame.h>
+#include <zstd.h>
 
 #include <algorithm>
 #include <memory>
@@ -87,6 +88,38 @@ absl::StatusOr<std::string> FromLz4(std::string_view bytes, size_t size,
   return out;
 }
 
+// Memory grows with what really comes out, since Zstandard packs without a bound.
+absl::StatusOr<std::string> FromZstd(std::string_view bytes, size_t size,
+                                     const std::string& origin) {
+  const auto fail = [&] {
+    return DamagedChunk(origin, absl::StrCat("the zstd chunk does not decompress to the ", size,
+                                             " bytes that it declares"));
+  };
+  const std::unique_ptr<ZSTD_DStream, decltype(&ZSTD_freeDStream)> stream(ZSTD_createDStream(),
+                                                                          &ZSTD_freeDStream);
+  if (stream == nullptr) return fail();
+  std::string out;
+  size_t done = 0;
+  ZSTD_inBuffer in = {bytes.data(), bytes.size(), 0};
+  size_t hint = 1;
+  while (hint != 0 || in.pos < in.size) {
+    if (done == out.size()) {
+      // One byte more than declared shows that the stream does not end there.
+      if (out.size() > size) return fail();
+      out.resize(std::min(size + 1, std::max(size_t{65536}, 2 * out.size())));
+    }
+    ZSTD_outBuffer to = {out.data() + done, out.size() - done, 0};
+    const size_t in_before = in.pos;
+    hint = ZSTD_decompressStream(stream.get(), &to, &in);
+    if (ZSTD_isError(hint) != 0) return fail();
+    done += to.pos;
+    if (hint != 0 && to.pos == 0 && in.pos == in_before) return fail();
+  }
+  out.resize(done);
+  if (out.size() != size) return fail();
+  return out;
+}
+
 }  // namespace
 
 absl::StatusOr<std::string> DecompressChunk(std::string_view compression, std::string_view bytes,
@@ -97,10 +130,11 @@ absl::StatusOr<std::string> DecompressChunk(std::string_view compression, std::s
   }
   if (compression == "bz2") return FromBz2(bytes, declared_size, origin);
   if (compression == "lz4") return FromLz4(bytes, declared_size, origin);
+  if (compression == "zstd") return FromZstd(bytes, declared_size, origin);
   if (compression != "none") {
     return DamagedChunk(origin, absl::StrCat("the chunk's compression is \"",
                                              std::string(compression.substr(0, 16)),
-                                             "\"; none, bz2 and lz4 are known"));
+                                             "\"; none, bz2, lz4 and zstd are known"));
   }
   if (bytes.size() != declared_size) {
     return DamagedChunk(origin, absl::StrCat("the chunk declares ", declared_size,

@@ -1,15 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ingest/log/bag_file.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <tuple>
+#include <optional>
 #include <unordered_map>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "ingest/log/bag_chunk.h"
@@ -22,9 +17,6 @@ namespace {
 // Headers hold a few numbers and names; definitions of messages are data.
 constexpr uint64_t kRecordHeaderBytesMax = 65536;
 constexpr uint64_t kConnectionBytesMax = uint64_t{16} << 20;
-// The chunks of a second of stereo and colour, so that images that were put in order are not
-// decompressed a second time.
-constexpr size_t kCacheBytesMax = size_t{96} << 20;
 constexpr size_t kIndexEntryBytes = 12;
 
 }  // namespace
@@ -70,11 +62,7 @@ class BagFile::Builder {
     index_at_ = index_at;
     DSG_ASSIGN_OR_RETURN(const uint64_t infos_at, ReadConnections(index_at, connection_count));
     DSG_RETURN_IF_ERROR(ReadChunks(infos_at, chunk_count));
-    std::stable_sort(bag_.messages_.begin(), bag_.messages_.end(),
-                     [](const BagMessageRef& a, const BagMessageRef& b) {
-                       return std::tie(a.bag_time_ns, a.chunk, a.offset) <
-                              std::tie(b.bag_time_ns, b.chunk, b.offset);
-                     });
+    SortBagMessages(&bag_.messages_);
     return absl::OkStatus();
   }
 
@@ -130,8 +118,10 @@ class BagFile::Builder {
       if (!index_of_.try_emplace(static_cast<uint32_t>(id), number).second) {
         return bag_.Fail(at, absl::StrCat("connection ", id, " comes twice"));
       }
-      bag_.connections_.push_back(
-          {static_cast<uint32_t>(id), std::string(*topic), std::string(*type), 0});
+      bag_.connections_.push_back({.id = static_cast<uint32_t>(id),
+                                   .topic = std::string(*topic),
+                                   .type = BagTypeName(*type, "ros1"),
+                                   .encoding = RosEncoding::kRos1});
       at = record->end();
     }
     return at;
@@ -213,66 +203,31 @@ class BagFile::Builder {
 };
 
 absl::StatusOr<std::shared_ptr<const BagFile>> BagFile::Open(const std::string& path) {
-  const int descriptor = open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  struct stat status = {};
-  if (descriptor < 0 || fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
-    const int error = errno;
-    if (descriptor >= 0) close(descriptor);
-    return MakeError(Reason::kFieldInvalid,
-                     absl::StrCat(path, ": cannot be read: ", std::strerror(error)),
-                     {{"field", "log"}, {"value", path}});
-  }
-  const std::shared_ptr<BagFile> bag(
-      new BagFile(path, descriptor, static_cast<uint64_t>(status.st_size)));
+  DSG_ASSIGN_OR_RETURN(std::unique_ptr<const RandomFile> file, RandomFile::Open(path));
+  const std::shared_ptr<BagFile> bag(new BagFile(std::move(file)));
   DSG_RETURN_IF_ERROR(Builder(*bag).Build());
   return bag;
 }
 
-BagFile::~BagFile() { close(descriptor_); }
-
-absl::Status BagFile::Fail(uint64_t at, const std::string& message) const {
-  return MakeError(Reason::kFileMalformed, absl::StrCat(path_, ": byte ", at, ": ", message),
-                   {{"file", path_}, {"offset", absl::StrCat(at)}});
-}
+BagFile::BagFile(std::unique_ptr<const RandomFile> file)
+    : file_(std::move(file)), size_(file_->size()), unpacked_(kUnpackedBytesMax) {}
 
 absl::StatusOr<std::string> BagFile::ReadBytes(uint64_t at, uint64_t size) const {
-  if (at > size_ || size > size_ - at) {
-    return Fail(at, absl::StrCat("the bag ends at byte ", size_,
-                                 ", in the middle of a record; it "
-                                 "was cut short: copy it again, or run \"rosbag reindex\""));
-  }
-  std::string bytes(size, '\0');
-  size_t done = 0;
-  while (done < bytes.size()) {
-    const ssize_t count =
-        pread(descriptor_, bytes.data() + done, bytes.size() - done, static_cast<off_t>(at + done));
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) return Fail(at, "cannot be read any more; did the bag change meanwhile?");
-    done += static_cast<size_t>(count);
-  }
-  return bytes;
+  return file_->ReadBytes(at, size, "copy it again, or run \"rosbag reindex\"");
 }
 
 absl::StatusOr<std::shared_ptr<const std::string>> BagFile::LoadChunk(uint32_t index) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  for (auto entry = cache_.begin(); entry != cache_.end(); ++entry) {
-    if (entry->first != index) continue;
-    cache_.splice(cache_.begin(), cache_, entry);
-    return cache_.front().second;
-  }
-  const Chunk& chunk = chunks_[index];
-  if (chunk.data_size > kBagChunkBytesMax) return Fail(chunk.data_at, "the chunk is too large");
-  DSG_ASSIGN_OR_RETURN(const std::string bytes, ReadBytes(chunk.data_at, chunk.data_size));
-  DSG_ASSIGN_OR_RETURN(std::string decompressed,
-                       DecompressChunk(chunk.compression, bytes, chunk.declared_size,
-                                       absl::StrCat(path_, ": byte ", chunk.data_at)));
-  cache_bytes_ += decompressed.size();
-  cache_.emplace_front(index, std::make_shared<const std::string>(std::move(decompressed)));
-  while (cache_bytes_ > kCacheBytesMax && cache_.size() > 1) {
-    cache_bytes_ -= cache_.back().second->size();
-    cache_.pop_back();
-  }
-  return cache_.front().second;
+  using Bytes = std::shared_ptr<const std::string>;
+  return unpacked_.Get(index, {}, [&]() -> absl::StatusOr<Costed<Bytes>> {
+    const Chunk& chunk = chunks_[index];
+    if (chunk.data_size > kBagChunkBytesMax) return Fail(chunk.data_at, "the chunk is too large");
+    DSG_ASSIGN_OR_RETURN(const std::string packed, ReadBytes(chunk.data_at, chunk.data_size));
+    DSG_ASSIGN_OR_RETURN(std::string bytes,
+                         DecompressChunk(chunk.compression, packed, chunk.declared_size,
+                                         absl::StrCat(path(), ": byte ", chunk.data_at)));
+    const size_t size = bytes.size();
+    return Costed<Bytes>{std::make_shared<const std::string>(std::move(bytes)), size};
+  });
 }
 
 absl::Status BagFile::CheckMessageHeader(const BagMessageRef& message,
@@ -314,12 +269,12 @@ absl::StatusOr<BagMessage> BagFile::ReadPlain(const BagMessageRef& message,
                        ReadBytes(data_at, std::min<uint64_t>(size, byte_count_max)));
   BagMessage result;
   result.owner = std::make_shared<const std::string>(std::move(bytes));
-  result.data = *result.owner;
+  result.data = RosBytes(*result.owner);
   return result;
 }
 
-absl::StatusOr<BagMessage> BagFile::Read(const BagMessageRef& message,
-                                         size_t byte_count_max) const {
+absl::StatusOr<BagMessage> BagFile::ReadFirst(const BagMessageRef& message,
+                                              size_t byte_count_max) const {
   if (chunks_[message.chunk].compression == "none") return ReadPlain(message, byte_count_max);
   BagMessage result;
   DSG_ASSIGN_OR_RETURN(result.owner, LoadChunk(message.chunk));
@@ -334,7 +289,7 @@ absl::StatusOr<BagMessage> BagFile::Read(const BagMessageRef& message,
   const uint64_t size = LittleEndian(rest, 4 + header_size, 4);
   rest.remove_prefix(8 + header_size);
   if (size > rest.size()) return Fail(at, "a message reaches past its chunk");
-  result.data = rest.substr(0, std::min<uint64_t>(size, byte_count_max));
+  result.data = RosBytes(rest.substr(0, std::min<uint64_t>(size, byte_count_max)));
   return result;
 }
 

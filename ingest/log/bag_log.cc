@@ -8,10 +8,8 @@
 #include <tuple>
 #include <utility>
 
-#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_join.h"
-#include "ingest/log/bag_file.h"
+#include "ingest/log/bag.h"
 #include "ingest/log/bag_topics.h"
 #include "ingest/log/detection_json.h"
 #include "ingest/log/image_file.h"
@@ -63,7 +61,7 @@ TimeNs TimeOf(const Measurement& measurement) {
 
 class BagLog : public LogSource {
  public:
-  BagLog(std::shared_ptr<const BagFile> bag, BagPlan plan, std::string robot_name, LogInfo info)
+  BagLog(std::shared_ptr<const Bag> bag, BagPlan plan, std::string robot_name, LogInfo info)
       : info_(std::move(info)),
         bag_(std::move(bag)),
         plan_(std::move(plan)),
@@ -125,13 +123,11 @@ class BagLog : public LogSource {
   }
 
   absl::Status NothingUsable() const {
-    std::vector<std::string> topics;
-    for (const BagTopic& topic : plan_.topics) {
-      topics.push_back(absl::Utf8SafeCHexEscape(absl::StrCat(topic.name, " (", topic.type, ")")));
-    }
+    std::vector<const BagTopic*> topics;
+    for (const BagTopic& topic : plan_.topics) topics.push_back(&topic);
     return MakeError(Reason::kFileMalformed,
                      absl::StrCat(info_.path, ": the bag holds no topic that can be used; it has: ",
-                                  absl::StrJoin(topics, ", "), "; see docs/sensor_logs.md"),
+                                  TopicNames(topics), "; see docs/sensor_logs.md"),
                      {{"file", info_.path}});
   }
 
@@ -218,7 +214,7 @@ class BagLog : public LogSource {
     return ReadPose(message.data, topic, origin);
   }
 
-  absl::StatusOr<Measurement> ReadPose(std::string_view bytes, const BagTopic& topic,
+  absl::StatusOr<Measurement> ReadPose(const RosBytes& bytes, const BagTopic& topic,
                                        const std::string& origin) const {
     const auto parse = topic.type == "nav_msgs/Odometry"           ? &ParseRosOdometry
                        : topic.type == "geometry_msgs/PoseStamped" ? &ParseRosPoseStamped
@@ -256,7 +252,7 @@ class BagLog : public LogSource {
   }
 
   LogInfo info_;
-  std::shared_ptr<const BagFile> bag_;
+  std::shared_ptr<const Bag> bag_;
   BagPlan plan_;
   std::shared_ptr<const std::map<uint32_t, int32_t>> class_of_color_;
   std::string robot_name_;
@@ -281,7 +277,7 @@ bool IsSensor(TopicUse use) {
 
 // By the headers of the first and last message of each sensor; what cannot be read is left for the
 // reader of the log to report.
-StampSpan SensorSpan(const BagFile& bag, const BagPlan& plan) {
+StampSpan SensorSpan(const Bag& bag, const BagPlan& plan) {
   std::vector<std::pair<const BagMessageRef*, const BagMessageRef*>> ends(plan.topics.size());
   for (const BagMessageRef& ref : bag.messages()) {
     auto& [first, last] = ends[plan.topic_of_connection[ref.connection]];
@@ -332,9 +328,9 @@ absl::StatusOr<std::optional<TrackTable>> PlanPoses(const LogOptions& options, B
 }
 
 // Loop closures are found, and recorded, long after their stamps: they are read before the rest.
-absl::StatusOr<std::optional<SensorChannel>> ReadLoops(const BagFile& bag,
-                                                       const LogOptions& options, BagPlan* plan,
-                                                       LogDigest* digest, LogInfo* info) {
+absl::StatusOr<std::optional<SensorChannel>> ReadLoops(const Bag& bag, const LogOptions& options,
+                                                       BagPlan* plan, LogDigest* digest,
+                                                       LogInfo* info) {
   LoopLines loops;
   bool has_topic = false;
   std::vector<int64_t> numbers(plan->topics.size(), 0);
@@ -361,21 +357,24 @@ void Count(const SensorChannel& channel, LogInfo* info) {
   info->measurement_count += count;
 }
 
-absl::StatusOr<std::string> Identity(const std::string& path, LogDigest digest,
+absl::StatusOr<std::string> Identity(const std::vector<std::string>& files, LogDigest digest,
                                      bool has_other_file) {
-  DSG_ASSIGN_OR_RETURN(const std::string hash, Sha256OfFile(path));
-  if (!has_other_file) return hash;
-  digest.AddSha256("bag", hash);
+  for (const std::string& file : files) {
+    DSG_ASSIGN_OR_RETURN(const std::string hash, Sha256OfFile(file));
+    if (files.size() == 1 && !has_other_file) return hash;
+    const std::string name = std::filesystem::path(file).filename().string();
+    digest.AddSha256(files.size() == 1 ? "bag" : absl::StrCat("bag/", name), hash);
+  }
   return digest.Hex();
 }
 
 }  // namespace
 
 OpenedLog OpenBag(const std::string& path, const LogOptions& options) {
-  DSG_ASSIGN_OR_RETURN(std::shared_ptr<const BagFile> bag, BagFile::Open(path));
+  DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Bag> bag, OpenBagFiles(path));
   DSG_ASSIGN_OR_RETURN(BagPlan plan, PlanBag(*bag));
   LogInfo info;
-  info.format = "rosbag";
+  info.format = bag->format();
   info.path = path;
   info.has_clock = true;
   info.rig = plan.rig;
@@ -386,7 +385,7 @@ OpenedLog OpenBag(const std::string& path, const LogOptions& options) {
   DSG_ASSIGN_OR_RETURN(std::optional<SensorChannel> loops,
                        ReadLoops(*bag, options, &plan, &digest, &info));
   const bool has_other_file = !options.pose_file.empty() || !options.loop_file.empty();
-  DSG_ASSIGN_OR_RETURN(info.content_sha256, Identity(path, digest, has_other_file));
+  DSG_ASSIGN_OR_RETURN(info.content_sha256, Identity(bag->files(), digest, has_other_file));
   for (const BagTopic& topic : plan.topics) {
     if (topic.use == TopicUse::kNone) continue;
     info.channel_counts[topic.channel] += topic.message_count;

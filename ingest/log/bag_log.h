@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A ROS bag as a log: topics as channels, stamps from the messages' headers.
+// A bag as a log: topics as channels, stamps from the messages' headers.
 // Refuses stamps that step back within a topic, or by more than a second between topics.
 #pragma once
 

@@ -66,7 +66,7 @@ void Use(TopicUse use, const std::string& channel, BagTopic* topic) {
   topic->decoding = DecodingOf(channel);
 }
 
-absl::Status ListTopics(const BagFile& bag, BagPlan* plan) {
+absl::Status ListTopics(const Bag& bag, BagPlan* plan) {
   std::map<std::string, size_t> index_of;
   for (const BagConnection& connection : bag.connections()) {
     BagTopic topic{.name = connection.topic, .type = connection.type};
@@ -83,6 +83,12 @@ absl::Status ListTopics(const BagFile& bag, BagPlan* plan) {
     known.message_count += connection.message_count;
     plan->topic_of_connection.push_back(entry->second);
   }
+  plan->first_messages.resize(plan->topics.size());
+  for (const BagMessageRef& message : bag.messages()) {
+    std::optional<BagMessageRef>& first =
+        plan->first_messages[plan->topic_of_connection[message.connection]];
+    if (!first.has_value()) first = message;
+  }
   return absl::OkStatus();
 }
 
@@ -93,6 +99,11 @@ void UseKnownTopics(BagPlan* plan) {
     if (topic != nullptr && topic->type == known.type) {
       Use(known.use, known.channel, topic);
       continue;
+    }
+    if (topic != nullptr) {
+      plan->notes.push_back(absl::StrCat("topic ", known.name, " is not read: it has messages of ",
+                                         absl::Utf8SafeCHexEscape(topic->type.substr(0, 80)), ", ",
+                                         known.type, " is due"));
     }
     BagTopic* compressed = FindTopic(plan, absl::StrCat(known.name, "/compressed"));
     if (known.use == TopicUse::kImage && compressed != nullptr &&
@@ -118,24 +129,15 @@ void UseOnlyTopicOf(const std::string& type, TopicUse use, const std::string& ch
                                      ", is taken for ", channel));
 }
 
-// The first message of a topic; nullopt if there is none.
-std::optional<BagMessageRef> FirstMessage(const BagFile& bag, const BagPlan& plan,
-                                          const BagTopic& topic) {
-  for (const BagMessageRef& message : bag.messages()) {
-    if (&plan.topics[plan.topic_of_connection[message.connection]] == &topic) return message;
-  }
-  return std::nullopt;
-}
-
 // Cameras of unknown names, by what their first image is: one of depth, one of colour, one grey.
-absl::Status UseImagesByEncoding(const BagFile& bag, BagPlan* plan) {
+absl::Status UseImagesByEncoding(const Bag& bag, BagPlan* plan) {
   std::map<std::string, std::vector<BagTopic*>> topics_of_channel;
   for (BagTopic& topic : plan->topics) {
     if (topic.use == TopicUse::kImage || topic.use == TopicUse::kCompressedImage) {
       return absl::OkStatus();
     }
     if (topic.type != kImageType) continue;
-    const std::optional<BagMessageRef> first = FirstMessage(bag, *plan, topic);
+    const std::optional<BagMessageRef>& first = plan->FirstOf(topic);
     if (!first.has_value()) continue;
     DSG_ASSIGN_OR_RETURN(const BagMessage message, bag.Read(*first));
     DSG_ASSIGN_OR_RETURN(const RosImage image,
@@ -154,10 +156,10 @@ absl::Status UseImagesByEncoding(const BagFile& bag, BagPlan* plan) {
   return absl::OkStatus();
 }
 
-absl::Status ReadLabels(const BagFile& bag, BagPlan* plan) {
+absl::Status ReadLabels(const Bag& bag, BagPlan* plan) {
   LogFile file{.path = bag.path(), .name = "labels.csv", .bytes = {}};
   if (const BagTopic* topic = FindTopic(plan, "/dsg/labels"); topic != nullptr) {
-    const std::optional<BagMessageRef> first = FirstMessage(bag, *plan, *topic);
+    const std::optional<BagMessageRef>& first = plan->FirstOf(*topic);
     if (first.has_value() && topic->type == "std_msgs/String") {
       file.path = BagOrigin(bag, topic->name, 1);
       DSG_ASSIGN_OR_RETURN(const BagMessage message, bag.Read(*first));
@@ -166,7 +168,7 @@ absl::Status ReadLabels(const BagFile& bag, BagPlan* plan) {
     }
   }
   const std::filesystem::path beside =
-      std::filesystem::path(bag.path()).parent_path() / "labels.csv";
+      std::filesystem::path(bag.files().front()).parent_path() / "labels.csv";
   std::error_code error;
   if (file.bytes.empty() && std::filesystem::is_regular_file(beside, error)) {
     DSG_ASSIGN_OR_RETURN(file, ReadLogFile(beside.string()));
@@ -192,33 +194,39 @@ void DropLabelsWithoutTable(BagPlan* plan) {
 }
 
 void NoteUnusedTopics(BagPlan* plan) {
-  std::vector<std::string> unused;
+  std::vector<const BagTopic*> unused;
   for (const BagTopic& topic : plan->topics) {
     const bool is_known = topic.use != TopicUse::kNone || topic.type == "sensor_msgs/CameraInfo" ||
                           topic.name == "/tf_static" || topic.name == "/dsg/labels";
-    if (!is_known) {
-      // A name may be any bytes; a terminal must not obey them.
-      unused.push_back(absl::Utf8SafeCHexEscape(
-          absl::StrCat(topic.name, " (", topic.message_count, " ", topic.type, ")")
-              .substr(0, 120)));
-    }
+    if (!is_known) unused.push_back(&topic);
   }
   if (unused.empty()) return;
-  // Recordings of some cameras have a hundred topics of settings.
-  constexpr size_t kNamedMax = 20;
-  const size_t more = unused.size() > kNamedMax ? unused.size() - kNamedMax : 0;
-  unused.resize(unused.size() - more);
-  plan->notes.push_back(absl::StrCat("topics that are not read: ", absl::StrJoin(unused, ", "),
-                                     more > 0 ? absl::StrCat(" and ", more, " more") : ""));
+  plan->notes.push_back(absl::StrCat("topics that are not read: ", TopicNames(unused)));
 }
 
 }  // namespace
 
-std::string BagOrigin(const BagFile& bag, const std::string& topic, int64_t number) {
+std::string BagOrigin(const Bag& bag, const std::string& topic, int64_t number) {
   return absl::StrCat(bag.path(), ": topic ", topic, " message ", number);
 }
 
-absl::StatusOr<BagPlan> PlanBag(const BagFile& bag) {
+std::string TopicNames(const std::vector<const BagTopic*>& topics) {
+  // Recordings of some cameras have a hundred topics of settings, hostile ones a million.
+  constexpr size_t kNamedMax = 20;
+  std::vector<std::string> names;
+  for (const BagTopic* const topic : topics) {
+    if (names.size() == kNamedMax) break;
+    // A name may be any bytes; a terminal must not obey them.
+    names.push_back(absl::Utf8SafeCHexEscape(absl::StrCat(topic->name.substr(0, 120), " (",
+                                                          topic->message_count, " ",
+                                                          topic->type.substr(0, 80), ")")));
+  }
+  const size_t more = topics.size() - names.size();
+  return absl::StrCat(absl::StrJoin(names, ", "),
+                      more > 0 ? absl::StrCat(" and ", more, " more") : "");
+}
+
+absl::StatusOr<BagPlan> PlanBag(const Bag& bag) {
   BagPlan plan;
   DSG_RETURN_IF_ERROR(ListTopics(bag, &plan));
   UseKnownTopics(&plan);

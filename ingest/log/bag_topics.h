@@ -5,11 +5,12 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "ingest/log/bag_file.h"
+#include "ingest/log/bag.h"
 #include "ingest/log/image_file.h"
 #include "ingest/log/log_source.h"
 
@@ -42,6 +43,12 @@ struct BagPlan {
   std::vector<BagTopic> topics;
   /// Index into `topics` of each connection.
   std::vector<size_t> topic_of_connection;
+  /// By topic; none of topics without messages.
+  std::vector<std::optional<BagMessageRef>> first_messages;
+
+  const std::optional<BagMessageRef>& FirstOf(const BagTopic& topic) const {
+    return first_messages[static_cast<size_t>(&topic - topics.data())];
+  }
   RigCalibration rig;
   std::map<uint32_t, int32_t> class_of_color;
   std::vector<SemanticLabel> labels;
@@ -51,9 +58,12 @@ struct BagPlan {
 /// Looks at the names and types, and reads the messages that are sent once: camera infos, static
 /// transforms, labels (or labels.csv beside the bag).
 /// Errors: INVALID_ARGUMENT/FILE_MALFORMED naming the topic.
-absl::StatusOr<BagPlan> PlanBag(const BagFile& bag);
+absl::StatusOr<BagPlan> PlanBag(const Bag& bag);
+
+/// "/imu0 (49 sensor_msgs/Imu), ... and 7 more", fit for a terminal.
+std::string TopicNames(const std::vector<const BagTopic*>& topics);
 
 /// "bag.bag: topic /imu0 message 3".
-std::string BagOrigin(const BagFile& bag, const std::string& topic, int64_t number);
+std::string BagOrigin(const Bag& bag, const std::string& topic, int64_t number);
 
 }  // namespace dsg::ingest

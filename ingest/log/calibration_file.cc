@@ -88,27 +88,6 @@ class Section {
   YAML::Node node_;
 };
 
-// Brackets and indentation alone can nest; both are seen without parsing.
-bool YamlNestsTooDeep(std::string_view text) {
-  int depth = 0;
-  int line_depth = 0;
-  bool at_line_start = true;
-  for (const char c : text) {
-    if (c == '\n') {
-      line_depth = 0;
-      at_line_start = true;
-      continue;
-    }
-    // "- - - -" opens a list at each dash.
-    if (at_line_start && (c == '-' || c == '?')) ++line_depth;
-    if (c != ' ' && c != '-' && c != '?') at_line_start = false;
-    if (c == '[' || c == '{') ++depth;
-    if ((c == ']' || c == '}') && depth > 0) --depth;
-    if (depth > kYamlDepthMax || line_depth > kYamlDepthMax) return true;
-  }
-  return false;
-}
-
 absl::StatusOr<Section> ParseYaml(const LogFile& file) {
   const LinePosition at{file.path, 1};
   if (file.bytes.size() > kCalibrationBytesMax) {
@@ -284,6 +263,27 @@ absl::StatusOr<std::vector<NumberedPose>> ReadPoses(const Section& section, cons
 }
 
 }  // namespace
+
+// Brackets and indentation alone can nest; both are seen without parsing.
+bool YamlNestsTooDeep(std::string_view text) {
+  int depth = 0;
+  int line_depth = 0;
+  bool at_line_start = true;
+  for (const char c : text) {
+    if (c == '\n') {
+      line_depth = 0;
+      at_line_start = true;
+      continue;
+    }
+    // "- - - -" opens a list at each dash.
+    if (at_line_start && (c == '-' || c == '?')) ++line_depth;
+    if (c != ' ' && c != '-' && c != '?') at_line_start = false;
+    if (c == '[' || c == '{') ++depth;
+    if ((c == ']' || c == '}') && depth > 0) --depth;
+    if (depth > kYamlDepthMax || line_depth > kYamlDepthMax) return true;
+  }
+  return false;
+}
 
 absl::StatusOr<CameraCalibration> ReadCameraYaml(const LogFile& file, const std::string& name) {
   return Guarded<CameraCalibration>(file, &ReadCamera, name);

@@ -9,8 +9,11 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "ingest/log/bag_folder.h"
+#include "ingest/log/db3_file.h"
 #include "ingest/log/file_bytes.h"
 #include "ingest/log/folder_log.h"
+#include "ingest/log/mcap_file.h"
 #include "ingest/log/readers.h"
 #include "ingest/log/rgbd_layout.h"
 #include "ingest/log/text_table.h"
@@ -21,7 +24,6 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr std::string_view kMcapBegin = "\x89MCAP0\r\n";
 // A header or a first row is far shorter; what is longer is no table.
 constexpr size_t kFirstLineMax = 65536;
 
@@ -153,7 +155,8 @@ const std::vector<std::string>& FormatNames() {
                                    "thor",        "euroc",       "spark-dsg",
                                    "kimera-json", "region-json", "dsg-tracks",
                                    "rgbd",        "rosbag",      "tesse-objects",
-                                   "tum",         "tum-rgbd",    "csv"};
+                                   "tum",         "tum-rgbd",    "csv",
+                                   "mcap",        "rosbag2"};
   return *names;
 }
 
@@ -179,26 +182,21 @@ std::string FindEurocFile(const std::string& folder) {
 }
 
 bool IsBagBegin(std::string_view bytes) {
-  return bytes.starts_with(kMcapBegin) || bytes.starts_with("#ROSBAG") ||
-         bytes.starts_with("#ROSRECORD");
+  return bytes.starts_with(kMcapMagic) || bytes.starts_with(kSqliteMagic) ||
+         bytes.starts_with("#ROSBAG") || bytes.starts_with("#ROSRECORD");
 }
 
-absl::StatusOr<bool> IsBag(const std::string& path) {
+absl::StatusOr<std::string> DetectBagFormat(const std::string& path) {
   // Opening a pipe would wait for its other end.
-  if (!IsFile(path)) return false;
+  if (!IsFile(path)) return "";
   std::ifstream in(path, std::ios::binary);
   std::string begin(16, '\0');
   in.read(begin.data(), static_cast<std::streamsize>(begin.size()));
   begin.resize(static_cast<size_t>(in.gcount()));
-  if (begin.starts_with(kMcapBegin)) {
-    return MakeError(Reason::kFileMalformed,
-                     absl::StrCat(path,
-                                  ": is an MCAP file, which is not supported; convert it to a "
-                                  "ROS 1 bag"),
-                     {{"file", path}});
-  }
-  if (begin.starts_with("#ROSBAG V2.0")) return true;
-  if (!begin.starts_with("#ROSBAG") && !begin.starts_with("#ROSRECORD")) return false;
+  if (begin.starts_with(kMcapMagic)) return "mcap";
+  if (begin.starts_with(kSqliteMagic)) return "rosbag2";
+  if (begin.starts_with("#ROSBAG V2.0")) return "rosbag";
+  if (!IsBagBegin(begin)) return "";
   return MakeError(Reason::kFileMalformed,
                    absl::StrCat(path, ": is a bag of an old version; run \"rosbag fix\" on it"),
                    {{"file", path}});
@@ -208,16 +206,18 @@ absl::StatusOr<std::string> DetectFolderFormat(const std::string& folder) {
   const std::filesystem::path root(folder);
   if (IsFile(root / "tracks.csv")) return "dsg-tracks";
   if (!FindSensorRoot(folder).empty() || !FindEurocFile(folder).empty()) return "euroc";
+  if (IsBagFolder(folder)) return "rosbag2";
   if (FindRgbdLayout(folder) != RgbdLayout::kNone) return "rgbd";
   if (IsTumFolder(folder)) return "tum-rgbd";
   if (!FindSensorRoot((root / "log").string()).empty()) {
     return Unknown(folder,
                    absl::StrCat("holds a simulation; give its log: ", (root / "log").string()));
   }
-  return Unknown(folder,
-                 "holds neither tracks.csv (dsg-tracks) nor mav0/ with sensors or "
-                 "mav0/state_groundtruth_estimate0/data.csv (euroc), nor frames of a known RGB-D "
-                 "dataset (rgbd, tum-rgbd); give the log file itself");
+  return Unknown(
+      folder,
+      "holds neither tracks.csv (dsg-tracks) nor mav0/ with sensors or "
+      "mav0/state_groundtruth_estimate0/data.csv (euroc), nor frames of a known RGB-D "
+      "dataset (rgbd, tum-rgbd), nor a bag of ROS 2 (rosbag2); give the log file itself");
 }
 
 }  // namespace dsg::ingest

@@ -21,9 +21,9 @@ std::string FormatList();
 absl::StatusOr<std::string> DetectFileFormat(std::string_view bytes, const std::string& path);
 absl::StatusOr<std::string> DetectFolderFormat(const std::string& folder);
 
-/// Whether a file begins like a ROS bag.
-/// Errors: INVALID_ARGUMENT/FILE_MALFORMED for bags that are not read: version 1, MCAP.
-absl::StatusOr<bool> IsBag(const std::string& path);
+/// Of a bag, by its first bytes: "rosbag", "mcap" or "rosbag2"; empty for other files.
+/// Errors: INVALID_ARGUMENT/FILE_MALFORMED for bags of version 1.
+absl::StatusOr<std::string> DetectBagFormat(const std::string& path);
 
 /// Whether bytes begin like a bag of any version or kind.
 bool IsBagBegin(std::string_view bytes);

@@ -77,7 +77,7 @@ using Measurement = std::variant<PoseMeasurement, GraphMeasurement, ImuMeasureme
 struct LogInfo {
   /// "obsmat", "trajnet", "trajnet-ndjson", "thor", "euroc", "spark-dsg", "kimera-json",
   /// "region-json", "dsg-tracks", "rgbd", "rosbag", "tesse-objects", "tum", "tum-rgbd",
-  /// "csv".
+  /// "csv", "mcap", "rosbag2".
   std::string format;
   std::string path;
   /// SHA-256 of the log's bytes, hexadecimal: the identity of the log. Of image files only names

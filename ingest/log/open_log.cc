@@ -40,12 +40,16 @@ absl::Status CheckOptions(const LogOptions& options) {
   return absl::OkStatus();
 }
 
+bool IsBagFormat(const std::string& format) {
+  return format == "rosbag" || format == "mcap" || format == "rosbag2";
+}
+
 // A log that has no robot of its own would leave poses of another out without a word.
 absl::Status CheckPoseOptions(const std::string& path, const std::string& format,
                               const LogOptions& options) {
-  const bool has_sensors =
-      format == "euroc" || format == "rgbd" || format == "tum-rgbd" || format == "rosbag";
-  if (has_sensors) return absl::OkStatus();
+  if (format == "euroc" || format == "rgbd" || format == "tum-rgbd" || IsBagFormat(format)) {
+    return absl::OkStatus();
+  }
   if (!options.loop_file.empty()) {
     return MakeError(Reason::kFieldInvalid,
                      absl::StrCat(path, ": a ", format,
@@ -135,6 +139,7 @@ OpenedLog OpenFolder(const std::string& folder, const LogOptions& options) {
     return OpenRgbdFolder(folder, options);
   }
   if (format == "tum-rgbd" && IsTumFolder(folder)) return OpenTumFolder(folder, options);
+  if (format == "rosbag2") return OpenBag(folder, options);
   return NoSuchLog(folder, format);
 }
 
@@ -147,15 +152,18 @@ absl::StatusOr<std::unique_ptr<LogSource>> OpenLog(const std::string& path,
   std::error_code error;
   if (fs::is_directory(path, error)) return OpenFolder(path, options);
   // Bags may be larger than the memory.
-  DSG_ASSIGN_OR_RETURN(const bool is_bag, IsBag(path));
-  if (fs::is_regular_file(path, error) && is_bag != (options.format == "rosbag") &&
-      options.format != "auto") {
+  DSG_ASSIGN_OR_RETURN(const std::string bag_format, DetectBagFormat(path));
+  const bool wants_bag = IsBagFormat(options.format);
+  if (fs::is_regular_file(path, error) && options.format != "auto" &&
+      (wants_bag || !bag_format.empty()) && bag_format != options.format) {
     return MakeError(Reason::kFileMalformed,
-                     absl::StrCat(path, is_bag ? ": is a rosbag, not " : ": is no ", options.format,
-                                  "; leave --format out"),
+                     absl::StrCat(path, bag_format.empty() ? ": is no " : ": is ",
+                                  bag_format.empty() ? options.format : bag_format,
+                                  bag_format.empty() ? "" : ", not ",
+                                  bag_format.empty() ? "" : options.format, "; leave --format out"),
                      {{"file", path}});
   }
-  if (is_bag) return OpenBag(path, options);
+  if (!bag_format.empty()) return OpenBag(path, options);
   return OpenInput(path, options);
 }
 

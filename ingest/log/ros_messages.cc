@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ingest/log/ros_messages.h"
 
-#include <bit>
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
-#include "ingest/log/bag_record.h"
 #include "ingest/log/file_bytes.h"
+#include "ingest/log/ros_fields.h"
 #include "ingest/log/text_table.h"
 #include "schema/base/status.h"
 #include "schema/model/delta_check.h"
@@ -14,88 +13,23 @@
 namespace dsg::ingest {
 namespace {
 
-// Reads on; past the end it gives zeros and remembers.
-class Cursor {
- public:
-  explicit Cursor(std::string_view bytes) : rest_(bytes) {}
-
-  std::string_view Bytes(uint64_t size) {
-    if (size > rest_.size()) {
-      is_cut_ = true;
-      rest_ = {};
-      return {};
-    }
-    const std::string_view bytes = rest_.substr(0, size);
-    rest_.remove_prefix(size);
-    return bytes;
-  }
-  uint64_t Unsigned(size_t size) {
-    const std::string_view bytes = Bytes(size);
-    return bytes.size() == size ? LittleEndian(bytes, 0, size) : 0;
-  }
-  uint32_t U32() { return static_cast<uint32_t>(Unsigned(4)); }
-  uint8_t U8() { return static_cast<uint8_t>(Unsigned(1)); }
-  double F64() { return std::bit_cast<double>(Unsigned(8)); }
-  std::string_view String() { return Bytes(U32()); }
-
-  RosHeader Header() {
-    U32();
-    RosHeader header;
-    const auto seconds = static_cast<TimeNs>(U32());
-    const auto nanoseconds = static_cast<TimeNs>(U32());
-    header.stamp_ns = seconds * kNsPerSecond + nanoseconds;
-    header.frame_id = std::string(String());
-    return header;
-  }
-  Eigen::Vector3d Vector3() {
-    Eigen::Vector3d v;
-    for (Eigen::Index i = 0; i < 3; ++i) v[i] = F64();
-    return v;
-  }
-  Eigen::Vector4d Vector4() {
-    Eigen::Vector4d v;
-    for (Eigen::Index i = 0; i < 4; ++i) v[i] = F64();
-    return v;
-  }
-  void SkipDoubles(uint64_t count) { Bytes(count * 8); }
-
-  bool is_cut() const { return is_cut_; }
-  size_t rest() const { return rest_.size(); }
-
- private:
-  std::string_view rest_;
-  bool is_cut_ = false;
-};
-
-absl::Status CheckEnd(const Cursor& cursor, const char* type, const std::string& origin) {
-  if (cursor.is_cut()) {
-    return MalformedFile(origin, absl::StrCat("the message is too short for ", type));
-  }
-  if (cursor.rest() != 0) {
-    return MalformedFile(
-        origin, absl::StrCat("the message is ", cursor.rest(), " bytes too long for ", type,
-                             "; is the type another one?"));
-  }
-  return absl::OkStatus();
-}
-
-RosImage ReadImageHead(Cursor* cursor) {
+RosImage ReadImageHead(RosFields* fields) {
   RosImage image;
-  image.header = cursor->Header();
-  image.height = cursor->U32();
-  image.width = cursor->U32();
-  image.encoding = std::string(cursor->String());
-  image.is_big_endian = cursor->U8() != 0;
-  image.step = cursor->U32();
+  image.header = fields->Header();
+  image.height = fields->U32();
+  image.width = fields->U32();
+  image.encoding = std::string(fields->String());
+  image.is_big_endian = fields->U8() != 0;
+  image.step = fields->U32();
   return image;
 }
 
-RosPose ReadTransform(Cursor* cursor) {
+RosPose ReadTransform(RosFields* fields) {
   RosPose pose;
-  pose.header = cursor->Header();
-  pose.child_frame_id = std::string(cursor->String());
-  pose.position = cursor->Vector3();
-  pose.xyzw = cursor->Vector4();
+  pose.header = fields->Header();
+  pose.child_frame_id = std::string(fields->String());
+  pose.position = fields->Vector3();
+  pose.xyzw = fields->Vector4();
   return pose;
 }
 
@@ -107,8 +41,9 @@ absl::StatusOr<Pose3d> RosPose::ToPose(const std::string& origin) const {
     return MalformedFile(origin, "the pose holds a number that is not finite or beyond 2000 km");
   }
   if (std::abs(xyzw.norm() - 1.0) > kQuaternionNormTolerance) {
-    return MalformedFile(origin,
-                         absl::StrCat("the quaternion's norm is ", xyzw.norm(), ", 1 is due"));
+    return MalformedFile(origin, absl::StrCat("the quaternion's norm is ", xyzw.norm(),
+                                              ", 1 is due; correct or filter the log, or give "
+                                              "--pose-file"));
   }
   Pose3d pose;
   pose.position = position;
@@ -116,122 +51,122 @@ absl::StatusOr<Pose3d> RosPose::ToPose(const std::string& origin) const {
   return pose;
 }
 
-absl::StatusOr<RosHeader> ParseRosHeader(std::string_view bytes, const std::string& origin) {
-  Cursor cursor(bytes);
-  RosHeader header = cursor.Header();
-  if (cursor.is_cut()) return MalformedFile(origin, "the message is too short for a header");
+absl::StatusOr<RosHeader> ParseRosHeader(const RosBytes& message, const std::string& origin) {
+  RosFields fields(message);
+  RosHeader header = fields.Header();
+  DSG_RETURN_IF_ERROR(fields.NotCut("a header", origin));
   return header;
 }
 
-absl::StatusOr<RosImage> ParseRosImageHead(std::string_view bytes, const std::string& origin) {
-  Cursor cursor(bytes);
-  RosImage image = ReadImageHead(&cursor);
-  if (cursor.is_cut()) {
-    return MalformedFile(origin, "the message is too short for sensor_msgs/Image");
-  }
+absl::StatusOr<RosImage> ParseRosImageHead(const RosBytes& message, const std::string& origin) {
+  RosFields fields(message);
+  RosImage image = ReadImageHead(&fields);
+  DSG_RETURN_IF_ERROR(fields.NotCut("sensor_msgs/Image", origin));
   return image;
 }
 
-absl::StatusOr<RosImage> ParseRosImage(std::string_view bytes, const std::string& origin) {
-  Cursor cursor(bytes);
-  RosImage image = ReadImageHead(&cursor);
-  image.data = cursor.String();
-  DSG_RETURN_IF_ERROR(CheckEnd(cursor, "sensor_msgs/Image", origin));
+absl::StatusOr<RosImage> ParseRosImage(const RosBytes& message, const std::string& origin) {
+  RosFields fields(message);
+  RosImage image = ReadImageHead(&fields);
+  image.data = fields.Bytes();
+  DSG_RETURN_IF_ERROR(fields.End("sensor_msgs/Image", origin));
   return image;
 }
 
-absl::StatusOr<RosCompressedImage> ParseRosCompressedImage(std::string_view bytes,
+absl::StatusOr<RosCompressedImage> ParseRosCompressedImage(const RosBytes& message,
                                                            const std::string& origin) {
-  Cursor cursor(bytes);
+  RosFields fields(message);
   RosCompressedImage image;
-  image.header = cursor.Header();
-  image.format = std::string(cursor.String());
-  image.data = cursor.String();
-  DSG_RETURN_IF_ERROR(CheckEnd(cursor, "sensor_msgs/CompressedImage", origin));
+  image.header = fields.Header();
+  image.format = std::string(fields.String());
+  image.data = fields.Bytes();
+  DSG_RETURN_IF_ERROR(fields.End("sensor_msgs/CompressedImage", origin));
   return image;
 }
 
-absl::StatusOr<RosCameraInfo> ParseRosCameraInfo(std::string_view bytes,
+absl::StatusOr<RosCameraInfo> ParseRosCameraInfo(const RosBytes& message,
                                                  const std::string& origin) {
-  Cursor cursor(bytes);
+  RosFields fields(message);
   RosCameraInfo info;
-  info.header = cursor.Header();
-  info.height = cursor.U32();
-  info.width = cursor.U32();
-  info.distortion_model = std::string(cursor.String());
-  const uint32_t count = cursor.U32();
-  if (count > cursor.rest() / 8) {
+  info.header = fields.Header();
+  info.height = fields.U32();
+  info.width = fields.U32();
+  info.distortion_model = std::string(fields.String());
+  const uint32_t count = fields.U32();
+  if (count > fields.rest() / 8) {
     return MalformedFile(origin,
                          absl::StrCat("sensor_msgs/CameraInfo claims ", count, " coefficients"));
   }
-  for (uint32_t i = 0; i < count; ++i) info.d.push_back(cursor.F64());
-  for (double& value : info.k) value = cursor.F64();
-  for (double& value : info.r) value = cursor.F64();
-  for (double& value : info.p) value = cursor.F64();
+  for (uint32_t i = 0; i < count; ++i) info.d.push_back(fields.F64());
+  for (double& value : info.k) value = fields.F64();
+  for (double& value : info.r) value = fields.F64();
+  for (double& value : info.p) value = fields.F64();
   // Binning x and y; region of interest: x, y, height, width, whether to rectify.
-  cursor.Bytes(2 * 4 + 4 * 4 + 1);
-  DSG_RETURN_IF_ERROR(CheckEnd(cursor, "sensor_msgs/CameraInfo", origin));
+  for (int i = 0; i < 2 + 4; ++i) fields.U32();
+  fields.U8();
+  DSG_RETURN_IF_ERROR(fields.End("sensor_msgs/CameraInfo", origin));
   return info;
 }
 
-absl::StatusOr<RosImu> ParseRosImu(std::string_view bytes, const std::string& origin) {
-  Cursor cursor(bytes);
+absl::StatusOr<RosImu> ParseRosImu(const RosBytes& message, const std::string& origin) {
+  RosFields fields(message);
   RosImu imu;
-  imu.header = cursor.Header();
-  cursor.SkipDoubles(4 + 9);
-  imu.angular_velocity = cursor.Vector3();
-  cursor.SkipDoubles(9);
-  imu.acceleration = cursor.Vector3();
-  cursor.SkipDoubles(9);
-  DSG_RETURN_IF_ERROR(CheckEnd(cursor, "sensor_msgs/Imu", origin));
+  imu.header = fields.Header();
+  fields.SkipDoubles(4 + 9);
+  imu.angular_velocity = fields.Vector3();
+  fields.SkipDoubles(9);
+  imu.acceleration = fields.Vector3();
+  fields.SkipDoubles(9);
+  DSG_RETURN_IF_ERROR(fields.End("sensor_msgs/Imu", origin));
   if (!imu.angular_velocity.allFinite() || !imu.acceleration.allFinite()) {
     return MalformedFile(origin, "the inertial sample holds a number that is not finite");
   }
   return imu;
 }
 
-absl::StatusOr<RosPose> ParseRosOdometry(std::string_view bytes, const std::string& origin) {
-  Cursor cursor(bytes);
-  RosPose pose = ReadTransform(&cursor);
+absl::StatusOr<RosPose> ParseRosOdometry(const RosBytes& message, const std::string& origin) {
+  RosFields fields(message);
+  RosPose pose = ReadTransform(&fields);
   // Covariance of the pose; the velocities and theirs.
-  cursor.SkipDoubles(36 + 6 + 36);
-  DSG_RETURN_IF_ERROR(CheckEnd(cursor, "nav_msgs/Odometry", origin));
+  fields.SkipDoubles(36 + 6 + 36);
+  DSG_RETURN_IF_ERROR(fields.End("nav_msgs/Odometry", origin));
   return pose;
 }
 
-absl::StatusOr<RosPose> ParseRosPoseStamped(std::string_view bytes, const std::string& origin) {
-  Cursor cursor(bytes);
+absl::StatusOr<RosPose> ParseRosPoseStamped(const RosBytes& message, const std::string& origin) {
+  RosFields fields(message);
   RosPose pose;
-  pose.header = cursor.Header();
-  pose.position = cursor.Vector3();
-  pose.xyzw = cursor.Vector4();
-  DSG_RETURN_IF_ERROR(CheckEnd(cursor, "geometry_msgs/PoseStamped", origin));
+  pose.header = fields.Header();
+  pose.position = fields.Vector3();
+  pose.xyzw = fields.Vector4();
+  DSG_RETURN_IF_ERROR(fields.End("geometry_msgs/PoseStamped", origin));
   return pose;
 }
 
-absl::StatusOr<RosPose> ParseRosTransform(std::string_view bytes, const std::string& origin) {
-  Cursor cursor(bytes);
-  RosPose pose = ReadTransform(&cursor);
-  DSG_RETURN_IF_ERROR(CheckEnd(cursor, "geometry_msgs/TransformStamped", origin));
+absl::StatusOr<RosPose> ParseRosTransform(const RosBytes& message, const std::string& origin) {
+  RosFields fields(message);
+  RosPose pose = ReadTransform(&fields);
+  DSG_RETURN_IF_ERROR(fields.End("geometry_msgs/TransformStamped", origin));
   return pose;
 }
 
-absl::StatusOr<std::vector<RosPose>> ParseRosTransforms(std::string_view bytes,
+absl::StatusOr<std::vector<RosPose>> ParseRosTransforms(const RosBytes& message,
                                                         const std::string& origin) {
-  Cursor cursor(bytes);
+  RosFields fields(message);
   std::vector<RosPose> poses;
-  const uint32_t count = cursor.U32();
-  for (uint32_t i = 0; i < count && !cursor.is_cut(); ++i) {
-    poses.push_back(ReadTransform(&cursor));
+  const uint32_t count = fields.U32();
+  for (uint32_t i = 0; i < count && !fields.is_cut(); ++i) {
+    poses.push_back(ReadTransform(&fields));
   }
-  DSG_RETURN_IF_ERROR(CheckEnd(cursor, "tf2_msgs/TFMessage", origin));
+  DSG_RETURN_IF_ERROR(fields.End("tf2_msgs/TFMessage", origin));
   return poses;
 }
 
-absl::StatusOr<std::string_view> ParseRosString(std::string_view bytes, const std::string& origin) {
-  Cursor cursor(bytes);
-  const std::string_view text = cursor.String();
-  DSG_RETURN_IF_ERROR(CheckEnd(cursor, "std_msgs/String", origin));
+absl::StatusOr<std::string_view> ParseRosString(const RosBytes& message,
+                                                const std::string& origin) {
+  RosFields fields(message);
+  const std::string_view text = fields.String();
+  DSG_RETURN_IF_ERROR(fields.End("std_msgs/String", origin));
   return text;
 }
 

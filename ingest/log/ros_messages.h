@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The ROS 1 messages that sensor logs are made of, from their bytes.
+// The ROS messages that sensor logs are made of, from their bytes.
 // Refuses messages with bytes too few or too many: they would be of another definition.
 #pragma once
 
@@ -15,6 +15,22 @@
 #include "schema/model/geometry.h"
 
 namespace dsg::ingest {
+
+/// How messages become bytes: ROS 1's own way, or CDR of ROS 2.
+enum class RosEncoding { kRos1, kCdr };
+
+/// One message.
+struct RosBytes {
+  RosBytes() = default;
+  // NOLINTNEXTLINE(google-explicit-constructor): bytes alone are ROS 1's.
+  RosBytes(std::string_view of_ros1) : bytes(of_ros1) {}
+  // NOLINTNEXTLINE(google-explicit-constructor)
+  RosBytes(const std::string& of_ros1) : bytes(of_ros1) {}
+  RosBytes(std::string_view some, RosEncoding how) : bytes(some), encoding(how) {}
+
+  std::string_view bytes;
+  RosEncoding encoding = RosEncoding::kRos1;
+};
 
 struct RosHeader {
   TimeNs stamp_ns = 0;
@@ -74,21 +90,22 @@ struct RosPose {
 
 /// The stamp and frame that a message begins with.
 /// Errors of all: INVALID_ARGUMENT/FILE_MALFORMED naming `origin` and the type.
-absl::StatusOr<RosHeader> ParseRosHeader(std::string_view bytes, const std::string& origin);
-absl::StatusOr<RosImage> ParseRosImage(std::string_view bytes, const std::string& origin);
-absl::StatusOr<RosCompressedImage> ParseRosCompressedImage(std::string_view bytes,
+absl::StatusOr<RosHeader> ParseRosHeader(const RosBytes& message, const std::string& origin);
+absl::StatusOr<RosImage> ParseRosImage(const RosBytes& message, const std::string& origin);
+absl::StatusOr<RosCompressedImage> ParseRosCompressedImage(const RosBytes& message,
                                                            const std::string& origin);
-absl::StatusOr<RosCameraInfo> ParseRosCameraInfo(std::string_view bytes, const std::string& origin);
-absl::StatusOr<RosImu> ParseRosImu(std::string_view bytes, const std::string& origin);
-absl::StatusOr<RosPose> ParseRosOdometry(std::string_view bytes, const std::string& origin);
-absl::StatusOr<RosPose> ParseRosPoseStamped(std::string_view bytes, const std::string& origin);
-absl::StatusOr<RosPose> ParseRosTransform(std::string_view bytes, const std::string& origin);
-absl::StatusOr<std::vector<RosPose>> ParseRosTransforms(std::string_view bytes,
+absl::StatusOr<RosCameraInfo> ParseRosCameraInfo(const RosBytes& message,
+                                                 const std::string& origin);
+absl::StatusOr<RosImu> ParseRosImu(const RosBytes& message, const std::string& origin);
+absl::StatusOr<RosPose> ParseRosOdometry(const RosBytes& message, const std::string& origin);
+absl::StatusOr<RosPose> ParseRosPoseStamped(const RosBytes& message, const std::string& origin);
+absl::StatusOr<RosPose> ParseRosTransform(const RosBytes& message, const std::string& origin);
+absl::StatusOr<std::vector<RosPose>> ParseRosTransforms(const RosBytes& message,
                                                         const std::string& origin);
 /// A view into the message.
-absl::StatusOr<std::string_view> ParseRosString(std::string_view bytes, const std::string& origin);
+absl::StatusOr<std::string_view> ParseRosString(const RosBytes& message, const std::string& origin);
 
 /// Reads an image's head from the message's first bytes, without its pixels.
-absl::StatusOr<RosImage> ParseRosImageHead(std::string_view bytes, const std::string& origin);
+absl::StatusOr<RosImage> ParseRosImageHead(const RosBytes& message, const std::string& origin);
 
 }  // namespace dsg::ingest

@@ -77,7 +77,7 @@ ALLOWED["ingest/evaluation"] += ["ingest/truth"]
 # A header named *_internal.h counts as part of the .cc files of its folder, which alone may
 # include it.
 THIRD_PARTY = [
-    (r"sqlite3", ["schema/store/sqlite *.cc", "tests"]),
+    (r"sqlite3", ["schema/store/sqlite *.cc", "ingest/log *.cc", "tests"]),
     (r"libpq", ["schema/store/postgres *.cc"]),
     (r"grpc(pp|\+\+)?/|.*\.grpc\.pb\.h$",
      ["query/client", "server", "tests"]),

@@ -37,11 +37,11 @@ TEST(BagFile, GivesEachMessageInTheOrderOfRecording) {
       EXPECT_EQ(ref.bag_time_ns, 1000 + i / 2);
       const auto message = (*bag)->Read(ref);
       ASSERT_TRUE(message.ok()) << message.status();
-      EXPECT_EQ(message->data, i % 2 == 0 ? ImuMessage(5000 + i / 2, 0.1 * (i / 2), 9.81)
-                                          : StringMessage(absl::StrCat("note ", i / 2)));
+      EXPECT_EQ(message->data.bytes, i % 2 == 0 ? ImuMessage(5000 + i / 2, 0.1 * (i / 2), 9.81)
+                                                : StringMessage(absl::StrCat("note ", i / 2)));
       const auto head = (*bag)->Read(ref, 4);
       ASSERT_TRUE(head.ok());
-      EXPECT_EQ(head->data, message->data.substr(0, 4));
+      EXPECT_EQ(head->data.bytes, message->data.bytes.substr(0, 4));
     }
   }
 }
@@ -53,7 +53,7 @@ TEST(BagFile, OutlivesItsMessagesAndIsOutlivedByThem) {
     const auto bag = BagFile::Open(folder.Write("log.bag", SmallBag("lz4")));
     message = *(*bag)->Read((*bag)->messages()[1]);
   }
-  EXPECT_EQ(message.data, StringMessage("note 0"));
+  EXPECT_EQ(message.data.bytes, StringMessage("note 0"));
 }
 
 TEST(BagFile, SaysHowToMendABagWithoutIndex) {

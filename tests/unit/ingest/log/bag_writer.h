@@ -36,6 +36,7 @@ class ByteWriter {
     return *this;
   }
   ByteWriter& String(const std::string& text) { return U32(text.size()).Raw(text); }
+  ByteWriter& Blob(const std::string& bytes) { return String(bytes); }
   ByteWriter& Time(TimeNs time_ns) {
     return U32(static_cast<uint64_t>(time_ns / kNsPerSecond))
         .U32(static_cast<uint64_t>(time_ns % kNsPerSecond));

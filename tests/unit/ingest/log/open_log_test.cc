@@ -87,17 +87,21 @@ TEST(OpenLog, FindsEurocGroundTruthAtEachLevelOfTheFolder) {
   EXPECT_NE(both->info.content_sha256, identity);
 }
 
-TEST(OpenLog, TellsBagsAndSaysThatMcapIsNotSupported) {
+TEST(OpenLog, TellsBagsByTheirFirstBytes) {
   const TempFolder folder;
-  const absl::Status mcap =
-      ReadAll(folder.Write("log.mcap", std::string("\x89MCAP0\r\n") + "rest")).status();
-  EXPECT_NE(std::string(mcap.message()).find("MCAP"), std::string::npos) << mcap;
-  const absl::Status old = ReadAll(folder.Write("log.bag", "#ROSBAG V1.2\n")).status();
-  EXPECT_NE(std::string(old.message()).find("rosbag fix"), std::string::npos) << old;
-  LogOptions options;
-  options.format = "rosbag";
-  EXPECT_EQ(ReasonOf(ReadAll(folder.Write("log.txt", "0 1 2 3\n"), options).status()),
-            Reason::kFileMalformed);
+  ExpectMalformedFile(
+      ReadAll(folder.Write("log.bin", std::string("\x89MCAP0\r\n") + "rest")).status(),
+      {"log.bin: byte", "mcap recover"});
+  ExpectMalformedFile(
+      ReadAll(folder.Write("log.bin", std::string("SQLite format 3\0", 16) + "rest")).status(),
+      {"log.bin", "SQLite says"});
+  ExpectMalformedFile(ReadAll(folder.Write("log.bag", "#ROSBAG V1.2\n")).status(), {"rosbag fix"});
+  const std::string text = folder.Write("log.txt", "0 1 2 3\n");
+  for (const char* const format : {"rosbag", "mcap", "rosbag2"}) {
+    LogOptions options;
+    options.format = format;
+    ExpectMalformedFile(ReadAll(text, options).status(), {"is no ", format});
+  }
 }
 
 TEST(OpenLog, RefusesExternalPosesForLogsWithoutARobot) {

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// MCAP files: the recordings of ROS 2, and of other programs.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "ingest/log/bag.h"
+#include "ingest/log/random_file.h"
+#include "schema/base/cache.h"
+
+namespace dsg::ingest {
+
+inline constexpr std::string_view kMcapMagic = "\x89MCAP0\r\n";
+
+/// Chunks may be plain, lz4 or zstd; what has no index is looked through. Checksums that are there
+/// are checked: of the data and the summary when a file is opened, of a chunk when it is unpacked.
+/// Attachments and metadata are passed over.
+///
+/// Source: "MCAP Format Specification", version 0, mcap.dev.
+class McapFile : public Bag {
+ public:
+  /// Every length is checked against the bytes that are left.
+  /// Errors: INVALID_ARGUMENT/FILE_MALFORMED naming the byte offset; a file that was not closed
+  /// names `mcap recover`.
+  static absl::StatusOr<std::shared_ptr<const McapFile>> Open(const std::string& path);
+
+  std::string_view format() const override { return "mcap"; }
+  const std::string& path() const override { return file_->path(); }
+  const std::vector<BagConnection>& connections() const override { return connections_; }
+  const std::vector<BagMessageRef>& messages() const override { return messages_; }
+
+ protected:
+  absl::StatusOr<BagMessage> ReadFirst(const BagMessageRef& message,
+                                       size_t byte_count_max) const override;
+
+ private:
+  struct Chunk {
+    uint64_t data_at = 0;
+    uint64_t data_size = 0;
+    uint64_t declared_size = 0;
+    /// 0 = none.
+    uint32_t crc = 0;
+    std::string compression;
+  };
+  class Builder;
+
+  explicit McapFile(std::unique_ptr<const RandomFile> file);
+
+  absl::StatusOr<std::shared_ptr<const std::string>> LoadChunk(uint32_t index) const;
+  absl::StatusOr<BagMessage> ReadPlain(const BagMessageRef& message, size_t byte_count_max) const;
+
+  std::unique_ptr<const RandomFile> file_;
+  std::vector<BagConnection> connections_;
+  std::vector<Chunk> chunks_;
+  std::vector<BagMessageRef> messages_;
+  mutable Cache<uint32_t, std::shared_ptr<const std::string>> unpacked_;
+};
+
+}  // namespace dsg::ingest
