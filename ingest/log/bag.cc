@@ -112,6 +112,10 @@ absl::StatusOr<std::shared_ptr<const Bag>> OpenBagFiles(const std::string& path)
   return std::make_shared<const JoinedBag>(path, std::move(parts));
 }
 
+std::string BagOrigin(const Bag& bag, const std::string& topic, int64_t number) {
+  return absl::StrCat(bag.path(), ": topic ", topic, " message ", number);
+}
+
 RosEncoding BagEncoding(std::string_view encoding) {
   return encoding == "ros1" ? RosEncoding::kRos1 : RosEncoding::kCdr;
 }

@@ -79,6 +79,9 @@ class Bag {
 /// Errors: INVALID_ARGUMENT/FILE_MALFORMED naming the place, and what repairs such a bag.
 absl::StatusOr<std::shared_ptr<const Bag>> OpenBagFiles(const std::string& path);
 
+/// "bag.bag: topic /imu0 message 3".
+std::string BagOrigin(const Bag& bag, const std::string& topic, int64_t number);
+
 /// "sensor_msgs/msg/Imu" and the encoding that a bag names as a connection has them.
 std::string BagTypeName(std::string_view type, std::string_view encoding);
 RosEncoding BagEncoding(std::string_view encoding);

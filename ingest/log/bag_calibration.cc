@@ -6,61 +6,15 @@
 #include <optional>
 #include <set>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "ingest/log/bag_transforms.h"
 #include "ingest/log/ros_messages.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
 namespace {
-
-// Chains of frames in a robot are short; a loop would not end.
-constexpr int kChainMax = 16;
-constexpr const char* kBodyFrames[] = {"base_link_gt", "base_link", "imu", "imu0"};
-
-struct Transform {
-  std::string parent;
-  Pose3d parent_T_child;
-};
-using Transforms = std::map<std::string, Transform>;
-
-std::string WithoutSlash(const std::string& frame) {
-  return frame.starts_with('/') ? frame.substr(1) : frame;
-}
-
-absl::StatusOr<Transforms> ReadTransforms(const Bag& bag, const BagPlan& plan) {
-  Transforms transforms;
-  int64_t number = 0;
-  for (const BagMessageRef& ref : bag.messages()) {
-    const BagTopic& topic = plan.topics[plan.topic_of_connection[ref.connection]];
-    if (topic.name != "/tf_static") continue;
-    if (topic.type != "tf2_msgs/TFMessage" && topic.type != "tf/tfMessage") continue;
-    const std::string origin = BagOrigin(bag, topic.name, ++number);
-    DSG_ASSIGN_OR_RETURN(const BagMessage message, bag.Read(ref));
-    DSG_ASSIGN_OR_RETURN(const std::vector<RosPose> poses,
-                         ParseRosTransforms(message.data, origin));
-    for (const RosPose& pose : poses) {
-      DSG_ASSIGN_OR_RETURN(const Pose3d parent_T_child, pose.ToPose(origin));
-      transforms[WithoutSlash(pose.child_frame_id)] = {WithoutSlash(pose.header.frame_id),
-                                                       parent_T_child};
-    }
-  }
-  return transforms;
-}
-
-std::optional<Pose3d> FindBodyTCamera(const Transforms& transforms, std::string frame) {
-  Pose3d frame_T_camera;
-  for (int i = 0; i < kChainMax; ++i) {
-    if (std::find(std::begin(kBodyFrames), std::end(kBodyFrames), frame) != std::end(kBodyFrames)) {
-      return frame_T_camera;
-    }
-    const auto found = transforms.find(frame);
-    if (found == transforms.end()) return std::nullopt;
-    frame_T_camera = found->second.parent_T_child * frame_T_camera;
-    frame = found->second.parent;
-  }
-  return std::nullopt;
-}
 
 // Which camera info speaks of an image: the one with the most of its path.
 size_t CommonLength(std::string_view a, std::string_view b) {
@@ -139,21 +93,45 @@ std::optional<CameraCalibration> ToCalibration(const RosCameraInfo& info,
   return camera;
 }
 
-absl::Status AddCamera(const Bag& bag, const Transforms& transforms, const BagTopic& image,
+// Where a camera is on the robot. /tf is read only if /tf_static does not say it.
+class Extrinsics {
+ public:
+  explicit Extrinsics(const Bag& bag) : bag_(bag) {}
+
+  absl::StatusOr<std::optional<Pose3d>> Find(const std::string& frame) {
+    if (!tree_.has_value()) {
+      DSG_ASSIGN_OR_RETURN(tree_, TransformTree::Read(bag_, /*with_moving=*/false));
+    }
+    std::optional<Pose3d> body_T_camera = tree_->BodyTFrame(frame);
+    if (body_T_camera.has_value() || has_moving_ || !HasMovingTransforms(bag_)) {
+      return body_T_camera;
+    }
+    DSG_ASSIGN_OR_RETURN(tree_, TransformTree::Read(bag_, /*with_moving=*/true));
+    has_moving_ = true;
+    return tree_->BodyTFrame(frame);
+  }
+
+ private:
+  const Bag& bag_;
+  std::optional<TransformTree> tree_;
+  bool has_moving_ = false;
+};
+
+absl::Status AddCamera(const Bag& bag, const BagTopic& image, Extrinsics* extrinsics,
                        BagPlan* plan) {
   const std::string name = FindInfoTopic(*plan, image);
   if (name.empty()) return absl::OkStatus();
   DSG_ASSIGN_OR_RETURN(const RosCameraInfo info, ReadInfo(bag, *plan, name));
   std::optional<CameraCalibration> camera = ToCalibration(info, image.channel, &plan->notes);
   if (!camera.has_value()) return absl::OkStatus();
-  const std::string frame = WithoutSlash(info.header.frame_id);
-  const std::optional<Pose3d> body_T_camera = FindBodyTCamera(transforms, frame);
+  const std::string& frame = info.header.frame_id;
+  DSG_ASSIGN_OR_RETURN(const std::optional<Pose3d> body_T_camera, extrinsics->Find(frame));
   if (body_T_camera.has_value()) {
     camera->body_T_camera = *body_T_camera;
   } else {
-    plan->notes.push_back(absl::StrCat("no static transform leads from base_link_gt to \"",
-                                       frame.substr(0, 64), "\": ", image.channel,
-                                       " is taken to sit at the body"));
+    plan->notes.push_back(absl::StrCat("no fixed transform leads from the robot's body to \"",
+                                       absl::Utf8SafeCHexEscape(frame.substr(0, 64)),
+                                       "\": ", image.channel, " is taken to sit at the body"));
   }
   const absl::Status valid = camera->Validate();
   if (!valid.ok()) {
@@ -181,12 +159,12 @@ void ShareLeftCamera(const std::set<std::string>& channels, RigCalibration* rig)
 }  // namespace
 
 absl::Status ReadBagCalibration(const Bag& bag, BagPlan* plan) {
-  DSG_ASSIGN_OR_RETURN(const Transforms transforms, ReadTransforms(bag, *plan));
+  Extrinsics extrinsics(bag);
   std::set<std::string> channels;
   for (const BagTopic& topic : plan->topics) {
     if (topic.use != TopicUse::kImage && topic.use != TopicUse::kCompressedImage) continue;
     channels.insert(topic.channel);
-    DSG_RETURN_IF_ERROR(AddCamera(bag, transforms, topic, plan));
+    DSG_RETURN_IF_ERROR(AddCamera(bag, topic, &extrinsics, plan));
   }
   ShareLeftCamera(channels, &plan->rig);
   std::sort(plan->rig.cameras.begin(), plan->rig.cameras.end(),

@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "ingest/log/bag.h"
 #include "ingest/log/bag_topics.h"
+#include "ingest/log/bag_transforms.h"
 #include "ingest/log/detection_json.h"
 #include "ingest/log/image_file.h"
 #include "ingest/log/loop_file.h"
@@ -297,17 +298,33 @@ StampSpan SensorSpan(const Bag& bag, const BagPlan& plan) {
   return span;
 }
 
-// Leaves one source of poses in the plan; gives the table of a pose file.
-absl::StatusOr<std::optional<TrackTable>> PlanPoses(const LogOptions& options, BagPlan* plan,
-                                                    LogDigest* digest, LogInfo* info) {
+absl::StatusOr<std::optional<TrackTable>> ReadTransformPoses(const Bag& bag,
+                                                             const LogOptions& options,
+                                                             LogInfo* info) {
+  DSG_ASSIGN_OR_RETURN(const TransformTree tree, TransformTree::Read(bag, /*with_moving=*/true));
+  return tree.ReadPoses(bag, RobotName(options), &info->notes);
+}
+
+// Leaves one source of poses in the plan; gives the table of a pose file, or of /tf.
+absl::StatusOr<std::optional<TrackTable>> PlanPoses(const Bag& bag, const LogOptions& options,
+                                                    BagPlan* plan, LogDigest* digest,
+                                                    LogInfo* info) {
   const bool from_file = !options.pose_file.empty();
   std::optional<TrackTable> table;
   PoseChoice choice = PoseChoice::kNone;
   if (from_file) {
     DSG_ASSIGN_OR_RETURN(table, ChoosePoses(options, {}, digest, info));
   } else {
-    DSG_ASSIGN_OR_RETURN(choice, ChoosePoseKind(options, HasUse(*plan, TopicUse::kTruth),
-                                                HasUse(*plan, TopicUse::kExternal), info->path));
+    const bool has_truth = HasUse(*plan, TopicUse::kTruth);
+    const bool has_external = HasUse(*plan, TopicUse::kExternal);
+    // A topic of poses goes before the transforms, which take a pass over the bag.
+    const bool wants_truth = options.poses == PoseSource::kGroundTruth ||
+                             (options.poses == PoseSource::kAuto && has_truth);
+    if (!has_external && !wants_truth && HasMovingTransforms(bag)) {
+      DSG_ASSIGN_OR_RETURN(table, ReadTransformPoses(bag, options, info));
+    }
+    DSG_ASSIGN_OR_RETURN(
+        choice, ChoosePoseKind(options, has_truth, has_external || table.has_value(), info->path));
   }
   for (BagTopic& topic : plan->topics) {
     const bool is_taken = (topic.use == TopicUse::kTruth && choice == PoseChoice::kGroundTruth) ||
@@ -319,6 +336,11 @@ absl::StatusOr<std::optional<TrackTable>> PlanPoses(const LogOptions& options, B
     } else if (topic.use == TopicUse::kTruth || topic.use == TopicUse::kExternal) {
       topic.use = TopicUse::kNone;
     }
+  }
+  if (table.has_value() && !from_file) {
+    info->notes.push_back(absl::StrCat("the robot's poses are external: ", table->file));
+  } else if (HasMovingTransforms(bag) && choice != PoseChoice::kNone) {
+    info->notes.push_back("/tf is not taken for poses: a topic of poses goes before it");
   }
   if (!from_file && choice == PoseChoice::kNone) {
     info->notes.push_back(
@@ -381,7 +403,8 @@ OpenedLog OpenBag(const std::string& path, const LogOptions& options) {
   info.labels = plan.labels;
   info.notes = plan.notes;
   LogDigest digest;
-  DSG_ASSIGN_OR_RETURN(std::optional<TrackTable> poses, PlanPoses(options, &plan, &digest, &info));
+  DSG_ASSIGN_OR_RETURN(std::optional<TrackTable> poses,
+                       PlanPoses(*bag, options, &plan, &digest, &info));
   DSG_ASSIGN_OR_RETURN(std::optional<SensorChannel> loops,
                        ReadLoops(*bag, options, &plan, &digest, &info));
   const bool has_other_file = !options.pose_file.empty() || !options.loop_file.empty();

@@ -197,7 +197,8 @@ void NoteUnusedTopics(BagPlan* plan) {
   std::vector<const BagTopic*> unused;
   for (const BagTopic& topic : plan->topics) {
     const bool is_known = topic.use != TopicUse::kNone || topic.type == "sensor_msgs/CameraInfo" ||
-                          topic.name == "/tf_static" || topic.name == "/dsg/labels";
+                          topic.name == "/tf_static" || topic.name == "/tf" ||
+                          topic.name == "/dsg/labels";
     if (!is_known) unused.push_back(&topic);
   }
   if (unused.empty()) return;
@@ -205,10 +206,6 @@ void NoteUnusedTopics(BagPlan* plan) {
 }
 
 }  // namespace
-
-std::string BagOrigin(const Bag& bag, const std::string& topic, int64_t number) {
-  return absl::StrCat(bag.path(), ": topic ", topic, " message ", number);
-}
 
 std::string TopicNames(const std::vector<const BagTopic*>& topics) {
   // Recordings of some cameras have a hundred topics of settings, hostile ones a million.

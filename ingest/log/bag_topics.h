@@ -63,7 +63,4 @@ absl::StatusOr<BagPlan> PlanBag(const Bag& bag);
 /// "/imu0 (49 sensor_msgs/Imu), ... and 7 more", fit for a terminal.
 std::string TopicNames(const std::vector<const BagTopic*>& topics);
 
-/// "bag.bag: topic /imu0 message 3".
-std::string BagOrigin(const Bag& bag, const std::string& topic, int64_t number);
-
 }  // namespace dsg::ingest

@@ -207,16 +207,27 @@ TEST_F(RealSensorLogs, Bz2BagEqualsTheUncompressedOneAndTheFolder) {
 
 TEST_F(RealSensorLogs, BagsWithoutSensorsOpenAndNameTheirTopics) {
   for (const auto& [path, topic] :
-       {std::pair("bags/tf_example.bag", "/tf (517"),
-        std::pair("bags/example-lz4.bag", "/turtle1/color_sensor (1351 turtlesim/Color)")}) {
+       {std::pair("bags-ros2/talker_sqlite3", "/rosout (10 rcl_interfaces/Log)"),
+        std::pair("bags-ros2/base_msgs.mcap", "geometry_msgs/Twist")}) {
     const auto log = OpenLog(Path(path), {});
     ASSERT_TRUE(log.ok()) << log.status();
     EXPECT_EQ((*log)->info().measurement_count, 0);
     EXPECT_TRUE(HasNote((*log)->info(), topic)) << path;
-    const absl::Status end = (*log)->Next().status();
-    EXPECT_EQ(ReasonOf(end), Reason::kFileMalformed);
-    EXPECT_NE(std::string(end.message()).find("/tf"), std::string::npos) << end;
+    ExpectMalformedFile((*log)->Next().status(), {"no topic that can be used", topic});
   }
+}
+
+TEST_F(RealSensorLogs, TransformsOfRos1AndRos2AreOneTrajectory) {
+  const auto ros1 = ReadAll(Path("bags/tf_example.bag"));
+  const auto ros2 = ReadAll(Path("bags-ros2/tf_example"));
+  ASSERT_TRUE(ros1.ok()) << ros1.status();
+  ASSERT_TRUE(ros2.ok()) << ros2.status();
+  EXPECT_EQ(ros1->poses.size(), 517u);
+  EXPECT_EQ(ros1->order, ros2->order);
+  for (size_t i = 0; i < ros1->poses.size(); ++i) {
+    EXPECT_EQ(ros1->poses[i].pose.map_T_agent.position, ros2->poses[i].pose.map_T_agent.position);
+  }
+  EXPECT_TRUE(HasNote(ros2->info, "frame \"base_link\" in \"odom\""));
 }
 
 TEST_F(RealSensorLogs, RealSenseBagHasItsCalibrationAndCountsItsTopics) {
