@@ -27,11 +27,13 @@ void AddMergeVerb(Grammar* grammar);
 void AddPruneVerb(Grammar* grammar);
 void AddAssetVerb(Grammar* grammar);
 void AddFactorsVerb(Grammar* grammar);
+void AddDropVerbs(Grammar* grammar);
+void AddSetVerb(Grammar* grammar);
 
 inline constexpr std::array kVerbs = {
     &AddAgentVerbs,  &AddShapeVerb,   &AddMeetingVerbs, &AddPredictVerb, &AddGraphVerbs,
     &AddSearchVerbs, &AddSpaceVerbs,  &AddChangeVerbs,  &AddMapVerbs,    &AddImportVerb,
     &AddStoreVerbs,  &AddExportVerbs, &AddKeepVerbs,    &AddBackupVerbs, &AddMergeVerb,
-    &AddPruneVerb,   &AddAssetVerb,   &AddFactorsVerb};
+    &AddPruneVerb,   &AddAssetVerb,   &AddFactorsVerb,  &AddDropVerbs,   &AddSetVerb};
 
 }  // namespace dsg::cli

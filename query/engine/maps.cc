@@ -29,7 +29,13 @@ absl::StatusOr<std::shared_ptr<MapReader>> MapTable::Reader(const std::string& n
   DSG_RETURN_IF_ERROR(CheckMapName(name));
   // Opened without the lock, so that a slow disk delays only those who ask for this map. When two
   // open it at once, the first stays and the second is dropped.
-  DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> opened, store_->OpenMap(name));
+  absl::StatusOr<std::shared_ptr<MapReader>> found = store_->OpenMap(name);
+  if (!found.ok()) {
+    // Another process may have dropped it: files that are open take space until they are closed.
+    TakeGone(name);
+    return found.status();
+  }
+  std::shared_ptr<MapReader> opened = *std::move(found);
   std::unique_lock lock(readers_mutex_);
   OpenMap& kept = readers_[name];
   if (kept.reader == nullptr || !kept.reader->IsCurrent()) std::swap(kept.reader, opened);
@@ -106,6 +112,45 @@ absl::Status MapTable::WithWriter(const std::string& name, const StopCheck& stop
   // with the same session and sequence, gets a fresh one.
   if (ReasonOf(status) == Reason::kCommitOutcomeUnknown) slot->writer.reset();
   return status;
+}
+
+absl::Status MapTable::TakeAway(const std::string& name, const StopCheck& stop,
+                                const std::function<absl::Status()>& work) {
+  DSG_RETURN_IF_ERROR(CheckMapName(name));
+  SlotUse slot = UseSlot(name);
+  // Closed last, without any lock.
+  std::shared_ptr<MapReader> gone;
+  absl::Status status;
+  {
+    const std::lock_guard lock(slot->mutex);
+    status = AskStop(stop);
+    if (status.ok()) {
+      slot->writer.reset();
+      slot->reader.reset();
+      status = work();
+    }
+    gone = TakeGone(name);
+  }
+  RemoveSlot(name, std::move(slot));
+  return status;
+}
+
+std::shared_ptr<MapReader> MapTable::TakeGone(const std::string& name) {
+  const std::unique_lock lock(readers_mutex_);
+  const auto found = readers_.find(name);
+  if (found == readers_.end() || found->second.reader->IsCurrent()) return nullptr;
+  std::shared_ptr<MapReader> gone = std::move(found->second.reader);
+  readers_.erase(found);
+  return gone;
+}
+
+void MapTable::RemoveSlot(const std::string& name, SlotUse slot) {
+  const std::lock_guard lock(slots_mutex_);
+  const auto found = slots_.find(name);
+  // The next call makes another one, and opens the writer again.
+  if (found->second->user_count > 1) return;
+  slot.Release();
+  slots_.erase(found);
 }
 
 absl::Status ListMaps(Engine* engine, const CallContext&, const v1::ListMapsRequest&,

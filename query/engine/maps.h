@@ -42,6 +42,12 @@ class MapTable {
   absl::Status WithWriter(const std::string& name, const StopCheck& stop,
                           const std::function<absl::Status(MapWriter&)>& work);
 
+  /// Runs `work`, which takes the map away from its name, when no call of this table writes it and
+  /// without its writer, whose lock `work` takes. If the map is gone then, its files are closed.
+  /// Errors: MAP_NAME_INVALID; what `stop` and `work` return.
+  absl::Status TakeAway(const std::string& name, const StopCheck& stop,
+                        const std::function<absl::Status()>& work);
+
  private:
   struct WriterSlot {
     /// Those that hold or wait for `mutex`. Under slots_mutex_.
@@ -68,12 +74,19 @@ class MapTable {
     }
     ~SlotUse();
     WriterSlot* operator->() const { return slot_; }
+    /// The slot is about to go.
+    void Release() { slot_ = nullptr; }
 
    private:
     MapTable* table_;
     WriterSlot* slot_;
   };
   SlotUse UseSlot(const std::string& name);
+  /// The reader of a map that is no longer what its name stands for, to be closed without a lock;
+  /// null if there is none.
+  std::shared_ptr<MapReader> TakeGone(const std::string& name);
+  /// So that names of maps that are gone do not pile up. Not if others wait for the slot.
+  void RemoveSlot(const std::string& name, SlotUse slot);
   /// nullopt if it is in use.
   std::optional<SlotUse> UseIdleSlot(const std::string& name);
 

@@ -26,8 +26,8 @@ ArchiveLimits::Clock::time_point NowOf(const ArchiveLimits& limits) {
 absl::Status ErasedError(const std::string& map) {
   return MakeError(Reason::kMapReplaced,
                    absl::StrCat("map \"", map,
-                                "\" was erased from while its archive was read, and the archive "
-                                "would still hold what is gone; ask for the archive again"),
+                                "\" was erased from or dropped while its archive was read, and the "
+                                "archive would still hold what is gone; ask for it again"),
                    {{"map", map}});
 }
 

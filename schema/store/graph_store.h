@@ -150,6 +150,27 @@ struct StoreOptions {
   int64_t quota_bytes = 0;
 };
 
+/// What a map must be for it to be dropped; what is not set may be anything.
+struct MapCondition {
+  /// Its newest revision.
+  std::optional<Revision> head{};
+  /// As MapReader::incarnation has it; empty = any.
+  std::string incarnation{};
+
+  bool is_set() const { return head.has_value() || !incarnation.empty(); }
+  /// Whether a map is so. Errors: ABORTED/MAP_REPLACED or PARENT_REVISION_STALE.
+  absl::Status Check(const std::string& map, const std::string& incarnation_now,
+                     Revision head_now) const;
+};
+
+/// A map that is gone.
+struct DropReport {
+  /// Its newest revision; unset if it could not be read.
+  std::optional<Revision> head;
+  /// All space that it took; 0 for a store without files.
+  int64_t bytes_on_disk = 0;
+};
+
 /// Threads: safe from many threads.
 class GraphStore {
  public:
@@ -199,6 +220,22 @@ class GraphStore {
   virtual absl::Status InstallRows(const MapSpec& spec, const RowSource& rows,
                                    const std::string& scratch, bool replace,
                                    const StopCheck& stop) = 0;
+  /// Removes a map with its history and all its files. Killed at any point, it has left the map
+  /// as it was, or none; what is left of the files then goes when the store is opened next.
+  /// Readers of the map notice (IsCurrent). A map that cannot be read is removed as well, unless
+  /// `condition` asks for something.
+  ///
+  /// Errors: as OpenWriter, but for those of formats; FAILED_PRECONDITION/NOT_A_STORE for files
+  /// that are no map; as MapCondition::Check, which sees the map with its lock held. After an
+  /// error the map is as it was.
+  virtual absl::StatusOr<DropReport> DropMap(const std::string& name,
+                                             const MapCondition& condition) = 0;
+  /// Gives a map another name; history and incarnation stay. Killed at any point, it has left the
+  /// map under one of the two names. Readers under the old name notice (IsCurrent).
+  ///
+  /// Errors: as OpenWriter; INVALID_ARGUMENT/MAP_NAME_INVALID; ALREADY_EXISTS/MAP_EXISTS. After an
+  /// error the map is as it was.
+  virtual absl::Status RenameMap(const std::string& from, const std::string& to) = 0;
   /// Errors: as OpenMap; UNAVAILABLE/WRITER_LOCKED naming who holds the lock.
   virtual absl::StatusOr<std::unique_ptr<MapWriter>> OpenWriter(const std::string& name) = 0;
 };

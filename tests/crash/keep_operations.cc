@@ -220,6 +220,65 @@ KeepOperation Upgrade() {
       .may_be_of_old_format = true};
 }
 
+// What a map of another name than the two says.
+MapContent ContentUnder(const Aftermath& after, const std::string& map, std::string* problems) {
+  return ReadContent(after.place + "/store", map, AllLooked(), problems);
+}
+
+// Names in the store's folder, but for the other map's.
+std::vector<std::string> NamesInStore(const Aftermath& after) {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(after.place + "/store")) {
+    const std::string name = entry.path().filename().string();
+    if (name != KeepRig::kOther) names.push_back(name);
+  }
+  return names;
+}
+
+// LookAt has opened the store, so nothing may be left of what was begun.
+KeepOperation Drop() {
+  return {.name = "drop",
+          .command =
+              [](const KeepRig&, const std::string& place) {
+                return Command{Program("dsg"), "drop",          kMain,
+                               "--yes",        "--expect",      absl::StrCat(kLength),
+                               "--store",      place + "/store"};
+              },
+          .violation = [](const Aftermath& after) -> std::string {
+            const std::vector<std::string> names = NamesInStore(after);
+            if (after.main.newest > 0) {
+              if (after.is_done) return "the map is there";
+              return names.size() == 1 ? PastViolation(after, AllLooked()) : "there is more of it";
+            }
+            if (!names.empty()) return absl::StrCat("it left ", names.front());
+            return after.other.digests == after.rig.other_content().digests
+                       ? ""
+                       : "the other map has changed";
+          },
+          .done_reason = "MAP_UNKNOWN"};
+}
+
+KeepOperation Rename() {
+  return {.name = "rename",
+          .command =
+              [](const KeepRig&, const std::string& place) {
+                return Command{Program("dsg"), "rename",  kMain,
+                               "moved",        "--store", place + "/store"};
+              },
+          .violation = [](const Aftermath& after) -> std::string {
+            const std::vector<std::string> names = NamesInStore(after);
+            if (names.size() != 1) return "the map has another number of names than one";
+            if (names.front() == kMain) {
+              return after.is_done ? "it has its old name" : PastViolation(after, AllLooked());
+            }
+            Aftermath renamed = after;
+            std::string problems;
+            renamed.main = ContentUnder(after, "moved", &problems);
+            return problems + PastViolation(renamed, AllLooked());
+          },
+          .done_reason = "MAP_UNKNOWN"};
+}
+
 bool HasVerb(const std::string& verb) {
   TempFolder folder;
   return RunToEnd({Program("dsg"), verb, "--help"}, folder.path()) == 0;
@@ -288,6 +347,8 @@ std::vector<KeepOperation> KeepOperations(std::vector<std::string>* missing) {
   add("backup", Backup());
   add("restore", Restore());
   add("upgrade", Upgrade());
+  add("drop", Drop());
+  add("rename", Rename());
   return all;
 }
 

@@ -30,6 +30,11 @@ MapRows::MapRows(MapSpec map_spec) : spec(std::move(map_spec)), incarnation(NewI
   for (const Layer& layer : DefaultLayers()) layers.emplace_back(0, layer);
 }
 
+MapRows::MapRows(MapSpec map_spec, std::string incarnation_kept, MapContent content)
+    : MapContent(std::move(content)),
+      spec(std::move(map_spec)),
+      incarnation(std::move(incarnation_kept)) {}
+
 RevisionRecord MapRows::Head() const {
   return commits.empty() ? RevisionRecord() : commits.rbegin()->second.record;
 }

@@ -70,15 +70,8 @@ struct NotedErasure {
   EraseList list;
 };
 
-/// Threads: whoever reads or writes holds `mutex`, except for `spec` and `incarnation`, which never
-/// change.
-struct MapRows {
-  explicit MapRows(MapSpec map_spec);
-
-  const MapSpec spec;
-  const std::string incarnation;
-  mutable std::mutex mutex;
-
+/// What changes with commits and forgetting.
+struct MapContent {
   /// Ascending by the revision that brought them.
   std::vector<std::pair<Revision, Layer>> layers;
   std::vector<std::pair<Revision, SemanticLabel>> labels;
@@ -111,6 +104,18 @@ struct MapRows {
 
   /// Who writes the map; empty when nobody does.
   std::string writer;
+};
+
+/// Threads: whoever reads or writes holds `mutex`, except for `spec` and `incarnation`, which never
+/// change.
+struct MapRows : MapContent {
+  explicit MapRows(MapSpec map_spec);
+  /// A map that has been another one, such as under another name.
+  MapRows(MapSpec map_spec, std::string incarnation_kept, MapContent content);
+
+  const MapSpec spec;
+  const std::string incarnation;
+  mutable std::mutex mutex;
 
   /// Revision 0 of an empty map.
   RevisionRecord Head() const;

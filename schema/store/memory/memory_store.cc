@@ -83,8 +83,51 @@ class MemoryStore : public GraphStore {
 
   absl::StatusOr<std::unique_ptr<MapWriter>> OpenWriter(const std::string& name) override {
     DSG_ASSIGN_OR_RETURN(auto rows, Find(name));
-    DSG_ASSIGN_OR_RETURN(auto writer, MemoryWriter::Open(std::move(rows), options_.program));
+    DSG_ASSIGN_OR_RETURN(auto writer, MemoryWriter::Open(rows, options_.program));
+    // The map may have been dropped, renamed or replaced before it was locked.
+    DSG_ASSIGN_OR_RETURN(const auto now, Find(name));
+    if (now != rows) return OpenWriter(name);
     return std::unique_ptr<MapWriter>(std::move(writer));
+  }
+
+  absl::StatusOr<DropReport> DropMap(const std::string& name,
+                                     const MapCondition& condition) override {
+    DSG_RETURN_IF_ERROR(CheckMapName(name));
+    const std::lock_guard lock(maps_->mutex);
+    const auto found = maps_->by_name.find(name);
+    if (found == maps_->by_name.end()) return UnknownMapError(name, location_);
+    const std::shared_ptr<MapRows> rows = found->second;
+    DSG_ASSIGN_OR_RETURN(const auto writer, MemoryWriter::Open(rows, options_.program));
+    const std::lock_guard rows_lock(rows->mutex);
+    DSG_RETURN_IF_ERROR(condition.Check(name, rows->incarnation, rows->newest()));
+    // Who reads it is to notice.
+    ++rows->generation;
+    maps_->by_name.erase(found);
+    return DropReport{rows->newest(), 0};
+  }
+
+  absl::Status RenameMap(const std::string& from, const std::string& to) override {
+    DSG_RETURN_IF_ERROR(CheckMapName(from));
+    DSG_RETURN_IF_ERROR(CheckMapName(to));
+    const std::lock_guard lock(maps_->mutex);
+    const auto found = maps_->by_name.find(from);
+    if (found == maps_->by_name.end()) return UnknownMapError(from, location_);
+    if (maps_->by_name.contains(to)) return MapExistsError(to);
+    const std::shared_ptr<MapRows> old = found->second;
+    DSG_ASSIGN_OR_RETURN(const auto writer, MemoryWriter::Open(old, options_.program));
+    const std::lock_guard old_lock(old->mutex);
+    MapSpec spec = old->spec;
+    spec.name = to;
+    MapContent& content = *old;
+    const auto renamed =
+        std::make_shared<MapRows>(std::move(spec), old->incarnation, std::move(content));
+    renamed->writer.clear();
+    // Who reads the old one finds nothing there, and is to notice.
+    content = MapContent();
+    old->generation = renamed->generation + 1;
+    maps_->by_name.erase(found);
+    maps_->by_name.emplace(to, renamed);
+    return absl::OkStatus();
   }
 
   absl::StatusOr<UpgradeReport> UpgradeMap(const std::string& name) override {

@@ -187,12 +187,8 @@ absl::Status InstallMapFile(const std::string& store_folder, const std::string& 
   DSG_RETURN_IF_ERROR(CheckMapFile(file, name));
   const std::string folder = MapFolder(store_folder, name);
   const std::string path = DatabasePath(store_folder, name);
+  DSG_ASSIGN_OR_RETURN(const auto lock, LockNewMap(store_folder, name, program));
   std::error_code error;
-  fs::create_directory(folder, error);
-  if (error) {
-    return absl::InternalError(absl::StrCat("cannot make ", folder, ": ", error.message()));
-  }
-  DSG_ASSIGN_OR_RETURN(const auto lock, WriterLock::Acquire(store_folder, name, program));
   int64_t generation = 0;
   if (fs::exists(path, error)) {
     if (!replace) {

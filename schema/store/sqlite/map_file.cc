@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -22,6 +23,7 @@
 #include "schema/model/edge.h"
 #include "schema/store/graph_store.h"
 #include "schema/store/sqlite/stream_in.h"
+#include "schema/store/sqlite/whole_maps.h"
 
 namespace dsg::sqlite {
 
@@ -33,9 +35,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// How those who make a map name themselves in its lock, and how long that takes at most.
+// How those name themselves in a lock who make a map, drop or rename it, and how long that takes at
+// most.
 constexpr char kCreator[] = "create";
-constexpr std::chrono::seconds kCreationMax{10};
+constexpr std::array<const char*, 3> kBriefHolders = {kCreator, "drop by ", "rename by "};
+constexpr std::chrono::seconds kBriefWorkMax{10};
 
 std::string Errno() { return std::strerror(errno); }
 
@@ -46,6 +50,25 @@ std::string ReadHolder(int fd) {
   std::string holder(text, static_cast<size_t>(size > 0 ? size : 0));
   if (!holder.empty() && holder.back() == '\n') holder.pop_back();
   return holder;
+}
+
+// Who does brief work is done in a moment; who has no name yet may be such a one.
+bool IsBrief(const std::string& holder) {
+  return holder.empty() ||
+         std::any_of(kBriefHolders.begin(), kBriefHolders.end(),
+                     [&](const char* brief) { return holder.rfind(brief, 0) == 0; });
+}
+
+// Whether a file is the one of that name.
+bool IsAtPath(const struct stat& file, const std::string& path) {
+  struct stat named {};
+  return stat(path.c_str(), &named) == 0 && file.st_dev == named.st_dev &&
+         file.st_ino == named.st_ino;
+}
+
+bool IsAtPath(int fd, const std::string& path) {
+  struct stat file {};
+  return fstat(fd, &file) == 0 && IsAtPath(file, path);
 }
 
 int64_t SizeOf(const std::string& path) {
@@ -109,6 +132,40 @@ absl::Status CheckNewestFormat(Database& db, const std::string& path) {
   return absl::OkStatus();
 }
 
+absl::Status CheckFile(const std::string& path, const struct stat& info, const std::string& map) {
+  if (!S_ISREG(info.st_mode)) {
+    return MakeError(Reason::kNotAStore, absl::StrCat(path, " is not a file"), {{"map", map}});
+  }
+  if (info.st_nlink > 1) {
+    return MakeError(Reason::kNotAStore,
+                     absl::StrCat(path,
+                                  " has a second hard link; two names for one database lose "
+                                  "its locks, so remove the other"),
+                     {{"map", map}});
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::unique_ptr<Database>> OpenThere(const std::string& store_folder,
+                                                    const std::string& map, Database::Mode mode) {
+  const std::string path = DatabasePath(store_folder, map);
+  DSG_ASSIGN_OR_RETURN(auto db, Database::Open(path, mode, map));
+  DSG_RETURN_IF_ERROR(CheckKnownFormat(*db, path));
+  DSG_ASSIGN_OR_RETURN(const MapSpec spec, ReadMapSpec(*db));
+  if (spec.name == map) return db;
+  if (IsBeingRenamed(store_folder, map, spec.name)) {
+    // Unless somebody does it at this moment, it was killed.
+    db.reset();
+    SettleWholeMaps(store_folder);
+    return UnknownMapError(map, store_folder);
+  }
+  return MakeError(
+      Reason::kNotAStore,
+      absl::StrCat("folder ", MapFolder(store_folder, map), " holds map \"", spec.name,
+                   "\"; a map cannot be copied under another name, rename the folder back"),
+      {{"map", map}});
+}
+
 }  // namespace
 
 absl::Status SyncFolder(const std::string& folder) {
@@ -166,16 +223,12 @@ absl::Status CheckFileSystem(const std::string& folder) {
 absl::Status CreateMapFile(const std::string& store_folder, const MapSpec& spec) {
   DSG_RETURN_IF_ERROR(spec.Validate());
   const std::string folder = MapFolder(store_folder, spec.name);
-  std::error_code error;
-  fs::create_directory(folder, error);
-  if (error) {
-    return absl::InternalError(absl::StrCat("cannot make ", folder, ": ", error.message()));
-  }
   const std::string path = DatabasePath(store_folder, spec.name);
   const absl::Status exists = MapExistsError(spec.name);
+  std::error_code error;
   if (fs::exists(path, error)) return exists;
   // Two processes may create the same map at once: the lock decides, the loser sees it exists.
-  const auto lock = WriterLock::Acquire(store_folder, spec.name, kCreator);
+  const auto lock = LockNewMap(store_folder, spec.name, kCreator);
   if (fs::exists(path, error)) return exists;
   DSG_RETURN_IF_ERROR(lock.status());
   const std::string partial = path + ".new";
@@ -217,30 +270,15 @@ absl::StatusOr<std::unique_ptr<Database>> OpenAnyFormat(const std::string& store
                                                         Database::Mode mode) {
   DSG_RETURN_IF_ERROR(CheckMapName(map));
   const std::string path = DatabasePath(store_folder, map);
-  struct stat info {};
-  if (stat(path.c_str(), &info) != 0) return UnknownMapError(map, store_folder);
-  if (!S_ISREG(info.st_mode)) {
-    return MakeError(Reason::kNotAStore, absl::StrCat(path, " is not a file"), {{"map", map}});
+  for (;;) {
+    struct stat info {};
+    if (stat(path.c_str(), &info) != 0) return UnknownMapError(map, store_folder);
+    DSG_RETURN_IF_ERROR(CheckFile(path, info, map));
+    absl::StatusOr<std::unique_ptr<Database>> db = OpenThere(store_folder, map, mode);
+    // The map may be dropped, renamed or replaced between the opening of its file and of its log,
+    // which then is of another file.
+    if (IsAtPath(info, path)) return db;
   }
-  if (info.st_nlink > 1) {
-    return MakeError(Reason::kNotAStore,
-                     absl::StrCat(path,
-                                  " has a second hard link; two names for one database lose "
-                                  "its locks, so remove the other"),
-                     {{"map", map}});
-  }
-  DSG_ASSIGN_OR_RETURN(auto db, Database::Open(path, mode, map));
-  DSG_RETURN_IF_ERROR(CheckKnownFormat(*db, path));
-  DSG_ASSIGN_OR_RETURN(const MapSpec spec, ReadMapSpec(*db));
-  if (spec.name != map) {
-    return MakeError(
-        Reason::kNotAStore,
-        absl::StrCat("folder ", MapFolder(store_folder, map), " holds map \"", spec.name,
-                     "\"; a map cannot be copied under another name, "
-                     "rename the folder back"),
-        {{"map", map}});
-  }
-  return db;
 }
 
 absl::StatusOr<MapSpec> ReadMapSpec(Database& db) {
@@ -317,16 +355,15 @@ absl::StatusOr<std::unique_ptr<WriterLock>> WriterLock::Acquire(const std::strin
   const std::string path = MapFolder(store_folder, map) + "/writer.lock";
   const int fd = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644);
   if (fd < 0) {
+    if (errno == ENOENT) return UnknownMapError(map, store_folder);
     return MakeError(Reason::kReadOnly, absl::StrCat("cannot open ", path, ": ", Errno()),
                      {{"map", map}});
   }
   std::unique_ptr<WriterLock> lock(new WriterLock(fd));
-  const auto give_up = std::chrono::steady_clock::now() + kCreationMax;
+  const auto give_up = std::chrono::steady_clock::now() + kBriefWorkMax;
   while (flock(fd, LOCK_EX | LOCK_NB) != 0) {
     const std::string holder = ReadHolder(fd);
-    // Who made the map at the same time is done in a moment; who has no name yet may be that one.
-    const bool is_brief = holder.empty() || holder.rfind(kCreator, 0) == 0;
-    if (is_brief && std::chrono::steady_clock::now() < give_up) {
+    if (IsBrief(holder) && std::chrono::steady_clock::now() < give_up) {
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
       continue;
     }
@@ -337,6 +374,8 @@ absl::StatusOr<std::unique_ptr<WriterLock>> WriterLock::Acquire(const std::strin
                                   "with --server"),
                      {{"map", map}, {"holder", named}});
   }
+  // The map was dropped or renamed before it was locked: what is locked is no map's any more.
+  if (!IsAtPath(fd, path)) return Acquire(store_folder, map, program);
   const std::string holder = absl::StrCat(program, " (process ", getpid(), ")\n");
   const bool named = ftruncate(fd, 0) == 0 && pwrite(fd, holder.data(), holder.size(), 0) ==
                                                   static_cast<ssize_t>(holder.size());
@@ -346,5 +385,21 @@ absl::StatusOr<std::unique_ptr<WriterLock>> WriterLock::Acquire(const std::strin
 }
 
 WriterLock::~WriterLock() { close(fd_); }
+
+absl::StatusOr<std::unique_ptr<WriterLock>> LockNewMap(const std::string& store_folder,
+                                                       const std::string& map,
+                                                       const std::string& program) {
+  const std::string folder = MapFolder(store_folder, map);
+  for (;;) {
+    std::error_code error;
+    fs::create_directory(folder, error);
+    if (error) {
+      return absl::InternalError(absl::StrCat("cannot make ", folder, ": ", error.message()));
+    }
+    auto lock = WriterLock::Acquire(store_folder, map, program);
+    // Somebody has dropped a map of that name in between, and its folder with it.
+    if (ReasonOf(lock.status()) != Reason::kMapUnknown) return lock;
+  }
+}
 
 }  // namespace dsg::sqlite

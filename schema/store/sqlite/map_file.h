@@ -80,7 +80,8 @@ std::vector<std::string> ListOtherFiles(const std::string& store_folder, const s
 /// however it ends.
 class WriterLock {
  public:
-  /// Errors: UNAVAILABLE/WRITER_LOCKED naming program and process id of the holder.
+  /// Errors: UNAVAILABLE/WRITER_LOCKED naming program and process id of the holder;
+  /// NOT_FOUND/MAP_UNKNOWN if the map's folder is gone.
   static absl::StatusOr<std::unique_ptr<WriterLock>> Acquire(const std::string& store_folder,
                                                              const std::string& map,
                                                              const std::string& program);
@@ -92,5 +93,11 @@ class WriterLock {
   explicit WriterLock(int fd) : fd_(fd) {}
   int fd_;
 };
+
+/// The lock of a map that is to be made, with its folder, which is made if it is not there.
+/// Errors: as WriterLock::Acquire.
+absl::StatusOr<std::unique_ptr<WriterLock>> LockNewMap(const std::string& store_folder,
+                                                       const std::string& map,
+                                                       const std::string& program);
 
 }  // namespace dsg::sqlite

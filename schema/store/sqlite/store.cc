@@ -10,6 +10,7 @@
 #include "schema/store/sqlite/copy.h"
 #include "schema/store/sqlite/map_reader.h"
 #include "schema/store/sqlite/upgrade.h"
+#include "schema/store/sqlite/whole_maps.h"
 #include "schema/store/sqlite/writer.h"
 
 namespace dsg::sqlite {
@@ -86,6 +87,15 @@ class SqliteStore : public GraphStore {
     return InstallMapFile(folder_, spec.name, file, replace, options_.program);
   }
 
+  absl::StatusOr<DropReport> DropMap(const std::string& name,
+                                     const MapCondition& condition) override {
+    return DropMapFiles(folder_, name, condition, options_.program);
+  }
+
+  absl::Status RenameMap(const std::string& from, const std::string& to) override {
+    return RenameMapFiles(folder_, from, to, options_.program);
+  }
+
   absl::StatusOr<std::unique_ptr<MapWriter>> OpenWriter(const std::string& name) override {
     DSG_ASSIGN_OR_RETURN(auto writer, SqliteWriter::Open(folder_, name, options_));
     return std::unique_ptr<MapWriter>(std::move(writer));
@@ -114,6 +124,7 @@ absl::StatusOr<std::unique_ptr<GraphStore>> OpenSqliteStore(const std::string& f
     return absl::InternalError(absl::StrCat("cannot resolve ", folder, ": ", error.message()));
   }
   DSG_RETURN_IF_ERROR(CheckFileSystem(canonical));
+  SettleWholeMaps(canonical);
   return std::unique_ptr<GraphStore>(std::make_unique<SqliteStore>(canonical, options));
 }
 
