@@ -9,14 +9,62 @@
 namespace dsg::ingest {
 namespace {
 
+// Remembers how far a map that was empty has come by commits of its own.
+class CountingWriter : public GraphWriter {
+ public:
+  explicit CountingWriter(GraphWriter* writer) : writer_(*writer) {}
+
+  absl::StatusOr<CommitResult> Commit(GraphDelta delta) override {
+    absl::StatusOr<CommitResult> result = writer_.Commit(std::move(delta));
+    if (!result.ok()) return result;
+    // Others that commit in between leave the count behind for good.
+    if (result->revision == own_head_ + 1) own_head_ = result->revision;
+    return result;
+  }
+  absl::StatusOr<SessionState> GetSession(const std::string& session_id) override {
+    return writer_.GetSession(session_id);
+  }
+
+  /// All revisions up to this one are its own.
+  Revision own_head() const { return own_head_; }
+
+ private:
+  GraphWriter& writer_;
+  Revision own_head_ = 0;
+};
+
+// Of a drop that checks what the map is: false if it is something else by now.
+absl::StatusOr<bool> Dropped(const absl::Status& status) {
+  const Reason reason = ReasonOf(status);
+  const bool is_another = reason == Reason::kParentRevisionStale ||
+                          reason == Reason::kMapReplaced || reason == Reason::kMapUnknown;
+  if (is_another) return false;
+  if (!status.ok()) return status;
+  return true;
+}
+
 class LocalDestination : public Destination {
  public:
   LocalDestination(std::unique_ptr<GraphStore> store, std::shared_ptr<MapReader> map,
-                   std::unique_ptr<GraphWriter> writer)
-      : store_(std::move(store)), map_(std::move(map)), writer_(std::move(writer)) {}
+                   std::unique_ptr<GraphWriter> writer, bool is_new)
+      : store_(std::move(store)),
+        map_(std::move(map)),
+        writer_(std::move(writer)),
+        counting_(writer_.get()),
+        is_new_(is_new) {}
 
   const MapSpec& spec() const override { return map_->spec(); }
-  GraphWriter& writer() override { return *writer_; }
+  GraphWriter& writer() override { return counting_; }
+  bool is_new() const override { return is_new_; }
+  absl::StatusOr<bool> DropIfOwn(bool only_empty) override {
+    if (!is_new_) return false;
+    const MapCondition condition{only_empty ? 0 : counting_.own_head(), map_->incarnation()};
+    const std::string name = map_->spec().name;
+    // The drop takes the lock itself.
+    map_.reset();
+    writer_.reset();
+    return Dropped(store_->DropMap(name, condition).status());
+  }
   absl::StatusOr<std::unique_ptr<MapView>> View() override {
     DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Snapshot> latest, map_->Latest());
     return MakeSnapshotMapView(std::move(latest), map_);
@@ -26,18 +74,27 @@ class LocalDestination : public Destination {
   std::unique_ptr<GraphStore> store_;
   std::shared_ptr<MapReader> map_;
   std::unique_ptr<GraphWriter> writer_;
+  CountingWriter counting_;
+  bool is_new_;
 };
 
 class RemoteDestination : public Destination {
  public:
-  explicit RemoteDestination(std::unique_ptr<RemoteMap> map) : map_(std::move(map)) {}
+  explicit RemoteDestination(std::unique_ptr<RemoteMap> map)
+      : map_(std::move(map)), counting_(&map_->writer()) {}
 
   const MapSpec& spec() const override { return map_->spec(); }
-  GraphWriter& writer() override { return map_->writer(); }
+  GraphWriter& writer() override { return counting_; }
+  bool is_new() const override { return map_->is_new(); }
+  absl::StatusOr<bool> DropIfOwn(bool only_empty) override {
+    if (!map_->is_new()) return false;
+    return Dropped(map_->Drop(only_empty ? 0 : counting_.own_head()));
+  }
   absl::StatusOr<std::unique_ptr<MapView>> View() override { return MakeRemoteMapView(*map_); }
 
  private:
   std::unique_ptr<RemoteMap> map_;
+  CountingWriter counting_;
 };
 
 }  // namespace
@@ -52,15 +109,18 @@ absl::StatusOr<std::unique_ptr<Destination>> OpenLocal(const std::string& folder
   options.program = "dsg-ingest";
   DSG_ASSIGN_OR_RETURN(std::unique_ptr<GraphStore> store, OpenStore(folder, options));
   absl::StatusOr<std::unique_ptr<GraphWriter>> writer = store->OpenWriter(spec.name);
+  bool is_new = false;
   if (ReasonOf(writer.status()) == Reason::kMapUnknown) {
     const absl::Status created = store->CreateMap(spec);
+    is_new = created.ok();
     // Another process may have been faster; its map serves as well.
     if (!created.ok() && ReasonOf(created) != Reason::kMapExists) return created;
     writer = store->OpenWriter(spec.name);
   }
   if (!writer.ok()) return writer.status();
   DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> map, store->OpenMap(spec.name));
-  return std::make_unique<LocalDestination>(std::move(store), std::move(map), *std::move(writer));
+  return std::make_unique<LocalDestination>(std::move(store), std::move(map), *std::move(writer),
+                                            is_new);
 }
 
 absl::StatusOr<std::unique_ptr<Destination>> OpenRemote(const std::string& address,

@@ -21,6 +21,13 @@ class Destination {
   virtual GraphWriter& writer() = 0;
   /// The map as it is now.
   virtual absl::StatusOr<std::unique_ptr<MapView>> View() = 0;
+  /// Whether opening has made the map.
+  virtual bool is_new() const = 0;
+  /// Drops the map again if opening has made it, and nobody but writer() has committed to it; with
+  /// `only_empty` not even that. False if it stays. Nothing may be called afterwards.
+  ///
+  /// Errors: what keeps it from being dropped, such as a server that does not answer.
+  virtual absl::StatusOr<bool> DropIfOwn(bool only_empty) = 0;
 };
 
 /// As StoreOptions has them.

@@ -39,6 +39,14 @@ bool HasPeople(const LogInfo& info, const IngestOptions& options) {
          (options.people.detector.has_value() || info.channel_counts.contains("detections0"));
 }
 
+// Of its own, without any other measurement.
+bool HasContent(const Measurement& measurement) {
+  if (const auto* graph = std::get_if<GraphMeasurement>(&measurement)) {
+    return !graph->delta.empty();
+  }
+  return std::holds_alternative<PoseMeasurement>(measurement);
+}
+
 bool HasLoops(const LogInfo& info) { return info.channel_counts.contains("loops0"); }
 
 SessionHeader MakeHeader(const LogInfo& info, const LogOptions& log_options,
@@ -116,14 +124,19 @@ absl::StatusOr<IngestSummary> IngestLog(LogSource& log, const LogOptions& log_op
   LogRun run(
       std::move(parts), map,
       DeltaSink(std::move(header), session.last_sequence, options.is_size_bounded, map, writer));
+  int64_t given_count = 0;
   for (int64_t count = 1;; ++count) {
     DSG_ASSIGN_OR_RETURN(std::optional<Measurement> measurement, log.Next());
     if (!measurement.has_value()) break;
+    if (HasContent(*measurement)) ++given_count;
     DSG_RETURN_IF_ERROR(run.Take(*measurement));
     if (on_progress) on_progress(count);
   }
   DSG_RETURN_IF_ERROR(run.Finish());
-  return run.Summary();
+  IngestSummary summary = run.Summary();
+  summary.given_count = given_count;
+  summary.was_known = session.last_sequence > 0;
+  return summary;
 }
 
 }  // namespace dsg::ingest

@@ -55,6 +55,10 @@ struct IngestSummary {
   std::optional<PeopleSummary> people;
   /// Unset when the log has no loop closures.
   std::optional<LoopCounts> loops;
+  /// Poses and graphs with content that the log gave, whether or not the map had them.
+  int64_t given_count = 0;
+  /// An earlier run has committed a part of the log, or all of it.
+  bool was_known = false;
 };
 
 /// Reads `log` to its end. The same log, options and starting map give byte-equal deltas. A run

@@ -26,6 +26,7 @@
 #include "ingest/pipeline/people_flags.h"
 #include "ingest/pipeline/progress.h"
 #include "ingest/pipeline/upright.h"
+#include "ingest/pipeline/yield.h"
 #include "schema/base/byte_size.h"
 #include "schema/base/exit_code.h"
 #include "schema/base/status.h"
@@ -284,6 +285,45 @@ void PrintSummary(const std::string& path, const LogInfo& info, const IngestSumm
   std::fflush(stdout);
 }
 
+// Whether the same log would fail in the same way again: it is malformed, contradicts itself, or
+// gives nothing (CheckYield). A disk that was full is another matter.
+bool IsRefusal(const absl::Status& failure) {
+  const bool gives_nothing =
+      absl::IsFailedPrecondition(failure) && ReasonOf(failure) == Reason::kUnspecified;
+  return gives_nothing || absl::IsInvalidArgument(failure) || absl::IsAlreadyExists(failure) ||
+         absl::IsOutOfRange(failure);
+}
+
+// After a failure nothing is left of a map that this run has made, if all that is in it comes from
+// a log that is refused and can be read again; after others what is committed stays, and the same
+// run goes on with it.
+absl::Status EndFailedRun(const absl::Status& failure, const std::string& path,
+                          Destination* destination) {
+  // Whether the last commit was made is open, or nobody answers.
+  if (destination == nullptr || !destination->is_new() || absl::IsUnavailable(failure)) {
+    return failure;
+  }
+  const std::string map = destination->spec().name;
+  std::error_code error;
+  const auto type = std::filesystem::status(path, error).type();
+  const bool can_be_read_again =
+      type == std::filesystem::file_type::regular || type == std::filesystem::file_type::directory;
+  const absl::StatusOr<bool> dropped =
+      destination->DropIfOwn(/*only_empty=*/!IsRefusal(failure) || !can_be_read_again);
+  std::string end = absl::StrCat("; map \"", map, "\" is not made");
+  if (!dropped.ok()) {
+    end = absl::StrCat("; map \"", map, "\", which was made for it, stays (",
+                       dropped.status().message(), "), remove it with `dsg drop ", map, "`");
+  } else if (!*dropped) {
+    end = absl::StrCat("; map \"", map, "\" keeps what is committed, remove it with `dsg drop ",
+                       map, "` or run the same again to go on");
+  }
+  absl::Status told(failure.code(), absl::StrCat(failure.message(), end));
+  failure.ForEachPayload(
+      [&](absl::string_view url, const absl::Cord& payload) { told.SetPayload(url, payload); });
+  return told;
+}
+
 // How often a log is begun again because others name agents in the map at the same time.
 constexpr int kConflictsMax = 100;
 
@@ -342,6 +382,12 @@ absl::Status IngestOne(const Flags& flags, const std::string& path, LogOptions o
   if (!flags.is_quiet && summary->people.has_value()) {
     PrintPeople(path, *summary->people, flags.mapping.has_timings);
   }
+  DSG_RETURN_IF_ERROR(CheckYield(log->info(), *summary));
+  if (!flags.is_quiet && summary->mapping.has_value()) {
+    for (const std::string& hint : HintsOnLostFrames(summary->mapping->skipped)) {
+      std::fprintf(stderr, "%s: note: %s\n", path.c_str(), hint.c_str());
+    }
+  }
   return absl::OkStatus();
 }
 
@@ -360,8 +406,12 @@ absl::Status Run(const Flags& flags) {
   }
   DSG_ASSIGN_OR_RETURN(ingest_options.people, MakePeopleOptions(flags.people));
   std::unique_ptr<Destination> destination;
+  bool is_first = true;
   for (const std::string& path : flags.logs) {
-    DSG_RETURN_IF_ERROR(IngestOne(flags, path, options, ingest_options, &destination));
+    const absl::Status status = IngestOne(flags, path, options, ingest_options, &destination);
+    // What earlier logs have brought stays.
+    if (!status.ok()) return is_first ? EndFailedRun(status, path, destination.get()) : status;
+    is_first = false;
   }
   return absl::OkStatus();
 }

@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/ingest_service.pb.h"
+#include "dsg/v1/maintenance_service.pb.h"
 #include "dsg/v1/map_service.pb.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/api/api.h"
@@ -63,6 +64,10 @@ absl::Status Advise(const absl::Status& status, const std::string& address) {
           status,
           absl::StrCat("server ", address,
                        " has less than it acknowledged (was a backup restored?); ", kGoesOn));
+    case Reason::kMapUnknown:
+      return Annotate(status, absl::StrCat("the map was dropped or renamed on server ", address,
+                                           " while it was written; look at `dsg maps --server ",
+                                           address, "`, then ingest into the map of the new name"));
     default:
       return status;
   }
@@ -177,13 +182,25 @@ class RemoteWriter : public GraphWriter {
 
 class GrpcRemoteMap : public RemoteMap {
  public:
-  GrpcRemoteMap(std::unique_ptr<Connection> connection, MapSpec spec)
+  /// `incarnation`: of a map that opening has made; empty for others.
+  GrpcRemoteMap(std::unique_ptr<Connection> connection, MapSpec spec, std::string incarnation)
       : connection_(std::move(connection)),
         spec_(std::move(spec)),
+        incarnation_(std::move(incarnation)),
         writer_(*connection_, spec_.name) {}
 
   GraphWriter& writer() override { return writer_; }
   const MapSpec& spec() const override { return spec_; }
+  bool is_new() const override { return !incarnation_.empty(); }
+
+  absl::Status Drop(Revision head) override {
+    v1::DropMapRequest request;
+    request.set_map(spec_.name);
+    request.set_expected_head_revision(head);
+    request.set_expected_incarnation(incarnation_);
+    v1::DropMapResponse response;
+    return connection_->Call(&query::Api::DropMap, request, &response);
+  }
 
   absl::StatusOr<std::vector<Node>> ListNodes(const std::string& layer) override {
     std::vector<Node> nodes;
@@ -273,6 +290,7 @@ class GrpcRemoteMap : public RemoteMap {
  private:
   std::unique_ptr<Connection> connection_;
   MapSpec spec_;
+  std::string incarnation_;
   RemoteWriter writer_;
 };
 
@@ -287,13 +305,20 @@ absl::StatusOr<std::optional<MapSpec>> FindMap(Connection& connection, const std
   return std::nullopt;
 }
 
-absl::Status CreateMap(Connection& connection, const MapSpec& spec) {
+// The incarnation of the new map; empty if it was there already.
+absl::StatusOr<std::string> CreateMap(Connection& connection, const MapSpec& spec) {
   v1::CreateMapRequest request;
   ToProto(spec, request.mutable_map());
   v1::CreateMapResponse response;
   const absl::Status status = connection.Call(&query::Api::CreateMap, request, &response);
   // A repeated call, or another client that was faster; its map serves as well.
-  return ReasonOf(status) == Reason::kMapExists ? absl::OkStatus() : status;
+  if (ReasonOf(status) == Reason::kMapExists) return std::string();
+  DSG_RETURN_IF_ERROR(status);
+  v1::GetMapStatsRequest look;
+  look.set_map(spec.name);
+  v1::GetMapStatsResponse stats;
+  DSG_RETURN_IF_ERROR(connection.Call(&query::Api::GetMapStats, look, &stats));
+  return stats.header().incarnation();
 }
 
 }  // namespace
@@ -309,8 +334,9 @@ absl::StatusOr<std::unique_ptr<RemoteMap>> OpenRemoteMap(const std::string& addr
                                             .receive_bytes_max = kReceiveBytesMax}));
   auto connection = std::make_unique<Connection>(std::move(api), address, options);
   DSG_ASSIGN_OR_RETURN(std::optional<MapSpec> found, FindMap(*connection, spec.name));
+  std::string incarnation;
   if (!found.has_value()) {
-    DSG_RETURN_IF_ERROR(CreateMap(*connection, spec));
+    DSG_ASSIGN_OR_RETURN(incarnation, CreateMap(*connection, spec));
     DSG_ASSIGN_OR_RETURN(found, FindMap(*connection, spec.name));
   }
   if (!found.has_value()) {
@@ -319,7 +345,8 @@ absl::StatusOr<std::unique_ptr<RemoteMap>> OpenRemoteMap(const std::string& addr
                                   " but is not listed there; look at the server's log"),
                      {{"map", spec.name}});
   }
-  return std::make_unique<GrpcRemoteMap>(std::move(connection), *std::move(found));
+  return std::make_unique<GrpcRemoteMap>(std::move(connection), *std::move(found),
+                                         std::move(incarnation));
 }
 
 }  // namespace dsg::ingest

@@ -37,6 +37,14 @@ class RemoteMap {
   /// Stored poses with from_ns <= time < to_ns, ascending; for comparing a log that overlaps.
   virtual absl::StatusOr<std::vector<TimedPose>> ReadPoses(NodeId agent, TimeNs from_ns,
                                                            TimeNs to_ns) = 0;
+  /// Whether opening has made the map.
+  virtual bool is_new() const = 0;
+  /// Drops the map if it is still the one that was opened, at revision `head`. Nothing may be
+  /// called afterwards.
+  ///
+  /// Errors: ABORTED/PARENT_REVISION_STALE or MAP_REPLACED; NOT_FOUND/MAP_UNKNOWN; UNIMPLEMENTED by
+  /// servers that are older than the call.
+  virtual absl::Status Drop(Revision head) = 0;
 };
 
 struct RemoteOptions {

@@ -165,14 +165,42 @@ absl::StatusOr<Committed> CommitAll(GraphWriter* writer, GraphDelta delta, Progr
   return committed;
 }
 
+// Removes a map that was made for an import which failed: with all that is in it if the file is
+// refused, and would be again; else, as when the disk is full, only if nothing is in it, so that
+// the same import goes on.
+absl::Status DropAfter(const absl::Status& failure, GraphStore* store, const std::string& map,
+                       std::unique_ptr<GraphWriter> writer) {
+  MapCondition condition;
+  {
+    DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> reader, store->OpenMap(map));
+    DSG_ASSIGN_OR_RETURN(const RevisionInfo head, reader->Head());
+    const Reason reason = ReasonOf(failure);
+    const bool is_refused = reason == Reason::kDeltaInvalid || reason == Reason::kTrackConflict;
+    if (!is_refused && head.revision > 0) return absl::OkStatus();
+    // Nobody else could commit while the writer was open.
+    condition = {head.revision, reader->incarnation()};
+  }
+  writer.reset();
+  return store->DropMap(map, condition).status();
+}
+
 absl::StatusOr<Committed> CommitToStore(const CommonOptions& common, bool map_exists,
                                         TimeNs first_ns, GraphDelta delta, Progress* progress) {
   DSG_ASSIGN_OR_RETURN(const std::unique_ptr<GraphStore> store,
                        OpenStore(common.store, {.create = true, .program = "dsg import"}));
   if (!map_exists) DSG_RETURN_IF_ERROR(store->CreateMap(SpecOfNewMap(common.map, first_ns)));
-  DSG_ASSIGN_OR_RETURN(const std::unique_ptr<GraphWriter> writer, store->OpenWriter(common.map));
-  const auto committed = CommitAll(writer.get(), std::move(delta), progress);
+  DSG_ASSIGN_OR_RETURN(std::unique_ptr<GraphWriter> writer, store->OpenWriter(common.map));
+  auto committed = CommitAll(writer.get(), std::move(delta), progress);
   const Reason reason = ReasonOf(committed.status());
+  if (!map_exists && !committed.ok()) {
+    const absl::Status dropped =
+        DropAfter(committed.status(), store.get(), common.map, std::move(writer));
+    if (dropped.ok()) return committed;
+    return Annotate(
+        committed.status(),
+        absl::StrCat("map \"", common.map, "\" is left without the file (",
+                     std::string(dropped.message()), "), `dsg drop ", common.map, "` removes it"));
+  }
   if (!map_exists || (reason != Reason::kDeltaInvalid && reason != Reason::kTrackConflict)) {
     return committed;
   }

@@ -301,5 +301,38 @@ TEST_F(RemoteMapTest, RefusesAContradictionThroughTheServer) {
             Reason::kTrackConflict);
 }
 
+TEST_F(RemoteMapTest, DropsOnlyTheMapThatOpeningHasMade) {
+  StartServer();
+  const std::unique_ptr<RemoteMap> map = OpenMap();
+  ASSERT_NE(map, nullptr);
+  EXPECT_TRUE(map->is_new());
+  const std::unique_ptr<RemoteMap> other = OpenMap();
+  ASSERT_NE(other, nullptr);
+  EXPECT_FALSE(other->is_new());
+  const auto committed = other->writer().Commit(Rooms(1, "other", 1));
+  ASSERT_TRUE(committed.ok()) << committed.status();
+  // Somebody else has committed to it.
+  EXPECT_EQ(ReasonOf(map->Drop(0)), Reason::kParentRevisionStale);
+  EXPECT_EQ(map->Drop(1), absl::OkStatus());
+  EXPECT_EQ(ReasonOf(map->Drop(1)), Reason::kMapUnknown);
+  // Another one of that name.
+  const std::unique_ptr<RemoteMap> again = OpenMap();
+  ASSERT_NE(again, nullptr);
+  EXPECT_TRUE(again->is_new());
+  EXPECT_EQ(ReasonOf(map->Drop(0)), Reason::kMapReplaced);
+  EXPECT_EQ(again->Drop(0), absl::OkStatus());
+}
+
+TEST_F(RemoteMapTest, TellsAWriterThatItsMapIsGone) {
+  StartServer();
+  const std::unique_ptr<RemoteMap> map = OpenMap();
+  ASSERT_NE(map, nullptr);
+  ASSERT_TRUE(map->writer().Commit(Rooms(1, "robot", 1)).ok());
+  ASSERT_EQ(map->Drop(1), absl::OkStatus());
+  const absl::Status status = map->writer().Commit(Rooms(2, "robot", 2)).status();
+  EXPECT_EQ(ReasonOf(status), Reason::kMapUnknown);
+  EXPECT_NE(status.message().find("was dropped or renamed"), std::string::npos) << status;
+}
+
 }  // namespace
 }  // namespace dsg::ingest
