@@ -9,9 +9,9 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "ingest/log/calibration_file.h"
 #include "ingest/log/file_bytes.h"
 #include "schema/base/status.h"
+#include "schema/files/yaml_text.h"
 
 namespace dsg::ingest {
 namespace {

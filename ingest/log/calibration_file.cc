@@ -10,13 +10,12 @@
 #include "ingest/log/rigid_matrix.h"
 #include "ingest/log/text_table.h"
 #include "schema/base/status.h"
+#include "schema/files/yaml_text.h"
 
 namespace dsg::ingest {
 namespace {
 
 constexpr size_t kCalibrationBytesMax = size_t{1} << 20;
-// A calibration nests four deep; the parser's own recursion must stay far from the stack's end.
-constexpr int kYamlDepthMax = 32;
 
 // One map of a file, with errors that name the file and the line.
 class Section {
@@ -263,27 +262,6 @@ absl::StatusOr<std::vector<NumberedPose>> ReadPoses(const Section& section, cons
 }
 
 }  // namespace
-
-// Brackets and indentation alone can nest; both are seen without parsing.
-bool YamlNestsTooDeep(std::string_view text) {
-  int depth = 0;
-  int line_depth = 0;
-  bool at_line_start = true;
-  for (const char c : text) {
-    if (c == '\n') {
-      line_depth = 0;
-      at_line_start = true;
-      continue;
-    }
-    // "- - - -" opens a list at each dash.
-    if (at_line_start && (c == '-' || c == '?')) ++line_depth;
-    if (c != ' ' && c != '-' && c != '?') at_line_start = false;
-    if (c == '[' || c == '{') ++depth;
-    if ((c == ']' || c == '}') && depth > 0) --depth;
-    if (depth > kYamlDepthMax || line_depth > kYamlDepthMax) return true;
-  }
-  return false;
-}
 
 absl::StatusOr<CameraCalibration> ReadCameraYaml(const LogFile& file, const std::string& name) {
   return Guarded<CameraCalibration>(file, &ReadCamera, name);

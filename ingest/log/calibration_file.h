@@ -32,9 +32,6 @@ absl::StatusOr<RgbdSettings> ReadRgbdSettings(const LogFile& file);
 /// T_BS (identity if missing), rate_hz, noise densities and random walks.
 absl::StatusOr<ImuCalibration> ReadImuYaml(const LogFile& file, const std::string& name);
 
-/// Whether YAML nests deeper than a calibration or a list does: the parser recurses as deep.
-bool YamlNestsTooDeep(std::string_view text);
-
 struct NumberedPose {
   int64_t number = 0;
   Pose3d map_T_camera;

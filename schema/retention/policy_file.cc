@@ -14,6 +14,7 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
+#include "schema/files/yaml_text.h"
 
 namespace dsg {
 namespace {
@@ -23,33 +24,6 @@ constexpr size_t kPolicyCountMax = 100;
 // Bounds the recursion of the parser; a policy nests three levels.
 constexpr size_t kBracketsMax = 1000;
 constexpr TimeNs kEveryMin = kNsPerSecond;
-
-bool IsMarker(std::string_view line, std::string_view marker) {
-  if (!line.starts_with(marker)) return false;
-  const std::string_view rest = line.substr(marker.size());
-  return rest.empty() || rest.front() == ' ' || rest.front() == '\t' || rest.front() == '\r';
-}
-
-// The line, counted from 0, at which a second document begins; nullopt if none does. YAML::Load
-// reads the first document and ignores what follows; YAML::LoadAll does not end on all texts.
-std::optional<int> FindSecondDocument(std::string_view text) {
-  bool has_content = false;
-  bool has_ended = false;
-  int number = 0;
-  for (size_t begin = 0; begin < text.size(); ++number) {
-    const size_t end = std::min(text.find('\n', begin), text.size());
-    const std::string_view line = text.substr(begin, end - begin);
-    begin = end + 1;
-    const bool begins = IsMarker(line, "---");
-    const bool ends = IsMarker(line, "...");
-    const size_t first = line.find_first_not_of(" \t\r");
-    const bool says_nothing = first == std::string_view::npos || line[first] == '#' || ends;
-    if ((begins && has_content) || (has_ended && !says_nothing)) return number;
-    has_ended = has_ended || ends;
-    has_content = has_content || begins || (!says_nothing && line.front() != '%');
-  }
-  return std::nullopt;
-}
 
 class PolicyReader {
  public:
@@ -301,7 +275,7 @@ absl::StatusOr<PolicyFile> ParsePolicyFile(std::string_view text, const std::str
   }
   try {
     const YAML::Node root = YAML::Load(std::string(text));
-    if (const auto line = FindSecondDocument(text)) {
+    if (const auto line = FindSecondYamlDocument(text)) {
       YAML::Mark begin;
       begin.line = *line;
       return reader.Wrong(begin, "a second document begins here; write all policies into one list");

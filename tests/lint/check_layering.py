@@ -38,7 +38,7 @@ ALLOWED = {
     "schema/interop": STORE,
     "schema/picture": MODEL,
     "schema/matching": BASE,
-    "schema/retention": STORE,
+    "schema/retention": STORE + ["schema/files"],
     "schema/merge": STORE + ["schema/matching"],
     "ingest/config": SCHEMA,
     "ingest/files": BASE + ["schema/files"],
