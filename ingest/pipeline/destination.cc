@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ingest/pipeline/destination.h"
 
+#include <filesystem>
 #include <utility>
+#include <vector>
 
 #include "schema/base/status.h"
 #include "schema/store/graph_store.h"
+#include "schema/store/row_stream.h"
 
 namespace dsg::ingest {
 namespace {
@@ -97,17 +100,32 @@ class RemoteDestination : public Destination {
   CountingWriter counting_;
 };
 
-}  // namespace
+// Copies a map, if there is one, between two stores of any backend.
+absl::Status CopyMap(const std::string& folder, const std::string& name, GraphStore* to) {
+  std::error_code error;
+  if (!std::filesystem::exists(folder, error)) return absl::OkStatus();
+  DSG_ASSIGN_OR_RETURN(const auto from, OpenStore(folder, {.program = "dsg-ingest"}));
+  const auto map = from->OpenMap(name);
+  if (ReasonOf(map.status()) == Reason::kMapUnknown) return absl::OkStatus();
+  if (!map.ok()) return map.status();
+  std::vector<StreamRow> rows;
+  const auto keep = [&rows](const StreamRow& row) {
+    rows.push_back(row);
+    return absl::OkStatus();
+  };
+  DSG_RETURN_IF_ERROR((*map)->ReadRows(keep, {}));
+  size_t taken = 0;
+  const auto take = [&](StreamRow* row) -> absl::StatusOr<bool> {
+    if (taken == rows.size()) return false;
+    *row = std::move(rows[taken++]);
+    return true;
+  };
+  return to->InstallRows((*map)->spec(), take, /*scratch=*/"", /*replace=*/false, {});
+}
 
-absl::StatusOr<std::unique_ptr<Destination>> OpenLocal(const std::string& folder,
-                                                       const MapSpec& spec,
-                                                       const SpaceLimits& limits) {
-  StoreOptions options;
-  options.reserve_bytes = limits.reserve_bytes;
-  options.quota_bytes = limits.quota_bytes;
-  options.create = true;
-  options.program = "dsg-ingest";
-  DSG_ASSIGN_OR_RETURN(std::unique_ptr<GraphStore> store, OpenStore(folder, options));
+// Makes the map from `spec` if `store` has none.
+absl::StatusOr<std::unique_ptr<Destination>> OpenIn(std::unique_ptr<GraphStore> store,
+                                                    const MapSpec& spec) {
   absl::StatusOr<std::unique_ptr<GraphWriter>> writer = store->OpenWriter(spec.name);
   bool is_new = false;
   if (ReasonOf(writer.status()) == Reason::kMapUnknown) {
@@ -121,6 +139,28 @@ absl::StatusOr<std::unique_ptr<Destination>> OpenLocal(const std::string& folder
   DSG_ASSIGN_OR_RETURN(std::shared_ptr<MapReader> map, store->OpenMap(spec.name));
   return std::make_unique<LocalDestination>(std::move(store), std::move(map), *std::move(writer),
                                             is_new);
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<Destination>> OpenTrial(const std::string& folder,
+                                                       const MapSpec& spec) {
+  DSG_ASSIGN_OR_RETURN(auto store,
+                       OpenStore("memory:dry-run", {.create = true, .program = "dsg-ingest"}));
+  DSG_RETURN_IF_ERROR(CopyMap(folder, spec.name, store.get()));
+  return OpenIn(std::move(store), spec);
+}
+
+absl::StatusOr<std::unique_ptr<Destination>> OpenLocal(const std::string& folder,
+                                                       const MapSpec& spec,
+                                                       const SpaceLimits& limits) {
+  StoreOptions options;
+  options.reserve_bytes = limits.reserve_bytes;
+  options.quota_bytes = limits.quota_bytes;
+  options.create = true;
+  options.program = "dsg-ingest";
+  DSG_ASSIGN_OR_RETURN(std::unique_ptr<GraphStore> store, OpenStore(folder, options));
+  return OpenIn(std::move(store), spec);
 }
 
 absl::StatusOr<std::unique_ptr<Destination>> OpenRemote(const std::string& address,

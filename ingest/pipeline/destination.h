@@ -43,7 +43,12 @@ absl::StatusOr<std::unique_ptr<Destination>> OpenLocal(const std::string& folder
                                                        const MapSpec& spec,
                                                        const SpaceLimits& limits = {});
 
-/// The same through a server. Errors: what OpenRemoteMap returns.
+/// The same on a copy of the map in memory, made of `spec` if the store has none; what is written
+/// is gone with it, and the store is not touched. The map's rows must fit into memory.
+absl::StatusOr<std::unique_ptr<Destination>> OpenTrial(const std::string& folder,
+                                                       const MapSpec& spec);
+
+/// OpenLocal through a server. Errors: what OpenRemoteMap returns.
 absl::StatusOr<std::unique_ptr<Destination>> OpenRemote(const std::string& address,
                                                         const MapSpec& spec,
                                                         const RemoteOptions& options);

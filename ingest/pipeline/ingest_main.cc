@@ -16,15 +16,15 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_format.h"
-#include "absl/strings/str_join.h"
 #include "ingest/log/log_source.h"
 #include "ingest/log/peeked_log.h"
+#include "ingest/pipeline/config_file.h"
 #include "ingest/pipeline/destination.h"
 #include "ingest/pipeline/ingest_log.h"
 #include "ingest/pipeline/mapping_flags.h"
 #include "ingest/pipeline/people_flags.h"
 #include "ingest/pipeline/progress.h"
+#include "ingest/pipeline/run_report.h"
 #include "ingest/pipeline/upright.h"
 #include "ingest/pipeline/yield.h"
 #include "schema/base/byte_size.h"
@@ -58,8 +58,37 @@ struct Flags {
   MappingFlags mapping;
   PeopleFlags people;
   bool is_quiet = false;
+  bool is_json = false;
+  bool is_dry_run = false;
   std::vector<std::string> logs;
 };
+
+// How the robot moved, and in which frame.
+void AddRobotFlags(CLI::App* app, Flags* flags) {
+  app->add_option("--poses", flags->poses,
+                  "Whose poses of the robot a sensor log is taken with: gt (its ground truth), "
+                  "external (other software's), auto (external if there are some) or vio (our own, "
+                  "not built yet)")
+      ->check(CLI::IsMember({"auto", "gt", "external", "vio"}))
+      ->capture_default_str();
+  app->add_option("--pose-file", flags->pose_file,
+                  "Poses of the robot, EuRoC or TUM columns, instead of the sensor log's own");
+  app->add_option("--loops", flags->loop_file,
+                  "Loop closures of the robot (JSON lines), instead of the log's own");
+  app->add_option("--odometry-m-per-m", flags->odometry_m_per_m,
+                  "How far off the robot's poses are after one metre (one standard deviation), "
+                  "where loop closures may correct them; grows with the root of the way")
+      ->check(CLI::Range(1e-4, 1.0))
+      ->capture_default_str();
+  app->add_option("--odometry-rad-per-m", flags->odometry_rad_per_m, "The same about the vertical")
+      ->check(CLI::Range(1e-5, 1.0))
+      ->capture_default_str();
+  app->add_option("--robot-cad", flags->robot_cad, "CAD model of the robot (PLY, OBJ), metres");
+  app->add_option("--up", flags->up,
+                  "Which way is up in the log's frame: x, -x, y, -y, z, -z, \"x,y,z\", none, or "
+                  "auto (RGB-D folders: told from the pictures; others: z)")
+      ->capture_default_str();
+}
 
 void AddFlags(CLI::App* app, Flags* flags) {
   app->set_version_flag("--version", DSG_VERSION);
@@ -99,35 +128,17 @@ void AddFlags(CLI::App* app, Flags* flags) {
   app->add_option("--codec", flags->codec,
                   "How a new map keeps trajectories: quantized (default) or lossless")
       ->check(CLI::IsMember({"quantized", "lossless"}));
-  app->add_option("--poses", flags->poses,
-                  "Whose poses of the robot a sensor log is taken with: gt (its ground truth), "
-                  "external (other software's), auto (external if there are some) or vio (our own, "
-                  "not built yet)")
-      ->check(CLI::IsMember({"auto", "gt", "external", "vio"}))
-      ->capture_default_str();
-  app->add_option("--pose-file", flags->pose_file,
-                  "Poses of the robot, EuRoC or TUM columns, instead of the sensor log's own");
-  app->add_option("--loops", flags->loop_file,
-                  "Loop closures of the robot (JSON lines), instead of the log's own");
-  app->add_option("--odometry-m-per-m", flags->odometry_m_per_m,
-                  "How far off the robot's poses are after one metre (one standard deviation), "
-                  "where loop closures may correct them; grows with the root of the way")
-      ->check(CLI::Range(1e-4, 1.0))
-      ->capture_default_str();
-  app->add_option("--odometry-rad-per-m", flags->odometry_rad_per_m, "The same about the vertical")
-      ->check(CLI::Range(1e-5, 1.0))
-      ->capture_default_str();
-  app->add_option("--robot-cad", flags->robot_cad, "CAD model of the robot (PLY, OBJ), metres");
-  app->add_option("--up", flags->up,
-                  "Which way is up in the log's frame: x, -x, y, -y, z, -z, \"x,y,z\", none, or "
-                  "auto (RGB-D folders: told from the pictures; others: z)")
-      ->capture_default_str();
+  AddRobotFlags(app, flags);
   app->add_option("--commit-poses", flags->commit_poses, "Poses a revision, of logs without depth")
       ->capture_default_str();
   AddMappingFlags(app, &flags->mapping);
   AddPeopleFlags(app, &flags->people);
   app->add_flag("--quiet", flags->is_quiet, "Write nothing but errors");
+  app->add_flag("--json", flags->is_json, "Write the summary of each log as a line of JSON");
+  app->add_flag("--dry-run", flags->is_dry_run,
+                "With --store: do all the work on a copy of the map in memory, and write nothing");
   app->add_option("LOG", flags->logs, "Log files or folders, taken one after another")->required();
+  AddConfigFile(app);
 }
 
 absl::StatusOr<PoseSource> ParsePoseSource(const std::string& text) {
@@ -201,6 +212,7 @@ void SayAboveProgress(const std::string& sentence) {
 
 absl::StatusOr<std::unique_ptr<Destination>> OpenDestination(const Flags& flags,
                                                              const MapSpec& spec) {
+  if (flags.is_dry_run) return OpenTrial(flags.store, spec);
   if (flags.server.empty()) return OpenLocal(flags.store, spec, flags.limits);
   RemoteOptions options;
   DSG_ASSIGN_OR_RETURN(options.retry_ns_max, ParseRetryFor(flags.retry_for));
@@ -226,63 +238,6 @@ absl::Status CheckAgainstMap(const Flags& flags, const LogOptions& options, cons
         {{"field", "codec"}, {"value", flags.codec}});
   }
   return absl::OkStatus();
-}
-
-// "320 images (cam0 160, cam1 160), 1791 inertial samples".
-std::string UnusedText(const IngestSummary& summary) {
-  int64_t image_count = 0;
-  std::vector<std::string> cameras;
-  std::vector<std::string> parts;
-  for (const auto& [channel, count] : summary.unused) {
-    if (channel == "imu0") {
-      parts.push_back(absl::StrCat(count, " inertial samples"));
-    } else if (channel == "detections0") {
-      parts.push_back(absl::StrCat(count, " detections"));
-    } else {
-      image_count += count;
-      cameras.push_back(absl::StrCat(channel, " ", count));
-    }
-  }
-  if (image_count > 0) {
-    parts.push_back(absl::StrCat(image_count, " images (", absl::StrJoin(cameras, ", "), ")"));
-  }
-  return absl::StrJoin(parts, ", ");
-}
-
-void PrintSummary(const std::string& path, const LogInfo& info, const IngestSummary& summary,
-                  double seconds) {
-  const CommitCounts& counts = summary.committed;
-  std::printf(
-      "%s (%s): %lld agents, %lld poses, %lld nodes, %lld edges, %lld stays in %lld revisions; "
-      "%lld poses skipped; %.1f s\n",
-      path.c_str(), info.format.c_str(), static_cast<long long>(summary.agent_count),
-      static_cast<long long>(counts.pose_count), static_cast<long long>(counts.node_count),
-      static_cast<long long>(counts.edge_count), static_cast<long long>(counts.stay_count),
-      static_cast<long long>(counts.revision_count),
-      static_cast<long long>(counts.skipped_pose_count), seconds);
-  if (counts.revision_count == 0) std::printf("%s: nothing new\n", path.c_str());
-  if (!summary.unused.empty()) {
-    std::printf("%s: read and not used yet: %s\n", path.c_str(), UnusedText(summary).c_str());
-  }
-  if (summary.loops.has_value()) {
-    const LoopCounts& loops = *summary.loops;
-    std::printf(
-        "%s: %lld loop closures, %lld believed, %lld outside the trajectory; it moved by up to "
-        "%.2f m\n",
-        path.c_str(), static_cast<long long>(loops.loop_count),
-        static_cast<long long>(loops.kept_count), static_cast<long long>(loops.unusable_count),
-        loops.largest_m);
-    constexpr size_t kNamedMax = 10;
-    std::vector<std::string> named(loops.doubted);
-    if (named.size() > kNamedMax) {
-      named.resize(kNamedMax);
-      named.push_back(absl::StrCat("and ", loops.doubted.size() - kNamedMax, " more"));
-    }
-    if (!named.empty()) {
-      std::printf("%s: not believed: %s\n", path.c_str(), absl::StrJoin(named, ", ").c_str());
-    }
-  }
-  std::fflush(stdout);
 }
 
 // Whether the same log would fail in the same way again: it is malformed, contradicts itself, or
@@ -322,6 +277,15 @@ absl::Status EndFailedRun(const absl::Status& failure, const std::string& path,
   failure.ForEachPayload(
       [&](absl::string_view url, const absl::Cord& payload) { told.SetPayload(url, payload); });
   return told;
+}
+
+void Tell(const Flags& flags, const RunReport& report) {
+  if (flags.is_json) {
+    std::printf("%s\n", ReportJson(report).c_str());
+    std::fflush(stdout);
+  } else if (!flags.is_quiet) {
+    PrintReport(report, flags.mapping.has_timings);
+  }
 }
 
 // How often a log is begun again because others name agents in the map at the same time.
@@ -375,13 +339,7 @@ absl::Status IngestOne(const Flags& flags, const std::string& path, LogOptions o
   }
   if (!summary.ok()) return summary.status();
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
-  if (!flags.is_quiet) PrintSummary(path, log->info(), *summary, elapsed.count());
-  if (!flags.is_quiet && summary->mapping.has_value()) {
-    PrintMapping(path, *summary->mapping, flags.mapping.has_timings);
-  }
-  if (!flags.is_quiet && summary->people.has_value()) {
-    PrintPeople(path, *summary->people, flags.mapping.has_timings);
-  }
+  Tell(flags, {path, log->info(), *summary, elapsed.count(), flags.is_dry_run});
   DSG_RETURN_IF_ERROR(CheckYield(log->info(), *summary));
   if (!flags.is_quiet && summary->mapping.has_value()) {
     for (const std::string& hint : HintsOnLostFrames(summary->mapping->skipped)) {
@@ -436,6 +394,11 @@ int Main(int argc, char** argv) {
   }
   if (flags.store.empty() && flags.server.empty()) {
     std::fputs("dsg-ingest: give --store DIR or --server ADDR\n", stderr);
+    return kUsage;
+  }
+  if (flags.is_dry_run && !flags.server.empty()) {
+    std::fputs("dsg-ingest: --dry-run works on a copy of a local map; leave --server out\n",
+               stderr);
     return kUsage;
   }
   return Report(Run(flags));

@@ -3,11 +3,9 @@
 
 #include <CLI/CLI.hpp>
 #include <cmath>
-#include <cstdio>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_join.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
@@ -95,46 +93,6 @@ absl::StatusOr<MappingOptions> MakeMappingOptions(const MappingFlags& flags) {
     DSG_ASSIGN_OR_RETURN(options.catalogue, ReadCatalogue(flags.cad_folder));
   }
   return options;
-}
-
-void PrintMapping(const std::string& path, const MappingSummary& summary, bool has_timings) {
-  const VolumeCounts& volume = summary.volume;
-  std::printf("%s: %lld frames fused, %lld pixels, %lld of them people", path.c_str(),
-              static_cast<long long>(volume.frame_count),
-              static_cast<long long>(volume.pixel_count + volume.dynamic_pixel_count),
-              static_cast<long long>(volume.dynamic_pixel_count));
-  std::vector<std::string> skipped;
-  for (const auto& [reason, count] : summary.skipped) {
-    skipped.push_back(absl::StrCat(reason, " ", count));
-  }
-  if (!skipped.empty()) std::printf("; skipped: %s", absl::StrJoin(skipped, ", ").c_str());
-  if (volume.refused_block_count > 0) {
-    std::printf("; %lld blocks of space left out, the map is too large for its voxels",
-                static_cast<long long>(volume.refused_block_count));
-  }
-  if (volume.cut_block_count > 0) {
-    std::printf("; %lld blocks too far from the others for places and rooms",
-                static_cast<long long>(volume.cut_block_count));
-  }
-  std::printf("\n");
-  if (!summary.note.empty()) {
-    std::fprintf(stderr, "%s: note: %s\n", path.c_str(), summary.note.c_str());
-  }
-  if (volume.pixel_count == 0) {
-    std::fprintf(stderr,
-                 "%s: warning: nothing was mapped: no frame had depth that could be used; look at "
-                 "what was skipped, at the depth images and at the time stamps of the poses\n",
-                 path.c_str());
-  }
-  if (has_timings) {
-    std::printf("%-12s %8s %10s %12s %12s\n", "stage", "times", "total s", "mean ms", "longest ms");
-    for (const auto& [stage, time] : summary.stages) {
-      std::printf("%-12s %8lld %10.2f %12.2f %12.2f\n", stage.c_str(),
-                  static_cast<long long>(time.count), time.total_s,
-                  1e3 * time.total_s / static_cast<double>(time.count), 1e3 * time.longest_s);
-    }
-  }
-  std::fflush(stdout);
 }
 
 }  // namespace dsg::ingest

@@ -36,6 +36,4 @@ void AddMappingFlags(CLI::App* app, MappingFlags* flags);
 absl::StatusOr<MappingOptions> MakeMappingOptions(const MappingFlags& flags);
 
 /// On stdout: frames used and skipped; with `has_timings` a table of the stages.
-void PrintMapping(const std::string& path, const MappingSummary& summary, bool has_timings);
-
 }  // namespace dsg::ingest

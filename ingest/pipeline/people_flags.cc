@@ -2,11 +2,9 @@
 #include "ingest/pipeline/people_flags.h"
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_join.h"
 #include "ingest/log/log_digest.h"
 #include "schema/base/status.h"
 
@@ -73,36 +71,6 @@ absl::StatusOr<PeopleOptions> MakePeopleOptions(const PeopleFlags& flags) {
   DSG_RETURN_IF_ERROR(options.Validate());
   if (!flags.detector_file.empty()) DSG_RETURN_IF_ERROR(SetDetector(flags, &options));
   return options;
-}
-
-void PrintPeople(const std::string& path, const PeopleSummary& summary, bool has_timings) {
-  const PeopleCounts& counts = summary.counts;
-  std::printf("%s: %lld of %lld detections of people used, %lld tracks", path.c_str(),
-              static_cast<long long>(counts.used_count),
-              static_cast<long long>(counts.detection_count),
-              static_cast<long long>(counts.track_count));
-  if (counts.dropped_track_count > 0) {
-    std::printf(" and %lld too short to believe",
-                static_cast<long long>(counts.dropped_track_count));
-  }
-  if (counts.same_as_count > 0) {
-    std::printf(", %lld of them perhaps the same person",
-                static_cast<long long>(counts.same_as_count));
-  }
-  std::vector<std::string> rejected;
-  for (const auto& [reason, count] : counts.rejected) {
-    rejected.push_back(absl::StrCat(reason, " ", count));
-  }
-  if (!rejected.empty()) std::printf("; left out: %s", absl::StrJoin(rejected, ", ").c_str());
-  std::printf("\n");
-  if (has_timings) {
-    for (const auto& [stage, time] : summary.stages) {
-      std::printf("%-12s %8lld %10.2f %12.2f %12.2f\n", stage.c_str(),
-                  static_cast<long long>(time.count), time.total_s,
-                  1e3 * time.total_s / static_cast<double>(time.count), 1e3 * time.longest_s);
-    }
-  }
-  std::fflush(stdout);
 }
 
 }  // namespace dsg::ingest

@@ -31,6 +31,4 @@ void AddPeopleFlags(CLI::App* app, PeopleFlags* flags);
 absl::StatusOr<PeopleOptions> MakePeopleOptions(const PeopleFlags& flags);
 
 /// On stdout: detections used and left out, tracks; with `has_timings` what an image has cost.
-void PrintPeople(const std::string& path, const PeopleSummary& summary, bool has_timings);
-
 }  // namespace dsg::ingest

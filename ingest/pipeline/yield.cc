@@ -2,7 +2,6 @@
 #include "ingest/pipeline/yield.h"
 
 #include <array>
-#include <cstdint>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
@@ -42,12 +41,6 @@ bool IsOfFrame(const std::string& reason) {
   return !absl::StrContains(reason, "left out") && reason != "broken pose";
 }
 
-std::string CountsText(const std::map<std::string, int64_t>& counts) {
-  std::vector<std::string> parts;
-  for (const auto& [what, count] : counts) parts.push_back(absl::StrCat(what, " ", count));
-  return absl::StrJoin(parts, ", ");
-}
-
 absl::Status NothingError(const LogInfo& info, const std::string& why) {
   return absl::FailedPreconditionError(
       absl::StrCat(info.path, " (", info.format, ") gives the map nothing: ", why));
@@ -79,6 +72,12 @@ std::string WhyUnmapped(const IngestSummary& summary) {
 }
 
 }  // namespace
+
+std::string CountsText(const std::map<std::string, int64_t>& counts) {
+  std::vector<std::string> parts;
+  for (const auto& [what, count] : counts) parts.push_back(absl::StrCat(what, " ", count));
+  return absl::StrJoin(parts, ", ");
+}
 
 absl::Status CheckYield(const LogInfo& info, const IngestSummary& summary) {
   const CommitCounts& counts = summary.committed;

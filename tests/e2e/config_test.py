@@ -1,0 +1,112 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""dsg-ingest's options in a YAML file, runs that write nothing, and summaries for programs."""
+
+import json
+import os
+import unittest
+
+import support
+
+SHIPPED = os.path.join(support.ROOT, "ingest", "configurations")
+
+
+class Configuration(support.ProgramsTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.small = cls.simulate("small", people=3, seconds=60)
+
+    def write(self, name, text):
+        with open(self.path(name), "w", encoding="utf-8") as f:
+            f.write(text)
+        return name
+
+    def printed(self, *options):
+        """The options in force, by name; without those that have no value."""
+        text = self.ok("dsg-ingest", *options, "--print-config")
+        lines = [line for line in text.splitlines() if line and not line.startswith("#")]
+        return dict(line.split(": ", 1) for line in lines), text
+
+    def test_what_is_printed_is_a_file_that_prints_the_same(self):
+        _, text = self.printed("--voxel", "0.08", "--no-layers", "--map", "m", "--up", "0,0,1")
+        self.write("again.yaml", text)
+        self.assertEqual(text, self.printed("--config", "again.yaml")[1])
+
+    def test_the_file_goes_before_defaults_and_the_command_line_before_the_file(self):
+        self.write("a.yaml", "# mine\nvoxel: 0.08\nrange: 4\nno-layers: true\nrooms: ceiling\n")
+        values, _ = self.printed("--config", "a.yaml", "--range", "3")
+        self.assertEqual("0.08", values["voxel"])
+        self.assertEqual("3", values["range"])
+        self.assertEqual("true", values["no-layers"])
+        self.assertEqual("ceiling", values["rooms"])
+        self.assertEqual("ground", values["places"])
+
+    def test_the_file_does_what_the_options_do(self):
+        self.write("b.yaml", "store: by-file\nmap: office\ncommit-poses: 100\nagent-prefix: x-\n")
+        self.ok("dsg-ingest", "--config", "b.yaml", self.small)
+        self.ok("dsg-ingest", "--store", "by-options", "--map", "office", "--commit-poses", "100",
+                "--agent-prefix", "x-", self.small)
+        logs = [self.ask("log", "--store", store)["revisions"] for store in
+                ("by-file", "by-options")]
+        self.assertEqual([r["session_id"] for r in logs[0]], [r["session_id"] for r in logs[1]])
+
+    def test_wrong_files_are_refused_with_their_line(self):
+        for text, line, words in (
+                ("voxel: 0.05\nvoxl: 0.08\n", 2, "voxl"),
+                ("voxel: 0.05\n\nvoxel: 0.08\n", 3, "again"),
+                ("no-layers: 3\n", 1, "true or false"),
+                ("voxel:\n", 1, "no value"),
+                ("voxel: {a: 1}\n", 1, "scalar"),
+                ("voxel: 0.05\n---\nrange: 3\n", 2, "second document"),
+                ("- voxel\n", 1, "map of options"),
+                ("voxel: [\n", 2, "YAML"),
+                ("config: other.yaml\n", 1, "config"),
+                ("LOG: small\n", 1, "LOG"),
+                ("[" * 5000, 1, "deep")):
+            name = self.write("wrong.yaml", text)
+            self.refused(2, [f"wrong.yaml:{line}: ", words], "dsg-ingest", "--config", name,
+                         "--store", "none", "--map", "m", self.small)
+        self.refused(2, ["nowhere.yaml"], "dsg-ingest", "--config", "nowhere.yaml", "--store",
+                     "none", "--map", "m", self.small)
+        self.refused(2, ["rooms"], "dsg-ingest", "--config",
+                     self.write("value.yaml", "rooms: round\n"), "--store", "none", "--map", "m",
+                     self.small)
+        self.assertFalse(os.path.exists(self.path("none")))
+
+    def test_shipped_files_are_in_force(self):
+        names = sorted(os.listdir(SHIPPED))
+        self.assertEqual(["euroc.yaml", "handheld_rgbd.yaml", "office_robot.yaml",
+                          "people_tracks.yaml"], names)
+        defaults, _ = self.printed()
+        for name in names:
+            values, _ = self.printed("--config", os.path.join(SHIPPED, name))
+            self.assertNotEqual(defaults, values, name)
+
+    def test_a_dry_run_says_what_the_run_would_and_writes_nothing(self):
+        dry = json.loads(self.ok("dsg-ingest", "--dry-run", "--json", "--store", "dry", "--map",
+                                 "office", self.small))
+        self.assertFalse(os.path.exists(self.path("dry")))
+        real = json.loads(self.ok("dsg-ingest", "--json", "--store", "dry", "--map", "office",
+                                  self.small))
+        self.assertTrue(dry.pop("dry_run"))
+        self.assertFalse(real.pop("dry_run"))
+        for summary in (dry, real):
+            self.assertGreaterEqual(summary.pop("seconds"), 0)
+        self.assertEqual(real, dry)
+        self.assertGreater(real["poses"], 0)
+        head = self.ask("stats", "--store", "dry")["head_revision"]
+        # Of a map that has the log, nothing; of one that has not, what is new.
+        again = json.loads(self.ok("dsg-ingest", "--dry-run", "--json", "--store", "dry", "--map",
+                                   "office", self.small))
+        self.assertEqual(0, again["revisions"])
+        other = json.loads(self.ok("dsg-ingest", "--dry-run", "--json", "--agent-prefix", "b",
+                                   "--store", "dry", "--map", "office", self.small))
+        self.assertGreater(other["revisions"], 0)
+        self.assertEqual(head, self.ask("stats", "--store", "dry")["head_revision"])
+        self.refused(2, ["--server"], "dsg-ingest", "--dry-run", "--server", "unix:none.sock",
+                     "--map", "office", self.small)
+
+
+if __name__ == "__main__":
+    unittest.main()
