@@ -145,7 +145,9 @@ class KilledBetweenCalls : public testing::Test {
         EXPECT_EQ(ContentOf(*OrDie(store->OpenMap(name))), content_);
         EXPECT_TRUE(store->OpenWriter(name).ok());
       }
-      if (found == before) EXPECT_TRUE(work(*store).ok());
+      if (found == before) {
+        EXPECT_TRUE(work(*store).ok());
+      }
       EXPECT_EQ(Entries(folder), after);
       fs::remove_all(folder);
     }
