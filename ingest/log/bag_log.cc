@@ -169,6 +169,11 @@ class BagLog : public LogSource {
     // Several people are seen in one image.
     const bool is_after = !last.has_value() || key.time_ns > last->time_ns ||
                           (key.rank == ChannelRank::kDetections && key > *last);
+    if (!is_after && key.time_ns == 0) {
+      return Malformed(index,
+                       "has stamp 0, as the one before: its publisher does not stamp; set the "
+                       "stamps to the times of recording, or leave the topic out");
+    }
     if (!is_after) {
       return Malformed(index,
                        absl::StrCat("has stamp ", key.time_ns, " after stamp ", last->time_ns,
@@ -244,7 +249,7 @@ class BagLog : public LogSource {
       if (is_compressed) {
         DSG_ASSIGN_OR_RETURN(const RosCompressedImage compressed,
                              ParseRosCompressedImage(message.data, origin));
-        return DecodeImage(compressed.data, origin, decoding);
+        return ToImage(compressed, decoding, origin);
       }
       DSG_ASSIGN_OR_RETURN(const RosImage raw, ParseRosImage(message.data, origin));
       return ToImage(raw, decoding, *classes, origin);

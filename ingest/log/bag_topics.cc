@@ -2,6 +2,7 @@
 #include "ingest/log/bag_topics.h"
 
 #include <algorithm>
+#include <cstring>
 #include <filesystem>
 #include <optional>
 #include <set>
@@ -12,6 +13,7 @@
 #include "ingest/log/bag_calibration.h"
 #include "ingest/log/file_bytes.h"
 #include "ingest/log/image_channel.h"
+#include "ingest/log/image_header.h"
 #include "ingest/log/label_table.h"
 #include "ingest/log/ros_messages.h"
 #include "schema/base/status.h"
@@ -21,6 +23,9 @@ namespace {
 
 constexpr char kImageType[] = "sensor_msgs/Image";
 constexpr char kCompressedType[] = "sensor_msgs/CompressedImage";
+// What image_transport adds to the name of a topic.
+constexpr char kCompressed[] = "/compressed";
+constexpr char kCompressedDepth[] = "/compressedDepth";
 constexpr char kLabelColors[] = "/tesse/seg_cam/rgb/image_raw";
 
 struct KnownTopic {
@@ -105,10 +110,12 @@ void UseKnownTopics(BagPlan* plan) {
                                          absl::Utf8SafeCHexEscape(topic->type.substr(0, 80)), ", ",
                                          known.type, " is due"));
     }
-    BagTopic* compressed = FindTopic(plan, absl::StrCat(known.name, "/compressed"));
-    if (known.use == TopicUse::kImage && compressed != nullptr &&
-        compressed->type == kCompressedType) {
-      Use(TopicUse::kCompressedImage, known.channel, compressed);
+    for (const char* const ending : {kCompressedDepth, kCompressed}) {
+      BagTopic* compressed = FindTopic(plan, absl::StrCat(known.name, ending));
+      if (known.use == TopicUse::kImage && compressed != nullptr &&
+          compressed->type == kCompressedType && !HasChannel(*plan, known.channel)) {
+        Use(TopicUse::kCompressedImage, known.channel, compressed);
+      }
     }
   }
 }
@@ -129,27 +136,75 @@ void UseOnlyTopicOf(const std::string& type, TopicUse use, const std::string& ch
                                      ", is taken for ", channel));
 }
 
+std::string ChannelOfEncoding(std::string_view encoding) {
+  if (encoding == "16UC1" || encoding == "mono16" || encoding == "32FC1") return "depth0";
+  return encoding == "mono8" || encoding == "8UC1" ? "cam0" : "color0";
+}
+
+// image_transport names the encoding first, as in "rgb8; jpeg compressed bgr8"; some drivers say
+// "jpeg" alone, then the picture tells. nullopt for what is no picture, as a frame of a video.
+std::optional<std::string> EncodingOf(const RosCompressedImage& image, const std::string& origin) {
+  const size_t end = image.format.find(';');
+  if (end != std::string::npos) return image.format.substr(0, end);
+  const absl::StatusOr<ImageHeader> header = ReadImageHeader(image.data, origin);
+  if (!header.ok()) return std::nullopt;
+  if (header->channel_count != 1) return "rgb8";
+  return header->bits_per_channel > 8 ? "16UC1" : "mono8";
+}
+
+using TopicsByName = std::map<std::string_view, const BagTopic*>;
+
+// Recorders that take all topics have a picture in several forms; one is enough.
+bool IsHeldBetter(const BagTopic& topic, const TopicsByName& topics) {
+  const auto has = [&topics](const std::string& name, std::string_view type) {
+    const auto found = topics.find(name);
+    return found != topics.end() && found->second->type == type && found->second->message_count > 0;
+  };
+  for (const char* const ending : {kCompressed, kCompressedDepth}) {
+    if (!topic.name.ends_with(ending)) continue;
+    const std::string raw = topic.name.substr(0, topic.name.size() - std::strlen(ending));
+    if (has(raw, kImageType)) return true;
+    return ending == kCompressed && has(raw + kCompressedDepth, kCompressedType);
+  }
+  return false;
+}
+
+// nullopt for a topic that has no picture.
+absl::StatusOr<std::optional<std::string>> FirstEncoding(const Bag& bag, const BagPlan& plan,
+                                                         const BagTopic& topic) {
+  const std::optional<BagMessageRef>& first = plan.FirstOf(topic);
+  if (!first.has_value()) return std::nullopt;
+  const std::string origin = BagOrigin(bag, topic.name, 1);
+  DSG_ASSIGN_OR_RETURN(const BagMessage message, bag.Read(*first));
+  if (topic.type == kImageType) {
+    DSG_ASSIGN_OR_RETURN(const RosImage image, ParseRosImageHead(message.data, origin));
+    return image.encoding;
+  }
+  DSG_ASSIGN_OR_RETURN(const RosCompressedImage image,
+                       ParseRosCompressedImage(message.data, origin));
+  return EncodingOf(image, origin);
+}
+
 // Cameras of unknown names, by what their first image is: one of depth, one of colour, one grey.
 absl::Status UseImagesByEncoding(const Bag& bag, BagPlan* plan) {
+  TopicsByName by_name;
+  for (const BagTopic& topic : plan->topics) by_name.emplace(topic.name, &topic);
   std::map<std::string, std::vector<BagTopic*>> topics_of_channel;
   for (BagTopic& topic : plan->topics) {
     if (topic.use == TopicUse::kImage || topic.use == TopicUse::kCompressedImage) {
       return absl::OkStatus();
     }
-    if (topic.type != kImageType) continue;
-    const std::optional<BagMessageRef>& first = plan->FirstOf(topic);
-    if (!first.has_value()) continue;
-    DSG_ASSIGN_OR_RETURN(const BagMessage message, bag.Read(*first));
-    DSG_ASSIGN_OR_RETURN(const RosImage image,
-                         ParseRosImageHead(message.data, BagOrigin(bag, topic.name, 1)));
-    const std::string& encoding = image.encoding;
-    const bool is_depth = encoding == "16UC1" || encoding == "mono16" || encoding == "32FC1";
-    const bool is_gray = encoding == "mono8" || encoding == "8UC1";
-    topics_of_channel[is_depth ? "depth0" : is_gray ? "cam0" : "color0"].push_back(&topic);
+    const bool is_compressed = topic.type == kCompressedType;
+    if (topic.type != kImageType && !is_compressed) continue;
+    if (topic.message_count == 0 || (is_compressed && IsHeldBetter(topic, by_name))) continue;
+    DSG_ASSIGN_OR_RETURN(const std::optional<std::string> encoding,
+                         FirstEncoding(bag, *plan, topic));
+    if (encoding.has_value()) topics_of_channel[ChannelOfEncoding(*encoding)].push_back(&topic);
   }
   for (const auto& [channel, topics] : topics_of_channel) {
     if (topics.size() != 1) continue;
-    Use(TopicUse::kImage, channel, topics.front());
+    const bool is_compressed = topics.front()->type == kCompressedType;
+    Use(is_compressed ? TopicUse::kCompressedImage : TopicUse::kImage, channel, topics.front());
     plan->notes.push_back(absl::StrCat("topic ", topics.front()->name, " is taken for ", channel,
                                        " by its encoding"));
   }

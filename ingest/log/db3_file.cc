@@ -50,10 +50,8 @@ class Db3File::Reader {
 
   absl::Status Read() {
     DSG_RETURN_IF_ERROR(CheckWhole());
-    std::error_code error;
-    const uintmax_t log_size = std::filesystem::file_size(bag_.path_ + "-wal", error);
-    // Nobody writes it, unless the recorder left a log of changes beside it.
-    const bool is_immutable = error || log_size == 0;
+    // Nobody writes it, unless the recorder left changes beside it that belong to it.
+    const bool is_immutable = IsEmptyOrMissing("-wal") && IsEmptyOrMissing("-journal");
     const int result =
         sqlite3_open_v2(UriOf(bag_.path_, is_immutable).c_str(), &bag_.database_,
                         SQLITE_OPEN_READONLY | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX, nullptr);
@@ -70,6 +68,12 @@ class Db3File::Reader {
   }
 
  private:
+  bool IsEmptyOrMissing(const char* ending) const {
+    std::error_code error;
+    const uintmax_t size = std::filesystem::file_size(bag_.path_ + ending, error);
+    return error || size == 0;
+  }
+
   // SQLite takes zeros for what is missing of the last page.
   absl::Status CheckWhole() const {
     std::ifstream in(bag_.path_, std::ios::binary);

@@ -88,7 +88,7 @@ absl::StatusOr<std::string> Gunzip(std::string_view bytes, Output* out) {
       if (IsAllZero(bytes)) return out->Take();
       if (!bytes.starts_with(kGzipBegin)) return out->Damaged("something else follows");
       inflateReset(&stream);
-    } else if (result != Z_OK && result != Z_BUF_ERROR) {
+    } else if (result != Z_OK) {
       return out->Damaged(stream.msg != nullptr ? stream.msg : "not gzip");
     }
   }

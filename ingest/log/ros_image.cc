@@ -2,6 +2,7 @@
 #include "ingest/log/ros_image.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <optional>
 
@@ -138,7 +139,60 @@ Image ToLabel(const RosImage& image, const Encoding& e,
   return result;
 }
 
+// What compressed_depth_image_transport puts before its PNG: a number, and the two parameters of
+// inverse depth, each of four bytes.
+constexpr size_t kDepthHeaderBytes = 12;
+
+float FloatAt(std::string_view bytes, size_t at) {
+  float value = 0.0f;
+  std::memcpy(&value, bytes.data() + at, sizeof(value));
+  return value;
+}
+
+// Zero stays what it is: no reading.
+Image FromInverseDepth(const Image& inverse, float a, float b) {
+  Image result{.width = inverse.width,
+               .height = inverse.height,
+               .format = PixelFormat::kDepth32,
+               .bytes = std::vector<uint8_t>(2 * inverse.bytes.size())};
+  for (size_t i = 0; 2 * i + 1 < inverse.bytes.size(); ++i) {
+    uint16_t raw = 0;
+    std::memcpy(&raw, inverse.bytes.data() + 2 * i, sizeof(raw));
+    const float depth = raw == 0 ? 0.0f : a / (static_cast<float>(raw) - b);
+    const float metres = std::isfinite(depth) && depth > 0.0f ? depth : 0.0f;
+    std::memcpy(result.bytes.data() + 4 * i, &metres, sizeof(metres));
+  }
+  return result;
+}
+
 }  // namespace
+
+absl::StatusOr<Image> ToImage(const RosCompressedImage& image, const ImageDecoding& decoding,
+                              const std::string& origin) {
+  if (image.format.find("compressedDepth") == std::string::npos) {
+    return DecodeImage(image.data, origin, decoding);
+  }
+  if (decoding.role != ImageRole::kDepth) {
+    return MalformedFile(origin, "the image is compressed depth, which its channel does not have");
+  }
+  if (image.format.find("rvl") != std::string::npos) {
+    return MalformedFile(origin,
+                         "the depth is compressed by RVL, which is not read; record it as PNG");
+  }
+  if (image.data.size() <= kDepthHeaderBytes) {
+    return MalformedFile(origin, "the compressed depth is cut short");
+  }
+  const std::string_view png = image.data.substr(kDepthHeaderBytes);
+  if (!image.format.starts_with("32FC1")) return DecodeImage(png, origin, decoding);
+  ImageDecoding plain = decoding;
+  plain.depth_units_per_m = 1000.0;
+  plain.is_max_no_reading = false;
+  DSG_ASSIGN_OR_RETURN(const Image inverse, DecodeImage(png, origin, plain));
+  if (inverse.format != PixelFormat::kDepth16) {
+    return MalformedFile(origin, "inverse depth has 16 bits; the message is of another kind");
+  }
+  return FromInverseDepth(inverse, FloatAt(image.data, 4), FloatAt(image.data, 8));
+}
 
 absl::StatusOr<Image> ToImage(const RosImage& image, const ImageDecoding& decoding,
                               const std::map<uint32_t, int32_t>& class_of_color,

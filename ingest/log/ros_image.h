@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Raw ROS images to plain pixels of the format that a channel has.
+// ROS images to plain pixels of the format that a channel has.
 // Refuses encodings that do not fit the channel.
 #pragma once
 
@@ -18,6 +18,12 @@ namespace dsg::ingest {
 /// Errors: INVALID_ARGUMENT/FILE_MALFORMED naming `origin`, also past kImagePixelsMax.
 absl::StatusOr<Image> ToImage(const RosImage& image, const ImageDecoding& decoding,
                               const std::map<uint32_t, int32_t>& class_of_color,
+                              const std::string& origin);
+
+/// PNG or JPEG, and the compressed depth of image_transport: a PNG of millimetres (16UC1), or of
+/// inverse depth (32FC1), which becomes metres.
+/// Errors: as above.
+absl::StatusOr<Image> ToImage(const RosCompressedImage& image, const ImageDecoding& decoding,
                               const std::string& origin);
 
 }  // namespace dsg::ingest

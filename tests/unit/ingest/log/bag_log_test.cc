@@ -196,6 +196,84 @@ TEST(BagLog, ReadsCompressedImages) {
   EXPECT_EQ(image->bytes, std::vector<uint8_t>(12, 77));
 }
 
+std::string PngBytes(int type, double value) {
+  std::vector<uint8_t> png;
+  EXPECT_TRUE(cv::imencode(".png", cv::Mat(1, 2, type, cv::Scalar(value, value, value)), png));
+  return {png.begin(), png.end()};
+}
+
+std::string CompressedMessage(const std::string& format, const std::string& data) {
+  return ByteWriter().Header(kT0, "cam").String(format).String(data).bytes();
+}
+
+// The number and the two parameters of inverse depth that come before the PNG.
+std::string DepthParameters(float a, float b) { return std::string(4, '\0') + Floats({a, b}); }
+
+TEST(BagLog, ReadsTheCompressedFormsThatCamerasOfAnyNameHave) {
+  constexpr char kCompressed[] = "sensor_msgs/CompressedImage";
+  const TempFolder folder;
+  BagWriter bag;
+  bag.Add("/front/color/compressed", kCompressed, 1,
+          CompressedMessage("rgb8; jpeg compressed bgr8", PngBytes(CV_8UC3, 9)));
+  // The same depth in three forms: the one without loss counts.
+  const std::string millimetres = PngBytes(CV_16UC1, 1500);
+  bag.Add("/front/depth/compressed", kCompressed, 1,
+          CompressedMessage("16UC1; png compressed ", millimetres));
+  bag.Add("/front/depth/compressedDepth", kCompressed, 1,
+          CompressedMessage("16UC1; compressedDepth png", DepthParameters(0, 0) + millimetres));
+  // Drivers that say how, and not what.
+  bag.Add("/rear/grey/compressed", kCompressed, 1, CompressedMessage("png", PngBytes(CV_8UC1, 77)));
+  bag.Add("/rear/video", kCompressed, 1, CompressedMessage("h264", "no picture"));
+  const auto log = ReadAll(folder.Write("log.bag", bag.Finish()));
+  ASSERT_TRUE(log.ok()) << log.status();
+  const std::map<std::string, int64_t> counts = {{"cam0", 1}, {"color0", 1}, {"depth0", 1}};
+  EXPECT_EQ(log->info.channel_counts, counts);
+  EXPECT_TRUE(HasNote(log->info, "/front/depth/compressedDepth is taken for depth0"));
+  EXPECT_TRUE(HasNote(log->info, "/rear/video (1 sensor_msgs/CompressedImage)"));
+  for (const ImageMeasurement& image : log->images) {
+    ASSERT_TRUE(image.load().ok()) << image.load().status();
+    if (image.channel == "depth0") {
+      EXPECT_FLOAT_EQ(DepthAt(*image.load(), 1, 0), 1.5f);
+    }
+    if (image.channel == "cam0") {
+      EXPECT_EQ(image.load()->bytes.at(1), 77);
+    }
+  }
+}
+
+TEST(BagLog, ReadsInverseDepthAndNamesWhatIsNotDepth) {
+  const TempFolder folder;
+  const auto load = [&](const std::string& format, const std::string& data) {
+    BagWriter bag;
+    bag.Add("/tesse/depth_cam/mono/image_raw/compressedDepth", "sensor_msgs/CompressedImage", 1,
+            CompressedMessage(format, data));
+    const auto log = ReadAll(folder.Write("log.bag", bag.Finish()));
+    EXPECT_TRUE(log.ok()) << log.status();
+    EXPECT_EQ(log->ImageCount("depth0"), 1);
+    return log->images.at(0).load();
+  };
+  // 100 / (70 - 20) = 2.
+  const auto inverse =
+      load("32FC1; compressedDepth png", DepthParameters(100, 20) + PngBytes(CV_16UC1, 70));
+  ASSERT_TRUE(inverse.ok()) << inverse.status();
+  EXPECT_FLOAT_EQ(DepthAt(*inverse, 1, 0), 2.0f);
+  const auto none =
+      load("32FC1; compressedDepth", DepthParameters(100, 20) + PngBytes(CV_16UC1, 0));
+  ASSERT_TRUE(none.ok()) << none.status();
+  EXPECT_EQ(DepthAt(*none, 1, 0), 0.0f);
+  // Behind the camera, and at no distance at all.
+  const auto behind =
+      load("32FC1; compressedDepth", DepthParameters(100, 70) + PngBytes(CV_16UC1, 70));
+  ASSERT_TRUE(behind.ok()) << behind.status();
+  EXPECT_EQ(DepthAt(*behind, 1, 0), 0.0f);
+  ExpectMalformedFile(load("32FC1; compressedDepth rvl", std::string(99, 'x')).status(),
+                      {"RVL", "record it as PNG"});
+  ExpectMalformedFile(load("16UC1; compressedDepth png", "short").status(), {"cut short"});
+  ExpectMalformedFile(
+      load("32FC1; compressedDepth", DepthParameters(1, 1) + PngBytes(CV_8UC1, 7)).status(),
+      {"compressedDepth message 1", "depth is 16 bit"});
+}
+
 TEST(BagLog, ChoosesPosesAsAsked) {
   const TempFolder folder;
   const std::string path = folder.Write("log.bag", FullBag().Finish());

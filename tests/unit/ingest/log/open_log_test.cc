@@ -94,7 +94,7 @@ TEST(OpenLog, TellsBagsByTheirFirstBytes) {
       {"log.bin: byte", "mcap recover"});
   ExpectMalformedFile(
       ReadAll(folder.Write("log.bin", std::string("SQLite format 3\0", 16) + "rest")).status(),
-      {"log.bin", "SQLite says"});
+      {"log.bin", "whole pages", "copy it again"});
   ExpectMalformedFile(ReadAll(folder.Write("log.bag", "#ROSBAG V1.2\n")).status(), {"rosbag fix"});
   const std::string text = folder.Write("log.txt", "0 1 2 3\n");
   for (const char* const format : {"rosbag", "mcap", "rosbag2"}) {

@@ -187,6 +187,12 @@ TEST(Ros2Bag, NamesStampsThatStepBackAndOtherClocks) {
   }
   ExpectMalformedFile(ReadAll(folder.Write("log.mcap", WriteMcap(recording))).status(),
                       {"/imu0", "message 3", absl::StrCat(kT0 + 20), absl::StrCat(kT0 + 30)});
+  recording.clear();
+  for (int i = 0; i < 2; ++i) {
+    recording.push_back({"/imu0", "sensor_msgs/Imu", 100, ImuFields(CdrWriter(), 0, 0, 0)});
+  }
+  ExpectMalformedFile(ReadAll(folder.Write("log.mcap", WriteMcap(recording))).status(),
+                      {"/imu0", "message 2", "stamp 0", "does not stamp"});
   recording = SmallRecording(CdrWriter(), 40);
   recording.push_back({"/tesse/imu/noisy/imu", "sensor_msgs/Imu", kT0 + 9 * kNsPerSecond,
                        ImuFields(CdrWriter(), 5 * kNsPerSecond, 0, 0)});
@@ -213,6 +219,28 @@ TEST(Db3File, NamesWhatIsWrong) {
   const std::string topic = tables + "INSERT INTO topics VALUES (1, '/a', 'b/msg/C', 'cdr', '');";
   expect(topic + "INSERT INTO messages VALUES (1, 1, 'noon', x'00')", {"message 1", "no time"});
   expect("CREATE TABLE topics(name); CREATE TABLE messages(id)", {"SQLite says", "no such column"});
+}
+
+TEST(Db3File, ReadsChangesThatTheRecorderLeftInItsLog) {
+  const TempFolder folder;
+  const std::string path = folder.Path("open.db3");
+  WriteDb3(SmallRecording(CdrWriter(), 2), path);
+  const auto before = Db3File::Open(path);
+  ASSERT_TRUE(before.ok()) << before.status();
+  sqlite3* recorder = nullptr;
+  ASSERT_EQ(sqlite3_open(path.c_str(), &recorder), SQLITE_OK);
+  EXPECT_EQ(sqlite3_exec(recorder,
+                         "PRAGMA journal_mode = WAL; INSERT INTO messages(topic_id, timestamp, "
+                         "data) VALUES (1, 7, x'00010000')",
+                         nullptr, nullptr, nullptr),
+            SQLITE_OK);
+  // What a crash leaves behind.
+  std::filesystem::copy_file(path, folder.Path("left.db3"));
+  std::filesystem::copy_file(path + "-wal", folder.Path("left.db3-wal"));
+  sqlite3_close(recorder);
+  const auto left = Db3File::Open(folder.Path("left.db3"));
+  ASSERT_TRUE(left.ok()) << left.status();
+  EXPECT_EQ((*left)->messages().size(), (*before)->messages().size() + 1);
 }
 
 TEST(Db3File, SurvivesCutsAndChangedBytes) {
