@@ -5,11 +5,13 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <filesystem>
 #include <istream>
 #include <memory>
 #include <set>
 #include <vector>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
@@ -51,7 +53,8 @@ class YamlConfig : public CLI::Config {
       }
       return Items(YAML::Load(text));
     } catch (const YAML::Exception& error) {
-      throw Wrong(error.mark, absl::StrCat("this is no YAML: ", error.msg));
+      throw Wrong(error.mark,
+                  absl::StrCat("this is no YAML: ", absl::Utf8SafeCHexEscape(error.msg)));
     }
   }
 
@@ -66,6 +69,8 @@ class YamlConfig : public CLI::Config {
     std::string text(kFileBytesMax + 1, '\0');
     input.read(text.data(), static_cast<std::streamsize>(text.size()));
     text.resize(static_cast<size_t>(input.gcount()));
+    // A folder can be opened, and not read.
+    if (input.bad()) throw Wrong(YAML::Mark(), "this is no file that can be read");
     if (text.size() > kFileBytesMax) {
       throw Wrong(YAML::Mark(), absl::StrCat("the file has more than ", kFileBytesMax, " bytes"));
     }
@@ -159,6 +164,17 @@ std::string EntryText(const CLI::Option& option) {
   return absl::StrCat(text, name, ": [", absl::StrJoin(values, ", "), "]\n");
 }
 
+// CLI11 tells of a file that is not there only after all options were looked at.
+void CheckIsThere(const CLI::App& app) {
+  const CLI::Option& option = *app.get_config_ptr();
+  if (option.count() == 0) return;
+  const std::string& file = option.results().back();
+  std::error_code error;
+  if (!std::filesystem::exists(file, error) || std::filesystem::is_directory(file, error)) {
+    throw CLI::FileError::Missing(file);
+  }
+}
+
 }  // namespace
 
 void AddConfigFile(CLI::App* app) {
@@ -170,6 +186,7 @@ void AddConfigFile(CLI::App* app) {
   app->add_flag_callback(
       absl::StrCat("--", kPrintConfig),
       [app] {
+        CheckIsThere(*app);
         std::fputs(ConfigText(*app).c_str(), stdout);
         throw CLI::Success();
       },

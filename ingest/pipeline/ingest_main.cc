@@ -258,6 +258,9 @@ absl::Status EndFailedRun(const absl::Status& failure, const std::string& path,
   if (destination == nullptr || !destination->is_new() || absl::IsUnavailable(failure)) {
     return failure;
   }
+  // Somebody has dropped or renamed it meanwhile.
+  const Reason reason = ReasonOf(failure);
+  if (reason == Reason::kMapUnknown || reason == Reason::kMapReplaced) return failure;
   const std::string map = destination->spec().name;
   std::error_code error;
   const auto type = std::filesystem::status(path, error).type();

@@ -69,6 +69,9 @@ class Configuration(support.ProgramsTest):
                          "--store", "none", "--map", "m", self.small)
         self.refused(2, ["nowhere.yaml"], "dsg-ingest", "--config", "nowhere.yaml", "--store",
                      "none", "--map", "m", self.small)
+        for name in (".", "nowhere.yaml"):
+            self.refused(2, [f"{name} was not readable"], "dsg-ingest", "--config", name,
+                         "--print-config")
         self.refused(2, ["rooms"], "dsg-ingest", "--config",
                      self.write("value.yaml", "rooms: round\n"), "--store", "none", "--map", "m",
                      self.small)
