@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/log/format.h"
 #include "ingest/log/log_source.h"
 #include "ingest/log/peeked_log.h"
 #include "ingest/pipeline/config_file.h"
@@ -110,9 +111,7 @@ void AddFlags(CLI::App* app, Flags* flags) {
   app->add_option("--map", flags->map, "Name of the map; made if missing")
       ->envname("DSG_MAP")
       ->required();
-  app->add_option("--format", flags->format,
-                  "auto, obsmat, trajnet, trajnet-ndjson, thor, euroc, spark-dsg, kimera-json, "
-                  "region-json, dsg-tracks, rgbd, rosbag or tesse-objects")
+  app->add_option("--format", flags->format, absl::StrCat("auto, or one of: ", FormatList()))
       ->capture_default_str();
   app->add_option("--frame-period", flags->frame_period_s,
                   "Seconds from frame to frame of a log without a clock; 0.4 for annotated tracks, "
