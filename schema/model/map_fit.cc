@@ -119,10 +119,29 @@ class TimeChecker {
   // given one, and other clocks may begin anywhere.
   absl::StatusOr<std::optional<Interval>> FindKnownSpan() const {
     DSG_ASSIGN_OR_RETURN(std::optional<Interval> span, graph_.FindSpan());
-    if (!span.has_value() && (spec_.clock != Clock::kUnix || spec_.epoch_ns == 0)) return span;
+    if (!span.has_value() && (spec_.clock != Clock::kUnix || spec_.epoch_ns == 0)) {
+      return FirstPoses();
+    }
     if (!span.has_value()) return std::optional<Interval>({spec_.epoch_ns, spec_.epoch_ns});
     span->from_ns = std::min(span->from_ns, spec_.epoch_ns);
     span->to_ns = std::max(span->to_ns, spec_.epoch_ns);
+    return span;
+  }
+
+  // The delta's own poses up to the first gap that is too long: the poses behind it would be
+  // refused if they came with the next delta, so they are with this one.
+  std::optional<Interval> FirstPoses() const {
+    std::vector<TimeNs> times;
+    for (const TrajectoryAppend& item : delta_.appends) {
+      for (const TimedPose& pose : item.poses) times.push_back(pose.time_ns);
+    }
+    if (times.empty()) return std::nullopt;
+    std::sort(times.begin(), times.end());
+    Interval span{times.front(), times.front()};
+    for (const TimeNs time_ns : times) {
+      if (DistanceNs(time_ns, span) > kObservedFarMaxNs) break;
+      span.to_ns = time_ns;
+    }
     return span;
   }
 

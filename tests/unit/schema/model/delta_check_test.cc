@@ -427,6 +427,25 @@ TEST(CheckDelta, RefusesTimesFarFromTheMap) {
   EXPECT_TRUE(CheckDelta(With(observed(kTimeMax - 1)), empty).ok());
 }
 
+// As if they had come one by one.
+TEST(CheckDelta, RefusesAClockThatJumpsWithinTheFirstPoses) {
+  SmallGraph empty;
+  empty.span.reset();
+  const auto poses = [](const std::vector<TimeNs>& times_ns) {
+    return With([&](GraphDelta* d) {
+      d->appends = {{NodeId('H', 0), {}}};
+      for (const TimeNs time_ns : times_ns) d->appends[0].poses.push_back(TimedPose{time_ns});
+    });
+  };
+  constexpr TimeNs kLateNs = 3 * kObservedFarMaxNs;
+  const TimeNs second_ns = kLateNs + kObservedFarMaxNs;
+  EXPECT_TRUE(CheckDelta(poses({kLateNs, kLateNs + 1, second_ns}), empty).ok());
+  EXPECT_TRUE(CheckDelta(poses({kLateNs, second_ns, second_ns + kObservedFarMaxNs}), empty).ok());
+  const absl::Status refused = CheckDelta(poses({kLateNs, kLateNs + 1, second_ns + 2}), empty);
+  EXPECT_EQ(ReasonOf(refused), Reason::kTimeImplausible) << refused;
+  EXPECT_TRUE(absl::StrContains(refused.message(), "time of a pose of H0")) << refused;
+}
+
 TEST(CheckDelta, RefusesARedefinedLayer) {
   ExpectRefused(
       [](GraphDelta* d) {
