@@ -119,7 +119,10 @@ class Part {
     for (const Reading& reading : readings_) depths.push_back(reading.depth_m);
     std::nth_element(depths.begin(), depths.begin() + std::ssize(depths) / 2, depths.end());
     const double bin_m = std::max(kDepthBinM, 1.5 * NoiseAt(depths[depths.size() / 2]));
-    const auto bin_of = [bin_m](double depth_m) { return static_cast<int>(depth_m / bin_m); };
+    // All that is too far to be of use is in one bin.
+    const auto bin_of = [bin_m](double depth_m) {
+      return static_cast<int>(std::min(depth_m, 2.0 * kSightingFarM) / bin_m);
+    };
     int first = bin_of(readings_.front().depth_m), last = first;
     for (const Reading& reading : readings_) {
       first = std::min(first, bin_of(reading.depth_m));

@@ -56,7 +56,7 @@ float DepthAt(const Image& image, int column, int row) {
   DSG_CHECK(image.format == PixelFormat::kDepth32);
   float metres = 0.0f;
   std::memcpy(&metres, image.bytes.data() + image.Offset(column, row), sizeof metres);
-  return std::isfinite(metres) && metres > 0.0f ? metres : 0.0f;
+  return metres > 0.0f && metres <= kDepthMaxM ? metres : 0.0f;
 }
 
 uint16_t LabelAt(const Image& image, int column, int row) {

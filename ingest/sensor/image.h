@@ -41,7 +41,11 @@ struct Image {
   }
 };
 
-/// Metres along the optical axis; 0 = no reading. Requires: kDepth16 or kDepth32, inside.
+/// No sensor of ours measures further, m; broken drivers write the largest float.
+inline constexpr float kDepthMaxM = 1000.0f;
+
+/// Metres along the optical axis; 0 = no reading, or one beyond kDepthMaxM. Requires: kDepth16 or
+/// kDepth32, inside.
 float DepthAt(const Image& image, int column, int row);
 /// class << 8 | instance. Requires: kLabel16, inside.
 uint16_t LabelAt(const Image& image, int column, int row);

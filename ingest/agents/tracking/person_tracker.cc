@@ -119,7 +119,7 @@ std::vector<SeenPerson> PersonTracker::Impl::Prepare(std::vector<PersonObservati
   std::sort(observations.begin(), observations.end(), ComesBefore);
   for (PersonObservation& observation : observations) {
     ++counts_.observation_count;
-    if (!IsTrackable(observation)) {
+    if (!IsTrackable(observation, options_)) {
       ++counts_.unusable_count;
       continue;
     }

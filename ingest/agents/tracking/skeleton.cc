@@ -28,14 +28,4 @@ SkeletonDistance Distance(const Skeleton& a, const Skeleton& b) {
   return {apart_m.maxCoeff(), apart_m.mean()};
 }
 
-bool IsTrackable(const PersonObservation& observation) {
-  if (!IsValidPose(observation.map_T_torso)) return false;
-  const Eigen::Matrix3d& covariance = observation.position_covariance_map;
-  if (!covariance.allFinite() || covariance.diagonal().minCoeff() <= 0.0) return false;
-  if (covariance.determinant() <= 0.0) return false;
-  if (!observation.has_joints) return true;
-  return std::all_of(observation.joints_torso.begin(), observation.joints_torso.end(),
-                     [](const Eigen::Vector3d& joint) { return joint.allFinite(); });
-}
-
 }  // namespace dsg::ingest

@@ -29,7 +29,4 @@ struct SkeletonDistance {
 /// Over all joints; between the torsos when one has no joints.
 SkeletonDistance Distance(const Skeleton& a, const Skeleton& b);
 
-/// All its numbers are finite and its covariance is positive: what an estimator can work with.
-bool IsTrackable(const PersonObservation& observation);
-
 }  // namespace dsg::ingest

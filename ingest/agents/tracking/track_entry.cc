@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "ingest/agents/estimation/torso_terms.h"
+
 namespace dsg::ingest {
 namespace {
 
@@ -13,7 +15,22 @@ std::vector<float> ToFloats(const ShapeVector& shape) {
   return out;
 }
 
+// Half a person tells less of where the torso is.
+PersonObservation Weighed(PersonObservation observation, const TrackerOptions& options) {
+  if (observation.is_weak) {
+    observation.position_covariance_map *= options.weak_sigma_factor * options.weak_sigma_factor;
+  }
+  return observation;
+}
+
 }  // namespace
+
+bool IsTrackable(const PersonObservation& observation, const TrackerOptions& options) {
+  if (!IsUsable(observation) || !IsUsable(Weighed(observation, options))) return false;
+  if (!observation.has_joints) return true;
+  return std::all_of(observation.joints_torso.begin(), observation.joints_torso.end(),
+                     [](const Eigen::Vector3d& joint) { return joint.allFinite(); });
+}
 
 SeenPerson MakeSeen(PersonObservation observation) {
   SeenPerson seen;
@@ -29,11 +46,8 @@ TrackEntry::TrackEntry(int64_t id, const TrackerOptions& options)
                                  {}} {}
 
 void TrackEntry::Append(PersonObservation observation) {
-  PersonObservation weighed = observation;
-  if (observation.is_weak) {
-    weighed.position_covariance_map *= options_->weak_sigma_factor * options_->weak_sigma_factor;
-  }
-  track_.graph.Add(weighed);
+  // Observations and estimates go in pairs.
+  if (!track_.graph.Add(Weighed(observation, *options_))) return;
   track_.observations.push_back(std::move(observation));
 }
 

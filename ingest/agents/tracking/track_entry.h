@@ -19,6 +19,9 @@ struct SeenPerson {
   ShapeMean shape;
 };
 
+/// Whether a torso graph takes it (IsUsable), however it is weighed, and its joints are finite.
+bool IsTrackable(const PersonObservation& observation, const TrackerOptions& options);
+
 SeenPerson MakeSeen(PersonObservation observation);
 
 class TrackEntry {

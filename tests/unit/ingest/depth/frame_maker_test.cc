@@ -144,19 +144,20 @@ TEST(FrameMaker, ColourFromBesideIsLeftOutAndSaid) {
 
 TEST(FrameMaker, CleansReadingsThatAreNone) {
   const float inf = std::numeric_limits<float>::infinity();
-  const std::vector<float> given = {1.5f, NAN, inf, -inf, -1.0f, 0.0f, 60.0f};
+  const std::vector<float> given = {
+      1.5f, NAN, inf, -inf, -1.0f, 0.0f, 60.0f, 1e10f, std::numeric_limits<float>::max()};
   FrameMaker maker(TestRig(), {});
   AddPoses(0, 200 * kMs, &maker);
   maker.AddPicture(Shot(0, "depth0", Depth32Image(64, 48, [&](int u, int) {
-                          return u < 7 ? given[static_cast<size_t>(u)] : 2.0f;
+                          return u < 9 ? given[static_cast<size_t>(u)] : 2.0f;
                         })));
   maker.AddPicture(Shot(100 * kMs, "depth0", Depth16Image(64, 48, [](int u, int) {
                           return static_cast<uint16_t>(u == 0 ? 0 : u == 1 ? 65535 : 1234);
                         })));
   const std::vector<DepthFrame> frames = Drain(&maker);
   ASSERT_EQ(frames.size(), 2u);
-  const std::vector<float> expected = {1.5f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 60.0f};
-  EXPECT_EQ(std::vector<float>(frames[0].depth_m.begin(), frames[0].depth_m.begin() + 7), expected);
+  const std::vector<float> expected = {1.5f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 60.0f, 0.0f, 0.0f};
+  EXPECT_EQ(std::vector<float>(frames[0].depth_m.begin(), frames[0].depth_m.begin() + 9), expected);
   EXPECT_EQ(frames[1].depth_m[0], 0.0f);
   EXPECT_EQ(frames[1].depth_m[1], 0.0f);
   EXPECT_FLOAT_EQ(frames[1].depth_m[2], 1.234f);

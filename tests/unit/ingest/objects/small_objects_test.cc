@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "tests/unit/ingest/objects/made_picture.h"
@@ -55,6 +56,21 @@ TEST_F(SmallThings, AreFoundWhereTheyStand) {
   EXPECT_NEAR(found[0].size.z(), 0.08, 0.02);
   EXPECT_EQ(found[0].first_seen_ns, 0);
   EXPECT_EQ(found[0].last_seen_ns, 9 * kNsPerSecond / 5);
+}
+
+TEST_F(SmallThings, AreFoundAmongReadingsOfNoSense) {
+  for (int i = 0; i < 10; ++i) {
+    frame_ = MakePicture(picture_ * kNsPerSecond / 5, Camera(),
+                         {MakeTable(), MakeCup(1, {0.2, 0.1, 0.75})});
+    ++picture_;
+    for (size_t pixel = 0; pixel < frame_.depth_m.size(); pixel += 7) {
+      frame_.depth_m[pixel] = pixel % 2 == 0 ? std::numeric_limits<float>::max() : 3e7F;
+    }
+    Look(frame_);
+  }
+  const auto found = Found();
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_LT((found[0].center_map - Eigen::Vector3d(0.2, 0.1, 0.79)).norm(), 0.03);
 }
 
 TEST_F(SmallThings, AreNotBelievedAtOnce) {

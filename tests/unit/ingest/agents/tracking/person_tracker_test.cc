@@ -162,8 +162,11 @@ TEST(PersonTracker, SurvivesNumbersThatAreNone) {
   limp.has_joints = true;
   for (Eigen::Vector3d& joint : limp.joints_torso) joint.setZero();
   limp.joints_torso[3].x() = nan;
-  EXPECT_TRUE(tracker.Observe(AtS(0.0), {broken, flat, limp}));
-  EXPECT_EQ(tracker.counts().unusable_count, 3);
+  // As a lens of absurd focal lengths places people.
+  const PersonObservation far = ObservationAt({0.0, 1e12, 0.95}, kSeenSigmaM);
+  const PersonObservation vague = ObservationAt({0.0, 0.0, 0.95}, 1e6);
+  EXPECT_TRUE(tracker.Observe(AtS(0.0), {broken, flat, limp, far, vague}));
+  EXPECT_EQ(tracker.counts().unusable_count, 5);
   tracker.Finish();
   EXPECT_TRUE(tracker.TakeChanges().empty());
 }
