@@ -167,7 +167,7 @@ struct MapCondition {
 struct DropReport {
   /// Its newest revision; unset if it could not be read.
   std::optional<Revision> head;
-  /// All space that it took; 0 for a store without files.
+  /// Space that is free again; 0 for a store without files.
   int64_t bytes_on_disk = 0;
 };
 

@@ -6,7 +6,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -17,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "schema/base/log.h"
 #include "schema/base/status.h"
@@ -67,17 +67,45 @@ absl::StatusOr<std::unique_ptr<WriterLock>> LockMap(const std::string& store_fol
                                                     const std::string& program) {
   DSG_RETURN_IF_ERROR(CheckMapName(name));
   if (!IsThere(DatabasePath(store_folder, name))) return UnknownMapError(name, store_folder);
-  if (IsLink(MapFolder(store_folder, name))) {
+  for (const std::string& path :
+       {MapFolder(store_folder, name), DatabasePath(store_folder, name)}) {
+    if (!IsLink(path)) continue;
     return MakeError(Reason::kNotAStore,
-                     absl::StrCat(MapFolder(store_folder, name),
-                                  " is a link; move the folder that it leads to into the store, or "
-                                  "remove both by hand"),
+                     absl::StrCat(path,
+                                  " is a link; move what it leads to into the store, or remove "
+                                  "both by hand"),
                      {{"map", name}});
   }
   DSG_ASSIGN_OR_RETURN(auto lock, WriterLock::Acquire(store_folder, name, program));
   // Another program may have dropped it just before, and a third one begun a new one.
   if (!IsThere(DatabasePath(store_folder, name))) return UnknownMapError(name, store_folder);
   return lock;
+}
+
+// What dsg puts into the folder of a map, also where it was killed: the database with its log, the
+// one that is being made, and those that an upgrade has kept.
+bool IsFileOfMap(const fs::directory_entry& entry) {
+  const std::string name = entry.path().filename().string();
+  std::error_code error;
+  return entry.symlink_status(error).type() == fs::file_type::regular &&
+         (name == "writer.lock" || name == "reserve" || absl::StartsWith(name, "graph.db"));
+}
+
+// What somebody else has put there is not ours to remove.
+absl::Status CheckForOthersFiles(const std::string& store_folder, const std::string& name) {
+  std::error_code error;
+  const std::string folder = MapFolder(store_folder, name);
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    if (IsFileOfMap(*it)) continue;
+    return MakeError(Reason::kNotAStore,
+                     absl::StrCat("map \"", name, "\" is not dropped: ", it->path().string(),
+                                  " is no file of a map; move it away first"),
+                     {{"map", name}, {"file", it->path().string()}});
+  }
+  if (error) return ChangeError("look at the folder of", name, error.value());
+  // Its files go only if the folder may be written.
+  if (access(folder.c_str(), W_OK) != 0) return ChangeError("drop", name, errno);
+  return absl::OkStatus();
 }
 
 int64_t BytesOfFolder(const std::string& folder) {
@@ -125,8 +153,9 @@ absl::Status MoveFolder(const std::string& from, const std::string& to) {
   return absl::ErrnoToStatus(errno, absl::StrCat("renaming ", from, " to ", to));
 }
 
-// Takes a folder out of the store, and removes it. Requires: its lock is held.
-absl::Status RemoveFolder(const std::string& store_folder, const std::string& name) {
+// Takes a folder out of the store, and removes it. Returns the bytes of files that cannot be
+// removed. Requires: its lock is held.
+absl::StatusOr<int64_t> RemoveFolder(const std::string& store_folder, const std::string& name) {
   const std::string dropped = absl::StrCat(store_folder, "/", kDropped, NewIncarnation());
   if (std::rename(MapFolder(store_folder, name).c_str(), dropped.c_str()) != 0) {
     return ChangeError("drop", name, errno);
@@ -134,18 +163,16 @@ absl::Status RemoveFolder(const std::string& store_folder, const std::string& na
   DSG_RETURN_IF_ERROR(SyncFolder(store_folder));
   std::error_code error;
   fs::remove_all(dropped, error);
-  if (error) {
-    Log(LogLevel::kWarning, "dropped-map-left",
-        {{"map", name}, {"folder", dropped}, {"error", error.message()}});
-  }
-  return absl::OkStatus();
+  // Another program may open the store now, and remove them too.
+  if (!error || !IsThere(dropped)) return 0;
+  Log(LogLevel::kWarning, "dropped-map-left",
+      {{"map", name}, {"folder", dropped}, {"error", error.message()}});
+  return BytesOfFolder(dropped);
 }
 
 // What a creation of a map that was killed leaves in its folder.
 bool IsLeftByCreation(const std::string& file) {
-  constexpr std::array<std::string_view, 4> kLeft = {"writer.lock", "graph.db.new",
-                                                     "graph.db.new-wal", "graph.db.new-shm"};
-  return std::find(kLeft.begin(), kLeft.end(), file) != kLeft.end();
+  return file == "writer.lock" || absl::StartsWith(file, "graph.db.new");
 }
 
 // Removes what stands in the way of a folder of that name, if it is nobody's.
@@ -153,6 +180,12 @@ absl::Status ClearTarget(const std::string& store_folder, const std::string& nam
   if (IsThere(DatabasePath(store_folder, name))) return MapExistsError(name);
   const std::string folder = MapFolder(store_folder, name);
   if (!IsThere(folder)) return absl::OkStatus();
+  if (IsLink(folder)) {
+    return MakeError(Reason::kMapExists,
+                     absl::StrCat("map \"", name, "\" does not exist, but ", folder,
+                                  " is a link; remove it, or choose another name"),
+                     {{"map", name}});
+  }
   std::error_code error;
   for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
     if (IsLeftByCreation(it->path().filename().string())) continue;
@@ -166,7 +199,7 @@ absl::Status ClearTarget(const std::string& store_folder, const std::string& nam
   const auto lock = WriterLock::Acquire(store_folder, name, kSettler);
   if (IsThere(DatabasePath(store_folder, name))) return MapExistsError(name);
   DSG_RETURN_IF_ERROR(lock.status());
-  return RemoveFolder(store_folder, name);
+  return RemoveFolder(store_folder, name).status();
 }
 
 absl::Status WriteName(Database& db, const std::string& name) {
@@ -244,8 +277,10 @@ absl::StatusOr<DropReport> DropMapFiles(const std::string& store_folder, const s
                        LockMap(store_folder, name, absl::StrCat("drop by ", program)));
   DropReport report;
   DSG_ASSIGN_OR_RETURN(report.head, CheckBeforeDrop(store_folder, name, condition));
-  report.bytes_on_disk = BytesOfFolder(MapFolder(store_folder, name));
-  DSG_RETURN_IF_ERROR(RemoveFolder(store_folder, name));
+  DSG_RETURN_IF_ERROR(CheckForOthersFiles(store_folder, name));
+  const int64_t bytes = BytesOfFolder(MapFolder(store_folder, name));
+  DSG_ASSIGN_OR_RETURN(const int64_t left, RemoveFolder(store_folder, name));
+  report.bytes_on_disk = bytes - left;
   return report;
 }
 

@@ -115,6 +115,38 @@ TEST_F(DroppedFiles, OfOthersStay) {
   EXPECT_TRUE(fs::exists(PathOf("office/graph.db")));
 }
 
+TEST_F(DroppedFiles, BesideThoseOfSomebodyElseStay) {
+  Write("office/notes/plan.txt", "mine");
+  const auto store = Open();
+  const absl::Status refused = store->DropMap(kMap, {}).status();
+  EXPECT_EQ(ReasonOf(refused), Reason::kNotAStore) << refused;
+  EXPECT_TRUE(absl::StrContains(refused.message(), "office/notes is no file of a map")) << refused;
+  EXPECT_EQ(HeadOf(*store, kMap), kLength);
+  fs::remove_all(PathOf("office/notes"));
+  EXPECT_TRUE(store->DropMap(kMap, {}).ok());
+}
+
+TEST_F(DroppedFiles, ThatAreLinksStay) {
+  TempFolder elsewhere;
+  fs::rename(PathOf("office/graph.db"), elsewhere.path() + "/graph.db");
+  fs::create_symlink(elsewhere.path() + "/graph.db", PathOf("office/graph.db"));
+  EXPECT_EQ(ReasonOf(Open()->DropMap(kMap, {}).status()), Reason::kNotAStore);
+  EXPECT_TRUE(fs::exists(elsewhere.path() + "/graph.db"));
+}
+
+TEST_F(DroppedFiles, AndALinkDoesNotMakeRoomForARenamedMap) {
+  TempFolder elsewhere;
+  fs::create_directory_symlink(elsewhere.path(), PathOf("attic"));
+  fs::create_directory_symlink(elsewhere.path() + "/nowhere", PathOf("cellar"));
+  const auto store = Open();
+  for (const std::string to : {"attic", "cellar"}) {
+    const absl::Status refused = store->RenameMap(kMap, to);
+    EXPECT_EQ(ReasonOf(refused), Reason::kMapExists) << refused;
+    EXPECT_TRUE(absl::StrContains(refused.message(), "is a link")) << refused;
+  }
+  EXPECT_EQ(HeadOf(*store, kMap), kLength);
+}
+
 TEST_F(DroppedFiles, ThatALinkLeadsToStay) {
   TempFolder elsewhere;
   fs::rename(PathOf("office"), elsewhere.path() + "/office");
@@ -140,6 +172,7 @@ TEST_F(DroppedFiles, OfADamagedMapGoUnlessSomethingIsExpectedOfIt) {
 TEST_F(DroppedFiles, OfACreationThatWasKilledMakeRoomForARenamedMap) {
   Write("attic/writer.lock", "create (process 1)\n");
   Write("attic/graph.db.new", "half a map");
+  Write("attic/graph.db.new-journal", "");
   const auto store = Open();
   OrDie(store->RenameMap(kMap, "attic"));
   EXPECT_EQ(Entries(), std::set<std::string>{"attic"});
