@@ -53,7 +53,7 @@ absl::Status ApplyFrameClock(const LogOptions& options, TrackTable* table) {
 
 absl::StatusOr<std::unique_ptr<LogSource>> MakeFrameLog(TrackTable table, const LogOptions& options,
                                                         LogInfo info) {
-  DSG_RETURN_IF_ERROR(CheckHasRows(table));
+  DSG_RETURN_IF_ERROR(CheckRows(table));
   DSG_RETURN_IF_ERROR(CheckOrder(table, "frame"));
   DSG_RETURN_IF_ERROR(ApplyFrameClock(options, &table));
   return MakeTrackLog(std::move(table), std::nullopt, std::move(info));

@@ -180,7 +180,7 @@ absl::StatusOr<std::optional<TrackTable>> ChoosePoses(const LogOptions& options,
   info->notes.push_back(absl::StrCat(
       "the robot's poses are ",
       choice == PoseChoice::kExternal ? "external: " : "the log's ground truth: ", table.file));
-  DSG_RETURN_IF_ERROR(CheckHasRows(table));
+  DSG_RETURN_IF_ERROR(CheckRows(table));
   DropRepeats(options.is_strict, &table, &info->notes);
   DSG_RETURN_IF_ERROR(CheckOrder(table, "time"));
   return table;

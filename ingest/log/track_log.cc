@@ -88,10 +88,16 @@ void TrackTable::AddPosition(TimeNs time_ns, int64_t line, int32_t agent,
        .map_T_agent = {.position = position, .orientation = Eigen::Quaterniond::Identity()}});
 }
 
-absl::Status CheckHasRows(const TrackTable& table) {
-  if (!table.rows.empty()) return absl::OkStatus();
+absl::Status CheckRows(const TrackTable& table) {
+  if (table.rows.empty()) {
+    return LinePosition{table.file, 1}.Error(
+        "the log holds no row; was the recording or the copy cut short?");
+  }
+  if (table.agents.size() <= kAgentsOfLogMax) return absl::OkStatus();
   return LinePosition{table.file, 1}.Error(
-      "the log holds no row; was the recording or the copy cut short?");
+      absl::StrCat("the log has ", table.agents.size(), " agents in ", table.rows.size(),
+                   " rows; a log may have ", kAgentsOfLogMax,
+                   ": split it by time, or look whether another column is the agent's id"));
 }
 
 absl::Status CheckOrder(const TrackTable& table, std::string_view unit) {
@@ -163,7 +169,7 @@ std::unique_ptr<LogSource> MakeTrackLog(TrackTable table, std::optional<GraphMea
 absl::StatusOr<std::unique_ptr<LogSource>> MakeClockLog(TrackTable table,
                                                         std::optional<GraphMeasurement> graph,
                                                         LogInfo info) {
-  DSG_RETURN_IF_ERROR(CheckHasRows(table));
+  DSG_RETURN_IF_ERROR(CheckRows(table));
   DSG_RETURN_IF_ERROR(CheckOrder(table, "time"));
   return MakeTrackLog(std::move(table), std::move(graph), std::move(info));
 }

@@ -45,8 +45,11 @@ struct TrackTable {
   absl::flat_hash_map<std::string, int32_t> index_;
 };
 
-/// Errors: FILE_MALFORMED when the log has no row.
-absl::Status CheckHasRows(const TrackTable& table);
+/// Each takes some 5 kB until the log is read.
+inline constexpr size_t kAgentsOfLogMax = 100'000;
+
+/// Errors: FILE_MALFORMED when the log has no row, or more agents than kAgentsOfLogMax.
+absl::Status CheckRows(const TrackTable& table);
 
 /// Times strictly grow per agent. `unit` is what a reader's times are: "time" or "frame".
 /// Errors: FILE_MALFORMED naming file, line, agent, both times and what to do.

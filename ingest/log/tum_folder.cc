@@ -140,7 +140,7 @@ class TumFolderReader {
       if (!IsFile(root_ / name)) continue;
       DSG_ASSIGN_OR_RETURN(const LogFile file, ReadFile(name));
       DSG_ASSIGN_OR_RETURN(TrackTable table, ReadTumPoses(file, RobotName(options_)));
-      DSG_RETURN_IF_ERROR(CheckHasRows(table));
+      DSG_RETURN_IF_ERROR(CheckRows(table));
       return table;
     }
     return std::nullopt;

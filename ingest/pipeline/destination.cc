@@ -22,6 +22,9 @@ class CountingWriter : public GraphWriter {
     if (!result.ok()) return result;
     // Others that commit in between leave the count behind for good.
     if (result->revision == own_head_ + 1) own_head_ = result->revision;
+    if (result->replayed) return result;
+    if (!committed_.has_value()) committed_ = {result->revision, result->revision};
+    committed_->last = result->revision;
     return result;
   }
   absl::StatusOr<SessionState> GetSession(const std::string& session_id) override {
@@ -30,10 +33,12 @@ class CountingWriter : public GraphWriter {
 
   /// All revisions up to this one are its own.
   Revision own_head() const { return own_head_; }
+  std::optional<RevisionRange> TakeCommitted() { return std::exchange(committed_, std::nullopt); }
 
  private:
   GraphWriter& writer_;
   Revision own_head_ = 0;
+  std::optional<RevisionRange> committed_;
 };
 
 // Of a drop that checks what the map is: false if it is something else by now.
@@ -58,6 +63,7 @@ class LocalDestination : public Destination {
 
   const MapSpec& spec() const override { return map_->spec(); }
   GraphWriter& writer() override { return counting_; }
+  std::optional<RevisionRange> TakeCommitted() override { return counting_.TakeCommitted(); }
   bool is_new() const override { return is_new_; }
   absl::StatusOr<bool> DropIfOwn(bool only_empty) override {
     if (!is_new_) return false;
@@ -88,6 +94,7 @@ class RemoteDestination : public Destination {
 
   const MapSpec& spec() const override { return map_->spec(); }
   GraphWriter& writer() override { return counting_; }
+  std::optional<RevisionRange> TakeCommitted() override { return counting_.TakeCommitted(); }
   bool is_new() const override { return map_->is_new(); }
   absl::StatusOr<bool> DropIfOwn(bool only_empty) override {
     if (!map_->is_new()) return false;

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "ingest/pipeline/map_view.h"
@@ -12,6 +13,12 @@
 #include "schema/store/graph_writer.h"
 
 namespace dsg::ingest {
+
+/// With those of others in between, if there are some.
+struct RevisionRange {
+  Revision first = 0;
+  Revision last = 0;
+};
 
 /// Threads: one caller at a time.
 class Destination {
@@ -21,6 +28,8 @@ class Destination {
   virtual GraphWriter& writer() = 0;
   /// The map as it is now.
   virtual absl::StatusOr<std::unique_ptr<MapView>> View() = 0;
+  /// What writer() has committed since the last call.
+  virtual std::optional<RevisionRange> TakeCommitted() = 0;
   /// Whether opening has made the map.
   virtual bool is_new() const = 0;
   /// Drops the map again if opening has made it, and nobody but writer() has committed to it; with

@@ -248,15 +248,35 @@ bool IsRefusal(const absl::Status& failure) {
          absl::IsOutOfRange(failure);
 }
 
+absl::Status WithEnd(const absl::Status& failure, const std::string& end) {
+  absl::Status told(failure.code(), absl::StrCat(failure.message(), end));
+  failure.ForEachPayload(
+      [&](absl::string_view url, const absl::Cord& payload) { told.SetPayload(url, payload); });
+  return told;
+}
+
+// What the log has brought before it failed stays in a map that had something else.
+absl::Status TellWhatStays(const absl::Status& failure, Destination* destination) {
+  const std::optional<RevisionRange> committed = destination->TakeCommitted();
+  if (!committed.has_value()) return failure;
+  const bool is_one = committed->first == committed->last;
+  return WithEnd(
+      failure,
+      absl::StrCat("; map \"", destination->spec().name, "\" keeps what was committed of the log, ",
+                   is_one ? "revision " : "revisions ", committed->first,
+                   is_one ? "" : absl::StrCat(" to ", committed->last),
+                   ": run the same again to go on, or take it back with `dsg revert ",
+                   committed->first - 1, "`"));
+}
+
 // After a failure nothing is left of a map that this run has made, if all that is in it comes from
 // a log that is refused and can be read again; after others what is committed stays, and the same
 // run goes on with it.
-absl::Status EndFailedRun(const absl::Status& failure, const std::string& path,
+absl::Status EndFailedRun(const absl::Status& failure, const std::string& path, bool is_first,
                           Destination* destination) {
   // Whether the last commit was made is open, or nobody answers.
-  if (destination == nullptr || !destination->is_new() || absl::IsUnavailable(failure)) {
-    return failure;
-  }
+  if (destination == nullptr || absl::IsUnavailable(failure)) return failure;
+  if (!is_first || !destination->is_new()) return TellWhatStays(failure, destination);
   // Somebody has dropped or renamed it meanwhile.
   const Reason reason = ReasonOf(failure);
   if (reason == Reason::kMapUnknown || reason == Reason::kMapReplaced) return failure;
@@ -275,10 +295,7 @@ absl::Status EndFailedRun(const absl::Status& failure, const std::string& path,
     end = absl::StrCat("; map \"", map, "\" keeps what is committed, remove it with `dsg drop ",
                        map, "` or run the same again to go on");
   }
-  absl::Status told(failure.code(), absl::StrCat(failure.message(), end));
-  failure.ForEachPayload(
-      [&](absl::string_view url, const absl::Cord& payload) { told.SetPayload(url, payload); });
-  return told;
+  return WithEnd(failure, end);
 }
 
 void Tell(const Flags& flags, const RunReport& report) {
@@ -341,8 +358,8 @@ absl::Status IngestOne(const Flags& flags, const std::string& path, LogOptions o
   }
   if (!summary.ok()) return summary.status();
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
-  Tell(flags, {path, log->info(), *summary, elapsed.count(), flags.is_dry_run});
   DSG_RETURN_IF_ERROR(CheckYield(log->info(), *summary));
+  Tell(flags, {path, log->info(), *summary, elapsed.count(), flags.is_dry_run});
   if (!flags.is_quiet && summary->mapping.has_value()) {
     for (const std::string& hint : HintsOnLostFrames(summary->mapping->skipped)) {
       std::fprintf(stderr, "%s: note: %s\n", path.c_str(), hint.c_str());
@@ -370,7 +387,10 @@ absl::Status Run(const Flags& flags) {
   for (const std::string& path : flags.logs) {
     const absl::Status status = IngestOne(flags, path, options, ingest_options, &destination);
     // What earlier logs have brought stays.
-    if (!status.ok()) return is_first ? EndFailedRun(status, path, destination.get()) : status;
+    if (!status.ok()) {
+      return flags.is_dry_run ? status : EndFailedRun(status, path, is_first, destination.get());
+    }
+    destination->TakeCommitted();
     is_first = false;
   }
   return absl::OkStatus();

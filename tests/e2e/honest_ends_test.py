@@ -89,6 +89,39 @@ class HonestEnds(support.ProgramsTest):
         self.assertIn("nowhere", done.stderr)
         self.assertGreater(self.head("two"), 0)
 
+    def test_a_log_that_fails_late_says_what_of_it_stays(self):
+        self.ok("dsg-ingest", "--store", "late", "--map", "home", self.small)
+        before = self.head("late")
+        with open(self.path("late.csv"), "w", encoding="utf-8") as f:
+            f.write("time_s,id,x,y,z\n")
+            for i in range(100):
+                f.write(f"{0.1 * i:.1f},visitor,{0.05 * i:.2f},1,0\n")
+            # Fifty years later: the clock was set while it ran.
+            f.write("1600000000,visitor,5,1,0\n")
+        late = ["--commit-poses", "10", "late.csv"]
+        said = self.refused(1, ["check the clock", "keeps what was committed",
+                                f"revisions {before + 1} to {before + 10}",
+                                f"dsg revert {before}"],
+                            "dsg-ingest", "--store", "late", "--map", "home", *late)
+        self.assertNotIn("not made", said)
+        self.assertEqual(before + 10, self.head("late"))
+        self.ok("dsg", "revert", "--store", "late", str(before))
+        self.assertEqual(0, int(self.ask("diff", "--store", "late", str(before),
+                                         str(self.head("late"))).get("pose_count", 0)))
+        # Nothing of it stays in a map that was made for it, and of a run in one piece.
+        for commit in ["10", "100000"]:
+            self.refused(1, ["check the clock", 'map "new" is not made'], "dsg-ingest", "--store",
+                         "late", "--map", "new", "--commit-poses", commit, "late.csv")
+        self.assertEqual(["home"], self.maps("--store", "late"))
+
+    def test_a_table_of_which_every_row_is_an_agent_is_refused(self):
+        with open(self.path("many.csv"), "w", encoding="utf-8") as f:
+            f.write("time_s,id,x,y,z\n")
+            f.writelines(f"{0.1 * i:.1f},{i},1,1,0\n" for i in range(100_001))
+        self.refused(1, ["100001 agents", "split it by time"], "dsg-ingest", "--store", "many", "--map",
+                     "many", "many.csv")
+        self.assertFalse(os.path.exists(self.path("many")))
+
     def test_through_a_server_a_log_that_gives_nothing_leaves_no_map_either(self):
         os.makedirs(self.path("served"))
         poses = self.sparse_poses("sparse3.csv")

@@ -3,6 +3,7 @@
 #include <random>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/log/track_log.h"
 #include "schema/base/status.h"
 #include "tests/unit/ingest/log/log_test_util.h"
 
@@ -173,14 +174,16 @@ TEST(CsvReader, NamesBadRows) {
   ExpectMalformed("time_ms,x,y\n1e300,0,0\n", "csv", {"field time", "1e-3"});
 }
 
-TEST(CsvReader, ReadsAMillionAgentsInBoundedTime) {
+TEST(CsvReader, ReadsManyAgentsAndNotTooMany) {
   std::string rows = "time,id,x,y\n";
-  constexpr int kAgents = 1'000'000;
-  for (int i = 0; i < kAgents; ++i) absl::StrAppend(&rows, "1,", i, ",0,0\n");
+  for (size_t i = 0; i < kAgentsOfLogMax; ++i) absl::StrAppend(&rows, "1,", i, ",0,0\n");
   const TempFolder folder;
   const auto log = OpenLog(folder.Write("log.csv", rows), {});
   ASSERT_TRUE(log.ok()) << log.status();
-  EXPECT_EQ((*log)->info().measurement_count, kAgents);
+  EXPECT_EQ((*log)->info().measurement_count, kAgentsOfLogMax);
+  rows += "1,one more,0,0\n";
+  const absl::Status refused = OpenLog(folder.Write("more.csv", rows), {}).status();
+  EXPECT_TRUE(absl::StrContains(refused.message(), "100001 agents in 100001 rows")) << refused;
 }
 
 TEST(PoseReaders, SurviveAnyCutAndAnyFlippedByte) {
