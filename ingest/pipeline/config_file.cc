@@ -4,6 +4,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <istream>
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "absl/strings/escaping.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
@@ -178,6 +180,15 @@ void CheckIsThere(const CLI::App& app) {
 }  // namespace
 
 void AddConfigFile(CLI::App* app) {
+  // Comparisons with "nan" are all false, those of range checks too.
+  for (CLI::Option* option : app->get_options()) {
+    if (option->get_type_name().rfind("FLOAT", 0) != 0) continue;
+    option->check([](const std::string& text) {
+      double number = 0.0;
+      if (!absl::SimpleAtod(text, &number) || std::isfinite(number)) return std::string();
+      return absl::StrCat(text, " is no number");
+    });
+  }
   app->set_config(absl::StrCat("--", kConfig), "",
                   "YAML file of options by their long names; the command line goes before it");
   app->config_formatter(std::make_shared<YamlConfig>(app));

@@ -11,7 +11,8 @@ class App;
 namespace dsg::ingest {
 
 /// Gives `app` the options --config FILE and --print-config, and all its named options as keys of
-/// that file. The command line goes before the file, the file before the environment.
+/// that file. Real numbers have to be finite. The command line goes before the file, the file
+/// before the environment.
 /// --print-config writes all options as they are in force, in the form of such a file, and ends the
 /// program with success; it needs none of the options that are required otherwise.
 ///

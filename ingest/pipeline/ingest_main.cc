@@ -42,8 +42,8 @@ struct Flags {
   SpaceLimits limits;
   std::string map;
   std::string format = "auto";
-  /// 0 = what the format is used to.
-  double frame_period_s = 0.0;
+  /// Unset = what the format is used to.
+  std::optional<double> frame_period_s;
   std::string agent_prefix;
   bool is_strict = false;
   std::string epoch;
@@ -150,14 +150,14 @@ absl::StatusOr<PoseSource> ParsePoseSource(const std::string& text) {
   return text == "external" ? PoseSource::kExternal : PoseSource::kAuto;
 }
 
-absl::Status SetFramePeriod(const Flags& flags, LogOptions* options) {
-  const double period_ns = flags.frame_period_s * static_cast<double>(kNsPerSecond);
+absl::Status SetFramePeriod(double period_s, LogOptions* options) {
+  const double period_ns = period_s * static_cast<double>(kNsPerSecond);
   // A day an annotation step is past any use, and keeps the product in range.
-  if (!(period_ns >= 1.0 && flags.frame_period_s <= 86400.0)) {
-    return MakeError(Reason::kFieldInvalid,
-                     absl::StrCat("--frame-period ", flags.frame_period_s,
-                                  " is no duration from 1e-9 to 86400 seconds"),
-                     {{"field", "frame-period"}, {"value", absl::StrCat(flags.frame_period_s)}});
+  if (!(period_ns >= 1.0 && period_s <= 86400.0)) {
+    return MakeError(
+        Reason::kFieldInvalid,
+        absl::StrCat("--frame-period ", period_s, " is no duration from 1e-9 to 86400 seconds"),
+        {{"field", "frame-period"}, {"value", absl::StrCat(period_s)}});
   }
   options->frame_period_ns = std::llround(period_ns);
   options->image_period_ns = options->frame_period_ns;
@@ -172,7 +172,9 @@ absl::StatusOr<LogOptions> MakeLogOptions(const Flags& flags) {
   DSG_ASSIGN_OR_RETURN(options.poses, ParsePoseSource(flags.poses));
   options.agent_prefix = flags.agent_prefix;
   options.is_strict = flags.is_strict;
-  if (flags.frame_period_s != 0.0) DSG_RETURN_IF_ERROR(SetFramePeriod(flags, &options));
+  if (flags.frame_period_s.has_value()) {
+    DSG_RETURN_IF_ERROR(SetFramePeriod(*flags.frame_period_s, &options));
+  }
   if (!flags.epoch.empty()) {
     DSG_ASSIGN_OR_RETURN(options.epoch_ns, ParseTime(flags.epoch, 0));
   }
@@ -409,6 +411,9 @@ int Main(int argc, char** argv) {
                "dsg-ingest");
   Flags flags;
   AddFlags(&app, &flags);
+  app.failure_message([](const CLI::App* program, const CLI::Error& error) {
+    return absl::StrCat(program->get_name(), ": ", CLI::FailureMessage::simple(program, error));
+  });
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "query/cli/session.h"
 
+#include <algorithm>
 #include <chrono>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "dsg/v1/map_service.pb.h"
 #include "query/client/remote_api.h"
 #include "query/service/service_core.h"
@@ -30,19 +34,21 @@ absl::StatusOr<std::unique_ptr<query::Api>> OpenApi(const CommonOptions& common)
   return query::MakeServiceCore(std::move(store));
 }
 
-absl::StatusOr<v1::MapSpec> OnlyMap(const v1::ListMapsResponse& reply, const std::string& place) {
-  if (reply.maps().empty()) {
+// One that cannot be opened is a map too: it is not passed over for another one.
+absl::StatusOr<std::string> OnlyMap(const v1::ListMapsResponse& reply, const std::string& place) {
+  std::vector<std::string> names(reply.unreadable_maps().begin(), reply.unreadable_maps().end());
+  for (const v1::MapSpec& map : reply.maps()) names.push_back(map.name());
+  if (names.empty()) {
     return MakeError(
         Reason::kMapUnknown,
         absl::StrCat(place, " has no maps yet; make one with dsg-ingest or dsg import"));
   }
-  if (reply.maps_size() == 1) return reply.maps(0);
-  std::string names;
-  for (const v1::MapSpec& map : reply.maps()) absl::StrAppend(&names, " ", map.name());
-  return MakeError(
-      Reason::kFieldInvalid,
-      absl::StrCat(place, " has ", reply.maps_size(), " maps; name one with --map:", names),
-      {{"field", "map"}});
+  if (names.size() == 1) return names.front();
+  std::sort(names.begin(), names.end());
+  return MakeError(Reason::kFieldInvalid,
+                   absl::StrCat(place, " has ", names.size(),
+                                " maps; name one with --map: ", absl::StrJoin(names, " ")),
+                   {{"field", "map"}});
 }
 
 }  // namespace
@@ -53,19 +59,17 @@ absl::Status Session::Open() {
 }
 
 absl::Status Session::ChooseMap() {
-  v1::MapSpec spec;
-  if (common_.map.empty()) {
-    v1::ListMapsResponse reply;
-    DSG_RETURN_IF_ERROR(api_->ListMaps(NewCall(), v1::ListMapsRequest(), &reply));
-    DSG_ASSIGN_OR_RETURN(spec, OnlyMap(reply, PlaceOf(common_)));
-  } else {
-    v1::GetMapStatsRequest request;
-    request.set_map(common_.map);
-    v1::GetMapStatsResponse reply;
-    DSG_RETURN_IF_ERROR(api_->GetMapStats(NewCall(), request, &reply));
-    spec = reply.map();
+  std::string name = common_.map;
+  if (name.empty()) {
+    v1::ListMapsResponse list;
+    DSG_RETURN_IF_ERROR(api_->ListMaps(NewCall(), v1::ListMapsRequest(), &list));
+    DSG_ASSIGN_OR_RETURN(name, OnlyMap(list, PlaceOf(common_)));
   }
-  DSG_ASSIGN_OR_RETURN(map_, FromProto(spec));
+  v1::GetMapStatsRequest request;
+  request.set_map(name);
+  v1::GetMapStatsResponse reply;
+  DSG_RETURN_IF_ERROR(api_->GetMapStats(NewCall(), request, &reply));
+  DSG_ASSIGN_OR_RETURN(map_, FromProto(reply.map()));
   times_ = TimeText(map_);
   return absl::OkStatus();
 }

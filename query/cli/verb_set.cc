@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The verb set: a person names a room or an object, or corrects its class. It is a patch of one
 // node, committed like any other change.
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/ingest_service.pb.h"
 #include "dsg/v1/query_service.pb.h"
@@ -14,6 +16,8 @@
 #include "query/cli/verb_list.h"
 #include "query/maintenance/commit.h"
 #include "schema/base/status.h"
+#include "schema/base/utf8.h"
+#include "schema/model/delta_check.h"
 #include "schema/model/node.h"
 
 namespace dsg::cli {
@@ -31,7 +35,21 @@ constexpr int kTriesMax = 20;
 // Of a class that no label image and no other node has numbered.
 constexpr int32_t kNoClass = -1;
 
+// One line of text, as lists print it.
+absl::Status CheckLine(const std::string& option, const std::optional<std::string>& text) {
+  if (!text.has_value()) return absl::OkStatus();
+  if (!IsUtf8(*text)) return Usage(option + " is not UTF-8", "set");
+  if (std::any_of(text->begin(), text->end(), [](char c) { return absl::ascii_iscntrl(c); })) {
+    return Usage(option + " has a line break or another control character in it", "set");
+  }
+  if (text->size() <= kNameLengthMax) return absl::OkStatus();
+  return Usage(absl::StrCat(option, " has ", text->size(), " bytes; a map takes ", kNameLengthMax),
+               "set");
+}
+
 absl::Status CheckSet(const SetVerb& verb, const CommonOptions&) {
+  DSG_RETURN_IF_ERROR(CheckLine("--name", verb.name));
+  DSG_RETURN_IF_ERROR(CheckLine("--class", verb.class_name));
   if (verb.name.has_value() || verb.class_name.has_value()) return absl::OkStatus();
   return Usage("say what to set: --name or --class", "set");
 }

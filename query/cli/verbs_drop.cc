@@ -16,6 +16,7 @@
 #include "query/cli/table.h"
 #include "query/cli/verb_list.h"
 #include "schema/base/status.h"
+#include "schema/model/ids.h"
 
 namespace dsg::cli {
 namespace {
@@ -103,14 +104,20 @@ absl::Status RunRename(Session* session, const RenameVerb& verb, std::ostream& o
   return absl::OkStatus();
 }
 
+absl::Status CheckRename(const RenameVerb& verb, const CommonOptions&) {
+  DSG_RETURN_IF_ERROR(CheckMapName(verb.from));
+  return CheckMapName(verb.to);
+}
+
 void AddDrop(Grammar* grammar) {
-  const auto [app, verb] =
-      grammar->Add<DropVerb>({.name = "drop",
-                              .what = "Remove a map with its history and all its files",
-                              .example = "office-copy --expect 3 --yes",
-                              .takes = kServer | kJson,
-                              .opens = Opens::kPlace,
-                              .run = RunDrop});
+  const auto [app, verb] = grammar->Add<DropVerb>(
+      {.name = "drop",
+       .what = "Remove a map with its history and all its files",
+       .example = "office-copy --expect 3 --yes",
+       .takes = kServer | kJson,
+       .opens = Opens::kPlace,
+       .run = RunDrop,
+       .check = [](const DropVerb& drop, const CommonOptions&) { return CheckMapName(drop.map); }});
   app->add_option("MAP", verb->map, "Name of the map")->required();
   app->add_option("--expect", verb->expected,
                   "Only if this is the map's newest revision; default any, or the one that the "
@@ -125,7 +132,8 @@ void AddRename(Grammar* grammar) {
                                                      .example = "office-copy attic",
                                                      .takes = kServer | kJson,
                                                      .opens = Opens::kPlace,
-                                                     .run = RunRename});
+                                                     .run = RunRename,
+                                                     .check = CheckRename});
   app->add_option("OLD", verb->from, "Name of the map")->required();
   app->add_option("NEW", verb->to, "Its new name, which no map has")->required();
 }

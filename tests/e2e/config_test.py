@@ -75,6 +75,13 @@ class Configuration(support.ProgramsTest):
         self.refused(2, ["rooms"], "dsg-ingest", "--config",
                      self.write("value.yaml", "rooms: round\n"), "--store", "none", "--map", "m",
                      self.small)
+        for option in ("mesh-seconds", "odometry-m-per-m", "detector-score"):
+            for number in ("nan", "inf"):
+                self.refused(2, ["dsg-ingest: --" + option, number], "dsg-ingest",
+                             "--" + option, number, "--store", "none", "--map", "m", self.small)
+        for period in ("0", "-1"):
+            self.refused(2, ["--frame-period " + period], "dsg-ingest", "--frame-period", period,
+                         "--store", "none", "--map", "m", self.small)
         self.assertFalse(os.path.exists(self.path("none")))
 
     def test_shipped_files_are_in_force(self):

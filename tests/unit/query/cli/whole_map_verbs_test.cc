@@ -4,6 +4,7 @@
 
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "query/cli/run.h"
@@ -99,6 +100,30 @@ TEST_F(WholeMapVerbs, DropAsksAndAScriptSaysYes) {
   ExpectRefused(1, "MAP_UNKNOWN", Ask({"drop", "office"}));
   const Json json = Json::parse(Ask({"drop", "attic", "--yes", "--json"}).out);
   EXPECT_EQ(json["head_revision"], "0");
+}
+
+TEST_F(WholeMapVerbs, NamesThatNoMapHasAreRefusedBeforeAnythingIsOpened) {
+  ExpectRefused(2, "is not allowed", Ask({"drop", "\xff", "--yes"}));
+  ExpectRefused(2, "is not allowed", Ask({"rename", "office", "\xff"}));
+  ExpectRefused(2, "is not allowed", Ask({"rename", "\xff", "office"}));
+}
+
+TEST_F(WholeMapVerbs, SetTakesOneLineOfText) {
+  ExpectRefused(2, "--name is not UTF-8", Set({"R1", "--name", "\xff"}));
+  ExpectRefused(2, "--name has a line break", Set({"R1", "--name", "kit\nchen"}));
+  ExpectRefused(2, "--class has 100000 bytes", Set({"O1", "--class", std::string(100'000, 'a')}));
+  EXPECT_EQ(Head(), 1);
+}
+
+TEST_F(WholeMapVerbs, AMapThatCannotBeOpenedIsNotPassedOver) {
+  std::ofstream(store_ + "/attic/graph.db", std::ios::binary) << "once a database";
+  ExpectRefused(2, "2 maps; name one with --map: attic office", Ask({"stats"}));
+  ASSERT_EQ(Ask({"drop", "office", "--yes"}).code, 0);
+  // Of the only map it is told what it has, and not that there is none.
+  const Outcome outcome = Ask({"stats"});
+  EXPECT_EQ(outcome.code, Ask({"stats", "--map", "attic"}).code);
+  EXPECT_EQ(outcome.errors, Ask({"stats", "--map", "attic"}).errors);
+  EXPECT_EQ(outcome.errors.find("no maps yet"), std::string::npos) << outcome.errors;
 }
 
 TEST_F(WholeMapVerbs, DropIsOfTheRevisionThatIsExpected) {
