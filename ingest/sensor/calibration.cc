@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ingest/sensor/calibration.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
@@ -13,9 +12,9 @@ namespace {
 // Of 80 degrees.
 constexpr double kTanHalfViewMax = 5.671;
 constexpr int kSideMax = 16384;
-// No lens of a robot looks through less than 0.06 degrees, nor so far past the picture's middle.
-constexpr double kFocalSidesMax = 1000.0;
-constexpr double kCenterSidesMax = 10.0;
+// Beyond those of any lens before the largest picture.
+constexpr double kFocalMaxPx = 1e7;
+constexpr double kCenterMaxPx = 1e5;
 constexpr int64_t kPixelsMax = 16'000'000;
 
 absl::Status Bad(const std::string& sensor, const std::string& field, double value,
@@ -85,15 +84,14 @@ absl::Status CameraCalibration::Validate() const {
                             " pixels, which is a view of 160 degrees"));
   }
   DSG_RETURN_IF_ERROR(CheckNotNegative(name, "rate_hz", rate_hz));
-  const double side = std::max(width, height);
   for (const auto& [field, value] : {std::pair("fx", fx), std::pair("fy", fy)}) {
-    const double most = kFocalSidesMax * side;
-    if (value > most) return Bad(name, field, value, absl::StrCat("at most ", most, " pixels"));
+    if (value <= kFocalMaxPx) continue;
+    return Bad(name, field, value, absl::StrCat("at most ", kFocalMaxPx, " pixels"));
   }
   for (const auto& [field, value] : {std::pair("cx", cx), std::pair("cy", cy)}) {
-    const double most = kCenterSidesMax * side;
-    if (std::abs(value) <= most) continue;
-    return Bad(name, field, value, absl::StrCat("within ", -most, " to ", most, " pixels"));
+    if (std::abs(value) <= kCenterMaxPx) continue;
+    return Bad(name, field, value,
+               absl::StrCat("within -", kCenterMaxPx, " to ", kCenterMaxPx, " pixels"));
   }
   const size_t count = distortion_coefficients.size();
   for (const double value : distortion_coefficients) {
