@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "ingest/log/bag.h"
+#include "ingest/log/bag_identity.h"
 #include "ingest/log/bag_topics.h"
 #include "ingest/log/bag_transforms.h"
 #include "ingest/log/detection_json.h"
@@ -222,10 +223,7 @@ class BagLog : public LogSource {
 
   absl::StatusOr<Measurement> ReadPose(const RosBytes& bytes, const BagTopic& topic,
                                        const std::string& origin) const {
-    const auto parse = topic.type == "nav_msgs/Odometry"           ? &ParseRosOdometry
-                       : topic.type == "geometry_msgs/PoseStamped" ? &ParseRosPoseStamped
-                                                                   : &ParseRosTransform;
-    DSG_ASSIGN_OR_RETURN(const RosPose pose, parse(bytes, origin));
+    DSG_ASSIGN_OR_RETURN(const RosPose pose, ParseRosPoseOf(topic.type, bytes, origin));
     DSG_ASSIGN_OR_RETURN(const Pose3d map_T_body, pose.ToPose(origin));
     return Measurement(
         PoseMeasurement{.agent_name = robot_name_,
@@ -384,22 +382,11 @@ void Count(const SensorChannel& channel, LogInfo* info) {
   info->measurement_count += count;
 }
 
-absl::StatusOr<std::string> Identity(const std::vector<std::string>& files, LogDigest digest,
-                                     bool has_other_file) {
-  for (const std::string& file : files) {
-    DSG_ASSIGN_OR_RETURN(const std::string hash, Sha256OfFile(file));
-    if (files.size() == 1 && !has_other_file) return hash;
-    const std::string name = std::filesystem::path(file).filename().string();
-    digest.AddSha256(files.size() == 1 ? "bag" : absl::StrCat("bag/", name), hash);
-  }
-  return digest.Hex();
-}
-
 }  // namespace
 
 OpenedLog OpenBag(const std::string& path, const LogOptions& options) {
   DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Bag> bag, OpenBagFiles(path));
-  DSG_ASSIGN_OR_RETURN(BagPlan plan, PlanBag(*bag));
+  DSG_ASSIGN_OR_RETURN(BagPlan plan, PlanBag(*bag, options.topics));
   LogInfo info;
   info.format = bag->format();
   info.path = path;
@@ -410,10 +397,11 @@ OpenedLog OpenBag(const std::string& path, const LogOptions& options) {
   LogDigest digest;
   DSG_ASSIGN_OR_RETURN(std::optional<TrackTable> poses,
                        PlanPoses(*bag, options, &plan, &digest, &info));
+  // While it still says which topic has the loop closures.
+  AddBagContent(*bag, plan, options.pose_file.empty() ? poses : std::nullopt, &digest);
   DSG_ASSIGN_OR_RETURN(std::optional<SensorChannel> loops,
                        ReadLoops(*bag, options, &plan, &digest, &info));
-  const bool has_other_file = !options.pose_file.empty() || !options.loop_file.empty();
-  DSG_ASSIGN_OR_RETURN(info.content_sha256, Identity(bag->files(), digest, has_other_file));
+  info.content_sha256 = digest.Hex();
   for (const BagTopic& topic : plan.topics) {
     if (topic.use == TopicUse::kNone) continue;
     info.channel_counts[topic.channel] += topic.message_count;

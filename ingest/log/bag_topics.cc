@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <set>
 
@@ -26,6 +27,7 @@ constexpr char kCompressedType[] = "sensor_msgs/CompressedImage";
 // What image_transport adds to the name of a topic.
 constexpr char kCompressed[] = "/compressed";
 constexpr char kCompressedDepth[] = "/compressedDepth";
+constexpr char kStringType[] = "std_msgs/String";
 constexpr char kLabelColors[] = "/tesse/seg_cam/rgb/image_raw";
 
 struct KnownTopic {
@@ -46,12 +48,43 @@ constexpr KnownTopic kKnown[] = {
     {kLabelColors, kImageType, TopicUse::kImage, "label0"},
     {"/tesse/imu/noisy/imu", "sensor_msgs/Imu", TopicUse::kImu, "imu0"},
     {"/tesse/odom", "nav_msgs/Odometry", TopicUse::kTruth, "poses"},
-    {"/dsg/detections", "std_msgs/String", TopicUse::kDetections, "detections0"},
-    {"/dsg/loop_closures", "std_msgs/String", TopicUse::kLoops, "loops0"},
+    {"/dsg/detections", kStringType, TopicUse::kDetections, "detections0"},
+    {"/dsg/loop_closures", kStringType, TopicUse::kLoops, "loops0"},
     {"/cam0/image_raw", kImageType, TopicUse::kImage, "cam0"},
     {"/cam1/image_raw", kImageType, TopicUse::kImage, "cam1"},
     {"/imu0", "sensor_msgs/Imu", TopicUse::kImu, "imu0"},
 };
+
+struct ChannelType {
+  const char* channel;
+  const char* type;
+  TopicUse use;
+};
+
+// What may be named for a channel. "truth" is the channel "poses" by another source.
+constexpr ChannelType kChannelTypes[] = {
+    {"cam0", kImageType, TopicUse::kImage},
+    {"cam0", kCompressedType, TopicUse::kCompressedImage},
+    {"cam1", kImageType, TopicUse::kImage},
+    {"cam1", kCompressedType, TopicUse::kCompressedImage},
+    {"color0", kImageType, TopicUse::kImage},
+    {"color0", kCompressedType, TopicUse::kCompressedImage},
+    {"depth0", kImageType, TopicUse::kImage},
+    {"depth0", kCompressedType, TopicUse::kCompressedImage},
+    {"label0", kImageType, TopicUse::kImage},
+    {"label0", kCompressedType, TopicUse::kCompressedImage},
+    {"imu0", "sensor_msgs/Imu", TopicUse::kImu},
+    {"poses", "nav_msgs/Odometry", TopicUse::kExternal},
+    {"poses", "geometry_msgs/PoseStamped", TopicUse::kExternal},
+    {"poses", "geometry_msgs/TransformStamped", TopicUse::kExternal},
+    {"truth", "nav_msgs/Odometry", TopicUse::kTruth},
+    {"truth", "geometry_msgs/PoseStamped", TopicUse::kTruth},
+    {"truth", "geometry_msgs/TransformStamped", TopicUse::kTruth},
+    {"detections0", kStringType, TopicUse::kDetections},
+    {"loops0", kStringType, TopicUse::kLoops},
+};
+
+using NamedTopics = std::map<std::string, std::string>;
 
 BagTopic* FindTopic(BagPlan* plan, std::string_view name) {
   for (BagTopic& topic : plan->topics) {
@@ -60,8 +93,10 @@ BagTopic* FindTopic(BagPlan* plan, std::string_view name) {
   return nullptr;
 }
 
-bool HasChannel(const BagPlan& plan, std::string_view channel) {
-  return std::any_of(plan.topics.begin(), plan.topics.end(),
+// Whether the channel has its topic, or is to have none.
+bool IsSettled(const BagPlan& plan, const NamedTopics& named, const std::string& channel) {
+  return named.contains(channel) ||
+         std::any_of(plan.topics.begin(), plan.topics.end(),
                      [&](const BagTopic& topic) { return topic.channel == channel; });
 }
 
@@ -97,10 +132,59 @@ absl::Status ListTopics(const Bag& bag, BagPlan* plan) {
   return absl::OkStatus();
 }
 
-void UseKnownTopics(BagPlan* plan) {
+absl::Status WrongTopic(const Bag& bag, const std::string& channel, const std::string& topic,
+                        const std::string& what) {
+  return MakeError(Reason::kFieldInvalid,
+                   absl::StrCat("--topic ", channel, "=", absl::Utf8SafeCHexEscape(topic), ": ",
+                                bag.path(), " ", what),
+                   {{"field", "topic"}, {"value", absl::StrCat(channel, "=", topic)}});
+}
+
+// Names of channels, or the types that one of them takes.
+std::string Listed(const std::function<const char*(const ChannelType&)>& word_of) {
+  std::set<std::string> words;
+  for (const ChannelType& known : kChannelTypes) {
+    if (const char* const word = word_of(known); word != nullptr) words.insert(word);
+  }
+  return absl::StrJoin(words, ", ");
+}
+
+absl::Status UseNamedTopic(const Bag& bag, const std::string& channel, const std::string& name,
+                           BagPlan* plan) {
+  const std::string types = Listed(
+      [&](const ChannelType& known) { return known.channel == channel ? known.type : nullptr; });
+  if (types.empty()) {
+    return WrongTopic(bag, channel, name,
+                      absl::StrCat("is read as channels ",
+                                   Listed([](const ChannelType& known) { return known.channel; })));
+  }
+  if (name == kNoTopic) return absl::OkStatus();
+  BagTopic* const topic = FindTopic(plan, name);
+  if (topic == nullptr) {
+    std::vector<const BagTopic*> all;
+    for (const BagTopic& other : plan->topics) all.push_back(&other);
+    return WrongTopic(bag, channel, name,
+                      absl::StrCat("does not have the topic; it has ", TopicNames(all)));
+  }
+  if (topic->use != TopicUse::kNone) {
+    return WrongTopic(bag, channel, name, "has one use for a topic; it is named for another one");
+  }
+  for (const ChannelType& known : kChannelTypes) {
+    if (known.channel != channel || known.type != topic->type) continue;
+    Use(known.use, known.use == TopicUse::kTruth ? "poses" : channel, topic);
+    return absl::OkStatus();
+  }
+  return WrongTopic(
+      bag, channel, name,
+      absl::StrCat("has messages of ", absl::Utf8SafeCHexEscape(topic->type.substr(0, 80)),
+                   " there; ", channel, " takes ", types));
+}
+
+void UseKnownTopics(const NamedTopics& named, BagPlan* plan) {
   for (const KnownTopic& known : kKnown) {
-    if (HasChannel(*plan, known.channel)) continue;
+    if (IsSettled(*plan, named, known.channel)) continue;
     BagTopic* topic = FindTopic(plan, known.name);
+    if (topic != nullptr && topic->use != TopicUse::kNone) continue;
     if (topic != nullptr && topic->type == known.type) {
       Use(known.use, known.channel, topic);
       continue;
@@ -113,7 +197,8 @@ void UseKnownTopics(BagPlan* plan) {
     for (const char* const ending : {kCompressedDepth, kCompressed}) {
       BagTopic* compressed = FindTopic(plan, absl::StrCat(known.name, ending));
       if (known.use == TopicUse::kImage && compressed != nullptr &&
-          compressed->type == kCompressedType && !HasChannel(*plan, known.channel)) {
+          compressed->use == TopicUse::kNone && compressed->type == kCompressedType &&
+          !IsSettled(*plan, named, known.channel)) {
         Use(TopicUse::kCompressedImage, known.channel, compressed);
       }
     }
@@ -122,8 +207,8 @@ void UseKnownTopics(BagPlan* plan) {
 
 // A topic that is the only one of its type needs no known name.
 void UseOnlyTopicOf(const std::string& type, TopicUse use, const std::string& channel,
-                    BagPlan* plan) {
-  if (HasChannel(*plan, channel)) return;
+                    const NamedTopics& named, BagPlan* plan) {
+  if (IsSettled(*plan, named, channel)) return;
   BagTopic* only = nullptr;
   for (BagTopic& topic : plan->topics) {
     if (topic.type != type || topic.use != TopicUse::kNone || topic.message_count == 0) continue;
@@ -186,13 +271,15 @@ absl::StatusOr<std::optional<std::string>> FirstEncoding(const Bag& bag, const B
 }
 
 // Cameras of unknown names, by what their first image is: one of depth, one of colour, one grey.
-absl::Status UseImagesByEncoding(const Bag& bag, BagPlan* plan) {
+absl::Status UseImagesByEncoding(const Bag& bag, const NamedTopics& named, BagPlan* plan) {
   TopicsByName by_name;
   for (const BagTopic& topic : plan->topics) by_name.emplace(topic.name, &topic);
   std::map<std::string, std::vector<BagTopic*>> topics_of_channel;
   for (BagTopic& topic : plan->topics) {
     if (topic.use == TopicUse::kImage || topic.use == TopicUse::kCompressedImage) {
-      return absl::OkStatus();
+      // Of a rig whose names are known all are.
+      if (!named.contains(topic.channel)) return absl::OkStatus();
+      continue;
     }
     const bool is_compressed = topic.type == kCompressedType;
     if (topic.type != kImageType && !is_compressed) continue;
@@ -202,7 +289,7 @@ absl::Status UseImagesByEncoding(const Bag& bag, BagPlan* plan) {
     if (encoding.has_value()) topics_of_channel[ChannelOfEncoding(*encoding)].push_back(&topic);
   }
   for (const auto& [channel, topics] : topics_of_channel) {
-    if (topics.size() != 1) continue;
+    if (topics.size() != 1 || IsSettled(*plan, named, channel)) continue;
     const bool is_compressed = topics.front()->type == kCompressedType;
     Use(is_compressed ? TopicUse::kCompressedImage : TopicUse::kImage, channel, topics.front());
     plan->notes.push_back(absl::StrCat("topic ", topics.front()->name, " is taken for ", channel,
@@ -215,7 +302,7 @@ absl::Status ReadLabels(const Bag& bag, BagPlan* plan) {
   LogFile file{.path = bag.path(), .name = "labels.csv", .bytes = {}};
   if (const BagTopic* topic = FindTopic(plan, "/dsg/labels"); topic != nullptr) {
     const std::optional<BagMessageRef>& first = plan->FirstOf(*topic);
-    if (first.has_value() && topic->type == "std_msgs/String") {
+    if (first.has_value() && topic->type == kStringType) {
       file.path = BagOrigin(bag, topic->name, 1);
       DSG_ASSIGN_OR_RETURN(const BagMessage message, bag.Read(*first));
       DSG_ASSIGN_OR_RETURN(const std::string_view text, ParseRosString(message.data, file.path));
@@ -278,17 +365,20 @@ std::string TopicNames(const std::vector<const BagTopic*>& topics) {
                       more > 0 ? absl::StrCat(" and ", more, " more") : "");
 }
 
-absl::StatusOr<BagPlan> PlanBag(const Bag& bag) {
+absl::StatusOr<BagPlan> PlanBag(const Bag& bag, const NamedTopics& named) {
   BagPlan plan;
   DSG_RETURN_IF_ERROR(ListTopics(bag, &plan));
-  UseKnownTopics(&plan);
+  for (const auto& [channel, topic] : named) {
+    DSG_RETURN_IF_ERROR(UseNamedTopic(bag, channel, topic, &plan));
+  }
+  UseKnownTopics(named, &plan);
   DSG_RETURN_IF_ERROR(ReadLabels(bag, &plan));
   DropLabelsWithoutTable(&plan);
-  DSG_RETURN_IF_ERROR(UseImagesByEncoding(bag, &plan));
-  UseOnlyTopicOf("sensor_msgs/Imu", TopicUse::kImu, "imu0", &plan);
+  DSG_RETURN_IF_ERROR(UseImagesByEncoding(bag, named, &plan));
+  UseOnlyTopicOf("sensor_msgs/Imu", TopicUse::kImu, "imu0", named, &plan);
   for (const char* type :
        {"nav_msgs/Odometry", "geometry_msgs/PoseStamped", "geometry_msgs/TransformStamped"}) {
-    UseOnlyTopicOf(type, TopicUse::kExternal, "poses", &plan);
+    UseOnlyTopicOf(type, TopicUse::kExternal, "poses", named, &plan);
   }
   DSG_RETURN_IF_ERROR(ReadBagCalibration(bag, &plan));
   NoteUnusedTopics(&plan);

@@ -56,9 +56,11 @@ struct BagPlan {
 };
 
 /// Looks at the names and types, and reads the messages that are sent once: camera infos, static
-/// transforms, labels (or labels.csv beside the bag).
-/// Errors: INVALID_ARGUMENT/FILE_MALFORMED naming the topic.
-absl::StatusOr<BagPlan> PlanBag(const Bag& bag);
+/// transforms, labels (or labels.csv beside the bag). `named` is LogOptions::topics.
+/// Errors: INVALID_ARGUMENT/FILE_MALFORMED naming the topic; FIELD_INVALID for a named topic that
+/// the bag does not have or that is of another type than its channel, and a channel that there is
+/// not.
+absl::StatusOr<BagPlan> PlanBag(const Bag& bag, const std::map<std::string, std::string>& named);
 
 /// "/imu0 (49 sensor_msgs/Imu), ... and 7 more", fit for a terminal.
 std::string TopicNames(const std::vector<const BagTopic*>& topics);

@@ -181,6 +181,10 @@ std::string FindEurocFile(const std::string& folder) {
   return "";
 }
 
+bool IsBagFormat(std::string_view format) {
+  return format == "rosbag" || format == "mcap" || format == "rosbag2";
+}
+
 bool IsBagBegin(std::string_view bytes) {
   return bytes.starts_with(kMcapMagic) || bytes.starts_with(kSqliteMagic) ||
          bytes.starts_with("#ROSBAG") || bytes.starts_with("#ROSRECORD");

@@ -25,6 +25,9 @@ absl::StatusOr<std::string> DetectFolderFormat(const std::string& folder);
 /// Errors: INVALID_ARGUMENT/FILE_MALFORMED for bags of version 1.
 absl::StatusOr<std::string> DetectBagFormat(const std::string& path);
 
+/// Whether a format is a recording of ROS messages.
+bool IsBagFormat(std::string_view format);
+
 /// Whether bytes begin like a bag of any version or kind.
 bool IsBagBegin(std::string_view bytes);
 

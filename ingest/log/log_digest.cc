@@ -6,7 +6,6 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
-#include <memory>
 #include <vector>
 
 #include "absl/strings/escaping.h"
@@ -16,6 +15,22 @@
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
+
+Sha256Stream::Sha256Stream() : context_(EVP_MD_CTX_new(), &EVP_MD_CTX_free) {
+  DSG_CHECK(context_ != nullptr);
+  DSG_CHECK(EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr) == 1);
+}
+
+void Sha256Stream::Add(std::string_view bytes) {
+  DSG_CHECK(EVP_DigestUpdate(context_.get(), bytes.data(), bytes.size()) == 1);
+}
+
+std::string Sha256Stream::Hex() {
+  unsigned char digest[EVP_MAX_MD_SIZE];
+  unsigned int size = 0;
+  DSG_CHECK(EVP_DigestFinal_ex(context_.get(), digest, &size) == 1);
+  return absl::BytesToHexString(absl::string_view(reinterpret_cast<const char*>(digest), size));
+}
 
 void LogDigest::Add(const std::string& name, std::string_view bytes) {
   parts_[name] = Sha256Hex(bytes);
@@ -34,25 +49,18 @@ std::string LogDigest::Hex() const {
 
 absl::StatusOr<std::string> Sha256OfFile(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
-  const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(),
-                                                                        &EVP_MD_CTX_free);
-  DSG_CHECK(context != nullptr);
-  DSG_CHECK(EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) == 1);
+  Sha256Stream hash;
   std::vector<char> buffer(size_t{1} << 20);
   while (in) {
     in.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
-    DSG_CHECK(EVP_DigestUpdate(context.get(), buffer.data(), static_cast<size_t>(in.gcount())) ==
-              1);
+    hash.Add({buffer.data(), static_cast<size_t>(in.gcount())});
   }
   if (!in.eof()) {
     return MakeError(Reason::kFieldInvalid,
                      absl::StrCat(path, ": cannot be read: ", std::strerror(errno)),
                      {{"field", "log"}, {"value", path}});
   }
-  unsigned char digest[EVP_MAX_MD_SIZE];
-  unsigned int size = 0;
-  DSG_CHECK(EVP_DigestFinal_ex(context.get(), digest, &size) == 1);
-  return absl::BytesToHexString(absl::string_view(reinterpret_cast<const char*>(digest), size));
+  return hash.Hex();
 }
 
 }  // namespace dsg::ingest

@@ -5,12 +5,27 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <string>
 #include <string_view>
 
 #include "absl/status/statusor.h"
 
+struct evp_md_ctx_st;
+
 namespace dsg::ingest {
+
+/// SHA-256 of bytes that come piece by piece.
+class Sha256Stream {
+ public:
+  Sha256Stream();
+  void Add(std::string_view bytes);
+  /// Hexadecimal; nothing may be added afterwards.
+  std::string Hex();
+
+ private:
+  std::unique_ptr<evp_md_ctx_st, void (*)(evp_md_ctx_st*)> context_;
+};
 
 /// A log of a single file has that file's SHA-256.
 class LogDigest {

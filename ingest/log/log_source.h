@@ -141,7 +141,12 @@ struct LogOptions {
   std::string pose_file;
   /// Loop closures to read instead of the log's; empty = the log's own.
   std::string loop_file;
+  /// Of bags: the topic of a channel ("depth0", "poses", ...), instead of the one that its name or
+  /// type tells; kNoTopic leaves the channel out.
+  std::map<std::string, std::string> topics;
 };
+
+inline constexpr char kNoTopic[] = "none";
 
 /// One log.
 ///

@@ -40,16 +40,18 @@ absl::Status CheckOptions(const LogOptions& options) {
   return absl::OkStatus();
 }
 
-bool IsBagFormat(const std::string& format) {
-  return format == "rosbag" || format == "mcap" || format == "rosbag2";
-}
-
-// A log that has no robot of its own would leave poses of another out without a word.
-absl::Status CheckPoseOptions(const std::string& path, const std::string& format,
-                              const LogOptions& options) {
-  if (format == "euroc" || format == "rgbd" || format == "tum-rgbd" || IsBagFormat(format)) {
-    return absl::OkStatus();
+// A log that has no topics, or no robot of its own, would leave these options out without a word.
+absl::Status CheckSensorOptions(const std::string& path, const std::string& format,
+                                const LogOptions& options) {
+  if (IsBagFormat(format)) return absl::OkStatus();
+  if (!options.topics.empty()) {
+    const auto& [channel, topic] = *options.topics.begin();
+    return MakeError(Reason::kFieldInvalid,
+                     absl::StrCat(path, ": a ", format, " log has no topics; leave --topic ",
+                                  channel, "=", topic, " out"),
+                     {{"field", "topic"}, {"value", absl::StrCat(channel, "=", topic)}});
   }
+  if (format == "euroc" || format == "rgbd" || format == "tum-rgbd") return absl::OkStatus();
   if (!options.loop_file.empty()) {
     return MakeError(Reason::kFieldInvalid,
                      absl::StrCat(path, ": a ", format,
@@ -105,7 +107,7 @@ OpenedLog OpenInput(const std::string& path, const LogOptions& options) {
   if (format == "auto") {
     DSG_ASSIGN_OR_RETURN(format, DetectFileFormat(file.bytes, file.path));
   }
-  DSG_RETURN_IF_ERROR(CheckPoseOptions(file.path, format, options));
+  DSG_RETURN_IF_ERROR(CheckSensorOptions(file.path, format, options));
   return OpenFile(file, format, options);
 }
 
@@ -132,7 +134,7 @@ OpenedLog OpenFolder(const std::string& folder, const LogOptions& options) {
   if (format == "auto") {
     DSG_ASSIGN_OR_RETURN(format, DetectFolderFormat(folder));
   }
-  DSG_RETURN_IF_ERROR(CheckPoseOptions(folder, format, options));
+  DSG_RETURN_IF_ERROR(CheckSensorOptions(folder, format, options));
   if (format == "dsg-tracks") return OpenTracks(folder, options);
   if (format == "euroc") return OpenEuroc(folder, options);
   if (format == "rgbd" && FindRgbdLayout(folder) != RgbdLayout::kNone) {

@@ -150,6 +150,13 @@ absl::StatusOr<RosPose> ParseRosTransform(const RosBytes& message, const std::st
   return pose;
 }
 
+absl::StatusOr<RosPose> ParseRosPoseOf(std::string_view type, const RosBytes& message,
+                                       const std::string& origin) {
+  if (type == "nav_msgs/Odometry") return ParseRosOdometry(message, origin);
+  if (type == "geometry_msgs/PoseStamped") return ParseRosPoseStamped(message, origin);
+  return ParseRosTransform(message, origin);
+}
+
 absl::StatusOr<std::vector<RosPose>> ParseRosTransforms(const RosBytes& message,
                                                         const std::string& origin) {
   RosFields fields(message);

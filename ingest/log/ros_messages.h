@@ -100,6 +100,9 @@ absl::StatusOr<RosImu> ParseRosImu(const RosBytes& message, const std::string& o
 absl::StatusOr<RosPose> ParseRosOdometry(const RosBytes& message, const std::string& origin);
 absl::StatusOr<RosPose> ParseRosPoseStamped(const RosBytes& message, const std::string& origin);
 absl::StatusOr<RosPose> ParseRosTransform(const RosBytes& message, const std::string& origin);
+/// Of the three types above, by name.
+absl::StatusOr<RosPose> ParseRosPoseOf(std::string_view type, const RosBytes& message,
+                                       const std::string& origin);
 absl::StatusOr<std::vector<RosPose>> ParseRosTransforms(const RosBytes& message,
                                                         const std::string& origin);
 /// A view into the message.

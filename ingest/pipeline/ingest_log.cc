@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/log/format.h"
 #include "ingest/pipeline/log_run.h"
 #include "ingest/pipeline/session.h"
 #include "schema/base/status.h"
@@ -51,8 +52,10 @@ bool HasLoops(const LogInfo& info) { return info.channel_counts.contains("loops0
 
 SessionHeader MakeHeader(const LogInfo& info, const LogOptions& log_options,
                          const IngestOptions& options, const MapSpec& spec) {
+  // A recording is the same log in any kind of file.
+  const bool is_bag = IsBagFormat(info.format);
   const SessionConfig config{
-      .format = info.format,
+      .format = is_bag ? "bag" : info.format,
       .epoch_ns = log_options.epoch_ns,
       .frame_period_ns =
           info.format == "rgbd" ? log_options.image_period_ns : log_options.frame_period_ns,
@@ -68,15 +71,17 @@ SessionHeader MakeHeader(const LogInfo& info, const LogOptions& log_options,
                                  : "",
       .robot_model =
           options.robot_model.has_value() ? ToHex(options.robot_model->asset.sha256) : "",
+      .topics = log_options.topics,
       .is_size_bounded = options.is_size_bounded && HasLoops(info)};
   // The file's name alone: where it lies on this machine is no property of the log.
-  std::string name = std::filesystem::path(info.path).filename().string();
+  const std::filesystem::path path(info.path);
+  std::string name = (is_bag ? path.stem() : path.filename()).string();
   // File names may be any bytes; a map holds text only.
   if (!IsUtf8(name)) name = "a file whose name is not UTF-8";
   return {.map = spec.name,
           .session_id = SessionId(info.content_sha256, config),
           .author = options.author,
-          .message = absl::StrCat(name, " (", info.format, ")"),
+          .message = absl::StrCat(name, " (", config.format, ")"),
           .config_digest = config.Digest()};
 }
 

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
 #include "ingest/log/format.h"
 #include "ingest/log/log_source.h"
 #include "ingest/log/peeked_log.h"
@@ -51,6 +52,7 @@ struct Flags {
   std::string poses = "auto";
   std::string pose_file;
   std::string loop_file;
+  std::vector<std::string> topics;
   std::string robot_cad;
   double odometry_m_per_m = RobotGraphOptions().odometry_m_per_m;
   double odometry_rad_per_m = RobotGraphOptions().odometry_rad_per_m;
@@ -64,8 +66,13 @@ struct Flags {
   std::vector<std::string> logs;
 };
 
-// How the robot moved, and in which frame.
+// Which topics of a bag, how the robot moved, and in which frame.
 void AddRobotFlags(CLI::App* app, Flags* flags) {
+  app->add_option("--topic", flags->topics,
+                  "Topic of a bag's channel, as depth0=/camera/depth, where its name and type do "
+                  "not tell: cam0, cam1, color0, depth0, label0, imu0, poses, truth, detections0, "
+                  "loops0; CHANNEL=none leaves the channel out; may be given several times")
+      ->allow_extra_args(false);
   app->add_option("--poses", flags->poses,
                   "Whose poses of the robot a sensor log is taken with: gt (its ground truth), "
                   "external (other software's), auto (external if there are some) or vio (our own, "
@@ -164,11 +171,26 @@ absl::Status SetFramePeriod(double period_s, LogOptions* options) {
   return absl::OkStatus();
 }
 
+absl::Status SetTopics(const std::vector<std::string>& topics, LogOptions* options) {
+  for (const std::string& text : topics) {
+    const std::pair<std::string, std::string> named = absl::StrSplit(text, absl::MaxSplits('=', 1));
+    const bool is_whole = !named.first.empty() && !named.second.empty();
+    if (is_whole && options->topics.insert(named).second) continue;
+    return MakeError(Reason::kFieldInvalid,
+                     absl::StrCat("--topic ", text,
+                                  is_whole ? ": the channel has a topic already"
+                                           : " is no CHANNEL=TOPIC, as depth0=/camera/depth"),
+                     {{"field", "topic"}, {"value", text}});
+  }
+  return absl::OkStatus();
+}
+
 absl::StatusOr<LogOptions> MakeLogOptions(const Flags& flags) {
   LogOptions options;
   options.format = flags.format;
   options.pose_file = flags.pose_file;
   options.loop_file = flags.loop_file;
+  DSG_RETURN_IF_ERROR(SetTopics(flags.topics, &options));
   DSG_ASSIGN_OR_RETURN(options.poses, ParsePoseSource(flags.poses));
   options.agent_prefix = flags.agent_prefix;
   options.is_strict = flags.is_strict;

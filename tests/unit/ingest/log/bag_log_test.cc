@@ -178,6 +178,63 @@ TEST(BagLog, TakesUnknownTopicsThatCanOnlyBeOneThing) {
   EXPECT_TRUE(HasNote(log->info, "the only one of type sensor_msgs/Imu"));
 }
 
+TEST(BagLog, TakesTheTopicsThatAreNamed) {
+  const TempFolder folder;
+  BagWriter bag;
+  bag.Add("/left/imu", "sensor_msgs/Imu", 1, ImuMessage(kT0, 1.0, 0));
+  bag.Add("/right/imu", "sensor_msgs/Imu", 1, ImuMessage(kT0, 2.0, 0));
+  bag.Add("/front", kImage, 1, ImageMessage(kT0, "16UC1", 1, 1, 2, "\x10\x27"));
+  bag.Add("/back", kImage, 1, ImageMessage(kT0, "16UC1", 1, 1, 2, "\x20\x4e"));
+  bag.Add("/colour", kImage, 1, ImageMessage(kT0, "rgb8", 1, 1, 3, "abc"));
+  bag.Add("/odom", "nav_msgs/Odometry", 1, OdometryMessage(kT0, {1, 2, 3, 0, 0, 0, 1}));
+  const std::string path = folder.Write("log.bag", bag.Finish());
+  // Of two that could be it, none is guessed.
+  const auto guessed = ReadAll(path);
+  ASSERT_TRUE(guessed.ok()) << guessed.status();
+  EXPECT_EQ(guessed->info.channel_counts,
+            (std::map<std::string, int64_t>{{"color0", 1}, {"poses", 1}}));
+  LogOptions options;
+  options.topics = {{"imu0", "/right/imu"}, {"depth0", "/back"}, {"truth", "/odom"}};
+  const auto log = ReadAll(path, options);
+  ASSERT_TRUE(log.ok()) << log.status();
+  ASSERT_EQ(log->imu.size(), 1u);
+  EXPECT_EQ(log->imu[0].angular_velocity_rad_s.x(), 2.0);
+  EXPECT_EQ(log->ImageCount("depth0"), 1);
+  EXPECT_EQ(log->ImageCount("color0"), 1);
+  EXPECT_TRUE(HasNote(log->info, "ground truth: /odom"));
+  EXPECT_NE(log->info.content_sha256, guessed->info.content_sha256);
+  options.topics = {{"color0", "none"}, {"poses", "none"}, {"imu0", "/left/imu"}};
+  const auto less = ReadAll(path, options);
+  ASSERT_TRUE(less.ok()) << less.status();
+  EXPECT_EQ(less->info.channel_counts, (std::map<std::string, int64_t>{{"imu0", 1}}));
+}
+
+TEST(BagLog, RefusesTopicsThatAreNamedWrongly) {
+  const TempFolder folder;
+  const std::string path = folder.Write("log.bag", FullBag().Finish());
+  const auto expect_refused = [&](const std::map<std::string, std::string>& topics,
+                                  const std::string& words) {
+    LogOptions options;
+    options.topics = topics;
+    const absl::Status refused = ReadAll(path, options).status();
+    EXPECT_EQ(ReasonOf(refused), Reason::kFieldInvalid) << refused;
+    EXPECT_NE(refused.message().find(words), std::string::npos) << refused;
+  };
+  expect_refused({{"depth0", "/nowhere"}}, "does not have the topic; it has ");
+  expect_refused({{"depth1", "/tesse/odom"}}, "is read as channels cam0, cam1, color0");
+  expect_refused({{"depth0", "/tesse/odom"}},
+                 "has messages of nav_msgs/Odometry there; depth0 takes "
+                 "sensor_msgs/CompressedImage, sensor_msgs/Image");
+  expect_refused({{"poses", "/tesse/odom"}, {"truth", "/tesse/odom"}}, "one use for a topic");
+  LogOptions options;
+  options.topics = {{"depth0", "/depth"}};
+  const absl::Status refused =
+      OpenLog(folder.Write("log.txt", "1.5 1 2 3 0 0 0 1\n2.5 1 2 3 0 0 0 1\n"), options).status();
+  EXPECT_NE(refused.message().find("has no topics; leave --topic depth0=/depth out"),
+            std::string::npos)
+      << refused;
+}
+
 TEST(BagLog, ReadsCompressedImages) {
   const TempFolder folder;
   std::vector<uint8_t> png;

@@ -66,11 +66,39 @@ TEST(Ros2Bag, GivesTheLogThatTheRos1BagGives) {
     ASSERT_TRUE(log.ok()) << log.status();
     EXPECT_EQ(log->info.format, format);
     ExpectSameLog(*log, *ros1);
+    EXPECT_EQ(log->info.content_sha256, ros1->info.content_sha256);
     LogOptions options;
     options.format = format;
     EXPECT_TRUE(ReadAll(path, options).ok());
     options.format = "rosbag";
     ExpectMalformedFile(ReadAll(path, options).status(), {format, "not rosbag"});
+  }
+}
+
+TEST(Ros2Bag, IsTheSameLogAsLongAsNothingThatIsReadDiffers) {
+  const TempFolder folder;
+  const auto hash_of = [&](const Recording& recording) {
+    const auto log = ReadAll(folder.Write("log.mcap", WriteMcap(recording)));
+    EXPECT_TRUE(log.ok()) << log.status();
+    return log->info.content_sha256;
+  };
+  const Recording recording = SmallRecording(CdrWriter(), 5);
+  const std::string hash = hash_of(recording);
+  Recording with_others = recording;
+  with_others.push_back({"/rosout", "rcl_interfaces/msg/Log", kT0, "anything"});
+  EXPECT_EQ(hash_of(with_others), hash);
+  // A nanosecond of the stamp behind the four bytes of CDR and the seconds, and a last pixel.
+  constexpr size_t kStampAt = 8;
+  for (size_t i = 0; i < recording.size(); ++i) {
+    const RecordedMessage& message = recording[i];
+    if (message.type == "std_msgs/String" || message.time_ns == kT0) continue;
+    std::vector<size_t> places = {kStampAt};
+    if (message.type == "sensor_msgs/Image") places.push_back(message.data.size() - 1);
+    for (const size_t at : places) {
+      Recording changed = recording;
+      changed[i].data[at] = static_cast<char>(changed[i].data[at] ^ 1);
+      EXPECT_NE(hash_of(changed), hash) << message.topic << " byte " << at;
+    }
   }
 }
 
