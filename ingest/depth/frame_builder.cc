@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/depth/cloud_views.h"
 #include "ingest/depth/dynamic_mask.h"
 #include "ingest/depth/pinhole.h"
 
@@ -88,6 +89,9 @@ FrameBuilder::FrameBuilder(const RigCalibration& rig, const DepthOptions& option
     depth_camera_ = *depth;
     camera_ = WithoutDistortion(*depth);
     depth_map_.emplace(camera_, *depth);
+  } else if (depth == nullptr && rig_.lidar.has_value() && rig_.lidar->Validate().ok()) {
+    source_ = FramePlanner::Source::kLidar;
+    return;
   } else if (depth == nullptr && left != nullptr && right != nullptr) {
     absl::StatusOr<StereoDepth> stereo = StereoDepth::Make(*left, *right, options.range_m);
     if (!stereo.ok()) return;
@@ -111,16 +115,30 @@ void FrameBuilder::AddOverlay(const RigCalibration& rig, const std::string& chan
   overlays_.emplace(channel, std::move(overlay));
 }
 
-BuiltFrame FrameBuilder::Build(const FramePlan& plan) const {
+BuiltFrame FrameBuilder::BuildViews(const FramePlan& plan) const {
   BuiltFrame built;
-  DepthFrame& frame = built.frame.emplace();
+  Image points;
+  if (!Load(plan.main, "", &points, &built)) return built;
+  if (points.format != PixelFormat::kPoints32) {
+    built.skips.push_back("no depth image");
+    return built;
+  }
+  built.frames = ViewsOfCloud(points, plan.time_ns, plan.map_T_body * rig_.lidar->body_T_lidar);
+  if (built.frames.empty()) built.skips.push_back("no points");
+  return built;
+}
+
+BuiltFrame FrameBuilder::Build(const FramePlan& plan) const {
+  if (source_ == FramePlanner::Source::kLidar) return BuildViews(plan);
+  BuiltFrame built;
+  DepthFrame& frame = built.frames.emplace_back();
   frame.time_ns = plan.time_ns;
   frame.camera = camera_;
   frame.map_T_camera = plan.map_T_body * camera_.body_T_camera;
   frame.map_T_camera.orientation.normalize();
   frame.is_stereo = stereo_.has_value();
   if (!(stereo_.has_value() ? FillStereo(plan, &built) : FillDepth(plan, &built))) {
-    built.frame.reset();
+    built.frames.clear();
     return built;
   }
   FillColor(plan, &built);
@@ -140,7 +158,7 @@ bool FrameBuilder::FillDepth(const FramePlan& plan, BuiltFrame* built) const {
     built->skips.push_back("size differs from calibration");
     return false;
   }
-  std::vector<float>& depth_m = built->frame->depth_m;
+  std::vector<float>& depth_m = built->frames.front().depth_m;
   depth_m.resize(depth_map_->pixel_count());
   for (size_t i = 0; i < depth_m.size(); ++i) {
     const int32_t from = (*depth_map_)[i];
@@ -158,7 +176,7 @@ bool FrameBuilder::FillStereo(const FramePlan& plan, BuiltFrame* built) const {
     built->skips.push_back("size differs from calibration");
     return false;
   }
-  built->frame->depth_m = *std::move(depth_m);
+  built->frames.front().depth_m = *std::move(depth_m);
   return true;
 }
 
@@ -188,7 +206,7 @@ void FrameBuilder::FillColor(const FramePlan& plan, BuiltFrame* built) const {
   const Overlay* overlay = OverlayFor(plan.color->channel, image, "colour", built);
   if (overlay == nullptr) return;
   const size_t stride = image.format == PixelFormat::kRgb8 ? 3 : 1;
-  std::vector<uint8_t>& rgb = built->frame->rgb;
+  std::vector<uint8_t>& rgb = built->frames.front().rgb;
   rgb.assign(3 * overlay->map->pixel_count(), 0);
   for (size_t i = 0; i < overlay->map->pixel_count(); ++i) {
     const int32_t from = (*overlay->map)[i];
@@ -208,7 +226,7 @@ void FrameBuilder::FillLabels(const FramePlan& plan, BuiltFrame* built) const {
   }
   const Overlay* overlay = OverlayFor("label0", image, "labels", built);
   if (overlay == nullptr) return;
-  std::vector<uint16_t>& labels = built->frame->labels;
+  std::vector<uint16_t>& labels = built->frames.front().labels;
   labels.assign(overlay->map->pixel_count(), 0);
   for (size_t i = 0; i < labels.size(); ++i) {
     const int32_t from = (*overlay->map)[i];

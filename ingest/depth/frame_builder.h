@@ -14,9 +14,9 @@
 namespace dsg::ingest {
 
 struct BuiltFrame {
-  /// Missing when there is no depth; `skips` says why.
-  std::optional<DepthFrame> frame;
-  /// Why the frame, its colour or its labels are missing.
+  /// One, or the views of a lidar's scan; none when there is no depth, `skips` says why.
+  std::vector<DepthFrame> frames;
+  /// Why a frame, its colour or its labels are missing.
   std::vector<std::string> skips;
 };
 
@@ -37,7 +37,9 @@ class FrameBuilder {
     std::optional<PixelMap> map;
   };
 
+  BuiltFrame BuildViews(const FramePlan& plan) const;
   void AddOverlay(const RigCalibration& rig, const std::string& channel);
+  /// Into the one frame of `built`, these and those below.
   bool FillDepth(const FramePlan& plan, BuiltFrame* built) const;
   bool FillStereo(const FramePlan& plan, BuiltFrame* built) const;
   /// Null, and a reason in `built`, if the picture cannot be laid over the depth.

@@ -3,6 +3,7 @@
 
 #include <deque>
 #include <future>
+#include <iterator>
 #include <utility>
 
 #include "ingest/depth/frame_builder.h"
@@ -37,16 +38,11 @@ class FrameMaker::Impl {
   }
 
   std::optional<DepthFrame> Next() {
-    Start();
-    // One frame stays behind: it is built while the caller uses the one before.
-    while (building_.size() > (planner_.is_finished() ? 0u : 1u)) {
-      BuiltFrame built = building_.front().get();
-      building_.pop_front();
-      Start();
-      for (const std::string& reason : built.skips) ++built_skips_[reason];
-      if (built.frame.has_value()) return std::move(built.frame);
-    }
-    return std::nullopt;
+    if (ready_.empty()) FillReady();
+    if (ready_.empty()) return std::nullopt;
+    DepthFrame frame = std::move(ready_.front());
+    ready_.pop_front();
+    return frame;
   }
 
   const SkipCounts& skips() {
@@ -58,8 +54,23 @@ class FrameMaker::Impl {
  private:
   static constexpr size_t kBuildingMax = 2;
 
+  // With what the next picture gives that gives anything.
+  void FillReady() {
+    Start();
+    // One frame stays behind: it is built while the caller uses the one before.
+    while (building_.size() > (planner_.is_finished() ? 0u : 1u)) {
+      BuiltFrame built = building_.front().get();
+      building_.pop_front();
+      Start();
+      for (const std::string& reason : built.skips) ++built_skips_[reason];
+      std::move(built.frames.begin(), built.frames.end(), std::back_inserter(ready_));
+      if (!ready_.empty()) return;
+    }
+  }
+
   const FrameBuilder builder_;
   FramePlanner planner_;
+  std::deque<DepthFrame> ready_;
   SkipCounts built_skips_;
   SkipCounts all_skips_;
   // Last: its threads end before what they use goes.

@@ -38,14 +38,15 @@ struct DepthOptions {
 };
 
 /// What could not be used, by reason, in words for the user. Frames: "no depth image", "no right
-/// image", "no pose", "pose jump", "size differs from calibration", "broken image", "out of order".
-/// Frames that came without colour or labels: "colour left out: ...", "labels left out: ..." and
-/// why. Poses: "broken pose".
+/// image", "no points", "no pose", "pose jump", "size differs from calibration", "broken image",
+/// "out of order". Frames that came without colour or labels: "colour left out: ...", "labels left
+/// out: ..." and why. Poses: "broken pose".
 using SkipCounts = std::map<std::string, int64_t>;
 
 /// Put in what the log says, in its order; take out frames once all they need is there.
 ///
-/// Depth is depth0's, of the left image of cam0 and cam1 if the rig has no depth0. Colour and
+/// Depth is depth0's; without one lidar0's, whose scans give a frame for each side on which there
+/// are points (ViewsOfCloud); without that of the left image of cam0 and cam1. Colour and
 /// labels are those of the nearest stamp within 20 ms and half the depth period, laid over the
 /// depth pixel by pixel if their camera stands in the same place (5 mm); cam0 stands in for a
 /// missing color0. Depth of a camera with distortion is rectified to a pinhole of the same size. No
@@ -61,7 +62,7 @@ class FrameMaker {
   /// An image as a log gives it.
   struct Picture {
     TimeNs time_ns = 0;
-    /// "cam0", "cam1", "color0", "depth0", "label0"; others are ignored.
+    /// "cam0", "cam1", "color0", "depth0", "label0", "lidar0"; others are ignored.
     std::string channel;
     std::string origin;
     std::function<absl::StatusOr<Image>()> load;
@@ -70,7 +71,8 @@ class FrameMaker {
   FrameMaker(const RigCalibration& rig, const DepthOptions& options);
   ~FrameMaker();
 
-  /// True when the rig can give depth at all: a depth camera, or two rectifiable grey ones.
+  /// True when the rig can give depth at all: a depth camera, a lidar, or two rectifiable grey
+  /// cameras.
   bool CanMakeFrames() const;
 
   void AddPicture(Picture picture);
@@ -78,7 +80,7 @@ class FrameMaker {
   void AddPose(TimeNs time_ns, const Pose3d& map_T_body);
   void AddDetection(const HumanDetection& detection);
 
-  /// The next frame, ascending in time; nullopt when more of the log is needed. After Finish,
+  /// The next frame; times do not descend. nullopt when more of the log is needed. After Finish,
   /// nullopt means that there are no more.
   std::optional<DepthFrame> Next();
   /// No more of the log will come.

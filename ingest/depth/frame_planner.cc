@@ -15,10 +15,11 @@ constexpr TimeNs kPairToleranceNs = 2'000'000;
 // Of each channel. A picture that waits is a few hundred bytes.
 constexpr size_t kWaitingMax = 10'000;
 
-constexpr const char* kMainOf[] = {"", "depth0", "cam0"};
+constexpr const char* kMainOf[] = {"", "depth0", "cam0", "lidar0"};
 
 bool IsKnownChannel(const std::string& channel) {
-  static constexpr const char* kChannels[] = {"cam0", "cam1", "color0", "depth0", "label0"};
+  static constexpr const char* kChannels[] = {"cam0",   "cam1",   "color0",
+                                              "depth0", "label0", "lidar0"};
   return std::find(std::begin(kChannels), std::end(kChannels), channel) != std::end(kChannels);
 }
 

@@ -19,7 +19,7 @@ namespace dsg::ingest {
 struct FramePlan {
   TimeNs time_ns = 0;
   Pose3d map_T_body;
-  /// depth0, or cam0 of a stereo pair.
+  /// depth0, cam0 of a stereo pair, or lidar0.
   FrameMaker::Picture main;
   /// cam1 of a stereo pair.
   std::optional<FrameMaker::Picture> right;
@@ -34,7 +34,7 @@ struct FramePlan {
 /// Threads: one caller at a time.
 class FramePlanner {
  public:
-  enum class Source { kNone, kDepth, kStereo };
+  enum class Source { kNone, kDepth, kStereo, kLidar };
 
   /// `rate_hz` is that of the depth camera, 0 = unknown.
   FramePlanner(Source source, double rate_hz, const DepthOptions& options);

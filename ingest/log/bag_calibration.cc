@@ -117,6 +117,12 @@ class Extrinsics {
   bool has_moving_ = false;
 };
 
+std::string NotPlaced(const std::string& frame, const std::string& channel) {
+  return absl::StrCat("no fixed transform leads from the robot's body to \"",
+                      absl::Utf8SafeCHexEscape(frame.substr(0, 64)), "\": ", channel,
+                      " is taken to sit at the body");
+}
+
 absl::Status AddCamera(const Bag& bag, const BagTopic& image, Extrinsics* extrinsics,
                        BagPlan* plan) {
   const std::string name = FindInfoTopic(*plan, image);
@@ -129,9 +135,7 @@ absl::Status AddCamera(const Bag& bag, const BagTopic& image, Extrinsics* extrin
   if (body_T_camera.has_value()) {
     camera->body_T_camera = *body_T_camera;
   } else {
-    plan->notes.push_back(absl::StrCat("no fixed transform leads from the robot's body to \"",
-                                       absl::Utf8SafeCHexEscape(frame.substr(0, 64)),
-                                       "\": ", image.channel, " is taken to sit at the body"));
+    plan->notes.push_back(NotPlaced(frame, image.channel));
   }
   const absl::Status valid = camera->Validate();
   if (!valid.ok()) {
@@ -140,6 +144,24 @@ absl::Status AddCamera(const Bag& bag, const BagTopic& image, Extrinsics* extrin
                      {{"file", bag.path()}, {"topic", name}});
   }
   plan->rig.cameras.push_back(*std::move(camera));
+  return absl::OkStatus();
+}
+
+absl::Status AddLidar(const Bag& bag, const BagTopic& cloud, Extrinsics* extrinsics,
+                      BagPlan* plan) {
+  const std::optional<BagMessageRef>& first = plan->FirstOf(cloud);
+  if (!first.has_value()) return absl::OkStatus();
+  DSG_ASSIGN_OR_RETURN(const BagMessage message, bag.Read(*first));
+  DSG_ASSIGN_OR_RETURN(const RosHeader header,
+                       ParseRosHeader(message.data, BagOrigin(bag, cloud.name, 1)));
+  DSG_ASSIGN_OR_RETURN(const std::optional<Pose3d> body_T_lidar, extrinsics->Find(header.frame_id));
+  LidarCalibration& lidar = plan->rig.lidar.emplace();
+  lidar.name = cloud.channel;
+  if (body_T_lidar.has_value()) {
+    lidar.body_T_lidar = *body_T_lidar;
+  } else {
+    plan->notes.push_back(NotPlaced(header.frame_id, cloud.channel));
+  }
   return absl::OkStatus();
 }
 
@@ -162,6 +184,9 @@ absl::Status ReadBagCalibration(const Bag& bag, BagPlan* plan) {
   Extrinsics extrinsics(bag);
   std::set<std::string> channels;
   for (const BagTopic& topic : plan->topics) {
+    if (topic.use == TopicUse::kCloud) {
+      DSG_RETURN_IF_ERROR(AddLidar(bag, topic, &extrinsics, plan));
+    }
     if (topic.use != TopicUse::kImage && topic.use != TopicUse::kCompressedImage) continue;
     channels.insert(topic.channel);
     DSG_RETURN_IF_ERROR(AddCamera(bag, topic, &extrinsics, plan));

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/log/ros_cloud.h"
 
 namespace dsg::ingest {
 namespace {
@@ -50,6 +51,10 @@ std::string HashOf(const BagPlan& plan) {
                 static_cast<int>(camera.distortion_coefficients.size()));
     hash.Pose(camera.body_T_camera);
   }
+  if (plan.rig.lidar.has_value()) {
+    hash.Text(plan.rig.lidar->name);
+    hash.Pose(plan.rig.lidar->body_T_lidar);
+  }
   for (const SemanticLabel& label : plan.labels) {
     hash.Numbers64(int64_t{label.id});
     hash.Text(label.name);
@@ -76,6 +81,15 @@ bool AddCompressed(const RosBytes& data, ContentHash* hash) {
   hash->Numbers64(image->header.stamp_ns);
   hash->Text(image->format);
   hash->Text(image->data);
+  return true;
+}
+
+bool AddCloud(const RosBytes& data, ContentHash* hash) {
+  const absl::StatusOr<RosHeader> header = ParseRosHeader(data, "");
+  const absl::StatusOr<Image> points = ParseRosPointCloud(data, "");
+  if (!header.ok() || !points.ok()) return false;
+  hash->Numbers64(header->stamp_ns);
+  hash->Text({reinterpret_cast<const char*>(points->bytes.data()), points->bytes.size()});
   return true;
 }
 
@@ -109,6 +123,8 @@ bool AddMessage(const BagTopic& topic, const RosBytes& data, ContentHash* hash) 
       return AddImage(data, hash);
     case TopicUse::kCompressedImage:
       return AddCompressed(data, hash);
+    case TopicUse::kCloud:
+      return AddCloud(data, hash);
     case TopicUse::kImu:
       return AddImu(data, hash);
     case TopicUse::kDetections:

@@ -16,6 +16,7 @@
 #include "ingest/log/detection_json.h"
 #include "ingest/log/image_file.h"
 #include "ingest/log/loop_file.h"
+#include "ingest/log/ros_cloud.h"
 #include "ingest/log/ros_image.h"
 #include "ingest/log/ros_messages.h"
 #include "ingest/log/sensor_log.h"
@@ -39,6 +40,11 @@ struct Key {
 
   auto operator<=>(const Key&) const = default;
 };
+
+// Of pixels, which are not read before somebody asks for them.
+bool IsImage(TopicUse use) {
+  return use == TopicUse::kImage || use == TopicUse::kCompressedImage || use == TopicUse::kCloud;
+}
 
 ChannelRank RankOf(TopicUse use) {
   switch (use) {
@@ -201,7 +207,7 @@ class BagLog : public LogSource {
 
   absl::StatusOr<Measurement> Read(const BagMessageRef& ref, const BagTopic& topic,
                                    const std::string& origin) const {
-    const bool is_image = topic.use == TopicUse::kImage || topic.use == TopicUse::kCompressedImage;
+    const bool is_image = IsImage(topic.use);
     DSG_ASSIGN_OR_RETURN(const BagMessage message,
                          bag_->Read(ref, is_image ? kImageHeadBytes : SIZE_MAX));
     if (is_image) {
@@ -239,12 +245,12 @@ class BagLog : public LogSource {
                              const std::string& origin) const {
     ImageMeasurement image{
         .time_ns = time_ns, .channel = topic.channel, .origin = origin, .load = {}};
-    const bool is_compressed = topic.use == TopicUse::kCompressedImage;
     // The bag stays open as long as somebody may ask for the image.
     image.load = [bag = bag_, classes = class_of_color_, ref, decoding = topic.decoding, origin,
-                  is_compressed]() -> absl::StatusOr<Image> {
+                  use = topic.use]() -> absl::StatusOr<Image> {
       DSG_ASSIGN_OR_RETURN(const BagMessage message, bag->Read(ref));
-      if (is_compressed) {
+      if (use == TopicUse::kCloud) return ParseRosPointCloud(message.data, origin);
+      if (use == TopicUse::kCompressedImage) {
         DSG_ASSIGN_OR_RETURN(const RosCompressedImage compressed,
                              ParseRosCompressedImage(message.data, origin));
         return ToImage(compressed, decoding, origin);
@@ -275,9 +281,7 @@ bool HasUse(const BagPlan& plan, TopicUse use) {
                      [use](const BagTopic& topic) { return topic.use == use; });
 }
 
-bool IsSensor(TopicUse use) {
-  return use == TopicUse::kImu || use == TopicUse::kImage || use == TopicUse::kCompressedImage;
-}
+bool IsSensor(TopicUse use) { return use == TopicUse::kImu || IsImage(use); }
 
 // By the headers of the first and last message of each sensor; what cannot be read is left for the
 // reader of the log to report.

@@ -27,6 +27,7 @@ constexpr char kCompressedType[] = "sensor_msgs/CompressedImage";
 // What image_transport adds to the name of a topic.
 constexpr char kCompressed[] = "/compressed";
 constexpr char kCompressedDepth[] = "/compressedDepth";
+constexpr char kCloudType[] = "sensor_msgs/PointCloud2";
 constexpr char kStringType[] = "std_msgs/String";
 constexpr char kLabelColors[] = "/tesse/seg_cam/rgb/image_raw";
 
@@ -73,6 +74,7 @@ constexpr ChannelType kChannelTypes[] = {
     {"depth0", kCompressedType, TopicUse::kCompressedImage},
     {"label0", kImageType, TopicUse::kImage},
     {"label0", kCompressedType, TopicUse::kCompressedImage},
+    {"lidar0", kCloudType, TopicUse::kCloud},
     {"imu0", "sensor_msgs/Imu", TopicUse::kImu},
     {"poses", "nav_msgs/Odometry", TopicUse::kExternal},
     {"poses", "geometry_msgs/PoseStamped", TopicUse::kExternal},
@@ -375,6 +377,7 @@ absl::StatusOr<BagPlan> PlanBag(const Bag& bag, const NamedTopics& named) {
   DSG_RETURN_IF_ERROR(ReadLabels(bag, &plan));
   DropLabelsWithoutTable(&plan);
   DSG_RETURN_IF_ERROR(UseImagesByEncoding(bag, named, &plan));
+  UseOnlyTopicOf(kCloudType, TopicUse::kCloud, "lidar0", named, &plan);
   UseOnlyTopicOf("sensor_msgs/Imu", TopicUse::kImu, "imu0", named, &plan);
   for (const char* type :
        {"nav_msgs/Odometry", "geometry_msgs/PoseStamped", "geometry_msgs/TransformStamped"}) {

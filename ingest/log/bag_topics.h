@@ -20,6 +20,7 @@ enum class TopicUse {
   kNone,
   kImage,
   kCompressedImage,
+  kCloud,
   kImu,
   kTruth,
   kExternal,

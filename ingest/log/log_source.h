@@ -45,7 +45,7 @@ struct ImuMeasurement {
 /// An image, not decoded until asked for.
 struct ImageMeasurement {
   TimeNs time_ns = 0;
-  /// "cam0" (left), "cam1" (right), "color0", "depth0", "label0".
+  /// "cam0" (left), "cam1" (right), "color0", "depth0", "label0", "lidar0" (points).
   std::string channel;
   /// File or bag and message, for messages.
   std::string origin;

@@ -32,7 +32,7 @@ std::string_view NameOf(PoseSource source) {
 }
 
 bool HasMapping(const LogInfo& info, const IngestOptions& options) {
-  return options.mapping.is_on && !info.rig.cameras.empty();
+  return options.mapping.is_on && info.rig.HasEyes();
 }
 
 bool HasPeople(const LogInfo& info, const IngestOptions& options) {
@@ -125,7 +125,7 @@ absl::StatusOr<IngestSummary> IngestLog(LogSource& log, const LogOptions& log_op
                            DetectorFeed::Make(log.info(), *options.people.detector));
     }
   }
-  if (!log.info().rig.cameras.empty() || parts.has_loops) parts.robot.emplace(options.robot_graph);
+  if (log.info().rig.HasEyes() || parts.has_loops) parts.robot.emplace(options.robot_graph);
   LogRun run(
       std::move(parts), map,
       DeltaSink(std::move(header), session.last_sequence, options.is_size_bounded, map, writer));

@@ -68,10 +68,11 @@ struct Flags {
 
 // Which topics of a bag, how the robot moved, and in which frame.
 void AddRobotFlags(CLI::App* app, Flags* flags) {
-  app->add_option("--topic", flags->topics,
-                  "Topic of a bag's channel, as depth0=/camera/depth, where its name and type do "
-                  "not tell: cam0, cam1, color0, depth0, label0, imu0, poses, truth, detections0, "
-                  "loops0; CHANNEL=none leaves the channel out; may be given several times")
+  app->add_option(
+         "--topic", flags->topics,
+         "Topic of a bag's channel, as depth0=/camera/depth, where its name and type do "
+         "not tell: cam0, cam1, color0, depth0, label0, lidar0, imu0, poses, truth, detections0, "
+         "loops0; CHANNEL=none leaves the channel out; may be given several times")
       ->allow_extra_args(false);
   app->add_option("--poses", flags->poses,
                   "Whose poses of the robot a sensor log is taken with: gt (its ground truth), "

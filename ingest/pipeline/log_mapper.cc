@@ -67,6 +67,7 @@ LogMapper::LogMapper(const LogInfo& info, const MappingOptions& options,
     : labels_(LabelsOf(info, info.channel_counts.contains("label0"))),
       mesh_block_size_m_(mesh_block_size_m),
       has_depth_camera_(info.channel_counts.contains("depth0")),
+      has_lidar_(info.rig.lidar.has_value()),
       has_color_camera_(info.channel_counts.contains("color0")),
       frames_(info.rig, WithClasses(options, labels_).depth),
       layers_(WithClasses(options, labels_), labels_, numbering),
@@ -74,6 +75,7 @@ LogMapper::LogMapper(const LogInfo& info, const MappingOptions& options,
 
 bool LogMapper::Uses(std::string_view channel) const {
   if (channel == "label0") return true;
+  if (!has_depth_camera_ && has_lidar_) return channel == "lidar0";
   if (!has_depth_camera_) return channel == "cam0" || channel == "cam1" || channel == "color0";
   return channel == "depth0" || channel == "color0" || (channel == "cam0" && !has_color_camera_);
 }

@@ -89,6 +89,7 @@ class LogMapper {
   std::vector<SemanticLabel> labels_;
   double mesh_block_size_m_;
   bool has_depth_camera_;
+  bool has_lidar_;
   bool has_color_camera_;
   bool is_closed_ = false;
   bool is_begun_ = false;

@@ -116,6 +116,10 @@ absl::Status ImuCalibration::Validate() const {
   return CheckPose(name, "body_T_imu", body_T_imu);
 }
 
+absl::Status LidarCalibration::Validate() const {
+  return CheckPose(name, "body_T_lidar", body_T_lidar);
+}
+
 const CameraCalibration* RigCalibration::FindCamera(std::string_view name) const {
   for (const CameraCalibration& camera : cameras) {
     if (camera.name == name) return &camera;

@@ -56,11 +56,24 @@ struct ImuCalibration {
   absl::Status Validate() const;
 };
 
+/// A scanner of any number of beams.
+struct LidarCalibration {
+  /// The channel it belongs to: "lidar0".
+  std::string name;
+  /// Lidar: x forward, y left, z up (REP 103).
+  Pose3d body_T_lidar;
+
+  absl::Status Validate() const;
+};
+
 struct RigCalibration {
   /// Ascending by name; names differ.
   std::vector<CameraCalibration> cameras;
   std::optional<ImuCalibration> imu;
+  std::optional<LidarCalibration> lidar;
 
+  /// Whether anything of it measures distances or can: a camera or a lidar.
+  bool HasEyes() const { return !cameras.empty() || lidar.has_value(); }
   /// Null when there is none of that name.
   const CameraCalibration* FindCamera(std::string_view name) const;
 };

@@ -27,6 +27,8 @@ int BytesPerPixel(PixelFormat format) {
       return 3;
     case PixelFormat::kDepth32:
       return 4;
+    case PixelFormat::kPoints32:
+      return 12;
   }
   DSG_CHECK(false && "no such pixel format");
   return 0;
@@ -44,6 +46,8 @@ std::string_view Name(PixelFormat format) {
       return "depth16";
     case PixelFormat::kDepth32:
       return "depth32";
+    case PixelFormat::kPoints32:
+      return "points32";
   }
   DSG_CHECK(false && "no such pixel format");
   return "";
@@ -57,6 +61,13 @@ float DepthAt(const Image& image, int column, int row) {
   float metres = 0.0f;
   std::memcpy(&metres, image.bytes.data() + image.Offset(column, row), sizeof metres);
   return metres > 0.0f && metres <= kDepthMaxM ? metres : 0.0f;
+}
+
+Eigen::Vector3f PointAt(const Image& image, int column, int row) {
+  DSG_CHECK(image.format == PixelFormat::kPoints32);
+  Eigen::Vector3f point;
+  std::memcpy(point.data(), image.bytes.data() + image.Offset(column, row), 3 * sizeof(float));
+  return point;
 }
 
 uint16_t LabelAt(const Image& image, int column, int row) {

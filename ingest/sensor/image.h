@@ -3,6 +3,7 @@
 // Refuses to know files, codecs or libraries of computer vision.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <string_view>
 #include <vector>
@@ -20,6 +21,9 @@ enum class PixelFormat {
   kDepth16,
   /// Four bytes, IEEE float: metres along the optical axis, 0 or NaN = no reading.
   kDepth32,
+  /// Twelve bytes, three IEEE floats: a point in the sensor's frame, x forward, y left, z up,
+  /// metres; NaN = no reading. The pixels of an unordered cloud are one row.
+  kPoints32,
 };
 
 /// Bytes of one pixel.
@@ -47,6 +51,8 @@ inline constexpr float kDepthMaxM = 1000.0f;
 /// Metres along the optical axis; 0 = no reading, or one beyond kDepthMaxM. Requires: kDepth16 or
 /// kDepth32, inside.
 float DepthAt(const Image& image, int column, int row);
+/// Metres, in the sensor's frame; NaN = no reading. Requires: kPoints32, inside.
+Eigen::Vector3f PointAt(const Image& image, int column, int row);
 /// class << 8 | instance. Requires: kLabel16, inside.
 uint16_t LabelAt(const Image& image, int column, int row);
 

@@ -8,6 +8,7 @@
 #include "tests/unit/ingest/log/bag_writer.h"
 #include "tests/unit/ingest/log/detection_lines.h"
 #include "tests/unit/ingest/log/log_test_util.h"
+#include "tests/unit/ingest/log/ros2_writer.h"
 
 namespace dsg::ingest {
 namespace {
@@ -176,6 +177,24 @@ TEST(BagLog, TakesUnknownTopicsThatCanOnlyBeOneThing) {
   ASSERT_EQ(log->ImageCount("depth0"), 1);
   EXPECT_EQ(DepthAt(*log->images[0].load(), 0, 0), 10.0f);
   EXPECT_TRUE(HasNote(log->info, "the only one of type sensor_msgs/Imu"));
+}
+
+TEST(BagLog, TakesTheOnlyLidarWithWhereItSits) {
+  const TempFolder folder;
+  BagWriter bag;
+  bag.Add("/tf_static", "tf2_msgs/TFMessage", 1,
+          ByteWriter().U32(1).bytes() +
+              TransformBytes(kT0, "base_link", "velodyne", {0.1, 0, 0.6, 0, 0, 0, 1}));
+  bag.Add("/points", "sensor_msgs/PointCloud2", 1,
+          CloudFields(ByteWriter(), kT0, "velodyne", {{1, 2, 3}}));
+  bag.Add("/odom", "nav_msgs/Odometry", 1, OdometryMessage(kT0, {1, 2, 3, 0, 0, 0, 1}));
+  const auto log = ReadAll(folder.Write("log.bag", bag.Finish()));
+  ASSERT_TRUE(log.ok()) << log.status();
+  ASSERT_EQ(log->ImageCount("lidar0"), 1);
+  EXPECT_EQ(PointAt(*log->images[0].load(), 0, 0), Eigen::Vector3f(1, 2, 3));
+  EXPECT_TRUE(HasNote(log->info, "/points, the only one of type sensor_msgs/PointCloud2"));
+  ASSERT_TRUE(log->info.rig.lidar.has_value());
+  EXPECT_EQ(log->info.rig.lidar->body_T_lidar.position, Eigen::Vector3d(0.1, 0, 0.6));
 }
 
 TEST(BagLog, TakesTheTopicsThatAreNamed) {

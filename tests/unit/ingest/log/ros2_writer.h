@@ -10,6 +10,7 @@
 #include <zstd.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -114,6 +115,24 @@ std::string TransformsFields(Writer out, const std::vector<std::string>& childre
     out.Header(1, "base_link_gt").String(child).Doubles({0, y, 0, 0.5, -0.5, 0.5, -0.5});
     y = -y;
   }
+  return out.bytes();
+}
+
+/// x, y, z as floats behind four other bytes.
+template <typename Writer>
+std::string CloudFields(Writer out, TimeNs time_ns, const std::string& frame,
+                        const std::vector<std::array<float, 3>>& points) {
+  out.Header(time_ns, frame).U32(1).U32(points.size()).U32(4);
+  int offset = 0;
+  for (const std::string name : {"intensity", "x", "y", "z"}) {
+    out.String(name).U32(offset).U8(7).U32(1);
+    offset += 4;
+  }
+  std::string data;
+  for (const std::array<float, 3>& point : points) {
+    data += "####" + std::string(reinterpret_cast<const char*>(point.data()), 12);
+  }
+  out.U8(0).U32(16).U32(data.size()).Blob(data).U8(1);
   return out.bytes();
 }
 
