@@ -70,7 +70,7 @@ absl::StatusOr<Cloud> ReadCloud(const RosBytes& message, const std::string& orig
   return cloud;
 }
 
-absl::Status Check(const Cloud& cloud, const std::string& origin) {
+absl::Status CheckCloud(const Cloud& cloud, const std::string& origin) {
   for (size_t axis = 0; axis < 3; ++axis) {
     const std::string name(1, "xyz"[axis]);
     const std::optional<PointField>& field = cloud.xyz[axis];
@@ -119,7 +119,7 @@ float Coordinate(const Cloud& cloud, const char* point, const PointField& field)
 
 absl::StatusOr<Image> ParseRosPointCloud(const RosBytes& message, const std::string& origin) {
   DSG_ASSIGN_OR_RETURN(const Cloud cloud, ReadCloud(message, origin));
-  DSG_RETURN_IF_ERROR(Check(cloud, origin));
+  DSG_RETURN_IF_ERROR(CheckCloud(cloud, origin));
   Image image{.width = 0, .height = 1, .format = PixelFormat::kPoints32, .bytes = {}};
   image.bytes.reserve(size_t{12} * cloud.width * cloud.height);
   for (uint32_t row = 0; row < cloud.height; ++row) {
