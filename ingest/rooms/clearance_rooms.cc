@@ -16,6 +16,7 @@ DividedPlan ClearanceRegions(const OccupancyGrid& plan, const RoomOptions& optio
   DivideOptions divide;
   divide.clearance_m = options.section_clearance_m;
   divide.room_m2_min = options.room_m2_min;
+  divide.close_open_rooms = true;
   DividedPlan divided = DivideAtGaps(plan, divide);
   // Given to a neighbour, not opened to all: two rooms would meet through a corner between them.
   const double cell_m2 = plan.frame.cell_m * plan.frame.cell_m;

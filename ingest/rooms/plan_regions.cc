@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "ingest/rooms/open_rooms.h"
+
 namespace dsg::ingest {
 namespace {
 
@@ -100,7 +102,8 @@ DividedPlan DivideAtGaps(const OccupancyGrid& plan, const DivideOptions& options
     CloseGap(gap, &closed);
     ++kept_count;
   }
-  if (kept_count == gaps.size()) return divided;
+  if (options.close_open_rooms) CloseOpenRooms(FindBlocks(plan), &closed);
+  if (kept_count == gaps.size() && !options.close_open_rooms) return divided;
   divided.closed = std::move(closed);
   divided.regions = LabelClear(divided.closed, options);
   return divided;

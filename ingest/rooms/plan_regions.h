@@ -33,6 +33,8 @@ struct DivideOptions {
   /// Cells nearer to obstacles than this belong to no component.
   double clearance_m = 0.2;
   double room_m2_min = 1.0;
+  /// Bays that stand open to a corridor are rooms too (CloseOpenRooms).
+  bool close_open_rooms = false;
   WallGapOptions gaps;
 };
 

@@ -19,38 +19,6 @@ constexpr double kThickM = 0.45;
 constexpr double kShortM = 2.6;
 constexpr double kFilled = 0.6;
 
-// Marks the occupied cells that are no walls.
-std::vector<uint8_t> FindBlocks(const OccupancyGrid& plan) {
-  const GridFrame& frame = plan.frame;
-  std::vector<uint8_t> state(plan.cells.size(), 0);
-  std::vector<int64_t> open;
-  for (size_t start = 0; start < state.size(); ++start) {
-    if (plan.cells[start] != Occupancy::kOccupied || state[start] != 0) continue;
-    Eigen::AlignedBox2i box;
-    open.assign(1, static_cast<int64_t>(start));
-    state[start] = 1;
-    for (size_t next = 0; next < open.size(); ++next) {
-      const Eigen::Vector3i at = frame.Cell(open[next]);
-      box.extend(Eigen::Vector2i(at.head<2>()));
-      for (int side = 0; side < 9; ++side) {
-        const Eigen::Vector3i cell(at.x() + side % 3 - 1, at.y() + side / 3 - 1, 0);
-        if (plan.At(cell) != Occupancy::kOccupied) continue;
-        const int64_t index = frame.Index(cell);
-        if (state[static_cast<size_t>(index)] != 0) continue;
-        state[static_cast<size_t>(index)] = 1;
-        open.push_back(index);
-      }
-    }
-    const Eigen::Vector2d size_m = frame.cell_m * (box.sizes().cast<double>().array() + 1).matrix();
-    const double filled =
-        static_cast<double>(open.size()) * frame.cell_m * frame.cell_m / size_m.prod();
-    if (size_m.minCoeff() < kThickM || size_m.maxCoeff() > kShortM || filled < kFilled) continue;
-    for (const int64_t cell : open) state[static_cast<size_t>(cell)] = 2;
-  }
-  for (uint8_t& cell : state) cell = cell == 2 ? 1 : 0;
-  return state;
-}
-
 class GapFinder {
  public:
   GapFinder(const DistanceField& plan, const WallGapOptions& options)
@@ -156,6 +124,37 @@ class GapFinder {
 };
 
 }  // namespace
+
+std::vector<uint8_t> FindBlocks(const OccupancyGrid& plan) {
+  const GridFrame& frame = plan.frame;
+  std::vector<uint8_t> state(plan.cells.size(), 0);
+  std::vector<int64_t> open;
+  for (size_t start = 0; start < state.size(); ++start) {
+    if (plan.cells[start] != Occupancy::kOccupied || state[start] != 0) continue;
+    Eigen::AlignedBox2i box;
+    open.assign(1, static_cast<int64_t>(start));
+    state[start] = 1;
+    for (size_t next = 0; next < open.size(); ++next) {
+      const Eigen::Vector3i at = frame.Cell(open[next]);
+      box.extend(Eigen::Vector2i(at.head<2>()));
+      for (int side = 0; side < 9; ++side) {
+        const Eigen::Vector3i cell(at.x() + side % 3 - 1, at.y() + side / 3 - 1, 0);
+        if (plan.At(cell) != Occupancy::kOccupied) continue;
+        const int64_t index = frame.Index(cell);
+        if (state[static_cast<size_t>(index)] != 0) continue;
+        state[static_cast<size_t>(index)] = 1;
+        open.push_back(index);
+      }
+    }
+    const Eigen::Vector2d size_m = frame.cell_m * (box.sizes().cast<double>().array() + 1).matrix();
+    const double filled =
+        static_cast<double>(open.size()) * frame.cell_m * frame.cell_m / size_m.prod();
+    if (size_m.minCoeff() < kThickM || size_m.maxCoeff() > kShortM || filled < kFilled) continue;
+    for (const int64_t cell : open) state[static_cast<size_t>(cell)] = 2;
+  }
+  for (uint8_t& cell : state) cell = cell == 2 ? 1 : 0;
+  return state;
+}
 
 std::vector<WallGap> FindWallGaps(const DistanceField& plan, const WallGapOptions& options) {
   return GapFinder(plan, options).Find();

@@ -3,6 +3,7 @@
 // Refuses passages that are as narrow before and behind: those are corridors.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "ingest/grid/distance_field.h"
@@ -29,6 +30,10 @@ struct WallGapOptions {
   /// Up to here there must be wall at both ends, with space before and behind it.
   double wide_m_max = 2.65;
 };
+
+/// Marks the occupied cells that are no walls: obstacles that stand alone, are as thick as a body
+/// and not long, and fill their box.
+std::vector<uint8_t> FindBlocks(const OccupancyGrid& plan);
 
 /// `plan`: of one cell's height. Ends are occupied cells, never unknown ones.
 /// Order: by width. Source: critical points of Voronoi graphs, Thrun 1998; the test of the jambs
