@@ -118,8 +118,8 @@ class HonestEnds(support.ProgramsTest):
         with open(self.path("many.csv"), "w", encoding="utf-8") as f:
             f.write("time_s,id,x,y,z\n")
             f.writelines(f"{0.1 * i:.1f},{i},1,1,0\n" for i in range(100_001))
-        self.refused(1, ["100001 agents", "split it by time"], "dsg-ingest", "--store", "many", "--map",
-                     "many", "many.csv")
+        self.refused(1, ["100001 agents", "split it by time"], "dsg-ingest", "--store", "many",
+                     "--map", "many", "many.csv")
         self.assertFalse(os.path.exists(self.path("many")))
 
     def test_through_a_server_a_log_that_gives_nothing_leaves_no_map_either(self):
