@@ -35,6 +35,8 @@ const char* Encoding(ingest::PixelFormat format) {
     case ingest::PixelFormat::kDepth16:
     case ingest::PixelFormat::kDepth32:
       return "32FC1";
+    case ingest::PixelFormat::kPoints32:
+      break;
   }
   return "";
 }

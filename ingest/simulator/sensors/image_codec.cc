@@ -27,6 +27,7 @@ int TypeOf(PixelFormat format) {
     case PixelFormat::kDepth16:
       return CV_16UC1;
     case PixelFormat::kDepth32:
+    case PixelFormat::kPoints32:
       break;
   }
   DSG_CHECK(false && "no codec for this pixel format");
