@@ -244,7 +244,8 @@ absl::Status CheckCollision(Engine* engine, const CallContext& call,
   CollisionWorld world =
       CollisionWorld::Create(graph, view.shared_snapshot(), at_ns, &engine->collisions);
   for (const std::string& name : request.scope().ignored()) {
-    DSG_ASSIGN_OR_RETURN(const NodeId node, view.snapshot().ResolveNode(name));
+    DSG_ASSIGN_OR_RETURN(const NodeId node,
+                         ResolveOne(view.snapshot(), name, "scope.ignored", call.stop()));
     DSG_RETURN_IF_ERROR(world.Ignore(node, call.stop(), &scope));
   }
   view.FillHeader(reply->mutable_header());

@@ -212,7 +212,8 @@ absl::Status ReadTypes(const v1::ListInteractionsRequest& in, ChangeFilter* filt
 
 absl::StatusOr<InteractionQuestion> InteractionQuestionOf(const Page& page, AgentNames* names,
                                                           const GraphView& graph,
-                                                          const v1::ListInteractionsRequest& in) {
+                                                          const v1::ListInteractionsRequest& in,
+                                                          const StopCheck& stop) {
   DSG_RETURN_IF_ERROR(CheckTimeRange(in.from_ns(), in.to_ns()));
   const Snapshot& snapshot = page.view.snapshot();
   InteractionQuestion question;
@@ -224,14 +225,15 @@ absl::StatusOr<InteractionQuestion> InteractionQuestionOf(const Page& page, Agen
     DSG_ASSIGN_OR_RETURN(question.agent, names->Resolve(snapshot, in.agent()));
   }
   if (!in.object().empty()) {
-    DSG_ASSIGN_OR_RETURN(question.filter.object, snapshot.ResolveNode(in.object()));
+    DSG_ASSIGN_OR_RETURN(question.filter.object, ResolveOne(snapshot, in.object(), "object", stop));
     const ViewNode* node = graph.FindNode(question.filter.object);
     if (node == nullptr || node->layer != layers::kObjects) {
       return FieldError("object", in.object(), "it is no object; give an object's id or name");
     }
   }
   if (!in.node_id().empty()) {
-    DSG_ASSIGN_OR_RETURN(question.filter.below, snapshot.ResolveNode(in.node_id()));
+    DSG_ASSIGN_OR_RETURN(question.filter.below,
+                         ResolveOne(snapshot, in.node_id(), "node_id", stop));
   }
   if (!page.is_first()) {
     DSG_ASSIGN_OR_RETURN(question.after, ChangeKeyOf(page.position));
@@ -297,7 +299,7 @@ absl::Status ListInteractions(Engine* engine, const CallContext& call,
   const StopCheck stop = call.stop();
   DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const GraphView> graph, page.view.Graph(stop));
   DSG_ASSIGN_OR_RETURN(const InteractionQuestion question,
-                       InteractionQuestionOf(page, &engine->names, *graph, request));
+                       InteractionQuestionOf(page, &engine->names, *graph, request, stop));
   // Where a thing went may be outside the interval and the room that are asked for.
   DSG_ASSIGN_OR_RETURN(const std::vector<ObjectChange> all,
                        FindChanges(snapshot, *graph, ChangeFilter(), stop));

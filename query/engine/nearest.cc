@@ -29,7 +29,8 @@ struct NearestQuestion {
 };
 
 absl::StatusOr<NearestQuestion> ReadNearestQuestion(const v1::ListNearestNodesRequest& request,
-                                                    const Snapshot& snapshot) {
+                                                    const Snapshot& snapshot,
+                                                    const StopCheck& stop) {
   NearestQuestion question;
   if (!request.has_position()) return FieldError("position", "", "give a point of the map frame");
   DSG_ASSIGN_OR_RETURN(question.point_map, PointFromProto(request.position(), "position"));
@@ -43,7 +44,7 @@ absl::StatusOr<NearestQuestion> ReadNearestQuestion(const v1::ListNearestNodesRe
                       "give finite metres, or 0 for no limit");
   }
   if (max_distance_m > 0.0) question.max_distance_m = max_distance_m;
-  DSG_ASSIGN_OR_RETURN(question.filter, FilterFromProto(request.filter(), snapshot));
+  DSG_ASSIGN_OR_RETURN(question.filter, FilterFromProto(request.filter(), snapshot, stop));
   return question;
 }
 
@@ -149,7 +150,8 @@ absl::Status ListNearestNodes(Engine* engine, const CallContext& call,
   DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
   const Snapshot& snapshot = view.snapshot();
   DSG_RETURN_IF_ERROR(CheckNodeView(request.view()));
-  DSG_ASSIGN_OR_RETURN(const NearestQuestion question, ReadNearestQuestion(request, snapshot));
+  DSG_ASSIGN_OR_RETURN(const NearestQuestion question,
+                       ReadNearestQuestion(request, snapshot, call.stop()));
   view.FillHeader(reply->mutable_header());
   const bool agents_only = AsksForAgents(question.filter);
   if (agents_only && !question.filter.at_ns.has_value()) {

@@ -18,13 +18,13 @@ namespace dsg::query {
 namespace {
 
 absl::StatusOr<EdgeFilter> EdgeFilterFromProto(const v1::ListEdgesRequest& in,
-                                               const Snapshot& snapshot) {
+                                               const Snapshot& snapshot, const StopCheck& stop) {
   EdgeFilter filter;
   if (!in.source().empty()) {
-    DSG_ASSIGN_OR_RETURN(filter.source, snapshot.ResolveNode(in.source()));
+    DSG_ASSIGN_OR_RETURN(filter.source, ResolveOne(snapshot, in.source(), "source", stop));
   }
   if (!in.target().empty()) {
-    DSG_ASSIGN_OR_RETURN(filter.target, snapshot.ResolveNode(in.target()));
+    DSG_ASSIGN_OR_RETURN(filter.target, ResolveOne(snapshot, in.target(), "target", stop));
   }
   filter.relation = in.relation();
   if (in.has_at_ns()) filter.at_ns = in.at_ns();
@@ -44,7 +44,8 @@ absl::Status ListEdges(Engine* engine, const CallContext& call, const v1::ListEd
                        v1::ListEdgesResponse* reply) {
   DSG_ASSIGN_OR_RETURN(const Page page, engine->ReadPage("ListEdges", request));
   const Snapshot& snapshot = page.view.snapshot();
-  DSG_ASSIGN_OR_RETURN(const EdgeFilter filter, EdgeFilterFromProto(request, snapshot));
+  DSG_ASSIGN_OR_RETURN(const EdgeFilter filter,
+                       EdgeFilterFromProto(request, snapshot, call.stop()));
   std::optional<EdgeKey> after;
   if (!page.is_first()) {
     if (!ReadKey(page.position, &after.emplace())) return PageTokenError();
@@ -68,22 +69,6 @@ absl::Status ListEdges(Engine* engine, const CallContext& call, const v1::ListEd
 
 namespace {
 
-// A node asked for by a name that several share would be an arbitrary one of them.
-absl::Status CheckNameIsUnique(const Snapshot& snapshot, const std::string& name,
-                               std::string_view field, const StopCheck& stop) {
-  NodeFilter filter;
-  filter.name = name;
-  std::vector<NodeId> found;
-  DSG_RETURN_IF_ERROR(snapshot.ScanNodes(filter, NodeId(), stop, [&](const Node& node) {
-    found.push_back(node.id);
-    return found.size() < 2;
-  }));
-  if (found.size() < 2) return absl::OkStatus();
-  return FieldError(field, name,
-                    absl::StrCat("several nodes have this name, among them ", ToString(found[0]),
-                                 " and ", ToString(found[1]), "; give an id"));
-}
-
 absl::StatusOr<int64_t> CountChildren(const Snapshot& snapshot, NodeId id, const StopCheck& stop) {
   int64_t count = 0;
   DSG_RETURN_IF_ERROR(snapshot.ScanEdges(ChildrenOf(id), std::nullopt, stop, [&](const Edge&) {
@@ -94,17 +79,6 @@ absl::StatusOr<int64_t> CountChildren(const Snapshot& snapshot, NodeId id, const
 }
 
 }  // namespace
-
-absl::StatusOr<NodeId> ResolveOne(const Snapshot& snapshot, const std::string& id_or_name,
-                                  std::string_view field, const StopCheck& stop) {
-  if (id_or_name.empty()) return FieldError(field, "", "give a node id such as O42, or a name");
-  DSG_ASSIGN_OR_RETURN(const NodeId id, snapshot.ResolveNode(id_or_name));
-  const absl::StatusOr<NodeId> parsed = ParseNodeId(id_or_name);
-  if (!parsed.ok() || *parsed != id) {
-    DSG_RETURN_IF_ERROR(CheckNameIsUnique(snapshot, id_or_name, field, stop));
-  }
-  return id;
-}
 
 absl::Status CheckNodeView(int view) {
   if (v1::NodeView_IsValid(view)) return absl::OkStatus();
@@ -164,7 +138,8 @@ absl::Status ListNodes(Engine* engine, const CallContext& call, const v1::ListNo
   DSG_ASSIGN_OR_RETURN(const Page page, engine->ReadPage("ListNodes", request));
   const Snapshot& snapshot = page.view.snapshot();
   DSG_RETURN_IF_ERROR(CheckNodeView(request.view()));
-  DSG_ASSIGN_OR_RETURN(const NodeFilter filter, FilterFromProto(request.filter(), snapshot));
+  DSG_ASSIGN_OR_RETURN(const NodeFilter filter,
+                       FilterFromProto(request.filter(), snapshot, call.stop()));
   DSG_ASSIGN_OR_RETURN(const LayerTable layers, LayersOf(snapshot));
   NodeId last;
   if (!page.is_first()) {

@@ -28,11 +28,6 @@ absl::Status CheckNodeView(int view);
 /// Fills `out` with the parts of `node` that the view shows.
 void FillNode(const Node& node, const LayerTable& layers, int view, v1::Node* out);
 
-/// A node by id, or by a name that no other node has; `field` is the request's that says it.
-/// Errors: NODE_UNKNOWN; FIELD_INVALID for nothing, and for a name that several nodes have.
-absl::StatusOr<NodeId> ResolveOne(const Snapshot& snapshot, const std::string& id_or_name,
-                                  std::string_view field, const StopCheck& stop);
-
 absl::StatusOr<LayerTable> LayersOf(const Snapshot& snapshot);
 
 /// Nodes or edges with keys that are known beforehand: read from the store many at a time, handed

@@ -83,7 +83,7 @@ absl::StatusOr<std::vector<NodeId>> RoomsBelow(const Snapshot& snapshot, NodeId 
 absl::StatusOr<std::vector<NodeId>> NodesAsked(const Snapshot& snapshot,
                                                const std::string& id_or_name,
                                                const Interval& during, const StopCheck& stop) {
-  DSG_ASSIGN_OR_RETURN(const NodeId id, snapshot.ResolveNode(id_or_name));
+  DSG_ASSIGN_OR_RETURN(const NodeId id, ResolveOne(snapshot, id_or_name, "node_id", stop));
   DSG_ASSIGN_OR_RETURN(const Node node, snapshot.GetNode(id));
   if (node.layer == layers::kRooms || node.layer == layers::kPlaces) {
     return std::vector<NodeId>{id};

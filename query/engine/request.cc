@@ -52,14 +52,47 @@ absl::StatusOr<Eigen::Vector3d> PointFromProto(const v1::Vector3& in, std::strin
                    {{"field", name}});
 }
 
-absl::StatusOr<NodeFilter> FilterFromProto(const v1::NodeFilter& in, const Snapshot& snapshot) {
+namespace {
+
+// A node asked for by a name that several share would be an arbitrary one of them.
+absl::Status CheckNameIsUnique(const Snapshot& snapshot, const std::string& name,
+                               std::string_view field, const StopCheck& stop) {
+  NodeFilter filter;
+  filter.name = name;
+  std::vector<NodeId> found;
+  DSG_RETURN_IF_ERROR(snapshot.ScanNodes(filter, NodeId(), stop, [&](const Node& node) {
+    found.push_back(node.id);
+    return found.size() < 2;
+  }));
+  if (found.size() < 2) return absl::OkStatus();
+  return FieldError(field, name,
+                    absl::StrCat("several nodes have this name, among them ", ToString(found[0]),
+                                 " and ", ToString(found[1]), "; give an id"));
+}
+
+}  // namespace
+
+absl::StatusOr<NodeId> ResolveOne(const Snapshot& snapshot, const std::string& id_or_name,
+                                  std::string_view field, const StopCheck& stop) {
+  if (id_or_name.empty()) return FieldError(field, "", "give a node id such as O42, or a name");
+  DSG_ASSIGN_OR_RETURN(const NodeId id, snapshot.ResolveNode(id_or_name));
+  const absl::StatusOr<NodeId> parsed = ParseNodeId(id_or_name);
+  if (!parsed.ok() || *parsed != id) {
+    DSG_RETURN_IF_ERROR(CheckNameIsUnique(snapshot, id_or_name, field, stop));
+  }
+  return id;
+}
+
+absl::StatusOr<NodeFilter> FilterFromProto(const v1::NodeFilter& in, const Snapshot& snapshot,
+                                           const StopCheck& stop) {
   NodeFilter filter;
   if (!in.layer().empty()) {
     DSG_ASSIGN_OR_RETURN(const Layer layer, snapshot.FindLayer(in.layer()));
     filter.layer = layer.id;
   }
   if (!in.parent_id().empty()) {
-    DSG_ASSIGN_OR_RETURN(filter.parent, snapshot.ResolveNode(in.parent_id()));
+    DSG_ASSIGN_OR_RETURN(filter.parent,
+                         ResolveOne(snapshot, in.parent_id(), "filter.parent_id", stop));
   }
   if (in.has_box()) {
     DSG_ASSIGN_OR_RETURN(filter.box_map, BoxFromProto(in.box(), "filter.box"));

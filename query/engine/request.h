@@ -59,7 +59,13 @@ absl::StatusOr<Eigen::Vector3d> PointFromProto(const v1::Vector3& in, std::strin
 
 /// Names of layers and nodes become ids. Errors: LAYER_UNKNOWN, NODE_UNKNOWN, BOX_INVERTED,
 /// NUMBER_NOT_FINITE.
-absl::StatusOr<NodeFilter> FilterFromProto(const v1::NodeFilter& in, const Snapshot& snapshot);
+absl::StatusOr<NodeFilter> FilterFromProto(const v1::NodeFilter& in, const Snapshot& snapshot,
+                                           const StopCheck& stop);
+
+/// A node by id, or by a name that no other node has; `field` is the request's that says it.
+/// Errors: NODE_UNKNOWN; FIELD_INVALID for nothing, and for a name that several nodes have.
+absl::StatusOr<NodeId> ResolveOne(const Snapshot& snapshot, const std::string& id_or_name,
+                                  std::string_view field, const StopCheck& stop);
 
 /// Errors: NOT_FOUND/TAG_UNKNOWN, which lists the tags that there are.
 absl::StatusOr<Revision> RevisionOfTag(MapReader* map, const std::string& tag);

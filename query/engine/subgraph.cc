@@ -267,7 +267,8 @@ CursorOr<v1::GetSubgraphResponse> GetSubgraph(Engine* engine, const CallContext&
     return FieldError("filter", "by name or parent",
                       "a walk is narrowed by layer, kind, class_name, box and at_ns");
   }
-  DSG_ASSIGN_OR_RETURN(question.filter, FilterFromProto(request.filter(), view.snapshot()));
+  DSG_ASSIGN_OR_RETURN(question.filter,
+                       FilterFromProto(request.filter(), view.snapshot(), call.stop()));
   DSG_ASSIGN_OR_RETURN(question.root,
                        ResolveOne(view.snapshot(), request.root(), "root", call.stop()));
   question.relations.assign(request.relations().begin(), request.relations().end());

@@ -166,6 +166,41 @@ TEST_F(GraphAccess, RefusesUnknownNodesAndSharedNames) {
   CommitToOffice(folder_.path(), std::move(delta));
   EXPECT_EQ(ReasonOf(GetNode("cup", v1::NODE_VIEW_FULL).status()), Reason::kFieldInvalid);
   EXPECT_TRUE(GetNode("O3", v1::NODE_VIEW_FULL).ok());
+  // Everywhere else where a node may be told by its name.
+  const auto expect_shared = [](const absl::Status& refused) {
+    EXPECT_EQ(ReasonOf(refused), Reason::kFieldInvalid) << refused;
+    EXPECT_NE(refused.message().find("several nodes have this name"), std::string::npos) << refused;
+  };
+  v1::ListNodesRequest nodes;
+  nodes.set_map(kMap);
+  nodes.mutable_filter()->set_parent_id("cup");
+  expect_shared(ListNodes(nodes).status());
+  v1::ListEdgesRequest edges;
+  edges.set_map(kMap);
+  edges.set_source("cup");
+  v1::ListEdgesResponse edges_reply;
+  expect_shared(core_->ListEdges(call_, edges, &edges_reply));
+  edges.clear_source();
+  edges.set_target("cup");
+  expect_shared(core_->ListEdges(call_, edges, &edges_reply));
+  v1::ListNearestNodesRequest nearest;
+  nearest.mutable_filter()->set_parent_id("cup");
+  expect_shared(Nearest(nearest, 1.0).status());
+  v1::ListInteractionsRequest interactions;
+  interactions.set_map(kMap);
+  interactions.set_from_ns(0);
+  interactions.set_to_ns(1);
+  interactions.set_object("cup");
+  v1::ListInteractionsResponse interactions_reply;
+  expect_shared(core_->ListInteractions(call_, interactions, &interactions_reply));
+  v1::CheckCollisionRequest collision;
+  collision.set_map(kMap);
+  collision.mutable_scope()->add_ignored("cup");
+  v1::CollisionBody* body = collision.add_bodies();
+  body->mutable_sphere()->set_radius_m(0.25);
+  body->add_poses()->mutable_position()->set_x(1);
+  v1::CheckCollisionResponse collision_reply;
+  expect_shared(core_->CheckCollision(call_, collision, &collision_reply));
 }
 
 TEST_F(GraphAccess, ListsNodesInOrderOfIdWhateverThePageSize) {
