@@ -187,6 +187,11 @@ class DeltaChecker {
         DSG_RETURN_IF_ERROR(
             values::CheckPose(node.object->map_T_model, [&] { return "the model of " + what(); }));
       }
+      const double residual_m = node.object->registration_residual_m;
+      if (!std::isfinite(residual_m))
+        return values::NotFinite("registration residual of " + what());
+      DSG_RETURN_IF_ERROR(values::CheckNotNegative(
+          residual_m, [&] { return "registration residual of " + what(); }));
       const Eigen::Vector3d& size = node.object->size;
       if (!values::IsSane(size)) return values::NotFinite("size of " + what());
       DSG_RETURN_IF_ERROR(

@@ -83,7 +83,7 @@ absl::Status CheckInstant(TimeNs time_ns, What what) {
 }
 
 absl::Status CheckNotNegative(double number, What what) {
-  if (!(number < 0.0)) return absl::OkStatus();
+  if (number >= 0.0) return absl::OkStatus();
   return Invalid(absl::StrCat(what(), " is ", number, "; it must be 0 or more"));
 }
 

@@ -192,9 +192,10 @@ class GraphStore {
   /// Of MapStats::bytes_on_disk of a map, what the backend uses again and says nothing about the
   /// map, such as a log, now; 0 when there is none.
   virtual int64_t ReusedBytesOnDisk(const std::string& map) const = 0;
-  /// Errors: ALREADY_EXISTS/MAP_EXISTS; what MapSpec::Validate returns.
+  /// Errors: ALREADY_EXISTS/MAP_EXISTS; what MapSpec::Validate returns, of the name too.
   virtual absl::Status CreateMap(const MapSpec& spec) = 0;
-  /// Errors: NOT_FOUND/MAP_UNKNOWN; FAILED_PRECONDITION/FORMAT_TOO_NEW or NOT_A_STORE.
+  /// Errors: INVALID_ARGUMENT/MAP_NAME_INVALID (CheckMapName); NOT_FOUND/MAP_UNKNOWN;
+  /// FAILED_PRECONDITION/FORMAT_TOO_NEW or NOT_A_STORE.
   virtual absl::StatusOr<std::shared_ptr<MapReader>> OpenMap(const std::string& name) = 0;
   /// Brings a map to the newest format, in one transaction, after keeping a copy. Opening never
   /// does it.
@@ -241,8 +242,8 @@ class GraphStore {
 };
 
 /// Opens a store by where it is: "file:PATH" or a bare path is a folder, "memory:NAME" a store in
-/// the memory of this process, shared by all who open the name and gone with the last of them.
-/// Link dsg::stores, which knows the backends.
+/// the memory of this process, gone with the last who has it open. All who open one URI share its
+/// maps. Link dsg::stores, which knows the backends.
 /// Errors: NOT_FOUND/MAP_UNKNOWN naming the store if it is not there and not to be made;
 /// FAILED_PRECONDITION/NETWORK_FILE_SYSTEM.
 absl::StatusOr<std::unique_ptr<GraphStore>> OpenStore(const std::string& uri,

@@ -112,6 +112,20 @@ TEST(NodeCodec, GivesEveryFieldBack) {
   }
 }
 
+// ToProto alone would say nothing of a field that neither of the two knows.
+TEST(NodeCodec, GivesEveryFieldBackFromProtobuf) {
+  Random random(18, 0);
+  for (int i = 0; i < 5'000; ++i) {
+    Node node = RandomNode(&random);
+    node.kind = kinds::kObject;
+    v1::Node message;
+    ToProto(node, LayerTable(), &message);
+    const absl::StatusOr<Node> back = FromProto(message, LayerTable());
+    ASSERT_TRUE(back.ok()) << back.status() << message.DebugString();
+    ASSERT_EQ(EncodeNodePayload(*back), EncodeNodePayload(node)) << message.DebugString();
+  }
+}
+
 TEST(NodeCodec, KeepsTheSignOfZero) {
   Node node;
   node.map_T_node.position.x() = -0.0;

@@ -274,6 +274,15 @@ TEST(CheckDelta, RefusesComponentsThatAreNoNumbers) {
         d->nodes[0].place->clearance_m = -1;
       },
       Reason::kDeltaInvalid, "clearance of node p1 is -1 m");
+  const auto with_residual = [](double residual_m) {
+    return [=](GraphDelta* d) {
+      d->nodes = {Place(1, 1)};
+      d->nodes[0].object.emplace();
+      d->nodes[0].object->registration_residual_m = residual_m;
+    };
+  };
+  ExpectRefused(with_residual(std::nan("")), Reason::kNumberNotFinite, "registration residual");
+  ExpectRefused(with_residual(-0.1), Reason::kDeltaInvalid, "registration residual of node p1 is");
   ExpectRefused(
       [](GraphDelta* d) {
         d->nodes = {Place(1, 1)};
