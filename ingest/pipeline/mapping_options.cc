@@ -35,13 +35,16 @@ std::string MappingOptions::Digest() const {
     const std::string sha256(model.asset.sha256.begin(), model.asset.sha256.end());
     absl::StrAppend(&shapes_digest, model.class_name, ":", absl::BytesToHexString(sha256), ",");
   }
+  // Of what the stages make of a log, with the same options.
+  constexpr int kStagesVersion = 2;
   return absl::StrCat(
-      "voxel=", volume.voxel_m, " truncation=", volume.truncation_m, " range=", volume.range_m,
-      " masking=", static_cast<int>(volume.masking), " label_confidence=", volume.label_confidence,
-      " blocks=", volume.block_count_max, " places=", static_cast<int>(places.mode),
-      " radius=", places.robot_radius_m, " rooms=", static_cast<int>(rooms.method),
-      " upright=", shapes.is_upright, " shapes=", shapes_digest, " commit=", commit_period_ns,
-      " mesh_wait=", mesh_wait_max_ns, " layers=", layers_period_ns, " cell=", grid_cell_m);
+      "stages=", kStagesVersion, " voxel=", volume.voxel_m, " truncation=", volume.truncation_m,
+      " range=", volume.range_m, " masking=", static_cast<int>(volume.masking),
+      " label_confidence=", volume.label_confidence, " blocks=", volume.block_count_max,
+      " places=", static_cast<int>(places.mode), " radius=", places.robot_radius_m,
+      " rooms=", static_cast<int>(rooms.method), " upright=", shapes.is_upright,
+      " shapes=", shapes_digest, " commit=", commit_period_ns, " mesh_wait=", mesh_wait_max_ns,
+      " layers=", layers_period_ns, " cell=", grid_cell_m);
 }
 
 }  // namespace dsg::ingest

@@ -62,6 +62,12 @@ class RegionIndex {
   /// The numbers of a room and a place; -1 for ids that are unknown here.
   RegionState Find(NodeId room, NodeId place) const;
 
+  /// Whether the place is in another room than the state says.
+  bool IsTorn(RegionState state) const {
+    return state.room >= 0 && state.place >= 0 && places_[state.place].room >= 0 &&
+           places_[state.place].room != state.room;
+  }
+
   /// Empty for -1.
   NodeId RoomId(int32_t room) const { return room < 0 ? NodeId() : rooms_[room].id; }
   NodeId PlaceId(int32_t place) const { return place < 0 ? NodeId() : places_[place].id; }

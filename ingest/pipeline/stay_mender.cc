@@ -46,7 +46,7 @@ std::vector<Stay> StayMender::Mend(const RegionIndex& regions) {
     if (stay.exit_ns == kTimeMax) continue;
     const RegionState known = regions.Find(stay.room, stay.place);
     if (regions.RoomId(known.room) == stay.room && regions.PlaceId(known.place) == stay.place &&
-        !stay.room.empty()) {
+        !stay.room.empty() && !regions.IsTorn(known)) {
       continue;
     }
     if (!told.middle_map.has_value()) continue;

@@ -27,7 +27,8 @@ class StayMender {
   /// stays of an agent end in order.
   void Remember(const std::vector<Stay>& stays);
 
-  /// The ended stays whose room or place is not in `regions` any more, or which had no room: where
+  /// The ended stays whose room or place is not in `regions` any more, whose place is in another
+  /// room by now, or which had no room: where
   /// the agent was in the middle of each, by `regions`. Counts as told. Order: agent, enter_ns.
   std::vector<Stay> Mend(const RegionIndex& regions);
 

@@ -20,11 +20,15 @@ void StayTracker::Observe(NodeId agent, TimeNs time_ns, const Eigen::Vector3d& p
   if (track.has_pose && Elapsed(track.last_ns, time_ns) > static_cast<uint64_t>(gap_ns_max_)) {
     End(agent, track.last_ns + 1, &track);
     track.where = {};
+    track.resumes_ns.reset();
   }
   const RegionState next = regions_.Next(track.where, position_map);
   if (next != track.where) End(agent, time_ns, &track);
   track.where = next;
-  if (!track.is_open && next != RegionState{}) Begin(agent, time_ns, &track);
+  if (!track.is_open && next != RegionState{}) {
+    Begin(agent, track.resumes_ns.value_or(time_ns), &track);
+  }
+  track.resumes_ns.reset();
   if (track.is_open) Cut(agent, time_ns, /*is_until_inside=*/true, &track);
   track.last_ns = time_ns;
   track.has_pose = true;
@@ -35,8 +39,12 @@ void StayTracker::SetRegions(RegionIndex regions) {
     const NodeId room = regions_.RoomId(track.where.room);
     const NodeId place = regions_.PlaceId(track.where.place);
     const RegionState now = regions.Find(room, place);
-    const bool is_lost = regions.RoomId(now.room) != room || regions.PlaceId(now.place) != place;
-    if (is_lost) End(agent, track.last_ns + 1, &track);
+    const bool is_lost = regions.RoomId(now.room) != room || regions.PlaceId(now.place) != place ||
+                         regions.IsTorn(now);
+    if (is_lost && track.is_open) {
+      End(agent, track.last_ns + 1, &track);
+      track.resumes_ns = track.last_ns + 1;
+    }
     track.where = is_lost ? RegionState() : now;
   }
   regions_ = std::move(regions);

@@ -3,6 +3,7 @@
 // Refuses to know about deltas: what it says depends on the poses only, not on when it is asked.
 #pragma once
 
+#include <optional>
 #include <unordered_map>
 #include <vector>
 
@@ -25,7 +26,8 @@ class StayTracker {
   void Observe(NodeId agent, TimeNs time_ns, const Eigen::Vector3d& position_map);
 
   /// From here on rooms and places are those of `regions`. Stays in what is no longer there, or
-  /// was moved to another room, end 1 ns after their last pose.
+  /// was moved to another room, end 1 ns after their last pose; if the next pose comes without a
+  /// gap, the stay that it is in begins there.
   void SetRegions(RegionIndex regions);
 
   /// Closes all stays: no pose will follow.
@@ -43,6 +45,8 @@ class StayTracker {
     bool is_open_told = false;
     TimeNs enter_ns = 0;
     TimeNs last_ns = 0;
+    /// Since when the agent is where its next pose will say.
+    std::optional<TimeNs> resumes_ns;
   };
 
   void Begin(NodeId agent, TimeNs enter_ns, Track* track);

@@ -33,6 +33,23 @@ TEST_F(StayMenderTest, MovesStaysToTheRoomThatTheirMiddleIsIn) {
   EXPECT_TRUE(mender_.Mend(regions).empty()) << "told already";
 }
 
+TEST_F(StayMenderTest, MovesStaysWhosePlaceIsInAnotherRoomByNow) {
+  Node place;
+  place.id = NodeId('p', 4);
+  place.layer = layers::kPlaces;
+  place.kind = kinds::kPlace;
+  place.map_T_node.position = {2.0, 2.0, 0.0};
+  const std::vector<Node> rooms = {MakeRoom(1, 5, 0, 11, 5), MakeRoom(2, 0, 0, 5, 5)};
+  mender_.Remember({{kRobot, place.id, NodeId('R', 1), 0, 501}});
+  const std::vector<Stay> mended =
+      mender_.Mend(RegionIndex(rooms, {place}, {{NodeId('R', 2), place.id}}));
+  ASSERT_EQ(mended.size(), 1u);
+  EXPECT_EQ(mended[0], (Stay{kRobot, place.id, NodeId('R', 2), 0, 501}));
+  // As it was, where the place is in the room that the stay names.
+  mender_.Remember({{kRobot, place.id, NodeId('R', 2), 0, 501}});
+  EXPECT_TRUE(mender_.Mend(RegionIndex(rooms, {place}, {{NodeId('R', 2), place.id}})).empty());
+}
+
 TEST_F(StayMenderTest, GivesARoomToStaysThatHadNone) {
   mender_.Remember({{kRobot, NodeId('p', 1), NodeId(), 600, 1001}});
   const RegionIndex regions({MakeRoom(3, 5, 0, 11, 5)}, {MakePlace(1, 8, 2)}, {});

@@ -71,7 +71,19 @@ TEST(StayTracker, EndsStaysInRoomsThatAreNoMore) {
   EXPECT_EQ(tracker.TakeChanges(), std::vector<Stay>{InRoom(kAnna, 1, 100, 101)});
   tracker.Observe(kAnna, 200, {4, 2, 0});
   tracker.Finish();
-  EXPECT_EQ(tracker.TakeChanges(), std::vector<Stay>{InRoom(kAnna, 7, 200, 201)});
+  // Nobody is nowhere while rooms are told anew.
+  EXPECT_EQ(tracker.TakeChanges(), std::vector<Stay>{InRoom(kAnna, 7, 101, 201)});
+}
+
+TEST(StayTracker, EndsStaysInRoomsThatAreNoMoreBeforeAGapToo) {
+  StayTracker tracker(TwoRoomRegions(), 2 * kNsPerSecond);
+  tracker.Observe(kAnna, 100, {4, 2, 0});
+  tracker.SetRegions(RegionIndex({MakeRoom(7, 0, 0, 10, 5)}, {}, {}));
+  EXPECT_EQ(tracker.TakeChanges(), std::vector<Stay>{InRoom(kAnna, 1, 100, 101)});
+  tracker.Observe(kAnna, 10 * kNsPerSecond, {4, 2, 0});
+  tracker.Finish();
+  EXPECT_EQ(tracker.TakeChanges(),
+            std::vector<Stay>{InRoom(kAnna, 7, 10 * kNsPerSecond, 10 * kNsPerSecond + 1)});
 }
 
 TEST(StayTracker, ForgetsTheRoomOverAGap) {
