@@ -50,6 +50,10 @@ absl::Status CheckLine(const std::string& option, const std::optional<std::strin
 absl::Status CheckSet(const SetVerb& verb, const CommonOptions&) {
   DSG_RETURN_IF_ERROR(CheckLine("--name", verb.name));
   DSG_RETURN_IF_ERROR(CheckLine("--class", verb.class_name));
+  if (ParseNodeId(verb.name.value_or("")).ok()) {
+    return Usage(absl::StrCat("--name ", *verb.name, " is of the form of an id; take another name"),
+                 "set");
+  }
   if (verb.name.has_value() || verb.class_name.has_value()) return absl::OkStatus();
   return Usage("say what to set: --name or --class", "set");
 }
@@ -57,7 +61,7 @@ absl::Status CheckSet(const SetVerb& verb, const CommonOptions&) {
 absl::StatusOr<v1::GetNodeResponse> ReadNode(Session* session, const std::string& id) {
   auto request = session->Begin<v1::GetNodeRequest>();
   request.set_id(id);
-  request.set_view(v1::NODE_VIEW_BASIC);
+  request.set_view(v1::NODE_VIEW_FULL);
   v1::GetNodeResponse reply;
   DSG_RETURN_IF_ERROR(session->api().GetNode(session->NewCall(), request, &reply));
   return reply;
@@ -75,14 +79,32 @@ absl::StatusOr<int32_t> ClassNumber(Session* session, const std::string& class_n
   return reply.nodes().empty() ? kNoClass : reply.nodes(0).semantic_class().id();
 }
 
-// Logs know agents by their names: under another one the next log would bring the agent again.
-absl::Status CheckMayBeNamed(const v1::Node& node) {
+// Logs know agents by their names and kinds: under others the next log would bring the agent again.
+absl::Status CheckIsNoAgent(const v1::Node& node) {
   if (!IsAgentKind(node.kind())) return absl::OkStatus();
   return MakeError(Reason::kFieldInvalid,
-                   absl::StrCat("ID ", node.id(), " is an agent, and its name \"", node.name(),
-                                "\" is what logs know it by; set the name of a room, a place or "
-                                "an object"),
+                   absl::StrCat("ID ", node.id(), " is an agent, whose name \"", node.name(),
+                                "\" and kind are what logs know it by; name a room, a place or an "
+                                "object"),
                    {{"field", "ID"}, {"value", node.id()}});
+}
+
+// Where a name stands for a node, one that several have is refused.
+absl::Status NoteSharedName(Session* session, const v1::Node& node) {
+  if (node.name().empty()) return absl::OkStatus();
+  auto request = session->Begin<v1::ListNodesRequest>();
+  request.mutable_filter()->set_name(node.name());
+  request.set_view(v1::NODE_VIEW_BASIC);
+  request.set_page_size(2);
+  v1::ListNodesResponse reply;
+  DSG_RETURN_IF_ERROR(session->api().ListNodes(session->NewCall(), request, &reply));
+  for (const v1::Node& other : reply.nodes()) {
+    if (other.id() == node.id()) continue;
+    session->notes() << "dsg: note: " << other.id() << " has the name \"" << Printable(node.name())
+                     << "\" too; ask for both by id\n";
+    break;
+  }
+  return absl::OkStatus();
 }
 
 // The patch that makes the node what is asked for; without nodes if it is that already.
@@ -92,9 +114,9 @@ absl::StatusOr<v1::GraphDelta> MakePatch(Session* session, const SetVerb& verb,
   v1::GraphDelta delta;
   v1::Node patch;
   patch.set_id(node.id());
+  DSG_RETURN_IF_ERROR(CheckIsNoAgent(node));
   std::string message = absl::StrCat("set ", node.id());
   if (verb.name.has_value() && *verb.name != node.name()) {
-    DSG_RETURN_IF_ERROR(CheckMayBeNamed(node));
     patch.set_name(*verb.name);
     patch.mutable_update_mask()->add_paths("name");
     absl::StrAppend(&message, " name \"", *verb.name, "\"");
@@ -155,6 +177,7 @@ absl::Status RunSet(Session* session, const SetVerb& verb, std::ostream& out) {
   }
   DSG_RETURN_IF_ERROR(status);
   DSG_ASSIGN_OR_RETURN(const v1::GetNodeResponse after, ReadNode(session, before.id()));
+  if (verb.name.has_value()) DSG_RETURN_IF_ERROR(NoteSharedName(session, after.node()));
   if (session->common().json) return WriteJson(after, out);
   out << RenderSet(before, after.node(), committed.revision());
   return absl::OkStatus();

@@ -112,7 +112,18 @@ TEST_F(WholeMapVerbs, SetTakesOneLineOfText) {
   ExpectRefused(2, "--name is not UTF-8", Set({"R1", "--name", "\xff"}));
   ExpectRefused(2, "--name has a line break", Set({"R1", "--name", "kit\nchen"}));
   ExpectRefused(2, "--class has 100000 bytes", Set({"O1", "--class", std::string(100'000, 'a')}));
+  ExpectRefused(2, "form of an id", Set({"R1", "--name", "O9"}));
+  ExpectRefused(2, "is an agent", Set({"H1", "--class", "chair"}));
   EXPECT_EQ(Head(), 1);
+}
+
+TEST_F(WholeMapVerbs, SetAnswersWithTheWholeNodeAndSaysWhoElseHasTheName) {
+  const Outcome outcome = Set({"O1", "--name", "old name", "--json"});
+  ASSERT_EQ(outcome.code, 0) << outcome.errors;
+  const Json json = Json::parse(outcome.out);
+  EXPECT_EQ(json["node"], Show("O1"));
+  EXPECT_EQ(json["node"]["name"], "old name");
+  EXPECT_NE(outcome.errors.find("O2 has the name \"old name\" too"), std::string::npos);
 }
 
 TEST_F(WholeMapVerbs, AMapThatCannotBeOpenedIsNotPassedOver) {
