@@ -52,7 +52,7 @@ absl::StatusOr<std::string> ReadWhole(const std::string& path) {
   std::error_code error;
   if (!fs::exists(path, error)) {
     return absl::NotFoundError(
-        absl::StrCat(path, " is missing; give the truth folder of a log of dsg-simulate sensors"));
+        absl::StrCat(path, " is missing; give what dsg-simulate sensors --out has made"));
   }
   if (!fs::is_regular_file(path, error)) return CannotRead(path, "it is no regular file");
   const uintmax_t size = fs::file_size(path, error);

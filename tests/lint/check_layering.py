@@ -78,7 +78,6 @@ ALLOWED["ingest/evaluation"] += ["ingest/truth"]
 # include it.
 THIRD_PARTY = [
     (r"sqlite3", ["schema/store/sqlite *.cc", "ingest/log *.cc", "tests"]),
-    (r"libpq", ["schema/store/postgres *.cc"]),
     (r"grpc(pp|\+\+)?/|.*\.grpc\.pb\.h$",
      ["query/client", "server", "tests"]),
     (r"(dsg/v1|google/protobuf)/.*",
