@@ -34,8 +34,9 @@ class SensorLog : public LogSource {
       }
     }
     if (first == channels_.size()) return std::nullopt;
-    DSG_ASSIGN_OR_RETURN(Measurement measurement, channels_[first].make(next_[first]++));
-    return measurement;
+    absl::StatusOr<Measurement> measurement = channels_[first].make(next_[first]++);
+    if (!measurement.ok()) return measurement.status();
+    return std::optional<Measurement>(*std::move(measurement));
   }
 
  private:
