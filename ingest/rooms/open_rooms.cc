@@ -3,16 +3,25 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/geometry.hpp>
+#include <boost/geometry/geometries/multi_point.hpp>
+#include <boost/geometry/geometries/point_xy.hpp>
+#include <boost/geometry/geometries/polygon.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "ingest/rooms/plan_regions.h"
 #include "ingest/rooms/wall_gaps.h"
 
 namespace dsg::ingest {
 namespace {
+
+namespace bg = boost::geometry;
+using Point = bg::model::d2::point_xy<double>;
 
 // Of the area of the convex hull. Corridors with what is open to them fill less, L-shaped rooms
 // more; a room fills most of it.
@@ -58,19 +67,20 @@ class CellShape {
   }
   int64_t count() const { return count_; }
 
-  // Share of the hull's cells that it has.
+  // Share of its hull that it fills. Requires: cells.
   double Compactness() const {
-    std::vector<Eigen::Vector2d> points;
+    bg::model::multi_point<Point> corners;
     for (size_t y = 0; y < rows_.size(); ++y) {
       if (rows_[y].first > rows_[y].last) continue;
       const double low = static_cast<double>(y);
       for (const double at : {low, low + 1.0}) {
-        points.emplace_back(rows_[y].first, at);
-        points.emplace_back(rows_[y].last + 1, at);
+        corners.emplace_back(rows_[y].first, at);
+        corners.emplace_back(rows_[y].last + 1, at);
       }
     }
-    const double hull = HullArea(&points);
-    return hull > 0.0 ? static_cast<double>(count_) / hull : 0.0;
+    bg::model::polygon<Point> hull;
+    bg::convex_hull(corners, hull);
+    return static_cast<double>(count_) / bg::area(hull);
   }
 
  private:
@@ -78,33 +88,6 @@ class CellShape {
     int first = std::numeric_limits<int>::max();
     int last = -1;
   };
-
-  static double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b,
-                      const Eigen::Vector2d& c) {
-    return (b.x() - a.x()) * (c.y() - a.y()) - (b.y() - a.y()) * (c.x() - a.x());
-  }
-
-  // Monotone chains, Andrew 1979.
-  static double HullArea(std::vector<Eigen::Vector2d>* points) {
-    std::sort(points->begin(), points->end(), [](const auto& a, const auto& b) {
-      return std::pair(a.x(), a.y()) < std::pair(b.x(), b.y());
-    });
-    double twice = 0.0;
-    for (const int side : {1, -1}) {
-      std::vector<Eigen::Vector2d> chain;
-      for (const Eigen::Vector2d& point : *points) {
-        while (chain.size() >= 2 &&
-               side * Cross(chain[chain.size() - 2], chain.back(), point) <= 0.0) {
-          chain.pop_back();
-        }
-        chain.push_back(point);
-      }
-      for (size_t i = 1; i < chain.size(); ++i) {
-        twice += side * (chain[i - 1].x() * chain[i].y() - chain[i].x() * chain[i - 1].y());
-      }
-    }
-    return 0.5 * twice;
-  }
 
   const GridFrame& frame_;
   std::vector<Row> rows_;
@@ -127,7 +110,7 @@ class OpenRoomCloser {
       std::vector<Opening> tried;
       for (const Opening& opening : openings) {
         if (!IsWayFree(opening.gap) || IsLikeOneOf(tried, opening)) continue;
-        if (OpensABay(opening, compact_min)) CloseGap(opening.gap, &plan_);
+        TryToClose(opening, compact_min);
         tried.push_back(opening);
       }
     }
@@ -287,10 +270,9 @@ class OpenRoomCloser {
     return true;
   }
 
-  // Tried on the plan itself, and taken back.
-  bool OpensABay(const Opening& opening, double compact_min) {
-    const WallGap& gap = opening.gap;
-    const Eigen::Vector3i a = CellAt(gap.from_map), b = CellAt(gap.to_map);
+  // On the plan itself; taken back if no bay is behind it.
+  void TryToClose(const Opening& opening, double compact_min) {
+    const Eigen::Vector3i a = CellAt(opening.gap.from_map), b = CellAt(opening.gap.to_map);
     const Eigen::Vector3i low = a.cwiseMin(b), high = a.cwiseMax(b);
     std::vector<std::pair<size_t, Occupancy>> before;
     for (int y = low.y(); y <= high.y(); ++y) {
@@ -299,10 +281,16 @@ class OpenRoomCloser {
         before.emplace_back(cell, plan_.cells[cell]);
       }
     }
-    CloseGap(gap, &plan_);
-    const bool opens = IsBay(opening, compact_min);
+    CloseGap(opening.gap, &plan_);
+    const std::optional<Side> smaller = SmallerSide(opening);
+    if (smaller.has_value() && IsBay(opening, *smaller, compact_min)) {
+      // A room, which is not divided any further.
+      for (const int64_t cell : smaller->cells) {
+        regions_.region_of[static_cast<size_t>(cell)] = -1;
+      }
+      return;
+    }
     for (const auto& [cell, state] : before) plan_.cells[cell] = state;
-    return opens;
   }
 
   // What lies on one side of a closed opening, as far as it is known.
@@ -317,9 +305,9 @@ class OpenRoomCloser {
     bool IsWhole() const { return next == cells.size(); }
   };
 
-  // Whether the smaller one of the two sides of the closed opening is a bay. Both are flooded in
-  // turns, so that the larger one costs no more than the smaller one.
-  bool IsBay(const Opening& opening, double compact_min) {
+  // Both sides of the closed opening are flooded in turns, so that the larger one costs no more
+  // than the smaller one. None if they are one, both too large, or not to be divided here.
+  std::optional<Side> SmallerSide(const Opening& opening) {
     const WallGap& gap = opening.gap;
     std::array<Side, 2> sides;
     for (size_t i = 0; i < 2; ++i) {
@@ -327,20 +315,20 @@ class OpenRoomCloser {
       sides[i].out = (i == 0 ? 1.0 : -1.0) * gap.NormalMap();
       const Eigen::Vector3i start = CellAt(gap.MiddleMap() + 3.0 * frame_.cell_m * sides[i].out);
       const int region = RegionAt(start);
-      if (region < 0 || !IsFreeCell(start)) return false;
-      if (KindOf(region) == Kind::kLarge && !opening.is_at_wall_end) return false;
+      if (region < 0 || !IsFreeCell(start)) return std::nullopt;
+      if (KindOf(region) == Kind::kLarge && !opening.is_at_wall_end) return std::nullopt;
       sides[i].cells.push_back(frame_.Index(start));
       seen_[static_cast<size_t>(sides[i].cells[0])] = sides[i].number;
     }
     const auto count_max = static_cast<size_t>(kBayM2Max / (frame_.cell_m * frame_.cell_m));
     while (!sides[0].IsWhole() && !sides[1].IsWhole()) {
-      if (sides[0].cells.size() > count_max) return false;
+      if (sides[0].cells.size() > count_max) return std::nullopt;
       for (size_t i = 0; i < 2; ++i) {
         // Around its ends, or through another way: it parts nothing.
-        if (!Grow(gap, sides[1 - i].number, &sides[i])) return false;
+        if (!Grow(gap, sides[1 - i].number, &sides[i])) return std::nullopt;
       }
     }
-    return IsBay(opening, sides[0].IsWhole() ? sides[0] : sides[1], compact_min);
+    return std::move(sides[0].IsWhole() ? sides[0] : sides[1]);
   }
 
   // By the cells beside one cell. False if the other side is reached.
@@ -365,7 +353,7 @@ class OpenRoomCloser {
     return true;
   }
 
-  bool IsBay(const Opening& opening, const Side& side, double compact_min) {
+  bool IsBay(const Opening& opening, const Side& side, double compact_min) const {
     const int region = regions_.region_of[static_cast<size_t>(side.cells[0])];
     const double width_m = opening.gap.WidthM();
     if (KindOf(region) == Kind::kLarge && width_m > kOpenShareMax * side.rim_m) return false;
@@ -376,10 +364,7 @@ class OpenRoomCloser {
     }
     CellShape shape(frame_);
     for (const int64_t cell : side.cells) shape.Add(cell);
-    if (shape.Compactness() < compact_min) return false;
-    // A room, which is not divided any further.
-    for (const int64_t cell : side.cells) regions_.region_of[static_cast<size_t>(cell)] = -1;
-    return true;
+    return shape.Compactness() >= compact_min;
   }
 
   OccupancyGrid& plan_;
