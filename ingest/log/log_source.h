@@ -142,7 +142,8 @@ struct LogOptions {
   /// Loop closures to read instead of the log's; empty = the log's own.
   std::string loop_file;
   /// Of bags: the topic of a channel ("depth0", "poses", ...), instead of the one that its name or
-  /// type tells; kNoTopic leaves the channel out.
+  /// type tells; kNoTopic leaves the channel out. What is read by them is part of the log's
+  /// content_sha256.
   std::map<std::string, std::string> topics;
 };
 

@@ -71,7 +71,6 @@ SessionHeader MakeHeader(const LogInfo& info, const LogOptions& log_options,
                                  : "",
       .robot_model =
           options.robot_model.has_value() ? ToHex(options.robot_model->asset.sha256) : "",
-      .topics = log_options.topics,
       .is_size_bounded = options.is_size_bounded && HasLoops(info)};
   // The file's name alone: where it lies on this machine is no property of the log.
   const std::filesystem::path path(info.path);

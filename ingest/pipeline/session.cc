@@ -20,9 +20,6 @@ std::string SessionConfig::Digest() const {
   if (!people.empty()) absl::StrAppend(&choice, "people=", people, "\n");
   if (!odometry.empty()) absl::StrAppend(&choice, "odometry=", odometry, "\n");
   if (!robot_model.empty()) absl::StrAppend(&choice, "robot_model=", robot_model, "\n");
-  for (const auto& [channel, topic] : topics) {
-    absl::StrAppend(&choice, "topic=", channel, "=", topic, "\n");
-  }
   if (is_size_bounded) absl::StrAppend(&choice, "bounded\n");
   return Sha256Hex(
       absl::StrCat(choice, "pipeline=", kPipelineVersion, "\nformat=", format,

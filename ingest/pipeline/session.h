@@ -2,7 +2,6 @@
 // The identity of one log's way into one map: what makes a second run a repetition.
 #pragma once
 
-#include <map>
 #include <string>
 
 #include "ingest/log/log_source.h"
@@ -30,8 +29,6 @@ struct SessionConfig {
   std::string odometry;
   /// SHA-256 of the robot's CAD model; empty for none.
   std::string robot_model;
-  /// LogOptions::topics; none leaves the digest as it was before there was a choice.
-  std::map<std::string, std::string> topics;
   /// Whether corrections of logs with loop closures are cut to the size of messages: then their
   /// sequences are others.
   bool is_size_bounded = false;

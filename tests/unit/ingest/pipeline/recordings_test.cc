@@ -25,16 +25,17 @@ class Recordings : public testing::Test {
     store_ = *OpenStore("memory:recordings", {.create = true});
   }
 
-  absl::StatusOr<IngestSummary> Ingest(const std::string& path, const std::string& map) {
+  absl::StatusOr<IngestSummary> Ingest(const std::string& path, const std::string& map,
+                                       const LogOptions& options = {}) {
     MapSpec spec;
     spec.name = map;
     const absl::Status made = store_->CreateMap(spec);
     EXPECT_TRUE(made.ok() || ReasonOf(made) == Reason::kMapExists) << made;
-    DSG_ASSIGN_OR_RETURN(const auto log, OpenLog(path, {}));
+    DSG_ASSIGN_OR_RETURN(const auto log, OpenLog(path, options));
     DSG_ASSIGN_OR_RETURN(const auto writer, store_->OpenWriter(map));
     DSG_ASSIGN_OR_RETURN(const std::shared_ptr<MapReader> reader, store_->OpenMap(map));
     DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> latest, reader->Latest());
-    return IngestLog(*log, {}, {.poses_per_delta = 3}, *MakeSnapshotMapView(latest, reader),
+    return IngestLog(*log, options, {.poses_per_delta = 3}, *MakeSnapshotMapView(latest, reader),
                      *writer, {});
   }
   RevisionInfo HeadOf(const std::string& map) { return *(*store_->OpenMap(map))->Head(); }
@@ -68,6 +69,17 @@ TEST_F(Recordings, AddNothingToAMapThatHasThemInAnotherKindOfFile) {
     EXPECT_TRUE(again->was_known) << path;
   }
   EXPECT_EQ(HeadOf("office").digest, head.digest);
+}
+
+TEST_F(Recordings, AreOtherLogsOnlyIfOtherTopicsAreRead) {
+  ASSERT_TRUE(Ingest(paths_[0], "office").ok());
+  LogOptions options;
+  options.topics = {{"imu0", "/tesse/imu/noisy/imu"}, {"truth", "/tesse/odom"}};
+  EXPECT_TRUE(Ingest(paths_[0], "office", options)->was_known) << "as without the names";
+  options.topics = {{"imu0", kNoTopic}};
+  const auto without = Ingest(paths_[0], "lab", options);
+  ASSERT_TRUE(without.ok()) << without.status();
+  EXPECT_NE(HeadOf("lab").session_id, HeadOf("office").session_id);
 }
 
 // A robot turns in a room; a lidar of 16 beams stands 0.6 m above its body.
