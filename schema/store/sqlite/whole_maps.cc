@@ -16,8 +16,8 @@
 #include <utility>
 #include <vector>
 
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/strip.h"
 #include "schema/base/log.h"
 #include "schema/base/status.h"
 #include "schema/store/sqlite/database.h"
@@ -82,13 +82,30 @@ absl::StatusOr<std::unique_ptr<WriterLock>> LockMap(const std::string& store_fol
   return lock;
 }
 
-// What dsg puts into the folder of a map, also where it was killed: the database with its log, the
-// one that is being made, and those that an upgrade has kept.
+// A database or what SQLite keeps beside it.
+bool IsDatabaseFile(absl::string_view file, absl::string_view database) {
+  if (!absl::ConsumePrefix(&file, database)) return false;
+  return file.empty() || file == "-wal" || file == "-shm" || file == "-journal";
+}
+
+// What a creation of a map that was killed leaves in its folder.
+bool IsLeftByCreation(absl::string_view file) {
+  return file == "writer.lock" || IsDatabaseFile(file, "graph.db.new");
+}
+
+// A copy that an upgrade has kept, or had begun.
+bool IsCopyOfUpgrade(absl::string_view file) {
+  if (!absl::ConsumePrefix(&file, "graph.db.format")) return false;
+  absl::ConsumeSuffix(&file, ".new");
+  return !file.empty() && file.find_first_not_of("0123456789") == absl::string_view::npos;
+}
+
 bool IsFileOfMap(const fs::directory_entry& entry) {
   const std::string name = entry.path().filename().string();
   std::error_code error;
   return entry.symlink_status(error).type() == fs::file_type::regular &&
-         (name == "writer.lock" || name == "reserve" || absl::StartsWith(name, "graph.db"));
+         (name == "reserve" || IsDatabaseFile(name, "graph.db") || IsLeftByCreation(name) ||
+          IsCopyOfUpgrade(name));
 }
 
 // What somebody else has put there is not ours to remove.
@@ -168,11 +185,6 @@ absl::StatusOr<int64_t> RemoveFolder(const std::string& store_folder, const std:
   Log(LogLevel::kWarning, "dropped-map-left",
       {{"map", name}, {"folder", dropped}, {"error", error.message()}});
   return BytesOfFolder(dropped);
-}
-
-// What a creation of a map that was killed leaves in its folder.
-bool IsLeftByCreation(const std::string& file) {
-  return file == "writer.lock" || absl::StartsWith(file, "graph.db.new");
 }
 
 // Removes what stands in the way of a folder of that name, if it is nobody's.

@@ -123,6 +123,12 @@ TEST_F(DroppedFiles, BesideThoseOfSomebodyElseStay) {
   EXPECT_TRUE(absl::StrContains(refused.message(), "office/notes is no file of a map")) << refused;
   EXPECT_EQ(HeadOf(*store, kMap), kLength);
   fs::remove_all(PathOf("office/notes"));
+  for (const std::string copy : {"graph.db.bak", "graph.db.format2.mine", "graph.db-old"}) {
+    Write("office/" + copy, "a copy that somebody made");
+    EXPECT_EQ(ReasonOf(store->DropMap(kMap, {}).status()), Reason::kNotAStore) << copy;
+    fs::remove(PathOf("office/" + copy));
+  }
+  Write("office/graph.db.format2.new", "half a copy");
   EXPECT_TRUE(store->DropMap(kMap, {}).ok());
 }
 
