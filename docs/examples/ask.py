@@ -27,10 +27,10 @@ TIMEOUT_S = 5.0
 NS_PER_S = 1_000_000_000
 
 
-def ask_where(stub, name, agent, at_ns):
+def ask_where(service, name, agent, at_ns):
     """Each second for ten seconds, in one call."""
     instants = [query.AgentInstant(agent=agent, at_ns=at_ns + i * NS_PER_S) for i in range(10)]
-    reply = stub.BatchLocateAgents(
+    reply = service.BatchLocateAgents(
         query.BatchLocateAgentsRequest(map=name, instants=instants), timeout=TIMEOUT_S)
     for result in reply.results:
         if result.status_code:
@@ -40,28 +40,28 @@ def ask_where(stub, name, agent, at_ns):
         print(f"where: {result.agent_id} in {result.room_id} at {p.x:.2f} {p.y:.2f}")
 
 
-def ask_find(stub, name):
+def ask_find(service, name):
     """The query language of docs/search.md, nearest first from the origin."""
     request = search.SearchNodesRequest(map=name, query="chair", page_size=3)
     request.near.SetInParent()
-    for hit in stub.SearchNodes(request, timeout=TIMEOUT_S).hits:
+    for hit in service.SearchNodes(request, timeout=TIMEOUT_S).hits:
         print(f"find: {hit.node.id} {hit.node.name}, {hit.distance_m:.2f} m")
 
 
-def ask_path(stub, name, agent, at_ns):
+def ask_path(service, name, agent, at_ns):
     """The path from the agent to the nearest chair."""
     request = space.PlanPathRequest(map=name, at_ns=at_ns)
     # "from" is a keyword of Python.
     getattr(request, "from").node = agent
     request.to.nearest.class_name = "chair"
-    reply = stub.PlanPath(request, timeout=TIMEOUT_S)
+    reply = service.PlanPath(request, timeout=TIMEOUT_S)
     print(f"path: {reply.length_m:.2f} m to {reply.to_node_id} over "
           f"{len(reply.place_ids)} places")
 
 
-def ask_predict(stub, name, agent, from_ns):
+def ask_predict(service, name, agent, from_ns):
     request = space.PredictAgentRequest(map=name, agent=agent, from_ns=from_ns)
-    for path in stub.PredictAgent(request, timeout=TIMEOUT_S).paths:
+    for path in service.PredictAgent(request, timeout=TIMEOUT_S).paths:
         print(f"predict: probability {path.probability:.3f}, {len(path.poses)} steps")
 
 
@@ -72,12 +72,12 @@ def main(arguments):
     address, name, agent, seconds = arguments
     at_ns = int(float(seconds) * NS_PER_S)
     with grpc.insecure_channel(address) as channel:
-        stub = query_service_pb2_grpc.QueryServiceStub(channel)
+        service = query_service_pb2_grpc.QueryServiceStub(channel)
         try:
-            ask_where(stub, name, agent, at_ns)
-            ask_find(stub, name)
-            ask_path(stub, name, agent, at_ns)
-            ask_predict(stub, name, agent, at_ns)
+            ask_where(service, name, agent, at_ns)
+            ask_find(service, name)
+            ask_path(service, name, agent, at_ns)
+            ask_predict(service, name, agent, at_ns)
         except grpc.RpcError as error:
             print(f"ask.py: {error.code().name}: {error.details()}", file=sys.stderr)
             return 1

@@ -186,7 +186,7 @@ void AddConfigFile(CLI::App* app) {
     option->check([](const std::string& text) {
       double number = 0.0;
       if (!absl::SimpleAtod(text, &number) || std::isfinite(number)) return std::string();
-      return absl::StrCat(text, " is no number");
+      return absl::StrCat(text, " is no finite number");
     });
   }
   app->set_config(absl::StrCat("--", kConfig), "",

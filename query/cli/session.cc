@@ -60,15 +60,20 @@ absl::Status Session::Open() {
 
 absl::Status Session::ChooseMap() {
   std::string name = common_.map;
+  v1::ListMapsResponse list;
   if (name.empty()) {
-    v1::ListMapsResponse list;
     DSG_RETURN_IF_ERROR(api_->ListMaps(NewCall(), v1::ListMapsRequest(), &list));
     DSG_ASSIGN_OR_RETURN(name, OnlyMap(list, PlaceOf(common_)));
   }
-  v1::GetMapStatsRequest request;
-  request.set_map(name);
+  // Of a map that cannot be opened the question for it says why.
   v1::GetMapStatsResponse reply;
-  DSG_RETURN_IF_ERROR(api_->GetMapStats(NewCall(), request, &reply));
+  if (list.maps().empty()) {
+    v1::GetMapStatsRequest request;
+    request.set_map(name);
+    DSG_RETURN_IF_ERROR(api_->GetMapStats(NewCall(), request, &reply));
+  } else {
+    *reply.mutable_map() = list.maps(0);
+  }
   DSG_ASSIGN_OR_RETURN(map_, FromProto(reply.map()));
   times_ = TimeText(map_);
   return absl::OkStatus();

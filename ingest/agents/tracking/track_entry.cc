@@ -26,7 +26,7 @@ PersonObservation Weighed(PersonObservation observation, const TrackerOptions& o
 }  // namespace
 
 bool IsTrackable(const PersonObservation& observation, const TrackerOptions& options) {
-  if (!IsUsable(observation) || !IsUsable(Weighed(observation, options))) return false;
+  if (!IsUsable(Weighed(observation, options))) return false;
   if (!observation.has_joints) return true;
   return std::all_of(observation.joints_torso.begin(), observation.joints_torso.end(),
                      [](const Eigen::Vector3d& joint) { return joint.allFinite(); });

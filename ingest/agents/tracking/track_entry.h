@@ -19,7 +19,7 @@ struct SeenPerson {
   ShapeMean shape;
 };
 
-/// Whether a torso graph takes it (IsUsable), however it is weighed, and its joints are finite.
+/// Whether a torso graph takes it as it is weighed (IsUsable), and its joints are finite.
 bool IsTrackable(const PersonObservation& observation, const TrackerOptions& options);
 
 SeenPerson MakeSeen(PersonObservation observation);
