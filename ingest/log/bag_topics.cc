@@ -28,7 +28,10 @@ constexpr char kCompressedType[] = "sensor_msgs/CompressedImage";
 constexpr char kCompressed[] = "/compressed";
 constexpr char kCompressedDepth[] = "/compressedDepth";
 constexpr char kCloudType[] = "sensor_msgs/PointCloud2";
+constexpr char kPoseWithCovarianceType[] = "geometry_msgs/PoseWithCovarianceStamped";
 constexpr char kStringType[] = "std_msgs/String";
+// What a person has told the localisation (RViz), no pose that was measured.
+constexpr char kInitialPose[] = "/initialpose";
 constexpr char kLabelColors[] = "/tesse/seg_cam/rgb/image_raw";
 
 struct KnownTopic {
@@ -78,9 +81,11 @@ constexpr ChannelType kChannelTypes[] = {
     {"imu0", "sensor_msgs/Imu", TopicUse::kImu},
     {"poses", "nav_msgs/Odometry", TopicUse::kExternal},
     {"poses", "geometry_msgs/PoseStamped", TopicUse::kExternal},
+    {"poses", kPoseWithCovarianceType, TopicUse::kExternal},
     {"poses", "geometry_msgs/TransformStamped", TopicUse::kExternal},
     {"truth", "nav_msgs/Odometry", TopicUse::kTruth},
     {"truth", "geometry_msgs/PoseStamped", TopicUse::kTruth},
+    {"truth", kPoseWithCovarianceType, TopicUse::kTruth},
     {"truth", "geometry_msgs/TransformStamped", TopicUse::kTruth},
     {"detections0", kStringType, TopicUse::kDetections},
     {"loops0", kStringType, TopicUse::kLoops},
@@ -214,6 +219,7 @@ void UseOnlyTopicOf(const std::string& type, TopicUse use, const std::string& ch
   BagTopic* only = nullptr;
   for (BagTopic& topic : plan->topics) {
     if (topic.type != type || topic.use != TopicUse::kNone || topic.message_count == 0) continue;
+    if (topic.name == kInitialPose) continue;
     if (only != nullptr) return;
     only = &topic;
   }
@@ -379,8 +385,8 @@ absl::StatusOr<BagPlan> PlanBag(const Bag& bag, const NamedTopics& named) {
   DSG_RETURN_IF_ERROR(UseImagesByEncoding(bag, named, &plan));
   UseOnlyTopicOf(kCloudType, TopicUse::kCloud, "lidar0", named, &plan);
   UseOnlyTopicOf("sensor_msgs/Imu", TopicUse::kImu, "imu0", named, &plan);
-  for (const char* type :
-       {"nav_msgs/Odometry", "geometry_msgs/PoseStamped", "geometry_msgs/TransformStamped"}) {
+  for (const char* type : {"nav_msgs/Odometry", "geometry_msgs/PoseStamped",
+                           kPoseWithCovarianceType, "geometry_msgs/TransformStamped"}) {
     UseOnlyTopicOf(type, TopicUse::kExternal, "poses", named, &plan);
   }
   DSG_RETURN_IF_ERROR(ReadBagCalibration(bag, &plan));

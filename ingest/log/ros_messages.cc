@@ -143,6 +143,18 @@ absl::StatusOr<RosPose> ParseRosPoseStamped(const RosBytes& message, const std::
   return pose;
 }
 
+absl::StatusOr<RosPose> ParseRosPoseWithCovariance(const RosBytes& message,
+                                                   const std::string& origin) {
+  RosFields fields(message);
+  RosPose pose;
+  pose.header = fields.Header();
+  pose.position = fields.Vector3();
+  pose.xyzw = fields.Vector4();
+  fields.SkipDoubles(36);
+  DSG_RETURN_IF_ERROR(fields.End("geometry_msgs/PoseWithCovarianceStamped", origin));
+  return pose;
+}
+
 absl::StatusOr<RosPose> ParseRosTransform(const RosBytes& message, const std::string& origin) {
   RosFields fields(message);
   RosPose pose = ReadTransform(&fields);
@@ -154,6 +166,9 @@ absl::StatusOr<RosPose> ParseRosPoseOf(std::string_view type, const RosBytes& me
                                        const std::string& origin) {
   if (type == "nav_msgs/Odometry") return ParseRosOdometry(message, origin);
   if (type == "geometry_msgs/PoseStamped") return ParseRosPoseStamped(message, origin);
+  if (type == "geometry_msgs/PoseWithCovarianceStamped") {
+    return ParseRosPoseWithCovariance(message, origin);
+  }
   return ParseRosTransform(message, origin);
 }
 

@@ -75,7 +75,8 @@ struct RosImu {
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();
 };
 
-/// nav_msgs/Odometry, geometry_msgs/PoseStamped or TransformStamped.
+/// nav_msgs/Odometry, geometry_msgs/PoseStamped, PoseWithCovarianceStamped or TransformStamped,
+/// without velocities and covariances.
 struct RosPose {
   RosHeader header;
   std::string child_frame_id;
@@ -99,8 +100,10 @@ absl::StatusOr<RosCameraInfo> ParseRosCameraInfo(const RosBytes& message,
 absl::StatusOr<RosImu> ParseRosImu(const RosBytes& message, const std::string& origin);
 absl::StatusOr<RosPose> ParseRosOdometry(const RosBytes& message, const std::string& origin);
 absl::StatusOr<RosPose> ParseRosPoseStamped(const RosBytes& message, const std::string& origin);
+absl::StatusOr<RosPose> ParseRosPoseWithCovariance(const RosBytes& message,
+                                                   const std::string& origin);
 absl::StatusOr<RosPose> ParseRosTransform(const RosBytes& message, const std::string& origin);
-/// Of the three types above, by name.
+/// Of the four types above, by name.
 absl::StatusOr<RosPose> ParseRosPoseOf(std::string_view type, const RosBytes& message,
                                        const std::string& origin);
 absl::StatusOr<std::vector<RosPose>> ParseRosTransforms(const RosBytes& message,

@@ -102,6 +102,42 @@ TEST(Ros2Bag, IsTheSameLogAsLongAsNothingThatIsReadDiffers) {
   }
 }
 
+// As AMCL publishes it; two topics of other uses must not hide it.
+TEST(Ros2Bag, TakesPosesWithCovariance) {
+  const auto record = [](const auto& empty) {
+    Recording recording;
+    const auto add = [&](const std::string& topic, TimeNs t, double x) {
+      recording.push_back({topic, "geometry_msgs/PoseWithCovarianceStamped", t,
+                           PoseWithCovarianceFields(empty, t, {x, 2, 3, 0, 0, 0.6, 0.8})});
+    };
+    add("/initialpose", kT0, 9);
+    for (int i = 0; i < 3; ++i) add("/amcl_pose", kT0 + i, 1.0 + i);
+    return recording;
+  };
+  const TempFolder folder;
+  const std::string ros2 = folder.Write("log.mcap", WriteMcap(record(CdrWriter())));
+  for (const std::string& path : {ros2, folder.Write("log.bag", WriteBag(record(ByteWriter())))}) {
+    SCOPED_TRACE(path);
+    const auto log = ReadAll(path);
+    ASSERT_TRUE(log.ok()) << log.status();
+    ASSERT_EQ(log->poses.size(), 3u);
+    const Pose3d& last = log->poses[2].pose.map_T_agent;
+    EXPECT_EQ(last.position, Eigen::Vector3d(3, 2, 3));
+    EXPECT_TRUE(last.orientation.isApprox(Eigen::Quaterniond(0.8, 0, 0, 0.6)));
+    EXPECT_NE(AllNotes(log->info).find("external: /amcl_pose"), std::string::npos);
+  }
+  LogOptions options;
+  options.topics = {{"truth", "/initialpose"}};
+  const auto named = ReadAll(ros2, options);
+  ASSERT_TRUE(named.ok()) << named.status();
+  ASSERT_EQ(named->poses.size(), 1u);
+  EXPECT_EQ(named->poses[0].pose.map_T_agent.position.x(), 9.0);
+  Recording cut = record(CdrWriter());
+  cut.back().data.resize(cut.back().data.size() - 8);
+  ExpectMalformedFile(ReadAll(folder.Write("cut.mcap", WriteMcap(cut))).status(),
+                      {"/amcl_pose message 3", "geometry_msgs/PoseWithCovarianceStamped"});
+}
+
 class BagFolderTest : public testing::Test {
  protected:
   void SetUp() override {

@@ -108,6 +108,12 @@ std::string OdometryFields(Writer out, TimeNs time_ns, const std::vector<double>
 }
 
 template <typename Writer>
+std::string PoseWithCovarianceFields(Writer out, TimeNs time_ns, const std::vector<double>& pose) {
+  out.Header(time_ns, "map").Doubles(pose).Doubles(std::vector<double>(36, 0.25));
+  return out.bytes();
+}
+
+template <typename Writer>
 std::string TransformsFields(Writer out, const std::vector<std::string>& children) {
   out.U32(children.size());
   double y = 0.05;

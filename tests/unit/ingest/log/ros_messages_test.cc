@@ -7,7 +7,7 @@
 #include <random>
 
 #include "schema/base/status.h"
-#include "tests/unit/ingest/log/bag_writer.h"
+#include "tests/unit/ingest/log/ros2_writer.h"
 
 namespace dsg::ingest {
 namespace {
@@ -62,6 +62,7 @@ TEST(RosMessages, SurviveAnyCutAndAnyChangedByte) {
     count += ParseRosImu(bytes, "x").ok() ? 1 : 0;
     count += ParseRosOdometry(bytes, "x").ok() ? 1 : 0;
     count += ParseRosPoseStamped(bytes, "x").ok() ? 1 : 0;
+    count += ParseRosPoseWithCovariance(bytes, "x").ok() ? 1 : 0;
     count += ParseRosTransform(bytes, "x").ok() ? 1 : 0;
     count += ParseRosTransforms(bytes, "x").ok() ? 1 : 0;
     count += ParseRosString(bytes, "x").ok() ? 1 : 0;
@@ -70,7 +71,8 @@ TEST(RosMessages, SurviveAnyCutAndAnyChangedByte) {
   for (const std::string& whole :
        {ImuMessage(1, 2, 3), ImageMessage(1, "mono8", 2, 2, 2, "abcd"),
         CameraInfoMessage(6, 4, 5.0, "plumb_bob", {1, 2}, "cam"),
-        OdometryMessage(1, {1, 2, 3, 0, 0, 0, 1}), StringMessage("hello")}) {
+        OdometryMessage(1, {1, 2, 3, 0, 0, 0, 1}),
+        PoseWithCovarianceFields(ByteWriter(), 1, {1, 2, 3, 0, 0, 0, 1}), StringMessage("hello")}) {
     EXPECT_GE(parse_all(whole), 1);
     for (size_t size = 0; size < whole.size(); ++size) {
       // Cut bytes may by chance be a whole message of another type; never of the same one.
