@@ -37,6 +37,16 @@ bool IsLong(const std::string& name) {
          std::end(kLongMembers);
 }
 
+// Of nearly all edges.
+const UsualMembers& UsualEdge() {
+  static const UsualMembers usual = {"info",
+                                     {{"metadata", "{}"},
+                                      {"type", "\"EdgeAttributes\""},
+                                      {"weight", "1.0"},
+                                      {"weighted", "false"}}};
+  return usual;
+}
+
 class SparkJsonReader {
  public:
   SparkJsonReader(const std::string& file, const PassedText& passed)
@@ -109,7 +119,8 @@ class SparkJsonReader {
     size_t done = 0;
     size_t count = 0;
     for (cursor.BeginArray(); cursor.NextElement();) {
-      Json element = std::is_same_v<T, SparkNode> ? NodeValue(member, &cursor) : cursor.Value();
+      Json element =
+          std::is_same_v<T, SparkNode> ? NodeValue(member, &cursor) : cursor.Value(&UsualEdge());
       if (!cursor.ok()) break;
       read(absl::StrCat(name, "[", count++, "]"), &element);
       // A list that grows is in memory twice, and its items are copied.
