@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "absl/status/status.h"
+#include "schema/model/graph_delta.h"
 #include "schema/model/node.h"
 
 namespace dsg::ingest {
@@ -36,5 +38,11 @@ class AgentNamer {
   std::unordered_set<NodeId> taken_;
   std::map<char, uint64_t> largest_index_;
 };
+
+/// Gives each agent of `delta` the id that `namer` has for its name, its own if that is free, in
+/// every part of the delta.
+///
+/// Errors: INVALID_ARGUMENT/FILE_MALFORMED when two agents of the graph share name and kind.
+absl::Status RenameAgents(AgentNamer* namer, GraphDelta* delta);
 
 }  // namespace dsg::ingest

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/pipeline/session.h"
 #include "ingest/log/format.h"
 #include "ingest/pipeline/log_run.h"
-#include "ingest/pipeline/session.h"
 #include "schema/base/status.h"
 #include "schema/base/utf8.h"
 #include "schema/codec/checksum.h"

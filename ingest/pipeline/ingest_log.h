@@ -7,8 +7,8 @@
 #include <optional>
 #include <string>
 
+#include "ingest/commit/delta_sink.h"
 #include "ingest/log/log_source.h"
-#include "ingest/pipeline/delta_sink.h"
 #include "ingest/pipeline/log_mapper.h"
 #include "ingest/pipeline/person_mapper.h"
 #include "ingest/pipeline/robot_model.h"

@@ -9,11 +9,11 @@
 #include <utility>
 #include <vector>
 
+#include "ingest/commit/graph_told.h"
 #include "ingest/objects/object_tracker.h"
 #include "ingest/objects/relations.h"
 #include "ingest/objects/shapes/cad_model.h"
 #include "ingest/objects/shapes/shape_fit.h"
-#include "ingest/pipeline/graph_told.h"
 #include "ingest/places/place_graph.h"
 #include "ingest/rooms/find_rooms.h"
 #include "ingest/rooms/structure.h"

@@ -12,13 +12,13 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "ingest/commit/map_view.h"
+#include "ingest/commit/mesh_told.h"
 #include "ingest/depth/frame_maker.h"
 #include "ingest/log/log_source.h"
-#include "ingest/pipeline/map_view.h"
 #include "ingest/pipeline/mapping_options.h"
-#include "ingest/pipeline/mesh_told.h"
-#include "ingest/pipeline/region_index.h"
 #include "ingest/pipeline/static_layers.h"
+#include "ingest/presence/region_index.h"
 
 namespace dsg::ingest {
 

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "ingest/commit/map_view.h"
 #include "ingest/pipeline/layer_graph.h"
-#include "ingest/pipeline/map_view.h"
-#include "ingest/pipeline/region_index.h"
+#include "ingest/presence/region_index.h"
 #include "schema/model/graph_delta.h"
 
 namespace dsg::ingest {

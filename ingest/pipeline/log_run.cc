@@ -5,10 +5,9 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/commit/graph_boxes.h"
+#include "ingest/correction/correction.h"
 #include "ingest/pipeline/contact_edges.h"
-#include "ingest/pipeline/correction.h"
-#include "ingest/pipeline/graph_agents.h"
-#include "ingest/pipeline/graph_boxes.h"
 #include "ingest/pipeline/held_edges.h"
 #include "schema/base/status.h"
 #include "schema/model/delta_check.h"

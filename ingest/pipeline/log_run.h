@@ -18,8 +18,8 @@
 #include "ingest/pipeline/people_told.h"
 #include "ingest/pipeline/person_mapper.h"
 #include "ingest/pipeline/robot_told.h"
-#include "ingest/pipeline/stay_mender.h"
-#include "ingest/pipeline/stay_tracker.h"
+#include "ingest/presence/stay_mender.h"
+#include "ingest/presence/stay_tracker.h"
 
 namespace dsg::ingest {
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "ingest/commit/graph_told.h"
 #include "ingest/grid/distance_field.h"
 #include "ingest/objects/carried_things.h"
 #include "ingest/objects/object_tracker.h"
@@ -19,7 +20,6 @@
 #include "ingest/objects/relations.h"
 #include "ingest/objects/shapes/shape_fit.h"
 #include "ingest/objects/small_objects.h"
-#include "ingest/pipeline/graph_told.h"
 #include "ingest/pipeline/layer_graph.h"
 #include "ingest/pipeline/mapping_options.h"
 #include "ingest/pipeline/stage_clock.h"

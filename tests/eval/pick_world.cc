@@ -8,8 +8,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "ingest/pipeline/contact_edges.h"
-#include "ingest/pipeline/region_index.h"
-#include "ingest/pipeline/stay_tracker.h"
+#include "ingest/presence/region_index.h"
+#include "ingest/presence/stay_tracker.h"
 #include "ingest/simulator/body/life.h"
 #include "ingest/simulator/world/world_graph.h"
 #include "schema/base/status.h"

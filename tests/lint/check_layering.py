@@ -20,6 +20,8 @@ INGEST_STAGES = ["log", "simulator", "evaluation", "odometry", "loop", "depth", 
                  "objects", "places", "rooms"]
 # Plain types that stages hand to one another.
 INGEST_SHARED = ["ingest/config", "ingest/files", "ingest/sensor", "ingest/grid"]
+# What is done with what the stages found.
+INGEST_ROOMS = ["ingest/commit", "ingest/presence", "ingest/correction"]
 # Programs of their own beside the pipeline, which knows nothing of them.
 ASIDE = ["simulator", "evaluation"]
 ALLOWED = {
@@ -44,10 +46,12 @@ ALLOWED = {
     "ingest/files": BASE + ["schema/files"],
     "ingest/sensor": MODEL,
     "ingest/grid": MODEL,
-    "ingest/remote": SCHEMA + ["query/api", "query/client"],
-    "ingest/pipeline": (SCHEMA + INGEST_SHARED + ["ingest/remote"] +
+    "ingest/commit": SCHEMA + ["query/api", "query/client"],
+    "ingest/presence": MODEL,
+    "ingest/correction": SCHEMA + ["ingest/commit", "ingest/log", "ingest/loop"],
+    "ingest/pipeline": (SCHEMA + INGEST_SHARED + INGEST_ROOMS +
                         [f"ingest/{s}" for s in INGEST_STAGES if s not in ASIDE]),
-    "ingest": SCHEMA + ["ingest/config", "ingest/log", "ingest/pipeline", "ingest/remote"],
+    "ingest/program": SCHEMA + ["ingest/files", "ingest/log", "ingest/commit", "ingest/pipeline"],
     # The calls as C++, and the one client: below both the programs of query and those of ingest.
     "query/api": BASE,
     "query/client": CODEC + ["query/api"],
@@ -81,7 +85,7 @@ THIRD_PARTY = [
     (r"grpc(pp|\+\+)?/|.*\.grpc\.pb\.h$",
      ["query/client", "server", "tests"]),
     (r"(dsg/v1|google/protobuf)/.*",
-     ["schema/codec *.cc", "schema/store *.cc", "ingest/remote *.cc", "query *.cc", "server *.cc",
+     ["schema/codec *.cc", "schema/store *.cc", "ingest/commit *.cc", "query *.cc", "server *.cc",
       "docs/examples *.cc", "proto", "tests"]),
     (r"fcl/", ["query/engine *.cc", "tests"]),
     (r"pcl/|opencv2?/|ceres/|gtsam/|embree3/|rosbag/|yaml-cpp/|nanoflann",

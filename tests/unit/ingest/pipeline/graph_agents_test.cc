@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Agents of ready-made graphs among the agents of a map.
-#include "ingest/pipeline/graph_agents.h"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "ingest/pipeline/region_index.h"
+#include "ingest/presence/region_index.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/model/node.h"
 #include "schema/store/graph_writer.h"
