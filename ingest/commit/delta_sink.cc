@@ -26,6 +26,18 @@ int64_t PoseCount(const GraphDelta& delta) {
 
 }  // namespace
 
+void DeltaSink::NumberByNews() {
+  numbers_by_news_ = true;
+  sequence_ = committed_sequence_ = last_sequence_;
+}
+
+void DeltaSink::BeginEnd() {
+  is_at_end_ = true;
+  header_.session_id = EndSessionId(header_.session_id);
+  last_sequence_ = end_sequence_;
+  sequence_ = committed_sequence_ = 0;
+}
+
 absl::Status DeltaSink::Put(GraphDelta delta) {
   if (delta.empty()) return absl::OkStatus();
   // Edges that end depend on what the map held before the log. They all go with the first part,
@@ -96,7 +108,11 @@ absl::Status DeltaSink::PutPartAsIs(GraphDelta delta) {
 
 absl::Status DeltaSink::CommitNext(GraphDelta delta) {
   DSG_RETURN_IF_ERROR(forgotten_.LeaveOut(&delta));
-  if (delta.empty()) return absl::OkStatus();
+  if (delta.empty()) {
+    if (numbers_by_news_) --sequence_;
+    return absl::OkStatus();
+  }
+  if (end_sequence_ > 0 && !is_at_end_) return EndWasTold();
   // Sequences have no holes, or a resumed run could not count its way back to here: deltas
   // without news are committed empty once there is news after them.
   while (committed_sequence_ + 1 < sequence_) {
@@ -106,6 +122,13 @@ absl::Status DeltaSink::CommitNext(GraphDelta delta) {
   }
   FillHeader(sequence_, &delta);
   return Commit(std::move(delta));
+}
+
+absl::Status DeltaSink::EndWasTold() const {
+  return absl::FailedPreconditionError(
+      absl::StrCat(header_.message, ": an earlier run has told map \"", header_.map,
+                   "\" the end of this log, and it has grown since; what it showed then cannot be "
+                   "continued: take the whole log into another --map"));
 }
 
 void DeltaSink::FillHeader(int64_t sequence, GraphDelta* delta) const {

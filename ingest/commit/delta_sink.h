@@ -37,6 +37,9 @@ struct SessionHeader {
   std::string config_digest;
 };
 
+/// Of the last deltas of a log that may grow on.
+inline std::string EndSessionId(const std::string& session_id) { return session_id + "-end"; }
+
 /// Threads: one caller at a time.
 class DeltaSink {
  public:
@@ -51,6 +54,18 @@ class DeltaSink {
         reconciler_(map),
         forgotten_(map),
         writer_(writer) {}
+
+  /// For a log that is cut into other deltas each time it is read, as it grows: what an earlier run
+  /// has committed is known by the map that holds it, and not by the number of its delta. Before
+  /// the first Put; goes with Put only.
+  void NumberByNews();
+
+  /// For a log that may grow on after its end: its last deltas, from BeginEnd on, are a session of
+  /// their own (EndSessionId), so that those before keep their numbers. `end_sequence`: how far an
+  /// earlier run of that session got; then news before BeginEnd are refused with
+  /// FAILED_PRECONDITION, since the log has grown after its end was told.
+  void SplitEnd(int64_t end_sequence) { end_sequence_ = end_sequence; }
+  void BeginEnd();
 
   /// Takes the next delta of the log, whatever its size. An empty one is passed over.
   ///
@@ -72,6 +87,7 @@ class DeltaSink {
   absl::Status PutPartAsIs(GraphDelta delta);
   absl::Status CommitNext(GraphDelta delta);
   void FillHeader(int64_t sequence, GraphDelta* delta) const;
+  absl::Status EndWasTold() const;
   absl::Status Commit(GraphDelta delta);
   absl::StatusOr<CommitResult> Send(const GraphDelta& delta);
   void Count(const GraphDelta& delta);
@@ -79,6 +95,11 @@ class DeltaSink {
   SessionHeader header_;
   int64_t last_sequence_;
   bool is_size_bounded_;
+  /// Only deltas with news have numbers.
+  bool numbers_by_news_ = false;
+  /// Of the session of the end; 0 = nothing of it was told.
+  int64_t end_sequence_ = 0;
+  bool is_at_end_ = false;
   /// Of the delta that came last.
   int64_t sequence_ = 0;
   /// Of the delta that the writer got last.

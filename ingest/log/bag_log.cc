@@ -8,12 +8,16 @@
 #include <tuple>
 #include <utility>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "ingest/log/bag.h"
 #include "ingest/log/bag_identity.h"
 #include "ingest/log/bag_topics.h"
 #include "ingest/log/bag_transforms.h"
 #include "ingest/log/detection_json.h"
+#include "ingest/log/followed_log.h"
+#include "ingest/log/growing_bag.h"
 #include "ingest/log/image_file.h"
 #include "ingest/log/loop_file.h"
 #include "ingest/log/ros_cloud.h"
@@ -69,19 +73,32 @@ TimeNs TimeOf(const Measurement& measurement) {
 
 class BagLog : public LogSource {
  public:
-  BagLog(std::shared_ptr<const Bag> bag, BagPlan plan, std::string robot_name, LogInfo info)
+  /// `growing`: null for a bag that is there as a whole.
+  BagLog(std::shared_ptr<const Bag> bag, std::unique_ptr<GrowingBag> growing, BagPlan plan,
+         std::string robot_name, LogInfo info)
       : info_(std::move(info)),
+        is_usable_(info_.measurement_count > 0),
         bag_(std::move(bag)),
+        growing_(std::move(growing)),
         plan_(std::move(plan)),
         class_of_color_(std::make_shared<const std::map<uint32_t, int32_t>>(plan_.class_of_color)),
         robot_name_(std::move(robot_name)),
         numbers_(plan_.topics.size(), 0),
-        last_(plan_.topics.size()) {}
+        last_(plan_.topics.size()) {
+    // Nobody knows how many there will be.
+    if (growing_ != nullptr) info_.measurement_count = 0;
+  }
 
   const LogInfo& info() const override { return info_; }
+  void SetIdle(std::function<absl::Status()> idle) override {
+    if (growing_ != nullptr) growing_->file().SetIdle(std::move(idle));
+  }
 
   /// What is known as a whole before the bag is read: poses and loop closures.
-  void AddKnown(SensorChannel channel) { known_.push_back({std::move(channel)}); }
+  void AddKnown(SensorChannel channel) {
+    known_.push_back({std::move(channel)});
+    is_usable_ = true;
+  }
 
   /// Reads until the first measurement is known.
   absl::Status FindFirst() {
@@ -97,8 +114,10 @@ class BagLog : public LogSource {
   }
 
   absl::StatusOr<std::optional<Measurement>> Next() override {
-    if (info_.measurement_count == 0) return NothingUsable();
+    if (!is_usable_) return NothingUsable();
     DSG_RETURN_IF_ERROR(Fill());
+    // What could still be overtaken is read again when the log is taken up again.
+    if (IsStopped() && UsedTopicCount() > 1) return std::nullopt;
     Known* const known = FirstKnown();
     if (known != nullptr &&
         (waiting_.empty() ||
@@ -139,11 +158,68 @@ class BagLog : public LogSource {
                      {{"file", info_.path}});
   }
 
+  bool IsStopped() const { return growing_ != nullptr && growing_->file().IsStopped(); }
+
+  int64_t UsedTopicCount() const {
+    return std::count_if(plan_.topics.begin(), plan_.topics.end(),
+                         [](const BagTopic& topic) { return topic.use != TopicUse::kNone; });
+  }
+
+  // Whether what comes first can no longer be overtaken.
+  bool HasNext() const {
+    if (waiting_.empty()) return false;
+    return latest_ns_ - waiting_.begin()->first.time_ns >= kHorizonNs ||
+           (growing_ != nullptr && UsedTopicCount() == 1);
+  }
+
+  // Whether there are messages that were not taken.
+  absl::StatusOr<bool> HasMore() {
+    if (next_ < bag_->messages().size()) return true;
+    if (growing_ == nullptr || is_ended_) return false;
+    DSG_ASSIGN_OR_RETURN(const bool has_more, growing_->Wait());
+    if (!has_more) EndGrowth();
+    return has_more;
+  }
+
+  void EndGrowth() {
+    is_ended_ = true;
+    if (late_topics_.empty()) return;
+    info_.notes.push_back(absl::StrCat(
+        "topics that came later than ", kFollowedBeginNs / kNsPerSecond,
+        " s after the first message and were not read: ", absl::StrJoin(late_topics_, ", ")));
+  }
+
+  // Gives the connections that are new a topic: that of their name, or none.
+  void PlanLateConnections() {
+    const std::vector<BagConnection>& connections = bag_->connections();
+    for (size_t i = plan_.topic_of_connection.size(); i < connections.size(); ++i) {
+      const auto same =
+          std::find_if(plan_.topics.begin(), plan_.topics.end(), [&](const BagTopic& topic) {
+            return topic.name == connections[i].topic && topic.type == connections[i].type;
+          });
+      plan_.topic_of_connection.push_back(static_cast<size_t>(same - plan_.topics.begin()));
+      if (same != plan_.topics.end()) continue;
+      constexpr size_t kNamedMax = 20;
+      if (late_topics_.size() < kNamedMax) {
+        late_topics_.push_back(absl::Utf8SafeCHexEscape(connections[i].topic.substr(0, 120)));
+      }
+      BagTopic topic;
+      topic.name = connections[i].topic;
+      topic.type = connections[i].type;
+      plan_.topics.push_back(std::move(topic));
+      plan_.first_messages.emplace_back();
+      numbers_.push_back(0);
+      last_.emplace_back();
+    }
+  }
+
   // Until what comes first can no longer be overtaken.
   absl::Status Fill() {
-    while (next_ < bag_->messages().size() &&
-           (waiting_.empty() || latest_ns_ - waiting_.begin()->first.time_ns < kHorizonNs)) {
-      const BagMessageRef& ref = bag_->messages()[next_++];
+    while (!HasNext()) {
+      DSG_ASSIGN_OR_RETURN(const bool has_more, HasMore());
+      if (!has_more) return absl::OkStatus();
+      PlanLateConnections();
+      const BagMessageRef ref = bag_->messages()[next_++];
       const size_t topic = plan_.topic_of_connection[ref.connection];
       if (plan_.topics[topic].use == TopicUse::kNone) continue;
       DSG_RETURN_IF_ERROR(Take(ref, topic));
@@ -262,7 +338,11 @@ class BagLog : public LogSource {
   }
 
   LogInfo info_;
+  bool is_usable_;
   std::shared_ptr<const Bag> bag_;
+  std::unique_ptr<GrowingBag> growing_;
+  bool is_ended_ = false;
+  std::vector<std::string> late_topics_;
   BagPlan plan_;
   std::shared_ptr<const std::map<uint32_t, int32_t>> class_of_color_;
   std::string robot_name_;
@@ -327,7 +407,9 @@ absl::StatusOr<std::optional<TrackTable>> PlanPoses(const Bag& bag, const LogOpt
     // A topic of poses goes before the transforms, which take a pass over the bag.
     const bool wants_truth = options.poses == PoseSource::kGroundTruth ||
                              (options.poses == PoseSource::kAuto && has_truth);
-    if (!has_external && !wants_truth && HasMovingTransforms(bag)) {
+    // Of a followed bag nobody knows them all.
+    const bool can_take_transforms = !options.follow.has_value() && HasMovingTransforms(bag);
+    if (!has_external && !wants_truth && can_take_transforms) {
       DSG_ASSIGN_OR_RETURN(table, ReadTransformPoses(bag, options, info));
     }
     DSG_ASSIGN_OR_RETURN(
@@ -346,6 +428,9 @@ absl::StatusOr<std::optional<TrackTable>> PlanPoses(const Bag& bag, const LogOpt
   }
   if (table.has_value() && !from_file) {
     info->notes.push_back(absl::StrCat("the robot's poses are external: ", table->file));
+  } else if (options.follow.has_value() && choice == PoseChoice::kNone) {
+    info->notes.push_back(
+        "a bag that is followed gives poses from a topic of poses only, not from /tf");
   } else if (HasMovingTransforms(bag) && choice != PoseChoice::kNone) {
     info->notes.push_back("/tf is not taken for poses: a topic of poses goes before it");
   }
@@ -380,6 +465,26 @@ absl::StatusOr<std::optional<SensorChannel>> ReadLoops(const Bag& bag, const Log
   return ReadLoopChannel(options, /*log_path=*/"", digest, info);
 }
 
+// What the plan says of a log, besides its poses and its identity.
+LogInfo InfoOf(const Bag& bag, const BagPlan& plan) {
+  LogInfo info;
+  info.format = bag.format();
+  info.path = bag.path();
+  info.has_clock = true;
+  info.rig = plan.rig;
+  info.labels = plan.labels;
+  info.notes = plan.notes;
+  return info;
+}
+
+void CountTopics(const BagPlan& plan, LogInfo* info) {
+  for (const BagTopic& topic : plan.topics) {
+    if (topic.use == TopicUse::kNone) continue;
+    info->channel_counts[topic.channel] += topic.message_count;
+    info->measurement_count += topic.message_count;
+  }
+}
+
 void Count(const SensorChannel& channel, LogInfo* info) {
   const auto count = static_cast<int64_t>(channel.times.size());
   info->channel_counts[channel.name] = count;
@@ -391,13 +496,7 @@ void Count(const SensorChannel& channel, LogInfo* info) {
 OpenedLog OpenBag(const std::string& path, const LogOptions& options) {
   DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Bag> bag, OpenBagFiles(path));
   DSG_ASSIGN_OR_RETURN(BagPlan plan, PlanBag(*bag, options.topics));
-  LogInfo info;
-  info.format = bag->format();
-  info.path = path;
-  info.has_clock = true;
-  info.rig = plan.rig;
-  info.labels = plan.labels;
-  info.notes = plan.notes;
+  LogInfo info = InfoOf(*bag, plan);
   LogDigest digest;
   DSG_ASSIGN_OR_RETURN(std::optional<TrackTable> poses,
                        PlanPoses(*bag, options, &plan, &digest, &info));
@@ -406,11 +505,7 @@ OpenedLog OpenBag(const std::string& path, const LogOptions& options) {
   DSG_ASSIGN_OR_RETURN(std::optional<SensorChannel> loops,
                        ReadLoops(*bag, options, &plan, &digest, &info));
   info.content_sha256 = digest.Hex();
-  for (const BagTopic& topic : plan.topics) {
-    if (topic.use == TopicUse::kNone) continue;
-    info.channel_counts[topic.channel] += topic.message_count;
-    info.measurement_count += topic.message_count;
-  }
+  CountTopics(plan, &info);
   std::vector<SensorChannel> known;
   if (poses.has_value()) {
     known.push_back(MakePoseChannel(*std::move(poses)));
@@ -420,9 +515,38 @@ OpenedLog OpenBag(const std::string& path, const LogOptions& options) {
   }
   if (loops.has_value()) known.push_back(*std::move(loops));
   for (const SensorChannel& channel : known) Count(channel, &info);
-  auto log = std::make_unique<BagLog>(std::move(bag), std::move(plan), RobotName(options),
+  auto log = std::make_unique<BagLog>(std::move(bag), nullptr, std::move(plan), RobotName(options),
                                       std::move(info));
   for (SensorChannel& channel : known) log->AddKnown(std::move(channel));
+  DSG_RETURN_IF_ERROR(log->FindFirst());
+  return std::unique_ptr<LogSource>(std::move(log));
+}
+
+OpenedLog OpenFollowedBag(std::unique_ptr<GrowingFile> file, const LogOptions& options) {
+  DSG_ASSIGN_OR_RETURN(std::unique_ptr<GrowingBag> growing, GrowingBag::Open(std::move(file)));
+  DSG_ASSIGN_OR_RETURN(const size_t message_count, growing->WaitForBegin(kFollowedBeginNs));
+  const std::shared_ptr<const Bag> bag = growing->bag();
+  const BagBegin begin(*bag, message_count);
+  DSG_ASSIGN_OR_RETURN(BagPlan plan, PlanBag(begin, options.topics));
+  LogInfo info = InfoOf(begin, plan);
+  info.notes.push_back("the log is followed: it is committed while it grows");
+  for (BagTopic& topic : plan.topics) {
+    if (topic.use != TopicUse::kLoops) continue;
+    topic.use = TopicUse::kNone;
+    info.notes.push_back(
+        absl::StrCat(topic.name,
+                     " is not read: loop closures are told after their times, "
+                     "and must be known before; take the bag when it is finished"));
+  }
+  LogDigest digest;
+  DSG_RETURN_IF_ERROR(PlanPoses(begin, options, &plan, &digest, &info).status());
+  AddBagContent(begin, plan, std::nullopt, &digest);
+  // A bag of the same first seconds that is taken as a whole is another session.
+  digest.AddSize("followed", 0);
+  info.content_sha256 = digest.Hex();
+  CountTopics(plan, &info);
+  auto log = std::make_unique<BagLog>(bag, std::move(growing), std::move(plan), RobotName(options),
+                                      std::move(info));
   DSG_RETURN_IF_ERROR(log->FindFirst());
   return std::unique_ptr<LogSource>(std::move(log));
 }

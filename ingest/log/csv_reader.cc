@@ -237,11 +237,11 @@ class RowReader {
   TrackTable* table_;
 };
 
-void AddHeaderNotes(const Header& header, LogInfo* info) {
+void AddHeaderNotes(const Header& header, std::vector<std::string>* notes) {
   if (header.Has(kId) && !header.Has(kKind)) {
-    info->notes.push_back("there is no column \"kind\": all agents are people");
+    notes->push_back("there is no column \"kind\": all agents are people");
   }
-  if (!header.Has(kZ)) info->notes.push_back("there is no column \"z\": all positions have z = 0");
+  if (!header.Has(kZ)) notes->push_back("there is no column \"z\": all positions have z = 0");
   if (header.unknown.empty()) return;
   constexpr size_t kNamedMax = 20;
   std::vector<std::string> named;
@@ -252,7 +252,7 @@ void AddHeaderNotes(const Header& header, LogInfo* info) {
     }
     named.push_back(absl::StrCat("\"", absl::Utf8SafeCHexEscape(name.substr(0, 40)), "\""));
   }
-  info->notes.push_back(absl::StrCat("columns that are not read: ", absl::StrJoin(named, ", ")));
+  notes->push_back(absl::StrCat("columns that are not read: ", absl::StrJoin(named, ", ")));
 }
 
 }  // namespace
@@ -270,15 +270,16 @@ bool IsCsvHeader(std::string_view line) {
   return has[kTime] && has[kX] && has[kY];
 }
 
-OpenedLog ReadCsv(const LogFile& file, const LogOptions& options) {
-  TrackTable table;
-  table.file = file.path;
-  LineReader lines(file.bytes);
+absl::StatusOr<TextRows> ReadCsvRows(const LogFile& file, const LogOptions& options) {
+  TextRows found{.clock = RowClock::kAny, .may_repeat = true};
+  found.table.file = file.path;
+  LineReader lines(file.bytes, file.lines_left_out);
   TextLine line;
   if (!lines.Next(&line)) return LinePosition{file.path, 1}.Error("the header is missing");
   DSG_ASSIGN_OR_RETURN(const Header header,
                        ReadColumns(LinePosition{file.path, line.number}, line.text));
-  RowReader rows(header, options, &table);
+  found.is_of_one = !header.Has(kId);
+  RowReader rows(header, options, &found.table);
   std::vector<std::string_view> fields;
   while (lines.Next(&line)) {
     if (line.text.starts_with('#')) continue;
@@ -288,11 +289,8 @@ OpenedLog ReadCsv(const LogFile& file, const LogOptions& options) {
         CheckFieldCount(at, line, fields.size(), header.field_count, "as in the header"));
     DSG_RETURN_IF_ERROR(rows.Add(at, fields));
   }
-  LogInfo info = DescribeTextLog("csv", file);
-  DSG_RETURN_IF_ERROR(SetClock(options, &table, &info));
-  AddHeaderNotes(header, &info);
-  DropRepeats(options.is_strict, &table, &info.notes);
-  return MakeClockLog(std::move(table), std::nullopt, std::move(info));
+  AddHeaderNotes(header, &found.notes);
+  return found;
 }
 
 }  // namespace dsg::ingest

@@ -34,7 +34,9 @@ absl::StatusOr<LogFile> ReadLogFile(const std::string& path) {
     return MalformedFile(path, "is not a regular file; give a log file or folder");
   }
   std::ifstream in(path, std::ios::binary);
-  LogFile file{.path = path, .name = fs::path(path).filename().string(), .bytes = {}};
+  LogFile file;
+  file.path = path;
+  file.name = fs::path(path).filename().string();
   const uintmax_t size = fs::file_size(path, error);
   if (in && !error) {
     file.bytes.resize(size);

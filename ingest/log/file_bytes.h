@@ -3,6 +3,7 @@
 // Refuses anything but regular files: a pipe or device has no end that can be checked.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -20,6 +21,8 @@ struct LogFile {
   /// Within the log: "tracks.csv"; part of the log's identity when the log is a folder.
   std::string name;
   std::string bytes;
+  /// Of a text whose lines are read in pieces: how many are missing behind the first line.
+  int64_t lines_left_out = 0;
 };
 
 /// INVALID_ARGUMENT/FILE_MALFORMED: "path: message".

@@ -13,6 +13,7 @@
 #include "ingest/log/db3_file.h"
 #include "ingest/log/file_bytes.h"
 #include "ingest/log/folder_log.h"
+#include "ingest/log/kitti_folder.h"
 #include "ingest/log/mcap_file.h"
 #include "ingest/log/readers.h"
 #include "ingest/log/rgbd_layout.h"
@@ -156,7 +157,7 @@ const std::vector<std::string>& FormatNames() {
                                    "kimera-json", "region-json", "dsg-tracks",
                                    "rgbd",        "rosbag",      "tesse-objects",
                                    "tum",         "tum-rgbd",    "csv",
-                                   "mcap",        "rosbag2"};
+                                   "mcap",        "rosbag2",     "kitti"};
   return *names;
 }
 
@@ -213,15 +214,16 @@ absl::StatusOr<std::string> DetectFolderFormat(const std::string& folder) {
   if (IsBagFolder(folder)) return "rosbag2";
   if (FindRgbdLayout(folder) != RgbdLayout::kNone) return "rgbd";
   if (IsTumFolder(folder)) return "tum-rgbd";
+  if (IsKittiFolder(folder)) return "kitti";
   if (!FindSensorRoot((root / "log").string()).empty()) {
     return Unknown(folder,
                    absl::StrCat("holds a simulation; give its log: ", (root / "log").string()));
   }
-  return Unknown(
-      folder,
-      "holds neither tracks.csv (dsg-tracks) nor mav0/ with sensors or "
-      "mav0/state_groundtruth_estimate0/data.csv (euroc), nor frames of a known RGB-D "
-      "dataset (rgbd, tum-rgbd), nor a bag of ROS 2 (rosbag2); give the log file itself");
+  return Unknown(folder,
+                 "holds neither tracks.csv (dsg-tracks) nor mav0/ with sensors or "
+                 "mav0/state_groundtruth_estimate0/data.csv (euroc), nor frames of a known RGB-D "
+                 "dataset (rgbd, tum-rgbd), nor scans in velodyne/ (kitti), nor a bag of ROS 2 "
+                 "(rosbag2); give the log file itself");
 }
 
 }  // namespace dsg::ingest

@@ -28,6 +28,17 @@ int64_t CommonestStep(const std::vector<int64_t>& frames) {
 
 }  // namespace
 
+absl::StatusOr<TimeNs> FrameTime(const LinePosition& at, const LogOptions& options, int64_t frame,
+                                 int64_t first, int64_t step) {
+  const __int128 scaled = static_cast<__int128>(frame - first) * options.frame_period_ns;
+  const __int128 offset = (scaled + step / 2) / step;
+  if (offset > kTimeMax) {
+    return at.FieldError("frame", absl::StrCat(frame),
+                         "lies more than 292 years after the first frame; correct the line");
+  }
+  return AddToEpoch(at, options.epoch_ns, static_cast<TimeNs>(offset));
+}
+
 absl::Status ApplyFrameClock(const LogOptions& options, TrackTable* table) {
   // Readers keep frames within +-2^53, so differences fit.
   std::vector<int64_t> frames;
@@ -38,15 +49,7 @@ absl::Status ApplyFrameClock(const LogOptions& options, TrackTable* table) {
   const int64_t step = CommonestStep(frames);
   for (TrackRow& row : table->rows) {
     const LinePosition at{table->file, row.line};
-    const __int128 scaled =
-        static_cast<__int128>(row.time_ns - frames.front()) * options.frame_period_ns;
-    const __int128 offset = (scaled + step / 2) / step;
-    if (offset > kTimeMax) {
-      return at.FieldError("frame", absl::StrCat(row.time_ns),
-                           "lies more than 292 years after the first frame; correct the line");
-    }
-    DSG_ASSIGN_OR_RETURN(row.time_ns,
-                         AddToEpoch(at, options.epoch_ns, static_cast<TimeNs>(offset)));
+    DSG_ASSIGN_OR_RETURN(row.time_ns, FrameTime(at, options, row.time_ns, frames.front(), step));
   }
   return CheckOrder(*table, "time");
 }

@@ -7,13 +7,20 @@
 
 #include "absl/status/statusor.h"
 #include "ingest/log/log_source.h"
+#include "ingest/log/text_table.h"
 #include "ingest/log/track_log.h"
 
 namespace dsg::ingest {
 
-/// Replaces frame numbers by nanoseconds: epoch + (frame - first) / step * frame_period, where
-/// first is the log's smallest frame and step the commonest difference of successive distinct
-/// frames (the smallest of equally common ones). Exact in integers, rounded to the nearest ns.
+/// epoch + (frame - first) / step * frame_period, exact in integers, rounded to the nearest ns.
+/// Requires: `frame` is not before `first`, both within +-2^53, and `step` is positive.
+/// Errors: FILE_MALFORMED when the time does not fit in 64 bits.
+absl::StatusOr<TimeNs> FrameTime(const LinePosition& at, const LogOptions& options, int64_t frame,
+                                 int64_t first, int64_t step);
+
+/// Replaces frame numbers by the nanoseconds of FrameTime, where first is the log's smallest frame
+/// and step the commonest difference of successive distinct frames (the smallest of equally common
+/// ones).
 ///
 /// Errors: FILE_MALFORMED when a time does not fit in 64 bits, or the period is so short that
 /// two frames fall on one nanosecond.

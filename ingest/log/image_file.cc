@@ -63,6 +63,20 @@ void SwapRedAndBlue(Image* image) {
   }
 }
 
+// Requires: one channel, of 8 or 16 bits.
+Image Labels(const cv::Mat& mat, const ImageDecoding& decoding) {
+  cv::Mat numbers;
+  mat.convertTo(numbers, CV_16U);
+  Image image = Copy(numbers, PixelFormat::kLabel16);
+  for (size_t i = 0; i + 1 < image.bytes.size(); i += 2) {
+    uint16_t value = 0;
+    std::memcpy(&value, image.bytes.data() + i, sizeof(value));
+    value = (*decoding.label_of_id)[value];
+    std::memcpy(image.bytes.data() + i, &value, sizeof(value));
+  }
+  return image;
+}
+
 absl::StatusOr<Image> Convert(const cv::Mat& mat, const std::string& origin,
                               const ImageDecoding& decoding) {
   switch (decoding.role) {
@@ -81,6 +95,9 @@ absl::StatusOr<Image> Convert(const cv::Mat& mat, const std::string& origin,
       if (mat.type() == CV_16UC1) return ScaleDepth(Copy(mat, PixelFormat::kDepth16), decoding);
       break;
     case ImageRole::kLabel:
+      if (decoding.label_of_id != nullptr && (mat.type() == CV_8UC1 || mat.type() == CV_16UC1)) {
+        return Labels(mat, decoding);
+      }
       if (mat.type() == CV_16UC1) return Copy(mat, PixelFormat::kLabel16);
       break;
   }

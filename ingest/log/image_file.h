@@ -3,8 +3,11 @@
 // Refuses to guess: an image of another depth than the channel's is an error.
 #pragma once
 
+#include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "ingest/log/image_header.h"
@@ -30,6 +33,9 @@ struct ImageDecoding {
   double depth_units_per_m = 1000.0;
   /// Whether a depth of 65535 means no reading, besides 0.
   bool is_max_no_reading = false;
+  /// Of labels of 8 or 16 bits that are numbers of a table: 65536 values of kLabel16. Null: 16 bits
+  /// that are kLabel16 themselves.
+  std::shared_ptr<const std::vector<uint16_t>> label_of_id;
 };
 
 /// PNG, JPEG or TIFF. `origin` is for messages.

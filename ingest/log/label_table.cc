@@ -1,6 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ingest/log/label_table.h"
 
+#include <algorithm>
+#include <iterator>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "ingest/log/text_table.h"
 #include "schema/base/status.h"
@@ -39,7 +45,129 @@ absl::StatusOr<LabelRow> ReadLabelRow(const LinePosition& at,
   return row;
 }
 
+// Where the columns of a table are that are read.
+struct IdColumns {
+  char comma = ',';
+  size_t id = 0;
+  size_t name = 1;
+};
+
+bool IsNoClass(const std::string& name) {
+  constexpr std::string_view kNoClass[] = {"unknown", "unlabeled",  "unlabelled", "unannotated",
+                                           "void",    "background", "ignore",     "none",
+                                           "null",    "undefined"};
+  const std::string lower = absl::AsciiStrToLower(name);
+  return std::find(std::begin(kNoClass), std::end(kNoClass), lower) != std::end(kNoClass);
+}
+
+void SplitIds(std::string_view text, char comma, std::vector<std::string_view>* fields) {
+  if (comma != ' ') return SplitAtCommas(text, fields, comma);
+  const size_t end = text.find_first_of(" \t");
+  fields->assign(1, text.substr(0, end));
+  const size_t name = end == std::string_view::npos ? end : text.find_first_not_of(" \t", end);
+  if (name != std::string_view::npos) fields->push_back(text.substr(name));
+}
+
+char CommaOfIds(std::string_view line) {
+  for (const char comma : {',', ';', '\t'}) {
+    if (line.find(comma) != std::string_view::npos) return comma;
+  }
+  return ' ';
+}
+
+// True if the line is a header, whose columns go to `columns`.
+absl::StatusOr<bool> ReadIdHeader(const LinePosition& at, std::string_view line,
+                                  IdColumns* columns) {
+  columns->comma = CommaOfIds(line);
+  std::vector<std::string_view> fields;
+  SplitIds(line, columns->comma, &fields);
+  if (ParseInteger(at, "id", fields[0]).ok()) return false;
+  std::optional<size_t> id;
+  std::optional<size_t> name;
+  for (size_t i = 0; i < fields.size(); ++i) {
+    const std::string field = absl::AsciiStrToLower(std::string(fields[i]));
+    if (field == "id" && !id.has_value()) id = i;
+    if (field == "name" && !name.has_value()) name = i;
+  }
+  if (!id.has_value() || !name.has_value()) {
+    return at.FieldError("header", line, "the columns \"id\" and \"name\" are due");
+  }
+  columns->id = *id;
+  columns->name = *name;
+  return true;
+}
+
 }  // namespace
+
+absl::StatusOr<LabelIds> ReadLabelIds(const LogFile& file) {
+  std::map<int64_t, std::string> name_of;
+  LabelIds ids;
+  IdColumns columns;
+  LineReader lines(file.bytes);
+  TextLine line;
+  std::vector<std::string_view> fields;
+  bool is_first = true;
+  while (lines.Next(&line)) {
+    if (line.text.starts_with('#')) continue;
+    const LinePosition at{file.path, line.number};
+    if (std::exchange(is_first, false)) {
+      DSG_ASSIGN_OR_RETURN(const bool is_header, ReadIdHeader(at, line.text, &columns));
+      if (is_header) continue;
+    }
+    SplitIds(line.text, columns.comma, &fields);
+    if (fields.size() <= std::max(columns.id, columns.name)) {
+      return at.Error("an id and a name are due");
+    }
+    DSG_ASSIGN_OR_RETURN(const uint32_t id,
+                         ReadBounded(at, "id", fields[columns.id], LabelIds::kCount - 1));
+    std::string name(fields[columns.name]);
+    if (name.empty() || name.size() > 1024 || !IsUtf8(name)) {
+      return at.FieldError("name", name, "a name in UTF-8 of at most 1024 bytes is due");
+    }
+    if (ids.is_listed[id]) return at.FieldError("id", fields[columns.id], "stands twice");
+    ids.is_listed[id] = true;
+    if (!IsNoClass(name)) name_of.emplace(id, std::move(name));
+  }
+  if (name_of.empty() || name_of.size() > kClassMax) {
+    return MalformedFile(file.path, absl::StrCat("names ", name_of.size(), " classes; 1 to ",
+                                                 kClassMax, " are read"));
+  }
+  ids.is_renumbered = name_of.begin()->first < 1 || name_of.rbegin()->first > kClassMax;
+  for (auto& [id, name] : name_of) {
+    const auto class_id =
+        static_cast<int32_t>(ids.is_renumbered ? std::ssize(ids.classes) + 1 : id);
+    ids.label_of_id[static_cast<size_t>(id)] = static_cast<uint16_t>(class_id << 8);
+    ids.classes.push_back({class_id, std::move(name)});
+  }
+  return ids;
+}
+
+absl::StatusOr<ClassList> ReadClassList(const LogFile& file) {
+  LogFile table = file;
+  LineReader lines(file.bytes);
+  TextLine line;
+  IdColumns columns;
+  const bool has_line = lines.Next(&line);
+  const LinePosition first{file.path, line.number};
+  std::vector<std::string_view> fields;
+  SplitIds(line.text, CommaOfIds(line.text), &fields);
+  const bool has_ids = has_line && (ParseInteger(first, "id", fields[0]).ok() ||
+                                    ReadIdHeader(first, line.text, &columns).ok());
+  if (has_line && !has_ids) {
+    // As a table, with a tab, which names do not have.
+    table.bytes = "id\tname\n";
+    LineReader names(file.bytes);
+    for (int64_t number = 0; names.Next(&line); ++number) {
+      absl::StrAppend(&table.bytes, number, "\t", std::string(line.text), "\n");
+    }
+  }
+  ClassList list;
+  DSG_ASSIGN_OR_RETURN(list.ids, ReadLabelIds(table));
+  for (size_t id = 0; id < LabelIds::kCount; ++id) {
+    if (list.ids.is_listed[id]) list.count = id + 1;
+  }
+  return list;
+}
 
 std::map<uint32_t, int32_t> LabelTable::ClassOfColor() const {
   std::map<uint32_t, int32_t> classes;

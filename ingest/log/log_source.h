@@ -2,6 +2,8 @@
 // One recorded log, whatever its format, as a stream of stamped measurements.
 #pragma once
 
+#include <atomic>
+#include <chrono>
 #include <functional>
 #include <map>
 #include <memory>
@@ -77,7 +79,7 @@ using Measurement = std::variant<PoseMeasurement, GraphMeasurement, ImuMeasureme
 struct LogInfo {
   /// "obsmat", "trajnet", "trajnet-ndjson", "thor", "euroc", "spark-dsg", "kimera-json",
   /// "region-json", "dsg-tracks", "rgbd", "rosbag", "tesse-objects", "tum", "tum-rgbd",
-  /// "csv", "mcap", "rosbag2".
+  /// "csv", "mcap", "rosbag2", "kitti".
   std::string format;
   std::string path;
   /// SHA-256 of the log's bytes, hexadecimal: the identity of the log. Of image files only names
@@ -120,6 +122,14 @@ enum class PoseSource {
   kExternal,
 };
 
+/// How a file is read that another program is still writing.
+struct FollowOptions {
+  /// The log ends after so long without growth; unset = never.
+  std::optional<std::chrono::milliseconds> timeout;
+  /// Set from a signal handler or another thread: the log ends at once. Outlives the log.
+  const std::atomic<bool>* stop = nullptr;
+};
+
 struct LogOptions {
   /// "auto" or one of the names in LogInfo::format.
   std::string format = "auto";
@@ -141,10 +151,15 @@ struct LogOptions {
   std::string pose_file;
   /// Loop closures to read instead of the log's; empty = the log's own.
   std::string loop_file;
+  /// Of RGB-D folders: pictures of labels, and what their numbers mean (label_folder.h); empty =
+  /// none.
+  std::string label_folder;
   /// Of bags: the topic of a channel ("depth0", "poses", ...), instead of the one that its name or
   /// type tells; kNoTopic leaves the channel out. What is read by them is part of the log's
   /// content_sha256.
   std::map<std::string, std::string> topics;
+  /// Set: the file may still grow, and Next waits for more of it (followed_log.h).
+  std::optional<FollowOptions> follow;
 };
 
 inline constexpr char kNoTopic[] = "none";
@@ -162,6 +177,8 @@ class LogSource {
   /// nullopt at the end. Errors: INVALID_ARGUMENT/FILE_MALFORMED naming file, line, field, and
   /// what to do.
   virtual absl::StatusOr<std::optional<Measurement>> Next() = 0;
+  /// Of a followed log: called several times a second while Next waits; an error of it is Next's.
+  virtual void SetIdle(std::function<absl::Status()> /*idle*/) {}
 };
 
 /// Opens a log file or folder, finding out its format unless told. "-" is standard input, for

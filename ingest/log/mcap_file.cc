@@ -35,6 +35,9 @@ enum class Op : uint8_t {
   kDataEnd = 0x0f,
 };
 
+// Attachments may be large.
+constexpr uint64_t kRecordBytesMax = uint64_t{4} << 30;
+
 constexpr uint64_t kRecordHead = 1 + 8;
 constexpr uint64_t kFooterSize = 8 + 8 + 4;
 constexpr uint64_t kMessageHead = 2 + 4 + 8 + 8;
@@ -112,6 +115,36 @@ class McapFile::Builder {
                                                  "; ", kRemedy));
     }
     SortBagMessages(&mcap_.messages_);
+    return absl::OkStatus();
+  }
+
+  // Takes whole records up to `size`, without index and summary, which come after the messages.
+  absl::Status Grow(uint64_t size) {
+    if (next_at_ == 0) {
+      if (size < kMcapMagic.size()) return absl::OkStatus();
+      next_at_ = kMcapMagic.size();
+    }
+    while (!mcap_.is_closed_ && size - next_at_ >= kRecordHead) {
+      DSG_ASSIGN_OR_RETURN(const std::string head, file_.ReadBytes(next_at_, kRecordHead, kRemedy));
+      const Record record{static_cast<Op>(head[0]), next_at_ + kRecordHead,
+                          LittleEndian(head, 1, 8)};
+      // No record begins so: space that its writer has set aside.
+      if (head[0] == '\0') return absl::OkStatus();
+      if (record.size > kRecordBytesMax) {
+        return file_.Fail(next_at_, absl::StrCat("a record claims ", record.size,
+                                                 " bytes: the file is damaged, or is no MCAP"));
+      }
+      if (record.size > size - record.at) return absl::OkStatus();
+      if (record.op == Op::kDataEnd || record.op == Op::kFooter) {
+        mcap_.is_closed_ = true;
+      } else if (record.op != Op::kMessageIndex) {
+        DSG_RETURN_IF_ERROR(Take(record));
+      }
+      for (const uint32_t chunk : std::exchange(chunks_to_search_, {})) {
+        DSG_RETURN_IF_ERROR(SearchChunk(chunk));
+      }
+      next_at_ = record.end();
+    }
     return absl::OkStatus();
   }
 
@@ -266,6 +299,7 @@ class McapFile::Builder {
     const auto [known, is_new] = connection_of_.try_emplace(
         static_cast<uint16_t>(id), static_cast<uint32_t>(mcap_.connections_.size()));
     if (is_new) {
+      const std::lock_guard<std::mutex> lock(mcap_.growth_mutex_);
       mcap_.connections_.push_back(std::move(connection));
       return absl::OkStatus();
     }
@@ -293,7 +327,10 @@ class McapFile::Builder {
       return TooShort(record.begin(), "a chunk");
     }
     const auto index = static_cast<uint32_t>(mcap_.chunks_.size());
-    mcap_.chunks_.push_back(std::move(chunk));
+    {
+      const std::lock_guard<std::mutex> lock(mcap_.growth_mutex_);
+      mcap_.chunks_.push_back(std::move(chunk));
+    }
     // Its index, if it has one, comes right behind it.
     chunks_to_search_.push_back(index);
     return absl::OkStatus();
@@ -373,6 +410,8 @@ class McapFile::Builder {
   const RandomFile& file_;
   uint64_t footer_at_ = 0;
   uint64_t summary_at_ = 0;
+  /// Of a growing file: the first record that has not been taken.
+  uint64_t next_at_ = 0;
   std::optional<uint64_t> message_count_;
   std::unordered_map<uint16_t, std::string> schemas_;
   std::unordered_map<uint16_t, uint32_t> connection_of_;
@@ -380,19 +419,35 @@ class McapFile::Builder {
 };
 
 absl::StatusOr<std::shared_ptr<const McapFile>> McapFile::Open(const std::string& path) {
-  DSG_ASSIGN_OR_RETURN(std::unique_ptr<const RandomFile> file, RandomFile::Open(path));
+  DSG_ASSIGN_OR_RETURN(std::unique_ptr<RandomFile> file, RandomFile::Open(path));
   const std::shared_ptr<McapFile> mcap(new McapFile(std::move(file)));
   DSG_RETURN_IF_ERROR(Builder(*mcap).Build());
   return mcap;
 }
 
-McapFile::McapFile(std::unique_ptr<const RandomFile> file)
+absl::StatusOr<std::shared_ptr<McapFile>> McapFile::OpenGrowing(const std::string& path) {
+  DSG_ASSIGN_OR_RETURN(std::unique_ptr<RandomFile> file, RandomFile::Open(path));
+  std::shared_ptr<McapFile> mcap(new McapFile(std::move(file)));
+  // As many as there are numbers of channels, so that none moves while others read.
+  mcap->connections_.reserve(size_t{1} << 16);
+  mcap->builder_ = std::make_unique<Builder>(*mcap);
+  return mcap;
+}
+
+absl::Status McapFile::GrowTo(uint64_t size) {
+  file_->GrowTo(size);
+  return builder_->Grow(size);
+}
+
+McapFile::McapFile(std::unique_ptr<RandomFile> file)
     : file_(std::move(file)), unpacked_(kUnpackedBytesMax) {}
+
+McapFile::~McapFile() = default;
 
 absl::StatusOr<std::shared_ptr<const std::string>> McapFile::LoadChunk(uint32_t index) const {
   using Bytes = std::shared_ptr<const std::string>;
   return unpacked_.Get(index, {}, [&]() -> absl::StatusOr<Costed<Bytes>> {
-    const Chunk& chunk = chunks_[index];
+    const Chunk chunk = ChunkAt(index);
     if (chunk.data_size > kBagChunkBytesMax) {
       return file_->Fail(chunk.data_at, "the chunk is too large");
     }
@@ -412,7 +467,12 @@ absl::StatusOr<std::shared_ptr<const std::string>> McapFile::LoadChunk(uint32_t 
   });
 }
 
-absl::StatusOr<BagMessage> McapFile::ReadPlain(const BagMessageRef& message,
+McapFile::Chunk McapFile::ChunkAt(uint32_t index) const {
+  const std::lock_guard<std::mutex> lock(growth_mutex_);
+  return chunks_[index];
+}
+
+absl::StatusOr<BagMessage> McapFile::ReadPlain(const BagMessageRef& message, RosEncoding encoding,
                                                size_t byte_count_max) const {
   DSG_ASSIGN_OR_RETURN(const std::string head,
                        file_->ReadBytes(message.offset, kRecordHead, kRemedy));
@@ -424,21 +484,27 @@ absl::StatusOr<BagMessage> McapFile::ReadPlain(const BagMessageRef& message,
                                         std::min<uint64_t>(size, byte_count_max), kRemedy));
   BagMessage result;
   result.owner = std::make_shared<const std::string>(std::move(bytes));
-  result.data = {*result.owner, connections_[message.connection].encoding};
+  result.data = {*result.owner, encoding};
   return result;
 }
 
 absl::StatusOr<BagMessage> McapFile::ReadFirst(const BagMessageRef& message,
                                                size_t byte_count_max) const {
-  if (message.chunk == kNoChunk) return ReadPlain(message, byte_count_max);
+  uint32_t channel = 0;
+  RosEncoding encoding = RosEncoding::kCdr;
+  {
+    const std::lock_guard<std::mutex> lock(growth_mutex_);
+    channel = connections_[message.connection].id;
+    encoding = connections_[message.connection].encoding;
+  }
+  if (message.chunk == kNoChunk) return ReadPlain(message, encoding, byte_count_max);
   BagMessage result;
   DSG_ASSIGN_OR_RETURN(result.owner, LoadChunk(message.chunk));
-  const BagConnection& connection = connections_[message.connection];
   const std::string_view all = *result.owner;
   const auto fail = [&] {
     return file_->Fail(
-        chunks_[message.chunk].data_at,
-        absl::StrCat("the index says that a message of channel ", connection.id, " lies at byte ",
+        ChunkAt(message.chunk).data_at,
+        absl::StrCat("the index says that a message of channel ", channel, " lies at byte ",
                      message.offset, " of this chunk, but it does not; ", kRemedy));
   };
   // Open() checked the offset against the size that the chunk declares, which is the real one.
@@ -447,11 +513,11 @@ absl::StatusOr<BagMessage> McapFile::ReadFirst(const BagMessageRef& message,
   const uint64_t size = LittleEndian(record, 1, 8);
   const bool is_message = static_cast<Op>(record[0]) == Op::kMessage && size >= kMessageHead &&
                           size <= record.size() - kRecordHead &&
-                          LittleEndian(record, kRecordHead, 2) == connection.id;
+                          LittleEndian(record, kRecordHead, 2) == channel;
   if (!is_message) return fail();
   const std::string_view data = record.substr(
       kRecordHead + kMessageHead, std::min<uint64_t>(size - kMessageHead, byte_count_max));
-  result.data = {data, connection.encoding};
+  result.data = {data, encoding};
   return result;
 }
 

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,17 @@ class McapFile : public Bag {
   /// Errors: INVALID_ARGUMENT/FILE_MALFORMED naming the byte offset; a file that was not closed
   /// names `mcap recover`.
   static absl::StatusOr<std::shared_ptr<const McapFile>> Open(const std::string& path);
+  ~McapFile() override;
+
+  /// Opens a file that is still written. It holds no messages before GrowTo.
+  static absl::StatusOr<std::shared_ptr<McapFile>> OpenGrowing(const std::string& path);
+  /// Adds the messages of the records and chunks that are whole within the first `size` bytes, as
+  /// they stand in the file; `size` grows from call to call. Threads: one caller, while others
+  /// read messages.
+  /// Errors: of Open; what was added before stays.
+  absl::Status GrowTo(uint64_t size);
+  /// Whether the end of the data has been seen: there will be no more messages.
+  bool is_closed() const { return is_closed_; }
 
   std::string_view format() const override { return "mcap"; }
   const std::string& path() const override { return file_->path(); }
@@ -48,12 +60,19 @@ class McapFile : public Bag {
   };
   class Builder;
 
-  explicit McapFile(std::unique_ptr<const RandomFile> file);
+  explicit McapFile(std::unique_ptr<RandomFile> file);
 
+  Chunk ChunkAt(uint32_t index) const;
   absl::StatusOr<std::shared_ptr<const std::string>> LoadChunk(uint32_t index) const;
-  absl::StatusOr<BagMessage> ReadPlain(const BagMessageRef& message, size_t byte_count_max) const;
+  absl::StatusOr<BagMessage> ReadPlain(const BagMessageRef& message, RosEncoding encoding,
+                                       size_t byte_count_max) const;
 
-  std::unique_ptr<const RandomFile> file_;
+  std::unique_ptr<RandomFile> file_;
+  /// Of a file that grows; null once it is read whole.
+  std::unique_ptr<Builder> builder_;
+  bool is_closed_ = false;
+  /// Pictures are read by any thread while a growing file gets further channels and chunks.
+  mutable std::mutex growth_mutex_;
   std::vector<BagConnection> connections_;
   std::vector<Chunk> chunks_;
   std::vector<BagMessageRef> messages_;

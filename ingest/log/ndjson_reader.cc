@@ -3,7 +3,6 @@
 #include <nlohmann/json.hpp>
 
 #include "absl/strings/str_cat.h"
-#include "ingest/log/frame_clock.h"
 #include "ingest/log/readers.h"
 #include "ingest/log/text_table.h"
 #include "ingest/log/track_log.h"
@@ -54,10 +53,10 @@ absl::Status AddTrack(const LogOptions& options, const LinePosition& at, const J
 
 }  // namespace
 
-OpenedLog ReadTrajnetNdjson(const LogFile& file, const LogOptions& options) {
-  TrackTable table;
-  table.file = file.path;
-  LineReader lines(file.bytes);
+absl::StatusOr<TextRows> ReadNdjsonRows(const LogFile& file, const LogOptions& options) {
+  TextRows rows{.clock = RowClock::kFrames};
+  rows.table.file = file.path;
+  LineReader lines(file.bytes, file.lines_left_out);
   TextLine line;
   int64_t scene_count = 0;
   while (lines.Next(&line)) {
@@ -72,7 +71,7 @@ OpenedLog ReadTrajnetNdjson(const LogFile& file, const LogOptions& options) {
       return at.FieldError("line", line.text, "one JSON object a line is due; correct the line");
     }
     if (json.is_object() && json.contains("track")) {
-      DSG_RETURN_IF_ERROR(AddTrack(options, at, json["track"], &table));
+      DSG_RETURN_IF_ERROR(AddTrack(options, at, json["track"], &rows.table));
     } else if (json.is_object() && json.contains("scene")) {
       ++scene_count;
     } else {
@@ -80,12 +79,11 @@ OpenedLog ReadTrajnetNdjson(const LogFile& file, const LogOptions& options) {
                            "an object with \"track\" or \"scene\" is due; correct the line");
     }
   }
-  LogInfo info = DescribeTextLog("trajnet-ndjson", file);
   if (scene_count > 0) {
-    info.notes.push_back(absl::StrCat(
+    rows.notes.push_back(absl::StrCat(
         scene_count, " scene windows (\"scene\" lines) are annotations and were not kept"));
   }
-  return MakeFrameLog(std::move(table), options, std::move(info));
+  return rows;
 }
 
 }  // namespace dsg::ingest

@@ -5,12 +5,15 @@
 #include "absl/strings/str_cat.h"
 #include "ingest/log/bag_log.h"
 #include "ingest/log/folder_log.h"
+#include "ingest/log/followed_log.h"
 #include "ingest/log/format.h"
+#include "ingest/log/kitti_folder.h"
 #include "ingest/log/log_input.h"
 #include "ingest/log/log_source.h"
 #include "ingest/log/readers.h"
 #include "ingest/log/rgbd_layout.h"
 #include "ingest/log/rgbd_log.h"
+#include "ingest/log/text_rows.h"
 #include "ingest/log/tum_folder.h"
 #include "schema/base/status.h"
 
@@ -51,7 +54,10 @@ absl::Status CheckSensorOptions(const std::string& path, const std::string& form
                                   channel, "=", topic, " out"),
                      {{"field", "topic"}, {"value", absl::StrCat(channel, "=", topic)}});
   }
-  if (format == "euroc" || format == "rgbd" || format == "tum-rgbd") return absl::OkStatus();
+  constexpr std::string_view kFolders[] = {"euroc", "rgbd", "tum-rgbd", "kitti"};
+  if (std::find(std::begin(kFolders), std::end(kFolders), format) != std::end(kFolders)) {
+    return absl::OkStatus();
+  }
   if (!options.loop_file.empty()) {
     return MakeError(Reason::kFieldInvalid,
                      absl::StrCat(path, ": a ", format,
@@ -63,6 +69,17 @@ absl::Status CheckSensorOptions(const std::string& path, const std::string& form
                    absl::StrCat(path, ": a ", format,
                                 " log takes no external poses; they go with logs of sensors"),
                    {{"field", "poses"}, {"value", "external"}});
+}
+
+absl::Status CheckLabels(const std::string& path, const std::string& format,
+                         const LogOptions& options) {
+  if (options.label_folder.empty() || format == "rgbd" || format == "tum-rgbd") {
+    return absl::OkStatus();
+  }
+  return MakeError(
+      Reason::kFieldInvalid,
+      absl::StrCat(path, ": a ", format, " log takes no --labels; they go with RGB-D folders"),
+      {{"field", "labels"}, {"value", options.label_folder}});
 }
 
 absl::Status NoSuchLog(const std::string& folder, const std::string& format) {
@@ -83,16 +100,12 @@ OpenedLog OpenTracks(const fs::path& folder, const LogOptions& options) {
 }
 
 OpenedLog OpenFile(const LogFile& file, const std::string& format, const LogOptions& options) {
-  if (format == "obsmat") return ReadObsmat(file, options);
-  if (format == "trajnet") return ReadTrajnet(file, options);
-  if (format == "trajnet-ndjson") return ReadTrajnetNdjson(file, options);
   if (format == "thor") return ReadThor(file, options);
-  if (format == "euroc") return ReadEuroc(file, options);
-  if (format == "tum") return ReadTum(file, options);
-  if (format == "csv") return ReadCsv(file, options);
   if (format == "dsg-tracks") return ReadTracks(std::nullopt, file, options);
   if (format == "tesse-objects") return ReadTesseObjects(file, options);
-  return ReadSceneGraphLog(file, options);
+  if (!IsRowFormat(format)) return ReadSceneGraphLog(file, options);
+  DSG_ASSIGN_OR_RETURN(TextRows rows, ReadTextRows(format, file, options));
+  return MakeTextLog(format, std::move(rows), file, options);
 }
 
 // A log that is read whole.
@@ -108,6 +121,7 @@ OpenedLog OpenInput(const std::string& path, const LogOptions& options) {
     DSG_ASSIGN_OR_RETURN(format, DetectFileFormat(file.bytes, file.path));
   }
   DSG_RETURN_IF_ERROR(CheckSensorOptions(file.path, format, options));
+  DSG_RETURN_IF_ERROR(CheckLabels(file.path, format, options));
   return OpenFile(file, format, options);
 }
 
@@ -116,7 +130,7 @@ OpenedLog OpenEuroc(const std::string& folder, const LogOptions& options) {
   const std::string path = FindEurocFile(folder);
   if (path.empty()) return NoSuchLog(folder, "euroc");
   DSG_ASSIGN_OR_RETURN(const LogFile file, ReadLogFile(path));
-  return ReadEuroc(file, options);
+  return OpenFile(file, "euroc", options);
 }
 
 OpenedLog OpenFolder(const std::string& folder, const LogOptions& options) {
@@ -135,12 +149,14 @@ OpenedLog OpenFolder(const std::string& folder, const LogOptions& options) {
     DSG_ASSIGN_OR_RETURN(format, DetectFolderFormat(folder));
   }
   DSG_RETURN_IF_ERROR(CheckSensorOptions(folder, format, options));
+  DSG_RETURN_IF_ERROR(CheckLabels(folder, format, options));
   if (format == "dsg-tracks") return OpenTracks(folder, options);
   if (format == "euroc") return OpenEuroc(folder, options);
   if (format == "rgbd" && FindRgbdLayout(folder) != RgbdLayout::kNone) {
     return OpenRgbdFolder(folder, options);
   }
   if (format == "tum-rgbd" && IsTumFolder(folder)) return OpenTumFolder(folder, options);
+  if (format == "kitti" && IsKittiFolder(folder)) return OpenKittiFolder(folder, options);
   if (format == "rosbag2") return OpenBag(folder, options);
   return NoSuchLog(folder, format);
 }
@@ -150,6 +166,7 @@ OpenedLog OpenFolder(const std::string& folder, const LogOptions& options) {
 absl::StatusOr<std::unique_ptr<LogSource>> OpenLog(const std::string& path,
                                                    const LogOptions& options) {
   DSG_RETURN_IF_ERROR(CheckOptions(options));
+  if (options.follow.has_value()) return OpenFollowed(path, options);
   if (path == kStandardInput) return OpenInput(path, options);
   std::error_code error;
   if (fs::is_directory(path, error)) return OpenFolder(path, options);
@@ -165,7 +182,10 @@ absl::StatusOr<std::unique_ptr<LogSource>> OpenLog(const std::string& path,
                                   bag_format.empty() ? "" : options.format, "; leave --format out"),
                      {{"file", path}});
   }
-  if (!bag_format.empty()) return OpenBag(path, options);
+  if (!bag_format.empty()) {
+    DSG_RETURN_IF_ERROR(CheckLabels(path, bag_format, options));
+    return OpenBag(path, options);
+  }
   return OpenInput(path, options);
 }
 

@@ -14,6 +14,7 @@ class PeekedLog : public LogSource {
       : log_(std::move(log)), first_(std::move(first)) {}
 
   const LogInfo& info() const override { return log_->info(); }
+  void SetIdle(std::function<absl::Status()> idle) override { log_->SetIdle(std::move(idle)); }
 
   absl::StatusOr<std::optional<Measurement>> Next() override {
     if (is_first_) {

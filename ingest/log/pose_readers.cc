@@ -3,28 +3,20 @@
 #include "ingest/log/pose_table.h"
 #include "ingest/log/readers.h"
 #include "ingest/log/sensor_log.h"
-#include "ingest/log/text_table.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
 
-OpenedLog ReadEuroc(const LogFile& file, const LogOptions& options) {
-  DSG_ASSIGN_OR_RETURN(TrackTable table, ReadEurocPoses(file, RobotName(options)));
-  LogInfo info = DescribeTextLog("euroc", file);
-  info.has_clock = true;
-  info.clock = Clock::kUnix;
-  DropRepeats(options.is_strict, &table, &info.notes);
-  info.channel_counts["poses"] = static_cast<int64_t>(table.rows.size());
-  return MakeClockLog(std::move(table), std::nullopt, std::move(info));
+absl::StatusOr<TextRows> ReadEurocRows(const LogFile& file, const LogOptions& options) {
+  TextRows rows{.clock = RowClock::kUnix, .is_robot = true, .is_of_one = true, .may_repeat = true};
+  DSG_ASSIGN_OR_RETURN(rows.table, ReadEurocPoses(file, RobotName(options)));
+  return rows;
 }
 
-OpenedLog ReadTum(const LogFile& file, const LogOptions& options) {
-  DSG_ASSIGN_OR_RETURN(TrackTable table, ReadTumPoses(file, RobotName(options)));
-  LogInfo info = DescribeTextLog("tum", file);
-  DSG_RETURN_IF_ERROR(SetClock(options, &table, &info));
-  DropRepeats(options.is_strict, &table, &info.notes);
-  info.channel_counts["poses"] = static_cast<int64_t>(table.rows.size());
-  return MakeClockLog(std::move(table), std::nullopt, std::move(info));
+absl::StatusOr<TextRows> ReadTumRows(const LogFile& file, const LogOptions& options) {
+  TextRows rows{.clock = RowClock::kAny, .is_robot = true, .is_of_one = true, .may_repeat = true};
+  DSG_ASSIGN_OR_RETURN(rows.table, ReadTumPoses(file, RobotName(options)));
+  return rows;
 }
 
 }  // namespace dsg::ingest

@@ -78,7 +78,7 @@ absl::StatusOr<TrackTable> ReadEurocPoses(const LogFile& file, const std::string
   TrackTable table;
   table.file = file.path;
   const int32_t agent = table.FindOrAdd(robot_name, kinds::kRobot);
-  LineReader lines(file.bytes);
+  LineReader lines(file.bytes, file.lines_left_out);
   TextLine line;
   std::vector<std::string_view> fields;
   size_t column_count = 0;
@@ -102,7 +102,7 @@ absl::StatusOr<TrackTable> ReadTumPoses(const LogFile& file, const std::string& 
   TrackTable table;
   table.file = file.path;
   const int32_t agent = table.FindOrAdd(robot_name, kinds::kRobot);
-  LineReader lines(file.bytes);
+  LineReader lines(file.bytes, file.lines_left_out);
   TextLine line;
   std::vector<std::string_view> fields;
   while (lines.Next(&line)) {
@@ -116,7 +116,7 @@ absl::StatusOr<TrackTable> ReadTumPoses(const LogFile& file, const std::string& 
 }
 
 absl::StatusOr<TrackTable> ReadPoseTable(const LogFile& file, const std::string& robot_name) {
-  LineReader lines(file.bytes);
+  LineReader lines(file.bytes, file.lines_left_out);
   TextLine line;
   while (lines.Next(&line)) {
     if (line.text.starts_with('#')) continue;

@@ -16,7 +16,7 @@
 
 namespace dsg::ingest {
 
-absl::StatusOr<std::unique_ptr<const RandomFile>> RandomFile::Open(const std::string& path) {
+absl::StatusOr<std::unique_ptr<RandomFile>> RandomFile::Open(const std::string& path) {
   const int descriptor = open(path.c_str(), O_RDONLY | O_CLOEXEC);
   struct stat status = {};
   if (descriptor < 0 || fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
@@ -26,7 +26,7 @@ absl::StatusOr<std::unique_ptr<const RandomFile>> RandomFile::Open(const std::st
                      absl::StrCat(path, ": cannot be read: ", std::strerror(error)),
                      {{"field", "log"}, {"value", path}});
   }
-  return std::unique_ptr<const RandomFile>(
+  return std::unique_ptr<RandomFile>(
       new RandomFile(path, descriptor, static_cast<uint64_t>(status.st_size)));
 }
 
@@ -42,8 +42,9 @@ absl::Status RandomFile::Fail(uint64_t at, const std::string& message) const {
 
 absl::StatusOr<std::string> RandomFile::ReadBytes(uint64_t at, uint64_t size,
                                                   const std::string& remedy) const {
-  if (at > size_ || size > size_ - at) {
-    return Fail(at, absl::StrCat("the bag ends at byte ", size_,
+  const uint64_t end = size_;
+  if (at > end || size > end - at) {
+    return Fail(at, absl::StrCat("the bag ends at byte ", end,
                                  ", in the middle of a record; it was cut short: ", remedy));
   }
   std::string bytes(size, '\0');

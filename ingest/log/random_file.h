@@ -2,6 +2,7 @@
 // A file of any size that is read in pieces.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -10,18 +11,20 @@
 
 namespace dsg::ingest {
 
-/// Threads: any number of callers.
+/// Threads: any number of callers, of GrowTo one.
 class RandomFile {
  public:
   /// Errors: INVALID_ARGUMENT/FIELD_INVALID naming what the system said when it is no regular file
   /// or cannot be read.
-  static absl::StatusOr<std::unique_ptr<const RandomFile>> Open(const std::string& path);
+  static absl::StatusOr<std::unique_ptr<RandomFile>> Open(const std::string& path);
   ~RandomFile();
   RandomFile(const RandomFile&) = delete;
   RandomFile& operator=(const RandomFile&) = delete;
 
   const std::string& path() const { return path_; }
   uint64_t size() const { return size_; }
+  /// Of a file that grows: bytes before `size` may be read from now on.
+  void GrowTo(uint64_t size) { size_ = size; }
 
   /// Errors: of Fail, when the bytes are not there; `remedy` is what the user can do then.
   absl::StatusOr<std::string> ReadBytes(uint64_t at, uint64_t size,
@@ -37,7 +40,7 @@ class RandomFile {
 
   std::string path_;
   int descriptor_;
-  uint64_t size_;
+  std::atomic<uint64_t> size_;
 };
 
 }  // namespace dsg::ingest

@@ -2,10 +2,12 @@
 #include "ingest/log/rgbd_log.h"
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "ingest/log/image_channel.h"
+#include "ingest/log/label_folder.h"
 #include "ingest/log/loop_file.h"
 #include "ingest/log/rgbd_layout.h"
 #include "ingest/log/sensor_log.h"
@@ -75,6 +77,43 @@ absl::StatusOr<TrackTable> MakePoses(const std::string& folder, const RgbdFrames
   return table;
 }
 
+absl::StatusOr<LabelledPictures> PicturesOf(const std::string& folder, const RgbdFrames& frames,
+                                            const LogOptions& options, const FrameSet& set) {
+  LabelledPictures pictures;
+  pictures.channel = set.channel;
+  std::map<TimeNs, std::string> name_at;
+  for (const auto& [number, name] : set.names) {
+    DSG_ASSIGN_OR_RETURN(const TimeNs time_ns, TimeOfFrame(folder, frames, options, number));
+    pictures.time_of_frame[number] = time_ns;
+    name_at[time_ns] = name;
+  }
+  for (auto& [time_ns, name] : name_at) {
+    pictures.times.push_back(time_ns);
+    pictures.names.push_back(std::move(name));
+  }
+  return pictures;
+}
+
+absl::StatusOr<SensorChannel> ReadRgbdLabels(const std::string& folder, const RgbdFrames& frames,
+                                             const LogOptions& options, LogDigest* digest,
+                                             LogInfo* info) {
+  std::vector<LabelledPictures> pictures;
+  for (const char* const channel : {"depth0", "color0"}) {
+    for (const FrameSet& set : frames.sets) {
+      if (set.channel != channel) continue;
+      DSG_ASSIGN_OR_RETURN(LabelledPictures some, PicturesOf(folder, frames, options, set));
+      pictures.push_back(std::move(some));
+    }
+  }
+  if (pictures.empty()) {
+    return MakeError(Reason::kFieldInvalid,
+                     absl::StrCat("--labels ", options.label_folder, ": ", folder,
+                                  " has neither depth nor colour pictures that labels may go with"),
+                     {{"field", "labels"}, {"value", options.label_folder}});
+  }
+  return ReadLabelFolder(options, pictures, /*stamp_offset_ns=*/0, digest, info);
+}
+
 }  // namespace
 
 OpenedLog OpenRgbdFolder(const std::string& folder, const LogOptions& options) {
@@ -93,6 +132,11 @@ OpenedLog OpenRgbdFolder(const std::string& folder, const LogOptions& options) {
   for (const FrameSet& set : frames.sets) {
     DSG_ASSIGN_OR_RETURN(SensorChannel channel, MakeFrameChannel(folder, frames, options, set));
     channels.push_back(std::move(channel));
+  }
+  if (!options.label_folder.empty()) {
+    DSG_ASSIGN_OR_RETURN(SensorChannel labels,
+                         ReadRgbdLabels(folder, frames, options, &digest, &info));
+    channels.push_back(std::move(labels));
   }
   PoseTables tables;
   if (!frames.map_T_body.empty()) {

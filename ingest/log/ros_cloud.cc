@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cmath>
 #include <cstring>
 #include <optional>
 
 #include "absl/strings/str_cat.h"
 #include "ingest/log/file_bytes.h"
 #include "ingest/log/image_file.h"
+#include "ingest/log/point_row.h"
 #include "ingest/log/ros_fields.h"
 #include "schema/base/status.h"
 
@@ -120,8 +120,7 @@ float Coordinate(const Cloud& cloud, const char* point, const PointField& field)
 absl::StatusOr<Image> ParseRosPointCloud(const RosBytes& message, const std::string& origin) {
   DSG_ASSIGN_OR_RETURN(const Cloud cloud, ReadCloud(message, origin));
   DSG_RETURN_IF_ERROR(CheckCloud(cloud, origin));
-  Image image{.width = 0, .height = 1, .format = PixelFormat::kPoints32, .bytes = {}};
-  image.bytes.reserve(size_t{12} * cloud.width * cloud.height);
+  PointRow points(size_t{cloud.width} * cloud.height);
   for (uint32_t row = 0; row < cloud.height; ++row) {
     for (uint32_t column = 0; column < cloud.width; ++column) {
       const char* const point =
@@ -129,13 +128,10 @@ absl::StatusOr<Image> ParseRosPointCloud(const RosBytes& message, const std::str
       std::array<float, 3> xyz;
       for (size_t axis = 0; axis < 3; ++axis)
         xyz[axis] = Coordinate(cloud, point, *cloud.xyz[axis]);
-      if (!std::all_of(xyz.begin(), xyz.end(), [](float x) { return std::isfinite(x); })) continue;
-      const auto* const bytes = reinterpret_cast<const uint8_t*>(xyz.data());
-      image.bytes.insert(image.bytes.end(), bytes, bytes + sizeof(xyz));
-      ++image.width;
+      points.Add(xyz);
     }
   }
-  return image;
+  return points.Take();
 }
 
 }  // namespace dsg::ingest

@@ -92,7 +92,7 @@ bool ReadSeconds(std::string_view text, int power, TimeNs* result) {
 
 bool LineReader::Next(TextLine* line) {
   while (!rest_.empty()) {
-    ++number_;
+    number_ += number_ == 1 ? left_out_ + 1 : 1;
     const size_t end = rest_.find('\n');
     line->has_line_end = end != std::string_view::npos;
     line->text = rest_.substr(0, end);

@@ -29,12 +29,15 @@ struct TextLine {
 /// Hands out the lines of a file that are not blank. "\r\n" ends a line as "\n" does.
 class LineReader {
  public:
-  explicit LineReader(std::string_view bytes) : rest_(bytes) {}
+  /// `left_out`: lines that are missing in `bytes` behind the first one, for their numbers.
+  explicit LineReader(std::string_view bytes, int64_t left_out = 0)
+      : rest_(bytes), left_out_(left_out) {}
   /// False at the end of the file.
   bool Next(TextLine* line);
 
  private:
   std::string_view rest_;
+  int64_t left_out_;
   int64_t number_ = 0;
 };
 

@@ -97,6 +97,23 @@ absl::Status AddTracksRow(const LogOptions& options, const TextLine& line,
 
 }  // namespace
 
+absl::StatusOr<TextRows> ReadTracksRows(const LogFile& file, const LogOptions& options) {
+  TextRows rows{.clock = RowClock::kMap};
+  rows.table.file = file.path;
+  LineReader lines(file.bytes, file.lines_left_out);
+  TextLine line;
+  if (!lines.Next(&line) || line.text != kTracksHeader) {
+    return LinePosition{file.path, 1}.FieldError("header", line.text,
+                                                 absl::StrCat("\"", kTracksHeader, "\" is due"));
+  }
+  std::vector<std::string_view> fields;
+  while (lines.Next(&line)) {
+    SplitAtCommas(line.text, &fields);
+    DSG_RETURN_IF_ERROR(AddTracksRow(options, line, fields, &rows.table));
+  }
+  return rows;
+}
+
 OpenedLog ReadTracks(const std::optional<LogFile>& world, const LogFile& tracks,
                      const LogOptions& options) {
   LogInfo info = DescribeTextLog("dsg-tracks", tracks);
@@ -107,20 +124,8 @@ OpenedLog ReadTracks(const std::optional<LogFile>& world, const LogFile& tracks,
   } else {
     info.notes.push_back("there is no map.json beside tracks.csv: rooms and places are the map's");
   }
-  TrackTable table;
-  table.file = tracks.path;
-  LineReader lines(tracks.bytes);
-  TextLine line;
-  if (!lines.Next(&line) || line.text != kTracksHeader) {
-    return LinePosition{tracks.path, 1}.FieldError("header", line.text,
-                                                   absl::StrCat("\"", kTracksHeader, "\" is due"));
-  }
-  std::vector<std::string_view> fields;
-  while (lines.Next(&line)) {
-    SplitAtCommas(line.text, &fields);
-    DSG_RETURN_IF_ERROR(AddTracksRow(options, line, fields, &table));
-  }
-  return MakeClockLog(std::move(table), std::move(graph), std::move(info));
+  DSG_ASSIGN_OR_RETURN(TextRows rows, ReadTracksRows(tracks, options));
+  return MakeClockLog(std::move(rows.table), std::move(graph), std::move(info));
 }
 
 }  // namespace dsg::ingest

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "absl/strings/str_cat.h"
-#include "ingest/log/frame_clock.h"
 #include "ingest/log/readers.h"
 #include "ingest/log/text_table.h"
 #include "ingest/log/track_log.h"
@@ -25,18 +24,17 @@ absl::Status AddTrajnetRow(const LogOptions& options, const TextLine& line,
 
 }  // namespace
 
-OpenedLog ReadTrajnet(const LogFile& file, const LogOptions& options) {
-  TrackTable table;
-  table.file = file.path;
-  LineReader lines(file.bytes);
+absl::StatusOr<TextRows> ReadTrajnetRows(const LogFile& file, const LogOptions& options) {
+  TextRows rows{.clock = RowClock::kFrames};
+  rows.table.file = file.path;
+  LineReader lines(file.bytes, file.lines_left_out);
   TextLine line;
   std::vector<std::string_view> fields;
   while (lines.Next(&line)) {
     SplitAtBlanks(line.text, &fields);
-    DSG_RETURN_IF_ERROR(AddTrajnetRow(options, line, fields, &table));
+    DSG_RETURN_IF_ERROR(AddTrajnetRow(options, line, fields, &rows.table));
   }
-  LogInfo info = DescribeTextLog("trajnet", file);
-  return MakeFrameLog(std::move(table), options, std::move(info));
+  return rows;
 }
 
 }  // namespace dsg::ingest

@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "ingest/log/calibration_file.h"
 #include "ingest/log/image_channel.h"
+#include "ingest/log/label_folder.h"
 #include "ingest/log/loop_file.h"
 #include "ingest/log/pose_table.h"
 #include "ingest/log/rgbd_poses.h"
@@ -62,6 +63,15 @@ class TumFolderReader {
     depth_decoding.depth_units_per_m = kTumDepthUnitsPerM;
     DSG_RETURN_IF_ERROR(SetCameras(color, depth, &depth_decoding));
     std::vector<SensorChannel> channels;
+    if (!options_.label_folder.empty()) {
+      const std::vector<LabelledPictures> pictures = {{"depth0", depth.times, depth.names, {}},
+                                                      {"color0", color.times, color.names, {}}};
+      DSG_ASSIGN_OR_RETURN(
+          SensorChannel labels,
+          ReadLabelFolder(options_, pictures, info_.has_clock ? 0 : options_.epoch_ns, &digest_,
+                          &info_));
+      channels.push_back(std::move(labels));
+    }
     channels.push_back(MakeImageChannel("color0", DecodingOf("color0"), std::move(color)));
     channels.push_back(MakeImageChannel("depth0", depth_decoding, std::move(depth)));
     PoseTables tables{.ground_truth = std::move(truth), .external = std::nullopt};

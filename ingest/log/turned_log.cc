@@ -14,6 +14,7 @@ class TurnedLog : public LogSource {
       : log_(std::move(log)), map_T_log_{Eigen::Vector3d::Zero(), map_R_log.normalized()} {}
 
   const LogInfo& info() const override { return log_->info(); }
+  void SetIdle(std::function<absl::Status()> idle) override { log_->SetIdle(std::move(idle)); }
 
   absl::StatusOr<std::optional<Measurement>> Next() override {
     DSG_ASSIGN_OR_RETURN(std::optional<Measurement> measurement, log_->Next());

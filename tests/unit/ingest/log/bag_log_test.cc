@@ -15,13 +15,6 @@ namespace {
 
 constexpr char kImage[] = "sensor_msgs/Image";
 
-bool HasNote(const LogInfo& info, const std::string& part) {
-  for (const std::string& note : info.notes) {
-    if (note.find(part) != std::string::npos) return true;
-  }
-  return false;
-}
-
 std::string Floats(const std::vector<float>& values) {
   return std::string(reinterpret_cast<const char*>(values.data()), values.size() * 4);
 }

@@ -82,13 +82,6 @@ class FolderLogTest : public testing::Test {
           << "no \"" << part << "\" in: " << status.message();
     }
   }
-  static bool HasNote(const LogInfo& info, const std::string& part) {
-    for (const std::string& note : info.notes) {
-      if (note.find(part) != std::string::npos) return true;
-    }
-    return false;
-  }
-
   TempFolder folder_;
 };
 

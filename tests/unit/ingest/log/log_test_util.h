@@ -106,6 +106,13 @@ inline absl::StatusOr<WholeLog> ReadAll(const std::string& path, const LogOption
   }
 }
 
+/// Whether one of the notes of a log has these words.
+inline bool HasNote(const LogInfo& info, const std::string& words) {
+  return std::any_of(info.notes.begin(), info.notes.end(), [&](const std::string& note) {
+    return note.find(words) != std::string::npos;
+  });
+}
+
 /// `text` with one piece replaced.
 inline std::string Changed(const std::string& text, const std::string& from,
                            const std::string& to) {

@@ -160,12 +160,6 @@ class RealSensorLogs : public testing::Test {
     if (DataFolder().empty()) GTEST_SKIP() << "the real data is not there; set DSG_DATA";
   }
   static std::string Path(const std::string& name) { return (DataFolder() / name).string(); }
-  static bool HasNote(const LogInfo& info, const std::string& part) {
-    for (const std::string& note : info.notes) {
-      if (note.find(part) != std::string::npos) return true;
-    }
-    return false;
-  }
 };
 
 TEST_F(RealSensorLogs, EurocCalibrationIsItsYaml) {

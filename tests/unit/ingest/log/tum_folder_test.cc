@@ -45,11 +45,6 @@ class TumFolderTest : public testing::Test {
   void ExpectMalformed(const std::vector<std::string>& parts) const {
     ExpectMalformedFile(Read().status(), parts);
   }
-  static bool HasNote(const LogInfo& info, const std::string& part) {
-    return std::any_of(info.notes.begin(), info.notes.end(), [&](const std::string& note) {
-      return note.find(part) != std::string::npos;
-    });
-  }
   TempFolder folder_;
 };
 
