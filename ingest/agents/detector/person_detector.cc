@@ -4,23 +4,19 @@
 #include <algorithm>
 #include <exception>
 #include <opencv2/core.hpp>
-#include <opencv2/core/utils/logger.hpp>
 #include <opencv2/dnn.hpp>
-#include <opencv2/imgproc.hpp>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "ingest/agents/detector/letterbox.h"
-#include "ingest/agents/detector/model_file.h"
+#include "ingest/agents/detector/network_internal.h"
 #include "ingest/agents/detector/output_layout.h"
-#include "ingest/agents/detector/trial.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
 namespace {
 
-constexpr int kInputPxMax = 4096;
 // Suppression compares all pairs; no image holds as many people.
 constexpr int kCandidateCountMax = 3000;
 // The grey that bars have in the training of most detectors.
@@ -32,12 +28,12 @@ absl::Status BadOption(const std::string& field, const std::string& message) {
 }
 
 absl::Status CheckOptions(const PersonDetectorOptions& options) {
-  const auto is_size = [](int px) { return px > 0 && px <= kInputPxMax; };
+  const auto is_size = [](int px) { return px > 0 && px <= kNetworkInputPxMax; };
   const auto is_share = [](double share) { return share >= 0.0 && share <= 1.0; };
   if (!is_size(options.input_width_px) || !is_size(options.input_height_px)) {
     return BadOption("input size",
                      absl::StrCat(options.input_width_px, " x ", options.input_height_px,
-                                  "; each may be 1 to ", kInputPxMax, " pixels"));
+                                  "; each may be 1 to ", kNetworkInputPxMax, " pixels"));
   }
   if (!is_share(options.score_min)) {
     return BadOption("score_min", absl::StrCat(options.score_min, "; give 0 to 1"));
@@ -51,30 +47,6 @@ absl::Status CheckOptions(const PersonDetectorOptions& options) {
   }
   return absl::OkStatus();
 }
-
-// OpenCV's importer prints what it also throws.
-class QuietOpenCv {
- public:
-  QuietOpenCv() : level_(cv::utils::logging::getLogLevel()) {
-    cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
-  }
-  ~QuietOpenCv() { cv::utils::logging::setLogLevel(level_); }
-  QuietOpenCv(const QuietOpenCv&) = delete;
-  QuietOpenCv& operator=(const QuietOpenCv&) = delete;
-
- private:
-  cv::utils::logging::LogLevel level_;
-};
-
-// Without the source line, and on one line.
-std::string WordsOf(const std::exception& exception) {
-  const auto* of_opencv = dynamic_cast<const cv::Exception*>(&exception);
-  std::string words = of_opencv != nullptr ? of_opencv->err : std::string(exception.what());
-  std::replace(words.begin(), words.end(), '\n', ' ');
-  return words;
-}
-
-std::vector<int> ShapeOf(const cv::Mat& mat) { return {mat.size.p, mat.size.p + mat.dims}; }
 
 // The one output whose shape is known; networks may give raw ones beside it.
 absl::StatusOr<size_t> ChooseOutput(const std::vector<cv::Mat>& outputs) {
@@ -100,8 +72,8 @@ absl::StatusOr<size_t> ChooseOutput(const std::vector<cv::Mat>& outputs) {
 
 class OnnxPersonDetector : public PersonDetector {
  public:
-  OnnxPersonDetector(PersonDetectorOptions options, const cv::dnn::Net& net)
-      : options_(std::move(options)), net_(net) {}
+  OnnxPersonDetector(PersonDetectorOptions options, Network network)
+      : options_(std::move(options)), network_(std::move(network)) {}
 
   // An image without anything in it tells the shape of the output.
   absl::Status Rehearse();
@@ -111,7 +83,9 @@ class OnnxPersonDetector : public PersonDetector {
                                                      int64_t first_id) override;
 
  private:
-  absl::StatusOr<std::vector<cv::Mat>> Run(const cv::Mat& input);
+  absl::StatusOr<std::vector<cv::Mat>> Run(const cv::Mat& input) {
+    return network_.Run(cv::dnn::blobFromImage(input, 1.0 / 255.0));
+  }
   absl::StatusOr<std::vector<PersonCandidate>> Candidates(const cv::Mat& input);
 
   CandidateOptions OptionsOfCandidates() const {
@@ -122,25 +96,11 @@ class OnnxPersonDetector : public PersonDetector {
   }
 
   PersonDetectorOptions options_;
-  cv::dnn::Net net_;
+  Network network_;
   // Of the network's outputs.
   size_t output_ = 0;
   OutputKind kind_ = OutputKind::kRows;
 };
-
-absl::StatusOr<std::vector<cv::Mat>> OnnxPersonDetector::Run(const cv::Mat& input) {
-  const QuietOpenCv quiet;
-  try {
-    net_.setInput(cv::dnn::blobFromImage(input, 1.0 / 255.0));
-    std::vector<cv::Mat> outputs;
-    net_.forward(outputs, net_.getUnconnectedOutLayersNames());
-    return outputs;
-  } catch (const std::exception& exception) {
-    return absl::InternalError(absl::StrCat("OpenCV cannot run the network on an input of ",
-                                            input.cols, " x ", input.rows,
-                                            " pixels: ", WordsOf(exception)));
-  }
-}
 
 absl::Status OnnxPersonDetector::Rehearse() {
   const cv::Mat input(options_.input_height_px, options_.input_width_px, CV_8UC3,
@@ -169,35 +129,6 @@ absl::StatusOr<std::vector<PersonCandidate>> OnnxPersonDetector::Candidates(cons
         absl::StrCat("the network's output changed its layout to ", ShapeText(ShapeOf(output))));
   }
   return ReadCandidates(layout, output.ptr<float>(), OptionsOfCandidates());
-}
-
-absl::Status CheckImage(const Image& image) {
-  const bool is_color = image.format == PixelFormat::kRgb8;
-  const bool is_sound =
-      (is_color || image.format == PixelFormat::kGray8) && image.width > 0 && image.height > 0 &&
-      image.bytes.size() == static_cast<size_t>(image.width) * static_cast<size_t>(image.height) *
-                                static_cast<size_t>(BytesPerPixel(image.format));
-  if (is_sound) return absl::OkStatus();
-  return MakeError(Reason::kFieldInvalid,
-                   absl::StrCat("person detector: the image is ", image.width, " x ", image.height,
-                                " pixels of ", std::string(Name(image.format)), " in ",
-                                image.bytes.size(), " bytes; give a whole gray8 or rgb8 image"),
-                   {{"field", "image"}});
-}
-
-// Red, green, blue, with bars. Requires: a sound image.
-cv::Mat MakeInput(const Image& image, const Letterbox& letterbox, int width_px, int height_px) {
-  const bool is_color = image.format == PixelFormat::kRgb8;
-  const cv::Mat whole(image.height, image.width, is_color ? CV_8UC3 : CV_8UC1,
-                      const_cast<uint8_t*>(image.bytes.data()));
-  cv::Mat resized;
-  cv::resize(whole, resized, cv::Size(letterbox.width_px, letterbox.height_px), 0, 0,
-             cv::INTER_LINEAR);
-  if (!is_color) cv::cvtColor(resized, resized, cv::COLOR_GRAY2RGB);
-  cv::Mat input(height_px, width_px, CV_8UC3, cv::Scalar::all(kBarGray));
-  resized.copyTo(input(
-      cv::Rect(letterbox.left_px, letterbox.top_px, letterbox.width_px, letterbox.height_px)));
-  return input;
 }
 
 // Best score first; equal ones in the network's order.
@@ -233,13 +164,13 @@ absl::StatusOr<std::vector<HumanDetection>> OnnxPersonDetector::Detect(const Ima
                                                                        TimeNs time_ns,
                                                                        const std::string& camera,
                                                                        int64_t first_id) {
-  DSG_RETURN_IF_ERROR(CheckImage(image));
+  DSG_RETURN_IF_ERROR(CheckNetworkImage("person detector", image));
   const Letterbox letterbox =
       FitLetterbox(image.width, image.height, options_.input_width_px, options_.input_height_px);
   std::vector<PersonCandidate> people;
   try {
-    const cv::Mat input =
-        MakeInput(image, letterbox, options_.input_width_px, options_.input_height_px);
+    const cv::Mat input = MakeInput(image, letterbox, options_.input_width_px,
+                                    options_.input_height_px, cv::Scalar::all(kBarGray));
     DSG_ASSIGN_OR_RETURN(const std::vector<PersonCandidate> candidates, Candidates(input));
     people = Suppress(candidates, options_.overlap_max);
   } catch (const std::exception& exception) {
@@ -260,48 +191,18 @@ absl::StatusOr<std::vector<HumanDetection>> OnnxPersonDetector::Detect(const Ima
   return detections;
 }
 
-// Loading, and one picture.
-constexpr double kTrialSeconds = 60.0;
-
-cv::dnn::Net ReadNet(const std::vector<uint8_t>& bytes) {
-  cv::dnn::Net net = cv::dnn::readNetFromONNX(bytes);
-  net.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);
-  net.setPreferableTarget(cv::dnn::DNN_TARGET_CPU);
-  return net;
-}
-
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<PersonDetector>> PersonDetector::Load(
     const PersonDetectorOptions& options) {
   DSG_RETURN_IF_ERROR(CheckOptions(options));
-  const std::string& file = options.model_file;
-  try {
-    DSG_ASSIGN_OR_RETURN(const std::vector<uint8_t> bytes, ReadModelFile(file));
-    const QuietOpenCv quiet;
-    const absl::Status trial = TryApart(
-        [&] {
-          // A pool of threads stays behind in the process that was copied.
-          cv::setNumThreads(1);
-          try {
-            OnnxPersonDetector(options, ReadNet(bytes)).Rehearse().IgnoreError();
-          } catch (const cv::Exception& exception) {
-            // All else is said again, in words, where it can be reported.
-            if (exception.code == cv::Error::StsNoMem) throw;
-          }
-        },
-        kTrialSeconds);
-    if (!trial.ok()) {
-      return BadModel(file, absl::StrCat("OpenCV cannot run it: ", trial.message()));
-    }
-    auto detector = std::make_unique<OnnxPersonDetector>(options, ReadNet(bytes));
-    const absl::Status rehearsal = detector->Rehearse();
-    if (ReasonOf(rehearsal) == Reason::kFieldInvalid) return rehearsal;
-    if (!rehearsal.ok()) return BadModel(file, std::string(rehearsal.message()));
-    return detector;
-  } catch (const std::exception& exception) {
-    return BadModel(file, absl::StrCat("OpenCV cannot read it: ", WordsOf(exception)));
-  }
+  std::unique_ptr<OnnxPersonDetector> detector;
+  const auto rehearse = [&](Network& network) {
+    detector = std::make_unique<OnnxPersonDetector>(options, network);
+    return detector->Rehearse();
+  };
+  DSG_RETURN_IF_ERROR(Network::Load(options.model_file, rehearse).status());
+  return detector;
 }
 
 }  // namespace dsg::ingest
