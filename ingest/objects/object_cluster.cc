@@ -40,6 +40,12 @@ class ClusterFinder {
                                              : FindFloorLevels(mesh, class_ids_);
   }
 
+  /// Groups are given: `surface` is not looked at for more.
+  ClusterFinder(ObjectSurface surface, std::vector<double> levels, double voxel_m)
+      : surface_(std::move(surface)), levels_(std::move(levels)) {
+    options_.voxel_m = voxel_m;
+  }
+
   std::vector<ObjectCluster> Find() const {
     std::vector<CellGroup> groups;
     for (size_t begin = 0; begin < surface_.cells.size();) {
@@ -49,17 +55,15 @@ class ClusterFinder {
     }
     groups = MergeByInstance(surface_.cells, std::move(groups), kJoinGapM);
     groups = DropEchoes(surface_.cells, std::move(groups), kEchoShare);
+    std::erase_if(groups, [this](const CellGroup& group) { return !IsLargeEnough(group); });
+    std::vector<ObjectCluster> clusters = Describe(groups);
+    SortClusters(&clusters);
+    return clusters;
+  }
+
+  std::vector<ObjectCluster> Describe(const std::vector<CellGroup>& groups) const {
     std::vector<ObjectCluster> clusters;
-    for (const CellGroup& group : groups) {
-      if (IsLargeEnough(group)) clusters.push_back(MakeCluster(group));
-    }
-    const auto key = [](const ObjectCluster& cluster) {
-      return std::tuple(cluster.class_id, cluster.center_map.x(), cluster.center_map.y(),
-                        cluster.center_map.z(), cluster.instance_id);
-    };
-    std::stable_sort(
-        clusters.begin(), clusters.end(),
-        [&](const ObjectCluster& a, const ObjectCluster& b) { return key(a) < key(b); });
+    for (const CellGroup& group : groups) clusters.push_back(MakeCluster(group));
     return clusters;
   }
 
@@ -225,6 +229,21 @@ std::vector<ObjectCluster> FindClusters(const std::vector<const MeshBlock*>& mes
                                         const ClusterOptions& options) {
   if (!(options.voxel_m > 0.0) || !std::isfinite(options.voxel_m)) return {};
   return ClusterFinder(mesh, options).Find();
+}
+
+void SortClusters(std::vector<ObjectCluster>* clusters) {
+  const auto key = [](const ObjectCluster& cluster) {
+    return std::tuple(cluster.class_id, cluster.center_map.x(), cluster.center_map.y(),
+                      cluster.center_map.z(), cluster.instance_id);
+  };
+  std::stable_sort(clusters->begin(), clusters->end(),
+                   [&](const ObjectCluster& a, const ObjectCluster& b) { return key(a) < key(b); });
+}
+
+std::vector<ObjectCluster> ClustersOfGroups(ObjectSurface surface,
+                                            const std::vector<CellGroup>& groups,
+                                            std::vector<double> floors_m, double voxel_m) {
+  return ClusterFinder(std::move(surface), std::move(floors_m), voxel_m).Describe(groups);
 }
 
 }  // namespace dsg::ingest

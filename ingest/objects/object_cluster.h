@@ -7,6 +7,8 @@
 #include <optional>
 #include <vector>
 
+#include "ingest/objects/instance_parts.h"
+#include "ingest/objects/surface_cells.h"
 #include "schema/base/time.h"
 #include "schema/model/geometry.h"
 #include "schema/model/mesh.h"
@@ -56,5 +58,14 @@ struct ObjectCluster {
 /// Source: RSS 2020, section IV-B (Euclidean clustering, PCL); instances split and join clusters.
 std::vector<ObjectCluster> FindClusters(const std::vector<const MeshBlock*>& mesh,
                                         const ClusterOptions& options);
+
+/// The order of FindClusters.
+void SortClusters(std::vector<ObjectCluster>* clusters);
+
+/// Groups of cells of `surface`, none of them empty, as clusters, in the order of the groups.
+/// `floors_m`: ascending heights of the floors; `voxel_m`: edge of the cells.
+std::vector<ObjectCluster> ClustersOfGroups(ObjectSurface surface,
+                                            const std::vector<CellGroup>& groups,
+                                            std::vector<double> floors_m, double voxel_m);
 
 }  // namespace dsg::ingest

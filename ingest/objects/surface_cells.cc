@@ -88,7 +88,7 @@ class VertexClassifier {
 
 auto SortKey(const SurfaceVertex& v) {
   return std::tuple(v.class_id, v.cell, v.position_map.x(), v.position_map.y(), v.position_map.z(),
-                    v.instance_id, v.color);
+                    v.instance_id, v.color, v.normal_map.x(), v.normal_map.y(), v.normal_map.z());
 }
 
 std::vector<SurfaceVertex> GatherVertices(const std::vector<const MeshBlock*>& mesh,
@@ -111,15 +111,44 @@ std::vector<SurfaceVertex> GatherVertices(const std::vector<const MeshBlock*>& m
       vertices.push_back(vertex);
     }
   }
-  std::sort(vertices.begin(), vertices.end(),
+  return vertices;
+}
+
+std::vector<SurfaceVertex> GatherAllVertices(const std::vector<const MeshBlock*>& mesh,
+                                             int32_t class_id, double voxel_m, bool* has_colors) {
+  std::vector<SurfaceVertex> vertices;
+  for (const MeshBlock* block : mesh) {
+    if (block == nullptr) continue;
+    const size_t count = block->positions_map.size();
+    const bool is_colored = block->colors.size() == count;
+    const bool has_normals = block->normals_map.size() == count;
+    for (size_t i = 0; i < count; ++i) {
+      const auto cell = PackedCell(block->positions_map[i], voxel_m);
+      if (!cell.has_value()) continue;
+      SurfaceVertex vertex;
+      vertex.class_id = class_id;
+      vertex.cell = *cell;
+      vertex.position_map = block->positions_map[i];
+      if (has_normals && block->normals_map[i].allFinite()) {
+        vertex.normal_map = block->normals_map[i];
+      }
+      if (is_colored) vertex.color = block->colors[i];
+      *has_colors |= is_colored;
+      vertices.push_back(vertex);
+    }
+  }
+  return vertices;
+}
+
+// Neighbouring blocks repeat the vertices that they share.
+void SortAndThin(std::vector<SurfaceVertex>* vertices) {
+  std::sort(vertices->begin(), vertices->end(),
             [](const SurfaceVertex& a, const SurfaceVertex& b) { return SortKey(a) < SortKey(b); });
-  // Neighbouring blocks repeat the vertices that they share.
   const auto is_same = [](const SurfaceVertex& a, const SurfaceVertex& b) {
     return a.class_id == b.class_id && a.position_map == b.position_map &&
            a.instance_id == b.instance_id;
   };
-  vertices.erase(std::unique(vertices.begin(), vertices.end(), is_same), vertices.end());
-  return vertices;
+  vertices->erase(std::unique(vertices->begin(), vertices->end(), is_same), vertices->end());
 }
 
 SurfaceCell MakeCell(const std::vector<SurfaceVertex>& vertices, size_t begin, size_t end) {
@@ -143,22 +172,37 @@ SurfaceCell MakeCell(const std::vector<SurfaceVertex>& vertices, size_t begin, s
   return cell;
 }
 
-}  // namespace
-
-ObjectSurface GatherSurface(const std::vector<const MeshBlock*>& mesh,
-                            const std::vector<int32_t>& class_ids, double voxel_m) {
-  ObjectSurface surface;
-  surface.vertices = GatherVertices(mesh, class_ids, voxel_m, &surface.has_colors);
-  const std::vector<SurfaceVertex>& vertices = surface.vertices;
+std::vector<SurfaceCell> MakeCells(const std::vector<SurfaceVertex>& vertices) {
+  std::vector<SurfaceCell> cells;
   for (size_t begin = 0; begin < vertices.size();) {
     size_t end = begin + 1;
     while (end < vertices.size() && vertices[end].class_id == vertices[begin].class_id &&
            vertices[end].cell == vertices[begin].cell) {
       ++end;
     }
-    surface.cells.push_back(MakeCell(vertices, begin, end));
+    cells.push_back(MakeCell(vertices, begin, end));
     begin = end;
   }
+  return cells;
+}
+
+}  // namespace
+
+ObjectSurface GatherSurface(const std::vector<const MeshBlock*>& mesh,
+                            const std::vector<int32_t>& class_ids, double voxel_m) {
+  ObjectSurface surface;
+  surface.vertices = GatherVertices(mesh, class_ids, voxel_m, &surface.has_colors);
+  SortAndThin(&surface.vertices);
+  surface.cells = MakeCells(surface.vertices);
+  return surface;
+}
+
+ObjectSurface GatherAllSurface(const std::vector<const MeshBlock*>& mesh, int32_t class_id,
+                               double voxel_m) {
+  ObjectSurface surface;
+  surface.vertices = GatherAllVertices(mesh, class_id, voxel_m, &surface.has_colors);
+  SortAndThin(&surface.vertices);
+  surface.cells = MakeCells(surface.vertices);
   return surface;
 }
 

@@ -16,6 +16,8 @@ struct SurfaceVertex {
   /// Packed index of the voxel that holds it.
   uint64_t cell = 0;
   Eigen::Vector3f position_map = Eigen::Vector3f::Zero();
+  /// Zero where the mesh has none.
+  Eigen::Vector3f normal_map = Eigen::Vector3f::Zero();
   /// 0 = none.
   uint32_t instance_id = 0;
   /// 0xRRGGBB.
@@ -48,5 +50,10 @@ struct ObjectSurface {
 /// of a wrong length. Requires: voxel_m > 0.
 ObjectSurface GatherSurface(const std::vector<const MeshBlock*>& mesh,
                             const std::vector<int32_t>& class_ids, double voxel_m);
+
+/// All vertices that are finite, whatever their labels, as of class `class_id`.
+/// Requires: voxel_m > 0.
+ObjectSurface GatherAllSurface(const std::vector<const MeshBlock*>& mesh, int32_t class_id,
+                               double voxel_m);
 
 }  // namespace dsg::ingest

@@ -48,6 +48,10 @@ bool HasContent(const Measurement& measurement) {
   return std::holds_alternative<PoseMeasurement>(measurement);
 }
 
+bool HasLabels(const LogInfo& info) {
+  return info.channel_counts.contains("label0") && !info.labels.empty();
+}
+
 bool HasLoops(const LogInfo& info) { return info.channel_counts.contains("loops0"); }
 
 SessionHeader MakeHeader(const LogInfo& info, const LogOptions& log_options,
@@ -64,7 +68,7 @@ SessionHeader MakeHeader(const LogInfo& info, const LogOptions& log_options,
       .poses_per_delta = options.poses_per_delta,
       .poses = std::string(NameOf(log_options.poses)),
       .up = options.up,
-      .mapping = HasMapping(info, options) ? options.mapping.Digest() : "",
+      .mapping = HasMapping(info, options) ? options.mapping.Digest(HasLabels(info)) : "",
       .people = HasPeople(info, options) ? options.people.Digest() : "",
       .odometry = HasLoops(info) ? absl::StrCat(options.robot_graph.odometry_m_per_m, " ",
                                                 options.robot_graph.odometry_rad_per_m)

@@ -12,8 +12,6 @@
 namespace dsg::ingest {
 namespace {
 
-// Without labels a vertex this near to a structure's plane belongs to it, in voxels.
-constexpr double kStructureVoxels = 1.5;
 // The middle of an object lies behind its surface by about half its depth, and this.
 constexpr double kHiddenM = 0.5;
 // A smaller floor is a landing or a platform.
@@ -25,12 +23,6 @@ constexpr double kStandingM = 0.3;
 constexpr double kStoreyM = 2.5;
 // Ceilings are no lower and no higher above their floor.
 const Eigen::Vector2d kCeilingM(1.8, 6.0);
-
-bool IsOnPiece(const StructurePiece& piece, const Eigen::Vector3d& point_map, double slack_m) {
-  if (piece.normal_map.isZero()) return DistanceToBox(point_map, piece.box_map) <= slack_m;
-  return std::abs(piece.normal_map.dot(point_map) + piece.offset_m) <= slack_m &&
-         DistanceToBox(point_map, piece.box_map) <= slack_m;
-}
 
 bool IsInView(const TrackedObject& object, const DepthFrame& frame) {
   const Eigen::Vector3d center_camera = frame.map_T_camera.Inverse() * object.cluster.center_map;
@@ -150,44 +142,6 @@ void CloseGlass(const std::vector<const MeshBlock*>& mesh, const std::vector<int
       }
     }
   }
-}
-
-std::vector<MeshBlock> UnlabelledThings(const std::vector<const MeshBlock*>& mesh,
-                                        const std::vector<StructurePiece>& structures,
-                                        double voxel_m) {
-  std::vector<MeshBlock> things;
-  for (const MeshBlock* block : mesh) {
-    Box3d box;
-    for (const Eigen::Vector3f& position : block->positions_map)
-      box.extend(position.cast<double>());
-    std::vector<const StructurePiece*> near;
-    for (const StructurePiece& piece : structures) {
-      const Box3d grown(piece.box_map.min().array() - voxel_m * kStructureVoxels,
-                        piece.box_map.max().array() + voxel_m * kStructureVoxels);
-      if (grown.intersects(box)) near.push_back(&piece);
-    }
-    MeshBlock thing;
-    thing.index = block->index;
-    for (size_t i = 0; i < block->positions_map.size(); ++i) {
-      const Eigen::Vector3d point_map = block->positions_map[i].cast<double>();
-      const bool is_structure =
-          std::any_of(near.begin(), near.end(), [&](const StructurePiece* piece) {
-            return IsOnPiece(*piece, point_map, voxel_m * kStructureVoxels);
-          });
-      if (is_structure) continue;
-      thing.positions_map.push_back(block->positions_map[i]);
-      if (!block->colors.empty()) thing.colors.push_back(block->colors[i]);
-      thing.labels.push_back(static_cast<uint32_t>(kThingClass));
-    }
-    if (!thing.positions_map.empty()) things.push_back(std::move(thing));
-  }
-  return things;
-}
-
-std::vector<const MeshBlock*> Pointers(const std::vector<MeshBlock>& blocks) {
-  std::vector<const MeshBlock*> pointers;
-  for (const MeshBlock& block : blocks) pointers.push_back(&block);
-  return pointers;
 }
 
 std::vector<int64_t> ObjectsInView(const std::vector<TrackedObject>& objects,

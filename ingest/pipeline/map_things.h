@@ -55,13 +55,6 @@ std::vector<int32_t> GlassClasses(const std::vector<SemanticLabel>& labels);
 void CloseGlass(const std::vector<const MeshBlock*>& mesh, const std::vector<int32_t>& classes,
                 const std::vector<double>& floors_m, double body_height_m, OccupancyGrid* grid);
 
-/// Vertices of a mesh without labels that belong to no structure, labelled kThingClass.
-std::vector<MeshBlock> UnlabelledThings(const std::vector<const MeshBlock*>& mesh,
-                                        const std::vector<StructurePiece>& structures,
-                                        double voxel_m);
-
-std::vector<const MeshBlock*> Pointers(const std::vector<MeshBlock>& blocks);
-
 /// Ids of the objects whose middle is in the picture and not hidden, ascending.
 std::vector<int64_t> ObjectsInView(const std::vector<TrackedObject>& objects,
                                    const DepthFrame& frame);

@@ -19,6 +19,7 @@ absl::Status CheckRange(const char* field, double value, double min, double max)
 
 absl::Status MappingOptions::Validate() const {
   DSG_RETURN_IF_ERROR(volume.Validate());
+  DSG_RETURN_IF_ERROR(segments.Validate());
   DSG_RETURN_IF_ERROR(CheckRange("robot radius", places.robot_radius_m, 0.05, 2.0));
   DSG_RETURN_IF_ERROR(CheckRange("grid cell", grid_cell_m, 0.02, 0.5));
   const auto seconds = [](TimeNs time_ns) {
@@ -29,7 +30,7 @@ absl::Status MappingOptions::Validate() const {
   return CheckRange("layers period", seconds(layers_period_ns), 0.1, 86400.0);
 }
 
-std::string MappingOptions::Digest() const {
+std::string MappingOptions::Digest(bool has_labels) const {
   std::string shapes_digest;
   for (const CadModel& model : catalogue) {
     const std::string sha256(model.asset.sha256.begin(), model.asset.sha256.end());
@@ -44,7 +45,8 @@ std::string MappingOptions::Digest() const {
       " places=", static_cast<int>(places.mode), " radius=", places.robot_radius_m,
       " rooms=", static_cast<int>(rooms.method), " upright=", shapes.is_upright,
       " shapes=", shapes_digest, " commit=", commit_period_ns, " mesh_wait=", mesh_wait_max_ns,
-      " layers=", layers_period_ns, " cell=", grid_cell_m);
+      " layers=", layers_period_ns, " cell=", grid_cell_m,
+      has_labels ? "" : " " + segments.Digest());
 }
 
 }  // namespace dsg::ingest

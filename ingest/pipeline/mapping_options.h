@@ -7,6 +7,7 @@
 
 #include "absl/status/status.h"
 #include "ingest/depth/frame_maker.h"
+#include "ingest/objects/segment_options.h"
 #include "ingest/objects/shapes/cad_model.h"
 #include "ingest/objects/shapes/shape_fit.h"
 #include "ingest/places/extract_places.h"
@@ -22,6 +23,8 @@ struct MappingOptions {
   DepthOptions depth;
   PlaceOptions places;
   RoomOptions rooms;
+  /// Of logs without labels.
+  SegmentOptions segments;
   ShapeOptions shapes;
   /// Known shapes; empty = all shapes are unknown.
   std::vector<CadModel> catalogue;
@@ -40,7 +43,7 @@ struct MappingOptions {
   absl::Status Validate() const;
 
   /// All that deltas depend on, as text; threads are left out.
-  std::string Digest() const;
+  std::string Digest(bool has_labels) const;
 };
 
 }  // namespace dsg::ingest

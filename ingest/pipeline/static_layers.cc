@@ -6,6 +6,7 @@
 #include <set>
 
 #include "ingest/objects/object_matching.h"
+#include "ingest/objects/unlabelled_objects.h"
 #include "ingest/pipeline/map_things.h"
 #include "ingest/rooms/room_class.h"
 #include "ingest/rooms/structure_rooms.h"
@@ -109,7 +110,7 @@ LayerGraph StaticLayers::Update(TimeNs now_ns, bool is_last) {
     structure_tracker_.Track(&parts.structures);
   }
   floors_m_ = FloorsOf(parts.structures, path_map_);
-  FindObjects(now_ns, mesh, parts.structures);
+  FindObjects(now_ns, mesh);
   FitShapes(floors_m_, is_last);
   // The last one is not needed beside the new one.
   field_.reset();
@@ -171,16 +172,15 @@ void StaticLayers::NoteCost(int64_t cell_count) {
   update_cost_ns_ = static_cast<TimeNs>(cost_s * static_cast<double>(kNsPerSecond));
 }
 
-void StaticLayers::FindObjects(TimeNs now_ns, const std::vector<const MeshBlock*>& mesh,
-                               const std::vector<StructurePiece>& structures) {
+void StaticLayers::FindObjects(TimeNs now_ns, const std::vector<const MeshBlock*>& mesh) {
   const StageClock::Span span(&clock_, "objects");
   ClusterOptions options;
   options.voxel_m = options_.volume.voxel_m;
   options.class_ids = object_classes_;
   std::vector<ObjectCluster> clusters;
   if (labels_.empty()) {
-    const std::vector<MeshBlock> things = UnlabelledThings(mesh, structures, options.voxel_m);
-    clusters = FindClusters(Pointers(things), options);
+    clusters = FindUnlabelledObjects(mesh, kThingClass, options.voxel_m, floors_m_,
+                                     options_.segments);
   } else {
     clusters = FindClusters(mesh, options);
   }

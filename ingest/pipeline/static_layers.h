@@ -80,8 +80,7 @@ class StaticLayers {
   DistanceField FindDistances(const std::vector<const MeshBlock*>& mesh,
                               const std::vector<double>& floors_m);
   void NoteCost(int64_t cell_count);
-  void FindObjects(TimeNs now_ns, const std::vector<const MeshBlock*>& mesh,
-                   const std::vector<StructurePiece>& structures);
+  void FindObjects(TimeNs now_ns, const std::vector<const MeshBlock*>& mesh);
   void KeepVacated();
   void KeepGone(const std::vector<TrackedObject>& before, const ObjectChanges& changes,
                 TimeNs now_ns);

@@ -69,6 +69,12 @@ void AddMappingFlags(CLI::App* app, MappingFlags* flags) {
       ->check(CLI::Range(1, 64))
       ->capture_default_str()
       ->group(group);
+  for (const SegmentField& field : SegmentFields()) {
+    app->add_option(absl::StrCat("--", field.name), flags->segments.*field.value, field.help)
+        ->check(CLI::Range(field.min, field.max))
+        ->capture_default_str()
+        ->group("Objects of logs without labels");
+  }
   app->add_flag("--timings", flags->has_timings, "Print what each stage has cost")->group(group);
 }
 
@@ -85,6 +91,7 @@ absl::StatusOr<MappingOptions> MakeMappingOptions(const MappingFlags& flags) {
   if (flags.rooms == "clearance") options.rooms.method = RoomMethod::kClearance;
   if (flags.places == "volume") options.places.mode = PlaceMode::kVolume;
   options.places.robot_radius_m = flags.robot_radius_m;
+  options.segments = flags.segments;
   DSG_ASSIGN_OR_RETURN(options.commit_period_ns, Nanoseconds("commit-seconds", flags.commit_s));
   DSG_ASSIGN_OR_RETURN(options.mesh_wait_max_ns, Nanoseconds("mesh-seconds", flags.mesh_s));
   DSG_ASSIGN_OR_RETURN(options.layers_period_ns, Nanoseconds("layers-seconds", flags.layers_s));

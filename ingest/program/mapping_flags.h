@@ -27,6 +27,7 @@ struct MappingFlags {
   double mesh_s = 32.0;
   double layers_s = 5.0;
   int thread_count = VolumeOptions().thread_count;
+  SegmentOptions segments;
   bool has_timings = false;
 };
 

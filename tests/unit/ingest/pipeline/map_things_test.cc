@@ -67,16 +67,6 @@ TEST(MapThings, GlassClosesItsColumnsAndNoOthers) {
   EXPECT_EQ(grid.AtPoint({0.25, 0.25, 1.0}), Occupancy::kFree);
 }
 
-TEST(MapThings, ThingsWithoutLabelsAreWhatIsNoStructure) {
-  MeshBlock block;
-  block.positions_map = {{1, 1, 0.02f}, {1, 1, 0.6f}};
-  const std::vector<MeshBlock> things = UnlabelledThings({&block}, {Level("floor", 0.0, 10)}, 0.05);
-  ASSERT_EQ(things.size(), 1u);
-  ASSERT_EQ(things[0].positions_map.size(), 1u);
-  EXPECT_FLOAT_EQ(things[0].positions_map[0].z(), 0.6f);
-  EXPECT_EQ(things[0].labels, std::vector<uint32_t>{kThingClass});
-}
-
 TEST(MapThings, ObjectsBehindAWallAreNotInView) {
   DepthFrame frame;
   frame.camera.width = frame.camera.height = 11;

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/objects/segment_options.h"
+
+#include "absl/strings/str_cat.h"
+#include "schema/base/status.h"
+
+namespace dsg::ingest {
+namespace {
+
+constexpr SegmentField kFields[] = {
+    {"segment-cell", &SegmentOptions::cell_m, 0.02, 0.2,
+     "Edge of the cells that the surface is thinned to, metres; the voxel if that is larger. Finer "
+     "cells see the noise of depth cameras"},
+    {"segment-floor-skin", &SegmentOptions::floor_skin_m, 0.0, 0.3,
+     "What is this near to the floor is floor, metres: rugs, skirtings, rounded edges"},
+    {"segment-floor-drift", &SegmentOptions::floor_drift_m, 0.0, 0.5,
+     "How far a floor may be off its level, metres: drift, thresholds, ramps"},
+    {"segment-floor-area", &SegmentOptions::floor_area_m2, 0.1, 100.0,
+     "Least surface of a floor where the map has none, square metres"},
+    {"segment-ceiling-skin", &SegmentOptions::ceiling_skin_m, 0.0, 0.5,
+     "What is this near below the ceiling is ceiling, metres"},
+    {"segment-ceiling-height", &SegmentOptions::ceiling_height_m, 1.0, 10.0,
+     "Least height of a ceiling above the floor, metres"},
+    {"segment-ceiling-area", &SegmentOptions::ceiling_area_m2, 0.1, 100.0,
+     "Least surface of a ceiling, square metres"},
+    {"segment-wall-skin", &SegmentOptions::wall_skin_m, 0.0, 0.3,
+     "What is this near before a wall is wall, metres: pictures, switches, frames"},
+    {"segment-wall-depth", &SegmentOptions::wall_depth_m, 0.0, 1.0,
+     "How far behind its face a wall is solid, metres"},
+    {"segment-wall-area", &SegmentOptions::wall_area_m2, 0.1, 100.0,
+     "Least surface of a wall, square metres"},
+    {"segment-wall-width", &SegmentOptions::wall_width_m, 0.1, 10.0,
+     "Least width of a wall, metres"},
+    {"segment-wall-gap", &SegmentOptions::wall_gap_m, 0.0, 10.0,
+     "How wide furniture and doors may interrupt a wall, metres"},
+    {"segment-wall-reach", &SegmentOptions::wall_reach_m, 0.5, 10.0,
+     "How high above the floor a wall reaches where no ceiling is seen, metres; lower where "
+     "nothing "
+     "is seen up there"},
+    {"segment-wall-top-gap", &SegmentOptions::wall_top_gap_m, 0.0, 3.0,
+     "How near below the ceiling a wall reaches where a ceiling is seen, metres"},
+    {"segment-front-depth", &SegmentOptions::front_depth_m, 0.0, 3.0,
+     "An upright face is a cupboard's if another one stands within this behind it, metres"},
+    {"segment-front-share", &SegmentOptions::front_share, 0.0, 1.0,
+     "... along this share of its width"},
+    {"segment-column-share", &SegmentOptions::column_share, 0.1, 1.0,
+     "What fills this share of the height up to the ceiling is wall or pillar"},
+    {"segment-patch-k", &SegmentOptions::patch_k, 0.01, 100.0,
+     "Constant k of the over-segmentation; larger makes larger patches"},
+    {"segment-patch-area", &SegmentOptions::patch_area_m2, 0.0, 1.0,
+     "Smaller patches join the neighbour that is most like them, square metres"},
+    {"segment-convex-weight", &SegmentOptions::convex_weight, 0.0, 1.0,
+     "What an edge that bends outwards counts in the over-segmentation, of one that bends inwards"},
+    {"segment-flat", &SegmentOptions::flat_rad, 0.0, 1.5,
+     "Patches that look nearly the same way go on into each other, radians"},
+    {"segment-convex-contact", &SegmentOptions::convex_contact, 0.0, 10.0,
+     "Patches that bend outwards where they touch are one thing if the contact is this long, of "
+     "the "
+     "root of the smaller one's area"},
+    {"segment-concave-contact", &SegmentOptions::concave_contact, 0.0, 10.0,
+     "The same of patches that bend inwards"},
+    {"segment-seat-height", &SegmentOptions::seat_height_m, 0.0, 2.0,
+     "Level surfaces up to here above the floor are seats and beds, with what rises from them; "
+     "what "
+     "rises from a higher one stands on it, metres"},
+    {"segment-table-width", &SegmentOptions::table_width_m, 0.0, 3.0,
+     "... if it is this wide: shelves are not, metres"},
+    {"segment-table-area", &SegmentOptions::table_area_m2, 0.0, 10.0,
+     "... and this large, square metres"},
+    {"segment-under-share", &SegmentOptions::under_share, 0.0, 1.0,
+     "What lies below a larger thing with this share of its footprint is a part of it: legs"},
+    {"segment-under-gap", &SegmentOptions::under_gap_m, 0.0, 2.0,
+     "... if no more than this is between them, metres"},
+    {"segment-size-max", &SegmentOptions::size_max_m, 0.5, 20.0, "Longest side of a box, metres"},
+    {"segment-size-min", &SegmentOptions::size_min_m, 0.0, 2.0,
+     "What is smaller on all sides is no object, metres"},
+    {"segment-area-min", &SegmentOptions::area_min_m2, 0.0, 10.0,
+     "Least surface of an object, square metres"},
+    {"segment-height-min", &SegmentOptions::height_min_m, 0.0, 2.0,
+     "What rises less above the floor, and hangs less below the ceiling, is no object, metres"},
+    {"segment-sliver", &SegmentOptions::sliver_m, 0.0, 1.0,
+     "What is thinner on two sides is no object, metres"},
+    {"segment-strip-share", &SegmentOptions::strip_share, 0.0, 1.0,
+     "What is thinner on one side is none if it is this narrow for its length: frames of doors"},
+    {"segment-mount", &SegmentOptions::mount_m, 0.0, 1.0,
+     "What sticks out from a wall by less is a part of it, metres"},
+    {"segment-shell-contact", &SegmentOptions::shell_contact, 0.0, 1.0,
+     "What touches walls and ceilings with this share of its surface is a remnant of them"},
+};
+
+}  // namespace
+
+std::span<const SegmentField> SegmentFields() { return kFields; }
+
+absl::Status SegmentOptions::Validate() const {
+  for (const SegmentField& field : kFields) {
+    const double value = this->*field.value;
+    if (value >= field.min && value <= field.max) continue;
+    return MakeError(
+        Reason::kFieldInvalid,
+        absl::StrCat(field.name, " is ", value, "; give ", field.min, " to ", field.max),
+        {{"field", field.name}, {"value", absl::StrCat(value)}});
+  }
+  return absl::OkStatus();
+}
+
+std::string SegmentOptions::Digest() const {
+  std::string text;
+  for (const SegmentField& field : kFields) {
+    absl::StrAppend(&text, text.empty() ? "" : " ", field.name, "=", this->*field.value);
+  }
+  return text;
+}
+
+}  // namespace dsg::ingest

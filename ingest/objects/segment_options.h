@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// What takes the surface of a room without labels apart: all its constants in one place.
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "absl/status/status.h"
+
+namespace dsg::ingest {
+
+/// Units and ranges: SegmentFields().
+struct SegmentOptions {
+  double cell_m = 0.05;
+
+  double floor_skin_m = 0.06;
+  double floor_drift_m = 0.15;
+  double floor_area_m2 = 0.5;
+  double ceiling_skin_m = 0.10;
+  double ceiling_height_m = 1.9;
+  double ceiling_area_m2 = 1.0;
+
+  double wall_skin_m = 0.08;
+  double wall_depth_m = 0.15;
+  double wall_area_m2 = 0.8;
+  double wall_width_m = 0.6;
+  double wall_gap_m = 1.2;
+  double wall_reach_m = 1.7;
+  double wall_top_gap_m = 0.4;
+  double front_depth_m = 1.0;
+  double front_share = 0.3;
+  double column_share = 0.75;
+
+  double patch_k = 0.6;
+  double patch_area_m2 = 0.02;
+  double convex_weight = 1.0;
+  double flat_rad = 0.35;
+  double convex_contact = 0.25;
+  double concave_contact = 0.35;
+  double seat_height_m = 0.6;
+  double table_width_m = 0.4;
+  double table_area_m2 = 0.25;
+  double under_share = 0.7;
+  double under_gap_m = 0.3;
+
+  double size_max_m = 3.0;
+  double size_min_m = 0.15;
+  double area_min_m2 = 0.06;
+  double height_min_m = 0.12;
+  double sliver_m = 0.12;
+  double strip_share = 0.25;
+  double mount_m = 0.18;
+  double shell_contact = 0.5;
+
+  /// Errors: INVALID_ARGUMENT/FIELD_INVALID naming field, value and bounds.
+  absl::Status Validate() const;
+
+  /// All values by name, as text.
+  std::string Digest() const;
+};
+
+struct SegmentField {
+  /// As in the command line, without "--": "segment-cell".
+  const char* name;
+  double SegmentOptions::*value;
+  double min;
+  double max;
+  /// Meaning and unit, a phrase.
+  const char* help;
+};
+
+/// All options of SegmentOptions.
+std::span<const SegmentField> SegmentFields();
+
+}  // namespace dsg::ingest

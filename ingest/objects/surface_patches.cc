@@ -1,0 +1,395 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/objects/surface_patches.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "schema/base/disjoint_sets.h"
+
+namespace dsg::ingest {
+namespace {
+
+// A bend of less counts as none, sine.
+constexpr double kBendMin = 0.17;
+// Of a normal's z, of patches that look up.
+constexpr double kPatchUp = 0.8;
+// Directions that the extent of a patch is known in: half a turn.
+constexpr int kDirections = 12;
+
+struct PatchEdge {
+  float weight = 0.0f;
+  int a = 0;
+  int b = 0;
+};
+
+float WeightOf(const CellGraph& graph, int a, int b, double convex_weight) {
+  const Eigen::Vector3f& normal_a = graph.normals_map[static_cast<size_t>(a)];
+  const Eigen::Vector3f& normal_b = graph.normals_map[static_cast<size_t>(b)];
+  constexpr float kUnknown = 0.5f;
+  if (normal_a.isZero() || normal_b.isZero()) return kUnknown;
+  const auto bend = static_cast<float>(std::max(0.0, 1.0 - graph.CosineOf(a, b)));
+  const Eigen::Vector3f step =
+      graph.points_map[static_cast<size_t>(b)] - graph.points_map[static_cast<size_t>(a)];
+  const bool is_convex = graph.is_oriented && (normal_b - normal_a).dot(step) > 0.0f;
+  return is_convex ? static_cast<float>(convex_weight) * bend : bend;
+}
+
+std::vector<PatchEdge> EdgesOf(const CellGraph& graph, const std::vector<bool>& is_free,
+                               double convex_weight) {
+  std::vector<PatchEdge> edges;
+  for (int i = 0; i < static_cast<int>(graph.size()); ++i) {
+    if (!is_free[static_cast<size_t>(i)]) continue;
+    for (const int other : graph.NeighboursOf(i)) {
+      if (other <= i || !is_free[static_cast<size_t>(other)]) continue;
+      edges.push_back({WeightOf(graph, i, other, convex_weight), i, other});
+    }
+  }
+  std::sort(edges.begin(), edges.end(), [](const PatchEdge& x, const PatchEdge& y) {
+    return std::tuple(x.weight, x.a, x.b) < std::tuple(y.weight, y.a, y.b);
+  });
+  return edges;
+}
+
+std::vector<CellGroup> GroupsOf(const std::vector<bool>& is_free, DisjointSets* sets) {
+  std::vector<int> group_of(is_free.size(), -1);
+  std::vector<CellGroup> groups;
+  for (size_t i = 0; i < is_free.size(); ++i) {
+    if (!is_free[i]) continue;
+    int& group = group_of[static_cast<size_t>(sets->Find(static_cast<int>(i)))];
+    if (group < 0) {
+      group = static_cast<int>(groups.size());
+      groups.emplace_back();
+    }
+    groups[static_cast<size_t>(group)].push_back(static_cast<int>(i));
+  }
+  return groups;
+}
+
+/// How far something reaches in each direction.
+struct Extent {
+  std::array<double, kDirections> low;
+  std::array<double, kDirections> high;
+  double bottom_m = INFINITY;
+  double top_m = -INFINITY;
+
+  Extent() {
+    low.fill(INFINITY);
+    high.fill(-INFINITY);
+  }
+  void Add(const Eigen::Vector3d& point) {
+    for (int i = 0; i < kDirections; ++i) {
+      const double angle = M_PI * i / kDirections;
+      const double along = std::cos(angle) * point.x() + std::sin(angle) * point.y();
+      low[static_cast<size_t>(i)] = std::min(low[static_cast<size_t>(i)], along);
+      high[static_cast<size_t>(i)] = std::max(high[static_cast<size_t>(i)], along);
+    }
+    bottom_m = std::min(bottom_m, point.z());
+    top_m = std::max(top_m, point.z());
+  }
+  void Add(const Extent& other) {
+    for (size_t i = 0; i < low.size(); ++i) {
+      low[i] = std::min(low[i], other.low[i]);
+      high[i] = std::max(high[i], other.high[i]);
+    }
+    bottom_m = std::min(bottom_m, other.bottom_m);
+    top_m = std::max(top_m, other.top_m);
+  }
+  /// Sides of the upright rectangle with the least area, the shorter first.
+  std::pair<double, double> Sides() const {
+    std::pair<double, double> best(INFINITY, INFINITY);
+    for (size_t i = 0; i < kDirections / 2; ++i) {
+      const double a = high[i] - low[i];
+      const double b = high[i + kDirections / 2] - low[i + kDirections / 2];
+      if (a * b < best.first * best.second || std::isinf(best.first)) best = std::minmax(a, b);
+    }
+    return best;
+  }
+  double Longest() const { return std::max(Sides().second, top_m - bottom_m); }
+};
+
+struct PatchInfo {
+  double area_m2 = 0.0;
+  Eigen::Vector3d center_map = Eigen::Vector3d::Zero();
+  Eigen::Vector3d normal_map = Eigen::Vector3d::Zero();
+  double height_m = 0.0;
+  Extent extent;
+};
+
+/// A set of patches.
+struct Thing {
+  Extent extent;
+  /// Height of its lowest table top, infinite if it has none.
+  double table_z_m = INFINITY;
+};
+
+struct Contact {
+  int a = 0;
+  int b = 0;
+  double length_m = 0.0;
+  Eigen::Vector3d center_map = Eigen::Vector3d::Zero();
+  /// Length by the root of the smaller patch's area.
+  double strength = 0.0;
+};
+
+class PatchJoiner {
+ public:
+  PatchJoiner(const CellGraph& graph, const std::vector<float>& heights_m,
+              const std::vector<CellGroup>& patches, const SegmentOptions& options)
+      : graph_(graph), patches_(patches), options_(options), sets_(patches.size()) {
+    for (const CellGroup& patch : patches) infos_.push_back(Describe(patch, heights_m));
+    for (const PatchInfo& info : infos_) {
+      things_.push_back({info.extent, IsTable(info) ? info.center_map.z() : INFINITY});
+    }
+    FindContacts();
+  }
+
+  std::vector<CellGroup> Join() && {
+    for (const Contact& contact : contacts_) {
+      if (AreOne(contact)) TryMerge(contact.a, contact.b);
+    }
+    JoinCrumbs();
+    JoinBelow();
+    return Groups();
+  }
+
+ private:
+  const PatchInfo& Info(int patch) const { return infos_[static_cast<size_t>(patch)]; }
+
+  PatchInfo Describe(const CellGroup& patch, const std::vector<float>& heights_m) const {
+    PatchInfo info;
+    for (const int cell : patch) {
+      const auto i = static_cast<size_t>(cell);
+      const Eigen::Vector3d point = graph_.points_map[i].cast<double>();
+      info.center_map += point;
+      info.normal_map += graph_.NormalAs(info.normal_map, cell);
+      info.height_m += static_cast<double>(heights_m[i]);
+      info.extent.Add(point);
+    }
+    const auto count = static_cast<double>(patch.size());
+    info.area_m2 = count * graph_.cell_m * graph_.cell_m;
+    info.center_map /= count;
+    info.height_m /= count;
+    if (!info.normal_map.isZero()) info.normal_map.normalize();
+    return info;
+  }
+
+  void FindContacts() {
+    std::vector<int> patch_of(graph_.size(), -1);
+    for (size_t patch = 0; patch < patches_.size(); ++patch) {
+      for (const int cell : patches_[patch]) {
+        patch_of[static_cast<size_t>(cell)] = static_cast<int>(patch);
+      }
+    }
+    // (own patch, other patch, own cell), once for each cell of a border.
+    std::vector<std::tuple<int, int, int>> borders;
+    for (const CellGroup& patch : patches_) {
+      for (const int cell : patch) {
+        const int own = patch_of[static_cast<size_t>(cell)];
+        for (const int neighbour : graph_.NeighboursOf(cell)) {
+          const int other = patch_of[static_cast<size_t>(neighbour)];
+          if (other >= 0 && other != own) borders.emplace_back(own, other, cell);
+        }
+      }
+    }
+    std::sort(borders.begin(), borders.end());
+    borders.erase(std::unique(borders.begin(), borders.end()), borders.end());
+    std::map<std::pair<int, int>, std::pair<int, Eigen::Vector3d>> sides;
+    for (const auto& [own, other, cell] : borders) {
+      auto& side = sides.try_emplace({own, other}, 0, Eigen::Vector3d::Zero()).first->second;
+      ++side.first;
+      side.second += graph_.points_map[static_cast<size_t>(cell)].cast<double>();
+    }
+    for (const auto& [key, side] : sides) {
+      if (key.first > key.second) continue;
+      const auto& [other_count, other_sum] = sides.at({key.second, key.first});
+      Contact contact{key.first, key.second};
+      contact.length_m = std::min(side.first, other_count) * graph_.cell_m;
+      contact.center_map = (side.second + other_sum) / (side.first + other_count);
+      contact.strength =
+          contact.length_m / std::sqrt(std::min(Info(contact.a).area_m2, Info(contact.b).area_m2));
+      contacts_.push_back(contact);
+    }
+    std::stable_sort(contacts_.begin(), contacts_.end(),
+                     [](const Contact& x, const Contact& y) { return x.strength > y.strength; });
+  }
+
+  bool IsTable(const PatchInfo& patch) const {
+    const double up = graph_.is_oriented ? patch.normal_map.z() : std::abs(patch.normal_map.z());
+    return up > kPatchUp && patch.height_m > options_.seat_height_m &&
+           patch.area_m2 >= options_.table_area_m2 &&
+           patch.extent.Sides().first >= options_.table_width_m;
+  }
+
+  // Sine of the angle under which the middle of `other` is seen above the plane of `patch`.
+  static double BendOf(const PatchInfo& patch, const PatchInfo& other, const Contact& contact) {
+    const Eigen::Vector3d away = other.center_map - contact.center_map;
+    return away.norm() < 1e-6 ? 0.0 : patch.normal_map.dot(away.normalized());
+  }
+
+  bool AreOne(const Contact& contact) const {
+    const PatchInfo& a = Info(contact.a);
+    const PatchInfo& b = Info(contact.b);
+    if (graph_.Cosine(a.normal_map, b.normal_map) >= std::cos(options_.flat_rad)) {
+      return contact.strength >= options_.convex_contact;
+    }
+    const bool is_convex = BendOf(a, b, contact) <= kBendMin && BendOf(b, a, contact) <= kBendMin;
+    if (is_convex) return contact.strength >= options_.convex_contact;
+    return contact.strength >= options_.concave_contact;
+  }
+
+  // A table has all of it below its top: what rises higher stands on it or beside it.
+  bool AreApart(const Thing& a, const Thing& b) const {
+    const double slack_m = 1.5 * graph_.cell_m;
+    return b.extent.top_m > a.table_z_m + slack_m || a.extent.top_m > b.table_z_m + slack_m;
+  }
+
+  bool TryMerge(int a, int b) {
+    a = sets_.Find(a);
+    b = sets_.Find(b);
+    if (a == b) return true;
+    Thing both = things_[static_cast<size_t>(a)];
+    const Thing& other = things_[static_cast<size_t>(b)];
+    if (AreApart(both, other)) return false;
+    both.extent.Add(other.extent);
+    both.table_z_m = std::min(both.table_z_m, other.table_z_m);
+    if (both.extent.Longest() > options_.size_max_m) return false;
+    sets_.Merge(a, b);
+    things_[static_cast<size_t>(sets_.Find(a))] = both;
+    return true;
+  }
+
+  // What is too small for a thing of its own belongs to what it touches most.
+  void JoinCrumbs() {
+    std::vector<double> areas(patches_.size(), 0.0);
+    for (size_t i = 0; i < patches_.size(); ++i) {
+      areas[static_cast<size_t>(sets_.Find(static_cast<int>(i)))] += infos_[i].area_m2;
+    }
+    std::vector<const Contact*> by_length;
+    for (const Contact& contact : contacts_) by_length.push_back(&contact);
+    std::stable_sort(by_length.begin(), by_length.end(),
+                     [](const Contact* x, const Contact* y) { return x->length_m > y->length_m; });
+    for (const Contact* contact : by_length) {
+      const int a = sets_.Find(contact->a);
+      const int b = sets_.Find(contact->b);
+      if (a == b) continue;
+      const double area_a = areas[static_cast<size_t>(a)];
+      const double area_b = areas[static_cast<size_t>(b)];
+      if (std::min(area_a, area_b) >= options_.area_min_m2) continue;
+      if (TryMerge(a, b)) areas[static_cast<size_t>(sets_.Find(a))] = area_a + area_b;
+    }
+  }
+
+  // What is below a larger thing, as what is seen of its legs, is a part of it.
+  void JoinBelow() {
+    const std::vector<CellGroup> groups = Groups();
+    std::vector<std::set<std::pair<int, int>>> footprints;
+    std::vector<int> root_of;
+    std::map<int, int> patch_of;
+    for (size_t i = 0; i < patches_.size(); ++i) {
+      patch_of[patches_[i].front()] = static_cast<int>(i);
+    }
+    for (const CellGroup& group : groups) {
+      root_of.push_back(sets_.Find(patch_of.at(group.front())));
+      footprints.emplace_back();
+      for (const int cell : group) footprints.back().insert(SquareBelow(cell));
+    }
+    for (size_t low = 0; low < groups.size(); ++low) {
+      for (size_t high = 0; high < groups.size(); ++high) {
+        if (2 * groups[low].size() > groups[high].size()) continue;
+        const Extent& below = things_[static_cast<size_t>(sets_.Find(root_of[low]))].extent;
+        const Extent& above = things_[static_cast<size_t>(sets_.Find(root_of[high]))].extent;
+        if (below.top_m > above.top_m || below.top_m < above.bottom_m - options_.under_gap_m) {
+          continue;
+        }
+        const auto count =
+            std::count_if(footprints[low].begin(), footprints[low].end(),
+                          [&](const auto& square) { return footprints[high].contains(square); });
+        if (static_cast<double>(count) <
+            options_.under_share * static_cast<double>(footprints[low].size())) {
+          continue;
+        }
+        if (TryMerge(root_of[low], root_of[high])) break;
+      }
+    }
+  }
+
+  std::pair<int, int> SquareBelow(int cell) const {
+    const Eigen::Vector3f& point = graph_.points_map[static_cast<size_t>(cell)];
+    const auto side = static_cast<float>(2.0 * graph_.cell_m);
+    return {static_cast<int>(std::floor(point.x() / side)),
+            static_cast<int>(std::floor(point.y() / side))};
+  }
+
+  std::vector<CellGroup> Groups() {
+    std::map<int, CellGroup> joined;
+    for (size_t i = 0; i < patches_.size(); ++i) {
+      CellGroup& group = joined[sets_.Find(static_cast<int>(i))];
+      group.insert(group.end(), patches_[i].begin(), patches_[i].end());
+    }
+    std::vector<CellGroup> groups;
+    for (auto& [root, group] : joined) {
+      std::sort(group.begin(), group.end());
+      groups.push_back(std::move(group));
+    }
+    std::sort(groups.begin(), groups.end());
+    return groups;
+  }
+
+  const CellGraph& graph_;
+  const std::vector<CellGroup>& patches_;
+  const SegmentOptions& options_;
+  std::vector<PatchInfo> infos_;
+  /// Of the sets, by representative.
+  std::vector<Thing> things_;
+  /// Strongest first.
+  std::vector<Contact> contacts_;
+  DisjointSets sets_;
+};
+
+}  // namespace
+
+std::vector<CellGroup> FindPatches(const CellGraph& graph, const std::vector<bool>& is_free,
+                                   const SegmentOptions& options) {
+  const std::vector<PatchEdge> edges = EdgesOf(graph, is_free, options.convex_weight);
+  const int cells_min = static_cast<int>(options.patch_area_m2 / (graph.cell_m * graph.cell_m));
+  DisjointSets sets(graph.size());
+  std::vector<int> sizes(graph.size(), 1);
+  // The largest weight within a patch, and what its size allows beyond it.
+  std::vector<double> limits(graph.size(), options.patch_k);
+  for (const PatchEdge& edge : edges) {
+    const int a = sets.Find(edge.a);
+    const int b = sets.Find(edge.b);
+    if (a == b) continue;
+    const double weight = static_cast<double>(edge.weight);
+    if (weight > std::min(limits[static_cast<size_t>(a)], limits[static_cast<size_t>(b)])) continue;
+    const int size = sizes[static_cast<size_t>(a)] + sizes[static_cast<size_t>(b)];
+    sets.Merge(a, b);
+    const auto root = static_cast<size_t>(sets.Find(a));
+    sizes[root] = size;
+    limits[root] = weight + options.patch_k / size;
+  }
+  for (const PatchEdge& edge : edges) {
+    const int a = sets.Find(edge.a);
+    const int b = sets.Find(edge.b);
+    if (a == b) continue;
+    const int size_a = sizes[static_cast<size_t>(a)];
+    const int size_b = sizes[static_cast<size_t>(b)];
+    if (std::min(size_a, size_b) >= cells_min) continue;
+    sets.Merge(a, b);
+    sizes[static_cast<size_t>(sets.Find(a))] = size_a + size_b;
+  }
+  return GroupsOf(is_free, &sets);
+}
+
+std::vector<CellGroup> JoinPatches(const CellGraph& graph, const std::vector<float>& heights_m,
+                                   const std::vector<CellGroup>& patches,
+                                   const SegmentOptions& options) {
+  return PatchJoiner(graph, heights_m, patches, options).Join();
+}
+
+}  // namespace dsg::ingest

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/objects/unlabelled_objects.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "ingest/objects/cell_graph.h"
+#include "ingest/objects/room_shell.h"
+#include "ingest/objects/surface_cells.h"
+#include "ingest/objects/surface_patches.h"
+
+namespace dsg::ingest {
+namespace {
+
+// What goes from here above the floor to here below the ceiling is a part of the building.
+constexpr double kFullHeightM = 0.35;
+// Cells at either end of an extent that may be smear.
+constexpr double kTrimShare = 0.03;
+
+/// What a group of cells is to the room around it.
+struct RoomAroundGroup {
+  double bottom_m = 0.0;
+  double top_m = 0.0;
+  double depth_m = INFINITY;
+  /// How far it sticks out from the wall that it is on, infinite if it is on none.
+  double before_wall_m = INFINITY;
+  /// Share of its cells that touch a wall or a ceiling.
+  double shell_contact = 0.0;
+};
+
+double Quantile(std::vector<double> values, double share) {
+  const auto index = static_cast<int64_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + index, values.end());
+  return values[static_cast<size_t>(index)];
+}
+
+RoomAroundGroup RoomAround(const CellGraph& graph, const RoomShell& shell, const CellGroup& group) {
+  RoomAroundGroup result;
+  std::vector<double> heights;
+  for (const int cell : group) {
+    const auto i = static_cast<size_t>(cell);
+    heights.push_back(static_cast<double>(shell.heights_m[i]));
+    result.depth_m = std::min(result.depth_m, static_cast<double>(shell.depths_m[i]));
+  }
+  const auto touches_shell = [&](int cell) {
+    const std::span<const int> around = graph.NeighboursOf(cell);
+    return std::any_of(around.begin(), around.end(), [&](int other) {
+      const ShellPart part = shell.parts[static_cast<size_t>(other)];
+      return part == ShellPart::kWall || part == ShellPart::kCeiling;
+    });
+  };
+  result.shell_contact =
+      static_cast<double>(std::count_if(group.begin(), group.end(), touches_shell)) /
+      static_cast<double>(group.size());
+  result.bottom_m = Quantile(heights, kTrimShare);
+  result.top_m = Quantile(std::move(heights), 1.0 - kTrimShare);
+  for (const ShellWall& wall : shell.walls) {
+    std::vector<double> distances;
+    size_t beside = 0;
+    for (const int cell : group) {
+      const Eigen::Vector3d point = graph.points_map[static_cast<size_t>(cell)].cast<double>();
+      distances.push_back(std::abs(wall.DistanceTo(point)));
+      beside += wall.IsBeside(point, graph.cell_m) ? 1 : 0;
+    }
+    if (2 * beside < group.size()) continue;
+    result.before_wall_m =
+        std::min(result.before_wall_m, Quantile(std::move(distances), 1.0 - kTrimShare));
+  }
+  return result;
+}
+
+bool MayBeObject(const RoomAroundGroup& around, const ObjectCluster& cluster,
+                 const SegmentOptions& options) {
+  std::array<double, 3> sides = {cluster.size.x(), cluster.size.y(), cluster.size.z()};
+  std::sort(sides.begin(), sides.end());
+  if (sides[2] > options.size_max_m || sides[2] < options.size_min_m) return false;
+  if (sides[1] < options.sliver_m) return false;
+  if (sides[0] < options.sliver_m && sides[1] < options.strip_share * sides[2]) return false;
+  if (around.top_m < options.height_min_m || around.before_wall_m < options.mount_m) return false;
+  if (around.shell_contact >= options.shell_contact) return false;
+  if (around.depth_m < kFullHeightM && around.bottom_m < kFullHeightM) return false;
+  const double height_m = around.top_m - around.bottom_m;
+  return around.depth_m + height_m > 2.0 * options.height_min_m;
+}
+
+}  // namespace
+
+std::vector<ObjectCluster> FindUnlabelledObjects(const std::vector<const MeshBlock*>& mesh,
+                                                 int32_t class_id, double voxel_m,
+                                                 const std::vector<double>& floors_m,
+                                                 const SegmentOptions& options) {
+  if (!(voxel_m > 0.0) || !std::isfinite(voxel_m)) return {};
+  const double cell_m = std::max(voxel_m, options.cell_m);
+  const ObjectSurface surface = GatherAllSurface(mesh, class_id, cell_m);
+  const CellGraph graph = MakeCellGraph(surface, cell_m);
+  const RoomShell shell = FindRoomShell(graph, floors_m, options);
+  std::vector<bool> is_free(graph.size());
+  for (size_t i = 0; i < graph.size(); ++i) is_free[i] = shell.parts[i] == ShellPart::kNone;
+  std::vector<CellGroup> groups =
+      JoinPatches(graph, shell.heights_m, FindPatches(graph, is_free, options), options);
+  std::erase_if(groups, [&](const CellGroup& group) {
+    return static_cast<double>(group.size()) * cell_m * cell_m < options.area_min_m2;
+  });
+  const std::vector<ObjectCluster> candidates =
+      ClustersOfGroups(surface, groups, shell.floors_m, cell_m);
+  std::vector<ObjectCluster> clusters;
+  for (size_t i = 0; i < groups.size(); ++i) {
+    if (!MayBeObject(RoomAround(graph, shell, groups[i]), candidates[i], options)) continue;
+    clusters.push_back(candidates[i]);
+  }
+  SortClusters(&clusters);
+  return clusters;
+}
+
+}  // namespace dsg::ingest
