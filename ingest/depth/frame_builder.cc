@@ -123,7 +123,7 @@ BuiltFrame FrameBuilder::BuildViews(const FramePlan& plan) const {
     built.skips.push_back("no depth image");
     return built;
   }
-  built.frames = ViewsOfCloud(points, plan.time_ns, plan.map_T_body * rig_.lidar->body_T_lidar);
+  built.frames = ViewsOfCloud(points, plan.time_ns, plan.odom_T_body * rig_.lidar->body_T_lidar);
   if (built.frames.empty()) built.skips.push_back("no points");
   return built;
 }
@@ -134,7 +134,7 @@ BuiltFrame FrameBuilder::Build(const FramePlan& plan) const {
   DepthFrame& frame = built.frames.emplace_back();
   frame.time_ns = plan.time_ns;
   frame.camera = camera_;
-  frame.map_T_camera = plan.map_T_body * camera_.body_T_camera;
+  frame.map_T_camera = plan.odom_T_body * camera_.body_T_camera;
   frame.map_T_camera.orientation.normalize();
   frame.is_stereo = stereo_.has_value();
   if (!(stereo_.has_value() ? FillStereo(plan, &built) : FillDepth(plan, &built))) {

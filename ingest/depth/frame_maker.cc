@@ -21,8 +21,8 @@ double DepthRate(const RigCalibration& rig) {
 
 class FrameMaker::Impl {
  public:
-  Impl(const RigCalibration& rig, const DepthOptions& options)
-      : builder_(rig, options), planner_(builder_.source(), DepthRate(rig), options) {}
+  Impl(const RigCalibration& rig, const DepthOptions& options, const RobotPath& path)
+      : builder_(rig, options), planner_(builder_.source(), DepthRate(rig), options, path) {}
 
   FramePlanner& planner() { return planner_; }
   const FrameBuilder& builder() const { return builder_; }
@@ -77,8 +77,9 @@ class FrameMaker::Impl {
   std::deque<std::future<BuiltFrame>> building_;
 };
 
-FrameMaker::FrameMaker(const RigCalibration& rig, const DepthOptions& options)
-    : impl_(std::make_unique<Impl>(rig, options)) {}
+FrameMaker::FrameMaker(const RigCalibration& rig, const DepthOptions& options,
+                       const RobotPath& path)
+    : impl_(std::make_unique<Impl>(rig, options, path)) {}
 FrameMaker::~FrameMaker() = default;
 
 bool FrameMaker::CanMakeFrames() const {
@@ -90,8 +91,8 @@ void FrameMaker::AddPicture(Picture picture) {
   impl_->Start();
 }
 
-void FrameMaker::AddPose(TimeNs time_ns, const Pose3d& map_T_body) {
-  impl_->planner().AddPose(time_ns, map_T_body);
+void FrameMaker::NotePose() {
+  impl_->planner().NotePose();
   impl_->Start();
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // From the images of a sensor log to depth frames ready to be fused.
 // Refuses to guess poses: a frame between two poses of the robot gets theirs, others wait or go.
+// All poses are those of the odometry frame: RobotPath::ToMap brings a frame into the map.
 #pragma once
 
 #include <cstdint>
@@ -16,6 +17,7 @@
 #include "ingest/sensor/depth_frame.h"
 #include "ingest/sensor/human_detection.h"
 #include "ingest/sensor/image.h"
+#include "ingest/trajectory/robot_path.h"
 
 namespace dsg::ingest {
 
@@ -31,16 +33,12 @@ struct DepthOptions {
   int mask_growth_px = 3;
   /// Depth edges of more than this beside a mask belong to the mask, metres.
   double mask_edge_m = 0.3;
-  /// Two poses further apart than this do not tell where the camera was in between.
-  TimeNs pose_gap_ns_max = 500'000'000;
-  /// The robot does not move faster; a frame across a faster step is skipped as a pose jump.
-  double speed_m_s_max = 20.0;
 };
 
 /// What could not be used, by reason, in words for the user. Frames: "no depth image", "no right
 /// image", "no points", "no pose", "pose jump", "size differs from calibration", "broken image",
 /// "out of order". Frames that came without colour or labels: "colour left out: ...", "labels left
-/// out: ..." and why. Poses: "broken pose".
+/// out: ..." and why.
 using SkipCounts = std::map<std::string, int64_t>;
 
 /// Put in what the log says, in its order; take out frames once all they need is there.
@@ -68,7 +66,8 @@ class FrameMaker {
     std::function<absl::StatusOr<Image>()> load;
   };
 
-  FrameMaker(const RigCalibration& rig, const DepthOptions& options);
+  /// `path`: poses of the rig's body. Must outlive the maker.
+  FrameMaker(const RigCalibration& rig, const DepthOptions& options, const RobotPath& path);
   ~FrameMaker();
 
   /// True when the rig can give depth at all: a depth camera, a lidar, or two rectifiable grey
@@ -76,8 +75,8 @@ class FrameMaker {
   bool CanMakeFrames() const;
 
   void AddPicture(Picture picture);
-  /// Pose of the robot's body in the map.
-  void AddPose(TimeNs time_ns, const Pose3d& map_T_body);
+  /// The path has got another pose.
+  void NotePose();
   void AddDetection(const HumanDetection& detection);
 
   /// The next frame; times do not descend. nullopt when more of the log is needed. After Finish,

@@ -25,12 +25,13 @@ bool IsKnownChannel(const std::string& channel) {
 
 }  // namespace
 
-FramePlanner::FramePlanner(Source source, double rate_hz, const DepthOptions& options)
+FramePlanner::FramePlanner(Source source, double rate_hz, const DepthOptions& options,
+                           const RobotPath& path)
     : source_(source),
       rate_hz_(rate_hz),
       options_(options),
       main_channel_(kMainOf[static_cast<int>(source)]),
-      poses_(options.pose_gap_ns_max, options.speed_m_s_max) {}
+      path_(path) {}
 
 void FramePlanner::AddPicture(FrameMaker::Picture picture) {
   if (source_ == Source::kNone || is_finished_ || !IsKnownChannel(picture.channel)) return;
@@ -53,12 +54,8 @@ void FramePlanner::AddPicture(FrameMaker::Picture picture) {
   Plan();
 }
 
-void FramePlanner::AddPose(TimeNs time_ns, const Pose3d& map_T_body) {
+void FramePlanner::NotePose() {
   if (source_ == Source::kNone || is_finished_) return;
-  if (!poses_.Add(time_ns, map_T_body)) {
-    ++skips_["broken pose"];
-    return;
-  }
   Plan();
 }
 
@@ -90,7 +87,6 @@ size_t FramePlanner::waiting_count() const {
 void FramePlanner::Plan() {
   while (PlanFront()) {
   }
-  if (last_main_ns_.has_value()) poses_.ForgetBefore(*last_main_ns_);
 }
 
 bool FramePlanner::PlanFront() {
@@ -100,25 +96,25 @@ bool FramePlanner::PlanFront() {
   if (!is_finished_ && now_ns_ <= time_ns + kToleranceNs) return false;
   const bool is_too_soon = source_ == Source::kStereo && last_plan_ns_.has_value() &&
                            time_ns < *last_plan_ns_ + options_.stereo_period_ns - kPairToleranceNs;
-  Pose3d map_T_body;
-  const PoseTrack::Answer answer = poses_.At(time_ns, &map_T_body);
-  if (!is_too_soon && !is_finished_ && answer == PoseTrack::Answer::kNotYet) return false;
+  Pose3d odom_T_body;
+  const RobotPath::Answer answer = path_.GivenAt(time_ns, &odom_T_body);
+  if (!is_too_soon && !is_finished_ && answer == RobotPath::Answer::kNotYet) return false;
   FrameMaker::Picture picture = std::move(main->second.begin()->second);
   main->second.erase(main->second.begin());
-  if (!is_too_soon && answer == PoseTrack::Answer::kKnown) {
-    MakePlan(std::move(picture), map_T_body);
+  if (!is_too_soon && answer == RobotPath::Answer::kKnown) {
+    MakePlan(std::move(picture), odom_T_body);
   } else if (!is_too_soon) {
-    ++skips_[answer == PoseTrack::Answer::kJump ? "pose jump" : "no pose"];
+    ++skips_[answer == RobotPath::Answer::kJump ? "pose jump" : "no pose"];
   }
   last_main_ns_ = time_ns;
   ForgetBefore(time_ns - kToleranceNs);
   return true;
 }
 
-void FramePlanner::MakePlan(FrameMaker::Picture main, const Pose3d& map_T_body) {
+void FramePlanner::MakePlan(FrameMaker::Picture main, const Pose3d& odom_T_body) {
   FramePlan plan;
   plan.time_ns = main.time_ns;
-  plan.map_T_body = map_T_body;
+  plan.odom_T_body = odom_T_body;
   if (source_ == Source::kStereo) {
     plan.right = Nearest("cam1", main.time_ns, kPairToleranceNs);
     if (!plan.right.has_value()) {

@@ -11,14 +11,15 @@
 #include <vector>
 
 #include "ingest/depth/frame_maker.h"
-#include "ingest/depth/pose_track.h"
+#include "ingest/trajectory/robot_path.h"
 
 namespace dsg::ingest {
 
 /// What a frame will be made of.
 struct FramePlan {
   TimeNs time_ns = 0;
-  Pose3d map_T_body;
+  /// As the log gives it: corrections of the path come later.
+  Pose3d odom_T_body;
   /// depth0, cam0 of a stereo pair, or lidar0.
   FrameMaker::Picture main;
   /// cam1 of a stereo pair.
@@ -37,10 +38,12 @@ class FramePlanner {
   enum class Source { kNone, kDepth, kStereo, kLidar };
 
   /// `rate_hz` is that of the depth camera, 0 = unknown.
-  FramePlanner(Source source, double rate_hz, const DepthOptions& options);
+  /// `path` must outlive the planner.
+  FramePlanner(Source source, double rate_hz, const DepthOptions& options, const RobotPath& path);
 
   void AddPicture(FrameMaker::Picture picture);
-  void AddPose(TimeNs time_ns, const Pose3d& map_T_body);
+  /// The path has got another pose.
+  void NotePose();
   void AddDetection(const HumanDetection& detection);
   void Finish();
 
@@ -56,7 +59,7 @@ class FramePlanner {
 
   void Plan();
   bool PlanFront();
-  void MakePlan(FrameMaker::Picture main, const Pose3d& map_T_body);
+  void MakePlan(FrameMaker::Picture main, const Pose3d& odom_T_body);
   /// How far from the main picture's stamp another may be.
   TimeNs ToleranceAt(TimeNs time_ns) const;
   std::optional<FrameMaker::Picture> Nearest(const std::string& channel, TimeNs time_ns,
@@ -67,7 +70,7 @@ class FramePlanner {
   double rate_hz_;
   DepthOptions options_;
   std::string main_channel_;
-  PoseTrack poses_;
+  const RobotPath& path_;
   std::map<std::string, Pictures> waiting_;
   std::deque<HumanDetection> detections_;
   std::deque<FramePlan> plans_;

@@ -16,26 +16,6 @@ namespace {
 constexpr double kKeyframeSpreadStep = 1.5;
 constexpr double kKeyframeSpreadMax = 1e6;
 
-// Between samples at either side of an instant.
-Pose3d InterpolateAt(const std::vector<TimeNs>& times, const std::vector<Pose3d>& poses,
-                     TimeNs time_ns) {
-  const auto after = std::upper_bound(times.begin(), times.end(), time_ns);
-  if (after == times.begin()) return poses.front();
-  if (after == times.end()) return poses.back();
-  const auto next = static_cast<size_t>(after - times.begin());
-  const double fraction = static_cast<double>(time_ns - times[next - 1]) /
-                          static_cast<double>(times[next] - times[next - 1]);
-  return Interpolate(poses[next - 1], poses[next], fraction);
-}
-
-size_t NearestIndex(const std::vector<TimeNs>& times, TimeNs time_ns) {
-  const auto after = std::lower_bound(times.begin(), times.end(), time_ns);
-  if (after == times.end()) return times.size() - 1;
-  const auto index = static_cast<size_t>(after - times.begin());
-  if (index == 0 || *after - time_ns < time_ns - times[index - 1]) return index;
-  return index - 1;
-}
-
 Covariance6 UpperTriangle(const Matrix6d& matrix) {
   Covariance6 values{};
   size_t next = 0;
@@ -60,71 +40,40 @@ PoseFactor MakeFactor(const std::string& type, TimeNs from_ns, TimeNs to_ns, con
 
 }  // namespace
 
-TrajectoryChange::TrajectoryChange(std::vector<TimeNs> times, std::vector<Pose3d> new_T_old)
-    : times_(std::move(times)), old_T_body_(times_.size()), new_T_body_(std::move(new_T_old)) {
-  DSG_CHECK(new_T_body_.size() == times_.size());
-  for (const Pose3d& pose : new_T_body_) {
-    largest_m_ = std::max(largest_m_, pose.position.norm());
-  }
-}
-
-TrajectoryChange::TrajectoryChange(std::vector<TimeNs> times, std::vector<Pose3d> old_T_body,
-                                   std::vector<Pose3d> new_T_body)
-    : times_(std::move(times)),
-      old_T_body_(std::move(old_T_body)),
-      new_T_body_(std::move(new_T_body)) {
-  DSG_CHECK(old_T_body_.size() == times_.size() && new_T_body_.size() == times_.size());
-  for (size_t i = 0; i < times_.size(); ++i) {
-    const double shift_m = (new_T_body_[i].position - old_T_body_[i].position).norm();
-    largest_m_ = std::max(largest_m_, shift_m);
-  }
-}
-
-Pose3d TrajectoryChange::At(TimeNs time_ns) const {
-  if (times_.empty()) return {};
-  Pose3d new_T_old = InterpolateAt(times_, new_T_body_, time_ns) *
-                     InterpolateAt(times_, old_T_body_, time_ns).Inverse();
-  new_T_old.orientation.normalize();
-  return new_T_old;
-}
-
 // A loop and the two poses that it is to bind.
 struct RobotGraph::BoundLoop {
   /// Index in loops_.
   size_t loop = 0;
-  /// Indices in poses_.
+  /// Indices of poses of the path.
   size_t from = 0;
   size_t to = 0;
   /// Between those two poses.
   Pose3d from_T_to;
 };
 
-RobotGraph::RobotGraph(const RobotGraphOptions& options) : options_(options) {}
-
-void RobotGraph::AddPose(TimeNs time_ns, const Pose3d& map_T_body) {
-  if (!times_.empty() && time_ns <= times_.back()) return;
-  times_.push_back(time_ns);
-  poses_.push_back(map_T_body);
-}
+RobotGraph::RobotGraph(const RobotGraphOptions& options, const RobotPath& path)
+    : options_(options), path_(path) {}
 
 void RobotGraph::AddLoop(const LoopClosure& loop) { loops_.push_back(loop); }
 
-Pose3d RobotGraph::PoseAt(TimeNs time_ns) const { return InterpolateAt(times_, poses_, time_ns); }
+const Pose3d& RobotGraph::Given(size_t index) const { return path_.poses()[index].map_T_agent; }
+TimeNs RobotGraph::TimeOf(size_t index) const { return path_.poses()[index].time_ns; }
 
 std::vector<RobotGraph::BoundLoop> RobotGraph::BindLoops() const {
   std::vector<BoundLoop> bound;
-  if (times_.empty()) return bound;
-  const auto is_inside = [this](TimeNs time_ns) {
-    return time_ns >= times_.front() && time_ns <= times_.back();
+  const std::deque<TimedPose>& poses = path_.poses();
+  if (poses.empty()) return bound;
+  const auto is_inside = [&poses](TimeNs time_ns) {
+    return time_ns >= poses.front().time_ns && time_ns <= poses.back().time_ns;
   };
   for (size_t i = 0; i < loops_.size(); ++i) {
     const LoopClosure& loop = loops_[i];
     if (!is_inside(loop.from_ns) || !is_inside(loop.to_ns)) continue;
-    BoundLoop item{i, NearestIndex(times_, loop.from_ns), NearestIndex(times_, loop.to_ns), {}};
+    BoundLoop item{i, path_.NearestIndex(loop.from_ns), path_.NearestIndex(loop.to_ns), {}};
     if (item.from == item.to) continue;
     // The robot moved on between the stamps and the poses that stand for them.
-    const Pose3d pose_T_from = poses_[item.from].Inverse() * PoseAt(loop.from_ns);
-    const Pose3d to_T_pose = PoseAt(loop.to_ns).Inverse() * poses_[item.to];
+    const Pose3d pose_T_from = Given(item.from).Inverse() * path_.GivenNear(loop.from_ns);
+    const Pose3d to_T_pose = path_.GivenNear(loop.to_ns).Inverse() * Given(item.to);
     item.from_T_to = pose_T_from * loop.from_T_to * to_T_pose;
     item.from_T_to.orientation.normalize();
     bound.push_back(item);
@@ -138,15 +87,15 @@ std::vector<size_t> RobotGraph::ChooseKeyframes(const std::vector<BoundLoop>& lo
   for (const BoundLoop& loop : loops) bound.insert(bound.end(), {loop.from, loop.to});
   std::sort(bound.begin(), bound.end());
   std::vector<size_t> keyframes;
-  for (size_t i = 0; i < poses_.size(); ++i) {
-    bool is_keyframe =
-        i == 0 || i + 1 == poses_.size() || std::binary_search(bound.begin(), bound.end(), i);
+  for (size_t i = 0; i < path_.poses().size(); ++i) {
+    bool is_keyframe = i == 0 || i + 1 == path_.poses().size() ||
+                       std::binary_search(bound.begin(), bound.end(), i);
     if (!is_keyframe) {
-      const Pose3d& last = poses_[keyframes.back()];
+      const Pose3d& last = Given(keyframes.back());
       is_keyframe =
-          (poses_[i].position - last.position).norm() >= spread * options_.keyframe_m ||
-          AngleBetween(last.orientation, poses_[i].orientation) >= spread * options_.keyframe_rad ||
-          static_cast<double>(times_[i] - times_[keyframes.back()]) >=
+          (Given(i).position - last.position).norm() >= spread * options_.keyframe_m ||
+          AngleBetween(last.orientation, Given(i).orientation) >= spread * options_.keyframe_rad ||
+          static_cast<double>(TimeOf(i) - TimeOf(keyframes.back())) >=
               spread * static_cast<double>(options_.keyframe_ns_max);
     }
     if (is_keyframe) keyframes.push_back(i);
@@ -156,10 +105,10 @@ std::vector<size_t> RobotGraph::ChooseKeyframes(const std::vector<BoundLoop>& lo
 
 RelativePose RobotGraph::Odometry(size_t from, size_t to) const {
   RelativePose edge;
-  edge.from_T_to = poses_[from].Inverse() * poses_[to];
+  edge.from_T_to = Given(from).Inverse() * Given(to);
   edge.from_T_to.orientation.normalize();
   const double way_m = edge.from_T_to.position.norm();
-  const double turn_rad = AngleBetween(poses_[from].orientation, poses_[to].orientation);
+  const double turn_rad = AngleBetween(Given(from).orientation, Given(to).orientation);
   const double variance_m2 = std::max(std::pow(options_.odometry_m_per_m, 2) * way_m,
                                       std::pow(options_.odometry_m_min, 2));
   const double variance_rad2 = std::max(std::pow(options_.odometry_rad_per_m, 2) * way_m +
@@ -168,7 +117,7 @@ RelativePose RobotGraph::Odometry(size_t from, size_t to) const {
   edge.information.setZero();
   edge.information.diagonal().head<3>().setConstant(1.0 / variance_m2);
   // The turn about the vertical alone drifts; the residual is in the axes of `to`.
-  const Eigen::Vector3d up_to = poses_[to].orientation.conjugate() * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d up_to = Given(to).orientation.conjugate() * Eigen::Vector3d::UnitZ();
   const Eigen::Matrix3d about_up = up_to * up_to.transpose();
   edge.information.bottomRightCorner<3, 3>() =
       about_up / variance_rad2 +
@@ -183,7 +132,7 @@ PoseGraph RobotGraph::MakeGraph(const std::vector<size_t>& keyframes,
   for (size_t k = 0; k < keyframes.size(); ++k) {
     keyframe_of_pose[keyframes[k]] = static_cast<int>(k);
     graph.ids.push_back(static_cast<int64_t>(k));
-    graph.poses.push_back(poses_[keyframes[k]]);
+    graph.poses.push_back(Given(keyframes[k]));
     if (k == 0) continue;
     RelativePose& edge = graph.edges.emplace_back(Odometry(keyframes[k - 1], keyframes[k]));
     edge.from = static_cast<int>(k) - 1;
@@ -201,7 +150,7 @@ PoseGraph RobotGraph::MakeGraph(const std::vector<size_t>& keyframes,
   return graph;
 }
 
-absl::StatusOr<RobotGraph::Solution> RobotGraph::Solve() const {
+absl::StatusOr<RobotGraph::Solution> RobotGraph::Solve(bool has_covariances) const {
   Solution solution;
   const std::vector<BoundLoop> loops = BindLoops();
   std::vector<size_t> keyframes = ChooseKeyframes(loops, solution.keyframe_spread);
@@ -210,7 +159,7 @@ absl::StatusOr<RobotGraph::Solution> RobotGraph::Solve() const {
     solution.keyframe_spread *= kKeyframeSpreadStep;
     keyframes = ChooseKeyframes(loops, solution.keyframe_spread);
   }
-  for (const size_t keyframe : keyframes) solution.keyframe_times.push_back(times_[keyframe]);
+  for (const size_t keyframe : keyframes) solution.keyframe_times.push_back(TimeOf(keyframe));
   solution.loop_count = static_cast<int64_t>(loops_.size());
   solution.unusable_count = static_cast<int64_t>(loops_.size() - loops.size());
   solution.is_kept.assign(loops_.size(), false);
@@ -219,7 +168,8 @@ absl::StatusOr<RobotGraph::Solution> RobotGraph::Solve() const {
   const PoseGraph graph = MakeGraph(keyframes, loops);
   RobustOptions robust = options_.robust;
   robust.optimize.fixed_pose = 0;
-  robust.optimize.has_covariance = keyframes.size() <= options_.covariance_count_max;
+  robust.optimize.has_covariance =
+      has_covariances && keyframes.size() <= options_.covariance_count_max;
   DSG_ASSIGN_OR_RETURN(const RobustResult result, OptimizeRobustly(graph, robust));
   for (size_t i = 0; i < loops.size(); ++i) {
     const bool is_kept = result.is_kept[keyframes.size() - 1 + i];
@@ -240,16 +190,16 @@ absl::StatusOr<RobotGraph::Solution> RobotGraph::Solve() const {
 std::vector<PoseFactor> RobotGraph::Factors(const Solution& solution) const {
   std::vector<PoseFactor> factors;
   for (size_t k = 1; k < solution.keyframe_times.size(); ++k) {
-    const size_t from = NearestIndex(times_, solution.keyframe_times[k - 1]);
-    const size_t to = NearestIndex(times_, solution.keyframe_times[k]);
+    const size_t from = path_.NearestIndex(solution.keyframe_times[k - 1]);
+    const size_t to = path_.NearestIndex(solution.keyframe_times[k]);
     const RelativePose edge = Odometry(from, to);
     factors.push_back(
-        MakeFactor("odometry", times_[from], times_[to], edge.from_T_to, edge.information));
+        MakeFactor("odometry", TimeOf(from), TimeOf(to), edge.from_T_to, edge.information));
   }
   for (const BoundLoop& loop : BindLoops()) {
     const bool is_kept = loop.loop < solution.is_kept.size() && solution.is_kept[loop.loop];
     factors.push_back(MakeFactor(is_kept ? "loop_closure" : "loop_closure_rejected",
-                                 times_[loop.from], times_[loop.to], loop.from_T_to,
+                                 TimeOf(loop.from), TimeOf(loop.to), loop.from_T_to,
                                  loops_[loop.loop].information));
   }
   return factors;

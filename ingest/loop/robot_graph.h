@@ -11,6 +11,7 @@
 #include "ingest/loop/optimize.h"
 #include "ingest/loop/pose_graph.h"
 #include "ingest/loop/robust.h"
+#include "ingest/trajectory/robot_path.h"
 #include "schema/model/trajectory.h"
 
 namespace dsg::ingest {
@@ -50,40 +51,19 @@ struct RobotGraphOptions {
   /// nothing knows which way is up.
   double odometry_tilt_rad = 0.0002;
   RobustOptions robust;
-};
-
-/// Where things were thought to be, against where they are now, by the time of seeing them.
-class TrajectoryChange {
- public:
-  /// Identity everywhere.
-  TrajectoryChange() = default;
-  /// `times` ascending, one transform each: new map frame from old map frame.
-  TrajectoryChange(std::vector<TimeNs> times, std::vector<Pose3d> new_T_old);
-  /// The robot's poses before and after. Between keyframes both are interpolated, so that turns go
-  /// around the robot and not around the map's origin.
-  TrajectoryChange(std::vector<TimeNs> times, std::vector<Pose3d> old_T_body,
-                   std::vector<Pose3d> new_T_body);
-
-  /// Interpolated between keyframes, held at the ends.
-  Pose3d At(TimeNs time_ns) const;
-  bool IsIdentity() const { return times_.empty(); }
-  /// Largest shift of a keyframe, metres.
-  double largest_m() const { return largest_m_; }
-
- private:
-  std::vector<TimeNs> times_;
-  std::vector<Pose3d> old_T_body_;
-  std::vector<Pose3d> new_T_body_;
-  double largest_m_ = 0.0;
+  /// While a log runs, the path is solved anew at most so often, in log time, and only after
+  /// another loop closure; with many keyframes more rarely.
+  TimeNs correct_period_ns = 10 * kNsPerSecond;
+  /// It is corrected if some keyframe has moved by so much, metres; at the end of the log by any.
+  double correct_min_m = 0.05;
 };
 
 /// Threads: one caller at a time. Deterministic.
 class RobotGraph {
  public:
-  explicit RobotGraph(const RobotGraphOptions& options);
+  /// `path`: its poses as given are what is solved. Must outlive the graph.
+  RobotGraph(const RobotGraphOptions& options, const RobotPath& path);
 
-  /// A pose that is not after the last one is left out.
-  void AddPose(TimeNs time_ns, const Pose3d& map_T_body);
   /// May come before the poses it speaks of; used by the next Solve.
   void AddLoop(const LoopClosure& loop);
 
@@ -105,7 +85,7 @@ class RobotGraph {
   /// Identity when no usable loop is believed. Loops bind the two poses nearest to their stamps,
   /// which become keyframes; what the robot moved between stamp and pose is taken from odometry.
   /// Errors: of OptimizeRobustly.
-  absl::StatusOr<Solution> Solve() const;
+  absl::StatusOr<Solution> Solve(bool has_covariances = true) const;
 
   /// "odometry" between keyframes and "loop_closure" (all of them; a loop that was not kept has the
   /// type "loop_closure_rejected"), for the store. `solution`: of the last Solve.
@@ -115,14 +95,14 @@ class RobotGraph {
   struct BoundLoop;
   std::vector<BoundLoop> BindLoops() const;
   std::vector<size_t> ChooseKeyframes(const std::vector<BoundLoop>& loops, double spread) const;
-  Pose3d PoseAt(TimeNs time_ns) const;
+  const Pose3d& Given(size_t index) const;
+  TimeNs TimeOf(size_t index) const;
   RelativePose Odometry(size_t from, size_t to) const;
   PoseGraph MakeGraph(const std::vector<size_t>& keyframes,
                       const std::vector<BoundLoop>& loops) const;
 
   RobotGraphOptions options_;
-  std::vector<TimeNs> times_;
-  std::vector<Pose3d> poses_;
+  const RobotPath& path_;
   std::vector<LoopClosure> loops_;
 };
 

@@ -60,4 +60,12 @@ std::vector<Carry> CarriedThings::Carries() const {
   return ways;
 }
 
+void CarriedThings::Move(const TrajectoryChange& change) {
+  for (Carry& carry : carries_) {
+    for (Carry::Point& point : carry.way) {
+      point.position_map = change.At(point.time_ns) * point.position_map;
+    }
+  }
+}
+
 }  // namespace dsg::ingest

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "ingest/objects/small_sightings.h"
+#include "ingest/trajectory/trajectory_change.h"
 #include "schema/base/time.h"
 
 namespace dsg::ingest {
@@ -27,6 +28,9 @@ class CarriedThings {
  public:
   /// Takes what touches a person; the rest of a picture's sightings is passed over.
   void See(const std::vector<SmallSighting>& sightings, TimeNs time_ns);
+
+  /// The path that things were seen from has moved.
+  void Move(const TrajectoryChange& change);
 
   /// Those that were seen four times or more and over half a metre or more: a thing that somebody
   /// stands beside does not move. Order: ascending by begin.

@@ -115,4 +115,22 @@ ObjectChanges ObjectTracker::Update(
   return changes;
 }
 
+Pose3d MoveOf(const TrackedObject& object, const TrajectoryChange& change) {
+  return MoveOf(object.cluster.center_map, object.first_observed_ns, object.last_observed_ns,
+                change);
+}
+
+void MoveCluster(const Pose3d& new_T_old, ObjectCluster* cluster) {
+  for (Eigen::Vector3f& point_map : cluster->points_map) {
+    point_map = (new_T_old * point_map.cast<double>().eval()).cast<float>();
+  }
+  cluster->center_map = new_T_old * cluster->center_map;
+  cluster->centroid_map = new_T_old * cluster->centroid_map;
+  cluster->map_T_box = new_T_old * cluster->map_T_box;
+}
+
+void ObjectTracker::Move(const TrajectoryChange& change) {
+  for (TrackedObject& object : objects_) MoveCluster(MoveOf(object, change), &object.cluster);
+}
+
 }  // namespace dsg::ingest

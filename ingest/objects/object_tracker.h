@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "ingest/objects/object_cluster.h"
+#include "ingest/trajectory/trajectory_change.h"
 #include "schema/base/time.h"
 
 namespace dsg::ingest {
@@ -25,6 +26,10 @@ struct TrackedObject {
   /// Updates in which it changed, or pictures that showed it.
   int64_t observation_count = 0;
 };
+
+/// How an object moves when the path that it was seen from does: new map frame from old map frame.
+Pose3d MoveOf(const TrackedObject& object, const TrajectoryChange& change);
+void MoveCluster(const Pose3d& new_T_old, ObjectCluster* cluster);
 
 /// What an update did, by id.
 struct ObjectChanges {
@@ -46,6 +51,9 @@ class ObjectTracker {
   /// Cost: known objects times clusters, in boxes.
   ObjectChanges Update(std::vector<ObjectCluster> clusters, TimeNs time_ns,
                        const std::function<bool(const Eigen::Vector3f&)>& is_seen_through);
+
+  /// The path that objects were seen from has moved: each moves by when it was seen.
+  void Move(const TrajectoryChange& change);
 
   /// Forgets an object that is known to be gone.
   void Remove(int64_t id);

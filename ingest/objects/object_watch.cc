@@ -177,4 +177,13 @@ void ObjectWatch::Follow(const std::vector<TrackedObject>& objects) {
   });
 }
 
+void ObjectWatch::Move(const TrajectoryChange& change) {
+  for (auto& [id, spot] : spots_) {
+    const Pose3d move = MoveOf(spot.center_map, spot.last_present_ns, spot.last_present_ns, change);
+    spot.box_map = TransformBox(move, spot.box_map);
+    for (Eigen::Vector3d& sample_map : spot.samples_map) sample_map = move * sample_map;
+    spot.center_map = move * spot.center_map;
+  }
+}
+
 }  // namespace dsg::ingest

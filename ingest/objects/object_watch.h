@@ -9,6 +9,7 @@
 
 #include "ingest/objects/object_tracker.h"
 #include "ingest/sensor/depth_frame.h"
+#include "ingest/trajectory/trajectory_change.h"
 
 namespace dsg::ingest {
 
@@ -36,6 +37,9 @@ class ObjectWatch {
 
   /// Without what has stayed in the mesh of things that are gone.
   void DropResidues(std::vector<ObjectCluster>* clusters) const;
+
+  /// The path that things were seen from has moved.
+  void Move(const TrajectoryChange& change);
 
   /// Watches these from now on, and no others.
   void Follow(const std::vector<TrackedObject>& objects);

@@ -299,4 +299,21 @@ void SmallObjects::Forget(int32_t class_id, const Box3d& box_map, TimeNs gone_ns
   }
 }
 
+void SmallObjects::Move(const TrajectoryChange& change) {
+  for (auto& [id, thing] : things_) {
+    const Pose3d move = MoveOf(thing.center_map, thing.first_seen_ns, thing.last_seen_ns, change);
+    const auto move_point = [&move](const Eigen::Vector3f& point_map) -> Eigen::Vector3f {
+      return (move * point_map.cast<double>().eval()).cast<float>();
+    };
+    thing.center_map = move * thing.center_map;
+    const Eigen::Matrix3d turn = move.orientation.toRotationMatrix();
+    thing.information = turn * thing.information * turn.transpose();
+    if (!thing.cameras_map.isEmpty()) thing.cameras_map = TransformBox(move, thing.cameras_map);
+    for (View& view : thing.views) {
+      view.hidden_map = move.orientation.cast<float>() * view.hidden_map;
+      for (Eigen::Vector3f& point_map : view.points_map) point_map = move_point(point_map);
+    }
+  }
+}
+
 }  // namespace dsg::ingest

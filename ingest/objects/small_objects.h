@@ -11,6 +11,7 @@
 
 #include "ingest/objects/object_cluster.h"
 #include "ingest/objects/small_sightings.h"
+#include "ingest/trajectory/trajectory_change.h"
 
 namespace dsg::ingest {
 
@@ -30,6 +31,9 @@ class SmallObjects {
 
   /// Whether next to all sightings of a class were small.
   bool IsSmallClass(int32_t class_id) const;
+
+  /// The path that things were seen from has moved: each moves by when it was seen.
+  void Move(const TrajectoryChange& change);
 
   /// Forgets the things of a class within a box; those that were seen at or after `gone_ns` are
   /// others, which were not there before.

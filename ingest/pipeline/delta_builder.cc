@@ -52,9 +52,10 @@ void DeltaBuilder::AddPose(NodeId agent, const PoseMeasurement& measurement) {
   ++pose_count_;
 }
 
-const Node& DeltaBuilder::NodeOf(NodeId agent) const {
+const Node& DeltaBuilder::Move(NodeId agent, const Pose3d& map_T_agent) {
   const auto found = agents_.find(agent);
   DSG_CHECK(found != agents_.end());
+  found->second.node.map_T_node = map_T_agent;
   return found->second.node;
 }
 

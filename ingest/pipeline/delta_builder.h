@@ -26,8 +26,8 @@ class DeltaBuilder {
   /// The first pose of an agent also makes its node.
   void AddPose(NodeId agent, const PoseMeasurement& measurement);
 
-  /// Requires: an agent that has poses.
-  const Node& NodeOf(NodeId agent) const;
+  /// The track of an agent that has poses ends elsewhere: its node, as it is now.
+  const Node& Move(NodeId agent, const Pose3d& map_T_agent);
 
   /// Poses since the last Take.
   int64_t pose_count() const { return pose_count_; }

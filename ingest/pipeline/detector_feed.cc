@@ -6,12 +6,12 @@
 
 namespace dsg::ingest {
 
-absl::StatusOr<std::unique_ptr<DetectorFeed>> DetectorFeed::Make(
-    const LogInfo& info, const PersonDetectorOptions& options) {
+absl::StatusOr<DetectorFeed> DetectorFeed::Make(const LogInfo& info,
+                                                const PersonDetectorOptions& options) {
   for (const char* channel : {"color0", "cam0"}) {
     if (!info.channel_counts.contains(channel)) continue;
     DSG_ASSIGN_OR_RETURN(std::unique_ptr<PersonDetector> detector, PersonDetector::Load(options));
-    return std::unique_ptr<DetectorFeed>(new DetectorFeed(channel, std::move(detector)));
+    return DetectorFeed(channel, std::move(detector));
   }
   return MakeError(Reason::kFieldInvalid,
                    absl::StrCat("--detector ", options.model_file, ": ", info.path,
@@ -19,16 +19,17 @@ absl::StatusOr<std::unique_ptr<DetectorFeed>> DetectorFeed::Make(
                    {{"field", "detector"}, {"value", options.model_file}});
 }
 
-absl::StatusOr<std::vector<HumanDetection>> DetectorFeed::Look(const ImageMeasurement& image) {
+absl::StatusOr<std::vector<HumanDetection>> DetectorFeed::Look(const Measurement& measurement) {
   std::vector<HumanDetection> seen;
-  if (image.channel != channel_ || image.time_ns < next_ns_) return seen;
-  const absl::StatusOr<Image> picture = image.load();
+  const auto* image = std::get_if<ImageMeasurement>(&measurement);
+  if (image == nullptr || image->channel != channel_ || image->time_ns < next_ns_) return seen;
+  const absl::StatusOr<Image> picture = image->load();
   if (!picture.ok()) {
     ++broken_image_count_;
     return seen;
   }
-  next_ns_ = image.time_ns + kPeriodNs;
-  DSG_ASSIGN_OR_RETURN(seen, detector_->Detect(*picture, image.time_ns, channel_, next_id_));
+  next_ns_ = image->time_ns + kPeriodNs;
+  DSG_ASSIGN_OR_RETURN(seen, detector_->Detect(*picture, image->time_ns, channel_, next_id_));
   next_id_ += static_cast<int64_t>(seen.size());
   return seen;
 }

@@ -20,14 +20,20 @@ class DetectorFeed {
  public:
   static constexpr TimeNs kPeriodNs = 190'000'000;
 
+  /// Sees nobody.
+  DetectorFeed() = default;
+
   /// Looks at color0, or at cam0 where the log has no color0.
   /// Errors: of PersonDetector::Load; FIELD_INVALID when the log has neither.
-  static absl::StatusOr<std::unique_ptr<DetectorFeed>> Make(const LogInfo& info,
-                                                            const PersonDetectorOptions& options);
+  static absl::StatusOr<DetectorFeed> Make(const LogInfo& info,
+                                           const PersonDetectorOptions& options);
 
-  /// The people in an image; none when it is of another channel, too soon after the last, or
-  /// cannot be decoded. Errors: of PersonDetector::Detect.
-  absl::StatusOr<std::vector<HumanDetection>> Look(const ImageMeasurement& image);
+  /// Where a network looks, the log's own detections would be the same people twice.
+  bool is_on() const { return detector_ != nullptr; }
+
+  /// The people in an image; none when it is none, is of another channel, too soon after the last,
+  /// or cannot be decoded. Errors: of PersonDetector::Detect.
+  absl::StatusOr<std::vector<HumanDetection>> Look(const Measurement& measurement);
 
   int64_t broken_image_count() const { return broken_image_count_; }
 

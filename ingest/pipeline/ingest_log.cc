@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "ingest/pipeline/session.h"
 #include "ingest/log/format.h"
 #include "ingest/pipeline/log_run.h"
+#include "ingest/pipeline/session.h"
 #include "schema/base/status.h"
 #include "schema/base/utf8.h"
 #include "schema/codec/checksum.h"
@@ -48,11 +48,25 @@ bool HasContent(const Measurement& measurement) {
   return std::holds_alternative<PoseMeasurement>(measurement);
 }
 
-bool HasLabels(const LogInfo& info) {
-  return info.channel_counts.contains("label0") && !info.labels.empty();
+// Whether its static layers are built: there are poses, and eyes that frames can be made of.
+absl::StatusOr<bool> HasLayers(const LogInfo& info, const MappingOptions& options) {
+  if (!options.is_on) return false;
+  DSG_RETURN_IF_ERROR(options.Validate());
+  const RobotPath no_path;
+  return info.channel_counts.contains("poses") &&
+         FrameMaker(info.rig, options.depth, no_path).CanMakeFrames();
+}
+
+std::string OdometryText(const RobotGraphOptions& options) {
+  return absl::StrCat(options.odometry_m_per_m, " ", options.odometry_rad_per_m, " corrected ",
+                      options.correct_period_ns, " ", options.correct_min_m);
 }
 
 bool HasLoops(const LogInfo& info) { return info.channel_counts.contains("loops0"); }
+
+bool HasLabels(const LogInfo& info) {
+  return info.channel_counts.contains("label0") && !info.labels.empty();
+}
 
 SessionHeader MakeHeader(const LogInfo& info, const LogOptions& log_options,
                          const IngestOptions& options, const MapSpec& spec) {
@@ -70,9 +84,7 @@ SessionHeader MakeHeader(const LogInfo& info, const LogOptions& log_options,
       .up = options.up,
       .mapping = HasMapping(info, options) ? options.mapping.Digest(HasLabels(info)) : "",
       .people = HasPeople(info, options) ? options.people.Digest() : "",
-      .odometry = HasLoops(info) ? absl::StrCat(options.robot_graph.odometry_m_per_m, " ",
-                                                options.robot_graph.odometry_rad_per_m)
-                                 : "",
+      .odometry = HasLoops(info) ? OdometryText(options.robot_graph) : "",
       .robot_model =
           options.robot_model.has_value() ? ToHex(options.robot_model->asset.sha256) : "",
       .is_size_bounded = options.is_size_bounded && HasLoops(info)};
@@ -98,6 +110,32 @@ absl::Status IngestOptions::Validate() const {
       {{"field", "poses_per_delta"}, {"value", absl::StrCat(poses_per_delta)}});
 }
 
+absl::StatusOr<RunPlan> MakePlan(const LogInfo& info, const IngestOptions& options,
+                                 const MapView& map, const std::string& session_id) {
+  RunPlan plan;
+  plan.options = options;
+  plan.info = info;
+  plan.session_id = session_id;
+  plan.has_people = HasPeople(info, options);
+  plan.has_loops = HasLoops(info);
+  DSG_ASSIGN_OR_RETURN(plan.has_layers, HasLayers(info, options.mapping));
+  std::optional<NodeNumbering> own;
+  if (plan.has_layers) {
+    plan.options.mapping = WithClasses(options.mapping, info);
+    DSG_ASSIGN_OR_RETURN(plan.numbering, NumberLayers(map, session_id));
+    own = plan.numbering;
+  } else {
+    plan.options.mapping = {};
+    plan.options.mapping.commit_period_ns = options.mapping.commit_period_ns;
+  }
+  DSG_ASSIGN_OR_RETURN(plan.agents, map.NodesOfLayer(layers::kAgents));
+  DSG_ASSIGN_OR_RETURN(plan.regions, LogRegions::Read(map, own));
+  if (plan.has_people && options.people.detector.has_value()) {
+    DSG_ASSIGN_OR_RETURN(plan.detector, DetectorFeed::Make(info, *options.people.detector));
+  }
+  return plan;
+}
+
 absl::StatusOr<IngestSummary> IngestLog(LogSource& log, const LogOptions& log_options,
                                         const IngestOptions& options, const MapView& map,
                                         GraphWriter& writer,
@@ -105,43 +143,34 @@ absl::StatusOr<IngestSummary> IngestLog(LogSource& log, const LogOptions& log_op
   DSG_RETURN_IF_ERROR(options.Validate());
   SessionHeader header = MakeHeader(log.info(), log_options, options, map.spec());
   DSG_ASSIGN_OR_RETURN(const SessionState session, writer.GetSession(header.session_id));
-  DSG_ASSIGN_OR_RETURN(const std::vector<Node> agents, map.NodesOfLayer(layers::kAgents));
-  DSG_ASSIGN_OR_RETURN(std::unique_ptr<LogMapper> mapper,
-                       LogMapper::Make(log.info(), options.mapping, map, header.session_id));
-  std::optional<NodeNumbering> own;
-  if (mapper != nullptr) own = mapper->numbering();
-  DSG_ASSIGN_OR_RETURN(LogRegions regions, LogRegions::Read(map, own));
-  LogRun::Parts parts{.options = options,
-                      .agents = agents,
-                      .regions = std::move(regions),
-                      .mapper = std::move(mapper),
-                      .session_id = header.session_id,
-                      .agent_prefix = log_options.agent_prefix,
-                      .feet_below_m = log.info().feet_below_m,
-                      .has_loops = HasLoops(log.info()),
-                      .first_revision = session.first_revision};
-  if (HasPeople(log.info(), options)) {
-    parts.people = std::make_unique<PersonMapper>(log.info().rig, options.people,
-                                                  /*has_depth=*/parts.mapper != nullptr);
-    if (options.people.detector.has_value()) {
-      DSG_ASSIGN_OR_RETURN(parts.detector,
-                           DetectorFeed::Make(log.info(), *options.people.detector));
-    }
+  DSG_ASSIGN_OR_RETURN(RunPlan plan, MakePlan(log.info(), options, map, header.session_id));
+  plan.agent_prefix = log_options.agent_prefix;
+  plan.first_revision = session.first_revision;
+  const std::optional<FollowOptions>& follow = log_options.follow;
+  if (follow.has_value()) {
+    DSG_ASSIGN_OR_RETURN(const SessionState end,
+                         writer.GetSession(EndSessionId(header.session_id)));
+    plan.end_sequence = end.last_sequence;
   }
-  if (log.info().rig.HasEyes() || parts.has_loops) parts.robot.emplace(options.robot_graph);
   LogRun run(
-      std::move(parts), map,
+      std::move(plan), map,
       DeltaSink(std::move(header), session.last_sequence, options.is_size_bounded, map, writer));
+  if (follow.has_value()) log.SetIdle([&run] { return run.CommitStale(); });
   int64_t given_count = 0;
   for (int64_t count = 1;; ++count) {
     DSG_ASSIGN_OR_RETURN(std::optional<Measurement> measurement, log.Next());
     if (!measurement.has_value()) break;
     if (HasContent(*measurement)) ++given_count;
     DSG_RETURN_IF_ERROR(run.Take(*measurement));
+    if (follow.has_value()) DSG_RETURN_IF_ERROR(run.CommitStale());
     if (on_progress) on_progress(count);
   }
-  DSG_RETURN_IF_ERROR(run.Finish());
+  log.SetIdle({});
+  const bool is_stopped = follow.has_value() && follow->stop != nullptr && *follow->stop;
+  const bool is_paused = is_stopped && run.is_timed();
+  if (!is_paused) DSG_RETURN_IF_ERROR(run.Finish());
   IngestSummary summary = run.Summary();
+  summary.is_paused = is_paused;
   summary.given_count = given_count;
   summary.was_known = session.last_sequence > 0;
   return summary;

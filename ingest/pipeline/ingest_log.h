@@ -8,13 +8,18 @@
 #include <string>
 
 #include "ingest/commit/delta_sink.h"
+#include "ingest/correction/loop_closer.h"
+#include "ingest/depth/frame_maker.h"
 #include "ingest/log/log_source.h"
-#include "ingest/pipeline/log_mapper.h"
-#include "ingest/pipeline/person_mapper.h"
+#include "ingest/pipeline/mapping_options.h"
+#include "ingest/pipeline/people_options.h"
 #include "ingest/pipeline/robot_model.h"
-#include "ingest/pipeline/robot_told.h"
+#include "ingest/pipeline/stage_clock.h"
+#include "ingest/volume/semantic_volume.h"
 
 namespace dsg::ingest {
+
+struct RunPlan;
 
 struct IngestOptions {
   /// A delta is closed after so many poses; the last one when the log ends.
@@ -38,6 +43,28 @@ struct IngestOptions {
   absl::Status Validate() const;
 };
 
+/// What became of a log's frames, for the user.
+struct MappingSummary {
+  /// A sentence about what was in the map already; empty when there is nothing to say.
+  std::string note;
+  VolumeCounts volume;
+  SkipCounts skipped;
+  std::map<std::string, StageClock::Time> stages;
+};
+
+/// What became of a log's detections, for the user.
+struct PeopleCounts {
+  int64_t detection_count = 0;
+  /// Observations that the tracker took.
+  int64_t used_count = 0;
+  /// Detections that were left out, by reason in words.
+  std::map<std::string, int64_t> rejected;
+  /// Believed ones, then those too short to believe.
+  int64_t track_count = 0;
+  int64_t dropped_track_count = 0;
+  int64_t same_as_count = 0;
+};
+
 struct PeopleSummary {
   PeopleCounts counts;
   std::map<std::string, StageClock::Time> stages;
@@ -59,11 +86,22 @@ struct IngestSummary {
   int64_t given_count = 0;
   /// An earlier run has committed a part of the log, or all of it.
   bool was_known = false;
+  /// A followed log was stopped, and its end was not told: the same run goes on with it.
+  bool is_paused = false;
 };
+
+/// What a log and its options call for in a map.
+/// Errors: of MappingOptions::Validate, of the map, of DetectorFeed::Make.
+absl::StatusOr<RunPlan> MakePlan(const LogInfo& info, const IngestOptions& options,
+                                 const MapView& map, const std::string& session_id);
 
 /// Reads `log` to its end. The same log, options and starting map give byte-equal deltas. A run
 /// that was cut off is continued by running it again; a log that the map holds adds nothing.
 /// `on_progress` (may be empty) gets the count of measurements read so far.
+///
+/// Of a followed log, poses are committed a second after they were read; a log with sensors goes by
+/// its own time (MappingOptions::commit_period_ns). If a log with sensors is stopped
+/// (FollowOptions::stop), what was committed stays and its end is not told.
 ///
 /// `log_options`: what the log was opened with.
 /// Errors: of the log, and of DeltaSink::Put. What is committed by then stays, and counts.

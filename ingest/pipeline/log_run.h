@@ -1,116 +1,120 @@
 // SPDX-License-Identifier: Apache-2.0
-// The stages of one log, wired: what is measured goes to who needs it, and what they found is
-// committed in an order that a map can take.
-// Refuses to find anything itself.
+// What happens to each measurement of a log, and what is committed when: the pipeline on one page.
 #pragma once
 
+#include <chrono>
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "ingest/commit/delta_sink.h"
+#include "ingest/correction/loop_closer.h"
+#include "ingest/depth/frame_maker.h"
 #include "ingest/pipeline/agent_namer.h"
 #include "ingest/pipeline/delta_builder.h"
 #include "ingest/pipeline/detector_feed.h"
 #include "ingest/pipeline/ingest_log.h"
-#include "ingest/pipeline/log_regions.h"
-#include "ingest/pipeline/people_told.h"
-#include "ingest/pipeline/person_mapper.h"
-#include "ingest/pipeline/robot_told.h"
-#include "ingest/presence/stay_mender.h"
-#include "ingest/presence/stay_tracker.h"
+#include "ingest/pipeline/layers_stage.h"
+#include "ingest/pipeline/log_presence.h"
+#include "ingest/pipeline/people_stage.h"
+#include "ingest/pipeline/stage.h"
+#include "ingest/trajectory/robot_path.h"
 
 namespace dsg::ingest {
+
+/// How long poses of a followed log wait before they are committed.
+inline constexpr std::chrono::milliseconds kStaleAfter(1000);
+
+/// What a log and its options call for.
+struct RunPlan {
+  IngestOptions options;
+  LogInfo info;
+  std::string session_id;
+  std::string agent_prefix;
+  /// The map's agents when the log begins.
+  std::vector<Node> agents;
+  LogRegions regions;
+  NodeNumbering numbering;
+  DetectorFeed detector;
+  /// Which stages have something to do.
+  bool has_layers = false;
+  bool has_people = false;
+  bool has_loops = false;
+  /// Of an earlier run of the session, that was cut off; 0 = there was none.
+  Revision first_revision = 0;
+  /// Of a log that is followed: DeltaSink::SplitEnd. Unset for others.
+  std::optional<int64_t> end_sequence;
+  /// Stages of the caller's, after the others.
+  std::vector<std::unique_ptr<Stage>> more_stages;
+};
 
 /// Threads: one caller at a time.
 class LogRun {
  public:
-  struct Parts {
-    IngestOptions options;
-    /// The map's agents when the log begins.
-    std::vector<Node> agents;
-    LogRegions regions;
-    /// Null for logs without depth.
-    std::unique_ptr<LogMapper> mapper;
-    /// Null for logs without detections.
-    std::unique_ptr<PersonMapper> people;
-    /// Null unless a network finds the people.
-    std::unique_ptr<DetectorFeed> detector;
-    std::string session_id;
-    std::string agent_prefix;
-    double feet_below_m = 0.0;
-    /// Unset for logs without sensors.
-    std::optional<RobotTold> robot;
-    bool has_loops = false;
-    /// Of an earlier run of the session, that was cut off; 0 = there was none.
-    Revision first_revision = 0;
-  };
-
   /// Requires: `map` outlives the run.
-  LogRun(Parts parts, const MapView& map, DeltaSink sink);
+  LogRun(RunPlan plan, const MapView& map, DeltaSink sink);
 
-  /// Takes what it needs out of `measurement`.
+  /// Gives a measurement to all whom it concerns, and commits what is due.
   absl::Status Take(Measurement& measurement);
+  /// Of a followed log, as often as one likes: commits poses that wait for longer than kStaleAfter,
+  /// if commits do not go by the log's time.
+  absl::Status CommitStale();
+  /// Whether commits go by the log's time, and not by the count of poses. Then a log is cut into
+  /// the same deltas each time it is read, and one that is not finished can be taken up again only
+  /// before its end was told.
+  bool is_timed() const { return is_timed_; }
   /// The log has ended.
   absl::Status Finish();
   IngestSummary Summary() const;
 
  private:
-  struct Waiting {
-    NodeId agent;
-    TimeNs time_ns;
-    Eigen::Vector3d position_map;
-  };
-
-  // Whether commits go by the log's time, and not by the count of poses.
-  bool IsTimed() const { return mapper_ != nullptr || people_ != nullptr || has_loops_; }
-
   absl::Status TakeGraph(GraphDelta graph);
   absl::Status TakePose(const PoseMeasurement& pose);
-  absl::Status TakeTimedPose(NodeId agent, const PoseMeasurement& pose);
-  absl::StatusOr<bool> IsToldBefore(NodeId agent, TimeNs time_ns);
-  absl::StatusOr<bool> TakeSensor(Measurement* measurement);
-  absl::StatusOr<bool> TakeImage(ImageMeasurement* image);
-  bool TakeDetection(HumanDetection* detection);
+  bool AddToPath(NodeId agent, const PoseMeasurement& pose);
+  absl::Status TakeSensor(Measurement& measurement);
+  bool Spread(Measurement& measurement);
+  absl::Status SeeFrames();
 
   absl::Status CommitIfDue(TimeNs now_ns);
-  absl::Status Commit(TimeNs now_ns, bool is_update, bool is_last);
-  GraphDelta TakeLayers(TimeNs now_ns);
+  absl::Status Commit(TimeNs now_ns, bool is_last);
+  absl::Status PutStays(std::vector<Stay> stays);
   absl::Status PutRobotGraph();
-  GraphDelta Correct(const RobotGraph::Solution& solution);
+  absl::Status CorrectPath(bool is_last);
+  void TellRobot(GraphDelta* delta);
   absl::Status PutContacts();
   std::vector<Edge> HeldEdges() const;
-  absl::Status PutStays(std::vector<Stay> stays);
-  void AwaitSightings();
-  void ReplayWaiting();
-  RegionIndex MakeIndex() const;
-  StayTracker& Tracker();
 
   IngestOptions options_;
   const MapView& map_;
+  bool has_loops_;
+  bool is_followed_;
+  bool is_timed_;
   AgentNamer namer_;
-  LogRegions regions_;
-  std::optional<StayTracker> tracker_;
+  DetectorFeed detector_;
+  RobotPath path_;
+  NodeId robot_;
+  LoopCloser loops_;
+  /// Channels that frames are made of.
+  std::set<std::string, std::less<>> eyes_;
+  FrameMaker frames_;
+  StageClock clock_;
+  LayersStage layers_;
+  PeopleStage people_;
+  std::vector<std::unique_ptr<Stage>> more_stages_;
+  /// All of them, in the order in which they are called.
+  std::vector<Stage*> stages_;
+  Findings findings_;
+  LogPresence presence_;
   DeltaBuilder builder_;
   DeltaSink sink_;
-  std::unique_ptr<LogMapper> mapper_;
-  std::unique_ptr<PersonMapper> people_;
-  std::unique_ptr<DetectorFeed> detector_;
-  PeopleTold people_told_;
-  std::optional<RobotTold> robot_;
-  bool has_loops_;
-  LoopCounts loops_;
-  /// The layers as loop closures have moved them.
-  std::optional<LayerGraph> corrected_;
-  Revision first_revision_;
-  /// By agent, the end of its track when the log began.
-  std::map<NodeId, TimeNs> told_until_ns_;
-  StayMender mender_;
   /// When the piece of the log began that is not committed yet.
   TimeNs begin_ns_ = kTimeMin;
   TimeNs last_ns_ = kTimeMin;
-  std::vector<Waiting> waiting_;
+  /// Since when poses wait, by this machine's clock.
+  std::optional<std::chrono::steady_clock::time_point> waits_since_;
   int64_t graph_agent_count_ = 0;
   std::map<std::string, int64_t> unused_;
 };

@@ -87,7 +87,7 @@ GraphDelta PeopleTold::Tell(PersonTracker* tracker, bool is_last) {
     const bool is_dropped = change.state == TrackState::kDropped;
     if (!is_dropped) TellPoses(track, change.first_estimate, is_last, &person, &delta);
     TellObservations(track, &person, &delta);
-    tracker->ForgetVertices(change.track, change.first_observation);
+    tracker->ForgetShapes(change.track, change.first_observation);
     TellSameAs(track, &person, &delta);
     if (!person.is_told || person.state != change.state || is_last) {
       person.state = change.state;
@@ -97,14 +97,6 @@ GraphDelta PeopleTold::Tell(PersonTracker* tracker, bool is_last) {
   }
   Coalesce(&delta);
   return delta;
-}
-
-void PeopleTold::Replace(const std::vector<TrajectoryCorrection>& corrections) {
-  for (const TrajectoryCorrection& correction : corrections) {
-    for (auto& [number, person] : people_) {
-      if (person.id == correction.agent) person.poses = correction.poses;
-    }
-  }
 }
 
 std::vector<PeopleTold::Sighting> PeopleTold::TakeSightings() {

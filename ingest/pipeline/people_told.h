@@ -49,9 +49,6 @@ class PeopleTold {
   /// corrections: live ones only when they moved by a few centimetres, all of them when `is_last`.
   GraphDelta Tell(PersonTracker* tracker, bool is_last);
 
-  /// Poses as a loop closure has moved them. Agents that are none of these people are passed over.
-  void Replace(const std::vector<TrajectoryCorrection>& corrections);
-
   /// Poses that were told for the first time since the last call, ascending by agent, then time.
   std::vector<Sighting> TakeSightings();
 

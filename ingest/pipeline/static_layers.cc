@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include "ingest/objects/object_matching.h"
@@ -56,8 +57,8 @@ absl::Status StaticLayers::Integrate(const DepthFrame& frame) {
     object_watch_.Watch(frame);
   }
   const Eigen::Vector3d& camera_map = frame.map_T_camera.position;
-  if (path_map_.empty() || (camera_map - path_map_.back()).norm() > kPathStepM) {
-    path_map_.push_back(camera_map);
+  if (viewpoints_.empty() || (camera_map - viewpoints_.back().position_map).norm() > kPathStepM) {
+    viewpoints_.push_back({frame.time_ns, camera_map});
   }
   if (observed_together_ns_ == kTimeMin ||
       frame.time_ns - observed_together_ns_ >= kTogetherPeriodNs) {
@@ -65,6 +66,56 @@ absl::Status StaticLayers::Integrate(const DepthFrame& frame) {
     together_.Observe(ObjectsInView(object_tracker_.objects(), frame));
   }
   return absl::OkStatus();
+}
+
+std::vector<Eigen::Vector3d> StaticLayers::SeenFrom() const {
+  std::vector<Eigen::Vector3d> path_map;
+  path_map.reserve(viewpoints_.size());
+  for (const Viewpoint& viewpoint : viewpoints_) path_map.push_back(viewpoint.position_map);
+  return path_map;
+}
+
+void StaticLayers::Correct(const TrajectoryChange& change) {
+  const StageClock::Span span(&clock_, "correction");
+  volume_.Move(change);
+  // Places, rooms and structures are found anew; what they were goes along only to keep its name.
+  const PointMove as_seen_near = [&](const Eigen::Vector3d& point_map) {
+    const Viewpoint* nearest = nullptr;
+    double nearest_m2 = std::numeric_limits<double>::infinity();
+    for (const Viewpoint& viewpoint : viewpoints_) {
+      const double distance_m2 = (viewpoint.position_map - point_map).squaredNorm();
+      if (distance_m2 >= nearest_m2) continue;
+      nearest_m2 = distance_m2;
+      nearest = &viewpoint;
+    }
+    if (nearest == nullptr) return Pose3d();
+    return MoveOf(point_map, nearest->time_ns, nearest->time_ns, change);
+  };
+  place_tracker_.Move(as_seen_near);
+  structure_tracker_.Move(as_seen_near);
+  room_tracker_.Move(as_seen_near);
+  MoveObjects(change);
+  for (Viewpoint& viewpoint : viewpoints_) {
+    viewpoint.position_map = change.At(viewpoint.time_ns) * viewpoint.position_map;
+  }
+}
+
+void StaticLayers::MoveObjects(const TrajectoryChange& change) {
+  const auto move_fit = [&change](const TrackedObject& object, ShapeFit* fit) {
+    fit->map_T_model = MoveOf(object, change) * fit->map_T_model;
+  };
+  for (const TrackedObject& object : object_tracker_.objects()) {
+    const auto fit = fits_.find(object.id);
+    if (fit != fits_.end()) move_fit(object, &fit->second);
+  }
+  for (GoneObject& gone : gone_) {
+    if (gone.fit.has_value()) move_fit(gone.object, &*gone.fit);
+    MoveCluster(MoveOf(gone.object, change), &gone.object.cluster);
+  }
+  object_tracker_.Move(change);
+  small_objects_.Move(change);
+  carried_things_.Move(change);
+  object_watch_.Move(change);
 }
 
 std::vector<BlockIndex> StaticLayers::UpdateMesh(double block_size_m) {
@@ -109,7 +160,8 @@ LayerGraph StaticLayers::Update(TimeNs now_ns, bool is_last) {
     parts.structures = FindStructures(mesh, classes_);
     structure_tracker_.Track(&parts.structures);
   }
-  floors_m_ = FloorsOf(parts.structures, path_map_);
+  const std::vector<Eigen::Vector3d> path_map = SeenFrom();
+  floors_m_ = FloorsOf(parts.structures, path_map);
   FindObjects(now_ns, mesh);
   FitShapes(floors_m_, is_last);
   // The last one is not needed beside the new one.
@@ -120,7 +172,7 @@ LayerGraph StaticLayers::Update(TimeNs now_ns, bool is_last) {
     const StageClock::Span span(&clock_, "places");
     PlaceOptions place_options = options_.places;
     if (place_options.floors_m.empty()) place_options.floors_m = floors_m_;
-    parts.places = ExtractPlaces(field.grid(), path_map_, place_options);
+    parts.places = ExtractPlaces(field.grid(), path_map, place_options);
     place_tracker_.Track(&parts.places);
   }
   parts.objects = object_tracker_.objects();
@@ -179,8 +231,8 @@ void StaticLayers::FindObjects(TimeNs now_ns, const std::vector<const MeshBlock*
   options.class_ids = object_classes_;
   std::vector<ObjectCluster> clusters;
   if (labels_.empty()) {
-    clusters = FindUnlabelledObjects(mesh, kThingClass, options.voxel_m, floors_m_,
-                                     options_.segments);
+    clusters =
+        FindUnlabelledObjects(mesh, kThingClass, options.voxel_m, floors_m_, options_.segments);
   } else {
     clusters = FindClusters(mesh, options);
   }

@@ -56,6 +56,9 @@ class StaticLayers {
   /// Finds all layers above the mesh anew. Call UpdateMesh before.
   LayerGraph Update(TimeNs now_ns, bool is_last);
 
+  /// The path that frames were seen from has moved: all that was found moves, by when it was seen.
+  void Correct(const TrajectoryChange& change);
+
   /// CAD models that nodes refer to for the first time since the last call.
   std::vector<Asset> TakeAssets();
 
@@ -74,12 +77,19 @@ class StaticLayers {
 
   const NodeNumbering& numbering() const { return maker_.numbering(); }
   VolumeCounts counts() const { return volume_.counts(); }
-  StageClock& clock() { return clock_; }
+  const StageClock& clock() const { return clock_; }
 
  private:
+  /// Where a frame was seen from; so close together that the rest adds nothing.
+  struct Viewpoint {
+    TimeNs time_ns = 0;
+    Eigen::Vector3d position_map = Eigen::Vector3d::Zero();
+  };
+  std::vector<Eigen::Vector3d> SeenFrom() const;
   DistanceField FindDistances(const std::vector<const MeshBlock*>& mesh,
                               const std::vector<double>& floors_m);
   void NoteCost(int64_t cell_count);
+  void MoveObjects(const TrajectoryChange& change);
   void FindObjects(TimeNs now_ns, const std::vector<const MeshBlock*>& mesh);
   void KeepVacated();
   void KeepGone(const std::vector<TrackedObject>& before, const ObjectChanges& changes,
@@ -99,7 +109,7 @@ class StaticLayers {
   LayerGraphMaker maker_;
   SemanticVolume volume_;
   std::map<BlockIndex, MeshBlock> mesh_;
-  std::vector<Eigen::Vector3d> path_map_;
+  std::vector<Viewpoint> viewpoints_;
   ObjectTracker object_tracker_;
   /// Ascending.
   std::vector<int32_t> object_classes_;

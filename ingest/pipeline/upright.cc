@@ -49,7 +49,8 @@ absl::StatusOr<Eigen::Vector3d> ParseUp(const std::string& up) {
 
 // A few of the log's frames; depth pictures in between are never decoded.
 absl::StatusOr<std::vector<DepthFrame>> SpreadFrames(LogSource& log) {
-  FrameMaker maker(log.info().rig, DepthOptions());
+  RobotPath path;
+  FrameMaker maker(log.info().rig, DepthOptions(), path);
   std::vector<DepthFrame> frames;
   const auto take = [&maker, &frames] {
     while (std::optional<DepthFrame> frame = maker.Next()) frames.push_back(*std::move(frame));
@@ -62,7 +63,7 @@ absl::StatusOr<std::vector<DepthFrame>> SpreadFrames(LogSource& log) {
     DSG_ASSIGN_OR_RETURN(std::optional<Measurement> measurement, log.Next());
     if (!measurement.has_value()) break;
     if (const auto* pose = std::get_if<PoseMeasurement>(&*measurement)) {
-      maker.AddPose(pose->pose.time_ns, pose->pose.map_T_agent);
+      if (path.Add(pose->pose)) maker.NotePose();
     } else if (auto* image = std::get_if<ImageMeasurement>(&*measurement)) {
       if (image->channel != "depth0" || seen++ % stride != 0) continue;
       maker.AddPicture({image->time_ns, image->channel, image->origin, image->load});

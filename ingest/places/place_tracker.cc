@@ -153,4 +153,9 @@ int NearestPlaceInSight(const PlaceGraph& graph, const DistanceField& field,
   return near.front();
 }
 
+void PlaceTracker::Move(const PointMove& move) {
+  for (Place& place : last_.places)
+    place.position_map = move(place.position_map) * place.position_map;
+}
+
 }  // namespace dsg::ingest

@@ -7,6 +7,7 @@
 
 #include "ingest/grid/distance_field.h"
 #include "ingest/places/place_graph.h"
+#include "ingest/trajectory/trajectory_change.h"
 
 namespace dsg::ingest {
 
@@ -16,6 +17,9 @@ class PlaceTracker {
   /// Gives `graph` the ids of the last one's places where they are near, and new ones otherwise;
   /// sorts it by id. Ids are never given twice.
   void Track(PlaceGraph* graph);
+
+  /// The map has moved under the last graph.
+  void Move(const PointMove& move);
 
  private:
   PlaceGraph last_;

@@ -61,4 +61,15 @@ std::vector<Stay> StayMender::Mend(const RegionIndex& regions) {
   return mended;
 }
 
+void StayMender::Move(const std::function<Pose3d(TimeNs)>& new_T_old) {
+  for (auto& [agent, positions] : seen_) {
+    for (Seen& seen : positions) seen.position_map = new_T_old(seen.time_ns) * seen.position_map;
+  }
+  for (auto& [key, told] : told_) {
+    if (!told.middle_map.has_value()) continue;
+    const TimeNs middle_ns = told.stay.enter_ns + (told.stay.exit_ns - told.stay.enter_ns) / 2;
+    told.middle_map = new_T_old(middle_ns) * *told.middle_map;
+  }
+}
+
 }  // namespace dsg::ingest

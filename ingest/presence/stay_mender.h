@@ -4,6 +4,7 @@
 #pragma once
 
 #include <deque>
+#include <functional>
 #include <map>
 #include <optional>
 #include <utility>
@@ -26,6 +27,9 @@ class StayMender {
   /// Takes note of stays that were told. Requires: the poses of ended ones were observed, and the
   /// stays of an agent end in order.
   void Remember(const std::vector<Stay>& stays);
+
+  /// The path that agents were seen from has moved: positions move by their times.
+  void Move(const std::function<Pose3d(TimeNs)>& new_T_old);
 
   /// The ended stays whose room or place is not in `regions` any more, whose place is in another
   /// room by now, or which had no room: where

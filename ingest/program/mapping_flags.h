@@ -6,7 +6,7 @@
 #include <string>
 
 #include "absl/status/statusor.h"
-#include "ingest/pipeline/log_mapper.h"
+#include "ingest/pipeline/mapping_options.h"
 
 namespace CLI {
 class App;

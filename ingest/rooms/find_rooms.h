@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "ingest/grid/distance_field.h"
+#include "ingest/trajectory/trajectory_change.h"
 #include "schema/model/geometry.h"
 
 namespace dsg::ingest {
@@ -95,6 +96,9 @@ class RoomTracker {
  public:
   /// `places`: of the input that the rooms are of.
   void Track(const std::vector<RoomPlace>& places, std::vector<FoundRoom>* rooms);
+
+  /// The map has moved under the last rooms.
+  void Move(const PointMove& move);
 
  private:
   struct Old {

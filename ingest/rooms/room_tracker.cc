@@ -92,4 +92,10 @@ void RoomTracker::Track(const std::vector<RoomPlace>& places, std::vector<FoundR
   std::sort(last_.begin(), last_.end(), [](const Old& a, const Old& b) { return a.id < b.id; });
 }
 
+void RoomTracker::Move(const PointMove& move) {
+  for (Old& room : last_) {
+    for (Eigen::Vector3d& place_map : room.places_map) place_map = move(place_map) * place_map;
+  }
+}
+
 }  // namespace dsg::ingest

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "ingest/trajectory/trajectory_change.h"
 #include "schema/model/layer.h"
 #include "schema/model/mesh.h"
 
@@ -61,6 +62,9 @@ std::vector<StructureHeight> FloorHeights(const std::vector<StructurePiece>& pie
 class StructureTracker {
  public:
   void Track(std::vector<StructurePiece>* pieces);
+
+  /// The map has moved under the last pieces.
+  void Move(const PointMove& move);
 
  private:
   std::vector<StructurePiece> last_;

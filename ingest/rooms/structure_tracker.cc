@@ -59,4 +59,13 @@ void StructureTracker::Track(std::vector<StructurePiece>* pieces) {
   std::sort(last_.begin(), last_.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
 }
 
+void StructureTracker::Move(const PointMove& move) {
+  for (StructurePiece& piece : last_) {
+    const Pose3d new_T_old = move(piece.box_map.center());
+    piece.box_map = TransformBox(new_T_old, piece.box_map);
+    piece.normal_map = new_T_old.orientation * piece.normal_map;
+    piece.offset_m -= piece.normal_map.dot(new_T_old.position);
+  }
+}
+
 }  // namespace dsg::ingest

@@ -34,8 +34,8 @@ void VoxelBlock::Clear() {
   voxels.fill(Voxel());
   label_index.clear();
   labels.clear();
-  first_surface_ns = kTimeMax;
-  last_surface_ns = kTimeMin;
+  first_seen_ns = first_surface_ns = kTimeMax;
+  last_seen_ns = last_surface_ns = kTimeMin;
   updated = has_surface = queued = label_changed = false;
 }
 

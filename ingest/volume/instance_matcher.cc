@@ -183,4 +183,21 @@ void InstanceMatcher::JoinOften() {
   }
 }
 
+void InstanceMatcher::MoveTo(const BlockMap& blocks) {
+  for (Instance& instance : instances_) instance.box.setEmpty();
+  for (int64_t number = 0; number < blocks.size(); ++number) {
+    const VoxelBlock& block = blocks.block(number);
+    for (int i = 0; i < VoxelBlock::kCount; ++i) {
+      const VoxelLabels* labels = block.LabelsOf(i);
+      const uint32_t id = labels == nullptr ? 0 : book_.Root(labels->instances.Best());
+      if (id == 0) continue;
+      const Eigen::Vector3i voxel(
+          VoxelBlock::kSide * block.key.x + i % VoxelBlock::kSide,
+          VoxelBlock::kSide * block.key.y + i / VoxelBlock::kSide % VoxelBlock::kSide,
+          VoxelBlock::kSide * block.key.z + i / (VoxelBlock::kSide * VoxelBlock::kSide));
+      instances_[id].box.extend((voxel.cast<double>().array() + 0.5).matrix() * blocks.voxel_m());
+    }
+  }
+}
+
 }  // namespace dsg::ingest

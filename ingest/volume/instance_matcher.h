@@ -23,6 +23,9 @@ class InstanceMatcher {
   /// Fills in `instance_of_label`: map instance of each label, 0 = none. Makes new instances.
   void Match(const FrameView& view, const BlockMap& blocks);
 
+  /// The blocks are others than before, moved: what is known of where instances are is read anew.
+  void MoveTo(const BlockMap& blocks);
+
   /// 65536 numbers.
   const std::vector<uint32_t>& instance_of_label() const { return instance_of_label_; }
   const InstanceBook& book() const { return book_; }

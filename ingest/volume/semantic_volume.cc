@@ -11,6 +11,7 @@
 #include "ingest/volume/block_mesher.h"
 #include "ingest/volume/block_search.h"
 #include "ingest/volume/instance_matcher.h"
+#include "ingest/volume/moved_blocks.h"
 #include "ingest/volume/parallel.h"
 #include "ingest/volume/published_field.h"
 #include "ingest/volume/volume_occupancy.h"
@@ -63,7 +64,10 @@ class SemanticVolume::Impl {
     const BlockIntegrator integrator(view, options_, matcher_.instance_of_label());
     ParallelFor(options_.thread_count, due.size(), [&](size_t i) { integrator.Integrate(due[i]); });
     for (VoxelBlock* block : due) {
-      if (!block->updated || !block->has_surface || block->queued) continue;
+      if (!block->updated) continue;
+      block->first_seen_ns = std::min(block->first_seen_ns, frame.time_ns);
+      block->last_seen_ns = std::max(block->last_seen_ns, frame.time_ns);
+      if (!block->has_surface || block->queued) continue;
       block->queued = true;
       queue_.push_back(block);
     }
@@ -95,6 +99,21 @@ class SemanticVolume::Impl {
     });
     std::erase_if(meshes, [this](const MeshBlock& mesh) { return !IsNews(mesh); });
     return meshes;
+  }
+
+  void Move(const TrajectoryChange& change) {
+    blocks_ = MoveBlocks(blocks_, change);
+    matcher_.MoveTo(blocks_);
+    counts_.block_count = blocks_.size();
+    queue_.clear();
+    for (int64_t i = 0; i < blocks_.size(); ++i) {
+      VoxelBlock& block = blocks_.block(i);
+      if (!block.has_surface) continue;
+      block.queued = true;
+      queue_.push_back(&block);
+    }
+    // Meshes of before may have lost their surface.
+    for (const auto& [index, digest] : digests_) due_meshes_.insert(index);
   }
 
   OccupancyGrid MakeOccupancy(double cell_m) {
@@ -204,6 +223,8 @@ absl::Status SemanticVolume::Integrate(const DepthFrame& frame) { return impl_->
 std::vector<MeshBlock> SemanticVolume::TakeChangedMesh(double block_size_m) {
   return impl_->TakeChangedMesh(block_size_m);
 }
+
+void SemanticVolume::Move(const TrajectoryChange& change) { impl_->Move(change); }
 
 OccupancyGrid SemanticVolume::MakeOccupancy(double cell_m) { return impl_->MakeOccupancy(cell_m); }
 

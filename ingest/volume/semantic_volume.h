@@ -11,6 +11,7 @@
 #include "absl/status/status.h"
 #include "ingest/grid/occupancy_grid.h"
 #include "ingest/sensor/depth_frame.h"
+#include "ingest/trajectory/trajectory_change.h"
 #include "schema/model/mesh.h"
 
 namespace dsg::ingest {
@@ -82,6 +83,10 @@ class SemanticVolume {
   /// without vertices has lost its surface. Vertices are shared within a block.
   /// Requires: the same `block_size_m` each time.
   std::vector<MeshBlock> TakeChangedMesh(double block_size_m);
+
+  /// The path that the frames were seen from has moved: the blocks move with it (MoveBlocks). The
+  /// next TakeChangedMesh gives what changed by that.
+  void Move(const TrajectoryChange& change);
 
   /// What has been seen of the space that holds all blocks, in cells of `cell_m` (a whole
   /// multiple of the voxel, or the voxel itself). A voxel is occupied where a surface passes

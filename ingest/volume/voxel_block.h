@@ -66,6 +66,9 @@ struct VoxelBlock {
   /// voxel in three is near enough to a surface to have labels.
   std::vector<uint16_t> label_index;
   std::vector<VoxelLabels> labels;
+  /// When anything was read in it, first and last.
+  TimeNs first_seen_ns = kTimeMax;
+  TimeNs last_seen_ns = kTimeMin;
   /// When a surface was near, first and last; the first is after the last when none was.
   TimeNs first_surface_ns = kTimeMax;
   TimeNs last_surface_ns = kTimeMin;

@@ -19,7 +19,8 @@ SCHEMA = STORE + ["schema/files", "schema/interop", "schema/picture", "schema/ma
 INGEST_STAGES = ["log", "simulator", "evaluation", "odometry", "loop", "depth", "volume", "agents",
                  "objects", "places", "rooms"]
 # Plain types that stages hand to one another.
-INGEST_SHARED = ["ingest/config", "ingest/files", "ingest/sensor", "ingest/grid"]
+INGEST_SHARED = ["ingest/config", "ingest/files", "ingest/sensor", "ingest/grid",
+                 "ingest/trajectory"]
 # What is done with what the stages found.
 INGEST_ROOMS = ["ingest/commit", "ingest/presence", "ingest/correction"]
 # Programs of their own beside the pipeline, which knows nothing of them.
@@ -46,9 +47,11 @@ ALLOWED = {
     "ingest/files": BASE + ["schema/files"],
     "ingest/sensor": MODEL,
     "ingest/grid": MODEL,
+    "ingest/trajectory": MODEL,
     "ingest/commit": SCHEMA + ["query/api", "query/client"],
     "ingest/presence": MODEL,
-    "ingest/correction": SCHEMA + ["ingest/commit", "ingest/log", "ingest/loop"],
+    "ingest/correction": SCHEMA + ["ingest/commit", "ingest/log", "ingest/loop",
+                                   "ingest/trajectory"],
     "ingest/pipeline": (SCHEMA + INGEST_SHARED + INGEST_ROOMS +
                         [f"ingest/{s}" for s in INGEST_STAGES if s not in ASIDE]),
     "ingest/program": SCHEMA + ["ingest/files", "ingest/log", "ingest/commit", "ingest/pipeline"],

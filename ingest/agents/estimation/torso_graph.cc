@@ -213,6 +213,13 @@ void TorsoGraph::SolveAll() {
   impl_->Solve(0, is_solved ? 1 : kFallbackIterationCount, false);
 }
 
+void TorsoGraph::Freeze() {
+  impl_->position = MakePositionChain(impl_->options);
+  impl_->heading = StateChain<1>(StateChain<1>::Matrix::Constant(kHeadingStart));
+  std::vector<RayDetection>().swap(impl_->rays);
+  std::vector<TorsoDetection>().swap(impl_->detections);
+}
+
 const std::vector<TorsoEstimate>& TorsoGraph::estimates() const { return impl_->estimates; }
 
 TorsoPrediction TorsoGraph::Predict(TimeNs time_ns) const {

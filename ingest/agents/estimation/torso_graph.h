@@ -84,6 +84,10 @@ class TorsoGraph {
   /// Moves all of them, and computes every covariance; at the end of a track.
   void SolveAll();
 
+  /// Keeps the estimates and frees the rest, 4 kB an observation: nothing more will be added,
+  /// solved or asked for but estimates().
+  void Freeze();
+
   /// One per observation, ascending in time.
   const std::vector<TorsoEstimate>& estimates() const;
   /// Requires: at least one observation. `time_ns` not before the last.

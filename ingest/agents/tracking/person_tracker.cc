@@ -61,9 +61,10 @@ class PersonTracker::Impl {
 
   bool Observe(TimeNs time_ns, std::vector<PersonObservation> observations);
   void Finish();
+  void Move(const TrajectoryChange& change);
   std::vector<TrackChange> TakeChanges();
   const Track& track(int64_t id) const;
-  void ForgetVertices(int64_t id, size_t first);
+  void ForgetShapes(int64_t id, size_t first);
   TrackerCounts counts() const { return counts_; }
 
  private:
@@ -93,6 +94,8 @@ class PersonTracker::Impl {
   /// Those that may still get observations: open, or closed and young enough to be found again.
   std::set<int64_t> living_;
   std::set<int64_t> touched_;
+  /// Closed for good, and not told of since.
+  std::set<int64_t> old_;
   std::optional<TimeNs> now_ns_;
   int64_t next_id_ = 1;
   TrackerCounts counts_;
@@ -265,7 +268,10 @@ void PersonTracker::Impl::Age() {
       SetState(track, TrackState::kLost);
     }
     if (track->state() == TrackState::kLost && unseen_ns > options_.close_ns) Close(track);
-    if (unseen_ns > options_.again_ns && !IsOpen(track->state())) living_.erase(id);
+    if (unseen_ns > options_.again_ns && !IsOpen(track->state())) {
+      living_.erase(id);
+      old_.insert(id);
+    }
   }
 }
 
@@ -277,6 +283,7 @@ void PersonTracker::Impl::Close(TrackEntry* track) {
 void PersonTracker::Impl::Drop(TrackEntry* track) {
   SetState(track, TrackState::kDropped);
   living_.erase(track->track().id);
+  old_.insert(track->track().id);
   ++counts_.dropped_track_count;
 }
 
@@ -298,7 +305,23 @@ void PersonTracker::Impl::Finish() {
   living_.clear();
 }
 
+void PersonTracker::Impl::Move(const TrajectoryChange& change) {
+  for (auto& [id, entry] : entries_) {
+    if (entry->state() == TrackState::kDropped) continue;
+    entry->Move(change);
+    touched_.insert(id);
+  }
+}
+
 std::vector<TrackChange> PersonTracker::Impl::TakeChanges() {
+  // What is asked of a track when it is told was asked after the last call.
+  for (const int64_t id : std::exchange(old_, {})) {
+    if (!touched_.contains(id)) {
+      entries_.at(id)->Freeze();
+    } else {
+      old_.insert(id);
+    }
+  }
   std::vector<TrackChange> changes;
   for (const int64_t id : touched_) {
     const auto found = entries_.find(id);
@@ -311,9 +334,14 @@ std::vector<TrackChange> PersonTracker::Impl::TakeChanges() {
   return changes;
 }
 
-void PersonTracker::Impl::ForgetVertices(int64_t id, size_t first) {
+void PersonTracker::Impl::ForgetShapes(int64_t id, size_t first) {
   std::vector<PersonObservation>& seen = entries_.at(id)->mutable_track()->observations;
-  for (size_t i = first; i < seen.size(); ++i) std::vector<float>().swap(seen[i].vertices_torso);
+  for (size_t i = first; i < seen.size(); ++i) {
+    for (std::vector<float>* part :
+         {&seen[i].vertices_torso, &seen[i].pose_coefficients, &seen[i].shape_coefficients}) {
+      std::vector<float>().swap(*part);
+    }
+  }
 }
 
 const PersonTracker::Track& PersonTracker::Impl::track(int64_t id) const {
@@ -332,11 +360,13 @@ bool PersonTracker::Observe(TimeNs time_ns, std::vector<PersonObservation> obser
 
 void PersonTracker::Finish() { impl_->Finish(); }
 
+void PersonTracker::Move(const TrajectoryChange& change) { impl_->Move(change); }
+
 std::vector<TrackChange> PersonTracker::TakeChanges() { return impl_->TakeChanges(); }
 
 const PersonTracker::Track& PersonTracker::track(int64_t id) const { return impl_->track(id); }
 
-void PersonTracker::ForgetVertices(int64_t id, size_t first) { impl_->ForgetVertices(id, first); }
+void PersonTracker::ForgetShapes(int64_t id, size_t first) { impl_->ForgetShapes(id, first); }
 
 TrackerCounts PersonTracker::counts() const { return impl_->counts(); }
 

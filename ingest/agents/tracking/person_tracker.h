@@ -11,6 +11,7 @@
 
 #include "ingest/agents/estimation/torso_graph.h"
 #include "ingest/agents/person_observation.h"
+#include "ingest/trajectory/trajectory_change.h"
 
 namespace dsg::ingest {
 
@@ -123,6 +124,10 @@ class PersonTracker {
   /// No more will come: closes all tracks and smooths each over its whole length.
   void Finish();
 
+  /// The path that people were seen from has moved: each observation moves by its time, upright,
+  /// and tracks are estimated anew.
+  void Move(const TrajectoryChange& change);
+
   /// Confirmed tracks (and closed ones, and dropped ones, once) that changed since the last call,
   /// ascending by track. A track is told from its first observation on when it is confirmed. A
   /// closed one whose person is found again is told as confirmed again, and goes on where it ended.
@@ -130,9 +135,9 @@ class PersonTracker {
   /// Requires: an id from TakeChanges. Tracks are kept until the end.
   const Track& track(int64_t id) const;
   TrackerCounts counts() const;
-  /// Frees the meshes of a track's observations from `first` on: they are large, and of no use to
-  /// the tracker.
-  void ForgetVertices(int64_t id, size_t first);
+  /// Frees the meshes and coefficients of a track's observations from `first` on: they are large,
+  /// and of no use to the tracker.
+  void ForgetShapes(int64_t id, size_t first);
 
  private:
   class Impl;

@@ -110,4 +110,29 @@ std::optional<TrackChange> TrackEntry::TakeChange() {
   return change;
 }
 
+void TrackEntry::Move(const TrajectoryChange& change) {
+  std::vector<PersonObservation> observations = std::exchange(track_.observations, {});
+  track_.graph = TorsoGraph(options_->torso);
+  for (PersonObservation& observation : observations) {
+    const Pose3d move = change.At(observation.time_ns);
+    const Eigen::Matrix3d turn = move.orientation.toRotationMatrix();
+    observation.map_T_torso = KeepUpright(observation.map_T_torso, move * observation.map_T_torso);
+    observation.position_covariance_map =
+        turn * observation.position_covariance_map * turn.transpose();
+    observation.camera_map = move * observation.camera_map;
+    for (PositionCue& cue : observation.cues) {
+      cue.torso_map = move * cue.torso_map;
+      cue.information_map = turn * cue.information_map * turn.transpose();
+    }
+    Append(std::move(observation));
+  }
+  Smooth();
+  if (is_frozen_) track_.graph.Freeze();
+}
+
+void TrackEntry::Freeze() {
+  is_frozen_ = true;
+  track_.graph.Freeze();
+}
+
 }  // namespace dsg::ingest

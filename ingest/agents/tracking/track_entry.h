@@ -33,7 +33,11 @@ class TrackEntry {
   void Absorb(TrackEntry* other);
   /// Over its whole length.
   void Smooth();
+  /// With the path that it was seen from, smoothed too.
+  void Move(const TrajectoryChange& change);
   void SetState(TrackState state);
+  /// Nothing will be added any more: frees what only estimating needs.
+  void Freeze();
 
   /// Whether enough hits are close together.
   bool IsConfirmable(TimeNs now_ns) const;
@@ -59,6 +63,7 @@ class TrackEntry {
   Skeleton skeleton_;
   bool was_confirmed_ = false;
   bool is_changed_ = false;
+  bool is_frozen_ = false;
   size_t first_estimate_ = 0;
   size_t first_observation_ = 0;
 };

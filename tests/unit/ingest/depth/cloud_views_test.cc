@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "ingest/depth/frame_maker.h"
+#include "tests/unit/ingest/depth/depth_test_util.h"
 #include "tests/unit/ingest/depth/made_scan.h"
 
 namespace dsg::ingest {
@@ -116,7 +117,7 @@ TEST(FrameMaker, MakesTheViewsOfALidarOneAfterAnother) {
   RigCalibration rig;
   rig.lidar.emplace().name = "lidar0";
   rig.lidar->body_T_lidar.position = {0.0, 0.0, 0.6};
-  FrameMaker maker(rig, {});
+  PosedFrameMaker maker(rig, {});
   ASSERT_TRUE(maker.CanMakeFrames());
   Pose3d map_T_body = LidarPose();
   map_T_body.position.z() -= 0.6;

@@ -87,6 +87,22 @@ inline Image FlatDepth(float metres, int width = 64, int height = 48) {
   return Depth32Image(width, height, [&](int, int) { return metres; });
 }
 
+struct OwnPath {
+  RobotPath path;
+};
+
+// A frame maker with a path of its own.
+class PosedFrameMaker : private OwnPath, public FrameMaker {
+ public:
+  PosedFrameMaker(const RigCalibration& rig, const DepthOptions& options)
+      : FrameMaker(rig, options, path) {}
+
+  void AddPose(TimeNs time_ns, const Pose3d& odom_T_body) {
+    path.Add({.time_ns = time_ns, .map_T_agent = odom_T_body});
+    NotePose();
+  }
+};
+
 inline FrameMaker::Picture Shot(TimeNs time_ns, const std::string& channel, Image image) {
   return {time_ns, channel, channel + ".png",
           [image = std::move(image)]() -> absl::StatusOr<Image> { return image; }};

@@ -149,7 +149,7 @@ TEST(DynamicMask, BoxesOutsideTheImageOrWithoutDepthDoNothing) {
 
 TEST(DynamicMask, FrameMakerMasksByDetectionsOfTheStamp) {
   const auto make = [](TimeNs detection_ns, const std::string& camera) {
-    FrameMaker maker(TestRig(kWidth, kHeight), Options(0));
+    PosedFrameMaker maker(TestRig(kWidth, kHeight), Options(0));
     maker.AddPose(0, At(0.0));
     maker.AddPicture(Shot(0, "depth0", Depth32Image(kWidth, kHeight, [](int u, int v) {
                             return IsPerson(u, v) ? 2.0f : 4.0f;

@@ -13,7 +13,7 @@ namespace dsg::ingest {
 namespace {
 
 // Poses along x at 1 m/s, each 10 ms, both ends included.
-void AddPoses(TimeNs from_ns, TimeNs to_ns, FrameMaker* maker) {
+void AddPoses(TimeNs from_ns, TimeNs to_ns, PosedFrameMaker* maker) {
   for (TimeNs t = from_ns; t <= to_ns; t += 10 * kMs) {
     maker->AddPose(t, At(1e-9 * static_cast<double>(t)));
   }
@@ -21,7 +21,7 @@ void AddPoses(TimeNs from_ns, TimeNs to_ns, FrameMaker* maker) {
 
 TEST(FrameMaker, JoinsChannelsOfOneStampInAnyOrder) {
   for (const bool is_depth_first : {true, false}) {
-    FrameMaker maker(TestRig(), {});
+    PosedFrameMaker maker(TestRig(), {});
     ASSERT_TRUE(maker.CanMakeFrames());
     AddPoses(0, 1000 * kMs, &maker);
     if (is_depth_first) maker.AddPicture(Shot(500 * kMs, "depth0", FlatDepth(2.0f)));
@@ -54,7 +54,7 @@ TEST(FrameMaker, PutsTheCameraWhereTheBodyCarriesIt) {
     camera.body_T_camera.orientation =
         Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitX()));
   }
-  FrameMaker maker(rig, {});
+  PosedFrameMaker maker(rig, {});
   Pose3d map_T_body = At(1.0, 2.0, 3.0);
   map_T_body.orientation = Eigen::Quaterniond(Eigen::AngleAxisd(M_PI_2, Eigen::Vector3d::UnitZ()));
   maker.AddPose(100, map_T_body);
@@ -68,7 +68,7 @@ TEST(FrameMaker, PutsTheCameraWhereTheBodyCarriesIt) {
 }
 
 TEST(FrameMaker, TakesTheNearestColourWithinTwentyMilliseconds) {
-  FrameMaker maker(TestRig(), {});
+  PosedFrameMaker maker(TestRig(), {});
   maker.AddPose(0, At(0.0));
   const auto color = [&](TimeNs t, uint8_t red) {
     maker.AddPicture(Shot(t, "color0", ColorImage(64, 48, red)));
@@ -93,7 +93,7 @@ TEST(FrameMaker, TakesTheNearestColourWithinTwentyMilliseconds) {
 TEST(FrameMaker, ColourOfTheNextFrameIsNotTaken) {
   RigCalibration rig = TestRig();
   for (CameraCalibration& camera : rig.cameras) camera.rate_hz = 100.0;
-  FrameMaker maker(rig, {});
+  PosedFrameMaker maker(rig, {});
   AddPoses(0, 100 * kMs, &maker);
   maker.AddPicture(Shot(50 * kMs, "depth0", FlatDepth(1.0f)));
   maker.AddPicture(Shot(60 * kMs, "color0", ColorImage(64, 48, 1)));
@@ -105,7 +105,7 @@ TEST(FrameMaker, ColourOfTheNextFrameIsNotTaken) {
 }
 
 TEST(FrameMaker, GreyStandsInForColour) {
-  FrameMaker maker(TestRig(), {});
+  PosedFrameMaker maker(TestRig(), {});
   maker.AddPose(0, At(0.0));
   maker.AddPicture(Shot(0, "cam0", GrayImage(64, 48, [](int u, int) { return 2.0 * u; })));
   maker.AddPicture(Shot(0, "depth0", FlatDepth(1.0f)));
@@ -118,7 +118,7 @@ TEST(FrameMaker, GreyStandsInForColour) {
 TEST(FrameMaker, SmallerColourIsSpreadByTheNearestPixel) {
   RigCalibration rig = TestRig();
   rig.cameras[1] = TestCamera("color0", 32, 24);
-  FrameMaker maker(rig, {});
+  PosedFrameMaker maker(rig, {});
   maker.AddPose(0, At(0.0));
   maker.AddPicture(Shot(0, "color0", ColorImage(32, 24, 9)));
   maker.AddPicture(Shot(0, "depth0", FlatDepth(1.0f)));
@@ -132,7 +132,7 @@ TEST(FrameMaker, SmallerColourIsSpreadByTheNearestPixel) {
 TEST(FrameMaker, ColourFromBesideIsLeftOutAndSaid) {
   RigCalibration rig = TestRig();
   rig.cameras[1].body_T_camera.position.x() = 0.05;
-  FrameMaker maker(rig, {});
+  PosedFrameMaker maker(rig, {});
   maker.AddPose(0, At(0.0));
   maker.AddPicture(Shot(0, "color0", ColorImage(64, 48, 9)));
   maker.AddPicture(Shot(0, "depth0", FlatDepth(1.0f)));
@@ -146,7 +146,7 @@ TEST(FrameMaker, CleansReadingsThatAreNone) {
   const float inf = std::numeric_limits<float>::infinity();
   const std::vector<float> given = {
       1.5f, NAN, inf, -inf, -1.0f, 0.0f, 60.0f, 1e10f, std::numeric_limits<float>::max()};
-  FrameMaker maker(TestRig(), {});
+  PosedFrameMaker maker(TestRig(), {});
   AddPoses(0, 200 * kMs, &maker);
   maker.AddPicture(Shot(0, "depth0", Depth32Image(64, 48, [&](int u, int) {
                           return u < 9 ? given[static_cast<size_t>(u)] : 2.0f;
@@ -164,7 +164,7 @@ TEST(FrameMaker, CleansReadingsThatAreNone) {
 }
 
 TEST(FrameMaker, SkipsFramesWithoutAPoseAndAcrossAJump) {
-  FrameMaker maker(TestRig(), {});
+  PosedFrameMaker maker(TestRig(), {});
   const auto depth = [&](TimeNs t) { maker.AddPicture(Shot(t, "depth0", FlatDepth(1.0f))); };
   depth(0);
   maker.AddPose(100 * kMs, At(0.0));
@@ -185,7 +185,7 @@ TEST(FrameMaker, SkipsFramesWithoutAPoseAndAcrossAJump) {
 }
 
 TEST(FrameMaker, CountsBrokenAndWrongPicturesAndGoesOn) {
-  FrameMaker maker(TestRig(), {});
+  PosedFrameMaker maker(TestRig(), {});
   AddPoses(0, 1000 * kMs, &maker);
   maker.AddPicture(BrokenShot(100 * kMs, "depth0"));
   maker.AddPicture(Shot(200 * kMs, "depth0", FlatDepth(1.0f, 32, 24)));
@@ -215,7 +215,7 @@ TEST(FrameMaker, CountsBrokenAndWrongPicturesAndGoesOn) {
 }
 
 TEST(FrameMaker, MissingDepthIsSaidOnce) {
-  FrameMaker maker(TestRig(), {});
+  PosedFrameMaker maker(TestRig(), {});
   AddPoses(0, 100 * kMs, &maker);
   for (int i = 0; i < 3; ++i) {
     maker.AddPicture(Shot(i * 20 * kMs, "color0", ColorImage(64, 48, 1)));
@@ -227,18 +227,18 @@ TEST(FrameMaker, MissingDepthIsSaidOnce) {
 TEST(FrameMaker, RigWithoutDepthMakesNothing) {
   RigCalibration rig;
   rig.cameras.push_back(TestCamera("cam0"));
-  FrameMaker maker(rig, {});
+  PosedFrameMaker maker(rig, {});
   EXPECT_FALSE(maker.CanMakeFrames());
   maker.AddPose(0, At(0.0));
   maker.AddPicture(Shot(0, "cam0", GrayImage(64, 48, [](int, int) { return 0.0; })));
   EXPECT_TRUE(Drain(&maker).empty());
   // A pair at one spot sees no parallax.
   rig.cameras.push_back(TestCamera("cam1"));
-  EXPECT_FALSE(FrameMaker(rig, {}).CanMakeFrames());
+  EXPECT_FALSE(PosedFrameMaker(rig, {}).CanMakeFrames());
 }
 
 TEST(FrameMaker, RepeatedAndLatePicturesAreCounted) {
-  FrameMaker maker(TestRig(), {});
+  PosedFrameMaker maker(TestRig(), {});
   AddPoses(0, 1000 * kMs, &maker);
   const auto depth = [&](TimeNs t) { maker.AddPicture(Shot(t, "depth0", FlatDepth(1.0f))); };
   depth(500 * kMs);
@@ -254,14 +254,14 @@ TEST(FrameMaker, RepeatedAndLatePicturesAreCounted) {
 }
 
 TEST(FrameMaker, PicturesWaitForPosesButNotForEver) {
-  FrameMaker maker(TestRig(), {});
+  PosedFrameMaker maker(TestRig(), {});
   for (int i = 0; i < 10'100; ++i) maker.AddPicture(BrokenShot(i * kMs, "depth0"));
   EXPECT_FALSE(maker.Next().has_value());
   EXPECT_EQ(maker.skips(), (SkipCounts{{"no pose", 100}}));
 }
 
 TEST(FrameMaker, FramesStreamOutOneBehind) {
-  FrameMaker maker(TestRig(), {});
+  PosedFrameMaker maker(TestRig(), {});
   std::vector<TimeNs> stamps;
   for (int i = 0; i < 20; ++i) {
     maker.AddPose(i * 100 * kMs, At(0.01 * i));
@@ -279,7 +279,7 @@ TEST(FrameMaker, AskingOftenOrOnlyAtTheEndGivesTheSame) {
   std::vector<DepthFrame> results[2];
   SkipCounts skips[2];
   for (const bool asks_often : {false, true}) {
-    FrameMaker maker(TestRig(), {});
+    PosedFrameMaker maker(TestRig(), {});
     std::vector<DepthFrame>& frames = results[asks_often ? 1 : 0];
     for (int i = 0; i < 40; ++i) {
       const TimeNs t = i * 50 * kMs;
@@ -311,7 +311,7 @@ TEST(FrameMaker, AskingOftenOrOnlyAtTheEndGivesTheSame) {
 }
 
 TEST(FrameMaker, MayBeThrownAwayWhileItOpensPictures) {
-  FrameMaker maker(TestRig(), {});
+  PosedFrameMaker maker(TestRig(), {});
   AddPoses(0, 1000 * kMs, &maker);
   for (int i = 0; i < 5; ++i) maker.AddPicture(Shot(i * 100 * kMs, "depth0", FlatDepth(1.0f)));
 }
@@ -325,7 +325,7 @@ TEST(FrameMaker, BentDepthIsRectified) {
   bent.distortion_coefficients = {-0.28, 0.07, 2e-4, 1.8e-5};
   rig.cameras.push_back(bent);
   const auto plane_m = [](const Eigen::Vector3d& ray) { return 3.0 / (1.0 + 0.8 * ray.x()); };
-  FrameMaker maker(rig, {});
+  PosedFrameMaker maker(rig, {});
   maker.AddPose(0, At(0.0));
   maker.AddPicture(Shot(0, "depth0", Depth32Image(320, 240, [&](int u, int v) {
                           const auto ray = RayOf(bent, Eigen::Vector2d(u, v));
@@ -353,7 +353,7 @@ TEST(FrameMaker, BentDepthIsRectified) {
 TEST(FrameMaker, FarReadingsOfADepthCameraAreKept) {
   DepthOptions options;
   options.range_m = 3.0;
-  FrameMaker maker(TestRig(), options);
+  PosedFrameMaker maker(TestRig(), options);
   maker.AddPose(0, At(0.0));
   maker.AddPicture(Shot(0, "depth0", FlatDepth(8.0f)));
   const std::vector<DepthFrame> frames = Drain(&maker);

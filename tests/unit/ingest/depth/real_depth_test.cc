@@ -52,7 +52,8 @@ Frames ReadFrames(const std::string& path, int every, size_t count, const Patch&
   absl::StatusOr<std::unique_ptr<LogSource>> log = OpenLog((DataFolder() / path).string(), {});
   EXPECT_TRUE(log.ok()) << log.status();
   if (!log.ok()) return result;
-  FrameMaker maker(patch.rig.value_or((*log)->info().rig), {});
+  RobotPath robot;
+  FrameMaker maker(patch.rig.value_or((*log)->info().rig), {}, robot);
   EXPECT_TRUE(maker.CanMakeFrames()) << path;
   int index = 0;
   const auto take = [&] {
@@ -67,9 +68,12 @@ Frames ReadFrames(const std::string& path, int every, size_t count, const Patch&
     EXPECT_TRUE(next.ok()) << next.status();
     if (!next.ok() || !next->has_value()) break;
     if (const auto* pose = std::get_if<PoseMeasurement>(&**next)) {
-      maker.AddPose(pose->pose.time_ns, pose->pose.map_T_agent);
+      if (robot.Add(pose->pose)) maker.NotePose();
     } else if (auto* image = std::get_if<ImageMeasurement>(&**next)) {
-      if (patch.stands_still && image->channel == "depth0") maker.AddPose(image->time_ns, {});
+      if (patch.stands_still && image->channel == "depth0") {
+        robot.Add({.time_ns = image->time_ns});
+        maker.NotePose();
+      }
       maker.AddPicture({image->time_ns, image->channel, image->origin, std::move(image->load)});
     }
     take();

@@ -251,7 +251,7 @@ TEST(FrameMaker, PairsGiveFramesAtTheStereoPeriod) {
   const Pair pair = IdealPair();
   RigCalibration rig;
   rig.cameras = {pair.left, pair.right};
-  FrameMaker maker(rig, {});
+  PosedFrameMaker maker(rig, {});
   ASSERT_TRUE(maker.CanMakeFrames());
   const Image left = Render(pair.left, Plane(2.0));
   const Image right = Render(pair.right, Plane(2.0));

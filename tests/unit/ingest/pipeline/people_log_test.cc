@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "ingest/pipeline/ingest_log.h"
+#include "ingest/pipeline/log_run.h"
 #include "schema/base/status.h"
 #include "schema/store/graph_store.h"
 #include "tests/unit/ingest/log/log_test_util.h"
@@ -335,6 +336,60 @@ TEST_F(PeopleLog, ASecondSessionEndsTheSameAfterAnInterruption) {
     EXPECT_EQ(Latest()->revision(), whole_revision) << commits;
     EXPECT_EQ(People().size(), whole_count) << commits;
   }
+}
+
+// What the recipe of docs/contributing.md makes: tells how often it saw the robot move and people
+// stand before it.
+class Counter : public Stage {
+ public:
+  void NotePose(TimeNs) override { ++pose_count_; }
+  bool Take(const Measurement& measurement) override {
+    person_count_ += std::holds_alternative<HumanDetection>(measurement) ? 1 : 0;
+    return false;
+  }
+  void Tell(Findings* findings, GraphDelta* delta) override {
+    Node node;
+    node.id = NodeId('O', 900);
+    node.layer = layers::kObjects;
+    node.kind = kinds::kObject;
+    node.name = "counter";
+    node.last_observed_ns = findings->now_ns;
+    node.attributes["poses"] = static_cast<double>(pose_count_);
+    node.attributes["people"] = static_cast<double>(person_count_);
+    delta->nodes.push_back(node);
+  }
+  void Summarize(IngestSummary* summary) const override {
+    summary->unused["counted"] = pose_count_;
+  }
+
+ private:
+  int64_t pose_count_ = 0;
+  int64_t person_count_ = 0;
+};
+
+TEST_F(PeopleLog, AStageOfTheCallersSeesAllAndIsToldWithTheOthers) {
+  const std::vector<Measurement> script = WalkLeft(20);
+  ScriptedLog log(script, "one");
+  const std::unique_ptr<MapView> view = MakeSnapshotMapView(*reader_->Latest(), reader_);
+  absl::StatusOr<RunPlan> plan = MakePlan(log.info(), {}, *view, "toy");
+  ASSERT_TRUE(plan.ok()) << plan.status();
+  plan->more_stages.push_back(std::make_unique<Counter>());
+  LogRun run(*std::move(plan), *view,
+             DeltaSink({.map = "test", .session_id = "toy"}, 0, false, *view, *writer_));
+  while (true) {
+    auto measurement = log.Next();
+    ASSERT_TRUE(measurement.ok());
+    if (!measurement->has_value()) break;
+    ASSERT_TRUE(run.Take(**measurement).ok());
+  }
+  ASSERT_TRUE(run.Finish().ok());
+  const auto node = (*reader_->Latest())->GetNode(NodeId('O', 900));
+  ASSERT_TRUE(node.ok()) << node.status();
+  EXPECT_EQ(node->attributes.at("poses"), AttributeValue(20.0));
+  EXPECT_EQ(node->attributes.at("people"), AttributeValue(20.0));
+  EXPECT_EQ(run.Summary().unused.at("counted"), 20);
+  // The stages before it did their work as ever.
+  EXPECT_EQ(run.Summary().people->counts.track_count, 1);
 }
 
 }  // namespace

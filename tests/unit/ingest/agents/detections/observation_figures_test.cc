@@ -99,7 +99,7 @@ class Log {
     for (const SemanticLabel& label : (*log)->info().labels) {
       if (label.name == "human" || label.name == "person") depth.dynamic_classes = {label.id};
     }
-    FrameMaker frames(rig_, depth);
+    FrameMaker frames(rig_, depth, path_);
     while (true) {
       auto next = (*log)->Next();
       ASSERT_TRUE(next.ok()) << next.status();
@@ -117,7 +117,7 @@ class Log {
  private:
   void Take(Measurement measurement, FrameMaker* frames) {
     if (const auto* pose = std::get_if<PoseMeasurement>(&measurement)) {
-      frames->AddPose(pose->pose.time_ns, pose->pose.map_T_agent);
+      if (path_.Add(pose->pose)) frames->NotePose();
     } else if (auto* image = std::get_if<ImageMeasurement>(&measurement)) {
       if (image->channel != "depth0" && image->channel != "label0") return;
       frames->AddPicture({image->time_ns, image->channel, image->origin, image->load});
@@ -141,6 +141,7 @@ class Log {
   std::map<int64_t, truth::DetectionTruth> truth_of_;
   std::map<std::pair<int, TimeNs>, Pose3d> torso_of_;
   RigCalibration rig_;
+  RobotPath path_;
   std::deque<HumanDetection> waiting_;
   Table table_;
   size_t case_count_ = 0;

@@ -333,5 +333,53 @@ TEST(PersonTracker, InThePapersModeTheFirstConsistentTrackWins) {
   EXPECT_EQ(tracker.counts().track_count, 2);
 }
 
+// Moving what was seen, and seeing it where it is, are the same; whether a track is open, closed or
+// so old that nothing but its estimates is kept.
+TEST(PersonTracker, MovesWithThePathThatItWasSeenFrom) {
+  Random random(11, 0);
+  const PeopleLog log = Walk({{{-2.0, 0.0, 0.95}, {0.5, 0.0, 0.0}, ShapeVector::Zero(), 6.0, 1e9}},
+                             0.0, 30.0, &random);
+  Pose3d astray;
+  astray.position = {0.4, -0.2, 0.0};
+  astray.orientation = Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitZ());
+  PeopleLog moved_log;
+  for (const auto& [time_ns, observations] : log.images) {
+    std::vector<PersonObservation>& moved = moved_log.images[time_ns];
+    for (PersonObservation observation : observations) {
+      const Eigen::Matrix3d turn = astray.orientation.toRotationMatrix();
+      observation.map_T_torso = astray * observation.map_T_torso;
+      observation.position_covariance_map =
+          turn * observation.position_covariance_map * turn.transpose();
+      observation.camera_map = astray * observation.camera_map;
+      moved.push_back(observation);
+    }
+  }
+  TrackerOptions options;
+  options.again_ns = 10 * kNsPerSecond;
+  PersonTracker right(options);
+  RunAll(log, &right);
+  for (const double move_s : {3.0, 12.0, 29.0}) {
+    PersonTracker tracker(options);
+    for (const auto& [time_ns, observations] : moved_log.images) {
+      // From then on seen right.
+      const bool is_before = time_ns <= AtS(move_s);
+      tracker.Observe(time_ns, is_before ? observations : log.images.at(time_ns));
+      tracker.TakeChanges();
+      if (time_ns != AtS(move_s)) continue;
+      tracker.Move(TrajectoryChange({time_ns}, {astray.Inverse()}));
+      EXPECT_EQ(tracker.TakeChanges().size(), 1u) << move_s;
+    }
+    tracker.Finish();
+    const std::vector<TorsoEstimate>& estimates = tracker.track(1).graph.estimates();
+    const std::vector<TorsoEstimate>& expected = right.track(1).graph.estimates();
+    ASSERT_EQ(estimates.size(), expected.size()) << move_s;
+    for (size_t i = 0; i < expected.size(); ++i) {
+      const Eigen::Vector3d apart =
+          estimates[i].map_T_torso.position - expected[i].map_T_torso.position;
+      EXPECT_LT(apart.norm(), 0.05) << move_s << " " << i;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace dsg::ingest

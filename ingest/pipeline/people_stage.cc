@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ingest/pipeline/person_mapper.h"
+#include "ingest/pipeline/people_stage.h"
 
 #include <algorithm>
+#include <iterator>
 #include <optional>
 #include <utility>
 
 #include "ingest/depth/frame_maker.h"
+#include "ingest/pipeline/ingest_log.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
@@ -18,19 +20,28 @@ constexpr double kCameraAboveFloorMaxM = 2.5;
 
 }  // namespace
 
-PersonMapper::PersonMapper(const RigCalibration& rig, const PeopleOptions& options, bool has_depth)
+PeopleStage::PeopleStage(const RigCalibration& rig, const PeopleOptions& options, bool has_depth,
+                         const RobotPath& path, PeopleTold told, bool is_on)
     : rig_(rig),
       options_(options),
       has_depth_(has_depth),
-      poses_(DepthOptions().pose_gap_ns_max, DepthOptions().speed_m_s_max),
-      tracker_(options.tracker) {}
+      is_on_(is_on),
+      path_(path),
+      tracker_(options.tracker),
+      told_(std::move(told)) {}
 
-void PersonMapper::AddPose(TimeNs time_ns, const Pose3d& map_T_body) {
-  if (!poses_.Add(time_ns, map_T_body)) return;
+void PeopleStage::NotePose(TimeNs time_ns) {
   if (!has_depth_) TakeUntil(time_ns, nullptr);
 }
 
-void PersonMapper::AddDetection(HumanDetection detection) {
+bool PeopleStage::Take(const Measurement& measurement) {
+  const auto* detection = std::get_if<HumanDetection>(&measurement);
+  if (!is_on_ || detection == nullptr) return false;
+  AddDetection(*detection);
+  return true;
+}
+
+void PeopleStage::AddDetection(HumanDetection detection) {
   ++counts_.detection_count;
   if (waiting_.empty() || waiting_.back().time_ns != detection.time_ns) {
     waiting_.push_back({detection.time_ns, {}});
@@ -38,16 +49,37 @@ void PersonMapper::AddDetection(HumanDetection detection) {
   waiting_.back().detections.push_back(std::move(detection));
 }
 
-void PersonMapper::AddFrame(const DepthFrame& frame) {
+absl::Status PeopleStage::See(const DepthFrame& frame) {
   TakeUntil(frame.time_ns + kSameMomentNs, &frame);
+  return absl::OkStatus();
 }
 
-void PersonMapper::Close() {
+void PeopleStage::Close() {
   TakeUntil(kTimeMax, nullptr);
   tracker_.Finish();
 }
 
-PeopleCounts PersonMapper::counts() const {
+void PeopleStage::Tell(Findings* findings, GraphDelta* delta) {
+  if (!is_on_) return;
+  floors_m_ = findings->floors_m;
+  GraphDelta change = told_.Tell(&tracker_, findings->is_last);
+  const auto move = [](auto& source, auto* target) {
+    std::move(source.begin(), source.end(), std::back_inserter(*target));
+  };
+  move(change.nodes, &delta->nodes);
+  move(change.edges, &delta->edges);
+  move(change.appends, &delta->appends);
+  move(change.corrections, &delta->corrections);
+  move(change.factors, &delta->factors);
+  move(change.shapes, &delta->shapes);
+  Coalesce(delta);
+}
+
+void PeopleStage::Summarize(IngestSummary* summary) const {
+  if (is_on_) summary->people = PeopleSummary{Counts(), clock_.times()};
+}
+
+PeopleCounts PeopleStage::Counts() const {
   PeopleCounts counts = counts_;
   const TrackerCounts tracks = tracker_.counts();
   counts.used_count = tracks.observation_count - tracks.duplicate_count - tracks.unusable_count -
@@ -64,17 +96,16 @@ PeopleCounts PersonMapper::counts() const {
   return counts;
 }
 
-void PersonMapper::TakeUntil(TimeNs until_ns, const DepthFrame* frame) {
+void PeopleStage::TakeUntil(TimeNs until_ns, const DepthFrame* frame) {
   while (!waiting_.empty() && waiting_.front().time_ns <= until_ns) {
     const Image& image = waiting_.front();
     const bool is_same_moment = frame != nullptr && image.time_ns >= frame->time_ns - kSameMomentNs;
-    Take(image, is_same_moment ? frame : nullptr);
-    poses_.ForgetBefore(image.time_ns);
+    Track(image, is_same_moment ? frame : nullptr);
     waiting_.pop_front();
   }
 }
 
-std::vector<PersonMapper::Filtered> PersonMapper::Filter(const Image& image) {
+std::vector<PeopleStage::Filtered> PeopleStage::Filter(const Image& image) {
   std::vector<Filtered> kept;
   const std::string& camera_name = image.detections.front().camera;
   for (const HumanDetection& detection : image.detections) {
@@ -98,11 +129,11 @@ std::vector<PersonMapper::Filtered> PersonMapper::Filter(const Image& image) {
   return kept;
 }
 
-void PersonMapper::Take(const Image& image, const DepthFrame* frame) {
+void PeopleStage::Track(const Image& image, const DepthFrame* frame) {
   const StageClock::Span span(&clock_, "people");
   const std::vector<Filtered> detections = Filter(image);
   Pose3d map_T_body;
-  if (poses_.At(image.time_ns, &map_T_body) != PoseTrack::Answer::kKnown) {
+  if (path_.At(image.time_ns, &map_T_body) != RobotPath::Answer::kKnown) {
     counts_.rejected["no pose"] += static_cast<int64_t>(detections.size());
     return;
   }
@@ -127,14 +158,14 @@ void PersonMapper::Take(const Image& image, const DepthFrame* frame) {
   }
 }
 
-const CameraCalibration* PersonMapper::CameraOf(const std::string& name) const {
+const CameraCalibration* PeopleStage::CameraOf(const std::string& name) const {
   for (const CameraCalibration& camera : rig_.cameras) {
     if (camera.name == name) return &camera;
   }
   return nullptr;
 }
 
-std::optional<double> PersonMapper::FloorUnder(double camera_z_m) const {
+std::optional<double> PeopleStage::FloorUnder(double camera_z_m) const {
   if (options_.floor_z_m.has_value()) return options_.floor_z_m;
   const auto above =
       std::upper_bound(floors_m_.begin(), floors_m_.end(), camera_z_m - kCameraAboveFloorMinM);

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/trajectory/robot_path.h"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "schema/base/check.h"
+#include "schema/model/rigid_motion.h"
+
+namespace dsg::ingest {
+namespace {
+
+constexpr double kTurnRadSMax = 20.0;
+// Poses of high rate jitter; over a few milliseconds that is not a speed.
+constexpr double kJitterM = 0.01;
+constexpr double kJitterRad = 0.01;
+
+Pose3d Between(const TimedPose& before, const TimedPose& after, TimeNs time_ns) {
+  const double fraction = static_cast<double>(time_ns - before.time_ns) /
+                          static_cast<double>(after.time_ns - before.time_ns);
+  return Interpolate(before.map_T_agent, after.map_T_agent, fraction);
+}
+
+}  // namespace
+
+bool RobotPath::Add(const TimedPose& given) {
+  const bool is_later = poses_.empty() || given.time_ns > poses_.back().time_ns;
+  if (!is_later || !IsValidPose(given.map_T_agent)) {
+    ++refused_count_;
+    return false;
+  }
+  poses_.push_back(given);
+  return true;
+}
+
+std::deque<TimedPose>::const_iterator RobotPath::NotBefore(TimeNs time_ns) const {
+  return std::lower_bound(poses_.begin(), poses_.end(), time_ns,
+                          [](const TimedPose& pose, TimeNs time) { return pose.time_ns < time; });
+}
+
+RobotPath::Answer RobotPath::GivenAt(TimeNs time_ns, Pose3d* odom_T_body) const {
+  const auto after = NotBefore(time_ns);
+  if (after == poses_.end()) return Answer::kNotYet;
+  const bool is_exact = after->time_ns == time_ns;
+  if (after == poses_.begin()) {
+    if (!is_exact) return Answer::kNone;
+    *odom_T_body = after->map_T_agent;
+    return Answer::kKnown;
+  }
+  const auto before = std::prev(after);
+  const bool is_gap = after->time_ns - before->time_ns > options_.gap_ns_max;
+  if (is_gap && !is_exact) return Answer::kNone;
+  if (!is_gap && IsJump(*before, *after)) return Answer::kJump;
+  *odom_T_body = is_exact ? after->map_T_agent : Between(*before, *after, time_ns);
+  return Answer::kKnown;
+}
+
+RobotPath::Answer RobotPath::At(TimeNs time_ns, Pose3d* map_T_body) const {
+  const Answer answer = GivenAt(time_ns, map_T_body);
+  if (answer == Answer::kKnown) *map_T_body = ToMap(time_ns, *map_T_body);
+  return answer;
+}
+
+bool RobotPath::IsJump(const TimedPose& from, const TimedPose& to) const {
+  const double seconds = 1e-9 * static_cast<double>(to.time_ns - from.time_ns);
+  const double step_m = (to.map_T_agent.position - from.map_T_agent.position).norm();
+  const double turn_rad = AngleBetween(from.map_T_agent.orientation, to.map_T_agent.orientation);
+  return step_m > options_.speed_m_s_max * seconds + kJitterM ||
+         turn_rad > kTurnRadSMax * seconds + kJitterRad;
+}
+
+Pose3d RobotPath::ToMap(TimeNs time_ns, const Pose3d& odom_T_thing) const {
+  if (map_T_odom_.IsIdentity()) return odom_T_thing;
+  Pose3d map_T_thing = map_T_odom_.At(time_ns) * odom_T_thing;
+  map_T_thing.orientation.normalize();
+  return map_T_thing;
+}
+
+TimedPose RobotPath::InMap(const TimedPose& given) const {
+  TimedPose pose = given;
+  if (!map_T_odom_.IsIdentity()) TransformPose(map_T_odom_.At(given.time_ns), &pose);
+  return pose;
+}
+
+TrajectoryChange RobotPath::ChangeTo(const TrajectoryChange& map_T_odom) const {
+  const TrajectoryChange& before = map_T_odom_;
+  if (poses_.empty() || (before.IsIdentity() && map_T_odom.IsIdentity())) return {};
+  // Keyframes of either are where the path bends; between them it moves stiffly.
+  std::vector<TimeNs> times = before.times();
+  times.insert(times.end(), map_T_odom.times().begin(), map_T_odom.times().end());
+  std::sort(times.begin(), times.end());
+  times.erase(std::unique(times.begin(), times.end()), times.end());
+  std::vector<Pose3d> old_T_body;
+  std::vector<Pose3d> new_T_body;
+  for (const TimeNs time_ns : times) {
+    const Pose3d odom_T_body = GivenNear(time_ns);
+    old_T_body.push_back(before.At(time_ns) * odom_T_body);
+    new_T_body.push_back(map_T_odom.At(time_ns) * odom_T_body);
+  }
+  return TrajectoryChange(std::move(times), std::move(old_T_body), std::move(new_T_body));
+}
+
+size_t RobotPath::NearestIndex(TimeNs time_ns) const {
+  DSG_CHECK(!poses_.empty());
+  const auto after = NotBefore(time_ns);
+  if (after == poses_.end()) return poses_.size() - 1;
+  const auto index = static_cast<size_t>(after - poses_.begin());
+  if (index == 0 || after->time_ns - time_ns < time_ns - poses_[index - 1].time_ns) return index;
+  return index - 1;
+}
+
+Pose3d RobotPath::GivenNear(TimeNs time_ns) const {
+  DSG_CHECK(!poses_.empty());
+  const auto after =
+      std::upper_bound(poses_.begin(), poses_.end(), time_ns,
+                       [](TimeNs time, const TimedPose& pose) { return time < pose.time_ns; });
+  if (after == poses_.begin()) return poses_.front().map_T_agent;
+  if (after == poses_.end()) return poses_.back().map_T_agent;
+  return Between(*std::prev(after), *after, time_ns);
+}
+
+}  // namespace dsg::ingest
