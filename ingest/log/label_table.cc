@@ -128,18 +128,18 @@ absl::StatusOr<LabelIds> ReadLabelIds(const LogFile& file) {
     ids.is_listed[id] = true;
     if (!IsNoClass(name)) name_of.emplace(id, std::move(name));
   }
-  if (name_of.empty() || name_of.size() > kClassMax) {
-    return MalformedFile(file.path, absl::StrCat("names ", name_of.size(), " classes; 1 to ",
-                                                 kClassMax, " are read"));
+  ids.is_renumbered =
+      !name_of.empty() && (name_of.begin()->first < 1 || name_of.rbegin()->first > kClassMax);
+  std::map<std::string, int32_t> class_of_name;
+  for (const auto& [id, name] : name_of) {
+    const auto next = static_cast<int32_t>(ids.is_renumbered ? std::ssize(ids.classes) + 1 : id);
+    const auto [known, is_new] = class_of_name.try_emplace(name, next);
+    if (is_new) ids.classes.push_back({next, name});
+    ids.label_of_id[static_cast<size_t>(id)] = static_cast<uint16_t>(known->second << 8);
   }
-  ids.is_renumbered = name_of.begin()->first < 1 || name_of.rbegin()->first > kClassMax;
-  for (auto& [id, name] : name_of) {
-    const auto class_id =
-        static_cast<int32_t>(ids.is_renumbered ? std::ssize(ids.classes) + 1 : id);
-    ids.label_of_id[static_cast<size_t>(id)] = static_cast<uint16_t>(class_id << 8);
-    ids.classes.push_back({class_id, std::move(name)});
-  }
-  return ids;
+  if (!ids.classes.empty() && std::ssize(ids.classes) <= kClassMax) return ids;
+  return MalformedFile(file.path, absl::StrCat("names ", ids.classes.size(), " classes; 1 to ",
+                                               kClassMax, " are read"));
 }
 
 absl::StatusOr<ClassList> ReadClassList(const LogFile& file) {

@@ -45,7 +45,7 @@ struct LabelIds {
 /// A table with a header that has the columns "id" (0 to 65535) and "name", or without one whose
 /// first two columns they are. Columns stand between commas, semicolons or tabs, or the id before
 /// the first blank. A number that is named unknown, unlabeled, void, background and the like is no
-/// class.
+/// class, and numbers of one name are one class, that of the lowest.
 /// Errors: INVALID_ARGUMENT/FILE_MALFORMED naming file, line, field and value: an id that stands
 /// twice, more than 255 classes, none.
 absl::StatusOr<LabelIds> ReadLabelIds(const LogFile& file);

@@ -5,6 +5,7 @@
 
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <set>
 
 #include "absl/strings/str_cat.h"
 #include "ingest/log/label_table.h"
@@ -49,6 +50,15 @@ TEST(LabelIds, RenumbersIdsThatDoNotFit) {
   const LabelIds large = Ids("id,name\n1163,picture\n40,wall\n");
   EXPECT_EQ(ClassesOf(large), "1wall 2picture ");
   EXPECT_EQ(large.label_of_id[1163], 2 << 8);
+}
+
+TEST(LabelIds, MakesOneClassOfOneName) {
+  const LabelIds ids = Ids("id,name\n2,chair\n3,table\n9,chair\n");
+  EXPECT_EQ(ClassesOf(ids), "2chair 3table ");
+  EXPECT_EQ(ids.label_of_id[9], 2 << 8);
+  const LabelIds large = Ids("id,name\n20,chair\n300,chair\n301,table\n");
+  EXPECT_EQ(ClassesOf(large), "1chair 2table ");
+  EXPECT_EQ(large.label_of_id[300], 1 << 8);
 }
 
 TEST(LabelIds, ReadsTheClassesOfANetwork) {
@@ -235,6 +245,65 @@ TEST_F(LabelFolderTest, SaysWhatIsWrong) {
   const absl::Status refused =
       ReadAll(folder_.Write("log.txt", "1.5 1 2 3 0 0 0 1\n"), options_).status();
   EXPECT_NE(refused.message().find("takes no --labels"), std::string::npos) << refused;
+}
+
+// Two pictures of a real apartment, whose 350 instances have 106 categories.
+TEST_F(LabelFolderTest, ReadsRealPictures) {
+  const std::filesystem::path images = DataFolder() / "adt-apartment" / "images";
+  if (DataFolder().empty() || !std::filesystem::is_directory(images)) {
+    GTEST_SKIP() << "the real data is not there; set DSG_DATA";
+  }
+  std::ifstream in(images / "segmentation_ids.csv");
+  std::string table = "id,name\n";
+  std::string line;
+  std::set<std::string> categories;
+  std::getline(in, line);
+  while (std::getline(in, line)) {
+    // index,instance_uid,instance_name,category,motion_type
+    std::vector<std::string> fields(1);
+    for (const char c : line) {
+      if (c == ',') fields.emplace_back();
+      if (c != ',') fields.back() += c;
+    }
+    if (fields[3].empty()) continue;
+    absl::StrAppend(&table, fields[0], ",", fields[3], "\n");
+    categories.insert(fields[3]);
+  }
+  folder_.Write("labels/labels.csv", table);
+  std::string color, depth;
+  for (const std::string stamp : {"87551170", "87551204"}) {
+    const std::string at = stamp.substr(0, 5) + "." + stamp.substr(5);
+    absl::StrAppend(&color, at, " rgb/", stamp, ".jpg\n");
+    absl::StrAppend(&depth, at, " depth/", stamp, ".png\n");
+    folder_.Write("log/rgb/none", "");
+    folder_.Write("log/depth/none", "");
+    const std::string name = "rgb_" + stamp + "ms";
+    // The colour of the second instant is not there in this size; any picture does.
+    std::filesystem::copy_file(images / "rgb_87551170ms.jpg",
+                               folder_.Path("log/rgb/" + stamp + ".jpg"));
+    std::filesystem::copy_file(images / (name + "_depth.png"),
+                               folder_.Path("log/depth/" + stamp + ".png"));
+    std::filesystem::copy_file(images / (name + "_segmentation.png"),
+                               folder_.Path("labels/" + at + ".png"));
+  }
+  folder_.Write("log/rgb.txt", color);
+  folder_.Write("log/depth.txt", depth);
+  const auto log = ReadAll(folder_.Path("log"), strict_);
+  ASSERT_TRUE(log.ok()) << log.status();
+  EXPECT_EQ(log->info.labels.size(), categories.size());
+  ASSERT_EQ(log->ImageCount("label0"), 2);
+  const Image label = LoadLabel(*log);
+  std::set<int> seen;
+  for (int row = 0; row < label.height; row += 8) {
+    for (int column = 0; column < label.width; column += 8) {
+      seen.insert(LabelAt(label, column, row) >> 8);
+    }
+  }
+  std::set<std::string> names;
+  for (const SemanticLabel& known : log->info.labels) {
+    if (seen.contains(known.id)) names.insert(known.name);
+  }
+  EXPECT_GE(names.size(), 15u);
 }
 
 }  // namespace
