@@ -100,6 +100,22 @@ class Follow(support.ProgramsTest):
         self.ok("dsg-ingest", "--store", "cut", "--map", "m", "cut.csv")
         self.assertEqual(head, self.ask("stats", "--store", "cut", "--map", "m")["head_revision"])
 
+    def test_through_a_server_it_goes_on_too(self):
+        self.append("served.csv", HEADER + rows(0, 5))
+        os.makedirs(self.path("served"))
+        with self.server("served", "unix:f.sock"):
+            for last in (5, 9):
+                process = support.start("dsg-ingest", "--server", "unix:f.sock", "--map", "m",
+                                        "--follow", "served.csv", cwd=self.folder)
+                try:
+                    support.wait_until(lambda s=last: self.sees("served", "alice", s - 1), "poses")
+                    self.assertEqual(0, self.stop(process, signal.SIGTERM))
+                finally:
+                    process.kill()
+                    process.wait()
+                self.append("served.csv", rows(last, last + 4))
+        self.assertEqual(9, len(self.poses("served", "alice")))
+
     def test_it_ends_by_itself_when_told_to(self):
         self.append("timed.csv", HEADER + rows(0, 3))
         begin = time.monotonic()
