@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -21,13 +22,14 @@
 #include "ingest/log/log_source.h"
 #include "ingest/log/peeked_log.h"
 #include "ingest/pipeline/ingest_log.h"
+#include "ingest/pipeline/upright.h"
 #include "ingest/program/config_file.h"
 #include "ingest/program/destination.h"
 #include "ingest/program/mapping_flags.h"
 #include "ingest/program/people_flags.h"
 #include "ingest/program/progress.h"
 #include "ingest/program/run_report.h"
-#include "ingest/pipeline/upright.h"
+#include "ingest/program/segmenter_flags.h"
 #include "ingest/program/yield.h"
 #include "schema/base/byte_size.h"
 #include "schema/base/exit_code.h"
@@ -52,7 +54,11 @@ struct Flags {
   std::string poses = "auto";
   std::string pose_file;
   std::string loop_file;
+  std::string label_folder;
   std::vector<std::string> topics;
+  bool is_followed = false;
+  /// Unset = never.
+  std::optional<double> follow_timeout_s;
   std::string robot_cad;
   double odometry_m_per_m = RobotGraphOptions().odometry_m_per_m;
   double odometry_rad_per_m = RobotGraphOptions().odometry_rad_per_m;
@@ -60,6 +66,7 @@ struct Flags {
   int64_t commit_poses = IngestOptions().poses_per_delta;
   MappingFlags mapping;
   PeopleFlags people;
+  SegmenterFlags segmenter;
   bool is_quiet = false;
   bool is_json = false;
   bool is_dry_run = false;
@@ -84,6 +91,9 @@ void AddRobotFlags(CLI::App* app, Flags* flags) {
                   "Poses of the robot, EuRoC or TUM columns, instead of the sensor log's own");
   app->add_option("--loops", flags->loop_file,
                   "Loop closures of the robot (JSON lines), instead of the log's own");
+  app->add_option("--labels", flags->label_folder,
+                  "Label pictures of an RGB-D folder: a folder of PNGs of numbers, and labels.csv "
+                  "with id,name");
   app->add_option("--odometry-m-per-m", flags->odometry_m_per_m,
                   "How far off the robot's poses are after one metre (one standard deviation), "
                   "where loop closures may correct them; grows with the root of the way")
@@ -97,6 +107,17 @@ void AddRobotFlags(CLI::App* app, Flags* flags) {
                   "Which way is up in the log's frame: x, -x, y, -y, z, -z, \"x,y,z\", none, or "
                   "auto (RGB-D folders: told from the pictures; others: z)")
       ->capture_default_str();
+}
+
+void AddFollowFlags(CLI::App* app, Flags* flags) {
+  app->add_flag("--follow", flags->is_followed,
+                "Read a file that is still written, a table of poses or tracks or an MCAP file: at "
+                "its end wait for more, and commit meanwhile; SIGINT or SIGTERM end it");
+  app->add_option("--follow-timeout", flags->follow_timeout_s,
+                  "With --follow: the log has ended after so many seconds without growth; 0 = "
+                  "with what is there. Without it, it never ends by itself")
+      ->check(CLI::Range(0.0, 86400.0 * 365))
+      ->needs("--follow");
 }
 
 void AddFlags(CLI::App* app, Flags* flags) {
@@ -136,10 +157,12 @@ void AddFlags(CLI::App* app, Flags* flags) {
                   "How a new map keeps trajectories: quantized (default) or lossless")
       ->check(CLI::IsMember({"quantized", "lossless"}));
   AddRobotFlags(app, flags);
+  AddFollowFlags(app, flags);
   app->add_option("--commit-poses", flags->commit_poses, "Poses a revision, of logs without depth")
       ->capture_default_str();
   AddMappingFlags(app, &flags->mapping);
   AddPeopleFlags(app, &flags->people);
+  AddSegmenterFlags(app, &flags->segmenter);
   app->add_flag("--quiet", flags->is_quiet, "Write nothing but errors");
   app->add_flag("--json", flags->is_json, "Write the summary of each log as a line of JSON");
   app->add_flag("--dry-run", flags->is_dry_run,
@@ -186,11 +209,41 @@ absl::Status SetTopics(const std::vector<std::string>& topics, LogOptions* optio
   return absl::OkStatus();
 }
 
+std::atomic<bool> is_stopped = false;
+
+// A second signal ends the program at once.
+void StopAtSignals() {
+  struct sigaction action = {};
+  action.sa_handler = [](int) { is_stopped = true; };
+  action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+absl::Status SetFollow(const Flags& flags, LogOptions* options) {
+  if (!flags.is_followed) return absl::OkStatus();
+  if (flags.logs.size() != 1) {
+    return MakeError(Reason::kFieldInvalid,
+                     absl::StrCat("--follow takes one log, not ", flags.logs.size(),
+                                  ": it would never come to the second one"),
+                     {{"field", "follow"}, {"value", absl::StrCat(flags.logs.size())}});
+  }
+  StopAtSignals();
+  FollowOptions& follow = options->follow.emplace();
+  follow.stop = &is_stopped;
+  if (flags.follow_timeout_s.has_value()) {
+    follow.timeout = std::chrono::milliseconds(std::llround(*flags.follow_timeout_s * 1e3));
+  }
+  return absl::OkStatus();
+}
+
 absl::StatusOr<LogOptions> MakeLogOptions(const Flags& flags) {
   LogOptions options;
+  DSG_RETURN_IF_ERROR(SetFollow(flags, &options));
   options.format = flags.format;
   options.pose_file = flags.pose_file;
   options.loop_file = flags.loop_file;
+  options.label_folder = flags.label_folder;
   DSG_RETURN_IF_ERROR(SetTopics(flags.topics, &options));
   DSG_ASSIGN_OR_RETURN(options.poses, ParsePoseSource(flags.poses));
   options.agent_prefix = flags.agent_prefix;
@@ -298,7 +351,7 @@ absl::Status TellWhatStays(const absl::Status& failure, Destination* destination
 // a log that is refused and can be read again; after others what is committed stays, and the same
 // run goes on with it.
 absl::Status EndFailedRun(const absl::Status& failure, const std::string& path, bool is_first,
-                          Destination* destination) {
+                          bool is_followed, Destination* destination) {
   // Whether the last commit was made is open, or nobody answers.
   if (destination == nullptr || absl::IsUnavailable(failure)) return failure;
   if (!is_first || !destination->is_new()) return TellWhatStays(failure, destination);
@@ -308,8 +361,9 @@ absl::Status EndFailedRun(const absl::Status& failure, const std::string& path, 
   const std::string map = destination->spec().name;
   std::error_code error;
   const auto type = std::filesystem::status(path, error).type();
-  const bool can_be_read_again =
-      type == std::filesystem::file_type::regular || type == std::filesystem::file_type::directory;
+  // What was seen of a log that was followed may be gone from its file.
+  const bool can_be_read_again = !is_followed && (type == std::filesystem::file_type::regular ||
+                                                  type == std::filesystem::file_type::directory);
   const absl::StatusOr<bool> dropped =
       destination->DropIfOwn(/*only_empty=*/!IsRefusal(failure) || !can_be_read_again);
   std::string end = absl::StrCat("; map \"", map, "\" is not made");
@@ -335,8 +389,17 @@ void Tell(const Flags& flags, const RunReport& report) {
 // How often a log is begun again because others name agents in the map at the same time.
 constexpr int kConflictsMax = 100;
 
+// Those from `first` on; how many there are.
+size_t TellNotes(const Flags& flags, const std::string& path, const LogInfo& info, size_t first) {
+  for (size_t i = first; i < info.notes.size() && !flags.is_quiet; ++i) {
+    std::fprintf(stderr, "%s: note: %s\n", path.c_str(), info.notes[i].c_str());
+  }
+  return info.notes.size();
+}
+
 absl::Status IngestOne(const Flags& flags, const std::string& path, LogOptions options,
                        const IngestOptions& ingest_options,
+                       const std::optional<Segmentation>& segmentation,
                        std::unique_ptr<Destination>* destination) {
   const auto begin = std::chrono::steady_clock::now();
   DSG_ASSIGN_OR_RETURN(std::unique_ptr<LogSource> log, OpenLog(path, options));
@@ -357,11 +420,7 @@ absl::Status IngestOne(const Flags& flags, const std::string& path, LogOptions o
   if (is_shifted || options.mesh_block_size_m != opened_with.mesh_block_size_m) {
     DSG_ASSIGN_OR_RETURN(log, OpenLog(path, options));
   }
-  if (!flags.is_quiet) {
-    for (const std::string& note : log->info().notes) {
-      std::fprintf(stderr, "%s: note: %s\n", path.c_str(), note.c_str());
-    }
-  }
+  size_t told_count = TellNotes(flags, path, log->info(), 0);
   absl::StatusOr<IngestSummary> summary = absl::UnknownError("not run");
   for (int tries = 0; tries < kConflictsMax; ++tries) {
     if (tries > 0) {
@@ -371,6 +430,10 @@ absl::Status IngestOne(const Flags& flags, const std::string& path, LogOptions o
     DSG_ASSIGN_OR_RETURN(log, TurnUpright(std::move(log), path, options, flags.up, &note));
     if (!flags.is_quiet && !note.empty() && tries == 0) {
       std::fprintf(stderr, "%s: note: %s\n", path.c_str(), note.c_str());
+    }
+    if (segmentation.has_value()) {
+      DSG_ASSIGN_OR_RETURN(log, SegmentLog(std::move(log), *segmentation));
+      told_count = TellNotes(flags, path, log->info(), told_count);
     }
     DSG_ASSIGN_OR_RETURN(const std::unique_ptr<MapView> view, (*destination)->View());
     Progress progress(std::filesystem::path(path).filename().string(),
@@ -383,7 +446,15 @@ absl::Status IngestOne(const Flags& flags, const std::string& path, LogOptions o
   }
   if (!summary.ok()) return summary.status();
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
-  DSG_RETURN_IF_ERROR(CheckYield(log->info(), *summary));
+  // What only the end of a followed log told.
+  TellNotes(flags, path, log->info(), told_count);
+  if (summary->is_paused && !flags.is_quiet) {
+    std::fprintf(stderr,
+                 "%s: note: stopped before the end of the log: the map keeps what is committed; "
+                 "run the same again to go on, with --follow-timeout 0 to end it\n",
+                 path.c_str());
+  }
+  if (!summary->is_paused) DSG_RETURN_IF_ERROR(CheckYield(log->info(), *summary));
   Tell(flags, {path, log->info(), *summary, elapsed.count(), flags.is_dry_run});
   if (!flags.is_quiet && summary->mapping.has_value()) {
     for (const std::string& hint : HintsOnLostFrames(summary->mapping->skipped)) {
@@ -407,13 +478,18 @@ absl::Status Run(const Flags& flags) {
     DSG_ASSIGN_OR_RETURN(ingest_options.robot_model, ReadRobotModel(flags.robot_cad));
   }
   DSG_ASSIGN_OR_RETURN(ingest_options.people, MakePeopleOptions(flags.people));
+  DSG_ASSIGN_OR_RETURN(const std::optional<Segmentation> segmentation,
+                       MakeSegmentation(flags.segmenter));
   std::unique_ptr<Destination> destination;
   bool is_first = true;
   for (const std::string& path : flags.logs) {
-    const absl::Status status = IngestOne(flags, path, options, ingest_options, &destination);
+    const absl::Status status =
+        IngestOne(flags, path, options, ingest_options, segmentation, &destination);
     // What earlier logs have brought stays.
     if (!status.ok()) {
-      return flags.is_dry_run ? status : EndFailedRun(status, path, is_first, destination.get());
+      return flags.is_dry_run
+                 ? status
+                 : EndFailedRun(status, path, is_first, flags.is_followed, destination.get());
     }
     destination->TakeCommitted();
     is_first = false;
