@@ -123,6 +123,34 @@ TEST_F(RealBags, BothStoragesOfOneBagHoldTheSame) {
   }
 }
 
+// As they would be read while they are written, in steps that end anywhere.
+TEST_F(RealBags, GrowingFilesOfOtherWritersHoldTheSame) {
+  int file_count = 0;
+  for (const char* const folder : {"mcap-conformance", "bags-ros2", "bags"}) {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(Path(folder))) {
+      if (entry.path().extension() != ".mcap") continue;
+      SCOPED_TRACE(entry.path());
+      ++file_count;
+      const auto whole = McapFile::Open(entry.path().string());
+      const auto growing = McapFile::OpenGrowing(entry.path().string());
+      ASSERT_TRUE(whole.ok() && growing.ok()) << whole.status() << growing.status();
+      const uint64_t size = std::filesystem::file_size(entry.path());
+      const uint64_t step = std::max<uint64_t>(1, size / 50);
+      for (uint64_t at = 0; at < size + step; at += step) {
+        const absl::Status grown = (*growing)->GrowTo(std::min(at, size));
+        ASSERT_TRUE(grown.ok()) << grown;
+      }
+      EXPECT_TRUE((*growing)->is_closed());
+      Content a = ContentOf(**whole);
+      Content b = ContentOf(**growing);
+      std::sort(a.begin(), a.end());
+      std::sort(b.begin(), b.end());
+      EXPECT_EQ(a, b);
+    }
+  }
+  EXPECT_GE(file_count, 174 + 10);
+}
+
 TEST_F(RealBags, CdrOfOtherWritersIsRead) {
   const auto bag = OpenBagFiles(Path("bags-ros2/sensor_msgs_31types.mcap"));
   ASSERT_TRUE(bag.ok()) << bag.status();
@@ -176,6 +204,17 @@ TEST_F(RealBags, TurtlebotOdometryMakesALog) {
   ASSERT_TRUE(log.ok()) << log.status();
   EXPECT_EQ(log->info.format, "mcap");
   EXPECT_EQ(log->poses.size(), 2639u);
+  // And as one that is still written.
+  LogOptions options;
+  options.follow = FollowOptions{.timeout = std::chrono::milliseconds(0), .stop = nullptr};
+  const auto followed = ReadAll(Path("bags/nav2_turtlebot.mcap"), options);
+  ASSERT_TRUE(followed.ok()) << followed.status();
+  ASSERT_EQ(followed->poses.size(), log->poses.size());
+  for (size_t i = 0; i < log->poses.size(); ++i) {
+    EXPECT_EQ(followed->poses[i].pose.time_ns, log->poses[i].pose.time_ns);
+    EXPECT_EQ(followed->poses[i].pose.map_T_agent.position,
+              log->poses[i].pose.map_T_agent.position);
+  }
 }
 
 TEST_F(RealBags, ImagesOfRos2Decode) {
