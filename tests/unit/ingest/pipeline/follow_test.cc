@@ -33,6 +33,21 @@ class FollowTest : public testing::Test {
     store_ = *OpenStore(absl::StrCat("memory:follow", ++count), {.create = true});
   }
 
+  // A map with two rooms, into which stays can be.
+  void MakeRooms(const std::string& map) {
+    MapSpec spec;
+    spec.name = map;
+    ASSERT_TRUE(store_->CreateMap(spec).ok());
+    GraphDelta world;
+    world.map = map;
+    world.session_id = "by hand";
+    world.sequence = 1;
+    world.nodes = {MakeRoom(1, -1, 0, 5, 9), MakeRoom(2, 5, 0, 20, 9)};
+    const auto writer = *store_->OpenWriter(map);
+    const auto made = writer->Commit(world);
+    ASSERT_TRUE(made.ok()) << made.status();
+  }
+
   // A name that is new is a new map.
   absl::StatusOr<IngestSummary> Ingest(const std::string& map, const std::string& path,
                                        const LogOptions& options, int commit_count_max = -1) {
@@ -59,7 +74,7 @@ class FollowTest : public testing::Test {
     return *MakeSnapshotMapView(*reader->Latest(), reader)->NodesOfLayer(layer);
   }
 
-  // Agents with their poses, as text.
+  // Agents with their poses and stays, as text.
   std::string TracksOf(const std::string& map) {
     const auto latest = *(*store_->OpenMap(map))->Latest();
     std::ostringstream out;
@@ -77,6 +92,11 @@ class FollowTest : public testing::Test {
                                     return true;
                                   })
                       .ok());
+      const std::vector<Stay> stays = *latest->StaysOfAgent(track.agent, kTimeMin, kTimeMax);
+      for (const Stay& stay : stays) {
+        out << "stay " << ToString(stay.room) << " " << stay.enter_ns << " " << stay.exit_ns
+            << "\n";
+      }
     }
     return out.str();
   }
@@ -130,11 +150,14 @@ TEST_F(FollowTest, ATableIsCommittedWhileItGrows) {
 
 TEST_F(FollowTest, ATableThatWasStoppedAnywhereGoesOn) {
   const std::string whole = folder_.Write("whole.csv", kHeader + Rows(0, 30));
+  MakeRooms("whole");
   ASSERT_TRUE(Ingest("whole", whole, {}).ok());
+  EXPECT_NE(TracksOf("whole").find("stay R2"), std::string::npos) << TracksOf("whole");
   for (const int cut : {1, 7, 29}) {
     for (const int commit_count_max : {0, 1, -1}) {
       const std::string map = absl::StrCat("cut", cut, "at", commit_count_max + 1);
       SCOPED_TRACE(map);
+      MakeRooms(map);
       const std::string path = folder_.Write("log.csv", kHeader + Rows(0, cut));
       const auto first = Ingest(map, path, FollowFor(milliseconds(0)), commit_count_max);
       EXPECT_EQ(first.ok(), commit_count_max != 0 && !(commit_count_max == 1 && cut > 1));
