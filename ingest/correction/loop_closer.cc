@@ -10,8 +10,6 @@
 namespace dsg::ingest {
 namespace {
 
-// A solve of so many keyframes is worth a second of the log.
-constexpr size_t kKeyframesPerSecond = 100;
 // Less is no correction, but what is left of rounding.
 constexpr double kNothingM = 1e-6;
 
@@ -59,8 +57,9 @@ bool LoopCloser::Take(const Measurement& measurement) {
 bool LoopCloser::IsDue(TimeNs now_ns) const {
   if (!has_news_) return false;
   if (solved_ns_ == kTimeMin) return true;
-  const auto cost_s = static_cast<TimeNs>(solution_.keyframe_times.size() / kKeyframesPerSecond);
-  return now_ns - solved_ns_ >= std::max(options_.correct_period_ns, cost_s * kNsPerSecond);
+  const auto log_ns = static_cast<double>(now_ns - path_.poses().front().time_ns);
+  const auto share_ns = static_cast<TimeNs>(options_.correct_share * log_ns);
+  return now_ns - solved_ns_ >= std::max(options_.correct_period_ns, share_ns);
 }
 
 absl::Status LoopCloser::Solve(bool is_last) {

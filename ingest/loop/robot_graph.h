@@ -52,8 +52,11 @@ struct RobotGraphOptions {
   double odometry_tilt_rad = 0.0002;
   RobustOptions robust;
   /// While a log runs, the path is solved anew at most so often, in log time, and only after
-  /// another loop closure; with many keyframes more rarely.
+  /// another loop closure...
   TimeNs correct_period_ns = 10 * kNsPerSecond;
+  /// ...and only after so large a share of the log so far: each correction writes the whole track
+  /// and mesh anew, which adds up to 1 / share times their size however long the log is.
+  double correct_share = 0.05;
   /// It is corrected if some keyframe has moved by so much, metres; at the end of the log by any.
   double correct_min_m = 0.05;
 };

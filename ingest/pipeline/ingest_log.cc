@@ -59,7 +59,8 @@ absl::StatusOr<bool> HasLayers(const LogInfo& info, const MappingOptions& option
 
 std::string OdometryText(const RobotGraphOptions& options) {
   return absl::StrCat(options.odometry_m_per_m, " ", options.odometry_rad_per_m, " corrected ",
-                      options.correct_period_ns, " ", options.correct_min_m);
+                      options.correct_period_ns, " ", options.correct_share, " ",
+                      options.correct_min_m);
 }
 
 bool HasLoops(const LogInfo& info) { return info.channel_counts.contains("loops0"); }

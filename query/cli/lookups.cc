@@ -98,10 +98,15 @@ absl::StatusOr<std::string> RegionId(Session* session, const std::string& id_or_
   if (!found.ok() && !absl::IsNotFound(found) && !absl::IsInvalidArgument(found)) return found;
   DSG_ASSIGN_OR_RETURN(const std::string named, OnlyRoom(session, id_or_name, false));
   if (!named.empty()) return named;
-  if (found.ok()) return reply.node().id();
   // Rooms found in images have a class but no name.
   DSG_ASSIGN_OR_RETURN(const std::string room, OnlyRoom(session, id_or_name, true));
-  return room.empty() ? absl::StatusOr<std::string>(found) : room;
+  if (room.empty()) return found.ok() ? absl::StatusOr<std::string>(reply.node().id()) : found;
+  if (!found.ok()) return room;
+  return MakeError(
+      Reason::kFieldInvalid,
+      absl::StrCat("--room: \"", id_or_name, "\" is the name of the ", reply.node().kind(), " ",
+                   reply.node().id(), " and the class of room ", room, "; name one by its id"),
+      {{"field", "--room"}, {"value", id_or_name}});
 }
 
 absl::StatusOr<v1::ListTagsResponse> ReadTags(Session* session) {

@@ -47,7 +47,7 @@ absl::StatusOr<std::string> NodeIdOf(Session* session, const std::string& id_or_
 
 /// The id of a room, place or region by id or name, or of the only room of a class. If a room and
 /// its furniture share a name, the room is meant. Errors: NOT_FOUND/NODE_UNKNOWN; FIELD_INVALID if
-/// several rooms have the name or the class.
+/// several rooms have the name or the class, or something else the name and a room the class.
 absl::StatusOr<std::string> RegionId(Session* session, const std::string& id_or_name);
 
 /// The number of a revision, if the option is set. Errors: NOT_FOUND/TAG_UNKNOWN.

@@ -3,17 +3,20 @@
 """Ingests a simulated log and measures how its map and the program grow with the log.
 
     tests/bench/growth.py [--bin build/release/bin] [--minutes 60] [--world apartment] [--seed 3]
-        [--folder growth-data] [--csv growth.csv] [--png growth.png]
+        [--folder growth-data] [--csv growth.csv] [--png growth.png] [--play 60]
 
 Simulates the log if FOLDER/sim is not there, ingests it into FOLDER/store, and samples every two
 seconds: the log time that the map has reached (its last pose), the bytes of its database, and the
-resident memory of dsg-ingest. Writes the samples as CSV, with --png also as a picture (needs
+resident memory of dsg-ingest. With --play N the log is of --minutes / N minutes, and is read N
+times without a break, every second time backwards: what is seen is as much as in the short log, how
+often it is seen as in a long one. Writes the samples as CSV, with --png also as a picture (needs
 python3-matplotlib). Exits with 1 if the map takes more than --target-mb-s megabytes a second of
 log, and with the status of dsg-ingest if that fails.
 """
 
 import argparse
 import csv
+import json
 import pathlib
 import shutil
 import sqlite3
@@ -22,6 +25,57 @@ import sys
 import time
 
 SAMPLE_S = 2.0
+
+
+def play(log, out, count):
+    """Writes a log that shows `log` `count` times, every second time backwards."""
+    shutil.rmtree(out, ignore_errors=True)
+    for source in sorted((log / "mav0").iterdir()):
+        if source.name == "imu0" or source.name.endswith("_clean"):
+            continue
+        target = out / "mav0" / source.name
+        target.mkdir(parents=True)
+        if (source / "data").is_dir():
+            (target / "data").symlink_to((source / "data").resolve())
+        if (source / "sensor.yaml").exists():
+            shutil.copy(source / "sensor.yaml", target)
+        if (source / "data.csv").exists():
+            head, *rows = (source / "data.csv").read_text().splitlines()
+            played = repeat([(int(row.split(",")[0]), row.split(",", 1)[1]) for row in rows], count,
+                            spans(log))
+            lines = [head] + [f"{stamp},{rest}" for stamp, rest in played]
+            (target / "data.csv").write_text("\n".join(lines) + "\n")
+        else:
+            rows = [json.loads(line) for line in (source / "data.jsonl").read_text().splitlines()]
+            played = repeat([(row["time_ns"], row) for row in rows], count, spans(log))
+            lines = [json.dumps({**row, "time_ns": stamp, "id": number})
+                     for number, (stamp, row) in enumerate(played)]
+            (target / "data.jsonl").write_text("\n".join(lines) + "\n")
+    shutil.copy(log / "labels.csv", out)
+    header = json.loads((log / "log.json").read_text())
+    header.pop("counts", None)
+    (out / "log.json").write_text(json.dumps(header))
+
+
+def spans(log):
+    """First and last stamp of the poses."""
+    rows = (log / "mav0/state_groundtruth_estimate0/data.csv").read_text().splitlines()[1:]
+    return int(rows[0].split(",")[0]), int(rows[-1].split(",")[0])
+
+
+def repeat(rows, count, span):
+    """(stamp, rest) `count` times one after another, turned around every second time."""
+    first, last = span
+    step = 10_000_000
+    rows = [row for row in rows if first <= row[0] <= last]
+    played = []
+    for turn in range(count):
+        begin = first + turn * (last - first + step)
+        if turn % 2 == 0:
+            played += [(begin + stamp - first, rest) for stamp, rest in rows]
+        else:
+            played += [(begin + last - stamp, rest) for stamp, rest in reversed(rows)]
+    return played
 
 
 def folder_bytes(folder):
@@ -93,6 +147,7 @@ def main():
     parser.add_argument("--folder", type=pathlib.Path, default=pathlib.Path("growth-data"))
     parser.add_argument("--csv", type=pathlib.Path, default=pathlib.Path("growth.csv"))
     parser.add_argument("--png", type=pathlib.Path)
+    parser.add_argument("--play", type=int, default=1)
     parser.add_argument("--target-mb-s", type=float, default=0.1)
     options = parser.parse_args()
     if options.png is not None:
@@ -104,9 +159,13 @@ def main():
     options.folder.mkdir(parents=True, exist_ok=True)
     if not simulation.exists():
         subprocess.run([options.bin / "dsg-simulate", "sensors", "--world", options.world, "--seed",
-                        str(options.seed), "--seconds", str(60.0 * options.minutes), "--out",
-                        simulation], check=True)
+                        str(options.seed), "--seconds",
+                        str(60.0 * options.minutes / options.play), "--out", simulation],
+                       check=True)
     log = simulation / "log"
+    if options.play > 1:
+        play(log, options.folder / "played", options.play)
+        log = options.folder / "played"
     print(f"log of {folder_bytes(log) / 1e9:.2f} GB", flush=True)
     store = options.folder / "store"
     shutil.rmtree(store, ignore_errors=True)

@@ -94,6 +94,24 @@ TEST_F(LoopCloserTest, IsInNoHurry) {
   EXPECT_LT(ErrorM(2 * kRound - 1), 0.1);
 }
 
+// Corrections write track and mesh anew: of a long log they are fewer.
+TEST_F(LoopCloserTest, WaitsForAShareOfTheLog) {
+  RobotGraphOptions options;
+  options.correct_share = 0.6;
+  LoopCloser seldom(options, &path_, true);
+  const auto correct = [&] {
+    return seldom.Correct(static_cast<TimeNs>(step_) * kStepNs, false).value_or(TrajectoryChange());
+  };
+  Drive(kRound + 5);
+  seldom.Take(LoopBack(kRound));
+  EXPECT_FALSE(correct().IsIdentity());
+  Drive(2 * kRound);
+  seldom.Take(LoopBack(2 * kRound - 1));
+  EXPECT_TRUE(correct().IsIdentity());
+  Drive(3 * kRound);
+  EXPECT_FALSE(correct().IsIdentity());
+}
+
 TEST_F(LoopCloserTest, ASmallShiftWaitsForTheEnd) {
   RobotGraphOptions options;
   options.correct_min_m = 10.0;

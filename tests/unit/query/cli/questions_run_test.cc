@@ -219,6 +219,10 @@ TEST_F(QuestionsRun, ARoomWithoutANameIsKnownByItsClass) {
   EXPECT_EQ(AskJson({"who", "--room", "bathroom"}), AskJson({"who", "--room", "R3"}));
   // What is no room is no place to be in.
   ExpectRefused(1, "NODE_UNKNOWN", {"who", "--room", "attic"});
+  // The building, or the room? Nobody can know.
+  ASSERT_EQ(Ask({"set", ToString(kBuilding), "--name", "bathroom"}).code, 0);
+  ExpectRefused(2, "is the name of the building", {"who", "--room", "bathroom"});
+  EXPECT_EQ(AskJson({"who", "--room", "R3"})["intervals"].size(), 0u);
 }
 
 TEST_F(QuestionsRun, NothingPickedIsAnAnswer) {
