@@ -78,9 +78,10 @@ bool HasModelOf(const std::vector<CadModel>& catalogue, std::string_view class_n
 }
 
 std::vector<double> FloorsOf(const std::vector<StructurePiece>& structures,
-                             const std::vector<Eigen::Vector3d>& path_map) {
+                             const std::vector<Eigen::Vector3d>& path_map,
+                             const StructureOptions& options) {
   std::vector<double> floors;
-  for (const StructureHeight& height : FloorHeights(structures)) {
+  for (const StructureHeight& height : FloorHeights(structures, options)) {
     if (height.area_m2 < kFloorM2Min) continue;
     const auto is_above = [&height](const Eigen::Vector3d& point_map) {
       return point_map.z() > height.z_m && point_map.z() < height.z_m + kStoreyM;
@@ -95,9 +96,9 @@ std::vector<double> FloorsOf(const std::vector<StructurePiece>& structures,
   return floors;
 }
 
-std::optional<double> CeilingAbove(const std::vector<StructurePiece>& structures,
-                                   double floor_z_m) {
-  for (const StructureHeight& height : CeilingHeights(structures)) {
+std::optional<double> CeilingAbove(const std::vector<StructurePiece>& structures, double floor_z_m,
+                                   const StructureOptions& options) {
+  for (const StructureHeight& height : CeilingHeights(structures, options)) {
     if (height.z_m > floor_z_m + kCeilingM.x() && height.z_m < floor_z_m + kCeilingM.y()) {
       return height.z_m;
     }

@@ -39,10 +39,12 @@ bool HasModelOf(const std::vector<CadModel>& catalogue, std::string_view class_n
 /// Heights of the storeys' floors, ascending, at least 2 m apart: large floor pieces that the
 /// robot was above. Empty when there are none.
 std::vector<double> FloorsOf(const std::vector<StructurePiece>& structures,
-                             const std::vector<Eigen::Vector3d>& path_map);
+                             const std::vector<Eigen::Vector3d>& path_map,
+                             const StructureOptions& options);
 
 /// Height of the largest ceiling between 1.8 and 6 m above a floor.
-std::optional<double> CeilingAbove(const std::vector<StructurePiece>& structures, double floor_z_m);
+std::optional<double> CeilingAbove(const std::vector<StructurePiece>& structures, double floor_z_m,
+                                   const StructureOptions& options);
 
 /// The floor that an object stands on; nullopt when its low side is far from all of them.
 std::optional<double> FloorUnder(const ObjectCluster& object, const std::vector<double>& floors_m);

@@ -20,6 +20,9 @@ absl::Status CheckRange(const char* field, double value, double min, double max)
 absl::Status MappingOptions::Validate() const {
   DSG_RETURN_IF_ERROR(volume.Validate());
   DSG_RETURN_IF_ERROR(segments.Validate());
+  DSG_RETURN_IF_ERROR(ValidateOptions(structures));
+  DSG_RETURN_IF_ERROR(ValidateOptions(rooms));
+  DSG_RETURN_IF_ERROR(ValidateOptions(places));
   DSG_RETURN_IF_ERROR(CheckRange("robot radius", places.robot_radius_m, 0.05, 2.0));
   DSG_RETURN_IF_ERROR(CheckRange("grid cell", grid_cell_m, 0.02, 0.5));
   const auto seconds = [](TimeNs time_ns) {
@@ -36,6 +39,13 @@ std::string MappingOptions::Digest(bool has_labels) const {
     const std::string sha256(model.asset.sha256.begin(), model.asset.sha256.end());
     absl::StrAppend(&shapes_digest, model.class_name, ":", absl::BytesToHexString(sha256), ",");
   }
+  // What differs from the defaults of the stages' options, none of which may change without the
+  // number below.
+  std::string tuning = rooms.split_corridors ? "" : " whole_corridors";
+  for (const std::string& digest :
+       {DigestOptions(structures), DigestOptions(places), DigestOptions(rooms)}) {
+    if (!digest.empty()) absl::StrAppend(&tuning, " ", digest);
+  }
   // Of what the stages make of a log, with the same options.
   constexpr int kStagesVersion = 2;
   return absl::StrCat(
@@ -46,7 +56,7 @@ std::string MappingOptions::Digest(bool has_labels) const {
       " rooms=", static_cast<int>(rooms.method), " upright=", shapes.is_upright,
       " shapes=", shapes_digest, " commit=", commit_period_ns, " mesh_wait=", mesh_wait_max_ns,
       " layers=", layers_period_ns, " cell=", grid_cell_m,
-      has_labels ? "" : " " + segments.Digest());
+      has_labels ? "" : " " + segments.Digest(), tuning);
 }
 
 }  // namespace dsg::ingest

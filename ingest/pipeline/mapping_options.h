@@ -22,6 +22,8 @@ struct MappingOptions {
   VolumeOptions volume;
   DepthOptions depth;
   PlaceOptions places;
+  /// Walls, floors, ceilings and pillars.
+  StructureOptions structures;
   RoomOptions rooms;
   /// Of logs without labels.
   SegmentOptions segments;

@@ -41,6 +41,9 @@ StaticLayers::StaticLayers(const MappingOptions& options, std::vector<SemanticLa
       maker_(numbering, NamesOf(labels_), options_.catalogue),
       volume_(options.volume),
       object_classes_(ObjectClasses(labels_, classes_, options_.depth.dynamic_classes)),
+      place_tracker_(options.places.same_m),
+      structure_tracker_(options.structures),
+      room_tracker_(options.rooms.same_place_m),
       is_asset_told_(options_.catalogue.size(), false) {}
 
 absl::Status StaticLayers::Integrate(const DepthFrame& frame) {
@@ -157,11 +160,11 @@ LayerGraph StaticLayers::Update(TimeNs now_ns, bool is_last) {
   const std::vector<const MeshBlock*> mesh = Mesh();
   {
     const StageClock::Span span(&clock_, "structures");
-    parts.structures = FindStructures(mesh, classes_);
+    parts.structures = FindStructures(mesh, classes_, options_.structures);
     structure_tracker_.Track(&parts.structures);
   }
   const std::vector<Eigen::Vector3d> path_map = SeenFrom();
-  floors_m_ = FloorsOf(parts.structures, path_map);
+  floors_m_ = FloorsOf(parts.structures, path_map, options_.structures);
   FindObjects(now_ns, mesh);
   FitShapes(floors_m_, is_last);
   // The last one is not needed beside the new one.
@@ -203,9 +206,9 @@ DistanceField StaticLayers::FindDistances(const std::vector<const MeshBlock*>& m
 std::function<bool(const Eigen::Vector3d&, const Eigen::Vector3d&)> StaticLayers::Sight() const {
   if (field_ == nullptr) return {};
   const bool is_on_floor = options_.places.mode == PlaceMode::kGround;
-  return [field = field_, is_on_floor](const Eigen::Vector3d& point_map,
-                                       const Eigen::Vector3d& place_map) {
-    return IsPlaceInSight(place_map, is_on_floor, *field, point_map);
+  return [field = field_, is_on_floor, places = options_.places](const Eigen::Vector3d& point_map,
+                                                                 const Eigen::Vector3d& place_map) {
+    return IsPlaceInSight(place_map, is_on_floor, *field, point_map, places);
   };
 }
 
@@ -336,11 +339,11 @@ std::vector<Asset> StaticLayers::TakeAssets() { return std::exchange(assets_, {}
 void StaticLayers::FindPlacesOfObjects(const DistanceField& field, LayerParts* parts) const {
   for (const TrackedObject& object : parts->objects) {
     parts->place_of_object.push_back(
-        NearestPlaceInSight(parts->places, field, object.cluster.center_map));
+        NearestPlaceInSight(parts->places, field, object.cluster.center_map, options_.places));
   }
   for (const GoneObject& gone : parts->gone) {
     parts->place_of_object.push_back(
-        NearestPlaceInSight(parts->places, field, gone.object.cluster.center_map));
+        NearestPlaceInSight(parts->places, field, gone.object.cluster.center_map, options_.places));
   }
 }
 
@@ -352,7 +355,8 @@ std::vector<Storey> StaticLayers::FindStoreys(const LayerParts& parts) const {
   std::vector<Storey> storeys;
   for (auto& [floor_z_m, storey] : by_floor) {
     storey.floor_z_m = floor_z_m;
-    const std::optional<double> ceiling = CeilingAbove(parts.structures, floor_z_m);
+    const std::optional<double> ceiling =
+        CeilingAbove(parts.structures, floor_z_m, options_.structures);
     storey.has_ceiling = ceiling.has_value();
     storey.ceiling_z_m = ceiling.value_or(floor_z_m + kCeilingGuessM);
     storeys.push_back(std::move(storey));
@@ -395,7 +399,7 @@ void StaticLayers::FindRoomsOf(const DistanceField& field, LayerParts* parts) {
 void StaticLayers::RelateStructures(LayerParts* parts) const {
   std::vector<FoundRoom> rooms;
   for (const RoomPart& part : parts->rooms) rooms.push_back(part.room);
-  parts->encloses = EnclosesOf(parts->structures, rooms);
+  parts->encloses = EnclosesOf(parts->structures, rooms, options_.structures);
   std::set<int64_t> resting;
   for (const ObjectRelation& relation : parts->relations) {
     if (relation.relation == relations::kOn) resting.insert(relation.first);
@@ -408,7 +412,7 @@ void StaticLayers::RelateStructures(LayerParts* parts) const {
         TransformBox(cluster.map_T_box, Box3d(-0.5 * cluster.size, 0.5 * cluster.size));
     const std::optional<int> piece =
         AttachedTo(box, parts->places.places[place].floor_z_m,
-                   resting.contains(parts->objects[i].id), parts->structures);
+                   resting.contains(parts->objects[i].id), parts->structures, options_.structures);
     if (piece.has_value()) parts->attached.push_back({static_cast<int>(i), *piece});
   }
 }

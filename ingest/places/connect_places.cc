@@ -45,7 +45,8 @@ class Parts {
 // Cheapest way from any spot of a part to a spot of another one.
 class Search {
  public:
-  Search(const Roadmap& roadmap, Parts* parts) : roadmap_(roadmap), parts_(*parts) {}
+  Search(const Roadmap& roadmap, double narrow_weight, Parts* parts)
+      : roadmap_(roadmap), narrow_weight_(narrow_weight), parts_(*parts) {}
 
   /// Cells from start to goal; empty when there is no way.
   std::vector<int64_t> Run(const std::vector<int>& part) {
@@ -82,7 +83,8 @@ class Search {
       if (!CanStep(space, at, offset)) continue;
       const int64_t next = space.frame().Index(at + offset);
       // The middle of a door is better than its edge.
-      const double narrow = space.robot_radius_m() / (space.ClearanceM(next) + 0.01);
+      const double narrow =
+          narrow_weight_ * space.robot_radius_m() / (space.ClearanceM(next) + 0.01);
       Reach(next, cell, cost + offset.cast<double>().norm() * (1.0 + narrow));
     }
   }
@@ -95,6 +97,7 @@ class Search {
   }
 
   const Roadmap& roadmap_;
+  const double narrow_weight_;
   Parts& parts_;
   // Looked up only, never listed: its order does not matter.
   std::unordered_map<int64_t, Reached> reached_;
@@ -104,14 +107,14 @@ class Search {
 
 }  // namespace
 
-void ConnectParts(Roadmap* roadmap) {
+void ConnectParts(const PlaceOptions& options, Roadmap* roadmap) {
   Parts parts(*roadmap);
   const std::vector<std::vector<int>> list = parts.List();
   for (size_t i = 0; i + 1 < list.size(); ++i) {
-    const std::vector<int64_t> way = Search(*roadmap, &parts).Run(list[i]);
+    const std::vector<int64_t> way = Search(*roadmap, options.narrow_weight, &parts).Run(list[i]);
     if (way.empty()) continue;
     const int known = roadmap->spot_count();
-    AddWay(Straighten(roadmap->space(), way), roadmap);
+    AddWay(Straighten(roadmap->space(), way, options), options, roadmap);
     parts.Grow(roadmap->spot_count());
     parts.Join(roadmap->SpotAt(way.front()), roadmap->SpotAt(way.back()));
     for (int spot = known; spot < roadmap->spot_count(); ++spot) {

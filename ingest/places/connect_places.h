@@ -3,12 +3,13 @@
 // Refuses to leave free space: what no robot can reach stays apart.
 #pragma once
 
+#include "ingest/places/place_options.h"
 #include "ingest/places/roadmap.h"
 
 namespace dsg::ingest {
 
 /// Smaller parts first, each by the cheapest way over open cells to a place of another one, with
 /// a place wherever the way bends.
-void ConnectParts(Roadmap* roadmap);
+void ConnectParts(const PlaceOptions& options, Roadmap* roadmap);
 
 }  // namespace dsg::ingest

@@ -8,12 +8,6 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kPathReachM = 2.0;
-// Where furniture makes ways wind, places must be close to each other to be no detour; measured on
-// apartments of the simulator.
-constexpr double kReachNearM = 0.6;
-constexpr double kReachRise = 0.3;
-
 // How densely to look, and how far a place covers.
 struct Pass {
   double step_m = 0.0;
@@ -136,25 +130,30 @@ void RunPass(const Pass& pass, Roadmap* roadmap) {
 
 }  // namespace
 
-void CoverPath(const std::vector<Eigen::Vector3d>& path_map, Roadmap* roadmap) {
+void CoverPath(const std::vector<Eigen::Vector3d>& path_map, const PlaceOptions& options,
+               Roadmap* roadmap) {
   const GridFrame& frame = roadmap->space().frame();
   for (const Eigen::Vector3d& point_map : path_map) {
     Eigen::Vector3i cell = frame.CellOf(point_map);
     if (roadmap->space().IsFlat()) cell.z() = 0;
     if (!frame.Holds(cell) || !roadmap->space().IsOpen(frame.Index(cell))) continue;
-    if (!roadmap->IsNearInSight(frame.Index(cell), kPathReachM)) roadmap->Add(frame.Index(cell));
+    if (roadmap->IsNearInSight(frame.Index(cell), options.path_reach_m)) continue;
+    roadmap->Add(frame.Index(cell));
   }
 }
 
-void CoverSpace(Roadmap* roadmap) {
+void CoverSpace(const PlaceOptions& options, Roadmap* roadmap) {
   const OpenSpace& space = roadmap->space();
   const double radius_m = space.robot_radius_m();
+  const double step_m = space.IsFlat() ? options.step_m : options.volume_step_m;
+  Pass pass{step_m, options.volume_reach_m, options.volume_reach_m, 0.0, radius_m};
   if (space.IsFlat()) {
-    RunPass({0.2, 1.5, kReachNearM, kReachRise, radius_m}, roadmap);
-  } else {
-    RunPass({0.4, 2.0, 2.0, 0.0, radius_m}, roadmap);
+    pass = {step_m, options.reach_m, options.near_reach_m, options.reach_rise, radius_m};
   }
-  RunPass({space.IsFlat() ? 0.2 : 0.4, 2.5, 2.5, 0.0, radius_m - space.frame().cell_m}, roadmap);
+  RunPass(pass, roadmap);
+  RunPass({step_m, options.corner_reach_m, options.corner_reach_m, 0.0,
+           radius_m - space.frame().cell_m},
+          roadmap);
 }
 
 }  // namespace dsg::ingest

@@ -19,11 +19,6 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kPathHeightM = 2.5;
-// A body whose height varies less than this stands on wheels.
-constexpr double kWheelsM = 0.1;
-constexpr double kWheelsShare = 0.95;
-
 using Path = std::vector<Eigen::Vector3d>;
 
 bool IsSane(const PlaceOptions& options) {
@@ -45,11 +40,12 @@ struct FloorPath {
   bool is_driven = false;
 };
 
-FloorPath OnFloor(const Path& path_map, double floor_z_m) {
+FloorPath OnFloor(const Path& path_map, double floor_z_m, const PlaceOptions& options) {
   FloorPath path;
   std::vector<double> heights;
   for (const Eigen::Vector3d& point : path_map) {
-    if (point.z() < floor_z_m - 0.3 || point.z() > floor_z_m + kPathHeightM) continue;
+    if (point.z() < floor_z_m - options.below_floor_m) continue;
+    if (point.z() > floor_z_m + options.path_height_m) continue;
     path.points.push_back(point);
     heights.push_back(point.z());
   }
@@ -57,25 +53,25 @@ FloorPath OnFloor(const Path& path_map, double floor_z_m) {
   std::sort(heights.begin(), heights.end());
   const double middle = heights[heights.size() / 2];
   const auto level_count = std::count_if(heights.begin(), heights.end(), [&](double height) {
-    return std::abs(height - middle) <= kWheelsM;
+    return std::abs(height - middle) <= options.wheels_m;
   });
-  path.is_driven =
-      static_cast<double>(level_count) >= kWheelsShare * static_cast<double>(heights.size());
+  path.is_driven = static_cast<double>(level_count) >=
+                   options.wheels_share * static_cast<double>(heights.size());
   return path;
 }
 
-void Draw(const Path& path_map, Roadmap* roadmap) {
-  AddVoronoiPlaces(roadmap);
-  CoverPath(path_map, roadmap);
-  CoverSpace(roadmap);
-  LinkNeighbours(roadmap);
+void Draw(const Path& path_map, const PlaceOptions& options, Roadmap* roadmap) {
+  AddVoronoiPlaces(options, roadmap);
+  CoverPath(path_map, options, roadmap);
+  CoverSpace(options, roadmap);
+  LinkNeighbours(options, roadmap);
   // In the air there is a way around on every side.
-  if (roadmap->space().IsFlat()) AddShortcuts(roadmap);
-  ConnectParts(roadmap);
+  if (roadmap->space().IsFlat()) AddShortcuts(options, roadmap);
+  ConnectParts(options, roadmap);
 }
 
 // Places in the order of their cells. Links are measured again: what is stored is proven.
-PlaceGraph Tell(const Roadmap& roadmap, const OccupancyGrid& seen) {
+PlaceGraph Tell(const Roadmap& roadmap, const OccupancyGrid& seen, const PlaceOptions& options) {
   const OpenSpace& space = roadmap.space();
   std::vector<int> order(roadmap.cells().size());
   std::iota(order.begin(), order.end(), 0);
@@ -88,8 +84,8 @@ PlaceGraph Tell(const Roadmap& roadmap, const OccupancyGrid& seen) {
     Place place;
     place.position_map = roadmap.position_map(spot);
     place.clearance_m = space.ClearanceM(roadmap.cell(spot));
-    place.basis_point_count = CountBasisPoints(space, roadmap.cell(spot));
-    place.free_box = GrowFreeBox(seen, space.frame().Cell(roadmap.cell(spot)));
+    place.basis_point_count = CountBasisPoints(space, roadmap.cell(spot), options);
+    place.free_box = GrowFreeBox(seen, space.frame().Cell(roadmap.cell(spot)), options.free_box_m);
     place.free_box.translate(-place.position_map);
     graph.places.push_back(place);
   }
@@ -108,15 +104,15 @@ PlaceGraph Tell(const Roadmap& roadmap, const OccupancyGrid& seen) {
 }
 
 PlaceGraph ExtractFrom(OccupancyGrid seen, const Path& path_map, bool is_path_free,
-                       double robot_radius_m) {
-  if (is_path_free) StampPath(path_map, &seen);
+                       const PlaceOptions& options) {
+  if (is_path_free) StampPath(path_map, options.footprint_m, &seen);
   KeepReached(path_map, &seen);
   OccupancyGrid sure = seen;
   ShrinkFromUnknown(&sure);
-  const OpenSpace space(std::move(sure), robot_radius_m);
+  const OpenSpace space(std::move(sure), options.robot_radius_m);
   Roadmap roadmap(&space);
-  Draw(path_map, &roadmap);
-  return Tell(ThinOut(roadmap), seen);
+  Draw(path_map, options, &roadmap);
+  return Tell(ThinOut(roadmap, options), seen, options);
 }
 
 void Append(const PlaceGraph& more, PlaceGraph* graph) {
@@ -129,11 +125,10 @@ void Append(const PlaceGraph& more, PlaceGraph* graph) {
 
 PlaceGraph ExtractOnFloor(const OccupancyGrid& grid, const Path& path_map, double floor_z_m,
                           const PlaceOptions& options) {
-  const FloorPath path = OnFloor(path_map, floor_z_m);
+  const FloorPath path = OnFloor(path_map, floor_z_m, options);
   OccupancyGrid flat = ProjectToFloor(grid, floor_z_m, options);
   if (flat.cells.empty()) return {};
-  PlaceGraph graph =
-      ExtractFrom(std::move(flat), path.points, path.is_driven, options.robot_radius_m);
+  PlaceGraph graph = ExtractFrom(std::move(flat), path.points, path.is_driven, options);
   for (Place& place : graph.places) {
     place.position_map.z() = floor_z_m;
     place.floor_z_m = floor_z_m;
@@ -160,9 +155,9 @@ PlaceGraph ExtractPlaces(const OccupancyGrid& grid, const std::vector<Eigen::Vec
   if (!IsSound(grid) || !IsSane(options)) return {};
   const Path path = FinitePoints(path_map);
   const std::vector<double> floors_m =
-      options.floors_m.empty() ? FindFloors(grid, path) : options.floors_m;
+      options.floors_m.empty() ? FindFloors(grid, path, options) : options.floors_m;
   if (options.mode == PlaceMode::kVolume) {
-    PlaceGraph graph = ExtractFrom(grid, path, true, options.robot_radius_m);
+    PlaceGraph graph = ExtractFrom(grid, path, true, options);
     for (Place& place : graph.places) {
       place.floor_z_m = FloorBelow(floors_m, place.position_map.z());
     }

@@ -7,38 +7,22 @@
 
 #include "ingest/grid/distance_field.h"
 #include "ingest/places/place_graph.h"
+#include "ingest/places/place_options.h"
 
 namespace dsg::ingest {
 
-enum class PlaceMode {
-  /// For robots on wheels and for people: obstacles are those within the height of a body, and
-  /// places lie on the floor.
-  kGround,
-  /// For things that fly: the whole volume.
-  kVolume,
-};
-
-struct PlaceOptions {
-  PlaceMode mode = PlaceMode::kGround;
-  double robot_radius_m = 0.25;
-  /// Heights above the floor between which a body is.
-  double body_z_min_m = 0.1;
-  double body_z_max_m = 1.8;
-  /// Heights of the floors, ascending; empty = found from the grid.
-  std::vector<double> floors_m;
-};
-
 /// What `grid` looks like to a body that stands on the floor at `floor_z_m`: one cell high,
 /// occupied where any cell of the body's height is or where one sees down past the floor, free
-/// where half of the column, and half of its lower half, was seen to be, and nothing like a thin
+/// where enough of the column, and of its lower half, was seen to be, and nothing like a thin
 /// board in between was missed. Empty for a grid whose numbers do not agree.
 OccupancyGrid ProjectToFloor(const OccupancyGrid& grid, double floor_z_m,
                              const PlaceOptions& options);
 
-/// Heights of floors in a grid, ascending: levels at least 2 m apart with free space above
+/// Heights of floors in a grid, ascending: levels a storey apart with free space above
 /// something flat, to within a cell. `path` is where the robot's body has been; floors that it
 /// never was on are left out, if it was on any.
-std::vector<double> FindFloors(const OccupancyGrid& grid, const std::vector<Eigen::Vector3d>& path);
+std::vector<double> FindFloors(const OccupancyGrid& grid, const std::vector<Eigen::Vector3d>& path,
+                               const PlaceOptions& options);
 
 /// Places without ids. `path_map`: where the robot has been; that is free by construction.
 /// Every link is proven: all cells that it passes were seen to be free, and the middles of all

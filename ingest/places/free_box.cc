@@ -6,8 +6,6 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kReachM = 5.0;
-
 struct CellBox {
   Eigen::Vector3i low;
   Eigen::Vector3i high;
@@ -39,11 +37,11 @@ bool Grow(const OccupancyGrid& grid, int side, CellBox* box) {
 
 }  // namespace
 
-Box3d GrowFreeBox(const OccupancyGrid& grid, const Eigen::Vector3i& cell) {
+Box3d GrowFreeBox(const OccupancyGrid& grid, const Eigen::Vector3i& cell, double reach_m) {
   if (grid.At(cell) != Occupancy::kFree) return {};
   CellBox box{cell, cell};
   std::array<bool, 6> can_grow = {true, true, true, true, true, true};
-  const int reach = static_cast<int>(kReachM / grid.frame.cell_m);
+  const int reach = static_cast<int>(reach_m / grid.frame.cell_m);
   for (int round = 0; round < reach; ++round) {
     for (int side = 0; side < 6; ++side) {
       bool& can = can_grow[static_cast<size_t>(side)];

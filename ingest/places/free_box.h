@@ -8,8 +8,8 @@
 
 namespace dsg::ingest {
 
-/// A large box of free cells around `cell`, in the map, grown side by side in turn, at most 5 m
-/// to each. Empty when the cell itself is not free.
-Box3d GrowFreeBox(const OccupancyGrid& grid, const Eigen::Vector3i& cell);
+/// A large box of free cells around `cell`, in the map, grown side by side in turn, at most
+/// `reach_m` to each. Empty when the cell itself is not free.
+Box3d GrowFreeBox(const OccupancyGrid& grid, const Eigen::Vector3i& cell, double reach_m);
 
 }  // namespace dsg::ingest

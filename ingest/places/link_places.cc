@@ -4,20 +4,15 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kPlaceLinkM = 3.5;
-// Links of one place are at least 40 degrees apart.
-constexpr double kApartCosine = 0.866;
-constexpr size_t kLinksPerPlace = 12;
-
-void LinkAround(int spot, Roadmap* roadmap) {
+void LinkAround(int spot, const PlaceOptions& options, Roadmap* roadmap) {
   const Eigen::Vector3d at = roadmap->position_map(spot);
   std::vector<Eigen::Vector3d> directions;
-  for (const auto& [distance_m, other] : roadmap->Near(at, kPlaceLinkM)) {
-    if (other == spot || directions.size() >= kLinksPerPlace) continue;
+  for (const auto& [distance_m, other] : roadmap->Near(at, options.link_m)) {
+    if (other == spot || static_cast<double>(directions.size()) >= options.link_count_max) continue;
     const Eigen::Vector3d direction = (roadmap->position_map(other) - at) / distance_m;
     bool is_taken = false;
     for (const Eigen::Vector3d& taken : directions) {
-      is_taken = is_taken || taken.dot(direction) > kApartCosine;
+      is_taken = is_taken || taken.dot(direction) > options.link_apart_cosine;
     }
     if (!is_taken && roadmap->Link(spot, other)) directions.push_back(direction);
   }
@@ -25,8 +20,8 @@ void LinkAround(int spot, Roadmap* roadmap) {
 
 }  // namespace
 
-void LinkNeighbours(Roadmap* roadmap) {
-  for (int spot = 0; spot < roadmap->spot_count(); ++spot) LinkAround(spot, roadmap);
+void LinkNeighbours(const PlaceOptions& options, Roadmap* roadmap) {
+  for (int spot = 0; spot < roadmap->spot_count(); ++spot) LinkAround(spot, options, roadmap);
 }
 
 }  // namespace dsg::ingest

@@ -3,6 +3,7 @@
 // Refuses long links where a shorter one leads the same way.
 #pragma once
 
+#include "ingest/places/place_options.h"
 #include "ingest/places/roadmap.h"
 
 namespace dsg::ingest {
@@ -11,6 +12,6 @@ namespace dsg::ingest {
 /// longer than straight ones.
 ///
 /// Source: Yao, 1982 (graphs of the nearest neighbour per cone).
-void LinkNeighbours(Roadmap* roadmap);
+void LinkNeighbours(const PlaceOptions& options, Roadmap* roadmap);
 
 }  // namespace dsg::ingest

@@ -8,15 +8,6 @@
 namespace dsg::ingest {
 namespace {
 
-// Of nine.
-constexpr int kBoardColumns = 6;
-// So far one must see down through a floor to take it for a hole.
-constexpr double kHoleDepthM = 0.4;
-
-// A layer of which more than this share is below a height is below it: the noise of a floor must
-// not stand in the way.
-constexpr double kLayerCut = 0.3;
-
 // Layers of a grid, the end not included.
 struct Band {
   int begin = 0;
@@ -24,15 +15,16 @@ struct Band {
   int count() const { return end - begin; }
 };
 
-// Layers that begin at one height and whose middle is below the other.
-Band BandBetween(const GridFrame& frame, double low_z_m, double high_z_m) {
+// Layers that begin at one height, give or take `cut` of a layer, and whose middle is below the
+// other.
+Band BandBetween(const GridFrame& frame, double low_z_m, double high_z_m, double cut) {
   if (!std::isfinite(low_z_m) || !std::isfinite(high_z_m)) return {};
   const auto layer = [&](double z_m, double share) {
     const double at = (z_m - frame.origin_map.z()) / frame.cell_m - share;
     const double top = frame.size.z();
     return static_cast<int>(std::ceil(std::clamp(at - 1e-6, 0.0, top)));
   };
-  const Band band{layer(low_z_m, kLayerCut), layer(high_z_m, 0.5)};
+  const Band band{layer(low_z_m, cut), layer(high_z_m, 0.5)};
   return band.count() > 0 ? band : Band{};
 }
 
@@ -59,20 +51,23 @@ struct Column {
   }
 };
 
-// Half of the body's height must have been seen, and half of its lower half: over the back of a
-// sofa one sees the upper half of what stands behind it.
-Occupancy Judge(const Column& column, int height, int low_height) {
+// A share of the body's height must have been seen, and of its lower half: over the back of a sofa
+// one sees the upper half of what stands behind it.
+Occupancy Judge(const Column& column, int height, int low_height, double share) {
   if (column.is_occupied) return Occupancy::kOccupied;
-  const bool is_free = 2 * column.free_count >= height && 2 * column.low_free_count >= low_height;
+  const bool is_free =
+      column.free_count >= share * height && column.low_free_count >= share * low_height;
   return is_free ? Occupancy::kFree : Occupancy::kUnknown;
 }
 
 // Where one sees down past the floor there is none: a stairwell. `flat` is as wide as `grid`.
-void BlockHoles(const OccupancyGrid& grid, double floor_z_m, OccupancyGrid* flat) {
+void BlockHoles(const OccupancyGrid& grid, double floor_z_m, const PlaceOptions& options,
+                OccupancyGrid* flat) {
   const GridFrame& frame = grid.frame;
   const double top_z_m = floor_z_m + frame.cell_m;
-  const Band band = BandBetween(frame, floor_z_m - kHoleDepthM, top_z_m);
-  const int wanted = static_cast<int>(std::lround(kHoleDepthM / frame.cell_m));
+  const Band band =
+      BandBetween(frame, floor_z_m - options.hole_depth_m, top_z_m, options.layer_cut);
+  const int wanted = static_cast<int>(std::lround(options.hole_depth_m / frame.cell_m));
   const int64_t layer = flat->frame.CellCount();
   for (int64_t i = 0; i < layer; ++i) {
     int free_count = 0;
@@ -89,7 +84,7 @@ void BlockHoles(const OccupancyGrid& grid, double floor_z_m, OccupancyGrid* flat
 
 // A thin board that was seen from above and from below leaves nothing but a gap between free
 // cells. Where most columns around have one, it is no chance.
-void HideBoards(const std::vector<Column>& columns, OccupancyGrid* flat) {
+void HideBoards(const std::vector<Column>& columns, double column_count, OccupancyGrid* flat) {
   const GridFrame& frame = flat->frame;
   for (int64_t i = 0; i < frame.CellCount(); ++i) {
     if (!columns[i].has_gap || flat->cells[i] != Occupancy::kFree) continue;
@@ -101,7 +96,7 @@ void HideBoards(const std::vector<Column>& columns, OccupancyGrid* flat) {
       const Column& column = columns[frame.Index(next)];
       count += column.has_gap || column.is_occupied ? 1 : 0;
     }
-    if (count >= kBoardColumns) flat->cells[i] = Occupancy::kUnknown;
+    if (count >= column_count) flat->cells[i] = Occupancy::kUnknown;
   }
 }
 
@@ -123,8 +118,8 @@ OccupancyGrid ProjectToFloor(const OccupancyGrid& grid, double floor_z_m,
   out.frame = FlatFrame(grid.frame, floor_z_m);
   const int64_t layer = out.frame.CellCount();
   out.cells.assign(layer, Occupancy::kUnknown);
-  const Band band =
-      BandBetween(grid.frame, floor_z_m + options.body_z_min_m, floor_z_m + options.body_z_max_m);
+  const Band band = BandBetween(grid.frame, floor_z_m + options.body_z_min_m,
+                                floor_z_m + options.body_z_max_m, options.layer_cut);
   if (band.count() == 0) return out;
   const int low_height = (band.count() + 1) / 2;
   std::vector<Column> columns(layer);
@@ -136,10 +131,10 @@ OccupancyGrid ProjectToFloor(const OccupancyGrid& grid, double floor_z_m,
     }
   }
   for (int64_t i = 0; i < layer; ++i) {
-    out.cells[i] = Judge(columns[i], band.count(), low_height);
+    out.cells[i] = Judge(columns[i], band.count(), low_height, options.body_seen_share);
   }
-  HideBoards(columns, &out);
-  BlockHoles(grid, floor_z_m, &out);
+  HideBoards(columns, options.board_column_count, &out);
+  BlockHoles(grid, floor_z_m, options, &out);
   return out;
 }
 

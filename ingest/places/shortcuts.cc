@@ -13,7 +13,6 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kDetour = 1.1;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // The nearest place of every cell, on foot.
@@ -148,7 +147,7 @@ double LengthOf(const std::vector<int64_t>& bends, const OpenSpace& space) {
 
 }  // namespace
 
-void AddShortcuts(Roadmap* roadmap) {
+void AddShortcuts(const PlaceOptions& options, Roadmap* roadmap) {
   const OpenSpace& space = roadmap->space();
   const Regions regions(*roadmap);
   std::vector<std::pair<std::pair<int, int>, Regions::Meeting>> meetings;
@@ -159,10 +158,10 @@ void AddShortcuts(Roadmap* roadmap) {
   Network network(*roadmap);
   for (const auto& [pair, meeting] : meetings) {
     if (roadmap->IsLinked(pair.first, pair.second)) continue;
-    const std::vector<int64_t> bends = Straighten(space, regions.WayThrough(meeting));
+    const std::vector<int64_t> bends = Straighten(space, regions.WayThrough(meeting), options);
     const double length_m = LengthOf(bends, space);
-    if (network.HasWay(pair.first, pair.second, kDetour * length_m)) continue;
-    for (const auto& [a, b] : AddWay(bends, roadmap)) network.Add(a, b);
+    if (network.HasWay(pair.first, pair.second, options.detour * length_m)) continue;
+    for (const auto& [a, b] : AddWay(bends, options, roadmap)) network.Add(a, b);
   }
 }
 

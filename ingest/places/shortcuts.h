@@ -3,6 +3,7 @@
 // Refuses links where the roadmap is almost as short.
 #pragma once
 
+#include "ingest/places/place_options.h"
 #include "ingest/places/roadmap.h"
 
 namespace dsg::ingest {
@@ -11,6 +12,6 @@ namespace dsg::ingest {
 /// which the roadmap makes a detour get the way between them, the shortest pairs first.
 ///
 /// Requires: a flat space. Cost: n log n in its cells.
-void AddShortcuts(Roadmap* roadmap);
+void AddShortcuts(const PlaceOptions& options, Roadmap* roadmap);
 
 }  // namespace dsg::ingest

@@ -10,8 +10,6 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kFootprintM = 0.3;
-
 // Cells of a path, each once, ascending.
 std::set<int64_t> CellsOf(const std::vector<Eigen::Vector3d>& path_map, const GridFrame& frame) {
   std::set<int64_t> cells;
@@ -23,8 +21,8 @@ std::set<int64_t> CellsOf(const std::vector<Eigen::Vector3d>& path_map, const Gr
   return cells;
 }
 
-std::vector<Eigen::Vector3i> Footprint(const GridFrame& frame) {
-  const int reach = static_cast<int>(kFootprintM / frame.cell_m + 1e-9);
+std::vector<Eigen::Vector3i> Footprint(const GridFrame& frame, double radius_m) {
+  const int reach = static_cast<int>(radius_m / frame.cell_m + 1e-9);
   const int up = frame.size.z() == 1 ? 0 : reach;
   std::vector<Eigen::Vector3i> offsets;
   for (int z = -up; z <= up; ++z) {
@@ -32,7 +30,7 @@ std::vector<Eigen::Vector3i> Footprint(const GridFrame& frame) {
       for (int x = -reach; x <= reach; ++x) {
         const Eigen::Vector3i offset(x, y, z);
         const double distance_m = frame.cell_m * offset.cast<double>().norm();
-        if (distance_m <= kFootprintM + 1e-9) offsets.push_back(offset);
+        if (distance_m <= radius_m + 1e-9) offsets.push_back(offset);
       }
     }
   }
@@ -74,9 +72,10 @@ bool IsSound(const OccupancyGrid& grid) {
          static_cast<int64_t>(grid.cells.size()) == frame.CellCount();
 }
 
-void StampPath(const std::vector<Eigen::Vector3d>& path_map, OccupancyGrid* grid) {
+void StampPath(const std::vector<Eigen::Vector3d>& path_map, double footprint_m,
+               OccupancyGrid* grid) {
   const GridFrame& frame = grid->frame;
-  const std::vector<Eigen::Vector3i> footprint = Footprint(frame);
+  const std::vector<Eigen::Vector3i> footprint = Footprint(frame, footprint_m);
   std::set<int64_t> freed;
   for (const int64_t index : CellsOf(path_map, frame)) {
     const Eigen::Vector3i at = frame.Cell(index);

@@ -12,9 +12,10 @@ namespace dsg::ingest {
 /// The sizes, numbers and cells of a grid agree, and it can be measured.
 bool IsSound(const OccupancyGrid& grid);
 
-/// Frees a footprint of 0.3 m around each point. Where more than a third of the footprint is
+/// Frees what is within `footprint_m` of each point. Where more than a third of the footprint is
 /// occupied the map and the path disagree, and the map is believed.
-void StampPath(const std::vector<Eigen::Vector3d>& path_map, OccupancyGrid* grid);
+void StampPath(const std::vector<Eigen::Vector3d>& path_map, double footprint_m,
+               OccupancyGrid* grid);
 
 /// Free cells that no way over free cells joins to the path become unknown. Without a free cell
 /// on the path nothing changes.

@@ -7,8 +7,6 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kSuccessorM = 0.45;
-
 using Neighbours = std::vector<std::set<int>>;
 
 Neighbours NeighboursOf(const Roadmap& roadmap) {
@@ -21,8 +19,8 @@ Neighbours NeighboursOf(const Roadmap& roadmap) {
 }
 
 // The nearest neighbour from which one gets to all the others; -1 = none.
-int Successor(const Roadmap& roadmap, int spot, const std::set<int>& neighbours) {
-  for (const auto& [distance_m, other] : roadmap.Near(roadmap.position_map(spot), kSuccessorM)) {
+int Successor(const Roadmap& roadmap, double heir_m, int spot, const std::set<int>& neighbours) {
+  for (const auto& [distance_m, other] : roadmap.Near(roadmap.position_map(spot), heir_m)) {
     if (neighbours.count(other) == 0) continue;
     const bool can_serve =
         std::all_of(neighbours.begin(), neighbours.end(), [&, heir = other](int neighbour) {
@@ -47,7 +45,7 @@ void Bequeath(int spot, int heir, Neighbours* next) {
 
 }  // namespace
 
-Roadmap ThinOut(const Roadmap& roadmap) {
+Roadmap ThinOut(const Roadmap& roadmap, const PlaceOptions& options) {
   const OpenSpace& space = roadmap.space();
   std::vector<int> order(static_cast<size_t>(roadmap.spot_count()));
   std::iota(order.begin(), order.end(), 0);
@@ -57,7 +55,7 @@ Roadmap ThinOut(const Roadmap& roadmap) {
   Neighbours next = NeighboursOf(roadmap);
   std::vector<bool> is_gone(order.size(), false);
   for (const int spot : order) {
-    const int heir = Successor(roadmap, spot, next[static_cast<size_t>(spot)]);
+    const int heir = Successor(roadmap, options.heir_m, spot, next[static_cast<size_t>(spot)]);
     if (heir < 0) continue;
     Bequeath(spot, heir, &next);
     is_gone[static_cast<size_t>(spot)] = true;

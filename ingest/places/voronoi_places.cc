@@ -12,24 +12,20 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kBlockM = 1.5;
-constexpr double kMergeM = 0.7;
-// Two obstacles are two when they are seen at least this angle apart: 60 degrees.
-constexpr double kBasisCosine = 0.5;
-
 // Whether two obstacle cells, as seen from a cell, are different ones.
-bool AreApart(const OpenSpace& space, const Eigen::Vector3i& cell, int64_t a, int64_t b) {
+bool AreApart(const OpenSpace& space, const PlaceOptions& options, const Eigen::Vector3i& cell,
+              int64_t a, int64_t b) {
   if (a == b || a < 0 || b < 0) return false;
   const GridFrame& frame = space.frame();
   const Eigen::Vector3d to_a = (frame.Cell(a) - cell).cast<double>();
   const Eigen::Vector3d to_b = (frame.Cell(b) - cell).cast<double>();
   const double apart_m = frame.cell_m * (to_a - to_b).norm();
-  if (apart_m < 2.0 * space.robot_radius_m()) return false;
-  return to_a.dot(to_b) < kBasisCosine * to_a.norm() * to_b.norm();
+  if (apart_m < options.basis_radii * space.robot_radius_m()) return false;
+  return to_a.dot(to_b) < options.basis_cosine * to_a.norm() * to_b.norm();
 }
 
 // One way along each axis; the diagram has no gaps that these would leave.
-std::vector<int64_t> FindDiagram(const OpenSpace& space) {
+std::vector<int64_t> FindDiagram(const OpenSpace& space, const PlaceOptions& options) {
   const GridFrame& frame = space.frame();
   const DistanceField& field = space.field();
   const std::array<int64_t, 3> strides = {1, frame.size.x(),
@@ -46,7 +42,7 @@ std::vector<int64_t> FindDiagram(const OpenSpace& space) {
       const int64_t apart = std::abs(mine - other);
       // The same obstacle, or the next cell of one.
       if (apart == 0 || apart == strides[0] || apart == strides[1] || apart == strides[2]) continue;
-      if (!space.IsOpen(next) || !AreApart(space, cell, mine, other)) continue;
+      if (!space.IsOpen(next) || !AreApart(space, options, cell, mine, other)) continue;
       is_in[i] = 1;
       is_in[next] = 1;
     }
@@ -71,8 +67,11 @@ struct Border {
 
 class Diagram {
  public:
-  explicit Diagram(const OpenSpace& space)
-      : space_(space), cells_(FindDiagram(space)), sets_(cells_.size()) {
+  Diagram(const OpenSpace& space, const PlaceOptions& options)
+      : space_(space),
+        block_m_(options.block_m),
+        cells_(FindDiagram(space, options)),
+        sets_(cells_.size()) {
     JoinParts();
     CollectParts();
     CollectBorders();
@@ -84,7 +83,7 @@ class Diagram {
  private:
   // Blocks lie fast in the map, so that places stay while it grows.
   Eigen::Vector3i BlockOf(int64_t cell) const {
-    const Eigen::Vector3d block = (space_.CenterOf(cell) / kBlockM).array().floor();
+    const Eigen::Vector3d block = (space_.CenterOf(cell) / block_m_).array().floor();
     return block.cast<int>();
   }
 
@@ -153,6 +152,7 @@ class Diagram {
   }
 
   const OpenSpace& space_;
+  const double block_m_;
   std::vector<int64_t> cells_;
   DisjointSets sets_;
   std::vector<int> part_of_;
@@ -161,7 +161,7 @@ class Diagram {
 };
 
 // The widest parts first; a part whose best cell is near a place already is served by that.
-void AddParts(std::vector<Part>* parts, Roadmap* roadmap) {
+void AddParts(double merge_m, std::vector<Part>* parts, Roadmap* roadmap) {
   const OpenSpace& space = roadmap->space();
   std::vector<int> order(parts->size());
   std::iota(order.begin(), order.end(), 0);
@@ -171,7 +171,7 @@ void AddParts(std::vector<Part>* parts, Roadmap* roadmap) {
   });
   for (const int i : order) {
     Part& part = (*parts)[static_cast<size_t>(i)];
-    for (const auto& [distance_m, spot] : roadmap->Near(space.CenterOf(part.best_cell), kMergeM)) {
+    for (const auto& [distance_m, spot] : roadmap->Near(space.CenterOf(part.best_cell), merge_m)) {
       if (!space.IsOpenWay(part.best_cell, roadmap->cell(spot))) continue;
       part.spot = spot;
       break;
@@ -182,7 +182,7 @@ void AddParts(std::vector<Part>* parts, Roadmap* roadmap) {
 
 }  // namespace
 
-int CountBasisPoints(const OpenSpace& space, int64_t cell) {
+int CountBasisPoints(const OpenSpace& space, int64_t cell, const PlaceOptions& options) {
   const GridFrame& frame = space.frame();
   const Eigen::Vector3i at = frame.Cell(cell);
   std::vector<int64_t> basis;
@@ -190,7 +190,7 @@ int CountBasisPoints(const OpenSpace& space, int64_t cell) {
     const int64_t obstacle = space.field().NearestObstacle(index);
     if (obstacle < 0) return;
     for (const int64_t known : basis) {
-      if (!AreApart(space, at, known, obstacle)) return;
+      if (!AreApart(space, options, at, known, obstacle)) return;
     }
     basis.push_back(obstacle);
   };
@@ -201,14 +201,14 @@ int CountBasisPoints(const OpenSpace& space, int64_t cell) {
   return static_cast<int>(basis.size());
 }
 
-void AddVoronoiPlaces(Roadmap* roadmap) {
-  Diagram diagram(roadmap->space());
-  AddParts(&diagram.parts(), roadmap);
+void AddVoronoiPlaces(const PlaceOptions& options, Roadmap* roadmap) {
+  Diagram diagram(roadmap->space(), options);
+  AddParts(options.merge_m, &diagram.parts(), roadmap);
   for (const auto& [pair, border] : diagram.borders()) {
     const int a = diagram.parts()[static_cast<size_t>(pair.first)].spot;
     const int b = diagram.parts()[static_cast<size_t>(pair.second)].spot;
     if (a == b || roadmap->Link(a, b)) continue;
-    if (roadmap->IsNearInSight(border.best_cell, kMergeM)) continue;
+    if (roadmap->IsNearInSight(border.best_cell, options.merge_m)) continue;
     const int middle = roadmap->Add(border.best_cell);
     roadmap->Link(a, middle);
     roadmap->Link(middle, b);

@@ -30,7 +30,8 @@ constexpr char kPrintConfig[] = "print-config";
 // Options that a file may not have: what ends the program, and the file itself.
 bool IsKey(const CLI::Option& option) {
   const std::vector<std::string>& names = option.get_lnames();
-  static const std::set<std::string> kOthers = {"help", "version", kConfig, kPrintConfig};
+  static const std::set<std::string> kOthers = {"help", "help-all", "version", kConfig,
+                                                kPrintConfig};
   return !names.empty() && kOthers.count(names.front()) == 0;
 }
 

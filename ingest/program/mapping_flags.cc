@@ -3,8 +3,13 @@
 
 #include <CLI/CLI.hpp>
 #include <cmath>
+#include <memory>
+#include <span>
+#include <utility>
 #include <vector>
 
+#include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
 
@@ -21,9 +26,56 @@ absl::StatusOr<TimeNs> Nanoseconds(const char* flag, double seconds) {
                    {{"field", flag}, {"value", absl::StrCat(seconds)}});
 }
 
+// Groups of options of single stages, which few runs need.
+constexpr absl::string_view kTuning = "Tuning: ";
+
+// Help with one line for each group of tuning, unless all is asked for.
+class ShortHelp : public CLI::Formatter {
+ public:
+  std::string make_help(const CLI::App* app, std::string name,
+                        CLI::AppFormatMode mode) const override {
+    shows_all_ = mode == CLI::AppFormatMode::All;
+    return CLI::Formatter::make_help(app, std::move(name), mode);
+  }
+
+  std::string make_group(std::string group, bool is_positional,
+                         std::vector<const CLI::Option*> options) const override {
+    if (shows_all_ || !absl::StartsWith(group, kTuning)) {
+      return CLI::Formatter::make_group(std::move(group), is_positional, std::move(options));
+    }
+    return absl::StrCat("\n", group, ": ", options.size(), " options, see --help-all\n");
+  }
+
+ private:
+  mutable bool shows_all_ = false;
+};
+
+// As ValidateFields has it, so that all ways say the same.
+CLI::Validator InRange(BoundOption field) {
+  return CLI::Validator(
+      [field](const std::string& text) mutable {
+        double value = 0.0;
+        if (!absl::SimpleAtod(text, &value)) return absl::StrCat(text, " is no number");
+        field.value = &value;
+        return std::string(ValidateFields({&field, 1}).message());
+      },
+      absl::StrCat("in [", field.min, " - ", field.max, "]"));
+}
+
+void AddTuning(const std::string& stage, std::span<const BoundOption> fields, CLI::App* app) {
+  for (const BoundOption& field : fields) {
+    app->add_option(absl::StrCat("--", field.name), *field.value, field.help)
+        ->check(InRange(field))
+        ->capture_default_str()
+        ->group(absl::StrCat(kTuning, stage));
+  }
+}
+
 }  // namespace
 
 void AddMappingFlags(CLI::App* app, MappingFlags* flags) {
+  app->formatter(std::make_shared<ShortHelp>());
+  app->set_help_all_flag("--help-all", "Print the options of all groups");
   const std::string group = "Static layers (logs with depth)";
   app->add_flag("--no-layers", flags->is_off, "Poses only: no mesh, objects, places and rooms")
       ->group(group);
@@ -47,6 +99,9 @@ void AddMappingFlags(CLI::App* app, MappingFlags* flags) {
       ->check(CLI::IsMember({"auto", "ceiling", "clearance", "filtration"}))
       ->capture_default_str()
       ->group(group);
+  app->add_flag("--whole-corridors", flags->keeps_corridors,
+                "A net of corridors is one room; otherwise each of its straight arms is")
+      ->group(group);
   app->add_option("--places", flags->places, "Places on the ground, or in the whole volume")
       ->check(CLI::IsMember({"ground", "volume"}))
       ->capture_default_str()
@@ -69,13 +124,16 @@ void AddMappingFlags(CLI::App* app, MappingFlags* flags) {
       ->check(CLI::Range(1, 64))
       ->capture_default_str()
       ->group(group);
+  app->add_flag("--timings", flags->has_timings, "Print what each stage has cost")->group(group);
+  AddTuning("walls, floors and ceilings", flags->structures.Bind(), app);
+  AddTuning("places", flags->place_options.Bind(), app);
+  AddTuning("rooms", flags->room_options.Bind(), app);
   for (const SegmentField& field : SegmentFields()) {
     app->add_option(absl::StrCat("--", field.name), flags->segments.*field.value, field.help)
         ->check(CLI::Range(field.min, field.max))
         ->capture_default_str()
-        ->group("Objects of logs without labels");
+        ->group(absl::StrCat(kTuning, "objects of logs without labels"));
   }
-  app->add_flag("--timings", flags->has_timings, "Print what each stage has cost")->group(group);
 }
 
 absl::StatusOr<MappingOptions> MakeMappingOptions(const MappingFlags& flags) {
@@ -86,9 +144,13 @@ absl::StatusOr<MappingOptions> MakeMappingOptions(const MappingFlags& flags) {
   options.volume.thread_count = flags.thread_count;
   if (flags.masking == "drop") options.volume.masking = DynamicMasking::kDrop;
   if (flags.masking == "off") options.volume.masking = DynamicMasking::kOff;
+  options.structures = flags.structures;
+  options.rooms = flags.room_options;
+  options.rooms.split_corridors = !flags.keeps_corridors;
   if (flags.rooms == "ceiling") options.rooms.method = RoomMethod::kCeiling;
   if (flags.rooms == "filtration") options.rooms.method = RoomMethod::kFiltration;
   if (flags.rooms == "clearance") options.rooms.method = RoomMethod::kClearance;
+  options.places = flags.place_options;
   if (flags.places == "volume") options.places.mode = PlaceMode::kVolume;
   options.places.robot_radius_m = flags.robot_radius_m;
   options.segments = flags.segments;

@@ -21,20 +21,24 @@ struct MappingFlags {
   std::string masking = "carve";
   std::string cad_folder;
   std::string rooms = "auto";
+  bool keeps_corridors = false;
   std::string places = "ground";
   double robot_radius_m = PlaceOptions().robot_radius_m;
+  PlaceOptions place_options;
   double commit_s = 1.0;
   double mesh_s = 32.0;
   double layers_s = 5.0;
   int thread_count = VolumeOptions().thread_count;
+  StructureOptions structures;
+  RoomOptions room_options;
   SegmentOptions segments;
   bool has_timings = false;
 };
 
+/// Options of single stages stand in groups of their own, which --help names and --help-all shows.
 void AddMappingFlags(CLI::App* app, MappingFlags* flags);
 
 /// Errors: INVALID_ARGUMENT/FIELD_INVALID naming the flag.
 absl::StatusOr<MappingOptions> MakeMappingOptions(const MappingFlags& flags);
 
-/// On stdout: frames used and skipped; with `has_timings` a table of the stages.
 }  // namespace dsg::ingest

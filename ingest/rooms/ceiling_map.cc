@@ -9,18 +9,13 @@
 namespace dsg::ingest {
 namespace {
 
-/// Below this an underside is a lintel's.
-constexpr double kCeilingMinM = 2.25;
-/// A height that fewer square metres have is no ceiling.
-constexpr double kModeM2Min = 2.0;
-constexpr double kWindowM = 1.5;
-
 /// Index of the layer in which each column first meets something above it from below; -1 = none.
-std::vector<int> FirstUndersides(const OccupancyGrid& grid, double floor_z_m) {
+std::vector<int> FirstUndersides(const OccupancyGrid& grid, double floor_z_m,
+                                 double ceiling_min_m) {
   const GridFrame& frame = grid.frame;
   const int64_t columns = int64_t{frame.size.x()} * frame.size.y();
   std::vector<int> layers(static_cast<size_t>(columns), -1);
-  const double low = (floor_z_m + kCeilingMinM - frame.origin_map.z()) / frame.cell_m;
+  const double low = (floor_z_m + ceiling_min_m - frame.origin_map.z()) / frame.cell_m;
   for (int z = std::max(1, static_cast<int>(std::floor(low))); z < frame.size.z(); ++z) {
     const Occupancy* here = grid.cells.data() + z * columns;
     const Occupancy* below = here - columns;
@@ -32,7 +27,7 @@ std::vector<int> FirstUndersides(const OccupancyGrid& grid, double floor_z_m) {
   return layers;
 }
 
-std::vector<int> FindModes(const std::vector<int>& layers, const GridFrame& frame) {
+std::vector<int> FindModes(const std::vector<int>& layers, const GridFrame& frame, double m2_min) {
   std::vector<int64_t> counts(static_cast<size_t>(frame.size.z()) + 2, 0);
   for (const int layer : layers) {
     if (layer >= 0) ++counts[static_cast<size_t>(layer) + 1];
@@ -43,7 +38,7 @@ std::vector<int> FindModes(const std::vector<int>& layers, const GridFrame& fram
     const auto at = static_cast<size_t>(z) + 1;
     const bool is_peak = counts[at] > counts[at - 1] && counts[at] >= counts[at + 1];
     const int64_t count = counts[at - 1] + counts[at] + counts[at + 1];
-    if (is_peak && static_cast<double>(count) * cell_m2 >= kModeM2Min) modes.push_back(z);
+    if (is_peak && static_cast<double>(count) * cell_m2 >= m2_min) modes.push_back(z);
   }
   return modes;
 }
@@ -81,11 +76,12 @@ std::vector<int> CountAround(const std::vector<int>& layers, const GridFrame& fr
   return counts;
 }
 
-// Where some ceiling takes at least an eighth of the window, the one that takes most.
+// Where some ceiling takes more than a share of the window, the one that takes most.
 void Vote(const std::vector<int>& layers, const std::vector<int>& modes, const GridFrame& frame,
-          double window_m, std::vector<float>* z_m) {
+          double window_m, double share, std::vector<float>* z_m) {
   const int reach = std::max(1, static_cast<int>(std::lround(0.5 * window_m / frame.cell_m)));
-  std::vector<int> best((*z_m).size(), (2 * reach + 1) * (2 * reach + 1) / 8);
+  const auto least = static_cast<int>(share * (2 * reach + 1) * (2 * reach + 1));
+  std::vector<int> best(z_m->size(), least);
   std::vector<int> mode_of(z_m->size(), -1);
   for (const int mode : modes) {
     const std::vector<int> counts = CountAround(layers, frame, mode, reach);
@@ -101,8 +97,9 @@ void Vote(const std::vector<int>& layers, const std::vector<int>& modes, const G
   }
 }
 
-double SeenShare(const OccupancyGrid& grid, double floor_z_m, const std::vector<int>& layers) {
-  const OccupancyGrid body = BodySection(grid, floor_z_m);
+double SeenShare(const OccupancyGrid& grid, double floor_z_m, const std::vector<int>& layers,
+                 const SectionOptions& options) {
+  const OccupancyGrid body = BodySection(grid, floor_z_m, options);
   int64_t known = 0;
   int64_t seen = 0;
   for (size_t i = 0; i < layers.size(); ++i) {
@@ -116,18 +113,18 @@ double SeenShare(const OccupancyGrid& grid, double floor_z_m, const std::vector<
 }  // namespace
 
 CeilingMap FindCeilings(const OccupancyGrid& grid, double floor_z_m,
-                        const std::optional<double>& ceiling_z_m) {
+                        const std::optional<double>& ceiling_z_m, const SectionOptions& options) {
   CeilingMap map;
   const size_t columns =
       static_cast<size_t>(grid.frame.size.x()) * static_cast<size_t>(grid.frame.size.y());
   map.z_m.assign(columns, std::numeric_limits<float>::quiet_NaN());
   if (grid.frame.size.z() < 2) return map;
-  const std::vector<int> layers = FirstUndersides(grid, floor_z_m);
-  const std::vector<int> modes = FindModes(layers, grid.frame);
-  map.seen_share = SeenShare(grid, floor_z_m, layers);
+  const std::vector<int> layers = FirstUndersides(grid, floor_z_m, options.ceiling_min_m);
+  const std::vector<int> modes = FindModes(layers, grid.frame, options.ceiling_m2_min);
+  map.seen_share = SeenShare(grid, floor_z_m, layers, options);
   // What is near decides; a little farther off where nothing near was seen.
-  for (const double window_m : {kWindowM, 3.0 * kWindowM}) {
-    Vote(layers, modes, grid.frame, window_m, &map.z_m);
+  for (const double window_m : {options.window_m, options.wide_window_m}) {
+    Vote(layers, modes, grid.frame, window_m, options.vote_share, &map.z_m);
   }
   if (!ceiling_z_m.has_value()) return map;
   for (float& z_m : map.z_m) {

@@ -5,24 +5,14 @@
 #include <vector>
 
 namespace dsg::ingest {
-namespace {
-
-/// Without a ceiling to go by, a smaller one is more likely a corner between furniture.
-constexpr double kRoomM2Min = 1.6;
-
-}  // namespace
 
 DividedPlan ClearanceRegions(const OccupancyGrid& plan, const RoomOptions& options) {
-  DivideOptions divide;
-  divide.clearance_m = options.section_clearance_m;
-  divide.room_m2_min = options.room_m2_min;
-  divide.close_open_rooms = true;
-  DividedPlan divided = DivideAtGaps(plan, divide);
+  DividedPlan divided = DivideAtGaps(plan, options, OpenRooms::kClose);
   // Given to a neighbour, not opened to all: two rooms would meet through a corner between them.
   const double cell_m2 = plan.frame.cell_m * plan.frame.cell_m;
   std::vector<bool> is_kept;
   for (const int64_t count : divided.regions.CellCounts()) {
-    is_kept.push_back(static_cast<double>(count) * cell_m2 >= kRoomM2Min);
+    is_kept.push_back(static_cast<double>(count) * cell_m2 >= options.clearance_room_m2_min);
   }
   if (std::find(is_kept.begin(), is_kept.end(), true) != is_kept.end()) {
     KeepRegions(is_kept, &divided.regions);

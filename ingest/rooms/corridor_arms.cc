@@ -9,15 +9,6 @@
 namespace dsg::ingest {
 namespace {
 
-/// Wider ones are halls.
-constexpr double kWidthM = 3.6;
-/// Of the whole net, over its width, and of an arm.
-constexpr double kNetSlenderness = 6.0;
-constexpr double kArmSlenderness = 2.0;
-constexpr double kArmMMin = 4.0;
-/// Where a cell sees farther than this many widths both along and across, arms meet.
-constexpr double kJunctionWidths = 1.6;
-
 /// The plan turned so that most walls run along its axes.
 struct TurnedPlan {
   GridFrame frame;
@@ -26,7 +17,7 @@ struct TurnedPlan {
 };
 
 // Angle to the nearest axis that the outlines' edges have, longer ones counting for more.
-double MainDirection(const PlanRegions& regions) {
+double MainDirection(const PlanRegions& regions, double straight_rad) {
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   for (const Polygon2d& outline : OutlinesOf(regions)) {
     for (size_t i = 0; i < outline.size(); ++i) {
@@ -36,8 +27,7 @@ double MainDirection(const PlanRegions& regions) {
     }
   }
   const double angle = 0.25 * std::atan2(sum.y(), sum.x());
-  constexpr double kStraightRad = 0.01;
-  return std::abs(angle) < kStraightRad ? 0.0 : angle;
+  return std::abs(angle) < straight_rad ? 0.0 : angle;
 }
 
 TurnedPlan Turn(const PlanRegions& regions, double angle) {
@@ -92,9 +82,13 @@ std::vector<int> RunLengths(const TurnedPlan& plan, bool along_x) {
 struct Shape {
   int width = 0;
   int64_t cell_count = 0;
-  bool IsNet(double cell_m) const {
+  bool IsNet(double cell_m, const CorridorOptions& options) const {
     const double length = static_cast<double>(cell_count) / std::max(1, width);
-    return width * cell_m <= kWidthM && length >= kNetSlenderness * width;
+    return width * cell_m <= options.width_m_max && length >= options.net_slenderness * width;
+  }
+  // Least length of its arms, in cells.
+  double ArmMin(double cell_m, const CorridorOptions& options) const {
+    return std::max(options.arm_slenderness * width, options.arm_m_min / cell_m);
   }
 };
 
@@ -114,7 +108,8 @@ std::vector<Shape> ShapesOf(const TurnedPlan& plan, int count, const std::vector
 }
 
 // Straight pieces of the nets, in the turned plan; along x and along y apart.
-PlanRegions FindArms(const TurnedPlan& plan, const std::vector<Shape>& shapes) {
+PlanRegions FindArms(const TurnedPlan& plan, const std::vector<Shape>& shapes,
+                     const CorridorOptions& options) {
   const std::vector<int> along_x = RunLengths(plan, true);
   const std::vector<int> along_y = RunLengths(plan, false);
   const size_t count = plan.region_of.size();
@@ -124,11 +119,11 @@ PlanRegions FindArms(const TurnedPlan& plan, const std::vector<Shape>& shapes) {
     for (size_t i = 0; i < count; ++i) {
       if (plan.region_of[i] < 0) continue;
       const Shape& shape = shapes[static_cast<size_t>(plan.region_of[i])];
-      if (!shape.IsNet(plan.frame.cell_m)) continue;
+      if (!shape.IsNet(plan.frame.cell_m, options)) continue;
       const int along = is_x ? along_x[i] : along_y[i];
       const int across = is_x ? along_y[i] : along_x[i];
-      const bool is_junction = std::min(along, across) > kJunctionWidths * shape.width;
-      const double arm_min = std::max(kArmSlenderness * shape.width, kArmMMin / plan.frame.cell_m);
+      const bool is_junction = std::min(along, across) > options.junction_widths * shape.width;
+      const double arm_min = shape.ArmMin(plan.frame.cell_m, options);
       is_member[i] = !is_junction && along > across && along >= arm_min ? 1 : 0;
     }
     const PlanRegions straight = LabelRegions(plan.frame, is_member, 1.0);
@@ -142,16 +137,15 @@ PlanRegions FindArms(const TurnedPlan& plan, const std::vector<Shape>& shapes) {
 
 // Only arms long enough by themselves count: a run may go on through a junction.
 std::vector<bool> AreLong(const PlanRegions& arms, const TurnedPlan& plan,
-                          const std::vector<Shape>& shapes) {
+                          const std::vector<Shape>& shapes, const CorridorOptions& options) {
   std::vector<Eigen::AlignedBox2i> boxes(static_cast<size_t>(arms.count));
   std::vector<double> length_min(boxes.size(), 0.0);
   for (int64_t i = 0; i < arms.frame.CellCount(); ++i) {
     const int arm = arms.region_of[static_cast<size_t>(i)];
     if (arm < 0) continue;
     boxes[static_cast<size_t>(arm)].extend(Eigen::Vector2i(arms.frame.Cell(i).head<2>()));
-    const int width = shapes[static_cast<size_t>(plan.region_of[static_cast<size_t>(i)])].width;
-    length_min[static_cast<size_t>(arm)] =
-        std::max(kArmSlenderness * width, kArmMMin / arms.frame.cell_m);
+    const Shape& shape = shapes[static_cast<size_t>(plan.region_of[static_cast<size_t>(i)])];
+    length_min[static_cast<size_t>(arm)] = shape.ArmMin(arms.frame.cell_m, options);
   }
   std::vector<bool> are_long(boxes.size());
   for (size_t arm = 0; arm < boxes.size(); ++arm) {
@@ -162,14 +156,14 @@ std::vector<bool> AreLong(const PlanRegions& arms, const TurnedPlan& plan,
 
 }  // namespace
 
-void SplitCorridors(PlanRegions* regions) {
-  const TurnedPlan plan = Turn(*regions, MainDirection(*regions));
+void SplitCorridors(const CorridorOptions& options, PlanRegions* regions) {
+  const TurnedPlan plan = Turn(*regions, MainDirection(*regions, options.straight_rad));
   std::vector<int> narrow = RunLengths(plan, true);
   const std::vector<int> along_y = RunLengths(plan, false);
   for (size_t i = 0; i < narrow.size(); ++i) narrow[i] = std::min(narrow[i], along_y[i]);
   const std::vector<Shape> shapes = ShapesOf(plan, regions->count, narrow);
-  PlanRegions arms = FindArms(plan, shapes);
-  KeepRegions(AreLong(arms, plan, shapes), &arms);
+  PlanRegions arms = FindArms(plan, shapes, options);
+  KeepRegions(AreLong(arms, plan, shapes, options), &arms);
   // The first arm of a net goes on under its number.
   std::vector<int> first_arm(shapes.size(), -1);
   std::vector<int> region_of_arm(static_cast<size_t>(arms.count), -1);

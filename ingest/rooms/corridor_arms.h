@@ -4,12 +4,13 @@
 #pragma once
 
 #include "ingest/rooms/plan_regions.h"
+#include "ingest/rooms/room_options.h"
 
 namespace dsg::ingest {
 
 /// Regions that consist of straight arms of one width, each much longer than wide, become one
 /// region an arm; the squares where they meet are shared out. Order: other regions keep their
 /// numbers, the arms of a net take its number and new ones.
-void SplitCorridors(PlanRegions* regions);
+void SplitCorridors(const CorridorOptions& options, PlanRegions* regions);
 
 }  // namespace dsg::ingest

@@ -13,8 +13,8 @@ namespace {
 // Parts of the place graph, and how many of them are large enough.
 class LargeParts {
  public:
-  LargeParts(size_t count, int size_min) : sets_(count), size_(count, 1), size_min_(size_min) {
-    large_count_ = size_min <= 1 ? static_cast<int>(count) : 0;
+  LargeParts(size_t count, double size_min) : sets_(count), size_(count, 1), size_min_(size_min) {
+    large_count_ = size_min <= 1.0 ? static_cast<int>(count) : 0;
   }
 
   int Root(int place) { return sets_.Find(place); }
@@ -35,7 +35,7 @@ class LargeParts {
  private:
   DisjointSets sets_;
   std::vector<int> size_;
-  int size_min_;
+  double size_min_;
   int large_count_ = 0;
 };
 

@@ -9,14 +9,6 @@
 
 namespace dsg::ingest {
 
-struct FiltrationOptions {
-  /// Obstacles grow by amounts between these, metres.
-  double clearance_m_min = 0.5;
-  double clearance_m_max = 1.2;
-  /// Smaller parts are no rooms.
-  int place_count_min = 10;
-};
-
 /// For each place its room, numbered from 0 by first place; -1 = reached from none.
 ///
 /// Ways are cut in order of their clearance. The number of parts with enough places that holds over

@@ -15,14 +15,8 @@
 namespace dsg::ingest {
 namespace {
 
-/// Holes up to this wide in what was seen of the ceiling's section are free space.
-constexpr double kHoleM = 0.5;
-/// How far rooms grow into doorways and under what hangs from the ceiling.
-constexpr double kDoorwayM = 0.6;
 /// Further than any room is wide.
 constexpr double kFarM = 100.0;
-/// The other method's word is passed on from here.
-constexpr double kOtherWordMin = 0.05;
 
 std::vector<uint8_t> FreeCells(const OccupancyGrid& plan) {
   std::vector<uint8_t> is_free(plan.cells.size());
@@ -43,27 +37,20 @@ struct Storey {
   Storey(const RoomInput& the_input, const RoomOptions& the_options)
       : input(the_input), options(the_options) {
     const OccupancyGrid& grid = input.field->grid();
-    body = BodySection(grid, input.floor_z_m);
-    FillHoles(0.6 * kHoleM, &body);
-    ceilings = FindCeilings(grid, input.floor_z_m, input.ceiling_z_m);
-    section = CeilingSection(grid, input.floor_z_m, ceilings, options.below_ceiling_m);
+    body = BodySection(grid, input.floor_z_m, options.section);
+    FillHoles(options.body_hole_m, &body);
+    ceilings = FindCeilings(grid, input.floor_z_m, input.ceiling_z_m, options.section);
+    section = CeilingSection(grid, input.floor_z_m, ceilings, options.section);
   }
 };
-
-DivideOptions DivideOptionsOf(const RoomOptions& options) {
-  DivideOptions divide;
-  divide.clearance_m = options.section_clearance_m;
-  divide.room_m2_min = options.room_m2_min;
-  return divide;
-}
 
 // What nobody saw of the section is not free, but for small holes away from walls.
 PlanRegions CeilingRegions(const Storey& storey) {
   OccupancyGrid section = storey.section;
   FillOccupiedFrom(storey.body, &section);
-  FillHoles(kHoleM, &section);
-  PlanRegions regions = DivideAtGaps(section, DivideOptionsOf(storey.options)).regions;
-  GrowRegions(FreeCells(section), kHoleM, &regions);
+  FillHoles(storey.options.hole_m, &section);
+  PlanRegions regions = DivideAtGaps(section, storey.options, OpenRooms::kLeave).regions;
+  GrowRegions(FreeCells(section), storey.options.hole_m, &regions);
   return regions;
 }
 
@@ -72,8 +59,8 @@ PlanRegions CeilingRegions(const Storey& storey) {
 PlanRegions JoinedRegions(const Storey& storey, const OccupancyGrid& closed) {
   OccupancyGrid joined = storey.section;
   FillFrom(closed, &joined);
-  PlanRegions regions = DivideAtGaps(joined, DivideOptionsOf(storey.options)).regions;
-  GrowRegions(FreeCells(joined), kHoleM, &regions);
+  PlanRegions regions = DivideAtGaps(joined, storey.options, OpenRooms::kLeave).regions;
+  GrowRegions(FreeCells(joined), storey.options.hole_m, &regions);
   return regions;
 }
 
@@ -81,7 +68,7 @@ PlanRegions JoinedRegions(const Storey& storey, const OccupancyGrid& closed) {
 PlanRegions FiltrationRegions(const Storey& storey) {
   const RoomInput& input = storey.input;
   const std::vector<int> rooms =
-      FiltrationRooms(input.places.size(), input.links, FiltrationOptions());
+      FiltrationRooms(input.places.size(), input.links, storey.options.filtration);
   PlanRegions regions;
   regions.frame = storey.body.frame;
   regions.region_of.assign(storey.body.cells.size(), -1);
@@ -160,12 +147,12 @@ void DropRoomsWithoutPlaces(const std::vector<RoomPlace>& places,
 
 RoomLabelling Label(const Storey& storey, RoomMethod method, PlanRegions regions) {
   const RoomInput& input = storey.input;
-  if (storey.options.split_corridors) SplitCorridors(&regions);
+  if (storey.options.split_corridors) SplitCorridors(storey.options.corridors, &regions);
   DropRoomsWithoutPlaces(input.places, input.links, &regions);
   RoomLabelling labelling;
   labelling.method = method;
   labelling.room_of_place = RoomsOfPlaces(input.places, input.links, regions);
-  GrowRegions(FreeCells(storey.body), kDoorwayM, &regions);
+  GrowRegions(FreeCells(storey.body), storey.options.doorway_m, &regions);
   labelling.adjacent = AdjacentRooms(input.places, input.links, labelling.room_of_place, regions);
   DescribeRooms(storey, regions, &labelling);
   return labelling;
@@ -175,10 +162,11 @@ RoomResult FindByBoth(const Storey& storey) {
   RoomResult result;
   const DividedPlan clearance = ClearanceRegions(storey.body, storey.options);
   const PlanRegions joined = JoinedRegions(storey, clearance.closed);
-  const bool saw_ceiling = storey.ceilings.seen_share >= 0.5;
+  const bool saw_ceiling = storey.ceilings.seen_share >= storey.options.ceiling_seen_share;
   result.best = Label(storey, saw_ceiling ? RoomMethod::kCeiling : RoomMethod::kClearance, joined);
   RoomLabelling other = Label(storey, RoomMethod::kClearance, clearance.regions);
-  if (Disagreement(result.best.room_of_place, other.room_of_place) > kOtherWordMin) {
+  if (Disagreement(result.best.room_of_place, other.room_of_place) >
+      storey.options.other_word_min) {
     result.alternative = std::move(other);
   }
   return result;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "ingest/grid/distance_field.h"
+#include "ingest/rooms/room_options.h"
 #include "ingest/trajectory/trajectory_change.h"
 #include "schema/model/geometry.h"
 
@@ -24,30 +25,6 @@ struct RoomLink {
   int from = 0;
   int to = 0;
   double clearance_m = 0.0;
-};
-
-enum class RoomMethod {
-  /// Both; the ceiling's where it could be seen, free space where not.
-  kAuto,
-  /// Horizontal section of free space just below the ceiling: doors have lintels.
-  /// Source: RSS 2020, section IV-C.
-  kCeiling,
-  /// Free space at a person's height, cut at the narrow ways through its walls; no ceiling needed.
-  /// Source: critical points of Voronoi graphs (Thrun, 1998; Bormann et al., 2016).
-  kClearance,
-  /// Parts of the place graph that stay apart while obstacles grow; see filtration.h.
-  /// Source: Hughes et al., 2022.
-  kFiltration,
-};
-
-struct RoomOptions {
-  RoomMethod method = RoomMethod::kAuto;
-  /// Section below the ceiling, and how far from obstacles it is kept. RSS 2020: 0.3 and 0.2.
-  double below_ceiling_m = 0.3;
-  double section_clearance_m = 0.2;
-  double room_m2_min = 1.0;
-  /// Nets of corridors are cut where their straight arms meet; false leaves them whole.
-  bool split_corridors = true;
 };
 
 /// One storey of the map.
@@ -83,7 +60,8 @@ struct RoomLabelling {
 
 struct RoomResult {
   RoomLabelling best;
-  /// The other method's word, when it differs on more than 5 % of the places.
+  /// The other method's word, when it differs on more than RoomOptions::other_word_min of the
+  /// places.
   std::optional<RoomLabelling> alternative;
 };
 
@@ -94,6 +72,9 @@ RoomResult FindRooms(const RoomInput& input, const RoomOptions& options);
 /// places (by position) with.
 class RoomTracker {
  public:
+  explicit RoomTracker(double same_place_m = RoomOptions().same_place_m)
+      : same_place_m_(same_place_m) {}
+
   /// `places`: of the input that the rooms are of.
   void Track(const std::vector<RoomPlace>& places, std::vector<FoundRoom>* rooms);
 
@@ -105,6 +86,7 @@ class RoomTracker {
     int64_t id;
     std::vector<Eigen::Vector3d> places_map;
   };
+  double same_place_m_;
   std::vector<Old> last_;
   int64_t next_id_ = 0;
 };

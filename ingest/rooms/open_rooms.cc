@@ -23,32 +23,8 @@ namespace {
 namespace bg = boost::geometry;
 using Point = bg::model::d2::point_xy<double>;
 
-// Of the area of the convex hull. Corridors with what is open to them fill less, L-shaped rooms
-// more; a room fills most of it.
-constexpr double kSparseMax = 0.72;
-// The best first: a room, and not a room with an end of the corridor.
-constexpr std::array<double, 2> kCompactMins = {0.93, 0.8};
-constexpr double kBayM2Min = 3.0;
-constexpr double kBayM2Max = 80.0;
-// How far a bay reaches behind its opening, and by how much more than it is wide: longer is an arm
-// of the corridor.
-constexpr double kDepthMinM = 1.2;
-constexpr double kElongationMax = 2.2;
-constexpr double kWidthMinM = 0.8;
-constexpr double kWidthMaxM = 6.0;
-// A straight wall leaves half of a disc free, a corner three quarters.
-constexpr double kCornerReachM = 0.5;
-constexpr double kCornerShareMin = 0.62;
-// The end of a wall that stands between two spaces. One that ends there parts a compact region too,
-// if the bay is walled in elsewhere.
-constexpr double kEndShareMin = 0.78;
-constexpr double kOpenShareMax = 0.25;
-constexpr double kLargeM2 = 80.0;
-constexpr double kCornerApartM = 0.25;
-constexpr double kSameOpeningM = 0.5;
+// How finely one looks around a corner; finer finds the same openings.
 constexpr int kRayCount = 180;
-// A ray is the shortest one among so many to either side.
-constexpr int kRaysBeside = 8;
 
 const std::array<Eigen::Vector3i, 4> kSides = {Eigen::Vector3i(1, 0, 0), Eigen::Vector3i(-1, 0, 0),
                                                Eigen::Vector3i(0, 1, 0), Eigen::Vector3i(0, -1, 0)};
@@ -96,8 +72,13 @@ class CellShape {
 
 class OpenRoomCloser {
  public:
-  OpenRoomCloser(const std::vector<uint8_t>& is_block, OccupancyGrid* plan)
-      : plan_(*plan), frame_(plan->frame), is_block_(is_block), seen_(plan->cells.size(), 0) {}
+  OpenRoomCloser(const std::vector<uint8_t>& is_block, const OpenRoomOptions& options,
+                 OccupancyGrid* plan)
+      : options_(options),
+        plan_(*plan),
+        frame_(plan->frame),
+        is_block_(is_block),
+        seen_(plan->cells.size(), 0) {}
 
   void Run() {
     FindRegions();
@@ -106,7 +87,8 @@ class OpenRoomCloser {
     std::stable_sort(openings.begin(), openings.end(), [](const Opening& a, const Opening& b) {
       return a.gap.WidthM() < b.gap.WidthM();
     });
-    for (const double compact_min : kCompactMins) {
+    // The best first.
+    for (const double compact_min : {options_.compact_first, options_.compact_min}) {
       std::vector<Opening> tried;
       for (const Opening& opening : openings) {
         if (!IsWayFree(opening.gap) || IsLikeOneOf(tried, opening)) continue;
@@ -148,7 +130,7 @@ class OpenRoomCloser {
     for (size_t i = 0; i < is_free.size(); ++i) {
       is_free[i] = plan_.cells[i] == Occupancy::kFree || is_block_[i] != 0 ? 1 : 0;
     }
-    regions_ = LabelRegions(frame_, is_free, 2.0 * kBayM2Min);
+    regions_ = LabelRegions(frame_, is_free, 2.0 * options_.bay_m2_min);
     std::vector<CellShape> shapes(static_cast<size_t>(regions_.count), CellShape(frame_));
     for (size_t i = 0; i < is_free.size(); ++i) {
       const int region = regions_.region_of[i];
@@ -156,8 +138,8 @@ class OpenRoomCloser {
     }
     for (const CellShape& shape : shapes) {
       const bool is_large =
-          static_cast<double>(shape.count()) * frame_.cell_m * frame_.cell_m >= kLargeM2;
-      const bool is_sparse = shape.Compactness() < kSparseMax;
+          static_cast<double>(shape.count()) * frame_.cell_m * frame_.cell_m >= options_.large_m2;
+      const bool is_sparse = shape.Compactness() < options_.sparse_max;
       kind_of_region_.push_back(is_sparse ? Kind::kSparse : is_large ? Kind::kLarge : Kind::kWhole);
     }
   }
@@ -174,7 +156,8 @@ class OpenRoomCloser {
 
   // Occupied cells around which most is free, the most so of their neighbourhood.
   std::vector<Corner> Corners() const {
-    const int reach = std::max(1, static_cast<int>(std::lround(kCornerReachM / frame_.cell_m)));
+    const int reach =
+        std::max(1, static_cast<int>(std::lround(options_.corner_reach_m / frame_.cell_m)));
     std::vector<std::pair<double, int64_t>> rated;
     for (int64_t i = 0; i < frame_.CellCount(); ++i) {
       const auto at = static_cast<size_t>(i);
@@ -183,16 +166,16 @@ class OpenRoomCloser {
       int region = -1;
       for (const Eigen::Vector3i& step : kSides) region = std::max(region, RegionAt(cell + step));
       const double share = region >= 0 ? FreeShare(cell, reach, region) : 0.0;
-      if (share >= kCornerShareMin) rated.emplace_back(-share, i);
+      if (share >= options_.corner_share_min) rated.emplace_back(-share, i);
     }
     std::sort(rated.begin(), rated.end());
     std::vector<Corner> corners;
     for (const auto& [share, index] : rated) {
       const Eigen::Vector2d at = CenterOf(index);
       const bool is_taken = std::any_of(corners.begin(), corners.end(), [&](const Corner& other) {
-        return (CenterOf(other.cell) - at).norm() < kCornerApartM;
+        return (CenterOf(other.cell) - at).norm() < options_.corner_apart_m;
       });
-      if (!is_taken) corners.push_back({index, -share >= kEndShareMin});
+      if (!is_taken) corners.push_back({index, -share >= options_.end_share_min});
     }
     return corners;
   }
@@ -215,13 +198,13 @@ class OpenRoomCloser {
   double RayM(const Eigen::Vector2d& from, const Eigen::Vector2d& way) const {
     constexpr double kNowhere = std::numeric_limits<double>::infinity();
     const double step_m = 0.5 * frame_.cell_m;
-    for (double at_m = 1.5 * frame_.cell_m; at_m <= kWidthMaxM; at_m += step_m) {
+    for (double at_m = 1.5 * frame_.cell_m; at_m <= options_.width_m_max; at_m += step_m) {
       const Eigen::Vector3i cell = CellAt(from + at_m * way);
       const Occupancy state = plan_.At(cell);
       if (state == Occupancy::kFree) continue;
       const bool is_wall = state == Occupancy::kOccupied && frame_.Holds(cell) &&
                            is_block_[static_cast<size_t>(frame_.Index(cell))] == 0;
-      return is_wall && at_m >= kWidthMinM ? at_m : kNowhere;
+      return is_wall && at_m >= options_.width_m_min ? at_m : kNowhere;
     }
     return kNowhere;
   }
@@ -235,10 +218,11 @@ class OpenRoomCloser {
       ways[static_cast<size_t>(ray)] = {std::cos(angle), std::sin(angle)};
       length_m[static_cast<size_t>(ray)] = RayM(from, ways[static_cast<size_t>(ray)]);
     }
+    const int rays_beside = static_cast<int>(std::lround(options_.turn_deg / 360.0 * kRayCount));
     for (int ray = 0; ray < kRayCount; ++ray) {
       const double own_m = length_m[static_cast<size_t>(ray)];
       bool is_shortest = std::isfinite(own_m);
-      for (int beside = -kRaysBeside; beside <= kRaysBeside && is_shortest; ++beside) {
+      for (int beside = -rays_beside; beside <= rays_beside && is_shortest; ++beside) {
         const auto other = static_cast<size_t>((ray + beside + kRayCount) % kRayCount);
         is_shortest = length_m[other] > own_m || (length_m[other] == own_m && beside >= 0);
       }
@@ -249,14 +233,14 @@ class OpenRoomCloser {
   }
 
   // Corners of one wall end are several, and their openings are the same one.
-  static bool IsLikeOneOf(const std::vector<Opening>& tried, const Opening& opening) {
+  bool IsLikeOneOf(const std::vector<Opening>& tried, const Opening& opening) const {
     return std::any_of(tried.begin(), tried.end(), [&](const Opening& other) {
       const auto apart_m = [&](const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
         return (from - opening.gap.from_map).norm() + (to - opening.gap.to_map).norm();
       };
       return other.is_at_wall_end == opening.is_at_wall_end &&
              std::min(apart_m(other.gap.from_map, other.gap.to_map),
-                      apart_m(other.gap.to_map, other.gap.from_map)) < kSameOpeningM;
+                      apart_m(other.gap.to_map, other.gap.from_map)) < options_.same_opening_m;
     });
   }
 
@@ -320,7 +304,8 @@ class OpenRoomCloser {
       sides[i].cells.push_back(frame_.Index(start));
       seen_[static_cast<size_t>(sides[i].cells[0])] = sides[i].number;
     }
-    const auto count_max = static_cast<size_t>(kBayM2Max / (frame_.cell_m * frame_.cell_m));
+    const auto count_max =
+        static_cast<size_t>(options_.bay_m2_max / (frame_.cell_m * frame_.cell_m));
     while (!sides[0].IsWhole() && !sides[1].IsWhole()) {
       if (sides[0].cells.size() > count_max) return std::nullopt;
       for (size_t i = 0; i < 2; ++i) {
@@ -356,10 +341,12 @@ class OpenRoomCloser {
   bool IsBay(const Opening& opening, const Side& side, double compact_min) const {
     const int region = regions_.region_of[static_cast<size_t>(side.cells[0])];
     const double width_m = opening.gap.WidthM();
-    if (KindOf(region) == Kind::kLarge && width_m > kOpenShareMax * side.rim_m) return false;
+    if (KindOf(region) == Kind::kLarge && width_m > options_.open_share_max * side.rim_m) {
+      return false;
+    }
     const double area_m2 = static_cast<double>(side.cells.size()) * frame_.cell_m * frame_.cell_m;
-    if (area_m2 < kBayM2Min || side.depth_m < kDepthMinM ||
-        side.depth_m * side.depth_m > kElongationMax * area_m2) {
+    if (area_m2 < options_.bay_m2_min || side.depth_m < options_.depth_m_min ||
+        side.depth_m * side.depth_m > options_.elongation_max * area_m2) {
       return false;
     }
     CellShape shape(frame_);
@@ -367,6 +354,7 @@ class OpenRoomCloser {
     return shape.Compactness() >= compact_min;
   }
 
+  const OpenRoomOptions& options_;
   OccupancyGrid& plan_;
   const GridFrame& frame_;
   const std::vector<uint8_t>& is_block_;
@@ -378,8 +366,9 @@ class OpenRoomCloser {
 
 }  // namespace
 
-void CloseOpenRooms(const std::vector<uint8_t>& is_block, OccupancyGrid* plan) {
-  OpenRoomCloser(is_block, plan).Run();
+void CloseOpenRooms(const std::vector<uint8_t>& is_block, const OpenRoomOptions& options,
+                    OccupancyGrid* plan) {
+  OpenRoomCloser(is_block, options, plan).Run();
 }
 
 }  // namespace dsg::ingest

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "ingest/grid/occupancy_grid.h"
+#include "ingest/rooms/room_options.h"
 
 namespace dsg::ingest {
 
@@ -20,6 +21,7 @@ namespace dsg::ingest {
 /// Order: by the openings' lengths, shortest first.
 /// Cost: corners of walls x rays, and for each opening twice the area of its smaller side.
 /// Source: ours; for dividing by lines between corners see Mielle et al., "MAORIS", ICRA 2018.
-void CloseOpenRooms(const std::vector<uint8_t>& is_block, OccupancyGrid* plan);
+void CloseOpenRooms(const std::vector<uint8_t>& is_block, const OpenRoomOptions& options,
+                    OccupancyGrid* plan);
 
 }  // namespace dsg::ingest

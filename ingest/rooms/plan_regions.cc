@@ -21,30 +21,30 @@ void VisitNeighbours(const GridFrame& frame, int64_t cell, const Visit& visit) {
   if (cell + width < frame.CellCount()) visit(cell + width);
 }
 
-PlanRegions LabelClear(OccupancyGrid plan, const DivideOptions& options) {
+PlanRegions LabelClear(OccupancyGrid plan, const RoomOptions& options) {
   const GridFrame frame = plan.frame;
   const DistanceField field(std::move(plan));
   std::vector<uint8_t> is_member(static_cast<size_t>(frame.CellCount()), 0);
   for (int64_t i = 0; i < frame.CellCount(); ++i) {
     const bool is_free = field.grid().cells[static_cast<size_t>(i)] == Occupancy::kFree;
-    const bool is_clear = static_cast<double>(field.DistanceM(i)) > options.clearance_m;
+    const bool is_clear = static_cast<double>(field.DistanceM(i)) > options.section_clearance_m;
     is_member[static_cast<size_t>(i)] = is_free && is_clear ? 1 : 0;
   }
   return LabelRegions(frame, is_member, options.room_m2_min);
 }
 
 // The region before (side 1) or behind (side -1) a gap.
-int RegionBeside(const PlanRegions& regions, const WallGap& gap, double side) {
-  for (double depth_m = 0.0; depth_m <= 1.2; depth_m += 0.5 * regions.frame.cell_m) {
+int RegionBeside(const PlanRegions& regions, const WallGap& gap, double side, double reach_m) {
+  for (double depth_m = 0.0; depth_m <= reach_m; depth_m += 0.5 * regions.frame.cell_m) {
     const int region = regions.At(gap.MiddleMap() + side * depth_m * gap.NormalMap());
     if (region >= 0) return region;
   }
   return -1;
 }
 
-bool PartsRegions(const PlanRegions& regions, const WallGap& gap) {
-  const int before = RegionBeside(regions, gap, 1.0);
-  const int behind = RegionBeside(regions, gap, -1.0);
+bool PartsRegions(const PlanRegions& regions, const WallGap& gap, double reach_m) {
+  const int before = RegionBeside(regions, gap, 1.0, reach_m);
+  const int behind = RegionBeside(regions, gap, -1.0, reach_m);
   return before >= 0 && behind >= 0 && before != behind;
 }
 
@@ -89,7 +89,8 @@ PlanRegions LabelRegions(const GridFrame& frame, const std::vector<uint8_t>& is_
   return regions;
 }
 
-DividedPlan DivideAtGaps(const OccupancyGrid& plan, const DivideOptions& options) {
+DividedPlan DivideAtGaps(const OccupancyGrid& plan, const RoomOptions& options,
+                         OpenRooms open_rooms) {
   const std::vector<WallGap> gaps = FindWallGaps(DistanceField(plan), options.gaps);
   DividedPlan divided{{}, plan};
   for (const WallGap& gap : gaps) CloseGap(gap, &divided.closed);
@@ -98,12 +99,15 @@ DividedPlan DivideAtGaps(const OccupancyGrid& plan, const DivideOptions& options
   OccupancyGrid closed = plan;
   size_t kept_count = 0;
   for (const WallGap& gap : gaps) {
-    if (!PartsRegions(divided.regions, gap)) continue;
+    if (!PartsRegions(divided.regions, gap, options.gaps.region_reach_m)) continue;
     CloseGap(gap, &closed);
     ++kept_count;
   }
-  if (options.close_open_rooms) CloseOpenRooms(FindBlocks(plan), &closed);
-  if (kept_count == gaps.size() && !options.close_open_rooms) return divided;
+  if (open_rooms == OpenRooms::kClose) {
+    CloseOpenRooms(FindBlocks(plan, options.gaps), options.open, &closed);
+  } else if (kept_count == gaps.size()) {
+    return divided;
+  }
   divided.closed = std::move(closed);
   divided.regions = LabelClear(divided.closed, options);
   return divided;

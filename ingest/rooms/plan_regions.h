@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "ingest/grid/occupancy_grid.h"
+#include "ingest/rooms/room_options.h"
 #include "ingest/rooms/wall_gaps.h"
 
 namespace dsg::ingest {
@@ -28,15 +29,8 @@ struct PlanRegions {
 PlanRegions LabelRegions(const GridFrame& frame, const std::vector<uint8_t>& is_member,
                          double m2_min);
 
-/// What one way of dividing a plan needs to know.
-struct DivideOptions {
-  /// Cells nearer to obstacles than this belong to no component.
-  double clearance_m = 0.2;
-  double room_m2_min = 1.0;
-  /// Bays that stand open to a corridor are rooms too (CloseOpenRooms).
-  bool close_open_rooms = false;
-  WallGapOptions gaps;
-};
+/// Whether bays that stand open to a corridor are rooms too (CloseOpenRooms).
+enum class OpenRooms { kLeave, kClose };
 
 struct DividedPlan {
   PlanRegions regions;
@@ -46,7 +40,8 @@ struct DividedPlan {
 
 /// Components of the free cells far enough from obstacles, with the gaps in walls closed that
 /// part one room from another. Cells next to obstacles stay without a region.
-DividedPlan DivideAtGaps(const OccupancyGrid& plan, const DivideOptions& options);
+DividedPlan DivideAtGaps(const OccupancyGrid& plan, const RoomOptions& options,
+                         OpenRooms open_rooms);
 
 /// Gives marked cells without a region the nearest region within `distance_m`, by ways over
 /// marked cells.

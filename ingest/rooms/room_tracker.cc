@@ -9,27 +9,26 @@
 namespace dsg::ingest {
 namespace {
 
-/// Places move a little when the map is corrected.
-constexpr double kSamePlaceM = 0.75;
-
 using Tile = std::tuple<int64_t, int64_t>;
 
-Tile TileOf(const Eigen::Vector3d& point) {
-  return {static_cast<int64_t>(std::floor(point.x() / kSamePlaceM)),
-          static_cast<int64_t>(std::floor(point.y() / kSamePlaceM))};
+Tile TileOf(const Eigen::Vector3d& point, double tile_m) {
+  return {static_cast<int64_t>(std::floor(point.x() / tile_m)),
+          static_cast<int64_t>(std::floor(point.y() / tile_m))};
 }
 
 /// Old places by where they are.
 class OldPlaces {
  public:
+  explicit OldPlaces(double near_m) : near_m_(near_m) {}
+
   void Add(const Eigen::Vector3d& point_map, size_t room) {
-    tiles_[TileOf(point_map)].push_back({point_map, room});
+    tiles_[TileOf(point_map, near_m_)].push_back({point_map, room});
   }
 
   /// Room of the nearest one that is near enough; -1 = none.
   int RoomNear(const Eigen::Vector3d& point_map) const {
-    const auto [x, y] = TileOf(point_map);
-    double best_m = kSamePlaceM;
+    const auto [x, y] = TileOf(point_map, near_m_);
+    double best_m = near_m_;
     int room = -1;
     for (int64_t dx = -1; dx <= 1; ++dx) {
       for (int64_t dy = -1; dy <= 1; ++dy) {
@@ -51,13 +50,14 @@ class OldPlaces {
     Eigen::Vector3d point_map;
     size_t room;
   };
+  double near_m_;
   std::map<Tile, std::vector<Item>> tiles_;
 };
 
 }  // namespace
 
 void RoomTracker::Track(const std::vector<RoomPlace>& places, std::vector<FoundRoom>* rooms) {
-  OldPlaces old_places;
+  OldPlaces old_places(same_place_m_);
   for (size_t i = 0; i < last_.size(); ++i) {
     for (const Eigen::Vector3d& point_map : last_[i].places_map) old_places.Add(point_map, i);
   }

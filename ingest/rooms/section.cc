@@ -9,9 +9,6 @@
 namespace dsg::ingest {
 namespace {
 
-/// Doors are 2.0 to 2.1 m high; only above them does a wall go on over a door.
-constexpr double kAboveDoorsM = 2.15;
-
 int LayerAt(const GridFrame& frame, double z_m) {
   return static_cast<int>(std::floor((z_m - frame.origin_map.z()) / frame.cell_m));
 }
@@ -48,15 +45,16 @@ OccupancyGrid EmptyPlan(const GridFrame& frame) {
 }
 
 OccupancyGrid CeilingSection(const OccupancyGrid& grid, double floor_z_m,
-                             const CeilingMap& ceilings, double below_m) {
+                             const CeilingMap& ceilings, const SectionOptions& options) {
   OccupancyGrid plan = EmptyPlan(grid.frame);
   const int64_t columns = ColumnCount(grid.frame);
-  const double low_m = floor_z_m + kAboveDoorsM;
+  const double low_m = floor_z_m + options.above_doors_m;
   for (int64_t i = 0; i < columns; ++i) {
     const double ceiling_m = static_cast<double>(ceilings.z_m[i]);
     if (std::isnan(ceiling_m)) continue;
-    for (int times = 1; times <= 3 && plan.cells[i] == Occupancy::kUnknown; ++times) {
-      double z_m = ceiling_m - times * below_m;
+    for (int times = 1; times <= options.step_count_max && plan.cells[i] == Occupancy::kUnknown;
+         ++times) {
+      double z_m = ceiling_m - times * options.below_ceiling_m;
       if (z_m < low_m && times > 1) break;
       // Under a low ceiling, between its underside and the lintels.
       z_m = std::max(z_m, std::min(low_m, ceiling_m - 1.5 * grid.frame.cell_m));
@@ -68,15 +66,16 @@ OccupancyGrid CeilingSection(const OccupancyGrid& grid, double floor_z_m,
   return plan;
 }
 
-OccupancyGrid BodySection(const OccupancyGrid& grid, double floor_z_m) {
+OccupancyGrid BodySection(const OccupancyGrid& grid, double floor_z_m,
+                          const SectionOptions& options) {
   OccupancyGrid plan = EmptyPlan(grid.frame);
   if (grid.frame.size.z() == 1) {
     plan.cells = grid.cells;
     return plan;
   }
-  JoinLayers(grid, floor_z_m + 1.4, floor_z_m + 1.95, &plan);
+  JoinLayers(grid, floor_z_m + options.head_min_m, floor_z_m + options.head_max_m, &plan);
   OccupancyGrid low = EmptyPlan(grid.frame);
-  JoinLayers(grid, floor_z_m + 0.3, floor_z_m + 1.35, &low);
+  JoinLayers(grid, floor_z_m + options.low_min_m, floor_z_m + options.low_max_m, &low);
   FillFrom(low, &plan);
   return plan;
 }

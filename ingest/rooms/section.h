@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "ingest/grid/occupancy_grid.h"
+#include "ingest/rooms/room_options.h"
 
 namespace dsg::ingest {
 
@@ -25,16 +26,17 @@ struct CeilingMap {
 
 /// `ceiling_z_m`: for columns whose own ceiling was not seen.
 CeilingMap FindCeilings(const OccupancyGrid& grid, double floor_z_m,
-                        const std::optional<double>& ceiling_z_m);
+                        const std::optional<double>& ceiling_z_m, const SectionOptions& options);
 
-/// The state of each column `below_m` below its ceiling; where that was not seen, twice and three
-/// times as far below, as long as that is above the doors. Source: RSS 2020, section IV-C.
+/// The state of each column below its ceiling; where that was not seen, at multiples of that
+/// distance, as long as that is above the doors. Source: RSS 2020, section IV-C.
 OccupancyGrid CeilingSection(const OccupancyGrid& grid, double floor_z_m,
-                             const CeilingMap& ceilings, double below_m);
+                             const CeilingMap& ceilings, const SectionOptions& options);
 
 /// What stands as high as a person's head; lower down where that was not seen. Tables, beds and
 /// chairs are not in it. A grid of one cell's height is taken as it is.
-OccupancyGrid BodySection(const OccupancyGrid& grid, double floor_z_m);
+OccupancyGrid BodySection(const OccupancyGrid& grid, double floor_z_m,
+                          const SectionOptions& options);
 
 /// Takes unknown cells for free where free cells close around them: holes up to `width_m`.
 void FillHoles(double width_m, OccupancyGrid* plan);

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "ingest/rooms/room_options.h"
 #include "ingest/trajectory/trajectory_change.h"
 #include "schema/model/layer.h"
 #include "schema/model/mesh.h"
@@ -45,7 +46,8 @@ struct StructurePiece {
 /// Order: the same mesh gives the same pieces in the same order.
 /// Source: RSS 2020, section IV-B (structures); one node per planar segment is ours.
 std::vector<StructurePiece> FindStructures(const std::vector<const MeshBlock*>& mesh,
-                                           const StructureClasses& classes);
+                                           const StructureClasses& classes,
+                                           const StructureOptions& options);
 
 /// A height that horizontal pieces share, and how many square metres of them there are.
 struct StructureHeight {
@@ -53,20 +55,24 @@ struct StructureHeight {
   double area_m2 = 0.0;
 };
 
-/// Heights of the ceilings or floors, those within 0.15 m of each other in one; largest area
-/// first.
-std::vector<StructureHeight> CeilingHeights(const std::vector<StructurePiece>& pieces);
-std::vector<StructureHeight> FloorHeights(const std::vector<StructurePiece>& pieces);
+/// Heights of the ceilings or floors, those near each other in one; largest area first.
+std::vector<StructureHeight> CeilingHeights(const std::vector<StructurePiece>& pieces,
+                                            const StructureOptions& options);
+std::vector<StructureHeight> FloorHeights(const std::vector<StructurePiece>& pieces,
+                                          const StructureOptions& options);
 
 /// Gives pieces the ids of the last ones that they continue.
 class StructureTracker {
  public:
+  explicit StructureTracker(const StructureOptions& options = {}) : options_(options) {}
+
   void Track(std::vector<StructurePiece>* pieces);
 
   /// The map has moved under the last pieces.
   void Move(const PointMove& move);
 
  private:
+  StructureOptions options_;
   std::vector<StructurePiece> last_;
   int64_t next_id_ = 0;
 };

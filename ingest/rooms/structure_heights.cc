@@ -6,10 +6,8 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kSameHeightM = 0.15;
-
 std::vector<StructureHeight> HeightsOf(const std::vector<StructurePiece>& pieces,
-                                       const std::string& type) {
+                                       const std::string& type, double same_height_m) {
   // The largest pieces say where a height is; smaller ones add to it.
   std::vector<const StructurePiece*> sorted;
   for (const StructurePiece& piece : pieces) {
@@ -21,7 +19,7 @@ std::vector<StructureHeight> HeightsOf(const std::vector<StructurePiece>& pieces
   for (const StructurePiece* piece : sorted) {
     const double z_m = piece->box_map.center().z();
     const auto same = std::find_if(heights.begin(), heights.end(), [&](const auto& height) {
-      return std::abs(height.z_m - z_m) <= kSameHeightM;
+      return std::abs(height.z_m - z_m) <= same_height_m;
     });
     if (same == heights.end()) {
       heights.push_back({z_m, piece->area_m2});
@@ -36,12 +34,14 @@ std::vector<StructureHeight> HeightsOf(const std::vector<StructurePiece>& pieces
 
 }  // namespace
 
-std::vector<StructureHeight> CeilingHeights(const std::vector<StructurePiece>& pieces) {
-  return HeightsOf(pieces, "ceiling");
+std::vector<StructureHeight> CeilingHeights(const std::vector<StructurePiece>& pieces,
+                                            const StructureOptions& options) {
+  return HeightsOf(pieces, "ceiling", options.same_height_m);
 }
 
-std::vector<StructureHeight> FloorHeights(const std::vector<StructurePiece>& pieces) {
-  return HeightsOf(pieces, "floor");
+std::vector<StructureHeight> FloorHeights(const std::vector<StructurePiece>& pieces,
+                                          const StructureOptions& options) {
+  return HeightsOf(pieces, "floor", options.same_height_m);
 }
 
 }  // namespace dsg::ingest

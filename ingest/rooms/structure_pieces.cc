@@ -18,15 +18,6 @@ constexpr uint8_t kCeiling = 3;
 constexpr uint8_t kPillar = 4;
 constexpr const char* kTypeNames[] = {"", "wall", "floor", "ceiling", "pillar"};
 
-constexpr double kGrowCosine = 0.9848;  // 10 degrees
-constexpr double kSeedCosine = 0.97;
-constexpr double kOffPlaneM = 0.1;
-/// Pieces of one plane with less than this between them are one.
-constexpr double kGapM = 0.5;
-constexpr double kWallM2Min = 0.3;
-constexpr double kFlatM2Min = 0.5;
-constexpr double kPillarM2Min = 0.2;
-
 /// What is summed up over the vertices of a piece.
 struct Sums {
   double area_m2 = 0.0;
@@ -62,23 +53,25 @@ struct Patch {
 };
 
 /// Least squares where the piece is broad enough to say, else the mean of the normals.
-Eigen::Vector3d PlaneNormal(const Sums& sums) {
-  constexpr double kBroadM2 = 0.02;
+Eigen::Vector3d PlaneNormal(const Sums& sums, const StructureOptions& options) {
   const Eigen::Vector3d mean = sums.MeanNormal();
   const Eigen::Vector3d center = sums.Center();
   const Eigen::Matrix3d spread = sums.square / sums.area_m2 - center * center.transpose();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(spread);
-  if (solver.info() != Eigen::Success || solver.eigenvalues()[1] < kBroadM2) return mean;
+  if (solver.info() != Eigen::Success || solver.eigenvalues()[1] < options.broad_m2) {
+    return mean;
+  }
   const Eigen::Vector3d fitted = solver.eigenvectors().col(0);
   const double cosine = fitted.dot(mean);
-  if (std::abs(cosine) < kGrowCosine) return mean;
+  if (std::abs(cosine) < options.grow_cosine) return mean;
   return cosine < 0.0 ? Eigen::Vector3d(-fitted) : fitted;
 }
 
 class PieceFinder {
  public:
-  PieceFinder(const StructureSurface& surface, const StructureClasses& classes)
-      : surface_(surface), types_(surface.positions_map.size(), kNone) {
+  PieceFinder(const StructureSurface& surface, const StructureClasses& classes,
+              const StructureOptions& options)
+      : surface_(surface), options_(options), types_(surface.positions_map.size(), kNone) {
     ReadTypes(classes);
   }
 
@@ -106,12 +99,12 @@ class PieceFinder {
     for (size_t i = 0; i < types_.size(); ++i) types_[i] = TypeOfNormal(surface_.normals_map[i]);
   }
 
-  static uint8_t TypeOfNormal(const Eigen::Vector3f& normal) {
-    constexpr float kLevel = 0.93f;
-    constexpr float kUpright = 0.2f;
-    if (normal.z() > kLevel) return kFloor;
-    if (normal.z() < -kLevel) return kCeiling;
-    return std::abs(normal.z()) < kUpright && !normal.isZero() ? kWall : kNone;
+  uint8_t TypeOfNormal(const Eigen::Vector3f& normal) const {
+    const auto level = static_cast<float>(options_.level_cosine);
+    const auto upright = static_cast<float>(options_.upright_cosine);
+    if (normal.z() > level) return kFloor;
+    if (normal.z() < -level) return kCeiling;
+    return std::abs(normal.z()) < upright && !normal.isZero() ? kWall : kNone;
   }
 
   int32_t ClassOf(uint32_t vertex) const { return is_labelled_ ? surface_.class_ids[vertex] : -1; }
@@ -148,8 +141,9 @@ class PieceFinder {
   // Whether all around a vertex looks the same way: plane pieces begin there.
   bool IsEven(uint32_t vertex) const {
     const Eigen::Vector3f& normal = surface_.normals_map[vertex];
+    const auto seed_cosine = static_cast<float>(options_.seed_cosine);
     for (const uint32_t other : surface_.NeighboursOf(vertex)) {
-      if (normal.dot(surface_.normals_map[other]) < static_cast<float>(kSeedCosine)) return false;
+      if (normal.dot(surface_.normals_map[other]) < seed_cosine) return false;
     }
     return !normal.isZero();
   }
@@ -177,26 +171,26 @@ class PieceFinder {
       }
       for (const uint32_t other : surface_.NeighboursOf(open_[next])) {
         if (types_[other] != type || ClassOf(other) != patch.class_id) continue;
-        if (Normal(other).dot(normal) < kGrowCosine) continue;
-        if (std::abs(normal.dot(Position(other)) + offset_m) > kOffPlaneM) continue;
+        if (Normal(other).dot(normal) < options_.grow_cosine) continue;
+        if (std::abs(normal.dot(Position(other)) + offset_m) > options_.off_plane_m) continue;
         AddTo(other, &patch);
       }
     }
     return patch;
   }
 
-  static bool MayJoin(const Patch& a, const Patch& b) {
+  bool MayJoin(const Patch& a, const Patch& b) const {
     if (a.type != b.type || a.class_id != b.class_id || a.type == kPillar) return false;
-    if (a.sums.box.exteriorDistance(b.sums.box) > kGapM) return false;
+    if (a.sums.box.exteriorDistance(b.sums.box) > options_.gap_m) return false;
     const Eigen::Vector3d normal = a.sums.MeanNormal();
-    if (normal.dot(b.sums.MeanNormal()) < kGrowCosine) return false;
-    return std::abs(normal.dot(b.sums.Center() - a.sums.Center())) <= kOffPlaneM;
+    if (normal.dot(b.sums.MeanNormal()) < options_.grow_cosine) return false;
+    return std::abs(normal.dot(b.sums.Center() - a.sums.Center())) <= options_.off_plane_m;
   }
 
   // Each piece takes what lies in its plane next to it, the largest first.
   void JoinPatches() {
-    constexpr double kCrumbM2 = 0.02;
-    std::erase_if(patches_, [](const Patch& patch) { return patch.sums.area_m2 < kCrumbM2; });
+    std::erase_if(patches_,
+                  [this](const Patch& patch) { return patch.sums.area_m2 < options_.crumb_m2; });
     std::stable_sort(patches_.begin(), patches_.end(), [](const Patch& a, const Patch& b) {
       return a.sums.area_m2 > b.sums.area_m2;
     });
@@ -219,35 +213,34 @@ class PieceFinder {
   // Without labels: what is level but neither lowest nor highest is furniture, and what is
   // upright but low.
   void DropImplausible() {
-    constexpr double kBigM2 = 2.0;
-    constexpr double kLevelM = 0.3;
-    constexpr double kWallHeightM = 1.5;
-    constexpr double kUnlabelledWallM2 = 1.0;
     double floor_m = INFINITY;
     double ceiling_m = -INFINITY;
     for (const Patch& patch : patches_) {
-      if (patch.sums.area_m2 < kBigM2) continue;
+      if (patch.sums.area_m2 < options_.big_m2) continue;
       const double z_m = patch.sums.Center().z();
       if (patch.type == kFloor) floor_m = std::min(floor_m, z_m);
       if (patch.type == kCeiling) ceiling_m = std::max(ceiling_m, z_m);
     }
     std::erase_if(patches_, [&](const Patch& patch) {
       const double z_m = patch.sums.Center().z();
-      if (patch.type == kFloor) return !(std::abs(z_m - floor_m) <= kLevelM);
+      if (patch.type == kFloor) return !(std::abs(z_m - floor_m) <= options_.floor_level_m);
       // Rooms may be lower than the highest one.
       if (patch.type == kCeiling) {
-        return patch.sums.area_m2 < kBigM2 || !(z_m > std::max(floor_m + 2.0, ceiling_m - 1.5));
+        const double low_m =
+            std::max(floor_m + options_.ceiling_above_m, ceiling_m - options_.ceiling_below_m);
+        return patch.sums.area_m2 < options_.big_m2 || !(z_m > low_m);
       }
-      return patch.sums.area_m2 < kUnlabelledWallM2 || patch.sums.box.sizes().z() < kWallHeightM;
+      return patch.sums.area_m2 < options_.unlabelled_wall_m2 ||
+             patch.sums.box.sizes().z() < options_.wall_height_m;
     });
   }
 
   std::vector<StructurePiece> Pieces() const {
     std::vector<StructurePiece> pieces;
     for (const Patch& patch : patches_) {
-      const double m2_min = patch.type == kWall     ? kWallM2Min
-                            : patch.type == kPillar ? kPillarM2Min
-                                                    : kFlatM2Min;
+      const double m2_min = patch.type == kWall     ? options_.wall_m2_min
+                            : patch.type == kPillar ? options_.pillar_m2_min
+                                                    : options_.flat_m2_min;
       if (patch.sums.area_m2 < m2_min) continue;
       StructurePiece piece;
       piece.type = kTypeNames[patch.type];
@@ -255,7 +248,7 @@ class PieceFinder {
       piece.box_map = patch.sums.box;
       piece.area_m2 = patch.sums.area_m2;
       if (patch.type != kPillar) {
-        piece.normal_map = PlaneNormal(patch.sums);
+        piece.normal_map = PlaneNormal(patch.sums, options_);
         piece.offset_m = -piece.normal_map.dot(patch.sums.Center());
       }
       pieces.push_back(std::move(piece));
@@ -264,6 +257,7 @@ class PieceFinder {
   }
 
   const StructureSurface& surface_;
+  const StructureOptions& options_;
   /// Of vertices that are not in a piece yet.
   std::vector<uint8_t> types_;
   bool is_labelled_ = false;
@@ -274,9 +268,10 @@ class PieceFinder {
 }  // namespace
 
 std::vector<StructurePiece> FindStructures(const std::vector<const MeshBlock*>& mesh,
-                                           const StructureClasses& classes) {
-  const StructureSurface surface = JoinBlocks(mesh);
-  return PieceFinder(surface, classes).Find();
+                                           const StructureClasses& classes,
+                                           const StructureOptions& options) {
+  const StructureSurface surface = JoinBlocks(mesh, options.smooth_cosine);
+  return PieceFinder(surface, classes, options).Find();
 }
 
 }  // namespace dsg::ingest

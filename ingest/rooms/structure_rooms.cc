@@ -7,11 +7,7 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kNearM = 0.4;
-constexpr double kHangGapM = 0.15;
-constexpr double kHangAboveM = 0.3;
-/// A wall that runs along a room for less is another room's.
-constexpr double kAlongM = 0.4;
+/// How densely walls and floors are looked at; denser says the same.
 constexpr double kStepM = 0.2;
 
 Eigen::AlignedBox2d Floor(const Box3d& box) {
@@ -38,7 +34,9 @@ bool OverlapInHeight(const StructurePiece& piece, const FoundRoom& room) {
   return piece.box_map.min().z() < room.z_max_m && piece.box_map.max().z() > room.z_min_m;
 }
 
-bool WallBounds(const StructurePiece& wall, const FoundRoom& room) {
+bool WallBounds(const StructurePiece& wall, const FoundRoom& room,
+                const StructureOptions& options) {
+  const double near_m = options.near_m;
   if (!OverlapInHeight(wall, room)) return false;
   const auto [from, to] = EndsOf(wall);
   const double length_m = (to - from).norm();
@@ -47,23 +45,23 @@ bool WallBounds(const StructurePiece& wall, const FoundRoom& room) {
   int hits = 0;
   for (int step = 0; step < steps; ++step) {
     const Eigen::Vector2d at = from + (to - from) * ((step + 0.5) / steps);
-    if (std::abs(SignedDistanceToPolygon(room.footprint_map, at)) > kNearM) continue;
-    const bool faces = SignedDistanceToPolygon(room.footprint_map, at + kNearM * into) < 0.0;
-    const bool turns_away = SignedDistanceToPolygon(room.footprint_map, at - kNearM * into) < 0.0;
+    if (std::abs(SignedDistanceToPolygon(room.footprint_map, at)) > near_m) continue;
+    const bool faces = SignedDistanceToPolygon(room.footprint_map, at + near_m * into) < 0.0;
+    const bool turns_away = SignedDistanceToPolygon(room.footprint_map, at - near_m * into) < 0.0;
     hits += faces && !turns_away ? 1 : 0;
   }
-  return hits * length_m / steps >= std::min(kAlongM, 0.5 * length_m);
+  return hits * length_m / steps >= std::min(options.along_m, options.along_share * length_m);
 }
 
-// Whether they share at least a tenth of a square metre, by points.
-bool LiesOver(const StructurePiece& piece, const FoundRoom& room) {
+// Whether they share an area, by points.
+bool LiesOver(const StructurePiece& piece, const FoundRoom& room, double m2_min) {
   const Eigen::AlignedBox2d shared =
       Floor(piece.box_map).intersection(BoundsOf(room.footprint_map));
   if (shared.isEmpty()) return false;
   int hits = 0;
   for (double y = shared.min().y() + 0.5 * kStepM; y < shared.max().y(); y += kStepM) {
     for (double x = shared.min().x() + 0.5 * kStepM; x < shared.max().x(); x += kStepM) {
-      if (PolygonContains(room.footprint_map, {x, y}) && ++hits * kStepM * kStepM >= 0.1) {
+      if (PolygonContains(room.footprint_map, {x, y}) && ++hits * kStepM * kStepM >= m2_min) {
         return true;
       }
     }
@@ -71,33 +69,34 @@ bool LiesOver(const StructurePiece& piece, const FoundRoom& room) {
   return false;
 }
 
-bool Bounds(const StructurePiece& piece, const FoundRoom& room) {
+bool Bounds(const StructurePiece& piece, const FoundRoom& room, const StructureOptions& options) {
   if (room.footprint_map.size() < 3 || piece.box_map.isEmpty()) return false;
   Eigen::AlignedBox2d near = BoundsOf(room.footprint_map);
-  near.min().array() -= kNearM;
-  near.max().array() += kNearM;
+  near.min().array() -= options.near_m;
+  near.max().array() += options.near_m;
   if (!near.intersects(Floor(piece.box_map))) return false;
   const double z_m = piece.box_map.center().z();
-  if (piece.type == "floor") return std::abs(z_m - room.z_min_m) < kNearM && LiesOver(piece, room);
-  if (piece.type == "ceiling") {
-    return std::abs(z_m - room.z_max_m) < kNearM && LiesOver(piece, room);
+  if (piece.type == "floor" || piece.type == "ceiling") {
+    const double room_z_m = piece.type == "floor" ? room.z_min_m : room.z_max_m;
+    return std::abs(z_m - room_z_m) < options.near_m && LiesOver(piece, room, options.over_m2);
   }
   if (piece.type == "pillar") {
     const Eigen::Vector2d middle = piece.box_map.center().head<2>();
     return OverlapInHeight(piece, room) &&
-           SignedDistanceToPolygon(room.footprint_map, middle) < kNearM;
+           SignedDistanceToPolygon(room.footprint_map, middle) < options.near_m;
   }
-  return WallBounds(piece, room);
+  return WallBounds(piece, room, options);
 }
 
 }  // namespace
 
 std::vector<std::pair<int, int>> EnclosesOf(const std::vector<StructurePiece>& pieces,
-                                            const std::vector<FoundRoom>& rooms) {
+                                            const std::vector<FoundRoom>& rooms,
+                                            const StructureOptions& options) {
   std::vector<std::pair<int, int>> pairs;
   for (size_t piece = 0; piece < pieces.size(); ++piece) {
     for (size_t room = 0; room < rooms.size(); ++room) {
-      if (Bounds(pieces[piece], rooms[room])) {
+      if (Bounds(pieces[piece], rooms[room], options)) {
         pairs.emplace_back(static_cast<int>(piece), static_cast<int>(room));
       }
     }
@@ -106,15 +105,16 @@ std::vector<std::pair<int, int>> EnclosesOf(const std::vector<StructurePiece>& p
 }
 
 std::optional<int> AttachedTo(const Box3d& box_map, double floor_z_m, bool rests_on_thing,
-                              const std::vector<StructurePiece>& pieces) {
+                              const std::vector<StructurePiece>& pieces,
+                              const StructureOptions& options) {
   if (rests_on_thing || box_map.isEmpty()) return std::nullopt;
-  if (box_map.min().z() <= floor_z_m + kHangAboveM) return std::nullopt;
+  if (box_map.min().z() <= floor_z_m + options.hang_above_m) return std::nullopt;
   std::optional<int> best;
-  double best_m = kHangGapM;
+  double best_m = options.hang_gap_m;
   for (size_t i = 0; i < pieces.size(); ++i) {
     const StructurePiece& wall = pieces[i];
     if (wall.type != "wall" || wall.box_map.isEmpty()) continue;
-    if (wall.box_map.exteriorDistance(box_map) >= kHangGapM) continue;
+    if (wall.box_map.exteriorDistance(box_map) >= options.hang_gap_m) continue;
     const Eigen::Vector3d half = 0.5 * box_map.sizes();
     const double reach_m = wall.normal_map.cwiseAbs().dot(half);
     const double middle_m = wall.normal_map.dot(box_map.center()) + wall.offset_m;

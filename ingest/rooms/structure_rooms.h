@@ -12,15 +12,16 @@
 
 namespace dsg::ingest {
 
-/// Pairs (piece, room), ascending: the piece runs along the room's outline within 0.4 m of it,
-/// faces it, and is at its height. Floors, ceilings and pillars: lie over or under it, or in it.
+/// Pairs (piece, room), ascending: the piece runs along the room's outline near it, faces it, and
+/// is at its height. Floors, ceilings and pillars: lie over or under it, or in it.
 std::vector<std::pair<int, int>> EnclosesOf(const std::vector<StructurePiece>& pieces,
-                                            const std::vector<FoundRoom>& rooms);
+                                            const std::vector<FoundRoom>& rooms,
+                                            const StructureOptions& options);
 
-/// The wall that a thing hangs on: nearest of those less than 0.15 m from its box, which is more
-/// than 0.3 m above the floor. nullopt for what stands on the floor or, as `rests_on_thing` says,
-/// on another thing.
+/// The wall that a thing hangs on: nearest of those near its box, which is above the floor. nullopt
+/// for what stands on the floor or, as `rests_on_thing` says, on another thing.
 std::optional<int> AttachedTo(const Box3d& box_map, double floor_z_m, bool rests_on_thing,
-                              const std::vector<StructurePiece>& pieces);
+                              const std::vector<StructurePiece>& pieces,
+                              const StructureOptions& options);
 
 }  // namespace dsg::ingest

@@ -42,7 +42,8 @@ class Welder {
 
 class Joiner {
  public:
-  explicit Joiner(const std::vector<const MeshBlock*>& mesh) : mesh_(mesh) {}
+  Joiner(const std::vector<const MeshBlock*>& mesh, double smooth_cosine)
+      : mesh_(mesh), smooth_cosine_(static_cast<float>(smooth_cosine)) {}
 
   StructureSurface Join() {
     size_t vertex_count = 0;
@@ -138,12 +139,11 @@ class Joiner {
 
   // Neighbours around the corner do not count, so that edges stay sharp.
   void Smooth() {
-    constexpr float kCosineMin = 0.8f;
     const std::vector<Eigen::Vector3f> before = surface_.normals_map;
     for (uint32_t i = 0; i < before.size(); ++i) {
       Eigen::Vector3f sum = 2.0f * before[i];
       for (const uint32_t other : surface_.NeighboursOf(i)) {
-        if (before[i].dot(before[other]) > kCosineMin) sum += before[other];
+        if (before[i].dot(before[other]) > smooth_cosine_) sum += before[other];
       }
       surface_.normals_map[i] = sum;
     }
@@ -151,14 +151,15 @@ class Joiner {
   }
 
   const std::vector<const MeshBlock*>& mesh_;
+  const float smooth_cosine_;
   StructureSurface surface_;
   std::vector<Face> faces_;
 };
 
 }  // namespace
 
-StructureSurface JoinBlocks(const std::vector<const MeshBlock*>& mesh) {
-  return Joiner(mesh).Join();
+StructureSurface JoinBlocks(const std::vector<const MeshBlock*>& mesh, double smooth_cosine) {
+  return Joiner(mesh, smooth_cosine).Join();
 }
 
 }  // namespace dsg::ingest

@@ -28,7 +28,8 @@ struct StructureSurface {
   }
 };
 
+/// Normals are smoothed over neighbours within an angle of cosine `smooth_cosine`.
 /// Order: vertices as they first come. Cost: linear.
-StructureSurface JoinBlocks(const std::vector<const MeshBlock*>& mesh);
+StructureSurface JoinBlocks(const std::vector<const MeshBlock*>& mesh, double smooth_cosine);
 
 }  // namespace dsg::ingest

@@ -8,25 +8,22 @@
 namespace dsg::ingest {
 namespace {
 
-/// A piece goes on as one of the same class whose plane is this near and whose box touches it.
-constexpr double kCosine = 0.966;
-constexpr double kOffM = 0.2;
-constexpr double kApartM = 0.3;
-
-bool MayContinue(const StructurePiece& old, const StructurePiece& now) {
+/// A piece goes on as one of the same class whose plane is near and whose box touches it.
+bool MayContinue(const StructurePiece& old, const StructurePiece& now,
+                 const StructureOptions& options) {
   if (old.type != now.type || old.class_id != now.class_id) return false;
   if (old.box_map.isEmpty() || now.box_map.isEmpty()) return false;
-  if (old.box_map.exteriorDistance(now.box_map) > kApartM) return false;
+  if (old.box_map.exteriorDistance(now.box_map) > options.same_apart_m) return false;
   if (now.type == "pillar") return true;
-  if (old.normal_map.dot(now.normal_map) < kCosine) return false;
-  return std::abs(old.normal_map.dot(now.box_map.center()) + old.offset_m) <= kOffM;
+  if (old.normal_map.dot(now.normal_map) < options.same_cosine) return false;
+  return std::abs(old.normal_map.dot(now.box_map.center()) + old.offset_m) <= options.same_plane_m;
 }
 
 // How much of the smaller of two boxes is in both, edges that are too thin made thicker.
-double Overlap(const Box3d& a, const Box3d& b) {
-  const auto thick = [](Box3d box) {
-    box.min().array() -= 0.5 * kApartM;
-    box.max().array() += 0.5 * kApartM;
+double Overlap(const Box3d& a, const Box3d& b, double thick_m) {
+  const auto thick = [thick_m](Box3d box) {
+    box.min().array() -= 0.5 * thick_m;
+    box.max().array() += 0.5 * thick_m;
     return box;
   };
   const Box3d shared = thick(a).intersection(thick(b));
@@ -39,8 +36,9 @@ void StructureTracker::Track(std::vector<StructurePiece>* pieces) {
   std::vector<std::tuple<double, size_t, size_t>> pairs;
   for (size_t i = 0; i < last_.size(); ++i) {
     for (size_t j = 0; j < pieces->size(); ++j) {
-      if (!MayContinue(last_[i], (*pieces)[j])) continue;
-      pairs.emplace_back(-Overlap(last_[i].box_map, (*pieces)[j].box_map), i, j);
+      if (!MayContinue(last_[i], (*pieces)[j], options_)) continue;
+      pairs.emplace_back(-Overlap(last_[i].box_map, (*pieces)[j].box_map, options_.same_apart_m), i,
+                         j);
     }
   }
   std::sort(pairs.begin(), pairs.end());

@@ -8,21 +8,13 @@
 namespace dsg::ingest {
 namespace {
 
-/// How far behind a jamb space must open, and how far before and behind a wall one looks for it.
-constexpr double kBehindJambM = 0.25;
-constexpr double kNarrowDepthM = 0.8;
-constexpr double kWideDepthM = 0.5;
-
-/// An obstacle that stands alone, is as thick and as short as this, and fills its box, is furniture
-/// or a pillar; corners of walls between two doors do not fill theirs.
-constexpr double kThickM = 0.45;
-constexpr double kShortM = 2.6;
-constexpr double kFilled = 0.6;
-
 class GapFinder {
  public:
   GapFinder(const DistanceField& plan, const WallGapOptions& options)
-      : plan_(plan), frame_(plan.frame()), options_(options), is_block_(FindBlocks(plan.grid())) {}
+      : plan_(plan),
+        frame_(plan.frame()),
+        options_(options),
+        is_block_(FindBlocks(plan.grid(), options)) {}
 
   std::vector<WallGap> Find() const {
     std::vector<WallGap> candidates = Candidates();
@@ -31,7 +23,7 @@ class GapFinder {
     std::vector<WallGap> gaps;
     for (const WallGap& gap : candidates) {
       const bool is_taken = std::any_of(gaps.begin(), gaps.end(), [&](const WallGap& other) {
-        const double reach_m = std::max(0.5, 0.5 * other.WidthM());
+        const double reach_m = std::max(options_.apart_m, 0.5 * other.WidthM());
         return (other.MiddleMap() - gap.MiddleMap()).norm() < reach_m;
       });
       if (!is_taken && OpensOnBothSides(gap)) gaps.push_back(gap);
@@ -76,7 +68,7 @@ class GapFinder {
     const double width_m = gap.WidthM();
     const double clearance_m = static_cast<double>(plan_.DistanceM(i));
     // Opposite each other, seen from here.
-    if (width_m < 1.8 * clearance_m || width_m < 0.4) return;
+    if (width_m < options_.opposite * clearance_m || width_m < options_.width_m_min) return;
     if (width_m > options_.wide_m_max) return;
     if (!candidates->empty() && candidates->back().from_map == gap.from_map &&
         candidates->back().to_map == gap.to_map) {
@@ -95,8 +87,8 @@ class GapFinder {
   bool Opens(const WallGap& gap, double side, bool is_narrow) const {
     const Eigen::Vector2d along = (gap.to_map - gap.from_map).normalized();
     const Eigen::Vector2d out = side * gap.NormalMap();
-    const double depth_m = is_narrow ? kNarrowDepthM : kWideDepthM;
-    const double reach_m = 0.5 * gap.WidthM() + kBehindJambM;
+    const double depth_m = is_narrow ? options_.narrow_depth_m : options_.wide_depth_m;
+    const double reach_m = 0.5 * gap.WidthM() + options_.behind_jamb_m;
     for (double depth = frame_.cell_m; depth <= depth_m; depth += 0.5 * frame_.cell_m) {
       const Eigen::Vector2d middle = gap.MiddleMap() + depth * out;
       if (!IsFree(middle)) return false;
@@ -125,7 +117,7 @@ class GapFinder {
 
 }  // namespace
 
-std::vector<uint8_t> FindBlocks(const OccupancyGrid& plan) {
+std::vector<uint8_t> FindBlocks(const OccupancyGrid& plan, const WallGapOptions& options) {
   const GridFrame& frame = plan.frame;
   std::vector<uint8_t> state(plan.cells.size(), 0);
   std::vector<int64_t> open;
@@ -149,7 +141,10 @@ std::vector<uint8_t> FindBlocks(const OccupancyGrid& plan) {
     const Eigen::Vector2d size_m = frame.cell_m * (box.sizes().cast<double>().array() + 1).matrix();
     const double filled =
         static_cast<double>(open.size()) * frame.cell_m * frame.cell_m / size_m.prod();
-    if (size_m.minCoeff() < kThickM || size_m.maxCoeff() > kShortM || filled < kFilled) continue;
+    if (size_m.minCoeff() < options.block_thick_m || size_m.maxCoeff() > options.block_long_m ||
+        filled < options.block_filled) {
+      continue;
+    }
     for (const int64_t cell : open) state[static_cast<size_t>(cell)] = 2;
   }
   for (uint8_t& cell : state) cell = cell == 2 ? 1 : 0;

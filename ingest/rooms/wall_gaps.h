@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "ingest/grid/distance_field.h"
+#include "ingest/rooms/room_options.h"
 
 namespace dsg::ingest {
 
@@ -24,16 +25,9 @@ struct WallGap {
   }
 };
 
-struct WallGapOptions {
-  /// Up to here it is enough that space opens at one end on either side: doors stand in corners.
-  double narrow_m_max = 1.3;
-  /// Up to here there must be wall at both ends, with space before and behind it.
-  double wide_m_max = 2.65;
-};
-
 /// Marks the occupied cells that are no walls: obstacles that stand alone, are as thick as a body
 /// and not long, and fill their box.
-std::vector<uint8_t> FindBlocks(const OccupancyGrid& plan);
+std::vector<uint8_t> FindBlocks(const OccupancyGrid& plan, const WallGapOptions& options);
 
 /// `plan`: of one cell's height. Ends are occupied cells, never unknown ones.
 /// Order: by width. Source: critical points of Voronoi graphs, Thrun 1998; the test of the jambs

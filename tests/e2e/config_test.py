@@ -29,7 +29,9 @@ class Configuration(support.ProgramsTest):
         return dict(line.split(": ", 1) for line in lines), text
 
     def test_what_is_printed_is_a_file_that_prints_the_same(self):
-        _, text = self.printed("--voxel", "0.08", "--no-layers", "--map", "m", "--up", "0,0,1")
+        values, text = self.printed("--voxel", "0.08", "--no-layers", "--map", "m", "--up",
+                                    "0,0,1", "--room-bay-sparse", "0.65", "--place-block", "2")
+        self.assertEqual("0.65", values["room-bay-sparse"])
         self.write("again.yaml", text)
         self.assertEqual(text, self.printed("--config", "again.yaml")[1])
 
@@ -83,6 +85,29 @@ class Configuration(support.ProgramsTest):
             self.refused(2, ["--frame-period " + period], "dsg-ingest", "--frame-period", period,
                          "--store", "none", "--map", "m", self.small)
         self.assertFalse(os.path.exists(self.path("none")))
+
+    def test_options_of_stages_have_ranges_and_groups(self):
+        for name, value, bounds in (("room-bay-sparse", "1.5", "0 to 1"),
+                                    ("place-block", "0.1", "0.2 to 20")):
+            self.refused(2, [name, value, bounds], "dsg-ingest", "--" + name, value, "--store",
+                         "none", "--map", "m", self.small)
+            self.refused(2, [name, value, bounds], "dsg-ingest", "--config",
+                         self.write("range.yaml", f"{name}: {value}\n"), "--store", "none",
+                         "--map", "m", self.small)
+        self.assertFalse(os.path.exists(self.path("none")))
+        _, text = self.printed()
+        groups = [line[7:] for line in text.splitlines() if line.startswith("# ---- Tuning: ")]
+        brief, whole = (self.ok("dsg-ingest", option) for option in ("--help", "--help-all"))
+        with open(os.path.join(support.ROOT, "docs", "configuration.md"), encoding="utf-8") as f:
+            docs = f.read()
+        self.assertEqual(docs.count("| Tuning: "), len(groups))
+        for group in groups:
+            self.assertIn(f"| {group} |", docs)
+            self.assertIn(group, brief)
+        for name in ("place-block", "room-bay-sparse", "structure-gap"):
+            self.assertIn("\n" + name + ": ", text)
+            self.assertIn("--" + name, whole)
+            self.assertNotIn("--" + name, brief)
 
     def test_shipped_files_are_in_force(self):
         names = sorted(os.listdir(SHIPPED))

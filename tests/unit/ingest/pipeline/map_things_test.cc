@@ -32,15 +32,15 @@ TEST(MapThings, ObjectsAreNeitherStructuresNorPeople) {
 TEST(MapThings, FloorsAreApartAndUnderTheRobot) {
   const std::vector<StructurePiece> pieces = {Level("floor", 0.0, 10), Level("floor", 0.8, 4),
                                               Level("floor", 3.0, 8), Level("floor", 6.0, 9)};
-  EXPECT_EQ(FloorsOf(pieces, {{1, 1, 1.2}, {1, 1, 4.2}}), (std::vector<double>{0.0, 3.0}));
-  EXPECT_TRUE(FloorsOf(pieces, {}).empty());
+  EXPECT_EQ(FloorsOf(pieces, {{1, 1, 1.2}, {1, 1, 4.2}}, {}), (std::vector<double>{0.0, 3.0}));
+  EXPECT_TRUE(FloorsOf(pieces, {}, {}).empty());
 }
 
 TEST(MapThings, TheCeilingIsTheLargestWithinReach) {
   const std::vector<StructurePiece> pieces = {Level("ceiling", 2.7, 4), Level("ceiling", 3.0, 9),
                                               Level("ceiling", 9.0, 20)};
-  EXPECT_DOUBLE_EQ(CeilingAbove(pieces, 0.0).value(), 3.0);
-  EXPECT_FALSE(CeilingAbove(pieces, 2.5).has_value());
+  EXPECT_DOUBLE_EQ(CeilingAbove(pieces, 0.0, {}).value(), 3.0);
+  EXPECT_FALSE(CeilingAbove(pieces, 2.5, {}).has_value());
 }
 
 TEST(MapThings, WhatHangsStandsOnNoFloor) {

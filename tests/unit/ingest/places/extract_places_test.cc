@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <set>
+#include <string>
 
 #include "ingest/grid/distance_field.h"
 #include "schema/base/disjoint_sets.h"
@@ -274,6 +276,46 @@ TEST(ExtractPlaces, TakesNothingAndNonsenseWithoutACrash) {
   for (Occupancy& cell : noise.cells) cell = static_cast<Occupancy>(random.Index(3));
   ExtractPlaces(noise, {{2.0, 2.0, 1.0}}, OnGround());
   ExtractPlaces(noise, {{2.0, 2.0, 1.0}}, InTheAir());
+}
+
+TEST(ExtractPlaces, HasMorePlacesWhereTheyCoverLess) {
+  const OccupancyGrid grid = TwoRooms(0.9);
+  const size_t count = ExtractPlaces(grid, {}, OnGround()).places.size();
+  PlaceOptions options = OnGround();
+  options.near_reach_m = 0.3;
+  options.reach_rise = 0.0;
+  options.heir_m = 0.0;
+  EXPECT_GT(ExtractPlaces(grid, {}, options).places.size(), count);
+  options = OnGround();
+  options.free_box_m = 0.5;
+  for (const Place& place : ExtractPlaces(grid, {}, options).places) {
+    EXPECT_LE(place.free_box.sizes().head<2>().maxCoeff(), 1.1 + 1e-6);
+  }
+}
+
+TEST(PlaceOptions, AreInRangeAndHaveNamesOfTheirOwn) {
+  EXPECT_TRUE(ValidateOptions(PlaceOptions()).ok());
+  PlaceOptions options;
+  const std::vector<BoundOption> bound = options.Bind();
+  std::set<std::string> names;
+  std::set<const double*> numbers;
+  for (const BoundOption& field : bound) {
+    names.insert(field.name);
+    numbers.insert(field.value);
+    const double before = *field.value;
+    *field.value = field.max + 1.0;
+    const absl::Status status = ValidateOptions(options);
+    EXPECT_NE(status.message().find(field.name), std::string::npos) << field.name;
+    *field.value = field.min;
+    EXPECT_TRUE(ValidateOptions(options).ok()) << field.name;
+    EXPECT_EQ(DigestOptions(options).empty(), before == field.min) << field.name;
+    *field.value = before;
+  }
+  EXPECT_EQ(names.size(), bound.size());
+  EXPECT_EQ(numbers.size(), bound.size());
+  // Each number has its row.
+  const auto* const end = reinterpret_cast<const double*>(&options + 1);
+  EXPECT_EQ(static_cast<ptrdiff_t>(bound.size()), end - &options.storey_m_min);
 }
 
 }  // namespace

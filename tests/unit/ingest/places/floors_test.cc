@@ -26,20 +26,20 @@ TEST(FindFloors, FindsTheOneFloorDespiteTablesAndHoles) {
   Fill({1.0, 1.0, 0.6}, {4.0, 5.0, 0.8}, kSolid, &grid);
   Fill({5.0, 1.0, -0.1}, {7.0, 5.0, 0.0}, Occupancy::kUnknown, &grid);
   Fill({0.0, 0.0, 2.4}, {8.0, 6.0, 2.6}, kSolid, &grid);
-  ASSERT_EQ(FindFloors(grid, {}).size(), 1u);
+  ASSERT_EQ(FindFloors(grid, {}, {}).size(), 1u);
   // Of cells that reach up to 0.
-  EXPECT_NEAR(FindFloors(grid, {{4.0, 3.0, 1.2}})[0], 0.0, 0.11);
+  EXPECT_NEAR(FindFloors(grid, {{4.0, 3.0, 1.2}}, {})[0], 0.0, 0.11);
 }
 
 TEST(FindFloors, FindsBothStoreysAroundAStairwell) {
-  const std::vector<double> floors_m = FindFloors(TwoStoreys(), {});
+  const std::vector<double> floors_m = FindFloors(TwoStoreys(), {}, {});
   ASSERT_EQ(floors_m.size(), 2u);
   EXPECT_NEAR(floors_m[1] - floors_m[0], 3.0, 0.11);
   EXPECT_LT(floors_m[0], floors_m[1]);
 }
 
 TEST(FindFloors, LeavesOutStoreysThatTheRobotOnlySaw) {
-  const std::vector<double> floors_m = FindFloors(TwoStoreys(), {{8.0, 4.0, 1.2}});
+  const std::vector<double> floors_m = FindFloors(TwoStoreys(), {{8.0, 4.0, 1.2}}, {});
   ASSERT_EQ(floors_m.size(), 1u);
   EXPECT_NEAR(floors_m[0], 0.0, 0.11);
 }
@@ -47,7 +47,7 @@ TEST(FindFloors, LeavesOutStoreysThatTheRobotOnlySaw) {
 TEST(FindFloors, LiftsAFloorWhoseNoiseReachesTheNextLayer) {
   OccupancyGrid grid = MakeHall({8.0, 6.0, 2.6});
   Fill({0.0, 0.0, 0.0}, {4.0, 6.0, 0.1}, kSolid, &grid);
-  const std::vector<double> floors_m = FindFloors(grid, {});
+  const std::vector<double> floors_m = FindFloors(grid, {}, {});
   ASSERT_EQ(floors_m.size(), 1u);
   PlaceOptions options;
   options.floors_m = floors_m;
@@ -55,11 +55,20 @@ TEST(FindFloors, LiftsAFloorWhoseNoiseReachesTheNextLayer) {
   for (const Occupancy cell : flat.cells) ASSERT_EQ(cell, Occupancy::kFree);
 }
 
+TEST(FindFloors, FindsWhatTheOptionsSay) {
+  PlaceOptions options;
+  options.storey_m_min = 3.5;
+  EXPECT_EQ(FindFloors(TwoStoreys(), {}, options).size(), 1u);
+  options = {};
+  options.floor_m2_min = 1000.0;
+  EXPECT_TRUE(FindFloors(TwoStoreys(), {}, options).empty());
+}
+
 TEST(FindFloors, FindsNoneInNothing) {
-  EXPECT_TRUE(FindFloors({}, {}).empty());
+  EXPECT_TRUE(FindFloors({}, {}, {}).empty());
   OccupancyGrid grid = MakeHall({3.0, 3.0, 2.0});
   for (Occupancy& cell : grid.cells) cell = Occupancy::kUnknown;
-  EXPECT_TRUE(FindFloors(grid, {{1.0, 1.0, 1.0}}).empty());
+  EXPECT_TRUE(FindFloors(grid, {{1.0, 1.0, 1.0}}, {}).empty());
 }
 
 TEST(ProjectToFloor, HoldsTheFloorAndItsCells) {
@@ -112,7 +121,7 @@ TEST(ProjectToFloor, BlocksAStairwell) {
 TEST(ExtractPlaces, LiesOnBothStoreys) {
   const OccupancyGrid grid = TwoStoreys();
   const PlaceGraph graph = ExtractPlaces(grid, {}, {});
-  const std::vector<double> floors_m = FindFloors(grid, {});
+  const std::vector<double> floors_m = FindFloors(grid, {}, {});
   int counts[2] = {0, 0};
   for (const Place& place : graph.places) {
     ASSERT_TRUE(place.floor_z_m == floors_m[0] || place.floor_z_m == floors_m[1]);

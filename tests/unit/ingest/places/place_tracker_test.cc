@@ -117,9 +117,9 @@ TEST(NearestPlaceInSight, DoesNotLookThroughWalls) {
   Fill({2.6, 1.0, 0.0}, {3.0, 3.0, 0.8}, Occupancy::kOccupied, &grid);
   const DistanceField field(grid);
   const PlaceGraph graph = GraphOf({{4.6, 2.0, 0.0}, {1.5, 2.0, 0.0}});
-  EXPECT_EQ(NearestPlaceInSight(graph, field, {3.5, 2.0, 1.1}), 1);
-  EXPECT_EQ(NearestPlaceInSight(graph, field, {3.5, 2.0, 0.3}), 1);
-  EXPECT_EQ(NearestPlaceInSight(graph, field, {4.5, 2.0, 1.1}), 0);
+  EXPECT_EQ(NearestPlaceInSight(graph, field, {3.5, 2.0, 1.1}, {}), 1);
+  EXPECT_EQ(NearestPlaceInSight(graph, field, {3.5, 2.0, 0.3}, {}), 1);
+  EXPECT_EQ(NearestPlaceInSight(graph, field, {4.5, 2.0, 1.1}, {}), 0);
 }
 
 TEST(NearestPlaceInSight, FallsBackToTheNearestAndToNone) {
@@ -127,9 +127,11 @@ TEST(NearestPlaceInSight, FallsBackToTheNearestAndToNone) {
   Fill({3.0, 0.0, 0.0}, {5.0, 4.0, 3.0}, Occupancy::kOccupied, &grid);
   const DistanceField field(grid);
   EXPECT_EQ(
-      NearestPlaceInSight(GraphOf({{6.0, 2.0, 0.0}, {7.0, 2.0, 0.0}}), field, {1.0, 2.0, 1.0}), 0);
-  EXPECT_EQ(NearestPlaceInSight({}, field, {1.0, 2.0, 1.0}), -1);
-  EXPECT_EQ(NearestPlaceInSight(GraphOf({{6.0, 2.0, 0.0}}), DistanceField(), {1.0, 2.0, 1.0}), 0);
+      NearestPlaceInSight(GraphOf({{6.0, 2.0, 0.0}, {7.0, 2.0, 0.0}}), field, {1.0, 2.0, 1.0}, {}),
+      0);
+  EXPECT_EQ(NearestPlaceInSight({}, field, {1.0, 2.0, 1.0}, {}), -1);
+  EXPECT_EQ(NearestPlaceInSight(GraphOf({{6.0, 2.0, 0.0}}), DistanceField(), {1.0, 2.0, 1.0}, {}),
+            0);
 }
 
 }  // namespace

@@ -2,7 +2,9 @@
 // Rooms of storeys drawn by hand, each with one difficulty.
 #include <gtest/gtest.h>
 
+#include <cstddef>
 #include <set>
+#include <string>
 
 #include "ingest/rooms/outline.h"
 #include "tests/unit/ingest/rooms/rooms_test_util.h"
@@ -128,6 +130,37 @@ TEST(Rooms, OfANetOfCorridorsAreItsArmsOrTheWhole) {
   RoomOptions options;
   options.split_corridors = false;
   EXPECT_EQ(FindRooms(example.input, options).best.rooms.size(), 1u);
+  // Corridors 2 m wide are halls for whom they are.
+  options = {};
+  options.corridors.width_m_max = 1.9;
+  EXPECT_EQ(FindRooms(example.input, options).best.rooms.size(), 1u);
+}
+
+TEST(RoomOptions, AreInRangeAndHaveNamesOfTheirOwn) {
+  EXPECT_TRUE(ValidateOptions(RoomOptions()).ok());
+  EXPECT_TRUE(ValidateOptions(StructureOptions()).ok());
+  RoomOptions rooms;
+  StructureOptions structures;
+  std::vector<BoundOption> bound = rooms.Bind();
+  const std::vector<BoundOption> more = structures.Bind();
+  bound.insert(bound.end(), more.begin(), more.end());
+  std::set<std::string> names;
+  std::set<const double*> numbers;
+  for (const BoundOption& field : bound) {
+    names.insert(field.name);
+    numbers.insert(field.value);
+    const double before = *field.value;
+    *field.value = field.max + 1.0;
+    const bool is_refused = !ValidateOptions(rooms).ok() || !ValidateOptions(structures).ok();
+    EXPECT_TRUE(is_refused) << field.name;
+    *field.value = before;
+  }
+  EXPECT_EQ(names.size(), bound.size());
+  EXPECT_EQ(numbers.size(), bound.size());
+  // Each number has its row.
+  EXPECT_EQ(more.size() * sizeof(double), sizeof(StructureOptions));
+  EXPECT_EQ((bound.size() - more.size()) * sizeof(double),
+            sizeof(RoomOptions) - offsetof(RoomOptions, section_clearance_m));
 }
 
 TEST(Rooms, OfAStraightCorridorAreOneWhateverOpensFromIt) {

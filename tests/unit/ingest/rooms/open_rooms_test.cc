@@ -30,9 +30,9 @@ class Drawing {
   }
 
   // Areas of the rooms once open ones are closed, descending, whole square metres.
-  std::vector<int> Rooms() const {
+  std::vector<int> Rooms(const OpenRoomOptions& options = {}) const {
     OccupancyGrid plan = plan_;
-    CloseOpenRooms(FindBlocks(plan), &plan);
+    CloseOpenRooms(FindBlocks(plan, {}), options, &plan);
     std::vector<uint8_t> is_free;
     for (const Occupancy state : plan.cells) is_free.push_back(state == Occupancy::kFree ? 1 : 0);
     std::vector<int> areas;
@@ -97,12 +97,24 @@ TEST(OpenRooms, AreNoArmsOfACorridor) {
             1u);
 }
 
+TEST(OpenRooms, AreWhatTheOptionsSay) {
+  Drawing plan(31, 8);
+  plan.Free(0.5, 0.5, 30.5, 2.5).Free(1.5, 2.5, 5.5, 7.5).Free(20.0, 2.5, 24.0, 7.5);
+  ASSERT_EQ(plan.Rooms(), (std::vector<int>{60, 20, 20}));
+  OpenRoomOptions options;
+  options.bay_m2_min = 60.0;
+  EXPECT_EQ(plan.Rooms(options), std::vector<int>{100});
+  options = {};
+  options.width_m_max = 1.5;
+  EXPECT_EQ(plan.Rooms(options), std::vector<int>{100});
+}
+
 TEST(OpenRooms, AreNotLookedForWhereNothingIsFree) {
   EXPECT_TRUE(Drawing(5, 5).Rooms().empty());
   OccupancyGrid unknown;
   unknown.frame.size = {40, 40, 1};
   unknown.cells.assign(1600, Occupancy::kUnknown);
-  CloseOpenRooms(FindBlocks(unknown), &unknown);
+  CloseOpenRooms(FindBlocks(unknown, {}), {}, &unknown);
   EXPECT_EQ(unknown.cells, std::vector<Occupancy>(1600, Occupancy::kUnknown));
 }
 

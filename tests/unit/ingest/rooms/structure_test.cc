@@ -111,7 +111,7 @@ TEST(StructureClasses, AreToldFromTheTablesOfOtherDataSets) {
 
 TEST(Structures, OfABoxAreItsSixSides) {
   const MeshBlock room = BoxRoom();
-  const std::vector<StructurePiece> pieces = FindStructures({&room}, Classes());
+  const std::vector<StructurePiece> pieces = FindStructures({&room}, Classes(), {});
   ASSERT_EQ(pieces.size(), 6u);
   EXPECT_EQ(CountOf(pieces, "wall"), 4);
   EXPECT_EQ(pieces[0].type, "floor");
@@ -130,7 +130,7 @@ TEST(Structures, AreWholeAcrossBlocks) {
     ASSERT_GT(blocks.size(), 20u);
     std::vector<const MeshBlock*> mesh;
     for (const MeshBlock& block : blocks) mesh.push_back(&block);
-    EXPECT_EQ(FindStructures(mesh, Classes()).size(), 6u) << noise_m;
+    EXPECT_EQ(FindStructures(mesh, Classes(), {}).size(), 6u) << noise_m;
   }
 }
 
@@ -140,7 +140,7 @@ TEST(Structures, WithoutLabelsAreToldByNormalsAndHeight) {
   AddSheet({1, 1, 0.75}, {1.5, 0, 0}, {0, 1.5, 0}, 10, &room);
   AddSheet({1, 1, 0.0}, {1.5, 0, 0}, {0, 0, 0.7}, 10, &room);
   room.labels.clear();
-  const std::vector<StructurePiece> pieces = FindStructures({&room}, {});
+  const std::vector<StructurePiece> pieces = FindStructures({&room}, {}, {});
   EXPECT_EQ(CountOf(pieces, "floor"), 1);
   EXPECT_EQ(CountOf(pieces, "ceiling"), 1);
   EXPECT_EQ(CountOf(pieces, "wall"), 4);
@@ -152,7 +152,7 @@ TEST(Structures, JoinAWallThatFurnitureHidesAPartOf) {
   AddSheet({2.3, 0, 0}, {2, 0, 0}, {0, 0, 2.5}, kWall, &mesh);
   // In one plane, but another wall: a room's width away.
   AddSheet({8.0, 0, 0}, {2, 0, 0}, {0, 0, 2.5}, kWall, &mesh);
-  const std::vector<StructurePiece> pieces = FindStructures({&mesh}, Classes());
+  const std::vector<StructurePiece> pieces = FindStructures({&mesh}, Classes(), {});
   ASSERT_EQ(pieces.size(), 2u);
   EXPECT_NEAR(pieces[0].area_m2, 10.0, 0.1);
 }
@@ -163,25 +163,25 @@ TEST(Structures, HaveOnePieceAPillar) {
     AddSheet({x, 0, 0}, {0.4, 0, 0}, {0, 0, 2.5}, kPillar, &mesh);
     AddSheet({x + 0.4, 0, 0}, {0, 0.4, 0}, {0, 0, 2.5}, kPillar, &mesh);
   }
-  const std::vector<StructurePiece> pieces = FindStructures({&mesh}, Classes());
+  const std::vector<StructurePiece> pieces = FindStructures({&mesh}, Classes(), {});
   ASSERT_EQ(pieces.size(), 2u);
   EXPECT_EQ(pieces[0].type, "pillar");
   EXPECT_TRUE(pieces[0].normal_map.isZero());
 }
 
 TEST(Structures, OfNothingOrOfBrokenBlocksAreNone) {
-  EXPECT_TRUE(FindStructures({}, Classes()).empty());
+  EXPECT_TRUE(FindStructures({}, Classes(), {}).empty());
   MeshBlock broken;
   broken.positions_map = {{0, 0, 0}, {NAN, 0, 0}, {0, 1, 0}};
   broken.labels = {1};
   broken.faces = {{{0, 1, 2}}, {{0, 2, 9}}, {{0, 0, 0}}};
-  EXPECT_TRUE(FindStructures({&broken, nullptr}, Classes()).empty());
+  EXPECT_TRUE(FindStructures({&broken, nullptr}, Classes(), {}).empty());
 }
 
 TEST(Structures, OfAMillionVerticesAreStillTheSixSides) {
   const MeshBlock room = BoxRoom(0.002, 0.0095);
   const auto start = std::chrono::steady_clock::now();
-  const std::vector<StructurePiece> pieces = FindStructures({&room}, Classes());
+  const std::vector<StructurePiece> pieces = FindStructures({&room}, Classes(), {});
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   std::printf("%zu vertices, %zu pieces, %.2f s\n", room.positions_map.size(), pieces.size(),
               took.count());
@@ -193,14 +193,14 @@ TEST(StructureTracker, KeepsIdsWhileWallsGrow) {
   MeshBlock mesh;
   AddSheet({0, 0, 0}, {2, 0, 0}, {0, 0, 2.5}, kWall, &mesh);
   AddSheet({0, 3, 0}, {0, 0, 2.5}, {2, 0, 0}, kWall, &mesh);
-  std::vector<StructurePiece> pieces = FindStructures({&mesh}, Classes());
+  std::vector<StructurePiece> pieces = FindStructures({&mesh}, Classes(), {});
   tracker.Track(&pieces);
   ASSERT_EQ(pieces.size(), 2u);
   MeshBlock more;
   AddSheet({0, 3, 0}, {0, 0, 2.5}, {6, 0, 0}, kWall, &more);
   AddSheet({0, 0, 0}, {3, 0, 0}, {0, 0, 2.5}, kWall, &more);
   AddSheet({0, 0, 0}, {0, 3, 0}, {0, 0, 2.5}, kWall, &more);
-  std::vector<StructurePiece> grown = FindStructures({&more}, Classes());
+  std::vector<StructurePiece> grown = FindStructures({&more}, Classes(), {});
   tracker.Track(&grown);
   ASSERT_EQ(grown.size(), 3u);
   for (const StructurePiece& piece : grown) {
@@ -220,18 +220,18 @@ TEST(StructureHeights, AddUpWhatIsLevel) {
     pieces[i].area_m2 = areas_m2[i];
     pieces[i].box_map.extend(Eigen::Vector3d(0, 0, heights_m[i]));
   }
-  const std::vector<StructureHeight> ceilings = CeilingHeights(pieces);
+  const std::vector<StructureHeight> ceilings = CeilingHeights(pieces, {});
   ASSERT_EQ(ceilings.size(), 2u);
   EXPECT_DOUBLE_EQ(ceilings[0].z_m, 2.70);
   EXPECT_DOUBLE_EQ(ceilings[0].area_m2, 19.0);
-  EXPECT_EQ(FloorHeights(pieces).size(), 1u);
+  EXPECT_EQ(FloorHeights(pieces, {}).size(), 1u);
 }
 
 TEST(StructureRooms, AWallBoundsTheRoomItFaces) {
   MeshBlock mesh = BoxRoom();
   // The other side of the wall at x = 5, in the next room.
   AddSheet({5.15, 0, 0}, {0, 4, 0}, {0, 0, 2.5}, kWall, &mesh);
-  const std::vector<StructurePiece> pieces = FindStructures({&mesh}, Classes());
+  const std::vector<StructurePiece> pieces = FindStructures({&mesh}, Classes(), {});
   ASSERT_EQ(pieces.size(), 7u);
   std::vector<FoundRoom> rooms(2);
   rooms[0].footprint_map = {{0, 0}, {5, 0}, {5, 4}, {0, 4}};
@@ -239,7 +239,7 @@ TEST(StructureRooms, AWallBoundsTheRoomItFaces) {
   for (FoundRoom& room : rooms) room.z_max_m = 2.5;
   int of_first = 0;
   int of_second = 0;
-  for (const auto& [piece, room] : EnclosesOf(pieces, rooms)) {
+  for (const auto& [piece, room] : EnclosesOf(pieces, rooms, {})) {
     of_first += room == 0 ? 1 : 0;
     of_second += room == 1 ? 1 : 0;
     if (room == 1) {
@@ -252,16 +252,16 @@ TEST(StructureRooms, AWallBoundsTheRoomItFaces) {
 
 TEST(StructureRooms, AThingHangsOnTheWallThatItTouches) {
   const MeshBlock mesh = BoxRoom();
-  const std::vector<StructurePiece> pieces = FindStructures({&mesh}, Classes());
+  const std::vector<StructurePiece> pieces = FindStructures({&mesh}, Classes(), {});
   const Box3d board(Eigen::Vector3d(1.0, 0.02, 0.9), Eigen::Vector3d(2.8, 0.06, 2.1));
-  const std::optional<int> wall = AttachedTo(board, 0.0, false, pieces);
+  const std::optional<int> wall = AttachedTo(board, 0.0, false, pieces, {});
   ASSERT_TRUE(wall.has_value());
   EXPECT_GT(pieces[static_cast<size_t>(*wall)].normal_map.y(), 0.99);
-  EXPECT_FALSE(AttachedTo(board, 0.0, true, pieces).has_value());
+  EXPECT_FALSE(AttachedTo(board, 0.0, true, pieces, {}).has_value());
   const Box3d shelf(Eigen::Vector3d(1.0, 0.02, 0.0), Eigen::Vector3d(2.8, 0.4, 1.9));
-  EXPECT_FALSE(AttachedTo(shelf, 0.0, false, pieces).has_value());
+  EXPECT_FALSE(AttachedTo(shelf, 0.0, false, pieces, {}).has_value());
   const Box3d lamp(Eigen::Vector3d(2.0, 2.0, 1.5), Eigen::Vector3d(2.2, 2.2, 1.7));
-  EXPECT_FALSE(AttachedTo(lamp, 0.0, false, pieces).has_value());
+  EXPECT_FALSE(AttachedTo(lamp, 0.0, false, pieces, {}).has_value());
 }
 
 }  // namespace
