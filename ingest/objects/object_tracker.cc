@@ -81,7 +81,11 @@ void ObjectTracker::Retire(const Assignment& assignment,
     }
     const std::vector<Eigen::Vector3f>& points = object.cluster.points_map;
     const auto count = std::count_if(points.begin(), points.end(), is_seen_through);
-    if (2 * count > static_cast<int64_t>(points.size())) changes->gone.push_back(object.id);
+    if (2 * count > static_cast<int64_t>(points.size())) {
+      changes->gone.push_back(object.id);
+    } else if (forgets_lost_) {
+      changes->forgotten.push_back(object.id);
+    }
   }
 }
 
@@ -97,6 +101,7 @@ ObjectChanges ObjectTracker::Update(
   const Assignment assignment = Assign(std::move(clusters), time_ns, &changes);
   Retire(assignment, is_seen_through, &changes);
   std::vector<int64_t> dropped = changes.gone;
+  dropped.insert(dropped.end(), changes.forgotten.begin(), changes.forgotten.end());
   for (const auto& [first, second] : changes.merged) {
     dropped.push_back(first);
     const auto& added = changes.added;

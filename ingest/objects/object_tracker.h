@@ -39,11 +39,17 @@ struct ObjectChanges {
   std::vector<std::pair<int64_t, int64_t>> merged;
   /// No longer there: its space has been seen through.
   std::vector<int64_t> gone;
+  /// Pieces of a surface that comes apart in another way now; of trackers that forget the lost.
+  std::vector<int64_t> forgotten;
 };
 
 /// Threads: one caller at a time.
 class ObjectTracker {
  public:
+  /// `forgets_lost`: clusters are all that the whole surface is taken for, so that an object
+  /// without one was a wrong piece of it, and never there.
+  explicit ObjectTracker(bool forgets_lost = false) : forgets_lost_(forgets_lost) {}
+
   /// Matches clusters with the known objects by instance, class and overlap of boxes. An object
   /// without a cluster is gone if `is_seen_through(point)` holds for most of its points, and
   /// stays as it is otherwise. Too small a change of pose or box is no change. An object whose
@@ -69,6 +75,7 @@ class ObjectTracker {
               const std::function<bool(const Eigen::Vector3f&)>& is_seen_through,
               ObjectChanges* changes);
 
+  bool forgets_lost_ = false;
   std::vector<TrackedObject> objects_;
   /// By id: which points the latest cluster had.
   std::map<int64_t, uint64_t> digests_;

@@ -39,6 +39,8 @@ constexpr double kFaceCosine = 0.7;
 constexpr double kRoomM = 3.0;
 constexpr double kColumnM = 0.1;
 constexpr size_t kColumnBins = 64;
+// How far beside a front the wall behind it is looked for.
+constexpr int kBesideColumns = 8;
 // A face behind a front begins at least this far behind it.
 constexpr double kBehindM = 0.25;
 // A ceiling goes on for so many squares beyond what is seen of it.
@@ -89,6 +91,8 @@ struct UprightRegion {
   std::vector<int> cells;
   Eigen::Vector3d normal_sum = Eigen::Vector3d::Zero();
   Eigen::Vector3d point_sum = Eigen::Vector3d::Zero();
+  /// WallOf the region, of joined ones.
+  ShellWall wall;
 
   Eigen::Vector3d Normal() const {
     return Eigen::Vector3d(normal_sum.x(), normal_sum.y(), 0.0).normalized();
@@ -343,7 +347,7 @@ class ShellFinder {
 
   bool MayJoin(const UprightRegion& a, const UprightRegion& b) const {
     if (graph_.Cosine(a.Normal(), b.Normal()) < kJoinRegionCosine) return false;
-    const ShellWall wall = WallOf(a);
+    const ShellWall& wall = a.wall;
     const Eigen::Vector3d middle = b.point_sum / static_cast<double>(b.cells.size());
     if (std::abs(wall.DistanceTo(middle)) > kOffJoinedM) return false;
     const Eigen::Vector3d along = wall.Along();
@@ -376,36 +380,58 @@ class ShellFinder {
       });
       if (host == joined.end()) {
         joined.push_back(std::move(region));
+        joined.back().wall = WallOf(joined.back());
         continue;
       }
       host->cells.insert(host->cells.end(), region.cells.begin(), region.cells.end());
       const bool is_turned = host->normal_sum.dot(region.normal_sum) < 0.0;
       host->normal_sum += is_turned ? Eigen::Vector3d(-region.normal_sum) : region.normal_sum;
       host->point_sum += region.point_sum;
+      host->wall = WallOf(*host);
     }
     return joined;
   }
 
-  // Whether a face that looks the same way stands behind much of a region: then it is the front of
-  // a cupboard.
-  bool IsFront(const UprightRegion& region, const ShellWall& wall) const {
-    std::set<int> columns;
-    std::set<int> backed;
+  // By cell: how many cells the region that it is in has.
+  std::vector<size_t> RegionSizes(const std::vector<UprightRegion>& regions) const {
+    std::vector<size_t> sizes(graph_.size(), 0);
+    for (const UprightRegion& region : regions) {
+      for (const int cell : region.cells) sizes[static_cast<size_t>(cell)] = region.cells.size();
+    }
+    return sizes;
+  }
+
+  // Whether a larger face that looks the same way stands behind much of a region, or behind the
+  // line that it makes, right beside it: then it is the front of a cupboard.
+  bool IsFront(const UprightRegion& region, const ShellWall& wall,
+               const std::vector<size_t>& region_sizes) const {
     const Eigen::Vector3d along = wall.Along();
     const auto column_of = [&](int cell) {
       return static_cast<int>(std::floor(along.dot(Point(cell)) / kColumnM));
     };
+    std::set<int> columns;
     for (const int cell : region.cells) columns.insert(column_of(cell));
+    const int first = *columns.begin();
+    const int last = *columns.rbegin();
+    std::set<int> backed;
+    std::set<int> before;
+    std::set<int> after;
     for (int i = 0; i < count(); ++i) {
-      if (!IsUpright(i) || !IsFree(i)) continue;
+      if (region_sizes[static_cast<size_t>(i)] <= region.cells.size() || !IsFree(i)) continue;
       const double distance_m = wall.DistanceTo(Point(i));
       if (distance_m > -kBehindM || distance_m < -options_.front_depth_m) continue;
       if (graph_.Cosine(Normal(i).cast<double>(), wall.normal_map) < kGrowRegionCosine) continue;
       const int column = column_of(i);
       if (columns.contains(column)) backed.insert(column);
+      if (column < first && column >= first - kBesideColumns) before.insert(column);
+      if (column > last && column <= last + kBesideColumns) after.insert(column);
     }
-    return static_cast<double>(backed.size()) >=
-           options_.front_share * static_cast<double>(columns.size());
+    if (static_cast<double>(backed.size()) >=
+        options_.front_share * static_cast<double>(columns.size())) {
+      return true;
+    }
+    if (wall.end_m - wall.begin_m > options_.front_width_m) return false;
+    return 2 * std::max(before.size(), after.size()) >= static_cast<size_t>(kBesideColumns);
   }
 
   // Near the ceiling, where there is one; else above `top_min_m`.
@@ -469,12 +495,14 @@ class ShellFinder {
     constexpr double kNearTopM = 0.3;
     const double top_min_m =
         std::min(options_.wall_reach_m, static_cast<double>(*high) - kNearTopM);
-    for (const UprightRegion& region : FindRegions()) {
-      ShellWall wall = WallOf(region);
+    const std::vector<UprightRegion> regions = FindRegions();
+    const std::vector<size_t> region_sizes = RegionSizes(regions);
+    for (const UprightRegion& region : regions) {
+      ShellWall wall = region.wall;
       if (wall.area_m2 < options_.wall_area_m2 || !ReachesUp(region, top_min_m)) continue;
       if (wall.end_m - wall.begin_m < options_.wall_width_m) continue;
       if (!graph_.is_oriented) TurnToRoom(&wall);
-      if (IsFront(region, wall)) continue;
+      if (IsFront(region, wall, region_sizes)) continue;
       shell_.walls.push_back(wall);
     }
     for (int i = 0; i < count(); ++i) {

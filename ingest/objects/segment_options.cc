@@ -23,6 +23,10 @@ constexpr SegmentField kFields[] = {
      "Least height of a ceiling above the floor, metres"},
     {"segment-ceiling-area", &SegmentOptions::ceiling_area_m2, 0.1, 100.0,
      "Least surface of a ceiling, square metres"},
+    {"segment-slope-height", &SegmentOptions::slope_height_m, 0.0, 10.0,
+     "An oblique face as large as a ceiling and on the average this high above the floor is a "
+     "roof's, "
+     "metres"},
     {"segment-wall-skin", &SegmentOptions::wall_skin_m, 0.0, 0.3,
      "What is this near before a wall is wall, metres: pictures, switches, frames"},
     {"segment-wall-depth", &SegmentOptions::wall_depth_m, 0.0, 1.0,
@@ -42,7 +46,9 @@ constexpr SegmentField kFields[] = {
     {"segment-front-depth", &SegmentOptions::front_depth_m, 0.0, 3.0,
      "An upright face is a cupboard's if another one stands within this behind it, metres"},
     {"segment-front-share", &SegmentOptions::front_share, 0.0, 1.0,
-     "... along this share of its width"},
+     "... along this share of its width, or beside it"},
+    {"segment-front-width", &SegmentOptions::front_width_m, 0.0, 10.0,
+     "... beside it counts for faces of up to this width, metres"},
     {"segment-column-share", &SegmentOptions::column_share, 0.1, 1.0,
      "What fills this share of the height up to the ceiling is wall or pillar"},
     {"segment-patch-k", &SegmentOptions::patch_k, 0.01, 100.0,
@@ -71,6 +77,11 @@ constexpr SegmentField kFields[] = {
      "What lies below a larger thing with this share of its footprint is a part of it: legs"},
     {"segment-under-gap", &SegmentOptions::under_gap_m, 0.0, 2.0,
      "... if no more than this is between them, metres"},
+    {"segment-over-gap", &SegmentOptions::over_gap_m, 0.0, 2.0,
+     "What lies above a larger thing that is no table is a part of it, if no more than this is "
+     "between them, metres"},
+    {"segment-over-area", &SegmentOptions::over_area_m2, 0.0, 10.0,
+     "... and its surface is no larger: backs of chairs, square metres"},
     {"segment-size-max", &SegmentOptions::size_max_m, 0.5, 20.0, "Longest side of a box, metres"},
     {"segment-size-min", &SegmentOptions::size_min_m, 0.0, 2.0,
      "What is smaller on all sides is no object, metres"},

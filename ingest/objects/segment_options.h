@@ -19,6 +19,7 @@ struct SegmentOptions {
   double ceiling_skin_m = 0.10;
   double ceiling_height_m = 1.9;
   double ceiling_area_m2 = 1.0;
+  double slope_height_m = 1.2;
 
   double wall_skin_m = 0.08;
   double wall_depth_m = 0.15;
@@ -29,6 +30,7 @@ struct SegmentOptions {
   double wall_top_gap_m = 0.4;
   double front_depth_m = 1.0;
   double front_share = 0.3;
+  double front_width_m = 2.5;
   double column_share = 0.75;
 
   double patch_k = 0.6;
@@ -42,6 +44,8 @@ struct SegmentOptions {
   double table_area_m2 = 0.25;
   double under_share = 0.7;
   double under_gap_m = 0.3;
+  double over_gap_m = 0.2;
+  double over_area_m2 = 0.25;
 
   double size_max_m = 3.0;
   double size_min_m = 0.15;

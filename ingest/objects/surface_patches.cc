@@ -109,6 +109,12 @@ struct Extent {
     }
     return best;
   }
+  bool IsNear(const Extent& other, double slack_m) const {
+    for (const size_t i : {size_t{0}, size_t{kDirections / 2}}) {
+      if (low[i] > other.high[i] + slack_m || high[i] < other.low[i] - slack_m) return false;
+    }
+    return true;
+  }
   double Longest() const { return std::max(Sides().second, top_m - bottom_m); }
 };
 
@@ -153,7 +159,7 @@ class PatchJoiner {
       if (AreOne(contact)) TryMerge(contact.a, contact.b);
     }
     JoinCrumbs();
-    JoinBelow();
+    JoinStacked();
     return Groups();
   }
 
@@ -284,38 +290,56 @@ class PatchJoiner {
     }
   }
 
-  // What is below a larger thing, as what is seen of its legs, is a part of it.
-  void JoinBelow() {
+  // What is seen of legs below a larger thing is a part of it, and what is right above it and
+  // small, as the back of a chair.
+  void JoinStacked() {
     const std::vector<CellGroup> groups = Groups();
-    std::vector<std::set<std::pair<int, int>>> footprints;
-    std::vector<int> root_of;
     std::map<int, int> patch_of;
     for (size_t i = 0; i < patches_.size(); ++i) {
       patch_of[patches_[i].front()] = static_cast<int>(i);
     }
+    std::vector<int> roots;
+    std::vector<std::set<std::pair<int, int>>> footprints;
     for (const CellGroup& group : groups) {
-      root_of.push_back(sets_.Find(patch_of.at(group.front())));
+      roots.push_back(patch_of.at(group.front()));
       footprints.emplace_back();
       for (const int cell : group) footprints.back().insert(SquareBelow(cell));
     }
-    for (size_t low = 0; low < groups.size(); ++low) {
-      for (size_t high = 0; high < groups.size(); ++high) {
-        if (2 * groups[low].size() > groups[high].size()) continue;
-        const Extent& below = things_[static_cast<size_t>(sets_.Find(root_of[low]))].extent;
-        const Extent& above = things_[static_cast<size_t>(sets_.Find(root_of[high]))].extent;
-        if (below.top_m > above.top_m || below.top_m < above.bottom_m - options_.under_gap_m) {
-          continue;
-        }
-        const auto count =
-            std::count_if(footprints[low].begin(), footprints[low].end(),
-                          [&](const auto& square) { return footprints[high].contains(square); });
-        if (static_cast<double>(count) <
-            options_.under_share * static_cast<double>(footprints[low].size())) {
-          continue;
-        }
-        if (TryMerge(root_of[low], root_of[high])) break;
+    for (size_t part = 0; part < groups.size(); ++part) {
+      for (size_t whole = 0; whole < groups.size(); ++whole) {
+        if (part == whole || groups[part].size() > groups[whole].size()) continue;
+        if (!AreStacked(groups[part], roots[part], groups[whole], roots[whole])) continue;
+        if (ShareOver(footprints[part], footprints[whole]) < options_.under_share) continue;
+        if (TryMerge(roots[part], roots[whole])) break;
       }
     }
+  }
+
+  bool AreStacked(const CellGroup& part, int part_root, const CellGroup& whole, int whole_root) {
+    const Extent& small = things_[static_cast<size_t>(sets_.Find(part_root))].extent;
+    const Extent& large = things_[static_cast<size_t>(sets_.Find(whole_root))].extent;
+    if (!small.IsNear(large, 2.0 * graph_.cell_m)) return false;
+    const bool is_below = small.top_m <= large.top_m &&
+                          small.top_m >= large.bottom_m - options_.under_gap_m &&
+                          2 * part.size() <= whole.size();
+    const double area_m2 = static_cast<double>(part.size()) * graph_.cell_m * graph_.cell_m;
+    const bool is_above = small.bottom_m >= large.bottom_m &&
+                          small.bottom_m <= large.top_m + options_.over_gap_m &&
+                          area_m2 <= options_.over_area_m2;
+    return is_below || is_above;
+  }
+
+  /// Share of the squares of `part` that are in `whole` or beside it.
+  static double ShareOver(const std::set<std::pair<int, int>>& part,
+                          const std::set<std::pair<int, int>>& whole) {
+    const auto is_over = [&](const std::pair<int, int>& square) {
+      return whole.contains(square) || whole.contains({square.first - 1, square.second}) ||
+             whole.contains({square.first + 1, square.second}) ||
+             whole.contains({square.first, square.second - 1}) ||
+             whole.contains({square.first, square.second + 1});
+    };
+    return static_cast<double>(std::count_if(part.begin(), part.end(), is_over)) /
+           static_cast<double>(part.size());
   }
 
   std::pair<int, int> SquareBelow(int cell) const {

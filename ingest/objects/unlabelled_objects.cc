@@ -13,6 +13,9 @@
 namespace dsg::ingest {
 namespace {
 
+// Of a normal's z, of faces that are oblique.
+constexpr double kUprightMax = 0.25;
+constexpr double kLevelMin = 0.85;
 // What goes from here above the floor to here below the ceiling is a part of the building.
 constexpr double kFullHeightM = 0.35;
 // Cells at either end of an extent that may be smear.
@@ -84,6 +87,22 @@ bool MayBeObject(const RoomAroundGroup& around, const ObjectCluster& cluster,
   return around.depth_m + height_m > 2.0 * options.height_min_m;
 }
 
+// A large oblique face high above the floor is a roof's: furniture has none.
+bool IsSlopedCeiling(const CellGraph& graph, const RoomShell& shell, const CellGroup& patch,
+                     const SegmentOptions& options) {
+  const double area_m2 = static_cast<double>(patch.size()) * graph.cell_m * graph.cell_m;
+  if (area_m2 < options.ceiling_area_m2) return false;
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+  double height_m = 0.0;
+  for (const int cell : patch) {
+    normal += graph.NormalAs(normal, cell);
+    height_m += static_cast<double>(shell.heights_m[static_cast<size_t>(cell)]);
+  }
+  const double steepness = std::abs(normal.normalized().z());
+  return steepness > kUprightMax && steepness < kLevelMin &&
+         height_m / static_cast<double>(patch.size()) >= options.slope_height_m;
+}
+
 }  // namespace
 
 std::vector<ObjectCluster> FindUnlabelledObjects(const std::vector<const MeshBlock*>& mesh,
@@ -97,8 +116,11 @@ std::vector<ObjectCluster> FindUnlabelledObjects(const std::vector<const MeshBlo
   const RoomShell shell = FindRoomShell(graph, floors_m, options);
   std::vector<bool> is_free(graph.size());
   for (size_t i = 0; i < graph.size(); ++i) is_free[i] = shell.parts[i] == ShellPart::kNone;
-  std::vector<CellGroup> groups =
-      JoinPatches(graph, shell.heights_m, FindPatches(graph, is_free, options), options);
+  std::vector<CellGroup> patches = FindPatches(graph, is_free, options);
+  std::erase_if(patches, [&](const CellGroup& patch) {
+    return IsSlopedCeiling(graph, shell, patch, options);
+  });
+  std::vector<CellGroup> groups = JoinPatches(graph, shell.heights_m, patches, options);
   std::erase_if(groups, [&](const CellGroup& group) {
     return static_cast<double>(group.size()) * cell_m * cell_m < options.area_min_m2;
   });

@@ -40,6 +40,7 @@ StaticLayers::StaticLayers(const MappingOptions& options, std::vector<SemanticLa
       fitter_(options_.catalogue, options.shapes),
       maker_(numbering, NamesOf(labels_), options_.catalogue),
       volume_(options.volume),
+      object_tracker_(/*forgets_lost=*/labels_.empty()),
       object_classes_(ObjectClasses(labels_, classes_, options_.depth.dynamic_classes)),
       place_tracker_(options.places.same_m),
       structure_tracker_(options.structures),
@@ -249,6 +250,7 @@ void StaticLayers::FindObjects(TimeNs now_ns, const std::vector<const MeshBlock*
       });
   for (const auto& [part, whole] : changes.merged) together_.Merge(part, whole);
   for (const int64_t id : changes.gone) together_.Forget(id);
+  for (const int64_t id : changes.forgotten) together_.Forget(id);
   KeepGone(before, changes, now_ns);
   object_watch_.Follow(object_tracker_.objects());
   unfitted_.insert(unfitted_.end(), changes.added.begin(), changes.added.end());

@@ -35,6 +35,19 @@ TEST(ObjectTracker, AddsObjectsInTheOrderOfTheirClusters) {
   EXPECT_EQ(tracker.objects()[1].observation_count, 1);
 }
 
+TEST(ObjectTracker, ForgetsWhatIsLostWhereClustersAreAllThereIs) {
+  for (const bool forgets_lost : {false, true}) {
+    ObjectTracker tracker(forgets_lost);
+    tracker.Update({ChairAt(0.0), ChairAt(2.0)}, 1, Nowhere);
+    const ObjectChanges changes = tracker.Update({ChairAt(2.0)}, 2, Nowhere);
+    EXPECT_TRUE(changes.gone.empty());
+    EXPECT_EQ(changes.forgotten, forgets_lost ? std::vector<int64_t>{0} : std::vector<int64_t>());
+    EXPECT_EQ(tracker.objects().size(), forgets_lost ? 1u : 2u);
+    // What is seen to be away was there.
+    EXPECT_EQ(tracker.Update({}, 3, Everywhere).gone.back(), 1);
+  }
+}
+
 TEST(ObjectTracker, CallsSmallDifferencesNoChange) {
   ObjectTracker tracker;
   tracker.Update({ChairAt(0.0)}, 1, Nowhere);

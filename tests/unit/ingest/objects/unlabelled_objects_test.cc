@@ -70,10 +70,6 @@ class MadeRoom {
     }
   }
 
-  const MeshBlock& mesh() const { return mesh_; }
-  MeshBlock* mutable_mesh() { return &mesh_; }
-
- private:
   void AddFace(const Vector3d& corner, const Vector3d& u, const Vector3d& v,
                const Vector3d& normal) {
     const int columns = static_cast<int>(std::ceil(u.norm() / kStepM));
@@ -88,6 +84,10 @@ class MadeRoom {
     }
   }
 
+  const MeshBlock& mesh() const { return mesh_; }
+  MeshBlock* mutable_mesh() { return &mesh_; }
+
+ private:
   MeshBlock mesh_;
 };
 
@@ -143,6 +143,21 @@ TEST(UnlabelledObjects, RugsFramesAndPillarsAreNone) {
   room.AddBox({0, 0, 0}, {5, 0.04, 0.12});
   room.AddBox({4, 1, 0}, {4.4, 1.4, kCeilingM});
   ExpectObjects(Find(room), {});
+}
+
+TEST(UnlabelledObjects, SlopedCeilingsAreNone) {
+  MadeRoom room;
+  room.AddFace({3.5, 1, 2.5}, {0, 2, 0}, {1.5, 0, -1.2}, {-0.62, 0, -0.78});
+  ExpectObjects(Find(room), {});
+}
+
+TEST(UnlabelledObjects, AMeshWithoutNormalsWillDo) {
+  MadeRoom room;
+  room.AddTable(2.0, 1.2);
+  room.AddBox({4.4, 2.0, 0}, {5, 3.2, 1.9});
+  room.mutable_mesh()->normals_map.clear();
+  ExpectObjects(Find(room), {Box3d(Vector3d(2.0, 1.2, 0), Vector3d(3.2, 1.9, 0.75)),
+                             Box3d(Vector3d(4.4, 2.0, 0), Vector3d(5, 3.2, 1.9))});
 }
 
 TEST(UnlabelledObjects, WhatStandsOnATableIsAnObject) {
