@@ -123,7 +123,8 @@ BuiltFrame FrameBuilder::BuildViews(const FramePlan& plan) const {
     built.skips.push_back("no depth image");
     return built;
   }
-  built.frames = ViewsOfCloud(points, plan.time_ns, plan.odom_T_body * rig_.lidar->body_T_lidar);
+  built.frames = ViewsOfCloud(points, plan.time_ns, plan.odom_T_body * rig_.lidar->body_T_lidar,
+                              options_.cloud);
   if (built.frames.empty()) built.skips.push_back("no points");
   return built;
 }

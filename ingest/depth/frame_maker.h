@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "ingest/depth/cloud_views.h"
 #include "ingest/sensor/calibration.h"
 #include "ingest/sensor/depth_frame.h"
 #include "ingest/sensor/human_detection.h"
@@ -33,6 +34,8 @@ struct DepthOptions {
   int mask_growth_px = 3;
   /// Depth edges of more than this beside a mask belong to the mask, metres.
   double mask_edge_m = 0.3;
+  /// Scans of lidars.
+  CloudOptions cloud;
 };
 
 /// What could not be used, by reason, in words for the user. Frames: "no depth image", "no right

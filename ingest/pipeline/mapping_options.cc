@@ -20,6 +20,7 @@ absl::Status CheckRange(const char* field, double value, double min, double max)
 absl::Status MappingOptions::Validate() const {
   DSG_RETURN_IF_ERROR(volume.Validate());
   DSG_RETURN_IF_ERROR(segments.Validate());
+  DSG_RETURN_IF_ERROR(ValidateOptions(depth.cloud));
   DSG_RETURN_IF_ERROR(ValidateOptions(structures));
   DSG_RETURN_IF_ERROR(ValidateOptions(rooms));
   DSG_RETURN_IF_ERROR(ValidateOptions(places));
@@ -42,8 +43,8 @@ std::string MappingOptions::Digest(bool has_labels) const {
   // What differs from the defaults of the stages' options, none of which may change without the
   // number below.
   std::string tuning = rooms.split_corridors ? "" : " whole_corridors";
-  for (const std::string& digest :
-       {DigestOptions(structures), DigestOptions(places), DigestOptions(rooms)}) {
+  for (const std::string& digest : {DigestOptions(depth.cloud), DigestOptions(structures),
+                                    DigestOptions(places), DigestOptions(rooms)}) {
     if (!digest.empty()) absl::StrAppend(&tuning, " ", digest);
   }
   // Of what the stages make of a log, with the same options.

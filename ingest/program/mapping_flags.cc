@@ -125,6 +125,7 @@ void AddMappingFlags(CLI::App* app, MappingFlags* flags) {
       ->capture_default_str()
       ->group(group);
   app->add_flag("--timings", flags->has_timings, "Print what each stage has cost")->group(group);
+  AddTuning("scans of lidars", flags->cloud.Bind(), app);
   AddTuning("walls, floors and ceilings", flags->structures.Bind(), app);
   AddTuning("places", flags->place_options.Bind(), app);
   AddTuning("rooms", flags->room_options.Bind(), app);
@@ -144,6 +145,7 @@ absl::StatusOr<MappingOptions> MakeMappingOptions(const MappingFlags& flags) {
   options.volume.thread_count = flags.thread_count;
   if (flags.masking == "drop") options.volume.masking = DynamicMasking::kDrop;
   if (flags.masking == "off") options.volume.masking = DynamicMasking::kOff;
+  options.depth.cloud = flags.cloud;
   options.structures = flags.structures;
   options.rooms = flags.room_options;
   options.rooms.split_corridors = !flags.keeps_corridors;

@@ -29,6 +29,7 @@ struct MappingFlags {
   double mesh_s = 32.0;
   double layers_s = 5.0;
   int thread_count = VolumeOptions().thread_count;
+  CloudOptions cloud;
   StructureOptions structures;
   RoomOptions room_options;
   SegmentOptions segments;

@@ -46,7 +46,7 @@ void ForEachReading(const DepthFrame& frame, const Visit& visit) {
 
 TEST(CloudViews, LieOnTheSurfacesAndFillTheBand) {
   const std::vector<DepthFrame> frames =
-      ViewsOfCloud(CloudOf(MadeScan(LidarPose())), 7, LidarPose());
+      ViewsOfCloud(CloudOf(MadeScan(LidarPose())), 7, LidarPose(), {});
   // Nothing is seen above and below.
   ASSERT_EQ(frames.size(), 4u);
   for (const DepthFrame& frame : frames) {
@@ -69,17 +69,21 @@ TEST(CloudViews, LieOnTheSurfacesAndFillTheBand) {
 
 TEST(CloudViews, LeaveOutWhatIsNoReading) {
   std::vector<Eigen::Vector3f> points(100, Eigen::Vector3f(0.1f, 0.1f, 0.1f));
-  EXPECT_TRUE(ViewsOfCloud(CloudOf(points), 0, {}).empty());
+  EXPECT_TRUE(ViewsOfCloud(CloudOf(points), 0, {}, {}).empty());
   for (size_t i = 0; i < points.size(); ++i) {
     points[i] = {2.0f, 0.01f * static_cast<float>(i), 0.0f};
     if (i % 3 == 1) points[i].y() = std::numeric_limits<float>::quiet_NaN();
     if (i % 3 == 2) points[i] *= 1e30f;
   }
-  const std::vector<DepthFrame> frames = ViewsOfCloud(CloudOf(points), 0, {});
+  const std::vector<DepthFrame> frames = ViewsOfCloud(CloudOf(points), 0, {}, {});
   ASSERT_EQ(frames.size(), 1u);
   ForEachReading(frames[0],
                  [](const Eigen::Vector3d& point, int) { EXPECT_NEAR(point.x(), 2.0, 1e-5); });
-  EXPECT_TRUE(ViewsOfCloud(CloudOf({}), 0, {}).empty());
+  EXPECT_TRUE(ViewsOfCloud(CloudOf({}), 0, {}, {}).empty());
+  CloudOptions options;
+  EXPECT_TRUE(ValidateOptions(options).ok());
+  options.reading_count_min = 10000.0;
+  EXPECT_TRUE(ViewsOfCloud(CloudOf(points), 0, {}, options).empty());
 }
 
 TEST(CloudViews, AreToAllSides) {
@@ -95,7 +99,7 @@ TEST(CloudViews, AreToAllSides) {
       }
     }
   }
-  const std::vector<DepthFrame> frames = ViewsOfCloud(CloudOf(points), 0, LidarPose());
+  const std::vector<DepthFrame> frames = ViewsOfCloud(CloudOf(points), 0, LidarPose(), {});
   ASSERT_EQ(frames.size(), 6u);
   size_t reading_count = 0;
   for (const DepthFrame& frame : frames) {

@@ -246,7 +246,7 @@ TEST_F(RealDepth, ViewsOfAScanLieWhereItsPointsDo) {
   Image image{static_cast<int>(points.size()), 1, PixelFormat::kPoints32, {}};
   image.bytes.resize(12 * points.size());
   std::memcpy(image.bytes.data(), points.data(), image.bytes.size());
-  const std::vector<DepthFrame> views = ViewsOfCloud(image, 0, {});
+  const std::vector<DepthFrame> views = ViewsOfCloud(image, 0, {}, {});
   ASSERT_GE(views.size(), 4u);
   int64_t reading_count = 0;
   std::vector<double> shares;
