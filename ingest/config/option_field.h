@@ -44,7 +44,7 @@ void BindFields(std::span<const OptionField<Options>> fields, Options* options,
 absl::Status ValidateFields(std::span<const BoundOption> fields);
 
 /// The values that differ from `defaults`, by name, as text; each value reads back as the same
-/// number. `defaults`: the same rows of another struct.
+/// number. `defaults`: the same rows of another struct; without, all values are told.
 std::string DigestFields(std::span<const BoundOption> fields,
                          std::span<const BoundOption> defaults);
 

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ingest/objects/segment_options.h"
 
-#include "absl/strings/str_cat.h"
-#include "schema/base/status.h"
-
 namespace dsg::ingest {
 namespace {
 
@@ -103,24 +100,17 @@ constexpr SegmentField kFields[] = {
 
 std::span<const SegmentField> SegmentFields() { return kFields; }
 
-absl::Status SegmentOptions::Validate() const {
-  for (const SegmentField& field : kFields) {
-    const double value = this->*field.value;
-    if (value >= field.min && value <= field.max) continue;
-    return MakeError(
-        Reason::kFieldInvalid,
-        absl::StrCat(field.name, " is ", value, "; give ", field.min, " to ", field.max),
-        {{"field", field.name}, {"value", absl::StrCat(value)}});
-  }
-  return absl::OkStatus();
+std::vector<BoundOption> SegmentOptions::Bind() {
+  std::vector<BoundOption> bound;
+  BindFields<SegmentOptions>(kFields, this, &bound);
+  return bound;
 }
 
+absl::Status SegmentOptions::Validate() const { return ValidateOptions(*this); }
+
 std::string SegmentOptions::Digest() const {
-  std::string text;
-  for (const SegmentField& field : kFields) {
-    absl::StrAppend(&text, text.empty() ? "" : " ", field.name, "=", this->*field.value);
-  }
-  return text;
+  SegmentOptions options = *this;
+  return DigestFields(options.Bind(), {});
 }
 
 }  // namespace dsg::ingest

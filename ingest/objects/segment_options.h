@@ -4,8 +4,10 @@
 
 #include <span>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
+#include "ingest/config/option_field.h"
 
 namespace dsg::ingest {
 
@@ -56,6 +58,9 @@ struct SegmentOptions {
   double mount_m = 0.18;
   double shell_contact = 0.5;
 
+  /// All numbers, for flags.
+  std::vector<BoundOption> Bind();
+
   /// Errors: INVALID_ARGUMENT/FIELD_INVALID naming field, value and bounds.
   absl::Status Validate() const;
 
@@ -63,15 +68,7 @@ struct SegmentOptions {
   std::string Digest() const;
 };
 
-struct SegmentField {
-  /// As in the command line, without "--": "segment-cell".
-  const char* name;
-  double SegmentOptions::*value;
-  double min;
-  double max;
-  /// Meaning and unit, a phrase.
-  const char* help;
-};
+using SegmentField = OptionField<SegmentOptions>;
 
 /// All options of SegmentOptions.
 std::span<const SegmentField> SegmentFields();

@@ -129,12 +129,7 @@ void AddMappingFlags(CLI::App* app, MappingFlags* flags) {
   AddTuning("walls, floors and ceilings", flags->structures.Bind(), app);
   AddTuning("places", flags->place_options.Bind(), app);
   AddTuning("rooms", flags->room_options.Bind(), app);
-  for (const SegmentField& field : SegmentFields()) {
-    app->add_option(absl::StrCat("--", field.name), flags->segments.*field.value, field.help)
-        ->check(CLI::Range(field.min, field.max))
-        ->capture_default_str()
-        ->group(absl::StrCat(kTuning, "objects of logs without labels"));
-  }
+  AddTuning("objects of logs without labels", flags->segments.Bind(), app);
 }
 
 absl::StatusOr<MappingOptions> MakeMappingOptions(const MappingFlags& flags) {

@@ -51,6 +51,7 @@ TEST(OptionField, IsRefusedOutOfItsRangeWithNameValueAndBounds) {
 
 TEST(OptionField, DigestsTellAllNumbersApart) {
   EXPECT_EQ(DigestOptions(Outer()), "");
+  EXPECT_EQ(DigestFields(Outer().Bind(), {}), "outer-length=0.1 inner-share=0.5");
   EXPECT_EQ(DigestOptions(Outer{0.2, {0.75}}), "outer-length=0.2 inner-share=0.75");
   EXPECT_EQ(DigestOptions(Outer{0.1, {std::nextafter(0.5, 1.0)}}),
             "inner-share=0.5000000000000001");

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/pipeline/mapping_options.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+
+namespace dsg::ingest {
+namespace {
+
+std::vector<BoundOption> AllOf(MappingOptions* options) {
+  std::vector<BoundOption> all;
+  for (const std::vector<BoundOption>& stage :
+       {options->depth.cloud.Bind(), options->structures.Bind(), options->places.Bind(),
+        options->rooms.Bind(), options->segments.Bind()}) {
+    all.insert(all.end(), stage.begin(), stage.end());
+  }
+  return all;
+}
+
+TEST(MappingOptions, TellEachNumberOfAStageInTheDigest) {
+  MappingOptions options;
+  const std::string standard = options.Digest(/*has_labels=*/false);
+  std::set<std::string> digests = {standard};
+  const std::vector<BoundOption> all = AllOf(&options);
+  for (const BoundOption& field : all) {
+    const double before = *field.value;
+    *field.value = before == field.max ? field.min : field.max;
+    EXPECT_TRUE(options.Validate().ok()) << field.name;
+    EXPECT_TRUE(digests.insert(options.Digest(/*has_labels=*/false)).second) << field.name;
+    *field.value = before;
+  }
+  EXPECT_EQ(options.Digest(/*has_labels=*/false), standard);
+  options.rooms.split_corridors = false;
+  EXPECT_NE(options.Digest(/*has_labels=*/true), MappingOptions().Digest(/*has_labels=*/true));
+}
+
+TEST(MappingOptions, AreRefusedOutOfTheirRangesByName) {
+  MappingOptions options;
+  EXPECT_TRUE(options.Validate().ok());
+  std::set<std::string> names;
+  for (const BoundOption& field : AllOf(&options)) {
+    EXPECT_TRUE(names.insert(field.name).second) << field.name << " stands twice";
+    const double before = *field.value;
+    for (const double wrong : {field.min - 1.0, field.max + 1.0}) {
+      *field.value = wrong;
+      const absl::Status status = options.Validate();
+      EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << field.name;
+      EXPECT_NE(status.message().find(std::string(field.name) + " is "), std::string::npos)
+          << status.message();
+    }
+    *field.value = before;
+  }
+}
+
+}  // namespace
+}  // namespace dsg::ingest
