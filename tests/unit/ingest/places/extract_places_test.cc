@@ -293,6 +293,25 @@ TEST(ExtractPlaces, HasMorePlacesWhereTheyCoverLess) {
   }
 }
 
+TEST(PlaceOptions, KeepThePromisesAtBothEndsOfTheirRanges) {
+  const OccupancyGrid grid = TwoRooms(0.9);
+  PlaceOptions options = OnGround();
+  for (const BoundOption& field : options.Bind()) {
+    const double before = *field.value;
+    for (const double value : {field.min, field.max}) {
+      *field.value = value;
+      SCOPED_TRACE(std::string(field.name) + " " + std::to_string(value));
+      for (const PlaceMode mode : {PlaceMode::kGround, PlaceMode::kVolume}) {
+        options.mode = mode;
+        const PlaceGraph graph = ExtractPlaces(grid, {}, options);
+        if (mode == PlaceMode::kVolume) continue;
+        ExpectLinksFree(graph, ProjectToFloor(grid, 0.0, options), 0.25);
+      }
+    }
+    *field.value = before;
+  }
+}
+
 TEST(PlaceOptions, AreInRangeAndHaveNamesOfTheirOwn) {
   EXPECT_TRUE(ValidateOptions(PlaceOptions()).ok());
   PlaceOptions options;

@@ -136,6 +136,31 @@ TEST(Rooms, OfANetOfCorridorsAreItsArmsOrTheWhole) {
   EXPECT_EQ(FindRooms(example.input, options).best.rooms.size(), 1u);
 }
 
+TEST(RoomOptions, GiveEachPlaceOneRoomAtBothEndsOfTheirRanges) {
+  const Example example(TwoRooms());
+  RoomOptions options;
+  for (const BoundOption& field : options.Bind()) {
+    const double before = *field.value;
+    for (const double value : {field.min, field.max}) {
+      *field.value = value;
+      for (const RoomMethod method : {RoomMethod::kAuto, RoomMethod::kCeiling,
+                                      RoomMethod::kClearance, RoomMethod::kFiltration}) {
+        options.method = method;
+        const RoomLabelling found = FindRooms(example.input, options).best;
+        ASSERT_EQ(found.room_of_place.size(), example.input.places.size()) << field.name;
+        size_t count = 0;
+        for (const FoundRoom& room : found.rooms) count += room.places.size();
+        for (const int room : found.room_of_place) {
+          EXPECT_LT(room, static_cast<int>(found.rooms.size())) << field.name;
+          count -= room >= 0 ? 1 : 0;
+        }
+        EXPECT_EQ(count, 0u) << field.name << " " << value;
+      }
+    }
+    *field.value = before;
+  }
+}
+
 TEST(RoomOptions, AreInRangeAndHaveNamesOfTheirOwn) {
   EXPECT_TRUE(ValidateOptions(RoomOptions()).ok());
   EXPECT_TRUE(ValidateOptions(StructureOptions()).ok());
