@@ -10,6 +10,8 @@
 namespace dsg::ingest {
 namespace {
 
+// More of them are solved at the end of the log only: each is compared with each.
+constexpr size_t kLoopsWhileRunningMax = 2000;
 // Less is no correction, but what is left of rounding.
 constexpr double kNothingM = 1e-6;
 
@@ -55,7 +57,7 @@ bool LoopCloser::Take(const Measurement& measurement) {
 }
 
 bool LoopCloser::IsDue(TimeNs now_ns) const {
-  if (!has_news_) return false;
+  if (!has_news_ || origins_.size() > kLoopsWhileRunningMax) return false;
   if (solved_ns_ == kTimeMin) return true;
   const auto log_ns = static_cast<double>(now_ns - path_.poses().front().time_ns);
   const auto share_ns = static_cast<TimeNs>(options_.correct_share * log_ns);

@@ -101,8 +101,8 @@ absl::Status GrowingFile::CheckBegin() {
 
 absl::Status GrowingFile::Changed(const std::string& how) const {
   return MalformedFile(path_, absl::StrCat(how,
-                                           " while it was followed; what was read of it stays "
-                                           "in the map; start again with the file as it is"));
+                                           " while it was followed; start again with the file "
+                                           "as it is"));
 }
 
 absl::StatusOr<std::string> GrowingFile::Read(uint64_t at, size_t size_max) const {

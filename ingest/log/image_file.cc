@@ -102,9 +102,12 @@ absl::StatusOr<Image> Convert(const cv::Mat& mat, const std::string& origin,
       break;
   }
   return MalformedFile(
-      origin, absl::StrCat("the image has ", mat.channels(), " channels of ", mat.elemSize1() * 8,
-                           " bits, which is not what its channel has: depth is 16 bit or "
-                           "float, labels are 16 bit, grey and colour 8 bit"));
+      origin,
+      absl::StrCat(
+          "the image has ", mat.channels(), " channels of ", mat.elemSize1() * 8,
+          " bits, which is not what its channel has: depth is 16 bit or "
+          "float, labels are numbers of 16 bit (of a label folder also 8) in one channel, grey and "
+          "colour 8 bit"));
 }
 
 absl::StatusOr<std::string> ReadBytes(const std::string& path, size_t byte_count_max) {
@@ -157,6 +160,16 @@ absl::StatusOr<Image> DecodeImage(std::string_view bytes, const std::string& ori
   if (is_eight_bit && header.bits_per_channel > 8) {
     return MalformedFile(origin, absl::StrCat("the image has ", header.bits_per_channel,
                                               " bits a channel; grey and colour have 8"));
+  }
+  // A decoder spreads few bits over eight, and looks colours up in the palette.
+  const bool has_numbers = header.bits_per_channel >= 8 && !header.is_palette;
+  if (decoding.role == ImageRole::kLabel && !has_numbers) {
+    return MalformedFile(
+        origin,
+        absl::StrCat("labels are numbers of 8 or 16 bits in one channel; these are ",
+                     header.is_palette ? "colours of a palette"
+                                       : absl::StrCat("of ", header.bits_per_channel, " bits"),
+                     ": save the numbers themselves"));
   }
   const cv::Mat mat = Decode(bytes, decoding.role);
   if (mat.empty() || mat.cols != header.width || mat.rows != header.height) {

@@ -51,8 +51,10 @@ std::optional<ImageHeader> OfPng(std::string_view bytes) {
     default:
       return std::nullopt;
   }
-  return HeaderOf(Integer(bytes, 16, 4, true), Integer(bytes, 20, 4, true), channel_count,
-                  Byte(bytes, 24));
+  std::optional<ImageHeader> header = HeaderOf(
+      Integer(bytes, 16, 4, true), Integer(bytes, 20, 4, true), channel_count, Byte(bytes, 24));
+  if (header.has_value()) header->is_palette = Byte(bytes, 25) == 3;
+  return header;
 }
 
 std::optional<ImageHeader> OfJpeg(std::string_view bytes) {

@@ -18,6 +18,8 @@ struct ImageHeader {
   int height = 0;
   int channel_count = 0;
   int bits_per_channel = 0;
+  /// Pixels are places in a table of colours; channel_count is that of the table.
+  bool is_palette = false;
 };
 
 /// PNG, JPEG and TIFF.

@@ -103,17 +103,29 @@ std::vector<size_t> RobotGraph::ChooseKeyframes(const std::vector<BoundLoop>& lo
   return keyframes;
 }
 
+// How much of the way, turn or time that makes a keyframe lies between two: 1 of those that are
+// taken by the options. Loop closures make keyframes of their ends; what odometry may err at least
+// is divided among them, or loops that are not believed would loosen it.
+double RobotGraph::ShareOfAStep(double way_m, double turn_rad, TimeNs time_ns) const {
+  constexpr double kShareMin = 1e-4;
+  const double share =
+      std::max({way_m / options_.keyframe_m, turn_rad / options_.keyframe_rad,
+                static_cast<double>(time_ns) / static_cast<double>(options_.keyframe_ns_max)});
+  return std::clamp(share, kShareMin, 1.0);
+}
+
 RelativePose RobotGraph::Odometry(size_t from, size_t to) const {
   RelativePose edge;
   edge.from_T_to = Given(from).Inverse() * Given(to);
   edge.from_T_to.orientation.normalize();
   const double way_m = edge.from_T_to.position.norm();
   const double turn_rad = AngleBetween(Given(from).orientation, Given(to).orientation);
+  const double share = ShareOfAStep(way_m, turn_rad, TimeOf(to) - TimeOf(from));
   const double variance_m2 = std::max(std::pow(options_.odometry_m_per_m, 2) * way_m,
-                                      std::pow(options_.odometry_m_min, 2));
+                                      std::pow(options_.odometry_m_min, 2) * share);
   const double variance_rad2 = std::max(std::pow(options_.odometry_rad_per_m, 2) * way_m +
                                             std::pow(options_.odometry_rad_per_rad, 2) * turn_rad,
-                                        std::pow(options_.odometry_rad_min, 2));
+                                        std::pow(options_.odometry_rad_min, 2) * share);
   edge.information.setZero();
   edge.information.diagonal().head<3>().setConstant(1.0 / variance_m2);
   // The turn about the vertical alone drifts; the residual is in the axes of `to`.
@@ -121,7 +133,7 @@ RelativePose RobotGraph::Odometry(size_t from, size_t to) const {
   const Eigen::Matrix3d about_up = up_to * up_to.transpose();
   edge.information.bottomRightCorner<3, 3>() =
       about_up / variance_rad2 +
-      (Eigen::Matrix3d::Identity() - about_up) / std::pow(options_.odometry_tilt_rad, 2);
+      (Eigen::Matrix3d::Identity() - about_up) / (std::pow(options_.odometry_tilt_rad, 2) * share);
   return edge;
 }
 

@@ -43,7 +43,7 @@ struct RobotGraphOptions {
   double odometry_m_per_m = 0.02;
   double odometry_rad_per_m = 0.005;
   double odometry_rad_per_rad = 0.02;
-  /// ...and at least this between two keyframes.
+  /// ...and at least this between two keyframes, less between ends of loops that lie closer.
   double odometry_m_min = 0.005;
   double odometry_rad_min = 0.00087;
   /// Of roll and pitch between two keyframes, whatever lies between: odometry with an inertial unit
@@ -100,6 +100,7 @@ class RobotGraph {
   std::vector<size_t> ChooseKeyframes(const std::vector<BoundLoop>& loops, double spread) const;
   const Pose3d& Given(size_t index) const;
   TimeNs TimeOf(size_t index) const;
+  double ShareOfAStep(double way_m, double turn_rad, TimeNs time_ns) const;
   RelativePose Odometry(size_t from, size_t to) const;
   PoseGraph MakeGraph(const std::vector<size_t>& keyframes,
                       const std::vector<BoundLoop>& loops) const;

@@ -235,6 +235,10 @@ TEST_F(LabelFolderTest, SaysWhatIsWrong) {
   refuse({"1.png", "is 5x3", "4x3"});
   folder_.Write("labels/1.png", Labels(CV_8UC3, 3));
   refuse({"1.png", "3 channels"});
+  std::vector<uchar> bits;
+  cv::imencode(".png", cv::Mat(3, 4, CV_8UC1, cv::Scalar(1)), bits, {cv::IMWRITE_PNG_BILEVEL, 1});
+  folder_.Write("labels/1.png", std::string(bits.begin(), bits.end()));
+  refuse({"1.png", "of 1 bits", "8 or 16 bits"});
   const std::string whole = Labels(CV_8UC1, 3);
   folder_.Write("labels/1.png", whole.substr(0, whole.size() / 2));
   refuse({"1.png"});

@@ -149,6 +149,26 @@ TEST_F(RobotGraphTest, LoopsThatLieAreToldAsRejected) {
   EXPECT_EQ(rejected_count, 5);
 }
 
+// Their ends are keyframes, and odometry is worth no less for it.
+TEST_F(RobotGraphTest, LoopsThatAreNotBelievedMoveNothing) {
+  AddRightLoops();
+  const auto right = graph_->Solve();
+  ASSERT_TRUE(right.ok()) << right.status();
+  Random random(5, 0);
+  for (int i = 0; i < 300; ++i) {
+    const auto from = static_cast<size_t>(random.Uniform(0.0, static_cast<double>(kRound)));
+    LoopClosure wrong = MakeLoop(way_, from, from + 90);
+    wrong.from_T_to = RobotPose(random.Uniform(-1e4, 1e4), random.Uniform(-1e4, 1e4), 0.5);
+    graph_->AddLoop(wrong);
+  }
+  const auto crowded = graph_->Solve();
+  ASSERT_TRUE(crowded.ok()) << crowded.status();
+  ASSERT_EQ(crowded->kept_count, right->kept_count);
+  EXPECT_GT(crowded->keyframe_times.size(), right->keyframe_times.size() * 5 / 4);
+  const double moved_m = RmsM(Corrected(right->change), odometry_);
+  EXPECT_LT(RmsM(Corrected(crowded->change), Corrected(right->change)), 0.03 * moved_m);
+}
+
 TEST_F(RobotGraphTest, CountsLoopsThatNobodyCanUse) {
   AddRightLoops();
   LoopClosure early = MakeLoop(way_, 0, kRound);
