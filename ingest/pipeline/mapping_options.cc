@@ -48,7 +48,7 @@ std::string MappingOptions::Digest(bool has_labels) const {
     if (!digest.empty()) absl::StrAppend(&tuning, " ", digest);
   }
   // Of what the stages make of a log, with the same options.
-  constexpr int kStagesVersion = 2;
+  constexpr int kStagesVersion = 3;
   return absl::StrCat(
       "stages=", kStagesVersion, " voxel=", volume.voxel_m, " truncation=", volume.truncation_m,
       " range=", volume.range_m, " masking=", static_cast<int>(volume.masking),

@@ -178,6 +178,9 @@ constexpr OptionField<StructureOptions> kStructureFields[] = {
      "the mean normal is the better word"},
     {"structure-wall-area", &StructureOptions::wall_m2_min, 0.0, 100.0,
      "Least area of a wall, square metres: smaller ones are frames"},
+    {"structure-wall-lean", &StructureOptions::wall_lean_max, 0.0, 1.0,
+     "What is labelled wall and faces up or down by more than this is none, cosine: labels bleed "
+     "over the edges of floors, and walls of attics lean by up to 45 degrees"},
     {"structure-flat-area", &StructureOptions::flat_m2_min, 0.0, 100.0,
      "Least area of a floor or ceiling, square metres: smaller ones are steps and sills"},
     {"structure-pillar-area", &StructureOptions::pillar_m2_min, 0.0, 100.0,

@@ -128,6 +128,7 @@ struct StructureOptions {
   double crumb_m2 = 0.02;
   double broad_m2 = 0.02;
   double wall_m2_min = 0.3;
+  double wall_lean_max = 0.7;
   double flat_m2_min = 0.5;
   double pillar_m2_min = 0.2;
 

@@ -242,6 +242,8 @@ class PieceFinder {
                             : patch.type == kPillar ? options_.pillar_m2_min
                                                     : options_.flat_m2_min;
       if (patch.sums.area_m2 < m2_min) continue;
+      const bool is_flat = std::abs(patch.sums.MeanNormal().z()) > options_.wall_lean_max;
+      if (patch.type == kWall && is_flat) continue;
       StructurePiece piece;
       piece.type = kTypeNames[patch.type];
       piece.class_id = patch.class_id;

@@ -157,6 +157,17 @@ TEST(Structures, JoinAWallThatFurnitureHidesAPartOf) {
   EXPECT_NEAR(pieces[0].area_m2, 10.0, 0.1);
 }
 
+TEST(Structures, WhatLiesFlatIsNoWallWhateverItsLabel) {
+  MeshBlock mesh;
+  AddSheet({0, 0, 0}, {1, 0, 0}, {0, 5, 0}, kWall, &mesh);
+  AddSheet({0, 0, 0}, {0, 0, 2.5}, {5, 0, 0}, kWall, &mesh);
+  // Of an attic.
+  AddSheet({0, 6, 0}, {0, 1.2, 2}, {5, 0, 0}, kWall, &mesh);
+  const std::vector<StructurePiece> pieces = FindStructures({&mesh}, Classes(), {});
+  ASSERT_EQ(pieces.size(), 2u);
+  for (const StructurePiece& piece : pieces) EXPECT_LT(std::abs(piece.normal_map.z()), 0.6);
+}
+
 TEST(Structures, HaveOnePieceAPillar) {
   MeshBlock mesh;
   for (const double x : {0.0, 3.0}) {
