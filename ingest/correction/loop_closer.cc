@@ -12,8 +12,6 @@ namespace {
 
 // More of them are solved at the end of the log only: each is compared with each.
 constexpr size_t kLoopsWhileRunningMax = 2000;
-// Less is no correction, but what is left of rounding.
-constexpr double kNothingM = 1e-6;
 
 // Covariances by keyframe, shared by the poses around it.
 class KeyframeCovariances {
@@ -84,8 +82,9 @@ absl::StatusOr<TrajectoryChange> LoopCloser::Correct(TimeNs now_ns, bool is_last
   solved_ns_ = now_ns;
   DSG_RETURN_IF_ERROR(Solve(is_last));
   TrajectoryChange change = path_.ChangeTo(solution_.change);
-  if (change.largest_m() < (is_last ? kNothingM : options_.correct_min_m))
-    return TrajectoryChange();
+  // The end has the last word on a corrected path, however little it moves: only then are there
+  // covariances.
+  if (!is_last && change.largest_m() < options_.correct_min_m) return TrajectoryChange();
   path_.Correct(solution_.change);
   return change;
 }

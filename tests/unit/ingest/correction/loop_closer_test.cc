@@ -143,6 +143,22 @@ TEST_F(LoopCloserTest, PosesCarryTheCovariancesOfTheCorrectedPath) {
   EXPECT_EQ(factors->back().type, "loop_closure");
 }
 
+// Also if nothing has moved since the last loop closure.
+TEST_F(LoopCloserTest, TheEndBringsCovariancesToAPathThatWasCorrectedBefore) {
+  Drive(kRound + 5);
+  closer_.Take(LoopBack(kRound));
+  EXPECT_FALSE(Correct().IsIdentity());
+  for (const TimedPose& pose : closer_.CorrectedPoses()) ASSERT_EQ(pose.covariance, nullptr);
+  EXPECT_FALSE(Correct(/*is_last=*/true).IsIdentity());
+  for (const TimedPose& pose : closer_.CorrectedPoses()) ASSERT_NE(pose.covariance, nullptr);
+}
+
+TEST_F(LoopCloserTest, WithoutLoopsTheEndMovesNothing) {
+  Drive(kRound);
+  EXPECT_TRUE(Correct(/*is_last=*/true).IsIdentity());
+  EXPECT_FALSE(path_.is_corrected());
+}
+
 TEST_F(LoopCloserTest, OffItTakesAndCorrectsNothing) {
   LoopCloser off(RobotGraphOptions(), &path_, /*is_on=*/false);
   Drive(kRound + 5);
