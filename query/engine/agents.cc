@@ -31,11 +31,6 @@ v1::PoseQuality QualityToProto(PoseQuality quality) {
   return v1::POSE_QUALITY_UNSPECIFIED;
 }
 
-size_t AgentNames::KeyHash::operator()(const Key& key) const noexcept {
-  const size_t hash = std::hash<std::string>()(key.id_or_name) * 31 + key.opening;
-  return hash * 31 + static_cast<size_t>(key.revision);
-}
-
 absl::StatusOr<NodeId> AgentNames::Resolve(const Snapshot& snapshot,
                                            const std::string& id_or_name) {
   if (id_or_name.empty()) {
@@ -110,13 +105,6 @@ absl::StatusOr<std::shared_ptr<const Ancestry>> Read(const Snapshot& snapshot, c
 }
 
 }  // namespace
-
-size_t AncestryCache::KeyHash::operator()(const Key& key) const noexcept {
-  const std::hash<NodeId> node_hash;
-  size_t hash = key.opening * 31 + static_cast<size_t>(key.revision);
-  hash = hash * 31 + node_hash(key.place);
-  return hash * 31 + node_hash(key.room);
-}
 
 absl::StatusOr<std::shared_ptr<const Ancestry>> AncestryCache::Find(const Snapshot& snapshot,
                                                                     const Stay& stay) {

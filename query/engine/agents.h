@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -36,13 +37,14 @@ class AgentNames {
     Revision revision = 0;
     std::string id_or_name;
     bool operator==(const Key&) const = default;
-  };
-  struct KeyHash {
-    size_t operator()(const Key& key) const noexcept;
+    template <typename H>
+    friend H AbslHashValue(H hash, const Key& key) {
+      return H::combine(std::move(hash), key.opening, key.revision, key.id_or_name);
+    }
   };
 
   // Entries.
-  Cache<Key, NodeId, KeyHash> entries_{65'536};
+  Cache<Key, NodeId> entries_{65'536};
 };
 
 /// Where an agent was; nullopt before its first pose and after its last. In a gap of its track
@@ -92,14 +94,16 @@ class AncestryCache {
     NodeId place;
     NodeId room;
     bool operator==(const Key&) const = default;
-  };
-  struct KeyHash {
-    size_t operator()(const Key& key) const noexcept;
+    template <typename H>
+    friend H AbslHashValue(H hash, const Key& key) {
+      return H::combine(std::move(hash), key.opening, key.revision, key.place.value,
+                        key.room.value);
+    }
   };
 
   // Entries, about 20 MB; a building has some thousand places, of which one revision is asked at a
   // time.
-  Cache<Key, std::shared_ptr<const Ancestry>, KeyHash> entries_{65'536};
+  Cache<Key, std::shared_ptr<const Ancestry>> entries_{65'536};
 };
 
 }  // namespace dsg::query

@@ -45,10 +45,6 @@ uint64_t CurveCode(const Eigen::Vector3d& point) {
   return code;
 }
 
-bool Contains(const SpaceRange& range, const SpaceKey& key) {
-  return range.first <= key && key <= range.second;
-}
-
 // Children of an inner page that may hold keys of the range.
 template <typename Visit>
 void VisitChildren(const SpaceTree::Inner& inner, const SpaceRange& range, const Visit& visit) {
@@ -56,6 +52,15 @@ void VisitChildren(const SpaceTree::Inner& inner, const SpaceRange& range, const
     if (i + 1 < inner.count && inner.lows[i + 1] <= range.first) continue;
     if (range.second < inner.lows[i]) return;
     visit(i);
+  }
+}
+
+// Entries of a leaf whose keys are in the range, until `visit` returns false.
+template <typename Visit>
+void VisitEntries(const SpaceTree::Leaf& leaf, const SpaceRange& range, const Visit& visit) {
+  for (int i = CowPages<SpaceTraits>::LowerBound(leaf, range.first); i < leaf.count; ++i) {
+    const SpaceEntry& entry = leaf.entries[i];
+    if (range.second < entry.key || !visit(entry)) return;
   }
 }
 
@@ -120,12 +125,10 @@ class NearestSearch {
       });
       return;
     }
-    const auto& leaf = SpaceTree::AsLeaf(page);
-    for (int i = 0; i < leaf.count; ++i) {
-      const SpaceEntry& entry = leaf.entries[i];
-      if (!Contains(ranges_[range], entry.key)) continue;
+    VisitEntries(SpaceTree::AsLeaf(page), ranges_[range], [&](const SpaceEntry& entry) {
       Push({entry.box.DistanceBound(point_map_), entry.key.id, nullptr, nullptr, 0});
-    }
+      return true;
+    });
   }
 
   const std::vector<SpaceRange>& ranges_;
@@ -146,12 +149,10 @@ bool VisitTouching(const SpaceTree::Page& page, const SpaceRange& range, const B
     });
     return go_on;
   }
-  const auto& leaf = SpaceTree::AsLeaf(page);
-  for (int i = 0; i < leaf.count && go_on; ++i) {
-    const SpaceEntry& entry = leaf.entries[i];
-    if (!Contains(range, entry.key) || !entry.box.MayTouch(box_map)) continue;
-    go_on = visit(entry.key.id);
-  }
+  VisitEntries(SpaceTree::AsLeaf(page), range, [&](const SpaceEntry& entry) {
+    go_on = !entry.box.MayTouch(box_map) || visit(entry.key.id);
+    return go_on;
+  });
   return go_on;
 }
 

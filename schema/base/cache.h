@@ -15,11 +15,11 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <unordered_map>
 #include <utility>
 #include <variant>
 #include <vector>
 
+#include "absl/container/flat_hash_map.h"
 #include "absl/status/statusor.h"
 #include "schema/base/status.h"
 #include "schema/base/stop_check.h"
@@ -128,12 +128,13 @@ struct Costed {
   size_t bytes = 0;
 };
 
-/// A map from keys to values under a bound in bytes; the least recently used go first. The newest
-/// stays, however large: its caller holds it anyway. Values are copied out, so they are small or
-/// shared pointers.
+/// A map from keys, which absl::Hash knows, to values under a bound in bytes. The oldest go first,
+/// but for those that were used since they came or were last spared: these are spared once more, so
+/// that a hit touches its own entry only. The newest stays, however large: its caller holds it
+/// anyway. Values are copied out, so they are small or shared pointers.
 ///
 /// Threads: safe from many threads. Values are destroyed outside the lock.
-template <typename Key, typename Value, typename Hash = std::hash<Key>>
+template <typename Key, typename Value>
 class Cache {
  public:
   explicit Cache(size_t bytes_max) : bytes_max_(bytes_max) {}
@@ -142,8 +143,9 @@ class Cache {
     const std::lock_guard lock(mutex_);
     const auto found = index_.find(key);
     if (found == index_.end()) return std::nullopt;
-    entries_.splice(entries_.begin(), entries_, found->second);
-    return found->second->value;
+    Entry& entry = *found->second;
+    entry.is_used = true;
+    return entry.value;
   }
 
   /// Replaces what is there.
@@ -151,10 +153,18 @@ class Cache {
     Entries dropped;
     const std::lock_guard lock(mutex_);
     if (const auto found = index_.find(key); found != index_.end()) Drop(found->second, &dropped);
-    entries_.push_front({key, std::move(value), bytes});
+    entries_.push_front({key, std::move(value), bytes, false});
     index_.emplace(key, entries_.begin());
     bytes_ += bytes;
-    while (bytes_ > bytes_max_ && entries_.size() > 1) Drop(std::prev(entries_.end()), &dropped);
+    const auto newest = entries_.begin();
+    while (bytes_ > bytes_max_ && entries_.size() > 1) {
+      const auto oldest = std::prev(entries_.end());
+      if (oldest == newest || std::exchange(oldest->is_used, false)) {
+        entries_.splice(entries_.begin(), entries_, oldest);
+      } else {
+        Drop(oldest, &dropped);
+      }
+    }
   }
 
   /// What is there, or else what `make` returns, an absl::StatusOr<Costed<Value>>. Callers that ask
@@ -185,6 +195,8 @@ class Cache {
     Key key;
     Value value;
     size_t bytes;
+    // Since it came to the front.
+    bool is_used;
   };
   using Entries = std::list<Entry>;
 
@@ -198,9 +210,9 @@ class Cache {
   const size_t bytes_max_;
   mutable std::mutex mutex_;
   size_t bytes_ = 0;
-  // The last used first.
+  // The newest first.
   Entries entries_;
-  std::unordered_map<Key, typename Entries::iterator, Hash> index_;
+  absl::flat_hash_map<Key, typename Entries::iterator> index_;
   SingleFlight<Key> flights_;
 };
 

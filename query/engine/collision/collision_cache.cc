@@ -257,16 +257,6 @@ absl::StatusOr<bool> RevisionFacts::HasTriangles(
   return has;
 }
 
-size_t CollisionCache::KeyHash::operator()(const Key& key) const noexcept {
-  size_t hash = static_cast<size_t>(key.map_key);
-  for (const int64_t part :
-       {int64_t{key.block.x}, int64_t{key.block.y}, int64_t{key.block.z}, key.written}) {
-    hash = (hash ^ static_cast<size_t>(part)) * 0x9e3779b97f4a7c15ull;
-    hash ^= hash >> 32;
-  }
-  return hash;
-}
-
 std::shared_ptr<RevisionFacts> CollisionCache::FactsOf(
     const std::shared_ptr<const GraphView>& view) {
   std::lock_guard lock(mutex_);

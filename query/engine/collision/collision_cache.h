@@ -191,9 +191,11 @@ class CollisionCache {
     BlockIndex block;
     Revision written = 0;
     bool operator==(const Key&) const = default;
-  };
-  struct KeyHash {
-    size_t operator()(const Key& key) const noexcept;
+    template <typename H>
+    friend H AbslHashValue(H hash, const Key& key) {
+      const BlockIndex& block = key.block;
+      return H::combine(std::move(hash), key.map_key, block.x, block.y, block.z, key.written);
+    }
   };
   struct KnownView {
     std::weak_ptr<const GraphView> view;
@@ -209,7 +211,7 @@ class CollisionCache {
   void KeepBounds(uint64_t map_key, std::vector<BlockBounds> bounds, int64_t measured_count);
 
   const size_t bytes_max_;
-  Cache<Key, std::shared_ptr<const MeshPiece>, KeyHash> pieces_;
+  Cache<Key, std::shared_ptr<const MeshPiece>> pieces_;
   std::atomic<int64_t> read_count_ = 0;
   mutable std::mutex mutex_;
   int64_t measured_count_ = 0;

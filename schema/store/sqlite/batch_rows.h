@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "schema/base/cache.h"
@@ -52,17 +53,15 @@ struct ShapeKey {
   Revision rev_from;
   bool with_vertices;
   bool operator==(const ShapeKey&) const = default;
-};
-struct ShapeKeyHash {
-  size_t operator()(const ShapeKey& key) const {
-    return std::hash<int64_t>()((key.row_id * 1'000'003 + key.rev_from) * 2 +
-                                (key.with_vertices ? 1 : 0));
+  template <typename H>
+  friend H AbslHashValue(H hash, const ShapeKey& key) {
+    return H::combine(std::move(hash), key.row_id, key.rev_from, key.with_vertices);
   }
 };
 
 /// Rows are never changed, so what was decoded once stays right.
 using ShapesPtr = std::shared_ptr<const DecodedShapes>;
-using ShapeCache = Cache<ShapeKey, ShapesPtr, ShapeKeyHash>;
+using ShapeCache = Cache<ShapeKey, ShapesPtr>;
 
 struct ShapeQuestion {
   NodeId agent;

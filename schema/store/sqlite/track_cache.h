@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "schema/base/cache.h"
@@ -58,29 +59,25 @@ struct TrackKey {
   NodeId agent;
   Revision revision;
   bool operator==(const TrackKey&) const = default;
+  template <typename H>
+  friend H AbslHashValue(H hash, const TrackKey& key) {
+    return H::combine(std::move(hash), key.agent.value, key.revision);
+  }
 };
 struct SegmentKey {
   int64_t id;
   Revision rev_from;
   int64_t pose_count;
   bool operator==(const SegmentKey&) const = default;
-};
-struct PairHash {
-  static size_t Mix(uint64_t a, uint64_t b) {
-    return static_cast<size_t>((a * 0x9e3779b97f4a7c15ull ^ b) * 0xff51afd7ed558ccdull);
-  }
-  size_t operator()(const TrackKey& key) const {
-    return Mix(key.agent.value, static_cast<uint64_t>(key.revision));
-  }
-  size_t operator()(const SegmentKey& key) const {
-    return Mix(static_cast<uint64_t>(key.id), static_cast<uint64_t>(key.rev_from)) ^
-           static_cast<size_t>(key.pose_count);
+  template <typename H>
+  friend H AbslHashValue(H hash, const SegmentKey& key) {
+    return H::combine(std::move(hash), key.id, key.rev_from, key.pose_count);
   }
 };
 
-using TrackCache = Cache<TrackKey, TrackPtr, PairHash>;
-using SegmentCache = Cache<SegmentKey, SegmentPtr, PairHash>;
-using AncestorCache = Cache<TrackKey, NodeIdsPtr, PairHash>;
+using TrackCache = Cache<TrackKey, TrackPtr>;
+using SegmentCache = Cache<SegmentKey, SegmentPtr>;
+using AncestorCache = Cache<TrackKey, NodeIdsPtr>;
 /// Humans and robots at a revision; ascending.
 using AgentCache = Cache<Revision, NodeIdsPtr>;
 

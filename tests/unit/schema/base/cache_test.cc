@@ -17,7 +17,7 @@ using CostedText = absl::StatusOr<Costed<std::string>>;
 
 absl::Status Enough() { return absl::CancelledError("enough"); }
 
-TEST(Cache, DropsTheLeastRecentlyUsedBeyondItsBytes) {
+TEST(Cache, DropsTheOldestThatWasNotUsedBeyondItsBytes) {
   Cache<int, std::string> cache(100);
   cache.Insert(1, "one", 40);
   cache.Insert(2, "two", 40);
@@ -28,6 +28,21 @@ TEST(Cache, DropsTheLeastRecentlyUsedBeyondItsBytes) {
   EXPECT_EQ(cache.Find(3), "three");
   EXPECT_EQ(cache.stats().bytes, 80u);
   EXPECT_EQ(cache.stats().entry_count, 2);
+}
+
+TEST(Cache, SparesWhatWasUsedOnceForEachTime) {
+  Cache<int, std::string> cache(100);
+  cache.Insert(1, "one", 40);
+  cache.Insert(2, "two", 40);
+  EXPECT_EQ(cache.Find(1), "one");
+  EXPECT_EQ(cache.Find(2), "two");
+  // Everything was used: the oldest goes all the same.
+  cache.Insert(3, "three", 40);
+  EXPECT_EQ(cache.Find(1), std::nullopt);
+  EXPECT_EQ(cache.Find(3), "three");
+  cache.Insert(4, "four", 40);
+  EXPECT_EQ(cache.Find(2), std::nullopt);
+  EXPECT_EQ(cache.Find(3), "three");
 }
 
 TEST(Cache, ReplacesAndKeepsTheNewestHoweverLarge) {

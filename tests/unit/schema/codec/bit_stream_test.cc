@@ -41,6 +41,24 @@ TEST(BitStream, ReadsBackVarintsAndKnowsTheirSize) {
   }
 }
 
+// Near the end bytes are read one by one, before it a word at a time.
+TEST(BitStream, ReadsVarintsOfEveryLengthWhateverFollows) {
+  for (int bits = 0; bits < 64; ++bits) {
+    for (const uint64_t value : {uint64_t{1} << bits, (uint64_t{2} << bits) - 1}) {
+      for (const char* rest : {"", "\x01", "\xff\xff\xff\xff\xff\xff\xff\xff\xff"}) {
+        std::string bytes;
+        AppendVarint(value, &bytes);
+        const size_t size = bytes.size();
+        bytes += rest;
+        ByteReader reader(bytes);
+        EXPECT_EQ(reader.Varint(), value);
+        EXPECT_EQ(reader.position(), size);
+        EXPECT_TRUE(reader.ok());
+      }
+    }
+  }
+}
+
 TEST(ByteReader, RemembersThatItReadPastTheEnd) {
   ByteReader reader("\x80\x80");
   reader.Varint();
