@@ -18,7 +18,7 @@
 namespace dsg::ingest {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using SteadyClock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kLookPeriod(50);
 // Enough to hold a header and some rows, so that a file that was written anew is known.
@@ -58,12 +58,12 @@ bool GrowingFile::IsStopped() const {
 
 absl::StatusOr<GrowingFile::Wait> GrowingFile::WaitBeyond(
     uint64_t size, std::optional<std::chrono::milliseconds> patience) {
-  const auto begin = Clock::now();
+  const auto begin = SteadyClock::now();
   while (true) {
     if (IsStopped()) return Wait::kEnd;
     DSG_RETURN_IF_ERROR(Look());
     if (size_ > size) return Wait::kMore;
-    const auto waited = Clock::now() - begin;
+    const auto waited = SteadyClock::now() - begin;
     if (patience.has_value() && waited >= *patience) return Wait::kPatience;
     if (options_.timeout.has_value() && waited >= *options_.timeout) return Wait::kEnd;
     if (idle_) DSG_RETURN_IF_ERROR(idle_());

@@ -103,7 +103,7 @@ void BlockPatch::Add(const std::vector<std::shared_ptr<const MeshBlock>>& blocks
 }
 
 void BlockPatch::NoteCopies(Source* source) {
-  constexpr float kSameM = 1e-4f;
+  constexpr float kSameVertexM = 1e-4f;
   // Faces that begin in a block reach out of it by a voxel.
   constexpr double kReachM = 0.2;
   const Box3d box = BoxOf(block_.index, block_size_m_);
@@ -113,7 +113,7 @@ void BlockPatch::NoteCopies(Source* source) {
     if (!around.contains(position.cast<double>()) || !IsOnSurface(i, source)) continue;
     const size_t mine = static_cast<size_t>(source->on[i]);
     if (mine >= known_count_) continue;
-    if ((block_.positions_map[mine] - position).norm() < kSameM) is_copy_[mine] = 1;
+    if ((block_.positions_map[mine] - position).norm() < kSameVertexM) is_copy_[mine] = 1;
   }
 }
 

@@ -94,7 +94,7 @@ Limb Head() {
   return limb;
 }
 
-Limb Arm(int side) {
+Limb ArmOf(int side) {
   const int collar = 13 + side;
   const int shoulder = 16 + side;
   const int elbow = 18 + side;
@@ -122,7 +122,7 @@ Limb Arm(int side) {
   return limb;
 }
 
-Limb Hand(int side) {
+Limb HandOf(int side) {
   const int wrist = 20 + side;
   const int hand = 22 + side;
   Limb limb = {Direction::kDown, GirthKind::kExtremity, 12, {}};
@@ -136,7 +136,7 @@ Limb Hand(int side) {
   return limb;
 }
 
-Limb Leg(int side) {
+Limb LegOf(int side) {
   const int hip = 1 + side;
   const int knee = 4 + side;
   const int ankle = 7 + side;
@@ -165,7 +165,7 @@ Limb Leg(int side) {
   return limb;
 }
 
-Limb Foot(int side) {
+Limb FootOf(int side) {
   const int ankle = 7 + side;
   const int toes = 10 + side;
   Limb limb = {Direction::kForward, GirthKind::kExtremity, 14, {}};
@@ -187,8 +187,9 @@ Limb Foot(int side) {
 }
 
 const std::vector<Limb>& Limbs() {
-  static const std::vector<Limb> limbs = {Trunk(), Neck(), Head(), Arm(0),  Arm(1), Hand(0),
-                                          Hand(1), Leg(0), Leg(1), Foot(0), Foot(1)};
+  static const std::vector<Limb> limbs = {Trunk(),  Neck(),    Head(),    ArmOf(0),
+                                          ArmOf(1), HandOf(0), HandOf(1), LegOf(0),
+                                          LegOf(1), FootOf(0), FootOf(1)};
   return limbs;
 }
 
