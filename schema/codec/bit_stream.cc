@@ -4,16 +4,6 @@
 #include <bit>
 
 namespace dsg {
-namespace {
-
-// Of a word, the low seven bits of each byte, one after the other.
-uint64_t JoinSevens(uint64_t word) {
-  word = (word & 0x007f007f007f007f) | (word & 0x7f007f007f007f00) >> 1;
-  word = (word & 0x00003fff00003fff) | (word & 0x3fff00003fff0000) >> 2;
-  return (word & 0x000000000fffffff) | (word & 0x0fffffff00000000) >> 4;
-}
-
-}  // namespace
 
 void AppendVarint(uint64_t value, std::string* out) {
   while (value >= 0x80) {
@@ -26,17 +16,6 @@ void AppendVarint(uint64_t value, std::string* out) {
 int VarintSize(uint64_t value) { return (static_cast<int>(std::bit_width(value | 1)) + 6) / 7; }
 
 uint64_t ByteReader::Varint() {
-  // A word at a time: a branch a byte is mispredicted where lengths vary, as in every header.
-  if (remaining() >= sizeof(uint64_t)) {
-    uint64_t word = 0;
-    std::memcpy(&word, bytes_.data() + at_, sizeof(word));
-    const uint64_t last_bytes = ~word & 0x8080808080808080;
-    if (last_bytes != 0) {
-      const int bits = std::countr_zero(last_bytes) + 1;
-      at_ += static_cast<size_t>(bits / 8);
-      return JoinSevens(word & (~uint64_t{0} >> (64 - bits)));
-    }
-  }
   uint64_t value = 0;
   for (int shift = 0; shift < 64; shift += 7) {
     const auto byte = Fixed<uint8_t>();

@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
+
+#include "schema/codec/delta_checksum.h"
+
 namespace dsg {
 namespace {
 
@@ -45,6 +49,27 @@ TEST(Sha256, IsTheStandardOne) {
 }
 
 TEST(Checksum, DependsOnTheSeed) { EXPECT_NE(Checksum("abc", 1), Checksum("abc", 2)); }
+
+// Stores keep it, so that a delta that is sent again by a later build is still known.
+TEST(DeltaChecksum, StaysWhatItIs) {
+  GraphDelta delta;
+  delta.labels.push_back({3, "chair"});
+  // Longer than what is gathered at once.
+  delta.labels.push_back({4, std::string(5000, 'x')});
+  TrajectoryAppend append;
+  append.agent = NodeId(7);
+  for (int i = 0; i < 100; ++i) {
+    TimedPose pose;
+    pose.time_ns = 1000 * i;
+    pose.map_T_agent.position = {0.5 * i, -1.0, 2.0};
+    append.poses.push_back(pose);
+  }
+  delta.appends.push_back(append);
+  constexpr int64_t kStored = 7908801847562944023;
+  EXPECT_EQ(DeltaChecksum(delta), kStored);
+  delta.appends[0].poses.back().time_ns += 1;
+  EXPECT_NE(DeltaChecksum(delta), kStored);
+}
 
 }  // namespace
 }  // namespace dsg
