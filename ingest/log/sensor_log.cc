@@ -2,11 +2,13 @@
 #include "ingest/log/sensor_log.h"
 
 #include <algorithm>
+#include <array>
 #include <initializer_list>
 #include <tuple>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/files/spilled_rows.h"
 #include "ingest/log/log_input.h"
 #include "ingest/log/pose_table.h"
 #include "ingest/log/text_table.h"
@@ -65,6 +67,24 @@ StampSpan SpanOf(const std::vector<SensorChannel>& channels,
     span.Add(channel.times.back());
   }
   return span;
+}
+
+// What stays of a pose until its turn.
+struct PoseRow {
+  TimeNs time_ns = 0;
+  int64_t line = 0;
+  int32_t agent = 0;
+  uint32_t flags = 0;
+  std::array<double, 3> position{};
+  /// x, y, z, w.
+  std::array<double, 4> orientation{};
+};
+
+PoseRow PoseRowOf(const TrackRow& given) {
+  PoseRow row{given.time_ns, given.line, given.agent, given.flags, {}, {}};
+  Eigen::Map<Eigen::Vector3d>(row.position.data()) = given.map_T_agent.position;
+  Eigen::Map<Eigen::Vector4d>(row.orientation.data()) = given.map_T_agent.orientation.coeffs();
+  return row;
 }
 
 }  // namespace
@@ -192,17 +212,22 @@ SensorChannel MakePoseChannel(TrackTable table) {
   channel.times.reserve(table.rows.size());
   for (const TrackRow& row : table.rows) channel.times.push_back(row.time_ns);
   // Shared, since a std::function must be copyable.
+  const auto rows = std::make_shared<SpilledRows<PoseRow>>();
+  absl::Status status;
+  for (const TrackRow& row : table.rows) status.Update(rows->Add(PoseRowOf(row)));
+  table.rows = {};
   const auto shared = std::make_shared<const TrackTable>(std::move(table));
-  channel.make = [shared](size_t index) -> absl::StatusOr<Measurement> {
-    const TrackRow& row = shared->rows[index];
+  channel.make = [shared, rows, status](size_t index) -> absl::StatusOr<Measurement> {
+    if (!status.ok()) return status;
+    DSG_ASSIGN_OR_RETURN(const PoseRow row, rows->At(index));
     const TrackTable::Agent& agent = shared->agents[row.agent];
-    return Measurement(PoseMeasurement{.agent_name = agent.name,
-                                       .agent_kind = agent.kind,
-                                       .pose = {.time_ns = row.time_ns,
-                                                .flags = row.flags,
-                                                .map_T_agent = row.map_T_agent,
-                                                .covariance = nullptr},
-                                       .line = row.line});
+    PoseMeasurement pose{.agent_name = agent.name, .agent_kind = agent.kind, .line = row.line};
+    pose.pose.time_ns = row.time_ns;
+    pose.pose.flags = row.flags;
+    pose.pose.map_T_agent.position = Eigen::Map<const Eigen::Vector3d>(row.position.data());
+    pose.pose.map_T_agent.orientation.coeffs() =
+        Eigen::Map<const Eigen::Vector4d>(row.orientation.data());
+    return Measurement(std::move(pose));
   };
   return channel;
 }
