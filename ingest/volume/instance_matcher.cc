@@ -186,6 +186,8 @@ void InstanceMatcher::JoinOften() {
 void InstanceMatcher::MoveTo(const BlockMap& blocks) {
   for (Instance& instance : instances_) instance.box.setEmpty();
   for (int64_t number = 0; number < blocks.size(); ++number) {
+    // Errors stay in the map.
+    if (blocks.IsFull()) blocks.Trim().IgnoreError();
     const VoxelBlock& block = blocks.block(number);
     for (int i = 0; i < VoxelBlock::kCount; ++i) {
       const VoxelLabels* labels = block.LabelsOf(i);

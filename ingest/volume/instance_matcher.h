@@ -24,6 +24,7 @@ class InstanceMatcher {
   void Match(const FrameView& view, const BlockMap& blocks);
 
   /// The blocks are others than before, moved: what is known of where instances are is read anew.
+  /// Pointers to blocks are void afterwards (BlockMap::Trim).
   void MoveTo(const BlockMap& blocks);
 
   /// 65536 numbers.

@@ -13,6 +13,8 @@ namespace {
 
 // A block that moves by less stays where it is: sampling would blur it for nothing.
 constexpr double kStillM = 1e-4;
+// Blocks that are poured one after another before others may go to disk.
+constexpr int64_t kPouredAtOnce = 64;
 
 // The value of a volume at a point.
 struct Sample {
@@ -34,6 +36,9 @@ class Sampler {
     sample.distance_m = Interpolated(point_map).value_or(sample.voxel().distance_m);
     return sample;
   }
+
+  // Before blocks go to disk.
+  void LetGo() { last_ = nullptr; }
 
  private:
   bool Find(const Eigen::Vector3i& voxel, Sample* sample) {
@@ -69,20 +74,37 @@ class Sampler {
 class Mover {
  public:
   Mover(const BlockMap& blocks, const TrajectoryChange& change)
-      : blocks_(blocks), voxel_m_(blocks.voxel_m()), moved_(blocks.voxel_m()), sampler_(blocks) {
-    for (int64_t i = 0; i < blocks_.size(); ++i) moves_.push_back(MoveOfBlock(i, change));
+      : blocks_(blocks), voxel_m_(blocks.voxel_m()), moved_(blocks.MakeEmpty()), sampler_(blocks) {
+    for (int64_t i = 0; i < blocks_.size(); ++i) {
+      moves_.push_back(MoveOfBlock(i, change));
+      Trim(i);
+    }
   }
 
   BlockMap Move() {
     // First what each block holds itself, then the seams between blocks.
-    for (int64_t i = 0; i < blocks_.size(); ++i) Pour(i, 0.0);
     for (int64_t i = 0; i < blocks_.size(); ++i) {
-      if (moves_[static_cast<size_t>(i)].has_value()) Pour(i, 0.5 * voxel_m_);
+      Pour(i, 0.0);
+      Trim(i);
+    }
+    for (int64_t i = 0; i < blocks_.size(); ++i) {
+      if (!moves_[static_cast<size_t>(i)].has_value()) continue;
+      Pour(i, 0.5 * voxel_m_);
+      Trim(i);
     }
     return std::move(moved_);
   }
 
  private:
+  // Errors stay in the maps.
+  void Trim(int64_t number) {
+    if (number % kPouredAtOnce != 0) return;
+    sampler_.LetGo();
+    last_ = nullptr;
+    blocks_.Trim().IgnoreError();
+    moved_.Trim().IgnoreError();
+  }
+
   // Unset for a block that stays.
   std::optional<Pose3d> MoveOfBlock(int64_t number, const TrajectoryChange& change) const {
     const VoxelBlock& block = blocks_.block(number);

@@ -14,7 +14,9 @@ namespace dsg::ingest {
 ///
 /// Frames are not fused again: that would need all of them, and their time, for each loop closure.
 /// What was merged wrongly before stays merged (docs/adr).
-/// Cost: about 10 million voxels a second. Deterministic.
+/// Cost: about 10 million voxels a second. Deterministic. Both maps keep as many blocks in memory
+/// as `blocks` may, and write the others to disk: pointers to blocks are void afterwards, and
+/// status() of both says whether the disk did as it should.
 BlockMap MoveBlocks(const BlockMap& blocks, const TrajectoryChange& change);
 
 }  // namespace dsg::ingest

@@ -20,6 +20,9 @@
 namespace dsg::ingest {
 namespace {
 
+// Meshes between two looks at how many blocks are in memory.
+constexpr size_t kMeshesAtOnce = 8;
+
 // Says whether a mesh is the one already handed out. Colours are left out: they never settle.
 class MeshDigest {
  public:
@@ -47,17 +50,23 @@ class SemanticVolume::Impl {
  public:
   explicit Impl(const VolumeOptions& options)
       : options_(options),
-        blocks_(options.voxel_m),
+        blocks_(options.voxel_m, options.spill),
         field_(blocks_, BandLengths(options)),
         meaning_(options.label_confidence) {}
 
   const VolumeOptions& options() const { return options_; }
-  VolumeCounts counts() const { return counts_; }
+  VolumeCounts counts() const {
+    VolumeCounts counts = counts_;
+    counts.resident_block_count = blocks_.resident_count();
+    return counts;
+  }
+  const absl::Status& status() const { return status_; }
   const BlockMap& blocks() const { return blocks_; }
 
   absl::Status Integrate(const DepthFrame& frame) {
     const absl::Status checked = FrameView::Check(frame, options_.voxel_m);
     if (!checked.ok()) return checked;
+    if (!status_.ok()) return status_;
     const FrameView view(frame, options_);
     matcher_.Match(view, blocks_);
     std::vector<VoxelBlock*> due = CollectBlocks(view);
@@ -69,22 +78,25 @@ class SemanticVolume::Impl {
       block->last_seen_ns = std::max(block->last_seen_ns, frame.time_ns);
       if (!block->has_surface || block->queued) continue;
       block->queued = true;
-      queue_.push_back(block);
+      queue_.push_back(block->key);
     }
     KeepUpdated();
     ++counts_.frame_count;
     counts_.pixel_count += view.used_count();
     counts_.dynamic_pixel_count += view.dynamic_count();
     counts_.block_count = blocks_.size();
-    return absl::OkStatus();
+    Trim();
+    return status_;
   }
 
   std::vector<MeshBlock> TakeChangedMesh(double block_size_m) {
     DSG_CHECK(block_size_m >= options_.voxel_m);
-    for (VoxelBlock* block : std::exchange(queue_, {})) {
+    for (const BlockKey& key : std::exchange(queue_, {})) {
+      VoxelBlock* const block = blocks_.Find(key);
       block->queued = false;
       const std::optional<Eigen::AlignedBox3i> changed = field_.Publish(block);
       if (changed.has_value()) MarkVoxels(*changed, block_size_m);
+      if (blocks_.IsFull()) Trim();
     }
     for (const Box3d& box : matcher_.TakeRenamedBoxes()) {
       MarkBox(box.min().array() - 4.0 * options_.voxel_m,
@@ -93,25 +105,33 @@ class SemanticVolume::Impl {
     const std::set<BlockIndex> due = std::exchange(due_meshes_, {});
     const std::vector<BlockIndex> indices(due.begin(), due.end());
     std::vector<MeshBlock> meshes(indices.size());
-    ParallelFor(options_.thread_count, indices.size(), [&](size_t i) {
-      meshes[i] =
-          BlockMesher(blocks_, field_, meaning_, matcher_.book(), block_size_m).Make(indices[i]);
-    });
+    const size_t at_once = blocks_.IsLarge() ? kMeshesAtOnce : indices.size();
+    for (size_t begin = 0; begin < indices.size(); begin += at_once) {
+      const size_t count = std::min(at_once, indices.size() - begin);
+      ParallelFor(options_.thread_count, count, [&](size_t i) {
+        meshes[begin + i] = BlockMesher(blocks_, field_, meaning_, matcher_.book(), block_size_m)
+                                .Make(indices[begin + i]);
+      });
+      Trim();
+    }
     std::erase_if(meshes, [this](const MeshBlock& mesh) { return !IsNews(mesh); });
     return meshes;
   }
 
   void Move(const TrajectoryChange& change) {
-    blocks_ = MoveBlocks(blocks_, change);
+    BlockMap moved = MoveBlocks(blocks_, change);
+    status_.Update(blocks_.status());
+    blocks_ = std::move(moved);
     matcher_.MoveTo(blocks_);
     counts_.block_count = blocks_.size();
     queue_.clear();
     for (int64_t i = 0; i < blocks_.size(); ++i) {
-      VoxelBlock& block = blocks_.block(i);
-      if (!block.has_surface) continue;
-      block.queued = true;
-      queue_.push_back(&block);
+      if (!blocks_.HasSurface(i)) continue;
+      blocks_.block(i).queued = true;
+      queue_.push_back(blocks_.key(i));
+      if (blocks_.IsFull()) Trim();
     }
+    Trim();
     // Meshes of before may have lost their surface.
     for (const auto& [index, digest] : digests_) due_meshes_.insert(index);
   }
@@ -123,6 +143,11 @@ class SemanticVolume::Impl {
   }
 
  private:
+  void Trim() {
+    blocks_.Trim().IgnoreError();
+    status_.Update(blocks_.status());
+  }
+
   // Blocks of the map that the frame concerns, and fresh ones for those it has not got yet.
   std::vector<VoxelBlock*> CollectBlocks(const FrameView& view) {
     std::vector<VoxelBlock*> due;
@@ -201,10 +226,11 @@ class SemanticVolume::Impl {
   std::vector<std::unique_ptr<VoxelBlock>> fresh_;
   size_t used_fresh_count_ = 0;
   // Blocks with a surface that have been written since the last mesh.
-  std::vector<VoxelBlock*> queue_;
+  std::vector<BlockKey> queue_;
   std::set<BlockIndex> due_meshes_;
   // Of the meshes handed out.
   std::map<BlockIndex, uint64_t> digests_;
+  absl::Status status_;
 };
 
 SemanticVolume::SemanticVolume(const VolumeOptions& options)
@@ -217,6 +243,7 @@ SemanticVolume& SemanticVolume::operator=(SemanticVolume&&) noexcept = default;
 
 const VolumeOptions& SemanticVolume::options() const { return impl_->options(); }
 VolumeCounts SemanticVolume::counts() const { return impl_->counts(); }
+const absl::Status& SemanticVolume::status() const { return impl_->status(); }
 
 absl::Status SemanticVolume::Integrate(const DepthFrame& frame) { return impl_->Integrate(frame); }
 
@@ -229,16 +256,9 @@ void SemanticVolume::Move(const TrajectoryChange& change) { impl_->Move(change);
 OccupancyGrid SemanticVolume::MakeOccupancy(double cell_m) { return impl_->MakeOccupancy(cell_m); }
 
 Occupancy SemanticVolume::At(const Eigen::Vector3d& point_map) const {
-  const BlockMap& blocks = impl_->blocks();
-  const double bound_m = BlockMap::kKeyMax * VoxelBlock::kSide * blocks.voxel_m();
-  if (!(point_map.cwiseAbs().maxCoeff() < bound_m)) return Occupancy::kUnknown;
-  const Eigen::Vector3i voxel = blocks.VoxelOf(point_map);
-  const VoxelBlock* block = blocks.Find(BlockMap::KeyOf(voxel));
-  if (block == nullptr) return Occupancy::kUnknown;
-  const Voxel& content = block->voxels[BlockMap::IndexOf(voxel)];
-  if (!content.IsSeen()) return Occupancy::kUnknown;
-  const bool is_free = static_cast<double>(content.distance_m) > blocks.voxel_m();
-  return is_free ? Occupancy::kFree : Occupancy::kOccupied;
+  const VoxelState state = impl_->blocks().StateAt(point_map);
+  if (state == VoxelState::kUnseen) return Occupancy::kUnknown;
+  return state == VoxelState::kFree ? Occupancy::kFree : Occupancy::kOccupied;
 }
 
 }  // namespace dsg::ingest

@@ -12,6 +12,7 @@
 #include "ingest/grid/occupancy_grid.h"
 #include "ingest/sensor/depth_frame.h"
 #include "ingest/trajectory/trajectory_change.h"
+#include "ingest/volume/spill_options.h"
 #include "schema/model/mesh.h"
 
 namespace dsg::ingest {
@@ -37,8 +38,10 @@ struct VolumeOptions {
   double label_confidence = 0.8;
   /// Threads to integrate with. The result does not depend on it.
   int thread_count = 2;
-  /// Voxel blocks that may be held; frames that would need more are cut there, and counted.
+  /// Voxel blocks that there may be; frames that would need more are cut there, and counted.
   int64_t block_count_max = 220'000;
+  /// How many of them stay in memory: those that frames did not show for longest go to disk.
+  SpillOptions spill;
 
   /// Errors: INVALID_ARGUMENT/FIELD_INVALID naming field, value and bounds.
   absl::Status Validate() const;
@@ -55,6 +58,8 @@ struct VolumeCounts {
   int64_t refused_block_count = 0;
   /// Blocks that the last occupancy grid left out: so far from most that no grid could hold all.
   int64_t cut_block_count = 0;
+  /// Blocks in memory; the rest is on disk.
+  int64_t resident_block_count = 0;
 };
 
 /// Threads: one caller at a time.
@@ -75,8 +80,12 @@ class SemanticVolume {
   /// the map's instance ids are unique over the run.
   ///
   /// Errors: INVALID_ARGUMENT/FIELD_INVALID when a channel has the wrong size or the pose is no
-  /// pose; then nothing has changed.
+  /// pose; then nothing has changed. Of status().
   absl::Status Integrate(const DepthFrame& frame);
+
+  /// Of the disk that holds blocks which are not in memory: RESOURCE_EXHAUSTED/DISK_FULL, DATA_LOSS
+  /// or UNAVAILABLE. What was asked of the volume since may be wrong: nothing of it may be used.
+  const absl::Status& status() const;
 
   /// The blocks of the surface that changed since the last call, `block_size_m` wide, ascending
   /// by index, with normals, colours, labels (class ids) and instance ids (0 = none). A block

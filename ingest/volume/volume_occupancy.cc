@@ -9,7 +9,6 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr float kOccupiedVoxels = 0.5f;
 constexpr double kCellCountMax = 3e8;
 
 // Low corner and first beyond the high one, in blocks, of the middle `1 - 2 * tail` of the blocks
@@ -33,7 +32,7 @@ BlockRange MiddleOf(const std::array<std::vector<int>, 3>& sorted, double tail) 
 GridFrame MakeFrame(const BlockMap& blocks, int voxels_per_cell) {
   std::array<std::vector<int>, 3> sorted;
   for (int64_t i = 0; i < blocks.size(); ++i) {
-    const BlockKey& key = blocks.block(i).key;
+    const BlockKey& key = blocks.key(i);
     sorted[0].push_back(key.x);
     sorted[1].push_back(key.y);
     sorted[2].push_back(key.z);
@@ -57,9 +56,9 @@ GridFrame MakeFrame(const BlockMap& blocks, int voxels_per_cell) {
   return frame;
 }
 
-Occupancy StateOf(const Voxel& voxel, float occupied_m) {
-  if (!voxel.IsSeen()) return Occupancy::kUnknown;
-  return voxel.distance_m < occupied_m ? Occupancy::kOccupied : Occupancy::kFree;
+Occupancy OccupancyOf(VoxelState state) {
+  if (state == VoxelState::kUnseen) return Occupancy::kUnknown;
+  return state == VoxelState::kInside ? Occupancy::kOccupied : Occupancy::kFree;
 }
 
 }  // namespace
@@ -67,7 +66,7 @@ Occupancy StateOf(const Voxel& voxel, float occupied_m) {
 int64_t CountBlocksOutside(const BlockMap& blocks, const GridFrame& frame) {
   int64_t count = 0;
   for (int64_t i = 0; i < blocks.size(); ++i) {
-    const BlockKey& key = blocks.block(i).key;
+    const BlockKey& key = blocks.key(i);
     const Eigen::Vector3d middle_map =
         (Eigen::Vector3d(key.x, key.y, key.z).array() + 0.5) * VoxelBlock::kSide * blocks.voxel_m();
     if (!frame.Holds(frame.CellOf(middle_map))) ++count;
@@ -83,7 +82,6 @@ OccupancyGrid MakeVolumeOccupancy(const BlockMap& blocks, double cell_m) {
   grid.frame = MakeFrame(blocks, per_cell);
   const Eigen::Vector3i origin =
       (grid.frame.origin_map / grid.frame.cell_m).array().round().cast<int>();
-  const float occupied_m = kOccupiedVoxels * static_cast<float>(blocks.voxel_m());
   grid.cells.assign(static_cast<size_t>(grid.frame.CellCount()), Occupancy::kUnknown);
   // At most one count per voxel of the cell; a cell of many voxels needs no exact one.
   std::vector<uint16_t> free_count(per_cell > 1 ? grid.cells.size() : 0, 0);
@@ -92,11 +90,11 @@ OccupancyGrid MakeVolumeOccupancy(const BlockMap& blocks, double cell_m) {
     return a >= 0 ? a / per_cell : -((-a + per_cell - 1) / per_cell);
   };
   for (int64_t i = 0; i < blocks.size(); ++i) {
-    const VoxelBlock& block = blocks.block(i);
-    const Eigen::Vector3i low =
-        Eigen::Vector3i(block.key.x, block.key.y, block.key.z) * VoxelBlock::kSide;
+    const BlockMap::States states = blocks.StatesOf(i);
+    const BlockKey& key = blocks.key(i);
+    const Eigen::Vector3i low = Eigen::Vector3i(key.x, key.y, key.z) * VoxelBlock::kSide;
     for (int j = 0; j < VoxelBlock::kCount; ++j) {
-      const Occupancy state = StateOf(block.voxels[j], occupied_m);
+      const Occupancy state = OccupancyOf(states[j]);
       if (state == Occupancy::kUnknown) continue;
       const Eigen::Vector3i voxel = low + Eigen::Vector3i(j & 7, j >> 3 & 7, j >> 6);
       const Eigen::Vector3i cell = voxel.unaryExpr(floor_divide) - origin;
