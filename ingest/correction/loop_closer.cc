@@ -93,7 +93,8 @@ std::vector<TimedPose> LoopCloser::CorrectedPoses() const {
   const KeyframeCovariances covariances(solution_);
   std::vector<TimedPose> poses;
   poses.reserve(path_.poses().size());
-  for (const TimedPose& given : path_.poses()) {
+  for (size_t i = 0; i < path_.poses().size(); ++i) {
+    const TimedPose given = path_.poses()[i];
     TimedPose& pose = poses.emplace_back(given);
     // Those of odometry grow for ever; these know of the loops.
     if (!covariances.empty()) pose.covariance = nullptr;

@@ -56,12 +56,12 @@ RobotGraph::RobotGraph(const RobotGraphOptions& options, const RobotPath& path)
 
 void RobotGraph::AddLoop(const LoopClosure& loop) { loops_.push_back(loop); }
 
-const Pose3d& RobotGraph::Given(size_t index) const { return path_.poses()[index].map_T_agent; }
+Pose3d RobotGraph::Given(size_t index) const { return path_.poses()[index].map_T_agent; }
 TimeNs RobotGraph::TimeOf(size_t index) const { return path_.poses()[index].time_ns; }
 
 std::vector<RobotGraph::BoundLoop> RobotGraph::BindLoops() const {
   std::vector<BoundLoop> bound;
-  const std::deque<TimedPose>& poses = path_.poses();
+  const PoseList& poses = path_.poses();
   if (poses.empty()) return bound;
   const auto is_inside = [&poses](TimeNs time_ns) {
     return time_ns >= poses.front().time_ns && time_ns <= poses.back().time_ns;

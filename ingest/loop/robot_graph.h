@@ -98,7 +98,7 @@ class RobotGraph {
   struct BoundLoop;
   std::vector<BoundLoop> BindLoops() const;
   std::vector<size_t> ChooseKeyframes(const std::vector<BoundLoop>& loops, double spread) const;
-  const Pose3d& Given(size_t index) const;
+  Pose3d Given(size_t index) const;
   TimeNs TimeOf(size_t index) const;
   double ShareOfAStep(double way_m, double turn_rad, TimeNs time_ns) const;
   RelativePose Odometry(size_t from, size_t to) const;

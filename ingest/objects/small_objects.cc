@@ -212,9 +212,13 @@ void SmallObjects::Join(const std::vector<int64_t>& thing_of) {
 }
 
 void SmallObjects::Tidy(TimeNs now_ns) {
-  std::erase_if(things_, [&](const auto& entry) {
+  const size_t dropped_count = std::erase_if(things_, [&](const auto& entry) {
     return !IsConfirmed(entry.second) && now_ns - entry.second.last_seen_ns > kForgetNs;
   });
+  if (dropped_count == 0) return;
+  for (auto& [id, thing] : things_) {
+    std::erase_if(thing.beside, [this](int64_t other) { return !things_.contains(other); });
+  }
 }
 
 bool SmallObjects::IsConfirmed(const Thing& thing) {

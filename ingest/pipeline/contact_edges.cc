@@ -26,12 +26,13 @@ void AddHand(const PersonObservation& seen, const TimedPose& pose, int joint,
 std::vector<AgentPath> PathsOf(const PersonTracker& tracker, const PeopleTold& told) {
   std::vector<AgentPath> paths;
   for (const auto& [number, person] : told.people()) {
-    if (person.poses.empty()) continue;
+    const std::vector<TimedPose> poses = told.PosesOf(person);
+    if (poses.empty()) continue;
     const PersonTracker::Track& track = tracker.track(number);
     AgentPath path;
     path.agent = person.id;
-    for (size_t i = 0; i < person.poses.size(); ++i) {
-      const TimedPose& pose = person.poses[i];
+    for (size_t i = 0; i < poses.size(); ++i) {
+      const TimedPose& pose = poses[i];
       path.torso.push_back({pose.time_ns, pose.map_T_agent.position});
       AddHand(track.observations[i], pose, kLeftHand, &path.left_hand);
       AddHand(track.observations[i], pose, kRightHand, &path.right_hand);

@@ -129,6 +129,7 @@ absl::StatusOr<RunPlan> MakePlan(const LogInfo& info, const IngestOptions& optio
     plan.options.mapping = {};
     plan.options.mapping.commit_period_ns = options.mapping.commit_period_ns;
   }
+  plan.options.mapping.volume.spill.folder = options.spill_folder;
   DSG_ASSIGN_OR_RETURN(plan.agents, map.NodesOfLayer(layers::kAgents));
   DSG_ASSIGN_OR_RETURN(plan.regions, LogRegions::Read(map, own));
   if (plan.has_people && options.people.detector.has_value()) {

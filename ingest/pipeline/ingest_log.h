@@ -36,6 +36,9 @@ struct IngestOptions {
   RobotGraphOptions robot_graph;
   /// The robot's shape; unset = unknown.
   std::optional<RobotModel> robot_model;
+  /// Where the run keeps on disk what it will not need for long (SpillFile): voxel blocks out of
+  /// sight, poses, tracks of people who have left. Empty = TMPDIR, or /tmp.
+  std::string spill_folder;
   /// Deltas must fit into messages to a server; a large correction then takes several revisions.
   bool is_size_bounded = false;
 

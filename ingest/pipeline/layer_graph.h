@@ -21,7 +21,7 @@
 
 namespace dsg::ingest {
 
-/// An object that left the world.
+/// An object that left the world, without the points of its cluster: 0.4 kB.
 struct GoneObject {
   TrackedObject object;
   std::optional<ShapeFit> fit;

@@ -65,6 +65,7 @@ void LayersStage::Tell(Findings* findings, GraphDelta* delta) {
   if (!is_on_) return;
   TellMesh(*findings, delta);
   if (findings->has_new_layers) TellLayers(findings, delta);
+  findings->status.Update(layers_.status());
 }
 
 void LayersStage::TellMesh(const Findings& findings, GraphDelta* delta) {

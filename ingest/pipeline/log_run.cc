@@ -61,6 +61,7 @@ LogRun::LogRun(RunPlan plan, const MapView& map, DeltaSink sink)
                 (is_followed_ && plan.info.rig.HasEyes())),
       namer_(plan.agents),
       detector_(std::move(plan.detector)),
+      path_({}, options_.spill_folder),
       loops_(options_.robot_graph, &path_, plan.info.rig.HasEyes() || plan.has_loops),
       eyes_(EyesOf(plan)),
       frames_(plan.has_layers ? plan.info.rig : RigCalibration(), options_.mapping.depth, path_),
@@ -68,8 +69,9 @@ LogRun::LogRun(RunPlan plan, const MapView& map, DeltaSink sink)
               plan.has_layers),
       people_(plan.info.rig, options_.people, plan.has_layers, path_,
               PeopleTold(plan.session_id, plan.agent_prefix,
-                         SessionPart(plan.agents, plan.agent_prefix, plan.session_id), &namer_),
-              plan.has_people),
+                         SessionPart(plan.agents, plan.agent_prefix, plan.session_id), &namer_,
+                         options_.spill_folder),
+              plan.has_people, options_.spill_folder),
       more_stages_(std::move(plan.more_stages)),
       stages_{&layers_, &people_},
       presence_(std::move(plan.regions), map, plan.first_revision, plan.has_layers),
@@ -183,6 +185,8 @@ absl::Status LogRun::Commit(TimeNs now_ns, bool is_last) {
   GraphDelta delta;
   for (Stage* stage : stages_) stage->Tell(&findings_, &delta);
   if (findings_.is_moved) TellRobot(&delta);
+  DSG_RETURN_IF_ERROR(findings_.status);
+  DSG_RETURN_IF_ERROR(path_.status());
   presence_.TakeRegions(findings_);
   DSG_RETURN_IF_ERROR(PutStays(presence_.TakeRemembered()));
   DSG_RETURN_IF_ERROR(findings_.is_moved ? sink_.PutCorrection(std::move(delta))
@@ -250,11 +254,13 @@ absl::Status LogRun::PutStays(std::vector<Stay> stays) {
 
 // All that hangs on the path moves with it, and is told in one delta.
 absl::Status LogRun::CorrectPath(bool is_last) {
-  DSG_ASSIGN_OR_RETURN(const TrajectoryChange change, loops_.Correct(last_ns_, is_last));
-  findings_.is_moved = !change.IsIdentity();
+  const absl::StatusOr<TrajectoryChange> change = loops_.Correct(last_ns_, is_last);
+  DSG_RETURN_IF_ERROR(path_.status());
+  if (!change.ok()) return change.status();
+  findings_.is_moved = !change->IsIdentity();
   if (!findings_.is_moved) return absl::OkStatus();
-  for (Stage* stage : stages_) stage->Correct(change);
-  presence_.Correct(change);
+  for (Stage* stage : stages_) stage->Correct(*change);
+  presence_.Correct(*change);
   return absl::OkStatus();
 }
 
@@ -270,6 +276,7 @@ void LogRun::TellRobot(GraphDelta* delta) {
 // The factors behind the robot's trajectory.
 absl::Status LogRun::PutRobotGraph() {
   DSG_ASSIGN_OR_RETURN(std::vector<PoseFactor> factors, loops_.Factors());
+  DSG_RETURN_IF_ERROR(path_.status());
   GraphDelta delta;
   if (!factors.empty()) delta.factors.push_back({robot_, std::move(factors)});
   return sink_.PutCorrection(std::move(delta));
@@ -283,6 +290,7 @@ absl::Status LogRun::PutContacts() {
       FindContactEdges(people_.tracker(), people_.told(), things, options_.people.contacts);
   const std::vector<Edge> held = HeldEdges();
   delta.edges.insert(delta.edges.end(), held.begin(), held.end());
+  DSG_RETURN_IF_ERROR(people_.status());
   Coalesce(&delta);
   return sink_.PutAsIs(std::move(delta));
 }
@@ -295,7 +303,7 @@ std::vector<Edge> LogRun::HeldEdges() const {
   for (const auto& [number, person] : people_.told().people()) {
     AgentPath& path = paths.emplace_back();
     path.agent = person.id;
-    for (const TimedPose& pose : person.poses) {
+    for (const TimedPose& pose : people_.told().PosesOf(person)) {
       path.torso.push_back({pose.time_ns, pose.map_T_agent.position});
     }
   }

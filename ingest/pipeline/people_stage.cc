@@ -21,13 +21,14 @@ constexpr double kCameraAboveFloorMaxM = 2.5;
 }  // namespace
 
 PeopleStage::PeopleStage(const RigCalibration& rig, const PeopleOptions& options, bool has_depth,
-                         const RobotPath& path, PeopleTold told, bool is_on)
+                         const RobotPath& path, PeopleTold told, bool is_on,
+                         const std::string& spill_folder)
     : rig_(rig),
       options_(options),
       has_depth_(has_depth),
       is_on_(is_on),
       path_(path),
-      tracker_(options.tracker),
+      tracker_(options.tracker, spill_folder),
       told_(std::move(told)) {}
 
 void PeopleStage::NotePose(TimeNs time_ns) {
@@ -73,6 +74,7 @@ void PeopleStage::Tell(Findings* findings, GraphDelta* delta) {
   move(change.factors, &delta->factors);
   move(change.shapes, &delta->shapes);
   Coalesce(delta);
+  findings->status.Update(status());
 }
 
 void PeopleStage::Summarize(IngestSummary* summary) const {

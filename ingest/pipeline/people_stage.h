@@ -26,9 +26,10 @@ class PeopleStage : public Stage {
  public:
   /// `has_depth`: frames will come, and detections wait for theirs. `path`: of the body that
   /// carries the cameras; must outlive the stage. `is_on`: false for logs without detections, or if
-  /// people are off.
+  /// people are off. `spill_folder`: of PersonTracker.
   PeopleStage(const RigCalibration& rig, const PeopleOptions& options, bool has_depth,
-              const RobotPath& path, PeopleTold told, bool is_on);
+              const RobotPath& path, PeopleTold told, bool is_on,
+              const std::string& spill_folder = "");
 
   void NotePose(TimeNs time_ns) override;
   /// Detections, ascending by stamp.
@@ -41,6 +42,8 @@ class PeopleStage : public Stage {
   void Summarize(IngestSummary* summary) const override;
 
   bool is_on() const { return is_on_; }
+  /// Of the disk that tracks wait on; once it is not OK, nothing that was told may be used.
+  absl::Status status() const { return tracker_.status().ok() ? told_.status() : tracker_.status(); }
   const PersonTracker& tracker() const { return tracker_; }
   PeopleTold& told() { return told_; }
   const PeopleTold& told() const { return told_; }

@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "ingest/pipeline/layer_graph.h"
+#include "ingest/trajectory/pose_bytes.h"
 #include "schema/base/check.h"
 #include "schema/model/delta_check.h"
 
@@ -85,6 +86,8 @@ GraphDelta PeopleTold::Tell(PersonTracker* tracker, bool is_last) {
     const PersonTracker::Track& track = tracker->track(change.track);
     Person& person = PersonOf(track);
     const bool is_dropped = change.state == TrackState::kDropped;
+    const bool is_away = person.poses.empty() && !person.away.empty();
+    if (is_away) person.poses = PosesOf(person);
     if (!is_dropped) TellPoses(track, change.first_estimate, is_last, &person, &delta);
     TellObservations(track, &person, &delta);
     tracker->ForgetShapes(change.track, change.first_observation);
@@ -94,9 +97,35 @@ GraphDelta PeopleTold::Tell(PersonTracker* tracker, bool is_last) {
       person.is_told = true;
       TellNode(track, &person, &delta);
     }
+    if (is_away) PutAway(&person);
+    // Nothing more will be told of it.
+    if (is_dropped) people_.erase(change.track);
+  }
+  for (const int64_t track : tracker->TakeClosed()) {
+    const auto person = people_.find(track);
+    if (person != people_.end()) PutAway(&person->second);
   }
   Coalesce(&delta);
   return delta;
+}
+
+void PeopleTold::PutAway(Person* person) {
+  if (person->poses.empty() || !status_.ok()) return;
+  status_ = file_->Write(EncodePoses(person->poses), &person->away);
+  if (status_.ok()) std::vector<TimedPose>().swap(person->poses);
+}
+
+std::vector<TimedPose> PeopleTold::PosesOf(const Person& person) const {
+  if (!person.poses.empty() || person.away.empty()) return person.poses;
+  std::string bytes;
+  std::vector<TimedPose> poses;
+  absl::Status status = file_->Read(person.away, &bytes);
+  if (status.ok() && !DecodePoses(bytes, person.pose_count, &poses)) {
+    status = absl::InternalError("poses of a person were written to disk in a form that is none");
+  }
+  if (!status.ok()) poses.assign(person.pose_count, TimedPose());
+  status_.Update(status);
+  return poses;
 }
 
 std::vector<PeopleTold::Sighting> PeopleTold::TakeSightings() {
@@ -109,7 +138,7 @@ std::vector<PeopleTold::Sighting> PeopleTold::TakeSightings() {
 
 int64_t PeopleTold::agent_count() const {
   return std::count_if(people_.begin(), people_.end(),
-                       [](const auto& person) { return !person.second.poses.empty(); });
+                       [](const auto& person) { return person.second.pose_count > 0; });
 }
 
 PeopleTold::Person& PeopleTold::PersonOf(const PersonTracker::Track& track) {
@@ -149,7 +178,6 @@ void PeopleTold::TellNode(const PersonTracker::Track& track, Person* person,
   node.agent->shape_coefficients = track.shape_coefficients;
   node.agent->track_state = std::string(ToString(track.state));
   node.attributes[kSessionAttribute] = session_id_;
-  person->node = node;
   delta->nodes.push_back(std::move(node));
 }
 
@@ -180,6 +208,7 @@ void PeopleTold::TellPoses(const PersonTracker::Track& track, size_t first_moved
     append.poses.push_back(told.back());
     sightings_.push_back({person->id, told.back().time_ns, told.back().map_T_agent.position});
   }
+  person->pose_count = told.size();
   if (!append.poses.empty()) delta->appends.push_back(std::move(append));
 }
 

@@ -4,10 +4,13 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "ingest/agents/tracking/person_tracker.h"
+#include "ingest/files/spill_file.h"
 #include "ingest/pipeline/agent_namer.h"
 #include "schema/model/graph_delta.h"
 
@@ -26,9 +29,10 @@ class PeopleTold {
   struct Person {
     NodeId id;
     std::string name;
-    /// As told last.
-    Node node;
+    /// Of a track that is closed for good they are on disk; ask PosesOf.
     std::vector<TimedPose> poses;
+    SpillPiece away;
+    size_t pose_count = 0;
     size_t observation_count = 0;
     size_t same_as_count = 0;
     TrackState state = TrackState::kTentative;
@@ -39,11 +43,12 @@ class PeopleTold {
   /// `agent_prefix` before all and `session_part` before the number. Requires: `namer` outlives
   /// this.
   PeopleTold(std::string session_id, std::string agent_prefix, std::string session_part,
-             AgentNamer* namer)
+             AgentNamer* namer, const std::string& spill_folder = "")
       : session_id_(std::move(session_id)),
         agent_prefix_(std::move(agent_prefix)),
         session_part_(std::move(session_part)),
-        namer_(namer) {}
+        namer_(namer),
+        file_(std::make_unique<SpillFile>(spill_folder)) {}
 
   /// The tracker's changes since the last call. Poses that were told and have moved come as
   /// corrections: live ones only when they moved by a few centimetres, all of them when `is_last`.
@@ -54,10 +59,15 @@ class PeopleTold {
 
   /// Tracks that have poses.
   int64_t agent_count() const;
-  /// By the tracker's number.
+  /// By the tracker's number; without those that were dropped.
   const std::map<int64_t, Person>& people() const { return people_; }
+  /// Of one of them, ascending in time.
+  std::vector<TimedPose> PosesOf(const Person& person) const;
+  /// Of the disk; once it is not OK, nothing that was told may be used.
+  const absl::Status& status() const { return status_; }
 
  private:
+  void PutAway(Person* person);
   Person& PersonOf(const PersonTracker::Track& track);
   void TellNode(const PersonTracker::Track& track, Person* person, GraphDelta* delta) const;
   void TellPoses(const PersonTracker::Track& track, size_t first_moved, bool is_last,
@@ -69,6 +79,8 @@ class PeopleTold {
   std::string agent_prefix_;
   std::string session_part_;
   AgentNamer* namer_;
+  std::unique_ptr<SpillFile> file_;
+  mutable absl::Status status_;
   std::map<int64_t, Person> people_;
   std::vector<Sighting> sightings_;
 };

@@ -18,6 +18,8 @@ struct IngestSummary;
 
 /// What stages found out that others go by. A stage reads what those before it in the list wrote.
 struct Findings {
+  /// Of a stage that lost what it knew: nothing of what was told is committed, and the log ends.
+  absl::Status status;
   /// When in the log this is, and whether the log has ended.
   TimeNs now_ns = 0;
   bool is_last = false;

@@ -30,6 +30,12 @@ constexpr size_t kFitsPerUpdate = 4;
 constexpr double kCellsPerSecond = 2.0e6;
 constexpr double kVerticesPerSecond = 1.0e5;
 
+// What is gone is told on, and never matched again.
+GoneObject WithoutPoints(GoneObject gone) {
+  gone.object.cluster.points_map = {};
+  return gone;
+}
+
 }  // namespace
 
 StaticLayers::StaticLayers(const MappingOptions& options, std::vector<SemanticLabel> labels,
@@ -272,7 +278,7 @@ void StaticLayers::KeepVacated() {
     gone.gone_ns = std::max(gone.gone_ns, gone.object.last_observed_ns + 1);
     const auto fit = fits_.find(vacated.id);
     if (fit != fits_.end()) gone.fit = fit->second;
-    gone_.push_back(std::move(gone));
+    gone_.push_back(WithoutPoints(std::move(gone)));
     together_.Forget(vacated.id);
     object_tracker_.Remove(vacated.id);
   }
@@ -291,7 +297,7 @@ void StaticLayers::KeepGone(const std::vector<TrackedObject>& before, const Obje
     if (object->first_observed_ns >= now_ns) continue;
     const auto fit = fits_.find(id);
     if (fit != fits_.end()) gone.fit = fit->second;
-    gone_.push_back(std::move(gone));
+    gone_.push_back(WithoutPoints(std::move(gone)));
   }
 }
 

@@ -65,6 +65,9 @@ class StaticLayers {
   /// Whether enough of the log has passed since the last Update.
   bool IsUpdateDue(TimeNs now_ns) const;
 
+  /// Of SemanticVolume: once it is not OK, nothing that was found may be used.
+  const absl::Status& status() const { return volume_.status(); }
+
   /// Heights of the floors found by the last Update, ascending.
   const std::vector<double>& floors_m() const { return floors_m_; }
   /// Whether nothing stood between a point and a place by the last Update; empty before it. May be

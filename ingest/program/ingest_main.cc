@@ -43,6 +43,7 @@ struct Flags {
   std::string server;
   std::string retry_for = "10m";
   SpaceLimits limits;
+  std::string spill_folder;
   std::string map;
   std::string format = "auto";
   /// Unset = what the format is used to.
@@ -137,6 +138,14 @@ void AddFlags(CLI::App* app, Flags* flags) {
   app->add_option("--reserve", flags->limits.reserve_bytes,
                   "With --store: space kept so that forgetting works on a full disk; 0 = none")
       ->transform(CLI::Validator(TakeByteSize, "SIZE"));
+  app->add_option("--spill-folder", flags->spill_folder,
+                  "Folder for working memory on disk, in a file without a name; the store's if not "
+                  "given, or TMPDIR without a local store")
+      ->check(CLI::Validator(
+          [](const std::string& folder) {
+            return folder.empty() ? std::string() : CLI::ExistingDirectory(folder);
+          },
+          "DIR"));
   app->add_option("--map", flags->map, "Name of the map; made if missing")
       ->envname("DSG_MAP")
       ->required();
@@ -397,8 +406,16 @@ size_t TellNotes(const Flags& flags, const std::string& path, const LogInfo& inf
   return info.notes.size();
 }
 
+// Beside the map, where there is room if there is any; TMPDIR may be memory.
+std::string SpillFolderOf(const Flags& flags) {
+  std::error_code error;
+  const bool is_beside = flags.spill_folder.empty() && !flags.is_dry_run && flags.server.empty() &&
+                         std::filesystem::is_directory(flags.store, error);
+  return is_beside ? flags.store : flags.spill_folder;
+}
+
 absl::Status IngestOne(const Flags& flags, const std::string& path, LogOptions options,
-                       const IngestOptions& ingest_options,
+                       IngestOptions ingest_options,
                        const std::optional<Segmentation>& segmentation,
                        std::unique_ptr<Destination>* destination) {
   const auto begin = std::chrono::steady_clock::now();
@@ -409,6 +426,7 @@ absl::Status IngestOne(const Flags& flags, const std::string& path, LogOptions o
     const MapSpec wanted = MakeSpec(flags, options, log->info());
     DSG_ASSIGN_OR_RETURN(*destination, OpenDestination(flags, wanted));
   }
+  ingest_options.spill_folder = SpillFolderOf(flags);
   const MapSpec& spec = (*destination)->spec();
   DSG_RETURN_IF_ERROR(CheckAgainstMap(flags, options, spec));
   const LogOptions opened_with = options;

@@ -130,6 +130,7 @@ void AddMappingFlags(CLI::App* app, MappingFlags* flags) {
   AddTuning("places", flags->place_options.Bind(), app);
   AddTuning("rooms", flags->room_options.Bind(), app);
   AddTuning("objects of logs without labels", flags->segments.Bind(), app);
+  AddTuning("memory", flags->spill.Bind(), app);
 }
 
 absl::StatusOr<MappingOptions> MakeMappingOptions(const MappingFlags& flags) {
@@ -151,6 +152,7 @@ absl::StatusOr<MappingOptions> MakeMappingOptions(const MappingFlags& flags) {
   if (flags.places == "volume") options.places.mode = PlaceMode::kVolume;
   options.places.robot_radius_m = flags.robot_radius_m;
   options.segments = flags.segments;
+  options.volume.spill = flags.spill;
   DSG_ASSIGN_OR_RETURN(options.commit_period_ns, Nanoseconds("commit-seconds", flags.commit_s));
   DSG_ASSIGN_OR_RETURN(options.mesh_wait_max_ns, Nanoseconds("mesh-seconds", flags.mesh_s));
   DSG_ASSIGN_OR_RETURN(options.layers_period_ns, Nanoseconds("layers-seconds", flags.layers_s));

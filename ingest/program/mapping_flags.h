@@ -33,6 +33,7 @@ struct MappingFlags {
   StructureOptions structures;
   RoomOptions room_options;
   SegmentOptions segments;
+  SpillOptions spill;
   bool has_timings = false;
 };
 

@@ -144,6 +144,7 @@ Json MappingJson(const MappingSummary& mapping) {
           {"pixels_of_people", volume.dynamic_pixel_count},
           {"skipped", Json(mapping.skipped)},
           {"blocks", volume.block_count},
+          {"blocks_in_memory", volume.resident_block_count},
           {"blocks_left_out", volume.refused_block_count},
           {"blocks_too_far", volume.cut_block_count}};
 }

@@ -2,7 +2,6 @@
 #include "ingest/trajectory/robot_path.h"
 
 #include <algorithm>
-#include <iterator>
 #include <utility>
 
 #include "schema/base/check.h"
@@ -30,29 +29,25 @@ bool RobotPath::Add(const TimedPose& given) {
     ++refused_count_;
     return false;
   }
-  poses_.push_back(given);
+  poses_.Add(given);
   return true;
 }
 
-std::deque<TimedPose>::const_iterator RobotPath::NotBefore(TimeNs time_ns) const {
-  return std::lower_bound(poses_.begin(), poses_.end(), time_ns,
-                          [](const TimedPose& pose, TimeNs time) { return pose.time_ns < time; });
-}
-
 RobotPath::Answer RobotPath::GivenAt(TimeNs time_ns, Pose3d* odom_T_body) const {
-  const auto after = NotBefore(time_ns);
-  if (after == poses_.end()) return Answer::kNotYet;
-  const bool is_exact = after->time_ns == time_ns;
-  if (after == poses_.begin()) {
+  const size_t index = poses_.NotBefore(time_ns);
+  if (index == poses_.size()) return Answer::kNotYet;
+  const TimedPose after = poses_[index];
+  const bool is_exact = after.time_ns == time_ns;
+  if (index == 0) {
     if (!is_exact) return Answer::kNone;
-    *odom_T_body = after->map_T_agent;
+    *odom_T_body = after.map_T_agent;
     return Answer::kKnown;
   }
-  const auto before = std::prev(after);
-  const bool is_gap = after->time_ns - before->time_ns > options_.gap_ns_max;
+  const TimedPose before = poses_[index - 1];
+  const bool is_gap = after.time_ns - before.time_ns > options_.gap_ns_max;
   if (is_gap && !is_exact) return Answer::kNone;
-  if (!is_gap && IsJump(*before, *after)) return Answer::kJump;
-  *odom_T_body = is_exact ? after->map_T_agent : Between(*before, *after, time_ns);
+  if (!is_gap && IsJump(before, after)) return Answer::kJump;
+  *odom_T_body = is_exact ? after.map_T_agent : Between(before, after, time_ns);
   return Answer::kKnown;
 }
 
@@ -103,21 +98,20 @@ TrajectoryChange RobotPath::ChangeTo(const TrajectoryChange& map_T_odom) const {
 
 size_t RobotPath::NearestIndex(TimeNs time_ns) const {
   DSG_CHECK(!poses_.empty());
-  const auto after = NotBefore(time_ns);
-  if (after == poses_.end()) return poses_.size() - 1;
-  const auto index = static_cast<size_t>(after - poses_.begin());
-  if (index == 0 || after->time_ns - time_ns < time_ns - poses_[index - 1].time_ns) return index;
+  const size_t index = poses_.NotBefore(time_ns);
+  if (index == poses_.size()) return index - 1;
+  if (index == 0 || poses_[index].time_ns - time_ns < time_ns - poses_[index - 1].time_ns) {
+    return index;
+  }
   return index - 1;
 }
 
 Pose3d RobotPath::GivenNear(TimeNs time_ns) const {
   DSG_CHECK(!poses_.empty());
-  const auto after =
-      std::upper_bound(poses_.begin(), poses_.end(), time_ns,
-                       [](TimeNs time, const TimedPose& pose) { return time < pose.time_ns; });
-  if (after == poses_.begin()) return poses_.front().map_T_agent;
-  if (after == poses_.end()) return poses_.back().map_T_agent;
-  return Between(*std::prev(after), *after, time_ns);
+  if (time_ns >= poses_.back().time_ns) return poses_.back().map_T_agent;
+  const size_t after = poses_.NotBefore(time_ns + 1);
+  if (after == 0) return poses_.front().map_T_agent;
+  return Between(poses_[after - 1], poses_[after], time_ns);
 }
 
 }  // namespace dsg::ingest

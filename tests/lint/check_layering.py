@@ -47,7 +47,7 @@ ALLOWED = {
     "ingest/files": BASE + ["schema/files"],
     "ingest/sensor": MODEL,
     "ingest/grid": MODEL,
-    "ingest/trajectory": MODEL,
+    "ingest/trajectory": MODEL + ["ingest/files"],
     "ingest/commit": SCHEMA + ["query/api", "query/client"],
     "ingest/presence": MODEL,
     "ingest/correction": SCHEMA + ["ingest/commit", "ingest/log", "ingest/loop",

@@ -222,6 +222,10 @@ void TorsoGraph::Freeze() {
 
 const std::vector<TorsoEstimate>& TorsoGraph::estimates() const { return impl_->estimates; }
 
+std::vector<TorsoEstimate> TorsoGraph::ExchangeEstimates(std::vector<TorsoEstimate> estimates) {
+  return std::exchange(impl_->estimates, std::move(estimates));
+}
+
 TorsoPrediction TorsoGraph::Predict(TimeNs time_ns) const {
   DSG_CHECK(!impl_->detections.empty());
   const double step_s = StepS(impl_->detections.back().time_ns, time_ns);

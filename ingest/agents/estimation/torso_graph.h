@@ -90,6 +90,9 @@ class TorsoGraph {
 
   /// One per observation, ascending in time.
   const std::vector<TorsoEstimate>& estimates() const;
+  /// Puts others in their place, of a frozen graph: what it has for a while elsewhere. Returns those
+  /// before.
+  std::vector<TorsoEstimate> ExchangeEstimates(std::vector<TorsoEstimate> estimates);
   /// Requires: at least one observation. `time_ns` not before the last.
   TorsoPrediction Predict(TimeNs time_ns) const;
   /// The factors behind the estimates from index `first` on, for the store: "detection_prior" (the

@@ -56,14 +56,16 @@ TrackerOptions PaperTrackerOptions() {
 
 class PersonTracker::Impl {
  public:
-  explicit Impl(const TrackerOptions& options)
-      : options_(options), shapes_(options.shape_noise_sigma, options.shape_spread_sigma) {}
+  Impl(const TrackerOptions& options, const std::string& spill_folder)
+      : options_(options), shapes_(options.shape_noise_sigma, options.shape_spread_sigma), file_(spill_folder) {}
 
   bool Observe(TimeNs time_ns, std::vector<PersonObservation> observations);
   void Finish();
   void Move(const TrajectoryChange& change);
   std::vector<TrackChange> TakeChanges();
   const Track& track(int64_t id) const;
+  std::vector<int64_t> TakeClosed() { return std::exchange(closed_, {}); }
+  const absl::Status& status() const { return status_; }
   void ForgetShapes(int64_t id, size_t first);
   TrackerCounts counts() const { return counts_; }
 
@@ -87,6 +89,9 @@ class PersonTracker::Impl {
   void Close(TrackEntry* track);
   void Drop(TrackEntry* track);
   void SetState(TrackEntry* track, TrackState state);
+  void PutAwayOld();
+  /// Of the track that was fetched last, unless it is `wanted`.
+  void LetGo(const TrackEntry* wanted) const;
 
   const TrackerOptions options_;
   ShapeStatistics shapes_;
@@ -96,6 +101,11 @@ class PersonTracker::Impl {
   std::set<int64_t> touched_;
   /// Closed for good, and not told of since.
   std::set<int64_t> old_;
+  /// Those of them that went to disk since TakeClosed.
+  std::vector<int64_t> closed_;
+  SpillFile file_;
+  mutable TrackEntry* fetched_ = nullptr;
+  mutable absl::Status status_;
   std::optional<TimeNs> now_ns_;
   int64_t next_id_ = 1;
   TrackerCounts counts_;
@@ -308,20 +318,43 @@ void PersonTracker::Impl::Finish() {
 void PersonTracker::Impl::Move(const TrajectoryChange& change) {
   for (auto& [id, entry] : entries_) {
     if (entry->state() == TrackState::kDropped) continue;
+    LetGo(nullptr);
+    const bool is_away = entry->is_away();
+    if (is_away) status_.Update(entry->Fetch(file_));
     entry->Move(change);
+    if (is_away) status_.Update(entry->PutAway(&file_));
     touched_.insert(id);
   }
 }
 
-std::vector<TrackChange> PersonTracker::Impl::TakeChanges() {
-  // What is asked of a track when it is told was asked after the last call.
+// What is asked of a track when it is told was asked after the last call of TakeChanges.
+void PersonTracker::Impl::PutAwayOld() {
   for (const int64_t id : std::exchange(old_, {})) {
-    if (!touched_.contains(id)) {
-      entries_.at(id)->Freeze();
-    } else {
+    if (touched_.contains(id)) {
       old_.insert(id);
+      continue;
+    }
+    const auto entry = entries_.find(id);
+    if (entry == entries_.end()) continue;
+    if (entry->second->state() == TrackState::kDropped) {
+      // Nobody was there, and it was told.
+      entries_.erase(entry);
+    } else if (status_.ok()) {
+      status_ = entry->second->PutAway(&file_);
+      closed_.push_back(id);
     }
   }
+}
+
+void PersonTracker::Impl::LetGo(const TrackEntry* wanted) const {
+  if (fetched_ == nullptr || fetched_ == wanted) return;
+  fetched_->LetGo();
+  fetched_ = nullptr;
+}
+
+std::vector<TrackChange> PersonTracker::Impl::TakeChanges() {
+  LetGo(nullptr);
+  PutAwayOld();
   std::vector<TrackChange> changes;
   for (const int64_t id : touched_) {
     const auto found = entries_.find(id);
@@ -335,7 +368,9 @@ std::vector<TrackChange> PersonTracker::Impl::TakeChanges() {
 }
 
 void PersonTracker::Impl::ForgetShapes(int64_t id, size_t first) {
-  std::vector<PersonObservation>& seen = entries_.at(id)->mutable_track()->observations;
+  const auto entry = entries_.find(id);
+  if (entry == entries_.end()) return;
+  std::vector<PersonObservation>& seen = entry->second->mutable_track()->observations;
   for (size_t i = first; i < seen.size(); ++i) {
     for (std::vector<float>* part :
          {&seen[i].vertices_torso, &seen[i].pose_coefficients, &seen[i].shape_coefficients}) {
@@ -347,11 +382,17 @@ void PersonTracker::Impl::ForgetShapes(int64_t id, size_t first) {
 const PersonTracker::Track& PersonTracker::Impl::track(int64_t id) const {
   const auto found = entries_.find(id);
   DSG_CHECK(found != entries_.end());
-  return found->second->track();
+  TrackEntry* const entry = found->second.get();
+  LetGo(entry);
+  if (entry->is_away()) {
+    status_.Update(entry->Fetch(file_));
+    fetched_ = entry;
+  }
+  return entry->track();
 }
 
-PersonTracker::PersonTracker(const TrackerOptions& options)
-    : impl_(std::make_unique<Impl>(options)) {}
+PersonTracker::PersonTracker(const TrackerOptions& options, const std::string& spill_folder)
+    : impl_(std::make_unique<Impl>(options, spill_folder)) {}
 PersonTracker::~PersonTracker() = default;
 
 bool PersonTracker::Observe(TimeNs time_ns, std::vector<PersonObservation> observations) {
@@ -365,6 +406,10 @@ void PersonTracker::Move(const TrajectoryChange& change) { impl_->Move(change); 
 std::vector<TrackChange> PersonTracker::TakeChanges() { return impl_->TakeChanges(); }
 
 const PersonTracker::Track& PersonTracker::track(int64_t id) const { return impl_->track(id); }
+
+std::vector<int64_t> PersonTracker::TakeClosed() { return impl_->TakeClosed(); }
+
+const absl::Status& PersonTracker::status() const { return impl_->status(); }
 
 void PersonTracker::ForgetShapes(int64_t id, size_t first) { impl_->ForgetShapes(id, first); }
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "ingest/agents/estimation/torso_graph.h"
 #include "ingest/agents/person_observation.h"
 #include "ingest/trajectory/trajectory_change.h"
@@ -115,7 +116,8 @@ class PersonTracker {
     std::vector<SameAs> same_as;
   };
 
-  explicit PersonTracker(const TrackerOptions& options);
+  /// `spill_folder`: of SpillFile, for tracks that are closed for good.
+  explicit PersonTracker(const TrackerOptions& options, const std::string& spill_folder = "");
   ~PersonTracker();
 
   /// All observations of one image, in any order; may be none (people who are not seen coast).
@@ -132,8 +134,15 @@ class PersonTracker {
   /// ascending by track. A track is told from its first observation on when it is confirmed. A
   /// closed one whose person is found again is told as confirmed again, and goes on where it ended.
   std::vector<TrackChange> TakeChanges();
-  /// Requires: an id from TakeChanges. Tracks are kept until the end.
+  /// Requires: an id from TakeChanges, and of a dropped track one of its last call. Tracks are kept
+  /// until the end, those that nobody can be found again in on disk: what is returned is valid until
+  /// the next call of this, TakeChanges, Observe or Move.
   const Track& track(int64_t id) const;
+  /// Tracks that went to disk since the last call: nothing will be told of them any more, unless the
+  /// path moves.
+  std::vector<int64_t> TakeClosed();
+  /// Of the disk; once it is not OK, nothing that was told may be used.
+  const absl::Status& status() const;
   TrackerCounts counts() const;
   /// Frees the meshes and coefficients of a track's observations from `first` on: they are large,
   /// and of no use to the tracker.

@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "ingest/agents/estimation/torso_terms.h"
+#include "ingest/agents/tracking/track_bytes.h"
+#include "schema/base/status.h"
 
 namespace dsg::ingest {
 namespace {
@@ -101,12 +103,12 @@ std::optional<TrackChange> TrackEntry::TakeChange() {
   if (!is_changed_ || (!was_confirmed_ && track_.state != TrackState::kDropped)) {
     return std::nullopt;
   }
-  const size_t estimate_count = track_.graph.estimates().size();
+  const size_t estimate_count = is_away() ? away_count_ : track_.graph.estimates().size();
   const TrackChange change{track_.id, track_.state, std::min(first_estimate_, estimate_count),
                            first_observation_};
   is_changed_ = false;
   first_estimate_ = estimate_count;
-  first_observation_ = track_.observations.size();
+  first_observation_ = estimate_count;
   return change;
 }
 
@@ -127,12 +129,36 @@ void TrackEntry::Move(const TrajectoryChange& change) {
     Append(std::move(observation));
   }
   Smooth();
-  if (is_frozen_) track_.graph.Freeze();
 }
 
-void TrackEntry::Freeze() {
-  is_frozen_ = true;
+absl::Status TrackEntry::PutAway(SpillFile* file) {
+  if (track_.observations.empty()) return absl::OkStatus();
   track_.graph.Freeze();
+  const std::string bytes = EncodeTrack(track_.observations, track_.graph.estimates());
+  DSG_RETURN_IF_ERROR(file->Write(bytes, &piece_));
+  away_count_ = track_.observations.size();
+  LetGo();
+  return absl::OkStatus();
+}
+
+absl::Status TrackEntry::Fetch(const SpillFile& file) {
+  std::string bytes;
+  absl::Status status = file.Read(piece_, &bytes);
+  std::vector<TorsoEstimate> estimates;
+  if (status.ok() && !DecodeTrack(bytes, away_count_, &track_.observations, &estimates)) {
+    status = absl::InternalError("a track was written to disk in a form that is none");
+  }
+  if (!status.ok()) {
+    track_.observations.assign(away_count_, PersonObservation());
+    estimates.assign(away_count_, TorsoEstimate());
+  }
+  track_.graph.ExchangeEstimates(std::move(estimates));
+  return status;
+}
+
+void TrackEntry::LetGo() {
+  std::vector<PersonObservation>().swap(track_.observations);
+  track_.graph.ExchangeEstimates({});
 }
 
 }  // namespace dsg::ingest

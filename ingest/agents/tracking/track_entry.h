@@ -5,9 +5,11 @@
 
 #include <optional>
 
+#include "absl/status/status.h"
 #include "ingest/agents/tracking/person_tracker.h"
 #include "ingest/agents/tracking/shape_statistics.h"
 #include "ingest/agents/tracking/skeleton.h"
+#include "ingest/files/spill_file.h"
 
 namespace dsg::ingest {
 
@@ -36,8 +38,14 @@ class TrackEntry {
   /// With the path that it was seen from, smoothed too.
   void Move(const TrajectoryChange& change);
   void SetState(TrackState state);
-  /// Nothing will be added any more: frees what only estimating needs.
-  void Freeze();
+  /// Nothing will be added any more: frees what only estimating needs, and puts observations and
+  /// estimates into the file. Errors: of SpillFile; they stay in memory then.
+  absl::Status PutAway(SpillFile* file);
+  bool is_away() const { return away_count_ > 0 && track_.observations.empty(); }
+  /// Reads them back. Errors: of SpillFile; they come as new then, as many as there were.
+  absl::Status Fetch(const SpillFile& file);
+  /// Of what was fetched, and is as it was.
+  void LetGo();
 
   /// Whether enough hits are close together.
   bool IsConfirmable(TimeNs now_ns) const;
@@ -63,7 +71,9 @@ class TrackEntry {
   Skeleton skeleton_;
   bool was_confirmed_ = false;
   bool is_changed_ = false;
-  bool is_frozen_ = false;
+  /// Observations that are, or were, in the file; 0 = none.
+  size_t away_count_ = 0;
+  SpillPiece piece_;
   size_t first_estimate_ = 0;
   size_t first_observation_ = 0;
 };

@@ -11,6 +11,7 @@
 #include "ingest/pipeline/segmented_log.h"
 #include "schema/base/status.h"
 #include "schema/store/graph_store.h"
+#include "tests/support/full_disk.h"
 #include "tests/unit/ingest/agents/detector/tiny_segmenter.h"
 #include "tests/unit/ingest/depth/made_scan.h"
 #include "tests/unit/ingest/log/log_test_util.h"
@@ -104,6 +105,28 @@ class LabelledLog : public testing::Test {
     return *made;
   }
 
+  // Of the log with its labels, with so many voxel blocks in memory.
+  absl::StatusOr<IngestSummary> IngestWith(const std::string& map, double resident_block_count) {
+    MapSpec spec;
+    spec.name = map;
+    spec.epoch_ns = 1'600'000'000 * kNsPerSecond;
+    const absl::Status made = store_->CreateMap(spec);
+    EXPECT_TRUE(made.ok() || absl::IsAlreadyExists(made)) << made;
+    LogOptions log_options;
+    log_options.label_folder = folder_.Path("labels");
+    IngestOptions options;
+    options.spill_folder = folder_.Path("labels");
+    options.mapping.volume.spill.resident_block_count = resident_block_count;
+    const auto log = OpenLog(folder_.Path("log"), log_options);
+    EXPECT_TRUE(log.ok()) << log.status();
+    const std::shared_ptr<MapReader> reader = *store_->OpenMap(map);
+    const auto writer = *store_->OpenWriter(map);
+    return IngestLog(**log, log_options, options, *MakeSnapshotMapView(*reader->Latest(), reader),
+                     *writer, {});
+  }
+
+  RevisionInfo HeadOf(const std::string& map) { return *(*store_->OpenMap(map))->Head(); }
+
   // The objects of the map, without those that only the session tells apart.
   std::vector<Node> Ingest(const std::string& map, const LogOptions& options,
                            const std::optional<Segmentation>& segmentation = {}) {
@@ -188,6 +211,36 @@ TEST_F(LabelledLog, IsAnotherLogWithAnotherNetwork) {
   ASSERT_TRUE(other.ok()) << other.status();
   network = *other;
   EXPECT_NE(identity(), first);
+}
+
+TEST_F(LabelledLog, IsTheSameMapWithTheVolumeOnDisk) {
+  const auto all = IngestWith("memory", 1e8);
+  const auto least = IngestWith("disk", 1);
+  ASSERT_TRUE(all.ok()) << all.status();
+  ASSERT_TRUE(least.ok()) << least.status();
+  EXPECT_EQ(all->mapping->volume.resident_block_count, all->mapping->volume.block_count);
+  EXPECT_EQ(least->mapping->volume.block_count, all->mapping->volume.block_count);
+  EXPECT_EQ(least->mapping->volume.resident_block_count, 1);
+  EXPECT_GT(HeadOf("disk").revision, 3);
+  EXPECT_EQ(HeadOf("disk").revision, HeadOf("memory").revision);
+  EXPECT_EQ(HeadOf("disk").digest, HeadOf("memory").digest);
+}
+
+// What is committed by then are whole revisions of the same log.
+TEST_F(LabelledLog, EndsWithAnErrorWhereTheVolumesDiskIsFull) {
+  ASSERT_TRUE(IngestWith("memory", 1e8).ok());
+  absl::Status status;
+  {
+    const test::FullDisk full(3'000'000);
+    status = IngestWith("disk", 1).status();
+  }
+  EXPECT_EQ(ReasonOf(status), Reason::kDiskFull) << status;
+  EXPECT_NE(status.message().find(folder_.Path("labels")), std::string::npos) << status;
+  EXPECT_LT(HeadOf("disk").revision, HeadOf("memory").revision);
+  // Once there is room, the same run goes on.
+  const auto rest = IngestWith("disk", 1);
+  ASSERT_TRUE(rest.ok()) << rest.status();
+  EXPECT_EQ(HeadOf("disk").digest, HeadOf("memory").digest);
 }
 
 TEST_F(LabelledLog, NeedsImagesToLookAt) {
