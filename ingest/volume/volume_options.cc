@@ -23,7 +23,7 @@ constexpr double kResidentMax = 1e8;
 constexpr OptionField<SpillOptions> kSpillFields[] = {
     {"resident-blocks", &SpillOptions::resident_block_count, kResidentMin, kResidentMax,
      "Voxel blocks in memory (8 voxels an edge, about 12 kB each); those out of sight for longest "
-     "wait on disk, and the result is the same: 60000 are some 0.7 GB, a flat or two floors of "
+     "wait on disk, and the result is the same: 60000 are some 0.7 GB, a thousand square metres of "
      "rooms at 5 cm"},
 };
 
