@@ -43,7 +43,9 @@ class PeopleStage : public Stage {
 
   bool is_on() const { return is_on_; }
   /// Of the disk that tracks wait on; once it is not OK, nothing that was told may be used.
-  absl::Status status() const { return tracker_.status().ok() ? told_.status() : tracker_.status(); }
+  absl::Status status() const {
+    return tracker_.status().ok() ? told_.status() : tracker_.status();
+  }
   const PersonTracker& tracker() const { return tracker_; }
   PeopleTold& told() { return told_; }
   const PeopleTold& told() const { return told_; }

@@ -22,10 +22,9 @@ struct PathOptions {
 /// The log's poses are those of the odometry frame. Without a correction that is the map frame; a
 /// correction says where the odometry frame stood in the map at each time.
 ///
-/// Memory: that of PoseList. Corrections and loop closures may concern any pose, so all are kept, on
-/// disk: 72 bytes a pose, 62 MB for eight hours at 30 Hz.
-/// Threads: one caller at a time.
-/// Source: REP 105 (odom and map frames).
+/// Memory: that of PoseList. Corrections and loop closures may concern any pose, so all are kept,
+/// on disk: 72 bytes a pose, 62 MB for eight hours at 30 Hz. Threads: one caller at a time. Source:
+/// REP 105 (odom and map frames).
 class RobotPath {
  public:
   enum class Answer {

@@ -90,8 +90,8 @@ class TorsoGraph {
 
   /// One per observation, ascending in time.
   const std::vector<TorsoEstimate>& estimates() const;
-  /// Puts others in their place, of a frozen graph: what it has for a while elsewhere. Returns those
-  /// before.
+  /// Puts others in their place, of a frozen graph whose estimates are elsewhere for a while.
+  /// Returns those before.
   std::vector<TorsoEstimate> ExchangeEstimates(std::vector<TorsoEstimate> estimates);
   /// Requires: at least one observation. `time_ns` not before the last.
   TorsoPrediction Predict(TimeNs time_ns) const;

@@ -57,7 +57,9 @@ TrackerOptions PaperTrackerOptions() {
 class PersonTracker::Impl {
  public:
   Impl(const TrackerOptions& options, const std::string& spill_folder)
-      : options_(options), shapes_(options.shape_noise_sigma, options.shape_spread_sigma), file_(spill_folder) {}
+      : options_(options),
+        shapes_(options.shape_noise_sigma, options.shape_spread_sigma),
+        file_(spill_folder) {}
 
   bool Observe(TimeNs time_ns, std::vector<PersonObservation> observations);
   void Finish();

@@ -135,11 +135,11 @@ class PersonTracker {
   /// closed one whose person is found again is told as confirmed again, and goes on where it ended.
   std::vector<TrackChange> TakeChanges();
   /// Requires: an id from TakeChanges, and of a dropped track one of its last call. Tracks are kept
-  /// until the end, those that nobody can be found again in on disk: what is returned is valid until
-  /// the next call of this, TakeChanges, Observe or Move.
+  /// until the end, those that nobody can be found again in on disk: what is returned is valid
+  /// until the next call of this, TakeChanges, Observe or Move.
   const Track& track(int64_t id) const;
-  /// Tracks that went to disk since the last call: nothing will be told of them any more, unless the
-  /// path moves.
+  /// Tracks that went to disk since the last call: nothing will be told of them any more, unless
+  /// the path moves.
   std::vector<int64_t> TakeClosed();
   /// Of the disk; once it is not OK, nothing that was told may be used.
   const absl::Status& status() const;
