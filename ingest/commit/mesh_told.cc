@@ -5,10 +5,11 @@
 
 namespace dsg::ingest {
 
-MeshTold::MeshTold(TimeNs wait_max_ns) : wait_max_ns_(std::max(wait_max_ns, kWaitMinNs)) {}
+MeshTold::MeshTold(TimeNs wait_max_ns, TimeNs wait_min_ns)
+    : wait_min_ns_(wait_min_ns), wait_max_ns_(std::max(wait_max_ns, wait_min_ns)) {}
 
 void MeshTold::Note(const BlockIndex& index, bool is_there, TimeNs now_ns) {
-  Entry& entry = entries_[index];
+  Entry& entry = entries_.try_emplace(index, Entry{wait_min_ns_}).first->second;
   entry.is_there = is_there;
   if (entry.changed_ns == kTimeMax) entry.changed_ns = now_ns;
 }

@@ -15,12 +15,9 @@ namespace dsg::ingest {
 /// Threads: one caller at a time.
 class MeshTold {
  public:
-  /// How long a change of a new block may wait, in log time.
-  static constexpr TimeNs kWaitMinNs = 2 * kNsPerSecond;
-
-  /// `wait_max_ns`: how long any change may wait, at least kWaitMinNs. The map is never further
-  /// behind than that and one commit period.
-  explicit MeshTold(TimeNs wait_max_ns);
+  /// `wait_max_ns`: how long any change may wait, in log time, at least `wait_min_ns`, which is for
+  /// changes of a new block. The map is never further behind than that and one commit period.
+  explicit MeshTold(TimeNs wait_max_ns, TimeNs wait_min_ns = 2 * kNsPerSecond);
 
   /// The block has changed; `is_there`: it has a surface now. Times ascend.
   void Note(const BlockIndex& index, bool is_there, TimeNs now_ns);
@@ -37,13 +34,14 @@ class MeshTold {
 
  private:
   struct Entry {
-    TimeNs wait_ns = kWaitMinNs;
+    TimeNs wait_ns = 0;
     /// kTimeMax when all has been told.
     TimeNs changed_ns = kTimeMax;
     bool is_there = false;
     bool is_told_there = false;
   };
 
+  TimeNs wait_min_ns_;
   TimeNs wait_max_ns_;
   std::map<BlockIndex, Entry> entries_;
 };

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <cstddef>
 
 #include "absl/strings/str_cat.h"
@@ -12,7 +13,7 @@ namespace dsg::ingest {
 namespace {
 
 // The shortest text that reads back as the same number.
-std::string Text(double value) {
+std::string ToText(double value) {
   std::array<char, 32> text;
   const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
   return {text.data(), end};
@@ -20,15 +21,38 @@ std::string Text(double value) {
 
 }  // namespace
 
-absl::Status ValidateFields(std::span<const BoundOption> fields) {
-  for (const BoundOption& field : fields) {
-    const double value = *field.value;
-    if (value >= field.min && value <= field.max) continue;
-    return MakeError(Reason::kFieldInvalid,
-                     absl::StrCat(field.name, " is ", Text(value), "; give ", Text(field.min),
-                                  " to ", Text(field.max)),
-                     {{"field", field.name}, {"value", Text(value)}});
+double BoundOption::Get() const {
+  if (const auto* count = std::get_if<int*>(&value)) return **count;
+  if (const auto* time = std::get_if<TimeNs*>(&value)) {
+    return static_cast<double>(**time) / static_cast<double>(kNsPerSecond);
   }
+  return *std::get<double*>(value);
+}
+
+std::string BoundOption::Text() const { return ToText(Get()); }
+
+absl::Status BoundOption::Check(double number) const {
+  const bool is_due = !IsCount() || number == std::floor(number);
+  if (is_due && number >= min && number <= max) return absl::OkStatus();
+  return MakeError(
+      Reason::kFieldInvalid,
+      absl::StrCat(name, " is ", ToText(number), "; give ", IsCount() ? "a whole number, " : "",
+                   ToText(min), " to ", ToText(max)),
+      {{"field", name}, {"value", ToText(number)}});
+}
+
+void BoundOption::Set(double number) const {
+  if (const auto* count = std::get_if<int*>(&value)) {
+    **count = static_cast<int>(number);
+  } else if (const auto* time = std::get_if<TimeNs*>(&value)) {
+    **time = std::llround(number * static_cast<double>(kNsPerSecond));
+  } else {
+    *std::get<double*>(value) = number;
+  }
+}
+
+absl::Status ValidateFields(std::span<const BoundOption> fields) {
+  for (const BoundOption& field : fields) DSG_RETURN_IF_ERROR(field.Check(field.Get()));
   return absl::OkStatus();
 }
 
@@ -36,9 +60,23 @@ std::string DigestFields(std::span<const BoundOption> fields,
                          std::span<const BoundOption> defaults) {
   std::string text;
   for (size_t i = 0; i < fields.size(); ++i) {
-    const double value = *fields[i].value;
-    if (i < defaults.size() && value == *defaults[i].value) continue;
-    absl::StrAppend(&text, text.empty() ? "" : " ", fields[i].name, "=", Text(value));
+    if (i < defaults.size() && fields[i].Get() == defaults[i].Get()) continue;
+    absl::StrAppend(&text, text.empty() ? "" : " ", fields[i].name, "=", fields[i].Text());
+  }
+  return text;
+}
+
+absl::Status ValidateGroups(std::span<const OptionGroup> groups) {
+  for (const OptionGroup& group : groups) DSG_RETURN_IF_ERROR(ValidateFields(group.fields));
+  return absl::OkStatus();
+}
+
+std::string DigestGroups(std::span<const OptionGroup> groups,
+                         std::span<const OptionGroup> defaults) {
+  std::string text;
+  for (size_t i = 0; i < groups.size(); ++i) {
+    const std::string digest = DigestFields(groups[i].fields, defaults[i].fields);
+    if (!digest.empty()) absl::StrAppend(&text, text.empty() ? "" : " ", digest);
   }
   return text;
 }

@@ -1,22 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
-// Real numbers that change results, as tables: name, unit, range, meaning and reason of each in one
+// Numbers that change results, as tables: name, unit, range, meaning and reason of each in one
 // place. Checks, digests, flags and files of options are made from the tables.
 #pragma once
 
 #include <span>
 #include <string>
+#include <type_traits>
+#include <variant>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "schema/base/time.h"
 
 namespace dsg::ingest {
+
+/// Real numbers, counts, and times, which users see in seconds.
+template <typename Options>
+using OptionMember = std::variant<double Options::*, int Options::*, TimeNs Options::*>;
 
 /// A row of the table of a struct of options. The default is that of the member.
 template <typename Options>
 struct OptionField {
   /// As in the command line, without "--": "segment-cell".
   const char* name;
-  double Options::*value;
+  OptionMember<Options> value;
   double min;
   double max;
   /// A phrase: meaning and unit, and after a colon why the default is what it is.
@@ -26,21 +33,36 @@ struct OptionField {
 /// A row with the number that it stands for, which has to outlive it.
 struct BoundOption {
   const char* name;
-  double* value;
+  std::variant<double*, int*, TimeNs*> value;
   double min;
   double max;
   const char* help;
+
+  double Get() const;
+  /// The shortest text that reads back as the same number.
+  std::string Text() const;
+  bool IsCount() const { return std::holds_alternative<int*>(value); }
+
+  /// Errors: INVALID_ARGUMENT/FIELD_INVALID naming field, value and bounds; also for NaN, and for a
+  /// count that is not whole.
+  absl::Status Check(double number) const;
+  /// Requires: Check(number).ok().
+  void Set(double number) const;
 };
 
 template <typename Options>
-void BindFields(std::span<const OptionField<Options>> fields, Options* options,
-                std::vector<BoundOption>* bound) {
+void BindFields(std::type_identity_t<std::span<const OptionField<Options>>> fields,
+                Options* options, std::vector<BoundOption>* bound) {
   for (const OptionField<Options>& field : fields) {
-    bound->push_back({field.name, &(options->*field.value), field.min, field.max, field.help});
+    std::visit(
+        [&](auto member) {
+          bound->push_back({field.name, &(options->*member), field.min, field.max, field.help});
+        },
+        field.value);
   }
 }
 
-/// Errors: INVALID_ARGUMENT/FIELD_INVALID naming field, value and bounds; also for NaN.
+/// Errors: of BoundOption::Check.
 absl::Status ValidateFields(std::span<const BoundOption> fields);
 
 /// The values that differ from `defaults`, by name, as text; each value reads back as the same
@@ -60,5 +82,17 @@ std::string DigestOptions(Options options) {
   Options defaults;
   return DigestFields(options.Bind(), defaults.Bind());
 }
+
+/// What belongs together for users: a group of --help.
+struct OptionGroup {
+  /// "rooms".
+  const char* name;
+  std::vector<BoundOption> fields;
+};
+
+/// The same of all groups together.
+absl::Status ValidateGroups(std::span<const OptionGroup> groups);
+std::string DigestGroups(std::span<const OptionGroup> groups,
+                         std::span<const OptionGroup> defaults);
 
 }  // namespace dsg::ingest

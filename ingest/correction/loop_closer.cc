@@ -10,9 +10,6 @@
 namespace dsg::ingest {
 namespace {
 
-// More of them are solved at the end of the log only: each is compared with each.
-constexpr size_t kLoopsWhileRunningMax = 2000;
-
 // Covariances by keyframe, shared by the poses around it.
 class KeyframeCovariances {
  public:
@@ -55,7 +52,8 @@ bool LoopCloser::Take(const Measurement& measurement) {
 }
 
 bool LoopCloser::IsDue(TimeNs now_ns) const {
-  if (!has_news_ || origins_.size() > kLoopsWhileRunningMax) return false;
+  const auto loop_count = static_cast<int64_t>(origins_.size());
+  if (!has_news_ || loop_count > options_.correct_loop_count_max) return false;
   if (solved_ns_ == kTimeMin) return true;
   const auto log_ns = static_cast<double>(now_ns - path_.poses().front().time_ns);
   const auto share_ns = static_cast<TimeNs>(options_.correct_share * log_ns);

@@ -10,11 +10,7 @@
 namespace dsg::ingest {
 namespace {
 
-// Half the reach of an adult's arms.
-constexpr double kBodyReachM = 0.6;
-constexpr double kVisibilityMin = 0.3;
-// Of a box's pixels; below, the labels missed who is in it.
-constexpr double kLabelledShareMin = 0.02;
+// Readings along each bone: a median needs no more.
 constexpr int kStepsPerBone = 6;
 constexpr float kFar = 1e6f;
 
@@ -60,13 +56,14 @@ void AddReading(const DepthFrame& frame, const PixelBox& box, const Eigen::Vecto
 }
 
 // Median depth of the torso, 0 if it cannot be seen.
-float TorsoDepth(const DepthFrame& frame, const PixelBox& box, const HumanDetection& detection) {
+float TorsoDepth(const DepthFrame& frame, const PixelBox& box, const HumanDetection& detection,
+                 double visibility_min) {
   std::vector<float> readings;
   for (const auto& [from, to] : kTorsoBones) {
     const size_t a = static_cast<size_t>(from);
     const size_t b = static_cast<size_t>(to);
-    if (detection.joint_visibility[a] < kVisibilityMin) continue;
-    if (detection.joint_visibility[b] < kVisibilityMin) continue;
+    if (detection.joint_visibility[a] < visibility_min) continue;
+    if (detection.joint_visibility[b] < visibility_min) continue;
     for (int i = 0; i <= kStepsPerBone; ++i) {
       const double t = static_cast<double>(i) / kStepsPerBone;
       AddReading(frame, box, (1.0 - t) * detection.joints_px[a] + t * detection.joints_px[b],
@@ -89,17 +86,17 @@ float TorsoDepth(const DepthFrame& frame, const PixelBox& box, const HumanDetect
 }
 
 void MaskBox(const DepthFrame& frame, const HumanDetection& detection, const cv::Mat1b& labelled,
-             cv::Mat1b* mask) {
+             const DepthOptions& options, cv::Mat1b* mask) {
   const PixelBox box = BoxOf(detection, frame.camera);
   if (box.left >= box.right || box.top >= box.bottom) return;
   const cv::Rect rect(box.left, box.top, box.right - box.left, box.bottom - box.top);
-  if (cv::countNonZero(labelled(rect)) > kLabelledShareMin * rect.area()) return;
-  const float torso_m = TorsoDepth(frame, box, detection);
+  if (cv::countNonZero(labelled(rect)) > options.labelled_share_min * rect.area()) return;
+  const float torso_m = TorsoDepth(frame, box, detection, options.joint_visibility_min);
   if (torso_m <= 0.0f) return;
   for (int v = box.top; v < box.bottom; ++v) {
     for (int u = box.left; u < box.right; ++u) {
       const float depth_m = frame.depth_m[static_cast<size_t>(v * frame.camera.width + u)];
-      if (depth_m > 0.0f && std::abs(depth_m - torso_m) < kBodyReachM) (*mask)(v, u) = 1;
+      if (depth_m > 0.0f && std::abs(depth_m - torso_m) < options.body_reach_m) (*mask)(v, u) = 1;
     }
   }
 }
@@ -136,7 +133,9 @@ std::vector<uint8_t> MaskPeople(const DepthFrame& frame,
                                 const DepthOptions& options) {
   const cv::Mat1b labelled = MaskLabels(frame, options.dynamic_classes);
   cv::Mat1b mask = labelled.clone();
-  for (const HumanDetection& detection : detections) MaskBox(frame, detection, labelled, &mask);
+  for (const HumanDetection& detection : detections) {
+    MaskBox(frame, detection, labelled, options, &mask);
+  }
   if (cv::countNonZero(mask) == 0) return {};
   const int growth_px = std::clamp(options.mask_growth_px, 0, 100);
   mask = Grow(mask, growth_px);

@@ -17,7 +17,8 @@ namespace dsg::ingest {
 /// A pixel is masked when
 /// - its class is one of DepthOptions::dynamic_classes, or
 /// - it lies in a detection's box in which the labels show (nearly) nobody, and its depth is within
-///   0.6 m of the median depth along the torso's joints (of the box's middle, if they are hidden),
+///   body_reach_m of the median depth along the torso's joints (of the box's middle, if they are
+///   hidden),
 /// - or within mask_growth_px of such a pixel,
 /// - or as far again and beside a depth edge of more than mask_edge_m: an outline that the labels
 ///   missed, and readings between person and background.

@@ -12,10 +12,6 @@
 namespace dsg::ingest {
 namespace {
 
-// A picture from so far beside is off by less than two pixels at 1 m.
-constexpr double kSameCentreM = 0.005;
-// Boxes of people are coarse: those of the camera beside will do, those of a pair's other one not.
-constexpr double kSamePeopleM = 0.06;
 // A structured-light sensor's way to say "nothing" in millimetres.
 constexpr uint16_t kNoReading16 = 65535;
 
@@ -93,7 +89,8 @@ FrameBuilder::FrameBuilder(const RigCalibration& rig, const DepthOptions& option
     source_ = FramePlanner::Source::kLidar;
     return;
   } else if (depth == nullptr && left != nullptr && right != nullptr) {
-    absl::StatusOr<StereoDepth> stereo = StereoDepth::Make(*left, *right, options.range_m);
+    absl::StatusOr<StereoDepth> stereo =
+        StereoDepth::Make(*left, *right, options.range_m, options.stereo);
     if (!stereo.ok()) return;
     source_ = FramePlanner::Source::kStereo;
     stereo_.emplace(*std::move(stereo));
@@ -109,7 +106,8 @@ void FrameBuilder::AddOverlay(const RigCalibration& rig, const std::string& chan
   if (given == nullptr && stereo_.has_value()) given = rig.FindCamera("cam0");
   Overlay overlay;
   overlay.camera = given != nullptr ? *given : camera_;
-  if (overlay.camera.Validate().ok() && CentreDistance(overlay.camera, camera_) < kSameCentreM) {
+  if (overlay.camera.Validate().ok() &&
+      CentreDistance(overlay.camera, camera_) < options_.same_center_m) {
     overlay.map.emplace(camera_, overlay.camera);
   }
   overlays_.emplace(channel, std::move(overlay));
@@ -243,7 +241,7 @@ std::vector<HumanDetection> FrameBuilder::InFrame(
   for (const HumanDetection& detection : detections) {
     const CameraCalibration* camera = rig_.FindCamera(detection.camera);
     if (camera == nullptr || !camera->Validate().ok()) continue;
-    if (CentreDistance(*camera, camera_) > kSamePeopleM) continue;
+    if (CentreDistance(*camera, camera_) > options_.same_people_m) continue;
     HumanDetection& in_frame = mapped.emplace_back(detection);
     in_frame.box_px = MapBox(detection.box_px, *camera, camera_);
     for (Eigen::Vector2d& joint : in_frame.joints_px) joint = MapPixel(joint, *camera, camera_);

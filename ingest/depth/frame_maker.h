@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "ingest/depth/cloud_views.h"
+#include "ingest/depth/depth_options.h"
 #include "ingest/sensor/calibration.h"
 #include "ingest/sensor/depth_frame.h"
 #include "ingest/sensor/human_detection.h"
@@ -21,22 +21,6 @@
 #include "ingest/trajectory/robot_path.h"
 
 namespace dsg::ingest {
-
-struct DepthOptions {
-  /// Stereo is used when there is no depth channel, on pairs at least this far apart.
-  TimeNs stereo_period_ns = 200'000'000;
-  /// Stereo readings beyond are dropped; 0 = 5 m. Those of a depth camera are all kept: the space
-  /// before them is free, which the map may want to know, and it has a range of its own.
-  double range_m = 0.0;
-  /// Class ids whose pixels move ("human", "person", "people" of the log's labels).
-  std::vector<int32_t> dynamic_classes;
-  /// Pixels that masks are grown by.
-  int mask_growth_px = 3;
-  /// Depth edges of more than this beside a mask belong to the mask, metres.
-  double mask_edge_m = 0.3;
-  /// Scans of lidars.
-  CloudOptions cloud;
-};
 
 /// What could not be used, by reason, in words for the user. Frames: "no depth image", "no right
 /// image", "no points", "no pose", "pose jump", "size differs from calibration", "broken image",
@@ -48,10 +32,10 @@ using SkipCounts = std::map<std::string, int64_t>;
 ///
 /// Depth is depth0's; without one lidar0's, whose scans give a frame for each side on which there
 /// are points (ViewsOfCloud); without that of the left image of cam0 and cam1. Colour and
-/// labels are those of the nearest stamp within 20 ms and half the depth period, laid over the
-/// depth pixel by pixel if their camera stands in the same place (5 mm); cam0 stands in for a
-/// missing color0. Depth of a camera with distortion is rectified to a pinhole of the same size. No
-/// reading: 0, NaN, infinity, 65535 mm.
+/// labels are those of the nearest stamp within DepthOptions::tolerance_ns and half the depth
+/// period, laid over the depth pixel by pixel if their camera stands in the same place; cam0 stands
+/// in for a missing color0. Depth of a camera with distortion is rectified to a pinhole of the same
+/// size. No reading: 0, NaN, infinity, 65535 mm.
 ///
 /// Order: stamps ascend, but for 20 ms between channels. A frame comes out when the next one is
 /// known, or after Finish. What comes out does not depend on when Next is called.

@@ -8,10 +8,6 @@
 namespace dsg::ingest {
 namespace {
 
-// Channels of one shutter differ by a few milliseconds in bags.
-constexpr TimeNs kToleranceNs = 20'000'000;
-// The two cameras of a pair must see the same instant.
-constexpr TimeNs kPairToleranceNs = 2'000'000;
 // Of each channel. A picture that waits is a few hundred bytes.
 constexpr size_t kWaitingMax = 10'000;
 
@@ -93,9 +89,10 @@ bool FramePlanner::PlanFront() {
   const auto main = waiting_.find(main_channel_);
   if (main == waiting_.end() || main->second.empty()) return false;
   const TimeNs time_ns = main->second.begin()->first;
-  if (!is_finished_ && now_ns_ <= time_ns + kToleranceNs) return false;
-  const bool is_too_soon = source_ == Source::kStereo && last_plan_ns_.has_value() &&
-                           time_ns < *last_plan_ns_ + options_.stereo_period_ns - kPairToleranceNs;
+  if (!is_finished_ && now_ns_ <= time_ns + options_.tolerance_ns) return false;
+  const bool is_too_soon =
+      source_ == Source::kStereo && last_plan_ns_.has_value() &&
+      time_ns < *last_plan_ns_ + options_.stereo_period_ns - options_.pair_tolerance_ns;
   Pose3d odom_T_body;
   const RobotPath::Answer answer = path_.GivenAt(time_ns, &odom_T_body);
   if (!is_too_soon && !is_finished_ && answer == RobotPath::Answer::kNotYet) return false;
@@ -107,7 +104,7 @@ bool FramePlanner::PlanFront() {
     ++skips_[answer == RobotPath::Answer::kJump ? "pose jump" : "no pose"];
   }
   last_main_ns_ = time_ns;
-  ForgetBefore(time_ns - kToleranceNs);
+  ForgetBefore(time_ns - options_.tolerance_ns);
   return true;
 }
 
@@ -116,7 +113,7 @@ void FramePlanner::MakePlan(FrameMaker::Picture main, const Pose3d& odom_T_body)
   plan.time_ns = main.time_ns;
   plan.odom_T_body = odom_T_body;
   if (source_ == Source::kStereo) {
-    plan.right = Nearest("cam1", main.time_ns, kPairToleranceNs);
+    plan.right = Nearest("cam1", main.time_ns, options_.pair_tolerance_ns);
     if (!plan.right.has_value()) {
       ++skips_["no right image"];
       return;
@@ -139,7 +136,7 @@ void FramePlanner::MakePlan(FrameMaker::Picture main, const Pose3d& odom_T_body)
 }
 
 TimeNs FramePlanner::ToleranceAt(TimeNs time_ns) const {
-  TimeNs tolerance_ns = kToleranceNs;
+  TimeNs tolerance_ns = options_.tolerance_ns;
   if (rate_hz_ > 0.0) {
     tolerance_ns = std::min(tolerance_ns, static_cast<TimeNs>(std::min(5e8 / rate_hz_, 1e9)));
   }

@@ -25,16 +25,13 @@ struct StereoLookup {
 namespace {
 
 constexpr double kRangeDefaultM = 5.0;
-// Nothing nearer is looked for: each 16 columns of disparity cost as much again.
-constexpr double kNearestM = 0.4;
+// Of the matcher; its penalties below follow from the block's size.
 constexpr int kBlockSize = 5;
 constexpr int kDisparitySteps = 16;
 constexpr int kRefineRounds = 2;
-// Mean absolute gradient along the rows in the window, grey levels a pixel. A blank wall shows 0.5
-// by the noise of the sensor alone.
+// In which the gradient along the rows is averaged.
 constexpr int kTextureWindow = 9;
 constexpr int kBorderSide = 9;
-constexpr double kTextureMin = 0.8;
 // Bytes hold the gradients in halves; Sobel's kernel gives eight of one.
 constexpr double kGradientScale = 2.0;
 
@@ -73,19 +70,19 @@ cv::Mat1b Rectified(const Image& image, const StereoLookup& lookup) {
 }
 
 // 255 where there is enough to match.
-cv::Mat1b Textured(const cv::Mat1b& image) {
+cv::Mat1b Textured(const cv::Mat1b& image, double texture_min) {
   cv::Mat1s gradient;
   cv::Sobel(image, gradient, CV_16S, 1, 0);
   cv::Mat strength;
   cv::convertScaleAbs(gradient, strength, kGradientScale / 8.0);
   cv::boxFilter(strength, strength, CV_32F, {kTextureWindow, kTextureWindow});
   cv::Mat1b textured;
-  cv::compare(strength, kTextureMin * kGradientScale, textured, cv::CMP_GE);
+  cv::compare(strength, texture_min * kGradientScale, textured, cv::CMP_GE);
   return textured;
 }
 
-int DisparityCount(const RectifiedPair& pair) {
-  const double largest = pair.left.fx * std::abs(pair.baseline_m) / kNearestM;
+int DisparityCount(const RectifiedPair& pair, double nearest_m) {
+  const double largest = pair.left.fx * std::abs(pair.baseline_m) / nearest_m;
   const int count = kDisparitySteps * static_cast<int>(std::ceil(std::min(largest, 1e4) / 16.0));
   const int widest = (pair.left.width / 2 / kDisparitySteps) * kDisparitySteps;
   return std::max(kDisparitySteps, std::min(count, widest));
@@ -96,8 +93,9 @@ int DisparityCount(const RectifiedPair& pair) {
 class StereoDepth::Impl {
  public:
   Impl(const RectifiedPair& pair, const CameraCalibration& left, const CameraCalibration& right,
-       double range_m)
+       double range_m, const StereoOptions& options)
       : pair_(pair),
+        options_(options),
         range_m_(range_m > 0.0 ? range_m : kRangeDefaultM),
         left_lookup_(MakeLookup(pair.left, left)),
         right_lookup_(MakeLookup(pair.right, right)) {}
@@ -108,7 +106,7 @@ class StereoDepth::Impl {
     cv::Mat1b left_image = Rectified(left, left_lookup_);
     cv::Mat1b right_image = Rectified(right, right_lookup_);
     cv::Mat1b usable;
-    cv::bitwise_and(Textured(left_image), left_lookup_.inside, usable);
+    cv::bitwise_and(Textured(left_image, options_.texture_min), left_lookup_.inside, usable);
     cv::Mat1b right_inside = right_lookup_.inside;
     const bool is_mirrored = pair_.baseline_m < 0.0;
     if (is_mirrored) {
@@ -130,7 +128,7 @@ class StereoDepth::Impl {
   // Pixels, 0 where there is no match.
   cv::Mat1f Match(const cv::Mat1b& left, const cv::Mat1b& right,
                   const cv::Mat1b& right_inside) const {
-    const int count = DisparityCount(pair_);
+    const int count = DisparityCount(pair_, options_.nearest_m);
     constexpr int kArea = kBlockSize * kBlockSize;
     const cv::Ptr<cv::StereoSGBM> matcher = cv::StereoSGBM::create(
         0, count, kBlockSize, 8 * kArea, 32 * kArea, /*disp12MaxDiff=*/1,
@@ -171,6 +169,7 @@ class StereoDepth::Impl {
   }
 
   RectifiedPair pair_;
+  StereoOptions options_;
   double range_m_;
   StereoLookup left_lookup_;
   StereoLookup right_lookup_;
@@ -182,9 +181,10 @@ StereoDepth::StereoDepth(StereoDepth&&) noexcept = default;
 StereoDepth& StereoDepth::operator=(StereoDepth&&) noexcept = default;
 
 absl::StatusOr<StereoDepth> StereoDepth::Make(const CameraCalibration& left,
-                                              const CameraCalibration& right, double range_m) {
+                                              const CameraCalibration& right, double range_m,
+                                              const StereoOptions& options) {
   DSG_ASSIGN_OR_RETURN(const RectifiedPair pair, RectifiedPair::Make(left, right));
-  return StereoDepth(std::make_unique<Impl>(pair, left, right, range_m));
+  return StereoDepth(std::make_unique<Impl>(pair, left, right, range_m, options));
 }
 
 const CameraCalibration& StereoDepth::camera() const { return impl_->camera(); }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "ingest/depth/depth_options.h"
 #include "ingest/sensor/calibration.h"
 #include "ingest/sensor/image.h"
 
@@ -14,7 +15,8 @@ namespace dsg::ingest {
 /// A rectified pair with semi-global matching (Hirschmueller 2008, OpenCV's), checked from left
 /// to right, speckles and untextured pixels removed.
 ///
-/// Looked for between 0.4 m and the range. The same result with any number of threads.
+/// Looked for between StereoOptions::nearest_m and the range. The same result with any number of
+/// threads.
 ///
 /// Threads: Compute may be called from several.
 class StereoDepth {
@@ -23,7 +25,8 @@ class StereoDepth {
   /// more than 30 degrees, are nearer than 1 mm to each other, or stand above or behind each
   /// other rather than side by side. Either may be the one on the left. `range_m` 0 = 5 m.
   static absl::StatusOr<StereoDepth> Make(const CameraCalibration& left,
-                                          const CameraCalibration& right, double range_m);
+                                          const CameraCalibration& right, double range_m,
+                                          const StereoOptions& options = {});
   ~StereoDepth();
   StereoDepth(StereoDepth&&) noexcept;
   StereoDepth& operator=(StereoDepth&&) noexcept;

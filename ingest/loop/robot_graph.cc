@@ -16,6 +16,39 @@ namespace {
 constexpr double kKeyframeSpreadStep = 1.5;
 constexpr double kKeyframeSpreadMax = 1e6;
 
+constexpr OptionField<RobotGraphOptions> kGraphFields[] = {
+    {"loop-keyframe", &RobotGraphOptions::keyframe_m, 0.01, 100.0,
+     "A keyframe is taken after so much way, metres: the path bends by less in between"},
+    {"loop-keyframe-turn", &RobotGraphOptions::keyframe_rad, 0.01, 3.2,
+     "... or turn, radians: 20 degrees"},
+    {"loop-keyframe-time", &RobotGraphOptions::keyframe_ns_max, 0.01, 3600.0,
+     "... or time, seconds: a robot that stands still drifts little"},
+    {"loop-odometry-turn", &RobotGraphOptions::odometry_rad_per_rad, 1e-5, 1.0,
+     "How far off the heading is after a turn of one radian, radians: of wheels and cheap gyros"},
+    {"loop-odometry-min", &RobotGraphOptions::odometry_m_min, 1e-5, 1.0,
+     "How far off the robot is after a keyframe at least, metres: noise of a pose"},
+    {"loop-odometry-turn-min", &RobotGraphOptions::odometry_rad_min, 1e-6, 1.0,
+     "The same of its heading, radians: a twentieth of a degree"},
+    {"loop-odometry-tilt", &RobotGraphOptions::odometry_tilt_rad, 1e-6, 1.0,
+     "How far off roll and pitch are after a keyframe, radians: an inertial unit sees gravity, and "
+     "a map that loops tilt is worse than a turned one"},
+    {"loop-correct-period", &RobotGraphOptions::correct_period_ns, 0.0, 86400.0,
+     "Least log time between two corrections of the path, seconds: each is solved anew"},
+    {"loop-correct-share", &RobotGraphOptions::correct_share, 0.0, 1.0,
+     "Least share of the log so far between two corrections: each writes track and mesh anew, "
+     "twenty times their size in all"},
+    {"loop-correct-move", &RobotGraphOptions::correct_min_m, 0.0, 100.0,
+     "Corrections that move the path by less wait for the end of the log, metres: a voxel"},
+    {"loop-correct-loops", &RobotGraphOptions::correct_loop_count_max, 0, 1e6,
+     "With more loop closures the path is corrected at the end of the log only: each is compared "
+     "with each"},
+};
+
+constexpr OptionField<RobustOptions> kRobustFields[] = {
+    {"loop-confidence", &RobustOptions::confidence, 0.5, 0.999999,
+     "Chance that right loop closures pass each test: one in a hundred is given up"},
+};
+
 Covariance6 UpperTriangle(const Matrix6d& matrix) {
   Covariance6 values{};
   size_t next = 0;
@@ -39,6 +72,13 @@ PoseFactor MakeFactor(const std::string& type, TimeNs from_ns, TimeNs to_ns, con
 }
 
 }  // namespace
+
+std::vector<BoundOption> RobotGraphOptions::Bind() {
+  std::vector<BoundOption> bound;
+  BindFields<RobotGraphOptions>(kGraphFields, this, &bound);
+  BindFields<RobustOptions>(kRobustFields, &robust, &bound);
+  return bound;
+}
 
 // A loop and the two poses that it is to bind.
 struct RobotGraph::BoundLoop {

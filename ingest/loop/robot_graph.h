@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "ingest/config/option_field.h"
 #include "ingest/loop/optimize.h"
 #include "ingest/loop/pose_graph.h"
 #include "ingest/loop/robust.h"
@@ -59,6 +60,13 @@ struct RobotGraphOptions {
   double correct_share = 0.05;
   /// It is corrected if some keyframe has moved by so much, metres; at the end of the log by any.
   double correct_min_m = 0.05;
+  /// With more loops than this the path is corrected at the end of the log only: each is compared
+  /// with each.
+  int correct_loop_count_max = 2000;
+
+  /// Without the two errors of odometry that have flags of their own, and without limits of time
+  /// and memory.
+  std::vector<BoundOption> Bind();
 };
 
 /// Threads: one caller at a time. Deterministic.

@@ -26,17 +26,24 @@ struct Carry {
 /// Threads: one caller at a time.
 class CarriedThings {
  public:
+  explicit CarriedThings(const SmallOptions& options = {})
+      : span_m_max_(options.span_m), options_(options.carry) {}
+
   /// Takes what touches a person; the rest of a picture's sightings is passed over.
   void See(const std::vector<SmallSighting>& sightings, TimeNs time_ns);
 
   /// The path that things were seen from has moved.
   void Move(const TrajectoryChange& change);
 
-  /// Those that were seen four times or more and over half a metre or more: a thing that somebody
-  /// stands beside does not move. Order: ascending by begin.
+  /// Those that were seen often enough and went far enough: a thing that somebody stands beside
+  /// does not move. Order: ascending by begin.
   std::vector<Carry> Carries() const;
 
  private:
+  bool IsWay(const Carry& carry) const;
+
+  double span_m_max_;
+  CarryOptions options_;
   std::vector<Carry> carries_;
 };
 

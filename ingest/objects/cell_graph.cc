@@ -9,9 +9,8 @@
 namespace dsg::ingest {
 namespace {
 
+// A second one makes up for cells whose first neighbours were noise.
 constexpr int kSmoothingRounds = 2;
-// Neighbours around a corner do not count, so that edges stay sharp.
-constexpr double kSameFaceCosine = 0.8;
 
 uint64_t VoxelOf(const ObjectSurface& surface, const SurfaceCell& cell) {
   return surface.vertices[cell.vertex_begin].cell;
@@ -42,14 +41,15 @@ void LinkNeighbours(const ObjectSurface& surface, CellGraph* graph) {
   }
 }
 
-void SmoothNormals(CellGraph* graph) {
+// Neighbours around a corner do not count, so that edges stay sharp.
+void SmoothNormals(double same_face_cosine, CellGraph* graph) {
   std::vector<Eigen::Vector3f> smooth = graph->normals_map;
   for (int cell = 0; cell < static_cast<int>(graph->size()); ++cell) {
     const Eigen::Vector3d own = graph->normals_map[static_cast<size_t>(cell)].cast<double>();
     if (own.isZero()) continue;
     Eigen::Vector3d sum = 2.0 * own;
     for (const int other : graph->NeighboursOf(cell)) {
-      if (graph->CosineOf(cell, other) > kSameFaceCosine) sum += graph->NormalAs(own, other);
+      if (graph->CosineOf(cell, other) > same_face_cosine) sum += graph->NormalAs(own, other);
     }
     smooth[static_cast<size_t>(cell)] = sum.normalized().cast<float>();
   }
@@ -58,7 +58,7 @@ void SmoothNormals(CellGraph* graph) {
 
 }  // namespace
 
-CellGraph MakeCellGraph(const ObjectSurface& surface, double cell_m) {
+CellGraph MakeCellGraph(const ObjectSurface& surface, double cell_m, double same_face_cosine) {
   CellGraph graph;
   graph.cell_m = cell_m;
   for (const SurfaceCell& cell : surface.cells) {
@@ -76,7 +76,7 @@ CellGraph MakeCellGraph(const ObjectSurface& surface, double cell_m) {
     graph.is_oriented = false;
     EstimateNormals(&graph);
   }
-  for (int round = 0; round < kSmoothingRounds; ++round) SmoothNormals(&graph);
+  for (int round = 0; round < kSmoothingRounds; ++round) SmoothNormals(same_face_cosine, &graph);
   return graph;
 }
 

@@ -43,8 +43,8 @@ struct CellGraph {
 };
 
 /// Neighbours are the up to 26 cells around. Normals are the means of the vertices', or estimated
-/// if no vertex has one, and smoothed over neighbours that look nearly the same way. Requires: a
-/// surface of one class, in cells of `cell_m`.
-CellGraph MakeCellGraph(const ObjectSurface& surface, double cell_m);
+/// if no vertex has one, and smoothed over neighbours within an angle of `same_face_cosine`.
+/// Requires: a surface of one class, in cells of `cell_m`.
+CellGraph MakeCellGraph(const ObjectSurface& surface, double cell_m, double same_face_cosine);
 
 }  // namespace dsg::ingest

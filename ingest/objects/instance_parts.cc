@@ -13,27 +13,15 @@
 namespace dsg::ingest {
 namespace {
 
-// Below this share of the cells an instance does not stand for a group.
-constexpr double kDominantShareMin = 0.3;
-// An instance this near to the most frequent one may replace it if its id is lower.
-constexpr double kNearlyAsFrequent = 0.8;
-// Support of an instance over that of the most frequent one: 30 % of the two together.
-constexpr double kSupportMin = 0.3 / 0.7;
-// Share of the smaller instance's box inside the larger one's: above, they are one thing.
-constexpr double kInterwovenMin = 0.35;
-// Share of cells at either end of each axis that boxes of instances leave out.
-constexpr double kTrim = 0.05;
-// A part is joined from this share of the largest part on.
-constexpr double kSpeckShare = 0.05;
-constexpr size_t kSpeckCells = 3;
-
 using InstanceCells = std::map<uint32_t, CellGroup>;
 
 /// Class and dominant instance.
 using InstanceKey = std::pair<int32_t, uint32_t>;
 
-InstanceKey KeyOf(const std::vector<SurfaceCell>& cells, const CellGroup& group) {
-  return {cells[static_cast<size_t>(group.front())].class_id, DominantInstance(cells, group)};
+InstanceKey KeyOf(const std::vector<SurfaceCell>& cells, const CellGroup& group,
+                  const PieceOptions& options) {
+  return {cells[static_cast<size_t>(group.front())].class_id,
+          DominantInstance(cells, group, options)};
 }
 
 std::vector<Eigen::Vector3f> PointsOf(const std::vector<SurfaceCell>& cells,
@@ -44,8 +32,8 @@ std::vector<Eigen::Vector3f> PointsOf(const std::vector<SurfaceCell>& cells,
   return points;
 }
 
-Box3d TrimmedBox(const std::vector<SurfaceCell>& cells, const CellGroup& group) {
-  const size_t cut = static_cast<size_t>(kTrim * static_cast<double>(group.size()));
+Box3d TrimmedBox(const std::vector<SurfaceCell>& cells, const CellGroup& group, double trim_share) {
+  const size_t cut = static_cast<size_t>(trim_share * static_cast<double>(group.size()));
   Box3d box;
   std::vector<double> values(group.size());
   for (int axis = 0; axis < 3; ++axis) {
@@ -60,7 +48,7 @@ Box3d TrimmedBox(const std::vector<SurfaceCell>& cells, const CellGroup& group) 
 }
 
 // Whether one thing has the two numbers in turns.
-bool AreInterwoven(const Box3d& a, const Box3d& b, double thickness_min_m) {
+bool AreInterwoven(const Box3d& a, const Box3d& b, double thickness_min_m, double share) {
   double shared = 1.0;
   for (int axis = 0; axis < 3; ++axis) {
     const double low = std::max(a.min()[axis], b.min()[axis]);
@@ -73,7 +61,7 @@ bool AreInterwoven(const Box3d& a, const Box3d& b, double thickness_min_m) {
     }
     shared *= std::max(0.0, high - low) / smaller;
   }
-  return shared > kInterwovenMin;
+  return shared > share;
 }
 
 InstanceCells CellsByInstance(const std::vector<SurfaceCell>& cells, const CellGroup& group) {
@@ -100,7 +88,9 @@ CellGroup MainPiece(const std::vector<SurfaceCell>& cells, const CellGroup& memb
 
 /// The pieces of the instances that are things of their own, the most frequent one first.
 std::vector<CellGroup> SeedsOf(const std::vector<SurfaceCell>& cells, const CellGroup& group,
-                               double tolerance_m) {
+                               double tolerance_m, const PieceOptions& options) {
+  // Over that of the most frequent one.
+  const double support_min = options.split_share / (1.0 - options.split_share);
   InstanceCells by_instance = CellsByInstance(cells, group);
   std::vector<CellGroup> members;
   for (auto& [instance, indices] : by_instance) members.push_back(std::move(indices));
@@ -111,11 +101,11 @@ std::vector<CellGroup> SeedsOf(const std::vector<SurfaceCell>& cells, const Cell
   for (const CellGroup& one : members) {
     const double support =
         static_cast<double>(one.size()) / static_cast<double>(members.front().size());
-    if (support <= kSupportMin) break;
+    if (support <= support_min) break;
     CellGroup piece = MainPiece(cells, one, tolerance_m);
-    const Box3d box = TrimmedBox(cells, piece);
+    const Box3d box = TrimmedBox(cells, piece, options.trim_share);
     const bool is_interwoven = std::any_of(boxes.begin(), boxes.end(), [&](const Box3d& other) {
-      return AreInterwoven(box, other, 0.5 * tolerance_m);
+      return AreInterwoven(box, other, 0.5 * tolerance_m, options.interwoven_share);
     });
     if (is_interwoven) continue;
     boxes.push_back(box);
@@ -135,10 +125,11 @@ bool AreWithin(const std::vector<Eigen::Vector3f>& a, const std::vector<Eigen::V
 
 /// Which groups of one instance are one; `members` are indices of groups, the largest first.
 void JoinNear(const std::vector<SurfaceCell>& cells, const std::vector<CellGroup>& groups,
-              const std::vector<int>& members, double gap_m, DisjointSets* sets) {
+              const std::vector<int>& members, const PieceOptions& options, DisjointSets* sets) {
   const size_t largest = groups[static_cast<size_t>(members.front())].size();
   const auto speck =
-      std::max(kSpeckCells, static_cast<size_t>(kSpeckShare * static_cast<double>(largest)));
+      std::max(static_cast<size_t>(options.speck_cell_count),
+               static_cast<size_t>(options.speck_share * static_cast<double>(largest)));
   for (size_t i = 0; i < members.size(); ++i) {
     const CellGroup& a = groups[static_cast<size_t>(members[i])];
     if (a.size() < speck) break;
@@ -147,7 +138,7 @@ void JoinNear(const std::vector<SurfaceCell>& cells, const std::vector<CellGroup
       const CellGroup& b = groups[static_cast<size_t>(members[j])];
       if (b.size() < speck) break;
       if (sets->Find(members[i]) == sets->Find(members[j])) continue;
-      if (!AreWithin(points, PointsOf(cells, b), gap_m)) continue;
+      if (!AreWithin(points, PointsOf(cells, b), options.join_gap_m)) continue;
       sets->Merge(members[i], members[j]);
     }
   }
@@ -155,15 +146,17 @@ void JoinNear(const std::vector<SurfaceCell>& cells, const std::vector<CellGroup
 
 }  // namespace
 
-uint32_t DominantInstance(const std::vector<SurfaceCell>& cells, const CellGroup& group) {
+uint32_t DominantInstance(const std::vector<SurfaceCell>& cells, const CellGroup& group,
+                          const PieceOptions& options) {
   std::map<uint32_t, size_t> counts;
   for (const int index : group) ++counts[cells[static_cast<size_t>(index)].instance_id];
   counts.erase(0);
   size_t most = 0;
   for (const auto& [instance, count] : counts) most = std::max(most, count);
-  if (static_cast<double>(most) < kDominantShareMin * static_cast<double>(group.size())) return 0;
+  if (static_cast<double>(most) < options.dominant_share * static_cast<double>(group.size()))
+    return 0;
   for (const auto& [instance, count] : counts) {
-    if (static_cast<double>(count) >= kNearlyAsFrequent * static_cast<double>(most)) {
+    if (static_cast<double>(count) >= options.nearly_share * static_cast<double>(most)) {
       return instance;
     }
   }
@@ -171,8 +164,9 @@ uint32_t DominantInstance(const std::vector<SurfaceCell>& cells, const CellGroup
 }
 
 std::vector<CellGroup> SplitByInstance(const std::vector<SurfaceCell>& cells,
-                                       const CellGroup& group, double tolerance_m) {
-  std::vector<CellGroup> parts = SeedsOf(cells, group, tolerance_m);
+                                       const CellGroup& group, double tolerance_m,
+                                       const PieceOptions& options) {
+  std::vector<CellGroup> parts = SeedsOf(cells, group, tolerance_m, options);
   if (parts.size() < 2) return {group};
   std::vector<Eigen::Vector3f> seed_points;
   std::vector<size_t> part_of_seed;
@@ -196,25 +190,25 @@ std::vector<CellGroup> SplitByInstance(const std::vector<SurfaceCell>& cells,
 }
 
 std::vector<CellGroup> DropEchoes(const std::vector<SurfaceCell>& cells,
-                                  std::vector<CellGroup> groups, double share) {
+                                  std::vector<CellGroup> groups, const PieceOptions& options) {
   std::map<InstanceKey, size_t> largest;
   for (const CellGroup& group : groups) {
-    size_t& size = largest[KeyOf(cells, group)];
+    size_t& size = largest[KeyOf(cells, group, options)];
     size = std::max(size, group.size());
   }
   std::erase_if(groups, [&](const CellGroup& group) {
-    const InstanceKey key = KeyOf(cells, group);
+    const InstanceKey key = KeyOf(cells, group, options);
     const double largest_size = static_cast<double>(largest[key]);
-    return key.second != 0 && static_cast<double>(group.size()) < share * largest_size;
+    return key.second != 0 && static_cast<double>(group.size()) < options.echo_share * largest_size;
   });
   return groups;
 }
 
 std::vector<CellGroup> MergeByInstance(const std::vector<SurfaceCell>& cells,
-                                       std::vector<CellGroup> groups, double gap_m) {
+                                       std::vector<CellGroup> groups, const PieceOptions& options) {
   std::map<InstanceKey, std::vector<int>> by_instance;
   for (size_t i = 0; i < groups.size(); ++i) {
-    const InstanceKey key = KeyOf(cells, groups[i]);
+    const InstanceKey key = KeyOf(cells, groups[i], options);
     if (key.second != 0) by_instance[key].push_back(static_cast<int>(i));
   }
   DisjointSets sets(groups.size());
@@ -222,7 +216,7 @@ std::vector<CellGroup> MergeByInstance(const std::vector<SurfaceCell>& cells,
     std::stable_sort(members.begin(), members.end(), [&](int a, int b) {
       return groups[static_cast<size_t>(a)].size() > groups[static_cast<size_t>(b)].size();
     });
-    if (members.size() > 1) JoinNear(cells, groups, members, gap_m, &sets);
+    if (members.size() > 1) JoinNear(cells, groups, members, options, &sets);
   }
   std::map<int, CellGroup> joined;
   for (size_t i = 0; i < groups.size(); ++i) {

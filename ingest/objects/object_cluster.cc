@@ -16,19 +16,6 @@
 namespace dsg::ingest {
 namespace {
 
-// Parts of one instance are joined over a gap such as a person or a column leaves.
-constexpr double kJoinGapM = 0.5;
-// A piece this much smaller than the rest of its instance is its outline on what is behind it.
-constexpr double kEchoShare = 0.2;
-// Lower sides this near to the floor were cut by the voxels or by what hides them.
-constexpr double kFloorReachM = 0.25;
-// Cells this near to the floor, in voxels, are as likely the floor's, mislabelled.
-constexpr double kFloorSkinVoxels = 0.6;
-// A slab this wide and this high over the floor is a table; its legs are too thin for the mesh.
-constexpr double kTableSideMinM = 0.4;
-constexpr double kTableFlatness = 0.4;
-constexpr double kTableHeightMaxM = 1.2;
-
 class ClusterFinder {
  public:
   ClusterFinder(const std::vector<const MeshBlock*>& mesh, const ClusterOptions& options)
@@ -36,14 +23,17 @@ class ClusterFinder {
     std::sort(class_ids_.begin(), class_ids_.end());
     if (options_.tolerance_m <= 0.0) options_.tolerance_m = 2.0 * options_.voxel_m;
     surface_ = GatherSurface(mesh, class_ids_, options_.voxel_m);
-    levels_ = options_.floor_z_m.has_value() ? std::vector<double>{*options_.floor_z_m}
-                                             : FindFloorLevels(mesh, class_ids_);
+    levels_ = options_.floor_z_m.has_value()
+                  ? std::vector<double>{*options_.floor_z_m}
+                  : FindFloorLevels(mesh, class_ids_, options_.pieces.floors);
   }
 
   /// Groups are given: `surface` is not looked at for more.
-  ClusterFinder(ObjectSurface surface, std::vector<double> levels, double voxel_m)
+  ClusterFinder(ObjectSurface surface, std::vector<double> levels, double voxel_m,
+                const PieceOptions& pieces)
       : surface_(std::move(surface)), levels_(std::move(levels)) {
     options_.voxel_m = voxel_m;
+    options_.pieces = pieces;
   }
 
   std::vector<ObjectCluster> Find() const {
@@ -53,8 +43,8 @@ class ClusterFinder {
       AddGroupsOfClass(begin, end, &groups);
       begin = end;
     }
-    groups = MergeByInstance(surface_.cells, std::move(groups), kJoinGapM);
-    groups = DropEchoes(surface_.cells, std::move(groups), kEchoShare);
+    groups = MergeByInstance(surface_.cells, std::move(groups), options_.pieces);
+    groups = DropEchoes(surface_.cells, std::move(groups), options_.pieces);
     std::erase_if(groups, [this](const CellGroup& group) { return !IsLargeEnough(group); });
     std::vector<ObjectCluster> clusters = Describe(groups);
     SortClusters(&clusters);
@@ -85,7 +75,8 @@ class ClusterFinder {
     for (size_t i = begin; i < end; ++i) points.push_back(surface_.cells[i].point_map);
     for (CellGroup& group : EuclideanClusters(points, options_.tolerance_m)) {
       for (int& index : group) index += static_cast<int>(begin);
-      for (CellGroup& part : SplitByInstance(surface_.cells, group, options_.tolerance_m)) {
+      for (CellGroup& part :
+           SplitByInstance(surface_.cells, group, options_.tolerance_m, options_.pieces)) {
         groups->push_back(std::move(part));
       }
     }
@@ -94,9 +85,9 @@ class ClusterFinder {
   // Small things have few voxels; that they all have one instance makes up for half of them.
   bool IsLargeEnough(const CellGroup& group) const {
     const int count = static_cast<int>(group.size());
-    if (count >= options_.point_count_min) return true;
-    const uint32_t instance = DominantInstance(surface_.cells, group);
-    if (instance == 0 || 2 * count < options_.point_count_min) return false;
+    if (count >= options_.pieces.cell_count_min) return true;
+    const uint32_t instance = DominantInstance(surface_.cells, group, options_.pieces);
+    if (instance == 0 || 2 * count < options_.pieces.cell_count_min) return false;
     return std::all_of(group.begin(), group.end(),
                        [&](int index) { return CellAt(index).instance_id == instance; });
   }
@@ -104,7 +95,7 @@ class ClusterFinder {
   ObjectCluster MakeCluster(const CellGroup& group) const {
     ObjectCluster cluster;
     cluster.class_id = CellAt(group.front()).class_id;
-    cluster.instance_id = DominantInstance(surface_.cells, group);
+    cluster.instance_id = DominantInstance(surface_.cells, group, options_.pieces);
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (const int index : group) {
       cluster.points_map.push_back(CellAt(index).point_map);
@@ -138,12 +129,15 @@ class ClusterFinder {
 
   UprightBox BoxOf(std::vector<Eigen::Vector3f> points, const CellGroup& group) const {
     std::vector<WeightedPoint> vertices = VerticesOf(group);
-    const UprightBox all = FitUprightBox(vertices, 0.0);
+    const BoxOptions& box_options = options_.pieces.box;
+    const UprightBox all = FitUprightBox(vertices, 0.0, box_options);
     const double low_m = all.map_T_box.position.z() - 0.5 * all.size.z();
-    const std::optional<double> floor_m = FloorBelow(levels_, low_m);
-    if (!floor_m.has_value()) return FitUprightBox(vertices, LeastFootprintYaw(points));
+    const std::optional<double> floor_m = FloorBelow(levels_, low_m, options_.pieces.floors);
+    if (!floor_m.has_value()) {
+      return FitUprightBox(vertices, LeastFootprintYaw(points, box_options), box_options);
+    }
     DropFloorSkin(*floor_m, &points, &vertices);
-    UprightBox box = FitUprightBox(vertices, LeastFootprintYaw(points));
+    UprightBox box = FitUprightBox(vertices, LeastFootprintYaw(points, box_options), box_options);
     if (StandsOnFloor(box, *floor_m, CellAt(group.front()).class_id)) {
       ExtendDownTo(*floor_m, &box);
     }
@@ -153,8 +147,8 @@ class ClusterFinder {
   // Labels that bled onto the floor would widen the box. What is mostly floor stays as it is.
   void DropFloorSkin(double floor_m, std::vector<Eigen::Vector3f>* points,
                      std::vector<WeightedPoint>* vertices) const {
-    const auto is_skin = [skin_m = floor_m + kFloorSkinVoxels *
-                                                 options_.voxel_m](const Eigen::Vector3f& point) {
+    const double skin_m = floor_m + options_.pieces.floor_skin_voxels * options_.voxel_m;
+    const auto is_skin = [skin_m](const Eigen::Vector3f& point) {
       return static_cast<double>(point.z()) <= skin_m;
     };
     const auto skin_count = std::count_if(points->begin(), points->end(), is_skin);
@@ -170,10 +164,12 @@ class ClusterFinder {
   bool StandsOnFloor(const UprightBox& box, double floor_m, int32_t class_id) const {
     const double low_m = box.map_T_box.position.z() - 0.5 * box.size.z();
     if (low_m <= floor_m) return false;
-    if (low_m - floor_m <= kFloorReachM) return true;
+    const PieceOptions& pieces = options_.pieces;
+    if (low_m - floor_m <= pieces.floor_reach_m) return true;
     const double side_m = std::min(box.size.x(), box.size.y());
-    const bool is_slab = side_m >= kTableSideMinM && box.size.z() <= kTableFlatness * side_m &&
-                         low_m - floor_m <= kTableHeightMaxM;
+    const bool is_slab = side_m >= pieces.table_side_m &&
+                         box.size.z() <= pieces.table_flatness * side_m &&
+                         low_m - floor_m <= pieces.table_height_m;
     return is_slab && !RestsOnObject(box, class_id);
   }
 
@@ -242,8 +238,9 @@ void SortClusters(std::vector<ObjectCluster>* clusters) {
 
 std::vector<ObjectCluster> ClustersOfGroups(ObjectSurface surface,
                                             const std::vector<CellGroup>& groups,
-                                            std::vector<double> floors_m, double voxel_m) {
-  return ClusterFinder(std::move(surface), std::move(floors_m), voxel_m).Describe(groups);
+                                            std::vector<double> floors_m, double voxel_m,
+                                            const PieceOptions& options) {
+  return ClusterFinder(std::move(surface), std::move(floors_m), voxel_m, options).Describe(groups);
 }
 
 }  // namespace dsg::ingest

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ingest/objects/instance_parts.h"
+#include "ingest/objects/object_options.h"
 #include "ingest/objects/surface_cells.h"
 #include "schema/base/time.h"
 #include "schema/model/geometry.h"
@@ -20,8 +21,7 @@ struct ClusterOptions {
   double voxel_m = 0.1;
   /// RSS 2020: twice the voxel; 0 = that.
   double tolerance_m = 0.0;
-  /// In vertices of the mesh, thinned to one a voxel.
-  int point_count_min = 8;
+  PieceOptions pieces;
   /// Classes that are objects: everything but structures and people.
   std::vector<int32_t> class_ids;
   /// Height of the floor that objects stand on; empty = from the horizontal surfaces of the mesh
@@ -66,6 +66,7 @@ void SortClusters(std::vector<ObjectCluster>* clusters);
 /// `floors_m`: ascending heights of the floors; `voxel_m`: edge of the cells.
 std::vector<ObjectCluster> ClustersOfGroups(ObjectSurface surface,
                                             const std::vector<CellGroup>& groups,
-                                            std::vector<double> floors_m, double voxel_m);
+                                            std::vector<double> floors_m, double voxel_m,
+                                            const PieceOptions& options = {});
 
 }  // namespace dsg::ingest

@@ -12,31 +12,14 @@
 namespace dsg::ingest {
 namespace {
 
-// Boxes of flat things get some volume.
-constexpr double kBoxSlackM = 0.02;
-// An instance that seems to be further away than this plus its own size was matched wrongly.
-constexpr double kInstanceReachM = 1.0;
-constexpr double kOverlapMin = 0.1;
-constexpr double kCenterReachM = 0.15;
-// Two classes in one place are one thing whose labels have changed.
-constexpr double kOtherClassOverlapMin = 0.4;
-constexpr double kCenterChangeM = 0.02;
-constexpr double kSizeChangeM = 0.05;
-constexpr double kYawChangeRad = 0.1;
-// Points that are this near to a cluster are its own now; another class must have the very same.
-constexpr double kOwnPointM = 0.1;
-constexpr double kSamePointM = 0.03;
-constexpr double kOwnShareMin = 0.5;
-constexpr double kSameShareMin = 0.7;
-
 double Overlap(const Box3d& a, const Box3d& b) {
   const Box3d both = a.intersection(b);
   if (both.isEmpty()) return 0.0;
   return both.volume() / (a.volume() + b.volume() - both.volume());
 }
 
-Box3d Widened(const Box3d& box) {
-  const Eigen::Vector3d slack = Eigen::Vector3d::Constant(kBoxSlackM);
+Box3d Widened(const Box3d& box, double slack_m) {
+  const Eigen::Vector3d slack = Eigen::Vector3d::Constant(slack_m);
   return Box3d(box.min() - slack, box.max() + slack);
 }
 
@@ -48,39 +31,41 @@ struct Candidate {
 };
 
 std::optional<Candidate> Compare(const ObjectCluster& object, const Box3d& object_box,
-                                 const ObjectCluster& cluster, const Box3d& cluster_box) {
+                                 const ObjectCluster& cluster, const Box3d& cluster_box,
+                                 const MatchOptions& options) {
   const double distance_m = (object.center_map - cluster.center_map).norm();
   const double overlap = Overlap(object_box, cluster_box);
   Candidate candidate;
   candidate.score = overlap - 0.1 * distance_m;
   if (object.instance_id != 0 && object.instance_id == cluster.instance_id &&
-      distance_m <= kInstanceReachM + 0.5 * object_box.diagonal().norm()) {
+      distance_m <= options.instance_reach_m + 0.5 * object_box.diagonal().norm()) {
     return candidate;
   }
   candidate.rank = 1;
   if (object.class_id == cluster.class_id) {
-    const bool is_same = overlap >= kOverlapMin || distance_m <= kCenterReachM ||
+    const bool is_same = overlap >= options.overlap_min || distance_m <= options.center_reach_m ||
                          object_box.contains(cluster.center_map) ||
                          cluster_box.contains(object.center_map);
     if (is_same) return candidate;
     return std::nullopt;
   }
   candidate.rank = 2;
-  if (overlap >= kOtherClassOverlapMin) return candidate;
+  if (overlap >= options.other_class_overlap_min) return candidate;
   return std::nullopt;
 }
 
 std::vector<Candidate> CandidatesOf(const std::vector<TrackedObject>& objects,
-                                    const std::vector<ObjectCluster>& clusters) {
+                                    const std::vector<ObjectCluster>& clusters,
+                                    const MatchOptions& options) {
   std::vector<Box3d> cluster_boxes;
   for (const ObjectCluster& cluster : clusters) {
-    cluster_boxes.push_back(Widened(AxisAlignedBox(cluster)));
+    cluster_boxes.push_back(Widened(AxisAlignedBox(cluster), options.box_slack_m));
   }
   std::vector<Candidate> candidates;
   for (size_t i = 0; i < objects.size(); ++i) {
-    const Box3d box = Widened(AxisAlignedBox(objects[i].cluster));
+    const Box3d box = Widened(AxisAlignedBox(objects[i].cluster), options.box_slack_m);
     for (size_t j = 0; j < clusters.size(); ++j) {
-      auto candidate = Compare(objects[i].cluster, box, clusters[j], cluster_boxes[j]);
+      auto candidate = Compare(objects[i].cluster, box, clusters[j], cluster_boxes[j], options);
       if (!candidate.has_value()) continue;
       candidate->object = static_cast<int>(i);
       candidate->cluster = static_cast<int>(j);
@@ -112,8 +97,9 @@ Box3d AxisAlignedBox(const ObjectCluster& cluster) {
 }
 
 std::vector<int> MatchClusters(const std::vector<TrackedObject>& objects,
-                               const std::vector<ObjectCluster>& clusters) {
-  std::vector<Candidate> candidates = CandidatesOf(objects, clusters);
+                               const std::vector<ObjectCluster>& clusters,
+                               const MatchOptions& options) {
+  std::vector<Candidate> candidates = CandidatesOf(objects, clusters, options);
   std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
     return std::tuple(a.rank, -a.score, a.object, a.cluster) <
            std::tuple(b.rank, -b.score, b.object, b.cluster);
@@ -130,28 +116,33 @@ std::vector<int> MatchClusters(const std::vector<TrackedObject>& objects,
   return object_of;
 }
 
-bool IsChanged(const ObjectCluster& before, const ObjectCluster& after) {
+bool IsChanged(const ObjectCluster& before, const ObjectCluster& after,
+               const MatchOptions& options) {
   if (before.class_id != after.class_id || before.instance_id != after.instance_id) return true;
-  if ((before.center_map - after.center_map).norm() > kCenterChangeM) return true;
+  if ((before.center_map - after.center_map).norm() > options.center_change_m) return true;
   const double turn_rad = YawOf(after) - YawOf(before);
   Eigen::Vector3d size = after.size;
   // Yaw runs from -45 to 45 degrees; past the end the sides change places.
   if (std::abs(turn_rad) > M_PI / 4.0) std::swap(size.x(), size.y());
-  if (std::abs(std::remainder(turn_rad, M_PI / 2.0)) > kYawChangeRad) return true;
-  return (before.size - size).cwiseAbs().maxCoeff() > kSizeChangeM;
+  if (std::abs(std::remainder(turn_rad, M_PI / 2.0)) > options.yaw_change_rad) return true;
+  return (before.size - size).cwiseAbs().maxCoeff() > options.size_change_m;
 }
 
-int AbsorbingCluster(const ObjectCluster& object, const std::vector<ObjectCluster>& clusters) {
+int AbsorbingCluster(const ObjectCluster& object, const std::vector<ObjectCluster>& clusters,
+                     const MatchOptions& options) {
   if (object.points_map.empty()) return -1;
-  const Box3d box = Widened(AxisAlignedBox(object));
+  const Box3d box = Widened(AxisAlignedBox(object), options.box_slack_m);
   int best = -1;
   double best_share = 0.0;
   for (size_t i = 0; i < clusters.size(); ++i) {
-    if (!box.intersects(Widened(AxisAlignedBox(clusters[i])))) continue;
+    if (!box.intersects(Widened(AxisAlignedBox(clusters[i]), options.box_slack_m))) continue;
     const bool is_same_class = clusters[i].class_id == object.class_id;
     const PointIndex points(clusters[i].points_map);
-    const double share = SharedPoints(object, points, is_same_class ? kOwnPointM : kSamePointM);
-    if (share < (is_same_class ? kOwnShareMin : kSameShareMin) || share <= best_share) continue;
+    const double share =
+        SharedPoints(object, points, is_same_class ? options.own_point_m : options.same_point_m);
+    if (share < (is_same_class ? options.own_share_min : options.same_share_min) ||
+        share <= best_share)
+      continue;
     best_share = share;
     best = static_cast<int>(i);
   }

@@ -16,13 +16,16 @@ Box3d AxisAlignedBox(const ObjectCluster& cluster);
 /// For each cluster the index of its object, -1 = none. The same instance first, then the same
 /// class by overlap, then another class in the same place.
 std::vector<int> MatchClusters(const std::vector<TrackedObject>& objects,
-                               const std::vector<ObjectCluster>& clusters);
+                               const std::vector<ObjectCluster>& clusters,
+                               const MatchOptions& options = {});
 
-/// Another class or instance, 2 cm of the centre, 5 cm of an edge, 6 degrees.
-bool IsChanged(const ObjectCluster& before, const ObjectCluster& after);
+/// Another class or instance, or more of the centre, an edge or the yaw than counts.
+bool IsChanged(const ObjectCluster& before, const ObjectCluster& after,
+               const MatchOptions& options = {});
 
 /// The cluster that has taken over most of the object's points, -1 = none.
-int AbsorbingCluster(const ObjectCluster& object, const std::vector<ObjectCluster>& clusters);
+int AbsorbingCluster(const ObjectCluster& object, const std::vector<ObjectCluster>& clusters,
+                     const MatchOptions& options = {});
 
 /// Equal for equal points, different for others but for a chance of 2^-64.
 uint64_t DigestOf(const ObjectCluster& cluster);

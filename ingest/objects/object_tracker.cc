@@ -29,7 +29,7 @@ void ObjectTracker::Refresh(size_t object, ObjectCluster cluster, TimeNs time_ns
     known.last_observed_ns = time_ns;
   }
   digest = new_digest;
-  if (!IsChanged(known.cluster, cluster)) return;
+  if (!IsChanged(known.cluster, cluster, options_)) return;
   known.cluster = std::move(cluster);
   ++known.observation_count;
   changes->changed.push_back(known.id);
@@ -39,7 +39,7 @@ ObjectTracker::Assignment ObjectTracker::Assign(std::vector<ObjectCluster> clust
                                                 ObjectChanges* changes) {
   Assignment result;
   result.is_matched.assign(objects_.size(), false);
-  const std::vector<int> object_of = MatchClusters(objects_, clusters);
+  const std::vector<int> object_of = MatchClusters(objects_, clusters, options_);
   for (size_t i = 0; i < clusters.size(); ++i) {
     if (object_of[i] >= 0) {
       const auto object = static_cast<size_t>(object_of[i]);
@@ -70,7 +70,7 @@ void ObjectTracker::Retire(const Assignment& assignment,
   for (size_t i = 0; i < assignment.is_matched.size(); ++i) {
     if (assignment.is_matched[i]) continue;
     const TrackedObject& object = objects_[i];
-    const int absorber = AbsorbingCluster(object.cluster, assignment.clusters);
+    const int absorber = AbsorbingCluster(object.cluster, assignment.clusters, options_);
     if (absorber >= 0) {
       const int64_t id = assignment.id_of[static_cast<size_t>(absorber)];
       changes->merged.emplace_back(object.id, id);
@@ -81,7 +81,8 @@ void ObjectTracker::Retire(const Assignment& assignment,
     }
     const std::vector<Eigen::Vector3f>& points = object.cluster.points_map;
     const auto count = std::count_if(points.begin(), points.end(), is_seen_through);
-    if (2 * count > static_cast<int64_t>(points.size())) {
+    if (static_cast<double>(count) >
+        options_.seen_through_share * static_cast<double>(points.size())) {
       changes->gone.push_back(object.id);
     } else if (forgets_lost_) {
       changes->forgotten.push_back(object.id);

@@ -48,7 +48,8 @@ class ObjectTracker {
  public:
   /// `forgets_lost`: clusters are all that the whole surface is taken for, so that an object
   /// without one was a wrong piece of it, and never there.
-  explicit ObjectTracker(bool forgets_lost = false) : forgets_lost_(forgets_lost) {}
+  explicit ObjectTracker(bool forgets_lost = false, const MatchOptions& options = {})
+      : forgets_lost_(forgets_lost), options_(options) {}
 
   /// Matches clusters with the known objects by instance, class and overlap of boxes. An object
   /// without a cluster is gone if `is_seen_through(point)` holds for most of its points, and
@@ -76,6 +77,7 @@ class ObjectTracker {
               ObjectChanges* changes);
 
   bool forgets_lost_ = false;
+  MatchOptions options_;
   std::vector<TrackedObject> objects_;
   /// By id: which points the latest cluster had.
   std::map<int64_t, uint64_t> digests_;

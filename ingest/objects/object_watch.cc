@@ -11,28 +11,6 @@
 namespace dsg::ingest {
 namespace {
 
-// Longest side of what a person carries about.
-constexpr double kSideMaxM = 0.6;
-constexpr size_t kSamplesMax = 40;
-// Of the way from the middle to the surface.
-constexpr double kInside = 0.4;
-constexpr double kWatchNearM = 0.4;
-constexpr double kWatchFarM = 5.0;
-// A reading nearer than the sample by more hides it; metres a metre.
-constexpr double kHiddenPerM = 0.015;
-// A thing of the class that is further behind is another one.
-constexpr double kPresentM = 0.3;
-constexpr double kVotedMin = 0.5;
-constexpr double kPresentMin = 0.25;
-constexpr double kAbsentMin = 0.9;
-constexpr int kAbsentRun = 5;
-constexpr int kPresentRun = 3;
-constexpr double kResidueM = 0.1;
-
-// Depth cameras are blind beside edges, so where small things stand. Pixels.
-constexpr int kBlindMax = 16;
-constexpr int kBlindStep = 2;
-
 enum class SampleVote { kNone, kPresent, kAbsent };
 
 struct Projection {
@@ -41,10 +19,11 @@ struct Projection {
   double depth_m = 0.0;
 };
 
-Projection Project(const DepthFrame& frame, const Eigen::Vector3d& point_camera) {
+Projection Project(const DepthFrame& frame, const Eigen::Vector3d& point_camera,
+                   const WatchOptions& options) {
   Projection result;
   result.depth_m = point_camera.z();
-  if (result.depth_m < kWatchNearM || result.depth_m > kWatchFarM) return result;
+  if (result.depth_m < options.near_m || result.depth_m > options.far_m) return result;
   const CameraCalibration& camera = frame.camera;
   const double u = camera.fx * point_camera.x() / result.depth_m + camera.cx;
   const double v = camera.fy * point_camera.y() / result.depth_m + camera.cy;
@@ -57,12 +36,13 @@ Projection Project(const DepthFrame& frame, const Eigen::Vector3d& point_camera)
 
 // The reading of a pixel, or of the nearest one along the four directions that shows the same
 // instance; 0 = none.
-double ReadingAt(const DepthFrame& frame, size_t pixel) {
+double ReadingAt(const DepthFrame& frame, size_t pixel, const WatchOptions& options) {
   if (frame.depth_m[pixel] > 0.0F) return frame.depth_m[pixel];
   const auto width = static_cast<int>(frame.camera.width);
   const int row = static_cast<int>(pixel) / width;
   const int column = static_cast<int>(pixel) % width;
-  for (int step = kBlindStep; step <= kBlindMax; step += kBlindStep) {
+  for (int step = options.blind_px_step; step <= options.blind_px_max;
+       step += options.blind_px_step) {
     for (const auto& [dx, dy] : {std::pair(step, 0), {-step, 0}, {0, step}, {0, -step}}) {
       const int x = column + dx;
       const int y = row + dy;
@@ -77,38 +57,39 @@ double ReadingAt(const DepthFrame& frame, size_t pixel) {
   return 0.0;
 }
 
-SampleVote VoteOf(const DepthFrame& frame, const Projection& sample, int32_t class_id) {
-  const double reading_m = ReadingAt(frame, sample.pixel);
+SampleVote VoteOf(const DepthFrame& frame, const Projection& sample, int32_t class_id,
+                  const WatchOptions& options) {
+  const double reading_m = ReadingAt(frame, sample.pixel, options);
   if (reading_m <= 0.0) return SampleVote::kNone;
   if (!frame.dynamic.empty() && frame.dynamic[sample.pixel] != 0) return SampleVote::kNone;
   const int32_t seen = frame.labels[sample.pixel] >> 8;
   const double behind_m = reading_m - sample.depth_m;
-  if (seen == class_id && std::abs(behind_m) <= kPresentM) return SampleVote::kPresent;
-  if (seen == 0 || behind_m < -kHiddenPerM * sample.depth_m) return SampleVote::kNone;
+  if (seen == class_id && std::abs(behind_m) <= options.present_m) return SampleVote::kPresent;
+  if (seen == 0 || behind_m < -options.hidden_per_m * sample.depth_m) return SampleVote::kNone;
   return SampleVote::kAbsent;
 }
 
 }  // namespace
 
-void ObjectWatch::Vote(const DepthFrame& frame, Spot* spot) {
+void ObjectWatch::Vote(const DepthFrame& frame, Spot* spot) const {
   const Pose3d camera_T_map = frame.map_T_camera.Inverse();
-  if (!Project(frame, camera_T_map * spot->center_map).is_in_picture) return;
+  if (!Project(frame, camera_T_map * spot->center_map, options_).is_in_picture) return;
   size_t present = 0, absent = 0;
   for (const Eigen::Vector3d& point_map : spot->samples_map) {
-    const Projection sample = Project(frame, camera_T_map * point_map);
+    const Projection sample = Project(frame, camera_T_map * point_map, options_);
     if (!sample.is_in_picture) continue;
-    const SampleVote vote = VoteOf(frame, sample, spot->class_id);
+    const SampleVote vote = VoteOf(frame, sample, spot->class_id, options_);
     if (vote == SampleVote::kPresent) ++present;
     if (vote == SampleVote::kAbsent) ++absent;
   }
   const auto voted = static_cast<double>(present + absent);
-  if (voted < kVotedMin * static_cast<double>(spot->samples_map.size())) return;
-  if (static_cast<double>(present) >= kPresentMin * voted) {
+  if (voted < options_.voted_share * static_cast<double>(spot->samples_map.size())) return;
+  if (static_cast<double>(present) >= options_.present_share * voted) {
     ++spot->present_count;
     ++spot->present_run;
     spot->absent_run = 0;
     spot->last_present_ns = frame.time_ns;
-  } else if (static_cast<double>(absent) >= kAbsentMin * voted) {
+  } else if (static_cast<double>(absent) >= options_.absent_share * voted) {
     if (spot->absent_run++ == 0) spot->first_absent_ns = frame.time_ns;
     spot->present_run = 0;
   }
@@ -119,12 +100,12 @@ void ObjectWatch::Watch(const DepthFrame& frame) {
   for (auto spot = spots_.begin(); spot != spots_.end();) {
     Spot& state = spot->second;
     Vote(frame, &state);
-    if (state.is_vacated && state.present_run >= kPresentRun) {
+    if (state.is_vacated && state.present_run >= options_.present_run) {
       spot = spots_.erase(spot);
       continue;
     }
     // What was never seen there cannot have left.
-    if (!state.is_vacated && state.present_count > 0 && state.absent_run >= kAbsentRun) {
+    if (!state.is_vacated && state.present_count > 0 && state.absent_run >= options_.absent_run) {
       state.is_vacated = true;
       state.present_run = 0;
       vacated_.push_back({spot->first, state.last_present_ns, state.first_absent_ns});
@@ -148,7 +129,7 @@ void ObjectWatch::DropResidues(std::vector<ObjectCluster>* clusters) const {
     return std::any_of(spots_.begin(), spots_.end(), [&](const auto& entry) {
       const Spot& spot = entry.second;
       return spot.is_vacated && spot.class_id == cluster.class_id &&
-             spot.box_map.exteriorDistance(cluster.center_map) <= kResidueM;
+             spot.box_map.exteriorDistance(cluster.center_map) <= options_.residue_m;
     });
   });
 }
@@ -157,7 +138,7 @@ void ObjectWatch::Follow(const std::vector<TrackedObject>& objects) {
   std::set<int64_t> known;
   for (const TrackedObject& object : objects) {
     const ObjectCluster& cluster = object.cluster;
-    if (cluster.size.maxCoeff() > kSideMaxM || cluster.points_map.empty()) continue;
+    if (cluster.size.maxCoeff() > options_.side_m_max || cluster.points_map.empty()) continue;
     known.insert(object.id);
     Spot& spot = spots_[object.id];
     // What is left of a thing that is going is no measure of it.
@@ -166,10 +147,12 @@ void ObjectWatch::Follow(const std::vector<TrackedObject>& objects) {
     spot.box_map = AxisAlignedBox(cluster);
     spot.center_map = cluster.center_map;
     spot.samples_map.clear();
-    const size_t step = (cluster.points_map.size() + kSamplesMax - 1) / kSamplesMax;
+    const auto sample_count_max = static_cast<size_t>(options_.sample_count_max);
+    const size_t step = (cluster.points_map.size() + sample_count_max - 1) / sample_count_max;
     for (size_t i = 0; i < cluster.points_map.size(); i += step) {
       const Eigen::Vector3d point = cluster.points_map[i].cast<double>();
-      spot.samples_map.push_back(cluster.center_map + kInside * (point - cluster.center_map));
+      spot.samples_map.push_back(cluster.center_map +
+                                 options_.inside_share * (point - cluster.center_map));
     }
   }
   std::erase_if(spots_, [&](const auto& entry) {

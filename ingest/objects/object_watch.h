@@ -22,12 +22,14 @@ struct VacatedObject {
 };
 
 /// A volume forgets a thing on a table slowly, since most rays that pass where it was graze the
-/// table: labels bleed, and its surface stays for minutes. Votes need five pictures.
+/// table: labels bleed, and its surface stays for minutes. Votes need some pictures.
 ///
 /// Threads: one caller at a time.
 /// Source: Schmid et al., 2024 (Khronos): votes of rays for presence and absence, occlusion none.
 class ObjectWatch {
  public:
+  explicit ObjectWatch(const WatchOptions& options = {}) : options_(options) {}
+
   /// Lets a picture vote on all that is watched. Pictures without labels do not vote.
   void Watch(const DepthFrame& frame);
 
@@ -60,8 +62,9 @@ class ObjectWatch {
     bool is_vacated = false;
   };
 
-  static void Vote(const DepthFrame& frame, Spot* spot);
+  void Vote(const DepthFrame& frame, Spot* spot) const;
 
+  WatchOptions options_;
   std::map<int64_t, Spot> spots_;
   std::vector<VacatedObject> vacated_;
 };

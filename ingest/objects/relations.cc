@@ -13,17 +13,7 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kNextToM = 0.5;
-constexpr double kLargerMin = 1.5;
-// Voxels round both the lower side of one and the upper side of the other.
-constexpr double kContactM = 0.12;
-// Share of the upper one's footprint that the lower one must carry.
-constexpr double kCarriedMin = 0.5;
-// Share of the inner one's volume that the outer one must hold.
-constexpr double kInsideMin = 0.75;
-constexpr double kInsideSlackM = 0.05;
-// Nothing lies in a thing of less than twice its volume.
-constexpr double kContainerMin = 2.0;
+// Flat things get some volume.
 constexpr double kEdgeMinM = 0.01;
 
 /// A box with some extent on each axis.
@@ -78,22 +68,24 @@ struct Support {
 };
 
 std::optional<Support> SupportOf(const TrackedObject& a, const Box3d& a_box, const TrackedObject& b,
-                                 const Box3d& b_box) {
+                                 const Box3d& b_box, const RelationOptions& options) {
   const double carried = SharedFootprint(a_box, b_box) / (a_box.sizes().x() * a_box.sizes().y());
-  if (carried >= kCarriedMin && std::abs(a_box.min().z() - b_box.max().z()) <= kContactM &&
+  if (carried >= options.carried_share &&
+      std::abs(a_box.min().z() - b_box.max().z()) <= options.contact_m &&
       a_box.max().z() > b_box.max().z()) {
     return Support{relations::kOn, carried};
   }
-  const Eigen::Vector3d slack = Eigen::Vector3d::Constant(kInsideSlackM);
+  const Eigen::Vector3d slack = Eigen::Vector3d::Constant(options.inside_slack_m);
   const Box3d shared = Box3d(b_box.min() - slack, b_box.max() + slack).intersection(a_box);
   const double inside = shared.isEmpty() ? 0.0 : shared.volume() / a_box.volume();
-  if (inside < kInsideMin || VolumeOf(b.cluster) < kContainerMin * VolumeOf(a.cluster)) {
+  if (inside < options.inside_share ||
+      VolumeOf(b.cluster) < options.container_min * VolumeOf(a.cluster)) {
     return std::nullopt;
   }
   if (b.cluster.points_map.empty()) return Support{relations::kIn, inside};
   const Surroundings around = Surround(b.cluster.points_map, a_box);
   // A bin under a desk stands on the same floor.
-  const bool is_on_same_floor = std::abs(a_box.min().z() - b_box.min().z()) <= kContactM;
+  const bool is_on_same_floor = std::abs(a_box.min().z() - b_box.min().z()) <= options.contact_m;
   if (around.is_enclosed) return Support{relations::kIn, inside};
   if (is_on_same_floor) return std::nullopt;
   return Support{around.is_covered ? relations::kIn : relations::kOn, inside};
@@ -106,34 +98,37 @@ void KeepBest(const std::optional<Support>& support, int64_t second,
   *best = std::pair(*support, second);
 }
 
-void AddComparison(const TrackedObject& a, const TrackedObject& b,
+void AddComparison(const TrackedObject& a, const TrackedObject& b, double larger_min,
                    std::vector<ObjectRelation>* relations) {
   const double ratio = VolumeOf(a.cluster) / VolumeOf(b.cluster);
-  if (ratio > kLargerMin) {
+  if (ratio > larger_min) {
     relations->push_back({a.id, relations::kLargerThan, b.id, ratio});
-  } else if (1.0 / ratio > kLargerMin) {
+  } else if (1.0 / ratio > larger_min) {
     relations->push_back({b.id, relations::kLargerThan, a.id, 1.0 / ratio});
   }
 }
 
 }  // namespace
 
-std::vector<ObjectRelation> FindRelations(const std::vector<TrackedObject>& objects) {
+std::vector<ObjectRelation> FindRelations(const std::vector<TrackedObject>& objects,
+                                          const RelationOptions& options) {
   std::vector<Box3d> boxes;
   for (const TrackedObject& object : objects) boxes.push_back(SolidBox(object.cluster));
   std::vector<ObjectRelation> relations;
   std::vector<std::optional<std::pair<Support, int64_t>>> support(objects.size());
-  for (const auto& [low, high] : NearPairs(boxes, kNextToM)) {
+  for (const auto& [low, high] : NearPairs(boxes, options.near_m)) {
     const auto i = static_cast<size_t>(low);
     const auto j = static_cast<size_t>(high);
     const double distance_m = DistanceBetween(boxes[i], boxes[j]);
-    if (distance_m < kNextToM) {
+    if (distance_m < options.near_m) {
       relations.push_back({std::min(objects[i].id, objects[j].id), relations::kNear,
                            std::max(objects[i].id, objects[j].id), distance_m});
-      AddComparison(objects[i], objects[j], &relations);
+      AddComparison(objects[i], objects[j], options.larger_min, &relations);
     }
-    KeepBest(SupportOf(objects[i], boxes[i], objects[j], boxes[j]), objects[j].id, &support[i]);
-    KeepBest(SupportOf(objects[j], boxes[j], objects[i], boxes[i]), objects[i].id, &support[j]);
+    KeepBest(SupportOf(objects[i], boxes[i], objects[j], boxes[j], options), objects[j].id,
+             &support[i]);
+    KeepBest(SupportOf(objects[j], boxes[j], objects[i], boxes[i], options), objects[i].id,
+             &support[j]);
   }
   for (size_t i = 0; i < objects.size(); ++i) {
     if (!support[i].has_value()) continue;

@@ -22,10 +22,11 @@ struct ObjectRelation {
 };
 
 /// ON and IN of boxes, at most one of both for an object: what lies in a box is IN it, but ON it
-/// when the points show that nothing covers or encloses it. NEAR below 0.5 m between the boxes
-/// along the axes, low id first; LARGER_THAN of near pairs by more than half.
+/// when the points show that nothing covers or encloses it. NEAR below a distance of the
+/// boxes along the axes, low id first; LARGER_THAN of near pairs by more than a ratio.
 /// Order: ascending by first, relation, second. Cost: n log n by a grid.
-std::vector<ObjectRelation> FindRelations(const std::vector<TrackedObject>& objects);
+std::vector<ObjectRelation> FindRelations(const std::vector<TrackedObject>& objects,
+                                          const RelationOptions& options = {});
 
 /// Pairs (object, object) that were in one picture; counts pictures. Input of CO_VISIBLE.
 /// Ids below are of ObjectTracker; `visible`: objects in one picture, ascending.

@@ -10,82 +10,15 @@
 #include <tuple>
 #include <utility>
 
+#include "ingest/objects/height_squares.h"
+
 namespace dsg::ingest {
 namespace {
 
-// Of a normal's z.
-constexpr float kLevelNormal = 0.85f;
-constexpr float kUprightNormal = 0.25f;
-// Of the angle between two normals of one plane: a cell's and its region's, two regions'.
-constexpr double kGrowRegionCosine = 0.94;
-constexpr double kJoinRegionCosine = 0.98;
-constexpr double kOffRegionM = 0.06;
-constexpr double kOffJoinedM = 0.10;
-constexpr double kRegionM2Min = 0.05;
-// Heights of floors and ceilings are kept in squares of this size.
-constexpr double kSquareM = 0.25;
+// Heights of floors are counted in bins, and what stands upright in columns.
 constexpr double kLevelBinM = 0.05;
-constexpr double kLevelsApartM = 2.2;
-// Upper floors have this share of the largest floor's surface.
-constexpr double kUpperFloorShare = 0.3;
-// Slabs between storeys are at least this thick where both sides are seen.
-constexpr double kSlabM = 0.4;
-// A wall goes this far beyond what is seen of it.
-constexpr double kWallEndM = 0.15;
-// What is no part of a wall's face belongs to it up to this share of its skin only.
-constexpr double kAcrossShare = 0.5;
-constexpr double kFaceCosine = 0.7;
-// Where nobody knows which side of a wall was seen: what is this near to it says so.
-constexpr double kRoomM = 3.0;
 constexpr double kColumnM = 0.1;
 constexpr size_t kColumnBins = 64;
-// How far beside a front the wall behind it is looked for.
-constexpr int kBesideColumns = 8;
-// A face behind a front begins at least this far behind it.
-constexpr double kBehindM = 0.25;
-// A ceiling goes on for so many squares beyond what is seen of it.
-constexpr int kCeilingReach = 4;
-
-using Square = std::pair<int, int>;
-
-Square SquareOf(const Eigen::Vector3d& point) {
-  return {static_cast<int>(std::floor(point.x() / kSquareM)),
-          static_cast<int>(std::floor(point.y() / kSquareM))};
-}
-
-struct MeanHeight {
-  double sum_m = 0.0;
-  int count = 0;
-  double Mean() const { return sum_m / count; }
-};
-
-/// Mean height of a level surface in each square that has some of it.
-using HeightMap = std::map<Square, MeanHeight>;
-
-void AddHeight(const Eigen::Vector3d& point, HeightMap* map) {
-  MeanHeight& height = (*map)[SquareOf(point)];
-  height.sum_m += point.z();
-  ++height.count;
-}
-
-/// Of the square or the nearest ones around it.
-std::optional<double> HeightAt(const HeightMap& map, const Eigen::Vector3d& point, int reach) {
-  const Square square = SquareOf(point);
-  for (int ring = 0; ring <= reach; ++ring) {
-    MeanHeight sum;
-    for (int dx = -ring; dx <= ring; ++dx) {
-      for (int dy = -ring; dy <= ring; ++dy) {
-        if (std::max(std::abs(dx), std::abs(dy)) != ring) continue;
-        const auto found = map.find({square.first + dx, square.second + dy});
-        if (found == map.end()) continue;
-        sum.sum_m += found->second.sum_m;
-        sum.count += found->second.count;
-      }
-    }
-    if (sum.count > 0) return sum.Mean();
-  }
-  return std::nullopt;
-}
 
 struct UprightRegion {
   std::vector<int> cells;
@@ -103,7 +36,9 @@ struct UprightRegion {
 class ShellFinder {
  public:
   ShellFinder(const CellGraph& graph, const SegmentOptions& options)
-      : graph_(graph), options_(options) {
+      : graph_(graph),
+        options_(options),
+        level_normal_(static_cast<float>(options.shell.level_normal)) {
     shell_.parts.assign(graph.size(), ShellPart::kNone);
     shell_.heights_m.assign(graph.size(), 0.0f);
     shell_.depths_m.assign(graph.size(), INFINITY);
@@ -130,11 +65,11 @@ class ShellFinder {
   ShellPart& Part(int cell) { return shell_.parts[static_cast<size_t>(cell)]; }
   bool LooksUp(int cell) const {
     const float z = Normal(cell).z();
-    return z >= kLevelNormal || (!graph_.is_oriented && z <= -kLevelNormal);
+    return z >= level_normal_ || (!graph_.is_oriented && z <= -level_normal_);
   }
   bool LooksDown(int cell) const {
     const float z = Normal(cell).z();
-    return z <= -kLevelNormal || (!graph_.is_oriented && z >= kLevelNormal);
+    return z <= -level_normal_ || (!graph_.is_oriented && z >= level_normal_);
   }
   bool IsFree(int cell) const {
     return shell_.parts[static_cast<size_t>(cell)] == ShellPart::kNone;
@@ -167,8 +102,8 @@ class ShellFinder {
       const double area_m2 = sum.count * CellArea();
       if (!is_peak || area_m2 < options_.floor_area_m2) continue;
       if (!levels.empty()) {
-        if (sum.Mean() - levels.back() < kLevelsApartM) continue;
-        if (area_m2 < kUpperFloorShare * largest_m2) continue;
+        if (sum.Mean() - levels.back() < options_.shell.storey_m) continue;
+        if (area_m2 < options_.shell.upper_floor_share * largest_m2) continue;
       }
       levels.push_back(sum.Mean());
       largest_m2 = std::max(largest_m2, area_m2);
@@ -216,9 +151,8 @@ class ShellFinder {
         continue;
       }
       const auto level = static_cast<size_t>(above - shell_.floors_m.begin() - 1);
-      constexpr int kReachSquares = 3;
-      const double floor_m =
-          HeightAt(floor_maps_[level], point, kReachSquares).value_or(shell_.floors_m[level]);
+      const double floor_m = HeightAt(floor_maps_[level], point, options_.shell.floor_squares)
+                                 .value_or(shell_.floors_m[level]);
       const double height_m = point.z() - floor_m;
       shell_.heights_m[static_cast<size_t>(i)] = static_cast<float>(height_m);
       if (height_m <= options_.floor_skin_m) Part(i) = ShellPart::kFloor;
@@ -251,10 +185,10 @@ class ShellFinder {
     for (int i = 0; i < count(); ++i) {
       const double floor_m =
           Point(i).z() - static_cast<double>(shell_.heights_m[static_cast<size_t>(i)]);
-      const double below_m =
-          HeightAt(ceiling_map_, Point(i), kCeilingReach).value_or(floor_m + usual_m) -
-          Point(i).z();
-      if (below_m < -kSlabM) continue;  // Another storey.
+      const double below_m = HeightAt(ceiling_map_, Point(i), options_.shell.ceiling_squares)
+                                 .value_or(floor_m + usual_m) -
+                             Point(i).z();
+      if (below_m < -options_.shell.slab_m) continue;  // Another storey.
       shell_.depths_m[static_cast<size_t>(i)] = static_cast<float>(below_m);
       if (Part(i) == ShellPart::kNone && below_m <= options_.ceiling_skin_m) {
         Part(i) = ShellPart::kCeiling;
@@ -278,14 +212,15 @@ class ShellFinder {
 
   bool IsUpright(int cell) const {
     const Eigen::Vector3f& normal = Normal(cell);
-    return std::abs(normal.z()) <= kUprightNormal && !normal.isZero();
+    return std::abs(normal.z()) <= static_cast<float>(options_.shell.upright_normal) &&
+           !normal.isZero();
   }
 
   // Whether all around a cell looks the same way: regions begin there.
   bool IsEven(int cell) const {
     const std::span<const int> around = graph_.NeighboursOf(cell);
     return around.size() >= 4 && std::all_of(around.begin(), around.end(), [&](int other) {
-             return graph_.CosineOf(cell, other) >= kGrowRegionCosine;
+             return graph_.CosineOf(cell, other) >= options_.shell.grow_cosine;
            });
   }
 
@@ -303,8 +238,9 @@ class ShellFinder {
       const double offset_m = region.Offset();
       for (const int other : graph_.NeighboursOf(region.cells[next])) {
         if ((*is_taken)[static_cast<size_t>(other)] || !IsUpright(other)) continue;
-        if (graph_.Cosine(Normal(other).cast<double>(), normal) < kGrowRegionCosine) continue;
-        if (std::abs(normal.dot(Point(other)) + offset_m) > kOffRegionM) continue;
+        if (graph_.Cosine(Normal(other).cast<double>(), normal) < options_.shell.grow_cosine)
+          continue;
+        if (std::abs(normal.dot(Point(other)) + offset_m) > options_.shell.off_face_m) continue;
         take(other);
       }
     }
@@ -334,7 +270,7 @@ class ShellFinder {
     int64_t balance = 0;
     for (int i = 0; i < count(); ++i) {
       const double distance_m = wall->DistanceTo(Point(i));
-      if (std::abs(distance_m) > kRoomM || !wall->IsBeside(Point(i), 0.0)) continue;
+      if (std::abs(distance_m) > options_.shell.room_m || !wall->IsBeside(Point(i), 0.0)) continue;
       balance += distance_m > 0.0 ? 1 : -1;
     }
     if (balance >= 0) return;
@@ -346,10 +282,10 @@ class ShellFinder {
   }
 
   bool MayJoin(const UprightRegion& a, const UprightRegion& b) const {
-    if (graph_.Cosine(a.Normal(), b.Normal()) < kJoinRegionCosine) return false;
+    if (graph_.Cosine(a.Normal(), b.Normal()) < options_.shell.join_cosine) return false;
     const ShellWall& wall = a.wall;
     const Eigen::Vector3d middle = b.point_sum / static_cast<double>(b.cells.size());
-    if (std::abs(wall.DistanceTo(middle)) > kOffJoinedM) return false;
+    if (std::abs(wall.DistanceTo(middle)) > options_.shell.off_joined_m) return false;
     const Eigen::Vector3d along = wall.Along();
     double begin_m = INFINITY;
     double end_m = -INFINITY;
@@ -368,7 +304,8 @@ class ShellFinder {
     for (int seed = 0; seed < count(); ++seed) {
       if (is_taken[static_cast<size_t>(seed)] || !IsUpright(seed) || !IsEven(seed)) continue;
       UprightRegion region = GrowRegion(seed, &is_taken);
-      if (static_cast<double>(region.cells.size()) * CellArea() < kRegionM2Min) continue;
+      if (static_cast<double>(region.cells.size()) * CellArea() < options_.shell.face_m2_min)
+        continue;
       regions.push_back(std::move(region));
     }
     std::stable_sort(regions.begin(), regions.end(),
@@ -413,25 +350,27 @@ class ShellFinder {
     for (const int cell : region.cells) columns.insert(column_of(cell));
     const int first = *columns.begin();
     const int last = *columns.rbegin();
+    const int beside = options_.shell.beside_columns;
     std::set<int> backed;
     std::set<int> before;
     std::set<int> after;
     for (int i = 0; i < count(); ++i) {
       if (region_sizes[static_cast<size_t>(i)] <= region.cells.size() || !IsFree(i)) continue;
       const double distance_m = wall.DistanceTo(Point(i));
-      if (distance_m > -kBehindM || distance_m < -options_.front_depth_m) continue;
-      if (graph_.Cosine(Normal(i).cast<double>(), wall.normal_map) < kGrowRegionCosine) continue;
+      if (distance_m > -options_.shell.behind_m || distance_m < -options_.front_depth_m) continue;
+      if (graph_.Cosine(Normal(i).cast<double>(), wall.normal_map) < options_.shell.grow_cosine)
+        continue;
       const int column = column_of(i);
       if (columns.contains(column)) backed.insert(column);
-      if (column < first && column >= first - kBesideColumns) before.insert(column);
-      if (column > last && column <= last + kBesideColumns) after.insert(column);
+      if (column < first && column >= first - beside) before.insert(column);
+      if (column > last && column <= last + beside) after.insert(column);
     }
     if (static_cast<double>(backed.size()) >=
         options_.front_share * static_cast<double>(columns.size())) {
       return true;
     }
     if (wall.end_m - wall.begin_m > options_.front_width_m) return false;
-    return 2 * std::max(before.size(), after.size()) >= static_cast<size_t>(kBesideColumns);
+    return 2 * std::max(before.size(), after.size()) >= static_cast<size_t>(beside);
   }
 
   // Near the ceiling, where there is one; else above `top_min_m`.
@@ -492,9 +431,8 @@ class ShellFinder {
     const auto high =
         heights.begin() + static_cast<int64_t>(0.98 * static_cast<double>(heights.size()));
     std::nth_element(heights.begin(), high, heights.end());
-    constexpr double kNearTopM = 0.3;
     const double top_min_m =
-        std::min(options_.wall_reach_m, static_cast<double>(*high) - kNearTopM);
+        std::min(options_.wall_reach_m, static_cast<double>(*high) - options_.shell.near_top_m);
     const std::vector<UprightRegion> regions = FindRegions();
     const std::vector<size_t> region_sizes = RegionSizes(regions);
     for (const UprightRegion& region : regions) {
@@ -517,13 +455,17 @@ class ShellFinder {
       const double distance_m = wall.DistanceTo(point);
       if (distance_m < -options_.wall_depth_m || distance_m > options_.wall_skin_m) return false;
       const double facing = std::abs(Normal(cell).cast<double>().dot(wall.normal_map));
-      if (facing < kFaceCosine && distance_m > kAcrossShare * options_.wall_skin_m) return false;
-      return wall.IsBeside(point, kWallEndM);
+      if (facing < options_.shell.across_cosine &&
+          distance_m > options_.shell.across_share * options_.wall_skin_m) {
+        return false;
+      }
+      return wall.IsBeside(point, options_.shell.wall_end_m);
     });
   }
 
   const CellGraph& graph_;
   const SegmentOptions& options_;
+  float level_normal_;
   RoomShell shell_;
   std::vector<HeightMap> floor_maps_;
   HeightMap ceiling_map_;

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ingest/objects/segment_options.h"
 
+#include "absl/strings/str_cat.h"
+
 namespace dsg::ingest {
 namespace {
 
-constexpr SegmentField kFields[] = {
+constexpr OptionField<SegmentOptions> kFields[] = {
     {"segment-cell", &SegmentOptions::cell_m, 0.02, 0.2,
      "Edge of the cells that the surface is thinned to, metres; the voxel if that is larger. Finer "
      "cells see the noise of depth cameras"},
@@ -96,13 +98,69 @@ constexpr SegmentField kFields[] = {
      "What touches walls and ceilings with this share of its surface is a remnant of them"},
 };
 
-}  // namespace
+constexpr OptionField<ShellOptions> kShellFields[] = {
+    {"segment-same-face", &ShellOptions::same_face_cosine, -1.0, 1.0,
+     "Normals are smoothed over neighbours within an angle of this cosine: 37 degrees keeps edges "
+     "sharp"},
+    {"segment-level", &ShellOptions::level_normal, 0.0, 1.0,
+     "What looks up or down is level, least z of the normal: within 32 degrees, noise of cells"},
+    {"segment-upright", &ShellOptions::upright_normal, 0.0, 1.0,
+     "What looks to the side is upright, greatest z of the normal: within 14 degrees"},
+    {"segment-grow", &ShellOptions::grow_cosine, 0.0, 1.0,
+     "An upright face goes on over cells that look as it does, cosine: within 20 degrees"},
+    {"segment-join", &ShellOptions::join_cosine, 0.0, 1.0,
+     "... and over other faces, cosine: within 11 degrees, since they are surer"},
+    {"segment-off-face", &ShellOptions::off_face_m, 0.0, 1.0,
+     "How far from a face its cells are, metres: noise of a cell"},
+    {"segment-off-joined", &ShellOptions::off_joined_m, 0.0, 1.0,
+     "... and other faces that it goes on in, metres: drift along a wall"},
+    {"segment-face-area", &ShellOptions::face_m2_min, 0.0, 10.0,
+     "Smaller faces are none, square metres: twenty cells"},
+    {"segment-storey", &ShellOptions::storey_m, 0.5, 20.0,
+     "Least height between two floors where the map has none, metres: a storey"},
+    {"segment-upper-floor", &ShellOptions::upper_floor_share, 0.0, 1.0,
+     "Least surface of an upper floor, of the largest below: less is a shelf or a landing"},
+    {"segment-slab", &ShellOptions::slab_m, 0.0, 5.0,
+     "What is this far above a ceiling is of another storey, metres: slabs are at least as thick"},
+    {"segment-floor-squares", &ShellOptions::floor_squares, 0, 100,
+     "How far around a place its floor is looked for, squares of 0.25 metres: below a table"},
+    {"segment-ceiling-squares", &ShellOptions::ceiling_squares, 0, 100,
+     "How far a ceiling goes on beyond what is seen of it, squares of 0.25 metres: lamps hide it"},
+    {"segment-near-top", &ShellOptions::near_top_m, 0.0, 5.0,
+     "Where no ceiling is seen, a wall reaches this near to the highest that is, metres: cameras "
+     "look at the top of some walls only"},
+    {"segment-wall-end", &ShellOptions::wall_end_m, 0.0, 5.0,
+     "A wall goes this far beyond what is seen of it, metres: corners are rounded off"},
+    {"segment-across-share", &ShellOptions::across_share, 0.0, 1.0,
+     "What is no part of a wall's face belongs to it up to this share of its skin: sides of things "
+     "that stand at it"},
+    {"segment-across", &ShellOptions::across_cosine, 0.0, 1.0,
+     "... which is what looks another way, cosine: by more than 45 degrees"},
+    {"segment-room", &ShellOptions::room_m, 0.1, 100.0,
+     "Where nobody knows which side of a wall was seen, what is this near to it says so, metres: a "
+     "small room"},
+    {"segment-behind", &ShellOptions::behind_m, 0.0, 5.0,
+     "A face behind a front begins this far behind it, metres: the least depth of a cupboard"},
+    {"segment-beside", &ShellOptions::beside_columns, 1, 1000,
+     "How far beside a front the wall behind it is looked for, columns of 0.1 metres: cupboards in "
+     "a row"},
+    {"segment-full-height", &ShellOptions::full_height_m, 0.0, 5.0,
+     "What reaches this near to floor and ceiling is a part of the building, metres: skirtings "
+     "hide the rest"},
+    {"segment-trim", &ShellOptions::trim_share, 0.0, 0.45,
+     "Share of the cells at either end of an extent that is left out: smear"},
+    {"segment-bend", &ShellOptions::bend_sine, 0.0, 1.0,
+     "A bend between patches of less counts as none, sine: 10 degrees, noise of normals"},
+    {"segment-up", &ShellOptions::up_normal, 0.0, 1.0,
+     "Patches that look up are seats and tables, least z of the normal: within 37 degrees"},
+};
 
-std::span<const SegmentField> SegmentFields() { return kFields; }
+}  // namespace
 
 std::vector<BoundOption> SegmentOptions::Bind() {
   std::vector<BoundOption> bound;
   BindFields<SegmentOptions>(kFields, this, &bound);
+  BindFields<ShellOptions>(kShellFields, &shell, &bound);
   return bound;
 }
 
@@ -110,7 +168,15 @@ absl::Status SegmentOptions::Validate() const { return ValidateOptions(*this); }
 
 std::string SegmentOptions::Digest() const {
   SegmentOptions options = *this;
-  return DigestFields(options.Bind(), {});
+  std::vector<BoundOption> own;
+  BindFields<SegmentOptions>(kFields, &options, &own);
+  std::vector<BoundOption> faces;
+  BindFields<ShellOptions>(kShellFields, &options.shell, &faces);
+  ShellOptions defaults;
+  std::vector<BoundOption> usual;
+  BindFields<ShellOptions>(kShellFields, &defaults, &usual);
+  const std::string tuning = DigestFields(faces, usual);
+  return absl::StrCat(DigestFields(own, {}), tuning.empty() ? "" : " ", tuning);
 }
 
 }  // namespace dsg::ingest

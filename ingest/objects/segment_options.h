@@ -2,7 +2,6 @@
 // What takes the surface of a room without labels apart: all its constants in one place.
 #pragma once
 
-#include <span>
 #include <string>
 #include <vector>
 
@@ -11,7 +10,38 @@
 
 namespace dsg::ingest {
 
-/// Units and ranges: SegmentFields().
+/// How faces are found in the surface, and which of them are walls, floors and ceilings.
+struct ShellOptions {
+  double same_face_cosine = 0.8;
+  double level_normal = 0.85;
+  double upright_normal = 0.25;
+  double grow_cosine = 0.94;
+  double join_cosine = 0.98;
+  double off_face_m = 0.06;
+  double off_joined_m = 0.10;
+  double face_m2_min = 0.05;
+
+  double storey_m = 2.2;
+  double upper_floor_share = 0.3;
+  double slab_m = 0.4;
+  int floor_squares = 3;
+  int ceiling_squares = 4;
+
+  double near_top_m = 0.3;
+  double wall_end_m = 0.15;
+  double across_share = 0.5;
+  double across_cosine = 0.7;
+  double room_m = 3.0;
+  double behind_m = 0.25;
+  int beside_columns = 8;
+  double full_height_m = 0.35;
+  double trim_share = 0.03;
+
+  double bend_sine = 0.17;
+  double up_normal = 0.8;
+};
+
+/// Units, ranges and reasons: the tables of the .cc file.
 struct SegmentOptions {
   double cell_m = 0.05;
 
@@ -58,19 +88,16 @@ struct SegmentOptions {
   double mount_m = 0.18;
   double shell_contact = 0.5;
 
+  ShellOptions shell;
+
   /// All numbers, for flags.
   std::vector<BoundOption> Bind();
 
   /// Errors: INVALID_ARGUMENT/FIELD_INVALID naming field, value and bounds.
   absl::Status Validate() const;
 
-  /// All values by name, as text.
+  /// The values by name, as text; of the shell, those that differ from the defaults.
   std::string Digest() const;
 };
-
-using SegmentField = OptionField<SegmentOptions>;
-
-/// All options of SegmentOptions.
-std::span<const SegmentField> SegmentFields();
 
 }  // namespace dsg::ingest

@@ -13,36 +13,12 @@
 namespace dsg::ingest {
 namespace {
 
-// Chi-square of three degrees of freedom, 1 %.
-constexpr double kGate = 11.3;
-constexpr double kGateM = 0.3;
-// Things stand still; poses and outlines do not, and their errors do not average out.
-constexpr double kStandM = 0.02;
-constexpr int64_t kWholeMin = 4;
-constexpr TimeNs kSpanMinNs = kNsPerSecond;
-constexpr double kViewpointsM = 0.15;
-constexpr double kSeenShareMin = 0.3;
-// Of sightings of a class of small things, and how many it takes to know.
-constexpr double kLargeShareMax = 0.15;
-constexpr int64_t kSightingsMin = 8;
-// Of what is not confirmed.
-constexpr TimeNs kForgetNs = 60 * kNsPerSecond;
-constexpr double kSameM = 0.08;
-constexpr double kOverlapM = 0.08;
-constexpr double kMissNearM = 0.5;
-constexpr double kMissFarM = 4.0;
-constexpr double kHiddenM = 0.05;
-constexpr int kMissBorderPx = 15;
-// A view that is off by a centimetre is as bad as one from so many centimetres further away.
-constexpr double kOffWeight = 20.0;
 // A box of one side's points is at least so thick.
 constexpr float kThinM = 0.005F;
 
 double MahalanobisSquared(const Eigen::Vector3d& apart_m, const Eigen::Matrix3d& covariance_m2) {
   return apart_m.dot(covariance_m2.ldlt().solve(apart_m));
 }
-
-Eigen::Matrix3d Standing() { return kStandM * kStandM * Eigen::Matrix3d::Identity(); }
 
 // Which of eight horizontal directions a thing is looked at from.
 size_t SideOf(const Eigen::Vector3d& camera_map, const Eigen::Vector3d& thing_map, size_t count) {
@@ -62,8 +38,9 @@ bool SmallObjects::IsSmallClass(int32_t class_id) const {
   if (known == sizes_.end()) return false;
   const ClassSize& size = known->second;
   const int64_t all = size.small_count + size.large_count;
-  return all >= kSightingsMin &&
-         static_cast<double>(size.large_count) <= kLargeShareMax * static_cast<double>(all);
+  return all >= options_.sighting_count_min &&
+         static_cast<double>(size.large_count) <=
+             options_.large_share_max * static_cast<double>(all);
 }
 
 void SmallObjects::See(const DepthFrame& frame, std::vector<SmallSighting> sightings) {
@@ -71,14 +48,14 @@ void SmallObjects::See(const DepthFrame& frame, std::vector<SmallSighting> sight
   for (const SmallSighting& seen : sightings) {
     ClassSize& size = sizes_[seen.class_id];
     // A part of a large thing looks small.
-    if (seen.span_m > kSmallSpanM) {
+    if (seen.span_m > span_m_max_) {
       ++size.large_count;
     } else if (seen.is_whole) {
       ++size.small_count;
     }
   }
   std::erase_if(sightings, [this](const SmallSighting& seen) {
-    return seen.span_m > kSmallSpanM || seen.is_held || IsLump(seen);
+    return seen.span_m > span_m_max_ || seen.is_held || IsLump(seen);
   });
   std::vector<int64_t> thing_of = Associate(sightings);
   for (size_t i = 0; i < sightings.size(); ++i) {
@@ -106,16 +83,18 @@ bool SmallObjects::IsLump(const SmallSighting& seen) const {
 
 // Nearest pairs first; each thing and each sighting once.
 std::vector<int64_t> SmallObjects::Associate(const std::vector<SmallSighting>& sightings) const {
+  const Eigen::Matrix3d standing_m2 =
+      options_.stand_m * options_.stand_m * Eigen::Matrix3d::Identity();
   std::vector<std::tuple<double, int64_t, size_t>> pairs;
   for (size_t i = 0; i < sightings.size(); ++i) {
     const SmallSighting& seen = sightings[i];
     for (const auto& [id, thing] : things_) {
       const Eigen::Vector3d apart_m = seen.center_map - thing.center_map;
-      if (thing.class_id != seen.class_id || apart_m.norm() > kGateM) continue;
+      if (thing.class_id != seen.class_id || apart_m.norm() > options_.gate_m) continue;
       const Eigen::Matrix3d covariance_m2 =
-          thing.information.inverse() + seen.covariance_m2 + Standing();
+          thing.information.inverse() + seen.covariance_m2 + standing_m2;
       const double distance = MahalanobisSquared(apart_m, covariance_m2);
-      if (distance <= kGate) pairs.emplace_back(distance, id, i);
+      if (distance <= options_.gate) pairs.emplace_back(distance, id, i);
     }
   }
   std::sort(pairs.begin(), pairs.end());
@@ -135,11 +114,12 @@ bool SmallObjects::IsNew(const SmallSighting& seen) const {
   return std::none_of(things_.begin(), things_.end(), [&](const auto& entry) {
     const Thing& thing = entry.second;
     return thing.class_id == seen.class_id &&
-           (thing.center_map - seen.center_map).norm() < 0.15 * (thing.span_m + seen.span_m);
+           (thing.center_map - seen.center_map).norm() <
+               options_.apart_share * (thing.span_m + seen.span_m);
   });
 }
 
-void SmallObjects::Update(const SmallSighting& seen, const DepthFrame& frame, Thing* thing) {
+void SmallObjects::Update(const SmallSighting& seen, const DepthFrame& frame, Thing* thing) const {
   thing->last_seen_ns = frame.time_ns;
   ++thing->seen_count;
   // Where half of a thing is does not tell where it is.
@@ -155,7 +135,7 @@ void SmallObjects::Update(const SmallSighting& seen, const DepthFrame& frame, Th
   thing->span_m = std::max(thing->span_m, seen.span_m);
   View& view = thing->views[SideOf(camera_map, thing->center_map, kSideCount)];
   const double off_m = (seen.center_map - thing->center_map).norm();
-  const double badness_m = seen.depth_m + kOffWeight * off_m;
+  const double badness_m = seen.depth_m + options_.off_weight * off_m;
   if (!view.points_map.empty() && view.badness_m <= badness_m) return;
   view.badness_m = badness_m;
   view.hidden_map = seen.hidden_map.cast<float>();
@@ -170,17 +150,20 @@ void SmallObjects::CountMisses(const DepthFrame& frame, const std::vector<int64_
   for (auto& [id, thing] : things_) {
     if (seen.contains(id)) continue;
     const Eigen::Vector3d center_camera = camera_T_map * thing.center_map;
-    if (center_camera.z() < kMissNearM || center_camera.z() > kMissFarM) continue;
+    if (center_camera.z() < options_.miss_near_m || center_camera.z() > options_.miss_far_m)
+      continue;
     const double u = camera.fx * center_camera.x() / center_camera.z() + camera.cx;
     const double v = camera.fy * center_camera.y() / center_camera.z() + camera.cy;
-    if (!(u >= kMissBorderPx && v >= kMissBorderPx && u < camera.width - kMissBorderPx &&
-          v < camera.height - kMissBorderPx)) {
+    const int border_px = options_.miss_border_px;
+    if (!(u >= border_px && v >= border_px && u < camera.width - border_px &&
+          v < camera.height - border_px)) {
       continue;
     }
     const size_t index =
         static_cast<size_t>(v) * static_cast<size_t>(camera.width) + static_cast<size_t>(u);
     const double reading_m = frame.depth_m[index];
-    if (reading_m <= 0.0 || reading_m < center_camera.z() - 0.5 * thing.span_m - kHiddenM) continue;
+    if (reading_m <= 0.0 || reading_m < center_camera.z() - 0.5 * thing.span_m - options_.hidden_m)
+      continue;
     if (frame.labels[index] >> 8 != thing.class_id) ++thing.missed_count;
   }
 }
@@ -194,10 +177,10 @@ void SmallObjects::Join(const std::vector<int64_t>& thing_of) {
       if (other >= 0 && other != thing_of[i]) thing.beside.insert(other);
     }
     for (auto other = things_.begin(); other != things_.end();) {
-      const bool is_same = other->first != thing_of[i] &&
-                           other->second.class_id == thing.class_id &&
-                           (other->second.center_map - thing.center_map).norm() <= kSameM &&
-                           !thing.beside.contains(other->first);
+      const bool is_same =
+          other->first != thing_of[i] && other->second.class_id == thing.class_id &&
+          (other->second.center_map - thing.center_map).norm() <= options_.same_m &&
+          !thing.beside.contains(other->first);
       if (!is_same) {
         ++other;
         continue;
@@ -213,7 +196,7 @@ void SmallObjects::Join(const std::vector<int64_t>& thing_of) {
 
 void SmallObjects::Tidy(TimeNs now_ns) {
   const size_t dropped_count = std::erase_if(things_, [&](const auto& entry) {
-    return !IsConfirmed(entry.second) && now_ns - entry.second.last_seen_ns > kForgetNs;
+    return !IsConfirmed(entry.second) && now_ns - entry.second.last_seen_ns > options_.forget_ns;
   });
   if (dropped_count == 0) return;
   for (auto& [id, thing] : things_) {
@@ -221,15 +204,16 @@ void SmallObjects::Tidy(TimeNs now_ns) {
   }
 }
 
-bool SmallObjects::IsConfirmed(const Thing& thing) {
-  if (thing.whole_count < kWholeMin) return false;
-  const bool is_looked_at_from_two = thing.cameras_map.sizes().norm() >= kViewpointsM;
-  if (!is_looked_at_from_two && thing.last_seen_ns - thing.first_seen_ns < kSpanMinNs) return false;
+bool SmallObjects::IsConfirmed(const Thing& thing) const {
+  if (thing.whole_count < options_.whole_count_min) return false;
+  const bool is_looked_at_from_two = thing.cameras_map.sizes().norm() >= options_.viewpoints_m;
+  if (!is_looked_at_from_two && thing.last_seen_ns - thing.first_seen_ns < options_.span_min_ns)
+    return false;
   const auto all = static_cast<double>(thing.seen_count + thing.missed_count);
-  return static_cast<double>(thing.seen_count) >= kSeenShareMin * all;
+  return static_cast<double>(thing.seen_count) >= options_.seen_share_min * all;
 }
 
-ObjectCluster SmallObjects::ClusterOf(const Thing& thing) {
+ObjectCluster SmallObjects::ClusterOf(const Thing& thing, const BoxOptions& box_options) {
   ObjectCluster cluster;
   cluster.class_id = thing.class_id;
   cluster.color = thing.color;
@@ -246,7 +230,8 @@ ObjectCluster SmallObjects::ClusterOf(const Thing& thing) {
       if (!is_back_seen) points.push_back({point + view.hidden_map, 1.0F});
     }
   }
-  const UprightBox box = FitUprightBox(points, LeastFootprintYaw(cluster.points_map));
+  const UprightBox box =
+      FitUprightBox(points, LeastFootprintYaw(cluster.points_map, box_options), box_options);
   cluster.map_T_box = box.map_T_box;
   cluster.size = box.size.cwiseMax(static_cast<double>(kThinM));
   cluster.center_map = box.map_T_box.position;
@@ -258,13 +243,14 @@ ObjectCluster SmallObjects::ClusterOf(const Thing& thing) {
   return cluster;
 }
 
-void SmallObjects::Place(std::vector<ObjectCluster>* clusters) const {
+void SmallObjects::Place(std::vector<ObjectCluster>* clusters,
+                         const BoxOptions& box_options) const {
   std::vector<ObjectCluster> things;
   std::vector<Box3d> boxes;
   for (const auto& [id, thing] : things_) {
     if (!IsConfirmed(thing) || !IsSmallClass(thing.class_id)) continue;
-    things.push_back(ClusterOf(thing));
-    boxes.push_back(Grown(AxisAlignedBox(things.back()), kOverlapM));
+    things.push_back(ClusterOf(thing, box_options));
+    boxes.push_back(Grown(AxisAlignedBox(things.back()), options_.overlap_m));
   }
   std::set<uint32_t> given;
   std::erase_if(*clusters, [&](const ObjectCluster& cluster) {
@@ -290,7 +276,7 @@ void SmallObjects::Place(std::vector<ObjectCluster>* clusters) const {
 }
 
 void SmallObjects::Forget(int32_t class_id, const Box3d& box_map, TimeNs gone_ns) {
-  const Box3d box = Grown(box_map, kHiddenM);
+  const Box3d box = Grown(box_map, options_.hidden_m);
   for (auto entry = things_.begin(); entry != things_.end();) {
     Thing& thing = entry->second;
     const bool is_it = thing.class_id == class_id && box.contains(thing.center_map);

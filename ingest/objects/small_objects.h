@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "ingest/objects/object_cluster.h"
+#include "ingest/objects/object_options.h"
 #include "ingest/objects/small_sightings.h"
 #include "ingest/trajectory/trajectory_change.h"
 
@@ -21,13 +22,16 @@ namespace dsg::ingest {
 /// Source: Schmid et al., 2024 (Khronos): sightings of labelled parts, tracked and then confirmed.
 class SmallObjects {
  public:
+  explicit SmallObjects(const SmallOptions& options = {})
+      : span_m_max_(options.span_m), options_(options.thing) {}
+
   /// Which known things a picture shows. `sightings`: of FindSmallSightings.
   void See(const DepthFrame& frame, std::vector<SmallSighting> sightings);
 
   /// Puts the confirmed things in the place of the clusters of their classes that they overlap: a
   /// thing is one object, and a lump of several is none. A cluster's instance goes to the thing, if
   /// it is one. Order of the result: as FindClusters.
-  void Place(std::vector<ObjectCluster>* clusters) const;
+  void Place(std::vector<ObjectCluster>* clusters, const BoxOptions& box_options = {}) const;
 
   /// Whether next to all sightings of a class were small.
   bool IsSmallClass(int32_t class_id) const;
@@ -76,13 +80,15 @@ class SmallObjects {
   std::vector<int64_t> Associate(const std::vector<SmallSighting>& sightings) const;
   bool IsLump(const SmallSighting& seen) const;
   bool IsNew(const SmallSighting& seen) const;
-  static void Update(const SmallSighting& seen, const DepthFrame& frame, Thing* thing);
+  void Update(const SmallSighting& seen, const DepthFrame& frame, Thing* thing) const;
   void CountMisses(const DepthFrame& frame, const std::vector<int64_t>& thing_of);
   void Join(const std::vector<int64_t>& thing_of);
   void Tidy(TimeNs now_ns);
-  static bool IsConfirmed(const Thing& thing);
-  static ObjectCluster ClusterOf(const Thing& thing);
+  bool IsConfirmed(const Thing& thing) const;
+  static ObjectCluster ClusterOf(const Thing& thing, const BoxOptions& box_options);
 
+  double span_m_max_;
+  SmallThingOptions options_;
   std::map<int32_t, ClassSize> sizes_;
   std::map<int64_t, Thing> things_;
   int64_t next_id_ = 0;

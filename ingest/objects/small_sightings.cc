@@ -12,44 +12,13 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr int kPixelsMin = 12;
-constexpr size_t kReadingsMin = 6;
-// Of its pixels.
-constexpr double kReadShareMin = 0.15;
-// Enough to tell where a large thing is.
-constexpr size_t kReadingsMax = 1500;
-constexpr size_t kPointsMax = 64;
-constexpr double kSightingNearM = 0.3;
-constexpr double kSightingFarM = 6.0;
-// Standard deviation of a reading: a depth camera, and a stereo pair at 0.1 m.
-constexpr double kNoiseM = 0.0025;
-constexpr double kNoisePerM = 0.002;
-constexpr double kStereoNoisePerM = 0.01;
-// Depths that fewer readings share than this part of the most frequent one are of something else.
-constexpr double kDepthBinM = 0.02;
-constexpr double kRareShare = 0.2;
-// Ends of each axis that labels which bled may reach.
-constexpr double kLabelTrimShare = 0.04;
-// Lower things, seen from above, show all of themselves; by their width.
-constexpr double kHighMin = 0.3;
-// A label's outline is off by so many pixels.
-constexpr double kOutlinePx = 2.0;
-// How far off its guessed back is, by its diagonal.
-constexpr double kBackShare = 0.12;
-constexpr int kBorderPx = 3;
-// Beside the outline depth cameras are blind; further away is something else.
+// Beside the outline depth cameras are blind; further away is something else. Pixels.
 constexpr std::array<int, 3> kOutsidePx = {3, 5, 7};
-// Nearer by more, and above the thing's foot by more: it hides some of it.
-constexpr double kBeforeM = 0.05;
-constexpr double kAboveFootM = 0.03;
-constexpr double kHiddenShareMax = 0.12;
-constexpr double kScatteredShareMax = 0.25;
-constexpr double kHandM = 0.3;
-constexpr double kHeldShareMin = 0.08;
 
 class Part {
  public:
-  Part(const DepthFrame& frame, const LabelPart& part) : frame_(frame), part_(part) {}
+  Part(const DepthFrame& frame, const LabelPart& part, const SmallOptions& options)
+      : frame_(frame), part_(part), span_m_max_(options.span_m), options_(options.sighting) {}
 
   std::optional<SmallSighting> Sight() {
     if (!FindDepth()) return std::nullopt;
@@ -59,7 +28,7 @@ class Part {
     FindBox(&seen);
     seen.covariance_m2 = Covariance(seen);
     LookAround(&seen);
-    if (seen.span_m <= kSmallSpanM) AddPoints(&seen);
+    if (seen.span_m <= span_m_max_) AddPoints(&seen);
     return seen;
   }
 
@@ -75,12 +44,15 @@ class Part {
            static_cast<size_t>(column);
   }
 
+  size_t CountMax() const { return static_cast<size_t>(options_.reading_count_max); }
+
   bool IsDynamic(size_t index) const {
     return !frame_.dynamic.empty() && frame_.dynamic[index] != 0;
   }
 
   double NoiseAt(double depth_m) const {
-    return kNoiseM + (frame_.is_stereo ? kStereoNoisePerM : kNoisePerM) * depth_m * depth_m;
+    const double per_m2 = frame_.is_stereo ? options_.stereo_noise_per_m2 : options_.noise_per_m2;
+    return options_.noise_m + per_m2 * depth_m * depth_m;
   }
 
   Eigen::Vector3d PointOf(const Reading& reading) const {
@@ -93,7 +65,7 @@ class Part {
 
   // The readings of the depths that most pixels share.
   bool FindDepth() {
-    const size_t step = 1 + static_cast<size_t>(part_.pixel_count) / kReadingsMax;
+    const size_t step = 1 + static_cast<size_t>(part_.pixel_count) / CountMax();
     size_t count = 0, looked = 0;
     for (const PixelRun& run : part_.runs) {
       for (int column = run.begin; column < run.end; ++column) {
@@ -107,21 +79,24 @@ class Part {
     }
     looked_count_ = looked;
     const auto read = static_cast<double>(readings_.size());
-    if (readings_.size() < kReadingsMin || read < kReadShareMin * static_cast<double>(looked)) {
+    if (std::ssize(readings_) < options_.reading_count_min ||
+        read < options_.read_share_min * static_cast<double>(looked)) {
       return false;
     }
     KeepSharedDepths();
-    return readings_.size() >= kReadingsMin && low_m_ >= kSightingNearM && high_m_ <= kSightingFarM;
+    return std::ssize(readings_) >= options_.reading_count_min && low_m_ >= options_.near_m &&
+           high_m_ <= options_.far_m;
   }
 
   void KeepSharedDepths() {
     std::vector<double> depths;
     for (const Reading& reading : readings_) depths.push_back(reading.depth_m);
     std::nth_element(depths.begin(), depths.begin() + std::ssize(depths) / 2, depths.end());
-    const double bin_m = std::max(kDepthBinM, 1.5 * NoiseAt(depths[depths.size() / 2]));
+    const double bin_m = std::max(options_.depth_bin_m, 1.5 * NoiseAt(depths[depths.size() / 2]));
     // All that is too far to be of use is in one bin.
-    const auto bin_of = [bin_m](double depth_m) {
-      return static_cast<int>(std::min(depth_m, 2.0 * kSightingFarM) / bin_m);
+    const double far_m = 2.0 * options_.far_m;
+    const auto bin_of = [bin_m, far_m](double depth_m) {
+      return static_cast<int>(std::min(depth_m, far_m) / bin_m);
     };
     int first = bin_of(readings_.front().depth_m), last = first;
     for (const Reading& reading : readings_) {
@@ -133,7 +108,7 @@ class Part {
       ++counts[static_cast<size_t>(bin_of(reading.depth_m) - first)];
     }
     const auto peak = std::max_element(counts.begin(), counts.end());
-    const double least = kRareShare * *peak;
+    const double least = options_.rare_share * *peak;
     auto begin = peak, end = peak + 1;
     while (begin != counts.begin() && *std::prev(begin) > least) --begin;
     while (end != counts.end() && *end > least) ++end;
@@ -163,7 +138,7 @@ class Part {
     for (const Eigen::Vector3d& point : points_map_) values.push_back(axis.dot(point));
     std::sort(values.begin(), values.end());
     const auto cut =
-        static_cast<size_t>(std::ceil(kLabelTrimShare * static_cast<double>(values.size())));
+        static_cast<size_t>(std::ceil(options_.trim_share * static_cast<double>(values.size())));
     const size_t low = std::min(cut, (values.size() - 1) / 2);
     return {values[low], values[values.size() - 1 - low]};
   }
@@ -176,15 +151,15 @@ class Part {
     const auto [near_m, far_m] = RangeAlong(along);
     const auto [left_m, right_m] = RangeAlong(Eigen::Vector3d(-along.y(), along.x(), 0.0));
     const double width_m = right_m - left_m;
-    if (box_map_.sizes().z() < kHighMin * width_m) return Eigen::Vector3d::Zero();
-    return std::clamp(width_m - (far_m - near_m), 0.0, kSmallSpanM) * along;
+    if (box_map_.sizes().z() < options_.high_min * width_m) return Eigen::Vector3d::Zero();
+    return std::clamp(width_m - (far_m - near_m), 0.0, span_m_max_) * along;
   }
 
   // Along the ray the back is not seen; across it the outline wanders.
   Eigen::Matrix3d Covariance(const SmallSighting& seen) const {
     const Eigen::Vector3d ray = (seen.center_map - frame_.map_T_camera.position).normalized();
-    const double across_m = 0.01 + kOutlinePx * seen.depth_m / frame_.camera.fx;
-    const double back_m = kBackShare * std::min(seen.span_m, kSmallSpanM);
+    const double across_m = 0.01 + options_.outline_px * seen.depth_m / frame_.camera.fx;
+    const double back_m = options_.back_share * std::min(seen.span_m, span_m_max_);
     const double along_m = std::hypot(across_m, 0.5 * NoiseAt(seen.depth_m), back_m);
     const Eigen::Matrix3d ray_ray = ray * ray.transpose();
     return across_m * across_m * (Eigen::Matrix3d::Identity() - ray_ray) +
@@ -202,14 +177,15 @@ class Part {
       const size_t index = IndexOf(x, y);
       const double depth_m = frame_.depth_m[index];
       if (depth_m <= 0.0 || frame_.labels[index] == part_.label) continue;
-      const double margin_m = kBeforeM + 3.0 * NoiseAt(low_m_);
+      const double margin_m = options_.before_m + 3.0 * NoiseAt(low_m_);
       if (IsDynamic(index)) {
-        if (std::abs(depth_m - 0.5 * (low_m_ + high_m_)) <= kHandM) return Beside::kPerson;
+        if (std::abs(depth_m - 0.5 * (low_m_ + high_m_)) <= options_.hand_m) return Beside::kPerson;
         return depth_m < low_m_ ? Beside::kBefore : Beside::kFree;
       }
       if (depth_m >= low_m_ - margin_m) return Beside::kFree;
       const double height_m = PointOf({x, y, depth_m}).z();
-      return height_m > box_map_.min().z() + kAboveFootM ? Beside::kBefore : Beside::kFree;
+      return height_m > box_map_.min().z() + options_.above_foot_m ? Beside::kBefore
+                                                                   : Beside::kFree;
     }
     return Beside::kNothing;
   }
@@ -223,7 +199,7 @@ class Part {
       look(run.begin, run.row, -1, 0);
       look(run.end - 1, run.row, 1, 0);
     }
-    const size_t step = 1 + part_.runs.size() / kReadingsMax;
+    const size_t step = 1 + part_.runs.size() / CountMax();
     for (size_t i = 0; i < part_.runs.size(); i += step) {
       const PixelRun& run = part_.runs[i];
       if (run.row - part_.top > 1 && part_.bottom - run.row > 1) continue;
@@ -237,16 +213,18 @@ class Part {
     };
     const double dynamic_share =
         static_cast<double>(dynamic_count_) / static_cast<double>(looked_count_);
-    seen->is_held = share(Beside::kPerson) >= kHeldShareMin || dynamic_share >= 2 * kHeldShareMin;
-    const bool is_inside = part_.left >= kBorderPx && part_.top >= kBorderPx &&
-                           part_.right < frame_.camera.width - kBorderPx &&
-                           part_.bottom < frame_.camera.height - kBorderPx;
-    seen->is_whole = is_inside && !seen->is_held && share(Beside::kBefore) <= kHiddenShareMax &&
-                     part_.scattered_count <= kScatteredShareMax * part_.pixel_count;
+    seen->is_held = share(Beside::kPerson) >= options_.held_share_min ||
+                    dynamic_share >= 2 * options_.held_share_min;
+    const bool is_inside = part_.left >= options_.border_px && part_.top >= options_.border_px &&
+                           part_.right < frame_.camera.width - options_.border_px &&
+                           part_.bottom < frame_.camera.height - options_.border_px;
+    seen->is_whole = is_inside && !seen->is_held &&
+                     share(Beside::kBefore) <= options_.hidden_share_max &&
+                     part_.scattered_count <= options_.scattered_share_max * part_.pixel_count;
   }
 
   void AddPoints(SmallSighting* seen) const {
-    const size_t step = 1 + points_map_.size() / kPointsMax;
+    const size_t step = 1 + points_map_.size() / static_cast<size_t>(options_.point_count_max);
     const Box3d box(box_map_.min().array() - 1e-9, box_map_.max().array() + 1e-9);
     std::array<std::vector<uint8_t>, 3> channels;
     for (size_t i = 0; i < points_map_.size(); i += step) {
@@ -270,6 +248,8 @@ class Part {
 
   const DepthFrame& frame_;
   const LabelPart& part_;
+  double span_m_max_;
+  const SightingOptions& options_;
   std::vector<Reading> readings_;
   std::vector<Eigen::Vector3d> points_map_;
   Box3d box_map_;
@@ -282,10 +262,11 @@ class Part {
 }  // namespace
 
 std::vector<SmallSighting> FindSmallSightings(const DepthFrame& frame,
-                                              const std::vector<int32_t>& class_ids) {
+                                              const std::vector<int32_t>& class_ids,
+                                              const SmallOptions& options) {
   std::vector<SmallSighting> sightings;
-  for (const LabelPart& part : FindLabelParts(frame, class_ids, kPixelsMin)) {
-    std::optional<SmallSighting> seen = Part(frame, part).Sight();
+  for (const LabelPart& part : FindLabelParts(frame, class_ids, options.sighting.pixel_count_min)) {
+    std::optional<SmallSighting> seen = Part(frame, part, options).Sight();
     if (seen.has_value()) sightings.push_back(std::move(*seen));
   }
   return sightings;

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "ingest/objects/small_options.h"
 #include "ingest/sensor/depth_frame.h"
 #include "schema/model/geometry.h"
 #include "schema/model/node.h"
@@ -30,18 +31,16 @@ struct SmallSighting {
   bool is_whole = false;
   /// It touches a person who is about as far away.
   bool is_held = false;
-  /// At most 64 of its surface, none of things larger than kSmallSpanM.
+  /// Some of its surface, none of things larger than SmallOptions::span_m.
   std::vector<Eigen::Vector3f> points_map;
   Color color{};
 };
-
-/// What a person carries in a hand, with what a label adds at the outline.
-inline constexpr double kSmallSpanM = 0.33;
 
 /// Of the classes among `class_ids` (ascending). Readings of what is before or behind a thing,
 /// where its label bled, are left out: the depth that most of its pixels share counts. Empty for
 /// pictures without labels. Order: ascending by first pixel.
 std::vector<SmallSighting> FindSmallSightings(const DepthFrame& frame,
-                                              const std::vector<int32_t>& class_ids);
+                                              const std::vector<int32_t>& class_ids,
+                                              const SmallOptions& options = {});
 
 }  // namespace dsg::ingest

@@ -14,10 +14,6 @@
 namespace dsg::ingest {
 namespace {
 
-// A bend of less counts as none, sine.
-constexpr double kBendMin = 0.17;
-// Of a normal's z, of patches that look up.
-constexpr double kPatchUp = 0.8;
 // Directions that the extent of a patch is known in: half a turn.
 constexpr int kDirections = 12;
 
@@ -226,7 +222,7 @@ class PatchJoiner {
 
   bool IsTable(const PatchInfo& patch) const {
     const double up = graph_.is_oriented ? patch.normal_map.z() : std::abs(patch.normal_map.z());
-    return up > kPatchUp && patch.height_m > options_.seat_height_m &&
+    return up > options_.shell.up_normal && patch.height_m > options_.seat_height_m &&
            patch.area_m2 >= options_.table_area_m2 &&
            patch.extent.Sides().first >= options_.table_width_m;
   }
@@ -243,7 +239,8 @@ class PatchJoiner {
     if (graph_.Cosine(a.normal_map, b.normal_map) >= std::cos(options_.flat_rad)) {
       return contact.strength >= options_.convex_contact;
     }
-    const bool is_convex = BendOf(a, b, contact) <= kBendMin && BendOf(b, a, contact) <= kBendMin;
+    const bool is_convex = BendOf(a, b, contact) <= options_.shell.bend_sine &&
+                           BendOf(b, a, contact) <= options_.shell.bend_sine;
     if (is_convex) return contact.strength >= options_.convex_contact;
     return contact.strength >= options_.concave_contact;
   }

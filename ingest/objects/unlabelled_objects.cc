@@ -13,14 +13,6 @@
 namespace dsg::ingest {
 namespace {
 
-// Of a normal's z, of faces that are oblique.
-constexpr double kUprightMax = 0.25;
-constexpr double kLevelMin = 0.85;
-// What goes from here above the floor to here below the ceiling is a part of the building.
-constexpr double kFullHeightM = 0.35;
-// Cells at either end of an extent that may be smear.
-constexpr double kTrimShare = 0.03;
-
 /// What a group of cells is to the room around it.
 struct RoomAroundGroup {
   double bottom_m = 0.0;
@@ -38,7 +30,8 @@ double Quantile(std::vector<double> values, double share) {
   return values[static_cast<size_t>(index)];
 }
 
-RoomAroundGroup RoomAround(const CellGraph& graph, const RoomShell& shell, const CellGroup& group) {
+RoomAroundGroup RoomAround(const CellGraph& graph, const RoomShell& shell, const CellGroup& group,
+                           double trim_share) {
   RoomAroundGroup result;
   std::vector<double> heights;
   for (const int cell : group) {
@@ -56,8 +49,8 @@ RoomAroundGroup RoomAround(const CellGraph& graph, const RoomShell& shell, const
   result.shell_contact =
       static_cast<double>(std::count_if(group.begin(), group.end(), touches_shell)) /
       static_cast<double>(group.size());
-  result.bottom_m = Quantile(heights, kTrimShare);
-  result.top_m = Quantile(std::move(heights), 1.0 - kTrimShare);
+  result.bottom_m = Quantile(heights, trim_share);
+  result.top_m = Quantile(std::move(heights), 1.0 - trim_share);
   for (const ShellWall& wall : shell.walls) {
     std::vector<double> distances;
     size_t beside = 0;
@@ -68,7 +61,7 @@ RoomAroundGroup RoomAround(const CellGraph& graph, const RoomShell& shell, const
     }
     if (2 * beside < group.size()) continue;
     result.before_wall_m =
-        std::min(result.before_wall_m, Quantile(std::move(distances), 1.0 - kTrimShare));
+        std::min(result.before_wall_m, Quantile(std::move(distances), 1.0 - trim_share));
   }
   return result;
 }
@@ -82,7 +75,8 @@ bool MayBeObject(const RoomAroundGroup& around, const ObjectCluster& cluster,
   if (sides[0] < options.sliver_m && sides[1] < options.strip_share * sides[2]) return false;
   if (around.top_m < options.height_min_m || around.before_wall_m < options.mount_m) return false;
   if (around.shell_contact >= options.shell_contact) return false;
-  if (around.depth_m < kFullHeightM && around.bottom_m < kFullHeightM) return false;
+  if (around.depth_m < options.shell.full_height_m && around.bottom_m < options.shell.full_height_m)
+    return false;
   const double height_m = around.top_m - around.bottom_m;
   return around.depth_m + height_m > 2.0 * options.height_min_m;
 }
@@ -99,7 +93,7 @@ bool IsSlopedCeiling(const CellGraph& graph, const RoomShell& shell, const CellG
     height_m += static_cast<double>(shell.heights_m[static_cast<size_t>(cell)]);
   }
   const double steepness = std::abs(normal.normalized().z());
-  return steepness > kUprightMax && steepness < kLevelMin &&
+  return steepness > options.shell.upright_normal && steepness < options.shell.level_normal &&
          height_m / static_cast<double>(patch.size()) >= options.slope_height_m;
 }
 
@@ -108,11 +102,12 @@ bool IsSlopedCeiling(const CellGraph& graph, const RoomShell& shell, const CellG
 std::vector<ObjectCluster> FindUnlabelledObjects(const std::vector<const MeshBlock*>& mesh,
                                                  int32_t class_id, double voxel_m,
                                                  const std::vector<double>& floors_m,
-                                                 const SegmentOptions& options) {
+                                                 const SegmentOptions& options,
+                                                 const PieceOptions& pieces) {
   if (!(voxel_m > 0.0) || !std::isfinite(voxel_m)) return {};
   const double cell_m = std::max(voxel_m, options.cell_m);
   const ObjectSurface surface = GatherAllSurface(mesh, class_id, cell_m);
-  const CellGraph graph = MakeCellGraph(surface, cell_m);
+  const CellGraph graph = MakeCellGraph(surface, cell_m, options.shell.same_face_cosine);
   const RoomShell shell = FindRoomShell(graph, floors_m, options);
   std::vector<bool> is_free(graph.size());
   for (size_t i = 0; i < graph.size(); ++i) is_free[i] = shell.parts[i] == ShellPart::kNone;
@@ -125,10 +120,12 @@ std::vector<ObjectCluster> FindUnlabelledObjects(const std::vector<const MeshBlo
     return static_cast<double>(group.size()) * cell_m * cell_m < options.area_min_m2;
   });
   const std::vector<ObjectCluster> candidates =
-      ClustersOfGroups(surface, groups, shell.floors_m, cell_m);
+      ClustersOfGroups(surface, groups, shell.floors_m, cell_m, pieces);
   std::vector<ObjectCluster> clusters;
   for (size_t i = 0; i < groups.size(); ++i) {
-    if (!MayBeObject(RoomAround(graph, shell, groups[i]), candidates[i], options)) continue;
+    if (!MayBeObject(RoomAround(graph, shell, groups[i], options.shell.trim_share), candidates[i],
+                     options))
+      continue;
     clusters.push_back(candidates[i]);
   }
   SortClusters(&clusters);

@@ -19,6 +19,7 @@ namespace dsg::ingest {
 std::vector<ObjectCluster> FindUnlabelledObjects(const std::vector<const MeshBlock*>& mesh,
                                                  int32_t class_id, double voxel_m,
                                                  const std::vector<double>& floors_m,
-                                                 const SegmentOptions& options);
+                                                 const SegmentOptions& options,
+                                                 const PieceOptions& pieces = {});
 
 }  // namespace dsg::ingest

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "ingest/objects/object_options.h"
 #include "schema/model/geometry.h"
 
 namespace dsg::ingest {
@@ -22,12 +23,14 @@ struct WeightedPoint {
   float weight = 1.0f;
 };
 
-/// Radians in (-pi/4, pi/4]; 0 unless the footprint gets at least 10 % smaller by turning.
+/// Radians in (-pi/4, pi/4]; 0 unless the footprint gets clearly smaller by turning.
 /// Cost: some 60 passes over the points, at most 500 of them.
-double LeastFootprintYaw(const std::vector<Eigen::Vector3f>& points);
+double LeastFootprintYaw(const std::vector<Eigen::Vector3f>& points,
+                         const BoxOptions& options = {});
 
-/// Leaves out 1 % of the weight at either end of each axis. Requires: points, weights above 0.
-UprightBox FitUprightBox(const std::vector<WeightedPoint>& points, double yaw_rad);
+/// Leaves out some of the weight at either end of each axis. Requires: points, weights above 0.
+UprightBox FitUprightBox(const std::vector<WeightedPoint>& points, double yaw_rad,
+                         const BoxOptions& options = {});
 
 /// The same box with its lower side at `z_m`.
 void ExtendDownTo(double z_m, UprightBox* box);

@@ -13,17 +13,16 @@ namespace {
 
 // Of each edge; the count tells of the others.
 constexpr size_t kIntervalsMax = 16;
-// A joint less visible than this is where the network thinks a hand should be.
-constexpr double kVisibilityMin = 0.3;
 
-void AddHand(const PersonObservation& seen, const TimedPose& pose, int joint,
+void AddHand(const PersonObservation& seen, const TimedPose& pose, int joint, double visibility_min,
              std::vector<TimedPoint>* path) {
   const auto index = static_cast<size_t>(joint);
-  if (!seen.has_joints || seen.joint_visibility[index] < kVisibilityMin) return;
+  if (!seen.has_joints || seen.joint_visibility[index] < visibility_min) return;
   path->push_back({pose.time_ns, pose.map_T_agent * seen.joints_torso[index]});
 }
 
-std::vector<AgentPath> PathsOf(const PersonTracker& tracker, const PeopleTold& told) {
+std::vector<AgentPath> PathsOf(const PersonTracker& tracker, const PeopleTold& told,
+                               double visibility_min) {
   std::vector<AgentPath> paths;
   for (const auto& [number, person] : told.people()) {
     const std::vector<TimedPose> poses = told.PosesOf(person);
@@ -34,8 +33,8 @@ std::vector<AgentPath> PathsOf(const PersonTracker& tracker, const PeopleTold& t
     for (size_t i = 0; i < poses.size(); ++i) {
       const TimedPose& pose = poses[i];
       path.torso.push_back({pose.time_ns, pose.map_T_agent.position});
-      AddHand(track.observations[i], pose, kLeftHand, &path.left_hand);
-      AddHand(track.observations[i], pose, kRightHand, &path.right_hand);
+      AddHand(track.observations[i], pose, kLeftHand, visibility_min, &path.left_hand);
+      AddHand(track.observations[i], pose, kRightHand, visibility_min, &path.right_hand);
     }
     paths.push_back(std::move(path));
   }
@@ -90,7 +89,7 @@ void AddEdges(const std::vector<Contact>& contacts, bool is_hand, std::vector<Ed
 std::vector<Edge> FindContactEdges(const PersonTracker& tracker, const PeopleTold& told,
                                    const std::vector<ThingBox>& things,
                                    const ContactOptions& options) {
-  return FindContactEdges(PathsOf(tracker, told), things, options);
+  return FindContactEdges(PathsOf(tracker, told, options.visibility_min), things, options);
 }
 
 std::vector<Edge> FindContactEdges(const std::vector<AgentPath>& paths,

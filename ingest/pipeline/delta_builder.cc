@@ -10,11 +10,22 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kHumanHalfWidthM = 0.25;
-constexpr double kHumanHeightM = 1.8;
-constexpr double kRobotHalfSizeM = 0.25;
+constexpr OptionField<AgentBodyOptions> kBodyFields[] = {
+    {"agent-half-width", &AgentBodyOptions::human_half_width_m, 0.01, 5.0,
+     "Half the width of a person of a track, metres: of adults"},
+    {"agent-height", &AgentBodyOptions::human_height_m, 0.1, 5.0,
+     "Height of a person of a track, metres: of adults; helmets may be worn higher"},
+    {"agent-robot-half-size", &AgentBodyOptions::robot_half_size_m, 0.01, 50.0,
+     "Half the size of a robot without --robot-cad, metres: a small wheeled one"},
+};
 
 }  // namespace
+
+std::vector<BoundOption> AgentBodyOptions::Bind() {
+  std::vector<BoundOption> bound;
+  BindFields<AgentBodyOptions>(kBodyFields, this, &bound);
+  return bound;
+}
 
 Node DeltaBuilder::MakeNode(NodeId id, const PoseMeasurement& first) const {
   Node node;
@@ -28,12 +39,13 @@ Node DeltaBuilder::MakeNode(NodeId id, const PoseMeasurement& first) const {
   node.agent.emplace();
   if (first.agent_kind == kinds::kHuman) {
     // A helmet may be worn higher than the usual height; the box reaches up to it.
-    const double top = std::max(kHumanHeightM - feet_below_m_, 0.0);
-    node.box_node = {Eigen::Vector3d(-kHumanHalfWidthM, -kHumanHalfWidthM, -feet_below_m_),
-                     Eigen::Vector3d(kHumanHalfWidthM, kHumanHalfWidthM, top)};
+    const double top = std::max(options_.human_height_m - feet_below_m_, 0.0);
+    const double half_m = options_.human_half_width_m;
+    node.box_node = {Eigen::Vector3d(-half_m, -half_m, -feet_below_m_),
+                     Eigen::Vector3d(half_m, half_m, top)};
   } else {
-    node.box_node = {Eigen::Vector3d::Constant(-kRobotHalfSizeM),
-                     Eigen::Vector3d::Constant(kRobotHalfSizeM)};
+    node.box_node = {Eigen::Vector3d::Constant(-options_.robot_half_size_m),
+                     Eigen::Vector3d::Constant(options_.robot_half_size_m)};
     if (robot_model_.has_value()) SetRobotModel(*robot_model_, &node);
   }
   return node;

@@ -9,19 +9,30 @@
 #include <utility>
 #include <vector>
 
+#include "ingest/config/option_field.h"
 #include "ingest/log/log_source.h"
 #include "ingest/pipeline/robot_model.h"
 #include "schema/model/graph_delta.h"
 
 namespace dsg::ingest {
 
+/// Bodies of agents of which the log says positions alone.
+struct AgentBodyOptions {
+  double human_half_width_m = 0.25;
+  double human_height_m = 1.8;
+  double robot_half_size_m = 0.25;
+
+  std::vector<BoundOption> Bind();
+};
+
 /// Threads: one caller at a time.
 class DeltaBuilder {
  public:
   /// `feet_below_m`: LogInfo::feet_below_m. `robot_model`: nullopt = unknown; else its asset goes
   /// into the first delta.
-  explicit DeltaBuilder(double feet_below_m, std::optional<RobotModel> robot_model = std::nullopt)
-      : feet_below_m_(feet_below_m), robot_model_(std::move(robot_model)) {}
+  explicit DeltaBuilder(double feet_below_m, std::optional<RobotModel> robot_model = std::nullopt,
+                        const AgentBodyOptions& options = {})
+      : feet_below_m_(feet_below_m), robot_model_(std::move(robot_model)), options_(options) {}
 
   /// The first pose of an agent also makes its node.
   void AddPose(NodeId agent, const PoseMeasurement& measurement);
@@ -54,6 +65,7 @@ class DeltaBuilder {
 
   double feet_below_m_;
   std::optional<RobotModel> robot_model_;
+  AgentBodyOptions options_;
   bool is_model_told_ = false;
   int64_t pose_count_ = 0;
   /// Ascending by id, so deltas are sorted.

@@ -7,11 +7,12 @@
 namespace dsg::ingest {
 
 absl::StatusOr<DetectorFeed> DetectorFeed::Make(const LogInfo& info,
-                                                const PersonDetectorOptions& options) {
+                                                const PersonDetectorOptions& options,
+                                                TimeNs period_ns) {
   for (const char* channel : {"color0", "cam0"}) {
     if (!info.channel_counts.contains(channel)) continue;
     DSG_ASSIGN_OR_RETURN(std::unique_ptr<PersonDetector> detector, PersonDetector::Load(options));
-    return DetectorFeed(channel, std::move(detector));
+    return DetectorFeed(channel, std::move(detector), period_ns);
   }
   return MakeError(Reason::kFieldInvalid,
                    absl::StrCat("--detector ", options.model_file, ": ", info.path,
@@ -28,7 +29,7 @@ absl::StatusOr<std::vector<HumanDetection>> DetectorFeed::Look(const Measurement
     ++broken_image_count_;
     return seen;
   }
-  next_ns_ = image->time_ns + kPeriodNs;
+  next_ns_ = image->time_ns + period_ns_;
   DSG_ASSIGN_OR_RETURN(seen, detector_->Detect(*picture, image->time_ns, channel_, next_id_));
   next_id_ += static_cast<int64_t>(seen.size());
   return seen;

@@ -18,15 +18,13 @@ namespace dsg::ingest {
 /// Threads: one caller at a time.
 class DetectorFeed {
  public:
-  static constexpr TimeNs kPeriodNs = 190'000'000;
-
   /// Sees nobody.
   DetectorFeed() = default;
 
-  /// Looks at color0, or at cam0 where the log has no color0.
+  /// Looks at color0, or at cam0 where the log has no color0, at most every `period_ns`.
   /// Errors: of PersonDetector::Load; FIELD_INVALID when the log has neither.
   static absl::StatusOr<DetectorFeed> Make(const LogInfo& info,
-                                           const PersonDetectorOptions& options);
+                                           const PersonDetectorOptions& options, TimeNs period_ns);
 
   /// Where a network looks, the log's own detections would be the same people twice.
   bool is_on() const { return detector_ != nullptr; }
@@ -38,11 +36,12 @@ class DetectorFeed {
   int64_t broken_image_count() const { return broken_image_count_; }
 
  private:
-  DetectorFeed(std::string channel, std::unique_ptr<PersonDetector> detector)
-      : channel_(std::move(channel)), detector_(std::move(detector)) {}
+  DetectorFeed(std::string channel, std::unique_ptr<PersonDetector> detector, TimeNs period_ns)
+      : channel_(std::move(channel)), detector_(std::move(detector)), period_ns_(period_ns) {}
 
   std::string channel_;
   std::unique_ptr<PersonDetector> detector_;
+  TimeNs period_ns_ = 0;
   TimeNs next_ns_ = kTimeMin;
   int64_t next_id_ = 0;
   int64_t broken_image_count_ = 0;

@@ -58,9 +58,18 @@ absl::StatusOr<bool> HasLayers(const LogInfo& info, const MappingOptions& option
 }
 
 std::string OdometryText(const RobotGraphOptions& options) {
+  const std::string tuning = DigestOptions(options);
   return absl::StrCat(options.odometry_m_per_m, " ", options.odometry_rad_per_m, " corrected ",
                       options.correct_period_ns, " ", options.correct_share, " ",
-                      options.correct_min_m);
+                      options.correct_min_m, tuning.empty() ? "" : " ", tuning);
+}
+
+// What differs from the defaults of stays, agents and path; loop closures count for logs that have
+// some only.
+std::string TuningText(IngestOptions options) {
+  IngestOptions defaults;
+  options.robot_graph = defaults.robot_graph;
+  return DigestGroups(options.Groups(), defaults.Groups());
 }
 
 bool HasLoops(const LogInfo& info) { return info.channel_counts.contains("loops0"); }
@@ -88,6 +97,7 @@ SessionHeader MakeHeader(const LogInfo& info, const LogOptions& log_options,
       .odometry = HasLoops(info) ? OdometryText(options.robot_graph) : "",
       .robot_model =
           options.robot_model.has_value() ? ToHex(options.robot_model->asset.sha256) : "",
+      .tuning = TuningText(options),
       .is_size_bounded = options.is_size_bounded && HasLoops(info)};
   // The file's name alone: where it lies on this machine is no property of the log.
   const std::filesystem::path path(info.path);
@@ -103,7 +113,21 @@ SessionHeader MakeHeader(const LogInfo& info, const LogOptions& log_options,
 
 }  // namespace
 
+std::vector<OptionGroup> IngestOptions::Groups() {
+  std::vector<BoundOption> agents = regions.Bind();
+  std::vector<BoundOption> frame = path.Bind();
+  const std::vector<BoundOption> bodies_bound = bodies.Bind();
+  const std::vector<BoundOption> upright_bound = upright.Bind();
+  agents.insert(agents.end(), bodies_bound.begin(), bodies_bound.end());
+  frame.insert(frame.end(), upright_bound.begin(), upright_bound.end());
+  return {{"agents and their stays", std::move(agents)},
+          {"the robot's path", std::move(frame)},
+          {"loop closures", robot_graph.Bind()}};
+}
+
 absl::Status IngestOptions::Validate() const {
+  IngestOptions options = *this;
+  DSG_RETURN_IF_ERROR(ValidateGroups(options.Groups()));
   if (poses_per_delta >= 1 && poses_per_delta <= kPosesPerDeltaMax) return absl::OkStatus();
   return MakeError(
       Reason::kFieldInvalid,
@@ -133,7 +157,8 @@ absl::StatusOr<RunPlan> MakePlan(const LogInfo& info, const IngestOptions& optio
   DSG_ASSIGN_OR_RETURN(plan.agents, map.NodesOfLayer(layers::kAgents));
   DSG_ASSIGN_OR_RETURN(plan.regions, LogRegions::Read(map, own));
   if (plan.has_people && options.people.detector.has_value()) {
-    DSG_ASSIGN_OR_RETURN(plan.detector, DetectorFeed::Make(info, *options.people.detector));
+    DSG_ASSIGN_OR_RETURN(plan.detector, DetectorFeed::Make(info, *options.people.detector,
+                                                           options.people.look.period_ns));
   }
   return plan;
 }

@@ -6,15 +6,19 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "ingest/commit/delta_sink.h"
 #include "ingest/correction/loop_closer.h"
 #include "ingest/depth/frame_maker.h"
 #include "ingest/log/log_source.h"
+#include "ingest/pipeline/delta_builder.h"
 #include "ingest/pipeline/mapping_options.h"
 #include "ingest/pipeline/people_options.h"
 #include "ingest/pipeline/robot_model.h"
 #include "ingest/pipeline/stage_clock.h"
+#include "ingest/pipeline/upright.h"
+#include "ingest/presence/region_index.h"
 #include "ingest/volume/semantic_volume.h"
 
 namespace dsg::ingest {
@@ -36,11 +40,21 @@ struct IngestOptions {
   RobotGraphOptions robot_graph;
   /// The robot's shape; unset = unknown.
   std::optional<RobotModel> robot_model;
+  AgentBodyOptions bodies;
+  /// Where the robot was between poses.
+  PathOptions path;
+  /// How TurnUpright has looked for it.
+  UprightOptions upright;
+  /// Of stays.
+  RegionOptions regions;
   /// Where the run keeps on disk what it will not need for long (SpillFile): voxel blocks out of
   /// sight, poses, tracks of people who have left. Empty = TMPDIR, or /tmp.
   std::string spill_folder;
   /// Deltas must fit into messages to a server; a large correction then takes several revisions.
   bool is_size_bounded = false;
+
+  /// All numbers besides those of mapping and people, for flags.
+  std::vector<OptionGroup> Groups();
 
   /// Errors: INVALID_ARGUMENT/FIELD_INVALID.
   absl::Status Validate() const;

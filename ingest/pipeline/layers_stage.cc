@@ -55,7 +55,7 @@ LayersStage::LayersStage(const LogInfo& info, const MappingOptions& options,
       mesh_block_size_m_(mesh_block_size_m),
       is_on_(is_on),
       layers_(options, labels_, numbering),
-      mesh_told_(options.mesh_wait_max_ns) {}
+      mesh_told_(options.mesh_wait_max_ns, options.layers.mesh_wait_min_ns) {}
 
 absl::Status LayersStage::See(const DepthFrame& frame) { return layers_.Integrate(frame); }
 

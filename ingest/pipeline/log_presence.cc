@@ -49,7 +49,7 @@ void LogRegions::Add(const GraphDelta& graph) {
   }
 }
 
-RegionIndex LogRegions::MakeIndex() const {
+RegionIndex LogRegions::MakeIndex(const RegionOptions& options) const {
   std::vector<Node> rooms = rooms_;
   std::vector<Node> places = places_;
   for (const Node& node : found_.nodes) {
@@ -66,15 +66,16 @@ RegionIndex LogRegions::MakeIndex() const {
             [](const RegionIndex::Containment& a, const RegionIndex::Containment& b) {
               return std::pair(a.room, a.place) < std::pair(b.room, b.place);
             });
-  return RegionIndex(std::move(rooms), std::move(places), contains);
+  return RegionIndex(std::move(rooms), std::move(places), contains, options);
 }
 
 LogPresence::LogPresence(LogRegions regions, const MapView& map, Revision first_revision,
-                         bool finds_rooms)
+                         bool finds_rooms, const RegionOptions& options)
     : regions_(std::move(regions)),
       map_(map),
       first_revision_(first_revision),
-      finds_rooms_(finds_rooms) {}
+      finds_rooms_(finds_rooms),
+      options_(options) {}
 
 void LogPresence::Observe(NodeId agent, TimeNs time_ns, const Eigen::Vector3d& position_map) {
   Tracker().Observe(agent, time_ns, position_map);
@@ -147,7 +148,7 @@ void LogPresence::ReplayWaiting() {
 }
 
 RegionIndex LogPresence::MakeIndex() const {
-  RegionIndex index = regions_.MakeIndex();
+  RegionIndex index = regions_.MakeIndex(options_);
   index.SetSight(sight_);
   return index;
 }

@@ -37,7 +37,7 @@ class LogRegions {
   /// The rooms and places that this log has found so far, instead of those it had found before.
   void SetFound(GraphDelta found) { found_ = std::move(found); }
 
-  RegionIndex MakeIndex() const;
+  RegionIndex MakeIndex(const RegionOptions& options) const;
 
  private:
   std::vector<Node> rooms_;
@@ -54,7 +54,8 @@ class LogPresence {
  public:
   /// `first_revision`: of an earlier run of the session that was cut off; 0 = there was none.
   /// Requires: `map` outlives this.
-  LogPresence(LogRegions regions, const MapView& map, Revision first_revision, bool finds_rooms);
+  LogPresence(LogRegions regions, const MapView& map, Revision first_revision, bool finds_rooms,
+              const RegionOptions& options);
 
   /// Rooms and places of a ready-made graph.
   void AddGraph(const GraphDelta& graph) { regions_.Add(graph); }
@@ -98,6 +99,7 @@ class LogPresence {
   const MapView& map_;
   Revision first_revision_;
   bool finds_rooms_;
+  RegionOptions options_;
   RegionIndex::Sight sight_;
   std::optional<StayTracker> tracker_;
   StayMender mender_;

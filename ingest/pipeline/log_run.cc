@@ -61,7 +61,7 @@ LogRun::LogRun(RunPlan plan, const MapView& map, DeltaSink sink)
                 (is_followed_ && plan.info.rig.HasEyes())),
       namer_(plan.agents),
       detector_(std::move(plan.detector)),
-      path_({}, options_.spill_folder),
+      path_(options_.path, options_.spill_folder),
       loops_(options_.robot_graph, &path_, plan.info.rig.HasEyes() || plan.has_loops),
       eyes_(EyesOf(plan)),
       frames_(plan.has_layers ? plan.info.rig : RigCalibration(), options_.mapping.depth, path_),
@@ -70,12 +70,13 @@ LogRun::LogRun(RunPlan plan, const MapView& map, DeltaSink sink)
       people_(plan.info.rig, options_.people, plan.has_layers, path_,
               PeopleTold(plan.session_id, plan.agent_prefix,
                          SessionPart(plan.agents, plan.agent_prefix, plan.session_id), &namer_,
-                         options_.spill_folder),
+                         options_.people.told, options_.spill_folder),
               plan.has_people, options_.spill_folder),
       more_stages_(std::move(plan.more_stages)),
       stages_{&layers_, &people_},
-      presence_(std::move(plan.regions), map, plan.first_revision, plan.has_layers),
-      builder_(plan.info.feet_below_m, options_.robot_model),
+      presence_(std::move(plan.regions), map, plan.first_revision, plan.has_layers,
+                options_.regions),
+      builder_(plan.info.feet_below_m, options_.robot_model, options_.bodies),
       sink_(std::move(sink)) {
   for (const std::unique_ptr<Stage>& stage : more_stages_) stages_.push_back(stage.get());
   if (is_followed_ && is_timed_) sink_.SplitEnd(*plan.end_sequence);
@@ -307,7 +308,7 @@ std::vector<Edge> LogRun::HeldEdges() const {
       path.torso.push_back({pose.time_ns, pose.map_T_agent.position});
     }
   }
-  return FindHeldEdges(paths, layers_.Carries(), objects);
+  return FindHeldEdges(paths, layers_.Carries(), objects, options_.people.held);
 }
 
 }  // namespace dsg::ingest

@@ -12,19 +12,8 @@
 namespace dsg::ingest {
 namespace {
 
-// The middle of an object lies behind its surface by about half its depth, and this.
-constexpr double kHiddenM = 0.5;
-// A smaller floor is a landing or a platform.
-constexpr double kFloorM2Min = 2.0;
-constexpr double kFloorDistanceM = 2.0;
-// An object whose low side is this near to a floor stands on it.
-constexpr double kStandingM = 0.3;
-// A robot is no higher above its floor.
-constexpr double kStoreyM = 2.5;
-// Ceilings are no lower and no higher above their floor.
-const Eigen::Vector2d kCeilingM(1.8, 6.0);
-
-bool IsInView(const TrackedObject& object, const DepthFrame& frame) {
+// `behind_m`: how far behind its surface the middle may be, besides half its size.
+bool IsInView(const TrackedObject& object, const DepthFrame& frame, double behind_m) {
   const Eigen::Vector3d center_camera = frame.map_T_camera.Inverse() * object.cluster.center_map;
   if (center_camera.z() <= 0.1) return false;
   const Eigen::Vector2d pixel = Project(frame.camera, center_camera);
@@ -36,7 +25,7 @@ bool IsInView(const TrackedObject& object, const DepthFrame& frame) {
   const size_t index = static_cast<size_t>(row) * static_cast<size_t>(frame.camera.width) +
                        static_cast<size_t>(column);
   const float depth_m = frame.depth_m[index];
-  const double reach_m = 0.5 * object.cluster.size.norm() + kHiddenM;
+  const double reach_m = 0.5 * object.cluster.size.norm() + behind_m;
   return depth_m > 0.0f && std::abs(static_cast<double>(depth_m) - center_camera.z()) <= reach_m;
 }
 
@@ -79,16 +68,16 @@ bool HasModelOf(const std::vector<CadModel>& catalogue, std::string_view class_n
 
 std::vector<double> FloorsOf(const std::vector<StructurePiece>& structures,
                              const std::vector<Eigen::Vector3d>& path_map,
-                             const StructureOptions& options) {
+                             const StructureOptions& options, const StoreyOptions& storeys) {
   std::vector<double> floors;
   for (const StructureHeight& height : FloorHeights(structures, options)) {
-    if (height.area_m2 < kFloorM2Min) continue;
-    const auto is_above = [&height](const Eigen::Vector3d& point_map) {
-      return point_map.z() > height.z_m && point_map.z() < height.z_m + kStoreyM;
+    if (height.area_m2 < storeys.floor_m2_min) continue;
+    const auto is_above = [&height, &storeys](const Eigen::Vector3d& point_map) {
+      return point_map.z() > height.z_m && point_map.z() < height.z_m + storeys.robot_above_m;
     };
     if (std::none_of(path_map.begin(), path_map.end(), is_above)) continue;
-    const bool is_apart = std::all_of(floors.begin(), floors.end(), [&height](double floor_m) {
-      return std::abs(floor_m - height.z_m) >= kFloorDistanceM;
+    const bool is_apart = std::all_of(floors.begin(), floors.end(), [&](double floor_m) {
+      return std::abs(floor_m - height.z_m) >= storeys.floor_apart_m;
     });
     if (is_apart) floors.push_back(height.z_m);
   }
@@ -97,19 +86,21 @@ std::vector<double> FloorsOf(const std::vector<StructurePiece>& structures,
 }
 
 std::optional<double> CeilingAbove(const std::vector<StructurePiece>& structures, double floor_z_m,
-                                   const StructureOptions& options) {
+                                   const StructureOptions& options, const StoreyOptions& storeys) {
   for (const StructureHeight& height : CeilingHeights(structures, options)) {
-    if (height.z_m > floor_z_m + kCeilingM.x() && height.z_m < floor_z_m + kCeilingM.y()) {
+    if (height.z_m > floor_z_m + storeys.ceiling_m_min &&
+        height.z_m < floor_z_m + storeys.ceiling_m_max) {
       return height.z_m;
     }
   }
   return std::nullopt;
 }
 
-std::optional<double> FloorUnder(const ObjectCluster& object, const std::vector<double>& floors_m) {
+std::optional<double> FloorUnder(const ObjectCluster& object, const std::vector<double>& floors_m,
+                                 const StoreyOptions& storeys) {
   const double low_m = object.map_T_box.position.z() - 0.5 * object.size.z();
   for (const double floor_m : floors_m) {
-    if (std::abs(low_m - floor_m) < kStandingM) return floor_m;
+    if (std::abs(low_m - floor_m) < storeys.standing_m) return floor_m;
   }
   return std::nullopt;
 }
@@ -124,7 +115,8 @@ std::vector<int32_t> GlassClasses(const std::vector<SemanticLabel>& labels) {
 }
 
 void CloseGlass(const std::vector<const MeshBlock*>& mesh, const std::vector<int32_t>& classes,
-                const std::vector<double>& floors_m, double body_height_m, OccupancyGrid* grid) {
+                const std::vector<double>& floors_m, double body_height_m,
+                const StoreyOptions& storeys, OccupancyGrid* grid) {
   if (classes.empty() || floors_m.empty()) return;
   const GridFrame& frame = grid->frame;
   for (const MeshBlock* block : mesh) {
@@ -133,7 +125,7 @@ void CloseGlass(const std::vector<const MeshBlock*>& mesh, const std::vector<int
       if (std::find(classes.begin(), classes.end(), label) == classes.end()) continue;
       const Eigen::Vector3d vertex_map = block->positions_map[i].cast<double>();
       const auto above =
-          std::upper_bound(floors_m.begin(), floors_m.end(), vertex_map.z() + kStandingM);
+          std::upper_bound(floors_m.begin(), floors_m.end(), vertex_map.z() + storeys.standing_m);
       const double floor_m = above == floors_m.begin() ? floors_m.front() : *std::prev(above);
       Eigen::Vector3d top_map = vertex_map;
       top_map.z() = std::max(vertex_map.z(), floor_m + body_height_m);
@@ -146,10 +138,10 @@ void CloseGlass(const std::vector<const MeshBlock*>& mesh, const std::vector<int
 }
 
 std::vector<int64_t> ObjectsInView(const std::vector<TrackedObject>& objects,
-                                   const DepthFrame& frame) {
+                                   const DepthFrame& frame, const StoreyOptions& storeys) {
   std::vector<int64_t> visible;
   for (const TrackedObject& object : objects) {
-    if (IsInView(object, frame)) visible.push_back(object.id);
+    if (IsInView(object, frame, storeys.in_view_m)) visible.push_back(object.id);
   }
   return visible;
 }

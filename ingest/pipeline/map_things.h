@@ -12,6 +12,7 @@
 #include "ingest/objects/object_tracker.h"
 #include "ingest/objects/relations.h"
 #include "ingest/pipeline/layer_graph.h"
+#include "ingest/pipeline/layers_options.h"
 #include "ingest/rooms/find_rooms.h"
 #include "ingest/rooms/structure.h"
 #include "ingest/sensor/depth_frame.h"
@@ -36,18 +37,19 @@ std::vector<int32_t> DynamicClasses(const std::vector<SemanticLabel>& labels);
 /// Letters' case ignored.
 bool HasModelOf(const std::vector<CadModel>& catalogue, std::string_view class_name);
 
-/// Heights of the storeys' floors, ascending, at least 2 m apart: large floor pieces that the
+/// Heights of the storeys' floors, ascending, apart by a storey: large floor pieces that the
 /// robot was above. Empty when there are none.
 std::vector<double> FloorsOf(const std::vector<StructurePiece>& structures,
                              const std::vector<Eigen::Vector3d>& path_map,
-                             const StructureOptions& options);
+                             const StructureOptions& options, const StoreyOptions& storeys);
 
-/// Height of the largest ceiling between 1.8 and 6 m above a floor.
+/// Height of the largest ceiling within the heights of one above a floor.
 std::optional<double> CeilingAbove(const std::vector<StructurePiece>& structures, double floor_z_m,
-                                   const StructureOptions& options);
+                                   const StructureOptions& options, const StoreyOptions& storeys);
 
 /// The floor that an object stands on; nullopt when its low side is far from all of them.
-std::optional<double> FloorUnder(const ObjectCluster& object, const std::vector<double>& floors_m);
+std::optional<double> FloorUnder(const ObjectCluster& object, const std::vector<double>& floors_m,
+                                 const StoreyOptions& storeys);
 
 /// Classes that light, and so depth, goes through: glass, window.
 std::vector<int32_t> GlassClasses(const std::vector<SemanticLabel>& labels);
@@ -55,11 +57,12 @@ std::vector<int32_t> GlassClasses(const std::vector<SemanticLabel>& labels);
 /// Panes cannot be seen, what holds them can: columns of the grid with vertices of such a class are
 /// made obstacles from the floor below to the vertex, and at least to the height of a body.
 void CloseGlass(const std::vector<const MeshBlock*>& mesh, const std::vector<int32_t>& classes,
-                const std::vector<double>& floors_m, double body_height_m, OccupancyGrid* grid);
+                const std::vector<double>& floors_m, double body_height_m,
+                const StoreyOptions& storeys, OccupancyGrid* grid);
 
 /// Ids of the objects whose middle is in the picture and not hidden, ascending.
 std::vector<int64_t> ObjectsInView(const std::vector<TrackedObject>& objects,
-                                   const DepthFrame& frame);
+                                   const DepthFrame& frame, const StoreyOptions& storeys);
 
 /// Those pairs whose objects are both still there.
 std::vector<CoVisibility::Pair> KnownPairs(std::vector<CoVisibility::Pair> pairs,

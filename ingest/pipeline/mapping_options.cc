@@ -17,13 +17,24 @@ absl::Status CheckRange(const char* field, double value, double min, double max)
 
 }  // namespace
 
+std::vector<OptionGroup> MappingOptions::Groups() {
+  return {{"depth frames", depth.Bind()},
+          {"scans of lidars", depth.cloud.Bind()},
+          {"fusion, instances and mesh", volume.Bind()},
+          {"walls, floors and ceilings", structures.Bind()},
+          {"places", places.Bind()},
+          {"rooms", rooms.Bind()},
+          {"objects of logs without labels", segments.Bind()},
+          {"objects and their relations", objects.Bind()},
+          {"small things and things in hands", objects.small.Bind()},
+          {"known shapes", shapes.Bind()},
+          {"storeys and updates of layers", layers.Bind()}};
+}
+
 absl::Status MappingOptions::Validate() const {
   DSG_RETURN_IF_ERROR(volume.Validate());
-  DSG_RETURN_IF_ERROR(segments.Validate());
-  DSG_RETURN_IF_ERROR(ValidateOptions(depth.cloud));
-  DSG_RETURN_IF_ERROR(ValidateOptions(structures));
-  DSG_RETURN_IF_ERROR(ValidateOptions(rooms));
-  DSG_RETURN_IF_ERROR(ValidateOptions(places));
+  MappingOptions options = *this;
+  DSG_RETURN_IF_ERROR(ValidateGroups(options.Groups()));
   DSG_RETURN_IF_ERROR(CheckRange("robot radius", places.robot_radius_m, 0.05, 2.0));
   DSG_RETURN_IF_ERROR(CheckRange("grid cell", grid_cell_m, 0.02, 0.5));
   const auto seconds = [](TimeNs time_ns) {
@@ -41,12 +52,13 @@ std::string MappingOptions::Digest(bool has_labels) const {
     absl::StrAppend(&shapes_digest, model.class_name, ":", absl::BytesToHexString(sha256), ",");
   }
   // What differs from the defaults of the stages' options, none of which may change without the
-  // number below.
+  // number below. Those of logs without labels count for such logs only.
   std::string tuning = rooms.split_corridors ? "" : " whole_corridors";
-  for (const std::string& digest : {DigestOptions(depth.cloud), DigestOptions(structures),
-                                    DigestOptions(places), DigestOptions(rooms)}) {
-    if (!digest.empty()) absl::StrAppend(&tuning, " ", digest);
-  }
+  MappingOptions options = *this;
+  MappingOptions defaults;
+  options.segments = defaults.segments;
+  const std::string digest = DigestGroups(options.Groups(), defaults.Groups());
+  if (!digest.empty()) absl::StrAppend(&tuning, " ", digest);
   // Of what the stages make of a log, with the same options.
   constexpr int kStagesVersion = 3;
   return absl::StrCat(

@@ -7,9 +7,11 @@
 
 #include "absl/status/status.h"
 #include "ingest/depth/frame_maker.h"
+#include "ingest/objects/object_options.h"
 #include "ingest/objects/segment_options.h"
 #include "ingest/objects/shapes/cad_model.h"
 #include "ingest/objects/shapes/shape_fit.h"
+#include "ingest/pipeline/layers_options.h"
 #include "ingest/places/extract_places.h"
 #include "ingest/rooms/find_rooms.h"
 #include "ingest/volume/semantic_volume.h"
@@ -25,8 +27,10 @@ struct MappingOptions {
   /// Walls, floors, ceilings and pillars.
   StructureOptions structures;
   RoomOptions rooms;
+  ObjectOptions objects;
   /// Of logs without labels.
   SegmentOptions segments;
+  LayersOptions layers;
   ShapeOptions shapes;
   /// Known shapes; empty = all shapes are unknown.
   std::vector<CadModel> catalogue;
@@ -40,6 +44,9 @@ struct MappingOptions {
   TimeNs layers_period_ns = 5 * kNsPerSecond;
   /// Cells of the grid that places and rooms are found in; the voxel if that is larger.
   double grid_cell_m = 0.1;
+
+  /// The numbers of all stages, for flags; without the few above, which most users set.
+  std::vector<OptionGroup> Groups();
 
   /// Errors: INVALID_ARGUMENT/FIELD_INVALID naming field, value and bounds.
   absl::Status Validate() const;

@@ -11,14 +11,6 @@
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
-namespace {
-
-// A depth picture this near in time is of the same moment.
-constexpr TimeNs kSameMomentNs = 20'000'000;
-constexpr double kCameraAboveFloorMinM = 0.2;
-constexpr double kCameraAboveFloorMaxM = 2.5;
-
-}  // namespace
 
 PeopleStage::PeopleStage(const RigCalibration& rig, const PeopleOptions& options, bool has_depth,
                          const RobotPath& path, PeopleTold told, bool is_on,
@@ -51,7 +43,7 @@ void PeopleStage::AddDetection(HumanDetection detection) {
 }
 
 absl::Status PeopleStage::See(const DepthFrame& frame) {
-  TakeUntil(frame.time_ns + kSameMomentNs, &frame);
+  TakeUntil(frame.time_ns + options_.look.same_moment_ns, &frame);
   return absl::OkStatus();
 }
 
@@ -101,7 +93,8 @@ PeopleCounts PeopleStage::Counts() const {
 void PeopleStage::TakeUntil(TimeNs until_ns, const DepthFrame* frame) {
   while (!waiting_.empty() && waiting_.front().time_ns <= until_ns) {
     const Image& image = waiting_.front();
-    const bool is_same_moment = frame != nullptr && image.time_ns >= frame->time_ns - kSameMomentNs;
+    const bool is_same_moment =
+        frame != nullptr && image.time_ns >= frame->time_ns - options_.look.same_moment_ns;
     Track(image, is_same_moment ? frame : nullptr);
     waiting_.pop_front();
   }
@@ -169,11 +162,11 @@ const CameraCalibration* PeopleStage::CameraOf(const std::string& name) const {
 
 std::optional<double> PeopleStage::FloorUnder(double camera_z_m) const {
   if (options_.floor_z_m.has_value()) return options_.floor_z_m;
+  const LookOptions& look = options_.look;
   const auto above =
-      std::upper_bound(floors_m_.begin(), floors_m_.end(), camera_z_m - kCameraAboveFloorMinM);
+      std::upper_bound(floors_m_.begin(), floors_m_.end(), camera_z_m - look.camera_m_min);
   if (above != floors_m_.begin()) return *std::prev(above);
-  const bool is_zero_likely =
-      camera_z_m >= kCameraAboveFloorMinM && camera_z_m <= kCameraAboveFloorMaxM;
+  const bool is_zero_likely = camera_z_m >= look.camera_m_min && camera_z_m <= look.camera_m_max;
   return is_zero_likely ? std::optional<double>(0.0) : std::nullopt;
 }
 

@@ -34,7 +34,7 @@ class PeopleStage : public Stage {
   void NotePose(TimeNs time_ns) override;
   /// Detections, ascending by stamp.
   bool Take(const Measurement& measurement) override;
-  /// All detections up to 20 ms after it must have been taken.
+  /// All detections up to LookOptions::same_moment_ns after it must have been taken.
   absl::Status See(const DepthFrame& frame) override;
   void Close() override;
   void Tell(Findings* findings, GraphDelta* delta) override;

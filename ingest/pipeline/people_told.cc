@@ -19,22 +19,28 @@ constexpr char kDetectionPrior[] = "detection_prior";
 constexpr char kPerson[] = "person-";
 constexpr char kUnconfirmed[] = "unconfirmed-";
 
-// A pose that moved by less keeps its row while the log runs, and at its end.
-constexpr double kLiveMoveM = 0.03;
-constexpr double kLiveTurnRad = 0.1;
-constexpr double kLastMoveM = 0.001;
-constexpr double kLastTurnRad = 0.005;
+constexpr OptionField<TellOptions> kTellFields[] = {
+    {"told-move", &TellOptions::live_move_m, 0.0, 10.0,
+     "A person's pose that moved by more is told anew while the log runs, metres: each costs a row "
+     "of the history"},
+    {"told-turn", &TellOptions::live_turn_rad, 0.0, 3.2, "... that turned by more, radians"},
+    {"told-last-move", &TellOptions::last_move_m, 0.0, 10.0,
+     "The same at the end of the log, metres: what remains is rounding"},
+    {"told-last-turn", &TellOptions::last_turn_rad, 0.0, 3.2, "... radians"},
+    {"told-half-width", &TellOptions::half_width_m, 0.01, 5.0,
+     "Half the width of a body whose joints are not known, metres: of adults, with elbows"},
+    {"told-below", &TellOptions::below_m, 0.01, 5.0,
+     "How far it reaches below its torso, metres: of adults"},
+    {"told-above", &TellOptions::above_m, 0.01, 5.0, "... and above, metres: of adults"},
+    {"told-flesh", &TellOptions::flesh_m, 0.0, 1.0,
+     "How far a body reaches beyond its joints, metres: joints are inside"},
+};
 
-// Of a body about its torso, metres, for people whose joints are not known.
-constexpr double kHalfWidthM = 0.3;
-constexpr double kBelowM = 1.0;
-constexpr double kAboveM = 0.85;
-// Joints are inside the body.
-constexpr double kFleshM = 0.1;
-
-bool HasMoved(const Pose3d& told, const Pose3d& now, bool is_last) {
-  return (told.position - now.position).norm() > (is_last ? kLastMoveM : kLiveMoveM) ||
-         AngleBetween(told.orientation, now.orientation) > (is_last ? kLastTurnRad : kLiveTurnRad);
+bool HasMoved(const Pose3d& told, const Pose3d& now, bool is_last, const TellOptions& options) {
+  const double move_m = is_last ? options.last_move_m : options.live_move_m;
+  const double turn_rad = is_last ? options.last_turn_rad : options.live_turn_rad;
+  return (told.position - now.position).norm() > move_m ||
+         AngleBetween(told.orientation, now.orientation) > turn_rad;
 }
 
 TimedPose MakePose(const TorsoEstimate& estimate, bool has_heading) {
@@ -46,17 +52,18 @@ TimedPose MakePose(const TorsoEstimate& estimate, bool has_heading) {
   return pose;
 }
 
-Box3d BodyBox(const PersonTracker::Track& track) {
+Box3d BodyBox(const PersonTracker::Track& track, const TellOptions& options) {
   Box3d box;
   for (auto seen = track.observations.rbegin(); seen != track.observations.rend(); ++seen) {
     if (!seen->has_joints) continue;
     for (const Eigen::Vector3d& joint : seen->joints_torso) box.extend(joint);
-    box.min().array() -= kFleshM;
-    box.max().array() += kFleshM;
+    box.min().array() -= options.flesh_m;
+    box.max().array() += options.flesh_m;
     return box;
   }
-  return {Eigen::Vector3d(-kHalfWidthM, -kHalfWidthM, -kBelowM),
-          Eigen::Vector3d(kHalfWidthM, kHalfWidthM, kAboveM)};
+  const double half_m = options.half_width_m;
+  return {Eigen::Vector3d(-half_m, -half_m, -options.below_m),
+          Eigen::Vector3d(half_m, half_m, options.above_m)};
 }
 
 BodyShape MakeShape(const PersonObservation& observation) {
@@ -79,6 +86,12 @@ bool HasShape(const PersonObservation& observation) {
 }
 
 }  // namespace
+
+std::vector<BoundOption> TellOptions::Bind() {
+  std::vector<BoundOption> bound;
+  BindFields<TellOptions>(kTellFields, this, &bound);
+  return bound;
+}
 
 GraphDelta PeopleTold::Tell(PersonTracker* tracker, bool is_last) {
   GraphDelta delta;
@@ -173,7 +186,7 @@ void PeopleTold::TellNode(const PersonTracker::Track& track, Person* person,
   node.confidence = is_dropped ? 0.0 : 1.0;
   node.map_T_node = is_dropped ? track.observations.back().map_T_torso
                                : track.graph.estimates().back().map_T_torso;
-  node.box_node = BodyBox(track);
+  node.box_node = BodyBox(track, options_);
   node.agent.emplace();
   node.agent->shape_coefficients = track.shape_coefficients;
   node.agent->track_state = std::string(ToString(track.state));
@@ -189,7 +202,7 @@ void PeopleTold::TellPoses(const PersonTracker::Track& track, size_t first_moved
   size_t first = told_count;
   size_t end = told_count;
   for (size_t i = is_last ? 0 : std::min(first_moved, told_count); i < told_count; ++i) {
-    if (!HasMoved(told[i].map_T_agent, estimates[i].map_T_torso, is_last)) continue;
+    if (!HasMoved(told[i].map_T_agent, estimates[i].map_T_torso, is_last, options_)) continue;
     if (first == told_count) first = i;
     end = i + 1;
   }

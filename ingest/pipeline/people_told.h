@@ -10,11 +10,29 @@
 
 #include "absl/status/status.h"
 #include "ingest/agents/tracking/person_tracker.h"
+#include "ingest/config/option_field.h"
 #include "ingest/files/spill_file.h"
 #include "ingest/pipeline/agent_namer.h"
 #include "schema/model/graph_delta.h"
 
 namespace dsg::ingest {
+
+/// What is told of tracks, in numbers.
+struct TellOptions {
+  /// A pose that moved by less keeps its row while the log runs, and at its end.
+  double live_move_m = 0.03;
+  double live_turn_rad = 0.1;
+  double last_move_m = 0.001;
+  double last_turn_rad = 0.005;
+  /// Of a body about its torso, for people whose joints are not known.
+  double half_width_m = 0.3;
+  double below_m = 1.0;
+  double above_m = 0.85;
+  /// Joints are inside the body.
+  double flesh_m = 0.1;
+
+  std::vector<BoundOption> Bind();
+};
 
 /// Threads: one caller at a time.
 class PeopleTold {
@@ -43,11 +61,12 @@ class PeopleTold {
   /// `agent_prefix` before all and `session_part` before the number. Requires: `namer` outlives
   /// this.
   PeopleTold(std::string session_id, std::string agent_prefix, std::string session_part,
-             AgentNamer* namer, const std::string& spill_folder = "")
+             AgentNamer* namer, const TellOptions& options, const std::string& spill_folder = "")
       : session_id_(std::move(session_id)),
         agent_prefix_(std::move(agent_prefix)),
         session_part_(std::move(session_part)),
         namer_(namer),
+        options_(options),
         file_(std::make_unique<SpillFile>(spill_folder)) {}
 
   /// The tracker's changes since the last call. Poses that were told and have moved come as
@@ -79,6 +98,7 @@ class PeopleTold {
   std::string agent_prefix_;
   std::string session_part_;
   AgentNamer* namer_;
+  TellOptions options_;
   std::unique_ptr<SpillFile> file_;
   mutable absl::Status status_;
   std::map<int64_t, Person> people_;

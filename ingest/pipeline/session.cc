@@ -20,6 +20,7 @@ std::string SessionConfig::Digest() const {
   if (!people.empty()) absl::StrAppend(&choice, "people=", people, "\n");
   if (!odometry.empty()) absl::StrAppend(&choice, "odometry=", odometry, "\n");
   if (!robot_model.empty()) absl::StrAppend(&choice, "robot_model=", robot_model, "\n");
+  if (!tuning.empty()) absl::StrAppend(&choice, "tuning=", tuning, "\n");
   if (is_size_bounded) absl::StrAppend(&choice, "bounded\n");
   return Sha256Hex(
       absl::StrCat(choice, "pipeline=", kPipelineVersion, "\nformat=", format,

@@ -29,6 +29,8 @@ struct SessionConfig {
   std::string odometry;
   /// SHA-256 of the robot's CAD model; empty for none.
   std::string robot_model;
+  /// Numbers of IngestOptions that differ from their defaults; empty = none.
+  std::string tuning;
   /// Whether corrections of logs with loop closures are cut to the size of messages: then their
   /// sequences are others.
   bool is_size_bounded = false;

@@ -15,21 +15,6 @@
 namespace dsg::ingest {
 namespace {
 
-// How often it is looked which objects are in one picture.
-constexpr TimeNs kTogetherPeriodNs = kNsPerSecond;
-constexpr int64_t kTogetherPicturesMin = 3;
-constexpr int kTogetherPartnersMax = 5;
-// Poses of the robot closer together than this add nothing to its path.
-constexpr double kPathStepM = 0.1;
-// Without a ceiling in sight.
-constexpr double kCeilingGuessM = 2.5;
-// Fits of known shapes in one update while the log runs; the rest waits for the next.
-constexpr size_t kFitsPerUpdate = 4;
-// A large map is updated less often: a second of log time for so many cells of the grid, and for
-// so many vertices of the mesh.
-constexpr double kCellsPerSecond = 2.0e6;
-constexpr double kVerticesPerSecond = 1.0e5;
-
 // What is gone is told on, and never matched again.
 GoneObject WithoutPoints(GoneObject gone) {
   gone.object.cluster.points_map = {};
@@ -46,8 +31,11 @@ StaticLayers::StaticLayers(const MappingOptions& options, std::vector<SemanticLa
       fitter_(options_.catalogue, options.shapes),
       maker_(numbering, NamesOf(labels_), options_.catalogue),
       volume_(options.volume),
-      object_tracker_(/*forgets_lost=*/labels_.empty()),
+      object_tracker_(/*forgets_lost=*/labels_.empty(), options.objects.match),
       object_classes_(ObjectClasses(labels_, classes_, options_.depth.dynamic_classes)),
+      small_objects_(options.objects.small),
+      carried_things_(options.objects.small),
+      object_watch_(options.objects.watch),
       place_tracker_(options.places.same_m),
       structure_tracker_(options.structures),
       room_tracker_(options.rooms.same_place_m),
@@ -61,19 +49,21 @@ absl::Status StaticLayers::Integrate(const DepthFrame& frame) {
   }
   {
     const StageClock::Span span(&clock_, "small");
-    std::vector<SmallSighting> sightings = FindSmallSightings(frame, object_classes_);
+    std::vector<SmallSighting> sightings =
+        FindSmallSightings(frame, object_classes_, options_.objects.small);
     carried_things_.See(sightings, frame.time_ns);
     small_objects_.See(frame, std::move(sightings));
     object_watch_.Watch(frame);
   }
   const Eigen::Vector3d& camera_map = frame.map_T_camera.position;
-  if (viewpoints_.empty() || (camera_map - viewpoints_.back().position_map).norm() > kPathStepM) {
+  if (viewpoints_.empty() ||
+      (camera_map - viewpoints_.back().position_map).norm() > options_.layers.path_step_m) {
     viewpoints_.push_back({frame.time_ns, camera_map});
   }
   if (observed_together_ns_ == kTimeMin ||
-      frame.time_ns - observed_together_ns_ >= kTogetherPeriodNs) {
+      frame.time_ns - observed_together_ns_ >= options_.layers.together_period_ns) {
     observed_together_ns_ = frame.time_ns;
-    together_.Observe(ObjectsInView(object_tracker_.objects(), frame));
+    together_.Observe(ObjectsInView(object_tracker_.objects(), frame, options_.layers.storeys));
   }
   return absl::OkStatus();
 }
@@ -171,7 +161,7 @@ LayerGraph StaticLayers::Update(TimeNs now_ns, bool is_last) {
     structure_tracker_.Track(&parts.structures);
   }
   const std::vector<Eigen::Vector3d> path_map = SeenFrom();
-  floors_m_ = FloorsOf(parts.structures, path_map, options_.structures);
+  floors_m_ = FloorsOf(parts.structures, path_map, options_.structures, options_.layers.storeys);
   FindObjects(now_ns, mesh);
   FitShapes(floors_m_, is_last);
   // The last one is not needed beside the new one.
@@ -188,9 +178,10 @@ LayerGraph StaticLayers::Update(TimeNs now_ns, bool is_last) {
   parts.objects = object_tracker_.objects();
   parts.fits = fits_;
   parts.gone = gone_;
-  parts.relations = FindRelations(parts.objects);
-  parts.together =
-      KnownPairs(together_.Pairs(kTogetherPicturesMin, kTogetherPartnersMax), parts.objects);
+  parts.relations = FindRelations(parts.objects, options_.objects.relations);
+  parts.together = KnownPairs(together_.Pairs(options_.layers.together_picture_count_min,
+                                              options_.layers.together_partner_count_max),
+                              parts.objects);
   FindPlacesOfObjects(field, &parts);
   {
     const StageClock::Span span(&clock_, "rooms");
@@ -206,7 +197,8 @@ DistanceField StaticLayers::FindDistances(const std::vector<const MeshBlock*>& m
   const StageClock::Span span(&clock_, "distances");
   OccupancyGrid grid =
       volume_.MakeOccupancy(std::max(options_.grid_cell_m, options_.volume.voxel_m));
-  CloseGlass(mesh, GlassClasses(labels_), floors_m, options_.places.body_z_max_m, &grid);
+  CloseGlass(mesh, GlassClasses(labels_), floors_m, options_.places.body_z_max_m,
+             options_.layers.storeys, &grid);
   return DistanceField(std::move(grid));
 }
 
@@ -229,8 +221,8 @@ std::vector<Carry> StaticLayers::Carries() const {
 void StaticLayers::NoteCost(int64_t cell_count) {
   size_t vertex_count = 0;
   for (const auto& [index, block] : mesh_) vertex_count += block.positions_map.size();
-  const double cost_s = static_cast<double>(cell_count) / kCellsPerSecond +
-                        static_cast<double>(vertex_count) / kVerticesPerSecond;
+  const double cost_s = static_cast<double>(cell_count) / options_.layers.cells_per_second +
+                        static_cast<double>(vertex_count) / options_.layers.vertices_per_second;
   update_cost_ns_ = static_cast<TimeNs>(cost_s * static_cast<double>(kNsPerSecond));
 }
 
@@ -239,15 +231,16 @@ void StaticLayers::FindObjects(TimeNs now_ns, const std::vector<const MeshBlock*
   ClusterOptions options;
   options.voxel_m = options_.volume.voxel_m;
   options.class_ids = object_classes_;
+  options.pieces = options_.objects.pieces;
   std::vector<ObjectCluster> clusters;
   if (labels_.empty()) {
-    clusters =
-        FindUnlabelledObjects(mesh, kThingClass, options.voxel_m, floors_m_, options_.segments);
+    clusters = FindUnlabelledObjects(mesh, kThingClass, options.voxel_m, floors_m_,
+                                     options_.segments, options.pieces);
   } else {
     clusters = FindClusters(mesh, options);
   }
   KeepVacated();
-  small_objects_.Place(&clusters);
+  small_objects_.Place(&clusters, options.pieces.box);
   object_watch_.DropResidues(&clusters);
   const std::vector<TrackedObject> before = object_tracker_.objects();
   const ObjectChanges changes =
@@ -309,12 +302,12 @@ void StaticLayers::FitShapes(const std::vector<double>& floors_m, bool is_last) 
   std::map<int64_t, const TrackedObject*> objects;
   for (const TrackedObject& object : object_tracker_.objects()) objects[object.id] = &object;
   std::erase_if(fits_, [&objects](const auto& entry) { return !objects.contains(entry.first); });
-  size_t fit_count = 0;
+  int fit_count = 0;
   std::vector<int64_t> waiting;
   for (const int64_t id : unfitted_) {
     const auto object = objects.find(id);
     if (object == objects.end()) continue;
-    if (!is_last && fit_count == kFitsPerUpdate) {
+    if (!is_last && fit_count == options_.layers.fit_count) {
       waiting.push_back(id);
       continue;
     }
@@ -327,7 +320,7 @@ void StaticLayers::FitShapes(const std::vector<double>& floors_m, bool is_last) 
         [this](const Eigen::Vector3d& point_map) {
           return volume_.At(point_map) == Occupancy::kFree;
         },
-        FloorUnder(cluster, floors_m));
+        FloorUnder(cluster, floors_m, options_.layers.storeys));
     fits_.erase(id);
     if (!fit.has_value()) continue;
     fits_.emplace(id, *fit);
@@ -364,9 +357,9 @@ std::vector<Storey> StaticLayers::FindStoreys(const LayerParts& parts) const {
   for (auto& [floor_z_m, storey] : by_floor) {
     storey.floor_z_m = floor_z_m;
     const std::optional<double> ceiling =
-        CeilingAbove(parts.structures, floor_z_m, options_.structures);
+        CeilingAbove(parts.structures, floor_z_m, options_.structures, options_.layers.storeys);
     storey.has_ceiling = ceiling.has_value();
-    storey.ceiling_z_m = ceiling.value_or(floor_z_m + kCeilingGuessM);
+    storey.ceiling_z_m = ceiling.value_or(floor_z_m + options_.layers.storeys.ceiling_guess_m);
     storeys.push_back(std::move(storey));
   }
   return storeys;

@@ -19,10 +19,14 @@
 namespace dsg::ingest {
 namespace {
 
-// Pictures that are looked at, spread over the log.
-constexpr int64_t kFrameCount = 16;
-// A frame that stands this upright is left alone: its poses know better than a look at the walls.
-constexpr double kUprightRad = 0.05;
+constexpr OptionField<UprightOptions> kUprightFields[] = {
+    {"up-pictures", &UprightOptions::frame_count, 1, 1000,
+     "With --up auto: pictures that are looked at, spread over the log: walls and floors of most "
+     "of it"},
+    {"up-aslant", &UprightOptions::upright_rad, 0.0, 3.2,
+     "A log that stands aslant by less is left alone, radians: its poses know better than a look "
+     "at the walls"},
+};
 
 absl::StatusOr<Eigen::Vector3d> ParseUp(const std::string& up) {
   for (int axis = 0; axis < 3; ++axis) {
@@ -48,7 +52,7 @@ absl::StatusOr<Eigen::Vector3d> ParseUp(const std::string& up) {
 }
 
 // A few of the log's frames; depth pictures in between are never decoded.
-absl::StatusOr<std::vector<DepthFrame>> SpreadFrames(LogSource& log) {
+absl::StatusOr<std::vector<DepthFrame>> SpreadFrames(LogSource& log, int frame_count) {
   RobotPath path;
   FrameMaker maker(log.info().rig, DepthOptions(), path);
   std::vector<DepthFrame> frames;
@@ -57,7 +61,7 @@ absl::StatusOr<std::vector<DepthFrame>> SpreadFrames(LogSource& log) {
   };
   const auto depth = log.info().channel_counts.find("depth0");
   const int64_t depth_count = depth == log.info().channel_counts.end() ? 0 : depth->second;
-  const int64_t stride = std::max<int64_t>(1, depth_count / kFrameCount);
+  const int64_t stride = std::max<int64_t>(1, depth_count / frame_count);
   int64_t seen = 0;
   while (true) {
     DSG_ASSIGN_OR_RETURN(std::optional<Measurement> measurement, log.Next());
@@ -77,19 +81,25 @@ absl::StatusOr<std::vector<DepthFrame>> SpreadFrames(LogSource& log) {
 
 }  // namespace
 
+std::vector<BoundOption> UprightOptions::Bind() {
+  std::vector<BoundOption> bound;
+  BindFields<UprightOptions>(kUprightFields, this, &bound);
+  return bound;
+}
+
 absl::Status CheckUp(const std::string& up) {
   if (up == "auto" || up == "none") return absl::OkStatus();
   return ParseUp(up).status();
 }
 
-absl::StatusOr<std::unique_ptr<LogSource>> TurnUpright(std::unique_ptr<LogSource> log,
-                                                       const std::string& path,
-                                                       const LogOptions& options,
-                                                       const std::string& up, std::string* note) {
+absl::StatusOr<std::unique_ptr<LogSource>> TurnUpright(
+    std::unique_ptr<LogSource> log, const std::string& path, const LogOptions& options,
+    const std::string& up, const UprightOptions& upright, std::string* note) {
   Eigen::Vector3d up_log = Eigen::Vector3d::UnitZ();
   if (up == "auto") {
     if (log->info().format != "rgbd" || !log->info().channel_counts.contains("depth0")) return log;
-    DSG_ASSIGN_OR_RETURN(const std::vector<DepthFrame> frames, SpreadFrames(*log));
+    DSG_ASSIGN_OR_RETURN(const std::vector<DepthFrame> frames,
+                         SpreadFrames(*log, upright.frame_count));
     DSG_ASSIGN_OR_RETURN(log, OpenLog(path, options));
     const std::optional<Eigen::Vector3d> found = EstimateUp(frames);
     if (!found.has_value()) {
@@ -100,7 +110,7 @@ absl::StatusOr<std::unique_ptr<LogSource>> TurnUpright(std::unique_ptr<LogSource
   } else if (up != "none") {
     DSG_ASSIGN_OR_RETURN(up_log, ParseUp(up));
   }
-  if (std::acos(std::clamp(up_log.z(), -1.0, 1.0)) < kUprightRad) return log;
+  if (std::acos(std::clamp(up_log.z(), -1.0, 1.0)) < upright.upright_rad) return log;
   *note = absl::StrFormat("the log's (%.3f, %.3f, %.3f) points up; its poses are turned",
                           up_log.x(), up_log.y(), up_log.z());
   return TurnLog(std::move(log),

@@ -8,6 +8,7 @@
 namespace dsg::ingest {
 namespace {
 
+// Cells decide what a search costs, not what it finds.
 constexpr double kCellSizeMinM = 0.1;
 
 }  // namespace

@@ -8,8 +8,13 @@
 namespace dsg::ingest {
 namespace {
 
-// Further away, a place in sight is no better than one that is not.
-constexpr double kSightM = 5.0;
+constexpr OptionField<RegionOptions> kRegionFields[] = {
+    {"stay-hysteresis", &RegionOptions::hysteresis_m, 0.0, 10.0,
+     "A room is left, or a place changed for another, only when that is clear by so much, metres: "
+     "noise of poses at a wall must not end stays"},
+    {"stay-sight", &RegionOptions::sight_m, 0.0, 1000.0,
+     "Farther away, a place in sight is no better than one that is not, metres: places lie denser"},
+};
 
 void SortById(std::vector<Node>* nodes) {
   std::sort(nodes->begin(), nodes->end(), [](const Node& a, const Node& b) { return a.id < b.id; });
@@ -17,8 +22,15 @@ void SortById(std::vector<Node>* nodes) {
 
 }  // namespace
 
+std::vector<BoundOption> RegionOptions::Bind() {
+  std::vector<BoundOption> bound;
+  BindFields<RegionOptions>(kRegionFields, this, &bound);
+  return bound;
+}
+
 RegionIndex::RegionIndex(std::vector<Node> rooms, std::vector<Node> places,
-                         const std::vector<Containment>& contains) {
+                         const std::vector<Containment>& contains, const RegionOptions& options)
+    : options_(options) {
   SortById(&rooms);
   SortById(&places);
   std::unordered_map<NodeId, int32_t> number_of_room;
@@ -86,7 +98,7 @@ RegionIndex::Depth RegionIndex::DepthIn(const Room& room, const Eigen::Vector3d&
   if (room.z_min_m <= z && z < room.z_max_m) return {across, is_within};
   const double beyond = z < room.z_min_m ? room.z_min_m - z : z - room.z_max_m;
   // Feet measured just below the floor are still in the room.
-  return {std::max(across, beyond), is_within && beyond <= kHysteresisM};
+  return {std::max(across, beyond), is_within && beyond <= options_.hysteresis_m};
 }
 
 int32_t RegionIndex::NextRoom(int32_t before, const Eigen::Vector3d& position) const {
@@ -102,9 +114,10 @@ int32_t RegionIndex::NextRoom(int32_t before, const Eigen::Vector3d& position) c
       deepest_m = depth.distance_m;
     }
   }
-  if (own_m > kHysteresisM) return deepest;
+  if (own_m > options_.hysteresis_m) return deepest;
   // Where rooms overlap, being deep in both must not change the room with every pose.
-  const bool is_other_clear = deepest_m < -kHysteresisM && deepest_m < own_m - kHysteresisM;
+  const bool is_other_clear =
+      deepest_m < -options_.hysteresis_m && deepest_m < own_m - options_.hysteresis_m;
   return is_other_clear ? deepest : before;
 }
 
@@ -120,14 +133,14 @@ int32_t RegionIndex::NextPlace(int32_t room, int32_t before,
   PlaceGrid::Found nearest;
   if (sight_) {
     nearest = grid.Nearest(
-        position, [&](int32_t place) { return IsInSight(position, place); }, kSightM);
+        position, [&](int32_t place) { return IsInSight(position, place); }, options_.sight_m);
   }
   const bool is_in_sight = nearest.number >= 0;
   if (!is_in_sight) nearest = grid.Nearest(position);
   if (before < 0 || (is_within_room && places_[before].room != room)) return nearest.number;
   if (is_in_sight && !IsInSight(position, before)) return nearest.number;
   const double own_m = (places_[before].position - position).norm();
-  return nearest.distance_m < own_m - kHysteresisM ? nearest.number : before;
+  return nearest.distance_m < own_m - options_.hysteresis_m ? nearest.number : before;
 }
 
 RegionState RegionIndex::Next(RegionState before, const Eigen::Vector3d& position_map) const {

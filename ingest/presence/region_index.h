@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "ingest/config/option_field.h"
 #include "ingest/presence/place_grid.h"
 #include "schema/model/node.h"
 
@@ -21,14 +22,20 @@ struct RegionState {
   bool operator==(const RegionState&) const = default;
 };
 
+struct RegionOptions {
+  /// A room is left, or a place changed for another, only when that is clear by so much.
+  double hysteresis_m = 0.3;
+  /// Further away, a place in sight is no better than one that is not.
+  double sight_m = 5.0;
+
+  std::vector<BoundOption> Bind();
+};
+
 /// Rooms and places of one map.
 ///
 /// Threads: safe from many threads.
 class RegionIndex {
  public:
-  /// A room is left, or a place changed for another, only when that is clear by so much.
-  static constexpr double kHysteresisM = 0.3;
-
   struct Containment {
     NodeId room;
     NodeId place;
@@ -42,17 +49,17 @@ class RegionIndex {
   /// Rooms with neither outline nor box hold nobody. `contains`: which places are in which room;
   /// pairs of unknown nodes are ignored.
   RegionIndex(std::vector<Node> rooms, std::vector<Node> places,
-              const std::vector<Containment>& contains);
+              const std::vector<Containment>& contains, const RegionOptions& options = {});
 
   bool empty() const { return rooms_.empty() && places_.empty(); }
 
   /// Where an agent that was in `before` is, now that it stands at `position_map`.
   ///
-  /// Room: kept until it is more than kHysteresisM behind, or another is deeper by more than
+  /// Room: kept until it is more than hysteresis_m behind, or another is deeper by more than
   /// that and more than that deep; a new one is the deepest that holds the position.
   /// Place: the nearest in sight, within some metres, of the room's places (of all, where there is
   /// no room or it has none); the nearest of any where none is in sight. Kept until another is
-  /// nearer by more than kHysteresisM, or it is out of sight and another is not. Ties go to the
+  /// nearer by more than hysteresis_m, or it is out of sight and another is not. Ties go to the
   /// lower id. Source: RSS 2020, section IV-B, with line of sight added.
   RegionState Next(RegionState before, const Eigen::Vector3d& position_map) const;
 
@@ -105,6 +112,7 @@ class RegionIndex {
   std::vector<Place> places_;
   PlaceGrid all_places_;
   Sight sight_;
+  RegionOptions options_;
 };
 
 }  // namespace dsg::ingest

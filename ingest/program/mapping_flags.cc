@@ -3,14 +3,10 @@
 
 #include <CLI/CLI.hpp>
 #include <cmath>
-#include <memory>
-#include <span>
-#include <utility>
 #include <vector>
 
-#include "absl/strings/match.h"
-#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "ingest/program/tuning_flags.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
@@ -26,56 +22,9 @@ absl::StatusOr<TimeNs> Nanoseconds(const char* flag, double seconds) {
                    {{"field", flag}, {"value", absl::StrCat(seconds)}});
 }
 
-// Groups of options of single stages, which few runs need.
-constexpr absl::string_view kTuning = "Tuning: ";
-
-// Help with one line for each group of tuning, unless all is asked for.
-class ShortHelp : public CLI::Formatter {
- public:
-  std::string make_help(const CLI::App* app, std::string name,
-                        CLI::AppFormatMode mode) const override {
-    shows_all_ = mode == CLI::AppFormatMode::All;
-    return CLI::Formatter::make_help(app, std::move(name), mode);
-  }
-
-  std::string make_group(std::string group, bool is_positional,
-                         std::vector<const CLI::Option*> options) const override {
-    if (shows_all_ || !absl::StartsWith(group, kTuning)) {
-      return CLI::Formatter::make_group(std::move(group), is_positional, std::move(options));
-    }
-    return absl::StrCat("\n", group, ": ", options.size(), " options, see --help-all\n");
-  }
-
- private:
-  mutable bool shows_all_ = false;
-};
-
-// As ValidateFields has it, so that all ways say the same.
-CLI::Validator InRange(BoundOption field) {
-  return CLI::Validator(
-      [field](const std::string& text) mutable {
-        double value = 0.0;
-        if (!absl::SimpleAtod(text, &value)) return absl::StrCat(text, " is no number");
-        field.value = &value;
-        return std::string(ValidateFields({&field, 1}).message());
-      },
-      absl::StrCat("in [", field.min, " - ", field.max, "]"));
-}
-
-void AddTuning(const std::string& stage, std::span<const BoundOption> fields, CLI::App* app) {
-  for (const BoundOption& field : fields) {
-    app->add_option(absl::StrCat("--", field.name), *field.value, field.help)
-        ->check(InRange(field))
-        ->capture_default_str()
-        ->group(absl::StrCat(kTuning, stage));
-  }
-}
-
 }  // namespace
 
 void AddMappingFlags(CLI::App* app, MappingFlags* flags) {
-  app->formatter(std::make_shared<ShortHelp>());
-  app->set_help_all_flag("--help-all", "Print the options of all groups");
   const std::string group = "Static layers (logs with depth)";
   app->add_flag("--no-layers", flags->is_off, "Poses only: no mesh, objects, places and rooms")
       ->group(group);
@@ -125,34 +74,25 @@ void AddMappingFlags(CLI::App* app, MappingFlags* flags) {
       ->capture_default_str()
       ->group(group);
   app->add_flag("--timings", flags->has_timings, "Print what each stage has cost")->group(group);
-  AddTuning("scans of lidars", flags->cloud.Bind(), app);
-  AddTuning("walls, floors and ceilings", flags->structures.Bind(), app);
-  AddTuning("places", flags->place_options.Bind(), app);
-  AddTuning("rooms", flags->room_options.Bind(), app);
-  AddTuning("objects of logs without labels", flags->segments.Bind(), app);
-  AddTuning("memory", flags->spill.Bind(), app);
+  AddTuning(flags->numbers.Groups(), app);
+  const OptionGroup memory{"memory", flags->numbers.volume.spill.Bind()};
+  AddTuning({&memory, 1}, app);
 }
 
 absl::StatusOr<MappingOptions> MakeMappingOptions(const MappingFlags& flags) {
-  MappingOptions options;
+  MappingOptions options = flags.numbers;
   options.is_on = !flags.is_off;
   options.volume.voxel_m = flags.voxel_m;
   options.volume.range_m = flags.range_m;
   options.volume.thread_count = flags.thread_count;
   if (flags.masking == "drop") options.volume.masking = DynamicMasking::kDrop;
   if (flags.masking == "off") options.volume.masking = DynamicMasking::kOff;
-  options.depth.cloud = flags.cloud;
-  options.structures = flags.structures;
-  options.rooms = flags.room_options;
   options.rooms.split_corridors = !flags.keeps_corridors;
   if (flags.rooms == "ceiling") options.rooms.method = RoomMethod::kCeiling;
   if (flags.rooms == "filtration") options.rooms.method = RoomMethod::kFiltration;
   if (flags.rooms == "clearance") options.rooms.method = RoomMethod::kClearance;
-  options.places = flags.place_options;
   if (flags.places == "volume") options.places.mode = PlaceMode::kVolume;
   options.places.robot_radius_m = flags.robot_radius_m;
-  options.segments = flags.segments;
-  options.volume.spill = flags.spill;
   DSG_ASSIGN_OR_RETURN(options.commit_period_ns, Nanoseconds("commit-seconds", flags.commit_s));
   DSG_ASSIGN_OR_RETURN(options.mesh_wait_max_ns, Nanoseconds("mesh-seconds", flags.mesh_s));
   DSG_ASSIGN_OR_RETURN(options.layers_period_ns, Nanoseconds("layers-seconds", flags.layers_s));

@@ -24,20 +24,15 @@ struct MappingFlags {
   bool keeps_corridors = false;
   std::string places = "ground";
   double robot_radius_m = PlaceOptions().robot_radius_m;
-  PlaceOptions place_options;
   double commit_s = 1.0;
   double mesh_s = 32.0;
   double layers_s = 5.0;
   int thread_count = VolumeOptions().thread_count;
-  CloudOptions cloud;
-  StructureOptions structures;
-  RoomOptions room_options;
-  SegmentOptions segments;
-  SpillOptions spill;
+  /// Numbers of MappingOptions::Groups alone; the rest is not used.
+  MappingOptions numbers;
   bool has_timings = false;
 };
 
-/// Options of single stages stand in groups of their own, which --help names and --help-all shows.
 void AddMappingFlags(CLI::App* app, MappingFlags* flags);
 
 /// Errors: INVALID_ARGUMENT/FIELD_INVALID naming the flag.

@@ -2,10 +2,12 @@
 #include "ingest/program/people_flags.h"
 
 #include <CLI/CLI.hpp>
+#include <string>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "ingest/log/log_digest.h"
+#include "ingest/program/tuning_flags.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
@@ -43,9 +45,24 @@ void AddPeopleFlags(CLI::App* app, PeopleFlags* flags) {
       ->check(CLI::Range(0, 100000))
       ->capture_default_str()
       ->group(group);
+  AddTuning(flags->numbers.Groups(), app);
 }
 
 namespace {
+
+// What only a detector would read: without one it would be ignored.
+absl::Status CheckWithoutDetector(const PeopleFlags& flags) {
+  const PeopleFlags defaults;
+  std::string flag;
+  if (flags.detector_score != defaults.detector_score) flag = "detector-score";
+  if (flags.detector_size_px != defaults.detector_size_px) flag = "detector-size";
+  if (flags.detector_class != defaults.detector_class) flag = "detector-class";
+  if (flags.numbers.look.period_ns != defaults.numbers.look.period_ns) flag = "person-look-period";
+  if (flags.numbers.look.overlap_max != defaults.numbers.look.overlap_max) {
+    flag = "person-look-overlap";
+  }
+  return flag.empty() ? absl::OkStatus() : NeedsOther(flag, "detector");
+}
 
 absl::Status SetDetector(const PeopleFlags& flags, PeopleOptions* options) {
   PersonDetectorOptions detector;
@@ -53,6 +70,7 @@ absl::Status SetDetector(const PeopleFlags& flags, PeopleOptions* options) {
   detector.score_min = flags.detector_score;
   detector.input_width_px = detector.input_height_px = flags.detector_size_px;
   detector.person_class = flags.detector_class;
+  detector.overlap_max = options->look.overlap_max;
   options->detector = detector;
   // Read once to know it, and to say early when it cannot be used.
   DSG_RETURN_IF_ERROR(PersonDetector::Load(detector).status());
@@ -63,13 +81,17 @@ absl::Status SetDetector(const PeopleFlags& flags, PeopleOptions* options) {
 }  // namespace
 
 absl::StatusOr<PeopleOptions> MakePeopleOptions(const PeopleFlags& flags) {
-  PeopleOptions options;
-  if (flags.people == "paper") options = PeopleOptions::Paper();
+  PeopleOptions options = flags.numbers;
+  if (flags.people == "paper") options.MakePaper();
   options.is_on = flags.people != "off";
   if (flags.has_no_depth) options.cues.is_depth_used = false;
   options.floor_z_m = flags.floor_z_m;
   DSG_RETURN_IF_ERROR(options.Validate());
-  if (!flags.detector_file.empty()) DSG_RETURN_IF_ERROR(SetDetector(flags, &options));
+  if (flags.detector_file.empty()) {
+    DSG_RETURN_IF_ERROR(CheckWithoutDetector(flags));
+  } else {
+    DSG_RETURN_IF_ERROR(SetDetector(flags, &options));
+  }
   return options;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The flags of dsg-ingest that concern people, and what it says of them at the end.
+// The flags of dsg-ingest that concern people.
 // Part of the program, not of the library.
 #pragma once
 
@@ -23,12 +23,14 @@ struct PeopleFlags {
   double detector_score = PersonDetectorOptions().score_min;
   int detector_size_px = PersonDetectorOptions().input_width_px;
   int detector_class = PersonDetectorOptions().person_class;
+  /// Numbers of PeopleOptions::Groups alone; the rest is not used.
+  PeopleOptions numbers;
 };
 
 void AddPeopleFlags(CLI::App* app, PeopleFlags* flags);
 
-/// Errors: INVALID_ARGUMENT/FIELD_INVALID naming the flag; of reading the detector's file.
+/// Errors: INVALID_ARGUMENT/FIELD_INVALID naming the flag, also of a detector's where there is
+/// none; of reading the detector's file.
 absl::StatusOr<PeopleOptions> MakePeopleOptions(const PeopleFlags& flags);
 
-/// On stdout: detections used and left out, tracks; with `has_timings` what an image has cost.
 }  // namespace dsg::ingest

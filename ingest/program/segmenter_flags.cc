@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "ingest/program/tuning_flags.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
@@ -73,7 +74,13 @@ void AddSegmenterFlags(CLI::App* app, SegmenterFlags* flags) {
 }
 
 absl::StatusOr<std::optional<Segmentation>> MakeSegmentation(const SegmenterFlags& flags) {
-  if (flags.model_file.empty() && flags.classes_file.empty()) return std::nullopt;
+  if (flags.model_file.empty() && flags.classes_file.empty()) {
+    const SegmenterFlags defaults;
+    if (flags.size_px != defaults.size_px) return NeedsOther("segmenter-size", "segmenter");
+    if (flags.mean != defaults.mean) return NeedsOther("segmenter-mean", "segmenter");
+    if (flags.scale != defaults.scale) return NeedsOther("segmenter-scale", "segmenter");
+    return std::nullopt;
+  }
   if (flags.model_file.empty() || flags.classes_file.empty()) {
     return MakeError(Reason::kFieldInvalid,
                      "--segmenter and --segmenter-classes go together; give both",

@@ -26,7 +26,8 @@ struct SegmenterFlags {
 void AddSegmenterFlags(CLI::App* app, SegmenterFlags* flags);
 
 /// nullopt without --segmenter.
-/// Errors: INVALID_ARGUMENT/FIELD_INVALID naming the flag; of MakeSegmentation.
+/// Errors: INVALID_ARGUMENT/FIELD_INVALID naming the flag, also of one that says nothing without
+/// --segmenter; of MakeSegmentation.
 absl::StatusOr<std::optional<Segmentation>> MakeSegmentation(const SegmenterFlags& flags);
 
 }  // namespace dsg::ingest

@@ -10,10 +10,18 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kTurnRadSMax = 20.0;
-// Poses of high rate jitter; over a few milliseconds that is not a speed.
-constexpr double kJitterM = 0.01;
-constexpr double kJitterRad = 0.01;
+constexpr OptionField<PathOptions> kPathFields[] = {
+    {"path-gap", &PathOptions::gap_ns_max, 0.001, 3600.0,
+     "Two poses farther apart do not tell where the robot was in between, seconds: half a second "
+     "of a turn in place"},
+    {"path-speed", &PathOptions::speed_m_s_max, 0.1, 1000.0,
+     "Fastest robot, metres / second; between poses that say faster it is nowhere: flying ones"},
+    {"path-turn", &PathOptions::turn_rad_s_max, 0.1, 1000.0,
+     "Fastest turn, radians / second: three turns a second"},
+    {"path-jitter", &PathOptions::jitter_m, 0.0, 10.0,
+     "Steps by this are no speed however little time they take, metres: poses of high rate jitter"},
+    {"path-turn-jitter", &PathOptions::jitter_rad, 0.0, 3.2, "The same of turns, radians"},
+};
 
 Pose3d Between(const TimedPose& before, const TimedPose& after, TimeNs time_ns) {
   const double fraction = static_cast<double>(time_ns - before.time_ns) /
@@ -22,6 +30,12 @@ Pose3d Between(const TimedPose& before, const TimedPose& after, TimeNs time_ns) 
 }
 
 }  // namespace
+
+std::vector<BoundOption> PathOptions::Bind() {
+  std::vector<BoundOption> bound;
+  BindFields<PathOptions>(kPathFields, this, &bound);
+  return bound;
+}
 
 bool RobotPath::Add(const TimedPose& given) {
   const bool is_later = poses_.empty() || given.time_ns > poses_.back().time_ns;
@@ -61,8 +75,8 @@ bool RobotPath::IsJump(const TimedPose& from, const TimedPose& to) const {
   const double seconds = 1e-9 * static_cast<double>(to.time_ns - from.time_ns);
   const double step_m = (to.map_T_agent.position - from.map_T_agent.position).norm();
   const double turn_rad = AngleBetween(from.map_T_agent.orientation, to.map_T_agent.orientation);
-  return step_m > options_.speed_m_s_max * seconds + kJitterM ||
-         turn_rad > kTurnRadSMax * seconds + kJitterRad;
+  return step_m > options_.speed_m_s_max * seconds + options_.jitter_m ||
+         turn_rad > options_.turn_rad_s_max * seconds + options_.jitter_rad;
 }
 
 Pose3d RobotPath::ToMap(TimeNs time_ns, const Pose3d& odom_T_thing) const {

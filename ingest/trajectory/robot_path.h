@@ -4,7 +4,9 @@
 
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "ingest/config/option_field.h"
 #include "ingest/trajectory/pose_list.h"
 #include "ingest/trajectory/trajectory_change.h"
 #include "schema/base/time.h"
@@ -17,6 +19,13 @@ struct PathOptions {
   TimeNs gap_ns_max = 500'000'000;
   /// The robot does not move faster, m / s; between poses that say so it is nowhere.
   double speed_m_s_max = 20.0;
+  /// Nor does it turn faster.
+  double turn_rad_s_max = 20.0;
+  /// Poses of high rate jitter; over a few milliseconds that is not a speed.
+  double jitter_m = 0.01;
+  double jitter_rad = 0.01;
+
+  std::vector<BoundOption> Bind();
 };
 
 /// The log's poses are those of the odometry frame. Without a correction that is the map frame; a

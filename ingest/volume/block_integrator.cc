@@ -8,31 +8,24 @@ namespace dsg::ingest {
 namespace {
 
 constexpr float kReadingNearM = 0.05f;
-// Readings nearer than this are not better for it.
-constexpr float kFullWeightM = 1.0f;
-// About 35 looks from three metres: enough to average noise away, few enough to forget what has
-// been taken away.
-constexpr float kWeightMax = 4.0f;
-// Free space gathers less: distances in front of a surface are cut to far more than can be read
-// behind one, and what is put down would take minutes to appear.
-constexpr float kFreeWeightMax = 1.0f;
-// Of the weight of a look from straight ahead; slanted surfaces are measured worse.
-constexpr float kSlantedMin = 0.05f;
-// Of the weight: a look that takes a voxel to be more than a voxel inside, against what has been
-// seen of it from its own side, where a wall is thin.
-constexpr float kThroughWall = 0.3f;
-// Where labels and colours are kept, in voxels: the corners in front of the cubes that the surface
-// cuts, and a little behind. The far side of a thin wall must not take this side's.
-constexpr float kLabelBefore = 1.5f;
-constexpr float kLabelBehind = 0.5f;
-constexpr int kColorCountMax = 16;
 
 }  // namespace
+
+BlockIntegrator::Numbers::Numbers(const FusionOptions& options)
+    : full_weight_m(static_cast<float>(options.full_weight_m)),
+      weight_max(static_cast<float>(options.weight_max)),
+      free_weight_max(static_cast<float>(options.free_weight_max)),
+      slanted_min(static_cast<float>(options.slanted_min)),
+      through_wall(static_cast<float>(options.through_wall)),
+      label_before_voxels(static_cast<float>(options.label_before_voxels)),
+      label_behind_voxels(static_cast<float>(options.label_behind_voxels)),
+      color_count_max(options.color_count_max) {}
 
 BlockIntegrator::BlockIntegrator(const FrameView& view, const VolumeOptions& options,
                                  const std::vector<uint32_t>& instance_of_label)
     : view_(view),
       options_(options),
+      numbers_(options.fusion),
       instance_of_label_(instance_of_label),
       camera_T_map_(view.frame().map_T_camera.Inverse()),
       steps_((camera_T_map_.orientation.toRotationMatrix() * options.voxel_m).cast<float>()),
@@ -77,7 +70,7 @@ void BlockIntegrator::FuseRow(const Eigen::Vector3f& start, const Eigen::Vector3
     if (distance <= -behind_m) continue;
     if (distance < view_.band().truncation_m) {
       const float cosine = scale / std::sqrt(x * x + y * y + 1.0f);
-      float weight = WeightAt(p.z()) * std::max(cosine * cosine, kSlantedMin);
+      float weight = WeightAt(p.z()) * std::max(cosine * cosine, numbers_.slanted_min);
       if (distance < 0.0f) weight *= 1.0f + distance / behind_m;
       FuseSurface(reading, distance, weight, block, first + i);
     } else {
@@ -87,7 +80,7 @@ void BlockIntegrator::FuseRow(const Eigen::Vector3f& start, const Eigen::Vector3
 }
 
 float BlockIntegrator::WeightAt(float depth) const {
-  const float inverse = std::min(kFullWeightM / depth, 1.0f);
+  const float inverse = std::min(numbers_.full_weight_m / depth, 1.0f);
   const float weight = inverse * inverse;
   return view_.frame().is_stereo ? weight * weight : weight;
 }
@@ -100,7 +93,7 @@ void BlockIntegrator::FuseDistance(float distance, float weight, float weight_ma
 
 void BlockIntegrator::FuseFree(float depth, VoxelBlock* block, int index) const {
   Voxel& voxel = block->voxels[index];
-  FuseDistance(view_.band().truncation_m, WeightAt(depth), kFreeWeightMax, &voxel);
+  FuseDistance(view_.band().truncation_m, WeightAt(depth), numbers_.free_weight_max, &voxel);
   block->updated = true;
 }
 
@@ -108,15 +101,15 @@ void BlockIntegrator::FuseSurface(const Reading& reading, float distance, float 
                                   VoxelBlock* block, int index) const {
   Voxel& voxel = block->voxels[index];
   if (distance < -view_.band().voxel_m && voxel.IsSeen() && voxel.distance_m > 0.0f) {
-    weight *= kThroughWall;
+    weight *= numbers_.through_wall;
   }
-  FuseDistance(std::max(distance, -view_.band().truncation_m), weight, kWeightMax, &voxel);
+  FuseDistance(std::max(distance, -view_.band().truncation_m), weight, numbers_.weight_max, &voxel);
   block->updated = true;
   block->has_surface = true;
   block->first_surface_ns = std::min(block->first_surface_ns, view_.frame().time_ns);
   block->last_surface_ns = std::max(block->last_surface_ns, view_.frame().time_ns);
-  if (distance > kLabelBefore * view_.band().voxel_m ||
-      distance < -kLabelBehind * view_.band().voxel_m ||
+  if (distance > numbers_.label_before_voxels * view_.band().voxel_m ||
+      distance < -numbers_.label_behind_voxels * view_.band().voxel_m ||
       !view_.IsInsideSurface(reading.column, reading.row)) {
     return;
   }
@@ -126,7 +119,7 @@ void BlockIntegrator::FuseSurface(const Reading& reading, float distance, float 
 }
 
 void BlockIntegrator::FuseColor(size_t pixel, Voxel* voxel) const {
-  if (voxel->color_count < kColorCountMax) ++voxel->color_count;
+  if (voxel->color_count < numbers_.color_count_max) ++voxel->color_count;
   const int count = voxel->color_count;
   for (size_t channel = 0; channel < 3; ++channel) {
     const int old = voxel->rgb[channel];

@@ -36,8 +36,23 @@ class BlockIntegrator {
   void FuseLabel(uint16_t label, VoxelBlock* block, int index) const;
   float WeightAt(float depth) const;
 
+  /// FusionOptions, as voxels need them.
+  struct Numbers {
+    explicit Numbers(const FusionOptions& options);
+
+    float full_weight_m;
+    float weight_max;
+    float free_weight_max;
+    float slanted_min;
+    float through_wall;
+    float label_before_voxels;
+    float label_behind_voxels;
+    int color_count_max;
+  };
+
   const FrameView& view_;
   const VolumeOptions& options_;
+  Numbers numbers_;
   const std::vector<uint32_t>& instance_of_label_;
   Pose3d camera_T_map_;
   Eigen::Matrix3f steps_;

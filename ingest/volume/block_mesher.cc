@@ -15,8 +15,6 @@
 namespace dsg::ingest {
 namespace {
 
-// Smaller pieces are noise: a lone voxel behind a surface makes eight faces.
-constexpr int kSpeckFaces = 12;
 // Vertices keep off the voxels' centres, or faces would shrink to nothing.
 constexpr float kFractionMin = 0.01f;
 constexpr uint32_t kNoColor = 0x808080;
@@ -243,9 +241,9 @@ void BlockMesher::DropSpecks() {
   bool drops_some = false;
   for (size_t i = 0; i < mesh_.faces.size(); ++i) {
     const size_t part = part_of(i);
-    if (face_count[part] >= kSpeckFaces) continue;
+    if (face_count[part] >= field_.speck_face_count()) continue;
     auto [found, is_new] = is_speck.try_emplace(part, false);
-    if (is_new) found->second = field_.IsSpeck(cell_of_face_[i], kSpeckFaces);
+    if (is_new) found->second = field_.IsSpeck(cell_of_face_[i]);
     if (!found->second) continue;
     is_kept[i] = 0;
     drops_some = true;

@@ -11,26 +11,6 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kTruncationVoxels = 3.0;
-// The corners of a cut cube lie up to the square root of three voxels behind its surface.
-constexpr float kBehindVoxels = 2.0f;
-// Standard deviation of depth near by and at a metre, growing with the square of the distance: what
-// docs/sensor_logs.md states for the simulated depth camera, not measured on a real one; and a
-// quarter of a pixel of disparity at a baseline of 0.1 m.
-constexpr float kNoiseM = 0.0025f;
-constexpr float kNoisePerM2 = 0.002f;
-constexpr float kStereoNoisePerM2 = 0.006f;
-constexpr float kNoiseSpread = 2.5f;
-// Free space ends this far before a person, besides the truncation: clothes, limbs, mask rims.
-constexpr float kPersonMarginM = 0.1f;
-// Slanted surfaces are measured badly; a wrong direction should not make distances vanish.
-constexpr float kScaleMin = 0.15f;
-// Depth jumps are looked for this many pixels away: outlines of labels wander, but a wider rim
-// would leave small things without a vote.
-constexpr int kEdgePixels = 1;
-constexpr float kEdgeM = 0.2f;
-constexpr float kEdgePerM2 = 0.02f;
-
 absl::Status Bad(const std::string& field, const std::string& value, const std::string& bound) {
   return MakeError(Reason::kFieldInvalid,
                    absl::StrCat("depth frame: ", field, " is ", value, "; it must be ", bound),
@@ -49,7 +29,7 @@ BandLengths::BandLengths(const VolumeOptions& options)
     : voxel_m(static_cast<float>(options.voxel_m)),
       truncation_m(static_cast<float>(options.truncation_m > 0.0
                                           ? options.truncation_m
-                                          : kTruncationVoxels * options.voxel_m)) {}
+                                          : options.fusion.truncation_voxels * options.voxel_m)) {}
 
 absl::Status FrameView::Check(const DepthFrame& frame, double voxel_m) {
   DSG_RETURN_IF_ERROR(frame.camera.Validate());
@@ -76,16 +56,24 @@ absl::Status FrameView::Check(const DepthFrame& frame, double voxel_m) {
 FrameView::FrameView(const DepthFrame& frame, const VolumeOptions& options)
     : frame_(&frame),
       band_(options),
-      near_behind_m_(std::min(band_.truncation_m, kBehindVoxels * band_.voxel_m)),
-      noise_m_(kNoiseSpread * kNoiseM),
-      noise_per_m2_(kNoiseSpread * (frame.is_stereo ? kStereoNoisePerM2 : kNoisePerM2)),
+      near_behind_m_(std::min(band_.truncation_m,
+                              static_cast<float>(options.fusion.behind_voxels) * band_.voxel_m)),
+      noise_m_(static_cast<float>(options.fusion.noise_spread) *
+               static_cast<float>(options.fusion.noise_m)),
+      noise_per_m2_(static_cast<float>(options.fusion.noise_spread) *
+                    static_cast<float>(frame.is_stereo ? options.fusion.stereo_noise_per_m2
+                                                       : options.fusion.noise_per_m2)),
+      scale_min_(static_cast<float>(options.fusion.scale_min)),
+      edge_px_(options.fusion.edge_px),
+      edge_m_(static_cast<float>(options.fusion.edge_m)),
+      edge_per_m2_(static_cast<float>(options.fusion.edge_per_m2)),
       reach_(MakeReach(options)),
       pyramid_(reach_, frame.camera.width, frame.camera.height),
-      normals_(reach_, frame.camera, options.thread_count) {}
+      normals_(reach_, frame.camera, options.fusion, options.thread_count) {}
 
 std::vector<float> FrameView::MakeReach(const VolumeOptions& options) {
   const float range = static_cast<float>(options.range_m);
-  const float person_gap = band_.truncation_m + kPersonMarginM;
+  const float person_gap = band_.truncation_m + static_cast<float>(options.fusion.person_margin_m);
   const bool sees_people = !frame_->dynamic.empty();
   std::vector<float> reach(frame_->depth_m.size(), 0.0f);
   for (size_t i = 0; i < reach.size(); ++i) {
@@ -138,19 +126,19 @@ bool FrameView::Read(float u, float v, Reading* reading) const {
 float FrameView::DistanceScale(const Reading& reading, float x, float y) const {
   const Eigen::Vector3f& normal = normals_.At(reading.column, reading.row);
   if (normal.isZero()) return std::sqrt(x * x + y * y + 1.0f);
-  return std::max(normal.x() * x + normal.y() * y + normal.z(), kScaleMin);
+  return std::max(normal.x() * x + normal.y() * y + normal.z(), scale_min_);
 }
 
 bool FrameView::IsInsideSurface(int column, int row) const {
-  if (column < kEdgePixels || row < kEdgePixels || column >= frame_->camera.width - kEdgePixels ||
-      row >= frame_->camera.height - kEdgePixels) {
+  if (column < edge_px_ || row < edge_px_ || column >= frame_->camera.width - edge_px_ ||
+      row >= frame_->camera.height - edge_px_) {
     return false;
   }
   const float* center = &reach_[Offset(column, row)];
-  const std::ptrdiff_t down = std::ptrdiff_t{kEdgePixels} * frame_->camera.width;
+  const std::ptrdiff_t down = std::ptrdiff_t{edge_px_} * frame_->camera.width;
   const float depth = *center;
-  const float tolerance = kEdgeM + kEdgePerM2 * depth * depth;
-  for (const std::ptrdiff_t step : {std::ptrdiff_t{kEdgePixels}, down}) {
+  const float tolerance = edge_m_ + edge_per_m2_ * depth * depth;
+  for (const std::ptrdiff_t step : {std::ptrdiff_t{edge_px_}, down}) {
     const float before = center[-step];
     const float after = center[step];
     if (before <= 0.0f || after <= 0.0f) return false;

@@ -77,6 +77,10 @@ class FrameView {
   float near_behind_m_;
   float noise_m_;
   float noise_per_m2_;
+  float scale_min_;
+  int edge_px_;
+  float edge_m_;
+  float edge_per_m2_;
   int64_t used_count_ = 0;
   int64_t dynamic_count_ = 0;
   std::vector<float> reach_;

@@ -11,18 +11,6 @@ namespace dsg::ingest {
 namespace {
 
 constexpr size_t kLabelCount = 65536;
-// Every so many columns and rows.
-constexpr int kStride = 4;
-// A segment with fewer samples starts no instance: about 100 pixels.
-constexpr int kSamplesMin = 6;
-constexpr int kVotesMin = 3;
-// An instance is a segment's when it has this share of the segment's samples, and this share of
-// those that hit any instance.
-constexpr double kShareOfSamples = 0.1;
-constexpr double kShareOfMapped = 0.3;
-// Instances are joined when so many more frames showed them as one than as two.
-constexpr int kJoinFrames = 5;
-constexpr int kApartFrames = 2;
 
 class VoxelFinder {
  public:
@@ -88,8 +76,9 @@ std::vector<InstanceMatcher::Vote> InstanceMatcher::CollectVotes(const FrameView
   const double shift_m = 0.5 * view.band().voxel_m;
   absl::flat_hash_map<uint64_t, int> counts;
   VoxelFinder finder(blocks);
-  for (int row = kStride / 2; row < camera.height; row += kStride) {
-    for (int column = kStride / 2; column < camera.width; column += kStride) {
+  const int stride = options_.stride_px;
+  for (int row = stride / 2; row < camera.height; row += stride) {
+    for (int column = stride / 2; column < camera.width; column += stride) {
       const uint16_t label = view.frame().labels[view.Offset(column, row)];
       const float depth = view.Reach(column, row);
       if ((label & 0xff) == 0 || label >> 8 == 0 || depth <= 0.0f) continue;
@@ -125,8 +114,9 @@ void InstanceMatcher::Assign(const std::vector<Vote>& votes) {
   std::vector<Vote> further;
   for (const Vote& vote : votes) {
     Segment& segment = segments_[vote.segment];
-    if (vote.count < kVotesMin || vote.count < kShareOfSamples * segment.samples ||
-        vote.count < kShareOfMapped * segment.mapped) {
+    if (vote.count < options_.vote_count_min ||
+        vote.count < options_.share_of_samples * segment.samples ||
+        vote.count < options_.share_of_mapped * segment.mapped) {
       continue;
     }
     if (segment.instance != 0) {
@@ -144,7 +134,7 @@ void InstanceMatcher::Assign(const std::vector<Vote>& votes) {
 
 void InstanceMatcher::MakeNewInstances() {
   for (Segment& segment : segments_) {
-    if (segment.instance != 0 || segment.samples < kSamplesMin) continue;
+    if (segment.instance != 0 || segment.samples < options_.sample_count_min) continue;
     segment.instance = book_.Add(segment.label >> 8);
     if (segment.instance != 0) instances_.emplace_back();
   }
@@ -158,7 +148,8 @@ void InstanceMatcher::NoteApart() {
   std::set<uint32_t> shown;
   for (const Segment& segment : segments_) shown.insert(segment.instance);
   for (auto& [pair, frames] : covered_) {
-    if (shown.count(pair.first) > 0 && shown.count(pair.second) > 0) frames -= kApartFrames;
+    if (shown.count(pair.first) > 0 && shown.count(pair.second) > 0)
+      frames -= options_.apart_frame_count;
   }
 }
 
@@ -167,7 +158,7 @@ void InstanceMatcher::JoinOften() {
     const uint32_t a = book_.Root(at->first.first);
     const uint32_t b = book_.Root(at->first.second);
     const bool is_stale = at->first != std::pair(a, b) || a == b;
-    if (!is_stale && at->second < kJoinFrames) {
+    if (!is_stale && at->second < options_.join_frame_count) {
       ++at;
       continue;
     }

@@ -20,6 +20,8 @@ namespace dsg::ingest {
 /// Threads: one caller at a time.
 class InstanceMatcher {
  public:
+  explicit InstanceMatcher(const InstanceOptions& options) : options_(options) {}
+
   /// Fills in `instance_of_label`: map instance of each label, 0 = none. Makes new instances.
   void Match(const FrameView& view, const BlockMap& blocks);
 
@@ -59,6 +61,7 @@ class InstanceMatcher {
   void NoteApart();
   void JoinOften();
 
+  InstanceOptions options_;
   InstanceBook book_;
   std::vector<Instance> instances_{1};
   std::vector<Segment> segments_;

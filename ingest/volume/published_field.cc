@@ -15,9 +15,6 @@ namespace {
 
 constexpr int16_t kUnpublished = std::numeric_limits<int16_t>::min();
 constexpr float kFullScale = 32000.0f;
-// In voxels: noise of a converged distance is below this, and it adds nothing to the error of a
-// mesh, which is several times as large.
-constexpr float kStill = 0.15f;
 // In voxels: the corners of cut cubes are nearer than this.
 constexpr float kNearSurface = 1.75f;
 // Of the truncation: such distances have been cut, and say nothing of where the surface is.
@@ -25,12 +22,13 @@ constexpr float kUncut = 0.99f;
 
 }  // namespace
 
-PublishedField::PublishedField(const BlockMap& blocks, const BandLengths& band)
-    : blocks_(blocks), band_(band), step_m_(band.truncation_m / kFullScale) {}
+PublishedField::PublishedField(const BlockMap& blocks, const BandLengths& band,
+                               const MeshingOptions& options)
+    : blocks_(blocks), band_(band), options_(options), step_m_(band.truncation_m / kFullScale) {}
 
 std::optional<Eigen::AlignedBox3i> PublishedField::Publish(VoxelBlock* block) const {
   const float near_m = kNearSurface * band_.voxel_m;
-  const float still = kStill * band_.voxel_m / step_m_;
+  const float still = static_cast<float>(options_.still_voxels) * band_.voxel_m / step_m_;
   const Eigen::Vector3i low =
       Eigen::Vector3i(block->key.x, block->key.y, block->key.z) * VoxelBlock::kSide;
   Eigen::AlignedBox3i changed;
@@ -93,7 +91,7 @@ int PublishedField::CaseAt(const Eigen::Vector3i& cell) const {
   return CaseOf(corners);
 }
 
-bool PublishedField::IsSpeck(const Eigen::Vector3i& cell, int face_count) const {
+bool PublishedField::IsSpeck(const Eigen::Vector3i& cell) const {
   const CubeTable& table = CubeTable::Get();
   const auto key = [](const Eigen::Vector3i& c) { return std::tuple(c.x(), c.y(), c.z()); };
   std::set<std::tuple<int, int, int>> seen{key(cell)};
@@ -105,7 +103,7 @@ bool PublishedField::IsSpeck(const Eigen::Vector3i& cell, int face_count) const 
     const int inside = CaseAt(at);
     if (inside == 0) continue;
     faces += static_cast<int>(table.Triangles(inside).size());
-    if (faces >= face_count) return false;
+    if (faces >= options_.speck_face_count) return false;
     const int crossed = table.CrossedEdges(inside);
     for (int face = 0; face < 6; ++face) {
       const int axis = face / 2;

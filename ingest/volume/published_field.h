@@ -17,10 +17,10 @@ namespace dsg::ingest {
 /// Threads: reading from many.
 class PublishedField {
  public:
-  PublishedField(const BlockMap& blocks, const BandLengths& band);
+  PublishedField(const BlockMap& blocks, const BandLengths& band, const MeshingOptions& options);
 
-  /// Takes over the distances of the block's voxels that have moved by more than a seventh of a
-  /// voxel. Returns the voxels (of the whole map) around which the mesh changes.
+  /// Takes over the distances of the block's voxels that have moved by more than still_voxels.
+  /// Returns the voxels (of the whole map) around which the mesh changes.
   std::optional<Eigen::AlignedBox3i> Publish(VoxelBlock* block) const;
 
   /// NaN where nothing has been seen.
@@ -32,12 +32,15 @@ class PublishedField {
   int CaseOf(const std::array<float, 8>& corners) const;
   int CaseAt(const Eigen::Vector3i& cell) const;
 
-  /// The surface through the cell has fewer than `face_count` faces in all.
-  bool IsSpeck(const Eigen::Vector3i& cell, int face_count) const;
+  /// Surfaces of fewer faces are specks.
+  int speck_face_count() const { return options_.speck_face_count; }
+  /// The surface through the cell has fewer faces in all.
+  bool IsSpeck(const Eigen::Vector3i& cell) const;
 
  private:
   const BlockMap& blocks_;
   BandLengths band_;
+  MeshingOptions options_;
   float step_m_;
 };
 

@@ -51,8 +51,9 @@ class SemanticVolume::Impl {
   explicit Impl(const VolumeOptions& options)
       : options_(options),
         blocks_(options.voxel_m, options.spill),
-        field_(blocks_, BandLengths(options)),
-        meaning_(options.label_confidence) {}
+        field_(blocks_, BandLengths(options), options.meshing),
+        meaning_(options.label_confidence),
+        matcher_(options.instances) {}
 
   const VolumeOptions& options() const { return options_; }
   VolumeCounts counts() const {

@@ -12,6 +12,7 @@
 #include "ingest/grid/occupancy_grid.h"
 #include "ingest/sensor/depth_frame.h"
 #include "ingest/trajectory/trajectory_change.h"
+#include "ingest/volume/fusion_options.h"
 #include "ingest/volume/spill_options.h"
 #include "schema/model/mesh.h"
 
@@ -29,7 +30,7 @@ enum class DynamicMasking {
 
 struct VolumeOptions {
   double voxel_m = 0.05;
-  /// Distances are kept within this of a surface; 0 = three voxels.
+  /// Distances are kept within this of a surface; 0 = FusionOptions::truncation_voxels.
   double truncation_m = 0.0;
   /// Readings further away are used to this distance only, as free space.
   double range_m = 10.0;
@@ -42,6 +43,12 @@ struct VolumeOptions {
   int64_t block_count_max = 220'000;
   /// How many of them stay in memory: those that frames did not show for longest go to disk.
   SpillOptions spill;
+  FusionOptions fusion;
+  InstanceOptions instances;
+  MeshingOptions meshing;
+
+  /// The numbers that change results, without those above that most users set.
+  std::vector<BoundOption> Bind();
 
   /// Errors: INVALID_ARGUMENT/FIELD_INVALID naming field, value and bounds.
   absl::Status Validate() const;

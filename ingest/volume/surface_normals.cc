@@ -11,11 +11,6 @@ namespace dsg::ingest {
 namespace {
 
 constexpr int kTile = 8;
-constexpr double kPixelsMin = 24.0;
-// Depth may leave the plane by this much, metres, and by this much more at a metre's distance,
-// growing with its square as the noise of depth cameras and stereo does.
-constexpr double kMisfitM = 0.02;
-constexpr double kMisfitPerM2 = 0.004;
 
 // Moments of x, y (image coordinates at z = 1, from the tile's centre) and inverse depth r.
 struct Moments {
@@ -49,8 +44,9 @@ struct Moments {
 };
 
 // Zero when the pixels are few, in line, or not on a plane.
-Eigen::Vector3f Fit(const Moments& m, double center_x, double center_y) {
-  if (m.count < kPixelsMin) return Eigen::Vector3f::Zero();
+Eigen::Vector3f Fit(const Moments& m, double center_x, double center_y,
+                    const FusionOptions& options) {
+  if (m.count < options.normal_pixel_count_min) return Eigen::Vector3f::Zero();
   const double mean_x = m.x / m.count;
   const double mean_y = m.y / m.count;
   const double mean_r = m.r / m.count;
@@ -66,7 +62,8 @@ Eigen::Vector3f Fit(const Moments& m, double center_x, double center_y) {
   const double misfit_r2 = (m.rr - mean_r * m.r - a * xr - b * yr) / m.count;
   const double depth = 1.0 / mean_r;
   const double misfit = std::sqrt(std::max(misfit_r2, 0.0)) * depth * depth;
-  if (misfit > kMisfitM + kMisfitPerM2 * depth * depth) return Eigen::Vector3f::Zero();
+  if (misfit > options.misfit_m + options.misfit_per_m2 * depth * depth)
+    return Eigen::Vector3f::Zero();
   const double c = mean_r - a * (mean_x + center_x) - b * (mean_y + center_y);
   const Eigen::Vector3d plane(a, b, c);
   return (plane / plane.norm()).cast<float>();
@@ -75,7 +72,7 @@ Eigen::Vector3f Fit(const Moments& m, double center_x, double center_y) {
 }  // namespace
 
 SurfaceNormals::SurfaceNormals(const std::vector<float>& reach, const CameraCalibration& camera,
-                               int thread_count)
+                               const FusionOptions& options, int thread_count)
     : width_((camera.width + kTile - 1) / kTile) {
   const int height = (camera.height + kTile - 1) / kTile;
   std::vector<Moments> tiles(size_t{1} * width_ * height);
@@ -107,8 +104,8 @@ SurfaceNormals::SurfaceNormals(const std::vector<float>& reach, const CameraCali
       const double center_x = (x * kTile + kCenter - camera.cx) * step_x;
       const double center_y = (y * kTile + kCenter - camera.cy) * step_y;
       Eigen::Vector3f& normal = normals_[tile_row * width_ + x];
-      normal = Fit(wide, center_x, center_y);
-      if (normal.isZero()) normal = Fit(tiles[tile_row * width_ + x], center_x, center_y);
+      normal = Fit(wide, center_x, center_y, options);
+      if (normal.isZero()) normal = Fit(tiles[tile_row * width_ + x], center_x, center_y, options);
     }
   });
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "ingest/sensor/calibration.h"
+#include "ingest/volume/fusion_options.h"
 
 namespace dsg::ingest {
 
@@ -16,7 +17,7 @@ class SurfaceNormals {
  public:
   /// `reach`: metres along the optical axis, positive where there is a surface.
   SurfaceNormals(const std::vector<float>& reach, const CameraCalibration& camera,
-                 int thread_count);
+                 const FusionOptions& options, int thread_count);
 
   /// Unit vector in the camera's frame that points away from the camera; zero = unknown.
   const Eigen::Vector3f& At(int column, int row) const {

@@ -42,7 +42,8 @@ absl::Status VolumeOptions::Validate() const {
     const double high = std::min(16.0 * voxel_m, range_m);
     DSG_RETURN_IF_ERROR(CheckWithin("truncation_m", truncation_m, 2.0 * voxel_m, high));
   }
-  DSG_RETURN_IF_ERROR(CheckWithin("label_confidence", label_confidence, 0.01, 0.999));
+  VolumeOptions options = *this;
+  DSG_RETURN_IF_ERROR(ValidateFields(options.Bind()));
   DSG_RETURN_IF_ERROR(ValidateOptions(spill));
   DSG_RETURN_IF_ERROR(CheckWithin("thread_count", thread_count, 1, 64));
   return CheckWithin("block_count_max", static_cast<double>(block_count_max), 1, 1e8);

@@ -10,6 +10,23 @@ import support
 
 SHIPPED = os.path.join(support.ROOT, "ingest", "configurations")
 
+# Of each group that a log with depth, labels and people concerns, a number that is far from its
+# default; each stage must have read it if the map is another.
+NUMBERS = {
+    "fusion, instances and mesh": ("volume-truncation", "2"),
+    "depth frames": ("depth-mask-growth", "30"),
+    "walls, floors and ceilings": ("structure-wall-area", "20"),
+    "places": ("place-block", "2"),
+    "rooms": ("room-ceiling-area", "40"),
+    "objects and their relations": ("object-cells", "60"),
+    "small things and things in hands": ("small-span", "0.05"),
+    "storeys and updates of layers": ("layers-ceiling-min", "15"),
+    "detections of people": ("person-ray", "1"),
+    "tracks of people": ("track-memory", "0.1"),
+    "contacts of people": ("contact-encounter", "50"),
+    "agents and their stays": ("agent-robot-half-size", "1"),
+}
+
 
 class Configuration(support.ProgramsTest):
     @classmethod
@@ -108,6 +125,45 @@ class Configuration(support.ProgramsTest):
             self.assertIn("\n" + name + ": ", text)
             self.assertIn("--" + name, whole)
             self.assertNotIn("--" + name, brief)
+
+    def content(self, map_name):
+        """All that a map says, without the name of the session that said it."""
+        out = self.path(map_name)
+        self.ok("dsg", "export", "--store", "numbers", "--map", map_name, "--spark",
+                out + ".json", "--ply", out + ".ply", "--pose-step", "0")
+        revisions = self.ask("log", "--store", "numbers", "--map", map_name)["revisions"]
+        with open(out + ".json", encoding="utf-8") as f:
+            graph = f.read()
+        with open(out + ".ply", "rb") as f:
+            mesh = f.read()
+        for revision in revisions:
+            graph = graph.replace(revision["session_id"], "")
+        return graph, mesh
+
+    def test_a_number_of_each_stage_makes_another_map(self):
+        self.ok("dsg-simulate", "sensors", "--world", "apartment", "--seed", "7", "--seconds", "5",
+                "--rate", "10", "--keyframe-every", "2", "--humans", "3", "--out", "sim")
+        def ingest(map_name, *options):
+            self.ok("dsg-ingest", "--quiet", "--store", "numbers", "--map", map_name, *options,
+                    os.path.join("sim", "log"))
+            return self.content(map_name)
+        usual = ingest("usual")
+        _, text = self.printed()
+        self.assertEqual(usual, ingest("again", "--config", self.write("all.yaml", text)))
+        for i, (group, (name, value)) in enumerate(NUMBERS.items()):
+            self.assertIn("# ---- Tuning: " + group + "\n", text)
+            self.assertIn("\n" + name + ": ", text)
+            self.assertNotEqual(usual, ingest(f"m{i}", "--" + name, value), name)
+
+    def test_what_only_a_network_reads_is_refused_without_one(self):
+        for options, words in ((["--segmenter-size", "256"], ["segmenter-size", "--segmenter"]),
+                               (["--detector-score", "0.9"], ["detector-score", "--detector"]),
+                               (["--person-look-period", "3"], ["look-period", "--detector"])):
+            self.refused(2, words, "dsg-ingest", "--store", "none", "--map", "m", *options,
+                         self.small)
+        self.refused(2, ["--quota"], "dsg-ingest", "--server", "unix:none.sock", "--map", "m",
+                     "--quota", "1GB", self.small)
+        self.assertFalse(os.path.exists(self.path("none")))
 
     def test_shipped_files_are_in_force(self):
         names = sorted(os.listdir(SHIPPED))

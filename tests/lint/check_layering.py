@@ -47,14 +47,15 @@ ALLOWED = {
     "ingest/files": BASE + ["schema/files"],
     "ingest/sensor": MODEL,
     "ingest/grid": MODEL,
-    "ingest/trajectory": MODEL + ["ingest/files"],
+    "ingest/trajectory": MODEL + ["ingest/config", "ingest/files"],
     "ingest/commit": SCHEMA + ["query/api", "query/client"],
-    "ingest/presence": MODEL,
+    "ingest/presence": MODEL + ["ingest/config"],
     "ingest/correction": SCHEMA + ["ingest/commit", "ingest/log", "ingest/loop",
                                    "ingest/trajectory"],
     "ingest/pipeline": (SCHEMA + INGEST_SHARED + INGEST_ROOMS +
                         [f"ingest/{s}" for s in INGEST_STAGES if s not in ASIDE]),
-    "ingest/program": SCHEMA + ["ingest/files", "ingest/log", "ingest/commit", "ingest/pipeline"],
+    "ingest/program": SCHEMA + ["ingest/config", "ingest/files", "ingest/log", "ingest/commit",
+                                "ingest/pipeline"],
     # The calls as C++, and the one client: below both the programs of query and those of ingest.
     "query/api": BASE,
     "query/client": CODEC + ["query/api"],

@@ -175,7 +175,28 @@ bool IsUsable(const ThingBox& thing) {
          thing.box_map.max().allFinite();
 }
 
+constexpr OptionField<ContactOptions> kFields[] = {
+    {"contact-encounter", &ContactOptions::encounter_m, 0.01, 100.0,
+     "People this near to each other meet, metres: the distance of a conversation"},
+    {"contact-pause", &ContactOptions::pause_ns, 0.0, 3600.0,
+     "Shorter pauses do not end an encounter, seconds: noise and doorways"},
+    {"contact-reach", &ContactOptions::reach_m, 0.01, 100.0,
+     "A hand this near to the box of a thing came near it, metres: what hands and boxes err by"},
+    {"contact-gap", &ContactOptions::gap_ns_max, 0.0, 3600.0,
+     "Between sightings farther apart nobody knows where a person or hand was, seconds: a step or "
+     "two"},
+    {"contact-hand-visibility", &ContactOptions::visibility_min, 0.0, 1.0,
+     "Hands that are less visible are not asked: they are where the network thinks that they "
+     "should be"},
+};
+
 }  // namespace
+
+std::vector<BoundOption> ContactOptions::Bind() {
+  std::vector<BoundOption> bound;
+  BindFields<ContactOptions>(kFields, this, &bound);
+  return bound;
+}
 
 std::vector<Contact> FindEncounters(const std::vector<AgentPath>& paths,
                                     const ContactOptions& options) {

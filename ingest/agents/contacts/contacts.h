@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "ingest/config/option_field.h"
 #include "schema/base/time.h"
 #include "schema/model/geometry.h"
 #include "schema/model/ids.h"
@@ -44,6 +45,10 @@ struct ContactOptions {
   /// Hand to box.
   double reach_m = 0.5;
   TimeNs gap_ns_max = 2'000'000'000;
+  /// Of a hand's joint.
+  double visibility_min = 0.3;
+
+  std::vector<BoundOption> Bind();
 };
 
 /// [from_ns, to_ns] during which two were within the distance, rounded to the nanosecond; exact

@@ -12,14 +12,6 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr int kSampleCount = 6000;
-constexpr double kBoxMarginPx = 2.0;
-constexpr double kSamePictureS = 0.02;
-// Half the reach of an adult's arms.
-constexpr float kBodyReachM = 0.6f;
-constexpr int kPixelsMin = 12;
-constexpr int kPatchPx = 2;
-
 // Hips, spine, neck, shoulders: what an arm in front of the camera does not show.
 constexpr std::array<size_t, 8> kTorsoJoints = {1, 2, 3, 6, 9, 12, 16, 17};
 
@@ -55,6 +47,7 @@ class PixelMapper {
 
 PixelRange BoxInDepth(const PlacedBody& body, const DepthFrame& depth, const PixelMapper& map) {
   const Eigen::Vector4d& box = body.detection->box_px;
+  const double margin_px = body.depth_options.box_margin_px;
   Eigen::AlignedBox2d range;
   for (const double u : {box[0], box[2]}) {
     for (const double v : {box[1], box[3]}) {
@@ -67,13 +60,14 @@ PixelRange BoxInDepth(const PlacedBody& body, const DepthFrame& depth, const Pix
     return static_cast<int>(std::clamp(std::round(value), 0.0, static_cast<double>(size)));
   };
   PixelRange pixels;
-  pixels.left = clamped(range.min().x() - kBoxMarginPx, depth.camera.width);
-  pixels.top = clamped(range.min().y() - kBoxMarginPx, depth.camera.height);
-  pixels.right = clamped(range.max().x() + kBoxMarginPx + 1.0, depth.camera.width);
-  pixels.bottom = clamped(range.max().y() + kBoxMarginPx + 1.0, depth.camera.height);
+  pixels.left = clamped(range.min().x() - margin_px, depth.camera.width);
+  pixels.top = clamped(range.min().y() - margin_px, depth.camera.height);
+  pixels.right = clamped(range.max().x() + margin_px + 1.0, depth.camera.width);
+  pixels.bottom = clamped(range.max().y() + margin_px + 1.0, depth.camera.height);
   const double area = static_cast<double>(pixels.right - pixels.left) *
                       static_cast<double>(pixels.bottom - pixels.top);
-  pixels.stride = std::max(1, static_cast<int>(std::lround(std::sqrt(area / kSampleCount))));
+  pixels.stride =
+      std::max(1, static_cast<int>(std::lround(std::sqrt(area / body.depth_options.sample_count))));
   return pixels;
 }
 
@@ -113,7 +107,8 @@ std::optional<uint16_t> FindLabel(const PlacedBody& body, const DepthFrame& dept
                                   const PixelRange& range) {
   const int instance = body.detection->mask_instance & 0xff;
   const double apart_s = 1e-9 * static_cast<double>(depth.time_ns - body.detection->time_ns);
-  if (instance == 0 || depth.labels.empty() || std::abs(apart_s) > kSamePictureS) {
+  if (instance == 0 || depth.labels.empty() ||
+      std::abs(apart_s) > body.depth_options.same_picture_s) {
     return std::nullopt;
   }
   std::map<uint16_t, int> counts;
@@ -124,7 +119,7 @@ std::optional<uint16_t> FindLabel(const PlacedBody& body, const DepthFrame& dept
                           static_cast<size_t>(pixel.u)]];
   }
   std::optional<uint16_t> best;
-  int best_count = kPixelsMin - 1;
+  int best_count = body.depth_options.pixel_count_min - 1;
   for (const auto& [label, count] : counts) {
     if (count <= best_count) continue;
     best = label;
@@ -137,18 +132,19 @@ std::optional<uint16_t> FindLabel(const PlacedBody& body, const DepthFrame& dept
 std::vector<PixelRange> TrunkPatches(const PlacedBody& body, const PixelRange& range,
                                      const PixelMapper& map) {
   std::vector<PixelRange> patches;
+  const int patch_px = body.depth_options.patch_px;
   for (const size_t joint : kTorsoJoints) {
     if (!body.detection->has_joints ||
-        body.detection->joint_visibility[joint] < kJointVisibilityMin) {
+        body.detection->joint_visibility[joint] < body.floor_options.visibility_min) {
       continue;
     }
     const auto pixel = map(body.detection->joints_px[joint]);
     if (!pixel.has_value() || !(pixel->cwiseAbs().maxCoeff() < 1e5)) continue;
     const int u = static_cast<int>(std::lround(pixel->x()));
     const int v = static_cast<int>(std::lround(pixel->y()));
-    patches.push_back({std::max(u - kPatchPx, range.left), std::max(v - kPatchPx, range.top),
-                       std::min(u + kPatchPx + 1, range.right),
-                       std::min(v + kPatchPx + 1, range.bottom), 1});
+    patches.push_back({std::max(u - patch_px, range.left), std::max(v - patch_px, range.top),
+                       std::min(u + patch_px + 1, range.right),
+                       std::min(v + patch_px + 1, range.bottom), 1});
   }
   if (patches.empty()) {
     const int width = range.right - range.left;
@@ -167,10 +163,11 @@ std::vector<Pixel> GatherByTrunk(const PlacedBody& body, const DepthFrame& depth
     const std::vector<Pixel> some = Gather(depth, patch, is_moving);
     trunk.insert(trunk.end(), some.begin(), some.end());
   }
-  if (std::ssize(trunk) < kPixelsMin) return {};
+  if (std::ssize(trunk) < body.depth_options.pixel_count_min) return {};
   const float middle_m = MedianDepth(trunk);
+  const auto reach_m = static_cast<float>(body.depth_options.reach_m);
   return Gather(depth, range, [&](size_t i) {
-    return is_moving(i) && std::abs(depth.depth_m[i] - middle_m) < kBodyReachM;
+    return is_moving(i) && std::abs(depth.depth_m[i] - middle_m) < reach_m;
   });
 }
 
@@ -188,11 +185,12 @@ BodyPixels FindBodyPixels(const PlacedBody& body, const DepthFrame& depth) {
   } else {
     pixels = GatherByTrunk(body, depth, range, map);
   }
-  if (std::ssize(pixels) < kPixelsMin) return result;
+  if (std::ssize(pixels) < body.depth_options.pixel_count_min) return result;
   // Labels spill over outlines, onto what is behind.
   const float middle_m = MedianDepth(pixels);
+  const auto reach_m = static_cast<float>(body.depth_options.reach_m);
   for (const Pixel& pixel : pixels) {
-    if (std::abs(pixel.depth_m - middle_m) > kBodyReachM) continue;
+    if (std::abs(pixel.depth_m - middle_m) > reach_m) continue;
     const Eigen::Vector3d ray((pixel.u - depth.camera.cx) / depth.camera.fx,
                               (pixel.v - depth.camera.cy) / depth.camera.fy, 1.0);
     result.points_map.push_back(depth.map_T_camera * (ray * static_cast<double>(pixel.depth_m)));

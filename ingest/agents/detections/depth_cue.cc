@@ -10,19 +10,6 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr int kTrunkCountMin = 10;
-// From the top of the head down to the shoulders and to the pelvis.
-constexpr double kTopShare = 0.97;
-constexpr double kShouldersBelowTopM = 0.30;
-constexpr double kPelvisBelowTopM = 0.85;
-// From the skin to the middle of the body.
-constexpr double kHalfBodyM = 0.11;
-constexpr double kRangeM = 0.045;
-constexpr double kRangePerM2 = 0.001;
-constexpr double kStereoPerM2 = 0.015;
-constexpr double kSideM = 0.035;
-constexpr double kHiddenSideM = 0.12;
-
 // Requires: not empty; 0 <= share <= 1. Changes the order.
 double Quantile(double share, std::vector<double>* values) {
   const auto at =
@@ -32,14 +19,15 @@ double Quantile(double share, std::vector<double>* values) {
   return *at;
 }
 
-std::vector<Eigen::Vector3d> TrunkOf(const std::vector<Eigen::Vector3d>& points) {
+std::vector<Eigen::Vector3d> TrunkOf(const std::vector<Eigen::Vector3d>& points,
+                                     const DepthCueOptions& options) {
   std::vector<double> heights;
   for (const Eigen::Vector3d& point : points) heights.push_back(point.z());
-  const double top = Quantile(kTopShare, &heights);
+  const double top = Quantile(options.top_share, &heights);
   std::vector<Eigen::Vector3d> trunk;
   for (const Eigen::Vector3d& point : points) {
     const double below_m = top - point.z();
-    if (below_m >= kShouldersBelowTopM && below_m <= kPelvisBelowTopM) trunk.push_back(point);
+    if (below_m >= options.shoulders_m && below_m <= options.pelvis_m) trunk.push_back(point);
   }
   return trunk;
 }
@@ -54,11 +42,12 @@ double MedianAlong(const Eigen::Vector3d& axis, const Eigen::Vector3d& from,
 }  // namespace
 
 std::optional<PositionCue> DepthImageCue(const PlacedBody& body, const DepthFrame& depth) {
+  const DepthCueOptions& options = body.depth_options;
   const BodyPixels pixels = FindBodyPixels(body, depth);
   const std::vector<Eigen::Vector3d>& points = pixels.points_map;
-  if (std::ssize(points) < kTrunkCountMin) return std::nullopt;
-  std::vector<Eigen::Vector3d> trunk = TrunkOf(points);
-  const bool is_trunk_seen = std::ssize(trunk) >= kTrunkCountMin;
+  if (std::ssize(points) < options.trunk_count_min) return std::nullopt;
+  std::vector<Eigen::Vector3d> trunk = TrunkOf(points, options);
+  const bool is_trunk_seen = std::ssize(trunk) >= options.trunk_count_min;
   if (!is_trunk_seen) trunk = points;
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& point : trunk) middle += point / static_cast<double>(trunk.size());
@@ -66,17 +55,19 @@ std::optional<PositionCue> DepthImageCue(const PlacedBody& body, const DepthFram
   const auto view = HorizontalView(camera_map, middle);
   if (!view.has_value()) return std::nullopt;
   const Eigen::Vector3d side(-view->y(), view->x(), 0.0);
-  const double range_m = MedianAlong(*view, camera_map, trunk) + kHalfBodyM;
+  const double range_m = MedianAlong(*view, camera_map, trunk) + options.half_body_m;
   const double side_m = MedianAlong(side, camera_map, trunk);
   PositionCue cue;
   cue.kind = PositionCue::Kind::kDepthImage;
   cue.torso_map = camera_map + *view * range_m + side * side_m;
   cue.torso_map.z() = body.torso_map.z();
   // Without a label it may be somebody else's trunk.
-  const double growth = (is_trunk_seen ? 1.0 : 2.0) * (pixels.is_by_instance ? 1.0 : 1.5);
-  const double per_m2 = depth.is_stereo ? kStereoPerM2 : kRangePerM2;
-  const double range_sigma_m = growth * (kRangeM + per_m2 * range_m * range_m);
-  const double side_sigma_m = growth * (kSideM + kHiddenSideM * (1.0 - body.visibility));
+  const double growth = (is_trunk_seen ? 1.0 : options.no_trunk_factor) *
+                        (pixels.is_by_instance ? 1.0 : options.no_label_factor);
+  const double per_m2 = depth.is_stereo ? options.stereo_per_m2 : options.range_per_m2;
+  const double range_sigma_m = growth * (options.range_m + per_m2 * range_m * range_m);
+  const double side_sigma_m =
+      growth * (options.side_m + options.hidden_side_m * (1.0 - body.visibility));
   cue.information_map = *view * view->transpose() / (range_sigma_m * range_sigma_m) +
                         side * side.transpose() / (side_sigma_m * side_sigma_m);
   return cue;

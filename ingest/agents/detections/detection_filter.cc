@@ -41,7 +41,23 @@ bool CountsAreRight(const HumanDetection& detection) {
          detection.vertices_root.size() % 3 == 0;
 }
 
+constexpr OptionField<DetectionFilterOptions> kFields[] = {
+    {"person-border", &DetectionFilterOptions::border_px, 0.0, 1000.0,
+     "Boxes this near to the image's border count as cut off, pixels: RSS 2020 rejects them, and "
+     "networks' boxes end some pixels before"},
+    {"person-side-min", &DetectionFilterOptions::side_px_min, 0.0, 10000.0,
+     "Larger side of a box at least, pixels: RSS 2020 has 30"},
+    {"person-score-min", &DetectionFilterOptions::score_min, 0.0, 1.0,
+     "Least score of a detection: logs have had their own threshold before"},
+};
+
 }  // namespace
+
+std::vector<BoundOption> DetectionFilterOptions::Bind() {
+  std::vector<BoundOption> bound;
+  BindFields<DetectionFilterOptions>(kFields, this, &bound);
+  return bound;
+}
 
 std::optional<std::string_view> WhyRejected(const HumanDetection& detection,
                                             const CameraCalibration& camera,

@@ -8,7 +8,9 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "ingest/config/option_field.h"
 #include "ingest/sensor/calibration.h"
 #include "ingest/sensor/human_detection.h"
 
@@ -20,6 +22,8 @@ struct DetectionFilterOptions {
   double border_px = 5.0;
   double side_px_min = 30.0;
   double score_min = 0.0;
+
+  std::vector<BoundOption> Bind();
 };
 
 /// Of a body that the image cuts off.

@@ -13,47 +13,24 @@ namespace {
 // SMPL's order. The ankles alone do not do: a doorstep hides the soles and makes metres of it.
 constexpr std::array<size_t, 2> kFootJoints = {10, 11};
 constexpr size_t kHead = 15;
-constexpr double kBorderPx = 3.0;
-constexpr double kContactPx = 3.0;
-constexpr double kContactM = 0.05;
-// The network's legs are not the person's.
-constexpr double kLegsM = 0.08;
-constexpr double kHiddenLegsM = 0.25;
-// From the middle of a foot to tip or heel, and down to the sole.
-constexpr double kTipM = 0.08;
-constexpr double kSoleBelowFootM = 0.055;
-constexpr double kRangeMinM = 0.4;
-constexpr double kRangeMaxM = 20.0;
-// A box without joints is a whole standing body when it is tall.
-constexpr double kStandingAspectMin = 2.0;
-constexpr double kBoxOnlyFactor = 2.0;
-constexpr double kTorsoHeightMinM = 0.15;
-constexpr double kTorsoHeightMaxM = 1.3;
-constexpr double kSkeletonHeightM = 0.05;
-constexpr double kHiddenSkeletonHeightM = 0.2;
-constexpr double kHeadJointToTopM = 0.17;
-// Of adults; a network that has a body's size wrong has it wrong in its skeleton too.
-constexpr double kStatureM = 0.08;
-// At the height of the camera a head says nothing of its distance.
-constexpr double kHeadAboveMinM = 0.2;
 
-bool FeetAreSeen(const HumanDetection& detection) {
+bool FeetAreSeen(const HumanDetection& detection, const FloorCueOptions& options) {
   if (!detection.has_joints) {
     const Eigen::Vector4d& box = detection.box_px;
-    return box[3] - box[1] >= kStandingAspectMin * (box[2] - box[0]);
+    return box[3] - box[1] >= options.aspect_min * (box[2] - box[0]);
   }
   return std::any_of(kFootJoints.begin(), kFootJoints.end(), [&](size_t joint) {
-    return detection.joint_visibility[joint] >= kJointVisibilityMin;
+    return detection.joint_visibility[joint] >= options.visibility_min;
   });
 }
 
-double ContactColumn(const HumanDetection& detection) {
+double ContactColumn(const HumanDetection& detection, double visibility_min) {
   const Eigen::Vector4d& box = detection.box_px;
   if (!detection.has_joints) return 0.5 * (box[0] + box[2]);
   double sum = 0.0;
   int count = 0;
   for (const size_t joint : kFootJoints) {
-    if (detection.joint_visibility[joint] < kJointVisibilityMin) continue;
+    if (detection.joint_visibility[joint] < visibility_min) continue;
     sum += detection.joints_px[joint].x();
     ++count;
   }
@@ -69,16 +46,18 @@ std::array<Eigen::Vector3d, 2> Feet(const PlacedBody& body) {
 
 // How far the nearest tip of a foot is from the pelvis, towards the camera negative.
 double NearestTipM(const PlacedBody& body, const Eigen::Vector3d& view) {
-  if (!body.detection->has_joints) return -kTipM;
+  const double tip_m = body.floor_options.tip_m;
+  if (!body.detection->has_joints) return -tip_m;
   const auto feet = Feet(body);
-  return std::min(view.dot(feet[0]), view.dot(feet[1])) - kTipM;
+  return std::min(view.dot(feet[0]), view.dot(feet[1])) - tip_m;
 }
 
 // Of the pelvis above the soles; nullopt when no person's are so long.
 std::optional<double> LegsM(const PlacedBody& body) {
+  const FloorCueOptions& options = body.floor_options;
   const auto feet = Feet(body);
-  const double legs_m = kSoleBelowFootM - std::min(feet[0].z(), feet[1].z());
-  if (!(legs_m >= kTorsoHeightMinM && legs_m <= kTorsoHeightMaxM)) return std::nullopt;
+  const double legs_m = options.sole_m - std::min(feet[0].z(), feet[1].z());
+  if (!(legs_m >= options.pelvis_m_min && legs_m <= options.pelvis_m_max)) return std::nullopt;
   return legs_m;
 }
 
@@ -91,7 +70,9 @@ std::optional<Eigen::Vector3d> MapRay(const PlacedBody& body, const Eigen::Vecto
 // Knows the horizontal distance along `view` alone.
 std::optional<PositionCue> RangeCue(const PlacedBody& body, const Eigen::Vector3d& view,
                                     double range_m, double sigma_m) {
-  if (!(range_m >= kRangeMinM && range_m <= kRangeMaxM)) return std::nullopt;
+  if (!(range_m >= body.floor_options.range_m_min && range_m <= body.floor_options.range_m_max)) {
+    return std::nullopt;
+  }
   PositionCue cue;
   cue.kind = PositionCue::Kind::kFloorContact;
   cue.torso_map = body.map_T_camera.position + view * range_m;
@@ -112,26 +93,31 @@ std::optional<Eigen::Vector3d> HorizontalView(const Eigen::Vector3d& camera_map,
 
 std::optional<PositionCue> FloorContactCue(const PlacedBody& body, double floor_z_map) {
   const HumanDetection& detection = *body.detection;
+  const FloorCueOptions& options = body.floor_options;
   const double bottom_px = detection.box_px[3];
-  if (bottom_px >= body.camera->height - 1 - kBorderPx || !FeetAreSeen(detection)) {
+  if (bottom_px >= body.camera->height - 1 - options.border_px ||
+      !FeetAreSeen(detection, options)) {
     return std::nullopt;
   }
   const double above_m = body.map_T_camera.position.z() - floor_z_map;
-  const auto ray = MapRay(body, {ContactColumn(detection), bottom_px});
+  const auto ray = MapRay(body, {ContactColumn(detection, options.visibility_min), bottom_px});
   // Upwards, or so flat that a pixel more is metres.
-  if (!ray.has_value() || !(above_m > 0.2) || !(ray->z() < -0.02)) return std::nullopt;
+  if (!ray.has_value() || !(above_m > options.camera_above_m) || !(ray->z() < -0.02))
+    return std::nullopt;
   const double contact_m = above_m * ray->head<2>().norm() / -ray->z();
   const Eigen::Vector3d view = Eigen::Vector3d(ray->x(), ray->y(), 0.0).normalized();
-  double sigma_m = contact_m * contact_m * kContactPx / (body.camera->fy * above_m) + kContactM;
-  sigma_m = std::hypot(sigma_m, kLegsM + kHiddenLegsM * (1.0 - body.visibility));
-  if (!detection.has_joints) sigma_m *= kBoxOnlyFactor;
+  double sigma_m =
+      contact_m * contact_m * options.contact_px / (body.camera->fy * above_m) + options.contact_m;
+  sigma_m = std::hypot(sigma_m, options.legs_m + options.hidden_legs_m * (1.0 - body.visibility));
+  if (!detection.has_joints) sigma_m *= options.box_factor;
   return RangeCue(body, view, contact_m - NearestTipM(body, view), sigma_m);
 }
 
 std::optional<PositionCue> HeadTopCue(const PlacedBody& body, double floor_z_map) {
   const HumanDetection& detection = *body.detection;
-  if (!detection.has_joints || detection.joint_visibility[kHead] < kJointVisibilityMin ||
-      detection.box_px[1] <= kBorderPx) {
+  const FloorCueOptions& options = body.floor_options;
+  if (!detection.has_joints || detection.joint_visibility[kHead] < options.visibility_min ||
+      detection.box_px[1] <= options.border_px) {
     return std::nullopt;
   }
   const auto ray = MapRay(body, {detection.joints_px[kHead].x(), detection.box_px[1]});
@@ -139,15 +125,16 @@ std::optional<PositionCue> HeadTopCue(const PlacedBody& body, double floor_z_map
   if (!ray.has_value() || !legs_m.has_value()) return std::nullopt;
   const double flat = ray->head<2>().norm();
   const Eigen::Vector3d& head = body.joints_map[kHead];
-  const double top_m = *legs_m + head.z() + kHeadJointToTopM;
+  const double top_m = *legs_m + head.z() + options.head_top_m;
   const double above_m = floor_z_map + top_m - body.map_T_camera.position.z();
-  if (!(std::abs(above_m) > kHeadAboveMinM) || !(ray->z() * above_m > 0.0) || !(flat > 0.05)) {
+  if (!(std::abs(above_m) > options.head_above_m) || !(ray->z() * above_m > 0.0) ||
+      !(flat > 0.05)) {
     return std::nullopt;
   }
   const double head_m = above_m * flat / ray->z();
   const Eigen::Vector3d view = Eigen::Vector3d(ray->x(), ray->y(), 0.0).normalized();
-  const double top_sigma_m =
-      std::hypot(kStatureM, kSkeletonHeightM + kHiddenSkeletonHeightM * (1.0 - body.visibility));
+  const double top_sigma_m = std::hypot(
+      options.stature_m, options.skeleton_m + options.hidden_skeleton_m * (1.0 - body.visibility));
   const double sigma_m = head_m * top_sigma_m / std::abs(above_m);
   return RangeCue(body, view, head_m - view.dot(head), sigma_m);
 }
@@ -159,7 +146,8 @@ PositionCue TorsoHeightCue(const PlacedBody& body, double floor_z_map, double st
     if (const auto legs_m = LegsM(body)) {
       height_m = *legs_m;
       sigma_m =
-          std::min(sigma_m, kSkeletonHeightM + kHiddenSkeletonHeightM * (1.0 - body.visibility));
+          std::min(sigma_m, body.floor_options.skeleton_m +
+                                body.floor_options.hidden_skeleton_m * (1.0 - body.visibility));
     }
   }
   PositionCue cue;

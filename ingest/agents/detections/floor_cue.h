@@ -7,6 +7,7 @@
 #include <array>
 #include <optional>
 
+#include "ingest/agents/detections/cue_options.h"
 #include "ingest/agents/person_observation.h"
 #include "ingest/sensor/calibration.h"
 #include "ingest/sensor/human_detection.h"
@@ -14,10 +15,7 @@
 
 namespace dsg::ingest {
 
-/// Joints that are less visible say nothing of where the body is.
-inline constexpr double kJointVisibilityMin = 0.25;
-
-/// A detection with what it says of the map's axes.
+/// A detection with what it says of the map's axes, and how it is read.
 struct PlacedBody {
   const HumanDetection* detection = nullptr;
   const CameraCalibration* camera = nullptr;
@@ -27,6 +25,8 @@ struct PlacedBody {
   std::array<Eigen::Vector3d, kJointCount> joints_map;
   /// 0 to 1; 1 without joints.
   double visibility = 1.0;
+  FloorCueOptions floor_options;
+  DepthCueOptions depth_options;
 };
 
 /// The distance at which the lowest seen pixel of the body meets the floor; nullopt when the feet

@@ -14,14 +14,11 @@
 namespace dsg::ingest {
 namespace {
 
-// Of somebody who lies or bends far, the horizontal part of "forward" is noise.
-constexpr double kForwardMin = 0.2;
-
-void SetTorso(const PersonInCamera& person, const Pose3d& map_T_camera,
+void SetTorso(const PersonInCamera& person, const Pose3d& map_T_camera, double forward_min,
               PersonObservation* observation) {
   const Pose3d map_T_torso = map_T_camera * person.camera_T_torso;
   const Eigen::Vector3d forward = map_T_torso.orientation * Eigen::Vector3d::UnitX();
-  observation->has_heading = person.has_heading && forward.head<2>().norm() >= kForwardMin;
+  observation->has_heading = person.has_heading && forward.head<2>().norm() >= forward_min;
   observation->heading_sigma_rad =
       observation->has_heading ? person.heading_sigma_rad : kNoHeadingSigmaRad;
   observation->map_T_torso.position = map_T_torso.position;
@@ -66,6 +63,8 @@ void AddCues(const HumanDetection& detection, const ObservationContext& context,
   body.map_T_camera = context.map_T_camera;
   body.torso_map = observation->map_T_torso.position;
   body.visibility = MeanVisibility(detection);
+  body.floor_options = options.floor;
+  body.depth_options = options.depth;
   if (detection.has_joints) {
     for (size_t j = 0; j < size_t{kJointCount}; ++j) {
       body.joints_map[j] = observation->map_T_torso.orientation * observation->joints_torso[j];
@@ -80,8 +79,9 @@ void AddCues(const HumanDetection& detection, const ObservationContext& context,
     if (const auto cue = DepthImageCue(body, *context.depth)) observation->cues.push_back(*cue);
   }
   if (options.is_height_used && context.floor_z_map.has_value()) {
-    observation->cues.push_back(TorsoHeightCue(body, *context.floor_z_map, options.torso_height_m,
-                                               options.torso_height_sigma_m));
+    observation->cues.push_back(TorsoHeightCue(body, *context.floor_z_map,
+                                               options.floor.torso_height_m,
+                                               options.floor.torso_height_sigma_m));
   }
 }
 
@@ -91,12 +91,13 @@ absl::StatusOr<PersonObservation> Observe(const HumanDetection& detection,
                                           const ObservationContext& context,
                                           const CueOptions& options) {
   DSG_CHECK(context.camera != nullptr);
-  DSG_ASSIGN_OR_RETURN(const PersonInCamera person, PlaceInCamera(detection, *context.camera));
+  DSG_ASSIGN_OR_RETURN(const PersonInCamera person,
+                       PlaceInCamera(detection, *context.camera, options.placement));
   PersonObservation observation;
   observation.joints_torso.fill(Eigen::Vector3d::Zero());
   observation.time_ns = detection.time_ns;
   observation.detection_id = detection.id;
-  SetTorso(person, context.map_T_camera, &observation);
+  SetTorso(person, context.map_T_camera, options.placement.forward_min, &observation);
   const Eigen::Quaterniond torso_R_root = observation.map_T_torso.orientation.conjugate() *
                                           context.map_T_camera.orientation * person.joints_turn;
   SetBody(detection, torso_R_root, &observation);

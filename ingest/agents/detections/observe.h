@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "absl/status/statusor.h"
+#include "ingest/agents/detections/cue_options.h"
 #include "ingest/agents/person_observation.h"
 #include "ingest/sensor/calibration.h"
 #include "ingest/sensor/depth_frame.h"
@@ -13,16 +14,6 @@
 #include "schema/model/geometry.h"
 
 namespace dsg::ingest {
-
-struct CueOptions {
-  /// False: nothing beyond the detection, as in the paper.
-  bool is_floor_used = true;
-  bool is_depth_used = true;
-  bool is_height_used = true;
-  /// Of a standing torso above its floor, metres.
-  double torso_height_m = 0.95;
-  double torso_height_sigma_m = 0.15;
-};
 
 /// What surrounds a detection.
 struct ObservationContext {

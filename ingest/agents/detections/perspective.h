@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "absl/status/statusor.h"
+#include "ingest/agents/detections/cue_options.h"
 #include "ingest/sensor/calibration.h"
 #include "ingest/sensor/human_detection.h"
 #include "schema/model/geometry.h"
@@ -38,7 +39,8 @@ struct PersonInCamera {
 /// the camera, or has nothing to place it by.
 /// Source: RSS 2020, section IV-A "Human Nodes"; Zheng et al. 2013 (PnP).
 absl::StatusOr<PersonInCamera> PlaceInCamera(const HumanDetection& detection,
-                                             const CameraCalibration& camera);
+                                             const CameraCalibration& camera,
+                                             const PlacementOptions& options);
 
 /// The pelvis by the weak camera alone: depth 2 f / (scale * crop), on the ray of its centre;
 /// nullopt when the detection has none, or it lies at no sensible depth.

@@ -10,14 +10,12 @@
 namespace dsg::ingest {
 namespace {
 
+// Weights have settled by then.
 constexpr int kReweightCount = 3;
-constexpr double kHuberPx = 4.0;
-constexpr double kNoisePxMin = 1.0;
 // Nearer joints have no sensible pixel.
 constexpr double kJointDepthMinM = 0.05;
 constexpr double kConditionMin = 1e-9;
-// Further, it is another body or a mirrored one.
-constexpr double kTurnMaxRad = 0.8;
+// Six unknowns take three joints; twice as many say whether they fit.
 constexpr int kSixDofJointsMin = 6;
 
 double ErrorPx(const SeenJoint& joint, double focal_px, const Eigen::Vector3d& at) {
@@ -55,7 +53,7 @@ double ReprojectionPx(const std::vector<SeenJoint>& joints, double focal_px,
 }
 
 std::optional<BodyPlacement> PlaceByTranslation(const std::vector<SeenJoint>& joints,
-                                                double focal_px) {
+                                                double focal_px, const PlacementOptions& options) {
   if (std::ssize(joints) < kPnpJointsMin) return std::nullopt;
   BodyPlacement placement;
   NormalEquations equations;
@@ -67,7 +65,7 @@ std::optional<BodyPlacement> PlaceByTranslation(const std::vector<SeenJoint>& jo
       if (round > 0) {
         const Eigen::Vector3d at = placement.root_camera + joint.root;
         const double error_px = ErrorPx(joint, focal_px, at);
-        weight *= error_px > kHuberPx ? kHuberPx / error_px : 1.0;
+        weight *= error_px > options.huber_px ? options.huber_px / error_px : 1.0;
         px_per_m /= std::max(at.z(), kJointDepthMinM);
       }
       Add(joint, weight, px_per_m, &equations);
@@ -85,13 +83,13 @@ std::optional<BodyPlacement> PlaceByTranslation(const std::vector<SeenJoint>& jo
   }
   placement.reprojection_px =
       ReprojectionPx(joints, focal_px, placement.root_camera, placement.turn);
-  const double noise_px = std::max(placement.reprojection_px, kNoisePxMin);
+  const double noise_px = std::max(placement.reprojection_px, options.noise_px_min);
   placement.covariance *= noise_px * noise_px;
   return placement;
 }
 
 std::optional<BodyPlacement> RefineSixDof(const std::vector<SeenJoint>& joints, double focal_px,
-                                          const BodyPlacement& start) {
+                                          const BodyPlacement& start, double turn_rad_max) {
   if (std::ssize(joints) < kSixDofJointsMin || start.root_camera.z() < kJointDepthMinM) {
     return std::nullopt;
   }
@@ -116,7 +114,7 @@ std::optional<BodyPlacement> RefineSixDof(const std::vector<SeenJoint>& joints, 
   const Eigen::Vector3d turn(rotation.at<double>(0), rotation.at<double>(1),
                              rotation.at<double>(2));
   const double angle = turn.norm();
-  if (!refined.root_camera.allFinite() || !(angle < kTurnMaxRad)) return std::nullopt;
+  if (!refined.root_camera.allFinite() || !(angle < turn_rad_max)) return std::nullopt;
   if (angle > 0.0) refined.turn = Eigen::Quaterniond(Eigen::AngleAxisd(angle, turn / angle));
   refined.reprojection_px = ReprojectionPx(joints, focal_px, refined.root_camera, refined.turn);
   if (!(refined.reprojection_px < start.reprojection_px)) return std::nullopt;

@@ -7,6 +7,8 @@
 #include <optional>
 #include <vector>
 
+#include "ingest/agents/detections/cue_options.h"
+
 namespace dsg::ingest {
 
 /// A joint and the ray on which it is seen.
@@ -32,12 +34,12 @@ inline constexpr int kPnpJointsMin = 4;
 /// kPnpJointsMin joints have a weight, or they do not tell the distance. May lie behind the
 /// camera, as mirrored joints do.
 std::optional<BodyPlacement> PlaceByTranslation(const std::vector<SeenJoint>& joints,
-                                                double focal_px);
+                                                double focal_px, const PlacementOptions& options);
 
 /// All six degrees of freedom from `start` on; nullopt unless it reprojects better in front of the
-/// camera without turning the body over.
+/// camera without turning the body by `turn_rad_max` or more.
 std::optional<BodyPlacement> RefineSixDof(const std::vector<SeenJoint>& joints, double focal_px,
-                                          const BodyPlacement& start);
+                                          const BodyPlacement& start, double turn_rad_max);
 
 /// Root of the weighted mean square, pixels; infinite when a joint is behind the camera.
 double ReprojectionPx(const std::vector<SeenJoint>& joints, double focal_px,

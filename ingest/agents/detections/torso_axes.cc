@@ -14,13 +14,9 @@ constexpr int kRightHip = 2;
 constexpr int kNeck = 12;
 constexpr int kLeftShoulder = 16;
 constexpr int kRightShoulder = 17;
+// Skeletons without a trunk, or in another unit, have no axes.
 constexpr double kLengthMinM = 0.02;
 constexpr double kLengthMaxM = 10.0;
-
-// Hidden bodies are guessed. Coefficients come from the whole picture, a joint from one place.
-constexpr double kPoseSigmaRad = 0.15;
-constexpr double kJointSigmaRad = 0.3;
-constexpr double kHiddenSigmaRad = 0.3;
 
 std::optional<Eigen::Quaterniond> FromJoints(const HumanDetection& detection) {
   if (!detection.has_joints) return std::nullopt;
@@ -58,18 +54,19 @@ Eigen::Quaterniond SmplFromTorso() {
 
 }  // namespace
 
-std::optional<TorsoAxes> FindTorsoAxes(const HumanDetection& detection) {
+std::optional<TorsoAxes> FindTorsoAxes(const HumanDetection& detection,
+                                       const PlacementOptions& options) {
   const std::optional<Eigen::Quaterniond> joints = FromJoints(detection);
   const std::optional<Eigen::Quaterniond> pose = FromPose(detection);
   if (!joints.has_value() && !pose.has_value()) return std::nullopt;
-  const double hidden_rad = kHiddenSigmaRad * (1.0 - MeanVisibility(detection));
-  if (!pose.has_value()) return TorsoAxes{*joints, kJointSigmaRad + hidden_rad};
+  const double hidden_rad = options.hidden_sigma_rad * (1.0 - MeanVisibility(detection));
+  if (!pose.has_value()) return TorsoAxes{*joints, options.joint_sigma_rad + hidden_rad};
   Eigen::Quaterniond turned = *pose;
   const Eigen::Quaterniond smpl = *pose * SmplFromTorso();
   if (joints.has_value() && AngleBetween(smpl, *joints) < AngleBetween(*pose, *joints)) {
     turned = smpl;
   }
-  return TorsoAxes{turned, kPoseSigmaRad + hidden_rad};
+  return TorsoAxes{turned, options.pose_sigma_rad + hidden_rad};
 }
 
 double MeanVisibility(const HumanDetection& detection) {

@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <optional>
 
+#include "ingest/agents/detections/cue_options.h"
 #include "ingest/sensor/human_detection.h"
 
 namespace dsg::ingest {
@@ -20,7 +21,8 @@ struct TorsoAxes {
 /// From the pelvis of the pose coefficients, else from hips, shoulders and neck; nullopt with
 /// neither. The pelvis' own axes are the torso's, or SMPL's (x left, y up, z forward) when the
 /// joints say so.
-std::optional<TorsoAxes> FindTorsoAxes(const HumanDetection& detection);
+std::optional<TorsoAxes> FindTorsoAxes(const HumanDetection& detection,
+                                       const PlacementOptions& options);
 
 /// Of the joints that the detection sees, 0 to 1; 1 without joints.
 double MeanVisibility(const HumanDetection& detection);

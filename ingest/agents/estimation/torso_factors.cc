@@ -27,15 +27,15 @@ Covariance6 BlockCovariance(const Eigen::Matrix3d& position, double tilt, double
 }
 
 PoseFactor DetectionFactor(TimeNs time_ns, const Pose3d& map_T_torso,
-                           const Eigen::Matrix3d& position_covariance_map,
-                           double heading_sigma_rad) {
+                           const Eigen::Matrix3d& position_covariance_map, double heading_sigma_rad,
+                           double tilt_sigma_rad) {
   PoseFactor factor;
   factor.type = "detection_prior";
   factor.from_ns = factor.to_ns = time_ns;
   factor.relative_pose = map_T_torso;
   const Eigen::Matrix3d position = position_covariance_map.llt().solve(Eigen::Matrix3d::Identity());
   const bool has_heading = heading_sigma_rad > 0.0;
-  const double tilt = has_heading ? 1.0 / (kTiltSigmaRad * kTiltSigmaRad) : kNoInformation;
+  const double tilt = has_heading ? 1.0 / (tilt_sigma_rad * tilt_sigma_rad) : kNoInformation;
   const double heading =
       has_heading ? 1.0 / (heading_sigma_rad * heading_sigma_rad) : kNoInformation;
   factor.information = BlockCovariance(position, tilt, heading);

@@ -11,16 +11,13 @@
 
 namespace dsg::ingest {
 
-/// Of rolling and pitching, which the graph leaves as the detection has them.
-inline constexpr double kTiltSigmaRad = 0.1;
-
 /// Upper triangle of a matrix with these diagonal blocks; heading about the torso's z axis.
 Covariance6 BlockCovariance(const Eigen::Matrix3d& position, double tilt, double heading);
 
 /// Of one detection. `heading_sigma_rad` 0 = it gives none.
 PoseFactor DetectionFactor(TimeNs time_ns, const Pose3d& map_T_torso,
-                           const Eigen::Matrix3d& position_covariance_map,
-                           double heading_sigma_rad);
+                           const Eigen::Matrix3d& position_covariance_map, double heading_sigma_rad,
+                           double tilt_sigma_rad);
 
 /// Between neighbours: `step` and the variances of what it leaves open.
 PoseFactor LinkFactor(const char* type, TimeNs from_ns, TimeNs to_ns, const Pose3d& step,

@@ -33,15 +33,11 @@ using StandingChain = StateChain<3>;
 using WalkingChain = StateChain<kSmoothStateCount>;
 using PositionChain = std::variant<StandingChain, WalkingChain>;
 
-// Warm starts need no more; each further detection brings further iterations.
-constexpr int kLiveIterationCount = 2;
-// A young track has no belief yet that a detection could contradict.
-constexpr size_t kYoungCount = 5;
-constexpr int kYoungIterationCount = 8;
 // Only where Ceres gives up.
 constexpr int kFallbackIterationCount = 30;
 // Links of nothing would be rigid beyond double precision.
 constexpr double kStepMinS = 1e-3;
+// A heading that nothing tells: half a turn.
 constexpr double kHeadingStart = 1.0 / (std::numbers::pi * std::numbers::pi);
 
 double StepS(TimeNs from_ns, TimeNs to_ns) {
@@ -146,8 +142,8 @@ void TorsoGraph::Impl::TakeEstimates(size_t first) {
         position);
     estimate.map_T_torso.orientation =
         Turned(detections[i].map_T_torso.orientation, heading.state(i)(0));
-    estimate.covariance =
-        BlockCovariance(covariance, kTiltSigmaRad * kTiltSigmaRad, heading.covariance(i)(0, 0));
+    estimate.covariance = BlockCovariance(
+        covariance, options.tilt_sigma_rad * options.tilt_sigma_rad, heading.covariance(i)(0, 0));
   }
 }
 
@@ -199,8 +195,10 @@ size_t TorsoGraph::SolveRecent() {
   const size_t lag = static_cast<size_t>(std::max(1, impl_->options.lag_count));
   const size_t first = count > lag ? count - lag : 0;
   impl_->Relinearise(first);
-  const bool is_young = first == 0 && count <= kYoungCount;
-  impl_->Solve(first, is_young ? kYoungIterationCount : kLiveIterationCount, is_young);
+  const TorsoOptions& options = impl_->options;
+  const bool is_young = first == 0 && count <= static_cast<size_t>(options.young_count);
+  impl_->Solve(first, is_young ? options.young_iteration_count : options.live_iteration_count,
+               is_young);
   return first;
 }
 
@@ -256,7 +254,7 @@ std::vector<PoseFactor> TorsoGraph::Factors(size_t first) const {
     if (i > 0) factors.push_back(impl_->LinkBefore(i));
     factors.push_back(DetectionFactor(detection.time_ns, detection.map_T_torso,
                                       detection.position_covariance_map,
-                                      detection.heading_sigma_rad));
+                                      detection.heading_sigma_rad, impl_->options.tilt_sigma_rad));
   }
   return factors;
 }

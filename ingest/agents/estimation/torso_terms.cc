@@ -15,8 +15,6 @@ using WalkTerm = ChainTerm<kSmoothStateCount>;
 
 constexpr int kVelocity = 3;
 constexpr int kLasting = 6;
-// Velocities up and down are forgotten sooner than those of a walk.
-constexpr double kVerticalMemoryS = 1.0;
 // Keeps a chain solvable that nothing ties to the map; far below any detection.
 constexpr double kWeakInformation = 1e-8;
 constexpr double kRayLengthMinM = 0.1;
@@ -57,7 +55,9 @@ AxisWalk WalkAxis(double sigma, double memory_s, double step_s) {
 }
 
 AxisWalk WalkAxis(const TorsoOptions& options, int axis, double step_s) {
-  if (axis == 2) return WalkAxis(options.vertical_acceleration_sigma, kVerticalMemoryS, step_s);
+  if (axis == 2) {
+    return WalkAxis(options.vertical_acceleration_sigma, options.vertical_memory_s, step_s);
+  }
   return WalkAxis(options.acceleration_sigma, options.walk_memory_s, step_s);
 }
 

@@ -10,13 +10,6 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr double kJointWeightPerM = 0.1;
-constexpr double kShapeWeight = 0.2;
-// What leaving an observation alone costs: more than any consistent pair, whose cost is cut below
-// it, so that one bad pair does not break two good ones.
-constexpr double kAloneCost = 16.0;
-constexpr double kPairCostMax = kAloneCost - 1.0;
-
 /// A track as it is expected at the image's stamp.
 struct Expected {
   const TrackEntry* track = nullptr;
@@ -29,27 +22,27 @@ double LogDeterminant(const Eigen::Matrix3d& covariance) {
   return std::log(covariance.determinant());
 }
 
-// kAloneCost for pairs that must not be.
+// options.alone_cost for pairs that must not be.
 double PairCost(const Expected& expected, const SeenPerson& seen, const ShapeStatistics& shapes,
                 const TrackerOptions& options) {
   const SkeletonDistance apart = Distance(expected.track->skeleton(), seen.skeleton);
-  if (!(apart.largest_m <= expected.reach_m)) return kAloneCost;
+  if (!(apart.largest_m <= expected.reach_m)) return options.alone_cost;
   const Eigen::Matrix3d& noise = seen.observation.position_covariance_map;
   const Eigen::Matrix3d covariance = expected.torso.covariance_map + noise;
   const Eigen::Vector3d off = seen.skeleton.torso - expected.torso.position_map;
   const double squared = off.dot(covariance.ldlt().solve(off));
-  if (!(squared <= options.gate)) return kAloneCost;
-  double cost = squared + kJointWeightPerM * apart.mean_m;
+  if (!(squared <= options.gate)) return options.alone_cost;
+  double cost = squared + options.joint_weight_per_m * apart.mean_m;
   // A track that could be anywhere is near everything: its width counts against it.
   cost += std::max(0.0, LogDeterminant(covariance) - LogDeterminant(noise));
   if (seen.shape.count > 0 && expected.track->shape().count > 0) {
     const double distance = shapes.SquaredDistance(expected.track->shape(), seen.shape);
-    if (distance > options.shape_gate) return kAloneCost;
-    cost += kShapeWeight * distance;
+    if (distance > options.shape_gate) return options.alone_cost;
+    cost += options.shape_weight * distance;
   } else if (expected.gap_ns > options.coast_ns) {
-    return kAloneCost;
+    return options.alone_cost;
   }
-  return std::min(cost, kPairCostMax);
+  return std::min(cost, options.alone_cost - 1.0);
 }
 
 }  // namespace
@@ -77,7 +70,7 @@ std::vector<int> AssignAll(const std::vector<TrackEntry*>& tracks,
   }
   track_of = MinimumAssignment(cost);
   for (size_t i = 0; i < seen.size(); ++i) {
-    if (track_of[i] >= 0 && cost(static_cast<Eigen::Index>(i), track_of[i]) >= kAloneCost) {
+    if (track_of[i] >= 0 && cost(static_cast<Eigen::Index>(i), track_of[i]) >= options.alone_cost) {
       track_of[i] = -1;
     }
   }

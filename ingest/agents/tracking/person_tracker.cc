@@ -45,20 +45,11 @@ std::string_view ToString(TrackState state) {
   return "unknown";
 }
 
-TrackerOptions PaperTrackerOptions() {
-  TrackerOptions options;
-  options.torso.model = TorsoModel::kPaper;
-  options.is_first_consistent = true;
-  // A graph of one node has no link, and says no more than its detection did.
-  options.confirm_hit_count = 2;
-  return options;
-}
-
 class PersonTracker::Impl {
  public:
   Impl(const TrackerOptions& options, const std::string& spill_folder)
       : options_(options),
-        shapes_(options.shape_noise_sigma, options.shape_spread_sigma),
+        shapes_(options.shape_noise_sigma, options.shape_spread_sigma, options.shape_prior),
         file_(spill_folder) {}
 
   bool Observe(TimeNs time_ns, std::vector<PersonObservation> observations);

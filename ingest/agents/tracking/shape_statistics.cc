@@ -4,11 +4,7 @@
 namespace dsg::ingest {
 namespace {
 
-// What is assumed counts as so many detections, and as so many people.
-constexpr double kAssumedNoiseCount = 50.0;
-constexpr double kAssumedPersonCount = 10.0;
-// A network errs alike from image to image: a mean never gets better than this share of the noise.
-constexpr double kSharedNoiseVariance = 0.06;
+// Networks that give everybody the same numbers must not divide by zero.
 constexpr double kVarianceMin = 1e-4;
 
 }  // namespace
@@ -33,8 +29,10 @@ void ShapeMean::Add(const ShapeMean& other) {
   count += other.count;
 }
 
-ShapeStatistics::ShapeStatistics(double noise_sigma, double spread_sigma)
-    : noise_variance_(noise_sigma * noise_sigma), spread_variance_(spread_sigma * spread_sigma) {}
+ShapeStatistics::ShapeStatistics(double noise_sigma, double spread_sigma, const ShapePrior& prior)
+    : noise_variance_(noise_sigma * noise_sigma),
+      spread_variance_(spread_sigma * spread_sigma),
+      prior_(prior) {}
 
 void ShapeStatistics::LearnNoise(const ShapeMean& person, const ShapeVector& shape) {
   if (person.count == 0) return;
@@ -53,20 +51,20 @@ void ShapeStatistics::LearnSpread(const ShapeMean& person) {
 }
 
 ShapeVector ShapeStatistics::NoiseOfMean(int64_t count) const {
-  const ShapeVector single = (kAssumedNoiseCount * noise_variance_ + noise_sum_.array()).matrix() /
-                             (kAssumedNoiseCount + static_cast<double>(noise_count_));
-  const double share = 1.0 / static_cast<double>(count) + kSharedNoiseVariance;
+  const ShapeVector single = (prior_.noise_count * noise_variance_ + noise_sum_.array()).matrix() /
+                             (prior_.noise_count + static_cast<double>(noise_count_));
+  const double share = 1.0 / static_cast<double>(count) + prior_.shared_noise;
   return (share * single).cwiseMax(kVarianceMin);
 }
 
 ShapeVector ShapeStatistics::Center() const {
-  return person_sum_ / (kAssumedPersonCount + static_cast<double>(person_count_));
+  return person_sum_ / (prior_.person_count + static_cast<double>(person_count_));
 }
 
 ShapeVector ShapeStatistics::Spread() const {
-  const double count = kAssumedPersonCount + static_cast<double>(person_count_);
+  const double count = prior_.person_count + static_cast<double>(person_count_);
   const ShapeVector square =
-      (kAssumedPersonCount * spread_variance_ + person_square_sum_.array()).matrix() / count;
+      (prior_.person_count * spread_variance_ + person_square_sum_.array()).matrix() / count;
   return (square - Center().cwiseAbs2()).cwiseMax(kVarianceMin);
 }
 

@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "ingest/agents/tracking/tracker_options.h"
 #include "ingest/sensor/human_detection.h"
 
 namespace dsg::ingest {
@@ -34,7 +35,7 @@ struct ShapeMean {
 class ShapeStatistics {
  public:
   /// Standard deviations of each coefficient: of one detection, and of people.
-  ShapeStatistics(double noise_sigma, double spread_sigma);
+  ShapeStatistics(double noise_sigma, double spread_sigma, const ShapePrior& prior = {});
 
   /// Another shape of a person whose mean before it is `person`.
   void LearnNoise(const ShapeMean& person, const ShapeVector& shape);
@@ -54,6 +55,7 @@ class ShapeStatistics {
 
   double noise_variance_;
   double spread_variance_;
+  ShapePrior prior_;
   int64_t noise_count_ = 0;
   ShapeVector noise_sum_ = ShapeVector::Zero();
   int64_t person_count_ = 0;

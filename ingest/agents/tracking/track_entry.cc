@@ -93,7 +93,9 @@ void TrackEntry::SetState(TrackState state) {
 }
 
 bool TrackEntry::IsConfirmable(TimeNs now_ns) const {
-  const auto needed = static_cast<size_t>(std::max(1, options_->confirm_hit_count));
+  const int hit_count = options_->is_first_consistent ? options_->paper_confirm_hit_count
+                                                      : options_->confirm_hit_count;
+  const auto needed = static_cast<size_t>(std::max(1, hit_count));
   const size_t count = track_.observations.size();
   return count >= needed &&
          now_ns - track_.observations[count - needed].time_ns <= options_->confirm_ns;

@@ -29,34 +29,16 @@ namespace {
 
 using FreeTest = std::function<bool(const Eigen::Vector3d&)>;
 
+// How finely models are sampled and few points stand for many: cost.
 constexpr int kSampleCount = 60'000;
 constexpr double kSurfaceM = 0.025;
 constexpr double kOuterCellM = 0.04;
 constexpr double kOuterCellCountMax = 2e6;
-// The distance of the inlier share, and of the cost that ranks poses.
-constexpr double kInlierM = 0.1;
 constexpr size_t kFitPointCountMin = 10;
 constexpr size_t kFitPointCountMax = 4000;
 constexpr double kCoordinateMaxM = 1e6;
-constexpr size_t kStartCount = 40;
-constexpr size_t kCandidateCount = 8;
-constexpr size_t kFinalistCount = 3;
-// Around the best poses: something beside the object (a table before a couch) pulls a pose off by
-// this much, and a tight gate from a start beyond lets go of it.
-constexpr size_t kShakenCount = 3;
-constexpr double kShakeM = 0.1;
-constexpr double kShakeRad = 8.0 * std::numbers::pi / 180.0;
 constexpr size_t kRoughPointCount = 250;
 constexpr size_t kFreeTestCount = 400;
-// Space counts as free where it is free this far around: a pose that is off by less, at the edge
-// of what a camera saw past, is not yet contradicted.
-constexpr double kFreeAroundM = 0.1;
-// How far off the floor's height an object may stand.
-constexpr double kFloorToleranceM = 0.05;
-// What a share of surface in free space, and a share of surface explained, weighs against the
-// share of points that are off the model.
-constexpr double kFreeWeight = 1.0;
-constexpr double kCoveredWeight = 0.1;
 
 // A pose with all that speaks for and against it.
 struct Candidate {
@@ -64,8 +46,9 @@ struct Candidate {
   Explanation explanation;
   double free_share = 0.0;
 
-  double score() const {
-    return explanation.cost + kFreeWeight * free_share - kCoveredWeight * explanation.covered_share;
+  double ScoreBy(const ShapeOptions& options) const {
+    return explanation.cost + options.free_weight * free_share -
+           options.covered_weight * explanation.covered_share;
   }
 };
 
@@ -109,10 +92,10 @@ std::vector<Eigen::Vector3d> CleanPoints(const std::vector<Eigen::Vector3f>& poi
   return EveryNth(ThinPoints(finite, distance_m), kFitPointCountMax);
 }
 
-bool IsFreeAround(const FreeTest& is_free, const Eigen::Vector3d& point_map) {
+bool IsFreeAround(const FreeTest& is_free, const Eigen::Vector3d& point_map, double around_m) {
   if (!is_free(point_map)) return false;
   for (int axis = 0; axis < 3; ++axis) {
-    const Eigen::Vector3d step = kFreeAroundM * Eigen::Vector3d::Unit(axis);
+    const Eigen::Vector3d step = around_m * Eigen::Vector3d::Unit(axis);
     if (!is_free(point_map + step) || !is_free(point_map - step)) return false;
   }
   return true;
@@ -154,8 +137,9 @@ class ShapeFitter::Impl {
     for (const FittedModel* model : models) {
       for (const Candidate& candidate :
            FindCandidates(*model, points, keypoints, is_free, floor_z_map)) {
-        if (!IsAccepted(candidate) || (best && candidate.score() >= best_score)) continue;
-        best_score = candidate.score();
+        const double score = candidate.ScoreBy(options_);
+        if (!IsAccepted(candidate) || (best && score >= best_score)) continue;
+        best_score = score;
         best = ShapeFit{model->index, candidate.map_T_model, candidate.explanation.residual_m,
                         candidate.explanation.inlier_share, candidate.free_share};
       }
@@ -196,11 +180,12 @@ class ShapeFitter::Impl {
                   const Pose3d& map_T_model, const FreeTest& is_free, bool is_exact) const {
     Candidate out;
     out.map_T_model = map_T_model;
-    out.explanation = Explain(model.surface, points, map_T_model, kInlierM, is_exact);
+    out.explanation = Explain(model.surface, points, map_T_model, options_.inlier_m, is_exact);
     if (!is_free) return out;
-    const auto free_count = std::count_if(
-        model.probes.begin(), model.probes.end(),
-        [&](const Eigen::Vector3d& probe) { return IsFreeAround(is_free, map_T_model * probe); });
+    const auto free_count =
+        std::count_if(model.probes.begin(), model.probes.end(), [&](const Eigen::Vector3d& probe) {
+          return IsFreeAround(is_free, map_T_model * probe, options_.free_around_m);
+        });
     out.free_share = static_cast<double>(free_count) / static_cast<double>(model.probes.size());
     return out;
   }
@@ -216,7 +201,8 @@ class ShapeFitter::Impl {
       if (!matched) return {};
       return {Judge(model, points, *matched, is_free, true)};
     }
-    std::vector<Start> starts = FindStarts(model.surface, points, floor_z_map, kStartCount);
+    std::vector<Start> starts =
+        FindStarts(model.surface, points, floor_z_map, static_cast<size_t>(options_.start_count));
     if (matched) starts.push_back({*matched, 0.0});
     const std::vector<Start> rough = AlignRoughly(model, points, std::move(starts));
     return Refine(model, points, rough, is_free, floor_z_map);
@@ -228,34 +214,38 @@ class ShapeFitter::Impl {
     const std::vector<Eigen::Vector3d> few = EveryNth(points, kRoughPointCount);
     AlignmentOptions options;
     options.is_upright = options_.is_upright;
+    const auto candidate_count = static_cast<size_t>(options_.candidate_count);
+    const auto shaken_count = static_cast<size_t>(options_.shaken_count);
     AlignAll(model, few, options, &starts);
-    starts = KeepDistinct(starts, kCandidateCount);
-    for (size_t i = std::min(starts.size(), kShakenCount); i-- > 0;) Shake(starts[i], &starts);
+    starts = KeepDistinct(starts, candidate_count);
+    for (size_t i = std::min(starts.size(), shaken_count); i-- > 0;) Shake(starts[i], &starts);
     options.gate_first_m = 0.15;
     options.gate_last_m = 0.08;
     AlignAll(model, few, options, &starts);
-    return KeepDistinct(starts, kCandidateCount);
+    return KeepDistinct(starts, candidate_count);
   }
 
   // Leaves the starts ascending by cost.
-  static void AlignAll(const FittedModel& model, const std::vector<Eigen::Vector3d>& points,
-                       const AlignmentOptions& options, std::vector<Start>* starts) {
+  void AlignAll(const FittedModel& model, const std::vector<Eigen::Vector3d>& points,
+                const AlignmentOptions& options, std::vector<Start>* starts) const {
     for (Start& start : *starts) {
       start.map_T_model = Align(model.surface, points, start.map_T_model, options);
       const Explanation explanation =
-          Explain(model.surface, points, start.map_T_model, kInlierM, false);
-      start.cost = explanation.cost - kCoveredWeight * explanation.covered_share;
+          Explain(model.surface, points, start.map_T_model, options_.inlier_m, false);
+      start.cost = explanation.cost - options_.covered_weight * explanation.covered_share;
     }
     std::stable_sort(starts->begin(), starts->end(),
                      [](const Start& a, const Start& b) { return a.cost < b.cost; });
   }
 
   // Appends poses turned and moved a little on the floor.
-  static void Shake(const Start& start, std::vector<Start>* starts) {
-    for (const double turn : {-kShakeRad, 0.0, kShakeRad}) {
+  void Shake(const Start& start, std::vector<Start>* starts) const {
+    const double shake_m = options_.shake_m;
+    const double shake_rad = options_.shake_deg * std::numbers::pi / 180.0;
+    for (const double turn : {-shake_rad, 0.0, shake_rad}) {
       for (const auto& [x, y] :
-           {std::pair(0.0, 0.0), std::pair(kShakeM, 0.0), std::pair(-kShakeM, 0.0),
-            std::pair(0.0, kShakeM), std::pair(0.0, -kShakeM)}) {
+           {std::pair(0.0, 0.0), std::pair(shake_m, 0.0), std::pair(-shake_m, 0.0),
+            std::pair(0.0, shake_m), std::pair(0.0, -shake_m)}) {
         const Pose3d change{{x, y, 0.0},
                             Eigen::Quaterniond(Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()))};
         starts->push_back({start.map_T_model * change, 1.0});
@@ -272,19 +262,22 @@ class ShapeFitter::Impl {
       candidates.push_back(Judge(model, points, start.map_T_model, is_free, false));
     }
     std::stable_sort(candidates.begin(), candidates.end(),
-                     [](const Candidate& a, const Candidate& b) { return a.score() < b.score(); });
-    if (candidates.size() > kFinalistCount) candidates.resize(kFinalistCount);
+                     [this](const Candidate& a, const Candidate& b) {
+                       return a.ScoreBy(options_) < b.ScoreBy(options_);
+                     });
+    const auto finalist_count = static_cast<size_t>(options_.finalist_count);
+    if (candidates.size() > finalist_count) candidates.resize(finalist_count);
     AlignmentOptions options;
     options.is_upright = options_.is_upright;
     options.is_exact = true;
     options.iteration_count_max = 15;
-    options.gate_first_m = kInlierM;
+    options.gate_first_m = options_.inlier_m;
     options.gate_last_m = 0.07;
     for (Candidate& candidate : candidates) {
       Pose3d pose = Align(model.surface, points, candidate.map_T_model, options);
       if (floor_z_map) {
-        pose.position.z() = std::clamp(pose.position.z(), *floor_z_map - kFloorToleranceM,
-                                       *floor_z_map + kFloorToleranceM);
+        pose.position.z() = std::clamp(pose.position.z(), *floor_z_map - options_.floor_tolerance_m,
+                                       *floor_z_map + options_.floor_tolerance_m);
       }
       candidate = Judge(model, points, pose, is_free, true);
     }

@@ -9,37 +9,19 @@
 #include <vector>
 
 #include "ingest/objects/shapes/cad_model.h"
+#include "ingest/objects/shapes/shape_options.h"
 #include "schema/model/geometry.h"
 
 namespace dsg::ingest {
-
-struct ShapeOptions {
-  /// RSS 2020: Harris keypoints within 0.15 m, threshold 1e-4.
-  double keypoint_radius_m = 0.15;
-  double keypoint_threshold = 1e-4;
-  double noise_bound_m = 0.08;
-  /// Points of both surfaces are resampled to this distance.
-  double point_distance_m = 0.05;
-  int keypoint_count_max = 60;
-  /// The object stands upright: only yaw and position are sought.
-  bool is_upright = true;
-  /// As in RSS 2020: all pairs of keypoints, six degrees of freedom, and nothing after the solver
-  /// but the two tests below.
-  bool is_paper = false;
-  /// Least share of the object's points within 0.1 m of the model, and largest share of the
-  /// model's surface in space that was seen to be free.
-  double inlier_share_min = 0.6;
-  double free_share_max = 0.05;
-};
 
 /// An accepted fit.
 struct ShapeFit {
   /// Index in the catalogue.
   int model = -1;
   Pose3d map_T_model;
-  /// Root mean square distance to the model of the object's points within 0.1 m of it, metres.
+  /// Root mean square distance to the model of the object's points near it, metres.
   double residual_m = 0.0;
-  /// Share of the object's points within 0.1 m of the model.
+  /// Share of the object's points near the model.
   double inlier_share = 0.0;
   /// Share of the model's surface in free space.
   double free_share = 0.0;

@@ -128,6 +128,18 @@ TEST_F(LoopCloserTest, ASmallShiftWaitsForTheEnd) {
   EXPECT_EQ(patient.counts().kept_count, 1);
 }
 
+TEST_F(LoopCloserTest, ManyLoopsWaitForTheEnd) {
+  RobotGraphOptions options;
+  options.correct_loop_count_max = 0;
+  LoopCloser patient(options, &path_, true);
+  Drive(kRound + 5);
+  patient.Take(LoopBack(kRound));
+  const TimeNs now_ns = static_cast<TimeNs>(step_) * kStepNs;
+  EXPECT_TRUE(patient.Correct(now_ns, false).value_or(TrajectoryChange()).IsIdentity());
+  EXPECT_EQ(patient.counts().loop_count, 0);
+  EXPECT_FALSE(patient.Correct(now_ns, true).value_or(TrajectoryChange()).IsIdentity());
+}
+
 TEST_F(LoopCloserTest, PosesCarryTheCovariancesOfTheCorrectedPath) {
   Drive(kRound + 5);
   closer_.Take(LoopBack(kRound));

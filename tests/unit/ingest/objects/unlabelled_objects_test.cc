@@ -218,17 +218,18 @@ TEST(UnlabelledObjects, BadMeshesGiveNothing) {
 TEST(SegmentOptions, DefaultsAreInRangeAndNamesDiffer) {
   EXPECT_TRUE(SegmentOptions().Validate().ok());
   SegmentOptions options;
-  for (const SegmentField& field : SegmentFields()) {
-    options = SegmentOptions();
-    options.*field.value = field.max + 1.0;
+  for (const BoundOption& field : options.Bind()) {
+    const double before = field.Get();
+    field.Set(field.max + 1.0);
     const absl::Status status = options.Validate();
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
     EXPECT_NE(status.message().find(field.name), std::string::npos);
-    options.*field.value = NAN;
-    EXPECT_FALSE(options.Validate().ok());
-    options.*field.value = options.*field.value == field.min ? field.max : field.min;
+    EXPECT_FALSE(field.Check(NAN).ok());
+    field.Set(before == field.min ? field.max : field.min);
     EXPECT_NE(options.Digest(), SegmentOptions().Digest()) << field.name;
+    field.Set(before);
   }
+  EXPECT_EQ(options.Digest(), SegmentOptions().Digest());
 }
 
 }  // namespace

@@ -39,6 +39,12 @@ Carry Between(double begin_s, double end_s) {
   return carry;
 }
 
+std::vector<Edge> FindHeldEdges(const std::vector<AgentPath>& people,
+                                const std::vector<Carry>& carries,
+                                const std::vector<Node>& objects) {
+  return ingest::FindHeldEdges(people, carries, objects, HeldOptions());
+}
+
 TEST(HeldEdges, NameThePersonThePlaceAndTheTime) {
   const auto edges =
       FindHeldEdges({Walker(1), Walker(2, 4.0)}, {Between(8, 10)}, {Cup(1, {5, 0.6, 0.8}, 0, 2)});

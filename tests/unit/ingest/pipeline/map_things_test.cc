@@ -32,24 +32,24 @@ TEST(MapThings, ObjectsAreNeitherStructuresNorPeople) {
 TEST(MapThings, FloorsAreApartAndUnderTheRobot) {
   const std::vector<StructurePiece> pieces = {Level("floor", 0.0, 10), Level("floor", 0.8, 4),
                                               Level("floor", 3.0, 8), Level("floor", 6.0, 9)};
-  EXPECT_EQ(FloorsOf(pieces, {{1, 1, 1.2}, {1, 1, 4.2}}, {}), (std::vector<double>{0.0, 3.0}));
-  EXPECT_TRUE(FloorsOf(pieces, {}, {}).empty());
+  EXPECT_EQ(FloorsOf(pieces, {{1, 1, 1.2}, {1, 1, 4.2}}, {}, {}), (std::vector<double>{0.0, 3.0}));
+  EXPECT_TRUE(FloorsOf(pieces, {}, {}, {}).empty());
 }
 
 TEST(MapThings, TheCeilingIsTheLargestWithinReach) {
   const std::vector<StructurePiece> pieces = {Level("ceiling", 2.7, 4), Level("ceiling", 3.0, 9),
                                               Level("ceiling", 9.0, 20)};
-  EXPECT_DOUBLE_EQ(CeilingAbove(pieces, 0.0, {}).value(), 3.0);
-  EXPECT_FALSE(CeilingAbove(pieces, 2.5, {}).has_value());
+  EXPECT_DOUBLE_EQ(CeilingAbove(pieces, 0.0, {}, {}).value(), 3.0);
+  EXPECT_FALSE(CeilingAbove(pieces, 2.5, {}, {}).has_value());
 }
 
 TEST(MapThings, WhatHangsStandsOnNoFloor) {
   ObjectCluster object;
   object.map_T_box.position.z() = 3.5;
   object.size.z() = 0.9;
-  EXPECT_DOUBLE_EQ(FloorUnder(object, {0.0, 3.0}).value(), 3.0);
+  EXPECT_DOUBLE_EQ(FloorUnder(object, {0.0, 3.0}, {}).value(), 3.0);
   object.map_T_box.position.z() = 2.0;
-  EXPECT_FALSE(FloorUnder(object, {0.0, 3.0}).has_value());
+  EXPECT_FALSE(FloorUnder(object, {0.0, 3.0}, {}).has_value());
 }
 
 TEST(MapThings, GlassClosesItsColumnsAndNoOthers) {
@@ -60,7 +60,7 @@ TEST(MapThings, GlassClosesItsColumnsAndNoOthers) {
   // The bottom rail of a pane, and a wall.
   block.positions_map = {{0.55f, 0.55f, 0.05f}, {0.25f, 0.25f, 0.05f}};
   block.labels = {4, 1};
-  CloseGlass({&block}, GlassClasses(kThingLabels), {0.0}, 1.8, &grid);
+  CloseGlass({&block}, GlassClasses(kThingLabels), {0.0}, 1.8, {}, &grid);
   EXPECT_EQ(grid.AtPoint({0.55, 0.55, 0.05}), Occupancy::kOccupied);
   EXPECT_EQ(grid.AtPoint({0.55, 0.55, 1.75}), Occupancy::kOccupied);
   EXPECT_EQ(grid.AtPoint({0.55, 0.55, 2.5}), Occupancy::kFree);
@@ -77,11 +77,11 @@ TEST(MapThings, ObjectsBehindAWallAreNotInView) {
   object.id = 7;
   object.cluster.size = {0.4, 0.4, 0.4};
   object.cluster.center_map = {0.0, 0.0, 3.1};
-  EXPECT_EQ(ObjectsInView({object}, frame), std::vector<int64_t>{7});
+  EXPECT_EQ(ObjectsInView({object}, frame, {}), std::vector<int64_t>{7});
   object.cluster.center_map.z() = 6.0;
-  EXPECT_TRUE(ObjectsInView({object}, frame).empty());
+  EXPECT_TRUE(ObjectsInView({object}, frame, {}).empty());
   object.cluster.center_map.z() = -3.0;
-  EXPECT_TRUE(ObjectsInView({object}, frame).empty());
+  EXPECT_TRUE(ObjectsInView({object}, frame, {}).empty());
 }
 
 TEST(MapThings, AspectIsOfTheTurnedRectangle) {

@@ -11,10 +11,8 @@ namespace {
 
 std::vector<BoundOption> AllOf(MappingOptions* options) {
   std::vector<BoundOption> all;
-  for (const std::vector<BoundOption>& stage :
-       {options->depth.cloud.Bind(), options->structures.Bind(), options->places.Bind(),
-        options->rooms.Bind(), options->segments.Bind()}) {
-    all.insert(all.end(), stage.begin(), stage.end());
+  for (const OptionGroup& group : options->Groups()) {
+    all.insert(all.end(), group.fields.begin(), group.fields.end());
   }
   return all;
 }
@@ -25,11 +23,11 @@ TEST(MappingOptions, TellEachNumberOfAStageInTheDigest) {
   std::set<std::string> digests = {standard};
   const std::vector<BoundOption> all = AllOf(&options);
   for (const BoundOption& field : all) {
-    const double before = *field.value;
-    *field.value = before == field.max ? field.min : field.max;
+    const double before = field.Get();
+    field.Set(before == field.max ? field.min : field.max);
     EXPECT_TRUE(options.Validate().ok()) << field.name;
     EXPECT_TRUE(digests.insert(options.Digest(/*has_labels=*/false)).second) << field.name;
-    *field.value = before;
+    field.Set(before);
   }
   EXPECT_EQ(options.Digest(/*has_labels=*/false), standard);
   options.rooms.split_corridors = false;
@@ -42,15 +40,15 @@ TEST(MappingOptions, AreRefusedOutOfTheirRangesByName) {
   std::set<std::string> names;
   for (const BoundOption& field : AllOf(&options)) {
     EXPECT_TRUE(names.insert(field.name).second) << field.name << " stands twice";
-    const double before = *field.value;
+    const double before = field.Get();
     for (const double wrong : {field.min - 1.0, field.max + 1.0}) {
-      *field.value = wrong;
+      field.Set(wrong);
       const absl::Status status = options.Validate();
       EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << field.name;
       EXPECT_NE(status.message().find(std::string(field.name) + " is "), std::string::npos)
           << status.message();
     }
-    *field.value = before;
+    field.Set(before);
   }
 }
 

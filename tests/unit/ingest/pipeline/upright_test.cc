@@ -32,7 +32,7 @@ Pose3d PoseOf(LogSource& log) {
 
 TEST(TurnUpright, TakesTheNamedAxisToZ) {
   std::string note;
-  auto log = TurnUpright(std::make_unique<OnePose>(), "log", {}, "-y", &note);
+  auto log = TurnUpright(std::make_unique<OnePose>(), "log", {}, "-y", {}, &note);
   ASSERT_TRUE(log.ok()) << log.status();
   const Pose3d pose = PoseOf(**log);
   EXPECT_NEAR(pose.position.z(), -2.0, 1e-12);
@@ -43,7 +43,7 @@ TEST(TurnUpright, TakesTheNamedAxisToZ) {
 TEST(TurnUpright, LeavesUprightLogsAlone) {
   for (const std::string up : {"auto", "none", "z", "0,0,7"}) {
     std::string note;
-    auto log = TurnUpright(std::make_unique<OnePose>(), "log", {}, up, &note);
+    auto log = TurnUpright(std::make_unique<OnePose>(), "log", {}, up, {}, &note);
     ASSERT_TRUE(log.ok()) << log.status();
     EXPECT_EQ(PoseOf(**log).position, Eigen::Vector3d(1.0, 2.0, 3.0)) << up;
     EXPECT_EQ(note, "");

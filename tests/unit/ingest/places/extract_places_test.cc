@@ -9,6 +9,7 @@
 #include <limits>
 #include <set>
 #include <string>
+#include <variant>
 
 #include "ingest/grid/distance_field.h"
 #include "schema/base/disjoint_sets.h"
@@ -297,9 +298,9 @@ TEST(PlaceOptions, KeepThePromisesAtBothEndsOfTheirRanges) {
   const OccupancyGrid grid = TwoRooms(0.9);
   PlaceOptions options = OnGround();
   for (const BoundOption& field : options.Bind()) {
-    const double before = *field.value;
+    const double before = field.Get();
     for (const double value : {field.min, field.max}) {
-      *field.value = value;
+      field.Set(value);
       SCOPED_TRACE(std::string(field.name) + " " + std::to_string(value));
       for (const PlaceMode mode : {PlaceMode::kGround, PlaceMode::kVolume}) {
         options.mode = mode;
@@ -308,7 +309,7 @@ TEST(PlaceOptions, KeepThePromisesAtBothEndsOfTheirRanges) {
         ExpectLinksFree(graph, ProjectToFloor(grid, 0.0, options), 0.25);
       }
     }
-    *field.value = before;
+    field.Set(before);
   }
 }
 
@@ -317,18 +318,18 @@ TEST(PlaceOptions, AreInRangeAndHaveNamesOfTheirOwn) {
   PlaceOptions options;
   const std::vector<BoundOption> bound = options.Bind();
   std::set<std::string> names;
-  std::set<const double*> numbers;
+  std::set<std::variant<double*, int*, TimeNs*>> numbers;
   for (const BoundOption& field : bound) {
     names.insert(field.name);
     numbers.insert(field.value);
-    const double before = *field.value;
-    *field.value = field.max + 1.0;
+    const double before = field.Get();
+    field.Set(field.max + 1.0);
     const absl::Status status = ValidateOptions(options);
     EXPECT_NE(status.message().find(field.name), std::string::npos) << field.name;
-    *field.value = field.min;
+    field.Set(field.min);
     EXPECT_TRUE(ValidateOptions(options).ok()) << field.name;
     EXPECT_EQ(DigestOptions(options).empty(), before == field.min) << field.name;
-    *field.value = before;
+    field.Set(before);
   }
   EXPECT_EQ(names.size(), bound.size());
   EXPECT_EQ(numbers.size(), bound.size());

@@ -29,6 +29,26 @@ TEST(RegionIndex, KeepsARoomUntilItIsClearlyLeft) {
       "R1 R1 R1 R2 R2 R1 ");
 }
 
+TEST(RegionIndex, TakesItsDistancesFromTheOptions) {
+  const std::vector<Node> rooms = {MakeRoom(1, 0, 0, 5, 5), MakeRoom(2, 5, 0, 10, 5)};
+  RegionOptions options;
+  options.hysteresis_m = 0.0;
+  EXPECT_EQ(RoomsOfWalk(RegionIndex(rooms, {}, {}, options), {{4, 2, 0}, {5.1, 2, 0}, {4.9, 2, 0}}),
+            "R1 R2 R1 ");
+  options.hysteresis_m = 1.5;
+  EXPECT_EQ(RoomsOfWalk(RegionIndex(rooms, {}, {}, options), {{4, 2, 0}, {6.4, 2, 0}, {6.6, 2, 0}}),
+            "R1 R1 R2 ");
+  // The near place is behind a wall, the far one in sight: but not from so far away.
+  const std::vector<Node> places = {MakePlace(1, 1, 0), MakePlace(2, -4, 0)};
+  for (const double sight_m : {5.0, 3.0}) {
+    options.sight_m = sight_m;
+    RegionIndex index({}, places, {}, options);
+    index.SetSight(
+        [](const Eigen::Vector3d&, const Eigen::Vector3d& place) { return place.x() < 0; });
+    EXPECT_EQ(index.PlaceId(index.Next({}, {0, 0, 0}).place), NodeId('p', sight_m == 5.0 ? 2 : 1));
+  }
+}
+
 TEST(RegionIndex, EntersFromNowhereAtOnceAndLeavesToNowhereClearly) {
   const RegionIndex index({MakeRoom(1, 0, 0, 5, 5)}, {}, {});
   EXPECT_EQ(

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <set>
 #include <string>
+#include <variant>
 
 #include "ingest/rooms/outline.h"
 #include "tests/unit/ingest/rooms/rooms_test_util.h"
@@ -140,9 +141,9 @@ TEST(RoomOptions, GiveEachPlaceOneRoomAtBothEndsOfTheirRanges) {
   const Example example(TwoRooms());
   RoomOptions options;
   for (const BoundOption& field : options.Bind()) {
-    const double before = *field.value;
+    const double before = field.Get();
     for (const double value : {field.min, field.max}) {
-      *field.value = value;
+      field.Set(value);
       for (const RoomMethod method : {RoomMethod::kAuto, RoomMethod::kCeiling,
                                       RoomMethod::kClearance, RoomMethod::kFiltration}) {
         options.method = method;
@@ -157,7 +158,7 @@ TEST(RoomOptions, GiveEachPlaceOneRoomAtBothEndsOfTheirRanges) {
         EXPECT_EQ(count, 0u) << field.name << " " << value;
       }
     }
-    *field.value = before;
+    field.Set(before);
   }
 }
 
@@ -170,15 +171,15 @@ TEST(RoomOptions, AreInRangeAndHaveNamesOfTheirOwn) {
   const std::vector<BoundOption> more = structures.Bind();
   bound.insert(bound.end(), more.begin(), more.end());
   std::set<std::string> names;
-  std::set<const double*> numbers;
+  std::set<std::variant<double*, int*, TimeNs*>> numbers;
   for (const BoundOption& field : bound) {
     names.insert(field.name);
     numbers.insert(field.value);
-    const double before = *field.value;
-    *field.value = field.max + 1.0;
+    const double before = field.Get();
+    field.Set(field.max + 1.0);
     const bool is_refused = !ValidateOptions(rooms).ok() || !ValidateOptions(structures).ok();
     EXPECT_TRUE(is_refused) << field.name;
-    *field.value = before;
+    field.Set(before);
   }
   EXPECT_EQ(names.size(), bound.size());
   EXPECT_EQ(numbers.size(), bound.size());

@@ -40,7 +40,7 @@ TEST(Perspective, FindsPlaceAndHeadingOfAPerfectDetection) {
   for (int i = 0; i < 200; ++i) {
     const Pose3d torso = RandomPerson(&random);
     const auto person =
-        PlaceInCamera(PerfectDetection(TestCamera(), map_T_camera, torso), TestCamera());
+        PlaceInCamera(PerfectDetection(TestCamera(), map_T_camera, torso), TestCamera(), {});
     ASSERT_TRUE(person.ok()) << person.status();
     EXPECT_LT(PositionErrorM(*person, map_T_camera, torso), 1e-6);
     EXPECT_LT(AngleBetween(map_T_camera.orientation * person->camera_T_torso.orientation,
@@ -60,10 +60,10 @@ TEST(Perspective, TakesDistortionOff) {
     for (int i = 0; i < 50; ++i) {
       const Pose3d torso = RandomPerson(&random);
       const HumanDetection detection = PerfectDetection(camera, map_T_camera, torso);
-      const auto person = PlaceInCamera(detection, camera);
+      const auto person = PlaceInCamera(detection, camera, {});
       ASSERT_TRUE(person.ok()) << person.status();
       EXPECT_LT(PositionErrorM(*person, map_T_camera, torso), 1e-5);
-      const auto straight = PlaceInCamera(detection, TestCamera());
+      const auto straight = PlaceInCamera(detection, TestCamera(), {});
       EXPECT_GT(PositionErrorM(*straight, map_T_camera, torso), 1e-3) << "distortion says nothing";
     }
   }
@@ -97,7 +97,7 @@ TEST(Perspective, StandsAFewWildJoints) {
     }
     detection.joints_px[20].x() += 25.0;
     detection.joints_px[5].y() -= 15.0;
-    const auto person = PlaceInCamera(detection, TestCamera());
+    const auto person = PlaceInCamera(detection, TestCamera(), {});
     ASSERT_TRUE(person.ok()) << person.status();
     sum_m += PositionErrorM(*person, map_T_camera, torso) / torso.position.norm();
   }
@@ -110,7 +110,7 @@ TEST(Perspective, TurnsABodyThatItsPixelsDoNotFit) {
   HumanDetection detection = PerfectDetection(TestCamera(), map_T_camera, torso);
   const Eigen::Quaterniond wrong(Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ()));
   for (auto& joint : detection.joints_root) joint = wrong * joint;
-  const auto person = PlaceInCamera(detection, TestCamera());
+  const auto person = PlaceInCamera(detection, TestCamera(), {});
   ASSERT_TRUE(person.ok()) << person.status();
   EXPECT_LT(person->reprojection_px, 0.1);
   EXPECT_LT(AngleBetween(person->joints_turn, wrong.conjugate()), 1e-3);
@@ -123,7 +123,7 @@ TEST(Perspective, FallsBackToTheWeakCameraWhenJointsAreHidden) {
   HumanDetection detection = PerfectDetection(TestCamera(), map_T_camera, torso);
   detection.joint_visibility.fill(0.0);
   detection.joint_visibility[0] = detection.joint_visibility[1] = 1.0;
-  const auto person = PlaceInCamera(detection, TestCamera());
+  const auto person = PlaceInCamera(detection, TestCamera(), {});
   ASSERT_TRUE(person.ok()) << person.status();
   EXPECT_LT(PositionErrorM(*person, map_T_camera, torso), 1e-6);
 }
@@ -132,7 +132,7 @@ TEST(Perspective, TakesAFullTranslationAsItIs) {
   HumanDetection detection =
       PerfectDetection(TestCamera(), LookAlongX(1.2), Upright({5.0, -1.0, 0.93}, 1.0));
   detection.pelvis_camera = Eigen::Vector3d(0.5, 0.2, 3.0);
-  const auto person = PlaceInCamera(detection, TestCamera());
+  const auto person = PlaceInCamera(detection, TestCamera(), {});
   ASSERT_TRUE(person.ok()) << person.status();
   EXPECT_EQ(person->camera_T_torso.position, *detection.pelvis_camera);
   EXPECT_GT(person->reprojection_px, 8.0) << "the joints' pixels say otherwise";
@@ -145,7 +145,7 @@ TEST(Perspective, PlacesABoxByTheHeightOfAMeanBody) {
   detection.has_joints = false;
   detection.pose_coefficients.clear();
   detection.weak_scale = 0.0;
-  const auto person = PlaceInCamera(detection, TestCamera());
+  const auto person = PlaceInCamera(detection, TestCamera(), {});
   ASSERT_TRUE(person.ok()) << person.status();
   EXPECT_LT(PositionErrorM(*person, map_T_camera, torso), 0.3);
   EXPECT_FALSE(person->has_heading);
@@ -155,7 +155,7 @@ TEST(Perspective, PlacesABoxByTheHeightOfAMeanBody) {
 TEST(Perspective, IsUnsureAlongTheRay) {
   const Pose3d torso = Upright({6.0, 2.0, 0.93}, 1.0);
   HumanDetection detection = PerfectDetection(TestCamera(), LookAlongX(1.2), torso);
-  const auto person = PlaceInCamera(detection, TestCamera());
+  const auto person = PlaceInCamera(detection, TestCamera(), {});
   ASSERT_TRUE(person.ok()) << person.status();
   const Eigen::Vector3d ray = person->camera_T_torso.position.normalized();
   const Eigen::Vector3d across = ray.cross(Eigen::Vector3d::UnitY()).normalized();
@@ -163,7 +163,7 @@ TEST(Perspective, IsUnsureAlongTheRay) {
   const double seen_m = std::sqrt(across.dot(person->covariance_camera * across));
   EXPECT_NEAR(seen_m, 0.02 * 6.0 + 0.08, 0.02);
   detection.joint_visibility.fill(0.4);
-  const auto hidden = PlaceInCamera(detection, TestCamera());
+  const auto hidden = PlaceInCamera(detection, TestCamera(), {});
   EXPECT_GT(across.dot(hidden->covariance_camera * across), 1.3 * seen_m * seen_m);
 }
 
@@ -180,7 +180,7 @@ TEST(Perspective, ReadsTheAxesOfSmplToo) {
     detection.pose_coefficients[i] =
         static_cast<float>(turn.angle() * turn.axis()[static_cast<int>(i)]);
   }
-  const auto person = PlaceInCamera(detection, TestCamera());
+  const auto person = PlaceInCamera(detection, TestCamera(), {});
   ASSERT_TRUE(person.ok()) << person.status();
   EXPECT_LT(AngleBetween(map_T_camera.orientation * person->camera_T_torso.orientation,
                          torso.orientation),
@@ -192,7 +192,7 @@ TEST(Perspective, FindsTheHeadingByJointsAlone) {
   const Pose3d torso = Upright({4.0, 0.0, 0.93}, -2.0);
   HumanDetection detection = PerfectDetection(TestCamera(), map_T_camera, torso);
   detection.pose_coefficients.clear();
-  const auto person = PlaceInCamera(detection, TestCamera());
+  const auto person = PlaceInCamera(detection, TestCamera(), {});
   ASSERT_TRUE(person.ok()) << person.status();
   const Eigen::Vector3d forward =
       map_T_camera.orientation * (person->camera_T_torso.orientation * Eigen::Vector3d::UnitX());
@@ -203,7 +203,7 @@ TEST(Perspective, NamesTheDetectionThatItCannotPlace) {
   HumanDetection detection =
       PerfectDetection(TestCamera(), LookAlongX(1.2), Upright({4.0, 0.0, 0.93}, 0.0));
   const auto expect_refused = [](const HumanDetection& bad) {
-    const auto person = PlaceInCamera(bad, TestCamera());
+    const auto person = PlaceInCamera(bad, TestCamera(), {});
     ASSERT_FALSE(person.ok());
     EXPECT_EQ(ReasonOf(person.status()), Reason::kFieldInvalid);
     EXPECT_NE(std::string(person.status().message()).find("detection 7"), std::string::npos);
@@ -258,7 +258,7 @@ TEST(Perspective, NeverCrashesOnNumbersOfAnyKind) {
           break;
       }
     }
-    const auto person = PlaceInCamera(detection, TestCamera());
+    const auto person = PlaceInCamera(detection, TestCamera(), {});
     if (person.ok()) {
       EXPECT_TRUE(IsValidPose(person->camera_T_torso)) << i;
       EXPECT_TRUE(person->covariance_camera.allFinite()) << i;
