@@ -397,6 +397,8 @@ class ShellFinder {
                               static_cast<float>(kColumnM));
     };
     for (int i = 0; i < count(); ++i) {
+      // What stands before a flat wall is not filled by it.
+      if (Part(i) == ShellPart::kWall) continue;
       if (!std::isfinite(shell_.depths_m[static_cast<size_t>(i)]) || bin_of(i) < 0) continue;
       if (bin_of(i) < static_cast<int>(kColumnBins)) {
         columns[column_of(i)].set(static_cast<size_t>(bin_of(i)));

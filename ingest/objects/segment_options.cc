@@ -58,16 +58,23 @@ constexpr OptionField<SegmentOptions> kFields[] = {
      "What an edge that bends outwards counts in the over-segmentation, of one that bends inwards"},
     {"segment-flat", &SegmentOptions::flat_rad, 0.0, 1.5,
      "Patches that look nearly the same way go on into each other, radians"},
-    {"segment-convex-contact", &SegmentOptions::convex_contact, 0.0, 10.0,
-     "Patches that bend outwards where they touch are one thing if the contact is this long, of "
-     "the "
-     "root of the smaller one's area"},
-    {"segment-concave-contact", &SegmentOptions::concave_contact, 0.0, 10.0,
-     "The same of patches that bend inwards"},
+    {"segment-side-reach", &SegmentOptions::side_reach_m, 0.0, 1.0,
+     "How far around a contact patches are looked at, whether they bend there, metres"},
+    {"segment-join-contact", &SegmentOptions::join_contact, 0.0, 10.0,
+     "Two things are one if they touch along this much of their outlines, of the root of the "
+     "smaller one's area"},
+    {"segment-concave-weight", &SegmentOptions::concave_weight, 0.0, 10.0,
+     "What a contact that bends inwards counts against that, of its length"},
+    {"segment-inner-weight", &SegmentOptions::inner_weight, 0.0, 10.0,
+     "What it counts for that if it is a whole side of both: backs and seats"},
+    {"segment-side-share", &SegmentOptions::side_share, 0.0, 10.0,
+     "... that is, this share of their widths"},
     {"segment-seat-height", &SegmentOptions::seat_height_m, 0.0, 2.0,
-     "Level surfaces up to here above the floor are seats and beds, with what rises from them; "
-     "what "
-     "rises from a higher one stands on it, metres"},
+     "What rises from a level surface higher than this above the floor stands on it, metres; lower "
+     "ones are seats and beds"},
+    {"segment-seat-low", &SegmentOptions::seat_low_m, 0.0, 2.0,
+     "A level surface from this height on is a seat of what stands below a table, metres: lower "
+     "ones are feet"},
     {"segment-table-width", &SegmentOptions::table_width_m, 0.0, 3.0,
      "... if it is this wide: shelves are not, metres"},
     {"segment-table-area", &SegmentOptions::table_area_m2, 0.0, 10.0,
@@ -94,6 +101,12 @@ constexpr OptionField<SegmentOptions> kFields[] = {
      "What is thinner on one side is none if it is this narrow for its length: frames of doors"},
     {"segment-mount", &SegmentOptions::mount_m, 0.0, 1.0,
      "What sticks out from a wall by less is a part of it, metres"},
+    {"segment-reach", &SegmentOptions::reach_m, 0.5, 20.0,
+     "What begins higher above the floor is a part of the building, metres"},
+    {"segment-sheet", &SegmentOptions::sheet_m, 0.0, 1.0,
+     "What is thinner and stands upright on the floor is a door or a piece of wall, metres"},
+    {"segment-sheet-height", &SegmentOptions::sheet_height_m, 0.5, 10.0,
+     "... if it is this high, metres: refrigerators are lower, doors are not"},
     {"segment-shell-contact", &SegmentOptions::shell_contact, 0.0, 1.0,
      "What touches walls and ceilings with this share of its surface is a remnant of them"},
 };

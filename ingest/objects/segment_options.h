@@ -69,9 +69,13 @@ struct SegmentOptions {
   double patch_area_m2 = 0.02;
   double convex_weight = 1.0;
   double flat_rad = 0.35;
-  double convex_contact = 0.25;
-  double concave_contact = 0.35;
+  double side_reach_m = 0.15;
+  double join_contact = 0.15;
+  double concave_weight = 0.5;
+  double inner_weight = 1.0;
+  double side_share = 0.4;
   double seat_height_m = 0.6;
+  double seat_low_m = 0.25;
   double table_width_m = 0.4;
   double table_area_m2 = 0.25;
   double under_share = 0.7;
@@ -87,6 +91,9 @@ struct SegmentOptions {
   double strip_share = 0.25;
   double mount_m = 0.18;
   double shell_contact = 0.5;
+  double reach_m = 2.3;
+  double sheet_m = 0.2;
+  double sheet_height_m = 1.9;
 
   ShellOptions shell;
 

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ingest/objects/surface_patches.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <set>
 #include <tuple>
@@ -129,20 +131,35 @@ struct Thing {
   double table_z_m = INFINITY;
 };
 
+/// What two things share of their outlines.
+struct Bond {
+  double convex_m = 0.0;
+  double concave_m = 0.0;
+};
+
+/// Of two patches.
 struct Contact {
   int a = 0;
   int b = 0;
   double length_m = 0.0;
+};
+
+/// A patch near its contact with another one.
+struct Side {
+  std::vector<int> cells;
   Eigen::Vector3d center_map = Eigen::Vector3d::Zero();
-  /// Length by the root of the smaller patch's area.
-  double strength = 0.0;
+  Eigen::Vector3d normal_map = Eigen::Vector3d::Zero();
 };
 
 class PatchJoiner {
  public:
   PatchJoiner(const CellGraph& graph, const std::vector<float>& heights_m,
               const std::vector<CellGroup>& patches, const SegmentOptions& options)
-      : graph_(graph), patches_(patches), options_(options), sets_(patches.size()) {
+      : graph_(graph),
+        patches_(patches),
+        options_(options),
+        bonds_(patches.size()),
+        sets_(patches.size()) {
     for (const CellGroup& patch : patches) infos_.push_back(Describe(patch, heights_m));
     for (const PatchInfo& info : infos_) {
       things_.push_back({info.extent, IsTable(info) ? info.center_map.z() : INFINITY});
@@ -151,9 +168,7 @@ class PatchJoiner {
   }
 
   std::vector<CellGroup> Join() && {
-    for (const Contact& contact : contacts_) {
-      if (AreOne(contact)) TryMerge(contact.a, contact.b);
-    }
+    JoinBonded();
     JoinCrumbs();
     JoinStacked();
     return Groups();
@@ -181,43 +196,155 @@ class PatchJoiner {
   }
 
   void FindContacts() {
-    std::vector<int> patch_of(graph_.size(), -1);
+    patch_of_.assign(graph_.size(), -1);
     for (size_t patch = 0; patch < patches_.size(); ++patch) {
       for (const int cell : patches_[patch]) {
-        patch_of[static_cast<size_t>(cell)] = static_cast<int>(patch);
+        patch_of_[static_cast<size_t>(cell)] = static_cast<int>(patch);
       }
     }
     // (own patch, other patch, own cell), once for each cell of a border.
     std::vector<std::tuple<int, int, int>> borders;
     for (const CellGroup& patch : patches_) {
       for (const int cell : patch) {
-        const int own = patch_of[static_cast<size_t>(cell)];
+        const int own = patch_of_[static_cast<size_t>(cell)];
         for (const int neighbour : graph_.NeighboursOf(cell)) {
-          const int other = patch_of[static_cast<size_t>(neighbour)];
+          const int other = patch_of_[static_cast<size_t>(neighbour)];
           if (other >= 0 && other != own) borders.emplace_back(own, other, cell);
         }
       }
     }
     std::sort(borders.begin(), borders.end());
     borders.erase(std::unique(borders.begin(), borders.end()), borders.end());
-    std::map<std::pair<int, int>, std::pair<int, Eigen::Vector3d>> sides;
-    for (const auto& [own, other, cell] : borders) {
-      auto& side = sides.try_emplace({own, other}, 0, Eigen::Vector3d::Zero()).first->second;
-      ++side.first;
-      side.second += graph_.points_map[static_cast<size_t>(cell)].cast<double>();
-    }
+    std::map<std::pair<int, int>, Side> sides;
+    for (const auto& [own, other, cell] : borders) sides[{own, other}].cells.push_back(cell);
+    for (auto& [key, side] : sides) LookAround(key.first, &side);
     for (const auto& [key, side] : sides) {
       if (key.first > key.second) continue;
-      const auto& [other_count, other_sum] = sides.at({key.second, key.first});
+      const Side& other = sides.at({key.second, key.first});
       Contact contact{key.first, key.second};
-      contact.length_m = std::min(side.first, other_count) * graph_.cell_m;
-      contact.center_map = (side.second + other_sum) / (side.first + other_count);
-      contact.strength =
-          contact.length_m / std::sqrt(std::min(Info(contact.a).area_m2, Info(contact.b).area_m2));
+      contact.length_m =
+          static_cast<double>(std::min(side.cells.size(), other.cells.size())) * graph_.cell_m;
       contacts_.push_back(contact);
+      const Bond bond = BondOf(contact, side, other);
+      bonds_[static_cast<size_t>(contact.a)][contact.b] = bond;
+      bonds_[static_cast<size_t>(contact.b)][contact.a] = bond;
     }
-    std::stable_sort(contacts_.begin(), contacts_.end(),
-                     [](const Contact& x, const Contact& y) { return x.strength > y.strength; });
+  }
+
+  // The mean of a patch within a few cells of a contact, without the bent edge itself where there
+  // is more.
+  void LookAround(int patch, Side* side) const {
+    std::vector<int> around = side->cells;
+    std::set<int> seen(around.begin(), around.end());
+    const size_t edge_count = around.size();
+    const auto rings = static_cast<size_t>(std::lround(options_.side_reach_m / graph_.cell_m));
+    for (size_t next = 0, ring = 0; ring < rings; ++ring) {
+      for (const size_t end = around.size(); next < end; ++next) {
+        for (const int cell : graph_.NeighboursOf(around[next])) {
+          if (patch_of_[static_cast<size_t>(cell)] != patch || !seen.insert(cell).second) continue;
+          around.push_back(cell);
+        }
+      }
+    }
+    const size_t first = around.size() >= 2 * edge_count ? edge_count : 0;
+    for (size_t i = first; i < around.size(); ++i) {
+      side->center_map += graph_.points_map[static_cast<size_t>(around[i])].cast<double>();
+      side->normal_map += graph_.NormalAs(side->normal_map, around[i]);
+    }
+    const auto count = static_cast<double>(around.size() - first);
+    side->center_map /= count;
+    side->normal_map /= count;
+  }
+
+  Bond BondOf(const Contact& contact, const Side& a, const Side& b) const {
+    const Eigen::Vector3d step = (b.center_map - a.center_map).normalized();
+    // How far each is seen above the plane of the other one, sine.
+    const double bend = std::max(a.normal_map.dot(step), -b.normal_map.dot(step));
+    const bool is_flat = graph_.Cosine(a.normal_map.normalized(), b.normal_map.normalized()) >=
+                         std::cos(options_.flat_rad);
+    if (is_flat || bend <= options_.shell.bend_sine) return {contact.length_m, 0.0};
+    if (SharesSide(contact, a, b)) return {options_.inner_weight * contact.length_m, 0.0};
+    return {0.0, contact.length_m};
+  }
+
+  // Whether a contact is a whole side of both patches, as that of a back and a seat, and not only
+  // of the smaller one, as that of a box and the sofa that it stands beside.
+  bool SharesSide(const Contact& contact, const Side& a, const Side& b) const {
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    std::vector<int> cells = a.cells;
+    cells.insert(cells.end(), b.cells.begin(), b.cells.end());
+    for (const int cell : cells) mean += Point(cell);
+    mean /= static_cast<double>(cells.size());
+    Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+    for (const int cell : cells) spread += (Point(cell) - mean) * (Point(cell) - mean).transpose();
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(spread);
+    if (solver.info() != Eigen::Success) return false;
+    const Eigen::Vector3d along = solver.eigenvectors().col(2);
+    const double width_m = std::max(WidthAlong(along, patches_[static_cast<size_t>(contact.a)]),
+                                    WidthAlong(along, patches_[static_cast<size_t>(contact.b)]));
+    return WidthAlong(along, cells) >= options_.side_share * width_m;
+  }
+
+  double WidthAlong(const Eigen::Vector3d& along, const std::vector<int>& cells) const {
+    double low_m = INFINITY;
+    double high_m = -INFINITY;
+    for (const int cell : cells) {
+      low_m = std::min(low_m, along.dot(Point(cell)));
+      high_m = std::max(high_m, along.dot(Point(cell)));
+    }
+    return high_m - low_m + graph_.cell_m;
+  }
+
+  Eigen::Vector3d Point(int cell) const {
+    return graph_.points_map[static_cast<size_t>(cell)].cast<double>();
+  }
+
+  // Joins the two things that share most of their outlines, again and again. What they share is
+  // counted anew after each step, so that two large things do not become one at a single spot.
+  void JoinBonded() {
+    std::vector<double> areas;
+    for (const PatchInfo& info : infos_) areas.push_back(info.area_m2);
+    const auto strength_of = [&](int a, int b) {
+      const Bond& bond = bonds_[static_cast<size_t>(a)].at(b);
+      const double area_m2 = std::min(areas[static_cast<size_t>(a)], areas[static_cast<size_t>(b)]);
+      return (bond.convex_m - options_.concave_weight * bond.concave_m) / std::sqrt(area_m2);
+    };
+    using Step = std::tuple<double, int, int>;
+    std::set<Step, std::greater<>> open;
+    const auto push = [&](int a, int b) {
+      open.emplace(strength_of(a, b), std::min(a, b), std::max(a, b));
+    };
+    for (const Contact& contact : contacts_) push(contact.a, contact.b);
+    while (!open.empty()) {
+      const auto [strength, a, b] = *open.begin();
+      if (strength < options_.join_contact) break;
+      open.erase(open.begin());
+      if (!TryMerge(a, b)) continue;
+      const int root = sets_.Find(a);
+      const int gone = root == a ? b : a;
+      for (const int one : {root, gone}) {
+        for (const auto& [other, bond] : bonds_[static_cast<size_t>(one)]) {
+          open.erase({strength_of(one, other), std::min(one, other), std::max(one, other)});
+        }
+      }
+      areas[static_cast<size_t>(root)] += areas[static_cast<size_t>(gone)];
+      TakeBonds(gone, root);
+      for (const auto& [other, bond] : bonds_[static_cast<size_t>(root)]) push(root, other);
+    }
+  }
+
+  void TakeBonds(int gone, int root) {
+    std::map<int, Bond>& own = bonds_[static_cast<size_t>(root)];
+    for (const auto& [other, bond] : bonds_[static_cast<size_t>(gone)]) {
+      std::map<int, Bond>& theirs = bonds_[static_cast<size_t>(other)];
+      theirs.erase(gone);
+      if (other == root) continue;
+      own[other].convex_m += bond.convex_m;
+      own[other].concave_m += bond.concave_m;
+      theirs[root] = own[other];
+    }
+    own.erase(gone);
+    bonds_[static_cast<size_t>(gone)].clear();
   }
 
   bool IsTable(const PatchInfo& patch) const {
@@ -225,24 +352,6 @@ class PatchJoiner {
     return up > options_.shell.up_normal && patch.height_m > options_.seat_height_m &&
            patch.area_m2 >= options_.table_area_m2 &&
            patch.extent.Sides().first >= options_.table_width_m;
-  }
-
-  // Sine of the angle under which the middle of `other` is seen above the plane of `patch`.
-  static double BendOf(const PatchInfo& patch, const PatchInfo& other, const Contact& contact) {
-    const Eigen::Vector3d away = other.center_map - contact.center_map;
-    return away.norm() < 1e-6 ? 0.0 : patch.normal_map.dot(away.normalized());
-  }
-
-  bool AreOne(const Contact& contact) const {
-    const PatchInfo& a = Info(contact.a);
-    const PatchInfo& b = Info(contact.b);
-    if (graph_.Cosine(a.normal_map, b.normal_map) >= std::cos(options_.flat_rad)) {
-      return contact.strength >= options_.convex_contact;
-    }
-    const bool is_convex = BendOf(a, b, contact) <= options_.shell.bend_sine &&
-                           BendOf(b, a, contact) <= options_.shell.bend_sine;
-    if (is_convex) return contact.strength >= options_.convex_contact;
-    return contact.strength >= options_.concave_contact;
   }
 
   // A table has all of it below its top: what rises higher stands on it or beside it.
@@ -307,9 +416,28 @@ class PatchJoiner {
         if (part == whole || groups[part].size() > groups[whole].size()) continue;
         if (!AreStacked(groups[part], roots[part], groups[whole], roots[whole])) continue;
         if (ShareOver(footprints[part], footprints[whole]) < options_.under_share) continue;
+        if (HasOwnSeat(groups[part], footprints[whole].size())) continue;
         if (TryMerge(roots[part], roots[whole])) break;
       }
     }
+  }
+
+  // What stands below a table with a seat of its own is no leg, but a chair.
+  bool HasOwnSeat(const CellGroup& part, size_t whole_squares) const {
+    const double square_m2 = 4.0 * graph_.cell_m * graph_.cell_m;
+    std::set<int> seen;
+    for (const int cell : part) {
+      const int patch = patch_of_[static_cast<size_t>(cell)];
+      if (!seen.insert(patch).second) continue;
+      const PatchInfo& info = Info(patch);
+      const double up = graph_.is_oriented ? info.normal_map.z() : std::abs(info.normal_map.z());
+      if (up > options_.shell.up_normal && info.area_m2 >= options_.area_min_m2 &&
+          info.height_m >= options_.seat_low_m &&
+          2.0 * info.area_m2 <= static_cast<double>(whole_squares) * square_m2) {
+        return true;
+      }
+    }
+    return false;
   }
 
   bool AreStacked(const CellGroup& part, int part_root, const CellGroup& whole, int whole_root) {
@@ -367,8 +495,10 @@ class PatchJoiner {
   std::vector<PatchInfo> infos_;
   /// Of the sets, by representative.
   std::vector<Thing> things_;
-  /// Strongest first.
+  std::vector<int> patch_of_;
   std::vector<Contact> contacts_;
+  /// By thing and other thing.
+  std::vector<std::map<int, Bond>> bonds_;
   DisjointSets sets_;
 };
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "ingest/objects/cell_graph.h"
+#include "ingest/objects/cell_normals.h"
 #include "ingest/objects/room_shell.h"
 #include "ingest/objects/surface_cells.h"
 #include "ingest/objects/surface_patches.h"
@@ -75,6 +76,10 @@ bool MayBeObject(const RoomAroundGroup& around, const ObjectCluster& cluster,
   if (sides[0] < options.sliver_m && sides[1] < options.strip_share * sides[2]) return false;
   if (around.top_m < options.height_min_m || around.before_wall_m < options.mount_m) return false;
   if (around.shell_contact >= options.shell_contact) return false;
+  if (around.bottom_m > options.reach_m) return false;
+  const bool is_sheet = std::min(cluster.size.x(), cluster.size.y()) < options.sheet_m &&
+                        around.top_m >= options.sheet_height_m;
+  if (is_sheet && around.bottom_m < options.shell.full_height_m) return false;
   if (around.depth_m < options.shell.full_height_m && around.bottom_m < options.shell.full_height_m)
     return false;
   const double height_m = around.top_m - around.bottom_m;
@@ -97,6 +102,19 @@ bool IsSlopedCeiling(const CellGraph& graph, const RoomShell& shell, const CellG
          height_m / static_cast<double>(patch.size()) >= options.slope_height_m;
 }
 
+// Floors, ceilings and walls say which side of the surface is the room's.
+std::vector<Eigen::Vector3f> SidesOfShell(const CellGraph& graph, const RoomShell& shell,
+                                          double level_normal) {
+  std::vector<Eigen::Vector3f> sides(graph.size(), Eigen::Vector3f::Zero());
+  for (size_t i = 0; i < graph.size(); ++i) {
+    const Eigen::Vector3f& normal = graph.normals_map[i];
+    if (shell.parts[i] == ShellPart::kFloor) sides[i] = Eigen::Vector3f::UnitZ();
+    if (shell.parts[i] == ShellPart::kCeiling) sides[i] = -Eigen::Vector3f::UnitZ();
+    if (std::abs(normal.dot(sides[i])) < level_normal) sides[i].setZero();
+  }
+  return sides;
+}
+
 }  // namespace
 
 std::vector<ObjectCluster> FindUnlabelledObjects(const std::vector<const MeshBlock*>& mesh,
@@ -107,8 +125,10 @@ std::vector<ObjectCluster> FindUnlabelledObjects(const std::vector<const MeshBlo
   if (!(voxel_m > 0.0) || !std::isfinite(voxel_m)) return {};
   const double cell_m = std::max(voxel_m, options.cell_m);
   const ObjectSurface surface = GatherAllSurface(mesh, class_id, cell_m);
-  const CellGraph graph = MakeCellGraph(surface, cell_m, options.shell.same_face_cosine);
+  CellGraph graph = MakeCellGraph(surface, cell_m, options.shell.same_face_cosine);
   const RoomShell shell = FindRoomShell(graph, floors_m, options);
+  if (!graph.is_oriented)
+    OrientNormals(SidesOfShell(graph, shell, options.shell.level_normal), &graph);
   std::vector<bool> is_free(graph.size());
   for (size_t i = 0; i < graph.size(); ++i) is_free[i] = shell.parts[i] == ShellPart::kNone;
   std::vector<CellGroup> patches = FindPatches(graph, is_free, options);

@@ -60,7 +60,7 @@ std::string MappingOptions::Digest(bool has_labels) const {
   const std::string digest = DigestGroups(options.Groups(), defaults.Groups());
   if (!digest.empty()) absl::StrAppend(&tuning, " ", digest);
   // Of what the stages make of a log, with the same options.
-  constexpr int kStagesVersion = 3;
+  constexpr int kStagesVersion = 4;
   return absl::StrCat(
       "stages=", kStagesVersion, " voxel=", volume.voxel_m, " truncation=", volume.truncation_m,
       " range=", volume.range_m, " masking=", static_cast<int>(volume.masking),

@@ -176,6 +176,39 @@ TEST(UnlabelledObjects, AChairAtATableIsItsOwnObject) {
                              Box3d(Vector3d(2.4, 1.74, 0), Vector3d(2.82, 2.16, 0.9))});
 }
 
+TEST(UnlabelledObjects, WhatStandsBeforeAWallIsNoPartOfIt) {
+  MadeRoom room;
+  room.AddBox({1.5, 3.65, 0}, {2.0, 4, 0.75});
+  ExpectObjects(Find(room), {Box3d(Vector3d(1.5, 3.65, 0), Vector3d(2.0, 4, 0.75))});
+}
+
+TEST(UnlabelledObjects, WhatHangsOutOfReachIsNone) {
+  MadeRoom room;
+  room.AddBox({1.5, 1.5, 2.0}, {2.1, 2.1, 2.3});
+  SegmentOptions options;
+  options.reach_m = 1.9;
+  ExpectObjects(Find(room, options), {});
+  options.reach_m = 2.3;
+  EXPECT_EQ(Find(room, options).size(), 1u);
+}
+
+TEST(UnlabelledObjects, ADoorThatStandsOpenIsNone) {
+  MadeRoom room;
+  room.AddBox({2.0, 1.5, 0}, {2.05, 2.4, 2.0});
+  ExpectObjects(Find(room), {});
+}
+
+TEST(UnlabelledObjects, AStoolBelowATableIsItsOwnObject) {
+  MadeRoom room;
+  room.AddTable(2.0, 1.2);
+  room.AddBox({2.3, 1.35, 0.4}, {2.7, 1.7, 0.46});
+  for (const double x : {2.3, 2.65}) {
+    for (const double y : {1.35, 1.65}) room.AddBox({x, y, 0}, {x + 0.05, y + 0.05, 0.4});
+  }
+  ExpectObjects(Find(room), {Box3d(Vector3d(2.0, 1.2, 0), Vector3d(3.2, 1.9, 0.75)),
+                             Box3d(Vector3d(2.3, 1.35, 0), Vector3d(2.7, 1.7, 0.46))});
+}
+
 TEST(UnlabelledObjects, NoBoxIsLongerThanAllowed) {
   MadeRoom room;
   // A worktop around a corner, 3.6 m and 2.4 m long.
