@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <CLI/CLI.hpp>
-#include <functional>
+#include <cmath>
 #include <set>
 #include <string>
 #include <vector>
@@ -114,14 +114,19 @@ TEST(Tuning, EachFlagReachesItsStageAndNoOther) {
 TEST(Tuning, EachNumberIsRefusedOutOfItsRange) {
   Options standard;
   for (const BoundOption& field : standard.All()) {
-    for (const std::string& wrong :
-         {absl::StrCat(field.min - 1.0), absl::StrCat(field.max * 2.0 + 1.0), std::string("nan"),
-          std::string("much")}) {
-      const auto options = Parse({absl::StrCat("--", field.name, "=", wrong)});
-      ASSERT_FALSE(options.ok()) << field.name << " " << wrong;
-      EXPECT_NE(options.status().message().find(field.name), std::string::npos) << options.status();
+    for (const double wrong : {field.min - 1.0, field.max * 2.0 + 1.0, std::nan("")}) {
+      EXPECT_FALSE(field.Check(wrong).ok()) << field.name << " " << wrong;
     }
+    const auto options = Parse({absl::StrCat("--", field.name, "=", field.max * 2.0 + 1.0)});
+    ASSERT_FALSE(options.ok()) << field.name;
+    EXPECT_NE(options.status().message().find(absl::StrCat(field.name, " is ")), std::string::npos)
+        << options.status();
   }
+  for (const char* wrong : {"nan", "inf", "much", ""}) {
+    EXPECT_FALSE(Parse({absl::StrCat("--track-lag=", wrong)}).ok()) << wrong;
+    EXPECT_FALSE(Parse({absl::StrCat("--track-memory=", wrong)}).ok()) << wrong;
+  }
+  EXPECT_FALSE(Parse({"--track-lag=2.5"}).ok());
 }
 
 TEST(Tuning, PeopleTellEachNumberInTheirDigest) {
