@@ -16,9 +16,10 @@ namespace dsg::ingest {
 std::vector<CellGroup> FindPatches(const CellGraph& graph, const std::vector<bool>& is_free,
                                    const SegmentOptions& options);
 
-/// Groups of patches, as cells: patches that touch along much of their outline, if they bend
-/// outwards there or rise from a seat; no group has an upright box longer than size_max_m unless a
-/// patch of it has. `heights_m`: of the cells above the floor.
+/// Groups of patches, as cells: the two that share most of their outlines become one, again and
+/// again; contacts that bend inwards speak against it, unless they are a whole side of both. No
+/// group has an upright box longer than size_max_m unless a patch of it has. `heights_m`: of the
+/// cells above the floor.
 /// Source: after Stein et al., 2014 (locally convex connected patches).
 std::vector<CellGroup> JoinPatches(const CellGraph& graph, const std::vector<float>& heights_m,
                                    const std::vector<CellGroup>& patches,
