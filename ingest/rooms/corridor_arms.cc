@@ -16,17 +16,9 @@ struct TurnedPlan {
   std::vector<int> region_of;
 };
 
-// Angle to the nearest axis that the outlines' edges have, longer ones counting for more.
+// 0 for plans that lie nearly along the axes.
 double MainDirection(const PlanRegions& regions, double straight_rad) {
-  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-  for (const Polygon2d& outline : OutlinesOf(regions)) {
-    for (size_t i = 0; i < outline.size(); ++i) {
-      const Eigen::Vector2d edge = outline[(i + 1) % outline.size()] - outline[i];
-      const double angle = 4.0 * std::atan2(edge.y(), edge.x());
-      sum += edge.squaredNorm() * Eigen::Vector2d(std::cos(angle), std::sin(angle));
-    }
-  }
-  const double angle = 0.25 * std::atan2(sum.y(), sum.x());
+  const double angle = MainAngle(OutlinesOf(regions), 0.0);
   return std::abs(angle) < straight_rad ? 0.0 : angle;
 }
 

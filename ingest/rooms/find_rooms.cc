@@ -8,6 +8,7 @@
 #include "ingest/rooms/clearance_rooms.h"
 #include "ingest/rooms/corridor_arms.h"
 #include "ingest/rooms/filtration.h"
+#include "ingest/rooms/furniture.h"
 #include "ingest/rooms/outline.h"
 #include "ingest/rooms/place_rooms.h"
 #include "ingest/rooms/section.h"
@@ -39,6 +40,7 @@ struct Storey {
     const OccupancyGrid& grid = input.field->grid();
     body = BodySection(grid, input.floor_z_m, options.section);
     FillHoles(options.body_hole_m, &body);
+    FreeIslands(options.furniture, &body);
     ceilings = FindCeilings(grid, input.floor_z_m, input.ceiling_z_m, options.section);
     section = CeilingSection(grid, input.floor_z_m, ceilings, options.section);
   }
@@ -49,6 +51,7 @@ PlanRegions CeilingRegions(const Storey& storey) {
   OccupancyGrid section = storey.section;
   FillOccupiedFrom(storey.body, &section);
   FillHoles(storey.options.hole_m, &section);
+  FreeIslands(storey.options.furniture, &section);
   PlanRegions regions = DivideAtGaps(section, storey.options, OpenRooms::kLeave).regions;
   GrowRegions(FreeCells(section), storey.options.hole_m, &regions);
   return regions;
@@ -59,6 +62,7 @@ PlanRegions CeilingRegions(const Storey& storey) {
 PlanRegions JoinedRegions(const Storey& storey, const OccupancyGrid& closed) {
   OccupancyGrid joined = storey.section;
   FillFrom(closed, &joined);
+  FreeIslands(storey.options.furniture, &joined);
   PlanRegions regions = DivideAtGaps(joined, storey.options, OpenRooms::kLeave).regions;
   GrowRegions(FreeCells(joined), storey.options.hole_m, &regions);
   return regions;
@@ -154,6 +158,7 @@ RoomLabelling Label(const Storey& storey, RoomMethod method, PlanRegions regions
   labelling.room_of_place = RoomsOfPlaces(input.places, input.links, regions);
   GrowRegions(FreeCells(storey.body), storey.options.doorway_m, &regions);
   labelling.adjacent = AdjacentRooms(input.places, input.links, labelling.room_of_place, regions);
+  CoverFurniture(storey.options.furniture, &regions);
   DescribeRooms(storey, regions, &labelling);
   return labelling;
 }

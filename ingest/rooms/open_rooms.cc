@@ -72,13 +72,8 @@ class CellShape {
 
 class OpenRoomCloser {
  public:
-  OpenRoomCloser(const std::vector<uint8_t>& is_block, const OpenRoomOptions& options,
-                 OccupancyGrid* plan)
-      : options_(options),
-        plan_(*plan),
-        frame_(plan->frame),
-        is_block_(is_block),
-        seen_(plan->cells.size(), 0) {}
+  OpenRoomCloser(const OpenRoomOptions& options, OccupancyGrid* plan)
+      : options_(options), plan_(*plan), frame_(plan->frame), seen_(plan->cells.size(), 0) {}
 
   void Run() {
     FindRegions();
@@ -110,11 +105,7 @@ class OpenRoomCloser {
     bool is_at_wall_end = false;
   };
 
-  // Furniture stands on a room's floor.
-  bool IsFreeCell(const Eigen::Vector3i& cell) const {
-    return plan_.At(cell) == Occupancy::kFree ||
-           (frame_.Holds(cell) && is_block_[static_cast<size_t>(frame_.Index(cell))] != 0);
-  }
+  bool IsFreeCell(const Eigen::Vector3i& cell) const { return plan_.At(cell) == Occupancy::kFree; }
   Eigen::Vector3i CellAt(const Eigen::Vector2d& point) const {
     Eigen::Vector3i cell = frame_.CellOf({point.x(), point.y(), frame_.origin_map.z()});
     cell.z() = 0;
@@ -128,7 +119,7 @@ class OpenRoomCloser {
   void FindRegions() {
     std::vector<uint8_t> is_free(plan_.cells.size());
     for (size_t i = 0; i < is_free.size(); ++i) {
-      is_free[i] = plan_.cells[i] == Occupancy::kFree || is_block_[i] != 0 ? 1 : 0;
+      is_free[i] = plan_.cells[i] == Occupancy::kFree ? 1 : 0;
     }
     regions_ = LabelRegions(frame_, is_free, 2.0 * options_.bay_m2_min);
     std::vector<CellShape> shapes(static_cast<size_t>(regions_.count), CellShape(frame_));
@@ -160,8 +151,7 @@ class OpenRoomCloser {
         std::max(1, static_cast<int>(std::lround(options_.corner_reach_m / frame_.cell_m)));
     std::vector<std::pair<double, int64_t>> rated;
     for (int64_t i = 0; i < frame_.CellCount(); ++i) {
-      const auto at = static_cast<size_t>(i);
-      if (plan_.cells[at] != Occupancy::kOccupied || is_block_[at] != 0) continue;
+      if (plan_.cells[static_cast<size_t>(i)] != Occupancy::kOccupied) continue;
       const Eigen::Vector3i cell = frame_.Cell(i);
       int region = -1;
       for (const Eigen::Vector3i& step : kSides) region = std::max(region, RegionAt(cell + step));
@@ -199,12 +189,9 @@ class OpenRoomCloser {
     constexpr double kNowhere = std::numeric_limits<double>::infinity();
     const double step_m = 0.5 * frame_.cell_m;
     for (double at_m = 1.5 * frame_.cell_m; at_m <= options_.width_m_max; at_m += step_m) {
-      const Eigen::Vector3i cell = CellAt(from + at_m * way);
-      const Occupancy state = plan_.At(cell);
+      const Occupancy state = plan_.At(CellAt(from + at_m * way));
       if (state == Occupancy::kFree) continue;
-      const bool is_wall = state == Occupancy::kOccupied && frame_.Holds(cell) &&
-                           is_block_[static_cast<size_t>(frame_.Index(cell))] == 0;
-      return is_wall && at_m >= options_.width_m_min ? at_m : kNowhere;
+      return state == Occupancy::kOccupied && at_m >= options_.width_m_min ? at_m : kNowhere;
     }
     return kNowhere;
   }
@@ -357,7 +344,6 @@ class OpenRoomCloser {
   const OpenRoomOptions& options_;
   OccupancyGrid& plan_;
   const GridFrame& frame_;
-  const std::vector<uint8_t>& is_block_;
   PlanRegions regions_;
   std::vector<Kind> kind_of_region_;
   std::vector<int32_t> seen_;
@@ -366,9 +352,8 @@ class OpenRoomCloser {
 
 }  // namespace
 
-void CloseOpenRooms(const std::vector<uint8_t>& is_block, const OpenRoomOptions& options,
-                    OccupancyGrid* plan) {
-  OpenRoomCloser(is_block, options, plan).Run();
+void CloseOpenRooms(const OpenRoomOptions& options, OccupancyGrid* plan) {
+  OpenRoomCloser(options, plan).Run();
 }
 
 }  // namespace dsg::ingest

@@ -15,13 +15,11 @@ namespace dsg::ingest {
 /// compact part of a region that is not compact itself, as a corridor with all that is open to it
 /// is not; its opening is a line from the end of a wall, or a corner of walls, straight to the
 /// nearest wall. In a large region that is compact, as a hall divided by thin walls is, openings
-/// begin at ends of walls only. `is_block`: occupied cells of furniture and pillars, at which no
-/// opening ends.
+/// begin at ends of walls only.
 ///
 /// Order: by the openings' lengths, shortest first.
 /// Cost: corners of walls x rays, and for each opening twice the area of its smaller side.
 /// Source: ours; for dividing by lines between corners see Mielle et al., "MAORIS", ICRA 2018.
-void CloseOpenRooms(const std::vector<uint8_t>& is_block, const OpenRoomOptions& options,
-                    OccupancyGrid* plan);
+void CloseOpenRooms(const OpenRoomOptions& options, OccupancyGrid* plan);
 
 }  // namespace dsg::ingest

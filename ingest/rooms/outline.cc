@@ -206,6 +206,20 @@ Polygon2d OutlineOf(Mask* mask, const Corner& low, const GridFrame& frame) {
 
 }  // namespace
 
+double MainAngle(const std::vector<Polygon2d>& outlines, double tolerance_m) {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  for (const Polygon2d& exact : outlines) {
+    const bool is_rough = tolerance_m > 0.0 && exact.size() > 3;
+    const Polygon2d outline = is_rough ? Simplified(exact, tolerance_m) : exact;
+    for (size_t i = 0; i < outline.size(); ++i) {
+      const Eigen::Vector2d edge = outline[(i + 1) % outline.size()] - outline[i];
+      const double angle = 4.0 * std::atan2(edge.y(), edge.x());
+      sum += edge.squaredNorm() * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+    }
+  }
+  return 0.25 * std::atan2(sum.y(), sum.x());
+}
+
 double SignedAreaM2(const Polygon2d& polygon) {
   double twice = 0.0;
   for (size_t i = 0; i < polygon.size(); ++i) {

@@ -14,6 +14,11 @@ namespace dsg::ingest {
 /// most a cell from the cells' edges. Empty for a region without cells.
 std::vector<Polygon2d> OutlinesOf(const PlanRegions& regions);
 
+/// Angle to the nearest axis, within 45 degrees, that the edges of outlines have, longer ones
+/// counting for more. Corners nearer than `tolerance_m` to a line between others do not count, so
+/// that steps of cells are no edges.
+double MainAngle(const std::vector<Polygon2d>& outlines, double tolerance_m);
+
 /// Positive when counter-clockwise.
 double SignedAreaM2(const Polygon2d& polygon);
 

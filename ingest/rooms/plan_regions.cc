@@ -104,7 +104,7 @@ DividedPlan DivideAtGaps(const OccupancyGrid& plan, const RoomOptions& options,
     ++kept_count;
   }
   if (open_rooms == OpenRooms::kClose) {
-    CloseOpenRooms(FindBlocks(plan, options.gaps), options.open, &closed);
+    CloseOpenRooms(options.open, &closed);
   } else if (kept_count == gaps.size()) {
     return divided;
   }

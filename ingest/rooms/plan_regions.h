@@ -39,7 +39,8 @@ struct DividedPlan {
 };
 
 /// Components of the free cells far enough from obstacles, with the gaps in walls closed that
-/// part one room from another. Cells next to obstacles stay without a region.
+/// part one room from another. Cells next to obstacles stay without a region. `plan`: without
+/// furniture that stands alone (FreeIslands), between which gaps are no doors.
 DividedPlan DivideAtGaps(const OccupancyGrid& plan, const RoomOptions& options,
                          OpenRooms open_rooms);
 

@@ -81,13 +81,35 @@ constexpr OptionField<WallGapOptions> kGapFields[] = {
     {"room-gap-region-reach", &WallGapOptions::region_reach_m, 0.0, 10.0,
      "How far from a way's middle one looks for the rooms that it parts, metres: past a thick wall "
      "and the clearance"},
-    {"room-block-thick", &WallGapOptions::block_thick_m, 0.0, 10.0,
+    {"room-mouth-hall", &WallGapOptions::hall_widths, 0.5, 100.0,
+     "A corridor ends where walls are so many of its widths away: the hall is four times as wide"},
+    {"room-mouth-arm", &WallGapOptions::arm_widths, 0.0, 100.0,
+     "... if it goes on straight for so many of its widths: shorter ones are niches of the hall"},
+    {"room-mouth-clearance", &WallGapOptions::arm_clearance, 0.5, 5.0,
+     "... with walls no farther from its middle than this share of its width: half of it, and "
+     "noise"},
+};
+
+constexpr OptionField<FurnitureOptions> kFurnitureFields[] = {
+    {"room-leg", &FurnitureOptions::leg_m_max, 0.0, 5.0,
+     "What stands alone and is no larger than this is no wall, metres: legs, bins, lamps"},
+    {"room-leg-apart", &FurnitureOptions::apart_m, 0.0, 2.0,
+     "What is nearer to something else does not stand alone, metres: walls that were seen in "
+     "dashes"},
+    {"room-block-thick", &FurnitureOptions::block_thick_m, 0.0, 10.0,
      "An obstacle that stands alone and is this thick is furniture or a pillar, metres: walls "
      "between rooms are thinner"},
-    {"room-block-long", &WallGapOptions::block_long_m, 0.0, 50.0,
+    {"room-block-long", &FurnitureOptions::block_long_m, 0.0, 50.0,
      "... and no longer than this, metres: longer ones are pieces of wall"},
-    {"room-block-filled", &WallGapOptions::block_filled, 0.0, 1.0,
+    {"room-block-filled", &FurnitureOptions::block_filled, 0.0, 1.0,
      "... and fills this share of its box: corners of walls between two doors do not"},
+    {"room-furniture-thin", &FurnitureOptions::thin_m, 0.0, 5.0,
+     "What stands in a corner or niche of a room's walls is furniture, unless it is thinner than "
+     "this, metres: walls are as rough"},
+    {"room-furniture-deep", &FurnitureOptions::deep_m, 0.0, 5.0,
+     "... or deeper than this, metres: cupboards, desks and sofas"},
+    {"room-furniture-long", &FurnitureOptions::long_m, 0.0, 10.0,
+     "... or longer than this, metres: two cupboards side by side"},
 };
 
 constexpr OptionField<OpenRoomOptions> kOpenFields[] = {
@@ -233,6 +255,7 @@ std::vector<BoundOption> RoomOptions::Bind() {
   std::vector<BoundOption> bound;
   BindFields<RoomOptions>(kRoomFields, this, &bound);
   BindFields<SectionOptions>(kSectionFields, &section, &bound);
+  BindFields<FurnitureOptions>(kFurnitureFields, &furniture, &bound);
   BindFields<WallGapOptions>(kGapFields, &gaps, &bound);
   BindFields<OpenRoomOptions>(kOpenFields, &open, &bound);
   BindFields<CorridorOptions>(kCorridorFields, &corridors, &bound);

@@ -50,9 +50,21 @@ struct WallGapOptions {
   double opposite = 1.8;
   double apart_m = 0.5;
   double region_reach_m = 1.2;
+  double hall_widths = 2.0;
+  double arm_widths = 2.0;
+  double arm_clearance = 0.6;
+};
+
+/// What stands in rooms and is no wall (furniture.h).
+struct FurnitureOptions {
+  double leg_m_max = 0.5;
+  double apart_m = 0.1;
   double block_thick_m = 0.45;
   double block_long_m = 2.6;
   double block_filled = 0.6;
+  double thin_m = 0.15;
+  double deep_m = 1.0;
+  double long_m = 3.0;
 };
 
 /// Bays that stand open to a corridor (open_rooms.h).
@@ -109,6 +121,7 @@ struct RoomOptions {
   double same_place_m = 0.75;
 
   SectionOptions section;
+  FurnitureOptions furniture;
   WallGapOptions gaps;
   OpenRoomOptions open;
   CorridorOptions corridors;

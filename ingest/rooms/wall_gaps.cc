@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace dsg::ingest {
 namespace {
@@ -11,10 +12,7 @@ namespace {
 class GapFinder {
  public:
   GapFinder(const DistanceField& plan, const WallGapOptions& options)
-      : plan_(plan),
-        frame_(plan.frame()),
-        options_(options),
-        is_block_(FindBlocks(plan.grid(), options)) {}
+      : plan_(plan), frame_(plan.frame()), options_(options) {}
 
   std::vector<WallGap> Find() const {
     std::vector<WallGap> candidates = Candidates();
@@ -26,7 +24,7 @@ class GapFinder {
         const double reach_m = std::max(options_.apart_m, 0.5 * other.WidthM());
         return (other.MiddleMap() - gap.MiddleMap()).norm() < reach_m;
       });
-      if (!is_taken && OpensOnBothSides(gap)) gaps.push_back(gap);
+      if (!is_taken && (OpensOnBothSides(gap) || IsMouth(gap))) gaps.push_back(gap);
     }
     return gaps;
   }
@@ -63,7 +61,6 @@ class GapFinder {
     const int64_t a = plan_.NearestObstacle(i);
     const int64_t b = plan_.NearestObstacle(j);
     if (!IsNear(j) || a < 0 || b < 0 || a == b) return;
-    if (is_block_[static_cast<size_t>(a)] != 0 || is_block_[static_cast<size_t>(b)] != 0) return;
     const WallGap gap{CenterOf(std::min(a, b)), CenterOf(std::max(a, b))};
     const double width_m = gap.WidthM();
     const double clearance_m = static_cast<double>(plan_.DistanceM(i));
@@ -77,26 +74,77 @@ class GapFinder {
     candidates->push_back(gap);
   }
 
+  // A single door may stand in a corner of either room; what is wider has walls at both ends, or
+  // bends of corridors would be doors.
   bool OpensOnBothSides(const WallGap& gap) const {
     if (!IsFree(gap.MiddleMap())) return false;
     const bool is_narrow = gap.WidthM() <= options_.narrow_m_max;
-    return Opens(gap, 1.0, is_narrow) && Opens(gap, -1.0, is_narrow);
+    const double depth_m = is_narrow ? options_.narrow_depth_m : options_.wide_depth_m;
+    const int jambs = is_narrow ? 1 : 2;
+    return OpenJambs(gap, 1.0, depth_m) >= jambs && OpenJambs(gap, -1.0, depth_m) >= jambs;
   }
 
-  // Whether the space on one side is wider than the gap.
-  bool Opens(const WallGap& gap, double side, bool is_narrow) const {
+  // Behind how many jambs the space on one side is wider than the gap.
+  int OpenJambs(const WallGap& gap, double side, double depth_m) const {
     const Eigen::Vector2d along = (gap.to_map - gap.from_map).normalized();
     const Eigen::Vector2d out = side * gap.NormalMap();
-    const double depth_m = is_narrow ? options_.narrow_depth_m : options_.wide_depth_m;
     const double reach_m = 0.5 * gap.WidthM() + options_.behind_jamb_m;
-    for (double depth = frame_.cell_m; depth <= depth_m; depth += 0.5 * frame_.cell_m) {
+    int most = 0;
+    for (double depth = frame_.cell_m; depth <= depth_m && most < 2; depth += 0.5 * frame_.cell_m) {
       const Eigen::Vector2d middle = gap.MiddleMap() + depth * out;
-      if (!IsFree(middle)) return false;
-      const bool left = IsWayFree(middle, -along, reach_m);
-      const bool right = IsWayFree(middle, along, reach_m);
-      if (is_narrow ? left || right : left && right) return true;
+      if (!IsFree(middle)) break;
+      const int open = (IsWayFree(middle, -along, reach_m) ? 1 : 0) +
+                       (IsWayFree(middle, along, reach_m) ? 1 : 0);
+      most = std::max(most, open);
+    }
+    return most;
+  }
+
+  // Whether a corridor ends here in a hall, which no wall shows.
+  bool IsMouth(const WallGap& gap) const {
+    if (!IsFree(gap.MiddleMap())) return false;
+    for (const double side : {1.0, -1.0}) {
+      if (OpenJambs(gap, side, options_.wide_depth_m) > 0 && IsHall(gap, side) &&
+          IsArm(gap, -side)) {
+        return true;
+      }
     }
     return false;
+  }
+
+  // Space much wider than the gap is in sight, straight on or aslant.
+  bool IsHall(const WallGap& gap, double side) const {
+    const double width_m = gap.WidthM();
+    const double need_m = options_.hall_widths * width_m;
+    for (const double angle : {0.0, 0.25 * std::numbers::pi, -0.25 * std::numbers::pi}) {
+      const Eigen::Vector2d way = Eigen::Rotation2Dd(angle) * (side * gap.NormalMap());
+      for (double at_m = frame_.cell_m; at_m <= 2.0 * need_m; at_m += frame_.cell_m) {
+        const Eigen::Vector2d at = gap.MiddleMap() + at_m * way;
+        // A door beside a corridor shows a hall too, but the way there is no wider.
+        const double clearance_m = ClearanceM(at);
+        const bool is_door = at_m > width_m && clearance_m <= options_.arm_clearance * width_m;
+        if (!IsFree(at) || is_door) break;
+        if (clearance_m >= need_m) return true;
+      }
+    }
+    return false;
+  }
+
+  // The space goes on straight and as narrow as the gap.
+  bool IsArm(const WallGap& gap, double side) const {
+    const double width_m = gap.WidthM();
+    for (double at_m = frame_.cell_m; at_m <= options_.arm_widths * width_m;
+         at_m += frame_.cell_m) {
+      const Eigen::Vector2d at = gap.MiddleMap() + side * at_m * gap.NormalMap();
+      if (!IsFree(at) || ClearanceM(at) > options_.arm_clearance * width_m) return false;
+    }
+    return true;
+  }
+
+  double ClearanceM(const Eigen::Vector2d& point) const {
+    const Eigen::Vector3i cell =
+        frame_.CellOf({point.x(), point.y(), frame_.origin_map.z() + 0.5 * frame_.cell_m});
+    return frame_.Holds(cell) ? static_cast<double>(plan_.DistanceM(frame_.Index(cell))) : 0.0;
   }
 
   bool IsWayFree(const Eigen::Vector2d& from, const Eigen::Vector2d& direction,
@@ -112,44 +160,9 @@ class GapFinder {
   const DistanceField& plan_;
   const GridFrame& frame_;
   const WallGapOptions& options_;
-  const std::vector<uint8_t> is_block_;
 };
 
 }  // namespace
-
-std::vector<uint8_t> FindBlocks(const OccupancyGrid& plan, const WallGapOptions& options) {
-  const GridFrame& frame = plan.frame;
-  std::vector<uint8_t> state(plan.cells.size(), 0);
-  std::vector<int64_t> open;
-  for (size_t start = 0; start < state.size(); ++start) {
-    if (plan.cells[start] != Occupancy::kOccupied || state[start] != 0) continue;
-    Eigen::AlignedBox2i box;
-    open.assign(1, static_cast<int64_t>(start));
-    state[start] = 1;
-    for (size_t next = 0; next < open.size(); ++next) {
-      const Eigen::Vector3i at = frame.Cell(open[next]);
-      box.extend(Eigen::Vector2i(at.head<2>()));
-      for (int side = 0; side < 9; ++side) {
-        const Eigen::Vector3i cell(at.x() + side % 3 - 1, at.y() + side / 3 - 1, 0);
-        if (plan.At(cell) != Occupancy::kOccupied) continue;
-        const int64_t index = frame.Index(cell);
-        if (state[static_cast<size_t>(index)] != 0) continue;
-        state[static_cast<size_t>(index)] = 1;
-        open.push_back(index);
-      }
-    }
-    const Eigen::Vector2d size_m = frame.cell_m * (box.sizes().cast<double>().array() + 1).matrix();
-    const double filled =
-        static_cast<double>(open.size()) * frame.cell_m * frame.cell_m / size_m.prod();
-    if (size_m.minCoeff() < options.block_thick_m || size_m.maxCoeff() > options.block_long_m ||
-        filled < options.block_filled) {
-      continue;
-    }
-    for (const int64_t cell : open) state[static_cast<size_t>(cell)] = 2;
-  }
-  for (uint8_t& cell : state) cell = cell == 2 ? 1 : 0;
-  return state;
-}
 
 std::vector<WallGap> FindWallGaps(const DistanceField& plan, const WallGapOptions& options) {
   return GapFinder(plan, options).Find();

@@ -25,10 +25,6 @@ struct WallGap {
   }
 };
 
-/// Marks the occupied cells that are no walls: obstacles that stand alone, are as thick as a body
-/// and not long, and fill their box.
-std::vector<uint8_t> FindBlocks(const OccupancyGrid& plan, const WallGapOptions& options);
-
 /// `plan`: of one cell's height. Ends are occupied cells, never unknown ones.
 /// Order: by width. Source: critical points of Voronoi graphs, Thrun 1998; the test of the jambs
 /// is ours.

@@ -5,6 +5,7 @@
 #include "ingest/rooms/outline.h"
 #include "ingest/rooms/wall_gaps.h"
 #include "schema/base/random.h"
+#include "tests/unit/ingest/rooms/drawing.h"
 
 namespace dsg::ingest {
 namespace {
@@ -103,6 +104,21 @@ TEST(WallGaps, AreNoneInACorridor) {
     for (int x = 5; x < 195; ++x) plan.cells[static_cast<size_t>(y * 200 + x)] = Occupancy::kFree;
   }
   EXPECT_TRUE(FindWallGaps(DistanceField(plan), {}).empty());
+}
+
+TEST(WallGaps, AreWhereACorridorEndsInAHall) {
+  Drawing plan(20, 12);
+  plan.Free(0.5, 0.5, 10.5, 11.5).Free(10.5, 5.0, 19.5, 6.6);
+  const std::vector<WallGap> gaps = FindWallGaps(DistanceField(plan.plan()), {});
+  ASSERT_EQ(gaps.size(), 1u);
+  EXPECT_NEAR(gaps[0].MiddleMap().x(), 10.5, 0.6);
+  // A niche of the hall, and a corridor that crosses another one.
+  Drawing niche(20, 12);
+  niche.Free(0.5, 0.5, 10.5, 11.5).Free(10.5, 5.0, 12.0, 6.6);
+  EXPECT_TRUE(FindWallGaps(DistanceField(niche.plan()), {}).empty());
+  Drawing cross(20, 20);
+  cross.Free(0.5, 9.0, 19.5, 11.0).Free(9.0, 0.5, 11.0, 19.5);
+  EXPECT_TRUE(FindWallGaps(DistanceField(cross.plan()), {}).empty());
 }
 
 TEST(Regions, GrowNoFartherThanTheyMay) {
