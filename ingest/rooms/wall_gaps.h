@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Ways through walls in a plan: short and narrow, with more space on both sides.
-// Refuses passages that are as narrow before and behind: those are corridors.
+// Refuses passages that are as narrow before and behind: those are corridors, but for their mouths
+// into halls.
 #pragma once
 
 #include <cstdint>
