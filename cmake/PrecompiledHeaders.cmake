@@ -13,6 +13,13 @@ set(CORE_HEADERS <algorithm> <array> <chrono> <cmath> <cstdint> <filesystem> <fs
 set(RPC_HEADERS <dsg/v1/query_service.pb.h> <dsg/v1/ingest_service.pb.h>
   <dsg/v1/map_service.pb.h> <dsg/v1/maintenance_service.pb.h> <dsg/v1/errors.pb.h>)
 
+# Release compiles with -O2, and with -O3 where a folder sets DSG_HOT: inner loops over poses, voxels,
+# nodes and pixels. -O3 everywhere costs a sixth of the build's time and gains nothing elsewhere. gcc
+# takes the level from the precompiled headers, so these folders have a set of their own.
+if(CMAKE_BUILD_TYPE STREQUAL "Release" AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  set(DSG_HOT_OPTIONS -O3)
+endif()
+
 # dsg_precompiled(name HEADERS ... LIBRARIES ...): one set of headers, as the target dsg_pch_<name>.
 function(dsg_precompiled name)
   cmake_parse_arguments(ARG "" "" "HEADERS;LIBRARIES" ${ARGN})
@@ -29,6 +36,10 @@ if(DSG_PCH)
   dsg_precompiled(core HEADERS ${CORE_HEADERS} LIBRARIES ${CORE_LIBRARIES})
   dsg_precompiled(rpc HEADERS ${CORE_HEADERS} ${RPC_HEADERS}
     LIBRARIES ${CORE_LIBRARIES} dsg_proto)
+  if(DSG_HOT_OPTIONS)
+    dsg_precompiled(core_hot HEADERS ${CORE_HEADERS} LIBRARIES ${CORE_LIBRARIES})
+    target_compile_options(dsg_pch_core_hot PRIVATE ${DSG_HOT_OPTIONS})
+  endif()
   if(DSG_BUILD_TESTS)
     find_package(GTest REQUIRED)
     dsg_precompiled(core_test HEADERS ${CORE_HEADERS} <gtest/gtest.h>
@@ -39,10 +50,15 @@ if(DSG_PCH)
 endif()
 
 # Lets the target name use the set of its folder: DSG_HEADERS (core when unset), and for tests the
-# set of that name with gtest.
+# set of that name with gtest. DSG_HOT goes with core only.
 function(dsg_use_precompiled name)
+  set(headers ${DSG_HEADERS}${ARGN})
+  if(DSG_HOT AND DSG_HOT_OPTIONS)
+    target_compile_options(${name} PRIVATE ${DSG_HOT_OPTIONS})
+    set(headers core_hot)
+  endif()
   if(DSG_PCH)
-    target_precompile_headers(${name} REUSE_FROM dsg_pch_${DSG_HEADERS}${ARGN})
+    target_precompile_headers(${name} REUSE_FROM dsg_pch_${headers})
   endif()
 endfunction()
 set(DSG_HEADERS core)
