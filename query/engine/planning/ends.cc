@@ -27,13 +27,14 @@ void KeepNearest(size_t count_max, std::vector<Anchor>* anchors) {
   if (anchors->size() > count_max) anchors->resize(count_max);
 }
 
-double DistanceToSegment(const Eigen::Vector3d& point, const Eigen::Vector3d& a,
-                         const Eigen::Vector3d& b) {
+double SquaredDistanceToSegment(const Eigen::Vector3d& point, const Eigen::Vector3d& a,
+                                const Eigen::Vector3d& b) {
   const Eigen::Vector3d along = b - a;
+  const Eigen::Vector3d from_a = point - a;
   const double square = along.squaredNorm();
-  if (square == 0.0) return (point - a).norm();
-  const double fraction = std::clamp((point - a).dot(along) / square, 0.0, 1.0);
-  return (point - a - fraction * along).norm();
+  if (square == 0.0) return from_a.squaredNorm();
+  const double fraction = std::clamp(from_a.dot(along) / square, 0.0, 1.0);
+  return (from_a - fraction * along).squaredNorm();
 }
 
 class Attacher {
@@ -131,11 +132,12 @@ class Attacher {
 
   // The space that a link has swept is convex: whoever is in it gets to both ends.
   bool IsBesideLink(PlaceIndex place, const Eigen::Vector3d& point_map) const {
+    const Eigen::Vector3d& place_map = graph_.position_map(place);
     return std::any_of(graph_.links_begin(place), graph_.links_end(place), [&](const auto& link) {
-      return limits_.Admits(link) && DistanceToSegment(point_map, graph_.position_map(place),
-                                                       graph_.position_map(link.to)) +
-                                             limits_.radius_m <=
-                                         static_cast<double>(link.clearance_m);
+      const double free_m = static_cast<double>(link.clearance_m) - limits_.radius_m;
+      return limits_.Admits(link) && free_m >= 0.0 &&
+             SquaredDistanceToSegment(point_map, place_map, graph_.position_map(link.to)) <=
+                 free_m * free_m;
     });
   }
 
