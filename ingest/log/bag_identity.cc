@@ -2,6 +2,7 @@
 #include "ingest/log/bag_identity.h"
 
 #include <cstdint>
+#include <iterator>
 #include <map>
 #include <string_view>
 
@@ -151,9 +152,12 @@ std::string HashOf(const TrackTable& poses) {
 }  // namespace
 
 void AddBagContent(const Bag& bag, const BagPlan& plan,
-                   const std::optional<TrackTable>& transform_poses, LogDigest* digest) {
+                   const std::optional<TrackTable>& transform_poses, const PassCallback& on_read,
+                   LogDigest* digest) {
   std::map<size_t, ContentHash> hash_of_topic;
+  int64_t done = 0;
   for (const BagMessageRef& ref : bag.messages()) {
+    if (on_read) on_read(++done, std::ssize(bag.messages()));
     const size_t index = plan.topic_of_connection[ref.connection];
     const BagTopic& topic = plan.topics[index];
     if (topic.use == TopicUse::kNone) continue;

@@ -8,6 +8,7 @@
 #include "ingest/log/bag.h"
 #include "ingest/log/bag_topics.h"
 #include "ingest/log/log_digest.h"
+#include "ingest/log/log_source.h"
 #include "ingest/log/track_log.h"
 
 namespace dsg::ingest {
@@ -17,8 +18,10 @@ namespace dsg::ingest {
 /// recording has one identity as ROS 1 bag, MCAP and SQLite file, compressed or not, with or
 /// without topics that are not read. Messages that cannot be read count by their bytes.
 ///
-/// Cost: reads the bag once.
+/// Cost: reads the bag once; `on_read` (may be empty) gets the count of messages that were looked
+/// at, and of how many.
 void AddBagContent(const Bag& bag, const BagPlan& plan,
-                   const std::optional<TrackTable>& transform_poses, LogDigest* digest);
+                   const std::optional<TrackTable>& transform_poses, const PassCallback& on_read,
+                   LogDigest* digest);
 
 }  // namespace dsg::ingest

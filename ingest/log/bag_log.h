@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A bag as a log: topics as channels, stamps from the messages' headers.
-// Refuses stamps that step back within a topic, or by more than a second between topics.
+// A bag as a log: topics as channels, and where its poses and loop closures come from.
 #pragma once
 
 #include <string>
@@ -9,7 +8,7 @@
 
 namespace dsg::ingest {
 
-/// A bag without anything usable opens, so that its notes can be read; its first Next() fails.
+/// The log is a BagStream.
 /// Errors: INVALID_ARGUMENT/FILE_MALFORMED naming byte offset or topic, message and stamps.
 OpenedLog OpenBag(const std::string& path, const LogOptions& options);
 

@@ -53,7 +53,7 @@ constexpr KnownTopic kKnown[] = {
     {"/tesse/imu/noisy/imu", "sensor_msgs/Imu", TopicUse::kImu, "imu0"},
     {"/tesse/odom", "nav_msgs/Odometry", TopicUse::kTruth, "poses"},
     {"/dsg/detections", kStringType, TopicUse::kDetections, "detections0"},
-    {"/dsg/loop_closures", kStringType, TopicUse::kLoops, "loops0"},
+    {kLoopTopic, kLoopType, TopicUse::kLoops, kLoopChannel},
     {"/cam0/image_raw", kImageType, TopicUse::kImage, "cam0"},
     {"/cam1/image_raw", kImageType, TopicUse::kImage, "cam1"},
     {"/imu0", "sensor_msgs/Imu", TopicUse::kImu, "imu0"},
@@ -88,7 +88,7 @@ constexpr ChannelType kChannelTypes[] = {
     {"truth", kPoseWithCovarianceType, TopicUse::kTruth},
     {"truth", "geometry_msgs/TransformStamped", TopicUse::kTruth},
     {"detections0", kStringType, TopicUse::kDetections},
-    {"loops0", kStringType, TopicUse::kLoops},
+    {kLoopChannel, kLoopType, TopicUse::kLoops},
 };
 
 using NamedTopics = std::map<std::string, std::string>;

@@ -16,6 +16,12 @@
 
 namespace dsg::ingest {
 
+inline constexpr char kPoseChannel[] = "poses";
+/// Loop closures: their channel, their topic unless another is named, and its type.
+inline constexpr char kLoopChannel[] = "loops0";
+inline constexpr char kLoopTopic[] = "/dsg/loop_closures";
+inline constexpr char kLoopType[] = "std_msgs/String";
+
 enum class TopicUse {
   kNone,
   kImage,

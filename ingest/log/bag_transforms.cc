@@ -2,9 +2,9 @@
 #include "ingest/log/bag_transforms.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
-#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "ingest/log/file_bytes.h"
@@ -23,40 +23,6 @@ constexpr size_t kFramesMax = 10'000;
 // Chains of frames in a robot are short; a circle would not end.
 constexpr size_t kChainMax = 64;
 
-std::string WithoutSlash(const std::string& frame) {
-  return frame.starts_with('/') ? frame.substr(1) : frame;
-}
-
-std::string Shown(const std::string& frame) {
-  return absl::StrCat("\"", absl::Utf8SafeCHexEscape(frame.substr(0, 64)), "\"");
-}
-
-bool IsSame(const Pose3d& a, const Pose3d& b) {
-  return a.position == b.position && a.orientation.coeffs() == b.orientation.coeffs();
-}
-
-// A frame over time.
-struct StampedPoses {
-  std::vector<TimeNs> times;
-  std::vector<Pose3d> poses;
-};
-
-// Between the neighbours; before the first and after the last it stands.
-Pose3d PoseAt(const StampedPoses& track, TimeNs time_ns) {
-  const auto next = std::lower_bound(track.times.begin(), track.times.end(), time_ns);
-  const auto index = static_cast<size_t>(next - track.times.begin());
-  if (next == track.times.end()) return track.poses.back();
-  if (index == 0 || *next == time_ns) return track.poses[index];
-  const double share = static_cast<double>(time_ns - track.times[index - 1]) /
-                       static_cast<double>(track.times[index] - track.times[index - 1]);
-  const Pose3d& a = track.poses[index - 1];
-  const Pose3d& b = track.poses[index];
-  Pose3d pose;
-  pose.position = a.position + share * (b.position - a.position);
-  pose.orientation = a.orientation.slerp(share, b.orientation).normalized();
-  return pose;
-}
-
 bool IsTransforms(const BagConnection& connection, std::string_view topic) {
   return connection.topic == topic &&
          (connection.type == "tf2_msgs/TFMessage" || connection.type == "tf/tfMessage");
@@ -64,9 +30,12 @@ bool IsTransforms(const BagConnection& connection, std::string_view topic) {
 
 // Calls visit(transform, origin) on each transform of a topic.
 template <typename Visit>
-absl::Status ForEachTransform(const Bag& bag, const std::string& topic, const Visit& visit) {
+absl::Status ForEachTransform(const Bag& bag, const std::string& topic, const PassCallback& on_read,
+                              const Visit& visit) {
   int64_t number = 0;
+  int64_t done = 0;
   for (const BagMessageRef& ref : bag.messages()) {
+    if (on_read) on_read(++done, std::ssize(bag.messages()));
     if (!IsTransforms(bag.connections()[ref.connection], topic)) continue;
     const std::string origin = BagOrigin(bag, topic, ++number);
     DSG_ASSIGN_OR_RETURN(const BagMessage message, bag.Read(ref));
@@ -81,25 +50,30 @@ absl::Status ForEachTransform(const Bag& bag, const std::string& topic, const Vi
 
 }  // namespace
 
+bool IsMovingTransforms(const BagConnection& connection) {
+  return IsTransforms(connection, kTopic);
+}
+
 bool HasMovingTransforms(const Bag& bag) {
   return std::any_of(bag.connections().begin(), bag.connections().end(),
                      [](const BagConnection& connection) {
-                       return IsTransforms(connection, kTopic) && connection.message_count > 0;
+                       return IsMovingTransforms(connection) && connection.message_count > 0;
                      });
 }
 
-absl::StatusOr<TransformTree> TransformTree::Read(const Bag& bag, bool with_moving) {
+absl::StatusOr<TransformTree> TransformTree::Read(const Bag& bag, bool with_moving,
+                                                  const PassCallback& on_read) {
   TransformTree tree;
   tree.path_ = bag.path();
-  DSG_RETURN_IF_ERROR(
-      ForEachTransform(bag, kStaticTopic, [&](const RosPose& transform, const std::string& origin) {
-        return tree.Add(transform, /*is_static=*/true, origin);
-      }));
+  DSG_RETURN_IF_ERROR(ForEachTransform(bag, kStaticTopic, on_read,
+                                       [&](const RosPose& transform, const std::string& origin) {
+                                         return tree.Add(transform, /*is_static=*/true, origin);
+                                       }));
   if (!with_moving) return tree;
-  DSG_RETURN_IF_ERROR(
-      ForEachTransform(bag, kTopic, [&](const RosPose& transform, const std::string& origin) {
-        return tree.Add(transform, /*is_static=*/false, origin);
-      }));
+  DSG_RETURN_IF_ERROR(ForEachTransform(bag, kTopic, on_read,
+                                       [&](const RosPose& transform, const std::string& origin) {
+                                         return tree.Add(transform, /*is_static=*/false, origin);
+                                       }));
   return tree;
 }
 
@@ -107,8 +81,8 @@ absl::Status TransformTree::Add(const RosPose& transform, bool is_static,
                                 const std::string& origin) {
   const absl::StatusOr<Pose3d> parent_T_child = transform.ToPose(origin);
   if (!parent_T_child.ok()) return is_static ? parent_T_child.status() : absl::OkStatus();
-  const std::string parent = WithoutSlash(transform.header.frame_id);
-  const auto [entry, is_new] = edges_.try_emplace(WithoutSlash(transform.child_frame_id));
+  const std::string parent = FrameName(transform.header.frame_id);
+  const auto [entry, is_new] = edges_.try_emplace(FrameName(transform.child_frame_id));
   Edge& edge = entry->second;
   if (is_new) {
     if (edges_.size() > kFramesMax) {
@@ -125,14 +99,15 @@ absl::Status TransformTree::Add(const RosPose& transform, bool is_static,
     edge = {.parent = parent, .other_parent = "", .parent_T_child = *parent_T_child};
     return absl::OkStatus();
   }
+  edge.is_repeated = edge.is_dynamic;
   edge.is_dynamic = true;
   if (edge.parent != parent) edge.other_parent = parent;
-  if (!IsSame(edge.parent_T_child, *parent_T_child)) edge.is_moving = true;
+  if (!IsSamePose(edge.parent_T_child, *parent_T_child)) edge.is_moving = true;
   return absl::OkStatus();
 }
 
 std::optional<Pose3d> TransformTree::BodyTFrame(const std::string& frame) const {
-  std::string name = WithoutSlash(frame);
+  std::string name = FrameName(frame);
   Pose3d name_T_frame;
   for (size_t i = 0; i < kChainMax; ++i) {
     if (std::find(std::begin(kBodyFrames), std::end(kBodyFrames), name) != std::end(kBodyFrames)) {
@@ -174,14 +149,17 @@ std::string TransformTree::FindBody() const {
 
 absl::StatusOr<std::vector<std::string>> TransformTree::BodyChain() const {
   const std::string body = FindBody();
+  return body.empty() ? std::vector<std::string>() : ChainFrom(body);
+}
+
+absl::StatusOr<std::vector<std::string>> TransformTree::ChainFrom(const std::string& body) const {
   std::vector<std::string> chain;
-  if (body.empty()) return chain;
   for (std::string name = body;;) {
     const bool is_circle = std::find(chain.begin(), chain.end(), name) != chain.end();
     chain.push_back(name);
     if (is_circle || chain.size() > kChainMax) {
       std::vector<std::string> shown;
-      for (const std::string& frame : chain) shown.push_back(Shown(frame));
+      for (const std::string& frame : chain) shown.push_back(ShownFrame(frame));
       return MalformedFile(
           path_, absl::StrCat("the transforms of /tf run in a circle: ",
                               absl::StrJoin(shown, " in "), "; correct their publishers"));
@@ -191,71 +169,69 @@ absl::StatusOr<std::vector<std::string>> TransformTree::BodyChain() const {
     const Edge& edge = found->second;
     if (!edge.other_parent.empty()) {
       return MalformedFile(
-          path_,
-          absl::StrCat("frame ", Shown(name), " of /tf is now in ", Shown(edge.parent), ", now in ",
-                       Shown(edge.other_parent), "; a frame has one parent: filter the bag"));
+          path_, absl::StrCat("frame ", ShownFrame(name), " of /tf is now in ",
+                              ShownFrame(edge.parent), ", now in ", ShownFrame(edge.other_parent),
+                              "; a frame has one parent: filter the bag"));
     }
     name = edge.parent;
   }
 }
 
-absl::StatusOr<std::optional<TrackTable>> TransformTree::ReadPoses(
-    const Bag& bag, const std::string& robot_name, std::vector<std::string>* notes) const {
-  DSG_ASSIGN_OR_RETURN(const std::vector<std::string> chain, BodyChain());
-  if (chain.empty()) return std::nullopt;
-  const auto flag = Has(&Edge::is_moving, chain.front()) ? &Edge::is_moving : &Edge::is_dynamic;
-  std::map<std::string, StampedPoses> moving;
-  for (const std::string& frame : chain) {
-    const auto found = edges_.find(frame);
-    if (found != edges_.end() && found->second.*flag) moving[frame];
-  }
-  int64_t skipped_count = 0;
-  DSG_RETURN_IF_ERROR(
-      ForEachTransform(bag, kTopic, [&](const RosPose& transform, const std::string& origin) {
-        const auto found = moving.find(WithoutSlash(transform.child_frame_id));
-        if (found == moving.end()) return absl::OkStatus();
-        StampedPoses& track = found->second;
-        const absl::StatusOr<Pose3d> pose = transform.ToPose(origin);
-        const TimeNs time_ns = transform.header.stamp_ns;
-        if (!pose.ok() || (!track.times.empty() && time_ns <= track.times.back())) {
-          const bool is_repeat =
-              pose.ok() && time_ns == track.times.back() && IsSame(*pose, track.poses.back());
-          skipped_count += is_repeat ? 0 : 1;
-          return absl::OkStatus();
-        }
-        track.times.push_back(time_ns);
-        track.poses.push_back(*pose);
-        return absl::OkStatus();
-      }));
-  TrackTable table;
-  table.file = absl::StrCat("/tf, frame ", Shown(chain.front()), " in ", Shown(chain.back()));
-  const int32_t agent = table.FindOrAdd(robot_name, kinds::kRobot);
-  const auto lowest = std::find_if(
-      chain.begin(), chain.end(), [&](const std::string& frame) { return moving.contains(frame); });
-  if (lowest == chain.end()) return std::nullopt;
-  for (const TimeNs time_ns : moving[*lowest].times) {
-    Pose3d root_T_body;
-    for (const std::string& frame : chain) {
-      const auto edge = edges_.find(frame);
-      if (edge == edges_.end()) continue;
-      const auto track = moving.find(frame);
-      const Pose3d parent_T_frame =
-          track == moving.end() ? edge->second.parent_T_child : PoseAt(track->second, time_ns);
-      root_T_body = parent_T_frame * root_T_body;
+absl::StatusOr<std::optional<BodyTrack>> TransformTree::MakeTrack(Tracks tracks,
+                                                                  size_t waiting_max) const {
+  DSG_ASSIGN_OR_RETURN(const std::vector<std::string> names, BodyChain());
+  if (names.empty()) return std::nullopt;
+  const auto flag = Has(&Edge::is_moving, names.front()) ? &Edge::is_moving : &Edge::is_dynamic;
+  const auto has_track = tracks == Tracks::kMoving ? flag : &Edge::is_dynamic;
+  std::vector<ChainFrame> chain;
+  std::optional<size_t> driver;
+  for (const std::string& name : names) {
+    const auto found = edges_.find(name);
+    if (found == edges_.end()) {
+      chain.push_back({.name = name, .parent = "", .parent_T_frame = {}});
+      continue;
     }
-    root_T_body.orientation.normalize();
-    table.rows.push_back({.time_ns = time_ns,
-                          .line = static_cast<int64_t>(table.rows.size()) + 1,
+    const Edge& edge = found->second;
+    if (!driver.has_value() && edge.*flag) driver = chain.size();
+    chain.push_back({.name = name,
+                     .parent = edge.parent,
+                     .parent_T_frame = edge.parent_T_child,
+                     .has_track = edge.*has_track,
+                     .is_repeated = edge.is_repeated && edge.*has_track});
+  }
+  if (!driver.has_value()) return std::nullopt;
+  return BodyTrack(std::move(chain), *driver, waiting_max);
+}
+
+absl::StatusOr<std::optional<TrackTable>> TransformTree::ReadPoses(
+    const Bag& bag, const std::string& robot_name, std::vector<std::string>* notes,
+    const PassCallback& on_read) const {
+  DSG_ASSIGN_OR_RETURN(std::optional<BodyTrack> track, MakeTrack(Tracks::kMoving));
+  if (!track.has_value()) return std::nullopt;
+  DSG_RETURN_IF_ERROR(ForEachTransform(bag, kTopic, on_read,
+                                       [&](const RosPose& transform, const std::string& origin) {
+                                         track->Add(transform, origin);
+                                         return absl::OkStatus();
+                                       }));
+  TrackTable table;
+  table.file = track->Name();
+  const int32_t agent = table.FindOrAdd(robot_name, kinds::kRobot);
+  while (const std::optional<BodyPose> pose = track->NextAtEnd()) {
+    table.rows.push_back({.time_ns = pose->time_ns,
+                          .line = std::ssize(table.rows) + 1,
                           .agent = agent,
                           .flags = 0,
-                          .map_T_agent = root_T_body});
+                          .map_T_agent = pose->root_T_body});
   }
-  if (skipped_count > 0) {
-    notes->push_back(absl::StrCat(skipped_count,
-                                  " transforms of /tf are no pose, or have a stamp that is not "
-                                  "after the one before, and were passed over"));
-  }
+  NotePassedOver(track->passed_over_count(), notes);
   return table;
+}
+
+void NotePassedOver(int64_t count, std::vector<std::string>* notes) {
+  if (count == 0) return;
+  notes->push_back(absl::StrCat(count,
+                                " transforms of /tf are no pose, or have a stamp that is not "
+                                "after the one before, and were passed over"));
 }
 
 }  // namespace dsg::ingest

@@ -34,10 +34,10 @@ absl::Status CheckPath(const std::string& path, const LogOptions& options) {
   if (!options.label_folder.empty()) {
     return CannotFollow(path, "--labels go with RGB-D folders, which cannot be followed");
   }
-  if (options.pose_file.empty() && options.loop_file.empty()) return absl::OkStatus();
+  if (options.pose_file.empty()) return absl::OkStatus();
   return CannotFollow(path,
-                      "--pose-file and --loops are read as a whole and do not go with --follow; "
-                      "take the log with them when it is finished");
+                      "--pose-file is read as a whole and does not go with --follow; take the log "
+                      "with it when it is finished");
 }
 
 }  // namespace
@@ -65,8 +65,9 @@ absl::StatusOr<std::unique_ptr<LogSource>> OpenFollowed(const std::string& path,
                                   "; leave --format out"),
                      {{"file", path}});
   }
-  return is_mcap ? OpenFollowedBag(std::move(file), options)
-                 : OpenFollowedTable(std::move(file), options);
+  if (is_mcap) return OpenFollowedBag(std::move(file), options);
+  if (options.loop_file.empty()) return OpenFollowedTable(std::move(file), options);
+  return CannotFollow(path, "a table takes no loop closures; they go with logs of sensors");
 }
 
 }  // namespace dsg::ingest

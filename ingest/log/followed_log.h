@@ -35,8 +35,11 @@ inline constexpr TimeNs kFollowedBeginNs = 3 * kNsPerSecond;
 absl::StatusOr<std::unique_ptr<LogSource>> OpenFollowedTable(std::unique_ptr<GrowingFile> file,
                                                              const LogOptions& options);
 
-/// An MCAP file (bag_log.cc). Poses come from topics: /tf, and loop closures, are known as a whole
-/// only when a bag has ended.
+/// An MCAP file (bag_log.cc). Poses come from a topic or from /tf (FollowedTransforms), loop
+/// closures from a topic, which may come later than kFollowedBeginNs, or from
+/// LogOptions::loop_file. That is read as a whole before, and is part of the log's identity: where
+/// a loop closure is told must follow from the files alone, or a run that was cut off could not be
+/// continued.
 absl::StatusOr<std::unique_ptr<LogSource>> OpenFollowedBag(std::unique_ptr<GrowingFile> file,
                                                            const LogOptions& options);
 

@@ -36,12 +36,42 @@ absl::StatusOr<bool> GrowingBag::Wait() {
   const size_t known = bag_->messages().size();
   while (bag_->messages().size() == known) {
     if (bag_->is_closed()) return false;
-    DSG_ASSIGN_OR_RETURN(const GrowingFile::Wait wait, file_->WaitBeyond(seen_));
+    const auto begin = std::chrono::steady_clock::now();
+    const auto has_more = [&]() -> absl::StatusOr<bool> {
+      if (std::chrono::steady_clock::now() - begin >= kTellAfter) TellOnce();
+      return HasMoreBytes();
+    };
+    DSG_ASSIGN_OR_RETURN(const GrowingFile::Wait wait, file_->WaitUntil(has_more));
     if (wait == GrowingFile::Wait::kEnd) return false;
     seen_ = file_->size();
     DSG_RETURN_IF_ERROR(bag_->GrowTo(seen_));
   }
   return true;
+}
+
+// A writer that has set space aside writes without making the file longer.
+absl::StatusOr<bool> GrowingBag::HasMoreBytes() {
+  if (file_->size() > seen_) return true;
+  if (!bag_->zero_at().has_value()) return false;
+  const uint64_t taken_size = bag_->taken_size();
+  DSG_RETURN_IF_ERROR(bag_->GrowTo(seen_));
+  return bag_->taken_size() > taken_size;
+}
+
+void GrowingBag::TellOnce() {
+  if (bag_->taken_size() >= seen_ || std::exchange(has_told_, true)) return;
+  file_->Tell(absl::StrCat(RestText(), "; waiting for what is to stand there"));
+}
+
+std::string GrowingBag::RestText() const {
+  return absl::StrCat("the ", seen_ - bag_->taken_size(), " bytes from byte ", bag_->taken_size(),
+                      " on are no whole record",
+                      bag_->zero_at().has_value() ? " (zeros, as in space that is set aside)" : "");
+}
+
+std::string GrowingBag::RestNote() const {
+  if (bag_->is_closed() || bag_->taken_size() >= seen_) return "";
+  return absl::StrCat(RestText(), " and were not read");
 }
 
 absl::StatusOr<size_t> GrowingBag::WaitForBegin(TimeNs begin_ns) {
@@ -50,10 +80,12 @@ absl::StatusOr<size_t> GrowingBag::WaitForBegin(TimeNs begin_ns) {
       DSG_ASSIGN_OR_RETURN(const bool has_more, Wait());
       if (!has_more && bag_->is_closed()) return count;
       if (!has_more) {
-        return MalformedFile(file_->path(),
-                             absl::StrCat("ends, without having been closed, within the first ",
-                                          begin_ns / kNsPerSecond,
-                                          " s, which tell what is in it; nothing was read"));
+        const std::string rest = RestNote();
+        return MalformedFile(
+            file_->path(),
+            absl::StrCat("ends, without having been closed, within the first ",
+                         begin_ns / kNsPerSecond, " s, which tell what is in it; nothing was read",
+                         rest.empty() ? "" : "; ", rest));
       }
     }
     const std::vector<BagMessageRef>& messages = bag_->messages();

@@ -2,9 +2,11 @@
 // MCAP files that are still written, as bags that get further messages.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -37,6 +39,9 @@ class BagBegin : public Bag {
   std::vector<BagMessageRef> messages_;
 };
 
+/// How long bytes that are no record are waited for before it is told.
+inline constexpr std::chrono::milliseconds kTellAfter(2000);
+
 /// Threads: one caller at a time; messages of bag() may be read by others meanwhile.
 class GrowingBag {
  public:
@@ -46,9 +51,14 @@ class GrowingBag {
   const std::shared_ptr<McapFile>& bag() const { return bag_; }
   GrowingFile& file() { return *file_; }
 
-  /// Waits for further messages. False: there will be none.
+  /// Waits for further messages. False: there will be none. Tells once (FollowOptions::tell) which
+  /// bytes are no record, if nothing comes for kTellAfter.
   /// Errors: of GrowingFile::WaitBeyond and McapFile::GrowTo.
   absl::StatusOr<bool> Wait();
+
+  /// How many bytes at the end of the file were no whole record, and where; empty if none were, or
+  /// the bag has its own end.
+  std::string RestNote() const;
 
   /// Waits until the first `begin_ns` are there, by the times of recording, or a shorter bag has
   /// been closed; how many messages they are.
@@ -58,10 +68,15 @@ class GrowingBag {
  private:
   GrowingBag() = default;
 
+  absl::StatusOr<bool> HasMoreBytes();
+  void TellOnce();
+  std::string RestText() const;
+
   std::shared_ptr<McapFile> bag_;
   std::unique_ptr<GrowingFile> file_;
   /// How much of the file the bag knows.
   uint64_t seen_ = 0;
+  bool has_told_ = false;
 };
 
 }  // namespace dsg::ingest

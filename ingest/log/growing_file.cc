@@ -56,13 +56,24 @@ bool GrowingFile::IsStopped() const {
   return options_.stop != nullptr && options_.stop->load(std::memory_order_relaxed);
 }
 
+void GrowingFile::Tell(const std::string& sentence) const {
+  if (options_.tell) options_.tell(sentence);
+}
+
 absl::StatusOr<GrowingFile::Wait> GrowingFile::WaitBeyond(
     uint64_t size, std::optional<std::chrono::milliseconds> patience) {
+  return WaitUntil([this, size] { return size_ > size; }, patience);
+}
+
+absl::StatusOr<GrowingFile::Wait> GrowingFile::WaitUntil(
+    const std::function<absl::StatusOr<bool>()>& has_more,
+    std::optional<std::chrono::milliseconds> patience) {
   const auto begin = SteadyClock::now();
   while (true) {
     if (IsStopped()) return Wait::kEnd;
     DSG_RETURN_IF_ERROR(Look());
-    if (size_ > size) return Wait::kMore;
+    DSG_ASSIGN_OR_RETURN(const bool is_more, has_more());
+    if (is_more) return Wait::kMore;
     const auto waited = SteadyClock::now() - begin;
     if (patience.has_value() && waited >= *patience) return Wait::kPatience;
     if (options_.timeout.has_value() && waited >= *options_.timeout) return Wait::kEnd;
@@ -92,9 +103,11 @@ absl::Status GrowingFile::Look() {
 
 absl::Status GrowingFile::CheckBegin() {
   DSG_ASSIGN_OR_RETURN(std::string begin, Read(0, kBeginBytes));
-  if (begin.compare(0, begin_.size(), begin_) != 0) {
-    return Changed("begins with other bytes than it did: it was written anew");
-  }
+  // Zeros may have been space that its writer had set aside.
+  const bool is_same = begin.size() >= begin_.size() &&
+                       std::equal(begin_.begin(), begin_.end(), begin.begin(),
+                                  [](char was, char is) { return was == is || was == '\0'; });
+  if (!is_same) return Changed("begins with other bytes than it did: it was written anew");
   begin_ = std::move(begin);
   return absl::OkStatus();
 }

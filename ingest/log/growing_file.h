@@ -45,6 +45,10 @@ class GrowingFile {
   /// begins with other bytes than it did; of the idle function.
   absl::StatusOr<Wait> WaitBeyond(uint64_t size,
                                   std::optional<std::chrono::milliseconds> patience = {});
+  /// Waits until `has_more` says so, which is asked after each look at the file. Errors: as above,
+  /// and of `has_more`.
+  absl::StatusOr<Wait> WaitUntil(const std::function<absl::StatusOr<bool>()>& has_more,
+                                 std::optional<std::chrono::milliseconds> patience = {});
 
   /// Bytes from `at` on, as many as are there, `size_max` at most.
   absl::StatusOr<std::string> Read(uint64_t at, size_t size_max) const;
@@ -52,6 +56,8 @@ class GrowingFile {
   /// The size when it was looked at last.
   uint64_t size() const { return size_; }
   bool IsStopped() const;
+  /// FollowOptions::tell.
+  void Tell(const std::string& sentence) const;
 
  private:
   GrowingFile(std::string path, int descriptor, FollowOptions options);

@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr char kChannel[] = "label0";
+constexpr char kLabelChannel[] = "label0";
 // Of ids that a note names.
 constexpr size_t kNamedMax = 20;
 // Where nobody can tell how far apart frames are.
@@ -148,7 +148,7 @@ class LabelFolderReader {
     ImageDecoding decoding;
     decoding.role = ImageRole::kLabel;
     decoding.label_of_id = std::shared_ptr<const std::vector<uint16_t>>(ids_, &ids_->label_of_id);
-    return MakeImageChannel(kChannel, decoding, std::move(list));
+    return MakeImageChannel(kLabelChannel, decoding, std::move(list));
   }
 
  private:
@@ -260,7 +260,7 @@ class LabelFolderReader {
       sizes.push_back(absl::StrCat(channel, " ", camera->width, "x", camera->height));
       if (camera->width != header.width || camera->height != header.height) continue;
       camera_ = *camera;
-      camera_.name = kChannel;
+      camera_.name = kLabelChannel;
       info_.rig.cameras.push_back(camera_);
       std::sort(
           info_.rig.cameras.begin(), info_.rig.cameras.end(),

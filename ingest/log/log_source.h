@@ -128,7 +128,12 @@ struct FollowOptions {
   std::optional<std::chrono::milliseconds> timeout;
   /// Set from a signal handler or another thread: the log ends at once. Outlives the log.
   const std::atomic<bool>* stop = nullptr;
+  /// Gets sentences for the user while OpenLog or Next waits: what for, if it is unusual.
+  std::function<void(const std::string&)> tell = {};
 };
+
+/// How far a pass over a file is: of `total` messages `done`.
+using PassCallback = std::function<void(int64_t done, int64_t total)>;
 
 struct LogOptions {
   /// "auto" or one of the names in LogInfo::format.
@@ -160,6 +165,8 @@ struct LogOptions {
   std::map<std::string, std::string> topics;
   /// Set: the file may still grow, and Next waits for more of it (followed_log.h).
   std::optional<FollowOptions> follow;
+  /// Called often while OpenLog reads a bag that is there as a whole, to know which log it is.
+  PassCallback on_pass = {};
 };
 
 inline constexpr char kNoTopic[] = "none";

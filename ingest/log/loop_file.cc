@@ -170,14 +170,14 @@ std::string Shorten(const std::string& key) {
 
 }  // namespace
 
-absl::Status LoopLines::Add(const LinePosition& at, std::string_view line) {
+absl::StatusOr<LoopMeasurement> LoopLines::Read(const LinePosition& at, std::string_view line) {
   DSG_ASSIGN_OR_RETURN(const Json object, ParseObject(at, line));
   DSG_ASSIGN_OR_RETURN(LoopMeasurement loop, LoopReader(at, object).Read());
-  if (loops_.size() == kLoopCountMax) {
+  if (count_ == kLoopCountMax) {
     return at.Error(absl::StrCat("is beyond the ", kLoopCountMax,
                                  " loop closures that a log may have; leave out the weak ones"));
   }
-  loops_.push_back(std::move(loop));
+  ++count_;
   for (const auto& item : object.items()) {
     const bool is_known = std::find_if(kKeys.begin(), kKeys.end(), [&](const char* key) {
                             return item.key() == key;
@@ -186,6 +186,12 @@ absl::Status LoopLines::Add(const LinePosition& at, std::string_view line) {
     const std::string key = Shorten(item.key());
     if (unknown_keys_.size() < kKeysNamedMax || unknown_keys_.contains(key)) ++unknown_keys_[key];
   }
+  return loop;
+}
+
+absl::Status LoopLines::Add(const LinePosition& at, std::string_view line) {
+  DSG_ASSIGN_OR_RETURN(LoopMeasurement loop, Read(at, line));
+  loops_.push_back(std::move(loop));
   return absl::OkStatus();
 }
 
@@ -201,17 +207,27 @@ SensorChannel LoopLines::TakeChannel(std::vector<std::string>* notes) {
   channel.make = [shared](size_t index) -> absl::StatusOr<Measurement> {
     return Measurement((*shared)[index]);
   };
-  if (!unknown_keys_.empty()) {
-    notes->push_back(
-        absl::StrCat("keys of loop closures that are not read: ",
-                     absl::StrJoin(unknown_keys_, ", ", [](std::string* out, const auto& entry) {
-                       absl::StrAppend(out, entry.first, " (", entry.second, ")");
-                     })));
-  }
-  loops_.clear();
-  unknown_keys_.clear();
+  NoteKeys(notes);
+  *this = LoopLines();
   return channel;
 }
+
+void LoopLines::NoteKeys(std::vector<std::string>* notes) const {
+  if (unknown_keys_.empty()) return;
+  notes->push_back(
+      absl::StrCat("keys of loop closures that are not read: ",
+                   absl::StrJoin(unknown_keys_, ", ", [](std::string* out, const auto& entry) {
+                     absl::StrAppend(out, entry.first, " (", entry.second, ")");
+                   })));
+}
+
+void LoopQueue::Add(LoopMeasurement loop) {
+  const std::tuple<TimeNs, TimeNs, TimeNs> key(std::max(loop.time_ns, loop.from_ns), loop.time_ns,
+                                               loop.from_ns);
+  waiting_.emplace(key, std::move(loop));
+}
+
+LoopMeasurement LoopQueue::Take() { return std::move(waiting_.extract(waiting_.begin()).mapped()); }
 
 absl::StatusOr<std::optional<SensorChannel>> ReadLoopChannel(const LogOptions& options,
                                                              const std::string& log_path,

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -23,15 +24,37 @@ class LoopLines {
  public:
   /// Errors: INVALID_ARGUMENT/FILE_MALFORMED at `at`, naming the field and the value. A line has at
   /// most 64 KiB.
+  absl::StatusOr<LoopMeasurement> Read(const LinePosition& at, std::string_view line);
+  /// Reads, and keeps it for TakeChannel. Errors: of Read.
   absl::Status Add(const LinePosition& at, std::string_view line);
 
-  /// The channel "loops0", ascending by time, then by the other time, then as they stood.
-  /// `notes`: keys that are unknown, and how often.
+  /// The channel "loops0" of those that were kept, ascending by time, then by the other time, then
+  /// as they stood. `notes`: of NoteKeys.
   SensorChannel TakeChannel(std::vector<std::string>* notes);
+  /// Which keys were unknown so far, and how often.
+  void NoteKeys(std::vector<std::string>* notes) const;
 
  private:
+  size_t count_ = 0;
   std::vector<LoopMeasurement> loops_;
   std::map<std::string, int64_t> unknown_keys_;
+};
+
+/// Loop closures that wait until both their stamps have been read. Those of one instant come by
+/// their stamps, then as they were added.
+class LoopQueue {
+ public:
+  void Add(LoopMeasurement loop);
+
+  bool empty() const { return waiting_.empty(); }
+  /// The later stamp of the first one. Requires: not empty.
+  TimeNs first_ns() const { return std::get<0>(waiting_.begin()->first); }
+  /// Requires: not empty.
+  LoopMeasurement Take();
+
+ private:
+  /// By the later stamp, LoopMeasurement::time_ns and from_ns.
+  std::multimap<std::tuple<TimeNs, TimeNs, TimeNs>, LoopMeasurement> waiting_;
 };
 
 /// The loop closures of a log: LogOptions::loop_file if there is one, else `log_path` if it is not

@@ -120,30 +120,24 @@ class McapFile::Builder {
 
   // Takes whole records up to `size`, without index and summary, which come after the messages.
   absl::Status Grow(uint64_t size) {
-    if (next_at_ == 0) {
+    uint64_t& next_at = mcap_.taken_size_;
+    mcap_.zero_at_.reset();
+    if (next_at == 0) {
       if (size < kMcapMagic.size()) return absl::OkStatus();
-      next_at_ = kMcapMagic.size();
+      next_at = kMcapMagic.size();
     }
-    while (!mcap_.is_closed_ && size - next_at_ >= kRecordHead) {
-      DSG_ASSIGN_OR_RETURN(const std::string head, file_.ReadBytes(next_at_, kRecordHead, kRemedy));
-      const Record record{static_cast<Op>(head[0]), next_at_ + kRecordHead,
-                          LittleEndian(head, 1, 8)};
-      // No record begins so: space that its writer has set aside.
-      if (head[0] == '\0') return absl::OkStatus();
-      if (record.size > kRecordBytesMax) {
-        return file_.Fail(next_at_, absl::StrCat("a record claims ", record.size,
-                                                 " bytes: the file is damaged, or is no MCAP"));
-      }
-      if (record.size > size - record.at) return absl::OkStatus();
-      if (record.op == Op::kDataEnd || record.op == Op::kFooter) {
+    while (!mcap_.is_closed_) {
+      DSG_ASSIGN_OR_RETURN(const std::optional<Record> record, WholeRecord(next_at, size));
+      if (!record.has_value()) return absl::OkStatus();
+      if (record->op == Op::kDataEnd || record->op == Op::kFooter) {
         mcap_.is_closed_ = true;
-      } else if (record.op != Op::kMessageIndex) {
-        DSG_RETURN_IF_ERROR(Take(record));
+      } else if (record->op != Op::kMessageIndex) {
+        DSG_RETURN_IF_ERROR(Take(*record));
       }
       for (const uint32_t chunk : std::exchange(chunks_to_search_, {})) {
         DSG_RETURN_IF_ERROR(SearchChunk(chunk));
       }
-      next_at_ = record.end();
+      next_at = record->end();
     }
     return absl::OkStatus();
   }
@@ -160,6 +154,29 @@ class McapFile::Builder {
                                          end - record.at, " are left; ", kRemedy));
     }
     return record;
+  }
+
+  // nullopt if it is not written as a whole within the first `size` bytes.
+  absl::StatusOr<std::optional<Record>> WholeRecord(uint64_t at, uint64_t size) {
+    if (size - at < kRecordHead) return std::nullopt;
+    DSG_ASSIGN_OR_RETURN(const std::string head, file_.ReadBytes(at, kRecordHead, kRemedy));
+    if (IsZero(head, at)) return std::nullopt;
+    const Record record{static_cast<Op>(head[0]), at + kRecordHead, LittleEndian(head, 1, 8)};
+    if (record.size > kRecordBytesMax) {
+      return file_.Fail(at, absl::StrCat("a record claims ", record.size,
+                                         " bytes: the file is damaged, or is no MCAP"));
+    }
+    if (record.size > size - record.at) return std::nullopt;
+    if (record.end() == size) return record;
+    DSG_ASSIGN_OR_RETURN(const std::string next, file_.ReadBytes(record.end(), 1, kRemedy));
+    return IsZero(next, record.end()) ? std::nullopt : std::optional<Record>(record);
+  }
+
+  // Whether bytes begin with a zero, which is noted.
+  bool IsZero(std::string_view bytes, uint64_t at) {
+    if (bytes.front() != '\0') return false;
+    mcap_.zero_at_ = at;
+    return true;
   }
 
   absl::StatusOr<std::string> Content(const Record& record, uint64_t size_max) const {
@@ -410,8 +427,6 @@ class McapFile::Builder {
   const RandomFile& file_;
   uint64_t footer_at_ = 0;
   uint64_t summary_at_ = 0;
-  /// Of a growing file: the first record that has not been taken.
-  uint64_t next_at_ = 0;
   std::optional<uint64_t> message_count_;
   std::unordered_map<uint16_t, std::string> schemas_;
   std::unordered_map<uint16_t, uint32_t> connection_of_;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,12 +34,17 @@ class McapFile : public Bag {
   /// Opens a file that is still written. It holds no messages before GrowTo.
   static absl::StatusOr<std::shared_ptr<McapFile>> OpenGrowing(const std::string& path);
   /// Adds the messages of the records and chunks that are whole within the first `size` bytes, as
-  /// they stand in the file; `size` grows from call to call. Threads: one caller, while others
-  /// read messages.
-  /// Errors: of Open; what was added before stays.
+  /// they stand in the file; `size` does not shrink from call to call. No record begins with a
+  /// zero: where one stands the writer has set space aside. A record before it may be written in
+  /// part, so it counts when another byte stands there. Threads: one caller, while others read
+  /// messages. Errors: of Open; what was added before stays.
   absl::Status GrowTo(uint64_t size);
   /// Whether the end of the data has been seen: there will be no more messages.
   bool is_closed() const { return is_closed_; }
+  /// Of a file that grows: up to here GrowTo has taken all of it...
+  uint64_t taken_size() const { return taken_size_; }
+  /// ...and where it has met a zero in the place of a record.
+  std::optional<uint64_t> zero_at() const { return zero_at_; }
 
   std::string_view format() const override { return "mcap"; }
   const std::string& path() const override { return file_->path(); }
@@ -71,6 +77,8 @@ class McapFile : public Bag {
   /// Of a file that grows; null once it is read whole.
   std::unique_ptr<Builder> builder_;
   bool is_closed_ = false;
+  uint64_t taken_size_ = 0;
+  std::optional<uint64_t> zero_at_;
   /// Pictures are read by any thread while a growing file gets further channels and chunks.
   mutable std::mutex growth_mutex_;
   std::vector<BagConnection> connections_;

@@ -97,7 +97,7 @@ struct IngestSummary {
   std::optional<MappingSummary> mapping;
   /// Unset when the log has no detections, or people are off.
   std::optional<PeopleSummary> people;
-  /// Unset when the log has no loop closures.
+  /// Unset when the log has no loop closures, or is followed and has brought none.
   std::optional<LoopCounts> loops;
   /// Poses and graphs with content that the log gave, whether or not the map had them.
   int64_t given_count = 0;

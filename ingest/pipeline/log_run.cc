@@ -84,12 +84,19 @@ LogRun::LogRun(RunPlan plan, const MapView& map, DeltaSink sink)
 }
 
 absl::Status LogRun::Take(Measurement& measurement) {
-  DSG_RETURN_IF_ERROR(CommitIfDue(TimeOf(measurement)));
+  if (!IsStrayLoop(measurement)) DSG_RETURN_IF_ERROR(CommitIfDue(TimeOf(measurement)));
   if (auto* graph = std::get_if<GraphMeasurement>(&measurement)) {
     return TakeGraph(std::move(graph->delta));
   }
   if (auto* pose = std::get_if<PoseMeasurement>(&measurement)) return TakePose(*pose);
   return TakeSensor(measurement);
+}
+
+// A loop closure may have any stamp; one far from all that was measured is no time of the log.
+bool LogRun::IsStrayLoop(const Measurement& measurement) const {
+  const auto* loop = std::get_if<LoopMeasurement>(&measurement);
+  return loop != nullptr &&
+         (last_ns_ == kTimeMin || loop->time_ns - last_ns_ > options_.mapping.commit_period_ns);
 }
 
 absl::Status LogRun::TakeGraph(GraphDelta graph) {
@@ -235,7 +242,10 @@ IngestSummary LogRun::Summary() const {
   summary.agent_count = graph_agent_count_ + builder_.agent_count() + people_.told().agent_count();
   summary.committed = sink_.counts();
   summary.unused = unused_;
-  if (has_loops_) summary.loops = loops_.counts();
+  // A followed log may have had some.
+  if (has_loops_ && (!is_followed_ || loops_.counts().loop_count > 0)) {
+    summary.loops = loops_.counts();
+  }
   for (const Stage* stage : stages_) stage->Summarize(&summary);
   if (!summary.mapping.has_value()) return summary;
   summary.mapping->skipped = frames_.skips();

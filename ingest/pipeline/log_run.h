@@ -71,6 +71,7 @@ class LogRun {
   IngestSummary Summary() const;
 
  private:
+  bool IsStrayLoop(const Measurement& measurement) const;
   absl::Status TakeGraph(GraphDelta graph);
   absl::Status TakePose(const PoseMeasurement& pose);
   bool AddToPath(NodeId agent, const PoseMeasurement& pose);

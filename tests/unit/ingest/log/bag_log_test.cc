@@ -343,6 +343,21 @@ TEST(BagLog, ReadsInverseDepthAndNamesWhatIsNotDepth) {
       {"compressedDepth message 1", "depth is 16 bit"});
 }
 
+TEST(BagLog, TellsHowFarItIsWhileItLooksThroughTheBag) {
+  const TempFolder folder;
+  LogOptions options;
+  std::vector<int64_t> done;
+  options.on_pass = [&done](int64_t count, int64_t total) {
+    EXPECT_EQ(total, std::ssize(SmallRecording(CdrWriter(), 5)));
+    done.push_back(count);
+  };
+  const std::string path = folder.Write("log.mcap", WriteMcap(SmallRecording(CdrWriter(), 5)));
+  ASSERT_TRUE(OpenLog(path, options).ok());
+  ASSERT_FALSE(done.empty());
+  EXPECT_TRUE(std::is_sorted(done.begin(), done.end()));
+  EXPECT_EQ(done.back(), std::ssize(SmallRecording(CdrWriter(), 5)));
+}
+
 TEST(BagLog, ChoosesPosesAsAsked) {
   const TempFolder folder;
   const std::string path = folder.Write("log.bag", FullBag().Finish());

@@ -10,23 +10,6 @@
 namespace dsg::ingest {
 namespace {
 
-struct Tf {
-  std::string parent;
-  std::string child;
-  TimeNs time_ns = 0;
-  /// x y z, q x y z w.
-  std::vector<double> pose = {0, 0, 0, 0, 0, 0, 1};
-};
-
-std::string TfMessage(const std::vector<Tf>& transforms) {
-  CdrWriter out;
-  out.U32(transforms.size());
-  for (const Tf& tf : transforms) {
-    out.Header(tf.time_ns, tf.parent).String(tf.child).Doubles(tf.pose);
-  }
-  return out.bytes();
-}
-
 class BagTransformsTest : public testing::Test {
  protected:
   void Add(const std::string& topic, const std::vector<Tf>& transforms) {

@@ -19,6 +19,7 @@ namespace dsg::ingest {
 
 /// When the bags of the tests begin.
 inline constexpr TimeNs kT0 = 1'600'000'000 * kNsPerSecond;
+inline constexpr TimeNs kMillisecond = 1'000'000;
 
 /// Little-endian bytes, one field after another.
 class ByteWriter {

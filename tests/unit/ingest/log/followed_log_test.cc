@@ -7,10 +7,10 @@
 
 #include <atomic>
 #include <random>
-#include <thread>
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
+#include "tests/unit/ingest/log/follow_test_util.h"
 #include "tests/unit/ingest/log/log_test_util.h"
 #include "tests/unit/ingest/log/ros2_writer.h"
 
@@ -18,50 +18,6 @@ namespace dsg::ingest {
 namespace {
 
 using std::chrono::milliseconds;
-
-LogOptions Following(milliseconds timeout, const std::atomic<bool>* stop = nullptr) {
-  LogOptions options;
-  options.follow = FollowOptions{.timeout = timeout, .stop = stop};
-  return options;
-}
-
-void Append(const std::string& path, std::string_view bytes) {
-  std::ofstream(path, std::ios::binary | std::ios::app) << bytes;
-}
-
-// Appends to a file in pieces of random sizes, which cut lines and records anywhere.
-class SlowWriter {
- public:
-  SlowWriter(std::string path, std::string bytes, size_t piece_max)
-      : thread_([path = std::move(path), bytes = std::move(bytes), piece_max] {
-          constexpr unsigned kSeed = 7;
-          std::mt19937 random(kSeed);
-          for (size_t at = 0; at < bytes.size();) {
-            const size_t size = 1 + random() % piece_max;
-            Append(path, std::string_view(bytes).substr(at, size));
-            at += size;
-            std::this_thread::sleep_for(milliseconds(3));
-          }
-        }) {}
-  ~SlowWriter() { thread_.join(); }
-  SlowWriter(const SlowWriter&) = delete;
-  SlowWriter& operator=(const SlowWriter&) = delete;
-
- private:
-  std::thread thread_;
-};
-
-void ExpectSamePoses(const WholeLog& a, const WholeLog& b) {
-  ASSERT_EQ(a.poses.size(), b.poses.size());
-  for (size_t i = 0; i < a.poses.size(); ++i) {
-    EXPECT_EQ(a.poses[i].agent_name, b.poses[i].agent_name) << i;
-    EXPECT_EQ(a.poses[i].agent_kind, b.poses[i].agent_kind) << i;
-    EXPECT_EQ(a.poses[i].line, b.poses[i].line) << i;
-    EXPECT_EQ(a.poses[i].pose.time_ns, b.poses[i].pose.time_ns) << i;
-    EXPECT_EQ(a.poses[i].pose.flags, b.poses[i].pose.flags) << i;
-    EXPECT_EQ(a.poses[i].pose.map_T_agent.position, b.poses[i].pose.map_T_agent.position) << i;
-  }
-}
 
 struct TableCase {
   std::string format;
@@ -272,14 +228,11 @@ TEST(FollowedLog, SaysWhatCannotBeFollowed) {
   refuse(folder.Write("log.json", "{\"nodes\": []}\n\n\n\n\n"), "cannot be followed");
   LogOptions with_poses = Following(milliseconds(50));
   with_poses.pose_file = "poses.txt";
-  refuse(folder.Write("log.txt", kRow1), "do not go with --follow", with_poses);
+  refuse(folder.Write("log.txt", kRow1), "does not go with --follow", with_poses);
   LogOptions as_mcap = Following(milliseconds(50));
   as_mcap.format = "mcap";
   ExpectMalformedFile(OpenLog(folder.Path("log.txt"), as_mcap).status(), {"is no mcap"});
 }
-
-// Ten seconds, in chunks of an odd count of messages.
-Recording TenSeconds() { return SmallRecording(CdrWriter(), 200); }
 
 TEST(FollowedBag, GivesWhatTheFinishedFileGives) {
   for (const std::string compression : {"zstd", "plain"}) {

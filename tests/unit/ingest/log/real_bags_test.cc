@@ -217,6 +217,24 @@ TEST_F(RealBags, TurtlebotOdometryMakesALog) {
   }
 }
 
+// Its localisation tells where the odometry is in the map, its wheels where the robot is in that.
+TEST_F(RealBags, TurtlebotTransformsMakeALogWhileTheyAreWritten) {
+  LogOptions options;
+  options.topics["poses"] = kNoTopic;
+  const auto log = ReadAll(Path("bags/nav2_turtlebot.mcap"), options);
+  ASSERT_TRUE(log.ok()) << log.status();
+  EXPECT_GT(log->poses.size(), 2000u);
+  options.follow = FollowOptions{.timeout = std::chrono::milliseconds(0), .stop = nullptr};
+  const auto followed = ReadAll(Path("bags/nav2_turtlebot.mcap"), options);
+  ASSERT_TRUE(followed.ok()) << followed.status();
+  EXPECT_EQ(followed->order, log->order);
+  ASSERT_EQ(followed->poses.size(), log->poses.size());
+  for (size_t i = 0; i < log->poses.size(); ++i) {
+    EXPECT_EQ(followed->poses[i].pose.map_T_agent.position,
+              log->poses[i].pose.map_T_agent.position);
+  }
+}
+
 TEST_F(RealBags, ImagesOfRos2Decode) {
   const auto log = ReadAll(Path("bags-ros2/soccer_goal_12_two_images.mcap"));
   ASSERT_TRUE(log.ok()) << log.status();

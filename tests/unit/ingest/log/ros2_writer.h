@@ -124,6 +124,25 @@ std::string TransformsFields(Writer out, const std::vector<std::string>& childre
   return out.bytes();
 }
 
+/// A transform of /tf.
+struct Tf {
+  std::string parent;
+  std::string child;
+  TimeNs time_ns = 0;
+  /// x y z, q x y z w.
+  std::vector<double> pose = {0, 0, 0, 0, 0, 0, 1};
+};
+
+/// tf2_msgs/TFMessage.
+inline std::string TfMessage(const std::vector<Tf>& transforms) {
+  CdrWriter out;
+  out.U32(transforms.size());
+  for (const Tf& tf : transforms) {
+    out.Header(tf.time_ns, tf.parent).String(tf.child).Doubles(tf.pose);
+  }
+  return out.bytes();
+}
+
 /// x, y, z as floats behind four other bytes.
 template <typename Writer>
 std::string CloudFields(Writer out, TimeNs time_ns, const std::string& frame,
