@@ -8,9 +8,9 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "ingest/config/option_flags.h"
 #include "ingest/log/format.h"
 #include "ingest/pipeline/robot_model.h"
-#include "ingest/program/tuning_flags.h"
 #include "schema/base/byte_size.h"
 #include "schema/base/status.h"
 
@@ -73,8 +73,8 @@ void AddIngestFlags(CLI::App* app, IngestFlags* flags) {
       "--server", flags->server,
       "Commit through this dsg-server (unix:PATH or HOST:PORT); --store is not touched");
   app->add_option("--retry-for", flags->retry_for,
-                  "How long to wait for a server that does not answer (90s, 10m, 24h); the log "
-                  "waits too")
+                  "With --server: how long to wait for one that does not answer (90s, 10m, 24h); "
+                  "the log waits too")
       ->capture_default_str();
   app->add_option("--quota", flags->limits.quota_bytes,
                   "With --store: refuse to let the map grow beyond (10GB, 500MiB); 0 = no limit")

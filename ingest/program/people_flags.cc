@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/config/option_flags.h"
 #include "ingest/log/log_digest.h"
-#include "ingest/program/tuning_flags.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {

@@ -10,7 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
-#include "ingest/program/tuning_flags.h"
+#include "ingest/config/option_flags.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every number of every stage: its flag, its range, its way into the options and into the session.
-#include "ingest/program/tuning_flags.h"
-
 #include <gtest/gtest.h>
 
 #include <CLI/CLI.hpp>
@@ -11,6 +9,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/config/option_flags.h"
 #include "ingest/pipeline/ingest_log.h"
 #include "ingest/program/ingest_flags.h"
 #include "schema/base/status.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ingest/program/tuning_flags.h"
+#include "ingest/config/option_flags.h"
 
 #include <CLI/CLI.hpp>
 #include <memory>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The numbers of the stages as flags, in groups of their own.
-// Part of the program, not of the library.
+// The numbers of tables of options as flags of a program, in groups of their own.
 #pragma once
 
 #include <span>
