@@ -63,13 +63,11 @@ bool LoopCloser::IsDue(TimeNs now_ns) const {
 absl::Status LoopCloser::Solve(bool is_last) {
   DSG_ASSIGN_OR_RETURN(solution_, graph_.Solve(/*has_covariances=*/is_last));
   is_solved_ = is_last;
-  counts_ = {solution_.loop_count,
-             solution_.kept_count,
-             solution_.unusable_count,
-             solution_.change.largest_m(),
-             {}};
+  counts_ = {solution_.loop_count,     solution_.kept_count,         solution_.unusable_count,
+             solution_.repeated_count, solution_.change.largest_m(), {}};
   for (size_t i = 0; i < solution_.is_kept.size(); ++i) {
-    if (!solution_.is_kept[i]) counts_.doubted.push_back(origins_[i]);
+    const bool is_judged = !solution_.is_repeated[i];
+    if (is_judged && !solution_.is_kept[i]) counts_.doubted.push_back(origins_[i]);
   }
   return absl::OkStatus();
 }

@@ -19,6 +19,8 @@ struct LoopCounts {
   int64_t kept_count = 0;
   /// Outside the robot's trajectory.
   int64_t unusable_count = 0;
+  /// That said again what another one said.
+  int64_t repeated_count = 0;
   /// By how much the trajectory has moved at most, metres.
   double largest_m = 0.0;
   /// Where those that were not believed stood: "loops.jsonl:3".

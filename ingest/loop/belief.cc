@@ -12,17 +12,9 @@
 #include "ingest/loop/twist.h"
 
 namespace dsg::ingest {
-namespace {
-
-// Noise has longer tails than the normal law, and edges of one graph differ.
-constexpr double kNoiseMargin = 4.0;
-// Degrees of freedom; fewer measurements say nothing about the noise.
-constexpr int kNoiseFreedomMin = 30;
-
-}  // namespace
 
 double NoiseScaleOf(const PoseGraph& graph, const std::vector<Pose3d>& map_T_pose,
-                    const std::vector<bool>& is_believed) {
+                    const std::vector<bool>& is_believed, const EvidenceOptions& evidence) {
   double squared = 0.0;
   int freedom = 0;
   for (size_t e = 0; e < graph.edges.size(); ++e) {
@@ -32,37 +24,43 @@ double NoiseScaleOf(const PoseGraph& graph, const std::vector<Pose3d>& map_T_pos
                                map_T_pose[Index(edge.to)]);
     if (edge.is_loop) freedom += graph.is_planar ? 3 : 6;
   }
-  if (freedom < kNoiseFreedomMin) return 1.0;
-  // A graph without noise must not make every loop of it impossible.
-  return std::clamp(kNoiseMargin * squared / freedom, 1e-9, 1.0);
+  if (freedom < evidence.noise_freedom_min) return 1.0;
+  // A graph without noise must not make every loop of it impossible: numerical, no option.
+  return std::clamp(evidence.noise_margin * squared / freedom, 1e-9, 1.0);
 }
 
 Belief::Belief(const PoseGraph& graph, const std::vector<Pose3d>& map_T_pose,
-               const std::vector<bool>& is_believed, double gate)
+               const std::vector<bool>& is_believed, double gate, const EvidenceOptions& evidence,
+               const TellWork& on_work)
     : graph_(graph),
       map_T_pose_(map_T_pose),
       is_believed_(is_believed),
       gate_(gate),
-      noise_scale_(NoiseScaleOf(graph, map_T_pose, is_believed)),
+      evidence_(evidence),
+      noise_scale_(NoiseScaleOf(graph, map_T_pose, is_believed, evidence)),
       covariances_(graph, map_T_pose, is_believed),
       judgements_(graph.edges.size()) {
   Eigen::AlignedBox3d box;
   for (const Pose3d& pose : map_T_pose) box.extend(pose.position);
   if (!box.isEmpty()) extent_m_ = box.sizes();
-  JudgeDoubtful();
+  JudgeDoubtful(on_work);
   for (size_t e = 0; e < graph.edges.size(); ++e) {
-    if (!judgements_[e].is_possible) impossible_count_ += 1.0;
+    if (!judgements_[e].is_possible) impossible_chances_.push_back(judgements_[e].accident_chance);
     if (graph.edges[e].is_loop && is_believed[e]) ++believed_count_;
   }
 }
 
-void Belief::JudgeDoubtful() {
+void Belief::JudgeDoubtful(const TellWork& on_work) {
   const BelievedPaths paths(graph_, map_T_pose_, is_believed_);
+  const auto doubtful_count = std::count(is_believed_.begin(), is_believed_.end(), false);
+  int64_t done = 0;
   std::map<int, std::vector<int>> doubtful_by_pose;
   for (size_t e = 0; e < graph_.edges.size(); ++e) {
     if (!is_believed_[e]) doubtful_by_pose[graph_.edges[e].from].push_back(static_cast<int>(e));
   }
   for (const auto& [from, edges] : doubtful_by_pose) {
+    if (on_work) on_work("judging doubtful loop closures", done, doubtful_count);
+    done += std::ssize(edges);
     std::vector<int> targets;
     for (const int e : edges) targets.push_back(graph_.edges[Index(e)].to);
     const std::vector<std::optional<Matrix6d>> bounds = paths.CovariancesFrom(from, targets);
@@ -95,19 +93,16 @@ Matrix6d Belief::NoiseOf(const RelativePose& edge) const {
 Belief::Judgement Belief::JudgementOf(const Vector6d& twist_map, const Matrix6d& covariance) const {
   const Deviation deviation = DeviationOf(twist_map, noise_scale_ * covariance, graph_.is_planar);
   return {deviation.squared <= gate_,
-          AccidentChance(extent_m_, graph_.is_planar, gate_, deviation.volume)};
+          AccidentChance(extent_m_, graph_.is_planar, gate_, deviation.volume, evidence_)};
 }
 
 // Loops that are known to be wrong stand for those that may be in the place of a right one: how
 // many would have passed a test as severe as the one of chance `accident_chance`.
 double Belief::WrongCountAt(double accident_chance) const {
-  // Their chances are bounds, and few loops are no sample: those that had it up to this many times
-  // easier count as if they had not.
-  constexpr double kAlike = 100.0;
   double count = 0.0;
-  for (const Judgement& judgement : judgements_) {
-    if (judgement.is_possible || judgement.accident_chance > kAlike * accident_chance) continue;
-    count += std::min(judgement.accident_chance, accident_chance);
+  for (const double chance : impossible_chances_) {
+    if (chance > evidence_.alike_factor * accident_chance) continue;
+    count += std::min(chance, accident_chance);
   }
   return count;
 }
@@ -145,8 +140,8 @@ Belief::Verdict Belief::VerdictOf(int edge, double wrong_share_max) {
     const Vector6d drawn = to_of_map * TwistOf(measured);
     judgement = JudgementOf(total * InverseOf(noise, graph_.is_planar) * drawn, total);
   }
-  const double wrong_share =
-      impossible_count_ / std::max(1.0, static_cast<double>(believed_count_));
+  const double wrong_share = static_cast<double>(impossible_chances_.size()) /
+                             std::max(1.0, static_cast<double>(believed_count_));
   if (judgement.accident_chance * wrong_share > wrong_share_max) return Verdict::kUnsure;
   return judgement.is_possible ? Verdict::kConfirmed : Verdict::kContradicted;
 }

@@ -9,6 +9,7 @@
 
 #include "ingest/loop/pose_graph.h"
 #include "ingest/loop/relative_covariance.h"
+#include "ingest/loop/robust_options.h"
 #include "ingest/loop/twist.h"
 
 namespace dsg::ingest {
@@ -17,15 +18,17 @@ namespace dsg::ingest {
 /// above 1, with a margin, and 1 where loops are too few to tell. Public graphs are off by factors
 /// up to a thousand.
 double NoiseScaleOf(const PoseGraph& graph, const std::vector<Pose3d>& map_T_pose,
-                    const std::vector<bool>& is_believed);
+                    const std::vector<bool>& is_believed, const EvidenceOptions& evidence);
 
 class Belief {
  public:
   /// `map_T_pose`: the solution of the edges of `is_believed`, all odometry among them. `gate`: the
-  /// largest squared deviation of a right loop. All must outlive this.
-  /// Requires: edges within the poses.
+  /// largest squared deviation of a right loop. `on_work` (may be empty) hears of the doubtful
+  /// loops while they are judged, here. All others must outlive this. Requires: edges within the
+  /// poses.
   Belief(const PoseGraph& graph, const std::vector<Pose3d>& map_T_pose,
-         const std::vector<bool>& is_believed, double gate);
+         const std::vector<bool>& is_believed, double gate, const EvidenceOptions& evidence,
+         const TellWork& on_work = {});
 
   /// What is believed, and loops that fit into it where few wrong ones would: less than
   /// `wrong_count_max` wrong ones are to be expected. Loops of `is_supported` need only fit.
@@ -54,18 +57,20 @@ class Belief {
   Vector6d TwistOf(const RelativePose& edge) const;
   Matrix6d NoiseOf(const RelativePose& edge) const;
   double WrongCountAt(double accident_chance) const;
-  void JudgeDoubtful();
+  void JudgeDoubtful(const TellWork& on_work);
 
   const PoseGraph& graph_;
   const std::vector<Pose3d>& map_T_pose_;
   const std::vector<bool>& is_believed_;
   double gate_;
+  const EvidenceOptions& evidence_;
   double noise_scale_;
   RelativeCovariances covariances_;
   Eigen::Vector3d extent_m_ = Eigen::Vector3d::Ones();
   /// By edge; of edges that are believed, the default.
   std::vector<Judgement> judgements_;
-  double impossible_count_ = 0.0;
+  /// Of judgements that are not possible, by edge.
+  std::vector<double> impossible_chances_;
   int64_t believed_count_ = 0;
 };
 

@@ -11,7 +11,8 @@
 namespace dsg::ingest {
 namespace {
 
-// Errors of turn count by what they do at this distance, which ranks paths; any choice is sound.
+// Errors of turn count by what they do at this distance, which ranks paths; any choice is sound, so
+// that it is no option.
 double LeverOf(const std::vector<Pose3d>& map_T_pose) {
   Eigen::AlignedBox3d box;
   for (const Pose3d& pose : map_T_pose) box.extend(pose.position);

@@ -20,6 +20,7 @@ double ChanceAbove(double value, bool is_planar) {
 
 double ChiSquareGate(double confidence, bool is_planar) {
   const double above = 1.0 - std::clamp(confidence, 0.0, 1.0 - 1e-12);
+  // Halved to the last digit: no option.
   double low = 0.0;
   double high = 100.0;
   for (int i = 0; i < 80; ++i) {

@@ -43,7 +43,8 @@ absl::StatusOr<Graduation> Graduate(const PoseGraph& graph, const std::vector<Po
       result.weights[e] = 0.0;
     }
   }
-  // Where even the largest residual is in the gate, one plain step is all there is to do.
+  // Where even the largest residual is in the gate, one plain step is all there is to do: so hard a
+  // cost is no option.
   double mu = largest > options.gate ? options.gate / (2.0 * largest - options.gate) : 1e6;
   while (result.step_count < options.step_count_max && !result.is_converged) {
     result.is_converged = true;

@@ -25,8 +25,11 @@ class OdometryTree {
   /// Requires: both of one part.
   /// Cost: O(1).
   Matrix6d CovarianceBetween(int a, int b) const;
-  /// Trace of the rotation's share of it, which no change of frame alters.
+  /// Trace of the rotation's share of it, which no change of frame alters. No less than the
+  /// difference of RotationVarianceOf.
   double RotationVarianceBetween(int a, int b) const;
+  /// The same of the way from the first pose of the part.
+  double RotationVarianceOf(int pose) const { return rotation_variance_[Index(pose)]; }
 
  private:
   static size_t Index(int i) { return static_cast<size_t>(i); }

@@ -30,7 +30,7 @@ inline constexpr size_t kCovariancePosesMax = 20'000;
 struct OptimizeOptions {
   PoseObjective objective = PoseObjective::kGeodesic;
   int iteration_count_max = 100;
-  /// Relative decrease of the cost at which it is done.
+  /// Relative decrease of the cost at which it is done: numerical, no option of dsg-ingest.
   double tolerance = 1e-10;
   /// Start from rotations and translations found linearly (chordal), instead of from the graph's
   /// poses. Source: Martinec and Pajdla 2007; Carlone et al. 2015.

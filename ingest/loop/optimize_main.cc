@@ -17,6 +17,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "ingest/config/option_flags.h"
 #include "ingest/loop/g2o_file.h"
 #include "ingest/loop/optimize.h"
 #include "ingest/loop/robust.h"
@@ -37,6 +38,8 @@ struct Flags {
   int iteration_count_max = 500;
   bool is_robust = false;
   bool is_json = false;
+  /// Numbers of RobustOptions::Bind alone; the rest is not used.
+  RobustOptions numbers;
 };
 
 struct Report {
@@ -70,24 +73,37 @@ void AddFlags(CLI::App* app, Flags* flags) {
   app->add_option("--iterations", flags->iteration_count_max, "At most so many steps")
       ->check(CLI::Range(0, 100'000))
       ->capture_default_str();
+  UseShortHelp(app);
+  const OptionGroup judged{"loop closures (--robust)", flags->numbers.Bind()};
+  AddTuning({&judged, 1}, app);
 }
 
 /// One line on a terminal, once it has taken two seconds.
 class Progress {
  public:
   void Update(int iteration, double cost) {
-    const auto now = SteadyClock::now();
-    if (!is_terminal_ || now < next_) return;
-    next_ = now + std::chrono::milliseconds(200);
-    std::fprintf(stderr, "\rstep %d, cost %.6g\033[K", iteration, cost);
-    std::fflush(stderr);
-    is_shown_ = true;
+    if (IsDue()) Show(absl::StrFormat("step %d, cost %.6g", iteration, cost));
+  }
+  void Update(const char* what, int64_t done, int64_t total) {
+    if (IsDue()) Show(absl::StrFormat("%s, %d of %d", what, done, total));
   }
   ~Progress() {
     if (is_shown_) std::fputs("\r\033[K", stderr);
   }
 
  private:
+  bool IsDue() {
+    const auto now = SteadyClock::now();
+    if (!is_terminal_ || now < next_) return false;
+    next_ = now + std::chrono::milliseconds(200);
+    return true;
+  }
+  void Show(const std::string& line) {
+    std::fprintf(stderr, "\r%s\033[K", line.c_str());
+    std::fflush(stderr);
+    is_shown_ = true;
+  }
+
   const bool is_terminal_ = isatty(STDERR_FILENO) == 1;
   SteadyClock::time_point next_ = SteadyClock::now() + std::chrono::seconds(2);
   bool is_shown_ = false;
@@ -115,13 +131,16 @@ absl::StatusOr<RobustResult> SolveRobustly(const PoseGraph& graph, RobustOptions
 
 absl::StatusOr<RobustResult> SolveRobustly(const Flags& flags, const G2oFile& file) {
   Progress progress;
-  RobustOptions options;
+  RobustOptions options = flags.numbers;
   options.optimize.objective = ObjectiveOf(flags.objective);
   options.optimize.is_chordal_start = flags.start == "chordal";
   options.optimize.fixed_pose = file.fixed_pose;
   options.optimize.iteration_count_max = flags.iteration_count_max;
   options.optimize.on_iteration = [&progress](int iteration, double cost) {
     progress.Update(iteration, cost);
+  };
+  options.on_work = [&progress](const char* what, int64_t done, int64_t total) {
+    progress.Update(what, done, total);
   };
   if (flags.is_robust) return SolveRobustly(file.graph, options);
   RobustResult result;
@@ -201,7 +220,20 @@ absl::Status WriteResult(const std::string& path, PoseGraph graph, const RobustR
   return WriteG2o(graph, path);
 }
 
+// What only --robust reads: without it it would be ignored.
+absl::Status CheckWithoutRobust(const Flags& flags) {
+  RobustOptions numbers = flags.numbers;
+  RobustOptions defaults;
+  const std::vector<BoundOption> given = numbers.Bind();
+  const std::vector<BoundOption> usual = defaults.Bind();
+  for (size_t i = 0; i < given.size(); ++i) {
+    if (given[i].Get() != usual[i].Get()) return NeedsOther(given[i].name, "robust");
+  }
+  return absl::OkStatus();
+}
+
 absl::Status OptimizeFile(const Flags& flags) {
+  if (!flags.is_robust) DSG_RETURN_IF_ERROR(CheckWithoutRobust(flags));
   DSG_ASSIGN_OR_RETURN(const G2oFile file, ReadG2o(flags.file));
   for (const std::string& note : file.notes) {
     std::fprintf(stderr, "%s: note: %s\n", flags.file.c_str(), note.c_str());

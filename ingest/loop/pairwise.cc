@@ -6,17 +6,13 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
+#include <tuple>
 
 #include "ingest/loop/twist.h"
 
 namespace dsg::ingest {
 namespace {
-
-// Pairs that agree by accident more often than this do so in swarms: where one
-// wrong loop fits, its neighbours fit as well.
-constexpr double kTellingChance = 3e-3;
-// Chances below this are not trusted: wrong loops are not that random.
-constexpr double kLeastChance = 1e-9;
 
 // A loop, turned so that it leads from the part and pose of lower number.
 struct Loop {
@@ -30,6 +26,16 @@ struct Loop {
   // Of the loop's own noise, twist of the frame of `from`'s part.
   Matrix6d covariance;
   double rotation_variance = 0.0;
+  // Of the odometry from the roots of the parts to both ends.
+  double from_variance = 0.0;
+  double to_variance = 0.0;
+};
+
+// Two loops that close a cycle, a > b, and the rotation variance of the odometry in it.
+struct LoopPair {
+  int a = 0;
+  int b = 0;
+  double variance = 0.0;
 };
 
 // A comparison of a loop with another that is rarely passed by accident.
@@ -53,10 +59,13 @@ class Comparison {
 
  private:
   Loop MakeLoop(const RelativePose& edge) const;
-  // Rotation variance of the odometry in the cycle of two loops; negative when
-  // there is no cycle.
+  // Rotation variance of the odometry in the cycle of two loops of the same parts.
   double CycleVariance(const Loop& a, const Loop& b) const;
+  void SortLoops();
+  template <typename Visit>
+  void ForEachPairBelow(double variance, Visit visit) const;
   double LargestVarianceCompared() const;
+  std::vector<LoopPair> PairsCompared() const;
   Deviation Compare(const Loop& a, const Loop& b) const;
   bool AgreesWithOdometry(const Loop& loop) const;
 
@@ -64,6 +73,10 @@ class Comparison {
   const OdometryTree& odometry_;
   const PairwiseOptions& options_;
   std::vector<Loop> loops_;
+  // Numbers of loops by the parts that they join, and within these ascending by their keys.
+  std::vector<int> sorted_;
+  std::vector<double> keys_;
+  double largest_key_ = 0.0;
   Eigen::Vector3d extent_m_ = Eigen::Vector3d::Ones();
 };
 
@@ -83,39 +96,108 @@ Loop Comparison::MakeLoop(const RelativePose& edge) const {
   const Pose3d& part_T_noise = is_turned ? odometry_.part_T_pose(loop.from) : part_T_measured;
   loop.covariance = MovedCovariance(AdjointOf(part_T_noise), covariance);
   loop.rotation_variance = covariance.bottomRightCorner<3, 3>().trace();
+  loop.from_variance = odometry_.RotationVarianceOf(loop.from);
+  loop.to_variance = odometry_.RotationVarianceOf(loop.to);
   return loop;
 }
 
 double Comparison::CycleVariance(const Loop& a, const Loop& b) const {
-  if (odometry_.part(a.from) != odometry_.part(b.from)) return -1.0;
-  if (odometry_.part(a.to) != odometry_.part(b.to)) return -1.0;
   return options_.noise_scale * (odometry_.RotationVarianceBetween(a.from, b.from) +
                                  odometry_.RotationVarianceBetween(a.to, b.to));
 }
 
-double Comparison::LargestVarianceCompared() const {
-  const double limit = 4.0 * options_.turn_rad_max * options_.turn_rad_max;
-  const int64_t count = static_cast<int64_t>(loops_.size());
-  if (count * (count - 1) / 2 <= options_.pair_count_max) return limit;
-  // Counts of pairs by variance, a quarter of an octave a bin, below `limit`.
-  constexpr int kBinCount = 200;
-  std::array<int64_t, kBinCount> counts{};
-  const auto bin_of = [limit](double variance) {
-    if (variance <= 0.0) return kBinCount - 1;
-    return std::clamp(static_cast<int>(4.0 * std::log2(limit / variance)), 0, kBinCount - 1);
+// The variance between two poses is no less than the difference of their variances from the root.
+// So keys of two loops differ by no more than the variance of their cycle, and whoever looks for
+// small variances need not look far. The share of the second end keeps loops apart that have one
+// end in common, or whose ends move together.
+void Comparison::SortLoops() {
+  constexpr double kShareOfTo = 0.618;
+  for (const Loop& loop : loops_) {
+    keys_.push_back(options_.noise_scale * (loop.from_variance + kShareOfTo * loop.to_variance));
+    largest_key_ = std::max(largest_key_, keys_.back());
+  }
+  sorted_.resize(loops_.size());
+  std::iota(sorted_.begin(), sorted_.end(), 0);
+  const auto rank = [this](int i) {
+    const Loop& loop = loops_[Index(i)];
+    return std::tuple(odometry_.part(loop.from), odometry_.part(loop.to), keys_[Index(i)], i);
   };
-  for (size_t a = 0; a < loops_.size(); ++a) {
-    for (size_t b = 0; b < a; ++b) {
-      const double variance = CycleVariance(loops_[a], loops_[b]);
-      if (variance >= 0.0 && variance < limit) ++counts[Index(bin_of(variance))];
+  std::sort(sorted_.begin(), sorted_.end(), [&](int a, int b) { return rank(a) < rank(b); });
+}
+
+// Calls `visit` with all pairs whose cycles have less variance, until it returns false.
+template <typename Visit>
+void Comparison::ForEachPairBelow(double variance, Visit visit) const {
+  // Variances are rounded.
+  const double reach = variance + 1e-12 * largest_key_;
+  for (size_t i = 0; i < sorted_.size(); ++i) {
+    const Loop& first = loops_[Index(sorted_[i])];
+    for (size_t j = i + 1; j < sorted_.size(); ++j) {
+      const Loop& second = loops_[Index(sorted_[j])];
+      if (odometry_.part(second.from) != odometry_.part(first.from) ||
+          odometry_.part(second.to) != odometry_.part(first.to) ||
+          keys_[Index(sorted_[j])] - keys_[Index(sorted_[i])] > reach) {
+        break;
+      }
+      const double least = std::abs(second.from_variance - first.from_variance) +
+                           std::abs(second.to_variance - first.to_variance);
+      if (options_.noise_scale * least > reach) continue;
+      const double exact = CycleVariance(first, second);
+      if (exact >= variance) continue;
+      const auto [b, a] = std::minmax(sorted_[i], sorted_[j]);
+      if (!visit(LoopPair{a, b, exact})) return;
     }
   }
+}
+
+// No more pairs than are allowed have less variance than this.
+double Comparison::LargestVarianceCompared() const {
+  const EvidenceOptions& evidence = options_.evidence;
+  const double limit = 4.0 * evidence.turn_rad_max * evidence.turn_rad_max;
+  const int64_t count = static_cast<int64_t>(loops_.size());
+  if (count * (count - 1) / 2 <= evidence.pair_count_max) return limit;
+  // Counts of pairs by variance, a quarter of an octave a bin (no option: finer bins only come
+  // nearer to the count); from small variances on, so that pairs are looked at until they are too
+  // many.
+  constexpr int kBinCount = 200;
+  constexpr int kBinsOfOctave = 4;
+  const auto begin_of = [limit](int bin) { return limit * std::exp2(-0.25 * bin); };
+  const auto bin_of = [limit](double variance) {
+    if (variance <= 0.0) return kBinCount - 1;
+    const double octaves = std::log2(limit / variance);
+    return static_cast<int>(std::clamp(4.0 * octaves, 0.0, kBinCount - 1.0));
+  };
   int64_t taken = 0;
-  for (int bin = kBinCount - 1; bin >= 0; --bin) {
-    taken += counts[Index(bin)];
-    if (taken > options_.pair_count_max) return limit * std::exp2(-0.25 * (bin + 1));
+  for (int first = kBinCount - kBinsOfOctave; first >= 0; first -= kBinsOfOctave) {
+    std::array<int64_t, kBinsOfOctave> counts{};
+    const double below = std::min(limit, begin_of(first) * (1.0 + 1e-9));
+    ForEachPairBelow(below, [&](const LoopPair& pair) {
+      const int bin = bin_of(pair.variance);
+      if (bin < first || bin >= first + kBinsOfOctave) return true;
+      ++counts[Index(bin - first)];
+      return taken + counts.back() <= evidence.pair_count_max;
+    });
+    for (int i = kBinsOfOctave - 1; i >= 0; --i) {
+      taken += counts[Index(i)];
+      if (taken > evidence.pair_count_max) return begin_of(first + i + 1);
+    }
   }
   return limit;
+}
+
+// In the order of their numbers. Where the odometry knows no difference between more pairs than are
+// allowed, those that come first.
+std::vector<LoopPair> Comparison::PairsCompared() const {
+  std::vector<LoopPair> pairs;
+  const auto count_max = static_cast<size_t>(options_.evidence.pair_count_max);
+  ForEachPairBelow(LargestVarianceCompared(), [&](const LoopPair& pair) {
+    pairs.push_back(pair);
+    return pairs.size() < count_max;
+  });
+  std::sort(pairs.begin(), pairs.end(), [](const LoopPair& one, const LoopPair& other) {
+    return std::pair(one.a, one.b) < std::pair(other.a, other.b);
+  });
+  return pairs;
 }
 
 Deviation Comparison::Compare(const Loop& a, const Loop& b) const {
@@ -132,7 +214,7 @@ bool Comparison::AgreesWithOdometry(const Loop& loop) const {
   const double variance =
       options_.noise_scale * odometry_.RotationVarianceBetween(loop.from, loop.to) +
       loop.rotation_variance;
-  if (variance > options_.turn_rad_max * options_.turn_rad_max) return true;
+  if (variance > options_.evidence.turn_rad_max * options_.evidence.turn_rad_max) return true;
   const Matrix6d covariance =
       loop.covariance + options_.noise_scale * odometry_.CovarianceBetween(loop.from, loop.to);
   const Vector6d twist = LogOf(loop.from_part_T_to_part);
@@ -184,29 +266,27 @@ LoopAgreement Comparison::Run() {
     loops_.push_back(MakeLoop(graph_.edges[e]));
     agreement.agrees_with_odometry.push_back(AgreesWithOdometry(loops_.back()));
   }
-  const int count = static_cast<int>(loops_.size());
-  agreement.agrees = BitsetGraph(count);
+  SortLoops();
+  const std::vector<LoopPair> pairs = PairsCompared();
+  agreement.compared_count = std::ssize(pairs);
   std::vector<std::vector<Telling>> telling(loops_.size());
-  const double variance_max = LargestVarianceCompared();
-  const double sure_variance = options_.turn_rad_max * options_.turn_rad_max;
-  for (int a = 0; a < count; ++a) {
-    for (int b = 0; b < a; ++b) {
-      const double variance = CycleVariance(loops_[Index(a)], loops_[Index(b)]);
-      if (variance < 0.0 || variance >= variance_max) {
-        agreement.agrees.AddEdge(a, b);
-        continue;
-      }
-      const Deviation deviation = Compare(loops_[Index(a)], loops_[Index(b)]);
-      const double chance =
-          AccidentChance(extent_m_, graph_.is_planar, options_.gate, deviation.volume);
-      const bool is_agreed = deviation.squared <= options_.gate;
-      for (const int loop : {a, b}) {
-        if (chance > kTellingChance) continue;
-        telling[Index(loop)].push_back({chance, is_agreed});
-      }
-      const bool is_tolerable = deviation.squared <= options_.disagreement_factor * options_.gate;
-      if (is_tolerable || variance > sure_variance) agreement.agrees.AddEdge(a, b);
+  const double sure_variance = options_.evidence.turn_rad_max * options_.evidence.turn_rad_max;
+  for (size_t k = 0; k < pairs.size(); ++k) {
+    if (options_.on_work && k % 1024 == 0) {
+      options_.on_work("comparing pairs of loop closures", static_cast<int64_t>(k),
+                       agreement.compared_count);
     }
+    const auto [a, b, variance] = pairs[k];
+    const Deviation deviation = Compare(loops_[Index(a)], loops_[Index(b)]);
+    const double chance = AccidentChance(extent_m_, graph_.is_planar, options_.gate,
+                                         deviation.volume, options_.evidence);
+    const bool is_agreed = deviation.squared <= options_.gate;
+    for (const int loop : {a, b}) {
+      if (chance > options_.evidence.telling_chance_max) continue;
+      telling[Index(loop)].push_back({chance, is_agreed});
+    }
+    const bool is_tolerable = deviation.squared <= options_.disagreement_factor * options_.gate;
+    if (!is_tolerable && variance <= sure_variance) agreement.disagreements.emplace_back(a, b);
   }
   for (const std::vector<Telling>& comparisons : telling) {
     agreement.support.push_back(SupportOf(comparisons));
@@ -217,14 +297,22 @@ LoopAgreement Comparison::Run() {
 
 }  // namespace
 
-double AccidentChance(const Eigen::Vector3d& extent_m, bool is_planar, double gate, double volume) {
-  // A map may be flat or a corridor; wrong measurements are not that thin.
-  const Eigen::Vector3d sides = extent_m.cwiseMax(std::max(1e-3, 0.1 * extent_m.maxCoeff()));
+bool LoopAgreement::Agree(int a, int b) const {
+  return !std::binary_search(disagreements.begin(), disagreements.end(),
+                             std::pair(std::max(a, b), std::min(a, b)));
+}
+
+double AccidentChance(const Eigen::Vector3d& extent_m, bool is_planar, double gate, double volume,
+                      const EvidenceOptions& evidence) {
+  // Maps of a single place have no extent: numerical, no option.
+  constexpr double kSideMinM = 1e-3;
+  const Eigen::Vector3d sides =
+      extent_m.cwiseMax(std::max(kSideMinM, evidence.room_side_share_min * extent_m.maxCoeff()));
   const double pi = std::numbers::pi;
   const double room = is_planar ? sides.x() * sides.y() * 2.0 * pi : sides.prod() * 8.0 * pi * pi;
   const double ball =
       is_planar ? 4.0 / 3.0 * pi * gate * std::sqrt(gate) : pi * pi * pi / 6.0 * gate * gate * gate;
-  return std::clamp(ball * volume / room, kLeastChance, 1.0);
+  return std::clamp(ball * volume / room, evidence.chance_min, 1.0);
 }
 
 LoopAgreement CompareLoops(const PoseGraph& graph, const OdometryTree& odometry,

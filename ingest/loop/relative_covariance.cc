@@ -34,6 +34,54 @@ struct RelativeCovariances::Network {
   std::vector<int> rows;
   Pose3d middle_T_map;
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor;
+  Eigen::VectorXd pivots;
+  // Of Resistance: zeros in between.
+  Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor> solved;
+  std::vector<bool> is_reached;
+
+  void Factorise(const Eigen::SparseMatrix<double>& matrix) {
+    factor.compute(matrix);
+    if (factor.info() != Eigen::Success) return;
+    pivots = factor.vectorD();
+    solved.setZero(matrix.rows(), 6);
+    is_reached.assign(static_cast<size_t>(matrix.rows()), false);
+  }
+
+  // E' M^-1 E of the ends E of two poses. With M = L D L', that is Y' D^-1 Y with L Y = E, and Y
+  // has no other rows than those that the elimination tree leads to from E: few of a large graph.
+  Eigen::MatrixXd Resistance(int from, int to) {
+    const int width = static_cast<int>(rows.size());
+    const auto& lower = factor.matrixL().nestedExpression();
+    const int* outer = lower.outerIndexPtr();
+    const int* inner = lower.innerIndexPtr();
+    const double* values = lower.valuePtr();
+    const auto& place = factor.permutationP().indices();
+    std::vector<int> reached;
+    for (const int end : {from, to}) {
+      for (int k = 0; k < width; ++k) {
+        int row = place[end * width + k];
+        solved(row, k) = end == to ? 1.0 : -1.0;
+        while (!is_reached[Index(row)]) {
+          is_reached[Index(row)] = true;
+          reached.push_back(row);
+          // The parent in the tree is the first row below; roots are their own.
+          if (outer[row] < outer[row + 1]) row = inner[outer[row]];
+        }
+      }
+    }
+    std::sort(reached.begin(), reached.end());
+    Matrix6d sum = Matrix6d::Zero();
+    for (const int column : reached) {
+      const Eigen::Matrix<double, 1, 6> row = solved.row(column);
+      for (int at = outer[column]; at < outer[column + 1]; ++at) {
+        solved.row(inner[at]) -= values[at] * row;
+      }
+      sum += row.transpose() * row / pivots[column];
+      solved.row(column).setZero();
+      is_reached[Index(column)] = false;
+    }
+    return sum.topLeftCorner(width, width);
+  }
 
   void Add(int a, int b, const Eigen::MatrixXd& block,
            std::vector<Eigen::Triplet<double>>* triplets) const {
@@ -88,21 +136,14 @@ void RelativeCovariances::Factorise() {
   const int size = width * static_cast<int>(map_T_pose_.size());
   Eigen::SparseMatrix<double> matrix(size, size);
   matrix.setFromTriplets(triplets.begin(), triplets.end());
-  network.factor.compute(matrix);
+  network.Factorise(matrix);
 }
 
 std::optional<Matrix6d> RelativeCovariances::Between(int from, int to) {
   if (!network_) Factorise();
   if (parts_[Index(from)] != parts_[Index(to)]) return std::nullopt;
   if (network_->factor.info() != Eigen::Success) return std::nullopt;
-  const int width = static_cast<int>(network_->rows.size());
-  Eigen::MatrixXd ends = Eigen::MatrixXd::Zero(width * static_cast<int>(map_T_pose_.size()), width);
-  ends.middleRows(width * from, width) -= Eigen::MatrixXd::Identity(width, width);
-  ends.middleRows(width * to, width) += Eigen::MatrixXd::Identity(width, width);
-  const Eigen::MatrixXd solved = network_->factor.solve(ends);
-  const Eigen::MatrixXd covariance =
-      solved.middleRows(width * to, width) - solved.middleRows(width * from, width);
-  const Matrix6d grown = Grown(0.5 * (covariance + covariance.transpose()), network_->rows);
+  const Matrix6d grown = Grown(network_->Resistance(from, to), network_->rows);
   return MovedCovariance(AdjointOf(network_->middle_T_map.Inverse()), grown);
 }
 

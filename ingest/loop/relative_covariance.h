@@ -15,7 +15,8 @@ namespace dsg::ingest {
 /// the covariance between two poses is the resistance between them, a matrix for a number.
 ///
 /// Threads: one caller at a time.
-/// Cost:    the first question factorises the network, each one solves it for six columns.
+/// Cost:    the first question factorises the network; each one goes through the part of the factor
+///          that belongs to its two poses, some hundredths of it in a large graph.
 class RelativeCovariances {
  public:
   /// `map_T_pose` and `is_believed` by pose and by edge. All must outlive this.

@@ -6,6 +6,8 @@
 #include <map>
 #include <utility>
 
+#include "ingest/loop/chi_square.h"
+#include "ingest/loop/repeated_loops.h"
 #include "schema/base/check.h"
 #include "schema/base/status.h"
 
@@ -13,6 +15,7 @@ namespace dsg::ingest {
 namespace {
 
 // Keyframes that are too many are taken further apart in steps, up to where only loops make them.
+// No options: they say how the limit is come near to, not what it is.
 constexpr double kKeyframeSpreadStep = 1.5;
 constexpr double kKeyframeSpreadMax = 1e6;
 
@@ -23,6 +26,12 @@ constexpr OptionField<RobotGraphOptions> kGraphFields[] = {
      "... or turn, radians: 20 degrees"},
     {"loop-keyframe-time", &RobotGraphOptions::keyframe_ns_max, 0.01, 3600.0,
      "... or time, seconds: a robot that stands still drifts little"},
+    {"loop-keyframes", &RobotGraphOptions::keyframe_count_max, 2, 1'000'000,
+     "A log of more keyframes takes them further apart, at the same rate everywhere: the path of "
+     "so many is solved in seconds"},
+    {"loop-covariances", &RobotGraphOptions::covariance_count_max, 0,
+     static_cast<double>(kCovariancePosesMax),
+     "Poses of a path of more keyframes have no covariances from loop closures: memory"},
     {"loop-odometry-turn", &RobotGraphOptions::odometry_rad_per_rad, 1e-5, 1.0,
      "How far off the heading is after a turn of one radian, radians: of wheels and cheap gyros"},
     {"loop-odometry-min", &RobotGraphOptions::odometry_m_min, 1e-5, 1.0,
@@ -44,9 +53,9 @@ constexpr OptionField<RobotGraphOptions> kGraphFields[] = {
      "with each"},
 };
 
-constexpr OptionField<RobustOptions> kRobustFields[] = {
-    {"loop-confidence", &RobustOptions::confidence, 0.5, 0.999999,
-     "Chance that right loop closures pass each test: one in a hundred is given up"},
+constexpr OptionField<OptimizeOptions> kOptimizeFields[] = {
+    {"loop-iterations", &OptimizeOptions::iteration_count_max, 1, 100'000,
+     "Steps of each solution of the path at most: few take more than ten"},
 };
 
 Covariance6 UpperTriangle(const Matrix6d& matrix) {
@@ -76,7 +85,9 @@ PoseFactor MakeFactor(const std::string& type, TimeNs from_ns, TimeNs to_ns, con
 std::vector<BoundOption> RobotGraphOptions::Bind() {
   std::vector<BoundOption> bound;
   BindFields<RobotGraphOptions>(kGraphFields, this, &bound);
-  BindFields<RobustOptions>(kRobustFields, &robust, &bound);
+  BindFields<OptimizeOptions>(kOptimizeFields, &robust.optimize, &bound);
+  const std::vector<BoundOption> robust_bound = robust.Bind();
+  bound.insert(bound.end(), robust_bound.begin(), robust_bound.end());
   return bound;
 }
 
@@ -121,6 +132,27 @@ std::vector<RobotGraph::BoundLoop> RobotGraph::BindLoops() const {
   return bound;
 }
 
+std::vector<RobotGraph::BoundLoop> RobotGraph::WithoutRepeated(
+    const std::vector<BoundLoop>& bound, std::vector<bool>* is_repeated) const {
+  std::vector<RelativePose> measured;
+  for (const BoundLoop& loop : bound) {
+    RelativePose& edge = measured.emplace_back();
+    edge.from = static_cast<int>(loop.from);
+    edge.to = static_cast<int>(loop.to);
+    edge.from_T_to = loop.from_T_to;
+    edge.information = loops_[loop.loop].information;
+  }
+  const std::vector<bool> is_told =
+      FindRepeated(measured, ChiSquareGate(options_.robust.confidence, /*is_planar=*/false));
+  is_repeated->assign(loops_.size(), false);
+  std::vector<BoundLoop> distinct;
+  for (size_t i = 0; i < bound.size(); ++i) {
+    (*is_repeated)[bound[i].loop] = is_told[i];
+    if (!is_told[i]) distinct.push_back(bound[i]);
+  }
+  return distinct;
+}
+
 std::vector<size_t> RobotGraph::ChooseKeyframes(const std::vector<BoundLoop>& loops,
                                                 double spread) const {
   std::vector<size_t> bound;
@@ -147,6 +179,7 @@ std::vector<size_t> RobotGraph::ChooseKeyframes(const std::vector<BoundLoop>& lo
 // taken by the options. Loop closures make keyframes of their ends; what odometry may err at least
 // is divided among them, or loops that are not believed would loosen it.
 double RobotGraph::ShareOfAStep(double way_m, double turn_rad, TimeNs time_ns) const {
+  // Numerical, no option: odometry of no way at all would be certain.
   constexpr double kShareMin = 1e-4;
   const double share =
       std::max({way_m / options_.keyframe_m, turn_rad / options_.keyframe_rad,
@@ -204,16 +237,18 @@ PoseGraph RobotGraph::MakeGraph(const std::vector<size_t>& keyframes,
 
 absl::StatusOr<RobotGraph::Solution> RobotGraph::Solve(bool has_covariances) const {
   Solution solution;
-  const std::vector<BoundLoop> loops = BindLoops();
+  const std::vector<BoundLoop> bound = BindLoops();
+  solution.loop_count = std::ssize(loops_);
+  solution.unusable_count = std::ssize(loops_) - std::ssize(bound);
+  const std::vector<BoundLoop> loops = WithoutRepeated(bound, &solution.is_repeated);
+  solution.repeated_count = std::ssize(loops_) - solution.unusable_count - std::ssize(loops);
   std::vector<size_t> keyframes = ChooseKeyframes(loops, solution.keyframe_spread);
-  while (keyframes.size() > options_.keyframe_count_max &&
+  while (keyframes.size() > static_cast<size_t>(options_.keyframe_count_max) &&
          solution.keyframe_spread < kKeyframeSpreadMax) {
     solution.keyframe_spread *= kKeyframeSpreadStep;
     keyframes = ChooseKeyframes(loops, solution.keyframe_spread);
   }
   for (const size_t keyframe : keyframes) solution.keyframe_times.push_back(TimeOf(keyframe));
-  solution.loop_count = static_cast<int64_t>(loops_.size());
-  solution.unusable_count = static_cast<int64_t>(loops_.size() - loops.size());
   solution.is_kept.assign(loops_.size(), false);
   if (loops.empty()) return solution;
 
@@ -221,7 +256,7 @@ absl::StatusOr<RobotGraph::Solution> RobotGraph::Solve(bool has_covariances) con
   RobustOptions robust = options_.robust;
   robust.optimize.fixed_pose = 0;
   robust.optimize.has_covariance =
-      has_covariances && keyframes.size() <= options_.covariance_count_max;
+      has_covariances && keyframes.size() <= static_cast<size_t>(options_.covariance_count_max);
   DSG_ASSIGN_OR_RETURN(const RobustResult result, OptimizeRobustly(graph, robust));
   for (size_t i = 0; i < loops.size(); ++i) {
     const bool is_kept = result.is_kept[keyframes.size() - 1 + i];
@@ -248,7 +283,8 @@ std::vector<PoseFactor> RobotGraph::Factors(const Solution& solution) const {
     factors.push_back(
         MakeFactor("odometry", TimeOf(from), TimeOf(to), edge.from_T_to, edge.information));
   }
-  for (const BoundLoop& loop : BindLoops()) {
+  std::vector<bool> is_repeated;
+  for (const BoundLoop& loop : WithoutRepeated(BindLoops(), &is_repeated)) {
     const bool is_kept = loop.loop < solution.is_kept.size() && solution.is_kept[loop.loop];
     factors.push_back(MakeFactor(is_kept ? "loop_closure" : "loop_closure_rejected",
                                  TimeOf(loop.from), TimeOf(loop.to), loop.from_T_to,

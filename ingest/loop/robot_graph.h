@@ -35,10 +35,10 @@ struct RobotGraphOptions {
   TimeNs keyframe_ns_max = 5'000'000'000;
   /// A log that would have more takes them further apart, at the same rate everywhere. The poses
   /// that loops bind are keyframes in any case.
-  size_t keyframe_count_max = 20'000;
+  int keyframe_count_max = 20'000;
   /// Covariances are found of at most so many keyframes, and of none if loops bind more. At most
   /// kCovariancePosesMax.
-  size_t covariance_count_max = kCovariancePosesMax;
+  int covariance_count_max = static_cast<int>(kCovariancePosesMax);
   /// Errors of odometry are a random walk: so large a standard deviation after one metre or radian,
   /// and twice that after four, however many keyframes lie between...
   double odometry_m_per_m = 0.02;
@@ -64,8 +64,7 @@ struct RobotGraphOptions {
   /// with each.
   int correct_loop_count_max = 2000;
 
-  /// Without the two errors of odometry that have flags of their own, and without limits of time
-  /// and memory.
+  /// Without the two errors of odometry that have flags of their own.
   std::vector<BoundOption> Bind();
 };
 
@@ -84,27 +83,35 @@ class RobotGraph {
     int64_t kept_count = 0;
     /// Loops whose stamps are outside the trajectory, and such that join a keyframe to itself.
     int64_t unusable_count = 0;
+    /// Loops that say what one before them said of the same two poses (FindRepeated): they are left
+    /// out.
+    int64_t repeated_count = 0;
     std::vector<TimeNs> keyframe_times;
     /// How many times as far apart keyframes are as the options say, because of their number.
     double keyframe_spread = 1.0;
     /// By keyframe, of the pose against the first one (TimedPose::covariance); empty without loops,
     /// and of more keyframes than covariance_count_max.
     std::vector<Covariance6> covariances;
-    /// By loop as added: whether it was believed. False for unusable ones.
+    /// By loop as added: whether it was believed. False for unusable and repeated ones.
     std::vector<bool> is_kept;
+    std::vector<bool> is_repeated;
   };
   /// Identity when no usable loop is believed. Loops bind the two poses nearest to their stamps,
   /// which become keyframes; what the robot moved between stamp and pose is taken from odometry.
+  /// RobustOptions::on_work hears of the parts that take long.
   /// Errors: of OptimizeRobustly.
   absl::StatusOr<Solution> Solve(bool has_covariances = true) const;
 
-  /// "odometry" between keyframes and "loop_closure" (all of them; a loop that was not kept has the
-  /// type "loop_closure_rejected"), for the store. `solution`: of the last Solve.
+  /// "odometry" between keyframes and "loop_closure" (all of them but repeated ones; a loop that
+  /// was not kept has the type "loop_closure_rejected"), for the store. `solution`: of the last
+  /// Solve.
   std::vector<PoseFactor> Factors(const Solution& solution) const;
 
  private:
   struct BoundLoop;
   std::vector<BoundLoop> BindLoops() const;
+  std::vector<BoundLoop> WithoutRepeated(const std::vector<BoundLoop>& bound,
+                                         std::vector<bool>* is_repeated) const;
   std::vector<size_t> ChooseKeyframes(const std::vector<BoundLoop>& loops, double spread) const;
   Pose3d Given(size_t index) const;
   TimeNs TimeOf(size_t index) const;

@@ -2,6 +2,9 @@
 #include "ingest/loop/robust.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <iterator>
+#include <memory>
 #include <utility>
 
 #include "ingest/loop/belief.h"
@@ -13,17 +16,8 @@
 namespace dsg::ingest {
 namespace {
 
-// Loops are believed before graduation, and after it by themselves, when no more wrong ones than
-// this are to be expected among them all.
-constexpr double kWrongCountMax = 1e-2;
-// Of loops that graduation kept and whose like are wrong this often at most.
-constexpr double kWrongShareMax = 1e-2;
-// Doubtful loops are not worth a graduation when they are fewer than this share of those believed:
-// it is slow, and all that few can do is bend the poses their way.
-constexpr double kDoubtfulShareMin = 0.05;
-constexpr int kBeliefRoundCountMax = 8;
-constexpr int kGraduationRoundCountMax = 4;
-// On the way to the last solution nothing is gained by the last digits.
+// Numerical, no options: on the way to the last solution nothing is gained by the last digits, and
+// the last one is solved to RobustOptions::optimize.
 constexpr double kRoughTolerance = 1e-4;
 constexpr int kRoughIterationCountMax = 8;
 
@@ -43,19 +37,21 @@ class RobustSolver {
  private:
   absl::StatusOr<std::vector<bool>> Believe();
   absl::Status FindSupported();
-  absl::StatusOr<std::vector<bool>> Grow(std::vector<bool> is_believed) const;
+  absl::StatusOr<std::vector<bool>> Grow(std::vector<bool> is_believed);
   absl::StatusOr<std::vector<bool>> GraduateDoubtful(const std::vector<bool>& is_believed);
   absl::StatusOr<std::vector<bool>> Confirmed(const std::vector<Pose3d>& poses,
                                               const std::vector<bool>& is_kept,
                                               const std::vector<bool>& is_believed) const;
   absl::StatusOr<RobustResult> Settle(std::vector<Pose3d> poses, std::vector<bool> is_kept) const;
 
+  Belief BeliefAt(const std::vector<Pose3d>& poses, const std::vector<bool>& is_believed,
+                  double gate) const;
   double ResidualOf(const RelativePose& edge, const std::vector<Pose3d>& poses) const;
   double TruncatedCost(const std::vector<Pose3d>& poses,
                        const std::vector<bool>& is_candidate) const;
   std::vector<bool> InGate(const std::vector<Pose3d>& poses, std::vector<bool> is_kept) const;
 
-  absl::StatusOr<std::vector<Pose3d>> RoughPoses(const std::vector<bool>& is_kept) const;
+  absl::StatusOr<std::vector<Pose3d>> RoughPoses(const std::vector<bool>& is_kept);
   absl::StatusOr<Optimized> LastPoses(const std::vector<bool>& is_kept,
                                       const std::vector<Pose3d>& poses,
                                       bool has_covariance = false) const;
@@ -63,7 +59,7 @@ class RobustSolver {
                                                      const std::vector<bool>& is_candidate) const;
 
   const PoseGraph& graph_;
-  const RobustOptions& options_;
+  RobustOptions options_;
   const std::vector<bool> is_odometry_;
   // With the wanted confidence one right loop passes this,
   double gate_ = 0.0;
@@ -73,6 +69,12 @@ class RobustSolver {
   std::vector<bool> is_supported_;
   // Whatever graduation had to decide on.
   std::vector<bool> is_graduated_;
+  // The last answer of RoughPoses, and of WithPossible for poses of it: each is slow, and asked for
+  // again where nothing has changed.
+  std::vector<bool> rough_kept_;
+  std::vector<Pose3d> rough_poses_;
+  std::vector<bool> judged_believed_;
+  std::vector<bool> is_possible_;
 };
 
 std::vector<bool> OdometryOf(const PoseGraph& graph) {
@@ -91,6 +93,17 @@ RobustSolver::RobustSolver(const PoseGraph& graph, const RobustOptions& options)
   const auto loop_count = std::count(is_odometry_.begin(), is_odometry_.end(), false);
   const double each = (1.0 - options.confidence) / std::max(1.0, static_cast<double>(loop_count));
   keep_gate_ = ChiSquareGate(1.0 - each, graph.is_planar);
+  if (!options_.on_work || options_.optimize.on_iteration) return;
+  // Of all solutions together: nobody knows how many there will be.
+  const auto count = std::make_shared<int64_t>(0);
+  options_.optimize.on_iteration = [tell = options_.on_work, count](int, double) {
+    tell("solving the path, step", ++*count, 0);
+  };
+}
+
+Belief RobustSolver::BeliefAt(const std::vector<Pose3d>& poses,
+                              const std::vector<bool>& is_believed, double gate) const {
+  return Belief(graph_, poses, is_believed, gate, options_.evidence, options_.on_work);
 }
 
 double RobustSolver::ResidualOf(const RelativePose& edge, const std::vector<Pose3d>& poses) const {
@@ -118,14 +131,16 @@ std::vector<bool> RobustSolver::InGate(const std::vector<Pose3d>& poses,
   return is_kept;
 }
 
-absl::StatusOr<std::vector<Pose3d>> RobustSolver::RoughPoses(
-    const std::vector<bool>& is_kept) const {
+absl::StatusOr<std::vector<Pose3d>> RobustSolver::RoughPoses(const std::vector<bool>& is_kept) {
+  if (!rough_poses_.empty() && is_kept == rough_kept_) return rough_poses_;
   OptimizeOptions optimize = options_.optimize;
   optimize.weights = WeightsFor(is_kept);
   optimize.tolerance = std::max(optimize.tolerance, kRoughTolerance);
   optimize.has_covariance = false;
   DSG_ASSIGN_OR_RETURN(Optimized optimized, Optimize(graph_, optimize));
-  return std::move(optimized.poses);
+  rough_kept_ = is_kept;
+  rough_poses_ = std::move(optimized.poses);
+  return rough_poses_;
 }
 
 absl::StatusOr<Optimized> RobustSolver::LastPoses(const std::vector<bool>& is_kept,
@@ -157,19 +172,24 @@ absl::StatusOr<std::vector<Pose3d>> RobustSolver::GraduatedPoses(
 // How large the noise is comes from loops that are likely right; once it is known, agreement tells
 // more.
 absl::Status RobustSolver::FindSupported() {
-  const std::vector<bool> is_likely = LikelyEdges(graph_, gate_);
+  const std::vector<bool> is_likely =
+      LikelyEdges(graph_, gate_, options_.evidence, options_.on_work);
   DSG_ASSIGN_OR_RETURN(const std::vector<Pose3d> poses, RoughPoses(is_likely));
-  const double noise_scale = NoiseScaleOf(graph_, poses, is_likely);
-  is_supported_ = SupportedEdges(graph_, gate_, noise_scale, kWrongCountMax);
+  const double noise_scale = NoiseScaleOf(graph_, poses, is_likely, options_.evidence);
+  is_supported_ = SupportedEdges(graph_, gate_, noise_scale, options_.wrong_count_max,
+                                 options_.evidence, options_.on_work);
   return absl::OkStatus();
 }
 
 // Loops that fit where what is believed leaves wrong ones no room, and so on from there.
-absl::StatusOr<std::vector<bool>> RobustSolver::Grow(std::vector<bool> is_believed) const {
-  for (int round = 0; round < kBeliefRoundCountMax; ++round) {
+absl::StatusOr<std::vector<bool>> RobustSolver::Grow(std::vector<bool> is_believed) {
+  for (int round = 0; round < options_.belief_round_count_max; ++round) {
     DSG_ASSIGN_OR_RETURN(const std::vector<Pose3d> poses, RoughPoses(is_believed));
-    const Belief belief(graph_, poses, is_believed, keep_gate_);
-    std::vector<bool> is_convincing = belief.WithConvincing(is_supported_, kWrongCountMax);
+    const Belief belief = BeliefAt(poses, is_believed, keep_gate_);
+    std::vector<bool> is_convincing =
+        belief.WithConvincing(is_supported_, options_.wrong_count_max);
+    judged_believed_ = is_believed;
+    is_possible_ = belief.WithPossible();
     if (is_convincing == is_believed) break;
     is_believed = std::move(is_convincing);
   }
@@ -181,14 +201,17 @@ absl::StatusOr<std::vector<bool>> RobustSolver::Grow(std::vector<bool> is_believ
 absl::StatusOr<std::vector<bool>> RobustSolver::GraduateDoubtful(
     const std::vector<bool>& is_believed) {
   DSG_ASSIGN_OR_RETURN(std::vector<Pose3d> poses, RoughPoses(is_believed));
-  const std::vector<bool> is_candidate =
-      Belief(graph_, poses, is_believed, keep_gate_).WithPossible();
+  if (judged_believed_ != is_believed) {
+    judged_believed_ = is_believed;
+    is_possible_ = BeliefAt(poses, is_believed, keep_gate_).WithPossible();
+  }
+  const std::vector<bool> is_candidate = is_possible_;
   const auto believed_count = std::count(is_believed.begin(), is_believed.end(), true);
   const auto doubtful_count =
       std::count(is_candidate.begin(), is_candidate.end(), true) - believed_count;
   const auto odometry_count = std::count(is_odometry_.begin(), is_odometry_.end(), true);
   if (static_cast<double>(doubtful_count) <=
-      kDoubtfulShareMin * static_cast<double>(believed_count - odometry_count)) {
+      options_.doubtful_share_min * static_cast<double>(believed_count - odometry_count)) {
     return is_believed;
   }
   for (size_t e = 0; e < is_candidate.size(); ++e) {
@@ -213,18 +236,18 @@ absl::StatusOr<std::vector<bool>> RobustSolver::Confirmed(
   // To the last digits: what a loop hides by drawing the poses towards itself is a large multiple
   // of a small residual.
   DSG_ASSIGN_OR_RETURN(const Optimized settled, LastPoses(is_kept, poses));
-  Belief belief(graph_, settled.poses, is_kept, gate_);
+  Belief belief = BeliefAt(settled.poses, is_kept, gate_);
   std::vector<bool> is_confirmed = is_believed;
   for (size_t e = 0; e < graph_.edges.size(); ++e) {
     if (!is_kept[e] || is_believed[e]) continue;
-    const Belief::Verdict verdict = belief.VerdictOf(static_cast<int>(e), kWrongShareMax);
+    const Belief::Verdict verdict = belief.VerdictOf(static_cast<int>(e), options_.wrong_share_max);
     is_confirmed[e] = verdict == Belief::Verdict::kConfirmed;
     if (verdict != Belief::Verdict::kContradicted) continue;
     // Too large a multiple may be an error of the first order; poses without the loop have none.
     std::vector<bool> is_other = is_kept;
     is_other[e] = false;
     DSG_ASSIGN_OR_RETURN(const Optimized without, LastPoses(is_other, settled.poses));
-    is_confirmed[e] = Belief(graph_, without.poses, is_other, gate_).WithPossible()[e];
+    is_confirmed[e] = BeliefAt(without.poses, is_other, gate_).WithPossible()[e];
   }
   return is_confirmed;
 }
@@ -232,7 +255,7 @@ absl::StatusOr<std::vector<bool>> RobustSolver::Confirmed(
 absl::StatusOr<std::vector<bool>> RobustSolver::Believe() {
   DSG_RETURN_IF_ERROR(FindSupported());
   std::vector<bool> is_believed = is_supported_;
-  for (int round = 0; round < kGraduationRoundCountMax; ++round) {
+  for (int round = 0; round < options_.graduation_round_count_max; ++round) {
     DSG_ASSIGN_OR_RETURN(is_believed, Grow(std::move(is_believed)));
     if (!options_.is_graduated_used) break;
     DSG_ASSIGN_OR_RETURN(std::vector<bool> is_confirmed, GraduateDoubtful(is_believed));
@@ -252,15 +275,16 @@ absl::StatusOr<RobustResult> RobustSolver::Settle(std::vector<Pose3d> poses,
     poses = result.optimized.poses;
     std::vector<bool> is_agreeing = result.is_kept;
     // Loops on the edge of the gate may come and go for ever; at last they may only go.
-    if (options_.is_pairwise_used && round < kBeliefRoundCountMax) {
-      is_agreeing = Belief(graph_, poses, result.is_kept, keep_gate_)
-                        .WithConvincing(is_supported_, kWrongCountMax);
+    if (options_.is_pairwise_used && round < options_.belief_round_count_max) {
+      is_agreeing = BeliefAt(poses, result.is_kept, keep_gate_)
+                        .WithConvincing(is_supported_, options_.wrong_count_max);
     }
     is_agreeing = InGate(poses, std::move(is_agreeing));
     if (is_agreeing == result.is_kept) break;
     result.is_kept = std::move(is_agreeing);
   }
   if (options_.optimize.has_covariance) {
+    if (options_.on_work) options_.on_work("finding covariances of poses", 0, std::ssize(poses));
     DSG_ASSIGN_OR_RETURN(result.optimized, LastPoses(result.is_kept, poses, true));
   }
   return result;

@@ -3,28 +3,15 @@
 // Refuses to doubt odometry.
 #pragma once
 
-#include <functional>
-#include <string>
+#include <cstdint>
 #include <vector>
 
 #include "absl/status/statusor.h"
 #include "ingest/loop/optimize.h"
 #include "ingest/loop/pose_graph.h"
+#include "ingest/loop/robust_options.h"
 
 namespace dsg::ingest {
-
-struct RobustOptions {
-  /// Its weights are not used.
-  OptimizeOptions optimize;
-  /// Chance that right measurements pass each test. Loops that are believed are given up by a gate
-  /// that all of them pass with this chance.
-  double confidence = 0.99;
-  bool is_pairwise_used = true;
-  bool is_graduated_used = true;
-  /// mu grows by this factor a step. Source: Yang et al. 2020.
-  double graduation = 1.4;
-  int graduation_count_max = 100;
-};
 
 struct RobustResult {
   Optimized optimized;

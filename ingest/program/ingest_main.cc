@@ -235,6 +235,10 @@ absl::Status IngestOne(const IngestFlags& flags, const std::string& path, LogOpt
     DSG_ASSIGN_OR_RETURN(const std::unique_ptr<MapView> view, (*destination)->View());
     Progress progress(std::filesystem::path(path).filename().string(),
                       log->info().measurement_count, flags.is_quiet);
+    ingest_options.robot_graph.robust.on_work = [&progress](const char* what, int64_t done,
+                                                            int64_t total) {
+      progress.Update(what, done, total);
+    };
     summary = IngestLog(*log, options, ingest_options, *view, (*destination)->writer(),
                         [&progress](int64_t done) { progress.Update(done); });
     // Another robot has given an id away that we had chosen for a new agent. What is committed of

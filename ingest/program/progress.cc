@@ -24,7 +24,7 @@ Progress::Progress(std::string what, int64_t total, bool is_quiet)
       total_(total),
       is_quiet_(is_quiet),
       is_terminal_(isatty(STDERR_FILENO) == 1),
-      begin_(std::chrono::steady_clock::now()),
+      begin_(Clock::now()),
       drawn_(begin_) {}
 
 Progress::~Progress() {
@@ -34,14 +34,31 @@ Progress::~Progress() {
 void Progress::Update(int64_t done) {
   if (is_quiet_ || done < next_look_) return;
   next_look_ = done + kLookEvery;
-  const auto now = std::chrono::steady_clock::now();
-  if (now - drawn_ < (is_terminal_ ? kTerminalPeriod : kPlainPeriod)) return;
-  drawn_ = now;
-  Draw(done, std::chrono::duration<double>(now - begin_).count());
+  const auto now = Clock::now();
+  if (!IsDue(now)) return;
+  Draw(FormatProgress(what_, done, total_, std::chrono::duration<double>(now - begin_).count()));
 }
 
-void Progress::Draw(int64_t done, double elapsed_s) {
-  const std::string line = FormatProgress(what_, done, total_, elapsed_s);
+void Progress::Update(const std::string& step, int64_t done, int64_t total) {
+  if (is_quiet_) return;
+  const auto now = Clock::now();
+  if (step != step_ || done < step_done_) {
+    step_ = step;
+    step_begin_ = now;
+  }
+  step_done_ = done;
+  if (!IsDue(now)) return;
+  const double elapsed_s = std::chrono::duration<double>(now - step_begin_).count();
+  Draw(FormatProgress(step, done, total, elapsed_s));
+}
+
+bool Progress::IsDue(Clock::time_point now) {
+  if (now - drawn_ < (is_terminal_ ? kTerminalPeriod : kPlainPeriod)) return false;
+  drawn_ = now;
+  return true;
+}
+
+void Progress::Draw(const std::string& line) {
   std::fprintf(stderr, is_terminal_ ? "\r%s\033[K" : "%s\n", line.c_str());
   std::fflush(stderr);
   is_drawn_ = true;

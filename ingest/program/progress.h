@@ -23,9 +23,13 @@ class Progress {
 
   /// `done` of the total so far.
   void Update(int64_t done);
+  /// Of work that stops the one above, a bar of its own: `done` of `total` pieces; 0 = unknown.
+  void Update(const std::string& step, int64_t done, int64_t total);
 
  private:
-  void Draw(int64_t done, double elapsed_s);
+  using Clock = std::chrono::steady_clock;
+  bool IsDue(Clock::time_point now);
+  void Draw(const std::string& line);
 
   std::string what_;
   int64_t total_;
@@ -33,8 +37,11 @@ class Progress {
   bool is_terminal_;
   bool is_drawn_ = false;
   int64_t next_look_ = 0;
-  std::chrono::steady_clock::time_point begin_;
-  std::chrono::steady_clock::time_point drawn_;
+  Clock::time_point begin_;
+  Clock::time_point drawn_;
+  std::string step_;
+  int64_t step_done_ = 0;
+  Clock::time_point step_begin_;
 };
 
 /// "1m05s", "3.2s".

@@ -54,12 +54,16 @@ void PrintSummary(const std::string& path, const LogInfo& info, const IngestSumm
 }
 
 void PrintLoops(const std::string& path, const LoopCounts& loops) {
+  const std::string repeated =
+      loops.repeated_count == 0
+          ? ""
+          : absl::StrCat(", ", loops.repeated_count, " that say again what others say (left out)");
   std::printf(
-      "%s: %lld loop closures, %lld believed, %lld outside the trajectory; it moved by up to "
+      "%s: %lld loop closures, %lld believed, %lld outside the trajectory%s; it moved by up to "
       "%.2f m\n",
       path.c_str(), static_cast<long long>(loops.loop_count),
       static_cast<long long>(loops.kept_count), static_cast<long long>(loops.unusable_count),
-      loops.largest_m);
+      repeated.c_str(), loops.largest_m);
   constexpr size_t kNamedMax = 10;
   std::vector<std::string> named(loops.doubted);
   if (named.size() > kNamedMax) {
@@ -162,6 +166,7 @@ Json LoopsJson(const LoopCounts& loops) {
   return {{"loops", loops.loop_count},
           {"believed", loops.kept_count},
           {"outside_the_trajectory", loops.unusable_count},
+          {"repeated", loops.repeated_count},
           {"moved_m", loops.largest_m},
           {"not_believed", loops.doubted}};
 }

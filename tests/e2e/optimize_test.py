@@ -77,6 +77,22 @@ class Optimize(support.ProgramsTest):
         self.assertIn("EDGE_SE2 39 0 ", text)
         self.assertGreater(self.optimize("wrong.g2o")["cost"], 10 * figures["cost"])
 
+    def test_takes_the_numbers_of_robustness(self):
+        wrong = [edge(3, 20, 9, 9, 1), edge(8, 25, -7, 4, 2)]
+        right = [edge(30, 29, -1, 0, -2 * math.pi / 40), edge(39, 1, 2, 0.2, math.pi / 10)]
+        self.write("numbers.g2o", ring(40, *wrong, *right))
+        usual = self.optimize("numbers.g2o", "--robust")
+        del usual["seconds"]
+        same = self.optimize("numbers.g2o", "--robust", "--loop-pairs", "2000000")
+        del same["seconds"]
+        self.assertEqual(usual, same)
+        self.assertIn("--loop-wrong-count", self.ok("dsg-optimize", "--help-all"))
+        self.assertNotIn("--loop-wrong-count", self.ok("dsg-optimize", "--help"))
+        said = self.refused(2, "numbers.g2o", "--loop-wrong-count", "1")
+        self.assertIn("without --robust", said)
+        self.assertIn("1e-09 to 100", self.refused(2, "numbers.g2o", "--robust",
+                                                   "--loop-wrong-count", "101"))
+
     def test_counts_the_lines_it_skips(self):
         self.write("skips.g2o", ring(10, "EDGE_SE2 0 1 1 0 0 -1 0 0 1 0 1", "VERTEX_XY 3 1 2"))
         done = support.run("dsg-optimize", "--json", "skips.g2o", cwd=self.folder)

@@ -101,6 +101,19 @@ class People(support.ProgramsTest):
         self.assertGreater(len(believed), 1)
         self.ok("dsg", "verify", "--store", "closed", "--map", "home")
 
+    def test_a_loop_closure_that_is_said_fifty_times_counts_once(self):
+        with open(self.path("drift", "loops.jsonl"), encoding="utf-8") as file:
+            lines = file.readlines()
+        with open(self.path("often.jsonl"), "w", encoding="utf-8") as file:
+            file.writelines(line for line in lines for _ in range(50))
+        poses_only = [*self.drifted, "--no-layers", "--people", "off"]
+        self.map_log("once", *poses_only, "--loops", self.path("drift", "loops.jsonl"))
+        said = self.map_log("often", *poses_only, "--loops", self.path("often.jsonl"))
+        self.assertIn("200 loop closures, 3 believed, 0 outside the trajectory, 196 that say again",
+                      said)
+        tracks = [self.about("track", "body", store=store)["poses"] for store in ("once", "often")]
+        self.assertEqual(*tracks)
+
     def test_a_broken_loop_closure_is_named(self):
         with open(self.path("broken.jsonl"), "w", encoding="utf-8") as file:
             file.write('{"from_ns": 1, "to_ns": 2, "translation": [0, 0], "rotation": [0,0,0,1]}\n')

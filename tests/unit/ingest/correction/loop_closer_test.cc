@@ -140,6 +140,16 @@ TEST_F(LoopCloserTest, ManyLoopsWaitForTheEnd) {
   EXPECT_FALSE(patient.Correct(now_ns, true).value_or(TrajectoryChange()).IsIdentity());
 }
 
+TEST_F(LoopCloserTest, CountsWhatIsSaidAgain) {
+  Drive(kRound + 5);
+  for (int i = 0; i < 50; ++i) closer_.Take(LoopBack(kRound));
+  Correct(/*is_last=*/true);
+  EXPECT_EQ(closer_.counts().loop_count, 50);
+  EXPECT_EQ(closer_.counts().kept_count, 1);
+  EXPECT_EQ(closer_.counts().repeated_count, 49);
+  EXPECT_TRUE(closer_.counts().doubted.empty());
+}
+
 TEST_F(LoopCloserTest, PosesCarryTheCovariancesOfTheCorrectedPath) {
   Drive(kRound + 5);
   closer_.Take(LoopBack(kRound));

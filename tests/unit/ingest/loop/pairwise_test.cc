@@ -5,17 +5,21 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "ingest/loop/believed_paths.h"
 #include "ingest/loop/chi_square.h"
+#include "ingest/loop/loop_support.h"
 #include "ingest/loop/odometry_tree.h"
 #include "ingest/loop/relative_covariance.h"
 #include "ingest/loop/twist.h"
 #include "schema/base/random.h"
+#include "schema/matching/max_clique.h"
 #include "tests/unit/ingest/loop/random_graph.h"
 
 namespace dsg::ingest {
@@ -178,7 +182,7 @@ TEST(CompareLoops, FindsTheLiarAmongLoopsInEitherDirection) {
     ASSERT_EQ(agreement.edges.size(), 5u);
     for (int a = 0; a < 5; ++a) {
       for (int b = 0; b < a; ++b) {
-        EXPECT_EQ(agreement.agrees.HasEdge(a, b), a != 4) << a << " " << b << " " << is_torn;
+        EXPECT_EQ(agreement.Agree(a, b), a != 4) << a << " " << b << " " << is_torn;
       }
       EXPECT_EQ(agreement.agrees_with_odometry[static_cast<size_t>(a)], a != 4 || is_torn);
     }
@@ -213,7 +217,7 @@ TEST(CompareLoops, PassesRightLoopsOfNoisyOdometryAsOftenAsItShould) {
     options.gate = ChiSquareGate(0.9, false);
     const LoopAgreement agreement = CompareLoops(graph, OdometryTree(graph), options);
     ++pair_count;
-    agreed_count += agreement.agrees.HasEdge(0, 1) ? 1 : 0;
+    agreed_count += agreement.Agree(0, 1) ? 1 : 0;
   }
   // Three standard deviations of the count.
   EXPECT_NEAR(agreed_count, 0.9 * pair_count, 3.0 * std::sqrt(0.09 * pair_count));
@@ -226,10 +230,136 @@ TEST(CompareLoops, ComparesTheNearestPairsWhenThereAreTooMany) {
         CoarseEdge(i, 59 - i, Planar(i % 2 == 0 ? 0.0 : 3.0, 0.0, std::numbers::pi), true));
   }
   PairwiseOptions options;
-  options.pair_count_max = 60;
+  options.evidence.pair_count_max = 60;
   const LoopAgreement agreement = CompareLoops(graph, OdometryTree(graph), options);
-  for (int i = 0; i + 1 < 28; ++i) EXPECT_FALSE(agreement.agrees.HasEdge(i, i + 1)) << i;
-  EXPECT_TRUE(agreement.agrees.HasEdge(0, 27));
+  for (int i = 0; i + 1 < 28; ++i) EXPECT_FALSE(agreement.Agree(i, i + 1)) << i;
+  EXPECT_TRUE(agreement.Agree(0, 27));
+  EXPECT_LE(agreement.compared_count, 60);
+}
+
+// Odometry of a tree, in parts, with branches; loops anywhere.
+PoseGraph RandomTrees(int pose_count, int loop_count, Random* random) {
+  PoseGraph graph;
+  for (int i = 0; i < pose_count; ++i) {
+    graph.ids.push_back(i);
+    graph.poses.push_back(RandomPose(random, 1.0));
+    if (i == 0 || random->Chance(0.03)) continue;
+    const int parent = random->Chance(0.9) ? i - 1 : random->Index(i);
+    graph.edges.push_back(CoarseEdge(parent, i, RandomPose(random, 0.3), false));
+    graph.edges.back().information *= random->Uniform(0.1, 10.0);
+  }
+  while (loop_count > 0) {
+    const int from = random->Index(pose_count);
+    const int to = random->Index(pose_count);
+    if (from == to) continue;
+    graph.edges.push_back(CoarseEdge(from, to, RandomPose(random, 3.0), true));
+    --loop_count;
+  }
+  return graph;
+}
+
+// As CompareLoops turns loops, and what it calls the variance of their cycle; negative without one.
+double CycleVarianceOf(const OdometryTree& tree, RelativePose a, RelativePose b) {
+  for (RelativePose* loop : {&a, &b}) {
+    const std::pair from(tree.part(loop->from), loop->from);
+    const std::pair to(tree.part(loop->to), loop->to);
+    if (to < from) std::swap(loop->from, loop->to);
+  }
+  if (tree.part(a.from) != tree.part(b.from) || tree.part(a.to) != tree.part(b.to)) return -1.0;
+  return tree.RotationVarianceBetween(a.from, b.from) + tree.RotationVarianceBetween(a.to, b.to);
+}
+
+// Looking at all pairs finds no others than the search among sorted ones.
+TEST(CompareLoops, FindsTheNearestPairsOfAnyOdometry) {
+  Random random(7, 0);
+  for (int round = 0; round < 20; ++round) {
+    const PoseGraph graph = RandomTrees(60, 80, &random);
+    const OdometryTree tree(graph);
+    PairwiseOptions options;
+    // Every cycle may make a disagreement, and random loops hardly ever agree.
+    options.evidence.turn_rad_max = 3.0;
+    const LoopAgreement all = CompareLoops(graph, tree, options);
+    options.evidence.pair_count_max = 40 + 30 * round;
+    const LoopAgreement some = CompareLoops(graph, tree, options);
+    EXPECT_LE(some.compared_count, options.evidence.pair_count_max);
+    std::vector<double> variances;
+    for (size_t a = 0; a < all.edges.size(); ++a) {
+      for (size_t b = 0; b < a; ++b) {
+        const double variance = CycleVarianceOf(tree, graph.edges[Index(all.edges[a])],
+                                                graph.edges[Index(all.edges[b])]);
+        if (variance >= 0.0) variances.push_back(variance);
+      }
+    }
+    std::sort(variances.begin(), variances.end());
+    ASSERT_LE(some.compared_count, std::ssize(variances));
+    const double last =
+        some.compared_count == 0 ? -1.0 : variances[static_cast<size_t>(some.compared_count - 1)];
+    std::vector<std::pair<int, int>> wanted;
+    for (const auto& [a, b] : all.disagreements) {
+      const double variance = CycleVarianceOf(tree, graph.edges[Index(all.edges[Index(a)])],
+                                              graph.edges[Index(all.edges[Index(b)])]);
+      if (variance <= last) wanted.emplace_back(a, b);
+    }
+    EXPECT_EQ(some.disagreements, wanted) << round;
+    EXPECT_GT(some.disagreements.size(), 10u) << round;
+  }
+}
+
+TEST(CompareLoops, ComparesNoMoreThanIsAllowedWhereOdometryTellsNothing) {
+  PoseGraph graph = OutAndBack(10);
+  for (int i = 0; i < 40; ++i) {
+    graph.edges.push_back(CoarseEdge(3, 16, Planar(0.1 * i, 0.0, std::numbers::pi), true));
+  }
+  PairwiseOptions options;
+  options.evidence.pair_count_max = 100;
+  EXPECT_EQ(CompareLoops(graph, OdometryTree(graph), options).compared_count, 100);
+}
+
+TEST(CompareLoops, TellsHowFarItIs) {
+  Random random(8, 0);
+  const PoseGraph graph = RandomTrees(60, 100, &random);
+  PairwiseOptions options;
+  std::vector<int64_t> told;
+  options.on_work = [&told](const char* what, int64_t done, int64_t total) {
+    EXPECT_STREQ(what, "comparing pairs of loop closures");
+    EXPECT_LE(done, total);
+    told.push_back(done);
+  };
+  const LoopAgreement agreement = CompareLoops(graph, OdometryTree(graph), options);
+  EXPECT_EQ(std::ssize(told), (agreement.compared_count + 1023) / 1024);
+  EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
+}
+
+// Groups that disagree among themselves only are searched one by one.
+TEST(ConsistentEdges, AreAsManyAsInASearchOfAllTogether) {
+  Random random(9, 0);
+  const double gate = ChiSquareGate(0.99, false);
+  int largest = 0;
+  for (int round = 0; round < 20; ++round) {
+    PoseGraph graph = OutAndBack(30);
+    for (int i = 0; i < 28; ++i) {
+      // A third lies, each by one of two lies.
+      const double lie = random.Chance(0.33) ? random.Chance(0.5) ? 1.0 : 2.0 : 0.0;
+      graph.edges.push_back(CoarseEdge(i, 59 - i, Planar(lie, 0.0, std::numbers::pi), true));
+    }
+    PairwiseOptions options;
+    options.gate = gate;
+    const LoopAgreement agreement = CompareLoops(graph, OdometryTree(graph), options);
+    BitsetGraph agrees(28);
+    std::vector<int> fits;
+    for (int a = 0; a < 28; ++a) {
+      if (!agreement.agrees_with_odometry[Index(a)]) continue;
+      for (const int b : fits) {
+        if (agreement.Agree(a, b)) agrees.AddEdge(a, b);
+      }
+      fits.push_back(a);
+    }
+    const std::vector<bool> is_kept = ConsistentEdges(graph, gate);
+    const auto kept_count = std::count(is_kept.begin() + 59, is_kept.end(), true);
+    EXPECT_EQ(kept_count, std::ssize(FindMaxClique(agrees, {}).vertices)) << round;
+    largest = std::max(largest, static_cast<int>(kept_count));
+  }
+  EXPECT_LT(largest, 28);
 }
 
 }  // namespace

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <set>
+#include <string>
 
 #include "schema/base/random.h"
 
@@ -184,6 +186,56 @@ TEST_F(RobotGraphTest, CountsLoopsThatNobodyCanUse) {
   EXPECT_EQ(solution->loop_count, solution->kept_count + 3);
 }
 
+// Fifty copies of a lie would bear each other out, and fifty of the truth would outweigh odometry.
+TEST_F(RobotGraphTest, WhatIsSaidFiftyTimesCountsOnce) {
+  LoopClosure wrong = MakeLoop(way_, 20, 110);
+  wrong.from_T_to = RobotPose(0.3, 0.2, 0.5);
+  const auto solve = [&](int copy_count) {
+    graph_.emplace(RobotGraphOptions(), path_);
+    AddRightLoops();
+    for (int i = 0; i < copy_count; ++i) {
+      graph_->AddLoop(wrong);
+      graph_->AddLoop(MakeLoop(way_, 10, 10 + kRound));
+    }
+    return graph_->Solve();
+  };
+  const auto once = solve(1);
+  const auto often = solve(50);
+  ASSERT_TRUE(once.ok() && often.ok());
+  const size_t right_count = (way_.size() - 11 - kRound) / 49 + 1;
+  EXPECT_EQ(once->repeated_count, 1);
+  EXPECT_EQ(often->loop_count, static_cast<int64_t>(right_count) + 100);
+  EXPECT_EQ(often->repeated_count, 99);
+  EXPECT_EQ(often->unusable_count, 0);
+  EXPECT_EQ(often->kept_count, static_cast<int64_t>(right_count));
+  for (size_t i = 0; i < often->is_kept.size(); ++i) {
+    EXPECT_EQ(often->is_kept[i], i < right_count) << i;
+    EXPECT_EQ(often->is_repeated[i], i > right_count) << i;
+  }
+  EXPECT_EQ(RmsM(Corrected(often->change), Corrected(once->change)), 0.0);
+  EXPECT_EQ(graph_->Factors(*often).size(), often->keyframe_times.size() - 1 + right_count + 1);
+}
+
+TEST_F(RobotGraphTest, TellsWhatTakesLong) {
+  RobotGraphOptions options;
+  std::set<std::string> told;
+  options.robust.on_work = [&told](const char* what, int64_t done, int64_t total) {
+    EXPECT_TRUE(total == 0 || done <= total) << what;
+    told.insert(what);
+  };
+  graph_.emplace(options, path_);
+  AddRightLoops();
+  LoopClosure wrong = MakeLoop(way_, 20, 110);
+  wrong.from_T_to = RobotPose(0.3, 0.2, 0.5);
+  graph_->AddLoop(wrong);
+  ASSERT_TRUE(graph_->Solve().ok());
+  for (const char* what : {"comparing pairs of loop closures", "choosing loop closures that agree",
+                           "judging doubtful loop closures", "solving the path, step",
+                           "finding covariances of poses"}) {
+    EXPECT_TRUE(told.contains(what)) << what;
+  }
+}
+
 TEST_F(RobotGraphTest, LoopsMayComeBeforeTheirPosesAndBetweenThem) {
   RobotPath path;
   RobotGraph graph(RobotGraphOptions(), path);
@@ -257,7 +309,7 @@ TEST_F(RobotGraphTest, MorePosesThanHaveCovariancesAreSolved) {
   const auto with = graph_->Solve();
   ASSERT_TRUE(with.ok()) << with.status();
   RobotGraphOptions options;
-  options.covariance_count_max = with->keyframe_times.size() - 1;
+  options.covariance_count_max = static_cast<int>(with->keyframe_times.size()) - 1;
   graph_.emplace(options, path_);
   AddRightLoops();
   const auto without = graph_->Solve();

@@ -7,9 +7,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
+#include <set>
+#include <string>
+#include <utility>
 #include <vector>
 
+#include "ingest/loop/belief.h"
 #include "ingest/loop/graduated.h"
 #include "schema/base/random.h"
 #include "schema/base/status.h"
@@ -201,6 +206,80 @@ TEST(OptimizeRobustly, RefusesWhatOptimizeRefuses) {
   graph.edges.back().to = 42;
   graph.edges.back().from_T_to.position.x() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(ReasonOf(OptimizeRobustly(graph, {}).status()), Reason::kFieldInvalid);
+}
+
+// What a solution does on its way, and what it ends with.
+struct Course {
+  std::map<std::string, int64_t> work;
+  std::vector<bool> is_kept;
+  double cost = 0.0;
+
+  bool operator==(const Course&) const = default;
+};
+
+Course CourseOf(const PoseGraph& graph, RobustOptions options) {
+  Course course;
+  options.on_work = [&course](const char* what, int64_t done, int64_t total) {
+    ++course.work[what];
+    course.work[std::string(what) + " of"] += total * (done + 1);
+  };
+  const absl::StatusOr<RobustResult> result = OptimizeRobustly(graph, options);
+  EXPECT_TRUE(result.ok()) << result.status();
+  if (!result.ok()) return course;
+  course.is_kept = result->is_kept;
+  course.cost = result->optimized.cost;
+  return course;
+}
+
+// Far from its default each number makes the solution of one of these graphs take another course;
+// but for three, which decide on loops that are nearly as likely right as wrong.
+TEST(OptimizeRobustly, ReadsEachOfItsNumbers) {
+  std::vector<PoseGraph> graphs;
+  for (uint64_t seed = 1; seed <= 6; ++seed) {
+    Random random(seed, 0);
+    const std::vector<Pose3d> poses = Rounds();
+    std::vector<std::pair<int, int>> loops;
+    for (int i = 0; i < 80; i += 4) loops.push_back({i, i + 40});
+    PoseGraph graph = Measured(poses, loops, seed % 2 == 0, &random);
+    // Noise is not always what information says.
+    for (RelativePose& edge : graph.edges)
+      edge.information *= std::vector{0.02, 1.0, 5.0}[seed % 3];
+    graphs.push_back(
+        WithWrongLoops(graph, poses, 50.0, {0.7, 1 + static_cast<int>(seed % 2), seed}));
+  }
+  std::vector<Course> usual;
+  for (const PoseGraph& graph : graphs) usual.push_back(CourseOf(graph, {}));
+  EXPECT_EQ(CourseOf(graphs[0], {}), usual[0]);
+  RobustOptions options;
+  const std::set<std::string> others = {"loop-doubtful-share", "loop-noise-freedom", "loop-alike"};
+  for (const BoundOption& field : options.Bind()) {
+    if (others.contains(field.name)) continue;
+    const double before = field.Get();
+    bool is_read = false;
+    for (const double number : {field.min, field.max}) {
+      field.Set(number);
+      for (size_t i = 0; i < graphs.size() && !is_read; ++i) {
+        is_read = !(CourseOf(graphs[i], options) == usual[i]);
+      }
+    }
+    field.Set(before);
+    EXPECT_TRUE(is_read) << field.name;
+  }
+}
+
+TEST(NoiseScale, IsLearnedFromEnoughLoopsOnly) {
+  Random random(3, 0);
+  const std::vector<Pose3d> poses = Rounds();
+  PoseGraph graph = Measured(poses, {{2, 42}, {8, 48}, {14, 54}}, false, &random);
+  for (RelativePose& edge : graph.edges) edge.information *= 1e-4;
+  const std::vector<bool> all(graph.edges.size(), true);
+  EvidenceOptions evidence;
+  EXPECT_EQ(NoiseScaleOf(graph, poses, all, evidence), 1.0);
+  evidence.noise_freedom_min = 18;
+  const double scale = NoiseScaleOf(graph, poses, all, evidence);
+  EXPECT_LT(scale, 0.1);
+  evidence.noise_margin *= 0.5;
+  EXPECT_NEAR(NoiseScaleOf(graph, poses, all, evidence), 0.5 * scale, 1e-9 * scale);
 }
 
 TEST(Graduate, EndsWithWeightsOfZeroAndOne) {
