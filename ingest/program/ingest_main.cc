@@ -184,6 +184,30 @@ size_t TellNotes(const IngestFlags& flags, const std::string& path, const LogInf
   return info.notes.size();
 }
 
+// Opens a log, and shows how far that is where it takes a pass over a bag. What a followed log
+// waits for is told meanwhile and later.
+absl::StatusOr<std::unique_ptr<LogSource>> OpenShown(const IngestFlags& flags,
+                                                     const std::string& path, LogOptions options) {
+  const std::string what =
+      absl::StrCat("looking through ", std::filesystem::path(path).filename().string());
+  Progress progress(what, 0, flags.is_quiet);
+  options.on_pass = [&](int64_t done, int64_t total) { progress.Update(what, done, total); };
+  if (options.follow.has_value() && !flags.is_quiet) {
+    options.follow->tell = [path](const std::string& sentence) {
+      SayAboveProgress(absl::StrCat(path, ": ", sentence));
+    };
+  }
+  return OpenLog(path, options);
+}
+
+void TellPause(const IngestFlags& flags, const std::string& path) {
+  if (flags.is_quiet) return;
+  std::fprintf(stderr,
+               "%s: note: stopped before the end of the log: the map keeps what is committed; run "
+               "the same again to go on, with --follow-timeout 0 to end it\n",
+               path.c_str());
+}
+
 // Beside the map, where there is room if there is any; TMPDIR may be memory.
 std::string SpillFolderOf(const IngestFlags& flags) {
   std::error_code error;
@@ -197,7 +221,7 @@ absl::Status IngestOne(const IngestFlags& flags, const std::string& path, LogOpt
                        const std::optional<Segmentation>& segmentation,
                        std::unique_ptr<Destination>* destination) {
   const auto begin = std::chrono::steady_clock::now();
-  DSG_ASSIGN_OR_RETURN(std::unique_ptr<LogSource> log, OpenLog(path, options));
+  DSG_ASSIGN_OR_RETURN(std::unique_ptr<LogSource> log, OpenShown(flags, path, options));
   // A log without a sound beginning must not leave a map, nor give it its epoch.
   DSG_ASSIGN_OR_RETURN(log, PeekLog(std::move(log)));
   if (*destination == nullptr) {
@@ -214,13 +238,13 @@ absl::Status IngestOne(const IngestFlags& flags, const std::string& path, LogOpt
   // read twice.
   const bool is_shifted = !log->info().has_clock && options.epoch_ns != opened_with.epoch_ns;
   if (is_shifted || options.mesh_block_size_m != opened_with.mesh_block_size_m) {
-    DSG_ASSIGN_OR_RETURN(log, OpenLog(path, options));
+    DSG_ASSIGN_OR_RETURN(log, OpenShown(flags, path, options));
   }
   size_t told_count = TellNotes(flags, path, log->info(), 0);
   absl::StatusOr<IngestSummary> summary = absl::UnknownError("not run");
   for (int tries = 0; tries < kConflictsMax; ++tries) {
     if (tries > 0) {
-      DSG_ASSIGN_OR_RETURN(log, OpenLog(path, options));
+      DSG_ASSIGN_OR_RETURN(log, OpenShown(flags, path, options));
     }
     std::string note;
     DSG_ASSIGN_OR_RETURN(
@@ -249,12 +273,7 @@ absl::Status IngestOne(const IngestFlags& flags, const std::string& path, LogOpt
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
   // What only the end of a followed log told.
   TellNotes(flags, path, log->info(), told_count);
-  if (summary->is_paused && !flags.is_quiet) {
-    std::fprintf(stderr,
-                 "%s: note: stopped before the end of the log: the map keeps what is committed; "
-                 "run the same again to go on, with --follow-timeout 0 to end it\n",
-                 path.c_str());
-  }
+  if (summary->is_paused) TellPause(flags, path);
   if (!summary->is_paused) DSG_RETURN_IF_ERROR(CheckYield(log->info(), *summary));
   Tell(flags, {path, log->info(), *summary, elapsed.count(), flags.is_dry_run});
   if (!flags.is_quiet && summary->mapping.has_value()) {

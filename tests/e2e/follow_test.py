@@ -6,6 +6,7 @@ import contextlib
 import json
 import os
 import signal
+import struct
 import subprocess
 import time
 import unittest
@@ -23,10 +24,54 @@ def rows(first, last):
                    for i in range(first, last) for name, y in (("bob", 1), ("alice", 2)))
 
 
+def text(string):
+    encoded = string.encode()
+    return struct.pack("<I", len(encoded)) + encoded
+
+
+def record(kind, content):
+    return struct.pack("<BQ", kind, len(content)) + content
+
+
+def recording_head():
+    """An MCAP file without chunks, up to its first message: /tf of ROS 2."""
+    return (b"\x89MCAP0\r\n" + record(1, text("ros2") + text("test")) +
+            record(3, struct.pack("<H", 1) + text("tf2_msgs/msg/TFMessage") + text("ros2msg") +
+                   text("")) +
+            record(4, struct.pack("<HH", 1, 1) + text("/tf") + text("cdr") + text("")))
+
+
+def transform(parent, child, second, x):
+    """One message: `child` is `x` metres ahead in `parent`."""
+    body = struct.pack("<III", 1, EPOCH_S + second, support.NS_PER_S // 2)
+    for frame in (parent, child):
+        body += b"\0" * (-len(body) % 4) + text(frame + "\0")
+    body += b"\0" * (-len(body) % 8) + struct.pack("<7d", x, 0, 0, 0, 0, 0, 1)
+    log_ns = (EPOCH_S + second) * support.NS_PER_S + support.NS_PER_S // 2
+    head = struct.pack("<HIQQ", 1, second, log_ns, log_ns)
+    return record(5, head + b"\x00\x01\x00\x00" + body)
+
+
+def drive(first, last):
+    """The robot drives in the odometry, which is a tenth of a metre off in the map."""
+    return b"".join(transform("map", "odom", s, 0.1) + transform("odom", "base_link", s, s * 0.25)
+                    for s in range(first, last))
+
+
 class Follow(support.ProgramsTest):
     def append(self, name, text):
         with open(self.path(name), "a", encoding="utf-8") as f:
             f.write(text)
+
+    def append_bytes(self, name, data):
+        with open(self.path(name), "ab") as f:
+            f.write(data)
+
+    def poses_so_far(self, store, agent):
+        """Empty while there is no map, or no such agent."""
+        done = support.run("dsg", "track", agent, "--store", store, "--map", "m", "--json",
+                           cwd=self.folder)
+        return json.loads(done.stdout)["poses"] if done.returncode == 0 else []
 
     def follow(self, store, log, *more):
         return support.start("dsg-ingest", "--store", store, "--map", "m", "--quiet", "--follow",
@@ -142,6 +187,34 @@ class Follow(support.ProgramsTest):
             said = log.read()
         self.assertIn("has shrunk from", said)
         self.assertEqual(8, len(self.poses("shrunk", "alice")))
+
+    def test_transforms_of_a_recording_are_seen_while_it_is_written(self):
+        def robot_at(second, x):
+            poses = [p for p in self.poses_so_far("bag", "body")
+                     if int(p["time_ns"]) // support.NS_PER_S == EPOCH_S + second]
+            return bool(poses) and abs(poses[0]["pose"]["position"]["x"] - x) < 1e-3
+
+        self.append_bytes("drive.mcap", recording_head() + drive(0, 6))
+        with open(self.path("log"), "w+", encoding="utf-8") as log:
+            process = support.start("dsg-ingest", "--store", "bag", "--map", "m", "--follow",
+                                    "--follow-timeout", "6", "drive.mcap", cwd=self.folder, log=log)
+            try:
+                support.wait_until(lambda: robot_at(5, 1.35), "the poses so far")
+                self.append_bytes("drive.mcap", drive(6, 8))
+                support.wait_until(lambda: robot_at(7, 1.85), "poses that were appended")
+                # Space that is set aside, and of which nothing comes.
+                self.append_bytes("drive.mcap", b"\0" * 5000)
+                self.assertEqual(0, process.wait(timeout=support.TIMEOUT_S))
+            finally:
+                process.kill()
+                process.wait()
+            log.seek(0)
+            said = log.read()
+        size = os.path.getsize(self.path("drive.mcap"))
+        rest = f"the 5000 bytes from byte {size - 5000} on are no whole record (zeros"
+        self.assertEqual(2, said.count(rest), said)
+        self.assertIn("waiting for what is to stand there", said)
+        self.assertEqual(8, len(self.poses("bag", "body")))
 
     def test_what_cannot_be_followed_is_said(self):
         self.append("one.csv", HEADER + rows(0, 1))
