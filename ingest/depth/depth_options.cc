@@ -39,6 +39,44 @@ constexpr OptionField<StereoOptions> kStereoFields[] = {
     {"depth-stereo-texture", &StereoOptions::texture_min, 0.0, 255.0,
      "Least gradient of what is matched, grey levels a pixel: a blank wall shows 0.5 by the noise "
      "of the sensor alone"},
+    {"depth-stereo-texture-reach", &StereoOptions::texture_reach_px, 0, 50,
+     "... over pixels this far beside it, pixels: as far as matches are refined"},
+    {"depth-stereo-border", &StereoOptions::border_px, 0, 100,
+     "What is this near to the border of a picture is left out, pixels: windows across it match "
+     "its straight line"},
+    {"depth-stereo-block", &StereoOptions::block_reach_px, 0, 5,
+     "Blocks that are matched reach this far beside their pixel, pixels: small ones keep edges, "
+     "large ones bear noise"},
+    {"depth-stereo-step", &StereoOptions::step_penalty, 1, 32,
+     "What a disparity costs that differs from the next pixel's by one, grey levels a pixel of the "
+     "block: slanted surfaces"},
+    {"depth-stereo-jump", &StereoOptions::jump_penalty, 2, 128,
+     "... and by more: edges of things, four times as rare"},
+    {"depth-stereo-agree", &StereoOptions::agree_px, 1, 64,
+     "Matches from left to right and back agree within this, pixels: what one camera alone sees "
+     "has no depth"},
+    {"depth-stereo-gradient", &StereoOptions::gradient_max, 15, 63,
+     "Gradients are cut at this before they are matched, grey levels: strong edges would outvote "
+     "their surroundings"},
+    {"depth-stereo-unique", &StereoOptions::unique_percent, 0, 90,
+     "The second best match costs so much more at least, per cent: repeated patterns have no "
+     "depth"},
+    {"depth-stereo-speckle", &StereoOptions::speckle_px, 0, 100'000,
+     "Spots of fewer pixels are dropped: matches by accident"},
+    {"depth-stereo-speckle-step", &StereoOptions::speckle_step_px, 1, 64,
+     "... in which disparities differ by this at most from pixel to pixel, pixels"},
+};
+
+constexpr OptionField<RefineOptions> kRefineFields[] = {
+    {"depth-refine-reach", &RefineOptions::reach_px, 1, 50,
+     "Fractions of a disparity are fitted to matches this far beside the pixel, pixels: noise "
+     "against edges"},
+    {"depth-refine-slope", &RefineOptions::slope_min, 1e-3, 1e4,
+     "... if their squared gradient is this at least, grey levels a pixel: less tells nothing"},
+    {"depth-refine-step", &RefineOptions::step_px_max, 0.0, 10.0,
+     "... and if they are less than this, pixels: a longer step leaves what was matched"},
+    {"depth-refine-rounds", &RefineOptions::round_count, 0, 20,
+     "How often they are fitted: what is left then is less than a hundredth of a pixel"},
 };
 
 }  // namespace
@@ -47,6 +85,7 @@ std::vector<BoundOption> DepthOptions::Bind() {
   std::vector<BoundOption> bound;
   BindFields<DepthOptions>(kDepthFields, this, &bound);
   BindFields<StereoOptions>(kStereoFields, &stereo, &bound);
+  BindFields<RefineOptions>(kRefineFields, &stereo.refine, &bound);
   return bound;
 }
 

@@ -11,11 +11,44 @@
 
 namespace dsg::ingest {
 
+/// Of RefineDisparity.
+struct RefineOptions {
+  /// Matches that a step is fitted to: this far beside the pixel, pixels.
+  int reach_px = 4;
+  /// Squared gradient, grey levels a pixel; less tells nothing.
+  double slope_min = 1.0;
+  /// A longer step leaves what was matched, pixels.
+  double step_px_max = 0.75;
+  /// How often; what is left is less than a hundredth of a pixel.
+  int round_count = 2;
+};
+
 struct StereoOptions {
   /// Nothing nearer is looked for: each 16 columns of disparity cost as much again.
   double nearest_m = 0.4;
-  /// Mean absolute gradient along the rows, grey levels a pixel, of what can be matched.
+  /// Mean absolute gradient along the rows, grey levels a pixel, of what can be matched: over
+  /// pixels this far beside it.
   double texture_min = 0.8;
+  int texture_reach_px = 4;
+  /// What is this near to the border of a picture is left out: windows across it would match its
+  /// straight line.
+  int border_px = 4;
+  /// Blocks that are matched reach this far beside their pixel.
+  int block_reach_px = 2;
+  /// Of a disparity that differs from the next pixel's by one, and by more; grey levels for each
+  /// pixel of the block.
+  int step_penalty = 8;
+  int jump_penalty = 32;
+  /// Left and right match each other within this many pixels.
+  int agree_px = 1;
+  /// Gradients are cut at this, grey levels.
+  int gradient_max = 31;
+  /// The second best match costs so much more at least, per cent.
+  int unique_percent = 10;
+  /// Spots of fewer pixels, within which disparities differ by so many, are dropped.
+  int speckle_px = 100;
+  int speckle_step_px = 2;
+  RefineOptions refine;
 };
 
 struct DepthOptions {

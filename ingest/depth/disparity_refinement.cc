@@ -7,15 +7,9 @@
 namespace dsg::ingest {
 namespace {
 
-constexpr int kWindow = 9;
-// Of the squared gradient; less tells nothing.
-constexpr float kSlopeMin = 1.0f;
-// A longer step leaves what was matched.
-constexpr float kStepMax = 0.75f;
-
-cv::Mat1f WindowMean(const cv::Mat1f& image) {
+cv::Mat1f WindowMean(const cv::Mat1f& image, int reach_px) {
   cv::Mat1f mean;
-  cv::boxFilter(image, mean, -1, {kWindow, kWindow});
+  cv::boxFilter(image, mean, -1, {2 * reach_px + 1, 2 * reach_px + 1});
   return mean;
 }
 
@@ -50,15 +44,18 @@ Warped Warp(const cv::Mat1f& right, const cv::Mat1f& disparity) {
 
 }  // namespace
 
-void RefineDisparity(const cv::Mat1f& left, const cv::Mat1f& right, cv::Mat1f* disparity) {
+void RefineDisparity(const cv::Mat1f& left, const cv::Mat1f& right, const RefineOptions& options,
+                     cv::Mat1f* disparity) {
+  const auto slope_min = static_cast<float>(options.slope_min);
+  const auto step_max = static_cast<float>(options.step_px_max);
   Warped warped = Warp(right, *disparity);
   cv::Mat1f matched;
   cv::threshold(*disparity, matched, 0.0, 1.0, cv::THRESH_BINARY);
-  const cv::Mat1f count = WindowMean(matched);
+  const cv::Mat1f count = WindowMean(matched, options.reach_px);
   cv::Mat1f difference;
   cv::subtract(left, warped.gray, difference);
   cv::multiply(difference, matched, difference);
-  const cv::Mat1f mean = WindowMean(difference);
+  const cv::Mat1f mean = WindowMean(difference, options.reach_px);
   for (int v = 0; v < count.rows; ++v) {
     for (int u = 0; u < count.cols; ++u) {
       // The two cameras' exposures may differ.
@@ -68,13 +65,13 @@ void RefineDisparity(const cv::Mat1f& left, const cv::Mat1f& right, cv::Mat1f* d
       slope *= slope * matched(v, u);
     }
   }
-  const cv::Mat1f top = WindowMean(difference);
-  const cv::Mat1f bottom = WindowMean(warped.slope);
+  const cv::Mat1f top = WindowMean(difference, options.reach_px);
+  const cv::Mat1f bottom = WindowMean(warped.slope, options.reach_px);
   for (int v = 0; v < count.rows; ++v) {
     for (int u = 0; u < count.cols; ++u) {
-      if (matched(v, u) == 0.0f || bottom(v, u) < kSlopeMin) continue;
+      if (matched(v, u) == 0.0f || bottom(v, u) < slope_min) continue;
       const float step = -top(v, u) / bottom(v, u);
-      if (std::abs(step) < kStepMax) (*disparity)(v, u) += step;
+      if (std::abs(step) < step_max) (*disparity)(v, u) += step;
     }
   }
 }

@@ -24,18 +24,15 @@ struct StereoLookup {
 
 namespace {
 
+// Of callers that give no range; dsg-ingest has an option for it.
 constexpr double kRangeDefaultM = 5.0;
-// Of the matcher; its penalties below follow from the block's size.
-constexpr int kBlockSize = 5;
+// OpenCV's matcher takes multiples of this many disparities: no option.
 constexpr int kDisparitySteps = 16;
-constexpr int kRefineRounds = 2;
-// In which the gradient along the rows is averaged.
-constexpr int kTextureWindow = 9;
-constexpr int kBorderSide = 9;
-// Bytes hold the gradients in halves; Sobel's kernel gives eight of one.
+// Bytes hold the gradients in halves; Sobel's kernel gives eight of one: no option.
 constexpr double kGradientScale = 2.0;
 
-StereoLookup MakeLookup(const CameraCalibration& rectified, const CameraCalibration& real) {
+StereoLookup MakeLookup(const CameraCalibration& rectified, const CameraCalibration& real,
+                        int border_px) {
   const cv::Size size(rectified.width, rectified.height);
   StereoLookup lookup{cv::Mat1f(size, -1e4f), cv::Mat1f(size, -1e4f), cv::Mat1b(size, uint8_t{0})};
   const Eigen::Matrix3d real_R_rectified =
@@ -57,8 +54,9 @@ StereoLookup MakeLookup(const CameraCalibration& rectified, const CameraCalibrat
     }
   }
   // Windows across the border would match its straight line.
-  cv::erode(lookup.inside, lookup.inside, cv::Mat::ones(kBorderSide, kBorderSide, CV_8U), {-1, -1},
-            1, cv::BORDER_CONSTANT, 0);
+  const int side = 2 * border_px + 1;
+  cv::erode(lookup.inside, lookup.inside, cv::Mat::ones(side, side, CV_8U), {-1, -1}, 1,
+            cv::BORDER_CONSTANT, 0);
   return lookup;
 }
 
@@ -70,14 +68,15 @@ cv::Mat1b Rectified(const Image& image, const StereoLookup& lookup) {
 }
 
 // 255 where there is enough to match.
-cv::Mat1b Textured(const cv::Mat1b& image, double texture_min) {
+cv::Mat1b Textured(const cv::Mat1b& image, const StereoOptions& options) {
   cv::Mat1s gradient;
   cv::Sobel(image, gradient, CV_16S, 1, 0);
   cv::Mat strength;
   cv::convertScaleAbs(gradient, strength, kGradientScale / 8.0);
-  cv::boxFilter(strength, strength, CV_32F, {kTextureWindow, kTextureWindow});
+  const int window = 2 * options.texture_reach_px + 1;
+  cv::boxFilter(strength, strength, CV_32F, {window, window});
   cv::Mat1b textured;
-  cv::compare(strength, texture_min * kGradientScale, textured, cv::CMP_GE);
+  cv::compare(strength, options.texture_min * kGradientScale, textured, cv::CMP_GE);
   return textured;
 }
 
@@ -97,8 +96,8 @@ class StereoDepth::Impl {
       : pair_(pair),
         options_(options),
         range_m_(range_m > 0.0 ? range_m : kRangeDefaultM),
-        left_lookup_(MakeLookup(pair.left, left)),
-        right_lookup_(MakeLookup(pair.right, right)) {}
+        left_lookup_(MakeLookup(pair.left, left, options.border_px)),
+        right_lookup_(MakeLookup(pair.right, right, options.border_px)) {}
 
   const CameraCalibration& camera() const { return pair_.left; }
 
@@ -106,7 +105,7 @@ class StereoDepth::Impl {
     cv::Mat1b left_image = Rectified(left, left_lookup_);
     cv::Mat1b right_image = Rectified(right, right_lookup_);
     cv::Mat1b usable;
-    cv::bitwise_and(Textured(left_image, options_.texture_min), left_lookup_.inside, usable);
+    cv::bitwise_and(Textured(left_image, options_), left_lookup_.inside, usable);
     cv::Mat1b right_inside = right_lookup_.inside;
     const bool is_mirrored = pair_.baseline_m < 0.0;
     if (is_mirrored) {
@@ -119,7 +118,9 @@ class StereoDepth::Impl {
     cv::Mat1f right_float;
     left_image.convertTo(left_float, CV_32F);
     right_image.convertTo(right_float, CV_32F);
-    for (int i = 0; i < kRefineRounds; ++i) RefineDisparity(left_float, right_float, &disparity);
+    for (int i = 0; i < options_.refine.round_count; ++i) {
+      RefineDisparity(left_float, right_float, options_.refine, &disparity);
+    }
     if (is_mirrored) cv::flip(disparity, disparity, 1);
     return ToDepth(disparity, usable);
   }
@@ -129,11 +130,13 @@ class StereoDepth::Impl {
   cv::Mat1f Match(const cv::Mat1b& left, const cv::Mat1b& right,
                   const cv::Mat1b& right_inside) const {
     const int count = DisparityCount(pair_, options_.nearest_m);
-    constexpr int kArea = kBlockSize * kBlockSize;
+    const int block = 2 * options_.block_reach_px + 1;
     const cv::Ptr<cv::StereoSGBM> matcher = cv::StereoSGBM::create(
-        0, count, kBlockSize, 8 * kArea, 32 * kArea, /*disp12MaxDiff=*/1,
-        /*preFilterCap=*/31, /*uniquenessRatio=*/10,
-        /*speckleWindowSize=*/100, /*speckleRange=*/2, cv::StereoSGBM::MODE_SGBM_3WAY);
+        0, count, block, options_.step_penalty * block * block,
+        options_.jump_penalty * block * block, /*disp12MaxDiff=*/options_.agree_px,
+        /*preFilterCap=*/options_.gradient_max, /*uniquenessRatio=*/options_.unique_percent,
+        /*speckleWindowSize=*/options_.speckle_px, /*speckleRange=*/options_.speckle_step_px,
+        cv::StereoSGBM::MODE_SGBM_3WAY);
     // The matcher leaves out as many columns on the left as it tries disparities.
     cv::Mat left_wide;
     cv::Mat right_wide;

@@ -12,7 +12,6 @@
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_split.h"
 #include "ingest/depth/frame_maker.h"
-#include "ingest/depth/gravity.h"
 #include "ingest/log/turned_log.h"
 #include "schema/base/status.h"
 
@@ -84,6 +83,8 @@ absl::StatusOr<std::vector<DepthFrame>> SpreadFrames(LogSource& log, int frame_c
 std::vector<BoundOption> UprightOptions::Bind() {
   std::vector<BoundOption> bound;
   BindFields<UprightOptions>(kUprightFields, this, &bound);
+  const std::vector<BoundOption> gravity_bound = gravity.Bind();
+  bound.insert(bound.end(), gravity_bound.begin(), gravity_bound.end());
   return bound;
 }
 
@@ -101,7 +102,7 @@ absl::StatusOr<std::unique_ptr<LogSource>> TurnUpright(
     DSG_ASSIGN_OR_RETURN(const std::vector<DepthFrame> frames,
                          SpreadFrames(*log, upright.frame_count));
     DSG_ASSIGN_OR_RETURN(log, OpenLog(path, options));
-    const std::optional<Eigen::Vector3d> found = EstimateUp(frames);
+    const std::optional<Eigen::Vector3d> found = EstimateUp(frames, upright.gravity);
     if (!found.has_value()) {
       *note = "which way is up could not be told from the pictures; z is taken for up, give --up";
       return log;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "ingest/config/option_field.h"
+#include "ingest/depth/gravity.h"
 #include "ingest/log/log_source.h"
 
 namespace dsg::ingest {
@@ -17,6 +18,7 @@ struct UprightOptions {
   /// A frame that stands this upright is left alone: its poses know better than a look at the
   /// walls.
   double upright_rad = 0.05;
+  GravityOptions gravity;
 
   std::vector<BoundOption> Bind();
 };

@@ -350,6 +350,13 @@ int Main(int argc, char** argv) {
         stderr);
     return kUsage;
   }
+  if (flags.server.empty() && flags.retry_for != IngestFlags().retry_for) {
+    std::fputs(
+        "dsg-ingest: --retry-for is how long a server that does not answer is waited for, and a "
+        "local store is not waited for; leave it out without --server\n",
+        stderr);
+    return kUsage;
+  }
   return Report(Run(flags));
 }
 

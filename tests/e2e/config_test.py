@@ -164,6 +164,8 @@ class Configuration(support.ProgramsTest):
                          self.small)
         self.refused(2, ["--quota"], "dsg-ingest", "--server", "unix:none.sock", "--map", "m",
                      "--quota", "1GB", self.small)
+        self.refused(2, ["--retry-for", "--server"], "dsg-ingest", "--store", "none", "--map", "m",
+                     "--retry-for", "5m", self.small)
         self.assertFalse(os.path.exists(self.path("none")))
 
     def test_shipped_files_are_in_force(self):

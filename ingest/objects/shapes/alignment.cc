@@ -8,8 +8,7 @@
 namespace dsg::ingest {
 namespace {
 
-// Against the distance to the plane; keeps a pose from sliding along a single plane.
-constexpr double kPointWeight = 0.1;
+// Numerical, no options: where iterations have converged, and equations for six unknowns.
 constexpr double kStepMinM = 1e-5;
 constexpr size_t kPairCountMin = 6;
 
@@ -28,7 +27,8 @@ int NearestOf(const ModelIndex& model, const Eigen::Vector3d& point_model, bool 
 
 // Rotation about `pivot` first, then translation, both in the model's frame.
 void AddPair(const Eigen::Vector3d& arm, const Eigen::Vector3d& offset,
-             const Eigen::Vector3d& normal, double weight, NormalEquations* sums) {
+             const Eigen::Vector3d& normal, double weight, double point_weight,
+             NormalEquations* sums) {
   Vector6 row;
   row << arm.cross(normal), normal;
   sums->hessian += weight * row * row.transpose();
@@ -38,24 +38,24 @@ void AddPair(const Eigen::Vector3d& arm, const Eigen::Vector3d& offset,
   jacobian << 0.0, arm.z(), -arm.y(), 1.0, 0.0, 0.0,  //
       -arm.z(), 0.0, arm.x(), 0.0, 1.0, 0.0,          //
       arm.y(), -arm.x(), 0.0, 0.0, 0.0, 1.0;
-  sums->hessian += weight * kPointWeight * jacobian.transpose() * jacobian;
-  sums->gradient += weight * kPointWeight * jacobian.transpose() * offset;
+  sums->hessian += weight * point_weight * jacobian.transpose() * jacobian;
+  sums->gradient += weight * point_weight * jacobian.transpose() * offset;
   ++sums->pair_count;
 }
 
 NormalEquations Collect(const ModelIndex& model, const std::vector<Eigen::Vector3d>& points_map,
                         const Pose3d& model_T_map, const Eigen::Vector3d& pivot, double gate_m,
-                        bool is_exact) {
+                        const AlignmentOptions& options) {
   NormalEquations sums;
   for (const Eigen::Vector3d& point_map : points_map) {
     const Eigen::Vector3d point = model_T_map * point_map;
-    const int nearest = NearestOf(model, point, is_exact);
+    const int nearest = NearestOf(model, point, options.is_exact);
     if (nearest < 0) continue;
     const Eigen::Vector3d offset = point - model.surface().points[static_cast<size_t>(nearest)];
     const double ratio = offset.squaredNorm() / (gate_m * gate_m);
     if (ratio >= 1.0) continue;
     AddPair(point - pivot, offset, model.surface().normals[static_cast<size_t>(nearest)],
-            (1.0 - ratio) * (1.0 - ratio), &sums);
+            (1.0 - ratio) * (1.0 - ratio), options.point_weight, &sums);
   }
   return sums;
 }
@@ -83,8 +83,7 @@ Pose3d Align(const ModelIndex& model, const std::vector<Eigen::Vector3d>& points
   const double shrink =
       std::pow(options.gate_last_m / options.gate_first_m, 1.0 / std::max(1, count / 2));
   for (int i = 0; i < count; ++i) {
-    const NormalEquations sums =
-        Collect(model, points_map, model_T_map, pivot, gate_m, options.is_exact);
+    const NormalEquations sums = Collect(model, points_map, model_T_map, pivot, gate_m, options);
     if (sums.pair_count < kPairCountMin) break;
     const Vector6 step = Solve(sums, options.is_upright);
     const Eigen::Vector3d turn = step.head<3>();

@@ -19,6 +19,8 @@ struct AlignmentOptions {
   /// Points farther from the model do not count: at the first and at the last iteration.
   double gate_first_m = 0.3;
   double gate_last_m = 0.12;
+  /// Of the distance to a point, against the distance to its plane.
+  double point_weight = 0.1;
 };
 
 /// Trimmed iterative closest points, to planes and a little to points.

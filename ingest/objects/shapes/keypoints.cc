@@ -15,7 +15,7 @@
 namespace dsg::ingest {
 namespace {
 
-// Less than this and no normal can be told.
+// Numerical, no option: less than this and no normal can be told.
 constexpr size_t kNormalPointCountMin = 8;
 
 std::vector<Eigen::Vector3d> FindCorners(const std::vector<Eigen::Vector3d>& points,

@@ -10,11 +10,11 @@
 namespace dsg::ingest {
 namespace {
 
+// No options: how fast a nearest point is found, and how far around a model at least.
 constexpr size_t kLeafPoints = 16;
 constexpr double kTableMarginM = 0.4;
 constexpr double kTableCellM = 0.04;
 constexpr double kTableCellCountMax = 200'000.0;
-constexpr double kPatchM = 0.1;
 
 }  // namespace
 
@@ -42,11 +42,11 @@ struct ModelIndex::Tree {
   KdTree tree;
 };
 
-ModelIndex::ModelIndex(Surface surface)
+ModelIndex::ModelIndex(Surface surface, double patch_m)
     : surface_(std::move(surface)), tree_(std::make_unique<Tree>(surface_.points)) {
   for (const Eigen::Vector3d& point : surface_.points) box_.extend(point);
   FillTable();
-  FillPatches();
+  FillPatches(patch_m);
 }
 ModelIndex::~ModelIndex() = default;
 ModelIndex::ModelIndex(ModelIndex&&) noexcept = default;
@@ -72,10 +72,10 @@ void ModelIndex::FillTable() {
   }
 }
 
-void ModelIndex::FillPatches() {
+void ModelIndex::FillPatches(double patch_m) {
   std::vector<std::pair<std::array<int64_t, 3>, size_t>> order;
   for (size_t i = 0; i < surface_.points.size(); ++i) {
-    const Eigen::Vector3d cell = (surface_.points[i] / kPatchM).array().floor();
+    const Eigen::Vector3d cell = (surface_.points[i] / patch_m).array().floor();
     order.push_back({{static_cast<int64_t>(cell.x()), static_cast<int64_t>(cell.y()),
                       static_cast<int64_t>(cell.z())},
                      i});

@@ -14,8 +14,8 @@ namespace dsg::ingest {
 /// Threads: safe from many threads.
 class ModelIndex {
  public:
-  /// Requires: at least one point.
-  explicit ModelIndex(Surface surface);
+  /// `patch_m`: edge of a patch. Requires: at least one point.
+  ModelIndex(Surface surface, double patch_m);
   ~ModelIndex();
   ModelIndex(ModelIndex&&) noexcept;
   ModelIndex& operator=(ModelIndex&&) noexcept;
@@ -29,7 +29,7 @@ class ModelIndex {
   /// model. Cost: one look-up.
   int NearestQuickly(const Eigen::Vector3d& point_model) const;
 
-  /// The patch of 0.1 m that a surface point belongs to.
+  /// The patch that a surface point belongs to.
   int patch(int index) const { return patches_[static_cast<size_t>(index)]; }
   int patch_count() const { return patch_count_; }
 
@@ -37,7 +37,7 @@ class ModelIndex {
   struct Tree;
 
   void FillTable();
-  void FillPatches();
+  void FillPatches(double patch_m);
 
   Surface surface_;
   Box3d box_;

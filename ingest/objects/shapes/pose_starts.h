@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "ingest/objects/shapes/model_index.h"
+#include "ingest/objects/shapes/shape_options.h"
 #include "schema/model/geometry.h"
 
 namespace dsg::ingest {
@@ -16,14 +17,16 @@ struct Start {
   double cost = 1.0;
 };
 
-/// Turns of 10 degrees; at each the model's box against the points' box: flush with either side or
+/// Turns all around; at each the model's box against the points' box: flush with either side or
 /// in the middle on x and y, flush below or above on z (on the floor when its height is known).
 /// The `count` best that differ, best first.
 std::vector<Start> FindStarts(const ModelIndex& model,
                               const std::vector<Eigen::Vector3d>& points_map,
-                              std::optional<double> floor_z_map, size_t count);
+                              std::optional<double> floor_z_map, size_t count,
+                              const StartOptions& options);
 
-/// The first of each group of poses within 0.15 m and 15 degrees; `starts` ascending by cost.
-std::vector<Start> KeepDistinct(const std::vector<Start>& starts, size_t count);
+/// The first of each group of poses within `same_m` and `same_deg`; `starts` ascending by cost.
+std::vector<Start> KeepDistinct(const std::vector<Start>& starts, size_t count,
+                                const StartOptions& options);
 
 }  // namespace dsg::ingest

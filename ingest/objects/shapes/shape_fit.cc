@@ -29,16 +29,12 @@ namespace {
 
 using FreeTest = std::function<bool(const Eigen::Vector3d&)>;
 
-// How finely models are sampled and few points stand for many: cost.
+// How finely models are sampled, to tell outside from inside: memory and time, no options.
 constexpr int kSampleCount = 60'000;
-constexpr double kSurfaceM = 0.025;
 constexpr double kOuterCellM = 0.04;
 constexpr double kOuterCellCountMax = 2e6;
-constexpr size_t kFitPointCountMin = 10;
-constexpr size_t kFitPointCountMax = 4000;
+// Refuses what no index can hold.
 constexpr double kCoordinateMaxM = 1e6;
-constexpr size_t kRoughPointCount = 250;
-constexpr size_t kFreeTestCount = 400;
 
 // A pose with all that speaks for and against it.
 struct Candidate {
@@ -70,26 +66,33 @@ KeypointOptions KeypointsOf(const ShapeOptions& options) {
   out.radius_m = options.keypoint_radius_m;
   out.threshold = options.keypoint_threshold;
   out.count_max = options.keypoint_count_max;
+  out.count_min = options.keypoint_count_min;
   return out;
 }
 
 FittedModel MakeModel(int index, const CadModel& cad, const ShapeOptions& options) {
   const Surface outer = KeepOuter(SampleFaces(cad, kSampleCount), OuterCell(cad));
-  FittedModel model{index, cad.class_name, ModelIndex(ThinSurface(outer, kSurfaceM)), {}, {}};
+  FittedModel model{index,
+                    cad.class_name,
+                    ModelIndex(ThinSurface(outer, options.surface_m), options.patch_m),
+                    {},
+                    {}};
   model.keypoints =
       FindKeypoints(ThinPoints(outer.points, options.point_distance_m), KeypointsOf(options));
-  model.probes = EveryNth(ThinSurface(outer, options.point_distance_m).points, kFreeTestCount);
+  model.probes = EveryNth(ThinSurface(outer, options.point_distance_m).points,
+                          static_cast<size_t>(options.free_point_count));
   return model;
 }
 
 std::vector<Eigen::Vector3d> CleanPoints(const std::vector<Eigen::Vector3f>& points_map,
-                                         double distance_m) {
+                                         const ShapeOptions& options) {
   std::vector<Eigen::Vector3d> finite;
   for (const Eigen::Vector3f& point : points_map) {
     const Eigen::Vector3d wide = point.cast<double>();
     if (wide.allFinite() && wide.cwiseAbs().maxCoeff() < kCoordinateMaxM) finite.push_back(wide);
   }
-  return EveryNth(ThinPoints(finite, distance_m), kFitPointCountMax);
+  return EveryNth(ThinPoints(finite, options.point_distance_m),
+                  static_cast<size_t>(options.point_count_max));
 }
 
 bool IsFreeAround(const FreeTest& is_free, const Eigen::Vector3d& point_map, double around_m) {
@@ -102,10 +105,11 @@ bool IsFreeAround(const FreeTest& is_free, const Eigen::Vector3d& point_map, dou
 }
 
 // Height that all but a few stray points lie above.
-double LowestOf(const std::vector<Eigen::Vector3d>& points) {
+double LowestOf(const std::vector<Eigen::Vector3d>& points, double stray_share) {
   std::vector<double> heights;
   for (const Eigen::Vector3d& point : points) heights.push_back(point.z());
-  const auto at = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 50);
+  const double below = stray_share * static_cast<double>(heights.size());
+  const auto at = heights.begin() + static_cast<std::ptrdiff_t>(below);
   std::nth_element(heights.begin(), at, heights.end());
   return *at;
 }
@@ -129,8 +133,8 @@ class ShapeFitter::Impl {
       if (absl::EqualsIgnoreCase(model.class_name, class_name)) models.push_back(&model);
     }
     if (models.empty()) return std::nullopt;
-    const std::vector<Eigen::Vector3d> points = CleanPoints(points_map, options_.point_distance_m);
-    if (points.size() < kFitPointCountMin) return std::nullopt;
+    const std::vector<Eigen::Vector3d> points = CleanPoints(points_map, options_);
+    if (std::ssize(points) < options_.point_count_min) return std::nullopt;
     const std::vector<Eigen::Vector3d> keypoints = FindKeypoints(points, KeypointsOf(options_));
     std::optional<ShapeFit> best;
     double best_score = 0.0;
@@ -166,6 +170,7 @@ class ShapeFitter::Impl {
       std::erase_if(pairs, [&](const Correspondence& pair) {
         const double height_model = model.keypoints[static_cast<size_t>(pair.first)].z();
         const double height = keypoints[static_cast<size_t>(pair.second)].z() - floor_z_map;
+        // Both corners are off.
         return std::abs(height - height_model) > 2.0 * options_.noise_bound_m;
       });
     }
@@ -195,14 +200,15 @@ class ShapeFitter::Impl {
                                         const std::vector<Eigen::Vector3d>& keypoints,
                                         const FreeTest& is_free,
                                         std::optional<double> floor_z_map) const {
-    const std::optional<Pose3d> matched =
-        Match(model, keypoints, floor_z_map ? *floor_z_map : LowestOf(points));
+    const std::optional<Pose3d> matched = Match(
+        model, keypoints, floor_z_map ? *floor_z_map : LowestOf(points, options_.stray_share));
     if (options_.is_paper) {
       if (!matched) return {};
       return {Judge(model, points, *matched, is_free, true)};
     }
     std::vector<Start> starts =
-        FindStarts(model.surface, points, floor_z_map, static_cast<size_t>(options_.start_count));
+        FindStarts(model.surface, points, floor_z_map, static_cast<size_t>(options_.start_count),
+                   options_.starts);
     if (matched) starts.push_back({*matched, 0.0});
     const std::vector<Start> rough = AlignRoughly(model, points, std::move(starts));
     return Refine(model, points, rough, is_free, floor_z_map);
@@ -211,18 +217,23 @@ class ShapeFitter::Impl {
   std::vector<Start> AlignRoughly(const FittedModel& model,
                                   const std::vector<Eigen::Vector3d>& points,
                                   std::vector<Start> starts) const {
-    const std::vector<Eigen::Vector3d> few = EveryNth(points, kRoughPointCount);
+    const std::vector<Eigen::Vector3d> few =
+        EveryNth(points, static_cast<size_t>(options_.rough_point_count));
     AlignmentOptions options;
     options.is_upright = options_.is_upright;
+    options.point_weight = options_.point_weight;
+    options.iteration_count_max = options_.rough_iteration_count;
+    options.gate_first_m = options_.rough_far_m;
+    options.gate_last_m = options_.rough_near_m;
     const auto candidate_count = static_cast<size_t>(options_.candidate_count);
     const auto shaken_count = static_cast<size_t>(options_.shaken_count);
     AlignAll(model, few, options, &starts);
-    starts = KeepDistinct(starts, candidate_count);
+    starts = KeepDistinct(starts, candidate_count, options_.starts);
     for (size_t i = std::min(starts.size(), shaken_count); i-- > 0;) Shake(starts[i], &starts);
-    options.gate_first_m = 0.15;
-    options.gate_last_m = 0.08;
+    options.gate_first_m = options_.kept_far_m;
+    options.gate_last_m = options_.kept_near_m;
     AlignAll(model, few, options, &starts);
-    return KeepDistinct(starts, candidate_count);
+    return KeepDistinct(starts, candidate_count, options_.starts);
   }
 
   // Leaves the starts ascending by cost.
@@ -270,9 +281,10 @@ class ShapeFitter::Impl {
     AlignmentOptions options;
     options.is_upright = options_.is_upright;
     options.is_exact = true;
-    options.iteration_count_max = 15;
+    options.point_weight = options_.point_weight;
+    options.iteration_count_max = options_.exact_iteration_count;
     options.gate_first_m = options_.inlier_m;
-    options.gate_last_m = 0.07;
+    options.gate_last_m = options_.exact_near_m;
     for (Candidate& candidate : candidates) {
       Pose3d pose = Align(model.surface, points, candidate.map_T_model, options);
       if (floor_z_map) {

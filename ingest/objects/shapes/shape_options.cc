@@ -41,6 +41,57 @@ constexpr OptionField<ShapeOptions> kShapeFields[] = {
      "The best poses, so many, are tried moved a little too: what stands beside pulls them off"},
     {"shape-shake", &ShapeOptions::shake_m, 0.0, 2.0, "... by this, metres"},
     {"shape-shake-turn", &ShapeOptions::shake_deg, 0.0, 90.0, "... and turned by this, degrees"},
+    {"shape-slide", &ShapeOptions::point_weight, 0.0, 10.0,
+     "What distances to points weigh against distances to their planes in an alignment: a little "
+     "keeps poses from sliding along a plane"},
+    {"shape-rough-steps", &ShapeOptions::rough_iteration_count, 1, 1000,
+     "Steps of a rough alignment: it is near the end by then"},
+    {"shape-rough-far", &ShapeOptions::rough_far_m, 0.01, 0.4,
+     "Points this near to the model count in the first step from a start, metres: no start is "
+     "farther from its true pose"},
+    {"shape-rough-near", &ShapeOptions::rough_near_m, 0.01, 0.4,
+     "... and in the last ones, metres: what stands beside it is left out"},
+    {"shape-kept-far", &ShapeOptions::kept_far_m, 0.01, 0.4,
+     "The same from the poses that are kept, and from shaken ones, metres: they are half as far "
+     "off"},
+    {"shape-kept-near", &ShapeOptions::kept_near_m, 0.01, 0.4,
+     "... and in the last steps, metres: tight gates let go of what pulls a pose off"},
+    {"shape-exact-steps", &ShapeOptions::exact_iteration_count, 1, 1000,
+     "Steps of an exact alignment: it has converged by then"},
+    {"shape-exact-near", &ShapeOptions::exact_near_m, 0.005, 0.4,
+     "Points this near to the model count in its last steps, metres: a voxel and a half"},
+    {"shape-points-min", &ShapeOptions::point_count_min, 3, 100'000,
+     "With fewer points an object has no shape: they fit anything"},
+    {"shape-points", &ShapeOptions::point_count_max, 10, 1'000'000,
+     "Of more points so many stand for all: time"},
+    {"shape-rough-points", &ShapeOptions::rough_point_count, 10, 1'000'000,
+     "... and so many in rough alignments: they are many"},
+    {"shape-free-points", &ShapeOptions::free_point_count, 10, 1'000'000,
+     "Points of a model that are looked up in free space: a quarter of a per cent each"},
+    {"shape-surface", &ShapeOptions::surface_m, 0.005, 0.5,
+     "Points of a model are this far apart, metres: half a voxel"},
+    {"shape-patch", &ShapeOptions::patch_m, 0.01, 2.0,
+     "Edge of the patches of a model that are counted as seen, metres: two voxels"},
+    {"shape-keypoints-min", &ShapeOptions::keypoint_count_min, 0, 1000,
+     "With fewer corners evenly spread points take their place: smooth things have none"},
+    {"shape-stray", &ShapeOptions::stray_share, 0.0, 0.5,
+     "Share of the points that may be below an object whose floor is not known: strays"},
+};
+
+constexpr OptionField<StartOptions> kStartFields[] = {
+    {"shape-turns", &StartOptions::turn_count, 1, 3600,
+     "Turns about the vertical that are tried: of 10 degrees, an alignment finds the rest"},
+    {"shape-look-near", &StartOptions::near_m, 0.02, 0.4,
+     "Points this near to the model are on it at first sight, metres: half a turn moves the end of "
+     "a couch by 0.09"},
+    {"shape-look-points", &StartOptions::look_count, 10, 100'000,
+     "Points that a first look takes: there are a thousand poses to look at"},
+    {"shape-trim", &StartOptions::trim_share, 0.0, 0.4,
+     "Share of an object's points off each side of its box before the model is laid against it: "
+     "what bled over from neighbours"},
+    {"shape-same", &StartOptions::same_m, 0.0, 2.0,
+     "Poses this near to each other are one, metres: they end in the same pose"},
+    {"shape-same-turn", &StartOptions::same_deg, 0.0, 180.0, "... and turned by this, degrees"},
 };
 
 }  // namespace
@@ -48,6 +99,7 @@ constexpr OptionField<ShapeOptions> kShapeFields[] = {
 std::vector<BoundOption> ShapeOptions::Bind() {
   std::vector<BoundOption> bound;
   BindFields<ShapeOptions>(kShapeFields, this, &bound);
+  BindFields<StartOptions>(kStartFields, &starts, &bound);
   return bound;
 }
 

@@ -8,6 +8,22 @@
 
 namespace dsg::ingest {
 
+/// Of FindStarts: poses all around, and a first look at each.
+struct StartOptions {
+  /// Turns about the vertical.
+  int turn_count = 36;
+  /// Points this near to the model are on it: half a turn of 10 degrees moves the end of a couch by
+  /// 9 cm.
+  double near_m = 0.2;
+  /// Points that are looked at.
+  int look_count = 120;
+  /// Off the ends of the points' box: what bled over from neighbours.
+  double trim_share = 0.03;
+  /// Poses this near to each other, in both, are one.
+  double same_m = 0.15;
+  double same_deg = 15.0;
+};
+
 struct ShapeOptions {
   /// RSS 2020: Harris keypoints within 0.15 m, threshold 1e-4.
   double keypoint_radius_m = 0.15;
@@ -44,6 +60,36 @@ struct ShapeOptions {
   int shaken_count = 3;
   double shake_m = 0.1;
   double shake_deg = 8.0;
+  StartOptions starts;
+  /// Of all stages of the alignment: what a distance to a point weighs against the distance to its
+  /// plane. It keeps a pose from sliding along a single plane.
+  double point_weight = 0.1;
+  /// Iterations of a rough alignment, and up to which distance points count, at its beginning and
+  /// at its end: from starts, and from those that are kept. No further than the table of nearest
+  /// points reaches (ModelIndex).
+  int rough_iteration_count = 10;
+  double rough_far_m = 0.3;
+  double rough_near_m = 0.12;
+  double kept_far_m = 0.15;
+  double kept_near_m = 0.08;
+  /// Of an exact alignment, which begins at `inlier_m`.
+  int exact_iteration_count = 15;
+  double exact_near_m = 0.07;
+  /// Points of an object: with fewer it has no shape, of more so many stand for all.
+  int point_count_min = 10;
+  int point_count_max = 4000;
+  /// So many stand for them in rough alignments, and so many of the model in the test of free
+  /// space.
+  int rough_point_count = 250;
+  int free_point_count = 400;
+  /// Distance of the points of a model that distances are taken to.
+  double surface_m = 0.025;
+  /// Edge of the patches that are counted for the share of the model that is seen.
+  double patch_m = 0.1;
+  /// With fewer corners, evenly spread points take their place.
+  int keypoint_count_min = 12;
+  /// Share of points that may be strays below an object whose floor is not known.
+  double stray_share = 0.02;
 
   std::vector<BoundOption> Bind();
 };

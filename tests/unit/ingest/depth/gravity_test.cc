@@ -82,6 +82,33 @@ TEST(EstimateUp, CamerasThatLookFarDownStillFindIt) {
   }
 }
 
+// Far from its default each number makes another answer for one of these cameras, or none.
+TEST(EstimateUp, ReadsEachOfItsNumbers) {
+  Random random(5, 1);
+  std::vector<std::vector<DepthFrame>> cameras;
+  cameras.push_back({Look(20.0, 15.0, 4.0, &random), Look(140.0, 30.0, -6.0, &random)});
+  cameras.push_back({Look(0.0, 50.0, 0.0, &random, 0.01), Look(90.0, 60.0, 10.0, &random, 0.01)});
+  cameras.push_back({Look(0.0, 20.0, 0.0, &random), Look(0.0, 20.0, 170.0, &random)});
+  const auto estimate = [&cameras](const GravityOptions& options) {
+    std::vector<std::optional<Eigen::Vector3d>> ups;
+    for (const std::vector<DepthFrame>& frames : cameras)
+      ups.push_back(EstimateUp(frames, options));
+    return ups;
+  };
+  const auto usual = estimate({});
+  EXPECT_TRUE(usual[0].has_value());
+  GravityOptions options;
+  for (const BoundOption& field : options.Bind()) {
+    const double before = field.Get();
+    field.Set(field.max);
+    bool is_read = estimate(options) != usual;
+    field.Set(field.min);
+    is_read = is_read || estimate(options) != usual;
+    field.Set(before);
+    EXPECT_TRUE(is_read) << field.name;
+  }
+}
+
 TEST(EstimateUp, DoesNotAnswerWithoutAnythingLevel) {
   Random random(6, 1);
   EXPECT_FALSE(EstimateUp({}).has_value());

@@ -7,6 +7,9 @@
 #include <cmath>
 #include <functional>
 #include <opencv2/core/utility.hpp>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "ingest/depth/pinhole.h"
 #include "schema/base/status.h"
@@ -192,6 +195,46 @@ TEST(StereoDepth, BlankWallsAndFarOnesGiveNoReading) {
   ASSERT_TRUE(far.ok());
   EXPECT_GT(static_cast<double>(std::count(far->begin(), far->end(), 0.0f)),
             0.99 * static_cast<double>(far->size()));
+}
+
+// Far from its default each number makes other depth of one of these scenes.
+TEST(StereoDepth, ReadsEachOfItsNumbers) {
+  const Pair pair = RealPair();
+  std::vector<std::pair<Image, Image>> pictures;
+  for (const Scene& scene : {Step(0.8, 3.0), Plane(4.0)}) {
+    pictures.emplace_back(Render(pair.left, scene), Render(pair.right, scene));
+  }
+  const auto compute = [&](const StereoOptions& options) {
+    const absl::StatusOr<StereoDepth> stereo =
+        StereoDepth::Make(pair.left, pair.right, 6.0, options);
+    EXPECT_TRUE(stereo.ok()) << stereo.status();
+    std::vector<float> all;
+    for (const auto& [left, right] : pictures) {
+      const auto depth_m = stereo->Compute(left, right);
+      EXPECT_TRUE(depth_m.ok()) << depth_m.status();
+      all.insert(all.end(), depth_m->begin(), depth_m->end());
+    }
+    return all;
+  };
+  const std::vector<float> usual = compute({});
+  DepthOptions options;
+  int count = 0;
+  for (const BoundOption& field : options.Bind()) {
+    const std::string name = field.name;
+    const bool is_of_pair =
+        name.rfind("depth-stereo-", 0) == 0 || name.rfind("depth-refine-", 0) == 0;
+    // Which pairs are matched is not asked here.
+    if (!is_of_pair || name == "depth-stereo-period") continue;
+    ++count;
+    const double before = field.Get();
+    field.Set(field.max);
+    bool is_read = compute(options.stereo) != usual;
+    field.Set(field.min);
+    is_read = is_read || compute(options.stereo) != usual;
+    field.Set(before);
+    EXPECT_TRUE(is_read) << name;
+  }
+  EXPECT_EQ(count, 16);
 }
 
 TEST(StereoDepth, ThreadsChangeNoBit) {

@@ -88,7 +88,7 @@ TEST(Tuning, NamesAreUniqueAndDefaultsInRange) {
     EXPECT_TRUE(field.Check(field.Get()).ok()) << field.Check(field.Get());
     EXPECT_LT(field.min, field.max) << field.name;
   }
-  EXPECT_GT(all.size(), 400u);
+  EXPECT_GT(all.size(), 600u);
 }
 
 TEST(Tuning, EachFlagReachesItsStageAndNoOther) {
@@ -143,6 +143,23 @@ TEST(Tuning, PeopleTellEachNumberInTheirDigest) {
     EXPECT_EQ(options.Digest(),
               is_paper ? "paper 1 0000 auto 5 30 0 20" : "smooth 0 1111 auto 5 30 0 20");
   }
+}
+
+TEST(Tuning, LoopClosuresTellEachNumberInTheirDigest) {
+  RobotGraphOptions options;
+  // As it was before the numbers of the solver were options: what is known of logs stays known.
+  std::set<std::string> digests = {""};
+  ASSERT_EQ(DigestOptions(options), "");
+  const std::vector<BoundOption> all = options.Bind();
+  for (const BoundOption& field : all) {
+    const double before = field.Get();
+    field.Set(Other(field));
+    EXPECT_TRUE(ValidateOptions(options).ok()) << field.name;
+    EXPECT_TRUE(digests.insert(DigestOptions(options)).second) << field.name;
+    field.Set(before);
+  }
+  EXPECT_EQ(DigestOptions(options), "");
+  EXPECT_GT(all.size(), 30u);
 }
 
 TEST(Tuning, PaperKeepsTheNumbersThatAreGiven) {

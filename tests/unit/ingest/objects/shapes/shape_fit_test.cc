@@ -8,6 +8,9 @@
 #include <ctime>
 #include <limits>
 #include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "ingest/simulator/scene/scene.h"
 #include "tests/support/temp_folder.h"
@@ -295,6 +298,59 @@ TEST(ShapeFit, KeepsQuietAboutClassesAndPointsItCannotFit) {
   const auto fit = fitter.Fit("couch", dirty, nullptr);
   ASSERT_TRUE(fit);
   EXPECT_LT(fit->map_T_model.position.norm(), 0.1);
+}
+
+// Away from its default each number of the search makes another fit, or none.
+TEST(ShapeFit, ReadsTheNumbersOfItsSearch) {
+  Random random(24, 1);
+  const CadModel couch = SimulatorCouch();
+  const Pose3d truth = RandomPose(&random);
+  const ViewOptions coarse{
+      .voxel_m = 0.1, .noise_m = 0.025, .inflation_m = 0.04, .stray_share = 0.15};
+  const ShapeView view(couch, truth, {EyeAround(truth, 0.5, 2.2)}, coarse, &random);
+  const auto fit_with = [&](ShapeOptions options, bool has_few_starts) {
+    if (has_few_starts) options.start_count = options.shaken_count = 1;
+    return ShapeFitter({couch}, options).Fit("couch", view.points_map(), nullptr);
+  };
+  const auto differ = [](const std::optional<ShapeFit>& a, const std::optional<ShapeFit>& b) {
+    if (!a || !b) return a.has_value() != b.has_value();
+    return a->map_T_model.position != b->map_T_model.position || a->residual_m != b->residual_m ||
+           a->inlier_share != b->inlier_share;
+  };
+  const std::optional<ShapeFit> usual[] = {fit_with({}, false), fit_with({}, true)};
+  EXPECT_TRUE(usual[0].has_value());
+  ShapeOptions options;
+  const std::vector<BoundOption> all = options.Bind();
+  for (const auto& [name, number] :
+       std::vector<std::pair<std::string, double>>{{"shape-slide", 0.0},
+                                                   {"shape-rough-steps", 1},
+                                                   {"shape-rough-far", 0.05},
+                                                   {"shape-rough-near", 0.3},
+                                                   {"shape-kept-far", 0.4},
+                                                   {"shape-kept-near", 0.02},
+                                                   {"shape-exact-steps", 1},
+                                                   {"shape-exact-near", 0.02},
+                                                   {"shape-points-min", 100'000},
+                                                   {"shape-points", 100},
+                                                   {"shape-rough-points", 20},
+                                                   {"shape-surface", 0.1},
+                                                   {"shape-turns", 5},
+                                                   {"shape-look-near", 0.05},
+                                                   {"shape-look-points", 10},
+                                                   {"shape-trim", 0.3},
+                                                   {"shape-candidates", 1}}) {
+    const auto field = std::find_if(all.begin(), all.end(), [&name = name](const BoundOption& one) {
+      return one.name == name;
+    });
+    ASSERT_NE(field, all.end()) << name;
+    const double before = field->Get();
+    field->Set(number);
+    EXPECT_TRUE(ValidateOptions(options).ok()) << name;
+    EXPECT_TRUE(differ(fit_with(options, false), usual[0]) ||
+                differ(fit_with(options, true), usual[1]))
+        << name;
+    field->Set(before);
+  }
 }
 
 TEST(ShapeFit, GivesTheSameFitForTheSamePoints) {
