@@ -210,8 +210,7 @@ absl::StatusOr<std::optional<TrackTable>> TransformTree::ReadPoses(
   if (!track.has_value()) return std::nullopt;
   DSG_RETURN_IF_ERROR(ForEachTransform(bag, kTopic, on_read,
                                        [&](const RosPose& transform, const std::string& origin) {
-                                         track->Add(transform, origin);
-                                         return absl::OkStatus();
+                                         return track->Add(transform, origin);
                                        }));
   TrackTable table;
   table.file = track->Name();

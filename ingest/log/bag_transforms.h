@@ -66,7 +66,7 @@ class TransformTree {
   /// The poses of the body as its track makes them. Transforms that are passed over are counted in
   /// `notes`. `on_read` (may be empty) gets the count of messages that were looked at, and of how
   /// many. nullopt if there is no chain. Requires: read with_moving, from this bag. Errors: of
-  /// BodyChain.
+  /// BodyChain and of BodyTrack::Add.
   absl::StatusOr<std::optional<TrackTable>> ReadPoses(const Bag& bag, const std::string& robot_name,
                                                       std::vector<std::string>* notes,
                                                       const PassCallback& on_read = {}) const;

@@ -8,6 +8,7 @@
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "schema/base/check.h"
+#include "schema/base/status.h"
 
 namespace dsg::ingest {
 
@@ -59,27 +60,45 @@ std::string BodyTrack::Name() const {
                       ShownFrame(chain_.back().name));
 }
 
-void BodyTrack::Add(const RosPose& transform, const std::string& origin) {
+absl::Status BodyTrack::Add(const RosPose& transform, const std::string& origin) {
   const std::string name = FrameName(transform.child_frame_id);
   const auto frame = std::find_if(chain_.begin(), chain_.end(), [&](const ChainFrame& any) {
     return any.has_track && any.name == name;
   });
-  if (frame == chain_.end()) return;
+  if (frame == chain_.end()) return absl::OkStatus();
   const auto index = static_cast<size_t>(frame - chain_.begin());
   const absl::StatusOr<Pose3d> parent_T_frame = transform.ToPose(origin);
   if (!parent_T_frame.ok()) {
     ++passed_over_count_;
-    return;
+    return absl::OkStatus();
   }
   Link& link = links_[index];
-  if (!Keep({transform.header.stamp_ns, *parent_T_frame}, &link)) return;
+  const TimeNs time_ns = transform.header.stamp_ns;
+  const bool is_back = link.last.has_value() && time_ns < link.last->time_ns;
+  link.steps_back = is_back ? link.steps_back + 1 : 0;
+  if (link.steps_back >= kStepsBackMax) return ClockJumped(link, name, time_ns, origin);
+  if (!Keep({time_ns, *parent_T_frame}, &link)) return absl::OkStatus();
+  link.last_origin = origin;
   if (index == driver_ && link.last->time_ns < floor_ns_) {
     link.samples.pop_back();
     ++late_count_;
   }
-  if (link.samples.size() <= waiting_max_) return;
+  if (link.samples.size() <= waiting_max_) return absl::OkStatus();
   link.samples.pop_front();
   if (index == driver_) ++skipped_count_;
+  return absl::OkStatus();
+}
+
+absl::Status BodyTrack::ClockJumped(const Link& link, const std::string& frame, TimeNs time_ns,
+                                    const std::string& origin) const {
+  return MakeError(
+      Reason::kFileMalformed,
+      absl::StrCat(origin, " has stamp ", time_ns, " of frame ", ShownFrame(frame), ", as ",
+                   kStepsBackMax - 1, " before it earlier than stamp ", link.last->time_ns, " of ",
+                   link.last_origin,
+                   ": a clock has jumped; take the transforms with the wrong stamps out of the "
+                   "bag, or give --pose-file"),
+      {{"frame", frame}});
 }
 
 // False for a sample that is passed over.

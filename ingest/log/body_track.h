@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "ingest/log/ros_messages.h"
 #include "schema/base/time.h"
 #include "schema/model/geometry.h"
@@ -35,6 +36,9 @@ struct ChainFrame {
   bool is_repeated = false;
 };
 
+/// Two publishers of one frame take turns; a clock that has jumped goes on.
+inline constexpr int kStepsBackMax = 20;
+
 struct BodyPose {
   TimeNs time_ns = 0;
   Pose3d root_T_body;
@@ -60,7 +64,9 @@ class BodyTrack {
 
   /// Keeps a transform of a frame with a track. One that is no pose, or whose stamp is not after
   /// that of the one before, is passed over, and counted unless it says the same.
-  void Add(const RosPose& transform, const std::string& origin);
+  /// Errors: FILE_MALFORMED when kStepsBackMax stamps of a frame in a row are before the one that
+  /// was kept: that one, or these, are of a clock that jumped.
+  absl::Status Add(const RosPose& transform, const std::string& origin);
 
   /// The next pose, if it waits for nothing. One up to `overdue_ns` does not wait for frames that
   /// have never moved.
@@ -89,6 +95,9 @@ class BodyTrack {
   struct Link {
     std::deque<Sample> samples;
     std::optional<Sample> last;
+    std::string last_origin;
+    /// Stamps in a row before the last one's.
+    int steps_back = 0;
     /// More than one transform is known to come; they have differed.
     bool is_repeated = false;
     bool has_moved = false;
@@ -100,6 +109,8 @@ class BodyTrack {
     void ForgetBefore(TimeNs time_ns);
   };
 
+  absl::Status ClockJumped(const Link& link, const std::string& frame, TimeNs time_ns,
+                           const std::string& origin) const;
   bool Keep(const Sample& sample, Link* link);
   BodyPose Take();
   void ForgetAbove(TimeNs time_ns);

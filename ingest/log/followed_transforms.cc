@@ -26,7 +26,7 @@ absl::Status FollowedTransforms::Take(const RosBytes& message, const std::string
   for (const RosPose& transform : transforms) {
     DSG_RETURN_IF_ERROR(tree_.Add(transform, origin));
     DSG_RETURN_IF_ERROR(CheckChain(transform));
-    track_.Add(transform, origin);
+    DSG_RETURN_IF_ERROR(track_.Add(transform, origin));
   }
   return absl::OkStatus();
 }

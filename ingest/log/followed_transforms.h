@@ -38,7 +38,7 @@ class FollowedTransforms {
 
   /// Takes a message of /tf.
   /// Errors: FILE_MALFORMED naming topic and message when it does not parse, or there are too many
-  /// frames; of TransformTree::BodyChain.
+  /// frames; of TransformTree::BodyChain and BodyTrack::Add.
   absl::Status Take(const RosBytes& message, const std::string& origin);
 
   /// The next pose that waits for nothing, or no longer. `now_ns`: the latest stamp of the log.

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <random>
 
+#include "schema/base/status.h"
+
 namespace dsg::ingest {
 namespace {
 
@@ -34,20 +36,20 @@ BodyTrack BaseInMap(bool is_repeated = true, size_t waiting_max = SIZE_MAX) {
 TEST(BodyTrack, WaitsForTheFramesAbove) {
   BodyTrack track = BaseInMap();
   EXPECT_EQ(track.Name(), "/tf, frame \"base\" in \"map\"");
-  track.Add(Transform("odom", 10 * kStep, 100), "");
-  track.Add(Transform("/odom", 30 * kStep, 120), "");
-  track.Add(Transform("base", 20 * kStep, 1), "");
-  track.Add(Transform("base", 40 * kStep, 2), "");
-  track.Add(Transform("wheel", 99 * kStep, 2), "");
+  EXPECT_TRUE(track.Add(Transform("odom", 10 * kStep, 100), "").ok());
+  EXPECT_TRUE(track.Add(Transform("/odom", 30 * kStep, 120), "").ok());
+  EXPECT_TRUE(track.Add(Transform("base", 20 * kStep, 1), "").ok());
+  EXPECT_TRUE(track.Add(Transform("base", 40 * kStep, 2), "").ok());
+  EXPECT_TRUE(track.Add(Transform("wheel", 99 * kStep, 2), "").ok());
   EXPECT_EQ(track.known_ns(), 30 * kStep);
   const auto pose = track.Next();
   ASSERT_TRUE(pose.has_value());
   EXPECT_EQ(pose->time_ns, 20 * kStep);
   EXPECT_EQ(pose->root_T_body.position.x(), 111);
   EXPECT_FALSE(track.Next().has_value()) << "the map may move until then";
-  track.Add(Transform("odom", 50 * kStep, 130), "");
+  EXPECT_TRUE(track.Add(Transform("odom", 50 * kStep, 130), "").ok());
   EXPECT_EQ(track.Next()->root_T_body.position.x(), 127);
-  track.Add(Transform("base", 60 * kStep, 3), "");
+  EXPECT_TRUE(track.Add(Transform("base", 60 * kStep, 3), "").ok());
   EXPECT_FALSE(track.Next().has_value());
   EXPECT_EQ(track.NextAtEnd()->root_T_body.position.x(), 133) << "the map stands then";
   EXPECT_FALSE(track.NextAtEnd().has_value());
@@ -68,7 +70,7 @@ TEST(BodyTrack, GivesTheSameHoweverItsTransformsCome) {
       }
     }
     BodyTrack whole = BaseInMap();
-    for (const RosPose& transform : all) whole.Add(transform, "");
+    for (const RosPose& transform : all) EXPECT_TRUE(whole.Add(transform, "").ok());
     // By their stamps, which are up to 300 ms older than when they come.
     std::vector<std::pair<TimeNs, RosPose>> in_order;
     TimeNs late_ns = 0;
@@ -81,7 +83,7 @@ TEST(BodyTrack, GivesTheSameHoweverItsTransformsCome) {
     BodyTrack growing = BaseInMap();
     std::vector<BodyPose> poses;
     for (const auto& [time_ns, transform] : in_order) {
-      growing.Add(transform, "");
+      EXPECT_TRUE(growing.Add(transform, "").ok());
       while (const auto pose = growing.Next()) poses.push_back(*pose);
     }
     while (const auto pose = growing.NextAtEnd()) poses.push_back(*pose);
@@ -97,41 +99,41 @@ TEST(BodyTrack, GivesTheSameHoweverItsTransformsCome) {
 
 TEST(BodyTrack, CountsWhatItPassesOver) {
   BodyTrack track = BaseInMap();
-  track.Add(Transform("base", 20 * kStep, 1), "");
-  track.Add(Transform("base", 20 * kStep, 1), "");
+  EXPECT_TRUE(track.Add(Transform("base", 20 * kStep, 1), "").ok());
+  EXPECT_TRUE(track.Add(Transform("base", 20 * kStep, 1), "").ok());
   EXPECT_EQ(track.passed_over_count(), 0) << "a repeat says nothing else";
-  track.Add(Transform("base", 20 * kStep, 2), "");
-  track.Add(Transform("base", 10 * kStep, 1), "");
-  track.Add(Transform("base", 30 * kStep, NAN), "");
+  EXPECT_TRUE(track.Add(Transform("base", 20 * kStep, 2), "").ok());
+  EXPECT_TRUE(track.Add(Transform("base", 10 * kStep, 1), "").ok());
+  EXPECT_TRUE(track.Add(Transform("base", 30 * kStep, NAN), "").ok());
   EXPECT_EQ(track.passed_over_count(), 3);
   EXPECT_EQ(track.waiting_count(), 1u);
 }
 
 TEST(BodyTrack, GivesUpWhatIsTooOld) {
   BodyTrack track = BaseInMap();
-  track.Add(Transform("odom", 10 * kStep, 0), "");
-  track.Add(Transform("odom", 11 * kStep, 1), "");
-  for (int i = 2; i < 6; ++i) track.Add(Transform("base", i * 10 * kStep, 0), "");
+  EXPECT_TRUE(track.Add(Transform("odom", 10 * kStep, 0), "").ok());
+  EXPECT_TRUE(track.Add(Transform("odom", 11 * kStep, 1), "").ok());
+  for (int i = 2; i < 6; ++i) EXPECT_TRUE(track.Add(Transform("base", i * 10 * kStep, 0), "").ok());
   EXPECT_FALSE(track.Next(45 * kStep).has_value()) << "it moves, so nobody knows where it is";
   track.SkipBefore(45 * kStep);
   EXPECT_EQ(track.skipped_count(), 3);
   EXPECT_EQ(track.waiting_count(), 1u);
   track.SkipBefore(70 * kStep);
-  track.Add(Transform("base", 65 * kStep, 0), "");
+  EXPECT_TRUE(track.Add(Transform("base", 65 * kStep, 0), "").ok());
   EXPECT_EQ(track.late_count(), 1);
   EXPECT_EQ(track.skipped_count(), 4);
-  track.Add(Transform("base", 70 * kStep, 3), "");
-  track.Add(Transform("odom", 90 * kStep, 1), "");
+  EXPECT_TRUE(track.Add(Transform("base", 70 * kStep, 3), "").ok());
+  EXPECT_TRUE(track.Add(Transform("odom", 90 * kStep, 1), "").ok());
   EXPECT_EQ(track.Next()->root_T_body.position.x(), 4);
 }
 
 TEST(BodyTrack, DoesNotWaitForWhatStands) {
   BodyTrack track = BaseInMap(/*is_repeated=*/false);
-  track.Add(Transform("odom", 10 * kStep, 5), "");
-  track.Add(Transform("base", 20 * kStep, 1), "");
+  EXPECT_TRUE(track.Add(Transform("odom", 10 * kStep, 5), "").ok());
+  EXPECT_TRUE(track.Add(Transform("base", 20 * kStep, 1), "").ok());
   EXPECT_EQ(track.Next()->root_T_body.position.x(), 6) << "it came once, and need not come again";
-  track.Add(Transform("odom", 30 * kStep, 5), "");
-  track.Add(Transform("base", 40 * kStep, 1), "");
+  EXPECT_TRUE(track.Add(Transform("odom", 30 * kStep, 5), "").ok());
+  EXPECT_TRUE(track.Add(Transform("base", 40 * kStep, 1), "").ok());
   EXPECT_FALSE(track.Next().has_value());
   EXPECT_FALSE(track.Next(39 * kStep).has_value());
   EXPECT_EQ(track.Next(40 * kStep)->root_T_body.position.x(), 6) << "it has never moved";
@@ -139,14 +141,37 @@ TEST(BodyTrack, DoesNotWaitForWhatStands) {
 
 TEST(BodyTrack, IsBoundedInMemory) {
   BodyTrack track = BaseInMap(/*is_repeated=*/true, 100);
-  for (int i = 1; i < 1000; ++i) track.Add(Transform("base", i * kStep, 0), "");
+  for (int i = 1; i < 1000; ++i) EXPECT_TRUE(track.Add(Transform("base", i * kStep, 0), "").ok());
   EXPECT_EQ(track.waiting_count(), 100u);
   EXPECT_EQ(track.skipped_count(), 899);
-  for (int i = 1; i < 1000; ++i) track.Add(Transform("odom", i * kStep, i), "");
+  for (int i = 1; i < 1000; ++i) EXPECT_TRUE(track.Add(Transform("odom", i * kStep, i), "").ok());
   const auto pose = track.Next();
   ASSERT_TRUE(pose.has_value());
   EXPECT_EQ(pose->time_ns, 900 * kStep);
   EXPECT_EQ(pose->root_T_body.position.x(), 900);
+}
+
+// Without this all that came after the jump would be passed over.
+TEST(BodyTrack, RefusesAClockThatHasJumped) {
+  BodyTrack track = BaseInMap();
+  EXPECT_TRUE(track.Add(Transform("base", 10 * kStep, 1), "message 1").ok());
+  EXPECT_TRUE(track.Add(Transform("base", 9000 * kStep, 1), "message 2").ok());
+  for (int i = 1; i < kStepsBackMax; ++i) {
+    ASSERT_TRUE(track.Add(Transform("base", (10 + i) * kStep, 1), "message 3").ok()) << i;
+  }
+  const absl::Status status = track.Add(Transform("base", 99 * kStep, 1), "message 22");
+  EXPECT_EQ(ReasonOf(status), Reason::kFileMalformed);
+  EXPECT_NE(status.message().find("message 22 has stamp 99000000"), std::string::npos) << status;
+  EXPECT_NE(status.message().find("stamp 9000000000 of message 2:"), std::string::npos) << status;
+}
+
+TEST(BodyTrack, TakesPublishersThatTakeTurns) {
+  BodyTrack track = BaseInMap();
+  for (int i = 1; i < 5 * kStepsBackMax; ++i) {
+    ASSERT_TRUE(track.Add(Transform("base", 10 * i * kStep, 1), "").ok()) << i;
+    ASSERT_TRUE(track.Add(Transform("base", (10 * i - 3) * kStep, 1), "").ok()) << i;
+  }
+  EXPECT_EQ(track.passed_over_count(), 5 * kStepsBackMax - 1);
 }
 
 }  // namespace
