@@ -31,11 +31,13 @@ void DeltaSink::NumberByNews() {
   sequence_ = committed_sequence_ = last_sequence_;
 }
 
-void DeltaSink::BeginEnd() {
+absl::Status DeltaSink::BeginEnd() {
+  if (sequence_ < last_sequence_) return IsShorter();
   is_at_end_ = true;
   header_.session_id = EndSessionId(header_.session_id);
   last_sequence_ = end_sequence_;
   sequence_ = committed_sequence_ = 0;
+  return absl::OkStatus();
 }
 
 absl::Status DeltaSink::Put(GraphDelta delta) {
@@ -129,6 +131,14 @@ absl::Status DeltaSink::EndWasTold() const {
       absl::StrCat(header_.message, ": an earlier run has told map \"", header_.map,
                    "\" the end of this log, and it has grown since; what it showed then cannot be "
                    "continued: take the whole log into another --map"));
+}
+
+absl::Status DeltaSink::IsShorter() const {
+  return absl::FailedPreconditionError(absl::StrCat(
+      header_.message, ": map \"", header_.map, "\" holds ", last_sequence_,
+      " parts of this log, and it ends after ", sequence_,
+      "; its end is not told to the map: run the same again on the whole log, or take this one "
+      "into another --map"));
 }
 
 void DeltaSink::FillHeader(int64_t sequence, GraphDelta* delta) const {

@@ -65,7 +65,9 @@ class DeltaSink {
   /// earlier run of that session got; then news before BeginEnd are refused with
   /// FAILED_PRECONDITION, since the log has grown after its end was told.
   void SplitEnd(int64_t end_sequence) { end_sequence_ = end_sequence; }
-  void BeginEnd();
+  /// Errors: FAILED_PRECONDITION if an earlier run has committed more of the log than has come: it
+  /// has become shorter, and its end is another.
+  absl::Status BeginEnd();
 
   /// Takes the next delta of the log, whatever its size. An empty one is passed over.
   ///
@@ -88,6 +90,7 @@ class DeltaSink {
   absl::Status CommitNext(GraphDelta delta);
   void FillHeader(int64_t sequence, GraphDelta* delta) const;
   absl::Status EndWasTold() const;
+  absl::Status IsShorter() const;
   absl::Status Commit(GraphDelta delta);
   absl::StatusOr<CommitResult> Send(const GraphDelta& delta);
   void Count(const GraphDelta& delta);

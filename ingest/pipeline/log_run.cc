@@ -220,7 +220,7 @@ absl::Status LogRun::CommitStale() {
 }
 
 absl::Status LogRun::Finish() {
-  if (is_followed_ && is_timed_) sink_.BeginEnd();
+  if (is_followed_ && is_timed_) DSG_RETURN_IF_ERROR(sink_.BeginEnd());
   frames_.Finish();
   DSG_RETURN_IF_ERROR(SeeFrames());
   for (Stage* stage : stages_) stage->Close();

@@ -163,5 +163,18 @@ TEST_F(FollowedRoom, IsRefusedIfItGrowsAfterItsEndWasTold) {
   EXPECT_EQ(HeadOf("office").digest, head.digest);
 }
 
+TEST_F(FollowedRoom, IsRefusedIfItEndsBeforeWhatTheMapHolds) {
+  ASSERT_TRUE(Ingest("whole", Begin(1.0), FollowFor(milliseconds(0))).ok());
+  const int cut = static_cast<int>(HeadOf("whole").revision) * 3 / 4;
+  EXPECT_FALSE(Ingest("office", Begin(1.0), FollowFor(milliseconds(0)), cut).ok());
+  const RevisionInfo head = HeadOf("office");
+  const absl::Status refused = Ingest("office", Begin(0.55), FollowFor(milliseconds(0))).status();
+  EXPECT_TRUE(absl::IsFailedPrecondition(refused)) << refused;
+  EXPECT_NE(refused.message().find("and it ends after"), std::string::npos) << refused;
+  EXPECT_EQ(HeadOf("office").digest, head.digest);
+  ASSERT_TRUE(Ingest("office", Begin(1.0), FollowFor(milliseconds(0))).ok());
+  EXPECT_EQ(HeadOf("office").digest, HeadOf("whole").digest);
+}
+
 }  // namespace
 }  // namespace dsg::ingest
