@@ -124,4 +124,6 @@ int Main(int argc, char** argv) {
 }  // namespace
 }  // namespace dsg::evaluation
 
-int main(int argc, char** argv) { return dsg::evaluation::Main(argc, argv); }
+int main(int argc, char** argv) {
+  return dsg::CodeAfterOutput("dsg-eval", dsg::evaluation::Main(argc, argv));
+}

@@ -24,9 +24,9 @@ struct SpillPiece {
   bool empty() const { return offset < 0; }
 };
 
-/// The file is made at the first write. It has no name (O_TMPFILE, or unlinked at once), mode 0600,
-/// and is not passed on to programs that are started: nothing is left behind however the process
-/// ends, and nobody else reads it.
+/// The file is made by Open, or at the first write. It has no name (O_TMPFILE, or unlinked at
+/// once), mode 0600, and is not passed on to programs that are started: nothing is left behind
+/// however the process ends, and nobody else reads it.
 ///
 /// Threads: Read from many; the rest one caller at a time, and none meanwhile.
 class SpillFile {
@@ -36,6 +36,10 @@ class SpillFile {
   ~SpillFile();
   SpillFile(const SpillFile&) = delete;
   SpillFile& operator=(const SpillFile&) = delete;
+
+  /// Makes the file now, to know early whether the folder takes one.
+  /// Errors: UNAVAILABLE naming the folder.
+  absl::Status Open();
 
   /// Puts `bytes` in the place of what was in `piece`. Nothing is written if they are the same.
   ///
@@ -53,7 +57,6 @@ class SpillFile {
   int64_t byte_count() const { return end_; }
 
  private:
-  absl::Status Open();
   absl::Status Failure(const char* what, int error) const;
 
   std::string folder_;

@@ -15,6 +15,7 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/files/spill_file.h"
 #include "ingest/log/log_source.h"
 #include "ingest/log/peeked_log.h"
 #include "ingest/pipeline/ingest_log.h"
@@ -288,6 +289,8 @@ absl::Status Run(const IngestFlags& flags) {
   DSG_RETURN_IF_ERROR(CheckMapName(flags.map));
   DSG_RETURN_IF_ERROR(CheckUp(flags.up));
   DSG_RETURN_IF_ERROR(ParseRetryFor(flags.retry_for).status());
+  // Hours into a log is too late to find out.
+  if (!flags.spill_folder.empty()) DSG_RETURN_IF_ERROR(SpillFile(flags.spill_folder).Open());
   if (flags.is_followed) StopAtSignals();
   DSG_ASSIGN_OR_RETURN(const LogOptions options, MakeLogOptions(flags, &is_stopped));
   DSG_ASSIGN_OR_RETURN(const IngestOptions ingest_options, MakeIngestOptions(flags));
@@ -318,6 +321,17 @@ ExitCode Report(const absl::Status& status) {
   return ExitCodeOf(status);
 }
 
+// The first option that is given an empty value, as of a variable of the shell that is not set; it
+// would count as 0, or as not given.
+const CLI::Option* FirstEmpty(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& value : option->results()) {
+      if (value.empty()) return option;
+    }
+  }
+  return nullptr;
+}
+
 int Main(int argc, char** argv) {
   CLI::App app("dsg-ingest: reads logs and scene graphs into a map of a dynamic scene graph store",
                "dsg-ingest");
@@ -332,6 +346,11 @@ int Main(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kDone : kUsage;
+  }
+  if (const CLI::Option* const empty = FirstEmpty(app)) {
+    std::fprintf(stderr, "dsg-ingest: %s has an empty value; give one, or leave the option out\n",
+                 empty->get_name().c_str());
+    return kUsage;
   }
   if (flags.store.empty() && flags.server.empty()) {
     std::fputs("dsg-ingest: give --store DIR or --server ADDR\n", stderr);
@@ -366,5 +385,5 @@ int Main(int argc, char** argv) {
 int main(int argc, char** argv) {
   // A file over the limit of the shell is a failed write with a message, not a sudden end.
   std::signal(SIGXFSZ, SIG_IGN);
-  return dsg::ingest::Main(argc, argv);
+  return dsg::CodeAfterOutput("dsg-ingest", dsg::ingest::Main(argc, argv));
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "schema/base/exit_code.h"
 
+#include <cstdio>
+
 #include "schema/base/status.h"
 
 namespace dsg {
@@ -19,6 +21,13 @@ ExitCode ExitCodeOf(const absl::Status& status) {
     default:
       return kFailed;
   }
+}
+
+int CodeAfterOutput(const char* program, int code) {
+  const bool is_written = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
+  if (is_written || code != kDone) return code;
+  std::fprintf(stderr, "%s: the output could not be written out in full\n", program);
+  return kUnavailable;
 }
 
 }  // namespace dsg

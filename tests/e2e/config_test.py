@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 import re
+import subprocess
 import unittest
 
 import support
@@ -167,6 +168,29 @@ class Configuration(support.ProgramsTest):
         self.refused(2, ["--retry-for", "--server"], "dsg-ingest", "--store", "none", "--map", "m",
                      "--retry-for", "5m", self.small)
         self.assertFalse(os.path.exists(self.path("none")))
+
+    def test_an_empty_value_is_no_zero(self):
+        config = self.write("empty.yaml", 'voxel: ""\n')
+        for options, word in ((["--floor-z", ""], "--floor-z"), (["--loops", ""], "--loops"),
+                              (["--config", config], "--voxel")):
+            self.refused(2, [word + " has an empty value"], "dsg-ingest", "--store", "none",
+                         "--map", "m", *options, self.small)
+        self.assertFalse(os.path.exists(self.path("none")))
+
+    def test_a_folder_that_takes_no_file_is_known_before_the_log(self):
+        self.refused(3, ["/proc", "--spill-folder"], "dsg-ingest", "--store", "none", "--map", "m",
+                     "--spill-folder", "/proc", self.small)
+        self.assertFalse(os.path.exists(self.path("none")))
+
+    def test_output_that_does_not_arrive_is_no_success(self):
+        with open("/dev/full", "w", encoding="utf-8") as full:
+            for more in (["--print-config"], ["--json"], []):
+                done = subprocess.run(
+                    ["dsg-ingest", "--store", "full", "--map", "m", *more, self.small],
+                    cwd=self.folder, env=support.environment(), stdout=full,
+                    stderr=subprocess.PIPE, text=True, check=False)
+                self.assertEqual(3, done.returncode, done.stderr)
+                self.assertIn("could not be written out in full", done.stderr)
 
     def test_shipped_files_are_in_force(self):
         names = sorted(os.listdir(SHIPPED))
