@@ -125,5 +125,6 @@ int Main(int argc, char** argv) {
 }  // namespace dsg::evaluation
 
 int main(int argc, char** argv) {
-  return dsg::CodeAfterOutput("dsg-eval", dsg::evaluation::Main(argc, argv));
+  const int code = dsg::evaluation::Main(argc, argv);
+  return code == dsg::kDone ? dsg::evaluation::ReportError(dsg::FinishOutput()) : code;
 }

@@ -296,5 +296,6 @@ int Main(int argc, char** argv) {
 int main(int argc, char** argv) {
   // A file over the limit of the shell is a failed write with a message, not a sudden end.
   std::signal(SIGXFSZ, SIG_IGN);
-  return dsg::CodeAfterOutput("dsg-optimize", dsg::ingest::Main(argc, argv));
+  const int code = dsg::ingest::Main(argc, argv);
+  return code == dsg::kDone ? dsg::ingest::ReportError(dsg::FinishOutput()) : code;
 }

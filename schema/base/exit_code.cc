@@ -23,11 +23,9 @@ ExitCode ExitCodeOf(const absl::Status& status) {
   }
 }
 
-int CodeAfterOutput(const char* program, int code) {
-  const bool is_written = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
-  if (is_written || code != kDone) return code;
-  std::fprintf(stderr, "%s: the output could not be written out in full\n", program);
-  return kUnavailable;
+absl::Status FinishOutput() {
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return absl::OkStatus();
+  return absl::UnavailableError("the output could not be written out in full");
 }
 
 }  // namespace dsg

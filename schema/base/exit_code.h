@@ -20,8 +20,8 @@ enum ExitCode : int {
 
 ExitCode ExitCodeOf(const absl::Status& status);
 
-/// `code`, or kUnavailable with a message of `program` if it is kDone and what was written to
-/// standard output did not arrive: a full disk must not look like a complete answer.
-int CodeAfterOutput(const char* program, int code);
+/// UNAVAILABLE if what was written to standard output did not arrive: a full disk must not look
+/// like a complete answer. For the end of a program.
+absl::Status FinishOutput();
 
 }  // namespace dsg
