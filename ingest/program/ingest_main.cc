@@ -322,9 +322,10 @@ ExitCode Report(const absl::Status& status) {
 }
 
 // The first option that is given an empty value, as of a variable of the shell that is not set; it
-// would count as 0, or as not given.
+// would count as 0, or as not given. A prefix may be empty.
 const CLI::Option* FirstEmpty(const CLI::App& app) {
   for (const CLI::Option* option : app.get_options()) {
+    if (option->check_lname("agent-prefix")) continue;
     for (const std::string& value : option->results()) {
       if (value.empty()) return option;
     }
