@@ -15,6 +15,7 @@ namespace {
 constexpr int kCommitTriesMax = 3;
 // Each names hundreds of nodes that the map has forgotten; they can be forgotten while we mend.
 constexpr int kMendTriesMax = 100;
+constexpr int kRevisionsPerCall = 1000;
 
 int64_t PoseCount(const GraphDelta& delta) {
   int64_t count = 0;
@@ -34,7 +35,7 @@ void DeltaSink::NumberByNews() {
 absl::Status DeltaSink::BeginEnd() {
   if (sequence_ < last_sequence_) return IsShorter();
   is_at_end_ = true;
-  header_.session_id = EndSessionId(header_.session_id);
+  header_.session_id = EndSessionId(session_id_);
   last_sequence_ = end_sequence_;
   sequence_ = committed_sequence_ = 0;
   return absl::OkStatus();
@@ -141,6 +142,17 @@ absl::Status DeltaSink::IsShorter() const {
       "into another --map"));
 }
 
+absl::Status DeltaSink::WasReverted(const Undoing& undoing) const {
+  const std::string undo = absl::StrCat("go back with \"dsg revert ", undoing.before,
+                                        "\" and run the same again, or take");
+  return absl::AbortedError(absl::StrCat(
+      header_.message, ": map \"", header_.map, "\" was reverted to revision ", undoing.to,
+      " by \"", undoing.revert.author, "\" (revision ", undoing.revert.revision,
+      "), and what this log had told it until revision ", undoing.newest_undone,
+      " is no longer there: ", undoing.has_later ? "take" : undo,
+      " the whole log into another --map"));
+}
+
 void DeltaSink::FillHeader(int64_t sequence, GraphDelta* delta) const {
   delta->map = header_.map;
   delta->session_id = header_.session_id;
@@ -161,8 +173,26 @@ absl::Status DeltaSink::Commit(GraphDelta delta) {
   Count(delta);
   if (!result.ok()) return Annotate(result.status(), delta.message);
   forgotten_.ObserveTaken(delta);
-  counts_.last_revision = result->revision;
-  return absl::OkStatus();
+  // Others have committed since: what, is asked only then, so that a writer alone asks nothing.
+  const Revision previous = std::exchange(counts_.last_revision, result->revision);
+  if (previous == 0 || result->revision <= previous + 1) return absl::OkStatus();
+  return CheckIsKept(previous);
+}
+
+absl::Status DeltaSink::CheckIsKept(Revision from) const {
+  UndoingSearch search([this](const std::string& session_id) {
+    return session_id == session_id_ || session_id == EndSessionId(session_id_);
+  });
+  for (Revision before = 0;;) {
+    DSG_ASSIGN_OR_RETURN(const std::vector<RevisionInfo> revisions,
+                         map_.ListRevisions(before, kRevisionsPerCall));
+    for (const RevisionInfo& info : revisions) {
+      if (info.revision >= from) search.Take(info);
+    }
+    if (std::ssize(revisions) < kRevisionsPerCall || revisions.back().revision <= from) break;
+    before = revisions.back().revision;
+  }
+  return search.found().has_value() ? WasReverted(*search.found()) : absl::OkStatus();
 }
 
 absl::StatusOr<CommitResult> DeltaSink::Send(const GraphDelta& delta) {

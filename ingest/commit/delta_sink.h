@@ -12,6 +12,7 @@
 #include "ingest/commit/map_view.h"
 #include "ingest/commit/reconciler.h"
 #include "schema/store/graph_writer.h"
+#include "schema/store/reverts.h"
 
 namespace dsg::ingest {
 
@@ -49,11 +50,17 @@ class DeltaSink {
   DeltaSink(SessionHeader header, int64_t last_sequence, bool is_size_bounded, const MapView& map,
             GraphWriter& writer)
       : header_(std::move(header)),
+        session_id_(header_.session_id),
         last_sequence_(last_sequence),
         is_size_bounded_(is_size_bounded),
+        map_(map),
         reconciler_(map),
         forgotten_(map),
         writer_(writer) {}
+
+  /// Whether the map still holds what this session has committed at `from` and later.
+  /// Errors: ABORTED if a revert has taken any of it out.
+  absl::Status CheckIsKept(Revision from) const;
 
   /// For a log that is cut into other deltas each time it is read, as it grows: what an earlier run
   /// has committed is known by the map that holds it, and not by the number of its delta. Before
@@ -71,7 +78,8 @@ class DeltaSink {
 
   /// Takes the next delta of the log, whatever its size. An empty one is passed over.
   ///
-  /// Errors: what Reconciler::Reconcile and GraphWriter::Commit return.
+  /// Errors: what Reconciler::Reconcile and GraphWriter::Commit return; ABORTED if the map was
+  /// reverted since the delta before, to what it held before that.
   absl::Status Put(GraphDelta delta);
 
   /// As Put, for what only this session speaks of: it is not compared with what the map held before
@@ -92,10 +100,13 @@ class DeltaSink {
   absl::Status EndWasTold() const;
   absl::Status IsShorter() const;
   absl::Status Commit(GraphDelta delta);
+  absl::Status WasReverted(const Undoing& undoing) const;
   absl::StatusOr<CommitResult> Send(const GraphDelta& delta);
   void Count(const GraphDelta& delta);
 
   SessionHeader header_;
+  /// Of all deltas but those of the end.
+  std::string session_id_;
   int64_t last_sequence_;
   bool is_size_bounded_;
   /// Only deltas with news have numbers.
@@ -107,6 +118,7 @@ class DeltaSink {
   int64_t sequence_ = 0;
   /// Of the delta that the writer got last.
   int64_t committed_sequence_ = 0;
+  const MapView& map_;
   Reconciler reconciler_;
   Forgotten forgotten_;
   GraphWriter& writer_;

@@ -47,6 +47,10 @@ class MapView {
   virtual absl::StatusOr<std::optional<TrackInfo>> FindTrackNow(NodeId agent) const = 0;
   /// Agents of the map as it is by now.
   virtual absl::StatusOr<std::set<NodeId>> AgentsNow() const = 0;
+  /// Revisions of the map as it is by now, newest first, below `before` (0 = from the newest), at
+  /// most `limit`.
+  virtual absl::StatusOr<std::vector<RevisionInfo>> ListRevisions(Revision before,
+                                                                  int limit) const = 0;
   /// The stored stay that holds an instant; nullopt also when the map cannot be asked for it.
   virtual absl::StatusOr<std::optional<Stay>> StayAt(NodeId agent, TimeNs at_ns) const = 0;
 };

@@ -73,6 +73,11 @@ class RemoteMapView : public MapView {
     return map_.ReadPoses(agent, from_ns, to_ns);
   }
 
+  absl::StatusOr<std::vector<RevisionInfo>> ListRevisions(Revision before,
+                                                          int limit) const override {
+    return map_.ListRevisions(before, limit);
+  }
+
   // The services tell where an agent was, not the key of the stay.
   absl::StatusOr<std::optional<Stay>> StayAt(NodeId, TimeNs) const override { return std::nullopt; }
 

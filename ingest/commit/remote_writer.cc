@@ -234,6 +234,27 @@ class GrpcRemoteMap : public RemoteMap {
     return agents;
   }
 
+  absl::StatusOr<std::vector<RevisionInfo>> ListRevisions(Revision before, int limit) override {
+    v1::ListRevisionsRequest request;
+    request.set_map(spec_.name);
+    request.set_before_revision(before);
+    request.set_page_size(limit);
+    v1::ListRevisionsResponse response;
+    DSG_RETURN_IF_ERROR(connection_->Call(&query::Api::ListRevisions, request, &response));
+    std::vector<RevisionInfo> revisions;
+    for (const v1::Revision& proto : response.revisions()) {
+      RevisionInfo& info = revisions.emplace_back();
+      info.revision = proto.revision();
+      info.committed_ns = proto.committed_ns();
+      info.author = proto.author();
+      info.message = proto.message();
+      info.session_id = proto.session_id();
+      info.sequence = proto.sequence();
+      info.config_digest = proto.config_digest();
+    }
+    return revisions;
+  }
+
   absl::StatusOr<std::optional<TrackInfo>> FindTrack(NodeId agent,
                                                      std::optional<Revision> at) override {
     v1::GetNodeRequest request;

@@ -11,6 +11,7 @@
 #include "query/client/retry.h"
 #include "schema/model/layer.h"
 #include "schema/model/node.h"
+#include "schema/model/revision.h"
 #include "schema/store/graph_writer.h"
 #include "schema/store/snapshot.h"
 
@@ -37,6 +38,9 @@ class RemoteMap {
   /// Stored poses with from_ns <= time < to_ns, ascending; for comparing a log that overlaps.
   virtual absl::StatusOr<std::vector<TimedPose>> ReadPoses(NodeId agent, TimeNs from_ns,
                                                            TimeNs to_ns) = 0;
+  /// Newest first, below `before` (0 = from the newest), at most `limit`; without digests and
+  /// counts.
+  virtual absl::StatusOr<std::vector<RevisionInfo>> ListRevisions(Revision before, int limit) = 0;
   /// Whether opening has made the map.
   virtual bool is_new() const = 0;
   /// Drops the map if it is still the one that was opened, at revision `head`. Nothing may be

@@ -102,6 +102,11 @@ class SnapshotMapView : public MapView {
     return poses;
   }
 
+  absl::StatusOr<std::vector<RevisionInfo>> ListRevisions(Revision before,
+                                                          int limit) const override {
+    return map_->ListRevisions(before, limit);
+  }
+
   absl::StatusOr<std::optional<Stay>> StayAt(NodeId agent, TimeNs at_ns) const override {
     return snapshot_->StayAt(agent, at_ns);
   }

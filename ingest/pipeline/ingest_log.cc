@@ -179,9 +179,11 @@ absl::StatusOr<IngestSummary> IngestLog(LogSource& log, const LogOptions& log_op
                          writer.GetSession(EndSessionId(header.session_id)));
     plan.end_sequence = end.last_sequence;
   }
-  LogRun run(
-      std::move(plan), map,
-      DeltaSink(std::move(header), session.last_sequence, options.is_size_bounded, map, writer));
+  DeltaSink sink(std::move(header), session.last_sequence, options.is_size_bounded, map, writer);
+  if (session.last_sequence > 0) {
+    DSG_RETURN_IF_ERROR(sink.CheckIsKept(session.first_revision));
+  }
+  LogRun run(std::move(plan), map, std::move(sink));
   if (follow.has_value()) log.SetIdle([&run] { return run.CommitStale(); });
   int64_t given_count = 0;
   for (int64_t count = 1;; ++count) {

@@ -141,6 +141,8 @@ absl::Status EndFailedRun(const absl::Status& failure, const std::string& path, 
                           bool is_followed, Destination* destination) {
   // Whether the last commit was made is open, or nobody answers.
   if (destination == nullptr || absl::IsUnavailable(failure)) return failure;
+  // Somebody has reverted the map; what can be done about that the failure says.
+  if (absl::IsAborted(failure) && ReasonOf(failure) == Reason::kUnspecified) return failure;
   if (!is_first || !destination->is_new()) return TellWhatStays(failure, destination);
   // Somebody has dropped or renamed it meanwhile.
   const Reason reason = ReasonOf(failure);

@@ -12,6 +12,7 @@
 #include "query/maintenance/prune_convert.h"
 #include "query/maintenance/revert_plan.h"
 #include "schema/base/status.h"
+#include "schema/store/reverts.h"
 
 namespace dsg::query {
 namespace {
@@ -54,7 +55,7 @@ class Reversion final : public EngineCursor<v1::RevertResponse> {
     present_ = present;
     parent_ = present->revision();
     next_ = 0;
-    session_id_ = NewSessionId("revert");
+    session_id_ = NewSessionId(RevertSessionName(wanted_->revision()));
     is_planned_ = true;
     return absl::OkStatus();
   }

@@ -2,11 +2,16 @@
 // Ingest through a real server on a socket of its own.
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <thread>
 
 #include "absl/strings/str_cat.h"
+#include "dsg/v1/maintenance_service.pb.h"
 #include "ingest/commit/remote_writer.h"
 #include "ingest/pipeline/ingest_log.h"
+#include "query/api/api.h"
+#include "query/api/stream_cursor.h"
+#include "query/client/remote_api.h"
 #include "schema/base/status.h"
 #include "schema/store/graph_store.h"
 #include "server/server.h"
@@ -45,11 +50,27 @@ class RemoteMapTest : public testing::Test {
   }
 
   absl::StatusOr<IngestSummary> Ingest(const std::string& path, RemoteMap& map) {
+    return Ingest(path, map, map.writer());
+  }
+
+  absl::StatusOr<IngestSummary> Ingest(const std::string& path, RemoteMap& map,
+                                       GraphWriter& writer) {
     LogOptions options;
     options.epoch_ns = map.spec().epoch_ns;
     DSG_ASSIGN_OR_RETURN(const std::unique_ptr<LogSource> log, OpenLog(path, options));
     const std::unique_ptr<MapView> view = MakeRemoteMapView(map);
-    return IngestLog(*log, options, {.poses_per_delta = 50}, *view, map.writer(), {});
+    return IngestLog(*log, options, {.poses_per_delta = 50}, *view, writer, {});
+  }
+
+  absl::Status Revert(Revision revision) {
+    DSG_ASSIGN_OR_RETURN(const std::unique_ptr<query::Api> api, client::Connect(address()));
+    v1::RevertRequest request;
+    request.set_map("test");
+    request.set_revision(revision);
+    request.set_author("ann");
+    const query::CallContext call;
+    return query::ReadStream(call, api->Revert(call, request),
+                             [](const v1::RevertResponse&) { return true; });
   }
 
   static GraphDelta Rooms(int count, const std::string& session, int64_t sequence) {
@@ -202,14 +223,14 @@ TEST_F(RemoteMapTest, NamesAnAddressWhereNobodyListens) {
   EXPECT_NE(std::string(status.message()).find(address()), std::string::npos) << status;
 }
 
-// Commits a delta of somebody else before the third of its own.
+// Lets somebody else write to the map before its third delta.
 class CrossedWriter : public GraphWriter {
  public:
-  CrossedWriter(GraphWriter& writer, GraphDelta crossing)
+  CrossedWriter(GraphWriter& writer, std::function<absl::Status()> crossing)
       : writer_(writer), crossing_(std::move(crossing)) {}
 
   absl::StatusOr<CommitResult> Commit(GraphDelta delta) override {
-    if (++count_ == 3) DSG_RETURN_IF_ERROR(writer_.Commit(crossing_).status());
+    if (++count_ == 3) DSG_RETURN_IF_ERROR(crossing_());
     return writer_.Commit(std::move(delta));
   }
   absl::StatusOr<SessionState> GetSession(const std::string& session_id) override {
@@ -218,7 +239,7 @@ class CrossedWriter : public GraphWriter {
 
  private:
   GraphWriter& writer_;
-  GraphDelta crossing_;
+  std::function<absl::Status()> crossing_;
   int count_ = 0;
 };
 
@@ -234,13 +255,8 @@ TEST_F(RemoteMapTest, LogGoesOnWhenTheServerForgetsWhatItTold) {
   for (const NodeId id : {NodeId('H', 1), NodeId('R', 0), NodeId('p', 1)}) {
     prune.retirements.push_back({id, std::nullopt});
   }
-  CrossedWriter writer(map->writer(), prune);
-  LogOptions options;
-  options.epoch_ns = map->spec().epoch_ns;
-  const auto log = OpenLog(folder_.Write("a.txt", WalkRows(100)), options);
-  ASSERT_TRUE(log.ok()) << log.status();
-  const auto view = MakeRemoteMapView(*map);
-  const auto summary = IngestLog(**log, options, {.poses_per_delta = 50}, *view, writer, {});
+  CrossedWriter writer(map->writer(), [&] { return map->writer().Commit(prune).status(); });
+  const auto summary = Ingest(folder_.Write("a.txt", WalkRows(100)), *map, writer);
   ASSERT_TRUE(summary.ok()) << summary.status();
   // Two deltas of fifty poses of three agents were told before.
   EXPECT_EQ((*map->FindTrack(NodeId('H', 1), std::nullopt))->pose_count, 100 - 34);
@@ -252,6 +268,59 @@ TEST_F(RemoteMapTest, LogGoesOnWhenTheServerForgetsWhatItTold) {
   const Node agent = map->ListAgents()->at(0);
   EXPECT_EQ(agent.observation_count, 100 - 34);
   EXPECT_EQ(agent.first_observed_ns, (*map->FindTrack(agent.id, std::nullopt))->first_ns);
+}
+
+TEST_F(RemoteMapTest, LogEndsWhenTheServerRevertsWhatItTold) {
+  StartServer();
+  const auto map = OpenMap();
+  ASSERT_TRUE(map->writer().Commit(Rooms(2, "s", 1)).ok());
+  const std::string log = folder_.Write("a.txt", WalkRows(100));
+  CrossedWriter writer(map->writer(), [&] { return Revert(1); });
+  const absl::Status ended = Ingest(log, *map, writer).status();
+  EXPECT_EQ(ended.code(), absl::StatusCode::kAborted);
+  EXPECT_EQ(
+      ended.message(),
+      "a.txt (trajnet): map \"test\" was reverted to revision 1 by \"ann\" (revision 4), and what "
+      "this log had told it until revision 3 is no longer there: take the whole log into "
+      "another --map");
+  // Nor does the same log say "nothing new".
+  EXPECT_EQ(Ingest(log, *map).status(), ended);
+}
+
+TEST_F(RemoteMapTest, LogGoesOnWhenARevertIsUndone) {
+  StartServer();
+  const auto map = OpenMap();
+  ASSERT_TRUE(map->writer().Commit(Rooms(2, "s", 1)).ok());
+  const std::string log = folder_.Write("a.txt", WalkRows(100));
+  CrossedWriter stopped(map->writer(), [] { return absl::CancelledError("stopped"); });
+  EXPECT_EQ(Ingest(log, *map, stopped).status().code(), absl::StatusCode::kCancelled);
+  ASSERT_EQ(Revert(1), absl::OkStatus());
+  const absl::Status refused = Ingest(log, *map).status();
+  EXPECT_NE(std::string(refused.message()).find("go back with \"dsg revert 3\" and run the same"),
+            std::string::npos)
+      << refused;
+  ASSERT_EQ(Revert(3), absl::OkStatus());
+  const auto rest = Ingest(log, *map);
+  ASSERT_TRUE(rest.ok()) << rest.status();
+  EXPECT_EQ((*map->FindTrack(NodeId('H', 1), std::nullopt))->pose_count, 100);
+}
+
+TEST_F(RemoteMapTest, LogGoesOnWhenOthersRevertWhatIsTheirs) {
+  StartServer();
+  const auto map = OpenMap();
+  ASSERT_TRUE(map->writer().Commit(Rooms(2, "s", 1)).ok());
+  CrossedWriter writer(map->writer(), [&]() -> absl::Status {
+    GraphDelta label;
+    label.map = "test";
+    label.session_id = "other";
+    label.sequence = 1;
+    label.nodes.push_back(MakeRoom(7, 90, 0, 95, 5));
+    DSG_ASSIGN_OR_RETURN(const CommitResult result, map->writer().Commit(label));
+    return Revert(result.revision - 1);
+  });
+  const auto summary = Ingest(folder_.Write("a.txt", WalkRows(100)), *map, writer);
+  ASSERT_TRUE(summary.ok()) << summary.status();
+  EXPECT_EQ((*map->FindTrack(NodeId('H', 1), std::nullopt))->pose_count, 100);
 }
 
 TEST_F(RemoteMapTest, TakesALogAndItsContinuation) {
