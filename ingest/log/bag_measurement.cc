@@ -34,14 +34,6 @@ ChannelRank RankOf(TopicUse use) {
   }
 }
 
-TimeNs StampOf(const Measurement& measurement) {
-  if (const auto* imu = std::get_if<ImuMeasurement>(&measurement)) return imu->time_ns;
-  if (const auto* image = std::get_if<ImageMeasurement>(&measurement)) return image->time_ns;
-  if (const auto* pose = std::get_if<PoseMeasurement>(&measurement)) return pose->pose.time_ns;
-  if (const auto* loop = std::get_if<LoopMeasurement>(&measurement)) return loop->time_ns;
-  return std::get<HumanDetection>(measurement).time_ns;
-}
-
 BagMeasurements::BagMeasurements(std::shared_ptr<const Bag> bag,
                                  std::map<uint32_t, int32_t> class_of_color, std::string robot_name)
     : bag_(std::move(bag)),

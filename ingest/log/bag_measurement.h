@@ -24,8 +24,6 @@ bool IsImage(TopicUse use);
 /// Measured by the robot itself: an image, or an inertial sample.
 bool IsSensor(TopicUse use);
 ChannelRank RankOf(TopicUse use);
-/// Requires: no piece of a graph.
-TimeNs StampOf(const Measurement& measurement);
 
 /// Threads: any number of callers.
 class BagMeasurements {

@@ -75,6 +75,16 @@ struct LoopMeasurement {
 using Measurement = std::variant<PoseMeasurement, GraphMeasurement, ImuMeasurement,
                                  ImageMeasurement, HumanDetection, LoopMeasurement>;
 
+/// When it was measured; kTimeMin for a piece of a graph, which speaks of many times.
+inline TimeNs StampOf(const Measurement& measurement) {
+  if (std::holds_alternative<GraphMeasurement>(measurement)) return kTimeMin;
+  if (const auto* pose = std::get_if<PoseMeasurement>(&measurement)) return pose->pose.time_ns;
+  if (const auto* imu = std::get_if<ImuMeasurement>(&measurement)) return imu->time_ns;
+  if (const auto* image = std::get_if<ImageMeasurement>(&measurement)) return image->time_ns;
+  if (const auto* loop = std::get_if<LoopMeasurement>(&measurement)) return loop->time_ns;
+  return std::get<HumanDetection>(measurement).time_ns;
+}
+
 /// What a reader knows of its log before the first measurement.
 struct LogInfo {
   /// "obsmat", "trajnet", "trajnet-ndjson", "thor", "euroc", "spark-dsg", "kimera-json",

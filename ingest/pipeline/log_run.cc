@@ -19,18 +19,6 @@ std::string ChannelOf(const Measurement& measurement) {
   return std::holds_alternative<ImuMeasurement>(measurement) ? "imu0" : "detections0";
 }
 
-TimeNs TimeIn(const GraphMeasurement&) { return kTimeMin; }
-TimeNs TimeIn(const PoseMeasurement& pose) { return pose.pose.time_ns; }
-template <typename Sensor>
-TimeNs TimeIn(const Sensor& measurement) {
-  return measurement.time_ns;
-}
-
-// kTimeMin for what has none.
-TimeNs TimeOf(const Measurement& measurement) {
-  return std::visit([](const auto& any) { return TimeIn(any); }, measurement);
-}
-
 std::set<std::string, std::less<>> EyesOf(const RunPlan& plan) {
   if (!plan.has_layers) return {};
   const auto& channels = plan.info.channel_counts;
@@ -84,7 +72,7 @@ LogRun::LogRun(RunPlan plan, const MapView& map, DeltaSink sink)
 }
 
 absl::Status LogRun::Take(Measurement& measurement) {
-  if (!IsStrayLoop(measurement)) DSG_RETURN_IF_ERROR(CommitIfDue(TimeOf(measurement)));
+  if (!IsStrayLoop(measurement)) DSG_RETURN_IF_ERROR(CommitIfDue(StampOf(measurement)));
   if (auto* graph = std::get_if<GraphMeasurement>(&measurement)) {
     return TakeGraph(std::move(graph->delta));
   }
