@@ -133,8 +133,12 @@ class Attacher {
   // The space that a link has swept is convex: whoever is in it gets to both ends.
   bool IsBesideLink(PlaceIndex place, const Eigen::Vector3d& point_map) const {
     const Eigen::Vector3d& place_map = graph_.position_map(place);
+    const double to_place_m = (place_map - point_map).norm();
     return std::any_of(graph_.links_begin(place), graph_.links_end(place), [&](const auto& link) {
       const double free_m = static_cast<double>(link.clearance_m) - limits_.radius_m;
+      // Most links are too short to lead there: their other ends need not be looked up.
+      constexpr double kRoundingM = 1e-9;
+      if (to_place_m - link.length_m > free_m + kRoundingM) return false;
       return limits_.Admits(link) && free_m >= 0.0 &&
              SquaredDistanceToSegment(point_map, place_map, graph_.position_map(link.to)) <=
                  free_m * free_m;
