@@ -12,55 +12,15 @@
 #include "ingest/loop/pose_covariance.h"
 #include "ingest/loop/residual.h"
 #include "ingest/loop/start.h"
+#include "ingest/solver/pose_block.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
 namespace {
 
-// A planar pose is x, y, yaw; a spatial one position, then quaternion x, y, z, w.
-using Block = std::array<double, 7>;
+// A planar pose is x, y, yaw; a spatial one a pose block.
+using Block = std::array<double, kPoseBlockSize>;
 using RowMatrix67 = Eigen::Matrix<double, 6, 7, Eigen::RowMajor>;
-
-Pose3d PoseOf(const double* block) {
-  return {Eigen::Vector3d(block[0], block[1], block[2]),
-          Eigen::Quaterniond(block[6], block[3], block[4], block[5])};
-}
-
-// Position in map axes, rotation on the right. Derivatives by a pose's block are handed to Ceres as
-// if the block began with these six numbers, so that quaternions are never differentiated.
-class PoseManifold : public ceres::Manifold {
- public:
-  int AmbientSize() const override { return 7; }
-  int TangentSize() const override { return 6; }
-
-  bool Plus(const double* x, const double* delta, double* x_plus_delta) const override {
-    const Pose3d pose = PoseOf(x);
-    const Eigen::Map<const Vector6d> step(delta);
-    Eigen::Map<Eigen::Vector3d>{x_plus_delta} = pose.position + step.head<3>();
-    const Eigen::Quaterniond turned = pose.orientation * RotationOf(step.tail<3>());
-    Eigen::Map<Eigen::Vector4d>{x_plus_delta + 3} = turned.coeffs().normalized();
-    return true;
-  }
-  bool PlusJacobian(const double*, double* jacobian) const override {
-    Eigen::Map<Eigen::Matrix<double, 7, 6, Eigen::RowMajor>>(jacobian).setIdentity();
-    return true;
-  }
-  bool Minus(const double* y, const double* x, double* y_minus_x) const override {
-    const Pose3d from = PoseOf(x);
-    const Pose3d to = PoseOf(y);
-    Eigen::Map<Vector6d> difference(y_minus_x);
-    difference.head<3>() = to.position - from.position;
-    const Pose3d turned{Eigen::Vector3d::Zero(), from.orientation.conjugate() * to.orientation};
-    difference.tail<3>() =
-        SpatialResidual(Pose3d(), Pose3d(), turned, RotationError::kVector, nullptr, nullptr)
-            .tail<3>();
-    return true;
-  }
-  bool MinusJacobian(const double*, double* jacobian) const override {
-    Eigen::Map<RowMatrix67>{jacobian}.setIdentity();
-    return true;
-  }
-};
 
 class SpatialCost : public ceres::SizedCostFunction<6, 7, 7> {
  public:
@@ -68,8 +28,8 @@ class SpatialCost : public ceres::SizedCostFunction<6, 7, 7> {
       : from_T_to_(edge.from_T_to), whitening_(information.llt().matrixU()), error_(error) {}
 
   bool Evaluate(const double* const* blocks, double* residuals, double** jacobians) const override {
-    const Pose3d from = PoseOf(blocks[0]);
-    const Pose3d to = PoseOf(blocks[1]);
+    const Pose3d from = PoseOfBlock(blocks[0]);
+    const Pose3d to = PoseOfBlock(blocks[1]);
     Eigen::Map<Vector6d> out(residuals);
     if (jacobians == nullptr) {
       out = whitening_ * SpatialResidual(from_T_to_, from, to, error_, nullptr, nullptr);
@@ -197,8 +157,7 @@ std::vector<Block> BlocksOf(const PoseGraph& graph, const std::vector<Pose3d>& p
     if (graph.is_planar) {
       Eigen::Map<Eigen::Vector3d>{block} = PlanarOf(poses[i]);
     } else {
-      Eigen::Map<Eigen::Vector3d>{block} = poses[i].position;
-      Eigen::Map<Eigen::Vector4d>(block + 3) = poses[i].orientation.coeffs();
+      WritePoseBlock(poses[i], block);
     }
   }
   return blocks;
@@ -242,12 +201,12 @@ ceres::Solver::Options SolverOptionsOf(const OptimizeOptions& options) {
 absl::Status Solve(const PoseGraph& graph, const OptimizeOptions& options,
                    const std::vector<int>& anchors, Optimized* optimized) {
   std::vector<Block> blocks = BlocksOf(graph, optimized->poses);
-  PoseManifold manifold;
+  const std::unique_ptr<ceres::Manifold> manifold = MakePoseManifold();
   ceres::Problem::Options problem_options;
   problem_options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   problem_options.disable_all_safety_checks = true;
   ceres::Problem problem(problem_options);
-  AddEdges(graph, options, &manifold, &blocks, &problem);
+  AddEdges(graph, options, manifold.get(), &blocks, &problem);
   for (const int anchor : anchors) {
     double* block = blocks[static_cast<size_t>(anchor)].data();
     if (problem.HasParameterBlock(block)) problem.SetParameterBlockConstant(block);
@@ -268,7 +227,8 @@ absl::Status Solve(const PoseGraph& graph, const OptimizeOptions& options,
     if (is_fixed[i]) continue;
     Pose3d& pose = optimized->poses[i];
     const double* block = blocks[i].data();
-    pose = graph.is_planar ? FromPlanar(Eigen::Vector3d(block), pose.position.z()) : PoseOf(block);
+    pose = graph.is_planar ? FromPlanar(Eigen::Vector3d(block), pose.position.z())
+                           : PoseOfBlock(block);
   }
   return absl::OkStatus();
 }

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "schema/model/rotation.h"
+
 namespace dsg::ingest {
 namespace {
 
@@ -12,37 +14,9 @@ using Eigen::Matrix3d;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-// Below this angle the series is exact to rounding.
-constexpr double kSmallAngle = 1e-4;
-
-Matrix3d Skew(const Vector3d& v) {
-  Matrix3d skew;
-  skew << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return skew;
-}
-
 // q and -q are one rotation; the one with w >= 0 turns by at most pi.
 Quaterniond ShortWay(const Quaterniond& q) {
   return q.w() < 0.0 ? Quaterniond(-q.w(), -q.x(), -q.y(), -q.z()) : q;
-}
-
-Vector3d RotationVector(const Quaterniond& short_way) {
-  const double sine = short_way.vec().norm();
-  if (sine < kSmallAngle) {
-    return (2.0 + sine * sine / 3.0) * short_way.vec();
-  }
-  return 2.0 * std::atan2(sine, short_way.w()) / sine * short_way.vec();
-}
-
-// d Log(E Exp(d)) / d d.
-Matrix3d InverseRightJacobian(const Vector3d& vector) {
-  const double angle = vector.norm();
-  const Matrix3d skew = Skew(vector);
-  const double square_share =
-      angle < kSmallAngle
-          ? 1.0 / 12.0
-          : 1.0 / (angle * angle) - std::cos(0.5 * angle) / (2.0 * angle * std::sin(0.5 * angle));
-  return Matrix3d::Identity() + 0.5 * skew + square_share * skew * skew;
 }
 
 double PlanarRotationError(double angle, RotationError error) {
@@ -51,14 +25,6 @@ double PlanarRotationError(double angle, RotationError error) {
 }
 
 }  // namespace
-
-Quaterniond RotationOf(const Vector3d& vector) {
-  const double angle = vector.norm();
-  const double share =
-      angle < kSmallAngle ? 0.5 - angle * angle / 48.0 : std::sin(0.5 * angle) / angle;
-  const Vector3d part = share * vector;
-  return {std::cos(0.5 * angle), part.x(), part.y(), part.z()};
-}
 
 RotationError RotationErrorOf(PoseObjective objective, bool is_planar) {
   const bool is_sine = objective == PoseObjective::kSeSync ||
@@ -93,17 +59,17 @@ Vector6d SpatialResidual(const Pose3d& from_T_to, const Pose3d& map_T_from, cons
 
   Vector6d residual;
   residual.head<3>() = z_transposed * (to_from - from_T_to.position);
-  residual.tail<3>() = is_vector ? RotationVector(rest) : Vector3d(2.0 * rest.vec());
+  residual.tail<3>() = is_vector ? RotationVectorOf(rest) : Vector3d(2.0 * rest.vec());
   if (by_from == nullptr || by_to == nullptr) return residual;
 
   by_from->setZero();
   by_to->setZero();
   by_to->topLeftCorner<3, 3>() = z_transposed * from_R_map;
   by_from->topLeftCorner<3, 3>() = -by_to->topLeftCorner<3, 3>();
-  by_from->topRightCorner<3, 3>() = z_transposed * Skew(to_from);
+  by_from->topRightCorner<3, 3>() = z_transposed * CrossMatrix(to_from);
   by_to->bottomRightCorner<3, 3>() =
       is_vector ? InverseRightJacobian(residual.tail<3>())
-                : Matrix3d(rest.w() * Matrix3d::Identity() + Skew(rest.vec()));
+                : Matrix3d(rest.w() * Matrix3d::Identity() + CrossMatrix(rest.vec()));
   by_from->bottomRightCorner<3, 3>() =
       -by_to->bottomRightCorner<3, 3>() * turn.conjugate().toRotationMatrix();
   return residual;

@@ -43,7 +43,4 @@ Eigen::Vector3d PlanarResidual(const Eigen::Vector3d& from_T_to, const Eigen::Ve
 /// Rows and columns 0, 1 and 5.
 Eigen::Matrix3d PlanarBlock(const Matrix6d& matrix);
 
-/// Exp: the rotation by a rotation vector.
-Eigen::Quaterniond RotationOf(const Eigen::Vector3d& vector);
-
 }  // namespace dsg::ingest

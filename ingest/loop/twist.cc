@@ -6,17 +6,13 @@
 #include <cmath>
 #include <limits>
 
+#include "schema/model/rotation.h"
+
 namespace dsg::ingest {
 namespace {
 
 constexpr int kPlanarRows[3] = {0, 1, 5};
 constexpr int kSpatialOnlyRows[3] = {2, 3, 4};
-
-Eigen::Matrix3d CrossMatrix(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d cross;
-  cross << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return cross;
-}
 
 }  // namespace
 

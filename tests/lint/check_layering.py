@@ -20,7 +20,7 @@ INGEST_STAGES = ["log", "simulator", "evaluation", "odometry", "loop", "depth", 
                  "objects", "places", "rooms"]
 # Plain types that stages hand to one another.
 INGEST_SHARED = ["ingest/config", "ingest/files", "ingest/sensor", "ingest/grid",
-                 "ingest/trajectory"]
+                 "ingest/trajectory", "ingest/solver"]
 # What is done with what the stages found.
 INGEST_ROOMS = ["ingest/commit", "ingest/presence", "ingest/correction"]
 # Programs of their own beside the pipeline, which knows nothing of them.
@@ -47,6 +47,7 @@ ALLOWED = {
     "ingest/files": BASE + ["schema/files"],
     "ingest/sensor": MODEL,
     "ingest/grid": MODEL,
+    "ingest/solver": MODEL,
     "ingest/trajectory": MODEL + ["ingest/config", "ingest/files"],
     "ingest/commit": SCHEMA + ["query/api", "query/client"],
     "ingest/presence": MODEL + ["ingest/config"],

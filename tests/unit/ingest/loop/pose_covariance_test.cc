@@ -6,6 +6,7 @@
 #include <Eigen/LU>
 
 #include "ingest/loop/residual.h"
+#include "schema/model/rotation.h"
 #include "tests/support/temp_folder.h"
 #include "tests/unit/ingest/loop/random_graph.h"
 

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "ingest/loop/residual.h"
+#include "schema/model/rotation.h"
 
 namespace dsg::ingest {
 namespace {

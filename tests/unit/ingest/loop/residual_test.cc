@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "schema/model/rotation.h"
 #include "tests/support/temp_folder.h"
 #include "tests/unit/ingest/loop/random_graph.h"
 
