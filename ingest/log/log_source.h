@@ -16,6 +16,7 @@
 #include "ingest/sensor/calibration.h"
 #include "ingest/sensor/human_detection.h"
 #include "ingest/sensor/image.h"
+#include "ingest/sensor/imu_measurement.h"
 #include "schema/model/graph_delta.h"
 
 namespace dsg::ingest {
@@ -34,14 +35,6 @@ struct PoseMeasurement {
 /// A ready-made piece of graph (nodes, edges, trajectories, mesh), as scene-graph files hold.
 struct GraphMeasurement {
   GraphDelta delta;
-};
-
-/// One sample of an inertial unit, in its own frame (the body, unless calibrated otherwise).
-struct ImuMeasurement {
-  TimeNs time_ns = 0;
-  Eigen::Vector3d angular_velocity_rad_s = Eigen::Vector3d::Zero();
-  /// Specific force: what an accelerometer at rest shows is minus gravity.
-  Eigen::Vector3d acceleration_m_s2 = Eigen::Vector3d::Zero();
 };
 
 /// An image, not decoded until asked for.
