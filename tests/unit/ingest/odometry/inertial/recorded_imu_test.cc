@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // A recorded unit (EuRoC V1_02_medium, 85 s) integrated between the true states beside it.
+#include <ceres/ceres.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <string>
 
+#include "ingest/odometry/inertial/inertial_factor.h"
 #include "ingest/odometry/inertial/preintegration.h"
 #include "schema/model/rotation.h"
 #include "tests/unit/ingest/odometry/inertial/euroc_tables.h"
 #include "tests/unit/ingest/odometry/inertial/inertial_test_util.h"
+#include "tests/unit/ingest/odometry/inertial/window_factors.h"
 
 namespace dsg::ingest {
 namespace {
@@ -161,6 +165,74 @@ TEST_F(RecordedImu, StraysByTheNoiseOfAVehicleWithMotors) {
     RecordProperty(name + "_share_1_s", std::to_string(second.share[part]));
     RecordProperty(name + "_share_200_ms_data_sheet", std::to_string(sheet.share[part]));
   }
+}
+
+// Squared errors of inertial factors and pose anchors by the degrees of freedom, after velocities,
+// biases and poses were fitted: 1 if the unit's noise is that of its data sheet and the true poses
+// are as good as the anchors say.
+struct FittedPath {
+  double mean_square = 0.0;
+  double gyro_bias_error = 0.0;
+  double accel_bias_error = 0.0;
+};
+
+FittedPath FitPath(const EurocTables& log, TimeNs step_ns, const ImuCalibration& unit,
+                   double sigma_m, double sigma_rad) {
+  const Vector3d gravity = InertialOptions().gravity_map();
+  const size_t stride = static_cast<size_t>(step_ns / 5'000'000);
+  std::deque<Preintegration> measured;
+  std::deque<StateBlocks> blocks;
+  ceres::Problem::Options problem_options;
+  problem_options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  const auto manifold = MakePoseManifold();
+  ceres::Problem problem(problem_options);
+  std::vector<const TrueState*> truth;
+  for (size_t i = 0; i < log.truth.size(); i += stride) truth.push_back(&log.truth[i]);
+  for (size_t i = 0; i < truth.size(); ++i) {
+    StateBlocks& to = blocks.emplace_back(truth[i]->state);
+    problem.AddParameterBlock(to.pose.data(), kPoseBlockSize, manifold.get());
+    problem.AddResidualBlock(new PoseAnchor(truth[i]->state.map_T_imu, sigma_m, sigma_rad), nullptr,
+                             to.pose.data());
+    if (i == 0) continue;
+    auto part = Preintegration::Make(log.samples, truth[i - 1]->time_ns, truth[i]->time_ns,
+                                     truth[i - 1]->state.bias, unit, {});
+    EXPECT_TRUE(part.ok()) << part.status();
+    measured.push_back(*std::move(part));
+    StateBlocks& from = blocks[i - 1];
+    problem.AddResidualBlock(MakeInertialFactor(&measured.back(), gravity).release(), nullptr,
+                             from.pose.data(), from.speed.data(), to.pose.data(), to.speed.data());
+  }
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  EXPECT_TRUE(summary.IsSolutionUsable()) << summary.message;
+  FittedPath fitted;
+  const double freedom = summary.num_residuals_reduced - summary.num_effective_parameters_reduced;
+  fitted.mean_square = 2.0 * summary.final_cost / freedom;
+  for (size_t i = 0; i < truth.size(); ++i) {
+    const Vector15d error = StepBetween(truth[i]->state, blocks[i].state());
+    fitted.gyro_bias_error =
+        std::max(fitted.gyro_bias_error, error.segment<3>(kGyroBiasRow).norm());
+    fitted.accel_bias_error =
+        std::max(fitted.accel_bias_error, error.segment<3>(kAccelBiasRow).norm());
+  }
+  return fitted;
+}
+
+// True poses only, held within a tenth of a millimetre and of a milliradian: velocities and biases
+// are fitted, and the whole log agrees with the noise.
+TEST_F(RecordedImu, FitsTheTruePosesOfTheWholeLog) {
+  const FittedPath fitted = FitPath(log_, 200'000'000, UnitAtRest(log_), 1e-4, 1e-4);
+  EXPECT_LT(fitted.mean_square, 1.0);
+  EXPECT_GT(fitted.mean_square, 0.5);
+  EXPECT_LT(fitted.gyro_bias_error, 1e-4);
+  EXPECT_LT(fitted.accel_bias_error, 0.05);
+  RecordProperty("mean_square", std::to_string(fitted.mean_square));
+  const FittedPath sheet = FitPath(log_, 200'000'000, Adis16448(), 1e-4, 1e-4);
+  EXPECT_GT(sheet.mean_square, 10.0);
 }
 
 }  // namespace
