@@ -15,6 +15,22 @@ constexpr OptionField<InertialOptions> kInertialFields[] = {
      "The same of the accelerometer's bias, metres / second^2"},
     {"inertial-gravity", &InertialOptions::gravity_m_s2, 9.7, 9.9,
      "Gravity, metres / second^2: within 0.05 of that of every place on earth"},
+    {"inertial-rest", &InertialOptions::rest_ns, 0.1, 60.0,
+     "Standing still is told of samples of this long, seconds: swaying takes about a second"},
+    {"inertial-rest-gyro", &InertialOptions::rest_gyro_sigma_max, 0.0, 1.0,
+     "Most by which a rate of turning varies at rest, one standard deviation, radians / second: "
+     "ten times the noise of a cheap unit, a tenth of a slow turn"},
+    {"inertial-rest-accel", &InertialOptions::rest_accel_sigma_max, 0.0, 10.0,
+     "The same of accelerations, metres / second^2: motors may run"},
+    {"inertial-rest-rate", &InertialOptions::rest_rate_max, 0.0, 1.0,
+     "Largest bias of a gyro, radians / second: 11 degrees / second, above it the unit turns or "
+     "measures degrees"},
+    {"inertial-rest-gravity", &InertialOptions::rest_gravity_error_max, 0.0, 5.0,
+     "Most by which what is felt at rest differs from gravity, metres / second^2: five standard "
+     "deviations of a bias"},
+    {"inertial-rest-bias", &InertialOptions::rest_accel_bias_sigma, 0.0001, 5.0,
+     "What an accelerometer's bias may be after it was switched on, one standard deviation, "
+     "metres / second^2: cheap units"},
 };
 
 }  // namespace
