@@ -4,7 +4,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <cmath>
-#include <numbers>
+
+#include "schema/model/rotation.h"
 
 namespace dsg::simulator {
 namespace {
@@ -16,31 +17,6 @@ using Matrix15d = Eigen::Matrix<double, 15, 15>;
 // 95 % quantiles of chi-squared with three and nine degrees of freedom.
 constexpr double kChiSquared3 = 7.8147;
 constexpr double kChiSquared9 = 16.9190;
-
-Matrix3d Skew(const Vector3d& v) {
-  Matrix3d m;
-  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return m;
-}
-
-Eigen::Quaterniond Exp(const Vector3d& w) {
-  const double angle = w.norm();
-  if (angle < 1e-12) {
-    return Eigen::Quaterniond(1.0, 0.5 * w.x(), 0.5 * w.y(), 0.5 * w.z()).normalized();
-  }
-  return Eigen::Quaterniond(Eigen::AngleAxisd(angle, w / angle));
-}
-
-Vector3d Log(const Eigen::Quaterniond& q) {
-  const Eigen::AngleAxisd turn(q);
-  return std::remainder(turn.angle(), 2.0 * std::numbers::pi) * turn.axis();
-}
-
-// The right Jacobian for the small angles between two samples.
-Matrix3d RightJacobian(const Vector3d& w) {
-  const Matrix3d skew = Skew(w);
-  return Matrix3d::Identity() - 0.5 * skew + skew * skew / 6.0;
-}
 
 struct Step {
   double dt_s = 0.0;
@@ -70,9 +46,9 @@ Step StepTo(std::span<const ImuSample> samples, size_t i, const Vector3d& gyro_b
 void Propagate(const Step& step, const Matrix3d& map_R_body, const ImuModel& model,
                Matrix15d* covariance) {
   const double dt = step.dt_s;
-  const Matrix3d turned = Exp(step.turn).toRotationMatrix();
+  const Matrix3d turned = RotationOf(step.turn).toRotationMatrix();
   const Matrix3d jr = RightJacobian(step.turn);
-  const Matrix3d lever = -map_R_body * Skew(step.accel) * dt;
+  const Matrix3d lever = -map_R_body * CrossMatrix(step.accel) * dt;
   Matrix15d a = Matrix15d::Identity();
   a.block<3, 3>(0, 0) = turned.transpose();
   a.block<3, 3>(0, 9) = -jr * dt;
@@ -122,7 +98,7 @@ std::vector<NavigationState> IntegrateImu(std::span<const ImuSample> samples,
     const Step step = StepTo(samples, i, gyro_bias, accel_bias);
     NavigationState state = states.back();
     const Eigen::Quaterniond before = state.map_T_body.orientation;
-    const Eigen::Quaterniond after = (before * Exp(step.turn)).normalized();
+    const Eigen::Quaterniond after = (before * RotationOf(step.turn)).normalized();
     const Vector3d a0 = before * (samples[i - 1].accel - accel_bias) + gravity;
     const Vector3d a1 = after * (samples[i].accel - accel_bias) + gravity;
     const double dt = step.dt_s;
@@ -142,7 +118,7 @@ Matrix9d PredictCovariance(std::span<const ImuSample> samples, const NavigationS
   for (size_t i = 1; i < samples.size(); ++i) {
     const Step step = StepTo(samples, i, first.gyro_bias, first.accel_bias);
     Propagate(step, map_R_body.toRotationMatrix(), model, &covariance);
-    map_R_body = (map_R_body * Exp(step.turn)).normalized();
+    map_R_body = (map_R_body * RotationOf(step.turn)).normalized();
   }
   return covariance.topLeftCorner<9, 9>();
 }
@@ -161,7 +137,8 @@ std::vector<ReckonedWindow> ReckonWindows(const RobotMotion& motion,
         IntegrateImu(inside, start, inside.front().gyro_bias, inside.front().accel_bias).back();
     ReckonedWindow window;
     window.begin_ns = samples[begin].time_ns;
-    window.error << Log(truth.map_T_body.orientation.conjugate() * reckoned.map_T_body.orientation),
+    window.error << RotationVectorOf(truth.map_T_body.orientation.conjugate() *
+                                     reckoned.map_T_body.orientation),
         reckoned.velocity_map - truth.velocity_map,
         reckoned.map_T_body.position - truth.map_T_body.position;
     window.covariance = PredictCovariance(inside, start, model);
