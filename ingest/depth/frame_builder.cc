@@ -7,7 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "ingest/depth/cloud_views.h"
 #include "ingest/depth/dynamic_mask.h"
-#include "ingest/depth/pinhole.h"
+#include "ingest/sensor/pinhole.h"
 
 namespace dsg::ingest {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "ingest/depth/pinhole.h"
+#include "ingest/sensor/pinhole.h"
 
 namespace dsg::ingest {
 namespace {

@@ -9,16 +9,15 @@
 
 #include "absl/strings/str_cat.h"
 #include "ingest/depth/disparity_refinement_internal.h"
-#include "ingest/depth/pinhole.h"
-#include "ingest/depth/rectified_pair.h"
+#include "ingest/sensor/rectified_pair.h"
+#include "ingest/sensor/rectify_lookup.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
 
-// Lookup tables of cv::remap from a rectified camera to the real one.
+// Where a real camera's image shows what the rectified one sees, and where windows are inside it.
 struct StereoLookup {
-  cv::Mat1f u;
-  cv::Mat1f v;
+  RectifyLookup at;
   cv::Mat1b inside;
 };
 
@@ -33,37 +32,22 @@ constexpr double kGradientScale = 2.0;
 
 StereoLookup MakeLookup(const CameraCalibration& rectified, const CameraCalibration& real,
                         int border_px) {
-  const cv::Size size(rectified.width, rectified.height);
-  StereoLookup lookup{cv::Mat1f(size, -1e4f), cv::Mat1f(size, -1e4f), cv::Mat1b(size, uint8_t{0})};
-  const Eigen::Matrix3d real_R_rectified =
-      (real.body_T_camera.orientation.conjugate() * rectified.body_T_camera.orientation)
-          .toRotationMatrix();
-  const double radius_max = RadiusMax(real);
-  for (int v = 0; v < size.height; ++v) {
-    for (int u = 0; u < size.width; ++u) {
-      const Eigen::Vector3d ray = real_R_rectified * PinholeRay(rectified, u, v);
-      if (ray.z() <= 0.0 || ray.head<2>().norm() > radius_max * ray.z()) continue;
-      const Eigen::Vector2d at = Project(real, ray);
-      if (!at.allFinite()) continue;
-      if (at.x() < 0.0 || at.y() < 0.0 || at.x() > real.width - 1 || at.y() > real.height - 1) {
-        continue;
-      }
-      lookup.u(v, u) = static_cast<float>(at.x());
-      lookup.v(v, u) = static_cast<float>(at.y());
-      lookup.inside(v, u) = 255;
-    }
-  }
+  StereoLookup lookup{MakeRectifyLookup(rectified, real), {}};
+  const cv::Mat1b inside(lookup.at.height, lookup.at.width, lookup.at.inside.data());
   // Windows across the border would match its straight line.
   const int side = 2 * border_px + 1;
-  cv::erode(lookup.inside, lookup.inside, cv::Mat::ones(side, side, CV_8U), {-1, -1}, 1,
+  cv::erode(inside, lookup.inside, cv::Mat::ones(side, side, CV_8U), {-1, -1}, 1,
             cv::BORDER_CONSTANT, 0);
   return lookup;
 }
 
 cv::Mat1b Rectified(const Image& image, const StereoLookup& lookup) {
+  const RectifyLookup& at = lookup.at;
   const cv::Mat1b real(image.height, image.width, const_cast<uint8_t*>(image.bytes.data()));
+  const cv::Mat1f u(at.height, at.width, const_cast<float*>(at.u.data()));
+  const cv::Mat1f v(at.height, at.width, const_cast<float*>(at.v.data()));
   cv::Mat1b rectified;
-  cv::remap(real, rectified, lookup.u, lookup.v, cv::INTER_LINEAR, cv::BORDER_CONSTANT, 0);
+  cv::remap(real, rectified, u, v, cv::INTER_LINEAR, cv::BORDER_CONSTANT, 0);
   return rectified;
 }
 

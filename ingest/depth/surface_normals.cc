@@ -6,7 +6,7 @@
 #include <cmath>
 #include <optional>
 
-#include "ingest/depth/pinhole.h"
+#include "ingest/sensor/pinhole.h"
 
 namespace dsg::ingest {
 namespace {

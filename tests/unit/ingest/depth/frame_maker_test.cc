@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "ingest/depth/pinhole.h"
+#include "ingest/sensor/pinhole.h"
 #include "tests/unit/ingest/depth/depth_test_util.h"
 
 namespace dsg::ingest {

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "ingest/depth/pinhole.h"
+#include "ingest/sensor/pinhole.h"
 #include "schema/base/random.h"
 #include "tests/unit/ingest/depth/depth_test_util.h"
 

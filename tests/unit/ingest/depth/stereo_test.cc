@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "ingest/depth/pinhole.h"
+#include "ingest/sensor/pinhole.h"
 #include "schema/base/status.h"
 #include "tests/unit/ingest/depth/depth_test_util.h"
 

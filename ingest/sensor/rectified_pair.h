@@ -18,7 +18,10 @@ struct RectifiedPair {
   /// Metres; negative when the right camera stands on the left.
   double baseline_m = 0.0;
 
-  /// Errors: those of StereoDepth::Make.
+  /// Either camera may be the one on the left.
+  /// Errors: INVALID_ARGUMENT/FIELD_INVALID for cameras that are not valid, whose sizes differ,
+  /// that look apart by more than 30 degrees, are nearer than 1 mm to each other, or stand above or
+  /// behind each other rather than side by side.
   static absl::StatusOr<RectifiedPair> Make(const CameraCalibration& left,
                                             const CameraCalibration& right);
 };

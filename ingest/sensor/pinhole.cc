@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ingest/depth/pinhole.h"
+#include "ingest/sensor/pinhole.h"
 
 #include <Eigen/LU>
 #include <cmath>

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ingest/depth/rectified_pair.h"
+#include "ingest/sensor/rectified_pair.h"
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
 #include "absl/strings/str_cat.h"
-#include "ingest/depth/pinhole.h"
+#include "ingest/sensor/pinhole.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
@@ -17,39 +17,42 @@ constexpr double kApartRadMax = 30.0 * M_PI / 180.0;
 // Between the line through both cameras and the left one's x axis.
 constexpr double kAsideRadMax = 45.0 * M_PI / 180.0;
 
-absl::Status Bad(const CameraCalibration& left, const CameraCalibration& right,
-                 const std::string& field, const std::string& what, double value) {
+absl::Status BadPair(const CameraCalibration& left, const CameraCalibration& right,
+                     const std::string& field, const std::string& what, double value) {
   return MakeError(Reason::kFieldInvalid,
                    absl::StrCat(left.name, " and ", right.name, " give no depth: ", what, " (",
                                 value, "); correct sensor.yaml, or map without stereo"),
                    {{"field", field}, {"value", absl::StrCat(value)}});
 }
 
-absl::Status Check(const CameraCalibration& left, const CameraCalibration& right) {
+absl::Status CheckPair(const CameraCalibration& left, const CameraCalibration& right) {
   DSG_RETURN_IF_ERROR(left.Validate());
   DSG_RETURN_IF_ERROR(right.Validate());
   if (left.width != right.width || left.height != right.height) {
-    return Bad(left, right, "resolution", "the sizes of their images differ, by columns and rows",
-               std::abs(left.width - right.width) + std::abs(left.height - right.height));
+    return BadPair(left, right, "resolution",
+                   "the sizes of their images differ, by columns and rows",
+                   std::abs(left.width - right.width) + std::abs(left.height - right.height));
   }
   const double baseline_m = CentreDistance(left, right);
   if (baseline_m < kBaselineMinM) {
-    return Bad(left, right, "T_BS", "their distance in metres must be at least 0.001", baseline_m);
+    return BadPair(left, right, "T_BS", "their distance in metres must be at least 0.001",
+                   baseline_m);
   }
   const Eigen::Matrix3d left_R = left.body_T_camera.orientation.toRotationMatrix();
   const Eigen::Matrix3d right_R = right.body_T_camera.orientation.toRotationMatrix();
   const double apart = std::acos(std::clamp(left_R.col(2).dot(right_R.col(2)), -1.0, 1.0));
   if (apart > kApartRadMax) {
-    return Bad(left, right, "T_BS", "they look apart by more than 30 degrees", apart * 180 / M_PI);
+    return BadPair(left, right, "T_BS", "they look apart by more than 30 degrees",
+                   apart * 180 / M_PI);
   }
   const Eigen::Vector3d line =
       (right.body_T_camera.position - left.body_T_camera.position) / baseline_m;
   const double aside = std::acos(std::clamp(std::abs(line.dot(left_R.col(0))), -1.0, 1.0));
   if (aside > kAsideRadMax) {
-    return Bad(left, right, "T_BS",
-               "they are not side by side: degrees between the left one's rows and the other "
-               "camera must be at most 45",
-               aside * 180 / M_PI);
+    return BadPair(left, right, "T_BS",
+                   "they are not side by side: degrees between the left one's rows and the other "
+                   "camera must be at most 45",
+                   aside * 180 / M_PI);
   }
   return absl::OkStatus();
 }
@@ -82,7 +85,7 @@ std::optional<Eigen::Vector2d> MiddleOf(const CameraCalibration& camera,
 
 absl::StatusOr<RectifiedPair> RectifiedPair::Make(const CameraCalibration& left,
                                                   const CameraCalibration& right) {
-  DSG_RETURN_IF_ERROR(Check(left, right));
+  DSG_RETURN_IF_ERROR(CheckPair(left, right));
   const Eigen::Matrix3d left_R = left.body_T_camera.orientation.toRotationMatrix();
   const Eigen::Matrix3d right_R = right.body_T_camera.orientation.toRotationMatrix();
   const Eigen::Vector3d line = right.body_T_camera.position - left.body_T_camera.position;
@@ -95,7 +98,8 @@ absl::StatusOr<RectifiedPair> RectifiedPair::Make(const CameraCalibration& left,
   const std::optional<Eigen::Vector2d> left_middle = MiddleOf(left, body_R);
   const std::optional<Eigen::Vector2d> right_middle = MiddleOf(right, body_R);
   if (!left_middle.has_value() || !right_middle.has_value()) {
-    return Bad(left, right, "distortion_coefficients", "their distortion cannot be undone", NAN);
+    return BadPair(left, right, "distortion_coefficients", "their distortion cannot be undone",
+                   NAN);
   }
   const Eigen::Vector2d middle = 0.5 * (*left_middle + *right_middle);
   RectifiedPair pair;
