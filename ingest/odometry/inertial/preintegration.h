@@ -34,7 +34,7 @@ struct ImuIncrement {
 /// orientation in the middle of the step: by the one at its beginning, as in the paper, a turn of
 /// 1 rad/s at 200 Hz would leave 0.025 m/s of gravity behind after a second, ten times the noise.
 ///
-/// Threads: safe while nobody reintegrates.
+/// Cost: about 8 us a sample. Threads: safe while nobody reintegrates.
 class Preintegration {
  public:
   /// `samples` ascend strictly and reach from `from_ns` or before to `to_ns` or after; what lies
