@@ -30,7 +30,7 @@ class InertialFactor : public ceres::SizedCostFunction<15, kPoseBlockSize, kSpee
     Matrix15d by_to;
     out = measured_.whitening() *
           InertialResidual(measured_, from, to, gravity_map_, &by_from, &by_to);
-    for (int state = 0; state < 2; ++state) {
+    for (size_t state = 0; state < 2; ++state) {
       const Matrix15d white = measured_.whitening() * (state == 0 ? by_from : by_to);
       if (double* pose = jacobians[2 * state]; pose != nullptr) {
         Eigen::Map<Eigen::Matrix<double, 15, kPoseBlockSize, Eigen::RowMajor>> jacobian(pose);

@@ -107,6 +107,7 @@ absl::StatusOr<Equations> Linearize(std::span<const WindowFactor> factors, size_
   const int row_count = factor.cost->num_residuals();
   std::vector<RowMatrix> by_block;
   std::vector<double*> outputs;
+  outputs.reserve(factor.blocks.size());
   for (const int32_t size : factor.cost->parameter_block_sizes()) {
     by_block.emplace_back(RowMatrix::Zero(row_count, size));
   }
