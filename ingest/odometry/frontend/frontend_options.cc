@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/odometry/frontend/frontend_options.h"
+
+namespace dsg::ingest {
+namespace {
+
+constexpr OptionField<ConsensusOptions> kConsensusFields[] = {
+    {"odometry-consensus-probability", &ConsensusOptions::probability, 0.5, 0.999999,
+     "Chance that one of the samples of a search holds no outlier: RSS 2020's front-end has 0.995"},
+    {"odometry-consensus-draws-min", &ConsensusOptions::draw_count_min, 1, 100'000,
+     "Samples at least: one sample of noisy points is a poor motion"},
+    {"odometry-consensus-draws", &ConsensusOptions::draw_count_max, 1, 100'000,
+     "Samples at most: five points with 70 per cent of outliers take 2178"},
+    {"odometry-consensus-points", &ConsensusOptions::agree_count_min, 1, 10'000,
+     "Points that agree with a motion, so many at least: fewer do by accident"},
+    {"odometry-consensus-share", &ConsensusOptions::agree_share_min, 0.0, 1.0,
+     "... and such a share of all: a tenth of unrelated points agrees with the best motion"},
+    {"odometry-consensus-seed", &ConsensusOptions::seed, 0, 2'147'483'647,
+     "Seed of the samples: the same seed gives the same result"},
+};
+
+constexpr OptionField<RelativePoseOptions> kRelativePoseFields[] = {
+    {"odometry-pose-refine", &RelativePoseOptions::refine_count, 0, 100,
+     "Steps by which a motion is refined on the points that agree: it has converged by then"},
+    {"odometry-pose-inlier", &RelativePoseOptions::inlier_px, 0.05, 50.0,
+     "A feature agrees with a motion that it misses by this at most, pixels: three times the noise "
+     "of a tracked feature"},
+    {"odometry-pose-soft", &RelativePoseOptions::soft_px, 0.01, 50.0,
+     "Misses of this size cost half of what an outlier does, pixels: twice the noise of a tracked "
+     "feature, so that what agrees by accident pulls at little"},
+    {"odometry-parallax", &RelativePoseOptions::parallax_px_min, 0.0, 100.0,
+     "With less flow than this between two images, the rotation taken off, there is no "
+     "translation, pixels: the noise of a tracked feature"},
+    {"odometry-parallax-noise", &RelativePoseOptions::parallax_noise_ratio, 0.0, 100.0,
+     "... nor with less than so many times what the features miss the motion by: noise alone gives "
+     "1.7"},
+    {"odometry-twin-angle", &RelativePoseOptions::twin_deg, 1.0, 180.0,
+     "Two motions differ if their translations do by this at least, degrees: noise turns a "
+     "translation by less"},
+    {"odometry-twin-cost", &RelativePoseOptions::twin_cost_ratio, 1.0, 100.0,
+     "A second motion is told if the features that agree cost at most so many times as much with "
+     "it: on a plane both differ by chance only"},
+    {"odometry-noise", &RelativePoseOptions::noise_px_min, 0.0, 10.0,
+     "... where features miss a motion by this at least, pixels: trackers are not better"},
+    {"odometry-pose-chi-square", &RelativePoseOptions::chi_square_max, 0.1, 1000.0,
+     "A stereo point agrees with a motion if its squared distance is at most so many times its "
+     "variance: 95 per cent of right ones"},
+    {"odometry-sigma-pixel", &RelativePoseOptions::pixel_sigma_px, 0.01, 50.0,
+     "Standard deviation of the place of a feature, pixels: a tracker's"},
+    {"odometry-sigma-disparity", &RelativePoseOptions::disparity_sigma_px, 0.01, 50.0,
+     "Standard deviation of a disparity, pixels: calibrations err too"},
+};
+
+}  // namespace
+
+std::vector<BoundOption> FrontendOptions::Bind() {
+  std::vector<BoundOption> bound;
+  BindFields<ConsensusOptions>(kConsensusFields, &relative_pose.consensus, &bound);
+  BindFields<RelativePoseOptions>(kRelativePoseFields, &relative_pose, &bound);
+  return bound;
+}
+
+}  // namespace dsg::ingest

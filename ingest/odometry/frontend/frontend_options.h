@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// How features are followed, matched and checked: all numbers that decide which are believed.
+#pragma once
+
+#include <vector>
+
+#include "ingest/config/option_field.h"
+
+namespace dsg::ingest {
+
+/// How models are searched for among points of which many are wrong.
+struct ConsensusOptions {
+  /// Chance that one of the samples holds no outlier.
+  double probability = 0.995;
+  /// Samples at least, and at most.
+  int draw_count_min = 20;
+  int draw_count_max = 2500;
+  /// Points that a model has to agree with: so many, and such a share of all.
+  int agree_count_min = 10;
+  double agree_share_min = 0.2;
+  int seed = 1;
+};
+
+/// Of the four methods that find a relative pose, and of StereoPointOf.
+struct RelativePoseOptions {
+  ConsensusOptions consensus;
+  /// Steps of the refinement of a motion on the points that agree with it.
+  int refine_count = 5;
+  /// A pair of bearings agrees with a motion if it misses it by this at most, pixels.
+  double inlier_px = 1.5;
+  /// Misses of this size cost half of what an outlier does, pixels: up to here they cost their
+  /// square.
+  double soft_px = 0.7;
+  /// With less flow than this once the rotation is taken off (median), there is no translation,
+  /// pixels.
+  double parallax_px_min = 0.5;
+  /// ... nor where this flow is less than so many times what the points miss the motion by: noise
+  /// alone gives 1.7.
+  double parallax_noise_ratio = 3.0;
+  /// A second motion whose translation points elsewhere by this at least, degrees, is told if the
+  /// points that agree cost at most so many times as much with it. Points are not believed to be
+  /// better than `noise_px_min`, pixels.
+  double twin_deg = 5.0;
+  double twin_cost_ratio = 1.5;
+  double noise_px_min = 0.1;
+  /// A pair of stereo points agrees with a motion if its squared distance, in units of its
+  /// covariance, is this at most.
+  double chi_square_max = 7.815;
+  /// Standard deviations of a pixel and of a disparity, pixels.
+  double pixel_sigma_px = 0.5;
+  double disparity_sigma_px = 1.0;
+};
+
+struct FrontendOptions {
+  RelativePoseOptions relative_pose;
+
+  std::vector<BoundOption> Bind();
+};
+
+}  // namespace dsg::ingest
