@@ -51,12 +51,60 @@ constexpr OptionField<RelativePoseOptions> kRelativePoseFields[] = {
      "Standard deviation of a disparity, pixels: calibrations err too"},
 };
 
+constexpr OptionField<FeatureTrackerOptions> kTrackerFields[] = {
+    {"odometry-feature-cell", &FeatureTrackerOptions::cell_px, 4, 1000,
+     "Edge of the cells of which each has a feature, pixels: about 300 cells of 752 x 480"},
+    {"odometry-features", &FeatureTrackerOptions::feature_count_max, 1, 10'000,
+     "Features at most: more add time, and little accuracy"},
+    {"odometry-feature-apart", &FeatureTrackerOptions::apart_px_min, 0.0, 1000.0,
+     "Features are found this far from each other, pixels: windows that overlap say the same "
+     "twice"},
+    {"odometry-feature-border", &FeatureTrackerOptions::border_px, 0, 200,
+     "... and from the border of the image, pixels: most of a window is in the image"},
+    {"odometry-corner-gradient", &FeatureTrackerOptions::corner_gradient_min, 0.0, 255.0,
+     "Least gradient of a corner across its weakest direction, grey levels a pixel: noise shows 1"},
+    {"odometry-corner-share", &FeatureTrackerOptions::corner_share_min, 0.0, 1.0,
+     "... and share of the strongest corner's: a thousandth of its square"},
+    {"odometry-corner-reach", &FeatureTrackerOptions::corner_reach_px, 1, 15,
+     "Gradients of a corner are taken this far beside it, pixels: small corners are sharp"},
+    {"odometry-feature-age", &FeatureTrackerOptions::keyframe_count_max, 1, 100'000,
+     "Features are dropped after so many keyframes: windows drift as views change"},
+    {"odometry-track-window", &FeatureTrackerOptions::window_reach_px, 2, 50,
+     "Windows that are sought in the next image reach this far beside the feature, pixels: noise "
+     "against depth edges"},
+    {"odometry-track-levels", &FeatureTrackerOptions::level_count, 1, 10,
+     "Sizes of the image, each half of the one before, that they are sought in: with the rotation "
+     "known, flow is short"},
+    {"odometry-track-steps", &FeatureTrackerOptions::step_count_max, 1, 1000,
+     "Steps of a search on each level at most: most take five"},
+    {"odometry-track-step", &FeatureTrackerOptions::step_px_min, 1e-4, 1.0,
+     "... and a step shorter than this is the last one, pixels: a tenth of the noise"},
+    {"odometry-track-back", &FeatureTrackerOptions::back_px_max, 0.01, 50.0,
+     "New features that are followed there and back come back within this, pixels: the noise of a "
+     "tracked feature"},
+    {"odometry-track-correlation", &FeatureTrackerOptions::correlation_min, -1.0, 1.0,
+     "Least correlation of what is around a feature before and after: blur and noise leave 0.8"},
+    {"odometry-track-correlation-reach", &FeatureTrackerOptions::correlation_reach_px, 1, 50,
+     "... this far beside it, pixels: half of the window, which the background is part of"},
+    {"odometry-track-merge", &FeatureTrackerOptions::merge_px, 0.0, 100.0,
+     "Of two features this near to each other the older one stays, pixels: they are the same"},
+    {"odometry-mask-growth", &FeatureTrackerOptions::mask_growth_px, 0, 100,
+     "Masks of what moves grow by so much, pixels: a window beside it is half on it"},
+};
+
 }  // namespace
+
+std::vector<BoundOption> FeatureTrackerOptions::Bind() {
+  std::vector<BoundOption> bound;
+  BindFields<FeatureTrackerOptions>(kTrackerFields, this, &bound);
+  return bound;
+}
 
 std::vector<BoundOption> FrontendOptions::Bind() {
   std::vector<BoundOption> bound;
   BindFields<ConsensusOptions>(kConsensusFields, &relative_pose.consensus, &bound);
   BindFields<RelativePoseOptions>(kRelativePoseFields, &relative_pose, &bound);
+  BindFields<FeatureTrackerOptions>(kTrackerFields, &tracker, &bound);
   return bound;
 }
 

@@ -51,8 +51,43 @@ struct RelativePoseOptions {
   double disparity_sigma_px = 1.0;
 };
 
+/// Of FeatureTracker.
+struct FeatureTrackerOptions {
+  /// Edge of the cells of which each has a feature, pixels; features at most.
+  int cell_px = 35;
+  int feature_count_max = 300;
+  /// Features are found this far from each other and from the border, pixels.
+  double apart_px_min = 15.0;
+  int border_px = 8;
+  /// A corner's gradient across its weakest direction: so many grey levels a pixel, and such a
+  /// share of the image's strongest one, over pixels this far beside it.
+  double corner_gradient_min = 1.5;
+  double corner_share_min = 0.03;
+  int corner_reach_px = 1;
+  /// Features are dropped at the keyframe after so many.
+  int keyframe_count_max = 25;
+  /// What is sought in the next image: a window that reaches so far, on so many levels of halved
+  /// size, in so many steps or until one is this short.
+  int window_reach_px = 10;
+  int level_count = 3;
+  int step_count_max = 30;
+  double step_px_min = 0.02;
+  /// New features come back to where they were within this, pixels.
+  double back_px_max = 0.5;
+  /// Correlation of what is around a feature before and after, this far beside it.
+  double correlation_min = 0.6;
+  int correlation_reach_px = 5;
+  /// Of two features that come this near to each other the older one stays.
+  double merge_px = 3.0;
+  /// Masks are grown by this.
+  int mask_growth_px = 8;
+
+  std::vector<BoundOption> Bind();
+};
+
 struct FrontendOptions {
   RelativePoseOptions relative_pose;
+  FeatureTrackerOptions tracker;
 
   std::vector<BoundOption> Bind();
 };
