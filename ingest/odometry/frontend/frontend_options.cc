@@ -92,7 +92,36 @@ constexpr OptionField<FeatureTrackerOptions> kTrackerFields[] = {
      "Masks of what moves grow by so much, pixels: a window beside it is half on it"},
 };
 
+constexpr OptionField<StereoMatchOptions> kMatchFields[] = {
+    {"odometry-stereo-near", &StereoMatchOptions::nearest_m, 0.05, 1000.0,
+     "Nearest distance at which features are matched, metres: a robot in a hand or in the air is "
+     "as "
+     "near to things"},
+    {"odometry-stereo-far", &StereoMatchOptions::farthest_m, 0.1, 10'000.0,
+     "... and farthest, metres: a disparity of 4 pixels with 0.1 m between the cameras errs by a "
+     "quarter"},
+    {"odometry-stereo-patch", &StereoMatchOptions::patch_reach_px, 1, 31,
+     "Patches that are matched reach this far beside the feature, pixels: noise against depth "
+     "edges"},
+    {"odometry-stereo-contrast", &StereoMatchOptions::contrast_min, 0.0, 128.0,
+     "Least standard deviation of a patch, grey levels: twice the noise of the sensor"},
+    {"odometry-stereo-row", &StereoMatchOptions::row_px_max, 0.0, 20.0,
+     "Rows that both places may differ by, pixels: calibrations err by one"},
+    {"odometry-stereo-correlation", &StereoMatchOptions::correlation_min, 0.0, 1.0,
+     "Least correlation of both patches: what is seen from two sides looks a little different"},
+    {"odometry-stereo-distinct", &StereoMatchOptions::distinct_min, 0.0, 1.0,
+     "The next best place correlates by so much less: patterns that repeat have no depth"},
+    {"odometry-stereo-refine", &StereoMatchOptions::refine_px_max, 0.0, 10.0,
+     "Fractions are found this near to the best whole pixel, pixels: farther is another place"},
+};
+
 }  // namespace
+
+std::vector<BoundOption> StereoMatchOptions::Bind() {
+  std::vector<BoundOption> bound;
+  BindFields<StereoMatchOptions>(kMatchFields, this, &bound);
+  return bound;
+}
 
 std::vector<BoundOption> FeatureTrackerOptions::Bind() {
   std::vector<BoundOption> bound;
@@ -105,6 +134,7 @@ std::vector<BoundOption> FrontendOptions::Bind() {
   BindFields<ConsensusOptions>(kConsensusFields, &relative_pose.consensus, &bound);
   BindFields<RelativePoseOptions>(kRelativePoseFields, &relative_pose, &bound);
   BindFields<FeatureTrackerOptions>(kTrackerFields, &tracker, &bound);
+  BindFields<StereoMatchOptions>(kMatchFields, &stereo, &bound);
   return bound;
 }
 

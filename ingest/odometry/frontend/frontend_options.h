@@ -85,9 +85,30 @@ struct FeatureTrackerOptions {
   std::vector<BoundOption> Bind();
 };
 
+/// Of StereoMatcher.
+struct StereoMatchOptions {
+  /// Distances along the optical axis within which features are matched, metres.
+  double nearest_m = 0.3;
+  double farthest_m = 10.0;
+  /// Patches reach this far beside the feature, pixels.
+  int patch_reach_px = 5;
+  /// Standard deviation of a patch that tells something, grey levels.
+  double contrast_min = 3.0;
+  /// Rows that the right place may be off, pixels.
+  double row_px_max = 1.5;
+  /// Correlation of both patches, and how much less the next best place has.
+  double correlation_min = 0.8;
+  double distinct_min = 0.05;
+  /// Fractions of a pixel are found this near to the best whole one, pixels.
+  double refine_px_max = 1.5;
+
+  std::vector<BoundOption> Bind();
+};
+
 struct FrontendOptions {
   RelativePoseOptions relative_pose;
   FeatureTrackerOptions tracker;
+  StereoMatchOptions stereo;
 
   std::vector<BoundOption> Bind();
 };

@@ -61,7 +61,7 @@ absl::StatusOr<MonoPoseMethod> ParseMonoPoseMethod(std::string_view name);
 /// never agree.
 ///
 /// `focal_px`: pixels of a radian, which turns pixels of the options into angles; > 0.
-/// Cost: up to a tenth of a millisecond a sample; 167 samples for 50 % outliers, 2178 for 70 %.
+/// Cost: a fraction of a millisecond a sample; 167 samples for 50 % outliers, 2178 for 70 %.
 /// Source: Nister, 2004 (five points); Geman and McClure, 1987 (what a miss costs); Chum, Matas and
 /// Kittler, 2003 (refinement inside the search).
 MonoPose FivePointPose(std::span<const BearingPair> pairs, double focal_px,
