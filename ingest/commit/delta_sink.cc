@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "ingest/commit/delta_size.h"
+#include "ingest/commit/undone_session.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
@@ -15,7 +16,6 @@ namespace {
 constexpr int kCommitTriesMax = 3;
 // Each names hundreds of nodes that the map has forgotten; they can be forgotten while we mend.
 constexpr int kMendTriesMax = 100;
-constexpr int kRevisionsPerCall = 1000;
 
 int64_t PoseCount(const GraphDelta& delta) {
   int64_t count = 0;
@@ -142,17 +142,6 @@ absl::Status DeltaSink::IsShorter() const {
       "into another --map"));
 }
 
-absl::Status DeltaSink::WasReverted(const Undoing& undoing) const {
-  const std::string undo = absl::StrCat("go back with \"dsg revert ", undoing.before,
-                                        "\" and run the same again, or take");
-  return absl::AbortedError(absl::StrCat(
-      header_.message, ": map \"", header_.map, "\" was reverted to revision ", undoing.to,
-      " by \"", undoing.revert.author, "\" (revision ", undoing.revert.revision,
-      "), and what this log had told it until revision ", undoing.newest_undone,
-      " is no longer there: ", undoing.has_later ? "take" : undo,
-      " the whole log into another --map"));
-}
-
 void DeltaSink::FillHeader(int64_t sequence, GraphDelta* delta) const {
   delta->map = header_.map;
   delta->session_id = header_.session_id;
@@ -164,6 +153,8 @@ void DeltaSink::FillHeader(int64_t sequence, GraphDelta* delta) const {
 }
 
 absl::Status DeltaSink::Commit(GraphDelta delta) {
+  // Nothing is told behind a gap.
+  DSG_RETURN_IF_ERROR(CheckIsKept(counts_.last_revision));
   committed_sequence_ = delta.sequence;
   absl::StatusOr<CommitResult> result = Send(delta);
   for (int tries = 0; tries < kMendTriesMax && !result.ok(); ++tries) {
@@ -173,26 +164,17 @@ absl::Status DeltaSink::Commit(GraphDelta delta) {
   Count(delta);
   if (!result.ok()) return Annotate(result.status(), delta.message);
   forgotten_.ObserveTaken(delta);
-  // Others have committed since: what, is asked only then, so that a writer alone asks nothing.
   const Revision previous = std::exchange(counts_.last_revision, result->revision);
-  if (previous == 0 || result->revision <= previous + 1) return absl::OkStatus();
+  if (result->revision <= previous + 1) return absl::OkStatus();
+  // Somebody has committed between the look and the commit.
   return CheckIsKept(previous);
 }
 
 absl::Status DeltaSink::CheckIsKept(Revision from) const {
-  UndoingSearch search([this](const std::string& session_id) {
-    return session_id == session_id_ || session_id == EndSessionId(session_id_);
-  });
-  for (Revision before = 0;;) {
-    DSG_ASSIGN_OR_RETURN(const std::vector<RevisionInfo> revisions,
-                         map_.ListRevisions(before, kRevisionsPerCall));
-    for (const RevisionInfo& info : revisions) {
-      if (info.revision >= from) search.Take(info);
-    }
-    if (std::ssize(revisions) < kRevisionsPerCall || revisions.back().revision <= from) break;
-    before = revisions.back().revision;
-  }
-  return search.found().has_value() ? WasReverted(*search.found()) : absl::OkStatus();
+  if (from == 0) return absl::OkStatus();
+  DSG_ASSIGN_OR_RETURN(const std::optional<Undoing> undoing, FindUndoing(map_, session_id_, from));
+  if (!undoing.has_value()) return absl::OkStatus();
+  return UndoneError(header_.message, header_.map, *undoing);
 }
 
 absl::StatusOr<CommitResult> DeltaSink::Send(const GraphDelta& delta) {

@@ -12,7 +12,6 @@
 #include "ingest/commit/map_view.h"
 #include "ingest/commit/reconciler.h"
 #include "schema/store/graph_writer.h"
-#include "schema/store/reverts.h"
 
 namespace dsg::ingest {
 
@@ -38,9 +37,6 @@ struct SessionHeader {
   std::string config_digest;
 };
 
-/// Of the last deltas of a log that may grow on.
-inline std::string EndSessionId(const std::string& session_id) { return session_id + "-end"; }
-
 /// Threads: one caller at a time.
 class DeltaSink {
  public:
@@ -57,10 +53,6 @@ class DeltaSink {
         reconciler_(map),
         forgotten_(map),
         writer_(writer) {}
-
-  /// Whether the map still holds what this session has committed at `from` and later.
-  /// Errors: ABORTED if a revert has taken any of it out.
-  absl::Status CheckIsKept(Revision from) const;
 
   /// For a log that is cut into other deltas each time it is read, as it grows: what an earlier run
   /// has committed is known by the map that holds it, and not by the number of its delta. Before
@@ -100,7 +92,8 @@ class DeltaSink {
   absl::Status EndWasTold() const;
   absl::Status IsShorter() const;
   absl::Status Commit(GraphDelta delta);
-  absl::Status WasReverted(const Undoing& undoing) const;
+  /// Whether the map still holds what was committed at `from` and later.
+  absl::Status CheckIsKept(Revision from) const;
   absl::StatusOr<CommitResult> Send(const GraphDelta& delta);
   void Count(const GraphDelta& delta);
 

@@ -278,8 +278,8 @@ class FollowedTable : public LogSource {
     return At(row).Error(
         absl::StrCat("agent \"", row.agent, "\" is at ", unit, " ", row.row.time_ns,
                      ", after a row of ", unit, " ", newest,
-                     "; the rows of a log that is followed must come in the order of time: take "
-                     "it without --follow, which sorts them, when it is finished"));
+                     "; the rows of a log that is followed must come in the order of time: sort "
+                     "them, and take it without --follow when it is finished"));
   }
 
   // As a finished log has them.

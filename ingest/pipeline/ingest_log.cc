@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/commit/undone_session.h"
 #include "ingest/log/format.h"
 #include "ingest/pipeline/log_run.h"
 #include "ingest/pipeline/session.h"
@@ -169,7 +170,10 @@ absl::StatusOr<IngestSummary> IngestLog(LogSource& log, const LogOptions& log_op
                                         const std::function<void(int64_t)>& on_progress) {
   DSG_RETURN_IF_ERROR(options.Validate());
   SessionHeader header = MakeHeader(log.info(), log_options, options, map.spec());
-  DSG_ASSIGN_OR_RETURN(const SessionState session, writer.GetSession(header.session_id));
+  DSG_ASSIGN_OR_RETURN(OpenedSession opened, OpenSession(header.session_id, header.message, map,
+                                                         writer, options.tells_undone_again));
+  header.session_id = std::move(opened.session_id);
+  const SessionState& session = opened.state;
   DSG_ASSIGN_OR_RETURN(RunPlan plan, MakePlan(log.info(), options, map, header.session_id));
   plan.agent_prefix = log_options.agent_prefix;
   plan.first_revision = session.first_revision;
@@ -179,11 +183,9 @@ absl::StatusOr<IngestSummary> IngestLog(LogSource& log, const LogOptions& log_op
                          writer.GetSession(EndSessionId(header.session_id)));
     plan.end_sequence = end.last_sequence;
   }
-  DeltaSink sink(std::move(header), session.last_sequence, options.is_size_bounded, map, writer);
-  if (session.last_sequence > 0) {
-    DSG_RETURN_IF_ERROR(sink.CheckIsKept(session.first_revision));
-  }
-  LogRun run(std::move(plan), map, std::move(sink));
+  LogRun run(
+      std::move(plan), map,
+      DeltaSink(std::move(header), session.last_sequence, options.is_size_bounded, map, writer));
   if (follow.has_value()) log.SetIdle([&run] { return run.CommitStale(); });
   int64_t given_count = 0;
   for (int64_t count = 1;; ++count) {

@@ -52,6 +52,8 @@ struct IngestOptions {
   std::string spill_folder;
   /// Deltas must fit into messages to a server; a large correction then takes several revisions.
   bool is_size_bounded = false;
+  /// What a revert has undone of the log is told again; otherwise such a log is refused.
+  bool tells_undone_again = false;
 
   /// All numbers besides those of mapping and people, for flags.
   std::vector<OptionGroup> Groups();

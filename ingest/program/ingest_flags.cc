@@ -103,6 +103,8 @@ void AddIngestFlags(CLI::App* app, IngestFlags* flags) {
   app->add_flag("--strict", flags->is_strict,
                 "Refuse a scene graph with edges to nodes that are not there and the like; without "
                 "it they are skipped and counted");
+  app->add_flag("--after-revert", flags->tells_undone_again,
+                "Tell again what a revert has undone of the log; without it such a log is refused");
   app->add_option("--epoch", flags->epoch,
                   "World time a new map begins at (nanoseconds or RFC 3339); default: the first "
                   "stamp of a log with a clock, else 0");
@@ -210,6 +212,7 @@ absl::StatusOr<IngestOptions> MakeIngestOptions(const IngestFlags& flags) {
   options.up = flags.up;
   DSG_ASSIGN_OR_RETURN(options.mapping, MakeMappingOptions(flags.mapping));
   options.is_size_bounded = !flags.server.empty();
+  options.tells_undone_again = flags.tells_undone_again;
   options.robot_graph.odometry_m_per_m = flags.odometry_m_per_m;
   options.robot_graph.odometry_rad_per_m = flags.odometry_rad_per_m;
   if (!flags.robot_cad.empty()) {

@@ -59,6 +59,7 @@ struct IngestFlags {
   bool is_quiet = false;
   bool is_json = false;
   bool is_dry_run = false;
+  bool tells_undone_again = false;
   std::vector<std::string> logs;
 };
 

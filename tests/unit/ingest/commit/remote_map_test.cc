@@ -53,13 +53,16 @@ class RemoteMapTest : public testing::Test {
     return Ingest(path, map, map.writer());
   }
 
-  absl::StatusOr<IngestSummary> Ingest(const std::string& path, RemoteMap& map,
-                                       GraphWriter& writer) {
+  absl::StatusOr<IngestSummary> Ingest(const std::string& path, RemoteMap& map, GraphWriter& writer,
+                                       bool tells_undone_again = false) {
     LogOptions options;
     options.epoch_ns = map.spec().epoch_ns;
     DSG_ASSIGN_OR_RETURN(const std::unique_ptr<LogSource> log, OpenLog(path, options));
     const std::unique_ptr<MapView> view = MakeRemoteMapView(map);
-    return IngestLog(*log, options, {.poses_per_delta = 50}, *view, writer, {});
+    IngestOptions ingest;
+    ingest.poses_per_delta = 50;
+    ingest.tells_undone_again = tells_undone_again;
+    return IngestLog(*log, options, ingest, *view, writer, {});
   }
 
   absl::Status Revert(Revision revision) {
@@ -275,16 +278,25 @@ TEST_F(RemoteMapTest, LogEndsWhenTheServerRevertsWhatItTold) {
   const auto map = OpenMap();
   ASSERT_TRUE(map->writer().Commit(Rooms(2, "s", 1)).ok());
   const std::string log = folder_.Write("a.txt", WalkRows(100));
+  // Between the look before a delta and its commit.
   CrossedWriter writer(map->writer(), [&] { return Revert(1); });
   const absl::Status ended = Ingest(log, *map, writer).status();
   EXPECT_EQ(ended.code(), absl::StatusCode::kAborted);
-  EXPECT_EQ(
-      ended.message(),
-      "a.txt (trajnet): map \"test\" was reverted to revision 1 by \"ann\" (revision 4), and what "
-      "this log had told it until revision 3 is no longer there: take the whole log into "
-      "another --map");
+  EXPECT_EQ(std::string(ended.message()),
+            "a.txt (trajnet): map \"test\" was reverted to revision 1 by \"ann\" (revision 4), and "
+            "what this log had told it until revision 3 is no longer there: undo with \"dsg revert "
+            "4\" what it has told since, and tell it again with --after-revert");
   // Nor does the same log say "nothing new".
   EXPECT_EQ(Ingest(log, *map).status(), ended);
+  ASSERT_EQ(Revert(4), absl::OkStatus());
+  const auto again = Ingest(log, *map, map->writer(), /*tells_undone_again=*/true);
+  ASSERT_TRUE(again.ok()) << again.status();
+  for (const uint64_t person : {1, 2, 3}) {
+    EXPECT_EQ((*map->FindTrack(NodeId('H', person), std::nullopt))->pose_count, 100) << person;
+  }
+  const auto known = Ingest(log, *map);
+  ASSERT_TRUE(known.ok()) << known.status();
+  EXPECT_EQ(known->committed.revision_count, 0);
 }
 
 TEST_F(RemoteMapTest, LogGoesOnWhenARevertIsUndone) {
@@ -296,7 +308,7 @@ TEST_F(RemoteMapTest, LogGoesOnWhenARevertIsUndone) {
   EXPECT_EQ(Ingest(log, *map, stopped).status().code(), absl::StatusCode::kCancelled);
   ASSERT_EQ(Revert(1), absl::OkStatus());
   const absl::Status refused = Ingest(log, *map).status();
-  EXPECT_NE(std::string(refused.message()).find("go back with \"dsg revert 3\" and run the same"),
+  EXPECT_NE(std::string(refused.message()).find("bring it back with \"dsg revert 3\" and run"),
             std::string::npos)
       << refused;
   ASSERT_EQ(Revert(3), absl::OkStatus());
