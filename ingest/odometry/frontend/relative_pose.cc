@@ -15,6 +15,7 @@
 #include "ingest/odometry/frontend/five_point_internal.h"
 #include "ingest/odometry/frontend/rotation_fit_internal.h"
 #include "schema/base/status.h"
+#include "schema/model/rotation.h"
 
 namespace dsg::ingest {
 namespace {
@@ -112,12 +113,6 @@ Motion Scored(const Search& search, const Eigen::Matrix3d& turn, const Eigen::Ve
   return motion;
 }
 
-Eigen::Matrix3d TurnOf(const Eigen::Vector3d& axis_angle) {
-  const double angle = axis_angle.norm();
-  if (angle < 1e-12) return Eigen::Matrix3d::Identity();
-  return Eigen::AngleAxisd(angle, axis_angle / angle).toRotationMatrix();
-}
-
 // A Gauss-Newton step on the misses, weighted as CostOf does: three numbers for the rotation, two
 // for the direction along the columns of `plane`.
 Eigen::Matrix<double, 5, 1> StepOf(const Search& search, const Motion& motion,
@@ -154,7 +149,7 @@ Motion Refined(const Search& search, Motion motion, bool is_turn_free) {
     plane.col(1) = motion.way.cross(plane.col(0));
     const Eigen::Matrix<double, 5, 1> step = StepOf(search, motion, plane, is_turn_free);
     if (!step.allFinite()) break;
-    const Motion next = Scored(search, TurnOf(step.head<3>()) * motion.turn,
+    const Motion next = Scored(search, RotationOf(step.head<3>()).toRotationMatrix() * motion.turn,
                                (motion.way + plane * step.tail<2>()).normalized());
     if (next.cost >= motion.cost) break;
     motion = next;

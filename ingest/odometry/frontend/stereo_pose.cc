@@ -17,6 +17,7 @@
 #include "ingest/odometry/frontend/consensus.h"
 #include "ingest/odometry/frontend/rotation_fit_internal.h"
 #include "schema/base/status.h"
+#include "schema/model/rotation.h"
 
 namespace dsg::ingest {
 namespace {
@@ -144,11 +145,10 @@ RigMotion Stepped(const PointSearch& search, const RigMotion& motion, bool is_ro
                   bool is_turn_free, const RelativePoseOptions& options) {
   const Vector6d step = StepOfPoints(EquationsOf(search, motion, is_robust, options), is_turn_free);
   if (!step.allFinite()) return motion;
-  const double angle = step.head<3>().norm();
   Eigen::Matrix3d turn = motion.turn;
   std::shared_ptr<const Weights> weights = motion.weights;
-  if (angle > 0.0) {
-    turn = Eigen::AngleAxisd(angle, step.head<3>() / angle).toRotationMatrix() * turn;
+  if (!step.head<3>().isZero(0.0)) {
+    turn = RotationOf(step.head<3>()).toRotationMatrix() * turn;
     weights = WeightsOf(search, turn);
   }
   return ScoredMotion(search, turn, motion.shift + step.tail<3>(), std::move(weights), options);
