@@ -15,6 +15,14 @@ namespace {
 constexpr int kRevisionsFirst = 4;
 constexpr int kRevisionsPerCall = 1000;
 
+absl::Status PartIsLeft(const std::string& log, const std::string& map, Revision first) {
+  return absl::AbortedError(absl::StrCat(
+      log, ": a part of this log is left in map \"", map,
+      "\", and would stand there twice, since its things get other ids when they are told again: "
+      "go back with \"dsg revert ",
+      first - 1, "\" to what the map held before the log, then run the same again"));
+}
+
 }  // namespace
 
 std::string EndSessionId(const std::string& session_id) { return session_id + "-end"; }
@@ -52,7 +60,8 @@ absl::Status UndoneError(const std::string& log, const std::string& map, const U
 
 absl::StatusOr<OpenedSession> OpenSession(const std::string& session_id, const std::string& log,
                                           const MapView& map, GraphWriter& writer,
-                                          bool tells_again) {
+                                          const UndoneOptions& options) {
+  const std::string& name = map.spec().name;
   OpenedSession opened{session_id, {}};
   while (true) {
     DSG_ASSIGN_OR_RETURN(opened.state, writer.GetSession(opened.session_id));
@@ -63,8 +72,10 @@ absl::StatusOr<OpenedSession> OpenSession(const std::string& session_id, const s
     // A later look finds the same revert, unless another one has undone what followed it.
     absl::StrAppend(&opened.session_id, "-after-", undoing->revert.revision);
     DSG_ASSIGN_OR_RETURN(const SessionState next, writer.GetSession(opened.session_id));
-    if (next.last_sequence == 0 && !tells_again) {
-      return UndoneError(log, map.spec().name, *undoing);
+    if (next.last_sequence > 0) continue;
+    if (!options.is_told_again) return UndoneError(log, name, *undoing);
+    if (options.has_own_ids && undoing->to >= opened.state.first_revision) {
+      return PartIsLeft(log, name, opened.state.first_revision);
     }
   }
 }

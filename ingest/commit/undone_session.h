@@ -23,16 +23,25 @@ absl::StatusOr<std::optional<Undoing>> FindUndoing(const MapView& map,
 /// ABORTED, saying who has reverted `map` and how the log that is called `log` can go on.
 absl::Status UndoneError(const std::string& log, const std::string& map, const Undoing& undoing);
 
-/// The session under which a log goes on: its own or, where that was undone and the log was told
-/// again, the last one of those that followed. `tells_again` begins another one where the last was
-/// undone.
 struct OpenedSession {
   std::string session_id;
   SessionState state;
 };
-/// Errors: UndoneError; of the map and the writer.
+
+/// What to do where a revert has undone a part of a log.
+struct UndoneOptions {
+  /// Tell it again; else the log is refused.
+  bool is_told_again = false;
+  /// What is told again has other ids, so that nothing of the log may be left in the map.
+  bool has_own_ids = false;
+};
+
+/// The session under which a log goes on: its own or, where that was undone and the log was told
+/// again, the last one of those that followed; another one to tell it again.
+/// Errors: UndoneError; ABORTED if a part of the log is left that must not be; of the map and the
+/// writer.
 absl::StatusOr<OpenedSession> OpenSession(const std::string& session_id, const std::string& log,
                                           const MapView& map, GraphWriter& writer,
-                                          bool tells_again);
+                                          const UndoneOptions& options);
 
 }  // namespace dsg::ingest

@@ -170,8 +170,11 @@ absl::StatusOr<IngestSummary> IngestLog(LogSource& log, const LogOptions& log_op
                                         const std::function<void(int64_t)>& on_progress) {
   DSG_RETURN_IF_ERROR(options.Validate());
   SessionHeader header = MakeHeader(log.info(), log_options, options, map.spec());
-  DSG_ASSIGN_OR_RETURN(OpenedSession opened, OpenSession(header.session_id, header.message, map,
-                                                         writer, options.tells_undone_again));
+  const UndoneOptions undone{
+      .is_told_again = options.tells_undone_again,
+      .has_own_ids = HasMapping(log.info(), options) || HasPeople(log.info(), options)};
+  DSG_ASSIGN_OR_RETURN(OpenedSession opened,
+                       OpenSession(header.session_id, header.message, map, writer, undone));
   header.session_id = std::move(opened.session_id);
   const SessionState& session = opened.state;
   DSG_ASSIGN_OR_RETURN(RunPlan plan, MakePlan(log.info(), options, map, header.session_id));
