@@ -29,6 +29,7 @@ int64_t PoseCount(const GraphDelta& delta) {
 
 void DeltaSink::NumberByNews() {
   numbers_by_news_ = true;
+  is_followed_ = true;
   sequence_ = committed_sequence_ = last_sequence_;
 }
 
@@ -153,8 +154,9 @@ void DeltaSink::FillHeader(int64_t sequence, GraphDelta* delta) const {
 }
 
 absl::Status DeltaSink::Commit(GraphDelta delta) {
-  // Nothing is told behind a gap.
-  DSG_RETURN_IF_ERROR(CheckIsKept(counts_.last_revision));
+  // Nothing is told behind a gap. Other logs send delta after delta: to look before each would cost
+  // a fifth of their time on a server, and what has changed between is found right after.
+  if (is_followed_) DSG_RETURN_IF_ERROR(CheckIsKept(counts_.last_revision));
   committed_sequence_ = delta.sequence;
   absl::StatusOr<CommitResult> result = Send(delta);
   for (int tries = 0; tries < kMendTriesMax && !result.ok(); ++tries) {
@@ -166,7 +168,7 @@ absl::Status DeltaSink::Commit(GraphDelta delta) {
   forgotten_.ObserveTaken(delta);
   const Revision previous = std::exchange(counts_.last_revision, result->revision);
   if (result->revision <= previous + 1) return absl::OkStatus();
-  // Somebody has committed between the look and the commit.
+  // Somebody else has committed before this.
   return CheckIsKept(previous);
 }
 

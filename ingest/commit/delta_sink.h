@@ -63,7 +63,10 @@ class DeltaSink {
   /// their own (EndSessionId), so that those before keep their numbers. `end_sequence`: how far an
   /// earlier run of that session got; then news before BeginEnd are refused with
   /// FAILED_PRECONDITION, since the log has grown after its end was told.
-  void SplitEnd(int64_t end_sequence) { end_sequence_ = end_sequence; }
+  void SplitEnd(int64_t end_sequence) {
+    end_sequence_ = end_sequence;
+    is_followed_ = true;
+  }
   /// Errors: FAILED_PRECONDITION if an earlier run has committed more of the log than has come: it
   /// has become shorter, and its end is another.
   absl::Status BeginEnd();
@@ -104,6 +107,8 @@ class DeltaSink {
   bool is_size_bounded_;
   /// Only deltas with news have numbers.
   bool numbers_by_news_ = false;
+  /// Its deltas come seconds apart, so that somebody else may well have reverted the map between.
+  bool is_followed_ = false;
   /// Of the session of the end; 0 = nothing of it was told.
   int64_t end_sequence_ = 0;
   bool is_at_end_ = false;
