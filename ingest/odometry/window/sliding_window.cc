@@ -1,0 +1,467 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/odometry/window/sliding_window.h"
+
+#include <ceres/ceres.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <deque>
+#include <limits>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "ingest/odometry/inertial/inertial_factor.h"
+#include "ingest/odometry/inertial/marginalization.h"
+#include "ingest/odometry/window/factor_covariance.h"
+#include "ingest/solver/pose_block.h"
+#include "schema/base/status.h"
+
+namespace dsg::ingest {
+namespace {
+
+using Eigen::Vector3d;
+
+absl::Status BadKeyframe(TimeNs time_ns, const std::string& what) {
+  return MakeError(Reason::kFieldInvalid,
+                   absl::StrCat("the keyframe at ", time_ns, " ns ", what, "; begin anew"),
+                   {{"field", "time_ns"}, {"value", absl::StrCat(time_ns)}});
+}
+
+}  // namespace
+
+class SlidingWindow::Impl {
+ public:
+  Impl(const StereoModel& model, const Vector3d& gravity_map, const WindowOptions& options)
+      : model_(model),
+        gravity_map_(gravity_map),
+        options_(options),
+        manifold_(MakePoseManifold()),
+        loss_(options.huber_sigmas),
+        slots_(static_cast<size_t>(options.keyframe_count) + 1) {}
+
+  absl::Status Begin(TimeNs time_ns, const AlignedState& aligned,
+                     std::span<const FeatureSight> sights) {
+    const Eigen::LLT<Matrix15d> root(aligned.covariance);
+    if (!aligned.covariance.allFinite() || root.info() != Eigen::Success) {
+      return BadKeyframe(time_ns, "has no covariance that is positive definite");
+    }
+    keyframes_.clear();
+    landmarks_.clear();
+    dropped_.clear();
+    AddKeyframe(time_ns, aligned.state, nullptr);
+    StateSlot& slot = slots_[keyframes_.back().slot];
+    LinearPrior prior;
+    prior.blocks = {slot.pose.data(), slot.speed.data()};
+    prior.sizes = {kPoseBlockSize, kSpeedBlockSize};
+    prior.point.assign(slot.pose.begin(), slot.pose.end());
+    prior.point.insert(prior.point.end(), slot.speed.begin(), slot.speed.end());
+    prior.jacobian = root.matrixL().solve(Matrix15d::Identity());
+    prior.residual = Vector15d::Zero();
+    SetPrior(std::move(prior));
+    AddSights(sights);
+    Anchor();
+    return absl::OkStatus();
+  }
+
+  absl::Status Add(TimeNs time_ns, Preintegration measured, std::span<const FeatureSight> sights) {
+    dropped_.clear();
+    if (keyframes_.empty()) return BadKeyframe(time_ns, "is in no window");
+    if (measured.from_ns() != newest_ns() || measured.to_ns() != time_ns) {
+      return BadKeyframe(time_ns, absl::StrCat("has samples from ", measured.from_ns(), " to ",
+                                               measured.to_ns(), " ns"));
+    }
+    const InertialState predicted = measured.Predict(newest(), gravity_map_, nullptr);
+    AddKeyframe(time_ns, predicted, std::make_unique<Preintegration>(std::move(measured)));
+    AddSights(sights);
+    Anchor();
+    DropMisfits(kFarMisses);
+    DSG_RETURN_IF_ERROR(Solve());
+    DSG_RETURN_IF_ERROR(Reintegrate());
+    DropMisfits(1.0);
+    if (keyframes_.size() > static_cast<size_t>(options_.keyframe_count)) {
+      DSG_RETURN_IF_ERROR(DropOldest());
+    }
+    ForgetLost();
+    return absl::OkStatus();
+  }
+
+  int keyframe_count() const { return static_cast<int>(keyframes_.size()); }
+  TimeNs newest_ns() const { return keyframes_.back().time_ns; }
+  TimeNs oldest_ns() const { return keyframes_.front().time_ns; }
+  InertialState newest() const { return StateOf(keyframes_.back()); }
+  InertialState oldest() const { return StateOf(keyframes_.front()); }
+
+  absl::StatusOr<Matrix15d> NewestCovariance() const {
+    std::vector<LandmarkBlock> blocks;
+    const FactorList list = Factors(&blocks);
+    StateSlot& slot = slots_[keyframes_.back().slot];
+    double* const wanted[] = {slot.pose.data(), slot.speed.data()};
+    DSG_ASSIGN_OR_RETURN(const Eigen::MatrixXd covariance, CovarianceOf(list.factors, wanted));
+    return Matrix15d(covariance);
+  }
+
+  const std::vector<int64_t>& dropped() const { return dropped_; }
+
+  std::vector<WindowLandmark> Landmarks() const {
+    std::vector<WindowLandmark> result;
+    for (const auto& [id, landmark] : landmarks_) {
+      if (!landmark.anchor.has_value()) continue;
+      const Vector3d point_camera =
+          Vector3d(landmark.block[0], landmark.block[1], 1.0) / landmark.block[2];
+      const Pose3d map_T_imu = PoseOf(*Find(landmark.anchor_keyframe()));
+      result.push_back({id, map_T_imu * (model_.imu_T_camera * point_camera),
+                        static_cast<int>(landmark.sights.size())});
+    }
+    return result;
+  }
+
+ private:
+  struct StateSlot {
+    std::array<double, kPoseBlockSize> pose{};
+    std::array<double, kSpeedBlockSize> speed{};
+  };
+
+  struct Keyframe {
+    /// Ascending; never used again.
+    int64_t number = 0;
+    TimeNs time_ns = 0;
+    size_t slot = 0;
+    /// From the keyframe before; null of the first one.
+    std::unique_ptr<Preintegration> measured;
+  };
+
+  struct Sight {
+    int64_t keyframe = 0;
+    LandmarkSight seen;
+  };
+
+  struct Landmark {
+    std::vector<Sight> sights;
+    /// Of `sights`, once the distance is known.
+    std::optional<size_t> anchor;
+    LandmarkBlock block{};
+
+    int64_t anchor_keyframe() const { return sights[*anchor].keyframe; }
+    /// A landmark that one image saw tells nothing of the keyframes.
+    bool tells() const { return anchor.has_value() && sights.size() > 1; }
+  };
+
+  // The window's factors at one moment; the blocks are those of the window.
+  struct FactorList {
+    std::vector<std::unique_ptr<ceres::CostFunction>> owned;
+    std::vector<WindowFactor> factors;
+    /// Blocks of the landmarks that tell something, in their order.
+    std::vector<double*> landmarks;
+
+    void Add(std::unique_ptr<ceres::CostFunction> cost, const ceres::LossFunction* loss,
+             std::vector<double*> blocks) {
+      factors.push_back({cost.get(), loss, std::move(blocks)});
+      owned.push_back(std::move(cost));
+    }
+  };
+
+  // Before a solve, states are predictions: only what is far off is no landmark.
+  static constexpr double kFarMisses = 10.0;
+
+  InertialState StateOf(const Keyframe& keyframe) const {
+    const StateSlot& slot = slots_[keyframe.slot];
+    return StateOfBlocks(slot.pose.data(), slot.speed.data());
+  }
+  Pose3d PoseOf(const Keyframe& keyframe) const {
+    return PoseOfBlock(slots_[keyframe.slot].pose.data());
+  }
+  const Keyframe* Find(int64_t number) const {
+    const auto index = static_cast<size_t>(number - keyframes_.front().number);
+    return number < keyframes_.front().number || index >= keyframes_.size() ? nullptr
+                                                                            : &keyframes_[index];
+  }
+
+  // Slots go by turn: where the blocks are in memory, by which Ceres sorts them, follows from the
+  // calls alone.
+  void AddKeyframe(TimeNs time_ns, const InertialState& state,
+                   std::unique_ptr<Preintegration> measured) {
+    const int64_t number = next_number_++;
+    const size_t slot = static_cast<size_t>(number) % slots_.size();
+    WritePoseBlock(state.map_T_imu, slots_[slot].pose.data());
+    WriteSpeedBlock(state, slots_[slot].speed.data());
+    keyframes_.push_back({number, time_ns, slot, std::move(measured)});
+  }
+
+  void AddSights(std::span<const FeatureSight> sights) {
+    for (const FeatureSight& sight : sights) {
+      landmarks_[sight.feature_id].sights.push_back({keyframes_.back().number, sight.sight});
+    }
+  }
+
+  void SetPrior(LinearPrior prior) {
+    prior_blocks_ = prior.blocks;
+    prior_ = prior.residual.size() > 0 ? MakePriorFactor(std::move(prior)) : nullptr;
+  }
+
+  // Finds the distances of landmarks that have none yet.
+  void Anchor() {
+    for (auto& [id, landmark] : landmarks_) {
+      if (landmark.anchor.has_value()) continue;
+      if (!AnchorByDisparity(&landmark)) AnchorByParallax(&landmark);
+    }
+  }
+
+  bool IsNearEnough(double inverse_depth) const {
+    return inverse_depth * options_.farthest_m >= 1.0 && inverse_depth * options_.nearest_m <= 1.0;
+  }
+
+  void SetAnchor(size_t sight, double inverse_depth, Landmark* landmark) const {
+    const Vector3d ray = model_.RayOf(landmark->sights[sight].seen.pixel);
+    landmark->anchor = sight;
+    landmark->block = {ray.x(), ray.y(), inverse_depth};
+  }
+
+  bool AnchorByDisparity(Landmark* landmark) {
+    for (size_t i = 0; i < landmark->sights.size(); ++i) {
+      const std::optional<double>& disparity_px = landmark->sights[i].seen.disparity_px;
+      if (!disparity_px.has_value()) continue;
+      const double inverse_depth = *disparity_px / model_.DisparityOf(1.0);
+      if (!IsNearEnough(inverse_depth)) continue;
+      SetAnchor(i, inverse_depth, landmark);
+      return true;
+    }
+    return false;
+  }
+
+  // Where the first ray and the last one come nearest to each other.
+  void AnchorByParallax(Landmark* landmark) {
+    if (landmark->sights.size() < 2) return;
+    const Sight& first = landmark->sights.front();
+    const Sight& last = landmark->sights.back();
+    const Pose3d map_T_first = PoseOf(*Find(first.keyframe)) * model_.imu_T_camera;
+    const Pose3d map_T_last = PoseOf(*Find(last.keyframe)) * model_.imu_T_camera;
+    const Vector3d a = map_T_first.orientation * model_.RayOf(first.seen.pixel);
+    const Vector3d b = map_T_last.orientation * model_.RayOf(last.seen.pixel);
+    const double sine_square = a.cross(b).squaredNorm() / (a.squaredNorm() * b.squaredNorm());
+    const double sine_min = std::sin(options_.parallax_deg_min * M_PI / 180.0);
+    if (sine_square < sine_min * sine_min) return;
+    const Vector3d way = map_T_last.position - map_T_first.position;
+    // s a - t b = way, least squares.
+    const double det = a.dot(b) * a.dot(b) - a.squaredNorm() * b.squaredNorm();
+    const double depth = (b.dot(way) * a.dot(b) - a.dot(way) * b.squaredNorm()) / det;
+    if (!(depth > 0.0) || !IsNearEnough(1.0 / depth)) return;
+    SetAnchor(0, 1.0 / depth, landmark);
+    if (!(MissOf(*landmark) <= options_.miss_px_max)) landmark->anchor.reset();
+  }
+
+  // Mean miss of its sights, pixels; infinite if one is not before the camera.
+  double MissOf(const Landmark& landmark) const {
+    const Pose3d map_T_anchor = PoseOf(*Find(landmark.anchor_keyframe()));
+    double sum = 0.0;
+    double disparity_sum = 0.0;
+    for (const Sight& sight : landmark.sights) {
+      const std::optional<Vector3d> error = SightErrorOf(
+          model_, map_T_anchor, PoseOf(*Find(sight.keyframe)), sight.seen, landmark.block);
+      if (!error.has_value()) return std::numeric_limits<double>::infinity();
+      sum += error->head<2>().norm();
+      disparity_sum += std::abs(error->z());
+    }
+    return std::max(sum, disparity_sum) / static_cast<double>(landmark.sights.size());
+  }
+
+  // Landmarks that miss by more than `times` the limit are dropped.
+  void DropMisfits(double times) {
+    for (auto entry = landmarks_.begin(); entry != landmarks_.end();) {
+      const Landmark& landmark = entry->second;
+      const bool fits =
+          !landmark.anchor.has_value() ||
+          (IsNearEnough(landmark.block[2]) && MissOf(landmark) <= times * options_.miss_px_max);
+      if (fits) {
+        ++entry;
+        continue;
+      }
+      if (landmark.sights.back().keyframe == keyframes_.back().number) {
+        dropped_.push_back(entry->first);
+      }
+      entry = landmarks_.erase(entry);
+    }
+    std::sort(dropped_.begin(), dropped_.end());
+  }
+
+  // `blocks` holds the landmarks that tell something, in their order: memory is ordered as they
+  // are, by which Ceres sorts.
+  FactorList Factors(std::vector<LandmarkBlock>* blocks) const {
+    blocks->clear();
+    for (const auto& [id, landmark] : landmarks_) {
+      if (landmark.tells()) blocks->push_back(landmark.block);
+    }
+    FactorList list;
+    if (prior_ != nullptr) list.factors.push_back({prior_.get(), nullptr, prior_blocks_});
+    for (size_t i = 1; i < keyframes_.size(); ++i) AddInertial(i, &list);
+    size_t index = 0;
+    for (const auto& [id, landmark] : landmarks_) {
+      if (landmark.tells()) AddSightsOf(landmark, (*blocks)[index++].data(), &list);
+    }
+    return list;
+  }
+
+  void AddInertial(size_t i, FactorList* list) const {
+    StateSlot& from = slots_[keyframes_[i - 1].slot];
+    StateSlot& to = slots_[keyframes_[i].slot];
+    list->Add(MakeInertialFactor(keyframes_[i].measured.get(), gravity_map_), nullptr,
+              {from.pose.data(), from.speed.data(), to.pose.data(), to.speed.data()});
+  }
+
+  void AddSightsOf(const Landmark& landmark, double* block, FactorList* list) const {
+    const SightNoise noise{options_.pixel_sigma_px, options_.disparity_sigma_px};
+    double* const anchor_pose = slots_[Find(landmark.anchor_keyframe())->slot].pose.data();
+    list->landmarks.push_back(block);
+    for (size_t i = 0; i < landmark.sights.size(); ++i) {
+      const Sight& sight = landmark.sights[i];
+      if (i == *landmark.anchor) {
+        list->Add(MakeAnchorFactor(model_, sight.seen, noise), &loss_, {block});
+      } else {
+        list->Add(MakeSightFactor(model_, sight.seen, noise), &loss_,
+                  {anchor_pose, slots_[Find(sight.keyframe)->slot].pose.data(), block});
+      }
+    }
+  }
+
+  absl::Status Solve() {
+    std::vector<LandmarkBlock> blocks;
+    const FactorList list = Factors(&blocks);
+    ceres::Problem::Options problem_options;
+    problem_options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    problem_options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    ceres::Problem problem(problem_options);
+    auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+    for (const Keyframe& keyframe : keyframes_) {
+      StateSlot& slot = slots_[keyframe.slot];
+      problem.AddParameterBlock(slot.pose.data(), kPoseBlockSize, manifold_.get());
+      problem.AddParameterBlock(slot.speed.data(), kSpeedBlockSize);
+      ordering->AddElementToGroup(slot.pose.data(), 1);
+      ordering->AddElementToGroup(slot.speed.data(), 1);
+    }
+    for (double* landmark : list.landmarks) {
+      problem.AddParameterBlock(landmark, kLandmarkBlockSize);
+      ordering->AddElementToGroup(landmark, 0);
+    }
+    for (const WindowFactor& factor : list.factors) {
+      problem.AddResidualBlock(const_cast<ceres::CostFunction*>(factor.cost),
+                               const_cast<ceres::LossFunction*>(factor.loss), factor.blocks);
+    }
+    ceres::Solver::Options options;
+    options.linear_solver_type =
+        list.landmarks.empty() ? ceres::DENSE_NORMAL_CHOLESKY : ceres::DENSE_SCHUR;
+    options.linear_solver_ordering = ordering;
+    options.max_num_iterations = options_.step_count;
+    options.num_threads = 1;
+    options.logging_type = ceres::SILENT;
+    ceres::Solver::Summary summary;
+    ceres::Solve(options, &problem, &summary);
+    if (!summary.IsSolutionUsable()) {
+      return BadKeyframe(newest_ns(), absl::StrCat("has no solution: ", summary.message));
+    }
+    size_t index = 0;
+    for (auto& [id, landmark] : landmarks_) {
+      if (landmark.tells()) landmark.block = blocks[index++];
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status Reintegrate() {
+    for (size_t i = 1; i < keyframes_.size(); ++i) {
+      const ImuBias bias = StateOf(keyframes_[i - 1]).bias;
+      if (!keyframes_[i].measured->IsFarFrom(bias)) continue;
+      DSG_RETURN_IF_ERROR(keyframes_[i].measured->Reintegrate(bias));
+    }
+    return absl::OkStatus();
+  }
+
+  // What the oldest keyframe and the landmarks that it saw first tell of the others becomes the
+  // prior. Landmarks that others saw first lose their sights in it.
+  absl::Status DropOldest() {
+    const Keyframe& oldest = keyframes_.front();
+    for (auto& [id, landmark] : landmarks_) {
+      if (landmark.sights.front().keyframe != oldest.number) continue;
+      if (landmark.anchor.has_value() && *landmark.anchor == 0) continue;
+      landmark.sights.erase(landmark.sights.begin());
+      if (landmark.anchor.has_value()) --*landmark.anchor;
+    }
+    std::vector<LandmarkBlock> blocks;
+    blocks.reserve(landmarks_.size());
+    FactorList list;
+    if (prior_ != nullptr) list.factors.push_back({prior_.get(), nullptr, prior_blocks_});
+    AddInertial(1, &list);
+    for (const auto& [id, landmark] : landmarks_) {
+      if (!landmark.tells() || landmark.anchor_keyframe() != oldest.number) continue;
+      blocks.push_back(landmark.block);
+      AddSightsOf(landmark, blocks.back().data(), &list);
+    }
+    std::vector<double*> dropped = list.landmarks;
+    StateSlot& slot = slots_[oldest.slot];
+    dropped.push_back(slot.pose.data());
+    dropped.push_back(slot.speed.data());
+    DSG_ASSIGN_OR_RETURN(LinearPrior prior, Marginalize(list.factors, dropped, {}));
+    SetPrior(std::move(prior));
+    std::erase_if(landmarks_, [&](const auto& entry) {
+      const Landmark& landmark = entry.second;
+      return landmark.sights.empty() ||
+             (landmark.anchor.has_value() && landmark.anchor_keyframe() == oldest.number);
+    });
+    keyframes_.pop_front();
+    keyframes_.front().measured = nullptr;
+    return absl::OkStatus();
+  }
+
+  // Features that are no longer followed and never got a distance.
+  void ForgetLost() {
+    std::erase_if(landmarks_, [&](const auto& entry) {
+      return !entry.second.anchor.has_value() &&
+             entry.second.sights.back().keyframe != keyframes_.back().number;
+    });
+  }
+
+  const StereoModel model_;
+  const Vector3d gravity_map_;
+  const WindowOptions options_;
+  const std::unique_ptr<ceres::Manifold> manifold_;
+  mutable ceres::HuberLoss loss_;
+  // Parameter blocks: the factors of a window that does not change name them, too.
+  mutable std::vector<StateSlot> slots_;
+  std::deque<Keyframe> keyframes_;
+  // By feature.
+  std::map<int64_t, Landmark> landmarks_;
+  std::unique_ptr<ceres::CostFunction> prior_;
+  std::vector<double*> prior_blocks_;
+  std::vector<int64_t> dropped_;
+  int64_t next_number_ = 0;
+};
+
+SlidingWindow::SlidingWindow(const StereoModel& model, const Vector3d& gravity_map,
+                             const WindowOptions& options)
+    : impl_(std::make_unique<Impl>(model, gravity_map, options)) {}
+SlidingWindow::~SlidingWindow() = default;
+SlidingWindow::SlidingWindow(SlidingWindow&&) noexcept = default;
+SlidingWindow& SlidingWindow::operator=(SlidingWindow&&) noexcept = default;
+
+absl::Status SlidingWindow::Begin(TimeNs time_ns, const AlignedState& aligned,
+                                  std::span<const FeatureSight> sights) {
+  return impl_->Begin(time_ns, aligned, sights);
+}
+absl::Status SlidingWindow::Add(TimeNs time_ns, Preintegration measured,
+                                std::span<const FeatureSight> sights) {
+  return impl_->Add(time_ns, std::move(measured), sights);
+}
+int SlidingWindow::keyframe_count() const { return impl_->keyframe_count(); }
+TimeNs SlidingWindow::newest_ns() const { return impl_->newest_ns(); }
+InertialState SlidingWindow::newest() const { return impl_->newest(); }
+InertialState SlidingWindow::oldest() const { return impl_->oldest(); }
+TimeNs SlidingWindow::oldest_ns() const { return impl_->oldest_ns(); }
+absl::StatusOr<Matrix15d> SlidingWindow::NewestCovariance() const {
+  return impl_->NewestCovariance();
+}
+const std::vector<int64_t>& SlidingWindow::dropped_features() const { return impl_->dropped(); }
+std::vector<WindowLandmark> SlidingWindow::Landmarks() const { return impl_->Landmarks(); }
+
+}  // namespace dsg::ingest

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// The last keyframes of a stereo camera with an inertial unit, estimated together.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "ingest/odometry/inertial/alignment.h"
+#include "ingest/odometry/inertial/inertial_state.h"
+#include "ingest/odometry/inertial/preintegration.h"
+#include "ingest/odometry/window/landmark_factor.h"
+#include "ingest/odometry/window/window_options.h"
+#include "schema/base/time.h"
+
+namespace dsg::ingest {
+
+/// A feature of a keyframe's left image, by the tracker's id.
+struct FeatureSight {
+  int64_t feature_id = 0;
+  LandmarkSight sight;
+};
+
+struct WindowLandmark {
+  int64_t feature_id = 0;
+  Eigen::Vector3d position_map = Eigen::Vector3d::Zero();
+  /// Images that saw it.
+  int sight_count = 0;
+};
+
+/// Fixed-lag smoothing: poses, velocities, biases and landmarks of the last keyframes are the least
+/// squares of what the unit and the images measured and of a prior, which is what older keyframes
+/// have left (marginalization.h). The same calls give the same numbers, whatever the number of
+/// threads.
+///
+/// A landmark is eliminated with the keyframe that saw it first. A feature that is followed on
+/// becomes a new landmark, from its next sight on, so that nothing counts twice.
+///
+/// Memory: keyframes times their features. Threads: one caller at a time.
+/// Source: RSS 2020, section V-A; Leutenegger and others, IJRR 2015 (fixed lag, marginalised).
+class SlidingWindow {
+ public:
+  SlidingWindow(const StereoModel& model, const Eigen::Vector3d& gravity_map,
+                const WindowOptions& options);
+  ~SlidingWindow();
+  SlidingWindow(SlidingWindow&&) noexcept;
+  SlidingWindow& operator=(SlidingWindow&&) noexcept;
+
+  /// Begins anew with one keyframe. Errors: FIELD_INVALID when the covariance is not positive
+  /// definite.
+  absl::Status Begin(TimeNs time_ns, const AlignedState& aligned,
+                     std::span<const FeatureSight> sights);
+
+  /// A keyframe after the last one; `measured` reaches from that one to this. Solves, drops
+  /// landmarks that do not fit, and the oldest keyframe if there are too many.
+  ///
+  /// Errors: FIELD_INVALID when times do not fit or numbers are not finite; begin anew then.
+  /// Cost: see docs/sensor_logs.md; 10 to 40 ms for 200 features.
+  absl::Status Add(TimeNs time_ns, Preintegration measured, std::span<const FeatureSight> sights);
+
+  int keyframe_count() const;
+  /// Require: Begin.
+  TimeNs newest_ns() const;
+  InertialState newest() const;
+  InertialState oldest() const;
+  TimeNs oldest_ns() const;
+  /// Of the newest state; rows as in a state. Cost: a few milliseconds.
+  /// Errors: FIELD_INVALID when it is not finite.
+  absl::StatusOr<Matrix15d> NewestCovariance() const;
+
+  /// Features that the last Add found to be wrong, ascending: landmarks that miss their images.
+  const std::vector<int64_t>& dropped_features() const;
+  /// Of which the distance is known, ascending by id.
+  std::vector<WindowLandmark> Landmarks() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace dsg::ingest

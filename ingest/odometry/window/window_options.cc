@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/odometry/window/window_options.h"
+
+namespace dsg::ingest {
+namespace {
+
+constexpr OptionField<WindowOptions> kWindowFields[] = {
+    {"odometry-window-keyframes", &WindowOptions::keyframe_count, 2, 100,
+     "Keyframes that are estimated together; older ones become a prior: more than 12 cost time and "
+     "bring little"},
+    {"odometry-window-steps", &WindowOptions::step_count, 1, 100,
+     "Steps of the solver after each keyframe: it begins where the inertial unit predicts"},
+    {"odometry-window-pixel", &WindowOptions::pixel_sigma_px, 0.01, 50.0,
+     "Standard deviation of a feature's place, pixels: that of a tracker that drifts along edges"},
+    {"odometry-window-disparity", &WindowOptions::disparity_sigma_px, 0.01, 50.0,
+     "Standard deviation of a disparity, pixels: calibrations err too"},
+    {"odometry-window-huber", &WindowOptions::huber_sigmas, 0.1, 1000.0,
+     "From so many standard deviations on a miss costs its size instead of its square: Huber's "
+     "choice"},
+    {"odometry-window-miss", &WindowOptions::miss_px_max, 0.1, 1000.0,
+     "Landmarks that miss their images by more on average are dropped, pixels: three standard "
+     "deviations"},
+    {"odometry-window-parallax", &WindowOptions::parallax_deg_min, 0.01, 90.0,
+     "Angle between the rays to a landmark without a disparity, degrees: below it the distance is "
+     "a guess"},
+    {"odometry-window-nearest", &WindowOptions::nearest_m, 0.01, 10.0,
+     "Least distance of a landmark, metres: nearer ones are out of focus"},
+    {"odometry-window-farthest", &WindowOptions::farthest_m, 1.0, 10'000.0,
+     "Largest distance of a landmark, metres: that of a large hall"},
+};
+
+}  // namespace
+
+std::vector<BoundOption> WindowOptions::Bind() {
+  std::vector<BoundOption> bound;
+  BindFields<WindowOptions>(kWindowFields, this, &bound);
+  return bound;
+}
+
+}  // namespace dsg::ingest

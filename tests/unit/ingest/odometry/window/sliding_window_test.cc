@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/odometry/window/sliding_window.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+#include <vector>
+
+#include "tests/unit/ingest/odometry/window/swinging_rig.h"
+
+namespace dsg::ingest {
+namespace {
+
+constexpr double kPeriodS = 0.2;
+
+struct Passage {
+  std::vector<InertialState> states;
+  std::vector<Matrix15d> covariances;
+  int dropped_count = 0;
+  SlidingWindow window;
+};
+
+struct Noise {
+  double pixel_px = 0.7;
+  double disparity_px = 0.7;
+  bool has_unit_noise = true;
+  /// Of the features, so many in a hundred are followed wrongly, each keyframe anew.
+  int wrong_percent = 0;
+};
+
+Passage PassageOf(double seconds, uint64_t seed, const Noise& noise, WindowOptions options = {}) {
+  Random random(seed, 0);
+  const StereoModel model = TestModel();
+  const std::vector<Eigen::Vector3d> points = RoomPoints(700, &random);
+  std::vector<ImuMeasurement> samples = SwungMeasurements(seconds + 0.1);
+  ImuBias bias;
+  if (noise.has_unit_noise) samples = Noisy(std::move(samples), Adis16448(), &random, &bias);
+  Passage run{{}, {}, 0, SlidingWindow(model, kGravity, options)};
+  const auto sights_at = [&](double t) {
+    auto sights =
+        SightsAt(model, SwungPose(t), points, noise.pixel_px, noise.disparity_px, &random);
+    for (FeatureSight& sight : sights) {
+      if (random.Uniform(0.0, 100.0) >= noise.wrong_percent) continue;
+      sight.sight.pixel += Eigen::Vector2d(random.Uniform(-40, 40), random.Uniform(-40, 40));
+    }
+    return sights;
+  };
+  EXPECT_TRUE(run.window.Begin(0, BeginAt(0.0), sights_at(0.0)).ok());
+  for (int i = 1; i * kPeriodS <= seconds; ++i) {
+    const TimeNs from_ns = std::llround(1e9 * kPeriodS * (i - 1));
+    const TimeNs to_ns = std::llround(1e9 * kPeriodS * i);
+    auto measured = Preintegration::Make(samples, from_ns, to_ns, run.window.newest().bias,
+                                         Adis16448(), InertialOptions());
+    EXPECT_TRUE(measured.ok()) << measured.status();
+    const absl::Status added = run.window.Add(to_ns, *std::move(measured), sights_at(i * kPeriodS));
+    EXPECT_TRUE(added.ok()) << added;
+    run.dropped_count += static_cast<int>(run.window.dropped_features().size());
+    run.states.push_back(run.window.newest());
+    const auto covariance = run.window.NewestCovariance();
+    EXPECT_TRUE(covariance.ok()) << covariance.status();
+    run.covariances.push_back(*covariance);
+  }
+  return run;
+}
+
+double EndErrorM(const Passage& run, double seconds) {
+  return (run.states.back().map_T_imu.position - SwungPose(seconds).position).norm();
+}
+
+TEST(SlidingWindow, FollowsWithoutNoiseExactly) {
+  const Passage run = PassageOf(6.0, 1, {0.0, 0.0, false, 0});
+  EXPECT_LT(EndErrorM(run, 6.0), 2e-3);
+  EXPECT_LT(AngleBetween(run.states.back().map_T_imu.orientation, SwungPose(6.0).orientation),
+            1e-3);
+  EXPECT_EQ(run.dropped_count, 0);
+  EXPECT_EQ(run.window.keyframe_count(), WindowOptions().keyframe_count);
+}
+
+TEST(SlidingWindow, DriftsByCentimetresWithNoise) {
+  std::vector<double> errors;
+  for (uint64_t seed = 1; seed <= 5; ++seed)
+    errors.push_back(EndErrorM(PassageOf(10.0, seed, {}), 10.0));
+  std::sort(errors.begin(), errors.end());
+  std::cout << "after 10 s: " << testing::PrintToString(errors) << " m\n";
+  EXPECT_LT(errors[2], 0.03);
+  EXPECT_LT(errors[4], 0.06);
+}
+
+// Position and heading are off by as much as the covariance says.
+TEST(SlidingWindow, KnowsHowSureItIs) {
+  WindowOptions options;
+  options.pixel_sigma_px = 0.7;
+  options.disparity_sigma_px = 0.7;
+  double position_sum = 0.0;
+  double turn_sum = 0.0;
+  int count = 0;
+  for (uint64_t seed = 1; seed <= 10; ++seed) {
+    const Passage run = PassageOf(8.0, seed, {}, options);
+    for (const size_t i : {19ul, 39ul}) {
+      const double t = kPeriodS * static_cast<double>(i + 1);
+      const Vector15d error = StepBetween(SwungState(t), run.states[i]);
+      const auto share = [&](int row) {
+        const Eigen::Vector3d part = error.segment<3>(row);
+        return part.dot(run.covariances[i].block<3, 3>(row, row).inverse() * part) / 3.0;
+      };
+      position_sum += share(kPositionRow);
+      turn_sum += share(kRotationRow);
+      ++count;
+    }
+  }
+  std::cout << "squared errors in units of the covariance: position " << position_sum / count
+            << ", rotation " << turn_sum / count << "\n";
+  // 60 numbers each, two by two dependent: 95 % within 0.55 and 1.6.
+  EXPECT_GT(position_sum / count, 0.5);
+  EXPECT_LT(position_sum / count, 1.8);
+  EXPECT_GT(turn_sum / count, 0.5);
+  EXPECT_LT(turn_sum / count, 1.8);
+}
+
+TEST(SlidingWindow, DropsFeaturesThatAreFollowedWrongly) {
+  const Passage run = PassageOf(8.0, 3, {0.7, 0.7, true, 10});
+  EXPECT_GT(run.dropped_count, 20);
+  EXPECT_LT(EndErrorM(run, 8.0), 0.1);
+}
+
+TEST(SlidingWindow, LeadsOnByTheUnitAloneWhenNothingIsSeen) {
+  const StereoModel model = TestModel();
+  SlidingWindow window(model, kGravity, {});
+  ASSERT_TRUE(window.Begin(0, BeginAt(0.0), {}).ok());
+  const std::vector<ImuMeasurement> samples = SwungMeasurements(1.1);
+  double sigma_before = 0.0;
+  for (int i = 1; i <= 5; ++i) {
+    auto measured = Preintegration::Make(samples, 200'000'000ll * (i - 1), 200'000'000ll * i, {},
+                                         Adis16448(), InertialOptions());
+    ASSERT_TRUE(measured.ok());
+    ASSERT_TRUE(window.Add(200'000'000ll * i, *std::move(measured), {}).ok());
+    const auto covariance = window.NewestCovariance();
+    ASSERT_TRUE(covariance.ok());
+    EXPECT_GT((*covariance)(0, 0), sigma_before);
+    sigma_before = (*covariance)(0, 0);
+  }
+  EXPECT_LT((window.newest().map_T_imu.position - SwungPose(1.0).position).norm(), 1e-3);
+}
+
+TEST(SlidingWindow, GivesTheSameNumbersTwice) {
+  const Passage a = PassageOf(4.0, 5, {});
+  const Passage b = PassageOf(4.0, 5, {});
+  for (size_t i = 0; i < a.states.size(); ++i) {
+    EXPECT_EQ(StepBetween(a.states[i], b.states[i]).norm(), 0.0);
+  }
+}
+
+TEST(SlidingWindow, RefusesSamplesOfOtherTimes) {
+  SlidingWindow window(TestModel(), kGravity, {});
+  const std::vector<ImuMeasurement> samples = SwungMeasurements(1.0);
+  const auto measured =
+      Preintegration::Make(samples, 0, 200'000'000, {}, Adis16448(), InertialOptions());
+  ASSERT_TRUE(measured.ok());
+  EXPECT_FALSE(window.Add(200'000'000, *measured, {}).ok());
+  ASSERT_TRUE(window.Begin(0, BeginAt(0.0), {}).ok());
+  EXPECT_FALSE(window.Add(300'000'000, *measured, {}).ok());
+  EXPECT_TRUE(window.Add(200'000'000, *measured, {}).ok());
+}
+
+TEST(SlidingWindow, RefusesACovarianceThatIsNone) {
+  SlidingWindow window(TestModel(), kGravity, {});
+  AlignedState aligned = BeginAt(0.0);
+  aligned.covariance(3, 3) = -1.0;
+  EXPECT_FALSE(window.Begin(0, aligned, {}).ok());
+}
+
+}  // namespace
+}  // namespace dsg::ingest
