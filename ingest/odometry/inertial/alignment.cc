@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/odometry/inertial/alignment_internal.h"
+#include "ingest/odometry/inertial/imu_faults.h"
 #include "ingest/odometry/inertial/imu_samples.h"
 #include "schema/base/status.h"
 #include "schema/model/rotation.h"
@@ -15,10 +17,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Of what the state defines or what standing still means: m, rad and m/s. Not 0, so that solvers
-// can invert the covariance.
-constexpr double kOriginSigma = 1e-5;
-constexpr double kYawSigma = 1e-3;
+// What standing still means, m/s. Not 0, so that solvers can invert the covariance.
 constexpr double kRestSigma = 1e-3;
 
 struct Spread {
@@ -39,17 +38,6 @@ Spread SpreadOf(std::span<const ImuMeasurement> samples, Vector3d ImuMeasurement
   return spread;
 }
 
-absl::Status NotYet(const ImuCalibration& unit, const std::string& what) {
-  return absl::FailedPreconditionError(absl::StrCat(unit.name, ": ", what));
-}
-
-// What a wrong length of gravity looks like.
-std::string GuessOf(double force) {
-  if (std::abs(force - 1.0) < 0.1) return "; these look like g, multiply them by 9.80665";
-  if (force < 0.5) return "; gravity seems to be subtracted already, give what the unit measured";
-  return "; check the unit's scale and whether it is at rest";
-}
-
 absl::Status CheckRest(const ImuCalibration& unit, const Spread& rate, const Spread& force,
                        const InertialOptions& options) {
   if (!(force.sigma.maxCoeff() <= options.rest_accel_sigma_max)) {
@@ -68,7 +56,7 @@ absl::Status CheckRest(const ImuCalibration& unit, const Spread& rate, const Spr
   if (!(std::abs(force.mean.norm() - options.gravity_m_s2) <= options.rest_gravity_error_max)) {
     return NotYet(unit, absl::StrCat("it feels ", force.mean.norm(), " m/s^2 and not gravity, ",
                                      options.gravity_m_s2, " +- ", options.rest_gravity_error_max,
-                                     GuessOf(force.mean.norm())));
+                                     "; ", GuessAtForce(force.mean.norm(), options)));
   }
   return absl::OkStatus();
 }
@@ -117,9 +105,7 @@ absl::StatusOr<AlignedState> AlignAtRest(std::span<const ImuMeasurement> samples
 
   const Vector3d up_imu = force.mean.normalized();
   AlignedState aligned;
-  const Eigen::Quaterniond upright = Eigen::Quaterniond::FromTwoVectors(up_imu, Vector3d::UnitZ());
-  aligned.state.map_T_imu.orientation =
-      (RotationOf(yaw_rad * Vector3d::UnitZ()) * upright).normalized();
+  aligned.state.map_T_imu.orientation = UprightOrientation(up_imu, yaw_rad);
   aligned.state.bias.gyro_rad_s = rate.mean;
   aligned.covariance = CovarianceAtRest(calibration, up_imu, span_s, options);
   return aligned;

@@ -53,6 +53,8 @@ class Preintegration {
   TimeNs to_ns() const { return samples_.back().time_ns; }
   double duration_s() const { return duration_s_; }
 
+  /// As they were measured; the first and the last one are interpolated.
+  std::span<const ImuMeasurement> samples() const { return samples_; }
   /// What was subtracted from the samples.
   const ImuBias& bias() const { return bias_; }
   const ImuIncrement& increment() const { return increment_; }
