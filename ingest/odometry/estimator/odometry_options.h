@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+// The numbers of visual-inertial odometry.
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "ingest/config/option_field.h"
+#include "ingest/odometry/frontend/frontend_options.h"
+#include "ingest/odometry/inertial/inertial_options.h"
+#include "ingest/odometry/window/window_options.h"
+#include "schema/base/time.h"
+
+namespace dsg::ingest {
+
+/// How features are followed and checked between keyframes. Source: RSS 2020, section V-A.
+enum class OdometryMethod {
+  /// Five points, and three of stereo: images alone.
+  kFivePoint,
+  /// Two points, and one of stereo: the rotation is the gyroscope's.
+  kTwoPoint,
+  /// The same, and features are sought where the gyroscope turns them ("DVIO").
+  kDynamic,
+};
+
+/// "5pt", "2pt", "dvio". Errors: INVALID_ARGUMENT/FIELD_INVALID for another name.
+absl::StatusOr<OdometryMethod> ParseOdometryMethod(std::string_view name);
+
+struct OdometryKeyframeOptions {
+  /// Keyframes are this far apart at least, and at most, ns.
+  TimeNs period_ns_min = 200'000'000;
+  TimeNs period_ns_max = kNsPerSecond;
+  /// Between both a keyframe is due when the median feature has moved this far, the rotation taken
+  /// off, pixels, or fewer of the last keyframe's features are left than this share.
+  double parallax_px = 6.0;
+  double share_min = 0.6;
+  /// Features of the last keyframe that are enough to tell the motion.
+  int sight_count_min = 8;
+  /// With fewer than that the unit alone is believed for so long, ns.
+  TimeNs blind_ns_max = 2 * kNsPerSecond;
+};
+
+/// How sure a start is, standard deviations; and what grows while nothing is known.
+struct OdometryStartOptions {
+  /// Keyframes that tell a start in motion.
+  int keyframe_count = 10;
+  double tilt_rad = 0.03;
+  double velocity_m_s = 0.2;
+  double gyro_bias_rad_s = 0.02;
+  double accel_bias_m_s2 = 0.1;
+  /// How fast a robot may go that is not seen to move, m/s, and how fast its heading is lost
+  /// without a gyroscope, rad/s.
+  double lost_speed_m_s = 1.0;
+  double lost_turn_rad_s = 1.0;
+};
+
+/// Vibration and temperature make a mounted unit noisier than its data sheet says.
+struct OdometryUnitOptions {
+  double gyro_noise_factor = 1.0;
+  double accel_noise_factor = 1.0;
+};
+
+struct OdometryOptions {
+  OdometryMethod method = OdometryMethod::kDynamic;
+  FrontendOptions frontend;
+  InertialOptions inertial;
+  WindowOptions window;
+  OdometryKeyframeOptions keyframe;
+  OdometryStartOptions start;
+  OdometryUnitOptions unit;
+
+  std::vector<BoundOption> Bind();
+};
+
+}  // namespace dsg::ingest
