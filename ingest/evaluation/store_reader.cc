@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ingest/evaluation/store_reader.h"
 
-#include <algorithm>
 #include <map>
+#include <optional>
+#include <utility>
 
-#include "absl/strings/str_cat.h"
+#include "ingest/evaluation/robot_tracks.h"
 #include "schema/base/status.h"
 
 namespace dsg::evaluation {
 namespace {
 
-constexpr int kRevisionPage = 1000;
 constexpr char kDetectionPrior[] = "detection_prior";
 
 StopCheck NeverStop() {
@@ -23,19 +23,6 @@ using Indices = std::map<NodeId, int>;
 int IndexOf(const Indices& indices, NodeId id) {
   const auto found = indices.find(id);
   return found == indices.end() ? -1 : found->second;
-}
-
-absl::StatusOr<std::vector<StampedPose>> ReadPoses(const Snapshot& snapshot, NodeId agent,
-                                                   TimeNs from_ns, TimeNs to_ns) {
-  std::vector<StampedPose> poses;
-  DSG_RETURN_IF_ERROR(
-      snapshot.ReadPoses(agent, from_ns, to_ns, NeverStop(), [&poses](const TimedPose& pose) {
-        if ((pose.flags & pose_flags::kPredicted) == 0) {
-          poses.push_back({pose.time_ns, pose.map_T_agent});
-        }
-        return true;
-      }));
-  return poses;
 }
 
 class Reader {
@@ -118,8 +105,6 @@ class Reader {
   absl::Status ReadTracks() {
     DSG_ASSIGN_OR_RETURN(const std::vector<TrackInfo> tracks, snapshot_.Tracks());
     Indices people;
-    const TrackInfo* robot = nullptr;
-    int robot_count = 0;
     for (const TrackInfo& track : tracks) {
       if (track.kind == kinds::kHuman) {
         const int index = static_cast<int>(people.size());
@@ -127,19 +112,12 @@ class Reader {
         Tell("people", static_cast<double>(index) / static_cast<double>(tracks.size()));
         DSG_RETURN_IF_ERROR(ReadPerson(track, index));
       }
-      if (track.kind != kinds::kRobot || track.pose_count == 0) continue;
-      ++robot_count;
-      if (robot == nullptr) robot = &track;
     }
     for (const Edge& edge : held_) {
       out_.holdings.push_back({IndexOf(objects_, edge.source), IndexOf(people, edge.target),
                                edge.valid.from_ns, edge.weight});
     }
-    if (robot_count > 1) {
-      out_.notes.push_back(absl::StrCat("the map has ", robot_count, " robots; only ",
-                                        ToString(robot->agent), " (", robot->name, ") is scored"));
-    }
-    return robot == nullptr ? absl::OkStatus() : ReadRobot(*robot);
+    return ReadRobot();
   }
 
   absl::Status ReadPerson(const TrackInfo& track, int index) {
@@ -151,68 +129,21 @@ class Reader {
     }
     if (track.pose_count == 0) return absl::OkStatus();
     DSG_ASSIGN_OR_RETURN(const std::vector<StampedPose> poses,
-                         ReadPoses(snapshot_, track.agent, kTimeMin, kTimeMax));
+                         ReadStampedPoses(snapshot_, track.agent, kTimeMin, kTimeMax));
     for (const StampedPose& pose : poses) {
       out_.torsos.push_back({pose.time_ns, index, pose.map_T_body.position});
     }
     return absl::OkStatus();
   }
 
-  absl::Status ReadRobot(const TrackInfo& robot) {
-    DSG_ASSIGN_OR_RETURN(out_.robot, ReadPoses(snapshot_, robot.agent, kTimeMin, kTimeMax));
-    DSG_ASSIGN_OR_RETURN(const std::vector<Revision> revisions, GrowingRevisions());
-    // Up to and with this stamp, what was first said is known.
-    std::optional<TimeNs> known_ns;
-    int chunk_count = 0;
-    for (size_t i = 0; i < revisions.size(); ++i) {
-      Tell("causal trajectory", static_cast<double>(i) / static_cast<double>(revisions.size()));
-      DSG_ASSIGN_OR_RETURN(const auto then, map_.At(revisions[i]));
-      const auto track = then->GetTrack(robot.agent);
-      // Not there yet.
-      if (absl::IsNotFound(track.status())) continue;
-      DSG_RETURN_IF_ERROR(track.status());
-      if (track->pose_count == 0 || (known_ns.has_value() && track->last_ns <= *known_ns)) continue;
-      const TimeNs from_ns = known_ns.has_value() ? *known_ns + 1 : kTimeMin;
-      DSG_ASSIGN_OR_RETURN(const std::vector<StampedPose> poses,
-                           ReadPoses(*then, robot.agent, from_ns, kTimeMax));
-      out_.robot_causal.insert(out_.robot_causal.end(), poses.begin(), poses.end());
-      known_ns = track->last_ns;
-      ++chunk_count;
-    }
-    if (chunk_count == 1) {
-      out_.notes.push_back(
-          "the robot's poses came in one revision, so the store cannot tell causal poses from "
-          "smoothed ones: ate_m may be of smoothed poses");
-    }
+  absl::Status ReadRobot() {
+    DSG_ASSIGN_OR_RETURN(std::optional<RobotTracks> robot,
+                         ReadRobotTracks(map_, snapshot_, "", progress_));
+    if (!robot.has_value()) return absl::OkStatus();
+    out_.robot_causal = std::move(robot->causal);
+    out_.robot = std::move(robot->corrected);
+    out_.notes.insert(out_.notes.end(), robot->notes.begin(), robot->notes.end());
     return absl::OkStatus();
-  }
-
-  // Ascending; only those after which there were more poses than before.
-  absl::StatusOr<std::vector<Revision>> GrowingRevisions() {
-    DSG_ASSIGN_OR_RETURN(const Revision oldest, map_.OldestRevision());
-    std::vector<std::pair<Revision, int64_t>> pose_counts;
-    Revision before = snapshot_.revision() + 1;
-    while (before > 1) {
-      DSG_ASSIGN_OR_RETURN(const std::vector<RevisionInfo> page,
-                           map_.ListRevisions(before, kRevisionPage));
-      if (page.empty()) break;
-      for (const RevisionInfo& info : page)
-        pose_counts.emplace_back(info.revision, info.pose_count);
-      before = page.back().revision;
-      if (before <= oldest) break;
-    }
-    std::reverse(pose_counts.begin(), pose_counts.end());
-    if (oldest > 1) {
-      out_.notes.push_back(absl::StrCat("revisions before ", oldest,
-                                        " are compacted: poses of that time are as smoothed then"));
-    }
-    std::vector<Revision> revisions;
-    int64_t last_count = -1;
-    for (const auto& [revision, pose_count] : pose_counts) {
-      if (revision >= oldest && pose_count != last_count) revisions.push_back(revision);
-      last_count = pose_count;
-    }
-    return revisions;
   }
 
   absl::Status ReadMesh() {

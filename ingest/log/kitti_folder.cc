@@ -16,7 +16,7 @@
 #include "ingest/log/image_file.h"
 #include "ingest/log/loop_file.h"
 #include "ingest/log/point_row.h"
-#include "ingest/log/rigid_matrix.h"
+#include "ingest/log/pose_table.h"
 #include "ingest/log/sensor_log.h"
 #include "ingest/log/text_table.h"
 #include "ingest/log/track_log.h"
@@ -58,17 +58,6 @@ absl::StatusOr<Image> LoadScan(const std::string& path) {
     points.Add(xyz);
   }
   return points.Take();
-}
-
-absl::StatusOr<Eigen::Matrix4d> ParseMatrix(const LinePosition& at,
-                                            const std::vector<std::string_view>& fields,
-                                            size_t first) {
-  Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
-  for (int i = 0; i < 12; ++i) {
-    DSG_ASSIGN_OR_RETURN(matrix(i / 4, i % 4),
-                         ParseNumber(at, absl::StrCat("number ", i + 1), fields[first + i]));
-  }
-  return matrix;
 }
 
 class KittiReader {
@@ -192,18 +181,9 @@ class KittiReader {
       if (fields[0] != "Tr:" && fields[0] != "Tr_velo_to_cam:") continue;
       const LinePosition at{file.path, line.number};
       DSG_RETURN_IF_ERROR(CheckFieldCount(at, line, fields.size(), 13, "Tr: and a 3x4 matrix"));
-      return ReadRigid(at, fields, 1);
+      return ReadMatrixFields(at, fields, 1, &deviation_max_);
     }
     return MalformedFile(file.path, "has no line \"Tr:\" with the transform from lidar to camera");
-  }
-
-  absl::StatusOr<Pose3d> ReadRigid(const LinePosition& at,
-                                   const std::vector<std::string_view>& fields, size_t first) {
-    DSG_ASSIGN_OR_RETURN(const Eigen::Matrix4d matrix, ParseMatrix(at, fields, first));
-    const absl::StatusOr<RigidMatrix> rigid = ToRigid(matrix);
-    if (!rigid.ok()) return at.Error(std::string(rigid.status().message()));
-    deviation_max_ = std::max(deviation_max_, rigid->deviation);
-    return rigid->pose;
   }
 
   absl::StatusOr<TrackTable> ReadPoses() {
@@ -212,28 +192,17 @@ class KittiReader {
     TrackTable table;
     table.file = file.path;
     const int32_t agent = table.FindOrAdd(RobotName(options_), kinds::kRobot);
-    LineReader lines(file.bytes);
-    TextLine line;
-    std::vector<std::string_view> fields;
-    while (lines.Next(&line)) {
-      const LinePosition at{file.path, line.number};
-      SplitAtBlanks(line.text, &fields);
-      DSG_RETURN_IF_ERROR(CheckFieldCount(at, line, fields.size(), 12, "a 3x4 matrix"));
-      DSG_ASSIGN_OR_RETURN(const Pose3d origin_T_camera, ReadRigid(at, fields, 0));
-      const size_t number = table.rows.size();
-      if (number < times_.size()) {
-        table.rows.push_back(
-            {.time_ns = times_[number],
-             .line = line.number,
-             .agent = agent,
-             .flags = 0,
-             .map_T_agent = camera_T_lidar.Inverse() * origin_T_camera * camera_T_lidar});
-        continue;
-      }
-      return CountsDiffer(file.path, "more");
-    }
-    if (table.rows.size() < times_.size()) {
-      return CountsDiffer(file.path, absl::StrCat(table.rows.size()));
+    DSG_ASSIGN_OR_RETURN(const MatrixPoses poses, ReadMatrixPoses(file));
+    if (poses.rows.size() != times_.size()) return CountsDiffer(file.path, poses.rows.size());
+    deviation_max_ = std::max(deviation_max_, poses.deviation_max);
+    for (size_t i = 0; i < times_.size(); ++i) {
+      const Pose3d& origin_T_camera = poses.rows[i].map_T_body;
+      table.rows.push_back(
+          {.time_ns = times_[i],
+           .line = poses.rows[i].line,
+           .agent = agent,
+           .flags = 0,
+           .map_T_agent = camera_T_lidar.Inverse() * origin_T_camera * camera_T_lidar});
     }
     if (deviation_max_ > kDeviationNoted) {
       info_.notes.push_back(absl::StrCat("rotations of ", kPosesFile, " or ", kCalibrationFile,
@@ -243,7 +212,7 @@ class KittiReader {
     return table;
   }
 
-  absl::Status CountsDiffer(const std::string& path, const std::string& count) const {
+  absl::Status CountsDiffer(const std::string& path, size_t count) const {
     return MalformedFile(
         path, absl::StrCat("has ", count, " poses, and ", kTimesFile, " has ", times_.size(),
                            " times; one of each is due for every scan"));

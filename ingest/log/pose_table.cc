@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ingest/log/pose_table.h"
 
+#include <algorithm>
+
 #include "absl/strings/str_cat.h"
-#include "ingest/log/text_table.h"
+#include "ingest/log/rigid_matrix.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
 namespace {
 
+constexpr size_t kMatrixFields = 12;
 constexpr char kPoseColumns[] = "timestamp, p x y z, q w x y z, then nothing or v, b_w, b_a";
 
 // A header that names other columns must not be read as if it named ours.
@@ -125,6 +128,49 @@ absl::StatusOr<TrackTable> ReadPoseTable(const LogFile& file, const std::string&
   }
   return LinePosition{file.path, 1}.Error(
       "holds no pose; EuRoC or TUM columns are due, one pose a line");
+}
+
+absl::StatusOr<Pose3d> ReadMatrixFields(const LinePosition& at,
+                                        const std::vector<std::string_view>& fields, size_t first,
+                                        double* deviation_max) {
+  Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
+  for (size_t i = 0; i < kMatrixFields; ++i) {
+    DSG_ASSIGN_OR_RETURN(matrix(i / 4, i % 4),
+                         ParseNumber(at, absl::StrCat("number ", i + 1), fields[first + i]));
+  }
+  const absl::StatusOr<RigidMatrix> rigid = ToRigid(matrix);
+  if (!rigid.ok()) return at.Error(std::string(rigid.status().message()));
+  *deviation_max = std::max(*deviation_max, rigid->deviation);
+  return rigid->pose;
+}
+
+absl::StatusOr<MatrixPoses> ReadMatrixPoses(const LogFile& file) {
+  MatrixPoses poses;
+  LineReader lines(file.bytes, file.lines_left_out);
+  TextLine line;
+  std::vector<std::string_view> fields;
+  while (lines.Next(&line)) {
+    if (line.text.starts_with('#')) continue;
+    const LinePosition at{file.path, line.number};
+    SplitAtBlanks(line.text, &fields);
+    DSG_RETURN_IF_ERROR(CheckFieldCount(at, line, fields.size(), kMatrixFields, "a 3x4 matrix"));
+    DSG_ASSIGN_OR_RETURN(const Pose3d map_T_body,
+                         ReadMatrixFields(at, fields, 0, &poses.deviation_max));
+    poses.rows.push_back({line.number, map_T_body});
+  }
+  return poses;
+}
+
+bool HasMatrixRows(const LogFile& file) {
+  LineReader lines(file.bytes, file.lines_left_out);
+  TextLine line;
+  std::vector<std::string_view> fields;
+  while (lines.Next(&line)) {
+    if (line.text.starts_with('#')) continue;
+    SplitAtBlanks(line.text, &fields);
+    return fields.size() == kMatrixFields;
+  }
+  return false;
 }
 
 }  // namespace dsg::ingest

@@ -80,7 +80,8 @@ ALLOWED["ingest/simulator"] += ["ingest/truth"]
 # A bag is made from what the readers make of a folder, so that both hold the same.
 ALLOWED["ingest/simulator/bag"] = ALLOWED["ingest/simulator"] + ["ingest/log", "ingest/simulator"]
 ALLOWED["ingest/simulator"] += ["ingest/simulator/bag"]
-ALLOWED["ingest/evaluation"] += ["ingest/truth"]
+# Trajectories of files are read by the readers of logs.
+ALLOWED["ingest/evaluation"] += ["ingest/truth", "ingest/log"]
 
 # Pattern of an include -> folders that may have it; "*.cc" after a folder means not in headers.
 # A header named *_internal.h counts as part of the .cc files of its folder, which alone may

@@ -122,7 +122,7 @@ TEST_F(KittiFolderTest, SaysWhatIsWrong) {
   SetUp();
   ExpectRefused("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n", {"poses.txt", "has 1 poses", "3 times"});
   const std::string pose = "1 0 0 0 0 1 0 0 0 0 1 0\n";
-  ExpectRefused("poses.txt", pose + pose + pose + pose, {"poses.txt", "more poses"});
+  ExpectRefused("poses.txt", pose + pose + pose + pose, {"poses.txt", "has 4 poses"});
   ExpectRefused("poses.txt", pose + "1 0 0 nan 0 1 0 0 0 0 1 0\n" + pose, {"poses.txt:2", "nan"});
   ExpectRefused("poses.txt", pose + "2 0 0 0 0 2 0 0 0 0 2 0\n" + pose,
                 {"poses.txt:2", "are no rotation"});
