@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "ingest/config/option_flags.h"
 #include "ingest/evaluation/compare_tracks.h"
@@ -50,6 +51,18 @@ struct Flags {
 
 TimeNs NsOf(double seconds) {
   return static_cast<TimeNs>(std::llround(seconds * static_cast<double>(kNsPerSecond)));
+}
+
+/// CLI::Range lets "nan" pass.
+CLI::Validator NumberIn(double min, double max) {
+  return CLI::Validator(
+      [min, max](const std::string& text) {
+        double number = 0.0;
+        const bool is_in = absl::SimpleAtod(text, &number) && number >= min && number <= max;
+        return is_in ? std::string()
+                     : absl::StrCat("\"", text, "\" is no number from ", min, " to ", max);
+      },
+      absl::StrCat("in [", min, " - ", max, "]"));
 }
 
 void AddMapFlags(CLI::App* app, Flags* flags) {
@@ -114,21 +127,21 @@ void AddTrackFlags(CLI::App* app, Flags* flags) {
   app->add_option("--tolerance", flags->tolerance_s,
                   "Seconds between true poses that are interpolated, or to the nearest one, at "
                   "most; and by how much a stretch of --rpe-seconds may be longer")
-      ->check(CLI::Range(0.0, 1e6))
+      ->check(NumberIn(0.0, 1e6))
       ->capture_default_str();
   app->add_option("--reach", flags->reach_s,
                   "Seconds around a pose that it covers of the truth's time")
-      ->check(CLI::Range(0.0, 1e6))
+      ->check(NumberIn(0.0, 1e6))
       ->capture_default_str();
   app->add_option("--rpe-lengths", track.options.rpe_lengths_m,
                   "Metres of true path over which relative errors are taken")
       ->delimiter(',')
-      ->check(CLI::Range(1e-3, 1e6))
+      ->check(NumberIn(1e-3, 1e6))
       ->capture_default_str();
   app->add_option("--rpe-seconds", flags->rpe_seconds,
                   "Seconds over which relative errors are taken")
       ->delimiter(',')
-      ->check(CLI::Range(1e-3, 1e6))
+      ->check(NumberIn(1e-3, 1e6))
       ->capture_default_str();
   ingest::UseShortHelp(app);
   const ingest::OptionGroup loops{"loop closures", track.options.loops.Bind()};
