@@ -93,6 +93,7 @@ template <typename Enum>
 void AddChoice(const std::string& name, const std::vector<Enum>& values, const std::string& help,
                std::function<void(Enum)> set, CLI::App* app) {
   std::vector<std::string> names;
+  names.reserve(values.size());
   for (const Enum value : values) names.emplace_back(NameOf(value));
   app->add_option_function<std::string>(
          name,
