@@ -293,20 +293,6 @@ std::string AxesOf(std::span<const Arrangement> arrangements) {
   return absl::StrJoin(names, ", ");
 }
 
-// Those that fit as well as the best one. A mirror is among them only if no rotation is: drivers
-// seldom mirror.
-std::vector<Arrangement> LikelyOf(std::span<const Arrangement> arrangements, double misfit_max) {
-  std::vector<Arrangement> likely;
-  for (const bool mirrors : {false, true}) {
-    for (const Arrangement& one : arrangements) {
-      const bool is_mirror = one.calibrated_R_unit.determinant() < 0.0;
-      if (is_mirror == mirrors && one.misfit <= misfit_max) likely.push_back(one);
-    }
-    if (!likely.empty()) break;
-  }
-  return likely;
-}
-
 void FindAxesFault(const RateSums& sums, double noise_rad_s, const std::string& unit,
                    const ImuFaultOptions& options, std::vector<ImuFault>* faults) {
   const std::vector<Arrangement> fitted = FitArrangements(sums);
@@ -315,8 +301,13 @@ void FindAxesFault(const RateSums& sums, double noise_rad_s, const std::string& 
   const double least = std::max(best.misfit, noise_rad_s);
   const double misfit_max = options.axes_ratio_min * least;
   if (calibrated.misfit <= misfit_max) return;
-  const std::vector<Arrangement> likely = LikelyOf(fitted, misfit_max);
-  const bool is_mirror = likely.front().calibrated_R_unit.determinant() < 0.0;
+  std::vector<Arrangement> likely;
+  bool is_mirror = true;
+  for (const Arrangement& one : fitted) {
+    if (one.misfit > misfit_max) break;
+    likely.push_back(one);
+    is_mirror = is_mirror && one.calibrated_R_unit.determinant() < 0.0;
+  }
   faults->push_back(
       {ImuFaultKind::kAxes,
        absl::StrCat(unit, ": the calibration's axes x, y, z are the gyro's ", AxesOf(likely),

@@ -59,8 +59,9 @@ std::vector<ImuFault> FaultsOfSamples(std::span<const ImuMeasurement> samples,
                                       const std::string& unit, const InertialOptions& options);
 
 /// What the gyro's rates are, compared with those that cameras saw: of the 48 ways to call its axes
-/// x, y, z and their opposites the one that fits best, with any scale and any bias. Empty: nothing
-/// is found, or the turns are too few or too much alike to tell.
+/// x, y, z and their opposites the one that fits best, with any scale and any bias; a "?" stands
+/// for an axis that turned too little. Empty: nothing is found, or the turns are too few or too
+/// much alike to tell.
 ///
 /// Axes of the accelerometer and its sign are not compared. Between keyframes a turn is taken as
 /// one about a fixed axis: of a radian or less. Requires: CheckSamples accepts the samples of each.

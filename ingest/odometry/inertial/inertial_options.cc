@@ -39,9 +39,10 @@ constexpr OptionField<MotionStartOptions> kMotionStartFields[] = {
      "show what does not fit"},
     {"inertial-start-way", &MotionStartOptions::way_sigma_m, 1e-5, 1.0,
      "What stereo errs by about the way between two keyframes, one standard deviation of each "
-     "axis, metres: three points 2 metres away, of a baseline of 0.1 metres"},
+     "axis, metres: 3 millimetres for each of the two, three times what is seen of things 2 metres "
+     "away"},
     {"inertial-start-turn", &MotionStartOptions::turn_sigma_rad, 1e-5, 0.5,
-     "... and about the turn, radians: what shifts such points as much"},
+     "... and about the turn, radians: a tenth of a degree for each of the two"},
     {"inertial-start-misfit", &MotionStartOptions::misfit_sigma_max, 1.0, 1000.0,
      "Most by which cameras and unit may differ between two keyframes, standard deviations: one of "
      "60,000 right ones differs by more"},
@@ -66,8 +67,9 @@ constexpr OptionField<ImuFaultOptions> kImuFaultFields[] = {
      "... and by which nine of ten accelerations differ from gravity: without gravity they would "
      "differ by more"},
     {"inertial-fault-clipped", &ImuFaultOptions::clipped_count_min, 2, 1000,
-     "Samples at one value in a row that make a peak a clipped one: noise seldom repeats a value "
-     "twice"},
+     "Samples at one value in a row that make a peak a clipped one: slow peaks of coarse units "
+     "have "
+     "four"},
     {"inertial-fault-clipped-rate", &ImuFaultOptions::clipped_rate_min, 0.0, 100.0,
      "... at a rate of this or more, radians / second: no unit's range ends below 125 degrees / "
      "second"},
@@ -82,9 +84,9 @@ constexpr OptionField<ImuFaultOptions> kImuFaultFields[] = {
      "by accident"},
     {"inertial-fault-turn-rate", &ImuFaultOptions::turn_rate_sigma_min, 0.001, 10.0,
      "... and how much the rate of turning varies by, one standard deviation, radians / second: "
-     "four times the noise of cameras"},
+     "eight times the noise of cameras"},
     {"inertial-fault-correlation", &ImuFaultOptions::turn_correlation_min, 0.0, 1.0,
-     "Least correlation of the rates of unit and cameras: noise leaves 0.9"},
+     "Least correlation of the rates of unit and cameras: noise leaves 0.98"},
     {"inertial-fault-axes", &ImuFaultOptions::axes_ratio_min, 1.1, 100.0,
      "Axes are taken as swapped if that leaves so many times less than the calibration's: a "
      "calibration that is right is at most worse by chance"},

@@ -16,8 +16,8 @@ struct MotionStartOptions {
   int keyframe_count_min = 5;
   /// What the cameras' pose of a keyframe relative to the one before errs by, one standard
   /// deviation of each axis, m and rad.
-  double way_sigma_m = 0.01;
-  double turn_sigma_rad = 0.005;
+  double way_sigma_m = 0.004;
+  double turn_sigma_rad = 0.0025;
   /// Most by which cameras and unit differ between two keyframes, standard deviations.
   double misfit_sigma_max = 5.0;
   /// By how much gravity may differ in length when it is left free, m/s^2.
@@ -40,7 +40,7 @@ struct ImuFaultOptions {
   double force_spread_max = 0.5;
   /// Samples at one value in a row that make a peak a clipped one, and where such peaks are looked
   /// for, rad/s and m/s^2.
-  int clipped_count_min = 3;
+  int clipped_count_min = 5;
   double clipped_rate_min = 2.0;
   double clipped_accel_min = 15.0;
   /// Share of the samples that may repeat the one before.
@@ -53,7 +53,7 @@ struct ImuFaultOptions {
   double turn_correlation_min = 0.8;
   /// Another arrangement of the axes is told if it leaves so many times less than the
   /// calibration's.
-  double axes_ratio_min = 3.0;
+  double axes_ratio_min = 2.0;
 
   std::vector<BoundOption> Bind();
 };

@@ -116,12 +116,12 @@ TEST(ImuFaults, TellClippedPeaks) {
   }
   ExpectFault(FaultsOfSamples(window.samples, "imu0", {}), ImuFaultKind::kClipped, "gyro's y");
   window = good;
-  for (size_t i = 100; i < 104; ++i) window.samples[i].acceleration_m_s2.x() = -19.6133;
+  for (size_t i = 100; i < 105; ++i) window.samples[i].acceleration_m_s2.x() = -19.6133;
   ExpectFault(FaultsOfSamples(window.samples, "imu0", {}), ImuFaultKind::kClipped,
               "accelerometer's x stays at its extreme of -19.6133");
   // A short knock is none.
   window = good;
-  for (size_t i = 100; i < 102; ++i) window.samples[i].acceleration_m_s2.x() = -19.6133;
+  for (size_t i = 100; i < 104; ++i) window.samples[i].acceleration_m_s2.x() = -19.6133;
   EXPECT_TRUE(FaultsOfSamples(window.samples, "imu0", {}).empty());
 }
 
@@ -180,7 +180,9 @@ TEST(ImuFaults, TellUnitsOfRates) {
 // All 47 wrong ones, each named as what makes it right.
 TEST(ImuFaults, NameTheAxes) {
   Random random(test::TestSeed(1), 0);
-  const MadeWindow good = CarriedWindow(&random);
+  MadeMotion motion = CarriedMotion(&random);
+  motion.swing_rad = 1.0;
+  const MadeWindow good = MakeWindow(motion, 0.0, 11, {}, {}, &random);
   std::array<int, 3> columns = {0, 1, 2};
   do {
     for (int signs = columns == std::array{0, 1, 2} ? 1 : 0; signs < 8; ++signs) {
@@ -209,7 +211,9 @@ TEST(ImuFaults, NameTheAxes) {
 
 TEST(ImuFaults, NameAxesAndUnitTogether) {
   Random random(test::TestSeed(1), 0);
-  MadeWindow window = CarriedWindow(&random);
+  MadeMotion motion = CarriedMotion(&random);
+  motion.swing_rad = 1.0;
+  MadeWindow window = MakeWindow(motion, 0.0, 11, {}, {}, &random);
   for (ImuMeasurement& sample : window.samples) {
     const Vector3d rate = sample.angular_velocity_rad_s;
     sample.angular_velocity_rad_s = kDegrees * Vector3d(rate.y(), rate.z(), rate.x());

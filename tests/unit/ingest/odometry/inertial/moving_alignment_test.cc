@@ -66,10 +66,10 @@ TEST(AlignInMotion, FindsUpSpeedAndBiases) {
     ASSERT_TRUE(aligned.ok()) << aligned.status();
     ASSERT_EQ(aligned->states.size(), 11u);
     const StartErrors errors = ErrorsOf(aligned->last.state, window.truth.back());
-    EXPECT_LT(errors.tilt_deg, 0.5);
-    EXPECT_LT(errors.speed_m_s, 0.03);
-    EXPECT_LT(errors.gyro_rad_s, 0.003);
-    EXPECT_LT(errors.accel_m_s2, 0.08);
+    EXPECT_LT(errors.tilt_deg, 1.0);
+    EXPECT_LT(errors.speed_m_s, 0.05);
+    EXPECT_LT(errors.gyro_rad_s, 0.006);
+    EXPECT_LT(errors.accel_m_s2, 0.16);
     EXPECT_NEAR(aligned->free_gravity_m_s2, 9.81, 0.15);
     const std::string name = "seed_" + std::to_string(seed);
     RecordProperty(name + "_tilt_deg", std::to_string(errors.tilt_deg));
@@ -77,7 +77,7 @@ TEST(AlignInMotion, FindsUpSpeedAndBiases) {
     RecordProperty(name + "_gyro_rad_s", std::to_string(errors.gyro_rad_s));
     RecordProperty(name + "_accel_m_s2", std::to_string(errors.accel_m_s2));
     for (size_t i = 0; i < window.truth.size(); ++i) {
-      EXPECT_LT(ErrorsOf(aligned->states[i], window.truth[i]).speed_m_s, 0.04) << i;
+      EXPECT_LT(ErrorsOf(aligned->states[i], window.truth[i]).speed_m_s, 0.06) << i;
     }
   }
 }
@@ -149,9 +149,9 @@ TEST(AlignInMotion, TakesStandingStillAndConstantSpeed) {
     const auto aligned = AlignWindow(&window);
     ASSERT_TRUE(aligned.ok()) << aligned.status();
     const StartErrors errors = ErrorsOf(aligned->last.state, window.truth.back());
-    EXPECT_LT(errors.tilt_deg, 0.7);
-    EXPECT_LT(errors.speed_m_s, 0.03);
-    EXPECT_LT(errors.gyro_rad_s, 0.003);
+    EXPECT_LT(errors.tilt_deg, 0.8);
+    EXPECT_LT(errors.speed_m_s, 0.05);
+    EXPECT_LT(errors.gyro_rad_s, 0.006);
     const auto tilt = aligned->last.covariance.block<3, 3>(kRotationRow, kRotationRow);
     EXPECT_GT(std::sqrt(0.5 * tilt.trace()), 0.1 / 9.81);
     EXPECT_LT(std::sqrt(0.5 * tilt.trace()), 0.13 / 9.81);
@@ -170,10 +170,10 @@ TEST(AlignInMotion, TellsBiasFromTiltByTurning) {
   options.start.turn_sigma_rad = 0.0025;
   const auto aligned = AlignWindow(&window, 0.0, options);
   ASSERT_TRUE(aligned.ok()) << aligned.status();
-  EXPECT_LT(ErrorsOf(aligned->last.state, window.truth.back()).accel_m_s2, 0.03);
-  EXPECT_LT(ErrorsOf(aligned->last.state, window.truth.back()).tilt_deg, 0.2);
+  EXPECT_LT(ErrorsOf(aligned->last.state, window.truth.back()).accel_m_s2, 0.06);
+  EXPECT_LT(ErrorsOf(aligned->last.state, window.truth.back()).tilt_deg, 0.4);
   const auto sigma = aligned->last.covariance.diagonal().tail<3>().cwiseSqrt();
-  EXPECT_LT(sigma.maxCoeff(), 0.03);
+  EXPECT_LT(sigma.maxCoeff(), 0.035);
   // At rest, what an earlier start knows of the bias keeps its tilt away.
   MadeMotion standing;
   MadeWindow again = MakeWindow(standing, 0.0, 11, bias, {}, &random);
@@ -181,7 +181,7 @@ TEST(AlignInMotion, TellsBiasFromTiltByTurning) {
   for (Preintegration& part : again.parts) ASSERT_TRUE(part.Reintegrate(bias).ok());
   const auto informed = AlignWindow(&again);
   ASSERT_TRUE(informed.ok()) << informed.status();
-  EXPECT_LT(ErrorsOf(informed->last.state, again.truth.back()).tilt_deg, 0.2);
+  EXPECT_LT(ErrorsOf(informed->last.state, again.truth.back()).tilt_deg, 0.4);
 }
 
 // Errors are as large as the covariance says, and as those of its parts belong together.
