@@ -87,7 +87,8 @@ absl::StatusOr<BagPoses> PlanPoses(const Bag& bag, const LogOptions& options, Ba
     // A topic of poses goes before the transforms, which take a pass over the bag.
     const bool wants_truth = options.poses == PoseSource::kGroundTruth ||
                              (options.poses == PoseSource::kAuto && has_truth);
-    if (!has_external && !wants_truth && HasMovingTransforms(bag)) {
+    const bool wants_any = options.poses != PoseSource::kOdometry;
+    if (wants_any && !has_external && !wants_truth && HasMovingTransforms(bag)) {
       DSG_RETURN_IF_ERROR(ReadTransformPoses(bag, options, &poses, info));
     }
     DSG_ASSIGN_OR_RETURN(
@@ -110,7 +111,7 @@ absl::StatusOr<BagPoses> PlanPoses(const Bag& bag, const LogOptions& options, Ba
   } else if (HasMovingTransforms(bag) && choice != PoseChoice::kNone) {
     info->notes.push_back("/tf is not taken for poses: a topic of poses goes before it");
   }
-  if (!from_file && choice == PoseChoice::kNone) {
+  if (!from_file && choice == PoseChoice::kNone && options.poses != PoseSource::kOdometry) {
     info->notes.push_back(
         "the log holds no poses of the robot, so nothing can be mapped; give --pose-file");
   }

@@ -123,6 +123,8 @@ enum class PoseSource {
   kGroundTruth,
   /// Estimated by other software, in the log or in LogOptions::pose_file.
   kExternal,
+  /// None of the log's: they are estimated from its images and its inertial unit.
+  kOdometry,
 };
 
 /// How a file is read that another program is still writing.

@@ -170,6 +170,8 @@ absl::StatusOr<PoseChoice> ChoosePoseKind(const LogOptions& options, bool has_gr
                                   ": the log holds no poses by other software "
                                   "(state_external0/data.csv); give --pose-file FILE with "
                                   "EuRoC or TUM columns, or --poses gt"));
+    case PoseSource::kOdometry:
+      return PoseChoice::kNone;
     case PoseSource::kAuto:
       break;
   }
@@ -184,6 +186,11 @@ absl::StatusOr<std::optional<TrackTable>> ChoosePoses(const LogOptions& options,
       return NoPoses("gt", absl::StrCat("--pose-file ", options.pose_file,
                                         " is not the log's ground truth; give --poses external"));
     }
+    if (options.poses == PoseSource::kOdometry) {
+      return NoPoses("vio", absl::StrCat("--pose-file ", options.pose_file,
+                                         ": with --poses vio the poses are estimated; leave one "
+                                         "of both out"));
+    }
     DSG_ASSIGN_OR_RETURN(const LogFile file, ReadInput(options.pose_file));
     digest->Add("--pose-file", file.bytes);
     DSG_ASSIGN_OR_RETURN(tables.external, ReadPoseTable(file, RobotName(options)));
@@ -191,6 +198,7 @@ absl::StatusOr<std::optional<TrackTable>> ChoosePoses(const LogOptions& options,
   DSG_ASSIGN_OR_RETURN(const PoseChoice choice,
                        ChoosePoseKind(options, tables.ground_truth.has_value(),
                                       tables.external.has_value(), info->path));
+  if (options.poses == PoseSource::kOdometry) return std::nullopt;
   if (choice == PoseChoice::kNone) {
     info->notes.push_back(
         "the log holds no poses of the robot, so nothing can be mapped; give --pose-file");

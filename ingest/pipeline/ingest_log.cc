@@ -26,6 +26,8 @@ std::string_view NameOf(PoseSource source) {
       return "gt";
     case PoseSource::kExternal:
       return "external";
+    case PoseSource::kOdometry:
+      return "vio";
     case PoseSource::kAuto:
       break;
   }

@@ -16,8 +16,8 @@ struct SessionConfig {
   std::string agent_prefix;
   double mesh_block_size_m = 0.0;
   int64_t poses_per_delta = 0;
-  /// Which poses of a sensor log: "auto", "gt", "external". "auto" leaves the digest as it was
-  /// before there was a choice. What a pose file says is part of the log's content.
+  /// Which poses of a sensor log: "auto", "gt", "external", "vio". "auto" leaves the digest as it
+  /// was before there was a choice. What a pose file says is part of the log's content.
   std::string poses = "auto";
   /// IngestOptions::up; "auto" leaves the digest as it was before there was a choice.
   std::string up = "auto";

@@ -25,10 +25,11 @@ void AddRobotFlags(CLI::App* app, IngestFlags* flags) {
          "not tell: cam0, cam1, color0, depth0, label0, lidar0, imu0, poses, truth, detections0, "
          "loops0; CHANNEL=none leaves the channel out; may be given several times")
       ->allow_extra_args(false);
-  app->add_option("--poses", flags->poses,
-                  "Whose poses of the robot a sensor log is taken with: gt (its ground truth), "
-                  "external (other software's), auto (external if there are some) or vio (our own, "
-                  "not built yet)")
+  app->add_option(
+         "--poses", flags->poses,
+         "Whose poses of the robot a sensor log is taken with: gt (its ground truth), "
+         "external (other software's), auto (external if there are some) or vio (estimated "
+         "from its images and its inertial unit)")
       ->check(CLI::IsMember({"auto", "gt", "external", "vio"}))
       ->capture_default_str();
   app->add_option("--pose-file", flags->pose_file,
@@ -117,6 +118,7 @@ void AddIngestFlags(CLI::App* app, IngestFlags* flags) {
       ->capture_default_str();
   UseShortHelp(app);
   AddMappingFlags(app, &flags->mapping);
+  AddOdometryFlags(app, &flags->odometry);
   AddPeopleFlags(app, &flags->people);
   AddSegmenterFlags(app, &flags->segmenter);
   AddTuning(flags->numbers.Groups(), app);
@@ -129,12 +131,8 @@ void AddIngestFlags(CLI::App* app, IngestFlags* flags) {
 
 namespace {
 
-absl::StatusOr<PoseSource> ParsePoseSource(const std::string& text) {
-  if (text == "vio") {
-    return absl::UnimplementedError(
-        "--poses vio: estimating the robot's poses from its sensors is not built yet; use gt or "
-        "external");
-  }
+PoseSource PoseSourceOf(const std::string& text) {
+  if (text == "vio") return PoseSource::kOdometry;
   if (text == "gt") return PoseSource::kGroundTruth;
   return text == "external" ? PoseSource::kExternal : PoseSource::kAuto;
 }
@@ -194,7 +192,7 @@ absl::StatusOr<LogOptions> MakeLogOptions(const IngestFlags& flags, const std::a
   options.loop_file = flags.loop_file;
   options.label_folder = flags.label_folder;
   DSG_RETURN_IF_ERROR(SetTopics(flags.topics, &options));
-  DSG_ASSIGN_OR_RETURN(options.poses, ParsePoseSource(flags.poses));
+  options.poses = PoseSourceOf(flags.poses);
   options.agent_prefix = flags.agent_prefix;
   options.is_strict = flags.is_strict;
   if (flags.frame_period_s.has_value()) {

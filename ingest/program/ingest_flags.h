@@ -14,6 +14,7 @@
 #include "ingest/pipeline/ingest_log.h"
 #include "ingest/program/destination.h"
 #include "ingest/program/mapping_flags.h"
+#include "ingest/program/odometry_flags.h"
 #include "ingest/program/people_flags.h"
 #include "ingest/program/segmenter_flags.h"
 
@@ -54,6 +55,7 @@ struct IngestFlags {
   MappingFlags mapping;
   /// Numbers of IngestOptions::Groups alone; the rest is not used.
   IngestOptions numbers;
+  OdometryFlags odometry;
   PeopleFlags people;
   SegmenterFlags segmenter;
   bool is_quiet = false;
@@ -67,7 +69,7 @@ struct IngestFlags {
 void AddIngestFlags(CLI::App* app, IngestFlags* flags);
 
 /// `stop`: ends a followed log; must outlive it.
-/// Errors: INVALID_ARGUMENT/FIELD_INVALID naming the flag; UNIMPLEMENTED for `--poses vio`.
+/// Errors: INVALID_ARGUMENT/FIELD_INVALID naming the flag.
 absl::StatusOr<LogOptions> MakeLogOptions(const IngestFlags& flags, const std::atomic<bool>* stop);
 
 /// Errors: INVALID_ARGUMENT/FIELD_INVALID naming the flag; of reading the files of CAD models and

@@ -219,9 +219,26 @@ std::string SpillFolderOf(const IngestFlags& flags) {
   return is_beside ? flags.store : flags.spill_folder;
 }
 
+// What is put into a log that it does not hold.
+struct Additions {
+  std::optional<OdometryLogOptions> odometry;
+  std::optional<Segmentation> segmentation;
+};
+
+absl::StatusOr<std::unique_ptr<LogSource>> WithAdditions(std::unique_ptr<LogSource> log,
+                                                         const LogOptions& options,
+                                                         const Additions& additions) {
+  if (additions.segmentation.has_value()) {
+    DSG_ASSIGN_OR_RETURN(log, SegmentLog(std::move(log), *additions.segmentation));
+  }
+  if (additions.odometry.has_value()) {
+    DSG_ASSIGN_OR_RETURN(log, EstimatePoses(std::move(log), options, *additions.odometry));
+  }
+  return log;
+}
+
 absl::Status IngestOne(const IngestFlags& flags, const std::string& path, LogOptions options,
-                       IngestOptions ingest_options,
-                       const std::optional<Segmentation>& segmentation,
+                       IngestOptions ingest_options, const Additions& additions,
                        std::unique_ptr<Destination>* destination) {
   const auto begin = std::chrono::steady_clock::now();
   DSG_ASSIGN_OR_RETURN(std::unique_ptr<LogSource> log, OpenShown(flags, path, options));
@@ -255,10 +272,8 @@ absl::Status IngestOne(const IngestFlags& flags, const std::string& path, LogOpt
     if (!flags.is_quiet && !note.empty() && tries == 0) {
       std::fprintf(stderr, "%s: note: %s\n", path.c_str(), note.c_str());
     }
-    if (segmentation.has_value()) {
-      DSG_ASSIGN_OR_RETURN(log, SegmentLog(std::move(log), *segmentation));
-      told_count = TellNotes(flags, path, log->info(), told_count);
-    }
+    DSG_ASSIGN_OR_RETURN(log, WithAdditions(std::move(log), options, additions));
+    told_count = TellNotes(flags, path, log->info(), told_count);
     DSG_ASSIGN_OR_RETURN(const std::unique_ptr<MapView> view, (*destination)->View());
     Progress progress(std::filesystem::path(path).filename().string(),
                       log->info().measurement_count, flags.is_quiet);
@@ -296,13 +311,15 @@ absl::Status Run(const IngestFlags& flags) {
   if (flags.is_followed) StopAtSignals();
   DSG_ASSIGN_OR_RETURN(const LogOptions options, MakeLogOptions(flags, &is_stopped));
   DSG_ASSIGN_OR_RETURN(const IngestOptions ingest_options, MakeIngestOptions(flags));
-  DSG_ASSIGN_OR_RETURN(const std::optional<Segmentation> segmentation,
-                       MakeSegmentation(flags.segmenter));
+  Additions additions;
+  DSG_ASSIGN_OR_RETURN(additions.odometry,
+                       MakeOdometryOptions(flags.odometry, flags.poses == "vio"));
+  DSG_ASSIGN_OR_RETURN(additions.segmentation, MakeSegmentation(flags.segmenter));
   std::unique_ptr<Destination> destination;
   bool is_first = true;
   for (const std::string& path : flags.logs) {
     const absl::Status status =
-        IngestOne(flags, path, options, ingest_options, segmentation, &destination);
+        IngestOne(flags, path, options, ingest_options, additions, &destination);
     // What earlier logs have brought stays.
     if (!status.ok()) {
       return flags.is_dry_run

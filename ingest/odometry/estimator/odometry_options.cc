@@ -51,6 +51,10 @@ constexpr OptionField<OdometryUnitOptions> kUnitFields[] = {
      "mounted unit"},
     {"odometry-accel-noise", &OdometryUnitOptions::accel_noise_factor, 0.1, 1000.0,
      "The same of the accelerometer: vibrating frames want more"},
+    {"odometry-covariance", &OdometryUnitOptions::covariance_factor, 0.01, 10'000.0,
+     "Covariances of poses are told so many times as large as noise alone makes them: in simulated "
+     "and recorded logs squared errors are that much larger, since clocks and mountings are off, "
+     "too"},
 };
 
 void Append(std::vector<BoundOption> more, std::vector<BoundOption>* bound) {

@@ -76,7 +76,9 @@ class VisualInertialOdometry::Impl {
     keyframe_R_now_ = (keyframe_R_now_ * last_R_now).normalized();
     absl::StatusOr<std::vector<OdometryPose>> poses =
         is_started_ ? Follow(frame) : Wait(frame, last_R_now);
-    if (poses.ok() && poses->empty()) ++counts_.unplaced;
+    if (!poses.ok()) return poses;
+    if (poses->empty()) ++counts_.unplaced;
+    for (OdometryPose& pose : *poses) pose.covariance *= options_.unit.covariance_factor;
     return poses;
   }
 

@@ -34,9 +34,17 @@ struct StereoModel {
 
   /// Through the pixel, with z = 1, in the camera's frame.
   Eigen::Vector3d RayOf(const Eigen::Vector2d& pixel) const;
-  /// Of a point at 1 / inverse_depth along the optical axis, pixels.
-  double DisparityOf(double inverse_depth) const { return fx * baseline_m * inverse_depth; }
 };
+
+/// What is wrong with the calibration of the pair, as a parameter block: pixels that all
+/// disparities are too large by (0.1 degrees between the cameras make one), and the share by which
+/// the baseline is longer than it is said to be.
+inline constexpr int kStereoErrorSize = 2;
+using StereoError = std::array<double, kStereoErrorSize>;
+
+/// Of a point at 1 / inverse_depth along the optical axis, pixels; and back.
+double DisparityOf(const StereoModel& model, const StereoError& error, double inverse_depth);
+double InverseDepthOf(const StereoModel& model, const StereoError& error, double disparity_px);
 
 /// Where a landmark was seen. Pixels of the rectified left camera.
 struct LandmarkSight {
@@ -59,13 +67,13 @@ inline constexpr int kLandmarkBlockSize = 3;
 using LandmarkBlock = std::array<double, kLandmarkBlockSize>;
 
 /// By how much the anchor's own sight is missed, in standard deviations: column, row, and the
-/// disparity if it has one. Block: the landmark.
+/// disparity if it has one. Blocks: the landmark; with a disparity, the stereo error.
 std::unique_ptr<ceres::CostFunction> MakeAnchorFactor(const StereoModel& model,
                                                       const LandmarkSight& sight,
                                                       const SightNoise& noise);
 
 /// The same of another image. Blocks: pose of the anchor, pose of that image (pose_block.h), the
-/// landmark.
+/// landmark; with a disparity, the stereo error.
 ///
 /// Fails to evaluate where the landmark is not before the camera.
 std::unique_ptr<ceres::CostFunction> MakeSightFactor(const StereoModel& model,
@@ -76,6 +84,7 @@ std::unique_ptr<ceres::CostFunction> MakeSightFactor(const StereoModel& model,
 /// nullopt unless it is before the camera.
 std::optional<Eigen::Vector3d> SightErrorOf(const StereoModel& model, const Pose3d& map_T_anchor,
                                             const Pose3d& map_T_imu, const LandmarkSight& sight,
-                                            const LandmarkBlock& landmark);
+                                            const LandmarkBlock& landmark,
+                                            const StereoError& error);
 
 }  // namespace dsg::ingest

@@ -55,12 +55,18 @@ class SlidingWindow::Impl {
     AddKeyframe(time_ns, aligned.state, nullptr);
     StateSlot& slot = slots_[keyframes_.back().slot];
     LinearPrior prior;
-    prior.blocks = {slot.pose.data(), slot.speed.data()};
-    prior.sizes = {kPoseBlockSize, kSpeedBlockSize};
+    prior.blocks = {slot.pose.data(), slot.speed.data(), stereo_error_.data()};
+    prior.sizes = {kPoseBlockSize, kSpeedBlockSize, kStereoErrorSize};
     prior.point.assign(slot.pose.begin(), slot.pose.end());
     prior.point.insert(prior.point.end(), slot.speed.begin(), slot.speed.end());
-    prior.jacobian = root.matrixL().solve(Matrix15d::Identity());
-    prior.residual = Vector15d::Zero();
+    // What was learnt of the calibration before is not sure: it may have been why one got lost.
+    stereo_error_ = {};
+    prior.point.insert(prior.point.end(), stereo_error_.begin(), stereo_error_.end());
+    prior.jacobian = Eigen::MatrixXd::Zero(17, 17);
+    prior.jacobian.topLeftCorner<15, 15>() = root.matrixL().solve(Matrix15d::Identity());
+    prior.jacobian(15, 15) = 1.0 / options_.disparity_offset_px;
+    prior.jacobian(16, 16) = 1.0 / options_.baseline_share;
+    prior.residual = Eigen::VectorXd::Zero(17);
     SetPrior(std::move(prior));
     AddSights(sights);
     Anchor();
@@ -104,6 +110,7 @@ class SlidingWindow::Impl {
     return Matrix15d(covariance);
   }
 
+  const StereoError& stereo_error() const { return stereo_error_; }
   const std::vector<int64_t>& dropped() const { return dropped_; }
 
   std::vector<WindowLandmark> Landmarks() const {
@@ -224,7 +231,7 @@ class SlidingWindow::Impl {
     for (size_t i = 0; i < landmark->sights.size(); ++i) {
       const std::optional<double>& disparity_px = landmark->sights[i].seen.disparity_px;
       if (!disparity_px.has_value()) continue;
-      const double inverse_depth = *disparity_px / model_.DisparityOf(1.0);
+      const double inverse_depth = InverseDepthOf(model_, stereo_error_, *disparity_px);
       if (!IsNearEnough(inverse_depth)) continue;
       SetAnchor(i, inverse_depth, landmark);
       return true;
@@ -259,8 +266,9 @@ class SlidingWindow::Impl {
     double sum = 0.0;
     double disparity_sum = 0.0;
     for (const Sight& sight : landmark.sights) {
-      const std::optional<Vector3d> error = SightErrorOf(
-          model_, map_T_anchor, PoseOf(*Find(sight.keyframe)), sight.seen, landmark.block);
+      const std::optional<Vector3d> error =
+          SightErrorOf(model_, map_T_anchor, PoseOf(*Find(sight.keyframe)), sight.seen,
+                       landmark.block, stereo_error_);
       if (!error.has_value()) return std::numeric_limits<double>::infinity();
       sum += error->head<2>().norm();
       disparity_sum += std::abs(error->z());
@@ -317,12 +325,14 @@ class SlidingWindow::Impl {
     list->landmarks.push_back(block);
     for (size_t i = 0; i < landmark.sights.size(); ++i) {
       const Sight& sight = landmark.sights[i];
-      if (i == *landmark.anchor) {
-        list->Add(MakeAnchorFactor(model_, sight.seen, noise), &loss_, {block});
-      } else {
-        list->Add(MakeSightFactor(model_, sight.seen, noise), &loss_,
-                  {anchor_pose, slots_[Find(sight.keyframe)->slot].pose.data(), block});
+      std::vector<double*> blocks = {block};
+      if (i != *landmark.anchor) {
+        blocks = {anchor_pose, slots_[Find(sight.keyframe)->slot].pose.data(), block};
       }
+      if (sight.seen.disparity_px.has_value()) blocks.push_back(stereo_error_.data());
+      list->Add(i == *landmark.anchor ? MakeAnchorFactor(model_, sight.seen, noise)
+                                      : MakeSightFactor(model_, sight.seen, noise),
+                &loss_, std::move(blocks));
     }
   }
 
@@ -342,6 +352,8 @@ class SlidingWindow::Impl {
       ordering->AddElementToGroup(slot.pose.data(), 1);
       ordering->AddElementToGroup(slot.speed.data(), 1);
     }
+    problem.AddParameterBlock(stereo_error_.data(), kStereoErrorSize);
+    ordering->AddElementToGroup(stereo_error_.data(), 1);
     for (double* landmark : list.landmarks) {
       problem.AddParameterBlock(landmark, kLandmarkBlockSize);
       ordering->AddElementToGroup(landmark, 0);
@@ -429,6 +441,7 @@ class SlidingWindow::Impl {
   mutable ceres::HuberLoss loss_;
   // Parameter blocks: the factors of a window that does not change name them, too.
   mutable std::vector<StateSlot> slots_;
+  mutable StereoError stereo_error_{};
   std::deque<Keyframe> keyframes_;
   // By feature.
   std::map<int64_t, Landmark> landmarks_;
@@ -461,6 +474,7 @@ TimeNs SlidingWindow::oldest_ns() const { return impl_->oldest_ns(); }
 absl::StatusOr<Matrix15d> SlidingWindow::NewestCovariance() const {
   return impl_->NewestCovariance();
 }
+const StereoError& SlidingWindow::stereo_error() const { return impl_->stereo_error(); }
 const std::vector<int64_t>& SlidingWindow::dropped_features() const { return impl_->dropped(); }
 std::vector<WindowLandmark> SlidingWindow::Landmarks() const { return impl_->Landmarks(); }
 

@@ -37,7 +37,9 @@ struct WindowLandmark {
 /// threads.
 ///
 /// A landmark is eliminated with the keyframe that saw it first. A feature that is followed on
-/// becomes a new landmark, from its next sight on, so that nothing counts twice.
+/// becomes a new landmark, from its next sight on, so that nothing counts twice. What is wrong with
+/// the calibration of the pair is estimated, too: near and far landmarks tell an offset of
+/// disparities, and the unit tells the baseline where it is accelerated.
 ///
 /// Memory: keyframes times their features. Threads: one caller at a time.
 /// Source: RSS 2020, section V-A; Leutenegger and others, IJRR 2015 (fixed lag, marginalised).
@@ -70,6 +72,9 @@ class SlidingWindow {
   /// Of the newest state; rows as in a state. Cost: a few milliseconds.
   /// Errors: FIELD_INVALID when it is not finite.
   absl::StatusOr<Matrix15d> NewestCovariance() const;
+
+  /// Of the pair's calibration, as it is known by now.
+  const StereoError& stereo_error() const;
 
   /// Features that the last Add found to be wrong, ascending: landmarks that miss their images.
   const std::vector<int64_t>& dropped_features() const;

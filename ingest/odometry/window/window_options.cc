@@ -14,6 +14,12 @@ constexpr OptionField<WindowOptions> kWindowFields[] = {
      "Standard deviation of a feature's place, pixels: that of a tracker that drifts along edges"},
     {"odometry-window-disparity", &WindowOptions::disparity_sigma_px, 0.01, 50.0,
      "Standard deviation of a disparity, pixels: calibrations err too"},
+    {"odometry-window-offset", &WindowOptions::disparity_offset_px, 1e-6, 100.0,
+     "How far off all disparities may be, one standard deviation, pixels: 0.1 degrees between the "
+     "cameras make one"},
+    {"odometry-window-baseline", &WindowOptions::baseline_share, 1e-6, 0.5,
+     "The same of the baseline, a share of it: calibrations measure it to 0.2 mm of a decimetre, "
+     "and a unit whose clock is a millisecond off tells it worse"},
     {"odometry-window-huber", &WindowOptions::huber_sigmas, 0.1, 1000.0,
      "From so many standard deviations on a miss costs its size instead of its square: Huber's "
      "choice"},

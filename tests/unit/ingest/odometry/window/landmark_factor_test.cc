@@ -17,9 +17,11 @@ struct Blocks {
   std::array<double, kPoseBlockSize> anchor{};
   std::array<double, kPoseBlockSize> other{};
   LandmarkBlock landmark{};
+  /// Of sights with a disparity only.
+  StereoError stereo{0.4, 0.02};
 
   Eigen::VectorXd Residual(const ceres::CostFunction& cost) const {
-    const double* blocks[] = {anchor.data(), other.data(), landmark.data()};
+    const double* blocks[] = {anchor.data(), other.data(), landmark.data(), stereo.data()};
     Eigen::VectorXd residual(cost.num_residuals());
     EXPECT_TRUE(cost.Evaluate(blocks, residual.data(), nullptr));
     return residual;
@@ -34,11 +36,12 @@ Blocks BlocksAt(double from_s, double to_s, const LandmarkBlock& landmark) {
   return blocks;
 }
 
-// Central differences of steps of the poses and of the landmark.
+// Central differences of steps of the poses, of the landmark and of the stereo error.
 Eigen::MatrixXd Differences(const ceres::CostFunction& cost, const Blocks& at) {
   constexpr double kStep = 1e-6;
-  Eigen::MatrixXd by_step(cost.num_residuals(), 15);
-  for (int i = 0; i < 15; ++i) {
+  const int count = cost.num_residuals() == 3 ? 17 : 15;
+  Eigen::MatrixXd by_step(cost.num_residuals(), count);
+  for (int i = 0; i < count; ++i) {
     Eigen::VectorXd ends[2];
     for (int side = 0; side < 2; ++side) {
       const double step = side == 0 ? -kStep : kStep;
@@ -49,7 +52,8 @@ Eigen::MatrixXd Differences(const ceres::CostFunction& cost, const Blocks& at) {
       if (i >= 6 && i < 12) {
         WritePoseBlock(Stepped(PoseOfBlock(at.other.data()), delta), moved.other.data());
       }
-      if (i >= 12) moved.landmark[static_cast<size_t>(i - 12)] += step;
+      if (i >= 12 && i < 15) moved.landmark[static_cast<size_t>(i - 12)] += step;
+      if (i >= 15) moved.stereo[static_cast<size_t>(i - 15)] += step;
       ends[side] = moved.Residual(cost);
     }
     by_step.col(i) = (ends[1] - ends[0]) / (2.0 * kStep);
@@ -66,12 +70,15 @@ void ExpectGradients(const LandmarkSight& sight) {
     RowMatrix by_anchor(rows, 7);
     RowMatrix by_other(rows, 7);
     RowMatrix by_landmark(rows, 3);
+    RowMatrix by_stereo(rows, 2);
     Eigen::VectorXd residual(rows);
-    const double* blocks[] = {at.anchor.data(), at.other.data(), at.landmark.data()};
-    double* outputs[] = {by_anchor.data(), by_other.data(), by_landmark.data()};
+    const double* blocks[] = {at.anchor.data(), at.other.data(), at.landmark.data(),
+                              at.stereo.data()};
+    double* outputs[] = {by_anchor.data(), by_other.data(), by_landmark.data(), by_stereo.data()};
     ASSERT_TRUE(cost->Evaluate(blocks, residual.data(), outputs));
-    Eigen::MatrixXd analytic(rows, 15);
-    analytic << by_anchor.leftCols<6>(), by_other.leftCols<6>(), by_landmark;
+    Eigen::MatrixXd analytic(rows, rows == 3 ? 17 : 15);
+    analytic.leftCols<15>() << by_anchor.leftCols<6>(), by_other.leftCols<6>(), by_landmark;
+    if (rows == 3) analytic.rightCols<2>() = by_stereo;
     const Eigen::MatrixXd numeric = Differences(*cost, at);
     const double scale = numeric.cwiseAbs().maxCoeff();
     EXPECT_LT((analytic - numeric).cwiseAbs().maxCoeff(), 1e-6 * scale) << inverse_depth;
@@ -95,9 +102,11 @@ TEST(SightFactor, MissesNothingOfThePointThatBothSee) {
     for (const FeatureSight& b : second) {
       if (a.feature_id != b.feature_id || !a.sight.disparity_px.has_value()) continue;
       const Eigen::Vector3d ray = model.RayOf(a.sight.pixel);
-      const double inverse_depth = *a.sight.disparity_px / model.DisparityOf(1.0);
+      const double inverse_depth = InverseDepthOf(model, {}, *a.sight.disparity_px);
       const auto cost = MakeSightFactor(model, b.sight, {1.0, 1.0});
-      EXPECT_LT(BlocksAt(1.0, 1.6, {ray.x(), ray.y(), inverse_depth}).Residual(*cost).norm(), 1e-6);
+      Blocks blocks = BlocksAt(1.0, 1.6, {ray.x(), ray.y(), inverse_depth});
+      blocks.stereo = {};
+      EXPECT_LT(blocks.Residual(*cost).norm(), 1e-6);
       ++count;
     }
   }
@@ -120,16 +129,17 @@ TEST(AnchorFactor, MissesNothingOfItsOwnSight) {
   const LandmarkSight sight{{300.0, 200.0}, 10.0};
   const auto cost = MakeAnchorFactor(model, sight, {1.0, 2.0});
   const Eigen::Vector3d ray = model.RayOf(sight.pixel);
-  const LandmarkBlock landmark{ray.x(), ray.y(), 10.0 / model.DisparityOf(1.0)};
-  const double* blocks[] = {landmark.data()};
+  const LandmarkBlock landmark{ray.x(), ray.y(), InverseDepthOf(model, {}, 10.0)};
+  const StereoError right{};
+  const double* blocks[] = {landmark.data(), right.data()};
   Eigen::Vector3d residual;
   Eigen::Matrix<double, 3, 3, Eigen::RowMajor> jacobian;
-  double* outputs[] = {jacobian.data()};
+  double* outputs[] = {jacobian.data(), nullptr};
   ASSERT_TRUE(cost->Evaluate(blocks, residual.data(), outputs));
   EXPECT_LT(residual.norm(), 1e-9);
   EXPECT_NEAR(jacobian(0, 0), model.fx, 1e-9);
   EXPECT_NEAR(jacobian(1, 1), model.fy, 1e-9);
-  EXPECT_NEAR(jacobian(2, 2), 0.5 * model.DisparityOf(1.0), 1e-9);
+  EXPECT_NEAR(jacobian(2, 2), 0.5 * DisparityOf(model, {}, 1.0), 1e-9);
 }
 
 }  // namespace

@@ -26,6 +26,8 @@ struct Noise {
   double pixel_px = 0.7;
   double disparity_px = 0.7;
   bool has_unit_noise = true;
+  /// Of all disparities, which the calibration does not know of.
+  double offset_px = 0.0;
   /// Of the features, so many in a hundred are followed wrongly, each keyframe anew.
   int wrong_percent = 0;
 };
@@ -42,6 +44,7 @@ Passage PassageOf(double seconds, uint64_t seed, const Noise& noise, WindowOptio
     auto sights =
         SightsAt(model, SwungPose(t), points, noise.pixel_px, noise.disparity_px, &random);
     for (FeatureSight& sight : sights) {
+      if (sight.sight.disparity_px.has_value()) *sight.sight.disparity_px += noise.offset_px;
       if (random.Uniform(0.0, 100.0) >= noise.wrong_percent) continue;
       sight.sight.pixel += Eigen::Vector2d(random.Uniform(-40, 40), random.Uniform(-40, 40));
     }
@@ -70,7 +73,7 @@ double EndErrorM(const Passage& run, double seconds) {
 }
 
 TEST(SlidingWindow, FollowsWithoutNoiseExactly) {
-  const Passage run = PassageOf(6.0, 1, {0.0, 0.0, false, 0});
+  const Passage run = PassageOf(6.0, 1, {0.0, 0.0, false, 0.0, 0});
   EXPECT_LT(EndErrorM(run, 6.0), 2e-3);
   EXPECT_LT(AngleBetween(run.states.back().map_T_imu.orientation, SwungPose(6.0).orientation),
             1e-3);
@@ -119,8 +122,20 @@ TEST(SlidingWindow, KnowsHowSureItIs) {
   EXPECT_LT(turn_sum / count, 1.8);
 }
 
+TEST(SlidingWindow, LearnsThatAllDisparitiesAreTooLarge) {
+  const Passage passage = PassageOf(10.0, 2, {0.7, 0.7, true, 0.6, 0});
+  EXPECT_NEAR(passage.window.stereo_error()[0], 0.6, 0.1);
+  EXPECT_LT(EndErrorM(passage, 10.0), 0.05);
+  // Without that it is worse.
+  WindowOptions trusting;
+  trusting.disparity_offset_px = 1e-3;
+  trusting.baseline_share = 1e-4;
+  const Passage trusted = PassageOf(10.0, 2, {0.7, 0.7, true, 0.6, 0}, trusting);
+  EXPECT_GT(EndErrorM(trusted, 10.0), 2.0 * EndErrorM(passage, 10.0));
+}
+
 TEST(SlidingWindow, DropsFeaturesThatAreFollowedWrongly) {
-  const Passage run = PassageOf(8.0, 3, {0.7, 0.7, true, 10});
+  const Passage run = PassageOf(8.0, 3, {0.7, 0.7, true, 0.0, 10});
   EXPECT_GT(run.dropped_count, 20);
   EXPECT_LT(EndErrorM(run, 8.0), 0.1);
 }

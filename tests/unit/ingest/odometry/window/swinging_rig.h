@@ -92,7 +92,8 @@ inline std::vector<FeatureSight> SightsAt(const StereoModel& model, const Pose3d
     FeatureSight sight{static_cast<int64_t>(i), {pixel, {}}};
     sight.sight.pixel += pixel_px * Eigen::Vector2d(random->Normal(), random->Normal());
     if (at.z() < 6.0) {
-      sight.sight.disparity_px = model.DisparityOf(1.0 / at.z()) + disparity_px * random->Normal();
+      sight.sight.disparity_px =
+          DisparityOf(model, {}, 1.0 / at.z()) + disparity_px * random->Normal();
     }
     sights.push_back(sight);
   }

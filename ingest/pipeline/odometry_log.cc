@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/pipeline/odometry_log.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "ingest/depth/dynamic_mask.h"
+#include "ingest/log/file_bytes.h"
+#include "ingest/log/sensor_log.h"
+#include "ingest/odometry/estimator/stereo_eye.h"
+#include "ingest/odometry/estimator/visual_inertial_odometry.h"
+#include "ingest/pipeline/map_things.h"
+#include "schema/base/status.h"
+
+namespace dsg::ingest {
+namespace {
+
+// The two channels of a frame.
+struct EyeChannels {
+  std::string left;
+  std::string other;
+};
+
+std::optional<EyeChannels> ChannelsOf(const LogInfo& info) {
+  const auto has = [&](const char* channel) {
+    return info.channel_counts.contains(channel) && info.rig.FindCamera(channel) != nullptr;
+  };
+  if (has("cam0") && has("cam1")) return EyeChannels{"cam0", "cam1"};
+  if (!has("depth0")) return std::nullopt;
+  if (has("color0")) return EyeChannels{"color0", "depth0"};
+  return has("cam0") ? std::optional(EyeChannels{"cam0", "depth0"}) : std::nullopt;
+}
+
+// What is there of a frame so far.
+struct PendingFrame {
+  TimeNs time_ns = 0;
+  std::optional<ImageMeasurement> left;
+  std::optional<ImageMeasurement> other;
+  std::optional<ImageMeasurement> label;
+};
+
+// The covariance of the body from that of the unit, which sits elsewhere on it.
+Covariance6 BodyCovariance(const OdometryPose& pose, const Pose3d& imu_T_body) {
+  const Eigen::Matrix3d map_R_imu = pose.state.map_T_imu.orientation.toRotationMatrix();
+  const Eigen::Vector3d lever = map_R_imu * imu_T_body.position;
+  Eigen::Matrix<double, 6, 6> by_imu = Eigen::Matrix<double, 6, 6>::Zero();
+  by_imu.topLeftCorner<3, 3>().setIdentity();
+  Eigen::Matrix3d cross;
+  cross << 0, -lever.z(), lever.y(), lever.z(), 0, -lever.x(), -lever.y(), lever.x(), 0;
+  by_imu.topRightCorner<3, 3>() = -cross * map_R_imu;
+  by_imu.bottomRightCorner<3, 3>() = imu_T_body.orientation.conjugate().toRotationMatrix();
+  const Eigen::Matrix<double, 6, 6> whole =
+      by_imu * pose.covariance.topLeftCorner<6, 6>() * by_imu.transpose();
+  Covariance6 covariance;
+  size_t index = 0;
+  for (Eigen::Index row = 0; row < 6; ++row) {
+    for (Eigen::Index column = row; column < 6; ++column) {
+      covariance[index++] = static_cast<float>(whole(row, column));
+    }
+  }
+  return covariance;
+}
+
+class OdometryLog : public LogSource {
+ public:
+  OdometryLog(std::unique_ptr<LogSource> log, EyeChannels channels,
+              std::unique_ptr<OdometryEye> eye, VisualInertialOdometry odometry, LogInfo info,
+              std::string robot_name, bool is_masked)
+      : log_(std::move(log)),
+        channels_(std::move(channels)),
+        eye_(std::move(eye)),
+        odometry_(std::move(odometry)),
+        info_(std::move(info)),
+        note_count_(log_->info().notes.size()),
+        robot_name_(std::move(robot_name)),
+        imu_T_body_(info_.rig.imu->body_T_imu.Inverse()) {
+    if (is_masked) moving_classes_ = DynamicClasses(info_.labels);
+    std::sort(moving_classes_.begin(), moving_classes_.end());
+  }
+
+  const LogInfo& info() const override { return info_; }
+  void SetIdle(std::function<absl::Status()> idle) override { log_->SetIdle(std::move(idle)); }
+
+  absl::StatusOr<std::optional<Measurement>> Next() override {
+    while (true) {
+      if (std::optional<Measurement> ready = TakeReady(); ready.has_value()) return ready;
+      if (is_ended_) return std::nullopt;
+      DSG_ASSIGN_OR_RETURN(std::optional<Measurement> measurement, log_->Next());
+      if (!measurement.has_value()) {
+        is_ended_ = true;
+      } else if (!std::holds_alternative<PoseMeasurement>(*measurement)) {
+        Note(*measurement);
+        held_.push_back(*std::move(measurement));
+      }
+      DSG_RETURN_IF_ERROR(PlaceFrames());
+      if (is_ended_) AddLateNotes();
+    }
+  }
+
+ private:
+  void Note(const Measurement& measurement) {
+    now_ns_ = std::max(now_ns_, StampOf(measurement));
+    if (const auto* sample = std::get_if<ImuMeasurement>(&measurement)) {
+      odometry_.AddSample(*sample);
+      return;
+    }
+    const auto* image = std::get_if<ImageMeasurement>(&measurement);
+    if (image == nullptr) return;
+    const bool is_label = image->channel == "label0" && !moving_classes_.empty();
+    if (image->channel != channels_.left && image->channel != channels_.other && !is_label) return;
+    if (pending_.empty() || pending_.back().time_ns != image->time_ns) {
+      pending_.push_back({image->time_ns, {}, {}, {}});
+    }
+    PendingFrame& frame = pending_.back();
+    if (image->channel == channels_.left) frame.left = *image;
+    if (image->channel == channels_.other) frame.other = *image;
+    if (is_label) frame.label = *image;
+  }
+
+  // Frames are whole once something later has come.
+  absl::Status PlaceFrames() {
+    while (!pending_.empty()) {
+      const TimeNs time_ns = pending_.front().time_ns;
+      if (!is_ended_ && (now_ns_ <= time_ns || !odometry_.Covers(time_ns))) break;
+      const PendingFrame frame = std::move(pending_.front());
+      pending_.pop_front();
+      DSG_RETURN_IF_ERROR(Place(frame));
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status Place(const PendingFrame& pending) {
+    if (!pending.left.has_value() || !pending.other.has_value()) {
+      if (pending.left.has_value() || pending.other.has_value()) ++lone_count_;
+      return absl::OkStatus();
+    }
+    if (!odometry_.Covers(pending.time_ns)) {
+      ++uncovered_count_;
+      return absl::OkStatus();
+    }
+    const absl::StatusOr<Image> left = pending.left->load();
+    absl::StatusOr<OdometryFrame> frame =
+        left.ok() ? eye_->FrameOf(pending.time_ns, *left, pending.other->load, MaskOf(pending))
+                  : left.status();
+    absl::StatusOr<std::vector<OdometryPose>> poses =
+        frame.ok() ? odometry_.AddFrame(*frame) : frame.status();
+    // What one image does to be refused another one need not: broken files, sizes of their own.
+    if (!poses.ok()) {
+      ++broken_count_;
+      if (first_broken_.empty()) first_broken_ = std::string(poses.status().message());
+      return absl::OkStatus();
+    }
+    for (const OdometryPose& pose : *poses) poses_.push_back(MeasurementOf(pose));
+    return absl::OkStatus();
+  }
+
+  std::vector<uint8_t> MaskOf(const PendingFrame& pending) const {
+    if (!pending.label.has_value()) return {};
+    const absl::StatusOr<Image> labels = pending.label->load();
+    return labels.ok() ? eye_->MaskOf(*labels, moving_classes_) : std::vector<uint8_t>();
+  }
+
+  PoseMeasurement MeasurementOf(const OdometryPose& pose) const {
+    PoseMeasurement measurement;
+    measurement.agent_name = robot_name_;
+    measurement.agent_kind = kinds::kRobot;
+    measurement.pose.time_ns = pose.time_ns;
+    measurement.pose.map_T_agent = pose.state.map_T_imu * imu_T_body_;
+    measurement.pose.covariance =
+        std::make_shared<const Covariance6>(BodyCovariance(pose, imu_T_body_));
+    return measurement;
+  }
+
+  // In order: a pose before what has its stamp; nothing of which a pose may still come.
+  std::optional<Measurement> TakeReady() {
+    const TimeNs held_ns = held_.empty() ? kTimeMax : StampOf(held_.front());
+    if (!poses_.empty() && poses_.front().pose.time_ns <= held_ns) {
+      Measurement pose = std::move(poses_.front());
+      poses_.pop_front();
+      return pose;
+    }
+    if (held_.empty() || (!is_ended_ && held_ns >= FrontierNs())) return std::nullopt;
+    Measurement measurement = std::move(held_.front());
+    held_.pop_front();
+    return measurement;
+  }
+
+  TimeNs FrontierNs() const {
+    const TimeNs pending_ns = pending_.empty() ? kTimeMax : pending_.front().time_ns;
+    return std::min(pending_ns, odometry_.waits_from_ns());
+  }
+
+  // What only the end of a log tells.
+  void AddLateNotes() {
+    const std::vector<std::string>& notes = log_->info().notes;
+    for (; note_count_ < notes.size(); ++note_count_) info_.notes.push_back(notes[note_count_]);
+    const OdometryCounts& counts = odometry_.counts();
+    std::string note =
+        absl::StrCat("odometry: poses of ", counts.frames - counts.unplaced, " of ", counts.frames,
+                     " images, ", counts.keyframes, " keyframes, ", counts.starts_at_rest,
+                     " starts at rest and ", counts.starts_in_motion, " in motion");
+    for (const auto& [reason, count] : counts.losses) {
+      absl::StrAppend(&note, ", lost ", count, " times (", reason, ")");
+    }
+    info_.notes.push_back(note);
+    if (lone_count_ > 0) {
+      info_.notes.push_back(absl::StrCat("odometry: ", lone_count_, " images of ", channels_.left,
+                                         " and ", channels_.other,
+                                         " have no partner of the same stamp"));
+    }
+    if (uncovered_count_ > 0) {
+      info_.notes.push_back(absl::StrCat("odometry: ", uncovered_count_,
+                                         " images come after the last inertial sample"));
+    }
+    if (broken_count_ > 0) {
+      info_.notes.push_back(absl::StrCat("odometry: ", broken_count_,
+                                         " images were passed over; the first: ", first_broken_));
+    }
+  }
+
+  std::unique_ptr<LogSource> log_;
+  const EyeChannels channels_;
+  const std::unique_ptr<OdometryEye> eye_;
+  VisualInertialOdometry odometry_;
+  LogInfo info_;
+  /// Of the log's own, those that `info_` has.
+  size_t note_count_;
+  const std::string robot_name_;
+  const Pose3d imu_T_body_;
+  std::vector<int32_t> moving_classes_;
+  bool is_ended_ = false;
+  TimeNs now_ns_ = kTimeMin;
+  std::deque<PendingFrame> pending_;
+  std::deque<PoseMeasurement> poses_;
+  std::deque<Measurement> held_;
+  int64_t lone_count_ = 0;
+  int64_t uncovered_count_ = 0;
+  int64_t broken_count_ = 0;
+  std::string first_broken_;
+};
+
+absl::Status CannotEstimate(const LogInfo& info, const std::string& why) {
+  return MakeError(Reason::kFieldInvalid,
+                   absl::StrCat("--poses vio: ", info.path, " ", why,
+                                "; give --poses gt or external, or a --pose-file"),
+                   {{"field", "poses"}, {"value", "vio"}});
+}
+
+}  // namespace
+
+std::string OdometryLogOptions::Digest() const {
+  static constexpr const char* kNames[] = {"5pt", "2pt", "dvio"};
+  return absl::StrCat("odometry=", kNames[static_cast<size_t>(odometry.method)],
+                      is_masked ? " masked" : "", "\n", DigestOptions(odometry));
+}
+
+absl::StatusOr<std::unique_ptr<LogSource>> EstimatePoses(std::unique_ptr<LogSource> log,
+                                                         const LogOptions& log_options,
+                                                         const OdometryLogOptions& options) {
+  LogInfo info = log->info();
+  const std::optional<EyeChannels> channels = ChannelsOf(info);
+  if (!info.rig.imu.has_value() || !info.channel_counts.contains("imu0")) {
+    return CannotEstimate(info, "has no inertial unit with a calibration");
+  }
+  if (!channels.has_value()) {
+    return CannotEstimate(info, "has neither a pair of cameras (cam0, cam1) nor depth (depth0)");
+  }
+  const CameraCalibration& left = *info.rig.FindCamera(channels->left);
+  const CameraCalibration& other = *info.rig.FindCamera(channels->other);
+  const StereoMatchOptions& stereo = options.odometry.frontend.stereo;
+  absl::StatusOr<std::unique_ptr<OdometryEye>> eye = channels->other == "depth0"
+                                                         ? MakeDepthEye(left, other, stereo)
+                                                         : MakeStereoEye(left, other, stereo);
+  if (!eye.ok()) return eye.status();
+  DSG_ASSIGN_OR_RETURN(
+      VisualInertialOdometry odometry,
+      VisualInertialOdometry::Make((*eye)->camera(), *info.rig.imu, options.odometry));
+  const int64_t count = info.channel_counts[channels->left];
+  if (info.measurement_count > 0) {
+    info.measurement_count += count - info.channel_counts["poses"];
+  }
+  info.channel_counts["poses"] = count;
+  info.content_sha256 = Sha256Hex(absl::StrCat(info.content_sha256, "\n", options.Digest(), "\n"));
+  info.notes.push_back(absl::StrCat("the poses are estimated from ", channels->left, ", ",
+                                    channels->other, " and imu0"));
+  return std::make_unique<OdometryLog>(std::move(log), *channels, *std::move(eye),
+                                       std::move(odometry), std::move(info), RobotName(log_options),
+                                       options.is_masked);
+}
+
+}  // namespace dsg::ingest

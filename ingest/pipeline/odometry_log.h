@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// A log whose robot poses are estimated from its images and its inertial unit, while it is read.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "ingest/log/log_source.h"
+#include "ingest/odometry/estimator/odometry_options.h"
+
+namespace dsg::ingest {
+
+struct OdometryLogOptions {
+  OdometryOptions odometry;
+  /// Nothing is followed on people that label images show.
+  bool is_masked = true;
+
+  /// What differs from the defaults, as text; it is part of the identity of the log.
+  std::string Digest() const;
+};
+
+/// The same log with poses of its body at each pair of images, instead of others that it has; the
+/// estimate is causal (visual_inertial_odometry.h). Images are cam0 and cam1, or color0 (or cam0)
+/// and depth0 where there is no pair. What was measured after an image waits until its pose is
+/// known: 0.1 s of the log, and while a start in motion is tried a few seconds.
+///
+/// Images that cannot be decoded or have no partner of their stamp are passed over and counted in
+/// the notes at the end, and so is how often the odometry was lost.
+/// Errors: FIELD_INVALID when the log has no inertial unit or no such images, or a calibration
+/// without noise; then of LogSource::Next.
+absl::StatusOr<std::unique_ptr<LogSource>> EstimatePoses(std::unique_ptr<LogSource> log,
+                                                         const LogOptions& log_options,
+                                                         const OdometryLogOptions& options);
+
+}  // namespace dsg::ingest

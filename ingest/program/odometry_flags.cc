@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ingest/program/odometry_flags.h"
+
+#include <CLI/CLI.hpp>
+#include <vector>
+
+#include "ingest/config/option_flags.h"
+#include "schema/base/status.h"
+
+namespace dsg::ingest {
+
+void AddOdometryFlags(CLI::App* app, OdometryFlags* flags) {
+  const std::string group = "The robot's own odometry (--poses vio)";
+  app->add_option("--odometry", flags->method,
+                  "How features are checked between keyframes: 5pt (images alone), 2pt (the "
+                  "rotation is the gyroscope's) or dvio (2pt, and the search follows the "
+                  "gyroscope)")
+      ->check(CLI::IsMember({"5pt", "2pt", "dvio"}))
+      ->capture_default_str()
+      ->group(group);
+  app->add_option("--odometry-masks", flags->masks,
+                  "Whether features on people are left out where label images show them: on, off")
+      ->check(CLI::IsMember({"on", "off"}))
+      ->capture_default_str()
+      ->group(group);
+  AddTuning(std::vector<OptionGroup>{{"odometry", flags->numbers.Bind()}}, app);
+}
+
+absl::StatusOr<std::optional<OdometryLogOptions>> MakeOdometryOptions(const OdometryFlags& flags,
+                                                                      bool is_on) {
+  const OdometryFlags defaults;
+  if (!is_on) {
+    if (flags.method != defaults.method) return NeedsOther("odometry", "poses vio");
+    if (flags.masks != defaults.masks) return NeedsOther("odometry-masks", "poses vio");
+    return std::nullopt;
+  }
+  OdometryLogOptions options;
+  options.odometry = flags.numbers;
+  DSG_ASSIGN_OR_RETURN(options.odometry.method, ParseOdometryMethod(flags.method));
+  options.is_masked = flags.masks == "on";
+  return options;
+}
+
+}  // namespace dsg::ingest
