@@ -17,7 +17,7 @@ STORE = CODEC + ["schema/store"]
 SCHEMA = STORE + ["schema/files", "schema/interop", "schema/picture", "schema/matching"]
 # The main of dsg-ingest alone may choose between a local store and a remote one.
 INGEST_STAGES = ["log", "simulator", "evaluation", "odometry", "loop", "depth", "volume", "agents",
-                 "objects", "places", "rooms"]
+                 "objects", "places", "rooms", "recognition"]
 # Plain types that stages hand to one another.
 INGEST_SHARED = ["ingest/config", "ingest/files", "ingest/sensor", "ingest/grid",
                  "ingest/trajectory", "ingest/solver"]
@@ -74,6 +74,8 @@ ALLOWED = {
 # What users of the client library would include.
 ALLOWED["docs/examples"] = ["query/api", "query/client"]
 ALLOWED.update({f"ingest/{s}": SCHEMA + INGEST_SHARED for s in INGEST_STAGES})
+# Features of stereo pairs, and poses between two cameras, are the front-end's.
+ALLOWED["ingest/recognition"] += ["ingest/odometry"]
 # Nobody but these two sees the ground truth.
 ALLOWED["ingest/truth"] = SCHEMA + ["ingest/files", "ingest/sensor"]
 ALLOWED["ingest/simulator"] += ["ingest/truth"]
