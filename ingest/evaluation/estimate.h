@@ -58,4 +58,9 @@ struct Estimate {
   std::vector<std::string> notes;
 };
 
+/// Brings all of the map into another frame. Boxes stay along the axes, and so grow where they are
+/// turned. Covariances of poses stay as they are: only NEES looks at them, and takes poses as they
+/// were committed.
+void MoveEstimate(const Pose3d& new_T_map, Estimate* estimate);
+
 }  // namespace dsg::evaluation

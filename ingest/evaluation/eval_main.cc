@@ -42,6 +42,7 @@ struct Flags {
   std::string map;
   int64_t mesh_samples = static_cast<int64_t>(MeshOptions().sample_count);
   bool is_json = false;
+  bool is_map_aligned = false;
   bool is_track_only = false;
   TrackRequest track;
   double tolerance_s = static_cast<double>(kTruthGapNsMax) / static_cast<double>(kNsPerSecond);
@@ -86,6 +87,9 @@ void AddMapFlags(CLI::App* app, Flags* flags) {
                   "Samples on each mesh; fewer is faster and coarser")
       ->check(CLI::Range(int64_t{1'000}, int64_t{20'000'000}))
       ->capture_default_str();
+  app->add_flag("--align-map", flags->is_map_aligned,
+                "Move the map first, by yaw and translation, to where the robot's path lies best "
+                "on the true one: maps of odometry begin anywhere");
   app->add_flag("--json", flags->is_json, "Print JSON instead of tables");
 }
 
@@ -173,8 +177,8 @@ void CheckTogether(const CLI::App& app, Flags* flags) {
   }
   flags->is_track_only = flags->is_track_only || has_file || !IsSimulatedTruth(track.truth);
   if (flags->is_track_only) {
-    if (app.count("--mesh-samples") > 0) {
-      Refuse("--mesh-samples", "says nothing of trajectories; leave it out");
+    for (const char* flag : {"--mesh-samples", "--align-map"}) {
+      if (app.count(flag) > 0) Refuse(flag, "says nothing of trajectories; leave it out");
     }
   } else {
     std::vector<std::string> track_flags(std::begin(kTrackFlags), std::end(kTrackFlags));
@@ -251,8 +255,8 @@ absl::StatusOr<std::string> WholeOutput(const Flags& flags, const ProgressFuncti
   DSG_ASSIGN_OR_RETURN(const OpenedMap opened, OpenMapOf(flags));
   tell("reading the truth", 0.0);
   DSG_ASSIGN_OR_RETURN(const truth::Truth truth, truth::ReadTruth(flags.track.truth));
-  DSG_ASSIGN_OR_RETURN(const Estimate estimate,
-                       ReadEstimate(*opened.map, flags.track.revision, tell));
+  DSG_ASSIGN_OR_RETURN(Estimate estimate, ReadEstimate(*opened.map, flags.track.revision, tell));
+  if (flags.is_map_aligned) DSG_RETURN_IF_ERROR(AlignMap(truth, &estimate));
   EvaluateOptions options;
   options.mesh.sample_count = static_cast<size_t>(flags.mesh_samples);
   const Report report = Evaluate(estimate, truth, options, tell);

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 
 namespace dsg::evaluation {
 namespace {
@@ -219,6 +220,22 @@ Report Evaluate(const Estimate& estimate, const truth::Truth& truth, const Evalu
   report.mesh = ScoreMesh(estimate, truth, options.mesh);
   AppendNotes(report, estimate, &report.notes);
   return report;
+}
+
+absl::Status AlignMap(const truth::Truth& truth, Estimate* estimate) {
+  const std::vector<PosePair> pairs = AssociatePoses(estimate->robot_causal, TrueTrajectory(truth));
+  if (pairs.size() < 3) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("--align-map: ", pairs.size(), " poses of the robot in map \"", estimate->map,
+                     "\" fall into the time of the truth, at least 3 do if the log is that of the "
+                     "truth; leave it out, or give the truth of this log"));
+  }
+  const Pose3d truth_T_map = TruthFromEstimate(pairs, Alignment::kYaw).target_T_source;
+  MoveEstimate(truth_T_map, estimate);
+  estimate->notes.push_back(
+      absl::StrFormat("the map was moved by %.2f m and turned to lie on the true path",
+                      truth_T_map.position.norm()));
+  return absl::OkStatus();
 }
 
 }  // namespace dsg::evaluation
