@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <variant>
 #include <vector>
@@ -105,6 +106,8 @@ struct LogInfo {
   /// Measurements of each sensor channel, by name: "cam0", "imu0", "detections0", "poses",
   /// "loops0".
   std::map<std::string, int64_t> channel_counts;
+  /// Channels that are used before the stages see them: by odometry, or to recognise places.
+  std::set<std::string> used_channels;
   /// Sentences about what was dropped or assumed, for the user.
   std::vector<std::string> notes;
 };

@@ -51,6 +51,7 @@ LogRun::LogRun(RunPlan plan, const MapView& map, DeltaSink sink)
       detector_(std::move(plan.detector)),
       path_(options_.path, options_.spill_folder),
       loops_(options_.robot_graph, &path_, plan.info.rig.HasEyes() || plan.has_loops),
+      used_channels_(plan.info.used_channels),
       eyes_(EyesOf(plan)),
       frames_(plan.has_layers ? plan.info.rig : RigCalibration(), options_.mapping.depth, path_),
       layers_(plan.info, options_.mapping, plan.numbering, map.spec().mesh_block_size_m,
@@ -134,7 +135,7 @@ absl::Status LogRun::TakeSensor(Measurement& measurement) {
   }
   // Where a network looks, the log's own detections would be the same people twice.
   if (!is_detection || !detector_.is_on()) is_used |= Spread(measurement);
-  if (!is_used) ++unused_[channel];
+  if (!is_used && !used_channels_.contains(channel)) ++unused_[channel];
   return SeeFrames();
 }
 

@@ -98,6 +98,8 @@ class LogRun {
   RobotPath path_;
   NodeId robot_;
   LoopCloser loops_;
+  /// LogInfo::used_channels.
+  std::set<std::string> used_channels_;
   /// Channels that frames are made of.
   std::set<std::string, std::less<>> eyes_;
   FrameMaker frames_;

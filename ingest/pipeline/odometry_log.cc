@@ -9,40 +9,15 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "ingest/depth/dynamic_mask.h"
 #include "ingest/log/file_bytes.h"
 #include "ingest/log/sensor_log.h"
-#include "ingest/odometry/estimator/stereo_eye.h"
 #include "ingest/odometry/estimator/visual_inertial_odometry.h"
+#include "ingest/pipeline/log_eye.h"
 #include "ingest/pipeline/map_things.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
 namespace {
-
-// The two channels of a frame.
-struct EyeChannels {
-  std::string left;
-  std::string other;
-};
-
-std::optional<EyeChannels> ChannelsOf(const LogInfo& info) {
-  const auto has = [&](const char* channel) {
-    return info.channel_counts.contains(channel) && info.rig.FindCamera(channel) != nullptr;
-  };
-  if (has("cam0") && has("cam1")) return EyeChannels{"cam0", "cam1"};
-  if (!has("depth0")) return std::nullopt;
-  if (has("color0")) return EyeChannels{"color0", "depth0"};
-  return has("cam0") ? std::optional(EyeChannels{"cam0", "depth0"}) : std::nullopt;
-}
-
-// What is there of a frame so far.
-struct PendingFrame {
-  TimeNs time_ns = 0;
-  std::optional<ImageMeasurement> left;
-  std::optional<ImageMeasurement> other;
-  std::optional<ImageMeasurement> label;
-};
 
 // The covariance of the body from that of the unit, which sits elsewhere on it.
 Covariance6 BodyCovariance(const OdometryPose& pose, const Pose3d& imu_T_body) {
@@ -68,12 +43,11 @@ Covariance6 BodyCovariance(const OdometryPose& pose, const Pose3d& imu_T_body) {
 
 class OdometryLog : public LogSource {
  public:
-  OdometryLog(std::unique_ptr<LogSource> log, EyeChannels channels,
-              std::unique_ptr<OdometryEye> eye, VisualInertialOdometry odometry, LogInfo info,
-              std::string robot_name, bool is_masked)
+  OdometryLog(std::unique_ptr<LogSource> log, LogEye eye, VisualInertialOdometry odometry,
+              LogInfo info, std::string robot_name, bool is_masked)
       : log_(std::move(log)),
-        channels_(std::move(channels)),
         eye_(std::move(eye)),
+        images_(eye_.left, eye_.other, is_masked),
         odometry_(std::move(odometry)),
         info_(std::move(info)),
         note_count_(log_->info().notes.size()),
@@ -104,38 +78,23 @@ class OdometryLog : public LogSource {
 
  private:
   void Note(const Measurement& measurement) {
-    now_ns_ = std::max(now_ns_, StampOf(measurement));
+    images_.Add(measurement);
     if (const auto* sample = std::get_if<ImuMeasurement>(&measurement)) {
       odometry_.AddSample(*sample);
-      return;
     }
-    const auto* image = std::get_if<ImageMeasurement>(&measurement);
-    if (image == nullptr) return;
-    const bool is_label = image->channel == "label0" && !moving_classes_.empty();
-    if (image->channel != channels_.left && image->channel != channels_.other && !is_label) return;
-    if (pending_.empty() || pending_.back().time_ns != image->time_ns) {
-      pending_.push_back({image->time_ns, {}, {}, {}});
-    }
-    PendingFrame& frame = pending_.back();
-    if (image->channel == channels_.left) frame.left = *image;
-    if (image->channel == channels_.other) frame.other = *image;
-    if (is_label) frame.label = *image;
   }
 
-  // Frames are whole once something later has come.
   absl::Status PlaceFrames() {
-    while (!pending_.empty()) {
-      const TimeNs time_ns = pending_.front().time_ns;
-      if (!is_ended_ && (now_ns_ <= time_ns || !odometry_.Covers(time_ns))) break;
-      const PendingFrame frame = std::move(pending_.front());
-      pending_.pop_front();
-      DSG_RETURN_IF_ERROR(Place(frame));
+    while (!images_.empty()) {
+      const TimeNs time_ns = images_.front_ns();
+      if (!is_ended_ && (images_.IsOpen(time_ns) || !odometry_.Covers(time_ns))) break;
+      DSG_RETURN_IF_ERROR(Place(images_.Take()));
     }
     return absl::OkStatus();
   }
 
-  absl::Status Place(const PendingFrame& pending) {
-    if (!pending.left.has_value() || !pending.other.has_value()) {
+  absl::Status Place(const PairedImages& pending) {
+    if (!pending.is_whole()) {
       if (pending.left.has_value() || pending.other.has_value()) ++lone_count_;
       return absl::OkStatus();
     }
@@ -145,7 +104,7 @@ class OdometryLog : public LogSource {
     }
     const absl::StatusOr<Image> left = pending.left->load();
     absl::StatusOr<OdometryFrame> frame =
-        left.ok() ? eye_->FrameOf(pending.time_ns, *left, pending.other->load, MaskOf(pending))
+        left.ok() ? eye_.eye->FrameOf(pending.time_ns, *left, pending.other->load, MaskOf(pending))
                   : left.status();
     absl::StatusOr<std::vector<OdometryPose>> poses =
         frame.ok() ? odometry_.AddFrame(*frame) : frame.status();
@@ -159,10 +118,10 @@ class OdometryLog : public LogSource {
     return absl::OkStatus();
   }
 
-  std::vector<uint8_t> MaskOf(const PendingFrame& pending) const {
+  std::vector<uint8_t> MaskOf(const PairedImages& pending) const {
     if (!pending.label.has_value()) return {};
     const absl::StatusOr<Image> labels = pending.label->load();
-    return labels.ok() ? eye_->MaskOf(*labels, moving_classes_) : std::vector<uint8_t>();
+    return labels.ok() ? eye_.eye->MaskOf(*labels, moving_classes_) : std::vector<uint8_t>();
   }
 
   PoseMeasurement MeasurementOf(const OdometryPose& pose) const {
@@ -191,7 +150,7 @@ class OdometryLog : public LogSource {
   }
 
   TimeNs FrontierNs() const {
-    const TimeNs pending_ns = pending_.empty() ? kTimeMax : pending_.front().time_ns;
+    const TimeNs pending_ns = images_.empty() ? kTimeMax : images_.front_ns();
     return std::min(pending_ns, odometry_.waits_from_ns());
   }
 
@@ -209,8 +168,8 @@ class OdometryLog : public LogSource {
     }
     info_.notes.push_back(note);
     if (lone_count_ > 0) {
-      info_.notes.push_back(absl::StrCat("odometry: ", lone_count_, " images of ", channels_.left,
-                                         " and ", channels_.other,
+      info_.notes.push_back(absl::StrCat("odometry: ", lone_count_, " images of ", eye_.left,
+                                         " and ", eye_.other,
                                          " have no partner of the same stamp"));
     }
     if (uncovered_count_ > 0) {
@@ -224,8 +183,8 @@ class OdometryLog : public LogSource {
   }
 
   std::unique_ptr<LogSource> log_;
-  const EyeChannels channels_;
-  const std::unique_ptr<OdometryEye> eye_;
+  const LogEye eye_;
+  ImagePairing images_;
   VisualInertialOdometry odometry_;
   LogInfo info_;
   /// Of the log's own, those that `info_` has.
@@ -234,8 +193,6 @@ class OdometryLog : public LogSource {
   const Pose3d imu_T_body_;
   std::vector<int32_t> moving_classes_;
   bool is_ended_ = false;
-  TimeNs now_ns_ = kTimeMin;
-  std::deque<PendingFrame> pending_;
   std::deque<PoseMeasurement> poses_;
   std::deque<Measurement> held_;
   int64_t lone_count_ = 0;
@@ -243,13 +200,6 @@ class OdometryLog : public LogSource {
   int64_t broken_count_ = 0;
   std::string first_broken_;
 };
-
-absl::Status CannotEstimate(const LogInfo& info, const std::string& why) {
-  return MakeError(Reason::kFieldInvalid,
-                   absl::StrCat("--poses vio: ", info.path, " ", why,
-                                "; give --poses gt or external, or a --pose-file"),
-                   {{"field", "poses"}, {"value", "vio"}});
-}
 
 }  // namespace
 
@@ -263,34 +213,29 @@ absl::StatusOr<std::unique_ptr<LogSource>> EstimatePoses(std::unique_ptr<LogSour
                                                          const LogOptions& log_options,
                                                          const OdometryLogOptions& options) {
   LogInfo info = log->info();
-  const std::optional<EyeChannels> channels = ChannelsOf(info);
   if (!info.rig.imu.has_value() || !info.channel_counts.contains("imu0")) {
-    return CannotEstimate(info, "has no inertial unit with a calibration");
+    return MakeError(Reason::kFieldInvalid,
+                     absl::StrCat("--poses vio: ", info.path,
+                                  " has no inertial unit with a calibration; give --poses gt or "
+                                  "external, or a --pose-file"),
+                     {{"field", "poses"}, {"value", "vio"}});
   }
-  if (!channels.has_value()) {
-    return CannotEstimate(info, "has neither a pair of cameras (cam0, cam1) nor depth (depth0)");
-  }
-  const CameraCalibration& left = *info.rig.FindCamera(channels->left);
-  const CameraCalibration& other = *info.rig.FindCamera(channels->other);
-  const StereoMatchOptions& stereo = options.odometry.frontend.stereo;
-  absl::StatusOr<std::unique_ptr<OdometryEye>> eye = channels->other == "depth0"
-                                                         ? MakeDepthEye(left, other, stereo)
-                                                         : MakeStereoEye(left, other, stereo);
-  if (!eye.ok()) return eye.status();
+  DSG_ASSIGN_OR_RETURN(LogEye eye,
+                       MakeLogEye(info, options.odometry.frontend.stereo, "--poses vio"));
   DSG_ASSIGN_OR_RETURN(
       VisualInertialOdometry odometry,
-      VisualInertialOdometry::Make((*eye)->camera(), *info.rig.imu, options.odometry));
-  const int64_t count = info.channel_counts[channels->left];
+      VisualInertialOdometry::Make(eye.eye->camera(), *info.rig.imu, options.odometry));
+  const int64_t count = info.channel_counts[eye.left];
   if (info.measurement_count > 0) {
     info.measurement_count += count - info.channel_counts["poses"];
   }
   info.channel_counts["poses"] = count;
+  info.used_channels.insert({eye.left, eye.other, "imu0"});
   info.content_sha256 = Sha256Hex(absl::StrCat(info.content_sha256, "\n", options.Digest(), "\n"));
-  info.notes.push_back(absl::StrCat("the poses are estimated from ", channels->left, ", ",
-                                    channels->other, " and imu0"));
-  return std::make_unique<OdometryLog>(std::move(log), *channels, *std::move(eye),
-                                       std::move(odometry), std::move(info), RobotName(log_options),
-                                       options.is_masked);
+  info.notes.push_back(
+      absl::StrCat("the poses are estimated from ", eye.left, ", ", eye.other, " and imu0"));
+  return std::make_unique<OdometryLog>(std::move(log), std::move(eye), std::move(odometry),
+                                       std::move(info), RobotName(log_options), options.is_masked);
 }
 
 }  // namespace dsg::ingest

@@ -223,6 +223,7 @@ std::string SpillFolderOf(const IngestFlags& flags) {
 struct Additions {
   std::optional<OdometryLogOptions> odometry;
   std::optional<Segmentation> segmentation;
+  std::optional<RecognizedLogOptions> recognition;
 };
 
 absl::StatusOr<std::unique_ptr<LogSource>> WithAdditions(std::unique_ptr<LogSource> log,
@@ -233,6 +234,9 @@ absl::StatusOr<std::unique_ptr<LogSource>> WithAdditions(std::unique_ptr<LogSour
   }
   if (additions.odometry.has_value()) {
     DSG_ASSIGN_OR_RETURN(log, EstimatePoses(std::move(log), options, *additions.odometry));
+  }
+  if (additions.recognition.has_value()) {
+    DSG_ASSIGN_OR_RETURN(log, RecognizePlaces(std::move(log), *additions.recognition));
   }
   return log;
 }
@@ -314,6 +318,7 @@ absl::Status Run(const IngestFlags& flags) {
   Additions additions;
   DSG_ASSIGN_OR_RETURN(additions.odometry,
                        MakeOdometryOptions(flags.odometry, flags.poses == "vio"));
+  additions.recognition = MakeRecognitionOptions(flags.odometry);
   DSG_ASSIGN_OR_RETURN(additions.segmentation, MakeSegmentation(flags.segmenter));
   std::unique_ptr<Destination> destination;
   bool is_first = true;

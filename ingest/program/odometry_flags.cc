@@ -23,7 +23,13 @@ void AddOdometryFlags(CLI::App* app, OdometryFlags* flags) {
       ->check(CLI::IsMember({"on", "off"}))
       ->capture_default_str()
       ->group(group);
-  AddTuning(std::vector<OptionGroup>{{"odometry", flags->numbers.Bind()}}, app);
+  app->add_flag("--recognize", flags->is_recognizing,
+                "Look for places seen before in the images of a sensor log, and correct the map by "
+                "the loop closures found")
+      ->group("Places seen again");
+  AddTuning(std::vector<OptionGroup>{{"odometry", flags->numbers.Bind()},
+                                     {"places seen again", flags->recognition.Bind()}},
+            app);
 }
 
 absl::StatusOr<std::optional<OdometryLogOptions>> MakeOdometryOptions(const OdometryFlags& flags,
@@ -38,6 +44,14 @@ absl::StatusOr<std::optional<OdometryLogOptions>> MakeOdometryOptions(const Odom
   options.odometry = flags.numbers;
   DSG_ASSIGN_OR_RETURN(options.odometry.method, ParseOdometryMethod(flags.method));
   options.is_masked = flags.masks == "on";
+  return options;
+}
+
+std::optional<RecognizedLogOptions> MakeRecognitionOptions(const OdometryFlags& flags) {
+  if (!flags.is_recognizing) return std::nullopt;
+  RecognizedLogOptions options = flags.recognition;
+  // Both look at one pair of images.
+  options.stereo = flags.numbers.frontend.stereo;
   return options;
 }
 

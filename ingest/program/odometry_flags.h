@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The flags of odometry: how the robot's poses are estimated from its images and inertial unit.
+// The flags of what is found in images of the robot's path: its poses, and places seen again.
 #pragma once
 
 #include <optional>
@@ -7,6 +7,7 @@
 
 #include "absl/status/statusor.h"
 #include "ingest/pipeline/odometry_log.h"
+#include "ingest/pipeline/recognized_log.h"
 
 namespace CLI {
 class App;
@@ -19,6 +20,8 @@ struct OdometryFlags {
   std::string masks = "on";
   /// Numbers alone; the rest is not used.
   OdometryOptions numbers;
+  bool is_recognizing = false;
+  RecognizedLogOptions recognition;
 };
 
 void AddOdometryFlags(CLI::App* app, OdometryFlags* flags);
@@ -27,5 +30,8 @@ void AddOdometryFlags(CLI::App* app, OdometryFlags* flags);
 /// Errors: INVALID_ARGUMENT/FIELD_INVALID naming a flag that says nothing unless they are.
 absl::StatusOr<std::optional<OdometryLogOptions>> MakeOdometryOptions(const OdometryFlags& flags,
                                                                       bool is_on);
+
+/// nullopt without --recognize.
+std::optional<RecognizedLogOptions> MakeRecognitionOptions(const OdometryFlags& flags);
 
 }  // namespace dsg::ingest

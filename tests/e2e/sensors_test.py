@@ -127,8 +127,27 @@ class Sensors(support.ProgramsTest):
         self.refused(1, ["cut.bag"], "dsg-ingest", "--store", "s", "--map", "m", "cut.bag")
         self.refused(2, ["external"], "dsg-ingest", "--store", "s", "--map", "m", "--poses",
                      "external", "sim/log")
-        self.refused(1, ["vio"], "dsg-ingest", "--store", "s", "--map", "m", "--poses", "vio",
-                     "sim/log")
+        self.refused(2, ["vio", "--pose-file"], "dsg-ingest", "--store", "s", "--map", "m",
+                     "--poses", "vio", "--pose-file", "x", "sim/log")
+        self.refused(2, ["odometry", "vio"], "dsg-ingest", "--store", "s", "--map", "m",
+                     "--odometry", "5pt", "sim/log")
+        # The bag says nothing of the noise of its inertial unit.
+        self.refused(2, ["vio", "inertial"], "dsg-ingest", "--store", "s", "--map", "m", "--poses",
+                     "vio", "sim/log.bag")
+
+    def test_poses_are_estimated_from_images_and_inertial_samples(self):
+        command = ["dsg-ingest", "--store", "own", "--map", "home", "--poses", "vio", "--recognize",
+                   "--no-layers", "sim/log"]
+        said = self.ok(*command)
+        self.assertRegex(said, r" [1-9]\d* poses, ")
+        self.assertNotIn("inertial samples", said)
+        self.assertIn("nothing new", self.ok(*command))
+        score = json.loads(self.ok("dsg-eval", "--store", "own", "--map", "home", "--truth",
+                                   "sim/truth", "--trajectory", "--json"))
+        self.assertLess(score["tracks"]["causal"]["ate"]["max_m"], 0.1)
+        # Other methods are other sessions, and other maps.
+        self.assertNotIn("nothing new", self.ok(*command[:4], "two", *command[5:], "--odometry",
+                                                "2pt"))
 
 
 if __name__ == "__main__":

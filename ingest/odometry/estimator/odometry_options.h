@@ -59,8 +59,8 @@ struct OdometryStartOptions {
 struct OdometryUnitOptions {
   double gyro_noise_factor = 1.0;
   double accel_noise_factor = 1.0;
-  /// Covariances are told so many times as large as noise alone makes them: clocks and mountings are
-  /// off, too, and followed features err alike from image to image.
+  /// Covariances are told so many times as large as noise alone makes them: clocks and mountings
+  /// are off, too, and followed features err alike from image to image.
   double covariance_factor = 10.0;
 };
 

@@ -12,6 +12,7 @@
 #include <variant>
 
 #include "ingest/trajectory/robot_path.h"
+#include "tests/unit/ingest/pipeline/given_log.h"
 
 namespace dsg::ingest {
 namespace {
@@ -23,24 +24,6 @@ std::filesystem::path ExcerptFolder() {
                        : std::filesystem::path(DSG_SOURCE_DIR) / ".." / "shared" / "data";
   return folder / "euroc-mh01-stereo";
 }
-
-// A log of a few lines.
-class GivenLog : public LogSource {
- public:
-  GivenLog(LogInfo info, std::deque<Measurement> measurements)
-      : info_(std::move(info)), measurements_(std::move(measurements)) {}
-  const LogInfo& info() const override { return info_; }
-  absl::StatusOr<std::optional<Measurement>> Next() override {
-    if (measurements_.empty()) return std::nullopt;
-    Measurement next = std::move(measurements_.front());
-    measurements_.pop_front();
-    return next;
-  }
-
- private:
-  LogInfo info_;
-  std::deque<Measurement> measurements_;
-};
 
 CameraCalibration SmallCamera(const std::string& name, double x_m) {
   CameraCalibration camera{.name = name, .width = 96, .height = 64};
@@ -73,30 +56,6 @@ ImageMeasurement Picture(TimeNs time_ns, const std::string& channel, bool is_bro
   return image;
 }
 
-struct Outcome {
-  std::vector<Measurement> measurements;
-  LogInfo info;
-};
-
-Outcome ReadAll(LogSource& log) {
-  Outcome outcome;
-  for (;;) {
-    absl::StatusOr<std::optional<Measurement>> next = log.Next();
-    EXPECT_TRUE(next.ok()) << next.status();
-    if (!next.ok() || !next->has_value()) break;
-    outcome.measurements.push_back(*std::move(*next));
-  }
-  outcome.info = log.info();
-  return outcome;
-}
-
-bool HasNote(const LogInfo& info, const std::string& part) {
-  for (const std::string& note : info.notes) {
-    if (note.find(part) != std::string::npos) return true;
-  }
-  return false;
-}
-
 TEST(OdometryLog, KeepsAllMeasurementsInOrderAndCountsWhatItCannotUse) {
   std::deque<Measurement> given;
   for (int i = 0; i < 40; ++i) {
@@ -111,7 +70,7 @@ TEST(OdometryLog, KeepsAllMeasurementsInOrderAndCountsWhatItCannotUse) {
   const size_t count = given.size();
   auto log = EstimatePoses(std::make_unique<GivenLog>(PairInfo(), given), {}, {});
   ASSERT_TRUE(log.ok()) << log.status();
-  const Outcome outcome = ReadAll(**log);
+  const ReadLog outcome = ReadAll(**log);
   // Grey walls tell nothing.
   ASSERT_EQ(outcome.measurements.size(), count);
   for (size_t i = 1; i < count; ++i) {
@@ -135,7 +94,7 @@ TEST(OdometryLog, LeavesOutThePosesOfTheLog) {
   given.push_back(ImuMeasurement{20, {0, 0, 0}, {0, 0, 9.81}});
   auto log = EstimatePoses(std::make_unique<GivenLog>(info, given), {}, {});
   ASSERT_TRUE(log.ok()) << log.status();
-  const Outcome outcome = ReadAll(**log);
+  const ReadLog outcome = ReadAll(**log);
   ASSERT_EQ(outcome.measurements.size(), 1u);
   EXPECT_TRUE(std::holds_alternative<ImuMeasurement>(outcome.measurements.front()));
 }
@@ -203,7 +162,7 @@ TEST_P(EurocOdometry, IsWithinCentimetresOfTheGroundTruth) {
   ASSERT_TRUE(opened.ok()) << opened.status();
   auto log = EstimatePoses(*std::move(opened), options, odometry);
   ASSERT_TRUE(log.ok()) << log.status();
-  const Outcome outcome = ReadAll(**log);
+  const ReadLog outcome = ReadAll(**log);
   std::vector<Pose3d> estimates;
   std::vector<Pose3d> truths;
   for (const Measurement& measurement : outcome.measurements) {
