@@ -46,6 +46,8 @@ class ImagePairing {
   /// What has this stamp may still come, but for the end of the log.
   bool IsOpen(TimeNs time_ns) const { return now_ns_ <= time_ns; }
 
+  /// The latest stamp so far.
+  TimeNs now_ns() const { return now_ns_; }
   bool empty() const { return waiting_.empty(); }
   TimeNs front_ns() const { return waiting_.front().time_ns; }
   PairedImages Take();

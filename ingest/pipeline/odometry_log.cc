@@ -41,6 +41,10 @@ Covariance6 BodyCovariance(const OdometryPose& pose, const Pose3d& imu_T_body) {
   return covariance;
 }
 
+// A log comes in the order of time. Where samples are missing for longer, none will come, and the
+// images must not wait for them in memory.
+constexpr TimeNs kWaitNs = 2 * kNsPerSecond;
+
 class OdometryLog : public LogSource {
  public:
   OdometryLog(std::unique_ptr<LogSource> log, LogEye eye, VisualInertialOdometry odometry,
@@ -87,7 +91,8 @@ class OdometryLog : public LogSource {
   absl::Status PlaceFrames() {
     while (!images_.empty()) {
       const TimeNs time_ns = images_.front_ns();
-      if (!is_ended_ && (images_.IsOpen(time_ns) || !odometry_.Covers(time_ns))) break;
+      const bool is_awaited = !odometry_.Covers(time_ns) && images_.now_ns() < time_ns + kWaitNs;
+      if (!is_ended_ && (images_.IsOpen(time_ns) || is_awaited)) break;
       DSG_RETURN_IF_ERROR(Place(images_.Take()));
     }
     return absl::OkStatus();
@@ -174,7 +179,7 @@ class OdometryLog : public LogSource {
     }
     if (uncovered_count_ > 0) {
       info_.notes.push_back(absl::StrCat("odometry: ", uncovered_count_,
-                                         " images come after the last inertial sample"));
+                                         " images have no inertial samples beside them"));
     }
     if (broken_count_ > 0) {
       info_.notes.push_back(absl::StrCat("odometry: ", broken_count_,

@@ -87,6 +87,9 @@ void OdometryStart::Add(TimeNs time_ns, SeenFeatures features, const Quaterniond
     }
   }
   keyframes_.push_back(std::move(keyframe));
+  // A start that does not come must not fill the memory.
+  const auto count_max = static_cast<size_t>(options_.start.keyframe_count);
+  if (keyframes_.size() > count_max) keyframes_.erase(keyframes_.begin());
 }
 
 std::optional<OdometryBegin> OdometryStart::Try(std::span<const ImuMeasurement> samples,
@@ -103,9 +106,12 @@ std::optional<OdometryBegin> OdometryStart::TryAtRest(std::span<const ImuMeasure
   const auto first = std::find_if(keyframes_.begin(), keyframes_.end(),
                                   [&](const EarlyKeyframe& k) { return k.time_ns >= from_ns; });
   const bool is_long = newest.time_ns - first->time_ns >= options_.inertial.rest_ns / 2;
-  if (!is_long || static_cast<int>(newest.features.size()) < options_.keyframe.sight_count_min ||
-      ParallaxOf(camera_, first->features, newest.features, Quaterniond::Identity()) >
-          options_.frontend.relative_pose.parallax_px_min) {
+  if (!is_long || static_cast<int>(newest.features.size()) < options_.keyframe.sight_count_min) {
+    return std::nullopt;
+  }
+  const std::optional<double> parallax_px =
+      ParallaxOf(camera_, first->features, newest.features, Quaterniond::Identity());
+  if (!parallax_px.has_value() || *parallax_px > options_.frontend.relative_pose.parallax_px_min) {
     return std::nullopt;
   }
   std::vector<ImuMeasurement> still;

@@ -51,7 +51,8 @@ class OdometryStart {
   bool empty() const { return keyframes_.empty(); }
   const SeenFeatures& last_features() const { return keyframes_.back().features; }
 
-  /// Forgets those before if stereo does not tell how the camera has moved since.
+  /// Forgets those before if stereo does not tell how the camera has moved since, and the oldest
+  /// one if there are more than a start in motion takes.
   void Add(TimeNs time_ns, SeenFeatures features, const Eigen::Quaterniond& last_R_now);
   void Clear() { keyframes_.clear(); }
 

@@ -91,8 +91,8 @@ StereoMotion StereoMotionOf(const StereoCamera& camera, const SeenFeatures& last
   return motion;
 }
 
-double ParallaxOf(const StereoCamera& camera, const SeenFeatures& last, const SeenFeatures& now,
-                  const Quaterniond& last_R_now) {
+std::optional<double> ParallaxOf(const StereoCamera& camera, const SeenFeatures& last,
+                                 const SeenFeatures& now, const Quaterniond& last_R_now) {
   std::vector<double> flows;
   for (const SharedFeature& feature : SharedBy(last, now)) {
     const Vector3d ray = last_R_now * RayThrough(camera.left, feature.now->pixel);
@@ -101,7 +101,7 @@ double ParallaxOf(const StereoCamera& camera, const SeenFeatures& last, const Se
                           camera.left.fy * ray.y() / ray.z() + camera.left.cy);
     flows.push_back((turned - feature.last->pixel).norm());
   }
-  if (flows.empty()) return 0.0;
+  if (flows.empty()) return std::nullopt;
   const auto middle = flows.begin() + static_cast<std::ptrdiff_t>(flows.size() / 2);
   std::nth_element(flows.begin(), middle, flows.end());
   return *middle;

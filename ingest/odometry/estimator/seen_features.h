@@ -49,9 +49,9 @@ StereoMotion StereoMotionOf(const StereoCamera& camera, const SeenFeatures& last
                             const SeenFeatures& now, const Eigen::Quaterniond& last_R_now,
                             OdometryMethod method, const RelativePoseOptions& options);
 
-/// Median flow of the features that both have once the rotation is taken off, pixels; 0 if they
-/// have none in common.
-double ParallaxOf(const StereoCamera& camera, const SeenFeatures& last, const SeenFeatures& now,
-                  const Eigen::Quaterniond& last_R_now);
+/// Median flow of the features that both have once the rotation is taken off, pixels; nullopt if
+/// they have none in common.
+std::optional<double> ParallaxOf(const StereoCamera& camera, const SeenFeatures& last,
+                                 const SeenFeatures& now, const Eigen::Quaterniond& last_R_now);
 
 }  // namespace dsg::ingest

@@ -119,10 +119,13 @@ class VisualInertialOdometry::Impl {
     const SeenFeatures now = FeaturesNow();
     const auto kept = std::count_if(now.begin(), now.end(),
                                     [&](const auto& entry) { return last.contains(entry.first); });
-    return static_cast<double>(kept) <
-               options_.keyframe.share_min * static_cast<double>(last.size()) ||
-           ParallaxOf(camera_, last, now, CameraTurn(keyframe_R_now_)) >=
-               options_.keyframe.parallax_px;
+    if (static_cast<double>(kept) <
+        options_.keyframe.share_min * static_cast<double>(last.size())) {
+      return true;
+    }
+    const std::optional<double> parallax_px =
+        ParallaxOf(camera_, last, now, CameraTurn(keyframe_R_now_));
+    return parallax_px.has_value() && *parallax_px >= options_.keyframe.parallax_px;
   }
 
   // New features where there are none, and the distances of all.

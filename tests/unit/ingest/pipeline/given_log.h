@@ -18,6 +18,8 @@ class GivenLog : public LogSource {
   GivenLog(LogInfo info, std::deque<Measurement> measurements)
       : info_(std::move(info)), measurements_(std::move(measurements)) {}
   const LogInfo& info() const override { return info_; }
+  /// Measurements that are not given yet.
+  size_t left_count() const { return measurements_.size(); }
   absl::StatusOr<std::optional<Measurement>> Next() override {
     if (measurements_.empty()) return std::nullopt;
     Measurement next = std::move(measurements_.front());

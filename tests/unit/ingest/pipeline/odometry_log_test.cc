@@ -78,8 +78,31 @@ TEST(OdometryLog, KeepsAllMeasurementsInOrderAndCountsWhatItCannotUse) {
   }
   EXPECT_TRUE(HasNote(outcome.info, "1 images of cam0 and cam1 have no partner"));
   EXPECT_TRUE(HasNote(outcome.info, "1 images were passed over; the first: is no picture"));
-  EXPECT_TRUE(HasNote(outcome.info, "1 images come after the last inertial sample"));
+  EXPECT_TRUE(HasNote(outcome.info, "1 images have no inertial samples beside them"));
   EXPECT_TRUE(HasNote(outcome.info, "poses of 0 of 2 images"));
+}
+
+// The unit falls silent for good: what comes after is not held back until the end of the log.
+TEST(OdometryLog, DoesNotWaitForSamplesThatNeverCome) {
+  std::deque<Measurement> given;
+  for (int i = 0; i < 20; ++i) {
+    given.push_back(ImuMeasurement{i * 5'000'000, {0, 0, 0}, {0, 0, 9.81}});
+  }
+  for (int i = 1; i <= 10; ++i) {
+    given.push_back(Picture(i * kNsPerSecond, "cam0"));
+    given.push_back(Picture(i * kNsPerSecond, "cam1"));
+  }
+  auto source = std::make_unique<GivenLog>(PairInfo(), given);
+  const GivenLog& given_log = *source;
+  auto log = EstimatePoses(std::move(source), {}, {});
+  ASSERT_TRUE(log.ok()) << log.status();
+  for (int i = 0; i < 22; ++i) ASSERT_TRUE((*log)->Next().ok());
+  // The first pair has come, and of the other nine some have not been asked for.
+  const auto third = (*log)->Next();
+  ASSERT_TRUE(third.ok() && third->has_value());
+  EXPECT_EQ(StampOf(**third), 2 * kNsPerSecond);
+  EXPECT_GE(given_log.left_count(), 10u);
+  EXPECT_TRUE(HasNote(ReadAll(**log).info, "10 images have no inertial samples beside them"));
 }
 
 TEST(OdometryLog, LeavesOutThePosesOfTheLog) {
