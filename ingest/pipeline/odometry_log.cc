@@ -15,6 +15,7 @@
 #include "ingest/pipeline/log_eye.h"
 #include "ingest/pipeline/map_things.h"
 #include "schema/base/status.h"
+#include "schema/model/rotation.h"
 
 namespace dsg::ingest {
 namespace {
@@ -25,9 +26,7 @@ Covariance6 BodyCovariance(const OdometryPose& pose, const Pose3d& imu_T_body) {
   const Eigen::Vector3d lever = map_R_imu * imu_T_body.position;
   Eigen::Matrix<double, 6, 6> by_imu = Eigen::Matrix<double, 6, 6>::Zero();
   by_imu.topLeftCorner<3, 3>().setIdentity();
-  Eigen::Matrix3d cross;
-  cross << 0, -lever.z(), lever.y(), lever.z(), 0, -lever.x(), -lever.y(), lever.x(), 0;
-  by_imu.topRightCorner<3, 3>() = -cross * map_R_imu;
+  by_imu.topRightCorner<3, 3>() = -CrossMatrix(lever) * map_R_imu;
   by_imu.bottomRightCorner<3, 3>() = imu_T_body.orientation.conjugate().toRotationMatrix();
   const Eigen::Matrix<double, 6, 6> whole =
       by_imu * pose.covariance.topLeftCorner<6, 6>() * by_imu.transpose();

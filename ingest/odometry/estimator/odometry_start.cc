@@ -59,11 +59,11 @@ void MoveTo(const StartPlace& place, const Pose3d& end_T_imu, AlignedState* alig
   aligned->covariance.block<3, 3>(kPositionRow, kPositionRow) +=
       place.covariance.block<3, 3>(kPositionRow, kPositionRow);
   // Of the heading alone: the tilt is known anew.
-  const auto heading_of = [](const Quaterniond& map_R_imu) -> Vector3d {
+  const auto up_in = [](const Quaterniond& map_R_imu) -> Vector3d {
     return map_R_imu.conjugate() * Vector3d::UnitZ();
   };
-  const Vector3d place_up = heading_of(place.map_T_imu.orientation);
-  const Vector3d up_imu = heading_of(state.map_T_imu.orientation);
+  const Vector3d place_up = up_in(place.map_T_imu.orientation);
+  const Vector3d up_imu = up_in(state.map_T_imu.orientation);
   const double heading =
       place_up.dot(place.covariance.block<3, 3>(kRotationRow, kRotationRow) * place_up);
   aligned->covariance.block<3, 3>(kRotationRow, kRotationRow) +=

@@ -138,12 +138,12 @@ absl::StatusOr<Eigen::MatrixXd> CovarianceOf(std::span<const WindowFactor> facto
   }
   Normal normal;
   normal.matrix = Eigen::MatrixXd::Zero(columns.count, columns.count);
-  std::map<Eigen::Index, Eigen::Index> wanted_sizes;
+  std::map<Eigen::Index, Eigen::Index> sizes_at;
   for (const WindowFactor& factor : factors) {
     DSG_ASSIGN_OR_RETURN(const Linear linear, LinearOf(factor));
     AddTo(linear, columns, &normal);
     for (const Linear::Part& part : linear.parts) {
-      if (!part.is_landmark) wanted_sizes[columns.first.at(part.block)] = part.jacobian.cols();
+      if (!part.is_landmark) sizes_at[columns.first.at(part.block)] = part.jacobian.cols();
     }
   }
   for (const LandmarkTerms& terms : normal.landmarks) EliminateLandmark(terms, &normal.matrix);
@@ -156,7 +156,7 @@ absl::StatusOr<Eigen::MatrixXd> CovarianceOf(std::span<const WindowFactor> facto
   for (const double* block : wanted) {
     const auto entry = columns.first.find(block);
     if (entry == columns.first.end()) return Undetermined();
-    for (Eigen::Index i = 0; i < wanted_sizes.at(entry->second); ++i) {
+    for (Eigen::Index i = 0; i < sizes_at.at(entry->second); ++i) {
       picked.push_back(entry->second + i);
     }
   }

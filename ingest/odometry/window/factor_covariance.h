@@ -16,7 +16,7 @@ namespace dsg::ingest {
 ///
 /// Errors: FIELD_INVALID when the factors do not determine the blocks, or are not finite.
 /// Cost: rows times columns of each factor, and the cube of all columns but those of
-/// landmarks: 3 ms for 12 states and 200 landmarks.
+/// landmarks.
 absl::StatusOr<Eigen::MatrixXd> CovarianceOf(std::span<const WindowFactor> factors,
                                              std::span<double* const> wanted);
 

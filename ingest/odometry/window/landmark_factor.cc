@@ -123,6 +123,14 @@ void WriteRayJacobians(const StereoModel& model, const SeenRay& seen, const Pose
   }
 }
 
+// Of a sight with a disparity, which alone depends on the stereo error.
+void WriteStereoErrorJacobian(const Prediction& predicted, double weight, double* output) {
+  if (output == nullptr) return;
+  Eigen::Map<Eigen::Matrix<double, 3, kStereoErrorSize, Eigen::RowMajor>> jacobian(output);
+  jacobian.setZero();
+  jacobian.row(2) = weight * predicted.by_stereo_error;
+}
+
 using MonoSightBase =
     ceres::SizedCostFunction<2, kPoseBlockSize, kPoseBlockSize, kLandmarkBlockSize>;
 using StereoSightBase = ceres::SizedCostFunction<3, kPoseBlockSize, kPoseBlockSize,
@@ -151,14 +159,10 @@ class SightFactor : public std::conditional_t<kRows == 3, StereoSightBase, MonoS
     WriteRayJacobians<kRows>(model_, seen, map_T_anchor, map_T_imu, inverse_depth, by_ray,
                              jacobians);
     if constexpr (kRows == 3) {
-      if (jacobians[2] != nullptr)
+      if (jacobians[2] != nullptr) {
         jacobians[2][8] += sight_.weights[2] * predicted.by_inverse_depth;
-      if (jacobians[3] != nullptr) {
-        Eigen::Map<Eigen::Matrix<double, 3, kStereoErrorSize, Eigen::RowMajor>> jacobian(
-            jacobians[3]);
-        jacobian.setZero();
-        jacobian.row(2) = sight_.weights[2] * predicted.by_stereo_error;
       }
+      WriteStereoErrorJacobian(predicted, sight_.weights[2], jacobians[3]);
     }
     return true;
   }
@@ -195,12 +199,7 @@ class AnchorFactor : public std::conditional_t<kRows == 3, StereoAnchorBase, Mon
       if constexpr (kRows == 3) jacobian(2, 2) = sight_.weights[2] * predicted.by_inverse_depth;
     }
     if constexpr (kRows == 3) {
-      if (jacobians[1] != nullptr) {
-        Eigen::Map<Eigen::Matrix<double, 3, kStereoErrorSize, Eigen::RowMajor>> jacobian(
-            jacobians[1]);
-        jacobian.setZero();
-        jacobian.row(2) = sight_.weights[2] * predicted.by_stereo_error;
-      }
+      WriteStereoErrorJacobian(predicted, sight_.weights[2], jacobians[1]);
     }
     return true;
   }

@@ -97,9 +97,7 @@ class SlidingWindow::Impl {
 
   int keyframe_count() const { return static_cast<int>(keyframes_.size()); }
   TimeNs newest_ns() const { return keyframes_.back().time_ns; }
-  TimeNs oldest_ns() const { return keyframes_.front().time_ns; }
   InertialState newest() const { return StateOf(keyframes_.back()); }
-  InertialState oldest() const { return StateOf(keyframes_.front()); }
 
   absl::StatusOr<Matrix15d> NewestCovariance() const {
     std::vector<LandmarkBlock> blocks;
@@ -112,19 +110,6 @@ class SlidingWindow::Impl {
 
   const StereoError& stereo_error() const { return stereo_error_; }
   const std::vector<int64_t>& dropped() const { return dropped_; }
-
-  std::vector<WindowLandmark> Landmarks() const {
-    std::vector<WindowLandmark> result;
-    for (const auto& [id, landmark] : landmarks_) {
-      if (!landmark.anchor.has_value()) continue;
-      const Vector3d point_camera =
-          Vector3d(landmark.block[0], landmark.block[1], 1.0) / landmark.block[2];
-      const Pose3d map_T_imu = PoseOf(*Find(landmark.anchor_keyframe()));
-      result.push_back({id, map_T_imu * (model_.imu_T_camera * point_camera),
-                        static_cast<int>(landmark.sights.size())});
-    }
-    return result;
-  }
 
  private:
   struct StateSlot {
@@ -469,13 +454,10 @@ absl::Status SlidingWindow::Add(TimeNs time_ns, Preintegration measured,
 int SlidingWindow::keyframe_count() const { return impl_->keyframe_count(); }
 TimeNs SlidingWindow::newest_ns() const { return impl_->newest_ns(); }
 InertialState SlidingWindow::newest() const { return impl_->newest(); }
-InertialState SlidingWindow::oldest() const { return impl_->oldest(); }
-TimeNs SlidingWindow::oldest_ns() const { return impl_->oldest_ns(); }
 absl::StatusOr<Matrix15d> SlidingWindow::NewestCovariance() const {
   return impl_->NewestCovariance();
 }
 const StereoError& SlidingWindow::stereo_error() const { return impl_->stereo_error(); }
 const std::vector<int64_t>& SlidingWindow::dropped_features() const { return impl_->dropped(); }
-std::vector<WindowLandmark> SlidingWindow::Landmarks() const { return impl_->Landmarks(); }
 
 }  // namespace dsg::ingest
