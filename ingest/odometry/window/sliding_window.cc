@@ -55,13 +55,13 @@ class SlidingWindow::Impl {
     AddKeyframe(time_ns, aligned.state, nullptr);
     StateSlot& slot = slots_[keyframes_.back().slot];
     LinearPrior prior;
-    prior.blocks = {slot.pose.data(), slot.speed.data(), stereo_error_.data()};
+    prior.blocks = {slot.pose.data(), slot.speed.data(), stereo_error().data()};
     prior.sizes = {kPoseBlockSize, kSpeedBlockSize, kStereoErrorSize};
     prior.point.assign(slot.pose.begin(), slot.pose.end());
     prior.point.insert(prior.point.end(), slot.speed.begin(), slot.speed.end());
     // What was learnt of the calibration before is not sure: it may have been why one got lost.
-    stereo_error_ = {};
-    prior.point.insert(prior.point.end(), stereo_error_.begin(), stereo_error_.end());
+    stereo_error() = {};
+    prior.point.insert(prior.point.end(), stereo_error().begin(), stereo_error().end());
     prior.jacobian = Eigen::MatrixXd::Zero(17, 17);
     prior.jacobian.topLeftCorner<15, 15>() = root.matrixL().solve(Matrix15d::Identity());
     prior.jacobian(15, 15) = 1.0 / options_.disparity_offset_px;
@@ -108,13 +108,16 @@ class SlidingWindow::Impl {
     return Matrix15d(covariance);
   }
 
-  const StereoError& stereo_error() const { return stereo_error_; }
+  StereoError& stereo_error() const { return slots_.front().stereo_error; }
   const std::vector<int64_t>& dropped() const { return dropped_; }
 
  private:
   struct StateSlot {
     std::array<double, kPoseBlockSize> pose{};
     std::array<double, kSpeedBlockSize> speed{};
+    /// Of the first slot only, for all: Ceres sorts blocks by their addresses, and beside the
+    /// states it has the same place among them in every run.
+    StereoError stereo_error{};
   };
 
   struct Keyframe {
@@ -216,7 +219,7 @@ class SlidingWindow::Impl {
     for (size_t i = 0; i < landmark->sights.size(); ++i) {
       const std::optional<double>& disparity_px = landmark->sights[i].seen.disparity_px;
       if (!disparity_px.has_value()) continue;
-      const double inverse_depth = InverseDepthOf(model_, stereo_error_, *disparity_px);
+      const double inverse_depth = InverseDepthOf(model_, stereo_error(), *disparity_px);
       if (!IsNearEnough(inverse_depth)) continue;
       SetAnchor(i, inverse_depth, landmark);
       return true;
@@ -253,7 +256,7 @@ class SlidingWindow::Impl {
     for (const Sight& sight : landmark.sights) {
       const std::optional<Vector3d> error =
           SightErrorOf(model_, map_T_anchor, PoseOf(*Find(sight.keyframe)), sight.seen,
-                       landmark.block, stereo_error_);
+                       landmark.block, stereo_error());
       if (!error.has_value()) return std::numeric_limits<double>::infinity();
       sum += error->head<2>().norm();
       disparity_sum += std::abs(error->z());
@@ -314,7 +317,7 @@ class SlidingWindow::Impl {
       if (i != *landmark.anchor) {
         blocks = {anchor_pose, slots_[Find(sight.keyframe)->slot].pose.data(), block};
       }
-      if (sight.seen.disparity_px.has_value()) blocks.push_back(stereo_error_.data());
+      if (sight.seen.disparity_px.has_value()) blocks.push_back(stereo_error().data());
       list->Add(i == *landmark.anchor ? MakeAnchorFactor(model_, sight.seen, noise)
                                       : MakeSightFactor(model_, sight.seen, noise),
                 &loss_, std::move(blocks));
@@ -337,8 +340,8 @@ class SlidingWindow::Impl {
       ordering->AddElementToGroup(slot.pose.data(), 1);
       ordering->AddElementToGroup(slot.speed.data(), 1);
     }
-    problem.AddParameterBlock(stereo_error_.data(), kStereoErrorSize);
-    ordering->AddElementToGroup(stereo_error_.data(), 1);
+    problem.AddParameterBlock(stereo_error().data(), kStereoErrorSize);
+    ordering->AddElementToGroup(stereo_error().data(), 1);
     for (double* landmark : list.landmarks) {
       problem.AddParameterBlock(landmark, kLandmarkBlockSize);
       ordering->AddElementToGroup(landmark, 0);
@@ -426,7 +429,6 @@ class SlidingWindow::Impl {
   mutable ceres::HuberLoss loss_;
   // Parameter blocks: the factors of a window that does not change name them, too.
   mutable std::vector<StateSlot> slots_;
-  mutable StereoError stereo_error_{};
   std::deque<Keyframe> keyframes_;
   // By feature.
   std::map<int64_t, Landmark> landmarks_;
