@@ -16,6 +16,7 @@
 #include <cstring>
 #include <filesystem>
 #include <thread>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
@@ -147,13 +148,17 @@ absl::Status CheckFile(const std::string& path, const struct stat& info, const s
 }
 
 absl::StatusOr<std::unique_ptr<Database>> OpenThere(const std::string& store_folder,
-                                                    const std::string& map, Database::Mode mode) {
+                                                    const std::string& map, Database::Mode mode,
+                                                    MapSpec* spec) {
   const std::string path = DatabasePath(store_folder, map);
   DSG_ASSIGN_OR_RETURN(auto db, Database::Open(path, mode, map));
   DSG_RETURN_IF_ERROR(CheckKnownFormat(*db, path));
-  DSG_ASSIGN_OR_RETURN(const MapSpec spec, ReadMapSpec(*db));
-  if (spec.name == map) return db;
-  if (IsBeingRenamed(store_folder, map, spec.name)) {
+  DSG_ASSIGN_OR_RETURN(MapSpec found, ReadMapSpec(*db));
+  if (found.name == map) {
+    if (spec != nullptr) *spec = std::move(found);
+    return db;
+  }
+  if (IsBeingRenamed(store_folder, map, found.name)) {
     // Unless somebody does it at this moment, it was killed.
     db.reset();
     SettleWholeMaps(store_folder);
@@ -161,7 +166,7 @@ absl::StatusOr<std::unique_ptr<Database>> OpenThere(const std::string& store_fol
   }
   return MakeError(
       Reason::kNotAStore,
-      absl::StrCat("folder ", MapFolder(store_folder, map), " holds map \"", spec.name,
+      absl::StrCat("folder ", MapFolder(store_folder, map), " holds map \"", found.name,
                    "\"; a map cannot be copied under another name, rename the folder back"),
       {{"map", map}});
 }
@@ -259,22 +264,23 @@ absl::Status MakeMapOfRows(const std::string& file, const MapSpec& spec, const R
 }
 
 absl::StatusOr<std::unique_ptr<Database>> OpenMapFile(const std::string& store_folder,
-                                                      const std::string& map, Database::Mode mode) {
-  DSG_ASSIGN_OR_RETURN(auto db, OpenAnyFormat(store_folder, map, mode));
+                                                      const std::string& map, Database::Mode mode,
+                                                      MapSpec* spec) {
+  DSG_ASSIGN_OR_RETURN(auto db, OpenAnyFormat(store_folder, map, mode, spec));
   DSG_RETURN_IF_ERROR(CheckNewestFormat(*db, db->path()));
   return db;
 }
 
 absl::StatusOr<std::unique_ptr<Database>> OpenAnyFormat(const std::string& store_folder,
-                                                        const std::string& map,
-                                                        Database::Mode mode) {
+                                                        const std::string& map, Database::Mode mode,
+                                                        MapSpec* spec) {
   DSG_RETURN_IF_ERROR(CheckMapName(map));
   const std::string path = DatabasePath(store_folder, map);
   for (;;) {
     struct stat info {};
     if (stat(path.c_str(), &info) != 0) return UnknownMapError(map, store_folder);
     DSG_RETURN_IF_ERROR(CheckFile(path, info, map));
-    absl::StatusOr<std::unique_ptr<Database>> db = OpenThere(store_folder, map, mode);
+    absl::StatusOr<std::unique_ptr<Database>> db = OpenThere(store_folder, map, mode, spec);
     // The map may be dropped, renamed or replaced between the opening of its file and of its log,
     // which then is of another file.
     if (IsAtPath(info, path)) return db;

@@ -33,14 +33,17 @@ absl::Status CreateMapFile(const std::string& store_folder, const MapSpec& spec)
 absl::Status MakeMapOfRows(const std::string& file, const MapSpec& spec, const RowSource& rows,
                            const StopCheck& stop);
 
-/// Opens a map's database after checking that it is one, of a format that this build reads.
+/// Opens a map's database after checking that it is one, of a format that this build reads. Where
+/// `spec` is not null it gets the map's.
 /// Errors: NOT_FOUND/MAP_UNKNOWN; FAILED_PRECONDITION/NOT_A_STORE or FORMAT_TOO_NEW.
 absl::StatusOr<std::unique_ptr<Database>> OpenMapFile(const std::string& store_folder,
-                                                      const std::string& map, Database::Mode mode);
+                                                      const std::string& map, Database::Mode mode,
+                                                      MapSpec* spec = nullptr);
 /// The same for a map of an older format, whose tables are not as this program expects them.
 absl::StatusOr<std::unique_ptr<Database>> OpenAnyFormat(const std::string& store_folder,
                                                         const std::string& map,
-                                                        Database::Mode mode);
+                                                        Database::Mode mode,
+                                                        MapSpec* spec = nullptr);
 /// Whether it is a map of the format that this program reads and writes.
 /// Errors: FAILED_PRECONDITION/NOT_A_STORE, FORMAT_TOO_NEW or FORMAT_TOO_OLD.
 absl::Status CheckFormat(Database& db);

@@ -78,8 +78,8 @@ absl::StatusOr<std::shared_ptr<SqliteMapReader>> SqliteMapReader::Open(
   std::shared_ptr<SqliteMapReader> reader(new SqliteMapReader(store_folder, cache_bytes));
   // Before opening: if the file is replaced in between, the reader takes itself for stale.
   reader->identity_ = IdentityOf(store_folder, map);
-  DSG_ASSIGN_OR_RETURN(reader->watcher_, OpenMapFile(store_folder, map, Database::Mode::kRead));
-  DSG_ASSIGN_OR_RETURN(reader->spec_, ReadMapSpec(*reader->watcher_));
+  DSG_ASSIGN_OR_RETURN(reader->watcher_,
+                       OpenMapFile(store_folder, map, Database::Mode::kRead, &reader->spec_));
   DSG_ASSIGN_OR_RETURN(const std::string stored, ReadIncarnation(*reader->watcher_));
   // A file that was put there by hand bears the text of the one that it was copied from.
   const uint64_t inode = reader->identity_.has_value() ? reader->identity_->inode : 0;

@@ -30,15 +30,15 @@ class SqliteStore : public GraphStore {
     std::vector<MapSpec> maps;
     for (const std::string& name : names) {
       // Those of older formats too: opening one says how to upgrade it.
-      const auto db = OpenAnyFormat(folder_, name, Database::Mode::kRead);
+      MapSpec spec;
+      const auto db = OpenAnyFormat(folder_, name, Database::Mode::kRead, &spec);
       if (!db.ok()) {
         // One map that this program cannot read must not hide the others.
         Log(LogLevel::kWarning, "map-skipped",
             {{"map", name}, {"error", std::string(db.status().message())}});
         continue;
       }
-      auto spec = ReadMapSpec(**db);
-      if (spec.ok()) maps.push_back(*std::move(spec));
+      maps.push_back(std::move(spec));
     }
     return maps;
   }

@@ -246,8 +246,7 @@ SqliteWriter::~SqliteWriter() {
 absl::Status SqliteWriter::Reopen() {
   tracks_.Forget();
   db_.reset();
-  DSG_ASSIGN_OR_RETURN(db_, OpenMapFile(store_folder_, map_, Database::Mode::kWrite));
-  DSG_ASSIGN_OR_RETURN(spec_, ReadMapSpec(*db_));
+  DSG_ASSIGN_OR_RETURN(db_, OpenMapFile(store_folder_, map_, Database::Mode::kWrite, &spec_));
   DSG_ASSIGN_OR_RETURN(head_, LoadHead(*db_));
   return absl::OkStatus();
 }
