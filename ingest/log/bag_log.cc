@@ -242,6 +242,7 @@ OpenedLog OpenBag(const std::string& path, const LogOptions& options) {
 
 OpenedLog OpenFollowedBag(std::unique_ptr<GrowingFile> file, const LogOptions& options) {
   BagGrowth growth;
+  growth.late_ns = options.follow->late_ns;
   DSG_ASSIGN_OR_RETURN(growth.bag, GrowingBag::Open(std::move(file)));
   DSG_ASSIGN_OR_RETURN(const size_t message_count, growth.bag->WaitForBegin(kFollowedBeginNs));
   const BagBegin begin(*growth.bag->bag(), message_count);

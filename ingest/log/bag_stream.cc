@@ -14,8 +14,6 @@
 namespace dsg::ingest {
 namespace {
 
-// How much later than others a topic may be recorded.
-constexpr TimeNs kHorizonNs = kNsPerSecond;
 // Far more than a second of any rig; stamps that all are equal must not fill the memory.
 constexpr size_t kWaitingMax = 200'000;
 static_assert(kTransformWaitingMax < kWaitingMax);
@@ -130,7 +128,7 @@ bool BagStream::HasNext() const {
       !growth_.transforms->IsSettled(first_ns, latest_ns_, waiting_.size())) {
     return false;
   }
-  return latest_ns_ - first_ns >= kHorizonNs || (growth_.bag != nullptr && IsOfOneSource());
+  return latest_ns_ - first_ns >= growth_.late_ns || (growth_.bag != nullptr && IsOfOneSource());
 }
 
 // Whether there are messages that were not taken.
@@ -200,7 +198,8 @@ absl::Status BagStream::Fill() {
     TakePoses();
     if (waiting_.size() > kWaitingMax) {
       return Malformed(plan_.topic_of_connection[ref.connection],
-                       absl::StrCat("more than ", kWaitingMax, " messages lie within one second"));
+                       absl::StrCat("more than ", kWaitingMax, " messages lie within ",
+                                    static_cast<double>(growth_.late_ns) * 1e-9, " s"));
     }
   }
   return absl::OkStatus();
@@ -277,7 +276,8 @@ absl::Status BagStream::CheckOrder(const Key& key, size_t index) {
   }
   if (key.time_ns < emitted_ns_) {
     return Malformed(index,
-                     absl::StrCat("has stamp ", key.time_ns, ", more than a second before stamp ",
+                     absl::StrCat("has stamp ", key.time_ns, ", more than ",
+                                  static_cast<double>(growth_.late_ns) * 1e-9, " s before stamp ",
                                   latest_ns_, " of another topic; do they share a clock?"));
   }
   last = key;

@@ -35,6 +35,8 @@ struct BagGrowth {
   LoopQueue loops;
   /// The topic of loop closures, which may come later than the others; empty = none is read.
   std::string loop_topic;
+  /// FollowOptions::late_ns.
+  TimeNs late_ns = kNsPerSecond;
 };
 
 /// A bag without anything usable can be made a stream, so that its notes can be read; its first

@@ -134,6 +134,9 @@ enum class PoseSource {
 struct FollowOptions {
   /// The log ends after so long without growth; unset = never.
   std::optional<std::chrono::milliseconds> timeout;
+  /// How much later than others a topic of a bag may be recorded, ns: what is newer than that is
+  /// held back. A message that comes later still ends the log with an error.
+  TimeNs late_ns = kNsPerSecond;
   /// Set from a signal handler or another thread: the log ends at once. Outlives the log.
   const std::atomic<bool>* stop = nullptr;
   /// Gets sentences for the user while OpenLog or Next waits: what for, if it is unusual.

@@ -63,6 +63,12 @@ void AddFollowFlags(CLI::App* app, IngestFlags* flags) {
                   "with what is there. Without it, it never ends by itself")
       ->check(CLI::Range(0.0, 86400.0 * 365))
       ->needs("--follow");
+  app->add_option("--follow-late", flags->follow_late_s,
+                  "With --follow: seconds that a topic of a bag may be recorded later than others; "
+                  "the map is so far behind, and what comes later still ends the log with an error")
+      ->check(CLI::Range(0.01, 10.0))
+      ->capture_default_str()
+      ->needs("--follow");
 }
 
 }  // namespace
@@ -176,6 +182,7 @@ absl::Status SetFollow(const IngestFlags& flags, const std::atomic<bool>* stop,
   }
   FollowOptions& follow = options->follow.emplace();
   follow.stop = stop;
+  follow.late_ns = std::llround(flags.follow_late_s * 1e9);
   if (flags.follow_timeout_s.has_value()) {
     follow.timeout = std::chrono::milliseconds(std::llround(*flags.follow_timeout_s * 1e3));
   }

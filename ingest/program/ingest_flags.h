@@ -47,6 +47,7 @@ struct IngestFlags {
   bool is_followed = false;
   /// Unset = never.
   std::optional<double> follow_timeout_s;
+  double follow_late_s = 1.0;
   std::string robot_cad;
   double odometry_m_per_m = RobotGraphOptions().odometry_m_per_m;
   double odometry_rad_per_m = RobotGraphOptions().odometry_rad_per_m;

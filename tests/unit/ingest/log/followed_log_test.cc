@@ -292,6 +292,26 @@ TEST(FollowedBag, EndsAfterATimeWithoutGrowth) {
   EXPECT_LT(log->poses.size(), 140u);
 }
 
+TEST(FollowedBag, HoldsBackWhatMayBeOvertaken) {
+  const TempFolder folder;
+  const std::string bytes = WriteMcap(TenSeconds());
+  const std::string path = folder.Write("log.mcap", bytes.substr(0, bytes.size() / 2));
+  const auto newest_ns = [&](TimeNs late_ns) {
+    LogOptions options = Following(milliseconds(60'000));
+    options.follow->late_ns = late_ns;
+    const auto log = OpenLog(path, options);
+    EXPECT_TRUE(log.ok()) << log.status();
+    (*log)->SetIdle([] { return absl::CancelledError("it waits"); });
+    TimeNs time_ns = 0;
+    auto next = (*log)->Next();
+    for (; next.ok() && next->has_value(); next = (*log)->Next()) time_ns = StampOf(**next);
+    EXPECT_TRUE(absl::IsCancelled(next.status())) << next.status();
+    return static_cast<double>(time_ns);
+  };
+  // Twenty of each topic in a second.
+  EXPECT_NEAR(newest_ns(200'000'000) - newest_ns(kNsPerSecond), 8e8, 6e7);
+}
+
 TEST(FollowedBag, NeedsItsFirstSecondsOrItsEnd) {
   const TempFolder folder;
   const Recording two_seconds = SmallRecording(CdrWriter(), 40);

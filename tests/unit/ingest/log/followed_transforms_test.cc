@@ -198,7 +198,7 @@ TEST(FollowedTransforms, SayWhenTheyAreOfAnotherClock) {
   ExpectMalformedFile(
       Follow(RecordDrive({.length_ns = 20 * kNsPerSecond, .clock_ns = 5000 * kNsPerSecond}))
           .status(),
-      {"more than a second before", "do they share a clock?"});
+      {"more than 1 s before", "do they share a clock?"});
 }
 
 TEST(FollowedTransforms, PassOverJumpsOfTheirClock) {
