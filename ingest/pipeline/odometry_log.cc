@@ -170,6 +170,11 @@ class OdometryLog : public LogSource {
     for (const auto& [reason, count] : counts.losses) {
       absl::StrAppend(&note, ", lost ", count, " times (", reason, ")");
     }
+    const bool has_started = counts.starts_at_rest + counts.starts_in_motion > 0;
+    if (!counts.failed_start.empty() && (!has_started || !counts.losses.empty())) {
+      absl::StrAppend(&note, "; the last start that failed: ", counts.failed_start);
+      if (!counts.gyro_fault.empty()) absl::StrAppend(&note, "; ", counts.gyro_fault);
+    }
     info_.notes.push_back(note);
     if (lone_count_ > 0) {
       info_.notes.push_back(absl::StrCat("odometry: ", lone_count_, " images of ", eye_.left,

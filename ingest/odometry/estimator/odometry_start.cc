@@ -5,7 +5,11 @@
 #include <cmath>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
+#include "ingest/odometry/inertial/imu_faults.h"
+#include "ingest/odometry/inertial/imu_samples.h"
 #include "ingest/odometry/inertial/moving_alignment.h"
+#include "schema/base/status.h"
 #include "schema/model/rotation.h"
 
 namespace dsg::ingest {
@@ -17,6 +21,9 @@ using Eigen::Vector3d;
 // How sure the origin is of being the origin: a solver wants a covariance.
 constexpr double kPlaceSigmaM = 1e-3;
 constexpr double kHeadingSigmaRad = 1e-3;
+
+// Of keyframes, to find faults in. More of them tell nothing new.
+constexpr size_t kTurnsMax = 100;
 
 // The turn about the vertical that brings one attitude nearest to the other.
 double HeadingBetween(const Quaterniond& from, const Quaterniond& to) {
@@ -92,10 +99,35 @@ void OdometryStart::Add(TimeNs time_ns, SeenFeatures features, const Quaterniond
   if (keyframes_.size() > count_max) keyframes_.erase(keyframes_.begin());
 }
 
-std::optional<OdometryBegin> OdometryStart::Try(std::span<const ImuMeasurement> samples,
-                                                const StartPlace& place) const {
+absl::StatusOr<OdometryBegin> OdometryStart::Try(std::span<const ImuMeasurement> samples,
+                                                 const StartPlace& place) {
+  KeepTurn(samples);
   std::optional<OdometryBegin> begin = TryAtRest(samples, place);
-  return begin.has_value() ? std::move(begin) : TryInMotion(samples, place);
+  if (begin.has_value()) return *std::move(begin);
+  return TryInMotion(samples, place);
+}
+
+void OdometryStart::KeepTurn(std::span<const ImuMeasurement> samples) {
+  if (keyframes_.size() < 2) return;
+  const EarlyKeyframe& from = keyframes_[keyframes_.size() - 2];
+  const EarlyKeyframe& to = keyframes_.back();
+  absl::StatusOr<std::vector<ImuMeasurement>> between =
+      CutSamples(samples, from.time_ns, to.time_ns, imu_.name, options_.inertial.gap_ns_max);
+  if (!between.ok()) return;
+  const Quaterniond imu_R_camera =
+      imu_.body_T_imu.orientation.conjugate() * camera_.left.body_T_camera.orientation;
+  const Quaterniond camera_turn =
+      from.first_T_camera.orientation.conjugate() * to.first_T_camera.orientation;
+  turns_.push_back(
+      {*std::move(between), (imu_R_camera * camera_turn * imu_R_camera.conjugate()).normalized()});
+  if (turns_.size() > kTurnsMax) turns_.pop_front();
+}
+
+std::string OdometryStart::GyroFault() const {
+  std::vector<SeenTurn> seen;
+  for (const Turn& turn : turns_) seen.push_back({turn.samples, turn.from_R_to});
+  const std::vector<ImuFault> faults = FaultsOfTurns(seen, imu_.name, options_.inertial);
+  return faults.empty() ? "" : faults.front().text;
 }
 
 // The unit alone cannot tell rest from an even ride; images can.
@@ -128,10 +160,14 @@ std::optional<OdometryBegin> OdometryStart::TryAtRest(std::span<const ImuMeasure
   return begin;
 }
 
-std::optional<OdometryBegin> OdometryStart::TryInMotion(std::span<const ImuMeasurement> samples,
-                                                        const StartPlace& place) const {
+absl::StatusOr<OdometryBegin> OdometryStart::TryInMotion(std::span<const ImuMeasurement> samples,
+                                                         const StartPlace& place) const {
   const auto count = static_cast<size_t>(options_.start.keyframe_count);
-  if (keyframes_.size() < count) return std::nullopt;
+  if (keyframes_.size() < count) {
+    return absl::FailedPreconditionError(absl::StrCat("images tell the motion of ",
+                                                      keyframes_.size(), " keyframes; a start in ",
+                                                      "motion takes ", count));
+  }
   OdometryBegin begin;
   begin.is_in_motion = true;
   begin.keyframes.assign(keyframes_.end() - options_.start.keyframe_count, keyframes_.end());
@@ -140,21 +176,20 @@ std::optional<OdometryBegin> OdometryStart::TryInMotion(std::span<const ImuMeasu
   for (size_t i = 0; i < count; ++i) {
     poses.push_back(begin.keyframes[i].first_T_camera * camera_T_imu);
     if (i == 0) continue;
-    absl::StatusOr<Preintegration> measured =
+    DSG_ASSIGN_OR_RETURN(
+        Preintegration measured,
         Preintegration::Make(samples, begin.keyframes[i - 1].time_ns, begin.keyframes[i].time_ns,
-                             ImuBias(), imu_, options_.inertial);
-    if (!measured.ok()) return std::nullopt;
-    begin.measured.push_back(*std::move(measured));
+                             ImuBias(), imu_, options_.inertial));
+    begin.measured.push_back(std::move(measured));
   }
   std::vector<Preintegration*> between;
   for (Preintegration& measured : begin.measured) between.push_back(&measured);
-  const absl::StatusOr<AlignedPath> path =
-      AlignInMotion(poses, between, imu_, 0.0, options_.inertial);
-  if (!path.ok()) return std::nullopt;
-  begin.first.state = path->states.front();
+  DSG_ASSIGN_OR_RETURN(const AlignedPath path,
+                       AlignInMotion(poses, between, imu_, 0.0, options_.inertial));
+  begin.first.state = path.states.front();
   const Vector3d up_imu = begin.first.state.map_T_imu.orientation.conjugate() * Vector3d::UnitZ();
   begin.first.covariance = CovarianceInMotion(up_imu, options_.start);
-  MoveTo(place, path->states.back().map_T_imu, &begin.first);
+  MoveTo(place, path.states.back().map_T_imu, &begin.first);
   return begin;
 }
 

@@ -2,11 +2,13 @@
 // How visual-inertial odometry begins: at rest, or in motion from the poses that stereo tells.
 #pragma once
 
+#include <deque>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
-#include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "ingest/odometry/estimator/odometry_options.h"
 #include "ingest/odometry/estimator/seen_features.h"
 #include "ingest/odometry/inertial/alignment.h"
@@ -56,21 +58,32 @@ class OdometryStart {
   void Add(TimeNs time_ns, SeenFeatures features, const Eigen::Quaterniond& last_R_now);
   void Clear() { keyframes_.clear(); }
 
-  /// A start at the newest keyframe or with the last ones, if it is known by now. `samples` reach
-  /// from before the first keyframe to the newest one.
-  std::optional<OdometryBegin> Try(std::span<const ImuMeasurement> samples,
-                                   const StartPlace& place) const;
+  /// A start at the newest keyframe or with the last ones. `samples` reach from before the first
+  /// keyframe to the newest one.
+  /// Errors: FAILED_PRECONDITION while there are too few keyframes; of AlignInMotion.
+  absl::StatusOr<OdometryBegin> Try(std::span<const ImuMeasurement> samples,
+                                    const StartPlace& place);
+
+  /// What the turns between the newest keyframes, also of tries before, tell of the gyro
+  /// (FaultsOfTurns): a sentence, or empty.
+  std::string GyroFault() const;
 
  private:
+  void KeepTurn(std::span<const ImuMeasurement> samples);
   std::optional<OdometryBegin> TryAtRest(std::span<const ImuMeasurement> samples,
                                          const StartPlace& place) const;
-  std::optional<OdometryBegin> TryInMotion(std::span<const ImuMeasurement> samples,
-                                           const StartPlace& place) const;
+  absl::StatusOr<OdometryBegin> TryInMotion(std::span<const ImuMeasurement> samples,
+                                            const StartPlace& place) const;
 
   StereoCamera camera_;
   ImuCalibration imu_;
   OdometryOptions options_;
   std::vector<EarlyKeyframe> keyframes_;
+  struct Turn {
+    std::vector<ImuMeasurement> samples;
+    Eigen::Quaterniond from_R_to;
+  };
+  std::deque<Turn> turns_;
 };
 
 }  // namespace dsg::ingest

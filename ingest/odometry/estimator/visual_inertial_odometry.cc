@@ -67,7 +67,8 @@ class VisualInertialOdometry::Impl {
     Quaterniond last_R_now = Quaterniond::Identity();
     if (is_tracking) last_R_now = TurnSince(*last_ns_, frame.time_ns);
     last_ns_ = frame.time_ns;
-    const bool is_led = options_.method == OdometryMethod::kDynamic;
+    // Before a start it is not known whether the unit's samples are what they should be.
+    const bool is_led = options_.method == OdometryMethod::kDynamic && is_started_;
     DSG_RETURN_IF_ERROR(tracker_
                             .Track(frame.left,
                                    is_led ? CameraTurn(last_R_now) : Quaterniond::Identity(),
@@ -155,9 +156,13 @@ class VisualInertialOdometry::Impl {
     start_.Add(frame.time_ns, std::move(features), CameraTurn(keyframe_R_now_));
     keyframe_R_now_ = Quaterniond::Identity();
     std::erase_if(early_ns_, [&](TimeNs time_ns) { return time_ns < start_.first_ns(); });
-    std::optional<OdometryBegin> begin = start_.Try(samples_, place_);
+    absl::StatusOr<OdometryBegin> begin = start_.Try(samples_, place_);
     ForgetSamples(frame.time_ns);
-    if (!begin.has_value()) return std::vector<OdometryPose>();
+    if (!begin.ok()) {
+      counts_.failed_start = std::string(begin.status().message());
+      counts_.gyro_fault = start_.GyroFault();
+      return std::vector<OdometryPose>();
+    }
     return Begin(*std::move(begin));
   }
 

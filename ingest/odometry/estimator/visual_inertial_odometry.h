@@ -56,6 +56,10 @@ struct OdometryCounts {
   int64_t starts_in_motion = 0;
   /// How often it had to start anew, by reason: "blind", "inertial gap", "no solution".
   std::map<std::string, int64_t> losses;
+  /// Why the newest start that was tried in vain failed, in words, and what was wrong with the
+  /// gyroscope by then, if that was known (imu_faults.h).
+  std::string failed_start;
+  std::string gyro_fault;
 };
 
 /// Features followed from image to image, checked and solved at keyframes in a window with what the

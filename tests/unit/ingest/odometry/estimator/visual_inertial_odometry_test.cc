@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ingest/odometry/estimator/visual_inertial_odometry.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,6 +9,8 @@
 #include <functional>
 #include <iostream>
 #include <set>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "ingest/odometry/estimator/stereo_eye.h"
@@ -30,6 +33,8 @@ struct Session {
   // When the lens is covered, and when the unit says nothing.
   std::function<bool(double)> is_covered = [](double) { return false; };
   std::function<bool(double)> is_silent = [](double) { return false; };
+  // What the unit's driver makes of a sample.
+  std::function<void(ImuMeasurement*)> spoil = [](ImuMeasurement*) {};
   OdometryOptions options;
 };
 
@@ -57,6 +62,7 @@ Outcome RunSession(Session session) {
     const TimeNs time_ns = std::llround(1e9 * t);
     while (next < samples.size() && samples[next].time_ns <= time_ns) {
       if (!session.is_silent(1e-9 * static_cast<double>(samples[next].time_ns))) {
+        session.spoil(&samples[next]);
         odometry->AddSample(samples[next]);
       }
       ++next;
@@ -180,6 +186,30 @@ TEST(VisualInertialOdometry, StartsAnewAfterAGapOfTheUnit) {
   EXPECT_EQ(outcome.counts.losses.at("inertial gap"), 1);
   EXPECT_GT(outcome.poses.back().time_ns, 9'900'000'000);
   EXPECT_EQ(outcome.counts.starts_at_rest + outcome.counts.starts_in_motion, 2);
+}
+
+TEST(VisualInertialOdometry, SaysWhatIsWrongWithTheSamples) {
+  struct Fault {
+    std::function<void(ImuMeasurement*)> spoil;
+    std::string text;
+  };
+  const std::vector<Fault> faults = {
+      {[](ImuMeasurement* sample) { sample->acceleration_m_s2 /= 9.80665; }, "look like g"},
+      {[](ImuMeasurement* sample) { sample->angular_velocity_rad_s *= 180.0 / M_PI; }, "deg"},
+      {[](ImuMeasurement* sample) {
+         std::swap(sample->angular_velocity_rad_s.x(), sample->angular_velocity_rad_s.z());
+       },
+       "axes"},
+      {[](ImuMeasurement* sample) { sample->angular_velocity_rad_s *= -1.0; }, "axes"}};
+  for (const Fault& fault : faults) {
+    Session session;
+    session.carried.rest_s = -3.0;
+    session.spoil = fault.spoil;
+    const Outcome outcome = RunSession(session);
+    EXPECT_TRUE(outcome.poses.empty());
+    EXPECT_THAT(outcome.counts.failed_start + outcome.counts.gyro_fault,
+                testing::HasSubstr(fault.text));
+  }
 }
 
 TEST(VisualInertialOdometry, GivesTheSamePosesTwice) {
