@@ -248,7 +248,7 @@ def main():
         found = run(arguments, pathlib.Path(work))
     if arguments.json:
         arguments.json.write_text(json.dumps(found))
-    print(f"{found['answered']} of {found['images']} images answered; from the image to the answer: "
+    print(f"{found['answered']} of {found['images']} images answered; from image to answer: "
           f"median {found['median_s']:.2f} s, p90 {found['p90_s']:.2f}, p99 {found['p99_s']:.2f}, "
           f"largest {found['max_s']:.2f}; the log was written at most "
           f"{found['player_late_s']:.2f} s late; dsg-ingest: exit {found['ingest_status']}")

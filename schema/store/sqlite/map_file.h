@@ -41,8 +41,7 @@ absl::StatusOr<std::unique_ptr<Database>> OpenMapFile(const std::string& store_f
                                                       MapSpec* spec = nullptr);
 /// The same for a map of an older format, whose tables are not as this program expects them.
 absl::StatusOr<std::unique_ptr<Database>> OpenAnyFormat(const std::string& store_folder,
-                                                        const std::string& map,
-                                                        Database::Mode mode,
+                                                        const std::string& map, Database::Mode mode,
                                                         MapSpec* spec = nullptr);
 /// Whether it is a map of the format that this program reads and writes.
 /// Errors: FAILED_PRECONDITION/NOT_A_STORE, FORMAT_TOO_NEW or FORMAT_TOO_OLD.
