@@ -79,6 +79,26 @@ TEST(TopView, KeepsTheHeightOfNarrowMapsInBounds) {
   EXPECT_LE(wide.height, kTopViewWidthMax);
 }
 
+TEST(TopView, DrawsASlantedWallAsALineInItsBox) {
+  Node wall;
+  wall.id = NodeId('S', 1);
+  wall.kind = kinds::kStructure;
+  wall.layer = layers::kStructures;
+  wall.box_node = Box3d(Eigen::Vector3d(-4.0, -4.0, 0.0), Eigen::Vector3d(4.0, 4.0, 2.5));
+  MapContent content;
+  const auto ink = [&](const Eigen::Vector3d& normal) {
+    wall.structure = StructureInfo{"wall", normal, 0.0, 0};
+    content.nodes = {wall};
+    const Picture picture = DrawTopView(content, {.width_px = 400, .title = ""});
+    return InkIn(picture, 35, 365, 70, 395);
+  };
+  // The box of one along the axes is all there is to know of it.
+  EXPECT_GT(ink({1.0, 0.0, 0.0}), 100'000);
+  const int line = ink(Eigen::Vector3d(1.0, 1.0, 0.0).normalized());
+  EXPECT_GT(line, 300);
+  EXPECT_LT(line, 3000);
+}
+
 TEST(TopView, IsTheSameForTheSameMap) {
   const MapContent content = test::ExampleContent();
   EXPECT_EQ(DrawTopView(content, {.title = "a"}).rgb, DrawTopView(content, {.title = "a"}).rgb);
