@@ -12,6 +12,7 @@
 #include "ingest/log/bag_transforms.h"
 #include "ingest/log/ros_messages.h"
 #include "schema/base/status.h"
+#include "schema/base/time.h"
 
 namespace dsg::ingest {
 namespace {
@@ -165,6 +166,44 @@ absl::Status AddLidar(const Bag& bag, const BagTopic& cloud, Extrinsics* extrins
   return absl::OkStatus();
 }
 
+// Messages in a second, by the recorder's clock; nullopt of fewer than two.
+std::optional<double> RateOf(const Bag& bag, const BagPlan& plan, const BagTopic& topic) {
+  TimeNs first_ns = kTimeMax;
+  TimeNs last_ns = kTimeMin;
+  int64_t count = 0;
+  for (const BagMessageRef& ref : bag.messages()) {
+    if (&plan.topics[plan.topic_of_connection[ref.connection]] != &topic) continue;
+    first_ns = std::min(first_ns, ref.bag_time_ns);
+    last_ns = std::max(last_ns, ref.bag_time_ns);
+    ++count;
+  }
+  if (count < 2 || last_ns <= first_ns) return std::nullopt;
+  return 1e9 * static_cast<double>(count - 1) / static_cast<double>(last_ns - first_ns);
+}
+
+// Bags say nothing of the unit's noise.
+absl::Status AddInertialUnit(const Bag& bag, const BagTopic& topic, Extrinsics* extrinsics,
+                             BagPlan* plan) {
+  const std::optional<BagMessageRef>& first = plan->FirstOf(topic);
+  const std::optional<double> rate_hz = RateOf(bag, *plan, topic);
+  if (!first.has_value() || !rate_hz.has_value()) return absl::OkStatus();
+  DSG_ASSIGN_OR_RETURN(const BagMessage message, bag.Read(*first));
+  const absl::StatusOr<RosHeader> header =
+      ParseRosHeader(message.data, BagOrigin(bag, topic.name, 1));
+  // The reader of the log tells what is wrong with it.
+  if (!header.ok()) return absl::OkStatus();
+  DSG_ASSIGN_OR_RETURN(const std::optional<Pose3d> body_T_imu, extrinsics->Find(header->frame_id));
+  ImuCalibration& imu = plan->rig.imu.emplace();
+  imu.name = topic.channel;
+  imu.rate_hz = *rate_hz;
+  if (body_T_imu.has_value()) {
+    imu.body_T_imu = *body_T_imu;
+  } else {
+    plan->notes.push_back(NotPlaced(header->frame_id, topic.channel));
+  }
+  return absl::OkStatus();
+}
+
 // Depth, labels and colour are of the left camera unless they say otherwise.
 void ShareLeftCamera(const std::set<std::string>& channels, RigCalibration* rig) {
   const CameraCalibration* left = rig->FindCamera("cam0");
@@ -186,6 +225,9 @@ absl::Status ReadBagCalibration(const Bag& bag, BagPlan* plan) {
   for (const BagTopic& topic : plan->topics) {
     if (topic.use == TopicUse::kCloud) {
       DSG_RETURN_IF_ERROR(AddLidar(bag, topic, &extrinsics, plan));
+    }
+    if (topic.use == TopicUse::kImu) {
+      DSG_RETURN_IF_ERROR(AddInertialUnit(bag, topic, &extrinsics, plan));
     }
     if (topic.use != TopicUse::kImage && topic.use != TopicUse::kCompressedImage) continue;
     channels.insert(topic.channel);

@@ -8,7 +8,9 @@
 
 namespace dsg::ingest {
 
-/// Fills in the rig of `plan` for its image channels, with notes for those without calibration.
+/// Fills in the rig of `plan` for its image channels, with notes for those without calibration, for
+/// its lidar, and for its inertial unit: where it sits and how often it measures. Of the unit's
+/// noise a bag says nothing; its densities are 0.
 /// Errors: INVALID_ARGUMENT/FILE_MALFORMED naming the topic and what is wrong.
 absl::Status ReadBagCalibration(const Bag& bag, BagPlan* plan);
 

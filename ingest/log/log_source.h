@@ -126,7 +126,7 @@ enum class PoseSource {
   kGroundTruth,
   /// Estimated by other software, in the log or in LogOptions::pose_file.
   kExternal,
-  /// None of the log's: they are estimated from its images and its inertial unit.
+  /// None of the log's: they are estimated from its images, and its inertial unit if any.
   kOdometry,
 };
 

@@ -2,6 +2,7 @@
 #include "ingest/pipeline/log_eye.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -29,7 +30,7 @@ absl::StatusOr<LogEye> MakeLogEye(const LogInfo& info, const StereoMatchOptions&
                                   "depth (depth0); leave it out"),
                      {{"field", flag}});
   }
-  LogEye eye{left->name, other->name, nullptr};
+  LogEye eye{left->name, other->name, is_pair, nullptr};
   DSG_ASSIGN_OR_RETURN(eye.eye, is_pair ? MakeStereoEye(*left, *other, options)
                                         : MakeDepthEye(*left, *other, options));
   return eye;
@@ -50,7 +51,36 @@ void ImagePairing::Add(const Measurement& measurement) {
   if (is_label) pair.label = *image;
 }
 
+std::deque<PairedImages>::iterator ImagePairing::PartnerOf(const PairedImages& images) {
+  auto best = waiting_.end();
+  TimeNs best_ns = apart_ns_max_ + 1;
+  for (auto other = waiting_.begin(); other != waiting_.end(); ++other) {
+    const bool fits = other->left.has_value() != images.left.has_value() &&
+                      other->other.has_value() != images.other.has_value();
+    const TimeNs apart_ns = std::abs(other->time_ns - images.time_ns);
+    if (!fits || apart_ns >= best_ns) continue;
+    best = other;
+    best_ns = apart_ns;
+  }
+  return best;
+}
+
 PairedImages ImagePairing::Take() {
+  const bool is_half = waiting_.front().left.has_value() != waiting_.front().other.has_value();
+  if (apart_ns_max_ > 0 && is_half) {
+    const auto partner = PartnerOf(waiting_.front());
+    if (partner != waiting_.end() && PartnerOf(*partner) == waiting_.begin()) {
+      PairedImages& front = waiting_.front();
+      if (partner->left.has_value()) {
+        front.left = std::move(partner->left);
+        front.time_ns = partner->time_ns;
+      } else {
+        front.other = std::move(partner->other);
+      }
+      if (!front.label.has_value()) front.label = std::move(partner->label);
+      waiting_.erase(partner);
+    }
+  }
   PairedImages front = std::move(waiting_.front());
   waiting_.pop_front();
   return front;

@@ -17,6 +17,8 @@ namespace dsg::ingest {
 struct LogEye {
   std::string left;
   std::string other;
+  /// Two cameras, not one with depth.
+  bool is_pair = false;
   std::unique_ptr<OdometryEye> eye;
 };
 
@@ -25,8 +27,9 @@ struct LogEye {
 absl::StatusOr<LogEye> MakeLogEye(const LogInfo& info, const StereoMatchOptions& options,
                                   const std::string& flag);
 
-/// The images of one stamp.
+/// The images of one moment.
 struct PairedImages {
+  /// Of the left one; of the other, or of labels, where there is no left one.
   TimeNs time_ns = 0;
   std::optional<ImageMeasurement> left;
   std::optional<ImageMeasurement> other;
@@ -35,16 +38,21 @@ struct PairedImages {
   bool is_whole() const { return left.has_value() && other.has_value(); }
 };
 
-/// Gathers the images of a log by stamp. Threads: one caller at a time.
+/// Gathers the images of a log by stamp: equal ones, or those that are nearest to each other and at
+/// most `apart_ns_max` apart. Threads: one caller at a time.
 class ImagePairing {
  public:
-  ImagePairing(std::string left, std::string other, bool with_labels)
-      : left_(std::move(left)), other_(std::move(other)), with_labels_(with_labels) {}
+  ImagePairing(std::string left, std::string other, bool with_labels, TimeNs apart_ns_max = 0)
+      : left_(std::move(left)),
+        other_(std::move(other)),
+        with_labels_(with_labels),
+        apart_ns_max_(apart_ns_max) {}
 
   /// Whatever the log gives next.
   void Add(const Measurement& measurement);
-  /// What has this stamp may still come, but for the end of the log.
-  bool IsOpen(TimeNs time_ns) const { return now_ns_ <= time_ns; }
+  /// What belongs to an image of this stamp may still come, but for the end of the log: its
+  /// partner, or a nearer one of its partner.
+  bool IsOpen(TimeNs time_ns) const { return now_ns_ <= time_ns + 2 * apart_ns_max_; }
 
   /// The latest stamp so far.
   TimeNs now_ns() const { return now_ns_; }
@@ -53,9 +61,13 @@ class ImagePairing {
   PairedImages Take();
 
  private:
+  // The nearest of those waiting that has what `images` lacks; past the end if none is near enough.
+  std::deque<PairedImages>::iterator PartnerOf(const PairedImages& images);
+
   std::string left_;
   std::string other_;
   bool with_labels_;
+  TimeNs apart_ns_max_;
   TimeNs now_ns_ = kTimeMin;
   std::deque<PairedImages> waiting_;
 };

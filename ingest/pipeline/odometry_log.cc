@@ -11,25 +11,18 @@
 #include "absl/strings/str_cat.h"
 #include "ingest/log/file_bytes.h"
 #include "ingest/log/sensor_log.h"
+#include "ingest/odometry/estimator/odometry.h"
 #include "ingest/odometry/estimator/visual_inertial_odometry.h"
+#include "ingest/odometry/estimator/visual_odometry.h"
 #include "ingest/pipeline/log_eye.h"
 #include "ingest/pipeline/map_things.h"
+#include "ingest/sensor/depth_frame.h"
 #include "schema/base/status.h"
-#include "schema/model/rotation.h"
 
 namespace dsg::ingest {
 namespace {
 
-// The covariance of the body from that of the unit, which sits elsewhere on it.
-Covariance6 BodyCovariance(const OdometryPose& pose, const Pose3d& imu_T_body) {
-  const Eigen::Matrix3d map_R_imu = pose.state.map_T_imu.orientation.toRotationMatrix();
-  const Eigen::Vector3d lever = map_R_imu * imu_T_body.position;
-  Eigen::Matrix<double, 6, 6> by_imu = Eigen::Matrix<double, 6, 6>::Zero();
-  by_imu.topLeftCorner<3, 3>().setIdentity();
-  by_imu.topRightCorner<3, 3>() = -CrossMatrix(lever) * map_R_imu;
-  by_imu.bottomRightCorner<3, 3>() = imu_T_body.orientation.conjugate().toRotationMatrix();
-  const Eigen::Matrix<double, 6, 6> whole =
-      by_imu * pose.covariance.topLeftCorner<6, 6>() * by_imu.transpose();
+Covariance6 PackedCovariance(const Matrix6d& whole) {
   Covariance6 covariance;
   size_t index = 0;
   for (Eigen::Index row = 0; row < 6; ++row) {
@@ -40,23 +33,54 @@ Covariance6 BodyCovariance(const OdometryPose& pose, const Pose3d& imu_T_body) {
   return covariance;
 }
 
+std::string StartsText(const OdometryCounts& counts) {
+  if (counts.starts_by_images > 0) return absl::StrCat(counts.starts_by_images, " starts");
+  return absl::StrCat(counts.starts_at_rest, " starts at rest and ", counts.starts_in_motion,
+                      " in motion");
+}
+
+// The direction that points up, told by the depth of an image, if the body has the attitude
+// `map_R_body`; nullopt when in doubt.
+std::optional<Eigen::Vector3d> UpIn(const OdometryFrame& frame, const StereoCamera& camera,
+                                    const Eigen::Quaterniond& map_R_body,
+                                    const GravityOptions& options) {
+  std::vector<Eigen::Vector2d> pixels;
+  for (int v = 0; v < camera.left.height; ++v) {
+    for (int u = 0; u < camera.left.width; ++u) pixels.emplace_back(u, v);
+  }
+  const auto disparities = frame.disparities(frame.left, pixels);
+  if (!disparities.ok()) return std::nullopt;
+  DepthFrame depth;
+  depth.time_ns = frame.time_ns;
+  depth.camera = camera.left;
+  depth.map_T_camera.orientation = map_R_body * camera.left.body_T_camera.orientation;
+  for (const std::optional<double>& disparity_px : *disparities) {
+    const double scale = camera.left.fx * camera.baseline_m;
+    depth.depth_m.push_back(disparity_px.has_value() ? static_cast<float>(scale / *disparity_px)
+                                                     : 0.0f);
+  }
+  return EstimateUp({std::move(depth)}, options);
+}
+
 // A log comes in the order of time. Where samples are missing for longer, none will come, and the
 // images must not wait for them in memory.
 constexpr TimeNs kWaitNs = 2 * kNsPerSecond;
 
 class OdometryLog : public LogSource {
  public:
-  OdometryLog(std::unique_ptr<LogSource> log, LogEye eye, VisualInertialOdometry odometry,
-              LogInfo info, std::string robot_name, bool is_masked)
+  OdometryLog(std::unique_ptr<LogSource> log, LogEye eye, std::unique_ptr<Odometry> odometry,
+              LogInfo info, std::string robot_name, const OdometryLogOptions& options)
       : log_(std::move(log)),
         eye_(std::move(eye)),
-        images_(eye_.left, eye_.other, is_masked),
+        images_(eye_.left, eye_.other, options.is_masked,
+                eye_.is_pair ? 0 : options.odometry.visual.apart_ns_max),
         odometry_(std::move(odometry)),
         info_(std::move(info)),
         note_count_(log_->info().notes.size()),
         robot_name_(std::move(robot_name)),
-        imu_T_body_(info_.rig.imu->body_T_imu.Inverse()) {
-    if (is_masked) moving_classes_ = DynamicClasses(info_.labels);
+        gravity_(options.gravity),
+        needs_up_(!info_.used_channels.contains("imu0")) {
+    if (options.is_masked) moving_classes_ = DynamicClasses(info_.labels);
     std::sort(moving_classes_.begin(), moving_classes_.end());
   }
 
@@ -83,14 +107,14 @@ class OdometryLog : public LogSource {
   void Note(const Measurement& measurement) {
     images_.Add(measurement);
     if (const auto* sample = std::get_if<ImuMeasurement>(&measurement)) {
-      odometry_.AddSample(*sample);
+      odometry_->AddSample(*sample);
     }
   }
 
   absl::Status PlaceFrames() {
     while (!images_.empty()) {
       const TimeNs time_ns = images_.front_ns();
-      const bool is_awaited = !odometry_.Covers(time_ns) && images_.now_ns() < time_ns + kWaitNs;
+      const bool is_awaited = !odometry_->Covers(time_ns) && images_.now_ns() < time_ns + kWaitNs;
       if (!is_ended_ && (images_.IsOpen(time_ns) || is_awaited)) break;
       DSG_RETURN_IF_ERROR(Place(images_.Take()));
     }
@@ -102,7 +126,7 @@ class OdometryLog : public LogSource {
       if (pending.left.has_value() || pending.other.has_value()) ++lone_count_;
       return absl::OkStatus();
     }
-    if (!odometry_.Covers(pending.time_ns)) {
+    if (!odometry_->Covers(pending.time_ns)) {
       ++uncovered_count_;
       return absl::OkStatus();
     }
@@ -110,8 +134,11 @@ class OdometryLog : public LogSource {
     absl::StatusOr<OdometryFrame> frame =
         left.ok() ? eye_.eye->FrameOf(pending.time_ns, *left, pending.other->load, MaskOf(pending))
                   : left.status();
+    if (frame.ok()) frame->depth_late_ns = pending.other->time_ns - pending.time_ns;
+    if (frame.ok() && needs_up_) StartUpright(*frame);
     absl::StatusOr<std::vector<OdometryPose>> poses =
-        frame.ok() ? odometry_.AddFrame(*frame) : frame.status();
+        frame.ok() ? odometry_->AddFrame(*frame) : frame.status();
+    needs_up_ = needs_up_ && odometry_->counts().starts_by_images == 0;
     // What one image does to be refused another one need not: broken files, sizes of their own.
     if (!poses.ok()) {
       ++broken_count_;
@@ -120,6 +147,22 @@ class OdometryLog : public LogSource {
     }
     for (const OdometryPose& pose : *poses) poses_.push_back(MeasurementOf(pose));
     return absl::OkStatus();
+  }
+
+  // A stereo pair would have to be matched at each pixel for it.
+  void StartUpright(const OdometryFrame& frame) {
+    const StereoCamera& camera = eye_.eye->camera();
+    const Eigen::Quaterniond level = LevelAttitude(camera);
+    const std::optional<Eigen::Vector3d> up_level =
+        camera.has_depth ? UpIn(frame, camera, level, gravity_) : std::nullopt;
+    if (up_level.has_value()) {
+      const auto upright = Eigen::Quaterniond::FromTwoVectors(*up_level, Eigen::Vector3d::UnitZ());
+      odometry_->StartAt(upright * level);
+    }
+    up_note_ = up_level.has_value()
+                   ? "odometry: up is what the first depth image shows"
+                   : "odometry: the first image does not show what is up: the camera is taken for "
+                     "level there; --up says another direction";
   }
 
   std::vector<uint8_t> MaskOf(const PairedImages& pending) const {
@@ -133,9 +176,9 @@ class OdometryLog : public LogSource {
     measurement.agent_name = robot_name_;
     measurement.agent_kind = kinds::kRobot;
     measurement.pose.time_ns = pose.time_ns;
-    measurement.pose.map_T_agent = pose.state.map_T_imu * imu_T_body_;
+    measurement.pose.map_T_agent = pose.map_T_body;
     measurement.pose.covariance =
-        std::make_shared<const Covariance6>(BodyCovariance(pose, imu_T_body_));
+        std::make_shared<const Covariance6>(PackedCovariance(pose.covariance));
     return measurement;
   }
 
@@ -155,18 +198,17 @@ class OdometryLog : public LogSource {
 
   TimeNs FrontierNs() const {
     const TimeNs pending_ns = images_.empty() ? kTimeMax : images_.front_ns();
-    return std::min(pending_ns, odometry_.waits_from_ns());
+    return std::min(pending_ns, odometry_->waits_from_ns());
   }
 
   // What only the end of a log tells.
   void AddLateNotes() {
     const std::vector<std::string>& notes = log_->info().notes;
     for (; note_count_ < notes.size(); ++note_count_) info_.notes.push_back(notes[note_count_]);
-    const OdometryCounts& counts = odometry_.counts();
+    const OdometryCounts& counts = odometry_->counts();
     std::string note =
         absl::StrCat("odometry: poses of ", counts.frames - counts.unplaced, " of ", counts.frames,
-                     " images, ", counts.keyframes, " keyframes, ", counts.starts_at_rest,
-                     " starts at rest and ", counts.starts_in_motion, " in motion");
+                     " images, ", counts.keyframes, " keyframes, ", StartsText(counts));
     for (const auto& [reason, count] : counts.losses) {
       absl::StrAppend(&note, ", lost ", count, " times (", reason, ")");
     }
@@ -176,10 +218,11 @@ class OdometryLog : public LogSource {
       if (!counts.gyro_fault.empty()) absl::StrAppend(&note, "; ", counts.gyro_fault);
     }
     info_.notes.push_back(note);
+    if (!up_note_.empty()) info_.notes.push_back(up_note_);
     if (lone_count_ > 0) {
       info_.notes.push_back(absl::StrCat("odometry: ", lone_count_, " images of ", eye_.left,
-                                         " and ", eye_.other,
-                                         " have no partner of the same stamp"));
+                                         " and ", eye_.other, " have no partner of the same stamp",
+                                         eye_.is_pair ? "" : " or near it"));
     }
     if (uncovered_count_ > 0) {
       info_.notes.push_back(absl::StrCat("odometry: ", uncovered_count_,
@@ -194,12 +237,15 @@ class OdometryLog : public LogSource {
   std::unique_ptr<LogSource> log_;
   const LogEye eye_;
   ImagePairing images_;
-  VisualInertialOdometry odometry_;
+  std::unique_ptr<Odometry> odometry_;
   LogInfo info_;
   /// Of the log's own, those that `info_` has.
   size_t note_count_;
   const std::string robot_name_;
-  const Pose3d imu_T_body_;
+  const GravityOptions gravity_;
+  // The odometry has not started yet, and nothing else tells what is up.
+  bool needs_up_;
+  std::string up_note_;
   std::vector<int32_t> moving_classes_;
   bool is_ended_ = false;
   std::deque<PoseMeasurement> poses_;
@@ -210,41 +256,76 @@ class OdometryLog : public LogSource {
   std::string first_broken_;
 };
 
+// What the calibration says nothing of is that of a consumer unit.
+void FillNoise(const OdometryUnitOptions& usual, ImuCalibration* imu,
+               std::vector<std::string>* notes) {
+  bool is_filled = false;
+  const auto fill = [&](double* value, double usual_value) {
+    if (*value != 0.0) return;
+    *value = usual_value;
+    is_filled = true;
+  };
+  fill(&imu->gyro_noise_density, usual.gyro_noise_density);
+  fill(&imu->gyro_random_walk, usual.gyro_random_walk);
+  fill(&imu->accel_noise_density, usual.accel_noise_density);
+  fill(&imu->accel_random_walk, usual.accel_random_walk);
+  if (!is_filled) return;
+  notes->push_back(absl::StrCat(
+      "odometry: the log does not tell all noise of ", imu->name,
+      ": taken for a consumer unit's; give --odometry-unit-gyro, -gyro-walk, -accel and "
+      "-accel-walk if you know better"));
+}
+
+// With an inertial unit if the log has one, and says in `info` what it uses.
+absl::StatusOr<std::unique_ptr<Odometry>> MakeOdometry(const LogEye& eye,
+                                                       const OdometryLogOptions& options,
+                                                       LogInfo* info) {
+  info->used_channels.insert({eye.left, eye.other});
+  const bool has_samples = info->channel_counts.contains("imu0");
+  if (options.is_inertial && has_samples && info->rig.imu.has_value()) {
+    info->used_channels.insert("imu0");
+    ImuCalibration imu = *info->rig.imu;
+    FillNoise(options.odometry.unit, &imu, &info->notes);
+    info->notes.push_back(
+        absl::StrCat("the poses are estimated from ", eye.left, ", ", eye.other, " and imu0"));
+    DSG_ASSIGN_OR_RETURN(VisualInertialOdometry odometry,
+                         VisualInertialOdometry::Make(eye.eye->camera(), imu, options.odometry));
+    return std::make_unique<VisualInertialOdometry>(std::move(odometry));
+  }
+  if (options.is_inertial && has_samples) {
+    info->notes.push_back("odometry: imu0 has no calibration and is not used");
+  }
+  info->notes.push_back(
+      absl::StrCat("the poses are estimated from ", eye.left, " and ", eye.other, " alone"));
+  DSG_ASSIGN_OR_RETURN(VisualOdometry odometry,
+                       VisualOdometry::Make(eye.eye->camera(), options.odometry));
+  return std::make_unique<VisualOdometry>(std::move(odometry));
+}
+
 }  // namespace
 
 std::string OdometryLogOptions::Digest() const {
   static constexpr const char* kNames[] = {"5pt", "2pt", "dvio"};
   return absl::StrCat("odometry=", kNames[static_cast<size_t>(odometry.method)],
-                      is_masked ? " masked" : "", "\n", DigestOptions(odometry));
+                      is_masked ? " masked" : "", is_inertial ? "" : " by images", "\n",
+                      DigestOptions(odometry), DigestOptions(gravity));
 }
 
 absl::StatusOr<std::unique_ptr<LogSource>> EstimatePoses(std::unique_ptr<LogSource> log,
                                                          const LogOptions& log_options,
                                                          const OdometryLogOptions& options) {
   LogInfo info = log->info();
-  if (!info.rig.imu.has_value() || !info.channel_counts.contains("imu0")) {
-    return MakeError(Reason::kFieldInvalid,
-                     absl::StrCat("--poses vio: ", info.path,
-                                  " has no inertial unit with a calibration; give --poses gt or "
-                                  "external, or a --pose-file"),
-                     {{"field", "poses"}, {"value", "vio"}});
-  }
   DSG_ASSIGN_OR_RETURN(LogEye eye,
                        MakeLogEye(info, options.odometry.frontend.stereo, "--poses vio"));
-  DSG_ASSIGN_OR_RETURN(
-      VisualInertialOdometry odometry,
-      VisualInertialOdometry::Make(eye.eye->camera(), *info.rig.imu, options.odometry));
+  DSG_ASSIGN_OR_RETURN(std::unique_ptr<Odometry> odometry, MakeOdometry(eye, options, &info));
   const int64_t count = info.channel_counts[eye.left];
   if (info.measurement_count > 0) {
     info.measurement_count += count - info.channel_counts["poses"];
   }
   info.channel_counts["poses"] = count;
-  info.used_channels.insert({eye.left, eye.other, "imu0"});
   info.content_sha256 = Sha256Hex(absl::StrCat(info.content_sha256, "\n", options.Digest(), "\n"));
-  info.notes.push_back(
-      absl::StrCat("the poses are estimated from ", eye.left, ", ", eye.other, " and imu0"));
   return std::make_unique<OdometryLog>(std::move(log), std::move(eye), std::move(odometry),
-                                       std::move(info), RobotName(log_options), options.is_masked);
+                                       std::move(info), RobotName(log_options), options);
 }
 
 }  // namespace dsg::ingest

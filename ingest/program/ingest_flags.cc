@@ -29,7 +29,7 @@ void AddRobotFlags(CLI::App* app, IngestFlags* flags) {
          "--poses", flags->poses,
          "Whose poses of the robot a sensor log is taken with: gt (its ground truth), "
          "external (other software's), auto (external if there are some) or vio (estimated "
-         "from its images and its inertial unit)")
+         "from its images, and its inertial unit if it has one)")
       ->check(CLI::IsMember({"auto", "gt", "external", "vio"}))
       ->capture_default_str();
   app->add_option("--pose-file", flags->pose_file,

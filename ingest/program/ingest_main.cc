@@ -271,12 +271,19 @@ absl::Status IngestOne(const IngestFlags& flags, const std::string& path, LogOpt
       DSG_ASSIGN_OR_RETURN(log, OpenShown(flags, path, options));
     }
     std::string note;
-    DSG_ASSIGN_OR_RETURN(
-        log, TurnUpright(std::move(log), path, options, flags.up, ingest_options.upright, &note));
+    // Poses that are estimated stand upright as far as anybody knows, unless the user does.
+    const bool is_estimated = additions.odometry.has_value();
+    const auto turn = [&]() -> absl::Status {
+      DSG_ASSIGN_OR_RETURN(
+          log, TurnUpright(std::move(log), path, options, flags.up, ingest_options.upright, &note));
+      return absl::OkStatus();
+    };
+    if (!is_estimated) DSG_RETURN_IF_ERROR(turn());
+    DSG_ASSIGN_OR_RETURN(log, WithAdditions(std::move(log), options, additions));
+    if (is_estimated && flags.up != "auto") DSG_RETURN_IF_ERROR(turn());
     if (!flags.is_quiet && !note.empty() && tries == 0) {
       std::fprintf(stderr, "%s: note: %s\n", path.c_str(), note.c_str());
     }
-    DSG_ASSIGN_OR_RETURN(log, WithAdditions(std::move(log), options, additions));
     told_count = TellNotes(flags, path, log->info(), told_count);
     DSG_ASSIGN_OR_RETURN(const std::unique_ptr<MapView> view, (*destination)->View());
     Progress progress(std::filesystem::path(path).filename().string(),
@@ -318,6 +325,7 @@ absl::Status Run(const IngestFlags& flags) {
   Additions additions;
   DSG_ASSIGN_OR_RETURN(additions.odometry,
                        MakeOdometryOptions(flags.odometry, flags.poses == "vio"));
+  if (additions.odometry.has_value()) additions.odometry->gravity = ingest_options.upright.gravity;
   additions.recognition = MakeRecognitionOptions(flags.odometry);
   DSG_ASSIGN_OR_RETURN(additions.segmentation, MakeSegmentation(flags.segmenter));
   std::unique_ptr<Destination> destination;

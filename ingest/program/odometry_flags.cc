@@ -23,6 +23,12 @@ void AddOdometryFlags(CLI::App* app, OdometryFlags* flags) {
       ->check(CLI::IsMember({"on", "off"}))
       ->capture_default_str()
       ->group(group);
+  app->add_option("--odometry-inertial", flags->inertial,
+                  "Whether the inertial unit is used where the log has one; without it the poses "
+                  "are those of images alone, and no --odometry method: on, off")
+      ->check(CLI::IsMember({"on", "off"}))
+      ->capture_default_str()
+      ->group(group);
   app->add_flag("--recognize", flags->is_recognizing,
                 "Look for places seen before in the images of a sensor log, and correct the map by "
                 "the loop closures found")
@@ -38,12 +44,14 @@ absl::StatusOr<std::optional<OdometryLogOptions>> MakeOdometryOptions(const Odom
   if (!is_on) {
     if (flags.method != defaults.method) return NeedsOther("odometry", "poses vio");
     if (flags.masks != defaults.masks) return NeedsOther("odometry-masks", "poses vio");
+    if (flags.inertial != defaults.inertial) return NeedsOther("odometry-inertial", "poses vio");
     return std::nullopt;
   }
   OdometryLogOptions options;
   options.odometry = flags.numbers;
   DSG_ASSIGN_OR_RETURN(options.odometry.method, ParseOdometryMethod(flags.method));
   options.is_masked = flags.masks == "on";
+  options.is_inertial = flags.inertial == "on";
   return options;
 }
 

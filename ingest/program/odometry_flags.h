@@ -18,6 +18,7 @@ namespace dsg::ingest {
 struct OdometryFlags {
   std::string method = "dvio";
   std::string masks = "on";
+  std::string inertial = "on";
   /// Numbers alone; the rest is not used.
   OdometryOptions numbers;
   bool is_recognizing = false;

@@ -14,6 +14,7 @@ class Manifold;
 namespace dsg::ingest {
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 /// Numbers of a block: position in metres, then the quaternion x, y, z, w.
 inline constexpr int kPoseBlockSize = 7;

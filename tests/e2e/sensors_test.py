@@ -131,9 +131,8 @@ class Sensors(support.ProgramsTest):
                      "--poses", "vio", "--pose-file", "x", "sim/log")
         self.refused(2, ["odometry", "vio"], "dsg-ingest", "--store", "s", "--map", "m",
                      "--odometry", "5pt", "sim/log")
-        # The bag says nothing of the noise of its inertial unit.
-        self.refused(2, ["vio", "inertial"], "dsg-ingest", "--store", "s", "--map", "m", "--poses",
-                     "vio", "sim/log.bag")
+        self.refused(2, ["odometry-inertial", "vio"], "dsg-ingest", "--store", "s", "--map", "m",
+                     "--odometry-inertial", "off", "sim/log")
 
     def test_poses_are_estimated_from_images_and_inertial_samples(self):
         command = ["dsg-ingest", "--store", "own", "--map", "home", "--poses", "vio", "--recognize",
@@ -148,6 +147,20 @@ class Sensors(support.ProgramsTest):
         # Other methods are other sessions, and other maps.
         self.assertNotIn("nothing new", self.ok(*command[:4], "two", *command[5:], "--odometry",
                                                 "2pt"))
+
+    def test_a_bag_that_tells_no_noise_gets_poses_all_the_same(self):
+        self.estimates("own-bag", "sim/log.bag")
+
+    def test_poses_are_estimated_from_images_alone(self):
+        self.estimates("own-eye", "--odometry-inertial", "off", "sim/log")
+
+    def estimates(self, store, *log):
+        said = self.ok("dsg-ingest", "--store", store, "--map", "home", "--poses", "vio",
+                       "--no-layers", *log)
+        self.assertRegex(said, r" [1-9]\d* poses, ")
+        score = json.loads(self.ok("dsg-eval", "--store", store, "--map", "home", "--truth",
+                                   "sim/truth", "--trajectory", "--json"))
+        self.assertLess(score["tracks"]["causal"]["ate"]["max_m"], 0.1)
 
 
 if __name__ == "__main__":

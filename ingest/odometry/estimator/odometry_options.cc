@@ -45,7 +45,39 @@ constexpr OptionField<OdometryStartOptions> kStartFields[] = {
      "How fast it turns while its gyroscope says nothing, radians / second"},
 };
 
+constexpr OptionField<OdometryVisualOptions> kVisualFields[] = {
+    {"odometry-visual-levels", &OdometryVisualOptions::level_count, 1, 10,
+     "Without an inertial unit: sizes of the image, each half of the one before, that features are "
+     "sought in: turns of 10 degrees between two images are found"},
+    {"odometry-visual-lead", &OdometryVisualOptions::lead_ns_max, 0.0, 10.0,
+     "... the last turn is expected to go on into an image that comes so soon, seconds: a hand "
+     "turns another way within less than a second"},
+    {"odometry-visual-inlier", &OdometryVisualOptions::inlier_px, 0.1, 50.0,
+     "... a landmark agrees with a pose that misses it by this at most, pixels: three standard "
+     "deviations of a feature's place"},
+    {"odometry-visual-blind", &OdometryVisualOptions::blind_ns_max, 0.0, 60.0,
+     "... images that tell no pose are passed over for so long, seconds, and the next one is "
+     "compared with the last that did: a hand before the lens is gone by then"},
+    {"odometry-visual-depth", &OdometryVisualOptions::depth_sigma_m, 1e-5, 1.0,
+     "... standard deviation of a depth camera's depth at one metre, metres; it grows with the "
+     "square: three times a Kinect's, since colour and depth are not taken at one time"},
+    {"odometry-visual-apart", &OdometryVisualOptions::apart_ns_max, 0.0, 1.0,
+     "... images and depth images this far apart at most belong together, seconds: TUM's own "
+     "tools take 0.02"},
+};
+
 constexpr OptionField<OdometryUnitOptions> kUnitFields[] = {
+    {"odometry-unit-gyro", &OdometryUnitOptions::gyro_noise_density, 1e-7, 1.0,
+     "Noise density of a gyroscope of which the log says none (bags), radians / second / sqrt(Hz): "
+     "0.017 degrees, a consumer unit's (BMI055: 0.014)"},
+    {"odometry-unit-gyro-walk", &OdometryUnitOptions::gyro_random_walk, 1e-9, 1.0,
+     "The same of the random walk of its bias, radians / second^2 / sqrt(Hz): 0.1 degrees / second "
+     "in an hour"},
+    {"odometry-unit-accel", &OdometryUnitOptions::accel_noise_density, 1e-6, 10.0,
+     "The same of an accelerometer, metres / second^2 / sqrt(Hz): 400 micro-g, a consumer unit's "
+     "(MPU-6050)"},
+    {"odometry-unit-accel-walk", &OdometryUnitOptions::accel_random_walk, 1e-8, 10.0,
+     "The same of the random walk of its bias, metres / second^3 / sqrt(Hz): that of EuRoC's unit"},
     {"odometry-gyro-noise", &OdometryUnitOptions::gyro_noise_factor, 0.1, 1000.0,
      "Noise of the gyroscope in units of its data sheet's: 1 if the calibration is that of the "
      "mounted unit"},
@@ -80,6 +112,7 @@ std::vector<BoundOption> OdometryOptions::Bind() {
   BindFields<OdometryKeyframeOptions>(kKeyframeFields, &keyframe, &bound);
   BindFields<OdometryStartOptions>(kStartFields, &start, &bound);
   BindFields<OdometryUnitOptions>(kUnitFields, &unit, &bound);
+  BindFields<OdometryVisualOptions>(kVisualFields, &visual, &bound);
   return bound;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The numbers of visual-inertial odometry.
+// The numbers of odometry, with an inertial unit and without.
 #pragma once
 
 #include <string_view>
@@ -55,8 +55,31 @@ struct OdometryStartOptions {
   double lost_turn_rad_s = 1.0;
 };
 
+/// Of odometry without an inertial unit.
+struct OdometryVisualOptions {
+  /// Sizes of the image in which features are sought, instead of the tracker's: nobody tells the
+  /// rotation.
+  int level_count = 5;
+  /// The last turn is expected to go on into an image that comes so soon, ns.
+  TimeNs lead_ns_max = 100'000'000;
+  /// A landmark agrees with a pose that misses it by this at most, pixels.
+  double inlier_px = 3.0;
+  /// Images that tell no pose are passed over for so long, ns.
+  TimeNs blind_ns_max = kNsPerSecond;
+  /// Standard deviation of a depth camera's depth at one metre, m; it grows with the square.
+  double depth_sigma_m = 0.004;
+  /// Images and depth images this far apart at most belong together, ns.
+  TimeNs apart_ns_max = 20'000'000;
+};
+
 /// Vibration and temperature make a mounted unit noisier than its data sheet says.
 struct OdometryUnitOptions {
+  /// Of a unit of which the log says none: rad/s/sqrt(Hz), rad/s^2/sqrt(Hz), m/s^2/sqrt(Hz),
+  /// m/s^3/sqrt(Hz).
+  double gyro_noise_density = 3e-4;
+  double gyro_random_walk = 3e-5;
+  double accel_noise_density = 4e-3;
+  double accel_random_walk = 3e-3;
   double gyro_noise_factor = 1.0;
   double accel_noise_factor = 1.0;
   /// Covariances are told so many times as large as noise alone makes them: clocks and mountings
@@ -72,6 +95,7 @@ struct OdometryOptions {
   OdometryKeyframeOptions keyframe;
   OdometryStartOptions start;
   OdometryUnitOptions unit;
+  OdometryVisualOptions visual;
 
   std::vector<BoundOption> Bind();
 };

@@ -28,6 +28,8 @@ using SeenFeatures = std::map<int64_t, SeenFeature>;
 struct StereoCamera {
   CameraCalibration left;
   double baseline_m = 0.0;
+  /// There is no right one: disparities are those of measured depth.
+  bool has_depth = false;
 };
 
 /// Features that both have, whose flow between both is that of no point at rest. Empty when no

@@ -111,7 +111,7 @@ class StereoEye : public OdometryEye {
 class DepthEye : public OdometryEye {
  public:
   DepthEye(const CameraCalibration& camera, const StereoMatchOptions& options)
-      : camera_{WithoutDistortion(camera), kDepthBaselineM},
+      : camera_{WithoutDistortion(camera), kDepthBaselineM, /*has_depth=*/true},
         real_(camera),
         options_(options),
         rectifier_(camera_.left, camera),

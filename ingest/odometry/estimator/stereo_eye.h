@@ -9,7 +9,8 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "ingest/odometry/estimator/visual_inertial_odometry.h"
+#include "ingest/odometry/estimator/odometry.h"
+#include "ingest/odometry/estimator/seen_features.h"
 #include "ingest/odometry/frontend/frontend_options.h"
 #include "ingest/sensor/calibration.h"
 #include "ingest/sensor/image.h"

@@ -3,10 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/odometry/estimator/keyframe_sights.h"
 #include "ingest/odometry/estimator/odometry_start.h"
 #include "ingest/odometry/frontend/feature_tracker.h"
 #include "ingest/odometry/inertial/imu_samples.h"
@@ -18,7 +22,6 @@ namespace dsg::ingest {
 namespace {
 
 using Eigen::Quaterniond;
-using Eigen::Vector2d;
 
 ImuCalibration NoisierUnit(ImuCalibration imu, const OdometryUnitOptions& options) {
   imu.gyro_noise_density *= options.gyro_noise_factor;
@@ -26,10 +29,13 @@ ImuCalibration NoisierUnit(ImuCalibration imu, const OdometryUnitOptions& option
   return imu;
 }
 
-absl::Status BadFrame(TimeNs time_ns, const std::string& what) {
-  return MakeError(Reason::kFieldInvalid, absl::StrCat("the image at ", time_ns, " ns ", what),
-                   {{"field", "time_ns"}, {"value", absl::StrCat(time_ns)}});
-}
+// A state of the unit, with what else is known of it.
+struct PlacedState {
+  TimeNs time_ns = 0;
+  InertialState state;
+  Matrix15d covariance = Matrix15d::Zero();
+  bool is_keyframe = false;
+};
 
 }  // namespace
 
@@ -75,11 +81,11 @@ class VisualInertialOdometry::Impl {
                                    frame.mask)
                             .status());
     keyframe_R_now_ = (keyframe_R_now_ * last_R_now).normalized();
-    absl::StatusOr<std::vector<OdometryPose>> poses =
-        is_started_ ? Follow(frame) : Wait(frame, last_R_now);
-    if (!poses.ok()) return poses;
-    if (poses->empty()) ++counts_.unplaced;
-    for (OdometryPose& pose : *poses) pose.covariance *= options_.unit.covariance_factor;
+    DSG_ASSIGN_OR_RETURN(const std::vector<PlacedState> states,
+                         is_started_ ? Follow(frame) : Wait(frame, last_R_now));
+    if (states.empty()) ++counts_.unplaced;
+    std::vector<OdometryPose> poses;
+    for (const PlacedState& state : states) poses.push_back(PoseOf(state));
     return poses;
   }
 
@@ -89,6 +95,16 @@ class VisualInertialOdometry::Impl {
   const OdometryCounts& counts() const { return counts_; }
 
  private:
+  // Of the body, from that of the unit, which sits elsewhere on it.
+  OdometryPose PoseOf(const PlacedState& placed) const {
+    const Pose3d imu_T_body = imu_.body_T_imu.Inverse();
+    const Pose3d& map_T_imu = placed.state.map_T_imu;
+    const Matrix6d covariance = placed.covariance.topLeftCorner<6, 6>();
+    return {placed.time_ns, map_T_imu * imu_T_body,
+            options_.unit.covariance_factor * CovarianceAt(covariance, map_T_imu, imu_T_body),
+            placed.is_keyframe};
+  }
+
   // Of the unit, by the gyroscope; none where its samples say nothing.
   Quaterniond TurnSince(TimeNs from_ns, TimeNs to_ns) {
     const absl::StatusOr<Preintegration> measured = Integrate(from_ns, to_ns);
@@ -105,54 +121,25 @@ class VisualInertialOdometry::Impl {
     return (mount.conjugate() * imu_turn * mount).normalized();
   }
 
-  SeenFeatures FeaturesNow() const {
-    SeenFeatures features;
-    for (const Feature& feature : tracker_.features()) {
-      features[feature.id].pixel = feature.pixel;
-    }
-    return features;
-  }
-
   bool IsKeyframeDue(TimeNs time_ns, TimeNs keyframe_ns, const SeenFeatures& last) const {
     const TimeNs span_ns = time_ns - keyframe_ns;
     if (span_ns < options_.keyframe.period_ns_min) return false;
     if (span_ns >= options_.keyframe.period_ns_max) return true;
-    const SeenFeatures now = FeaturesNow();
-    const auto kept = std::count_if(now.begin(), now.end(),
-                                    [&](const auto& entry) { return last.contains(entry.first); });
-    if (static_cast<double>(kept) <
-        options_.keyframe.share_min * static_cast<double>(last.size())) {
-      return true;
-    }
-    const std::optional<double> parallax_px =
-        ParallaxOf(camera_, last, now, CameraTurn(keyframe_R_now_));
-    return parallax_px.has_value() && *parallax_px >= options_.keyframe.parallax_px;
-  }
-
-  // New features where there are none, and the distances of all.
-  absl::StatusOr<SeenFeatures> SeeKeyframe(const OdometryFrame& frame) {
-    DSG_RETURN_IF_ERROR(tracker_.Detect(frame.mask).status());
-    SeenFeatures features = FeaturesNow();
-    std::vector<Vector2d> pixels;
-    for (const auto& [id, seen] : features) pixels.push_back(seen.pixel);
-    DSG_ASSIGN_OR_RETURN(const std::vector<std::optional<double>> disparities,
-                         frame.disparities(frame.left, pixels));
-    size_t index = 0;
-    for (auto& [id, seen] : features) seen.disparity_px = disparities[index++];
-    return features;
+    return HasMoved(camera_, last, FeaturesOf(tracker_), CameraTurn(keyframe_R_now_),
+                    options_.keyframe);
   }
 
   // --- Before a start.
 
-  absl::StatusOr<std::vector<OdometryPose>> Wait(const OdometryFrame& frame,
-                                                 const Quaterniond& last_R_now) {
+  absl::StatusOr<std::vector<PlacedState>> Wait(const OdometryFrame& frame,
+                                                const Quaterniond& last_R_now) {
     GoOnLost(frame.time_ns, last_R_now);
     if (!has_turn_) start_.Clear();
     early_ns_.push_back(frame.time_ns);
     const bool is_due =
         start_.empty() || frame.time_ns - start_.last_ns() >= options_.keyframe.period_ns_min;
-    if (!is_due) return std::vector<OdometryPose>();
-    DSG_ASSIGN_OR_RETURN(SeenFeatures features, SeeKeyframe(frame));
+    if (!is_due) return std::vector<PlacedState>();
+    DSG_ASSIGN_OR_RETURN(SeenFeatures features, SeeKeyframe(frame, camera_.left, &tracker_));
     start_.Add(frame.time_ns, std::move(features), CameraTurn(keyframe_R_now_));
     keyframe_R_now_ = Quaterniond::Identity();
     std::erase_if(early_ns_, [&](TimeNs time_ns) { return time_ns < start_.first_ns(); });
@@ -161,16 +148,16 @@ class VisualInertialOdometry::Impl {
     if (!begin.ok()) {
       counts_.failed_start = std::string(begin.status().message());
       counts_.gyro_fault = start_.GyroFault();
-      return std::vector<OdometryPose>();
+      return std::vector<PlacedState>();
     }
     return Begin(*std::move(begin));
   }
 
   // The poses of a start in motion are those of all images since its first keyframe.
-  absl::StatusOr<std::vector<OdometryPose>> Begin(OdometryBegin begin) {
+  absl::StatusOr<std::vector<PlacedState>> Begin(OdometryBegin begin) {
     start_.Clear();
     const StartPlace place = place_;
-    std::vector<OdometryPose> poses;
+    std::vector<PlacedState> poses;
     const EarlyKeyframe& first = begin.keyframes.front();
     absl::Status status = window_.Begin(first.time_ns, begin.first, SightsOf(first.features));
     if (status.ok() && TakeNewest()) poses.push_back(NewestPose());
@@ -189,7 +176,7 @@ class VisualInertialOdometry::Impl {
     early_ns_.clear();
     if (poses.empty() || poses.back().time_ns != begin.keyframes.back().time_ns) {
       place_ = place;
-      return std::vector<OdometryPose>();
+      return std::vector<PlacedState>();
     }
     is_started_ = true;
     counts_.unplaced -= std::ssize(poses) - 1;
@@ -219,20 +206,18 @@ class VisualInertialOdometry::Impl {
 
   // --- After it.
 
-  absl::StatusOr<std::vector<OdometryPose>> Follow(const OdometryFrame& frame) {
+  absl::StatusOr<std::vector<PlacedState>> Follow(const OdometryFrame& frame) {
     absl::StatusOr<Preintegration> measured = Integrate(window_.newest_ns(), frame.time_ns);
     if (!measured.ok()) return Lose("inertial gap");
-    const OdometryPose pose = PoseAfter(*measured);
+    const PlacedState pose = PoseAfter(*measured);
     if (!IsKeyframeDue(frame.time_ns, window_.newest_ns(), last_features_)) {
-      return std::vector<OdometryPose>{pose};
+      return std::vector<PlacedState>{pose};
     }
     DropOutliers();
-    DSG_ASSIGN_OR_RETURN(SeenFeatures features, SeeKeyframe(frame));
+    DSG_ASSIGN_OR_RETURN(SeenFeatures features, SeeKeyframe(frame, camera_.left, &tracker_));
     CheckDistances(&features);
-    const auto old_count = std::count_if(features.begin(), features.end(), [&](const auto& entry) {
-      return last_features_.contains(entry.first);
-    });
-    if (old_count >= options_.keyframe.sight_count_min) last_seen_ns_ = frame.time_ns;
+    if (SharedCount(last_features_, features) >= options_.keyframe.sight_count_min)
+      last_seen_ns_ = frame.time_ns;
     if (frame.time_ns - last_seen_ns_ > options_.keyframe.blind_ns_max) {
       // The last pose is still told: the unit has led up to it.
       place_ = {pose.state.map_T_imu, pose.covariance, false};
@@ -248,12 +233,13 @@ class VisualInertialOdometry::Impl {
     last_features_ = std::move(features);
     keyframe_R_now_ = Quaterniond::Identity();
     ForgetSamples(frame.time_ns);
-    return std::vector<OdometryPose>{NewestPose()};
+    return std::vector<PlacedState>{NewestPose()};
   }
 
   void DropOutliers() {
-    tracker_.Drop(MonoOutliers(camera_, last_features_, FeaturesNow(), CameraTurn(keyframe_R_now_),
-                               options_.method, options_.frontend.relative_pose));
+    tracker_.Drop(MonoOutliers(camera_, last_features_, FeaturesOf(tracker_),
+                               CameraTurn(keyframe_R_now_), options_.method,
+                               options_.frontend.relative_pose));
   }
 
   // A distance that disagrees is not believed; the place in the image was checked before.
@@ -262,14 +248,6 @@ class VisualInertialOdometry::Impl {
         StereoMotionOf(camera_, last_features_, *features, CameraTurn(keyframe_R_now_),
                        options_.method, options_.frontend.relative_pose);
     for (const int64_t id : motion.outliers) (*features)[id].disparity_px.reset();
-  }
-
-  static std::vector<FeatureSight> SightsOf(const SeenFeatures& features) {
-    std::vector<FeatureSight> sights;
-    for (const auto& [id, seen] : features) {
-      sights.push_back({id, {seen.pixel, seen.disparity_px}});
-    }
-    return sights;
   }
 
   // False when nobody can tell how sure it is.
@@ -284,8 +262,8 @@ class VisualInertialOdometry::Impl {
   }
 
   // As the unit leads on from the newest keyframe.
-  OdometryPose PoseAfter(const Preintegration& measured) const {
-    OdometryPose pose;
+  PlacedState PoseAfter(const Preintegration& measured) const {
+    PlacedState pose;
     pose.time_ns = measured.to_ns();
     pose.covariance = newest_covariance_;
     pose.state =
@@ -293,11 +271,11 @@ class VisualInertialOdometry::Impl {
     return pose;
   }
 
-  OdometryPose NewestPose() const {
+  PlacedState NewestPose() const {
     return {window_.newest_ns(), window_.newest(), newest_covariance_, /*is_keyframe=*/true};
   }
 
-  std::vector<OdometryPose> Lose(const std::string& reason) {
+  std::vector<PlacedState> Lose(const std::string& reason) {
     ++counts_.losses[reason];
     is_started_ = false;
     lost_ns_ = last_ns_;

@@ -109,6 +109,7 @@ class FeatureTracker::Impl {
       return BadInput(camera_, "rotation", "not finite", "a unit quaternion");
     }
     std::vector<cv::Mat> pyramid = PyramidOf(image);
+    features_before_ = features_;
     TrackCounts counts;
     if (!features_.empty()) {
       Follow(pyramid, last_R_now.toRotationMatrix(), &counts);
@@ -117,7 +118,7 @@ class FeatureTracker::Impl {
       counts.merged = Merge();
     }
     counts.tracked = static_cast<int>(features_.size());
-    pyramid_ = std::move(pyramid);
+    pyramid_before_ = std::exchange(pyramid_, std::move(pyramid));
     return counts;
   }
 
@@ -150,9 +151,18 @@ class FeatureTracker::Impl {
     });
   }
 
+  void GoBack() {
+    if (pyramid_before_.empty()) return;
+    pyramid_ = std::move(pyramid_before_);
+    features_ = std::move(features_before_);
+    pyramid_before_.clear();
+    features_before_.clear();
+  }
+
   void Reset() {
     features_.clear();
     pyramid_.clear();
+    pyramid_before_.clear();
   }
 
   const std::vector<Feature>& features() const { return features_; }
@@ -308,6 +318,9 @@ class FeatureTracker::Impl {
   // Images and gradients of the last image, by level.
   std::vector<cv::Mat> pyramid_;
   std::vector<Feature> features_;
+  // The same of the image before, for GoBack; no pyramid if there is none.
+  std::vector<cv::Mat> pyramid_before_;
+  std::vector<Feature> features_before_;
   int64_t next_id_ = 0;
 };
 
@@ -343,6 +356,7 @@ absl::StatusOr<int> FeatureTracker::Detect(std::span<const uint8_t> mask) {
 }
 
 void FeatureTracker::Drop(std::span<const int64_t> ids) { impl_->Drop(ids); }
+void FeatureTracker::GoBack() { impl_->GoBack(); }
 void FeatureTracker::Reset() { impl_->Reset(); }
 const std::vector<Feature>& FeatureTracker::features() const { return impl_->features(); }
 

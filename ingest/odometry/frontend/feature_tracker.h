@@ -48,7 +48,7 @@ struct TrackCounts {
 /// A mask has a byte for each pixel of the camera, not 0 where nothing may be followed (what
 /// moves), or is empty. It is grown by `mask_growth_px`.
 ///
-/// Memory: two pyramids, and what the options allow of features. Threads: one caller at a time.
+/// Memory: three pyramids, and what the options allow of features. Threads: one caller at a time.
 /// Source: Shi and Tomasi, 1994; Bouguet, 2000; Hwangbo, Kim and Kanade, 2009 (start from a
 /// rotation).
 class FeatureTracker {
@@ -77,6 +77,10 @@ class FeatureTracker {
 
   /// Drops features that others have found to be wrong; unknown ids are nothing.
   void Drop(std::span<const int64_t> ids);
+  /// Undoes the last Track, and what came after it: features are those of the image before, which
+  /// the next one is compared with. So an image that shows nothing (a hand before the lens) costs
+  /// no features. Once after each Track; nothing happens before the second image.
+  void GoBack();
   /// Forgets the last image and all features; ids go on.
   void Reset();
 

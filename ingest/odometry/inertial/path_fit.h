@@ -13,8 +13,6 @@
 
 namespace dsg::ingest {
 
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
-
 struct PathMeasurements {
   /// At keyframes.
   std::span<const Pose3d> start_T_imu;

@@ -11,6 +11,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -49,25 +50,21 @@ class SlidingWindow::Impl {
     if (!aligned.covariance.allFinite() || root.info() != Eigen::Success) {
       return BadKeyframe(time_ns, "has no covariance that is positive definite");
     }
-    keyframes_.clear();
-    landmarks_.clear();
-    dropped_.clear();
-    AddKeyframe(time_ns, aligned.state, nullptr);
-    StateSlot& slot = slots_[keyframes_.back().slot];
-    LinearPrior prior;
-    prior.blocks = {slot.pose.data(), slot.speed.data(), stereo_error().data()};
-    prior.sizes = {kPoseBlockSize, kSpeedBlockSize, kStereoErrorSize};
-    prior.point.assign(slot.pose.begin(), slot.pose.end());
-    prior.point.insert(prior.point.end(), slot.speed.begin(), slot.speed.end());
-    // What was learnt of the calibration before is not sure: it may have been why one got lost.
-    stereo_error() = {};
-    prior.point.insert(prior.point.end(), stereo_error().begin(), stereo_error().end());
-    prior.jacobian = Eigen::MatrixXd::Zero(17, 17);
-    prior.jacobian.topLeftCorner<15, 15>() = root.matrixL().solve(Matrix15d::Identity());
-    prior.jacobian(15, 15) = 1.0 / options_.disparity_offset_px;
-    prior.jacobian(16, 16) = 1.0 / options_.baseline_share;
-    prior.residual = Eigen::VectorXd::Zero(17);
-    SetPrior(std::move(prior));
+    BeginKeyframes(time_ns, aligned.state, /*has_unit=*/true);
+    SetFirstPrior(root.matrixL().solve(Matrix15d::Identity()));
+    AddSights(sights);
+    Anchor();
+    return absl::OkStatus();
+  }
+
+  absl::Status BeginByImages(TimeNs time_ns, const Pose3d& map_T_imu, const Matrix6d& covariance,
+                             std::span<const FeatureSight> sights) {
+    const Eigen::LLT<Matrix6d> root(covariance);
+    if (!covariance.allFinite() || root.info() != Eigen::Success) {
+      return BadKeyframe(time_ns, "has no covariance that is positive definite");
+    }
+    BeginKeyframes(time_ns, {.map_T_imu = map_T_imu}, /*has_unit=*/false);
+    SetFirstPrior(root.matrixL().solve(Matrix6d::Identity()));
     AddSights(sights);
     Anchor();
     return absl::OkStatus();
@@ -75,24 +72,23 @@ class SlidingWindow::Impl {
 
   absl::Status Add(TimeNs time_ns, Preintegration measured, std::span<const FeatureSight> sights) {
     dropped_.clear();
-    if (keyframes_.empty()) return BadKeyframe(time_ns, "is in no window");
+    if (keyframes_.empty() || !has_unit_) return BadKeyframe(time_ns, "is in no window of a unit");
     if (measured.from_ns() != newest_ns() || measured.to_ns() != time_ns) {
       return BadKeyframe(time_ns, absl::StrCat("has samples from ", measured.from_ns(), " to ",
                                                measured.to_ns(), " ns"));
     }
     const InertialState predicted = measured.Predict(newest(), gravity_map_, nullptr);
     AddKeyframe(time_ns, predicted, std::make_unique<Preintegration>(std::move(measured)));
-    AddSights(sights);
-    Anchor();
-    DropMisfits(kFarMisses);
-    DSG_RETURN_IF_ERROR(Solve());
-    DSG_RETURN_IF_ERROR(Reintegrate());
-    DropMisfits(1.0);
-    if (keyframes_.size() > static_cast<size_t>(options_.keyframe_count)) {
-      DSG_RETURN_IF_ERROR(DropOldest());
-    }
-    ForgetLost();
-    return absl::OkStatus();
+    return Estimate(sights);
+  }
+
+  absl::Status AddByImages(TimeNs time_ns, const Pose3d& guess,
+                           std::span<const FeatureSight> sights) {
+    dropped_.clear();
+    const bool is_next = !keyframes_.empty() && !has_unit_ && time_ns > newest_ns();
+    if (!is_next) return BadKeyframe(time_ns, "is in no window without a unit, or not the next");
+    AddKeyframe(time_ns, {.map_T_imu = guess}, nullptr);
+    return Estimate(sights);
   }
 
   int keyframe_count() const { return static_cast<int>(keyframes_.size()); }
@@ -106,6 +102,25 @@ class SlidingWindow::Impl {
     double* const wanted[] = {slot.pose.data(), slot.speed.data()};
     DSG_ASSIGN_OR_RETURN(const Eigen::MatrixXd covariance, CovarianceOf(list.factors, wanted));
     return Matrix15d(covariance);
+  }
+
+  absl::StatusOr<Matrix6d> NewestPoseCovariance() const {
+    std::vector<LandmarkBlock> blocks;
+    const FactorList list = Factors(&blocks);
+    double* const wanted[] = {slots_[keyframes_.back().slot].pose.data()};
+    DSG_ASSIGN_OR_RETURN(const Eigen::MatrixXd covariance, CovarianceOf(list.factors, wanted));
+    return Matrix6d(covariance);
+  }
+
+  std::optional<Vector3d> PointOf(int64_t feature_id) const {
+    const auto entry = landmarks_.find(feature_id);
+    if (entry == landmarks_.end() || !entry->second.anchor.has_value()) return std::nullopt;
+    const Landmark& landmark = entry->second;
+    // What is infinitely far is a direction.
+    if (!(landmark.block[2] > 0.0)) return std::nullopt;
+    const Vector3d ray(landmark.block[0], landmark.block[1], 1.0);
+    const Pose3d map_T_anchor = PoseOf(*Find(landmark.anchor_keyframe())) * model_.imu_T_camera;
+    return map_T_anchor * (ray / landmark.block[2]);
   }
 
   StereoError& stereo_error() const { return slots_.front().stereo_error; }
@@ -125,7 +140,7 @@ class SlidingWindow::Impl {
     int64_t number = 0;
     TimeNs time_ns = 0;
     size_t slot = 0;
-    /// From the keyframe before; null of the first one.
+    /// From the keyframe before; null of the first one, and of all without a unit.
     std::unique_ptr<Preintegration> measured;
   };
 
@@ -173,6 +188,52 @@ class SlidingWindow::Impl {
     const auto index = static_cast<size_t>(number - keyframes_.front().number);
     return number < keyframes_.front().number || index >= keyframes_.size() ? nullptr
                                                                             : &keyframes_[index];
+  }
+
+  // Forgets all, what was learnt of the calibration, too: it may have been why one got lost.
+  void BeginKeyframes(TimeNs time_ns, const InertialState& state, bool has_unit) {
+    keyframes_.clear();
+    landmarks_.clear();
+    dropped_.clear();
+    has_unit_ = has_unit;
+    stereo_error() = {};
+    AddKeyframe(time_ns, state, nullptr);
+  }
+
+  // Of the first state, by the root of its information, and of the calibration.
+  void SetFirstPrior(const Eigen::MatrixXd& root) {
+    StateSlot& slot = slots_[keyframes_.back().slot];
+    const auto size = root.rows();
+    LinearPrior prior;
+    const auto add = [&](std::span<double> block) {
+      prior.blocks.push_back(block.data());
+      prior.sizes.push_back(static_cast<int>(block.size()));
+      prior.point.insert(prior.point.end(), block.begin(), block.end());
+    };
+    add(slot.pose);
+    if (has_unit_) add(slot.speed);
+    add(stereo_error());
+    prior.jacobian = Eigen::MatrixXd::Zero(size + kStereoErrorSize, size + kStereoErrorSize);
+    prior.jacobian.topLeftCorner(size, size) = root;
+    prior.jacobian(size, size) = 1.0 / options_.disparity_offset_px;
+    prior.jacobian(size + 1, size + 1) = 1.0 / options_.baseline_share;
+    prior.residual = Eigen::VectorXd::Zero(size + kStereoErrorSize);
+    SetPrior(std::move(prior));
+  }
+
+  // With the newest keyframe, which has come without its sights.
+  absl::Status Estimate(std::span<const FeatureSight> sights) {
+    AddSights(sights);
+    Anchor();
+    DropMisfits(kFarMisses);
+    DSG_RETURN_IF_ERROR(Solve());
+    DSG_RETURN_IF_ERROR(Reintegrate());
+    DropMisfits(1.0);
+    if (keyframes_.size() > static_cast<size_t>(options_.keyframe_count)) {
+      DSG_RETURN_IF_ERROR(DropOldest());
+    }
+    ForgetLost();
+    return absl::OkStatus();
   }
 
   // Slots go by turn: where the blocks are in memory, by which Ceres sorts them, follows from the
@@ -292,7 +353,7 @@ class SlidingWindow::Impl {
     }
     FactorList list;
     if (prior_ != nullptr) list.factors.push_back({prior_.get(), nullptr, prior_blocks_});
-    for (size_t i = 1; i < keyframes_.size(); ++i) AddInertial(i, &list);
+    for (size_t i = 1; i < keyframes_.size() && has_unit_; ++i) AddInertial(i, &list);
     size_t index = 0;
     for (const auto& [id, landmark] : landmarks_) {
       if (landmark.tells()) AddSightsOf(landmark, (*blocks)[index++].data(), &list);
@@ -336,8 +397,9 @@ class SlidingWindow::Impl {
     for (const Keyframe& keyframe : keyframes_) {
       StateSlot& slot = slots_[keyframe.slot];
       problem.AddParameterBlock(slot.pose.data(), kPoseBlockSize, manifold_.get());
-      problem.AddParameterBlock(slot.speed.data(), kSpeedBlockSize);
       ordering->AddElementToGroup(slot.pose.data(), 1);
+      if (!has_unit_) continue;
+      problem.AddParameterBlock(slot.speed.data(), kSpeedBlockSize);
       ordering->AddElementToGroup(slot.speed.data(), 1);
     }
     problem.AddParameterBlock(stereo_error().data(), kStereoErrorSize);
@@ -370,7 +432,7 @@ class SlidingWindow::Impl {
   }
 
   absl::Status Reintegrate() {
-    for (size_t i = 1; i < keyframes_.size(); ++i) {
+    for (size_t i = 1; i < keyframes_.size() && has_unit_; ++i) {
       const ImuBias bias = StateOf(keyframes_[i - 1]).bias;
       if (!keyframes_[i].measured->IsFarFrom(bias)) continue;
       DSG_RETURN_IF_ERROR(keyframes_[i].measured->Reintegrate(bias));
@@ -392,7 +454,7 @@ class SlidingWindow::Impl {
     blocks.reserve(landmarks_.size());
     FactorList list;
     if (prior_ != nullptr) list.factors.push_back({prior_.get(), nullptr, prior_blocks_});
-    AddInertial(1, &list);
+    if (has_unit_) AddInertial(1, &list);
     for (const auto& [id, landmark] : landmarks_) {
       if (!landmark.tells() || landmark.anchor_keyframe() != oldest.number) continue;
       blocks.push_back(landmark.block);
@@ -401,7 +463,7 @@ class SlidingWindow::Impl {
     std::vector<double*> dropped = list.landmarks;
     StateSlot& slot = slots_[oldest.slot];
     dropped.push_back(slot.pose.data());
-    dropped.push_back(slot.speed.data());
+    if (has_unit_) dropped.push_back(slot.speed.data());
     DSG_ASSIGN_OR_RETURN(LinearPrior prior, Marginalize(list.factors, dropped, {}));
     SetPrior(std::move(prior));
     std::erase_if(landmarks_, [&](const auto& entry) {
@@ -436,6 +498,8 @@ class SlidingWindow::Impl {
   std::vector<double*> prior_blocks_;
   std::vector<int64_t> dropped_;
   int64_t next_number_ = 0;
+  // Whether states have velocities and biases, and an inertial unit between them.
+  bool has_unit_ = true;
 };
 
 SlidingWindow::SlidingWindow(const StereoModel& model, const Vector3d& gravity_map,
@@ -453,11 +517,26 @@ absl::Status SlidingWindow::Add(TimeNs time_ns, Preintegration measured,
                                 std::span<const FeatureSight> sights) {
   return impl_->Add(time_ns, std::move(measured), sights);
 }
+absl::Status SlidingWindow::BeginByImages(TimeNs time_ns, const Pose3d& map_T_imu,
+                                          const Matrix6d& covariance,
+                                          std::span<const FeatureSight> sights) {
+  return impl_->BeginByImages(time_ns, map_T_imu, covariance, sights);
+}
+absl::Status SlidingWindow::AddByImages(TimeNs time_ns, const Pose3d& guess,
+                                        std::span<const FeatureSight> sights) {
+  return impl_->AddByImages(time_ns, guess, sights);
+}
 int SlidingWindow::keyframe_count() const { return impl_->keyframe_count(); }
 TimeNs SlidingWindow::newest_ns() const { return impl_->newest_ns(); }
 InertialState SlidingWindow::newest() const { return impl_->newest(); }
 absl::StatusOr<Matrix15d> SlidingWindow::NewestCovariance() const {
   return impl_->NewestCovariance();
+}
+absl::StatusOr<Matrix6d> SlidingWindow::NewestPoseCovariance() const {
+  return impl_->NewestPoseCovariance();
+}
+std::optional<Vector3d> SlidingWindow::PointOf(int64_t feature_id) const {
+  return impl_->PointOf(feature_id);
 }
 const StereoError& SlidingWindow::stereo_error() const { return impl_->stereo_error(); }
 const std::vector<int64_t>& SlidingWindow::dropped_features() const { return impl_->dropped(); }

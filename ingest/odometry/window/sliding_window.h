@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The last keyframes of a stereo camera with an inertial unit, estimated together.
+// The last keyframes of a stereo camera, with an inertial unit or without, estimated together.
 #pragma once
 
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "ingest/odometry/inertial/preintegration.h"
 #include "ingest/odometry/window/landmark_factor.h"
 #include "ingest/odometry/window/window_options.h"
+#include "ingest/solver/pose_block.h"
 #include "schema/base/time.h"
 
 namespace dsg::ingest {
@@ -26,13 +28,15 @@ struct FeatureSight {
 
 /// Fixed-lag smoothing: poses, velocities, biases and landmarks of the last keyframes are the least
 /// squares of what the unit and the images measured and of a prior, which is what older keyframes
-/// have left (marginalization.h). The same calls give the same numbers, whatever the number of
-/// threads.
+/// have left (marginalization.h). Without a unit keyframes are poses alone, which their landmarks
+/// tie together; its frame is then that of the body. The same calls give the same numbers, whatever
+/// the number of threads.
 ///
 /// A landmark is eliminated with the keyframe that saw it first. A feature that is followed on
 /// becomes a new landmark, from its next sight on, so that nothing counts twice. What is wrong with
 /// the calibration of the pair is estimated, too: near and far landmarks tell an offset of
-/// disparities, and the unit tells the baseline where it is accelerated.
+/// disparities, and the unit tells the baseline where it is accelerated. Without a unit the
+/// baseline stays what it is said to be.
 ///
 /// Memory: keyframes times their features. Threads: one caller at a time.
 /// Source: RSS 2020, section V-A; Leutenegger and others, IJRR 2015 (fixed lag, marginalised).
@@ -48,6 +52,10 @@ class SlidingWindow {
   /// definite.
   absl::Status Begin(TimeNs time_ns, const AlignedState& aligned,
                      std::span<const FeatureSight> sights);
+  /// The same without a unit; rows of the covariance as in a pose block's step. All keyframes until
+  /// the next Begin are added without one.
+  absl::Status BeginByImages(TimeNs time_ns, const Pose3d& map_T_imu, const Matrix6d& covariance,
+                             std::span<const FeatureSight> sights);
 
   /// A keyframe after the last one; `measured` reaches from that one to this. Solves, drops
   /// landmarks that do not fit, and the oldest keyframe if there are too many.
@@ -55,6 +63,10 @@ class SlidingWindow {
   /// Errors: FIELD_INVALID when times do not fit or numbers are not finite; begin anew then.
   /// Cost: keyframes times features, and the cube of the keyframes.
   absl::Status Add(TimeNs time_ns, Preintegration measured, std::span<const FeatureSight> sights);
+  /// The same without a unit: `guess` is where the solver begins, and says nothing itself. Errors:
+  /// as Add; after Begin.
+  absl::Status AddByImages(TimeNs time_ns, const Pose3d& guess,
+                           std::span<const FeatureSight> sights);
 
   int keyframe_count() const;
   /// Require: Begin.
@@ -63,6 +75,11 @@ class SlidingWindow {
   /// Of the newest state; rows as in a state. Cost: a few milliseconds.
   /// Errors: FIELD_INVALID when it is not finite.
   absl::StatusOr<Matrix15d> NewestCovariance() const;
+  /// The same of the newest pose alone, with a unit or without.
+  absl::StatusOr<Matrix6d> NewestPoseCovariance() const;
+
+  /// Where a feature's landmark is, map; nullopt while its distance is not known.
+  std::optional<Eigen::Vector3d> PointOf(int64_t feature_id) const;
 
   /// Of the pair's calibration, as it is known by now.
   const StereoError& stereo_error() const;

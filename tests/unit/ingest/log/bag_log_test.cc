@@ -110,6 +110,20 @@ TEST(BagLog, TakesCalibrationFromCameraInfoAndStaticTransforms) {
   EXPECT_EQ(rig.FindCamera("depth0")->body_T_camera.position, Eigen::Vector3d(0, 0.05, 0));
 }
 
+TEST(BagLog, SaysWhereTheInertialUnitSitsAndHowOftenItMeasures) {
+  const TempFolder folder;
+  const auto log = OpenLog(folder.Write("log.bag", FullBag().Finish()), {});
+  ASSERT_TRUE(log.ok()) << log.status();
+  ASSERT_TRUE((*log)->info().rig.imu.has_value());
+  const ImuCalibration& imu = *(*log)->info().rig.imu;
+  EXPECT_EQ(imu.name, "imu0");
+  // Two messages, 50 ms apart.
+  EXPECT_NEAR(imu.rate_hz, 20.0, 1e-9);
+  EXPECT_EQ(imu.body_T_imu.position, Eigen::Vector3d(0, 0, 0));
+  EXPECT_EQ(imu.gyro_noise_density, 0.0);
+  EXPECT_TRUE(imu.Validate().ok());
+}
+
 TEST(BagLog, PrefersLabelImagesWithInstances) {
   const TempFolder folder;
   BagWriter bag = FullBag();

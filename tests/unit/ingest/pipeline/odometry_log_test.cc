@@ -8,21 +8,24 @@
 #include <deque>
 #include <filesystem>
 #include <iostream>
+#include <optional>
 #include <utility>
 #include <variant>
 
+#include "ingest/pipeline/log_eye.h"
 #include "ingest/trajectory/robot_path.h"
+#include "tests/unit/ingest/odometry/frontend/made_images.h"
 #include "tests/unit/ingest/pipeline/given_log.h"
 
 namespace dsg::ingest {
 namespace {
 
-std::filesystem::path ExcerptFolder() {
+std::filesystem::path DataFolder(const std::string& name) {
   const char* const given = std::getenv("DSG_DATA");
   const std::filesystem::path folder =
       given != nullptr ? std::filesystem::path(given)
                        : std::filesystem::path(DSG_SOURCE_DIR) / ".." / "shared" / "data";
-  return folder / "euroc-mh01-stereo";
+  return folder / name;
 }
 
 CameraCalibration SmallCamera(const std::string& name, double x_m) {
@@ -148,9 +151,6 @@ TEST(OdometryLog, RefusesLogsThatTellNoMotion) {
     EXPECT_EQ(log.status().code(), absl::StatusCode::kInvalidArgument);
     return std::string(log.status().message());
   };
-  LogInfo without_unit = PairInfo();
-  without_unit.rig.imu.reset();
-  EXPECT_NE(refusal_of(without_unit).find("no inertial unit"), std::string::npos);
   LogInfo without_pair = PairInfo();
   without_pair.rig.cameras.pop_back();
   without_pair.channel_counts.erase("cam1");
@@ -160,53 +160,218 @@ TEST(OdometryLog, RefusesLogsThatTellNoMotion) {
   refusal_of(without_noise);
 }
 
+// A wall with a pattern, 2 m before a camera with depth; depth comes `late_ns` after its image.
+struct WallLog {
+  LogInfo info;
+  std::deque<Measurement> given;
+};
+
+WallLog MakeWallLog(int count, TimeNs late_ns) {
+  WallLog wall;
+  wall.info.format = "tum-rgbd";
+  wall.info.path = "wall";
+  wall.info.content_sha256 = "00";
+  wall.info.rig.cameras = {SmallCamera("color0", 0.0), SmallCamera("depth0", 0.0)};
+  wall.info.channel_counts = {{"color0", count}, {"depth0", count}};
+  for (int i = 0; i < count; ++i) {
+    const TimeNs time_ns = kNsPerSecond + i * TimeNs{33'000'000};
+    ImageMeasurement color = Picture(time_ns, "color0");
+    color.load = [i]() -> absl::StatusOr<Image> {
+      // It moves aside by a pixel an image.
+      return PaintedImage(96, 64,
+                          [i](int u, int v) { return WaveTexture((u + i) / 7.0, v / 7.0); });
+    };
+    ImageMeasurement depth = Picture(time_ns + late_ns, "depth0");
+    depth.load = []() -> absl::StatusOr<Image> {
+      Image picture{96, 64, PixelFormat::kDepth16, {}};
+      for (int k = 0; k < 96 * 64; ++k) {
+        picture.bytes.push_back(2000 & 0xff);
+        picture.bytes.push_back(2000 >> 8);
+      }
+      return picture;
+    };
+    wall.given.push_back(color);
+    wall.given.push_back(depth);
+  }
+  return wall;
+}
+
+ReadLog PlacedWall(const WallLog& wall, const OdometryLogOptions& options = {}) {
+  auto log = EstimatePoses(std::make_unique<GivenLog>(wall.info, wall.given), {}, options);
+  EXPECT_TRUE(log.ok()) << log.status();
+  return ReadAll(**log);
+}
+
+std::vector<PoseMeasurement> PosesOf(const ReadLog& read) {
+  std::vector<PoseMeasurement> poses;
+  for (const Measurement& measurement : read.measurements) {
+    if (const auto* pose = std::get_if<PoseMeasurement>(&measurement)) poses.push_back(*pose);
+  }
+  return poses;
+}
+
+// The camera is level: its right is the odometry frame's -y. A pixel is 2 m / 60.
+TEST(OdometryLog, PlacesACameraWithDepthAndWithoutAnInertialUnit) {
+  OdometryLogOptions options;
+  options.odometry.frontend.tracker.cell_px = 8;
+  options.odometry.frontend.tracker.apart_px_min = 6.0;
+  for (const TimeNs late_ns : {0, 13'700'000}) {
+    const ReadLog read = PlacedWall(MakeWallLog(8, late_ns), options);
+    const std::vector<PoseMeasurement> poses = PosesOf(read);
+    ASSERT_EQ(poses.size(), 8u);
+    for (size_t i = 0; i < poses.size(); ++i) {
+      EXPECT_EQ(poses[i].pose.time_ns, kNsPerSecond + static_cast<TimeNs>(i) * 33'000'000);
+      const Eigen::Vector3d due(0.0, -2.0 / 60.0 * static_cast<double>(i), 0.0);
+      EXPECT_LT((poses[i].pose.map_T_agent.position - due).norm(), 0.01) << i;
+      EXPECT_NE(poses[i].pose.covariance, nullptr);
+    }
+    for (size_t i = 1; i < read.measurements.size(); ++i) {
+      EXPECT_LE(StampOf(read.measurements[i - 1]), StampOf(read.measurements[i]));
+    }
+    EXPECT_TRUE(HasNote(read.info, "estimated from color0 and depth0 alone"));
+    EXPECT_TRUE(HasNote(read.info, "poses of 8 of 8 images"));
+    // One wall may be seen from anywhere.
+    EXPECT_TRUE(HasNote(read.info, "does not show what is up"));
+  }
+}
+
+TEST(OdometryLog, LeavesDepthOfAnotherTimeAlone) {
+  const ReadLog read = PlacedWall(MakeWallLog(1, 21'000'000));
+  EXPECT_TRUE(PosesOf(read).empty());
+  EXPECT_TRUE(HasNote(read.info, "2 images of color0 and depth0 have no partner"));
+}
+
+TEST(OdometryLog, UsesNoInertialUnitThatItIsToldNotToOrThatHasNoCalibration) {
+  const auto notes_of = [](const LogInfo& info, const OdometryLogOptions& options) {
+    auto log =
+        EstimatePoses(std::make_unique<GivenLog>(info, std::deque<Measurement>()), {}, options);
+    EXPECT_TRUE(log.ok()) << log.status();
+    return (*log)->info();
+  };
+  EXPECT_TRUE(HasNote(notes_of(PairInfo(), {}), "cam0, cam1 and imu0"));
+  OdometryLogOptions by_images;
+  by_images.is_inertial = false;
+  EXPECT_TRUE(HasNote(notes_of(PairInfo(), by_images), "cam0 and cam1 alone"));
+  LogInfo without = PairInfo();
+  without.rig.imu.reset();
+  EXPECT_TRUE(HasNote(notes_of(without, {}), "cam0 and cam1 alone"));
+  EXPECT_TRUE(HasNote(notes_of(without, {}), "imu0 has no calibration"));
+}
+
+TEST(OdometryLog, TakesAConsumerUnitsNoiseWhereTheLogTellsNone) {
+  LogInfo quiet = PairInfo();
+  quiet.rig.imu = ImuCalibration{"imu0", 200.0, 0.0, 0.0, 0.0, 0.0, {}};
+  std::deque<Measurement> given;
+  for (int i = 0; i < 40; ++i) {
+    given.push_back(ImuMeasurement{i * 5'000'000, {0, 0, 0}, {0, 0, 9.81}});
+  }
+  auto log = EstimatePoses(std::make_unique<GivenLog>(quiet, given), {}, {});
+  ASSERT_TRUE(log.ok()) << log.status();
+  EXPECT_TRUE(HasNote((*log)->info(), "does not tell all noise of imu0"));
+  auto known = EstimatePoses(std::make_unique<GivenLog>(PairInfo(), given), {}, {});
+  ASSERT_TRUE(known.ok()) << known.status();
+  EXPECT_FALSE(HasNote((*known)->info(), "does not tell all noise"));
+}
+
+TEST(ImagePairing, TakesTheNearestImageThatHasNoNearerOneItself) {
+  const auto pairs_of = [](const std::vector<std::pair<std::string, TimeNs>>& images) {
+    ImagePairing pairing("color0", "depth0", /*with_labels=*/false, /*apart_ns_max=*/20);
+    for (const auto& [channel, time_ns] : images) pairing.Add(Picture(time_ns, channel));
+    std::vector<std::pair<TimeNs, TimeNs>> pairs;
+    while (!pairing.empty()) {
+      const PairedImages pair = pairing.Take();
+      pairs.emplace_back(pair.left.has_value() ? pair.left->time_ns : -1,
+                         pair.other.has_value() ? pair.other->time_ns : -1);
+      if (pair.left.has_value()) EXPECT_EQ(pair.time_ns, pair.left->time_ns);
+    }
+    return pairs;
+  };
+  using Pairs = std::vector<std::pair<TimeNs, TimeNs>>;
+  EXPECT_EQ(pairs_of({{"color0", 100}, {"depth0", 114}, {"color0", 133}, {"depth0", 147}}),
+            (Pairs{{100, 114}, {133, 147}}));
+  EXPECT_EQ(pairs_of({{"depth0", 90}, {"color0", 100}, {"depth0", 125}, {"color0", 133}}),
+            (Pairs{{100, 90}, {133, 125}}));
+  // The second image is nearer to it.
+  EXPECT_EQ(pairs_of({{"color0", 100}, {"depth0", 118}, {"color0", 120}}),
+            (Pairs{{100, -1}, {120, 118}}));
+  EXPECT_EQ(pairs_of({{"color0", 100}, {"depth0", 121}}), (Pairs{{100, -1}, {-1, 121}}));
+  EXPECT_EQ(pairs_of({{"color0", 100}, {"depth0", 100}}), (Pairs{{100, 100}}));
+}
+
+TEST(ImagePairing, WaitsUntilNoNearerImageMayCome) {
+  ImagePairing pairing("color0", "depth0", /*with_labels=*/false, /*apart_ns_max=*/20);
+  pairing.Add(Picture(100, "color0"));
+  pairing.Add(Picture(140, "depth0"));
+  EXPECT_TRUE(pairing.IsOpen(100));
+  pairing.Add(Picture(141, "color0"));
+  EXPECT_FALSE(pairing.IsOpen(100));
+}
+
+// Of the whole path of a log, moved as the first pose says, largest error in metres; and how many
+// poses there are.
+struct PathError {
+  double largest_m = 0.0;
+  double largest_rad = 0.0;
+  size_t count = 0;
+};
+
+PathError ErrorOf(const std::filesystem::path& folder, const OdometryLogOptions& odometry) {
+  PathError error;
+  RobotPath truth;
+  LogOptions options;
+  options.poses = PoseSource::kGroundTruth;
+  auto true_log = OpenLog(folder.string(), options);
+  EXPECT_TRUE(true_log.ok()) << true_log.status();
+  for (const PoseMeasurement& pose : PosesOf(ReadAll(**true_log))) truth.Add(pose.pose);
+  options.poses = PoseSource::kOdometry;
+  auto opened = OpenLog(folder.string(), options);
+  EXPECT_TRUE(opened.ok()) << opened.status();
+  auto log = EstimatePoses(*std::move(opened), options, odometry);
+  EXPECT_TRUE(log.ok()) << log.status();
+  const ReadLog read = ReadAll(**log);
+  for (const std::string& note : read.info.notes) std::cout << note << "\n";
+  std::optional<Pose3d> truth_T_odom;
+  for (const PoseMeasurement& pose : PosesOf(read)) {
+    Pose3d map_T_body;
+    if (truth.At(pose.pose.time_ns, &map_T_body) != RobotPath::Answer::kKnown) continue;
+    if (!truth_T_odom.has_value()) truth_T_odom = map_T_body * pose.pose.map_T_agent.Inverse();
+    const Pose3d moved = *truth_T_odom * pose.pose.map_T_agent;
+    error.largest_m = std::max(error.largest_m, (moved.position - map_T_body.position).norm());
+    error.largest_rad =
+        std::max(error.largest_rad, AngleBetween(moved.orientation, map_T_body.orientation));
+    ++error.count;
+  }
+  return error;
+}
+
+// A second of TUM's fr1_rpy: turns of 58 degrees over a desk.
+TEST(OdometryLog, IsWithinCentimetresOfTheGroundTruthOfARealDepthCamera) {
+  const std::filesystem::path folder = DataFolder("rgbd-tum") / "freiburg1_rpy";
+  if (!std::filesystem::is_directory(folder)) {
+    GTEST_SKIP() << "the real data is not there; set DSG_DATA";
+  }
+  const PathError error = ErrorOf(folder, {});
+  std::cout << "fr1_rpy: largest error " << error.largest_m << " m, " << error.largest_rad
+            << " rad\n";
+  EXPECT_EQ(error.count, 18u);
+  EXPECT_LT(error.largest_m, 0.05);
+  EXPECT_LT(error.largest_rad, 0.05);
+}
+
 // Eight seconds of EuRoC's MH_01, in motion from the first image on.
 class EurocOdometry : public testing::TestWithParam<OdometryMethod> {};
 
 TEST_P(EurocOdometry, IsWithinCentimetresOfTheGroundTruth) {
-  if (!std::filesystem::is_directory(ExcerptFolder())) {
+  const std::filesystem::path folder = DataFolder("euroc-mh01-stereo");
+  if (!std::filesystem::is_directory(folder)) {
     GTEST_SKIP() << "the real data is not there; set DSG_DATA";
   }
-  RobotPath truth;
-  {
-    LogOptions options;
-    options.poses = PoseSource::kGroundTruth;
-    auto log = OpenLog(ExcerptFolder().string(), options);
-    ASSERT_TRUE(log.ok()) << log.status();
-    for (const Measurement& measurement : ReadAll(**log).measurements) {
-      if (const auto* pose = std::get_if<PoseMeasurement>(&measurement)) truth.Add(pose->pose);
-    }
-  }
-  LogOptions options;
-  options.poses = PoseSource::kOdometry;
   OdometryLogOptions odometry;
   odometry.odometry.method = GetParam();
-  auto opened = OpenLog(ExcerptFolder().string(), options);
-  ASSERT_TRUE(opened.ok()) << opened.status();
-  auto log = EstimatePoses(*std::move(opened), options, odometry);
-  ASSERT_TRUE(log.ok()) << log.status();
-  const ReadLog outcome = ReadAll(**log);
-  std::vector<Pose3d> estimates;
-  std::vector<Pose3d> truths;
-  for (const Measurement& measurement : outcome.measurements) {
-    const auto* pose = std::get_if<PoseMeasurement>(&measurement);
-    if (pose == nullptr) continue;
-    Pose3d map_T_body;
-    ASSERT_EQ(truth.At(pose->pose.time_ns, &map_T_body), RobotPath::Answer::kKnown);
-    estimates.push_back(pose->pose.map_T_agent);
-    truths.push_back(map_T_body);
-  }
-  for (const std::string& note : outcome.info.notes) std::cout << note << "\n";
-  ASSERT_GT(estimates.size(), 150u);
-  // Moved as the first pose says: the whole drift is counted.
-  const Pose3d truth_T_odom = truths.front() * estimates.front().Inverse();
-  double largest_m = 0.0;
-  for (size_t i = 0; i < estimates.size(); ++i) {
-    largest_m =
-        std::max(largest_m, ((truth_T_odom * estimates[i]).position - truths[i].position).norm());
-  }
-  std::cout << "euroc: largest error " << largest_m << " m\n";
-  EXPECT_LT(largest_m, 0.15);
+  const PathError error = ErrorOf(folder, odometry);
+  std::cout << "euroc: largest error " << error.largest_m << " m\n";
+  EXPECT_GT(error.count, 150u);
+  EXPECT_LT(error.largest_m, 0.15);
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, EurocOdometry,

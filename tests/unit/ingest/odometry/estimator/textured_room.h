@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -30,6 +31,22 @@ class TexturedRoom {
     }
   }
 
+  /// What a depth camera measures, to the millimetre.
+  Image Depth(const CameraCalibration& camera, const Pose3d& map_T_camera) const {
+    Image depth{camera.width, camera.height, PixelFormat::kDepth16, {}};
+    depth.bytes.resize(depth.Offset(0, camera.height));
+    for (int v = 0; v < camera.height; ++v) {
+      for (int u = 0; u < camera.width; ++u) {
+        const Eigen::Vector3d ray = map_T_camera.orientation * PinholeRay(camera, u, v);
+        const auto depth_mm =
+            static_cast<uint16_t>(std::lround(1e3 * HitAlong(map_T_camera.position, ray).along));
+        depth.bytes[depth.Offset(u, v)] = static_cast<uint8_t>(depth_mm & 0xff);
+        depth.bytes[depth.Offset(u, v) + 1] = static_cast<uint8_t>(depth_mm >> 8);
+      }
+    }
+    return depth;
+  }
+
   Image Seen(const CameraCalibration& camera, const Pose3d& map_T_camera) const {
     return PaintedImage(camera.width, camera.height, [&](int u, int v) {
       return GrayAlong(map_T_camera.position, map_T_camera.orientation * PinholeRay(camera, u, v));
@@ -39,24 +56,31 @@ class TexturedRoom {
  private:
   static constexpr int kSide = 2048;
 
-  // Walls have other places of one texture, a texel a centimetre.
-  double GrayAlong(const Eigen::Vector3d& from, const Eigen::Vector3d& ray) const {
-    const Eigen::Vector3d half(3.5, 3.0, 1.5);
-    double nearest = 1e9;
+  // Where a ray meets a wall: so many times its length.
+  struct Hit {
+    double along = 1e9;
     int wall = 0;
+  };
+
+  static Hit HitAlong(const Eigen::Vector3d& from, const Eigen::Vector3d& ray) {
+    const Eigen::Vector3d half(3.5, 3.0, 1.5);
+    Hit hit;
     for (int axis = 0; axis < 3; ++axis) {
       if (ray[axis] == 0.0) continue;
       const double side = ray[axis] > 0.0 ? half[axis] : -half[axis];
       const double along = (side - from[axis]) / ray[axis];
-      if (along < nearest) {
-        nearest = along;
-        wall = 2 * axis + (ray[axis] > 0.0 ? 1 : 0);
-      }
+      if (along < hit.along) hit = {along, 2 * axis + (ray[axis] > 0.0 ? 1 : 0)};
     }
-    const Eigen::Vector3d at = from + nearest * ray;
-    const int axis = wall / 2;
-    const double x = 100.0 * (at[(axis + 1) % 3] + 4.0) + 131.0 * wall;
-    const double y = 100.0 * (at[(axis + 2) % 3] + 4.0) + 97.0 * wall;
+    return hit;
+  }
+
+  // Walls have other places of one texture, a texel a centimetre.
+  double GrayAlong(const Eigen::Vector3d& from, const Eigen::Vector3d& ray) const {
+    const Hit hit = HitAlong(from, ray);
+    const Eigen::Vector3d at = from + hit.along * ray;
+    const int axis = hit.wall / 2;
+    const double x = 100.0 * (at[(axis + 1) % 3] + 4.0) + 131.0 * hit.wall;
+    const double y = 100.0 * (at[(axis + 2) % 3] + 4.0) + 97.0 * hit.wall;
     return Texel(std::clamp(x, 0.0, kSide - 2.0), std::clamp(y, 0.0, kSide - 2.0));
   }
 

@@ -95,12 +95,12 @@ std::vector<double> ErrorsM(const Outcome& outcome, const Carried& carried) {
   };
   const Pose3d truth = truth_at(first);
   const Eigen::Matrix3d turn =
-      (truth.orientation * first.state.map_T_imu.orientation.conjugate()).toRotationMatrix();
+      (truth.orientation * first.map_T_body.orientation.conjugate()).toRotationMatrix();
   const double yaw = std::atan2(turn(1, 0) - turn(0, 1), turn(0, 0) + turn(1, 1));
   const Eigen::Quaterniond heading = RotationOf(yaw * Eigen::Vector3d::UnitZ());
   for (const OdometryPose& pose : outcome.poses) {
     const Eigen::Vector3d moved =
-        heading * (pose.state.map_T_imu.position - first.state.map_T_imu.position) + truth.position;
+        heading * (pose.map_T_body.position - first.map_T_body.position) + truth.position;
     errors.push_back((moved - truth_at(pose).position).norm());
   }
   return errors;
@@ -219,7 +219,7 @@ TEST(VisualInertialOdometry, GivesTheSamePosesTwice) {
   const Outcome b = RunSession(session);
   ASSERT_EQ(a.poses.size(), b.poses.size());
   for (size_t i = 0; i < a.poses.size(); ++i) {
-    EXPECT_EQ(StepBetween(a.poses[i].state, b.poses[i].state).norm(), 0.0);
+    EXPECT_EQ(StepBetween(a.poses[i].map_T_body, b.poses[i].map_T_body).norm(), 0.0);
   }
 }
 

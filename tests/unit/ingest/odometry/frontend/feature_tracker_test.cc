@@ -99,6 +99,25 @@ TEST(FeatureTracker, FollowsAPlaneWithinAFifthOfAPixel) {
   }
 }
 
+TEST(FeatureTracker, GoesBackToTheImageBeforeOneThatShowsNothing) {
+  FeatureTracker tracker = StartedTracker();
+  const Pixels first = PixelsOf(tracker);
+  tracker.GoBack();
+  EXPECT_EQ(PixelsOf(tracker), first) << "there is no image before the first";
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_TRUE(tracker.Track(Blank()).ok());
+    EXPECT_LT(tracker.features().size(), first.size() / 4);
+    tracker.GoBack();
+    EXPECT_EQ(PixelsOf(tracker), first);
+  }
+  Eigen::Matrix3d aside = Eigen::Matrix3d::Identity();
+  aside(0, 2) = -5.0;
+  ASSERT_TRUE(tracker.Track(PlaneUnder(aside)).ok());
+  const std::vector<double> errors = ErrorsPx(first, tracker, aside);
+  ASSERT_GT(errors.size(), 0.75 * static_cast<double>(first.size()));
+  EXPECT_LT(errors[errors.size() / 2], 0.1);
+}
+
 TEST(FeatureTracker, CountsWhatBecomesOfFeatures) {
   FeatureTracker tracker = StartedTracker();
   const int before = static_cast<int>(tracker.features().size());

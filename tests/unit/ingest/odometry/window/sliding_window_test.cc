@@ -3,9 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <iostream>
+#include <optional>
 #include <vector>
 
 #include "tests/unit/ingest/odometry/window/swinging_rig.h"
@@ -157,6 +159,105 @@ TEST(SlidingWindow, LeadsOnByTheUnitAloneWhenNothingIsSeen) {
     sigma_before = (*covariance)(0, 0);
   }
   EXPECT_LT((window.newest().map_T_imu.position - SwungPose(1.0).position).norm(), 1e-3);
+}
+
+struct ImagePassage {
+  std::vector<Pose3d> poses;
+  std::vector<Matrix6d> covariances;
+};
+
+// The same way without a unit; guesses are off by a hand's breadth and some degrees.
+ImagePassage ImagePassageOf(double seconds, uint64_t seed, double noise_px) {
+  Random random(seed, 1);
+  const StereoModel model = TestModel();
+  const std::vector<Eigen::Vector3d> points = RoomPoints(700, &random);
+  WindowOptions options;
+  if (noise_px > 0.0) options.pixel_sigma_px = options.disparity_sigma_px = noise_px;
+  // As it is: nothing tells it.
+  options.disparity_offset_px = 0.01;
+  options.baseline_share = 1e-4;
+  SlidingWindow window(model, kGravity, options);
+  ImagePassage run;
+  const auto sights_at = [&](double t) {
+    return SightsAt(model, SwungPose(t), points, noise_px, noise_px, &random);
+  };
+  const Matrix6d sure = 1e-8 * Matrix6d::Identity();
+  EXPECT_TRUE(window.BeginByImages(0, SwungPose(0.0), sure, sights_at(0.0)).ok());
+  for (int i = 1; i * kPeriodS <= seconds; ++i) {
+    const Pose3d truth = SwungPose(i * kPeriodS);
+    Vector6d off;
+    off << NormalVector(0.05, &random), NormalVector(0.03, &random);
+    const absl::Status added = window.AddByImages(std::llround(1e9 * kPeriodS * i),
+                                                  Stepped(truth, off), sights_at(i * kPeriodS));
+    EXPECT_TRUE(added.ok()) << added;
+    run.poses.push_back(window.newest().map_T_imu);
+    const auto covariance = window.NewestPoseCovariance();
+    EXPECT_TRUE(covariance.ok()) << covariance.status();
+    run.covariances.push_back(*covariance);
+  }
+  return run;
+}
+
+TEST(SlidingWindow, FollowsByImagesAlone) {
+  const ImagePassage exact = ImagePassageOf(6.0, 1, 0.0);
+  EXPECT_LT(StepBetween(SwungPose(6.0), exact.poses.back()).norm(), 2e-3);
+  std::vector<double> errors;
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    errors.push_back(
+        (ImagePassageOf(10.0, seed, 0.7).poses.back().position - SwungPose(10.0).position).norm());
+  }
+  std::sort(errors.begin(), errors.end());
+  std::cout << "by images, after 10 s: " << testing::PrintToString(errors) << " m\n";
+  EXPECT_LT(errors[2], 0.03);
+  EXPECT_LT(errors[4], 0.06);
+}
+
+TEST(SlidingWindow, KnowsHowSureImagesAreOfThePose) {
+  double sum = 0.0;
+  int count = 0;
+  for (uint64_t seed = 1; seed <= 10; ++seed) {
+    const ImagePassage run = ImagePassageOf(8.0, seed, 0.7);
+    for (const size_t i : {19ul, 39ul}) {
+      const Vector6d error =
+          StepBetween(SwungPose(kPeriodS * static_cast<double>(i + 1)), run.poses[i]);
+      sum += error.dot(run.covariances[i].inverse() * error) / 6.0;
+      ++count;
+    }
+  }
+  std::cout << "by images: squared errors in units of the covariance: " << sum / count << "\n";
+  EXPECT_GT(sum / count, 0.5);
+  EXPECT_LT(sum / count, 1.8);
+}
+
+TEST(SlidingWindow, TellsWhereLandmarksAre) {
+  Random random(1, 0);
+  const StereoModel model = TestModel();
+  const std::vector<Eigen::Vector3d> points = RoomPoints(200, &random);
+  SlidingWindow window(model, kGravity, {});
+  const auto sights = SightsAt(model, SwungPose(0.0), points, 0.0, 0.0, &random);
+  ASSERT_TRUE(window.BeginByImages(0, SwungPose(0.0), 1e-8 * Matrix6d::Identity(), sights).ok());
+  for (const FeatureSight& sight : sights) {
+    const std::optional<Eigen::Vector3d> point = window.PointOf(sight.feature_id);
+    ASSERT_EQ(point.has_value(), sight.sight.disparity_px.has_value());
+    if (!point.has_value()) continue;
+    EXPECT_LT((*point - points[static_cast<size_t>(sight.feature_id)]).norm(), 1e-6);
+  }
+  EXPECT_FALSE(window.PointOf(1000).has_value());
+}
+
+TEST(SlidingWindow, DoesNotMixKeyframesWithAndWithoutAUnit) {
+  SlidingWindow window(TestModel(), kGravity, {});
+  EXPECT_FALSE(window.AddByImages(1, Pose3d(), {}).ok());
+  EXPECT_FALSE(window.BeginByImages(0, Pose3d(), Matrix6d::Zero(), {}).ok());
+  ASSERT_TRUE(window.BeginByImages(0, Pose3d(), Matrix6d::Identity(), {}).ok());
+  const std::vector<ImuMeasurement> samples = SwungMeasurements(1.0);
+  const auto measured =
+      Preintegration::Make(samples, 0, 200'000'000, {}, Adis16448(), InertialOptions());
+  ASSERT_TRUE(measured.ok());
+  EXPECT_FALSE(window.Add(200'000'000, *measured, {}).ok());
+  ASSERT_TRUE(window.Begin(0, BeginAt(0.0), {}).ok());
+  EXPECT_FALSE(window.AddByImages(200'000'000, Pose3d(), {}).ok());
+  EXPECT_TRUE(window.Add(200'000'000, *measured, {}).ok());
 }
 
 TEST(SlidingWindow, GivesTheSameNumbersTwice) {
