@@ -69,7 +69,8 @@ constexpr TimeNs kWaitNs = 2 * kNsPerSecond;
 class OdometryLog : public LogSource {
  public:
   OdometryLog(std::unique_ptr<LogSource> log, LogEye eye, std::unique_ptr<Odometry> odometry,
-              LogInfo info, std::string robot_name, const OdometryLogOptions& options)
+              LogInfo info, std::string robot_name, const OdometryLogOptions& options,
+              std::optional<OdometryMesh> mesh)
       : log_(std::move(log)),
         eye_(std::move(eye)),
         images_(eye_.left, eye_.other, options.is_masked,
@@ -78,6 +79,7 @@ class OdometryLog : public LogSource {
         info_(std::move(info)),
         note_count_(log_->info().notes.size()),
         robot_name_(std::move(robot_name)),
+        mesh_(std::move(mesh)),
         gravity_(options.gravity),
         needs_up_(!info_.used_channels.contains("imu0")) {
     if (options.is_masked) moving_classes_ = DynamicClasses(info_.labels);
@@ -99,7 +101,9 @@ class OdometryLog : public LogSource {
         held_.push_back(*std::move(measurement));
       }
       DSG_RETURN_IF_ERROR(PlaceFrames());
-      if (is_ended_) AddLateNotes();
+      if (!is_ended_) continue;
+      AddLateNotes();
+      DSG_RETURN_IF_ERROR(EndMesh());
     }
   }
 
@@ -146,6 +150,10 @@ class OdometryLog : public LogSource {
       return absl::OkStatus();
     }
     for (const OdometryPose& pose : *poses) poses_.push_back(MeasurementOf(pose));
+    if (mesh_.has_value() && !poses->empty() && poses->back().is_keyframe) {
+      mesh_->Add(pending.time_ns, poses_.back().pose.map_T_agent, odometry_->landmarks(),
+                 frame->mask);
+    }
     return absl::OkStatus();
   }
 
@@ -163,6 +171,12 @@ class OdometryLog : public LogSource {
                    ? "odometry: up is what the first depth image shows"
                    : "odometry: the first image does not show what is up: the camera is taken for "
                      "level there; --up says another direction";
+  }
+
+  absl::Status EndMesh() {
+    if (!mesh_.has_value()) return absl::OkStatus();
+    info_.notes.push_back(mesh_->Note());
+    return mesh_->Write();
   }
 
   std::vector<uint8_t> MaskOf(const PairedImages& pending) const {
@@ -242,6 +256,7 @@ class OdometryLog : public LogSource {
   /// Of the log's own, those that `info_` has.
   size_t note_count_;
   const std::string robot_name_;
+  std::optional<OdometryMesh> mesh_;
   const GravityOptions gravity_;
   // The odometry has not started yet, and nothing else tells what is up.
   bool needs_up_;
@@ -318,6 +333,10 @@ absl::StatusOr<std::unique_ptr<LogSource>> EstimatePoses(std::unique_ptr<LogSour
   DSG_ASSIGN_OR_RETURN(LogEye eye,
                        MakeLogEye(info, options.odometry.frontend.stereo, "--poses vio"));
   DSG_ASSIGN_OR_RETURN(std::unique_ptr<Odometry> odometry, MakeOdometry(eye, options, &info));
+  std::optional<OdometryMesh> mesh;
+  if (options.mesh.has_value()) {
+    DSG_ASSIGN_OR_RETURN(mesh, OdometryMesh::Make(eye.eye->camera().left, *options.mesh));
+  }
   const int64_t count = info.channel_counts[eye.left];
   if (info.measurement_count > 0) {
     info.measurement_count += count - info.channel_counts["poses"];
@@ -325,7 +344,8 @@ absl::StatusOr<std::unique_ptr<LogSource>> EstimatePoses(std::unique_ptr<LogSour
   info.channel_counts["poses"] = count;
   info.content_sha256 = Sha256Hex(absl::StrCat(info.content_sha256, "\n", options.Digest(), "\n"));
   return std::make_unique<OdometryLog>(std::move(log), std::move(eye), std::move(odometry),
-                                       std::move(info), RobotName(log_options), options);
+                                       std::move(info), RobotName(log_options), options,
+                                       std::move(mesh));
 }
 
 }  // namespace dsg::ingest

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "ingest/depth/gravity.h"
 #include "ingest/log/log_source.h"
 #include "ingest/odometry/estimator/odometry_options.h"
+#include "ingest/pipeline/odometry_mesh.h"
 
 namespace dsg::ingest {
 
@@ -22,6 +24,8 @@ struct OdometryLogOptions {
   bool is_inertial = true;
   /// Without a unit: how up is found in the first depth image.
   GravityOptions gravity;
+  /// A mesh of the landmarks beside the poses, which it does not change.
+  std::optional<OdometryMeshOptions> mesh;
 
   /// What differs from the defaults, as text; it is part of the identity of the log.
   std::string Digest() const;
@@ -39,8 +43,8 @@ struct OdometryLogOptions {
 /// Of noise that the calibration does not tell, that of OdometryUnitOptions is taken, with a note.
 /// Images that cannot be decoded or have no partner of their stamp are passed over and counted in
 /// the notes at the end, and so is how often the odometry was lost.
-/// Errors: FIELD_INVALID when the log has no such images, or a calibration is not valid; then of
-/// LogSource::Next.
+/// Errors: FIELD_INVALID when the log has no such images, a calibration is not valid, or the mesh's
+/// file cannot be made; then of LogSource::Next, and of writing the mesh when the log ends.
 absl::StatusOr<std::unique_ptr<LogSource>> EstimatePoses(std::unique_ptr<LogSource> log,
                                                          const LogOptions& log_options,
                                                          const OdometryLogOptions& options);

@@ -241,6 +241,26 @@ absl::StatusOr<std::unique_ptr<LogSource>> WithAdditions(std::unique_ptr<LogSour
   return log;
 }
 
+// The log with what is made of it, turned upright. Poses that are estimated stand upright as far as
+// anybody knows, unless the user does.
+absl::StatusOr<std::unique_ptr<LogSource>> Prepare(std::unique_ptr<LogSource> log,
+                                                   const IngestFlags& flags,
+                                                   const std::string& path,
+                                                   const LogOptions& options,
+                                                   const IngestOptions& ingest_options,
+                                                   const Additions& additions, std::string* note) {
+  const auto turn = [&](std::unique_ptr<LogSource> lying) {
+    return TurnUpright(std::move(lying), path, options, flags.up, ingest_options.upright, note);
+  };
+  const bool is_estimated = additions.odometry.has_value();
+  if (!is_estimated) {
+    DSG_ASSIGN_OR_RETURN(log, turn(std::move(log)));
+  }
+  DSG_ASSIGN_OR_RETURN(log, WithAdditions(std::move(log), options, additions));
+  if (!is_estimated || flags.up == "auto") return log;
+  return turn(std::move(log));
+}
+
 absl::Status IngestOne(const IngestFlags& flags, const std::string& path, LogOptions options,
                        IngestOptions ingest_options, const Additions& additions,
                        std::unique_ptr<Destination>* destination) {
@@ -271,16 +291,8 @@ absl::Status IngestOne(const IngestFlags& flags, const std::string& path, LogOpt
       DSG_ASSIGN_OR_RETURN(log, OpenShown(flags, path, options));
     }
     std::string note;
-    // Poses that are estimated stand upright as far as anybody knows, unless the user does.
-    const bool is_estimated = additions.odometry.has_value();
-    const auto turn = [&]() -> absl::Status {
-      DSG_ASSIGN_OR_RETURN(
-          log, TurnUpright(std::move(log), path, options, flags.up, ingest_options.upright, &note));
-      return absl::OkStatus();
-    };
-    if (!is_estimated) DSG_RETURN_IF_ERROR(turn());
-    DSG_ASSIGN_OR_RETURN(log, WithAdditions(std::move(log), options, additions));
-    if (is_estimated && flags.up != "auto") DSG_RETURN_IF_ERROR(turn());
+    DSG_ASSIGN_OR_RETURN(
+        log, Prepare(std::move(log), flags, path, options, ingest_options, additions, &note));
     if (!flags.is_quiet && !note.empty() && tries == 0) {
       std::fprintf(stderr, "%s: note: %s\n", path.c_str(), note.c_str());
     }

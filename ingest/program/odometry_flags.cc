@@ -29,11 +29,17 @@ void AddOdometryFlags(CLI::App* app, OdometryFlags* flags) {
       ->check(CLI::IsMember({"on", "off"}))
       ->capture_default_str()
       ->group(group);
+  app->add_option(
+         "--odometry-mesh", flags->mesh,
+         "Join the landmarks of the odometry to a mesh of obstacles, and write that of the "
+         "last keyframe to this PLY file, in the frame of the poses, when the log ends")
+      ->group(group);
   app->add_flag("--recognize", flags->is_recognizing,
                 "Look for places seen before in the images of a sensor log, and correct the map by "
                 "the loop closures found")
       ->group("Places seen again");
   AddTuning(std::vector<OptionGroup>{{"odometry", flags->numbers.Bind()},
+                                     {"odometry mesh", flags->mesh_numbers.Bind()},
                                      {"places seen again", flags->recognition.Bind()}},
             app);
 }
@@ -45,6 +51,7 @@ absl::StatusOr<std::optional<OdometryLogOptions>> MakeOdometryOptions(const Odom
     if (flags.method != defaults.method) return NeedsOther("odometry", "poses vio");
     if (flags.masks != defaults.masks) return NeedsOther("odometry-masks", "poses vio");
     if (flags.inertial != defaults.inertial) return NeedsOther("odometry-inertial", "poses vio");
+    if (!flags.mesh.empty()) return NeedsOther("odometry-mesh", "poses vio");
     return std::nullopt;
   }
   OdometryLogOptions options;
@@ -52,6 +59,7 @@ absl::StatusOr<std::optional<OdometryLogOptions>> MakeOdometryOptions(const Odom
   DSG_ASSIGN_OR_RETURN(options.odometry.method, ParseOdometryMethod(flags.method));
   options.is_masked = flags.masks == "on";
   options.is_inertial = flags.inertial == "on";
+  if (!flags.mesh.empty()) options.mesh = OdometryMeshOptions{flags.mesh_numbers, flags.mesh, {}};
   return options;
 }
 

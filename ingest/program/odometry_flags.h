@@ -21,6 +21,9 @@ struct OdometryFlags {
   std::string inertial = "on";
   /// Numbers alone; the rest is not used.
   OdometryOptions numbers;
+  /// A file; empty = no mesh.
+  std::string mesh;
+  MesherOptions mesh_numbers;
   bool is_recognizing = false;
   RecognizedLogOptions recognition;
 };

@@ -96,10 +96,9 @@ std::string Quoted(std::string_view word) {
   return out + (word.size() > kQuotedCharacterMax ? "...\"" : "\"");
 }
 
-std::string WritePly(const TriangleSoup& mesh) {
+std::string WritePly(const TriangleSoup& mesh, std::string_view frame) {
   std::string out = absl::StrCat(
-      "ply\nformat binary_little_endian 1.0\n",
-      "comment metres, z up, origin in the middle of the floor face\n", "element vertex ",
+      "ply\nformat binary_little_endian 1.0\ncomment ", std::string(frame), "\nelement vertex ",
       mesh.vertices.size(), "\nproperty float x\nproperty float y\nproperty float z\nelement face ",
       mesh.faces.size(), "\nproperty list uchar int vertex_indices\nend_header\n");
   out.reserve(out.size() + mesh.vertices.size() * 12 + mesh.faces.size() * 13);

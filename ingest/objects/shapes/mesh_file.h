@@ -36,7 +36,10 @@ absl::StatusOr<TriangleSoup> ReadPly(std::string_view bytes, const std::string& 
 /// Statements v and f; the rest is skipped. Errors: as ReadPly.
 absl::StatusOr<TriangleSoup> ReadObj(std::string_view bytes, const std::string& file);
 
-/// Binary little endian, single precision; the same mesh gives the same bytes.
-std::string WritePly(const TriangleSoup& mesh);
+/// Binary little endian, single precision; the same mesh gives the same bytes. `frame`: a comment,
+/// one line.
+std::string WritePly(
+    const TriangleSoup& mesh,
+    std::string_view frame = "metres, z up, origin in the middle of the floor face");
 
 }  // namespace dsg::ingest

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "ingest/odometry/window/seen_landmark.h"
 #include "ingest/sensor/image.h"
 #include "ingest/sensor/imu_measurement.h"
 #include "ingest/solver/pose_block.h"
@@ -90,6 +91,10 @@ class Odometry {
   /// Of images from then on poses may still come: those of a start that is tried. kTimeMax if there
   /// is none.
   virtual TimeNs waits_from_ns() const = 0;
+
+  /// Of the window at the newest keyframe, ascending by feature, in the frame of the poses. Before
+  /// the first start there are none.
+  virtual const std::vector<SeenLandmark>& landmarks() const = 0;
 
   virtual const OdometryCounts& counts() const = 0;
 };

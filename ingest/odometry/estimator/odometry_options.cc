@@ -55,6 +55,9 @@ constexpr OptionField<OdometryVisualOptions> kVisualFields[] = {
     {"odometry-visual-inlier", &OdometryVisualOptions::inlier_px, 0.1, 50.0,
      "... a landmark agrees with a pose that misses it by this at most, pixels: three standard "
      "deviations of a feature's place"},
+    {"odometry-visual-share", &OdometryVisualOptions::agree_share_min, 0.0, 1.0,
+     "... and such a share of the landmarks that are followed has to: after a hand before the lens "
+     "most are followed wrongly, and a few agree by accident"},
     {"odometry-visual-blind", &OdometryVisualOptions::blind_ns_max, 0.0, 60.0,
      "... images that tell no pose are passed over for so long, seconds, and the next one is "
      "compared with the last that did: a hand before the lens is gone by then"},

@@ -64,6 +64,8 @@ struct OdometryVisualOptions {
   TimeNs lead_ns_max = 100'000'000;
   /// A landmark agrees with a pose that misses it by this at most, pixels.
   double inlier_px = 3.0;
+  /// Share of the landmarks that are followed which have to agree with a pose.
+  double agree_share_min = 0.5;
   /// Images that tell no pose are passed over for so long, ns.
   TimeNs blind_ns_max = kNsPerSecond;
   /// Standard deviation of a depth camera's depth at one metre, m; it grows with the square.

@@ -92,6 +92,7 @@ class VisualInertialOdometry::Impl {
   TimeNs waits_from_ns() const {
     return is_started_ || start_.empty() ? kTimeMax : start_.first_ns();
   }
+  const std::vector<SeenLandmark>& landmarks() const { return window_.landmarks(); }
   const OdometryCounts& counts() const { return counts_; }
 
  private:
@@ -346,6 +347,9 @@ absl::StatusOr<std::vector<OdometryPose>> VisualInertialOdometry::AddFrame(
   return impl_->AddFrame(frame);
 }
 TimeNs VisualInertialOdometry::waits_from_ns() const { return impl_->waits_from_ns(); }
+const std::vector<SeenLandmark>& VisualInertialOdometry::landmarks() const {
+  return impl_->landmarks();
+}
 const OdometryCounts& VisualInertialOdometry::counts() const { return impl_->counts(); }
 
 }  // namespace dsg::ingest

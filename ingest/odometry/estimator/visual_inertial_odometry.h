@@ -41,6 +41,7 @@ class VisualInertialOdometry : public Odometry {
   bool Covers(TimeNs time_ns) const override;
   absl::StatusOr<std::vector<OdometryPose>> AddFrame(const OdometryFrame& frame) override;
   TimeNs waits_from_ns() const override;
+  const std::vector<SeenLandmark>& landmarks() const override;
   const OdometryCounts& counts() const override;
 
  private:

@@ -31,6 +31,7 @@ constexpr double kOriginSigmaRad = 1e-3;
 OdometryOptions ForImages(OdometryOptions options, const StereoCamera& camera) {
   options.frontend.tracker.level_count = options.visual.level_count;
   options.frontend.relative_pose.inlier_px = options.visual.inlier_px;
+  options.frontend.relative_pose.consensus.agree_share_min = options.visual.agree_share_min;
   if (!camera.has_depth) return options;
   // Of a depth z, f b / z errs by f b / z^2 times what z does.
   const double sigma_px = camera.left.fx * camera.baseline_m * options.visual.depth_sigma_m;
@@ -88,6 +89,7 @@ class VisualOdometry::Impl {
     return poses;
   }
 
+  const std::vector<SeenLandmark>& landmarks() const { return window_.landmarks(); }
   const OdometryCounts& counts() const { return counts_; }
 
  private:
@@ -331,6 +333,7 @@ absl::StatusOr<std::vector<OdometryPose>> VisualOdometry::AddFrame(const Odometr
   return impl_->AddFrame(frame);
 }
 TimeNs VisualOdometry::waits_from_ns() const { return kTimeMax; }
+const std::vector<SeenLandmark>& VisualOdometry::landmarks() const { return impl_->landmarks(); }
 const OdometryCounts& VisualOdometry::counts() const { return impl_->counts(); }
 
 }  // namespace dsg::ingest

@@ -54,6 +54,7 @@ class SlidingWindow::Impl {
     SetFirstPrior(root.matrixL().solve(Matrix15d::Identity()));
     AddSights(sights);
     Anchor();
+    TellLandmarks();
     return absl::OkStatus();
   }
 
@@ -67,6 +68,7 @@ class SlidingWindow::Impl {
     SetFirstPrior(root.matrixL().solve(Matrix6d::Identity()));
     AddSights(sights);
     Anchor();
+    TellLandmarks();
     return absl::OkStatus();
   }
 
@@ -125,6 +127,7 @@ class SlidingWindow::Impl {
 
   StereoError& stereo_error() const { return slots_.front().stereo_error; }
   const std::vector<int64_t>& dropped() const { return dropped_; }
+  const std::vector<SeenLandmark>& landmarks() const { return told_landmarks_; }
 
  private:
   struct StateSlot {
@@ -229,6 +232,7 @@ class SlidingWindow::Impl {
     DSG_RETURN_IF_ERROR(Solve());
     DSG_RETURN_IF_ERROR(Reintegrate());
     DropMisfits(1.0);
+    TellLandmarks();
     if (keyframes_.size() > static_cast<size_t>(options_.keyframe_count)) {
       DSG_RETURN_IF_ERROR(DropOldest());
     }
@@ -323,6 +327,19 @@ class SlidingWindow::Impl {
       disparity_sum += std::abs(error->z());
     }
     return std::max(sum, disparity_sum) / static_cast<double>(landmark.sights.size());
+  }
+
+  void TellLandmarks() {
+    told_landmarks_.clear();
+    for (const auto& [id, landmark] : landmarks_) {
+      const std::optional<Vector3d> point = PointOf(id);
+      if (!point.has_value()) continue;
+      SeenLandmark told{id, *point, {}, 0};
+      told.sight_count = static_cast<int>(landmark.sights.size());
+      const Sight& last = landmark.sights.back();
+      if (last.keyframe == keyframes_.back().number) told.pixel = last.seen.pixel;
+      told_landmarks_.push_back(told);
+    }
   }
 
   // Landmarks that miss by more than `times` the limit are dropped.
@@ -497,6 +514,7 @@ class SlidingWindow::Impl {
   std::unique_ptr<ceres::CostFunction> prior_;
   std::vector<double*> prior_blocks_;
   std::vector<int64_t> dropped_;
+  std::vector<SeenLandmark> told_landmarks_;
   int64_t next_number_ = 0;
   // Whether states have velocities and biases, and an inertial unit between them.
   bool has_unit_ = true;
@@ -540,5 +558,6 @@ std::optional<Vector3d> SlidingWindow::PointOf(int64_t feature_id) const {
 }
 const StereoError& SlidingWindow::stereo_error() const { return impl_->stereo_error(); }
 const std::vector<int64_t>& SlidingWindow::dropped_features() const { return impl_->dropped(); }
+const std::vector<SeenLandmark>& SlidingWindow::landmarks() const { return impl_->landmarks(); }
 
 }  // namespace dsg::ingest

@@ -14,6 +14,7 @@
 #include "ingest/odometry/inertial/inertial_state.h"
 #include "ingest/odometry/inertial/preintegration.h"
 #include "ingest/odometry/window/landmark_factor.h"
+#include "ingest/odometry/window/seen_landmark.h"
 #include "ingest/odometry/window/window_options.h"
 #include "ingest/solver/pose_block.h"
 #include "schema/base/time.h"
@@ -86,6 +87,10 @@ class SlidingWindow {
 
   /// Features that the last Add found to be wrong, ascending: landmarks that miss their images.
   const std::vector<int64_t>& dropped_features() const;
+
+  /// With a distance, ascending by feature, as the last Begin or Add has left them; those that the
+  /// oldest keyframe saw first are still among them when it has just become a prior.
+  const std::vector<SeenLandmark>& landmarks() const;
 
  private:
   class Impl;

@@ -12,6 +12,7 @@
 #include "ingest/config/option_flags.h"
 #include "ingest/pipeline/ingest_log.h"
 #include "ingest/program/ingest_flags.h"
+#include "ingest/program/odometry_flags.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
@@ -188,6 +189,29 @@ TEST(Tuning, WhatOnlyANetworkReadsIsRefusedWithoutOne) {
   }
   // As --print-config writes it.
   EXPECT_TRUE(Parse({"--segmenter-size=512", "--detector-score=0.5"}).ok());
+}
+
+TEST(Tuning, TheMeshOfOdometryIsMadeOnlyWhereItIsWanted) {
+  const auto options_of = [](std::vector<std::string> arguments, bool is_on) {
+    CLI::App app;
+    OdometryFlags flags;
+    AddOdometryFlags(&app, &flags);
+    app.parse(arguments);
+    return MakeOdometryOptions(flags, is_on);
+  };
+  const auto without = options_of({}, true);
+  ASSERT_TRUE(without.ok() && without->has_value());
+  EXPECT_FALSE((*without)->mesh.has_value());
+  const auto with = options_of({"--odometry-mesh-edge=0.5", "--odometry-mesh=near.ply"}, true);
+  ASSERT_TRUE(with.ok() && with->has_value() && (*with)->mesh.has_value());
+  EXPECT_EQ((*with)->mesh->file, "near.ply");
+  EXPECT_EQ((*with)->mesh->mesher.edge_m_max, 0.5);
+  // The poses, and so the log, are the same.
+  EXPECT_EQ((*with)->Digest(), (*without)->Digest());
+  const auto refused = options_of({"--odometry-mesh=near.ply"}, false);
+  EXPECT_NE(refused.status().message().find("--odometry-mesh changes nothing without --poses vio"),
+            std::string::npos)
+      << refused.status();
 }
 
 }  // namespace

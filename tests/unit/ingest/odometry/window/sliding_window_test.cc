@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iostream>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -81,6 +82,39 @@ TEST(SlidingWindow, FollowsWithoutNoiseExactly) {
             1e-3);
   EXPECT_EQ(run.dropped_count, 0);
   EXPECT_EQ(run.window.keyframe_count(), WindowOptions().keyframe_count);
+}
+
+TEST(SlidingWindow, TellsWhereItsLandmarksAre) {
+  const Passage run = PassageOf(6.0, 1, {0.0, 0.0, false, 0.0, 0});
+  Random random(1, 0);
+  const std::vector<Eigen::Vector3d> points = RoomPoints(700, &random);
+  std::map<int64_t, Eigen::Vector2d> pixels;
+  for (const FeatureSight& sight :
+       SightsAt(TestModel(), SwungPose(30 * kPeriodS), points, 0.0, 0.0, &random)) {
+    pixels[sight.feature_id] = sight.sight.pixel;
+  }
+  const std::vector<SeenLandmark>& landmarks = run.window.landmarks();
+  EXPECT_GT(landmarks.size(), 100u);
+  size_t seen_count = 0;
+  int most_sights = 0;
+  for (size_t i = 0; i < landmarks.size(); ++i) {
+    const SeenLandmark& landmark = landmarks[i];
+    const auto index = static_cast<size_t>(landmark.feature_id);
+    EXPECT_LT((landmark.position_odom - points[index]).norm(), 0.1) << landmark.feature_id;
+    if (i > 0) {
+      EXPECT_LT(landmarks[i - 1].feature_id, landmark.feature_id);
+    }
+    most_sights = std::max(most_sights, landmark.sight_count);
+    const auto pixel = pixels.find(landmark.feature_id);
+    ASSERT_EQ(landmark.pixel.has_value(), pixel != pixels.end());
+    if (!landmark.pixel.has_value()) continue;
+    ++seen_count;
+    EXPECT_LT((*landmark.pixel - pixel->second).norm(), 1e-6);
+  }
+  EXPECT_GT(seen_count, 50u);
+  EXPECT_LT(seen_count, landmarks.size());
+  // Before the oldest keyframe left.
+  EXPECT_EQ(most_sights, WindowOptions().keyframe_count + 1);
 }
 
 TEST(SlidingWindow, DriftsByCentimetresWithNoise) {
