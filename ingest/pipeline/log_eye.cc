@@ -27,7 +27,8 @@ absl::StatusOr<LogEye> MakeLogEye(const LogInfo& info, const StereoMatchOptions&
     return MakeError(Reason::kFieldInvalid,
                      absl::StrCat(flag, ": ", info.path,
                                   " has neither a pair of cameras (cam0, cam1) nor a camera with "
-                                  "depth (depth0); leave it out"),
+                                  "depth (depth0) with their calibration, which a bag tells by "
+                                  "sensor_msgs/CameraInfo and a folder by sensor.yaml"),
                      {{"field", flag}});
   }
   LogEye eye{left->name, other->name, is_pair, nullptr};

@@ -318,7 +318,10 @@ absl::Status IngestOne(const IngestFlags& flags, const std::string& path, LogOpt
   if (!summary->is_paused) DSG_RETURN_IF_ERROR(CheckYield(log->info(), *summary));
   Tell(flags, {path, log->info(), *summary, elapsed.count(), flags.is_dry_run});
   if (!flags.is_quiet && summary->mapping.has_value()) {
-    for (const std::string& hint : HintsOnLostFrames(summary->mapping->skipped)) {
+    SkipCounts skipped = summary->mapping->skipped;
+    // Odometry itself tells of how many images it has none.
+    if (additions.odometry.has_value()) skipped.erase("no pose");
+    for (const std::string& hint : HintsOnLostFrames(skipped)) {
       std::fprintf(stderr, "%s: note: %s\n", path.c_str(), hint.c_str());
     }
   }
