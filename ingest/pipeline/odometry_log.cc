@@ -81,7 +81,8 @@ class OdometryLog : public LogSource {
         robot_name_(std::move(robot_name)),
         mesh_(std::move(mesh)),
         gravity_(options.gravity),
-        needs_up_(!info_.used_channels.contains("imu0")) {
+        has_unit_(info_.used_channels.contains("imu0")),
+        needs_up_(!has_unit_) {
     if (options.is_masked) moving_classes_ = DynamicClasses(info_.labels);
     std::sort(moving_classes_.begin(), moving_classes_.end());
   }
@@ -111,7 +112,7 @@ class OdometryLog : public LogSource {
   void Note(const Measurement& measurement) {
     images_.Add(measurement);
     if (const auto* sample = std::get_if<ImuMeasurement>(&measurement)) {
-      odometry_->AddSample(*sample);
+      if (!odometry_->AddSample(*sample) && has_unit_) ++bad_sample_count_;
     }
   }
 
@@ -242,6 +243,11 @@ class OdometryLog : public LogSource {
       info_.notes.push_back(absl::StrCat("odometry: ", uncovered_count_,
                                          " images have no inertial samples beside them"));
     }
+    if (bad_sample_count_ > 0) {
+      info_.notes.push_back(absl::StrCat("odometry: ", bad_sample_count_,
+                                         " inertial samples beyond 100 rad/s or 1000 m/s^2 were "
+                                         "left out; look at the unit's driver"));
+    }
     if (broken_count_ > 0) {
       info_.notes.push_back(absl::StrCat("odometry: ", broken_count_,
                                          " images were passed over; the first: ", first_broken_));
@@ -258,6 +264,7 @@ class OdometryLog : public LogSource {
   const std::string robot_name_;
   std::optional<OdometryMesh> mesh_;
   const GravityOptions gravity_;
+  const bool has_unit_;
   // The odometry has not started yet, and nothing else tells what is up.
   bool needs_up_;
   std::string up_note_;
@@ -268,6 +275,7 @@ class OdometryLog : public LogSource {
   int64_t lone_count_ = 0;
   int64_t uncovered_count_ = 0;
   int64_t broken_count_ = 0;
+  int64_t bad_sample_count_ = 0;
   std::string first_broken_;
 };
 

@@ -328,9 +328,22 @@ absl::Status IngestOne(const IngestFlags& flags, const std::string& path, LogOpt
   return absl::OkStatus();
 }
 
+// The mesh is of one log, and a file.
+absl::Status CheckMesh(const IngestFlags& flags) {
+  if (flags.odometry.mesh.empty() || (flags.logs.size() == 1 && !flags.is_dry_run)) {
+    return absl::OkStatus();
+  }
+  return MakeError(Reason::kFieldInvalid,
+                   absl::StrCat("--odometry-mesh ", flags.odometry.mesh,
+                                flags.is_dry_run ? ": --dry-run writes nothing; leave one out"
+                                                 : " takes one log; ingest them one by one"),
+                   {{"field", "odometry-mesh"}, {"value", flags.odometry.mesh}});
+}
+
 absl::Status Run(const IngestFlags& flags) {
   DSG_RETURN_IF_ERROR(CheckMapName(flags.map));
   DSG_RETURN_IF_ERROR(CheckUp(flags.up));
+  DSG_RETURN_IF_ERROR(CheckMesh(flags));
   DSG_RETURN_IF_ERROR(ParseRetryFor(flags.retry_for).status());
   // Hours into a log is too late to find out.
   if (!flags.spill_folder.empty()) DSG_RETURN_IF_ERROR(SpillFile(flags.spill_folder).Open());

@@ -32,7 +32,7 @@ void AddOdometryFlags(CLI::App* app, OdometryFlags* flags) {
   app->add_option(
          "--odometry-mesh", flags->mesh,
          "Join the landmarks of the odometry to a mesh of obstacles, and write that of the "
-         "last keyframe to this PLY file, in the frame of the poses, when the log ends")
+         "last keyframe to this new PLY file, in the frame of the poses, when the log ends")
       ->group(group);
   app->add_flag("--recognize", flags->is_recognizing,
                 "Look for places seen before in the images of a sensor log, and correct the map by "

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <functional>
 #include <iostream>
+#include <limits>
 #include <set>
 #include <string>
 #include <utility>
@@ -221,6 +222,19 @@ TEST(VisualInertialOdometry, GivesTheSamePosesTwice) {
   for (size_t i = 0; i < a.poses.size(); ++i) {
     EXPECT_EQ(StepBetween(a.poses[i].map_T_body, b.poses[i].map_T_body).norm(), 0.0);
   }
+}
+
+TEST(VisualInertialOdometry, LeavesOutSamplesThatNoUnitMeasures) {
+  const auto with = [](double spike) {
+    Session session;
+    session.seconds = 4.0;
+    session.spoil = [spike](ImuMeasurement* sample) {
+      if (sample->time_ns == 3'000'000'000) sample->acceleration_m_s2.x() += spike;
+    };
+    return Largest(ErrorsM(RunSession(session), session.carried));
+  };
+  EXPECT_LT(with(1e6), 0.05);
+  EXPECT_LT(with(std::numeric_limits<double>::infinity()), 0.05);
 }
 
 TEST(VisualInertialOdometry, RefusesImagesOutOfOrderAndOfOtherSizes) {
