@@ -32,8 +32,8 @@ struct OdometryFrame {
   std::function<absl::StatusOr<std::vector<std::optional<double>>>(
       const Image& left, std::span<const Eigen::Vector2d> pixels)>
       disparities;
-  /// How much later than `left` that was measured which disparities are read from, ns: of depth
-  /// cameras, which have a clock of their own.
+  /// How much later than `left` that was measured which disparities are read from, ns, negative if
+  /// earlier: of depth cameras, which have a clock of their own.
   TimeNs depth_late_ns = 0;
   /// Of FeatureTracker: a byte for each pixel, not 0 where something moves; may be empty.
   std::vector<uint8_t> mask;

@@ -264,7 +264,8 @@ class VisualOdometry::Impl {
   Quaterniond TurnUntilDepth(const OdometryFrame& frame, const Pose3d& map_T_body) const {
     const std::optional<Vector3d> turn = CameraTurnTo(frame.time_ns, map_T_body);
     if (!turn.has_value()) return Quaterniond::Identity();
-    return RotationOf(SecondsBetween(0, frame.depth_late_ns) * *turn);
+    // Depth may also be the earlier one.
+    return RotationOf(1e-9 * static_cast<double>(frame.depth_late_ns) * *turn);
   }
 
   void NoteSeen(TimeNs time_ns, const PlacedBody& body) {

@@ -211,8 +211,8 @@ WallLog MakeWallLog(int count, TimeNs late_ns) {
       }
       return picture;
     };
-    wall.given.push_back(color);
-    wall.given.push_back(depth);
+    wall.given.push_back(late_ns < 0 ? depth : color);
+    wall.given.push_back(late_ns < 0 ? color : depth);
   }
   return wall;
 }
@@ -236,7 +236,7 @@ TEST(OdometryLog, PlacesACameraWithDepthAndWithoutAnInertialUnit) {
   OdometryLogOptions options;
   options.odometry.frontend.tracker.cell_px = 8;
   options.odometry.frontend.tracker.apart_px_min = 6.0;
-  for (const TimeNs late_ns : {0, 13'700'000}) {
+  for (const TimeNs late_ns : {-13'700'000, 0, 13'700'000}) {
     const ReadLog read = PlacedWall(MakeWallLog(8, late_ns), options);
     const std::vector<PoseMeasurement> poses = PosesOf(read);
     ASSERT_EQ(poses.size(), 8u);
