@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The messages of a bag as measurements in the order of their stamps.
-// Refuses stamps that step back within a topic, or by more than a second between topics.
+// Refuses stamps that step back within a topic, or between topics by more than a second, of a bag
+// that is followed FollowOptions::late_ns.
 #pragma once
 
 #include <compare>
@@ -43,10 +44,10 @@ struct BagGrowth {
 /// Next() fails.
 ///
 /// Topics are recorded when they arrive, which is a little after their stamps and not all alike:
-/// what a topic has waits until another one is a second later. Of a bag that is still written it
-/// also waits for the transforms around it (FollowedTransforms); a loop closure waits until what is
-/// as late as its later stamp has come. What comes when depends on the bag only, not on how much of
-/// it was there when.
+/// what a topic has waits until another one is a second (late_ns) later. Of a bag that is still
+/// written it also waits for the transforms around it (FollowedTransforms); a loop closure waits
+/// until what is as late as its later stamp has come. What comes when depends on the bag only, not
+/// on how much of it was there when.
 class BagStream : public LogSource {
  public:
   /// A bag that is there as a whole.

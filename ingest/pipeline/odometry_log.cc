@@ -245,7 +245,8 @@ class OdometryLog : public LogSource {
     }
     if (bad_sample_count_ > 0) {
       info_.notes.push_back(absl::StrCat("odometry: ", bad_sample_count_,
-                                         " inertial samples beyond 100 rad/s or 1000 m/s^2 were "
+                                         " inertial samples are higher than any unit measures "
+                                         "(--inertial-rate-most, --inertial-force-most) and were "
                                          "left out; look at the unit's driver"));
     }
     if (broken_count_ > 0) {

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <ctime>
-#include <filesystem>
-#include <system_error>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
@@ -27,14 +25,8 @@ absl::StatusOr<OdometryMesh> OdometryMesh::Make(const CameraCalibration& camera,
                                                 const OdometryMeshOptions& options) {
   DSG_ASSIGN_OR_RETURN(MultiFrameMesh mesh, MultiFrameMesh::Make(camera, options.mesher));
   if (!options.file.empty()) {
-    std::error_code error;
-    if (std::filesystem::exists(options.file, error)) {
-      return MakeError(Reason::kFieldInvalid,
-                       absl::StrCat("--odometry-mesh: ", options.file,
-                                    " is there already; name another file, or remove it"),
-                       {{"field", "odometry-mesh"}, {"value", options.file}});
-    }
-    DSG_RETURN_IF_ERROR(AtomicFile::Create(options.file, /*may_replace=*/true).status());
+    DSG_RETURN_IF_ERROR(CheckMayWrite(options.file, /*may_replace=*/false, "remove it"));
+    DSG_RETURN_IF_ERROR(AtomicFile::Create(options.file).status());
   }
   return OdometryMesh(std::move(mesh), camera, options);
 }

@@ -5,12 +5,12 @@
     tests/bench/live_latency.py --bag sim/log.bag [--bin build/release/bin] [--folder live-data]
         [--speed 1] [--json FILE] [-- DSG-INGEST-OPTION...]
 
-Writes the bag (ROS 1, as `dsg-simulate sensors --bag` makes it) as MCAP at the pace of its stamps,
-lets `dsg-ingest --follow` read it while it grows and commit through a dsg-server, and asks that
-server where the robot is at the stamp of each image: not before the image is in the file, and until
-there is an answer. Prints median, 99th percentile and largest of the times between both, and of
-what dsg-ingest has to read by then. Images of the first three seconds, in which dsg-ingest finds
-out what the log has, are left out. Exits with 1 if an image has no answer at the end.
+Writes the bag (ROS 1, as `dsg-simulate sensors --bag` makes it) as MCAP at the pace of its
+stamps, lets `dsg-ingest --follow` read it while it grows and commit through a dsg-server, and
+asks that server where the robot is at the stamp of each image: not before the image is in the
+file, and until there is an answer. Prints median and percentiles of the times between both.
+Images of the first three seconds, in which dsg-ingest finds out what the log has, are left out.
+Exits with 1 if an image has no answer at the end.
 
 Needs python3-grpcio, protoc with its Python plugin, and liblz4.
 """

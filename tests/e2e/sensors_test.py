@@ -131,6 +131,9 @@ class Sensors(support.ProgramsTest):
                      "--poses", "vio", "--pose-file", "x", "sim/log")
         self.refused(2, ["odometry", "vio"], "dsg-ingest", "--store", "s", "--map", "m",
                      "--odometry", "5pt", "sim/log")
+        for more, word in (("--dry-run", "writes nothing"), ("sim/log", "one by one")):
+            self.refused(2, ["odometry-mesh", word], "dsg-ingest", "--store", "s", "--map", "m",
+                         "--poses", "vio", "--odometry-mesh", "x.ply", more, "sim/log")
         self.refused(2, ["odometry-inertial", "vio"], "dsg-ingest", "--store", "s", "--map", "m",
                      "--odometry-inertial", "off", "sim/log")
 

@@ -78,7 +78,7 @@ class Odometry {
   virtual void StartAt(const Eigen::Quaterniond& /*map_R_body*/) {}
 
   /// Samples come in order; false, and nothing happens, for one that is not after the last one, is
-  /// not finite or beyond 100 rad/s or 1000 m/s^2, and without a unit.
+  /// not finite or beyond what InertialOptions takes, and without a unit.
   virtual bool AddSample(const ImuMeasurement& sample) = 0;
   /// Whether samples reach up to that time: frames wait for that. Always true without a unit.
   virtual bool Covers(TimeNs time_ns) const = 0;

@@ -29,10 +29,6 @@ ImuCalibration NoisierUnit(ImuCalibration imu, const OdometryUnitOptions& option
   return imu;
 }
 
-// What no unit on a robot measures: one sample of a million would throw the path out of the house.
-constexpr double kRateMaxRadS = 100.0;
-constexpr double kForceMaxMS2 = 1000.0;
-
 // A state of the unit, with what else is known of it.
 struct PlacedState {
   TimeNs time_ns = 0;
@@ -57,9 +53,12 @@ class VisualInertialOdometry::Impl {
         start_(camera, imu_, options) {}
 
   bool AddSample(const ImuMeasurement& sample) {
-    const bool is_good = sample.angular_velocity_rad_s.norm() <= kRateMaxRadS &&
-                         sample.acceleration_m_s2.norm() <= kForceMaxMS2 &&
-                         (samples_.empty() || sample.time_ns > samples_.back().time_ns);
+    const bool is_good =
+        sample.angular_velocity_rad_s.allFinite() && sample.acceleration_m_s2.allFinite() &&
+        (!is_started_ ||
+         (sample.angular_velocity_rad_s.norm() <= options_.inertial.rate_max_rad_s &&
+          sample.acceleration_m_s2.norm() <= options_.inertial.force_max_m_s2)) &&
+        (samples_.empty() || sample.time_ns > samples_.back().time_ns);
     if (is_good) samples_.push_back(sample);
     return is_good;
   }

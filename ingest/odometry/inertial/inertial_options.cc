@@ -8,6 +8,12 @@ constexpr OptionField<InertialOptions> kInertialFields[] = {
     {"inertial-gap", &InertialOptions::gap_ns_max, 0.001, 1.0,
      "Inertial samples farther apart do not tell the motion in between, seconds: a rig in the hand "
      "sways at a few hertz, which a straight line over this still follows"},
+    {"inertial-rate-most", &InertialOptions::rate_max_rad_s, 1.0, 1e6,
+     "Samples of a higher rate of turning are left out once odometry has started, radians / "
+     "second: "
+     "gyroscopes end at 35 to 70"},
+    {"inertial-force-most", &InertialOptions::force_max_m_s2, 10.0, 1e6,
+     "The same of accelerations, metres / second^2: units on robots end at 160 to 320"},
     {"inertial-gyro-shift", &InertialOptions::gyro_bias_shift_max, 0.0, 1.0,
      "Samples are integrated anew when the gyro bias has moved further, radians / second: within a "
      "second the error of the first-order correction stays below the noise"},

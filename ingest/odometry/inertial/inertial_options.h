@@ -61,6 +61,10 @@ struct ImuFaultOptions {
 struct InertialOptions {
   /// Samples further apart than this do not tell the motion in between, ns.
   TimeNs gap_ns_max = 50'000'000;
+  /// No unit on a robot measures more, rad/s and m/s^2, once odometry has started: until then it
+  /// may be another unit of measure.
+  double rate_max_rad_s = 100.0;
+  double force_max_m_s2 = 1000.0;
   /// Biases further than this from those of an integration, rad/s and m/s^2, want a new one.
   double gyro_bias_shift_max = 0.01;
   double accel_bias_shift_max = 0.1;

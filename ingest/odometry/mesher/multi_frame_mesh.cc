@@ -14,11 +14,6 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-Vector2d PixelOf(const CameraCalibration& camera, const Vector3d& point_camera) {
-  return {camera.cx + camera.fx * point_camera.x() / point_camera.z(),
-          camera.cy + camera.fy * point_camera.y() / point_camera.z()};
-}
-
 bool IsInOrder(const SeenLandmark& a, const SeenLandmark& b) { return a.feature_id < b.feature_id; }
 
 bool HasId(const std::vector<SeenLandmark>& corners, int64_t id) {
@@ -110,7 +105,7 @@ bool MultiFrameMesh::IsSeenThrough(const MeshTriangle& triangle, const Pose3d& c
     const Vector3d corner = camera_T_odom * vertices_.at(triangle[i]).position_odom;
     // Of what is partly behind the camera nothing is told.
     if (!(corner.z() > 0.0)) return false;
-    pixels[i] = PixelOf(camera_, corner);
+    pixels[i] = Project(camera_, corner);
     depths[i] = corner.z();
   }
   const auto [left, right] = std::minmax({pixels[0].x(), pixels[1].x(), pixels[2].x()});

@@ -5,6 +5,7 @@
 
 #include <zlib.h>
 
+#include <algorithm>
 #include <atomic>
 #include <random>
 
@@ -310,6 +311,21 @@ TEST(FollowedBag, HoldsBackWhatMayBeOvertaken) {
   };
   // Twenty of each topic in a second.
   EXPECT_NEAR(newest_ns(200'000'000) - newest_ns(kNsPerSecond), 8e8, 6e7);
+}
+
+TEST(FollowedBag, RefusesWhatComesLaterThanTold) {
+  const TempFolder folder;
+  Recording recording = TenSeconds();
+  for (RecordedMessage& message : recording) {
+    if (message.topic == "/tesse/odom") message.time_ns += 300'000'000;
+  }
+  std::stable_sort(recording.begin(), recording.end(),
+                   [](const auto& a, const auto& b) { return a.time_ns < b.time_ns; });
+  const std::string path = folder.Write("log.mcap", WriteMcap(recording));
+  LogOptions options = Following(milliseconds(0));
+  EXPECT_TRUE(ReadAll(path, options).ok());
+  options.follow->late_ns = 200'000'000;
+  ExpectMalformedFile(ReadAll(path, options).status(), {"/tesse/odom", "more than 0.2 s before"});
 }
 
 TEST(FollowedBag, NeedsItsFirstSecondsOrItsEnd) {

@@ -66,7 +66,8 @@ ImageMeasurement Picture(TimeNs time_ns, const std::string& channel, bool is_bro
 TEST(OdometryLog, KeepsAllMeasurementsInOrderAndCountsWhatItCannotUse) {
   std::deque<Measurement> given;
   for (int i = 0; i < 40; ++i) {
-    given.push_back(ImuMeasurement{i * 10'000'000, {0, 0, 0}, {0, 0, 9.81}});
+    const double rate = i == 30 ? std::numeric_limits<double>::infinity() : 0.0;
+    given.push_back(ImuMeasurement{i * 10'000'000, {rate, 0, 0}, {0, 0, 9.81}});
     if (i % 10 == 5) given.push_back(Picture(i * 10'000'000 + 1, "cam0", /*is_broken=*/i == 15));
     // One has no partner.
     if (i % 10 == 5 && i != 25) given.push_back(Picture(i * 10'000'000 + 1, "cam1"));
@@ -86,6 +87,7 @@ TEST(OdometryLog, KeepsAllMeasurementsInOrderAndCountsWhatItCannotUse) {
   EXPECT_TRUE(HasNote(outcome.info, "1 images of cam0 and cam1 have no partner"));
   EXPECT_TRUE(HasNote(outcome.info, "1 images were passed over; the first: is no picture"));
   EXPECT_TRUE(HasNote(outcome.info, "1 images have no inertial samples beside them"));
+  EXPECT_TRUE(HasNote(outcome.info, "1 inertial samples are higher than any unit measures"));
   EXPECT_TRUE(HasNote(outcome.info, "poses of 0 of 2 images"));
 }
 
@@ -174,6 +176,9 @@ TEST(OdometryLog, WritesAnEmptyMeshWhereNothingIsSeen) {
   EXPECT_FALSE(std::filesystem::exists(options.mesh->file));
   EXPECT_TRUE(HasNote(ReadAll(**log).info, "odometry mesh: no keyframe had a pose"));
   EXPECT_TRUE(std::filesystem::exists(options.mesh->file));
+  const auto again =
+      EstimatePoses(std::make_unique<GivenLog>(PairInfo(), std::deque<Measurement>()), {}, options);
+  EXPECT_NE(again.status().message().find("is there already"), std::string::npos) << again.status();
   options.mesh->file = folder.path() + "/missing/near.ply";
   const auto refused =
       EstimatePoses(std::make_unique<GivenLog>(PairInfo(), std::deque<Measurement>()), {}, options);
@@ -376,7 +381,7 @@ TEST(OdometryLog, IsWithinCentimetresOfTheGroundTruthOfARealDepthCamera) {
             << " rad\n";
   EXPECT_EQ(error.count, 18u);
   EXPECT_LT(error.largest_m, 0.05);
-  EXPECT_LT(error.largest_rad, 0.09);
+  EXPECT_LT(error.largest_rad, 0.075);
 }
 
 // Eight seconds of EuRoC's MH_01, in motion from the first image on.

@@ -196,6 +196,8 @@ TEST(VisualInertialOdometry, SaysWhatIsWrongWithTheSamples) {
   };
   const std::vector<Fault> faults = {
       {[](ImuMeasurement* sample) { sample->acceleration_m_s2 /= 9.80665; }, "look like g"},
+      {[](ImuMeasurement* sample) { sample->acceleration_m_s2 *= 1000.0 / 9.80665; },
+       "look like mg"},
       {[](ImuMeasurement* sample) { sample->angular_velocity_rad_s *= 180.0 / M_PI; }, "deg"},
       {[](ImuMeasurement* sample) {
          std::swap(sample->angular_velocity_rad_s.x(), sample->angular_velocity_rad_s.z());
