@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ingest/config/option_field.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <cstddef>
+#include <string_view>
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
@@ -17,6 +19,19 @@ std::string ToText(double value) {
   std::array<char, 32> text;
   const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
   return {text.data(), end};
+}
+
+// The two ends of a range are rows of one table.
+absl::Status CheckRange(std::span<const BoundOption> fields, const BoundOption& upper) {
+  if (upper.lower_end == nullptr) return absl::OkStatus();
+  const auto lower = std::find_if(fields.begin(), fields.end(), [&](const BoundOption& field) {
+    return std::string_view(field.name) == upper.lower_end;
+  });
+  if (lower == fields.end() || lower->Get() <= upper.Get()) return absl::OkStatus();
+  return MakeError(Reason::kFieldInvalid,
+                   absl::StrCat(lower->name, " is ", lower->Text(), ", above ", upper.name,
+                                ", which is ", upper.Text(), "; give at most that"),
+                   {{"field", lower->name}, {"value", lower->Text()}});
 }
 
 }  // namespace
@@ -53,6 +68,7 @@ void BoundOption::Set(double number) const {
 
 absl::Status ValidateFields(std::span<const BoundOption> fields) {
   for (const BoundOption& field : fields) DSG_RETURN_IF_ERROR(field.Check(field.Get()));
+  for (const BoundOption& field : fields) DSG_RETURN_IF_ERROR(CheckRange(fields, field));
   return absl::OkStatus();
 }
 

@@ -28,6 +28,8 @@ struct OptionField {
   double max;
   /// A phrase: meaning and unit, and after a colon why the default is what it is.
   const char* help;
+  /// Name of the row of the same struct that this one must not be below: the other end of a range.
+  const char* lower_end = nullptr;
 };
 
 /// A row with the number that it stands for, which has to outlive it.
@@ -37,6 +39,7 @@ struct BoundOption {
   double min;
   double max;
   const char* help;
+  const char* lower_end = nullptr;
 
   double Get() const;
   /// The shortest text that reads back as the same number.
@@ -56,13 +59,15 @@ void BindFields(std::type_identity_t<std::span<const OptionField<Options>>> fiel
   for (const OptionField<Options>& field : fields) {
     std::visit(
         [&](auto member) {
-          bound->push_back({field.name, &(options->*member), field.min, field.max, field.help});
+          bound->push_back(
+              {field.name, &(options->*member), field.min, field.max, field.help, field.lower_end});
         },
         field.value);
   }
 }
 
-/// Errors: of BoundOption::Check.
+/// Errors: of BoundOption::Check; FIELD_INVALID, naming both rows and their values, for a range
+/// whose lower end is above its upper one.
 absl::Status ValidateFields(std::span<const BoundOption> fields);
 
 /// The values that differ from `defaults`, by name, as text; each value reads back as the same

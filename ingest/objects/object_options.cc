@@ -124,7 +124,7 @@ constexpr OptionField<WatchOptions> kWatchFields[] = {
     {"watch-near", &WatchOptions::near_m, 0.01, 100.0,
      "Pictures from this distance on vote, metres: nearer, depth cameras are blind"},
     {"watch-far", &WatchOptions::far_m, 0.1, 100.0,
-     "... and up to this one, metres: farther, labels are wrong too often"},
+     "... and up to this one, metres: farther, labels are wrong too often", "watch-near"},
     {"watch-hidden", &WatchOptions::hidden_per_m, 0.0, 1.0,
      "A reading nearer than the point by more hides it, metres a metre of distance: noise"},
     {"watch-present", &WatchOptions::present_m, 0.0, 10.0,

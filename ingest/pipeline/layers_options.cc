@@ -14,7 +14,7 @@ constexpr OptionField<StoreyOptions> kStoreyFields[] = {
     {"layers-ceiling-min", &StoreyOptions::ceiling_m_min, 0.5, 20.0,
      "Least height of a ceiling above its floor, metres: lower ones are tables and lintels"},
     {"layers-ceiling-max", &StoreyOptions::ceiling_m_max, 1.0, 100.0,
-     "Greatest height of it, metres: higher ones are another storey's"},
+     "Greatest height of it, metres: higher ones are another storey's", "layers-ceiling-min"},
     {"layers-ceiling-guess", &StoreyOptions::ceiling_guess_m, 1.0, 20.0,
      "Height of the ceiling where none is in sight, metres: that of homes"},
     {"layers-standing", &StoreyOptions::standing_m, 0.0, 2.0,

@@ -20,7 +20,8 @@ constexpr OptionField<LookOptions> kLookFields[] = {
      "higher"},
     {"person-camera-max", &LookOptions::camera_m_max, 0.0, 100.0,
      "Greatest height of it where the map knows no floor and the ground is taken for 0, metres: "
-     "of cameras in a hand"},
+     "of cameras in a hand",
+     "person-camera-min"},
     {"person-look-period", &LookOptions::period_ns, 0.0, 3600.0,
      "With --detector: least time between two images that it looks at, seconds: five a second are "
      "enough for tracks"},

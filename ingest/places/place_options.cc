@@ -23,7 +23,8 @@ constexpr OptionField<PlaceOptions> kFields[] = {
     {"place-body-low", &PlaceOptions::body_z_min_m, 0.0, 2.0,
      "Height above the floor from which obstacles count, metres: above rugs and thresholds"},
     {"place-body-high", &PlaceOptions::body_z_max_m, 0.1, 5.0,
-     "Height above the floor up to which obstacles count, metres: that of a person"},
+     "Height above the floor up to which obstacles count, metres: that of a person",
+     "place-body-low"},
     {"place-body-seen", &PlaceOptions::body_seen_share, 0.0, 1.0,
      "Share of a body's height, and of its lower half, that has to be seen free: half, so that "
      "what stands behind a sofa counts"},
@@ -106,7 +107,7 @@ constexpr OptionField<PlaceOptions> kFields[] = {
     {"place-eye-low", &PlaceOptions::eye_low_m, 0.0, 5.0,
      "Who stands at a place looks from this height at least, metres: over tables"},
     {"place-eye-high", &PlaceOptions::eye_high_m, 0.0, 5.0,
-     "... and from this height at most, metres: a person's eyes"},
+     "... and from this height at most, metres: a person's eyes", "place-eye-low"},
     {"place-above-furniture", &PlaceOptions::above_furniture_m, 0.0, 10.0,
      "Where no place is in sight, one that no wall hides at this height is taken, metres: above "
      "furniture and below lintels"},

@@ -51,12 +51,12 @@ constexpr OptionField<SectionOptions> kSectionFields[] = {
      "Lowest height above the floor of what parts rooms without a ceiling, metres: above tables, "
      "beds and chairs"},
     {"room-head-high", &SectionOptions::head_max_m, 0.0, 5.0,
-     "Highest height of it, metres: below lintels"},
+     "Highest height of it, metres: below lintels", "room-head-low"},
     {"room-low-low", &SectionOptions::low_min_m, 0.0, 5.0,
      "Lowest height that counts where nothing was seen between those two, metres: above rugs and "
      "thresholds"},
     {"room-low-high", &SectionOptions::low_max_m, 0.0, 5.0,
-     "Highest height of it, metres: just below the other two"},
+     "Highest height of it, metres: just below the other two", "room-low-low"},
 };
 
 constexpr OptionField<WallGapOptions> kGapFields[] = {
@@ -124,7 +124,7 @@ constexpr OptionField<OpenRoomOptions> kOpenFields[] = {
     {"room-bay-area-min", &OpenRoomOptions::bay_m2_min, 0.1, 1000.0,
      "Least area of a bay, square metres: smaller ones are niches"},
     {"room-bay-area-max", &OpenRoomOptions::bay_m2_max, 0.1, 10000.0,
-     "Greatest area of a bay, square metres: larger ones are halls"},
+     "Greatest area of a bay, square metres: larger ones are halls", "room-bay-area-min"},
     {"room-bay-depth", &OpenRoomOptions::depth_m_min, 0.0, 20.0,
      "How far a bay reaches behind its opening at least, metres: less is a niche"},
     {"room-bay-elongation", &OpenRoomOptions::elongation_max, 0.1, 100.0,
@@ -132,7 +132,7 @@ constexpr OptionField<OpenRoomOptions> kOpenFields[] = {
     {"room-bay-width-min", &OpenRoomOptions::width_m_min, 0.0, 20.0,
      "Least width of an opening, metres: narrower ones are doors"},
     {"room-bay-width-max", &OpenRoomOptions::width_m_max, 0.0, 20.0,
-     "Greatest width of an opening, metres: the side of a room"},
+     "Greatest width of an opening, metres: the side of a room", "room-bay-width-min"},
     {"room-bay-corner-reach", &OpenRoomOptions::corner_reach_m, 0.05, 2.0,
      "Radius of the disc by which corners of walls are told, metres: more than a wall is thick"},
     {"room-bay-corner", &OpenRoomOptions::corner_share_min, 0.0, 1.0,
@@ -175,7 +175,7 @@ constexpr OptionField<FiltrationOptions> kFiltrationFields[] = {
     {"room-filtration-min", &FiltrationOptions::clearance_m_min, 0.0, 10.0,
      "Obstacles grow from this, metres: half a door's width"},
     {"room-filtration-max", &FiltrationOptions::clearance_m_max, 0.0, 10.0,
-     "... up to this, metres: half the width of a small room"},
+     "... up to this, metres: half the width of a small room", "room-filtration-min"},
     {"room-filtration-places", &FiltrationOptions::place_count_min, 1.0, 1000.0,
      "Least number of places of a room: fewer are a corner"},
 };

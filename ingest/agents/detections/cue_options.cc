@@ -67,7 +67,7 @@ constexpr OptionField<FloorCueOptions> kFloorFields[] = {
     {"person-floor-near", &FloorCueOptions::range_m_min, 0.0, 10.0,
      "Nearest distance that the floor says, metres: nearer, feet are out of the image"},
     {"person-floor-far", &FloorCueOptions::range_m_max, 1.0, 200.0,
-     "Greatest distance of it, metres: farther, a pixel is a metre"},
+     "Greatest distance of it, metres: farther, a pixel is a metre", "person-floor-near"},
     {"person-floor-aspect", &FloorCueOptions::aspect_min, 0.1, 10.0,
      "A box without joints is a whole standing body if it is so many times as high as wide: half "
      "bodies and pairs are wider"},
@@ -77,7 +77,8 @@ constexpr OptionField<FloorCueOptions> kFloorFields[] = {
     {"person-legs-min", &FloorCueOptions::pelvis_m_min, 0.0, 1.0,
      "Lowest pelvis above the soles that is believed, metres: somebody who squats"},
     {"person-legs-max", &FloorCueOptions::pelvis_m_max, 0.5, 2.0,
-     "Highest pelvis above the soles that is believed, metres: nobody's legs are longer"},
+     "Highest pelvis above the soles that is believed, metres: nobody's legs are longer",
+     "person-legs-min"},
     {"person-skeleton", &FloorCueOptions::skeleton_m, 0.001, 2.0,
      "Error of the height of a skeleton's pelvis, metres: what good networks err by"},
     {"person-hidden-skeleton", &FloorCueOptions::hidden_skeleton_m, 0.0, 2.0,

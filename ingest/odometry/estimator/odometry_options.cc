@@ -14,7 +14,8 @@ constexpr OptionField<OdometryKeyframeOptions> kKeyframeFields[] = {
      "Least time between keyframes, seconds: 0.2 leaves time for solving between them"},
     {"odometry-keyframe-most", &OdometryKeyframeOptions::period_ns_max, 0.01, 60.0,
      "Most time between keyframes, seconds: what the inertial unit alone tells of a second is good "
-     "to centimetres"},
+     "to centimetres",
+     "odometry-keyframe-least"},
     {"odometry-keyframe-parallax", &OdometryKeyframeOptions::parallax_px, 0.0, 1000.0,
      "Median flow of features without their rotation after which a keyframe is due, pixels: below "
      "it a new one says little"},

@@ -99,7 +99,8 @@ constexpr OptionField<StereoMatchOptions> kMatchFields[] = {
      "near to things"},
     {"odometry-stereo-far", &StereoMatchOptions::farthest_m, 0.1, 10'000.0,
      "... and farthest, metres: a disparity of 4 pixels with 0.1 m between the cameras errs by a "
-     "quarter"},
+     "quarter",
+     "odometry-stereo-near"},
     {"odometry-stereo-patch", &StereoMatchOptions::patch_reach_px, 1, 31,
      "Patches that are matched reach this far beside the feature, pixels: noise against depth "
      "edges"},

@@ -10,8 +10,7 @@ constexpr OptionField<InertialOptions> kInertialFields[] = {
      "sways at a few hertz, which a straight line over this still follows"},
     {"inertial-rate-most", &InertialOptions::rate_max_rad_s, 1.0, 1e6,
      "Samples of a higher rate of turning are left out once odometry has started, radians / "
-     "second: "
-     "gyroscopes end at 35 to 70"},
+     "second: gyroscopes end at 35 to 70"},
     {"inertial-force-most", &InertialOptions::force_max_m_s2, 10.0, 1e6,
      "The same of accelerations, metres / second^2: units on robots end at 160 to 320"},
     {"inertial-gyro-shift", &InertialOptions::gyro_bias_shift_max, 0.0, 1.0,
@@ -74,8 +73,7 @@ constexpr OptionField<ImuFaultOptions> kImuFaultFields[] = {
      "differ by more"},
     {"inertial-fault-clipped", &ImuFaultOptions::clipped_count_min, 2, 1000,
      "Samples at one value in a row that make a peak a clipped one: slow peaks of coarse units "
-     "have "
-     "four"},
+     "have four"},
     {"inertial-fault-clipped-rate", &ImuFaultOptions::clipped_rate_min, 0.0, 100.0,
      "... at a rate of this or more, radians / second: no unit's range ends below 125 degrees / "
      "second"},

@@ -32,7 +32,7 @@ constexpr OptionField<WindowOptions> kWindowFields[] = {
     {"odometry-window-nearest", &WindowOptions::nearest_m, 0.01, 10.0,
      "Least distance of a landmark, metres: nearer ones are out of focus"},
     {"odometry-window-farthest", &WindowOptions::farthest_m, 1.0, 10'000.0,
-     "Largest distance of a landmark, metres: that of a large hall"},
+     "Largest distance of a landmark, metres: that of a large hall", "odometry-window-nearest"},
 };
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <string>
@@ -10,6 +11,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "ingest/config/option_flags.h"
+#include "ingest/odometry/estimator/odometry_options.h"
 #include "ingest/pipeline/ingest_log.h"
 #include "ingest/program/ingest_flags.h"
 #include "ingest/program/odometry_flags.h"
@@ -75,8 +77,19 @@ std::string Given(const BoundOption& field, double number) {
   return text;
 }
 
-// Another value in the range.
-double Other(const BoundOption& field) { return field.Get() == field.max ? field.min : field.max; }
+// Another value in the range, and on the right side of the range's other end.
+double Other(const BoundOption& field, const std::vector<BoundOption>& all) {
+  const auto is_end = [](const char* end, const BoundOption& of) {
+    return end != nullptr && std::string(end) == of.name;
+  };
+  double low = field.min;
+  double high = field.max;
+  for (const BoundOption& other : all) {
+    if (is_end(field.lower_end, other)) low = std::max(low, other.Get());
+    if (is_end(other.lower_end, field)) high = std::min(high, other.Get());
+  }
+  return field.Get() == high ? low : high;
+}
 
 TEST(Tuning, NamesAreUniqueAndDefaultsInRange) {
   Options options;
@@ -99,7 +112,7 @@ TEST(Tuning, EachFlagReachesItsStageAndNoOther) {
     const std::string name = field.name;
     // What only a network of the user's reads has a test of its own.
     if (name.rfind("person-look-", 0) == 0) continue;
-    absl::StatusOr<Options> options = Parse({Given(field, Other(field))});
+    absl::StatusOr<Options> options = Parse({Given(field, Other(field, defaults))});
     ASSERT_TRUE(options.ok()) << name << ": " << options.status();
     std::string changed;
     const std::vector<BoundOption> all = options->All();
@@ -107,7 +120,7 @@ TEST(Tuning, EachFlagReachesItsStageAndNoOther) {
       if (all[i].Get() != defaults[i].Get()) absl::StrAppend(&changed, all[i].name, " ");
     }
     EXPECT_EQ(changed, name + " ");
-    EXPECT_EQ(options->Find(all, name).Get(), Other(field)) << name;
+    EXPECT_EQ(options->Find(all, name).Get(), Other(field, defaults)) << name;
   }
 }
 
@@ -129,13 +142,36 @@ TEST(Tuning, EachNumberIsRefusedOutOfItsRange) {
   EXPECT_FALSE(Parse({"--track-lag=2.5"}).ok());
 }
 
+TEST(Tuning, EndsOfRangesAreThere) {
+  Options standard;
+  OdometryOptions odometry;
+  std::vector<BoundOption> all = standard.All();
+  for (const BoundOption& field : odometry.Bind()) all.push_back(field);
+  int count = 0;
+  for (const BoundOption& field : all) {
+    if (field.lower_end == nullptr) continue;
+    ++count;
+    const BoundOption& lower = standard.Find(all, field.lower_end);
+    EXPECT_LE(lower.Get(), field.Get()) << field.name;
+    EXPECT_LT(lower.min, field.max) << field.name;
+  }
+  EXPECT_GE(count, 18);
+  const auto options = Parse({"--place-body-low=0.5", "--place-body-high=0.3"});
+  ASSERT_FALSE(options.ok());
+  EXPECT_EQ(options.status().message(),
+            "place-body-low is 0.5, above place-body-high, which is 0.3; give at most that");
+  odometry.keyframe.period_ns_min = 2 * odometry.keyframe.period_ns_max;
+  EXPECT_FALSE(ValidateOptions(odometry).ok());
+}
+
 TEST(Tuning, PeopleTellEachNumberInTheirDigest) {
   for (const bool is_paper : {false, true}) {
     PeopleOptions options = is_paper ? PeopleOptions::Paper() : PeopleOptions();
     std::set<std::string> digests = {options.Digest()};
-    for (const BoundOption& field : Flat(options.Groups())) {
+    const std::vector<BoundOption> all = Flat(options.Groups());
+    for (const BoundOption& field : all) {
       const double before = field.Get();
-      field.Set(Other(field));
+      field.Set(Other(field, all));
       EXPECT_TRUE(options.Validate().ok()) << field.name;
       EXPECT_TRUE(digests.insert(options.Digest()).second) << field.name;
       field.Set(before);
@@ -154,7 +190,7 @@ TEST(Tuning, LoopClosuresTellEachNumberInTheirDigest) {
   const std::vector<BoundOption> all = options.Bind();
   for (const BoundOption& field : all) {
     const double before = field.Get();
-    field.Set(Other(field));
+    field.Set(Other(field, all));
     EXPECT_TRUE(ValidateOptions(options).ok()) << field.name;
     EXPECT_TRUE(digests.insert(DigestOptions(options)).second) << field.name;
     field.Set(before);
