@@ -2,13 +2,13 @@
 #include "ingest/odometry/inertial/marginalization.h"
 
 #include <ceres/cost_function.h>
-#include <ceres/loss_function.h>
 
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <iterator>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -25,8 +25,6 @@ using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::R
 // A direction of a dropped block that its factors tell less of than this share of what they tell of
 // the others is taken as not observed.
 constexpr double kObservedShareMin = 1e-10;
-
-int StepSizeOf(int block_size) { return block_size == kPoseBlockSize ? kPoseStepSize : block_size; }
 
 // The blocks of all factors, numbered in the order in which they appear.
 struct BlockTable {
@@ -104,14 +102,6 @@ Eigen::Index ColumnOf(const BlockTable& table, const std::vector<int>& blocks, i
 absl::StatusOr<Equations> Linearize(std::span<const WindowFactor> factors, size_t index,
                                     const BlockTable& table) {
   const WindowFactor& factor = factors[index];
-  const int row_count = factor.cost->num_residuals();
-  std::vector<RowMatrix> by_block;
-  std::vector<double*> outputs;
-  outputs.reserve(factor.blocks.size());
-  for (const int32_t size : factor.cost->parameter_block_sizes()) {
-    by_block.emplace_back(RowMatrix::Zero(row_count, size));
-  }
-  for (RowMatrix& jacobian : by_block) outputs.push_back(jacobian.data());
   std::vector<int> blocks;
   for (const double* block : factor.blocks) {
     const int number = table.index.at(block);
@@ -121,29 +111,19 @@ absl::StatusOr<Equations> Linearize(std::span<const WindowFactor> factors, size_
   if (std::adjacent_find(blocks.begin(), blocks.end()) != blocks.end()) {
     return BadFactor(index, factors.size(), "takes one block twice");
   }
-  Equations equations = Empty(table, std::move(blocks), row_count);
-  bool is_good =
-      factor.cost->Evaluate(factor.blocks.data(), equations.residual.data(), outputs.data()) &&
-      equations.residual.allFinite();
-  double weight = 1.0;
-  if (is_good && factor.loss != nullptr) {
-    double rho[3];
-    factor.loss->Evaluate(equations.residual.squaredNorm(), rho);
-    weight = std::sqrt(std::max(0.0, rho[1]));
-  }
-  for (size_t k = 0; k < by_block.size(); ++k) {
-    const int number = table.index.at(factor.blocks[k]);
-    is_good = is_good && by_block[k].allFinite();
-    if (!is_good || table.is_held[static_cast<size_t>(number)]) continue;
-    const Eigen::Index step_size = table.StepSize(number);
-    equations.jacobian.middleCols(ColumnOf(table, equations.blocks, number), step_size) =
-        weight * by_block[k].leftCols(step_size);
-  }
-  if (!is_good || !std::isfinite(weight)) {
+  const std::optional<LinearFactor> linear = Linearized(factor);
+  if (!linear.has_value()) {
     return BadFactor(index, factors.size(),
                      "is not finite where the window is; drop the window and begin anew");
   }
-  equations.residual *= weight;
+  Equations equations = Empty(table, std::move(blocks), linear->residual.size());
+  equations.residual = linear->residual;
+  for (size_t k = 0; k < linear->by_block.size(); ++k) {
+    const int number = table.index.at(factor.blocks[k]);
+    if (table.is_held[static_cast<size_t>(number)]) continue;
+    equations.jacobian.middleCols(ColumnOf(table, equations.blocks, number),
+                                  table.StepSize(number)) = linear->by_block[k];
+  }
   return equations;
 }
 

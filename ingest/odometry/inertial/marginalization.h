@@ -8,23 +8,13 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "ingest/odometry/inertial/linear_factor.h"
 
 namespace ceres {
 class CostFunction;
-class LossFunction;
-}  // namespace ceres
+}
 
 namespace dsg::ingest {
-
-/// A residual block as it was given to Ceres.
-struct WindowFactor {
-  const ceres::CostFunction* cost = nullptr;
-  /// Null: squares.
-  const ceres::LossFunction* loss = nullptr;
-  /// In the order of the cost function, each once. A block of seven numbers is a pose
-  /// (pose_block.h), others are vectors.
-  std::vector<double*> blocks;
-};
 
 /// residual + jacobian * (what the blocks have moved by since), squared and halved.
 struct LinearPrior {

@@ -2,23 +2,18 @@
 #include "ingest/odometry/window/factor_covariance.h"
 
 #include <ceres/cost_function.h>
-#include <ceres/loss_function.h>
 
 #include <Eigen/Cholesky>
-#include <algorithm>
-#include <cmath>
 #include <map>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "absl/container/flat_hash_map.h"
-#include "ingest/solver/pose_block.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
 namespace {
-
-using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 // Numbers of the blocks that are eliminated first.
 constexpr int kLandmarkSize = 3;
@@ -30,7 +25,7 @@ struct Columns {
 
   void Add(const double* block, int block_size) {
     if (block_size == kLandmarkSize || !first.try_emplace(block, count).second) return;
-    count += block_size == kPoseBlockSize ? kPoseStepSize : block_size;
+    count += StepSizeOf(block_size);
   }
 };
 
@@ -48,15 +43,6 @@ struct Normal {
   absl::flat_hash_map<const double*, size_t> landmark_of;
 };
 
-struct Linear {
-  struct Part {
-    const double* block;
-    bool is_landmark;
-    Eigen::MatrixXd jacobian;
-  };
-  std::vector<Part> parts;
-};
-
 absl::Status Undetermined() {
   return MakeError(Reason::kFieldInvalid,
                    "the window's covariance is not finite: its factors do not determine its "
@@ -64,54 +50,32 @@ absl::Status Undetermined() {
                    {{"field", "factors"}});
 }
 
-absl::StatusOr<Linear> LinearOf(const WindowFactor& factor) {
-  const int rows = factor.cost->num_residuals();
-  const auto& sizes = factor.cost->parameter_block_sizes();
-  Eigen::VectorXd residual(rows);
-  std::vector<RowMatrix> jacobians;
-  std::vector<double*> outputs;
-  for (const int size : sizes) jacobians.emplace_back(RowMatrix::Zero(rows, size));
-  for (RowMatrix& jacobian : jacobians) outputs.push_back(jacobian.data());
-  if (!factor.cost->Evaluate(factor.blocks.data(), residual.data(), outputs.data()) ||
-      !residual.allFinite()) {
-    return Undetermined();
-  }
-  double weight = 1.0;
-  if (factor.loss != nullptr) {
-    double rho[3];
-    factor.loss->Evaluate(residual.squaredNorm(), rho);
-    weight = std::sqrt(std::max(0.0, rho[1]));
-  }
-  Linear linear;
-  for (size_t k = 0; k < sizes.size(); ++k) {
-    const int step = sizes[k] == kPoseBlockSize ? kPoseStepSize : sizes[k];
-    linear.parts.push_back(
-        {factor.blocks[k], sizes[k] == kLandmarkSize, weight * jacobians[k].leftCols(step)});
-  }
-  return linear;
-}
-
-void AddTo(const Linear& linear, const Columns& columns, Normal* normal) {
-  for (const Linear::Part& a : linear.parts) {
-    if (a.is_landmark) {
+void AddTo(const WindowFactor& factor, const LinearFactor& linear, const Columns& columns,
+           Normal* normal) {
+  const auto is_landmark = [&](size_t k) { return linear.by_block[k].cols() == kLandmarkSize; };
+  for (size_t a = 0; a < factor.blocks.size(); ++a) {
+    const Eigen::MatrixXd& by_a = linear.by_block[a];
+    if (is_landmark(a)) {
       const auto [entry, is_new] =
-          normal->landmark_of.try_emplace(a.block, normal->landmarks.size());
+          normal->landmark_of.try_emplace(factor.blocks[a], normal->landmarks.size());
       if (is_new) normal->landmarks.emplace_back();
       LandmarkTerms& landmark = normal->landmarks[entry->second];
-      landmark.square += a.jacobian.transpose() * a.jacobian;
-      for (const Linear::Part& b : linear.parts) {
-        if (b.is_landmark) continue;
-        const Eigen::MatrixXd product = b.jacobian.transpose() * a.jacobian;
-        const auto [with, is_first] = landmark.with.try_emplace(columns.first.at(b.block), product);
+      landmark.square += by_a.transpose() * by_a;
+      for (size_t b = 0; b < factor.blocks.size(); ++b) {
+        if (is_landmark(b)) continue;
+        const Eigen::MatrixXd product = linear.by_block[b].transpose() * by_a;
+        const auto [with, is_first] =
+            landmark.with.try_emplace(columns.first.at(factor.blocks[b]), product);
         if (!is_first) with->second += product;
       }
       continue;
     }
-    const Eigen::Index row = columns.first.at(a.block);
-    for (const Linear::Part& b : linear.parts) {
-      if (b.is_landmark) continue;
-      normal->matrix.block(row, columns.first.at(b.block), a.jacobian.cols(), b.jacobian.cols()) +=
-          a.jacobian.transpose() * b.jacobian;
+    const Eigen::Index row = columns.first.at(factor.blocks[a]);
+    for (size_t b = 0; b < factor.blocks.size(); ++b) {
+      if (is_landmark(b)) continue;
+      const Eigen::MatrixXd& by_b = linear.by_block[b];
+      normal->matrix.block(row, columns.first.at(factor.blocks[b]), by_a.cols(), by_b.cols()) +=
+          by_a.transpose() * by_b;
     }
   }
 }
@@ -140,10 +104,12 @@ absl::StatusOr<Eigen::MatrixXd> CovarianceOf(std::span<const WindowFactor> facto
   normal.matrix = Eigen::MatrixXd::Zero(columns.count, columns.count);
   std::map<Eigen::Index, Eigen::Index> sizes_at;
   for (const WindowFactor& factor : factors) {
-    DSG_ASSIGN_OR_RETURN(const Linear linear, LinearOf(factor));
-    AddTo(linear, columns, &normal);
-    for (const Linear::Part& part : linear.parts) {
-      if (!part.is_landmark) sizes_at[columns.first.at(part.block)] = part.jacobian.cols();
+    const std::optional<LinearFactor> linear = Linearized(factor);
+    if (!linear.has_value()) return Undetermined();
+    AddTo(factor, *linear, columns, &normal);
+    for (size_t k = 0; k < factor.blocks.size(); ++k) {
+      const Eigen::Index size = linear->by_block[k].cols();
+      if (size != kLandmarkSize) sizes_at[columns.first.at(factor.blocks[k])] = size;
     }
   }
   for (const LandmarkTerms& terms : normal.landmarks) EliminateLandmark(terms, &normal.matrix);
