@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "ingest/odometry/frontend/relative_pose.h"
-#include "ingest/recognition/view_pose_internal.h"
+#include "ingest/recognition/view_sightings_internal.h"
 #include "schema/base/status.h"
 #include "schema/model/rotation.h"
 
@@ -69,11 +69,20 @@ int FewestParts(const KeyframeFeatures& from, const KeyframeFeatures& to,
   return std::min(from_parts.count(), to_parts.count());
 }
 
+std::vector<FeatureMatch> MatchesAt(const std::vector<FeatureMatch>& matches,
+                                    const std::vector<int>& indices) {
+  std::vector<FeatureMatch> chosen;
+  chosen.reserve(indices.size());
+  for (const int i : indices) chosen.push_back(matches[static_cast<size_t>(i)]);
+  return chosen;
+}
+
 // Of a pose that was found, whether it is believed.
 PlaceOutcome JudgedPose(const KeyframeFeatures& from, const KeyframeFeatures& to,
-                        const ViewPose& pose, const PlaceVerifierOptions& options) {
-  if (std::ssize(pose.inliers) < options.inlier_count_min) return PlaceOutcome::kTooFewInliers;
-  if (FewestParts(from, to, pose.inliers) < options.part_count_min) {
+                        const SightingPose& pose, const std::vector<FeatureMatch>& inliers,
+                        const PlaceVerifierOptions& options) {
+  if (std::ssize(inliers) < options.inlier_count_min) return PlaceOutcome::kTooFewInliers;
+  if (FewestParts(from, to, inliers) < options.part_count_min) {
     return PlaceOutcome::kClustered;
   }
   const bool is_loose =
@@ -87,7 +96,7 @@ PlaceOutcome JudgedPose(const KeyframeFeatures& from, const KeyframeFeatures& to
 
 // The pose of the bodies, with floors.
 void TakeBodyPose(const Pose3d& from_body_T_camera, const Pose3d& to_body_T_camera,
-                  const ViewPose& pose, const PlaceVerifierOptions& options,
+                  const SightingPose& pose, const PlaceVerifierOptions& options,
                   PlaceVerdict* verdict) {
   verdict->from_T_to = from_body_T_camera * pose.from_T_to * to_body_T_camera.Inverse();
   verdict->from_T_to.orientation.normalize();
@@ -101,28 +110,32 @@ void TakeBodyPose(const Pose3d& from_body_T_camera, const Pose3d& to_body_T_came
 }
 
 // Of matches of which some have a depth.
-void VerifyPoints(const KeyframeFeatures& from, const KeyframeFeatures& to,
-                  const std::vector<PointSighting>& sightings, const ViewPoseSearch& search,
-                  const PlaceVerifierOptions& options, PlaceVerdict* verdict) {
+void VerifyPoints(const KeyframeFeatures& from, const KeyframeFeatures& to, const cv::Mat1i& bits,
+                  const ViewSightings& view, const PlaceVerifierOptions& options,
+                  PlaceVerdict* verdict) {
+  const SightingPoseSearch search(
+      from.camera, to.camera, {options.chi_square_max, options.refine_count, options.consensus});
   verdict->outcome = PlaceOutcome::kDisagree;
-  const std::optional<Pose3d> first = search.Consensus(sightings, &verdict->draw_count);
+  const std::optional<Pose3d> first =
+      search.Consensus(view.sightings, std::nullopt, &verdict->draw_count);
   if (!first.has_value()) return;
   verdict->camera_from_T_to = *first;
-  const std::vector<FeatureMatch> near = search.MatchesNear(*first);
-  const std::optional<ViewPose> pose = search.Refined(search.SightingsOf(near), *first);
+  const ViewSightings near =
+      SightingsOf(from, to, MatchesNear(from, to, bits, search, *first, options));
+  const std::optional<SightingPose> pose = search.Refined(near.sightings, *first);
   verdict->outcome = PlaceOutcome::kLoose;
   if (!pose.has_value()) return;
   verdict->camera_from_T_to = pose->from_T_to;
   verdict->inlier_count = static_cast<int>(pose->inliers.size());
   verdict->chi_square_mean = pose->chi_square_mean;
-  verdict->agree_count = search.AgreeCount(sightings, pose->from_T_to);
+  verdict->agree_count = search.AgreeCount(view.sightings, pose->from_T_to);
   // What was found by a pose agrees with it, also with a wrong one; what was found before tells.
   if (verdict->agree_count < options.agree_count_min ||
       verdict->agree_count < options.agree_share_min * verdict->point_count) {
     verdict->outcome = PlaceOutcome::kTooFewInliers;
     return;
   }
-  verdict->outcome = JudgedPose(from, to, *pose, options);
+  verdict->outcome = JudgedPose(from, to, *pose, MatchesAt(near.matches, pose->inliers), options);
   if (verdict->outcome != PlaceOutcome::kVerified) return;
   TakeBodyPose(from.camera.body_T_camera, to.camera.body_T_camera, *pose, options, verdict);
 }
@@ -150,9 +163,7 @@ void VerifyBearings(const KeyframeFeatures& from, const KeyframeFeatures& to,
   if (pose.outcome != PoseOutcome::kFound && pose.outcome != PoseOutcome::kNoTranslation) return;
   verdict->camera_from_T_to = pose.first_T_second;
   verdict->agree_count = verdict->inlier_count = static_cast<int>(pose.inliers.size());
-  std::vector<FeatureMatch> inliers;
-  inliers.reserve(pose.inliers.size());
-  for (const int i : pose.inliers) inliers.push_back(matches[static_cast<size_t>(i)]);
+  const std::vector<FeatureMatch> inliers = MatchesAt(matches, pose.inliers);
   const double share = static_cast<double>(inliers.size()) / static_cast<double>(matches.size());
   if (verdict->inlier_count < options.mono_inlier_count_min ||
       share < options.mono_inlier_share_min) {
@@ -197,13 +208,12 @@ PlaceVerdict PlaceVerifier::Verify(const KeyframeFeatures& from, const KeyframeF
   PlaceVerdict verdict;
   const cv::Mat1i bits = BitsOfAllPairs(from, to);
   const std::vector<FeatureMatch> matches = MutualMatches(bits, options_);
-  const ViewPoseSearch search(from, to, bits, options_);
-  const std::vector<PointSighting> sightings = search.SightingsOf(matches);
+  const ViewSightings view = SightingsOf(from, to, matches);
   verdict.match_count = static_cast<int>(matches.size());
-  verdict.point_count = static_cast<int>(sightings.size());
+  verdict.point_count = static_cast<int>(view.sightings.size());
   if (verdict.match_count < options_.match_count_min) return verdict;
   if (verdict.point_count >= options_.match_count_min) {
-    VerifyPoints(from, to, sightings, search, options_, &verdict);
+    VerifyPoints(from, to, bits, view, options_, &verdict);
   } else {
     VerifyBearings(from, to, matches, options_, &verdict);
   }

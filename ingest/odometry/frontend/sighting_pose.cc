@@ -1,30 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "ingest/odometry/frontend/sighting_pose.h"
+
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <opencv2/calib3d.hpp>
-#include <tuple>
 #include <utility>
 
-#include "ingest/odometry/frontend/consensus.h"
-#include "ingest/recognition/view_pose_internal.h"
 #include "ingest/sensor/pinhole.h"
 #include "schema/model/rotation.h"
 
 namespace dsg::ingest {
 namespace {
 
-using Twist = Eigen::Matrix<double, 6, 1>;
-using TwistMatrix = Eigen::Matrix<double, 6, 6>;
-
 // Points nearer than this to the plane of a camera have no projection, metres. A condition of the
 // arithmetic, no option.
 constexpr double kDepthMinM = 0.05;
 constexpr int kSampleOfThree = 3;
 
-Pose3d MovedOnTheRight(const Pose3d& pose, const Twist& twist) {
+Pose3d MovedOnTheRight(const Pose3d& pose, const Vector6d& twist) {
   return pose * Pose3d{twist.head<3>(), RotationOf(twist.tail<3>())};
 }
 
@@ -52,7 +46,7 @@ std::vector<cv::Point2d> OnUnitPlane(const CameraCalibration& camera,
 
 // Whitened: of unit variance but for what the depth of the point adds along `along`. Rows are
 // column, row and inverse depth; those that there are not are 0.
-struct ViewPoseSearch::SightingError {
+struct SightingPoseSearch::SightingError {
   bool is_before = false;
   Eigen::Vector3d error = Eigen::Vector3d::Zero();
   Eigen::Vector3d along = Eigen::Vector3d::Zero();
@@ -70,58 +64,24 @@ struct ViewPoseSearch::SightingError {
   }
 };
 
-struct ViewPoseSearch::ScoredPose {
+struct SightingPoseSearch::ScoredPose {
   Pose3d from_T_to;
   double cost = std::numeric_limits<double>::infinity();
   int agree_count = 0;
 };
 
-struct ViewPoseSearch::PoseEquations {
-  TwistMatrix matrix = TwistMatrix::Zero();
-  Twist right_side = Twist::Zero();
+struct SightingPoseSearch::PoseEquations {
+  Matrix6d matrix = Matrix6d::Zero();
+  Vector6d right_side = Vector6d::Zero();
   double chi_square = 0.0;
   int row_count = 0;
 };
 
-PointSighting ViewPoseSearch::SightingOf(const FeatureMatch& match, bool is_forward) const {
-  const KeyframeFeatures& knows = is_forward ? from_ : to_;
-  const KeyframeFeatures& sees = is_forward ? to_ : from_;
-  const KeyframeFeature& known =
-      knows.features[static_cast<size_t>(is_forward ? match.from : match.to)];
-  const KeyframeFeature& seen =
-      sees.features[static_cast<size_t>(is_forward ? match.to : match.from)];
-  const Eigen::Vector3d ray = PinholeRay(knows.camera, known.pixel.x(), known.pixel.y());
-  PointSighting sighting;
-  sighting.match = match;
-  sighting.is_forward = is_forward;
-  sighting.point = double{known.depth_m} * ray;
-  sighting.depth_step = double{known.depth_sigma_m} * ray;
-  sighting.aside_sigma_m = double{known.depth_m} * known.pixel_sigma_px / knows.camera.fx;
-  sighting.pixel = seen.pixel.cast<double>();
-  sighting.pixel_sigma_px = seen.pixel_sigma_px;
-  if (seen.depth_m > 0.0f && seen.depth_sigma_m > 0.0f) {
-    sighting.inverse_depth = 1.0 / seen.depth_m;
-    sighting.inverse_sigma = seen.depth_sigma_m / (double{seen.depth_m} * seen.depth_m);
-  }
-  return sighting;
-}
-
-std::vector<PointSighting> ViewPoseSearch::SightingsOf(
-    const std::vector<FeatureMatch>& matches) const {
-  std::vector<PointSighting> sightings;
-  for (const FeatureMatch& match : matches) {
-    const bool from_knows = from_.features[static_cast<size_t>(match.from)].depth_m > 0.0f;
-    const bool to_knows = to_.features[static_cast<size_t>(match.to)].depth_m > 0.0f;
-    if (from_knows || to_knows) sightings.push_back(SightingOf(match, from_knows));
-  }
-  return sightings;
-}
-
-ViewPoseSearch::SightingError ViewPoseSearch::ErrorOf(const PointSighting& sighting,
-                                                      const Pose3d& from_T_to,
-                                                      const Pose3d& to_T_from) const {
+SightingPoseSearch::SightingError SightingPoseSearch::ErrorOf(const PointSighting& sighting,
+                                                              const Pose3d& from_T_to,
+                                                              const Pose3d& to_T_from) const {
   const Pose3d& sees_T_knows = sighting.is_forward ? to_T_from : from_T_to;
-  const CameraCalibration& camera = sighting.is_forward ? to_.camera : from_.camera;
+  const CameraCalibration& camera = sighting.is_forward ? to_ : from_;
   SightingError result;
   result.seen_point = sees_T_knows * sighting.point;
   const double depth_m = result.seen_point.z();
@@ -143,8 +103,9 @@ ViewPoseSearch::SightingError ViewPoseSearch::ErrorOf(const PointSighting& sight
   return result;
 }
 
-ViewPoseSearch::ScoredPose ViewPoseSearch::ScoreOf(const std::vector<PointSighting>& sightings,
-                                                   const Pose3d& from_T_to, double limit) const {
+SightingPoseSearch::ScoredPose SightingPoseSearch::ScoreOf(std::span<const PointSighting> sightings,
+                                                           const Pose3d& from_T_to,
+                                                           double limit) const {
   const Pose3d to_T_from = from_T_to.Inverse();
   ScoredPose scored{from_T_to, 0.0, 0};
   for (const PointSighting& sighting : sightings) {
@@ -159,8 +120,8 @@ ViewPoseSearch::ScoredPose ViewPoseSearch::ScoreOf(const std::vector<PointSighti
   return scored;
 }
 
-ViewPoseSearch::PoseEquations ViewPoseSearch::EquationsAt(
-    const std::vector<PointSighting>& sightings, const Pose3d& from_T_to, bool is_robust) const {
+SightingPoseSearch::PoseEquations SightingPoseSearch::EquationsAt(
+    std::span<const PointSighting> sightings, const Pose3d& from_T_to, bool is_robust) const {
   const Pose3d to_T_from = from_T_to.Inverse();
   const Eigen::Matrix3d turn = from_T_to.orientation.toRotationMatrix();
   PoseEquations equations;
@@ -187,11 +148,11 @@ ViewPoseSearch::PoseEquations ViewPoseSearch::EquationsAt(
   return equations;
 }
 
-ViewPoseSearch::ScoredPose ViewPoseSearch::Improved(const std::vector<PointSighting>& sightings,
-                                                    ScoredPose pose) const {
+SightingPoseSearch::ScoredPose SightingPoseSearch::Improved(
+    std::span<const PointSighting> sightings, ScoredPose pose) const {
   for (int i = 0; i < options_.refine_count; ++i) {
     const PoseEquations equations = EquationsAt(sightings, pose.from_T_to, /*is_robust=*/true);
-    const Twist step = equations.matrix.ldlt().solve(equations.right_side);
+    const Vector6d step = equations.matrix.ldlt().solve(equations.right_side);
     if (!step.allFinite()) break;
     const ScoredPose next = ScoreOf(sightings, MovedOnTheRight(pose.from_T_to, step), pose.cost);
     if (!(next.cost < pose.cost)) break;
@@ -200,8 +161,8 @@ ViewPoseSearch::ScoredPose ViewPoseSearch::Improved(const std::vector<PointSight
   return pose;
 }
 
-std::vector<Pose3d> ViewPoseSearch::PosesOfThree(const std::vector<PointSighting>& sightings,
-                                                 const std::vector<size_t>& three) const {
+std::vector<Pose3d> SightingPoseSearch::PosesOfThree(std::span<const PointSighting> sightings,
+                                                     std::span<const size_t> three) const {
   const bool is_forward = sightings[three.front()].is_forward;
   std::vector<cv::Point3d> points;
   std::vector<Eigen::Vector2d> pixels;
@@ -212,8 +173,8 @@ std::vector<Pose3d> ViewPoseSearch::PosesOfThree(const std::vector<PointSighting
   }
   std::vector<cv::Vec3d> turns;
   std::vector<cv::Vec3d> shifts;
-  cv::solveP3P(points, OnUnitPlane(is_forward ? to_.camera : from_.camera, pixels),
-               cv::Matx33d::eye(), cv::noArray(), turns, shifts, cv::SOLVEPNP_AP3P);
+  cv::solveP3P(points, OnUnitPlane(is_forward ? to_ : from_, pixels), cv::Matx33d::eye(),
+               cv::noArray(), turns, shifts, cv::SOLVEPNP_AP3P);
   std::vector<Pose3d> poses;
   for (size_t i = 0; i < turns.size(); ++i) {
     const Pose3d sees_T_knows{{shifts[i][0], shifts[i][1], shifts[i][2]},
@@ -226,9 +187,9 @@ std::vector<Pose3d> ViewPoseSearch::PosesOfThree(const std::vector<PointSighting
   return poses;
 }
 
-std::optional<Pose3d> ViewPoseSearch::Consensus(const std::vector<PointSighting>& sightings,
-                                                int* draw_count) const {
-  // Samples are of one kind, the one that there is more of.
+std::optional<Pose3d> SightingPoseSearch::Consensus(std::span<const PointSighting> sightings,
+                                                    const std::optional<Pose3d>& guess,
+                                                    int* draw_count) const {
   std::vector<size_t> forward;
   std::vector<size_t> backward;
   for (size_t i = 0; i < sightings.size(); ++i) {
@@ -236,8 +197,16 @@ std::optional<Pose3d> ViewPoseSearch::Consensus(const std::vector<PointSighting>
   }
   const std::vector<size_t>& kind = forward.size() >= backward.size() ? forward : backward;
   if (std::ssize(kind) < kSampleOfThree) return std::nullopt;
-  ScoredPose best;
   SampleDraws draws(static_cast<int>(kind.size()), kSampleOfThree, options_.consensus);
+  // Of the kind that is drawn at most as many are right as of all.
+  const auto note = [&](const ScoredPose& pose) {
+    draws.NoteAgreement(std::min(pose.agree_count, static_cast<int>(kind.size())));
+  };
+  ScoredPose best;
+  if (guess.has_value()) {
+    best = Improved(sightings, ScoreOf(sightings, *guess));
+    note(best);
+  }
   for (auto sample = draws.Next(); !sample.empty(); sample = draws.Next()) {
     std::vector<size_t> three;
     for (const int i : sample) three.push_back(kind[static_cast<size_t>(i)]);
@@ -245,8 +214,7 @@ std::optional<Pose3d> ViewPoseSearch::Consensus(const std::vector<PointSighting>
       const ScoredPose scored = ScoreOf(sightings, pose, best.cost);
       if (!(scored.cost < best.cost)) continue;
       best = Improved(sightings, scored);
-      // Of the kind that is drawn at most as many are right as of all.
-      draws.NoteAgreement(std::min(best.agree_count, static_cast<int>(kind.size())));
+      note(best);
     }
   }
   *draw_count = draws.drawn_count();
@@ -256,75 +224,43 @@ std::optional<Pose3d> ViewPoseSearch::Consensus(const std::vector<PointSighting>
   return best.from_T_to;
 }
 
-int ViewPoseSearch::AgreeCount(const std::vector<PointSighting>& sightings,
-                               const Pose3d& from_T_to) const {
-  return ScoreOf(sightings, from_T_to, std::numeric_limits<double>::infinity()).agree_count;
+int SightingPoseSearch::AgreeCount(std::span<const PointSighting> sightings,
+                                   const Pose3d& from_T_to) const {
+  return ScoreOf(sightings, from_T_to).agree_count;
 }
 
-std::vector<FeatureMatch> ViewPoseSearch::MatchesNear(const Pose3d& from_T_to) const {
-  const Pose3d to_T_from = from_T_to.Inverse();
-  // Bits, then both features: the most alike ones first.
-  std::vector<std::tuple<int, int, int>> near;
-  for (int i = 0; i < static_cast<int>(from_.features.size()); ++i) {
-    const bool from_knows = from_.features[static_cast<size_t>(i)].depth_m > 0.0f;
-    for (int k = 0; k < static_cast<int>(to_.features.size()); ++k) {
-      const int bits = bits_(i, k);
-      if (bits > options_.search_bits_max) continue;
-      const bool to_knows = to_.features[static_cast<size_t>(k)].depth_m > 0.0f;
-      if (!from_knows && !to_knows) continue;
-      const PointSighting sighting = SightingOf({i, k}, from_knows);
-      const SightingError error = ErrorOf(sighting, from_T_to, to_T_from);
-      if (!error.is_before) continue;
-      // What the first pose errs by comes on top of what the match does.
-      const double reach =
-          std::max(options_.search_sigmas, options_.search_px / sighting.pixel_sigma_px);
-      if (error.ChiSquare() <= reach * reach) near.emplace_back(bits, i, k);
-    }
-  }
-  std::sort(near.begin(), near.end());
-  std::vector<uint8_t> is_from_taken(from_.features.size(), 0);
-  std::vector<uint8_t> is_to_taken(to_.features.size(), 0);
-  std::vector<FeatureMatch> matches;
-  for (const auto& [bits, i, k] : near) {
-    uint8_t& from_taken = is_from_taken[static_cast<size_t>(i)];
-    uint8_t& to_taken = is_to_taken[static_cast<size_t>(k)];
-    if (from_taken != 0 || to_taken != 0) continue;
-    from_taken = to_taken = 1;
-    matches.push_back({i, k});
-  }
-  std::sort(matches.begin(), matches.end(),
-            [](const FeatureMatch& a, const FeatureMatch& b) { return a.from < b.from; });
-  return matches;
+double SightingPoseSearch::ChiSquareOf(const PointSighting& sighting, const Pose3d& from_T_to,
+                                       const Pose3d& to_T_from) const {
+  return ErrorOf(sighting, from_T_to, to_T_from).ChiSquare();
 }
 
-std::optional<ViewPose> ViewPoseSearch::Refined(const std::vector<PointSighting>& sightings,
-                                                const Pose3d& start) const {
-  ScoredPose pose =
-      Improved(sightings, ScoreOf(sightings, start, std::numeric_limits<double>::infinity()));
+std::optional<SightingPose> SightingPoseSearch::Refined(std::span<const PointSighting> sightings,
+                                                        const Pose3d& start) const {
+  ScoredPose pose = Improved(sightings, ScoreOf(sightings, start));
   // Least squares of what agrees, which has a covariance.
   PoseEquations equations;
   for (int i = 0; i <= options_.refine_count; ++i) {
     equations = EquationsAt(sightings, pose.from_T_to, /*is_robust=*/false);
     if (i == options_.refine_count) break;
-    const Twist step = equations.matrix.ldlt().solve(equations.right_side);
+    const Vector6d step = equations.matrix.ldlt().solve(equations.right_side);
     if (!step.allFinite()) return std::nullopt;
     pose.from_T_to = MovedOnTheRight(pose.from_T_to, step);
   }
-  const Eigen::LLT<TwistMatrix> factor(equations.matrix);
-  const int freedom = equations.row_count - static_cast<int>(Twist::RowsAtCompileTime);
+  const Eigen::LLT<Matrix6d> factor(equations.matrix);
+  const int freedom = equations.row_count - static_cast<int>(Vector6d::RowsAtCompileTime);
   if (factor.info() != Eigen::Success || freedom <= 0) return std::nullopt;
-  ViewPose result;
+  SightingPose result;
   result.from_T_to = pose.from_T_to;
   result.from_T_to.orientation.normalize();
   result.chi_square_mean = equations.chi_square / freedom;
-  const TwistMatrix covariance =
-      std::max(1.0, result.chi_square_mean) * factor.solve(TwistMatrix::Identity());
+  const Matrix6d covariance =
+      std::max(1.0, result.chi_square_mean) * factor.solve(Matrix6d::Identity());
   result.covariance = 0.5 * (covariance + covariance.transpose());
   if (!result.covariance.allFinite()) return std::nullopt;
   const Pose3d to_T_from = result.from_T_to.Inverse();
-  for (const PointSighting& sighting : sightings) {
-    if (ErrorOf(sighting, result.from_T_to, to_T_from).ChiSquare() <= options_.chi_square_max) {
-      result.inliers.push_back(sighting.match);
+  for (size_t i = 0; i < sightings.size(); ++i) {
+    if (ChiSquareOf(sightings[i], result.from_T_to, to_T_from) <= options_.chi_square_max) {
+      result.inliers.push_back(static_cast<int>(i));
     }
   }
   return result;
