@@ -42,7 +42,8 @@ class SlidingWindow::Impl {
         options_(options),
         manifold_(MakePoseManifold()),
         loss_(options.huber_sigmas),
-        slots_(static_cast<size_t>(options.keyframe_count) + 1) {}
+        slots_(static_cast<size_t>(options.keyframe_count) + 1),
+        landmarks_(model, options) {}
 
   absl::Status Begin(TimeNs time_ns, const AlignedState& aligned,
                      std::span<const FeatureSight> sights) {
@@ -52,9 +53,8 @@ class SlidingWindow::Impl {
     }
     BeginKeyframes(time_ns, aligned.state, /*has_unit=*/true);
     SetFirstPrior(root.matrixL().solve(Matrix15d::Identity()));
-    AddSights(sights);
-    Anchor();
-    TellLandmarks();
+    SeeLandmarks(sights);
+    told_landmarks_ = landmarks_.Told(Poses());
     return absl::OkStatus();
   }
 
@@ -66,9 +66,8 @@ class SlidingWindow::Impl {
     }
     BeginKeyframes(time_ns, {.map_T_imu = map_T_imu}, /*has_unit=*/false);
     SetFirstPrior(root.matrixL().solve(Matrix6d::Identity()));
-    AddSights(sights);
-    Anchor();
-    TellLandmarks();
+    SeeLandmarks(sights);
+    told_landmarks_ = landmarks_.Told(Poses());
     return absl::OkStatus();
   }
 
@@ -100,7 +99,7 @@ class SlidingWindow::Impl {
   absl::StatusOr<Matrix15d> NewestCovariance() const {
     std::vector<LandmarkBlock> blocks;
     const FactorList list = Factors(&blocks);
-    StateSlot& slot = slots_[keyframes_.back().slot];
+    StateSlot& slot = SlotOf(keyframes_.back().number);
     double* const wanted[] = {slot.pose.data(), slot.speed.data()};
     DSG_ASSIGN_OR_RETURN(const Eigen::MatrixXd covariance, CovarianceOf(list.factors, wanted));
     return Matrix15d(covariance);
@@ -109,22 +108,17 @@ class SlidingWindow::Impl {
   absl::StatusOr<Matrix6d> NewestPoseCovariance() const {
     std::vector<LandmarkBlock> blocks;
     const FactorList list = Factors(&blocks);
-    double* const wanted[] = {slots_[keyframes_.back().slot].pose.data()};
+    double* const wanted[] = {SlotOf(keyframes_.back().number).pose.data()};
     DSG_ASSIGN_OR_RETURN(const Eigen::MatrixXd covariance, CovarianceOf(list.factors, wanted));
     return Matrix6d(covariance);
   }
 
   std::optional<Vector3d> PointOf(int64_t feature_id) const {
-    const auto entry = landmarks_.find(feature_id);
-    if (entry == landmarks_.end() || !entry->second.anchor.has_value()) return std::nullopt;
-    const Landmark& landmark = entry->second;
-    // What is infinitely far is a direction.
-    if (!(landmark.block[2] > 0.0)) return std::nullopt;
-    const Vector3d ray(landmark.block[0], landmark.block[1], 1.0);
-    const Pose3d map_T_anchor = PoseOf(*Find(landmark.anchor_keyframe())) * model_.imu_T_camera;
-    return map_T_anchor * (ray / landmark.block[2]);
+    if (keyframes_.empty()) return std::nullopt;
+    return landmarks_.PointOf(feature_id, Poses());
   }
 
+  double misfit() const { return misfit_; }
   StereoError& stereo_error() const { return slots_.front().stereo_error; }
   const std::vector<int64_t>& dropped() const { return dropped_; }
   const std::vector<SeenLandmark>& landmarks() const { return told_landmarks_; }
@@ -142,25 +136,8 @@ class SlidingWindow::Impl {
     /// Ascending; never used again.
     int64_t number = 0;
     TimeNs time_ns = 0;
-    size_t slot = 0;
     /// From the keyframe before; null of the first one, and of all without a unit.
     std::unique_ptr<Preintegration> measured;
-  };
-
-  struct Sight {
-    int64_t keyframe = 0;
-    LandmarkSight seen;
-  };
-
-  struct Landmark {
-    std::vector<Sight> sights;
-    /// Of `sights`, once the distance is known.
-    std::optional<size_t> anchor;
-    LandmarkBlock block{};
-
-    int64_t anchor_keyframe() const { return sights[*anchor].keyframe; }
-    /// A landmark that one image saw tells nothing of the keyframes.
-    bool tells() const { return anchor.has_value() && sights.size() > 1; }
   };
 
   // The window's factors at one moment; the blocks are those of the window.
@@ -181,23 +158,28 @@ class SlidingWindow::Impl {
   static constexpr double kFarMisses = 10.0;
 
   InertialState StateOf(const Keyframe& keyframe) const {
-    const StateSlot& slot = slots_[keyframe.slot];
+    const StateSlot& slot = SlotOf(keyframe.number);
     return StateOfBlocks(slot.pose.data(), slot.speed.data());
   }
-  Pose3d PoseOf(const Keyframe& keyframe) const {
-    return PoseOfBlock(slots_[keyframe.slot].pose.data());
+  // Slots go by turn: where the blocks are in memory, by which Ceres sorts them, follows from the
+  // calls alone.
+  StateSlot& SlotOf(int64_t number) const {
+    return slots_[static_cast<size_t>(number) % slots_.size()];
   }
-  const Keyframe* Find(int64_t number) const {
-    const auto index = static_cast<size_t>(number - keyframes_.front().number);
-    return number < keyframes_.front().number || index >= keyframes_.size() ? nullptr
-                                                                            : &keyframes_[index];
+  WindowPoses Poses() const {
+    WindowPoses poses{keyframes_.front().number, {}, stereo_error()};
+    for (const Keyframe& keyframe : keyframes_) {
+      poses.map_T_imu.push_back(PoseOfBlock(SlotOf(keyframe.number).pose.data()));
+    }
+    return poses;
   }
 
   // Forgets all, what was learnt of the calibration, too: it may have been why one got lost.
   void BeginKeyframes(TimeNs time_ns, const InertialState& state, bool has_unit) {
     keyframes_.clear();
-    landmarks_.clear();
+    landmarks_.Clear();
     dropped_.clear();
+    misfit_ = 0.0;
     has_unit_ = has_unit;
     stereo_error() = {};
     AddKeyframe(time_ns, state, nullptr);
@@ -205,7 +187,7 @@ class SlidingWindow::Impl {
 
   // Of the first state, by the root of its information, and of the calibration.
   void SetFirstPrior(const Eigen::MatrixXd& root) {
-    StateSlot& slot = slots_[keyframes_.back().slot];
+    StateSlot& slot = SlotOf(keyframes_.back().number);
     const auto size = root.rows();
     LinearPrior prior;
     const auto add = [&](std::span<double> block) {
@@ -226,35 +208,38 @@ class SlidingWindow::Impl {
 
   // With the newest keyframe, which has come without its sights.
   absl::Status Estimate(std::span<const FeatureSight> sights) {
-    AddSights(sights);
-    Anchor();
+    SeeLandmarks(sights);
     DropMisfits(kFarMisses);
     DSG_RETURN_IF_ERROR(Solve());
     DSG_RETURN_IF_ERROR(Reintegrate());
     DropMisfits(1.0);
-    TellLandmarks();
+    told_landmarks_ = landmarks_.Told(Poses());
     if (keyframes_.size() > static_cast<size_t>(options_.keyframe_count)) {
       DSG_RETURN_IF_ERROR(DropOldest());
     }
-    ForgetLost();
+    landmarks_.ForgetLost(keyframes_.back().number);
     return absl::OkStatus();
   }
 
-  // Slots go by turn: where the blocks are in memory, by which Ceres sorts them, follows from the
-  // calls alone.
+  // Those that the newest keyframe sees, by the poses of now.
+  void SeeLandmarks(std::span<const FeatureSight> sights) {
+    landmarks_.AddSights(keyframes_.back().number, sights);
+    landmarks_.Anchor(Poses());
+  }
+
+  // Landmarks that miss by more than `times` the limit are dropped.
+  void DropMisfits(double times) {
+    std::vector<int64_t> dropped = landmarks_.DropMisfits(times * options_.miss_px_max, Poses());
+    dropped_.insert(dropped_.end(), dropped.begin(), dropped.end());
+    std::sort(dropped_.begin(), dropped_.end());
+  }
+
   void AddKeyframe(TimeNs time_ns, const InertialState& state,
                    std::unique_ptr<Preintegration> measured) {
     const int64_t number = next_number_++;
-    const size_t slot = static_cast<size_t>(number) % slots_.size();
-    WritePoseBlock(state.map_T_imu, slots_[slot].pose.data());
-    WriteSpeedBlock(state, slots_[slot].speed.data());
-    keyframes_.push_back({number, time_ns, slot, std::move(measured)});
-  }
-
-  void AddSights(std::span<const FeatureSight> sights) {
-    for (const FeatureSight& sight : sights) {
-      landmarks_[sight.feature_id].sights.push_back({keyframes_.back().number, sight.sight});
-    }
+    WritePoseBlock(state.map_T_imu, SlotOf(number).pose.data());
+    WriteSpeedBlock(state, SlotOf(number).speed.data());
+    keyframes_.push_back({number, time_ns, std::move(measured)});
   }
 
   void SetPrior(LinearPrior prior) {
@@ -262,138 +247,39 @@ class SlidingWindow::Impl {
     prior_ = prior.residual.size() > 0 ? MakePriorFactor(std::move(prior)) : nullptr;
   }
 
-  // Finds the distances of landmarks that have none yet.
-  void Anchor() {
-    for (auto& [id, landmark] : landmarks_) {
-      if (landmark.anchor.has_value()) continue;
-      if (!AnchorByDisparity(&landmark)) AnchorByParallax(&landmark);
-    }
-  }
-
-  bool IsNearEnough(double inverse_depth) const {
-    return inverse_depth * options_.farthest_m >= 1.0 && inverse_depth * options_.nearest_m <= 1.0;
-  }
-
-  void SetAnchor(size_t sight, double inverse_depth, Landmark* landmark) const {
-    const Vector3d ray = model_.RayOf(landmark->sights[sight].seen.pixel);
-    landmark->anchor = sight;
-    landmark->block = {ray.x(), ray.y(), inverse_depth};
-  }
-
-  bool AnchorByDisparity(Landmark* landmark) {
-    for (size_t i = 0; i < landmark->sights.size(); ++i) {
-      const std::optional<double>& disparity_px = landmark->sights[i].seen.disparity_px;
-      if (!disparity_px.has_value()) continue;
-      const double inverse_depth = InverseDepthOf(model_, stereo_error(), *disparity_px);
-      if (!IsNearEnough(inverse_depth)) continue;
-      SetAnchor(i, inverse_depth, landmark);
-      return true;
-    }
-    return false;
-  }
-
-  // Where the first ray and the last one come nearest to each other.
-  void AnchorByParallax(Landmark* landmark) {
-    if (landmark->sights.size() < 2) return;
-    const Sight& first = landmark->sights.front();
-    const Sight& last = landmark->sights.back();
-    const Pose3d map_T_first = PoseOf(*Find(first.keyframe)) * model_.imu_T_camera;
-    const Pose3d map_T_last = PoseOf(*Find(last.keyframe)) * model_.imu_T_camera;
-    const Vector3d a = map_T_first.orientation * model_.RayOf(first.seen.pixel);
-    const Vector3d b = map_T_last.orientation * model_.RayOf(last.seen.pixel);
-    const double sine_square = a.cross(b).squaredNorm() / (a.squaredNorm() * b.squaredNorm());
-    const double sine_min = std::sin(options_.parallax_deg_min * M_PI / 180.0);
-    if (sine_square < sine_min * sine_min) return;
-    const Vector3d way = map_T_last.position - map_T_first.position;
-    // s a - t b = way, least squares.
-    const double det = a.dot(b) * a.dot(b) - a.squaredNorm() * b.squaredNorm();
-    const double depth = (b.dot(way) * a.dot(b) - a.dot(way) * b.squaredNorm()) / det;
-    if (!(depth > 0.0) || !IsNearEnough(1.0 / depth)) return;
-    SetAnchor(0, 1.0 / depth, landmark);
-    if (!(MissOf(*landmark) <= options_.miss_px_max)) landmark->anchor.reset();
-  }
-
-  // Mean miss of its sights, pixels; infinite if one is not before the camera.
-  double MissOf(const Landmark& landmark) const {
-    const Pose3d map_T_anchor = PoseOf(*Find(landmark.anchor_keyframe()));
-    double sum = 0.0;
-    double disparity_sum = 0.0;
-    for (const Sight& sight : landmark.sights) {
-      const std::optional<Vector3d> error =
-          SightErrorOf(model_, map_T_anchor, PoseOf(*Find(sight.keyframe)), sight.seen,
-                       landmark.block, stereo_error());
-      if (!error.has_value()) return std::numeric_limits<double>::infinity();
-      sum += error->head<2>().norm();
-      disparity_sum += std::abs(error->z());
-    }
-    return std::max(sum, disparity_sum) / static_cast<double>(landmark.sights.size());
-  }
-
-  void TellLandmarks() {
-    told_landmarks_.clear();
-    for (const auto& [id, landmark] : landmarks_) {
-      const std::optional<Vector3d> point = PointOf(id);
-      if (!point.has_value()) continue;
-      SeenLandmark told{id, *point, {}, 0};
-      told.sight_count = static_cast<int>(landmark.sights.size());
-      const Sight& last = landmark.sights.back();
-      if (last.keyframe == keyframes_.back().number) told.pixel = last.seen.pixel;
-      told_landmarks_.push_back(told);
-    }
-  }
-
-  // Landmarks that miss by more than `times` the limit are dropped.
-  void DropMisfits(double times) {
-    for (auto entry = landmarks_.begin(); entry != landmarks_.end();) {
-      const Landmark& landmark = entry->second;
-      const bool fits =
-          !landmark.anchor.has_value() ||
-          (IsNearEnough(landmark.block[2]) && MissOf(landmark) <= times * options_.miss_px_max);
-      if (fits) {
-        ++entry;
-        continue;
-      }
-      if (landmark.sights.back().keyframe == keyframes_.back().number) {
-        dropped_.push_back(entry->first);
-      }
-      entry = landmarks_.erase(entry);
-    }
-    std::sort(dropped_.begin(), dropped_.end());
-  }
-
   // `blocks` holds the landmarks that tell something, in their order: memory is ordered as they
   // are, by which Ceres sorts.
   FactorList Factors(std::vector<LandmarkBlock>* blocks) const {
     blocks->clear();
-    for (const auto& [id, landmark] : landmarks_) {
+    for (const auto& [id, landmark] : landmarks_.all()) {
       if (landmark.tells()) blocks->push_back(landmark.block);
     }
     FactorList list;
     if (prior_ != nullptr) list.factors.push_back({prior_.get(), nullptr, prior_blocks_});
     for (size_t i = 1; i < keyframes_.size() && has_unit_; ++i) AddInertial(i, &list);
     size_t index = 0;
-    for (const auto& [id, landmark] : landmarks_) {
+    for (const auto& [id, landmark] : landmarks_.all()) {
       if (landmark.tells()) AddSightsOf(landmark, (*blocks)[index++].data(), &list);
     }
     return list;
   }
 
   void AddInertial(size_t i, FactorList* list) const {
-    StateSlot& from = slots_[keyframes_[i - 1].slot];
-    StateSlot& to = slots_[keyframes_[i].slot];
+    StateSlot& from = SlotOf(keyframes_[i - 1].number);
+    StateSlot& to = SlotOf(keyframes_[i].number);
     list->Add(MakeInertialFactor(keyframes_[i].measured.get(), gravity_map_), nullptr,
               {from.pose.data(), from.speed.data(), to.pose.data(), to.speed.data()});
   }
 
-  void AddSightsOf(const Landmark& landmark, double* block, FactorList* list) const {
+  void AddSightsOf(const WindowLandmark& landmark, double* block, FactorList* list) const {
     const SightNoise noise{options_.pixel_sigma_px, options_.disparity_sigma_px};
-    double* const anchor_pose = slots_[Find(landmark.anchor_keyframe())->slot].pose.data();
+    double* const anchor_pose = SlotOf(landmark.anchor_keyframe()).pose.data();
     list->landmarks.push_back(block);
     for (size_t i = 0; i < landmark.sights.size(); ++i) {
-      const Sight& sight = landmark.sights[i];
+      const WindowLandmark::Sight& sight = landmark.sights[i];
       std::vector<double*> blocks = {block};
       if (i != *landmark.anchor) {
-        blocks = {anchor_pose, slots_[Find(sight.keyframe)->slot].pose.data(), block};
+        blocks = {anchor_pose, SlotOf(sight.keyframe).pose.data(), block};
       }
       if (sight.seen.disparity_px.has_value()) blocks.push_back(stereo_error().data());
       list->Add(i == *landmark.anchor ? MakeAnchorFactor(model_, sight.seen, noise)
@@ -412,7 +298,7 @@ class SlidingWindow::Impl {
     ceres::Problem problem(problem_options);
     auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
     for (const Keyframe& keyframe : keyframes_) {
-      StateSlot& slot = slots_[keyframe.slot];
+      StateSlot& slot = SlotOf(keyframe.number);
       problem.AddParameterBlock(slot.pose.data(), kPoseBlockSize, manifold_.get());
       ordering->AddElementToGroup(slot.pose.data(), 1);
       if (!has_unit_) continue;
@@ -442,9 +328,11 @@ class SlidingWindow::Impl {
       return BadKeyframe(newest_ns(), absl::StrCat("has no solution: ", summary.message));
     }
     size_t index = 0;
-    for (auto& [id, landmark] : landmarks_) {
+    for (auto& [id, landmark] : landmarks_.all()) {
       if (landmark.tells()) landmark.block = blocks[index++];
     }
+    const int spare_count = summary.num_residuals - summary.num_effective_parameters;
+    misfit_ = 2.0 * summary.final_cost / std::max(1, spare_count);
     return absl::OkStatus();
   }
 
@@ -461,44 +349,27 @@ class SlidingWindow::Impl {
   // prior. Landmarks that others saw first lose their sights in it.
   absl::Status DropOldest() {
     const Keyframe& oldest = keyframes_.front();
-    for (auto& [id, landmark] : landmarks_) {
-      if (landmark.sights.front().keyframe != oldest.number) continue;
-      if (landmark.anchor.has_value() && *landmark.anchor == 0) continue;
-      landmark.sights.erase(landmark.sights.begin());
-      if (landmark.anchor.has_value()) --*landmark.anchor;
-    }
+    landmarks_.DropSightsOf(oldest.number);
     std::vector<LandmarkBlock> blocks;
-    blocks.reserve(landmarks_.size());
+    blocks.reserve(landmarks_.all().size());
     FactorList list;
     if (prior_ != nullptr) list.factors.push_back({prior_.get(), nullptr, prior_blocks_});
     if (has_unit_) AddInertial(1, &list);
-    for (const auto& [id, landmark] : landmarks_) {
+    for (const auto& [id, landmark] : landmarks_.all()) {
       if (!landmark.tells() || landmark.anchor_keyframe() != oldest.number) continue;
       blocks.push_back(landmark.block);
       AddSightsOf(landmark, blocks.back().data(), &list);
     }
     std::vector<double*> dropped = list.landmarks;
-    StateSlot& slot = slots_[oldest.slot];
+    StateSlot& slot = SlotOf(oldest.number);
     dropped.push_back(slot.pose.data());
     if (has_unit_) dropped.push_back(slot.speed.data());
     DSG_ASSIGN_OR_RETURN(LinearPrior prior, Marginalize(list.factors, dropped, {}));
     SetPrior(std::move(prior));
-    std::erase_if(landmarks_, [&](const auto& entry) {
-      const Landmark& landmark = entry.second;
-      return landmark.sights.empty() ||
-             (landmark.anchor.has_value() && landmark.anchor_keyframe() == oldest.number);
-    });
+    landmarks_.ForgetAnchoredIn(oldest.number);
     keyframes_.pop_front();
     keyframes_.front().measured = nullptr;
     return absl::OkStatus();
-  }
-
-  // Features that are no longer followed and never got a distance.
-  void ForgetLost() {
-    std::erase_if(landmarks_, [&](const auto& entry) {
-      return !entry.second.anchor.has_value() &&
-             entry.second.sights.back().keyframe != keyframes_.back().number;
-    });
   }
 
   const StereoModel model_;
@@ -509,12 +380,12 @@ class SlidingWindow::Impl {
   // Parameter blocks: the factors of a window that does not change name them, too.
   mutable std::vector<StateSlot> slots_;
   std::deque<Keyframe> keyframes_;
-  // By feature.
-  std::map<int64_t, Landmark> landmarks_;
+  WindowLandmarks landmarks_;
   std::unique_ptr<ceres::CostFunction> prior_;
   std::vector<double*> prior_blocks_;
   std::vector<int64_t> dropped_;
   std::vector<SeenLandmark> told_landmarks_;
+  double misfit_ = 0.0;
   int64_t next_number_ = 0;
   // Whether states have velocities and biases, and an inertial unit between them.
   bool has_unit_ = true;
@@ -556,6 +427,7 @@ absl::StatusOr<Matrix6d> SlidingWindow::NewestPoseCovariance() const {
 std::optional<Vector3d> SlidingWindow::PointOf(int64_t feature_id) const {
   return impl_->PointOf(feature_id);
 }
+double SlidingWindow::misfit() const { return impl_->misfit(); }
 const StereoError& SlidingWindow::stereo_error() const { return impl_->stereo_error(); }
 const std::vector<int64_t>& SlidingWindow::dropped_features() const { return impl_->dropped(); }
 const std::vector<SeenLandmark>& SlidingWindow::landmarks() const { return impl_->landmarks(); }

@@ -15,17 +15,12 @@
 #include "ingest/odometry/inertial/preintegration.h"
 #include "ingest/odometry/window/landmark_factor.h"
 #include "ingest/odometry/window/seen_landmark.h"
+#include "ingest/odometry/window/window_landmarks.h"
 #include "ingest/odometry/window/window_options.h"
 #include "ingest/solver/pose_block.h"
 #include "schema/base/time.h"
 
 namespace dsg::ingest {
-
-/// A feature of a keyframe's left image, by the tracker's id.
-struct FeatureSight {
-  int64_t feature_id = 0;
-  LandmarkSight sight;
-};
 
 /// Fixed-lag smoothing: poses, velocities, biases and landmarks of the last keyframes are the least
 /// squares of what the unit and the images measured and of a prior, which is what older keyframes
@@ -81,6 +76,11 @@ class SlidingWindow {
 
   /// Where a feature's landmark is, map; nullopt while its distance is not known.
   std::optional<Eigen::Vector3d> PointOf(int64_t feature_id) const;
+
+  /// By how much the estimate misses what was measured, in squares of standard deviations, for each
+  /// measurement that is more than enough to tell the states: about 1, or less, where the noise is
+  /// what it is said to be. Of the last Add.
+  double misfit() const;
 
   /// Of the pair's calibration, as it is known by now.
   const StereoError& stereo_error() const;

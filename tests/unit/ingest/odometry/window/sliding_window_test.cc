@@ -33,7 +33,15 @@ struct Noise {
   double offset_px = 0.0;
   /// Of the features, so many in a hundred are followed wrongly, each keyframe anew.
   int wrong_percent = 0;
+  /// Of the gyroscope, before the last keyframe alone.
+  double turn_error_rad_s = 0.0;
 };
+
+void Turn(TimeNs from_ns, double error_rad_s, std::vector<ImuMeasurement>* samples) {
+  for (ImuMeasurement& sample : *samples) {
+    if (sample.time_ns >= from_ns) sample.angular_velocity_rad_s.z() += error_rad_s;
+  }
+}
 
 Passage PassageOf(double seconds, uint64_t seed, const Noise& noise, WindowOptions options = {}) {
   Random random(seed, 0);
@@ -57,6 +65,7 @@ Passage PassageOf(double seconds, uint64_t seed, const Noise& noise, WindowOptio
   for (int i = 1; i * kPeriodS <= seconds; ++i) {
     const TimeNs from_ns = std::llround(1e9 * kPeriodS * (i - 1));
     const TimeNs to_ns = std::llround(1e9 * kPeriodS * i);
+    if ((i + 1) * kPeriodS > seconds) Turn(from_ns, noise.turn_error_rad_s, &samples);
     auto measured = Preintegration::Make(samples, from_ns, to_ns, run.window.newest().bias,
                                          Adis16448(), InertialOptions());
     EXPECT_TRUE(measured.ok()) << measured.status();
@@ -174,6 +183,13 @@ TEST(SlidingWindow, DropsFeaturesThatAreFollowedWrongly) {
   const Passage run = PassageOf(8.0, 3, {0.7, 0.7, true, 0.0, 10});
   EXPECT_GT(run.dropped_count, 20);
   EXPECT_LT(EndErrorM(run, 8.0), 0.1);
+}
+
+TEST(SlidingWindow, TellsHowFarUnitAndImagesMissEachOther) {
+  EXPECT_LT(PassageOf(6.0, 1, {}).window.misfit(), 1.5);
+  Noise noise;
+  noise.turn_error_rad_s = 1.0;
+  EXPECT_GT(PassageOf(6.0, 1, noise).window.misfit(), 5.0);
 }
 
 TEST(SlidingWindow, LeadsOnByTheUnitAloneWhenNothingIsSeen) {
