@@ -233,6 +233,12 @@ class OdometryLog : public LogSource {
       if (!counts.gyro_fault.empty()) absl::StrAppend(&note, "; ", counts.gyro_fault);
     }
     info_.notes.push_back(note);
+    if (counts.doubts > 0) {
+      info_.notes.push_back(absl::StrCat(
+          "odometry: at ", counts.doubts, " keyframes most of what was seen moved otherwise than ",
+          "the inertial unit tells: it is wrong there (look at its samples), or people fill the ",
+          "image (--odometry-masks); covariances are larger since"));
+    }
     if (!up_note_.empty()) info_.notes.push_back(up_note_);
     if (lone_count_ > 0) {
       info_.notes.push_back(absl::StrCat("odometry: ", lone_count_, " images of ", eye_.left,
@@ -245,9 +251,10 @@ class OdometryLog : public LogSource {
     }
     if (bad_sample_count_ > 0) {
       info_.notes.push_back(absl::StrCat("odometry: ", bad_sample_count_,
-                                         " inertial samples are higher than any unit measures "
-                                         "(--inertial-rate-most, --inertial-force-most) and were "
-                                         "left out; look at the unit's driver"));
+                                         " inertial samples were left out: no numbers, higher than "
+                                         "any unit measures (--inertial-rate-most, "
+                                         "--inertial-force-most), or out of order; look at the "
+                                         "unit's driver"));
     }
     if (broken_count_ > 0) {
       info_.notes.push_back(absl::StrCat("odometry: ", broken_count_,

@@ -59,8 +59,12 @@ struct OdometryCounts {
   int64_t starts_in_motion = 0;
   /// Without an inertial unit it is the same.
   int64_t starts_by_images = 0;
-  /// How often it had to start anew, by reason: "blind", "inertial gap", "no solution".
+  /// How often it had to start anew, by reason: "blind", "inertial gap", "no solution", "clipped
+  /// samples", "samples that stand still", "disagreement" of unit and images.
   std::map<std::string, int64_t> losses;
+  /// Keyframes at which most of what was seen moved otherwise than the path: covariances are larger
+  /// since.
+  int64_t doubts = 0;
   /// Why the newest start that was tried in vain failed, in words, and what was wrong with the
   /// gyroscope by then, if that was known (imu_faults.h); empty without a unit.
   std::string failed_start;

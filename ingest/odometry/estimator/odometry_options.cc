@@ -91,6 +91,17 @@ constexpr OptionField<OdometryUnitOptions> kUnitFields[] = {
      "Covariances of poses are told so many times as large as noise alone makes them: in simulated "
      "and recorded logs squared errors are that much larger, since clocks and mountings are off, "
      "too"},
+    {"odometry-doubt-share", &OdometryUnitOptions::doubt_share_min, 0.0, 1.0,
+     "Share of the features with distances that must agree on another motion than the path before "
+     "it is doubted: with half of them nobody can tell which is right"},
+    {"odometry-doubt-way", &OdometryUnitOptions::doubt_way_m, 0.001, 100.0,
+     "Least difference of these motions between two keyframes, metres: three times the largest of "
+     "simulated and recorded logs without faults"},
+    {"odometry-doubt-turn", &OdometryUnitOptions::doubt_turn_rad, 0.001, 3.0,
+     "... or of their turns, radians: the same"},
+    {"odometry-doubt-count", &OdometryUnitOptions::doubt_count_max, 1, 1000,
+     "Keyframes in a row that are doubted after which the robot is lost: who passes the lens is "
+     "gone by then, a velocity that is wrong stays"},
 };
 
 void Append(std::vector<BoundOption> more, std::vector<BoundOption>* bound) {

@@ -87,6 +87,13 @@ struct OdometryUnitOptions {
   /// Covariances are told so many times as large as noise alone makes them: clocks and mountings
   /// are off, too, and followed features err alike from image to image.
   double covariance_factor = 10.0;
+  /// The path is doubted where at least this share of the features with distances agree on another
+  /// motion since the last keyframe, that differs by this way or this turn at least.
+  double doubt_share_min = 0.5;
+  double doubt_way_m = 0.15;
+  double doubt_turn_rad = 0.05;
+  /// After so many keyframes in a row that are doubted the robot is lost.
+  int doubt_count_max = 3;
 };
 
 struct OdometryOptions {

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/odometry/estimator/keyframe_sights.h"
 #include "ingest/odometry/inertial/imu_faults.h"
 #include "ingest/odometry/inertial/imu_samples.h"
 #include "ingest/odometry/inertial/moving_alignment.h"
@@ -80,6 +81,11 @@ void MoveTo(const StartPlace& place, const Pose3d& end_T_imu, AlignedState* alig
 }  // namespace
 
 void OdometryStart::Add(TimeNs time_ns, SeenFeatures features, const Quaterniond& last_R_now) {
+  feature_count_ = features.size();
+  distance_count_ = std::count_if(features.begin(), features.end(), [](const auto& entry) {
+    return entry.second.disparity_px.has_value();
+  });
+  shared_count_ = keyframes_.empty() ? 0 : SharedCount(keyframes_.back().features, features);
   EarlyKeyframe keyframe{time_ns, std::move(features), Pose3d()};
   if (!keyframes_.empty()) {
     const EarlyKeyframe& last = keyframes_.back();
@@ -105,6 +111,13 @@ absl::StatusOr<OdometryBegin> OdometryStart::Try(std::span<const ImuMeasurement>
   std::optional<OdometryBegin> begin = TryAtRest(samples, place);
   if (begin.has_value()) return *std::move(begin);
   return TryInMotion(samples, place);
+}
+
+std::string OdometryStart::SeenText() const {
+  return absl::StrCat("the newest image shows ", feature_count_, " features, of which ",
+                      distance_count_, " have a distance (few: look at the calibration and at the ",
+                      "stamps of both cameras) and ", shared_count_,
+                      " were in the keyframe before (few: images are too rare or too blurred)");
 }
 
 void OdometryStart::KeepTurn(std::span<const ImuMeasurement> samples) {
@@ -164,9 +177,9 @@ absl::StatusOr<OdometryBegin> OdometryStart::TryInMotion(std::span<const ImuMeas
                                                          const StartPlace& place) const {
   const auto count = static_cast<size_t>(options_.start.keyframe_count);
   if (keyframes_.size() < count) {
-    return absl::FailedPreconditionError(absl::StrCat("images tell the motion of ",
-                                                      keyframes_.size(), " keyframes; a start in ",
-                                                      "motion takes ", count));
+    return absl::FailedPreconditionError(
+        absl::StrCat("images tell the motion of ", keyframes_.size(),
+                     " keyframes; a start in motion takes ", count, "; ", SeenText()));
   }
   OdometryBegin begin;
   begin.is_in_motion = true;

@@ -69,6 +69,8 @@ class OdometryStart {
   std::string GyroFault() const;
 
  private:
+  /// What the images tell, for who wonders why there is no start.
+  std::string SeenText() const;
   void KeepTurn(std::span<const ImuMeasurement> samples);
   std::optional<OdometryBegin> TryAtRest(std::span<const ImuMeasurement> samples,
                                          const StartPlace& place) const;
@@ -79,6 +81,10 @@ class OdometryStart {
   ImuCalibration imu_;
   OdometryOptions options_;
   std::vector<EarlyKeyframe> keyframes_;
+  // Of the newest keyframe: features, those with a distance, and those that the one before saw.
+  size_t feature_count_ = 0;
+  int64_t distance_count_ = 0;
+  int64_t shared_count_ = 0;
   struct Turn {
     std::vector<ImuMeasurement> samples;
     Eigen::Quaterniond from_R_to;

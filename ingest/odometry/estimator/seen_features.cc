@@ -87,6 +87,8 @@ StereoMotion StereoMotionOf(const StereoCamera& camera, const SeenFeatures& last
   motion.outcome = pose.outcome;
   if (pose.outcome != PoseOutcome::kFound) return motion;
   motion.last_T_now = pose.first_T_second;
+  motion.inlier_share =
+      static_cast<double>(pose.inliers.size()) / static_cast<double>(pairs.size());
   motion.outliers = IdsBeside(ids, pose.inliers);
   return motion;
 }

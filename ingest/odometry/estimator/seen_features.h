@@ -42,6 +42,8 @@ struct StereoMotion {
   PoseOutcome outcome = PoseOutcome::kTooFewPoints;
   /// Of the left camera; identity unless kFound.
   Pose3d last_T_now;
+  /// Of the features, those that agree with it.
+  double inlier_share = 0.0;
   /// Features whose distance in both disagrees with it.
   std::vector<int64_t> outliers;
 };

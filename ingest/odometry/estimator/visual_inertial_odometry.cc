@@ -12,7 +12,9 @@
 #include "absl/strings/str_cat.h"
 #include "ingest/odometry/estimator/keyframe_sights.h"
 #include "ingest/odometry/estimator/odometry_start.h"
+#include "ingest/odometry/estimator/path_doubt.h"
 #include "ingest/odometry/frontend/feature_tracker.h"
+#include "ingest/odometry/inertial/imu_faults.h"
 #include "ingest/odometry/inertial/imu_samples.h"
 #include "ingest/odometry/inertial/preintegration.h"
 #include "ingest/odometry/window/sliding_window.h"
@@ -105,7 +107,8 @@ class VisualInertialOdometry::Impl {
     const Pose3d& map_T_imu = placed.state.map_T_imu;
     const Matrix6d covariance = placed.covariance.topLeftCorner<6, 6>();
     return {placed.time_ns, map_T_imu * imu_T_body,
-            options_.unit.covariance_factor * CovarianceAt(covariance, map_T_imu, imu_T_body),
+            options_.unit.covariance_factor * CovarianceAt(covariance, map_T_imu, imu_T_body) +
+                doubt_.At(map_T_imu * imu_T_body),
             placed.is_keyframe};
   }
 
@@ -137,7 +140,7 @@ class VisualInertialOdometry::Impl {
 
   absl::StatusOr<std::vector<PlacedState>> Wait(const OdometryFrame& frame,
                                                 const Quaterniond& last_R_now) {
-    GoOnLost(frame.time_ns, last_R_now);
+    GoOnLost(frame.time_ns, last_R_now, has_turn_);
     if (!has_turn_) start_.Clear();
     early_ns_.push_back(frame.time_ns);
     const bool is_due =
@@ -192,7 +195,7 @@ class VisualInertialOdometry::Impl {
   }
 
   // Where the robot is by and by, while nobody sees it.
-  void GoOnLost(TimeNs time_ns, const Quaterniond& last_R_now) {
+  void GoOnLost(TimeNs time_ns, const Quaterniond& last_R_now, bool is_turn_known) {
     if (place_.is_first || !lost_ns_.has_value()) return;
     const double seconds = SecondsBetween(*lost_ns_, time_ns);
     const auto square = [](double value) { return value * value; };
@@ -202,7 +205,7 @@ class VisualInertialOdometry::Impl {
     auto position = place_.covariance.block<3, 3>(kPositionRow, kPositionRow);
     const double sigma = std::sqrt(position(0, 0)) + options_.start.lost_speed_m_s * seconds;
     position.diagonal().setConstant(square(sigma));
-    if (has_turn_) return;
+    if (is_turn_known) return;
     auto turn = place_.covariance.block<3, 3>(kRotationRow, kRotationRow);
     const double turn_sigma = std::sqrt(turn(2, 2)) + options_.start.lost_turn_rad_s * seconds;
     turn.diagonal().setConstant(std::min(square(M_PI), square(turn_sigma)));
@@ -217,8 +220,12 @@ class VisualInertialOdometry::Impl {
     if (!IsKeyframeDue(frame.time_ns, window_.newest_ns(), last_features_)) {
       return std::vector<PlacedState>{pose};
     }
+    if (const std::string fault = FaultOf(*measured); !fault.empty()) {
+      return LoseSinceKeyframe(fault, frame.time_ns);
+    }
     DropOutliers();
     DSG_ASSIGN_OR_RETURN(SeenFeatures features, SeeKeyframe(frame, camera_.left, &tracker_));
+    const StereoMotion seen = MotionTo(features, OdometryMethod::kFivePoint);
     CheckDistances(&features);
     if (SharedCount(last_features_, features) >= options_.keyframe.sight_count_min)
       last_seen_ns_ = frame.time_ns;
@@ -227,11 +234,14 @@ class VisualInertialOdometry::Impl {
       place_ = {pose.state.map_T_imu, pose.covariance, false};
       return Lose("blind");
     }
-    if (!window_.Add(frame.time_ns, *std::move(measured), SightsOf(features)).ok() ||
-        !TakeNewest()) {
+    const Pose3d map_T_last = window_.newest().map_T_imu;
+    const absl::Status added = window_.Add(frame.time_ns, *std::move(measured), SightsOf(features));
+    if (!added.ok() || !TakeNewest()) {
       place_ = {pose.state.map_T_imu, pose.covariance, false};
       return Lose("no solution");
     }
+    doubts_in_row_ = IsDoubted(map_T_last, seen) ? doubts_in_row_ + 1 : 0;
+    if (doubts_in_row_ >= options_.unit.doubt_count_max) return Lose("disagreement");
     tracker_.Drop(window_.dropped_features());
     for (const int64_t id : window_.dropped_features()) features.erase(id);
     last_features_ = std::move(features);
@@ -246,12 +256,44 @@ class VisualInertialOdometry::Impl {
                                options_.frontend.relative_pose));
   }
 
+  StereoMotion MotionTo(const SeenFeatures& features, OdometryMethod method) const {
+    return StereoMotionOf(camera_, last_features_, features, CameraTurn(keyframe_R_now_), method,
+                          options_.frontend.relative_pose);
+  }
+
   // A distance that disagrees is not believed; the place in the image was checked before.
   void CheckDistances(SeenFeatures* features) const {
-    const StereoMotion motion =
-        StereoMotionOf(camera_, last_features_, *features, CameraTurn(keyframe_R_now_),
-                       options_.method, options_.frontend.relative_pose);
+    const StereoMotion motion = MotionTo(*features, options_.method);
     for (const int64_t id : motion.outliers) (*features)[id].disparity_px.reset();
+  }
+
+  // What makes the samples since the last keyframe worthless, in words; empty if nothing is known
+  // to.
+  std::string FaultOf(const Preintegration& measured) const {
+    for (const ImuFault& fault :
+         FaultsOfSamples(measured.samples(), imu_.name, options_.inertial)) {
+      if (fault.kind == ImuFaultKind::kClipped) return "clipped samples";
+      if (fault.kind == ImuFaultKind::kStuck) return "samples that stand still";
+    }
+    return "";
+  }
+
+  // Where most of what is seen moves otherwise than the path, either the unit is wrong or something
+  // fills the image that moves. Nobody can tell which at once: the path goes on, and its covariance
+  // says so.
+  bool IsDoubted(const Pose3d& map_T_last, const StereoMotion& seen) {
+    const OdometryUnitOptions& unit = options_.unit;
+    if (seen.outcome != PoseOutcome::kFound || seen.inlier_share < unit.doubt_share_min) {
+      return false;
+    }
+    const Pose3d map_T_now = window_.newest().map_T_imu;
+    const Pose3d told = (map_T_last * imu_T_camera_).Inverse() * map_T_now * imu_T_camera_;
+    const double way_m = (seen.last_T_now.position - told.position).norm();
+    const double turn_rad = AngleBetween(seen.last_T_now.orientation, told.orientation);
+    if (way_m < unit.doubt_way_m && turn_rad < unit.doubt_turn_rad) return false;
+    doubt_.Add(map_T_now.position, way_m, turn_rad);
+    ++counts_.doubts;
+    return true;
   }
 
   // False when nobody can tell how sure it is.
@@ -259,7 +301,8 @@ class VisualInertialOdometry::Impl {
     ++counts_.keyframes;
     const absl::StatusOr<Matrix15d> covariance = window_.NewestCovariance();
     if (!covariance.ok()) return false;
-    newest_covariance_ = *covariance;
+    // Where measurements miss by more than their noise, the states do, too.
+    newest_covariance_ = std::max(1.0, window_.misfit()) * *covariance;
     bias_ = window_.newest().bias;
     place_ = {window_.newest().map_T_imu, newest_covariance_, false};
     return true;
@@ -281,11 +324,20 @@ class VisualInertialOdometry::Impl {
 
   std::vector<PlacedState> Lose(const std::string& reason) {
     ++counts_.losses[reason];
+    doubts_in_row_ = 0;
     is_started_ = false;
     lost_ns_ = last_ns_;
     start_.Clear();
     keyframe_R_now_ = Quaterniond::Identity();
     return {};
+  }
+
+  // What was measured since the last keyframe is not believed.
+  std::vector<PlacedState> LoseSinceKeyframe(const std::string& reason, TimeNs time_ns) {
+    std::vector<PlacedState> none = Lose(reason);
+    lost_ns_ = window_.newest_ns();
+    GoOnLost(time_ns, Quaterniond::Identity(), /*is_turn_known=*/false);
+    return none;
   }
 
   // Those that no keyframe needs any more.
@@ -321,6 +373,8 @@ class VisualInertialOdometry::Impl {
   Quaterniond keyframe_R_now_ = Quaterniond::Identity();
   SeenFeatures last_features_;
   Matrix15d newest_covariance_ = Matrix15d::Zero();
+  PathDoubt doubt_;
+  int doubts_in_row_ = 0;
   OdometryCounts counts_;
 };
 

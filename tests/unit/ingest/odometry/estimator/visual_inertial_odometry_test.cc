@@ -239,6 +239,67 @@ TEST(VisualInertialOdometry, LeavesOutSamplesThatNoUnitMeasures) {
   EXPECT_LT(with(std::numeric_limits<double>::infinity()), 0.05);
 }
 
+// Wrong samples from the fourth second on.
+struct UnitFault {
+  std::string name;
+  std::function<void(ImuMeasurement*)> spoil;
+};
+
+Outcome RunWithFault(const UnitFault& fault) {
+  Session session;
+  session.seconds = 10.0;
+  session.spoil = [&](ImuMeasurement* sample) {
+    if (sample->time_ns > 4'000'000'000 && sample->time_ns < 4'300'000'000) fault.spoil(sample);
+  };
+  return RunSession(session);
+}
+
+TEST(VisualInertialOdometry, IsLostWhereSamplesAreClippedOrStandStill) {
+  ImuMeasurement still;
+  const std::vector<UnitFault> faults = {
+      {"clipped samples",
+       [](ImuMeasurement* sample) { sample->angular_velocity_rad_s.z() = 4.36; }},
+      {"samples that stand still", [&still](ImuMeasurement* sample) {
+         if (still.time_ns == 0) still = *sample;
+         sample->angular_velocity_rad_s = still.angular_velocity_rad_s;
+         sample->acceleration_m_s2 = still.acceleration_m_s2;
+       }}};
+  for (const UnitFault& fault : faults) {
+    const Outcome outcome = RunWithFault(fault);
+    ASSERT_FALSE(outcome.poses.empty());
+    EXPECT_TRUE(outcome.counts.losses.contains(fault.name))
+        << fault.name << " of " << testing::PrintToString(outcome.counts.losses);
+    EXPECT_EQ(outcome.counts.starts_at_rest + outcome.counts.starts_in_motion, 2);
+    EXPECT_GT(outcome.poses.back().time_ns, 9'900'000'000);
+    EXPECT_GT(outcome.poses.back().covariance(0, 0), 0.01) << fault.name;
+  }
+}
+
+// It is wrong for some tenths of a second, and possible.
+TEST(VisualInertialOdometry, DoubtsThePathWhereTheUnitTellsAnotherOne) {
+  const std::vector<UnitFault> faults = {
+      {"turns", [](ImuMeasurement* sample) { sample->angular_velocity_rad_s *= -6.0; }},
+      {"forces", [](ImuMeasurement* sample) { sample->acceleration_m_s2.x() += 60.0; }}};
+  for (const UnitFault& fault : faults) {
+    const Outcome outcome = RunWithFault(fault);
+    ASSERT_FALSE(outcome.poses.empty());
+    EXPECT_GT(outcome.counts.doubts, 0) << fault.name;
+    EXPECT_GT(outcome.poses.back().time_ns, 9'900'000'000);
+    const std::vector<double> errors = ErrorsM(outcome, Carried());
+    double worst = 0.0;
+    for (size_t i = 0; i < errors.size(); ++i) {
+      // Until a keyframe comes, nothing contradicts the unit.
+      if (outcome.poses[i].time_ns < 4'700'000'000) continue;
+      const double variance = outcome.poses[i].covariance.topLeftCorner<3, 3>().trace();
+      worst = std::max(worst, errors[i] / std::sqrt(variance));
+    }
+    std::cout << fault.name << ": error at the end " << errors.back() << " m, largest " << worst
+              << " standard deviations\n";
+    EXPECT_LT(worst, 4.0) << fault.name;
+  }
+  EXPECT_EQ(RunWithFault({"none", [](ImuMeasurement*) {}}).counts.doubts, 0);
+}
+
 TEST(VisualInertialOdometry, RefusesImagesOutOfOrderAndOfOtherSizes) {
   const RoomRig rig;
   auto odometry = VisualInertialOdometry::Make({rig.left, rig.baseline_m}, rig.imu, {});
