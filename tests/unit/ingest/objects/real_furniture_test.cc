@@ -5,6 +5,7 @@
 #include <iostream>
 
 #include "ingest/objects/unlabelled_objects.h"
+#include "tests/unit/ingest/objects/aria_apartment.h"
 #include "tests/unit/ingest/objects/room_truth.h"
 
 namespace dsg::ingest {
@@ -41,6 +42,13 @@ TEST(RealFurniture, OfTheDigitalTwin) {
   if (!room.has_value()) GTEST_SKIP() << "no adt-apartment in " << DataFolder();
   ASSERT_GT(room->mesh.labels.size(), 100000u);
   ExpectAtLeast({0.25, 0.15}, *room);
+}
+
+TEST(RealFurniture, OfTheDigitalTwinFused) {
+  const auto room = FuseAriaApartment(DataFolder() / "adt-apartment");
+  if (!room.has_value()) GTEST_SKIP() << "no adt-apartment in " << DataFolder();
+  ASSERT_GT(room->mesh.labels.size(), 10000u);
+  ExpectAtLeast({0.25, 0.2}, *room);
 }
 
 }  // namespace

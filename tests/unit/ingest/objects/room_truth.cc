@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/unit/ingest/objects/room_truth.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,8 +9,6 @@
 #include <fstream>
 #include <iterator>
 #include <map>
-#include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <set>
 #include <sstream>
 #include <utility>
@@ -22,8 +19,6 @@ namespace dsg::ingest {
 namespace {
 
 namespace fs = std::filesystem;
-using Eigen::Matrix4d;
-using Eigen::Vector3d;
 
 // One vertex of ScanNet: float x y z, uchar red green blue, ushort label instance.
 constexpr size_t kVertexBytes = 19;
@@ -42,16 +37,6 @@ std::vector<std::string> Split(const std::string& line) {
   return fields;
 }
 
-/// Rows of a table, without its head.
-std::vector<std::vector<std::string>> ReadTable(const fs::path& path) {
-  std::vector<std::vector<std::string>> rows;
-  std::ifstream in(path);
-  std::string line;
-  std::getline(in, line);
-  while (std::getline(in, line)) rows.push_back(Split(line));
-  return rows;
-}
-
 using Cell = std::array<int, 3>;
 
 Cell CellOf(const Eigen::Vector3f& point) {
@@ -67,135 +52,6 @@ bool IsRoom(const std::string& name) {
   static const std::set<std::string> kRoom = {"",          "wall",    "floor", "ceiling",
                                               "floor mat", "shelter", "human"};
   return kRoom.contains(name);
-}
-
-/// A camera after Kannala and Brandt with decentring and a thin prism, as Aria's calibration has
-/// it.
-struct Fisheye {
-  std::array<double, 15> p{};
-  Matrix4d device_T_camera = Matrix4d::Identity();
-
-  Eigen::Vector2d Project(const Vector3d& ray, double* angle) const {
-    const double a = ray.x() / ray.z();
-    const double b = ray.y() / ray.z();
-    const double r = std::hypot(a, b);
-    *angle = std::atan(r);
-    double bent = 1.0;
-    for (size_t i = 0; i < 6; ++i) {
-      bent += p[3 + i] * std::pow(*angle, 2.0 * static_cast<double>(i + 1));
-    }
-    const double scale = r > 1e-9 ? *angle * bent / r : 1.0;
-    const double x = a * scale;
-    const double y = b * scale;
-    const double q = x * x + y * y;
-    const double d = 2.0 * (x * p[9] + y * p[10]);
-    const double u = x + d * x + q * p[9] + p[11] * q + p[12] * q * q;
-    const double v = y + d * y + q * p[10] + p[13] * q + p[14] * q * q;
-    return {p[0] * u + p[1], p[0] * v + p[2]};
-  }
-};
-
-Matrix4d Motion(const std::array<double, 4>& wxyz, const Vector3d& translation) {
-  Matrix4d motion = Matrix4d::Identity();
-  motion.topLeftCorner<3, 3>() =
-      Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]).normalized().toRotationMatrix();
-  motion.topRightCorner<3, 1>() = translation;
-  return motion;
-}
-
-std::optional<Fisheye> ReadCamera(const nlohmann::json& calibration, const std::string& label) {
-  for (const auto& entry : calibration.at("CameraCalibrations")) {
-    if (entry.at("Label") != label) continue;
-    Fisheye camera;
-    camera.p = entry.at("Projection").at("Params").get<std::array<double, 15>>();
-    const auto& pose = entry.at("T_Device_Camera");
-    const auto xyz = pose.at("Translation").get<std::array<double, 3>>();
-    const auto& turn = pose.at("UnitQuaternion");
-    const auto axis = turn.at(1).get<std::array<double, 3>>();
-    camera.device_T_camera = Motion({turn.at(0).get<double>(), axis[0], axis[1], axis[2]},
-                                    Vector3d(xyz[0], xyz[1], xyz[2]));
-    return camera;
-  }
-  return std::nullopt;
-}
-
-/// One image with depth along the camera's axis, and the pose of the camera.
-struct DepthView {
-  Fisheye camera;
-  cv::Mat depth_mm;
-  cv::Mat instances;
-  cv::Mat color;
-  Matrix4d map_T_camera = Matrix4d::Identity();
-};
-
-constexpr int kViewSide = 480;
-constexpr double kViewFocal = 240.0;
-// The lenses show nothing beyond, radians.
-constexpr double kLensRad = 1.05;
-// Neighbouring points that are further apart in depth, by share, are of two surfaces.
-constexpr double kJumpShare = 0.05;
-
-/// Adds what a pinhole camera of 90 degrees, turned by yaw and pitch, would see of it.
-void AddView(const DepthView& view, double yaw, double pitch, MeshBlock* mesh) {
-  const Eigen::Matrix3d turn =
-      (Eigen::AngleAxisd(yaw, Vector3d::UnitY()) * Eigen::AngleAxisd(pitch, Vector3d::UnitX()))
-          .toRotationMatrix();
-  const Eigen::Matrix3d rotation = view.map_T_camera.topLeftCorner<3, 3>();
-  const Vector3d center = view.map_T_camera.topRightCorner<3, 1>();
-  std::vector<Vector3d> points(static_cast<size_t>(kViewSide) * kViewSide, Vector3d::Zero());
-  std::vector<cv::Point> pixels(points.size());
-  const auto at = [](int x, int y) { return static_cast<size_t>(y) * kViewSide + x; };
-  for (int y = 0; y < kViewSide; ++y) {
-    for (int x = 0; x < kViewSide; ++x) {
-      const Vector3d ray = turn * Vector3d((x - kViewSide / 2 + 0.5) / kViewFocal,
-                                           (y - kViewSide / 2 + 0.5) / kViewFocal, 1.0);
-      if (ray.z() < 0.15) continue;
-      double angle = 0.0;
-      const Eigen::Vector2d uv = view.camera.Project(ray, &angle);
-      const cv::Point pixel(static_cast<int>(std::lround(uv.x())),
-                            static_cast<int>(std::lround(uv.y())));
-      if (angle > kLensRad || pixel.x < 0 || pixel.y < 0 || pixel.x >= view.depth_mm.cols ||
-          pixel.y >= view.depth_mm.rows) {
-        continue;
-      }
-      const double z_m = 0.001 * view.depth_mm.at<uint16_t>(pixel);
-      points[at(x, y)] = ray * (z_m / ray.z());
-      pixels[at(x, y)] = pixel;
-    }
-  }
-  for (int y = 1; y < kViewSide; ++y) {
-    for (int x = 1; x < kViewSide; ++x) {
-      const Vector3d& point = points[at(x, y)];
-      const Vector3d right = point - points[at(x - 1, y)];
-      const Vector3d down = point - points[at(x, y - 1)];
-      if (point.isZero() || right.norm() > kJumpShare * point.norm() ||
-          down.norm() > kJumpShare * point.norm()) {
-        continue;
-      }
-      Vector3d normal = right.cross(down).normalized();
-      if (normal.dot(point) > 0.0) normal = -normal;
-      mesh->positions_map.push_back((rotation * point + center).cast<float>());
-      mesh->normals_map.push_back((rotation * normal).cast<float>());
-      const cv::Vec3b color = view.color.at<cv::Vec3b>(pixels[at(x, y)]);
-      mesh->colors.push_back(uint32_t{color[2]} << 16 | uint32_t{color[1]} << 8 | color[0]);
-      mesh->instance_ids.push_back(view.instances.at<uint16_t>(pixels[at(x, y)]));
-    }
-  }
-}
-
-/// The pose of the glasses nearest to a time, in a world with z up.
-Matrix4d PoseAt(const std::vector<std::vector<std::string>>& rows, int64_t time_us) {
-  const auto number = [](const std::string& text) { return std::atof(text.c_str()); };
-  const auto nearest =
-      std::min_element(rows.begin(), rows.end(), [&](const auto& a, const auto& b) {
-        return std::abs(std::atoll(a[1].c_str()) - time_us) <
-               std::abs(std::atoll(b[1].c_str()) - time_us);
-      });
-  const std::vector<std::string>& row = *nearest;
-  Matrix4d z_up = Matrix4d::Identity();
-  z_up.topLeftCorner<3, 3>() << 1, 0, 0, 0, 0, -1, 0, 1, 0;
-  return z_up * Motion({number(row[9]), number(row[6]), number(row[7]), number(row[8])},
-                       Vector3d(number(row[3]), number(row[4]), number(row[5])));
 }
 
 /// The instance of most vertices in each cell; 0 = the room's.
@@ -260,6 +116,15 @@ fs::path DataFolder() {
   return given != nullptr ? fs::path(given) : fs::path(DSG_SOURCE_DIR) / ".." / "shared" / "data";
 }
 
+std::vector<std::vector<std::string>> ReadTable(const fs::path& path) {
+  std::vector<std::vector<std::string>> rows;
+  std::ifstream in(path);
+  std::string line;
+  std::getline(in, line);
+  while (std::getline(in, line)) rows.push_back(Split(line));
+  return rows;
+}
+
 std::optional<RealRoom> ReadScannetRoom(const fs::path& folder) {
   std::ifstream in(folder / "scene0000_00_labelled_vertices.ply", std::ios::binary);
   const std::string bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
@@ -286,57 +151,6 @@ std::optional<RealRoom> ReadScannetRoom(const fs::path& folder) {
     block.colors.push_back(uint32_t{rgb[0]} << 16 | uint32_t{rgb[1]} << 8 | rgb[2]);
     block.labels.push_back(label);
     block.instance_ids.push_back(instance);
-  }
-  return room;
-}
-
-std::optional<RealRoom> ReadAriaApartment(const fs::path& folder) {
-  std::ifstream in(folder / "device_calibration.json");
-  const nlohmann::json calibration = nlohmann::json::parse(in, nullptr, false);
-  const auto poses = ReadTable(folder / "aria_trajectory.csv");
-  if (calibration.is_discarded() || poses.empty()) return std::nullopt;
-  RealRoom room;
-  room.classes.assign(1, "");
-  std::vector<uint32_t> label_of;
-  for (const std::vector<std::string>& row : ReadTable(folder / "images/segmentation_ids.csv")) {
-    const std::string name = row.size() > 3 ? row[3] : "";
-    auto known = std::find(room.classes.begin(), room.classes.end(), name);
-    if (known == room.classes.end()) known = room.classes.insert(known, name);
-    label_of.push_back(static_cast<uint32_t>(known - room.classes.begin()));
-  }
-  for (const char* const camera : {"rgb", "slam-left", "slam-right"}) {
-    for (const int64_t time_ms : {87551170, 87551204}) {
-      const std::string stem =
-          (folder / "images" / camera).string() + "_" + std::to_string(time_ms) + "ms";
-      const auto fisheye = ReadCamera(calibration, std::string("camera-") + camera);
-      if (!fisheye.has_value()) return std::nullopt;
-      DepthView view{*fisheye, cv::imread(stem + "_depth.png", cv::IMREAD_UNCHANGED),
-                     cv::imread(stem + "_segmentation.png", cv::IMREAD_UNCHANGED),
-                     cv::imread(stem + ".jpg", cv::IMREAD_COLOR)};
-      if (view.depth_mm.type() != CV_16UC1 || view.instances.type() != CV_16UC1 ||
-          view.depth_mm.size() != view.instances.size() ||
-          view.depth_mm.size() != view.color.size()) {
-        return std::nullopt;
-      }
-      // The calibration of the colour camera is of 2880 pixels with a border of 32; images are of
-      // half of that.
-      if (std::string(camera) == "rgb") {
-        view.camera.p[0] *= 0.5;
-        for (const size_t i : {size_t{1}, size_t{2}}) {
-          view.camera.p[i] = 0.5 * (view.camera.p[i] - 32.0 + 0.5) - 0.5;
-        }
-      }
-      view.map_T_camera = PoseAt(poses, 1000 * time_ms) * view.camera.device_T_camera;
-      AddView(view, 0.0, 0.0, &room.mesh);
-      for (const double turn : {-0.6, 0.6}) {
-        AddView(view, turn, 0.0, &room.mesh);
-        AddView(view, 0.0, turn, &room.mesh);
-      }
-    }
-  }
-  for (const uint32_t instance : room.mesh.instance_ids) {
-    if (instance >= label_of.size()) return std::nullopt;
-    room.mesh.labels.push_back(label_of[instance]);
   }
   return room;
 }

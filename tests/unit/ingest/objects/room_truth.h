@@ -25,12 +25,11 @@ struct RealRoom {
 /// Folder of recorded data: DSG_DATA, or the one beside the source tree.
 std::filesystem::path DataFolder();
 
+/// Rows of a table with commas, without its head; empty if there is no such file.
+std::vector<std::vector<std::string>> ReadTable(const std::filesystem::path& path);
+
 /// Vertices without normals and faces. Empty if something is missing.
 std::optional<RealRoom> ReadScannetRoom(const std::filesystem::path& folder);
-
-/// What three fisheye cameras saw at two instants, as pinhole views of 90 degrees put into the
-/// world: points with normals towards the camera, z up. Empty if something is missing.
-std::optional<RealRoom> ReadAriaApartment(const std::filesystem::path& folder);
 
 /// The room with furniture as instances only: doors, windows, curtains, pictures and what lies flat
 /// on the floor have none, and the parts of one cupboard are one instance.
