@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ingest/pipeline/mapping_options.h"
+#include "tests/unit/ingest/config/other_value.h"
 
 #include <gtest/gtest.h>
 
@@ -24,7 +25,7 @@ TEST(MappingOptions, TellEachNumberOfAStageInTheDigest) {
   const std::vector<BoundOption> all = AllOf(&options);
   for (const BoundOption& field : all) {
     const double before = field.Get();
-    field.Set(before == field.max ? field.min : field.max);
+    field.Set(OtherValue(field, all));
     EXPECT_TRUE(options.Validate().ok()) << field.name;
     EXPECT_TRUE(digests.insert(options.Digest(/*has_labels=*/false)).second) << field.name;
     field.Set(before);

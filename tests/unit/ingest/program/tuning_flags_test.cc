@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cmath>
 #include <set>
 #include <string>
@@ -16,6 +15,7 @@
 #include "ingest/program/ingest_flags.h"
 #include "ingest/program/odometry_flags.h"
 #include "schema/base/status.h"
+#include "tests/unit/ingest/config/other_value.h"
 
 namespace dsg::ingest {
 namespace {
@@ -77,20 +77,6 @@ std::string Given(const BoundOption& field, double number) {
   return text;
 }
 
-// Another value in the range, and on the right side of the range's other end.
-double Other(const BoundOption& field, const std::vector<BoundOption>& all) {
-  const auto is_end = [](const char* end, const BoundOption& of) {
-    return end != nullptr && std::string(end) == of.name;
-  };
-  double low = field.min;
-  double high = field.max;
-  for (const BoundOption& other : all) {
-    if (is_end(field.lower_end, other)) low = std::max(low, other.Get());
-    if (is_end(other.lower_end, field)) high = std::min(high, other.Get());
-  }
-  return field.Get() == high ? low : high;
-}
-
 TEST(Tuning, NamesAreUniqueAndDefaultsInRange) {
   Options options;
   std::set<std::string> names;
@@ -112,7 +98,7 @@ TEST(Tuning, EachFlagReachesItsStageAndNoOther) {
     const std::string name = field.name;
     // What only a network of the user's reads has a test of its own.
     if (name.rfind("person-look-", 0) == 0) continue;
-    absl::StatusOr<Options> options = Parse({Given(field, Other(field, defaults))});
+    absl::StatusOr<Options> options = Parse({Given(field, OtherValue(field, defaults))});
     ASSERT_TRUE(options.ok()) << name << ": " << options.status();
     std::string changed;
     const std::vector<BoundOption> all = options->All();
@@ -120,7 +106,7 @@ TEST(Tuning, EachFlagReachesItsStageAndNoOther) {
       if (all[i].Get() != defaults[i].Get()) absl::StrAppend(&changed, all[i].name, " ");
     }
     EXPECT_EQ(changed, name + " ");
-    EXPECT_EQ(options->Find(all, name).Get(), Other(field, defaults)) << name;
+    EXPECT_EQ(options->Find(all, name).Get(), OtherValue(field, defaults)) << name;
   }
 }
 
@@ -171,7 +157,7 @@ TEST(Tuning, PeopleTellEachNumberInTheirDigest) {
     const std::vector<BoundOption> all = Flat(options.Groups());
     for (const BoundOption& field : all) {
       const double before = field.Get();
-      field.Set(Other(field, all));
+      field.Set(OtherValue(field, all));
       EXPECT_TRUE(options.Validate().ok()) << field.name;
       EXPECT_TRUE(digests.insert(options.Digest()).second) << field.name;
       field.Set(before);
@@ -190,7 +176,7 @@ TEST(Tuning, LoopClosuresTellEachNumberInTheirDigest) {
   const std::vector<BoundOption> all = options.Bind();
   for (const BoundOption& field : all) {
     const double before = field.Get();
-    field.Set(Other(field, all));
+    field.Set(OtherValue(field, all));
     EXPECT_TRUE(ValidateOptions(options).ok()) << field.name;
     EXPECT_TRUE(digests.insert(DigestOptions(options)).second) << field.name;
     field.Set(before);
