@@ -186,6 +186,8 @@ class VisualInertialOdometry::Impl {
       return std::vector<PlacedState>();
     }
     is_started_ = true;
+    // At rest the values of a simulated unit without noise stand still, and nothing is wrong.
+    has_noise_ = !HasFault(ImuFaultKind::kStuck, SamplesSince(lost_ns_.value_or(kTimeMin)));
     counts_.unplaced -= std::ssize(poses) - 1;
     ++(begin.is_in_motion ? counts_.starts_in_motion : counts_.starts_at_rest);
     last_seen_ns_ = window_.newest_ns();
@@ -220,8 +222,11 @@ class VisualInertialOdometry::Impl {
     if (!IsKeyframeDue(frame.time_ns, window_.newest_ns(), last_features_)) {
       return std::vector<PlacedState>{pose};
     }
-    if (const std::string fault = FaultOf(*measured); !fault.empty()) {
-      return LoseSinceKeyframe(fault, frame.time_ns);
+    if (HasFault(ImuFaultKind::kClipped, measured->samples())) {
+      return LoseSinceKeyframe("clipped samples", frame.time_ns);
+    }
+    if (has_noise_ && HasFault(ImuFaultKind::kStuck, measured->samples())) {
+      return LoseSinceKeyframe("samples that stand still", frame.time_ns);
     }
     DropOutliers();
     DSG_ASSIGN_OR_RETURN(SeenFeatures features, SeeKeyframe(frame, camera_.left, &tracker_));
@@ -267,15 +272,16 @@ class VisualInertialOdometry::Impl {
     for (const int64_t id : motion.outliers) (*features)[id].disparity_px.reset();
   }
 
-  // What makes the samples since the last keyframe worthless, in words; empty if nothing is known
-  // to.
-  std::string FaultOf(const Preintegration& measured) const {
-    for (const ImuFault& fault :
-         FaultsOfSamples(measured.samples(), imu_.name, options_.inertial)) {
-      if (fault.kind == ImuFaultKind::kClipped) return "clipped samples";
-      if (fault.kind == ImuFaultKind::kStuck) return "samples that stand still";
-    }
-    return "";
+  bool HasFault(ImuFaultKind kind, std::span<const ImuMeasurement> samples) const {
+    const std::vector<ImuFault> faults = FaultsOfSamples(samples, imu_.name, options_.inertial);
+    return std::any_of(faults.begin(), faults.end(),
+                       [kind](const ImuFault& fault) { return fault.kind == kind; });
+  }
+
+  std::span<const ImuMeasurement> SamplesSince(TimeNs time_ns) const {
+    const auto first = std::find_if(samples_.begin(), samples_.end(),
+                                    [&](const auto& sample) { return sample.time_ns > time_ns; });
+    return {first, samples_.end()};
   }
 
   // Where most of what is seen moves otherwise than the path, either the unit is wrong or something
@@ -360,6 +366,8 @@ class VisualInertialOdometry::Impl {
   std::vector<ImuMeasurement> samples_;
   ImuBias bias_;
   bool is_started_ = false;
+  // Whether the unit's values vary while it rests.
+  bool has_noise_ = true;
   // Whether the samples told the turn since the last image.
   bool has_turn_ = true;
   std::optional<TimeNs> last_ns_;

@@ -34,6 +34,7 @@ struct Session {
   // When the lens is covered, and when the unit says nothing.
   std::function<bool(double)> is_covered = [](double) { return false; };
   std::function<bool(double)> is_silent = [](double) { return false; };
+  bool has_noise = true;
   // What the unit's driver makes of a sample.
   std::function<void(ImuMeasurement*)> spoil = [](ImuMeasurement*) {};
   OdometryOptions options;
@@ -56,7 +57,7 @@ Outcome RunSession(Session session) {
   const int sample_count = static_cast<int>(std::lround(200.0 * session.seconds));
   for (int i = 0; i <= sample_count; ++i) samples.push_back(session.carried.Measured(i / 200.0));
   ImuBias bias;
-  samples = Noisy(std::move(samples), rig.imu, &random, &bias);
+  if (session.has_noise) samples = Noisy(std::move(samples), rig.imu, &random, &bias);
   size_t next = 0;
   Outcome outcome;
   for (double t = kFrameS; t <= session.seconds; t += kFrameS) {
@@ -273,6 +274,17 @@ TEST(VisualInertialOdometry, IsLostWhereSamplesAreClippedOrStandStill) {
     EXPECT_GT(outcome.poses.back().time_ns, 9'900'000'000);
     EXPECT_GT(outcome.poses.back().covariance(0, 0), 0.01) << fault.name;
   }
+}
+
+// Its values are the same while it rests.
+TEST(VisualInertialOdometry, FollowsAUnitWithoutNoise) {
+  Session session;
+  session.has_noise = false;
+  session.carried.rest_s = 3.0;
+  const Outcome outcome = RunSession(session);
+  ASSERT_FALSE(outcome.poses.empty());
+  EXPECT_TRUE(outcome.counts.losses.empty()) << testing::PrintToString(outcome.counts.losses);
+  EXPECT_LT(Largest(ErrorsM(outcome, session.carried)), 0.05);
 }
 
 // It is wrong for some tenths of a second, and possible.
