@@ -90,6 +90,8 @@ struct OdometryUnitOptions {
   /// The path is doubted where at least this share of the features with distances agree on another
   /// motion since the last keyframe, that differs by this way or this turn at least.
   double doubt_share_min = 0.5;
+  /// Unless so many of the same agree with the path, too: then they do not tell the two apart.
+  double doubt_path_share_max = 0.25;
   double doubt_way_m = 0.15;
   double doubt_turn_rad = 0.05;
   /// After so many keyframes in a row that are doubted the robot is lost.

@@ -33,6 +33,27 @@ Vector3d RayThrough(const CameraCalibration& camera, const Vector2d& pixel) {
   return PinholeRay(camera, pixel.x(), pixel.y());
 }
 
+/// Features that both have with a disparity.
+struct SharedPoints {
+  std::vector<int64_t> ids;
+  /// Of the same.
+  std::vector<StereoPointPair> pairs;
+};
+
+SharedPoints PointsOf(const StereoCamera& camera, const SeenFeatures& last, const SeenFeatures& now,
+                      const RelativePoseOptions& options) {
+  SharedPoints shared;
+  const auto point_of = [&](const SeenFeature& seen) {
+    return StereoPointOf(camera.left, camera.baseline_m, seen.pixel, *seen.disparity_px, options);
+  };
+  for (const SharedFeature& feature : SharedBy(last, now)) {
+    if (!feature.last->disparity_px.has_value() || !feature.now->disparity_px.has_value()) continue;
+    shared.ids.push_back(feature.id);
+    shared.pairs.push_back({point_of(*feature.last), point_of(*feature.now)});
+  }
+  return shared;
+}
+
 // Those of the ids that are not at the ascending indices.
 std::vector<int64_t> IdsBeside(const std::vector<int64_t>& ids, const std::vector<int>& indices) {
   std::vector<int64_t> beside;
@@ -70,27 +91,26 @@ std::vector<int64_t> MonoOutliers(const StereoCamera& camera, const SeenFeatures
 StereoMotion StereoMotionOf(const StereoCamera& camera, const SeenFeatures& last,
                             const SeenFeatures& now, const Quaterniond& last_R_now,
                             OdometryMethod method, const RelativePoseOptions& options) {
-  std::vector<int64_t> ids;
-  std::vector<StereoPointPair> pairs;
-  const auto point_of = [&](const SeenFeature& seen) {
-    return StereoPointOf(camera.left, camera.baseline_m, seen.pixel, *seen.disparity_px, options);
-  };
-  for (const SharedFeature& feature : SharedBy(last, now)) {
-    if (!feature.last->disparity_px.has_value() || !feature.now->disparity_px.has_value()) continue;
-    ids.push_back(feature.id);
-    pairs.push_back({point_of(*feature.last), point_of(*feature.now)});
-  }
+  const SharedPoints shared = PointsOf(camera, last, now, options);
   const StereoPose pose = method == OdometryMethod::kFivePoint
-                              ? ThreePointPose(pairs, options)
-                              : OnePointPose(pairs, last_R_now, options);
+                              ? ThreePointPose(shared.pairs, options)
+                              : OnePointPose(shared.pairs, last_R_now, options);
   StereoMotion motion;
   motion.outcome = pose.outcome;
   if (pose.outcome != PoseOutcome::kFound) return motion;
   motion.last_T_now = pose.first_T_second;
   motion.inlier_share =
-      static_cast<double>(pose.inliers.size()) / static_cast<double>(pairs.size());
-  motion.outliers = IdsBeside(ids, pose.inliers);
+      static_cast<double>(pose.inliers.size()) / static_cast<double>(shared.pairs.size());
+  motion.outliers = IdsBeside(shared.ids, pose.inliers);
   return motion;
+}
+
+double AgreeingShare(const StereoCamera& camera, const SeenFeatures& last, const SeenFeatures& now,
+                     const Pose3d& last_T_now, const RelativePoseOptions& options) {
+  const SharedPoints shared = PointsOf(camera, last, now, options);
+  if (shared.pairs.empty()) return 0.0;
+  return static_cast<double>(CountAgreeing(shared.pairs, last_T_now, options)) /
+         static_cast<double>(shared.pairs.size());
 }
 
 std::optional<double> ParallaxOf(const StereoCamera& camera, const SeenFeatures& last,

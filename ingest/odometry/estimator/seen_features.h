@@ -53,6 +53,11 @@ StereoMotion StereoMotionOf(const StereoCamera& camera, const SeenFeatures& last
                             const SeenFeatures& now, const Eigen::Quaterniond& last_R_now,
                             OdometryMethod method, const RelativePoseOptions& options);
 
+/// Share of the features that both have with a disparity which agree with a motion of the left
+/// camera; 0 of none.
+double AgreeingShare(const StereoCamera& camera, const SeenFeatures& last, const SeenFeatures& now,
+                     const Pose3d& last_T_now, const RelativePoseOptions& options);
+
 /// Median flow of the features that both have once the rotation is taken off, pixels; nullopt if
 /// they have none in common.
 std::optional<double> ParallaxOf(const StereoCamera& camera, const SeenFeatures& last,

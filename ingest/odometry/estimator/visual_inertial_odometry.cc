@@ -230,7 +230,7 @@ class VisualInertialOdometry::Impl {
     }
     DropOutliers();
     DSG_ASSIGN_OR_RETURN(SeenFeatures features, SeeKeyframe(frame, camera_.left, &tracker_));
-    const StereoMotion seen = MotionTo(features, OdometryMethod::kFivePoint);
+    const SeenFeatures seen = features;
     CheckDistances(&features);
     if (SharedCount(last_features_, features) >= options_.keyframe.sight_count_min)
       last_seen_ns_ = frame.time_ns;
@@ -287,8 +287,9 @@ class VisualInertialOdometry::Impl {
   // Where most of what is seen moves otherwise than the path, either the unit is wrong or something
   // fills the image that moves. Nobody can tell which at once: the path goes on, and its covariance
   // says so.
-  bool IsDoubted(const Pose3d& map_T_last, const StereoMotion& seen) {
+  bool IsDoubted(const Pose3d& map_T_last, const SeenFeatures& features) {
     const OdometryUnitOptions& unit = options_.unit;
+    const StereoMotion seen = MotionTo(features, OdometryMethod::kFivePoint);
     if (seen.outcome != PoseOutcome::kFound || seen.inlier_share < unit.doubt_share_min) {
       return false;
     }
@@ -297,6 +298,9 @@ class VisualInertialOdometry::Impl {
     const double way_m = (seen.last_T_now.position - told.position).norm();
     const double turn_rad = AngleBetween(seen.last_T_now.orientation, told.orientation);
     if (way_m < unit.doubt_way_m && turn_rad < unit.doubt_turn_rad) return false;
+    const double path_share =
+        AgreeingShare(camera_, last_features_, features, told, options_.frontend.relative_pose);
+    if (path_share > unit.doubt_path_share_max) return false;
     doubt_.Add(map_T_now.position, way_m, turn_rad);
     ++counts_.doubts;
     return true;

@@ -296,4 +296,17 @@ StereoPose OnePointPose(std::span<const StereoPointPair> pairs,
   return result;
 }
 
+int CountAgreeing(std::span<const StereoPointPair> pairs, const Pose3d& first_T_second,
+                  const RelativePoseOptions& options) {
+  const Eigen::Matrix3d turn = first_T_second.orientation.toRotationMatrix();
+  return static_cast<int>(std::count_if(pairs.begin(), pairs.end(), [&](const auto& pair) {
+    if (!IsUsable(pair.first) || !IsUsable(pair.second)) return false;
+    const Eigen::Vector3d error = pair.first.point - first_T_second * pair.second.point;
+    const Eigen::Matrix3d covariance =
+        pair.first.covariance + turn * pair.second.covariance * turn.transpose();
+    const double chi_square = error.dot(covariance.llt().solve(error));
+    return chi_square <= options.chi_square_max;
+  }));
+}
+
 }  // namespace dsg::ingest

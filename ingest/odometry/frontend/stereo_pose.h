@@ -60,6 +60,10 @@ absl::StatusOr<StereoPoseMethod> ParseStereoPoseMethod(std::string_view name);
 StereoPose ThreePointPose(std::span<const StereoPointPair> pairs,
                           const RelativePoseOptions& options = {});
 
+/// How many of the pairs agree with a motion, as ThreePointPose counts those of its own.
+int CountAgreeing(std::span<const StereoPointPair> pairs, const Pose3d& first_T_second,
+                  const RelativePoseOptions& options = {});
+
 /// The translation alone: each pair says one, and the one that most pairs agree with wins. The
 /// rotation is that of a gyroscope, unit. Without random samples: all pairs vote, or
 /// `draw_count_max` evenly chosen ones.

@@ -5,6 +5,7 @@
 
 #include <Eigen/LU>
 #include <iostream>
+#include <iterator>
 #include <limits>
 
 #include "schema/base/status.h"
@@ -81,6 +82,21 @@ TEST_P(StereoPoseTest, PureRotationAndStandstillAreMotionsOfNoLength) {
       EXPECT_LT(error.dot(pose.position_covariance.inverse() * error), 16.3) << outlier_share;
       EXPECT_LT(DegreesApart(pose.first_T_second.orientation, motion.orientation), 0.5);
     }
+  }
+}
+
+TEST(CountAgreeing, CountsAsThreePointPoseDoes) {
+  for (const uint64_t seed : kRigSeeds) {
+    MadeScene scene = MakeScene({.outlier_share = 0.4, .seed = seed});
+    const StereoPose pose = ThreePointPose(scene.points);
+    ASSERT_EQ(pose.outcome, PoseOutcome::kFound);
+    const int agree_count = CountAgreeing(scene.points, pose.first_T_second);
+    EXPECT_EQ(agree_count, std::ssize(pose.inliers)) << seed;
+    Pose3d turned = pose.first_T_second;
+    turned.orientation = turned.orientation * Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY());
+    EXPECT_LT(CountAgreeing(scene.points, turned), agree_count / 4) << seed;
+    scene.points[0].first.point.x() = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_GE(CountAgreeing(scene.points, pose.first_T_second), agree_count - 1) << seed;
   }
 }
 
