@@ -44,9 +44,8 @@ def simulate(arguments, people, seed):
     if (folder / "log").exists():
         return folder, False
     print(f"simulating {folder}", file=sys.stderr, flush=True)
-    # A log that was not finished is no log.
-    begun = folder.with_suffix(".begun")
-    shutil.rmtree(begun, ignore_errors=True)
+    # A log that was not finished is no log; the simulator goes on with it.
+    begun = folder.with_name(folder.name + ".begun")
     run([arguments.bin / "dsg-simulate", "sensors", "--out", begun, "--world", arguments.world,
          "--people", people, "--seed", seed, "--seconds", f"{arguments.seconds:g}",
          *arguments.simulate])

@@ -96,8 +96,7 @@ constexpr OptionField<OdometryUnitOptions> kUnitFields[] = {
      "it is doubted: with half of them nobody can tell which is right"},
     {"odometry-doubt-path", &OdometryUnitOptions::doubt_path_share_max, 0.0, 1.0,
      "... and the share of them that may agree with the path all the same: more do not tell the "
-     "two "
-     "motions apart, as few points on a far wall"},
+     "two motions apart, as few points on a far wall"},
     {"odometry-doubt-way", &OdometryUnitOptions::doubt_way_m, 0.001, 100.0,
      "Least difference of these motions between two keyframes, metres: three times the largest of "
      "simulated and recorded logs without faults"},

@@ -231,7 +231,8 @@ class VisualInertialOdometry::Impl {
     DropOutliers();
     DSG_ASSIGN_OR_RETURN(SeenFeatures features, SeeKeyframe(frame, camera_.left, &tracker_));
     const SeenFeatures seen = features;
-    CheckDistances(&features);
+    const StereoMotion motion = MotionTo(features, OdometryMethod::kFivePoint);
+    CheckDistances(motion, &features);
     if (SharedCount(last_features_, features) >= options_.keyframe.sight_count_min)
       last_seen_ns_ = frame.time_ns;
     if (frame.time_ns - last_seen_ns_ > options_.keyframe.blind_ns_max) {
@@ -245,7 +246,7 @@ class VisualInertialOdometry::Impl {
       place_ = {pose.state.map_T_imu, pose.covariance, false};
       return Lose("no solution");
     }
-    doubts_in_row_ = IsDoubted(map_T_last, seen) ? doubts_in_row_ + 1 : 0;
+    doubts_in_row_ = IsDoubted(map_T_last, motion, seen) ? doubts_in_row_ + 1 : 0;
     if (doubts_in_row_ >= options_.unit.doubt_count_max) return Lose("disagreement");
     tracker_.Drop(window_.dropped_features());
     for (const int64_t id : window_.dropped_features()) features.erase(id);
@@ -267,8 +268,10 @@ class VisualInertialOdometry::Impl {
   }
 
   // A distance that disagrees is not believed; the place in the image was checked before.
-  void CheckDistances(SeenFeatures* features) const {
-    const StereoMotion motion = MotionTo(*features, options_.method);
+  void CheckDistances(const StereoMotion& by_three_points, SeenFeatures* features) const {
+    const StereoMotion motion = options_.method == OdometryMethod::kFivePoint
+                                    ? by_three_points
+                                    : MotionTo(*features, options_.method);
     for (const int64_t id : motion.outliers) (*features)[id].disparity_px.reset();
   }
 
@@ -287,9 +290,8 @@ class VisualInertialOdometry::Impl {
   // Where most of what is seen moves otherwise than the path, either the unit is wrong or something
   // fills the image that moves. Nobody can tell which at once: the path goes on, and its covariance
   // says so.
-  bool IsDoubted(const Pose3d& map_T_last, const SeenFeatures& features) {
+  bool IsDoubted(const Pose3d& map_T_last, const StereoMotion& seen, const SeenFeatures& features) {
     const OdometryUnitOptions& unit = options_.unit;
-    const StereoMotion seen = MotionTo(features, OdometryMethod::kFivePoint);
     if (seen.outcome != PoseOutcome::kFound || seen.inlier_share < unit.doubt_share_min) {
       return false;
     }

@@ -9,12 +9,12 @@
 #include <cstdint>
 #include <cstdlib>
 #include <fstream>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <vector>
 
+#include "ingest/evaluation/point_index.h"
 #include "ingest/volume/semantic_volume.h"
 
 namespace dsg::ingest {
@@ -90,7 +90,7 @@ constexpr double kLensRad = 1.05;
 // Neighbouring points that are further apart in depth, by share, are of two surfaces.
 constexpr double kJumpShare = 0.05;
 // A vertex further from all points has no instance, metres.
-constexpr float kNearM = 0.05F;
+constexpr double kNearM = 0.05;
 constexpr double kBlockM = 1.0;
 
 /// What a pinhole camera of 90 degrees would see, row by row.
@@ -249,63 +249,32 @@ std::vector<PinholeView> ViewsOf(const DepthImage& image) {
   return views;
 }
 
-/// The indices of points by cells of kNearM.
-class NearestPoint {
- public:
-  explicit NearestPoint(const std::vector<Eigen::Vector3f>& points) : points_(points) {
-    for (size_t i = 0; i < points.size(); ++i) by_cell_[CellAt(points[i])].push_back(i);
+std::optional<RealRoom> PointsSeen(const Apartment& apartment) {
+  RealRoom room;
+  room.classes = apartment.classes;
+  for (const DepthImage& image : apartment.images) {
+    for (const PinholeView& view : ViewsOf(image)) AddPoints(view, image, &room.mesh);
   }
-
-  /// Nullopt if none is within kNearM.
-  std::optional<size_t> To(const Eigen::Vector3f& point) const {
-    std::optional<size_t> nearest;
-    float least = kNearM;
-    const std::array<int, 3> cell = CellAt(point);
-    for (int i = 0; i < 27; ++i) {
-      const auto entry =
-          by_cell_.find({cell[0] + i % 3 - 1, cell[1] + i / 3 % 3 - 1, cell[2] + i / 9 - 1});
-      if (entry == by_cell_.end()) continue;
-      for (const size_t index : entry->second) {
-        const float distance = (points_[index] - point).norm();
-        if (distance > least) continue;
-        least = distance;
-        nearest = index;
-      }
-    }
-    return nearest;
+  for (const uint32_t instance : room.mesh.instance_ids) {
+    if (instance >= apartment.labels.size()) return std::nullopt;
+    room.mesh.labels.push_back(apartment.labels[instance]);
   }
-
- private:
-  static std::array<int, 3> CellAt(const Eigen::Vector3f& point) {
-    const auto cell = [](float x) { return static_cast<int>(std::floor(x / kNearM)); };
-    return {cell(point.x()), cell(point.y()), cell(point.z())};
-  }
-
-  const std::vector<Eigen::Vector3f>& points_;
-  std::map<std::array<int, 3>, std::vector<size_t>> by_cell_;
-};
+  return room;
+}
 
 }  // namespace
 
 std::optional<RealRoom> ReadAriaApartment(const fs::path& folder) {
   const std::optional<Apartment> apartment = ReadImages(folder);
   if (!apartment.has_value()) return std::nullopt;
-  RealRoom room;
-  room.classes = apartment->classes;
-  for (const DepthImage& image : apartment->images) {
-    for (const PinholeView& view : ViewsOf(image)) AddPoints(view, image, &room.mesh);
-  }
-  for (const uint32_t instance : room.mesh.instance_ids) {
-    if (instance >= apartment->labels.size()) return std::nullopt;
-    room.mesh.labels.push_back(apartment->labels[instance]);
-  }
-  return room;
+  return PointsSeen(*apartment);
 }
 
 std::optional<RealRoom> FuseAriaApartment(const fs::path& folder) {
-  const std::optional<RealRoom> seen = ReadAriaApartment(folder);
   const std::optional<Apartment> apartment = ReadImages(folder);
-  if (!seen.has_value() || !apartment.has_value()) return std::nullopt;
+  if (!apartment.has_value()) return std::nullopt;
+  const std::optional<RealRoom> seen = PointsSeen(*apartment);
+  if (!seen.has_value()) return std::nullopt;
   VolumeOptions options;
   options.voxel_m = kTruthCellM;
   SemanticVolume volume(options);
@@ -328,11 +297,12 @@ std::optional<RealRoom> FuseAriaApartment(const fs::path& folder) {
     for (const auto& face : block.faces)
       all.faces.push_back({face[0] + first, face[1] + first, face[2] + first});
   }
-  const NearestPoint nearest(seen->mesh.positions_map);
+  const evaluation::PointIndex points(seen->mesh.positions_map);
   for (const Eigen::Vector3f& point : all.positions_map) {
-    const std::optional<size_t> index = nearest.To(point);
-    all.instance_ids.push_back(index.has_value() ? seen->mesh.instance_ids[*index] : 0);
-    all.labels.push_back(index.has_value() ? seen->mesh.labels[*index] : 0);
+    const std::vector<evaluation::Neighbour> nearest = points.Nearest(point.cast<double>(), 1);
+    const bool is_seen = !nearest.empty() && nearest[0].distance_m <= kNearM;
+    all.instance_ids.push_back(is_seen ? seen->mesh.instance_ids[nearest[0].index] : 0);
+    all.labels.push_back(is_seen ? seen->mesh.labels[nearest[0].index] : 0);
   }
   return room;
 }
