@@ -2,6 +2,7 @@
 #include "ingest/pipeline/odometry_log.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -9,6 +10,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "ingest/log/file_bytes.h"
 #include "ingest/log/sensor_log.h"
 #include "ingest/odometry/estimator/odometry.h"
@@ -65,6 +67,9 @@ std::optional<Eigen::Vector3d> UpIn(const OdometryFrame& frame, const StereoCame
 // A log comes in the order of time. Where samples are missing for longer, none will come, and the
 // images must not wait for them in memory.
 constexpr TimeNs kWaitNs = 2 * kNsPerSecond;
+
+// Clocks that are off by less are as good as they get.
+constexpr double kTellLateS = 0.005;
 
 class OdometryLog : public LogSource {
  public:
@@ -238,6 +243,12 @@ class OdometryLog : public LogSource {
           "odometry: at ", counts.doubts, " keyframes most of what was seen moved otherwise than ",
           "the inertial unit tells: it is wrong there (look at its samples), or people fill the ",
           "image (--odometry-masks); covariances are larger since"));
+    }
+    if (std::abs(counts.image_late_s) >= kTellLateS) {
+      info_.notes.push_back(absl::StrFormat(
+          "odometry: images were taken %.0f ms %s their stamps on the clock of the inertial unit; "
+          "poses know of it, and are those of the stamps on that clock",
+          1e3 * std::abs(counts.image_late_s), counts.image_late_s > 0.0 ? "after" : "before"));
     }
     if (!up_note_.empty()) info_.notes.push_back(up_note_);
     if (lone_count_ > 0) {

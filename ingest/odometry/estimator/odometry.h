@@ -65,6 +65,9 @@ struct OdometryCounts {
   /// Keyframes at which most of what was seen moved otherwise than the path: covariances are larger
   /// since.
   int64_t doubts = 0;
+  /// By how much images are later than their stamps on the clock of the unit, seconds, as the
+  /// newest keyframe tells it.
+  double image_late_s = 0.0;
   /// Why the newest start that was tried in vain failed, in words, and what was wrong with the
   /// gyroscope by then, if that was known (imu_faults.h); empty without a unit.
   std::string failed_start;

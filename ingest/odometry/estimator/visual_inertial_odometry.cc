@@ -311,6 +311,7 @@ class VisualInertialOdometry::Impl {
   // False when nobody can tell how sure it is.
   bool TakeNewest() {
     ++counts_.keyframes;
+    counts_.image_late_s = window_.calibration_error()[2];
     const absl::StatusOr<Matrix15d> covariance = window_.NewestCovariance();
     if (!covariance.ok()) return false;
     // Where measurements miss by more than their noise, the states do, too.

@@ -176,7 +176,7 @@ class VisualOdometry::Impl {
       if (!point.has_value() && last != last_features_.end() &&
           last->second.disparity_px.has_value()) {
         const double inverse_depth =
-            InverseDepthOf(model_, window_.stereo_error(), *last->second.disparity_px);
+            InverseDepthOf(model_, window_.calibration_error(), *last->second.disparity_px);
         if (inverse_depth * options_.window.farthest_m < 1.0) continue;
         point = map_T_camera * (model_.RayOf(last->second.pixel) / inverse_depth);
       }

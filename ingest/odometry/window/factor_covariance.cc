@@ -15,17 +15,13 @@
 namespace dsg::ingest {
 namespace {
 
-// Numbers of the blocks that are eliminated first.
-constexpr int kLandmarkSize = 3;
-
 // Where the steps of the blocks stand among the columns. Landmarks have none.
 struct Columns {
   absl::flat_hash_map<const double*, Eigen::Index> first;
   Eigen::Index count = 0;
 
   void Add(const double* block, int block_size) {
-    if (block_size == kLandmarkSize || !first.try_emplace(block, count).second) return;
-    count += StepSizeOf(block_size);
+    if (first.try_emplace(block, count).second) count += StepSizeOf(block_size);
   }
 };
 
@@ -38,7 +34,6 @@ struct LandmarkTerms {
 
 struct Normal {
   Eigen::MatrixXd matrix;
-  // In the order in which factors name them.
   std::vector<LandmarkTerms> landmarks;
   absl::flat_hash_map<const double*, size_t> landmark_of;
 };
@@ -52,14 +47,11 @@ absl::Status Undetermined() {
 
 void AddTo(const WindowFactor& factor, const LinearFactor& linear, const Columns& columns,
            Normal* normal) {
-  const auto is_landmark = [&](size_t k) { return linear.by_block[k].cols() == kLandmarkSize; };
+  const auto is_landmark = [&](size_t k) { return normal->landmark_of.contains(factor.blocks[k]); };
   for (size_t a = 0; a < factor.blocks.size(); ++a) {
     const Eigen::MatrixXd& by_a = linear.by_block[a];
     if (is_landmark(a)) {
-      const auto [entry, is_new] =
-          normal->landmark_of.try_emplace(factor.blocks[a], normal->landmarks.size());
-      if (is_new) normal->landmarks.emplace_back();
-      LandmarkTerms& landmark = normal->landmarks[entry->second];
+      LandmarkTerms& landmark = normal->landmarks[normal->landmark_of.at(factor.blocks[a])];
       landmark.square += by_a.transpose() * by_a;
       for (size_t b = 0; b < factor.blocks.size(); ++b) {
         if (is_landmark(b)) continue;
@@ -93,14 +85,18 @@ void EliminateLandmark(const LandmarkTerms& landmark, Eigen::MatrixXd* matrix) {
 }  // namespace
 
 absl::StatusOr<Eigen::MatrixXd> CovarianceOf(std::span<const WindowFactor> factors,
+                                             std::span<double* const> landmarks,
                                              std::span<double* const> wanted) {
+  Normal normal;
+  normal.landmarks.resize(landmarks.size());
+  for (size_t i = 0; i < landmarks.size(); ++i) normal.landmark_of.emplace(landmarks[i], i);
   Columns columns;
   for (const WindowFactor& factor : factors) {
     for (size_t k = 0; k < factor.blocks.size(); ++k) {
+      if (normal.landmark_of.contains(factor.blocks[k])) continue;
       columns.Add(factor.blocks[k], factor.cost->parameter_block_sizes()[k]);
     }
   }
-  Normal normal;
   normal.matrix = Eigen::MatrixXd::Zero(columns.count, columns.count);
   std::map<Eigen::Index, Eigen::Index> sizes_at;
   for (const WindowFactor& factor : factors) {
@@ -108,8 +104,8 @@ absl::StatusOr<Eigen::MatrixXd> CovarianceOf(std::span<const WindowFactor> facto
     if (!linear.has_value()) return Undetermined();
     AddTo(factor, *linear, columns, &normal);
     for (size_t k = 0; k < factor.blocks.size(); ++k) {
-      const Eigen::Index size = linear->by_block[k].cols();
-      if (size != kLandmarkSize) sizes_at[columns.first.at(factor.blocks[k])] = size;
+      const auto column = columns.first.find(factor.blocks[k]);
+      if (column != columns.first.end()) sizes_at[column->second] = linear->by_block[k].cols();
     }
   }
   for (const LandmarkTerms& terms : normal.landmarks) EliminateLandmark(terms, &normal.matrix);

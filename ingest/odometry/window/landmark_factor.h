@@ -36,15 +36,24 @@ struct StereoModel {
   Eigen::Vector3d RayOf(const Eigen::Vector2d& pixel) const;
 };
 
-/// What is wrong with the calibration of the pair, as a parameter block: pixels that all
-/// disparities are too large by (0.1 degrees between the cameras make one), and the share by which
-/// the baseline is longer than it is said to be.
-inline constexpr int kStereoErrorSize = 2;
-using StereoError = std::array<double, kStereoErrorSize>;
+/// What is wrong with the calibration, as a parameter block: pixels that all disparities are too
+/// large by (0.1 degrees between the cameras make one), the share by which the baseline is longer
+/// than it is said to be, and the seconds by which images are later than their stamps say, on the
+/// clock of the unit.
+inline constexpr int kCalibrationErrorSize = 3;
+using CalibrationError = std::array<double, kCalibrationErrorSize>;
+
+/// How the camera moves, in its own frame: rad/s and m/s. Between the stamp of an image and the
+/// instant at which it was taken that does not change.
+/// Source: Li and Mourikis, IJRR 2014 (the offset of clocks as a state).
+struct CameraMotion {
+  Eigen::Vector3d turn_rad_s = Eigen::Vector3d::Zero();
+  Eigen::Vector3d speed_m_s = Eigen::Vector3d::Zero();
+};
 
 /// Of a point at 1 / inverse_depth along the optical axis, pixels; and back.
-double DisparityOf(const StereoModel& model, const StereoError& error, double inverse_depth);
-double InverseDepthOf(const StereoModel& model, const StereoError& error, double disparity_px);
+double DisparityOf(const StereoModel& model, const CalibrationError& error, double inverse_depth);
+double InverseDepthOf(const StereoModel& model, const CalibrationError& error, double disparity_px);
 
 /// Where a landmark was seen. Pixels of the rectified left camera.
 struct LandmarkSight {
@@ -67,24 +76,27 @@ inline constexpr int kLandmarkBlockSize = 3;
 using LandmarkBlock = std::array<double, kLandmarkBlockSize>;
 
 /// By how much the anchor's own sight is missed, in standard deviations: column, row, and the
-/// disparity if it has one. Blocks: the landmark; with a disparity, the stereo error.
+/// disparity if it has one. Blocks: the landmark, the calibration error.
 std::unique_ptr<ceres::CostFunction> MakeAnchorFactor(const StereoModel& model,
                                                       const LandmarkSight& sight,
-                                                      const SightNoise& noise);
+                                                      const SightNoise& noise,
+                                                      const CameraMotion& motion);
 
 /// The same of another image. Blocks: pose of the anchor, pose of that image (pose_block.h), the
-/// landmark; with a disparity, the stereo error.
+/// landmark, the calibration error.
 ///
 /// Fails to evaluate where the landmark is not before the camera.
 std::unique_ptr<ceres::CostFunction> MakeSightFactor(const StereoModel& model,
                                                      const LandmarkSight& sight,
-                                                     const SightNoise& noise);
+                                                     const SightNoise& noise,
+                                                     const CameraMotion& motion);
 
 /// What a landmark is missed by in an image, pixels: column, row, and disparity (0 if it has none);
 /// nullopt unless it is before the camera.
 std::optional<Eigen::Vector3d> SightErrorOf(const StereoModel& model, const Pose3d& map_T_anchor,
                                             const Pose3d& map_T_imu, const LandmarkSight& sight,
+                                            const CameraMotion& motion,
                                             const LandmarkBlock& landmark,
-                                            const StereoError& error);
+                                            const CalibrationError& error);
 
 }  // namespace dsg::ingest

@@ -24,6 +24,7 @@
 namespace dsg::ingest {
 namespace {
 
+using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 absl::Status BadKeyframe(TimeNs time_ns, const std::string& what) {
@@ -97,19 +98,15 @@ class SlidingWindow::Impl {
   InertialState newest() const { return StateOf(keyframes_.back()); }
 
   absl::StatusOr<Matrix15d> NewestCovariance() const {
-    std::vector<LandmarkBlock> blocks;
-    const FactorList list = Factors(&blocks);
     StateSlot& slot = SlotOf(keyframes_.back().number);
     double* const wanted[] = {slot.pose.data(), slot.speed.data()};
-    DSG_ASSIGN_OR_RETURN(const Eigen::MatrixXd covariance, CovarianceOf(list.factors, wanted));
+    DSG_ASSIGN_OR_RETURN(const Eigen::MatrixXd covariance, CovarianceOfNewest(wanted));
     return Matrix15d(covariance);
   }
 
   absl::StatusOr<Matrix6d> NewestPoseCovariance() const {
-    std::vector<LandmarkBlock> blocks;
-    const FactorList list = Factors(&blocks);
     double* const wanted[] = {SlotOf(keyframes_.back().number).pose.data()};
-    DSG_ASSIGN_OR_RETURN(const Eigen::MatrixXd covariance, CovarianceOf(list.factors, wanted));
+    DSG_ASSIGN_OR_RETURN(const Eigen::MatrixXd covariance, CovarianceOfNewest(wanted));
     return Matrix6d(covariance);
   }
 
@@ -119,7 +116,7 @@ class SlidingWindow::Impl {
   }
 
   double misfit() const { return misfit_; }
-  StereoError& stereo_error() const { return slots_.front().stereo_error; }
+  CalibrationError& calibration_error() const { return slots_.front().calibration_error; }
   const std::vector<int64_t>& dropped() const { return dropped_; }
   const std::vector<SeenLandmark>& landmarks() const { return told_landmarks_; }
 
@@ -129,13 +126,15 @@ class SlidingWindow::Impl {
     std::array<double, kSpeedBlockSize> speed{};
     /// Of the first slot only, for all: Ceres sorts blocks by their addresses, and beside the
     /// states it has the same place among them in every run.
-    StereoError stereo_error{};
+    CalibrationError calibration_error{};
   };
 
   struct Keyframe {
     /// Ascending; never used again.
     int64_t number = 0;
     TimeNs time_ns = 0;
+    /// As the gyroscope measured it, bias and all.
+    Vector3d rate_rad_s = Vector3d::Zero();
     /// From the keyframe before; null of the first one, and of all without a unit.
     std::unique_ptr<Preintegration> measured;
   };
@@ -167,11 +166,21 @@ class SlidingWindow::Impl {
     return slots_[static_cast<size_t>(number) % slots_.size()];
   }
   WindowPoses Poses() const {
-    WindowPoses poses{keyframes_.front().number, {}, stereo_error()};
+    WindowPoses poses{keyframes_.front().number, {}, {}, calibration_error()};
     for (const Keyframe& keyframe : keyframes_) {
       poses.map_T_imu.push_back(PoseOfBlock(SlotOf(keyframe.number).pose.data()));
+      poses.motions.push_back(MotionOf(keyframe));
     }
     return poses;
+  }
+  CameraMotion MotionOf(const Keyframe& keyframe) const {
+    if (!has_unit_) return {};
+    const InertialState state = StateOf(keyframe);
+    const Quaterniond camera_R_imu = model_.imu_T_camera.orientation.conjugate();
+    const Vector3d turn_rad_s = keyframe.rate_rad_s - state.bias.gyro_rad_s;
+    const Vector3d speed_m_s = state.map_T_imu.orientation.conjugate() * state.velocity_map +
+                               turn_rad_s.cross(model_.imu_T_camera.position);
+    return {camera_R_imu * turn_rad_s, camera_R_imu * speed_m_s};
   }
 
   // Forgets all, what was learnt of the calibration, too: it may have been why one got lost.
@@ -181,7 +190,7 @@ class SlidingWindow::Impl {
     dropped_.clear();
     misfit_ = 0.0;
     has_unit_ = has_unit;
-    stereo_error() = {};
+    calibration_error() = {};
     AddKeyframe(time_ns, state, nullptr);
   }
 
@@ -197,12 +206,14 @@ class SlidingWindow::Impl {
     };
     add(slot.pose);
     if (has_unit_) add(slot.speed);
-    add(stereo_error());
-    prior.jacobian = Eigen::MatrixXd::Zero(size + kStereoErrorSize, size + kStereoErrorSize);
+    add(calibration_error());
+    prior.jacobian =
+        Eigen::MatrixXd::Zero(size + kCalibrationErrorSize, size + kCalibrationErrorSize);
     prior.jacobian.topLeftCorner(size, size) = root;
     prior.jacobian(size, size) = 1.0 / options_.disparity_offset_px;
     prior.jacobian(size + 1, size + 1) = 1.0 / options_.baseline_share;
-    prior.residual = Eigen::VectorXd::Zero(size + kStereoErrorSize);
+    prior.jacobian(size + 2, size + 2) = 1.0 / options_.clock_s;
+    prior.residual = Eigen::VectorXd::Zero(size + kCalibrationErrorSize);
     SetPrior(std::move(prior));
   }
 
@@ -239,7 +250,14 @@ class SlidingWindow::Impl {
     const int64_t number = next_number_++;
     WritePoseBlock(state.map_T_imu, SlotOf(number).pose.data());
     WriteSpeedBlock(state, SlotOf(number).speed.data());
-    keyframes_.push_back({number, time_ns, std::move(measured)});
+    keyframes_.push_back({number, time_ns, Vector3d::Zero(), std::move(measured)});
+    if (keyframes_.back().measured == nullptr) return;
+    const std::span<const ImuMeasurement> samples = keyframes_.back().measured->samples();
+    keyframes_.back().rate_rad_s = samples.back().angular_velocity_rad_s;
+    // Of the first keyframe no samples before it are known.
+    if (keyframes_.size() == 2) {
+      keyframes_.front().rate_rad_s = samples.front().angular_velocity_rad_s;
+    }
   }
 
   void SetPrior(LinearPrior prior) {
@@ -257,11 +275,18 @@ class SlidingWindow::Impl {
     FactorList list;
     if (prior_ != nullptr) list.factors.push_back({prior_.get(), nullptr, prior_blocks_});
     for (size_t i = 1; i < keyframes_.size() && has_unit_; ++i) AddInertial(i, &list);
+    const WindowPoses poses = Poses();
     size_t index = 0;
     for (const auto& [id, landmark] : landmarks_.all()) {
-      if (landmark.tells()) AddSightsOf(landmark, (*blocks)[index++].data(), &list);
+      if (landmark.tells()) AddSightsOf(landmark, poses, (*blocks)[index++].data(), &list);
     }
     return list;
+  }
+
+  absl::StatusOr<Eigen::MatrixXd> CovarianceOfNewest(std::span<double* const> wanted) const {
+    std::vector<LandmarkBlock> blocks;
+    const FactorList list = Factors(&blocks);
+    return CovarianceOf(list.factors, list.landmarks, wanted);
   }
 
   void AddInertial(size_t i, FactorList* list) const {
@@ -271,20 +296,21 @@ class SlidingWindow::Impl {
               {from.pose.data(), from.speed.data(), to.pose.data(), to.speed.data()});
   }
 
-  void AddSightsOf(const WindowLandmark& landmark, double* block, FactorList* list) const {
+  void AddSightsOf(const WindowLandmark& landmark, const WindowPoses& poses, double* block,
+                   FactorList* list) const {
     const SightNoise noise{options_.pixel_sigma_px, options_.disparity_sigma_px};
+    double* const error = calibration_error().data();
     double* const anchor_pose = SlotOf(landmark.anchor_keyframe()).pose.data();
     list->landmarks.push_back(block);
     for (size_t i = 0; i < landmark.sights.size(); ++i) {
       const WindowLandmark::Sight& sight = landmark.sights[i];
-      std::vector<double*> blocks = {block};
-      if (i != *landmark.anchor) {
-        blocks = {anchor_pose, SlotOf(sight.keyframe).pose.data(), block};
+      const CameraMotion& motion = poses.MotionOf(sight.keyframe);
+      if (i == *landmark.anchor) {
+        list->Add(MakeAnchorFactor(model_, sight.seen, noise, motion), &loss_, {block, error});
+      } else {
+        list->Add(MakeSightFactor(model_, sight.seen, noise, motion), &loss_,
+                  {anchor_pose, SlotOf(sight.keyframe).pose.data(), block, error});
       }
-      if (sight.seen.disparity_px.has_value()) blocks.push_back(stereo_error().data());
-      list->Add(i == *landmark.anchor ? MakeAnchorFactor(model_, sight.seen, noise)
-                                      : MakeSightFactor(model_, sight.seen, noise),
-                &loss_, std::move(blocks));
     }
   }
 
@@ -305,8 +331,8 @@ class SlidingWindow::Impl {
       problem.AddParameterBlock(slot.speed.data(), kSpeedBlockSize);
       ordering->AddElementToGroup(slot.speed.data(), 1);
     }
-    problem.AddParameterBlock(stereo_error().data(), kStereoErrorSize);
-    ordering->AddElementToGroup(stereo_error().data(), 1);
+    problem.AddParameterBlock(calibration_error().data(), kCalibrationErrorSize);
+    ordering->AddElementToGroup(calibration_error().data(), 1);
     for (double* landmark : list.landmarks) {
       problem.AddParameterBlock(landmark, kLandmarkBlockSize);
       ordering->AddElementToGroup(landmark, 0);
@@ -355,10 +381,11 @@ class SlidingWindow::Impl {
     FactorList list;
     if (prior_ != nullptr) list.factors.push_back({prior_.get(), nullptr, prior_blocks_});
     if (has_unit_) AddInertial(1, &list);
+    const WindowPoses poses = Poses();
     for (const auto& [id, landmark] : landmarks_.all()) {
       if (!landmark.tells() || landmark.anchor_keyframe() != oldest.number) continue;
       blocks.push_back(landmark.block);
-      AddSightsOf(landmark, blocks.back().data(), &list);
+      AddSightsOf(landmark, poses, blocks.back().data(), &list);
     }
     std::vector<double*> dropped = list.landmarks;
     StateSlot& slot = SlotOf(oldest.number);
@@ -428,7 +455,9 @@ std::optional<Vector3d> SlidingWindow::PointOf(int64_t feature_id) const {
   return impl_->PointOf(feature_id);
 }
 double SlidingWindow::misfit() const { return impl_->misfit(); }
-const StereoError& SlidingWindow::stereo_error() const { return impl_->stereo_error(); }
+const CalibrationError& SlidingWindow::calibration_error() const {
+  return impl_->calibration_error();
+}
 const std::vector<int64_t>& SlidingWindow::dropped_features() const { return impl_->dropped(); }
 const std::vector<SeenLandmark>& SlidingWindow::landmarks() const { return impl_->landmarks(); }
 

@@ -30,9 +30,10 @@ namespace dsg::ingest {
 ///
 /// A landmark is eliminated with the keyframe that saw it first. A feature that is followed on
 /// becomes a new landmark, from its next sight on, so that nothing counts twice. What is wrong with
-/// the calibration of the pair is estimated, too: near and far landmarks tell an offset of
-/// disparities, and the unit tells the baseline where it is accelerated. Without a unit the
-/// baseline stays what it is said to be.
+/// the calibration is estimated, too: near and far landmarks tell an offset of disparities, the
+/// unit tells the baseline where it is accelerated, and the offset of its clock where it turns.
+/// Poses are those of the stamps on the clock of the unit. Without a unit baseline and stamps stay
+/// what they are said to be.
 ///
 /// Memory: keyframes times their features. Threads: one caller at a time.
 /// Source: RSS 2020, section V-A; Leutenegger and others, IJRR 2015 (fixed lag, marginalised).
@@ -82,8 +83,8 @@ class SlidingWindow {
   /// what it is said to be. Of the last Add.
   double misfit() const;
 
-  /// Of the pair's calibration, as it is known by now.
-  const StereoError& stereo_error() const;
+  /// As it is known by now.
+  const CalibrationError& calibration_error() const;
 
   /// Features that the last Add found to be wrong, ascending: landmarks that miss their images.
   const std::vector<int64_t>& dropped_features() const;

@@ -21,7 +21,7 @@ void WindowLandmarks::AddSights(int64_t keyframe, std::span<const FeatureSight> 
 void WindowLandmarks::Anchor(const WindowPoses& poses) {
   for (auto& [id, landmark] : landmarks_) {
     if (landmark.anchor.has_value()) continue;
-    if (!AnchorByDisparity(poses.stereo_error, &landmark)) AnchorByParallax(poses, &landmark);
+    if (!AnchorByDisparity(poses.calibration_error, &landmark)) AnchorByParallax(poses, &landmark);
   }
 }
 
@@ -101,7 +101,8 @@ void WindowLandmarks::SetAnchor(size_t sight, double inverse_depth,
   landmark->block = {ray.x(), ray.y(), inverse_depth};
 }
 
-bool WindowLandmarks::AnchorByDisparity(const StereoError& error, WindowLandmark* landmark) const {
+bool WindowLandmarks::AnchorByDisparity(const CalibrationError& error,
+                                        WindowLandmark* landmark) const {
   for (size_t i = 0; i < landmark->sights.size(); ++i) {
     const std::optional<double>& disparity_px = landmark->sights[i].seen.disparity_px;
     if (!disparity_px.has_value()) continue;
@@ -140,8 +141,8 @@ double WindowLandmarks::MissOf(const WindowLandmark& landmark, const WindowPoses
   double disparity_sum = 0.0;
   for (const WindowLandmark::Sight& sight : landmark.sights) {
     const std::optional<Vector3d> error =
-        SightErrorOf(model_, map_T_anchor, poses.Of(sight.keyframe), sight.seen, landmark.block,
-                     poses.stereo_error);
+        SightErrorOf(model_, map_T_anchor, poses.Of(sight.keyframe), sight.seen,
+                     poses.MotionOf(sight.keyframe), landmark.block, poses.calibration_error);
     if (!error.has_value()) return std::numeric_limits<double>::infinity();
     sum += error->head<2>().norm();
     disparity_sum += std::abs(error->z());

@@ -47,12 +47,17 @@ struct WindowLandmark {
 struct WindowPoses {
   int64_t oldest_keyframe = 0;
   std::vector<Pose3d> map_T_imu;
-  StereoError stereo_error{};
+  /// Of the camera, in the same order; none of it is known without a unit.
+  std::vector<CameraMotion> motions;
+  CalibrationError calibration_error{};
 
   int64_t newest_keyframe() const { return oldest_keyframe + std::ssize(map_T_imu) - 1; }
   /// Requires: a keyframe of the window.
   const Pose3d& Of(int64_t keyframe) const {
     return map_T_imu[static_cast<size_t>(keyframe - oldest_keyframe)];
+  }
+  const CameraMotion& MotionOf(int64_t keyframe) const {
+    return motions[static_cast<size_t>(keyframe - oldest_keyframe)];
   }
 };
 
@@ -93,7 +98,7 @@ class WindowLandmarks {
  private:
   bool IsNearEnough(double inverse_depth) const;
   void SetAnchor(size_t sight, double inverse_depth, WindowLandmark* landmark) const;
-  bool AnchorByDisparity(const StereoError& error, WindowLandmark* landmark) const;
+  bool AnchorByDisparity(const CalibrationError& error, WindowLandmark* landmark) const;
   void AnchorByParallax(const WindowPoses& poses, WindowLandmark* landmark) const;
   double MissOf(const WindowLandmark& landmark, const WindowPoses& poses) const;
   std::optional<Eigen::Vector3d> PointOf(const WindowLandmark& landmark,

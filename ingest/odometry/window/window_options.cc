@@ -20,6 +20,9 @@ constexpr OptionField<WindowOptions> kWindowFields[] = {
     {"odometry-window-baseline", &WindowOptions::baseline_share, 1e-6, 0.5,
      "The same of the baseline, a share of it: calibrations measure it to 0.2 mm of a decimetre, "
      "and a unit whose clock is a millisecond off tells it worse"},
+    {"odometry-window-clock", &WindowOptions::clock_s, 1e-6, 0.1,
+     "The same of the clock of the unit beside the stamps of images, seconds: drivers that stamp "
+     "what they receive are some milliseconds late"},
     {"odometry-window-huber", &WindowOptions::huber_sigmas, 0.1, 1000.0,
      "From so many standard deviations on a miss costs its size instead of its square: Huber's "
      "choice"},

@@ -16,10 +16,11 @@ struct WindowOptions {
   /// Standard deviations of a feature's place and of its disparity, pixels.
   double pixel_sigma_px = 1.0;
   double disparity_sigma_px = 1.0;
-  /// How wrong the calibration of the pair may be, one standard deviation: all disparities, pixels,
-  /// and the baseline, a share of it.
+  /// How wrong the calibration may be, one standard deviation: all disparities, pixels, the
+  /// baseline, a share of it, and the stamps of images on the clock of the unit, seconds.
   double disparity_offset_px = 1.0;
   double baseline_share = 0.002;
+  double clock_s = 0.005;
   /// From here on a miss costs its size instead of its square, standard deviations.
   double huber_sigmas = 1.5;
   /// Landmarks that miss the images they were seen in by more, on average, are dropped, pixels.

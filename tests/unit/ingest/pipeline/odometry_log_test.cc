@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <iostream>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <variant>
@@ -399,6 +400,34 @@ TEST_P(EurocOdometry, IsWithinCentimetresOfTheGroundTruth) {
   std::cout << "euroc: largest error " << error.largest_m << " m\n";
   EXPECT_GT(error.count, 150u);
   EXPECT_LT(error.largest_m, 0.15);
+}
+
+TEST(OdometryLog, SaysThatItsImagesAreLateOnTheClockOfTheUnit) {
+  if (!std::filesystem::is_directory(DataFolder("euroc-mh01-stereo"))) {
+    GTEST_SKIP() << "the real data is not there; set DSG_DATA";
+  }
+  LogOptions options;
+  options.poses = PoseSource::kOdometry;
+  auto opened = OpenLog(DataFolder("euroc-mh01-stereo").string(), options);
+  ASSERT_TRUE(opened.ok()) << opened.status();
+  const ReadLog read = ReadAll(**opened);
+  const auto notes_with = [&](TimeNs unit_late_ns) {
+    std::deque<Measurement> measurements(read.measurements.begin(), read.measurements.end());
+    for (Measurement& measurement : measurements) {
+      if (auto* sample = std::get_if<ImuMeasurement>(&measurement)) sample->time_ns += unit_late_ns;
+    }
+    std::stable_sort(
+        measurements.begin(), measurements.end(),
+        [](const Measurement& a, const Measurement& b) { return StampOf(a) < StampOf(b); });
+    auto log =
+        EstimatePoses(std::make_unique<GivenLog>(read.info, std::move(measurements)), options, {});
+    EXPECT_TRUE(log.ok()) << log.status();
+    return ReadAll(**log).info;
+  };
+  EXPECT_FALSE(HasNote(notes_with(0), "on the clock of the inertial unit"));
+  const LogInfo late = notes_with(20'000'000);
+  for (const std::string& note : late.notes) std::cout << note << "\n";
+  EXPECT_TRUE(HasNote(late, "20 ms after their stamps") || HasNote(late, "19 ms after"));
 }
 
 TEST(EurocMesh, HoldsWhatIsNearAndLeavesThePosesAsTheyAre) {

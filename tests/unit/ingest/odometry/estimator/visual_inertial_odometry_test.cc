@@ -287,6 +287,15 @@ TEST(VisualInertialOdometry, FollowsAUnitWithoutNoise) {
   EXPECT_LT(Largest(ErrorsM(outcome, session.carried)), 0.05);
 }
 
+TEST(VisualInertialOdometry, LearnsHowLateItsImagesAre) {
+  Session session;
+  session.spoil = [](ImuMeasurement* sample) { sample->time_ns += 15'000'000; };
+  const Outcome outcome = RunSession(session);
+  ASSERT_FALSE(outcome.poses.empty());
+  EXPECT_NEAR(outcome.counts.image_late_s, 0.015, 2e-3);
+  EXPECT_LT(Largest(ErrorsM(outcome, session.carried)), 0.1);
+}
+
 // It is wrong for some tenths of a second, and possible.
 TEST(VisualInertialOdometry, DoubtsThePathWhereTheUnitTellsAnotherOne) {
   const std::vector<UnitFault> faults = {

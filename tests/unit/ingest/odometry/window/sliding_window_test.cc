@@ -35,6 +35,8 @@ struct Noise {
   int wrong_percent = 0;
   /// Of the gyroscope, before the last keyframe alone.
   double turn_error_rad_s = 0.0;
+  /// Of the images, after their stamps.
+  double late_s = 0.0;
 };
 
 void Turn(TimeNs from_ns, double error_rad_s, std::vector<ImuMeasurement>* samples) {
@@ -52,8 +54,8 @@ Passage PassageOf(double seconds, uint64_t seed, const Noise& noise, WindowOptio
   if (noise.has_unit_noise) samples = Noisy(std::move(samples), Adis16448(), &random, &bias);
   Passage run{{}, {}, 0, SlidingWindow(model, kGravity, options)};
   const auto sights_at = [&](double t) {
-    auto sights =
-        SightsAt(model, SwungPose(t), points, noise.pixel_px, noise.disparity_px, &random);
+    auto sights = SightsAt(model, SwungPose(t + noise.late_s), points, noise.pixel_px,
+                           noise.disparity_px, &random);
     for (FeatureSight& sight : sights) {
       if (sight.sight.disparity_px.has_value()) *sight.sight.disparity_px += noise.offset_px;
       if (random.Uniform(0.0, 100.0) >= noise.wrong_percent) continue;
@@ -169,7 +171,7 @@ TEST(SlidingWindow, KnowsHowSureItIs) {
 
 TEST(SlidingWindow, LearnsThatAllDisparitiesAreTooLarge) {
   const Passage passage = PassageOf(10.0, 2, {0.7, 0.7, true, 0.6, 0});
-  EXPECT_NEAR(passage.window.stereo_error()[0], 0.6, 0.1);
+  EXPECT_NEAR(passage.window.calibration_error()[0], 0.6, 0.1);
   EXPECT_LT(EndErrorM(passage, 10.0), 0.05);
   // Without that it is worse.
   WindowOptions trusting;
@@ -177,6 +179,20 @@ TEST(SlidingWindow, LearnsThatAllDisparitiesAreTooLarge) {
   trusting.baseline_share = 1e-4;
   const Passage trusted = PassageOf(10.0, 2, {0.7, 0.7, true, 0.6, 0}, trusting);
   EXPECT_GT(EndErrorM(trusted, 10.0), 2.0 * EndErrorM(passage, 10.0));
+}
+
+TEST(SlidingWindow, LearnsThatImagesAreLate) {
+  for (const double late_s : {0.02, -0.01}) {
+    Noise noise;
+    noise.late_s = late_s;
+    const Passage passage = PassageOf(10.0, 2, noise);
+    EXPECT_NEAR(passage.window.calibration_error()[2], late_s, 1e-3);
+    EXPECT_LT(EndErrorM(passage, 10.0), 0.05);
+    // Without that it is worse.
+    WindowOptions trusting;
+    trusting.clock_s = 1e-6;
+    EXPECT_GT(EndErrorM(PassageOf(10.0, 2, noise, trusting), 10.0), 1.5 * EndErrorM(passage, 10.0));
+  }
 }
 
 TEST(SlidingWindow, DropsFeaturesThatAreFollowedWrongly) {
