@@ -93,9 +93,10 @@ void Forgotten::Observe(const GraphDelta& delta) {
     if (!IsAgentKind(node.kind)) continue;
     Agent& agent = agents_[node.id];
     agent.node = node;
-    if (!node.agent.has_value() || !node.agent->body_model.has_value()) continue;
+    const std::vector<Sha256> referred = AssetsOf(node);
     for (const Asset& asset : delta.assets) {
-      if (asset.sha256 == *node.agent->body_model) agent.model = asset;
+      const auto at = std::find(referred.begin(), referred.end(), asset.sha256);
+      if (at != referred.end()) agent.assets.push_back(asset);
     }
   }
 }
@@ -217,7 +218,7 @@ bool Forgotten::Return(NodeId id, GraphDelta* delta) {
   node.valid.to_ns = kTimeMax;
   Begin(*agent.back_since_ns, std::ssize(append->poses), &node);
   delta->nodes.push_back(std::move(node));
-  if (agent.model.has_value()) delta->assets.push_back(*agent.model);
+  delta->assets.insert(delta->assets.end(), agent.assets.begin(), agent.assets.end());
   std::erase_if(delta->corrections, is_of);
   LeaveOutOlder(id, *agent.back_since_ns, agent.pose_count, delta);
   return true;

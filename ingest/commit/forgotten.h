@@ -43,8 +43,8 @@ class Forgotten {
   struct Agent {
     /// As the log said it last.
     std::optional<Node> node;
-    /// The model of its body, which may have gone with it.
-    std::optional<Asset> model;
+    /// What its node refers to, which may have gone with it.
+    std::vector<Asset> assets;
     /// The map has taken it in this session.
     bool is_told = false;
     /// Of the poses of an earlier run; kTimeMax = there are none.

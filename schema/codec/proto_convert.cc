@@ -371,6 +371,7 @@ void ToProto(const AgentInfo& agent, v1::AgentComponent* out) {
                                          agent.shape_coefficients.end());
   out->set_track_state(agent.track_state);
   out->set_gap_ns_max(agent.gap_ns_max);
+  for (const Sha256& part : agent.place_memory) out->add_place_memory_sha256(BytesOf(part));
 }
 
 absl::StatusOr<AgentInfo> FromProto(const v1::AgentComponent& in) {
@@ -380,6 +381,11 @@ absl::StatusOr<AgentInfo> FromProto(const v1::AgentComponent& in) {
   agent.shape_coefficients.assign(in.shape_coefficients().begin(), in.shape_coefficients().end());
   agent.track_state = in.track_state();
   agent.gap_ns_max = in.gap_ns_max();
+  for (const std::string& bytes : in.place_memory_sha256()) {
+    DSG_ASSIGN_OR_RETURN(const std::optional<Sha256> part,
+                         Sha256FromProto(bytes, "agent.place_memory_sha256"));
+    if (part.has_value()) agent.place_memory.push_back(*part);
+  }
   return agent;
 }
 

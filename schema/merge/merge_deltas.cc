@@ -16,15 +16,10 @@
 namespace dsg::merge {
 namespace {
 
-std::set<Sha256> AssetsOf(const GraphDelta& graph) {
+std::set<Sha256> AssetsOfNodes(const GraphDelta& graph) {
   std::set<Sha256> assets;
   for (const Node& node : graph.nodes) {
-    if (node.object.has_value() && node.object->model.has_value()) {
-      assets.insert(*node.object->model);
-    }
-    if (node.agent.has_value() && node.agent->body_model.has_value()) {
-      assets.insert(*node.agent->body_model);
-    }
+    for (const Sha256& asset : AssetsOf(node)) assets.insert(asset);
   }
   return assets;
 }
@@ -151,7 +146,7 @@ class MergeDeltas::Impl {
   }
 
   absl::Status PrepareGraph() {
-    for (const Sha256& sha256 : AssetsOf(plan_.graph)) DSG_RETURN_IF_ERROR(QueueAsset(sha256));
+    for (const Sha256& sha256 : AssetsOfNodes(plan_.graph)) DSG_RETURN_IF_ERROR(QueueAsset(sha256));
     if (!plan_.graph.empty()) {
       for (GraphDelta& part : SplitDelta(plan_.graph, plan_.batch_row_count)) {
         queue_.push_back(std::move(part));

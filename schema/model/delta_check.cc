@@ -199,6 +199,9 @@ class DeltaChecker {
     }
     if (node.agent.has_value()) {
       DSG_RETURN_IF_ERROR(CheckAssetKnown(node.agent->body_model, what));
+      for (const Sha256& part : node.agent->place_memory) {
+        DSG_RETURN_IF_ERROR(CheckAssetKnown(part, what));
+      }
       DSG_RETURN_IF_ERROR(values::CheckText(node.agent->track_state, 64,
                                             [&] { return "track state of " + what(); }));
       if (node.agent->gap_ns_max < 0) {

@@ -53,6 +53,9 @@ struct AgentInfo {
   std::string track_state;
   /// 0 = the map's default.
   TimeNs gap_ns_max = 0;
+  /// What a robot knows places by: keyframes of its track, ascending, to be found again by other
+  /// sessions.
+  std::vector<Sha256> place_memory;
 };
 
 struct PlaceInfo {
@@ -119,5 +122,8 @@ struct Node {
     return DistanceToBox(point_map, map_T_node, box_node);
   }
 };
+
+/// The assets that it refers to.
+std::vector<Sha256> AssetsOf(const Node& node);
 
 }  // namespace dsg

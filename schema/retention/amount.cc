@@ -43,8 +43,7 @@ absl::Status CountGraph(const Snapshot& map, const StopCheck& stop, Amount* amou
                         std::set<Sha256>* assets) {
   DSG_RETURN_IF_ERROR(map.ReadAllNodes(stop, [&](const Node& node) {
     amount->byte_count += static_cast<int64_t>(EncodeNodePayload(node).size());
-    if (node.object.has_value() && node.object->model) assets->insert(*node.object->model);
-    if (node.agent.has_value() && node.agent->body_model) assets->insert(*node.agent->body_model);
+    for (const Sha256& asset : AssetsOf(node)) assets->insert(asset);
   }));
   return map.ReadAllEdges(stop, [&](const Edge& edge) {
     amount->byte_count += static_cast<int64_t>(EncodeEdgePayload(edge).size());

@@ -15,15 +15,6 @@
 #include "schema/retention/past.h"
 
 namespace dsg {
-namespace {
-
-std::optional<Sha256> AssetOf(const Node& node) {
-  if (node.object.has_value() && node.object->model) return node.object->model;
-  if (node.agent.has_value()) return node.agent->body_model;
-  return std::nullopt;
-}
-
-}  // namespace
 
 std::optional<Solid> SpaceOf(const Node& node) {
   if (node.kind != kinds::kRoom) return std::nullopt;
@@ -61,10 +52,7 @@ void GraphIndex::Add(const Node& node) {
   made.valid_to_ns = node.valid.to_ns;
   made.last_observed_ns = node.last_observed_ns;
   made.byte_count = static_cast<int32_t>(EncodeNodePayload(node).size());
-  if (const auto asset = AssetOf(node)) {
-    made.asset = static_cast<int32_t>(assets_.size());
-    assets_.push_back(*asset);
-  }
+  for (const Sha256& asset : AssetsOf(node)) assets_.push_back({node.id, asset});
   if (auto space = SpaceOf(node)) {
     made.solid = static_cast<int32_t>(solids_.size());
     solids_.push_back(*std::move(space));

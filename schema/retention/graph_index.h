@@ -54,10 +54,14 @@ struct IndexedNode {
   std::optional<TimeNs> last_observed_ns;
   /// Size of the payload.
   int32_t byte_count = 0;
-  /// Index in GraphIndex::assets; -1 = none.
-  int32_t asset = -1;
   /// Index of the space of a room in GraphIndex::solids; -1 = none.
   int32_t solid = -1;
+};
+
+/// An asset that a node refers to.
+struct IndexedAsset {
+  NodeId node;
+  Sha256 sha256{};
 };
 
 /// The space of a room; nullopt for other nodes, and for rooms without an extent.
@@ -69,7 +73,7 @@ class GraphIndex {
 
   /// Order: ascending by id.
   const std::vector<IndexedNode>& nodes() const { return nodes_; }
-  const std::vector<Sha256>& assets() const { return assets_; }
+  const std::vector<IndexedAsset>& assets() const { return assets_; }
   const std::vector<Solid>& solids() const { return solids_; }
   /// Lower ranks first, then ascending ids: children before parents. Indices of nodes.
   const std::vector<uint32_t>& bottom_up() const { return bottom_up_; }
@@ -91,7 +95,7 @@ class GraphIndex {
   void Add(const Node& node);
 
   std::vector<IndexedNode> nodes_;
-  std::vector<Sha256> assets_;
+  std::vector<IndexedAsset> assets_;
   std::vector<Solid> solids_;
   std::vector<uint32_t> bottom_up_;
   std::vector<std::vector<uint32_t>> children_;

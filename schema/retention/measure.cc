@@ -377,15 +377,15 @@ absl::Status MeasureAssets(const Snapshot& map, const GraphIndex& index, const S
                            std::set<Sha256> assets, Measured* measured) {
   const bool has_topologies = !assets.empty();
   const auto& is_gone = measured->selection.is_gone;
-  const auto asset_of = [&](size_t i) {
-    return index.assets()[static_cast<size_t>(index.nodes()[i].asset)];
+  const auto is_left = [&](const IndexedAsset& asset) {
+    return !is_gone[static_cast<size_t>(index.Find(asset.node))];
   };
-  for (size_t i = 0; i < is_gone.size(); ++i) {
-    if (is_gone[i] && index.nodes()[i].asset >= 0) assets.insert(asset_of(i));
+  for (const IndexedAsset& asset : index.assets()) {
+    if (!is_left(asset)) assets.insert(asset.sha256);
   }
   if (assets.empty()) return absl::OkStatus();
-  for (size_t i = 0; i < is_gone.size(); ++i) {
-    if (!is_gone[i] && index.nodes()[i].asset >= 0) assets.erase(asset_of(i));
+  for (const IndexedAsset& asset : index.assets()) {
+    if (is_left(asset)) assets.erase(asset.sha256);
   }
   if (has_topologies) {
     DSG_RETURN_IF_ERROR(DropKeptTopologies(map, index, stop, *measured, &assets));

@@ -98,15 +98,6 @@ PendingErasure CountsOf(const EraseList& list) {
           count(list.spans)};
 }
 
-void CollectReferences(const Node& node, std::set<Sha256>* assets) {
-  if (node.object.has_value() && node.object->model.has_value()) {
-    assets->insert(*node.object->model);
-  }
-  if (node.agent.has_value() && node.agent->body_model.has_value()) {
-    assets->insert(*node.agent->body_model);
-  }
-}
-
 std::string PendingErasureNote(const PendingErasure& left) {
   const int64_t count = left.node_count + left.edge_count + left.mesh_block_count + left.span_count;
   if (count == 0) {

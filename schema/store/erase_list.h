@@ -55,9 +55,6 @@ PendingErasure CountsOf(const EraseList& list);
 /// What Verify notes of it, and what is to be done.
 std::string PendingErasureNote(const PendingErasure& left);
 
-/// Assets that a node refers to.
-void CollectReferences(const Node& node, std::set<Sha256>* assets);
-
 /// INVALID_ARGUMENT/FIELD_INVALID: without its past an agent's track would belong to nobody there.
 absl::Status AgentIsThereError(const std::string& map, NodeId agent);
 

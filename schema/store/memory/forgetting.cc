@@ -155,8 +155,9 @@ class Eraser {
 
   absl::Status EraseNode(NodeId id) {
     ErasePast(&rows_.nodes, [&](NodeId key, const auto& version) {
-      if (key == id) CollectReferences(version.value.node, &doubtful_);
-      return key == id;
+      if (key != id) return false;
+      for (const Sha256& asset : AssetsOf(version.value.node)) doubtful_.insert(asset);
+      return true;
     });
     const auto* const current = rows_.nodes.Current(id);
     const Revision since = current == nullptr ? 0 : current->from;
@@ -366,8 +367,9 @@ class Eraser {
 
 std::set<Sha256> ReferredAssets(const MapRows& rows) {
   std::set<Sha256> assets;
-  rows.nodes.ForEach(
-      [&](NodeId, const auto& version) { CollectReferences(version.value.node, &assets); });
+  rows.nodes.ForEach([&](NodeId, const auto& version) {
+    for (const Sha256& asset : AssetsOf(version.value.node)) assets.insert(asset);
+  });
   rows.shapes.ForEach([&](int64_t, const Batches::Version& batch) {
     std::optional<Sha256> topology;
     if (DecodeShapeTopology(batch.value.payload, &topology) && topology.has_value()) {

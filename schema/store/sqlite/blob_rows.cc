@@ -71,7 +71,7 @@ absl::Status CollectFromNodes(Database& db, const char* sql, std::set<Sha256>* a
   while (query.Next()) {
     // What a damaged row refers to would be taken for unused, and dropped.
     DSG_ASSIGN_OR_RETURN(const Node node, NodeFromRow(query, db.map_name()));
-    CollectReferences(node, assets);
+    for (const Sha256& asset : AssetsOf(node)) assets->insert(asset);
   }
   return query.status();
 }

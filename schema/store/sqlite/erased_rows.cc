@@ -92,7 +92,7 @@ absl::Status TakeVersions(int64_t key, ErasedRows* erased, bool* is_agent) {
       DSG_ASSIGN_OR_RETURN(const Node node, NodeFromRow(query, erased->spec.name));
       const NodeRow row{node.id, node.revision, node.layer, query.Blob(3), IsAgentKind(node.kind)};
       *is_agent = *is_agent || row.is_agent;
-      CollectReferences(node, &erased->assets);
+      for (const Sha256& asset : AssetsOf(node)) erased->assets.insert(asset);
       erased->Take(SumsOf(row), row.rev_from, query.Int(5), row.payload.size());
     }
     DSG_RETURN_IF_ERROR(query.status());

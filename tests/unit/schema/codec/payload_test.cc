@@ -90,7 +90,9 @@ Node RandomNode(Random* random) {
   if (random->Chance(0.5)) node.confidence = random->Uniform();
   node.provenance = static_cast<Provenance>(random->Index(5));
   if (random->Chance(0.5)) node.object = RandomObject(node.box_node, random);
-  if (random->Chance(0.2)) node.agent = AgentInfo{{}, {0.5f}, "lost", 77};
+  if (random->Chance(0.2)) {
+    node.agent = AgentInfo{{}, {0.5f}, "lost", 77, {Sha256{1, 2, 3}, Sha256{4}}};
+  }
   if (random->Chance(0.5)) node.place = PlaceInfo{0.75, RandomBox(random), random->Index(9) - 4};
   if (random->Chance(0.2)) node.structure = StructureInfo{"wall", {0, 0, 1}, -2.5, 8};
   if (random->Chance(0.2)) node.region = RegionInfo{{{0, 0}, {1, 0}}, 0.5, 2.5, {{"hall", 0.9}}};
