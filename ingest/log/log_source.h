@@ -106,6 +106,9 @@ struct LogInfo {
   /// Measurements of each sensor channel, by name: "cam0", "imu0", "detections0", "poses",
   /// "loops0".
   std::map<std::string, int64_t> channel_counts;
+  /// What the robot knows places by, once the log has ended, in parts as assets have it
+  /// (recognition/place_memory.h); empty where none are sought.
+  std::vector<std::string> place_memory;
   /// Channels that are used before the stages see them: by odometry, or to recognise places.
   std::set<std::string> used_channels;
   /// Sentences about what was dropped or assumed, for the user.

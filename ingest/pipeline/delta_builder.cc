@@ -71,6 +71,13 @@ const Node& DeltaBuilder::Move(NodeId agent, const Pose3d& map_T_agent) {
   return found->second.node;
 }
 
+void DeltaBuilder::Remember(NodeId agent, std::vector<Sha256> place_memory) {
+  const auto found = agents_.find(agent);
+  if (found == agents_.end()) return;
+  found->second.node.agent->place_memory = std::move(place_memory);
+  found->second.is_stale = true;
+}
+
 GraphDelta DeltaBuilder::Take(std::vector<Stay> stays) {
   GraphDelta delta;
   for (Agent* agent : touched_) {

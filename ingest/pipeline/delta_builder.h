@@ -40,6 +40,9 @@ class DeltaBuilder {
   /// The track of an agent that has poses ends elsewhere: its node, as it is now.
   const Node& Move(NodeId agent, const Pose3d& map_T_agent);
 
+  /// What an agent that has poses knows places by; goes into TakeNodes.
+  void Remember(NodeId agent, std::vector<Sha256> place_memory);
+
   /// Poses since the last Take.
   int64_t pose_count() const { return pose_count_; }
   int64_t agent_count() const { return static_cast<int64_t>(agents_.size()); }
@@ -48,7 +51,7 @@ class DeltaBuilder {
   GraphDelta Take(std::vector<Stay> stays);
 
   /// At the end of the log: what became of each agent whose node was told before its last pose
-  /// (last pose, times observed).
+  /// (last pose, times observed), and what they remember.
   GraphDelta TakeNodes();
 
  private:

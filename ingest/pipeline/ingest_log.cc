@@ -204,7 +204,7 @@ absl::StatusOr<IngestSummary> IngestLog(LogSource& log, const LogOptions& log_op
   log.SetIdle({});
   const bool is_stopped = follow.has_value() && follow->stop != nullptr && *follow->stop;
   const bool is_paused = is_stopped && run.is_timed();
-  if (!is_paused) DSG_RETURN_IF_ERROR(run.Finish());
+  if (!is_paused) DSG_RETURN_IF_ERROR(run.Finish(log.info().place_memory));
   IngestSummary summary = run.Summary();
   summary.is_paused = is_paused;
   summary.given_count = given_count;

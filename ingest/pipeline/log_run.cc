@@ -7,7 +7,9 @@
 #include "ingest/commit/graph_boxes.h"
 #include "ingest/pipeline/contact_edges.h"
 #include "ingest/pipeline/held_edges.h"
+#include "ingest/recognition/place_memory.h"
 #include "schema/base/status.h"
+#include "schema/codec/checksum.h"
 #include "schema/model/delta_check.h"
 
 namespace dsg::ingest {
@@ -208,7 +210,7 @@ absl::Status LogRun::CommitStale() {
   return sink_.Put(builder_.Take(presence_.TakeChanges()));
 }
 
-absl::Status LogRun::Finish() {
+absl::Status LogRun::Finish(std::vector<std::string> place_memory) {
   if (is_followed_ && is_timed_) DSG_RETURN_IF_ERROR(sink_.BeginEnd());
   frames_.Finish();
   DSG_RETURN_IF_ERROR(SeeFrames());
@@ -221,9 +223,23 @@ absl::Status LogRun::Finish() {
   } else {
     DSG_RETURN_IF_ERROR(sink_.Put(builder_.Take(presence_.TakeChanges())));
   }
+  DSG_RETURN_IF_ERROR(PutPlaceMemory(std::move(place_memory)));
   DSG_RETURN_IF_ERROR(sink_.Put(builder_.TakeNodes()));
   DSG_RETURN_IF_ERROR(PutRobotGraph());
   return PutContacts();
+}
+
+// Each part for itself, so that a message to a server holds it.
+absl::Status LogRun::PutPlaceMemory(std::vector<std::string> parts) {
+  std::vector<Sha256> remembered;
+  for (std::string& part : parts) {
+    GraphDelta delta;
+    remembered.push_back(ComputeSha256(part));
+    delta.assets.push_back({remembered.back(), std::string(kPlaceMemoryType), std::move(part)});
+    DSG_RETURN_IF_ERROR(sink_.Put(std::move(delta)));
+  }
+  if (!remembered.empty()) builder_.Remember(robot_, std::move(remembered));
+  return absl::OkStatus();
 }
 
 IngestSummary LogRun::Summary() const {

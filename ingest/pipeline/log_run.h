@@ -66,8 +66,8 @@ class LogRun {
   /// the same deltas each time it is read, and one that is not finished can be taken up again only
   /// before its end was told.
   bool is_timed() const { return is_timed_; }
-  /// The log has ended.
-  absl::Status Finish();
+  /// The log has ended. `place_memory`: LogInfo::place_memory.
+  absl::Status Finish(std::vector<std::string> place_memory);
   IngestSummary Summary() const;
 
  private:
@@ -83,6 +83,7 @@ class LogRun {
   absl::Status Commit(TimeNs now_ns, bool is_last);
   absl::Status PutStays(std::vector<Stay> stays);
   absl::Status PutRobotGraph();
+  absl::Status PutPlaceMemory(std::vector<std::string> parts);
   absl::Status CorrectPath(bool is_last);
   void TellRobot(GraphDelta* delta);
   absl::Status PutContacts();

@@ -37,7 +37,8 @@ class RecognizedLog : public LogSource {
         info_(std::move(info)),
         note_count_(log_->info().notes.size()),
         options_(options),
-        moving_classes_(DynamicClasses(info_.labels)) {
+        moving_classes_(DynamicClasses(info_.labels)),
+        kept_(options.memory) {
     std::sort(moving_classes_.begin(), moving_classes_.end());
   }
 
@@ -57,10 +58,16 @@ class RecognizedLog : public LogSource {
       DSG_ASSIGN_OR_RETURN(held_, log_->Next());
       is_ended_ = !held_.has_value();
       if (!is_ended_) images_.Add(*held_);
+      if (const PoseMeasurement* pose = is_ended_ ? nullptr : std::get_if<PoseMeasurement>(&*held_);
+          pose != nullptr && pose->agent_kind == kinds::kRobot) {
+        odom_T_body_ = pose->pose.map_T_agent;
+      }
       while (!images_.empty() && (is_ended_ || !images_.IsOpen(images_.front_ns()))) {
         Look(images_.Take());
       }
-      if (is_ended_) AddLateNotes();
+      if (!is_ended_) continue;
+      info_.place_memory = EncodePlaceMemory(kept_.keyframes());
+      AddLateNotes();
     }
   }
 
@@ -71,6 +78,8 @@ class RecognizedLog : public LogSource {
     if (!is_due) return;
     last_ns_ = images.time_ns;
     absl::StatusOr<KeyframeFeatures> features = FeaturesOf(images);
+    // A robot that was nowhere yet cannot say later where its keyframe is.
+    if (features.ok() && odom_T_body_.has_value()) kept_.Add(*odom_T_body_, *features);
     absl::StatusOr<RecognizedPlaces> places =
         features.ok() ? recognizer_.Add(*std::move(features)) : features.status();
     if (!places.ok()) {
@@ -144,6 +153,9 @@ class RecognizedLog : public LogSource {
   const RecognizedLogOptions options_;
   std::vector<int32_t> moving_classes_;
   bool is_ended_ = false;
+  // Where the robot was last.
+  std::optional<Pose3d> odom_T_body_;
+  KeptPlaces kept_;
   std::optional<TimeNs> last_ns_;
   std::optional<Measurement> held_;
   std::deque<Measurement> loops_;
@@ -157,6 +169,7 @@ class RecognizedLog : public LogSource {
 
 std::vector<BoundOption> RecognizedLogOptions::Bind() {
   std::vector<BoundOption> bound = recognition.Bind();
+  for (const BoundOption& field : memory.Bind()) bound.push_back(field);
   BindFields<RecognizedLogOptions>(kRecognizedFields, this, &bound);
   return bound;
 }

@@ -382,7 +382,7 @@ TEST_F(PeopleLog, AStageOfTheCallersSeesAllAndIsToldWithTheOthers) {
     if (!measurement->has_value()) break;
     ASSERT_TRUE(run.Take(**measurement).ok());
   }
-  ASSERT_TRUE(run.Finish().ok());
+  ASSERT_TRUE(run.Finish({}).ok());
   const auto node = (*reader_->Latest())->GetNode(NodeId('O', 900));
   ASSERT_TRUE(node.ok()) << node.status();
   EXPECT_EQ(node->attributes.at("poses"), AttributeValue(20.0));
