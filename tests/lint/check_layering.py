@@ -56,7 +56,7 @@ ALLOWED = {
     "ingest/pipeline": (SCHEMA + INGEST_SHARED + INGEST_ROOMS +
                         [f"ingest/{s}" for s in INGEST_STAGES if s not in ASIDE]),
     "ingest/program": SCHEMA + ["ingest/config", "ingest/files", "ingest/log", "ingest/commit",
-                                "ingest/pipeline"],
+                                "ingest/pipeline", "ingest/alignment"],
     # The calls as C++, and the one client: below both the programs of query and those of ingest.
     "query/api": BASE,
     "query/client": CODEC + ["query/api"],
@@ -76,6 +76,8 @@ ALLOWED["docs/examples"] = ["query/api", "query/client"]
 ALLOWED.update({f"ingest/{s}": SCHEMA + INGEST_SHARED for s in INGEST_STAGES})
 # Features of stereo pairs, and poses between two cameras, are the front-end's.
 ALLOWED["ingest/recognition"] += ["ingest/odometry"]
+# Where maps lie to each other is told by what their robots recognise.
+ALLOWED["ingest/alignment"] = SCHEMA + INGEST_SHARED + ["ingest/recognition"]
 # Nobody but these two sees the ground truth.
 ALLOWED["ingest/truth"] = SCHEMA + ["ingest/files", "ingest/sensor"]
 ALLOWED["ingest/simulator"] += ["ingest/truth"]
