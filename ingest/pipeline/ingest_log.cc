@@ -95,6 +95,7 @@ SessionHeader MakeHeader(const LogInfo& info, const LogOptions& log_options,
       .poses_per_delta = options.poses_per_delta,
       .poses = std::string(NameOf(log_options.poses)),
       .up = options.up,
+      .transform = options.transform,
       .mapping = HasMapping(info, options) ? options.mapping.Digest(HasLabels(info)) : "",
       .people = HasPeople(info, options) ? options.people.Digest() : "",
       .odometry = HasLoops(info) ? OdometryText(options.robot_graph) : "",
@@ -112,6 +113,39 @@ SessionHeader MakeHeader(const LogInfo& info, const LogOptions& log_options,
           .author = options.author,
           .message = absl::StrCat(name, " (", config.format, ")"),
           .config_digest = config.Digest()};
+}
+
+// Something of the map that has a place in it; nullopt in an empty one.
+absl::StatusOr<std::optional<Node>> PlacedNode(const MapView& map,
+                                               const std::vector<Node>& agents) {
+  for (const Node& agent : agents) {
+    DSG_ASSIGN_OR_RETURN(const std::optional<TrackInfo> track, map.FindTrack(agent.id));
+    if (track.has_value()) return agent;
+  }
+  for (const LayerId layer : {layers::kRooms, layers::kObjects}) {
+    DSG_ASSIGN_OR_RETURN(const std::vector<Node> nodes, map.NodesOfLayer(layer));
+    if (!nodes.empty()) return nodes.front();
+  }
+  return std::nullopt;
+}
+
+// Odometry begins where the log begins: in the frame of another log its poses would be anywhere.
+absl::Status CheckFrame(const LogOptions& log_options, const IngestOptions& options,
+                        const MapView& map, const std::vector<Node>& agents) {
+  if (log_options.poses != PoseSource::kOdometry || !options.transform.empty()) {
+    return absl::OkStatus();
+  }
+  DSG_ASSIGN_OR_RETURN(const std::optional<Node> other, PlacedNode(map, agents));
+  if (!other.has_value()) return absl::OkStatus();
+  return MakeError(
+      Reason::kNoRegistration,
+      absl::StrCat(
+          "map \"", map.spec().name, "\" holds ", ToString(other->id), " \"", other->name,
+          "\" in a frame of its own, and poses of --poses vio begin where the log begins: "
+          "take the log into a map of its own with --recognize, and lay that over this one "
+          "(dsg-align, dsg merge), or say where the log begins with --transform "
+          "X,Y,Z,YAW"),
+      {{"map", map.spec().name}, {"field", "transform"}});
 }
 
 }  // namespace
@@ -180,6 +214,9 @@ absl::StatusOr<IngestSummary> IngestLog(LogSource& log, const LogOptions& log_op
   header.session_id = std::move(opened.session_id);
   const SessionState& session = opened.state;
   DSG_ASSIGN_OR_RETURN(RunPlan plan, MakePlan(log.info(), options, map, header.session_id));
+  if (session.last_sequence == 0) {
+    DSG_RETURN_IF_ERROR(CheckFrame(log_options, options, map, plan.agents));
+  }
   plan.agent_prefix = log_options.agent_prefix;
   plan.first_revision = session.first_revision;
   const std::optional<FollowOptions>& follow = log_options.follow;

@@ -32,6 +32,8 @@ struct IngestOptions {
   std::string author = "dsg-ingest";
   /// How the log was turned (TurnUpright); part of what deltas depend on.
   std::string up = "auto";
+  /// Where the log's frame is in the map (MoveLog), as it was given; empty = it is the map's.
+  std::string transform;
   /// Of logs with depth: static layers, committed while the log runs.
   MappingOptions mapping;
   /// Of logs with detections of people: their tracks.
@@ -123,7 +125,9 @@ absl::StatusOr<RunPlan> MakePlan(const LogInfo& info, const IngestOptions& optio
 /// (FollowOptions::stop), what was committed stays and its end is not told.
 ///
 /// `log_options`: what the log was opened with.
-/// Errors: of the log, and of DeltaSink::Put. What is committed by then stays, and counts.
+/// Errors: NOT_FOUND/NO_REGISTRATION for poses of odometry, which begin anywhere, in a map that
+/// holds another log, without a transform; of the log, and of DeltaSink::Put. What is committed by
+/// then stays, and counts.
 absl::StatusOr<IngestSummary> IngestLog(LogSource& log, const LogOptions& log_options,
                                         const IngestOptions& options, const MapView& map,
                                         GraphWriter& writer,

@@ -16,6 +16,7 @@ constexpr int kPipelineVersion = 2;
 std::string SessionConfig::Digest() const {
   std::string choice = poses == "auto" ? "" : absl::StrCat("poses=", poses, "\n");
   if (up != "auto") absl::StrAppend(&choice, "up=", up, "\n");
+  if (!transform.empty()) absl::StrAppend(&choice, "transform=", transform, "\n");
   if (!mapping.empty()) absl::StrAppend(&choice, "mapping=", mapping, "\n");
   if (!people.empty()) absl::StrAppend(&choice, "people=", people, "\n");
   if (!odometry.empty()) absl::StrAppend(&choice, "odometry=", odometry, "\n");

@@ -21,6 +21,8 @@ struct SessionConfig {
   std::string poses = "auto";
   /// IngestOptions::up; "auto" leaves the digest as it was before there was a choice.
   std::string up = "auto";
+  /// IngestOptions::transform; empty for none.
+  std::string transform;
   /// MappingOptions::Digest of logs that give static layers; empty for others.
   std::string mapping;
   /// PeopleOptions::Digest of logs that give people's tracks; empty for others.

@@ -12,7 +12,7 @@
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_split.h"
 #include "ingest/depth/frame_maker.h"
-#include "ingest/log/turned_log.h"
+#include "ingest/log/moved_log.h"
 #include "schema/base/status.h"
 
 namespace dsg::ingest {
@@ -27,21 +27,27 @@ constexpr OptionField<UprightOptions> kUprightFields[] = {
      "at the walls"},
 };
 
+// So many finite numbers with commas between them; nullopt of anything else.
+std::optional<std::vector<double>> NumbersOf(const std::string& text, size_t count) {
+  std::vector<double> numbers;
+  for (const absl::string_view part : absl::StrSplit(text, ',')) {
+    double number = 0.0;
+    if (!absl::SimpleAtod(part, &number) || !std::isfinite(number)) return std::nullopt;
+    numbers.push_back(number);
+  }
+  return numbers.size() == count ? std::optional(numbers) : std::nullopt;
+}
+
 absl::StatusOr<Eigen::Vector3d> ParseUp(const std::string& up) {
   for (int axis = 0; axis < 3; ++axis) {
     const std::string name(1, static_cast<char>('x' + axis));
     if (up == name || up == "+" + name) return Eigen::Vector3d::Unit(axis);
     if (up == "-" + name) return -Eigen::Vector3d::Unit(axis);
   }
-  const std::vector<std::string> parts = absl::StrSplit(up, ',');
+  const std::optional<std::vector<double>> numbers = NumbersOf(up, 3);
   Eigen::Vector3d vector = Eigen::Vector3d::Zero();
-  bool is_read = parts.size() == 3;
-  for (size_t i = 0; is_read && i < parts.size(); ++i) {
-    is_read = absl::SimpleAtod(parts[i], &vector[static_cast<int>(i)]);
-  }
-  if (is_read && vector.allFinite() && vector.norm() > 1e-6 && vector.norm() < 1e6) {
-    return vector.normalized();
-  }
+  if (numbers.has_value()) vector = Eigen::Map<const Eigen::Vector3d>(numbers->data());
+  if (vector.norm() > 1e-6 && vector.norm() < 1e6) return vector.normalized();
   return MakeError(
       Reason::kFieldInvalid,
       absl::StrCat("--up ", up,
@@ -88,6 +94,19 @@ std::vector<BoundOption> UprightOptions::Bind() {
   return bound;
 }
 
+absl::StatusOr<Pose3d> ParseTransform(const std::string& text) {
+  const std::optional<std::vector<double>> numbers = NumbersOf(text, 4);
+  if (!numbers.has_value()) {
+    return MakeError(Reason::kFieldInvalid,
+                     absl::StrCat("--transform ", text,
+                                  " is no transform; write X,Y,Z,YAW, in metres and radians"),
+                     {{"field", "transform"}, {"value", text}});
+  }
+  const std::vector<double>& n = *numbers;
+  return Pose3d{{n[0], n[1], n[2]},
+                Eigen::Quaterniond(Eigen::AngleAxisd(n[3], Eigen::Vector3d::UnitZ()))};
+}
+
 absl::Status CheckUp(const std::string& up) {
   if (up == "auto" || up == "none") return absl::OkStatus();
   return ParseUp(up).status();
@@ -114,8 +133,8 @@ absl::StatusOr<std::unique_ptr<LogSource>> TurnUpright(
   if (std::acos(std::clamp(up_log.z(), -1.0, 1.0)) < upright.upright_rad) return log;
   *note = absl::StrFormat("the log's (%.3f, %.3f, %.3f) points up; its poses are turned",
                           up_log.x(), up_log.y(), up_log.z());
-  return TurnLog(std::move(log),
-                 Eigen::Quaterniond::FromTwoVectors(up_log, Eigen::Vector3d::UnitZ()));
+  return MoveLog(std::move(log), {Eigen::Vector3d::Zero(), Eigen::Quaterniond::FromTwoVectors(
+                                                               up_log, Eigen::Vector3d::UnitZ())});
 }
 
 }  // namespace dsg::ingest

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Turns logs whose frame lies on its side upright: maps have z up.
+// Where a log's frame is in the map: logs whose frame lies on its side are turned upright, since
+// maps have z up.
 #pragma once
 
 #include <memory>
@@ -36,5 +37,9 @@ absl::StatusOr<std::unique_ptr<LogSource>> TurnUpright(
 
 /// Errors: as TurnUpright, for the text alone.
 absl::Status CheckUp(const std::string& up);
+
+/// "X,Y,Z,YAW" of a frame that stands upright: metres, and radians about z.
+/// Errors: INVALID_ARGUMENT/FIELD_INVALID.
+absl::StatusOr<Pose3d> ParseTransform(const std::string& text);
 
 }  // namespace dsg::ingest

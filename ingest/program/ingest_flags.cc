@@ -52,6 +52,9 @@ void AddRobotFlags(CLI::App* app, IngestFlags* flags) {
                   "Which way is up in the log's frame: x, -x, y, -y, z, -z, \"x,y,z\", none, or "
                   "auto (RGB-D folders: told from the pictures; others: z)")
       ->capture_default_str();
+  app->add_option("--transform", flags->transform,
+                  "Where the log's frame is in the map: X,Y,Z,YAW in metres and radians, as "
+                  "dsg-align prints it; without it both are the same");
 }
 
 void AddFollowFlags(CLI::App* app, IngestFlags* flags) {
@@ -215,6 +218,7 @@ absl::StatusOr<IngestOptions> MakeIngestOptions(const IngestFlags& flags) {
   IngestOptions options = flags.numbers;
   options.poses_per_delta = flags.commit_poses;
   options.up = flags.up;
+  options.transform = flags.transform;
   DSG_ASSIGN_OR_RETURN(options.mapping, MakeMappingOptions(flags.mapping));
   options.is_size_bounded = !flags.server.empty();
   options.tells_undone_again = flags.tells_undone_again;

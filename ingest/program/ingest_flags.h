@@ -52,6 +52,7 @@ struct IngestFlags {
   double odometry_m_per_m = RobotGraphOptions().odometry_m_per_m;
   double odometry_rad_per_m = RobotGraphOptions().odometry_rad_per_m;
   std::string up = "auto";
+  std::string transform;
   int64_t commit_poses = IngestOptions().poses_per_delta;
   MappingFlags mapping;
   /// Numbers of IngestOptions::Groups alone; the rest is not used.

@@ -17,7 +17,9 @@
 #include "absl/strings/str_cat.h"
 #include "ingest/files/spill_file.h"
 #include "ingest/log/log_source.h"
+#include "ingest/log/moved_log.h"
 #include "ingest/log/peeked_log.h"
+#include "ingest/log/read_ahead_log.h"
 #include "ingest/pipeline/ingest_log.h"
 #include "ingest/pipeline/upright.h"
 #include "ingest/program/config_file.h"
@@ -178,6 +180,9 @@ void Tell(const IngestFlags& flags, const RunReport& report) {
 // How often a log is begun again because others name agents in the map at the same time.
 constexpr int kConflictsMax = 100;
 
+// Measurements that odometry and recognition are ahead of the layers: three seconds of a log.
+constexpr size_t kAheadCount = 1000;
+
 // Those from `first` on; how many there are.
 size_t TellNotes(const IngestFlags& flags, const std::string& path, const LogInfo& info,
                  size_t first) {
@@ -243,12 +248,10 @@ absl::StatusOr<std::unique_ptr<LogSource>> WithAdditions(std::unique_ptr<LogSour
 
 // The log with what is made of it, turned upright. Poses that are estimated stand upright as far as
 // anybody knows, unless the user does.
-absl::StatusOr<std::unique_ptr<LogSource>> Prepare(std::unique_ptr<LogSource> log,
-                                                   const IngestFlags& flags,
-                                                   const std::string& path,
-                                                   const LogOptions& options,
-                                                   const IngestOptions& ingest_options,
-                                                   const Additions& additions, std::string* note) {
+absl::StatusOr<std::unique_ptr<LogSource>> MakeUpright(
+    std::unique_ptr<LogSource> log, const IngestFlags& flags, const std::string& path,
+    const LogOptions& options, const IngestOptions& ingest_options, const Additions& additions,
+    std::string* note) {
   const auto turn = [&](std::unique_ptr<LogSource> lying) {
     return TurnUpright(std::move(lying), path, options, flags.up, ingest_options.upright, note);
   };
@@ -259,6 +262,25 @@ absl::StatusOr<std::unique_ptr<LogSource>> Prepare(std::unique_ptr<LogSource> lo
   DSG_ASSIGN_OR_RETURN(log, WithAdditions(std::move(log), options, additions));
   if (!is_estimated || flags.up == "auto") return log;
   return turn(std::move(log));
+}
+
+// That in the frame of the map.
+absl::StatusOr<std::unique_ptr<LogSource>> Prepare(std::unique_ptr<LogSource> log,
+                                                   const IngestFlags& flags,
+                                                   const std::string& path,
+                                                   const LogOptions& options,
+                                                   const IngestOptions& ingest_options,
+                                                   const Additions& additions, std::string* note) {
+  DSG_ASSIGN_OR_RETURN(
+      log, MakeUpright(std::move(log), flags, path, options, ingest_options, additions, note));
+  if (!flags.transform.empty()) {
+    DSG_ASSIGN_OR_RETURN(const Pose3d map_T_log, ParseTransform(flags.transform));
+    log = MoveLog(std::move(log), map_T_log);
+  }
+  // A followed log waits for what is written, and not for what is made of it.
+  const bool is_made = additions.odometry.has_value() || additions.recognition.has_value() ||
+                       additions.segmentation.has_value();
+  return is_made && !flags.is_followed ? ReadAhead(std::move(log), kAheadCount) : std::move(log);
 }
 
 absl::Status IngestOne(const IngestFlags& flags, const std::string& path, LogOptions options,
@@ -343,6 +365,7 @@ absl::Status CheckMesh(const IngestFlags& flags) {
 absl::Status Run(const IngestFlags& flags) {
   DSG_RETURN_IF_ERROR(CheckMapName(flags.map));
   DSG_RETURN_IF_ERROR(CheckUp(flags.up));
+  if (!flags.transform.empty()) DSG_RETURN_IF_ERROR(ParseTransform(flags.transform).status());
   DSG_RETURN_IF_ERROR(CheckMesh(flags));
   DSG_RETURN_IF_ERROR(ParseRetryFor(flags.retry_for).status());
   // Hours into a log is too late to find out.

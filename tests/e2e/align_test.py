@@ -49,9 +49,9 @@ class Align(support.ProgramsTest):
             cls.ok("dsg-ingest", "--store", "store", "--map", name, "--poses", "vio",
                    "--recognize", "--no-layers", name)
 
-    def places(self, map_name):
+    def places(self, map_name, robot="r0"):
         """Where the robot was, by time."""
-        track = self.ask("track", "r0", "--store", "store", "--map", map_name)
+        track = self.ask("track", robot, "--store", "store", "--map", map_name)
         return {pose["time_ns"]: [pose["pose"]["position"].get(axis, 0.0) for axis in "xyz"]
                 for pose in track["poses"]}
 
@@ -78,6 +78,20 @@ class Align(support.ProgramsTest):
                        f"--transform={transform}", "--yes", "--dry-run")
         x, y, z, heading = (float(number) for number in transform.split(","))
         self.assertIn(f"{x:.3f},{y:.3f},{z:.3f} turned by {math.degrees(heading):.2f}", plan)
+
+    def test_a_later_session_goes_on_in_the_map_of_the_first(self):
+        log = ("--poses", "vio", "--no-layers", "--agent-prefix", "again-", "second")
+        self.refused(1, ["first", "--transform", "dsg-align"], "dsg-ingest", "--store", "store",
+                     "--map", "first", *log)
+        transform = self.ok("dsg-align", "first", "second", "--store", "store", "--quiet").strip()
+        before = self.places("first")
+        self.ok("dsg-ingest", "--store", "store", "--map", "first", f"--transform={transform}",
+                *log)
+        again = self.places("first", "r1")
+        both = sorted(before.keys() & again.keys())
+        self.assertGreater(len(both), 20)
+        for time_ns in both:
+            self.assertLess(math.dist(before[time_ns], again[time_ns]), 0.15)
 
     def test_says_what_is_missing(self):
         self.ok("dsg-ingest", "--store", "store", "--map", "bare", "--poses", "vio", "--no-layers",

@@ -11,6 +11,7 @@
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/store/graph_store.h"
+#include "tests/unit/ingest/log/given_log.h"
 #include "tests/unit/ingest/log/log_test_util.h"
 #include "tests/unit/ingest/pipeline/pipeline_test_util.h"
 
@@ -46,11 +47,16 @@ class TestMap {
                                        int commit_count_max = kAllCommits,
                                        const LogOptions& log_options = {}) {
     DSG_ASSIGN_OR_RETURN(const std::unique_ptr<LogSource> log, OpenLog(path, log_options));
+    return Take(*log, log_options, {.poses_per_delta = poses_per_delta}, commit_count_max);
+  }
+
+  absl::StatusOr<IngestSummary> Take(LogSource& log, const LogOptions& log_options,
+                                     const IngestOptions& options,
+                                     int commit_count_max = kAllCommits) {
     DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> latest, reader_->Latest());
     const std::unique_ptr<MapView> view = MakeSnapshotMapView(latest, reader_);
     FragileWriter writer(*writer_, commit_count_max);
-    absl::StatusOr<IngestSummary> summary =
-        IngestLog(*log, log_options, {.poses_per_delta = poses_per_delta}, *view, writer, {});
+    absl::StatusOr<IngestSummary> summary = IngestLog(log, log_options, options, *view, writer, {});
     deltas_.insert(deltas_.end(), writer.deltas().begin(), writer.deltas().end());
     return summary;
   }
@@ -423,6 +429,50 @@ TEST_F(IngestLogTest, TakesRealPeopleAndRobots) {
     EXPECT_EQ(stats.at.agent_count, expected.agent_count);
     EXPECT_EQ(stats.at.pose_count, expected.pose_count);
   }
+}
+
+// Poses of a robot at a time, as odometry gives them.
+absl::StatusOr<IngestSummary> TakeOdometry(TestMap& map, const std::string& content, TimeNs time_ns,
+                                           const std::string& transform) {
+  LogInfo info;
+  info.format = "euroc";
+  info.path = content;
+  info.content_sha256 = content;
+  PoseMeasurement pose;
+  pose.agent_name = "rover";
+  pose.agent_kind = kinds::kRobot;
+  std::deque<Measurement> measurements;
+  for (int i = 0; i < 3; ++i) {
+    pose.pose.time_ns = time_ns + i * 100'000'000;
+    measurements.emplace_back(pose);
+  }
+  GivenLog log(info, std::move(measurements));
+  LogOptions options;
+  options.poses = PoseSource::kOdometry;
+  return map.Take(log, options, {.transform = transform});
+}
+
+// It begins where its log begins.
+TEST(IngestLog, TakesOdometryIntoTheMapOfAnotherLogOnlyWithATransform) {
+  TestMap map;
+  ASSERT_TRUE(TakeOdometry(map, "monday", 0, "").ok());
+  EXPECT_TRUE(TakeOdometry(map, "monday", 0, "")->was_known);
+  const absl::Status refused = TakeOdometry(map, "tuesday", 60'000'000'000, "").status();
+  EXPECT_EQ(ReasonOf(refused), Reason::kNoRegistration);
+  EXPECT_NE(refused.message().find("--transform"), std::string::npos) << refused;
+  EXPECT_NE(refused.message().find("\"rover\""), std::string::npos) << refused;
+  const auto laid = TakeOdometry(map, "tuesday", 60'000'000'000, "1,2,0,0.5");
+  ASSERT_TRUE(laid.ok()) << laid.status();
+  EXPECT_EQ(laid->committed.pose_count, 3);
+  // With another one it is another session.
+  EXPECT_FALSE(TakeOdometry(map, "tuesday", 120'000'000'000, "1,2,0,0.6")->was_known);
+}
+
+TEST(IngestLog, TakesOdometryIntoAMapOfRoomsOnlyWithATransform) {
+  TestMap map;
+  map.Commit(TwoRoomWorld());
+  EXPECT_EQ(ReasonOf(TakeOdometry(map, "monday", 0, "").status()), Reason::kNoRegistration);
+  EXPECT_TRUE(TakeOdometry(map, "monday", 0, "0,0,0,0").ok());
 }
 
 }  // namespace

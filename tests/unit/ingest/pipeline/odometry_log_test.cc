@@ -20,8 +20,8 @@
 #include "ingest/pipeline/log_eye.h"
 #include "ingest/trajectory/robot_path.h"
 #include "tests/support/temp_folder.h"
+#include "tests/unit/ingest/log/given_log.h"
 #include "tests/unit/ingest/odometry/frontend/made_images.h"
-#include "tests/unit/ingest/pipeline/given_log.h"
 
 namespace dsg::ingest {
 namespace {

@@ -10,8 +10,8 @@
 #include <utility>
 #include <variant>
 
+#include "tests/unit/ingest/log/given_log.h"
 #include "tests/unit/ingest/odometry/estimator/textured_room.h"
-#include "tests/unit/ingest/pipeline/given_log.h"
 
 namespace dsg::ingest {
 namespace {

@@ -56,5 +56,16 @@ TEST(TurnUpright, RefusesWhatIsNoDirection) {
   }
 }
 
+TEST(ParseTransform, TakesAShiftAndATurnAboutTheVertical) {
+  const auto transform = ParseTransform("1,-2.5,0.25,1.5707963267948966");
+  ASSERT_TRUE(transform.ok()) << transform.status();
+  EXPECT_EQ(transform->position, Eigen::Vector3d(1.0, -2.5, 0.25));
+  EXPECT_TRUE((transform->orientation * Eigen::Vector3d::UnitX())
+                  .isApprox(Eigen::Vector3d::UnitY(), 1e-12));
+  for (const std::string text : {"", "1,2,3", "1,2,3,4,5", "1,2,3,inf", "1,2,three,4", "1;2;3;4"}) {
+    EXPECT_EQ(ReasonOf(ParseTransform(text).status()), Reason::kFieldInvalid) << text;
+  }
+}
+
 }  // namespace
 }  // namespace dsg::ingest

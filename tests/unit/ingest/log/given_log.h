@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "ingest/log/log_source.h"
+#include "tests/unit/ingest/log/log_test_util.h"
 
 namespace dsg::ingest {
 
@@ -48,13 +49,6 @@ inline ReadLog ReadAll(LogSource& log) {
   }
   read.info = log.info();
   return read;
-}
-
-inline bool HasNote(const LogInfo& info, const std::string& part) {
-  for (const std::string& note : info.notes) {
-    if (note.find(part) != std::string::npos) return true;
-  }
-  return false;
 }
 
 }  // namespace dsg::ingest
