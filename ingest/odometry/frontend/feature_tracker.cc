@@ -108,11 +108,11 @@ class FeatureTracker::Impl {
     if (!last_R_now.coeffs().allFinite()) {
       return BadInput(camera_, "rotation", "not finite", "a unit quaternion");
     }
-    std::vector<cv::Mat> pyramid = PyramidOf(image);
+    std::vector<cv::Mat> pyramid = PyramidOf(Flat(GrayView(image)));
     features_before_ = features_;
     TrackCounts counts;
     if (!features_.empty()) {
-      Follow(pyramid, last_R_now.toRotationMatrix(), &counts);
+      Follow(pyramid, last_R_now, &counts);
       const cv::Mat1b grown = GrownMask(camera_, mask, options_.mask_growth_px);
       counts.masked = DropIf([&](const Feature& feature) { return IsIn(grown, PointOf(feature)); });
       counts.merged = Merge();
@@ -168,22 +168,36 @@ class FeatureTracker::Impl {
   const std::vector<Feature>& features() const { return features_; }
 
  private:
-  // A feature on its way into the next image.
+  // A feature on its way into the next image, and where it is in the image before, as turned.
   struct Step {
     Feature feature;
     cv::Point2f before;
-    cv::Point2f guess;
     cv::Point2f after;
   };
+
+  // A turn of a pixel or more.
+  static constexpr double kTurnPx = 1.0;
 
   cv::Size Window() const {
     const int side = 2 * options_.window_reach_px + 1;
     return {side, side};
   }
 
-  std::vector<cv::Mat> PyramidOf(const Image& image) const {
+  // Without what varies slowly: a lens darkens the borders of all images alike, which holds windows
+  // without much else in them back where they were.
+  cv::Mat Flat(const cv::Mat& image) const {
+    if (options_.flat_reach_px == 0) return image;
+    const int side = 2 * options_.flat_reach_px + 1;
+    cv::Mat mean;
+    cv::blur(image, mean, cv::Size(side, side));
+    cv::Mat flat;
+    cv::addWeighted(image, 1.0, mean, -1.0, 128.0, flat);
+    return flat;
+  }
+
+  std::vector<cv::Mat> PyramidOf(const cv::Mat& image) const {
     std::vector<cv::Mat> pyramid;
-    cv::buildOpticalFlowPyramid(GrayView(image), pyramid, Window(), options_.level_count - 1,
+    cv::buildOpticalFlowPyramid(image, pyramid, Window(), options_.level_count - 1,
                                 /*withDerivatives=*/true, cv::BORDER_REFLECT_101,
                                 cv::BORDER_CONSTANT, /*tryReuseInputImage=*/false);
     return pyramid;
@@ -199,9 +213,25 @@ class FeatureTracker::Impl {
            at.y <= static_cast<float>(camera_.height - 1);
   }
 
+  // The last image as the camera would have taken it with the attitude of the next one: a window
+  // that turns with the image looks the same there. Where a turn stretches windows, which it does
+  // by some per cent near the borders, features would lag behind.
+  std::vector<cv::Mat> TurnedPyramid(const Eigen::Matrix3d& now_R_last) const {
+    Eigen::Matrix3d camera;
+    camera << camera_.fx, 0.0, camera_.cx, 0.0, camera_.fy, camera_.cy, 0.0, 0.0, 1.0;
+    const Eigen::Matrix3d by_turn = camera * now_R_last * camera.inverse();
+    cv::Matx33d homography;
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) homography(row, column) = by_turn(row, column);
+    }
+    cv::Mat turned;
+    cv::warpPerspective(pyramid_[0], turned, homography, pyramid_[0].size(), cv::INTER_LINEAR,
+                        cv::BORDER_REPLICATE);
+    return PyramidOf(turned);
+  }
+
   // Where features are in the next image if the camera turns only; outside where it turns away.
-  std::vector<cv::Point2f> Predicted(const Eigen::Matrix3d& last_R_now) const {
-    const Eigen::Matrix3d now_R_last = last_R_now.transpose();
+  std::vector<cv::Point2f> Turned(const Eigen::Matrix3d& now_R_last) const {
     std::vector<cv::Point2f> points;
     for (const Feature& feature : features_) {
       const Eigen::Vector3d turned =
@@ -227,19 +257,24 @@ class FeatureTracker::Impl {
     return is_found;
   }
 
-  void Follow(const std::vector<cv::Mat>& pyramid, const Eigen::Matrix3d& last_R_now,
+  void Follow(const std::vector<cv::Mat>& pyramid, const Eigen::Quaterniond& last_R_now,
               TrackCounts* counts) {
-    const std::vector<cv::Point2f> guesses = Predicted(last_R_now);
+    const Eigen::Matrix3d now_R_last = last_R_now.conjugate().toRotationMatrix();
+    const bool is_turned =
+        camera_.fx * AngleBetween(last_R_now, Eigen::Quaterniond::Identity()) >= kTurnPx;
+    const std::vector<cv::Mat> before = is_turned ? TurnedPyramid(now_R_last) : pyramid_;
+    const std::vector<cv::Point2f> from =
+        Turned(is_turned ? now_R_last : Eigen::Matrix3d::Identity());
     std::vector<Step> steps;
     for (size_t i = 0; i < features_.size(); ++i) {
-      if (IsInside(guesses[i])) {
-        steps.push_back({features_[i], PointOf(features_[i]), guesses[i], guesses[i]});
+      if (IsInside(from[i])) {
+        steps.push_back({features_[i], from[i], from[i]});
       } else {
         ++counts->left;
       }
     }
-    SearchAhead(pyramid, &steps, counts);
-    counts->strayed = DropStrayed(pyramid, &steps);
+    SearchAhead(before, pyramid, &steps, counts);
+    counts->strayed = DropStrayed(before, pyramid, &steps);
     features_.clear();
     for (Step& step : steps) {
       step.feature.pixel = {step.after.x, step.after.y};
@@ -248,21 +283,19 @@ class FeatureTracker::Impl {
     }
   }
 
-  void SearchAhead(const std::vector<cv::Mat>& pyramid, std::vector<Step>* steps,
-                   TrackCounts* counts) const {
+  void SearchAhead(const std::vector<cv::Mat>& pyramid_before, const std::vector<cv::Mat>& pyramid,
+                   std::vector<Step>* steps, TrackCounts* counts) const {
     if (steps->empty()) return;
     std::vector<cv::Point2f> before;
-    std::vector<cv::Point2f> after;
-    for (const Step& step : *steps) {
-      before.push_back(step.before);
-      after.push_back(step.guess);
-    }
-    const std::vector<uint8_t> is_found = Search(pyramid_, pyramid, before, &after);
+    for (const Step& step : *steps) before.push_back(step.before);
+    std::vector<cv::Point2f> after = before;
+    const std::vector<uint8_t> is_found = Search(pyramid_before, pyramid, before, &after);
     std::vector<Step> kept;
     for (size_t i = 0; i < steps->size(); ++i) {
       if (is_found[i] != 0 && !IsInside(after[i])) {
         ++counts->left;
-      } else if (is_found[i] == 0 || !LooksTheSame(pyramid, before[i], after[i])) {
+      } else if (is_found[i] == 0 ||
+                 !LooksTheSame(pyramid_before[0], before[i], pyramid[0], after[i])) {
         ++counts->lost;
       } else {
         kept.push_back((*steps)[i]);
@@ -274,16 +307,15 @@ class FeatureTracker::Impl {
 
   // Those that were followed for the first time and do not come back to where they were. The search
   // back begins as far off as the one ahead did.
-  int DropStrayed(const std::vector<cv::Mat>& pyramid, std::vector<Step>* steps) const {
+  int DropStrayed(const std::vector<cv::Mat>& pyramid_before, const std::vector<cv::Mat>& pyramid,
+                  std::vector<Step>* steps) const {
     std::vector<cv::Point2f> there;
-    std::vector<cv::Point2f> back;
     for (const Step& step : *steps) {
-      if (step.feature.image_count > 0) continue;
-      there.push_back(step.after);
-      back.push_back(step.before + step.after - step.guess);
+      if (step.feature.image_count == 0) there.push_back(step.after);
     }
     if (there.empty()) return 0;
-    const std::vector<uint8_t> is_found = Search(pyramid, pyramid_, there, &back);
+    std::vector<cv::Point2f> back = there;
+    const std::vector<uint8_t> is_found = Search(pyramid, pyramid_before, there, &back);
     size_t next = 0;
     return static_cast<int>(std::erase_if(*steps, [&](const Step& step) {
       if (step.feature.image_count > 0) return false;
@@ -293,9 +325,9 @@ class FeatureTracker::Impl {
     }));
   }
 
-  bool LooksTheSame(const std::vector<cv::Mat>& pyramid, const cv::Point2f& before,
+  bool LooksTheSame(const cv::Mat& image_before, const cv::Point2f& before, const cv::Mat& image,
                     const cv::Point2f& after) const {
-    return CorrelationAt(pyramid_[0], before, pyramid[0], after, options_.correlation_reach_px) >=
+    return CorrelationAt(image_before, before, image, after, options_.correlation_reach_px) >=
            options_.correlation_min;
   }
 

@@ -42,7 +42,9 @@ struct TrackCounts {
   int merged = 0;
 };
 
-/// Pyramidal Lucas-Kanade (OpenCV's) on Shi-Tomasi corners. The same images give the same features,
+/// Pyramidal Lucas-Kanade (OpenCV's) on Shi-Tomasi corners, of images without their local mean. If
+/// the camera turns, features are sought in the image before as it would have looked from there:
+/// windows that are not turned lag behind. The same images give the same features,
 /// whatever the number of threads.
 ///
 /// A mask has a byte for each pixel of the camera, not 0 where nothing may be followed (what

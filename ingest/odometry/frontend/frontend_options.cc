@@ -72,6 +72,9 @@ constexpr OptionField<FeatureTrackerOptions> kTrackerFields[] = {
     {"odometry-track-window", &FeatureTrackerOptions::window_reach_px, 2, 50,
      "Windows that are sought in the next image reach this far beside the feature, pixels: noise "
      "against depth edges"},
+    {"odometry-track-flat", &FeatureTrackerOptions::flat_reach_px, 0, 200,
+     "Brightness is compared once the mean of the pixels this near is subtracted, pixels: a lens "
+     "darkens the borders of all images alike, which holds windows back; 0 = as it is"},
     {"odometry-track-levels", &FeatureTrackerOptions::level_count, 1, 10,
      "Sizes of the image, each half of the one before, that they are sought in: with the rotation "
      "known, flow is short"},

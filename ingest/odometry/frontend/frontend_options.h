@@ -69,6 +69,8 @@ struct FeatureTrackerOptions {
   /// What is sought in the next image: a window that reaches so far, on so many levels of halved
   /// size, in so many steps or until one is this short.
   int window_reach_px = 10;
+  /// Before that, the mean of the pixels that are this near is subtracted; 0 = it is not.
+  int flat_reach_px = 20;
   int level_count = 3;
   int step_count_max = 30;
   double step_px_min = 0.02;

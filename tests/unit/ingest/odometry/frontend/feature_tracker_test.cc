@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <cmath>
+#include <iostream>
 #include <map>
 #include <opencv2/core/utility.hpp>
 #include <set>
@@ -94,7 +96,7 @@ TEST(FeatureTracker, FollowsAPlaneWithinAFifthOfAPixel) {
     ASSERT_GT(errors.size(), 0.75 * static_cast<double>(first.size())) << image;
     // Each image adds what the change of view within a window does.
     EXPECT_LT(errors[errors.size() / 2], 0.06 * image) << image;
-    EXPECT_LT(errors[errors.size() * 95 / 100], 0.1 + 0.1 * image) << image;
+    EXPECT_LT(errors[errors.size() * 95 / 100], 0.12 + 0.1 * image) << image;
     for (const Feature& feature : tracker.features()) EXPECT_EQ(feature.image_count, image);
   }
 }
@@ -132,6 +134,50 @@ TEST(FeatureTracker, CountsWhatBecomesOfFeatures) {
   EXPECT_GT(counts.tracked, before / 2);
 }
 
+// A weak texture, seen by a camera that turns and whose lens darkens the borders.
+Image DarkenedUnder(const Eigen::Matrix3d& homography) {
+  const CameraCalibration camera = ImageCamera();
+  const Eigen::Matrix3d inverse = homography.inverse();
+  return PaintedImage(camera.width, camera.height, [&](int u, int v) {
+    const Eigen::Vector2d at = (inverse * Eigen::Vector3d(u, v, 1.0)).hnormalized();
+    const double weak = 110.0 + 0.12 * (WaveTexture(at.x() / kWavePx, at.y() / kWavePx) - 128.0);
+    const double x = (u - camera.cx) / camera.cx;
+    const double y = (v - camera.cy) / camera.cx;
+    return weak * (1.0 - 0.4 * (x * x + y * y));
+  });
+}
+
+TEST(FeatureTracker, IsNotHeldBackByALensThatDarkensTheBorders) {
+  const auto lag_px = [](int flat_reach_px) {
+    FeatureTrackerOptions options;
+    options.flat_reach_px = flat_reach_px;
+    options.corner_gradient_min = 0.5;
+    FeatureTracker tracker = MakeTracker(options);
+    EXPECT_TRUE(tracker.Track(DarkenedUnder(Eigen::Matrix3d::Identity())).ok());
+    EXPECT_TRUE(tracker.Detect().ok());
+    const Pixels first = PixelsOf(tracker);
+    const Eigen::Quaterniond step(Eigen::AngleAxisd(0.02, Eigen::Vector3d::UnitY()));
+    Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
+    for (int image = 0; image < 4; ++image) {
+      turn = turn * step;
+      EXPECT_TRUE(tracker.Track(DarkenedUnder(TurnedBy(turn)), step).ok());
+    }
+    double sum = 0.0;
+    for (const Feature& feature : tracker.features()) {
+      sum += feature.pixel.x() -
+             (TurnedBy(turn) * first.at(feature.id).homogeneous()).hnormalized().x();
+    }
+    EXPECT_GT(tracker.features().size(), 30u);
+    return sum / static_cast<double>(tracker.features().size());
+  };
+  const double before = lag_px(0);
+  const double after = lag_px(FeatureTrackerOptions().flat_reach_px);
+  std::cout << "mean lag " << before << " px, with flat images " << after << " px\n";
+  // The scene moves to the left.
+  EXPECT_GT(before, 0.1);
+  EXPECT_LT(std::abs(after), 0.25 * before);
+}
+
 TEST(FeatureTracker, StartsFromAKnownRotation) {
   const Eigen::Quaterniond turn(
       Eigen::AngleAxisd(0.25, Eigen::Vector3d(0.1, 1.0, 0.1).normalized()));
@@ -145,8 +191,8 @@ TEST(FeatureTracker, StartsFromAKnownRotation) {
   EXPECT_GT(with.tracked, 0.8 * static_cast<double>(first.size() - static_cast<size_t>(with.left)));
   EXPECT_LT(without.tracked, with.tracked / 4);
   const std::vector<double> errors = ErrorsPx(first, knowing, homography);
-  // Views from 14 degrees apart are a third larger at one side.
-  EXPECT_LT(errors[errors.size() / 2], 0.3);
+  // Views from 14 degrees apart are a third larger at one side; turned first they look alike.
+  EXPECT_LT(errors[errors.size() / 2], 0.1);
 }
 
 TEST(FeatureTracker, FindsOneCornerInEachEmptyCell) {
