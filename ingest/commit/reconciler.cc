@@ -8,6 +8,7 @@
 #include "absl/strings/str_format.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
+#include "schema/model/place_memory.h"
 
 namespace dsg::ingest {
 namespace {
@@ -158,6 +159,7 @@ absl::StatusOr<bool> Reconciler::MergeAgent(Node* node) {
   const int64_t stored_count = known->track.has_value() ? known->track->pose_count : 0;
   merged.observation_count =
       std::max(merged.observation_count, stored_count + known->new_pose_count);
+  AddPlaceMemory(log, &merged);
   if (IsSameNode(merged, *known->node)) return false;
   *node = merged;
   return true;

@@ -136,7 +136,12 @@ class RecognizedLog : public LogSource {
     const std::vector<std::string>& notes = log_->info().notes;
     for (; note_count_ < notes.size(); ++note_count_) info_.notes.push_back(notes[note_count_]);
     info_.notes.push_back(absl::StrCat("recognition: ", loop_count_, " loop closures in ",
-                                       keyframe_count_, " images"));
+                                       keyframe_count_, " images, of which ",
+                                       kept_.keyframes().size(), " are kept for other sessions"));
+    if (keyframe_count_ == 0) {
+      info_.notes.push_back(absl::StrCat("recognition: no image of ", eye_.left,
+                                         " has a partner of its stamp in ", eye_.other));
+    }
     if (broken_count_ == 0) return;
     info_.notes.push_back(absl::StrCat("recognition: ", broken_count_,
                                        " images were passed over; the first: ", first_broken_));

@@ -27,6 +27,9 @@ constexpr OptionField<UprightOptions> kUprightFields[] = {
      "at the walls"},
 };
 
+// Farther away no map has anything.
+constexpr double kShiftMaxM = 1e6;
+
 // So many finite numbers with commas between them; nullopt of anything else.
 std::optional<std::vector<double>> NumbersOf(const std::string& text, size_t count) {
   std::vector<double> numbers;
@@ -96,13 +99,17 @@ std::vector<BoundOption> UprightOptions::Bind() {
 
 absl::StatusOr<Pose3d> ParseTransform(const std::string& text) {
   const std::optional<std::vector<double>> numbers = NumbersOf(text, 4);
-  if (!numbers.has_value()) {
-    return MakeError(Reason::kFieldInvalid,
-                     absl::StrCat("--transform ", text,
-                                  " is no transform; write X,Y,Z,YAW, in metres and radians"),
-                     {{"field", "transform"}, {"value", text}});
+  const std::vector<double> n = numbers.value_or(std::vector<double>());
+  const bool is_within = !n.empty() &&
+                         std::max({std::abs(n[0]), std::abs(n[1]), std::abs(n[2])}) <= kShiftMaxM &&
+                         std::abs(n[3]) <= 2.0 * M_PI;
+  if (!is_within) {
+    return MakeError(
+        Reason::kFieldInvalid,
+        absl::StrCat("--transform ", text, " is no transform; write X,Y,Z,YAW: metres, at most ",
+                     kShiftMaxM, ", and radians, at most a whole turn"),
+        {{"field", "transform"}, {"value", text}});
   }
-  const std::vector<double>& n = *numbers;
   return Pose3d{{n[0], n[1], n[2]},
                 Eigen::Quaterniond(Eigen::AngleAxisd(n[3], Eigen::Vector3d::UnitZ()))};
 }

@@ -72,16 +72,21 @@ void Explain(const Flags& flags, const MapAlignment& alignment) {
   std::fputs(
       absl::StrFormat(
           "%d of %d views of %s that show places of %s agree within %.2f m, and the transform is "
-          "good to %.2f m and %.1f degrees; next: dsg merge --map %s %s --transform=%s",
+          "good to %.2f m and %.1f degrees; next: dsg merge --store %s --map %s %s --transform=%s",
           found.agree_count, found.tie_count, flags.other, flags.map, found.residual_m,
-          found.position_sigma_m, found.turn_sigma_rad * 180.0 / M_PI, flags.map, flags.other,
-          ToTransform(found.map_T_other))
+          found.position_sigma_m, found.turn_sigma_rad * 180.0 / M_PI, flags.store, flags.map,
+          flags.other, ToTransform(found.map_T_other))
           .c_str(),
       stderr);
 }
 
 absl::Status Align(Flags& flags) {
   DSG_RETURN_IF_ERROR(ValidateFields(flags.options.Bind()));
+  if (flags.map == flags.other) {
+    return MakeError(Reason::kFieldInvalid,
+                     absl::StrCat("MAP and OTHER are both \"", flags.map, "\"; name two maps"),
+                     {{"field", "OTHER"}, {"value", flags.other}});
+  }
   DSG_ASSIGN_OR_RETURN(const auto store, GraphStore::Open(flags.store, {}));
   DSG_ASSIGN_OR_RETURN(const auto map, store->OpenMap(flags.map));
   DSG_ASSIGN_OR_RETURN(const auto other, store->OpenMap(flags.other));

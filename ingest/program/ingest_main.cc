@@ -362,11 +362,21 @@ absl::Status CheckMesh(const IngestFlags& flags) {
                    {{"field", "odometry-mesh"}, {"value", flags.odometry.mesh}});
 }
 
+absl::Status CheckTransform(const IngestFlags& flags) {
+  if (!flags.transform.empty()) DSG_RETURN_IF_ERROR(ParseTransform(flags.transform).status());
+  if (flags.poses != "vio" || flags.logs.size() < 2) return absl::OkStatus();
+  return MakeError(Reason::kFieldInvalid,
+                   absl::StrCat("--poses vio takes one log, not ", flags.logs.size(),
+                                ": each begins in a frame of its own; ingest them one by one, into "
+                                "maps of their own or with --transform"),
+                   {{"field", "poses"}, {"value", flags.poses}});
+}
+
 absl::Status Run(const IngestFlags& flags) {
   DSG_RETURN_IF_ERROR(CheckMapName(flags.map));
   DSG_RETURN_IF_ERROR(CheckUp(flags.up));
-  if (!flags.transform.empty()) DSG_RETURN_IF_ERROR(ParseTransform(flags.transform).status());
   DSG_RETURN_IF_ERROR(CheckMesh(flags));
+  DSG_RETURN_IF_ERROR(CheckTransform(flags));
   DSG_RETURN_IF_ERROR(ParseRetryFor(flags.retry_for).status());
   // Hours into a log is too late to find out.
   if (!flags.spill_folder.empty()) DSG_RETURN_IF_ERROR(SpillFile(flags.spill_folder).Open());

@@ -6,6 +6,7 @@
 
 #include "schema/merge/footprint.h"
 #include "schema/merge/map_content.h"
+#include "schema/model/place_memory.h"
 
 namespace dsg::merge {
 namespace {
@@ -221,6 +222,7 @@ void FuseNode(const std::string& into, Origin origin, bool is_known, const Node&
   if (IsAgentKind(known->kind)) {
     // The position of an agent is the end of its track.
     if (is_later) known->map_T_node = seen.map_T_node;
+    AddPlaceMemory(seen, known);
     return;
   }
   if (known->kind == kinds::kPlace) {

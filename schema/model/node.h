@@ -53,8 +53,8 @@ struct AgentInfo {
   std::string track_state;
   /// 0 = the map's default.
   TimeNs gap_ns_max = 0;
-  /// What a robot knows places by: keyframes of its track, ascending, to be found again by other
-  /// sessions.
+  /// What a robot knows places by: keyframes of its track, in the order in which they were added,
+  /// to be found again by other sessions.
   std::vector<Sha256> place_memory;
 };
 

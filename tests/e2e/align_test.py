@@ -98,6 +98,7 @@ class Align(support.ProgramsTest):
                 "first")
         self.refused(1, ["bare", "--recognize"], "dsg-align", "first", "bare", "--store", "store")
         self.refused(1, ["nowhere"], "dsg-align", "first", "nowhere", "--store", "store")
+        self.refused(2, ["both"], "dsg-align", "first", "first", "--store", "store")
         self.refused(2, ["--align-share"], "dsg-align", "first", "second", "--store", "store",
                      "--align-share", "2")
 

@@ -433,8 +433,12 @@ TEST_F(IngestLogTest, TakesRealPeopleAndRobots) {
 
 // Poses of a robot at a time, as odometry gives them.
 absl::StatusOr<IngestSummary> TakeOdometry(TestMap& map, const std::string& content, TimeNs time_ns,
-                                           const std::string& transform) {
+                                           const std::string& transform,
+                                           const std::string& place_memory = "") {
   LogInfo info;
+  // Of a robot with a camera.
+  info.rig.cameras = {CameraCalibration{.name = "cam0", .width = 10, .height = 10}};
+  if (!place_memory.empty()) info.place_memory = {place_memory};
   info.format = "euroc";
   info.path = content;
   info.content_sha256 = content;
@@ -466,6 +470,22 @@ TEST(IngestLog, TakesOdometryIntoTheMapOfAnotherLogOnlyWithATransform) {
   EXPECT_EQ(laid->committed.pose_count, 3);
   // With another one it is another session.
   EXPECT_FALSE(TakeOdometry(map, "tuesday", 120'000'000'000, "1,2,0,0.6")->was_known);
+}
+
+// A log that was taken without it, or cut off before its end, and a later one of the same robot.
+TEST(IngestLog, AddsWhatARobotKnowsPlacesBy) {
+  TestMap map;
+  const auto memory = [&map] { return map.Latest()->GetNode(NodeId('r', 0))->agent->place_memory; };
+  ASSERT_TRUE(TakeOdometry(map, "monday", 0, "").ok());
+  EXPECT_TRUE(memory().empty());
+  ASSERT_TRUE(TakeOdometry(map, "monday seen", 0, "0,0,0,0", "hall").ok());
+  ASSERT_EQ(memory().size(), 1u);
+  ASSERT_TRUE(TakeOdometry(map, "tuesday", 60'000'000'000, "0,0,0,0", "kitchen").ok());
+  ASSERT_EQ(memory().size(), 2u);
+  EXPECT_EQ(map.Latest()->ReadAsset(memory()[0])->content, "hall");
+  EXPECT_EQ(map.Latest()->ReadAsset(memory()[1])->content, "kitchen");
+  ASSERT_TRUE(TakeOdometry(map, "tuesday", 60'000'000'000, "0,0,0,0", "kitchen").ok());
+  EXPECT_EQ(memory().size(), 2u);
 }
 
 TEST(IngestLog, TakesOdometryIntoAMapOfRoomsOnlyWithATransform) {

@@ -62,7 +62,8 @@ TEST(ParseTransform, TakesAShiftAndATurnAboutTheVertical) {
   EXPECT_EQ(transform->position, Eigen::Vector3d(1.0, -2.5, 0.25));
   EXPECT_TRUE((transform->orientation * Eigen::Vector3d::UnitX())
                   .isApprox(Eigen::Vector3d::UnitY(), 1e-12));
-  for (const std::string text : {"", "1,2,3", "1,2,3,4,5", "1,2,3,inf", "1,2,three,4", "1;2;3;4"}) {
+  for (const std::string text :
+       {"", "1,2,3", "1,2,3,4,5", "1,2,3,inf", "1,2,three,4", "1;2;3;4", "1e7,0,0,0", "0,0,0,90"}) {
     EXPECT_EQ(ReasonOf(ParseTransform(text).status()), Reason::kFieldInvalid) << text;
   }
 }

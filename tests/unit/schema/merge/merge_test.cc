@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "schema/base/status.h"
+#include "schema/codec/checksum.h"
 #include "schema/merge/origins.h"
 #include "schema/merge/refine.h"
 #include "tests/unit/schema/merge/small_map.h"
@@ -229,6 +230,12 @@ TEST(Merge, PutsAnAgentWhereItsLaterTrackEnds) {
     Node robot = MakeAgent(NodeId('r', 0), "spot");
     robot.map_T_node.position = {x, 0, 0};
     robot.last_observed_ns = from_ns + 4 * kNsPerSecond;
+    Asset places;
+    places.content = std::to_string(x);
+    places.sha256 = ComputeSha256(places.content);
+    places.media_type = "application/x-dsg-places";
+    robot.agent.emplace().place_memory = {places.sha256};
+    delta.assets = {places};
     delta.nodes = {robot};
     delta.appends = {MakeTrack(NodeId('r', 0), from_ns, 5)};
     return delta;
@@ -241,6 +248,11 @@ TEST(Merge, PutsAnAgentWhereItsLaterTrackEnds) {
     const Node robot = maps.Get("a", NodeId('r', 0));
     const Eigen::Vector3d expected = is_later ? Eigen::Vector3d(7, 1, 0) : Eigen::Vector3d(3, 0, 0);
     EXPECT_LT((robot.map_T_node.position - expected).norm(), 1e-9) << is_later;
+    // A later session is the same robot's, and what it saw in both is known.
+    ASSERT_EQ(robot.agent->place_memory.size(), is_later ? 2u : 1u);
+    for (const Sha256& part : robot.agent->place_memory) {
+      EXPECT_TRUE(maps.Newest("a")->ReadAsset(part).ok());
+    }
   }
 }
 
