@@ -82,7 +82,7 @@ class VisualInertialOdometry::Impl {
     const bool is_led = options_.method == OdometryMethod::kDynamic && is_started_;
     DSG_RETURN_IF_ERROR(tracker_
                             .Track(frame.left,
-                                   is_led ? CameraTurn(last_R_now) : Quaterniond::Identity(),
+                                   is_led ? std::optional(CameraTurn(last_R_now)) : std::nullopt,
                                    frame.mask)
                             .status());
     keyframe_R_now_ = (keyframe_R_now_ * last_R_now).normalized();

@@ -30,6 +30,8 @@ constexpr double kOriginSigmaRad = 1e-3;
 // Those of the front-end and the window, for images alone and for what measures distances.
 OdometryOptions ForImages(OdometryOptions options, const StereoCamera& camera) {
   options.frontend.tracker.level_count = options.visual.level_count;
+  // What varies slowly is all that the smallest of these images have.
+  options.frontend.tracker.flat_reach_px = 0;
   options.frontend.relative_pose.inlier_px = options.visual.inlier_px;
   options.frontend.relative_pose.consensus.agree_share_min = options.visual.agree_share_min;
   if (!camera.has_depth) return options;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -101,37 +102,38 @@ class FeatureTracker::Impl {
   Impl(const CameraCalibration& camera, const FeatureTrackerOptions& options)
       : camera_(camera), options_(options) {}
 
-  absl::StatusOr<TrackCounts> Track(const Image& image, const Eigen::Quaterniond& last_R_now,
+  absl::StatusOr<TrackCounts> Track(const Image& image,
+                                    const std::optional<Eigen::Quaterniond>& last_R_now,
                                     std::span<const uint8_t> mask) {
     DSG_RETURN_IF_ERROR(CheckGrayImage(camera_, image));
     DSG_RETURN_IF_ERROR(CheckMask(camera_, mask));
-    if (!last_R_now.coeffs().allFinite()) {
+    if (last_R_now.has_value() && !last_R_now->coeffs().allFinite()) {
       return BadInput(camera_, "rotation", "not finite", "a unit quaternion");
     }
-    std::vector<cv::Mat> pyramid = PyramidOf(Flat(GrayView(image)));
+    const cv::Mat now = GrayView(image).clone();
     features_before_ = features_;
     TrackCounts counts;
     if (!features_.empty()) {
-      Follow(pyramid, last_R_now, &counts);
+      Follow(now, last_R_now, &counts);
       const cv::Mat1b grown = GrownMask(camera_, mask, options_.mask_growth_px);
       counts.masked = DropIf([&](const Feature& feature) { return IsIn(grown, PointOf(feature)); });
       counts.merged = Merge();
     }
     counts.tracked = static_cast<int>(features_.size());
-    pyramid_before_ = std::exchange(pyramid_, std::move(pyramid));
+    image_before_ = std::exchange(image_, now);
     return counts;
   }
 
   absl::StatusOr<int> Detect(std::span<const uint8_t> mask) {
     DSG_RETURN_IF_ERROR(CheckMask(camera_, mask));
-    if (pyramid_.empty()) return 0;
+    if (image_.empty()) return 0;
     for (Feature& feature : features_) ++feature.keyframe_count;
     DropIf([&](const Feature& feature) {
       return feature.keyframe_count > options_.keyframe_count_max;
     });
     const cv::Mat1b grown = GrownMask(camera_, mask, options_.mask_growth_px);
     int new_count = 0;
-    for (const Corner& corner : CornersOf(pyramid_[0], grown, features_, options_)) {
+    for (const Corner& corner : CornersOf(image_, grown, features_, options_)) {
       if (std::ssize(features_) >= options_.feature_count_max) break;
       const Eigen::Vector2d pixel(corner.at.x, corner.at.y);
       const bool is_crowded =
@@ -152,17 +154,14 @@ class FeatureTracker::Impl {
   }
 
   void GoBack() {
-    if (pyramid_before_.empty()) return;
-    pyramid_ = std::move(pyramid_before_);
-    features_ = std::move(features_before_);
-    pyramid_before_.clear();
-    features_before_.clear();
+    if (image_before_.empty()) return;
+    image_ = std::exchange(image_before_, cv::Mat());
+    features_ = std::exchange(features_before_, {});
   }
 
   void Reset() {
     features_.clear();
-    pyramid_.clear();
-    pyramid_before_.clear();
+    image_ = image_before_ = cv::Mat();
   }
 
   const std::vector<Feature>& features() const { return features_; }
@@ -186,7 +185,6 @@ class FeatureTracker::Impl {
   // Without what varies slowly: a lens darkens the borders of all images alike, which holds windows
   // without much else in them back where they were.
   cv::Mat Flat(const cv::Mat& image) const {
-    if (options_.flat_reach_px == 0) return image;
     const int side = 2 * options_.flat_reach_px + 1;
     cv::Mat mean;
     cv::blur(image, mean, cv::Size(side, side));
@@ -216,7 +214,7 @@ class FeatureTracker::Impl {
   // The last image as the camera would have taken it with the attitude of the next one: a window
   // that turns with the image looks the same there. Where a turn stretches windows, which it does
   // by some per cent near the borders, features would lag behind.
-  std::vector<cv::Mat> TurnedPyramid(const Eigen::Matrix3d& now_R_last) const {
+  cv::Mat TurnedImage(const Eigen::Matrix3d& now_R_last) const {
     Eigen::Matrix3d camera;
     camera << camera_.fx, 0.0, camera_.cx, 0.0, camera_.fy, camera_.cy, 0.0, 0.0, 1.0;
     const Eigen::Matrix3d by_turn = camera * now_R_last * camera.inverse();
@@ -225,9 +223,9 @@ class FeatureTracker::Impl {
       for (int column = 0; column < 3; ++column) homography(row, column) = by_turn(row, column);
     }
     cv::Mat turned;
-    cv::warpPerspective(pyramid_[0], turned, homography, pyramid_[0].size(), cv::INTER_LINEAR,
+    cv::warpPerspective(image_, turned, homography, image_.size(), cv::INTER_LINEAR,
                         cv::BORDER_REPLICATE);
-    return PyramidOf(turned);
+    return turned;
   }
 
   // Where features are in the next image if the camera turns only; outside where it turns away.
@@ -257,14 +255,20 @@ class FeatureTracker::Impl {
     return is_found;
   }
 
-  void Follow(const std::vector<cv::Mat>& pyramid, const Eigen::Quaterniond& last_R_now,
+  // Where the turn is not known, features are sought far away, on the levels of small images: what
+  // varies slowly is all that those have.
+  void Follow(const cv::Mat& image, const std::optional<Eigen::Quaterniond>& last_R_now,
               TrackCounts* counts) {
-    const Eigen::Matrix3d now_R_last = last_R_now.conjugate().toRotationMatrix();
+    const Eigen::Quaterniond turn = last_R_now.value_or(Eigen::Quaterniond::Identity());
     const bool is_turned =
-        camera_.fx * AngleBetween(last_R_now, Eigen::Quaterniond::Identity()) >= kTurnPx;
-    const std::vector<cv::Mat> before = is_turned ? TurnedPyramid(now_R_last) : pyramid_;
-    const std::vector<cv::Point2f> from =
-        Turned(is_turned ? now_R_last : Eigen::Matrix3d::Identity());
+        camera_.fx * AngleBetween(turn, Eigen::Quaterniond::Identity()) >= kTurnPx;
+    const Eigen::Matrix3d now_R_last =
+        is_turned ? turn.conjugate().toRotationMatrix() : Eigen::Matrix3d::Identity();
+    const cv::Mat last = is_turned ? TurnedImage(now_R_last) : image_;
+    const bool is_flat = last_R_now.has_value() && options_.flat_reach_px > 0;
+    const std::vector<cv::Mat> before = PyramidOf(is_flat ? Flat(last) : last);
+    const std::vector<cv::Mat> pyramid = PyramidOf(is_flat ? Flat(image) : image);
+    const std::vector<cv::Point2f> from = Turned(now_R_last);
     std::vector<Step> steps;
     for (size_t i = 0; i < features_.size(); ++i) {
       if (IsInside(from[i])) {
@@ -347,11 +351,10 @@ class FeatureTracker::Impl {
 
   CameraCalibration camera_;
   FeatureTrackerOptions options_;
-  // Images and gradients of the last image, by level.
-  std::vector<cv::Mat> pyramid_;
+  cv::Mat image_;
   std::vector<Feature> features_;
-  // The same of the image before, for GoBack; no pyramid if there is none.
-  std::vector<cv::Mat> pyramid_before_;
+  // Those of the image before, for GoBack; none if there is none.
+  cv::Mat image_before_;
   std::vector<Feature> features_before_;
   int64_t next_id_ = 0;
 };
@@ -377,9 +380,9 @@ absl::StatusOr<FeatureTracker> FeatureTracker::Make(const CameraCalibration& cam
   return FeatureTracker(std::make_unique<Impl>(camera, options));
 }
 
-absl::StatusOr<TrackCounts> FeatureTracker::Track(const Image& image,
-                                                  const Eigen::Quaterniond& last_R_now,
-                                                  std::span<const uint8_t> mask) {
+absl::StatusOr<TrackCounts> FeatureTracker::Track(
+    const Image& image, const std::optional<Eigen::Quaterniond>& last_R_now,
+    std::span<const uint8_t> mask) {
   return impl_->Track(image, last_R_now, mask);
 }
 

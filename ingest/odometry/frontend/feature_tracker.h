@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -42,16 +43,17 @@ struct TrackCounts {
   int merged = 0;
 };
 
-/// Pyramidal Lucas-Kanade (OpenCV's) on Shi-Tomasi corners, of images without their local mean. If
-/// the camera turns, features are sought in the image before as it would have looked from there:
-/// windows that are not turned lag behind. The same images give the same features,
+/// Pyramidal Lucas-Kanade (OpenCV's) on Shi-Tomasi corners. If the turn of the camera is known,
+/// features are sought in images without their local mean, and in the last one as it would have
+/// looked from there: windows that are not turned, and those under a lens that darkens the borders,
+/// lag behind. The same images give the same features,
 /// whatever the number of threads.
 ///
 /// A mask has a byte for each pixel of the camera, not 0 where nothing may be followed (what
 /// moves), or is empty. It is grown by `mask_growth_px`.
 ///
-/// Memory: three pyramids, and what the options allow of features. Threads: one caller at a time.
-/// Source: Shi and Tomasi, 1994; Bouguet, 2000; Hwangbo, Kim and Kanade, 2009 (start from a
+/// Memory: two images and pyramids, and what the options allow of features. Threads: one caller at
+/// a time. Source: Shi and Tomasi, 1994; Bouguet, 2000; Hwangbo, Kim and Kanade, 2009 (start from a
 /// rotation).
 class FeatureTracker {
  public:
@@ -65,11 +67,12 @@ class FeatureTracker {
   FeatureTracker& operator=(FeatureTracker&&) noexcept;
 
   /// Follows all features into the next image. `last_R_now` (unit) is the orientation of the camera
-  /// in its frame at the image before, as a gyroscope tells it: where the search begins.
+  /// in its frame at the image before, as a gyroscope tells it: where the search begins. Unset:
+  /// nobody knows.
   /// Errors: INVALID_ARGUMENT/FIELD_INVALID when image or mask do not fit the camera, or the
   /// rotation is not finite; the features stay those of the image before.
   absl::StatusOr<TrackCounts> Track(
-      const Image& image, const Eigen::Quaterniond& last_R_now = Eigen::Quaterniond::Identity(),
+      const Image& image, const std::optional<Eigen::Quaterniond>& last_R_now = std::nullopt,
       std::span<const uint8_t> mask = {});
 
   /// At a keyframe: drops features that are too old, then finds new ones in cells of the last image

@@ -74,7 +74,8 @@ constexpr OptionField<FeatureTrackerOptions> kTrackerFields[] = {
      "against depth edges"},
     {"odometry-track-flat", &FeatureTrackerOptions::flat_reach_px, 0, 200,
      "Brightness is compared once the mean of the pixels this near is subtracted, pixels: a lens "
-     "darkens the borders of all images alike, which holds windows back; 0 = as it is"},
+     "darkens the borders of all images alike, which holds windows back; 0 = as it is. Only where "
+     "a gyroscope leads (dvio)"},
     {"odometry-track-levels", &FeatureTrackerOptions::level_count, 1, 10,
      "Sizes of the image, each half of the one before, that they are sought in: with the rotation "
      "known, flow is short"},
