@@ -46,14 +46,14 @@ struct TrackCounts {
 /// Pyramidal Lucas-Kanade (OpenCV's) on Shi-Tomasi corners. If the turn of the camera is known,
 /// features are sought in images without their local mean, and in the last one as it would have
 /// looked from there: windows that are not turned, and those under a lens that darkens the borders,
-/// lag behind. The same images give the same features,
-/// whatever the number of threads.
+/// lag behind. The same images give the same features, whatever the number of threads.
 ///
 /// A mask has a byte for each pixel of the camera, not 0 where nothing may be followed (what
 /// moves), or is empty. It is grown by `mask_growth_px`.
 ///
-/// Memory: two images and pyramids, and what the options allow of features. Threads: one caller at
-/// a time. Source: Shi and Tomasi, 1994; Bouguet, 2000; Hwangbo, Kim and Kanade, 2009 (start from a
+/// Memory: two images and pyramids, and what the options allow of features.
+/// Threads: one caller at a time.
+/// Source: Shi and Tomasi, 1994; Bouguet, 2000; Hwangbo, Kim and Kanade, 2009 (start from a
 /// rotation).
 class FeatureTracker {
  public:
