@@ -75,6 +75,13 @@ std::vector<PrunePolicy> YearStore::PoliciesOf(int day) const {
   return policies;
 }
 
+absl::Status YearStore::CopyTo(const std::string& folder) const {
+  std::error_code error;
+  std::filesystem::copy(folder_, folder, std::filesystem::copy_options::recursive, error);
+  if (!error) return absl::OkStatus();
+  return absl::InternalError(absl::StrCat("cannot copy ", folder_, ": ", error.message()));
+}
+
 int64_t YearStore::FileBytes() const {
   int64_t bytes = 0;
   for (const auto& entry :

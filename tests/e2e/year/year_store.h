@@ -26,6 +26,8 @@ class YearStore {
   /// Applies the policies at the end of a day. Policies of history count in days of the simulated
   /// world: a year is over in minutes, and the wall clock knows nothing of it.
   absl::Status Forget(int day);
+  /// A copy of the store as it is now, to be opened beside it. `folder` exists and is empty.
+  absl::Status CopyTo(const std::string& folder) const;
   /// Of the database and its log.
   int64_t FileBytes() const;
   /// Poses that the newest revision knows.
