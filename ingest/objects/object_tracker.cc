@@ -79,6 +79,10 @@ void ObjectTracker::Retire(const Assignment& assignment,
       into->first_observed_ns = std::min(into->first_observed_ns, object.first_observed_ns);
       continue;
     }
+    if (is_surface_new_) {
+      changes->forgotten.push_back(object.id);
+      continue;
+    }
     const std::vector<Eigen::Vector3f>& points = object.cluster.points_map;
     const auto count = std::count_if(points.begin(), points.end(), is_seen_through);
     if (static_cast<double>(count) >
@@ -101,6 +105,7 @@ ObjectChanges ObjectTracker::Update(
   ObjectChanges changes;
   const Assignment assignment = Assign(std::move(clusters), time_ns, &changes);
   Retire(assignment, is_seen_through, &changes);
+  is_surface_new_ = false;
   std::vector<int64_t> dropped = changes.gone;
   dropped.insert(dropped.end(), changes.forgotten.begin(), changes.forgotten.end());
   for (const auto& [first, second] : changes.merged) {

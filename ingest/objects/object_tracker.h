@@ -39,7 +39,8 @@ struct ObjectChanges {
   std::vector<std::pair<int64_t, int64_t>> merged;
   /// No longer there: its space has been seen through.
   std::vector<int64_t> gone;
-  /// Pieces of a surface that comes apart in another way now; of trackers that forget the lost.
+  /// Pieces of a surface that comes apart in another way now; of trackers that forget the lost, and
+  /// after BeginAgain.
   std::vector<int64_t> forgotten;
 };
 
@@ -62,6 +63,10 @@ class ObjectTracker {
   /// The path that objects were seen from has moved: each moves by when it was seen.
   void Move(const TrajectoryChange& change);
 
+  /// The surface was made anew of all that was seen: an object without a cluster in the next update
+  /// was never there, whatever is seen through.
+  void BeginAgain() { is_surface_new_ = true; }
+
   /// Forgets an object that is known to be gone.
   void Remove(int64_t id);
 
@@ -77,6 +82,7 @@ class ObjectTracker {
               ObjectChanges* changes);
 
   bool forgets_lost_ = false;
+  bool is_surface_new_ = false;
   MatchOptions options_;
   std::vector<TrackedObject> objects_;
   /// By id: which points the latest cluster had.

@@ -60,11 +60,15 @@ absl::StatusOr<bool> HasLayers(const LogInfo& info, const MappingOptions& option
          FrameMaker(info.rig, options.depth, no_path).CanMakeFrames();
 }
 
-std::string OdometryText(const RobotGraphOptions& options) {
+std::string OdometryText(const LogInfo& info, const IngestOptions& ingest) {
+  const RobotGraphOptions& options = ingest.robot_graph;
   const std::string tuning = DigestOptions(options);
+  const bool fuses_again =
+      HasMapping(info, ingest) && ingest.mapping.fuses_again && ingest.open_again;
   return absl::StrCat(options.odometry_m_per_m, " ", options.odometry_rad_per_m, " corrected ",
                       options.correct_period_ns, " ", options.correct_share, " ",
-                      options.correct_min_m, tuning.empty() ? "" : " ", tuning);
+                      options.correct_min_m, fuses_again ? " fused again" : "",
+                      tuning.empty() ? "" : " ", tuning);
 }
 
 // What differs from the defaults of stays, agents and path; loop closures count for logs that have
@@ -98,7 +102,7 @@ SessionHeader MakeHeader(const LogInfo& info, const LogOptions& log_options,
       .transform = options.transform,
       .mapping = HasMapping(info, options) ? options.mapping.Digest(HasLabels(info)) : "",
       .people = HasPeople(info, options) ? options.people.Digest() : "",
-      .odometry = HasLoops(info) ? OdometryText(options.robot_graph) : "",
+      .odometry = HasLoops(info) ? OdometryText(info, options) : "",
       .robot_model =
           options.robot_model.has_value() ? ToHex(options.robot_model->asset.sha256) : "",
       .tuning = TuningText(options),

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -52,6 +53,12 @@ struct IngestOptions {
   /// Where the run keeps on disk what it will not need for long (SpillFile): voxel blocks out of
   /// sight, poses, tracks of people who have left. Empty = TMPDIR, or /tmp.
   std::string spill_folder;
+  /// Opens the log once more, as it was opened for IngestLog but for poses, which are not read
+  /// then: for MappingOptions::fuses_again. Empty = it cannot be read twice.
+  std::function<absl::StatusOr<std::unique_ptr<LogSource>>()> open_again;
+  /// Told of what takes long at the end of a log: what it is, and how much of it is done. May be
+  /// empty.
+  TellWork on_work;
   /// Deltas must fit into messages to a server; a large correction then takes several revisions.
   bool is_size_bounded = false;
   /// What a revert has undone of the log is told again; otherwise such a log is refused.

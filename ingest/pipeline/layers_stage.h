@@ -38,6 +38,9 @@ class LayersStage : public Stage {
   /// closed, all layers above found anew.
   void Tell(Findings* findings, GraphDelta* delta) override;
   void Correct(const TrajectoryChange& change) override { layers_.Correct(change); }
+  /// StaticLayers::BeginAgain, and IntegrateAgain.
+  void BeginAgain() { layers_.BeginAgain(); }
+  absl::Status SeeAgain(const DepthFrame& frame) { return layers_.IntegrateAgain(frame); }
   void Summarize(IngestSummary* summary) const override;
 
   bool is_on() const { return is_on_; }

@@ -21,16 +21,6 @@ std::string ChannelOf(const Measurement& measurement) {
   return std::holds_alternative<ImuMeasurement>(measurement) ? "imu0" : "detections0";
 }
 
-std::set<std::string, std::less<>> EyesOf(const RunPlan& plan) {
-  if (!plan.has_layers) return {};
-  const auto& channels = plan.info.channel_counts;
-  if (channels.contains("depth0")) {
-    return {"depth0", "label0", "color0", channels.contains("color0") ? "color0" : "cam0"};
-  }
-  if (plan.info.rig.lidar.has_value()) return {"lidar0", "label0"};
-  return {"cam0", "cam1", "color0", "label0"};
-}
-
 std::vector<ThingBox> ThingsOf(const LayerGraph& graph) {
   std::vector<ThingBox> things;
   for (const Node& node : graph.nodes) {
@@ -44,6 +34,7 @@ std::vector<ThingBox> ThingsOf(const LayerGraph& graph) {
 
 LogRun::LogRun(RunPlan plan, const MapView& map, DeltaSink sink)
     : options_(plan.options),
+      info_(plan.info),
       map_(map),
       has_loops_(plan.has_loops),
       is_followed_(plan.end_sequence.has_value()),
@@ -53,9 +44,7 @@ LogRun::LogRun(RunPlan plan, const MapView& map, DeltaSink sink)
       detector_(std::move(plan.detector)),
       path_(options_.path, options_.spill_folder),
       loops_(options_.robot_graph, &path_, plan.info.rig.HasEyes() || plan.has_loops),
-      used_channels_(plan.info.used_channels),
-      eyes_(EyesOf(plan)),
-      frames_(plan.has_layers ? plan.info.rig : RigCalibration(), options_.mapping.depth, path_),
+      frames_(plan.info, options_.mapping.depth, path_, plan.has_layers),
       layers_(plan.info, options_.mapping, plan.numbering, map.spec().mesh_block_size_m,
               plan.has_layers),
       people_(plan.info.rig, options_.people, plan.has_layers, path_,
@@ -137,20 +126,15 @@ absl::Status LogRun::TakeSensor(Measurement& measurement) {
   }
   // Where a network looks, the log's own detections would be the same people twice.
   if (!is_detection || !detector_.is_on()) is_used |= Spread(measurement);
-  if (!is_used && !used_channels_.contains(channel)) ++unused_[channel];
+  if (!is_used && !info_.used_channels.contains(channel)) ++unused_[channel];
   return SeeFrames();
 }
 
 // False when nobody has a use for it.
 bool LogRun::Spread(Measurement& measurement) {
   bool is_used = loops_.Take(measurement);
-  if (const auto* human = std::get_if<HumanDetection>(&measurement)) frames_.AddDetection(*human);
   for (Stage* stage : stages_) is_used |= stage->Take(measurement);
-  auto* image = std::get_if<ImageMeasurement>(&measurement);
-  if (image == nullptr || !eyes_.contains(image->channel)) return is_used;
-  frames_.AddPicture({image->time_ns, std::move(image->channel), std::move(image->origin),
-                      std::move(image->load)});
-  return true;
+  return frames_.Take(measurement) || is_used;
 }
 
 absl::Status LogRun::SeeFrames() {
@@ -161,7 +145,6 @@ absl::Status LogRun::SeeFrames() {
       frame = frames_.Next();
     }
     if (!frame.has_value()) return absl::OkStatus();
-    frame->map_T_camera = path_.ToMap(frame->time_ns, frame->map_T_camera);
     for (Stage* stage : stages_) DSG_RETURN_IF_ERROR(stage->See(*frame));
   }
 }
@@ -181,6 +164,7 @@ absl::Status LogRun::Commit(TimeNs now_ns, bool is_last) {
   findings_.is_last = is_last;
   DSG_RETURN_IF_ERROR(sink_.Put(builder_.Take({})));
   DSG_RETURN_IF_ERROR(CorrectPath(is_last));
+  if (is_last) DSG_RETURN_IF_ERROR(FuseAgain());
   GraphDelta delta;
   for (Stage* stage : stages_) stage->Tell(&findings_, &delta);
   if (findings_.is_moved) TellRobot(&delta);
@@ -278,6 +262,45 @@ absl::Status LogRun::CorrectPath(bool is_last) {
   for (Stage* stage : stages_) stage->Correct(*change);
   presence_.Correct(*change);
   return absl::OkStatus();
+}
+
+// What was mapped twice, before a loop closure and after it, is one again.
+absl::Status LogRun::FuseAgain() {
+  if (!layers_.is_on() || !path_.is_corrected() || !options_.mapping.fuses_again ||
+      !options_.open_again) {
+    return absl::OkStatus();
+  }
+  DSG_ASSIGN_OR_RETURN(const std::unique_ptr<LogSource> log, options_.open_again());
+  DetectorFeed detector;
+  if (detector_.is_on()) {
+    DSG_ASSIGN_OR_RETURN(detector, DetectorFeed::Make(info_, *options_.people.detector,
+                                                      options_.people.look.period_ns));
+  }
+  LogFrames frames(info_, options_.mapping.depth, path_, /*is_on=*/true);
+  layers_.BeginAgain();
+  const auto fuse = [&]() -> absl::Status {
+    const StageClock::Span span(&clock_, "fused again");
+    while (const std::optional<DepthFrame> frame = frames.Next()) {
+      DSG_RETURN_IF_ERROR(layers_.SeeAgain(*frame));
+    }
+    return absl::OkStatus();
+  };
+  for (int64_t count = 1;; ++count) {
+    DSG_ASSIGN_OR_RETURN(std::optional<Measurement> measurement, log->Next());
+    if (!measurement.has_value()) break;
+    DSG_ASSIGN_OR_RETURN(std::vector<HumanDetection> seen, detector.Look(*measurement));
+    for (HumanDetection& detection : seen) {
+      Measurement one = std::move(detection);
+      frames.Take(one);
+    }
+    const bool is_doubled =
+        detector.is_on() && std::holds_alternative<HumanDetection>(*measurement);
+    if (!is_doubled) frames.Take(*measurement);
+    DSG_RETURN_IF_ERROR(fuse());
+    if (options_.on_work) options_.on_work("fusing again", count, log->info().measurement_count);
+  }
+  frames.Finish();
+  return fuse();
 }
 
 void LogRun::TellRobot(GraphDelta* delta) {

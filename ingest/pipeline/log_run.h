@@ -6,18 +6,17 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
 #include "ingest/commit/delta_sink.h"
 #include "ingest/correction/loop_closer.h"
-#include "ingest/depth/frame_maker.h"
 #include "ingest/pipeline/agent_namer.h"
 #include "ingest/pipeline/delta_builder.h"
 #include "ingest/pipeline/detector_feed.h"
 #include "ingest/pipeline/ingest_log.h"
 #include "ingest/pipeline/layers_stage.h"
+#include "ingest/pipeline/log_frames.h"
 #include "ingest/pipeline/log_presence.h"
 #include "ingest/pipeline/people_stage.h"
 #include "ingest/pipeline/stage.h"
@@ -85,11 +84,13 @@ class LogRun {
   absl::Status PutRobotGraph();
   absl::Status PutPlaceMemory(std::vector<std::string> parts);
   absl::Status CorrectPath(bool is_last);
+  absl::Status FuseAgain();
   void TellRobot(GraphDelta* delta);
   absl::Status PutContacts();
   std::vector<Edge> HeldEdges() const;
 
   IngestOptions options_;
+  LogInfo info_;
   const MapView& map_;
   bool has_loops_;
   bool is_followed_;
@@ -99,11 +100,7 @@ class LogRun {
   RobotPath path_;
   NodeId robot_;
   LoopCloser loops_;
-  /// LogInfo::used_channels.
-  std::set<std::string> used_channels_;
-  /// Channels that frames are made of.
-  std::set<std::string, std::less<>> eyes_;
-  FrameMaker frames_;
+  LogFrames frames_;
   StageClock clock_;
   LayersStage layers_;
   PeopleStage people_;

@@ -21,6 +21,9 @@ namespace dsg::ingest {
 struct MappingOptions {
   /// False: poses only, as if the log had no images.
   bool is_on = true;
+  /// A log that loop closures have corrected is fused once more from its begin at the end, along
+  /// the path as it is then (IngestOptions::open_again).
+  bool fuses_again = true;
   VolumeOptions volume;
   DepthOptions depth;
   PlaceOptions places;
@@ -51,7 +54,8 @@ struct MappingOptions {
   /// Errors: INVALID_ARGUMENT/FIELD_INVALID naming field, value and bounds.
   absl::Status Validate() const;
 
-  /// All that deltas depend on, as text; threads are left out.
+  /// All that deltas depend on, as text; threads are left out, and `fuses_again`, which concerns
+  /// logs with loop closures only.
   std::string Digest(bool has_labels) const;
 };
 

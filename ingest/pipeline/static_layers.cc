@@ -100,6 +100,15 @@ void StaticLayers::Correct(const TrajectoryChange& change) {
   }
 }
 
+void StaticLayers::BeginAgain() {
+  volume_.Clear();
+  object_tracker_.BeginAgain();
+}
+
+absl::Status StaticLayers::IntegrateAgain(const DepthFrame& frame) {
+  return volume_.Integrate(frame);
+}
+
 void StaticLayers::MoveObjects(const TrajectoryChange& change) {
   const auto move_fit = [&change](const TrackedObject& object, ShapeFit* fit) {
     fit->map_T_model = MoveOf(object, change) * fit->map_T_model;

@@ -59,6 +59,13 @@ class StaticLayers {
   /// The path that frames were seen from has moved: all that was found moves, by when it was seen.
   void Correct(const TrajectoryChange& change);
 
+  /// The path has moved, and all frames will come once more: what they were fused into is empty
+  /// until then (IntegrateAgain). Objects, places and rooms keep their names; an object that the
+  /// new surface does not have was one that was mapped twice, and was never there.
+  void BeginAgain();
+  /// Errors: of SemanticVolume::Integrate; nothing has changed then.
+  absl::Status IntegrateAgain(const DepthFrame& frame);
+
   /// CAD models that nodes refer to for the first time since the last call.
   std::vector<Asset> TakeAssets();
 

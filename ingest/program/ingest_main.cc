@@ -283,6 +283,24 @@ absl::StatusOr<std::unique_ptr<LogSource>> Prepare(std::unique_ptr<LogSource> lo
   return is_made && !flags.is_followed ? ReadAhead(std::move(log), kAheadCount) : std::move(log);
 }
 
+void TellLostFrames(const std::string& path, SkipCounts skipped, bool has_odometry) {
+  // Odometry itself tells of how many images it has none.
+  if (has_odometry) skipped.erase("no pose");
+  for (const std::string& hint : HintsOnLostFrames(skipped)) {
+    std::fprintf(stderr, "%s: note: %s\n", path.c_str(), hint.c_str());
+  }
+}
+
+// The log once more, with the images and detections that it had.
+absl::StatusOr<std::unique_ptr<LogSource>> OpenForImages(const std::string& path,
+                                                         const LogOptions& options,
+                                                         const Additions& additions) {
+  DSG_ASSIGN_OR_RETURN(std::unique_ptr<LogSource> log, OpenLog(path, options));
+  if (!additions.segmentation.has_value()) return log;
+  DSG_ASSIGN_OR_RETURN(log, SegmentLog(std::move(log), *additions.segmentation));
+  return ReadAhead(std::move(log), kAheadCount);
+}
+
 absl::Status IngestOne(const IngestFlags& flags, const std::string& path, LogOptions options,
                        IngestOptions ingest_options, const Additions& additions,
                        std::unique_ptr<Destination>* destination) {
@@ -306,6 +324,10 @@ absl::Status IngestOne(const IngestFlags& flags, const std::string& path, LogOpt
   if (is_shifted || options.mesh_block_size_m != opened_with.mesh_block_size_m) {
     DSG_ASSIGN_OR_RETURN(log, OpenShown(flags, path, options));
   }
+  // What a followed log has become may be read in another way than what it was.
+  if (!flags.is_followed) {
+    ingest_options.open_again = [&] { return OpenForImages(path, options, additions); };
+  }
   size_t told_count = TellNotes(flags, path, log->info(), 0);
   absl::StatusOr<IngestSummary> summary = absl::UnknownError("not run");
   for (int tries = 0; tries < kConflictsMax; ++tries) {
@@ -322,10 +344,10 @@ absl::Status IngestOne(const IngestFlags& flags, const std::string& path, LogOpt
     DSG_ASSIGN_OR_RETURN(const std::unique_ptr<MapView> view, (*destination)->View());
     Progress progress(std::filesystem::path(path).filename().string(),
                       log->info().measurement_count, flags.is_quiet);
-    ingest_options.robot_graph.robust.on_work = [&progress](const char* what, int64_t done,
-                                                            int64_t total) {
+    ingest_options.on_work = [&progress](const char* what, int64_t done, int64_t total) {
       progress.Update(what, done, total);
     };
+    ingest_options.robot_graph.robust.on_work = ingest_options.on_work;
     summary = IngestLog(*log, options, ingest_options, *view, (*destination)->writer(),
                         [&progress](int64_t done) { progress.Update(done); });
     // Another robot has given an id away that we had chosen for a new agent. What is committed of
@@ -340,12 +362,7 @@ absl::Status IngestOne(const IngestFlags& flags, const std::string& path, LogOpt
   if (!summary->is_paused) DSG_RETURN_IF_ERROR(CheckYield(log->info(), *summary));
   Tell(flags, {path, log->info(), *summary, elapsed.count(), flags.is_dry_run});
   if (!flags.is_quiet && summary->mapping.has_value()) {
-    SkipCounts skipped = summary->mapping->skipped;
-    // Odometry itself tells of how many images it has none.
-    if (additions.odometry.has_value()) skipped.erase("no pose");
-    for (const std::string& hint : HintsOnLostFrames(skipped)) {
-      std::fprintf(stderr, "%s: note: %s\n", path.c_str(), hint.c_str());
-    }
+    TellLostFrames(path, summary->mapping->skipped, additions.odometry.has_value());
   }
   return absl::OkStatus();
 }

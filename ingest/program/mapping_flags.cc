@@ -69,6 +69,10 @@ void AddMappingFlags(CLI::App* app, MappingFlags* flags) {
                   "Least log time between updates of objects, places and rooms")
       ->capture_default_str()
       ->group(group);
+  app->add_flag("--fuse-once", flags->is_fused_once,
+                "Leave surfaces as corrections have moved them; otherwise a log with loop closures "
+                "is read and fused once more when it has ended")
+      ->group(group);
   app->add_option("--threads", flags->thread_count, "Threads of the fusion")
       ->check(CLI::Range(1, 64))
       ->capture_default_str()
@@ -82,6 +86,7 @@ void AddMappingFlags(CLI::App* app, MappingFlags* flags) {
 absl::StatusOr<MappingOptions> MakeMappingOptions(const MappingFlags& flags) {
   MappingOptions options = flags.numbers;
   options.is_on = !flags.is_off;
+  options.fuses_again = !flags.is_fused_once;
   options.volume.voxel_m = flags.voxel_m;
   options.volume.range_m = flags.range_m;
   options.volume.thread_count = flags.thread_count;

@@ -27,6 +27,7 @@ struct MappingFlags {
   double commit_s = 1.0;
   double mesh_s = 32.0;
   double layers_s = 5.0;
+  bool is_fused_once = false;
   int thread_count = VolumeOptions().thread_count;
   /// Numbers of MappingOptions::Groups alone; the rest is not used.
   MappingOptions numbers;

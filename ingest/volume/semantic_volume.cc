@@ -120,12 +120,7 @@ class SemanticVolume::Impl {
   }
 
   void Move(const TrajectoryChange& change) {
-    BlockMap moved = MoveBlocks(blocks_, change);
-    status_.Update(blocks_.status());
-    blocks_ = std::move(moved);
-    matcher_.MoveTo(blocks_);
-    counts_.block_count = blocks_.size();
-    queue_.clear();
+    Replace(MoveBlocks(blocks_, change));
     for (int64_t i = 0; i < blocks_.size(); ++i) {
       if (!blocks_.HasSurface(i)) continue;
       blocks_.block(i).queued = true;
@@ -133,8 +128,11 @@ class SemanticVolume::Impl {
       if (blocks_.IsFull()) Trim();
     }
     Trim();
-    // Meshes of before may have lost their surface.
-    for (const auto& [index, digest] : digests_) due_meshes_.insert(index);
+  }
+
+  void Clear() {
+    Replace(blocks_.MakeEmpty());
+    counts_ = {};
   }
 
   OccupancyGrid MakeOccupancy(double cell_m) {
@@ -144,6 +142,17 @@ class SemanticVolume::Impl {
   }
 
  private:
+  // Pointers to blocks are void afterwards.
+  void Replace(BlockMap blocks) {
+    status_.Update(blocks_.status());
+    blocks_ = std::move(blocks);
+    matcher_.MoveTo(blocks_);
+    counts_.block_count = blocks_.size();
+    queue_.clear();
+    // Meshes of before may have lost their surface.
+    for (const auto& [index, digest] : digests_) due_meshes_.insert(index);
+  }
+
   void Trim() {
     blocks_.Trim().IgnoreError();
     status_.Update(blocks_.status());
@@ -253,6 +262,8 @@ std::vector<MeshBlock> SemanticVolume::TakeChangedMesh(double block_size_m) {
 }
 
 void SemanticVolume::Move(const TrajectoryChange& change) { impl_->Move(change); }
+
+void SemanticVolume::Clear() { impl_->Clear(); }
 
 OccupancyGrid SemanticVolume::MakeOccupancy(double cell_m) { return impl_->MakeOccupancy(cell_m); }
 

@@ -104,6 +104,10 @@ class SemanticVolume {
   /// next TakeChangedMesh gives what changed by that.
   void Move(const TrajectoryChange& change);
 
+  /// Forgets all that was fused, but for the instances that labels had: those of the frames to come
+  /// are numbered after them. The next TakeChangedMesh gives what is different then.
+  void Clear();
+
   /// What has been seen of the space that holds all blocks, in cells of `cell_m` (a whole
   /// multiple of the voxel, or the voxel itself). A voxel is occupied where a surface passes
   /// through it or it is inside one: below half a voxel, nearer than At() asks for. A cell is

@@ -48,6 +48,19 @@ TEST(ObjectTracker, ForgetsWhatIsLostWhereClustersAreAllThereIs) {
   }
 }
 
+TEST(ObjectTracker, ForgetsWhatANewSurfaceDoesNotHave) {
+  ObjectTracker tracker;
+  tracker.Update({ChairAt(0.0), ChairAt(2.0), ChairAt(4.0)}, 1, Nowhere);
+  tracker.BeginAgain();
+  const ObjectChanges changes = tracker.Update({ChairAt(2.0, 7)}, 2, Everywhere);
+  EXPECT_TRUE(changes.gone.empty());
+  EXPECT_EQ(changes.forgotten, (std::vector<int64_t>{0, 2}));
+  ASSERT_EQ(tracker.objects().size(), 1u);
+  EXPECT_EQ(tracker.objects()[0].id, 1);
+  // Once only.
+  EXPECT_EQ(tracker.Update({}, 3, Everywhere).gone.back(), 1);
+}
+
 TEST(ObjectTracker, CallsSmallDifferencesNoChange) {
   ObjectTracker tracker;
   tracker.Update({ChairAt(0.0)}, 1, Nowhere);

@@ -9,6 +9,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <sstream>
 #include <string>
@@ -76,6 +77,7 @@ class FollowTest : public testing::Test {
     IngestOptions ingest_options;
     ingest_options.poses_per_delta = 7;
     ingest_options.mapping.volume.range_m = 8.0;
+    ingest_options.open_again = open_again_;
     return IngestLog(log, options, ingest_options, *MakeSnapshotMapView(latest, reader), writer,
                      {});
   }
@@ -116,6 +118,8 @@ class FollowTest : public testing::Test {
 
   TempFolder folder_;
   std::unique_ptr<GraphStore> store_;
+  /// IngestOptions::open_again.
+  std::function<absl::StatusOr<std::unique_ptr<LogSource>>()> open_again_;
 };
 
 /// A robot with a lidar turns in a room, for eight seconds.

@@ -128,7 +128,7 @@ class RoomWithLoops : public FollowedRecording {
 
   void AddPoses(int i, Recording* recording) override {
     Pose3d odom_T_base = PoseOfScan(i);
-    odom_T_base.position.y() += kDriftPerScanM * i;
+    odom_T_base.position += i * drift_per_scan_m_;
     recording->push_back({"/odom", "nav_msgs/Odometry", StampOfScan(i),
                           OdometryFields(CdrWriter(), StampOfScan(i), Numbers(odom_T_base))});
   }
@@ -163,7 +163,25 @@ class RoomWithLoops : public FollowedRecording {
     return path;
   }
 
+  // Mean distance of the mesh from the room that was scanned, metres.
+  double OffSurfaceOf(const std::string& map) {
+    const auto latest = *(*store_->OpenMap(map))->Latest();
+    double sum_m = 0.0;
+    int count = 0;
+    const std::vector<BlockIndex> indices = *latest->MeshBlocks();
+    for (const BlockIndex& index : indices) {
+      const MeshBlock block = *latest->ReadMeshBlock(index);
+      for (const Eigen::Vector3f& point : block.positions_map) {
+        sum_m += OffSurface(point.cast<double>());
+        ++count;
+      }
+    }
+    EXPECT_GT(count, 1000);
+    return sum_m / count;
+  }
+
   TimeNs recorded_after_ns_ = 250 * kMillisecond;
+  Eigen::Vector3d drift_per_scan_m_{0.0, kDriftPerScanM, 0.0};
 };
 
 TEST_F(RoomWithLoops, GivesTheMapOfTheFinishedFile) {
@@ -195,6 +213,15 @@ TEST_F(RoomWithLoops, OfAFileGivesTheSameMap) {
   EXPECT_LT(std::abs(PathOf("followed")[17].y() - 1.0), 0.5 * 17 * kDriftPerScanM);
 }
 
+// A log that is gone by then ends the run; what was committed stays.
+TEST_F(RoomWithLoops, TellsIfItCannotBeReadAgain) {
+  const std::string path = Begin(1.0);
+  open_again_ = [] { return OpenLog("gone.mcap", {}); };
+  const auto summary = Ingest("home", path, {});
+  EXPECT_EQ(summary.status().code(), absl::StatusCode::kNotFound) << summary.status();
+  EXPECT_GT(HeadOf("home").pose_count, 0);
+}
+
 // Outside of all that was recorded, they change nothing but their count.
 TEST_F(RoomWithLoops, OutsideOfTheLogAreCounted) {
   LoopMeasurement stray;
@@ -213,6 +240,34 @@ TEST_F(RoomWithLoops, OutsideOfTheLogAreCounted) {
     EXPECT_EQ(summary->loops->kept_count, 2);
   }
   EXPECT_EQ(TracksOf("followed"), TracksOf("finished"));
+}
+
+// Odometry of steps that are too long, as wheels have it.
+class RoomOfLongSteps : public RoomWithLoops {
+ protected:
+  RoomOfLongSteps() { drift_per_scan_m_ = {kDriftPerScanM, 0.0, 0.0}; }
+};
+
+// Along the corrected path, the surface is nearer to the room than what was moved.
+TEST_F(RoomOfLongSteps, IsFusedAgainWhenItHasEnded) {
+  const std::string path = Begin(1.0);
+  const auto once = Ingest("once", path, {});
+  ASSERT_TRUE(once.ok()) << once.status();
+  int opened_count = 0;
+  open_again_ = [&] {
+    ++opened_count;
+    return OpenLog(path, {});
+  };
+  const auto again = Ingest("again", path, {});
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_EQ(opened_count, 1);
+  EXPECT_EQ(again->mapping->volume.frame_count, once->mapping->volume.frame_count);
+  EXPECT_EQ(TracksOf("again"), TracksOf("once"));
+  EXPECT_LT(OffSurfaceOf("again"), 0.9 * OffSurfaceOf("once"));
+  const RevisionInfo head = HeadOf("again");
+  EXPECT_FALSE(Ingest("killed", path, {}, static_cast<int>(head.revision) - 2).ok());
+  ASSERT_TRUE(Ingest("killed", path, {}).ok());
+  EXPECT_EQ(HeadOf("killed").digest, head.digest);
 }
 
 // Found more than a second after their stamps: the path is corrected later, and is the same in the

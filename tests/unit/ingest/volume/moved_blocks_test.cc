@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The volume after the path that it was seen from was corrected.
+// The volume after the path that it was seen from was corrected: moved, and fused again.
 #include "ingest/volume/moved_blocks.h"
 
 #include <gtest/gtest.h>
@@ -25,16 +25,21 @@ TestScene RoomWithABall() {
 
 // 16 pictures from a circle, one a second; those from `shifted_from` on are taken from where the
 // robot was not: `error` further.
-SemanticVolume SeenFromACircle(const TestScene& scene, int shifted_from, const Pose3d& error) {
-  SemanticVolume volume((VolumeOptions()));
+void FuseCircle(const TestScene& scene, int shifted_from, const Pose3d& error,
+                SemanticVolume* volume) {
   for (int i = 0; i < 16; ++i) {
     const double angle = i * M_PI / 8.0;
     const Eigen::Vector3d eye(2.2 * std::cos(angle), 2.2 * std::sin(angle), 0.3);
     DepthFrame frame = scene.Render(SmallCamera(), LookAt(eye, {0, 0, -0.3}));
     frame.time_ns = i * kNsPerSecond;
     if (i >= shifted_from) frame.map_T_camera = error * frame.map_T_camera;
-    EXPECT_TRUE(volume.Integrate(frame).ok());
+    EXPECT_TRUE(volume->Integrate(frame).ok());
   }
+}
+
+SemanticVolume SeenFromACircle(const TestScene& scene, int shifted_from, const Pose3d& error) {
+  SemanticVolume volume((VolumeOptions()));
+  FuseCircle(scene, shifted_from, error, &volume);
   return volume;
 }
 
@@ -103,6 +108,28 @@ TEST(MovedBlocks, HaveNoGapsBetweenThem) {
   after.Take(&volume);
   EXPECT_GT(after.vertex_count(), before.vertex_count() * 93 / 100);
   EXPECT_EQ(volume.At(kInBallMap), Occupancy::kOccupied);
+}
+
+// What was fused again is what a volume is that saw nothing else, and what was there before is
+// gone.
+TEST(ClearedVolume, IsFusedAnew) {
+  const TestScene scene = RoomWithABall();
+  SemanticVolume right = SeenFromACircle(scene, 16, {});
+  CollectedMesh truth;
+  truth.Take(&right);
+  SemanticVolume volume = SeenFromACircle(scene, 5, Shift(0.4, 0.3, 0.1));
+  CollectedMesh mesh;
+  mesh.Take(&volume);
+  EXPECT_GT(mesh.WorstError(scene), 0.1);
+  volume.Clear();
+  EXPECT_EQ(volume.counts().frame_count, 0);
+  EXPECT_EQ(volume.At(kInBallMap), Occupancy::kUnknown);
+  FuseCircle(scene, 16, {}, &volume);
+  mesh.Take(&volume);
+  EXPECT_EQ(mesh.vertex_count(), truth.vertex_count());
+  EXPECT_DOUBLE_EQ(mesh.RmsError(scene), truth.RmsError(scene));
+  EXPECT_EQ(volume.counts().frame_count, 16);
+  EXPECT_EQ(volume.counts().block_count, right.counts().block_count);
 }
 
 TEST(MovedBlocks, FramesGoOnInTheMovedVolume) {
