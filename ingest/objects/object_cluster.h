@@ -37,8 +37,10 @@ struct ObjectCluster {
   std::vector<Eigen::Vector3f> points_map;
   /// Middle of the box of the points, extended to what it stands on.
   Eigen::Vector3d center_map = Eigen::Vector3d::Zero();
-  /// Mean of the points, the paper's position.
+  /// Mean of the points.
   Eigen::Vector3d centroid_map = Eigen::Vector3d::Zero();
+  /// The object stands there, and not in the middle of its box.
+  bool is_at_centroid = false;
   /// Upright box with the least footprint: pose of its centre (yaw only) and edge lengths.
   Pose3d map_T_box;
   Eigen::Vector3d size = Eigen::Vector3d::Zero();

@@ -93,6 +93,9 @@ struct WatchOptions {
 };
 
 struct ObjectOptions {
+  /// To the letter of RSS 2020: FindPaperObjects and ShapeOptions::is_paper, and nothing that
+  /// pictures tell of small things.
+  bool is_paper = false;
   PieceOptions pieces;
   MatchOptions match;
   RelationOptions relations;

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/rooms/room_class.h"
 
 namespace dsg::ingest {
 namespace {
@@ -41,6 +42,8 @@ std::string MethodName(RoomMethod method) {
       return "ceiling section";
     case RoomMethod::kFiltration:
       return "place graph filtration";
+    case RoomMethod::kPaper:
+      return "section of the distance field";
     case RoomMethod::kAuto:
     case RoomMethod::kClearance:
       break;
@@ -119,6 +122,10 @@ class LayerGraphMaker::Build {
     node.class_name = maker_.ClassName(cluster.class_id);
     node.map_T_node = cluster.map_T_box;
     node.box_node = Box3d(-0.5 * cluster.size, 0.5 * cluster.size);
+    if (cluster.is_at_centroid) {
+      node.map_T_node.position = cluster.centroid_map;
+      node.box_node.translate(cluster.map_T_box.position - cluster.centroid_map);
+    }
     node.valid = {object.first_observed_ns, until_ns};
     node.first_observed_ns = object.first_observed_ns;
     node.last_observed_ns = object.last_observed_ns;
@@ -229,13 +236,13 @@ class LayerGraphMaker::Build {
     }
   }
 
-  static void SetClass(const std::map<std::string, double>& probabilities, Node* room) {
+  static void SetClass(const std::map<std::string, double>& probabilities, Node* node) {
     double best = 0.0;
     for (const auto& [name, probability] : probabilities) {
       if (probability <= best) continue;
       best = probability;
-      room->class_name = name;
-      room->confidence = probability;
+      node->class_name = name;
+      node->confidence = probability;
     }
   }
 
@@ -249,6 +256,9 @@ class LayerGraphMaker::Build {
     node.box_node = BoxAround(box, node.map_T_node.position);
     node.region = RegionInfo{Corners(box), box.min().z(), box.max().z(), {}};
     node.attributes[kSessionAttribute] = maker_.numbering_.session_id;
+    std::vector<std::map<std::string, double>> rooms;
+    for (const RoomPart& part : parts_.rooms) rooms.push_back(part.class_probabilities);
+    SetClass(ClassifyBuilding(rooms), &node);
     const NodeId building = node.id;
     delta_.nodes.push_back(std::move(node));
     const bool has_levels = parts_.storeys.size() > 1;

@@ -54,6 +54,7 @@ std::string MappingOptions::Digest(bool has_labels) const {
   // What differs from the defaults of the stages' options, none of which may change without the
   // number below. Those of logs without labels count for such logs only.
   std::string tuning = rooms.split_corridors ? "" : " whole_corridors";
+  if (objects.is_paper) absl::StrAppend(&tuning, " paper_objects");
   MappingOptions options = *this;
   MappingOptions defaults;
   options.segments = defaults.segments;

@@ -77,10 +77,10 @@ std::string PeopleOptions::Digest() const {
   PeopleOptions defaults;
   const std::string tuning = DigestGroups(options.Groups(), defaults.Groups());
   return absl::StrCat(
-      torso.model == TorsoModel::kPaper ? "paper" : "smooth", " ", tracker.is_first_consistent, " ",
-      cues.is_floor_used, cues.is_depth_used, cues.is_height_used, is_border_used, " ",
-      floor_z_m.has_value() ? absl::StrCat(*floor_z_m) : "auto", " ", filter.border_px, " ",
-      filter.side_px_min, " ", filter.score_min, " ", torso.lag_count,
+      torso.model == TorsoModel::kPaper ? "paper letter" : "smooth", " ",
+      tracker.is_first_consistent, " ", cues.is_floor_used, cues.is_depth_used, cues.is_height_used,
+      is_border_used, " ", floor_z_m.has_value() ? absl::StrCat(*floor_z_m) : "auto", " ",
+      filter.border_px, " ", filter.side_px_min, " ", filter.score_min, " ", torso.lag_count,
       detector.has_value() ? absl::StrCat(" ", detector_sha256, " ", detector->score_min, " ",
                                           detector->input_width_px, "x", detector->input_height_px,
                                           " ", detector->person_class)

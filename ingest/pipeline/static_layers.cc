@@ -7,6 +7,7 @@
 #include <set>
 
 #include "ingest/objects/object_matching.h"
+#include "ingest/objects/paper_objects.h"
 #include "ingest/objects/unlabelled_objects.h"
 #include "ingest/pipeline/map_things.h"
 #include "ingest/rooms/room_class.h"
@@ -242,15 +243,19 @@ void StaticLayers::FindObjects(TimeNs now_ns, const std::vector<const MeshBlock*
   options.class_ids = object_classes_;
   options.pieces = options_.objects.pieces;
   std::vector<ObjectCluster> clusters;
-  if (labels_.empty()) {
+  if (options_.objects.is_paper) {
+    clusters = FindPaperObjects(mesh, options);
+  } else if (labels_.empty()) {
     clusters = FindUnlabelledObjects(mesh, kThingClass, options.voxel_m, floors_m_,
                                      options_.segments, options.pieces);
   } else {
     clusters = FindClusters(mesh, options);
   }
-  KeepVacated();
-  small_objects_.Place(&clusters, options.pieces.box);
-  object_watch_.DropResidues(&clusters);
+  if (!options_.objects.is_paper) {
+    KeepVacated();
+    small_objects_.Place(&clusters, options.pieces.box);
+    object_watch_.DropResidues(&clusters);
+  }
   const std::vector<TrackedObject> before = object_tracker_.objects();
   const ObjectChanges changes =
       object_tracker_.Update(std::move(clusters), now_ns, [this](const Eigen::Vector3f& point_map) {
@@ -260,7 +265,7 @@ void StaticLayers::FindObjects(TimeNs now_ns, const std::vector<const MeshBlock*
   for (const int64_t id : changes.gone) together_.Forget(id);
   for (const int64_t id : changes.forgotten) together_.Forget(id);
   KeepGone(before, changes, now_ns);
-  object_watch_.Follow(object_tracker_.objects());
+  if (!options_.objects.is_paper) object_watch_.Follow(object_tracker_.objects());
   unfitted_.insert(unfitted_.end(), changes.added.begin(), changes.added.end());
   unfitted_.insert(unfitted_.end(), changes.changed.begin(), changes.changed.end());
 }

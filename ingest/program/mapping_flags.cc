@@ -44,12 +44,19 @@ void AddMappingFlags(CLI::App* app, MappingFlags* flags) {
       ->group(group);
   app->add_option("--rooms", flags->rooms,
                   "How rooms are told apart: ceiling (section below it), clearance (narrow ways of "
-                  "free space), filtration (of the graph of places), or auto")
-      ->check(CLI::IsMember({"auto", "ceiling", "clearance", "filtration"}))
+                  "free space), filtration (of the graph of places), paper (pieces of the distance "
+                  "field below the ceiling, and nothing else), or auto")
+      ->check(CLI::IsMember({"auto", "ceiling", "clearance", "filtration", "paper"}))
       ->capture_default_str()
       ->group(group);
   app->add_flag("--whole-corridors", flags->keeps_corridors,
                 "A net of corridors is one room; otherwise each of its straight arms is")
+      ->group(group);
+  app->add_option("--objects", flags->objects,
+                  "What one object is: instances (by labels, pictures and floors), or paper "
+                  "(clusters of the mesh of a class; CAD models wherever corners say)")
+      ->check(CLI::IsMember({"instances", "paper"}))
+      ->capture_default_str()
       ->group(group);
   app->add_option("--places", flags->places, "Places on the ground, or in the whole volume")
       ->check(CLI::IsMember({"ground", "volume"}))
@@ -96,6 +103,8 @@ absl::StatusOr<MappingOptions> MakeMappingOptions(const MappingFlags& flags) {
   if (flags.rooms == "ceiling") options.rooms.method = RoomMethod::kCeiling;
   if (flags.rooms == "filtration") options.rooms.method = RoomMethod::kFiltration;
   if (flags.rooms == "clearance") options.rooms.method = RoomMethod::kClearance;
+  if (flags.rooms == "paper") options.rooms.method = RoomMethod::kPaper;
+  options.objects.is_paper = options.shapes.is_paper = flags.objects == "paper";
   if (flags.places == "volume") options.places.mode = PlaceMode::kVolume;
   options.places.robot_radius_m = flags.robot_radius_m;
   DSG_ASSIGN_OR_RETURN(options.commit_period_ns, Nanoseconds("commit-seconds", flags.commit_s));

@@ -22,6 +22,7 @@ struct MappingFlags {
   std::string cad_folder;
   std::string rooms = "auto";
   bool keeps_corridors = false;
+  std::string objects = "instances";
   std::string places = "ground";
   double robot_radius_m = PlaceOptions().robot_radius_m;
   double commit_s = 1.0;

@@ -87,6 +87,28 @@ PlanRegions FiltrationRegions(const Storey& storey) {
   return regions;
 }
 
+// The distance field as it is below the storey's ceiling, in pieces; none without a ceiling.
+PlanRegions PaperRegions(const RoomInput& input, const RoomOptions& options) {
+  const OccupancyGrid& grid = input.field->grid();
+  GridFrame plan = grid.frame;
+  plan.size.z() = 1;
+  const int64_t columns = int64_t{plan.size.x()} * plan.size.y();
+  std::vector<uint8_t> is_member(static_cast<size_t>(columns), 0);
+  const double z_m = input.ceiling_z_m.value_or(0.0) - options.section.below_ceiling_m;
+  const auto layer =
+      static_cast<int>(std::floor((z_m - grid.frame.origin_map.z()) / grid.frame.cell_m));
+  if (input.ceiling_z_m.has_value() && layer >= 0 && layer < grid.frame.size.z()) {
+    for (int64_t i = 0; i < columns; ++i) {
+      const int64_t cell = layer * columns + i;
+      const bool is_far =
+          input.field->DistanceM(cell) > static_cast<float>(options.section_clearance_m);
+      is_member[static_cast<size_t>(i)] =
+          is_far && grid.cells[static_cast<size_t>(cell)] == Occupancy::kFree ? 1 : 0;
+    }
+  }
+  return LabelRegions(plan, is_member, /*m2_min=*/0.0);
+}
+
 double HighestFreeM(const Storey& storey, const std::vector<int64_t>& columns) {
   const OccupancyGrid& grid = storey.input.field->grid();
   const int64_t layer = int64_t{grid.frame.size.x()} * grid.frame.size.y();
@@ -163,6 +185,19 @@ RoomLabelling Label(const Storey& storey, RoomMethod method, PlanRegions regions
   return labelling;
 }
 
+// Rooms are joined where a link joins their places.
+RoomLabelling LabelAsPaper(const Storey& storey) {
+  const RoomInput& input = storey.input;
+  PlanRegions regions = PaperRegions(input, storey.options);
+  DropRoomsWithoutPlaces(input.places, input.links, &regions);
+  RoomLabelling labelling;
+  labelling.method = RoomMethod::kPaper;
+  labelling.room_of_place = RoomsOfPlaces(input.places, input.links, regions);
+  labelling.adjacent = LinkedRooms(input.links, labelling.room_of_place);
+  DescribeRooms(storey, regions, &labelling);
+  return labelling;
+}
+
 RoomResult FindByBoth(const Storey& storey) {
   RoomResult result;
   const DividedPlan clearance = ClearanceRegions(storey.body, storey.options);
@@ -194,6 +229,8 @@ RoomResult FindRooms(const RoomInput& input, const RoomOptions& options) {
               std::nullopt};
     case RoomMethod::kFiltration:
       return {Label(storey, RoomMethod::kFiltration, FiltrationRegions(storey)), std::nullopt};
+    case RoomMethod::kPaper:
+      return {LabelAsPaper(storey), std::nullopt};
     case RoomMethod::kAuto:
       break;
   }

@@ -107,6 +107,18 @@ std::vector<std::pair<int, int>> AdjacentRooms(const std::vector<RoomPlace>& pla
   return {pairs.begin(), pairs.end()};
 }
 
+std::vector<std::pair<int, int>> LinkedRooms(const std::vector<RoomLink>& links,
+                                             const std::vector<int>& room_of_place) {
+  std::set<std::pair<int, int>> pairs;
+  for (const RoomLink& link : links) {
+    if (!IsLink(link, room_of_place.size())) continue;
+    const int from = room_of_place[static_cast<size_t>(link.from)];
+    const int to = room_of_place[static_cast<size_t>(link.to)];
+    if (from >= 0 && to >= 0 && from != to) pairs.insert(Ordered(from, to));
+  }
+  return {pairs.begin(), pairs.end()};
+}
+
 double Disagreement(const std::vector<int>& a, const std::vector<int>& b) {
   if (a.empty()) return 0.0;
   std::map<std::pair<int, int>, int64_t> shared;

@@ -24,6 +24,11 @@ std::vector<std::pair<int, int>> AdjacentRooms(const std::vector<RoomPlace>& pla
                                                const std::vector<int>& room_of_place,
                                                const PlanRegions& regions);
 
+/// Pairs of rooms that some link joins places of, low index first, ascending.
+/// Source: RSS 2020, section IV-C.
+std::vector<std::pair<int, int>> LinkedRooms(const std::vector<RoomLink>& links,
+                                             const std::vector<int>& room_of_place);
+
 /// Share of the places on which two labellings differ, rooms matched by what they share most of.
 double Disagreement(const std::vector<int>& a, const std::vector<int>& b);
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "absl/strings/ascii.h"
 #include "ingest/rooms/room_kinds.h"
@@ -111,6 +112,29 @@ std::map<std::string, double> ClassifyRoom(const RoomContents& contents) {
   }
   for (auto& [name, value] : result) value /= sum;
   return result;
+}
+
+std::map<std::string, double> ClassifyBuilding(
+    const std::vector<std::map<std::string, double>>& rooms) {
+  static const std::set<std::string> kHomes = {"bedroom", "bathroom", "living room", "dining room"};
+  static const std::set<std::string> kWork = {"office",    "open office", "meeting room",
+                                              "copy room", "restroom",    "lobby"};
+  // Less than half of a room is a guess.
+  constexpr double kRoomsMin = 0.5;
+  // A bedroom is four times as likely in a house as in an office, and so on: nap rooms, home
+  // offices.
+  constexpr double kOdds = 4.0;
+  double home_count = 0.0;
+  double work_count = 0.0;
+  for (const auto& room : rooms) {
+    for (const auto& [kind, probability] : room) {
+      if (kHomes.contains(kind)) home_count += probability;
+      if (kWork.contains(kind)) work_count += probability;
+    }
+  }
+  if (home_count + work_count < kRoomsMin) return {};
+  const double house = 1.0 / (1.0 + std::pow(kOdds, work_count - home_count));
+  return {{"house", house}, {"office", 1.0 - house}};
 }
 
 }  // namespace dsg::ingest

@@ -21,6 +21,9 @@ enum class RoomMethod {
   /// Parts of the place graph that stay apart while obstacles grow; see filtration.h.
   /// Source: Hughes et al., 2022.
   kFiltration,
+  /// To the letter of RSS 2020, section IV-C: a section of the distance field 0.3 m below the
+  /// ceiling, without what is nearer than 0.2 m to an obstacle; its pieces, and a vote over places.
+  kPaper,
 };
 
 /// Horizontal sections of a storey (section.h).

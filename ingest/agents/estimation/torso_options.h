@@ -47,7 +47,7 @@ struct TorsoOptions {
   /// Scale of Cauchy's loss on priors and cues (kSmooth), in standard deviations; 0 = squares.
   double loss_scale = 2.0;
   /// The same for kPaper. The paper names no loss; 0 is its letter.
-  double paper_loss_scale = 3.0;
+  double paper_loss_scale = 0.0;
   /// Of rolling and pitching, which the graph leaves as the detection has them.
   double tilt_sigma_rad = 0.1;
 

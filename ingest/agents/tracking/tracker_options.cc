@@ -22,7 +22,7 @@ constexpr OptionField<TrackerOptions> kFields[] = {
     {"track-hits", &TrackerOptions::confirm_hit_count, 1, 1000,
      "Detections within track-confirm that make a track: two may be a picture on a wall"},
     {"track-paper-hits", &TrackerOptions::paper_confirm_hit_count, 1, 1000,
-     "The same with --people paper: a graph of one pose has no link"},
+     "The same with --people paper: RSS 2020 begins a graph with a single pose"},
     {"track-confirm", &TrackerOptions::confirm_ns, 0.0, 3600.0,
      "A track is made within this, and lost when unseen for longer, seconds: RSS 2020 drops tracks "
      "of single detections within a second"},

@@ -36,10 +36,10 @@ struct TrackerOptions {
   /// What leaving an observation alone costs: more than any consistent pair, whose cost is cut
   /// below it, so that one bad pair does not break two good ones.
   double alone_cost = 16.0;
-  /// A tentative track is confirmed after so many hits within confirm_ns. The paper's after two: a
-  /// graph of one node has no link, and says no more than its detection did.
+  /// A tentative track is confirmed after so many hits within confirm_ns; the paper's with its
+  /// first node.
   int confirm_hit_count = 3;
-  int paper_confirm_hit_count = 2;
+  int paper_confirm_hit_count = 1;
   TimeNs confirm_ns = 1'000'000'000;
   /// Unseen for longer, a track is closed (a tentative one is dropped after confirm_ns).
   TimeNs close_ns = 5'000'000'000;
@@ -74,7 +74,7 @@ struct TrackerOptions {
 };
 
 /// As the paper has it: each detection joins the first consistent track or opens one; nobody is
-/// found again. Tracks of a single detection within a second are dropped.
+/// found again.
 /// Source: RSS 2020, section IV-A ("Human Nodes").
 TrackerOptions PaperTrackerOptions();
 

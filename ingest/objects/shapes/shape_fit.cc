@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <set>
 #include <utility>
 
 #include "absl/strings/match.h"
@@ -70,6 +71,15 @@ KeypointOptions KeypointsOf(const ShapeOptions& options) {
   return out;
 }
 
+// Those that faces have, each once.
+std::vector<Eigen::Vector3d> UsedVertices(const CadModel& cad) {
+  std::set<uint32_t> used;
+  for (const auto& [a, b, c] : cad.faces) used.insert({a, b, c});
+  std::vector<Eigen::Vector3d> vertices;
+  for (const uint32_t index : used) vertices.push_back(cad.vertices[index]);
+  return vertices;
+}
+
 FittedModel MakeModel(int index, const CadModel& cad, const ShapeOptions& options) {
   const Surface outer = KeepOuter(SampleFaces(cad, kSampleCount), OuterCell(cad));
   FittedModel model{index,
@@ -77,8 +87,9 @@ FittedModel MakeModel(int index, const CadModel& cad, const ShapeOptions& option
                     ModelIndex(ThinSurface(outer, options.surface_m), options.patch_m),
                     {},
                     {}};
-  model.keypoints =
-      FindKeypoints(ThinPoints(outer.points, options.point_distance_m), KeypointsOf(options));
+  model.keypoints = FindKeypoints(
+      options.is_paper ? UsedVertices(cad) : ThinPoints(outer.points, options.point_distance_m),
+      KeypointsOf(options));
   model.probes = EveryNth(ThinSurface(outer, options.point_distance_m).points,
                           static_cast<size_t>(options.free_point_count));
   return model;
@@ -91,7 +102,7 @@ std::vector<Eigen::Vector3d> CleanPoints(const std::vector<Eigen::Vector3f>& poi
     const Eigen::Vector3d wide = point.cast<double>();
     if (wide.allFinite() && wide.cwiseAbs().maxCoeff() < kCoordinateMaxM) finite.push_back(wide);
   }
-  return EveryNth(ThinPoints(finite, options.point_distance_m),
+  return EveryNth(options.is_paper ? finite : ThinPoints(finite, options.point_distance_m),
                   static_cast<size_t>(options.point_count_max));
 }
 
@@ -153,8 +164,8 @@ class ShapeFitter::Impl {
 
  private:
   bool IsAccepted(const Candidate& candidate) const {
-    return candidate.explanation.inlier_share >= options_.inlier_share_min &&
-           candidate.free_share <= options_.free_share_max;
+    return options_.is_paper || (candidate.explanation.inlier_share >= options_.inlier_share_min &&
+                                 candidate.free_share <= options_.free_share_max);
   }
 
   // The paper's step: all keypoints of the one with all of the other.

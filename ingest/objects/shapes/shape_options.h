@@ -34,8 +34,8 @@ struct ShapeOptions {
   int keypoint_count_max = 60;
   /// The object stands upright: only yaw and position are sought.
   bool is_upright = true;
-  /// As in RSS 2020: all pairs of keypoints, six degrees of freedom, and nothing after the solver
-  /// but the two tests below.
+  /// As in RSS 2020: corners of the vertices as they are, all pairs of them, six degrees of
+  /// freedom, and whatever pose the solver finds.
   bool is_paper = false;
   /// Least share of the object's points near the model, and largest share of the model's surface in
   /// space that was seen to be free.

@@ -164,7 +164,7 @@ TEST(Tuning, PeopleTellEachNumberInTheirDigest) {
     }
     // As it was before these numbers were options: what is known of logs stays known.
     EXPECT_EQ(options.Digest(),
-              is_paper ? "paper 1 0000 auto 5 30 0 20" : "smooth 0 1111 auto 5 30 0 20");
+              is_paper ? "paper letter 1 0000 auto 5 30 0 20" : "smooth 0 1111 auto 5 30 0 20");
   }
 }
 

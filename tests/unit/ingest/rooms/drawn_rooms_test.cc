@@ -102,6 +102,40 @@ TEST(Rooms, PartAtAnOpeningAsHighAsTheCeiling) {
   }
 }
 
+TEST(PaperRooms, PartAtADoorWithALintelAndAtNothingElse) {
+  DrawnStorey storey = TwoRooms();
+  storey.Carve({5.2, 1.2}, {5.4, 2.3}, kDoorM);
+  const Example example(storey);
+  const RoomLabelling rooms = example.Find(RoomMethod::kPaper);
+  ASSERT_EQ(rooms.rooms.size(), 2u);
+  EXPECT_EQ(rooms.adjacent, (std::vector<std::pair<int, int>>{{0, 1}}));
+  // The vote gives places in the doorway a room too.
+  for (const int room : rooms.room_of_place) EXPECT_GE(room, 0);
+  // The pieces end 0.2 m before the walls.
+  EXPECT_NEAR(rooms.rooms[0].area_m2, 4.6 * 3.6, 1.0);
+  storey.Carve({5.2, 1.2}, {5.4, 2.3});
+  EXPECT_EQ(Example(storey).Find(RoomMethod::kPaper).rooms.size(), 1u) << "as high as the ceiling";
+  EXPECT_EQ(Example(storey).Find(RoomMethod::kAuto).rooms.size(), 2u);
+}
+
+TEST(PaperRooms, PartAtOpeningsNoWiderThanTwiceTheDistance) {
+  DrawnStorey storey = TwoRooms();
+  storey.Carve({5.2, 1.2}, {5.4, 1.5});
+  EXPECT_EQ(Example(storey).Find(RoomMethod::kPaper).rooms.size(), 2u);
+}
+
+TEST(PaperRooms, AreNoneWithoutACeiling) {
+  const Example seen(TwoRooms());
+  RoomInput input = seen.input;
+  input.ceiling_z_m.reset();
+  RoomOptions options;
+  options.method = RoomMethod::kPaper;
+  EXPECT_TRUE(FindRooms(input, options).best.rooms.empty());
+  // Above all that was seen.
+  input.ceiling_z_m = 1000.0;
+  EXPECT_TRUE(FindRooms(input, options).best.rooms.empty());
+}
+
 TEST(Rooms, AreOneWhereAWallIsMostlyMissing) {
   DrawnStorey storey = TwoRooms();
   storey.Carve({5.2, 0.6}, {5.4, 3.8});

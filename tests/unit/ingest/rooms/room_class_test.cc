@@ -46,6 +46,24 @@ TEST(RoomClass, SaysNothingAboutAnEmptyRoom) {
   EXPECT_TRUE(ClassifyRoom({{"human", "unheard-of"}, 20.0, 1.3, 1}).empty());
 }
 
+TEST(BuildingClass, IsToldByItsRooms) {
+  const auto bedroom = ClassifyRoom({{"bed", "wardrobe", "nightstand"}, 15.0});
+  const auto kitchen = ClassifyRoom({{"fridge", "counter", "microwave"}, 20.0});
+  const auto office = ClassifyRoom({{"desk", "desk", "chair", "chair", "laptop", "laptop"}, 22.0});
+  EXPECT_GT(ClassifyBuilding({bedroom, kitchen, {}}).at("house"), 0.7);
+  EXPECT_GT(ClassifyBuilding({office, office, office, kitchen}).at("office"), 0.9);
+  // A house with a room to work in.
+  EXPECT_GT(ClassifyBuilding({bedroom, bedroom, office}).at("house"), 0.5);
+  const auto both = ClassifyBuilding({bedroom, office});
+  EXPECT_NEAR(both.at("house") + both.at("office"), 1.0, 1e-12);
+}
+
+TEST(BuildingClass, IsNotGuessed) {
+  EXPECT_TRUE(ClassifyBuilding({}).empty());
+  EXPECT_TRUE(ClassifyBuilding({{}, {}}).empty());
+  EXPECT_TRUE(ClassifyBuilding({{{"kitchen", 1.0}}, {{"corridor", 1.0}}}).empty());
+}
+
 TEST(RoomClass, AddsUpToOne) {
   double sum = 0.0;
   for (const auto& [name, probability] : ClassifyRoom({{"desk"}, 20.0, 1.3, 1})) {

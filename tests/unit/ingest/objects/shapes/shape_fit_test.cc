@@ -94,6 +94,8 @@ Statistics RunTrials(const CadModel& model, const Trials& trials, uint64_t seed)
   Random random(seed, 1);
   ShapeOptions options;
   options.is_paper = trials.is_paper;
+  // Its poses stay, however little of the object they explain.
+  if (trials.is_paper) options.inlier_share_min = 1.0;
   options.is_upright = trials.is_upright;
   const ShapeFitter fitter({model}, options);
   Statistics statistics;
@@ -212,7 +214,7 @@ TEST(ShapeFit, ThePapersStepsAloneFindSomeCouches) {
   trials.count = kFewTrialCount;
   const Statistics statistics = RunTrials(SimulatorCouch(), trials, seed);
   statistics.Print("paper's steps");
-  EXPECT_GT(statistics.fit_count, 0);
+  EXPECT_GT(statistics.fit_count, kFewTrialCount / 2);
 }
 
 TEST(ShapeFit, TellsFrontFromBackByTheSpaceThatWasSeenToBeFree) {
