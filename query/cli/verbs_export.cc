@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "query/cli/export/exploded_view.h"
 #include "query/cli/export/gltf_scene.h"
 #include "query/cli/export/map_content.h"
 #include "query/cli/export/mesh_file.h"
@@ -53,6 +54,8 @@ struct MapVerb {
   std::string png;
   /// A level or room by id or name, or a height; empty = all floors.
   std::string floor;
+  /// The layers one above the other, instead of the map from above.
+  bool is_exploded = false;
   int width_px = 1600;
   std::string at;
   bool force = false;
@@ -280,8 +283,10 @@ absl::Status RunMap(Session* session, const MapVerb& verb, std::ostream& out) {
     DSG_ASSIGN_OR_RETURN(const HeightRange floor, ChooseFloor(content, verb.floor));
     KeepFloor(floor, &content);
   }
+  const std::string title = TitleOf(*session, answer, verb);
   const picture::Picture picture =
-      DrawTopView(content, {.width_px = verb.width_px, .title = TitleOf(*session, answer, verb)});
+      verb.is_exploded ? DrawExplodedView(content, {.width_px = verb.width_px, .title = title})
+                       : DrawTopView(content, {.width_px = verb.width_px, .title = title});
   DSG_ASSIGN_OR_RETURN(const std::string png, picture::EncodePng(picture));
   DSG_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(verb.png, verb.force));
   DSG_RETURN_IF_ERROR(file.Write(png));
@@ -360,6 +365,7 @@ void AddMap(Grammar* grammar) {
                                                   .run = RunMap});
   app->add_option("--png", verb->png, "The picture to write")->required();
   app->add_option("--floor", verb->floor, kFloorHelp);
+  app->add_flag("--exploded", verb->is_exploded, "Layers one above the other, seen obliquely");
   app->add_option("--width", verb->width_px, "Width of the picture, pixels")
       ->check(Between(kTopViewWidthMin, kTopViewWidthMax))
       ->capture_default_str();

@@ -46,6 +46,11 @@ uint32_t ClassNumber(const Node& node) {
   return 0;
 }
 
+double RoomHue(const Node& node) {
+  const uint32_t number = ClassNumber(node);
+  return HueOf(number == 0 ? static_cast<uint32_t>(node.id.index() % 4093) : number);
+}
+
 constexpr uint32_t kNoColorRgb = 0xb0b0b0;
 
 std::vector<Eigen::Vector3f> SumOfFaces(const MeshBlock& block) {
@@ -71,11 +76,9 @@ uint32_t LabelColor(uint32_t label) {
 
 uint32_t ClassColor(const Node& node) { return LabelColor(ClassNumber(node)); }
 
-uint32_t FloorColor(const Node& node) {
-  const uint32_t number = ClassNumber(node);
-  const auto index = static_cast<uint32_t>(node.id.index() % 4093);
-  return FromHsv(HueOf(number == 0 ? index : number), 0.13, 0.95);
-}
+uint32_t FloorColor(const Node& node) { return FromHsv(RoomHue(node), 0.13, 0.95); }
+
+uint32_t RoomColor(const Node& node) { return FromHsv(RoomHue(node), 0.75, 0.72); }
 
 uint32_t LayerColor(LayerId layer) {
   switch (layer) {

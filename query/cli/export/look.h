@@ -21,6 +21,10 @@ uint32_t LabelColor(uint32_t label);
 uint32_t ClassColor(const Node& node);
 /// A pale form, for the floors of rooms. Neighbours without a class differ.
 uint32_t FloorColor(const Node& node);
+/// A strong form of the same hue, for what is in the room.
+uint32_t RoomColor(const Node& node);
+/// Of links between rooms. Source: RSS 2020, figure 2.
+inline constexpr uint32_t kRoomLinkRgb = 0xd33a2c;
 uint32_t LayerColor(LayerId layer);
 uint32_t RelationColor(std::string_view relation);
 /// The n-th agent of a map.

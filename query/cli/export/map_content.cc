@@ -63,6 +63,15 @@ std::unordered_map<NodeId, const Node*> NodesById(const MapContent& content) {
   return nodes;
 }
 
+std::unordered_map<NodeId, const Node*> ParentsOf(const MapContent& content) {
+  const auto nodes = NodesById(content);
+  std::unordered_map<NodeId, const Node*> parents;
+  for (const Edge& edge : content.edges) {
+    if (edge.relation == relations::kContains) parents[edge.target] = nodes.at(edge.source);
+  }
+  return parents;
+}
+
 Eigen::Vector3d MiddleOf(const Node& node) {
   const bool has_middle = !node.box_node.isEmpty() && node.kind != kinds::kPlace;
   return has_middle ? node.map_T_node * node.box_node.center() : node.map_T_node.position;

@@ -46,6 +46,9 @@ std::string NameOf(const Node& node);
 /// Nodes by id; points into `content`.
 std::unordered_map<NodeId, const Node*> NodesById(const MapContent& content);
 
+/// What contains each node, by its id; points into `content`. Nodes of the top are not in it.
+std::unordered_map<NodeId, const Node*> ParentsOf(const MapContent& content);
+
 /// The centre of the node's box; its position without a box, and for places, whose box is the free
 /// space around them. Map frame.
 Eigen::Vector3d MiddleOf(const Node& node);

@@ -227,10 +227,23 @@ void DrawPlaces(const MapContent& content, const FloorView& view, picture::Canva
                           view.ToPixel(MiddleOf(*nodes.at(edge.target)))},
                          2.0, picture::MakePaint(LayerColor(layers::kPlaces), 0.35f));
   }
+  const auto parents = ParentsOf(content);
   for (const Node& node : content.nodes) {
     if (node.kind != kinds::kPlace) continue;
-    canvas->FillCircle(view.ToPixel(MiddleOf(node)), 5.0,
-                       picture::MakePaint(LayerColor(layers::kPlaces), 0.7f));
+    const auto parent = parents.find(node.id);
+    const bool has_room = parent != parents.end() && parent->second->kind == kinds::kRoom;
+    const uint32_t rgb = has_room ? RoomColor(*parent->second) : LayerColor(layers::kPlaces);
+    canvas->FillCircle(view.ToPixel(MiddleOf(node)), 5.0, picture::MakePaint(rgb, 0.7f));
+  }
+}
+
+void DrawRoomLinks(const MapContent& content, const FloorView& view, picture::Canvas* canvas) {
+  const auto nodes = NodesById(content);
+  for (const Edge& edge : content.edges) {
+    if (edge.relation != relations::kAdjacent) continue;
+    canvas->DrawPolyline({view.ToPixel(MiddleOf(*nodes.at(edge.source))),
+                          view.ToPixel(MiddleOf(*nodes.at(edge.target)))},
+                         4.0, picture::MakePaint(kRoomLinkRgb, 0.5f));
   }
 }
 
@@ -366,6 +379,7 @@ picture::Picture DrawTopView(const MapContent& content, const TopViewOptions& op
   DrawStructures(content, view, &canvas);
   DrawOthers(content, view, &canvas);
   DrawPlaces(content, view, &canvas);
+  DrawRoomLinks(content, view, &canvas);
   DrawObjects(content, view, &canvas);
   DrawTracks(content, view, &canvas);
   const double margin = 0.5 * kMarginPx;
