@@ -254,8 +254,9 @@ OpenedLog OpenFollowedBag(std::unique_ptr<GrowingFile> file, const LogOptions& o
   growth.transforms = std::move(poses.followed);
   DSG_RETURN_IF_ERROR(PlanFollowedLoops(options, &plan, &growth, &digest, &info));
   AddBagContent(begin, plan, poses.table, options.on_pass, &digest);
-  // A bag of the same first seconds that is taken as a whole is another session.
-  digest.AddSize("followed", 0);
+  // A bag of the same first seconds that is taken as a whole is another session. The number is that
+  // of how a followed bag is cut into deltas: a run must not go on behind one that cut otherwise.
+  digest.AddSize("followed", 1);
   info.content_sha256 = digest.Hex();
   CountTopics(plan, &info);
   if (poses.table.has_value()) Count(kPoseChannel, poses.table->rows.size(), &info);

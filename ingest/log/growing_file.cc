@@ -20,7 +20,8 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 
-constexpr std::chrono::milliseconds kLookPeriod(50);
+// A look costs microseconds, and the answers about now are late by it.
+constexpr std::chrono::milliseconds kLookPeriod(10);
 // Enough to hold a header and some rows, so that a file that was written anew is known.
 constexpr size_t kBeginBytes = 4096;
 

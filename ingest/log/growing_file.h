@@ -29,7 +29,7 @@ class GrowingFile {
 
   const std::string& path() const { return path_; }
 
-  /// Called several times a second while something waits; an error of it ends the wait.
+  /// Called many times a second while something waits; an error of it ends the wait.
   void SetIdle(std::function<absl::Status()> idle) { idle_ = std::move(idle); }
 
   enum class Wait {

@@ -161,6 +161,9 @@ std::vector<OptionGroup> IngestOptions::Groups() {
   const std::vector<BoundOption> upright_bound = upright.Bind();
   agents.insert(agents.end(), bodies_bound.begin(), bodies_bound.end());
   frame.insert(frame.end(), upright_bound.begin(), upright_bound.end());
+  frame.push_back({"follow-pose-period", &follow_pose_period_ns, 0.01, 3600.0,
+                   "With --follow: least log time between commits of the robot's poses, seconds; "
+                   "ten revisions a second"});
   return {{"agents and their stays", std::move(agents)},
           {"the robot's path", std::move(frame)},
           {"loop closures", robot_graph.Bind()}};

@@ -46,6 +46,10 @@ struct IngestOptions {
   AgentBodyOptions bodies;
   /// Where the robot was between poses.
   PathOptions path;
+  /// Of a followed log with sensors: the robot's poses are committed as they come, but for those
+  /// less than this after the last ones that were; what is made of pictures goes by
+  /// MappingOptions::commit_period_ns.
+  TimeNs follow_pose_period_ns = kNsPerSecond / 10;
   /// How TurnUpright has looked for it.
   UprightOptions upright;
   /// Of stays.

@@ -103,9 +103,20 @@ absl::Status LogRun::TakePose(const PoseMeasurement& pose) {
   }
   DSG_RETURN_IF_ERROR(presence_.Await(agent, time_ns, position_map));
   if (!is_of_path) return absl::OkStatus();
+  if (is_followed_) DSG_RETURN_IF_ERROR(CommitPoses(time_ns));
   frames_.NotePose();
   for (Stage* stage : stages_) stage->NotePose(time_ns);
   return SeeFrames();
+}
+
+// Somebody may ask where the robot is now: that does not wait for what pictures show. By the log's
+// time, so that a run that was cut off finds the same deltas.
+absl::Status LogRun::CommitPoses(TimeNs now_ns) {
+  const bool is_due =
+      last_pose_ns_ == kTimeMin || now_ns - last_pose_ns_ >= options_.follow_pose_period_ns;
+  if (!is_due) return absl::OkStatus();
+  last_pose_ns_ = now_ns;
+  return sink_.Put(builder_.Take({}));
 }
 
 // A log has one body that its sensors are on: poses of another robot are no path of its own.

@@ -73,6 +73,7 @@ class LogRun {
   bool IsStrayLoop(const Measurement& measurement) const;
   absl::Status TakeGraph(GraphDelta graph);
   absl::Status TakePose(const PoseMeasurement& pose);
+  absl::Status CommitPoses(TimeNs now_ns);
   bool AddToPath(NodeId agent, const PoseMeasurement& pose);
   absl::Status TakeSensor(Measurement& measurement);
   bool Spread(Measurement& measurement);
@@ -114,6 +115,8 @@ class LogRun {
   /// When the piece of the log began that is not committed yet.
   TimeNs begin_ns_ = kTimeMin;
   TimeNs last_ns_ = kTimeMin;
+  /// Of a followed log: the pose that was the last to be committed as it came.
+  TimeNs last_pose_ns_ = kTimeMin;
   /// Since when poses wait, by this machine's clock.
   std::optional<std::chrono::steady_clock::time_point> waits_since_;
   int64_t graph_agent_count_ = 0;

@@ -288,6 +288,53 @@ TEST_F(RoomWithLateLoops, EndsOnTheSamePath) {
   for (size_t i = 0; i < a.size(); ++i) EXPECT_LT((a[i] - b[i]).norm(), 1e-3) << i;
 }
 
+// Twenty poses a second.
+class RoomWithManyPoses : public FollowedRecording {
+ protected:
+  static constexpr int kPosesPerScan = 8;
+
+  void AddPoses(int i, Recording* recording) override {
+    for (int k = 0; k < kPosesPerScan; ++k) {
+      const TimeNs t = StampOfScan(i) + k * 50 * kMillisecond;
+      recording->push_back({"/odom", "nav_msgs/Odometry", t,
+                            OdometryFields(CdrWriter(), t, Numbers(PoseOfScan(i)))});
+    }
+  }
+
+  // How many a revision has brought at most.
+  int64_t MostPosesAtOnce(const std::string& map) {
+    constexpr int kRevisionsMax = 10'000;
+    const std::vector<RevisionInfo> latest_first =
+        *(*store_->OpenMap(map))->ListRevisions(HeadOf(map).revision + 1, kRevisionsMax);
+    int64_t most = 0;
+    for (size_t i = 0; i + 1 < latest_first.size(); ++i) {
+      most = std::max(most, latest_first[i].pose_count - latest_first[i + 1].pose_count);
+    }
+    return most;
+  }
+};
+
+TEST_F(RoomWithManyPoses, AreCommittedTenTimesASecond) {
+  ASSERT_TRUE(Ingest("followed", Begin(1.0), FollowFor(milliseconds(0))).ok());
+  EXPECT_EQ(HeadOf("followed").pose_count, kScanCount * kPosesPerScan);
+  EXPECT_EQ(MostPosesAtOnce("followed"), 2);
+  // Nobody waits for a log that is finished: a commit for each second of it.
+  ASSERT_TRUE(Ingest("finished", Begin(1.0), {}).ok());
+  EXPECT_GE(MostPosesAtOnce("finished"), 20);
+}
+
+TEST_F(RoomWithManyPoses, EndInTheSameMapHoweverOftenItWasStopped) {
+  ASSERT_TRUE(Ingest("whole", Begin(1.0), FollowFor(milliseconds(0))).ok());
+  const RevisionInfo whole = HeadOf("whole");
+  for (const Revision cut : {3, 40, 77}) {
+    const std::string map = absl::StrCat("cut", cut);
+    EXPECT_FALSE(Ingest(map, Begin(1.0), FollowFor(milliseconds(0)), static_cast<int>(cut)).ok());
+    ASSERT_TRUE(Ingest(map, Begin(1.0), FollowFor(milliseconds(0))).ok());
+    EXPECT_EQ(HeadOf(map).digest, whole.digest);
+    EXPECT_EQ(HeadOf(map).revision, whole.revision);
+  }
+}
+
 TEST_F(FollowedRoom, WithoutLoopClosuresSaysNothingOfThem) {
   const auto summary = Ingest("office", Begin(1.0), FollowFor(milliseconds(0)));
   ASSERT_TRUE(summary.ok()) << summary.status();
