@@ -20,7 +20,7 @@ class ReadAheadLog : public LogSource {
         reader_([this](const std::stop_token& stop) { Read(stop); }) {}
 
   const LogInfo& info() const override { return info_; }
-  // A log that is finished never waits.
+  // Only the reader waits, who must not call what belongs to the caller's thread.
   void SetIdle(std::function<absl::Status()> /*idle*/) override {}
 
   absl::StatusOr<std::optional<Measurement>> Next() override {
@@ -42,6 +42,11 @@ class ReadAheadLog : public LogSource {
   static bool IsLast(const Item& item) { return !item.ok() || !item->has_value(); }
 
   void Read(const std::stop_token& stop) {
+    // A log that waits for its file may wait for ever.
+    log_->SetIdle([stop] {
+      return stop.stop_requested() ? absl::CancelledError("nobody reads the log")
+                                   : absl::OkStatus();
+    });
     for (bool is_last = false; !is_last;) {
       Item item = log_->Next();
       is_last = IsLast(item);

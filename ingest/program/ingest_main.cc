@@ -277,10 +277,9 @@ absl::StatusOr<std::unique_ptr<LogSource>> Prepare(std::unique_ptr<LogSource> lo
     DSG_ASSIGN_OR_RETURN(const Pose3d map_T_log, ParseTransform(flags.transform));
     log = MoveLog(std::move(log), map_T_log);
   }
-  // A followed log waits for what is written, and not for what is made of it.
   const bool is_made = additions.odometry.has_value() || additions.recognition.has_value() ||
                        additions.segmentation.has_value();
-  return is_made && !flags.is_followed ? ReadAhead(std::move(log), kAheadCount) : std::move(log);
+  return is_made ? ReadAhead(std::move(log), kAheadCount) : std::move(log);
 }
 
 void TellLostFrames(const std::string& path, SkipCounts skipped, bool has_odometry) {

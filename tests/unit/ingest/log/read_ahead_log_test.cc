@@ -3,9 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <functional>
 #include <memory>
+#include <optional>
+#include <thread>
 #include <utility>
 
+#include "schema/base/status.h"
 #include "tests/unit/ingest/log/given_log.h"
 
 namespace dsg::ingest {
@@ -49,6 +54,30 @@ TEST(ReadAhead, GivesTheErrorAfterWhatCameBefore) {
   auto log = ReadAhead(std::make_unique<CountingLog>(3, absl::DataLossError("cut")), 2);
   for (int i = 0; i < 3; ++i) EXPECT_TRUE((*log->Next()).has_value());
   EXPECT_EQ(log->Next().status().code(), absl::StatusCode::kDataLoss);
+}
+
+// Waits for more, which never comes.
+class WaitingLog : public LogSource {
+ public:
+  const LogInfo& info() const override { return info_; }
+  void SetIdle(std::function<absl::Status()> idle) override { idle_ = std::move(idle); }
+  absl::StatusOr<std::optional<Measurement>> Next() override {
+    if (!std::exchange(has_given_, true)) return Measurement(ImuMeasurement{});
+    while (true) {
+      DSG_RETURN_IF_ERROR(idle_());
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  }
+
+ private:
+  LogInfo info_;
+  std::function<absl::Status()> idle_;
+  bool has_given_ = false;
+};
+
+TEST(ReadAhead, GivesWhatThereIsAndEndsWhileTheLogWaits) {
+  auto log = ReadAhead(std::make_unique<WaitingLog>(), 5);
+  EXPECT_TRUE((*log->Next()).has_value());
 }
 
 TEST(ReadAhead, EndsWithoutBeingRead) {
