@@ -31,7 +31,7 @@ constexpr uint32_t kWallRgb = 0x3d4250;
 constexpr double kTurnRad = 20.0 * std::numbers::pi / 180.0;
 constexpr double kElevationRad = 38.0 * std::numbers::pi / 180.0;
 // Between layers, shares of the picture's height of one.
-constexpr double kGapShare = 0.72;
+constexpr double kGapShare = 0.55;
 // Ceilings and lamps would hide the rooms.
 constexpr double kCutAboveFloorM = 2.0;
 
@@ -290,6 +290,20 @@ class Drawer {
     }
   }
 
+  void DrawWall(const Node& node) {
+    const std::vector<Eigen::Vector2d> line = SlantedWall(node);
+    if (line.empty()) {
+      if (!node.box_node.isEmpty()) DrawBox(node, kWallRgb, 0.1f);
+      return;
+    }
+    const Box3d box = node.BoxMap();
+    Pixels panel = view_.ToPixels({line[0], line[1]}, box.min().z(), kPlaceLevel);
+    const Pixels top = view_.ToPixels({line[1], line[0]}, box.max().z(), kPlaceLevel);
+    panel.insert(panel.end(), top.begin(), top.end());
+    canvas_.FillPolygon(panel, picture::MakePaint(kWallRgb, 0.1f));
+    canvas_.DrawOutline(panel, 1.5, picture::MakePaint(kInkRgb, 0.35f));
+  }
+
   uint32_t RoomColorOf(const Node& place) const {
     const auto parent = parent_of_.find(place.id);
     const bool has_room = parent != parent_of_.end() && parent->second->kind == kinds::kRoom;
@@ -301,7 +315,7 @@ class Drawer {
       if (node.kind != kinds::kStructure || IsOfType(node, "floor") || IsOfType(node, "ceiling")) {
         continue;
       }
-      if (!node.box_node.isEmpty()) DrawBox(node, kWallRgb, 0.1f);
+      DrawWall(node);
     }
     DrawLinks(relations::kTraversable, 2.0, picture::MakePaint(LayerColor(layers::kPlaces), 0.4f));
     for (const Node& node : content_.nodes) {

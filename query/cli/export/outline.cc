@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "query/cli/export/map_content.h"
+
 namespace dsg::cli {
 namespace {
 
@@ -93,6 +95,27 @@ Polygon2d FloorOutline(const Node& node) {
   Polygon2d points;
   for (const Eigen::Vector3d& corner : BoxCorners(node)) points.push_back(corner.head<2>());
   return ConvexHull(std::move(points));
+}
+
+std::vector<Eigen::Vector2d> SlantedWall(const Node& node) {
+  const Polygon2d outline = FloorOutline(node);
+  if (!node.structure.has_value() || outline.empty()) return {};
+  const Eigen::Vector3d& normal = node.structure->plane_normal_map;
+  const Eigen::Vector2d level = normal.head<2>();
+  constexpr double kAlong = 0.05;
+  if (level.cwiseAbs().minCoeff() < kAlong) return {};
+  const double offset_m = node.structure->plane_offset_m + normal.z() * MiddleOf(node).z();
+  std::vector<Eigen::Vector2d> ends;
+  for (size_t i = 0; i < outline.size(); ++i) {
+    const Eigen::Vector2d& from = outline[i];
+    const Eigen::Vector2d& to = outline[(i + 1) % outline.size()];
+    const double before_m = level.dot(from) + offset_m;
+    const double behind_m = level.dot(to) + offset_m;
+    if ((before_m < 0.0) == (behind_m < 0.0)) continue;
+    ends.push_back(from + before_m / (before_m - behind_m) * (to - from));
+  }
+  if (ends.size() != 2) ends.clear();
+  return ends;
 }
 
 double AreaOf(const Polygon2d& polygon) {

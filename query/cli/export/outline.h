@@ -34,6 +34,11 @@ Polygon2d ConvexHull(Polygon2d points);
 /// Seen from above: the footprint of a region, otherwise the box; empty without either.
 Polygon2d FloorOutline(const Node& node);
 
+/// Where the plane of a wall cuts the outline of its box, two points; empty where the box tells as
+/// much, since the wall is along its sides. Boxes of walls lie along the axes of the map, which
+/// maps of odometry do not share with their buildings.
+std::vector<Eigen::Vector2d> SlantedWall(const Node& node);
+
 /// Unsigned area, for either order of the corners.
 double AreaOf(const Polygon2d& polygon);
 

@@ -176,29 +176,6 @@ void DrawRooms(const MapContent& content, const FloorView& view, picture::Canvas
   }
 }
 
-// Where the plane of a wall cuts the outline of its box, two points; empty where the box tells as
-// much, since the wall is along its sides. Boxes of walls lie along the axes of the map, which
-// maps of odometry do not share with their buildings.
-std::vector<Eigen::Vector2d> SlantedWall(const Node& node, const Polygon2d& outline) {
-  if (!node.structure.has_value() || outline.empty()) return {};
-  const Eigen::Vector3d& normal = node.structure->plane_normal_map;
-  const Eigen::Vector2d level = normal.head<2>();
-  constexpr double kAlong = 0.05;
-  if (level.cwiseAbs().minCoeff() < kAlong) return {};
-  const double offset_m = node.structure->plane_offset_m + normal.z() * MiddleOf(node).z();
-  std::vector<Eigen::Vector2d> ends;
-  for (size_t i = 0; i < outline.size(); ++i) {
-    const Eigen::Vector2d& from = outline[i];
-    const Eigen::Vector2d& to = outline[(i + 1) % outline.size()];
-    const double before_m = level.dot(from) + offset_m;
-    const double behind_m = level.dot(to) + offset_m;
-    if ((before_m < 0.0) == (behind_m < 0.0)) continue;
-    ends.push_back(from + before_m / (before_m - behind_m) * (to - from));
-  }
-  if (ends.size() != 2) ends.clear();
-  return ends;
-}
-
 void DrawStructures(const MapContent& content, const FloorView& view, picture::Canvas* canvas) {
   for (const Node& node : content.nodes) {
     if (node.kind != kinds::kStructure) continue;
@@ -207,7 +184,7 @@ void DrawStructures(const MapContent& content, const FloorView& view, picture::C
     const picture::Paint paint =
         picture::MakePaint(type == "glass" || type == "window" ? kGlassRgb : kWallRgb);
     const Polygon2d outline_map = FloorOutline(node);
-    const std::vector<Eigen::Vector2d> wall = SlantedWall(node, outline_map);
+    const std::vector<Eigen::Vector2d> wall = SlantedWall(node);
     if (!wall.empty()) {
       canvas->DrawPolyline({view.ToPixel(wall[0]), view.ToPixel(wall[1])}, 5.0, paint);
       continue;
