@@ -18,14 +18,11 @@ namespace {
 using Pixels = std::vector<Eigen::Vector2d>;
 
 // Of the canvas, which is twice the size of the picture.
-constexpr double kMarginPx = 60.0;
-constexpr double kTitlePx = 80.0;
+constexpr double kEdgePx = 60.0;
+constexpr double kHeadPx = 80.0;
 constexpr double kNamePx = 260.0;
-constexpr double kTextDotPx = 4.0;
-constexpr uint32_t kPaperRgb = 0xfbfaf7;
-constexpr uint32_t kInkRgb = 0x2b2f3a;
+constexpr double kNameDotPx = 4.0;
 constexpr uint32_t kPlateRgb = 0xe9e7e0;
-constexpr uint32_t kWallRgb = 0x3d4250;
 
 // Where the eye stands: turned off the axes, so that walls along them do not hide one another.
 constexpr double kTurnRad = 20.0 * std::numbers::pi / 180.0;
@@ -33,7 +30,7 @@ constexpr double kElevationRad = 38.0 * std::numbers::pi / 180.0;
 // Between layers, shares of the picture's height of one.
 constexpr double kGapShare = 0.55;
 // Ceilings and lamps would hide the rooms.
-constexpr double kCutAboveFloorM = 2.0;
+constexpr double kMeshCutM = 2.0;
 
 enum Level { kMeshLevel, kObjectLevel, kPlaceLevel, kRoomLevel, kBuildingLevel, kLevelCount };
 constexpr std::array<const char*, kLevelCount> kLevelNames = {
@@ -67,12 +64,12 @@ class Oblique {
       if (has[level]) lift_m += gap_m;
     }
     const double top_m = std::max(0.0, lift_m - gap_m) * std::cos(kElevationRad);
-    const double width = 2.0 * width_px - 2.0 * kMarginPx - kNamePx;
-    const double height_max = 2.0 * kTopViewWidthMax - 2.0 * kMarginPx - kTitlePx;
+    const double width = 2.0 * width_px - 2.0 * kEdgePx - kNamePx;
+    const double height_max = 2.0 * kTopViewWidthMax - 2.0 * kEdgePx - kHeadPx;
     px_per_m_ = std::min(width / plane.sizes().x(), height_max / (plane.sizes().y() + top_m));
-    height_px_ = px_per_m_ * (plane.sizes().y() + top_m) + 2.0 * kMarginPx + kTitlePx;
-    origin_px_ = Eigen::Vector2d(kMarginPx + kNamePx - px_per_m_ * plane.min().x(),
-                                 height_px_ - kMarginPx - px_per_m_ * plane.max().y());
+    height_px_ = px_per_m_ * (plane.sizes().y() + top_m) + 2.0 * kEdgePx + kHeadPx;
+    origin_px_ = Eigen::Vector2d(kEdgePx + kNamePx - px_per_m_ * plane.min().x(),
+                                 height_px_ - kEdgePx - px_per_m_ * plane.max().y());
   }
 
   double height_px() const { return height_px_; }
@@ -160,9 +157,9 @@ class Drawer {
       if (level == kBuildingLevel) DrawBuildings();
     }
     double dot = 6.0;
-    while (dot > 2.0 && picture::Canvas::TextWidth(title, dot) > canvas_.width() - 2.0 * kMarginPx)
+    while (dot > 2.0 && picture::Canvas::TextWidth(title, dot) > canvas_.width() - 2.0 * kEdgePx)
       dot -= 1.0;
-    canvas_.DrawText({kMarginPx, kMarginPx - 10.0}, title, dot, picture::MakePaint(kInkRgb));
+    canvas_.DrawText({kEdgePx, kEdgePx - 10.0}, title, dot, picture::MakePaint(kInkRgb));
     return canvas_.Halved();
   }
 
@@ -194,7 +191,7 @@ class Drawer {
     canvas_.DrawOutline(plate, 2.0, picture::MakePaint(kInkRgb, 0.25f));
     const auto left = std::min_element(plate.begin(), plate.end(),
                                        [](const auto& a, const auto& b) { return a.x() < b.x(); });
-    canvas_.DrawText({kMarginPx, left->y() - 14.0}, kLevelNames[static_cast<size_t>(level)], 3.0,
+    canvas_.DrawText({kEdgePx, left->y() - 14.0}, kLevelNames[static_cast<size_t>(level)], 3.0,
                      picture::MakePaint(kInkRgb));
   }
 
@@ -227,7 +224,7 @@ class Drawer {
           middle += corner / 3.0;
           drawn.corners.push_back(view_.ToPixel(corner, kMeshLevel));
         }
-        if (middle.z() > bounds_.min().z() + kCutAboveFloorM) continue;
+        if (middle.z() > bounds_.min().z() + kMeshCutM) continue;
         const Eigen::Vector3f& normal = normals[face[0]];
         const double light = 0.75 + 0.25 * static_cast<double>(std::abs(normal.z()));
         drawn.paint = Shaded(VertexColor(block, face[0], color), light, 1.0f);
@@ -356,7 +353,7 @@ class Drawer {
       const std::string name = node.class_name.empty() || !node.name.empty()
                                    ? NameOf(node)
                                    : node.class_name + " " + ToString(node.id);
-      canvas_.DrawText(at + Eigen::Vector2d(20.0, -14.0), name, kTextDotPx,
+      canvas_.DrawText(at + Eigen::Vector2d(20.0, -14.0), name, kNameDotPx,
                        picture::MakePaint(kInkRgb));
     }
   }

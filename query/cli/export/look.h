@@ -15,6 +15,11 @@ namespace dsg::cli {
 
 // All colours are 0xRRGGBB.
 
+/// Of pictures: the page, its letters, and walls.
+inline constexpr uint32_t kPaperRgb = 0xfbfaf7;
+inline constexpr uint32_t kInkRgb = 0x2b2f3a;
+inline constexpr uint32_t kWallRgb = 0x3d4250;
+
 /// Differs from the colours of neighbouring labels; 0 (unknown) is grey.
 uint32_t LabelColor(uint32_t label);
 /// By class id, or else by class name; grey without either.

@@ -29,9 +29,6 @@ constexpr double kTextHeightPx = kTextDotPx * picture::kGlyphHeightDots;
 // A smaller map is drawn with this size.
 constexpr double kMapSizeMinM = 2.0;
 
-constexpr uint32_t kPaperRgb = 0xfbfaf7;
-constexpr uint32_t kInkRgb = 0x2b2f3a;
-constexpr uint32_t kWallRgb = 0x3d4250;
 constexpr uint32_t kGlassRgb = 0x8fd0ea;
 constexpr uint32_t kGroundRgb = 0xefede6;
 
