@@ -324,11 +324,11 @@ TEST(PersonTracker, TheOrderWithinAnImageDoesNotMatter) {
 TEST(PersonTracker, InThePapersModeTheFirstConsistentTrackWins) {
   PersonTracker tracker(PaperTrackerOptions());
   tracker.Observe(AtS(0.0), {ObservationAt({0.0, 0.0, 0.95}, kSeenSigmaM)});
-  EXPECT_EQ(tracker.counts().track_count, 0) << "one detection is no track yet";
+  EXPECT_EQ(tracker.counts().track_count, 1) << "a graph of one node";
   tracker.Observe(AtS(0.2), {ObservationAt({2.9, 0.0, 0.95}, kSeenSigmaM)});
   EXPECT_EQ(tracker.counts().track_count, 1);
   tracker.Observe(AtS(0.4), {ObservationAt({-4.0, 0.0, 0.95}, kSeenSigmaM)});
-  EXPECT_EQ(tracker.counts().track_count, 1) << "6.9 m away: another track begins";
+  EXPECT_EQ(tracker.counts().track_count, 2) << "6.9 m away: another track begins";
   tracker.Observe(AtS(0.6), {ObservationAt({-4.0, 0.0, 0.95}, kSeenSigmaM)});
   EXPECT_EQ(tracker.counts().track_count, 2);
 }
