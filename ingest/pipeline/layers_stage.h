@@ -44,6 +44,8 @@ class LayersStage : public Stage {
   void Summarize(IngestSummary* summary) const override;
 
   bool is_on() const { return is_on_; }
+  /// Frames that are fused.
+  int64_t frame_count() const { return layers_.counts().frame_count; }
   /// As they were told last.
   const LayerGraph& graph() const { return graph_; }
   /// Small things that were seen on their way in somebody's hand.

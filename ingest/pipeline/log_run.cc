@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "ingest/commit/graph_boxes.h"
 #include "ingest/pipeline/contact_edges.h"
 #include "ingest/pipeline/held_edges.h"
@@ -288,6 +289,7 @@ absl::Status LogRun::FuseAgain() {
                                                       options_.people.look.period_ns));
   }
   LogFrames frames(info_, options_.mapping.depth, path_, /*is_on=*/true);
+  const int64_t frame_count = layers_.frame_count();
   layers_.BeginAgain();
   const auto fuse = [&]() -> absl::Status {
     const StageClock::Span span(&clock_, "fused again");
@@ -311,7 +313,30 @@ absl::Status LogRun::FuseAgain() {
     if (options_.on_work) options_.on_work("fusing again", count, log->info().measurement_count);
   }
   frames.Finish();
-  return fuse();
+  DSG_RETURN_IF_ERROR(fuse());
+  return CheckSame(frames.skips(), frame_count);
+}
+
+// A log that went away while it was read again would leave an empty map behind a good one.
+absl::Status LogRun::CheckSame(const SkipCounts& skips, int64_t frame_count) const {
+  std::string change;
+  if (layers_.frame_count() < frame_count) {
+    change = absl::StrCat(layers_.frame_count(), " depth frames of ", frame_count);
+  }
+  for (const auto& [reason, count] : skips) {
+    const auto first = frames_.skips().find(reason);
+    const int64_t before = first == frames_.skips().end() ? 0 : first->second;
+    if (count > before) change = absl::StrCat(reason, ": ", count, " times, before ", before);
+  }
+  if (change.empty()) return absl::OkStatus();
+  return MakeError(Reason::kFileMalformed,
+                   absl::StrCat(info_.path,
+                                " was read again, to be fused along its corrected path, and is not "
+                                "what it was (",
+                                change,
+                                "); nothing of that is committed: restore the log and "
+                                "run the same again"),
+                   {{"file", info_.path}});
 }
 
 void LogRun::TellRobot(GraphDelta* delta) {

@@ -86,6 +86,7 @@ class LogRun {
   absl::Status PutPlaceMemory(std::vector<std::string> parts);
   absl::Status CorrectPath(bool is_last);
   absl::Status FuseAgain();
+  absl::Status CheckSame(const SkipCounts& skips, int64_t frame_count) const;
   void TellRobot(GraphDelta* delta);
   absl::Status PutContacts();
   std::vector<Edge> HeldEdges() const;

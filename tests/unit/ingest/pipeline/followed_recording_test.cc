@@ -213,6 +213,20 @@ TEST_F(RoomWithLoops, OfAFileGivesTheSameMap) {
   EXPECT_LT(std::abs(PathOf("followed")[17].y() - 1.0), 0.5 * 17 * kDriftPerScanM);
 }
 
+// One of which less is left by then is not taken for all there is; it goes on once it is whole.
+TEST_F(RoomWithLoops, TellsIfLessOfItIsReadAgain) {
+  const std::string path = Begin(1.0);
+  const std::string rest = folder_.Write("rest.mcap", bytes_.substr(0, bytes_.size() / 2));
+  open_again_ = [&] { return OpenLog(rest, {}); };
+  const auto summary = Ingest("home", path, {});
+  EXPECT_EQ(ReasonOf(summary.status()), Reason::kFileMalformed) << summary.status();
+  EXPECT_GT(HeadOf("home").mesh_block_count, 0);
+  open_again_ = [&] { return OpenLog(path, {}); };
+  ASSERT_TRUE(Ingest("home", path, {}).ok());
+  ASSERT_TRUE(Ingest("whole", path, {}).ok());
+  EXPECT_EQ(HeadOf("home").digest, HeadOf("whole").digest);
+}
+
 // A log that is gone by then ends the run; what was committed stays.
 TEST_F(RoomWithLoops, TellsIfItCannotBeReadAgain) {
   const std::string path = Begin(1.0);
