@@ -84,6 +84,17 @@ absl::Status CheckFiles(const fs::path& folder, const std::string& channel, cons
       {{"file", first_absent}, {"count", absl::StrCat(absent_count)}});
 }
 
+// A broken image is left out; a log that is taken away while it is read has no end.
+absl::Status CheckStillThere(const std::string& path) {
+  std::error_code error;
+  if (fs::exists(path, error)) return absl::OkStatus();
+  return MakeError(Reason::kFileMalformed,
+                   absl::StrCat(path,
+                                " has gone since the log was opened; what was read before is "
+                                "committed: put the log back and run the same again"),
+                   {{"file", path}});
+}
+
 }  // namespace
 
 bool IsImageChannel(std::string_view name) {
@@ -109,6 +120,7 @@ SensorChannel MakeImageChannel(const std::string& channel, const ImageDecoding& 
     image.time_ns = shared->times[index];
     image.channel = channel;
     image.origin = (fs::path(shared->folder) / shared->names[index]).string();
+    DSG_RETURN_IF_ERROR(CheckStillThere(image.origin));
     image.load = [path = image.origin, decoding] { return LoadImageFile(path, decoding); };
     return Measurement(std::move(image));
   };

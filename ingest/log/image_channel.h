@@ -29,6 +29,7 @@ bool IsImageChannel(std::string_view name);
 ImageDecoding DecodingOf(std::string_view channel);
 
 /// The channel of files that exist. `names` are files within `folder`.
+/// Errors: FILE_MALFORMED of its measurements, if a file has gone by the time that it is due.
 SensorChannel MakeImageChannel(const std::string& channel, const ImageDecoding& decoding,
                                ImageList list);
 

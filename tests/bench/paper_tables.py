@@ -100,7 +100,8 @@ ODOMETRY = Table(
           for method in TABLE_1 for masks in ("off", "on")),
     ("RMSE of causal poses over all poses, without a gate, aligned by heading and translation. "
      "Without masks as in the paper; masks leave out features on people. EuRoC's columns of the "
-     "paper's table need its recordings: `--log FOLDER --truth FOLDER`.",),
+     "paper's table need its recordings: `--log FOLDER --truth FOLDER`. Times are those of the "
+     "clock, whatever else the machine did.",),
     "not in the paper (its odometry has no masks)")
 
 

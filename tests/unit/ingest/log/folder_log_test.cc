@@ -127,6 +127,18 @@ TEST_F(FolderLogTest, DecodesImagesWhenAsked) {
   EXPECT_EQ(LabelAt(images["label0"], 0, 0), 5 << 8 | 2);
 }
 
+// What is committed of a part of the log would contradict the whole of it.
+TEST_F(FolderLogTest, EndsWithAnErrorWhenItIsTakenAwayWhileItIsRead) {
+  auto log = OpenLog(folder_.Path(""), {});
+  ASSERT_TRUE(log.ok()) << log.status();
+  ASSERT_TRUE((*log)->Next().ok());
+  Remove("depth0/data/300.png");
+  absl::Status status;
+  for (int i = 0; i < 100 && status.ok(); ++i) status = (*log)->Next().status();
+  EXPECT_EQ(ReasonOf(status), Reason::kFileMalformed) << status;
+  EXPECT_NE(status.message().find("depth0/data/300.png has gone"), std::string::npos) << status;
+}
+
 TEST_F(FolderLogTest, IdentityCoversTablesAndNamesOfImages) {
   const std::string identity = Read()->info.content_sha256;
   EXPECT_EQ(Read()->info.content_sha256, identity);
