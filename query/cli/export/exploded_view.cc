@@ -28,7 +28,7 @@ constexpr uint32_t kPlateRgb = 0xe9e7e0;
 constexpr double kTurnRad = 20.0 * std::numbers::pi / 180.0;
 constexpr double kElevationRad = 38.0 * std::numbers::pi / 180.0;
 // Between layers, shares of the picture's height of one.
-constexpr double kGapShare = 0.55;
+constexpr double kGapShare = 0.6;
 // Ceilings and lamps would hide the rooms.
 constexpr double kMeshCutM = 2.0;
 
@@ -187,7 +187,7 @@ class Drawer {
     const double y[] = {bounds_.min().y(), bounds_.max().y()};
     const Pixels plate = view_.ToPixels({{x[0], y[0]}, {x[1], y[0]}, {x[1], y[1]}, {x[0], y[1]}},
                                         bounds_.min().z(), level);
-    canvas_.FillPolygon(plate, picture::MakePaint(kPlateRgb, 0.55f));
+    canvas_.FillPolygon(plate, picture::MakePaint(kPlateRgb, 0.2f));
     canvas_.DrawOutline(plate, 2.0, picture::MakePaint(kInkRgb, 0.25f));
     const auto left = std::min_element(plate.begin(), plate.end(),
                                        [](const auto& a, const auto& b) { return a.x() < b.x(); });
