@@ -132,7 +132,7 @@ absl::StatusOr<RunPlan> MakePlan(const LogInfo& info, const IngestOptions& optio
 /// `on_progress` (may be empty) gets the count of measurements read so far.
 ///
 /// Of a followed log, poses are committed a second after they were read; a log with sensors goes by
-/// its own time (MappingOptions::commit_period_ns). If a log with sensors is stopped
+/// its own time (follow_pose_period_ns; MappingOptions::commit_period_ns). If one is stopped
 /// (FollowOptions::stop), what was committed stays and its end is not told.
 ///
 /// `log_options`: what the log was opened with.

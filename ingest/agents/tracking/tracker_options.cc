@@ -24,8 +24,8 @@ constexpr OptionField<TrackerOptions> kFields[] = {
     {"track-paper-hits", &TrackerOptions::paper_confirm_hit_count, 1, 1000,
      "The same with --people paper: RSS 2020 begins a graph with a single pose"},
     {"track-confirm", &TrackerOptions::confirm_ns, 0.0, 3600.0,
-     "A track is made within this, and lost when unseen for longer, seconds: RSS 2020 drops tracks "
-     "of single detections within a second"},
+     "A track is made within this, and lost when unseen for longer, seconds: somebody in sight is "
+     "detected several times a second"},
     {"track-close", &TrackerOptions::close_ns, 0.0, 3600.0,
      "Unseen for longer, a track is closed, seconds: by then somebody may be in another room"},
     {"track-coast", &TrackerOptions::coast_ns, 0.0, 3600.0,

@@ -154,7 +154,7 @@ class Drawer {
       if (level == kObjectLevel) DrawObjects();
       if (level == kPlaceLevel) DrawPlaces();
       if (level == kRoomLevel) DrawRooms();
-      if (level == kBuildingLevel) DrawBuildings();
+      if (level == kBuildingLevel) DrawNamed(kinds::kBuilding);
     }
     double dot = 6.0;
     while (dot > 2.0 && picture::Canvas::TextWidth(title, dot) > canvas_.width() - 2.0 * kEdgePx)
@@ -301,12 +301,6 @@ class Drawer {
     canvas_.DrawOutline(panel, 1.5, picture::MakePaint(kInkRgb, 0.35f));
   }
 
-  uint32_t RoomColorOf(const Node& place) const {
-    const auto parent = parent_of_.find(place.id);
-    const bool has_room = parent != parent_of_.end() && parent->second->kind == kinds::kRoom;
-    return has_room ? RoomColor(*parent->second) : LayerColor(layers::kPlaces);
-  }
-
   void DrawPlaces() {
     for (const Node& node : content_.nodes) {
       if (node.kind != kinds::kStructure || IsOfType(node, "floor") || IsOfType(node, "ceiling")) {
@@ -317,7 +311,7 @@ class Drawer {
     DrawLinks(relations::kTraversable, 2.0, picture::MakePaint(LayerColor(layers::kPlaces), 0.4f));
     for (const Node& node : content_.nodes) {
       if (node.kind != kinds::kPlace) continue;
-      canvas_.FillCircle(PixelOf(node), 6.0, picture::MakePaint(RoomColorOf(node)));
+      canvas_.FillCircle(PixelOf(node), 6.0, picture::MakePaint(PlaceColor(node, parent_of_)));
     }
   }
 
@@ -339,8 +333,6 @@ class Drawer {
     DrawLinks(relations::kAdjacent, 5.0, picture::MakePaint(kRoomLinkRgb, 0.8f));
     DrawNamed(kinds::kRoom);
   }
-
-  void DrawBuildings() { DrawNamed(kinds::kBuilding); }
 
   void DrawNamed(const char* kind) {
     for (const Node& node : content_.nodes) {

@@ -80,6 +80,12 @@ uint32_t FloorColor(const Node& node) { return FromHsv(RoomHue(node), 0.13, 0.95
 
 uint32_t RoomColor(const Node& node) { return FromHsv(RoomHue(node), 0.75, 0.72); }
 
+uint32_t PlaceColor(const Node& place, const std::unordered_map<NodeId, const Node*>& parents) {
+  const auto parent = parents.find(place.id);
+  const bool has_room = parent != parents.end() && parent->second->kind == kinds::kRoom;
+  return has_room ? RoomColor(*parent->second) : LayerColor(layers::kPlaces);
+}
+
 uint32_t LayerColor(LayerId layer) {
   switch (layer) {
     case layers::kObjects:

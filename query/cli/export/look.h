@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <string_view>
+#include <unordered_map>
 #include <vector>
 
 #include "schema/model/mesh.h"
@@ -28,6 +29,8 @@ uint32_t ClassColor(const Node& node);
 uint32_t FloorColor(const Node& node);
 /// A strong form of the same hue, for what is in the room.
 uint32_t RoomColor(const Node& node);
+/// That of the room that contains the place, if one does. `parents`: ParentsOf.
+uint32_t PlaceColor(const Node& place, const std::unordered_map<NodeId, const Node*>& parents);
 /// Of links between rooms. Source: RSS 2020, figure 2.
 inline constexpr uint32_t kRoomLinkRgb = 0xd33a2c;
 uint32_t LayerColor(LayerId layer);

@@ -204,10 +204,8 @@ void DrawPlaces(const MapContent& content, const FloorView& view, picture::Canva
   const auto parents = ParentsOf(content);
   for (const Node& node : content.nodes) {
     if (node.kind != kinds::kPlace) continue;
-    const auto parent = parents.find(node.id);
-    const bool has_room = parent != parents.end() && parent->second->kind == kinds::kRoom;
-    const uint32_t rgb = has_room ? RoomColor(*parent->second) : LayerColor(layers::kPlaces);
-    canvas->FillCircle(view.ToPixel(MiddleOf(node)), 5.0, picture::MakePaint(rgb, 0.7f));
+    canvas->FillCircle(view.ToPixel(MiddleOf(node)), 5.0,
+                       picture::MakePaint(PlaceColor(node, parents), 0.7f));
   }
 }
 
