@@ -172,7 +172,8 @@ class ContentReader {
   }
 
   absl::Status ReadMesh() {
-    const auto request = Begin<v1::GetMeshRequest>();
+    auto request = Begin<v1::GetMeshRequest>();
+    request.set_node(options_.mesh_node);
     absl::Status broken;
     const auto take = [&](const v1::GetMeshResponse& message) {
       for (const v1::MeshBlock& in : message.blocks()) {

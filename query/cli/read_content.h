@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "absl/status/statusor.h"
 #include "query/cli/export/map_content.h"
@@ -16,6 +17,8 @@ struct ContentOptions {
   /// The world at this instant, with tracks up to it; unset = all that has not ended, whole tracks.
   std::optional<TimeNs> at_ns{};
   bool with_mesh = true;
+  /// Only the mesh of this node, by id or unique name; empty = all of it.
+  std::string mesh_node{};
   /// False: only the building, without agents.
   bool with_agents = true;
   /// Also every pose of the tracks.

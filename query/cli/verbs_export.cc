@@ -47,6 +47,8 @@ struct ExportVerb {
   /// "rgb", "label", "instance"; empty = rgb if the mesh has it, else label.
   std::string color;
   std::string at;
+  /// Of the mesh only what is this node's; empty = all of it.
+  std::string node;
   bool force = false;
 };
 
@@ -259,7 +261,8 @@ absl::Status RunExport(Session* session, const ExportVerb& verb, std::ostream& o
   const bool with_mesh = !verb.ply.empty() || !verb.gltf.empty() || with_spark;
   DSG_ASSIGN_OR_RETURN(
       ContentAnswer answer,
-      ReadMapAt(session, verb.at, {.with_mesh = with_mesh, .with_poses = with_spark}));
+      ReadMapAt(session, verb.at,
+                {.with_mesh = with_mesh, .mesh_node = verb.node, .with_poses = with_spark}));
   Exporter exporter(answer.content, color, verb.force);
   if (!verb.ply.empty()) DSG_RETURN_IF_ERROR(exporter.WriteMesh(verb.ply));
   if (!verb.graph_ply.empty()) DSG_RETURN_IF_ERROR(exporter.WriteGraph(verb.graph_ply));
@@ -317,6 +320,11 @@ absl::Status CheckExport(const ExportVerb& verb, const CommonOptions& common) {
         absl::StrCat("\"", verb.archive, "\" does not end in .dsgz; other formats have options"),
         "export");
   }
+  const bool is_ply_alone = !verb.ply.empty() && verb.graph_ply.empty() && verb.gltf.empty() &&
+                            verb.spark.empty() && verb.archive.empty();
+  if (!verb.node.empty() && !is_ply_alone) {
+    return Usage("--node is of the mesh: give --ply FILE, and no other file", "export");
+  }
   if (!verb.spark.empty() && !SparkFormOf(verb.spark).has_value()) {
     return Usage(absl::StrCat("--spark \"", verb.spark,
                               "\": end the name in .json, or in .sparkdsg or .bin for the binary "
@@ -354,6 +362,9 @@ void AddExport(Grammar* grammar) {
          "--color", verb->color,
          "Mesh colours: rgb, label or instance; default rgb if the mesh has it, else label")
       ->check(CLI::IsMember({"rgb", "label", "instance"}));
+  app->add_option("--node", verb->node,
+                  "Of the mesh only what is this object's, structure's, room's or region's (id or "
+                  "unique name); with --ply");
   app->add_option("--at", verb->at, kContentAtHelp);
   app->add_flag("--force", verb->force, "Replace existing files");
 }

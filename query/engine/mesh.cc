@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/engine/engine.h"
+#include "query/engine/node_mesh.h"
 #include "query/engine/request.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
@@ -105,8 +106,9 @@ Box3d CubeOf(BlockIndex index, double size_m) {
 
 class MeshCursor final : public EngineCursor<v1::GetMeshResponse> {
  public:
-  MeshCursor(const ReadView& view, std::vector<BlockIndex> blocks)
-      : view_(view), blocks_(std::move(blocks)) {}
+  /// Without `part` whole blocks.
+  MeshCursor(const ReadView& view, std::vector<BlockIndex> blocks, std::optional<NodeMesh> part)
+      : view_(view), blocks_(std::move(blocks)), part_(std::move(part)) {}
 
   bool done() const override {
     return next_block_ == blocks_.size() && next_piece_ == pieces_.size();
@@ -131,13 +133,18 @@ class MeshCursor final : public EngineCursor<v1::GetMeshResponse> {
   absl::Status ReadBlock() {
     DSG_ASSIGN_OR_RETURN(MeshBlock block, view_.snapshot().ReadMeshBlock(blocks_[next_block_]));
     ++next_block_;
-    pieces_ = CutBlock(std::move(block), kVerticesPerPiece);
     next_piece_ = 0;
+    pieces_.clear();
+    if (part_.has_value()) block = part_->Cut(block);
+    // Of a node a block without any of its faces says nothing.
+    if (part_.has_value() && block.faces.empty()) return absl::OkStatus();
+    pieces_ = CutBlock(std::move(block), kVerticesPerPiece);
     return absl::OkStatus();
   }
 
   const ReadView view_;
   const std::vector<BlockIndex> blocks_;
+  const std::optional<NodeMesh> part_;
   size_t next_block_ = 0;
   std::vector<MeshBlock> pieces_;
   size_t next_piece_ = 0;
@@ -156,19 +163,52 @@ std::vector<MeshBlock> CutBlock(MeshBlock block, size_t vertex_count_max) {
   return whole;
 }
 
-CursorOr<v1::GetMeshResponse> GetMesh(Engine* engine, const CallContext&,
+namespace {
+
+// The blocks with triangles where those of the node can be; a face may reach far out of its block.
+absl::StatusOr<std::vector<BlockIndex>> BlocksOf(Engine* engine, const CallContext& call,
+                                                 const ReadView& view, const NodeMesh& part) {
+  DSG_ASSIGN_OR_RETURN(const auto graph, view.Graph(call.stop()));
+  const auto facts = engine->collisions.FactsOf(graph);
+  DSG_ASSIGN_OR_RETURN(const auto table,
+                       engine->collisions.Blocks(facts.get(), view.snapshot(), call.stop()));
+  std::vector<BlockIndex> blocks;
+  for (const BlockBounds& block : table->blocks()) {
+    if (part.bounds_map().intersects(block.bounds.cast<double>())) blocks.push_back(block.block);
+  }
+  return blocks;
+}
+
+absl::StatusOr<NodeMesh> PartOfNode(const CallContext& call, const ReadView& view,
+                                    const std::string& id_or_name) {
+  DSG_ASSIGN_OR_RETURN(const NodeId id,
+                       ResolveOne(view.snapshot(), id_or_name, "node", call.stop()));
+  DSG_ASSIGN_OR_RETURN(const Node node, view.snapshot().GetNode(id));
+  return NodeMesh::Of(node);
+}
+
+}  // namespace
+
+CursorOr<v1::GetMeshResponse> GetMesh(Engine* engine, const CallContext& call,
                                       const v1::GetMeshRequest& request) {
   DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
   std::optional<Box3d> box_map;
   if (request.has_box()) {
     DSG_ASSIGN_OR_RETURN(box_map, BoxFromProto(request.box(), "box"));
   }
-  DSG_ASSIGN_OR_RETURN(std::vector<BlockIndex> blocks, view.snapshot().MeshBlocks());
+  std::optional<NodeMesh> part;
+  std::vector<BlockIndex> blocks;
+  if (request.node().empty()) {
+    DSG_ASSIGN_OR_RETURN(blocks, view.snapshot().MeshBlocks());
+  } else {
+    DSG_ASSIGN_OR_RETURN(part, PartOfNode(call, view, request.node()));
+    DSG_ASSIGN_OR_RETURN(blocks, BlocksOf(engine, call, view, *part));
+  }
   const double size_m = view.snapshot().spec().mesh_block_size_m;
   std::erase_if(blocks, [&](const BlockIndex& index) {
     return box_map.has_value() && !box_map->intersects(CubeOf(index, size_m));
   });
-  return std::make_unique<MeshCursor>(view, std::move(blocks));
+  return std::make_unique<MeshCursor>(view, std::move(blocks), std::move(part));
 }
 
 namespace {
