@@ -51,6 +51,20 @@ std::string MethodName(RoomMethod method) {
   return "narrow ways";
 }
 
+std::string ClassOf(PlaceKind kind) {
+  switch (kind) {
+    case PlaceKind::kStairs:
+      return "stairs";
+    case PlaceKind::kRamp:
+      return "ramp";
+    case PlaceKind::kLift:
+      return "lift";
+    case PlaceKind::kFloor:
+      break;
+  }
+  return "";
+}
+
 }  // namespace
 
 Layer LevelLayer() { return {kLevelLayer, "levels", 450}; }
@@ -182,6 +196,7 @@ class LayerGraphMaker::Build {
       node.map_T_node.position = place.position_map;
       // A point, so that the box over the objects of a place holds the place too.
       node.box_node = Box3d(Eigen::Vector3d::Zero().eval());
+      node.class_name = ClassOf(place.kind);
       node.place = PlaceInfo{place.clearance_m, place.free_box, place.basis_point_count};
       if (!parts_.other_room_of_place.empty()) {
         node.attributes["room_by_other_method"] =

@@ -13,6 +13,7 @@
 #include "ingest/places/roadmap.h"
 #include "ingest/places/shortcuts.h"
 #include "ingest/places/space_grid.h"
+#include "ingest/places/storey_links.h"
 #include "ingest/places/thin_out.h"
 #include "ingest/places/voronoi_places.h"
 
@@ -167,6 +168,7 @@ PlaceGraph ExtractPlaces(const OccupancyGrid& grid, const std::vector<Eigen::Vec
   for (const double floor_z_m : floors_m) {
     Append(ExtractOnFloor(grid, path, floor_z_m, options), &graph);
   }
+  LinkStoreys(path, floors_m, options, &graph);
   return graph;
 }
 

@@ -26,8 +26,9 @@ std::vector<double> FindFloors(const OccupancyGrid& grid, const std::vector<Eige
 
 /// Places without ids. `path_map`: where the robot has been; that is free by construction.
 /// Every link is proven: all cells that it passes were seen to be free, and the middles of all
-/// obstacle cells are at least half a cell further away than the robot's radius. Links stay on
-/// one floor. Places without links are where a robot does not get to, but sees.
+/// obstacle cells are at least half a cell further away than the robot's radius. Such links stay
+/// on one floor; ways between floors are those that the robot went (LinkStoreys), and not proven
+/// otherwise. Places without links are where a robot does not get to, but sees.
 ///
 /// Cost: 65 m x 65 m of offices at 0.1 m in about a second.
 /// Order: the same input gives the same places in the same order.

@@ -9,6 +9,9 @@
 
 namespace dsg::ingest {
 
+/// What a place is on. Other than floors: ways between them that the robot went (LinkStoreys).
+enum class PlaceKind { kFloor, kStairs, kRamp, kLift };
+
 struct Place {
   /// Stable over a run (see PlaceTracker); -1 = not given yet.
   int64_t id = -1;
@@ -21,6 +24,7 @@ struct Place {
   int32_t basis_point_count = 0;
   /// Height of the floor that it belongs to; the position's z for ground robots.
   double floor_z_m = 0.0;
+  PlaceKind kind = PlaceKind::kFloor;
 };
 
 /// Straight and free over its whole length.

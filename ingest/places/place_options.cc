@@ -93,6 +93,12 @@ constexpr OptionField<PlaceOptions> kFields[] = {
     {"place-heir", &PlaceOptions::heir_m, 0.0, 5.0,
      "A place goes if another one this near can take all its links, metres: closer than places "
      "that cover narrow space"},
+    {"place-landing", &PlaceOptions::landing_m, 0.05, 1.0,
+     "A robot is on a floor while its feet are this near to it, metres: two steps"},
+    {"place-lift-run", &PlaceOptions::lift_run_m, 0.0, 10.0,
+     "A way between floors that goes no farther along the floor is a lift, metres: a cabin"},
+    {"place-ramp-slope", &PlaceOptions::ramp_slope, 0.0, 10.0,
+     "... and one that rises by no more for each metre is a ramp, metres: stairs are steeper"},
     {"place-free-box", &PlaceOptions::free_box_m, 0.0, 20.0,
      "How far the free box of a place reaches to each side at most, metres: most rooms are "
      "smaller"},

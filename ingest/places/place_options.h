@@ -73,6 +73,11 @@ struct PlaceOptions {
   double detour = 1.1;
   double heir_m = 0.45;
 
+  // Ways between floors (storey_links.cc).
+  double landing_m = 0.4;
+  double lift_run_m = 1.0;
+  double ramp_slope = 0.3;
+
   // What is free around a place (free_box.cc).
   double free_box_m = 5.0;
 

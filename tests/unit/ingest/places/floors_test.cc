@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "ingest/places/extract_places.h"
+#include "schema/base/disjoint_sets.h"
 #include "tests/unit/ingest/places/plan_map.h"
 
 namespace dsg::ingest {
@@ -134,6 +138,123 @@ TEST(ExtractPlaces, LiesOnBothStoreys) {
   }
   EXPECT_GT(counts[0], 10);
   EXPECT_GT(counts[1], 10);
+}
+
+// A body 1 m above the floor goes through these points, a pose each 0.2 m.
+std::vector<Eigen::Vector3d> PathOver(const std::vector<Eigen::Vector3d>& feet_map) {
+  std::vector<Eigen::Vector3d> path_map;
+  for (size_t i = 0; i + 1 < feet_map.size(); ++i) {
+    const Eigen::Vector3d way = feet_map[i + 1] - feet_map[i];
+    const int steps = std::max(1, static_cast<int>(way.norm() / 0.2));
+    for (int step = 0; step < steps; ++step) {
+      path_map.push_back(feet_map[i] + way * step / steps + Eigen::Vector3d(0, 0, 1));
+    }
+  }
+  path_map.push_back(feet_map.back() + Eigen::Vector3d(0, 0, 1));
+  return path_map;
+}
+
+const std::vector<Eigen::Vector3d> kUpTheStairs = {{8.0, 1.0, 0.0}, {1.5, 1.0, 0.0},
+                                                   {1.5, 2.0, 0.0}, {1.5, 6.0, 3.0},
+                                                   {1.5, 7.0, 3.0}, {8.0, 7.0, 3.0}};
+
+PlaceGraph PlacesOfTwoStoreys(const std::vector<Eigen::Vector3d>& path_map,
+                              const PlaceOptions& more = {}) {
+  PlaceOptions options = more;
+  options.floors_m = {0.0, 3.0};
+  return ExtractPlaces(TwoStoreys(), path_map, options);
+}
+
+std::vector<Place> PlacesOn(PlaceKind kind, const PlaceGraph& graph) {
+  std::vector<Place> places;
+  for (const Place& place : graph.places) {
+    if (place.kind == kind) places.push_back(place);
+  }
+  return places;
+}
+
+// Whether links lead from the place that is nearest to one point to the one nearest to another.
+bool IsWayBetween(const Eigen::Vector3d& from_map, const Eigen::Vector3d& to_map,
+                  const PlaceGraph& graph) {
+  const auto nearest = [&](const Eigen::Vector3d& point_map) {
+    size_t best = 0;
+    for (size_t i = 0; i < graph.places.size(); ++i) {
+      const auto distance_m = [&](size_t place) {
+        return (graph.places[place].position_map - point_map).norm();
+      };
+      if (distance_m(i) < distance_m(best)) best = i;
+    }
+    return static_cast<int>(best);
+  };
+  DisjointSets sets(graph.places.size());
+  for (const PlaceLink& link : graph.links) sets.Merge(link.from, link.to);
+  return sets.Find(nearest(from_map)) == sets.Find(nearest(to_map));
+}
+
+TEST(LinkStoreys, JoinsFloorsByStairsThatTheRobotWent) {
+  const PlaceGraph graph = PlacesOfTwoStoreys(PathOver(kUpTheStairs));
+  EXPECT_TRUE(IsWayBetween({8, 4, 0}, {8, 4, 3}, graph));
+  const std::vector<Place> stairs = PlacesOn(PlaceKind::kStairs, graph);
+  ASSERT_GE(stairs.size(), 3u);
+  for (const Place& place : stairs) {
+    EXPECT_EQ(place.floor_z_m, place.position_map.z() < 1.5 ? 0.0 : 3.0);
+    EXPECT_NEAR(place.position_map.x(), 1.5, 0.2);
+    EXPECT_EQ(place.clearance_m, PlaceOptions().robot_radius_m);
+  }
+  for (const PlaceLink& link : graph.links) {
+    const Eigen::Vector3d way = graph.places[static_cast<size_t>(link.to)].position_map -
+                                graph.places[static_cast<size_t>(link.from)].position_map;
+    EXPECT_LE(std::abs(way.z()), 2.0);
+    EXPECT_LT(link.from, link.to);
+  }
+}
+
+TEST(LinkStoreys, DoesNotJoinFloorsByAStairwellThatWasOnlySeen) {
+  // The robot was on both floors, and nobody knows how it came up.
+  std::vector<Eigen::Vector3d> path_map = PathOver({{8, 1, 0}, {1.5, 1, 0}});
+  for (const Eigen::Vector3d& point : PathOver({{8, 7, 3}, {6, 7, 3}})) path_map.push_back(point);
+  const PlaceGraph graph = PlacesOfTwoStoreys(path_map);
+  EXPECT_FALSE(IsWayBetween({8, 4, 0}, {8, 4, 3}, graph));
+  EXPECT_EQ(PlacesOn(PlaceKind::kFloor, graph).size(), graph.places.size());
+}
+
+TEST(LinkStoreys, TellsAWayOnceHoweverOftenItWasGone) {
+  std::vector<Eigen::Vector3d> feet_map = kUpTheStairs;
+  const size_t once = PlacesOn(PlaceKind::kStairs, PlacesOfTwoStoreys(PathOver(feet_map))).size();
+  feet_map.insert(feet_map.end(), kUpTheStairs.rbegin(), kUpTheStairs.rend());
+  EXPECT_EQ(PlacesOn(PlaceKind::kStairs, PlacesOfTwoStoreys(PathOver(feet_map))).size(), once);
+}
+
+TEST(LinkStoreys, ForgetsAWayThatWasBegunAndNotEnded) {
+  const PlaceGraph graph = PlacesOfTwoStoreys(
+      PathOver({{8, 1, 0}, {1.5, 1, 0}, {1.5, 2, 0}, {1.5, 4, 1.5}, {1.5, 2, 0}, {8, 1, 0}}));
+  EXPECT_EQ(PlacesOn(PlaceKind::kFloor, graph).size(), graph.places.size());
+}
+
+TEST(LinkStoreys, KnowsLiftsAndRampsFromStairs) {
+  // A cabin of which only the begin and the end of the ride were seen.
+  std::vector<Eigen::Vector3d> path_map = PathOver({{4, 1, 0}, {8, 4, 0}});
+  for (const Eigen::Vector3d& point : PathOver({{8, 4, 3}, {4, 7, 3}})) path_map.push_back(point);
+  const PlaceGraph lift = PlacesOfTwoStoreys(path_map);
+  EXPECT_TRUE(IsWayBetween({4, 1, 0}, {4, 7, 3}, lift));
+  EXPECT_GE(PlacesOn(PlaceKind::kLift, lift).size(), 2u);
+  PlaceOptions options;
+  options.ramp_slope = 1.0;
+  const PlaceGraph ramp = PlacesOfTwoStoreys(PathOver(kUpTheStairs), options);
+  EXPECT_FALSE(PlacesOn(PlaceKind::kRamp, ramp).empty());
+  options = {};
+  options.lift_run_m = 9.0;
+  EXPECT_FALSE(
+      PlacesOn(PlaceKind::kLift, PlacesOfTwoStoreys(PathOver(kUpTheStairs), options)).empty());
+}
+
+TEST(LinkStoreys, ForgivesHeightsThatAreALittleOff) {
+  std::vector<Eigen::Vector3d> feet_map = kUpTheStairs;
+  for (Eigen::Vector3d& point : feet_map) point.z() *= 1.06;
+  PlaceOptions options;
+  EXPECT_TRUE(IsWayBetween({8, 4, 0}, {8, 4, 3}, PlacesOfTwoStoreys(PathOver(feet_map), options)));
+  options.landing_m = 0.05;
+  EXPECT_FALSE(IsWayBetween({8, 4, 0}, {8, 4, 3}, PlacesOfTwoStoreys(PathOver(feet_map), options)));
 }
 
 }  // namespace
