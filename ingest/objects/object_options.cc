@@ -105,6 +105,14 @@ constexpr OptionField<RelationOptions> kRelationFields[] = {
      "What stands on something is this near to its top, metres: voxels round both sides"},
     {"relation-carried", &RelationOptions::carried_share, 0.0, 1.0,
      "... with so much of its footprint above it: else it would fall"},
+    {"relation-edge-height", &RelationOptions::edge_height_m, 0.0, 5.0,
+     "... or, where nothing carries it so, what it touches the upper edge of, if that is so high, "
+     "metres: of counters often the front alone is seen, and what stands on the floor beside "
+     "something flat stands on nothing"},
+    {"relation-edge-gap", &RelationOptions::edge_gap_m, 0.0, 5.0,
+     "... or has beside it, this near, where it hangs on nothing either, metres: nothing floats, "
+     "and "
+     "of the tops of tables much is hidden or seen at a slant"},
     {"relation-inside", &RelationOptions::inside_share, 0.0, 1.0,
      "What is in something has so much of its volume in the box of it: most of it"},
     {"relation-inside-slack", &RelationOptions::inside_slack_m, 0.0, 5.0,

@@ -68,6 +68,8 @@ struct RelationOptions {
   double larger_min = 1.5;
   double contact_m = 0.12;
   double carried_share = 0.5;
+  double edge_height_m = 0.3;
+  double edge_gap_m = 0.25;
   double inside_share = 0.75;
   double inside_slack_m = 0.05;
   double container_min = 2.0;

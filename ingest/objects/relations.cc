@@ -91,6 +91,24 @@ std::optional<Support> SupportOf(const TrackedObject& a, const Box3d& a_box, con
   return Support{around.is_covered ? relations::kIn : relations::kOn, inside};
 }
 
+// ON, for what nothing carries by SupportOf and what is well above the floor: the side of the other
+// reaches up to its underside. Of cupboards and counters often the front alone is seen.
+std::optional<Support> EdgeSupportOf(const Box3d& a_box, const Box3d& b_box, double gap_m_max,
+                                     const RelationOptions& options) {
+  if (std::abs(a_box.min().z() - b_box.max().z()) > options.contact_m) return std::nullopt;
+  if (a_box.max().z() <= b_box.max().z()) return std::nullopt;
+  // A chair beside a carpet stands on the floor.
+  if (b_box.sizes().z() < options.edge_height_m) return std::nullopt;
+  const auto floor_of = [](const Box3d& box) {
+    return Eigen::AlignedBox2d(Eigen::Vector2d(box.min().head<2>()),
+                               Eigen::Vector2d(box.max().head<2>()));
+  };
+  const double gap_m = floor_of(a_box).exteriorDistance(floor_of(b_box));
+  if (gap_m > gap_m_max) return std::nullopt;
+  // Where several touch, the one with most of it, and then the nearest.
+  return Support{relations::kOn, SharedFootprint(a_box, b_box) - gap_m};
+}
+
 void KeepBest(const std::optional<Support>& support, int64_t second,
               std::optional<std::pair<Support, int64_t>>* best) {
   if (!support.has_value()) return;
@@ -116,6 +134,7 @@ std::vector<ObjectRelation> FindRelations(const std::vector<TrackedObject>& obje
   for (const TrackedObject& object : objects) boxes.push_back(SolidBox(object.cluster));
   std::vector<ObjectRelation> relations;
   std::vector<std::optional<std::pair<Support, int64_t>>> support(objects.size());
+  std::vector<std::optional<std::pair<Support, int64_t>>> edge_support(objects.size());
   for (const auto& [low, high] : NearPairs(boxes, options.near_m)) {
     const auto i = static_cast<size_t>(low);
     const auto j = static_cast<size_t>(high);
@@ -129,8 +148,12 @@ std::vector<ObjectRelation> FindRelations(const std::vector<TrackedObject>& obje
              &support[i]);
     KeepBest(SupportOf(objects[j], boxes[j], objects[i], boxes[i], options), objects[i].id,
              &support[j]);
+    const double touch_m = options.inside_slack_m;
+    KeepBest(EdgeSupportOf(boxes[i], boxes[j], touch_m, options), objects[j].id, &edge_support[i]);
+    KeepBest(EdgeSupportOf(boxes[j], boxes[i], touch_m, options), objects[i].id, &edge_support[j]);
   }
   for (size_t i = 0; i < objects.size(); ++i) {
+    if (!support[i].has_value()) support[i] = edge_support[i];
     if (!support[i].has_value()) continue;
     relations.push_back({objects[i].id, support[i]->first.relation, support[i]->second, 1.0});
   }
@@ -139,6 +162,20 @@ std::vector<ObjectRelation> FindRelations(const std::vector<TrackedObject>& obje
         return std::tie(a.first, a.relation, a.second) < std::tie(b.first, b.relation, b.second);
       });
   return relations;
+}
+
+std::optional<int64_t> CarrierBeside(const TrackedObject& object,
+                                     const std::vector<TrackedObject>& objects,
+                                     const RelationOptions& options) {
+  const Box3d box = SolidBox(object.cluster);
+  std::optional<std::pair<Support, int64_t>> best;
+  for (const TrackedObject& other : objects) {
+    if (other.id == object.id) continue;
+    KeepBest(EdgeSupportOf(box, SolidBox(other.cluster), options.edge_gap_m, options), other.id,
+             &best);
+  }
+  if (!best.has_value()) return std::nullopt;
+  return best->second;
 }
 
 }  // namespace dsg::ingest

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,11 +23,19 @@ struct ObjectRelation {
 };
 
 /// ON and IN of boxes, at most one of both for an object: what lies in a box is IN it, but ON it
-/// when the points show that nothing covers or encloses it. NEAR below a distance of the
+/// when the points show that nothing covers or encloses it. What nothing carries so, well above the
+/// floor, is ON what it touches the upper edge of. NEAR below a distance of the
 /// boxes along the axes, low id first; LARGER_THAN of near pairs by more than a ratio.
 /// Order: ascending by first, relation, second. Cost: n log n by a grid.
 std::vector<ObjectRelation> FindRelations(const std::vector<TrackedObject>& objects,
                                           const RelationOptions& options = {});
+
+/// The object that carries one which FindRelations found no support for and which hangs on nothing:
+/// nothing floats, so it is on what has its top at its underside a little beside it, of which more
+/// was not seen. Requires: it is well above the floor. Cost: linear.
+std::optional<int64_t> CarrierBeside(const TrackedObject& object,
+                                     const std::vector<TrackedObject>& objects,
+                                     const RelationOptions& options);
 
 /// Pairs (object, object) that were in one picture; counts pictures. Input of CO_VISIBLE.
 /// Ids below are of ObjectTracker; `visible`: objects in one picture, ascending.

@@ -407,28 +407,52 @@ void StaticLayers::FindRoomsOf(const DistanceField& field, LayerParts* parts) {
     for (const int place : rooms[i].places) parts->room_of_place[place] = static_cast<int>(i);
     parts->rooms[i].room = std::move(rooms[i]);
   }
+  JoinStoreys(parts);
   RelateStructures(parts);
   ClassifyRooms(parts);
+}
+
+void StaticLayers::JoinStoreys(LayerParts* parts) {
+  std::set<std::pair<int, int>> joined;
+  for (const PlaceLink& link : parts->places.links) {
+    const int a = parts->room_of_place[static_cast<size_t>(link.from)];
+    const int b = parts->room_of_place[static_cast<size_t>(link.to)];
+    if (a < 0 || b < 0 ||
+        parts->rooms[static_cast<size_t>(a)].storey ==
+            parts->rooms[static_cast<size_t>(b)].storey) {
+      continue;
+    }
+    joined.insert(std::minmax(a, b));
+  }
+  for (const auto& [a, b] : joined) parts->adjacent.push_back({a, b});
 }
 
 void StaticLayers::RelateStructures(LayerParts* parts) const {
   std::vector<FoundRoom> rooms;
   for (const RoomPart& part : parts->rooms) rooms.push_back(part.room);
   parts->encloses = EnclosesOf(parts->structures, rooms, options_.structures);
-  std::set<int64_t> resting;
+  std::set<int64_t> supported;
   for (const ObjectRelation& relation : parts->relations) {
-    if (relation.relation == relations::kOn) resting.insert(relation.first);
+    if (relation.relation == relations::kOn || relation.relation == relations::kIn) {
+      supported.insert(relation.first);
+    }
   }
   for (size_t i = 0; i < parts->objects.size(); ++i) {
-    const ObjectCluster& cluster = parts->objects[i].cluster;
+    const TrackedObject& object = parts->objects[i];
     const int place = parts->place_of_object[i];
-    if (place < 0) continue;
-    const Box3d box =
-        TransformBox(cluster.map_T_box, Box3d(-0.5 * cluster.size, 0.5 * cluster.size));
-    const std::optional<int> piece =
-        AttachedTo(box, parts->places.places[place].floor_z_m,
-                   resting.contains(parts->objects[i].id), parts->structures, options_.structures);
-    if (piece.has_value()) parts->attached.push_back({static_cast<int>(i), *piece});
+    if (place < 0 || supported.contains(object.id)) continue;
+    const Box3d box = TransformBox(object.cluster.map_T_box,
+                                   Box3d(-0.5 * object.cluster.size, 0.5 * object.cluster.size));
+    const double floor_z_m = parts->places.places[static_cast<size_t>(place)].floor_z_m;
+    if (box.min().z() <= floor_z_m + options_.structures.hang_above_m) continue;
+    const std::optional<int> piece = AttachedTo(box, parts->structures, options_.structures);
+    if (piece.has_value()) {
+      parts->attached.push_back({static_cast<int>(i), *piece});
+      continue;
+    }
+    const std::optional<int64_t> carrier =
+        CarrierBeside(object, parts->objects, options_.objects.relations);
+    if (carrier.has_value()) parts->relations.push_back({object.id, relations::kOn, *carrier, 1.0});
   }
 }
 

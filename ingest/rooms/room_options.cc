@@ -238,7 +238,8 @@ constexpr OptionField<StructureOptions> kStructureFields[] = {
     {"structure-over", &StructureOptions::over_m2, 0.0, 100.0,
      "Least area that a floor or ceiling shares with its room, square metres: more than its rim"},
     {"structure-hang-gap", &StructureOptions::hang_gap_m, 0.0, 2.0,
-     "What is this near to a wall hangs on it, metres: boxes are rough by about a hand"},
+     "What is this near to a wall, ceiling or pillar hangs on it, metres: boxes are rough by about "
+     "a hand"},
     {"structure-hang-above", &StructureOptions::hang_above_m, 0.0, 5.0,
      "... if it is this high above the floor, metres: what is lower stands"},
     {"structure-same-angle", &StructureOptions::same_cosine, -1.0, 1.0,

@@ -88,6 +88,21 @@ bool Bounds(const StructurePiece& piece, const FoundRoom& room, const StructureO
   return WallBounds(piece, room, options);
 }
 
+// How far a thing is from the side of a piece on which things hang, metres; nullopt = it is not on
+// that side.
+std::optional<double> HangGap(const StructurePiece& piece, const Box3d& thing_map) {
+  if (piece.type == "pillar") return piece.box_map.exteriorDistance(thing_map);
+  if (piece.type == "ceiling") {
+    return std::abs(piece.box_map.center().z() - thing_map.max().z());
+  }
+  if (piece.type != "wall") return std::nullopt;
+  const double reach_m = piece.normal_map.cwiseAbs().dot(0.5 * thing_map.sizes());
+  const double middle_m = piece.normal_map.dot(thing_map.center()) + piece.offset_m;
+  if (middle_m < 0.0) return std::nullopt;
+  // Before the wall, or sunk into it as far as a noisy box may be.
+  return std::abs(middle_m - reach_m);
+}
+
 }  // namespace
 
 std::vector<std::pair<int, int>> EnclosesOf(const std::vector<StructurePiece>& pieces,
@@ -104,24 +119,18 @@ std::vector<std::pair<int, int>> EnclosesOf(const std::vector<StructurePiece>& p
   return pairs;
 }
 
-std::optional<int> AttachedTo(const Box3d& box_map, double floor_z_m, bool rests_on_thing,
-                              const std::vector<StructurePiece>& pieces,
+std::optional<int> AttachedTo(const Box3d& box_map, const std::vector<StructurePiece>& pieces,
                               const StructureOptions& options) {
-  if (rests_on_thing || box_map.isEmpty()) return std::nullopt;
-  if (box_map.min().z() <= floor_z_m + options.hang_above_m) return std::nullopt;
+  if (box_map.isEmpty()) return std::nullopt;
   std::optional<int> best;
   double best_m = options.hang_gap_m;
   for (size_t i = 0; i < pieces.size(); ++i) {
-    const StructurePiece& wall = pieces[i];
-    if (wall.type != "wall" || wall.box_map.isEmpty()) continue;
-    if (wall.box_map.exteriorDistance(box_map) >= options.hang_gap_m) continue;
-    const Eigen::Vector3d half = 0.5 * box_map.sizes();
-    const double reach_m = wall.normal_map.cwiseAbs().dot(half);
-    const double middle_m = wall.normal_map.dot(box_map.center()) + wall.offset_m;
-    // Before the wall, or sunk into it as far as a noisy box may be.
-    const double gap_m = std::abs(middle_m - reach_m);
-    if (middle_m < 0.0 || gap_m >= best_m) continue;
-    best_m = gap_m;
+    const StructurePiece& piece = pieces[i];
+    if (piece.box_map.isEmpty()) continue;
+    if (piece.box_map.exteriorDistance(box_map) >= options.hang_gap_m) continue;
+    const std::optional<double> gap_m = HangGap(piece, box_map);
+    if (!gap_m.has_value() || *gap_m >= best_m) continue;
+    best_m = *gap_m;
     best = static_cast<int>(i);
   }
   return best;

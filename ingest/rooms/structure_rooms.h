@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which rooms a wall, floor or ceiling bounds, and which wall a thing hangs on.
+// Which rooms a wall, floor or ceiling bounds, and what a thing hangs on.
 // Refuses to guess across walls: a wall bounds the room that it faces.
 #pragma once
 
@@ -18,10 +18,9 @@ std::vector<std::pair<int, int>> EnclosesOf(const std::vector<StructurePiece>& p
                                             const std::vector<FoundRoom>& rooms,
                                             const StructureOptions& options);
 
-/// The wall that a thing hangs on: nearest of those near its box, which is above the floor. nullopt
-/// for what stands on the floor or, as `rests_on_thing` says, on another thing.
-std::optional<int> AttachedTo(const Box3d& box_map, double floor_z_m, bool rests_on_thing,
-                              const std::vector<StructurePiece>& pieces,
+/// The wall, ceiling or pillar that a thing hangs on: nearest of those near its box.
+/// Requires: it stands neither on the floor nor on another thing.
+std::optional<int> AttachedTo(const Box3d& box_map, const std::vector<StructurePiece>& pieces,
                               const StructureOptions& options);
 
 }  // namespace dsg::ingest

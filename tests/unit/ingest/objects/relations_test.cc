@@ -35,6 +35,26 @@ TEST(Relations, PutACupOnATable) {
   EXPECT_EQ(found.size(), 3u);
 }
 
+TEST(Relations, PutAThingOnACounterOfWhichOnlyTheFrontWasSeen) {
+  const TrackedObject front = BoxObject(1, {0.0, 0.0, 0.0}, {0.07, 2.0, 0.88});
+  const TrackedObject machine = BoxObject(2, {0.08, 0.9, 0.89}, {0.3, 0.3, 0.38});
+  EXPECT_TRUE(WeightOf(FindRelations({front, machine}), 2, relations::kOn, 1).has_value());
+  // What carries it for sure goes before.
+  const TrackedObject tray = BoxObject(3, {0.05, 0.8, 0.8}, {0.5, 0.5, 0.09});
+  const auto found = FindRelations({front, machine, tray});
+  EXPECT_TRUE(WeightOf(found, 2, relations::kOn, 3).has_value());
+  EXPECT_FALSE(WeightOf(found, 2, relations::kOn, 1).has_value());
+  // Too far behind it, and beside a carpet.
+  const TrackedObject behind = BoxObject(4, {0.2, 0.9, 0.89}, {0.3, 0.3, 0.38});
+  EXPECT_FALSE(WeightOf(FindRelations({front, behind}), 4, relations::kOn, 1).has_value());
+  EXPECT_EQ(CarrierBeside(behind, {front, behind}, {}), 1);
+  const TrackedObject lamp = BoxObject(7, {0.2, 0.9, 1.5}, {0.3, 0.3, 0.38});
+  EXPECT_FALSE(CarrierBeside(lamp, {front, lamp}, {}).has_value());
+  const TrackedObject carpet = BoxObject(5, {0.0, 0.0, 0.0}, {1.0, 1.0, 0.02});
+  const TrackedObject chair = BoxObject(6, {1.02, 0.0, 0.0}, {0.5, 0.5, 0.9});
+  EXPECT_FALSE(WeightOf(FindRelations({carpet, chair}), 6, relations::kOn, 5).has_value());
+}
+
 TEST(Relations, PutABowlInAShelf) {
   TrackedObject shelf = BoxObject(1, {0.0, 0.0, 0.0}, {1.2, 0.36, 1.9});
   const TrackedObject bowl = BoxObject(2, {0.5, 0.1, 0.95}, {0.2, 0.2, 0.1});

@@ -265,14 +265,29 @@ TEST(StructureRooms, AThingHangsOnTheWallThatItTouches) {
   const MeshBlock mesh = BoxRoom();
   const std::vector<StructurePiece> pieces = FindStructures({&mesh}, Classes(), {});
   const Box3d board(Eigen::Vector3d(1.0, 0.02, 0.9), Eigen::Vector3d(2.8, 0.06, 2.1));
-  const std::optional<int> wall = AttachedTo(board, 0.0, false, pieces, {});
+  const std::optional<int> wall = AttachedTo(board, pieces, {});
   ASSERT_TRUE(wall.has_value());
   EXPECT_GT(pieces[static_cast<size_t>(*wall)].normal_map.y(), 0.99);
-  EXPECT_FALSE(AttachedTo(board, 0.0, true, pieces, {}).has_value());
-  const Box3d shelf(Eigen::Vector3d(1.0, 0.02, 0.0), Eigen::Vector3d(2.8, 0.4, 1.9));
-  EXPECT_FALSE(AttachedTo(shelf, 0.0, false, pieces, {}).has_value());
   const Box3d lamp(Eigen::Vector3d(2.0, 2.0, 1.5), Eigen::Vector3d(2.2, 2.2, 1.7));
-  EXPECT_FALSE(AttachedTo(lamp, 0.0, false, pieces, {}).has_value());
+  EXPECT_FALSE(AttachedTo(lamp, pieces, {}).has_value());
+}
+
+TEST(StructureRooms, AThingHangsOnACeilingAndOnAPillarToo) {
+  StructurePiece ceiling;
+  ceiling.type = "ceiling";
+  ceiling.box_map = Box3d(Eigen::Vector3d(0, 0, 2.5), Eigen::Vector3d(4, 4, 2.52));
+  StructurePiece pillar;
+  pillar.type = "pillar";
+  pillar.box_map = Box3d(Eigen::Vector3d(2, 2, 0), Eigen::Vector3d(2.4, 2.4, 2.5));
+  StructurePiece floor = ceiling;
+  floor.type = "floor";
+  const std::vector<StructurePiece> pieces = {floor, ceiling, pillar};
+  const Box3d lamp(Eigen::Vector3d(1.0, 1.0, 2.1), Eigen::Vector3d(1.3, 1.3, 2.48));
+  EXPECT_EQ(AttachedTo(lamp, pieces, {}), 1);
+  const Box3d hanging_low(Eigen::Vector3d(1.0, 1.0, 1.8), Eigen::Vector3d(1.3, 1.3, 2.2));
+  EXPECT_FALSE(AttachedTo(hanging_low, pieces, {}).has_value());
+  const Box3d clock(Eigen::Vector3d(2.1, 1.95, 1.6), Eigen::Vector3d(2.3, 2.0, 1.8));
+  EXPECT_EQ(AttachedTo(clock, pieces, {}), 2);
 }
 
 }  // namespace
