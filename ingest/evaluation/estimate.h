@@ -10,6 +10,7 @@
 
 #include "ingest/evaluation/objects.h"
 #include "ingest/evaluation/places.h"
+#include "ingest/evaluation/relations.h"
 #include "ingest/evaluation/rooms.h"
 #include "ingest/evaluation/trajectory.h"
 #include "schema/model/layer.h"
@@ -54,6 +55,8 @@ struct Estimate {
   int room_count = 0;
   std::vector<RoomPair> adjacent_rooms;
   std::vector<Holding> holdings;
+  /// From object to object or structure, of those that hold at the end.
+  std::vector<EstimatedRelation> relations;
   /// What a reader of the figures should know.
   std::vector<std::string> notes;
 };

@@ -151,22 +151,84 @@ RoomResult ScoreRooms(const Estimate& estimate, const truth::Truth& truth, const
   return EvaluateRooms(predicted, rooms, map, options);
 }
 
-PickResult ScorePicks(const Estimate& estimate, const truth::Truth& truth,
-                      const std::vector<int>& truth_of_object, const HumanResult& humans,
-                      const PickOptions& options) {
+/// Where an object stood until it was picked up, or until the end.
+struct Standing {
+  int object = 0;
+  Eigen::Vector3d position_map = Eigen::Vector3d::Zero();
+  /// Index of the pick that ended it; -1 = none.
+  int pick = -1;
+};
+
+std::vector<Standing> Standings(const truth::Truth& truth) {
+  std::vector<Standing> all;
+  // Of each object the place in `all` where it stood last.
+  std::vector<size_t> last;
+  for (size_t i = 0; i < truth.objects.size(); ++i) {
+    last.push_back(all.size());
+    all.push_back({static_cast<int>(i), truth.objects[i].map_T_object.position});
+  }
+  for (size_t i = 0; i < truth.picks.size(); ++i) {
+    const truth::Pick& pick = truth.picks[i];
+    size_t& standing = last[static_cast<size_t>(pick.object)];
+    all[standing].pick = static_cast<int>(i);
+    // Else it is carried until the end.
+    if (pick.place_ns == kTimeMax) continue;
+    standing = all.size();
+    all.push_back({pick.object, pick.map_T_object_after.position});
+  }
+  return all;
+}
+
+// What stood where a node is: nearest of its class, nullptr = nothing within the gate. Nodes are
+// not shared out: one may be of before a pick, another of after it.
+const Standing* StandingOf(const EstimatedObject& node, const std::vector<Standing>& standings,
+                           const truth::Truth& truth, double gate_m) {
+  const Standing* nearest = nullptr;
+  double least_m = gate_m;
+  for (const Standing& standing : standings) {
+    if (truth.objects[static_cast<size_t>(standing.object)].class_name != node.class_name) continue;
+    const double distance_m = (standing.position_map - node.position_map).norm();
+    if (distance_m >= least_m) continue;
+    least_m = distance_m;
+    nearest = &standing;
+  }
+  return nearest;
+}
+
+std::vector<TruePick> TruePicks(const Estimate& estimate, const truth::Truth& truth,
+                                const std::vector<Standing>& standings, double gate_m) {
   std::vector<TruePick> picks;
   for (const truth::Pick& pick : truth.picks) {
     picks.push_back({pick.object, pick.human, pick.pick_ns, pick.observed});
   }
+  for (const EstimatedObject& node : estimate.objects) {
+    const Standing* standing = StandingOf(node, standings, truth, gate_m);
+    if (standing == nullptr || standing->pick < 0) continue;
+    TruePick& pick = picks[static_cast<size_t>(standing->pick)];
+    if (node.valid.from_ns > pick.pick_ns) continue;
+    pick.is_mapped = true;
+    pick.is_noticed |= node.valid.to_ns != kTimeMax;
+  }
+  return picks;
+}
+
+PickResult ScorePicks(const Estimate& estimate, const truth::Truth& truth,
+                      const HumanResult& humans, const EvaluateOptions& options) {
+  const std::vector<Standing> standings = Standings(truth);
+  const double gate_m = options.objects.gate_m;
   std::vector<PredictedPick> predicted;
   for (const Holding& holding : estimate.holdings) {
     PredictedPick pick{-1, -1, holding.from_ns, std::clamp(holding.probability, 0.0, 1.0)};
-    if (holding.object >= 0) pick.object = truth_of_object[static_cast<size_t>(holding.object)];
+    if (holding.object >= 0) {
+      const EstimatedObject& node = estimate.objects[static_cast<size_t>(holding.object)];
+      const Standing* standing = StandingOf(node, standings, truth, gate_m);
+      if (standing != nullptr) pick.object = standing->object;
+    }
     const auto human = humans.human_of_track.find(holding.track);
     if (human != humans.human_of_track.end()) pick.human = human->second;
     predicted.push_back(pick);
   }
-  return EvaluatePicks(predicted, picks, options);
+  return EvaluatePicks(predicted, TruePicks(estimate, truth, standings, gate_m), options.picks);
 }
 
 void AppendNotes(const Report& report, const Estimate& estimate, std::vector<std::string>* notes) {
@@ -210,8 +272,12 @@ Report Evaluate(const Estimate& estimate, const truth::Truth& truth, const Evalu
   tell("scoring people", 0.05);
   report.humans = ScoreHumans(estimate, truth, options.humans);
   tell("scoring objects", 0.1);
-  report.objects = EvaluateObjects(estimate.objects, TrueObjects(truth), options.objects);
-  report.picks = ScorePicks(estimate, truth, report.objects.truth_of, report.humans, options.picks);
+  const std::vector<TrueObject> objects = TrueObjects(truth);
+  report.objects = EvaluateObjects(estimate.objects, objects, options.objects);
+  report.relations =
+      EvaluateRelations(estimate.relations, estimate.objects, report.objects.truth_of, objects,
+                        options.objects, options.relations);
+  report.picks = ScorePicks(estimate, truth, report.humans, options);
   tell("scoring places and rooms", 0.15);
   const GridMap map(&truth.free_grid);
   report.places = EvaluatePlaces(estimate.places, estimate.place_edges, map, options.places);

@@ -15,6 +15,7 @@ struct EvaluateOptions {
   MeshOptions mesh;
   HumanOptions humans;
   ObjectOptions objects;
+  RelationScoreOptions relations;
   PlaceOptions places;
   RoomOptions rooms;
   PickOptions picks;

@@ -185,6 +185,7 @@ HumanResult EvaluateHumans(const std::vector<TrueDetection>& detections,
   for (const auto& [track_stamp, explanation] : explanations) {
     const auto& [prior, detection] = explanation;
     if (detection->human < 0) continue;
+    ++result.filtered_count;
     filtered.Add(detection->human, (prior->torso_map - detection->torso_map).norm());
   }
   result.raw_m = raw.Mean();

@@ -64,6 +64,8 @@ struct HumanResult {
   /// Poses that no true detection explains. They count as false in IDF1 and MOTA.
   int64_t unexplained_pose_count = 0;
   int64_t detection_count = 0;
+  /// Detections behind filtered_m.
+  int64_t filtered_count = 0;
   /// The human that most poses of a track are of.
   std::map<int, int> human_of_track;
 };

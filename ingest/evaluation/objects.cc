@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "ingest/evaluation/rigid_fit.h"
 #include "schema/matching/assignment.h"
@@ -45,8 +46,8 @@ struct Sums {
 
 void AddKnownMatch(const TrueObject& object, const Pose3d& map_T_model, Sums* sums) {
   const Pose3d pose = NearestPose(object, map_T_model.position);
-  const Eigen::Vector3d origin = pose * Eigen::Vector3d(0.0, 0.0, -0.5 * object.size.z());
-  sums->error_m += (map_T_model.position - origin).norm();
+  const Eigen::Vector3d center = map_T_model * Eigen::Vector3d(0.0, 0.0, 0.5 * object.size.z());
+  sums->error_m += (center - pose.position).norm();
   sums->yaw_rad += YawError(map_T_model.orientation, pose.orientation, object.symmetry_order);
   ++sums->match_count;
 }
@@ -105,6 +106,25 @@ void AddEstimates(const std::vector<EstimatedObject>& estimate,
       unknown->error_m += DistanceTo(object, node.position_map);
       ++unknown->match_count;
     }
+  }
+}
+
+// Further apart than any two things of a map.
+constexpr double kNoGateM = 1e6;
+
+void AddUngated(const std::vector<EstimatedObject>& estimate, const std::vector<TrueObject>& truth,
+                ObjectOptions options, ObjectScore* unknown_score, ObjectScore* known_score) {
+  options.gate_m = kNoGateM;
+  Sums unknown;
+  Sums known;
+  AddEstimates(estimate, truth, options, MatchObjects(estimate, truth, options.gate_m), &unknown,
+               &known);
+  unknown.truth_count = unknown_score->truth_count;
+  known.truth_count = known_score->truth_count;
+  for (const auto& [sums, score] : {std::pair(unknown, unknown_score), {known, known_score}}) {
+    const ObjectScore ungated = ScoreOf(sums, /*is_known=*/false);
+    score->mean_ungated_m = ungated.mean_error_m;
+    score->found_ratio_ungated = ungated.found_ratio;
   }
 }
 
@@ -190,6 +210,7 @@ ObjectResult EvaluateObjects(const std::vector<EstimatedObject>& estimate,
   result.unknown = ScoreOf(unknown, /*is_known=*/false);
   // Not one model: nobody tried to fit any.
   if (has_models) result.known = ScoreOf(known, /*is_known=*/true);
+  AddUngated(estimate, truth, options, &result.unknown, &result.known);
   CountMergesAndSplits(estimate, truth, options, &result);
   return result;
 }

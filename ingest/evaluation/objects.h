@@ -30,6 +30,8 @@ struct EstimatedObject {
   Box3d box_map;
   /// The CAD model's pose, origin in the middle of the model's floor face.
   std::optional<Pose3d> map_T_model;
+  /// When it was there, as the map says.
+  Interval valid{};
 };
 
 struct ObjectOptions {
@@ -43,6 +45,10 @@ struct ObjectOptions {
 /// Of one kind of object. Units: metres, degrees; shares from 0 to 1.
 struct ObjectScore {
   std::optional<double> mean_error_m;
+  /// The same without a gate: as many pairs of a class as there can be, however far apart; and the
+  /// share of the true objects that then have one.
+  std::optional<double> mean_ungated_m;
+  std::optional<double> found_ratio_ungated;
   /// Known shapes only; modulo the object's symmetry.
   std::optional<double> mean_yaw_deg;
   std::optional<double> found_ratio;
@@ -56,7 +62,8 @@ struct ObjectScore {
 struct ObjectResult {
   /// True objects without a CAD model against nodes without one. Error: of the centre.
   ObjectScore unknown;
-  /// True objects with a CAD model against nodes with one. Error: of the model's origin.
+  /// True objects with a CAD model against nodes with one. Error: of the centre of the true box and
+  /// that of the model there.
   ObjectScore known;
   /// Share of the asked-for objects that are unmatched and lie in a node matched to another one of
   /// their class; share of the matched ones that hold another, unmatched node of their class.

@@ -39,6 +39,11 @@ PickResult EvaluatePicks(const std::vector<PredictedPick>& predicted,
   result.prediction_count = static_cast<int64_t>(predicted.size());
   result.truth_count =
       std::count_if(truth.begin(), truth.end(), [](const TruePick& pick) { return pick.observed; });
+  for (const TruePick& pick : truth) {
+    if (!pick.observed) continue;
+    result.mapped_count += pick.is_mapped ? 1 : 0;
+    result.noticed_count += pick.is_noticed ? 1 : 0;
+  }
   if (predicted.empty()) return result;
   std::vector<size_t> order(predicted.size());
   std::iota(order.begin(), order.end(), size_t{0});
@@ -46,7 +51,7 @@ PickResult EvaluatePicks(const std::vector<PredictedPick>& predicted,
     return predicted[a].probability > predicted[b].probability;
   });
   std::vector<bool> is_used(truth.size(), false);
-  int64_t sure = 0, right = 0, found = 0;
+  int64_t found = 0;
   double squares = 0.0;
   for (const size_t i : order) {
     const PredictedPick& prediction = predicted[i];
@@ -56,13 +61,16 @@ PickResult EvaluatePicks(const std::vector<PredictedPick>& predicted,
     squares += miss * miss;
     if (pick >= 0) is_used[static_cast<size_t>(pick)] = true;
     if (prediction.probability < options.probability_min) continue;
-    ++sure;
+    ++result.sure_count;
     if (pick < 0) continue;
-    ++right;
+    ++result.right_count;
     if (truth[static_cast<size_t>(pick)].observed) ++found;
   }
   result.brier = squares / static_cast<double>(predicted.size());
-  if (sure > 0) result.precision = static_cast<double>(right) / static_cast<double>(sure);
+  if (result.sure_count > 0) {
+    result.precision =
+        static_cast<double>(result.right_count) / static_cast<double>(result.sure_count);
+  }
   if (result.truth_count > 0) {
     result.recall = static_cast<double>(found) / static_cast<double>(result.truth_count);
   }

@@ -15,6 +15,9 @@ struct TruePick {
   int human = 0;
   TimeNs pick_ns = 0;
   bool observed = true;
+  /// Whether the map had the object where it was taken from, and ended it there after the pick.
+  bool is_mapped = false;
+  bool is_noticed = false;
 };
 
 struct PredictedPick {
@@ -41,6 +44,13 @@ struct PickResult {
   std::optional<double> brier;
   int64_t truth_count = 0;
   int64_t prediction_count = 0;
+  /// Predictions at or above probability_min, and the right ones of them.
+  int64_t sure_count = 0;
+  int64_t right_count = 0;
+  /// Of the picks that the cameras could tell: those whose object the map had where it was taken
+  /// from, and those of which it noticed that the object went.
+  int64_t mapped_count = 0;
+  int64_t noticed_count = 0;
 };
 
 /// A prediction is right if a pick of that object by that human is within the window; each pick

@@ -13,6 +13,7 @@
 #include "ingest/evaluation/objects.h"
 #include "ingest/evaluation/picks.h"
 #include "ingest/evaluation/places.h"
+#include "ingest/evaluation/relations.h"
 #include "ingest/evaluation/rooms.h"
 #include "ingest/evaluation/trajectory.h"
 #include "schema/model/ids.h"
@@ -45,6 +46,7 @@ struct Report {
   std::map<uint32_t, std::string> class_names;
   HumanResult humans;
   ObjectResult objects;
+  RelationResult relations;
   PlaceResult places;
   RoomResult rooms;
   PickResult picks;

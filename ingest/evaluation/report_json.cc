@@ -77,6 +77,7 @@ Json HumansJson(const HumanResult& result) {
           {"id_switches", is_tracked ? Json(result.id_switch_count) : Json()},
           {"tracks_per_human", OrNull(result.tracks_per_human)},
           {"detection_count", result.detection_count},
+          {"filtered_count", result.filtered_count},
           {"scored_pose_count", result.scored_pose_count},
           {"unexplained_pose_count", result.unexplained_pose_count}};
 }
@@ -84,12 +85,39 @@ Json HumansJson(const HumanResult& result) {
 Json ScoreJson(const ObjectScore& score, bool is_known) {
   Json out = {{"mean_error_m", OrNull(score.mean_error_m)}};
   if (is_known) out["mean_yaw_deg"] = OrNull(score.mean_yaw_deg);
+  out["mean_ungated_m"] = OrNull(score.mean_ungated_m);
+  out["found_ratio_ungated"] = OrNull(score.found_ratio_ungated);
   out["found_ratio"] = OrNull(score.found_ratio);
   out["f1"] = OrNull(score.f1);
   out["precision"] = OrNull(score.precision);
   out["match_count"] = score.match_count;
   out["truth_count"] = score.truth_count;
   return out;
+}
+
+Json RelationsJson(const RelationResult& result) {
+  Json out = Json::object();
+  for (const auto& [relation, score] : result) {
+    out[relation] = {{"precision", OrNull(score.precision)},
+                     {"recall", OrNull(score.recall)},
+                     {"recall_between_found", OrNull(score.recall_between_found)},
+                     {"estimate_count", score.estimate_count},
+                     {"truth_count", score.truth_count},
+                     {"between_found_count", score.between_found_count}};
+  }
+  return out;
+}
+
+Json PicksJson(const PickResult& result) {
+  return {{"precision", OrNull(result.precision)},
+          {"recall", OrNull(result.recall)},
+          {"brier", OrNull(result.brier)},
+          {"truth_count", result.truth_count},
+          {"mapped_count", result.mapped_count},
+          {"noticed_count", result.noticed_count},
+          {"sure_count", result.sure_count},
+          {"right_count", result.right_count},
+          {"prediction_count", result.prediction_count}};
 }
 
 Json PlacesJson(const PlaceResult& result) {
@@ -130,11 +158,8 @@ std::string ReportToJson(const Report& report) {
                     {"split_rate", OrNull(report.objects.split_rate)}};
   out["places"] = PlacesJson(report.places);
   out["rooms"] = RoomsJson(report.rooms);
-  out["picks"] = {{"precision", OrNull(report.picks.precision)},
-                  {"recall", OrNull(report.picks.recall)},
-                  {"brier", OrNull(report.picks.brier)},
-                  {"truth_count", report.picks.truth_count},
-                  {"prediction_count", report.picks.prediction_count}};
+  out["relations"] = RelationsJson(report.relations);
+  out["picks"] = PicksJson(report.picks);
   out["notes"] = report.notes;
   // Map names are ASCII, but a world's name comes from a file.
   return out.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";

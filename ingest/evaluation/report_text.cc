@@ -62,7 +62,8 @@ void AppendMesh(const MeshResult& result, std::string* out) {
 void AppendHumans(const HumanResult& result, std::string* out) {
   absl::StrAppend(out, "People (Table III; m)\n");
   Row(out, "raw detections, mean over people", Cell(result.raw_m, 1.0, 2));
-  Row(out, "filtered detections", Cell(result.filtered_m, 1.0, 2));
+  Row(out, "filtered detections", Cell(result.filtered_m, 1.0, 2),
+      absl::StrFormat("%d of %d detections", result.filtered_count, result.detection_count));
   Row(out, "tracked", Cell(result.tracked_m, 1.0, 2),
       absl::StrFormat("%d poses, %d unexplained", result.scored_pose_count,
                       result.unexplained_pose_count));
@@ -77,6 +78,8 @@ void AppendObjects(const ObjectResult& result, std::string* out) {
   const auto kind = [out](const std::string& name, const ObjectScore& score) {
     Row(out, name + " shape, error", Cell(score.mean_error_m, 1.0, 2),
         absl::StrFormat("%d of %d", score.match_count, score.truth_count));
+    Row(out, name + " shape, error, no gate", Cell(score.mean_ungated_m, 1.0, 2),
+        absl::StrCat("found ", Percent(score.found_ratio_ungated), " %"));
     Row(out, name + " shape, found (%)", Percent(score.found_ratio));
     Row(out, name + " shape, precision (%)", Percent(score.precision));
     Row(out, name + " shape, F1 (%)", Percent(score.f1));
@@ -86,6 +89,17 @@ void AppendObjects(const ObjectResult& result, std::string* out) {
   Row(out, "known shape, yaw (deg)", Cell(result.known.mean_yaw_deg, 1.0, 1));
   Row(out, "merged (%)", Percent(result.merge_rate));
   Row(out, "split (%)", Percent(result.split_rate));
+}
+
+void AppendRelations(const RelationResult& result, std::string* out) {
+  if (result.empty()) return;
+  absl::StrAppend(out, "Relations (%; precision / recall / recall between things found)\n");
+  for (const auto& [relation, score] : result) {
+    Row(out, relation,
+        absl::StrCat(Percent(score.precision), " / ", Percent(score.recall), " / ",
+                     Percent(score.recall_between_found)),
+        absl::StrFormat("%d told, %d there", score.estimate_count, score.truth_count));
+  }
 }
 
 void AppendPlaces(const PlaceResult& result, std::string* out) {
@@ -120,6 +134,9 @@ void AppendPicks(const PickResult& result, std::string* out) {
   Row(out, "precision (%)", Percent(result.precision),
       absl::StrFormat("%d predictions", result.prediction_count));
   Row(out, "recall (%)", Percent(result.recall), absl::StrFormat("%d picks", result.truth_count));
+  Row(out, "objects in the map / gone / named",
+      absl::StrFormat("%d / %d / %d", result.mapped_count, result.noticed_count,
+                      result.right_count));
   Row(out, "Brier score", Cell(result.brier));
 }
 
@@ -132,6 +149,7 @@ std::string ReportToText(const Report& report) {
   AppendMesh(report.mesh, &out);
   AppendHumans(report.humans, &out);
   AppendObjects(report.objects, &out);
+  AppendRelations(report.relations, &out);
   AppendPlaces(report.places, &out);
   AppendRooms(report.rooms, &out);
   AppendPicks(report.picks, &out);

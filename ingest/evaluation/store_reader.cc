@@ -60,6 +60,7 @@ class Reader {
     EstimatedObject object;
     object.class_name = node.class_name;
     object.position_map = node.map_T_node.position;
+    object.valid = node.valid;
     if (!node.box_node.isEmpty()) object.box_map = node.BoxMap();
     if (node.object.has_value() && node.object->model.has_value()) {
       object.map_T_model = node.object->map_T_model;
@@ -99,7 +100,16 @@ class Reader {
       const int b = IndexOf(rooms_, edge.target);
       if (a >= 0 && b >= 0) out_.adjacent_rooms.emplace_back(a, b);
     }));
+    for (const char* relation : kScoredRelations) {
+      DSG_RETURN_IF_ERROR(scan(relation, [this](const Edge& edge) { AddRelation(edge); }));
+    }
     return scan(relations::kHeldBy, [this](const Edge& edge) { held_.push_back(edge); });
+  }
+
+  void AddRelation(const Edge& edge) {
+    const int source = IndexOf(objects_, edge.source);
+    if (source < 0 || edge.valid.to_ns != kTimeMax) return;
+    out_.relations.push_back({edge.relation, source, IndexOf(objects_, edge.target)});
   }
 
   absl::Status ReadTracks() {

@@ -181,6 +181,8 @@ void AddPeople(const truth::Truth& truth, GraphDelta* delta) {
   held.weight = 1.0;
   held.valid.from_ns = truth.picks[0].pick_ns + kNsPerSecond;
   delta->edges.push_back(held);
+  // Plant and couch are not near each other.
+  delta->edges.push_back(MakeEdge(NodeId('O', 2), relations::kNear, NodeId('O', 3)));
 }
 
 GraphDelta PerfectGraph(const truth::Truth& truth) {
@@ -286,6 +288,10 @@ TEST_F(EvaluateStore, ScoresThePerfectGraphPerfectly) {
   EXPECT_DOUBLE_EQ(*report.picks.precision, 1.0);
   EXPECT_DOUBLE_EQ(*report.picks.recall, 1.0);
   EXPECT_DOUBLE_EQ(*report.picks.brier, 0.0);
+  EXPECT_EQ(report.picks.mapped_count, 1);
+  EXPECT_EQ(report.picks.noticed_count, 0);
+  EXPECT_EQ(report.picks.right_count, 1);
+  EXPECT_DOUBLE_EQ(*report.relations.at(relations::kNear).precision, 0.0);
   EXPECT_TRUE(report.notes.empty()) << report.notes[0];
 }
 

@@ -69,6 +69,16 @@ TEST(ObjectMetric, IsPerfectForTheTruthItself) {
   EXPECT_EQ(result.truth_of, (std::vector<int>{0, 1, 2, 3, 4}));
 }
 
+TEST(ObjectMetric, HidesNothingBehindTheGate) {
+  std::vector<EstimatedObject> nodes = PerfectObjects();
+  nodes[2].position_map.x() += 6.0;
+  const ObjectScore unknown = ScoreObjects(nodes).unknown;
+  EXPECT_NEAR(*unknown.mean_error_m, 0.0, 1e-12);
+  EXPECT_NEAR(*unknown.found_ratio, 2.0 / 3.0, 1e-12);
+  EXPECT_NEAR(*unknown.mean_ungated_m, 2.0, 1e-9);
+  EXPECT_DOUBLE_EQ(*unknown.found_ratio_ungated, 1.0);
+}
+
 TEST(ObjectMetric, MeasuresAShiftAndATurn) {
   std::vector<EstimatedObject> nodes = PerfectObjects();
   for (EstimatedObject& node : nodes) {

@@ -66,6 +66,21 @@ TEST(PickMetric, NeitherAsksForNorPunishesWhatNobodySaw) {
   EXPECT_EQ(result.truth_count, 3);
 }
 
+TEST(PickMetric, CountsHowFarTheChainCame) {
+  std::vector<TruePick> truth = PickTruth();
+  for (TruePick& pick : truth) pick.is_mapped = true;
+  truth[1].is_mapped = false;
+  truth[2].is_noticed = truth[3].is_noticed = true;
+  std::vector<PredictedPick> picks = PerfectPicks();
+  picks[0].human = 1;
+  picks[1].probability = 0.3;
+  const PickResult result = EvaluatePicks(picks, truth, {});
+  EXPECT_EQ(result.mapped_count, 2);
+  EXPECT_EQ(result.noticed_count, 1);
+  EXPECT_EQ(result.sure_count, 2);
+  EXPECT_EQ(result.right_count, 1);
+}
+
 TEST(PickMetric, IsEmptyWithoutPredictions) {
   const PickResult result = EvaluatePicks({}, PickTruth(), {});
   EXPECT_FALSE(result.precision.has_value());
