@@ -42,7 +42,9 @@ struct Flags {
 };
 
 void DeclareFlags(CLI::App* app, Flags* flags) {
-  app->add_option("--store", flags->store, "Folder of the maps; created if missing")->required();
+  app->add_option("--store", flags->store, "Folder of the maps; created if missing")
+      ->envname("DSG_STORE")
+      ->required();
   app->add_option("--listen", flags->options.listen,
                   "unix:PATH or HOST:PORT; default unix:<store>/dsg-server.sock");
   app->add_option("--workers", flags->options.worker_count,

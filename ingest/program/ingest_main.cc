@@ -45,6 +45,22 @@ void StopAtSignals() {
   sigaction(SIGTERM, &action, nullptr);
 }
 
+// A log is taken up where its last commit ended, so nothing has to be brought to an end.
+void SayWhenInterrupted() {
+  struct sigaction action = {};
+  action.sa_handler = [](int signal) {
+    constexpr char kText[] =
+        "\ndsg-ingest: interrupted; what is committed stays, and the same command goes on from "
+        "there\n";
+    // The only output that a signal handler may make; there is nobody to tell if it fails.
+    [[maybe_unused]] const ssize_t written = write(STDERR_FILENO, kText, sizeof(kText) - 1);
+    std::raise(signal);
+  };
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
 // Neither a number nor one relative to something.
 bool IsDate(const std::string& epoch) { return epoch.find('T') != std::string::npos; }
 
@@ -396,7 +412,7 @@ absl::Status Run(const IngestFlags& flags) {
   DSG_RETURN_IF_ERROR(ParseRetryFor(flags.retry_for).status());
   // Hours into a log is too late to find out.
   if (!flags.spill_folder.empty()) DSG_RETURN_IF_ERROR(SpillFile(flags.spill_folder).Open());
-  if (flags.is_followed) StopAtSignals();
+  flags.is_followed ? StopAtSignals() : SayWhenInterrupted();
   DSG_ASSIGN_OR_RETURN(const LogOptions options, MakeLogOptions(flags, &is_stopped));
   DSG_ASSIGN_OR_RETURN(const IngestOptions ingest_options, MakeIngestOptions(flags));
   Additions additions;

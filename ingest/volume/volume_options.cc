@@ -11,10 +11,9 @@ namespace {
 
 absl::Status CheckWithin(const std::string& field, double value, double low, double high) {
   if (std::isfinite(value) && value >= low && value <= high) return absl::OkStatus();
-  return MakeError(
-      Reason::kFieldInvalid,
-      absl::StrCat("volume options: ", field, " is ", value, "; it must be ", low, " to ", high),
-      {{"field", field}, {"value", absl::StrCat(value)}});
+  return MakeError(Reason::kFieldInvalid,
+                   absl::StrCat(field, " is ", value, "; it must be ", low, " to ", high),
+                   {{"field", field}, {"value", absl::StrCat(value)}});
 }
 
 constexpr double kResidentMin = 1.0;
@@ -36,8 +35,8 @@ std::vector<BoundOption> SpillOptions::Bind() {
 }
 
 absl::Status VolumeOptions::Validate() const {
-  DSG_RETURN_IF_ERROR(CheckWithin("voxel_m", voxel_m, 0.005, 2.0));
-  DSG_RETURN_IF_ERROR(CheckWithin("range_m", range_m, 4.0 * voxel_m, 1000.0 * voxel_m));
+  DSG_RETURN_IF_ERROR(CheckWithin("--voxel", voxel_m, 0.005, 2.0));
+  DSG_RETURN_IF_ERROR(CheckWithin("--range", range_m, 4.0 * voxel_m, 1000.0 * voxel_m));
   if (truncation_m != 0.0) {
     const double high = std::min(16.0 * voxel_m, range_m);
     DSG_RETURN_IF_ERROR(CheckWithin("truncation_m", truncation_m, 2.0 * voxel_m, high));
@@ -45,7 +44,7 @@ absl::Status VolumeOptions::Validate() const {
   VolumeOptions options = *this;
   DSG_RETURN_IF_ERROR(ValidateFields(options.Bind()));
   DSG_RETURN_IF_ERROR(ValidateOptions(spill));
-  DSG_RETURN_IF_ERROR(CheckWithin("thread_count", thread_count, 1, 64));
+  DSG_RETURN_IF_ERROR(CheckWithin("--threads", thread_count, 1, 64));
   return CheckWithin("block_count_max", static_cast<double>(block_count_max), 1, 1e8);
 }
 

@@ -4,6 +4,7 @@
 
 import json
 import os
+import signal
 import unittest
 
 import support
@@ -113,6 +114,18 @@ class HonestEnds(support.ProgramsTest):
             self.refused(1, ["check the clock", 'map "new" is not made'], "dsg-ingest", "--store",
                          "late", "--map", "new", "--commit-poses", commit, "late.csv")
         self.assertEqual(["home"], self.maps("--store", "late"))
+
+    def test_a_run_that_is_interrupted_says_what_stays(self):
+        with open(self.path("stopped.err"), "w+", encoding="utf-8") as err:
+            running = support.start("dsg-ingest", "--store", "stopped", "--map", "home", "sim/log",
+                                    cwd=self.folder, log=err)
+            # The map is made at the first commit, with most of the log still to be read.
+            support.wait_until(lambda: os.path.isdir(self.path("stopped")) and
+                               os.listdir(self.path("stopped")), "the map")
+            running.send_signal(signal.SIGINT)
+            self.assertEqual(-signal.SIGINT, running.wait(support.TIMEOUT_S))
+            err.seek(0)
+            self.assertIn("interrupted; what is committed stays", err.read())
 
     def test_a_table_of_which_every_row_is_an_agent_is_refused(self):
         with open(self.path("many.csv"), "w", encoding="utf-8") as f:

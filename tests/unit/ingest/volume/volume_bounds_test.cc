@@ -26,13 +26,13 @@ TEST(VolumeOptions, NamesTheFieldThatCannotBe) {
     EXPECT_EQ(ReasonOf(status), Reason::kFieldInvalid);
     return MetadataOf(status)["field"];
   };
-  EXPECT_EQ(field_of([](VolumeOptions* o) { o->voxel_m = 0.0; }), "voxel_m");
-  EXPECT_EQ(field_of([](VolumeOptions* o) { o->voxel_m = NAN; }), "voxel_m");
+  EXPECT_EQ(field_of([](VolumeOptions* o) { o->voxel_m = 0.0; }), "--voxel");
+  EXPECT_EQ(field_of([](VolumeOptions* o) { o->voxel_m = NAN; }), "--voxel");
   EXPECT_EQ(field_of([](VolumeOptions* o) { o->truncation_m = 0.01; }), "truncation_m");
-  EXPECT_EQ(field_of([](VolumeOptions* o) { o->range_m = INFINITY; }), "range_m");
+  EXPECT_EQ(field_of([](VolumeOptions* o) { o->range_m = INFINITY; }), "--range");
   EXPECT_EQ(field_of([](VolumeOptions* o) { o->label_confidence = 1.0; }),
             "volume-label-confidence");
-  EXPECT_EQ(field_of([](VolumeOptions* o) { o->thread_count = 0; }), "thread_count");
+  EXPECT_EQ(field_of([](VolumeOptions* o) { o->thread_count = 0; }), "--threads");
   EXPECT_EQ(field_of([](VolumeOptions* o) { o->block_count_max = 0; }), "block_count_max");
 }
 
