@@ -11,13 +11,13 @@
 #include "dsg/v1/query_service.pb.h"
 #include "dsg/v1/space.pb.h"
 #include "query/cli/answer_picture.h"
-#include "query/cli/export/look.h"
 #include "query/cli/json.h"
 #include "query/cli/lookups.h"
 #include "query/cli/table.h"
 #include "query/cli/values.h"
 #include "query/cli/verb_list.h"
 #include "schema/base/status.h"
+#include "schema/picture/look.h"
 
 namespace dsg::cli {
 namespace {

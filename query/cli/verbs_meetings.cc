@@ -11,7 +11,6 @@
 #include "dsg/v1/query_service.pb.h"
 #include "query/cli/answer_picture.h"
 #include "query/cli/answer_text.h"
-#include "query/cli/export/look.h"
 #include "query/cli/json.h"
 #include "query/cli/lookups.h"
 #include "query/cli/session.h"
@@ -19,6 +18,7 @@
 #include "query/cli/values.h"
 #include "query/cli/verb_list.h"
 #include "schema/base/status.h"
+#include "schema/picture/look.h"
 
 namespace dsg::cli {
 namespace {

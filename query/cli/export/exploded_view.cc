@@ -7,10 +7,11 @@
 #include <numbers>
 #include <unordered_map>
 
-#include "query/cli/export/look.h"
 #include "query/cli/export/outline.h"
 #include "query/cli/export/top_view.h"
 #include "schema/base/check.h"
+#include "schema/picture/look.h"
+#include "schema/picture/wire.h"
 
 namespace dsg::cli {
 namespace {

@@ -6,8 +6,9 @@
 #include <unordered_map>
 #include <utility>
 
-#include "query/cli/export/look.h"
 #include "query/cli/export/outline.h"
+#include "schema/picture/look.h"
+#include "schema/picture/wire.h"
 
 namespace dsg::cli {
 namespace {

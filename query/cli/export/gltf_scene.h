@@ -4,8 +4,8 @@
 #pragma once
 
 #include "query/cli/export/gltf_document.h"
-#include "query/cli/export/look.h"
 #include "query/cli/export/map_content.h"
+#include "schema/picture/look.h"
 
 namespace dsg::cli {
 

@@ -12,10 +12,11 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "query/cli/export/look.h"
 #include "query/cli/export/outline.h"
 #include "query/cli/table.h"
 #include "schema/base/status.h"
+#include "schema/picture/look.h"
+#include "schema/picture/wire.h"
 
 namespace dsg::cli {
 namespace {

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "query/cli/export/look.h"
 #include "query/cli/export/map_content.h"
 #include "schema/files/atomic_file.h"
+#include "schema/picture/look.h"
 
 namespace dsg::cli {
 

@@ -1,32 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shapes of nodes, in space and seen from above, and where they lie in a picture.
+// Shapes of nodes seen from above, and where they lie in a picture.
 #pragma once
 
 #include <Eigen/Geometry>
-#include <array>
-#include <cstdint>
-#include <utility>
 #include <vector>
 
 #include "schema/model/geometry.h"
 #include "schema/model/node.h"
 
 namespace dsg::cli {
-
-/// Map frame; bit i of the index chooses the upper end of axis i of the node's frame.
-/// Requires: the box is not empty.
-std::array<Eigen::Vector3d, 8> BoxCorners(const Node& node);
-
-/// Lines in space, map frame, metres.
-struct Wire {
-  std::vector<Eigen::Vector3d> points;
-  /// Indices into `points`.
-  std::vector<std::array<uint32_t, 2>> lines;
-};
-
-/// The edges of the node's box, or of the prism over a region's footprint; no lines without either.
-/// Frames: map.
-Wire WireOf(const Node& node);
 
 /// The convex hull, counter-clockwise; fewer corners when the points lie on a line.
 Polygon2d ConvexHull(Polygon2d points);

@@ -8,13 +8,13 @@
 #include <map>
 
 #include "absl/strings/str_cat.h"
-#include "query/cli/export/look.h"
 #include "query/cli/export/outline.h"
 #include "query/cli/export/overlay.h"
 #include "query/cli/export/top_view_labels.h"
 #include "query/cli/table.h"
 #include "schema/base/check.h"
 #include "schema/picture/font.h"
+#include "schema/picture/look.h"
 
 namespace dsg::cli {
 namespace {

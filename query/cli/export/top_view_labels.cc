@@ -9,9 +9,9 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
-#include "query/cli/export/look.h"
 #include "query/cli/export/outline.h"
 #include "schema/picture/font.h"
+#include "schema/picture/look.h"
 
 namespace dsg::cli {
 namespace {

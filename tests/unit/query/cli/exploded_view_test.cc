@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <array>
 
-#include "query/cli/export/look.h"
 #include "query/cli/export/top_view.h"
+#include "schema/picture/look.h"
 #include "tests/unit/query/cli/example_content.h"
 
 namespace dsg::cli {

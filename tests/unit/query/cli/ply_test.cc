@@ -10,7 +10,7 @@
 #include <map>
 #include <sstream>
 
-#include "query/cli/export/look.h"
+#include "schema/picture/look.h"
 #include "tests/support/temp_folder.h"
 #include "tests/unit/query/cli/example_content.h"
 

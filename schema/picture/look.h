@@ -12,7 +12,7 @@
 #include "schema/model/mesh.h"
 #include "schema/model/node.h"
 
-namespace dsg::cli {
+namespace dsg {
 
 // All colours are 0xRRGGBB.
 
@@ -62,4 +62,4 @@ struct MeshCounts {
 };
 MeshCounts CountMesh(const std::vector<MeshBlock>& mesh);
 
-}  // namespace dsg::cli
+}  // namespace dsg

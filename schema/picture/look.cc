@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query/cli/export/look.h"
+#include "schema/picture/look.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 #include "schema/model/edge.h"
 
-namespace dsg::cli {
+namespace dsg {
 namespace {
 
 constexpr uint32_t kUnknownRgb = 0x9aa0a6;
@@ -150,4 +150,4 @@ MeshCounts CountMesh(const std::vector<MeshBlock>& mesh) {
   return counts;
 }
 
-}  // namespace dsg::cli
+}  // namespace dsg
