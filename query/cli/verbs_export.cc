@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The verbs that write a map to files: export, map.
 #include <cstdio>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
@@ -11,6 +12,7 @@
 #include "query/cli/export/gltf_scene.h"
 #include "query/cli/export/map_content.h"
 #include "query/cli/export/mesh_file.h"
+#include "query/cli/export/sdf_world.h"
 #include "query/cli/export/top_view.h"
 #include "query/cli/json.h"
 #include "query/cli/progress.h"
@@ -44,6 +46,9 @@ struct ExportVerb {
   std::string spark;
   /// Distance between its poses, metres; 0 = all poses.
   double pose_step_m = 0.5;
+  /// A world of a physics simulator; its mesh goes beside it, as .stl.
+  std::string sdf;
+  SdfOptions sdf_options{};
   /// "rgb", "label", "instance"; empty = rgb if the mesh has it, else label.
   std::string color;
   std::string at;
@@ -85,6 +90,13 @@ std::optional<SparkForm> SparkFormOf(const std::string& path) {
   return std::nullopt;
 }
 
+// Of all files that can be written in one run, those that are.
+std::vector<std::string> PathsOf(const ExportVerb& verb) {
+  std::vector<std::string> paths = {verb.ply, verb.graph_ply, verb.gltf, verb.spark, verb.sdf};
+  std::erase(paths, "");
+  return paths;
+}
+
 // `content` has poses and mesh; notes and progress go to `progress_out`.
 absl::StatusOr<Written> WriteSparkExport(MapContent content, const ExportVerb& verb,
                                          std::ostream* progress_out) {
@@ -116,9 +128,7 @@ absl::Status CheckAlone(const Session& session, const ExportVerb& verb) {
                      "an archive has all revisions and all times; remove --revision and --at",
                      {{"field", "--revision"}});
   }
-  const bool is_alone =
-      verb.ply.empty() && verb.graph_ply.empty() && verb.gltf.empty() && verb.spark.empty();
-  if (is_alone) return absl::OkStatus();
+  if (PathsOf(verb).empty()) return absl::OkStatus();
   return MakeError(
       Reason::kFieldInvalid,
       "an archive is the only file of its call; export the other files in another call",
@@ -187,6 +197,11 @@ absl::StatusOr<MeshColor> ParseColor(const std::string& text) {
                    {{"field", "--color"}, {"value", text}});
 }
 
+// "office.stl" of "office.sdf".
+std::string MeshPathOf(const std::string& sdf_path) {
+  return std::filesystem::path(sdf_path).replace_extension(".stl").string();
+}
+
 // Writes the files of one run and counts what is in them.
 class Exporter {
  public:
@@ -212,6 +227,27 @@ class Exporter {
     DSG_RETURN_IF_ERROR(document.Write(&file));
     const MeshCounts counts = CountMesh(content_.mesh);
     return Finish("glb", {{"nodes", document.nodes.size()}, {"faces", counts.faces}}, &file);
+  }
+
+  /// The mesh first: a world whose mesh is missing does not load.
+  absl::Status WriteSdf(const std::string& path, SdfOptions options) {
+    const std::string mesh_path = MeshPathOf(path);
+    options.mesh_uri = std::filesystem::path(mesh_path).filename().string();
+    const SdfWorld world = MakeSdf(content_, options);
+    if (!world.stl.empty()) {
+      DSG_ASSIGN_OR_RETURN(AtomicFile mesh, AtomicFile::Create(mesh_path, force_));
+      DSG_RETURN_IF_ERROR(mesh.Write(world.stl));
+      DSG_RETURN_IF_ERROR(Finish("stl", {{"faces", world.face_count}}, &mesh));
+    }
+    DSG_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(path, force_));
+    DSG_RETURN_IF_ERROR(file.Write(world.xml));
+    return Finish("sdf",
+                  {{"floors", world.floor_count},
+                   {"structures", world.wall_count},
+                   {"objects", world.object_count},
+                   {"movable", world.movable_count},
+                   {"agents", world.agent_count}},
+                  &file);
   }
 
   const std::vector<Written>& files() const { return files_; }
@@ -254,11 +290,13 @@ std::string TitleOf(const Session& session, const ContentAnswer& answer, const M
 absl::Status RunExport(Session* session, const ExportVerb& verb, std::ostream& out) {
   if (!verb.archive.empty()) return WriteArchive(session, verb, out);
   DSG_ASSIGN_OR_RETURN(const MeshColor color, ParseColor(verb.color));
-  for (const std::string* path : {&verb.ply, &verb.graph_ply, &verb.gltf, &verb.spark}) {
-    if (!path->empty()) DSG_RETURN_IF_ERROR(CheckMayWrite(*path, verb.force));
+  for (const std::string& path : PathsOf(verb)) {
+    DSG_RETURN_IF_ERROR(CheckMayWrite(path, verb.force));
   }
   const bool with_spark = !verb.spark.empty();
-  const bool with_mesh = !verb.ply.empty() || !verb.gltf.empty() || with_spark;
+  const bool with_sdf = !verb.sdf.empty();
+  if (with_sdf) DSG_RETURN_IF_ERROR(CheckMayWrite(MeshPathOf(verb.sdf), verb.force));
+  const bool with_mesh = !verb.ply.empty() || !verb.gltf.empty() || with_spark || with_sdf;
   DSG_ASSIGN_OR_RETURN(
       ContentAnswer answer,
       ReadMapAt(session, verb.at,
@@ -267,6 +305,11 @@ absl::Status RunExport(Session* session, const ExportVerb& verb, std::ostream& o
   if (!verb.ply.empty()) DSG_RETURN_IF_ERROR(exporter.WriteMesh(verb.ply));
   if (!verb.graph_ply.empty()) DSG_RETURN_IF_ERROR(exporter.WriteGraph(verb.graph_ply));
   if (!verb.gltf.empty()) DSG_RETURN_IF_ERROR(exporter.WriteScene(verb.gltf));
+  if (with_sdf) {
+    SdfOptions options = verb.sdf_options;
+    options.with_agents = !verb.at.empty();
+    DSG_RETURN_IF_ERROR(exporter.WriteSdf(verb.sdf, std::move(options)));
+  }
   std::vector<Written> files = exporter.files();
   const Revision revision = answer.content.revision;
   if (with_spark) {
@@ -331,12 +374,13 @@ absl::Status CheckExport(const ExportVerb& verb, const CommonOptions& common) {
                               "form"),
                  "export");
   }
-  for (const std::string* path : {&verb.ply, &verb.graph_ply, &verb.gltf, &verb.spark}) {
-    if (!path->empty()) return absl::OkStatus();
+  if (!verb.sdf.empty() && !verb.sdf.ends_with(".sdf")) {
+    return Usage(absl::StrCat("--sdf \"", verb.sdf, "\": end the name in .sdf"), "export");
   }
+  if (!PathsOf(verb).empty()) return absl::OkStatus();
   return Usage(
-      "export writes files: give FILE.dsgz, --ply FILE, --graph-ply FILE, --gltf FILE or --spark "
-      "FILE",
+      "export writes files: give FILE.dsgz, --ply FILE, --graph-ply FILE, --gltf FILE, --spark "
+      "FILE or --sdf FILE",
       "export");
 }
 
@@ -354,6 +398,16 @@ void AddExport(Grammar* grammar) {
   app->add_option("--graph-ply", verb->graph_ply, "The graph, PLY of points and lines");
   app->add_option("--gltf", verb->gltf, "Mesh and graph, binary glTF 2.0 (.glb)");
   app->add_option("--spark", verb->spark, "A Spark-DSG graph, .json, or binary .sparkdsg or .bin");
+  app->add_option("--sdf", verb->sdf,
+                  "A world of a physics simulator, SDFormat .sdf, and its mesh beside it, .stl");
+  app->add_option("--movable-size", verb->sdf_options.movable_size_m,
+                  "Longest edge of the objects that move in --sdf, metres; 0 = all are fixed")
+      ->check(ZeroOrMore())
+      ->capture_default_str();
+  app->add_option("--density", verb->sdf_options.density_kg_m3,
+                  "Mass of the boxes of objects in --sdf, kg a cubic metre")
+      ->check(Between(0.001, 1e5))
+      ->capture_default_str();
   app->add_option("--pose-step", verb->pose_step_m,
                   "Distance between the poses that --spark writes, metres; 0 = all poses")
       ->check(ZeroOrMore())

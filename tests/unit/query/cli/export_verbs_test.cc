@@ -112,6 +112,32 @@ TEST_F(ExportVerbs, LeavesOutWhatHasEndedUnlessAskedForThen) {
   EXPECT_NE(Scene({}).find("\"name\":\"mesh\",\"mesh\""), std::string::npos);
 }
 
+TEST_F(ExportVerbs, WritesAWorldForPhysicsAndItsMeshBesideIt) {
+  const Outcome outcome = Ask({"export", "--sdf", Path("a.sdf"), "--at", "+5s", "--json"});
+  ASSERT_EQ(outcome.code, 0) << outcome.errors;
+  const Json told = Json::parse(outcome.out);
+  ASSERT_EQ(told["files"].size(), 2u);
+  EXPECT_EQ(told["files"][0]["path"], Path("a.stl"));
+  EXPECT_EQ(told["files"][0]["faces"], "4");
+  EXPECT_EQ(told["files"][1]["objects"], "1");
+  EXPECT_EQ(told["files"][1]["movable"], "0");
+  EXPECT_EQ(told["files"][1]["agents"], "1");
+  const std::string world = ReadFile(Path("a.sdf"));
+  EXPECT_NE(world.find("<uri>a.stl</uri>"), std::string::npos);
+  // At 5 s the human was last seen at 3 s, 1.5 m along.
+  EXPECT_NE(world.find("<pose>1.500000 3.000000 1.000000 "), std::string::npos);
+  // Without an instant nobody is anywhere, and the chair has been taken away.
+  fs::remove(Path("a.sdf"));
+  const Outcome refused = Ask({"export", "--sdf", Path("a.sdf")});
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_NE(refused.errors.find("a.stl"), std::string::npos) << refused.errors;
+  EXPECT_EQ(Ask({"export", "--sdf", Path("a.sdf"), "--force"}).code, 0);
+  EXPECT_EQ(ReadFile(Path("a.sdf")).find("H1"), std::string::npos);
+  EXPECT_EQ(ReadFile(Path("a.sdf")).find("O1"), std::string::npos);
+  EXPECT_EQ(Ask({"export", "--sdf", Path("a.xml")}).code, 2);
+  EXPECT_EQ(Ask({"export", "--sdf", Path("b.sdf"), "--density", "nan"}).code, 2);
+}
+
 TEST_F(ExportVerbs, EndsTracksAtTheInstant) {
   // At 5 s the human was last seen at 3 s, 1.5 m along.
   EXPECT_NE(Scene({"--at", "+5s"}).find("\"translation\":[1.5,3.0,1.0]"), std::string::npos);
