@@ -63,6 +63,10 @@ struct MapVerb {
   std::string floor;
   /// The layers one above the other, instead of the map from above.
   bool is_exploded = false;
+  /// The mesh alone, seen obliquely.
+  bool is_mesh = false;
+  /// A second map whose mesh is drawn at the right of it; empty = none.
+  std::string beside;
   int width_px = 1600;
   std::string at;
   bool force = false;
@@ -270,10 +274,13 @@ class Exporter {
   std::vector<Written> files_;
 };
 
+std::string NameAndRevision(const MapContent& content) {
+  return absl::StrCat(content.spec.name, "  revision ", content.revision);
+}
+
 // The title of the picture: map, revision and instant.
 std::string TitleOf(const Session& session, const ContentAnswer& answer, const MapVerb& verb) {
-  std::string title =
-      absl::StrCat(answer.content.spec.name, "  revision ", answer.content.revision);
+  std::string title = NameAndRevision(answer.content);
   if (!verb.at.empty()) {
     const auto at_ns = ParseInstant("--at", verb.at, session.map());
     if (at_ns.ok()) absl::StrAppend(&title, "  at ", session.times().Full(*at_ns));
@@ -321,6 +328,31 @@ absl::Status RunExport(Session* session, const ExportVerb& verb, std::ostream& o
   return absl::OkStatus();
 }
 
+// The newest content of another map of the same store or server.
+absl::StatusOr<MapContent> ReadBeside(const Session& session, const MapVerb& verb) {
+  CommonOptions common = session.common();
+  common.map = verb.beside;
+  common.revision.reset();
+  common.tag.clear();
+  Session other(std::move(common), session.program_version(), &session.notes());
+  DSG_RETURN_IF_ERROR(other.Open());
+  DSG_RETURN_IF_ERROR(other.ChooseMap());
+  DSG_ASSIGN_OR_RETURN(ContentAnswer answer, ReadMapAt(&other, verb.at, {}));
+  return std::move(answer.content);
+}
+
+absl::StatusOr<picture::Picture> DrawMap(Session* session, const MapVerb& verb,
+                                         const MapContent& content, const std::string& title) {
+  if (verb.is_exploded) {
+    return DrawExplodedView(content, {.width_px = verb.width_px, .title = title});
+  }
+  if (!verb.is_mesh) return DrawTopView(content, {.width_px = verb.width_px, .title = title});
+  if (verb.beside.empty()) return DrawMeshes({{content, title}}, verb.width_px);
+  DSG_ASSIGN_OR_RETURN(const MapContent other, ReadBeside(*session, verb));
+  return DrawMeshes({{content, NameAndRevision(content)}, {other, NameAndRevision(other)}},
+                    verb.width_px);
+}
+
 absl::Status RunMap(Session* session, const MapVerb& verb, std::ostream& out) {
   DSG_RETURN_IF_ERROR(CheckMayWrite(verb.png, verb.force));
   DSG_ASSIGN_OR_RETURN(ContentAnswer answer, ReadMapAt(session, verb.at, {}));
@@ -329,10 +361,8 @@ absl::Status RunMap(Session* session, const MapVerb& verb, std::ostream& out) {
     DSG_ASSIGN_OR_RETURN(const HeightRange floor, ChooseFloor(content, verb.floor));
     KeepFloor(floor, &content);
   }
-  const std::string title = TitleOf(*session, answer, verb);
-  const picture::Picture picture =
-      verb.is_exploded ? DrawExplodedView(content, {.width_px = verb.width_px, .title = title})
-                       : DrawTopView(content, {.width_px = verb.width_px, .title = title});
+  DSG_ASSIGN_OR_RETURN(const picture::Picture picture,
+                       DrawMap(session, verb, content, TitleOf(*session, answer, verb)));
   DSG_ASSIGN_OR_RETURN(const std::string png, picture::EncodePng(picture));
   DSG_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(verb.png, verb.force));
   DSG_RETURN_IF_ERROR(file.Write(png));
@@ -430,7 +460,13 @@ void AddMap(Grammar* grammar) {
                                                   .run = RunMap});
   app->add_option("--png", verb->png, "The picture to write")->required();
   app->add_option("--floor", verb->floor, kFloorHelp);
-  app->add_flag("--exploded", verb->is_exploded, "Layers one above the other, seen obliquely");
+  CLI::Option* exploded =
+      app->add_flag("--exploded", verb->is_exploded, "Layers one above the other, seen obliquely");
+  CLI::Option* mesh =
+      app->add_flag("--mesh", verb->is_mesh, "The mesh alone, seen obliquely")->excludes(exploded);
+  app->add_option("--beside", verb->beside,
+                  "Another map: its mesh at the right, seen from the same place")
+      ->needs(mesh);
   app->add_option("--width", verb->width_px, "Width of the picture, pixels")
       ->check(Between(kTopViewWidthMin, kTopViewWidthMax))
       ->capture_default_str();

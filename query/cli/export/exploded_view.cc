@@ -51,7 +51,9 @@ bool IsOfType(const Node& node, const char* type) {
 // From the map and a level to pixels: a view from infinity.
 class Oblique {
  public:
-  Oblique(const Box3d& bounds, const std::array<bool, kLevelCount>& has, int width_px)
+  // `edge_px`: what stays free on the left, for names of levels.
+  Oblique(const Box3d& bounds, const std::array<bool, kLevelCount>& has, double edge_px,
+          int width_px)
       : bounds_(bounds) {
     Eigen::AlignedBox2d plane;
     for (int corner = 0; corner < 8; ++corner) {
@@ -65,11 +67,11 @@ class Oblique {
       if (has[level]) lift_m += gap_m;
     }
     const double top_m = std::max(0.0, lift_m - gap_m) * std::cos(kElevationRad);
-    const double width = 2.0 * width_px - 2.0 * kEdgePx - kNamePx;
+    const double width = 2.0 * width_px - kEdgePx - edge_px;
     const double height_max = 2.0 * kTopViewWidthMax - 2.0 * kEdgePx - kHeadPx;
     px_per_m_ = std::min(width / plane.sizes().x(), height_max / (plane.sizes().y() + top_m));
     height_px_ = px_per_m_ * (plane.sizes().y() + top_m) + 2.0 * kEdgePx + kHeadPx;
-    origin_px_ = Eigen::Vector2d(kEdgePx + kNamePx - px_per_m_ * plane.min().x(),
+    origin_px_ = Eigen::Vector2d(edge_px - px_per_m_ * plane.min().x(),
                                  height_px_ - kEdgePx - px_per_m_ * plane.max().y());
   }
 
@@ -136,14 +138,18 @@ picture::Paint Shaded(uint32_t rgb, double light, float opacity) {
 
 class Drawer {
  public:
-  Drawer(const MapContent& content, const ExplodedOptions& options)
+  Drawer(const MapContent& content, int width_px)
+      : Drawer(content, BoundsOf(content), LevelsOf(content), kEdgePx + kNamePx, width_px) {}
+
+  Drawer(const MapContent& content, const Box3d& bounds, const std::array<bool, kLevelCount>& has,
+         double edge_px, int width_px)
       : content_(content),
-        bounds_(BoundsOf(content)),
-        has_(LevelsOf(content)),
-        view_(bounds_, has_, options.width_px),
+        bounds_(bounds),
+        has_(has),
+        view_(bounds_, has_, edge_px, width_px),
         nodes_(NodesById(content)),
         parent_of_(ParentsOf(content)),
-        canvas_(2 * options.width_px, 2 * static_cast<int>(std::ceil(0.5 * view_.height_px())),
+        canvas_(2 * width_px, 2 * static_cast<int>(std::ceil(0.5 * view_.height_px())),
                 picture::MakePaint(kPaperRgb)) {}
 
   picture::Picture Draw(const std::string& title) {
@@ -157,14 +163,24 @@ class Drawer {
       if (level == kRoomLevel) DrawRooms();
       if (level == kBuildingLevel) DrawNamed(kinds::kBuilding);
     }
-    double dot = 6.0;
-    while (dot > 2.0 && picture::Canvas::TextWidth(title, dot) > canvas_.width() - 2.0 * kEdgePx)
-      dot -= 1.0;
-    canvas_.DrawText({kEdgePx, kEdgePx - 10.0}, title, dot, picture::MakePaint(kInkRgb));
+    DrawTitle(title);
+    return canvas_.Halved();
+  }
+
+  picture::Picture DrawMeshAlone(const std::string& title) {
+    DrawMesh();
+    DrawTitle(title);
     return canvas_.Halved();
   }
 
  private:
+  void DrawTitle(const std::string& title) {
+    double dot = 6.0;
+    while (dot > 2.0 && picture::Canvas::TextWidth(title, dot) > canvas_.width() - 2.0 * kEdgePx)
+      dot -= 1.0;
+    canvas_.DrawText({kEdgePx, kEdgePx - 10.0}, title, dot, picture::MakePaint(kInkRgb));
+  }
+
   static std::array<bool, kLevelCount> LevelsOf(const MapContent& content) {
     std::array<bool, kLevelCount> has{};
     has[kMeshLevel] = std::any_of(content.mesh.begin(), content.mesh.end(),
@@ -364,7 +380,32 @@ class Drawer {
 
 picture::Picture DrawExplodedView(const MapContent& content, const ExplodedOptions& options) {
   DSG_CHECK(options.width_px >= kTopViewWidthMin && options.width_px <= kTopViewWidthMax);
-  return Drawer(content, options).Draw(options.title);
+  return Drawer(content, options.width_px).Draw(options.title);
+}
+
+picture::Picture DrawMeshes(const std::vector<TitledMap>& maps, int width_px) {
+  DSG_CHECK(!maps.empty() && width_px >= kTopViewWidthMin && width_px <= kTopViewWidthMax);
+  MapContent all;
+  for (const TitledMap& map : maps) {
+    all.mesh.insert(all.mesh.end(), map.content.mesh.begin(), map.content.mesh.end());
+  }
+  const int part_px = width_px / static_cast<int>(maps.size());
+  std::vector<picture::Picture> parts;
+  for (const TitledMap& map : maps) {
+    parts.push_back(
+        Drawer(map.content, BoundsOf(all), {}, kEdgePx, part_px).DrawMeshAlone(map.title));
+  }
+  // All have the same bounds, and so the same size.
+  picture::Picture joined{part_px * static_cast<int>(maps.size()), parts[0].height, {}};
+  const size_t row_bytes = 3 * static_cast<size_t>(part_px);
+  for (int row = 0; row < joined.height; ++row) {
+    for (const picture::Picture& part : parts) {
+      const auto begin =
+          part.rgb.begin() + static_cast<std::ptrdiff_t>(static_cast<size_t>(row) * row_bytes);
+      joined.rgb.insert(joined.rgb.end(), begin, begin + static_cast<std::ptrdiff_t>(row_bytes));
+    }
+  }
+  return joined;
 }
 
 }  // namespace dsg::cli

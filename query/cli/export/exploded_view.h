@@ -4,6 +4,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "query/cli/export/map_content.h"
 #include "schema/picture/raster.h"
@@ -20,5 +21,16 @@ struct ExplodedOptions {
 /// title on empty paper.
 /// Source: RSS 2020, figure 1.
 picture::Picture DrawExplodedView(const MapContent& content, const ExplodedOptions& options);
+
+/// A map and what is written above it.
+struct TitledMap {
+  const MapContent& content;
+  std::string title;
+};
+
+/// Only the meshes, in the colours that they have, seen in the same way from the same place and
+/// side by side in a picture of `width_px`. Requires: at least one map.
+/// Source: RSS 2020, figure 5.
+picture::Picture DrawMeshes(const std::vector<TitledMap>& maps, int width_px);
 
 }  // namespace dsg::cli

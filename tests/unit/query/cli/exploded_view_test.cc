@@ -100,6 +100,31 @@ TEST(ExplodedView, KeepsLongAndHighMapsInBounds) {
   }
 }
 
+TEST(MeshViews, ShowMapsFromTheSamePlace) {
+  const MapContent left = test::ExampleContent();
+  MapContent right = test::ExampleContent();
+  right.mesh.push_back(test::FlatBlock(3));
+  const Picture picture = DrawMeshes({{left, "same title"}, {right, "same title"}}, 800);
+  ASSERT_EQ(picture.width, 800);
+  ASSERT_EQ(picture.rgb.size(), 3 * static_cast<size_t>(800 * picture.height));
+  int left_count = 0;
+  int right_count = 0;
+  for (int y = 0; y < picture.height; ++y) {
+    for (int x = 0; x < 400; ++x) {
+      const auto at = picture.rgb.begin() + 3 * (static_cast<std::ptrdiff_t>(y) * 800 + x);
+      const auto is_drawn = [](auto pixel) {
+        return (pixel[0] << 16 | pixel[1] << 8 | pixel[2]) != static_cast<int>(kPaperRgb);
+      };
+      // What both have is at the same pixels of both; the third block is beside it.
+      EXPECT_TRUE(!is_drawn(at) || is_drawn(at + 3 * 400)) << x << " " << y;
+      left_count += is_drawn(at) ? 1 : 0;
+      right_count += is_drawn(at + 3 * 400) ? 1 : 0;
+    }
+  }
+  EXPECT_GT(left_count, 1000);
+  EXPECT_GT(right_count, left_count * 5 / 4);
+}
+
 TEST(ExplodedView, IsTheSameEachTime) {
   const MapContent content = WithBuilding();
   EXPECT_EQ(DrawExplodedView(content, {}).rgb, DrawExplodedView(content, {}).rgb);

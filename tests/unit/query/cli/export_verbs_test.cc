@@ -169,6 +169,9 @@ TEST_F(ExportVerbs, SayWhatIsMissingOrWrong) {
   EXPECT_EQ(Ask({"map", "--png", Path("no/a.png")}).code, 2);
   EXPECT_EQ(Ask({"map", "--png", "/dev/full", "--force"}).code, 2);
   EXPECT_EQ(Ask({"map", "--png", Path("a.png"), "--at", "soon"}).code, 2);
+  EXPECT_EQ(Ask({"map", "--png", Path("a.png"), "--mesh", "--exploded"}).code, 2);
+  EXPECT_EQ(Ask({"map", "--png", Path("a.png"), "--beside", "example"}).code, 2);
+  EXPECT_EQ(Ask({"map", "--png", Path("a.png"), "--mesh", "--beside", "nowhere"}).code, 1);
 }
 
 TEST_F(ExportVerbs, AFullDiskIsToldAndLeavesNoFile) {
@@ -197,6 +200,11 @@ TEST_F(ExportVerbs, DrawsAPicture) {
   const std::string png = ReadFile(Path("a.png"));
   EXPECT_EQ(png.substr(0, 8), "\x89PNG\r\n\x1a\n");
   EXPECT_EQ(png.substr(16, 4), std::string("\0\0\x02\x80", 4));
+  // The mesh of the map twice, side by side, as wide together as asked for.
+  const Outcome meshes = Ask({"map", "--png", Path("m.png"), "--width", "640", "--mesh", "--beside",
+                              "example", "--at", "+5s"});
+  ASSERT_EQ(meshes.code, 0) << meshes.errors;
+  EXPECT_EQ(meshes.out.find("wrote " + Path("m.png") + ": 640 columns, "), 0u) << meshes.out;
   // A height without a floor is no picture.
   const Outcome nothing = Ask({"map", "--png", Path("b.png"), "--width", "640", "--floor", "40"});
   EXPECT_EQ(nothing.code, 2);
