@@ -71,6 +71,18 @@ Canvas::Canvas(int width, int height, const Paint& background) : width_(width), 
   }
 }
 
+Canvas::Canvas(const Picture& background)
+    : Canvas(2 * background.width, 2 * background.height, Paint()) {
+  DSG_CHECK(4 * background.rgb.size() == pixels_.size());
+  for (size_t i = 0; i < pixels_.size(); ++i) {
+    const size_t channel = i % 3;
+    const size_t column = i / 3 % static_cast<size_t>(width_) / 2;
+    const size_t row = i / 3 / static_cast<size_t>(width_) / 2;
+    const size_t from = row * static_cast<size_t>(background.width) + column;
+    pixels_[i] = static_cast<float>(background.rgb[3 * from + channel]) / 255.0f;
+  }
+}
+
 void Canvas::Blend(int x, int y, const Paint& paint) {
   float* pixel =
       &pixels_[3 * (static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x))];

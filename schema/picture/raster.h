@@ -35,6 +35,9 @@ class Canvas {
  public:
   /// Requires: both sizes from 1 to 16384.
   Canvas(int width, int height, const Paint& background);
+  /// Twice as wide and high: each pixel becomes four, and Halved gives the picture back.
+  /// Requires: both sizes of the picture from 1 to 8192, and all its bytes are there.
+  explicit Canvas(const Picture& background);
 
   int width() const { return width_; }
   int height() const { return height_; }

@@ -137,6 +137,35 @@ class Sensors(support.ProgramsTest):
         self.refused(2, ["odometry-inertial", "vio"], "dsg-ingest", "--store", "s", "--map", "m",
                      "--odometry-inertial", "off", "sim/log")
 
+    def test_what_a_map_has_is_drawn_over_the_images_of_its_log(self):
+        self.ok("dsg-ingest", "--store", "seen", "--map", "home", "--poses", "gt", "--voxel", "0.1",
+                "sim/log")
+        draw = ["dsg-overlay", "--store", "seen", "--map", "home", "--out"]
+        said = self.ok(*draw, "drawn", "--every", "5", "sim/log")
+        self.assertIn(f"wrote {KEYFRAME_COUNT} pictures of cam0", said)
+        pictures = files_under(self.path("drawn"))
+        rows = support.read_rows(self.path("sim", "log", "mav0", "cam0", "data.csv"))
+        stamps = [next(iter(row.values())) for row in rows]
+        self.assertEqual([f"cam0_{stamp}.png" for stamp in stamps[::5]], pictures)
+        # A bag of the same log gives the same; only single instants, and another camera.
+        self.ok(*draw, "drawn-bag", "--at", "+0s", "sim/log.bag")
+        self.assertEqual(pictures[:1], files_under(self.path("drawn-bag")))
+        self.assertTrue(filecmp.cmp(self.path("drawn", pictures[0]),
+                                    self.path("drawn-bag", pictures[0]), shallow=False))
+        self.ok(*draw, "drawn-color", "--camera", "color0", "--at", "+0s", "sim/log")
+        self.assertEqual([f"color0_{stamps[0]}.png"], files_under(self.path("drawn-color")))
+        # What was there is kept, and what cannot be drawn is said.
+        self.refused(2, [pictures[0], "--force"], *draw, "drawn", "--every", "5", "sim/log")
+        self.ok(*draw, "drawn", "--every", "5", "--force", "sim/log")
+        self.refused(2, ["depth0", "cam0"], *draw, "x", "--camera", "depth0", "sim/log")
+        self.refused(1, ["spot", "r0"], *draw, "x", "--robot", "spot", "sim/log")
+        self.refused(1, ["no image of cam0"], *draw, "x", "--at", "+9s", "sim/log")
+        self.refused(2, ["--trail", "nan"], *draw, "x", "--trail", "nan", "sim/log")
+        self.refused(2, ["--at"], *draw, "x", "--at", "+1s", "--every", "5", "sim/log")
+        # A log without images.
+        self.ok("dsg-simulate", "tracks", "--out", "tracks", "--people", "2", "--seconds", "5")
+        self.refused(2, ["no camera"], *draw, "x", "tracks/log")
+
     def test_poses_are_estimated_from_images_and_inertial_samples(self):
         command = ["dsg-ingest", "--store", "own", "--map", "home", "--poses", "vio", "--recognize",
                    "--no-layers", "sim/log"]

@@ -56,7 +56,7 @@ ALLOWED = {
     "ingest/pipeline": (SCHEMA + INGEST_SHARED + INGEST_ROOMS +
                         [f"ingest/{s}" for s in INGEST_STAGES if s not in ASIDE]),
     "ingest/program": SCHEMA + ["ingest/config", "ingest/files", "ingest/log", "ingest/commit",
-                                "ingest/pipeline", "ingest/alignment"],
+                                "ingest/pipeline", "ingest/alignment", "ingest/overlay"],
     # The calls as C++, and the one client: below both the programs of query and those of ingest.
     "query/api": BASE,
     "query/client": CODEC + ["query/api"],
@@ -78,6 +78,8 @@ ALLOWED.update({f"ingest/{s}": SCHEMA + INGEST_SHARED for s in INGEST_STAGES})
 ALLOWED["ingest/recognition"] += ["ingest/odometry"]
 # Where maps lie to each other is told by what their robots recognise.
 ALLOWED["ingest/alignment"] = SCHEMA + INGEST_SHARED + ["ingest/recognition"]
+# Plain images, and a map to draw over them.
+ALLOWED["ingest/overlay"] = SCHEMA + ["ingest/config", "ingest/sensor"]
 # Nobody but these two sees the ground truth.
 ALLOWED["ingest/truth"] = SCHEMA + ["ingest/files", "ingest/sensor"]
 ALLOWED["ingest/simulator"] += ["ingest/truth"]

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "ingest/sensor/skeleton.h"
 #include "ingest/simulator/body/body_skin.h"
 
 namespace dsg::simulator {
@@ -79,11 +80,7 @@ Girths GirthsOf(const ShapeCoefficients& c) {
 
 }  // namespace
 
-const std::array<int, ingest::kJointCount>& JointParents() {
-  static const std::array<int, ingest::kJointCount> parents = {
-      -1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19, 20, 21};
-  return parents;
-}
+const std::array<int, ingest::kJointCount>& JointParents() { return ingest::kJointParents; }
 
 BodyModel::BodyModel(const ShapeCoefficients& shape)
     : shape_(shape), girths_(GirthsOf(shape)), offsets_(Proportioned(shape)) {

@@ -30,6 +30,19 @@ TEST(Canvas, FillsRectanglesAndBlends) {
   EXPECT_EQ(At(picture, 15, 5), (Pixel{255, 255, 255}));
 }
 
+TEST(Canvas, OfAPictureGivesItBack) {
+  Picture picture{3, 2, {}};
+  for (uint8_t i = 0; i < 18; ++i) picture.rgb.push_back(static_cast<uint8_t>(13 * i));
+  Canvas canvas(picture);
+  EXPECT_EQ(canvas.width(), 6);
+  EXPECT_EQ(canvas.height(), 4);
+  EXPECT_EQ(canvas.Halved().rgb, picture.rgb);
+  canvas.FillRect(Vector(2, 0), Vector(4, 2), MakePaint(0x0000ff));
+  picture.rgb[3] = picture.rgb[4] = 0;
+  picture.rgb[5] = 255;
+  EXPECT_EQ(canvas.Halved().rgb, picture.rgb);
+}
+
 TEST(Canvas, CutsShapesAtItsBorder) {
   Canvas canvas(20, 20, MakePaint(0xffffff));
   canvas.FillRect(Vector(-50, -50), Vector(4, 4), MakePaint(0x000000));
