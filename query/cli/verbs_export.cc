@@ -378,6 +378,10 @@ absl::Status RunMap(Session* session, const MapVerb& verb, std::ostream& out) {
 constexpr char kContentAtHelp[] = "The world at this TIME; default all that has not ended";
 
 absl::Status CheckExport(const ExportVerb& verb, const CommonOptions& common) {
+  const bool is_mesh_alone = verb.archive.empty() && !verb.ply.empty() && PathsOf(verb).size() == 1;
+  if (!verb.node.empty() && !is_mesh_alone) {
+    return Usage("--node is of the mesh: give --ply FILE, and no other file", "export");
+  }
   if (verb.with_rows && verb.archive.empty()) {
     return Usage("--rows is of an archive: give FILE.dsgz", "export");
   }
@@ -392,11 +396,6 @@ absl::Status CheckExport(const ExportVerb& verb, const CommonOptions& common) {
     return Usage(
         absl::StrCat("\"", verb.archive, "\" does not end in .dsgz; other formats have options"),
         "export");
-  }
-  const bool is_ply_alone = !verb.ply.empty() && verb.graph_ply.empty() && verb.gltf.empty() &&
-                            verb.spark.empty() && verb.archive.empty();
-  if (!verb.node.empty() && !is_ply_alone) {
-    return Usage("--node is of the mesh: give --ply FILE, and no other file", "export");
   }
   if (!verb.spark.empty() && !SparkFormOf(verb.spark).has_value()) {
     return Usage(absl::StrCat("--spark \"", verb.spark,

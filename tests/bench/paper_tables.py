@@ -4,8 +4,8 @@
 with the paper's numbers beside ours.
 
     ./dev tables [odometry|mesh|humans|objects|relations|rooms|pick|all] [--small]
-        [--seeds 11 12 13] [--people 12 24 60] [--variants NAME...] [--drop] [--tables-only] [--out docs/results]
-        [--log FOLDER --truth FOLDER]
+        [--seeds 11 12 13] [--people 12 24 60] [--variants NAME...] [--drop] [--tables-only]
+        [--out docs/results] [--log FOLDER --truth FOLDER]
 
 Simulates each log that is not in --folder yet, makes maps of it, scores them with dsg-eval, and
 prints mean, standard deviation and median over the seeds. The full form is a tour of the whole

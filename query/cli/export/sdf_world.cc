@@ -13,6 +13,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/strings/str_replace.h"
 #include "query/cli/export/outline.h"
 #include "schema/picture/look.h"
 
@@ -43,6 +44,11 @@ std::string NameIn(const Node& node) {
     if (!absl::ascii_isalnum(static_cast<unsigned char>(letter))) letter = '_';
   }
   return name;
+}
+
+// Names of files may have any letters.
+std::string Escaped(const std::string& text) {
+  return absl::StrReplaceAll(text, {{"&", "&amp;"}, {"<", "&lt;"}, {">", "&gt;"}});
 }
 
 std::string Numbers(const Eigen::Vector3d& values) {
@@ -171,10 +177,10 @@ class WorldMaker {
     }
     MakeStl();
     if (world_.face_count > 0) {
-      absl::StrAppend(
-          &shapes,
-          ShapeTags("mesh", Pose3d(),
-                    absl::StrCat("<mesh><uri>", options_.mesh_uri, "</uri></mesh>"), kWallRgb));
+      absl::StrAppend(&shapes, ShapeTags("mesh", Pose3d(),
+                                         absl::StrCat("<mesh><uri>", Escaped(options_.mesh_uri),
+                                                      "</uri></mesh>"),
+                                         kWallRgb));
     } else {
       AddStructures(&shapes);
     }

@@ -101,6 +101,19 @@ TEST_F(ExportVerbs, WritesAllFilesOfOneRunAndTellsWhatIsInThem) {
   }
 }
 
+TEST_F(ExportVerbs, WritesTheMeshOfOneNode) {
+  // All of it lies in the first room.
+  for (const auto& [room, faces] : {std::pair{"R1", "4"}, {"R2", "0"}}) {
+    const Outcome outcome =
+        Ask({"export", "--ply", Path("m.ply"), "--node", room, "--force", "--json"});
+    ASSERT_EQ(outcome.code, 0) << outcome.errors;
+    EXPECT_EQ(Json::parse(outcome.out)["files"][0]["faces"], faces) << room;
+  }
+  EXPECT_NE(Ask({"export", "--ply", Path("h.ply"), "--node", "H1"}).code, 0);
+  EXPECT_EQ(Ask({"export", "--gltf", Path("a.glb"), "--node", "R1"}).code, 2);
+  EXPECT_EQ(Ask({"export", Path("a.dsgz"), "--node", "R1"}).code, 2);
+}
+
 TEST_F(ExportVerbs, LeavesOutWhatHasEndedUnlessAskedForThen) {
   EXPECT_EQ(Scene({}).find("\"O1\""), std::string::npos);
   EXPECT_NE(Scene({"--at", "+5s"}).find("\"O1\""), std::string::npos);
