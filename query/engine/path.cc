@@ -170,7 +170,7 @@ class PathQuestionReader {
     DSG_ASSIGN_OR_RETURN(const Pattern pattern,
                          PatternFromProto(in, *view_, &read_.snapshot(), stop));
     DSG_ASSIGN_OR_RETURN(const std::vector<NodeId> found,
-                         FindMatches(*view_, pattern, limits.at_ns, stop));
+                         FindMatches(*view_, pattern, &read_.snapshot(), limits.at_ns, stop));
     PathEndpoint end;
     end.text = absl::StrCat("nearest ", FormatQuery(pattern.source()));
     for (size_t i = 0; i < found.size(); ++i) {

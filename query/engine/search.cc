@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Answers SearchNodes: nodes by class, name, colour, attribute, relation and containment. A word
 // that the map does not know is an error that lists what is near in spelling.
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <utility>
@@ -80,19 +81,42 @@ absl::StatusOr<SearchQuestion> ReadSearchQuestion(const Page& page,
     DSG_ASSIGN_OR_RETURN(question.after, HitKeyOf(page.position));
   }
   question.limit = page.size;
+  question.count_only = request.count_only();
   question.explain = request.explain();
   return question;
 }
 
-absl::Status FillHit(const Hit& hit, const GraphView& graph, bool has_near, NodeFiller* filler,
-                     v1::SearchHit* out) {
+// What is above an agent while it stays somewhere, nearest first. Where the hierarchy does not put
+// the place below the room, the stay is believed.
+std::vector<NodeId> AncestorsOf(const Stay& stay, const GraphView& graph) {
+  std::vector<NodeId> ids;
+  const bool has_place = graph.FindNode(stay.place) != nullptr;
+  if (has_place) ids = graph.Ancestors(stay.place);
+  if (graph.FindNode(stay.room) != nullptr && std::ranges::count(ids, stay.room) == 0) {
+    ids = graph.Ancestors(stay.room);
+    ids.insert(ids.begin(), stay.room);
+  }
+  if (has_place) ids.insert(ids.begin(), stay.place);
+  return ids;
+}
+
+absl::StatusOr<std::vector<NodeId>> AncestorsOf(const Hit& hit, const SearchQuestion& question,
+                                                const GraphView& graph) {
+  const bool is_agent_then = hit.map_T_agent.has_value() || hit.is_in_gap;
+  if (!is_agent_then) return graph.Ancestors(hit.key.id);
+  DSG_ASSIGN_OR_RETURN(const std::optional<Stay> stay,
+                       question.snapshot->StayAt(hit.key.id, *question.at_ns));
+  return stay.has_value() ? AncestorsOf(*stay, graph) : std::vector<NodeId>();
+}
+
+absl::Status FillHit(const Hit& hit, const SearchQuestion& question, const GraphView& graph,
+                     NodeFiller* filler, v1::SearchHit* out) {
   DSG_RETURN_IF_ERROR(
       filler->Fill(*graph.FindNode(hit.key.id), hit.map_T_agent, out->mutable_node()));
   if (hit.is_in_gap) out->mutable_node()->clear_map_t_node();
-  if (has_near) out->set_distance_m(hit.key.distance_m);
-  for (const NodeId ancestor : graph.Ancestors(hit.key.id)) {
-    out->add_ancestor_ids(ToString(ancestor));
-  }
+  if (question.near_map.has_value()) out->set_distance_m(hit.key.distance_m);
+  DSG_ASSIGN_OR_RETURN(const std::vector<NodeId> ancestors, AncestorsOf(hit, question, graph));
+  for (const NodeId ancestor : ancestors) out->add_ancestor_ids(ToString(ancestor));
   for (const NodeId related : hit.related) out->add_related_ids(ToString(related));
   return absl::OkStatus();
 }
@@ -123,10 +147,12 @@ absl::Status SearchNodes(Engine* engine, const CallContext& call,
   if (is_in_space && question.pattern.compiled().asks_for_agents && !question.at_ns.has_value()) {
     return FieldError("at_ns", "", "agents move; say at which instant they are to be there");
   }
+  question.snapshot = &snapshot;
   question.locate = [&](NodeId agent) { return LocateAt(snapshot, agent, *question.at_ns); };
   DSG_ASSIGN_OR_RETURN(const SearchAnswer answer, RunSearch(*graph, question, stop));
 
   page.view.FillHeader(reply->mutable_header());
+  if (request.count_only()) reply->set_hit_count(answer.hit_count);
   NodeFiller filler(snapshot, *graph, request.view());
   std::vector<NodeId> ids;
   for (const Hit& hit : answer.hits) ids.push_back(hit.key.id);
@@ -135,7 +161,7 @@ absl::Status SearchNodes(Engine* engine, const CallContext& call,
   for (size_t i = 0; i < answer.hits.size(); ++i) {
     DSG_RETURN_IF_ERROR(call.Check());
     v1::SearchHit* out = reply->add_hits();
-    DSG_RETURN_IF_ERROR(FillHit(answer.hits[i], *graph, request.has_near(), &filler, out));
+    DSG_RETURN_IF_ERROR(FillHit(answer.hits[i], question, *graph, &filler, out));
     bytes += out->ByteSizeLong();
     const bool is_last = i + 1 == answer.hits.size();
     if ((is_last && answer.has_more) || (!is_last && bytes > kPageBytesSoftMax)) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <unordered_set>
+#include <utility>
 
 #include "query/engine/search/words.h"
 
@@ -82,13 +83,13 @@ bool Matcher::MatchesAlone(const CompiledPattern& pattern, const ViewNode& node)
 
 bool Matcher::Matches(const CompiledPattern& pattern, const ViewNode& node) {
   if (!Tick() || !MatchesAlone(pattern, node)) return false;
-  if (pattern.relations.empty()) return true;
+  if (pattern.relations.empty() && pattern.alternatives.empty()) return true;
   const auto index = static_cast<size_t>(pattern.index);
   if (index >= known_.size()) known_.resize(index + 1);
   if (const auto known = known_[index].find(node.id); known != known_[index].end()) {
     return known->second;
   }
-  const bool matches = MatchesRelations(pattern, node);
+  const bool matches = MatchesAlternatives(pattern, node) && MatchesRelations(pattern, node);
   if (!status_.ok()) return false;
   if (known_count_ == kKnownMax) {
     for (auto& of_pattern : known_) of_pattern.clear();
@@ -99,10 +100,18 @@ bool Matcher::Matches(const CompiledPattern& pattern, const ViewNode& node) {
   return matches;
 }
 
+bool Matcher::MatchesAlternatives(const CompiledPattern& pattern, const ViewNode& node) {
+  return std::ranges::all_of(pattern.alternatives, [&](const CompiledAlternatives& alternatives) {
+    const bool is_any = std::ranges::any_of(alternatives.any_of,
+                                            [&](const auto& one) { return Matches(*one, node); });
+    return status_.ok() && is_any != alternatives.negated;
+  });
+}
+
 bool Matcher::MatchesRelations(const CompiledPattern& pattern, const ViewNode& node) {
   return std::all_of(pattern.relations.begin(), pattern.relations.end(),
                      [&](const CompiledRelation& relation) {
-                       const bool is_found = !FindRelated(relation, pattern.contains, node).empty();
+                       const bool is_found = !FindRelated(relation, pattern, node).empty();
                        return status_.ok() && is_found != relation.negated;
                      });
 }
@@ -110,7 +119,7 @@ bool Matcher::MatchesRelations(const CompiledPattern& pattern, const ViewNode& n
 std::vector<NodeId> Matcher::Related(const CompiledPattern& pattern, const ViewNode& node) {
   std::vector<NodeId> related;
   for (const CompiledRelation& relation : pattern.relations) {
-    related.push_back(relation.negated ? NodeId() : FindRelated(relation, pattern.contains, node));
+    related.push_back(relation.negated ? NodeId() : FindRelated(relation, pattern, node));
   }
   return related;
 }
@@ -129,29 +138,60 @@ void Matcher::ForEachAcross(Symbol symbol, bool outgoing, NodeId node, const Vis
   }
 }
 
-void Matcher::ForEachInHierarchy(Symbol contains, bool up, NodeId node, const Visit& visit) {
-  std::vector<NodeId> level = {node};
-  std::unordered_set<NodeId> seen = {node};
-  bool goes_on = true;
-  while (!level.empty() && goes_on) {
+std::vector<NodeId> Matcher::Then(absl::StatusOr<const std::vector<NodeId>*> ids) {
+  if (!ids.ok()) status_ = ids.status();
+  if (!status_.ok()) return {};
+  std::vector<NodeId> then;
+  for (const NodeId id : **ids) {
+    const ViewNode* node = view_.FindNode(id);
+    if (Tick() && node != nullptr && HoldsNow(node->valid)) then.push_back(id);
+  }
+  return then;
+}
+
+std::vector<NodeId> Matcher::StayedIn(const ViewNode& agent) {
+  const bool is_agent =
+      agent.layer == layers::kAgents && IsAgentKind(view_.symbols().Text(agent.kind));
+  return is_agent ? Then(stays_.NodesOf(agent.id)) : std::vector<NodeId>();
+}
+
+std::vector<NodeId> Matcher::AgentsIn(NodeId node) { return Then(stays_.AgentsIn(node)); }
+
+void Matcher::ForEachInHierarchy(std::optional<Symbol> contains, bool up, bool with_agents,
+                                 const ViewNode& node, const Visit& visit) {
+  std::vector<NodeId> level = {node.id};
+  std::unordered_set<NodeId> seen = {node.id};
+  std::unordered_set<NodeId> guests_seen;
+  std::vector<NodeId> stayed_in = up ? StayedIn(node) : std::vector<NodeId>();
+  while (!level.empty() && status_.ok()) {
     std::vector<NodeId> next;
-    for (const NodeId from : level) {
-      ForEachAcross(contains, !up, from, [&](const ViewNode& other) {
-        if (HoldsNow(other.valid) && seen.insert(other.id).second) next.push_back(other.id);
-        return true;
-      });
+    std::vector<NodeId> shown;
+    for (const NodeId id : std::exchange(stayed_in, {})) {
+      if (seen.insert(id).second) next.push_back(id);
     }
+    for (const NodeId from : level) {
+      if (contains.has_value()) {
+        ForEachAcross(*contains, !up, from, [&](const ViewNode& other) {
+          if (HoldsNow(other.valid) && seen.insert(other.id).second) next.push_back(other.id);
+          return true;
+        });
+      }
+      if (up || !with_agents) continue;
+      for (const NodeId guest : AgentsIn(from)) {
+        if (guests_seen.insert(guest).second) shown.push_back(guest);
+      }
+    }
+    shown.insert(shown.end(), next.begin(), next.end());
     // The nearest first, and of those the lowest id, however edges were stored.
-    std::sort(next.begin(), next.end());
-    for (const NodeId id : next) {
-      goes_on = Tick() && visit(*view_.FindNode(id));
-      if (!goes_on) return;
+    std::sort(shown.begin(), shown.end());
+    for (const NodeId id : shown) {
+      if (!Tick() || !visit(*view_.FindNode(id))) return;
     }
     level = std::move(next);
   }
 }
 
-NodeId Matcher::FindRelated(const CompiledRelation& relation, std::optional<Symbol> contains,
+NodeId Matcher::FindRelated(const CompiledRelation& relation, const CompiledPattern& pattern,
                             const ViewNode& node) {
   NodeId found;
   const auto take = [&](const ViewNode& other) {
@@ -168,15 +208,14 @@ NodeId Matcher::FindRelated(const CompiledRelation& relation, std::optional<Symb
       ForEachAcross(*relation.symbol, false, node.id, take);
     }
   }
-  if (!found.empty() || relation.how == CompiledRelation::How::kEdge || !contains.has_value()) {
-    return found;
-  }
-  ForEachInHierarchy(*contains, !relation.reversed, node.id, take);
+  if (!found.empty() || relation.how == CompiledRelation::How::kEdge) return found;
+  ForEachInHierarchy(pattern.contains, !relation.reversed, relation.other->may_be_agent, node,
+                     take);
   return found;
 }
 
 void Matcher::ForEachThatMayRelateTo(const CompiledRelation& relation,
-                                     std::optional<Symbol> contains, const ViewNode& node,
+                                     const CompiledPattern& pattern, const ViewNode& node,
                                      const Visit& visit) {
   if (relation.how != CompiledRelation::How::kInside && relation.symbol.has_value()) {
     if (relation.symmetric || !relation.reversed) {
@@ -186,8 +225,8 @@ void Matcher::ForEachThatMayRelateTo(const CompiledRelation& relation,
       ForEachAcross(*relation.symbol, true, node.id, visit);
     }
   }
-  if (relation.how == CompiledRelation::How::kEdge || !contains.has_value()) return;
-  ForEachInHierarchy(*contains, relation.reversed, node.id, visit);
+  if (relation.how == CompiledRelation::How::kEdge) return;
+  ForEachInHierarchy(pattern.contains, relation.reversed, pattern.may_be_agent, node, visit);
 }
 
 }  // namespace dsg::query

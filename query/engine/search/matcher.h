@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "query/engine/search/pattern.h"
+#include "query/engine/search/stays.h"
 #include "query/view/graph_view.h"
 
 namespace dsg::query {
@@ -19,9 +20,14 @@ namespace dsg::query {
 /// Threads: one caller at a time.
 class Matcher {
  public:
-  /// `view` must outlive this; nullopt = at any time, each condition for itself.
-  Matcher(const GraphView& view, std::optional<TimeNs> at_ns, StopCheck stop)
-      : view_(view), at_ns_(at_ns), stop_(std::move(stop)) {}
+  /// `view` must outlive this, and so must `snapshot`, which is as of Stays; nullopt = at any time,
+  /// each condition for itself.
+  Matcher(const GraphView& view, const Snapshot* snapshot, std::optional<TimeNs> at_ns,
+          StopCheck stop)
+      : view_(view), at_ns_(at_ns), stop_(std::move(stop)), stays_(view, snapshot, at_ns, stop_) {}
+  // What it knows of stays refers to it.
+  Matcher(const Matcher&) = delete;
+  Matcher& operator=(const Matcher&) = delete;
 
   bool Matches(const CompiledPattern& pattern, const ViewNode& node);
 
@@ -30,9 +36,10 @@ class Matcher {
   /// Requires: the node matches.
   std::vector<NodeId> Related(const CompiledPattern& pattern, const ViewNode& node);
 
-  /// Every node that an edge, or the hierarchy, leads to from here when the relation is walked
-  /// against its sense: all that may have this relation to `node`. Until `visit` returns false.
-  void ForEachThatMayRelateTo(const CompiledRelation& relation, std::optional<Symbol> contains,
+  /// Every node that an edge, the hierarchy or a stay leads to from here when the relation, one of
+  /// `pattern`, is walked against its sense: all that may match the pattern by `node`. Until
+  /// `visit` returns false.
+  void ForEachThatMayRelateTo(const CompiledRelation& relation, const CompiledPattern& pattern,
                               const ViewNode& node,
                               const std::function<bool(const ViewNode&)>& visit);
 
@@ -49,19 +56,28 @@ class Matcher {
   }
   bool MatchesAlone(const CompiledPattern& pattern, const ViewNode& node) const;
   bool MatchesRelations(const CompiledPattern& pattern, const ViewNode& node);
-  NodeId FindRelated(const CompiledRelation& relation, std::optional<Symbol> contains,
+  bool MatchesAlternatives(const CompiledPattern& pattern, const ViewNode& node);
+  NodeId FindRelated(const CompiledRelation& relation, const CompiledPattern& pattern,
                      const ViewNode& node);
   /// Nodes at the other ends of edges of one symbol, ascending id in each direction.
   void ForEachAcross(Symbol symbol, bool outgoing, NodeId node, const Visit& visit);
-  /// Breadth first over CONTAINS.
-  void ForEachInHierarchy(Symbol contains, bool up, NodeId node, const Visit& visit);
+  /// Breadth first over CONTAINS. A stay leads up from its agent, and down to the agent but not to
+  /// what is below it; `with_agents` false leaves the latter out.
+  void ForEachInHierarchy(std::optional<Symbol> contains, bool up, bool with_agents,
+                          const ViewNode& node, const Visit& visit);
+  /// Where the agent stayed, nodes that hold then; none for what is no agent.
+  std::vector<NodeId> StayedIn(const ViewNode& agent);
+  std::vector<NodeId> AgentsIn(NodeId node);
+  /// A result whose error stops everything.
+  std::vector<NodeId> Then(absl::StatusOr<const std::vector<NodeId>*> ids);
 
   const GraphView& view_;
   std::optional<TimeNs> at_ns_;
   StopCheck stop_;
   absl::Status status_;
+  Stays stays_;
   uint64_t work_count_ = 0;
-  // By index of the pattern; only patterns with relations, which are dear.
+  // By index of the pattern; only patterns with relations or alternatives, which are dear.
   std::vector<std::unordered_map<NodeId, bool>> known_;
   size_t known_count_ = 0;
 };

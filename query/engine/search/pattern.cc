@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "query/engine/search/pattern.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -16,8 +17,26 @@ namespace dsg::query {
 bool NodePattern::operator==(const NodePattern& other) const {
   return kind == other.kind && layer == other.layer && class_name == other.class_name &&
          name == other.name && color == other.color && id == other.id &&
-         attributes == other.attributes && relations == other.relations && word == other.word &&
+         attributes == other.attributes && relations == other.relations &&
+         alternatives == other.alternatives && word == other.word &&
          word_is_quoted == other.word_is_quoted;
+}
+
+bool IsOnlyAlternatives(const NodePattern& pattern) {
+  if (pattern.alternatives.size() != 1 || pattern.alternatives.front().negated) return false;
+  NodePattern only;
+  only.alternatives = pattern.alternatives;
+  return pattern == only;
+}
+
+void AddAlternatives(NodePattern operand, bool negated, NodePattern* pattern) {
+  Alternatives added{{}, negated};
+  if (IsOnlyAlternatives(operand)) {
+    added.any_of = std::move(operand.alternatives.front().any_of);
+  } else {
+    added.any_of.push_back(std::move(operand));
+  }
+  pattern->alternatives.push_back(std::move(added));
 }
 
 const NodePattern& Pattern::source() const { return compiled_->source; }
@@ -72,17 +91,44 @@ absl::StatusOr<AttributeCondition> ConditionFromProto(const v1::AttributeConditi
       absl::StrCat("give a number, a text or a flag to compare ", out.name, " with, or EXISTS"));
 }
 
-absl::Status FillFromProto(const v1::NodePattern& in, int depth, int* condition_count,
-                           NodePattern* out) {
+// Alternatives count one by one, so that a pattern of nothing else is bounded too.
+absl::Status CheckSize(const v1::NodePattern& in, int depth, int* condition_count) {
   if (depth > kPatternDepthMax) {
     return PatternFieldError("relations", absl::StrCat(depth, " levels deep"),
                              absl::StrCat("give at most ", kPatternDepthMax));
   }
   *condition_count += in.attributes_size() + in.relations_size();
-  if (*condition_count > kPatternConditionsMax) {
-    return PatternFieldError("relations", absl::StrCat(*condition_count, " conditions long"),
-                             absl::StrCat("give at most ", kPatternConditionsMax));
+  for (const v1::Alternatives& alternatives : in.alternatives()) {
+    *condition_count += alternatives.any_of_size();
   }
+  if (*condition_count <= kPatternConditionsMax) return absl::OkStatus();
+  return PatternFieldError("relations", absl::StrCat(*condition_count, " conditions long"),
+                           absl::StrCat("give at most ", kPatternConditionsMax));
+}
+
+absl::Status FillFromProto(const v1::NodePattern& in, int depth, int* condition_count,
+                           NodePattern* out);
+
+absl::Status AddFromProto(const v1::Alternatives& in, int depth, int* condition_count,
+                          NodePattern* out) {
+  if (in.any_of().empty()) {
+    return PatternFieldError("alternatives.any_of", "", "give at least one pattern");
+  }
+  NodePattern either;
+  Alternatives& alternatives = either.alternatives.emplace_back();
+  for (const v1::NodePattern& pattern : in.any_of()) {
+    DSG_RETURN_IF_ERROR(
+        FillFromProto(pattern, depth + 1, condition_count, &alternatives.any_of.emplace_back()));
+  }
+  const bool is_one = alternatives.any_of.size() == 1;
+  AddAlternatives(is_one ? NodePattern(alternatives.any_of.front()) : std::move(either),
+                  in.negated(), out);
+  return absl::OkStatus();
+}
+
+absl::Status FillFromProto(const v1::NodePattern& in, int depth, int* condition_count,
+                           NodePattern* out) {
+  DSG_RETURN_IF_ERROR(CheckSize(in, depth, condition_count));
   out->kind = in.kind();
   out->layer = in.layer();
   out->class_name = in.class_name();
@@ -111,6 +157,9 @@ absl::Status FillFromProto(const v1::NodePattern& in, int depth, int* condition_
     DSG_RETURN_IF_ERROR(
         FillFromProto(condition.other(), depth + 1, condition_count, &relation.other));
     out->relations.push_back(std::move(relation));
+  }
+  for (const v1::Alternatives& alternatives : in.alternatives()) {
+    DSG_RETURN_IF_ERROR(AddFromProto(alternatives, depth, condition_count, out));
   }
   return absl::OkStatus();
 }
@@ -239,10 +288,13 @@ class Compiler {
     DSG_RETURN_IF_ERROR(CompileClass(out.get()));
     DSG_RETURN_IF_ERROR(CompileId(out.get()));
     DSG_RETURN_IF_ERROR(CompileAttributes(out.get()));
-    out->name = NameMatcher(out->source.name);
+    DSG_RETURN_IF_ERROR(CompileName(out.get()));
     out->contains = view_.symbols().Find(relations::kContains);
     for (RelationCondition& relation : out->source.relations) {
       DSG_RETURN_IF_ERROR(CompileRelation(&relation, out.get()));
+    }
+    for (Alternatives& alternatives : out->source.alternatives) {
+      DSG_RETURN_IF_ERROR(CompileAlternatives(&alternatives, out.get()));
     }
     return std::shared_ptr<const CompiledPattern>(std::move(out));
   }
@@ -259,7 +311,7 @@ class Compiler {
       out->kind = view_.symbols().Find(source.kind);
       out->is_never = !out->kind.has_value();
       out->layer = LayerOfKind(source.kind);
-      out->asks_for_agents = IsAgentKind(source.kind);
+      out->asks_for_agents = out->may_be_agent = IsAgentKind(source.kind);
     }
     if (source.layer.empty()) return absl::OkStatus();
     const Layer* layer = vocabulary_.FindLayer(source.layer);
@@ -269,6 +321,7 @@ class Compiler {
     if (out->layer.has_value() && *out->layer != layer->id) out->is_never = true;
     out->layer = layer->id;
     out->asks_for_agents = out->asks_for_agents || layer->id == layers::kAgents;
+    out->may_be_agent = out->may_be_agent && layer->id == layers::kAgents;
     return absl::OkStatus();
   }
 
@@ -284,7 +337,20 @@ class Compiler {
                     [&](const ClassRange& range) { return range.layer != *out->layer; });
     }
     if (out->classes.empty()) out->is_never = true;
+    out->may_be_agent = out->may_be_agent && std::any_of(out->classes.begin(), out->classes.end(),
+                                                         [](const ClassRange& range) {
+                                                           return range.layer == layers::kAgents;
+                                                         });
     return absl::OkStatus();
+  }
+
+  absl::Status CompileName(CompiledPattern* out) {
+    const std::string& name = out->source.name;
+    out->name = NameMatcher(name);
+    // With "*" it is a question whether there are any.
+    if (name.empty() || name.find('*') != std::string::npos) return absl::OkStatus();
+    DSG_ASSIGN_OR_RETURN(const bool is_known, vocabulary_.HasName(name));
+    return is_known ? absl::OkStatus() : vocabulary_.NameUnknown(name, out->layer);
   }
 
   absl::Status CompileId(CompiledPattern* out) {
@@ -298,7 +364,9 @@ class Compiler {
           {{"node", out->source.id}});
     }
     out->id = id;
-    out->asks_for_agents = out->asks_for_agents || IsAgentKind(view_.symbols().Text(node->kind));
+    const bool is_agent = IsAgentKind(view_.symbols().Text(node->kind));
+    out->asks_for_agents = out->asks_for_agents || is_agent;
+    out->may_be_agent = out->may_be_agent && is_agent;
     return absl::OkStatus();
   }
 
@@ -335,6 +403,27 @@ class Compiler {
     DSG_ASSIGN_OR_RETURN(relation.other, Compile(condition->other));
     condition->other = relation.other->source;
     out->relations.push_back(std::move(relation));
+    return absl::OkStatus();
+  }
+
+  absl::Status CompileAlternatives(Alternatives* alternatives, CompiledPattern* out) {
+    CompiledAlternatives compiled;
+    compiled.negated = alternatives->negated;
+    bool is_never = true;
+    bool may_be_agent = false;
+    for (NodePattern& pattern : alternatives->any_of) {
+      DSG_ASSIGN_OR_RETURN(auto one, Compile(pattern));
+      pattern = one->source;
+      is_never = is_never && one->is_never;
+      may_be_agent = may_be_agent || one->may_be_agent;
+      if (!compiled.negated && one->asks_for_agents) out->asks_for_agents = true;
+      compiled.any_of.push_back(std::move(one));
+    }
+    if (!compiled.negated) {
+      out->is_never = out->is_never || is_never;
+      out->may_be_agent = out->may_be_agent && may_be_agent;
+    }
+    out->alternatives.push_back(std::move(compiled));
     return absl::OkStatus();
   }
 

@@ -42,6 +42,7 @@ struct AttributeCondition {
 };
 
 struct RelationCondition;
+struct Alternatives;
 
 /// Everything that is set must hold; an empty pattern means any node.
 struct NodePattern {
@@ -53,6 +54,7 @@ struct NodePattern {
   std::string id;
   std::vector<AttributeCondition> attributes;
   std::vector<RelationCondition> relations;
+  std::vector<Alternatives> alternatives;
   /// A noun of the query language that only a map can explain: kind, layer, class, id or name.
   std::string word;
   /// A quoted word is a class or a name, nothing else.
@@ -74,6 +76,23 @@ struct RelationCondition {
 
   bool operator==(const RelationCondition& other) const = default;
 };
+
+/// The node matches at least one of some patterns.
+struct Alternatives {
+  /// Not empty.
+  std::vector<NodePattern> any_of;
+  /// It matches none of them.
+  bool negated = false;
+
+  bool operator==(const Alternatives& other) const = default;
+};
+
+/// Adds the condition that a node matches `operand` (negated: does not). What is nothing but an
+/// "or" becomes the alternatives of the condition.
+void AddAlternatives(NodePattern operand, bool negated, NodePattern* pattern);
+
+/// True if the pattern says nothing but "this or that".
+bool IsOnlyAlternatives(const NodePattern& pattern);
 
 /// Longer queries, deeper nesting and more conditions in all are refused.
 inline constexpr size_t kQueryBytesMax = 4096;
@@ -108,9 +127,9 @@ class Pattern {
 
 /// Explains a pattern by a map. `snapshot`, of the view's revision, may be null: then a class that
 /// has a label but no node counts as unknown.
-/// Errors: CLASS_UNKNOWN, RELATION_UNKNOWN or LAYER_UNKNOWN with those that are near in spelling;
-/// NODE_ID_INVALID; NODE_UNKNOWN; FIELD_INVALID, also for an attribute that no node has; what
-/// `stop` returned.
+/// Errors: CLASS_UNKNOWN, also for a kind, RELATION_UNKNOWN, LAYER_UNKNOWN, and NODE_UNKNOWN for a
+/// name, with those that are near in spelling; NODE_ID_INVALID; NODE_UNKNOWN for an id;
+/// FIELD_INVALID for an attribute that no node has; what `stop` returned.
 absl::StatusOr<Pattern> ResolvePattern(const NodePattern& pattern, const GraphView& view,
                                        const Snapshot* snapshot, const StopCheck& stop);
 
@@ -137,6 +156,11 @@ struct CompiledRelation {
   std::shared_ptr<const CompiledPattern> other;
 };
 
+struct CompiledAlternatives {
+  std::vector<std::shared_ptr<const CompiledPattern>> any_of;
+  bool negated = false;
+};
+
 /// A pattern with the symbols of a view in place of names. For this folder only.
 struct CompiledPattern {
   NodePattern source;
@@ -153,9 +177,12 @@ struct CompiledPattern {
   NameMatcher name;
   /// Of source.attributes.
   std::vector<Symbol> attribute_names;
-  /// Only nodes that have a track, or only in their layer.
+  /// It, or one of its alternatives, wants only nodes that have a track, or only their layer.
   bool asks_for_agents = false;
+  /// False if no node that has a track can match.
+  bool may_be_agent = true;
   std::vector<CompiledRelation> relations;
+  std::vector<CompiledAlternatives> alternatives;
   /// CONTAINS; nullopt if the map has no such edge.
   std::optional<Symbol> contains;
 

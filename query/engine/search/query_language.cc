@@ -18,7 +18,7 @@ namespace {
 using Kind = Token::Kind;
 
 constexpr char kAfterPattern[] =
-    "a relation, \"and\" or the end (names of several words need quotation marks)";
+    "a relation, \"and\", \"or\" or the end (names of several words need quotation marks)";
 constexpr char kNoun[] = "a node: a kind, a class, a name, an id or \"any\"";
 
 class Parser {
@@ -52,9 +52,9 @@ class Parser {
     return Error(token, absl::StrCat("at most ", kPatternConditionsMax, " conditions"));
   }
 
-  std::optional<RelationWord> PeekRelationWord() const {
+  std::optional<RelationWord> PeekRelationWord(size_t ahead = 0) const {
     std::vector<std::string_view> words;
-    for (size_t i = 0; i < kRelationWordsMax && Peek(i).kind == Kind::kWord; ++i) {
+    for (size_t i = ahead; i < ahead + kRelationWordsMax && Peek(i).kind == Kind::kWord; ++i) {
       words.push_back(Peek(i).text);
     }
     return FindRelationWord(words);
@@ -66,15 +66,55 @@ class Parser {
     return is_name && Peek(1).kind == Kind::kOperator;
   }
 
-  bool PeekIsKnownRelation() const {
-    return PeekIsWord(words::kNot) || PeekIsWord(words::kReversed) ||
-           PeekIsWord(words::kRelation) || PeekRelationWord().has_value();
+  bool PeekIsKnownRelation(size_t ahead = 0) const {
+    return PeekIsWord(words::kReversed, ahead) || PeekIsWord(words::kRelation, ahead) ||
+           PeekRelationWord(ahead).has_value();
+  }
+
+  // After "not": a relation of the map's own is known by the noun that follows it.
+  bool PeekIsNegatedRelation() const {
+    if (PeekIsKnownRelation(1)) return true;
+    const Token& name = Peek(1);
+    if (name.kind != Kind::kWord || IsReservedWord(name.text) || !CanonicalColor(name.text).empty())
+      return false;
+    const Token& operand = Peek(2);
+    if (operand.kind != Kind::kWord) {
+      return operand.kind == Kind::kQuoted || operand.kind == Kind::kOpen;
+    }
+    const bool is_noun = !IsReservedWord(operand.text) || IsArticle(operand.text) || PeekIsAny(2);
+    return is_noun && !PeekRelationWord(2).has_value();
+  }
+
+  bool PeekIsAny(size_t ahead = 0) const {
+    return PeekIsWord(words::kAny, ahead) || PeekIsWord("anything", ahead);
+  }
+
+  absl::Status CheckDepth(int depth) const {
+    if (depth <= kPatternDepthMax) return absl::OkStatus();
+    return Error(Peek(), absl::StrCat("at most ", kPatternDepthMax, " levels of nesting"));
   }
 
   absl::StatusOr<NodePattern> ParsePattern(int depth) {
+    DSG_ASSIGN_OR_RETURN(NodePattern first, ParseAlternative(depth));
+    if (!PeekIsWord(words::kOr)) return first;
+    NodePattern either;
+    Alternatives& alternatives = either.alternatives.emplace_back();
+    alternatives.any_of.push_back(std::move(first));
+    while (PeekIsWord(words::kOr)) {
+      DSG_RETURN_IF_ERROR(CountCondition(Peek()));
+      ++at_;
+      DSG_ASSIGN_OR_RETURN(NodePattern next, ParseAlternative(depth));
+      alternatives.any_of.push_back(std::move(next));
+    }
+    return either;
+  }
+
+  absl::StatusOr<NodePattern> ParseAlternative(int depth) {
     NodePattern pattern;
     if (Peek().kind == Kind::kOpen) {
       DSG_ASSIGN_OR_RETURN(pattern, ParseParentheses(depth + 1));
+    } else if (PeekIsWord(words::kNot)) {
+      DSG_RETURN_IF_ERROR(ParseNegation(depth, &pattern));
     } else if (PeekIsCondition()) {
       DSG_RETURN_IF_ERROR(ParseCondition(&pattern));
     } else if (PeekIsKnownRelation()) {
@@ -87,31 +127,62 @@ class Parser {
   }
 
   absl::StatusOr<NodePattern> ParseParentheses(int depth) {
-    if (depth > kPatternDepthMax) {
-      return Error(Peek(), absl::StrCat("at most ", kPatternDepthMax, " levels of nesting"));
-    }
+    DSG_RETURN_IF_ERROR(CheckDepth(depth));
     ++at_;
     DSG_ASSIGN_OR_RETURN(NodePattern pattern, ParsePattern(depth));
-    if (Peek().kind != Kind::kClose) return Error(Peek(), "a relation, \"and\" or \")\"");
+    if (Peek().kind != Kind::kClose) {
+      return Error(Peek(), "a relation, \"and\", \"or\" or \")\"");
+    }
     ++at_;
     return pattern;
   }
 
   absl::Status ParseTails(int depth, NodePattern* pattern) {
-    while (Peek().kind == Kind::kWord) {
+    while (Peek().kind == Kind::kWord && !PeekIsWord(words::kOr)) {
       if (!TakeWord(words::kAnd)) {
-        DSG_RETURN_IF_ERROR(ParseRelation(depth, pattern));
+        DSG_RETURN_IF_ERROR(ParseRelationOrNegation(depth, pattern));
       } else if (PeekIsCondition()) {
         DSG_RETURN_IF_ERROR(ParseCondition(pattern));
       } else if (Peek().kind == Kind::kWord && !CanonicalColor(Peek().text).empty()) {
-        const Token& color = tokens_[at_++];
-        DSG_RETURN_IF_ERROR(SetField(color, CanonicalColor(color.text), "color", &pattern->color));
+        DSG_RETURN_IF_ERROR(ParseColor(pattern));
+      } else if (Peek().kind == Kind::kOpen) {
+        DSG_RETURN_IF_ERROR(CountCondition(Peek()));
+        DSG_ASSIGN_OR_RETURN(NodePattern operand, ParseParentheses(depth + 1));
+        AddAlternatives(std::move(operand), false, pattern);
       } else if (Peek().kind == Kind::kWord) {
-        DSG_RETURN_IF_ERROR(ParseRelation(depth, pattern));
+        DSG_RETURN_IF_ERROR(ParseRelationOrNegation(depth, pattern));
       } else {
-        return Error(Peek(), "a condition, a relation or a colour");
+        return Error(Peek(), "a condition, a relation, a colour or \"(\"");
       }
     }
+    return absl::OkStatus();
+  }
+
+  absl::Status ParseColor(NodePattern* pattern) {
+    const Token& color = tokens_[at_++];
+    return SetField(color, CanonicalColor(color.text), "color", &pattern->color);
+  }
+
+  absl::Status ParseRelationOrNegation(int depth, NodePattern* pattern) {
+    return PeekIsWord(words::kNot) ? ParseNegation(depth, pattern) : ParseRelation(depth, pattern);
+  }
+
+  // A relation to no node, or "not" before what the node itself is not.
+  absl::Status ParseNegation(int depth, NodePattern* pattern) {
+    if (PeekIsNegatedRelation()) return ParseRelation(depth, pattern);
+    DSG_RETURN_IF_ERROR(CountCondition(Peek()));
+    ++at_;
+    DSG_RETURN_IF_ERROR(CheckDepth(depth + 1));
+    NodePattern operand;
+    if (PeekIsCondition()) {
+      DSG_RETURN_IF_ERROR(ParseCondition(&operand));
+    } else if (Peek().kind == Kind::kWord && !CanonicalColor(Peek().text).empty() &&
+               !PeekIsAdjective()) {
+      DSG_RETURN_IF_ERROR(ParseColor(&operand));
+    } else {
+      DSG_ASSIGN_OR_RETURN(operand, ParseOperand(depth + 1));
+    }
+    AddAlternatives(std::move(operand), true, pattern);
     return absl::OkStatus();
   }
 
@@ -129,8 +200,9 @@ class Parser {
       pattern->color = CanonicalColor(tokens_[at_++].text);
     }
     const Token& noun = Peek();
-    if (TakeWord(words::kAny) || TakeWord("anything")) {
+    if (PeekIsAny()) {
       // Narrows nothing.
+      ++at_;
     } else if (noun.kind == Kind::kQuoted ||
                (noun.kind == Kind::kWord && !IsReservedWord(noun.text) &&
                 !PeekRelationWord().has_value() && Peek(1).kind != Kind::kOperator)) {
@@ -139,6 +211,11 @@ class Parser {
       pattern->word_is_quoted = noun.kind == Kind::kQuoted;
       pattern->word_position = noun.position;
       ++at_;
+      // "office 4" is a class or a name, as in quotation marks.
+      if (noun.kind == Kind::kWord && Peek().kind == Kind::kNumber) {
+        pattern->word += " " + tokens_[at_++].text;
+        pattern->word_is_quoted = true;
+      }
     } else {
       return Error(noun, kNoun);
     }
@@ -153,16 +230,8 @@ class Parser {
     const Token& next = Peek(1);
     if (next.kind == Kind::kQuoted) return true;
     if (next.kind != Kind::kWord) return false;
-    if (PeekIsWord(words::kAny, 1) || PeekIsWord("anything", 1)) return true;
-    return !IsReservedWord(next.text) && !StartsRelation(1);
-  }
-
-  bool StartsRelation(size_t ahead) const {
-    std::vector<std::string_view> words;
-    for (size_t i = ahead; i < ahead + kRelationWordsMax && Peek(i).kind == Kind::kWord; ++i) {
-      words.push_back(Peek(i).text);
-    }
-    return FindRelationWord(words).has_value();
+    if (PeekIsAny(1)) return true;
+    return !IsReservedWord(next.text) && !PeekRelationWord(1).has_value();
   }
 
   absl::Status ParseCondition(NodePattern* pattern) {
@@ -270,13 +339,11 @@ class Parser {
 
   absl::StatusOr<NodePattern> ParseOperand(int depth) {
     if (Peek().kind == Kind::kOpen) return ParseParentheses(depth);
-    if (depth > kPatternDepthMax) {
-      return Error(Peek(), absl::StrCat("at most ", kPatternDepthMax, " levels of nesting"));
-    }
+    DSG_RETURN_IF_ERROR(CheckDepth(depth));
     NodePattern pattern;
     DSG_RETURN_IF_ERROR(ParseNoun(&pattern));
-    while (Peek().kind == Kind::kWord && !PeekIsWord(words::kAnd)) {
-      DSG_RETURN_IF_ERROR(ParseRelation(depth, &pattern));
+    while (Peek().kind == Kind::kWord && !PeekIsWord(words::kAnd) && !PeekIsWord(words::kOr)) {
+      DSG_RETURN_IF_ERROR(ParseRelationOrNegation(depth, &pattern));
     }
     return pattern;
   }
@@ -339,9 +406,24 @@ std::string FormatRelation(const RelationCondition& condition) {
   return text + FormatRelationName(condition.relation) + " (" + FormatQuery(condition.other) + ")";
 }
 
+bool IsOr(const NodePattern& pattern) {
+  return IsOnlyAlternatives(pattern) && pattern.alternatives.front().any_of.size() > 1;
+}
+
+std::string FormatOr(const Alternatives& alternatives) {
+  std::string text;
+  for (const NodePattern& pattern : alternatives.any_of) {
+    if (!text.empty()) text += std::string(" ") + words::kOr + " ";
+    const std::string one = FormatQuery(pattern);
+    text += IsOr(pattern) ? "(" + one + ")" : one;
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string FormatQuery(const NodePattern& pattern) {
+  if (IsOr(pattern)) return FormatOr(pattern.alternatives.front());
   std::string text;
   const auto add = [&text](const std::string& part) {
     if (!text.empty()) text += " and ";
@@ -358,7 +440,15 @@ std::string FormatQuery(const NodePattern& pattern) {
   add_field("color", pattern.color);
   add_field("id", pattern.id);
   for (const AttributeCondition& condition : pattern.attributes) add(FormatAttribute(condition));
-  if (text.empty()) text = words::kAny;
+  // What stands first in parentheses would lose them when it is read back, unless it is an "or".
+  const bool starts_with_or = !pattern.alternatives.empty() &&
+                              !pattern.alternatives.front().negated &&
+                              pattern.alternatives.front().any_of.size() > 1;
+  if (text.empty() && !starts_with_or) text = words::kAny;
+  for (const Alternatives& alternatives : pattern.alternatives) {
+    const char* const negation = alternatives.negated ? "not (" : "(";
+    add(negation + FormatOr(alternatives) + ")");
+  }
   for (const RelationCondition& condition : pattern.relations) add(FormatRelation(condition));
   return text;
 }

@@ -178,17 +178,9 @@ std::string Quote(std::string_view text) {
 
 namespace {
 
-constexpr std::string_view kReserved[] = {words::kAnd,
-                                          words::kNot,
-                                          words::kHas,
-                                          words::kAny,
-                                          words::kReversed,
-                                          words::kRelation,
-                                          "anything",
-                                          "or",
-                                          "the",
-                                          "a",
-                                          "an"};
+constexpr std::string_view kReserved[] = {
+    words::kAnd,      words::kOr, words::kNot, words::kHas, words::kAny, words::kReversed,
+    words::kRelation, "anything", "the",       "a",         "an"};
 
 constexpr std::pair<std::string_view, Comparison> kComparisons[] = {
     {"=", Comparison::kEqual},   {"!=", Comparison::kNotEqual},

@@ -38,6 +38,7 @@ absl::Status QueryError(std::string_view text, size_t position, std::string_view
 
 namespace words {
 inline constexpr char kAnd[] = "and";
+inline constexpr char kOr[] = "or";
 inline constexpr char kNot[] = "not";
 inline constexpr char kHas[] = "has";
 inline constexpr char kAny[] = "any";

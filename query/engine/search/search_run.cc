@@ -20,10 +20,10 @@ namespace {
 
 /// Where candidates come from.
 struct PlanStart {
-  enum class Kind { kNothing, kId, kClass, kLayer, kBox, kJoin, kName, kScan };
+  enum class Kind { kNothing, kId, kClass, kLayer, kBox, kJoin, kUnion, kName, kScan };
   Kind kind = Kind::kScan;
-  /// Of kJoin: which relation of the pattern.
-  size_t relation = 0;
+  /// Which relation of the pattern (kJoin), or which of its alternatives (kUnion).
+  size_t part = 0;
   /// Nodes that will be touched, an estimate.
   double cost = 0.0;
 };
@@ -51,6 +51,7 @@ class Planner {
   std::optional<PlanStart> BoxStart(const CompiledPattern& pattern,
                                     const std::optional<Box3d>& box_map, double best_cost) const;
   std::vector<NodeId> Join(const CompiledPattern& pattern, const CompiledRelation& relation);
+  std::vector<NodeId> Unite(const CompiledAlternatives& alternatives, NodeId after);
   void AddStep(const char* operation, std::string detail, int64_t in_count, int64_t out_count);
 
   const GraphView& view_;
@@ -118,6 +119,12 @@ double Planner::EstimateMatches(const CompiledPattern& pattern) const {
   if (pattern.has_name() && IsLiteral(pattern.source.name)) {
     estimate = std::min(estimate, kNamesakes);
   }
+  for (const CompiledAlternatives& alternatives : pattern.alternatives) {
+    if (alternatives.negated) continue;
+    double sum = 0.0;
+    for (const auto& one : alternatives.any_of) sum += EstimateMatches(*one);
+    estimate = std::min(estimate, sum);
+  }
   return estimate;
 }
 
@@ -161,6 +168,14 @@ PlanStart Planner::ChooseStart(const CompiledPattern& pattern,
     const double cost =
         ChooseStart(*relation.other, std::nullopt).cost + kJoinCost * others * FanOut(relation);
     consider({PlanStart::Kind::kJoin, i, cost});
+  }
+  for (size_t i = 0; i < pattern.alternatives.size(); ++i) {
+    if (pattern.alternatives[i].negated) continue;
+    double cost = 0.0;
+    for (const auto& one : pattern.alternatives[i].any_of) {
+      cost += ChooseStart(*one, std::nullopt).cost;
+    }
+    consider({PlanStart::Kind::kUnion, i, cost});
   }
   if (const auto box = BoxStart(pattern, box_map, best.cost)) consider(*box);
   return best;
@@ -215,11 +230,12 @@ std::vector<NodeId> Planner::Candidates(const CompiledPattern& pattern, const Pl
       }
       break;
     case PlanStart::Kind::kJoin: {
-      const CompiledRelation& relation = pattern.relations[start.relation];
-      ids = Join(pattern, relation);
+      ids = Join(pattern, pattern.relations[start.part]);
       ids.erase(ids.begin(), std::upper_bound(ids.begin(), ids.end(), after));
       return ids;
     }
+    case PlanStart::Kind::kUnion:
+      return Unite(pattern.alternatives[start.part], after);
     case PlanStart::Kind::kScan:
       operation = "scan";
       view_.ForEachNode(after, take);
@@ -235,7 +251,7 @@ std::vector<NodeId> Planner::Join(const CompiledPattern& pattern,
   const std::vector<NodeId> others = Collect(*relation.other);
   std::vector<NodeId> ids;
   for (const NodeId other : others) {
-    matcher_->ForEachThatMayRelateTo(relation, pattern.contains, *view_.FindNode(other),
+    matcher_->ForEachThatMayRelateTo(relation, pattern, *view_.FindNode(other),
                                      [&](const ViewNode& node) {
                                        ids.push_back(node.id);
                                        return true;
@@ -247,6 +263,21 @@ std::vector<NodeId> Planner::Join(const CompiledPattern& pattern,
   const RelationCondition& condition = pattern.source.relations[index];
   AddStep("join", condition.relation + (condition.reversed ? " reversed" : ""),
           static_cast<int64_t>(others.size()), static_cast<int64_t>(ids.size()));
+  return ids;
+}
+
+std::vector<NodeId> Planner::Unite(const CompiledAlternatives& alternatives, NodeId after) {
+  std::vector<NodeId> ids;
+  for (const auto& one : alternatives.any_of) {
+    const std::vector<NodeId> some =
+        Candidates(*one, ChooseStart(*one, std::nullopt), std::nullopt, after);
+    ids.insert(ids.end(), some.begin(), some.end());
+    if (!matcher_->status().ok()) return {};
+  }
+  const auto in_count = static_cast<int64_t>(ids.size());
+  SortUnique(&ids);
+  AddStep("union", absl::StrCat(alternatives.any_of.size(), " alternatives"), in_count,
+          static_cast<int64_t>(ids.size()));
   return ids;
 }
 
@@ -269,7 +300,7 @@ class Runner {
       : view_(view),
         question_(question),
         pattern_(question.pattern.compiled()),
-        matcher_(view, question.at_ns, stop),
+        matcher_(view, question.snapshot, question.at_ns, stop),
         planner_(view, &matcher_, question.explain ? &answer_.steps : nullptr) {}
 
   absl::StatusOr<SearchAnswer> Run() {
@@ -283,6 +314,7 @@ class Runner {
     }
     DSG_RETURN_IF_ERROR(matcher_.status());
     DSG_RETURN_IF_ERROR(locate_status_);
+    if (question_.count_only) return std::move(answer_);
     answer_.has_more = answer_.hits.size() > static_cast<size_t>(question_.limit);
     if (answer_.has_more) answer_.hits.pop_back();
     for (Hit& hit : answer_.hits) {
@@ -307,7 +339,10 @@ class Runner {
 
   bool IsFull() const { return answer_.hits.size() > static_cast<size_t>(question_.limit); }
 
-  void Add(Hit hit) { answer_.hits.push_back(std::move(hit)); }
+  void Add(Hit hit) {
+    ++answer_.hit_count;
+    if (!question_.count_only) answer_.hits.push_back(std::move(hit));
+  }
 
   // The hit that a matching node is; nullopt where it lies outside of what is asked for.
   std::optional<Hit> Place(const ViewNode& node) {
@@ -371,6 +406,7 @@ class Runner {
       if (hit.has_value() && IsAfter(hit->key)) Add(*std::move(hit));
     }
     AddStep("filter", Description(), looked_at, HitCount());
+    if (question_.count_only) return;
     const auto by_key = [](const Hit& a, const Hit& b) { return a.key < b.key; };
     std::sort(answer_.hits.begin(), answer_.hits.end(), by_key);
     AddStep("order", "by distance, then id", HitCount(), HitCount());
@@ -410,8 +446,8 @@ class Runner {
     return text;
   }
   int64_t HitCount() const {
-    return std::min(static_cast<int64_t>(answer_.hits.size()),
-                    static_cast<int64_t>(question_.limit) + 1);
+    if (question_.count_only) return answer_.hit_count;
+    return std::min(answer_.hit_count, static_cast<int64_t>(question_.limit) + 1);
   }
   void AddStep(const char* operation, std::string detail, int64_t in_count, int64_t out_count) {
     if (!question_.explain) return;
@@ -434,15 +470,11 @@ absl::StatusOr<SearchAnswer> RunSearch(const GraphView& view, const SearchQuesti
   return Runner(view, question, stop).Run();
 }
 
-bool Matches(const GraphView& view, const Pattern& pattern, const ViewNode& node,
-             std::optional<TimeNs> at_ns) {
-  return Matcher(view, at_ns, StopCheck()).Matches(pattern.compiled(), node);
-}
-
 absl::StatusOr<std::vector<NodeId>> FindMatches(const GraphView& view, const Pattern& pattern,
+                                                const Snapshot* snapshot,
                                                 std::optional<TimeNs> at_ns,
                                                 const StopCheck& stop) {
-  Matcher matcher(view, at_ns, stop);
+  Matcher matcher(view, snapshot, at_ns, stop);
   std::vector<NodeId> ids = Planner(view, &matcher, nullptr).Collect(pattern.compiled());
   DSG_RETURN_IF_ERROR(matcher.status());
   return ids;

@@ -34,6 +34,8 @@ struct Hit {
 
 struct SearchQuestion {
   Pattern pattern;
+  /// Of the view's revision: it knows where agents stayed. Null = nowhere.
+  const Snapshot* snapshot = nullptr;
   /// nullopt: at any time.
   std::optional<TimeNs> at_ns;
   std::optional<Eigen::Vector3d> near_map;
@@ -43,6 +45,8 @@ struct SearchQuestion {
   std::function<absl::StatusOr<std::optional<LocatedPose>>(NodeId agent)> locate;
   std::optional<HitKey> after;
   int limit = 1;
+  /// Only SearchAnswer::hit_count; `after` and `limit` mean nothing.
+  bool count_only = false;
   bool explain = false;
 };
 
@@ -58,6 +62,7 @@ struct SearchAnswer {
   /// Ascending by key.
   std::vector<Hit> hits;
   bool has_more = false;
+  int64_t hit_count = 0;
   /// Empty unless asked for.
   std::vector<PlanStep> steps;
 };
@@ -70,14 +75,11 @@ struct SearchAnswer {
 absl::StatusOr<SearchAnswer> RunSearch(const GraphView& view, const SearchQuestion& question,
                                        const StopCheck& stop);
 
-/// True if the node is what the pattern says at an instant; nullopt: at any time, each condition
-/// for itself. For the present give kTimeMax - 1. For many nodes, a Matcher remembers more.
-bool Matches(const GraphView& view, const Pattern& pattern, const ViewNode& node,
-             std::optional<TimeNs> at_ns);
-
-/// All nodes that match, agents included. Ascending id.
-/// Errors: what `stop` returned.
+/// All nodes that match at an instant, agents included; nullopt: at any time, each condition for
+/// itself. For the present give kTimeMax - 1. `snapshot` as in SearchQuestion. Ascending id.
+/// Errors: of the store; what `stop` returned.
 absl::StatusOr<std::vector<NodeId>> FindMatches(const GraphView& view, const Pattern& pattern,
+                                                const Snapshot* snapshot,
                                                 std::optional<TimeNs> at_ns, const StopCheck& stop);
 
 }  // namespace dsg::query

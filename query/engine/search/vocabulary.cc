@@ -170,6 +170,18 @@ std::vector<std::string> Vocabulary::ClassNames() const {
   return names;
 }
 
+absl::StatusOr<std::vector<std::string>> Vocabulary::NodeNames(std::optional<LayerId> layer) const {
+  std::set<Symbol> symbols;
+  const auto note_name = [&](const ViewNode& node) {
+    if (node.name != 0 && (!layer.has_value() || node.layer == *layer)) symbols.insert(node.name);
+    return false;
+  };
+  DSG_RETURN_IF_ERROR(HasNode(note_name).status());
+  std::vector<std::string> names;
+  for (const Symbol symbol : symbols) names.push_back(view_.symbols().Text(symbol));
+  return names;
+}
+
 absl::Status Vocabulary::ClassUnknown(std::string_view word, bool is_noun) const {
   std::vector<std::string> known = ClassNames();
   DSG_ASSIGN_OR_RETURN(const std::vector<std::string> labels, Labels());
@@ -177,6 +189,9 @@ absl::Status Vocabulary::ClassUnknown(std::string_view word, bool is_noun) const
   if (is_noun) {
     for (const kinds::Kind& kind : kinds::kAll) known.emplace_back(kind.name);
     for (const Layer& layer : view_.layers()) known.push_back(layer.name);
+    DSG_ASSIGN_OR_RETURN(const std::vector<std::string> names, NodeNames(std::nullopt));
+    // Of the thousands that are not near none is worth a line.
+    for (std::string& name : NearInSpelling(word, names)) known.push_back(std::move(name));
   }
   const std::string text(word);
   return MakeError(
@@ -216,10 +231,19 @@ absl::Status Vocabulary::KindUnknown(std::string_view word) const {
   std::vector<std::string> known;
   for (const kinds::Kind& kind : kinds::kAll) known.emplace_back(kind.name);
   const std::string text(word);
-  return MakeError(Reason::kFieldInvalid,
-                   absl::StrCat("pattern.kind is ", text, "; no node of the map is of this kind",
-                                SpellingHint(word, std::move(known))),
-                   {{"field", "pattern.kind"}, {"value", text}});
+  return MakeError(Reason::kClassUnknown,
+                   absl::StrCat("no node of the map is of kind \"", text, "\" at revision ",
+                                view_.revision(), SpellingHint(word, std::move(known))),
+                   {{"kind", text}});
+}
+
+absl::Status Vocabulary::NameUnknown(std::string_view name, std::optional<LayerId> layer) const {
+  DSG_ASSIGN_OR_RETURN(std::vector<std::string> known, NodeNames(layer));
+  const std::string text(name);
+  return MakeError(Reason::kNodeUnknown,
+                   absl::StrCat("no node of the map is called \"", text, "\" at revision ",
+                                view_.revision(), SpellingHint(name, std::move(known))),
+                   {{"node", text}});
 }
 
 absl::Status Vocabulary::AttributeUnknown(std::string_view name) const {

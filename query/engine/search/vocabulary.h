@@ -45,11 +45,14 @@ class Vocabulary {
   absl::Status LayerUnknown(std::string_view word) const;
   absl::Status RelationUnknown(std::string_view word) const;
   absl::Status KindUnknown(std::string_view word) const;
+  /// `layer`: where the name was looked for; nullopt = everywhere.
+  absl::Status NameUnknown(std::string_view name, std::optional<LayerId> layer) const;
   absl::Status AttributeUnknown(std::string_view name) const;
 
  private:
   absl::StatusOr<std::vector<std::string>> Labels() const;
   std::vector<std::string> ClassNames() const;
+  absl::StatusOr<std::vector<std::string>> NodeNames(std::optional<LayerId> layer) const;
   /// Symbols of all relations, or only whether `wanted` is one of them.
   absl::StatusOr<std::vector<Symbol>> RelationSymbols(std::optional<Symbol> wanted) const;
   absl::StatusOr<bool> HasNode(const std::function<bool(const ViewNode&)>& is_it) const;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <utility>
 
 #include "query/engine/search/pattern.h"
@@ -93,6 +94,9 @@ std::vector<std::string> NearInSpelling(std::string_view word,
   std::vector<std::pair<int, std::string>> near;
   for (const std::string& candidate : known) {
     if (candidate.size() > kSpellingBytesMax) continue;
+    // So many bytes have to be put in or left out at least.
+    const int longer = static_cast<int>(candidate.size()) - static_cast<int>(word.size());
+    if (std::abs(longer) > distance_max) continue;
     const int distance = EditDistance(folded, FoldCase(candidate));
     if (distance <= distance_max) near.emplace_back(distance, candidate);
   }

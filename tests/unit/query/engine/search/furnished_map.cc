@@ -218,6 +218,14 @@ query::NodePattern RandomPattern(Random* random, int depth) {
     condition.other = RandomPattern(random, depth - 1);
     pattern.relations.push_back(std::move(condition));
   }
+  while (depth > 0 && random->Chance(0.25)) {
+    query::NodePattern either;
+    query::Alternatives& alternatives = either.alternatives.emplace_back();
+    for (int i = random->Integer(2, 3); i > 0; --i) {
+      alternatives.any_of.push_back(RandomPattern(random, depth - 1));
+    }
+    query::AddAlternatives(std::move(either), random->Chance(0.3), &pattern);
+  }
   return pattern;
 }
 

@@ -73,6 +73,11 @@ class Scanner {
     for (const RelationCondition& condition : pattern.relations) {
       if (HasRelated(node, condition) == condition.negated) return false;
     }
+    for (const query::Alternatives& alternatives : pattern.alternatives) {
+      bool is_any = false;
+      for (const NodePattern& one : alternatives.any_of) is_any = is_any || Matches(node, one);
+      if (is_any == alternatives.negated) return false;
+    }
     return true;
   }
 

@@ -99,7 +99,7 @@ TEST(Search, FindsWhatAScanFindsAtEveryRevisionAndPageSize) {
         ASSERT_EQ(KeysOf(SearchAll(*view, Ask(question, *pattern), page_size)), expected)
             << "revision " << revision << ": " << Describe(question);
         if (question.near_map.has_value() || question.box_map.has_value()) continue;
-        auto all = FindMatches(*view, *pattern, question.at_ns, {});
+        auto all = FindMatches(*view, *pattern, snapshot.get(), question.at_ns, {});
         ASSERT_TRUE(all.ok());
         // Matches are of any place, so agents without a track are among them.
         if (question.at_ns.has_value()) {
@@ -176,6 +176,8 @@ TEST(Search, SaysTheStepsOfItsPlanWithCounts) {
   EXPECT_EQ(steps_of("rooms"), "layer index, filter, ");
   EXPECT_EQ(steps_of("any"), "scan, filter, ");
   EXPECT_EQ(steps_of("any SEES O3"), "id, filter, join, filter, ");
+  EXPECT_EQ(steps_of("cup or room"), "class index, layer index, union, filter, ");
+  EXPECT_EQ(steps_of("cup and not (red or yellow)"), "class index, filter, ");
 }
 
 TEST(Search, StopsWhenItIsTold) {
@@ -198,7 +200,8 @@ TEST(Search, StopsWhenItIsTold) {
   EXPECT_TRUE(absl::IsCancelled(query::RunSearch(*view, asked, stop).status()));
   asked.near_map = Eigen::Vector3d::Zero();
   EXPECT_TRUE(absl::IsCancelled(query::RunSearch(*view, asked, stop).status()));
-  EXPECT_TRUE(absl::IsCancelled(FindMatches(*view, *pattern, std::nullopt, stop).status()));
+  EXPECT_TRUE(
+      absl::IsCancelled(FindMatches(*view, *pattern, nullptr, std::nullopt, stop).status()));
 }
 
 }  // namespace

@@ -214,6 +214,10 @@ TEST_F(SearchNodes, FindsAgentsWhereTheyWereAtTheInstant) {
   ASSERT_EQ(there->hits_size(), 2);
   EXPECT_EQ(there->hits(0).node().map_t_node().position().x(), 11.5);
   EXPECT_EQ(there->hits(1).node().map_t_node().position().x(), 3.0);
+  ASSERT_EQ(there->hits(0).ancestor_ids_size(), 3);
+  EXPECT_EQ(there->hits(0).ancestor_ids(0), "p3");
+  EXPECT_EQ(there->hits(0).ancestor_ids(1), "R2");
+  EXPECT_EQ(there->hits(1).ancestor_ids(1), "R1");
   // H13 has left; H12 is in a gap of its track.
   request.set_at_ns(40 * kSecond);
   const auto gap = Ask(request);
@@ -221,6 +225,7 @@ TEST_F(SearchNodes, FindsAgentsWhereTheyWereAtTheInstant) {
   ASSERT_EQ(gap->hits_size(), 1);
   EXPECT_EQ(gap->hits(0).node().id(), "H12");
   EXPECT_FALSE(gap->hits(0).node().has_map_t_node());
+  EXPECT_EQ(gap->hits(0).ancestor_ids_size(), 0);
   request.set_at_ns(63 * kSecond);
   EXPECT_EQ(Hits(request), "");
   request = Query("any");
@@ -244,6 +249,145 @@ TEST_F(SearchNodes, TakesAPatternFromPrograms) {
   relation->set_relation("INSIDE");
   relation->mutable_other()->set_id("B1");
   EXPECT_EQ(Hits(request), "O11 ");
+}
+
+TEST_F(SearchNodes, TakesOneOrTheOtherAndWhatIsNotSo) {
+  EXPECT_EQ(Hits("cup or chair"), "O2 O11 ");
+  EXPECT_EQ(Hits("red cup or lab"), "O11 R2 ");
+  EXPECT_EQ(Hits("(cup or \"dining table\") and (red or blue)"), "O11 O12 ");
+  EXPECT_EQ(Hits("cup on (\"Blue Table\" or O10)"), "O11 ");
+  EXPECT_EQ(Hits("object and not (cup or \"dining table\")"), "O1 O2 ");
+  // What has no weight, and what has no colour, is not so either.
+  EXPECT_EQ(Hits("object and not weight > 2.4"), "O1 O2 O10 ");
+  EXPECT_EQ(Hits("object and not red"), "O1 O2 O10 O12 ");
+  EXPECT_EQ(Hits("room not lab"), "R1 ");
+  v1::SearchNodesRequest request;
+  request.set_map(kMap);
+  v1::Alternatives* either = request.mutable_pattern()->add_alternatives();
+  either->add_any_of()->set_class_name("cup");
+  either->add_any_of()->set_kind("room");
+  EXPECT_EQ(Hits(request), "O11 R1 R2 ");
+  EXPECT_EQ(Ask(request)->canonical_query(), "class = cup or kind = room");
+  either->set_negated(true);
+  request.mutable_pattern()->set_layer("objects");
+  EXPECT_EQ(Hits(request), "O1 O2 O10 O12 ");
+  EXPECT_EQ(Ask(request)->canonical_query(),
+            "layer = objects and not (class = cup or kind = room)");
+}
+
+TEST_F(SearchNodes, AlternativesMayWantAgentsNearAPoint) {
+  auto request = Query("human or chair");
+  request.mutable_near()->set_x(14.0);
+  request.mutable_near()->set_y(5.0);
+  EXPECT_EQ(ReasonOfAsking(request), Reason::kFieldInvalid);
+  request.set_at_ns(10 * kSecond);
+  EXPECT_EQ(Hits(request), "O2 H12 H13 ");
+  EXPECT_EQ(Hits(request, 1), "O2 H12 H13 ");
+}
+
+TEST_F(SearchNodes, AgentsAreWhereTheyStay) {
+  const auto at = [&](const char* query, TimeNs at_ns) {
+    auto request = Query(query);
+    request.set_at_ns(at_ns);
+    return Hits(request);
+  };
+  EXPECT_EQ(at("human in kitchen", 3 * kSecond), "H12 H13 ");
+  EXPECT_EQ(at("human in kitchen", 10 * kSecond), "H13 ");
+  EXPECT_EQ(at("human inside p2", 4 * kSecond), "H12 ");
+  EXPECT_EQ(at("human in HQ", 10 * kSecond), "H12 H13 ");
+  EXPECT_EQ(at("human not in HQ", 40 * kSecond), "H12 ");
+  EXPECT_EQ(at("room with human", 10 * kSecond), "R1 R2 ");
+  EXPECT_EQ(at("room with human", 15 * kSecond), "R2 ");
+  EXPECT_EQ(at("building with human", 40 * kSecond), "");
+  EXPECT_EQ(at("any in kitchen", 10 * kSecond), "H13 O1 O10 O11 p1 p2 ");
+  EXPECT_EQ(Hits("human in lab"), "H12 ");
+  EXPECT_EQ(Hits("human not in lab"), "H13 ");
+  EXPECT_EQ(Hits("robot in HQ"), "");
+  EXPECT_EQ(Hits("room contains human"), "");
+  const auto reply = Ask(Query("human in room"));
+  ASSERT_TRUE(reply.ok()) << reply.status();
+  ASSERT_EQ(reply->hits_size(), 2);
+  EXPECT_EQ(reply->hits(0).related_ids(0), "R1");
+}
+
+TEST_F(SearchNodes, AgentsAreOnTheLevelOfTheirRoom) {
+  GraphDelta delta;
+  delta.layers = {{450, "levels", 450}};
+  Node level = MakeNode(NodeId('L', 1), 450, "level", "level 1", Box3d());
+  delta.edges = {MakeEdge(level.id, relations::kContains, NodeId('R', 2))};
+  delta.nodes = {std::move(level)};
+  CommitToOffice(folder_.path(), std::move(delta));
+  auto request = Query("human in (level 1)");
+  EXPECT_EQ(Hits(request), "H12 ");
+  request.set_at_ns(10 * kSecond);
+  EXPECT_EQ(Hits(request), "H12 ");
+  request.set_at_ns(3 * kSecond);
+  EXPECT_EQ(Hits(request), "");
+  request.set_query("human and not in (level 1)");
+  EXPECT_EQ(Hits(request), "H12 H13 ");
+}
+
+TEST_F(SearchNodes, FindsInARoomWhomListPresenceListsThere) {
+  int64_t found_count = 0;
+  for (TimeNs at_ns = 0; at_ns <= 64 * kSecond; at_ns += kSecond / 2) {
+    for (const char* where : {"R1", "R2", "B1", "p1", "p2", "p3"}) {
+      v1::ListPresenceRequest who;
+      who.set_map(kMap);
+      who.set_node_id(where);
+      who.set_from_ns(at_ns);
+      who.set_to_ns(at_ns + 1);
+      v1::ListPresenceResponse there;
+      ASSERT_TRUE(core_->ListPresence(call_, who, &there).ok());
+      std::string ids;
+      for (const auto& interval : there.intervals()) ids += interval.agent_id() + " ";
+      auto request = Query("human in " + std::string(where));
+      request.set_at_ns(at_ns);
+      EXPECT_EQ(Hits(request), ids) << where << " at " << at_ns;
+      request.set_query(std::string(where) + " with human");
+      EXPECT_EQ(Hits(request).empty(), ids.empty()) << where << " at " << at_ns;
+      found_count += there.intervals_size();
+    }
+  }
+  EXPECT_GT(found_count, 100);
+}
+
+TEST_F(SearchNodes, CountsWithoutNodes) {
+  for (const bool is_near : {false, true}) {
+    auto request = Query("object or room");
+    request.set_page_size(2);
+    request.set_count_only(true);
+    if (is_near) request.mutable_near()->set_x(5.0);
+    const auto reply = Ask(request);
+    ASSERT_TRUE(reply.ok()) << reply.status();
+    EXPECT_EQ(reply->hit_count(), 7);
+    EXPECT_EQ(reply->hits_size(), 0);
+    EXPECT_EQ(reply->next_page_token(), "");
+  }
+  EXPECT_EQ(Ask(Query("object"))->hit_count(), 0);
+}
+
+TEST_F(SearchNodes, SaysNamesThatAreNearInSpelling) {
+  const std::pair<const char*, const char*> mistakes[] = {
+      {"cup in (room \"kitchn\")", "; near in spelling: \"kitchen\""},
+      {"cup not in (room \"kitchn\")", "; near in spelling: \"kitchen\""},
+      {"cup or name = \"blue tabel\"", "; near in spelling: \"Blue Table\""},
+      // None is near: those that rooms have.
+      {"room \"observatory\"", "; known: \"kitchen\", \"lab\""},
+  };
+  for (const auto& [query, hint] : mistakes) {
+    const auto reply = Ask(Query(query));
+    EXPECT_EQ(ReasonOf(reply.status()), Reason::kNodeUnknown) << query;
+    EXPECT_NE(reply.status().message().find(hint), std::string::npos) << reply.status();
+  }
+  const auto numbered = Ask(Query("cup in kitchen 2"));
+  EXPECT_EQ(ReasonOf(numbered.status()), Reason::kClassUnknown);
+  EXPECT_NE(numbered.status().message().find("\"kitchen 2\""), std::string::npos);
+  EXPECT_NE(numbered.status().message().find("near in spelling: \"kitchen\""), std::string::npos)
+      << numbered.status();
+  const auto kind = Ask(Query("kind = humna"));
+  EXPECT_NE(kind.status().message().find("\"human\""), std::string::npos) << kind.status();
+  // Whether there are any is the question.
+  EXPECT_EQ(Hits("name = \"obs*\""), "");
 }
 
 TEST_F(SearchNodes, NarrowsByABoxThatTouches) {
@@ -296,7 +440,7 @@ TEST_F(SearchNodes, RefusesWhatItCannotAnswer) {
   EXPECT_EQ(ReasonOfAsking(Query("O99")), Reason::kNodeUnknown);
   EXPECT_EQ(ReasonOfAsking(Query("id = O99")), Reason::kNodeUnknown);
   EXPECT_EQ(ReasonOfAsking(Query("id = x")), Reason::kNodeIdInvalid);
-  EXPECT_EQ(ReasonOfAsking(Query("kind = humna")), Reason::kFieldInvalid);
+  EXPECT_EQ(ReasonOfAsking(Query("kind = humna")), Reason::kClassUnknown);
   EXPECT_EQ(ReasonOfAsking(Query("any and has spark_dsg")), Reason::kFieldInvalid);
   EXPECT_EQ(ReasonOfAsking(Query("cup and class = \"dining table\"")), Reason::kQueryMalformed);
   request = Query("any");
@@ -343,6 +487,17 @@ TEST_F(SearchNodes, RefusesPatternsThatMeanNothing) {
   condition->set_comparison(v1::LESS);
   EXPECT_EQ(reason_of(pattern), Reason::kFieldInvalid);
   condition->set_comparison(static_cast<v1::Comparison>(42));
+  EXPECT_EQ(reason_of(pattern), Reason::kFieldInvalid);
+  pattern.Clear();
+  pattern.add_alternatives();
+  EXPECT_EQ(reason_of(pattern), Reason::kFieldInvalid);
+  for (int i = 0; i < 64; ++i) pattern.mutable_alternatives(0)->add_any_of()->set_kind("room");
+  EXPECT_EQ(reason_of(pattern), Reason::kUnspecified);
+  pattern.mutable_alternatives(0)->add_any_of();
+  EXPECT_EQ(reason_of(pattern), Reason::kFieldInvalid);
+  pattern.Clear();
+  v1::NodePattern* inner = &pattern;
+  for (int i = 0; i < 9; ++i) inner = inner->add_alternatives()->add_any_of();
   EXPECT_EQ(reason_of(pattern), Reason::kFieldInvalid);
   pattern.Clear();
   v1::NodePattern* deepest = &pattern;
