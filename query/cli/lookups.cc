@@ -157,14 +157,19 @@ absl::Status FillFilter(const FilterOptions& options, const MapSpec& map, v1::No
   return absl::OkStatus();
 }
 
-absl::Status CheckWords(Session* session, const std::string& layer, const std::string& class_name,
-                        const std::string& relation) {
-  if (layer.empty() && class_name.empty() && relation.empty()) return absl::OkStatus();
+v1::NodePattern WordsOf(const FilterOptions& options) {
+  v1::NodePattern words;
+  words.set_layer(options.layer);
+  words.set_kind(options.kind);
+  words.set_class_name(options.class_name);
+  return words;
+}
+
+absl::Status CheckWords(Session* session, const v1::NodePattern& words) {
+  if (words.ByteSizeLong() == 0) return absl::OkStatus();
   // The search names the words of the map that are similar.
   auto request = session->Begin<v1::SearchNodesRequest>();
-  request.mutable_pattern()->set_layer(layer);
-  request.mutable_pattern()->set_class_name(class_name);
-  if (!relation.empty()) request.mutable_pattern()->add_relations()->set_relation(relation);
+  *request.mutable_pattern() = words;
   request.set_page_size(1);
   v1::SearchNodesResponse reply;
   absl::Status status = session->api().SearchNodes(session->NewCall(), request, &reply);

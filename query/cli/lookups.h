@@ -19,6 +19,7 @@
 namespace dsg::v1 {
 class ListTagsResponse;
 class NodeFilter;
+class NodePattern;
 }  // namespace dsg::v1
 
 namespace dsg::cli {
@@ -64,9 +65,11 @@ absl::StatusOr<Interval> AskedInterval(Session* session, const std::string& from
 /// Errors: INVALID_ARGUMENT with --at.
 absl::Status FillFilter(const FilterOptions& options, const MapSpec& map, v1::NodeFilter* filter);
 
-/// For lists that came out empty: an error if the map does not know one of the words; empty words
-/// are not checked. Errors: NOT_FOUND/CLASS_UNKNOWN, RELATION_UNKNOWN, LAYER_UNKNOWN.
-absl::Status CheckWords(Session* session, const std::string& layer, const std::string& class_name,
-                        const std::string& relation);
+/// The layer, kind and class of a filter, for CheckWords.
+v1::NodePattern WordsOf(const FilterOptions& options);
+
+/// For lists that came out empty: an error if the map does not know one of the words of a pattern.
+/// Errors: NOT_FOUND/CLASS_UNKNOWN (also for a kind), RELATION_UNKNOWN, LAYER_UNKNOWN.
+absl::Status CheckWords(Session* session, const v1::NodePattern& words);
 
 }  // namespace dsg::cli

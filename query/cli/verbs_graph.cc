@@ -224,7 +224,7 @@ absl::Status RunList(Session* session, const ListVerb& verb, std::ostream& out) 
   DSG_RETURN_IF_ERROR(session->ReadPages(&query::Api::ListNodes, request, session->common().limit,
                                          &v1::ListNodesResponse::nodes_size, &all));
   if (all.nodes().empty()) {
-    DSG_RETURN_IF_ERROR(CheckWords(session, verb.filter.layer, verb.filter.class_name, ""));
+    DSG_RETURN_IF_ERROR(CheckWords(session, WordsOf(verb.filter)));
   }
   if (session->common().json) return WriteJson(all, out);
   out << RenderNodes(all);
@@ -242,7 +242,9 @@ absl::Status RunEdges(Session* session, const EdgesVerb& verb, std::ostream& out
   DSG_RETURN_IF_ERROR(session->ReadPages(&query::Api::ListEdges, request, session->common().limit,
                                          &v1::ListEdgesResponse::edges_size, &all));
   if (all.edges().empty()) {
-    DSG_RETURN_IF_ERROR(CheckWords(session, "", "", verb.relation));
+    v1::NodePattern words;
+    if (!verb.relation.empty()) words.add_relations()->set_relation(verb.relation);
+    DSG_RETURN_IF_ERROR(CheckWords(session, words));
   }
   if (session->common().json) return WriteJson(all, out);
   out << RenderEdges(all, session->times());
@@ -273,7 +275,7 @@ absl::Status RunNear(Session* session, const NearVerb& verb, std::ostream& out) 
   v1::ListNearestNodesResponse reply;
   DSG_RETURN_IF_ERROR(session->api().ListNearestNodes(session->NewCall(), request, &reply));
   if (reply.nodes().empty()) {
-    DSG_RETURN_IF_ERROR(CheckWords(session, "", verb.filter.class_name, ""));
+    DSG_RETURN_IF_ERROR(CheckWords(session, WordsOf(verb.filter)));
   }
   if (session->common().json) return WriteJson(reply, out);
   out << RenderNearest(reply);

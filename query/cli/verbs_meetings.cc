@@ -294,7 +294,9 @@ absl::Status RunPicked(Session* session, const PickedVerb& verb, std::ostream& o
                                          session->common().limit,
                                          &v1::ListInteractionsResponse::interactions_size, &all));
   if (all.interactions().empty()) {
-    DSG_RETURN_IF_ERROR(CheckWords(session, "", verb.class_name, ""));
+    v1::NodePattern words;
+    words.set_class_name(verb.class_name);
+    DSG_RETURN_IF_ERROR(CheckWords(session, words));
   }
   AnswerPicture picture;
   if (!verb.picture.png.empty()) {

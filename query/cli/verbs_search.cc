@@ -135,6 +135,7 @@ absl::StatusOr<v1::SearchNodesRequest> SearchRequest(Session* session, const Fin
   DSG_RETURN_IF_ERROR(
       SetInstant("--at", verb.at, session->map(), &request, &v1::SearchNodesRequest::set_at_ns));
   request.set_view(v1::NODE_VIEW_GEOMETRY);
+  request.set_count_only(verb.count);
   request.set_explain(verb.explain);
   return request;
 }
@@ -182,7 +183,13 @@ AnswerPicture DrawFound(const v1::SearchNodesRequest& request, const v1::SearchN
   return picture;
 }
 
-absl::Status PrintHits(Session* session, const v1::SearchNodesResponse& reply, std::ostream& out) {
+absl::Status PrintHits(Session* session, const FindVerb& verb, const v1::SearchNodesResponse& reply,
+                       std::ostream& out) {
+  if (verb.count) {
+    out << Footer(reply.hit_count(), "node", reply.header().read_revision(), false)
+        << (reply.plan().empty() ? "" : RenderPlan(reply));
+    return absl::OkStatus();
+  }
   std::vector<std::string> ids;
   for (const v1::SearchHit& hit : reply.hits()) {
     ids.insert(ids.end(), hit.ancestor_ids().begin(), hit.ancestor_ids().end());
@@ -211,7 +218,7 @@ absl::Status RunFind(Session* session, const FindVerb& verb, std::ostream& out) 
   if (session->common().json) {
     DSG_RETURN_IF_ERROR(WriteJson(all, out));
   } else {
-    DSG_RETURN_IF_ERROR(PrintHits(session, all, out));
+    DSG_RETURN_IF_ERROR(PrintHits(session, verb, all, out));
   }
   return WritePicture(session, verb.picture, DrawFound(request, all, verb), out);
 }
@@ -251,7 +258,7 @@ absl::Status RunSubgraph(Session* session, const SubgraphVerb& verb, std::ostrea
   DSG_RETURN_IF_ERROR(session->Read(&query::Api::GetSubgraph, request, merge));
   // Only the root: the filter may name a class that does not exist.
   if (all.nodes_size() <= 1) {
-    DSG_RETURN_IF_ERROR(CheckWords(session, "", verb.filter.class_name, ""));
+    DSG_RETURN_IF_ERROR(CheckWords(session, WordsOf(verb.filter)));
   }
   if (session->common().json) return WriteJson(all, out);
   out << RenderSubgraph(all, session->times());
@@ -265,7 +272,8 @@ void AddFind(Grammar* grammar) {
                               .example = "'laptop on (desk in (room \"office 4\"))' --near 10,10,1",
                               .run = RunFind});
   app->add_option("QUERY", verb->words,
-                  "cup and color = red on table in (room \"Dining room\"); see docs/search.md")
+                  "red cup on table in (room \"Dining room\"), human in (level 1), "
+                  "(cup or mug) and not red; see docs/search.md")
       ->required();
   CLI::Option* near =
       app->add_option("--near", verb->near, "Sort by distance to X,Y,Z in the map frame, metres");
@@ -274,10 +282,14 @@ void AddFind(Grammar* grammar) {
       ->needs(near);
   app->add_option("--box", verb->box, "Only nodes that touch X0,Y0,Z0,X1,Y1,Z1, metres");
   app->add_option("--at", verb->at, "What held at this TIME; default now or before");
-  app->add_option("-k,--limit", grammar->common()->limit, "List at most this many entries")
-      ->check(WholeAboveZero());
+  CLI::Option* limit =
+      app->add_option("-k,--limit", grammar->common()->limit, "List at most this many entries")
+          ->check(WholeAboveZero());
+  CLI::Option* count =
+      app->add_flag("--count", verb->count, "Only say how many nodes there are")->excludes(limit);
   app->add_flag("--explain", verb->explain, "Also show the plan of the search");
   AddPicture(app, "the hits", &verb->picture);
+  count->excludes(app->get_option("--png"));
 }
 
 void AddAround(Grammar* grammar) {

@@ -24,6 +24,7 @@ struct FindVerb {
   double max_distance_m = 0.0;
   std::string box;
   std::string at;
+  bool count = false;
   bool explain = false;
   PictureOptions picture;
 };

@@ -60,6 +60,14 @@ TEST(FindArguments, TakeAQueryInOneWordOrMany) {
   Refusal({"find", "cup", "--max-distance", "3"});
 }
 
+TEST(FindArguments, CountStandsAlone) {
+  EXPECT_TRUE(ParseAs<FindVerb>({"find", "cup", "--count", "--explain"}).count);
+  EXPECT_FALSE(ParseAs<FindVerb>({"find", "cup"}).count);
+  // Nothing to list, nothing to draw.
+  Refusal({"find", "cup", "--count", "-k", "3"});
+  Refusal({"find", "cup", "--count", "--png", "x.png"});
+}
+
 TEST(FindArguments, KIsALimit) {
   const auto command = ParseArguments({"find", "cup", "-k", "3"}, {.store = "s"});
   ASSERT_TRUE(command.ok()) << command.status();

@@ -147,6 +147,13 @@ TEST_F(QuestionsRun, FindTakesTheQueryLanguage) {
   EXPECT_NE(outcome.out.find("understood as: "), std::string::npos) << outcome.out;
 }
 
+TEST_F(QuestionsRun, FindCounts) {
+  EXPECT_EQ(AskJson({"find", "cup or table", "--count"})["hit_count"], "2");
+  const Outcome outcome = Ask({"find", "cup or table", "--count"});
+  EXPECT_EQ(outcome.code, 0) << outcome.errors;
+  EXPECT_EQ(outcome.out, "2 nodes (revision 2)\n");
+}
+
 TEST_F(QuestionsRun, AMistakeInAQueryIsShownWhereItIs) {
   ExpectRefused(2, "QUERY_MALFORMED", {"find", "cup on ("});
   ExpectRefused(2, ">>>", {"find", "cup on ("});
@@ -156,6 +163,11 @@ TEST_F(QuestionsRun, AMistakeInAQueryIsShownWhereItIs) {
 TEST_F(QuestionsRun, WordsThatTheMapDoesNotKnowAreNoEmptyList) {
   ExpectRefused(1, "RELATION_UNKNOWN", {"edges", "--relation", "BOGUS"});
   ExpectRefused(1, "CLASS_UNKNOWN", {"ls", "--class", "unicorn"});
+  ExpectRefused(1, "\"room\"", {"ls", "--kind", "rooom"});
+  ExpectRefused(1, "CLASS_UNKNOWN", {"near", "0,0,0", "--kind", "rooom"});
+  ExpectRefused(1, "near in spelling: \"kitchen\"", {"find", "cup in (room \"kitchn\")"});
+  // A kind of the model, though none is there.
+  EXPECT_EQ(Ask({"ls", "--kind", "structure"}).code, 0);
   // Known, though none is there.
   EXPECT_EQ(Ask({"edges", "--relation", "ON", "--source", "p1"}).code, 0);
 }
