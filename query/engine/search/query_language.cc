@@ -47,6 +47,8 @@ class Parser {
   absl::Status Error(const Token& token, std::string_view expected) const {
     return QueryError(text_, token.position, expected);
   }
+  // As a typed pattern counts, so that the text of one is no longer than it may be. Fields do not
+  // count: a pattern has each of them once at most.
   absl::Status CountCondition(const Token& token) {
     if (++condition_count_ <= kPatternConditionsMax) return absl::OkStatus();
     return Error(token, absl::StrCat("at most ", kPatternConditionsMax, " conditions"));
@@ -235,8 +237,9 @@ class Parser {
   }
 
   absl::Status ParseCondition(NodePattern* pattern) {
-    DSG_RETURN_IF_ERROR(CountCondition(Peek()));
+    const Token& first = Peek();
     if (TakeWord(words::kHas)) {
+      DSG_RETURN_IF_ERROR(CountCondition(first));
       const Token& name = Peek();
       if ((name.kind != Kind::kWord && name.kind != Kind::kQuoted) || name.text.empty()) {
         return Error(name, "the name of an attribute");
@@ -273,6 +276,7 @@ class Parser {
 
   absl::Status ParseAttribute(const Token& name, const Token& op, NodePattern* pattern) {
     if (name.text.empty()) return Error(name, "the name of an attribute");
+    DSG_RETURN_IF_ERROR(CountCondition(name));
     AttributeCondition condition;
     condition.name = name.text;
     condition.comparison = *ComparisonOf(op.text);
