@@ -53,6 +53,7 @@ std::vector<QuestionKind> PresenceQuestions();
 std::vector<QuestionKind> CollisionQuestions();
 std::vector<QuestionKind> PathQuestions();
 std::vector<QuestionKind> DiffQuestions();
+std::vector<QuestionKind> SearchQuestions();
 
 /// The words of an answer that is an error.
 ComparedAnswer ErrorAnswer(const absl::Status& status);

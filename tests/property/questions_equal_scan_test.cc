@@ -17,8 +17,9 @@ constexpr int kQuestionCountAcrossWritings = 500;
 
 std::vector<QuestionKind> AllKinds() {
   std::vector<QuestionKind> all;
-  for (const auto& some : {NodeQuestions(), EdgeQuestions(), LocateQuestions(), PresenceQuestions(),
-                           CollisionQuestions(), PathQuestions(), DiffQuestions()}) {
+  for (const auto& some :
+       {NodeQuestions(), EdgeQuestions(), LocateQuestions(), PresenceQuestions(),
+        CollisionQuestions(), PathQuestions(), DiffQuestions(), SearchQuestions()}) {
     all.insert(all.end(), some.begin(), some.end());
   }
   return all;
