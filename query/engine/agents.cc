@@ -96,10 +96,13 @@ absl::StatusOr<std::shared_ptr<const Ancestry>> Read(const Snapshot& snapshot, c
   DSG_ASSIGN_OR_RETURN(const std::vector<NodeId> ids, FindIds(snapshot, stay));
   auto ancestry = std::make_shared<Ancestry>();
   for (const NodeId id : ids) {
+    const absl::StatusOr<Node> node = snapshot.GetNode(id);
+    // A stay outlasts a room that turned out never to have been.
+    if (absl::IsNotFound(node.status())) continue;
+    DSG_RETURN_IF_ERROR(node.status());
     ancestry->ids.push_back(ToString(id));
-    if (!ancestry->building_id.empty()) continue;
-    DSG_ASSIGN_OR_RETURN(const Node node, snapshot.GetNode(id));
-    if (node.kind == kinds::kBuilding) ancestry->building_id = ancestry->ids.back();
+    const bool is_building = node->kind == kinds::kBuilding;
+    if (is_building && ancestry->building_id.empty()) ancestry->building_id = ToString(id);
   }
   return std::shared_ptr<const Ancestry>(std::move(ancestry));
 }

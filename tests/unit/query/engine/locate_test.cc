@@ -73,6 +73,21 @@ TEST_F(Locate, NamesPlaceRoomBuildingAndAllAncestorsNearestFirst) {
   EXPECT_EQ(reply->ancestor_ids(1), "B1");
 }
 
+TEST_F(Locate, LeavesOutARoomThatNeverWas) {
+  GraphDelta delta;
+  const NodeId room('R', 1);
+  delta.retirements = {{room, std::nullopt}};
+  delta.edge_removals = {{NodeId('B', 1), relations::kContains, room},
+                         {room, relations::kContains, NodeId('p', 1)},
+                         {room, relations::kContains, NodeId('p', 2)}};
+  CommitToOffice(folder_.path(), delta);
+  const auto reply = Get(Ask("H12", 5 * kSecond));
+  ASSERT_TRUE(reply.ok()) << reply.status();
+  EXPECT_EQ(reply->place_id(), "p2");
+  EXPECT_EQ(reply->building_id(), "");
+  EXPECT_EQ(reply->ancestor_ids_size(), 0);
+}
+
 TEST_F(Locate, LeavesTheHierarchyEmptyWhereNoStayIsKnown) {
   const auto reply = Get(Ask("spot", 5 * kSecond));
   ASSERT_TRUE(reply.ok()) << reply.status();
