@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "ingest/log/ros_cloud.h"
+#include "schema/codec/topology.h"
 
 namespace dsg::ingest {
 namespace {
@@ -63,6 +64,8 @@ std::string HashOf(const BagPlan& plan) {
   for (const auto& [color, class_id] : plan.class_of_color) {
     hash.Numbers64(int64_t{color}, int64_t{class_id});
   }
+  // Logs without it keep the identity that they had before bodies were read.
+  if (plan.body_topology != nullptr) hash.Text(EncodeTopology(*plan.body_topology));
   return hash.Hex();
 }
 

@@ -150,6 +150,7 @@ LogInfo InfoOf(const Bag& bag, const BagPlan& plan) {
   info.has_clock = true;
   info.rig = plan.rig;
   info.labels = plan.labels;
+  info.body_topology = plan.body_topology;
   info.notes = plan.notes;
   return info;
 }
@@ -214,6 +215,7 @@ absl::Status PlanFollowedLoops(const LogOptions& options, BagPlan* plan, BagGrow
 OpenedLog OpenBag(const std::string& path, const LogOptions& options) {
   DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Bag> bag, OpenBagFiles(path));
   DSG_ASSIGN_OR_RETURN(BagPlan plan, PlanBag(*bag, options.topics));
+  plan.is_strict = options.is_strict;
   LogInfo info = InfoOf(*bag, plan);
   LogDigest digest;
   DSG_ASSIGN_OR_RETURN(BagPoses poses, PlanPoses(*bag, options, &plan, &digest, &info));
@@ -247,6 +249,7 @@ OpenedLog OpenFollowedBag(std::unique_ptr<GrowingFile> file, const LogOptions& o
   DSG_ASSIGN_OR_RETURN(const size_t message_count, growth.bag->WaitForBegin(kFollowedBeginNs));
   const BagBegin begin(*growth.bag->bag(), message_count);
   DSG_ASSIGN_OR_RETURN(BagPlan plan, PlanBag(begin, TopicsOfBegin(begin, options)));
+  plan.is_strict = options.is_strict;
   LogInfo info = InfoOf(begin, plan);
   info.notes.push_back("the log is followed: it is committed while it grows");
   LogDigest digest;

@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "ingest/log/body_topology.h"
 #include "ingest/log/detection_json.h"
 #include "ingest/log/image_file.h"
 #include "ingest/log/ros_cloud.h"
@@ -34,11 +35,12 @@ ChannelRank RankOf(TopicUse use) {
   }
 }
 
-BagMeasurements::BagMeasurements(std::shared_ptr<const Bag> bag,
-                                 std::map<uint32_t, int32_t> class_of_color, std::string robot_name)
+BagMeasurements::BagMeasurements(std::shared_ptr<const Bag> bag, const BagPlan& plan,
+                                 std::string robot_name)
     : bag_(std::move(bag)),
-      class_of_color_(
-          std::make_shared<const std::map<uint32_t, int32_t>>(std::move(class_of_color))),
+      class_of_color_(std::make_shared<const std::map<uint32_t, int32_t>>(plan.class_of_color)),
+      body_topology_(plan.body_topology),
+      is_strict_(plan.is_strict),
       robot_name_(std::move(robot_name)) {}
 
 absl::StatusOr<Measurement> BagMeasurements::Read(const BagMessageRef& ref, const BagTopic& topic,
@@ -57,7 +59,9 @@ absl::StatusOr<Measurement> BagMeasurements::Read(const BagMessageRef& ref, cons
   }
   if (topic.use == TopicUse::kDetections) {
     DSG_ASSIGN_OR_RETURN(const std::string_view text, ParseRosString(message.data, origin));
-    DSG_ASSIGN_OR_RETURN(HumanDetection detection, ParseDetection(LinePosition{origin, 1}, text));
+    const LinePosition at{origin, 1};
+    DSG_ASSIGN_OR_RETURN(HumanDetection detection, ParseDetection(at, text));
+    DSG_RETURN_IF_ERROR(CheckBody(at, body_topology_.get(), is_strict_, detection));
     return Measurement(std::move(detection));
   }
   DSG_ASSIGN_OR_RETURN(const RosPose pose, ParseRosPoseOf(topic.type, message.data, origin));

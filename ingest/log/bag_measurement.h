@@ -29,8 +29,7 @@ ChannelRank RankOf(TopicUse use);
 class BagMeasurements {
  public:
   /// `robot_name`: whose poses the bag has.
-  BagMeasurements(std::shared_ptr<const Bag> bag, std::map<uint32_t, int32_t> class_of_color,
-                  std::string robot_name);
+  BagMeasurements(std::shared_ptr<const Bag> bag, const BagPlan& plan, std::string robot_name);
 
   /// `number`: of the message in its topic, from 1. An image keeps the bag open.
   /// Requires: the topic is used, and not for loop closures.
@@ -45,6 +44,8 @@ class BagMeasurements {
 
   std::shared_ptr<const Bag> bag_;
   std::shared_ptr<const std::map<uint32_t, int32_t>> class_of_color_;
+  std::shared_ptr<const Topology> body_topology_;
+  bool is_strict_;
   std::string robot_name_;
 };
 

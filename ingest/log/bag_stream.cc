@@ -26,7 +26,7 @@ BagStream::BagStream(std::shared_ptr<const Bag> bag, BagPlan plan, const std::st
       is_usable_(info_.measurement_count > 0),
       bag_(std::move(bag)),
       plan_(std::move(plan)),
-      measurements_(bag_, plan_.class_of_color, robot_name),
+      measurements_(bag_, plan_, robot_name),
       numbers_(plan_.topics.size(), 0),
       last_(plan_.topics.size()) {}
 

@@ -12,6 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "ingest/log/bag_calibration.h"
+#include "ingest/log/body_topology.h"
 #include "ingest/log/file_bytes.h"
 #include "ingest/log/image_channel.h"
 #include "ingest/log/image_header.h"
@@ -32,6 +33,8 @@ constexpr char kPoseWithCovarianceType[] = "geometry_msgs/PoseWithCovarianceStam
 constexpr char kStringType[] = "std_msgs/String";
 // What a person has told the localisation (RViz), no pose that was measured.
 constexpr char kInitialPose[] = "/initialpose";
+constexpr char kLabels[] = "/dsg/labels";
+constexpr char kBodyTopology[] = "/dsg/body_topology";
 constexpr char kLabelColors[] = "/tesse/seg_cam/rgb/image_raw";
 
 struct KnownTopic {
@@ -306,17 +309,30 @@ absl::Status UseImagesByEncoding(const Bag& bag, const NamedTopics& named, BagPl
   return absl::OkStatus();
 }
 
+// The text of a topic that is sent once; its bytes are empty if the bag has no such topic.
+absl::StatusOr<LogFile> ReadTextSentOnce(const Bag& bag, const std::string& name, BagPlan* plan) {
+  LogFile file{.path = bag.path(), .name = {}, .bytes = {}};
+  const BagTopic* topic = FindTopic(plan, name);
+  if (topic == nullptr || topic->type != kStringType) return file;
+  const std::optional<BagMessageRef>& first = plan->FirstOf(*topic);
+  if (!first.has_value()) return file;
+  file.path = BagOrigin(bag, topic->name, 1);
+  DSG_ASSIGN_OR_RETURN(const BagMessage message, bag.Read(*first));
+  DSG_ASSIGN_OR_RETURN(const std::string_view text, ParseRosString(message.data, file.path));
+  file.bytes = std::string(text);
+  return file;
+}
+
+absl::Status ReadBodyTopology(const Bag& bag, BagPlan* plan) {
+  DSG_ASSIGN_OR_RETURN(const LogFile file, ReadTextSentOnce(bag, kBodyTopology, plan));
+  if (file.bytes.empty()) return absl::OkStatus();
+  DSG_ASSIGN_OR_RETURN(plan->body_topology, ParseBodyTopology(file.path, file.bytes));
+  return absl::OkStatus();
+}
+
 absl::Status ReadLabels(const Bag& bag, BagPlan* plan) {
-  LogFile file{.path = bag.path(), .name = "labels.csv", .bytes = {}};
-  if (const BagTopic* topic = FindTopic(plan, "/dsg/labels"); topic != nullptr) {
-    const std::optional<BagMessageRef>& first = plan->FirstOf(*topic);
-    if (first.has_value() && topic->type == kStringType) {
-      file.path = BagOrigin(bag, topic->name, 1);
-      DSG_ASSIGN_OR_RETURN(const BagMessage message, bag.Read(*first));
-      DSG_ASSIGN_OR_RETURN(const std::string_view text, ParseRosString(message.data, file.path));
-      file.bytes = std::string(text);
-    }
-  }
+  DSG_ASSIGN_OR_RETURN(LogFile file, ReadTextSentOnce(bag, kLabels, plan));
+  file.name = "labels.csv";
   const std::filesystem::path beside =
       std::filesystem::path(bag.files().front()).parent_path() / "labels.csv";
   std::error_code error;
@@ -348,7 +364,7 @@ void NoteUnusedTopics(BagPlan* plan) {
   for (const BagTopic& topic : plan->topics) {
     const bool is_known = topic.use != TopicUse::kNone || topic.type == "sensor_msgs/CameraInfo" ||
                           topic.name == "/tf_static" || topic.name == "/tf" ||
-                          topic.name == "/dsg/labels";
+                          topic.name == kLabels || topic.name == kBodyTopology;
     if (!is_known) unused.push_back(&topic);
   }
   if (unused.empty()) return;
@@ -381,6 +397,7 @@ absl::StatusOr<BagPlan> PlanBag(const Bag& bag, const NamedTopics& named) {
   }
   UseKnownTopics(named, &plan);
   DSG_RETURN_IF_ERROR(ReadLabels(bag, &plan));
+  DSG_RETURN_IF_ERROR(ReadBodyTopology(bag, &plan));
   DropLabelsWithoutTable(&plan);
   DSG_RETURN_IF_ERROR(UseImagesByEncoding(bag, named, &plan));
   UseOnlyTopicOf(kCloudType, TopicUse::kCloud, "lidar0", named, &plan);

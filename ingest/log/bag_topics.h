@@ -59,14 +59,18 @@ struct BagPlan {
   RigCalibration rig;
   std::map<uint32_t, int32_t> class_of_color;
   std::vector<SemanticLabel> labels;
+  /// The faces of bodies; null when the bag has none.
+  std::shared_ptr<const Topology> body_topology;
+  /// LogOptions::is_strict.
+  bool is_strict = false;
   std::vector<std::string> notes;
 };
 
 /// Looks at the names and types, and reads the messages that are sent once: camera infos, static
-/// transforms, labels (or labels.csv beside the bag). `named` is LogOptions::topics.
-/// Errors: INVALID_ARGUMENT/FILE_MALFORMED naming the topic; FIELD_INVALID for a named topic that
-/// the bag does not have or that is of another type than its channel, and a channel that there is
-/// not.
+/// transforms, labels (or labels.csv beside the bag), the faces of bodies. `named` is
+/// LogOptions::topics. Errors: INVALID_ARGUMENT/FILE_MALFORMED naming the topic; FIELD_INVALID for
+/// a named topic that the bag does not have or that is of another type than its channel, and a
+/// channel that there is not.
 absl::StatusOr<BagPlan> PlanBag(const Bag& bag, const std::map<std::string, std::string>& named);
 
 /// "/imu0 (49 sensor_msgs/Imu), ... and 7 more", fit for a terminal.

@@ -9,6 +9,7 @@
 
 #include "absl/container/flat_hash_map.h"
 #include "absl/strings/str_cat.h"
+#include "ingest/log/body_topology.h"
 #include "ingest/log/detection_json.h"
 #include "ingest/log/file_bytes.h"
 #include "schema/base/status.h"
@@ -45,12 +46,26 @@ absl::Status CheckFollows(const LinePosition& at, const HumanDetection& before,
                                "; sort the lines by time_ns, then id"));
 }
 
+absl::Status ReadTopology(const std::string& path, const std::string& channel, LogDigest* digest,
+                          LogInfo* info) {
+  constexpr char kName[] = "topology.json";
+  const std::filesystem::path beside = std::filesystem::path(path).parent_path() / kName;
+  if (!IsFile(beside)) return absl::OkStatus();
+  DSG_ASSIGN_OR_RETURN(const LogFile file, ReadLogFile(beside.string()));
+  digest->Add(absl::StrCat(channel, "/", kName), file.bytes);
+  DSG_ASSIGN_OR_RETURN(info->body_topology, ParseBodyTopology(file.path, file.bytes));
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 absl::StatusOr<SensorChannel> ReadDetectionChannel(const std::string& path,
-                                                   const std::string& channel, LogDigest* digest) {
+                                                   const std::string& channel,
+                                                   const LogOptions& options, LogDigest* digest,
+                                                   LogInfo* info) {
   SensorChannel result{.name = channel, .rank = ChannelRank::kDetections, .times = {}, .make = {}};
   const std::string name = absl::StrCat(channel, "/data.jsonl");
+  DSG_RETURN_IF_ERROR(ReadTopology(path, channel, digest, info));
   std::error_code error;
   if (std::filesystem::file_size(path, error) == 0 && !error) {
     digest->AddSize(name, 0);
@@ -67,6 +82,7 @@ absl::StatusOr<SensorChannel> ReadDetectionChannel(const std::string& path,
   while (lines.Next(&line)) {
     const LinePosition at{path, line.number};
     DSG_ASSIGN_OR_RETURN(HumanDetection detection, ParseDetection(at, line.text));
+    DSG_RETURN_IF_ERROR(CheckBody(at, info->body_topology.get(), options.is_strict, detection));
     if (before.has_value()) DSG_RETURN_IF_ERROR(CheckFollows(at, *before, detection));
     const auto [first, is_new] = line_of_id.emplace(detection.id, line.number);
     if (!is_new) {

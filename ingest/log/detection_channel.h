@@ -11,9 +11,12 @@
 namespace dsg::ingest {
 
 /// `path`: one detection a line, ascending by time, then id. An empty file is a log of an empty
-/// building. `channel` is its name in the log.
-/// Errors: FILE_MALFORMED naming file, line, field and value.
+/// building. `channel` is its name in the log. The faces of bodies, topology.json beside it, go
+/// into `info`.
+/// Errors: FILE_MALFORMED naming file, line, field and value; of CheckBody.
 absl::StatusOr<SensorChannel> ReadDetectionChannel(const std::string& path,
-                                                   const std::string& channel, LogDigest* digest);
+                                                   const std::string& channel,
+                                                   const LogOptions& options, LogDigest* digest,
+                                                   LogInfo* info);
 
 }  // namespace dsg::ingest

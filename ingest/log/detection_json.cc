@@ -4,7 +4,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
+#include "ingest/log/body_topology.h"
 #include "schema/base/status.h"
 #include "schema/base/utf8.h"
 
@@ -19,7 +21,7 @@ constexpr double kPixelMax = 1e6;
 // A joint is on its own body.
 constexpr double kJointMaxM = 10.0;
 constexpr double kPelvisMaxM = 1000.0;
-constexpr size_t kVertexCountMax = 20'000;
+constexpr double kMmPerM = 1000.0;
 // Axis-angle beyond a full turn, or a shape ten deviations out, is no body.
 constexpr double kAngleMax = 10.0;
 constexpr double kShapeMax = 50.0;
@@ -121,6 +123,38 @@ class Fields {
     return flat;
   }
 
+  // x y z in whole millimetres, 16 bits each, little-endian, as base64; flat, metres.
+  absl::StatusOr<std::vector<float>> Millimetres(const char* key, size_t count_max,
+                                                 double max_m) const {
+    DSG_ASSIGN_OR_RETURN(const std::string text, Text(key));
+    std::string bytes;
+    constexpr size_t kVertexBytes = 6;
+    if (!absl::Base64Unescape(text, &bytes)) {
+      return at_.FieldError(key, absl::StrCat(text.substr(0, 20), "..."),
+                            "base64 of 16-bit numbers is due");
+    }
+    if (bytes.size() % kVertexBytes != 0 || bytes.size() > count_max * kVertexBytes) {
+      return at_.FieldError(
+          key, absl::StrCat(bytes.size(), " bytes"),
+          absl::StrCat("six bytes for each of at most ", count_max, " vertices are due"));
+    }
+    std::vector<float> flat;
+    flat.reserve(bytes.size() / 2);
+    for (size_t i = 0; i < bytes.size(); i += 2) {
+      const auto low = static_cast<uint8_t>(bytes[i]);
+      const auto high = static_cast<uint8_t>(bytes[i + 1]);
+      const auto mm = static_cast<int16_t>(static_cast<uint16_t>(low | high << 8));
+      const double metres = static_cast<double>(mm) / kMmPerM;
+      if (std::abs(metres) > max_m) {
+        return at_.FieldError(key, absl::StrCat(mm, " mm"),
+                              absl::StrCat("vertex ", i / kVertexBytes, " is to be within ", max_m,
+                                           " m of the pelvis"));
+      }
+      flat.push_back(static_cast<float>(metres));
+    }
+    return flat;
+  }
+
  private:
   // Nested values are not printed: they may be as large as the line.
   static std::string Show(const Json& value) {
@@ -206,7 +240,7 @@ absl::Status ReadJoints(const LinePosition& at, const Fields& fields, HumanDetec
   return absl::OkStatus();
 }
 
-absl::Status ReadBody(const Fields& fields, HumanDetection* detection) {
+absl::Status ReadBody(const LinePosition& at, const Fields& fields, HumanDetection* detection) {
   if (fields.Has("pose")) {
     DSG_ASSIGN_OR_RETURN(const std::vector<double> pose,
                          fields.List("pose", kPoseCoefficientCount, kAngleMax));
@@ -219,7 +253,14 @@ absl::Status ReadBody(const Fields& fields, HumanDetection* detection) {
   }
   if (fields.Has("vertices")) {
     DSG_ASSIGN_OR_RETURN(detection->vertices_root,
-                         fields.FlatTriples("vertices", kVertexCountMax, kJointMaxM));
+                         fields.FlatTriples("vertices", kBodyVertexCountMax, kJointMaxM));
+  }
+  if (fields.Has("vertices_mm")) {
+    if (fields.Has("vertices")) {
+      return at.Error("the detection has both \"vertices\" and \"vertices_mm\"; give one of them");
+    }
+    DSG_ASSIGN_OR_RETURN(detection->vertices_root,
+                         fields.Millimetres("vertices_mm", kBodyVertexCountMax, kJointMaxM));
   }
   return absl::OkStatus();
 }
@@ -275,7 +316,7 @@ absl::StatusOr<HumanDetection> ParseDetection(const LinePosition& at, std::strin
   HumanDetection detection;
   DSG_RETURN_IF_ERROR(ReadHead(at, fields, &detection));
   DSG_RETURN_IF_ERROR(ReadJoints(at, fields, &detection));
-  DSG_RETURN_IF_ERROR(ReadBody(fields, &detection));
+  DSG_RETURN_IF_ERROR(ReadBody(at, fields, &detection));
   DSG_RETURN_IF_ERROR(ReadPlacement(at, fields, &detection));
   return detection;
 }

@@ -77,7 +77,7 @@ class FolderReader {
     if (IsFolder(root_ / kDetections)) {
       DSG_ASSIGN_OR_RETURN(SensorChannel detections,
                            ReadDetectionChannel((root_ / kDetections / "data.jsonl").string(),
-                                                kDetections, &digest_));
+                                                kDetections, options_, &digest_, &info_));
       channels_.push_back(std::move(detections));
     }
     DSG_RETURN_IF_ERROR(ReadPoses());

@@ -20,6 +20,10 @@
 #include "ingest/sensor/imu_measurement.h"
 #include "schema/model/graph_delta.h"
 
+namespace dsg {
+struct Topology;
+}
+
 namespace dsg::ingest {
 
 /// A tracked person or robot was somewhere.
@@ -103,6 +107,8 @@ struct LogInfo {
   RigCalibration rig;
   /// The classes of label images, ascending by id, each once; empty when the log names none.
   std::vector<SemanticLabel> labels;
+  /// The faces of the detections' bodies; null when the log has none.
+  std::shared_ptr<const Topology> body_topology;
   /// Measurements of each sensor channel, by name: "cam0", "imu0", "detections0", "poses",
   /// "loops0".
   std::map<std::string, int64_t> channel_counts;

@@ -87,6 +87,9 @@ struct MappingSummary {
 /// What became of a log's detections, for the user.
 struct PeopleCounts {
   int64_t detection_count = 0;
+  /// Detections with vertices, and those of them that the log has no faces for.
+  int64_t body_count = 0;
+  int64_t faceless_body_count = 0;
   /// Observations that the tracker took.
   int64_t used_count = 0;
   /// Detections that were left out, by reason in words.

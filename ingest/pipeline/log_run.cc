@@ -51,7 +51,7 @@ LogRun::LogRun(RunPlan plan, const MapView& map, DeltaSink sink)
       people_(plan.info.rig, options_.people, plan.has_layers, path_,
               PeopleTold(plan.session_id, plan.agent_prefix,
                          SessionPart(plan.agents, plan.agent_prefix, plan.session_id), &namer_,
-                         options_.people.told, options_.spill_folder),
+                         options_.people.told, plan.info.body_topology, options_.spill_folder),
               plan.has_people, options_.spill_folder),
       more_stages_(std::move(plan.more_stages)),
       stages_{&layers_, &people_},

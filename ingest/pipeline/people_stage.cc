@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "ingest/depth/frame_maker.h"
+#include "ingest/log/body_topology.h"
 #include "ingest/pipeline/ingest_log.h"
 #include "schema/base/status.h"
 
@@ -36,6 +37,11 @@ bool PeopleStage::Take(const Measurement& measurement) {
 
 void PeopleStage::AddDetection(HumanDetection detection) {
   ++counts_.detection_count;
+  if (!detection.vertices_root.empty()) {
+    ++counts_.body_count;
+    const bool has_faces = FitsTopology(told_.body_topology(), detection.vertices_root);
+    if (!has_faces) ++counts_.faceless_body_count;
+  }
   if (waiting_.empty() || waiting_.back().time_ns != detection.time_ns) {
     waiting_.push_back({detection.time_ns, {}});
   }
@@ -65,6 +71,7 @@ void PeopleStage::Tell(Findings* findings, GraphDelta* delta) {
   move(change.corrections, &delta->corrections);
   move(change.factors, &delta->factors);
   move(change.shapes, &delta->shapes);
+  move(change.assets, &delta->assets);
   Coalesce(delta);
   findings->status.Update(status());
 }

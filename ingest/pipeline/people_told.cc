@@ -7,9 +7,11 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "ingest/log/body_topology.h"
 #include "ingest/pipeline/layer_graph.h"
 #include "ingest/trajectory/pose_bytes.h"
 #include "schema/base/check.h"
+#include "schema/codec/checksum.h"
 #include "schema/model/delta_check.h"
 
 namespace dsg::ingest {
@@ -226,7 +228,7 @@ void PeopleTold::TellPoses(const PersonTracker::Track& track, size_t first_moved
 }
 
 void PeopleTold::TellObservations(const PersonTracker::Track& track, Person* person,
-                                  GraphDelta* delta) const {
+                                  GraphDelta* delta) {
   const size_t first = person->observation_count;
   if (first == track.observations.size()) return;
   person->observation_count = track.observations.size();
@@ -236,11 +238,30 @@ void PeopleTold::TellObservations(const PersonTracker::Track& track, Person* per
                   [](const PoseFactor& factor) { return factor.type != kDetectionPrior; });
   }
   if (!factors.factors.empty()) delta->factors.push_back(std::move(factors));
-  ShapeAppend shapes{person->id, std::nullopt, {}};
+  TellShapes(track, first, person->id, delta);
+}
+
+void PeopleTold::TellShapes(const PersonTracker::Track& track, size_t first, NodeId agent,
+                            GraphDelta* delta) {
+  ShapeAppend bare{agent, std::nullopt, {}};
+  ShapeAppend faced{agent, std::nullopt, {}};
   for (size_t i = first; i < track.observations.size(); ++i) {
-    if (HasShape(track.observations[i])) shapes.shapes.push_back(MakeShape(track.observations[i]));
+    const PersonObservation& observation = track.observations[i];
+    if (!HasShape(observation)) continue;
+    const bool has_faces = FitsTopology(body_topology_.get(), observation.vertices_torso);
+    (has_faces ? faced : bare).shapes.push_back(MakeShape(observation));
   }
-  if (!shapes.shapes.empty()) delta->shapes.push_back(std::move(shapes));
+  if (!bare.shapes.empty()) delta->shapes.push_back(std::move(bare));
+  if (faced.shapes.empty()) return;
+  if (!topology_asset_.has_value()) {
+    Asset asset{
+        .sha256 = {}, .media_type = kTopologyMediaType, .content = EncodeTopology(*body_topology_)};
+    asset.sha256 = ComputeSha256(asset.content);
+    topology_asset_ = asset.sha256;
+    delta->assets.push_back(std::move(asset));
+  }
+  faced.topology = topology_asset_;
+  delta->shapes.push_back(std::move(faced));
 }
 
 void PeopleTold::TellSameAs(const PersonTracker::Track& track, Person* person, GraphDelta* delta) {

@@ -5,7 +5,9 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -13,6 +15,7 @@
 #include "ingest/config/option_field.h"
 #include "ingest/files/spill_file.h"
 #include "ingest/pipeline/agent_namer.h"
+#include "schema/codec/topology.h"
 #include "schema/model/graph_delta.h"
 
 namespace dsg::ingest {
@@ -58,15 +61,18 @@ class PeopleTold {
   };
 
   /// Tracks are named person-1, person-2, or unconfirmed-3 where they were dropped, with
-  /// `agent_prefix` before all and `session_part` before the number. Requires: `namer` outlives
-  /// this.
+  /// `agent_prefix` before all and `session_part` before the number. `body_topology`: LogInfo's;
+  /// told with the first body that it fits. Requires: `namer` outlives this.
   PeopleTold(std::string session_id, std::string agent_prefix, std::string session_part,
-             AgentNamer* namer, const TellOptions& options, const std::string& spill_folder = "")
+             AgentNamer* namer, const TellOptions& options,
+             std::shared_ptr<const Topology> body_topology = nullptr,
+             const std::string& spill_folder = "")
       : session_id_(std::move(session_id)),
         agent_prefix_(std::move(agent_prefix)),
         session_part_(std::move(session_part)),
         namer_(namer),
         options_(options),
+        body_topology_(std::move(body_topology)),
         file_(std::make_unique<SpillFile>(spill_folder)) {}
 
   /// The tracker's changes since the last call. Poses that were told and have moved come as
@@ -82,6 +88,8 @@ class PeopleTold {
   const std::map<int64_t, Person>& people() const { return people_; }
   /// Of one of them, ascending in time.
   std::vector<TimedPose> PosesOf(const Person& person) const;
+  /// May be null.
+  const Topology* body_topology() const { return body_topology_.get(); }
   /// Of the disk; once it is not OK, nothing that was told may be used.
   const absl::Status& status() const { return status_; }
 
@@ -91,7 +99,8 @@ class PeopleTold {
   void TellNode(const PersonTracker::Track& track, Person* person, GraphDelta* delta) const;
   void TellPoses(const PersonTracker::Track& track, size_t first_moved, bool is_last,
                  Person* person, GraphDelta* delta);
-  void TellObservations(const PersonTracker::Track& track, Person* person, GraphDelta* delta) const;
+  void TellObservations(const PersonTracker::Track& track, Person* person, GraphDelta* delta);
+  void TellShapes(const PersonTracker::Track& track, size_t first, NodeId agent, GraphDelta* delta);
   void TellSameAs(const PersonTracker::Track& track, Person* person, GraphDelta* delta);
 
   std::string session_id_;
@@ -99,6 +108,9 @@ class PeopleTold {
   std::string session_part_;
   AgentNamer* namer_;
   TellOptions options_;
+  std::shared_ptr<const Topology> body_topology_;
+  /// Set once it is told.
+  std::optional<Sha256> topology_asset_;
   std::unique_ptr<SpillFile> file_;
   mutable absl::Status status_;
   std::map<int64_t, Person> people_;

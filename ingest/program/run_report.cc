@@ -130,6 +130,15 @@ void PrintPeople(const std::string& path, const PeopleSummary& summary, bool has
   }
   if (!counts.rejected.empty()) std::printf("; left out: %s", CountsText(counts.rejected).c_str());
   std::printf("\n");
+  if (counts.body_count > 0) {
+    std::printf("%s: %lld of them with vertices of the body", path.c_str(),
+                static_cast<long long>(counts.body_count));
+    if (counts.faceless_body_count > 0) {
+      std::printf(", %lld without faces that fit: stored as points",
+                  static_cast<long long>(counts.faceless_body_count));
+    }
+    std::printf("\n");
+  }
   if (has_timings) PrintStages(summary.stages);
 }
 
@@ -156,6 +165,8 @@ Json MappingJson(const MappingSummary& mapping) {
 Json PeopleJson(const PeopleCounts& counts) {
   return {{"detections", counts.detection_count},
           {"used", counts.used_count},
+          {"bodies", counts.body_count},
+          {"bodies_without_faces", counts.faceless_body_count},
           {"left_out", Json(counts.rejected)},
           {"tracks", counts.track_count},
           {"tracks_too_short", counts.dropped_track_count},
@@ -178,7 +189,13 @@ void PrintReport(const RunReport& report, bool has_timings) {
   PrintSummary(report.path, report.info, summary, report.seconds);
   if (summary.loops.has_value()) PrintLoops(report.path, *summary.loops);
   if (summary.mapping.has_value()) PrintMapping(report.path, *summary.mapping, has_timings);
-  if (summary.people.has_value()) PrintPeople(report.path, *summary.people, has_timings);
+  if (summary.people.has_value()) {
+    PrintPeople(report.path, *summary.people, has_timings);
+    if (report.info.body_topology != nullptr && summary.people->counts.body_count == 0) {
+      std::fprintf(stderr, "%s: note: the log has faces of bodies, but no detection has vertices\n",
+                   report.path.c_str());
+    }
+  }
   if (report.is_dry_run) {
     std::printf("%s: nothing was written: this was a dry run\n", report.path.c_str());
   }

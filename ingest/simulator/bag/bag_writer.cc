@@ -27,6 +27,7 @@ constexpr char kSegmentationTopic[] = "/tesse/seg_cam/rgb/image_raw";
 constexpr char kDetectionsTopic[] = "/dsg/detections";
 constexpr char kLoopsTopic[] = "/dsg/loop_closures";
 constexpr char kLabelsTopic[] = "/dsg/labels";
+constexpr char kBodyTopologyTopic[] = "/dsg/body_topology";
 constexpr char kTransformsTopic[] = "/tf_static";
 // Calibrations that should be equal are read from text and were made orthonormal.
 constexpr double kSameCalibration = 1e-9;
@@ -158,10 +159,14 @@ absl::Status Converter::WriteLatched(const ros::Time& stamp) {
     transforms.transforms.back().header.stamp = stamp;
   }
   DSG_RETURN_IF_ERROR(bag_->WriteLatched(kTransformsTopic, stamp, transforms));
-  if (!text_.labels.has_value()) return absl::OkStatus();
-  ros_messages::String labels;
-  labels.data = *std::move(text_.labels);
-  return bag_->WriteLatched(kLabelsTopic, stamp, labels);
+  for (const auto& [topic, text] :
+       {std::pair{kLabelsTopic, &text_.labels}, {kBodyTopologyTopic, &text_.body_topology}}) {
+    if (!text->has_value()) continue;
+    ros_messages::String message;
+    message.data = **text;
+    DSG_RETURN_IF_ERROR(bag_->WriteLatched(topic, stamp, message));
+  }
+  return absl::OkStatus();
 }
 
 absl::Status Converter::WriteDetections(TimeNs before_ns) {

@@ -31,6 +31,11 @@ absl::StatusOr<FolderText> ReadFolderText(const std::string& log_folder,
     text.colors = ColorsOf(table);
     text.labels = std::move(file.bytes);
   }
+  const fs::path topology_path = fs::path(log_folder) / "mav0" / "detections0" / "topology.json";
+  if (ingest::IsFile(topology_path)) {
+    DSG_ASSIGN_OR_RETURN(ingest::LogFile file, ingest::ReadLogFile(topology_path.string()));
+    text.body_topology = std::move(file.bytes);
+  }
   const fs::path detections_path = fs::path(log_folder) / "mav0" / "detections0" / "data.jsonl";
   if (HasSome(info, "detections0") && !fs::exists(detections_path, error)) {
     return absl::NotFoundError(

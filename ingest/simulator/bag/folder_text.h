@@ -18,6 +18,8 @@ struct FolderText {
   /// The bytes of labels.csv, if there is one.
   std::optional<std::string> labels;
   LabelColors colors;
+  /// The bytes of detections0/topology.json, if there is one.
+  std::optional<std::string> body_topology;
   /// Never null.
   std::unique_ptr<DetectionLines> detections;
 };

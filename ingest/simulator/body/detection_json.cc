@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ingest/simulator/body/detection_json.h"
 
+#include <algorithm>
 #include <cmath>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 
@@ -58,7 +60,30 @@ std::string JointsText(const ingest::HumanDetection& detection) {
   return text + "]";
 }
 
+// Whole millimetres, 16 bits each, little-endian, as base64: a third of the numbers' text.
+std::string VerticesText(const std::vector<float>& vertices_root) {
+  constexpr double kLargestMm = 10'000.0;
+  std::string bytes;
+  bytes.reserve(2 * vertices_root.size());
+  for (const float number : vertices_root) {
+    const double mm = std::clamp(1000.0 * static_cast<double>(number), -kLargestMm, kLargestMm);
+    const auto bits = static_cast<uint16_t>(std::lround(mm));
+    bytes.push_back(static_cast<char>(bits & 0xff));
+    bytes.push_back(static_cast<char>(bits >> 8));
+  }
+  return absl::StrCat(",\"vertices_mm\":\"", absl::Base64Escape(bytes), "\"");
+}
+
 }  // namespace
+
+std::string TopologyJson(size_t vertex_count, const std::vector<std::array<uint32_t, 3>>& faces) {
+  std::string text = absl::StrCat("{\"vertex_count\":", vertex_count, ",\"faces\":[");
+  for (size_t i = 0; i < faces.size(); ++i) {
+    const auto& [a, b, c] = faces[i];
+    absl::StrAppend(&text, i > 0 ? ",[" : "[", a, ",", b, ",", c, "]");
+  }
+  return text + "]}\n";
+}
 
 std::string DetectionJson(const ingest::HumanDetection& detection) {
   std::string text =
@@ -72,6 +97,7 @@ std::string DetectionJson(const ingest::HumanDetection& detection) {
   if (!detection.shape_coefficients.empty()) {
     absl::StrAppend(&text, ",\"shape\":", List(detection.shape_coefficients, kMetreDecimals));
   }
+  if (!detection.vertices_root.empty()) text += VerticesText(detection.vertices_root);
   absl::StrAppend(&text,
                   ",\"weak_camera\":{\"scale\":", Number(detection.weak_scale, kScaleDecimals),
                   ",\"t\":", List(detection.weak_translation, kScaleDecimals),

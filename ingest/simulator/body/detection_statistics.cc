@@ -45,6 +45,10 @@ std::string FormatDetectionStatistics(const DetectionStatistics& statistics) {
   absl::StrAppendFormat(&text, "outlier rate x %.2f (mean %.2f m without), %d false positives\n",
                         statistics.outlier_scale, statistics.unscaled_mean_m,
                         statistics.false_positive_count);
+  if (statistics.skin.count > 0) {
+    absl::StrAppendFormat(&text, "vertices  %6d bodies, mean %.3f m from the pelvis, p99 %.3f\n",
+                          statistics.skin.count, statistics.skin.mean_m, statistics.skin.p99_m);
+  }
   if (statistics.low_statistics) absl::StrAppend(&text, "few detections: figures are uncertain\n");
   if (statistics.off_target) absl::StrAppend(&text, "no outlier rate reaches the paper's mean\n");
   return text;

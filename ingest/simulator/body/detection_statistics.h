@@ -29,6 +29,8 @@ struct ErrorSummary {
 struct DetectionStatistics {
   ErrorSummary raw;
   ErrorSummary filtered;
+  /// Of the vertices against the pelvis, a detection's mean each; none without bodies.
+  ErrorSummary skin;
   int false_positive_count = 0;
   /// Views that were too hidden or too small.
   int dropped_view_count = 0;

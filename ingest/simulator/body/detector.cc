@@ -171,7 +171,7 @@ void SetWeakCamera(const Eigen::Vector3d& torso_camera, const ingest::CameraCali
 }
 
 DetectionOutput MakeOutput(const Sample& sample, const ingest::CameraCalibration& camera,
-                           const ShapeCoefficients& shape, double outlier_scale) {
+                           const ShapeCoefficients& shape, double outlier_scale, bool has_body) {
   const BodyView& view = *sample.view;
   const Eigen::Vector3d torso = sample.Torso(outlier_scale);
   DetectionOutput output;
@@ -202,6 +202,7 @@ DetectionOutput MakeOutput(const Sample& sample, const ingest::CameraCalibration
   truth.touches_border = view.touches_border;
   truth.torso_map = view.state.joints_map[ingest::kPelvis];
   truth.detected_torso_map = sample.map_T_camera * torso;
+  if (has_body) output.body = {view.person, view.state.pose, view.state.map_T_torso, camera_R_map};
   return output;
 }
 
@@ -234,15 +235,17 @@ Sample FalseSample(const Sample& in_image, const ingest::CameraCalibration& came
 }
 
 void AddFalsePositives(const std::vector<Sample>& samples, const ingest::CameraCalibration& camera,
-                       uint64_t seed, double rate, std::vector<DetectionOutput>* outputs) {
+                       uint64_t seed, const DetectorOptions& options,
+                       std::vector<DetectionOutput>* outputs) {
   for (size_t i = 0; i < samples.size(); ++i) {
     const int64_t frame = samples[i].view->frame;
     if (i > 0 && samples[i - 1].view->frame == frame) continue;
     Random random(seed, kFalseStream + static_cast<uint64_t>(frame));
-    if (!random.Chance(rate)) continue;
+    if (!random.Chance(options.false_positive_rate)) continue;
     BodyView view;
     const Sample sample = FalseSample(samples[i], camera, &random, &view);
-    DetectionOutput output = MakeOutput(sample, camera, ShapeCoefficients(), 0.0);
+    DetectionOutput output =
+        MakeOutput(sample, camera, ShapeCoefficients(), 0.0, options.has_bodies);
     output.truth.torso_map = output.truth.detected_torso_map;
     outputs->push_back(std::move(output));
   }
@@ -273,6 +276,19 @@ void Count(const std::vector<DetectionOutput>& outputs, const ingest::CameraCali
   statistics->filtered = Summarize(std::move(filtered));
 }
 
+ErrorSummary SkinErrors(const std::vector<DetectionOutput>& outputs,
+                        const std::vector<ShapeCoefficients>& shapes) {
+  const std::vector<BodyModel> models(shapes.begin(), shapes.end());
+  std::vector<double> errors_m;
+  for (const DetectionOutput& output : outputs) {
+    if (output.truth.human < 0) continue;
+    const BodyModel& model = models[static_cast<size_t>(output.truth.human)];
+    const SkinPair skins = MakeSkins(*output.body, model, output.detection.joints_root);
+    errors_m.push_back(MeanSkinErrorM(*output.body, skins));
+  }
+  return Summarize(std::move(errors_m));
+}
+
 }  // namespace
 
 DetectorResult MakeDetections(const std::vector<BodyView>& views,
@@ -287,9 +303,10 @@ DetectorResult MakeDetections(const std::vector<BodyView>& views,
   statistics.outlier_scale = FindOutlierScale(samples, options, &statistics);
   for (const Sample& sample : samples) {
     const ShapeCoefficients& shape = shapes[static_cast<size_t>(sample.view->person)];
-    result.outputs.push_back(MakeOutput(sample, camera, shape, statistics.outlier_scale));
+    result.outputs.push_back(
+        MakeOutput(sample, camera, shape, statistics.outlier_scale, options.has_bodies));
   }
-  AddFalsePositives(samples, camera, seed, options.false_positive_rate, &result.outputs);
+  AddFalsePositives(samples, camera, seed, options, &result.outputs);
   std::stable_sort(result.outputs.begin(), result.outputs.end(),
                    [](const DetectionOutput& a, const DetectionOutput& b) {
                      return a.truth.time_ns < b.truth.time_ns;
@@ -301,6 +318,7 @@ DetectorResult MakeDetections(const std::vector<BodyView>& views,
     output.truth.id = id;
   }
   Count(result.outputs, camera, &statistics);
+  if (options.has_bodies) statistics.skin = SkinErrors(result.outputs, shapes);
   return result;
 }
 

@@ -7,12 +7,14 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "ingest/sensor/calibration.h"
 #include "ingest/sensor/human_detection.h"
 #include "ingest/simulator/body/body_model.h"
+#include "ingest/simulator/body/detected_skin.h"
 #include "ingest/simulator/body/detection_statistics.h"
 #include "ingest/simulator/body/human_motion.h"
 #include "ingest/truth/truth.h"
@@ -54,11 +56,15 @@ struct DetectorOptions {
   double target_mean_m = 1.1;
   /// Left as it is when the plain rate comes as close as this, metres.
   double target_tolerance_m = 0.1;
+  /// Whether outputs have the bodies that their skins are made of.
+  bool has_bodies = false;
 };
 
 struct DetectionOutput {
   ingest::HumanDetection detection;
   truth::DetectionTruth truth;
+  /// Set if DetectorOptions::has_bodies.
+  std::optional<DetectedBody> body;
 };
 
 struct DetectorResult {

@@ -38,6 +38,8 @@ void AddOptions(CLI::App* app, SensorsArguments* arguments) {
   app->add_option("--calibration-error", options.calibration_error_factor,
                   "errors of the log's calibration: 1 = 0.3 px, 0.1 degrees, 2 mm, 1 ms")
       ->capture_default_str();
+  app->add_flag("--bodies", options.has_bodies,
+                "detections have the vertices of bodies too, 13 kB each");
   app->add_flag("--bag", run.bag, "write log.bag too");
   app->add_flag("--force", run.force, "replace a finished log, or one begun with other options");
   app->add_option("--frames", arguments->frames,

@@ -4,10 +4,12 @@
 #include "absl/strings/str_cat.h"
 #include "ingest/files/output_file.h"
 #include "ingest/files/output_folder.h"
+#include "ingest/simulator/body/body_skin.h"
 #include "ingest/simulator/body/detection_json.h"
 #include "ingest/simulator/sensors/label_colors.h"
 #include "ingest/simulator/sensors/log_layout.h"
 #include "ingest/simulator/sensors/rig_files.h"
+#include "ingest/simulator/sensors/truth_builder.h"
 #include "ingest/simulator/world/catalogue.h"
 #include "schema/base/check.h"
 #include "schema/base/status.h"
@@ -91,15 +93,31 @@ absl::Status WriteRobotPoses(const SensorSession& session, const std::string& lo
   return WriteFile(folder + "/sensor.yaml", GroundTruthYaml());
 }
 
-absl::Status WriteDetections(const std::vector<DetectionOutput>& detections,
+ingest::HumanDetection WithSkin(const SensorSession& session, const DetectionOutput& output) {
+  ingest::HumanDetection detection = output.detection;
+  if (!output.body.has_value()) return detection;
+  const SkinPair skins =
+      MakeSkins(*output.body, ModelOf(session, *output.body), detection.joints_root);
+  for (const Eigen::Vector3f& vertex : skins.detected_root_camera) {
+    detection.vertices_root.insert(detection.vertices_root.end(), vertex.begin(), vertex.end());
+  }
+  return detection;
+}
+
+absl::Status WriteDetections(const SensorSession& session,
+                             const std::vector<DetectionOutput>& detections,
                              const std::string& log_folder) {
   const std::string folder = ChannelFolder(log_folder, kDetections);
   DSG_RETURN_IF_ERROR(ingest::MakeFolder(folder));
-  std::string lines;
-  for (const DetectionOutput& detection : detections) {
-    absl::StrAppend(&lines, DetectionJson(detection.detection), "\n");
+  DSG_ASSIGN_OR_RETURN(ingest::OutputFile file, ingest::OutputFile::Create(folder + "/data.jsonl"));
+  for (const DetectionOutput& output : detections) {
+    absl::StrAppend(&file.buffer(), DetectionJson(WithSkin(session, output)), "\n");
+    DSG_RETURN_IF_ERROR(file.Flush());
   }
-  return WriteFile(folder + "/data.jsonl", std::move(lines));
+  DSG_RETURN_IF_ERROR(file.Commit());
+  if (!session.options().has_bodies) return absl::OkStatus();
+  const SkinTopology& skin = SkinTopologyOfAll();
+  return WriteFile(folder + "/topology.json", TopologyJson(skin.bindings.size(), skin.faces));
 }
 
 }  // namespace
@@ -110,7 +128,7 @@ absl::Status WriteLogTables(const SensorSession& session,
   DSG_RETURN_IF_ERROR(WriteImageTables(session, log_folder));
   DSG_RETURN_IF_ERROR(WriteImu(session, log_folder));
   DSG_RETURN_IF_ERROR(WriteRobotPoses(session, log_folder));
-  DSG_RETURN_IF_ERROR(WriteDetections(detections, log_folder));
+  DSG_RETURN_IF_ERROR(WriteDetections(session, detections, log_folder));
   return WriteFile(log_folder + "/labels.csv", LabelTable(Labels()));
 }
 

@@ -46,7 +46,7 @@ DetectorResult Detect(const SensorSession& session, const Observation& observati
   return MakeDetections(
       observation.views,
       [&](const BodyView& view) { return session.MapTCamera(camera, view.frame); }, camera, shapes,
-      session.options().world.seed, {});
+      session.options().world.seed, {.has_bodies = session.options().has_bodies});
 }
 
 double ObservedShare(const truth::FreeGrid& grid) {
@@ -83,6 +83,7 @@ absl::Status Finish(const SensorSession& session, const LogPaths& folders, int t
   const truth::Truth truth = BuildTruth(session, observation, detections.outputs, std::move(grid));
   DSG_RETURN_IF_ERROR(truth::WriteTruth(truth, folders.work_truth));
   DSG_RETURN_IF_ERROR(WriteCadModels(session, folders.work_truth));
+  DSG_RETURN_IF_ERROR(WriteTrueBodies(session, detections.outputs, folders.work_truth));
   DSG_RETURN_IF_ERROR(WriteLogTables(session, detections.outputs, folders.work_log));
   return WriteFile(folders.work_log + "/log.json", LogJson(session, detections.outputs.size()));
 }

@@ -56,9 +56,9 @@ absl::Status SensorsOptions::Validate() const {
 std::string SensorsOptions::CommandLine() const {
   return absl::StrFormat(
       "dsg-simulate sensors --world %s --seed %d --humans %d --seconds %g --rate %g "
-      "--keyframe-every %d --imu-noise %g --calibration-error %g",
+      "--keyframe-every %d --imu-noise %g --calibration-error %g%s",
       Name(world.kind), world.seed, people_count, duration_s, rate_hz, keyframe_every,
-      imu_noise_factor, calibration_error_factor);
+      imu_noise_factor, calibration_error_factor, has_bodies ? " --bodies" : "");
 }
 
 }  // namespace dsg::simulator

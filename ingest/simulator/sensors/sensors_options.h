@@ -37,6 +37,8 @@ struct SensorsOptions {
   double imu_noise_factor = 1.0;
   /// Of the calibration errors (0.3 px, 0.1 degrees, 2 mm, 1 ms), 0 to 100.
   double calibration_error_factor = 1.0;
+  /// Detections have the vertices of bodies, as networks that regress a mesh give them.
+  bool has_bodies = false;
 
   int64_t FrameCount() const;
   /// First stamp: some time in the years from 2023 on, drawn from all options.

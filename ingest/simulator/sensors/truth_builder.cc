@@ -9,7 +9,9 @@
 #include "absl/strings/str_format.h"
 #include "ingest/files/output_file.h"
 #include "ingest/files/output_folder.h"
+#include "ingest/simulator/body/body_skin.h"
 #include "ingest/simulator/world/catalogue.h"
+#include "ingest/truth/body_file.h"
 #include "schema/base/status.h"
 
 namespace dsg::simulator {
@@ -186,6 +188,26 @@ truth::Truth BuildTruth(const SensorSession& session, const Observation& observa
   AddPicks(session, observation, &out);
   out.free_grid = std::move(grid);
   return out;
+}
+
+const BodyModel& ModelOf(const SensorSession& session, const DetectedBody& body) {
+  static const BodyModel mean{ShapeCoefficients()};
+  return body.person < 0 ? mean : session.crowd().body(body.person);
+}
+
+absl::Status WriteTrueBodies(const SensorSession& session,
+                             const std::vector<DetectionOutput>& detections,
+                             const std::string& folder) {
+  if (!session.options().has_bodies) return absl::OkStatus();
+  DSG_ASSIGN_OR_RETURN(truth::BodyFileWriter file,
+                       truth::BodyFileWriter::Create(folder, SkinTopologyOfAll().bindings.size()));
+  for (const DetectionOutput& output : detections) {
+    if (output.truth.human < 0) continue;
+    const SkinPair skins =
+        MakeSkins(*output.body, ModelOf(session, *output.body), output.detection.joints_root);
+    DSG_RETURN_IF_ERROR(file.Add(output.truth.id, skins.true_root_map));
+  }
+  return file.Commit();
 }
 
 absl::Status WriteCadModels(const SensorSession& session, const std::string& folder) {

@@ -16,6 +16,15 @@ namespace dsg::simulator {
 truth::Truth BuildTruth(const SensorSession& session, const Observation& observation,
                         const std::vector<DetectionOutput>& detections, truth::FreeGrid grid);
 
+/// The model of a detected body.
+const BodyModel& ModelOf(const SensorSession& session, const DetectedBody& body);
+
+/// The true body behind each detection, as `folder`/bodies.bin, if the log has bodies.
+/// Errors: of OutputFile.
+absl::Status WriteTrueBodies(const SensorSession& session,
+                             const std::vector<DetectionOutput>& detections,
+                             const std::string& folder);
+
 /// The CAD models that the truth's objects name, as PLY files under `folder`/cad.
 /// Errors: of OutputFile.
 absl::Status WriteCadModels(const SensorSession& session, const std::string& folder);

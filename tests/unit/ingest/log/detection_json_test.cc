@@ -6,6 +6,7 @@
 
 #include <random>
 
+#include "absl/strings/escaping.h"
 #include "schema/base/status.h"
 #include "tests/unit/ingest/log/detection_lines.h"
 #include "tests/unit/ingest/log/log_test_util.h"
@@ -97,6 +98,36 @@ TEST(DetectionJson, ReadsVerticesFlatOrInThrees) {
   ExpectLineError(with("[0.5,1,[2,3,4]]"), "vertices");
   ExpectLineError(with("[0.5,1,200]"), "vertices");
   ExpectLineError(with("7"), "vertices");
+}
+
+TEST(DetectionJson, ReadsVerticesInMillimetres) {
+  const auto with = [](const std::string& text) {
+    return LineWith("\"shape\"", "\"vertices_mm\":" + text + ",\"shape\"");
+  };
+  const auto encoded = [&with](const std::vector<int16_t>& millimetres) {
+    std::string bytes;
+    for (const int16_t mm : millimetres) {
+      bytes.push_back(static_cast<char>(mm & 0xff));
+      bytes.push_back(static_cast<char>(mm >> 8 & 0xff));
+    }
+    return with("\"" + absl::Base64Escape(bytes) + "\"");
+  };
+  const auto detection = ParseLine(encoded({500, 1000, -2000, 10'000, -1, 0}));
+  ASSERT_TRUE(detection.ok()) << detection.status();
+  const std::vector<float> expected = {0.5f, 1.0f, -2.0f, 10.0f, -0.001f, 0.0f};
+  EXPECT_EQ(detection->vertices_root, expected);
+  EXPECT_TRUE(ParseLine(encoded({}))->vertices_root.empty());
+  // What `base64.b64encode(numpy.array([[500, 1000, -2000]], "<i2").tobytes())` gives.
+  const auto from_python = ParseLine(with("\"9AHoAzD4\""));
+  ASSERT_TRUE(from_python.ok()) << from_python.status();
+  EXPECT_EQ(from_python->vertices_root, (std::vector<float>{0.5f, 1.0f, -2.0f}));
+  EXPECT_TRUE(ParseLine(encoded(std::vector<int16_t>(60'000, 1))).ok());
+  ExpectLineError(encoded(std::vector<int16_t>(60'003, 1)), "vertices_mm");
+  ExpectLineError(encoded({500, 1000}), "vertices_mm");
+  ExpectLineError(encoded({0, 0, 0, 0, 0, -10'001}), "vertex 1");
+  ExpectLineError(with("\"%%%\""), "base64");
+  ExpectLineError(with("[1,2,3]"), "vertices_mm");
+  ExpectLineError(LineWith("\"shape\"", "\"vertices\":[],\"vertices_mm\":\"\",\"shape\""), "both");
 }
 
 TEST(DetectionJson, NamesTheFieldThatIsWrong) {

@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
+#include "schema/codec/topology.h"
 #include "tests/unit/ingest/log/detection_lines.h"
 #include "tests/unit/ingest/log/log_test_util.h"
 
@@ -216,6 +217,33 @@ TEST_F(FolderLogTest, ChecksDetections) {
   const auto log = Read();
   ASSERT_TRUE(log.ok()) << log.status();
   EXPECT_EQ(log->info.channel_counts.at("detections0"), 0);
+}
+
+TEST_F(FolderLogTest, ReadsTheFacesOfBodies) {
+  EXPECT_EQ(Read()->info.body_topology, nullptr);
+  const std::string without = Read()->info.content_sha256;
+  Write("detections0/topology.json", "{\"vertex_count\":4,\"faces\":[[0,1,2],[1,2,3]]}");
+  const auto log = Read();
+  ASSERT_TRUE(log.ok()) << log.status();
+  ASSERT_NE(log->info.body_topology, nullptr);
+  EXPECT_EQ(log->info.body_topology->faces.size(), 2U);
+  EXPECT_NE(log->info.content_sha256, without);
+  Write("detections0/topology.json", "{\"vertex_count\":2,\"faces\":[[0,1,2]]}");
+  ExpectMalformed({"topology.json", "face 0"});
+}
+
+TEST_F(FolderLogTest, RefusesBodiesThatItsFacesDoNotFitIfStrict) {
+  Write("detections0/topology.json", "{\"vertex_count\":4,\"faces\":[[0,1,2]]}");
+  Write("detections0/data.jsonl",
+        DetectionLine(100, 0) + "\n" +
+            Changed(DetectionLine(300, 1), "\"shape\"", "\"vertices\":[1,2,3],\"shape\"") + "\n");
+  const auto log = Read();
+  ASSERT_TRUE(log.ok()) << log.status();
+  EXPECT_EQ(log->detections.at(1).vertices_root.size(), 3U);
+  LogOptions options;
+  options.is_strict = true;
+  ExpectMalformedFile(OpenLog(folder_.Path("mav0"), options).status(),
+                      {"data.jsonl:2", "1 vertices", "of 4"});
 }
 
 TEST_F(FolderLogTest, RefusesOtherVersionsAndUnfinishedSimulations) {

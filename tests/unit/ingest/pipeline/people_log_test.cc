@@ -11,6 +11,7 @@
 #include "ingest/pipeline/ingest_log.h"
 #include "ingest/pipeline/log_run.h"
 #include "schema/base/status.h"
+#include "schema/codec/topology.h"
 #include "schema/store/graph_store.h"
 #include "tests/unit/ingest/log/log_test_util.h"
 #include "tests/unit/ingest/pipeline/pipeline_test_util.h"
@@ -24,7 +25,9 @@ constexpr TimeNs kBeginNs = 1'000'000'000'000;
 // A log held in memory.
 class ScriptedLog : public LogSource {
  public:
-  ScriptedLog(std::vector<Measurement> measurements, std::string content) {
+  ScriptedLog(std::vector<Measurement> measurements, std::string content,
+              std::shared_ptr<const Topology> topology = nullptr) {
+    info_.body_topology = std::move(topology);
     measurements_ = std::move(measurements);
     info_.format = "scripted";
     info_.path = "scripted";
@@ -135,7 +138,7 @@ class PeopleLog : public testing::Test {
   absl::StatusOr<IngestSummary> IngestWith(std::vector<Measurement> measurements,
                                            GraphWriter& writer, const std::string& content = "one",
                                            const IngestOptions& options = {}) {
-    ScriptedLog log(std::move(measurements), content);
+    ScriptedLog log(std::move(measurements), content, topology_);
     DSG_ASSIGN_OR_RETURN(const std::shared_ptr<const Snapshot> latest, reader_->Latest());
     const std::unique_ptr<MapView> view = MakeSnapshotMapView(latest, reader_);
     return IngestLog(log, {}, options, *view, writer, {});
@@ -150,6 +153,7 @@ class PeopleLog : public testing::Test {
   }
 
   TempFolder folder_;
+  std::shared_ptr<const Topology> topology_;
   std::unique_ptr<GraphStore> store_;
   std::unique_ptr<GraphWriter> writer_;
   std::shared_ptr<MapReader> reader_;
@@ -182,6 +186,41 @@ TEST_F(PeopleLog, KeepsFactorsAndShapesOfEachDetection) {
   ASSERT_EQ(shapes->size(), 20U);
   EXPECT_EQ(shapes->front().joints.size(), 72U);
   EXPECT_EQ(shapes->front().shape_coefficients.size(), 10U);
+}
+
+TEST_F(PeopleLog, StoresTheFacesOnceAndBodiesThatTheyDoNotFitAsPoints) {
+  std::vector<Measurement> walk = WalkLeft(20);
+  for (Measurement& measurement : walk) {
+    auto* seen = std::get_if<HumanDetection>(&measurement);
+    if (seen == nullptr || seen->id == 0) continue;
+    // Down, right and towards the camera from the pelvis; one body has a vertex too many.
+    seen->vertices_root = {0, 0.5F, 0, 0.25F, 0, 0, 0, 0, -0.25F};
+    if (seen->id == 7) seen->vertices_root.insert(seen->vertices_root.end(), {0, 0, 0});
+  }
+  topology_ = std::make_shared<Topology>(Topology{3, {{0, 1, 2}}});
+  const auto summary = Ingest(std::move(walk));
+  ASSERT_TRUE(summary.ok()) << summary.status();
+  EXPECT_EQ(summary->people->counts.body_count, 19);
+  EXPECT_EQ(summary->people->counts.faceless_body_count, 1);
+  const NodeId agent = People().at(0).agent;
+  int64_t faced_count = 0;
+  int64_t bare_count = 0;
+  ASSERT_TRUE(Latest()
+                  ->ReadShapes(agent, kTimeMin, kTimeMax, /*with_vertices=*/true, {},
+                               [&](const ShownShape& shown) {
+                                 ++(shown.topology.has_value() ? faced_count : bare_count);
+                                 if (!shown.topology.has_value()) return true;
+                                 const auto asset = Latest()->ReadAsset(*shown.topology);
+                                 Topology stored;
+                                 EXPECT_TRUE(asset.ok() && DecodeTopology(asset->content, &stored));
+                                 EXPECT_EQ(stored, *topology_);
+                                 // Half a metre below the pelvis of one who stands.
+                                 EXPECT_NEAR(shown.shape.vertices[2], -0.5F, 0.02F);
+                                 return true;
+                               })
+                  .ok());
+  EXPECT_EQ(faced_count, 18);
+  EXPECT_EQ(bare_count, 2);
 }
 
 TEST_F(PeopleLog, AddsNothingWhenRepeated) {

@@ -14,6 +14,7 @@
 #include "ingest/log/log_source.h"
 #include "ingest/simulator/bag/bag_writer.h"
 #include "schema/base/status.h"
+#include "schema/codec/topology.h"
 #include "tests/support/temp_folder.h"
 #include "tests/unit/ingest/simulator/bag/small_log.h"
 
@@ -91,6 +92,8 @@ void WriteTables(const std::string& root) {
   test::WriteText(root + "/imu0/sensor.yaml", kImuYaml);
   test::WriteText(root + "/state_groundtruth_estimate0/data.csv", poses);
   test::WriteText(root + "/detections0/data.jsonl", detections);
+  test::WriteText(root + "/detections0/topology.json",
+                  "{\"vertex_count\":4,\"faces\":[[0,1,2],[1,2,3]]}");
 }
 
 void WriteLog(const std::string& folder) {
@@ -177,6 +180,8 @@ TEST(BagRoundTrip, ReadsBackAsTheFolderDoes) {
                **a);
   }
   EXPECT_FALSE((*bag->Next()).has_value());
+  ASSERT_TRUE(log->info().body_topology != nullptr && bag->info().body_topology != nullptr);
+  EXPECT_EQ(*log->info().body_topology, *bag->info().body_topology);
 }
 
 TEST(BagRoundTrip, KeepsTheCalibrationOfTheCameras) {

@@ -64,6 +64,20 @@ TEST(DetectionJson, LeavesOutWhatTheNetworkDoesNotSay) {
   EXPECT_FALSE(json.contains("shape"));
 }
 
+TEST(DetectionJson, WritesVerticesInMillimetresOnlyIfThereAreSome) {
+  ingest::HumanDetection detection = Example();
+  EXPECT_EQ(DetectionJson(detection).find("vertices"), std::string::npos);
+  detection.vertices_root = {0.5f, 1.0f, -2.0004f, 77.0f, -77.0f, 0.0f};
+  const nlohmann::json json = nlohmann::json::parse(DetectionJson(detection));
+  // 500, 1000, -2000, and what no body has as the farthest that readers take.
+  EXPECT_EQ(json.at("vertices_mm"), "9AHoAzD4ECfw2AAA");
+}
+
+TEST(DetectionJson, WritesFacesAsTheFormatSays) {
+  EXPECT_EQ(TopologyJson(4, {{0, 1, 2}, {1, 2, 3}}),
+            "{\"vertex_count\":4,\"faces\":[[0,1,2],[1,2,3]]}\n");
+}
+
 TEST(DetectionJson, SpellsZeroInOneWayAndEscapesNames) {
   ingest::HumanDetection detection = Example();
   detection.joints_root[0] = {-0.0, -1e-9, 0.0};

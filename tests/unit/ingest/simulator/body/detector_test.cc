@@ -119,6 +119,35 @@ TEST(Detector, ScalesTheOutlierRateUntilTheMeanIsThePapers) {
   }
 }
 
+TEST(Detector, BodiesChangeNothingElseAndErrAsJointsDo) {
+  const std::vector<BodyView> views = Mixture(300, 1.0);
+  DetectorOptions with;
+  with.has_bodies = true;
+  const DetectorResult a = Detect(views, {});
+  const DetectorResult b = Detect(views, with);
+  ASSERT_EQ(a.outputs.size(), b.outputs.size());
+  double joint_sum_m = 0.0;
+  for (size_t i = 0; i < a.outputs.size(); ++i) {
+    const ingest::HumanDetection& detection = b.outputs[i].detection;
+    EXPECT_EQ(a.outputs[i].detection.joints_root, detection.joints_root);
+    EXPECT_FALSE(a.outputs[i].body.has_value());
+    ASSERT_TRUE(b.outputs[i].body.has_value());
+    const BodyView& view = views[static_cast<size_t>(detection.time_ns / 200'000'000)];
+    const Pose3d camera_T_map = CameraPose(view).Inverse();
+    for (int j = 0; j < ingest::kJointCount; ++j) {
+      const Eigen::Vector3d true_root =
+          camera_T_map.orientation * (view.state.joints_map[j] - view.state.joints_map[0]);
+      joint_sum_m += (detection.joints_root[j] - true_root).norm() / ingest::kJointCount;
+    }
+  }
+  EXPECT_EQ(a.statistics.skin.count, 0);
+  EXPECT_EQ(b.statistics.skin.count, static_cast<int>(b.outputs.size()));
+  // Vertices are between joints, whose errors cancel in part.
+  const double joint_m = joint_sum_m / static_cast<double>(b.outputs.size());
+  EXPECT_LT(b.statistics.skin.mean_m, joint_m);
+  EXPECT_GT(b.statistics.skin.mean_m, 0.5 * joint_m);
+}
+
 TEST(Detector, SaysSoWhenNoOutlierRateHelps) {
   const DetectorResult far = Detect(Mixture(1000, 3.0), {});
   EXPECT_EQ(far.statistics.outlier_scale, 0.0);
