@@ -33,6 +33,7 @@ void MoveEstimate(const Pose3d& new_T_map, Estimate* estimate) {
   for (Eigen::Vector3f& normal : estimate->mesh.normals_map) normal = turn * normal;
   MoveTorsos(new_T_map, &estimate->torsos);
   MoveTorsos(new_T_map, &estimate->detection_priors);
+  for (TrackedBody& body : estimate->bodies) body.map_T_torso = new_T_map * body.map_T_torso;
   for (EstimatedObject& object : estimate->objects) {
     object.position_map = new_T_map * object.position_map;
     object.box_map = MovedBox(new_T_map, object.box_map);

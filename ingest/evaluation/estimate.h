@@ -26,6 +26,16 @@ struct TrackedTorso {
   Eigen::Vector3d torso_map = Eigen::Vector3d::Zero();
 };
 
+/// A stored body of a track that has a pose at that stamp.
+struct TrackedBody {
+  TimeNs time_ns = 0;
+  int track = 0;
+  Pose3d map_T_torso;
+  /// x y z each, against the pelvis, axes of the torso, metres; either may be empty.
+  std::vector<float> joints;
+  std::vector<float> vertices;
+};
+
 /// An edge HELD_BY.
 struct Holding {
   /// Index in Estimate::objects; -1 when the source is no object.
@@ -47,6 +57,7 @@ struct Estimate {
   /// Without the predicted ones.
   std::vector<TrackedTorso> torsos;
   std::vector<TrackedTorso> detection_priors;
+  std::vector<TrackedBody> bodies;
   std::vector<EstimatedObject> objects;
   std::vector<EstimatedPlace> places;
   std::vector<PlaceEdge> place_edges;

@@ -13,16 +13,19 @@
 #include <functional>
 #include <iterator>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "ingest/config/option_flags.h"
+#include "ingest/evaluation/bodies.h"
 #include "ingest/evaluation/compare_tracks.h"
 #include "ingest/evaluation/evaluate.h"
 #include "ingest/evaluation/pose_file.h"
 #include "ingest/evaluation/store_reader.h"
+#include "ingest/truth/body_file.h"
 #include "ingest/truth/truth.h"
 #include "schema/base/exit_code.h"
 #include "schema/base/status.h"
@@ -259,7 +262,11 @@ absl::StatusOr<std::string> WholeOutput(const Flags& flags, const ProgressFuncti
   if (flags.is_map_aligned) DSG_RETURN_IF_ERROR(AlignMap(truth, &estimate));
   EvaluateOptions options;
   options.mesh.sample_count = static_cast<size_t>(flags.mesh_samples);
-  const Report report = Evaluate(estimate, truth, options, tell);
+  Report report = Evaluate(estimate, truth, options, tell);
+  DSG_ASSIGN_OR_RETURN(std::optional<truth::BodyFile> bodies,
+                       truth::BodyFile::Open(flags.track.truth));
+  DSG_RETURN_IF_ERROR(
+      ScoreBodies(estimate, truth, bodies.has_value() ? &*bodies : nullptr, &report.humans));
   return flags.is_json ? ReportToJson(report) : ReportToText(report);
 }
 

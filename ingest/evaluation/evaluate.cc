@@ -103,7 +103,7 @@ HumanResult ScoreHumans(const Estimate& estimate, const truth::Truth& truth,
   std::vector<TrueDetection> detections;
   for (const truth::DetectionTruth& row : truth.detections) {
     detections.push_back(
-        {row.time_ns, row.human, row.visibility, row.torso_map, row.detected_torso_map});
+        {row.time_ns, row.human, row.visibility, row.torso_map, row.detected_torso_map, row.id});
   }
   const DriftRemover without_drift(estimate, truth);
   std::vector<EstimatedPrior> priors;

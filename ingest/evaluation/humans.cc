@@ -187,6 +187,7 @@ HumanResult EvaluateHumans(const std::vector<TrueDetection>& detections,
     if (detection->human < 0) continue;
     ++result.filtered_count;
     filtered.Add(detection->human, (prior->torso_map - detection->torso_map).norm());
+    result.detection_of.emplace(track_stamp, detection->id);
   }
   result.raw_m = raw.Mean();
   result.filtered_m = filtered.Mean();

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <map>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "schema/base/time.h"
@@ -22,6 +23,7 @@ struct TrueDetection {
   Eigen::Vector3d torso_map = Eigen::Vector3d::Zero();
   /// What the detector said, put into the map by the true robot pose.
   Eigen::Vector3d detected_torso_map = Eigen::Vector3d::Zero();
+  int64_t id = 0;
 };
 
 /// A detection that the estimate took in: a prior on a track's pose at its stamp.
@@ -66,6 +68,16 @@ struct HumanResult {
   int64_t detection_count = 0;
   /// Detections behind filtered_m.
   int64_t filtered_count = 0;
+  /// Of ScoreBodies: mean over bodies of the mean distance of joints and of vertices, each turned
+  /// as in the map but against the pelvis, and where they are in the map. Unset without any.
+  std::optional<double> joint_root_m;
+  std::optional<double> joint_m;
+  std::optional<double> vertex_root_m;
+  std::optional<double> vertex_m;
+  int64_t joint_body_count = 0;
+  int64_t vertex_body_count = 0;
+  /// The true detection's id behind a track's pose, by stamp and track; without those of nobody.
+  std::map<std::pair<TimeNs, int>, int64_t> detection_of;
   /// The human that most poses of a track are of.
   std::map<int, int> human_of_track;
 };

@@ -71,6 +71,16 @@ void AppendHumans(const HumanResult& result, std::string* out) {
   Row(out, "MOTA (%)", Percent(result.mota),
       result.mota.has_value() ? absl::StrFormat("%d id switches", result.id_switch_count) : "");
   Row(out, "tracks per person", Cell(result.tracks_per_human, 1.0, 2));
+  const auto body = [out](const char* name, const std::optional<double>& root_m,
+                          const std::optional<double>& map_m, int64_t count) {
+    Row(out, absl::StrCat(name, ", against the pelvis"), Cell(root_m),
+        absl::StrCat(count, " bodies"));
+    Row(out, absl::StrCat(name, ", in the map"), Cell(map_m));
+  };
+  body("joints", result.joint_root_m, result.joint_m, result.joint_body_count);
+  if (result.vertex_body_count > 0) {
+    body("vertices", result.vertex_root_m, result.vertex_m, result.vertex_body_count);
+  }
 }
 
 void AppendObjects(const ObjectResult& result, std::string* out) {

@@ -143,6 +143,19 @@ class Reader {
     for (const StampedPose& pose : poses) {
       out_.torsos.push_back({pose.time_ns, index, pose.map_T_body.position});
     }
+    return ReadBodies(track.agent, index, poses);
+  }
+
+  absl::Status ReadBodies(NodeId agent, int index, const std::vector<StampedPose>& poses) {
+    DSG_ASSIGN_OR_RETURN(std::vector<BodyShape> shapes,
+                         snapshot_.Shapes(agent, kTimeMin, kTimeMax));
+    size_t at = 0;
+    for (BodyShape& shape : shapes) {
+      while (at < poses.size() && poses[at].time_ns < shape.time_ns) ++at;
+      if (at == poses.size() || poses[at].time_ns != shape.time_ns) continue;
+      out_.bodies.push_back({shape.time_ns, index, poses[at].map_T_body, std::move(shape.joints),
+                             std::move(shape.vertices)});
+    }
     return absl::OkStatus();
   }
 
