@@ -8,9 +8,11 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/map_service.pb.h"
 #include "dsg/v1/query_service.pb.h"
+#include "query/cli/read_bodies.h"
 #include "query/cli/session.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
+#include "schema/picture/look.h"
 
 namespace dsg::cli {
 namespace {
@@ -31,6 +33,7 @@ class ContentReader {
     DSG_RETURN_IF_ERROR(ReadNodes());
     DSG_RETURN_IF_ERROR(ReadEdges());
     DSG_RETURN_IF_ERROR(ReadTracks());
+    if (options_.with_bodies) DSG_RETURN_IF_ERROR(ReadAllBodies());
     if (options_.with_mesh) DSG_RETURN_IF_ERROR(ReadMesh());
     return std::move(answer_);
   }
@@ -156,6 +159,44 @@ class ContentReader {
     return track;
   }
 
+  absl::Status ReadAllBodies() {
+    MapContent& content = answer_.content;
+    for (size_t i = 0; i < content.tracks.size(); ++i) {
+      AgentBodies bodies{.agent = content.tracks[i].agent, .rgb = AgentColor(i), .bodies = {}};
+      auto request = Begin<v1::GetAgentShapeRequest>();
+      request.set_agent(ToString(bodies.agent));
+      if (options_.at_ns.has_value()) {
+        DSG_ASSIGN_OR_RETURN(std::optional<Body> body,
+                             ReadBodyAt(session_, std::move(request), *options_.at_ns));
+        if (body.has_value() && body->face_count() > 0) bodies.bodies = {*std::move(body)};
+      } else {
+        DSG_RETURN_IF_ERROR(ReadBodiesOverTime(request, &bodies.bodies));
+      }
+      if (!bodies.bodies.empty()) content.bodies.push_back(std::move(bodies));
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status ReadBodiesOverTime(const v1::GetAgentShapeRequest& request,
+                                  std::vector<Body>* bodies) {
+    bool is_full = false;
+    DSG_RETURN_IF_ERROR(ReadBodies(session_, request, nullptr, [&](const BodySource&, Body body) {
+      const bool is_early =
+          !bodies->empty() && body.time_ns - bodies->back().time_ns < options_.body_step_ns;
+      if (is_early || body.face_count() == 0) return true;
+      is_full = ++body_count_ > options_.body_count_max;
+      if (!is_full) bodies->push_back(std::move(body));
+      return !is_full;
+    }));
+    if (!is_full) return absl::OkStatus();
+    const double step_s = static_cast<double>(options_.body_step_ns) / kNsPerSecond;
+    return MakeError(
+        Reason::kLimitExceeded,
+        absl::StrCat("the map has more than ", options_.body_count_max, " bodies that are ", step_s,
+                     " s apart; raise --body-step or --body-max, or give --at"),
+        {{"field", "--body-max"}});
+  }
+
   // Indices from a faulty server must not lead outside the lists.
   static absl::Status CheckBlock(const MeshBlock& block) {
     const size_t count = block.positions_map.size();
@@ -190,6 +231,7 @@ class ContentReader {
 
   Session& session_;
   const ContentOptions options_;
+  int64_t body_count_ = 0;
   ContentAnswer answer_;
 };
 

@@ -21,6 +21,11 @@ struct ContentOptions {
   std::string mesh_node{};
   /// False: only the building, without agents.
   bool with_agents = true;
+  /// Also the bodies with faces of people: at the instant, or over time.
+  bool with_bodies = false;
+  /// Bodies over time are at least so far apart, and no more than so many in all.
+  TimeNs body_step_ns = 0;
+  int64_t body_count_max = 0;
   /// Also every pose of the tracks.
   bool with_poses = false;
   /// Unset = the revision that the session asks for.
@@ -34,7 +39,8 @@ struct ContentAnswer {
 };
 
 /// Requires: the session's map is chosen.
-/// Errors: of the calls; DATA_LOSS when the answers contradict each other.
+/// Errors: of the calls; DATA_LOSS when the answers contradict each other;
+/// RESOURCE_EXHAUSTED/LIMIT_EXCEEDED for more bodies than asked for.
 absl::StatusOr<ContentAnswer> ReadContent(Session* session, const ContentOptions& options);
 
 }  // namespace dsg::cli

@@ -1,22 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-// The verb shape: the body of an agent over time, as a table or as mesh files.
+// The verb shape: the body of an agent over time, as a table, as mesh files or as a picture.
 #include <filesystem>
-#include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
+#include "query/cli/export/body_view.h"
 #include "query/cli/export/mesh_file.h"
+#include "query/cli/export/top_view.h"
 #include "query/cli/json.h"
+#include "query/cli/read_bodies.h"
 #include "query/cli/session.h"
 #include "query/cli/table.h"
 #include "query/cli/values.h"
 #include "query/cli/verb_list.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
-#include "schema/codec/topology.h"
+#include "schema/files/atomic_file.h"
+#include "schema/picture/raster.h"
 
 namespace dsg::cli {
 namespace {
@@ -25,9 +29,13 @@ struct ShapeVerb {
   std::string agent;
   std::string from;
   std::string to;
-  // At most one of the two: a file for the first body, a folder for one file per body.
+  // Instead of the two: the body nearest to this.
+  std::string at;
+  // At most one: a file for the first body, a folder for one file per body, a picture of all.
   std::string ply;
   std::string obj_folder;
+  std::string png;
+  int width_px = 1600;
   bool force = false;
 };
 
@@ -116,65 +124,35 @@ class BodyWriter {
         times_(session.times()) {}
 
   /// False when no more is needed; status() then says whether that is an error.
-  bool Take(const v1::GetAgentShapeResponse& message) {
-    if (message.has_header()) revision_ = message.header().read_revision();
-    if (!message.agent_id().empty()) agent_ = message.agent_id();
-    for (const v1::Asset& asset : message.topologies()) {
-      status_ = TakeTopology(asset);
-      if (!status_.ok()) return false;
-    }
-    for (const v1::AgentShape& body : message.shapes()) {
-      if (static_cast<int64_t>(files_.size()) >= count_max_) return false;
-      // A body without a pose has no place in the map.
-      if (body.shape().vertices().empty() || !body.has_pose()) continue;
-      status_ = Write(body);
-      if (!status_.ok()) return false;
-    }
-    return static_cast<int64_t>(files_.size()) < count_max_;
+  bool Take(const BodySource& source, const Body& body) {
+    if (static_cast<int64_t>(files_.size()) >= count_max_) return false;
+    if (body.points_map.empty()) return true;
+    status_ = Write(source, body);
+    return status_.ok() && static_cast<int64_t>(files_.size()) < count_max_;
   }
 
   const absl::Status& status() const { return status_; }
   const std::vector<Written>& files() const { return files_; }
-  Revision revision() const { return revision_; }
-  const std::string& agent() const { return agent_; }
 
  private:
-  absl::Status TakeTopology(const v1::Asset& asset) {
-    if (DecodeTopology(asset.content(), &topologies_[asset.sha256()])) return absl::OkStatus();
-    return absl::DataLossError(absl::StrCat(
-        "the topology of agent ", agent_, " has media type ", Printable(asset.media_type()),
-        " instead of ", std::string(kTopologyMediaType), "; commit one of that type"));
-  }
-
-  BodyMesh MeshOf(const v1::AgentShape& body) const {
-    const Pose3d map_T_agent = FromProto(body.pose());
-    BodyMesh mesh;
-    const auto& vertices = body.shape().vertices();
-    for (int i = 0; i + 2 < vertices.size(); i += 3) {
-      const Eigen::Vector3f point_agent(vertices[i], vertices[i + 1], vertices[i + 2]);
-      mesh.points_map.push_back((map_T_agent * point_agent.cast<double>()).cast<float>());
-    }
-    const auto topology = topologies_.find(body.topology_sha256());
-    if (topology != topologies_.end()) mesh.faces = topology->second.faces;
-    mesh.comment = absl::StrCat("agent ", agent_, " at ", times_.Full(body.shape().time_ns()),
-                                ", revision ", revision_, ", metres, z up");
-    return mesh;
-  }
-
-  absl::Status Write(const v1::AgentShape& body) {
+  absl::Status Write(const BodySource& source, const Body& body) {
     const bool is_obj = !verb_.obj_folder.empty();
     const std::string path =
-        is_obj ? absl::StrCat(verb_.obj_folder, "/", agent_, "_", body.shape().time_ns(), ".obj")
+        is_obj ? absl::StrCat(verb_.obj_folder, "/", source.agent_id, "_", body.time_ns, ".obj")
                : verb_.ply;
-    const BodyMesh mesh = MeshOf(body);
+    const std::string comment =
+        absl::StrCat("agent ", source.agent_id, " at ", times_.Full(body.time_ns), ", revision ",
+                     source.revision, ", metres, z up");
     DSG_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(path, verb_.force));
-    DSG_RETURN_IF_ERROR(is_obj ? WriteBodyObj(mesh, &file) : WriteBodyPly(mesh, &file));
+    DSG_RETURN_IF_ERROR(is_obj ? WriteBodyObj(body, comment, &file)
+                               : WriteBodyPly(body, comment, &file));
     DSG_RETURN_IF_ERROR(file.Commit());
+    const size_t face_count = body.faces == nullptr ? 0 : body.faces->size();
     files_.push_back({.format = is_obj ? "obj" : "ply",
                       .path = path,
                       .byte_count = file.byte_count(),
-                      .counts = {{"vertices", static_cast<int64_t>(mesh.points_map.size())},
-                                 {"faces", static_cast<int64_t>(mesh.faces.size())}}});
+                      .counts = {{"vertices", static_cast<int64_t>(body.points_map.size())},
+                                 {"faces", static_cast<int64_t>(face_count)}}});
     return absl::OkStatus();
   }
 
@@ -182,14 +160,13 @@ class BodyWriter {
   const int64_t count_max_;
   const TimeText& times_;
   absl::Status status_;
-  Revision revision_ = 0;
-  std::string agent_;
-  std::map<std::string, Topology> topologies_;
   std::vector<Written> files_;
 };
 
 absl::Status PrepareFiles(const ShapeVerb& verb) {
-  if (!verb.ply.empty()) return CheckMayWrite(verb.ply, verb.force);
+  for (const std::string* path : {&verb.ply, &verb.png}) {
+    if (!path->empty()) return CheckMayWrite(*path, verb.force);
+  }
   std::error_code failure;
   std::filesystem::create_directories(verb.obj_folder, failure);
   if (!failure) return absl::OkStatus();
@@ -199,31 +176,81 @@ absl::Status PrepareFiles(const ShapeVerb& verb) {
                    {{"field", "--obj"}, {"value", verb.obj_folder}});
 }
 
+absl::Status NoBody(const BodySource& source, const std::string& what) {
+  return absl::NotFoundError(absl::StrCat("agent ", source.agent_id, " has no body with ", what,
+                                          " and a pose in that interval; list its bodies with dsg "
+                                          "shape ",
+                                          source.agent_id));
+}
+
 absl::Status WriteBodies(Session* session, v1::GetAgentShapeRequest request, const ShapeVerb& verb,
                          std::ostream& out) {
-  DSG_RETURN_IF_ERROR(PrepareFiles(verb));
   request.add_parts(v1::SHAPE_PART_VERTICES);
   request.add_parts(v1::SHAPE_PART_TOPOLOGY);
   BodyWriter writer(*session, verb);
-  DSG_RETURN_IF_ERROR(session->Read(
-      &query::Api::GetAgentShape, request,
-      [&](const v1::GetAgentShapeResponse& message) { return writer.Take(message); }));
+  BodySource source;
+  DSG_RETURN_IF_ERROR(ReadBodies(
+      *session, request, &source,
+      [&](const BodySource& from, const Body& body) { return writer.Take(from, body); }));
   DSG_RETURN_IF_ERROR(writer.status());
-  if (writer.files().empty()) {
-    return absl::NotFoundError(absl::StrCat("agent ", writer.agent(),
-                                            " has no body with vertices and a pose in that "
-                                            "interval; list its bodies with dsg shape ",
-                                            writer.agent()));
+  if (writer.files().empty()) return NoBody(source, "vertices");
+  TellWritten(writer.files(), source.revision, session->common().json, out);
+  return absl::OkStatus();
+}
+
+absl::Status DrawPicture(Session* session, const v1::GetAgentShapeRequest& request,
+                         const ShapeVerb& verb, std::ostream& out) {
+  BodySource source;
+  std::vector<Body> bodies;
+  DSG_RETURN_IF_ERROR(
+      ReadBodies(*session, request, &source, [&bodies](const BodySource&, Body body) {
+        if (!body.joints_map.empty() || !body.points_map.empty()) bodies.push_back(std::move(body));
+        return true;
+      }));
+  if (bodies.empty()) return NoBody(source, "joints or vertices");
+  const std::string title = absl::StrCat(
+      source.agent_id, "  ", session->times().Relative(bodies.front().time_ns), " to ",
+      session->times().Relative(bodies.back().time_ns), "  revision ", source.revision);
+  const picture::Picture picture = DrawBodies(
+      bodies, {.width_px = verb.width_px, .title = title, .gap_ns = session->map().gap_ns_max});
+  DSG_ASSIGN_OR_RETURN(const std::string png, picture::EncodePng(picture));
+  DSG_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(verb.png, verb.force));
+  DSG_RETURN_IF_ERROR(file.Write(png));
+  DSG_RETURN_IF_ERROR(file.Commit());
+  const Written written{.format = "png",
+                        .path = verb.png,
+                        .byte_count = file.byte_count(),
+                        .counts = {{"bodies", static_cast<int64_t>(bodies.size())},
+                                   {"columns", picture.width},
+                                   {"rows", picture.height}}};
+  TellWritten({written}, source.revision, session->common().json, out);
+  return absl::OkStatus();
+}
+
+// Narrows the request to the body nearest to --at.
+absl::Status NarrowTo(const Session& session, const std::string& at,
+                      v1::GetAgentShapeRequest* request) {
+  DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, ParseInstant("--at", at, session.map()));
+  DSG_ASSIGN_OR_RETURN(const std::optional<Body> body, ReadBodyAt(session, *request, at_ns));
+  if (!body.has_value()) {
+    return absl::NotFoundError(
+        absl::StrCat("agent ", request->agent(), " has no body with a pose within ",
+                     static_cast<double>(BodyReachNs(session)) / static_cast<double>(kNsPerSecond),
+                     " s of --at ", at, "; list its bodies with dsg shape ", request->agent()));
   }
-  TellWritten(writer.files(), writer.revision(), session->common().json, out);
+  request->set_from_ns(body->time_ns);
+  request->set_to_ns(body->time_ns + 1);
   return absl::OkStatus();
 }
 
 absl::Status RunShape(Session* session, const ShapeVerb& verb, std::ostream& out) {
   DSG_ASSIGN_OR_RETURN(v1::GetAgentShapeRequest request, ShapeRequest(*session, verb));
-  if (verb.ply.empty() && verb.obj_folder.empty()) {
+  if (!verb.at.empty()) DSG_RETURN_IF_ERROR(NarrowTo(*session, verb.at, &request));
+  if (verb.ply.empty() && verb.obj_folder.empty() && verb.png.empty()) {
     return ListBodies(session, std::move(request), out);
   }
+  DSG_RETURN_IF_ERROR(PrepareFiles(verb));
+  if (!verb.png.empty()) return DrawPicture(session, request, verb, out);
   return WriteBodies(session, std::move(request), verb, out);
 }
 
@@ -237,13 +264,23 @@ void AddShapeVerb(Grammar* grammar) {
                                .takes = kQuestion | kLimit,
                                .run = RunShape});
   app->add_option("AGENT", verb->agent, kAgentHelp)->required();
-  app->add_option("--from", verb->from, "First TIME; default the first body");
-  app->add_option("--to", verb->to, "TIME to stop before; default after the last body");
+  CLI::Option* from = app->add_option("--from", verb->from, "First TIME; default the first body");
+  CLI::Option* to =
+      app->add_option("--to", verb->to, "TIME to stop before; default after the last body");
+  app->add_option("--at", verb->at, "The body nearest to this TIME alone, at most half a gap away")
+      ->excludes(from)
+      ->excludes(to);
   CLI::Option* ply =
       app->add_option("--ply", verb->ply, "Write the first body to this file, binary PLY");
   CLI::Option* obj = app->add_option("--obj", verb->obj_folder,
                                      "Write one Wavefront OBJ file per body to this folder");
-  ply->excludes(obj);
+  CLI::Option* png =
+      app->add_option("--png", verb->png, "Draw bodies and skeletons over time as a picture");
+  ply->excludes(obj)->excludes(png);
+  obj->excludes(png);
+  app->add_option("--width", verb->width_px, "Width of the picture, pixels")
+      ->check(Between(kTopViewWidthMin, kTopViewWidthMax))
+      ->capture_default_str();
   app->add_flag("--force", verb->force, "Replace existing files");
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The verbs that write a map to files: export, map.
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
@@ -49,6 +50,10 @@ struct ExportVerb {
   /// A world of a physics simulator; its mesh goes beside it, as .stl.
   std::string sdf;
   SdfOptions sdf_options{};
+  /// People as bodies: walking in a glTF scene, standing at `at`.
+  bool with_bodies = false;
+  double body_step_s = 0.25;
+  int64_t body_count_max = 2000;
   /// "rgb", "label", "instance"; empty = rgb if the mesh has it, else label.
   std::string color;
   std::string at;
@@ -67,6 +72,7 @@ struct MapVerb {
   bool is_mesh = false;
   /// A second map whose mesh is drawn at the right of it; empty = none.
   std::string beside;
+  bool with_bodies = false;
   int width_px = 1600;
   std::string at;
   bool force = false;
@@ -215,7 +221,13 @@ class Exporter {
   absl::Status WriteMesh(const std::string& path) {
     DSG_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(path, force_));
     DSG_RETURN_IF_ERROR(WriteMeshPly(content_, color_, &file));
-    const MeshCounts counts = CountMesh(content_.mesh);
+    MeshCounts counts = CountMesh(content_.mesh);
+    for (const AgentBodies& agent : content_.bodies) {
+      for (const Body& body : agent.bodies) {
+        counts.vertices += body.points_map.size();
+        counts.faces += body.face_count();
+      }
+    }
     return Finish("ply", {{"vertices", counts.vertices}, {"faces", counts.faces}}, &file);
   }
 
@@ -307,7 +319,15 @@ absl::Status RunExport(Session* session, const ExportVerb& verb, std::ostream& o
   DSG_ASSIGN_OR_RETURN(
       ContentAnswer answer,
       ReadMapAt(session, verb.at,
-                {.with_mesh = with_mesh, .mesh_node = verb.node, .with_poses = with_spark}));
+                {.with_mesh = with_mesh,
+                 .mesh_node = verb.node,
+                 .with_bodies = verb.with_bodies,
+                 .body_step_ns = static_cast<TimeNs>(std::llround(verb.body_step_s * kNsPerSecond)),
+                 .body_count_max = verb.body_count_max,
+                 .with_poses = with_spark}));
+  if (verb.with_bodies && answer.content.bodies.empty()) {
+    session->notes() << "note: no agent has a body with faces and a pose then\n";
+  }
   Exporter exporter(answer.content, color, verb.force);
   if (!verb.ply.empty()) DSG_RETURN_IF_ERROR(exporter.WriteMesh(verb.ply));
   if (!verb.graph_ply.empty()) DSG_RETURN_IF_ERROR(exporter.WriteGraph(verb.graph_ply));
@@ -355,7 +375,8 @@ absl::StatusOr<picture::Picture> DrawMap(Session* session, const MapVerb& verb,
 
 absl::Status RunMap(Session* session, const MapVerb& verb, std::ostream& out) {
   DSG_RETURN_IF_ERROR(CheckMayWrite(verb.png, verb.force));
-  DSG_ASSIGN_OR_RETURN(ContentAnswer answer, ReadMapAt(session, verb.at, {}));
+  DSG_ASSIGN_OR_RETURN(ContentAnswer answer,
+                       ReadMapAt(session, verb.at, {.with_bodies = verb.with_bodies}));
   MapContent& content = answer.content;
   if (!verb.floor.empty()) {
     DSG_ASSIGN_OR_RETURN(const HeightRange floor, ChooseFloor(content, verb.floor));
@@ -381,6 +402,12 @@ absl::Status CheckExport(const ExportVerb& verb, const CommonOptions& common) {
   const bool is_mesh_alone = verb.archive.empty() && !verb.ply.empty() && PathsOf(verb).size() == 1;
   if (!verb.node.empty() && !is_mesh_alone) {
     return Usage("--node is of the mesh: give --ply FILE, and no other file", "export");
+  }
+  if (verb.with_bodies && verb.ply.empty() && verb.gltf.empty()) {
+    return Usage("--bodies go into --gltf FILE, or with --at into --ply FILE", "export");
+  }
+  if (verb.with_bodies && !verb.ply.empty() && verb.at.empty()) {
+    return Usage("a PLY file shows one instant: give --at with --bodies", "export");
   }
   if (verb.with_rows && verb.archive.empty()) {
     return Usage("--rows is of an archive: give FILE.dsgz", "export");
@@ -441,6 +468,16 @@ void AddExport(Grammar* grammar) {
                   "Distance between the poses that --spark writes, metres; 0 = all poses")
       ->check(ZeroOrMore())
       ->capture_default_str();
+  app->add_flag("--bodies", verb->with_bodies,
+                "People as bodies: walking in --gltf, or as they are at --at in --gltf and --ply");
+  app->add_option("--body-step", verb->body_step_s,
+                  "Least time between two bodies of one that walks, seconds; 0 = all")
+      ->check(ZeroOrMore())
+      ->capture_default_str();
+  app->add_option("--body-max", verb->body_count_max,
+                  "Refuse more bodies in all; each is 12 bytes a vertex of the file")
+      ->check(Between(1, 1'000'000))
+      ->capture_default_str();
   app->add_option(
          "--color", verb->color,
          "Mesh colours: rgb, label or instance; default rgb if the mesh has it, else label")
@@ -452,11 +489,17 @@ void AddExport(Grammar* grammar) {
   app->add_flag("--force", verb->force, "Replace existing files");
 }
 
+absl::Status CheckMap(const MapVerb& verb, const CommonOptions&) {
+  if (!verb.with_bodies || !verb.at.empty()) return absl::OkStatus();
+  return Usage("a picture shows one instant: give --at with --bodies", "map");
+}
+
 void AddMap(Grammar* grammar) {
   const auto [app, verb] = grammar->Add<MapVerb>({.name = "map",
                                                   .what = "Draw a map from above",
                                                   .example = "--png office.png",
-                                                  .run = RunMap});
+                                                  .run = RunMap,
+                                                  .check = CheckMap});
   app->add_option("--png", verb->png, "The picture to write")->required();
   app->add_option("--floor", verb->floor, kFloorHelp);
   CLI::Option* exploded =
@@ -466,6 +509,7 @@ void AddMap(Grammar* grammar) {
   app->add_option("--beside", verb->beside,
                   "Another map: its mesh at the right, seen from the same place")
       ->needs(mesh);
+  app->add_flag("--bodies", verb->with_bodies, "People as bodies, as they are at --at");
   app->add_option("--width", verb->width_px, "Width of the picture, pixels")
       ->check(Between(kTopViewWidthMin, kTopViewWidthMax))
       ->capture_default_str();

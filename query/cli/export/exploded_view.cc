@@ -122,6 +122,11 @@ Box3d BoundsOf(const MapContent& content) {
   for (const MeshBlock& block : content.mesh) {
     for (const Eigen::Vector3f& point : block.positions_map) bounds.extend(point.cast<double>());
   }
+  for (const AgentBodies& agent : content.bodies) {
+    for (const Body& body : agent.bodies) {
+      for (const Eigen::Vector3f& point : body.points_map) bounds.extend(point.cast<double>());
+    }
+  }
   if (bounds.isEmpty()) bounds.extend(Eigen::Vector3d::Zero());
   // A flat or a tiny map has a size, too.
   const Eigen::Vector3d lack = (Eigen::Vector3d(2.0, 2.0, 0.5) - bounds.sizes()).cwiseMax(0.0);
@@ -158,7 +163,10 @@ class Drawer {
       DrawPlate(level);
       DrawContainment(static_cast<Level>(level));
       if (level == kMeshLevel) DrawMesh();
-      if (level == kObjectLevel) DrawObjects();
+      if (level == kObjectLevel) {
+        DrawObjects();
+        DrawBodies();
+      }
       if (level == kPlaceLevel) DrawPlaces();
       if (level == kRoomLevel) DrawRooms();
       if (level == kBuildingLevel) DrawNamed(kinds::kBuilding);
@@ -272,9 +280,32 @@ class Drawer {
         }
         canvas_.DrawPolyline(pixels, 3.0, picture::MakePaint(AgentColor(i), 0.7f));
       }
+      if (HasBody(content_, track.agent)) continue;
       const Eigen::Vector2d last = view_.ToPixel(LastOf(track), kObjectLevel);
       canvas_.FillCircle(last, 12.0, picture::MakePaint(0xffffff));
       canvas_.FillCircle(last, 9.0, picture::MakePaint(AgentColor(i)));
+    }
+  }
+
+  void DrawBodies() {
+    // The way to the eye grows fastest towards it.
+    const Eigen::Vector3d to_eye(Oblique::NearnessOf(Eigen::Vector3d::UnitX()),
+                                 Oblique::NearnessOf(Eigen::Vector3d::UnitY()),
+                                 Oblique::NearnessOf(Eigen::Vector3d::UnitZ()));
+    for (const AgentBodies& agent : content_.bodies) {
+      for (const Body& body : agent.bodies) {
+        std::vector<LitFace> faces = LitFaces(body, agent.rgb, to_eye.normalized());
+        std::stable_sort(faces.begin(), faces.end(), [](const LitFace& a, const LitFace& b) {
+          return Oblique::NearnessOf(a.middle_map) < Oblique::NearnessOf(b.middle_map);
+        });
+        for (const LitFace& face : faces) {
+          Pixels corners;
+          for (const Eigen::Vector3d& corner : face.corners_map) {
+            corners.push_back(view_.ToPixel(corner, kObjectLevel));
+          }
+          canvas_.FillPolygon(corners, face.paint);
+        }
+      }
     }
   }
 

@@ -64,6 +64,7 @@ Json JsonOf(const GltfPrimitive& primitive) {
   if (primitive.colors != kNone) out["attributes"]["COLOR_0"] = primitive.colors;
   if (primitive.indices != kNone) out["indices"] = primitive.indices;
   if (primitive.material != kNone) out["material"] = primitive.material;
+  for (const int target : primitive.targets) out["targets"].push_back({{"POSITION", target}});
   return out;
 }
 
@@ -82,6 +83,31 @@ Json JsonOf(const GltfMaterial& material) {
               {"pbrMetallicRoughness",
                {{"baseColorFactor", color}, {"metallicFactor", 0.0}, {"roughnessFactor", 1.0}}}};
   if (material.is_unlit) out["extensions"][kUnlit] = Json::object();
+  return out;
+}
+
+const char* PathName(GltfPath path) {
+  switch (path) {
+    case GltfPath::kTranslation:
+      return "translation";
+    case GltfPath::kScale:
+      return "scale";
+    case GltfPath::kWeights:
+      break;
+  }
+  return "weights";
+}
+
+Json AnimationOf(const std::vector<GltfChannel>& channels) {
+  Json out = {{"name", "over time"}};
+  for (size_t i = 0; i < channels.size(); ++i) {
+    const GltfChannel& channel = channels[i];
+    out["samplers"].push_back({{"input", channel.times},
+                               {"output", channel.values},
+                               {"interpolation", channel.is_step ? "STEP" : "LINEAR"}});
+    out["channels"].push_back(
+        {{"sampler", i}, {"target", {{"node", channel.node}, {"path", PathName(channel.path)}}}});
+  }
   return out;
 }
 
@@ -179,6 +205,27 @@ int GltfDocument::AddIndices(const std::vector<uint32_t>& indices) {
                       .high = {}});
 }
 
+int GltfDocument::AddTimes(const std::vector<float>& times_s) {
+  return AddAccessor(times_s.data(), times_s.size() * sizeof(float),
+                     {.count = times_s.size(),
+                      .component_type = kFloat,
+                      .type = "SCALAR",
+                      .low = {times_s.front()},
+                      .high = {times_s.back()}});
+}
+
+int GltfDocument::AddScalars(const std::vector<float>& numbers) {
+  return AddAccessor(
+      numbers.data(), numbers.size() * sizeof(float),
+      {.count = numbers.size(), .component_type = kFloat, .type = "SCALAR", .low = {}, .high = {}});
+}
+
+int GltfDocument::AddVectors(const std::vector<Eigen::Vector3f>& vectors) {
+  return AddAccessor(
+      vectors.data(), vectors.size() * sizeof(Eigen::Vector3f),
+      {.count = vectors.size(), .component_type = kFloat, .type = "VEC3", .low = {}, .high = {}});
+}
+
 std::string GltfDocument::MakeJson() const {
   Json document = {{"asset", {{"version", "2.0"}, {"generator", "dsg"}}}};
   const auto is_unlit = [](const GltfMaterial& material) { return material.is_unlit; };
@@ -190,6 +237,7 @@ std::string GltfDocument::MakeJson() const {
   AddList("nodes", nodes, &document);
   AddList("meshes", meshes, &document);
   AddList("materials", materials, &document);
+  if (!channels.empty()) document["animations"] = Json::array({AnimationOf(channels)});
   for (size_t i = 0; i < accessors_.size(); ++i) {
     const Accessor& accessor = accessors_[i];
     Json out = {{"bufferView", i},
@@ -202,10 +250,10 @@ std::string GltfDocument::MakeJson() const {
       out["max"] = NumbersOf(accessor.high);
     }
     document["accessors"].push_back(std::move(out));
-    document["bufferViews"].push_back({{"buffer", 0},
-                                       {"byteOffset", accessor.offset},
-                                       {"byteLength", accessor.byte_length},
-                                       {"target", accessor.target}});
+    Json view = {
+        {"buffer", 0}, {"byteOffset", accessor.offset}, {"byteLength", accessor.byte_length}};
+    if (accessor.target != 0) view["target"] = accessor.target;
+    document["bufferViews"].push_back(std::move(view));
   }
   if (!buffer_.empty()) {
     document["buffers"] = Json::array({{{"byteLength", buffer_.size()}}});

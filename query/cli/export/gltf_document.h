@@ -16,7 +16,8 @@
 
 namespace dsg::cli {
 
-// Source: Khronos glTF 2.0 specification, sections 3.6 (buffers), 3.7 (geometry), 4.4 (.glb).
+// Source: Khronos glTF 2.0 specification, sections 3.6 (buffers), 3.7 (geometry and morph targets),
+// 3.11 (animations), 4.4 (.glb).
 
 /// The index of a missing part.
 inline constexpr int kNone = -1;
@@ -30,6 +31,8 @@ struct GltfPrimitive {
   int colors = kNone;
   int indices = kNone;
   int material = kNone;
+  /// Accessors of positions that are added to the primitive's own, times the weight of each.
+  std::vector<int> targets;
   GltfMode mode = GltfMode::kTriangles;
 };
 
@@ -57,12 +60,28 @@ struct GltfNode {
   std::vector<std::pair<std::string, std::string>> extras;
 };
 
+enum class GltfPath { kTranslation, kScale, kWeights };
+
+/// How one property of a node goes over time.
+struct GltfChannel {
+  int node = kNone;
+  GltfPath path = GltfPath::kTranslation;
+  /// Accessors: of AddTimes; of AddVectors for translation and scale, of AddScalars for weights,
+  /// all those of one time after the other.
+  int times = kNone;
+  int values = kNone;
+  /// A value holds until the next one, instead of going over to it.
+  bool is_step = false;
+};
+
 /// Nodes, meshes and materials may change before Write; geometry is only added.
 class GltfDocument {
  public:
   std::vector<GltfNode> nodes;
   std::vector<GltfMesh> meshes;
   std::vector<GltfMaterial> materials;
+  /// One animation with all of them.
+  std::vector<GltfChannel> channels;
   /// The nodes without a parent.
   std::vector<int> roots;
 
@@ -76,6 +95,10 @@ class GltfDocument {
   /// 0xRRGGBB as seen on a screen.
   int AddColors(const std::vector<uint32_t>& colors);
   int AddIndices(const std::vector<uint32_t>& indices);
+  /// Seconds from the begin of the animation. Requires: from 0 on and strictly growing.
+  int AddTimes(const std::vector<float>& times_s);
+  int AddScalars(const std::vector<float>& numbers);
+  int AddVectors(const std::vector<Eigen::Vector3f>& vectors);
 
   /// The whole file. Errors: as AtomicFile::Write; RESOURCE_EXHAUSTED/LIMIT_EXCEEDED for more than
   /// the 4 GiB that the format can hold.
@@ -90,9 +113,9 @@ class GltfDocument {
     int component_type = 0;
     const char* type = "";
     bool is_normalized = false;
-    /// 34962 = vertices, 34963 = indices.
+    /// 34962 = vertices, 34963 = indices, 0 = neither.
     int target = 0;
-    /// Bounds of positions; empty for other accessors.
+    /// Bounds of positions and times; empty for other accessors.
     std::vector<float> low;
     std::vector<float> high;
   };

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "query/cli/export/gltf_scene.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <unordered_map>
 #include <utility>
 
+#include "query/cli/export/gltf_bodies.h"
 #include "query/cli/export/outline.h"
 #include "schema/picture/look.h"
 #include "schema/picture/wire.h"
@@ -252,6 +254,7 @@ class SceneBuilder {
     last.name = out->name + " last position";
     PutBall(LastOf(track), kAgentRadiusM, rgb, &last);
     out->children.push_back(document_.AddNode(std::move(last)));
+    ShapeBodies(node, rgb, out);
     Points points;
     Indices indices;
     for (const auto& piece : track.pieces) {
@@ -266,6 +269,17 @@ class SceneBuilder {
     path.name = out->name + " track";
     path.mesh = LineMesh("track", points, indices, rgb);
     out->children.push_back(document_.AddNode(std::move(path)));
+  }
+
+  void ShapeBodies(const Node& node, uint32_t rgb, GltfNode* out) {
+    const auto found =
+        std::find_if(content_.bodies.begin(), content_.bodies.end(),
+                     [&node](const AgentBodies& bodies) { return bodies.agent == node.id; });
+    if (found == content_.bodies.end()) return;
+    const std::vector<int> nodes =
+        AddBodies(*found, out->name, FirstBodyNs(content_.bodies), content_.spec.gap_ns_max,
+                  Material(rgb, false), &document_);
+    out->children.insert(out->children.end(), nodes.begin(), nodes.end());
   }
 
   void AddEdges(std::vector<int>* groups) {

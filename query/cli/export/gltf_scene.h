@@ -16,6 +16,8 @@ inline constexpr size_t kPrimitiveVertexCountMax = size_t{1} << 22;
 /// boxes, places as small balls, objects and others as wire boxes, agents as balls at their last
 /// position and their tracks); "edges" with one child per relation. Children carry the node's name,
 /// or its id without one, and id, kind, class in their extras.
+///
+/// Agents with bodies have them as further children. One body stands; several walk (gltf_bodies.h).
 GltfDocument MakeGltf(const MapContent& content, MeshColor color,
                       size_t primitive_vertex_count_max = kPrimitiveVertexCountMax);
 

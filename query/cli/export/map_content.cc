@@ -77,6 +77,11 @@ Eigen::Vector3d MiddleOf(const Node& node) {
   return has_middle ? node.map_T_node * node.box_node.center() : node.map_T_node.position;
 }
 
+bool HasBody(const MapContent& content, NodeId agent) {
+  return std::any_of(content.bodies.begin(), content.bodies.end(),
+                     [agent](const AgentBodies& bodies) { return bodies.agent == agent; });
+}
+
 const Eigen::Vector3d& LastOf(const Track& track) { return track.pieces.back().back(); }
 
 HeightRange StandingHeights(const HeightRange& floor) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "query/cli/export/body.h"
 #include "schema/model/edge.h"
 #include "schema/model/layer.h"
 #include "schema/model/mesh.h"
@@ -38,6 +39,8 @@ struct MapContent {
   /// Of the agents that have poses, ascending by id.
   std::vector<Track> tracks;
   std::vector<MeshBlock> mesh;
+  /// Of the agents that have some, if asked for.
+  std::vector<AgentBodies> bodies;
 };
 
 /// "office 4"; the id of a node without a name.
@@ -52,6 +55,9 @@ std::unordered_map<NodeId, const Node*> ParentsOf(const MapContent& content);
 /// The centre of the node's box; its position without a box, and for places, whose box is the free
 /// space around them. Map frame.
 Eigen::Vector3d MiddleOf(const Node& node);
+
+/// Whether bodies of the agent are in the content.
+bool HasBody(const MapContent& content, NodeId agent);
 
 /// The last position of an agent. Requires: at least one piece, and no piece is empty.
 const Eigen::Vector3d& LastOf(const Track& track);

@@ -111,8 +111,8 @@ absl::Status WriteVertices(const std::vector<MeshBlock>& mesh, MeshColor color, 
   return absl::OkStatus();
 }
 
-absl::Status WriteFaces(const std::vector<MeshBlock>& mesh, PlyWriter* writer) {
-  uint32_t first = 0;
+// `first`: vertices that are before those of the mesh.
+absl::Status WriteFaces(const std::vector<MeshBlock>& mesh, uint32_t first, PlyWriter* writer) {
   for (const MeshBlock& block : mesh) {
     for (const auto& face : block.faces) {
       writer->Add(uint8_t{3});
@@ -224,27 +224,23 @@ void AppendBytes(const T& value, std::string* out) {
   out->append(reinterpret_cast<const char*>(&value), sizeof(T));
 }
 
-absl::Status CheckFaces(const BodyMesh& body, const AtomicFile& file) {
-  for (const auto& face : body.faces) {
-    const uint32_t vertex = *std::max_element(face.begin(), face.end());
-    if (vertex < body.points_map.size()) continue;
-    return absl::DataLossError(absl::StrCat(file.path(),
-                                            " is not written: the topology has a face of vertex ",
-                                            vertex, ", but the body has ", body.points_map.size(),
-                                            " vertices; verify the map with dsg verify"));
-  }
-  return absl::OkStatus();
-}
-
 }  // namespace
 
 absl::Status WriteMeshPly(const MapContent& content, MeshColor color, AtomicFile* file) {
+  std::vector<MeshBlock> bodies;
+  for (const AgentBodies& agent : content.bodies) {
+    for (const Body& body : agent.bodies) bodies.push_back(MeshOf(body, agent.rgb));
+  }
   const MeshCounts counts = CountMesh(content.mesh);
-  DSG_RETURN_IF_ERROR(CheckCount(counts.vertices, *file));
+  const MeshCounts of_bodies = CountMesh(bodies);
+  const MeshCounts all{counts.vertices + of_bodies.vertices, counts.faces + of_bodies.faces};
+  DSG_RETURN_IF_ERROR(CheckCount(all.vertices, *file));
   PlyWriter writer(file);
-  writer.AddText(MeshHeader(content, counts));
+  writer.AddText(MeshHeader(content, all));
   DSG_RETURN_IF_ERROR(WriteVertices(content.mesh, SettleColor(content.mesh, color), &writer));
-  DSG_RETURN_IF_ERROR(WriteFaces(content.mesh, &writer));
+  DSG_RETURN_IF_ERROR(WriteVertices(bodies, MeshColor::kRgb, &writer));
+  DSG_RETURN_IF_ERROR(WriteFaces(content.mesh, 0, &writer));
+  DSG_RETURN_IF_ERROR(WriteFaces(bodies, static_cast<uint32_t>(counts.vertices), &writer));
   return writer.Flush(0);
 }
 
@@ -270,33 +266,32 @@ absl::StatusOr<GraphPlyCounts> WriteGraphPly(const MapContent& content, AtomicFi
   return counts;
 }
 
-absl::Status WriteBodyPly(const BodyMesh& body, AtomicFile* file) {
-  DSG_RETURN_IF_ERROR(CheckFaces(body, *file));
+absl::Status WriteBodyPly(const Body& body, const std::string& comment, AtomicFile* file) {
   std::string bytes =
-      absl::StrCat("ply\nformat binary_little_endian 1.0\ncomment ", Printable(body.comment),
+      absl::StrCat("ply\nformat binary_little_endian 1.0\ncomment ", Printable(comment),
                    "\nelement vertex ", body.points_map.size(),
                    "\nproperty float x\nproperty float y\nproperty float z\nelement face ",
-                   body.faces.size(), "\nproperty list uchar int vertex_indices\nend_header\n");
+                   body.face_count(), "\nproperty list uchar int vertex_indices\nend_header\n");
   for (const Eigen::Vector3f& point : body.points_map) {
     for (int axis = 0; axis < 3; ++axis) AppendBytes(point[axis], &bytes);
   }
-  for (const auto& face : body.faces) {
+  for (size_t i = 0; i < body.face_count(); ++i) {
     AppendBytes(uint8_t{3}, &bytes);
-    for (const uint32_t vertex : face) AppendBytes(vertex, &bytes);
+    for (const uint32_t vertex : (*body.faces)[i]) AppendBytes(vertex, &bytes);
   }
   return file->Write(bytes);
 }
 
-absl::Status WriteBodyObj(const BodyMesh& body, AtomicFile* file) {
-  DSG_RETURN_IF_ERROR(CheckFaces(body, *file));
-  std::string text = absl::StrCat("# ", Printable(body.comment), "\n");
+absl::Status WriteBodyObj(const Body& body, const std::string& comment, AtomicFile* file) {
+  std::string text = absl::StrCat("# ", Printable(comment), "\n");
   for (const Eigen::Vector3f& point : body.points_map) {
     absl::StrAppend(&text, "v ", Fixed(static_cast<double>(point.x()), 4), " ",
                     Fixed(static_cast<double>(point.y()), 4), " ",
                     Fixed(static_cast<double>(point.z()), 4), "\n");
   }
   // The format counts from 1.
-  for (const auto& face : body.faces) {
+  for (size_t i = 0; i < body.face_count(); ++i) {
+    const auto& face = (*body.faces)[i];
     absl::StrAppend(&text, "f ", face[0] + 1, " ", face[1] + 1, " ", face[2] + 1, "\n");
   }
   return file->Write(text);

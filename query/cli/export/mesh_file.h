@@ -10,13 +10,15 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "query/cli/export/body.h"
 #include "query/cli/export/map_content.h"
 #include "schema/files/atomic_file.h"
 #include "schema/picture/look.h"
 
 namespace dsg::cli {
 
-/// Binary PLY, little endian: vertices with normal, colour, label and instance; faces.
+/// Binary PLY, little endian: vertices with normal, colour, label and instance; faces. Bodies are
+/// behind the mesh, in the colours of their agents.
 /// Errors: as AtomicFile::Write; RESOURCE_EXHAUSTED/LIMIT_EXCEEDED from 2^31 vertices on, beyond
 /// the 32-bit counts of readers.
 absl::Status WriteMeshPly(const MapContent& content, MeshColor color, AtomicFile* file);
@@ -31,17 +33,10 @@ struct GraphPlyCounts {
 /// the layers. Errors: as WriteMeshPly.
 absl::StatusOr<GraphPlyCounts> WriteGraphPly(const MapContent& content, AtomicFile* file);
 
-struct BodyMesh {
-  std::vector<Eigen::Vector3f> points_map;
-  /// Empty without a topology; the files then have points only.
-  std::vector<std::array<uint32_t, 3>> faces;
-  /// One line: the agent and the time.
-  std::string comment;
-};
-
-/// Binary PLY. Errors: DATA_LOSS for a face with an unknown vertex; as AtomicFile::Write.
-absl::Status WriteBodyPly(const BodyMesh& body, AtomicFile* file);
+/// Binary PLY. `comment`: one line, the agent and the time.
+/// Errors: as AtomicFile::Write.
+absl::Status WriteBodyPly(const Body& body, const std::string& comment, AtomicFile* file);
 /// Wavefront OBJ. Errors: as WriteBodyPly.
-absl::Status WriteBodyObj(const BodyMesh& body, AtomicFile* file);
+absl::Status WriteBodyObj(const Body& body, const std::string& comment, AtomicFile* file);
 
 }  // namespace dsg::cli

@@ -126,6 +126,13 @@ Eigen::AlignedBox2d MapBounds(const MapContent& content, const Overlay& overlay)
       for (const Eigen::Vector3d& point : piece) bounds.extend(Eigen::Vector2d(point.head<2>()));
     }
   }
+  for (const AgentBodies& agent : content.bodies) {
+    for (const Body& body : agent.bodies) {
+      for (const Eigen::Vector3f& point : body.points_map) {
+        bounds.extend(Eigen::Vector2d(point.head<2>().cast<double>()));
+      }
+    }
+  }
   for (const MeshBlock& block : content.mesh) {
     for (const auto& face : block.faces) {
       const Eigen::Vector3f& corner = block.positions_map[face[0]];
@@ -259,9 +266,29 @@ void DrawTracks(const MapContent& content, const FloorView& view, picture::Canva
     }
   }
   for (size_t i = 0; i < content.tracks.size(); ++i) {
+    if (HasBody(content, content.tracks[i].agent)) continue;
     const Eigen::Vector2d last = view.ToPixel(LastOf(content.tracks[i]));
     canvas->FillCircle(last, 14.0, picture::MakePaint(0xffffff));
     canvas->FillCircle(last, 11.0, picture::MakePaint(AgentColor(i)));
+  }
+}
+
+// Seen from above, so higher faces hide lower ones.
+void DrawPeople(const MapContent& content, const FloorView& view, picture::Canvas* canvas) {
+  for (const AgentBodies& agent : content.bodies) {
+    for (const Body& body : agent.bodies) {
+      std::vector<LitFace> faces = LitFaces(body, agent.rgb, Eigen::Vector3d::UnitZ());
+      std::stable_sort(faces.begin(), faces.end(), [](const LitFace& a, const LitFace& b) {
+        return a.middle_map.z() < b.middle_map.z();
+      });
+      for (const LitFace& face : faces) {
+        Polygon2d corners;
+        for (const Eigen::Vector3d& corner : face.corners_map) {
+          corners.push_back(view.ToPixel(corner));
+        }
+        canvas->FillPolygon(corners, face.paint);
+      }
+    }
   }
 }
 
@@ -354,6 +381,7 @@ picture::Picture DrawTopView(const MapContent& content, const TopViewOptions& op
   DrawRoomLinks(content, view, &canvas);
   DrawObjects(content, view, &canvas);
   DrawTracks(content, view, &canvas);
+  DrawPeople(content, view, &canvas);
   const double margin = 0.5 * kMarginPx;
   const Eigen::Vector2d around(margin, margin);
   picture::LabelLayout layout(Eigen::AlignedBox2d(area.min() - around, area.max() + around));

@@ -185,6 +185,12 @@ TEST_F(ExportVerbs, SayWhatIsMissingOrWrong) {
   EXPECT_EQ(Ask({"map", "--png", Path("a.png"), "--mesh", "--exploded"}).code, 2);
   EXPECT_EQ(Ask({"map", "--png", Path("a.png"), "--beside", "example"}).code, 2);
   EXPECT_EQ(Ask({"map", "--png", Path("a.png"), "--mesh", "--beside", "nowhere"}).code, 1);
+  EXPECT_EQ(Ask({"map", "--png", Path("a.png"), "--bodies"}).code, 2) << "no instant";
+  EXPECT_EQ(Ask({"export", "--ply", Path("m.ply"), "--bodies"}).code, 2) << "no instant";
+  EXPECT_EQ(Ask({"export", "--graph-ply", Path("g.ply"), "--bodies"}).code, 2) << "no place";
+  const Outcome none = Ask({"export", "--gltf", Path("b.glb"), "--bodies"});
+  EXPECT_EQ(none.code, 0) << none.errors;
+  EXPECT_NE(none.errors.find("no agent has a body"), std::string::npos) << none.errors;
 }
 
 TEST_F(ExportVerbs, AFullDiskIsToldAndLeavesNoFile) {

@@ -7,6 +7,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "query/cli/export/gltf_bodies.h"
 #include "query/cli/export/gltf_scene.h"
 #include "tests/support/temp_folder.h"
 #include "tests/unit/query/cli/example_content.h"
@@ -153,6 +154,140 @@ TEST_F(GltfTest, KeepsNamesInAnyScriptAndSaysWhatNodesAre) {
   for (const char* name : {"mesh", "places", "rooms", "TRAVERSABLE", "CONTAINS", "ada track"}) {
     EXPECT_NE(glb.Find(name), nullptr) << name;
   }
+}
+
+// A tetrahedron about the agent, which is at `x`; taller with time.
+Body BodyOf(TimeNs time_ns, float x, const std::shared_ptr<const BodyFaces>& faces) {
+  Body body;
+  body.time_ns = time_ns;
+  body.map_T_agent.position = Eigen::Vector3d(static_cast<double>(x), 2.0, 1.0);
+  const float top = 1.0f + 0.5f * static_cast<float>(time_ns) / kNsPerSecond;
+  body.points_map = {{x, 2, 0}, {x + 1, 2, 0}, {x, 3, 0}, {x, 2, top}};
+  body.faces = faces;
+  return body;
+}
+
+// Bodies a second apart from 1 s on; one pose leads to the next if `gap_s` is at least 1.
+MapContent WithBodies(int count, double gap_s) {
+  MapContent content = test::ExampleContent();
+  content.spec.gap_ns_max = static_cast<TimeNs>(gap_s * kNsPerSecond);
+  const auto faces =
+      std::make_shared<const BodyFaces>(BodyFaces{{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}});
+  AgentBodies bodies{.agent = NodeId('H', 1), .rgb = 0x336699, .bodies = {}};
+  for (int i = 1; i <= count; ++i) {
+    bodies.bodies.push_back(BodyOf(i * kNsPerSecond, static_cast<float>(i), faces));
+  }
+  content.bodies = {bodies};
+  return content;
+}
+
+// Plays the animation: where the body is drawn at a time, or nothing where all are hidden.
+class Player {
+ public:
+  explicit Player(const Glb& glb) : glb_(glb) {}
+
+  std::vector<Eigen::Vector3f> PointsAt(float time_s) const {
+    std::vector<Eigen::Vector3f> shown;
+    for (size_t node = 0; node < glb_.json["nodes"].size(); ++node) {
+      if (!std::string(glb_.json["nodes"][node]["name"]).starts_with("ada body")) continue;
+      if (Sampled(node, "scale", time_s).front() < 0.5f) continue;
+      EXPECT_TRUE(shown.empty()) << "two bodies at " << time_s;
+      shown = PointsOf(node, time_s);
+    }
+    return shown;
+  }
+
+ private:
+  const Json& Accessor(const Json& index) const {
+    return glb_.json["accessors"][index.get<size_t>()];
+  }
+
+  // The value of a property; empty where it is not animated.
+  std::vector<float> Sampled(size_t node, const std::string& path, float time_s) const {
+    const Json& animation = glb_.json["animations"][0];
+    for (const Json& channel : animation["channels"]) {
+      if (channel["target"]["node"] != node || channel["target"]["path"] != path) continue;
+      const Json& sampler = animation["samplers"][channel["sampler"].get<size_t>()];
+      const auto times = glb_.Values<float>(Accessor(sampler["input"]));
+      const auto values = glb_.Values<float>(Accessor(sampler["output"]));
+      const size_t width = values.size() / times.size();
+      size_t after = 0;
+      while (after < times.size() && times[after] <= time_s) ++after;
+      const size_t before = after == 0 ? 0 : after - 1;
+      after = std::min(after, times.size() - 1);
+      const bool holds = sampler["interpolation"] == "STEP" || after == before;
+      const float part = holds ? 0.0f : (time_s - times[before]) / (times[after] - times[before]);
+      std::vector<float> value;
+      for (size_t i = 0; i < width; ++i) {
+        const float a = values[before * width + i];
+        value.push_back(a + part * (values[after * width + i] - a));
+      }
+      return value;
+    }
+    return {};
+  }
+
+  std::vector<Eigen::Vector3f> PointsOf(size_t node, float time_s) const {
+    const Json& json = glb_.json["nodes"][node];
+    const Json& mesh = glb_.json["meshes"][json["mesh"].get<size_t>()];
+    const Json& skin = mesh["primitives"][0];
+    auto numbers = glb_.Values<float>(Accessor(skin["attributes"]["POSITION"]));
+    const std::vector<float> weights = Sampled(node, "weights", time_s);
+    for (size_t target = 0; target < weights.size(); ++target) {
+      const auto moved = glb_.Values<float>(Accessor(skin["targets"][target]["POSITION"]));
+      for (size_t i = 0; i < numbers.size(); ++i) numbers[i] += weights[target] * moved[i];
+    }
+    auto place = Sampled(node, "translation", time_s);
+    if (place.empty()) place = json["translation"].get<std::vector<float>>();
+    std::vector<Eigen::Vector3f> points;
+    for (size_t i = 0; i < numbers.size(); i += 3) {
+      points.emplace_back(numbers[i] + place[0], numbers[i + 1] + place[1],
+                          numbers[i + 2] + place[2]);
+    }
+    return points;
+  }
+
+  const Glb& glb_;
+};
+
+TEST_F(GltfTest, LetsBodiesWalk) {
+  constexpr int kCount = 2 * static_cast<int>(kPosesPerNode) + 5;
+  const MapContent content = WithBodies(kCount, 1.0);
+  const Glb glb = Export(content);
+  const Player player(glb);
+  const std::vector<Body>& bodies = content.bodies[0].bodies;
+  for (size_t i = 0; i + 1 < bodies.size(); ++i) {
+    // On a pose, and half way to the next.
+    for (const float share : {0.0f, 0.5f}) {
+      const auto points = player.PointsAt(static_cast<float>(i) + share);
+      ASSERT_EQ(points.size(), 4U) << i;
+      for (size_t v = 0; v < points.size(); ++v) {
+        const Eigen::Vector3f due = bodies[i].points_map[v] +
+                                    share * (bodies[i + 1].points_map[v] - bodies[i].points_map[v]);
+        EXPECT_LT((points[v] - due).norm(), 1e-3f) << i << " " << share;
+      }
+    }
+  }
+  EXPECT_TRUE(player.PointsAt(static_cast<float>(kCount)).empty());
+  EXPECT_NE(glb.Find("ada body 3"), nullptr);
+  EXPECT_EQ(glb.Find("ada body 4"), nullptr);
+}
+
+TEST_F(GltfTest, ShowsNoBodyInAGapOfItsTrack) {
+  const Glb glb = Export(WithBodies(3, 0.5));
+  const Player player(glb);
+  EXPECT_EQ(player.PointsAt(1.0f).size(), 4U);
+  EXPECT_TRUE(player.PointsAt(1.6f).empty());
+}
+
+TEST_F(GltfTest, LetsOneBodyStand) {
+  const Glb glb = Export(WithBodies(1, 1.0));
+  EXPECT_FALSE(glb.json.contains("animations"));
+  const Json* body = glb.Find("ada body");
+  ASSERT_NE(body, nullptr);
+  EXPECT_EQ((*body)["translation"], Json({1.0, 2.0, 1.0}));
+  EXPECT_FALSE(body->contains("scale"));
+  EXPECT_FALSE(Export(test::ExampleContent()).json.contains("animations"));
 }
 
 TEST_F(GltfTest, TurnsTheMapsZUp) {

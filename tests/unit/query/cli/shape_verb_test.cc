@@ -131,6 +131,37 @@ TEST_F(ShapeVerbs, WriteTheFirstBodyAsPlyInTheFrameOfTheMap) {
   EXPECT_NEAR(second[1], 1.0f, 1e-3f);
 }
 
+TEST_F(ShapeVerbs, ShowTheBodyNearestToAnInstant) {
+  const std::string folder = folder_.path() + "/bodies";
+  for (const char* at : {"+0.6s", "+1.4s", "+1.5s"}) {
+    const Outcome outcome = Dsg({"ann", "--at", at, "--obj", folder, "--force", "--json"});
+    ASSERT_EQ(outcome.code, 0) << outcome.errors;
+    const Json files = Json::parse(outcome.out)["files"];
+    ASSERT_EQ(files.size(), 1u);
+    EXPECT_EQ(files[0]["path"], folder + "/H12_1000000000.obj") << at;
+  }
+  const Outcome list = Dsg({"ann", "--at", "+0.2s"});
+  ASSERT_EQ(list.code, 0) << list.errors;
+  EXPECT_NE(list.out.find("1 body shape of H12"), std::string::npos) << list.out;
+  const Outcome late = Dsg({"ann", "--at", "+9s", "--obj", folder});
+  EXPECT_EQ(late.code, 1);
+  EXPECT_NE(late.errors.find("within 1 s of --at +9s"), std::string::npos) << late.errors;
+  EXPECT_EQ(Dsg({"ann", "--at", "+1s", "--from", "+0s"}).code, 2);
+}
+
+TEST_F(ShapeVerbs, DrawBodiesAndSkeletons) {
+  const std::string path = folder_.path() + "/bodies.png";
+  const Outcome outcome = Dsg({"ann", "--png", path, "--width", "300", "--json"});
+  ASSERT_EQ(outcome.code, 0) << outcome.errors;
+  const Json file = Json::parse(outcome.out)["files"][0];
+  EXPECT_EQ(file["bodies"], "3");
+  EXPECT_EQ(file["columns"], "300");
+  EXPECT_EQ(ReadFile(path).substr(1, 3), "PNG");
+  EXPECT_EQ(Dsg({"ann", "--png", path}).code, 2) << "replaced without --force";
+  EXPECT_EQ(Dsg({"ann", "--png", path, "--ply", path, "--force"}).code, 2);
+  EXPECT_EQ(Dsg({"ann", "--from", "+3s", "--png", path, "--force"}).code, 1) << "has no pose";
+}
+
 TEST_F(ShapeVerbs, WriteAnObjABodyThatHasAPose) {
   const std::string folder = folder_.path() + "/bodies";
   const Outcome outcome = Dsg({"ann", "--obj", folder, "--json"});
