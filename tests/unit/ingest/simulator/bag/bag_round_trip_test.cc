@@ -184,6 +184,31 @@ TEST(BagRoundTrip, ReadsBackAsTheFolderDoes) {
   EXPECT_EQ(*log->info().body_topology, *bag->info().body_topology);
 }
 
+TEST(BagRoundTrip, RefusesBodiesThatTheFacesDoNotFitIfStrict) {
+  const dsg::test::TempFolder folder;
+  WriteLog(folder.path());
+  std::string line = Detection(kBeginNs, 1);
+  line.insert(line.find("\"joints\""), "\"vertices\":[0.5,1,2],");
+  test::WriteText(folder.path() + "/mav0/detections0/data.jsonl", line);
+  const std::string path = folder.path() + "/log.bag";
+  ASSERT_TRUE(WriteBag(folder.path(), path, nullptr).ok());
+  for (const bool is_strict : {false, true}) {
+    auto log =
+        ingest::OpenLog(path, {.is_strict = is_strict, .poses = ingest::PoseSource::kGroundTruth});
+    absl::Status status = log.status();
+    while (status.ok()) {
+      const auto next = (*log)->Next();
+      status = next.status();
+      if (status.ok() && !next->has_value()) break;
+    }
+    EXPECT_EQ(status.ok(), !is_strict) << status;
+    if (is_strict) {
+      EXPECT_NE(std::string(status.message()).find("1 vertices"), std::string::npos) << status;
+      EXPECT_NE(std::string(status.message()).find("/dsg/detections"), std::string::npos) << status;
+    }
+  }
+}
+
 TEST(BagRoundTrip, KeepsTheCalibrationOfTheCameras) {
   const dsg::test::TempFolder folder;
   WriteLog(folder.path());
