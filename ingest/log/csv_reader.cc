@@ -200,7 +200,9 @@ class RowReader {
     if (header_.Has(kKind)) {
       kind = Field(fields, kKind);
       if (!IsAgentKind(kind)) {
-        return at.FieldError("kind", kind, "\"human\" or \"robot\" is due; correct the line");
+        return at.FieldError(
+            "kind", kind,
+            "\"human\", \"robot\", \"vehicle\" or \"animal\" is due; correct the line");
       }
     }
     if (!header_.Has(kId)) return table_->FindOrAdd(RobotName(options_), kind);

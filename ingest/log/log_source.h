@@ -30,7 +30,7 @@ namespace dsg::ingest {
 struct PoseMeasurement {
   /// The name that the log gives; the same name is the same agent within a map.
   std::string agent_name;
-  /// kinds::kHuman or kinds::kRobot.
+  /// One of IsAgentKind.
   std::string agent_kind;
   TimedPose pose;
   /// Where it stood in the log, for messages: "obsmat.txt:17".

@@ -54,7 +54,8 @@ absl::StatusOr<int32_t> FindTracksAgent(const LinePosition& at, const LogOptions
                                         TrackTable* table) {
   if (name.empty()) return at.FieldError("agent", name, "a name is due; correct the line");
   if (!IsAgentKind(kind)) {
-    return at.FieldError("kind", kind, "\"human\" or \"robot\" is due; correct the line");
+    return at.FieldError(
+        "kind", kind, "\"human\", \"robot\", \"vehicle\" or \"animal\" is due; correct the line");
   }
   return table->FindOrAdd(options.agent_prefix + std::string(name), kind);
 }

@@ -42,6 +42,12 @@ void ReplaceEverywhere(const NewIds& new_ids, GraphDelta* delta) {
   for (Stay& stay : delta->stays) Replace(new_ids, &stay.agent);
 }
 
+char LetterOf(std::string_view kind) {
+  if (kind == kinds::kRobot) return 'r';
+  if (kind == kinds::kVehicle) return 'V';
+  return kind == kinds::kAnimal ? 'N' : 'H';
+}
+
 }  // namespace
 
 AgentNamer::AgentNamer(const std::vector<Node>& known) {
@@ -58,7 +64,7 @@ NodeId AgentNamer::AssignPreferring(NodeId preferred, std::string_view name,
   const auto known = id_of_.find(std::pair(std::string(name), std::string(kind)));
   if (known != id_of_.end()) return known->second;
   if (!preferred.empty() && !taken_.contains(preferred)) return Take(preferred, name, kind);
-  const char letter = kind == kinds::kRobot ? 'r' : 'H';
+  const char letter = LetterOf(kind);
   uint64_t index = 0;
   if (IsCanonicalIndex(name, &index) && !taken_.contains(NodeId(letter, index))) {
     return Take(NodeId(letter, index), name, kind);

@@ -46,7 +46,9 @@ Node DeltaBuilder::MakeNode(NodeId id, const PoseMeasurement& first) const {
   } else {
     node.box_node = {Eigen::Vector3d::Constant(-options_.robot_half_size_m),
                      Eigen::Vector3d::Constant(options_.robot_half_size_m)};
-    if (robot_model_.has_value()) SetRobotModel(*robot_model_, &node);
+    if (robot_model_.has_value() && first.agent_kind == kinds::kRobot) {
+      SetRobotModel(*robot_model_, &node);
+    }
   }
   return node;
 }

@@ -31,10 +31,11 @@ int64_t AttributeBytesOf(const ViewNode& node) {
 }  // namespace
 
 ViewParts::ViewParts(std::shared_ptr<SymbolTable> symbols)
-    : symbols_(std::move(symbols)),
-      contains_(symbols_->Intern(relations::kContains)),
-      human_(symbols_->Intern(kinds::kHuman)),
-      robot_(symbols_->Intern(kinds::kRobot)) {}
+    : symbols_(std::move(symbols)), contains_(symbols_->Intern(relations::kContains)) {
+  for (const kinds::Kind& kind : kinds::kAll) {
+    if (kind.is_agent) agents_.push_back(symbols_->Intern(kind.name));
+  }
+}
 
 ViewNode ViewParts::ToView(const Node& node) {
   ViewNode view;

@@ -2,6 +2,7 @@
 // The graph view that answers from indexes, and how one is made from another.
 #pragma once
 
+#include <algorithm>
 #include <map>
 #include <memory>
 #include <utility>
@@ -75,13 +76,15 @@ class ViewParts {
 
  private:
   void SetAttributes(const Attributes& attributes, ViewNode* view);
-  bool IsAgent(const ViewNode& node) const { return node.kind == human_ || node.kind == robot_; }
+  bool IsAgent(const ViewNode& node) const {
+    return std::find(agents_.begin(), agents_.end(), node.kind) != agents_.end();
+  }
   void CountNode(const ViewNode& node, int64_t change);
 
   std::shared_ptr<SymbolTable> symbols_;
   Symbol contains_;
-  Symbol human_;
-  Symbol robot_;
+  /// The kinds of agents.
+  std::vector<Symbol> agents_;
   std::vector<Layer> layers_;
   CowTree<NodeTraits> nodes_;
   CowTree<NameTraits> names_;

@@ -20,6 +20,9 @@ inline constexpr char kPlace[] = "place";
 inline constexpr char kStructure[] = "structure";
 inline constexpr char kRoom[] = "room";
 inline constexpr char kBuilding[] = "building";
+/// What drives or is pushed, and what walks: carts, bicycles, dogs. The class says which.
+inline constexpr char kVehicle[] = "vehicle";
+inline constexpr char kAnimal[] = "animal";
 
 struct Kind {
   std::string_view name;
@@ -34,14 +37,15 @@ inline constexpr Kind kAll[] = {
     {kObject, layers::kObjects},       {kHuman, layers::kAgents, true},
     {kRobot, layers::kAgents, true},   {kPlace, layers::kPlaces},
     {kStructure, layers::kStructures}, {kRoom, layers::kRooms},
-    {kBuilding, layers::kBuildings},
+    {kBuilding, layers::kBuildings},   {kVehicle, layers::kAgents, true},
+    {kAnimal, layers::kAgents, true},
 };
 
 /// nullptr for a custom kind.
 const Kind* Find(std::string_view name);
 }  // namespace kinds
 
-/// Humans and robots: the kinds that have a trajectory.
+/// Humans, robots, vehicles and animals: the kinds that have a trajectory.
 bool IsAgentKind(std::string_view kind);
 
 /// The layer that nodes of a known kind live in; nullopt for custom kinds.

@@ -350,6 +350,8 @@ void DrawLegend(const MapContent& content, double y, double x_end, picture::Canv
   add(kinds::kObject, "object", LayerColor(layers::kObjects));
   add(kinds::kRobot, "robot", ColorOfKind(content, kinds::kRobot));
   add(kinds::kHuman, "human", ColorOfKind(content, kinds::kHuman));
+  add(kinds::kVehicle, "vehicle", ColorOfKind(content, kinds::kVehicle));
+  add(kinds::kAnimal, "animal", ColorOfKind(content, kinds::kAnimal));
 }
 
 void DrawTitle(const std::string& title, picture::Canvas* canvas) {

@@ -20,6 +20,8 @@ TEST(AgentNamer, GivesANumberItsOwnIndex) {
   EXPECT_EQ(namer.Assign("12", kinds::kHuman), NodeId('H', 12));
   EXPECT_EQ(namer.Assign("0", kinds::kHuman), NodeId('H', 0));
   EXPECT_EQ(namer.Assign("12", kinds::kRobot), NodeId('r', 12));
+  EXPECT_EQ(namer.Assign("12", kinds::kVehicle), NodeId('V', 12));
+  EXPECT_EQ(namer.Assign("12", kinds::kAnimal), NodeId('N', 12));
   EXPECT_EQ(namer.Assign("12", kinds::kHuman), NodeId('H', 12));
 }
 

@@ -73,6 +73,21 @@ TEST_F(Locate, NamesPlaceRoomBuildingAndAllAncestorsNearestFirst) {
   EXPECT_EQ(reply->ancestor_ids(1), "B1");
 }
 
+TEST_F(Locate, KnowsACartAsWellAsAPerson) {
+  GraphDelta delta;
+  const NodeId cart('V', 1);
+  delta.nodes = {MakeNode(cart, layers::kAgents, kinds::kVehicle, "cart", Box3d())};
+  delta.nodes.back().agent.emplace();
+  delta.appends = {{cart, {PoseAt(0, 2, 5, 0), PoseAt(2 * kSecond, 4, 5, 0)}}};
+  delta.stays = {{cart, NodeId('p', 1), NodeId('R', 1), 0, kTimeMax}};
+  CommitToOffice(folder_.path(), delta);
+  const auto reply = Get(Ask("cart", kSecond));
+  ASSERT_TRUE(reply.ok()) << reply.status();
+  EXPECT_EQ(reply->quality(), v1::INTERPOLATED);
+  EXPECT_NEAR(reply->pose().position().x(), 3.0, 1e-12);
+  EXPECT_EQ(reply->building_id(), "B1");
+}
+
 TEST_F(Locate, LeavesOutARoomThatNeverWas) {
   GraphDelta delta;
   const NodeId room('R', 1);

@@ -11,12 +11,14 @@ namespace dsg {
 namespace {
 
 TEST(KnownNames, KindsKeepTheirPlaces) {
-  ASSERT_EQ(std::size(kinds::kAll), 7u);
+  ASSERT_EQ(std::size(kinds::kAll), 9u);
   EXPECT_EQ(kinds::Find("object"), &kinds::kAll[0]);
   EXPECT_EQ(kinds::Find("place"), &kinds::kAll[3]);
   EXPECT_EQ(kinds::Find("building"), &kinds::kAll[6]);
   EXPECT_EQ(kinds::Find(kAgentPoseKind), nullptr);
+  EXPECT_EQ(kinds::Find("animal"), &kinds::kAll[8]);
   EXPECT_TRUE(IsAgentKind("human"));
+  EXPECT_TRUE(IsAgentKind("vehicle"));
   EXPECT_FALSE(IsAgentKind("room"));
   EXPECT_EQ(LayerOfKind("structure"), layers::kStructures);
   EXPECT_FALSE(LayerOfKind("lamp").has_value());
