@@ -115,8 +115,8 @@ class Bodies(support.ProgramsTest):
     def test_the_evaluation_says_how_far_bodies_are_off(self):
         humans = json.loads(self.ok("dsg-eval", "--store", "store", "--map", "home", "--truth",
                                     "sim/truth", "--json"))["humans"]
-        self.assertGreater(humans["vertex_bodies"], 20)
-        self.assertEqual(humans["joint_bodies"], humans["vertex_bodies"])
+        self.assertGreater(humans["vertex_body_count"], 20)
+        self.assertEqual(humans["joint_body_count"], humans["vertex_body_count"])
         self.assertLess(humans["vertex_root_m"], 0.2)
         self.assertLess(humans["joint_root_m"], 0.2)
         self.assertLess(humans["vertex_m"], humans["tracked_m"] + humans["vertex_root_m"] + 0.1)
