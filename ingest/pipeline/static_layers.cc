@@ -441,11 +441,13 @@ void StaticLayers::RelateStructures(LayerParts* parts) const {
     const TrackedObject& object = parts->objects[i];
     const int place = parts->place_of_object[i];
     if (place < 0 || supported.contains(object.id)) continue;
-    const Box3d box = TransformBox(object.cluster.map_T_box,
-                                   Box3d(-0.5 * object.cluster.size, 0.5 * object.cluster.size));
+    const ObjectCluster& cluster = object.cluster;
+    const Box3d box =
+        TransformBox(cluster.map_T_box, Box3d(-0.5 * cluster.size, 0.5 * cluster.size));
     const double floor_z_m = parts->places.places[static_cast<size_t>(place)].floor_z_m;
     if (box.min().z() <= floor_z_m + options_.structures.hang_above_m) continue;
-    const std::optional<int> piece = AttachedTo(box, parts->structures, options_.structures);
+    const std::optional<int> piece =
+        AttachedTo(cluster.map_T_box, cluster.size, parts->structures, options_.structures);
     if (piece.has_value()) {
       parts->attached.push_back({static_cast<int>(i), *piece});
       continue;

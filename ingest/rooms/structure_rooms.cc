@@ -90,14 +90,18 @@ bool Bounds(const StructurePiece& piece, const FoundRoom& room, const StructureO
 
 // How far a thing is from the side of a piece on which things hang, metres; nullopt = it is not on
 // that side.
-std::optional<double> HangGap(const StructurePiece& piece, const Box3d& thing_map) {
+std::optional<double> HangGap(const StructurePiece& piece, const Pose3d& map_T_thing,
+                              const Eigen::Vector3d& size) {
+  const Box3d thing_map = TransformBox(map_T_thing, Box3d(-0.5 * size, 0.5 * size));
   if (piece.type == "pillar") return piece.box_map.exteriorDistance(thing_map);
   if (piece.type == "ceiling") {
     return std::abs(piece.box_map.center().z() - thing_map.max().z());
   }
   if (piece.type != "wall") return std::nullopt;
-  const double reach_m = piece.normal_map.cwiseAbs().dot(0.5 * thing_map.sizes());
-  const double middle_m = piece.normal_map.dot(thing_map.center()) + piece.offset_m;
+  // Of the box as it is turned: in a map that lies askew one along the axes is far too thick.
+  const Eigen::Vector3d normal_thing = map_T_thing.orientation.conjugate() * piece.normal_map;
+  const double reach_m = normal_thing.cwiseAbs().dot(0.5 * size);
+  const double middle_m = piece.normal_map.dot(map_T_thing.position) + piece.offset_m;
   if (middle_m < 0.0) return std::nullopt;
   // Before the wall, or sunk into it as far as a noisy box may be.
   return std::abs(middle_m - reach_m);
@@ -119,16 +123,17 @@ std::vector<std::pair<int, int>> EnclosesOf(const std::vector<StructurePiece>& p
   return pairs;
 }
 
-std::optional<int> AttachedTo(const Box3d& box_map, const std::vector<StructurePiece>& pieces,
+std::optional<int> AttachedTo(const Pose3d& map_T_box, const Eigen::Vector3d& size,
+                              const std::vector<StructurePiece>& pieces,
                               const StructureOptions& options) {
-  if (box_map.isEmpty()) return std::nullopt;
+  const Box3d box_map = TransformBox(map_T_box, Box3d(-0.5 * size, 0.5 * size));
   std::optional<int> best;
   double best_m = options.hang_gap_m;
   for (size_t i = 0; i < pieces.size(); ++i) {
     const StructurePiece& piece = pieces[i];
     if (piece.box_map.isEmpty()) continue;
     if (piece.box_map.exteriorDistance(box_map) >= options.hang_gap_m) continue;
-    const std::optional<double> gap_m = HangGap(piece, box_map);
+    const std::optional<double> gap_m = HangGap(piece, map_T_box, size);
     if (!gap_m.has_value() || *gap_m >= best_m) continue;
     best_m = *gap_m;
     best = static_cast<int>(i);

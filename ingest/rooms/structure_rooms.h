@@ -18,9 +18,11 @@ std::vector<std::pair<int, int>> EnclosesOf(const std::vector<StructurePiece>& p
                                             const std::vector<FoundRoom>& rooms,
                                             const StructureOptions& options);
 
-/// The wall, ceiling or pillar that a thing hangs on: nearest of those near its box.
+/// The wall, ceiling or pillar that a thing hangs on: nearest of those near its box, which has its
+/// middle at the origin of `map_T_box`.
 /// Requires: it stands neither on the floor nor on another thing.
-std::optional<int> AttachedTo(const Box3d& box_map, const std::vector<StructurePiece>& pieces,
+std::optional<int> AttachedTo(const Pose3d& map_T_box, const Eigen::Vector3d& size,
+                              const std::vector<StructurePiece>& pieces,
                               const StructureOptions& options);
 
 }  // namespace dsg::ingest

@@ -261,15 +261,35 @@ TEST(StructureRooms, AWallBoundsTheRoomItFaces) {
   EXPECT_EQ(of_second, 1);
 }
 
+std::optional<int> OfBox(const Box3d& box, const std::vector<StructurePiece>& pieces) {
+  return AttachedTo({box.center(), Eigen::Quaterniond::Identity()}, box.sizes(), pieces, {});
+}
+
 TEST(StructureRooms, AThingHangsOnTheWallThatItTouches) {
   const MeshBlock mesh = BoxRoom();
   const std::vector<StructurePiece> pieces = FindStructures({&mesh}, Classes(), {});
   const Box3d board(Eigen::Vector3d(1.0, 0.02, 0.9), Eigen::Vector3d(2.8, 0.06, 2.1));
-  const std::optional<int> wall = AttachedTo(board, pieces, {});
+  const std::optional<int> wall = OfBox(board, pieces);
   ASSERT_TRUE(wall.has_value());
   EXPECT_GT(pieces[static_cast<size_t>(*wall)].normal_map.y(), 0.99);
   const Box3d lamp(Eigen::Vector3d(2.0, 2.0, 1.5), Eigen::Vector3d(2.2, 2.2, 1.7));
-  EXPECT_FALSE(AttachedTo(lamp, pieces, {}).has_value());
+  EXPECT_FALSE(OfBox(lamp, pieces).has_value());
+}
+
+TEST(StructureRooms, APictureHangsOnAWallThatLiesAskew) {
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitZ()));
+  StructurePiece wall;
+  wall.type = "wall";
+  wall.normal_map = turn * Eigen::Vector3d::UnitY();
+  wall.box_map = TransformBox({Eigen::Vector3d::Zero(), turn},
+                              Box3d(Eigen::Vector3d(-3, -0.05, 0), Eigen::Vector3d(3, 0.05, 2.5)));
+  const Eigen::Vector3d size(1.2, 0.03, 0.8);
+  const auto piece_at = [&](double from_wall_m) {
+    const Eigen::Vector3d at = turn * Eigen::Vector3d(0.5, from_wall_m, 1.6);
+    return AttachedTo({at, turn}, size, {wall}, {});
+  };
+  EXPECT_EQ(piece_at(0.05), 0);
+  EXPECT_FALSE(piece_at(0.4).has_value());
 }
 
 TEST(StructureRooms, AThingHangsOnACeilingAndOnAPillarToo) {
@@ -283,11 +303,11 @@ TEST(StructureRooms, AThingHangsOnACeilingAndOnAPillarToo) {
   floor.type = "floor";
   const std::vector<StructurePiece> pieces = {floor, ceiling, pillar};
   const Box3d lamp(Eigen::Vector3d(1.0, 1.0, 2.1), Eigen::Vector3d(1.3, 1.3, 2.48));
-  EXPECT_EQ(AttachedTo(lamp, pieces, {}), 1);
+  EXPECT_EQ(OfBox(lamp, pieces), 1);
   const Box3d hanging_low(Eigen::Vector3d(1.0, 1.0, 1.8), Eigen::Vector3d(1.3, 1.3, 2.2));
-  EXPECT_FALSE(AttachedTo(hanging_low, pieces, {}).has_value());
+  EXPECT_FALSE(OfBox(hanging_low, pieces).has_value());
   const Box3d clock(Eigen::Vector3d(2.1, 1.95, 1.6), Eigen::Vector3d(2.3, 2.0, 1.8));
-  EXPECT_EQ(AttachedTo(clock, pieces, {}), 2);
+  EXPECT_EQ(OfBox(clock, pieces), 2);
 }
 
 }  // namespace
