@@ -328,6 +328,9 @@ absl::Status RunExport(Session* session, const ExportVerb& verb, std::ostream& o
   if (verb.with_bodies && answer.content.bodies.empty()) {
     session->notes() << "note: no agent has a body with faces and a pose then\n";
   }
+  if (!verb.node.empty() && CountMesh(answer.content.mesh).faces == 0) {
+    session->notes() << "note: the mesh has no triangles of " << Printable(verb.node) << "\n";
+  }
   Exporter exporter(answer.content, color, verb.force);
   if (!verb.ply.empty()) DSG_RETURN_IF_ERROR(exporter.WriteMesh(verb.ply));
   if (!verb.graph_ply.empty()) DSG_RETURN_IF_ERROR(exporter.WriteGraph(verb.graph_ply));
@@ -509,7 +512,8 @@ void AddMap(Grammar* grammar) {
   app->add_option("--beside", verb->beside,
                   "Another map: its mesh at the right, seen from the same place")
       ->needs(mesh);
-  app->add_flag("--bodies", verb->with_bodies, "People as bodies, as they are at --at");
+  app->add_flag("--bodies", verb->with_bodies, "People as bodies, as they are at --at")
+      ->excludes(mesh);
   app->add_option("--width", verb->width_px, "Width of the picture, pixels")
       ->check(Between(kTopViewWidthMin, kTopViewWidthMax))
       ->capture_default_str();

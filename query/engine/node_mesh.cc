@@ -73,13 +73,13 @@ absl::StatusOr<NodeMesh> NodeMesh::Of(const Node& node) {
 NodeMesh::NodeMesh(const Node& node) : node_(node) {
   if (node.object.has_value()) instance_id_ = node.object->mesh_instance_id;
   if (node.structure.has_value()) instance_id_ = node.structure->mesh_instance_id;
-  if (instance_id_ != 0) {
+  if (instance_id_ != 0 && node.box_node.isEmpty()) {
     const double far = std::numeric_limits<double>::max();
     bounds_map_ = Box3d(Eigen::Vector3d::Constant(-far), Eigen::Vector3d::Constant(far));
-  } else if (node.structure.has_value()) {
+  } else if (instance_id_ == 0 && node.structure.has_value()) {
     structure_ = FactsOf(node);
     bounds_map_ = Grown(structure_->box_map, kShellMarginM);
-  } else if (node.object.has_value()) {
+  } else if (instance_id_ != 0 || node.object.has_value()) {
     bounds_map_ = Grown(node.BoxMap(), kObjectMarginM);
   } else {
     bounds_map_ = Grown(RegionBounds(node), kShellMarginM);
@@ -87,7 +87,11 @@ NodeMesh::NodeMesh(const Node& node) : node_(node) {
 }
 
 bool NodeMesh::IsOfNode(const MeshBlock& block, const std::array<uint32_t, 3>& face) const {
-  if (instance_id_ != 0) return Agreed(block.instance_ids, face) == instance_id_;
+  if (instance_id_ != 0) {
+    // Two nodes may be pieces of what was one thing, and have its instance id both.
+    return Agreed(block.instance_ids, face) == instance_id_ &&
+           (node_.box_node.isEmpty() || node_.DistanceTo(CenterOf(block, face)) <= kObjectMarginM);
+  }
   const uint32_t label = Agreed(block.labels, face);
   if (structure_.has_value()) {
     const auto corner = [&](int i) {

@@ -15,7 +15,8 @@
 namespace dsg::query {
 
 /// The triangles of an object, a structure, a room or a region above rooms:
-/// - those whose corners all have the node's instance id, if it has one;
+/// - those whose corners all have the node's instance id, if it has one, in its box or within 5 cm
+///   of it: two pieces of a thing have one id;
 /// - of other structures those that lie on it, as for collision questions (LiesOn);
 /// - of other objects those with their middle in the box, 5 cm around it included, that are of no
 ///   other class;

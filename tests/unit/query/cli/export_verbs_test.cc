@@ -108,6 +108,7 @@ TEST_F(ExportVerbs, WritesTheMeshOfOneNode) {
         Ask({"export", "--ply", Path("m.ply"), "--node", room, "--force", "--json"});
     ASSERT_EQ(outcome.code, 0) << outcome.errors;
     EXPECT_EQ(Json::parse(outcome.out)["files"][0]["faces"], faces) << room;
+    EXPECT_EQ(outcome.errors.find("no triangles of R2") != std::string::npos, faces[0] == '0');
   }
   EXPECT_NE(Ask({"export", "--ply", Path("h.ply"), "--node", "H1"}).code, 0);
   EXPECT_EQ(Ask({"export", "--gltf", Path("a.glb"), "--node", "R1"}).code, 2);
