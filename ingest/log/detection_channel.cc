@@ -50,7 +50,14 @@ absl::Status ReadTopology(const std::string& path, const std::string& channel, L
                           LogInfo* info) {
   constexpr char kName[] = "topology.json";
   const std::filesystem::path beside = std::filesystem::path(path).parent_path() / kName;
-  if (!IsFile(beside)) return absl::OkStatus();
+  std::error_code error;
+  const auto type = std::filesystem::symlink_status(beside, error).type();
+  if (type == std::filesystem::file_type::not_found) return absl::OkStatus();
+  if (!IsFile(beside)) {
+    return MalformedFile(beside.string(),
+                         "is no regular file, nor a link to one; copy it again, or remove it if "
+                         "bodies have no faces");
+  }
   DSG_ASSIGN_OR_RETURN(const LogFile file, ReadLogFile(beside.string()));
   digest->Add(absl::StrCat(channel, "/", kName), file.bytes);
   DSG_ASSIGN_OR_RETURN(info->body_topology, ParseBodyTopology(file.path, file.bytes));

@@ -230,6 +230,11 @@ TEST_F(FolderLogTest, ReadsTheFacesOfBodies) {
   EXPECT_NE(log->info.content_sha256, without);
   Write("detections0/topology.json", "{\"vertex_count\":2,\"faces\":[[0,1,2]]}");
   ExpectMalformed({"topology.json", "face 0"});
+  // A link that a copy left behind leads nowhere: it is not as if there were none.
+  const std::string topology = folder_.Path("mav0/detections0/topology.json");
+  std::filesystem::remove(topology);
+  std::filesystem::create_symlink("nowhere", topology);
+  ExpectMalformed({"topology.json", "regular file"});
 }
 
 TEST_F(FolderLogTest, RefusesBodiesThatItsFacesDoNotFitIfStrict) {
