@@ -37,7 +37,7 @@ struct OverlayFlags {
   /// Empty = the first of kCameras that the log has.
   std::string camera;
   int64_t every = 10;
-  /// Instants, each the image nearest to it; instead of `every`.
+  /// Instants, each the first image at or after it; instead of `every`.
   std::vector<std::string> at;
   std::string robot;
   int64_t revision = 0;
@@ -101,6 +101,9 @@ absl::StatusOr<const CameraCalibration*> ChooseCamera(const LogInfo& info,
       {{"field", "--camera"}, {"value", asked}});
 }
 
+// An image that comes later than this after an instant does not show it.
+constexpr TimeNs kNearNs = kNsPerSecond;
+
 // Which images of a camera are drawn, in their order.
 class ImagePicks {
  public:
@@ -120,14 +123,17 @@ class ImagePicks {
     if (!is_timed_) return count_++ % every_ == 0;
     bool is_due = false;
     while (!waiting_.empty() && waiting_.front() <= image_ns) {
+      const bool is_near = image_ns - waiting_.front() <= kNearNs;
       waiting_.erase(waiting_.begin());
-      is_due = true;
+      is_due |= is_near;
+      missed_count_ += is_near ? 0 : 1;
     }
     return is_due;
   }
   /// No later image will be taken.
   bool IsDone() const { return is_timed_ && waiting_.empty(); }
-  size_t left_count() const { return waiting_.size(); }
+  /// Instants that no image was near.
+  size_t missed_count() const { return missed_count_ + waiting_.size(); }
 
  private:
   int64_t every_ = 1;
@@ -135,6 +141,7 @@ class ImagePicks {
   bool is_timed_ = false;
   /// Ascending.
   std::vector<TimeNs> waiting_;
+  size_t missed_count_ = 0;
 };
 
 // Draws the images of a log as they come.
@@ -173,12 +180,18 @@ class OverlayRun {
       progress.Update(count);
     }
     DSG_RETURN_IF_ERROR(finish());
-    late_count_ = picks.left_count();
+    missed_count_ = picks.missed_count();
     return absl::OkStatus();
   }
 
   /// Errors: OUT_OF_RANGE when nothing was drawn.
   absl::Status Tell() const {
+    if (drawn_count_ == 0 && lost_count_ == 0 && missed_count_ > 0) {
+      return absl::OutOfRangeError(
+          absl::StrCat(camera_.name, " of ", flags_.log, " has no image within a second after ",
+                       missed_count_, missed_count_ == 1 ? " time" : " times",
+                       " of --at; give times of the log, as \"+3s\" from the epoch of the map"));
+    }
     if (drawn_count_ == 0) {
       return absl::OutOfRangeError(absl::StrCat(
           "no image of ", camera_.name, " of ", flags_.log, " was drawn: of ", lost_count_,
@@ -193,8 +206,9 @@ class OverlayRun {
     if (lost_count_ > 0) {
       absl::StrAppend(&out, "left out where the robot was is not known: ", lost_count_, "\n");
     }
-    if (late_count_ > 0) {
-      absl::StrAppend(&out, "times of --at after the last image: ", late_count_, "\n");
+    if (missed_count_ > 0) {
+      absl::StrAppend(
+          &out, "times of --at without an image within a second after them: ", missed_count_, "\n");
     }
     std::fputs(out.c_str(), stdout);
     return absl::OkStatus();
@@ -238,7 +252,7 @@ class OverlayRun {
   const CameraCalibration& camera_;
   int64_t drawn_count_ = 0;
   int64_t lost_count_ = 0;
-  size_t late_count_ = 0;
+  size_t missed_count_ = 0;
 };
 
 absl::Status DrawOverlays(const OverlayFlags& flags) {

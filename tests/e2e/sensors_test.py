@@ -159,7 +159,7 @@ class Sensors(support.ProgramsTest):
         self.ok(*draw, "drawn", "--every", "5", "--force", "sim/log")
         self.refused(2, ["depth0", "cam0"], *draw, "x", "--camera", "depth0", "sim/log")
         self.refused(1, ["spot", "r0"], *draw, "x", "--robot", "spot", "sim/log")
-        self.refused(1, ["no image of cam0"], *draw, "x", "--at", "+9s", "sim/log")
+        self.refused(1, ["no image within a second"], *draw, "x", "--at", "+9s", "sim/log")
         self.refused(2, ["--trail", "nan"], *draw, "x", "--trail", "nan", "sim/log")
         self.refused(2, ["--at"], *draw, "x", "--at", "+1s", "--every", "5", "sim/log")
         # A log without images.
