@@ -2,6 +2,8 @@
 #include "ingest/pipeline/layer_graph.h"
 
 #include <algorithm>
+#include <set>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "ingest/rooms/room_class.h"
@@ -249,6 +251,26 @@ class LayerGraphMaker::Build {
     for (const auto& [a, b] : parts_.adjacent) {
       AddEdge(RoomId(a), relations::kAdjacent, RoomId(b), 1.0);
     }
+    for (const auto& [a, b] : JoinedOverStoreys()) {
+      AddEdge(RoomId(a), relations::kAdjacent, RoomId(b), 1.0);
+    }
+  }
+
+  // Rooms of two storeys whose places stairs, a ramp or a lift joins. Within a storey rooms are
+  // neighbours by their walls.
+  std::set<std::pair<int, int>> JoinedOverStoreys() const {
+    std::set<std::pair<int, int>> joined;
+    for (const PlaceLink& link : parts_.places.links) {
+      const int a = parts_.room_of_place[static_cast<size_t>(link.from)];
+      const int b = parts_.room_of_place[static_cast<size_t>(link.to)];
+      if (a < 0 || b < 0) continue;
+      if (parts_.rooms[static_cast<size_t>(a)].storey ==
+          parts_.rooms[static_cast<size_t>(b)].storey) {
+        continue;
+      }
+      joined.insert(std::minmax(a, b));
+    }
+    return joined;
   }
 
   static void SetClass(const std::map<std::string, double>& probabilities, Node* node) {

@@ -407,24 +407,8 @@ void StaticLayers::FindRoomsOf(const DistanceField& field, LayerParts* parts) {
     for (const int place : rooms[i].places) parts->room_of_place[place] = static_cast<int>(i);
     parts->rooms[i].room = std::move(rooms[i]);
   }
-  JoinStoreys(parts);
   RelateStructures(parts);
   ClassifyRooms(parts);
-}
-
-void StaticLayers::JoinStoreys(LayerParts* parts) {
-  std::set<std::pair<int, int>> joined;
-  for (const PlaceLink& link : parts->places.links) {
-    const int a = parts->room_of_place[static_cast<size_t>(link.from)];
-    const int b = parts->room_of_place[static_cast<size_t>(link.to)];
-    if (a < 0 || b < 0 ||
-        parts->rooms[static_cast<size_t>(a)].storey ==
-            parts->rooms[static_cast<size_t>(b)].storey) {
-      continue;
-    }
-    joined.insert(std::minmax(a, b));
-  }
-  for (const auto& [a, b] : joined) parts->adjacent.push_back({a, b});
 }
 
 void StaticLayers::RelateStructures(LayerParts* parts) const {

@@ -109,8 +109,6 @@ class StaticLayers {
   void FindPlacesOfObjects(const DistanceField& field, LayerParts* parts) const;
   std::vector<Storey> FindStoreys(const LayerParts& parts) const;
   void FindRoomsOf(const DistanceField& field, LayerParts* parts);
-  /// Rooms of two storeys are neighbours where stairs, a ramp or a lift joins their places.
-  static void JoinStoreys(LayerParts* parts);
   void RelateStructures(LayerParts* parts) const;
   void ClassifyRooms(LayerParts* parts) const;
 

@@ -33,21 +33,26 @@ absl::Status DrawToFile(Session* session, const PictureOptions& options,
     KeepFloor(floor, &top.overlay);
     absl::StrAppend(&top.title, "  floor ", options.floor);
   }
-  const picture::Picture drawn = DrawTopView(answer.content, top);
-  DSG_ASSIGN_OR_RETURN(const std::string png, picture::EncodePng(drawn));
-  DSG_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(options.png, options.force));
-  DSG_RETURN_IF_ERROR(file.Write(png));
-  DSG_RETURN_IF_ERROR(file.Commit());
+  DSG_ASSIGN_OR_RETURN(const Written written,
+                       WritePng(DrawTopView(answer.content, top), options.png, options.force));
   if (session->common().json) return absl::OkStatus();
-  TellWritten({{.format = "png",
-                .path = options.png,
-                .byte_count = file.byte_count(),
-                .counts = {{"columns", drawn.width}, {"rows", drawn.height}}}},
-              picture.revision, /*as_json=*/false, out);
+  TellWritten({written}, picture.revision, /*as_json=*/false, out);
   return absl::OkStatus();
 }
 
 }  // namespace
+
+absl::StatusOr<Written> WritePng(const picture::Picture& picture, const std::string& path,
+                                 bool force) {
+  DSG_ASSIGN_OR_RETURN(const std::string png, picture::EncodePng(picture));
+  DSG_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(path, force));
+  DSG_RETURN_IF_ERROR(file.Write(png));
+  DSG_RETURN_IF_ERROR(file.Commit());
+  return Written{.format = "png",
+                 .path = path,
+                 .byte_count = file.byte_count(),
+                 .counts = {{"columns", picture.width}, {"rows", picture.height}}};
+}
 
 absl::Status CheckPicture(const PictureOptions& options) {
   if (options.png.empty()) return absl::OkStatus();

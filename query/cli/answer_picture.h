@@ -9,10 +9,13 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "query/cli/arguments.h"
 #include "query/cli/export/overlay.h"
+#include "query/cli/json.h"
 #include "query/cli/session.h"
 #include "schema/base/time.h"
+#include "schema/picture/raster.h"
 
 namespace dsg::v1 {
 class Node;
@@ -29,6 +32,10 @@ struct AnswerPicture {
   std::optional<TimeNs> at_ns{};
   Overlay overlay{};
 };
+
+/// Writes a picture to a PNG file, and tells its columns and rows. Errors: of AtomicFile.
+absl::StatusOr<Written> WritePng(const picture::Picture& picture, const std::string& path,
+                                 bool force);
 
 /// Checks, before the question is asked, that the file of the picture can be created. OK without a
 /// picture. Errors: of AtomicFile::Create.

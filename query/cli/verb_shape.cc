@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
+#include "query/cli/answer_picture.h"
 #include "query/cli/export/body_view.h"
 #include "query/cli/export/mesh_file.h"
 #include "query/cli/export/top_view.h"
@@ -213,16 +214,8 @@ absl::Status DrawPicture(Session* session, const v1::GetAgentShapeRequest& reque
       session->times().Relative(bodies.back().time_ns), "  revision ", source.revision);
   const picture::Picture picture = DrawBodies(
       bodies, {.width_px = verb.width_px, .title = title, .gap_ns = session->map().gap_ns_max});
-  DSG_ASSIGN_OR_RETURN(const std::string png, picture::EncodePng(picture));
-  DSG_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(verb.png, verb.force));
-  DSG_RETURN_IF_ERROR(file.Write(png));
-  DSG_RETURN_IF_ERROR(file.Commit());
-  const Written written{.format = "png",
-                        .path = verb.png,
-                        .byte_count = file.byte_count(),
-                        .counts = {{"bodies", static_cast<int64_t>(bodies.size())},
-                                   {"columns", picture.width},
-                                   {"rows", picture.height}}};
+  DSG_ASSIGN_OR_RETURN(Written written, WritePng(picture, verb.png, verb.force));
+  written.counts.emplace(written.counts.begin(), "bodies", static_cast<int64_t>(bodies.size()));
   TellWritten({written}, source.revision, session->common().json, out);
   return absl::OkStatus();
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "query/cli/answer_picture.h"
 #include "query/cli/export/exploded_view.h"
 #include "query/cli/export/gltf_scene.h"
 #include "query/cli/export/map_content.h"
@@ -387,14 +388,7 @@ absl::Status RunMap(Session* session, const MapVerb& verb, std::ostream& out) {
   }
   DSG_ASSIGN_OR_RETURN(const picture::Picture picture,
                        DrawMap(session, verb, content, TitleOf(*session, answer, verb)));
-  DSG_ASSIGN_OR_RETURN(const std::string png, picture::EncodePng(picture));
-  DSG_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(verb.png, verb.force));
-  DSG_RETURN_IF_ERROR(file.Write(png));
-  DSG_RETURN_IF_ERROR(file.Commit());
-  const Written written{.format = "png",
-                        .path = verb.png,
-                        .byte_count = file.byte_count(),
-                        .counts = {{"columns", picture.width}, {"rows", picture.height}}};
+  DSG_ASSIGN_OR_RETURN(const Written written, WritePng(picture, verb.png, verb.force));
   TellWritten({written}, content.revision, session->common().json, out);
   return absl::OkStatus();
 }

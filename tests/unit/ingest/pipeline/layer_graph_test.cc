@@ -111,6 +111,24 @@ TEST(LayerGraph, TwoStoreysGetLevels) {
   EXPECT_EQ(Find(graph, NodeId('L', 0))->layer, kLevelLayer);
 }
 
+TEST(LayerGraph, StairsJoinTheRoomsOfTwoStoreys) {
+  const std::vector<CadModel> no_models;
+  LayerParts parts = TwoRoomParts();
+  parts.adjacent.clear();
+  parts.rooms[1].storey = 1;
+  parts.storeys = {{0.0, 2.5, true, {0}}, {3.0, 5.5, true, {1}}};
+  parts.places.places[1].kind = PlaceKind::kStairs;
+  const LayerGraphMaker maker({"s", 0}, kLayerLabels, no_models);
+  LayerGraph graph = maker.Make(parts);
+  EXPECT_NE(Find(graph, NodeId('R', 0), relations::kAdjacent, NodeId('R', 1)), nullptr);
+  EXPECT_EQ(Find(graph, NodeId('p', 11))->class_name, "stairs");
+  EXPECT_EQ(Find(graph, NodeId('p', 10))->class_name, "");
+  // Of one storey walls say who is whose neighbour.
+  parts.rooms[1].storey = 0;
+  graph = maker.Make(parts);
+  EXPECT_EQ(Find(graph, NodeId('R', 0), relations::kAdjacent, NodeId('R', 1)), nullptr);
+}
+
 TEST(LayerGraph, WhatLeftTheWorldStaysWithItsEnd) {
   const std::vector<CadModel> no_models;
   LayerParts parts = TwoRoomParts();
