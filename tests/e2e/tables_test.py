@@ -152,6 +152,15 @@ class SmallestRun(unittest.TestCase):
             self.assertNotIn("simulating", again.stderr)
             self.assertRegex(again.stdout, r"\| 2 \| true poses, masked \| - \[1\] \| \d+\.\d \|")
 
+    def test_the_task_script_takes_each_table_and_no_other_word(self):
+        for table in (*paper_tables.TABLES, "all", "tracks"):
+            with tempfile.TemporaryDirectory() as folder:
+                done = support.run(os.path.join(support.ROOT, "dev"), "tables", table, "--bin",
+                                   folder)
+                self.assertNotEqual(0, done.returncode)
+                self.assertIn('not "tracks"' if table == "tracks" else "there is no dsg-simulate",
+                              done.stderr)
+
     def test_a_failed_run_is_said_and_leaves_a_mark(self):
         with tempfile.TemporaryDirectory() as folder:
             log = os.path.join(folder, "log")
