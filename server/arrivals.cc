@@ -3,8 +3,9 @@
 
 #include <algorithm>
 #include <unordered_map>
+#include <utility>
 
-#include "grpc/grpc.h"
+#include "absl/status/status.h"
 
 namespace dsg::server {
 
@@ -13,29 +14,25 @@ Arrivals::Place::~Place() {
   if (is_listed_) arrivals_->places_.erase(at_);
 }
 
-std::unique_ptr<Arrivals::Place> Arrivals::Enter(grpc_call* call, const Connection* connection) {
-  std::unique_ptr<Place> place(new Place(this, call, connection));
-  grpc_call* ended = nullptr;
+std::unique_ptr<Arrivals::Place> Arrivals::Enter(EndCall end, const Connection* connection) {
+  std::unique_ptr<Place> place(new Place(this, std::move(end), connection));
+  EndCall ended;
   {
     std::lock_guard lock(mutex_);
     if (places_.size() >= count_max_) {
       Place* const longest = Longest();
       places_.erase(longest->at_);
       longest->is_listed_ = false;
-      // The end of the call takes the lock, so cancel it without; the reference keeps it alive.
-      ended = longest->call_;
-      grpc_call_ref(ended);
+      // The end of the call takes the lock, so end it without.
+      ended = std::move(longest->end_);
     }
     place->at_ = places_.insert(places_.end(), place.get());
     place->is_listed_ = true;
   }
-  if (ended != nullptr) {
-    grpc_call_cancel_with_status(ended, GRPC_STATUS_RESOURCE_EXHAUSTED,
-                                 "the server receives too many requests at once, and this is the "
-                                 "oldest of the connection with the most; send it again after a "
-                                 "pause",
-                                 nullptr);
-    grpc_call_unref(ended);
+  if (ended) {
+    ended(absl::ResourceExhaustedError(
+        "the server receives too many requests at once, and this is the oldest of the connection "
+        "with the most; send it again after a pause"));
   }
   return place;
 }

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// Requests that are being received. Their final size is unknown and gRPC buffers what has arrived
-// of each, so their number is bounded. At the bound, the connection with the most such requests
+// Requests that are being received. Their final size is unknown and what has arrived of each is
+// buffered, so their number is bounded. At the bound, the connection with the most such requests
 // loses its oldest.
 #pragma once
 
 #include <list>
 #include <memory>
 #include <mutex>
+#include <utility>
 
 #include "server/connections.h"
-
-struct grpc_call;
+#include "server/end_call.h"
 
 namespace dsg::server {
 
@@ -26,11 +26,11 @@ class Arrivals {
 
    private:
     friend class Arrivals;
-    Place(Arrivals* arrivals, grpc_call* call, const Connection* connection)
-        : arrivals_(arrivals), call_(call), connection_(connection) {}
+    Place(Arrivals* arrivals, EndCall end, const Connection* connection)
+        : arrivals_(arrivals), end_(std::move(end)), connection_(connection) {}
 
     Arrivals* const arrivals_;
-    grpc_call* const call_;
+    EndCall end_;
     const Connection* const connection_;
     // Position in the list, if it is listed; a cancelled request is not.
     std::list<Place*>::iterator at_;
@@ -39,9 +39,9 @@ class Arrivals {
 
   explicit Arrivals(int count_max) : count_max_(static_cast<size_t>(count_max)) {}
 
-  /// Counts a request. When there are too many, cancels another call with RESOURCE_EXHAUSTED.
-  /// `call` and `connection` must outlive the returned place.
-  std::unique_ptr<Place> Enter(grpc_call* call, const Connection* connection);
+  /// Counts the request of a call that `end` ends. When there are too many, ends another call with
+  /// RESOURCE_EXHAUSTED. `connection` must outlive the returned place.
+  std::unique_ptr<Place> Enter(EndCall end, const Connection* connection);
 
  private:
   // The oldest request of the connection that has the most. Requires: mutex_ held, and a request.

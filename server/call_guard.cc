@@ -4,10 +4,8 @@
 #include <algorithm>
 #include <atomic>
 #include <mutex>
-#include <string>
 
 #include "absl/strings/str_cat.h"
-#include "grpc/grpc.h"
 
 namespace dsg::server {
 
@@ -32,8 +30,8 @@ struct CallGuard::Watched : std::enable_shared_from_this<Watched> {
   std::atomic<Clock::rep> write_began{kNoWrite};
   std::atomic<Verdict> verdict{Verdict::kNone};
   std::mutex mutex;
-  // These are guarded by the mutex. Null once the place has gone, and the call maybe with it.
-  grpc_call* call = nullptr;
+  // These are guarded by the mutex. Empty once the place has gone, and the call maybe with it.
+  EndCall end;
   Timer::Handle alarm;
 };
 
@@ -50,7 +48,7 @@ void CallGuard::Watched::LookAgain(Clock::time_point now, Clock::time_point due)
 
 void CallGuard::Watched::Look() {
   std::unique_lock lock(mutex);
-  if (call == nullptr) return;
+  if (!end) return;
   const auto now = Clock::now();
   const auto stall_end = StallEnd();
   if (const auto due = std::min(deadline, stall_end); due > now) {
@@ -59,14 +57,10 @@ void CallGuard::Watched::Look() {
   }
   verdict = deadline <= now ? Verdict::kDeadline : Verdict::kStall;
   const absl::Status reason = Reason();
-  // Cancelling a call may run OnDone of its reactor in this thread, and with it the destructor of
-  // its place, which takes the lock. The reference keeps the call alive until then.
-  grpc_call* const ended = call;
-  grpc_call_ref(ended);
+  // Ending a call may run the destructor of its place in this thread, which takes the lock.
+  const EndCall taken = std::exchange(end, nullptr);
   lock.unlock();
-  grpc_call_cancel_with_status(ended, static_cast<grpc_status_code>(reason.code()),
-                               std::string(reason.message()).c_str(), nullptr);
-  grpc_call_unref(ended);
+  taken(reason);
 }
 
 absl::Status CallGuard::Watched::Reason() const {
@@ -85,21 +79,23 @@ absl::Status CallGuard::Watched::Reason() const {
       " ms; ask again from where it ended, and read what is sent at once or ask for less"));
 }
 
-std::unique_ptr<CallGuard::Place> CallGuard::Guard(grpc_call* call, Clock::time_point deadline) {
+std::unique_ptr<CallGuard::Place> CallGuard::Guard(EndCall end, Clock::time_point deadline) {
   auto watched = std::make_shared<Watched>(timer_, stall_max_, deadline);
   {
     std::lock_guard lock(watched->mutex);
-    watched->call = call;
+    watched->end = std::move(end);
     watched->LookAgain(Clock::now(), deadline);
   }
   return std::unique_ptr<Place>(new Place(std::move(watched)));
 }
 
 CallGuard::Place::~Place() {
+  // What it holds is freed after the lock.
+  EndCall dropped;
   Timer::Handle alarm;
   {
     std::lock_guard lock(watched_->mutex);
-    watched_->call = nullptr;
+    dropped = std::exchange(watched_->end, nullptr);
     alarm = watched_->alarm;
   }
   watched_->timer->Cancel(alarm);

@@ -9,9 +9,8 @@
 #include <utility>
 
 #include "absl/status/status.h"
+#include "server/end_call.h"
 #include "server/timer.h"
-
-struct grpc_call;
 
 namespace dsg::server {
 
@@ -25,7 +24,7 @@ class CallGuard {
  public:
   using Clock = Timer::Clock;
 
-  /// Guards a call from its begin until OnDone.
+  /// Guards a call from its begin until it is over.
   ///
   /// Threads: one at a time; verdict is safe from any.
   class Place {
@@ -35,7 +34,7 @@ class CallGuard {
     Place(const Place&) = delete;
     Place& operator=(const Place&) = delete;
 
-    /// To be called when a message is handed to gRPC and when the reader has taken it.
+    /// To be called when a message is handed over to be sent and when the reader has taken it.
     void BeginWrite();
     void EndWrite();
     /// Why the guard ended the call: DEADLINE_EXCEEDED, or RESOURCE_EXHAUSTED for a reader that
@@ -55,8 +54,8 @@ class CallGuard {
   CallGuard(const CallGuard&) = delete;
   CallGuard& operator=(const CallGuard&) = delete;
 
-  /// Begins to guard `call`, which must outlive the returned place.
-  std::unique_ptr<Place> Guard(grpc_call* call, Clock::time_point deadline);
+  /// Begins to guard a call that `end` ends; it is called at most once, without a lock.
+  std::unique_ptr<Place> Guard(EndCall end, Clock::time_point deadline);
 
  private:
   Timer* const timer_;

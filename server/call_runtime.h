@@ -52,6 +52,8 @@ struct CallRuntime {
 absl::Status OverloadedError(std::string_view why);
 /// RESOURCE_EXHAUSTED/OVERLOADED for a watch above the limit.
 absl::Status TooManyWatchesError(int watch_max);
+/// UNIMPLEMENTED: no method has this path.
+absl::Status UnknownMethodError(std::string_view path);
 /// UNAVAILABLE/SHUTTING_DOWN.
 absl::Status ShuttingDownError();
 

@@ -22,7 +22,7 @@ uint64_t CookieOf(int fd) {
 
 }  // namespace
 
-bool Connections::Add(int fd, const std::string& peer) {
+std::shared_ptr<Connection> Connections::Add(int fd, const std::string& peer) {
   auto connection = std::make_shared<Connection>();
   connection->fd = fd;
   connection->cookie = CookieOf(fd);
@@ -36,9 +36,9 @@ bool Connections::Add(int fd, const std::string& peer) {
         {{"open", absl::StrCat(by_fd_.size())}, {"peer", peer}});
   }
   full_ = is_full;
-  if (is_full) return false;
-  by_fd_.emplace(fd, std::move(connection));
-  return true;
+  if (is_full) return nullptr;
+  by_fd_.emplace(fd, connection);
+  return connection;
 }
 
 void Connections::Sweep() {

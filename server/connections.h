@@ -16,7 +16,7 @@ namespace dsg::server {
 
 /// One connection, from its accept until its last call has ended.
 struct Connection {
-  /// Owned by gRPC; valid while a call of the connection exists.
+  /// Owned by gRPC, whose is valid while a call of the connection exists, or by the HTTP port.
   int fd = -1;
   /// Distinguishes the socket from a later one with the same descriptor number.
   uint64_t cookie = 0;
@@ -58,8 +58,8 @@ class Connections {
  public:
   explicit Connections(const ConnectionLimits& limits) : limits_(limits) {}
 
-  /// Registers an accepted socket before gRPC gets it. False when there are too many.
-  [[nodiscard]] bool Add(int fd, const std::string& peer);
+  /// Registers an accepted socket before it is used. nullptr when there are too many.
+  [[nodiscard]] std::shared_ptr<Connection> Add(int fd, const std::string& peer);
   /// The connection of a call; `name` is the peer name that gRPC gives.
   std::shared_ptr<Connection> Find(const std::string& name);
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// dsg-server: serves the maps of one store folder over gRPC until SIGTERM or SIGINT.
+// dsg-server: serves the maps of one store folder over gRPC, and HTTP if asked to, until SIGTERM or
+// SIGINT.
 // Exits with 0 after an orderly stop, 2 if it could not start, 3 if it could not stop in time.
 #include <signal.h>
 #include <sys/resource.h>
@@ -90,6 +91,16 @@ void DeclareFlags(CLI::App* app, Flags* flags) {
       ->capture_default_str();
   app->add_flag("--allow-remote", flags->options.allow_remote,
                 "Listen on addresses that other machines reach; callers are not authenticated");
+  app->add_option("--http", flags->options.http.listen,
+                  "Answer over HTTP too: HOST:PORT or unix:PATH (docs/operations.md)");
+  app->add_option("--http-host", flags->options.http.hosts,
+                  "Another name that HTTP clients call this server by, such as that of a proxy; "
+                  "may be repeated")
+      ->type_name("NAME[:PORT]")
+      ->allow_extra_args(false);
+  app->add_flag("--http-write", flags->options.http.may_write, "Let HTTP clients change maps, too");
+  app->add_flag("--http-no-token", flags->options.http.without_token,
+                "Answer HTTP clients without a token: every user of this machine reads every map");
   app->set_version_flag("--version", DSG_VERSION);
 }
 
@@ -192,6 +203,9 @@ int Serve(Flags flags) {
   if (policies->has_value()) pruning.emplace(kept_core, **std::move(policies));
   std::printf("dsg-server: listening on %s, store %s%s, %zu maps\n", (*server)->address().c_str(),
               flags.store.c_str(), is_new ? " (new: it did not exist)" : "", maps->size());
+  if (const std::string url = (*server)->http_url(); !url.empty()) {
+    std::printf("dsg-server: HTTP on %s\n", url.c_str());
+  }
   std::fflush(stdout);
 
   int received = 0;
@@ -210,7 +224,8 @@ int Serve(Flags flags) {
 
 int main(int argc, char** argv) {
   Flags flags;
-  CLI::App app("Serves the maps of a store folder over gRPC.", "dsg-server");
+  CLI::App app("Serves the maps of a store folder over gRPC, and over HTTP if asked to.",
+               "dsg-server");
   try {
     DeclareFlags(&app, &flags);
     app.parse(argc, argv);

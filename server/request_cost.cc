@@ -9,8 +9,6 @@
 #include <algorithm>
 #include <string>
 
-#include "grpcpp/support/proto_buffer_reader.h"
-
 namespace dsg::server {
 namespace {
 
@@ -194,10 +192,8 @@ RequestCost::Field RequestCost::FieldOf(const pb::FieldDescriptor& field) {
   return {kind, bytes, nullptr};
 }
 
-size_t RequestCost::Bytes(grpc::ByteBuffer* wire, size_t bytes_max) const {
-  grpc::ProtoBufferReader reader(wire);
-  if (!reader.status().ok()) return kArenaBytes;
-  pb::io::CodedInputStream input(&reader);
+size_t RequestCost::Bytes(pb::io::ZeroCopyInputStream* wire, size_t bytes_max) const {
+  pb::io::CodedInputStream input(wire);
   Count count(&input, bytes_max);
   count.Walk(request_, 0);
   return count.bytes();

@@ -9,13 +9,12 @@
 #include <map>
 #include <vector>
 
-#include "grpcpp/support/byte_buffer.h"
-
 namespace google::protobuf {
 class Descriptor;
 class FieldDescriptor;
 namespace io {
 class CodedInputStream;
+class ZeroCopyInputStream;
 }  // namespace io
 }  // namespace google::protobuf
 
@@ -30,11 +29,12 @@ class RequestCost {
   RequestCost(const RequestCost&) = delete;
   RequestCost& operator=(const RequestCost&) = delete;
 
-  /// At least the bytes that parsing `wire` on an arena allocates, and rarely twice as many.
+  /// At least the bytes that parsing `wire`, which is read to its end, on an arena allocates, and
+  /// rarely twice as many.
   /// Counting stops above `bytes_max`, and where the bytes are malformed, as parsing will.
   ///
   /// Cost: linear in the bytes, about the time to parse them.
-  size_t Bytes(grpc::ByteBuffer* wire, size_t bytes_max) const;
+  size_t Bytes(google::protobuf::io::ZeroCopyInputStream* wire, size_t bytes_max) const;
 
  private:
   enum class Kind : uint8_t { kUnknown, kVarint, kFixed32, kFixed64, kText, kMessage };

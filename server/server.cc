@@ -5,29 +5,23 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <functional>
 #include <memory>
 #include <string>
 #include <thread>
-#include <unordered_map>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "dsg/v1/ingest_service.pb.h"
-#include "dsg/v1/maintenance_service.pb.h"
-#include "dsg/v1/map_service.pb.h"
-#include "dsg/v1/query_service.pb.h"
 #include "grpcpp/ext/health_check_service_server_builder_option.h"
 #include "grpcpp/generic/async_generic_service.h"
 #include "grpcpp/grpcpp.h"
 #include "grpcpp/server_posix.h"
-#include "query/api/api.h"
-#include "schema/base/check.h"
 #include "schema/base/status.h"
 #include "server/call_runtime.h"
+#include "server/grpc_call.h"
+#include "server/http/http_port.h"
 #include "server/listen.h"
-#include "server/stream_call.h"
-#include "server/unary_call_internal.h"
+#include "server/method_table.h"
+#include "server/status_mapping.h"
 
 namespace dsg::server {
 namespace {
@@ -73,6 +67,15 @@ absl::Status CheckRange(const std::string& option, int value, int min, int max) 
                    {{"field", option}, {"value", absl::StrCat(value)}});
 }
 
+absl::Status CheckHttp(const HttpOptions& http) {
+  const bool has_more = !http.hosts.empty() || http.may_write || http.without_token;
+  if (!http.listen.empty() || !has_more) return absl::OkStatus();
+  return MakeError(Reason::kFieldInvalid,
+                   "there are options of the HTTP port, but no HTTP port; give its address by "
+                   "--http, or leave them out",
+                   {{"field", "http"}, {"value", ""}});
+}
+
 // Half of the descriptors are left for the files of maps and for gRPC.
 int ConnectionMax(int asked) {
   rlimit limit{};
@@ -90,70 +93,26 @@ ConnectionLimits LimitsOfConnections(const ServerOptions& options) {
 
 class UnknownMethod final : public grpc::ServerGenericBidiReactor {
  public:
-  explicit UnknownMethod(const std::string& path) {
-    Finish(grpc::Status(grpc::StatusCode::UNIMPLEMENTED,
-                        absl::StrCat("no method ", path, "; see proto/dsg/v1")));
-  }
+  explicit UnknownMethod(const std::string& path) { Finish(ToGrpc(UnknownMethodError(path))); }
   void OnDone() override { delete this; }
 };
 
-// The methods of dsg.v1 as gRPC sees them: each path begins a call. gRPC hands over bytes instead
-// of messages, so that a request is charged for before it is parsed.
-class Services final : public grpc::CallbackGenericService {
+// The methods as gRPC sees them: each path begins a call. gRPC hands over bytes instead of
+// messages, so that a request is charged for before it is parsed.
+class GrpcService final : public grpc::CallbackGenericService {
  public:
-  using Context = grpc::GenericCallbackServerContext;
+  /// `methods` must outlive the service and all calls.
+  explicit GrpcService(const MethodTable* methods) : methods_(methods) {}
 
-  /// `questions` serves the methods that read, `commits` those that write and may wait for the
-  /// disk. Both must outlive the service and all calls.
-  Services(CallRuntime* questions, CallRuntime* commits) {
-    query::ForEachMethod([&](const query::MethodInfo& info, auto ask) {
-      // Maintenance shares the workers of commits: it writes too and may wait for commits.
-      Add(info, ask, info.writes ? commits : questions);
-    });
-  }
-
-  grpc::ServerGenericBidiReactor* CreateReactor(Context* context) override {
-    const auto found = methods_.find(context->method());
-    if (found == methods_.end()) return new UnknownMethod(context->method());
-    return found->second.begin(context);
+  grpc::ServerGenericBidiReactor* CreateReactor(
+      grpc::GenericCallbackServerContext* context) override {
+    const Method* const method = methods_->Find(context->method());
+    if (method == nullptr) return new UnknownMethod(context->method());
+    return new GrpcCall(method, context);
   }
 
  private:
-  struct Entry {
-    std::unique_ptr<Method> method;
-    std::function<grpc::ServerGenericBidiReactor*(Context*)> begin;
-  };
-
-  template <typename Request, typename Reply>
-  void Add(const query::MethodInfo& info, AskUnary<Request, Reply> ask, CallRuntime* runtime) {
-    Add(std::make_unique<Method>(info, Request::descriptor()),
-        [=](const Method* method, Context* context) {
-          return new UnaryCall<Request, Reply>(runtime, method, ask, context);
-        });
-  }
-
-  template <typename Request, typename Reply>
-  void Add(const query::MethodInfo& info, OpenStream<Request, Reply> open, CallRuntime* runtime) {
-    Add(std::make_unique<Method>(info, Request::descriptor()),
-        [=](const Method* method, Context* context) {
-          return new StreamCall<Request, Reply>(runtime, method, open, context);
-        });
-  }
-
-  // `begin` gets the method, whose address is stable.
-  template <typename Begin>
-  void Add(std::unique_ptr<Method> method, const Begin& begin) {
-    const Method* const kept = method.get();
-    std::string path = absl::StrCat("/dsg.v1.", std::string(kept->info.service), "/",
-                                    std::string(kept->info.name));
-    Entry entry{std::move(method),
-                [begin, kept](Context* context) { return begin(kept, context); }};
-    const bool is_new = methods_.emplace(std::move(path), std::move(entry)).second;
-    DSG_CHECK(is_new);
-  }
-
-  // By path: "/dsg.v1.MapService/ListMaps".
-  std::unordered_map<std::string, Entry> methods_;
+  const MethodTable* const methods_;
 };
 
 class RunningServer final : public Server {
@@ -168,7 +127,8 @@ class RunningServer final : public Server {
         connections_(LimitsOfConnections(options)),
         arrivals_(kArrivalsMax),
         memory_(options.call_memory_bytes),
-        services_(&questions_, &commits_) {
+        methods_(&questions_, &commits_),
+        grpc_service_(&methods_) {
     Prepare(options, &workers_, &questions_);
     Prepare(options, &commit_workers_, &commits_);
   }
@@ -182,26 +142,33 @@ class RunningServer final : public Server {
       DSG_ASSIGN_OR_RETURN(claim_, UnixSocketClaim::Take(address.socket_path));
     }
     DSG_ASSIGN_OR_RETURN(acceptor_, Acceptor::Listen(address));
+    if (!options.http.listen.empty()) {
+      DSG_ASSIGN_OR_RETURN(
+          http_port_, HttpPort::Listen(options.http, options.allow_remote, options.reader_stall_max,
+                                       &methods_, &questions_));
+    }
     grpc::EnableDefaultHealthCheckService(true);
     grpc::ServerBuilder builder;
     SetLimits(&builder);
-    builder.RegisterCallbackGenericService(&services_);
+    builder.RegisterCallbackGenericService(&grpc_service_);
     grpc_server_ = builder.BuildAndStart();
     if (grpc_server_ == nullptr) {
       return absl::InternalError("gRPC did not start; see its log");
     }
     acceptor_->Start([this](int fd, const std::string& peer) {
-      if (connections_.Add(fd, peer)) {
+      if (connections_.Add(fd, peer) != nullptr) {
         grpc::AddInsecureChannelFromFd(grpc_server_.get(), fd);
       } else {
         close(fd);
       }
     });
     address_ = acceptor_->address().ToString();
+    if (http_port_ != nullptr) http_port_->Start();
     return absl::OkStatus();
   }
 
   const std::string& address() const override { return address_; }
+  std::string http_url() const override { return http_port_ == nullptr ? "" : http_port_->url(); }
 
   ServerLoad Load() const override {
     const auto [running_count, queued_count] = workers_.Load();
@@ -216,9 +183,11 @@ class RunningServer final : public Server {
       questions_.stopping = true;
       commits_.stopping = true;
       delays_.HurryAll();
+      if (http_port_ != nullptr) http_port_->BeginShutdown(grace);
       // Waits for every call. Calls that run past the grace are cancelled and then finish.
       grpc_server_->Shutdown(std::chrono::system_clock::now() + grace);
       grpc_server_->Wait();
+      http_port_ = nullptr;
       // The timer may still hold a call that the guard has just ended.
       timer_.Stop();
       grpc_server_ = nullptr;
@@ -259,7 +228,9 @@ class RunningServer final : public Server {
   ArenaBlocks blocks_;
   CallRuntime questions_;
   CallRuntime commits_;
-  Services services_;
+  MethodTable methods_;
+  GrpcService grpc_service_;
+  std::unique_ptr<HttpPort> http_port_;
   std::unique_ptr<Acceptor> acceptor_;
   std::string address_;
   std::unique_ptr<grpc::Server> grpc_server_;
@@ -285,6 +256,11 @@ absl::Status TooManyWatchesError(int watch_max) {
                    {{"watches", absl::StrCat(watch_max)}});
 }
 
+absl::Status UnknownMethodError(std::string_view path) {
+  return absl::UnimplementedError(
+      absl::StrCat("no method ", CutText(path, kMessageBytesMax / 2), "; see proto/dsg/v1"));
+}
+
 absl::Status ShuttingDownError() {
   return MakeError(Reason::kShuttingDown,
                    "the server is stopping; call again when it is back: resume a watch from the "
@@ -292,6 +268,7 @@ absl::Status ShuttingDownError() {
 }
 
 absl::Status ServerOptions::Validate() const {
+  DSG_RETURN_IF_ERROR(CheckHttp(http));
   DSG_RETURN_IF_ERROR(CheckRange("workers", worker_count, 0, 256));
   DSG_RETURN_IF_ERROR(CheckRange("max-in-flight", in_flight_max, 1, 65536));
   DSG_RETURN_IF_ERROR(CheckRange("max-streams", open_stream_max, 1, 65536));

@@ -8,6 +8,7 @@
 
 #include "absl/status/statusor.h"
 #include "query/service/service_core.h"
+#include "server/http/http_options.h"
 
 namespace dsg::server {
 
@@ -36,6 +37,8 @@ struct ServerOptions {
   bool allow_remote = false;
   /// A log line for every call, not only for errors and slow ones.
   bool log_all_calls = false;
+  /// The HTTP port beside gRPC; off unless it has an address.
+  HttpOptions http;
 
   /// Errors: FIELD_INVALID outside of these ranges: workers 0 to 256; calls, streams and
   /// connections 1 to 65536; watches 0 to 65536; memory from 16 MiB; stall 1 ms to 1 h.
@@ -57,8 +60,9 @@ class Server {
  public:
   /// Starts a server, which listens when this returns.
   ///
-  /// Errors: those of ServerOptions::Validate, ParseListenAddress and UnixSocketClaim::Take;
-  /// UNAVAILABLE with the address and the system's reason when the server cannot listen there.
+  /// Errors: those of ServerOptions::Validate, ParseListenAddress, UnixSocketClaim::Take and
+  /// HttpPort::Listen; UNAVAILABLE with the address and the system's reason when the server cannot
+  /// listen there.
   static absl::StatusOr<std::unique_ptr<Server>> Start(std::unique_ptr<query::ServiceCore> core,
                                                        const ServerOptions& options);
 
@@ -67,6 +71,9 @@ class Server {
 
   /// The address that clients dial, with the actual port.
   virtual const std::string& address() const = 0;
+
+  /// What to open over HTTP, with the token; empty if the server has no HTTP port.
+  virtual std::string http_url() const = 0;
 
   virtual ServerLoad Load() const = 0;
 

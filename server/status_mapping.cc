@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
 #include "dsg/v1/errors.pb.h"
+#include "grpcpp/support/status.h"
 #include "schema/base/status.h"
 #include "schema/base/utf8.h"
 

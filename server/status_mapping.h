@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Turns a Status into what a gRPC caller gets: the code (absl and gRPC use the same numbers), the
-// message, and a trailer with the reason and its metadata. All of it fits the size that a gRPC peer
+// Turns a Status into what a caller gets: the code (absl and gRPC use the same numbers), the
+// message, and a detail with the reason and its metadata. All of it fits the size that a gRPC peer
 // accepts.
 #pragma once
 
@@ -8,8 +8,10 @@
 #include <string_view>
 
 #include "absl/status/status.h"
-#include "grpcpp/support/status.h"
-#include "schema/codec/status_decode.h"
+
+namespace grpc {
+class Status;
+}  // namespace grpc
 
 namespace dsg::server {
 
@@ -23,7 +25,7 @@ grpc::Status ToGrpc(const absl::Status& status);
 /// the server keeps its maps. `folder` is absolute; an empty one changes nothing.
 absl::Status HideFolder(const absl::Status& status, std::string_view folder);
 
-/// The bytes for kErrorTrailer; empty when the error has no reason.
+/// A serialized dsg.v1.ErrorDetail; empty when the error has no reason.
 std::string EncodeErrorDetail(const absl::Status& status);
 
 /// At most `bytes_max` bytes of `text`, in whole characters. Each byte that is not part of valid

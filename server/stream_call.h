@@ -9,8 +9,7 @@
 #include <utility>
 
 #include "schema/base/status.h"
-#include "server/call_deadline.h"
-#include "server/incoming_call.h"
+#include "server/served_call.h"
 
 namespace dsg::server {
 
@@ -19,31 +18,37 @@ template <typename Request, typename Reply>
 using OpenStream = query::CursorOr<Reply> (query::Api::*)(const query::CallContext&,
                                                           const Request&);
 
-// Run, the delay queue and OnWriteDone alternate, so that at most one message is in flight and
+// Run, the delay queue and OnSent alternate, so that at most one message is in flight and
 // Finish is called once.
 template <typename Request, typename Reply>
-class StreamCall final : public IncomingCall {
+class StreamCall final : public ServedCall {
  public:
-  StreamCall(CallRuntime* runtime, const Method* method, OpenStream<Request, Reply> open,
-             grpc::GenericCallbackServerContext* context)
-      : IncomingCall(runtime, method, context,
-                     method->info.lifetime == query::Lifetime::kAnswer
-                         ? BoundDeadline(context->deadline())
-                         : WatchDeadline(context->deadline())),
-        lifetime_(method->info.lifetime),
+  StreamCall(const Method* method, OpenStream<Request, Reply> open, CallWire* on,
+             std::shared_ptr<Connection> connection, CallerDeadline deadline)
+      : ServedCall(method, on, std::move(connection), deadline),
         open_(open),
-        place_(runtime->guard->Guard(context->c_call(), call().deadline())) {
-    Receive();
-  }
+        place_(runtime().guard->Guard(wire().ender(), call().deadline())) {}
   ~StreamCall() override { DropWork(); }
 
+  void OnSent(bool ok) override {
+    place_->EndWrite();
+    // SendLast has already sent the status.
+    if (cursor_->done()) return;
+    if (ok) {
+      runtime().workers->Resubmit(this);
+    } else {
+      wire().Finish(LastWords(absl::CancelledError("the reader left, or the deadline passed")));
+    }
+  }
+
+ private:
   void Work() override {
     const absl::StatusOr<std::chrono::nanoseconds> wait = Prepare();
     // After each of these another thread may have deleted this.
     if (!wait.ok() && cursor_ == nullptr) {
       FinishRefused(LastWords(wait.status()));
     } else if (!wait.ok()) {
-      Finish(LastWords(wait.status()));
+      wire().Finish(LastWords(wait.status()));
     } else if (wait->count() > 0) {
       runtime().delays->Add(this, Timer::Clock::now() + *wait);
     } else {
@@ -51,19 +56,7 @@ class StreamCall final : public IncomingCall {
     }
   }
 
-  void OnWriteDone(bool ok) override {
-    place_->EndWrite();
-    // StartWriteAndFinish has already sent the status.
-    if (cursor_->done()) return;
-    if (ok) {
-      runtime().workers->Resubmit(this);
-    } else {
-      Finish(LastWords(absl::CancelledError("the reader left, or the deadline passed")));
-    }
-  }
-
- private:
-  bool is_watch() const { return lifetime_ == query::Lifetime::kWatch; }
+  bool is_watch() const { return method().info.lifetime == query::Lifetime::kWatch; }
   std::atomic<int>& open_count() {
     return is_watch() ? runtime().open_watch_count : runtime().open_stream_count;
   }
@@ -92,7 +85,8 @@ class StreamCall final : public IncomingCall {
   // Time until there may be something to send; 0 for now.
   absl::StatusOr<std::chrono::nanoseconds> Prepare() {
     DSG_RETURN_IF_ERROR(call().Check());
-    if (lifetime_ != query::Lifetime::kAnswer && runtime().stopping) return ShuttingDownError();
+    const bool ends_by_itself = method().info.lifetime == query::Lifetime::kAnswer;
+    if (!ends_by_itself && runtime().stopping) return ShuttingDownError();
     if (cursor_ == nullptr) {
       DSG_RETURN_IF_ERROR(Parse(&request_));
       DSG_ASSIGN_OR_RETURN(cursor_, (runtime().core->*open_)(call(), request_));
@@ -103,14 +97,14 @@ class StreamCall final : public IncomingCall {
   void Write() {
     const absl::StatusOr<bool> has_message = ReadNext();
     if (!has_message.ok() || !*has_message) {
-      Finish(LastWords(has_message.status()));
+      wire().Finish(LastWords(has_message.status()));
       return;
     }
     place_->BeginWrite();
     if (cursor_->done()) {
-      StartWriteAndFinish(&packed(), grpc::WriteOptions(), LastWords(absl::OkStatus()));
+      wire().SendLast(LastWords(absl::OkStatus()));
     } else {
-      StartWrite(&packed());
+      wire().Send();
     }
   }
 
@@ -124,19 +118,18 @@ class StreamCall final : public IncomingCall {
       if (message.has_header()) revision_ = message.header().read_revision();
     }
     row_count_ += RowCountOf(message);
-    DSG_RETURN_IF_ERROR(Pack(message));
+    DSG_RETURN_IF_ERROR(wire().Pack(message));
     return true;
   }
 
-  // Logs the call and prepares its status and trailers. A call that the guard ended looks cancelled
-  // from inside, so the guard's verdict replaces the status.
-  grpc::Status LastWords(absl::Status status) {
+  // Logs the call and prepares its status. A call that the guard ended looks cancelled from inside,
+  // so the guard's verdict replaces the status.
+  absl::Status LastWords(absl::Status status) {
     if (const absl::Status verdict = place_->verdict(); !verdict.ok()) status = verdict;
     LogEnd(request_.map(), status, revision_, row_count_);
     return ForCaller(status);
   }
 
-  const query::Lifetime lifetime_;
   const OpenStream<Request, Reply> open_;
   const std::unique_ptr<CallGuard::Place> place_;
   bool is_counted_ = false;

@@ -10,8 +10,7 @@
 #include <utility>
 
 #include "schema/base/status.h"
-#include "server/call_deadline.h"
-#include "server/incoming_call.h"
+#include "server/served_call.h"
 
 namespace dsg::server {
 
@@ -54,34 +53,32 @@ inline google::protobuf::ArenaOptions ArenaOptionsOn(const ArenaBlocks::Lent& bl
 template <typename Request, typename Reply>
 using AskUnary = absl::Status (query::Api::*)(const query::CallContext&, const Request&, Reply*);
 
-/// Deletes itself when gRPC is done with it. A worker finishes it exactly once, even if it was
-/// cancelled.
+/// A worker finishes it exactly once, even if it was cancelled.
 template <typename Request, typename Reply>
-class UnaryCall final : public IncomingCall {
+class UnaryCall final : public ServedCall {
  public:
-  UnaryCall(CallRuntime* runtime, const Method* method, AskUnary<Request, Reply> ask,
-            grpc::GenericCallbackServerContext* context)
-      : IncomingCall(runtime, method, context, BoundDeadline(context->deadline())), ask_(ask) {
-    Receive();
-  }
+  UnaryCall(const Method* method, AskUnary<Request, Reply> ask, CallWire* on,
+            std::shared_ptr<Connection> connection, CallerDeadline deadline)
+      : ServedCall(method, on, std::move(connection), deadline), ask_(ask) {}
 
+  void OnSent(bool /*ok*/) override {}
+
+ private:
   void Work() override {
     const absl::Status status = Answer();
     if (!status.ok()) {
-      FinishRefused(ForCaller(status));
+      FinishRefused(status);
       return;
     }
     // A reply that nobody takes would be kept for ever.
-    if (OutlastsBound(context()->deadline())) {
-      reply_guard_ =
-          runtime().guard->Guard(context()->c_call(), CallGuard::Clock::time_point::max());
+    if (!wire().ends_stalled()) {
+      reply_guard_ = runtime().guard->Guard(wire().ender(), CallGuard::Clock::time_point::max());
       reply_guard_->BeginWrite();
     }
     // After that another thread may have deleted this.
-    StartWriteAndFinish(&packed(), grpc::WriteOptions(), ForCaller(status));
+    wire().SendLast(status);
   }
 
- private:
   // Its messages went with Answer.
   void DropWork() override {}
 
@@ -108,8 +105,8 @@ class UnaryCall final : public IncomingCall {
     DSG_RETURN_IF_ERROR(call().Check());
     DSG_RETURN_IF_ERROR(Parse(request));
     DSG_RETURN_IF_ERROR((runtime().core->*ask_)(call(), *request, reply));
-    DSG_RETURN_IF_ERROR(Pack(*reply));
-    return memory().Resize(packed().Length());
+    DSG_RETURN_IF_ERROR(wire().Pack(*reply));
+    return memory().Resize(wire().packed_bytes());
   }
 
   const AskUnary<Request, Reply> ask_;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Answers for programs: protobuf JSON with the field names of the .proto files, and reports of the
-// files that a verb has written.
+// Answers for programs: replies as JSON, and reports of the files that a verb has written.
 #pragma once
 
 #include <cstdint>
@@ -18,8 +17,7 @@ class Message;
 
 namespace dsg::cli {
 
-/// One JSON object and a newline. Fields with zeros and empty strings are written too, so every
-/// field that is not a message is there; 64-bit integers are strings, as in protobuf JSON.
+/// One JSON object and a newline, as query/api/message_json.h writes it.
 absl::Status WriteJson(const google::protobuf::Message& reply, std::ostream& out);
 
 /// The same on one line, for streams of answers.

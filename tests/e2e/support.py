@@ -113,12 +113,12 @@ class ProgramsTest(unittest.TestCase):
 
     @classmethod
     @contextlib.contextmanager
-    def server(cls, store, listen):
-        """A server that is ready; it must stop in order when asked to."""
+    def server(cls, store, listen, *options):
+        """A server that is ready; it must stop in order when asked to. Its log is server.log."""
         log_path = cls.path("server.log")
         with open(log_path, "w", encoding="utf-8") as log:
-            process = start("dsg-server", "--store", store, "--listen", listen, cwd=cls.folder,
-                            log=log)
+            process = start("dsg-server", "--store", store, "--listen", listen, *options,
+                            cwd=cls.folder, log=log)
         try:
             wait_until(lambda: process.poll() is not None or run(
                 "dsg", "version", "--server", listen, cwd=cls.folder).returncode == 0,

@@ -106,7 +106,8 @@ THIRD_PARTY = [
     (r"CLI/", ["ingest *.cc", "query/cli", "server *.cc", "tests"]),
     (r"png\.h$", ["schema/picture *.cc", "ingest/truth *.cc", "tests"]),
     (r"nlohmann/", ["schema/interop", "schema/archive *.cc", "ingest *.cc", "query/cli *.cc",
-                    "tests"]),
+                    "server/http *.cc", "tests"]),
+    (r"boost/(asio|beast|system)/", ["server/http *.cc"]),
 ]
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "dsg/v1/errors.pb.h"
+#include "grpcpp/support/status.h"
 #include "schema/base/status.h"
 
 namespace dsg::server {

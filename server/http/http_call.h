@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// A call that came over HTTP: its request as Connect writes it, its answer as bytes for the socket.
+// Knows no socket.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "server/http/call_plan.h"
+
+namespace dsg::server {
+
+/// The connection as a call sees it.
+///
+/// Threads: safe from any thread; what is written leaves in the order in which it came.
+class Outlet {
+ public:
+  virtual ~Outlet() = default;
+
+  /// Sends bytes. After the last ones the call is deleted; after others its ServedCall::OnSent is
+  /// called.
+  virtual void Write(std::string bytes, bool is_last) = 0;
+  /// Ends the call of that number, if it has not ended.
+  virtual void End(uint64_t number) = 0;
+};
+
+class HttpCall final : public CallWire {
+ public:
+  struct Place {
+    std::shared_ptr<Outlet> outlet;
+    std::shared_ptr<Connection> connection;
+    /// Of this call on its connection.
+    uint64_t number = 0;
+    /// The client understands chunks.
+    bool may_chunk = true;
+    bool keeps_connection = true;
+  };
+
+  HttpCall(const CallPlan& plan, std::string body, Place place);
+
+  ServedCall* served() { return call_.get(); }
+  bool is_stream() const { return type_.is_stream; }
+
+  size_t request_bytes() const override { return body_.size(); }
+  size_t decode_bytes() const override;
+  absl::Status Decode(const google::protobuf::Descriptor& type) override;
+  std::unique_ptr<google::protobuf::io::ZeroCopyInputStream> OpenRequest() override;
+  absl::Status Pack(const google::protobuf::Message& message) override;
+  size_t packed_bytes() const override { return packed_.size(); }
+  void Drop() override;
+  void Send() override;
+  void SendLast(const absl::Status& status) override;
+  void Finish(const absl::Status& status) override;
+  EndCall ender() override;
+  bool ends_stalled() const override { return true; }
+
+ private:
+  // The answer's head, or nothing if it has been sent.
+  std::string TakeHead(int status);
+  // A message of a stream, as it leaves.
+  std::string Chunk(const std::string& bytes) const;
+  // How the stream ends, as it leaves.
+  std::string End(const absl::Status& status) const;
+
+  CallRuntime* const runtime_;
+  const ConnectType type_;
+  const Place place_;
+  bool is_head_sent_ = false;
+  // As it came; from Decode on in protobuf's binary form.
+  std::string body_;
+  std::string packed_;
+  // Last, since it asks this for its ender.
+  const std::unique_ptr<ServedCall> call_;
+};
+
+}  // namespace dsg::server

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+// One HTTP connection: reads requests, one after another, and sends their answers. All but Outlet
+// runs on the thread of the port.
+#pragma once
+
+// Asio 1.18 uses std::exchange without it.
+#include <utility>
+// In this order.
+#include <array>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/generic/stream_protocol.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/string_body.hpp>
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "server/http/access_rules.h"
+#include "server/http/http_call.h"
+
+namespace dsg::server {
+
+class Session;
+
+/// What the sessions of a port share. Used on the port's thread only.
+struct SessionRuntime {
+  using Clock = std::chrono::steady_clock;
+
+  boost::asio::io_context io{1};
+  // Keeps the thread of `io` from ending while there is a session, or the port is open.
+  boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work =
+      boost::asio::make_work_guard(io);
+  const MethodTable* methods = nullptr;
+  CallRuntime* calls = nullptr;
+  const AccessRules* rules = nullptr;
+  bool may_write = false;
+  Clock::duration stall_max{};
+  bool is_stopping = false;
+  int open_stream_count = 0;
+  std::set<std::shared_ptr<Session>> sessions;
+};
+
+class Session final : public Outlet, public std::enable_shared_from_this<Session> {
+ public:
+  using Clock = SessionRuntime::Clock;
+  using Socket = boost::asio::generic::stream_protocol::socket;
+
+  Session(SessionRuntime* runtime, Socket socket, std::shared_ptr<Connection> connection);
+
+  void Start();
+  /// Closes the connection if its time is over.
+  void Look(Clock::time_point now);
+  /// Takes no more requests: closes the connection, when its answer has been sent.
+  void Stop();
+  /// Ends the call that is being answered.
+  void EndAnswer();
+  /// Closes the connection now.
+  void Close();
+
+  // From any thread.
+  void Write(std::string bytes, bool is_last) override;
+  void End(uint64_t number) override;
+
+ private:
+  enum class Phase {
+    /// Waits for a request, or has part of one.
+    kRequest,
+    /// A call is running, or an answer is being sent.
+    kAnswer,
+    /// All has been sent; waits for the client to close the connection, since closing it at once
+    /// may take away from the client what it has not read yet.
+    kLinger,
+    kClosed,
+  };
+  using Parser = boost::beast::http::request_parser<boost::beast::http::string_body>;
+
+  void NextRequest();
+  void ReadMore();
+  void OnRead(bool ok, size_t byte_count);
+  // Gives what has come to the parser.
+  void Parse();
+  // False if the request is refused.
+  bool TakeHead();
+  std::optional<Refusal> PlanOf(const RequestHead& head);
+  // Waits for the rest of a body.
+  void AwaitBody();
+  void TakeRequest();
+  void BeginCall();
+  void SendFile();
+  void Refuse(const Refusal& refusal);
+  void RefuseUnparsed(const boost::system::error_code& error);
+
+  void SendBytes(std::string bytes, bool is_last);
+  void OnSent(bool ok, bool is_last);
+  void FinishAnswer();
+  void Linger();
+  void Remove();
+
+  SessionRuntime* const runtime_;
+  const std::shared_ptr<Connection> connection_;
+  Socket socket_;
+  Phase phase_ = Phase::kRequest;
+  // When Look closes the connection.
+  Clock::time_point due_ = Clock::time_point::max();
+
+  // Reading. While a call runs, one read stays pending: it tells that the client has left.
+  std::array<char, size_t{16} << 10> read_;
+  bool is_reading_ = false;
+  // What has been read and not parsed.
+  std::string unparsed_;
+  std::optional<Parser> parser_;
+  bool has_head_ = false;
+  bool has_left_ = false;
+  size_t lingered_bytes_ = 0;
+  std::unique_ptr<Arrivals::Place> arrival_;
+
+  // The request.
+  CallPlan plan_;
+  bool keeps_connection_ = true;
+
+  // Answering.
+  uint64_t call_number_ = 0;
+  std::unique_ptr<HttpCall> call_;
+  std::string sending_;
+  bool is_sending_ = false;
+};
+
+}  // namespace dsg::server
