@@ -53,6 +53,11 @@ stop_server() {
   printf 'dsg-server exited 0\n'
 }
 
+http=()
+if [[ ${1:-} == --serve ]]; then
+  http=(--http 127.0.0.1:0)
+  shift
+fi
 kept=${1:-}
 folder=${kept:-$(mktemp -d "${TMPDIR:-/tmp}/dsg-demo.XXXXXX")}
 mkdir -p "$folder"
@@ -72,8 +77,8 @@ say '2. The log becomes a versioned scene graph in a store'
 show dsg-ingest --store store --map office office/log
 
 say '3. A server answers for the store over gRPC'
-printf '$ dsg-server --store store --listen unix:dsg.sock &\n'
-dsg-server --store store --listen unix:dsg.sock >server.log 2>&1 &
+printf '$ %s &\n' "dsg-server --store store --listen unix:dsg.sock${http[*]:+ ${http[*]}}"
+dsg-server --store store --listen unix:dsg.sock "${http[@]}" >server.log 2>&1 &
 server_pid=$!
 printf '$ export DSG_SERVER=unix:dsg.sock DSG_MAP=office\n'
 export DSG_SERVER=unix:dsg.sock DSG_MAP=office
@@ -91,6 +96,16 @@ show dsg who --room kitchen --from +1m --to +2m
 say '6. What does the map hold?'
 show dsg stats
 
-say '7. The server stops in order'
-stop_server
+if ((${#http[@]})); then
+  say '7. The map in a browser, until Ctrl-C'
+  grep -o 'http://.*' server.log
+  # Ctrl-C reaches the server too, which stops in order.
+  trap ':' INT
+  until ! kill -0 "$server_pid" 2>/dev/null; do wait "$server_pid" || true; done
+  server_pid=
+else
+  say '7. The server stops in order'
+  stop_server
+fi
 [[ -z $kept ]] || printf 'kept in %s\n' "$folder"
+((${#http[@]})) || printf 'its map in a browser: ./dev demo --serve\n'

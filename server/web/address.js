@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// The address of the page holds what is shown: a copied link shows the same again. The token is not
+// part of it; it is kept for this tab alone.
+
+const TOKEN_KEY = 'dsgdb-token';
+
+/** Takes the token out of the address and remembers it for the tab. */
+export function takeToken() {
+  const given = new URLSearchParams(location.hash.slice(1));
+  const token = given.get('token');
+  if (token !== null) {
+    given.delete('token');
+    sessionStorage.setItem(TOKEN_KEY, token);
+    history.replaceState(null, '', `#${given}`);
+  }
+  return sessionStorage.getItem(TOKEN_KEY) ?? '';
+}
+
+function numbers(text, count) {
+  const values = (text ?? '').split(',').map(Number);
+  return values.length === count && values.every(Number.isFinite) ? values : null;
+}
+
+/** What the address asks for; what it does not say is undefined. */
+export function readAddress() {
+  const given = new URLSearchParams(location.hash.slice(1));
+  const revision = Number(given.get('rev'));
+  const at = given.get('at');
+  return {
+    map: given.get('map') ?? '',
+    revision: Number.isInteger(revision) && revision > 0 ? revision : null,
+    atNs: at !== null && /^-?\d{1,19}$/.test(at) ? BigInt(at) : undefined,
+    camera: numbers(given.get('cam'), 6) ?? undefined,
+    selected: given.get('sel') ?? '',
+    hidden: given.get('hide')?.split(',').filter(Boolean),
+    explode: Math.min(1, Math.max(0, Number(given.get('explode')) || 0)),
+    query: given.get('q') ?? '',
+    diff: Number(given.get('diff')) || 0,
+    isLive: given.get('live') === '1',
+  };
+}
+
+/** Writes the address without adding to the history. */
+export function writeAddress(state) {
+  const out = new URLSearchParams();
+  const set = (name, value) => value && out.set(name, value);
+  set('map', state.map);
+  set('rev', state.revision && String(state.revision));
+  set('at', state.atNs !== undefined && String(state.atNs));
+  set('cam', state.camera?.map((value) => value.toFixed(3)).join(','));
+  set('sel', state.selected);
+  out.set('hide', (state.hidden ?? []).join(','));
+  set('explode', state.explode && state.explode.toFixed(2));
+  set('q', state.query);
+  set('diff', state.diff && String(state.diff));
+  set('live', state.isLive && '1');
+  history.replaceState(null, '', `#${out}`);
+}

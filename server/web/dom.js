@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Small helpers for the page. All text goes in as text: names come from logs, and are never markup.
+
+/** @returns {HTMLElement} */
+export function element(id) {
+  const found = document.getElementById(id);
+  if (!found) throw new Error(`the page has no #${id}`);
+  return found;
+}
+
+/**
+ * A new element with children, which are elements or text.
+ * @param {string} tag
+ * @param {object} properties of the element, as className or onclick
+ */
+export function make(tag, properties = {}, ...children) {
+  const made = Object.assign(document.createElement(tag), properties);
+  made.append(...children);
+  return made;
+}
+
+/** Text that leads somewhere. */
+export function link(text, onclick) {
+  return make('button', {className: 'link', type: 'button', onclick}, text);
+}
+
+/** A term and what is to be said of it, for a list of definitions. */
+export function pair(term, ...value) {
+  return [make('dt', {}, term), make('dd', {}, ...value)];
+}
+
+export function metres(value) {
+  return `${value.toFixed(2)} m`;
+}
+
+/** Runs a function once the calls have stopped for a while. */
+export function debounced(run, milliseconds) {
+  let timer = 0;
+  return () => {
+    clearTimeout(timer);
+    timer = setTimeout(run, milliseconds);
+  };
+}

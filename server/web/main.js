@@ -1,0 +1,615 @@
+// SPDX-License-Identifier: Apache-2.0
+// The viewer: one picture of a map at one revision and one time. Everything that is shown follows
+// from `state` and `show`; answers that come too late are dropped.
+import {readAddress, takeToken, writeAddress} from './address.js';
+import {Camera} from './camera.js';
+import {debounced, element, make} from './dom.js';
+import {drawLabels} from './labels.js';
+import {
+  drawHistogram, fillHelp, fillInspector, fillLayers, fillTable, sentenceOf,
+} from './panels.js';
+import {listenToKeys, listenToPointer} from './input.js';
+import {pick} from './pick.js';
+import {Plan} from './plan.js';
+import {Renderer, Show, stepOf} from './renderer.js';
+import {CallError, Client} from './rpc.js';
+import {GROUPS, loadMesh, loadRevisions, loadScene, loadTags} from './scene.js';
+import {nsOf, secondsOf, textOf} from './time.js';
+
+const REVISIONS_MAX = 5000;
+const RETRY_MS = [500, 1000, 2000, 5000, 10000];
+const TIME_STEPS = 10000;
+const IDLE_PERIOD_NS = '5000000000';
+
+const client = new Client(takeToken());
+const show = new Show();
+const camera = new Camera();
+const canvas = element('scene');
+
+const state = {
+  map: '', revision: null, isLive: false, query: '', diff: 0, isPlaying: false,
+  /** What comes next while the scene is loading. */
+  loading: '',
+};
+let scene = null;
+let neighbors = [];
+let revisions = [];
+let tags = [];
+let painter = null;
+/** Why there is no third dimension; empty if there is. */
+let webglNote = '';
+/** Ends what runs for the scene that is shown. */
+let running = new AbortController();
+let watching = null;
+let isDirty = true;
+let isStale = true;
+
+function setState(name) {
+  document.body.dataset.state = name;
+}
+
+/** Says something over the picture; `buttons` are offered with it. */
+function banner(text, kind = 'error', buttons = []) {
+  const shown = element('banner');
+  shown.hidden = !text;
+  shown.dataset.kind = kind;
+  shown.replaceChildren(text, ...buttons);
+}
+
+/** The picture is made again with the next frame; `stale`: so are its buffers. */
+function redraw(stale = false) {
+  isDirty = true;
+  isStale ||= stale;
+}
+
+const saveAddress = debounced(() => {
+  if (!scene) return;
+  writeAddress({
+    map: state.map, revision: state.isLive ? null : scene.revision, isLive: state.isLive,
+    atNs: nsOf(show.time, scene.epoch), selected: show.selected, hidden: [...show.hidden],
+    explode: show.explode, query: state.query, diff: state.diff,
+    camera: [...camera.target, camera.distance, camera.yaw, camera.pitch],
+  });
+}, 200);
+
+function changed(stale = true) {
+  redraw(stale);
+  saveAddress();
+  refresh();
+}
+
+/** All text that follows from the scene and the time. */
+function refresh() {
+  if (!scene) return;
+  element('sentence').textContent = sentenceOf(scene, show, state.loading);
+  element('time-text').textContent = textOf(show.time, scene.map);
+  const span = scene.end - scene.begin;
+  element('time').value = String(
+      span > 0 ? Math.round((show.time - scene.begin) / span * TIME_STEPS) : 0);
+  element('revision-text').textContent = revisionText();
+  if (!element('table').hidden) fillTable(scene, show, select);
+}
+
+function revisionText() {
+  const at = revisions.find((one) => one.number === scene.revision);
+  const named = tags.filter((tag) => Number(tag.revision) === scene.revision);
+  const names = named.length ? ` (${named.map((tag) => tag.name).join(', ')})` : '';
+  return `${scene.revision} of ${scene.head}${names} ${at?.message ?? ''}`.slice(0, 60);
+}
+
+// ---- what went wrong ----
+
+/** Says why a call failed, and what can be done. */
+function explain(error) {
+  if (error.name === 'AbortError') return;
+  if (!(error instanceof CallError)) {
+    setState('error');
+    banner(`The viewer failed: ${error.message}`);
+    throw error;
+  }
+  if (error.code === 'unauthenticated') {
+    setState('token');
+    banner('The server wants a token. Open the address that dsg-server printed when it started, ' +
+           'with #token=... at its end.');
+  } else if (error.mayPass) {
+    setState('away');
+    banner(`${error.message}\nTrying again; the picture is as it was.`);
+  } else {
+    setState('error');
+    const oldest = error.metadata.oldest_revision;
+    const go = oldest && make('button', {onclick: () => open(state.map, Number(oldest))},
+                              `open revision ${oldest}`);
+    const newest = make('button', {onclick: () => open(state.map, null)}, 'open the newest');
+    banner(error.message, 'error', [...(go ? [go] : []), newest]);
+  }
+}
+
+/** Calls again while the server is away, with longer and longer pauses. */
+async function persistently(run, signal) {
+  for (let attempt = 0;; ++attempt) {
+    try {
+      return await run();
+    } catch (error) {
+      if (!(error instanceof CallError && error.mayPass) || signal.aborted) throw error;
+      explain(error);
+      const pause = RETRY_MS[Math.min(attempt, RETRY_MS.length - 1)];
+      await new Promise((resolve) => setTimeout(resolve, pause * (0.75 + Math.random() / 2)));
+      if (signal.aborted) throw error;
+    }
+  }
+}
+
+// ---- loading ----
+
+/** Takes a scene, or more of it, into the picture. */
+function take(next, loading, wanted) {
+  const isNew = scene !== next;
+  const before = scene;
+  scene = next;
+  state.loading = loading;
+  if (isNew) {
+    banner(webglNote, 'note');
+    element('revision').max = String(next.head);
+    element('revision').value = String(next.revision);
+    const at = wanted.atNs !== undefined ? secondsOf(wanted.atNs, next.epoch)
+        : before?.map.name === next.map.name ? show.time : next.end;
+    show.time = at;
+  }
+  document.body.dataset.revision = String(next.revision);
+  changed();
+}
+
+/**
+ * Opens a map at a revision, null for the newest.
+ * @param {object} wanted more of the address
+ */
+async function open(map, revision, wanted = {}) {
+  running.abort();
+  running = new AbortController();
+  const {signal} = running;
+  const isOther = map !== state.map;
+  Object.assign(state, {map, revision});
+  setState('loading');
+  if (isOther) {
+    [show.selected, show.diff, state.diff] = ['', null, 0];
+    show.hits.clear();
+    show.path = [];
+    show.predictions = [];
+  }
+  try {
+    const loaded = await persistently(
+        () => loadScene(client, map, revision, signal,
+                        (next, loading) => { if (!signal.aborted) take(next, loading, wanted); }),
+        signal);
+    if (isOther && !wanted.camera) frameAll();
+    await settle(loaded, wanted, signal);
+  } catch (error) {
+    if (!signal.aborted) explain(error);
+  }
+}
+
+/** What is loaded once the scene is there. */
+async function settle(loaded, wanted, signal) {
+  if (!loaded.nodes.size) {
+    setState('empty');
+    banner(`The map "${state.map}" has no nodes yet. dsg-ingest puts a log into it: ` +
+           `dsg-ingest --map ${state.map} LOG`, 'note');
+    return;
+  }
+  [revisions, tags] = await Promise.all([
+    loadRevisions(client, state.map, REVISIONS_MAX, signal), loadTags(client, state.map, signal),
+  ]);
+  if (signal.aborted) return;
+  fillLayers(loaded, show, layersChanged);
+  fillInspector(loaded, show, neighbors, actions);
+  drawHistogram(loaded);
+  fillDiffs();
+  if (wanted.selected) await select(wanted.selected);
+  if (wanted.query) await search(wanted.query);
+  if (wanted.diff) await compare(wanted.diff);
+  if (state.isLive) watch();
+  await meshIfShown();
+  setState('ready');
+  changed();
+}
+
+function layersChanged() {
+  meshIfShown().catch(explain);
+  changed();
+}
+
+async function meshIfShown() {
+  if (!scene || show.hidden.has('mesh') || scene.meshAsked) return;
+  scene.meshAsked = true;
+  const of = scene;
+  await loadMesh(client, of, running.signal, () => {
+    if (scene === of) redraw(true);
+  });
+}
+
+function frameAll() {
+  const {min, max} = scene.bounds;
+  const top = show.hidden.has('building') ? 2 : 3;
+  camera.frame(min, [max[0], max[1], max[2] + top * stepOf(scene, show.explode)]);
+  changed(false);
+}
+
+// ---- questions ----
+
+async function select(id) {
+  show.selected = id;
+  neighbors = [];
+  fillInspector(scene, show, neighbors, actions);
+  changed();
+  if (!id) return;
+  const asked = scene;
+  try {
+    const reply = await client.call('QueryService/GetNeighbors', {
+      map: state.map, read_at: {exact_revision: String(scene.revision)}, id,
+      view: 'NODE_VIEW_BASIC', page_size: 200,
+    }, running.signal);
+    if (show.selected !== id || scene !== asked) return;
+    neighbors = reply.neighbors;
+    fillInspector(scene, show, neighbors, actions);
+  } catch (error) {
+    sayAnswer(error);
+  }
+}
+
+/** An answer, or why there is none, below the buttons of the inspector. */
+function sayAnswer(what) {
+  if (what?.name === 'AbortError') return;
+  const answer = document.getElementById('answer');
+  if (answer) answer.textContent = what instanceof Error ? what.message : what;
+}
+
+const timed = () => ({
+  map: state.map, read_at: {exact_revision: String(scene.revision)},
+});
+
+const actions = {
+  select,
+  async path() {
+    const node = scene.nodes.get(show.selected);
+    const [x, y, z] = camera.target;
+    try {
+      const reply = await client.call('QueryService/PlanPath', {
+        ...timed(), from: {position: {x, y, z}}, to: {node: node.id},
+        at_ns: String(nsOf(show.time, scene.epoch)),
+      }, running.signal);
+      show.path = reply.polyline.map((point) => [point.x, point.y, point.z]);
+      sayAnswer(`path of ${reply.length_m.toFixed(1)} m from the middle of the picture, ` +
+                `clearance at least ${reply.clearance_m_min.toFixed(2)} m`);
+      redraw();
+    } catch (error) {
+      sayAnswer(error);
+    }
+  },
+  async predict() {
+    try {
+      const reply = await client.call('QueryService/PredictAgent', {
+        ...timed(), agent: show.selected, from_ns: String(nsOf(show.time, scene.epoch)),
+        horizon_ns: '8000000000', period_ns: '400000000', path_count_max: 5,
+      }, running.signal);
+      show.predictions = reply.paths.map(({probability, poses}) => ({
+        probability, points: poses.map(({position: p}) => [p.x, p.y, p.z + 0.1]),
+      }));
+      sayAnswer(reply.paths.map(
+          ({probability, goal_node_id: goal}) =>
+              `${Math.round(probability * 100)} % ${goal ? `to ${scene.titleOf(goal)}` : 'on'}`)
+          .join('; '));
+      redraw();
+    } catch (error) {
+      sayAnswer(error);
+    }
+  },
+};
+
+async function search(query) {
+  state.query = query;
+  element('query').value = query;
+  show.hits.clear();
+  const found = element('found');
+  if (!query) {
+    found.textContent = '';
+    changed();
+    return;
+  }
+  try {
+    const reply = await client.call('QueryService/SearchNodes', {
+      ...timed(), query, at_ns: String(nsOf(show.time, scene.epoch)), page_size: 1000,
+    }, running.signal);
+    for (const {node} of reply.hits) show.hits.add(node.id);
+    found.textContent = `${reply.hits.length}${reply.next_page_token ? ' and more' : ''} found`;
+    if (reply.hits.length === 1) await select(reply.hits[0].node.id);
+  } catch (error) {
+    if (error.name === 'AbortError') return;
+    found.textContent = error.message;
+  }
+  changed();
+}
+
+/** Colours what differs from another revision; 0 ends it. */
+async function compare(revision) {
+  state.diff = revision;
+  show.diff = null;
+  element('diff').value = revision ? String(revision) : '';
+  if (revision) {
+    const states = new Map();
+    let token = '';
+    do {
+      const reply = await client.call('MapService/DiffRevisions', {
+        map: state.map, from_revision: String(revision), to_revision: String(scene.revision),
+        view: 'NODE_VIEW_BASIC', page_size: 1000, page_token: token,
+      }, running.signal);
+      for (const {type, before, after} of reply.nodes) {
+        states.set((after ?? before).id, type.toLowerCase());
+      }
+      token = reply.next_page_token;
+    } while (token);
+    show.diff = states;
+    const count = (name) => [...states.values()].filter((one) => one === name).length;
+    element('found').textContent = `+${count('added')} -${count('removed')} ~${count('changed')} ` +
+                                   `since revision ${revision}`;
+  }
+  changed();
+}
+
+function fillDiffs() {
+  const options = [make('option', {value: ''}, 'nothing')];
+  for (const tag of tags) {
+    options.push(make('option', {value: String(tag.revision)}, `${tag.name} (${tag.revision})`));
+  }
+  for (const {number} of revisions.slice(-50).reverse()) {
+    options.push(make('option', {value: String(number)}, `revision ${number}`));
+  }
+  element('diff').replaceChildren(...options);
+  element('diff').value = state.diff ? String(state.diff) : '';
+}
+
+// ---- live ----
+
+/** Follows the map while the tab is seen: one open call, closed when the tab is hidden. */
+async function watch() {
+  watching?.abort();
+  watching = new AbortController();
+  const {signal} = watching;
+  let known = scene.head;
+  while (!signal.aborted) {
+    try {
+      const messages = client.stream('MapService/WatchMap', {
+        map: state.map, after_revision: String(known), idle_period_ns: IDLE_PERIOD_NS,
+      }, signal);
+      for await (const message of messages) {
+        const read = Number(message.header.read_revision);
+        if (document.body.dataset.state === 'away') {
+          setState('ready');
+          banner('');
+        }
+        if (read <= known) continue;
+        known = read;
+        const isAtEnd = show.time >= scene.end - 0.001;
+        await open(state.map, null);
+        if (isAtEnd) show.time = scene.end;
+        changed();
+      }
+    } catch (error) {
+      if (signal.aborted) return;
+      explain(error);
+      if (!(error instanceof CallError && error.mayPass)) return;
+      await new Promise((resolve) => setTimeout(resolve, 1000));
+    }
+  }
+}
+
+function setLive(isLive) {
+  state.isLive = isLive;
+  element('live').setAttribute('aria-pressed', String(isLive));
+  watching?.abort();
+  if (isLive && scene) open(state.map, null);
+  saveAddress();
+}
+
+document.addEventListener('visibilitychange', () => {
+  if (!state.isLive || !scene) return;
+  if (document.hidden) watching?.abort();
+  else watch();
+});
+
+// ---- time ----
+
+let lastFrame = 0;
+
+function setTime(seconds) {
+  const before = show.time;
+  show.time = Math.min(Math.max(seconds, scene.begin), scene.end);
+  show.predictions = [];
+  changed(scene.changesBetween(before, show.time));
+}
+
+function setPlaying(isPlaying) {
+  state.isPlaying = isPlaying;
+  element('play').setAttribute('aria-pressed', String(isPlaying));
+  if (isPlaying && scene && show.time >= scene.end - 0.01) setTime(scene.begin);
+  lastFrame = 0;
+}
+
+function advance(now) {
+  if (!state.isPlaying || !scene) return;
+  const elapsed = lastFrame ? (now - lastFrame) / 1000 : 0;
+  lastFrame = now;
+  setTime(show.time + elapsed * Number(element('speed').value));
+  if (show.time >= scene.end) setPlaying(false);
+}
+
+const openRevision = debounced(() => {
+  setLive(false);
+  open(state.map, Number(element('revision').value));
+}, 150);
+
+function stepRevision(by) {
+  if (!scene) return;
+  const next = Math.min(scene.head, Math.max(1, scene.revision + by));
+  if (next === scene.revision) return;
+  setLive(false);
+  open(state.map, next);
+}
+
+function stepTag(by) {
+  const marked = tags.map((tag) => Number(tag.revision)).sort((a, b) => a - b);
+  const next = by > 0 ? marked.find((one) => one > scene.revision)
+                      : marked.reverse().find((one) => one < scene.revision);
+  if (next) stepRevision(next - scene.revision);
+}
+
+// ---- picture ----
+
+function resize() {
+  const scale = window.devicePixelRatio || 1;
+  for (const one of [canvas, element('labels')]) {
+    const [width, height] = [one.clientWidth, one.clientHeight].map((v) => Math.round(v * scale));
+    if (one.width === width && one.height === height) continue;
+    one.width = width;
+    one.height = height;
+    redraw();
+  }
+}
+
+function frame(now) {
+  advance(now);
+  resize();
+  if (isDirty && painter) {
+    if (isStale && scene) painter.build(scene, show);
+    isStale = isDirty = false;
+    painter.draw(scene, show, camera);
+    const count = painter instanceof Plan ? 0
+                                          : drawLabels(element('labels'), scene, show, camera);
+    document.body.dataset.labels = String(count);
+    document.body.dataset.drawn = String(Number(document.body.dataset.drawn ?? 0) + 1);
+  }
+  requestAnimationFrame(frame);
+}
+
+function makePainter() {
+  try {
+    painter = new Renderer(canvas);
+  } catch (error) {
+    document.body.dataset.plan = '1';
+    painter = new Plan(canvas);
+    webglNote = `${error.message}: the plan from above is shown.`;
+  }
+  canvas.addEventListener('webglcontextlost', (event) => event.preventDefault());
+  canvas.addEventListener('webglcontextrestored', () => {
+    painter.restore();
+    redraw(true);
+  });
+}
+
+// ---- keys and controls ----
+
+const KEYS = {
+  ' ': () => setPlaying(!state.isPlaying),
+  ',': () => setTime(show.time - 1),
+  '.': () => setTime(show.time + 1),
+  '[': () => stepRevision(-1),
+  ']': () => stepRevision(1),
+  '{': () => stepTag(-1),
+  '}': () => stepTag(1),
+  x: () => {
+    show.explode = show.explode > 0 ? 0 : 1;
+    fillLayers(scene, show, layersChanged);
+    changed();
+    frameAll();
+  },
+  d: () => compare(state.diff ? 0 : Math.max(1, scene.revision - 1)).catch(explain),
+  f: frameAll,
+  '/': () => element('query').focus(),
+  l: () => setLive(!state.isLive),
+  t: toggleTable,
+  '?': () => element('help').showModal(),
+  ...Object.fromEntries(GROUPS.map(
+      (group, i) => [String(i + 1), () => element(`layer-${group.name}`).click()])),
+  Escape: () => {
+    show.hits.clear();
+    [show.path, show.predictions] = [[], []];
+    search('');
+    select('');
+  },
+};
+
+/** Flies to what is selected. */
+function goTo() {
+  const node = scene?.nodes.get(show.selected);
+  const place = node && (scene.placeOf(node, show.time) ?? node.position);
+  if (!place) return;
+  camera.target = [...place];
+  camera.distance = Math.min(camera.distance, 8);
+  changed(false);
+}
+
+function toggleTable() {
+  element('table').hidden = !element('table').hidden;
+  refresh();
+}
+
+function listenToControls() {
+  element('map').onchange = () => open(element('map').value, null);
+  element('search').onsubmit = (event) => {
+    event.preventDefault();
+    search(element('query').value.trim());
+  };
+  element('play').onclick = () => setPlaying(!state.isPlaying);
+  element('live').onclick = () => setLive(!state.isLive);
+  element('table-button').onclick = toggleTable;
+  element('help-button').onclick = () => element('help').showModal();
+  element('time').oninput = () => {
+    if (!scene) return;
+    setPlaying(false);
+    setTime(scene.begin + Number(element('time').value) / TIME_STEPS * (scene.end - scene.begin));
+  };
+  element('revision').oninput = openRevision;
+  element('diff').onchange = () => compare(Number(element('diff').value)).catch(explain);
+  window.addEventListener('resize', () => scene && drawHistogram(scene));
+}
+
+// ---- begin ----
+
+async function begin() {
+  const wanted = readAddress();
+  if (wanted.hidden) show.hidden = new Set(wanted.hidden);
+  show.explode = wanted.explode;
+  if (wanted.camera) {
+    camera.target = wanted.camera.slice(0, 3);
+    [camera.distance, camera.yaw, camera.pitch] = wanted.camera.slice(3);
+  }
+  makePainter();
+  fillHelp();
+  listenToPointer(canvas, camera, {
+    moved: () => changed(false),
+    clicked: (at) => scene && select(pick(scene, show, camera, at)),
+    goTo,
+  });
+  listenToKeys(KEYS, () => scene !== null);
+  listenToControls();
+  requestAnimationFrame(frame);
+  try {
+    const reply = await persistently(() => client.call('MapService/ListMaps', {}), running.signal);
+    const names = reply.maps.map((map) => map.name);
+    element('map').replaceChildren(...names.map((name) => make('option', {value: name}, name)));
+    if (!names.length) {
+      setState('no-maps');
+      banner('The store has no maps yet. Put a log into one: dsg-ingest --store DIR --map NAME LOG',
+             'note');
+      return;
+    }
+    const map = wanted.map || names[0];
+    element('map').value = map;
+    state.isLive = wanted.isLive;
+    element('live').setAttribute('aria-pressed', String(wanted.isLive));
+    await open(map, wanted.isLive ? null : wanted.revision, wanted);
+  } catch (error) {
+    explain(error);
+  }
+}
+
+begin();

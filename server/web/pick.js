@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which node is under the pointer: small things by their distance on the screen, things with a box
+// by the ray through it, rooms by their floor.
+import {project} from './camera.js';
+import {stepOf} from './renderer.js';
+import {GROUPS} from './scene.js';
+
+/** Pixels around a point that still count as it. */
+const REACH = 12;
+const LIFTS = Object.fromEntries(GROUPS.map((group) => [group.name, group.lift]));
+
+/** A vector turned back by a quaternion. */
+function turnedBack([x, y, z, w], v) {
+  const tx = 2 * (-y * v[2] + z * v[1]);
+  const ty = 2 * (-z * v[0] + x * v[2]);
+  const tz = 2 * (-x * v[1] + y * v[0]);
+  return [
+    v[0] + w * tx - y * tz + z * ty, v[1] + w * ty - z * tx + x * tz,
+    v[2] + w * tz - x * ty + y * tx,
+  ];
+}
+
+/** How far along a ray a node's box begins; infinite if the ray misses it. */
+function distanceToBox(ray, node, position) {
+  const origin = turnedBack(node.orientation, ray.origin.map((v, i) => v - position[i]));
+  const direction = turnedBack(node.orientation, ray.direction);
+  let near = 0;
+  let far = Infinity;
+  for (let i = 0; i < 3; ++i) {
+    const a = (node.box.min[i] - origin[i]) / direction[i];
+    const b = (node.box.max[i] - origin[i]) / direction[i];
+    near = Math.max(near, Math.min(a, b));
+    far = Math.min(far, Math.max(a, b));
+  }
+  return near <= far ? near : Infinity;
+}
+
+function isInOutline(outline, x, y) {
+  let isIn = false;
+  for (let i = 0, j = outline.length - 1; i < outline.length; j = i++) {
+    const [xi, yi] = outline[i];
+    const [xj, yj] = outline[j];
+    if ((yi > y) !== (yj > y) && x < (xj - xi) * (y - yi) / (yj - yi) + xi) isIn = !isIn;
+  }
+  return isIn;
+}
+
+function distanceToFloor(ray, node, lift) {
+  const distance = (node.zMin + lift - ray.origin[2]) / ray.direction[2];
+  if (!(distance > 0)) return Infinity;
+  const [x, y] = [0, 1].map((i) => ray.origin[i] + ray.direction[i] * distance);
+  return isInOutline(node.outline, x, y) ? distance : Infinity;
+}
+
+/**
+ * The id of the node at a point of the picture; empty if there is none.
+ * @param {{x: number, y: number, width: number, height: number}} at pixels
+ */
+export function pick(scene, show, camera, at) {
+  const aspect = at.width / at.height;
+  const ray = camera.ray(at.x / at.width * 2 - 1, 1 - at.y / at.height * 2, aspect);
+  const matrix = camera.matrix(aspect);
+  const step = stepOf(scene, show.explode);
+  let best = {id: '', rank: 3, distance: Infinity};
+  const offer = (id, rank, distance) => {
+    if (distance === Infinity || rank > best.rank) return;
+    if (rank < best.rank || distance < best.distance) best = {id, rank, distance};
+  };
+  for (const node of scene.nodes.values()) {
+    if (show.hidden.has(node.group)) continue;
+    if (node.group !== 'agents' && !scene.isValid(node, show.time)) continue;
+    const lift = LIFTS[node.group] * step;
+    const place = scene.placeOf(node, show.time);
+    if (node.outline.length >= 3) {
+      offer(node.id, node.group === 'rooms' ? 2 : 3, distanceToFloor(ray, node, lift));
+    } else if (place && node.box && node.group === 'objects') {
+      offer(node.id, 1, distanceToBox(ray, node, [place[0], place[1], place[2] + lift]));
+    } else if (place && node.group !== 'structures') {
+      const height = node.group === 'agents' ? 0.6 : 0;
+      const spot = project(matrix, [place[0], place[1], place[2] + lift + height], at.width,
+                           at.height);
+      const away = spot ? Math.hypot(spot.x - at.x, spot.y - at.y) : Infinity;
+      if (away < (node.group === 'agents' ? 2 * REACH : REACH)) {
+        offer(node.id, node.group === 'agents' ? 0 : 1, spot.depth + away / 100);
+      }
+    }
+  }
+  return best.id;
+}
+
+/** Where the pointer's ray meets the floor, for zooming; null above the horizon. */
+export function floorPoint(camera, at, height) {
+  const ray = camera.ray(at.x / at.width * 2 - 1, 1 - at.y / at.height * 2, at.width / at.height);
+  const distance = (height - ray.origin[2]) / ray.direction[2];
+  if (!(distance > 0) || distance > camera.distance * 4) return null;
+  return ray.origin.map((v, i) => v + ray.direction[i] * distance);
+}

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// The plan from above on a 2-D canvas, for browsers without WebGL2: the same scene and the same
+// times, without layers apart.
+import {colorOfAgent} from './renderer.js';
+import {GROUPS} from './scene.js';
+
+const MARGIN = 30;
+
+export class Plan {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.context = canvas.getContext('2d');
+  }
+
+  restore() {}
+
+  build() {}
+
+  /** Map frame to pixels, so that the whole map is to be seen. */
+  #view(scene) {
+    const {min, max} = scene.bounds;
+    const {width, height} = this.canvas;
+    const scale = Math.min((width - 2 * MARGIN) / Math.max(1, max[0] - min[0]),
+                           (height - 2 * MARGIN) / Math.max(1, max[1] - min[1]));
+    const [cx, cy] = [(min[0] + max[0]) / 2, (min[1] + max[1]) / 2];
+    return {scale, at: ([x, y]) => [width / 2 + (x - cx) * scale, height / 2 - (y - cy) * scale]};
+  }
+
+  draw(scene, show) {
+    const {context, canvas} = this;
+    context.fillStyle = '#10141a';
+    context.fillRect(0, 0, canvas.width, canvas.height);
+    if (!scene) return;
+    const view = this.#view(scene);
+    for (const group of [...GROUPS].reverse()) {
+      if (show.hidden.has(group.name)) continue;
+      for (const node of scene.of(group.name)) this.#drawNode(view, scene, show, node, group);
+    }
+  }
+
+  #drawNode(view, scene, show, node, group) {
+    const {context} = this;
+    if (group.name !== 'agents' && !scene.isValid(node, show.time)) return;
+    const isMarked = node.id === show.selected || show.hits.has(node.id);
+    const rgb = group.name === 'agents' ? colorOfAgent(node.id) : group.color;
+    context.strokeStyle = context.fillStyle = isMarked ? '#ffffff' : `rgb(${rgb.join(',')})`;
+    if (node.outline.length >= 3) {
+      context.beginPath();
+      node.outline.forEach((point) => context.lineTo(...view.at(point)));
+      context.closePath();
+      context.stroke();
+      return;
+    }
+    const place = scene.placeOf(node, show.time);
+    if (!place) return;
+    const [x, y] = view.at(place);
+    const half = group.name === 'agents' ? 5 : group.name === 'objects' ? 3 : 1;
+    context.fillRect(x - half, y - half, 2 * half, 2 * half);
+    if (group.name !== 'agents' && !isMarked) return;
+    context.font = '12px system-ui, sans-serif';
+    context.fillText(scene.titleOf(node.id).slice(0, 40), x + 8, y + 4);
+  }
+}

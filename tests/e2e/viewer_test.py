@@ -1,0 +1,294 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""The viewer in a real browser: what it says is what `dsg` says, and names from logs stay text."""
+
+import contextlib
+import os
+import re
+import subprocess
+import unittest
+
+import browser
+import support
+
+PICTURES = os.environ.get("DSG_VIEWER_PICTURES", "")
+READY = "document.body.dataset.state === 'ready'"
+
+
+@unittest.skipUnless(browser.find_programs(), "chromium and chromium-driver are not installed")
+class Viewer(support.ProgramsTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.ingest("store", cls.simulate("office", people=6, seconds=60))
+        cls.window = browser.Browser()
+        cls.addClassCleanup(cls.window.close)
+        served = contextlib.ExitStack()
+        cls.addClassCleanup(served.close)
+        cls.url = served.enter_context(cls.served("store"))
+
+    @classmethod
+    @contextlib.contextmanager
+    def served(cls, store):
+        """The address that a server of the store prints for browsers."""
+        process = subprocess.Popen(
+            [os.path.join(support.BIN, "dsg-server"), "--store", store, "--listen",
+             f"unix:{store}.sock", "--http", "127.0.0.1:0"],
+            cwd=cls.folder, env=support.environment(), stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL, text=True)
+        try:
+            for line in process.stdout:
+                address = re.search(r"http://\S+#token=\S+", line)
+                if address:
+                    break
+            yield address[0]
+        finally:
+            process.terminate()
+            process.wait(timeout=support.TIMEOUT_S)
+            process.stdout.close()
+
+    def open(self, more=""):
+        self.window.get("about:blank")
+        self.window.get(self.url + more)
+        self.window.wait(READY)
+
+    def picture(self, name):
+        """Kept where DSG_VIEWER_PICTURES says, to be looked at."""
+        shot = self.window.picture()
+        self.assertGreater(len(shot), 10_000)
+        if PICTURES:
+            with open(os.path.join(PICTURES, name + ".png"), "wb") as out:
+                out.write(shot)
+
+    def colors(self):
+        """How many different colours the scene has: one of nothing but background has one."""
+        return self.window.run("""
+          const of = document.getElementById('scene');
+          const to = document.createElement('canvas');
+          [to.width, to.height] = [of.width, of.height];
+          // WebGL forgets a picture once it was shown: this one is drawn anew, and read with it.
+          document.dispatchEvent(new KeyboardEvent('keydown', {key: 'f'}));
+          return new Promise((done) => requestAnimationFrame(() => {
+            const context = to.getContext('2d');
+            context.drawImage(of, 0, 0);
+            const data = context.getImageData(0, 0, to.width, to.height).data;
+            const seen = new Set();
+            for (let i = 0; i < data.length; i += 4) {
+              seen.add(data[i] << 16 | data[i + 1] << 8 | data[i + 2]);
+            }
+            done(seen.size);
+          }));""")
+
+    def test_the_token_leaves_the_address_and_the_page_is_quiet(self):
+        self.window.messages()
+        self.open()
+        self.assertNotIn("token", self.window.run("return location.href"))
+        self.assertEqual([], self.window.messages())
+
+    def test_says_the_revision_and_where_people_are(self):
+        self.open("&at=" + str(self.at_ns(30)))
+        stats = self.ask("stats", "--store", "store", "--map", "office")
+        self.assertEqual(stats["head_revision"], self.window.run(
+            "return document.body.dataset.revision"))
+        self.window.keys("t")
+        self.window.wait("document.querySelectorAll('#table tr').length > 3")
+        rows = self.window.run("""return [...document.querySelectorAll('#table tr')].map(
+            (row) => [...row.cells].map((cell) => cell.textContent.trim()))""")
+        people = [row for row in rows if row[2] == "human"]
+        self.assertTrue(people)
+        for row in people:
+            said = self.ask("where", row[0], "--at", "+30s", "--store", "store", "--map", "office")
+            if said["quality"] == "IN_GAP":
+                self.assertEqual("in a gap of the track", row[4])
+                continue
+            at = said["pose"]["position"]
+            shown = [float(value) for value in row[4].split(",")]
+            for axis, value in zip("xyz", shown):
+                self.assertAlmostEqual(at[axis], value, delta=0.02, msg=f"{row}")
+        self.picture("table")
+        self.window.keys("t")
+
+    def at_ns(self, seconds):
+        maps = self.ask("maps", "--store", "store")
+        return int(maps["maps"][0]["epoch_ns"]) + seconds * support.NS_PER_S
+
+    def test_draws_layers_in_place_and_apart(self):
+        self.open()
+        self.assertGreater(self.colors(), 20)
+        self.picture("in_place")
+        self.window.keys("x")
+        self.window.wait("location.hash.includes('explode=1')")
+        self.picture("apart")
+        for key in "1234567":
+            if key != "6" and key != "7":
+                self.window.keys(key)
+        self.window.wait("document.querySelectorAll('#layers input:checked').length <= 1")
+        self.window.keys("6", "7")
+
+    def test_finds_what_dsg_finds(self):
+        self.open("&q=human")
+        found = self.ask("find", "human", "--at", "+30s", "--store", "store", "--map", "office")
+        self.open("&q=human&at=" + str(self.at_ns(30)))
+        self.assertEqual(f"{len(found['hits'])} found", self.window.run(
+            "return document.getElementById('found').textContent"))
+        self.open("&q=no+such+thing")
+        self.assertIn("no", self.window.run("return document.getElementById('found').textContent"))
+
+    def test_a_link_shows_the_same_again(self):
+        self.open("&at=" + str(self.at_ns(20)) + "&explode=0.50")
+        self.window.keys("f")
+        self.window.wait("location.hash.includes('cam=')")
+        before = self.window.run("return location.href")
+        facts = self.window.run("return document.getElementById('sentence').textContent")
+        self.window.get("about:blank")
+        self.window.get(before)
+        self.window.wait(READY)
+        self.assertEqual(facts, self.window.run(
+            "return document.getElementById('sentence').textContent"))
+
+    def test_says_what_is_wrong(self):
+        self.window.get("about:blank")
+        self.window.get(self.url.split("#")[0] + "#token=wrong")
+        self.window.wait("document.body.dataset.state === 'token'")
+        self.open()
+        self.window.get("about:blank")
+        self.window.get(self.url + "&rev=99")
+        self.window.wait("document.body.dataset.state === 'error'")
+        said = self.window.run("return document.getElementById('banner').textContent")
+        self.assertIn("99", said)
+        self.window.run("document.querySelector('#banner button').click()")
+        self.window.wait(READY)
+        os.makedirs(self.path("empty"))
+        with self.served("empty") as url:
+            self.window.get("about:blank")
+            self.window.get(url)
+            self.window.wait("document.body.dataset.state === 'no-maps'")
+
+    def test_follows_new_revisions_and_says_that_the_server_went_away(self):
+        self.ingest("live", self.simulate("live-log", people=1, seconds=5))
+        with self.served("live") as url:
+            self.window.get("about:blank")
+            self.window.get(url + "&live=1")
+            self.window.wait(READY)
+            before = int(self.window.run("return document.body.dataset.revision"))
+            room = self.ask("ls", "--kind", "room", "--store", "live")["nodes"][0]["id"]
+            self.ok("dsg", "set", room, "--name", "the den", "--server", "unix:live.sock")
+            self.window.wait(f"Number(document.body.dataset.revision) === {before + 1} && {READY}")
+            self.window.keys("t")
+            self.window.wait("document.getElementById('table').textContent.includes('the den')")
+            self.window.keys("t")
+        self.window.wait("document.body.dataset.state === 'away'")
+        self.assertGreater(self.colors(), 20)
+
+    def test_without_webgl_there_is_a_plan(self):
+        plain = browser.Browser("--disable-3d-apis")
+        try:
+            plain.get(self.url)
+            plain.wait(READY + " && document.body.dataset.plan === '1'")
+            self.assertIn("WebGL2", plain.run(
+                "return document.getElementById('banner').textContent"))
+            if PICTURES:
+                with open(os.path.join(PICTURES, "plan.png"), "wb") as out:
+                    out.write(plain.picture())
+        finally:
+            plain.close()
+
+    def test_a_click_selects_what_is_there(self):
+        self.open("&at=" + str(self.at_ns(30)))
+        self.window.click(640, 300)
+        self.window.wait("location.hash.includes('sel=')")
+        title = self.window.run("return document.querySelector('#inspector h2').textContent")
+        self.assertTrue(title)
+        self.window.wait("document.querySelectorAll('#inspector .link').length > 0")
+        self.picture("selected")
+        self.window.keys("\ue00c")  # Escape
+        self.window.wait("!location.hash.includes('sel=')")
+
+    def test_names_are_never_markup(self):
+        self.ok("dsg-ingest", "--store", "names", "--map", "office",
+                self.simulate("names-log", people=2, seconds=20))
+        payloads = ["<img src=x onerror=document.title='ran'>",
+                    "<script>document.title='ran'</script>",
+                    "\"><svg onload=document.title='ran'>", "javascript:document.title='ran'",
+                    "{{constructor.constructor('document.title=1')()}}", "\u202egnp.exe",
+                    "a" * 200]
+        objects = self.ask("ls", "--layer", "objects", "--store", "names", "--map", "office")
+        ids = [node["id"] for node in objects["nodes"]][:len(payloads)]
+        for node, name in zip(ids, payloads):
+            self.ok("dsg", "set", node, "--name", name, "--store", "names", "--map", "office")
+        with self.served("names") as url:
+            self.window.get("about:blank")
+            self.window.messages()
+            self.window.get(url)
+            self.window.wait(READY)
+            self.window.keys("t")
+            self.window.wait("document.querySelectorAll('#table tr').length > 3")
+            text = self.window.run("return document.getElementById('table').textContent")
+            for name in payloads[:len(ids)]:
+                self.assertIn(name, text)
+            self.assertEqual([], self.window.messages())
+            self.assertEqual("dsgdb", self.window.run("return document.title"))
+
+    def test_the_decoder_reads_what_is_whole_and_refuses_what_is_cut(self):
+        self.open()
+        wrong = self.window.run("""return import('/wire.js').then(({Reader, Writer}) => {
+          const wrong = [];
+          const values = [0n, 1n, 127n, 128n, (1n << 31n), (1n << 35n) - 1n, (1n << 63n) - 1n, -1n,
+                          -(1n << 63n)];
+          for (const value of values) {
+            let read = null;
+            const reader = new Reader(new Writer().number(6, value).done());
+            reader.each({6: (r) => { read = r.int64(); }});
+            if (read !== value) wrong.push(`${value} became ${read}`);
+          }
+          const whole = new Writer().number(1, 300).text(2, 'a name').number(9, 7).done();
+          const fields = {1: (r) => r.varint(), 2: (r) => r.block()};
+          let refused = 0;
+          for (let length = 0; length < whole.length; ++length) {
+            try {
+              new Reader(whole.slice(0, length)).each(fields);
+            } catch (error) {
+              if (!(error instanceof RangeError)) wrong.push(String(error));
+              ++refused;
+            }
+          }
+          if (refused < whole.length - 4) wrong.push(`only ${refused} cuts were refused`);
+          return wrong;
+        });""")
+        self.assertEqual([], wrong)
+
+    def test_tracks_know_their_gaps_and_floors_keep_their_area(self):
+        self.open()
+        wrong = self.window.run("""return Promise.all([import('/scene.js'), import('/shapes.js')])
+          .then(([{Track}, {triangulated}]) => {
+            const wrong = [];
+            const track = new Track(2);
+            [[0, 0], [1, 10], [9, 20]].forEach(([time, x]) => {
+              track.times.push(time);
+              track.positions.push([x, 0, 0]);
+            });
+            const expect = (time, x, known) => {
+              const here = track.at(time);
+              const is = here && [here.position[0], here.known];
+              const due = x === null ? null : [x, known];
+              if (JSON.stringify(is) !== JSON.stringify(due)) wrong.push(`${time}: ${is}`);
+            };
+            expect(-0.1, null);
+            expect(0.5, 5, true);
+            expect(1, 10, true);
+            expect(5, 10, false);
+            expect(9, 20, true);
+            expect(9.1, null);
+            const ell = [[0, 0], [4, 0], [4, 1], [1, 1], [1, 3], [0, 3]];
+            for (const outline of [ell, [...ell].reverse()]) {
+              const area = triangulated(outline).reduce((sum, [a, b, c]) => sum + Math.abs(
+                  (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])) / 2, 0);
+              if (Math.abs(area - 6) > 1e-9) wrong.push(`area ${area}`);
+            }
+            return wrong;
+          });""")
+        self.assertEqual([], wrong)
+
+
+if __name__ == "__main__":
+    unittest.main()
