@@ -3,23 +3,23 @@
 // from `state` and `show`; answers that come too late are dropped.
 import {readAddress, takeToken, writeAddress} from './address.js';
 import {Camera} from './camera.js';
-import {debounced, element, make} from './dom.js';
+import {debounced, element, link, make} from './dom.js';
 import {drawLabels} from './labels.js';
 import {
   drawHistogram, fillHelp, fillInspector, fillLayers, fillTable, sentenceOf,
 } from './panels.js';
 import {listenToKeys, listenToPointer} from './input.js';
+import {follow, persistently} from './live.js';
 import {pick} from './pick.js';
 import {Plan} from './plan.js';
+import {Questions} from './questions.js';
 import {Renderer, Show, stepOf} from './renderer.js';
 import {CallError, Client} from './rpc.js';
 import {GROUPS, loadMesh, loadRevisions, loadScene, loadTags} from './scene.js';
 import {nsOf, secondsOf, textOf} from './time.js';
 
 const REVISIONS_MAX = 5000;
-const RETRY_MS = [500, 1000, 2000, 5000, 10000];
 const TIME_STEPS = 10000;
-const IDLE_PERIOD_NS = '5000000000';
 
 const client = new Client(takeToken());
 const show = new Show();
@@ -32,7 +32,6 @@ const state = {
   loading: '',
 };
 let scene = null;
-let neighbors = [];
 let revisions = [];
 let tags = [];
 let painter = null;
@@ -78,6 +77,12 @@ function changed(stale = true) {
   refresh();
 }
 
+/** Says what is being loaded. */
+function say(loading) {
+  state.loading = loading;
+  element('sentence').textContent = sentenceOf(scene, show, loading);
+}
+
 /** All text that follows from the scene and the time. */
 function refresh() {
   if (!scene) return;
@@ -87,6 +92,7 @@ function refresh() {
   element('time').value = String(
       span > 0 ? Math.round((show.time - scene.begin) / span * TIME_STEPS) : 0);
   element('revision-text').textContent = revisionText();
+  if (scene.nodes.get(show.selected)?.group === 'agents') locate();
   if (!element('table').hidden) fillTable(scene, show, select);
 }
 
@@ -124,21 +130,6 @@ function explain(error) {
   }
 }
 
-/** Calls again while the server is away, with longer and longer pauses. */
-async function persistently(run, signal) {
-  for (let attempt = 0;; ++attempt) {
-    try {
-      return await run();
-    } catch (error) {
-      if (!(error instanceof CallError && error.mayPass) || signal.aborted) throw error;
-      explain(error);
-      const pause = RETRY_MS[Math.min(attempt, RETRY_MS.length - 1)];
-      await new Promise((resolve) => setTimeout(resolve, pause * (0.75 + Math.random() / 2)));
-      if (signal.aborted) throw error;
-    }
-  }
-}
-
 // ---- loading ----
 
 /** Takes a scene, or more of it, into the picture. */
@@ -168,20 +159,30 @@ async function open(map, revision, wanted = {}) {
   running = new AbortController();
   const {signal} = running;
   const isOther = map !== state.map;
+  const isFirst = isOther || scene === null;
+  if (isOther) watching?.abort();
   Object.assign(state, {map, revision});
   setState('loading');
   if (isOther) {
     [show.selected, show.diff, state.diff] = ['', null, 0];
+    show.ghosts = [];
     show.hits.clear();
     show.path = [];
     show.predictions = [];
   }
   try {
-    const loaded = await persistently(
-        () => loadScene(client, map, revision, signal,
-                        (next, loading) => { if (!signal.aborted) take(next, loading, wanted); }),
-        signal);
-    if (isOther && !wanted.camera) frameAll();
+    // Of another map each part is shown at once; of the same, the old picture stays until the new
+    // one is whole.
+    const progress = (next, loading) => {
+      if (signal.aborted) return;
+      if (isFirst) take(next, loading, wanted);
+      else say(loading);
+    };
+    const loaded = await persistently(() => loadScene(client, map, revision, signal, progress),
+                                      signal, explain);
+    if (signal.aborted) return;
+    take(loaded, '', wanted);
+    if (isFirst && !wanted.camera) frameAll();
     await settle(loaded, wanted, signal);
   } catch (error) {
     if (!signal.aborted) explain(error);
@@ -201,13 +202,13 @@ async function settle(loaded, wanted, signal) {
   ]);
   if (signal.aborted) return;
   fillLayers(loaded, show, layersChanged);
-  fillInspector(loaded, show, neighbors, actions);
+  fillInspector(loaded, show, [], actions);
   drawHistogram(loaded);
   fillDiffs();
   if (wanted.selected) await select(wanted.selected);
   if (wanted.query) await search(wanted.query);
   if (wanted.diff) await compare(wanted.diff);
-  if (state.isLive) watch();
+  if (state.isLive && !isWatching()) watch();
   await meshIfShown();
   setState('ready');
   changed();
@@ -236,25 +237,39 @@ function frameAll() {
 
 // ---- questions ----
 
+const ask = () => new Questions(client, scene, running.signal);
+
 async function select(id) {
   show.selected = id;
-  neighbors = [];
-  fillInspector(scene, show, neighbors, actions);
+  fillInspector(scene, show, [], actions);
   changed();
   if (!id) return;
   const asked = scene;
   try {
-    const reply = await client.call('QueryService/GetNeighbors', {
-      map: state.map, read_at: {exact_revision: String(scene.revision)}, id,
-      view: 'NODE_VIEW_BASIC', page_size: 200,
-    }, running.signal);
+    const neighbors = await ask().neighbors(id);
     if (show.selected !== id || scene !== asked) return;
-    neighbors = reply.neighbors;
     fillInspector(scene, show, neighbors, actions);
+    refresh();
   } catch (error) {
     sayAnswer(error);
   }
 }
+
+/** Says where the selected agent is at the time that is shown: its room, place and building. */
+const locate = debounced(async () => {
+  const [asked, agent, time] = [scene, show.selected, show.time];
+  const where = document.getElementById('where');
+  if (!where || !agent) return;
+  try {
+    const ids = await ask().where(agent, time);
+    if (scene !== asked || show.selected !== agent || show.time !== time) return;
+    const links = ids.map((id) => link(scene.titleOf(id), () => select(id)));
+    where.replaceChildren(...links.flatMap((one, i) => (i ? [', ', one] : [one])),
+                          ids.length ? '' : 'no room is known');
+  } catch (error) {
+    if (scene === asked && error.name !== 'AbortError') where.textContent = error.message;
+  }
+}, 150);
 
 /** An answer, or why there is none, below the buttons of the inspector. */
 function sayAnswer(what) {
@@ -263,23 +278,14 @@ function sayAnswer(what) {
   if (answer) answer.textContent = what instanceof Error ? what.message : what;
 }
 
-const timed = () => ({
-  map: state.map, read_at: {exact_revision: String(scene.revision)},
-});
-
 const actions = {
   select,
   async path() {
-    const node = scene.nodes.get(show.selected);
-    const [x, y, z] = camera.target;
     try {
-      const reply = await client.call('QueryService/PlanPath', {
-        ...timed(), from: {position: {x, y, z}}, to: {node: node.id},
-        at_ns: String(nsOf(show.time, scene.epoch)),
-      }, running.signal);
-      show.path = reply.polyline.map((point) => [point.x, point.y, point.z]);
-      sayAnswer(`path of ${reply.length_m.toFixed(1)} m from the middle of the picture, ` +
-                `clearance at least ${reply.clearance_m_min.toFixed(2)} m`);
+      const path = await ask().path(camera.target, show.selected, show.time);
+      show.path = path.corners;
+      sayAnswer(`path of ${path.length.toFixed(1)} m from the middle of the picture, clearance ` +
+                `at least ${path.clearance.toFixed(2)} m`);
       redraw();
     } catch (error) {
       sayAnswer(error);
@@ -287,15 +293,9 @@ const actions = {
   },
   async predict() {
     try {
-      const reply = await client.call('QueryService/PredictAgent', {
-        ...timed(), agent: show.selected, from_ns: String(nsOf(show.time, scene.epoch)),
-        horizon_ns: '8000000000', period_ns: '400000000', path_count_max: 5,
-      }, running.signal);
-      show.predictions = reply.paths.map(({probability, poses}) => ({
-        probability, points: poses.map(({position: p}) => [p.x, p.y, p.z + 0.1]),
-      }));
-      sayAnswer(reply.paths.map(
-          ({probability, goal_node_id: goal}) =>
+      show.predictions = await ask().predict(show.selected, show.time);
+      sayAnswer(show.predictions.map(
+          ({probability, goal}) =>
               `${Math.round(probability * 100)} % ${goal ? `to ${scene.titleOf(goal)}` : 'on'}`)
           .join('; '));
       redraw();
@@ -310,18 +310,14 @@ async function search(query) {
   element('query').value = query;
   show.hits.clear();
   const found = element('found');
-  if (!query) {
-    found.textContent = '';
-    changed();
-    return;
-  }
+  found.textContent = '';
   try {
-    const reply = await client.call('QueryService/SearchNodes', {
-      ...timed(), query, at_ns: String(nsOf(show.time, scene.epoch)), page_size: 1000,
-    }, running.signal);
-    for (const {node} of reply.hits) show.hits.add(node.id);
-    found.textContent = `${reply.hits.length}${reply.next_page_token ? ' and more' : ''} found`;
-    if (reply.hits.length === 1) await select(reply.hits[0].node.id);
+    if (query) {
+      const {ids, hasMore} = await ask().search(query, show.time);
+      show.hits = new Set(ids);
+      found.textContent = `${ids.length}${hasMore ? ' and more' : ''} found`;
+      if (ids.length === 1) await select(ids[0]);
+    }
   } catch (error) {
     if (error.name === 'AbortError') return;
     found.textContent = error.message;
@@ -333,21 +329,12 @@ async function search(query) {
 async function compare(revision) {
   state.diff = revision;
   show.diff = null;
+  show.ghosts = [];
   element('diff').value = revision ? String(revision) : '';
   if (revision) {
-    const states = new Map();
-    let token = '';
-    do {
-      const reply = await client.call('MapService/DiffRevisions', {
-        map: state.map, from_revision: String(revision), to_revision: String(scene.revision),
-        view: 'NODE_VIEW_BASIC', page_size: 1000, page_token: token,
-      }, running.signal);
-      for (const {type, before, after} of reply.nodes) {
-        states.set((after ?? before).id, type.toLowerCase());
-      }
-      token = reply.next_page_token;
-    } while (token);
+    const {states, removed} = await ask().diff(revision);
     show.diff = states;
+    show.ghosts = removed;
     const count = (name) => [...states.values()].filter((one) => one === name).length;
     element('found').textContent = `+${count('added')} -${count('removed')} ~${count('changed')} ` +
                                    `since revision ${revision}`;
@@ -369,37 +356,26 @@ function fillDiffs() {
 
 // ---- live ----
 
-/** Follows the map while the tab is seen: one open call, closed when the tab is hidden. */
-async function watch() {
+const isWatching = () => watching !== null && !watching.signal.aborted;
+
+/** Follows the map while the tab is seen. */
+function watch() {
   watching?.abort();
   watching = new AbortController();
-  const {signal} = watching;
-  let known = scene.head;
-  while (!signal.aborted) {
-    try {
-      const messages = client.stream('MapService/WatchMap', {
-        map: state.map, after_revision: String(known), idle_period_ns: IDLE_PERIOD_NS,
-      }, signal);
-      for await (const message of messages) {
-        const read = Number(message.header.read_revision);
-        if (document.body.dataset.state === 'away') {
-          setState('ready');
-          banner('');
-        }
-        if (read <= known) continue;
-        known = read;
-        const isAtEnd = show.time >= scene.end - 0.001;
-        await open(state.map, null);
-        if (isAtEnd) show.time = scene.end;
-        changed();
-      }
-    } catch (error) {
-      if (signal.aborted) return;
-      explain(error);
-      if (!(error instanceof CallError && error.mayPass)) return;
-      await new Promise((resolve) => setTimeout(resolve, 1000));
-    }
-  }
+  follow(client, state.map, scene.head, watching.signal, {
+    heard: () => {
+      if (document.body.dataset.state !== 'away') return;
+      setState('ready');
+      banner(webglNote, 'note');
+    },
+    revision: async () => {
+      const isAtEnd = show.time >= scene.end - 0.001;
+      await open(state.map, null);
+      if (isAtEnd) show.time = scene.end;
+      changed();
+    },
+    failed: explain,
+  }).catch(explain);
 }
 
 function setLive(isLive) {
@@ -593,7 +569,8 @@ async function begin() {
   listenToControls();
   requestAnimationFrame(frame);
   try {
-    const reply = await persistently(() => client.call('MapService/ListMaps', {}), running.signal);
+    const reply = await persistently(() => client.call('MapService/ListMaps', {}), running.signal,
+                                     explain);
     const names = reply.maps.map((map) => map.name);
     element('map').replaceChildren(...names.map((name) => make('option', {value: name}, name)));
     if (!names.length) {

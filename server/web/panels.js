@@ -100,6 +100,7 @@ export function fillInspector(scene, show, neighbors, actions) {
     return isSource ? make('div', {}, `${edge.relation} `, there)
                     : make('div', {}, there, ` ${edge.relation} this`);
   });
+  if (node.group === 'agents') facts.push(...pair('in', make('span', {id: 'where'})));
   const buttons = node.group === 'agents'
       ? [make('button', {type: 'button', onclick: actions.predict}, 'predict')]
       : [make('button', {type: 'button', onclick: actions.path}, 'path to here')];

@@ -118,6 +118,8 @@ export class Show {
     this.predictions = [];
     /** @type {Map<string, string> | null} id to "added", "removed", "changed" */
     this.diff = null;
+    /** Nodes that the other revision had, and this one has no more. */
+    this.ghosts = [];
   }
 }
 
@@ -189,6 +191,7 @@ export class Renderer {
         }
       }
     }
+    for (const node of show.ghosts) this.#addGhost(out, node, show);
     if (show.hasEdges) this.#addEdges(out.lines, scene, show, false);
     for (const [name, vertices] of Object.entries(out)) {
       this[name].fill(vertices, this.gl.STATIC_DRAW);
@@ -215,6 +218,17 @@ export class Renderer {
       const half = group.name === 'objects' ? 0.12 : 0.4;
       const box = {min: [-half, -half, -half], max: [half, half, half]};
       addBox(out.solid, box, node.position, node.orientation, color, 1, lift);
+    }
+  }
+
+  #addGhost(out, node, show) {
+    const group = GROUPS.find((one) => one.name === node.group);
+    if (show.hidden.has(node.group) || !node.position || node.group === 'agents') return;
+    if (node.box && node.group !== 'places') {
+      addBoxEdges(out.lines, node.box, node.position, node.orientation, DIFF_COLORS.removed, 1,
+                  group.lift);
+    } else {
+      addPoint(out.points, node.position, DIFF_COLORS.removed, 1, group.lift);
     }
   }
 

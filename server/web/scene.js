@@ -55,7 +55,7 @@ function regionOf(message, box, position, orientation) {
 }
 
 /** A node in numbers; `from` and `to` are when it is valid, seconds. */
-function toNode(message, epoch) {
+export function toNode(message, epoch) {
   const pose = message.map_T_node;
   const q = pose?.orientation;
   const group = groupOf(message);
@@ -198,6 +198,8 @@ export class Scene {
     /** @type {Map<string, Track>} by id of the agent */
     this.tracks = new Map();
     this.mesh = [];
+    /** Whether the mesh was asked for. */
+    this.meshAsked = false;
     this.changes = new Float64Array(0);
     this.changesOf = 0;
     /** What was left out, and why; shown, never silent. */

@@ -134,6 +134,25 @@ class Viewer(support.ProgramsTest):
         self.open("&q=no+such+thing")
         self.assertIn("no", self.window.run("return document.getElementById('found').textContent"))
 
+    def test_compares_with_another_revision(self):
+        self.ingest("compared", self.simulate("compared-log", people=1, seconds=5))
+        store = ("--store", "compared")
+        before = self.ask("stats", *store)["head_revision"]
+        cup = self.ask("ls", "--layer", "objects", *store)["nodes"][0]["id"]
+        self.ok("dsg", "set", cup, "--name", "the other one", *store)
+        after = self.ask("stats", *store)["head_revision"]
+        changes = self.ask("diff", before, after, *store)["nodes"]
+        count = lambda kind: sum(change["type"] == kind for change in changes)
+        with self.served("compared") as url:
+            self.window.get("about:blank")
+            self.window.get(f"{url}&diff={before}")
+            self.window.wait(READY)
+            said = f"+{count('ADDED')} -{count('REMOVED')} ~{count('CHANGED')}"
+            self.assertEqual(
+                f"{said} since revision {before}",
+                self.window.run("return document.getElementById('found').textContent"))
+            self.assertGreater(count("CHANGED"), 0)
+
     def test_a_link_shows_the_same_again(self):
         self.open("&at=" + str(self.at_ns(20)) + "&explode=0.50")
         self.window.keys("f")

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the viewer asks about a scene, all at its revision, in the scene's units.
+import {toNode} from './scene.js';
+import {nsOf} from './time.js';
+
+const NEIGHBORS_MAX = 200;
+const HITS_MAX = 1000;
+const CHANGES_A_PAGE = 1000;
+/** How far predictions reach, how densely, and how many ways. */
+const PREDICTION = {horizon_ns: '8000000000', period_ns: '400000000', path_count_max: 5};
+
+export class Questions {
+  /**
+   * @param {import('./rpc.js').Client} client
+   * @param {import('./scene.js').Scene} scene
+   * @param {AbortSignal} signal ends the calls when another scene is shown
+   */
+  constructor(client, scene, signal) {
+    this.client = client;
+    this.scene = scene;
+    this.signal = signal;
+  }
+
+  #ask(method, request) {
+    return this.client.call(method, {
+      map: this.scene.map.name, read_at: {exact_revision: String(this.scene.revision)}, ...request,
+    }, this.signal);
+  }
+
+  #ns(time) {
+    return String(nsOf(time, this.scene.epoch));
+  }
+
+  /** The edges of a node, incoming and outgoing. */
+  async neighbors(id) {
+    const reply = await this.#ask('QueryService/GetNeighbors', {
+      id, view: 'NODE_VIEW_BASIC', page_size: NEIGHBORS_MAX,
+    });
+    return reply.neighbors;
+  }
+
+  /** Ids of the room, place and building of an agent at a time; those that are known. */
+  async where(agent, time) {
+    const reply = await this.#ask('QueryService/LocateAgent', {agent, at_ns: this.#ns(time)});
+    return [reply.room_id, reply.place_id, reply.building_id].filter(Boolean);
+  }
+
+  /** A path from a point to a node: corners, length and least clearance in metres. */
+  async path([x, y, z], node, time) {
+    const reply = await this.#ask('QueryService/PlanPath', {
+      from: {position: {x, y, z}}, to: {node}, at_ns: this.#ns(time),
+    });
+    return {corners: reply.polyline.map((point) => [point.x, point.y, point.z]),
+            length: reply.length_m, clearance: reply.clearance_m_min};
+  }
+
+  /** Where an agent may go: ways with probabilities, and goals where there are some. */
+  async predict(agent, time) {
+    const reply = await this.#ask('QueryService/PredictAgent', {
+      agent, from_ns: this.#ns(time), ...PREDICTION,
+    });
+    return reply.paths.map(({probability, poses, goal_node_id: goal}) => ({
+      probability, goal, points: poses.map(({position: p}) => [p.x, p.y, p.z]),
+    }));
+  }
+
+  /** Ids that a query finds, and whether there are more. */
+  async search(query, time) {
+    const reply = await this.#ask('QueryService/SearchNodes', {
+      query, at_ns: this.#ns(time), page_size: HITS_MAX,
+    });
+    return {ids: reply.hits.map(({node}) => node.id), hasMore: reply.next_page_token !== ''};
+  }
+
+  /** What differs from another revision: id to "added", "removed", "changed"; removed nodes. */
+  async diff(revision) {
+    const states = new Map();
+    const removed = [];
+    let token = '';
+    do {
+      const reply = await this.client.call('MapService/DiffRevisions', {
+        map: this.scene.map.name, from_revision: String(revision),
+        to_revision: String(this.scene.revision), view: 'NODE_VIEW_FULL',
+        page_size: CHANGES_A_PAGE, page_token: token,
+      }, this.signal);
+      for (const {type, before, after} of reply.nodes) {
+        states.set((after ?? before).id, type.toLowerCase());
+        if (type === 'REMOVED') removed.push(toNode(before, this.scene.epoch));
+      }
+      token = reply.next_page_token;
+    } while (token);
+    return {states, removed};
+  }
+}
