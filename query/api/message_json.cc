@@ -2,19 +2,19 @@
 #include "query/api/message_json.h"
 
 #include <google/protobuf/descriptor.h>
-#include <google/protobuf/io/coded_stream.h>
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 #include <google/protobuf/message.h>
-#include <google/protobuf/type.pb.h>
+#include <google/protobuf/stubs/strutil.h>
 #include <google/protobuf/util/json_util.h>
 #include <google/protobuf/util/type_resolver.h>
 #include <google/protobuf/util/type_resolver_util.h>
+#include <google/protobuf/wrappers.pb.h>
 
-#include <map>
-#include <memory>
-#include <mutex>
-#include <shared_mutex>
+#include <algorithm>
+#include <cmath>
+#include <vector>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
 
@@ -22,120 +22,278 @@ namespace dsg::query {
 namespace {
 
 namespace pb = google::protobuf;
+using Field = pb::FieldDescriptor;
 
-constexpr char kUrlPrefix[] = "type.googleapis.com";
-
-// Protobuf's own resolver makes the description of a type anew for every message that it writes or
-// reads, which took several times as long as the writing.
-class KeptTypes final : public pb::util::TypeResolver {
- public:
-  pb::util::Status ResolveMessageType(const std::string& url, pb::Type* type) override {
-    return Resolve(url, type, &messages_, &TypeResolver::ResolveMessageType);
-  }
-  pb::util::Status ResolveEnumType(const std::string& url, pb::Enum* type) override {
-    return Resolve(url, type, &enums_, &TypeResolver::ResolveEnumType);
-  }
-
- private:
-  template <typename Type>
-  pb::util::Status Resolve(const std::string& url, Type* type, std::map<std::string, Type>* kept,
-                           pb::util::Status (TypeResolver::*make)(const std::string&, Type*)) {
-    {
-      std::shared_lock lock(mutex_);
-      if (const auto found = kept->find(url); found != kept->end()) {
-        *type = found->second;
-        return {};
-      }
-    }
-    pb::util::Status status = (maker_.get()->*make)(url, type);
-    if (!status.ok()) return status;
-    std::unique_lock lock(mutex_);
-    kept->emplace(url, *type);
-    return {};
-  }
-
-  const std::unique_ptr<TypeResolver> maker_{
-      pb::util::NewTypeResolverForDescriptorPool(kUrlPrefix, pb::DescriptorPool::generated_pool())};
-  std::shared_mutex mutex_;
-  std::map<std::string, pb::Type> messages_;
-  std::map<std::string, pb::Enum> enums_;
-};
-
-pb::util::TypeResolver* Types() {
-  static pb::util::TypeResolver& types = *new KeptTypes();
-  return &types;
+// Text that JSON writes as it is.
+bool IsPlain(const std::string& text) {
+  return std::all_of(text.begin(), text.end(), [](char c) {
+    return c >= ' ' && c <= '~' && c != '"' && c != '\\' && c != '<' && c != '>';
+  });
 }
 
-std::string UrlOf(const pb::Descriptor& type) {
-  return absl::StrCat(kUrlPrefix, "/", type.full_name());
+// Such as a field mask, which is text in JSON.
+bool IsProtobufs(const pb::Descriptor& type) { return type.file()->package() == "google.protobuf"; }
+
+// Protobuf's printer has values that may be missing after the others, as they come on the wire.
+bool ComesLast(const Field& field) {
+  if (field.is_repeated()) return false;
+  return field.message_type() == nullptr ? field.containing_oneof() != nullptr
+                                         : IsProtobufs(*field.message_type());
 }
 
-// A string that takes no more than a number of bytes.
-class BoundedOutput final : public pb::io::ZeroCopyOutputStream {
+// Writes what protobuf's own printer writes for a message and these options: names as in the .proto
+// file, fields without presence always, maps sorted. That printer describes all types anew for each
+// message, and makes a tree of its text: 75 us for the reply of LocateAgent, where this takes a
+// few. A test compares the two.
+class Printer {
  public:
-  BoundedOutput(std::string* text, size_t bytes_max) : text_(text), bytes_max_(bytes_max) {}
+  Printer(JsonLayout layout, size_t bytes_max)
+      : is_indented_(layout == JsonLayout::kIndented), bytes_max_(bytes_max) {}
 
-  bool Next(void** data, int* size) override {
-    is_full_ = text_->size() >= bytes_max_;
-    return !is_full_ && stream_.Next(data, size);
-  }
-  void BackUp(int count) override { stream_.BackUp(count); }
-  int64_t ByteCount() const override { return stream_.ByteCount(); }
-  bool is_full() const { return is_full_; }
+  void PrintMessage(const pb::Message& message);
+  std::string TakeText() { return std::move(text_); }
+  /// OK unless the text is longer than it may be, or not all of it is UTF-8.
+  absl::Status status() const { return status_; }
 
  private:
-  std::string* const text_;
+  void PrintField(const pb::Message& message, const Field& field);
+  void PrintList(const pb::Message& message, const Field& field);
+  void PrintMap(const pb::Message& message, const Field& field);
+  // Of a repeated field the element `index`, otherwise -1.
+  void PrintValue(const pb::Message& message, const Field& field, int index);
+  void PrintText(const std::string& text);
+  // What is rare, or a type of protobuf's own.
+  void PrintByProtobuf(const pb::Message& message);
+  void PrintNumber(double value, const std::string& text);
+
+  void Open(char bracket);
+  // Before each entry of what is open.
+  void Next();
+  void Close(char bracket);
+  void NewLine();
+
+  const bool is_indented_;
   const size_t bytes_max_;
-  pb::io::StringOutputStream stream_{text_};
-  bool is_full_ = false;
+  std::string text_;
+  size_t depth_ = 0;
+  bool is_empty_ = true;
+  absl::Status status_;
 };
 
-// The same message gives the same bytes. Printing a message itself writes its maps in their order
-// in memory, which differs for a message that came over the wire.
-std::string SortedBytes(const pb::Message& message) {
-  std::string bytes;
-  pb::io::StringOutputStream stream(&bytes);
-  pb::io::CodedOutputStream out(&stream);
-  out.SetSerializationDeterministic(true);
-  message.SerializePartialToCodedStream(&out);
-  out.Trim();
-  return bytes;
+void Printer::Open(char bracket) {
+  text_ += bracket;
+  ++depth_;
+  is_empty_ = true;
+}
+
+void Printer::Next() {
+  if (!is_empty_) text_ += ',';
+  is_empty_ = false;
+  NewLine();
+}
+
+void Printer::Close(char bracket) {
+  --depth_;
+  if (!is_empty_) NewLine();
+  is_empty_ = false;
+  text_ += bracket;
+}
+
+void Printer::NewLine() {
+  if (!is_indented_) return;
+  text_ += '\n';
+  text_.append(depth_, ' ');
+}
+
+void Printer::PrintMessage(const pb::Message& message) {
+  if (text_.size() > bytes_max_) {
+    status_ = MakeError(Reason::kLimitExceeded,
+                        absl::StrCat("the reply takes more than ", bytes_max_,
+                                     " bytes as JSON; ask for less at a time, or for protobuf"),
+                        {{"bytes_max", absl::StrCat(bytes_max_)}});
+  }
+  if (!status_.ok()) return;
+  const pb::Descriptor& type = *message.GetDescriptor();
+  if (IsProtobufs(type)) {
+    PrintByProtobuf(message);
+    return;
+  }
+  Open('{');
+  std::vector<const Field*> last;
+  for (int i = 0; i < type.field_count(); ++i) {
+    const Field& field = *type.field(i);
+    if (ComesLast(field)) {
+      if (message.GetReflection()->HasField(message, &field)) last.push_back(&field);
+    } else if (field.is_repeated() || field.message_type() == nullptr ||
+               message.GetReflection()->HasField(message, &field)) {
+      PrintField(message, field);
+    }
+  }
+  std::sort(last.begin(), last.end(),
+            [](const Field* a, const Field* b) { return a->number() < b->number(); });
+  for (const Field* field : last) PrintField(message, *field);
+  Close('}');
+}
+
+void Printer::PrintField(const pb::Message& message, const Field& field) {
+  Next();
+  absl::StrAppend(&text_, "\"", field.name(), is_indented_ ? "\": " : "\":");
+  if (field.is_map()) {
+    PrintMap(message, field);
+  } else if (field.is_repeated()) {
+    PrintList(message, field);
+  } else {
+    PrintValue(message, field, -1);
+  }
+}
+
+void Printer::PrintList(const pb::Message& message, const Field& field) {
+  Open('[');
+  const int count = message.GetReflection()->FieldSize(message, &field);
+  for (int i = 0; i < count; ++i) {
+    Next();
+    PrintValue(message, field, i);
+  }
+  Close(']');
+}
+
+void Printer::PrintMap(const pb::Message& message, const Field& field) {
+  const pb::Reflection& reflection = *message.GetReflection();
+  const Field& key = *field.message_type()->map_key();
+  // All keys of the protocol are text.
+  std::vector<std::pair<std::string, const pb::Message*>> entries;
+  for (int i = 0; i < reflection.FieldSize(message, &field); ++i) {
+    const pb::Message& entry = reflection.GetRepeatedMessage(message, &field, i);
+    entries.emplace_back(entry.GetReflection()->GetString(entry, &key), &entry);
+  }
+  std::sort(entries.begin(), entries.end());
+  Open('{');
+  for (const auto& [name, entry] : entries) {
+    Next();
+    PrintText(name);
+    text_ += is_indented_ ? ": " : ":";
+    PrintValue(*entry, *field.message_type()->map_value(), -1);
+  }
+  Close('}');
+}
+
+void Printer::PrintValue(const pb::Message& message, const Field& field, int index) {
+  const pb::Reflection& r = *message.GetReflection();
+  const bool is_element = index >= 0;
+  switch (field.cpp_type()) {
+    case Field::CPPTYPE_INT32:
+      absl::StrAppend(&text_, is_element ? r.GetRepeatedInt32(message, &field, index)
+                                         : r.GetInt32(message, &field));
+      return;
+    case Field::CPPTYPE_UINT32:
+      absl::StrAppend(&text_, is_element ? r.GetRepeatedUInt32(message, &field, index)
+                                         : r.GetUInt32(message, &field));
+      return;
+    case Field::CPPTYPE_INT64:
+      absl::StrAppend(
+          &text_, "\"",
+          is_element ? r.GetRepeatedInt64(message, &field, index) : r.GetInt64(message, &field),
+          "\"");
+      return;
+    case Field::CPPTYPE_UINT64:
+      absl::StrAppend(
+          &text_, "\"",
+          is_element ? r.GetRepeatedUInt64(message, &field, index) : r.GetUInt64(message, &field),
+          "\"");
+      return;
+    case Field::CPPTYPE_DOUBLE: {
+      const double value =
+          is_element ? r.GetRepeatedDouble(message, &field, index) : r.GetDouble(message, &field);
+      PrintNumber(value, pb::SimpleDtoa(value));
+      return;
+    }
+    case Field::CPPTYPE_FLOAT: {
+      const float value =
+          is_element ? r.GetRepeatedFloat(message, &field, index) : r.GetFloat(message, &field);
+      PrintNumber(value, pb::SimpleFtoa(value));
+      return;
+    }
+    case Field::CPPTYPE_BOOL:
+      text_ += (is_element ? r.GetRepeatedBool(message, &field, index) : r.GetBool(message, &field))
+                   ? "true"
+                   : "false";
+      return;
+    case Field::CPPTYPE_ENUM: {
+      const int number = is_element ? r.GetRepeatedEnumValue(message, &field, index)
+                                    : r.GetEnumValue(message, &field);
+      const auto* const value = field.enum_type()->FindValueByNumber(number);
+      // A number that this build has no name for.
+      absl::StrAppend(&text_, value == nullptr ? absl::StrCat(number)
+                                               : absl::StrCat("\"", value->name(), "\""));
+      return;
+    }
+    case Field::CPPTYPE_STRING: {
+      std::string scratch;
+      const std::string& value =
+          is_element ? r.GetRepeatedStringReference(message, &field, index, &scratch)
+                     : r.GetStringReference(message, &field, &scratch);
+      if (field.type() == Field::TYPE_BYTES) {
+        absl::StrAppend(&text_, "\"", absl::Base64Escape(value), "\"");
+      } else {
+        PrintText(value);
+      }
+      return;
+    }
+    case Field::CPPTYPE_MESSAGE:
+      PrintMessage(is_element ? r.GetRepeatedMessage(message, &field, index)
+                              : r.GetMessage(message, &field));
+      return;
+  }
+}
+
+void Printer::PrintText(const std::string& text) {
+  if (IsPlain(text)) {
+    absl::StrAppend(&text_, "\"", text, "\"");
+    return;
+  }
+  pb::StringValue value;
+  value.set_value(text);
+  PrintByProtobuf(value);
+}
+
+void Printer::PrintByProtobuf(const pb::Message& message) {
+  std::string text;
+  const pb::util::Status written = pb::util::MessageToJsonString(message, &text);
+  text_ += text;
+  if (!written.ok()) {
+    status_ = absl::InternalError(
+        absl::StrCat("the reply cannot be written as JSON: ", written.ToString()));
+  }
+}
+
+void Printer::PrintNumber(double value, const std::string& text) {
+  if (std::isfinite(value)) {
+    text_ += text;
+  } else {
+    text_ += std::isnan(value) ? "\"NaN\"" : value > 0 ? "\"Infinity\"" : "\"-Infinity\"";
+  }
 }
 
 }  // namespace
 
 absl::StatusOr<std::string> JsonOfMessage(const pb::Message& message, JsonLayout layout,
                                           size_t bytes_max) {
-  pb::util::JsonPrintOptions options;
-  options.add_whitespace = layout == JsonLayout::kIndented;
-  options.always_print_primitive_fields = true;
-  options.preserve_proto_field_names = true;
-  const std::string bytes = SortedBytes(message);
-  pb::io::ArrayInputStream in(bytes.data(), static_cast<int>(bytes.size()));
-  std::string text;
-  BoundedOutput out(&text, bytes_max);
-  const pb::util::Status status =
-      pb::util::BinaryToJsonStream(Types(), UrlOf(*message.GetDescriptor()), &in, &out, options);
-  if (out.is_full()) {
-    return MakeError(Reason::kLimitExceeded,
-                     absl::StrCat("the reply takes more than ", bytes_max,
-                                  " bytes as JSON; ask for less at a time, or for protobuf"),
-                     {{"bytes_max", absl::StrCat(bytes_max)}});
-  }
-  if (!status.ok()) {
-    return absl::InternalError(absl::StrCat("the reply ", message.GetTypeName(),
-                                            " cannot be written as JSON: ", status.ToString()));
-  }
-  if (layout == JsonLayout::kOneLine) text += '\n';
-  return text;
+  Printer printer(layout, bytes_max);
+  printer.PrintMessage(message);
+  DSG_RETURN_IF_ERROR(printer.status());
+  return printer.TakeText() + "\n";
 }
 
 absl::StatusOr<std::string> BytesOfJson(std::string_view json, const pb::Descriptor& type) {
+  constexpr char kUrlPrefix[] = "type.googleapis.com";
+  static pb::util::TypeResolver& types =
+      *pb::util::NewTypeResolverForDescriptorPool(kUrlPrefix, pb::DescriptorPool::generated_pool());
   pb::io::ArrayInputStream in(json.data(), static_cast<int>(json.size()));
   std::string bytes;
   pb::io::StringOutputStream out(&bytes);
   const pb::util::Status status =
-      pb::util::JsonToBinaryStream(Types(), UrlOf(type), &in, &out, pb::util::JsonParseOptions());
+      pb::util::JsonToBinaryStream(&types, absl::StrCat(kUrlPrefix, "/", type.full_name()), &in,
+                                   &out, pb::util::JsonParseOptions());
   if (status.ok()) return bytes;
   return MakeError(Reason::kFieldInvalid,
                    absl::StrCat("the request is no ", type.full_name(),

@@ -96,8 +96,8 @@ struct Clients {
 v1::LocateAgentRequest DrawRequest(Random* random) {
   v1::LocateAgentRequest request;
   request.set_map(kWireMap);
-  request.set_agent(WirePerson(static_cast<int>(random->Index(kWirePersonCount))).ToString());
-  request.set_at_ns(static_cast<int64_t>(random->Index(kWireEndNs - kNsPerSecond)));
+  request.set_agent(ToString(WirePerson(random->Index(kWirePersonCount))));
+  request.set_at_ns(static_cast<int64_t>(random->Uniform(0, kWireEndNs - kNsPerSecond)));
   return request;
 }
 

@@ -12,6 +12,7 @@
 #include "dsg/v1/query_service.grpc.pb.h"
 #include "grpcpp/generic/generic_stub.h"
 #include "grpcpp/grpcpp.h"
+#include "schema/codec/status_decode.h"
 #include "server/server.h"
 #include "server/status_mapping.h"
 #include "tests/unit/query/engine/office.h"

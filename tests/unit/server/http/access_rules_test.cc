@@ -25,8 +25,9 @@ RequestHead Head(std::string_view method,
 // The status of the answer, 0 if the request may pass.
 int StatusOf(const AccessRules& rules, const RequestHead& head) {
   const auto refusal = rules.Check(head);
-  if (refusal.has_value()) EXPECT_FALSE(refusal->error.ok());
-  return refusal.has_value() ? refusal->http_status : 0;
+  if (!refusal.has_value()) return 0;
+  EXPECT_FALSE(refusal->error.ok());
+  return refusal->http_status;
 }
 
 TEST(AccessRules, TakeOwnNamesWithTheOwnPort) {
