@@ -200,8 +200,8 @@ absl::StatusOr<ListenAddress> ParseListenAddress(std::string_view text, bool all
   }
   if (!allow_remote && !IsLoopback(address.host)) {
     return AddressError(text,
-                        "other machines could reach it, and there is no authentication: every "
-                        "client can read and write every map. Listen on a unix socket or "
+                        "other machines could reach it, nothing is encrypted, and over gRPC "
+                        "every client can read and write every map. Listen on a unix socket or "
                         "127.0.0.1, or pass --allow-remote on a trusted network");
   }
   return address;

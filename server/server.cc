@@ -68,6 +68,16 @@ absl::Status CheckRange(const std::string& option, int value, int min, int max) 
 }
 
 absl::Status CheckHttp(const HttpOptions& http) {
+  for (const std::string& name : http.hosts) {
+    constexpr char kHostCharacters[] =
+        "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-_:[]";
+    if (!name.empty() && name.find_first_not_of(kHostCharacters) == std::string::npos) continue;
+    return MakeError(Reason::kFieldInvalid,
+                     absl::StrCat("\"", name,
+                                  "\" is no name of a host; give --http-host NAME or NAME:PORT, as "
+                                  "in the addresses that clients use"),
+                     {{"field", "http-host"}, {"value", name}});
+  }
   const bool has_more = !http.hosts.empty() || http.may_write || http.without_token;
   if (!http.listen.empty() || !has_more) return absl::OkStatus();
   return MakeError(Reason::kFieldInvalid,

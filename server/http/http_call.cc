@@ -65,17 +65,19 @@ void HttpCall::Drop() {
 }
 
 void HttpCall::Send() {
-  std::string bytes = TakeHead(200) + Chunk(EnvelopeOf(packed_.size()) + packed_);
+  std::string bytes = TakeHead(200);
+  AppendChunk(EnvelopeOf(packed_.size()), packed_, &bytes);
   std::string().swap(packed_);
   place_.outlet->Write(std::move(bytes), /*is_last=*/false);
 }
 
 void HttpCall::SendLast(const absl::Status& status) {
-  std::string bytes;
+  std::string bytes = TakeHead(200);
   if (type_.is_stream) {
-    bytes = TakeHead(200) + Chunk(EnvelopeOf(packed_.size()) + packed_) + End(status);
+    AppendChunk(EnvelopeOf(packed_.size()), packed_, &bytes);
+    AppendEnd(status, &bytes);
   } else {
-    bytes = TakeHead(200) + packed_;
+    bytes += packed_;
   }
   std::string().swap(packed_);
   place_.outlet->Write(std::move(bytes), /*is_last=*/true);
@@ -88,7 +90,8 @@ void HttpCall::Finish(const absl::Status& status) {
   packed_.clear();
   std::string bytes;
   if (type_.is_stream) {
-    bytes = TakeHead(200) + End(told);
+    bytes = TakeHead(200);
+    AppendEnd(told, &bytes);
   } else {
     packed_ = ErrorJson(told);
     bytes = TakeHead(HttpStatusOf(told.code())) + packed_;
@@ -117,14 +120,18 @@ std::string HttpCall::TakeHead(int status) {
   return TextOf(head);
 }
 
-std::string HttpCall::Chunk(const std::string& bytes) const {
-  if (!place_.may_chunk) return bytes;
-  return absl::StrCat(absl::Hex(bytes.size()), "\r\n", bytes, "\r\n");
+void HttpCall::AppendChunk(const std::string& head, const std::string& rest,
+                           std::string* bytes) const {
+  const size_t size = head.size() + rest.size();
+  bytes->reserve(bytes->size() + size + 64);
+  if (place_.may_chunk) absl::StrAppend(bytes, absl::Hex(size), "\r\n");
+  absl::StrAppend(bytes, head, rest);
+  if (place_.may_chunk) bytes->append("\r\n");
 }
 
-std::string HttpCall::End(const absl::Status& status) const {
-  const std::string end = Chunk(EndOfStream(status));
-  return place_.may_chunk ? end + "0\r\n\r\n" : end;
+void HttpCall::AppendEnd(const absl::Status& status, std::string* bytes) const {
+  AppendChunk(EndOfStream(status), "", bytes);
+  if (place_.may_chunk) bytes->append("0\r\n\r\n");
 }
 
 }  // namespace dsg::server

@@ -58,10 +58,10 @@ class HttpCall final : public CallWire {
  private:
   // The answer's head, or nothing if it has been sent.
   std::string TakeHead(int status);
-  // A message of a stream, as it leaves.
-  std::string Chunk(const std::string& bytes) const;
+  // A part of a stream, as it leaves.
+  void AppendChunk(const std::string& head, const std::string& rest, std::string* bytes) const;
   // How the stream ends, as it leaves.
-  std::string End(const absl::Status& status) const;
+  void AppendEnd(const absl::Status& status, std::string* bytes) const;
 
   CallRuntime* const runtime_;
   const ConnectType type_;

@@ -308,7 +308,8 @@ void Session::Refuse(const Refusal& refusal) {
   answer.body_bytes = body.size();
   answer.keeps_connection = false;
   answer.fields = fields;
-  SendBytes(TextOf(answer) + body, /*is_last=*/true);
+  const bool is_head = has_head_ && parser_->get().method() == http::verb::head;
+  SendBytes(TextOf(answer) + (is_head ? "" : body), /*is_last=*/true);
 }
 
 void Session::RefuseUnparsed(const error_code& error) {

@@ -61,8 +61,8 @@ class Stall(support.ProgramsTest):
     def test_sixty_streams_that_nobody_reads(self):
         body = http_port.envelope(b'{"map": "office", "agent": "robot"}')
 
-        def hold(port):
-            for _ in range(60):
+        def hold(port, count=60):
+            for _ in range(count):
                 made = port.socket(receive_bytes=4096)
                 made.sendall(port.head(TRACK, http_port.STREAM_JSON, len(body),
                                        connect_timeout_ms=60_000) + body)
@@ -70,11 +70,12 @@ class Stall(support.ProgramsTest):
             time.sleep(1)
         with self.beside(hold) as (process, port):
             # As many as there may be, and one more.
-            for _ in range(4):
-                port.socket(4096).sendall(port.head(TRACK, http_port.STREAM_JSON, len(body)) + body)
+            more = list(hold(port, count=4))
             support.wait_until(lambda: port.ask(TRACK, body, http_port.STREAM_JSON)[0] == 429,
                                "the port to have as many streams as it takes")
             self.assertIsNone(process.poll())
+            for made in more:
+                made.close()
 
     def test_two_hundred_half_sent_heads(self):
         def hold(port):

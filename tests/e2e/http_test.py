@@ -3,6 +3,7 @@
 """The HTTP port: the bytes of `dsg --json`, the Connect protocol by hand, files, orderly ends."""
 
 import contextlib
+import http.client
 import json
 import os
 import signal
@@ -258,6 +259,8 @@ class Process(http_port.HttpTest):
         self.refused(2, ["--allow-remote"], *start("--http", "0.0.0.0:0"))
         self.refused(2, ["HOST:PORT"], *start("--http", "8080"))
         self.refused(2, ["--http"], *start("--http-write"))
+        for name in ("", "http://example.org", "a b"):
+            self.refused(2, ["--http-host"], *start("--http", "127.0.0.1:0", "--http-host", name))
         with http_port.served(self, "store") as (_, port):
             self.refused(2, [port.host], *start("--http", port.host))
 
@@ -286,6 +289,23 @@ class Process(http_port.HttpTest):
             watch.close()
             self.assertEqual(0, process.wait(timeout=support.TIMEOUT_S))
             self.assertLess(time.monotonic() - begin, 4)
+
+    def test_a_stream_of_a_killed_server_has_no_end(self):
+        process = support.start("dsg-server", "--store", "store", "--listen", "unix:killed.sock",
+                                "--http", "unix:killed.http", cwd=self.folder)
+        port = http_port.Port("unix:killed.http", self.folder)
+        self.addCleanup(process.kill)
+        support.wait_until(lambda: os.path.exists(port.path), "the server")
+        watch = Stream(port, WATCH, {"map": "office", "after_revision": "0"})
+        self.assertEqual(0, watch.next()[0])
+        process.kill()
+        process.wait()
+        # Never an envelope that looks like the end.
+        with self.assertRaises((http.client.IncompleteRead, struct.error)):
+            while watch.next()[0] == 0:
+                pass
+            self.fail("the stream has an end")
+        watch.close()
 
     def test_a_client_that_is_killed_leaves_nothing(self):
         with http_port.served(self, "store", "--max-watches", "1") as (_, port):
