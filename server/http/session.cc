@@ -159,12 +159,9 @@ void Session::OnRead(bool ok, size_t byte_count) {
   } else if (!ok) {
     Close();
   } else if (phase_ == Phase::kLinger) {
+    // Beyond that the client has to wait, until Look closes the connection.
     lingered_bytes_ += byte_count;
-    if (lingered_bytes_ > kLingerBytesMax) {
-      Close();
-    } else {
-      ReadMore();
-    }
+    if (lingered_bytes_ < kLingerBytesMax) ReadMore();
   } else {
     Parse();
   }
