@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each lint check finds what it is there to find, and lets good code pass."""
 
+import os
+import tempfile
 import unittest
 
 import check_docs
@@ -9,8 +11,10 @@ import check_layering
 import check_names
 import check_packages
 import check_proto
+import check_python
 import check_tidy
 import check_types
+import tree
 
 LICENCE = "// SPDX-License-Identifier: Apache-2.0\n"
 
@@ -116,6 +120,25 @@ class Proto(unittest.TestCase):
         same = FIELD.format("x", 1, "TYPE_DOUBLE")
         self.assertEqual(1, len(self.breaks(same, values='value { name: "ONE" number: 2 }')))
         self.assertEqual(1, len(self.breaks(same, values="")))
+
+
+class Python(unittest.TestCase):
+    def test_a_message_that_the_protos_do_not_have_is_found(self):
+        text = tree.read(check_python.GENERATED)
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "v1.py")
+            for changed, problems in ((text, 0), (text.replace("at_ns: int", "at_s: int"), 1)):
+                with open(path, "w", encoding="utf-8") as f:
+                    f.write(changed)
+                self.assertEqual(problems, len(check_python.generated_problems(path)))
+
+    def test_a_wrong_type_is_found(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "module.py")
+            for text, problems in (("x: int = 1\n", 0), ("x: int = ''\n", 1)):
+                with open(path, "w", encoding="utf-8") as f:
+                    f.write(text)
+                self.assertEqual(problems, len(check_python.type_problems(path)))
 
 
 class Types(unittest.TestCase):

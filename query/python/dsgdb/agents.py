@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Questions about people and robots: where, when, who with whom."""
+
+from __future__ import annotations
+
+from typing import Iterable, Optional
+
+from dsgdb import v1
+from dsgdb.errors import InvalidArgument
+from dsgdb.questions import Box, Questions, box as to_box, optional_duration
+from dsgdb.rows import Rows, join
+from dsgdb.times import Duration, Instant, instant_ns
+from dsgdb.tracks import Track, Tracks, read_track
+
+_COEFFICIENTS_AND_JOINTS = (v1.ShapePart.SHAPE_PART_COEFFICIENTS, v1.ShapePart.SHAPE_PART_JOINTS)
+
+
+class AgentQuestions(Questions):
+    """An agent is named by node id ("H12") or by its name in the log ("carol")."""
+
+    def where(self, agent: str, at: Instant) -> v1.LocateAgentResponse:
+        """Where an agent was at an instant: interpolated between stored poses, never extrapolated.
+        In a gap of the track `position` is None and `quality` IN_GAP.
+
+        Errors: NOT_FOUND/AGENT_UNKNOWN; OUT_OF_RANGE/TIME_OUTSIDE_TRACK with both ends of the track
+        in the metadata.
+        """
+        return self.api.locate_agent(v1.LocateAgentRequest(
+            **self._common(), agent=agent, at_ns=instant_ns(at, self.spec, "at")))
+
+    def track(self, agent: str, start: Optional[Instant] = None, end: Optional[Instant] = None, *,
+              every: Optional[Duration] = None) -> Track:
+        """The poses of an agent in [start, end), by default all. With `every`: interpolated at this
+        period from `start` (or the first pose) on, NaN in gaps.
+        """
+        return self._track(agent, start, end, every, self._read_at)
+
+    def tracks(self, agents: Optional[Iterable[str]] = None, start: Optional[Instant] = None,
+               end: Optional[Instant] = None, *, every: Optional[Duration] = None) -> Tracks:
+        """The tracks of several agents (None = of all, by id), all of one revision."""
+        read_at = self._read_at
+        if agents is None:
+            # Agents of any kind; the first answer says which revision the others are read at.
+            listed = self._rows(
+                v1.Node, self.api.list_nodes, v1.ListNodesRequest(
+                    **self._common(), filter=v1.NodeFilter(layer="agents"),
+                    view=v1.NodeView.NODE_VIEW_BASIC), "nodes", None)
+            agents, read_at = listed.ids, v1.ReadAt(exact_revision=listed.revision)
+        elif isinstance(agents, str):
+            raise InvalidArgument(f"agents \"{agents}\" is one name; write [\"{agents}\"], or ask "
+                                  "for track()", "FIELD_INVALID", {"field": "agents"})
+        found: dict[str, Track] = {}
+        for agent in agents:
+            found[agent] = self._track(agent, start, end, every, read_at)
+            read_at = v1.ReadAt(exact_revision=found[agent].revision)
+        return Tracks(found, self.spec)
+
+    def who(self, where: Optional[str] = None, start: Optional[Instant] = None,
+            end: Optional[Instant] = None, *, box: Optional[Box] = None,
+            limit: Optional[int] = None) -> Rows[v1.PresenceInterval, v1.ListPresenceResponse]:
+        """Who was in a room, a place, a region above rooms (by id, name, or the class of a single
+        room), or in a box of the map frame, and when: stays, clipped to [start, end), which is by
+        default the span of all poses. `reply.observed_agent_count` agents were observed anywhere
+        then; the absence of others is no evidence.
+        """
+        if (where is None) == (box is None):
+            raise InvalidArgument("who asks about a room or a box: name one of both",
+                                  "FIELD_INVALID", {"field": "where"})
+        request = v1.ListPresenceRequest(
+            **self._common(), **self._interval(start, end), box=to_box(box),
+            node_id=None if where is None else self._region_id(where))
+        return self._rows(v1.PresenceInterval, self.api.list_presence, request, "intervals", limit)
+
+    def met(self, agent: str = "", other: str = "", start: Optional[Instant] = None,
+            end: Optional[Instant] = None, *, within_m: float = 0.0,
+            at_least: Optional[Duration] = None, line_of_sight: bool = False,
+            sight_gap: Optional[Duration] = None,
+            limit: Optional[int] = None) -> Rows[v1.Encounter, v1.ListEncountersResponse]:
+        """When agents were closer to each other than within_m metres (0 = 2), where, and how close:
+        those of `agent`, those of `agent` with `other`, or all. at_least leaves out shorter ones;
+        line_of_sight times with a wall between them, except for up to sight_gap (2 s).
+        """
+        request = v1.ListEncountersRequest(
+            **self._common(), **self._interval(start, end), agent=agent, other_agent=other,
+            distance_m=within_m, duration_ns_min=optional_duration(at_least, "at_least"),
+            line_of_sight=line_of_sight,
+            sight_gap_ns_max=optional_duration(sight_gap, "sight_gap"))
+        return self._rows(v1.Encounter, self.api.list_encounters, request, "encounters", limit)
+
+    def picked(self, agent: str = "", start: Optional[Instant] = None,
+               end: Optional[Instant] = None, *, object: str = "", class_name: str = "",
+               room: str = "", placed: bool = False, include_abstained: bool = False,
+               limit: Optional[int] = None) -> Rows[v1.Interaction, v1.ListInteractionsResponse]:
+        """Which objects went away, and who may have taken them, with probability and evidence;
+        placed: which objects appeared. include_abstained: also those for which the evidence names
+        nobody.
+        """
+        kind = v1.InteractionType.PLACED if placed else v1.InteractionType.PICKED
+        request = v1.ListInteractionsRequest(
+            **self._common(), **self._interval(start, end), agent=agent, class_name=class_name,
+            object=self._node_id(object) if object else "",
+            node_id=self._region_id(room) if room else "", types=(kind,),
+            include_abstained=include_abstained)
+        found = self._rows(v1.Interaction, self.api.list_interactions, request, "interactions",
+                           limit)
+        if not found:
+            self._check_words(v1.NodePattern(class_name=class_name))
+        return found
+
+    def predict(self, agent: str, at: Optional[Instant] = None, *,
+                horizon: Optional[Duration] = None, every: Optional[Duration] = None,
+                model: v1.PredictionModel = v1.PredictionModel.GOALS, paths_max: int = 0,
+                stop_at_walls: bool = False) -> v1.PredictAgentResponse:
+        """Where an agent will be: paths with their probabilities over `horizon` (4.8 s) in steps of
+        `every` (0.4 s), from `at` (the end of the track), without what was observed later.
+        """
+        return self.api.predict_agent(v1.PredictAgentRequest(
+            **self._common(), agent=agent, from_ns=self._ns(at, "at"), model=model,
+            horizon_ns=optional_duration(horizon, "horizon"),
+            period_ns=optional_duration(every, "every"), path_count_max=paths_max,
+            stop_at_walls=stop_at_walls))
+
+    def shape(self, agent: str, start: Optional[Instant] = None, end: Optional[Instant] = None, *,
+              parts: Iterable[v1.ShapePart] = _COEFFICIENTS_AND_JOINTS
+              ) -> Rows[v1.AgentShape, v1.GetAgentShapeResponse]:
+        """The body of an agent at each time of [start, end), in the frame of the agent. Vertices
+        come only if `parts` names them.
+        """
+        request = v1.GetAgentShapeRequest(**self._common(), agent=agent, parts=tuple(parts),
+                                          from_ns=self._ns(start, "start"),
+                                          to_ns=self._ns(end, "end"))
+        return join(v1.AgentShape, self.api.get_agent_shape(request), "shapes", self.spec)
+
+    def factors(self, agent: str, start: Optional[Instant] = None, end: Optional[Instant] = None,
+                ) -> Rows[v1.PoseFactor, v1.ListFactorsResponse]:
+        """The pose-graph factors of an agent that begin in [start, end)."""
+        request = v1.ListFactorsRequest(**self._common(), agent=agent,
+                                        from_ns=self._ns(start, "start"),
+                                        to_ns=self._ns(end, "end"))
+        return join(v1.PoseFactor, self.api.list_factors(request), "factors", self.spec)
+
+    def _track(self, agent: str, start: Optional[Instant], end: Optional[Instant],
+               every: Optional[Duration], read_at: Optional[v1.ReadAt]) -> Track:
+        period_ns = optional_duration(every, "every")
+        request = v1.GetTrajectoryRequest(
+            map=self.spec.name, read_at=read_at, agent=agent, from_ns=self._ns(start, "start"),
+            to_ns=self._ns(end, "end"), resample_period_ns=period_ns)
+        with self.api.json_stream("dsg.v1.QueryService/GetTrajectory", request) as messages:
+            return read_track(messages, self.spec, period_ns, agent)
