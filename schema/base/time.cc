@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "schema/base/time.h"
 
+#include <algorithm>
 #include <charconv>
 #include <chrono>
 #include <cmath>
@@ -32,31 +33,57 @@ int64_t UnitNs(std::string_view unit) {
   return 0;
 }
 
-// Exact for up to nine decimals of any unit: whole part and fraction are integers.
-absl::StatusOr<TimeNs> ParseOffset(std::string_view text) {
-  const bool negative = text[0] == '-';
-  size_t at = 1;
+// Takes a number and its unit from the front of `text`, as "1.5h" of "1.5h10m"; false if there is
+// none or it is far beyond 64 bits. Exact for up to nine decimals of any unit: whole part and
+// fraction are integers.
+bool TakeQuantity(std::string_view* text, __int128* quantity_ns, int64_t* unit_ns) {
+  const auto is_digit = [&](size_t at) {
+    return at < text->size() && std::isdigit(static_cast<unsigned char>((*text)[at]));
+  };
+  size_t at = 0;
   __int128 whole = 0;
   size_t digit_count = 0;
-  for (; at < text.size() && std::isdigit(static_cast<unsigned char>(text[at])); ++at) {
-    whole = whole * 10 + (text[at] - '0');
-    if (++digit_count > 19) return BadTime(text);
+  for (; is_digit(at); ++at) {
+    whole = whole * 10 + ((*text)[at] - '0');
+    if (++digit_count > 19) return false;
   }
   __int128 fraction = 0;
   __int128 scale = 1;
-  if (at < text.size() && text[at] == '.') {
-    for (++at; at < text.size() && std::isdigit(static_cast<unsigned char>(text[at])); ++at) {
+  if (at < text->size() && (*text)[at] == '.') {
+    for (++at; is_digit(at); ++at) {
       ++digit_count;
       if (scale >= 1'000'000'000'000'000) continue;
-      fraction = fraction * 10 + (text[at] - '0');
+      fraction = fraction * 10 + ((*text)[at] - '0');
       scale *= 10;
     }
   }
-  const int64_t unit = UnitNs(text.substr(at));
-  if (digit_count == 0 || unit == 0) return BadTime(text);
-  const __int128 offset = whole * unit + fraction * unit / scale;
-  if (offset > kTimeMax) return BadTime(text);
-  return static_cast<TimeNs>(negative ? -offset : offset);
+  const size_t unit_end = std::min(text->find_first_of("0123456789.", at), text->size());
+  *unit_ns = UnitNs(text->substr(at, unit_end - at));
+  if (digit_count == 0 || *unit_ns == 0) return false;
+  *quantity_ns = whole * *unit_ns + fraction * *unit_ns / scale;
+  text->remove_prefix(unit_end);
+  return true;
+}
+
+// A sign and quantities in descending units: "+12.5s", "-1m10s".
+absl::StatusOr<TimeNs> ParseOffset(std::string_view text) {
+  __int128 offset = 0;
+  int64_t last_unit_ns = std::numeric_limits<int64_t>::max();
+  std::string_view rest = text.substr(1);
+  // Of "+1h30" one would not know the unit; a number alone is seconds.
+  const bool is_bare = std::isalpha(static_cast<unsigned char>(text.back())) == 0;
+  do {
+    __int128 quantity_ns = 0;
+    int64_t unit_ns = 0;
+    if (!TakeQuantity(&rest, &quantity_ns, &unit_ns) || unit_ns >= last_unit_ns ||
+        (is_bare && !rest.empty())) {
+      return BadTime(text);
+    }
+    last_unit_ns = unit_ns;
+    offset += quantity_ns;
+    if (offset > kTimeMax) return BadTime(text);
+  } while (!rest.empty());
+  return static_cast<TimeNs>(text[0] == '-' ? -offset : offset);
 }
 
 }  // namespace

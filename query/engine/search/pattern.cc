@@ -9,6 +9,7 @@
 #include "dsg/v1/search.pb.h"
 #include "query/engine/search/vocabulary.h"
 #include "query/engine/search/words.h"
+#include "schema/base/spelling.h"
 #include "schema/base/status.h"
 #include "schema/model/known_names.h"
 

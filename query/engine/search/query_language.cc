@@ -10,6 +10,7 @@
 #include "query/engine/search/pattern.h"
 #include "query/engine/search/query_text.h"
 #include "query/engine/search/words.h"
+#include "schema/base/spelling.h"
 #include "schema/base/status.h"
 
 namespace dsg::query {

@@ -8,6 +8,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "query/engine/search/words.h"
+#include "schema/base/spelling.h"
 #include "schema/base/status.h"
 #include "schema/model/known_names.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Words as people type them: compared without letter case (A to Z only; other alphabets compare by
-// their bytes), with "*" for any text, near in spelling; names of colours; phrases for relations.
+// their bytes), with "*" for any text; names of colours; phrases for relations.
 #pragma once
 
 #include <optional>
@@ -30,17 +30,6 @@ class NameMatcher {
  private:
   std::string folded_;
 };
-
-/// Insertions, deletions, replacements and swaps of neighbours that turn one into the other.
-int EditDistance(std::string_view a, std::string_view b);
-
-/// At most five of `known` that are near to `word`, nearest first, then by spelling; case ignored.
-std::vector<std::string> NearInSpelling(std::string_view word,
-                                        const std::vector<std::string>& known);
-
-/// `; near in spelling: "cup", "cap"`, or, when nothing is near, `; known: ...` with the first ten
-/// in spelling and how many more there are, or nothing when none is known.
-std::string SpellingHint(std::string_view word, std::vector<std::string> known);
 
 /// All names, in the order in which people are told them.
 const std::vector<std::string>& ColorNames();

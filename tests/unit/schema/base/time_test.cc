@@ -23,6 +23,8 @@ TEST(ParseTime, ReadsOffsetsFromTheEpochWithoutRounding) {
   EXPECT_EQ(*ParseTime("-200ms", 0), -200'000'000);
   EXPECT_EQ(*ParseTime("+3m", 0), 180 * kNsPerSecond);
   EXPECT_EQ(*ParseTime("+1.5h", 0), 5400 * kNsPerSecond);
+  EXPECT_EQ(*ParseTime("+1m10s", 0), 70 * kNsPerSecond);
+  EXPECT_EQ(*ParseTime("-1d2h3min4.5s6ms", 0), -(93'784'506 * kNsPerSecond / 1000));
 }
 
 TEST(ParseTime, ReadsRfc3339) {
@@ -33,7 +35,8 @@ TEST(ParseTime, ReadsRfc3339) {
 TEST(ParseTime, RefusesWhatItDoesNotUnderstand) {
   for (const char* text :
        {"", "+", "-", "+s", "+1x", "12.5", "noon", "+99999999999999999999s", "2014-13-01T00:00:00Z",
-        "9223372036854775808", "+300000000000s", "9999-01-01T00:00:00Z", "+1.5 s"}) {
+        "9223372036854775808", "+300000000000s", "9999-01-01T00:00:00Z", "+1.5 s", "+10s1m",
+        "+1m1m", "+1h30", "+1m.s", "+1m-2s", "+200000d99999h"}) {
     const auto time = ParseTime(text, kEpoch);
     EXPECT_EQ(ReasonOf(time.status()), Reason::kFieldInvalid) << text;
   }

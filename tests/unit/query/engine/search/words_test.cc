@@ -52,25 +52,6 @@ TEST(NameMatcher, KnowsStarsAndIgnoresCase) {
   EXPECT_TRUE(NameMatcher(std::string(200, '*') + "b").Matches(std::string(2000, 'a') + "b"));
 }
 
-TEST(Spelling, CountsInsertionsDeletionsReplacementsAndSwaps) {
-  EXPECT_EQ(EditDistance("cup", "cup"), 0);
-  EXPECT_EQ(EditDistance("cup", "cpu"), 1);
-  EXPECT_EQ(EditDistance("table", "tables"), 1);
-  EXPECT_EQ(EditDistance("", "abc"), 3);
-  EXPECT_EQ(EditDistance("kitten", "sitting"), 3);
-}
-
-TEST(Spelling, ListsTheNearestFirst) {
-  const std::vector<std::string> known = {"table", "cable", "stable", "chair", "Tablet"};
-  EXPECT_EQ(NearInSpelling("tabel", known), (std::vector<std::string>{"table"}));
-  EXPECT_EQ(NearInSpelling("TABLE", known).front(), "table");
-  EXPECT_EQ(SpellingHint("zzzzz", {"b", "a"}), "; known: \"a\", \"b\"");
-  std::vector<std::string> many;
-  for (char c = 'a'; c <= 'm'; ++c) many.emplace_back(3, c);
-  const std::string hint = SpellingHint("zzzzz", many);
-  EXPECT_EQ(hint.substr(hint.find("\"jjj\"")), "\"jjj\" and 3 more") << hint;
-}
-
 TEST(RelationWords, TakeTheLongestPhrase) {
   EXPECT_EQ(FindRelationWord({"on", "top", "of"})->word_count, 3U);
   EXPECT_EQ(FindRelationWord({"on", "table"})->word_count, 1U);
