@@ -20,6 +20,7 @@
 #include "schema/base/byte_size.h"
 #include "schema/base/log.h"
 #include "schema/base/status.h"
+#include "schema/program/manual.h"
 #include "schema/retention/policy_file.h"
 #include "schema/store/graph_store.h"
 #include "server/prune_schedule.h"
@@ -228,6 +229,7 @@ int main(int argc, char** argv) {
                "dsg-server");
   try {
     DeclareFlags(&app, &flags);
+    dsg::AddManual(&app, DSG_VERSION);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;

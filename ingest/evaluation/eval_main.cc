@@ -29,6 +29,7 @@
 #include "ingest/truth/truth.h"
 #include "schema/base/exit_code.h"
 #include "schema/base/status.h"
+#include "schema/program/manual.h"
 #include "schema/store/graph_store.h"
 
 namespace dsg::evaluation {
@@ -302,6 +303,7 @@ int Main(int argc, char** argv) {
   Flags flags;
   AddMapFlags(&app, &flags);
   AddTrackFlags(&app, &flags);
+  AddManual(&app, DSG_VERSION);
   try {
     app.parse(argc, argv);
     CheckTogether(app, &flags);

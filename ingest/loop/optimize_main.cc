@@ -23,6 +23,7 @@
 #include "ingest/loop/robust.h"
 #include "schema/base/exit_code.h"
 #include "schema/base/status.h"
+#include "schema/program/manual.h"
 
 namespace dsg::ingest {
 namespace {
@@ -282,6 +283,7 @@ int Main(int argc, char** argv) {
                "dsg-optimize");
   Flags flags;
   AddFlags(&app, &flags);
+  AddManual(&app, DSG_VERSION);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -16,6 +16,7 @@
 #include "ingest/program/progress.h"
 #include "schema/base/exit_code.h"
 #include "schema/base/status.h"
+#include "schema/program/manual.h"
 #include "schema/store/graph_store.h"
 
 namespace dsg::ingest {
@@ -124,6 +125,7 @@ int AlignMain(int argc, char** argv) {
                "dsg-align");
   Flags flags;
   AddFlags(&app, &flags);
+  AddManual(&app, DSG_VERSION);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -30,6 +30,7 @@
 #include "ingest/program/yield.h"
 #include "schema/base/exit_code.h"
 #include "schema/base/status.h"
+#include "schema/program/manual.h"
 
 namespace dsg::ingest {
 namespace {
@@ -465,6 +466,7 @@ int Main(int argc, char** argv) {
   app.set_version_flag("--version", DSG_VERSION);
   AddIngestFlags(&app, &flags);
   AddConfigFile(&app);
+  AddManual(&app, DSG_VERSION);
   app.failure_message([](const CLI::App* program, const CLI::Error& error) {
     return absl::StrCat(program->get_name(), ": ", CLI::FailureMessage::simple(program, error));
   });

@@ -23,6 +23,7 @@
 #include "schema/base/exit_code.h"
 #include "schema/base/status.h"
 #include "schema/files/atomic_file.h"
+#include "schema/program/manual.h"
 #include "schema/store/graph_store.h"
 
 namespace dsg::ingest {
@@ -291,6 +292,7 @@ int OverlayMain(int argc, char** argv) {
   CLI::App app("dsg-overlay: draws what a map has over the images of its log", "dsg-overlay");
   OverlayFlags flags;
   AddOverlayFlags(&app, &flags);
+  AddManual(&app, DSG_VERSION);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ingest/simulator/cli/command.h"
+#include "schema/program/manual.h"
 
 namespace {
 
@@ -35,6 +36,7 @@ int main(int argc, char** argv) {
       {sensors, dsg::simulator::AddSensorsCommand(sensors)},
       {drift, dsg::simulator::AddDriftCommand(drift)},
       {preview, dsg::simulator::AddPreviewCommand(preview)}};
+  dsg::AddManual(&app, DSG_VERSION);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

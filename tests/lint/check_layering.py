@@ -14,7 +14,8 @@ BASE = ["schema/base"]
 MODEL = BASE + ["schema/model"]
 CODEC = MODEL + ["schema/codec"]
 STORE = CODEC + ["schema/store"]
-SCHEMA = STORE + ["schema/files", "schema/interop", "schema/picture", "schema/matching"]
+SCHEMA = STORE + ["schema/files", "schema/interop", "schema/picture", "schema/matching",
+                  "schema/program"]
 # The main of dsg-ingest alone may choose between a local store and a remote one.
 INGEST_STAGES = ["log", "simulator", "evaluation", "odometry", "loop", "depth", "volume", "agents",
                  "objects", "places", "rooms", "recognition"]
@@ -30,6 +31,7 @@ ALLOWED = {
     "proto": [],
     "schema/base": [],
     "schema/files": BASE,
+    "schema/program": BASE,
     "schema/model": BASE,
     "schema/codec": MODEL,
     "schema/store": CODEC,
@@ -103,7 +105,8 @@ THIRD_PARTY = [
     (r"pcl/|opencv2?/|ceres/|gtsam/|embree3/|rosbag/|yaml-cpp/|nanoflann",
      ["schema/retention *.cc", "ingest *.cc", "tests"]),
     (r"spdlog/", ["schema/base *.cc"]),
-    (r"CLI/", ["ingest *.cc", "query/cli", "server *.cc", "tests"]),
+    (r"CLI/", ["schema/program *.cc", "ingest *.cc", "query/cli", "server *.cc", "tests"]),
+    (r"GeographicLib/", ["query/cli/export *.cc"]),
     (r"png\.h$", ["schema/picture *.cc", "ingest/truth *.cc", "tests"]),
     (r"nlohmann/", ["schema/interop", "schema/archive *.cc", "ingest *.cc", "query/cli *.cc",
                     "server/http *.cc", "tests"]),
