@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "query/cli/answer_picture.h"
 
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -35,7 +38,10 @@ absl::Status DrawToFile(Session* session, const PictureOptions& options,
   }
   DSG_ASSIGN_OR_RETURN(const Written written,
                        WritePng(DrawTopView(answer.content, top), options.png, options.force));
-  if (session->common().json) return absl::OkStatus();
+  // What programs read has no line for people.
+  const bool is_for_people =
+      !session->common().json && session->common().format == ListFormat::kTable;
+  if (!is_for_people) return absl::OkStatus();
   TellWritten({written}, picture.revision, /*as_json=*/false, out);
   return absl::OkStatus();
 }
@@ -69,11 +75,11 @@ absl::Status WritePicture(Session* session, const PictureOptions& options,
                                         " was not written"));
 }
 
-absl::StatusOr<std::vector<std::vector<Eigen::Vector3d>>> WayOf(Session* session,
+absl::StatusOr<std::vector<std::vector<Eigen::Vector3d>>> WayOf(const Session& session,
                                                                 const std::string& agent,
                                                                 int64_t revision,
                                                                 const Interval& span) {
-  auto request = session->Begin<v1::GetTrajectoryRequest>();
+  auto request = session.Begin<v1::GetTrajectoryRequest>();
   request.mutable_read_at()->set_exact_revision(revision);
   request.set_agent(agent);
   if (span.from_ns != kTimeMin) request.set_from_ns(span.from_ns);
@@ -82,7 +88,7 @@ absl::StatusOr<std::vector<std::vector<Eigen::Vector3d>>> WayOf(Session* session
   TimeNs last_ns = kTimeMin;
   const auto take = [&](const v1::GetTrajectoryResponse& message) {
     for (const v1::TimedPose& pose : message.poses()) {
-      if (pieces.empty() || pose.time_ns() - last_ns > session->map().gap_ns_max) {
+      if (pieces.empty() || pose.time_ns() - last_ns > session.map().gap_ns_max) {
         pieces.emplace_back();
       }
       pieces.back().push_back(PointOf(pose.pose().position()));
@@ -90,7 +96,7 @@ absl::StatusOr<std::vector<std::vector<Eigen::Vector3d>>> WayOf(Session* session
     }
     return true;
   };
-  DSG_RETURN_IF_ERROR(session->Read(&query::Api::GetTrajectory, request, take));
+  DSG_RETURN_IF_ERROR(session.Read(&query::Api::GetTrajectory, request, take));
   return pieces;
 }
 
@@ -102,6 +108,19 @@ Polygon2d OutlineOf(const v1::Node& node) {
   bare.set_layer("objects");
   const auto plain = FromProto(bare, LayerTable());
   return plain.ok() ? FloorOutline(*plain) : Polygon2d();
+}
+
+Polygon2d EllipseOf(const Eigen::Vector2d& middle, const Eigen::Matrix2d& covariance) {
+  constexpr int kCornerCount = 48;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(covariance);
+  const Eigen::Vector2d radii = axes.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+  Polygon2d corners;
+  for (int i = 0; i < kCornerCount; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / kCornerCount;
+    const Eigen::Vector2d circle(std::cos(angle), std::sin(angle));
+    corners.push_back(middle + axes.eigenvectors() * radii.cwiseProduct(circle));
+  }
+  return corners;
 }
 
 void MarkNode(const v1::Node& node, uint32_t rgb, const std::string& label, Overlay* overlay) {

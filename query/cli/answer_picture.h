@@ -41,15 +41,16 @@ absl::StatusOr<Written> WritePng(const picture::Picture& picture, const std::str
 /// picture. Errors: of AtomicFile::Create.
 absl::Status CheckPicture(const PictureOptions& options);
 
-/// Writes the picture and, unless the answer is JSON, a line about it. Does nothing without a
-/// picture. To be called after the answer was printed: errors say that only the picture is missing.
+/// Writes the picture and, unless the answer is JSON or CSV, a line about it. Does nothing without
+/// a picture. To be called after the answer was printed: errors say that only the picture is
+/// missing.
 ///
 /// Errors: of the calls; of AtomicFile, naming the file.
 absl::Status WritePicture(Session* session, const PictureOptions& options,
                           const AnswerPicture& picture, std::ostream& out);
 
 /// The positions of an agent within an interval, map frame; one piece per stretch without a gap.
-absl::StatusOr<std::vector<std::vector<Eigen::Vector3d>>> WayOf(Session* session,
+absl::StatusOr<std::vector<std::vector<Eigen::Vector3d>>> WayOf(const Session& session,
                                                                 const std::string& agent,
                                                                 int64_t revision,
                                                                 const Interval& span);
@@ -58,6 +59,10 @@ Eigen::Vector3d PointOf(const v1::Vector3& point);
 
 /// The node's box or footprint seen from above; empty without either.
 Polygon2d OutlineOf(const v1::Node& node);
+
+/// The points that lie one standard deviation from the middle. Requires: `covariance` is symmetric;
+/// negative variances count as zero.
+Polygon2d EllipseOf(const Eigen::Vector2d& middle, const Eigen::Matrix2d& covariance);
 
 /// Adds a mark for a node, with its outline if it has one.
 void MarkNode(const v1::Node& node, uint32_t rgb, const std::string& label, Overlay* overlay);

@@ -8,6 +8,7 @@
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "dsg/v1/graph.pb.h"
 #include "dsg/v1/maintenance_service.pb.h"
 #include "schema/base/status.h"
@@ -47,11 +48,6 @@ std::string TimeText::Span(TimeNs from_ns, TimeNs to_ns) const {
   return absl::StrCat(Full(from_ns), " to ", Full(to_ns));
 }
 
-std::string TimeText::Held(const v1::Edge& edge) const {
-  return Span(edge.has_valid_from_ns() ? edge.valid_from_ns() : kTimeMin,
-              edge.has_valid_to_ns() ? edge.valid_to_ns() : kTimeMax);
-}
-
 absl::Status TimeText::Explain(const absl::Status& status) const {
   if (ReasonOf(status) != Reason::kTimeOutsideTrack) return status;
   const ErrorMetadata metadata = MetadataOf(status);
@@ -68,10 +64,22 @@ absl::Status TimeText::Explain(const absl::Status& status) const {
                    metadata);
 }
 
+TimeNs LengthNs(TimeNs from_ns, TimeNs to_ns) {
+  TimeNs length_ns = 0;
+  return __builtin_sub_overflow(to_ns, from_ns, &length_ns) ? kTimeMax : length_ns;
+}
+
 std::string DurationText(TimeNs from_ns, TimeNs to_ns) {
   // Drops the sign of the relative time.
   const std::string text = FormatRelative(to_ns, from_ns);
   return text[0] == '+' ? text.substr(1) : text;
+}
+
+std::string SecondsText(TimeNs time_ns) {
+  const __int128 magnitude = time_ns < 0 ? -static_cast<__int128>(time_ns) : time_ns;
+  return absl::StrFormat("%s%d.%09d", time_ns < 0 ? "-" : "",
+                         static_cast<uint64_t>(magnitude / kNsPerSecond),
+                         static_cast<uint64_t>(magnitude % kNsPerSecond));
 }
 
 std::string BytesText(int64_t byte_count) {
@@ -104,36 +112,27 @@ std::string NamedId(const std::string& id, const std::string& name) {
   return name.empty() || name == id ? id : absl::StrCat(name, " (", id, ")");
 }
 
+std::string ProvenanceText(int provenance) {
+  switch (provenance) {
+    case v1::PROVENANCE_PERCEIVED:
+      return "perceived";
+    case v1::PROVENANCE_IMPORTED:
+      return "imported";
+    case v1::PROVENANCE_PREDICTED:
+      return "predicted";
+    case v1::PROVENANCE_MANUAL:
+      return "manual";
+    default:
+      return "";
+  }
+}
+
 double YawDeg(const v1::Pose& pose) {
   const v1::Quaternion& q = pose.orientation();
   // A message without an orientation means the identity; its zeros also give 0 here.
   const double sine = 2.0 * (q.w() * q.z() + q.x() * q.y());
   const double cosine = 1.0 - 2.0 * (q.y() * q.y() + q.z() * q.z());
   return std::atan2(sine, cosine) * 180.0 / std::numbers::pi;
-}
-
-std::vector<Column> NodeColumns() {
-  return {{"id"},
-          {"kind"},
-          {"layer"},
-          {"name"},
-          {"class"},
-          {"x m", Align::kRight},
-          {"y m", Align::kRight},
-          {"z m", Align::kRight}};
-}
-
-std::vector<std::string> NodeCells(const v1::Node& node) {
-  std::vector<std::string> cells = {node.id(), node.kind(), node.layer(), node.name(),
-                                    node.semantic_class().name()};
-  // An agent that is not observed at the instant has no pose.
-  if (!node.has_map_t_node()) {
-    cells.insert(cells.end(), 3, "unknown");
-    return cells;
-  }
-  const v1::Vector3& p = node.map_t_node().position();
-  for (const double coordinate : {p.x(), p.y(), p.z()}) cells.push_back(Fixed(coordinate, 2));
-  return cells;
 }
 
 std::string Footer(int64_t count, const std::string& noun, int64_t revision, bool is_cut) {

@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <string>
-#include <vector>
 
 #include "absl/status/status.h"
 #include "query/cli/table.h"
@@ -13,8 +12,6 @@
 
 namespace dsg::v1 {
 class Amount;
-class Edge;
-class Node;
 class Pose;
 class Vector3;
 }  // namespace dsg::v1
@@ -39,8 +36,6 @@ class TimeText {
   std::string Tenth(TimeNs time_ns) const;
   /// "+1s to +2.5s"; empty if both ends are open.
   std::string Span(TimeNs from_ns, TimeNs to_ns) const;
-  /// When the edge held, as Span.
-  std::string Held(const v1::Edge& edge) const;
 
   /// The same error; TIME_OUTSIDE_TRACK also gets the times at which the track begins and ends.
   absl::Status Explain(const absl::Status& status) const;
@@ -50,8 +45,14 @@ class TimeText {
   Clock clock_;
 };
 
+/// Of an interval; the largest number if it is longer than 64 bits hold.
+TimeNs LengthNs(TimeNs from_ns, TimeNs to_ns);
+
 /// "2.5s" for the length of an interval.
 std::string DurationText(TimeNs from_ns, TimeNs to_ns);
+
+/// Seconds with nine decimals, exact: "1403715524.907143168".
+std::string SecondsText(TimeNs time_ns);
 
 /// "60.5 MB (60512345 bytes)"; only the bytes below 1 kB.
 std::string BytesText(int64_t byte_count);
@@ -62,15 +63,14 @@ std::string AmountText(const v1::Amount& amount);
 /// "carol (H1)"; the id without a name.
 std::string NamedId(const std::string& id, const std::string& name);
 
+/// "perceived"; empty if unspecified. `provenance` is a v1::Provenance.
+std::string ProvenanceText(int provenance);
+
 /// Rotation about the map's z axis, degrees in (-180, 180].
 double YawDeg(const v1::Pose& pose);
 
 /// "x 1.20 y 3.40 z 0.00 m".
 std::string PositionText(const v1::Vector3& position);
-
-/// The columns of every list of nodes, and the cells of one node.
-std::vector<Column> NodeColumns();
-std::vector<std::string> NodeCells(const v1::Node& node);
 
 /// "3 nodes (revision 6)", and a hint at --limit if the list is cut.
 std::string Footer(int64_t count, const std::string& noun, int64_t revision, bool is_cut);

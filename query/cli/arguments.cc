@@ -32,7 +32,7 @@ absl::Status ApplyEnvironment(const Environment& environment, Command* command) 
 
 absl::StatusOr<Command> ParseArguments(const std::vector<std::string>& arguments,
                                        const Environment& environment) {
-  Grammar grammar;
+  Grammar grammar(environment.version);
   for (const auto add : kVerbs) add(&grammar);
   DSG_RETURN_IF_ERROR(grammar.Parse(arguments));
   Command command = grammar.command();

@@ -25,6 +25,9 @@ struct Environment {
   std::string version{};
 };
 
+/// How a list is written, unless the whole reply is asked for as JSON.
+enum class ListFormat { kTable, kCsv, kJsonLines };
+
 /// Options that several verbs share.
 struct CommonOptions {
   /// At most one of the two is set.
@@ -38,6 +41,7 @@ struct CommonOptions {
   /// The revision by its tag; then `revision` is unset.
   std::string tag;
   bool json = false;
+  ListFormat format = ListFormat::kTable;
   /// Maximum number of entries; 0 = all.
   int64_t limit = 0;
   /// Deadline of each call, seconds; 0 = none on a store, the client's default on a server.
@@ -94,7 +98,7 @@ struct Command {
   std::any verb;
   /// Checks options that depend on each other; may be empty.
   std::function<absl::Status(const CommonOptions& common)> check;
-  /// Writes the answer to `out`; nothing on an error.
+  /// Writes the answer to `out`; on an error nothing, or what a list had written until then.
   std::function<absl::Status(Session* session, std::ostream& out)> run;
 };
 

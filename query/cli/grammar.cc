@@ -6,10 +6,13 @@
 #include <cstdint>
 #include <functional>
 
+#include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "query/cli/export/top_view.h"
+#include "schema/base/spelling.h"
+#include "schema/program/manual.h"
 
 namespace dsg::cli {
 namespace {
@@ -49,6 +52,11 @@ CLI::Validator WholeCheck(const std::string& form, const std::string& what, int6
   });
 }
 
+ListFormat FormatOf(const std::string& name) {
+  if (name == "csv") return ListFormat::kCsv;
+  return name == "jsonl" ? ListFormat::kJsonLines : ListFormat::kTable;
+}
+
 }  // namespace
 
 absl::Status Usage(const std::string& message, const std::string& verb) {
@@ -56,10 +64,11 @@ absl::Status Usage(const std::string& message, const std::string& verb) {
       absl::StrCat(message, "; see dsg ", verb, verb.empty() ? "" : " ", "--help"));
 }
 
-Grammar::Grammar() {
+Grammar::Grammar(const std::string& version) {
   app_.name("dsg");
   app_.require_subcommand(1);
-  app_.footer(kTimeHelp);
+  app_.footer(absl::StrCat("dsg help VERB explains a verb.\n", kTimeHelp));
+  AddManual(&app_, version);
 }
 
 CLI::App* Grammar::AddApp(const std::string& name, const std::string& what,
@@ -84,6 +93,13 @@ CLI::App* Grammar::AddApp(const std::string& name, const std::string& what,
     AddRevision(app, "--revision", "Read at this revision or tag; default the newest", &revision_);
   }
   if (takes & kJson) app->add_flag("--json", common.json, "Print the reply as protobuf JSON");
+  if (takes & kFormat) {
+    app->add_option_function<std::string>(
+           "--format", [&common](const std::string& format) { common.format = FormatOf(format); },
+           "table, csv (exact numbers, times in ns), or jsonl: an entry a line, as in --json")
+        ->check(CLI::IsMember({"table", "csv", "jsonl"}))
+        ->excludes(app->get_option("--json"));
+  }
   if (takes & kLimit) {
     app->add_option("--limit", common.limit, "List at most this many entries")
         ->check(WholeAboveZero());
@@ -91,15 +107,47 @@ CLI::App* Grammar::AddApp(const std::string& name, const std::string& what,
   return app;
 }
 
+namespace {
+
+std::vector<std::string> NamesOfVerbs(const CLI::App& app) {
+  std::vector<std::string> names;
+  const auto any = [](const CLI::App*) { return true; };
+  for (const CLI::App* verb : app.get_subcommands(any)) names.push_back(verb->get_name());
+  return names;
+}
+
+// Options near in spelling to the first of the words that looks like one.
+std::string OptionHint(const CLI::App& verb, const std::vector<std::string>& words) {
+  std::vector<std::string> known;
+  for (const CLI::Option* option : verb.get_options()) {
+    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+  }
+  for (const std::string& word : words) {
+    if (absl::StartsWith(word, "--")) return NearHint(word.substr(0, word.find('=')), known);
+  }
+  return "";
+}
+
+// "help VERB" as "VERB --help".
+void ReplaceHelp(std::vector<std::string>* arguments) {
+  if (arguments->empty() || (*arguments)[0] != "help") return;
+  arguments->erase(arguments->begin());
+  if (arguments->size() <= 1) arguments->push_back("--help");
+}
+
+}  // namespace
+
 absl::Status Grammar::Parse(std::vector<std::string> arguments) {
+  ReplaceHelp(&arguments);
   // CLI11 would only say that a subcommand is missing.
   if (arguments.empty()) return Usage("name a verb: where, who, find, path, ...", "");
   if (arguments[0] == "--version") arguments[0] = "version";
   const std::string first = arguments[0];
   const auto is_first = [&](const CLI::App* verb) { return verb->check_name(first); };
   const bool is_verb = !app_.get_subcommands(is_first).empty();
-  if (!is_verb && first != "-h" && first != "--help") {
-    return Usage(absl::StrCat("there is no verb \"", first, "\""), "");
+  if (!is_verb && first != "-h" && first != "--help" && first != kManualFlag) {
+    return Usage(
+        absl::StrCat("there is no verb \"", first, "\"", NearHint(first, NamesOfVerbs(app_))), "");
   }
   // CLI11 takes them last first.
   std::reverse(arguments.begin(), arguments.end());
@@ -108,10 +156,16 @@ absl::Status Grammar::Parse(std::vector<std::string> arguments) {
   } catch (const CLI::CallForHelp&) {
     // The help of the verb, if one is named.
     command_.help = app_.help();
-  } catch (const CLI::ExtrasError&) {
-    return Usage(absl::StrCat("not understood: ", absl::StrJoin(app_.remaining(true), " ")),
-                 is_verb ? first : "");
+  } catch (const CLI::CallForVersion& manual) {
+    command_.help = absl::StrCat(manual.what(), "\n");
   } catch (const CLI::ParseError& error) {
+    // A misspelt option is also missing; the word is what helps.
+    const std::vector<std::string> unknown = app_.remaining(true);
+    if (is_verb && !unknown.empty()) {
+      return Usage(absl::StrCat("not understood: ", absl::StrJoin(unknown, " "),
+                                OptionHint(*app_.get_subcommand(first), unknown)),
+                   first);
+    }
     return Usage(error.what(), is_verb ? first : "");
   }
   command_.common.revision = revision_.number;
@@ -128,7 +182,8 @@ void AddFilter(CLI::App* app, FilterOptions* filter) {
 
 void AddPicture(CLI::App* app, const std::string& what, PictureOptions* picture) {
   CLI::Option* png =
-      app->add_option("--png", picture->png, "Also draw " + what + " on the map, to this PNG file");
+      app->add_option("--png", picture->png, "Also draw " + what + " on the map, to this PNG file")
+          ->check(EndsIn({".png"}));
   app->add_option("--floor", picture->floor, kFloorHelp)->needs(png);
   app->add_option("--width", picture->width_px, "Width of the picture, pixels")
       ->check(Between(kTopViewWidthMin, kTopViewWidthMax))
@@ -170,6 +225,19 @@ CLI::Validator Between(double low, double high) {
   return RealCheck(absl::StrCat("in [", low, " - ", high, "]"),
                    absl::StrCat("a number from ", low, " to ", high),
                    [low, high](double number) { return number >= low && number <= high; });
+}
+
+CLI::Validator EndsIn(const std::vector<std::string>& endings) {
+  const auto check = [endings](const std::string& path) {
+    const bool fits = std::any_of(endings.begin(), endings.end(), [&](const std::string& ending) {
+      return path.size() > ending.size() && absl::EndsWithIgnoreCase(path, ending);
+    });
+    if (fits) return std::string();
+    return absl::StrCat("\"", path,
+                        "\" is of another format than what is written; end the name in ",
+                        absl::StrJoin(endings, ", "));
+  };
+  return CLI::Validator(check, absl::StrCat("FILE", absl::StrJoin(endings, "|")));
 }
 
 }  // namespace dsg::cli

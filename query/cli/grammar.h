@@ -22,6 +22,8 @@ enum Takes : unsigned {
   kRevision = 8,
   kJson = 16,
   kLimit = 32,
+  /// The answer is one list, which has --format.
+  kFormat = 64,
   kQuestion = kServer | kMap | kRevision | kJson,
 };
 
@@ -32,6 +34,7 @@ inline constexpr char kAgentHelp[] = "Node id (H12) or the name in the log (12)"
 inline constexpr char kNodeHelp[] = "Node id (O42) or a unique name";
 inline constexpr char kMapFromHelp[] = "First TIME; default the first pose of the map";
 inline constexpr char kMapToHelp[] = "TIME to stop before; default after the last pose";
+inline constexpr char kContentAtHelp[] = "The world at this TIME; default all that has not ended";
 inline constexpr char kFloorHelp[] =
     "Draw only this floor: a level or room by id or name, or a height in metres";
 
@@ -45,7 +48,7 @@ struct VerbSpec {
   std::string example{};
   unsigned takes = kQuestion;
   Opens opens = Opens::kMap;
-  /// Writes the answer to `out`; nothing on an error.
+  /// Writes the answer to `out`; on an error nothing, or what a list had written until then.
   absl::Status (*run)(Session* session, const V& verb, std::ostream& out) = nullptr;
   /// Checks options that depend on each other, before anything is opened.
   absl::Status (*check)(const V& verb, const CommonOptions& common) = nullptr;
@@ -58,7 +61,8 @@ absl::Status Usage(const std::string& message, const std::string& verb);
 
 class Grammar {
  public:
-  Grammar();
+  /// `version`: of this program, for its manual.
+  explicit Grammar(const std::string& version);
 
   /// Adds a verb. The verb's own options are added to the first, and write to the second, which
   /// lives as long as the first.
@@ -86,6 +90,8 @@ class Grammar {
 
   absl::Status Parse(std::vector<std::string> arguments);
   const Command& command() const { return command_; }
+  /// All verbs and their options.
+  const CLI::App& app() const { return app_; }
 
  private:
   CLI::App* AddApp(const std::string& name, const std::string& what, const std::string& example,
@@ -111,5 +117,8 @@ CLI::Validator WholeAboveZero();
 CLI::Validator WholeZeroOrMore();
 /// Both ends are allowed.
 CLI::Validator Between(double low, double high);
+
+/// The name of a file that ends in one of these, which say its format; letters of either case.
+CLI::Validator EndsIn(const std::vector<std::string>& endings);
 
 }  // namespace dsg::cli

@@ -32,10 +32,8 @@ absl::Status JsonListWriter::Add(const google::protobuf::Message& part) {
   const std::string head = absl::StrCat("\n \"", list_, "\": [");
   const size_t begin = text.find(head) + head.size();
   const size_t end = text[begin] == ']' ? begin : text.find("\n ]", begin);
-  if (!has_begun_) {
-    out_ << text.substr(0, begin);
-    rest_ = text.substr(text.find(']', end));
-  }
+  if (!has_begun_) out_ << text.substr(0, begin);
+  rest_ = text.substr(text.find(']', end));
   has_begun_ = true;
   if (end == begin) return absl::OkStatus();
   if (has_entries_) out_ << ",";

@@ -24,7 +24,8 @@ absl::Status WriteJson(const google::protobuf::Message& reply, std::ostream& out
 absl::Status WriteJsonLine(const google::protobuf::Message& reply, std::ostream& out);
 
 /// Writes a reply that arrives in parts, with the bytes that WriteJson writes for the whole,
-/// without keeping the parts: one list grows from part to part, everything else is in the first.
+/// without keeping the parts: one list grows from part to part; the fields before it are those of
+/// the first part, the fields behind it those of the last.
 class JsonListWriter {
  public:
   /// `list` is a repeated message field of the reply. `out` must outlive this.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "query/cli/lookups.h"
 
+#include <set>
+
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/maintenance_service.pb.h"
 #include "dsg/v1/map_service.pb.h"
@@ -58,6 +60,12 @@ std::string NodeNames::Text(const std::string& id) const {
   return found == names_.end() ? id : NamedId(id, found->second);
 }
 
+Cell NodeNames::Of(const std::string& id) const {
+  if (id.empty()) return Cell();
+  const auto found = names_.find(id);
+  return NodeCell{id, found == names_.end() ? "" : found->second};
+}
+
 absl::StatusOr<NodeNames> NamesOf(Session* session, int64_t revision,
                                   const std::vector<std::string>& ids) {
   std::map<std::string, std::string> names;
@@ -76,6 +84,35 @@ absl::StatusOr<NodeNames> NamesOf(Session* session, int64_t revision,
     }
   }
   return NodeNames(std::move(names));
+}
+
+absl::StatusOr<std::vector<std::string>> NamesOfMaps(const Session& session) {
+  v1::ListMapsResponse reply;
+  DSG_RETURN_IF_ERROR(session.api().ListMaps(session.NewCall(), v1::ListMapsRequest(), &reply));
+  std::vector<std::string> names;
+  for (const v1::MapSpec& map : reply.maps()) names.push_back(map.name());
+  return names;
+}
+
+absl::StatusOr<std::vector<std::string>> NamesOfNodes(const Session& session,
+                                                      const std::string& layer,
+                                                      int64_t node_count_max) {
+  auto request = session.Begin<v1::ListNodesRequest>();
+  request.mutable_filter()->set_layer(layer);
+  request.set_view(v1::NODE_VIEW_BASIC);
+  std::set<std::string> names;
+  DSG_RETURN_IF_ERROR(
+      session.EachPage(&query::Api::ListNodes, request, node_count_max,
+                       &v1::ListNodesResponse::nodes_size, [&](const v1::ListNodesResponse& page) {
+                         for (const v1::Node& node : page.nodes()) {
+                           names.insert(node.name().empty() ? node.id() : node.name());
+                           if (node.kind() == kinds::kRoom)
+                             names.insert(node.semantic_class().name());
+                         }
+                         return absl::OkStatus();
+                       }));
+  names.erase("");
+  return std::vector<std::string>(names.begin(), names.end());
 }
 
 absl::StatusOr<std::string> NodeIdOf(Session* session, const std::string& id_or_name) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "query/cli/list_writer.h"
 #include "query/cli/session.h"
 #include "schema/base/time.h"
 #include "schema/model/layer.h"
@@ -34,6 +35,8 @@ class NodeNames {
 
   /// "kitchen (R9)"; only the id of a node without a name; empty without an id.
   std::string Text(const std::string& id) const;
+  /// The same as a cell of a list; none without an id.
+  Cell Of(const std::string& id) const;
 
  private:
   std::map<std::string, std::string> names_;
@@ -42,6 +45,15 @@ class NodeNames {
 /// Reads the names of all ids in one call, at `revision`. Ids may repeat, be empty or be unknown.
 absl::StatusOr<NodeNames> NamesOf(Session* session, int64_t revision,
                                   const std::vector<std::string>& ids);
+
+/// The names of all maps.
+absl::StatusOr<std::vector<std::string>> NamesOfMaps(const Session& session);
+
+/// Names of nodes, ids of those without one, and the classes of rooms, by which these can be named:
+/// each once, of at most so many nodes of a layer; empty = of all layers.
+absl::StatusOr<std::vector<std::string>> NamesOfNodes(const Session& session,
+                                                      const std::string& layer,
+                                                      int64_t node_count_max);
 
 /// The id of a node by id or unique name. Errors: of GetNode.
 absl::StatusOr<std::string> NodeIdOf(Session* session, const std::string& id_or_name);

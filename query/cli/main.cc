@@ -18,6 +18,9 @@ std::string FromEnvironment(const char* name) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // A reader that has seen enough (`| head`) ends the program without a word, whatever was
+  // inherited.
+  std::signal(SIGPIPE, SIG_DFL);
   // Beyond the file-size limit of the shell a write fails with a message, instead of a signal.
   std::signal(SIGXFSZ, SIG_IGN);
   const dsg::cli::Environment environment{.store = FromEnvironment("DSG_STORE"),

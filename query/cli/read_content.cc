@@ -10,6 +10,7 @@
 #include "dsg/v1/query_service.pb.h"
 #include "query/cli/read_bodies.h"
 #include "query/cli/session.h"
+#include "query/cli/values.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/picture/look.h"
@@ -239,6 +240,14 @@ class ContentReader {
 
 absl::StatusOr<ContentAnswer> ReadContent(Session* session, const ContentOptions& options) {
   return ContentReader(session, options).Read();
+}
+
+absl::StatusOr<ContentAnswer> ReadContentAt(Session* session, const std::string& at,
+                                            ContentOptions options) {
+  if (!at.empty()) {
+    DSG_ASSIGN_OR_RETURN(options.at_ns, ParseInstant("--at", at, session->map()));
+  }
+  return ReadContent(session, options);
 }
 
 }  // namespace dsg::cli

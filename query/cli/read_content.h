@@ -43,4 +43,8 @@ struct ContentAnswer {
 /// RESOURCE_EXHAUSTED/LIMIT_EXCEEDED for more bodies than asked for.
 absl::StatusOr<ContentAnswer> ReadContent(Session* session, const ContentOptions& options);
 
+/// The same at the instant of --at, which may be empty. Errors: also INVALID_ARGUMENT naming --at.
+absl::StatusOr<ContentAnswer> ReadContentAt(Session* session, const std::string& at,
+                                            ContentOptions options);
+
 }  // namespace dsg::cli

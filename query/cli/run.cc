@@ -2,6 +2,7 @@
 #include "query/cli/run.h"
 
 #include "query/cli/errors.h"
+#include "query/cli/near_names.h"
 #include "query/cli/session.h"
 #include "schema/base/status.h"
 
@@ -14,9 +15,14 @@ absl::StatusOr<ExitCode> RunCommand(const std::vector<std::string>& arguments,
   DSG_ASSIGN_OR_RETURN(const Command command, ParseArguments(arguments, environment));
   Session session(command.common, environment.version, &errors);
   if (command.opens != Opens::kNothing) DSG_RETURN_IF_ERROR(session.Open());
-  if (command.opens == Opens::kMap) DSG_RETURN_IF_ERROR(session.ChooseMap());
+  absl::Status answered;
+  if (command.opens == Opens::kMap) answered = session.ChooseMap();
   out << command.help;
-  if (command.run) DSG_RETURN_IF_ERROR(command.run(&session, out));
+  if (answered.ok() && command.run) answered = command.run(&session, out);
+  if (!answered.ok() && command.opens != Opens::kNothing) {
+    return WithNearNames(&session, answered);
+  }
+  DSG_RETURN_IF_ERROR(answered);
   out.flush();
   // A full disk or a closed pipe must not look like a complete answer.
   if (!out) return absl::UnavailableError("the answer could not be written out in full");

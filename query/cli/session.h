@@ -29,23 +29,40 @@ inline int64_t EntriesLeft(int64_t limit) {
   return limit == 0 ? std::numeric_limits<int64_t>::max() : limit;
 }
 
-/// Calls `fetch(request, &page)` page by page, until the list ends or `all` has `limit` entries
-/// (0 = all). The next_page_token of `all` is set only if entries are left out. `count(page)` is
-/// the number of entries of a page.
-template <class Request, class Reply, class Count, class Fetch>
-absl::Status FetchPages(Request request, int64_t limit, const Count& count, const Fetch& fetch,
-                        Reply* all) {
+/// Leaves at most `*left` entries in a part of a list, and counts them down.
+template <class Entries>
+void CutToLimit(Entries* entries, int64_t* left) {
+  const int count = static_cast<int>(std::min<int64_t>(entries->size(), *left));
+  entries->DeleteSubrange(count, entries->size() - count);
+  *left -= count;
+}
+
+/// Calls `fetch(request, &page)` page by page and gives each page to `take`, until the list ends or
+/// `limit` entries were read (0 = all). The next_page_token of the last page is set only if entries
+/// are left out. `count(page)` is the number of entries of a page. Errors: of both calls.
+template <class Reply, class Request, class Count, class Fetch, class Take>
+absl::Status ForEachPage(Request request, int64_t limit, const Count& count, const Fetch& fetch,
+                         const Take& take) {
   for (int64_t left = EntriesLeft(limit);;) {
     request.set_page_size(static_cast<int32_t>(std::min(left, kPageSizeMax)));
     Reply page;
     DSG_RETURN_IF_ERROR(fetch(request, &page));
-    const std::string token = page.next_page_token();
     left -= std::invoke(count, page);
-    all->MergeFrom(page);
-    all->set_next_page_token(token);
-    if (token.empty() || left <= 0) return absl::OkStatus();
-    request.set_page_token(token);
+    DSG_RETURN_IF_ERROR(take(page));
+    if (page.next_page_token().empty() || left <= 0) return absl::OkStatus();
+    request.set_page_token(page.next_page_token());
   }
+}
+
+/// The same, with all pages in one reply.
+template <class Request, class Reply, class Count, class Fetch>
+absl::Status FetchPages(const Request& request, int64_t limit, const Count& count,
+                        const Fetch& fetch, Reply* all) {
+  return ForEachPage<Reply>(request, limit, count, fetch, [all](const Reply& page) {
+    all->MergeFrom(page);
+    all->set_next_page_token(page.next_page_token());
+    return absl::OkStatus();
+  });
 }
 
 class Session {
@@ -67,7 +84,7 @@ class Session {
   /// Errors: NOT_FOUND/MAP_UNKNOWN; INVALID_ARGUMENT with the names if there are several maps.
   absl::Status ChooseMap();
 
-  query::Api& api() { return *api_; }
+  query::Api& api() const { return *api_; }
   const CommonOptions& common() const { return common_; }
   const std::string& program_version() const { return program_version_; }
   const MapSpec& map() const { return map_; }
@@ -100,6 +117,18 @@ class Session {
       return (api_.get()->*method)(NewCall(), next, page);
     };
     return FetchPages(request, limit, count, fetch, all);
+  }
+
+  /// Reads a list and gives each page to `take`; see ForEachPage.
+  template <class Request, class Reply, class Count, class Take>
+  absl::Status EachPage(absl::Status (query::Api::*method)(const query::CallContext&,
+                                                           const Request&, Reply*),
+                        const Request& request, int64_t limit, const Count& count,
+                        const Take& take) const {
+    const auto fetch = [&](const Request& next, Reply* page) {
+      return (api_.get()->*method)(NewCall(), next, page);
+    };
+    return ForEachPage<Reply>(request, limit, count, fetch, take);
   }
 
   /// A request about the map, at the revision asked for.

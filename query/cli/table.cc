@@ -46,26 +46,28 @@ void Table::AddRow(std::vector<std::string> cells) {
   rows_.push_back(std::move(cells));
 }
 
-std::string Table::Render() const {
-  std::vector<std::string> headings;
-  std::vector<size_t> widths;
-  for (size_t i = 0; i < columns_.size(); ++i) {
-    headings.push_back(columns_[i].heading);
-    widths.push_back(CountUtf8(columns_[i].heading));
-    for (const auto& row : rows_) widths[i] = std::max(widths[i], CountUtf8(row[i]));
+std::string Table::Take() {
+  const bool is_first = widths_.empty();
+  widths_.resize(columns_.size());
+  if (is_first) {
+    std::vector<std::string> headings;
+    for (const Column& column : columns_) headings.push_back(column.heading);
+    rows_.insert(rows_.begin(), std::move(headings));
+  }
+  for (const auto& row : rows_) {
+    for (size_t i = 0; i < row.size(); ++i) widths_[i] = std::max(widths_[i], CountUtf8(row[i]));
   }
   std::string text;
-  const auto append_line = [&](const std::vector<std::string>& cells) {
+  for (const auto& row : rows_) {
     std::string line;
-    for (size_t i = 0; i < cells.size(); ++i) {
+    for (size_t i = 0; i < row.size(); ++i) {
       if (i > 0) line.append("  ");
-      AppendCell(cells[i], widths[i], columns_[i].align, &line);
+      AppendCell(row[i], widths_[i], columns_[i].align, &line);
     }
     line.erase(line.find_last_not_of(' ') + 1);
     text.append(line).append("\n");
-  };
-  append_line(headings);
-  for (const auto& row : rows_) append_line(row);
+  }
+  rows_.clear();
   return text;
 }
 

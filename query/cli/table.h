@@ -33,14 +33,21 @@ class Table {
   /// Missing cells at the end are empty. Requires: no more cells than columns.
   void AddRow(std::vector<std::string> cells);
 
+  /// Rows that no Take has given out.
   size_t row_count() const { return rows_.size(); }
 
   /// Lines end with '\n', without trailing blanks; two blanks separate the columns.
-  std::string Render() const;
+  std::string Render() const { return Table(*this).Take(); }
+
+  /// The text of the rows since the last call, which are then dropped: a long table in parts. The
+  /// first part begins with the headings; columns never become narrower.
+  std::string Take();
 
  private:
   std::vector<Column> columns_;
   std::vector<std::vector<std::string>> rows_;
+  /// Empty until the headings are given out.
+  std::vector<size_t> widths_;
 };
 
 using Field = std::pair<std::string, std::string>;

@@ -2,6 +2,7 @@
 #include "query/cli/values.h"
 
 #include <cmath>
+#include <filesystem>
 #include <vector>
 
 #include "absl/strings/match.h"
@@ -110,7 +111,7 @@ absl::StatusOr<TimeNs> ParseDuration(const std::string& option, const std::strin
   const auto duration_ns = dsg::ParseTime(absl::StrCat("+", text), 0);
   if (!duration_ns.ok() || *duration_ns <= 0) {
     return BadValue(Reason::kFieldInvalid, option, text,
-                    "is not a positive duration; write 0.5s or 200ms");
+                    "is not a positive duration; write 0.5s, 200ms or 1m10s");
   }
   return *duration_ns;
 }
@@ -127,12 +128,16 @@ absl::StatusOr<TimeNs> ParseInstant(const std::string& option, const std::string
   const auto time_ns = dsg::ParseTime(text, map.epoch_ns);
   if (!time_ns.ok()) return Annotate(time_ns.status(), option);
   if (is_number && MayBeSeconds(number, map)) {
+    const std::string date =
+        map.clock == Clock::kUnix
+            ? absl::StrCat(", or a date like \"", FormatRfc3339(map.epoch_ns), "\"")
+            : "";
     return BadValue(
         Reason::kFieldInvalid, option, text,
         absl::StrCat("a number without a unit means nanoseconds on the map's clock, here ", text,
                      " ns; write \"", is_signed ? "" : "+", text,
                      "s\" for seconds from the epoch of the map",
-                     is_signed ? "" : absl::StrCat(", or \"", text, "ns\"")));
+                     is_signed ? "" : absl::StrCat(", \"", text, "ns\" for nanoseconds"), date));
   }
   if (!is_number && !is_signed && map.clock != Clock::kUnix) {
     return BadValue(
@@ -143,6 +148,17 @@ absl::StatusOr<TimeNs> ParseInstant(const std::string& option, const std::string
                      "; write \"+12.5s\", from the epoch of the map"));
   }
   return *time_ns;
+}
+
+absl::Status MakeFolder(const std::string& option, const std::string& folder) {
+  std::error_code failure;
+  std::filesystem::create_directories(folder, failure);
+  if (!failure && std::filesystem::is_directory(folder, failure)) return absl::OkStatus();
+  return MakeError(Reason::kFieldInvalid,
+                   absl::StrCat(option, " ", folder, ": cannot create the folder (",
+                                failure ? failure.message() : "a file of that name is there",
+                                "); name another folder"),
+                   {{"field", option}, {"value", folder}});
 }
 
 }  // namespace dsg::cli

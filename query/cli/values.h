@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parses values of options: points, boxes, poses, durations, instants. Errors name the option.
+// Values of options: points, boxes, poses, durations, instants, folders. Errors name the option.
 #pragma once
 
 #include <array>
@@ -29,7 +29,8 @@ absl::StatusOr<std::array<double, 2>> ParsePair(const std::string& option, const
 /// Errors: as ParsePoint; FIELD_INVALID for a quaternion of length zero.
 absl::StatusOr<Pose3d> ParsePose(const std::string& option, const std::string& text);
 
-/// "0.5s", "200ms"; seconds without a unit. Errors: INVALID_ARGUMENT/FIELD_INVALID unless positive.
+/// "0.5s", "200ms", "1m10s"; seconds without a unit. Errors: INVALID_ARGUMENT/FIELD_INVALID unless
+/// positive.
 absl::StatusOr<TimeNs> ParseDuration(const std::string& option, const std::string& text);
 
 /// An instant of the map's time: "+12.5s" from its epoch, nanoseconds on its clock, or a date if
@@ -58,5 +59,9 @@ absl::Status SetDuration(const std::string& option, const std::string& text, Req
   (request->*set)(duration_ns);
   return absl::OkStatus();
 }
+
+/// Makes the folder that an option names, if it is not there.
+/// Errors: INVALID_ARGUMENT/FIELD_INVALID with what the system says.
+absl::Status MakeFolder(const std::string& option, const std::string& folder);
 
 }  // namespace dsg::cli

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The verbs that write a map to files: export, map.
+// The verb export: a map as files.
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -8,15 +8,18 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
-#include "query/cli/answer_picture.h"
-#include "query/cli/export/exploded_view.h"
+#include "query/cli/export/geo_origin.h"
 #include "query/cli/export/gltf_scene.h"
 #include "query/cli/export/map_content.h"
 #include "query/cli/export/mesh_file.h"
 #include "query/cli/export/sdf_world.h"
-#include "query/cli/export/top_view.h"
+#include "query/cli/export_csv.h"
+#include "query/cli/export_geojson.h"
+#include "query/cli/export_tum.h"
 #include "query/cli/json.h"
+#include "query/cli/map_rows.h"
 #include "query/cli/progress.h"
 #include "query/cli/read_content.h"
 #include "query/cli/session.h"
@@ -30,7 +33,7 @@
 #include "schema/files/atomic_file.h"
 #include "schema/interop/map_to_spark.h"
 #include "schema/interop/spark_writer.h"
-#include "schema/picture/raster.h"
+#include "schema/picture/look.h"
 
 namespace dsg::cli {
 namespace {
@@ -51,6 +54,13 @@ struct ExportVerb {
   /// A world of a physics simulator; its mesh goes beside it, as .stl.
   std::string sdf;
   SdfOptions sdf_options{};
+  /// Tracks: a folder for one file an agent.
+  std::string tum;
+  /// Tables: a folder.
+  std::string csv;
+  /// Places on the Earth, with where the map lies there.
+  std::string geojson;
+  std::string origin;
   /// People as bodies: walking in a glTF scene, standing at `at`.
   bool with_bodies = false;
   double body_step_s = 0.25;
@@ -60,22 +70,6 @@ struct ExportVerb {
   std::string at;
   /// Of the mesh only what is this node's; empty = all of it.
   std::string node;
-  bool force = false;
-};
-
-struct MapVerb {
-  std::string png;
-  /// A level or room by id or name, or a height; empty = all floors.
-  std::string floor;
-  /// The layers one above the other, instead of the map from above.
-  bool is_exploded = false;
-  /// The mesh alone, seen obliquely.
-  bool is_mesh = false;
-  /// A second map whose mesh is drawn at the right of it; empty = none.
-  std::string beside;
-  bool with_bodies = false;
-  int width_px = 1600;
-  std::string at;
   bool force = false;
 };
 
@@ -95,15 +89,20 @@ MapContents ContentsOf(MapContent content) {
 }
 
 // By the ending of the name: .json; .sparkdsg or .bin.
-std::optional<SparkForm> SparkFormOf(const std::string& path) {
-  if (path.ends_with(".json")) return SparkForm::kJson;
-  if (path.ends_with(".sparkdsg") || path.ends_with(".bin")) return SparkForm::kBinary;
-  return std::nullopt;
+SparkForm SparkFormOf(const std::string& path) {
+  return absl::EndsWithIgnoreCase(path, ".json") ? SparkForm::kJson : SparkForm::kBinary;
 }
 
-// Of all files that can be written in one run, those that are.
-std::vector<std::string> PathsOf(const ExportVerb& verb) {
+// The files that are made of the whole content, held in memory.
+std::vector<std::string> ContentPaths(const ExportVerb& verb) {
   std::vector<std::string> paths = {verb.ply, verb.graph_ply, verb.gltf, verb.spark, verb.sdf};
+  std::erase(paths, "");
+  return paths;
+}
+
+// The files and folders that are written while the map is read.
+std::vector<std::string> RowPaths(const ExportVerb& verb) {
+  std::vector<std::string> paths = {verb.tum, verb.csv, verb.geojson};
   std::erase(paths, "");
   return paths;
 }
@@ -112,7 +111,7 @@ std::vector<std::string> PathsOf(const ExportVerb& verb) {
 absl::StatusOr<Written> WriteSparkExport(MapContent content, const ExportVerb& verb,
                                          std::ostream* progress_out) {
   Progress progress("export to Spark-DSG", progress_out);
-  const SparkForm form = SparkFormOf(verb.spark).value_or(SparkForm::kJson);
+  const SparkForm form = SparkFormOf(verb.spark);
   DSG_ASSIGN_OR_RETURN(AtomicFile file, AtomicFile::Create(verb.spark, verb.force));
   DSG_ASSIGN_OR_RETURN(const SparkExport made, MapToSpark(ContentsOf(std::move(content)),
                                                           {.distance_m = verb.pose_step_m}));
@@ -139,7 +138,7 @@ absl::Status CheckAlone(const Session& session, const ExportVerb& verb) {
                      "an archive has all revisions and all times; remove --revision and --at",
                      {{"field", "--revision"}});
   }
-  if (PathsOf(verb).empty()) return absl::OkStatus();
+  if (ContentPaths(verb).empty() && RowPaths(verb).empty()) return absl::OkStatus();
   return MakeError(
       Reason::kFieldInvalid,
       "an archive is the only file of its call; export the other files in another call",
@@ -188,14 +187,6 @@ absl::Status WriteArchive(Session* session, const ExportVerb& verb, std::ostream
       .counts = {{verb.with_rows ? "row bytes" : "database bytes", manifest->database_bytes}}};
   TellWritten({written}, manifest->newest_revision, session->common().json, out);
   return absl::OkStatus();
-}
-
-absl::StatusOr<ContentAnswer> ReadMapAt(Session* session, const std::string& at,
-                                        ContentOptions options) {
-  if (!at.empty()) {
-    DSG_ASSIGN_OR_RETURN(options.at_ns, ParseInstant("--at", at, session->map()));
-  }
-  return ReadContent(session, options);
 }
 
 absl::StatusOr<MeshColor> ParseColor(const std::string& text) {
@@ -287,45 +278,24 @@ class Exporter {
   std::vector<Written> files_;
 };
 
-std::string NameAndRevision(const MapContent& content) {
-  return absl::StrCat(content.spec.name, "  revision ", content.revision);
-}
-
-// The title of the picture: map, revision and instant.
-std::string TitleOf(const Session& session, const ContentAnswer& answer, const MapVerb& verb) {
-  std::string title = NameAndRevision(answer.content);
-  if (!verb.at.empty()) {
-    const auto at_ns = ParseInstant("--at", verb.at, session.map());
-    if (at_ns.ok()) absl::StrAppend(&title, "  at ", session.times().Full(*at_ns));
-  } else if (answer.last_pose_ns.has_value()) {
-    // A millisecond is finer than the picture.
-    constexpr TimeNs kMillisecond = 1'000'000;
-    const TimeNs last_ns = *answer.last_pose_ns / kMillisecond * kMillisecond;
-    absl::StrAppend(&title, "  up to ", session.times().Full(last_ns));
-  }
-  if (!verb.floor.empty()) absl::StrAppend(&title, "  floor ", verb.floor);
-  return title;
-}
-
-absl::Status RunExport(Session* session, const ExportVerb& verb, std::ostream& out) {
-  if (!verb.archive.empty()) return WriteArchive(session, verb, out);
+absl::Status ExportContent(Session* session, const ExportVerb& verb, Revision revision,
+                           std::vector<Written>* files) {
   DSG_ASSIGN_OR_RETURN(const MeshColor color, ParseColor(verb.color));
-  for (const std::string& path : PathsOf(verb)) {
-    DSG_RETURN_IF_ERROR(CheckMayWrite(path, verb.force));
-  }
   const bool with_spark = !verb.spark.empty();
   const bool with_sdf = !verb.sdf.empty();
   if (with_sdf) DSG_RETURN_IF_ERROR(CheckMayWrite(MeshPathOf(verb.sdf), verb.force));
   const bool with_mesh = !verb.ply.empty() || !verb.gltf.empty() || with_spark || with_sdf;
   DSG_ASSIGN_OR_RETURN(
       ContentAnswer answer,
-      ReadMapAt(session, verb.at,
-                {.with_mesh = with_mesh,
-                 .mesh_node = verb.node,
-                 .with_bodies = verb.with_bodies,
-                 .body_step_ns = static_cast<TimeNs>(std::llround(verb.body_step_s * kNsPerSecond)),
-                 .body_count_max = verb.body_count_max,
-                 .with_poses = with_spark}));
+      ReadContentAt(
+          session, verb.at,
+          {.with_mesh = with_mesh,
+           .mesh_node = verb.node,
+           .with_bodies = verb.with_bodies,
+           .body_step_ns = static_cast<TimeNs>(std::llround(verb.body_step_s * kNsPerSecond)),
+           .body_count_max = verb.body_count_max,
+           .with_poses = with_spark,
+           .revision = revision}));
   if (verb.with_bodies && answer.content.bodies.empty()) {
     session->notes() << "note: no agent has a body with faces and a pose then\n";
   }
@@ -341,62 +311,55 @@ absl::Status RunExport(Session* session, const ExportVerb& verb, std::ostream& o
     options.with_agents = !verb.at.empty();
     DSG_RETURN_IF_ERROR(exporter.WriteSdf(verb.sdf, std::move(options)));
   }
-  std::vector<Written> files = exporter.files();
-  const Revision revision = answer.content.revision;
-  if (with_spark) {
-    DSG_ASSIGN_OR_RETURN(Written file,
-                         WriteSparkExport(std::move(answer.content), verb, &session->notes()));
-    files.push_back(std::move(file));
-  }
-  TellWritten(files, revision, session->common().json, out);
+  *files = exporter.files();
+  if (!with_spark) return absl::OkStatus();
+  DSG_ASSIGN_OR_RETURN(Written file,
+                       WriteSparkExport(std::move(answer.content), verb, &session->notes()));
+  files->push_back(std::move(file));
   return absl::OkStatus();
 }
 
-// The newest content of another map of the same store or server.
-absl::StatusOr<MapContent> ReadBeside(const Session& session, const MapVerb& verb) {
-  CommonOptions common = session.common();
-  common.map = verb.beside;
-  common.revision.reset();
-  common.tag.clear();
-  Session other(std::move(common), session.program_version(), &session.notes());
-  DSG_RETURN_IF_ERROR(other.Open());
-  DSG_RETURN_IF_ERROR(other.ChooseMap());
-  DSG_ASSIGN_OR_RETURN(ContentAnswer answer, ReadMapAt(&other, verb.at, {}));
-  return std::move(answer.content);
-}
-
-absl::StatusOr<picture::Picture> DrawMap(Session* session, const MapVerb& verb,
-                                         const MapContent& content, const std::string& title) {
-  if (verb.is_exploded) {
-    return DrawExplodedView(content, {.width_px = verb.width_px, .title = title});
+absl::Status ExportRows(const MapRows& map, const ExportVerb& verb, std::vector<Written>* files) {
+  if (!verb.geojson.empty()) {
+    DSG_ASSIGN_OR_RETURN(const GeoOrigin origin, ParseOrigin(verb.origin));
+    DSG_ASSIGN_OR_RETURN(Written file, WriteGeoJson(map, origin, verb.geojson, verb.force));
+    files->push_back(std::move(file));
   }
-  if (!verb.is_mesh) return DrawTopView(content, {.width_px = verb.width_px, .title = title});
-  if (verb.beside.empty()) return DrawMeshes({{content, title}}, verb.width_px);
-  DSG_ASSIGN_OR_RETURN(const MapContent other, ReadBeside(*session, verb));
-  return DrawMeshes({{content, NameAndRevision(content)}, {other, NameAndRevision(other)}},
-                    verb.width_px);
-}
-
-absl::Status RunMap(Session* session, const MapVerb& verb, std::ostream& out) {
-  DSG_RETURN_IF_ERROR(CheckMayWrite(verb.png, verb.force));
-  DSG_ASSIGN_OR_RETURN(ContentAnswer answer,
-                       ReadMapAt(session, verb.at, {.with_bodies = verb.with_bodies}));
-  MapContent& content = answer.content;
-  if (!verb.floor.empty()) {
-    DSG_ASSIGN_OR_RETURN(const HeightRange floor, ChooseFloor(content, verb.floor));
-    KeepFloor(floor, &content);
+  if (!verb.tum.empty()) {
+    DSG_ASSIGN_OR_RETURN(const auto tracks, WriteTumFiles(map, verb.tum, verb.force));
+    if (tracks.empty()) map.session().notes() << "note: no agent has a pose; no track is written\n";
+    files->insert(files->end(), tracks.begin(), tracks.end());
   }
-  DSG_ASSIGN_OR_RETURN(const picture::Picture picture,
-                       DrawMap(session, verb, content, TitleOf(*session, answer, verb)));
-  DSG_ASSIGN_OR_RETURN(const Written written, WritePng(picture, verb.png, verb.force));
-  TellWritten({written}, content.revision, session->common().json, out);
+  if (!verb.csv.empty()) {
+    DSG_ASSIGN_OR_RETURN(const auto tables, WriteCsvTables(map, verb.csv, verb.force));
+    files->insert(files->end(), tables.begin(), tables.end());
+  }
   return absl::OkStatus();
 }
 
-constexpr char kContentAtHelp[] = "The world at this TIME; default all that has not ended";
+absl::Status RunExport(Session* session, const ExportVerb& verb, std::ostream& out) {
+  if (!verb.archive.empty()) return WriteArchive(session, verb, out);
+  for (const std::string& path : ContentPaths(verb)) {
+    DSG_RETURN_IF_ERROR(CheckMayWrite(path, verb.force));
+  }
+  std::optional<TimeNs> at_ns;
+  if (!verb.at.empty()) {
+    DSG_ASSIGN_OR_RETURN(at_ns, ParseInstant("--at", verb.at, session->map()));
+  }
+  // All files of a run have one revision.
+  DSG_ASSIGN_OR_RETURN(const MapRows map, MapRows::Open(session, at_ns));
+  std::vector<Written> files;
+  if (!ContentPaths(verb).empty()) {
+    DSG_RETURN_IF_ERROR(ExportContent(session, verb, map.revision(), &files));
+  }
+  DSG_RETURN_IF_ERROR(ExportRows(map, verb, &files));
+  TellWritten(files, map.revision(), session->common().json, out);
+  return absl::OkStatus();
+}
 
 absl::Status CheckExport(const ExportVerb& verb, const CommonOptions& common) {
-  const bool is_mesh_alone = verb.archive.empty() && !verb.ply.empty() && PathsOf(verb).size() == 1;
+  const bool is_mesh_alone = verb.archive.empty() && !verb.ply.empty() &&
+                             ContentPaths(verb).size() == 1 && RowPaths(verb).empty();
   if (!verb.node.empty() && !is_mesh_alone) {
     return Usage("--node is of the mesh: give --ply FILE, and no other file", "export");
   }
@@ -421,38 +384,51 @@ absl::Status CheckExport(const ExportVerb& verb, const CommonOptions& common) {
         absl::StrCat("\"", verb.archive, "\" does not end in .dsgz; other formats have options"),
         "export");
   }
-  if (!verb.spark.empty() && !SparkFormOf(verb.spark).has_value()) {
-    return Usage(absl::StrCat("--spark \"", verb.spark,
-                              "\": end the name in .json, or in .sparkdsg or .bin for the binary "
-                              "form"),
-                 "export");
+  if (!verb.geojson.empty() && verb.origin.empty()) {
+    return Usage(
+        "GeoJSON is in degrees: say where the map lies with --origin LAT,LON,HEADING (WGS84 of its "
+        "origin, and the compass direction of its x axis)",
+        "export");
   }
-  if (!verb.sdf.empty() && !verb.sdf.ends_with(".sdf")) {
-    return Usage(absl::StrCat("--sdf \"", verb.sdf, "\": end the name in .sdf"), "export");
-  }
-  if (!PathsOf(verb).empty()) return absl::OkStatus();
+  if (!verb.origin.empty()) DSG_RETURN_IF_ERROR(ParseOrigin(verb.origin).status());
+  if (!ContentPaths(verb).empty() || !RowPaths(verb).empty()) return absl::OkStatus();
   return Usage(
       "export writes files: give FILE.dsgz, --ply FILE, --graph-ply FILE, --gltf FILE, --spark "
-      "FILE or --sdf FILE",
+      "FILE, --sdf FILE, --tum DIR, --csv DIR or --geojson FILE",
       "export");
 }
 
-void AddExport(Grammar* grammar) {
+}  // namespace
+
+void AddExportVerb(Grammar* grammar) {
   const auto [app, verb] =
       grammar->Add<ExportVerb>({.name = "export",
-                                .what = "Write mesh and graph to files, or an archive of the map",
+                                .what = "Write a map to files, or an archive of it",
                                 .example = "--gltf office.glb",
                                 .run = RunExport,
                                 .check = CheckExport});
   app->add_option("FILE", verb->archive, "Archive of the whole map with its history, FILE.dsgz");
   app->add_flag("--rows", verb->with_rows,
                 "An archive of rows, which programs with another store or a newer format read too");
-  app->add_option("--ply", verb->ply, "The mesh, binary PLY");
-  app->add_option("--graph-ply", verb->graph_ply, "The graph, PLY of points and lines");
-  app->add_option("--gltf", verb->gltf, "Mesh and graph, binary glTF 2.0 (.glb)");
-  app->add_option("--spark", verb->spark, "A Spark-DSG graph, .json, or binary .sparkdsg or .bin");
+  app->add_option("--ply", verb->ply, "The mesh, binary PLY")->check(EndsIn({".ply"}));
+  app->add_option("--graph-ply", verb->graph_ply, "The graph, PLY of points and lines")
+      ->check(EndsIn({".ply"}));
+  app->add_option("--gltf", verb->gltf, "Mesh and graph, binary glTF 2.0")->check(EndsIn({".glb"}));
+  app->add_option("--spark", verb->spark, "A Spark-DSG graph, .json, or binary .sparkdsg or .bin")
+      ->check(EndsIn({".json", ".sparkdsg", ".bin"}));
   app->add_option("--sdf", verb->sdf,
-                  "A world of a physics simulator, SDFormat .sdf, and its mesh beside it, .stl");
+                  "A world of a physics simulator, SDFormat, and its mesh beside it, .stl")
+      ->check(EndsIn({".sdf"}));
+  app->add_option("--tum", verb->tum,
+                  "Tracks, to this folder: NAME.tum an agent, timestamp tx ty tz qx qy qz qw");
+  app->add_option("--csv", verb->csv, "Nodes, edges, tracks and stays as tables, to this folder");
+  CLI::Option* geojson =
+      app->add_option("--geojson", verb->geojson, "Rooms, objects, places and tracks on the Earth")
+          ->check(EndsIn({".geojson", ".json"}));
+  app->add_option("--origin", verb->origin,
+                  "LAT,LON,HEADING: WGS84 degrees of the map's origin, and the compass direction "
+                  "of its x axis (0 north, 90 east), for --geojson")
+      ->needs(geojson);
   app->add_option("--movable-size", verb->sdf_options.movable_size_m,
                   "Longest edge of the objects that move in --sdf, metres; 0 = all are fixed")
       ->check(ZeroOrMore())
@@ -484,42 +460,6 @@ void AddExport(Grammar* grammar) {
                   "unique name); with --ply");
   app->add_option("--at", verb->at, kContentAtHelp);
   app->add_flag("--force", verb->force, "Replace existing files");
-}
-
-absl::Status CheckMap(const MapVerb& verb, const CommonOptions&) {
-  if (!verb.with_bodies || !verb.at.empty()) return absl::OkStatus();
-  return Usage("a picture shows one instant: give --at with --bodies", "map");
-}
-
-void AddMap(Grammar* grammar) {
-  const auto [app, verb] = grammar->Add<MapVerb>({.name = "map",
-                                                  .what = "Draw a map from above",
-                                                  .example = "--png office.png",
-                                                  .run = RunMap,
-                                                  .check = CheckMap});
-  app->add_option("--png", verb->png, "The picture to write")->required();
-  app->add_option("--floor", verb->floor, kFloorHelp);
-  CLI::Option* exploded =
-      app->add_flag("--exploded", verb->is_exploded, "Layers one above the other, seen obliquely");
-  CLI::Option* mesh =
-      app->add_flag("--mesh", verb->is_mesh, "The mesh alone, seen obliquely")->excludes(exploded);
-  app->add_option("--beside", verb->beside,
-                  "Another map: its mesh at the right, seen from the same place")
-      ->needs(mesh);
-  app->add_flag("--bodies", verb->with_bodies, "People as bodies, as they are at --at")
-      ->excludes(mesh);
-  app->add_option("--width", verb->width_px, "Width of the picture, pixels")
-      ->check(Between(kTopViewWidthMin, kTopViewWidthMax))
-      ->capture_default_str();
-  app->add_option("--at", verb->at, kContentAtHelp);
-  app->add_flag("--force", verb->force, "Replace an existing file");
-}
-
-}  // namespace
-
-void AddExportVerbs(Grammar* grammar) {
-  AddExport(grammar);
-  AddMap(grammar);
 }
 
 }  // namespace dsg::cli

@@ -5,7 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/cli/answer_text.h"
-#include "query/cli/json.h"
+#include "query/cli/list_writer.h"
 #include "query/cli/session.h"
 #include "query/cli/table.h"
 #include "query/cli/values.h"
@@ -21,26 +21,30 @@ struct FactorsVerb {
   std::string to;
 };
 
-std::string RenderFactors(const v1::ListFactorsResponse& reply, const TimeText& times) {
-  Table table({{"from", Align::kRight},
-               {"to", Align::kRight},
-               {"type"},
-               {"of"},
-               {"x m", Align::kRight},
-               {"y m", Align::kRight},
-               {"z m", Align::kRight},
-               {"yaw deg", Align::kRight},
-               {"information"}});
-  for (const v1::PoseFactor& factor : reply.factors()) {
-    const v1::Vector3& p = factor.relative_pose().position();
-    table.AddRow({times.Relative(factor.from_time_ns()), times.Relative(factor.to_time_ns()),
-                  Printable(factor.type()),
-                  factor.to_agent().empty() ? reply.agent_id() : factor.to_agent(), Fixed(p.x(), 3),
-                  Fixed(p.y(), 3), Fixed(p.z(), 3), Fixed(YawDeg(factor.relative_pose()), 1),
-                  factor.information().empty() ? "none" : "6x6"});
-  }
-  return absl::StrCat(table.Render(), Counted(reply.factors_size(), "factor"), " of ",
-                      reply.agent_id(), " (revision ", reply.header().read_revision(), ")\n");
+std::vector<ListColumn> FactorColumns() {
+  return {{"from", CellType::kTime},
+          {"to", CellType::kTime},
+          {"type"},
+          {"of"},
+          {"x m", CellType::kReal, 3},
+          {"y m", CellType::kReal, 3},
+          {"z m", CellType::kReal, 3},
+          {"yaw deg", CellType::kReal, 1},
+          {"information"}};
+}
+
+// `agent_id`: whose factors they are.
+Row FactorRow(const v1::PoseFactor& factor, const std::string& agent_id) {
+  const v1::Vector3& p = factor.relative_pose().position();
+  return {factor.from_time_ns(),
+          factor.to_time_ns(),
+          factor.type(),
+          factor.to_agent().empty() ? agent_id : factor.to_agent(),
+          p.x(),
+          p.y(),
+          p.z(),
+          YawDeg(factor.relative_pose()),
+          factor.information().empty() ? "none" : "6x6"};
 }
 
 absl::Status RunFactors(Session* session, const FactorsVerb& verb, std::ostream& out) {
@@ -50,20 +54,27 @@ absl::Status RunFactors(Session* session, const FactorsVerb& verb, std::ostream&
                                  &v1::ListFactorsRequest::set_from_ns));
   DSG_RETURN_IF_ERROR(
       SetInstant("--to", verb.to, session->map(), &request, &v1::ListFactorsRequest::set_to_ns));
-  const int64_t count_max = EntriesLeft(session->common().limit);
-  v1::ListFactorsResponse all;
+  ListWriter list(session->common(), session->times(), "factors", FactorColumns(), &out);
+  int64_t left = EntriesLeft(session->common().limit);
+  std::string agent_id;
+  int64_t revision = 0;
+  absl::Status written;
   DSG_RETURN_IF_ERROR(
-      session->Read(&query::Api::ListFactors, request, [&](const v1::ListFactorsResponse& message) {
-        all.MergeFrom(message);
-        return all.factors_size() < count_max;
+      session->Read(&query::Api::ListFactors, request, [&](v1::ListFactorsResponse message) {
+        // The first message has both.
+        if (message.has_header()) {
+          agent_id = message.agent_id();
+          revision = message.header().read_revision();
+        }
+        CutToLimit(message.mutable_factors(), &left);
+        written = list.Add(message, message.factors(), [&](const v1::PoseFactor& factor) {
+          return FactorRow(factor, agent_id);
+        });
+        return written.ok() && left > 0;
       }));
-  if (all.factors_size() > count_max) {
-    all.mutable_factors()->DeleteSubrange(static_cast<int>(count_max),
-                                          all.factors_size() - static_cast<int>(count_max));
-  }
-  if (session->common().json) return WriteJson(all, out);
-  out << RenderFactors(all, session->times());
-  return absl::OkStatus();
+  DSG_RETURN_IF_ERROR(written);
+  return list.End(absl::StrCat(Counted(list.count(), "factor"), " of ", agent_id, " (revision ",
+                               revision, ")\n"));
 }
 
 }  // namespace
@@ -72,7 +83,7 @@ void AddFactorsVerb(Grammar* grammar) {
   const auto [app, verb] = grammar->Add<FactorsVerb>({.name = "factors",
                                                       .what = "The pose-graph factors of an agent",
                                                       .example = "body --from +10s --to +20s",
-                                                      .takes = kQuestion | kLimit,
+                                                      .takes = kQuestion | kLimit | kFormat,
                                                       .run = RunFactors});
   app->add_option("AGENT", verb->agent, "Node id (r0) or the name in the log (body)")->required();
   app->add_option("--from", verb->from, "Factors that begin at this TIME or later");

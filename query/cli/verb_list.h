@@ -17,10 +17,11 @@ void AddGraphVerbs(Grammar* grammar);
 void AddSearchVerbs(Grammar* grammar);
 void AddSpaceVerbs(Grammar* grammar);
 void AddChangeVerbs(Grammar* grammar);
-void AddMapVerbs(Grammar* grammar);
+void AddMapsVerbs(Grammar* grammar);
 void AddImportVerb(Grammar* grammar);
 void AddStoreVerbs(Grammar* grammar);
-void AddExportVerbs(Grammar* grammar);
+void AddExportVerb(Grammar* grammar);
+void AddMapVerb(Grammar* grammar);
 void AddKeepVerbs(Grammar* grammar);
 void AddBackupVerbs(Grammar* grammar);
 void AddMergeVerb(Grammar* grammar);
@@ -29,11 +30,13 @@ void AddAssetVerb(Grammar* grammar);
 void AddFactorsVerb(Grammar* grammar);
 void AddDropVerbs(Grammar* grammar);
 void AddSetVerb(Grammar* grammar);
+void AddCompletionVerb(Grammar* grammar);
 
 inline constexpr std::array kVerbs = {
-    &AddAgentVerbs,  &AddShapeVerb,   &AddMeetingVerbs, &AddPredictVerb, &AddGraphVerbs,
-    &AddSearchVerbs, &AddSpaceVerbs,  &AddChangeVerbs,  &AddMapVerbs,    &AddImportVerb,
-    &AddStoreVerbs,  &AddExportVerbs, &AddKeepVerbs,    &AddBackupVerbs, &AddMergeVerb,
-    &AddPruneVerb,   &AddAssetVerb,   &AddFactorsVerb,  &AddDropVerbs,   &AddSetVerb};
+    &AddAgentVerbs,  &AddShapeVerb,     &AddMeetingVerbs, &AddPredictVerb, &AddGraphVerbs,
+    &AddSearchVerbs, &AddSpaceVerbs,    &AddChangeVerbs,  &AddMapsVerbs,   &AddImportVerb,
+    &AddStoreVerbs,  &AddExportVerb,    &AddMapVerb,      &AddKeepVerbs,   &AddBackupVerbs,
+    &AddMergeVerb,   &AddPruneVerb,     &AddAssetVerb,    &AddFactorsVerb, &AddDropVerbs,
+    &AddSetVerb,     &AddCompletionVerb};
 
 }  // namespace dsg::cli

@@ -112,7 +112,27 @@ absl::StatusOr<v1::PredictAgentRequest> PredictionRequest(Session* session,
   return request;
 }
 
-// The last observed seconds and the predicted paths; more probable paths are thicker.
+constexpr double kEllipseWidthPx = 2.0;
+
+// A certain path is five times as wide as one that is almost impossible.
+double WidthOf(const v1::PredictedPath& path) { return 3.0 + 13.0 * path.probability(); }
+
+// Where the agent is with the certainty of one standard deviation, seen from above.
+void AddEllipse(const v1::PredictedPose& pose, uint32_t rgb, Overlay* overlay) {
+  // Upper triangle: xx, xy, xz, yy, yz, zz.
+  if (pose.covariance_size() != 6) return;
+  const Eigen::Matrix2d covariance{{pose.covariance(0), pose.covariance(1)},
+                                   {pose.covariance(1), pose.covariance(3)}};
+  const Eigen::Vector3d position = PointOf(pose.position());
+  overlay->outlines.push_back({.corners_map = EllipseOf(position.head<2>(), covariance),
+                               .rgb = rgb,
+                               .height_m = position.z(),
+                               .width_px = kEllipseWidthPx,
+                               .opacity = 0.08f});
+}
+
+// The last observed seconds and the predicted paths: probabilities are widths, and ellipses what is
+// known of the position at each step.
 absl::StatusOr<AnswerPicture> DrawPrediction(Session* session,
                                              const v1::PredictAgentResponse& reply,
                                              const std::string& agent) {
@@ -125,16 +145,18 @@ absl::StatusOr<AnswerPicture> DrawPrediction(Session* session,
   Interval past;
   if (reply.observed_ns() > kTimeMin + kPastNs) past.from_ns = reply.observed_ns() - kPastNs;
   if (reply.observed_ns() < kTimeMax) past.to_ns = reply.observed_ns() + 1;
-  DSG_ASSIGN_OR_RETURN(const auto pieces, WayOf(session, reply.agent_id(), picture.revision, past));
+  DSG_ASSIGN_OR_RETURN(const auto pieces,
+                       WayOf(*session, reply.agent_id(), picture.revision, past));
   overlay.legend.push_back({"seen", kPastRgb});
   // The most probable path is drawn last, on top.
   for (int i = reply.paths_size() - 1; i >= 0; --i) {
     const v1::PredictedPath& path = reply.paths(i);
     const uint32_t rgb = AgentColor(static_cast<size_t>(i) + 1);
-    OverlayLine line{.points_map = {}, .rgb = rgb, .width_px = 4.0 + 8.0 * path.probability()};
+    OverlayLine line{.points_map = {}, .rgb = rgb, .width_px = WidthOf(path)};
     if (!pieces.empty()) line.points_map.push_back(pieces.back().back());
     for (const v1::PredictedPose& pose : path.poses()) {
       line.points_map.push_back(PointOf(pose.position()));
+      AddEllipse(pose, rgb, &overlay);
     }
     if (line.points_map.empty()) continue;
     overlay.marks.push_back({.position_map = line.points_map.back(),
@@ -146,7 +168,10 @@ absl::StatusOr<AnswerPicture> DrawPrediction(Session* session,
   for (int i = 0; i < reply.paths_size(); ++i) {
     overlay.legend.push_back(
         {absl::StrCat("way ", i + 1, ": ", Fixed(reply.paths(i).probability(), 2)),
-         AgentColor(static_cast<size_t>(i) + 1)});
+         AgentColor(static_cast<size_t>(i) + 1), WidthOf(reply.paths(i))});
+  }
+  if (!overlay.outlines.empty()) {
+    overlay.legend.push_back({"ellipses: 1 standard deviation", kPastRgb, kEllipseWidthPx});
   }
   for (const auto& piece : pieces) overlay.lines.push_back({piece, kPastRgb});
   if (!pieces.empty()) {

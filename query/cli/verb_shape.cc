@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // The verb shape: the body of an agent over time, as a table, as mesh files or as a picture.
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
@@ -13,6 +12,7 @@
 #include "query/cli/export/mesh_file.h"
 #include "query/cli/export/top_view.h"
 #include "query/cli/json.h"
+#include "query/cli/list_writer.h"
 #include "query/cli/read_bodies.h"
 #include "query/cli/session.h"
 #include "query/cli/table.h"
@@ -45,11 +45,11 @@ constexpr int kJointCount = 24;
 constexpr int kLeftHand = 22;
 constexpr int kRightHand = 23;
 
-std::string CountOrDash(int count) { return count == 0 ? "-" : absl::StrCat(count); }
+Cell CountOrNone(int count) { return count == 0 ? Cell() : Cell(int64_t{count}); }
 
-std::string JointText(const v1::AgentShape& body, int joint) {
+Cell JointCell(const v1::AgentShape& body, int joint) {
   const auto& joints = body.shape().joints();
-  if (joints.size() != 3 * kJointCount || !body.has_pose()) return "-";
+  if (joints.size() != 3 * kJointCount || !body.has_pose()) return Cell();
   const Eigen::Vector3d joint_agent(static_cast<double>(joints[3 * joint]),
                                     static_cast<double>(joints[3 * joint + 1]),
                                     static_cast<double>(joints[3 * joint + 2]));
@@ -59,29 +59,32 @@ std::string JointText(const v1::AgentShape& body, int joint) {
                       Fixed(joint_map.z(), 2));
 }
 
-// One line per body: what is stored of it, and where its hands are in the map. Only skeletons of 24
-// joints in the order of SMPL show hands.
-std::string RenderShapes(const v1::GetAgentShapeResponse& reply, const TimeText& times) {
-  std::vector<Column> columns{{"time", Align::kRight},        {"pose", Align::kRight},
-                              {"shape", Align::kRight},       {"joints", Align::kRight},
-                              {"vertices", Align::kRight},    {"left hand m", Align::kRight},
-                              {"right hand m", Align::kRight}};
-  if (times.has_dates()) columns.push_back({"date"});
-  Table table(columns);
-  for (const v1::AgentShape& body : reply.shapes()) {
-    const v1::BodyShape& shape = body.shape();
-    std::vector<std::string> cells{times.Relative(shape.time_ns()),
-                                   CountOrDash(shape.pose_coefficients_size()),
-                                   CountOrDash(shape.shape_coefficients_size()),
-                                   CountOrDash(shape.joints_size() / 3),
-                                   CountOrDash(body.vertex_count()),
-                                   JointText(body, kLeftHand),
-                                   JointText(body, kRightHand)};
-    if (times.has_dates()) cells.push_back(times.Date(shape.time_ns()));
-    table.AddRow(std::move(cells));
-  }
-  return absl::StrCat(table.Render(), Counted(reply.shapes_size(), "body shape"), " of ",
-                      reply.agent_id(), " (revision ", reply.header().read_revision(), ")\n");
+// What is stored of a body, and where its hands are in the map. Only skeletons of 24 joints in the
+// order of SMPL show hands.
+std::vector<ListColumn> BodyColumns() {
+  const auto optional = [](const char* heading, CellType type) {
+    return ListColumn{.heading = heading, .type = type, .unknown = "-"};
+  };
+  return {{"time", CellType::kTime},
+          optional("pose", CellType::kCount),
+          optional("shape", CellType::kCount),
+          optional("joints", CellType::kCount),
+          optional("vertices", CellType::kCount),
+          optional("left hand m", CellType::kText),
+          optional("right hand m", CellType::kText),
+          {"date", CellType::kDate}};
+}
+
+Row BodyRow(const v1::AgentShape& body) {
+  const v1::BodyShape& shape = body.shape();
+  return {shape.time_ns(),
+          CountOrNone(shape.pose_coefficients_size()),
+          CountOrNone(shape.shape_coefficients_size()),
+          CountOrNone(shape.joints_size() / 3),
+          CountOrNone(body.vertex_count()),
+          JointCell(body, kLeftHand),
+          JointCell(body, kRightHand),
+          shape.time_ns()};
 }
 
 absl::StatusOr<v1::GetAgentShapeRequest> ShapeRequest(const Session& session,
@@ -100,20 +103,25 @@ absl::Status ListBodies(Session* session, v1::GetAgentShapeRequest request, std:
   // Vertices go to files: one body has thousands.
   request.add_parts(v1::SHAPE_PART_COEFFICIENTS);
   request.add_parts(v1::SHAPE_PART_JOINTS);
-  v1::GetAgentShapeResponse all;
-  const int64_t count_max = EntriesLeft(session->common().limit);
-  const auto merge = [&](const v1::GetAgentShapeResponse& message) {
-    all.MergeFrom(message);
-    return all.shapes_size() < count_max;
-  };
-  DSG_RETURN_IF_ERROR(session->Read(&query::Api::GetAgentShape, request, merge));
-  if (all.shapes_size() > count_max) {
-    all.mutable_shapes()->DeleteSubrange(static_cast<int>(count_max),
-                                         all.shapes_size() - static_cast<int>(count_max));
-  }
-  if (session->common().json) return WriteJson(all, out);
-  out << RenderShapes(all, session->times());
-  return absl::OkStatus();
+  ListWriter list(session->common(), session->times(), "shapes", BodyColumns(), &out);
+  int64_t left = EntriesLeft(session->common().limit);
+  std::string agent_id;
+  int64_t revision = 0;
+  absl::Status written;
+  DSG_RETURN_IF_ERROR(
+      session->Read(&query::Api::GetAgentShape, request, [&](v1::GetAgentShapeResponse message) {
+        // The first message has both.
+        if (message.has_header()) {
+          agent_id = message.agent_id();
+          revision = message.header().read_revision();
+        }
+        CutToLimit(message.mutable_shapes(), &left);
+        written = list.Add(message, message.shapes(), BodyRow);
+        return written.ok() && left > 0;
+      }));
+  DSG_RETURN_IF_ERROR(written);
+  return list.End(absl::StrCat(Counted(list.count(), "body shape"), " of ", agent_id, " (revision ",
+                               revision, ")\n"));
 }
 
 // Writes bodies as they arrive, without keeping them.
@@ -168,13 +176,7 @@ absl::Status PrepareFiles(const ShapeVerb& verb) {
   for (const std::string* path : {&verb.ply, &verb.png}) {
     if (!path->empty()) return CheckMayWrite(*path, verb.force);
   }
-  std::error_code failure;
-  std::filesystem::create_directories(verb.obj_folder, failure);
-  if (!failure) return absl::OkStatus();
-  return MakeError(Reason::kFieldInvalid,
-                   absl::StrCat("--obj ", verb.obj_folder, ": cannot create the folder (",
-                                failure.message(), "); name another folder"),
-                   {{"field", "--obj"}, {"value", verb.obj_folder}});
+  return MakeFolder("--obj", verb.obj_folder);
 }
 
 absl::Status NoBody(const BodySource& source, const std::string& what) {
@@ -254,7 +256,7 @@ void AddShapeVerb(Grammar* grammar) {
       grammar->Add<ShapeVerb>({.name = "shape",
                                .what = "The body shapes of an agent over time",
                                .example = "person-1 --from +20s --to +30s --obj bodies",
-                               .takes = kQuestion | kLimit,
+                               .takes = kQuestion | kLimit | kFormat,
                                .run = RunShape});
   app->add_option("AGENT", verb->agent, kAgentHelp)->required();
   CLI::Option* from = app->add_option("--from", verb->from, "First TIME; default the first body");
@@ -264,11 +266,13 @@ void AddShapeVerb(Grammar* grammar) {
       ->excludes(from)
       ->excludes(to);
   CLI::Option* ply =
-      app->add_option("--ply", verb->ply, "Write the first body to this file, binary PLY");
+      app->add_option("--ply", verb->ply, "Write the first body to this file, binary PLY")
+          ->check(EndsIn({".ply"}));
   CLI::Option* obj = app->add_option("--obj", verb->obj_folder,
                                      "Write one Wavefront OBJ file per body to this folder");
   CLI::Option* png =
-      app->add_option("--png", verb->png, "Draw bodies and skeletons over time as a picture");
+      app->add_option("--png", verb->png, "Draw bodies and skeletons over time as a picture")
+          ->check(EndsIn({".png"}));
   ply->excludes(obj)->excludes(png);
   obj->excludes(png);
   app->add_option("--width", verb->width_px, "Width of the picture, pixels")

@@ -10,8 +10,10 @@
 #include "absl/strings/str_join.h"
 #include "dsg/v1/map_service.pb.h"
 #include "dsg/v1/query_service.pb.h"
+#include "query/cli/agent_pictures.h"
 #include "query/cli/answer_picture.h"
 #include "query/cli/json.h"
+#include "query/cli/list_writer.h"
 #include "query/cli/lookups.h"
 #include "query/cli/session.h"
 #include "query/cli/table.h"
@@ -59,11 +61,6 @@ std::string FlagsText(uint32_t flags) {
   return absl::StrJoin(words, ",");
 }
 
-// Only maps with dates have this column.
-void AddDateColumn(const TimeText& times, std::vector<Column>* columns) {
-  if (times.has_dates()) columns->push_back({"date"});
-}
-
 }  // namespace
 
 std::string RenderLocation(const v1::LocateAgentResponse& reply, const TimeText& times,
@@ -75,52 +72,62 @@ std::string RenderLocation(const v1::LocateAgentResponse& reply, const TimeText&
          "\n";
 }
 
-std::string RenderTrack(const v1::GetTrajectoryResponse& reply, const TimeText& times) {
-  std::vector<Column> columns{{"time", Align::kRight},    {"x m", Align::kRight},
-                              {"y m", Align::kRight},     {"z m", Align::kRight},
-                              {"yaw deg", Align::kRight}, {"note"}};
-  AddDateColumn(times, &columns);
-  Table table(columns);
-  for (const v1::TimedPose& pose : reply.poses()) {
-    const v1::Vector3& p = pose.pose().position();
-    const bool has_yaw = (pose.flags() & pose_flags::kNoOrientation) == 0;
-    std::vector<std::string> cells{times.Relative(pose.time_ns()),
-                                   Fixed(p.x(), 3),
-                                   Fixed(p.y(), 3),
-                                   Fixed(p.z(), 3),
-                                   has_yaw ? Fixed(YawDeg(pose.pose()), 1) : "-",
-                                   FlagsText(pose.flags())};
-    if (times.has_dates()) cells.push_back(times.Date(pose.time_ns()));
-    table.AddRow(std::move(cells));
-  }
-  return absl::StrCat(table.Render(), Counted(reply.poses_size(), "pose"), " of ", reply.agent_id(),
-                      " (revision ", reply.header().read_revision(), ")\n");
+std::vector<ListColumn> PoseColumns() {
+  return {{"time", CellType::kTime},
+          {"x m", CellType::kReal, 3},
+          {"y m", CellType::kReal, 3},
+          {"z m", CellType::kReal, 3},
+          {"yaw deg", CellType::kReal, 1, "-"},
+          {"note"},
+          {"date", CellType::kDate}};
 }
 
-std::string RenderPresence(const v1::ListPresenceResponse& reply, const TimeText& times) {
-  std::vector<Column> columns{{"agent"},
-                              {"name"},
-                              {"enter", Align::kRight},
-                              {"exit", Align::kRight},
-                              {"stayed", Align::kRight},
-                              {"in"}};
-  AddDateColumn(times, &columns);
-  Table table(columns);
-  for (const v1::PresenceInterval& stay : reply.intervals()) {
-    std::vector<std::string> cells{stay.agent_id(),
-                                   stay.agent_name(),
-                                   times.Relative(stay.enter_ns()),
-                                   times.Relative(stay.exit_ns()),
-                                   DurationText(stay.enter_ns(), stay.exit_ns()),
-                                   stay.node_id()};
-    if (times.has_dates()) cells.push_back(times.Date(stay.enter_ns()));
-    table.AddRow(std::move(cells));
-  }
-  return absl::StrCat(table.Render(), Counted(reply.intervals_size(), "stay"), "; ",
-                      Counted(reply.observed_agent_count(), "agent"),
-                      " observed anywhere in that time (revision ", reply.header().read_revision(),
-                      ")", reply.next_page_token().empty() ? "" : "; there are more, see --limit",
-                      "\n");
+absl::Status AddPoses(const v1::GetTrajectoryResponse& part, ListWriter* list) {
+  return list->Add(part, part.poses(), [](const v1::TimedPose& pose) {
+    const v1::Vector3& p = pose.pose().position();
+    const bool has_yaw = (pose.flags() & pose_flags::kNoOrientation) == 0;
+    return Row{pose.time_ns(),
+               p.x(),
+               p.y(),
+               p.z(),
+               has_yaw ? Cell(YawDeg(pose.pose())) : Cell(),
+               FlagsText(pose.flags()),
+               pose.time_ns()};
+  });
+}
+
+std::vector<ListColumn> StayColumns() {
+  return {{"agent"},
+          {"name"},
+          {"enter", CellType::kTime},
+          {"exit", CellType::kTime},
+          {"stayed", CellType::kDuration},
+          {"in"},
+          {"date", CellType::kDate}};
+}
+
+absl::Status AddStays(const v1::ListPresenceResponse& part, ListWriter* list) {
+  return list->Add(part, part.intervals(), [](const v1::PresenceInterval& stay) {
+    return Row{stay.agent_id(),
+               stay.agent_name(),
+               stay.enter_ns(),
+               stay.exit_ns(),
+               LengthNs(stay.enter_ns(), stay.exit_ns()),
+               stay.node_id(),
+               stay.enter_ns()};
+  });
+}
+
+std::string ObservedFooter(const std::string& counted, int64_t observed_agent_count,
+                           const PageEnd& end) {
+  return absl::StrCat(counted, "; ", Counted(observed_agent_count, "agent"),
+                      " observed anywhere in that time (revision ", end.revision, ")",
+                      end.is_cut ? "; there are more, see --limit" : "", "\n");
+}
+
+std::string TrackFooter(int64_t pose_count, const v1::GetTrajectoryResponse& first) {
+  return absl::StrCat(Counted(pose_count, "pose"), " of ", first.agent_id(), " (revision ",
+                      first.header().read_revision(), ")\n");
 }
 
 namespace {
@@ -137,37 +144,8 @@ absl::StatusOr<std::string> RoomName(Session* session, const v1::LocateAgentResp
   return reply.node().name();
 }
 
-AnswerPicture DrawTrack(const v1::GetTrajectoryResponse& track, const Session& session,
-                        const std::string& agent) {
-  constexpr uint32_t kTrackRgb = 0x1f5fbf;
-  AnswerPicture picture{.title = agent, .revision = track.header().read_revision()};
-  if (track.poses().empty()) return picture;
-  const v1::TimedPose& first = track.poses(0);
-  const v1::TimedPose& last = track.poses(track.poses_size() - 1);
-  // A tenth of a second is finer than the picture.
-  const std::string begin = session.times().Tenth(first.time_ns());
-  const std::string end = session.times().Tenth(last.time_ns());
-  absl::StrAppend(&picture.title, "  ", begin, " to ", end);
-  picture.at_ns = last.time_ns();
-  Overlay& overlay = picture.overlay;
-  TimeNs before_ns = kTimeMin;
-  for (const v1::TimedPose& pose : track.poses()) {
-    const bool begins =
-        overlay.lines.empty() || pose.time_ns() - before_ns > session.map().gap_ns_max;
-    if (begins) overlay.lines.push_back({.points_map = {}, .rgb = kTrackRgb, .width_px = 5.0});
-    overlay.lines.back().points_map.push_back(PointOf(pose.pose().position()));
-    before_ns = pose.time_ns();
-  }
-  overlay.marks = {
-      {.position_map = PointOf(first.pose().position()),
-       .rgb = kTrackRgb,
-       .shape = OverlayMark::Shape::kRing,
-       .label = begin},
-      {.position_map = PointOf(last.pose().position()), .rgb = kTrackRgb, .label = end}};
-  return picture;
-}
-
 absl::Status RunWhere(Session* session, const WhereVerb& verb, std::ostream& out) {
+  DSG_RETURN_IF_ERROR(CheckPicture(verb.picture));
   auto request = session->Begin<v1::LocateAgentRequest>();
   request.set_agent(verb.agent);
   DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, ParseInstant("--at", verb.at, session->map()));
@@ -175,10 +153,17 @@ absl::Status RunWhere(Session* session, const WhereVerb& verb, std::ostream& out
   v1::LocateAgentResponse reply;
   DSG_RETURN_IF_ERROR(
       session->times().Explain(session->api().LocateAgent(session->NewCall(), request, &reply)));
-  if (session->common().json) return WriteJson(reply, out);
-  DSG_ASSIGN_OR_RETURN(const std::string room_name, RoomName(session, reply));
-  out << RenderLocation(reply, session->times(), room_name);
-  return absl::OkStatus();
+  AnswerPicture picture;
+  if (!verb.picture.png.empty()) {
+    DSG_ASSIGN_OR_RETURN(picture, DrawLocation(*session, reply));
+  }
+  if (session->common().json) {
+    DSG_RETURN_IF_ERROR(WriteJson(reply, out));
+  } else {
+    DSG_ASSIGN_OR_RETURN(const std::string room_name, RoomName(session, reply));
+    out << RenderLocation(reply, session->times(), room_name);
+  }
+  return WritePicture(session, verb.picture, picture, out);
 }
 
 absl::Status RunTrack(Session* session, const TrackVerb& verb, std::ostream& out) {
@@ -192,37 +177,32 @@ absl::Status RunTrack(Session* session, const TrackVerb& verb, std::ostream& out
       SetInstant("--to", verb.to, map, &request, &v1::GetTrajectoryRequest::set_to_ns));
   DSG_RETURN_IF_ERROR(SetDuration("--every", verb.every, &request,
                                   &v1::GetTrajectoryRequest::set_resample_period_ns));
-  // JSON is written as it arrives; a table or a picture needs all poses.
-  const bool is_json = session->common().json;
-  const bool is_kept = !is_json || !verb.picture.png.empty();
-  JsonListWriter json("poses", &out);
-  v1::GetTrajectoryResponse all;
+  // The list is written as it arrives; a picture needs all poses.
+  const bool is_kept = !verb.picture.png.empty();
+  ListWriter list(session->common(), session->times(), "poses", PoseColumns(), &out);
+  v1::GetTrajectoryResponse kept;
+  v1::GetTrajectoryResponse first;
   int64_t poses_left = EntriesLeft(session->common().limit);
   absl::Status written;
   const auto take = [&](v1::GetTrajectoryResponse message) {
-    if (message.poses_size() > poses_left) {
-      message.mutable_poses()->DeleteSubrange(static_cast<int>(poses_left),
-                                              message.poses_size() - static_cast<int>(poses_left));
-    }
-    poses_left -= message.poses_size();
-    if (is_json) written = json.Add(message);
-    // The first message has header and agent, all have poses.
-    if (is_kept) all.MergeFrom(message);
+    CutToLimit(message.mutable_poses(), &poses_left);
+    written = AddPoses(message, &list);
+    if (is_kept) kept.MergeFrom(message);
+    message.clear_poses();
+    // The first message has header and agent.
+    first.MergeFrom(message);
     return written.ok() && poses_left > 0;
   };
   DSG_RETURN_IF_ERROR(
       session->times().Explain(session->Read(&query::Api::GetTrajectory, request, take)));
   DSG_RETURN_IF_ERROR(written);
-  if (is_json) {
-    json.End();
-  } else {
-    out << RenderTrack(all, session->times());
-  }
-  if (verb.picture.png.empty()) return absl::OkStatus();
-  return WritePicture(session, verb.picture, DrawTrack(all, *session, verb.agent), out);
+  DSG_RETURN_IF_ERROR(list.End(TrackFooter(list.count(), first)));
+  if (!is_kept) return absl::OkStatus();
+  return WritePicture(session, verb.picture, DrawTrack(*session, kept, verb.agent), out);
 }
 
 absl::Status RunWho(Session* session, const WhoVerb& verb, std::ostream& out) {
+  DSG_RETURN_IF_ERROR(CheckPicture(verb.picture));
   auto request = session->Begin<v1::ListPresenceRequest>();
   if (verb.box.empty()) {
     DSG_ASSIGN_OR_RETURN(const std::string node_id, RegionId(session, verb.room));
@@ -234,13 +214,22 @@ absl::Status RunWho(Session* session, const WhoVerb& verb, std::ostream& out) {
   DSG_ASSIGN_OR_RETURN(const Interval asked, AskedInterval(session, verb.from, verb.to));
   request.set_from_ns(asked.from_ns);
   request.set_to_ns(asked.to_ns);
-  v1::ListPresenceResponse all;
-  DSG_RETURN_IF_ERROR(session->ReadPages(&query::Api::ListPresence, request,
-                                         session->common().limit,
-                                         &v1::ListPresenceResponse::intervals_size, &all));
-  if (session->common().json) return WriteJson(all, out);
-  out << RenderPresence(all, session->times());
-  return absl::OkStatus();
+  ListWriter list(session->common(), session->times(), "intervals", StayColumns(), &out);
+  PageEnd end;
+  int64_t observed_count = 0;
+  v1::ListPresenceResponse kept;
+  const auto take = [&](const v1::ListPresenceResponse& page) {
+    if (!verb.picture.png.empty()) kept.MergeFrom(page);
+    end = PageEnd::Of(page);
+    observed_count = page.observed_agent_count();
+    return AddStays(page, &list);
+  };
+  DSG_RETURN_IF_ERROR(session->EachPage(&query::Api::ListPresence, request, session->common().limit,
+                                        &v1::ListPresenceResponse::intervals_size, take));
+  DSG_RETURN_IF_ERROR(list.End(ObservedFooter(Counted(list.count(), "stay"), observed_count, end)));
+  if (verb.picture.png.empty()) return absl::OkStatus();
+  DSG_ASSIGN_OR_RETURN(const AnswerPicture picture, DrawPresence(*session, request, kept));
+  return WritePicture(session, verb.picture, picture, out);
 }
 
 absl::Status CheckWho(const WhoVerb& verb, const CommonOptions&) {
@@ -253,7 +242,7 @@ void AddTrack(Grammar* grammar) {
       {.name = "track",
        .what = "The poses of an agent",
        .example = "carol --from +30s --to +32s --every 500ms --png carol.png",
-       .takes = kQuestion | kLimit,
+       .takes = kQuestion | kLimit | kFormat,
        .run = RunTrack});
   app->add_option("AGENT", verb->agent, kAgentHelp)->required();
   app->add_option("--from", verb->from, "First TIME; default the first pose of the track");
@@ -266,7 +255,7 @@ void AddWho(Grammar* grammar) {
   const auto [app, verb] = grammar->Add<WhoVerb>({.name = "who",
                                                   .what = "Who was in a room or a box, and when",
                                                   .example = "--room kitchen --from +1m --to +2m",
-                                                  .takes = kQuestion | kLimit,
+                                                  .takes = kQuestion | kLimit | kFormat,
                                                   .run = RunWho,
                                                   .check = CheckWho});
   CLI::Option* room =
@@ -277,6 +266,7 @@ void AddWho(Grammar* grammar) {
   room->excludes(box);
   app->add_option("--from", verb->from, kMapFromHelp);
   app->add_option("--to", verb->to, kMapToHelp);
+  AddPicture(app, "the place and the ways of those who were there", &verb->picture);
 }
 
 }  // namespace
@@ -288,6 +278,7 @@ void AddAgentVerbs(Grammar* grammar) {
                                                     .run = RunWhere});
   app->add_option("AGENT", verb->agent, kAgentHelp)->required();
   app->add_option("--at", verb->at, "TIME asked about")->required();
+  AddPicture(app, "the agent and its way", &verb->picture);
   AddTrack(grammar);
   AddWho(grammar);
 }

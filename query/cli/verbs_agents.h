@@ -3,9 +3,11 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "query/cli/answer_text.h"
 #include "query/cli/arguments.h"
+#include "query/cli/list_writer.h"
 
 namespace dsg::v1 {
 class GetTrajectoryResponse;
@@ -18,6 +20,7 @@ namespace dsg::cli {
 struct WhereVerb {
   std::string agent;
   std::string at;
+  PictureOptions picture;
 };
 
 struct TrackVerb {
@@ -35,16 +38,25 @@ struct WhoVerb {
   std::string box;
   std::string from;
   std::string to;
+  PictureOptions picture;
 };
 
 /// One sentence. `room_name` may be empty.
 std::string RenderLocation(const v1::LocateAgentResponse& reply, const TimeText& times,
                            const std::string& room_name);
 
-/// One line per pose.
-std::string RenderTrack(const v1::GetTrajectoryResponse& reply, const TimeText& times);
+/// A row per pose of a track; `list` has PoseColumns.
+std::vector<ListColumn> PoseColumns();
+absl::Status AddPoses(const v1::GetTrajectoryResponse& part, ListWriter* list);
+/// `first`: the part with the header.
+std::string TrackFooter(int64_t pose_count, const v1::GetTrajectoryResponse& first);
 
-/// One line per stay, then the number of agents that were observed at all.
-std::string RenderPresence(const v1::ListPresenceResponse& reply, const TimeText& times);
+/// A row per stay; `list` has StayColumns.
+std::vector<ListColumn> StayColumns();
+absl::Status AddStays(const v1::ListPresenceResponse& part, ListWriter* list);
+
+/// "2 stays; 7 agents observed anywhere in that time (revision 6)".
+std::string ObservedFooter(const std::string& counted, int64_t observed_agent_count,
+                           const PageEnd& end);
 
 }  // namespace dsg::cli

@@ -18,6 +18,7 @@
 #include "dsg/v1/maintenance_service.pb.h"
 #include "dsg/v1/map_service.pb.h"
 #include "query/cli/json.h"
+#include "query/cli/list_writer.h"
 #include "query/cli/lookups.h"
 #include "query/cli/progress.h"
 #include "query/cli/session.h"
@@ -163,59 +164,60 @@ std::string RenderDiff(const v1::DiffRevisionsResponse& reply, const TimeText& t
 
 namespace {
 
-// One row per revision, with a column of tags if there are any.
-std::string RenderRevisions(const v1::ListRevisionsResponse& reply,
-                            const v1::ListTagsResponse& tags) {
-  std::map<int64_t, std::vector<std::string>> tags_of;
-  for (const v1::Tag& tag : tags.tags()) tags_of[tag.revision()].push_back(tag.name());
-  std::vector<Column> columns = {{"revision", Align::kRight},
-                                 {"committed"},
-                                 {"author"},
-                                 {"nodes", Align::kRight},
-                                 {"edges", Align::kRight},
-                                 {"agents", Align::kRight},
-                                 {"poses", Align::kRight},
-                                 {"session"},
-                                 {"message"}};
-  if (!tags_of.empty()) columns.insert(columns.begin() + 1, {"tags"});
-  Table table(std::move(columns));
-  for (const v1::Revision& revision : reply.revisions()) {
-    std::vector<std::string> cells = {absl::StrCat(revision.revision()),
-                                      FormatRfc3339(revision.committed_ns()),
-                                      revision.author(),
-                                      absl::StrCat(revision.node_count()),
-                                      absl::StrCat(revision.edge_count()),
-                                      absl::StrCat(revision.agent_count()),
-                                      absl::StrCat(revision.pose_count()),
-                                      absl::StrCat(revision.session_id(), "/", revision.sequence()),
-                                      revision.message()};
-    if (!tags_of.empty()) {
-      cells.insert(cells.begin() + 1, absl::StrJoin(tags_of[revision.revision()], " "));
-    }
-    table.AddRow(std::move(cells));
-  }
-  return table.Render();
+using RevisionTags = std::map<int64_t, std::vector<std::string>>;
+
+std::vector<ListColumn> RevisionColumns(bool has_tags) {
+  std::vector<ListColumn> columns = {{"revision", CellType::kCount},
+                                     {"committed"},
+                                     {"author"},
+                                     {"nodes", CellType::kCount},
+                                     {"edges", CellType::kCount},
+                                     {"agents", CellType::kCount},
+                                     {"poses", CellType::kCount},
+                                     {"session"},
+                                     {"message"}};
+  if (has_tags) columns.insert(columns.begin() + 1, {"tags"});
+  return columns;
+}
+
+Row RevisionRow(const v1::Revision& revision, bool has_tags, const RevisionTags& tags) {
+  // A commit has a date on every clock.
+  Row row = {revision.revision(),   FormatRfc3339(revision.committed_ns()),
+             revision.author(),     revision.node_count(),
+             revision.edge_count(), revision.agent_count(),
+             revision.pose_count(), absl::StrCat(revision.session_id(), "/", revision.sequence()),
+             revision.message()};
+  if (!has_tags) return row;
+  const auto found = tags.find(revision.revision());
+  row.insert(row.begin() + 1, found == tags.end() ? "" : absl::StrJoin(found->second, " "));
+  return row;
 }
 
 absl::Status RunLog(Session* session, const LogVerb&, std::ostream& out) {
+  const CommonOptions& common = session->common();
+  RevisionTags tags;
+  if (!common.json && common.format != ListFormat::kJsonLines) {
+    DSG_ASSIGN_OR_RETURN(const v1::ListTagsResponse reply, ReadTags(session));
+    for (const v1::Tag& tag : reply.tags()) tags[tag.revision()].push_back(tag.name());
+  }
+  const bool has_tags = !tags.empty() || common.format == ListFormat::kCsv;
+  ListWriter list(common, session->times(), "revisions", RevisionColumns(has_tags), &out);
   // This list is paged by revision, not by token.
   v1::ListRevisionsRequest request;
   request.set_map(session->map().name);
-  v1::ListRevisionsResponse all;
-  for (int64_t left = EntriesLeft(session->common().limit); left > 0;) {
+  for (int64_t left = EntriesLeft(common.limit); left > 0;) {
     const int64_t page_size = std::min(left, kPageSizeMax);
     request.set_page_size(static_cast<int32_t>(page_size));
     v1::ListRevisionsResponse page;
     DSG_RETURN_IF_ERROR(session->api().ListRevisions(session->NewCall(), request, &page));
-    all.MergeFrom(page);
+    DSG_RETURN_IF_ERROR(list.Add(page, page.revisions(), [&](const v1::Revision& revision) {
+      return RevisionRow(revision, has_tags, tags);
+    }));
     left -= page.revisions_size();
     if (page.revisions_size() < page_size) break;
     request.set_before_revision(page.revisions(page.revisions_size() - 1).revision());
   }
-  if (session->common().json) return WriteJson(all, out);
-  DSG_ASSIGN_OR_RETURN(const v1::ListTagsResponse tags, ReadTags(session));
-  out << RenderRevisions(all, tags);
-  return absl::OkStatus();
+  return list.End("");
 }
 
 absl::Status RunDiff(Session* session, const DiffVerb& verb, std::ostream& out) {
@@ -377,7 +379,7 @@ void AddLog(Grammar* grammar) {
   grammar->Add<LogVerb>({.name = "log",
                          .what = "List the revisions of a map, newest first",
                          .example = "--limit 5",
-                         .takes = kServer | kMap | kJson | kLimit,
+                         .takes = kServer | kMap | kJson | kLimit | kFormat,
                          .run = RunLog});
 }
 

@@ -12,7 +12,9 @@
 #include "absl/strings/str_join.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/cli/answer_text.h"
+#include "query/cli/graph_rows.h"
 #include "query/cli/json.h"
+#include "query/cli/list_writer.h"
 #include "query/cli/lookups.h"
 #include "query/cli/session.h"
 #include "query/cli/table.h"
@@ -54,21 +56,6 @@ std::string AttributeText(const v1::AttributeValue& value) {
       break;
   }
   return "unset";
-}
-
-std::string ProvenanceText(v1::Provenance provenance) {
-  switch (provenance) {
-    case v1::PROVENANCE_PERCEIVED:
-      return "perceived";
-    case v1::PROVENANCE_IMPORTED:
-      return "imported";
-    case v1::PROVENANCE_PREDICTED:
-      return "predicted";
-    case v1::PROVENANCE_MANUAL:
-      return "manual";
-    default:
-      return "";
-  }
 }
 
 void AddObjectFields(const v1::ObjectComponent& object, std::vector<Field>* fields) {
@@ -153,26 +140,19 @@ void AddAttributeFields(const v1::Node& node, std::vector<Field>* fields) {
 
 }  // namespace
 
-std::string RenderEdges(const v1::ListEdgesResponse& reply, const TimeText& times) {
-  Table table({{"source"}, {"relation"}, {"target"}, {"weight", Align::kRight}, {"held"}});
-  for (const v1::Edge& edge : reply.edges()) {
-    table.AddRow(
-        {edge.source(), edge.relation(), edge.target(), Fixed(edge.weight(), 3), times.Held(edge)});
-  }
-  return table.Render() + Footer(reply.edges_size(), "edge", reply.header().read_revision(),
-                                 !reply.next_page_token().empty());
+std::vector<ListColumn> NearestColumns() {
+  std::vector<ListColumn> columns = NodeColumns();
+  columns.insert(columns.begin(),
+                 {.heading = "distance m", .type = CellType::kReal, .decimals = 3});
+  return columns;
 }
 
-std::string RenderNearest(const v1::ListNearestNodesResponse& reply) {
-  std::vector<Column> columns = NodeColumns();
-  columns.insert(columns.begin(), {"distance m", Align::kRight});
-  Table table(columns);
-  for (const v1::NearestNode& nearest : reply.nodes()) {
-    std::vector<std::string> cells = NodeCells(nearest.node());
-    cells.insert(cells.begin(), Fixed(nearest.distance_m(), 3));
-    table.AddRow(std::move(cells));
-  }
-  return table.Render() + Footer(reply.nodes_size(), "node", reply.header().read_revision(), false);
+absl::Status AddNearest(const v1::ListNearestNodesResponse& reply, ListWriter* list) {
+  return list->Add(reply, reply.nodes(), [](const v1::NearestNode& nearest) {
+    Row row = NodeRow(nearest.node());
+    row.insert(row.begin(), nearest.distance_m());
+    return row;
+  });
 }
 
 std::string RenderNode(const v1::GetNodeResponse& reply, const TimeText& times) {
@@ -202,13 +182,6 @@ std::string RenderNode(const v1::GetNodeResponse& reply, const TimeText& times) 
 
 namespace {
 
-std::string RenderNodes(const v1::ListNodesResponse& reply) {
-  Table table(NodeColumns());
-  for (const v1::Node& node : reply.nodes()) table.AddRow(NodeCells(node));
-  return table.Render() + Footer(reply.nodes_size(), "node", reply.header().read_revision(),
-                                 !reply.next_page_token().empty());
-}
-
 absl::Status RunList(Session* session, const ListVerb& verb, std::ostream& out) {
   auto request = session->Begin<v1::ListNodesRequest>();
   v1::NodeFilter* filter = request.mutable_filter();
@@ -220,15 +193,18 @@ absl::Status RunList(Session* session, const ListVerb& verb, std::ostream& out) 
     ToProto(box, filter->mutable_box());
   }
   request.set_view(v1::NODE_VIEW_GEOMETRY);
-  v1::ListNodesResponse all;
-  DSG_RETURN_IF_ERROR(session->ReadPages(&query::Api::ListNodes, request, session->common().limit,
-                                         &v1::ListNodesResponse::nodes_size, &all));
-  if (all.nodes().empty()) {
-    DSG_RETURN_IF_ERROR(CheckWords(session, WordsOf(verb.filter)));
-  }
-  if (session->common().json) return WriteJson(all, out);
-  out << RenderNodes(all);
-  return absl::OkStatus();
+  ListWriter list(session->common(), session->times(), "nodes", NodeColumns(), &out);
+  PageEnd end;
+  const auto take = [&](const v1::ListNodesResponse& page) -> absl::Status {
+    if (page.nodes().empty() && list.count() == 0) {
+      DSG_RETURN_IF_ERROR(CheckWords(session, WordsOf(verb.filter)));
+    }
+    end = PageEnd::Of(page);
+    return list.Add(page, page.nodes(), NodeRow);
+  };
+  DSG_RETURN_IF_ERROR(session->EachPage(&query::Api::ListNodes, request, session->common().limit,
+                                        &v1::ListNodesResponse::nodes_size, take));
+  return list.End(Footer(list.count(), "node", end.revision, end.is_cut));
 }
 
 absl::Status RunEdges(Session* session, const EdgesVerb& verb, std::ostream& out) {
@@ -238,17 +214,20 @@ absl::Status RunEdges(Session* session, const EdgesVerb& verb, std::ostream& out
   request.set_target(verb.target);
   DSG_RETURN_IF_ERROR(
       SetInstant("--at", verb.at, session->map(), &request, &v1::ListEdgesRequest::set_at_ns));
-  v1::ListEdgesResponse all;
-  DSG_RETURN_IF_ERROR(session->ReadPages(&query::Api::ListEdges, request, session->common().limit,
-                                         &v1::ListEdgesResponse::edges_size, &all));
-  if (all.edges().empty()) {
-    v1::NodePattern words;
-    if (!verb.relation.empty()) words.add_relations()->set_relation(verb.relation);
-    DSG_RETURN_IF_ERROR(CheckWords(session, words));
-  }
-  if (session->common().json) return WriteJson(all, out);
-  out << RenderEdges(all, session->times());
-  return absl::OkStatus();
+  v1::NodePattern words;
+  if (!verb.relation.empty()) words.add_relations()->set_relation(verb.relation);
+  ListWriter list(session->common(), session->times(), "edges", EdgeColumns(), &out);
+  PageEnd end;
+  const auto take = [&](const v1::ListEdgesResponse& page) -> absl::Status {
+    if (page.edges().empty() && list.count() == 0) {
+      DSG_RETURN_IF_ERROR(CheckWords(session, words));
+    }
+    end = PageEnd::Of(page);
+    return list.Add(page, page.edges(), EdgeRow);
+  };
+  DSG_RETURN_IF_ERROR(session->EachPage(&query::Api::ListEdges, request, session->common().limit,
+                                        &v1::ListEdgesResponse::edges_size, take));
+  return list.End(Footer(list.count(), "edge", end.revision, end.is_cut));
 }
 
 absl::Status RunShow(Session* session, const ShowVerb& verb, std::ostream& out) {
@@ -277,16 +256,16 @@ absl::Status RunNear(Session* session, const NearVerb& verb, std::ostream& out) 
   if (reply.nodes().empty()) {
     DSG_RETURN_IF_ERROR(CheckWords(session, WordsOf(verb.filter)));
   }
-  if (session->common().json) return WriteJson(reply, out);
-  out << RenderNearest(reply);
-  return absl::OkStatus();
+  ListWriter list(session->common(), session->times(), "nodes", NearestColumns(), &out);
+  DSG_RETURN_IF_ERROR(AddNearest(reply, &list));
+  return list.End(Footer(list.count(), "node", reply.header().read_revision(), false));
 }
 
 void AddList(Grammar* grammar) {
   const auto [app, verb] = grammar->Add<ListVerb>({.name = "ls",
                                                    .what = "List nodes",
                                                    .example = "--kind room",
-                                                   .takes = kQuestion | kLimit,
+                                                   .takes = kQuestion | kLimit | kFormat,
                                                    .run = RunList});
   AddFilter(app, &verb->filter);
   app->add_option("--parent", verb->parent, "Only children of this node");
@@ -298,7 +277,7 @@ void AddEdges(Grammar* grammar) {
   const auto [app, verb] = grammar->Add<EdgesVerb>({.name = "edges",
                                                     .what = "List edges",
                                                     .example = "--source R9 --relation CONTAINS",
-                                                    .takes = kQuestion | kLimit,
+                                                    .takes = kQuestion | kLimit | kFormat,
                                                     .run = RunEdges});
   app->add_option("--source", verb->source, "Only edges from this node");
   app->add_option("--relation", verb->relation, "Only this relation: CONTAINS, ON, ...");
@@ -316,6 +295,7 @@ void AddNear(Grammar* grammar) {
   const auto [app, verb] = grammar->Add<NearVerb>({.name = "near",
                                                    .what = "The nodes nearest to a point",
                                                    .example = "3,2,0 --k 3 --layer objects",
+                                                   .takes = kQuestion | kFormat,
                                                    .run = RunNear});
   app->add_option("POSITION", verb->position, "X,Y,Z in the map frame, metres")->required();
   app->add_option("-k,--k", verb->k, "Number of nodes")

@@ -4,13 +4,14 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "query/cli/answer_text.h"
 #include "query/cli/arguments.h"
+#include "query/cli/list_writer.h"
 
 namespace dsg::v1 {
 class GetNodeResponse;
-class ListEdgesResponse;
 class ListNearestNodesResponse;
 }  // namespace dsg::v1
 
@@ -42,8 +43,10 @@ struct NearVerb {
   double max_distance_m = 0.0;
 };
 
-std::string RenderEdges(const v1::ListEdgesResponse& reply, const TimeText& times);
-std::string RenderNearest(const v1::ListNearestNodesResponse& reply);
+/// A row per node, with its distance; `list` has NearestColumns.
+std::vector<ListColumn> NearestColumns();
+absl::Status AddNearest(const v1::ListNearestNodesResponse& reply, ListWriter* list);
+
 /// One line per field; fields that the node does not have are left out.
 std::string RenderNode(const v1::GetNodeResponse& reply, const TimeText& times);
 

@@ -2,11 +2,13 @@
 // The verbs about revisions that are kept, dropped or restored: tag, compact, revert.
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/maintenance_service.pb.h"
 #include "query/cli/answer_text.h"
 #include "query/cli/json.h"
+#include "query/cli/list_writer.h"
 #include "query/cli/lookups.h"
 #include "query/cli/progress.h"
 #include "query/cli/session.h"
@@ -34,16 +36,6 @@ struct RevertVerb {
   RevisionOption to;
   bool dry_run = false;
 };
-
-std::string RenderTags(const v1::ListTagsResponse& reply) {
-  if (reply.tags().empty()) return "no tags\n";
-  Table table({{"tag"}, {"revision", Align::kRight}, {"set"}, {"note"}});
-  for (const v1::Tag& tag : reply.tags()) {
-    table.AddRow(
-        {tag.name(), absl::StrCat(tag.revision()), FormatRfc3339(tag.created_ns()), tag.note()});
-  }
-  return table.Render();
-}
 
 std::string RenderTag(const v1::Tag& tag) {
   return absl::StrCat("tag ", tag.name(), " is revision ", tag.revision(), "\n");
@@ -73,9 +65,17 @@ absl::Status ListTags(Session* session, std::ostream& out) {
   request.set_map(session->map().name);
   v1::ListTagsResponse reply;
   DSG_RETURN_IF_ERROR(session->api().ListTags(session->NewCall(), request, &reply));
-  if (session->common().json) return WriteJson(reply, out);
-  out << RenderTags(reply);
-  return absl::OkStatus();
+  const std::vector<ListColumn> columns = {
+      {"tag"}, {"revision", CellType::kCount}, {"set"}, {"note"}};
+  ListWriter list(session->common(), session->times(), "tags", columns, &out);
+  if (list.is_table() && reply.tags().empty()) {
+    out << "no tags\n";
+    return absl::OkStatus();
+  }
+  DSG_RETURN_IF_ERROR(list.Add(reply, reply.tags(), [](const v1::Tag& tag) {
+    return Row{tag.name(), tag.revision(), FormatRfc3339(tag.created_ns()), tag.note()};
+  }));
+  return list.End("");
 }
 
 absl::Status RemoveTag(Session* session, const std::string& name, std::ostream& out) {
@@ -146,7 +146,7 @@ void AddTag(Grammar* grammar) {
       grammar->Add<TagVerb>({.name = "tag",
                              .what = "Name a revision, which then stays readable; or list the tags",
                              .example = "before-moving --note \"desks as built\"",
-                             .takes = kServer | kMap | kJson | kRevision,
+                             .takes = kServer | kMap | kJson | kRevision | kFormat,
                              .run = RunTag});
   CLI::Option* name =
       app->add_option("NAME", verb->name, "Name of the tag; an existing tag is moved");
@@ -155,6 +155,7 @@ void AddTag(Grammar* grammar) {
   CLI::Option* remove = app->add_option("--remove", verb->removed, "Remove this tag");
   list->excludes(name)->excludes(remove);
   remove->excludes(name);
+  app->get_option("--format")->excludes(name)->excludes(remove);
 }
 
 void AddCompact(Grammar* grammar) {

@@ -7,6 +7,7 @@
 #include "dsg/v1/map_service.pb.h"
 #include "query/cli/answer_text.h"
 #include "query/cli/json.h"
+#include "query/cli/list_writer.h"
 #include "query/cli/session.h"
 #include "query/cli/table.h"
 #include "query/cli/verb_list.h"
@@ -53,25 +54,24 @@ std::string EpochText(const v1::MapSpec& map) {
              : absl::StrCat(map.epoch_ns(), " ns");
 }
 
-std::string RenderMaps(const v1::ListMapsResponse& reply) {
-  Table table({{"map"},
-               {"frame"},
-               {"clock"},
-               {"epoch"},
-               {"codec"},
-               {"gap", Align::kRight},
-               {"mesh block m", Align::kRight}});
-  for (const v1::MapSpec& map : reply.maps()) {
-    table.AddRow({map.name(), map.frame(), ClockText(map.clock()), EpochText(map),
-                  CodecText(map.codec()), DurationText(0, map.gap_ns_max()),
-                  Fixed(map.mesh_block_size_m(), 1)});
-  }
-  std::string text = table.Render();
-  for (const std::string& name : reply.unreadable_maps()) {
-    absl::StrAppend(&text, "map ", Printable(name),
-                    " cannot be opened; dsg verify gives the reason\n");
-  }
-  return text;
+std::vector<ListColumn> MapColumns() {
+  return {{"map"},
+          {"frame"},
+          {"clock"},
+          {"epoch"},
+          {"codec"},
+          {"gap", CellType::kDuration},
+          {"mesh block m", CellType::kReal, 1}};
+}
+
+Row MapRow(const v1::MapSpec& map, bool is_table) {
+  return {map.name(),
+          map.frame(),
+          ClockText(map.clock()),
+          is_table ? EpochText(map) : absl::StrCat(map.epoch_ns()),
+          CodecText(map.codec()),
+          map.gap_ns_max(),
+          map.mesh_block_size_m()};
 }
 
 std::string RenderStats(const v1::GetMapStatsResponse& reply, const TimeText& times) {
@@ -122,9 +122,17 @@ absl::Status RunStats(Session* session, const StatsVerb&, std::ostream& out) {
 absl::Status RunMaps(Session* session, const MapsVerb&, std::ostream& out) {
   v1::ListMapsResponse reply;
   DSG_RETURN_IF_ERROR(session->api().ListMaps(session->NewCall(), v1::ListMapsRequest(), &reply));
-  if (session->common().json) return WriteJson(reply, out);
-  out << RenderMaps(reply);
-  return absl::OkStatus();
+  std::string unreadable;
+  for (const std::string& name : reply.unreadable_maps()) {
+    absl::StrAppend(&unreadable, "map ", Printable(name),
+                    " cannot be opened; dsg verify gives the reason\n");
+  }
+  ListWriter list(session->common(), session->times(), "maps", MapColumns(), &out);
+  DSG_RETURN_IF_ERROR(list.Add(
+      reply, reply.maps(), [&](const v1::MapSpec& map) { return MapRow(map, list.is_table()); }));
+  // JSON has them in a field of its own; rows have no place for them.
+  if (!list.is_table() && !session->common().json) session->notes() << unreadable;
+  return list.End(unreadable);
 }
 
 absl::Status RunVersion(Session* session, const VersionVerb&, std::ostream& out) {
@@ -149,14 +157,14 @@ absl::Status RunVersion(Session* session, const VersionVerb&, std::ostream& out)
 
 }  // namespace
 
-void AddMapVerbs(Grammar* grammar) {
+void AddMapsVerbs(Grammar* grammar) {
   grammar->Add<StatsVerb>({.name = "stats",
                            .what = "Counts and sizes of a map",
                            .example = "--revision 3",
                            .run = RunStats});
   grammar->Add<MapsVerb>({.name = "maps",
                           .what = "List the maps",
-                          .takes = kServer | kJson,
+                          .takes = kServer | kJson | kFormat,
                           .opens = Opens::kPlace,
                           .run = RunMaps});
   grammar->Add<VersionVerb>({.name = "version",

@@ -12,20 +12,18 @@
 #include "query/cli/answer_picture.h"
 #include "query/cli/answer_text.h"
 #include "query/cli/json.h"
+#include "query/cli/list_writer.h"
 #include "query/cli/lookups.h"
 #include "query/cli/session.h"
 #include "query/cli/table.h"
 #include "query/cli/values.h"
 #include "query/cli/verb_list.h"
+#include "query/cli/verbs_agents.h"
 #include "schema/base/status.h"
 #include "schema/picture/look.h"
 
 namespace dsg::cli {
 namespace {
-
-std::string MeetingPlaceText(const v1::Encounter& meeting, const NodeNames& names) {
-  return names.Text(meeting.room_id().empty() ? meeting.place_id() : meeting.room_id());
-}
 
 std::string PickedObjectText(const v1::Interaction& interaction) {
   const std::string& id = interaction.object_id();
@@ -80,39 +78,30 @@ void AddInteraction(const v1::Interaction& interaction, const TimeText& times,
 
 }  // namespace
 
-std::string RenderEncounters(const v1::ListEncountersResponse& reply, const TimeText& times,
-                             const NodeNames& names) {
-  std::vector<Column> columns{{"agent"},
-                              {"other"},
-                              {"from", Align::kRight},
-                              {"to", Align::kRight},
-                              {"lasted", Align::kRight},
-                              {"closest m", Align::kRight},
-                              {"at", Align::kRight},
-                              {"x m", Align::kRight},
-                              {"y m", Align::kRight},
-                              {"in"}};
-  if (times.has_dates()) columns.push_back({"date"});
-  Table table(columns);
-  for (const v1::Encounter& meeting : reply.encounters()) {
-    std::vector<std::string> cells{NamedId(meeting.agent_id(), meeting.agent_name()),
-                                   NamedId(meeting.other_agent_id(), meeting.other_agent_name()),
-                                   times.Relative(meeting.from_ns()),
-                                   times.Relative(meeting.to_ns()),
-                                   DurationText(meeting.from_ns(), meeting.to_ns()),
-                                   Fixed(meeting.distance_m_min(), 2),
-                                   times.Relative(meeting.closest_at_ns()),
-                                   Fixed(meeting.position().x(), 2),
-                                   Fixed(meeting.position().y(), 2),
-                                   MeetingPlaceText(meeting, names)};
-    if (times.has_dates()) cells.push_back(times.Date(meeting.from_ns()));
-    table.AddRow(std::move(cells));
-  }
-  return absl::StrCat(table.Render(), Counted(reply.encounters_size(), "meeting"), "; ",
-                      Counted(reply.observed_agent_count(), "agent"),
-                      " observed anywhere in that time (revision ", reply.header().read_revision(),
-                      ")", reply.next_page_token().empty() ? "" : "; there are more, see --limit",
-                      "\n");
+std::vector<ListColumn> MeetingColumns() {
+  return {
+      {"agent", CellType::kNode}, {"other", CellType::kNode},      {"from", CellType::kTime},
+      {"to", CellType::kTime},    {"lasted", CellType::kDuration}, {"closest m", CellType::kReal},
+      {"at", CellType::kTime},    {"x m", CellType::kReal},        {"y m", CellType::kReal},
+      {"in", CellType::kNode},    {"date", CellType::kDate}};
+}
+
+absl::Status AddMeetings(const v1::ListEncountersResponse& reply, const NodeNames& names,
+                         ListWriter* list) {
+  return list->Add(reply, reply.encounters(), [&](const v1::Encounter& meeting) {
+    const std::string& in_id = meeting.room_id().empty() ? meeting.place_id() : meeting.room_id();
+    return Row{NodeCell{meeting.agent_id(), meeting.agent_name()},
+               NodeCell{meeting.other_agent_id(), meeting.other_agent_name()},
+               meeting.from_ns(),
+               meeting.to_ns(),
+               LengthNs(meeting.from_ns(), meeting.to_ns()),
+               meeting.distance_m_min(),
+               meeting.closest_at_ns(),
+               meeting.position().x(),
+               meeting.position().y(),
+               names.Of(in_id),
+               meeting.from_ns()};
+  });
 }
 
 std::string RenderInteractions(const v1::ListInteractionsResponse& reply, const TimeText& times,
@@ -174,7 +163,7 @@ absl::StatusOr<AnswerPicture> DrawMeetings(Session* session,
     for (const auto& [id, line_rgb] :
          {std::pair(meeting.agent_id(), rgb), std::pair(meeting.other_agent_id(), other_rgb)}) {
       if (i >= kTrackCountMax) break;
-      DSG_ASSIGN_OR_RETURN(const auto pieces, WayOf(session, id, picture.revision,
+      DSG_ASSIGN_OR_RETURN(const auto pieces, WayOf(*session, id, picture.revision,
                                                     {meeting.from_ns(), meeting.to_ns()}));
       for (const auto& piece : pieces) picture.overlay.lines.push_back({piece, line_rgb});
     }
@@ -213,17 +202,18 @@ absl::Status RunMet(Session* session, const MetVerb& verb, std::ostream& out) {
   if (!verb.picture.png.empty()) {
     DSG_ASSIGN_OR_RETURN(picture, DrawMeetings(session, all, verb));
   }
-  if (session->common().json) {
-    DSG_RETURN_IF_ERROR(WriteJson(all, out));
-  } else {
+  ListWriter list(session->common(), session->times(), "encounters", MeetingColumns(), &out);
+  NodeNames names;
+  if (list.has_rows()) {
     std::vector<std::string> ids;
     for (const v1::Encounter& meeting : all.encounters()) {
       ids.insert(ids.end(), {meeting.room_id(), meeting.place_id()});
     }
-    DSG_ASSIGN_OR_RETURN(const NodeNames names,
-                         NamesOf(session, all.header().read_revision(), ids));
-    out << RenderEncounters(all, session->times(), names);
+    DSG_ASSIGN_OR_RETURN(names, NamesOf(session, all.header().read_revision(), ids));
   }
+  DSG_RETURN_IF_ERROR(AddMeetings(all, names, &list));
+  DSG_RETURN_IF_ERROR(list.End(ObservedFooter(Counted(list.count(), "meeting"),
+                                              all.observed_agent_count(), PageEnd::Of(all))));
   return WritePicture(session, verb.picture, picture, out);
 }
 
@@ -279,7 +269,7 @@ absl::StatusOr<AnswerPicture> DrawPicked(Session* session,
       continue;
     }
     DSG_ASSIGN_OR_RETURN(const auto pieces,
-                         WayOf(session, best.agent_id(), picture.revision,
+                         WayOf(*session, best.agent_id(), picture.revision,
                                {best.at_ns() - kAroundNs, best.at_ns() + kAroundNs}));
     for (const auto& piece : pieces) picture.overlay.lines.push_back({piece, rgb, 5.0, 0.7f});
   }
@@ -321,7 +311,7 @@ void AddMet(Grammar* grammar) {
       grammar->Add<MetVerb>({.name = "met",
                              .what = "Who came near whom, when and where",
                              .example = "carol frank --within 1.5 --for 2s --line-of-sight",
-                             .takes = kQuestion | kLimit,
+                             .takes = kQuestion | kLimit | kFormat,
                              .run = RunMet});
   app->add_option("AGENT", verb->agent, "Only meetings of this agent; default of all agents");
   app->add_option("OTHER", verb->other_agent, "Only meetings with this agent");

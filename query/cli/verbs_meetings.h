@@ -3,8 +3,10 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "query/cli/arguments.h"
+#include "query/cli/list_writer.h"
 #include "query/cli/lookups.h"
 
 namespace dsg::v1 {
@@ -48,9 +50,10 @@ struct PickedVerb {
   PictureOptions picture;
 };
 
-/// One line per meeting, then the number of agents that were observed at all.
-std::string RenderEncounters(const v1::ListEncountersResponse& reply, const TimeText& times,
-                             const NodeNames& names);
+/// A row per meeting; `list` has MeetingColumns.
+std::vector<ListColumn> MeetingColumns();
+absl::Status AddMeetings(const v1::ListEncountersResponse& reply, const NodeNames& names,
+                         ListWriter* list);
 
 /// One line per candidate, grouped by object. `with_evidence`: each followed by its evidence.
 std::string RenderInteractions(const v1::ListInteractionsResponse& reply, const TimeText& times,

@@ -12,7 +12,9 @@
 #include "dsg/v1/query_service.pb.h"
 #include "query/cli/answer_picture.h"
 #include "query/cli/answer_text.h"
+#include "query/cli/graph_rows.h"
 #include "query/cli/json.h"
+#include "query/cli/list_writer.h"
 #include "query/cli/lookups.h"
 #include "query/cli/session.h"
 #include "query/cli/table.h"
@@ -20,6 +22,7 @@
 #include "query/cli/verb_list.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
+#include "schema/picture/look.h"
 
 namespace dsg::cli {
 namespace {
@@ -54,65 +57,83 @@ std::string RenderPlan(const v1::SearchNodesResponse& reply) {
 
 }  // namespace
 
-std::string RenderHits(const v1::SearchNodesResponse& reply, const NodeNames& names) {
+std::vector<ListColumn> HitColumns(const v1::SearchNodesResponse& reply, const NodeNames& names,
+                                   ListFormat format) {
   const bool has_distance =
       std::any_of(reply.hits().begin(), reply.hits().end(),
                   [](const v1::SearchHit& hit) { return hit.has_distance_m(); });
   const bool has_related =
+      format == ListFormat::kCsv ||
       std::any_of(reply.hits().begin(), reply.hits().end(),
                   [&](const v1::SearchHit& hit) { return !RelatedText(hit, names).empty(); });
-  std::vector<Column> columns = NodeColumns();
-  if (has_distance) columns.insert(columns.begin(), {"distance m", Align::kRight});
-  columns.push_back({"in"});
-  if (has_related) columns.push_back({"with"});
-  Table table(columns);
-  for (const v1::SearchHit& hit : reply.hits()) {
-    std::vector<std::string> cells = NodeCells(hit.node());
-    if (has_distance) cells.insert(cells.begin(), Fixed(hit.distance_m(), 3));
-    cells.push_back(names.Text(WhereIn(hit)));
-    if (has_related) cells.push_back(RelatedText(hit, names));
-    table.AddRow(std::move(cells));
+  std::vector<ListColumn> columns = NodeColumns();
+  if (has_distance) {
+    columns.insert(columns.begin(),
+                   {.heading = "distance m", .type = CellType::kReal, .decimals = 3});
   }
-  return absl::StrCat(table.Render(),
-                      Footer(reply.hits_size(), "node", reply.header().read_revision(),
+  columns.push_back({"in", CellType::kNode});
+  if (has_related) columns.push_back({"with"});
+  return columns;
+}
+
+absl::Status AddHits(const v1::SearchNodesResponse& reply, const NodeNames& names,
+                     const std::vector<ListColumn>& columns, ListWriter* list) {
+  const bool has_distance = columns.front().heading == "distance m";
+  const bool has_related = columns.back().heading == "with";
+  return list->Add(reply, reply.hits(), [&](const v1::SearchHit& hit) {
+    Row row = NodeRow(hit.node());
+    if (has_distance) row.insert(row.begin(), hit.distance_m());
+    row.push_back(names.Of(WhereIn(hit)));
+    if (has_related) row.push_back(RelatedText(hit, names));
+    return row;
+  });
+}
+
+std::string HitsFooter(const v1::SearchNodesResponse& reply) {
+  return absl::StrCat(Footer(reply.hits_size(), "node", reply.header().read_revision(),
                              !reply.next_page_token().empty()),
                       reply.plan().empty() ? "" : RenderPlan(reply));
 }
 
-std::string RenderNeighbors(const v1::GetNeighborsResponse& reply, const TimeText& times) {
-  Table table({{""},
-               {"relation"},
-               {"id"},
-               {"kind"},
-               {"name"},
-               {"class"},
-               {"weight", Align::kRight},
-               {"held"}});
-  for (const v1::Neighbor& neighbor : reply.neighbors()) {
+std::vector<ListColumn> NeighborColumns() {
+  return {{.heading = "", .name = "direction"},
+          {"relation"},
+          {"id"},
+          {"kind"},
+          {"name"},
+          {"class"},
+          {"weight", CellType::kReal, 3},
+          {"held", CellType::kSpan}};
+}
+
+absl::Status AddNeighbors(const v1::GetNeighborsResponse& part, ListWriter* list) {
+  return list->Add(part, part.neighbors(), [](const v1::Neighbor& neighbor) {
     const v1::Node& node = neighbor.node();
     const bool leads_away = neighbor.edge().target() == node.id();
-    table.AddRow({leads_away ? "->" : "<-", neighbor.edge().relation(), node.id(), node.kind(),
-                  node.name(), node.semantic_class().name(), Fixed(neighbor.edge().weight(), 3),
-                  times.Held(neighbor.edge())});
-  }
-  return table.Render() + Footer(reply.neighbors_size(), "edge", reply.header().read_revision(),
-                                 !reply.next_page_token().empty());
+    return Row{leads_away ? "->" : "<-",
+               neighbor.edge().relation(),
+               node.id(),
+               node.kind(),
+               node.name(),
+               node.semantic_class().name(),
+               neighbor.edge().weight(),
+               HeldOf(neighbor.edge())};
+  });
 }
 
 namespace {
 
 // Nodes, then edges.
-std::string RenderSubgraph(const v1::GetSubgraphResponse& reply, const TimeText& times) {
-  Table nodes(NodeColumns());
-  for (const v1::Node& node : reply.nodes()) nodes.AddRow(NodeCells(node));
-  Table edges({{"source"}, {"relation"}, {"target"}, {"weight", Align::kRight}, {"held"}});
-  for (const v1::Edge& edge : reply.edges()) {
-    edges.AddRow(
-        {edge.source(), edge.relation(), edge.target(), Fixed(edge.weight(), 3), times.Held(edge)});
-  }
-  return absl::StrCat(nodes.Render(), "\n", edges.Render(), Counted(reply.nodes_size(), "node"),
-                      ", ",
-                      Footer(reply.edges_size(), "edge", reply.header().read_revision(), false));
+absl::Status WriteSubgraph(const Session& session, const v1::GetSubgraphResponse& reply,
+                           std::ostream& out) {
+  ListWriter nodes(session.common(), session.times(), "nodes", NodeColumns(), &out);
+  DSG_RETURN_IF_ERROR(nodes.Add(reply, reply.nodes(), NodeRow));
+  DSG_RETURN_IF_ERROR(nodes.End("\n"));
+  ListWriter edges(session.common(), session.times(), "edges", EdgeColumns(), &out);
+  DSG_RETURN_IF_ERROR(edges.Add(reply, reply.edges(), EdgeRow));
+  return edges.End(
+      absl::StrCat(Counted(nodes.count(), "node"), ", ",
+                   Footer(edges.count(), "edge", reply.header().read_revision(), false)));
 }
 
 constexpr uint32_t kFoundRgb = 0xc8321e;
@@ -185,20 +206,25 @@ AnswerPicture DrawFound(const v1::SearchNodesRequest& request, const v1::SearchN
 
 absl::Status PrintHits(Session* session, const FindVerb& verb, const v1::SearchNodesResponse& reply,
                        std::ostream& out) {
-  if (verb.count) {
+  const CommonOptions& common = session->common();
+  if (verb.count && !common.json) {
     out << Footer(reply.hit_count(), "node", reply.header().read_revision(), false)
         << (reply.plan().empty() ? "" : RenderPlan(reply));
     return absl::OkStatus();
   }
-  std::vector<std::string> ids;
-  for (const v1::SearchHit& hit : reply.hits()) {
-    ids.insert(ids.end(), hit.ancestor_ids().begin(), hit.ancestor_ids().end());
-    ids.insert(ids.end(), hit.related_ids().begin(), hit.related_ids().end());
+  NodeNames names;
+  if (!common.json && common.format != ListFormat::kJsonLines) {
+    std::vector<std::string> ids;
+    for (const v1::SearchHit& hit : reply.hits()) {
+      ids.insert(ids.end(), hit.ancestor_ids().begin(), hit.ancestor_ids().end());
+      ids.insert(ids.end(), hit.related_ids().begin(), hit.related_ids().end());
+    }
+    DSG_ASSIGN_OR_RETURN(names, NamesOf(session, reply.header().read_revision(), ids));
   }
-  DSG_ASSIGN_OR_RETURN(const NodeNames names,
-                       NamesOf(session, reply.header().read_revision(), ids));
-  out << RenderHits(reply, names);
-  return absl::OkStatus();
+  const std::vector<ListColumn> columns = HitColumns(reply, names, common.format);
+  ListWriter list(common, session->times(), "hits", columns, &out);
+  DSG_RETURN_IF_ERROR(AddHits(reply, names, columns, &list));
+  return list.End(HitsFooter(reply));
 }
 
 absl::Status RunFind(Session* session, const FindVerb& verb, std::ostream& out) {
@@ -215,15 +241,57 @@ absl::Status RunFind(Session* session, const FindVerb& verb, std::ostream& out) 
       },
       &all);
   DSG_RETURN_IF_ERROR(ShowMistake(found, request.query()));
-  if (session->common().json) {
-    DSG_RETURN_IF_ERROR(WriteJson(all, out));
-  } else {
-    DSG_RETURN_IF_ERROR(PrintHits(session, verb, all, out));
-  }
+  DSG_RETURN_IF_ERROR(PrintHits(session, verb, all, out));
   return WritePicture(session, verb.picture, DrawFound(request, all, verb), out);
 }
 
+// The node with lines to its neighbours, in a colour for each relation.
+absl::StatusOr<AnswerPicture> DrawAround(const Session& session, const AroundVerb& verb,
+                                         const v1::GetNeighborsResponse& reply) {
+  constexpr uint32_t kMiddleRgb = 0x1f5fbf;
+  // Of many neighbours only names are written, not ids.
+  constexpr int kLabelledMax = 12;
+  AnswerPicture picture{.title = "", .revision = reply.header().read_revision()};
+  auto request = session.Begin<v1::GetNodeRequest>();
+  request.mutable_read_at()->set_exact_revision(picture.revision);
+  request.set_id(verb.id);
+  request.set_view(v1::NODE_VIEW_GEOMETRY);
+  v1::GetNodeResponse middle;
+  DSG_RETURN_IF_ERROR(session.api().GetNode(session.NewCall(), request, &middle));
+  const Eigen::Vector3d from_map = PointOf(middle.node().map_t_node().position());
+  picture.title = absl::StrCat("around ", FoundLabel(middle.node()), ": ",
+                               Counted(reply.neighbors_size(), "edge"));
+  Overlay& overlay = picture.overlay;
+  // The first mark is the first to find space for its label.
+  MarkNode(middle.node(), kMiddleRgb, FoundLabel(middle.node()), &overlay);
+  std::vector<std::string> relations;
+  for (const v1::Neighbor& neighbor : reply.neighbors()) {
+    const std::string& relation = neighbor.edge().relation();
+    const auto found = std::find(relations.begin(), relations.end(), relation);
+    const uint32_t rgb = AgentColor(static_cast<size_t>(found - relations.begin()));
+    if (found == relations.end()) {
+      relations.push_back(relation);
+      overlay.legend.push_back({relation, rgb, 5.0});
+    }
+    const v1::Node& node = neighbor.node();
+    if (!node.has_map_t_node()) continue;
+    overlay.lines.push_back({{from_map, PointOf(node.map_t_node().position())}, rgb, 5.0});
+    const bool is_labelled = !node.name().empty() || reply.neighbors_size() <= kLabelledMax;
+    MarkNode(node, rgb, is_labelled ? FoundLabel(node) : "", &overlay);
+  }
+  // A neighbour may stand at the same point, as the floor of a room.
+  overlay.marks.push_back({.position_map = from_map,
+                           .rgb = kMiddleRgb,
+                           .shape = OverlayMark::Shape::kRing,
+                           .radius_px = 18.0});
+  // Rooms are large, and what is in them matters here.
+  for (OverlayOutline& outline : overlay.outlines) outline.opacity = 0.08f;
+  return picture;
+}
+
 absl::Status RunAround(Session* session, const AroundVerb& verb, std::ostream& out) {
+  DSG_RETURN_IF_ERROR(CheckPicture(verb.picture));
+  const bool has_picture = !verb.picture.png.empty();
   auto request = session->Begin<v1::GetNeighborsRequest>();
   request.set_id(verb.id);
   for (const std::string& relation : verb.relations) request.add_relations(relation);
@@ -231,14 +299,22 @@ absl::Status RunAround(Session* session, const AroundVerb& verb, std::ostream& o
   request.set_incoming(verb.incoming);
   DSG_RETURN_IF_ERROR(
       SetInstant("--at", verb.at, session->map(), &request, &v1::GetNeighborsRequest::set_at_ns));
-  request.set_view(v1::NODE_VIEW_BASIC);
-  v1::GetNeighborsResponse all;
-  DSG_RETURN_IF_ERROR(session->ReadPages(&query::Api::GetNeighbors, request,
-                                         session->common().limit,
-                                         &v1::GetNeighborsResponse::neighbors_size, &all));
-  if (session->common().json) return WriteJson(all, out);
-  out << RenderNeighbors(all, session->times());
-  return absl::OkStatus();
+  request.set_view(has_picture ? v1::NODE_VIEW_GEOMETRY : v1::NODE_VIEW_BASIC);
+  ListWriter list(session->common(), session->times(), "neighbors", NeighborColumns(), &out);
+  PageEnd end;
+  v1::GetNeighborsResponse kept;
+  const auto take = [&](const v1::GetNeighborsResponse& page) {
+    if (has_picture) kept.MergeFrom(page);
+    end = PageEnd::Of(page);
+    return AddNeighbors(page, &list);
+  };
+  DSG_RETURN_IF_ERROR(session->EachPage(&query::Api::GetNeighbors, request, session->common().limit,
+                                        &v1::GetNeighborsResponse::neighbors_size, take));
+  DSG_RETURN_IF_ERROR(list.End(Footer(list.count(), "edge", end.revision, end.is_cut)));
+  if (!has_picture) return absl::OkStatus();
+  DSG_ASSIGN_OR_RETURN(AnswerPicture picture, DrawAround(*session, verb, kept));
+  if (request.has_at_ns()) picture.at_ns = request.at_ns();
+  return WritePicture(session, verb.picture, picture, out);
 }
 
 absl::Status RunSubgraph(Session* session, const SubgraphVerb& verb, std::ostream& out) {
@@ -261,8 +337,7 @@ absl::Status RunSubgraph(Session* session, const SubgraphVerb& verb, std::ostrea
     DSG_RETURN_IF_ERROR(CheckWords(session, WordsOf(verb.filter)));
   }
   if (session->common().json) return WriteJson(all, out);
-  out << RenderSubgraph(all, session->times());
-  return absl::OkStatus();
+  return WriteSubgraph(*session, all, out);
 }
 
 void AddFind(Grammar* grammar) {
@@ -270,6 +345,7 @@ void AddFind(Grammar* grammar) {
       grammar->Add<FindVerb>({.name = "find",
                               .what = "Nodes by class, name, colour, attribute, relation and room",
                               .example = "'laptop on (desk in (room \"office 4\"))' --near 10,10,1",
+                              .takes = kQuestion | kFormat,
                               .run = RunFind});
   app->add_option("QUERY", verb->words,
                   "red cup on table in (room \"Dining room\"), human in (level 1), "
@@ -285,8 +361,9 @@ void AddFind(Grammar* grammar) {
   CLI::Option* limit =
       app->add_option("-k,--limit", grammar->common()->limit, "List at most this many entries")
           ->check(WholeAboveZero());
-  CLI::Option* count =
-      app->add_flag("--count", verb->count, "Only say how many nodes there are")->excludes(limit);
+  CLI::Option* count = app->add_flag("--count", verb->count, "Only say how many nodes there are")
+                           ->excludes(limit)
+                           ->excludes(app->get_option("--format"));
   app->add_flag("--explain", verb->explain, "Also show the plan of the search");
   AddPicture(app, "the hits", &verb->picture);
   count->excludes(app->get_option("--png"));
@@ -297,7 +374,7 @@ void AddAround(Grammar* grammar) {
       grammar->Add<AroundVerb>({.name = "around",
                                 .what = "The edges of a node and the nodes at their other ends",
                                 .example = "\"desk 10\" --relation ON",
-                                .takes = kQuestion | kLimit,
+                                .takes = kQuestion | kLimit | kFormat,
                                 .run = RunAround});
   app->add_option("ID", verb->id, kNodeHelp)->required();
   app->add_option("--relation", verb->relations, "Only this relation; repeatable")
@@ -305,6 +382,7 @@ void AddAround(Grammar* grammar) {
   app->add_flag("--out", verb->outgoing, "Only edges from the node");
   app->add_flag("--in", verb->incoming, "Only edges to the node");
   app->add_option("--at", verb->at, "Only edges that held at this TIME");
+  AddPicture(app, "the edges", &verb->picture);
 }
 
 void AddSubgraph(Grammar* grammar) {

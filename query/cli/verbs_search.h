@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "query/cli/arguments.h"
+#include "query/cli/list_writer.h"
 #include "query/cli/lookups.h"
 
 namespace dsg::v1 {
@@ -37,6 +38,7 @@ struct AroundVerb {
   bool outgoing = false;
   bool incoming = false;
   std::string at;
+  PictureOptions picture;
 };
 
 struct SubgraphVerb {
@@ -50,10 +52,18 @@ struct SubgraphVerb {
   FilterOptions filter;
 };
 
-/// One line per hit with its nearest room, then the plan if the reply has it.
-std::string RenderHits(const v1::SearchNodesResponse& reply, const NodeNames& names);
+/// The columns of hits: with a distance if they have one, with the related nodes if there are any
+/// or the format needs the same columns always.
+std::vector<ListColumn> HitColumns(const v1::SearchNodesResponse& reply, const NodeNames& names,
+                                   ListFormat format);
+/// A row per hit with its nearest room; `columns` are those of `list`.
+absl::Status AddHits(const v1::SearchNodesResponse& reply, const NodeNames& names,
+                     const std::vector<ListColumn>& columns, ListWriter* list);
+/// The number of hits, and the plan if the reply has it.
+std::string HitsFooter(const v1::SearchNodesResponse& reply);
 
-/// One line per edge; "->" leads away from the node asked about.
-std::string RenderNeighbors(const v1::GetNeighborsResponse& reply, const TimeText& times);
+/// A row per edge, "->" leads away from the node asked about; `list` has NeighborColumns.
+std::vector<ListColumn> NeighborColumns();
+absl::Status AddNeighbors(const v1::GetNeighborsResponse& part, ListWriter* list);
 
 }  // namespace dsg::cli

@@ -50,8 +50,11 @@ class FloorView {
     for (const Eigen::Vector2d& corner : polygon_map) pixels.push_back(ToPixel(corner));
     return pixels;
   }
-  /// The pixel row below the southern edge of the region.
-  double bottom_px() const { return low_px_.y() + px_per_m_ * bounds_map_.sizes().y(); }
+  const Eigen::AlignedBox2d& bounds_map() const { return bounds_map_; }
+  /// The part of the picture that the region takes.
+  Eigen::AlignedBox2d area_px() const {
+    return Eigen::AlignedBox2d(low_px_, low_px_ + px_per_m_ * bounds_map_.sizes());
+  }
 
  private:
   Eigen::AlignedBox2d bounds_map_;

@@ -101,8 +101,8 @@ void DrawOverlay(const Overlay& overlay, const FloorView& view, picture::LabelLa
                  picture::Canvas* canvas) {
   for (const OverlayOutline& outline : overlay.outlines) {
     const Polygon2d pixels = view.ToPixels(outline.corners_map);
-    canvas->FillPolygon(pixels, picture::MakePaint(outline.rgb, 0.3f));
-    canvas->DrawOutline(pixels, 5.0, picture::MakePaint(outline.rgb));
+    canvas->FillPolygon(pixels, picture::MakePaint(outline.rgb, outline.opacity));
+    canvas->DrawOutline(pixels, outline.width_px, picture::MakePaint(outline.rgb));
   }
   for (const OverlayLine& line : overlay.lines) {
     DrawLine(line, view, canvas);
@@ -131,7 +131,7 @@ void DrawOverlayLegend(const Overlay& overlay, const Eigen::Vector2d& low, doubl
   for (const OverlayKey& key : overlay.legend) {
     const double end = x + kSamplePx + 14.0 + picture::Canvas::TextWidth(key.text, kKeyDotPx);
     if (end > x_end) return;
-    canvas->DrawPolyline({{x + 4.0, middle_y}, {x + kSamplePx, middle_y}}, 9.0,
+    canvas->DrawPolyline({{x + 4.0, middle_y}, {x + kSamplePx, middle_y}}, key.width_px,
                          picture::MakePaint(key.rgb));
     canvas->DrawText({x + kSamplePx + 14.0, low.y()}, key.text, kKeyDotPx,
                      picture::MakePaint(kKeyInkRgb));

@@ -43,11 +43,15 @@ struct OverlayOutline {
   uint32_t rgb = 0;
   /// Height that decides its floor, metres.
   double height_m = 0.0;
+  double width_px = 5.0;
+  /// Of what is inside.
+  float opacity = 0.3f;
 };
 
 struct OverlayKey {
   std::string text;
   uint32_t rgb = 0;
+  double width_px = 9.0;
 };
 
 /// Later entries of a list are drawn over earlier ones; marks over lines over outlines.

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "absl/strings/str_cat.h"
+#include "query/cli/export/axes.h"
 #include "query/cli/export/outline.h"
 #include "query/cli/export/overlay.h"
 #include "query/cli/export/top_view_labels.h"
@@ -112,8 +113,8 @@ std::string StructureType(const Node& node) {
   return node.class_name;
 }
 
-// Bounds of all that is drawn.
-Eigen::AlignedBox2d MapBounds(const MapContent& content, const Overlay& overlay) {
+// Bounds of all that is drawn; empty if nothing is.
+Eigen::AlignedBox2d DrawnBounds(const MapContent& content, const Overlay& overlay) {
   Eigen::AlignedBox2d bounds = BoundsOf(overlay);
   for (const Node& node : content.nodes) {
     if (IsAgentKind(node.kind)) continue;
@@ -139,6 +140,11 @@ Eigen::AlignedBox2d MapBounds(const MapContent& content, const Overlay& overlay)
       bounds.extend(Eigen::Vector2d(corner.head<2>().cast<double>()));
     }
   }
+  return bounds;
+}
+
+// At least kMapSizeMinM wide and high.
+Eigen::AlignedBox2d MapBounds(Eigen::AlignedBox2d bounds) {
   if (bounds.isEmpty()) bounds.extend(Eigen::Vector2d::Zero());
   const Eigen::Vector2d lack =
       (Eigen::Vector2d::Constant(kMapSizeMinM) - bounds.sizes()).cwiseMax(0.0);
@@ -147,11 +153,11 @@ Eigen::AlignedBox2d MapBounds(const MapContent& content, const Overlay& overlay)
 
 // The part of the canvas for the map: the full width, and a height that fits.
 Eigen::AlignedBox2d AreaFor(const Eigen::AlignedBox2d& bounds_map, int width_px) {
-  const double width = 2.0 * width_px - 2.0 * kMarginPx;
-  const double height_max =
-      std::min(4.0 * width_px, 2.0 * kTopViewWidthMax) - 2.0 * kMarginPx - kTitlePx - kFooterPx;
+  const double width = 2.0 * width_px - 2.0 * kMarginPx - kAxisLeftPx;
+  const double height_max = std::min(4.0 * width_px, 2.0 * kTopViewWidthMax) - 2.0 * kMarginPx -
+                            kTitlePx - kAxisBottomPx - kFooterPx;
   const double height = width * bounds_map.sizes().y() / bounds_map.sizes().x();
-  const Eigen::Vector2d low(kMarginPx, kMarginPx + kTitlePx);
+  const Eigen::Vector2d low(kMarginPx + kAxisLeftPx, kMarginPx + kTitlePx);
   return Eigen::AlignedBox2d(low,
                              low + Eigen::Vector2d(width, std::clamp(height, 60.0, height_max)));
 }
@@ -292,19 +298,10 @@ void DrawPeople(const MapContent& content, const FloorView& view, picture::Canva
   }
 }
 
-// 1, 2 or 5 times a power of ten.
-double RoundLength(double length_m) {
-  const double power = std::pow(10.0, std::floor(std::log10(length_m)));
-  for (const double factor : {5.0, 2.0}) {
-    if (factor * power <= length_m) return factor * power;
-  }
-  return power;
-}
-
 // Returns its left end, pixels.
 double DrawScaleBar(const FloorView& view, double y, picture::Canvas* canvas) {
   constexpr int kParts = 5;
-  const double length_m = RoundLength(0.25 * canvas->width() / view.px_per_m());
+  const double length_m = RoundBelow(0.25 * canvas->width() / view.px_per_m());
   const double part_px = length_m * view.px_per_m() / kParts;
   const Eigen::Vector2d begin(canvas->width() - kMarginPx - kParts * part_px,
                               y + 0.5 * kTextHeightPx - 6.0);
@@ -367,11 +364,13 @@ void DrawTitle(const std::string& title, picture::Canvas* canvas) {
 picture::Picture DrawTopView(const MapContent& content, const TopViewOptions& options) {
   DSG_CHECK(options.width_px >= kTopViewWidthMin && options.width_px <= kTopViewWidthMax);
   const Overlay& overlay = options.overlay;
-  const Eigen::AlignedBox2d bounds_map = MapBounds(content, overlay);
+  const Eigen::AlignedBox2d drawn_map = DrawnBounds(content, overlay);
+  const Eigen::AlignedBox2d bounds_map = MapBounds(drawn_map);
   const Eigen::AlignedBox2d area = AreaFor(bounds_map, options.width_px);
   const FloorView view(bounds_map, area);
   const double key_height = overlay.legend.empty() ? 0.0 : kKeyRowPx;
-  const double height = area.max().y() + kMarginPx + kFooterPx + key_height;
+  const double height =
+      view.area_px().max().y() + kAxisBottomPx + kMarginPx + kFooterPx + key_height;
   picture::Canvas canvas(2 * options.width_px, 2 * static_cast<int>(std::ceil(0.5 * height)),
                          picture::MakePaint(kPaperRgb));
   DrawMesh(content.mesh, view, &canvas);
@@ -384,9 +383,7 @@ picture::Picture DrawTopView(const MapContent& content, const TopViewOptions& op
   DrawObjects(content, view, &canvas);
   DrawTracks(content, view, &canvas);
   DrawPeople(content, view, &canvas);
-  const double margin = 0.5 * kMarginPx;
-  const Eigen::Vector2d around(margin, margin);
-  picture::LabelLayout layout(Eigen::AlignedBox2d(area.min() - around, area.max() + around));
+  picture::LabelLayout layout(view.area_px());
   if (!overlay.empty()) {
     canvas.FillRect({0.0, 0.0}, {canvas.width(), canvas.height()},
                     picture::MakePaint(kPaperRgb, 0.4f));
@@ -394,6 +391,7 @@ picture::Picture DrawTopView(const MapContent& content, const TopViewOptions& op
     DrawOverlayLabels(overlay, view, &layout, &canvas);
   }
   DrawLabels(content, overlay.named, view, &layout, &canvas);
+  if (!drawn_map.isEmpty()) DrawAxes(view, &canvas);
   DrawTitle(options.title, &canvas);
   const double footer_y = canvas.height() - kMarginPx - kTextHeightPx;
   DrawLegend(content, footer_y, DrawScaleBar(view, footer_y, &canvas) - 40.0, &canvas);

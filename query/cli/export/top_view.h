@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A map from above, as a picture for people: floors, walls, places, objects, tracks, names. Names
-// do not overlap: a name without free space is left out.
+// A map from above, as a picture for people: floors, walls, places, objects, tracks, names, and the
+// axes of the map frame in metres. Names do not overlap: a name without free space is left out.
 #pragma once
 
 #include <string>

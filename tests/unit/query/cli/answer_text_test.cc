@@ -57,5 +57,12 @@ TEST(TimeText, TenthsAreTheNearest) {
 
 TEST(TimeText, DurationsHaveNoSign) { EXPECT_EQ(DurationText(5, 5 + 2 * kNsPerSecond), "2s"); }
 
+TEST(AnswerText, SecondsHaveAllDecimals) {
+  EXPECT_EQ(SecondsText(1'403'715'524'907'143'168), "1403715524.907143168");
+  EXPECT_EQ(SecondsText(0), "0.000000000");
+  EXPECT_EQ(SecondsText(-1), "-0.000000001");
+  EXPECT_EQ(SecondsText(kTimeMin), "-9223372036.854775808");
+}
+
 }  // namespace
 }  // namespace dsg::cli

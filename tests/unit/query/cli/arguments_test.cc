@@ -201,6 +201,46 @@ TEST(Arguments, MistakesNameTheOptionAndWhereHelpIs) {
   EXPECT_NE(Refusal({}).find("see dsg --help"), std::string::npos);
 }
 
+TEST(Arguments, SaysWhatAMisspeltWordMayHaveMeant) {
+  EXPECT_EQ(Refusal({"serch"}), "there is no verb \"serch\"; see dsg --help");
+  EXPECT_EQ(Refusal({"wheer", "ada"}),
+            "there is no verb \"wheer\"; near in spelling: \"where\"; see dsg --help");
+  EXPECT_EQ(Refusal({"ls", "--revison", "3"}),
+            "not understood: --revison 3; near in spelling: \"--revision\"; see dsg ls --help");
+  // The option that is missing is the one that is misspelt.
+  const std::string required = Refusal({"export", "--gtlf=a.glb"});
+  EXPECT_NE(required.find("near in spelling: \"--gltf\""), std::string::npos) << required;
+  EXPECT_EQ(Refusal({"where", "ada", "--att", "+1s"}),
+            "not understood: --att +1s; near in spelling: \"--at\"; see dsg where --help");
+}
+
+TEST(Arguments, HelpIsAlsoAVerb) {
+  EXPECT_EQ(ParseArguments({"help"}, {})->help, HelpOf({}));
+  EXPECT_EQ(ParseArguments({"help", "where"}, {})->help, HelpOf({"where"}));
+  EXPECT_NE(Refusal({"help", "wheer"}, {}).find("near in spelling: \"where\""), std::string::npos);
+  Refusal({"help", "where", "who"}, {});
+}
+
+TEST(Arguments, FormatIsOfListsAndNotOfWholeReplies) {
+  EXPECT_EQ(ParseCommon({"ls", "--format", "csv"}, {.store = "s"}).format, ListFormat::kCsv);
+  EXPECT_EQ(ParseCommon({"ls", "--format", "jsonl"}, {.store = "s"}).format,
+            ListFormat::kJsonLines);
+  EXPECT_EQ(ParseCommon({"ls"}, {.store = "s"}).format, ListFormat::kTable);
+  Refusal({"ls", "--format", "xml"});
+  Refusal({"ls", "--format", "csv", "--json"});
+  Refusal({"find", "cup", "--count", "--format", "csv"});
+  Refusal({"stats", "--format", "csv"});
+}
+
+TEST(Arguments, ManualHasEveryVerb) {
+  const auto command = ParseArguments({"--man"}, {.version = "0.1.0"});
+  ASSERT_TRUE(command.ok()) << command.status();
+  EXPECT_EQ(command->help.substr(0, 10), ".TH DSG 1 ");
+  for (const char* verb : {"where", "predict", "completion"}) {
+    EXPECT_NE(command->help.find(std::string(".SS ") + verb + "\n"), std::string::npos) << verb;
+  }
+}
+
 TEST(Arguments, VersionNeedsNoPlace) {
   EXPECT_TRUE(ParseArguments({"version"}, {}).ok());
   EXPECT_TRUE(ParseArguments({"--version"}, {}).ok());

@@ -87,12 +87,12 @@ TEST(Body, HasOnlyTheFacesThatLookAtTheEye) {
 TEST(Body, IsDrawnInMapsInsteadOfADot) {
   MapContent content = test::ExampleContent();
   content.mesh.clear();
-  const int none = GreenCount(DrawTopView(content, {.width_px = 860, .title = ""}));
+  const int none = GreenCount(DrawTopView(content, {.width_px = 908, .title = ""}));
   content.bodies = {{.agent = NodeId('H', 1), .rgb = kGreen, .bodies = {Plate(0, 6.0f, 1.0f)}}};
   EXPECT_TRUE(HasBody(content, NodeId('H', 1)));
   EXPECT_FALSE(HasBody(content, NodeId('H', 2)));
-  const Picture top = DrawTopView(content, {.width_px = 860, .title = ""});
-  // The map of 8 m fills all but a margin of 30 pixels: a metre is 100 pixels.
+  const Picture top = DrawTopView(content, {.width_px = 908, .title = ""});
+  // The map of 8 m fills all but a margin of 30 pixels and 48 of the y axis: a metre is 100 pixels.
   EXPECT_NEAR(GreenCount(top) - none, 100 * 100, 600);
   const Picture exploded = DrawExplodedView(content, {.width_px = 800, .title = ""});
   content.bodies.clear();

@@ -2,6 +2,7 @@
 #include "tests/unit/query/cli/cli_test_util.h"
 
 #include <sstream>
+#include <utility>
 
 namespace dsg::test {
 
@@ -23,6 +24,18 @@ std::string Refusal(const Arguments& arguments, const cli::Environment& environm
 }
 
 cli::TimeText Monotonic() { return cli::TimeText(MapSpec()); }
+
+std::string ListText(std::vector<cli::ListColumn> columns, const cli::TimeText& times,
+                     const std::function<absl::Status(cli::ListWriter*)>& add,
+                     const std::string& footer, cli::ListFormat format) {
+  std::ostringstream out;
+  cli::ListWriter list({.format = format}, times, "entries", std::move(columns), &out);
+  const absl::Status added = add(&list);
+  EXPECT_TRUE(added.ok()) << added;
+  const absl::Status ended = list.End(footer);
+  EXPECT_TRUE(ended.ok()) << ended;
+  return out.str();
+}
 
 Node MakeNode(NodeId id, const std::string& kind, const std::string& name,
               const Eigen::Vector3d& position_map) {

@@ -6,10 +6,12 @@
 #include <gtest/gtest.h>
 
 #include <any>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "query/cli/answer_text.h"
+#include "query/cli/list_writer.h"
 #include "query/cli/run.h"
 #include "schema/model/graph_delta.h"
 
@@ -42,6 +44,12 @@ std::string Refusal(const Arguments& arguments,
 
 /// The times of a map with a monotonic clock.
 cli::TimeText Monotonic();
+
+/// A list of one reply as it is written: `add(list)` adds the reply, `footer` ends a table.
+std::string ListText(std::vector<cli::ListColumn> columns, const cli::TimeText& times,
+                     const std::function<absl::Status(cli::ListWriter*)>& add,
+                     const std::string& footer = "",
+                     cli::ListFormat format = cli::ListFormat::kTable);
 
 Node MakeNode(NodeId id, const std::string& kind, const std::string& name,
               const Eigen::Vector3d& position_map);

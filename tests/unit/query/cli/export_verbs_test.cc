@@ -199,18 +199,39 @@ TEST_F(ExportVerbs, AFullDiskIsToldAndLeavesNoFile) {
   const auto store = GraphStore::Open(store_, {});
   const auto map = (*store)->OpenMap("example");
   ASSERT_TRUE(map.ok() && (*map)->Latest().ok());
-  for (const auto& [verb, option] : {std::pair{"export", "--gltf"},
-                                     {"export", "--ply"},
-                                     {"export", "--graph-ply"},
-                                     {"map", "--png"}}) {
+  for (const auto& [verb, option, name] : {std::tuple{"export", "--gltf", "x.glb"},
+                                           {"export", "--ply", "x.ply"},
+                                           {"export", "--graph-ply", "x.ply"},
+                                           {"export", "--geojson", "x.geojson"},
+                                           {"export", "--csv", "x"},
+                                           {"export", "--tum", "x"},
+                                           {"map", "--png", "x.png"}}) {
     const Outcome outcome = [&] {
       const dsg::test::FullDisk full;
-      return Ask({verb, option, Path("x")});
+      Arguments arguments = {verb, option, Path(name)};
+      if (name == std::string("x.geojson"))
+        arguments.insert(arguments.end(), {"--origin", "0,0,0"});
+      return Ask(arguments);
     }();
     EXPECT_EQ(outcome.code, 3) << verb << " " << option << " " << outcome.errors;
     EXPECT_NE(outcome.errors.find("DISK_FULL"), std::string::npos) << outcome.errors;
-    EXPECT_FALSE(fs::exists(Path("x")));
+    EXPECT_TRUE(!fs::exists(Path(name)) || fs::is_empty(Path(name))) << name;
   }
+}
+
+TEST_F(ExportVerbs, TheEndingOfAFileSaysItsFormatOrIsRefused) {
+  for (const auto& [verb, option, name] : {std::tuple{"export", "--gltf", "a.gltf"},
+                                           {"export", "--ply", "a.obj"},
+                                           {"export", "--graph-ply", "a"},
+                                           {"export", "--spark", "a.txt"},
+                                           {"export", "--sdf", "a.xml"},
+                                           {"map", "--png", "a.jpg"}}) {
+    const Outcome outcome = Ask({verb, option, Path(name)});
+    EXPECT_EQ(outcome.code, 2) << option;
+    EXPECT_NE(outcome.errors.find("end the name in ."), std::string::npos) << outcome.errors;
+    EXPECT_FALSE(fs::exists(Path(name)));
+  }
+  EXPECT_EQ(Ask({"map", "--png", Path("A.PNG"), "--width", "200"}).code, 0);
 }
 
 TEST_F(ExportVerbs, DrawsAPicture) {

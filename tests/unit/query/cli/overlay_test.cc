@@ -2,9 +2,11 @@
 // What an answer adds to the picture of a map is there, in its colour, where it belongs.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdlib>
 
+#include "query/cli/answer_picture.h"
 #include "query/cli/export/overlay.h"
 #include "query/cli/export/top_view.h"
 #include "tests/unit/query/cli/example_content.h"
@@ -46,6 +48,42 @@ TEST(Overlay, DrawsLinesMarksAndOutlines) {
   Overlay outline;
   outline.outlines.push_back({.corners_map = {{1, 1}, {2, 1}, {2, 2}, {1, 2}}, .rgb = kRed});
   EXPECT_GT(CountOf(Draw(outline), kRed), 100);
+}
+
+TEST(Overlay, OutlinesAndKeysHaveTheirOwnWidths) {
+  Overlay thin;
+  thin.outlines.push_back({.corners_map = {{1, 1}, {3, 1}, {3, 3}, {1, 3}},
+                           .rgb = kRed,
+                           .width_px = 2.0,
+                           .opacity = 0.0f});
+  Overlay thick = thin;
+  thick.outlines[0].width_px = 12.0;
+  EXPECT_GT(CountOf(Draw(thick), kRed), 2 * CountOf(Draw(thin), kRed));
+  Overlay keyed;
+  keyed.legend.push_back({"the way", kRed, 2.0});
+  Overlay wide;
+  wide.legend.push_back({"the way", kRed, 16.0});
+  EXPECT_GT(CountOf(Draw(wide), kRed), 2 * CountOf(Draw(keyed), kRed));
+}
+
+// Half axes are standard deviations along the axes of the covariance.
+TEST(Overlay, EllipsesAreOneStandardDeviation) {
+  const Eigen::Vector2d middle(5.0, -2.0);
+  const Eigen::Matrix2d covariance{{2.5, 1.5}, {1.5, 2.5}};
+  double nearest = 1e9;
+  double farthest = 0.0;
+  for (const Eigen::Vector2d& corner : EllipseOf(middle, covariance)) {
+    const Eigen::Vector2d off = corner - middle;
+    EXPECT_NEAR(off.dot(covariance.inverse() * off), 1.0, 1e-9);
+    nearest = std::min(nearest, off.norm());
+    farthest = std::max(farthest, off.norm());
+  }
+  EXPECT_NEAR(nearest, 1.0, 1e-2);
+  EXPECT_NEAR(farthest, 2.0, 1e-2);
+  // Without any uncertainty, or with rounding below zero, it is a point.
+  for (const Eigen::Vector2d& corner : EllipseOf(middle, -1e-12 * Eigen::Matrix2d::Identity())) {
+    EXPECT_EQ(corner, middle);
+  }
 }
 
 TEST(Overlay, GrowsThePictureToWhatLiesOutsideTheMap) {

@@ -295,6 +295,9 @@ TEST_F(QuestionsRun, WatchTellsWhatCameSinceARevision) {
 
 TEST_F(QuestionsRun, AnswersCanBeDrawn) {
   const std::vector<Arguments> questions = {{"track", "ann"},
+                                            {"where", "ann", "--at", "+2.2s"},
+                                            {"who", "--room", "hall"},
+                                            {"around", "hall"},
                                             {"met"},
                                             {"picked"},
                                             {"find", "cup"},
@@ -315,6 +318,21 @@ TEST_F(QuestionsRun, AnswersCanBeDrawn) {
     EXPECT_EQ(magic, "\x89PNG") << question[0];
     ExpectRefused(2, "--force", arguments);
     EXPECT_FALSE(std::filesystem::exists(file + ".part"));
+  }
+}
+
+// A box instead of a room, and what an answer in JSON has beside it.
+TEST_F(QuestionsRun, PicturesAreOfEveryFormOfAQuestion) {
+  const std::string file = folder_ + "/a.png";
+  for (const Arguments& question : {Arguments{"who", "--box", "0,-1,-1,3,1,2"},
+                                    {"around", "cup", "--at", "+1s"},
+                                    {"where", "ann", "--at", "+2s", "--json"},
+                                    {"track", "ann", "--format", "csv"}}) {
+    Arguments arguments = question;
+    arguments.insert(arguments.end(), {"--png", file, "--width", "300", "--force"});
+    const Outcome outcome = Ask(arguments);
+    EXPECT_EQ(outcome.code, 0) << question[0] << ": " << outcome.errors;
+    EXPECT_TRUE(std::filesystem::remove(file)) << question[0];
   }
 }
 

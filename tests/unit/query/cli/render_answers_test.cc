@@ -4,10 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <vector>
 
 #include "dsg/v1/map_service.pb.h"
 #include "dsg/v1/query_service.pb.h"
+#include "query/cli/list_writer.h"
 #include "query/cli/verb_predict.h"
+#include "query/cli/verbs_agents.h"
 #include "query/cli/verbs_changes.h"
 #include "query/cli/verbs_meetings.h"
 #include "query/cli/verbs_search.h"
@@ -17,6 +20,7 @@
 namespace dsg::cli {
 namespace {
 
+using test::ListText;
 using test::Monotonic;
 
 NodeNames Names() {
@@ -33,7 +37,6 @@ TEST(NodeNamesText, FallsBackToTheId) {
 TEST(RenderEncounters, WritesALineAMeeting) {
   v1::ListEncountersResponse reply;
   reply.mutable_header()->set_read_revision(4);
-  reply.set_observed_agent_count(3);
   v1::Encounter* meeting = reply.add_encounters();
   meeting->set_agent_id("H1");
   meeting->set_agent_name("carol");
@@ -45,10 +48,16 @@ TEST(RenderEncounters, WritesALineAMeeting) {
   meeting->mutable_position()->set_x(1.25);
   meeting->set_place_id("p3");
   meeting->set_room_id("R9");
-  EXPECT_EQ(RenderEncounters(reply, Monotonic(), Names()),
+  const auto add = [&](ListWriter* list) { return AddMeetings(reply, Names(), list); };
+  EXPECT_EQ(ListText(MeetingColumns(), Monotonic(), add,
+                     ObservedFooter("1 meeting", 3, PageEnd::Of(reply))),
             "agent       other  from    to  lasted  closest m    at   x m   y m  in\n"
             "carol (H1)  H3     +10s  +12s      2s       0.50  +11s  1.25  0.00  kitchen (R9)\n"
             "1 meeting; 3 agents observed anywhere in that time (revision 4)\n");
+  const std::string csv = ListText(MeetingColumns(), Monotonic(), add, "", ListFormat::kCsv);
+  EXPECT_EQ(csv.substr(0, csv.find("\r\n")),
+            "agent_id,agent_name,other_id,other_name,from_ns,to_ns,lasted_ns,closest_m,at_ns,x_m,"
+            "y_m,in_id,in_name");
 }
 
 v1::ListInteractionsResponse Picks() {
@@ -104,6 +113,13 @@ TEST(RenderInteractions, SaysWhyNobodyIsNamed) {
   EXPECT_NE(text.find("carol (H1)"), std::string::npos) << text;
 }
 
+std::string HitsText(const v1::SearchNodesResponse& reply) {
+  const std::vector<ListColumn> columns = HitColumns(reply, Names(), ListFormat::kTable);
+  return ListText(
+      columns, Monotonic(),
+      [&](ListWriter* list) { return AddHits(reply, Names(), columns, list); }, HitsFooter(reply));
+}
+
 TEST(RenderHits, ShowsDistanceRoomAndWhatItStandsOn) {
   v1::SearchNodesResponse reply;
   reply.mutable_header()->set_read_revision(4);
@@ -118,13 +134,13 @@ TEST(RenderHits, ShowsDistanceRoomAndWhatItStandsOn) {
   hit->add_ancestor_ids("R9");
   hit->add_related_ids("O7");
   EXPECT_EQ(
-      RenderHits(reply, Names()),
+      HitsText(reply),
       "distance m  id  kind    layer    name  class   x m   y m   z m  in            with\n"
       "     1.500  O8  object  objects        plate  0.00  0.00  0.00  kitchen (R9)  cup (O7)\n"
       "1 node (revision 4)\n");
   // What the query asked for by its room alone is said once.
   hit->set_related_ids(0, "R9");
-  EXPECT_EQ(RenderHits(reply, Names()),
+  EXPECT_EQ(HitsText(reply),
             "distance m  id  kind    layer    name  class   x m   y m   z m  in\n"
             "     1.500  O8  object  objects        plate  0.00  0.00  0.00  kitchen (R9)\n"
             "1 node (revision 4)\n");
@@ -134,7 +150,7 @@ TEST(RenderHits, ShowsDistanceRoomAndWhatItStandsOn) {
   step->set_in_count(9);
   step->set_out_count(1);
   reply.set_canonical_query("plate");
-  const std::string text = RenderHits(reply, Names());
+  const std::string text = HitsText(reply);
   EXPECT_NE(text.find("class index   9    1  plate\nunderstood as: plate\n"), std::string::npos)
       << text;
 }
@@ -148,7 +164,8 @@ TEST(RenderNeighbors, SaysWhichWayAnEdgeLeads) {
     neighbor->mutable_edge()->set_source(outgoing ? "p3" : "R9");
     neighbor->mutable_edge()->set_target(outgoing ? "O7" : "p3");
   }
-  const std::string text = RenderNeighbors(reply, Monotonic());
+  const std::string text = ListText(NeighborColumns(), Monotonic(),
+                                    [&](ListWriter* list) { return AddNeighbors(reply, list); });
   EXPECT_NE(text.find("->  NEAR      O7"), std::string::npos) << text;
   EXPECT_NE(text.find("<-  CONTAINS  R9"), std::string::npos) << text;
 }

@@ -7,6 +7,8 @@
 #include "dsg/v1/map_service.pb.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/cli/answer_text.h"
+#include "query/cli/graph_rows.h"
+#include "query/cli/list_writer.h"
 #include "query/cli/verbs_agents.h"
 #include "query/cli/verbs_graph.h"
 #include "tests/unit/query/cli/cli_test_util.h"
@@ -14,6 +16,7 @@
 namespace dsg::cli {
 namespace {
 
+using test::ListText;
 using test::Monotonic;
 
 TimeText Unix() {
@@ -84,7 +87,8 @@ TEST(RenderTrack, WritesALineAPose) {
   pose->set_time_ns(12 * kNsPerSecond);
   pose->mutable_pose()->mutable_orientation()->set_w(1.0);
   pose->set_flags(2);
-  EXPECT_EQ(RenderTrack(reply, Monotonic()),
+  const auto add = [&](ListWriter* list) { return AddPoses(reply, list); };
+  EXPECT_EQ(ListText(PoseColumns(), Monotonic(), add, TrackFooter(2, reply)),
             "time     x m    y m    z m  yaw deg  note\n"
             " +1s  -1.500  0.000  0.000        -\n"
             "+12s   0.000  0.000  0.000      0.0  corrected\n"
@@ -94,7 +98,6 @@ TEST(RenderTrack, WritesALineAPose) {
 TEST(RenderPresence, WritesALineAStayAndTheCoverage) {
   v1::ListPresenceResponse reply;
   reply.mutable_header()->set_read_revision(3);
-  reply.set_observed_agent_count(4);
   reply.set_next_page_token("more");
   v1::PresenceInterval* stay = reply.add_intervals();
   stay->set_agent_id("H1");
@@ -102,11 +105,17 @@ TEST(RenderPresence, WritesALineAStayAndTheCoverage) {
   stay->set_enter_ns(kNsPerSecond);
   stay->set_exit_ns(3 * kNsPerSecond);
   stay->set_node_id("R2");
-  EXPECT_EQ(RenderPresence(reply, Unix()),
+  const auto add = [&](ListWriter* list) { return AddStays(reply, list); };
+  const std::string footer = ObservedFooter("1 stay", 4, PageEnd::Of(reply));
+  EXPECT_EQ(ListText(StayColumns(), Unix(), add, footer),
             "agent  name   enter  exit  stayed  in  date\n"
             "H1     alice    +1s   +3s      2s  R2  1970-01-01T00:00:01Z\n"
             "1 stay; 4 agents observed anywhere in that time (revision 3); there are more, "
             "see --limit\n");
+  EXPECT_EQ(ListText(StayColumns(), Unix(), add, footer, ListFormat::kCsv),
+            "agent,name,enter_ns,enter_utc,exit_ns,exit_utc,stayed_ns,in\r\n"
+            "H1,alice,1000000000,1970-01-01T00:00:01Z,3000000000,1970-01-01T00:00:03Z,2000000000,"
+            "R2\r\n");
 }
 
 TEST(RenderNode, LeavesOutWhatTheNodeDoesNotHave) {
@@ -142,10 +151,13 @@ TEST(RenderEdges, ShowsWhenAnEdgeHeld) {
   edge->set_relation("ON");
   edge->set_target("O2");
   edge->set_valid_from_ns(kNsPerSecond);
-  EXPECT_EQ(RenderEdges(reply, Monotonic()),
+  const auto add = [&](ListWriter* list) { return list->Add(reply, reply.edges(), EdgeRow); };
+  EXPECT_EQ(ListText(EdgeColumns(), Monotonic(), add),
             "source  relation  target  weight  held\n"
-            "O1      ON        O2       0.000  +1s to open\n"
-            "1 edge (revision 0)\n");
+            "O1      ON        O2       0.000  +1s to open\n");
+  EXPECT_EQ(ListText(EdgeColumns(), Monotonic(), add, "", ListFormat::kCsv),
+            "source,relation,target,weight,held_from_ns,held_to_ns\r\n"
+            "O1,ON,O2,0,1000000000,\r\n");
 }
 
 TEST(RenderNearest, BeginsWithTheDistance) {
@@ -154,7 +166,8 @@ TEST(RenderNearest, BeginsWithTheDistance) {
   nearest->set_distance_m(1.25);
   nearest->mutable_node()->set_id("O1");
   nearest->mutable_node()->mutable_map_t_node()->mutable_position();
-  const std::string text = RenderNearest(reply);
+  const std::string text = ListText(NearestColumns(), Monotonic(),
+                                    [&](ListWriter* list) { return AddNearest(reply, list); });
   EXPECT_EQ(text.substr(0, text.find('\n')),
             "distance m  id  kind  layer  name  class   x m   y m   z m");
   EXPECT_NE(text.find("     1.250  O1"), std::string::npos) << text;

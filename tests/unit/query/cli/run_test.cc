@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -165,6 +166,13 @@ TEST_F(RunTest, AGapIsAnAnswerWithoutAPose) {
   EXPECT_FALSE(reply.contains("pose"));
 }
 
+TEST_F(RunTest, AGapIsDrawnByItsEnds) {
+  const std::string file = folder_ + "/gap.png";
+  const Outcome outcome = Ask({"where", "12", "--at", "+15s", "--png", file, "--width", "300"});
+  EXPECT_EQ(outcome.code, 0) << outcome.errors;
+  EXPECT_TRUE(fs::exists(file));
+}
+
 TEST_F(RunTest, WhatIsNotThereExitsWithOne) {
   ExpectRefused(1, "AGENT_UNKNOWN", {"where", "H99", "--at", "+1s"});
   ExpectRefused(1, "TIME_OUTSIDE_TRACK", {"where", "H12", "--at", "+21s"});
@@ -173,6 +181,56 @@ TEST_F(RunTest, WhatIsNotThereExitsWithOne) {
   ExpectRefused(1, "REVISION_IN_FUTURE", {"stats", "--revision", "3"});
   ExpectRefused(1, "NODE_UNKNOWN", {"show", "O77"});
   ExpectRefused(1, "NODE_UNKNOWN", {"who", "--room", "pantry"});
+}
+
+TEST_F(RunTest, MisspeltNamesGetThoseThatAreNear) {
+  ExpectRefused(1, "near in spelling: \"office\"", {"stats", "--map", "ofice"});
+  ExpectRefused(1, "near in spelling: \"12\"", {"where", "13", "--at", "+1s"});
+  ExpectRefused(1, "near in spelling: \"kitchen\"", {"who", "--room", "kitchn"});
+  ExpectRefused(1, "near in spelling: \"cup\"", {"show", "cupp"});
+  // An id is not a word.
+  EXPECT_EQ(Ask({"show", "O2"}).errors.find("near in spelling"), std::string::npos);
+}
+
+TEST_F(RunTest, ListsComeAsCsvAndAsJsonLines) {
+  const Outcome csv = Ask({"ls", "--kind", "room", "--format", "csv"});
+  EXPECT_EQ(csv.code, 0) << csv.errors;
+  EXPECT_EQ(csv.out,
+            "id,kind,layer,name,class,x_m,y_m,z_m\r\n"
+            "R1,room,rooms,hall,,2.5,0,0\r\n"
+            "R2,room,rooms,kitchen,,7.5,0,0\r\n");
+  const Outcome lines = Ask({"track", "12", "--limit", "2", "--format", "jsonl"});
+  EXPECT_EQ(lines.code, 0) << lines.errors;
+  EXPECT_EQ(std::count(lines.out.begin(), lines.out.end(), '\n'), 2) << lines.out;
+  EXPECT_EQ(Json::parse(lines.out.substr(0, lines.out.find('\n')))["time_ns"], "100000000000");
+  for (const Arguments& verb : {Arguments{"edges"},
+                                {"near", "1,0,0"},
+                                {"around", "R1"},
+                                {"find", "cup"},
+                                {"log"},
+                                {"maps"},
+                                {"tag"},
+                                {"who", "--room", "hall"},
+                                {"met"},
+                                {"factors", "12"}}) {
+    for (const char* format : {"csv", "jsonl"}) {
+      Arguments arguments = verb;
+      arguments.insert(arguments.end(), {"--format", format});
+      const Outcome outcome = Ask(arguments);
+      EXPECT_EQ(outcome.code, 0) << verb[0] << " " << outcome.errors;
+      EXPECT_EQ(outcome.errors, "") << verb[0];
+      EXPECT_TRUE(format[0] == 'j' || outcome.out.find("\r\n") != std::string::npos) << verb[0];
+    }
+  }
+}
+
+// The parts of a long list make the same JSON as the whole.
+TEST_F(RunTest, JsonOfPagesIsOfOneReply) {
+  const Json nodes = AskJson({"ls"});
+  EXPECT_EQ(nodes["nodes"].size(), 7u);
+  EXPECT_EQ(nodes["next_page_token"], "");
+  EXPECT_NE(AskJson({"ls", "--limit", "2"})["next_page_token"], "");
+  EXPECT_EQ(AskJson({"who", "--room", "hall"})["observed_agent_count"], "1");
 }
 
 TEST_F(RunTest, WhatIsAskedWronglyExitsWithTwo) {

@@ -94,10 +94,10 @@ TEST_F(ShapeVerbs, ListWhatIsStoredAndWhereTheHandsAre) {
   const Outcome outcome = Dsg({"ann", "--from", "+1s", "--to", "+4s"});
   ASSERT_EQ(outcome.code, 0) << outcome.errors;
   EXPECT_EQ(outcome.out,
-            "time  pose  shape  joints  vertices      left hand m     right hand m\n"
+            "time  pose  shape  joints  vertices  left hand m      right hand m\n"
             " +1s    72     10      24         4  10.00 0.50 0.00  10.25 0.00 0.00\n"
             " +2s    72     10      24         4  10.00 0.50 0.00  10.25 0.00 0.00\n"
-            " +3s    72     10      24         4                -                -\n"
+            " +3s    72     10      24         4  -                -\n"
             "3 body shapes of H12 (revision 1)\n");
 }
 

@@ -30,6 +30,18 @@ TEST(Table, FillsMissingCellsAndLeavesNoBlanksAtTheEnd) {
   EXPECT_EQ(table.Render(), "a  b  c\n1\n");
 }
 
+TEST(Table, ComesInPartsThatNeverBecomeNarrower) {
+  Table table({{"id"}, {"n", Align::kRight}});
+  table.AddRow({"O1", "100"});
+  EXPECT_EQ(table.Take(), "id    n\nO1  100\n");
+  EXPECT_EQ(table.row_count(), 0u);
+  EXPECT_EQ(table.Take(), "");
+  table.AddRow({"O2", "7"});
+  EXPECT_EQ(table.Take(), "O2    7\n");
+  table.AddRow({"O1000", "7"});
+  EXPECT_EQ(table.Take(), "O1000    7\n");
+}
+
 TEST(Table, NeverSendsControlCodesToTheTerminal) {
   Table table({{"name"}});
   table.AddRow({"a\x1b[31mb\nc"});

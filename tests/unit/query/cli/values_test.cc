@@ -49,10 +49,12 @@ TEST(Values, ReadsDurations) {
   EXPECT_EQ(*ParseDuration("--every", "0.5s"), kNsPerSecond / 2);
   EXPECT_EQ(*ParseDuration("--every", "200ms"), 200'000'000);
   EXPECT_EQ(*ParseDuration("--every", "2"), 2 * kNsPerSecond);
+  EXPECT_EQ(*ParseDuration("--every", "1m10s"), 70 * kNsPerSecond);
 }
 
 TEST(Values, RefusesDurationsThatAreNotAboveZero) {
-  for (const char* text : {"", "0", "0s", "-1s", "+1s", "fast", "2014-06-25T16:58:44Z"}) {
+  for (const char* text :
+       {"", "0", "0s", "-1s", "+1s", "fast", "10s1m", "1m10", "2014-06-25T16:58:44Z"}) {
     EXPECT_EQ(ReasonOf(ParseDuration("--every", text).status()), Reason::kFieldInvalid) << text;
   }
 }
@@ -81,6 +83,7 @@ TEST(Values, NumbersThatMayBeSecondsAreNoInstants) {
     const absl::Status status = ParseInstant("--at", text, MapWith(kIn2014, Clock::kUnix)).status();
     EXPECT_EQ(ReasonOf(status), Reason::kFieldInvalid) << text;
     EXPECT_NE(status.message().find(std::string(text) + "s\""), std::string::npos) << status;
+    EXPECT_NE(status.message().find("a date like \"2014-"), std::string::npos) << status;
   }
   const MapSpec simulated = MapWith(0, Clock::kUnix);
   EXPECT_EQ(ReasonOf(ParseInstant("--at", "30", simulated).status()), Reason::kFieldInvalid);
