@@ -31,12 +31,13 @@ void AddFactorsVerb(Grammar* grammar);
 void AddDropVerbs(Grammar* grammar);
 void AddSetVerb(Grammar* grammar);
 void AddCompletionVerb(Grammar* grammar);
+void AddViewVerb(Grammar* grammar);
 
 inline constexpr std::array kVerbs = {
-    &AddAgentVerbs,  &AddShapeVerb,     &AddMeetingVerbs, &AddPredictVerb, &AddGraphVerbs,
-    &AddSearchVerbs, &AddSpaceVerbs,    &AddChangeVerbs,  &AddMapsVerbs,   &AddImportVerb,
-    &AddStoreVerbs,  &AddExportVerb,    &AddMapVerb,      &AddKeepVerbs,   &AddBackupVerbs,
-    &AddMergeVerb,   &AddPruneVerb,     &AddAssetVerb,    &AddFactorsVerb, &AddDropVerbs,
-    &AddSetVerb,     &AddCompletionVerb};
+    &AddAgentVerbs,  &AddShapeVerb,      &AddMeetingVerbs, &AddPredictVerb, &AddGraphVerbs,
+    &AddSearchVerbs, &AddSpaceVerbs,     &AddChangeVerbs,  &AddMapsVerbs,   &AddImportVerb,
+    &AddStoreVerbs,  &AddExportVerb,     &AddMapVerb,      &AddKeepVerbs,   &AddBackupVerbs,
+    &AddMergeVerb,   &AddPruneVerb,      &AddAssetVerb,    &AddFactorsVerb, &AddDropVerbs,
+    &AddSetVerb,     &AddCompletionVerb, &AddViewVerb};
 
 }  // namespace dsg::cli

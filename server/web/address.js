@@ -16,26 +16,38 @@ export function takeToken() {
   return sessionStorage.getItem(TOKEN_KEY) ?? '';
 }
 
-function numbers(text, count) {
-  const values = (text ?? '').split(',').map(Number);
-  return values.length === count && values.every(Number.isFinite) ? values : null;
+const COORDINATE_MAX = 1e8;
+
+/** Target, distance, yaw and pitch of a camera; undefined if they are none. */
+function cameraOf(text) {
+  const values = (text ?? '').split(',').map((word) => (word.trim() ? Number(word) : NaN));
+  const [x, y, z, distance, yaw, pitch] = values;
+  const isCamera = values.length === 6 && values.every(Number.isFinite) &&
+                   Math.max(...[x, y, z].map(Math.abs)) < COORDINATE_MAX && distance > 0.1 &&
+                   distance < COORDINATE_MAX && Math.abs(pitch) < 1.56;
+  return isCamera ? [x, y, z, distance, yaw % (2 * Math.PI), pitch] : undefined;
+}
+
+/** A revision; null if it is none. */
+function revisionOf(text) {
+  const value = Number(text);
+  return Number.isSafeInteger(value) && value > 0 ? value : null;
 }
 
 /** What the address asks for; what it does not say is undefined. */
 export function readAddress() {
   const given = new URLSearchParams(location.hash.slice(1));
-  const revision = Number(given.get('rev'));
   const at = given.get('at');
   return {
     map: given.get('map') ?? '',
-    revision: Number.isInteger(revision) && revision > 0 ? revision : null,
+    revision: revisionOf(given.get('rev')),
     atNs: at !== null && /^-?\d{1,19}$/.test(at) ? BigInt(at) : undefined,
-    camera: numbers(given.get('cam'), 6) ?? undefined,
+    camera: cameraOf(given.get('cam')),
     selected: given.get('sel') ?? '',
     hidden: given.get('hide')?.split(',').filter(Boolean),
     explode: Math.min(1, Math.max(0, Number(given.get('explode')) || 0)),
     query: given.get('q') ?? '',
-    diff: Number(given.get('diff')) || 0,
+    diff: revisionOf(given.get('diff')) ?? 0,
     isLive: given.get('live') === '1',
   };
 }

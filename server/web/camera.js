@@ -7,7 +7,7 @@ const FIELD_OF_VIEW = 0.8;
 
 /** The product a * b of two 4x4 matrices. */
 function times(a, b) {
-  const out = new Float32Array(16);
+  const out = new Float64Array(16);
   for (let column = 0; column < 4; ++column) {
     for (let row = 0; row < 4; ++row) {
       let sum = 0;
@@ -73,18 +73,21 @@ export class Camera {
     this.distance = Math.max(2, radius / Math.sin(FIELD_OF_VIEW / 2) * 0.9);
   }
 
-  /** The map frame to clip space. */
-  matrix(aspect) {
+  /**
+   * The map frame to clip space, in doubles. With an origin: from a frame with the same axes that
+   * begins there, whose coordinates are small enough for floats.
+   */
+  matrix(aspect, origin = [0, 0, 0]) {
     const {right, up, forward} = this.#axes();
-    const eye = this.eye;
+    const eye = this.eye.map((value, i) => value - origin[i]);
     const dot = (a) => a[0] * eye[0] + a[1] * eye[1] + a[2] * eye[2];
-    const view = Float32Array.of(
+    const view = Float64Array.of(
         right[0], up[0], -forward[0], 0, right[1], up[1], -forward[1], 0,
         right[2], up[2], -forward[2], 0, -dot(right), -dot(up), dot(forward), 1);
     const near = Math.max(0.02, this.distance / 200);
     const far = this.distance * 20 + 200;
     const f = 1 / Math.tan(FIELD_OF_VIEW / 2);
-    const projection = Float32Array.of(
+    const projection = Float64Array.of(
         f / aspect, 0, 0, 0, 0, f, 0, 0, 0, 0, (far + near) / (near - far), -1, 0, 0,
         2 * far * near / (near - far), 0);
     return times(projection, view);

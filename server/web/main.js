@@ -20,6 +20,8 @@ import {nsOf, secondsOf, textOf} from './time.js';
 
 const REVISIONS_MAX = 5000;
 const TIME_STEPS = 10000;
+/** How often a store without maps is asked again. */
+const MAPS_MS = 2000;
 
 const client = new Client(takeToken());
 const show = new Show();
@@ -32,6 +34,8 @@ const state = {
   loading: '',
 };
 let scene = null;
+/** Of the selected node. */
+let neighbors = [];
 let revisions = [];
 let tags = [];
 let painter = null;
@@ -60,6 +64,28 @@ function redraw(stale = false) {
   isDirty = true;
   isStale ||= stale;
 }
+
+/** Asks the server where everybody is at the time that is shown; tracks are samples of that. */
+const settleTime = debounced(async () => {
+  if (!scene) return;
+  const [asked, time] = [scene, show.time];
+  const agents = scene.of('agents').map((node) => node.id);
+  if (!agents.length || scene.exact.time === time) return;
+  try {
+    const positions = await ask().positions(agents, time);
+    if (scene !== asked || show.time !== time) return;
+    scene.exact = {time, positions};
+    redraw(true);
+    refresh();
+    if (show.selected) fillInspector(scene, show, neighbors, actions);
+    if (scene.nodes.get(show.selected)?.group === 'agents') locate();
+  } catch {
+    // The picture is that of the samples, as the sentence says.
+  }
+}, 150);
+
+/** A search is of a time: it is made again for another one. */
+const searchAgain = debounced(() => state.query && search(state.query), 300);
 
 const saveAddress = debounced(() => {
   if (!scene) return;
@@ -92,7 +118,7 @@ function refresh() {
   element('time').value = String(
       span > 0 ? Math.round((show.time - scene.begin) / span * TIME_STEPS) : 0);
   element('revision-text').textContent = revisionText();
-  if (scene.nodes.get(show.selected)?.group === 'agents') locate();
+  settleTime();
   if (!element('table').hidden) fillTable(scene, show, select);
 }
 
@@ -126,7 +152,8 @@ function explain(error) {
     const go = oldest && make('button', {onclick: () => open(state.map, Number(oldest))},
                               `open revision ${oldest}`);
     const newest = make('button', {onclick: () => open(state.map, null)}, 'open the newest');
-    banner(error.message, 'error', [...(go ? [go] : []), newest]);
+    const choices = error.reason === 'MAP_UNKNOWN' ? [] : [...(go ? [go] : []), newest];
+    banner(error.message, 'error', choices);
   }
 }
 
@@ -142,9 +169,12 @@ function take(next, loading, wanted) {
     banner(webglNote, 'note');
     element('revision').max = String(next.head);
     element('revision').value = String(next.revision);
+    // What differed from another revision is asked anew for this one.
+    [show.diff, show.ghosts] = [null, []];
     const at = wanted.atNs !== undefined ? secondsOf(wanted.atNs, next.epoch)
         : before?.map.name === next.map.name ? show.time : next.end;
-    show.time = at;
+    show.time = next.end > next.begin ? Math.min(Math.max(at, next.begin), next.end)
+        : Number.isFinite(at) ? at : 0;
   }
   document.body.dataset.revision = String(next.revision);
   changed();
@@ -164,9 +194,7 @@ async function open(map, revision, wanted = {}) {
   Object.assign(state, {map, revision});
   setState('loading');
   if (isOther) {
-    [show.selected, show.diff, state.diff] = ['', null, 0];
-    show.ghosts = [];
-    show.hits.clear();
+    [show.selected, state.query, state.diff] = ['', '', 0];
     show.path = [];
     show.predictions = [];
   }
@@ -191,26 +219,24 @@ async function open(map, revision, wanted = {}) {
 
 /** What is loaded once the scene is there. */
 async function settle(loaded, wanted, signal) {
-  if (!loaded.nodes.size) {
-    setState('empty');
-    banner(`The map "${state.map}" has no nodes yet. dsg-ingest puts a log into it: ` +
-           `dsg-ingest --map ${state.map} LOG`, 'note');
-    return;
-  }
   [revisions, tags] = await Promise.all([
     loadRevisions(client, state.map, REVISIONS_MAX, signal), loadTags(client, state.map, signal),
   ]);
   if (signal.aborted) return;
   fillLayers(loaded, show, layersChanged);
-  fillInspector(loaded, show, [], actions);
   drawHistogram(loaded);
   fillDiffs();
-  if (wanted.selected) await select(wanted.selected);
-  if (wanted.query) await search(wanted.query);
-  if (wanted.diff) await compare(wanted.diff);
+  // What was asked of another revision is asked of this one.
+  await select(wanted.selected || show.selected);
+  await search(wanted.query || state.query);
+  await compare(wanted.diff || state.diff);
   if (state.isLive && !isWatching()) watch();
   await meshIfShown();
-  setState('ready');
+  setState(loaded.nodes.size ? 'ready' : 'empty');
+  if (!loaded.nodes.size) {
+    banner(`The map "${state.map}" has no nodes yet. dsg-ingest puts a log into it: ` +
+           `dsg-ingest --map ${state.map} LOG`, 'note');
+  }
   changed();
 }
 
@@ -241,13 +267,15 @@ const ask = () => new Questions(client, scene, running.signal);
 
 async function select(id) {
   show.selected = id;
-  fillInspector(scene, show, [], actions);
+  neighbors = [];
+  fillInspector(scene, show, neighbors, actions);
   changed();
   if (!id) return;
   const asked = scene;
   try {
-    const neighbors = await ask().neighbors(id);
+    const found = await ask().neighbors(id);
     if (show.selected !== id || scene !== asked) return;
+    neighbors = found;
     fillInspector(scene, show, neighbors, actions);
     refresh();
   } catch (error) {
@@ -327,11 +355,12 @@ async function search(query) {
 
 /** Colours what differs from another revision; 0 ends it. */
 async function compare(revision) {
-  state.diff = revision;
+  // A revision does not differ from itself.
+  state.diff = revision === scene.revision ? 0 : revision;
   show.diff = null;
   show.ghosts = [];
-  element('diff').value = revision ? String(revision) : '';
-  if (revision) {
+  element('diff').value = state.diff ? String(state.diff) : '';
+  if (state.diff) {
     const {states, removed} = await ask().diff(revision);
     show.diff = states;
     show.ghosts = removed;
@@ -374,7 +403,11 @@ function watch() {
       if (isAtEnd) show.time = scene.end;
       changed();
     },
-    failed: explain,
+    failed: (error) => {
+      // The map was dropped and made again: the new one is followed.
+      if (error.reason === 'MAP_REPLACED') open(state.map, null);
+      else explain(error);
+    },
   }).catch(explain);
 }
 
@@ -401,6 +434,7 @@ function setTime(seconds) {
   show.time = Math.min(Math.max(seconds, scene.begin), scene.end);
   show.predictions = [];
   changed(scene.changesBetween(before, show.time));
+  if (state.query) searchAgain();
 }
 
 function setPlaying(isPlaying) {
@@ -503,8 +537,9 @@ const KEYS = {
   l: () => setLive(!state.isLive),
   t: toggleTable,
   '?': () => element('help').showModal(),
-  ...Object.fromEntries(GROUPS.map(
-      (group, i) => [String(i + 1), () => element(`layer-${group.name}`).click()])),
+  ...Object.fromEntries(GROUPS.map(({name}, i) => [
+    String(i + 1), () => document.getElementById(`layer-${name}`)?.click(),
+  ])),
   Escape: () => {
     show.hits.clear();
     [show.path, show.predictions] = [[], []];
@@ -545,10 +580,27 @@ function listenToControls() {
   };
   element('revision').oninput = openRevision;
   element('diff').onchange = () => compare(Number(element('diff').value)).catch(explain);
+  // An address that was pasted into this tab; what the page itself writes does not come here.
+  window.addEventListener('hashchange', () => location.reload());
   window.addEventListener('resize', () => scene && drawHistogram(scene));
 }
 
 // ---- begin ----
+
+/** The names of the maps; waits for the first one. */
+async function mapsOf(signal) {
+  while (true) {
+    const reply = await persistently(() => client.call('MapService/ListMaps', {}, signal), signal,
+                                     explain);
+    const names = reply.maps.map((map) => map.name);
+    element('map').replaceChildren(...names.map((name) => make('option', {value: name}, name)));
+    if (names.length) return names;
+    setState('no-maps');
+    banner('The store has no maps yet. Put a log into one: dsg-ingest --store DIR --map NAME LOG',
+           'note');
+    await new Promise((resolve) => setTimeout(resolve, MAPS_MS));
+  }
+}
 
 async function begin() {
   const wanted = readAddress();
@@ -569,16 +621,7 @@ async function begin() {
   listenToControls();
   requestAnimationFrame(frame);
   try {
-    const reply = await persistently(() => client.call('MapService/ListMaps', {}), running.signal,
-                                     explain);
-    const names = reply.maps.map((map) => map.name);
-    element('map').replaceChildren(...names.map((name) => make('option', {value: name}, name)));
-    if (!names.length) {
-      setState('no-maps');
-      banner('The store has no maps yet. Put a log into one: dsg-ingest --store DIR --map NAME LOG',
-             'note');
-      return;
-    }
+    const names = await mapsOf(running.signal);
     const map = wanted.map || names[0];
     element('map').value = map;
     state.isLive = wanted.isLive;

@@ -60,7 +60,7 @@ function placeFacts(scene, show, node) {
   }
   const track = scene.tracks.get(node.id);
   if (!track) return pair('track', 'none');
-  const here = track.at(show.time);
+  const here = scene.agentAt(node.id, show.time);
   const where = !here ? 'outside of the track'
       : here.known ? here.position.map((v) => v.toFixed(2)).join(', ')
                    : 'in a gap of the track';
@@ -119,7 +119,7 @@ export function fillTable(scene, show, select) {
       if (group.name !== 'agents' && !scene.isValid(node, show.time)) continue;
       const place = scene.placeOf(node, show.time);
       if (group.name === 'agents' && !place) continue;
-      const isKnown = group.name !== 'agents' || scene.tracks.get(node.id).at(show.time).known;
+      const isKnown = group.name !== 'agents' || scene.agentAt(node.id, show.time).known;
       const where = !place ? '' : isKnown ? place.map((v) => v.toFixed(2)).join(', ')
                                           : 'in a gap of the track';
       const name = make('td', {}, swatch(group.name === 'agents' ? colorOfAgent(node.id)
@@ -175,6 +175,7 @@ export function sentenceOf(scene, show, loading) {
   const parts = [`${scene.map.name} as believed at revision ${scene.revision}${age}, ` +
                  `true at ${textOf(show.time, scene.map)}`];
   if (scene.end > scene.begin) parts.push(`tracks of ${durationText(scene.end - scene.begin)}`);
+  if (scene.isThinned && scene.exact.time !== show.time) parts.push('positions between samples');
   if (loading) parts.push(`loading ${loading}`);
   return `${parts.join('; ')}.`;
 }

@@ -5,6 +5,7 @@ import {nsOf} from './time.js';
 
 const NEIGHBORS_MAX = 200;
 const HITS_MAX = 1000;
+const INSTANTS_MAX = 10000;
 const CHANGES_A_PAGE = 1000;
 /** How far predictions reach, how densely, and how many ways. */
 const PREDICTION = {horizon_ns: '8000000000', period_ns: '400000000', path_count_max: 5};
@@ -43,6 +44,23 @@ export class Questions {
   async where(agent, time) {
     const reply = await this.#ask('QueryService/LocateAgent', {agent, at_ns: this.#ns(time)});
     return [reply.room_id, reply.place_id, reply.building_id].filter(Boolean);
+  }
+
+  /** Positions of agents at a time: undefined in a gap, null outside of the track. */
+  async positions(agents, time) {
+    const positions = new Map();
+    for (let i = 0; i < agents.length; i += INSTANTS_MAX) {
+      const part = agents.slice(i, i + INSTANTS_MAX);
+      const reply = await this.#ask('QueryService/BatchLocateAgents', {
+        instants: part.map((agent) => ({agent, at_ns: this.#ns(time)})),
+      });
+      reply.results.forEach((result, k) => {
+        const at = result.pose?.position;
+        positions.set(part[k], result.status_code !== 0 ? null : at ? [at.x, at.y, at.z]
+                                                                    : undefined);
+      });
+    }
+    return positions;
   }
 
   /** A path from a point to a node: corners, length and least clearance in metres. */

@@ -10,6 +10,8 @@ import {
 
 const BACKGROUND = [0x10 / 255, 0x14 / 255, 0x1a / 255];
 const PERSON_HEIGHT = 1.7;
+/** A crowd of more people is drawn as boxes. */
+const FIGURES_MAX = 300;
 const ROBOT_BOX = {min: [-0.25, -0.25, 0], max: [0.25, 0.25, 0.5]};
 const DIFF_COLORS = {added: [0x4d, 0xa3, 0xff], removed: [0xff, 0x7a, 0x33],
                      changed: [0xf5, 0xf0, 0xa0], same: [0x5a, 0x61, 0x6b]};
@@ -123,8 +125,8 @@ export class Show {
   }
 }
 
-function isMoving(source, target) {
-  return source.group === 'agents' || target.group === 'agents';
+function isAgent(scene, id) {
+  return scene.nodes.get(id)?.group === 'agents';
 }
 
 /** Metres between two steps of the exploded view. */
@@ -175,14 +177,18 @@ export class Renderer {
     this.mesh = new Buffer(gl, gl.TRIANGLES);
     this.movingSolid = new Buffer(gl, gl.TRIANGLES);
     this.movingLines = new Buffer(gl, gl.LINES);
+    this.movingEdges = [];
     this.meshOf = null;
     this.meshBlocks = 0;
   }
 
   /** Makes the buffers of what stands still. */
   build(scene, show) {
-    const out = {solid: new Vertices(), glass: new Vertices(), lines: new Vertices(),
-                 points: new Vertices()};
+    const out = Object.fromEntries(['solid', 'glass', 'lines', 'points'].map(
+        (name) => [name, new Vertices(scene.origin)]));
+    this.movingEdges = scene.edges.filter(
+        ({source, target}) => isAgent(scene, source) || isAgent(scene, target));
+    const moving = new Set(this.movingEdges);
     for (const group of GROUPS) {
       if (show.hidden.has(group.name) || group.name === 'agents' || group.name === 'mesh') continue;
       for (const node of scene.of(group.name)) {
@@ -192,7 +198,9 @@ export class Renderer {
       }
     }
     for (const node of show.ghosts) this.#addGhost(out, node, show);
-    if (show.hasEdges) this.#addEdges(out.lines, scene, show, false);
+    if (show.hasEdges) {
+      this.#addEdges(out.lines, scene, show, scene.edges.filter((one) => !moving.has(one)));
+    }
     for (const [name, vertices] of Object.entries(out)) {
       this[name].fill(vertices, this.gl.STATIC_DRAW);
     }
@@ -234,11 +242,11 @@ export class Renderer {
 
   // The hierarchy is drawn when layers are apart, the other relations while both ends are to be
   // seen; of the selected node, always. Edges of agents move with them.
-  #addEdges(lines, scene, show, areMoving) {
+  #addEdges(lines, scene, show, edges) {
     const lifts = Object.fromEntries(GROUPS.map((group) => [group.name, group.lift]));
-    for (const edge of scene.edges) {
+    for (const edge of edges) {
       const [source, target] = [scene.nodes.get(edge.source), scene.nodes.get(edge.target)];
-      if (!source || !target || areMoving !== isMoving(source, target)) continue;
+      if (!source || !target) continue;
       if (!(edge.from <= show.time && show.time < edge.to)) continue;
       if (show.hidden.has(source.group) || show.hidden.has(target.group)) continue;
       const isSelected = edge.source === show.selected || edge.target === show.selected;
@@ -254,7 +262,7 @@ export class Renderer {
 
   #buildMesh(scene) {
     if (this.meshOf === scene && this.meshBlocks === scene.mesh.length) return;
-    const vertices = new Vertices(65536);
+    const vertices = new Vertices(scene.origin, 65536);
     for (const block of scene.mesh) {
       if (vertices.count > TRIANGLES_MAX * 3) break;
       for (let i = 0; i + 2 < block.faces.length; i += 3) this.#addFace(vertices, block, i);
@@ -280,11 +288,11 @@ export class Renderer {
 
   /** People, their trails, and what was asked for last. */
   #buildMoving(scene, show) {
-    const [solid, lines] = [new Vertices(), new Vertices()];
+    const [solid, lines] = [new Vertices(scene.origin), new Vertices(scene.origin)];
     if (!show.hidden.has('agents')) {
       for (const node of scene.of('agents')) this.#addAgent(solid, lines, scene, show, node);
     }
-    if (show.hasEdges) this.#addEdges(lines, scene, show, true);
+    if (show.hasEdges) this.#addEdges(lines, scene, show, this.movingEdges);
     show.path.slice(1).forEach((point, i) => {
       const lifted = (p) => [p[0], p[1], p[2] + 0.05];
       addLine(lines, lifted(show.path[i]), lifted(point), PATH, 1, 0);
@@ -303,12 +311,12 @@ export class Renderer {
     if (!track) return;
     const [color] = lookOf(show, node, colorOfAgent(node.id));
     this.#addTrail(lines, track, show, color);
-    const here = track.at(show.time);
+    const here = scene.agentAt(node.id, show.time);
     if (!here) return;
     const foot = scene.footOf(here.position);
     if (!here.known) {
       addRing(lines, foot, 0.35, color, 0.9, 0);
-    } else if (node.kind === 'human') {
+    } else if (node.kind === 'human' && scene.of('agents').length <= FIGURES_MAX) {
       addFigure(solid, foot, PERSON_HEIGHT, color, 1, 0);
     } else {
       addBox(solid, ROBOT_BOX, foot, [0, 0, 0, 1], color, 1, 0);
@@ -337,7 +345,8 @@ export class Renderer {
     if (!scene) return;
     this.#buildMoving(scene, show);
     gl.useProgram(this.program);
-    gl.uniformMatrix4fv(this.uniforms.matrix, false, camera.matrix(width / height));
+    gl.uniformMatrix4fv(this.uniforms.matrix, false,
+                        Float32Array.from(camera.matrix(width / height, scene.origin)));
     gl.uniform1f(this.uniforms.step_m, stepOf(scene, show.explode));
     gl.uniform1f(this.uniforms.point_size, height * 0.12);
     gl.disable(gl.BLEND);

@@ -2,6 +2,10 @@
 // Calls of proto/dsg/v1 over the Connect protocol: unary calls in JSON, server streams in JSON or
 // in protobuf's bytes.
 
+/** Deadlines of a call and of a stream that ends by itself: slow links take long. */
+const CALL_MS_MAX = 30000;
+const STREAM_MS_MAX = 600000;
+
 /** An answer that says no: the status, and why. */
 export class CallError extends Error {
   /**
@@ -42,13 +46,16 @@ async function errorOf(response) {
   }
 }
 
+const broken = (error) => (error.name === 'AbortError' ? error
+                           : new CallError('unavailable', 'the connection to the server broke'));
+
 /** Splits a body into Connect's envelopes: [flags, bytes]. */
 async function* envelopes(body) {
   const reader = body.getReader();
   let held = new Uint8Array(0);
   try {
     while (true) {
-      const {done, value} = await reader.read();
+      const {done, value} = await reader.read().catch((error) => { throw broken(error); });
       if (done) break;
       const joined = new Uint8Array(held.length + value.length);
       joined.set(held);
@@ -79,15 +86,16 @@ export class Client {
    * @returns {Promise<object>} the reply in JSON: snake_case names, 64-bit numbers as strings
    */
   async call(method, request, signal) {
-    const response = await this.#post(method, 'application/json', JSON.stringify(request), signal);
+    const response = await this.#post(method, 'application/json', JSON.stringify(request), signal,
+                                      CALL_MS_MAX);
     if (!response.ok) throw await errorOf(response);
-    return response.json();
+    return response.json().catch((error) => { throw broken(error); });
   }
 
-  /** The messages of a stream in JSON. */
+  /** The messages of a stream that lasts until the signal ends it, in JSON. */
   async* stream(method, request, signal) {
     const decoder = new TextDecoder();
-    for await (const bytes of this.#messages(method, 'json', request, signal)) {
+    for await (const bytes of this.#messages(method, 'json', request, signal, 0)) {
       yield JSON.parse(decoder.decode(bytes));
     }
   }
@@ -97,16 +105,16 @@ export class Client {
    * the message's bytes.
    */
   bytes(method, encoded, signal) {
-    return this.#messages(method, 'proto', encoded, signal);
+    return this.#messages(method, 'proto', encoded, signal, STREAM_MS_MAX);
   }
 
-  async* #messages(method, codec, request, signal) {
+  async* #messages(method, codec, request, signal, msMax) {
     const payload =
         codec === 'json' ? new TextEncoder().encode(JSON.stringify(request)) : request;
     const body = new Uint8Array(5 + payload.length);
     new DataView(body.buffer).setUint32(1, payload.length);
     body.set(payload, 5);
-    const response = await this.#post(method, `application/connect+${codec}`, body, signal);
+    const response = await this.#post(method, `application/connect+${codec}`, body, signal, msMax);
     if (!response.ok) throw await errorOf(response);
     for await (const [flags, bytes] of envelopes(response.body)) {
       if ((flags & 2) === 0) {
@@ -120,8 +128,9 @@ export class Client {
     throw new CallError('unavailable', 'the stream broke off');
   }
 
-  async #post(method, type, body, signal) {
+  async #post(method, type, body, signal, msMax) {
     const headers = {'Content-Type': type, 'Connect-Protocol-Version': '1'};
+    if (msMax) headers['Connect-Timeout-Ms'] = String(msMax);
     if (this.token) headers.Authorization = `Bearer ${this.token}`;
     try {
       return await fetch(`/dsg.v1.${method}`, {

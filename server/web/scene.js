@@ -13,6 +13,10 @@ const NODES_MAX = 200000;
 /** About so many poses of each track; drawn they are closer than a pixel. */
 const POSES_A_TRACK = 1500;
 const TRACKS_AT_ONCE = 4;
+/** Tracks of a shorter log are loaded whole, seconds. */
+const WHOLE_S_MAX = 60;
+/** How often a scene that is being loaded is drawn, milliseconds. */
+const PROGRESS_MS = 250;
 
 /** The seven groups of the legend, in the order of their keys. */
 export const GROUPS = [
@@ -24,6 +28,8 @@ export const GROUPS = [
   {name: 'structures', title: 'Walls and floors', color: [0x8a, 0x90, 0x9a], lift: 0},
   {name: 'mesh', title: 'Mesh', color: [0x9a, 0xa4, 0xb2], lift: 0},
 ];
+
+const ORIGIN = [0, 0, 0];
 
 function groupOf(node) {
   if (node.agent || node.kind === 'human' || node.kind === 'robot') return 'agents';
@@ -109,6 +115,11 @@ export class Track {
     return low - 1;
   }
 
+  /** The last position at or before a time; undefined before the first. */
+  before(time) {
+    return this.positions[this.indexAt(time)];
+  }
+
   /**
    * Where the agent is at a time; `known` is false in a gap, where it was last. Null outside of the
    * track.
@@ -126,11 +137,12 @@ export class Track {
   }
 }
 
-/** The message GetTrajectoryRequest. */
-function trajectoryRequest(map, revision, agent, period) {
-  const readAt = new Writer().number(3, revision).done();
-  const request = new Writer().text(1, map).block(2, readAt).text(3, agent);
-  if (period > 0n) request.number(6, period);
+/** The message GetTrajectoryRequest: a pose each period, or all poses from a time on. */
+function trajectoryRequest(scene, agent, {period, from}) {
+  const readAt = new Writer().number(3, scene.revision).done();
+  const request = new Writer().text(1, scene.map.name).block(2, readAt).text(3, agent);
+  if (from !== undefined) request.number(4, from);
+  if (period !== undefined) request.number(6, period);
   return request.done();
 }
 
@@ -200,6 +212,15 @@ export class Scene {
     this.mesh = [];
     /** Whether the mesh was asked for. */
     this.meshAsked = false;
+    /** Drawn positions are relative to it: floats are too coarse for a national grid. */
+    this.origin = ORIGIN;
+    /** Whether tracks have fewer poses than the map. */
+    this.isThinned = false;
+    /**
+     * What the server said of one time: positions by id of the agent, undefined in a gap, null
+     * outside of the track.
+     */
+    this.exact = {time: NaN, positions: new Map()};
     this.changes = new Float64Array(0);
     this.changesOf = 0;
     /** What was left out, and why; shown, never silent. */
@@ -213,6 +234,7 @@ export class Scene {
   add(node) {
     if (this.nodes.has(node.id)) return;
     this.nodes.set(node.id, node);
+    if (node.position && this.origin === ORIGIN) this.origin = node.position;
     this.groups.get(node.group).push(node);
   }
 
@@ -227,10 +249,32 @@ export class Scene {
     return node.name || (node.className ? `${node.className} ${id}` : id);
   }
 
+  /**
+   * Where an agent is at a time, and whether that is known or it is in a gap of its track; null
+   * outside of the track. Exact where the server was asked for this time, else by the samples.
+   */
+  agentAt(id, time) {
+    const track = this.tracks.get(id);
+    if (this.exact.time !== time || !this.exact.positions.has(id)) return track?.at(time) ?? null;
+    const position = this.exact.positions.get(id);
+    if (position) return {position, known: true};
+    const last = position === null ? null : track?.before(time);
+    return last ? {position: last, known: false} : null;
+  }
+
   /** Where a node is at a time: an agent on its track, everything else at its place. */
   placeOf(node, time) {
     if (node.group !== 'agents') return node.position;
-    return this.tracks.get(node.id)?.at(time)?.position ?? null;
+    return this.agentAt(node.id, time)?.position ?? null;
+  }
+
+  /** What of the world's time there is to see, once all is loaded: tracks, else what changes. */
+  settleSpan() {
+    if (this.end > this.begin) return;
+    this.changesBetween(0, 0);
+    if (!this.changes.length) return;
+    this.begin = Math.min(this.begin, this.changes[0]);
+    this.end = Math.max(this.end, this.changes[this.changes.length - 1] + 1);
   }
 
   /** Where an agent stands: tracks may be of torsos, so the floor of a room below them counts. */
@@ -335,13 +379,27 @@ async function listEdges(client, scene, signal) {
 async function loadTrack(client, scene, agent, signal) {
   const span = scene.end - scene.begin;
   const period = Math.max(0.05, span / POSES_A_TRACK);
-  const track = new Track(Math.max(scene.gap, period * 1.5));
-  const request = trajectoryRequest(scene.map.name, scene.revision, agent,
-                                    span > 60 ? nsOf(period, 0n) : 0n);
-  for await (const bytes of client.bytes('QueryService/GetTrajectory', request, signal)) {
-    readPoses(bytes, scene.epoch, track);
+  const isThinned = span > WHOLE_S_MAX;
+  const track = new Track(isThinned ? Math.max(scene.gap, period * 1.5) : scene.gap);
+  const read = async (choice, into) => {
+    const request = trajectoryRequest(scene, agent, choice);
+    for await (const bytes of client.bytes('QueryService/GetTrajectory', request, signal)) {
+      readPoses(bytes, scene.epoch, into);
+    }
+  };
+  await read(isThinned ? {period: nsOf(period, 0n)} : {}, track);
+  if (!track.times.length) return;
+  if (isThinned) {
+    // The samples end before the track does.
+    scene.isThinned = true;
+    const rest = new Track(scene.gap);
+    await read({from: nsOf(track.to, scene.epoch)}, rest);
+    if (rest.to > track.to) {
+      track.times.push(rest.to);
+      track.positions.push(rest.positions[rest.positions.length - 1]);
+    }
   }
-  if (track.times.length) scene.tracks.set(agent, track);
+  scene.tracks.set(agent, track);
 }
 
 async function loadTracks(client, scene, signal, take) {
@@ -374,9 +432,15 @@ export async function loadScene(client, name, revision, signal, progress) {
     await listNodes(client, scene, {layer: layer.name}, signal, () => progress(scene, layer.name));
   }
   progress(scene, 'tracks');
-  await loadTracks(client, scene, signal, () => progress(scene, 'tracks'));
+  let shown = 0;
+  await loadTracks(client, scene, signal, () => {
+    if (Date.now() - shown < PROGRESS_MS) return;
+    shown = Date.now();
+    progress(scene, `tracks: ${scene.tracks.size} of ${scene.of('agents').length}`);
+  });
   progress(scene, 'edges');
   await listEdges(client, scene, signal);
+  scene.settleSpan();
   progress(scene, '');
   return scene;
 }

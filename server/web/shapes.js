@@ -20,13 +20,11 @@ function packed([red, green, blue], opacity) {
 
 /** Vertices that grow; doubled when full, so that appending is cheap. */
 export class Vertices {
-  constructor(capacity = 1024) {
+  /** @param {number[]} origin what positions are written relative to, metres */
+  constructor(origin, capacity = 1024) {
     this.data = new Float32Array(capacity * FLOATS_PER_VERTEX);
     this.count = 0;
-  }
-
-  clear() {
-    this.count = 0;
+    this.origin = origin;
   }
 
   /** The part that is filled. */
@@ -40,7 +38,8 @@ export class Vertices {
       larger.set(this.data);
       this.data = larger;
     }
-    this.data.set([x, y, z, color, shade, lift], this.count++ * FLOATS_PER_VERTEX);
+    const [ox, oy, oz] = this.origin;
+    this.data.set([x - ox, y - oy, z - oz, color, shade, lift], this.count++ * FLOATS_PER_VERTEX);
   }
 }
 

@@ -183,6 +183,8 @@ class Answers(python_support.HttpTest):
                 (dsgdb.NotFound, "RELATION_UNKNOWN", lambda: self.m.edges(relation="OVER")),
                 (dsgdb.NotFound, "TAG_UNKNOWN", lambda: self.m.diff("last")),
                 (dsgdb.NotFound, "TAG_UNKNOWN", lambda: self.m.at(tag="last").stats()),
+                (dsgdb.InvalidArgument, "FIELD_INVALID", lambda: self.m.at(tag="")),
+                (dsgdb.InvalidArgument, "FIELD_INVALID", lambda: dsgdb.open("")),
                 (dsgdb.OutOfRange, "REVISION_IN_FUTURE",
                  lambda: self.m.at(revision=10 ** 6).stats()),
                 (dsgdb.InvalidArgument, "QUERY_MALFORMED", lambda: self.m.find("chair on (")),

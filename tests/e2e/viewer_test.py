@@ -112,6 +112,35 @@ class Viewer(support.ProgramsTest):
         maps = self.ask("maps", "--store", "store")
         return int(maps["maps"][0]["epoch_ns"]) + seconds * support.NS_PER_S
 
+    def test_a_thinned_log_shows_everybody_at_its_end_and_between_samples(self):
+        self.ingest("long", self.simulate("long-log", people=3, seconds=150))
+        store = ("--store", "long")
+        stats = self.ask("stats", *store)
+        with self.served("long") as url:
+            for at in (int(stats["last_pose_ns"]), int(stats["last_pose_ns"]) - 37_123_456_000):
+                self.window.get("about:blank")
+                self.window.get(f"{url}&at={at}")
+                self.window.wait(READY)
+                self.window.keys("t")
+                self.window.wait("!document.getElementById('sentence').textContent"
+                                 ".includes('between samples')")
+                rows = dict(self.window.run("""
+                  return [...document.querySelectorAll('#table tr')].slice(1).map(
+                      (row) => [row.cells[0].textContent, row.cells[4].textContent]);"""))
+                there = self.ask("ls", "--layer", "agents", "--at", support.at(
+                    at - int(stats["map"]["epoch_ns"])), *store)["nodes"]
+                self.assertTrue(there)
+                for node in there:
+                    place = node.get("map_T_node", {}).get("position")
+                    said = rows.pop(node["id"])
+                    if place is None:
+                        self.assertEqual("in a gap of the track", said)
+                        continue
+                    shown = [float(value) for value in said.split(",")]
+                    for axis, value in zip("xyz", shown):
+                        self.assertAlmostEqual(place[axis], value, delta=0.0051)
+                self.assertEqual([], [row for row in rows if row[0] in "Hr"])
+
     def test_draws_layers_in_place_and_apart(self):
         self.open()
         self.assertGreater(self.colors(), 20)
@@ -164,6 +193,22 @@ class Viewer(support.ProgramsTest):
         self.window.wait(READY)
         self.assertEqual(facts, self.window.run(
             "return document.getElementById('sentence').textContent"))
+
+    def test_dsg_view_prints_an_address_that_answers(self):
+        self.ingest("viewed", self.simulate("viewed-log", people=1, seconds=5))
+        process = subprocess.Popen([os.path.join(support.BIN, "dsg"), "view", "viewed"],
+                                   cwd=self.folder, env=support.environment(),
+                                   stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        try:
+            address = next(filter(None, (re.search(r"http://\S+#token=\S+", line)
+                                         for line in process.stdout)))
+            self.window.get(address[0])
+            self.window.wait(READY)
+        finally:
+            process.terminate()
+            self.assertEqual(0, process.wait(timeout=support.TIMEOUT_S))
+            process.stdout.close()
+        self.refused(2, ["nowhere"], "dsg", "view", "nowhere")
 
     def test_says_what_is_wrong(self):
         self.window.get("about:blank")

@@ -110,6 +110,9 @@ def open(where: Union[str, os.PathLike[str]], *, token: Optional[str] = None,
     call only.
     """
     text = os.fspath(where)
+    if not text:
+        raise InvalidArgument("the store has an empty name; give a folder, unix:PATH or "
+                              "http://HOST:PORT#token=TOKEN", "FIELD_INVALID", {"field": "where"})
     if not timeout > 0:
         raise InvalidArgument(f"timeout {timeout!r} is not above 0 seconds", "FIELD_INVALID",
                               {"field": "timeout", "value": str(timeout)})

@@ -32,6 +32,9 @@ class Map(AgentQuestions, SceneQuestions, SpaceQuestions, HistoryQuestions, Writ
         if (revision is None) == (tag is None):
             raise InvalidArgument("at takes a revision or a tag: name one of both", "FIELD_INVALID",
                                   {"field": "revision"})
+        if tag == "":
+            raise InvalidArgument("the tag is empty; name one of tags(), or leave at() out for the "
+                                  "newest revision", "FIELD_INVALID", {"field": "tag"})
         return Map(self.api, self.spec, v1.ReadAt(exact_revision=revision, tag=tag))
 
     def __repr__(self) -> str:
