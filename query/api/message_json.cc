@@ -4,14 +4,15 @@
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 #include <google/protobuf/message.h>
-#include <google/protobuf/stubs/strutil.h>
 #include <google/protobuf/util/json_util.h>
 #include <google/protobuf/util/type_resolver.h>
 #include <google/protobuf/util/type_resolver_util.h>
 #include <google/protobuf/wrappers.pb.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "absl/strings/escaping.h"
@@ -64,7 +65,8 @@ class Printer {
   void PrintText(const std::string& text);
   // What is rare, or a type of protobuf's own.
   void PrintByProtobuf(const pb::Message& message);
-  void PrintNumber(double value, const std::string& text);
+  template <typename Real>
+  void PrintReal(Real value);
 
   void Open(char bracket);
   // Before each entry of what is open.
@@ -204,13 +206,13 @@ void Printer::PrintValue(const pb::Message& message, const Field& field, int ind
     case Field::CPPTYPE_DOUBLE: {
       const double value =
           is_element ? r.GetRepeatedDouble(message, &field, index) : r.GetDouble(message, &field);
-      PrintNumber(value, pb::SimpleDtoa(value));
+      PrintReal(value);
       return;
     }
     case Field::CPPTYPE_FLOAT: {
       const float value =
           is_element ? r.GetRepeatedFloat(message, &field, index) : r.GetFloat(message, &field);
-      PrintNumber(value, pb::SimpleFtoa(value));
+      PrintReal(value);
       return;
     }
     case Field::CPPTYPE_BOOL:
@@ -266,12 +268,24 @@ void Printer::PrintByProtobuf(const pb::Message& message) {
   }
 }
 
-void Printer::PrintNumber(double value, const std::string& text) {
-  if (std::isfinite(value)) {
-    text_ += text;
-  } else {
+// As printf's %g with the digits that every such number has or, where these do not give the same
+// number again, with as many as always do.
+template <typename Real>
+void Printer::PrintReal(Real value) {
+  if (!std::isfinite(value)) {
     text_ += std::isnan(value) ? "\"NaN\"" : value > 0 ? "\"Infinity\"" : "\"-Infinity\"";
+    return;
   }
+  constexpr int kDigits = std::numeric_limits<Real>::digits10;
+  constexpr int kMoreDigits = kDigits + (std::is_same_v<Real, double> ? 2 : 3);
+  char text[40];
+  auto end = std::to_chars(text, std::end(text), value, std::chars_format::general, kDigits);
+  Real read = 0;
+  std::from_chars(text, end.ptr, read);
+  if (read != value) {
+    end = std::to_chars(text, std::end(text), value, std::chars_format::general, kMoreDigits);
+  }
+  text_.append(text, end.ptr);
 }
 
 }  // namespace

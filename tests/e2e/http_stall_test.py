@@ -5,6 +5,7 @@
 import contextlib
 import json
 import select
+import signal
 import time
 import unittest
 
@@ -161,6 +162,27 @@ class Stall(support.ProgramsTest):
         # Of 64, which are as many as may come at a time.
         with self.beside(hold, memory_bytes=160 * MIB):
             pass
+
+    def test_a_server_that_stops_waits_for_no_reader(self):
+        body = http_port.envelope(b'{"map": "office", "agent": "robot"}')
+        with http_port.served(self, "store") as (process, port):
+            held = [port.socket(receive_bytes=4096) for _ in range(8)]
+            for made in held:
+                made.sendall(port.head(TRACK, http_port.STREAM_JSON, len(body),
+                                       connect_timeout_ms=60_000) + body)
+                self.assertIn(b"200 OK", made.recv(1000))
+            half = port.socket()
+            half.sendall(port.head(LIST)[:-2])
+            begin = time.monotonic()
+            process.send_signal(signal.SIGTERM)
+            self.assertEqual(b"", half.recv(1))
+            self.assertEqual(0, process.wait(timeout=support.TIMEOUT_S))
+            self.assertLess(time.monotonic() - begin, 9)
+            for made in held:
+                # Without the end that a whole stream has.
+                self.assertFalse(http_port.read_all(made).endswith(b"0\r\n\r\n"))
+                made.close()
+            half.close()
 
     def test_a_killed_reader_ends_its_stream(self):
         body = http_port.envelope(json.dumps({"map": "office", "agent": "robot"}).encode())

@@ -173,9 +173,9 @@ class RandomMessages {
       case Field::CPPTYPE_UINT64:
         return put(&R::AddUInt64, &R::SetUInt64, static_cast<uint64_t>(one_of(kWhole)));
       case Field::CPPTYPE_DOUBLE:
-        return put(&R::AddDouble, &R::SetDouble, one_of(kReal));
+        return put(&R::AddDouble, &R::SetDouble, RandomReal());
       case Field::CPPTYPE_FLOAT:
-        return put(&R::AddFloat, &R::SetFloat, static_cast<float>(one_of(kReal)));
+        return put(&R::AddFloat, &R::SetFloat, static_cast<float>(RandomReal()));
       case Field::CPPTYPE_BOOL:
         return put(&R::AddBool, &R::SetBool, random_.Index(2) == 0);
       case Field::CPPTYPE_ENUM:
@@ -188,6 +188,11 @@ class RandomMessages {
              depth + 1);
         return;
     }
+  }
+
+  double RandomReal() {
+    if (random_.Chance(0.4)) return kReal[random_.Index(static_cast<int>(kReal.size()))];
+    return random_.Uniform(-1, 1) * std::pow(10.0, random_.Index(30) - 15);
   }
 
   Random random_;
