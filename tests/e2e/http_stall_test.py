@@ -175,7 +175,7 @@ class Stall(support.ProgramsTest):
             half.sendall(port.head(LIST)[:-2])
             begin = time.monotonic()
             process.send_signal(signal.SIGTERM)
-            self.assertEqual(b"", half.recv(1))
+            self.assertEqual(b"", http_port.read_all(half))
             self.assertEqual(0, process.wait(timeout=support.TIMEOUT_S))
             self.assertLess(time.monotonic() - begin, 9)
             for made in held:
