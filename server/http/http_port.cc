@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "schema/base/log.h"
 #include "schema/base/status.h"
 
 namespace dsg::server {
@@ -92,7 +93,13 @@ class RunningPort final : public HttpPort {
 
  private:
   void Take(int fd, std::shared_ptr<Connection> connection) {
-    if (sessions_.is_stopping || sessions_.sessions.size() >= kSessionMax) {
+    const bool is_full = sessions_.sessions.size() >= kSessionMax;
+    if (is_full && !is_full_) {
+      Log(LogLevel::kWarning, "refusing HTTP connections",
+          {{"open", absl::StrCat(kSessionMax)}, {"peer", connection->peer}});
+    }
+    is_full_ = is_full;
+    if (is_full || sessions_.is_stopping) {
       close(fd);
       return;
     }
@@ -143,6 +150,8 @@ class RunningPort final : public HttpPort {
   std::unique_ptr<UnixSocketClaim> claim_;
   std::unique_ptr<Acceptor> acceptor_;
   asio::steady_timer timer_{sessions_.io};
+  // The last connection was refused.
+  bool is_full_ = false;
   // When the answers that are still being sent end; after is_stopping.
   Clock::time_point end_due_;
   std::thread thread_;

@@ -221,12 +221,6 @@ std::optional<Refusal> Session::PlanOf(const RequestHead& head) {
                                      plan_.body_bytes_max, " are taken; ask for less"));
   }
   parser_->body_limit(plan_.body_bytes_max);
-  if (plan_.type.is_stream && runtime_->open_stream_count >= kOpenStreamMax) {
-    return Refusal{429,
-                   OverloadedError(absl::StrCat("the HTTP port has ", kOpenStreamMax,
-                                                " streams open, as many as it takes at a time")),
-                   ""};
-  }
   return std::nullopt;
 }
 
@@ -254,6 +248,13 @@ void Session::TakeRequest() {
 }
 
 void Session::BeginCall() {
+  if (plan_.type.is_stream && runtime_->open_stream_count >= kOpenStreamMax) {
+    Refuse({429,
+            OverloadedError(absl::StrCat("the HTTP port has ", kOpenStreamMax,
+                                         " streams open, as many as it takes at a time")),
+            ""});
+    return;
+  }
   HttpCall::Place place;
   place.outlet = shared_from_this();
   place.connection = connection_;
