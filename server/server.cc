@@ -197,7 +197,7 @@ class RunningServer final : public Server {
       // Waits for every call. Calls that run past the grace are cancelled and then finish.
       grpc_server_->Shutdown(std::chrono::system_clock::now() + grace);
       grpc_server_->Wait();
-      http_port_ = nullptr;
+      if (http_port_ != nullptr) http_port_->Join();
       // The timer may still hold a call that the guard has just ended.
       timer_.Stop();
       grpc_server_ = nullptr;

@@ -42,7 +42,7 @@ class RunningPort final : public HttpPort {
   ~RunningPort() override {
     if (!thread_.joinable()) return;
     BeginShutdown(std::chrono::milliseconds(0));
-    thread_.join();
+    Join();
   }
 
   absl::Status Listen(const HttpOptions& options, bool allow_remote) {
@@ -89,6 +89,10 @@ class RunningPort final : public HttpPort {
       end_due_ = Clock::now() + grace;
       Look();
     });
+  }
+
+  void Join() override {
+    if (thread_.joinable()) thread_.join();
   }
 
  private:

@@ -27,8 +27,7 @@ class HttpPort {
                                                           const MethodTable* methods,
                                                           CallRuntime* runtime);
 
-  /// Waits for all calls and closes all connections; after BeginShutdown not much longer than its
-  /// grace.
+  /// Shuts down without grace, if it has not been shut down.
   virtual ~HttpPort() = default;
 
   virtual void Start() = 0;
@@ -39,6 +38,10 @@ class HttpPort {
   /// Accepts no more, closes idle connections, and ends what runs after `grace`: with UNAVAILABLE
   /// where the reader can be told. Returns at once.
   virtual void BeginShutdown(std::chrono::milliseconds grace) = 0;
+
+  /// Waits until all calls have ended and all connections are closed. Requires: BeginShutdown.
+  /// Workers may still be leaving their last calls, so they are stopped before this is destroyed.
+  virtual void Join() = 0;
 };
 
 }  // namespace dsg::server
