@@ -15,7 +15,7 @@ import support
 LIST = "MapService/ListMaps"
 TRACK = "QueryService/GetTrajectory"
 MIB = 1 << 20
-# 5 ms on an idle machine.
+# 2 ms on an idle machine.
 NEW_CALL_S = 0.5
 MEMORY_BYTES = 64 * MIB
 
