@@ -2,7 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Requests that the HTTP port refuses before any call: other sites, other users, other forms."""
 
+import contextlib
 import json
+import os
+import random
 import unittest
 
 import http_port
@@ -100,6 +103,33 @@ def malformed(port):
     ]
 
 
+def good_requests(port):
+    where = b'{"map": "office", "agent": "alice", "at_ns": 20000000000}'
+    track = http_port.envelope(b'{"map": "office", "agent": "alice"}')
+    return [
+        port.head("QueryService/LocateAgent", length=len(where)) + where,
+        port.head("QueryService/GetTrajectory", http_port.STREAM_JSON, len(track)) + track,
+        port.head(LIST, length=None, transfer_encoding="chunked") + b"2\r\n{}\r\n0\r\n\r\n",
+        port.head("IngestService/Commit", "application/proto", 60) + b"\x0a\x3a" + b"\x52\0" * 29,
+        b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n",
+    ]
+
+
+def mutated(requests, dice):
+    """One to three requests in a row, with bytes changed, left out and repeated."""
+    text = bytearray(b"".join(dice.choice(requests) for _ in range(dice.randint(1, 3))))
+    for _ in range(dice.choice([0, 1, 2, 8])):
+        at = dice.randrange(len(text))
+        what = dice.randrange(3)
+        if what == 0:
+            text[at] = dice.randrange(256)
+        elif what == 1:
+            del text[at + 1:at + dice.randrange(20)]
+        else:
+            text[at:at] = text[dice.randrange(len(text)):][:40]
+    return bytes(text)
+
+
 class Hostile(http_port.HttpTest):
     def test_foreign_requests_are_refused_and_nothing_is_asked(self):
         refused_count = 0
@@ -128,6 +158,24 @@ class Hostile(http_port.HttpTest):
                       b"X-Content-Type-Options: nosniff", b"Connection: close"):
             self.assertIn(field, head)
         self.assertTrue(json.loads(body)["message"])
+
+    def test_mutated_requests_harm_nobody(self):
+        seed = int(os.environ.get("DSG_SEED", random.randrange(1 << 32)))
+        print(f"DSG_SEED={seed}")
+        dice = random.Random(seed)
+        with http_port.served(self, "store", "--http-write", "--log-level", "error",
+                              http="unix:mutated.http") as (process, port):
+            for _ in range(3000):
+                request = mutated(good_requests(port), dice)
+                with contextlib.closing(port.socket()) as made, contextlib.suppress(OSError):
+                    made.settimeout(dice.choice([0.001, 0.01]))
+                    half = dice.randrange(len(request) + 1)
+                    made.sendall(request[:half])
+                    made.sendall(request[half:])
+                    made.recv(4096)
+            self.assertIsNone(process.poll())
+            self.assertEqual(200, port.ask(LIST, {})[0])
+            self.assertLess(http_port.resident_bytes(process), 200 << 20)
 
     def test_names_of_a_proxy_are_taken_if_told(self):
         with http_port.served(self, "store", "--http-host", "maps.example.org", "--http-host",
