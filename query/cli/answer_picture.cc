@@ -130,7 +130,8 @@ void MarkNode(const v1::Node& node, uint32_t rgb, const std::string& label, Over
                    .rgb = rgb,
                    .radius_px = 10.0,
                    .label = label};
-  Polygon2d outline = OutlineOf(node);
+  // The box of a place is the free space around it.
+  Polygon2d outline = node.kind() == kinds::kPlace ? Polygon2d() : OutlineOf(node);
   const double height_m = mark.position_map.z();
   if (outline.size() >= 3) overlay->outlines.push_back({std::move(outline), rgb, height_m});
   const absl::StatusOr<NodeId> id = ParseNodeId(node.id());

@@ -248,7 +248,6 @@ absl::Status RunFind(Session* session, const FindVerb& verb, std::ostream& out) 
 // The node with lines to its neighbours, in a colour for each relation.
 absl::StatusOr<AnswerPicture> DrawAround(const Session& session, const AroundVerb& verb,
                                          const v1::GetNeighborsResponse& reply) {
-  constexpr uint32_t kMiddleRgb = 0x1f5fbf;
   // Of many neighbours only names are written, not ids.
   constexpr int kLabelledMax = 12;
   AnswerPicture picture{.title = "", .revision = reply.header().read_revision()};
@@ -263,7 +262,7 @@ absl::StatusOr<AnswerPicture> DrawAround(const Session& session, const AroundVer
                                Counted(reply.neighbors_size(), "edge"));
   Overlay& overlay = picture.overlay;
   // The first mark is the first to find space for its label.
-  MarkNode(middle.node(), kMiddleRgb, FoundLabel(middle.node()), &overlay);
+  MarkNode(middle.node(), kInkRgb, FoundLabel(middle.node()), &overlay);
   std::vector<std::string> relations;
   for (const v1::Neighbor& neighbor : reply.neighbors()) {
     const std::string& relation = neighbor.edge().relation();
@@ -281,7 +280,7 @@ absl::StatusOr<AnswerPicture> DrawAround(const Session& session, const AroundVer
   }
   // A neighbour may stand at the same point, as the floor of a room.
   overlay.marks.push_back({.position_map = from_map,
-                           .rgb = kMiddleRgb,
+                           .rgb = kInkRgb,
                            .shape = OverlayMark::Shape::kRing,
                            .radius_px = 18.0});
   // Rooms are large, and what is in them matters here.
