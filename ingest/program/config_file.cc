@@ -29,10 +29,7 @@ constexpr char kPrintConfig[] = "print-config";
 
 // Options that a file may not have: what ends the program, and the file itself.
 bool IsKey(const CLI::Option& option) {
-  const std::vector<std::string>& names = option.get_lnames();
-  static const std::set<std::string> kOthers = {"help", "help-all", "version", kConfig,
-                                                kPrintConfig};
-  return !names.empty() && kOthers.count(names.front()) == 0;
+  return !option.get_lnames().empty() && option.get_configurable();
 }
 
 // A flag takes no value on the command line, and true or false in a file.
@@ -196,13 +193,14 @@ void AddConfigFile(CLI::App* app) {
   app->allow_config_extras(CLI::config_extras_mode::error);
   // Options are looked at in their order: by now all others have got their values.
   app->add_flag_callback(
-      absl::StrCat("--", kPrintConfig),
-      [app] {
-        CheckIsThere(*app);
-        std::fputs(ConfigText(*app).c_str(), stdout);
-        throw CLI::Success();
-      },
-      "Write all options as they are in force, as a file for --config");
+         absl::StrCat("--", kPrintConfig),
+         [app] {
+           CheckIsThere(*app);
+           std::fputs(ConfigText(*app).c_str(), stdout);
+           throw CLI::Success();
+         },
+         "Write all options as they are in force, as a file for --config")
+      ->configurable(false);
 }
 
 std::string ConfigText(const CLI::App& app) {
