@@ -250,7 +250,9 @@ async function meshIfShown() {
   scene.meshAsked = true;
   const of = scene;
   await loadMesh(client, of, running.signal, () => {
-    if (scene === of) redraw(true);
+    if (scene !== of) return;
+    document.body.dataset.mesh = String(of.mesh.length);
+    redraw(true);
   });
 }
 

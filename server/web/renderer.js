@@ -351,7 +351,10 @@ export class Renderer {
     gl.uniform1f(this.uniforms.point_size, height * 0.12);
     gl.disable(gl.BLEND);
     gl.depthMask(true);
+    // Surfaces face the room: from above, ceilings do not hide what is below them.
+    gl.enable(gl.CULL_FACE);
     if (!show.hidden.has('mesh')) this.mesh.draw();
+    gl.disable(gl.CULL_FACE);
     this.solid.draw();
     this.movingSolid.draw();
     gl.enable(gl.BLEND);

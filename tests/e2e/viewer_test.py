@@ -154,6 +154,24 @@ class Viewer(support.ProgramsTest):
         self.window.wait("document.querySelectorAll('#layers input:checked').length <= 1")
         self.window.keys("6", "7")
 
+    def test_shows_the_mesh_of_a_sensor_log(self):
+        self.ok("dsg-simulate", "sensors", "--out", "seen", "--world", "apartment", "--seconds",
+                "2", "--people", "1", "--seed", "2", "--rate", "5", "--keyframe-every", "1")
+        self.ok("dsg-ingest", "--store", "mesh", "--map", "home", "--poses", "gt", "--voxel", "0.1",
+                os.path.join("seen", "log"))
+        blocks = int(self.ask("stats", "--store", "mesh")["mesh_block_count"])
+        self.assertGreater(blocks, 0)
+        with self.served("mesh") as url:
+            self.window.get("about:blank")
+            self.window.get(url)
+            self.window.wait(READY)
+            before = self.colors()
+            self.window.keys("7")
+            # A large block comes in pieces.
+            self.window.wait(f"Number(document.body.dataset.mesh) >= {blocks}")
+            self.assertGreater(self.colors(), 2 * before)
+            self.picture("mesh")
+
     def test_finds_what_dsg_finds(self):
         self.open("&q=human")
         found = self.ask("find", "human", "--at", "+30s", "--store", "store", "--map", "office")
