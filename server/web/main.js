@@ -148,7 +148,7 @@ function explain(error) {
     banner(`${error.message}\nTrying again; the picture is as it was.`);
   } else {
     setState('error');
-    const oldest = error.metadata.oldest_revision;
+    const {oldest} = error.metadata;
     const go = oldest && make('button', {onclick: () => open(state.map, Number(oldest))},
                               `open revision ${oldest}`);
     const newest = make('button', {onclick: () => open(state.map, null)}, 'open the newest');
@@ -254,6 +254,7 @@ async function meshIfShown() {
     document.body.dataset.mesh = String(of.mesh.length);
     redraw(true);
   });
+  if (scene === of) fillLayers(of, show, layersChanged);
 }
 
 function frameAll() {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What stands beside the picture: the layers, what is selected, and the same facts as a table.
 import {element, link, make, metres, pair} from './dom.js';
+import {NEIGHBORS_MAX} from './questions.js';
 import {colorOfAgent} from './renderer.js';
 import {GROUPS} from './scene.js';
 import {durationText, textOf} from './time.js';
@@ -106,7 +107,8 @@ export function fillInspector(scene, show, neighbors, actions) {
       : [make('button', {type: 'button', onclick: actions.path}, 'path to here')];
   panel.replaceChildren(make('h2', {}, scene.titleOf(node.id)), make('dl', {}, ...facts),
                         make('div', {className: 'row'}, ...buttons), make('p', {id: 'answer'}),
-                        make('h3', {}, 'Relations'), ...relations);
+                        make('h3', {}, neighbors.length < NEIGHBORS_MAX
+                            ? 'Relations' : `The first ${NEIGHBORS_MAX} relations`), ...relations);
 }
 
 /** Everything that is shown, in words. */

@@ -3,7 +3,8 @@
 import {toNode} from './scene.js';
 import {nsOf} from './time.js';
 
-const NEIGHBORS_MAX = 200;
+/** Relations of a node that are asked for. */
+export const NEIGHBORS_MAX = 200;
 const HITS_MAX = 1000;
 const INSTANTS_MAX = 10000;
 const CHANGES_A_PAGE = 1000;

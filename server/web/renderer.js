@@ -2,7 +2,7 @@
 // Draws a scene with WebGL2. What stands still is in one buffer a group, made when the scene or its
 // time changes; people and trails are made anew for each picture. Nothing is drawn while nothing
 // changes.
-import {GROUPS} from './scene.js';
+import {GROUPS, TRIANGLES_MAX} from './scene.js';
 import {
   FLOATS_PER_VERTEX, Vertices, addBox, addBoxEdges, addFigure, addLine, addPoint, addPrism, addRing,
   addTriangle,
@@ -24,8 +24,6 @@ const PEOPLE = [
   [0xd4, 0xe1, 0x57], [0xff, 0xb3, 0xc6], [0x8d, 0x6e, 0x63], [0x4f, 0xc3, 0xf7],
   [0xba, 0x68, 0xc8], [0xa5, 0xd6, 0xa7],
 ];
-/** The drawn mesh has at most so many triangles; a picture takes longer with more. */
-const TRIANGLES_MAX = 400000;
 
 const VERTEX_SHADER = `#version 300 es
 layout(location = 0) in vec3 position;
@@ -103,7 +101,7 @@ class Buffer {
 /** What of a scene is shown, and how. */
 export class Show {
   constructor() {
-    /** World time, seconds since the epoch; null shows what was valid at any time. */
+    /** World time, seconds since the epoch. */
     this.time = 0;
     /** Names of groups that are not drawn. */
     this.hidden = new Set(['mesh', 'structures']);

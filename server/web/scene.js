@@ -6,6 +6,8 @@ import {transformed} from './shapes.js';
 import {OPEN_BEGIN, OPEN_END, nsOf, secondsOf} from './time.js';
 import {Reader, Writer} from './wire.js';
 
+/** The drawn mesh has at most about so many triangles; a picture takes longer with more. */
+export const TRIANGLES_MAX = 400000;
 const PAGE = 1000;
 /** More edges than these hide the map, and are not loaded. */
 const EDGES_MAX = 30000;
@@ -452,6 +454,10 @@ export async function loadMesh(client, scene, signal, progress) {
   for await (const bytes of client.bytes('QueryService/GetMesh', request, signal)) {
     scene.mesh.push(...readMesh(bytes));
     progress();
+  }
+  const count = scene.mesh.reduce((sum, block) => sum + block.faces.length / 3, 0);
+  if (count > TRIANGLES_MAX) {
+    scene.notes.push(`of ${count} triangles of the mesh some ${TRIANGLES_MAX} are drawn`);
   }
 }
 
