@@ -148,11 +148,12 @@ function explain(error) {
     banner(`${error.message}\nTrying again; the picture is as it was.`);
   } else {
     setState('error');
-    const {oldest} = error.metadata;
-    const go = oldest && make('button', {onclick: () => open(state.map, Number(oldest))},
-                              `open revision ${oldest}`);
+    const oldest = Number(error.metadata.oldest);
+    // Only of a revision that is gone; the newest is what is meant by one that is still to come.
+    const gone = state.revision < oldest && make(
+        'button', {onclick: () => open(state.map, oldest)}, `open revision ${oldest}`);
     const newest = make('button', {onclick: () => open(state.map, null)}, 'open the newest');
-    const choices = error.reason === 'MAP_UNKNOWN' ? [] : [...(go ? [go] : []), newest];
+    const choices = error.reason === 'MAP_UNKNOWN' ? [] : [...(gone ? [gone] : []), newest];
     banner(error.message, 'error', choices);
   }
 }

@@ -240,6 +240,24 @@ class Viewer(support.ProgramsTest):
         self.assertIn("99", said)
         self.window.run("document.querySelector('#banner button').click()")
         self.window.wait(READY)
+    def test_offers_what_can_be_read_of_a_compacted_map(self):
+        self.ingest("short", self.simulate("short-log", people=1, seconds=5))
+        room = self.ask("ls", "--kind", "room", "--store", "short")["nodes"][0]["id"]
+        self.ok("dsg", "set", room, "--name", "the den", "--store", "short")
+        with self.served("short") as url:
+            self.ok("dsg", "compact", "--server", "unix:short.sock")
+            newest = self.ask("stats", "--store", "short")["head_revision"]
+            self.window.get("about:blank")
+            self.window.get(url + "&rev=1")
+            self.window.wait("document.body.dataset.state === 'error'")
+            self.assertEqual(f"open revision {newest}", self.window.run("""
+                const button = document.querySelector('#banner button');
+                button.click();
+                return button.textContent;"""))
+            self.window.wait(READY)
+            self.assertEqual(newest, self.window.run("return document.body.dataset.revision"))
+
+    def test_waits_for_the_first_map(self):
         os.makedirs(self.path("empty"))
         with self.served("empty") as url:
             self.window.get("about:blank")
