@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "google/rpc/status.pb.h"
 #include "grpc/grpc.h"
 #include "grpcpp/impl/codegen/proto_utils.h"
 #include "grpcpp/support/proto_buffer_reader.h"
@@ -83,7 +84,9 @@ EndCall GrpcCall::ender() {
 bool GrpcCall::ends_stalled() const { return !OutlastsBound(context_->deadline()); }
 
 grpc::Status GrpcCall::LastWords(const absl::Status& status) {
-  std::string detail = EncodeErrorDetail(status);
+  if (status.ok()) return grpc::Status::OK;
+  const google::rpc::Status error = ErrorStatus(status);
+  std::string detail = OwnDetail(error);
   if (!detail.empty()) context_->AddTrailingMetadata(kErrorTrailer, std::move(detail));
   return ToGrpc(status);
 }

@@ -35,7 +35,7 @@ class GrpcCall final : public grpc::ServerGenericBidiReactor, public CallWire {
   bool ends_stalled() const override;
 
  private:
-  // Adds the trailer with the reason.
+  // Adds the trailer with our own detail; the details that all clients know come with the status.
   grpc::Status LastWords(const absl::Status& status);
 
   CallRuntime* const runtime_;

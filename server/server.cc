@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "google/rpc/status.pb.h"
 #include "grpcpp/ext/health_check_service_server_builder_option.h"
 #include "grpcpp/generic/async_generic_service.h"
 #include "grpcpp/grpcpp.h"
@@ -103,7 +104,9 @@ ConnectionLimits LimitsOfConnections(const ServerOptions& options) {
 
 class UnknownMethod final : public grpc::ServerGenericBidiReactor {
  public:
-  explicit UnknownMethod(const std::string& path) { Finish(ToGrpc(UnknownMethodError(path))); }
+  explicit UnknownMethod(const std::string& path) {
+    Finish(ToGrpc(ErrorStatus(UnknownMethodError(path))));
+  }
   void OnDone() override { delete this; }
 };
 

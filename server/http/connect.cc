@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/http/connect.h"
 
+#include <google/protobuf/any.pb.h>
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/message.h>
+
 #include <algorithm>
+#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
-#include "dsg/v1/errors.pb.h"
+#include "google/rpc/status.pb.h"
 #include "query/api/message_json.h"
 #include "schema/base/status.h"
 #include "schema/codec/status_decode.h"
@@ -73,19 +78,27 @@ std::string Dump(const ordered_json& json) {
   return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
 
-ordered_json ErrorOf(const absl::Status& error, const std::string& detail_bytes) {
-  const std::string_view message(error.message().data(), error.message().size());
-  ordered_json json = {{"code", Find(error.code()).name},
-                       {"message", CutText(message, kMessageBytesMax)}};
-  if (detail_bytes.empty()) return json;
-  ordered_json detail = {{"type", v1::ErrorDetail::descriptor()->full_name()},
-                         {"value", Base64(detail_bytes)}};
-  v1::ErrorDetail told;
-  if (told.ParseFromString(detail_bytes)) {
-    const auto text = query::JsonOfMessage(told, query::JsonLayout::kOneLine);
-    if (text.ok()) detail["debug"] = ordered_json::parse(*text);
+// Any detail, with its JSON if this program knows its type.
+ordered_json DetailJson(const google::protobuf::Any& detail) {
+  const std::string type = detail.type_url().substr(detail.type_url().rfind('/') + 1);
+  ordered_json json = {{"type", type}, {"value", Base64(detail.value())}};
+  const auto* const descriptor =
+      google::protobuf::DescriptorPool::generated_pool()->FindMessageTypeByName(type);
+  if (descriptor == nullptr) return json;
+  const std::unique_ptr<google::protobuf::Message> told(
+      google::protobuf::MessageFactory::generated_factory()->GetPrototype(descriptor)->New());
+  if (!told->ParseFromString(detail.value())) return json;
+  const auto text = query::JsonOfMessage(*told, query::JsonLayout::kOneLine);
+  if (text.ok()) json["debug"] = ordered_json::parse(*text);
+  return json;
+}
+
+ordered_json ErrorOf(const google::rpc::Status& error) {
+  ordered_json json = {{"code", Find(static_cast<absl::StatusCode>(error.code())).name},
+                       {"message", error.message()}};
+  for (const google::protobuf::Any& detail : error.details()) {
+    json["details"].push_back(DetailJson(detail));
   }
-  json["details"] = ordered_json::array({std::move(detail)});
   return json;
 }
 
@@ -130,18 +143,17 @@ absl::StatusOr<std::chrono::milliseconds> ReadTimeout(std::string_view text) {
 
 int HttpStatusOf(absl::StatusCode code) { return Find(code).http_status; }
 
-std::string ErrorJson(const absl::Status& error) {
-  return Dump(ErrorOf(error, EncodeErrorDetail(error)));
-}
+std::string ErrorJson(const absl::Status& error) { return Dump(ErrorOf(ErrorStatus(error))); }
 
 std::string EnvelopeOf(size_t message_bytes) { return Envelope(0, message_bytes); }
 
 std::string EndOfStream(const absl::Status& status) {
   ordered_json end = ordered_json::object();
   if (!status.ok()) {
-    const std::string detail = EncodeErrorDetail(status);
-    end["error"] = ErrorOf(status, detail);
+    const google::rpc::Status error = ErrorStatus(status);
+    end["error"] = ErrorOf(error);
     // What gRPC sends as the trailer of that name.
+    const std::string detail = OwnDetail(error);
     if (!detail.empty()) end["metadata"] = {{kErrorTrailer, ordered_json::array({Base64(detail)})}};
   }
   const std::string text = Dump(end);

@@ -34,8 +34,7 @@ absl::StatusOr<std::chrono::milliseconds> ReadTimeout(std::string_view text);
 /// The status that answers an error, by Connect's table.
 int HttpStatusOf(absl::StatusCode code);
 
-/// An error as the body of an answer: its code, its message and, if it has a reason, its
-/// dsg.v1.ErrorDetail.
+/// An error as the body of an answer: its code, its message, and the details of its ErrorStatus.
 std::string ErrorJson(const absl::Status& error);
 
 /// Bytes of an envelope before its message.

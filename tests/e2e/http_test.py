@@ -76,6 +76,11 @@ class Contract(http_port.HttpTest):
             self.assertEqual("application/json", reply.headers["Content-Type"])
             detail = http_port.detail_of(error)
             self.assertEqual(("AGENT_UNKNOWN", "dsg"), (detail["reason"], detail["domain"]))
+            standard = error["details"][1]
+            self.assertEqual("google.rpc.ErrorInfo", standard["type"])
+            self.assertEqual(("AGENT_UNKNOWN", "dsgdb", detail["metadata"]),
+                             tuple(standard["debug"][key]
+                                   for key in ("reason", "domain", "metadata")))
             said = self.refused(1, [], "dsg", "where", wrong["agent"], "--at", "+0s", "--server",
                                 "unix:grpc.sock")
             self.assertIn(error["message"][:60], said)

@@ -98,7 +98,7 @@ THIRD_PARTY = [
     (r"sqlite3", ["schema/store/sqlite *.cc", "ingest/log *.cc", "tests"]),
     (r"grpc(pp|\+\+)?/|.*\.grpc\.pb\.h$",
      ["query/client", "server", "tests"]),
-    (r"(dsg/v1|google/protobuf)/.*",
+    (r"(dsg/v1|google/(protobuf|rpc))/.*",
      ["schema/codec *.cc", "schema/store *.cc", "ingest/commit *.cc", "query *.cc", "server *.cc",
       "docs/examples *.cc", "proto", "tests"]),
     (r"fcl/", ["query/engine *.cc", "tests"]),

@@ -10,6 +10,8 @@
 #include "dsg/v1/maintenance_service.pb.h"
 #include "dsg/v1/map_service.grpc.pb.h"
 #include "dsg/v1/query_service.grpc.pb.h"
+#include "google/rpc/error_details.pb.h"
+#include "google/rpc/status.pb.h"
 #include "grpcpp/generic/generic_stub.h"
 #include "grpcpp/grpcpp.h"
 #include "schema/codec/status_decode.h"
@@ -313,6 +315,28 @@ TEST_F(Rpc, CarriesTheReasonAndItsFactsInTheTrailer) {
   EXPECT_EQ(detail.reason(), v1::TIME_OUTSIDE_TRACK);
   EXPECT_EQ(detail.domain(), "dsg");
   EXPECT_EQ(detail.metadata().at("last_ns"), "62000000000");
+  google::rpc::Status details;
+  ASSERT_TRUE(details.ParseFromString(status.error_details()));
+  ASSERT_EQ(details.details_size(), 2);
+  google::rpc::ErrorInfo info;
+  ASSERT_TRUE(details.details(1).UnpackTo(&info));
+  EXPECT_EQ(info.reason(), "TIME_OUTSIDE_TRACK");
+  EXPECT_EQ(info.domain(), "dsgdb");
+  EXPECT_EQ(info.metadata().at("last_ns"), "62000000000");
+}
+
+TEST_F(Rpc, CarriesTheLongestErrorsWhole) {
+  // Every character of the name is sent as three, and the name is in message and metadata.
+  grpc::ClientContext context;
+  v1::LocateAgentRequest request = Where("12", 0);
+  request.set_map(std::string(4000, '%'));
+  v1::LocateAgentResponse reply;
+  const grpc::Status status = query_->LocateAgent(&context, request, &reply);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT) << status.error_message();
+  EXPECT_EQ(DetailOf(context).reason(), v1::MAP_NAME_INVALID);
+  google::rpc::Status details;
+  ASSERT_TRUE(details.ParseFromString(status.error_details()));
+  EXPECT_GE(details.details_size(), 2);
 }
 
 TEST_F(Rpc, CarriesTheReasonOfAStreamThatFails) {

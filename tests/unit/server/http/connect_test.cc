@@ -9,7 +9,10 @@
 
 #include "absl/strings/escaping.h"
 #include "dsg/v1/errors.pb.h"
+#include "google/rpc/status.pb.h"
+#include "grpcpp/support/status.h"
 #include "schema/base/status.h"
+#include "server/status_mapping.h"
 
 namespace dsg::server {
 namespace {
@@ -43,12 +46,12 @@ TEST(Connect, ReadsTimeoutsOfAtMostTenDigits) {
   }
 }
 
-TEST(Connect, WritesErrorsWithTheirDetail) {
+TEST(Connect, WritesErrorsWithTheirDetails) {
   const auto error = MakeError(Reason::kMapUnknown, "there is no map \"x\"", {{"map", "x"}});
   const json told = json::parse(ErrorJson(error));
   EXPECT_EQ(told["code"], "not_found");
   EXPECT_EQ(told["message"], "there is no map \"x\"");
-  ASSERT_EQ(told["details"].size(), 1u);
+  ASSERT_EQ(told["details"].size(), 2u);
   const json& detail = told["details"][0];
   EXPECT_EQ(detail["type"], "dsg.v1.ErrorDetail");
   EXPECT_EQ(detail["debug"]["reason"], "MAP_UNKNOWN");
@@ -60,7 +63,29 @@ TEST(Connect, WritesErrorsWithTheirDetail) {
   v1::ErrorDetail read;
   ASSERT_TRUE(read.ParseFromString(bytes));
   EXPECT_EQ(read.reason(), v1::MAP_UNKNOWN);
+  EXPECT_EQ(told["details"][1]["type"], "google.rpc.ErrorInfo");
+  EXPECT_EQ(told["details"][1]["debug"]["domain"], "dsgdb");
+  EXPECT_EQ(told["details"][1]["debug"]["reason"], "MAP_UNKNOWN");
   EXPECT_EQ(HttpStatusOf(error.code()), 404);
+}
+
+TEST(Connect, WritesTheSameDetailsAsGrpc) {
+  for (const auto& error : {MakeError(Reason::kFieldInvalid, "k is 0", {{"field", "k"}}),
+                            MakeError(Reason::kOverloaded, "busy", {{"retry_after_ms", "200"}})}) {
+    google::rpc::Status sent;
+    ASSERT_TRUE(sent.ParseFromString(ToGrpc(ErrorStatus(error)).error_details()));
+    const json details = json::parse(ErrorJson(error))["details"];
+    ASSERT_EQ(details.size(), 3u);
+    ASSERT_EQ(sent.details_size(), 3);
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_EQ("type.googleapis.com/" + details[i]["type"].get<std::string>(),
+                sent.details(i).type_url());
+      std::string bytes;
+      ASSERT_TRUE(absl::Base64Unescape(details[i]["value"].get<std::string>(), &bytes));
+      EXPECT_EQ(bytes, sent.details(i).value());
+      EXPECT_TRUE(details[i]["debug"].is_object());
+    }
+  }
 }
 
 TEST(Connect, HasANameAndAStatusForEveryCode) {
