@@ -17,7 +17,7 @@
 
 namespace dsg::server {
 
-GrpcCall::GrpcCall(const Method* method, grpc::GenericCallbackServerContext* context)
+GrpcCall::GrpcCall(const Method* method, grpc::CallbackServerContext* context)
     : runtime_(method->runtime),
       context_(context),
       connection_(runtime_->connections->Find(context->peer())),
@@ -88,7 +88,7 @@ grpc::Status GrpcCall::LastWords(const absl::Status& status) {
   const google::rpc::Status error = ErrorStatus(status);
   std::string detail = OwnDetail(error);
   if (!detail.empty()) context_->AddTrailingMetadata(kErrorTrailer, std::move(detail));
-  return ToGrpc(status);
+  return ToGrpc(error);
 }
 
 }  // namespace dsg::server

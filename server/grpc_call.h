@@ -14,7 +14,7 @@ namespace dsg::server {
 class GrpcCall final : public grpc::ServerGenericBidiReactor, public CallWire {
  public:
   /// Starts to receive the request; may refuse the call at once.
-  GrpcCall(const Method* method, grpc::GenericCallbackServerContext* context);
+  GrpcCall(const Method* method, grpc::CallbackServerContext* context);
 
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override { call_->OnSent(ok); }
@@ -39,7 +39,7 @@ class GrpcCall final : public grpc::ServerGenericBidiReactor, public CallWire {
   grpc::Status LastWords(const absl::Status& status);
 
   CallRuntime* const runtime_;
-  grpc::GenericCallbackServerContext* const context_;
+  grpc::CallbackServerContext* const context_;
   const std::shared_ptr<Connection> connection_;
   const std::unique_ptr<ServedCall> call_;
   // Set while the request is being received.

@@ -178,6 +178,8 @@ void Tune(int fd) {
 
 }  // namespace
 
+bool ListenAddress::is_local() const { return is_unix() || IsLoopback(host); }
+
 std::string ListenAddress::ToString() const {
   if (is_unix()) return absl::StrCat(std::string(kUnixPrefix), socket_path);
   if (host.find(':') != std::string::npos) return absl::StrCat("[", host, "]:", port);
@@ -198,7 +200,7 @@ absl::StatusOr<ListenAddress> ParseListenAddress(std::string_view text, bool all
   if (!absl::SimpleAtoi(port, &address.port) || address.port < 0 || address.port > 65535) {
     return AddressError(text, kForm);
   }
-  if (!allow_remote && !IsLoopback(address.host)) {
+  if (!allow_remote && !address.is_local()) {
     return AddressError(text,
                         "other machines could reach it, nothing is encrypted, and over gRPC "
                         "every client can read and write every map. Listen on a unix socket or "

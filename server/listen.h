@@ -24,6 +24,8 @@ struct ListenAddress {
   int port = 0;
 
   bool is_unix() const { return !socket_path.empty(); }
+  /// A unix socket or a loopback host: no other machine reaches it.
+  bool is_local() const;
   /// As a client dials it: "unix:/run/dsg.sock", "[::1]:4410".
   std::string ToString() const;
 };

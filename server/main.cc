@@ -40,6 +40,7 @@ struct Flags {
   size_t call_memory_mb = dsg::server::ServerOptions().call_memory_bytes >> 20;
   dsg::StoreOptions limits;
   std::string policy_file;
+  std::string reflection = "local";
   dsg::server::ServerOptions options;
 };
 
@@ -92,6 +93,10 @@ void DeclareFlags(CLI::App* app, Flags* flags) {
       ->capture_default_str();
   app->add_flag("--allow-remote", flags->options.allow_remote,
                 "Listen on addresses that other machines reach; callers are not authenticated");
+  app->add_option("--reflection", flags->reflection,
+                  "Tell gRPC clients the protos: local = on a unix socket or loopback only")
+      ->check(CLI::IsMember({"local", "on", "off"}))
+      ->capture_default_str();
   app->add_option("--http", flags->options.http.listen,
                   "Answer over HTTP too: HOST:PORT or unix:PATH (docs/operations.md)");
   app->add_option("--http-host", flags->options.http.hosts,
@@ -170,6 +175,11 @@ absl::StatusOr<std::optional<dsg::PolicyFile>> ReadPolicies(const std::string& p
   return std::optional<dsg::PolicyFile>(std::move(file));
 }
 
+dsg::server::Reflection ReflectionOf(const std::string& flag) {
+  if (flag == "on") return dsg::server::Reflection::kOn;
+  return flag == "off" ? dsg::server::Reflection::kOff : dsg::server::Reflection::kLocal;
+}
+
 int Serve(Flags flags) {
   const sigset_t signals = BlockStopSignals();
   RaiseDescriptorLimit();
@@ -192,6 +202,7 @@ int Serve(Flags flags) {
   if (flags.options.listen.empty())
     flags.options.listen = "unix:" + flags.store + "/dsg-server.sock";
   flags.options.call_memory_bytes = flags.call_memory_mb << 20;
+  flags.options.reflection = ReflectionOf(flags.reflection);
   flags.options.log_all_calls = flags.log_level == "debug";
   dsg::query::ServiceCoreOptions core_options;
   core_options.view_cache_bytes = flags.view_cache_mb << 20;

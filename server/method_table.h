@@ -2,9 +2,9 @@
 // The methods of the services by the path that gRPC and HTTP name them with.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <string>
-#include <unordered_map>
 
 #include "server/served_call.h"
 
@@ -22,8 +22,12 @@ class MethodTable {
   /// The method of "/dsg.v1.MapService/ListMaps"; nullptr if there is none.
   const Method* Find(const std::string& path) const;
 
+  /// By path, in its order: the methods of one service follow one another.
+  using ByPath = std::map<std::string, std::unique_ptr<const Method>>;
+  const ByPath& methods() const { return methods_; }
+
  private:
-  std::unordered_map<std::string, std::unique_ptr<const Method>> methods_;
+  ByPath methods_;
 };
 
 }  // namespace dsg::server

@@ -11,14 +11,11 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "google/rpc/status.pb.h"
-#include "grpcpp/ext/health_check_service_server_builder_option.h"
-#include "grpcpp/generic/async_generic_service.h"
 #include "grpcpp/grpcpp.h"
 #include "grpcpp/server_posix.h"
 #include "schema/base/status.h"
 #include "server/call_runtime.h"
-#include "server/grpc_call.h"
+#include "server/grpc_services.h"
 #include "server/http/http_port.h"
 #include "server/listen.h"
 #include "server/method_table.h"
@@ -102,32 +99,6 @@ ConnectionLimits LimitsOfConnections(const ServerOptions& options) {
   return limits;
 }
 
-class UnknownMethod final : public grpc::ServerGenericBidiReactor {
- public:
-  explicit UnknownMethod(const std::string& path) {
-    Finish(ToGrpc(ErrorStatus(UnknownMethodError(path))));
-  }
-  void OnDone() override { delete this; }
-};
-
-// The methods as gRPC sees them: each path begins a call. gRPC hands over bytes instead of
-// messages, so that a request is charged for before it is parsed.
-class GrpcService final : public grpc::CallbackGenericService {
- public:
-  /// `methods` must outlive the service and all calls.
-  explicit GrpcService(const MethodTable* methods) : methods_(methods) {}
-
-  grpc::ServerGenericBidiReactor* CreateReactor(
-      grpc::GenericCallbackServerContext* context) override {
-    const Method* const method = methods_->Find(context->method());
-    if (method == nullptr) return new UnknownMethod(context->method());
-    return new GrpcCall(method, context);
-  }
-
- private:
-  const MethodTable* const methods_;
-};
-
 class RunningServer final : public Server {
  public:
   RunningServer(std::unique_ptr<query::ServiceCore> core, const ServerOptions& options)
@@ -141,7 +112,7 @@ class RunningServer final : public Server {
         arrivals_(kArrivalsMax),
         memory_(options.call_memory_bytes),
         methods_(&questions_, &commits_),
-        grpc_service_(&methods_) {
+        grpc_services_(&methods_) {
     Prepare(options, &workers_, &questions_);
     Prepare(options, &commit_workers_, &commits_);
   }
@@ -160,14 +131,16 @@ class RunningServer final : public Server {
           http_port_, HttpPort::Listen(options.http, options.allow_remote, options.reader_stall_max,
                                        &methods_, &questions_));
     }
-    grpc::EnableDefaultHealthCheckService(true);
     grpc::ServerBuilder builder;
     SetLimits(&builder);
-    builder.RegisterCallbackGenericService(&grpc_service_);
+    const bool is_for_all = options.reflection == Reflection::kOn;
+    const bool is_for_local = options.reflection == Reflection::kLocal && address.is_local();
+    grpc_services_.AddTo(&builder, is_for_all || is_for_local);
     grpc_server_ = builder.BuildAndStart();
     if (grpc_server_ == nullptr) {
       return absl::InternalError("gRPC did not start; see its log");
     }
+    grpc_services_.ReportServing(grpc_server_.get());
     acceptor_->Start([this](int fd, const std::string& peer) {
       if (connections_.Add(fd, peer) != nullptr) {
         grpc::AddInsecureChannelFromFd(grpc_server_.get(), fd);
@@ -242,7 +215,7 @@ class RunningServer final : public Server {
   CallRuntime questions_;
   CallRuntime commits_;
   MethodTable methods_;
-  GrpcService grpc_service_;
+  GrpcServices grpc_services_;
   std::unique_ptr<HttpPort> http_port_;
   std::unique_ptr<Acceptor> acceptor_;
   std::string address_;

@@ -12,6 +12,14 @@
 
 namespace dsg::server {
 
+/// Whether gRPC clients may ask for the protos (server reflection).
+enum class Reflection {
+  /// On a unix socket and on loopback only.
+  kLocal,
+  kOn,
+  kOff,
+};
+
 struct ServerOptions {
   /// "unix:PATH" or "HOST:PORT".
   std::string listen;
@@ -35,6 +43,7 @@ struct ServerOptions {
   std::chrono::milliseconds reader_stall_max{30'000};
   /// Listen on addresses that other machines can reach.
   bool allow_remote = false;
+  Reflection reflection = Reflection::kLocal;
   /// A log line for every call, not only for errors and slow ones.
   bool log_all_calls = false;
   /// The HTTP port beside gRPC; off unless it has an address.

@@ -4,7 +4,6 @@
 
 import os
 import subprocess
-import sys
 import unittest
 
 import support
@@ -12,15 +11,6 @@ import support
 EXAMPLES = os.path.join(support.ROOT, "docs", "examples")
 PROTO = os.path.join(support.ROOT, "proto")
 PLUGIN = "/usr/bin/grpc_python_plugin"
-
-
-def python_with_grpc():
-    """Debian's packages belong to Debian's Python, which need not be the first on the path."""
-    for python in (sys.executable, "/usr/bin/python3"):
-        done = subprocess.run([python, "-c", "import grpc"], capture_output=True, check=False)
-        if done.returncode == 0:
-            return python
-    raise AssertionError("no Python here knows grpc; install python3-grpcio and python3-protobuf")
 
 
 class Examples(support.ProgramsTest):
@@ -61,7 +51,7 @@ class Examples(support.ProgramsTest):
                   if name.endswith(".proto")]
         self.ok("protoc", "-I", PROTO, f"--python_out={stubs}", f"--grpc_out={stubs}",
                 f"--plugin=protoc-gen-grpc={PLUGIN}", *protos)
-        program = [python_with_grpc(), os.path.join(EXAMPLES, "ask.py")]
+        program = [support.python_with_grpc(), os.path.join(EXAMPLES, "ask.py")]
         with self.server("store", "unix:" + self.path("py.sock")):
             address = "unix:" + self.path("py.sock")
             self.expect_answers(self.ask(program, address, "alice", {"PYTHONPATH": stubs}))

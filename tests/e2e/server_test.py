@@ -44,6 +44,8 @@ class Server(support.ProgramsTest):
         self.refused(2, ["unix:"], "dsg-server", "--store", "store", "--listen", "unix:")
         self.refused(2, ["--allow-remote"], "dsg-server", "--store", "store", "--listen",
                      "0.0.0.0:50051")
+        self.refused(2, ["--reflection"], "dsg-server", "--store", "store", "--listen",
+                     "unix:r.sock", "--reflection", "perhaps")
 
     def test_more_connections_than_descriptors_harm_nobody(self):
         address = "unix:few.sock"

@@ -12,6 +12,7 @@ import re
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 import time
 import unittest
@@ -65,6 +66,15 @@ def without_incarnation(text):
 def read_rows(path):
     with open(path, encoding="utf-8", newline="") as f:
         return list(csv.DictReader(f))
+
+
+def python_with_grpc():
+    """Debian's packages belong to Debian's Python, which need not be the first on the path."""
+    for python in (sys.executable, "/usr/bin/python3"):
+        done = subprocess.run([python, "-c", "import grpc"], capture_output=True, check=False)
+        if done.returncode == 0:
+            return python
+    raise AssertionError("no Python here knows grpc; install python3-grpcio and python3-protobuf")
 
 
 class ProgramsTest(unittest.TestCase):

@@ -22,6 +22,7 @@ TEST(ListenAddress, ReadsSocketsHostsAndPorts) {
     const auto address = ParseListenAddress(text, false);
     ASSERT_TRUE(address.ok()) << address.status();
     EXPECT_EQ(address->ToString(), text);
+    EXPECT_TRUE(address->is_local()) << text;
   }
 }
 
@@ -30,7 +31,9 @@ TEST(ListenAddress, RefusesWhatOtherMachinesReachUnlessTold) {
     const auto address = ParseListenAddress(text, false);
     EXPECT_EQ(ReasonOf(address.status()), Reason::kFieldInvalid);
     EXPECT_NE(address.status().message().find("--allow-remote"), absl::string_view::npos);
-    EXPECT_TRUE(ParseListenAddress(text, true).ok()) << text;
+    const auto remote = ParseListenAddress(text, true);
+    ASSERT_TRUE(remote.ok()) << text;
+    EXPECT_FALSE(remote->is_local()) << text;
   }
 }
 
