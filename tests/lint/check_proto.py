@@ -19,20 +19,31 @@ INCLUDE = "/usr/include"
 TOKEN = re.compile(r'"((?:\\.|[^"\\])*)"|([{}])|([^\s{}":]+)')
 
 
-def describe():
-    """The descriptor set of all protos, as protobuf text, files in alphabetical order."""
+def describe(with_comments=False):
+    """describe_files of all protos of the tree, in alphabetical order."""
     paths = [p[len("proto/"):] for p in tree.files((".proto",)) if p.startswith("proto/")]
-    with tempfile.TemporaryDirectory() as folder:
-        binary = os.path.join(folder, "set.pb")
-        subprocess.run(["protoc", "--proto_path=" + os.path.join(tree.ROOT, "proto"),
-                        "--descriptor_set_out=" + binary, *paths], check=True)
+    return describe_files(os.path.join(tree.ROOT, "proto"), paths, with_comments)
+
+
+def describe_files(folder, paths, with_comments):
+    """The descriptor set of protos, as protobuf text; and what protoc warns of, such as imports
+    that nothing uses."""
+    with tempfile.TemporaryDirectory() as scratch:
+        binary = os.path.join(scratch, "set.pb")
+        options = ["--include_source_info"] if with_comments else []
+        made = subprocess.run(
+            ["protoc", "--proto_path=" + folder, *options, "--descriptor_set_out=" + binary,
+             *paths], capture_output=True, text=True, check=False)
+        if made.returncode != 0:
+            raise SystemExit(made.stderr)
         with open(binary, "rb") as f:
             text = subprocess.run(
                 ["protoc", f"--proto_path={INCLUDE}", "--decode=google.protobuf.FileDescriptorSet",
                  "google/protobuf/descriptor.proto"], stdin=f, capture_output=True, text=True,
                 check=True).stdout
     # Names in JSON follow from the names of the fields and say nothing new.
-    return re.sub(r"^ *json_name: .*\n", "", text, flags=re.MULTILINE)
+    return (re.sub(r"^ *json_name: .*\n", "", text, flags=re.MULTILINE),
+            made.stderr.splitlines())
 
 
 def parse(text):
@@ -129,17 +140,20 @@ def compare(where, old, new):
 
 def breaks(old_text, new_text):
     """Files do not matter, packages do: a message may move from file to file."""
-    def joined(text):
-        whole = {}
+    def by_package(text):
+        packages = {}
         for file in parse(text).get("file", []):
+            whole = packages.setdefault(one(file, "package"), {})
             for kind in COMPARE:
                 whole.setdefault(kind, []).extend(file.get(kind, []))
-        return whole
-    return list(compare("dsg.v1", joined(old_text), joined(new_text)))
+        return packages
+    new = by_package(new_text)
+    return [problem for package, old in by_package(old_text).items()
+            for problem in compare(package, old, new.get(package, {}))]
 
 
 def find_problems(update, allow_break):
-    new = describe()
+    new, _ = describe()
     golden = os.path.join(tree.ROOT, GOLDEN)
     old = tree.read(GOLDEN) if os.path.exists(golden) else ""
     problems = breaks(old, new)

@@ -11,6 +11,7 @@ import check_layering
 import check_names
 import check_packages
 import check_proto
+import check_proto_style
 import check_python
 import check_tidy
 import check_types
@@ -120,6 +121,87 @@ class Proto(unittest.TestCase):
         same = FIELD.format("x", 1, "TYPE_DOUBLE")
         self.assertEqual(1, len(self.breaks(same, values='value { name: "ONE" number: 2 }')))
         self.assertEqual(1, len(self.breaks(same, values="")))
+
+
+STYLE = """syntax = "proto3";
+// A package.
+// - `map`, `*_count`: told here.
+package dsg.v1;
+// A service.
+service ThingService {{
+  // A list.
+  rpc ListThings(ListThingsRequest) returns (ListThingsResponse);
+}}
+message ListThingsRequest {{ string map = 1; int32 page_size = 2; string page_token = 3; }}
+message ListThingsResponse {{ repeated Thing things = 1; string next_page_token = 2; }}
+// A thing.
+message Thing {{
+  int64 part_count = 1;
+  // Metres.
+  double length_m = 2;
+  Colour colour = 3;
+  {fields}
+}}
+// A colour.
+enum Colour {{
+  COLOUR_UNSPECIFIED = 0;
+  // Red.
+  COLOUR_RED = 1;
+  {values}
+}}
+{more}
+"""
+
+
+class ProtoStyle(unittest.TestCase):
+    def problems(self, fields="", values="", more="", change=("", "")):
+        text = STYLE.format(fields=fields, values=values, more=more).replace(*change)
+        with tempfile.TemporaryDirectory() as folder:
+            os.makedirs(os.path.join(folder, "dsg/v1"))
+            with open(os.path.join(folder, "dsg/v1/thing.proto"), "w", encoding="utf-8") as f:
+                f.write(text)
+            described, _ = check_proto.describe_files(folder, ["dsg/v1/thing.proto"], True)
+        return check_proto_style.problems_of(described, ["map", "page_*", "next_page_token",
+                                                         "*_count"])
+
+    def test_lets_good_protos_pass(self):
+        self.assertEqual([], self.problems())
+
+    def test_reads_the_conventions_from_a_comment(self):
+        self.assertEqual(["map", "*_count"], check_proto_style.conventions_of(
+            " A package.\n - `map`, `*_count`: as in `other`.\n   `not` this one\n"))
+
+    def test_wants_comments(self):
+        for change in (("  // Metres.\n", ""), ("// A thing.\n", ""), ("  // Red.\n", ""),
+                       ("// A colour.\n", ""), ("// A service.\n", ""), ("  // A list.\n", ""),
+                       ("string map = 1", "string chart = 1")):
+            with self.subTest(change=change):
+                self.assertEqual(1, len(self.problems(change=change)))
+
+    def test_wants_the_names_of_public_linters(self):
+        for change in (("ThingService", "Things"), ("ListThings(", "list_things("),
+                       ("length_m", "lengthM"), ("COLOUR_RED", "RED"), ("COLOUR_RED", "COLOUR_Red"),
+                       ("COLOUR_UNSPECIFIED", "COLOUR_NONE")):
+            with self.subTest(change=change):
+                self.assertLessEqual(1, len(self.problems(change=change)))
+        self.assertEqual(1, len(self.problems(more="// A thing.\nmessage small_thing {}")))
+
+    def test_keeps_the_list_of_bare_values_closed(self):
+        change = ("Colour", "PoseQuality")
+        bare = "// A value.\n  {} = 2;"
+
+        def of(value):
+            found = self.problems(values=bare.format(value), change=change)
+            return [p for p in found if value in p]
+
+        self.assertEqual([], of("EXACT"))
+        self.assertEqual(1, len(of("GUESSED")))
+
+    def test_wants_messages_of_their_own_and_pages(self):
+        self.assertEqual(1, len(self.problems(change=(" string page_token = 3;", ""))))
+        second = ("// A call.\nrpc GetThing(ListThingsRequest) returns (GetThingResponse);\n}\n"
+                  "message GetThingResponse {}\nmessage ListThingsRequest")
+        self.assertEqual(1, len(self.problems(change=("}\nmessage ListThingsRequest", second))))
 
 
 class Python(unittest.TestCase):

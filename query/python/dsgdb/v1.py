@@ -22,90 +22,127 @@ VERSION = "0.1.0"
 
 class Reason(ProtoEnum):
     """A reason exists only where a caller can act on it. The list grows: clients treat an unknown
-    reason as REASON_UNSPECIFIED and use the status code.
+    reason as REASON_UNSPECIFIED and use the status code. A comment names the metadata that callers
+    can rely on; there may be more.
     """
 
     REASON_UNSPECIFIED = "REASON_UNSPECIFIED"
-    # INVALID_ARGUMENT: correct the call. metadata: field, value.
+    # A field of the request has a value that it cannot have. metadata: field, value.
     FIELD_INVALID = "FIELD_INVALID"
+    # The name of a map has characters that docs/conventions.md does not allow. metadata: value.
     MAP_NAME_INVALID = "MAP_NAME_INVALID"
+    # What should be a node id is not a letter and a number. metadata: value.
     NODE_ID_INVALID = "NODE_ID_INVALID"
+    # An interval ends where it begins, or before. metadata: from_ns, to_ns.
     TIME_RANGE_INVERTED = "TIME_RANGE_INVERTED"
+    # A box has its min above its max on some axis. metadata: field.
     BOX_INVERTED = "BOX_INVERTED"
+    # A number is NaN, infinite or larger than any map.
     NUMBER_NOT_FINITE = "NUMBER_NOT_FINITE"
+    # A page token belongs to another question, or was changed: begin without one. metadata: field.
     PAGE_TOKEN_MISMATCH = "PAGE_TOKEN_MISMATCH"
+    # A delta contradicts itself or the map. metadata: missing_nodes, if it refers to nodes that do
+    # not exist.
     DELTA_INVALID = "DELTA_INVALID"
+    # A file does not have the content that its format asks for. metadata: file.
     FILE_MALFORMED = "FILE_MALFORMED"
-    # metadata: position (bytes from 0), expected.
+    # A query does not follow docs/search.md. metadata: position (bytes from 0), expected.
     QUERY_MALFORMED = "QUERY_MALFORMED"
     # A time is implausibly far from all others of the map. metadata: map, what, time_ns, first_ns,
     # last_ns.
     TIME_IMPLAUSIBLE = "TIME_IMPLAUSIBLE"
-    # NOT_FOUND. metadata: map, node, agent.
+    # The store has no such map. metadata: map.
     MAP_UNKNOWN = "MAP_UNKNOWN"
+    # The map has no such node at the revision. metadata: map, node.
     NODE_UNKNOWN = "NODE_UNKNOWN"
+    # The map has no such agent at the revision. metadata: map, agent.
     AGENT_UNKNOWN = "AGENT_UNKNOWN"
+    # The map has no such layer. metadata: layer.
     LAYER_UNKNOWN = "LAYER_UNKNOWN"
+    # The map has no asset with this hash at the revision. metadata: map, asset.
     ASSET_UNKNOWN = "ASSET_UNKNOWN"
+    # No node of the map has this class, kind or name. metadata: class.
     CLASS_UNKNOWN = "CLASS_UNKNOWN"
+    # No edge of the map has this relation. metadata: relation.
     RELATION_UNKNOWN = "RELATION_UNKNOWN"
-    # metadata: from, to, why.
+    # The places do not lead from the start to the goal. metadata: from, to, why.
     NO_PATH = "NO_PATH"
+    # No revision of the map has this tag. metadata: map, tag.
     TAG_UNKNOWN = "TAG_UNKNOWN"
-    # metadata: why.
+    # Two maps have too little in common to find the transform between them. metadata: why.
     NO_REGISTRATION = "NO_REGISTRATION"
-    # OUT_OF_RANGE. metadata: first_ns, last_ns; or oldest, newest.
+    # The agent has no pose at that time. metadata: first_ns, last_ns of its track.
     TIME_OUTSIDE_TRACK = "TIME_OUTSIDE_TRACK"
+    # The map has no such revision yet. metadata: map, oldest, newest.
     REVISION_IN_FUTURE = "REVISION_IN_FUTURE"
+    # The revision has been compacted away. metadata: map, oldest, newest.
     REVISION_COMPACTED = "REVISION_COMPACTED"
+    # A time is more years from the epoch of the map than a map can hold: check the clock. metadata:
+    # map, time_ns.
     TIME_OUTSIDE_MAP = "TIME_OUTSIDE_MAP"
-    # ALREADY_EXISTS. metadata: map; or agent, time_ns.
+    # The store has a map of this name. metadata: map.
     MAP_EXISTS = "MAP_EXISTS"
+    # A pose is not later than the stored end of its track: send a correction to change the past.
+    # metadata: agent, time_ns.
     TRACK_CONFLICT = "TRACK_CONFLICT"
     # A different delta was committed with the same session and sequence. metadata: map, session_id,
     # sequence, revision.
     SEQUENCE_REUSED = "SEQUENCE_REUSED"
-    # FAILED_PRECONDITION.
+    # A newer build wrote the map or the file: use that one. metadata: format.
     FORMAT_TOO_NEW = "FORMAT_TOO_NEW"
+    # An older build wrote the map: run `dsg upgrade`. metadata: map, format.
     FORMAT_TOO_OLD = "FORMAT_TOO_OLD"
+    # The file or folder is no map, or no store.
     NOT_A_STORE = "NOT_A_STORE"
+    # The store is on a network file system, where a crash can corrupt it. metadata: store.
     NETWORK_FILE_SYSTEM = "NETWORK_FILE_SYSTEM"
+    # The process may not write where the map is. metadata: map.
     READ_ONLY = "READ_ONLY"
     # The policy would leave nothing in the map. metadata: map, policy.
     POLICY_MATCHES_ALL = "POLICY_MATCHES_ALL"
-    # metadata: map, other, field.
+    # Two maps have different clocks or frames. metadata: map, other, field.
     FRAMES_INCOMPATIBLE = "FRAMES_INCOMPATIBLE"
     # The policies would remove a larger share of the map than the caller allows. metadata: map,
     # policy, share, share_max.
     POLICY_TAKES_TOO_MUCH = "POLICY_TAKES_TOO_MUCH"
-    # ABORTED: read the head revision again, then retry.
+    # Another commit came in between.
     PARENT_REVISION_STALE = "PARENT_REVISION_STALE"
+    # Deltas of the session are missing before this one: send them first. metadata: map, session_id,
+    # last_sequence.
     SEQUENCE_GAP = "SEQUENCE_GAP"
     # The map's file was replaced during a watch: start a new watch.
     MAP_REPLACED = "MAP_REPLACED"
-    # UNAVAILABLE: retry later. metadata: holder.
+    # Another process writes the map. metadata: holder.
     WRITER_LOCKED = "WRITER_LOCKED"
+    # The server is stopping.
     SHUTTING_DOWN = "SHUTTING_DOWN"
+    # The disk failed during a commit: send the same delta again, which applies it once. metadata:
+    # map, sequence.
     COMMIT_OUTCOME_UNKNOWN = "COMMIT_OUTCOME_UNKNOWN"
-    # RESOURCE_EXHAUSTED: retry after a pause, or free space.
+    # The server is at one of its limits. metadata: retry_after_ms, if waiting helps.
     OVERLOADED = "OVERLOADED"
+    # There is no space for what the call writes, and nothing was written.
     DISK_FULL = "DISK_FULL"
+    # The request, its answer or what it needs is larger than the server allows: ask for less at
+    # once.
     LIMIT_EXCEEDED = "LIMIT_EXCEEDED"
     # The map has reached its size limit: prune it. metadata: map, quota_bytes.
     QUOTA_EXCEEDED = "QUOTA_EXCEEDED"
-    # DATA_LOSS: stored bytes differ from what was written. metadata: map, table, key.
+    # Stored bytes differ from what was written. metadata: map, table, key.
     STORE_CORRUPT = "STORE_CORRUPT"
 
 
 @dataclass(frozen=True)
 class ErrorDetail:
-    """Sent in serialized form in the trailer "dsg-error-bin", in addition to the status code and
-    message.
+    """Sent beside the status code and message: in serialized form in the trailer "dsg-error-bin",
+    and as a detail of the google.rpc.Status in the trailer "grpc-status-details-bin".
     """
 
     reason: Reason = Reason.REASON_UNSPECIFIED
     # Always "dsg".
     domain: str = ""
+    # Names and values that the error is about. A value is cut to 256 bytes, and pairs that would
+    # make all of it longer than 768 bytes are left out.
     metadata: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -113,9 +150,13 @@ class Provenance(ProtoEnum):
     """Where the information about a node came from."""
 
     PROVENANCE_UNSPECIFIED = "PROVENANCE_UNSPECIFIED"
+    # Seen by sensors.
     PROVENANCE_PERCEIVED = "PROVENANCE_PERCEIVED"
+    # Read from a scene graph that another program made.
     PROVENANCE_IMPORTED = "PROVENANCE_IMPORTED"
+    # Inferred, not seen.
     PROVENANCE_PREDICTED = "PROVENANCE_PREDICTED"
+    # Written by a person.
     PROVENANCE_MANUAL = "PROVENANCE_MANUAL"
 
 
@@ -145,6 +186,8 @@ class TrajectoryCodec(ProtoEnum):
 
 @dataclass(frozen=True)
 class Vector3(Triple):
+    """A point or a direction, in the frame that the containing field names."""
+
     x: float = 0.0
     y: float = 0.0
     z: float = 0.0
@@ -152,9 +195,12 @@ class Vector3(Triple):
 
 @dataclass(frozen=True)
 class Quaternion:
+    """A unit quaternion (Hamilton)."""
+
     x: float = 0.0
     y: float = 0.0
     z: float = 0.0
+    # The real part.
     w: float = 0.0
 
 
@@ -162,7 +208,9 @@ class Quaternion:
 class Pose:
     """A rigid transform. An unset orientation is the identity."""
 
+    # Origin of the body in the outer frame, metres. Unset = the origin.
     position: Optional[Vector3] = None
+    # Rotation from the frame of the body to the outer frame. Unset = the identity.
     orientation: Optional[Quaternion] = None
 
 
@@ -170,19 +218,27 @@ class Pose:
 class Box:
     """An axis-aligned box in the frame that the containing field names."""
 
+    # The corner with the smallest coordinates, metres.
     min: Optional[Vector3] = None
+    # The corner with the largest coordinates, metres; on each axis at least that of min.
     max: Optional[Vector3] = None
 
 
 @dataclass(frozen=True)
 class Polygon:
+    """An outline in the plane, closed from the last corner to the first."""
+
     # Corners in order; x and y in metres, interleaved: x0 y0 x1 y1 ...
     xy: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
 class Layer:
+    """A level of abstraction: all nodes of one layer."""
+
+    # Unique in the map and fixed for its life; 1 to 7 are the layers that every map begins with.
     id: int = 0
+    # Unique in the map, at most 64 bytes.
     name: str = ""
     # A higher rank is more abstract: mesh 100, objects 200, places 300, rooms 400, buildings 500.
     rank: int = 0
@@ -190,19 +246,30 @@ class Layer:
 
 @dataclass(frozen=True)
 class SemanticLabel:
+    """A semantic class of the map."""
+
+    # Unique in the map; the labels of mesh vertices refer to it.
     id: int = 0
+    # What people call the class: "mug"; at most 1024 bytes.
     name: str = ""
 
 
 @dataclass(frozen=True)
 class AttributeValue:
+    """The value of an attribute that the model does not know itself."""
+
+    # Finite; the unit is told by the name of the attribute.
     number: Optional[float] = None
+    # UTF-8, at most 64 KiB.
     text: Optional[str] = None
+    # Compared as a flag, and never as a number.
     flag: Optional[bool] = None
 
 
 @dataclass(frozen=True)
 class Color:
+    """A colour of an object."""
+
     # Each component 0 to 255.
     red: int = 0
     green: int = 0
@@ -212,6 +279,8 @@ class Color:
 
 @dataclass(frozen=True)
 class ObjectComponent:
+    """What only objects have."""
+
     # SHA-256 of the CAD model's asset, 32 bytes; empty while the shape is unknown.
     model_sha256: bytes = b""
     # Pose of the CAD model in the map frame; set together with model_sha256.
@@ -227,6 +296,8 @@ class ObjectComponent:
 
 @dataclass(frozen=True)
 class AgentComponent:
+    """What only agents have: people and robots, whose poses are in a track."""
+
     # SHA-256 of the body model or CAD asset, 32 bytes; may be empty.
     body_model_sha256: bytes = b""
     # Shape coefficients of the body model (10 for SMPL); may be empty.
@@ -243,20 +314,27 @@ class AgentComponent:
 
 @dataclass(frozen=True)
 class PlaceComponent:
+    """What only places have: free space that can be traversed."""
+
     # Distance to the nearest obstacle, metres.
     clearance_m: float = 0.0
     # Obstacle-free box around the place, in the node's frame.
     free_box: Optional[Box] = None
+    # Number of obstacle points that are equally near, at the clearance.
     basis_point_count: int = 0
 
 
 @dataclass(frozen=True)
 class StructureComponent:
+    """What only structures have: the fixed parts of a building."""
+
     # "wall", "floor", "ceiling" or "pillar".
     structure_type: str = ""
-    # Plane n.x + d = 0 in the map frame: unit normal n, and offset d in metres.
+    # Plane n.x + d = 0 in the map frame: its unit normal n. Zero = unknown.
     plane_normal: Optional[Vector3] = None
+    # Offset d of that plane, metres.
     plane_offset_m: float = 0.0
+    # Mesh vertices with this instance id belong to the structure. 0 = none.
     mesh_instance_id: int = 0
 
 
@@ -266,28 +344,38 @@ class RegionComponent:
 
     # Outline on the floor, in the map frame.
     footprint: Optional[Polygon] = None
-    # Floor and ceiling heights in the map frame, metres.
+    # Height of the floor in the map frame, metres.
     z_min_m: float = 0.0
+    # Height of the ceiling in the map frame, metres.
     z_max_m: float = 0.0
+    # Probability, 0 to 1, of each class that the region may be of, by name.
     class_probabilities: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Node:
+    """An entity of the world in one layer, with what the map knows of it."""
+
+    # A letter and a number: "O42". Stable for the life of the map and never reused.
     id: str = ""
     # Name of the layer.
     layer: str = ""
     # "object", "human", "robot", "place", "structure", "room", "building" or a custom name.
     kind: str = ""
+    # What people call it, at most 1024 bytes; may be empty, and several nodes may have the same.
     name: str = ""
+    # Unset = no class.
     semantic_class: Optional[SemanticLabel] = None
+    # Pose of the node in the map frame; of an agent, its last one or that at the time asked for.
     map_T_node: Optional[Pose] = None
     # Axis-aligned in the node's frame; unset if the node has no extent.
     bounding_box: Optional[Box] = None
     # When the node existed in the world. An unset end is open.
     valid_from_ns: Optional[int] = None
     valid_to_ns: Optional[int] = None
+    # World time of the first observation. Unset = unknown.
     first_observed_ns: Optional[int] = None
+    # World time of the last observation. Unset = unknown.
     last_observed_ns: Optional[int] = None
     observation_count: int = 0
     # 0 to 1; unset = not estimated.
@@ -307,6 +395,8 @@ class Node:
 
 @dataclass(frozen=True)
 class Edge:
+    """A relation from one node to another; the three names together are its identity."""
+
     source: str = ""
     # CONTAINS, TRAVERSABLE, ADJACENT, NEAREST_PLACE, ON, IN, NEAR, CO_VISIBLE, LARGER_THAN,
     # ATTACHED_TO, ENCLOSES, SAME_AS, HELD_BY or a custom name.
@@ -325,6 +415,8 @@ class Edge:
 
 @dataclass(frozen=True)
 class TimedPose:
+    """A pose of an agent at one time."""
+
     time_ns: int = 0
     pose: Optional[Pose] = None
     # Bit flags: 1 = the source gave no orientation; 2 = corrected by a later estimate; 4 =
@@ -337,6 +429,8 @@ class TimedPose:
 
 @dataclass(frozen=True)
 class TrajectoryAppend:
+    """New poses at the end of an agent's track."""
+
     agent: str = ""
     # Strictly ascending in time and later than every stored pose of the agent.
     poses: tuple[TimedPose, ...] = ()
@@ -361,7 +455,9 @@ class PoseFactor:
     # "odometry", "zero_velocity", "motion", "detection_prior", "loop_closure" or
     # "loop_closure_rejected" (measured but rejected: not used for the trajectory).
     type: str = ""
+    # World time of the pose that it begins at.
     from_time_ns: int = 0
+    # World time of the pose that it ends at.
     to_time_ns: int = 0
     # The other agent of an inter-robot factor. Empty = the same agent.
     to_agent: str = ""
@@ -375,6 +471,8 @@ class PoseFactor:
 
 @dataclass(frozen=True)
 class FactorAppend:
+    """New factors of an agent."""
+
     agent: str = ""
     factors: tuple[PoseFactor, ...] = ()
 
@@ -415,8 +513,11 @@ class Stay:
     """An interval during which an agent was in one place and one room."""
 
     agent: str = ""
+    # Node id; may be empty.
     place: str = ""
+    # Node id; may be empty.
     room: str = ""
+    # World time from which the agent is there; with the agent, the identity of the stay.
     enter_ns: int = 0
     # The largest int64 until the agent has been observed to leave.
     exit_ns: int = 0
@@ -424,18 +525,30 @@ class Stay:
 
 @dataclass(frozen=True)
 class MeshBlock:
-    # Index of the block, which covers [index, index + 1) times the map's block size on each axis.
+    """The part of the mesh in one cube of the map. A face belongs to the block of its first vertex;
+    vertices that it shares with neighbours are in both. Lists by vertex are as long as that of the
+    positions, or empty.
+    """
+
+    # Index of the block on this axis, which covers [index, index + 1) times the block size of the
+    # map.
     x: int = 0
     y: int = 0
     z: int = 0
     # x y z interleaved, map frame, metres.
     positions: tuple[float, ...] = ()
+    # x y z interleaved, map frame, unit vectors, one per vertex, or none.
     normals: tuple[float, ...] = ()
     # 0xRRGGBB, one per vertex, or none.
     colors: tuple[int, ...] = ()
+    # SemanticLabel.id, one per vertex, or none.
     labels: tuple[int, ...] = ()
+    # ObjectComponent.mesh_instance_id or that of a structure, one per vertex, or none. 0 = no
+    # instance.
     instance_ids: tuple[int, ...] = ()
+    # World time of the first observation of each vertex, or none.
     first_seen_ns: tuple[int, ...] = ()
+    # World time of the last observation of each vertex, or none.
     last_seen_ns: tuple[int, ...] = ()
     # Indices of vertices in this block, three per face.
     faces: tuple[int, ...] = ()
@@ -443,6 +556,8 @@ class MeshBlock:
 
 @dataclass(frozen=True)
 class MeshBlockIndex:
+    """Names a block; see MeshBlock.x."""
+
     x: int = 0
     y: int = 0
     z: int = 0
@@ -450,15 +565,21 @@ class MeshBlockIndex:
 
 @dataclass(frozen=True)
 class Asset:
+    """A file that the map refers to by its hash: a CAD model, a body model, a topology."""
+
     # SHA-256 of content, 32 bytes; the store verifies it.
     sha256: bytes = b""
     # "model/ply", "model/obj", "application/x-topology", ...
     media_type: str = ""
+    # The bytes of the file.
     content: bytes = b""
 
 
 @dataclass(frozen=True)
 class Retirement:
+    """The end of a node, of its edges and of its stays."""
+
+    # The node that ends.
     id: str = ""
     # When the node left the world. Unset: the node never existed, and its row ends with this
     # revision.
@@ -467,6 +588,8 @@ class Retirement:
 
 @dataclass(frozen=True)
 class EdgeKey:
+    """Names an edge."""
+
     source: str = ""
     relation: str = ""
     target: str = ""
@@ -483,7 +606,10 @@ class TrackSpan:
 
 @dataclass(frozen=True)
 class StayKey:
+    """Names a stay."""
+
     agent: str = ""
+    # See Stay.enter_ns.
     enter_ns: int = 0
 
 
@@ -500,6 +626,7 @@ class GraphDelta:
     # If set, the commit fails with ABORTED unless this is the newest revision.
     parent_revision: Optional[int] = None
     author: str = ""
+    # One line about the change, at most 64 KiB; in the record of the revision.
     message: str = ""
     config_digest: str = ""
     layers: tuple[Layer, ...] = ()
@@ -513,6 +640,7 @@ class GraphDelta:
     nodes: tuple[Node, ...] = ()
     retirements: tuple[Retirement, ...] = ()
     edges: tuple[Edge, ...] = ()
+    # Ends these edges with this revision.
     edge_removals: tuple[EdgeKey, ...] = ()
     appends: tuple[TrajectoryAppend, ...] = ()
     corrections: tuple[TrajectoryCorrection, ...] = ()
@@ -521,6 +649,7 @@ class GraphDelta:
     # To close an open stay, commit it again with the same agent and enter_ns.
     stays: tuple[Stay, ...] = ()
     mesh_blocks: tuple[MeshBlock, ...] = ()
+    # Removes these blocks from this revision on.
     mesh_removals: tuple[MeshBlockIndex, ...] = ()
     assets: tuple[Asset, ...] = ()
     # Removes the agent's factors with an end in the span. Applied before `factors`.
@@ -536,6 +665,8 @@ class GraphDelta:
 
 @dataclass(frozen=True)
 class MapSpec:
+    """What a map is created with, fixed for its life."""
+
     # [a-z0-9][a-z0-9_-]{0,63}
     name: str = ""
     # Name of the frame of all poses in the map.
@@ -552,10 +683,14 @@ class MapSpec:
 
 @dataclass(frozen=True)
 class Revision:
+    """The record of one commit."""
+
+    # From 1, without gaps.
     revision: int = 0
     # Time of the commit on the writer's wall clock, nanoseconds since 1970 UTC.
     committed_ns: int = 0
     author: str = ""
+    # See GraphDelta.message.
     message: str = ""
     session_id: str = ""
     sequence: int = 0
@@ -589,8 +724,9 @@ class GetSessionRequest:
 
 @dataclass(frozen=True)
 class GetSessionResponse:
-    # 0 = unknown session.
+    # The sequence of its last delta, so that the next one has one more. 0 = unknown session.
     last_sequence: int = 0
+    # The revision of that delta.
     last_revision: int = 0
     # The revision of the session's first delta; everything in earlier revisions is older than the
     # session.
@@ -618,6 +754,7 @@ class NodeView(ProtoEnum):
     NODE_VIEW_BASIC = "NODE_VIEW_BASIC"
     # BASIC, and pose and box.
     NODE_VIEW_GEOMETRY = "NODE_VIEW_GEOMETRY"
+    # All fields.
     NODE_VIEW_FULL = "NODE_VIEW_FULL"
 
 
@@ -637,10 +774,13 @@ class ReadAt:
 
 @dataclass(frozen=True)
 class ResponseHeader:
+    """Which state of the map an answer is about."""
+
     # The revision that the answer was read from.
     read_revision: int = 0
-    # The newest and the oldest readable revision.
+    # The newest revision.
     head_revision: int = 0
+    # The oldest revision that can be read.
     oldest_revision: int = 0
     # Identifies the instance of the map. It changes when the map is restored or created anew;
     # revisions, ids and page tokens of an earlier incarnation are then invalid. Opaque.
@@ -649,8 +789,11 @@ class ResponseHeader:
 
 @dataclass(frozen=True)
 class NodeFilter:
-    # Empty = any.
+    """Which nodes to take; all conditions that are set must hold."""
+
+    # Name of the layer. Empty = any.
     layer: str = ""
+    # Kind of the node, see Node.kind. Empty = any.
     kind: str = ""
     class_name: str = ""
     # Only children of this node by CONTAINS.
@@ -661,11 +804,13 @@ class NodeFilter:
     # and last pose, with their pose at that time; in a gap of the track they are listed without a
     # pose, and match no box and no distance.
     at_ns: Optional[int] = None
-    # Exact name.
+    # Exact name. Empty = any.
     name: str = ""
 
 
 class PruneStrength(ProtoEnum):
+    """How much of what a policy matches is removed."""
+
     # Same as RETIRE.
     PRUNE_STRENGTH_UNSPECIFIED = "PRUNE_STRENGTH_UNSPECIFIED"
     # New revisions do not contain the data; older revisions still do.
@@ -751,6 +896,9 @@ class Amount:
 
 @dataclass(frozen=True)
 class PolicyReport:
+    """What one policy of a prune takes."""
+
+    # PrunePolicy.name.
     name: str = ""
     # What the policy matched.
     matched: Optional[Amount] = None
@@ -761,6 +909,7 @@ class PruneResponse:
     header: Optional[ResponseHeader] = None
     # One per policy, in order; complete in the first message.
     policies: tuple[PolicyReport, ...] = ()
+    # What the map held before the call; in the first message.
     map_before: Optional[Amount] = None
     # 0 to 1.
     progress: float = 0.0
@@ -768,23 +917,27 @@ class PruneResponse:
     revision: int = 0
     # Set with `done`.
     map_after: Optional[Amount] = None
-    # All space that the map takes on disk, bytes.
+    # With `done`: all space that the map took on disk before the call, bytes.
     file_bytes_before: int = 0
+    # With `done`: the same after the call.
     file_bytes_after: int = 0
     # With ERASE: false if data is left, of this erasure or of an earlier one that was interrupted,
     # or if a reader kept the log from being truncated; call again.
     erased: bool = False
     done: bool = False
-    # The part of `file_bytes_before` and `file_bytes_after` that the store reuses, such as a log.
+    # The part of `file_bytes_before` that the store reuses, such as a log, bytes.
     log_bytes_before: int = 0
+    # That part of `file_bytes_after`.
     log_bytes_after: int = 0
-    # With ERASE: agents and mesh blocks (x,y,z) that other clients kept writing or correcting
-    # meanwhile, so that some of their data is left. The first 20 are named.
+    # With ERASE: number of agents and mesh blocks that other clients kept writing or correcting
+    # meanwhile, so that some of their data is left.
     left_count: int = 0
+    # The first 20 of them: node ids, and blocks as x,y,z.
     left_ids: tuple[str, ...] = ()
-    # With ERASE: nodes that other clients wrote again meanwhile. Their history is erased, but they
-    # exist in the newest revision. The first 20 are named.
+    # With ERASE: number of nodes that other clients wrote again meanwhile. Their history is erased,
+    # but they exist in the newest revision.
     rewritten_count: int = 0
+    # The first 20 of them.
     rewritten_ids: tuple[str, ...] = ()
     # With `dry_run`: why the run would be refused. Empty = it would not.
     refusal: str = ""
@@ -806,10 +959,15 @@ class CompactRequest:
 @dataclass(frozen=True)
 class CompactResponse:
     progress: float = 0.0
+    # The oldest revision that can be read now.
     oldest_revision: int = 0
+    # Number of revisions that the call made unreadable.
     revision_count: int = 0
+    # Number of rows that no readable revision shows, and that are deleted.
     row_count: int = 0
+    # All space that the map took on disk before the call, bytes.
     file_bytes_before: int = 0
+    # The same after the call.
     file_bytes_after: int = 0
     # False if a reader kept the file from shrinking; it shrinks later.
     shrunk: bool = False
@@ -819,7 +977,9 @@ class CompactResponse:
 @dataclass(frozen=True)
 class RevertRequest:
     map: str = ""
+    # The number of the revision.
     revision: Optional[int] = None
+    # A tag of the revision; see SetTag.
     tag: Optional[str] = None
     author: str = ""
     dry_run: bool = False
@@ -830,8 +990,9 @@ class RevertResponse:
     progress: float = 0.0
     # The newest revision written. 0 = there was nothing to do.
     revision: int = 0
-    # Rows that are written back, and rows that are removed. A changed row counts as written.
+    # Rows that are written back. A changed row counts among these.
     added: Optional[Amount] = None
+    # Rows that are removed.
     removed: Optional[Amount] = None
     done: bool = False
 
@@ -851,10 +1012,11 @@ class MergeMapsRequest:
 @dataclass(frozen=True)
 class MergeMapsResponse:
     progress: float = 0.0
+    # The transform that is used: that of the request, or the estimated one.
     map_t_other: Optional[Pose] = None
-    # Root mean square distance of fused objects, metres, and how many objects agree with the
-    # transform.
+    # Root mean square distance of fused objects, metres.
     residual_m: float = 0.0
+    # Number of objects that agree with the transform.
     agreeing_count: int = 0
     fused_object_count: int = 0
     fused_place_count: int = 0
@@ -863,32 +1025,43 @@ class MergeMapsResponse:
     added_node_count: int = 0
     # Objects of `map` at positions where `other` later saw free space.
     gone_count: int = 0
+    # The newest revision that the merge wrote. 0 = none yet.
     revision: int = 0
     # The node ids of `other` and their ids in `map`: in the last messages, thousands in each, when
     # everything is written; at once in a dry run.
     node_ids: Mapping[str, str] = field(default_factory=dict)
     done: bool = False
-    # With `done`: the ids of removed nodes, and the new ids of nodes that moved.
+    # With `done`: nodes that the merge removed.
     gone_ids: tuple[str, ...] = ()
+    # With `done`: the new ids of nodes that moved, by their old ids.
     moved_ids: Mapping[str, str] = field(default_factory=dict)
     fused_structure_count: int = 0
-    # Evidence against the transform: objects of either map that the other one observed to be
-    # missing, and the share of places near walls of the other map that lie inside a wall.
+    # Evidence against the transform: number of objects of either map that the other one observed to
+    # be missing.
     missing_count: int = 0
+    # Evidence against the transform: share, 0 to 1, of the places near walls of the other map that
+    # lie inside a wall.
     blocked_share: float = 0.0
 
 
 @dataclass(frozen=True)
 class Tag:
+    """A name of a revision, which keeps it readable when its neighbours are compacted."""
+
+    # 1 to 64 letters, digits, '.', '_' and '-', not digits alone.
     name: str = ""
+    # The revision that is named.
     revision: int = 0
+    # When the tag was set, by the server's wall clock, nanoseconds since 1970 UTC.
     created_ns: int = 0
+    # Free text, at most 1000 bytes; may be empty.
     note: str = ""
 
 
 @dataclass(frozen=True)
 class SetTagRequest:
     map: str = ""
+    # See Tag.name.
     name: str = ""
     # Unset = the newest revision.
     revision: Optional[int] = None
@@ -904,6 +1077,7 @@ class SetTagResponse:
 @dataclass(frozen=True)
 class RemoveTagRequest:
     map: str = ""
+    # See Tag.name.
     name: str = ""
 
 
@@ -954,6 +1128,7 @@ class DropMapResponse:
 @dataclass(frozen=True)
 class RenameMapRequest:
     map: str = ""
+    # As MapSpec.name; no map of the store has it.
     new_name: str = ""
 
 
@@ -964,9 +1139,14 @@ class RenameMapResponse:
 
 
 class ChangeType(ProtoEnum):
+    """What happened to an entity between two revisions."""
+
     CHANGE_TYPE_UNSPECIFIED = "CHANGE_TYPE_UNSPECIFIED"
+    # Only "after" has it.
     ADDED = "ADDED"
+    # Only "before" has it.
     REMOVED = "REMOVED"
+    # Both have it, with different content.
     CHANGED = "CHANGED"
 
 
@@ -1003,7 +1183,11 @@ class GetMapStatsRequest:
 
 @dataclass(frozen=True)
 class LayerStats:
+    """The size of one layer."""
+
+    # Layer.name.
     name: str = ""
+    # Layer.rank.
     rank: int = 0
     node_count: int = 0
 
@@ -1023,6 +1207,7 @@ class PendingErasure:
 class GetMapStatsResponse:
     header: Optional[ResponseHeader] = None
     map: Optional[MapSpec] = None
+    # The newest revision of the map.
     head_revision: int = 0
     # Ascending by rank, then name.
     layers: tuple[LayerStats, ...] = ()
@@ -1034,9 +1219,11 @@ class GetMapStatsResponse:
     mesh_block_count: int = 0
     # Space that the map takes on disk, bytes; 0 for a store in memory.
     bytes_on_disk: int = 0
-    # Time span of all trajectories; unset if there are none.
+    # World time of the earliest pose of all tracks. Unset if there are none.
     first_pose_ns: Optional[int] = None
+    # World time of the latest pose of all tracks. Unset if there are none.
     last_pose_ns: Optional[int] = None
+    # The store format of the map on disk.
     format_version: int = 0
     # What an interrupted erasure still has to remove; unset = none is pending. Repeat the same
     # prune to finish it.
@@ -1065,7 +1252,9 @@ class GetServerInfoRequest:
 
 @dataclass(frozen=True)
 class GetServerInfoResponse:
+    # What `dsg-server --version` prints.
     version: str = ""
+    # The store format that the server writes, and the newest one that it reads.
     store_format_version: int = 0
 
 
@@ -1087,6 +1276,8 @@ class DiffRevisionsRequest:
 
 @dataclass(frozen=True)
 class NodeChange:
+    """A node that differs."""
+
     type: ChangeType = ChangeType.CHANGE_TYPE_UNSPECIFIED
     # Unset if type is ADDED.
     before: Optional[Node] = None
@@ -1096,17 +1287,27 @@ class NodeChange:
 
 @dataclass(frozen=True)
 class EdgeChange:
+    """An edge that differs."""
+
     type: ChangeType = ChangeType.CHANGE_TYPE_UNSPECIFIED
+    # Unset if type is ADDED.
     before: Optional[Edge] = None
+    # Unset if type is REMOVED.
     after: Optional[Edge] = None
 
 
 @dataclass(frozen=True)
 class TrackChange:
+    """A track that differs."""
+
     agent_id: str = ""
+    # Number of poses in "before".
     pose_count_before: int = 0
+    # Number of poses in "after".
     pose_count_after: int = 0
+    # World time of the last pose in "before". 0 without poses.
     last_pose_ns_before: int = 0
+    # World time of the last pose in "after". 0 without poses.
     last_pose_ns_after: int = 0
     # Poses of the earlier revision are changed or missing in the later one.
     corrected: bool = False
@@ -1114,7 +1315,10 @@ class TrackChange:
 
 @dataclass(frozen=True)
 class MeshChange:
+    """A mesh block that differs."""
+
     type: ChangeType = ChangeType.CHANGE_TYPE_UNSPECIFIED
+    # The block.
     index: Optional[MeshBlockIndex] = None
 
 
@@ -1122,7 +1326,9 @@ class MeshChange:
 class DiffRevisionsResponse:
     # read_revision is the later of the two revisions.
     header: Optional[ResponseHeader] = None
+    # "Before".
     from_revision: int = 0
+    # "After"; that of the request, or the newest revision.
     to_revision: int = 0
     # Ascending by id.
     nodes: tuple[NodeChange, ...] = ()
@@ -1163,6 +1369,8 @@ class WatchMapResponse:
 
 
 class InteractionType(ProtoEnum):
+    """What happened to an object."""
+
     INTERACTION_TYPE_UNSPECIFIED = "INTERACTION_TYPE_UNSPECIFIED"
     # The object was removed from where it was.
     PICKED = "PICKED"
@@ -1197,7 +1405,9 @@ class ListEncountersRequest:
 
 @dataclass(frozen=True)
 class Encounter:
-    # agent_id < other_agent_id.
+    """An interval in which two agents were near each other."""
+
+    # Of the two ids, the lower one.
     agent_id: str = ""
     agent_name: str = ""
     other_agent_id: str = ""
@@ -1208,7 +1418,9 @@ class Encounter:
     # is the one while in sight.
     from_ns: int = 0
     to_ns: int = 0
+    # Least distance between the positions of the two, metres.
     distance_m_min: float = 0.0
+    # World time of the least distance.
     closest_at_ns: int = 0
     # Midpoint of the two positions at closest_at_ns, map frame.
     position: Optional[Vector3] = None
@@ -1233,6 +1445,7 @@ class ListInteractionsRequest:
     read_at: Optional[ReadAt] = None
     # Empty = any agent.
     agent: str = ""
+    # Only this object, by node id or unique name. Empty = any.
     object: str = ""
     class_name: str = ""
     # A room, or a node of a higher layer: only objects below it when they were picked or placed.
@@ -1269,10 +1482,13 @@ class Evidence:
 
 @dataclass(frozen=True)
 class InteractionCandidate:
-    # Empty if `alternative` is set. The alternatives are "unseen" (an agent that nobody observed)
-    # and "false_change" (nothing happened).
+    """Who or what may explain a change of an object."""
+
+    # Empty if `alternative` is set.
     agent_id: str = ""
     agent_name: str = ""
+    # An explanation without an agent of the map: "unseen" (an agent that nobody observed) or
+    # "false_change" (nothing happened). Empty if `agent_id` is set.
     alternative: str = ""
     probability: float = 0.0
     # Most likely time according to the evidence.
@@ -1282,20 +1498,23 @@ class InteractionCandidate:
 
 @dataclass(frozen=True)
 class Interaction:
+    """An object was picked or placed."""
+
     type: InteractionType = InteractionType.INTERACTION_TYPE_UNSPECIFIED
     object_id: str = ""
     object_name: str = ""
     class_name: str = ""
     room_id: str = ""
-    # The interaction happened between the last time that the object was seen in its earlier state
-    # and the first time that it was seen in its later state.
+    # The last time before the change that the object was seen in its earlier state.
     earliest_ns: int = 0
+    # The first time after it that the object was seen in its later state.
     latest_ns: int = 0
     # Descending probability, then id. The probabilities of all candidates, including those not
     # listed, sum to 1.
     candidates: tuple[InteractionCandidate, ...] = ()
     # The evidence names no agent; `reason` says why.
     abstained: bool = False
+    # Why no agent is named, one sentence. Empty unless `abstained`.
     reason: str = ""
 
 
@@ -1310,13 +1529,21 @@ class ListInteractionsResponse:
 
 
 class Comparison(ProtoEnum):
+    """How an attribute is compared with a value."""
+
     # = EQUAL
     COMPARISON_UNSPECIFIED = "COMPARISON_UNSPECIFIED"
+    # The attribute is the value.
     EQUAL = "EQUAL"
+    # The attribute exists and is another value.
     NOT_EQUAL = "NOT_EQUAL"
+    # The attribute is below the value.
     LESS = "LESS"
+    # The attribute is at most the value.
     LESS_OR_EQUAL = "LESS_OR_EQUAL"
+    # The attribute is above the value.
     GREATER = "GREATER"
+    # The attribute is at least the value.
     GREATER_OR_EQUAL = "GREATER_OR_EQUAL"
     # The attribute exists, with any value.
     EXISTS = "EXISTS"
@@ -1328,6 +1555,7 @@ class NodePattern:
 
     # "object", "human", "place", "room", ... or a custom kind.
     kind: str = ""
+    # Name of the layer.
     layer: str = ""
     # Name of the semantic class; case is ignored.
     class_name: str = ""
@@ -1359,6 +1587,7 @@ class Alternatives:
 class AttributeCondition:
     """A node without the attribute, or with a value of another type, fails every comparison."""
 
+    # Name of the attribute, as in Node.attributes.
     name: str = ""
     comparison: Comparison = Comparison.COMPARISON_UNSPECIFIED
     # Numbers compare as numbers and text by its bytes; flags support only EQUAL and NOT_EQUAL.
@@ -1373,6 +1602,7 @@ class RelationCondition:
     # hierarchy at any depth. IN matches an edge IN as well as INSIDE. Agents are INSIDE the place
     # and the room of their stays (ListPresence), and what is above these, while they stay.
     relation: str = ""
+    # The node at the other end.
     other: Optional[NodePattern] = None
     # The edge points from the other node to this one. No effect for ADJACENT, NEAR, CO_VISIBLE,
     # SAME_AS and TRAVERSABLE, which are symmetric: their edges are stored once, in a direction that
@@ -1411,6 +1641,8 @@ class SearchNodesRequest:
 
 @dataclass(frozen=True)
 class SearchHit:
+    """A node that matches."""
+
     node: Optional[Node] = None
     # Set if the request has `near`.
     distance_m: Optional[float] = None
@@ -1428,6 +1660,7 @@ class SearchStep:
 
     # "class index", "name index", "children", "box", "nearest", "filter", "join", ...
     operation: str = ""
+    # What the step worked on, in words.
     detail: str = ""
     # Number of input and output nodes; the input is an estimate if the step did not run to its end.
     in_count: int = 0
@@ -1448,6 +1681,8 @@ class SearchNodesResponse:
 
 
 class PlanMode(ProtoEnum):
+    """How a path is searched for."""
+
     # = HIERARCHICAL
     PLAN_MODE_UNSPECIFIED = "PLAN_MODE_UNSPECIFIED"
     # Plans over rooms first and then over the places of rooms that can lead to the goal, guided by
@@ -1458,6 +1693,8 @@ class PlanMode(ProtoEnum):
 
 
 class PredictionModel(ProtoEnum):
+    """How the future of an agent is estimated."""
+
     # = GOALS
     PREDICTION_MODEL_UNSPECIFIED = "PREDICTION_MODEL_UNSPECIFIED"
     # Follows the places to likely goals of people; WEIGHTED_VELOCITY if the map has no places.
@@ -1488,7 +1725,9 @@ class PathEnd:
 class PlanPathRequest:
     map: str = ""
     read_at: Optional[ReadAt] = None
+    # Where the path begins.
     from_: Optional[PathEnd] = None
+    # Where the path ends.
     to: Optional[PathEnd] = None
     # Places and links with less clearance are not used. 0 = a point.
     robot_radius_m: float = 0.0
@@ -1512,11 +1751,13 @@ class PlanPathResponse:
     # From start to end, map frame, metres: the requested positions and the places between them.
     # Within the free space of a single place, the straight line between the positions.
     polyline: tuple[Vector3, ...] = ()
+    # Length of the polyline, metres.
     length_m: float = 0.0
     # Smallest clearance of places and links on the path, metres.
     clearance_m_min: float = 0.0
-    # The requested node, or the node chosen for `nearest`; empty for positions.
+    # The requested node at the start, or the node chosen for `nearest`; empty for a position.
     from_node_id: str = ""
+    # The same at the end.
     to_node_id: str = ""
     # Set if requested: the first contact.
     collision: Optional[CollisionResult] = None
@@ -1528,17 +1769,22 @@ class PlanPathResponse:
 
 @dataclass(frozen=True)
 class PlanPathsRequest:
-    # These replace `map` and `read_at` of each path. At most 1000 paths.
+    # The map of all paths, instead of their own `map`.
     map: str = ""
+    # The revision for all paths, instead of their own `read_at`.
     read_at: Optional[ReadAt] = None
+    # At most 1000.
     paths: tuple[PlanPathRequest, ...] = ()
 
 
 @dataclass(frozen=True)
 class PlanPathResult:
+    """The answer to one path, or its error."""
+
     # 0 = answered; otherwise the gRPC status code of this path.
     status_code: int = 0
     status_message: str = ""
+    # Unset if the path has an error.
     path: Optional[PlanPathResponse] = None
 
 
@@ -1551,17 +1797,25 @@ class PlanPathsResponse:
 
 @dataclass(frozen=True)
 class Sphere:
+    """A sphere around the pose."""
+
+    # Metres, above 0.
     radius_m: float = 0.0
 
 
 @dataclass(frozen=True)
 class Cuboid:
+    """A box that turns with the pose."""
+
     # Edge lengths, metres; the centre is at the pose.
     size: Optional[Vector3] = None
 
 
 @dataclass(frozen=True)
 class Capsule:
+    """A cylinder with half spheres at its ends."""
+
+    # Of the cylinder and the half spheres, metres, above 0.
     radius_m: float = 0.0
     # Length of the axis between the centres of both half spheres, along z of the pose.
     length_m: float = 0.0
@@ -1575,11 +1829,14 @@ class TriangleMesh:
 
     # x y z interleaved, metres, in the frame of the body.
     vertices: tuple[float, ...] = ()
+    # Indices of vertices, three per face.
     faces: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
 class CollisionBody:
+    """A shape that stands or moves."""
+
     sphere: Optional[Sphere] = None
     cuboid: Optional[Cuboid] = None
     capsule: Optional[Capsule] = None
@@ -1643,6 +1900,7 @@ class CollisionResult:
     by up to 5 mm or 5 %, whichever is more.
     """
 
+    # The body comes as near to an obstacle as the margin.
     hit: bool = False
     # Smallest distance to an obstacle on the whole path, or at the first hit, metres; at most
     # clearance_m_max; 0 if touching.
@@ -1691,6 +1949,8 @@ class PredictAgentRequest:
 
 @dataclass(frozen=True)
 class PredictedPose:
+    """Where an agent is expected at one time."""
+
     time_ns: int = 0
     # Map frame, metres.
     position: Optional[Vector3] = None
@@ -1700,6 +1960,8 @@ class PredictedPose:
 
 @dataclass(frozen=True)
 class PredictedPath:
+    """One way on which an agent may go."""
+
     probability: float = 0.0
     # The node that the path leads to; empty for the velocity models.
     goal_node_id: str = ""
@@ -1726,7 +1988,9 @@ class ShapePart(ProtoEnum):
     SHAPE_PART_UNSPECIFIED = "SHAPE_PART_UNSPECIFIED"
     # Pose and shape coefficients.
     SHAPE_PART_COEFFICIENTS = "SHAPE_PART_COEFFICIENTS"
+    # Positions of the joints.
     SHAPE_PART_JOINTS = "SHAPE_PART_JOINTS"
+    # Positions of the vertices.
     SHAPE_PART_VERTICES = "SHAPE_PART_VERTICES"
     # The assets with the faces between the vertices.
     SHAPE_PART_TOPOLOGY = "SHAPE_PART_TOPOLOGY"
@@ -1738,6 +2002,7 @@ class LocateAgentRequest:
     read_at: Optional[ReadAt] = None
     # A node id ("H12") or the name that the log gave ("12").
     agent: str = ""
+    # World time of the pose.
     at_ns: int = 0
 
 
@@ -1746,12 +2011,14 @@ class LocateAgentResponse(Located):
     header: Optional[ResponseHeader] = None
     agent_id: str = ""
     agent_name: str = ""
+    # That of the request.
     at_ns: int = 0
     # map_T_agent. Unset if quality is IN_GAP.
     pose: Optional[Pose] = None
     quality: PoseQuality = PoseQuality.POSE_QUALITY_UNSPECIFIED
-    # Times of the stored poses before and after; equal if EXACT.
+    # World time of the stored pose at or before at_ns.
     before_ns: int = 0
+    # World time of the stored pose at or after at_ns; equal to before_ns if EXACT.
     after_ns: int = 0
     # Place, room and building of the agent at that time; empty if unknown.
     place_id: str = ""
@@ -1768,7 +2035,10 @@ class LocateAgentResponse(Located):
 
 @dataclass(frozen=True)
 class AgentInstant:
+    """One question of a batch: where an agent is at a time."""
+
     agent: str = ""
+    # World time of the pose.
     at_ns: int = 0
 
 
@@ -1782,6 +2052,8 @@ class BatchLocateAgentsRequest:
 
 @dataclass(frozen=True)
 class LocateResult:
+    """The answer to one of them, or its error; see LocateAgentResponse."""
+
     # 0 = answered; otherwise the gRPC status code of this pair.
     status_code: int = 0
     status_message: str = ""
@@ -1837,10 +2109,13 @@ class ListPresenceRequest:
 
 @dataclass(frozen=True)
 class PresenceInterval:
+    """An interval in which one agent was there without a break."""
+
     agent_id: str = ""
     agent_name: str = ""
-    # Clipped to the requested interval.
+    # World time from which it is there, clipped to the requested interval.
     enter_ns: int = 0
+    # World time from which it is there no more, clipped likewise.
     exit_ns: int = 0
     # The room or place of the stay; empty for a box.
     node_id: str = ""
@@ -1873,8 +2148,9 @@ class GetNodeResponse:
     # The node's ancestors in the hierarchy, nearest first.
     ancestor_ids: tuple[str, ...] = ()
     child_count: int = 0
-    # For agents: the time span and number of poses of the track.
+    # For agents: world time of the first pose of the track.
     first_pose_ns: int = 0
+    # For agents: world time of the last pose of the track.
     last_pose_ns: int = 0
     pose_count: int = 0
 
@@ -1900,10 +2176,13 @@ class ListNodesResponse:
 class ListEdgesRequest:
     map: str = ""
     read_at: Optional[ReadAt] = None
-    # Empty = any.
+    # Only edges from this node, by id or unique name. Empty = any.
     source: str = ""
+    # Only edges of this relation. Empty = any.
     relation: str = ""
+    # Only edges to this node, by id or unique name. Empty = any.
     target: str = ""
+    # Only edges that are valid at this world time. Unset = at any.
     at_ns: Optional[int] = None
     page_size: int = 0
     page_token: str = ""
@@ -1934,6 +2213,8 @@ class ListNearestNodesRequest:
 
 @dataclass(frozen=True)
 class NearestNode:
+    """A node with its distance."""
+
     node: Optional[Node] = None
     # Distance from the point to the node's box (to its position if it has none); 0 inside. Metres.
     distance_m: float = 0.0
@@ -1981,6 +2262,8 @@ class GetAgentShapeRequest:
 
 @dataclass(frozen=True)
 class AgentShape:
+    """One shape of an agent's body, and where the agent was."""
+
     # Vertices and joints are in the frame of the agent.
     shape: Optional[BodyShape] = None
     # map_T_agent at the shape's time. Unset in a gap or outside of the track.
@@ -2048,12 +2331,15 @@ class GetAssetResponse:
 class BatchGetNodesRequest:
     map: str = ""
     read_at: Optional[ReadAt] = None
+    # At most 1000, each a node id or a name that is unique in the map.
     ids: tuple[str, ...] = ()
     view: NodeView = NodeView.NODE_VIEW_UNSPECIFIED
 
 
 @dataclass(frozen=True)
 class GetNodeResult:
+    """One node of a batch, or its error."""
+
     # 0 = found; otherwise the gRPC status code of this node.
     status_code: int = 0
     status_message: str = ""
@@ -2070,11 +2356,13 @@ class BatchGetNodesResponse:
 class GetNeighborsRequest:
     map: str = ""
     read_at: Optional[ReadAt] = None
+    # A node id, or a name that is unique in the map.
     id: str = ""
     # Empty = all.
     relations: tuple[str, ...] = ()
-    # If neither is set, both directions.
+    # Edges from the node. If neither this nor `incoming` is set, both are sent.
     outgoing: bool = False
+    # Edges to the node.
     incoming: bool = False
     # Only edges and neighbours that were valid at this time. Unset = of any time.
     at_ns: Optional[int] = None
@@ -2085,6 +2373,8 @@ class GetNeighborsRequest:
 
 @dataclass(frozen=True)
 class Neighbor:
+    """An edge of the node, with what it leads to."""
+
     edge: Optional[Edge] = None
     # The node at the other end of the edge.
     node: Optional[Node] = None
