@@ -93,6 +93,11 @@ export class Camera {
     return times(projection, view);
   }
 
+  /** How large a metre is in a picture of this height, so far in front of the camera. */
+  pixelsPerMetre(depth, height) {
+    return height / (2 * Math.tan(FIELD_OF_VIEW / 2) * depth);
+  }
+
   /** The ray through a point of the picture; x and y from -1 to 1, y up. */
   ray(x, y, aspect) {
     const {right, up, forward} = this.#axes();

@@ -33,6 +33,12 @@ export function metres(value) {
   return `${value.toFixed(2)} m`;
 }
 
+/** At most so many characters of a text; what is left out is marked. */
+export function shortened(text, most) {
+  const characters = [...text];
+  return characters.length > most ? `${characters.slice(0, most - 1).join('')}\u2026` : text;
+}
+
 /** Runs a function once the calls have stopped for a while. */
 export function debounced(run, milliseconds) {
   let timer = 0;

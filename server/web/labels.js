@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Names over the picture, on a canvas of their own: the most telling first, none over another.
 import {project} from './camera.js';
+import {shortened} from './dom.js';
 import {colorOfAgent, stepOf} from './renderer.js';
 import {GROUPS} from './scene.js';
 
 const LABELS_MAX = 80;
+/** Letters of a name on the picture. */
+export const LETTERS_MAX = 40;
 const FONT_PX = 12;
 /** Names of objects are left out from farther away, metres. */
 const NEAR_M = 18;
@@ -51,7 +54,7 @@ export function drawLabels(canvas, scene, show, camera) {
     const spot = project(matrix, [place[0], place[1], place[2] + group.lift * step + above], width,
                          height);
     if (!spot || spot.x < 0 || spot.y < 0 || spot.x > width || spot.y > height) continue;
-    const text = scene.titleOf(node.id).slice(0, 40);
+    const text = shortened(scene.titleOf(node.id), LETTERS_MAX);
     const half = context.measureText(text).width / 2 + 4 * scale;
     const tall = FONT_PX * 0.75 * scale;
     const area = [spot.x - half, spot.y - tall, spot.x + half, spot.y + tall];

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What goes on by itself: calls that are made again while the server is away, and new revisions.
+import {checkIncarnation} from './questions.js';
 import {CallError} from './rpc.js';
 
 const RETRY_MS = [500, 1000, 2000, 5000, 10000];
@@ -32,19 +33,20 @@ export async function persistently(run, signal, failed) {
 }
 
 /**
- * Follows a map: one open call, until the signal ends it or an error that will not pass.
- * @param {number} after the last revision that is known
+ * Follows the map of a scene: one open call, until the signal ends it or an error that will not
+ * pass.
  * @param {{heard: function(), revision: function(number): Promise, failed: function(Error)}} on
  */
-export async function follow(client, map, after, signal, on) {
-  let known = after;
+export async function follow(client, scene, signal, on) {
+  let known = scene.head;
   for (let attempt = 0; !signal.aborted;) {
     try {
       const messages = client.stream('MapService/WatchMap', {
-        map, after_revision: String(known), idle_period_ns: IDLE_PERIOD_NS,
+        map: scene.map.name, after_revision: String(known), idle_period_ns: IDLE_PERIOD_NS,
       }, signal);
       for await (const {header} of messages) {
         attempt = 0;
+        checkIncarnation(scene, header);
         on.heard();
         const read = Number(header.read_revision);
         if (read <= known) continue;

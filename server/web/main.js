@@ -3,7 +3,7 @@
 // from `state` and `show`; answers that come too late are dropped.
 import {readAddress, takeToken, writeAddress} from './address.js';
 import {Camera} from './camera.js';
-import {debounced, element, link, make} from './dom.js';
+import {debounced, element, link, make, shortened} from './dom.js';
 import {drawLabels} from './labels.js';
 import {
   drawHistogram, fillHelp, fillInspector, fillLayers, fillTable, sentenceOf,
@@ -79,8 +79,9 @@ const settleTime = debounced(async () => {
     refresh();
     if (show.selected) fillInspector(scene, show, neighbors, actions);
     if (scene.nodes.get(show.selected)?.group === 'agents') locate();
-  } catch {
-    // The picture is that of the samples, as the sentence says.
+  } catch (error) {
+    // Without an answer the picture is that of the samples, as the sentence says.
+    isSaid(error);
   }
 }, 150);
 
@@ -126,7 +127,7 @@ function revisionText() {
   const at = revisions.find((one) => one.number === scene.revision);
   const named = tags.filter((tag) => Number(tag.revision) === scene.revision);
   const names = named.length ? ` (${named.map((tag) => tag.name).join(', ')})` : '';
-  return `${scene.revision} of ${scene.head}${names} ${at?.message ?? ''}`.slice(0, 60);
+  return shortened(`${scene.revision} of ${scene.head}${names} ${at?.message ?? ''}`, 60);
 }
 
 // ---- what went wrong ----
@@ -158,6 +159,12 @@ function explain(error) {
   }
 }
 
+/** Whether the error of a question needs no more words: it was ended, or concerns all questions. */
+function isSaid(error) {
+  if (error.reason === 'MAP_REPLACED') explain(error);
+  return error.name === 'AbortError' || error.reason === 'MAP_REPLACED';
+}
+
 // ---- loading ----
 
 /** Takes a scene, or more of it, into the picture. */
@@ -172,8 +179,14 @@ function take(next, loading, wanted) {
     element('revision').value = String(next.revision);
     // What differed from another revision is asked anew for this one.
     [show.diff, show.ghosts] = [null, []];
+    const isSameMap = before?.stats.header.incarnation === next.stats.header.incarnation;
+    // Ids of a map that was replaced mean nothing in the other one.
+    if (before && !isSameMap) [show.selected, show.path, show.predictions] = ['', [], []];
     const at = wanted.atNs !== undefined ? secondsOf(wanted.atNs, next.epoch)
-        : before?.map.name === next.map.name ? show.time : next.end;
+        : isSameMap ? show.time : next.end;
+    if (next.end > next.begin && (at < next.begin || at > next.end)) {
+      next.notes.push(`${textOf(at, next.map)} is outside of the tracks: the nearest time is shown`);
+    }
     show.time = next.end > next.begin ? Math.min(Math.max(at, next.begin), next.end)
         : Number.isFinite(at) ? at : 0;
   }
@@ -299,13 +312,13 @@ const locate = debounced(async () => {
     where.replaceChildren(...links.flatMap((one, i) => (i ? [', ', one] : [one])),
                           ids.length ? '' : 'no room is known');
   } catch (error) {
-    if (scene === asked && error.name !== 'AbortError') where.textContent = error.message;
+    if (scene === asked && !isSaid(error)) where.textContent = error.message;
   }
 }, 150);
 
 /** An answer, or why there is none, below the buttons of the inspector. */
 function sayAnswer(what) {
-  if (what?.name === 'AbortError') return;
+  if (what instanceof Error && isSaid(what)) return;
   const answer = document.getElementById('answer');
   if (answer) answer.textContent = what instanceof Error ? what.message : what;
 }
@@ -351,7 +364,7 @@ async function search(query) {
       if (ids.length === 1) await select(ids[0]);
     }
   } catch (error) {
-    if (error.name === 'AbortError') return;
+    if (isSaid(error)) return;
     found.textContent = error.message;
   }
   changed();
@@ -391,11 +404,12 @@ function fillDiffs() {
 
 const isWatching = () => watching !== null && !watching.signal.aborted;
 
-/** Follows the map while the tab is seen. */
+/** Follows the map while the tab is seen: a browser has few connections to a server. */
 function watch() {
   watching?.abort();
-  watching = new AbortController();
-  follow(client, state.map, scene.head, watching.signal, {
+  if (document.hidden) return;
+  const mine = watching = new AbortController();
+  follow(client, scene, mine.signal, {
     heard: () => {
       if (document.body.dataset.state !== 'away') return;
       setState('ready');
@@ -412,7 +426,7 @@ function watch() {
       if (error.reason === 'MAP_REPLACED') open(state.map, null);
       else explain(error);
     },
-  }).catch(explain);
+  }).catch(explain).finally(() => mine.abort());
 }
 
 function setLive(isLive) {

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which node is under the pointer: small things by their distance on the screen, things with a box
-// by the ray through it, rooms by their floor.
+// Which node is under the pointer: places by their distance on the screen, people by that of their
+// figure, things with a box by the ray through it, rooms by their floor.
 import {project} from './camera.js';
-import {stepOf} from './renderer.js';
+import {PERSON_HEIGHT, ROBOT_BOX, stepOf} from './renderer.js';
 import {GROUPS} from './scene.js';
 
-/** Pixels around a point that still count as it. */
-const REACH = 12;
+/** Pixels around an agent, and around a place: those stand close together before the floor. */
+const AGENT_REACH = 24;
+const PLACE_REACH = 8;
+/** Half the width of a figure, metres. */
+const FIGURE_WIDTH = 0.22;
 const LIFTS = Object.fromEntries(GROUPS.map((group) => [group.name, group.lift]));
 
 /** A vector turned back by a quaternion. */
@@ -35,6 +38,8 @@ function distanceToBox(ray, node, position) {
   return near <= far ? near : Infinity;
 }
 
+const distanceTo = (ray, point) => Math.hypot(...point.map((v, i) => v - ray.origin[i]));
+
 function isInOutline(outline, x, y) {
   let isIn = false;
   for (let i = 0, j = outline.length - 1; i < outline.length; j = i++) {
@@ -50,6 +55,25 @@ function distanceToFloor(ray, node, lift) {
   if (!(distance > 0)) return Infinity;
   const [x, y] = [0, 1].map((i) => ray.origin[i] + ray.direction[i] * distance);
   return isInOutline(node.outline, x, y) ? distance : Infinity;
+}
+
+/** How far a point of the picture is from the line between two others, pixels, and its depth. */
+function nearestOnLine(at, a, b) {
+  const [dx, dy] = [b.x - a.x, b.y - a.y];
+  const share = ((at.x - a.x) * dx + (at.y - a.y) * dy) / (dx * dx + dy * dy || 1);
+  const on = Math.min(1, Math.max(0, share));
+  return {away: Math.hypot(a.x + dx * on - at.x, a.y + dy * on - at.y),
+          depth: 1 / ((1 - on) / a.depth + on / b.depth)};
+}
+
+/** Whether an agent, from its feet to its top, is at a point of the picture. */
+function isAgentAt(node, foot, matrix, camera, at) {
+  const top = node.kind === 'human' ? PERSON_HEIGHT : ROBOT_BOX.max[2];
+  const [low, high] = [0, top].map(
+      (up) => project(matrix, [foot[0], foot[1], foot[2] + up], at.width, at.height));
+  if (!low || !high) return false;
+  const {away, depth} = nearestOnLine(at, low, high);
+  return away < Math.max(AGENT_REACH, FIGURE_WIDTH * camera.pixelsPerMetre(depth, at.height));
 }
 
 /**
@@ -75,14 +99,14 @@ export function pick(scene, show, camera, at) {
       offer(node.id, node.group === 'rooms' ? 2 : 3, distanceToFloor(ray, node, lift));
     } else if (place && node.box && node.group === 'objects') {
       offer(node.id, 1, distanceToBox(ray, node, [place[0], place[1], place[2] + lift]));
+    } else if (place && node.group === 'agents') {
+      const foot = scene.footOf(place);
+      if (isAgentAt(node, foot, matrix, camera, at)) offer(node.id, 0, distanceTo(ray, foot));
     } else if (place && node.group !== 'structures') {
-      const height = node.group === 'agents' ? 0.6 : 0;
-      const spot = project(matrix, [place[0], place[1], place[2] + lift + height], at.width,
-                           at.height);
+      const lifted = [place[0], place[1], place[2] + lift];
+      const spot = project(matrix, lifted, at.width, at.height);
       const away = spot ? Math.hypot(spot.x - at.x, spot.y - at.y) : Infinity;
-      if (away < (node.group === 'agents' ? 2 * REACH : REACH)) {
-        offer(node.id, node.group === 'agents' ? 0 : 1, spot.depth + away / 100);
-      }
+      if (away < PLACE_REACH) offer(node.id, 1, distanceTo(ray, lifted) + away / 100);
     }
   }
   return best.id;

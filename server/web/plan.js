@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The plan from above on a 2-D canvas, for browsers without WebGL2: the same scene and the same
 // times, without layers apart.
+import {shortened} from './dom.js';
+import {LETTERS_MAX} from './labels.js';
 import {colorOfAgent} from './renderer.js';
 import {GROUPS} from './scene.js';
 
@@ -58,6 +60,6 @@ export class Plan {
     context.fillRect(x - half, y - half, 2 * half, 2 * half);
     if (group.name !== 'agents' && !isMarked) return;
     context.font = '12px system-ui, sans-serif';
-    context.fillText(scene.titleOf(node.id).slice(0, 40), x + 8, y + 4);
+    context.fillText(shortened(scene.titleOf(node.id), LETTERS_MAX), x + 8, y + 4);
   }
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the viewer asks about a scene, all at its revision, in the scene's units.
+import {CallError} from './rpc.js';
 import {toNode} from './scene.js';
 import {nsOf} from './time.js';
 
@@ -10,6 +11,13 @@ const INSTANTS_MAX = 10000;
 const CHANGES_A_PAGE = 1000;
 /** How far predictions reach, how densely, and how many ways. */
 const PREDICTION = {horizon_ns: '8000000000', period_ns: '400000000', path_count_max: 5};
+
+/** Throws if a reply is of another map than the one that is shown, made anew under its name. */
+export function checkIncarnation({map, stats}, header) {
+  if (header.incarnation === stats.header.incarnation) return;
+  throw new CallError('aborted', `the map "${map.name}" was replaced by another one of this name; ` +
+                      'what is shown is no more in the store', 'MAP_REPLACED');
+}
 
 export class Questions {
   /**
@@ -24,9 +32,15 @@ export class Questions {
   }
 
   #ask(method, request) {
-    return this.client.call(method, {
-      map: this.scene.map.name, read_at: {exact_revision: String(this.scene.revision)}, ...request,
-    }, this.signal);
+    return this.#call(method, {read_at: {exact_revision: String(this.scene.revision)}, ...request});
+  }
+
+  /** Fails with MAP_REPLACED if the answer is of another map of the same name. */
+  async #call(method, request) {
+    const {name} = this.scene.map;
+    const reply = await this.client.call(method, {map: name, ...request}, this.signal);
+    checkIncarnation(this.scene, reply.header);
+    return reply;
   }
 
   #ns(time) {
@@ -97,11 +111,10 @@ export class Questions {
     const removed = [];
     let token = '';
     do {
-      const reply = await this.client.call('MapService/DiffRevisions', {
-        map: this.scene.map.name, from_revision: String(revision),
-        to_revision: String(this.scene.revision), view: 'NODE_VIEW_FULL',
-        page_size: CHANGES_A_PAGE, page_token: token,
-      }, this.signal);
+      const reply = await this.#call('MapService/DiffRevisions', {
+        from_revision: String(revision), to_revision: String(this.scene.revision),
+        view: 'NODE_VIEW_FULL', page_size: CHANGES_A_PAGE, page_token: token,
+      });
       for (const {type, before, after} of reply.nodes) {
         states.set((after ?? before).id, type.toLowerCase());
         if (type === 'REMOVED') removed.push(toNode(before, this.scene.epoch));

@@ -9,10 +9,10 @@ import {
 } from './shapes.js';
 
 const BACKGROUND = [0x10 / 255, 0x14 / 255, 0x1a / 255];
-const PERSON_HEIGHT = 1.7;
+export const PERSON_HEIGHT = 1.7;
 /** A crowd of more people is drawn as boxes. */
 const FIGURES_MAX = 300;
-const ROBOT_BOX = {min: [-0.25, -0.25, 0], max: [0.25, 0.25, 0.5]};
+export const ROBOT_BOX = {min: [-0.25, -0.25, 0], max: [0.25, 0.25, 0.5]};
 const DIFF_COLORS = {added: [0x4d, 0xa3, 0xff], removed: [0xff, 0x7a, 0x33],
                      changed: [0xf5, 0xf0, 0xa0], same: [0x5a, 0x61, 0x6b]};
 const SELECTED = [255, 255, 255];

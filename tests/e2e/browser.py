@@ -35,8 +35,12 @@ class Browser:
                 break
         self.base = f"http://127.0.0.1:{port[1]}"
         options = {"binary": chromium, "args": FLAGS + list(more_flags)}
-        reply = self._post("/session", {"capabilities": {"alwaysMatch": {
-            "goog:chromeOptions": options, "goog:loggingPrefs": {"browser": "ALL"}}}})
+        try:
+            reply = self._post("/session", {"capabilities": {"alwaysMatch": {
+                "goog:chromeOptions": options, "goog:loggingPrefs": {"browser": "ALL"}}}})
+        except Exception:
+            self._end_driver()
+            raise
         self.base += f"/session/{reply['sessionId']}"
 
     def _post(self, path, body):
@@ -65,6 +69,50 @@ class Browser:
                 raise AssertionError(f"waited {WAIT_S} s for {condition}: {page}")
             time.sleep(0.05)
 
+    def command(self, name, **parameters):
+        """A command of the DevTools protocol, which has what WebDriver has not."""
+        return self._post("/goog/cdp/execute", {"cmd": name, "params": parameters})
+
+    def heap_bytes(self):
+        """What the page's scripts hold, without what is waste."""
+        self.command("HeapProfiler.enable")
+        self.command("HeapProfiler.collectGarbage")
+        return self.command("Runtime.getHeapUsage")["usedSize"]
+
+    def new_window(self):
+        """Opens another window, to which all further calls go, and gives its name. Tabs of one
+        window would not do: without a screen they are all seen, or none.
+        """
+        name = self._post("/window/new", {"type": "window"})["handle"]
+        self.switch(name)
+        return name
+
+    def switch(self, name):
+        """Further calls go to this window, be it seen or not."""
+        self._post("/window", {"handle": name})
+
+    def this_window(self):
+        """The name of the window to which calls go."""
+        with urllib.request.urlopen(self.base + "/window", timeout=WAIT_S) as reply:
+            return json.load(reply)["value"]
+
+    def hide(self):
+        """Its page is hidden then, as that of a tab behind another one is."""
+        self._post("/window/minimize", {})
+        self.wait("document.hidden")
+
+    def show(self):
+        self.resize(1280, 800)
+        self.wait("!document.hidden")
+
+    def resize(self, width, height):
+        self._post("/window/rect", {"width": width, "height": height})
+
+    def close_window(self):
+        """Another one has to be chosen then."""
+        request = urllib.request.Request(self.base + "/window", method="DELETE")
+        urllib.request.urlopen(request, timeout=WAIT_S).close()
+
     def keys(self, *keys):
         """Presses keys, by their character."""
         actions = [{"type": kind, "value": key} for key in keys for kind in ("keyDown", "keyUp")]
@@ -92,6 +140,9 @@ class Browser:
         # The driver alone would leave the browser behind.
         request = urllib.request.Request(self.base, method="DELETE")
         urllib.request.urlopen(request, timeout=WAIT_S).close()
+        self._end_driver()
+
+    def _end_driver(self):
         self.driver.terminate()
         self.driver.wait()
         self.driver.stdout.close()

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The viewer in a real browser: what it says is what `dsg` says, and names from logs stay text."""
 
-import contextlib
 import os
 import re
 import subprocess
@@ -10,75 +9,11 @@ import unittest
 
 import browser
 import support
+import viewer_support
+from viewer_support import READY
 
-PICTURES = os.environ.get("DSG_VIEWER_PICTURES", "")
-READY = "document.body.dataset.state === 'ready'"
 
-
-@unittest.skipUnless(browser.find_programs(), "chromium and chromium-driver are not installed")
-class Viewer(support.ProgramsTest):
-    @classmethod
-    def setUpClass(cls):
-        super().setUpClass()
-        cls.ingest("store", cls.simulate("office", people=6, seconds=60))
-        cls.window = browser.Browser()
-        cls.addClassCleanup(cls.window.close)
-        served = contextlib.ExitStack()
-        cls.addClassCleanup(served.close)
-        cls.url = served.enter_context(cls.served("store"))
-
-    @classmethod
-    @contextlib.contextmanager
-    def served(cls, store):
-        """The address that a server of the store prints for browsers."""
-        process = subprocess.Popen(
-            [os.path.join(support.BIN, "dsg-server"), "--store", store, "--listen",
-             f"unix:{store}.sock", "--http", "127.0.0.1:0"],
-            cwd=cls.folder, env=support.environment(), stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL, text=True)
-        try:
-            for line in process.stdout:
-                address = re.search(r"http://\S+#token=\S+", line)
-                if address:
-                    break
-            yield address[0]
-        finally:
-            process.terminate()
-            process.wait(timeout=support.TIMEOUT_S)
-            process.stdout.close()
-
-    def open(self, more=""):
-        self.window.get("about:blank")
-        self.window.get(self.url + more)
-        self.window.wait(READY)
-
-    def picture(self, name):
-        """Kept where DSG_VIEWER_PICTURES says, to be looked at."""
-        shot = self.window.picture()
-        self.assertGreater(len(shot), 10_000)
-        if PICTURES:
-            with open(os.path.join(PICTURES, name + ".png"), "wb") as out:
-                out.write(shot)
-
-    def colors(self):
-        """How many different colours the scene has: one of nothing but background has one."""
-        return self.window.run("""
-          const of = document.getElementById('scene');
-          const to = document.createElement('canvas');
-          [to.width, to.height] = [of.width, of.height];
-          // WebGL forgets a picture once it was shown: this one is drawn anew, and read with it.
-          document.dispatchEvent(new KeyboardEvent('keydown', {key: 'f'}));
-          return new Promise((done) => requestAnimationFrame(() => {
-            const context = to.getContext('2d');
-            context.drawImage(of, 0, 0);
-            const data = context.getImageData(0, 0, to.width, to.height).data;
-            const seen = new Set();
-            for (let i = 0; i < data.length; i += 4) {
-              seen.add(data[i] << 16 | data[i + 1] << 8 | data[i + 2]);
-            }
-            done(seen.size);
-          }));""")
-
+class Viewer(viewer_support.ViewerTest):
     def test_the_token_leaves_the_address_and_the_page_is_quiet(self):
         self.window.messages()
         self.open()
@@ -108,18 +43,13 @@ class Viewer(support.ProgramsTest):
         self.picture("table")
         self.window.keys("t")
 
-    def at_ns(self, seconds):
-        maps = self.ask("maps", "--store", "store")
-        return int(maps["maps"][0]["epoch_ns"]) + seconds * support.NS_PER_S
-
     def test_a_thinned_log_shows_everybody_at_its_end_and_between_samples(self):
         self.ingest("long", self.simulate("long-log", people=3, seconds=150))
         store = ("--store", "long")
         stats = self.ask("stats", *store)
         with self.served("long") as url:
             for at in (int(stats["last_pose_ns"]), int(stats["last_pose_ns"]) - 37_123_456_000):
-                self.window.get("about:blank")
-                self.window.get(f"{url}&at={at}")
+                self.go(f"{url}&at={at}")
                 self.window.wait(READY)
                 self.window.keys("t")
                 self.window.wait("!document.getElementById('sentence').textContent"
@@ -162,8 +92,7 @@ class Viewer(support.ProgramsTest):
         blocks = int(self.ask("stats", "--store", "mesh")["mesh_block_count"])
         self.assertGreater(blocks, 0)
         with self.served("mesh") as url:
-            self.window.get("about:blank")
-            self.window.get(url)
+            self.go(url)
             self.window.wait(READY)
             before = self.colors()
             self.window.keys("7")
@@ -191,8 +120,7 @@ class Viewer(support.ProgramsTest):
         changes = self.ask("diff", before, after, *store)["nodes"]
         count = lambda kind: sum(change["type"] == kind for change in changes)
         with self.served("compared") as url:
-            self.window.get("about:blank")
-            self.window.get(f"{url}&diff={before}")
+            self.go(f"{url}&diff={before}")
             self.window.wait(READY)
             said = f"+{count('ADDED')} -{count('REMOVED')} ~{count('CHANGED')}"
             self.assertEqual(
@@ -206,8 +134,7 @@ class Viewer(support.ProgramsTest):
         self.window.wait("location.hash.includes('cam=')")
         before = self.window.run("return location.href")
         facts = self.window.run("return document.getElementById('sentence').textContent")
-        self.window.get("about:blank")
-        self.window.get(before)
+        self.go(before)
         self.window.wait(READY)
         self.assertEqual(facts, self.window.run(
             "return document.getElementById('sentence').textContent"))
@@ -229,17 +156,16 @@ class Viewer(support.ProgramsTest):
         self.refused(2, ["nowhere"], "dsg", "view", "nowhere")
 
     def test_says_what_is_wrong(self):
-        self.window.get("about:blank")
-        self.window.get(self.url.split("#")[0] + "#token=wrong")
+        self.go(self.url.split("#")[0] + "#token=wrong")
         self.window.wait("document.body.dataset.state === 'token'")
         self.open()
-        self.window.get("about:blank")
-        self.window.get(self.url + "&rev=99")
+        self.go(self.url + "&rev=99")
         self.window.wait("document.body.dataset.state === 'error'")
         said = self.window.run("return document.getElementById('banner').textContent")
         self.assertIn("99", said)
         self.window.run("document.querySelector('#banner button').click()")
         self.window.wait(READY)
+
     def test_offers_what_can_be_read_of_a_compacted_map(self):
         self.ingest("short", self.simulate("short-log", people=1, seconds=5))
         room = self.ask("ls", "--kind", "room", "--store", "short")["nodes"][0]["id"]
@@ -247,8 +173,7 @@ class Viewer(support.ProgramsTest):
         with self.served("short") as url:
             self.ok("dsg", "compact", "--server", "unix:short.sock")
             newest = self.ask("stats", "--store", "short")["head_revision"]
-            self.window.get("about:blank")
-            self.window.get(url + "&rev=1")
+            self.go(url + "&rev=1")
             self.window.wait("document.body.dataset.state === 'error'")
             self.assertEqual(f"open revision {newest}", self.window.run("""
                 const button = document.querySelector('#banner button');
@@ -260,15 +185,13 @@ class Viewer(support.ProgramsTest):
     def test_waits_for_the_first_map(self):
         os.makedirs(self.path("empty"))
         with self.served("empty") as url:
-            self.window.get("about:blank")
-            self.window.get(url)
+            self.go(url)
             self.window.wait("document.body.dataset.state === 'no-maps'")
 
     def test_follows_new_revisions_and_says_that_the_server_went_away(self):
         self.ingest("live", self.simulate("live-log", people=1, seconds=5))
         with self.served("live") as url:
-            self.window.get("about:blank")
-            self.window.get(url + "&live=1")
+            self.go(url + "&live=1")
             self.window.wait(READY)
             before = int(self.window.run("return document.body.dataset.revision"))
             room = self.ask("ls", "--kind", "room", "--store", "live")["nodes"][0]["id"]
@@ -287,8 +210,8 @@ class Viewer(support.ProgramsTest):
             plain.wait(READY + " && document.body.dataset.plan === '1'")
             self.assertIn("WebGL2", plain.run(
                 "return document.getElementById('banner').textContent"))
-            if PICTURES:
-                with open(os.path.join(PICTURES, "plan.png"), "wb") as out:
+            if viewer_support.PICTURES:
+                with open(os.path.join(viewer_support.PICTURES, "plan.png"), "wb") as out:
                     out.write(plain.picture())
         finally:
             plain.close()
@@ -301,7 +224,7 @@ class Viewer(support.ProgramsTest):
         self.assertTrue(title)
         self.window.wait("document.querySelectorAll('#inspector .link').length > 0")
         self.picture("selected")
-        self.window.keys("\ue00c")  # Escape
+        self.window.keys(viewer_support.ESCAPE)
         self.window.wait("!location.hash.includes('sel=')")
 
     def test_names_are_never_markup(self):
