@@ -148,7 +148,7 @@ void DescribeRooms(const Storey& storey, const PlanRegions& regions, RoomLabelli
   for (size_t i = 0; i < columns.size(); ++i) {
     FoundRoom& room = labelling->rooms[i];
     room.footprint_map = outlines[i];
-    room.area_m2 = std::abs(SignedAreaM2(outlines[i]));
+    room.area_m2 = std::abs(SignedArea(outlines[i]));
     room.z_min_m = storey.input.floor_z_m;
     room.z_max_m = std::max(room.z_min_m, TopOf(storey, columns[i]));
   }

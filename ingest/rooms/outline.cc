@@ -220,16 +220,6 @@ double MainAngle(const std::vector<Polygon2d>& outlines, double tolerance_m) {
   return 0.25 * std::atan2(sum.y(), sum.x());
 }
 
-double SignedAreaM2(const Polygon2d& polygon) {
-  double twice = 0.0;
-  for (size_t i = 0; i < polygon.size(); ++i) {
-    const Eigen::Vector2d& a = polygon[i];
-    const Eigen::Vector2d& b = polygon[(i + 1) % polygon.size()];
-    twice += a.x() * b.y() - a.y() * b.x();
-  }
-  return 0.5 * twice;
-}
-
 std::vector<Polygon2d> OutlinesOf(const PlanRegions& regions) {
   const int width = regions.frame.size.x();
   struct Bounds {

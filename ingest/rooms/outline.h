@@ -19,7 +19,4 @@ std::vector<Polygon2d> OutlinesOf(const PlanRegions& regions);
 /// that steps of cells are no edges.
 double MainAngle(const std::vector<Polygon2d>& outlines, double tolerance_m);
 
-/// Positive when counter-clockwise.
-double SignedAreaM2(const Polygon2d& polygon);
-
 }  // namespace dsg::ingest

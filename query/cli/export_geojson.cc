@@ -25,17 +25,6 @@ std::string Dump(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-// Twice the area, negative for corners in clockwise order.
-double SignedArea(const Polygon2d& corners) {
-  double sum = 0.0;
-  for (size_t i = 0; i < corners.size(); ++i) {
-    const Eigen::Vector2d& a = corners[i];
-    const Eigen::Vector2d& b = corners[(i + 1) % corners.size()];
-    sum += a.x() * b.y() - a.y() * b.x();
-  }
-  return sum;
-}
-
 class GeoJsonWriter {
  public:
   GeoJsonWriter(const MapRows& map, const GeoOrigin& origin, AtomicFile* file)

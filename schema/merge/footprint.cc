@@ -62,16 +62,6 @@ std::optional<double> TryShared(const Polygon& a, const Polygon& b) {
 
 }  // namespace
 
-double AreaOf(const Polygon2d& outline) {
-  double twice = 0.0;
-  for (size_t i = 0; i < outline.size(); ++i) {
-    const Eigen::Vector2d& a = outline[i];
-    const Eigen::Vector2d& b = outline[(i + 1) % outline.size()];
-    twice += a.x() * b.y() - b.x() * a.y();
-  }
-  return 0.5 * std::abs(twice);
-}
-
 double SharedArea(const Polygon2d& a, const Polygon2d& b) {
   if (a.size() < 3 || b.size() < 3) return 0.0;
   const Polygon first = ToBoost(a);

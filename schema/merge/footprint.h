@@ -7,9 +7,6 @@
 
 namespace dsg::merge {
 
-/// Square metres; 0 for fewer than three corners.
-double AreaOf(const Polygon2d& outline);
-
 /// Area that both cover, square metres.
 double SharedArea(const Polygon2d& a, const Polygon2d& b);
 

@@ -97,13 +97,13 @@ void FuseRegion(const Node& seen, Node* known) {
     known->region = seen.region;
     return;
   }
-  const double area = AreaOf(known->region->footprint_map);
+  const double area = std::abs(SignedArea(known->region->footprint_map));
   const Polygon2d both = UnionOf(known->region->footprint_map, seen.region->footprint_map);
   // Slivers along a wall are noise and would accumulate.
-  if (AreaOf(both) > 1.01 * area) {
+  if (std::abs(SignedArea(both)) > 1.01 * area) {
     known->region->footprint_map = both;
     const auto noted = known->attributes.find("area_m2");
-    if (noted != known->attributes.end()) noted->second = AreaOf(both);
+    if (noted != known->attributes.end()) noted->second = std::abs(SignedArea(both));
   }
   const HeightSpan low = HeightsOf(*known);
   const HeightSpan high = HeightsOf(seen);

@@ -382,7 +382,7 @@ double Likeness(const Node& known, const Node& node, double child_share, double 
   if (known.layer != node.layer || known.kind != node.kind) return 0.0;
   const Polygon2d a = FootprintOf(known);
   const Polygon2d b = FootprintOf(node);
-  const double smaller = std::min(AreaOf(a), AreaOf(b));
+  const double smaller = std::min(std::abs(SignedArea(a)), std::abs(SignedArea(b)));
   double overlap = 0.0;
   if (smaller > 0.0 && AreOnOneStorey(known, node)) overlap = SharedArea(a, b) / smaller;
   if (overlap < overlap_needed && child_share < kChildShareMin) return 0.0;

@@ -56,6 +56,17 @@ bool PolygonContains(const Polygon2d& polygon, const Eigen::Vector2d& point) {
   return inside;
 }
 
+double SignedArea(const Polygon2d& polygon) {
+  double twice = 0.0;
+  for (size_t i = 0; i < polygon.size(); ++i) {
+    // From the first corner: far from the origin the products would swallow the area.
+    const Eigen::Vector2d a = polygon[i] - polygon[0];
+    const Eigen::Vector2d b = polygon[(i + 1) % polygon.size()] - polygon[0];
+    twice += a.x() * b.y() - b.x() * a.y();
+  }
+  return 0.5 * twice;
+}
+
 double SignedDistanceToPolygon(const Polygon2d& polygon, const Eigen::Vector2d& point) {
   double nearest_squared = std::numeric_limits<double>::infinity();
   for (size_t i = 0, j = polygon.size() - 1; i < polygon.size(); j = i++) {

@@ -51,6 +51,9 @@ double DistanceToBox(const Eigen::Vector3d& point_map, const Pose3d& map_T_node,
 /// Corners in order, map frame, z ignored.
 using Polygon2d = std::vector<Eigen::Vector2d>;
 
+/// Square metres; negative for corners in clockwise order.
+double SignedArea(const Polygon2d& polygon);
+
 /// Inside by the even-odd rule; a point on a low-x or low-y edge counts as inside.
 bool PolygonContains(const Polygon2d& polygon, const Eigen::Vector2d& point);
 

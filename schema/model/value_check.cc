@@ -9,22 +9,6 @@
 #include "schema/model/delta_check.h"
 
 namespace dsg::values {
-namespace {
-
-// Twice the area of an outline; its sign tells the sense.
-double TwiceArea(const Polygon2d& outline) {
-  double twice = 0.0;
-  for (size_t i = 0; i < outline.size(); ++i) {
-    // From the first corner: far from the origin the products would swallow the area.
-    const Eigen::Vector2d a = outline[i] - outline[0];
-    const Eigen::Vector2d b = outline[(i + 1) % outline.size()] - outline[0];
-    twice += a.x() * b.y() - b.x() * a.y();
-  }
-  return twice;
-}
-
-}  // namespace
-
 absl::Status Invalid(std::string_view what, ErrorMetadata metadata) {
   return MakeError(Reason::kDeltaInvalid, absl::StrCat("delta refused: ", std::string(what)),
                    std::move(metadata));
@@ -98,7 +82,7 @@ absl::Status CheckRegion(const RegionInfo& region, What what) {
   for (const Eigen::Vector2d& corner : outline) {
     if (!IsSane({corner.x(), corner.y(), 0.0})) return NotFinite("footprint of " + what());
   }
-  if (!outline.empty() && (outline.size() < 3 || TwiceArea(outline) == 0.0)) {
+  if (!outline.empty() && (outline.size() < 3 || SignedArea(outline) == 0.0)) {
     return Invalid(absl::StrCat("footprint of ", what(), " has ", outline.size(),
                                 " corners and no area; give at least 3 that are not on a line, or "
                                 "none if it is not known"));

@@ -75,12 +75,4 @@ std::vector<Eigen::Vector2d> SlantedWall(const Node& node) {
   return ends;
 }
 
-double AreaOf(const Polygon2d& polygon) {
-  double twice = 0.0;
-  for (size_t i = 0; i < polygon.size(); ++i) {
-    twice += Cross(polygon[i], polygon[i + 1 == polygon.size() ? 0 : i + 1]);
-  }
-  return 0.5 * std::abs(twice);
-}
-
 }  // namespace dsg::cli

@@ -21,9 +21,6 @@ Polygon2d FloorOutline(const Node& node);
 /// maps of odometry do not share with their buildings.
 std::vector<Eigen::Vector2d> SlantedWall(const Node& node);
 
-/// Unsigned area, for either order of the corners.
-double AreaOf(const Polygon2d& polygon);
-
 /// Maps a region seen from above to a picture: north (y) up, one scale.
 class FloorView {
  public:

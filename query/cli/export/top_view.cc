@@ -252,7 +252,7 @@ void DrawObjects(const MapContent& content, const FloorView& view, picture::Canv
                    [&](const Node* a, const Node* b) { return top_of(a) < top_of(b); });
   for (const Node* node : objects) {
     const Polygon2d outline = view.ToPixels(FloorOutline(*node));
-    if (outline.size() < 3 || AreaOf(outline) < 64.0) {
+    if (outline.size() < 3 || std::abs(SignedArea(outline)) < 64.0) {
       canvas->FillCircle(view.ToPixel(MiddleOf(*node)), 6.0, picture::MakePaint(kInkRgb));
       canvas->FillCircle(view.ToPixel(MiddleOf(*node)), 4.0, picture::MakePaint(ClassColor(*node)));
       continue;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 #include <utility>
 
@@ -91,7 +92,7 @@ std::vector<LabelledShape> ShapesOf(const MapContent& content, const char* kind,
   for (const Node& node : content.nodes) {
     if (node.kind != kind) continue;
     LabelledShape shape{.node = &node, .outline_px = view.ToPixels(FloorOutline(node))};
-    shape.area_px = AreaOf(shape.outline_px);
+    shape.area_px = std::abs(SignedArea(shape.outline_px));
     shapes.push_back(std::move(shape));
   }
   std::stable_sort(

@@ -74,7 +74,7 @@ TEST(Rooms, OfOneRoomAreOne) {
     EXPECT_EQ(rooms.rooms[0].places.size(), example.input.places.size());
     EXPECT_NEAR(rooms.rooms[0].area_m2, 20.0, 0.5);
     EXPECT_NEAR(rooms.rooms[0].z_max_m, kCeilingM, 0.1);
-    EXPECT_GT(SignedAreaM2(rooms.rooms[0].footprint_map), 0.0);
+    EXPECT_GT(SignedArea(rooms.rooms[0].footprint_map), 0.0);
     EXPECT_TRUE(rooms.adjacent.empty());
   }
 }

@@ -35,7 +35,7 @@ TEST(Outline, OfARectangleHasFourCorners) {
   const std::vector<Polygon2d> outlines = OutlinesOf(regions);
   ASSERT_EQ(outlines.size(), 1u);
   EXPECT_EQ(outlines[0].size(), 4u);
-  EXPECT_NEAR(SignedAreaM2(outlines[0]), 0.24, 1e-9);
+  EXPECT_NEAR(SignedArea(outlines[0]), 0.24, 1e-9);
 }
 
 TEST(Outline, OfARandomRegionIsSimpleAndCounterClockwise) {
@@ -50,7 +50,7 @@ TEST(Outline, OfARandomRegionIsSimpleAndCounterClockwise) {
     regions.region_of[0] = 0;
     const Polygon2d outline = OutlinesOf(regions)[0];
     ASSERT_GE(outline.size(), 3u) << "seed " << seed;
-    EXPECT_GT(SignedAreaM2(outline), 0.0) << "seed " << seed;
+    EXPECT_GT(SignedArea(outline), 0.0) << "seed " << seed;
     for (size_t i = 0; i < outline.size(); ++i) {
       for (size_t j = i + 1; j < outline.size(); ++j) {
         EXPECT_FALSE(SegmentsTouch(outline[i], outline[(i + 1) % outline.size()], outline[j],
