@@ -191,7 +191,7 @@ class Drawer {
   // Above its thing or, where others are, below them; left out where there is no room.
   void WriteLabel(const Label& label) {
     const Eigen::Vector2d size_px(picture::Canvas::TextWidth(label.text, kLabelDotPx),
-                                  kLabelDotPx * picture::kGlyphHeightDots);
+                                  kLabelDotPx * picture::kCapHeightDots);
     const Eigen::Vector2d edge = Eigen::Vector2d::Constant(kLabelEdgePx);
     for (const double step : {-1.2, -2.6, 0.2, 1.6, 3.0}) {
       Eigen::Vector2d low = label.foot_px - Eigen::Vector2d(0.5 * size_px.x(), 0.0);

@@ -1,32 +1,37 @@
 // SPDX-License-Identifier: Apache-2.0
-// Text in pictures: glyphs of 5 x 7 dots, and free spots for labels. ASCII and Latin letters
-// without accents; any other character is a small box.
+// Text in pictures: the letters of DejaVu Sans, and free spots for labels.
 #pragma once
 
 #include <Eigen/Geometry>
-#include <array>
 #include <cstdint>
+#include <memory>
 #include <string_view>
 #include <vector>
 
 namespace dsg::picture {
 
-inline constexpr int kGlyphWidthDots = 5;
-inline constexpr int kGlyphHeightDots = 7;
-/// Distance between the left edges of neighbouring letters.
-inline constexpr int kAdvanceDots = 6;
-/// How far g, p, q, y and the like reach below the line.
-inline constexpr int kDescentDots = 2;
+/// The height of capitals and figures, in the dots that sizes of texts are told in.
+inline constexpr int kCapHeightDots = 7;
+/// How far g, p, q, y and the like reach below the line, at most.
+inline constexpr int kDescentDots = 3;
 
-struct Glyph {
-  /// From the top, five dots each, the leftmost in bit 4.
-  std::array<uint8_t, kGlyphHeightDots> rows{};
-  /// Dots that the whole letter is shifted down.
-  int drop = 0;
+/// One letter, drawn at a size.
+struct Letter {
+  /// From where it begins to where the next one does.
+  double advance_px = 0.0;
+  /// Of its pixels: from where it begins to their left, and from the line up to their top.
+  int left_px = 0;
+  int top_px = 0;
+  int width = 0;
+  int height = 0;
+  /// Row by row from the top: how much of each pixel the letter covers, of 255.
+  std::vector<uint8_t> coverage;
 };
 
-/// One glyph per character. Bytes that are not UTF-8 are a box each.
-std::vector<const Glyph*> GlyphsOf(std::string_view text);
+/// One letter a character; a box for what the font lacks, and for bytes that are not UTF-8.
+///
+/// Threads: safe from many threads.
+std::vector<std::shared_ptr<const Letter>> LettersOf(std::string_view text, double cap_height_px);
 
 /// Assigns spots for labels, each once: a spot must not touch an earlier one or leave the picture.
 /// Cost: a spot is compared with its neighbourhood only.

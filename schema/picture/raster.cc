@@ -158,24 +158,34 @@ void Canvas::DrawOutline(std::vector<Eigen::Vector2d> corners, double width, con
 
 void Canvas::DrawText(const Eigen::Vector2d& low, std::string_view text, double dot,
                       const Paint& paint) {
-  Eigen::Vector2d corner = low;
-  for (const Glyph* glyph : GlyphsOf(text)) {
-    const Eigen::Vector2d top = corner + Eigen::Vector2d(0.0, glyph->drop * dot);
-    for (int row = 0; row < kGlyphHeightDots; ++row) {
-      for (int column = 0; column < kGlyphWidthDots; ++column) {
-        const int bit = kGlyphWidthDots - 1 - column;
-        if ((glyph->rows[static_cast<size_t>(row)] >> bit & 1) == 0) continue;
-        const Eigen::Vector2d begin = top + dot * Eigen::Vector2d(column, row);
-        FillRect(begin, begin + Eigen::Vector2d(dot, dot), paint);
+  // Farther away than any picture is wide.
+  constexpr double kFarPx = 1e6;
+  if (!(low.cwiseAbs().maxCoeff() < kFarPx)) return;
+  double begin = low.x();
+  const auto line = static_cast<int>(std::lround(low.y() + kCapHeightDots * dot));
+  for (const auto& letter : LettersOf(text, kCapHeightDots * dot)) {
+    if (begin > width_) return;
+    const int left = static_cast<int>(std::lround(begin)) + letter->left_px;
+    for (int y = 0; y < letter->height; ++y) {
+      for (int x = 0; x < letter->width; ++x) {
+        const uint8_t covered = letter->coverage[static_cast<size_t>(y * letter->width + x)];
+        const int column = left + x;
+        const int row = line - letter->top_px + y;
+        const bool is_inside = column >= 0 && column < width_ && row >= 0 && row < height_;
+        if (covered == 0 || !is_inside) continue;
+        Paint part = paint;
+        part.opacity *= static_cast<float>(covered) / 255.0f;
+        Blend(column, row, part);
       }
     }
-    corner.x() += kAdvanceDots * dot;
+    begin += letter->advance_px;
   }
 }
 
 double Canvas::TextWidth(std::string_view text, double dot) {
-  const size_t count = GlyphsOf(text).size();
-  return count == 0 ? 0.0 : dot * (kAdvanceDots * static_cast<double>(count) - 1.0);
+  double width = 0.0;
+  for (const auto& letter : LettersOf(text, kCapHeightDots * dot)) width += letter->advance_px;
+  return width;
 }
 
 Picture Canvas::Halved() const {

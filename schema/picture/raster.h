@@ -50,8 +50,8 @@ class Canvas {
   void DrawPolyline(const std::vector<Eigen::Vector2d>& points, double width, const Paint& paint);
   /// As DrawPolyline, back to the first point.
   void DrawOutline(std::vector<Eigen::Vector2d> corners, double width, const Paint& paint);
-  /// UTF-8 text in the letters of font.h, `dot` pixels a dot. `low` is the top left corner; some
-  /// letters hang kDescentDots below the line.
+  /// UTF-8 text in the letters of font.h, whose capitals are kCapHeightDots times `dot` pixels
+  /// high. `low` is the top left corner of a capital; some letters hang up to kDescentDots below.
   void DrawText(const Eigen::Vector2d& low, std::string_view text, double dot, const Paint& paint);
   static double TextWidth(std::string_view text, double dot);
 

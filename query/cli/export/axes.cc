@@ -12,7 +12,7 @@ namespace dsg::cli {
 namespace {
 
 constexpr double kTickDotPx = 3.0;
-constexpr double kTickTextPx = kTickDotPx * picture::kGlyphHeightDots;
+constexpr double kTickTextPx = kTickDotPx * picture::kCapHeightDots;
 constexpr double kTickPx = 10.0;
 constexpr double kSpacePx = 6.0;
 // Between ticks: labels of four letters stay apart.

@@ -126,7 +126,7 @@ void DrawOverlayLabels(const Overlay& overlay, const FloorView& view, picture::L
 void DrawOverlayLegend(const Overlay& overlay, const Eigen::Vector2d& low, double x_end,
                        picture::Canvas* canvas) {
   constexpr double kSamplePx = 44.0;
-  const double middle_y = low.y() + 0.5 * kKeyDotPx * picture::kGlyphHeightDots;
+  const double middle_y = low.y() + 0.5 * kKeyDotPx * picture::kCapHeightDots;
   double x = low.x();
   for (const OverlayKey& key : overlay.legend) {
     const double end = x + kSamplePx + 14.0 + picture::Canvas::TextWidth(key.text, kKeyDotPx);

@@ -26,7 +26,7 @@ constexpr double kTitlePx = 70.0;
 constexpr double kFooterPx = 80.0;
 constexpr double kKeyRowPx = 52.0;
 constexpr double kTextDotPx = 4.0;
-constexpr double kTextHeightPx = kTextDotPx * picture::kGlyphHeightDots;
+constexpr double kTextHeightPx = kTextDotPx * picture::kCapHeightDots;
 // A smaller map is drawn with this size.
 constexpr double kMapSizeMinM = 2.0;
 

@@ -33,7 +33,7 @@ struct Label {
 
   Eigen::Vector2d Size() const {
     return {picture::Canvas::TextWidth(text, dot_px) + 2.0 * kPadPx,
-            dot_px * (picture::kGlyphHeightDots + picture::kDescentDots) + 2.0 * kPadPx};
+            dot_px * (picture::kCapHeightDots + picture::kDescentDots) + 2.0 * kPadPx};
   }
   Eigen::AlignedBox2d At(const Eigen::Vector2d& middle) const {
     return Eigen::AlignedBox2d(middle - 0.5 * Size(), middle + 0.5 * Size());

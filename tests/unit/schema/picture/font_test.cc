@@ -5,51 +5,73 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <memory>
 #include <set>
 #include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "schema/base/random.h"
 
 namespace dsg::picture {
 namespace {
 
+constexpr double kCapPx = 14.0;
+
+std::shared_ptr<const Letter> LetterOf(std::string_view text) {
+  const auto letters = LettersOf(text, kCapPx);
+  EXPECT_EQ(letters.size(), 1u) << text;
+  return letters.at(0);
+}
+
 TEST(Font, DrawsEachVisibleCharacterDifferently) {
-  std::set<std::array<uint8_t, kGlyphHeightDots>> seen;
+  std::set<std::pair<std::vector<uint8_t>, int>> seen;
   for (char c = 0x21; c <= 0x7e; ++c) {
-    const auto glyphs = GlyphsOf(std::string(1, c));
-    ASSERT_EQ(glyphs.size(), 1u);
-    EXPECT_TRUE(seen.insert(glyphs[0]->rows).second) << "'" << c << "' looks like another";
+    const auto letter = LetterOf(std::string(1, c));
+    EXPECT_TRUE(seen.insert({letter->coverage, letter->top_px}).second)
+        << "'" << c << "' looks like another";
   }
 }
 
-TEST(Font, KeepsItsDotsInFiveColumns) {
-  for (char c = 0x20; c <= 0x7e; ++c) {
-    for (const uint8_t row : GlyphsOf(std::string(1, c))[0]->rows) EXPECT_LT(row, 1 << 5) << c;
+TEST(Font, HasTheSizeThatWasAskedFor) {
+  for (const double cap_px : {7.0, 14.0, 40.0}) {
+    const auto letter = LettersOf("H", cap_px).at(0);
+    EXPECT_NEAR(letter->height, cap_px, 1.0);
+    EXPECT_EQ(letter->top_px, letter->height);
+  }
+  // What hangs below the line.
+  for (char c = 0x21; c <= 0x7e; ++c) {
+    const auto letter = LetterOf(std::string(1, c));
+    EXPECT_LE(letter->height - letter->top_px, kDescentDots * kCapPx / kCapHeightDots) << c;
   }
 }
 
 TEST(Font, CountsCharactersAndNotBytes) {
-  EXPECT_EQ(GlyphsOf("Küche").size(), 5u);
-  EXPECT_EQ(GlyphsOf("Küche"), GlyphsOf("Kuche"));
-  EXPECT_EQ(GlyphsOf("Łódź"), GlyphsOf("Lodz"));
+  EXPECT_EQ(LettersOf("Küche", kCapPx).size(), 5u);
+  EXPECT_NE(LetterOf("ü")->coverage, LetterOf("u")->coverage);
+  EXPECT_NE(LetterOf("Ł")->coverage, LetterOf("L")->coverage);
   // No letter for these: a box each.
-  EXPECT_EQ(GlyphsOf("厨房").size(), 2u);
-  EXPECT_EQ(GlyphsOf("厨房")[0], GlyphsOf("🚪")[0]);
-  EXPECT_TRUE(GlyphsOf("").empty());
+  EXPECT_EQ(LettersOf("厨房", kCapPx).size(), 2u);
+  EXPECT_EQ(LetterOf("厨")->coverage, LetterOf("房")->coverage);
+  EXPECT_FALSE(LetterOf("厨")->coverage.empty());
+  EXPECT_TRUE(LettersOf("", kCapPx).empty());
 }
 
 TEST(Font, DrawsABoxForBytesThatAreNoText) {
-  const Glyph* const box = GlyphsOf("\n")[0];
-  EXPECT_EQ(GlyphsOf("\xff"), std::vector<const Glyph*>({box}));
   // A character that breaks off, and a letter after it.
-  EXPECT_EQ(GlyphsOf("\xe5\x8e"
-                     "a"),
-            std::vector<const Glyph*>({box, GlyphsOf("a")[0]}));
+  const auto letters = LettersOf(
+      "\xe5\x8e"
+      "a",
+      kCapPx);
+  ASSERT_EQ(letters.size(), 2u);
+  EXPECT_EQ(letters[0], LetterOf("\xff"));
+  EXPECT_EQ(letters[1], LetterOf("a"));
   Random random(1, 0);
   for (int i = 0; i < 2000; ++i) {
     std::string bytes(static_cast<size_t>(i % 9), '\0');
     for (char& byte : bytes) byte = static_cast<char>(random.Integer(0, 255));
-    EXPECT_LE(GlyphsOf(bytes).size(), bytes.size());
+    EXPECT_LE(LettersOf(bytes, kCapPx).size(), bytes.size());
   }
 }
 
