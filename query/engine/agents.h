@@ -17,6 +17,11 @@ namespace dsg::v1 {
 enum PoseQuality : int;
 }  // namespace dsg::v1
 
+namespace google::protobuf {
+template <typename Element>
+class RepeatedPtrField;
+}  // namespace google::protobuf
+
 namespace dsg::query {
 
 v1::PoseQuality QualityToProto(PoseQuality quality);
@@ -46,6 +51,12 @@ class AgentNames {
   // Entries.
   Cache<Key, NodeId> entries_{65'536};
 };
+
+/// The tracks of the agents that a request names, of all if it names none. Ascending id, each once.
+/// Errors: AGENT_UNKNOWN; FIELD_INVALID for more than kBatchSizeMax names; of the store.
+absl::StatusOr<std::vector<TrackInfo>> TracksOf(
+    AgentNames* names, const Snapshot& snapshot,
+    const google::protobuf::RepeatedPtrField<std::string>& agents, const StopCheck& stop);
 
 /// Where an agent was; nullopt before its first pose and after its last. In a gap of its track
 /// (PoseQuality::kInGap) it was there, and nobody knows where.

@@ -140,6 +140,13 @@ absl::StatusOr<std::optional<v1::NodeChange>> ChangeOf(const std::optional<Node>
   return std::optional<v1::NodeChange>(std::move(change));
 }
 
+void FillEdge(const Edge& edge, int view, v1::Edge* out) {
+  if (view != v1::NODE_VIEW_ID) return ToProto(edge, out);
+  out->set_source(ToString(edge.source));
+  out->set_relation(edge.relation);
+  out->set_target(ToString(edge.target));
+}
+
 absl::StatusOr<std::optional<v1::EdgeChange>> ChangeOf(const std::optional<Edge>& before,
                                                        const std::optional<Edge>& after,
                                                        const Ends& ends) {
@@ -152,8 +159,8 @@ absl::StatusOr<std::optional<v1::EdgeChange>> ChangeOf(const std::optional<Edge>
   }
   v1::EdgeChange change;
   change.set_type(*type);
-  if (before.has_value()) ToProto(*before, change.mutable_before());
-  if (after.has_value()) ToProto(*after, change.mutable_after());
+  if (before.has_value()) FillEdge(*before, ends.view, change.mutable_before());
+  if (after.has_value()) FillEdge(*after, ends.view, change.mutable_after());
   return std::optional<v1::EdgeChange>(std::move(change));
 }
 

@@ -168,6 +168,33 @@ absl::Status ListMaps(Engine* engine, const CallContext&, const v1::ListMapsRequ
   return absl::OkStatus();
 }
 
+namespace {
+
+absl::Status FillReadable(MapReader* map, Revision head, v1::GetMapStatsResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const Revision oldest, map->OldestRevision());
+  DSG_ASSIGN_OR_RETURN(const std::vector<Tag> tags, map->Tags());
+  std::set<Revision> kept;
+  for (const Tag& tag : tags) {
+    if (tag.revision < oldest) kept.insert(tag.revision);
+  }
+  const auto add = [&](Revision first, Revision last) {
+    const int count = reply->readable_revisions_size();
+    v1::RevisionRange* before = count > 0 ? reply->mutable_readable_revisions(count - 1) : nullptr;
+    if (before != nullptr && before->last() + 1 == first) {
+      before->set_last(last);
+      return;
+    }
+    v1::RevisionRange* range = reply->add_readable_revisions();
+    range->set_first(first);
+    range->set_last(last);
+  };
+  for (const Revision revision : kept) add(revision, revision);
+  add(oldest, std::max(head, oldest));
+  return absl::OkStatus();
+}
+
+}  // namespace
+
 absl::Status GetMapStats(Engine* engine, const CallContext&, const v1::GetMapStatsRequest& request,
                          v1::GetMapStatsResponse* reply) {
   DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
@@ -191,6 +218,7 @@ absl::Status GetMapStats(Engine* engine, const CallContext&, const v1::GetMapSta
   if (stats.first_pose_ns.has_value()) reply->set_first_pose_ns(*stats.first_pose_ns);
   if (stats.last_pose_ns.has_value()) reply->set_last_pose_ns(*stats.last_pose_ns);
   reply->set_format_version(kStoreFormatVersion);
+  DSG_RETURN_IF_ERROR(FillReadable(&view.map(), view.head_revision(), reply));
   DSG_ASSIGN_OR_RETURN(const auto pending, view.map().GetPendingErasure());
   if (pending.has_value()) {
     v1::PendingErasure* out = reply->mutable_pending_erasure();
@@ -202,18 +230,40 @@ absl::Status GetMapStats(Engine* engine, const CallContext&, const v1::GetMapSta
   return absl::OkStatus();
 }
 
+namespace {
+
+// So many revisions at even steps, newest first; the log may lack some in between.
+absl::StatusOr<std::vector<RevisionInfo>> SampleRevisions(const ReadView& view, Revision before,
+                                                          int count) {
+  const Revision newest =
+      before > 0 ? std::min(before - 1, view.head_revision()) : view.head_revision();
+  const Revision steps = std::max(std::min<Revision>(count, newest) - 1, Revision{1});
+  std::vector<RevisionInfo> sampled;
+  for (Revision step = steps; step >= 0; --step) {
+    const Revision wanted = 1 + (newest - 1) * step / steps;
+    if (!sampled.empty() && sampled.back().revision <= wanted) continue;
+    DSG_ASSIGN_OR_RETURN(const auto found, view.map().ListRevisions(wanted + 1, 1));
+    if (found.empty()) break;
+    sampled.push_back(found.front());
+  }
+  return sampled;
+}
+
+}  // namespace
+
 absl::Status ListRevisions(Engine* engine, const CallContext&,
                            const v1::ListRevisionsRequest& request,
                            v1::ListRevisionsResponse* reply) {
-  DSG_ASSIGN_OR_RETURN(const ReadView view, ReadView::Open(&engine->maps, request.map(),
-                                                           v1::ReadAt::default_instance()));
+  DSG_ASSIGN_OR_RETURN(const ReadView view, ReadView::Newest(&engine->maps, request.map()));
   DSG_ASSIGN_OR_RETURN(const int page_size, CheckPageSize(request.page_size()));
   if (request.before_revision() < 0) {
     return FieldError("before_revision", absl::StrCat(request.before_revision()),
                       "give a revision, or 0 to begin with the newest");
   }
   DSG_ASSIGN_OR_RETURN(const std::vector<RevisionInfo> revisions,
-                       view.map().ListRevisions(request.before_revision(), page_size));
+                       request.sampled()
+                           ? SampleRevisions(view, request.before_revision(), page_size)
+                           : view.map().ListRevisions(request.before_revision(), page_size));
   view.FillHeader(reply->mutable_header());
   size_t bytes = 0;
   for (const RevisionInfo& revision : revisions) {

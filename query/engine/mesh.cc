@@ -5,11 +5,14 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
+#include "dsg/v1/scene.pb.h"
+#include "query/engine/coarse_mesh.h"
 #include "query/engine/engine.h"
 #include "query/engine/node_mesh.h"
 #include "query/engine/request.h"
@@ -104,11 +107,72 @@ Box3d CubeOf(BlockIndex index, double size_m) {
   return Box3d(low, low + Eigen::Vector3d::Constant(size_m));
 }
 
+// How blocks are shown.
+struct MeshForm {
+  // 0 = as they are stored.
+  double cell_m = 0.0;
+  bool normals = true;
+  bool colors = true;
+  bool labels = true;
+  bool instances = true;
+  bool times = true;
+};
+
+absl::StatusOr<MeshForm> FormOf(const v1::GetMeshRequest& request) {
+  // A cell below the voxels of any mesh would only cost time.
+  constexpr double kCellMinM = 0.001;
+  constexpr double kCellMaxM = 100.0;
+  MeshForm form;
+  form.cell_m = request.cell_m();
+  if (form.cell_m != 0.0 && !(form.cell_m >= kCellMinM && form.cell_m <= kCellMaxM)) {
+    return FieldError("cell_m", absl::StrCat(request.cell_m()),
+                      "give 0.001 to 100 metres, or 0 for the mesh as it is stored");
+  }
+  if (request.channels().empty()) return form;
+  form.normals = form.colors = form.labels = form.instances = form.times = false;
+  for (const int channel : request.channels()) {
+    switch (channel) {
+      case v1::MESH_CHANNEL_NONE:
+        break;
+      case v1::MESH_CHANNEL_NORMALS:
+        form.normals = true;
+        break;
+      case v1::MESH_CHANNEL_COLORS:
+        form.colors = true;
+        break;
+      case v1::MESH_CHANNEL_LABELS:
+        form.labels = true;
+        break;
+      case v1::MESH_CHANNEL_INSTANCES:
+        form.instances = true;
+        break;
+      case v1::MESH_CHANNEL_TIMES:
+        form.times = true;
+        break;
+      default:
+        return FieldError("channels", absl::StrCat(channel),
+                          "name normals, colors, labels, instances, times or none");
+    }
+  }
+  return form;
+}
+
+void TakeForm(const MeshForm& form, MeshBlock* block) {
+  if (!form.normals) block->normals_map.clear();
+  if (!form.colors) block->colors.clear();
+  if (!form.labels) block->labels.clear();
+  if (!form.instances) block->instance_ids.clear();
+  if (!form.times) block->first_seen_ns.clear();
+  if (!form.times) block->last_seen_ns.clear();
+  if (form.cell_m > 0.0) *block = CoarsenBlock(*block, form.cell_m);
+}
+
 class MeshCursor final : public EngineCursor<v1::GetMeshResponse> {
  public:
   /// Without `part` whole blocks.
-  MeshCursor(const ReadView& view, std::vector<BlockIndex> blocks, std::optional<NodeMesh> part)
-      : view_(view), blocks_(std::move(blocks)), part_(std::move(part)) {}
+  MeshCursor(const ReadView& view, std::vector<BlockIndex> blocks, std::optional<NodeMesh> part,
+             const MeshForm& form)
+      : view_(view), blocks_(std::move(blocks)), part_(std::move(part)), form_(form) {}
 
   bool done() const override {
     return next_block_ == blocks_.size() && next_piece_ == pieces_.size();
@@ -138,6 +202,7 @@ class MeshCursor final : public EngineCursor<v1::GetMeshResponse> {
     if (part_.has_value()) block = part_->Cut(block);
     // Of a node a block without any of its faces says nothing.
     if (part_.has_value() && block.faces.empty()) return absl::OkStatus();
+    TakeForm(form_, &block);
     pieces_ = CutBlock(std::move(block), kVerticesPerPiece);
     return absl::OkStatus();
   }
@@ -145,6 +210,7 @@ class MeshCursor final : public EngineCursor<v1::GetMeshResponse> {
   const ReadView view_;
   const std::vector<BlockIndex> blocks_;
   const std::optional<NodeMesh> part_;
+  const MeshForm form_;
   size_t next_block_ = 0;
   std::vector<MeshBlock> pieces_;
   size_t next_piece_ = 0;
@@ -192,6 +258,7 @@ absl::StatusOr<NodeMesh> PartOfNode(const CallContext& call, const ReadView& vie
 CursorOr<v1::GetMeshResponse> GetMesh(Engine* engine, const CallContext& call,
                                       const v1::GetMeshRequest& request) {
   DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
+  DSG_ASSIGN_OR_RETURN(const MeshForm form, FormOf(request));
   std::optional<Box3d> box_map;
   if (request.has_box()) {
     DSG_ASSIGN_OR_RETURN(box_map, BoxFromProto(request.box(), "box"));
@@ -204,11 +271,51 @@ CursorOr<v1::GetMeshResponse> GetMesh(Engine* engine, const CallContext& call,
     DSG_ASSIGN_OR_RETURN(part, PartOfNode(call, view, request.node()));
     DSG_ASSIGN_OR_RETURN(blocks, BlocksOf(engine, call, view, *part));
   }
+  std::set<BlockIndex> wanted;
+  for (const v1::MeshBlockIndex& index : request.blocks()) {
+    wanted.insert({index.x(), index.y(), index.z()});
+  }
   const double size_m = view.snapshot().spec().mesh_block_size_m;
   std::erase_if(blocks, [&](const BlockIndex& index) {
-    return box_map.has_value() && !box_map->intersects(CubeOf(index, size_m));
+    return (box_map.has_value() && !box_map->intersects(CubeOf(index, size_m))) ||
+           (!wanted.empty() && !wanted.contains(index));
   });
-  return std::make_unique<MeshCursor>(view, std::move(blocks), std::move(part));
+  return std::make_unique<MeshCursor>(view, std::move(blocks), std::move(part), form);
+}
+
+absl::Status ListMeshBlocks(Engine* engine, const CallContext& call,
+                            const v1::ListMeshBlocksRequest& request,
+                            v1::ListMeshBlocksResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const Page page, engine->ReadPage("ListMeshBlocks", request));
+  std::optional<Box3d> box_map;
+  if (request.has_box()) {
+    DSG_ASSIGN_OR_RETURN(box_map, BoxFromProto(request.box(), "box"));
+  }
+  std::optional<BlockIndex> last;
+  if (!page.is_first()) {
+    if (!ReadKey(page.position, &last.emplace())) return PageTokenError();
+  }
+  const Snapshot& snapshot = page.view.snapshot();
+  DSG_ASSIGN_OR_RETURN(const auto blocks, snapshot.MeshBlockVersions(call.stop()));
+  page.view.FillHeader(reply->mutable_header());
+  for (const auto& [index, revision] : blocks) {
+    if (last.has_value() && !(*last < index)) continue;
+    if (box_map.has_value() &&
+        !box_map->intersects(CubeOf(index, snapshot.spec().mesh_block_size_m))) {
+      continue;
+    }
+    if (reply->blocks_size() == page.size) {
+      reply->set_next_page_token(page.NextToken(KeyPosition(*last)));
+      break;
+    }
+    v1::MeshBlockVersion* out = reply->add_blocks();
+    out->mutable_index()->set_x(index.x);
+    out->mutable_index()->set_y(index.y);
+    out->mutable_index()->set_z(index.z);
+    out->set_revision(revision);
+    last = index;
+  }
+  return absl::OkStatus();
 }
 
 namespace {

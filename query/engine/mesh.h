@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Answers GetMesh, a few blocks a message, and GetAsset. A block that outgrows a message is cut
-// into pieces.
+// Answers GetMesh, a few blocks a message, ListMeshBlocks, and GetAsset. A block that outgrows a
+// message is cut into pieces.
 #pragma once
 
 #include <vector>

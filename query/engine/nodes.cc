@@ -83,10 +83,14 @@ absl::StatusOr<int64_t> CountChildren(const Snapshot& snapshot, NodeId id, const
 absl::Status CheckNodeView(int view) {
   if (v1::NodeView_IsValid(view)) return absl::OkStatus();
   return FieldError("view", absl::StrCat(view),
-                    "give NODE_VIEW_BASIC, NODE_VIEW_GEOMETRY or NODE_VIEW_FULL");
+                    "give NODE_VIEW_ID, NODE_VIEW_BASIC, NODE_VIEW_GEOMETRY or NODE_VIEW_FULL");
 }
 
 void FillNode(const Node& node, const LayerTable& layers, int view, v1::Node* out) {
+  if (view == v1::NODE_VIEW_ID) {
+    out->set_id(ToString(node.id));
+    return;
+  }
   v1::Node full;
   v1::Node* filled = view == v1::NODE_VIEW_BASIC || view == v1::NODE_VIEW_GEOMETRY ? &full : out;
   ToProto(node, layers, filled);

@@ -115,6 +115,34 @@ absl::StatusOr<Revision> RevisionOfTag(MapReader* map, const std::string& tag) {
                    {{"map", map->spec().name}, {"tag", tag}});
 }
 
+namespace {
+
+// The newest revision with a stamp at or before this one. Clocks of writers go back at times, so
+// all that is newer has to be looked at.
+absl::StatusOr<Revision> RevisionCommittedAt(MapReader* map, int64_t committed_at_ns) {
+  Revision before = 0;
+  for (;;) {
+    DSG_ASSIGN_OR_RETURN(const auto revisions, map->ListRevisions(before, kPageSizeMax));
+    for (const RevisionInfo& one : revisions) {
+      if (one.committed_ns <= committed_at_ns) return one.revision;
+      before = one.revision;
+    }
+    if (std::ssize(revisions) < kPageSizeMax) break;
+  }
+  DSG_ASSIGN_OR_RETURN(const RevisionInfo head, map->Head());
+  return MakeError(Reason::kRevisionCompacted,
+                   absl::StrCat("map \"", map->spec().name,
+                                "\" knows no revision that was committed "
+                                "at or before ",
+                                FormatRfc3339(committed_at_ns),
+                                "; the oldest that it knows is revision ", before),
+                   {{"map", map->spec().name},
+                    {"oldest", absl::StrCat(before)},
+                    {"newest", absl::StrCat(head.revision)}});
+}
+
+}  // namespace
+
 absl::StatusOr<ReadView> ReadView::Make(MapTable* maps, std::shared_ptr<MapReader> map,
                                         std::shared_ptr<const Snapshot> snapshot, Revision head) {
   ReadView view;
@@ -134,6 +162,10 @@ absl::StatusOr<ReadView> ReadView::OpenAt(MapTable* maps, std::shared_ptr<MapRea
   return Make(maps, std::move(reader), std::move(snapshot), head.revision);
 }
 
+absl::StatusOr<ReadView> ReadView::Newest(MapTable* maps, const std::string& map) {
+  return Open(maps, map, v1::ReadAt::default_instance());
+}
+
 absl::StatusOr<ReadView> ReadView::Open(MapTable* maps, const std::string& map,
                                         const v1::ReadAt& read_at) {
   if (read_at.has_exact_revision() && read_at.exact_revision() < 0) {
@@ -147,6 +179,11 @@ absl::StatusOr<ReadView> ReadView::Open(MapTable* maps, const std::string& map,
   if (!read_at.tag().empty()) {
     DSG_ASSIGN_OR_RETURN(const Revision tagged, RevisionOfTag(reader.get(), read_at.tag()));
     return OpenAt(maps, std::move(reader), tagged);
+  }
+  if (read_at.has_committed_at_ns()) {
+    DSG_ASSIGN_OR_RETURN(const Revision revision,
+                         RevisionCommittedAt(reader.get(), read_at.committed_at_ns()));
+    return OpenAt(maps, std::move(reader), revision);
   }
   DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Snapshot> snapshot, reader->Latest());
   // The newest revision is the head, so it need not be asked for again.

@@ -80,6 +80,8 @@ class ReadView {
   static absl::StatusOr<ReadView> Open(MapTable* maps, const std::string& map,
                                        const v1::ReadAt& read_at);
 
+  static absl::StatusOr<ReadView> Newest(MapTable* maps, const std::string& map);
+
   /// The same of a map that is open, at exactly one revision.
   static absl::StatusOr<ReadView> OpenAt(MapTable* maps, std::shared_ptr<MapReader> map,
                                          Revision revision);
@@ -167,6 +169,7 @@ struct Page {
 /// the first one read, whatever has been committed since.
 /// Errors: as CheckPageSize, DecodePageToken, ReadView::Open; ABORTED/MAP_REPLACED when the map is
 /// another one than that of the first page.
+/// A request without `read_at` reads the newest revision.
 template <typename Request>
 absl::StatusOr<Page> OpenPage(MapTable* maps, std::string_view method, const Request& request) {
   Page page;
@@ -176,7 +179,11 @@ absl::StatusOr<Page> OpenPage(MapTable* maps, std::string_view method, const Req
   question.clear_page_token();
   page.question = QuestionDigest(method, question);
   if (request.page_token().empty()) {
-    DSG_ASSIGN_OR_RETURN(page.view, ReadView::Open(maps, request.map(), request.read_at()));
+    if constexpr (requires { request.read_at(); }) {
+      DSG_ASSIGN_OR_RETURN(page.view, ReadView::Open(maps, request.map(), request.read_at()));
+    } else {
+      DSG_ASSIGN_OR_RETURN(page.view, ReadView::Newest(maps, request.map()));
+    }
     return page;
   }
   DSG_ASSIGN_OR_RETURN(PageToken token, DecodePageToken(request.page_token(), page.question));

@@ -48,7 +48,7 @@ NodeFiller::NodeFiller(const Snapshot& snapshot, const GraphView& graph, int nod
     : snapshot_(snapshot), graph_(graph), layers_(graph.layers()), node_view_(node_view) {}
 
 bool NodeFiller::IsInView() const {
-  return node_view_ == v1::NODE_VIEW_BASIC || node_view_ == v1::NODE_VIEW_GEOMETRY;
+  return node_view_ != v1::NODE_VIEW_UNSPECIFIED && node_view_ != v1::NODE_VIEW_FULL;
 }
 
 Node NodeFiller::FromView(const ViewNode& node) const {

@@ -21,6 +21,7 @@ class Pose;
 class PoseFactor;
 class Revision;
 class TimedPose;
+class Vector3;
 }  // namespace dsg::v1
 
 namespace dsg {
@@ -38,6 +39,7 @@ class LayerTable {
   std::vector<Layer> layers_;
 };
 
+void ToProto(const Eigen::Vector3d& v, v1::Vector3* out);
 void ToProto(const Pose3d& pose, v1::Pose* out);
 Pose3d FromProto(const v1::Pose& in);
 void ToProto(const Box3d& box, v1::Box* out);

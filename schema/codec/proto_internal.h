@@ -14,7 +14,6 @@ class Vector3;
 
 namespace dsg {
 
-void ToProto(const Eigen::Vector3d& v, v1::Vector3* out);
 Eigen::Vector3d FromProto(const v1::Vector3& in);
 
 void AttributesToProto(const Attributes& attributes,

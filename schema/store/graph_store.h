@@ -50,6 +50,14 @@ struct Touched {
   bool layers_or_labels = false;
 };
 
+/// What was believed of a node during [from, to).
+struct NodeVersion {
+  Revision from = 0;
+  /// kRevisionMax = it is believed still.
+  Revision to = kRevisionMax;
+  Node node;
+};
+
 /// What an erasure that was begun and cut off has still to wipe out, by what it is.
 struct PendingErasure {
   int64_t node_count = 0;
@@ -90,6 +98,10 @@ class MapReader {
   virtual absl::StatusOr<std::vector<Tag>> Tags() = 0;
   /// Newest first, below `before` (0 = from the newest), at most `limit`.
   virtual absl::StatusOr<std::vector<RevisionInfo>> ListRevisions(Revision before, int limit) = 0;
+  /// Versions of a node that began before the revision `before` (0 = all), at most `limit`. Those
+  /// that no readable revision shows may be missing. Order: newest first.
+  virtual absl::StatusOr<std::vector<NodeVersion>> NodeVersions(NodeId id, Revision before,
+                                                                int limit) = 0;
   /// What was touched by the revisions after `after`, up to and with `until`.
   /// Nothing unless `after` is below `until`.
   /// Cost: that of what was touched; of the whole map where it was made before commits listed it.

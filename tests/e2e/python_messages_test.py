@@ -99,7 +99,7 @@ class Messages(unittest.TestCase):
 
     def test_each_message_of_the_protos_is_there(self):
         pool = descriptor_pool.Default()
-        names = {name for file in ("graph", "read", "search", "space", "meetings", *FILES)
+        names = {name for file in ("graph", "read", "search", "space", "meetings", "scene", *FILES)
                  for name in pool.FindFileByName(f"dsg/v1/{file}.proto").message_types_by_name}
         self.assertEqual(names, {kind.__name__ for kind in self.types})
 

@@ -33,6 +33,9 @@ class RevisionLog final : public MapReader {
     while (revision >= 1 && std::ssize(page) < limit) page.push_back(InfoOf(revision--));
     return page;
   }
+  absl::StatusOr<std::vector<NodeVersion>> NodeVersions(NodeId, Revision, int) override {
+    return NotThere();
+  }
   absl::StatusOr<Touched> TouchedBetween(Revision, Revision, const StopCheck&) override {
     return NotThere();
   }

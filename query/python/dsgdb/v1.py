@@ -756,6 +756,8 @@ class NodeView(ProtoEnum):
     NODE_VIEW_GEOMETRY = "NODE_VIEW_GEOMETRY"
     # All fields.
     NODE_VIEW_FULL = "NODE_VIEW_FULL"
+    # The id only; of edges their key.
+    NODE_VIEW_ID = "NODE_VIEW_ID"
 
 
 @dataclass(frozen=True)
@@ -770,6 +772,9 @@ class ReadAt:
     exact_revision: Optional[int] = None
     # The revision with this tag; see SetTag.
     tag: Optional[str] = None
+    # The newest revision that was committed at or before this time of the writer's wall clock,
+    # nanoseconds since 1970 UTC; fails with OUT_OF_RANGE if there is none.
+    committed_at_ns: Optional[int] = None
 
 
 @dataclass(frozen=True)
@@ -1228,6 +1233,18 @@ class GetMapStatsResponse:
     # What an interrupted erasure still has to remove; unset = none is pending. Repeat the same
     # prune to finish it.
     pending_erasure: Optional[PendingErasure] = None
+    # What can be read, ascending: a tag keeps its revision when those around it are compacted.
+    readable_revisions: tuple[RevisionRange, ...] = ()
+
+
+@dataclass(frozen=True)
+class RevisionRange:
+    """Revisions from `first` up to and including `last`."""
+
+    # The oldest and the newest revision of the range; equal for a single one.
+    first: int = 0
+    # At least `first`.
+    last: int = 0
 
 
 @dataclass(frozen=True)
@@ -1237,6 +1254,8 @@ class ListRevisionsRequest:
     before_revision: int = 0
     # 1 to 1000; 0 = 100.
     page_size: int = 0
+    # Not all, but page_size of them at even steps, the newest and the oldest among them.
+    sampled: bool = False
 
 
 @dataclass(frozen=True)
@@ -1526,6 +1545,251 @@ class ListInteractionsResponse:
     next_page_token: str = ""
     # Share of the interval, 0 to 1, in which any agent or object was observed.
     observed_share: float = 0.0
+
+
+@dataclass(frozen=True)
+class GetSceneRequest:
+    map: str = ""
+    read_at: Optional[ReadAt] = None
+    # Names of layers. Empty = all.
+    layers: tuple[str, ...] = ()
+    # Relations of the edges. Empty = all.
+    relations: tuple[str, ...] = ()
+    # Send no edges. Parents are sent all the same.
+    without_edges: bool = False
+    # Only nodes and edges that were valid at this world time, and agents between their first and
+    # last pose, where they were then. Unset = of any time, agents at their last pose.
+    at_ns: Optional[int] = None
+    # Of a layer with more nodes only so many are sent, evenly over its ids. 0 = no limit.
+    nodes_per_layer_max: int = 0
+
+
+@dataclass(frozen=True)
+class SceneLayer:
+    """A layer of a scene, and how much of it is sent."""
+
+    layer: Optional[Layer] = None
+    # Nodes of the layer that the request asks for.
+    node_count: int = 0
+    # How many of them are sent: fewer than node_count if nodes_per_layer_max was exceeded.
+    sent_count: int = 0
+
+
+@dataclass(frozen=True)
+class SceneHead:
+    """What a reader must know before the first row."""
+
+    # Descending by rank, then by name: the order of the rows.
+    layers: tuple[SceneLayer, ...] = ()
+    # Positions and outlines are relative to this point of the map frame, metres.
+    origin_map: Optional[Vector3] = None
+    # The corners of all boxes and positions that are sent, map frame, metres. Unset without nodes.
+    bounds_map: Optional[Box] = None
+    # Edges of the revision: no more are sent.
+    edge_count_max: int = 0
+
+
+@dataclass(frozen=True)
+class SceneNodes:
+    """Nodes of one layer, ascending by id."""
+
+    # Name of the layer that all of them are in.
+    layer: str = ""
+    # The number of the first row; rows are numbered from 0 through all messages of the stream.
+    first_row: int = 0
+    row_count: int = 0
+    # uint64: the letter of the id in the top 8 bits, its number in the low 56.
+    ids: bytes = b""
+    # uint32: the row of the parent by CONTAINS; 0xffffffff = it has none, or the parent is not
+    # sent.
+    parents: bytes = b""
+    # 3 x float32, metres from origin_map. NaN = nobody knows: an agent in a gap of its track.
+    positions: bytes = b""
+    # 4 x float32, x y z w of map_T_node. Empty = all are the identity.
+    orientations: bytes = b""
+    # 6 x float32: minimum and maximum in the node's frame, metres. NaN = no extent. Empty = none
+    # has an extent.
+    boxes: bytes = b""
+    # The kinds that the rows have: "human", "room", ...
+    kinds: tuple[str, ...] = ()
+    # uint16 into kinds. Empty = all are kinds[0].
+    kind_indices: bytes = b""
+    # Names of semantic classes; "" stands for none.
+    classes: tuple[str, ...] = ()
+    # uint16 into classes. Empty = all are classes[0].
+    class_indices: bytes = b""
+    # 4 x uint8: red, green, blue, alpha. Alpha 0 = no colour. Empty = none has a colour.
+    colors: bytes = b""
+    # int64, nanoseconds; the smallest int64 = open. Empty = all are open.
+    valid_from_ns: bytes = b""
+    # int64, nanoseconds; the largest int64 = open. Empty = all are open.
+    valid_to_ns: bytes = b""
+    # uint32: the end of the row's name in `names`; it begins where that of the row before ends.
+    # Empty = none has a name.
+    name_ends: bytes = b""
+    # The names one after the other, UTF-8.
+    names: bytes = b""
+    # float32, metres to the nearest obstacle. Empty = these are no places.
+    clearances: bytes = b""
+    # uint32: the end of the row's outline in `outlines`, in corners. Empty = none has an outline.
+    outline_ends: bytes = b""
+    # 2 x float32 a corner: x and y in metres from origin_map.
+    outlines: bytes = b""
+    # 2 x float32: heights of floor and ceiling, metres from origin_map. Empty = none has an
+    # outline.
+    heights: bytes = b""
+
+
+@dataclass(frozen=True)
+class SceneEdges:
+    """Edges of one relation between nodes that are sent, ascending by source, then target."""
+
+    relation: str = ""
+    row_count: int = 0
+    # uint32: the row of the node that each edge comes from.
+    sources: bytes = b""
+    # uint32: the row of the node that it leads to.
+    targets: bytes = b""
+    # float32; the meaning depends on the relation. Empty = all are 1.
+    weights: bytes = b""
+    # int64, nanoseconds; as of nodes.
+    valid_from_ns: bytes = b""
+    valid_to_ns: bytes = b""
+
+
+@dataclass(frozen=True)
+class GetSceneResponse:
+    # Set in the first message only, as is head.
+    header: Optional[ResponseHeader] = None
+    head: Optional[SceneHead] = None
+    # One of both, about 1 MiB; all nodes come before the first edge.
+    nodes: Optional[SceneNodes] = None
+    edges: Optional[SceneEdges] = None
+
+
+@dataclass(frozen=True)
+class GetTracksRequest:
+    map: str = ""
+    read_at: Optional[ReadAt] = None
+    # Node ids ("H12") or the names that the log gave ("12"), at most 10,000. Empty = all agents.
+    agents: tuple[str, ...] = ()
+    # Half-open. Unset = from the first pose, and up to and including the last.
+    from_ns: Optional[int] = None
+    to_ns: Optional[int] = None
+    # If set (at least 1 ms): poses interpolated at this period, from from_ns on, or of each track
+    # from its first pose on; none inside gaps.
+    resample_period_ns: int = 0
+    # If set: of stored poses that follow another one sooner than this only some are sent, so that
+    # two are at least so far apart. The first and the last pose of a stretch without a gap are
+    # always sent. Not together with resample_period_ns.
+    thin_period_ns: int = 0
+    # Send times and positions only.
+    without_orientations: bool = False
+    # Send positions and orientations as float32, in half of the bytes: positions within some
+    # micrometres, relative to an origin near by.
+    single_precision: bool = False
+
+
+@dataclass(frozen=True)
+class TrackHead:
+    """An agent whose poses are sent."""
+
+    agent_id: str = ""
+    agent_name: str = ""
+    # Consecutive poses further apart than this are a gap.
+    gap_ns_max: int = 0
+    # Poses of the whole track, whatever the request asks.
+    pose_count: int = 0
+    # Time of its first pose, nanoseconds; 0 without poses.
+    first_pose_ns: int = 0
+    # Time of its last pose, nanoseconds; 0 without poses.
+    last_pose_ns: int = 0
+
+
+@dataclass(frozen=True)
+class TrackPoses:
+    """Poses map_T_agent of one track, ascending in time."""
+
+    # Index into tracks of the first message.
+    track: int = 0
+    row_count: int = 0
+    # int64, nanoseconds.
+    times_ns: bytes = b""
+    # The size of a number in positions and orientations: 8 (float64), or 4 (float32) if
+    # single_precision was asked for.
+    value_bytes: int = 0
+    # Positions are relative to this point of the map frame, metres; 0 with float64, so that they
+    # are to the bit what GetTrajectory says.
+    origin_map: Optional[Vector3] = None
+    # 3 numbers a row, metres from origin_map.
+    positions: bytes = b""
+    # 4 numbers a row, x y z w; NaN = the source gave none. Empty = not asked for, or none is known.
+    orientations: bytes = b""
+    # uint32, ascending: rows before which the track has a gap.
+    gaps: bytes = b""
+    # uint8, bits as of TimedPose.flags. Empty = all are 0.
+    flags: bytes = b""
+
+
+@dataclass(frozen=True)
+class GetTracksResponse:
+    # Set in the first message only, as is tracks.
+    header: Optional[ResponseHeader] = None
+    # Ascending by id.
+    tracks: tuple[TrackHead, ...] = ()
+    # About 1 MiB; the tracks one after the other.
+    poses: tuple[TrackPoses, ...] = ()
+
+
+@dataclass(frozen=True)
+class GetTimelineRequest:
+    map: str = ""
+    read_at: Optional[ReadAt] = None
+    # Half-open. Unset = from the first pose of all tracks, and up to and including the last.
+    from_ns: Optional[int] = None
+    to_ns: Optional[int] = None
+    # Bins of equal length, 1 to 2000; 0 = 200.
+    bin_count: int = 0
+
+
+@dataclass(frozen=True)
+class GetTimelineResponse:
+    header: Optional[ResponseHeader] = None
+    # Ends of the first and the last bin; equal if there are no poses.
+    from_ns: int = 0
+    to_ns: int = 0
+    # Of each bin: agents with a pose in it, or an interpolated one.
+    agent_counts: tuple[int, ...] = ()
+    # Of each bin: stored poses of all agents.
+    pose_counts: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class ListMeshBlocksRequest:
+    map: str = ""
+    read_at: Optional[ReadAt] = None
+    # Only blocks whose cubes touch this box in the map frame. Unset = all.
+    box: Optional[Box] = None
+    # 1 to 1000; 0 = 100.
+    page_size: int = 0
+    page_token: str = ""
+
+
+@dataclass(frozen=True)
+class MeshBlockVersion:
+    """Which version of a mesh block a revision has."""
+
+    index: Optional[MeshBlockIndex] = None
+    # The revision that wrote the block: a reader that has it of this revision need not ask again.
+    revision: int = 0
+
+
+@dataclass(frozen=True)
+class ListMeshBlocksResponse:
+    header: Optional[ResponseHeader] = None
+    # Ascending by x, y, z.
+    blocks: tuple[MeshBlockVersion, ...] = ()
+    next_page_token: str = ""
 
 
 class Comparison(ProtoEnum):
@@ -1982,6 +2246,24 @@ class PredictAgentResponse:
     model: PredictionModel = PredictionModel.PREDICTION_MODEL_UNSPECIFIED
 
 
+class MeshChannel(ProtoEnum):
+    """What a mesh says of its vertices."""
+
+    MESH_CHANNEL_UNSPECIFIED = "MESH_CHANNEL_UNSPECIFIED"
+    # Nothing: with this one alone, positions and faces.
+    MESH_CHANNEL_NONE = "MESH_CHANNEL_NONE"
+    # Unit normals, map frame.
+    MESH_CHANNEL_NORMALS = "MESH_CHANNEL_NORMALS"
+    # Colours, 0xRRGGBB.
+    MESH_CHANNEL_COLORS = "MESH_CHANNEL_COLORS"
+    # Numbers of semantic classes.
+    MESH_CHANNEL_LABELS = "MESH_CHANNEL_LABELS"
+    # Numbers of the objects and structures that vertices belong to.
+    MESH_CHANNEL_INSTANCES = "MESH_CHANNEL_INSTANCES"
+    # When vertices were seen first and last.
+    MESH_CHANNEL_TIMES = "MESH_CHANNEL_TIMES"
+
+
 class ShapePart(ProtoEnum):
     """Parts of a body's shape."""
 
@@ -1994,6 +2276,18 @@ class ShapePart(ProtoEnum):
     SHAPE_PART_VERTICES = "SHAPE_PART_VERTICES"
     # The assets with the faces between the vertices.
     SHAPE_PART_TOPOLOGY = "SHAPE_PART_TOPOLOGY"
+
+
+class WordType(ProtoEnum):
+    """What a word names."""
+
+    WORD_TYPE_UNSPECIFIED = "WORD_TYPE_UNSPECIFIED"
+    # A kind of nodes: "human", "room".
+    WORD_TYPE_KIND = "WORD_TYPE_KIND"
+    # A semantic class: "chair".
+    WORD_TYPE_CLASS = "WORD_TYPE_CLASS"
+    # A relation of edges: "ON".
+    WORD_TYPE_RELATION = "WORD_TYPE_RELATION"
 
 
 @dataclass(frozen=True)
@@ -2235,6 +2529,13 @@ class GetMeshRequest:
     # Only the faces of this object, structure, room or region, by id or unique name: by its
     # instance id, else by where they lie (docs/query_semantics.md). Empty = all.
     node: str = ""
+    # Only these blocks; one that is not there is left out. Empty = all. See ListMeshBlocks.
+    blocks: tuple[MeshBlockIndex, ...] = ()
+    # A coarser mesh: all vertices of a block within a cube of this edge length, metres, become one,
+    # and faces that lose an edge by it are left out. 0 = the mesh as it is stored.
+    cell_m: float = 0.0
+    # What to send beside positions and faces. Empty = everything.
+    channels: tuple[MeshChannel, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -2417,6 +2718,99 @@ class GetSubgraphResponse:
     nodes: tuple[Node, ...] = ()
     # Ascending by source, relation, target; sent after the last node.
     edges: tuple[Edge, ...] = ()
+
+
+@dataclass(frozen=True)
+class BatchGetShapesRequest:
+    map: str = ""
+    read_at: Optional[ReadAt] = None
+    # Node ids ("H12") or the names that the log gave ("12"), at most 10,000. Empty = all agents.
+    agents: tuple[str, ...] = ()
+    # World time, nanoseconds.
+    at_ns: int = 0
+    # What to send; empty = everything.
+    parts: tuple[ShapePart, ...] = ()
+
+
+@dataclass(frozen=True)
+class ShapeOfAgent:
+    """The body of one of many agents."""
+
+    agent_id: str = ""
+    # The stored shape that is nearest in time, at most the gap limit of the track away. `pose` is
+    # that at at_ns.
+    shape: Optional[AgentShape] = None
+
+
+@dataclass(frozen=True)
+class BatchGetShapesResponse:
+    # Set in the first message only, which is also sent if no agent has a shape then.
+    header: Optional[ResponseHeader] = None
+    # Ascending by id. An agent without a shape near at_ns, or that was not there then, is left out.
+    shapes: tuple[ShapeOfAgent, ...] = ()
+    # Each is sent once, before the first shape that refers to it, in a message without shapes.
+    topologies: tuple[Asset, ...] = ()
+
+
+@dataclass(frozen=True)
+class ListNodeVersionsRequest:
+    map: str = ""
+    # A node id. Names change from version to version.
+    id: str = ""
+    view: NodeView = NodeView.NODE_VIEW_UNSPECIFIED
+    # 1 to 1000; 0 = 100.
+    page_size: int = 0
+    page_token: str = ""
+
+
+@dataclass(frozen=True)
+class NodeVersion:
+    """What a stretch of revisions says of a node."""
+
+    # The version was believed from this revision on, up to and without to_revision.
+    from_revision: int = 0
+    # Unset = it is believed still.
+    to_revision: Optional[int] = None
+    node: Optional[Node] = None
+
+
+@dataclass(frozen=True)
+class ListNodeVersionsResponse:
+    # read_revision is the newest revision.
+    header: Optional[ResponseHeader] = None
+    # Newest first. Between two that do not meet the node was not in the map.
+    versions: tuple[NodeVersion, ...] = ()
+    next_page_token: str = ""
+
+
+@dataclass(frozen=True)
+class ListVocabularyRequest:
+    map: str = ""
+    read_at: Optional[ReadAt] = None
+    # 1 to 1000; 0 = 100.
+    page_size: int = 0
+    page_token: str = ""
+
+
+@dataclass(frozen=True)
+class Word:
+    """A word that a search can use."""
+
+    type: WordType = WordType.WORD_TYPE_UNSPECIFIED
+    # Of kinds and classes: the layer of the nodes that are counted. Empty for relations.
+    layer: str = ""
+    # As a query has it: "chair", "ON".
+    text: str = ""
+    # Nodes of the kind or class, edges of the relation.
+    count: int = 0
+
+
+@dataclass(frozen=True)
+class ListVocabularyResponse:
+    header: Optional[ResponseHeader] = None
+    # Ascending by type, layer, text.
+    words: tuple[Word, ...] = ()
+    next_page_token: str = ""
 
 
 class Api(Caller):
@@ -2757,4 +3151,60 @@ class Api(Caller):
         more than a day after the last.
         """
         return self._unary("dsg.v1.QueryService/PredictAgent", request, PredictAgentResponse,
+                           timeout, reads=True)
+
+    def get_scene(self, request: GetSceneRequest,
+                  timeout: Optional[float] = None) -> Iterator[GetSceneResponse]:
+        """Nodes and edges of whole layers as packed columns, about 1 MiB per message.
+        Errors: NOT_FOUND/LAYER_UNKNOWN; INVALID_ARGUMENT/FIELD_INVALID.
+        """
+        return self._stream("dsg.v1.QueryService/GetScene", request, GetSceneResponse, timeout,
+                            reads=True, lifetime="answer")
+
+    def get_tracks(self, request: GetTracksRequest,
+                   timeout: Optional[float] = None) -> Iterator[GetTracksResponse]:
+        """The poses of many agents over an interval as packed columns, about 1 MiB per message.
+        Covariances are left out; GetTrajectory has them.
+        Errors: NOT_FOUND/AGENT_UNKNOWN; INVALID_ARGUMENT/TIME_RANGE_INVERTED or FIELD_INVALID.
+        """
+        return self._stream("dsg.v1.QueryService/GetTracks", request, GetTracksResponse, timeout,
+                            reads=True, lifetime="answer")
+
+    def get_timeline(self, request: GetTimelineRequest,
+                     timeout: Optional[float] = None) -> GetTimelineResponse:
+        """How many agents were observed when, in bins of equal length.
+        Errors: INVALID_ARGUMENT/TIME_RANGE_INVERTED or FIELD_INVALID.
+        """
+        return self._unary("dsg.v1.QueryService/GetTimeline", request, GetTimelineResponse, timeout,
+                           reads=True)
+
+    def batch_get_shapes(self, request: BatchGetShapesRequest,
+                         timeout: Optional[float] = None) -> Iterator[BatchGetShapesResponse]:
+        """The bodies of agents at one instant, those with a body shape, about 1 MiB per message.
+        Errors: NOT_FOUND/AGENT_UNKNOWN; INVALID_ARGUMENT/FIELD_INVALID.
+        """
+        return self._stream("dsg.v1.QueryService/BatchGetShapes", request, BatchGetShapesResponse,
+                            timeout, reads=True, lifetime="answer")
+
+    def list_mesh_blocks(self, request: ListMeshBlocksRequest,
+                         timeout: Optional[float] = None) -> ListMeshBlocksResponse:
+        """Indices of mesh blocks, with the revision that wrote each.
+        Errors: INVALID_ARGUMENT/BOX_INVERTED or NUMBER_NOT_FINITE.
+        """
+        return self._unary("dsg.v1.QueryService/ListMeshBlocks", request, ListMeshBlocksResponse,
+                           timeout, reads=True)
+
+    def list_node_versions(self, request: ListNodeVersionsRequest,
+                           timeout: Optional[float] = None) -> ListNodeVersionsResponse:
+        """What was believed of one node: its versions in the revisions that are still readable,
+        newest first. Errors: NOT_FOUND/NODE_UNKNOWN for an id that no readable revision knows.
+        """
+        return self._unary("dsg.v1.QueryService/ListNodeVersions", request,
+                           ListNodeVersionsResponse, timeout, reads=True)
+
+    def list_vocabulary(self, request: ListVocabularyRequest,
+                        timeout: Optional[float] = None) -> ListVocabularyResponse:
+        """The words that a search can use: kinds, classes and relations of a revision, with counts.
+        """
+        return self._unary("dsg.v1.QueryService/ListVocabulary", request, ListVocabularyResponse,
                            timeout, reads=True)

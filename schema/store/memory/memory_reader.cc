@@ -65,6 +65,19 @@ absl::StatusOr<std::vector<RevisionInfo>> MemoryReader::ListRevisions(Revision b
   return revisions;
 }
 
+absl::StatusOr<std::vector<NodeVersion>> MemoryReader::NodeVersions(NodeId id, Revision before,
+                                                                    int limit) {
+  const std::lock_guard lock(rows_->mutex);
+  std::vector<NodeVersion> versions;
+  rows_->nodes.ForEachOf(id, [&](const auto& version) {
+    if (before > 0 && version.from >= before) return;
+    versions.push_back({version.from, version.to, version.value.node});
+  });
+  std::reverse(versions.begin(), versions.end());
+  versions.resize(std::min(versions.size(), static_cast<size_t>(std::max(limit, 0))));
+  return versions;
+}
+
 absl::StatusOr<Touched> MemoryReader::TouchedBetween(Revision after, Revision until,
                                                      const StopCheck& stop) {
   const std::lock_guard lock(rows_->mutex);

@@ -70,6 +70,13 @@ class Versions {
       for (const Version& version : versions) visit(key, version);
     }
   }
+  /// Calls `visit(version)` for each version of one key, ascending by revision.
+  template <typename Visit>
+  void ForEachOf(const Key& key, const Visit& visit) const {
+    const auto found = all_.find(key);
+    if (found == all_.end()) return;
+    for (const Version& version : found->second) visit(version);
+  }
   template <typename Visit>
   void ForEachAt(Revision revision, const Visit& visit) const {
     ForEach([&](const Key& key, const Version& version) {

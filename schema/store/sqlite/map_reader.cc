@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "schema/store/sqlite/copy.h"
 #include "schema/store/sqlite/erasure.h"
+#include "schema/store/sqlite/graph_rows.h"
 #include "schema/store/sqlite/revision_rows.h"
 #include "schema/store/sqlite/rows.h"
 #include "schema/store/sqlite/stream_out.h"
@@ -194,6 +195,25 @@ absl::StatusOr<std::vector<RevisionInfo>> SqliteMapReader::ListRevisions(Revisio
                                                                          int limit) {
   DSG_ASSIGN_OR_RETURN(Lease lease, LeaseConnection());
   return ReadRevisions(*lease, before > 0 ? before : kRevisionMax, limit);
+}
+
+absl::StatusOr<std::vector<NodeVersion>> SqliteMapReader::NodeVersions(NodeId id, Revision before,
+                                                                       int limit) {
+  DSG_ASSIGN_OR_RETURN(Lease lease, LeaseConnection());
+  Query query(*lease,
+              "SELECT key, rev_from, layer, payload, checksum, NULL FROM node"
+              " WHERE key = ?1 AND rev_from < ?2"
+              " UNION ALL SELECT key, rev_from, layer, payload, checksum, rev_to FROM node_history"
+              " WHERE key = ?1 AND rev_from < ?2 ORDER BY rev_from DESC LIMIT ?3");
+  query.Bind(KeyOf(id), before > 0 ? before : kRevisionMax, limit);
+  std::vector<NodeVersion> versions;
+  while (query.Next()) {
+    DSG_ASSIGN_OR_RETURN(Node node, NodeFromRow(query, spec_.name));
+    const Revision to = query.IsNull(5) ? kRevisionMax : query.Int(5);
+    versions.push_back({query.Int(1), to, std::move(node)});
+  }
+  DSG_RETURN_IF_ERROR(query.status());
+  return versions;
 }
 
 absl::StatusOr<Touched> SqliteMapReader::TouchedBetween(Revision after, Revision until,

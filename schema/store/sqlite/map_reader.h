@@ -33,6 +33,8 @@ class SqliteMapReader : public MapReader, public std::enable_shared_from_this<Sq
   absl::StatusOr<std::optional<PendingErasure>> GetPendingErasure() override;
   absl::StatusOr<std::vector<Tag>> Tags() override;
   absl::StatusOr<std::vector<RevisionInfo>> ListRevisions(Revision before, int limit) override;
+  absl::StatusOr<std::vector<NodeVersion>> NodeVersions(NodeId id, Revision before,
+                                                        int limit) override;
   absl::StatusOr<Touched> TouchedBetween(Revision after, Revision until,
                                          const StopCheck& stop) override;
   absl::StatusOr<SessionState> GetSession(const std::string& session_id) override;

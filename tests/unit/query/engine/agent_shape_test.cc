@@ -231,5 +231,65 @@ TEST_F(AgentShape, StopsAtTheDeadlineAndWhenTheCallerHasEnough) {
   EXPECT_EQ(count, 2);
 }
 
+class ShapesAt : public AgentShape {
+ protected:
+  absl::StatusOr<std::vector<v1::BatchGetShapesResponse>> AskAt(TimeNs at_ns) {
+    if (core_ == nullptr) core_ = OpenCore(folder_.path());
+    batch_.set_map(kMap);
+    batch_.set_at_ns(at_ns);
+    std::vector<v1::BatchGetShapesResponse> messages;
+    const absl::Status status = query::ReadStream(
+        CallContext(), core_->BatchGetShapes(CallContext(), batch_), [&](const auto& message) {
+          messages.push_back(message);
+          return true;
+        });
+    if (!status.ok()) return status;
+    return messages;
+  }
+
+  v1::BatchGetShapesRequest batch_;
+};
+
+TEST_F(ShapesAt, AnInstantAreTheNearestInTimeWithTheFacesFirst) {
+  const auto messages = AskAt(3 * kSecond + 200'000'000);
+  ASSERT_TRUE(messages.ok()) << messages.status();
+  ASSERT_EQ(messages->size(), 2u);
+  EXPECT_TRUE(messages->front().has_header());
+  ASSERT_EQ(messages->front().topologies_size(), 1);
+  // H13 has no body, the robot was not there yet.
+  ASSERT_EQ(messages->back().shapes_size(), 1);
+  const v1::ShapeOfAgent& body = messages->back().shapes(0);
+  EXPECT_EQ(body.agent_id(), "H12");
+  EXPECT_EQ(body.shape().shape().time_ns(), 3 * kSecond);
+  EXPECT_NEAR(body.shape().pose().position().x(), 4.2, 1e-9);
+  EXPECT_EQ(body.shape().quality(), v1::INTERPOLATED);
+  EXPECT_EQ(body.shape().topology_sha256(), messages->front().topologies(0).sha256());
+  EXPECT_EQ(body.shape().vertex_count(), static_cast<int>(kVertexCount));
+}
+
+TEST_F(ShapesAt, AnInstantOfAGapOrWithoutABodyAreNone) {
+  // Its track has a gap, though there are bodies; at the end of it there are none.
+  for (const TimeNs at_ns : {20 * kSecond, 61 * kSecond}) {
+    const auto messages = AskAt(at_ns);
+    ASSERT_TRUE(messages.ok()) << messages.status();
+    ASSERT_EQ(messages->size(), 1u);
+    EXPECT_TRUE(messages->front().has_header());
+    EXPECT_EQ(messages->front().shapes_size(), 0);
+  }
+  batch_.add_agents("nobody");
+  EXPECT_EQ(ReasonOf(AskAt(kSecond).status()), Reason::kAgentUnknown);
+}
+
+TEST_F(ShapesAt, AnInstantHaveThePartsThatWereAskedFor) {
+  batch_.add_agents("12");
+  batch_.add_parts(v1::SHAPE_PART_JOINTS);
+  const auto messages = AskAt(18 * kSecond);
+  ASSERT_TRUE(messages.ok()) << messages.status();
+  ASSERT_EQ(messages->size(), 1u);
+  ASSERT_EQ(messages->front().shapes_size(), 1);
+  EXPECT_EQ(messages->front().shapes(0).shape().shape().joints_size(), 72);
+  EXPECT_EQ(messages->front().shapes(0).shape().shape().vertices_size(), 0);
+}
+
 }  // namespace
 }  // namespace dsg::test

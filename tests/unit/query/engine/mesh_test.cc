@@ -5,9 +5,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "dsg/v1/query_service.pb.h"
+#include "dsg/v1/scene.pb.h"
+#include "query/engine/coarse_mesh.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 #include "tests/unit/query/engine/office.h"
@@ -134,6 +137,94 @@ TEST_F(Mesh, GivesOnlyBlocksThatTouchTheBox) {
   ASSERT_EQ(messages->size(), 1u);
   ASSERT_EQ(messages->front().blocks_size(), 1);
   EXPECT_EQ(messages->front().blocks(0).x(), 4);
+}
+
+TEST_F(Mesh, GivesTheBlocksAndChannelsThatAreNamed) {
+  v1::GetMeshRequest request = OfMap();
+  for (const int x : {4, 9}) request.add_blocks()->set_x(x);
+  request.add_channels(v1::MESH_CHANNEL_COLORS);
+  const auto messages = Ask(request);
+  ASSERT_TRUE(messages.ok()) << messages.status();
+  ASSERT_EQ(messages->front().blocks_size(), 1) << "there is no block 9";
+  const MeshBlock block = *FromProto(messages->front().blocks(0));
+  EXPECT_EQ(block.index.x, 4);
+  EXPECT_EQ(block.colors.size(), block.positions_map.size());
+  EXPECT_TRUE(block.normals_map.empty());
+  EXPECT_TRUE(block.labels.empty());
+  EXPECT_TRUE(block.last_seen_ns.empty());
+  request.add_channels(static_cast<v1::MeshChannel>(99));
+  EXPECT_EQ(ReasonOf(Ask(request).status()), Reason::kFieldInvalid);
+}
+
+TEST_F(Mesh, IsCoarserWithACell) {
+  v1::GetMeshRequest request = OfMap();
+  request.set_cell_m(0.1);
+  const auto messages = Ask(request);
+  ASSERT_TRUE(messages.ok()) << messages.status();
+  size_t vertices = 0;
+  for (const v1::GetMeshResponse& message : *messages) {
+    for (const v1::MeshBlock& in : message.blocks())
+      vertices += FromProto(in)->positions_map.size();
+  }
+  // Three strips of 1.9 m, two vertices wide.
+  EXPECT_LE(vertices, 3u * 2 * 20);
+  EXPECT_GE(vertices, 40u);
+  for (const double cell : {-1.0, 1e-9, std::nan("")}) {
+    request.set_cell_m(cell);
+    EXPECT_EQ(ReasonOf(Ask(request).status()), Reason::kFieldInvalid) << cell;
+  }
+}
+
+TEST(CoarsenBlock, KeepsASurfaceAndItsSide) {
+  // A square of 1 m, 11 x 11 vertices, facing up, with colours that grow along x.
+  MeshBlock square;
+  for (uint32_t i = 0; i < 121; ++i) {
+    square.positions_map.emplace_back(0.1f * static_cast<float>(i % 11),
+                                      0.1f * static_cast<float>(i / 11), 0.0f);
+    square.normals_map.emplace_back(0.0f, 0.0f, 1.0f);
+    square.colors.push_back(i % 11 * 20 << 16);
+    square.first_seen_ns.push_back(i);
+    square.last_seen_ns.push_back(i);
+  }
+  for (uint32_t row = 0; row < 10; ++row) {
+    for (uint32_t i = 11 * row; i < 11 * row + 10; ++i) {
+      square.faces.push_back({i, i + 1, i + 12});
+      square.faces.push_back({i, i + 12, i + 11});
+    }
+  }
+  const MeshBlock coarse = CoarsenBlock(square, 0.25);
+  EXPECT_EQ(coarse.positions_map.size(), 25u);
+  EXPECT_EQ(coarse.colors.size(), 25u);
+  EXPECT_EQ(coarse.first_seen_ns.front(), 0);
+  EXPECT_EQ(coarse.last_seen_ns.back(), 120);
+  double area = 0.0;
+  for (const auto& [a, b, c] : coarse.faces) {
+    const Eigen::Vector3f u = coarse.positions_map[b] - coarse.positions_map[a];
+    const Eigen::Vector3f v = coarse.positions_map[c] - coarse.positions_map[a];
+    EXPECT_GT(u.cross(v).z(), 0.0f);
+    area += 0.5 * u.cross(v).z();
+  }
+  // Only the outermost half cells are lost.
+  EXPECT_GT(area, 0.7);
+  EXPECT_LE(area, 1.0);
+}
+
+TEST_F(Mesh, ListsItsBlocksWithTheirRevisions) {
+  v1::ListMeshBlocksRequest request;
+  request.set_map(kMap);
+  request.set_page_size(2);
+  core_ = test::OpenCore(folder_.path());
+  std::vector<int> found;
+  do {
+    v1::ListMeshBlocksResponse reply;
+    ASSERT_TRUE(core_->ListMeshBlocks(CallContext(), request, &reply).ok());
+    for (const v1::MeshBlockVersion& block : reply.blocks()) {
+      found.push_back(block.index().x());
+      EXPECT_EQ(block.revision(), 2);
+    }
+    request.set_page_token(reply.next_page_token());
+  } while (!request.page_token().empty());
+  EXPECT_EQ(found, (std::vector<int>{-1, 0, 4}));
 }
 
 TEST_F(Mesh, AnswersWithAHeaderAloneWhereThereIsNoMesh) {

@@ -284,6 +284,33 @@ TEST_P(Revisions, AreDenseAndListedNewestFirst) {
   EXPECT_EQ(page[1].revision, 3);
 }
 
+TEST_P(Revisions, OfOneNodeAreItsVersions) {
+  TestMap map(GetParam());
+  const NodeId cup('O', 1);
+  for (const char* name : {"cup", "mug", "mug", "glass"}) {
+    map.MustCommit(DeltaOfNodes({MakeObject(1, name, Box3d())}));
+  }
+  map.MustCommit(DeltaOfNodes({MakeHuman(1, "ann")}));
+  const auto all = OrDie(map.reader().NodeVersions(cup, 0, 10));
+  std::vector<std::string> said;
+  for (const NodeVersion& version : all) {
+    const std::string to =
+        version.to == kRevisionMax ? std::string("now") : absl::StrCat(version.to);
+    said.push_back(absl::StrCat(version.node.name, " ", version.from, " to ", to));
+    EXPECT_EQ(version.node.id, cup);
+  }
+  // What is written again as it is may be a version of its own, or none.
+  ASSERT_GE(said.size(), 3u);
+  EXPECT_EQ(said.front(), "glass 4 to now");
+  EXPECT_EQ(said.back(), "cup 1 to 2");
+  for (size_t i = 1; i < all.size(); ++i) EXPECT_EQ(all[i].to, all[i - 1].from);
+  const auto page = OrDie(map.reader().NodeVersions(cup, 4, 1));
+  ASSERT_EQ(page.size(), 1u);
+  EXPECT_EQ(page[0].node.name, "mug");
+  EXPECT_EQ(page[0].from, all[1].from);
+  EXPECT_TRUE(OrDie(map.reader().NodeVersions(NodeId('O', 2), 0, 10)).empty());
+}
+
 TEST_P(Revisions, OfTheFutureAreRefusedNamingWhatIsReadable) {
   TestMap map(GetParam());
   map.MustCommit({});

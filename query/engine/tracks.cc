@@ -1,0 +1,320 @@
+// SPDX-License-Identifier: Apache-2.0
+// Answers GetTracks and GetTimeline: the tracks of many agents at once. Memory holds one message.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "dsg/v1/query_service.pb.h"
+#include "dsg/v1/scene.pb.h"
+#include "query/engine/columns.h"
+#include "query/engine/engine.h"
+#include "query/engine/request.h"
+#include "query/engine/track_walk.h"
+#include "schema/base/status.h"
+#include "schema/codec/proto_convert.h"
+
+namespace dsg::query {
+namespace {
+
+constexpr TimeNs kThinPeriodNsMin = 1'000'000;
+constexpr int kBinCountDefault = 200;
+constexpr int kBinCountMax = 2000;
+
+// The columns of one TrackPoses.
+class PoseColumns {
+ public:
+  PoseColumns(bool is_single, bool with_orientations)
+      : is_single_(is_single), with_orientations_(with_orientations) {}
+
+  void Add(const TimedPose& pose, bool is_after_gap) {
+    if (row_count_ == 0 && is_single_) origin_map_ = pose.map_T_agent.position.array().round();
+    if (is_after_gap) Append(static_cast<uint32_t>(row_count_), &gaps_);
+    ++row_count_;
+    Append(pose.time_ns, &times_);
+    flags_.Add(static_cast<uint8_t>(pose.flags));
+    AddRow(pose.map_T_agent.position - origin_map_, &positions_);
+    if (!with_orientations_) return;
+    const bool is_known = (pose.flags & pose_flags::kNoOrientation) == 0;
+    has_orientation_ = has_orientation_ || is_known;
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    AddRow(is_known ? Eigen::Vector4d(pose.map_T_agent.orientation.coeffs())
+                    : Eigen::Vector4d::Constant(kNone),
+           &orientations_);
+  }
+
+  bool empty() const { return row_count_ == 0; }
+  size_t size_bytes() const { return times_.size() + positions_.size() + orientations_.size(); }
+
+  void Fill(v1::TrackPoses* out) {
+    out->set_row_count(row_count_);
+    out->set_value_bytes(is_single_ ? sizeof(float) : sizeof(double));
+    ToProto(origin_map_, out->mutable_origin_map());
+    *out->mutable_times_ns() = std::move(times_);
+    *out->mutable_positions() = std::move(positions_);
+    if (has_orientation_) *out->mutable_orientations() = std::move(orientations_);
+    *out->mutable_gaps() = std::move(gaps_);
+    *out->mutable_flags() = flags_.Take();
+  }
+
+ private:
+  template <typename Row>
+  void AddRow(const Row& values, std::string* column) const {
+    if (is_single_) {
+      AppendRow<float>(values, column);
+    } else {
+      AppendRow<double>(values, column);
+    }
+  }
+
+  const bool is_single_;
+  const bool with_orientations_;
+  bool has_orientation_ = false;
+  int row_count_ = 0;
+  Eigen::Vector3d origin_map_ = Eigen::Vector3d::Zero();
+  std::string times_;
+  std::string positions_;
+  std::string orientations_;
+  std::string gaps_;
+  RareColumn<uint8_t> flags_{0};
+};
+
+// Leaves out stored poses that follow another one too soon, but for the ends of stretches.
+class Thinner {
+ public:
+  explicit Thinner(TimeNs period_ns) : period_ns_(period_ns) {}
+
+  void Take(const TimedPose& pose, bool is_after_gap, PoseColumns* columns) {
+    if (is_after_gap) Finish(columns);
+    if (last_ns_.has_value() && !is_after_gap && pose.time_ns - *last_ns_ < period_ns_) {
+      waiting_ = pose;
+      return;
+    }
+    columns->Add(pose, is_after_gap);
+    last_ns_ = pose.time_ns;
+    waiting_.reset();
+  }
+  // The last pose of a stretch.
+  void Finish(PoseColumns* columns) {
+    if (waiting_.has_value()) columns->Add(*waiting_, false);
+    waiting_.reset();
+  }
+
+ private:
+  TimeNs period_ns_;
+  std::optional<TimeNs> last_ns_;
+  std::optional<TimedPose> waiting_;
+};
+
+class TracksCursor final : public EngineCursor<v1::GetTracksResponse> {
+ public:
+  TracksCursor(const ReadView& view, std::vector<TrackInfo> tracks, const WalkRange& range,
+               const v1::GetTracksRequest& request)
+      : view_(view),
+        tracks_(std::move(tracks)),
+        range_(range),
+        thin_period_ns_(request.thin_period_ns()),
+        is_single_(request.single_precision()),
+        with_orientations_(!request.without_orientations()),
+        thinner_(thin_period_ns_) {}
+
+  bool done() const override { return track_ == tracks_.size(); }
+
+ private:
+  absl::Status Fill(const CallContext& call, v1::GetTracksResponse* reply) override {
+    if (is_first_) {
+      view_.FillHeader(reply->mutable_header());
+      for (const TrackInfo& track : tracks_) FillTrack(track, reply->add_tracks());
+      is_first_ = false;
+    }
+    for (size_t bytes = 0; !done() && bytes < kPageBytesSoftMax;) {
+      DSG_RETURN_IF_ERROR(call.Check());
+      DSG_RETURN_IF_ERROR(ReadOn(call, kPageBytesSoftMax - bytes, &bytes, reply));
+    }
+    return absl::OkStatus();
+  }
+
+  static void FillTrack(const TrackInfo& track, v1::TrackHead* out) {
+    out->set_agent_id(ToString(track.agent));
+    out->set_agent_name(track.name);
+    out->set_gap_ns_max(track.gap_ns_max);
+    out->set_pose_count(track.pose_count);
+    if (track.pose_count == 0) return;
+    out->set_first_pose_ns(track.first_ns);
+    out->set_last_pose_ns(track.last_ns);
+  }
+
+  // Poses of the track that is walked along, until it ends or there is no more room.
+  absl::Status ReadOn(const CallContext& call, size_t room_bytes, size_t* bytes,
+                      v1::GetTracksResponse* reply) {
+    if (!walk_.has_value()) {
+      walk_.emplace(tracks_[track_], range_);
+      thinner_ = Thinner(thin_period_ns_);
+    }
+    PoseColumns columns(is_single_, with_orientations_);
+    DSG_RETURN_IF_ERROR(
+        walk_->Read(view_.snapshot(), call.stop(), [&](const TimedPose& pose, bool is_after_gap) {
+          if (columns.size_bytes() >= room_bytes) return false;
+          Take(pose, is_after_gap, &columns);
+          return true;
+        }));
+    if (walk_->done()) thinner_.Finish(&columns);
+    if (!columns.empty()) {
+      *bytes += columns.size_bytes();
+      v1::TrackPoses* out = reply->add_poses();
+      out->set_track(static_cast<int32_t>(track_));
+      columns.Fill(out);
+    }
+    if (walk_->done()) {
+      walk_.reset();
+      ++track_;
+    }
+    return absl::OkStatus();
+  }
+
+  void Take(const TimedPose& pose, bool is_after_gap, PoseColumns* columns) {
+    if (thin_period_ns_ > 0) {
+      thinner_.Take(pose, is_after_gap, columns);
+    } else {
+      columns->Add(pose, is_after_gap);
+    }
+  }
+
+  const ReadView view_;
+  const std::vector<TrackInfo> tracks_;
+  const WalkRange range_;
+  const TimeNs thin_period_ns_;
+  const bool is_single_;
+  const bool with_orientations_;
+  bool is_first_ = true;
+  // The track that is walked along.
+  size_t track_ = 0;
+  std::optional<TrackWalk> walk_;
+  Thinner thinner_;
+};
+
+absl::StatusOr<WalkRange> RangeOf(const v1::GetTracksRequest& request) {
+  DSG_ASSIGN_OR_RETURN(const WalkRange range, WalkRangeOf(request));
+  const TimeNs thin_ns = request.thin_period_ns();
+  if (thin_ns != 0 && thin_ns < kThinPeriodNsMin) {
+    return FieldError("thin_period_ns", absl::StrCat(thin_ns),
+                      "give at least 1000000 (1 ms), or 0 for all poses");
+  }
+  if (thin_ns != 0 && range.period_ns != 0) {
+    return FieldError("thin_period_ns", absl::StrCat(thin_ns),
+                      "poses are either interpolated or thinned: leave out this one or "
+                      "resample_period_ns");
+  }
+  return range;
+}
+
+// How many agents were observed in each of some bins.
+class Bins {
+ public:
+  Bins(TimeNs from_ns, TimeNs to_ns, int count)
+      : from_ns_(from_ns),
+        width_ns_((static_cast<double>(to_ns) - static_cast<double>(from_ns)) / count),
+        count_(count),
+        agents_(static_cast<size_t>(count)),
+        poses_(static_cast<size_t>(count)) {}
+
+  // The poses of one track, one after the other, also those next to the first and the last bin.
+  // `is_connected`: the agent was interpolated from the pose before.
+  void Add(TimeNs time_ns, bool is_connected) {
+    const int bin = BinOf(time_ns);
+    if (bin >= 0 && bin < count_) ++poses_[static_cast<size_t>(bin)];
+    const int first = is_connected ? last_bin_ + 1 : bin;
+    for (int i = std::max(first, next_unseen_); i <= std::min(bin, count_ - 1); ++i) {
+      ++agents_[static_cast<size_t>(i)];
+      next_unseen_ = i + 1;
+    }
+    last_bin_ = bin;
+  }
+  void EndTrack() { next_unseen_ = 0; }
+
+  void Fill(v1::GetTimelineResponse* reply) const {
+    reply->mutable_agent_counts()->Add(agents_.begin(), agents_.end());
+    reply->mutable_pose_counts()->Add(poses_.begin(), poses_.end());
+  }
+
+ private:
+  // -1 before the first bin, and their count after the last.
+  int BinOf(TimeNs time_ns) const {
+    const double at = (static_cast<double>(time_ns) - static_cast<double>(from_ns_)) / width_ns_;
+    return static_cast<int>(std::clamp(std::floor(at), -1.0, static_cast<double>(count_)));
+  }
+
+  const TimeNs from_ns_;
+  const double width_ns_;
+  const int count_;
+  std::vector<int32_t> agents_;
+  std::vector<int64_t> poses_;
+  int last_bin_ = -1;
+  // Of the track: the first bin that has not counted it.
+  int next_unseen_ = 0;
+};
+
+// Also the poses that others inside of the interval are interpolated from.
+WalkRange Around(const TrackInfo& track, TimeNs from_ns, TimeNs to_ns) {
+  WalkRange range;
+  range.from_ns = from_ns > kTimeMin + track.gap_ns_max ? from_ns - track.gap_ns_max : kTimeMin;
+  range.to_ns = to_ns < kTimeMax - track.gap_ns_max ? to_ns + track.gap_ns_max : kTimeMax;
+  return range;
+}
+
+}  // namespace
+
+CursorOr<v1::GetTracksResponse> GetTracks(Engine* engine, const CallContext& call,
+                                          const v1::GetTracksRequest& request) {
+  DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
+  DSG_ASSIGN_OR_RETURN(const WalkRange range, RangeOf(request));
+  DSG_ASSIGN_OR_RETURN(std::vector<TrackInfo> tracks,
+                       TracksOf(&engine->names, view.snapshot(), request.agents(), call.stop()));
+  return std::make_unique<TracksCursor>(view, std::move(tracks), range, request);
+}
+
+absl::Status GetTimeline(Engine* engine, const CallContext& call,
+                         const v1::GetTimelineRequest& request, v1::GetTimelineResponse* reply) {
+  DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
+  const int bin_count = request.bin_count() == 0 ? kBinCountDefault : request.bin_count();
+  if (bin_count < 0 || bin_count > kBinCountMax) {
+    return FieldError("bin_count", absl::StrCat(request.bin_count()),
+                      "give 1 to 2000, or 0 for 200");
+  }
+  DSG_ASSIGN_OR_RETURN(const std::vector<TrackInfo> tracks, view.snapshot().Tracks(call.stop()));
+  TimeNs from_ns = kTimeMax;
+  TimeNs last_ns = kTimeMin;
+  for (const TrackInfo& track : tracks) {
+    if (track.pose_count == 0) continue;
+    from_ns = std::min(from_ns, track.first_ns);
+    last_ns = std::max(last_ns, track.last_ns);
+  }
+  view.FillHeader(reply->mutable_header());
+  if (from_ns > last_ns) from_ns = last_ns = 0;
+  if (request.has_from_ns()) from_ns = request.from_ns();
+  const TimeNs to_ns =
+      request.has_to_ns() ? request.to_ns() : last_ns + (last_ns < kTimeMax ? 1 : 0);
+  DSG_RETURN_IF_ERROR(CheckTimeRange(from_ns, to_ns));
+  reply->set_from_ns(from_ns);
+  reply->set_to_ns(to_ns);
+  Bins bins(from_ns, to_ns, bin_count);
+  for (const TrackInfo& track : tracks) {
+    TrackWalk walk(track, Around(track, from_ns, to_ns));
+    bool has_begun = false;
+    DSG_RETURN_IF_ERROR(
+        walk.Read(view.snapshot(), call.stop(), [&](const TimedPose& pose, bool is_after_gap) {
+          bins.Add(pose.time_ns, has_begun && !is_after_gap);
+          has_begun = true;
+          return true;
+        }));
+    bins.EndTrack();
+  }
+  bins.Fill(reply);
+  return absl::OkStatus();
+}
+
+}  // namespace dsg::query
