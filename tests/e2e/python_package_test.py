@@ -19,7 +19,7 @@ python_support.run_with("numpy", "pandas", "networkx")
 PAGES = ("README.md", "docs/python.md")
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
 TABLES = ("numpy", "pandas", "networkx")
-NEEDS_TABLES = re.compile(r"to_(pandas|numpy|networkx)|networkx\.")
+NEEDS_TABLES = re.compile(r"to_(arrays|pandas|numpy|networkx)|networkx\.")
 
 
 class Package(support.ProgramsTest):

@@ -10,7 +10,7 @@ from dsgdb.errors import InvalidArgument
 from dsgdb.questions import Box, Questions, box as to_box, optional_duration
 from dsgdb.rows import Rows, join
 from dsgdb.times import Duration, Instant, instant_ns
-from dsgdb.tracks import Track, Tracks, read_track
+from dsgdb.tracks import Track, Tracks, encode_read_at, encode_request, read_tracks
 
 _COEFFICIENTS_AND_JOINTS = (v1.ShapePart.SHAPE_PART_COEFFICIENTS, v1.ShapePart.SHAPE_PART_JOINTS)
 
@@ -33,27 +33,29 @@ class AgentQuestions(Questions):
         """The poses of an agent in [start, end), by default all. With `every`: interpolated at this
         period from `start` (or the first pose) on, NaN in gaps.
         """
-        return self._track(agent, start, end, every, self._read_at)
+        if not agent:
+            raise InvalidArgument("agent \"\" names nobody; give an id (\"H12\") or a name",
+                                  "FIELD_INVALID", {"field": "agent", "value": ""})
+        found = self._tracks((agent,), start, end, every)
+        return next(track for _, track in found.values())
 
     def tracks(self, agents: Optional[Iterable[str]] = None, start: Optional[Instant] = None,
                end: Optional[Instant] = None, *, every: Optional[Duration] = None) -> Tracks:
         """The tracks of several agents (None = of all, by id), all of one revision."""
         read_at = self._read_at
-        if agents is None:
-            # Agents of any kind; the first answer says which revision the others are read at.
-            listed = self._rows(
-                v1.Node, self.api.list_nodes, v1.ListNodesRequest(
-                    **self._common(), filter=v1.NodeFilter(layer="agents"),
-                    view=v1.NodeView.NODE_VIEW_BASIC), "nodes", None)
-            agents, read_at = listed.ids, v1.ReadAt(exact_revision=listed.revision)
-        elif isinstance(agents, str):
+        if isinstance(agents, str):
             raise InvalidArgument(f"agents \"{agents}\" is one name; write [\"{agents}\"], or ask "
                                   "for track()", "FIELD_INVALID", {"field": "agents"})
-        found: dict[str, Track] = {}
-        for agent in agents:
-            found[agent] = self._track(agent, start, end, every, read_at)
-            read_at = v1.ReadAt(exact_revision=found[agent].revision)
-        return Tracks(found, self.spec)
+        asked = None if agents is None else list(agents)
+        if asked == []:
+            return Tracks({}, self.spec)
+        found = self._tracks(asked or (), start, end, every)
+        if asked is None:
+            return Tracks({agent: track for agent, (_, track) in found.items()}, self.spec)
+        # Each under the word that it was asked for with: its id or its name.
+        by_word = {name: track for name, track in found.values()}
+        by_word.update({agent: track for agent, (_, track) in found.items()})
+        return Tracks({word: by_word[word] for word in asked}, self.spec)
 
     def who(self, where: Optional[str] = None, start: Optional[Instant] = None,
             end: Optional[Instant] = None, *, box: Optional[Box] = None,
@@ -131,6 +133,15 @@ class AgentQuestions(Questions):
                                           to_ns=self._ns(end, "end"))
         return join(v1.AgentShape, self.api.get_agent_shape(request), "shapes", self.spec)
 
+    def timeline(self, start: Optional[Instant] = None, end: Optional[Instant] = None, *,
+                 bins: int = 0) -> v1.GetTimelineResponse:
+        """How many agents were observed in each of `bins` (200) equal parts of [start, end), which
+        is by default the span of all poses.
+        """
+        return self.api.get_timeline(v1.GetTimelineRequest(
+            **self._common(), from_ns=self._ns(start, "start"), to_ns=self._ns(end, "end"),
+            bin_count=bins))
+
     def factors(self, agent: str, start: Optional[Instant] = None, end: Optional[Instant] = None,
                 ) -> Rows[v1.PoseFactor, v1.ListFactorsResponse]:
         """The pose-graph factors of an agent that begin in [start, end)."""
@@ -139,11 +150,10 @@ class AgentQuestions(Questions):
                                         to_ns=self._ns(end, "end"))
         return join(v1.PoseFactor, self.api.list_factors(request), "factors", self.spec)
 
-    def _track(self, agent: str, start: Optional[Instant], end: Optional[Instant],
-               every: Optional[Duration], read_at: Optional[v1.ReadAt]) -> Track:
+    def _tracks(self, agents: Iterable[str], start: Optional[Instant], end: Optional[Instant],
+                every: Optional[Duration]) -> dict[str, tuple[str, Track]]:
         period_ns = optional_duration(every, "every")
-        request = v1.GetTrajectoryRequest(
-            map=self.spec.name, read_at=read_at, agent=agent, from_ns=self._ns(start, "start"),
-            to_ns=self._ns(end, "end"), resample_period_ns=period_ns)
-        with self.api.json_stream("dsg.v1.QueryService/GetTrajectory", request) as messages:
-            return read_track(messages, self.spec, period_ns, agent)
+        request = encode_request(self.spec.name, encode_read_at(self._read_at), agents,
+                                 self._ns(start, "start"), self._ns(end, "end"), period_ns)
+        with self.api.binary_stream("dsg.v1.QueryService/GetTracks", request) as messages:
+            return read_tracks(messages, self.spec, period_ns)

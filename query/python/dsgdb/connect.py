@@ -92,11 +92,21 @@ class Channel:
         if timeout_s is None and lifetime == "answer":
             timeout_s = max(self.timeout_s, _STREAM_TIMEOUT_S)
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
-        data = _dumped(request)
+        for data in self._messages(path, "json", _dumped(request), deadline, silence_s, reads):
+            yield _parsed(data, path)
+
+    def binary_stream(self, path: str, request: bytes) -> Generator[memoryview, None, None]:
+        """The messages of a stream that reads and ends by itself, in protobuf's wire format."""
+        deadline = time.monotonic() + max(self.timeout_s, _STREAM_TIMEOUT_S)
+        for data in self._messages(path, "proto", request, deadline, None, True):
+            yield memoryview(data)
+
+    def _messages(self, path: str, codec: str, data: bytes, deadline: Optional[float],
+                  silence_s: Optional[float], reads: bool) -> Generator[bytes, None, None]:
         body = _ENVELOPE.pack(0, len(data)) + data
 
-        def begin() -> tuple[_Stream, Optional[Json]]:
-            call = _Stream(self, path, body, deadline, silence_s)
+        def begin() -> tuple[_Stream, Optional[bytes]]:
+            call = _Stream(self, path, codec, body, deadline, silence_s)
             return call, call.next()
 
         # Once a message was given, nothing is repeated.
@@ -193,8 +203,8 @@ class Channel:
 class _Stream:
     """One stream from its request to its end."""
 
-    def __init__(self, channel: Channel, path: str, body: bytes, deadline: Optional[float],
-                 silence_s: Optional[float]) -> None:
+    def __init__(self, channel: Channel, path: str, codec: str, body: bytes,
+                 deadline: Optional[float], silence_s: Optional[float]) -> None:
         self._channel = channel
         self._path = path
         self._deadline = deadline
@@ -203,8 +213,8 @@ class _Stream:
         self._socket = self._connection.sock
         self._is_over = False
         with channel.failures(path, self._connection):
-            self._response = channel.post(self._connection, path, "application/connect+json", body,
-                                          deadline)
+            self._response = channel.post(self._connection, path, f"application/connect+{codec}",
+                                          body, deadline)
             if self._response.status != 200:
                 raise _error_of(self._response.status, self._response.read(), channel.address.name)
 
@@ -213,23 +223,24 @@ class _Stream:
         if not self._is_over:
             self._connection.close()
 
-    def next(self) -> Optional[Json]:
+    def next(self) -> Optional[bytes]:
         """The next message, or None at the end. Raises the error that the stream ended with."""
         with self._channel.failures(self._path, self._connection):
             flags, data = self._envelope()
             if flags & _COMPRESSED:
                 raise errors.Internal(f"the server compressed a message of {self._path}, which was "
                                       "not asked for")
-            message = _parsed(data, self._path)
             if not flags & _END:
-                return message
+                return data
+            # Its end is JSON in any codec.
+            end = _parsed(data, self._path)
             self._response.read()
         # From here on the connection may be another call's.
         self._is_over = True
         self._channel.give_back(self._connection, self._response)
-        if message.get("error"):
+        if end.get("error"):
             with reading(self._path):
-                raise _error_from(message["error"])
+                raise _error_from(end["error"])
         return None
 
     def _envelope(self) -> tuple[int, bytes]:
@@ -278,6 +289,13 @@ class Caller:
     def json_stream(self, path: str, request: Any) -> Iterator[Iterator[Json]]:
         """The messages of a stream that reads, without objects for what is in them."""
         stream = self.channel.stream(path, _request(request), None, True, "answer")
+        with contextlib.closing(stream), reading(path):
+            yield stream
+
+    @contextlib.contextmanager
+    def binary_stream(self, path: str, request: bytes) -> Iterator[Iterator[memoryview]]:
+        """The same in protobuf's wire format; `request` is an encoded message."""
+        stream = self.channel.binary_stream(path, request)
         with contextlib.closing(stream), reading(path):
             yield stream
 

@@ -56,6 +56,27 @@ class HistoryQuestions(Questions):
             to_revision=None if end is None else self._number(end), layer=layer, view=view)
         return merge_diffs(self._pages(self.api.diff_revisions, request, limit, _change_count))
 
+    def versions(self, node: str, *, view: v1.NodeView = v1.NodeView.NODE_VIEW_FULL,
+                 limit: Optional[int] = None
+                 ) -> Rows[v1.NodeVersion, v1.ListNodeVersionsResponse]:
+        """What was believed of a node in the revisions that can be read, newest first: each
+        version with the revision that wrote it and the one that ended it. A node that is gone is
+        named by its id, any other one also by the name that it has now.
+        """
+        try:
+            node = self._node_id(node)
+        except NotFound:
+            # The call says so, unless this is the id of a node that is gone.
+            pass
+        request = v1.ListNodeVersionsRequest(map=self.spec.name, id=node, view=view)
+        return self._rows(v1.NodeVersion, self.api.list_node_versions, request, "versions", limit)
+
+    def vocabulary(self, limit: Optional[int] = None
+                   ) -> Rows[v1.Word, v1.ListVocabularyResponse]:
+        """The words that `find` can use: kinds, classes and relations, with how many there are."""
+        request = v1.ListVocabularyRequest(**self._common())
+        return self._rows(v1.Word, self.api.list_vocabulary, request, "words", limit)
+
     def watch(self, after: Optional[AnyRevision] = None, *, changes: bool = False,
               idle: float = 5.0) -> Generator[Change, None, None]:
         """Each revision when it is committed, from the one behind `after` (the newest) on, for
