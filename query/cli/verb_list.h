@@ -32,12 +32,13 @@ void AddDropVerbs(Grammar* grammar);
 void AddSetVerb(Grammar* grammar);
 void AddCompletionVerb(Grammar* grammar);
 void AddViewVerb(Grammar* grammar);
+void AddHistoryVerbs(Grammar* grammar);
 
 inline constexpr std::array kVerbs = {
     &AddAgentVerbs,  &AddShapeVerb,      &AddMeetingVerbs, &AddPredictVerb, &AddGraphVerbs,
     &AddSearchVerbs, &AddSpaceVerbs,     &AddChangeVerbs,  &AddMapsVerbs,   &AddImportVerb,
     &AddStoreVerbs,  &AddExportVerb,     &AddMapVerb,      &AddKeepVerbs,   &AddBackupVerbs,
     &AddMergeVerb,   &AddPruneVerb,      &AddAssetVerb,    &AddFactorsVerb, &AddDropVerbs,
-    &AddSetVerb,     &AddCompletionVerb, &AddViewVerb};
+    &AddSetVerb,     &AddCompletionVerb, &AddViewVerb,     &AddHistoryVerbs};
 
 }  // namespace dsg::cli

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "absl/strings/escaping.h"
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
@@ -23,6 +24,7 @@
 #include "schema/base/status.h"
 #include "schema/base/utf8.h"
 #include "schema/codec/proto_convert.h"
+#include "schema/model/known_names.h"
 
 namespace dsg::cli {
 namespace {
@@ -207,10 +209,19 @@ absl::Status RunList(Session* session, const ListVerb& verb, std::ostream& out) 
   return list.End(Footer(list.count(), "node", end.revision, end.is_cut));
 }
 
+// "on" means ON: names of relations are told apart by their letters, not by their case.
+std::string RelationNamed(const std::string& name) {
+  for (const relations::Relation& known : relations::kAll) {
+    const std::string spelt(known.name);
+    if (absl::EqualsIgnoreCase(spelt, name)) return spelt;
+  }
+  return name;
+}
+
 absl::Status RunEdges(Session* session, const EdgesVerb& verb, std::ostream& out) {
   auto request = session->Begin<v1::ListEdgesRequest>();
   request.set_source(verb.source);
-  request.set_relation(verb.relation);
+  request.set_relation(RelationNamed(verb.relation));
   request.set_target(verb.target);
   DSG_RETURN_IF_ERROR(
       SetInstant("--at", verb.at, session->map(), &request, &v1::ListEdgesRequest::set_at_ns));

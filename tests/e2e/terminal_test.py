@@ -186,6 +186,27 @@ class Terminal(support.ProgramsTest):
         for feature in features:
             self.assertAlmostEqual(47.38, positions(feature)[0][1], delta=0.002)
 
+    def test_history_and_words_say_what_was_and_is_believed(self):
+        self.ingest("renamed", self.simulate("small", people=1, seconds=5))
+        store = ("--store", "renamed")
+        room = self.ask("ls", "--kind", "room", *store)["nodes"][0]
+        self.ok("dsg", "set", room["id"], "--name", "the den", *store)
+        versions = self.ask("history", room["id"], *store)["versions"]
+        self.assertEqual(["the den", room["name"]], [one["node"]["name"] for one in versions])
+        self.assertEqual(versions[0]["from_revision"], versions[1]["to_revision"])
+        table = self.ok("dsg", "history", room["id"], "--format", "csv", *store)
+        rows = list(csv.DictReader(table.splitlines()))
+        self.assertEqual(["the den", room["name"]], [row["name"] for row in rows])
+        self.assertEqual("", rows[0]["to_revision"])
+        self.refused(1, ["O999999"], "dsg", "history", "O999999", *store)
+        rooms = len(self.ask("ls", "--kind", "room", *store)["nodes"])
+        words = list(csv.DictReader(self.ok("dsg", "words", "--format", "csv",
+                                            *store).splitlines()))
+        self.assertIn({"type": "kind", "layer": "rooms", "word": "room", "count": str(rooms)},
+                      words)
+        # Nothing was believed before the first revision.
+        self.assertEqual([], self.ask("words", "--revision", "0", *store)["words"])
+
     def test_json_lines_are_the_entries_of_the_reply(self):
         whole = self.ask("ls", "--store", "store", "--kind", "room")["nodes"]
         lines = self.ok("dsg", "ls", "--store", "store", "--kind", "room", "--format",
