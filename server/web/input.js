@@ -59,7 +59,10 @@ function isTyping({type, tagName}) {
 export function listenToKeys(keys, isReady) {
   document.addEventListener('keydown', (event) => {
     if (event.ctrlKey || event.altKey || event.metaKey || !isReady()) return;
+    // A dialog has its keys for itself; Escape closes it.
+    if (document.querySelector('dialog[open]')) return;
     if (isTyping(event.target) && event.key !== 'Escape') return;
+    if (event.key === 'Escape') event.target.blur();
     // A button has the space bar for itself.
     if (event.key === ' ' && event.target.tagName === 'BUTTON') return;
     if (!keys[event.key]) return;

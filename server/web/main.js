@@ -2,6 +2,7 @@
 // The viewer: one picture of a map at one revision and one time. Everything that is shown follows
 // from `state` and `show`; answers that come too late are dropped.
 import {readAddress, takeToken, writeAddress} from './address.js';
+import {loadBodies} from './bodies.js';
 import {Camera} from './camera.js';
 import {debounced, element, link, make, shortened} from './dom.js';
 import {drawLabels} from './labels.js';
@@ -10,12 +11,13 @@ import {
 } from './panels.js';
 import {listenToKeys, listenToPointer} from './input.js';
 import {follow, persistently} from './live.js';
+import {loadMesh, loadRevisions, loadScene, loadTags} from './load.js';
 import {pick} from './pick.js';
 import {Plan} from './plan.js';
 import {Questions} from './questions.js';
 import {Renderer, Show, stepOf} from './renderer.js';
 import {CallError, Client} from './rpc.js';
-import {GROUPS, loadMesh, loadRevisions, loadScene, loadTags} from './scene.js';
+import {GROUPS} from './scene.js';
 import {nsOf, secondsOf, textOf} from './time.js';
 
 const REVISIONS_MAX = 5000;
@@ -79,11 +81,25 @@ const settleTime = debounced(async () => {
     refresh();
     if (show.selected) fillInspector(scene, show, neighbors, actions);
     if (scene.nodes.get(show.selected)?.group === 'agents') locate();
+    await showBodies(asked, positions, time);
   } catch (error) {
     // Without an answer the picture is that of the samples, as the sentence says.
     isSaid(error);
   }
 }, 150);
+
+/** People that stand still are drawn with their bodies, where the map has those. */
+async function showBodies(asked, positions, time) {
+  const people = asked.of('agents').filter((node) => node.kind === 'human' &&
+                                                     positions.get(node.id));
+  if (!people.length || state.isPlaying || show.hidden.has('agents')) return;
+  const meshes = await loadBodies(client, asked, people.map((node) => node.id), time,
+                                  running.signal);
+  if (scene !== asked || show.time !== time) return;
+  asked.bodies = {time, meshes};
+  document.body.dataset.bodies = String(meshes.size);
+  redraw();
+}
 
 /** A search is of a time: it is made again for another one. */
 const searchAgain = debounced(() => state.query && search(state.query), 300);
@@ -224,10 +240,17 @@ async function open(map, revision, wanted = {}) {
                                       signal, explain);
     if (signal.aborted) return;
     take(loaded, '', wanted);
+    // Where there is the most to see; at the end of a log nearly everybody is gone.
+    if (isFirst && wanted.atNs === undefined && !state.isLive) show.time = loaded.busiest;
     if (isFirst && !wanted.camera) frameAll();
     await settle(loaded, wanted, signal);
   } catch (error) {
-    if (!signal.aborted) explain(error);
+    if (signal.aborted) return;
+    explain(error);
+    // Who follows a map that was dropped waits for the next one of its name.
+    if (state.isLive && error.reason === 'MAP_UNKNOWN') {
+      setTimeout(() => signal.aborted || open(map, null), MAPS_MS);
+    }
   }
 }
 
@@ -247,6 +270,7 @@ async function settle(loaded, wanted, signal) {
   if (state.isLive && !isWatching()) watch();
   await meshIfShown();
   setState(loaded.nodes.size ? 'ready' : 'empty');
+  performance.mark('ready');
   if (!loaded.nodes.size) {
     banner(`The map "${state.map}" has no nodes yet. dsg-ingest puts a log into it: ` +
            `dsg-ingest --map ${state.map} LOG`, 'note');
@@ -289,11 +313,13 @@ async function select(id) {
   changed();
   if (!id) return;
   const asked = scene;
+  locate();
   try {
     const found = await ask().neighbors(id);
     if (show.selected !== id || scene !== asked) return;
     neighbors = found;
     fillInspector(scene, show, neighbors, actions);
+    locate();
     refresh();
   } catch (error) {
     sayAnswer(error);
@@ -303,24 +329,26 @@ async function select(id) {
 /** Says where the selected agent is at the time that is shown: its room, place and building. */
 const locate = debounced(async () => {
   const [asked, agent, time] = [scene, show.selected, show.time];
-  const where = document.getElementById('where');
-  if (!where || !agent) return;
+  if (asked?.nodes.get(agent)?.group !== 'agents') return;
+  let answer = ['no room is known'];
   try {
     const ids = await ask().where(agent, time);
-    if (scene !== asked || show.selected !== agent || show.time !== time) return;
-    const links = ids.map((id) => link(scene.titleOf(id), () => select(id)));
-    where.replaceChildren(...links.flatMap((one, i) => (i ? [', ', one] : [one])),
-                          ids.length ? '' : 'no room is known');
+    const links = ids.map((id) => link(asked.titleOf(id), () => select(id)));
+    if (ids.length) answer = links.flatMap((one, i) => (i ? [', ', one] : [one]));
   } catch (error) {
-    if (scene === asked && !isSaid(error)) where.textContent = error.message;
+    if (isSaid(error)) return;
+    answer = [error.message];
   }
+  if (scene !== asked || show.selected !== agent || show.time !== time) return;
+  // The inspector may have been filled anew meanwhile.
+  document.getElementById('where')?.replaceChildren(...answer);
 }, 150);
 
-/** An answer, or why there is none, below the buttons of the inspector. */
+/** An answer (a text, or texts and links), or why there is none, below the inspector's buttons. */
 function sayAnswer(what) {
   if (what instanceof Error && isSaid(what)) return;
   const answer = document.getElementById('answer');
-  if (answer) answer.textContent = what instanceof Error ? what.message : what;
+  answer?.replaceChildren(...(what instanceof Error ? [what.message] : [what].flat()));
 }
 
 const actions = {
@@ -332,6 +360,17 @@ const actions = {
       sayAnswer(`path of ${path.length.toFixed(1)} m from the middle of the picture, clearance ` +
                 `at least ${path.clearance.toFixed(2)} m`);
       redraw();
+    } catch (error) {
+      sayAnswer(error);
+    }
+  },
+  async history() {
+    try {
+      const versions = await ask().versions(show.selected);
+      sayAnswer(['believed since ', ...versions.flatMap(({from, name, className}, i) => [
+        i ? ', ' : '', link(`revision ${from}`, () => open(state.map, from)),
+        ` (${[name, className].filter(Boolean).join(', ') || 'without a name'})`,
+      ])]);
     } catch (error) {
       sayAnswer(error);
     }
@@ -351,6 +390,7 @@ const actions = {
 };
 
 async function search(query) {
+  if (!scene) return;
   state.query = query;
   element('query').value = query;
   show.hits.clear();
@@ -360,7 +400,8 @@ async function search(query) {
     if (query) {
       const {ids, hasMore} = await ask().search(query, show.time);
       show.hits = new Set(ids);
-      found.textContent = `${ids.length}${hasMore ? ' and more' : ''} found`;
+      found.textContent = `${ids.length}${hasMore ? ' and more' : ''} found, ` +
+                          `true at ${textOf(show.time, scene.map)}`;
       if (ids.length === 1) await select(ids[0]);
     }
   } catch (error) {
@@ -423,7 +464,7 @@ function watch() {
     },
     failed: (error) => {
       // The map was dropped and made again: the new one is followed.
-      if (error.reason === 'MAP_REPLACED') open(state.map, null);
+      if (['MAP_REPLACED', 'MAP_UNKNOWN'].includes(error.reason)) open(state.map, null);
       else explain(error);
     },
   }).catch(explain).finally(() => mine.abort());
@@ -510,6 +551,9 @@ function frame(now) {
     if (isStale && scene) painter.build(scene, show);
     isStale = isDirty = false;
     painter.draw(scene, show, camera);
+    if (scene?.nodes.size && !performance.getEntriesByName('picture').length) {
+      performance.mark('picture');
+    }
     const count = painter instanceof Plan ? 0
                                           : drawLabels(element('labels'), scene, show, camera);
     document.body.dataset.labels = String(count);
@@ -610,7 +654,8 @@ async function mapsOf(signal) {
   while (true) {
     const reply = await persistently(() => client.call('MapService/ListMaps', {}, signal), signal,
                                      explain);
-    const names = reply.maps.map((map) => map.name);
+    // One that cannot be read says why when it is opened.
+    const names = [...reply.maps.map((map) => map.name), ...reply.unreadable_maps];
     element('map').replaceChildren(...names.map((name) => make('option', {value: name}, name)));
     if (names.length) return names;
     setState('no-maps');

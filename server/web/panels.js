@@ -72,7 +72,8 @@ function placeFacts(scene, show, node) {
 /**
  * The inspector of a node.
  * @param {object[]} neighbors of GetNeighbors
- * @param {{select: function(string), path: function(), predict: function()}} actions
+ * @param {{select: function(string), path: function(), predict: function(),
+ *     history: function()}} actions
  */
 export function fillInspector(scene, show, neighbors, actions) {
   const panel = element('inspector');
@@ -104,7 +105,8 @@ export function fillInspector(scene, show, neighbors, actions) {
   if (node.group === 'agents') facts.push(...pair('in', make('span', {id: 'where'})));
   const buttons = node.group === 'agents'
       ? [make('button', {type: 'button', onclick: actions.predict}, 'predict')]
-      : [make('button', {type: 'button', onclick: actions.path}, 'path to here')];
+      : [make('button', {type: 'button', onclick: actions.path}, 'path from the middle of the picture')];
+  buttons.push(make('button', {type: 'button', onclick: actions.history}, 'history'));
   panel.replaceChildren(make('h2', {}, scene.titleOf(node.id)), make('dl', {}, ...facts),
                         make('div', {className: 'row'}, ...buttons), make('p', {id: 'answer'}),
                         make('h3', {}, neighbors.length < NEIGHBORS_MAX
@@ -144,7 +146,7 @@ export function drawHistogram(scene) {
   const width = canvas.width = Math.max(1, canvas.clientWidth);
   const height = canvas.height = Math.max(1, canvas.clientHeight);
   const context = canvas.getContext('2d');
-  const counts = scene.histogram(Math.min(200, width));
+  const counts = scene.timeline;
   const most = Math.max(1, ...counts);
   context.fillStyle = '#e69f00';
   counts.forEach((count, i) => {
@@ -176,7 +178,7 @@ export function sentenceOf(scene, show, loading) {
   const age = scene.revision === scene.head ? '' : `, the newest is ${scene.head}`;
   const parts = [`${scene.map.name} as believed at revision ${scene.revision}${age}, ` +
                  `true at ${textOf(show.time, scene.map)}`];
-  if (scene.end > scene.begin) parts.push(`tracks of ${durationText(scene.end - scene.begin)}`);
+  if (scene.end > scene.begin) parts.push(`poses over ${durationText(scene.end - scene.begin)}`);
   if (scene.isThinned && scene.exact.time !== show.time) parts.push('positions between samples');
   if (loading) parts.push(`loading ${loading}`);
   return `${parts.join('; ')}.`;

@@ -7,6 +7,7 @@ import {nsOf} from './time.js';
 /** Relations of a node that are asked for. */
 export const NEIGHBORS_MAX = 200;
 const HITS_MAX = 1000;
+const VERSIONS_MAX = 30;
 const INSTANTS_MAX = 10000;
 const CHANGES_A_PAGE = 1000;
 /** How far predictions reach, how densely, and how many ways. */
@@ -53,6 +54,16 @@ export class Questions {
       id, view: 'NODE_VIEW_BASIC', page_size: NEIGHBORS_MAX,
     });
     return reply.neighbors;
+  }
+
+  /** What was believed of a node, newest first: since which revision, and its names. */
+  async versions(id) {
+    const reply = await this.client.call('QueryService/ListNodeVersions', {
+      map: this.scene.map.name, id, view: 'NODE_VIEW_BASIC', page_size: VERSIONS_MAX,
+    }, this.signal);
+    return reply.versions.map(({from_revision: from, node}) => ({
+      from: Number(from), name: node.name, className: node.semantic_class?.name ?? '',
+    }));
   }
 
   /** Ids of the room, place and building of an agent at a time; those that are known. */

@@ -2,7 +2,7 @@
 // Draws a scene with WebGL2. What stands still is in one buffer a group, made when the scene or its
 // time changes; people and trails are made anew for each picture. Nothing is drawn while nothing
 // changes.
-import {GROUPS, TRIANGLES_MAX} from './scene.js';
+import {GROUPS} from './scene.js';
 import {
   FLOATS_PER_VERTEX, Vertices, addBox, addBoxEdges, addFigure, addLine, addPoint, addPrism, addRing,
   addTriangle,
@@ -262,15 +262,16 @@ export class Renderer {
     if (this.meshOf === scene && this.meshBlocks === scene.mesh.length) return;
     const vertices = new Vertices(scene.origin, 65536);
     for (const block of scene.mesh) {
-      if (vertices.count > TRIANGLES_MAX * 3) break;
-      for (let i = 0; i + 2 < block.faces.length; i += 3) this.#addFace(vertices, block, i);
+      for (let i = 0; i + 2 < block.faces.length; i += 3) {
+        this.#addFace(vertices, block, i, block.colors?.[block.faces[i]] ?? 0x9aa4b2);
+      }
     }
     this.mesh.fill(vertices, this.gl.STATIC_DRAW);
     this.meshOf = scene;
     this.meshBlocks = scene.mesh.length;
   }
 
-  #addFace(vertices, block, i) {
+  #addFace(vertices, block, i, rgb) {
     const corner = (k) => block.positions.subarray(block.faces[i + k] * 3,
                                                    block.faces[i + k] * 3 + 3);
     const [a, b, c] = [corner(0), corner(1), corner(2)];
@@ -280,7 +281,6 @@ export class Renderer {
                     u[0] * v[1] - u[1] * v[0]];
     const length = Math.hypot(...normal) || 1;
     const shade = 0.55 + 0.35 * Math.abs(normal[2] / length) + 0.1 * (normal[0] / length);
-    const rgb = block.colors?.[block.faces[i]] ?? 0x9aa4b2;
     addTriangle(vertices, a, b, c, [rgb >> 16 & 255, rgb >> 8 & 255, rgb & 255], 1, shade, 0);
   }
 
@@ -312,8 +312,12 @@ export class Renderer {
     const here = scene.agentAt(node.id, show.time);
     if (!here) return;
     const foot = scene.footOf(here.position);
+    const body = scene.bodies.time === show.time && scene.bodies.meshes.get(node.id);
     if (!here.known) {
       addRing(lines, foot, 0.35, color, 0.9, 0);
+    } else if (body) {
+      const rgb = color[0] << 16 | color[1] << 8 | color[2];
+      for (let i = 0; i + 2 < body.faces.length; i += 3) this.#addFace(solid, body, i, rgb);
     } else if (node.kind === 'human' && scene.of('agents').length <= FIGURES_MAX) {
       addFigure(solid, foot, PERSON_HEIGHT, color, 1, 0);
     } else {
@@ -327,7 +331,7 @@ export class Renderer {
     const end = track.indexAt(show.time);
     for (let i = begin; i < end; ++i) {
       if (track.times[i] < show.time - show.tail) continue;
-      if (track.times[i + 1] - track.times[i] > track.gap) continue;
+      if (track.gaps.has(i + 1)) continue;
       const age = (show.time - track.times[i]) / show.tail;
       addLine(lines, track.positions[i], track.positions[i + 1], color, 1 - 0.85 * age, 0);
     }

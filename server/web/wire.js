@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads and writes protobuf's wire format, for the bulk messages: trajectories and meshes, whose
-// JSON would be five times as large. Field numbers are those of proto/dsg/v1.
+// Reads and writes protobuf's wire format, for the bulk messages: scenes, tracks and meshes, whose
+// JSON would be many times as large. Field numbers are those of proto/dsg/v1.
 
 const LENGTH_MAX = 64 << 20;
 
@@ -135,6 +135,13 @@ export class Writer {
   number(field, value) {
     this.#varint(field << 3);
     this.#varint(value);
+    return this;
+  }
+
+  /** Eight bytes, lowest first. */
+  fixed64(field, bits) {
+    this.#varint((field << 3) | 1);
+    for (let i = 0n; i < 64n; i += 8n) this.#bytes.push(Number(bits >> i & 0xffn));
     return this;
   }
 

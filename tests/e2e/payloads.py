@@ -18,7 +18,8 @@ _BREAKS = ("\">", "'>", "-->", "</td>", "</option>", "</canvas>", "</title>", "<
            "&#x3c;", "&#60", "\uff1c")
 _MARKS = ("\u202e", "\u202d", "\u2066", "\u2067", "\u2068", "\u2069", "\u200e", "\u200f", "\u200b",
           "\u2028", "\u2029", "\ufeff", "\u00ad", "\u0301" * 40, "\U0001f468\u200d\U0001f469",
-          "\U000e0041", "\ufffd", "\uffff", "\U0010ffff", "\x00", "\x01", "\x08", "\x1b[31m", "\x7f",
+          "\U000e0041", "\ufffd", "\uffff", "\U0010ffff", "\x00", "\x01", "\x08", "\x1b[31m",
+          "\x7f",
           "\r\n", "\n", "\t")
 _WORDS = ("__proto__", "constructor", "toString", "hasOwnProperty", "null", "undefined", "NaN",
           "true", "-1", "1e999", "[object Object]", "%s%n%x", "../../etc/passwd", "' OR 1=1 --",

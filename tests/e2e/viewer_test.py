@@ -105,7 +105,7 @@ class Viewer(viewer_support.ViewerTest):
         self.open("&q=human")
         found = self.ask("find", "human", "--at", "+30s", "--store", "store", "--map", "office")
         self.open("&q=human&at=" + str(self.at_ns(30)))
-        self.assertEqual(f"{len(found['hits'])} found", self.window.run(
+        self.assertEqual(f"{len(found['hits'])} found, true at +30.0 s", self.window.run(
             "return document.getElementById('found').textContent"))
         self.open("&q=no+such+thing")
         self.assertIn("no", self.window.run("return document.getElementById('found').textContent"))
@@ -280,16 +280,63 @@ class Viewer(viewer_support.ViewerTest):
         });""")
         self.assertEqual([], wrong)
 
+    def test_columns_that_are_cut_or_changed_are_refused(self):
+        self.open()
+        figures = self.window.run("""return (async () => {
+          const [columns, {Client}, {takeToken}, {Writer}] = await Promise.all([
+              import('/columns.js'), import('/rpc.js'), import('/address.js'),
+              import('/wire.js')]);
+          const request = new Writer().text(1, 'office').done();
+          const read = {
+            GetScene: (bytes) => {
+              const {head, nodes, edges} = columns.readSceneMessage(bytes);
+              if (nodes) columns.nodesOf(nodes, head?.origin ?? [0, 0, 0], 0n);
+              if (edges) columns.edgesOf(edges, (row) => (row < 100000 ? 'x' : undefined), 0n);
+            },
+            GetTracks: (bytes) => columns.readTracksMessage(bytes, 0n),
+          };
+          const out = {whole: 0, refused: 0, wrong: []};
+          let seed = 7;
+          const below = (most) => {
+            seed = (seed * 1103515245 + 12345) & 0x7fffffff;
+            return seed % most;
+          };
+          const attempt = (method, bytes) => {
+            try {
+              read[method](bytes);
+            } catch (error) {
+              if (!(error instanceof RangeError)) out.wrong.push(`${method}: ${error}`);
+              ++out.refused;
+            }
+          };
+          for (const method of Object.keys(read)) {
+            const client = new Client(takeToken());
+            for await (const bytes of client.bytes(`QueryService/${method}`, request)) {
+              read[method](bytes);
+              ++out.whole;
+              for (let i = 0; i < 300; ++i) {
+                attempt(method, bytes.slice(0, below(bytes.length)));
+                const changed = bytes.slice();
+                changed[below(changed.length)] ^= 1 + below(255);
+                attempt(method, changed);
+              }
+            }
+          }
+          return out;
+        })();""")
+        self.assertEqual([], figures["wrong"])
+        self.assertGreater(figures["whole"], 3)
+        # A change within a number is another number.
+        self.assertGreater(figures["refused"], 300 * figures["whole"] // 2)
+
     def test_tracks_know_their_gaps_and_floors_keep_their_area(self):
         self.open()
         wrong = self.window.run("""return Promise.all([import('/scene.js'), import('/shapes.js')])
           .then(([{Track}, {triangulated}]) => {
             const wrong = [];
-            const track = new Track(2);
-            [[0, 0], [1, 10], [9, 20]].forEach(([time, x]) => {
-              track.times.push(time);
-              track.positions.push([x, 0, 0]);
-            });
+            const track = new Track();
+            track.append([0, 1], [[0, 0, 0], [10, 0, 0]], []);
+            track.append([9], [[20, 0, 0]], [0]);
             const expect = (time, x, known) => {
               const here = track.at(time);
               const is = here && [here.position[0], here.known];
