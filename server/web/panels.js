@@ -105,7 +105,7 @@ export function fillInspector(scene, show, neighbors, actions) {
   if (node.group === 'agents') facts.push(...pair('in', make('span', {id: 'where'})));
   const buttons = node.group === 'agents'
       ? [make('button', {type: 'button', onclick: actions.predict}, 'predict')]
-      : [make('button', {type: 'button', onclick: actions.path}, 'path from the middle of the picture')];
+      : [make('button', {type: 'button', onclick: actions.path}, 'path from the middle')];
   buttons.push(make('button', {type: 'button', onclick: actions.history}, 'history'));
   panel.replaceChildren(make('h2', {}, scene.titleOf(node.id)), make('dl', {}, ...facts),
                         make('div', {className: 'row'}, ...buttons), make('p', {id: 'answer'}),

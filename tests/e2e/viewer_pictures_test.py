@@ -65,7 +65,7 @@ class Pictures(viewer_support.ViewerTest):
         self.settled("prediction")
         self.shown("room", f"&sel={self.room}")
         self.window.wait("document.querySelectorAll('#inspector .link').length > 3")
-        self.click("path from the middle of the picture")
+        self.click("path from the middle")
         self.assertIn("path of", self.text("answer"))
         self.settled("path")
 
