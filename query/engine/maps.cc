@@ -237,6 +237,8 @@ absl::StatusOr<std::vector<RevisionInfo>> SampleRevisions(const ReadView& view, 
                                                           int count) {
   const Revision newest =
       before > 0 ? std::min(before - 1, view.head_revision()) : view.head_revision();
+  // One alone is the newest.
+  if (count == 1) return view.map().ListRevisions(newest + 1, 1);
   const Revision steps = std::max(std::min<Revision>(count, newest) - 1, Revision{1});
   std::vector<RevisionInfo> sampled;
   for (Revision step = steps; step >= 0; --step) {

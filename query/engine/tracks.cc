@@ -294,11 +294,12 @@ absl::Status GetTimeline(Engine* engine, const CallContext& call,
     last_ns = std::max(last_ns, track.last_ns);
   }
   view.FillHeader(reply->mutable_header());
-  if (from_ns > last_ns) from_ns = last_ns = 0;
+  const bool is_empty = from_ns > last_ns;
+  if (is_empty) from_ns = last_ns = 0;
   if (request.has_from_ns()) from_ns = request.from_ns();
-  const TimeNs to_ns =
-      request.has_to_ns() ? request.to_ns() : last_ns + (last_ns < kTimeMax ? 1 : 0);
-  DSG_RETURN_IF_ERROR(CheckTimeRange(from_ns, to_ns));
+  TimeNs to_ns = is_empty ? from_ns : last_ns + (last_ns < kTimeMax ? 1 : 0);
+  if (request.has_to_ns()) to_ns = request.to_ns();
+  if (!is_empty || request.has_to_ns()) DSG_RETURN_IF_ERROR(CheckTimeRange(from_ns, to_ns));
   reply->set_from_ns(from_ns);
   reply->set_to_ns(to_ns);
   Bins bins(from_ns, to_ns, bin_count);

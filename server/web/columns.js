@@ -75,12 +75,11 @@ const int = (reader) => Number(reader.int64());
 const text = (reader) => new TextDecoder().decode(reader.block());
 const vector = (reader) => vectorOf(reader.block());
 
-const HEADER = {1: ['revision', int], 2: ['head', int], 3: ['oldest', int]};
-const LAYER = {2: ['name', text], 3: ['rank', int]};
+const LAYER = {2: ['name', text]};
 const SCENE_LAYER = {1: ['layer', block], 2: ['count', int], 3: ['sent', int]};
-const HEAD = {1: ['layers', block], 2: ['origin', vector], 4: ['edgeCountMax', int]};
+const HEAD = {1: ['layers', block], 2: ['origin', vector]};
 const NODES = {
-  1: ['layer', text], 2: ['firstRow', int], 3: ['rowCount', int], 4: ['ids', block],
+  1: ['layer', text], 3: ['rowCount', int], 4: ['ids', block],
   5: ['parents', block], 6: ['positions', block], 7: ['orientations', block], 8: ['boxes', block],
   9: ['kinds', text], 10: ['kindIndices', block], 11: ['classes', text],
   12: ['classIndices', block], 14: ['from', block], 15: ['to', block], 16: ['nameEnds', block],
@@ -91,13 +90,13 @@ const EDGES = {
   1: ['relation', text], 2: ['rowCount', int], 3: ['sources', block], 4: ['targets', block],
   6: ['from', block], 7: ['to', block],
 };
-const SCENE = {1: ['header', block], 2: ['head', block], 3: ['nodes', block], 4: ['edges', block]};
-const TRACK = {1: ['id', text], 3: ['gap', int], 4: ['count', int]};
+const SCENE = {2: ['head', block], 3: ['nodes', block], 4: ['edges', block]};
+const TRACK = {1: ['id', text]};
 const POSES = {
   1: ['track', int], 2: ['rowCount', int], 3: ['times', block], 4: ['valueBytes', int],
   5: ['origin', vector], 6: ['positions', block], 8: ['gaps', block],
 };
-const TRACKS = {1: ['header', block], 2: ['tracks', block], 3: ['poses', block]};
+const TRACKS = {2: ['tracks', block], 3: ['poses', block]};
 
 /** "O42" of an id in 64 bits. */
 function idOf(low, high) {
@@ -107,11 +106,10 @@ function idOf(low, high) {
   return `${letter}${(BigInt(rest) << 32n) | BigInt(low)}`;
 }
 
-/** One GetSceneResponse: what of header, head, nodes and edges it has, undecoded columns inside. */
+/** One GetSceneResponse: what of head, nodes and edges it has, undecoded columns inside. */
 export function readSceneMessage(bytes) {
   const message = fieldsOf(bytes, SCENE);
   const out = {};
-  if (message.header) out.header = fieldsOf(message.header, HEADER);
   if (message.head) {
     out.head = fieldsOf(message.head, HEAD, new Set(['layers']));
     out.head.layers = (out.head.layers ?? []).map((one) => {
@@ -209,16 +207,13 @@ export function edgesOf(message, idAt, epoch) {
 }
 
 /**
- * One GetTracksResponse: heads of tracks in the first message, then poses: the number of the
+ * One GetTracksResponse: ids of tracks in the first message, then poses: the number of the
  * track, times in seconds, positions, and the rows before which it has a gap.
  */
 export function readTracksMessage(bytes, epoch) {
   const message = fieldsOf(bytes, TRACKS, new Set(['tracks', 'poses']));
   return {
-    tracks: (message.tracks ?? []).map((one) => {
-      const {id, gap = 0, count = 0} = fieldsOf(one, TRACK);
-      return {id, gap: gap / 1e9, count};
-    }),
+    tracks: (message.tracks ?? []).map((one) => fieldsOf(one, TRACK)),
     poses: (message.poses ?? []).map((one) => {
       const poses = fieldsOf(one, POSES);
       const count = poses.rowCount ?? 0;

@@ -145,6 +145,11 @@ TEST_F(Belief, IsSampledAtEvenSteps) {
   std::vector<int64_t> numbers;
   for (const v1::Revision& one : reply.revisions()) numbers.push_back(one.revision());
   EXPECT_EQ(numbers, (std::vector<int64_t>{21, 16, 11, 6, 1}));
+  list.set_page_size(1);
+  reply.Clear();
+  ASSERT_TRUE(core_->ListRevisions(CallContext(), list, &reply).ok());
+  ASSERT_EQ(reply.revisions_size(), 1);
+  EXPECT_EQ(reply.revisions(0).revision(), 21);
 }
 
 TEST_F(Belief, DiffersByIdsAlone) {

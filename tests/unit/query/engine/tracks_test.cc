@@ -246,6 +246,7 @@ TEST_F(TimelineTest, IsOfAllPosesUnlessAnIntervalIsAsked) {
   reply = Count();
   ASSERT_TRUE(reply.ok()) << reply.status();
   EXPECT_EQ(reply->pose_counts(0), 0);
+  EXPECT_EQ(reply->from_ns(), reply->to_ns()) << "there are no poses";
 }
 
 }  // namespace
