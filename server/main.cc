@@ -17,6 +17,7 @@
 #include "CLI/CLI.hpp"
 #include "grpc/grpc.h"
 #include "grpc/support/log.h"
+#include "schema/base/allocator.h"
 #include "schema/base/byte_size.h"
 #include "schema/base/log.h"
 #include "schema/base/status.h"
@@ -235,6 +236,8 @@ int Serve(Flags flags) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // Some messages of a stream.
+  dsg::KeepFreedMemory(size_t{16} << 20);
   Flags flags;
   CLI::App app("Serves the maps of a store folder over gRPC, and over HTTP if asked to.",
                "dsg-server");

@@ -28,6 +28,7 @@
 #include "ingest/program/progress.h"
 #include "ingest/program/run_report.h"
 #include "ingest/program/yield.h"
+#include "schema/base/allocator.h"
 #include "schema/base/exit_code.h"
 #include "schema/base/status.h"
 #include "schema/program/manual.h"
@@ -511,6 +512,8 @@ int Main(int argc, char** argv) {
 }  // namespace dsg::ingest
 
 int main(int argc, char** argv) {
+  // Images and what is made of them.
+  dsg::KeepFreedMemory(size_t{64} << 20);
   // A file over the limit of the shell is a failed write with a message, not a sudden end.
   std::signal(SIGXFSZ, SIG_IGN);
   const int code = dsg::ingest::Main(argc, argv);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ingest/simulator/cli/command.h"
+#include "schema/base/allocator.h"
 #include "schema/program/manual.h"
 
 namespace {
@@ -20,6 +21,8 @@ constexpr int kExitUsage = 2;
 }  // namespace
 
 int main(int argc, char** argv) {
+  // Images.
+  dsg::KeepFreedMemory(size_t{64} << 20);
   CLI::App app("Generates seeded worlds and logs of what moves in them, with ground truth.",
                "dsg-simulate");
   app.set_version_flag("--version", DSG_VERSION);

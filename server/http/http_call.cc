@@ -64,22 +64,17 @@ void HttpCall::Drop() {
   std::string().swap(packed_);
 }
 
-void HttpCall::Send() {
-  std::string bytes = TakeHead(200);
-  AppendChunk(EnvelopeOf(packed_.size()), packed_, &bytes);
-  std::string().swap(packed_);
-  place_.outlet->Write(std::move(bytes), /*is_last=*/false);
-}
+void HttpCall::Send() { place_.outlet->Write(TakeChunk(), /*is_last=*/false); }
 
 void HttpCall::SendLast(const absl::Status& status) {
-  std::string bytes = TakeHead(200);
+  AnswerBytes bytes;
   if (type_.is_stream) {
-    AppendChunk(EnvelopeOf(packed_.size()), packed_, &bytes);
-    AppendEnd(status, &bytes);
+    bytes = TakeChunk();
+    AppendEnd(status, &bytes.tail);
   } else {
-    bytes += packed_;
+    bytes.head = TakeHead(200);
+    bytes.message = std::move(packed_);
   }
-  std::string().swap(packed_);
   place_.outlet->Write(std::move(bytes), /*is_last=*/true);
 }
 
@@ -88,13 +83,14 @@ void HttpCall::Finish(const absl::Status& status) {
   const bool is_stopped = absl::IsCancelled(status) && runtime_->stopping;
   const absl::Status told = is_stopped ? ShuttingDownError() : status;
   packed_.clear();
-  std::string bytes;
+  AnswerBytes bytes;
   if (type_.is_stream) {
-    bytes = TakeHead(200);
-    AppendEnd(told, &bytes);
+    bytes.head = TakeHead(200);
+    AppendEnd(told, &bytes.tail);
   } else {
     packed_ = ErrorJson(told);
-    bytes = TakeHead(HttpStatusOf(told.code())) + packed_;
+    bytes.head = TakeHead(HttpStatusOf(told.code()));
+    bytes.message = std::move(packed_);
   }
   place_.outlet->Write(std::move(bytes), /*is_last=*/true);
 }
@@ -120,18 +116,24 @@ std::string HttpCall::TakeHead(int status) {
   return TextOf(head);
 }
 
-void HttpCall::AppendChunk(const std::string& head, const std::string& rest,
-                           std::string* bytes) const {
-  const size_t size = head.size() + rest.size();
-  bytes->reserve(bytes->size() + size + 64);
-  if (place_.may_chunk) absl::StrAppend(bytes, absl::Hex(size), "\r\n");
-  absl::StrAppend(bytes, head, rest);
-  if (place_.may_chunk) bytes->append("\r\n");
+AnswerBytes HttpCall::TakeChunk() {
+  AnswerBytes bytes{.head = TakeHead(200), .message = std::move(packed_), .tail = ""};
+  const std::string envelope = EnvelopeOf(bytes.message.size());
+  if (place_.may_chunk) {
+    absl::StrAppend(&bytes.head, absl::Hex(envelope.size() + bytes.message.size()), "\r\n");
+    bytes.tail = "\r\n";
+  }
+  bytes.head += envelope;
+  return bytes;
 }
 
 void HttpCall::AppendEnd(const absl::Status& status, std::string* bytes) const {
-  AppendChunk(EndOfStream(status), "", bytes);
-  if (place_.may_chunk) bytes->append("0\r\n\r\n");
+  const std::string end = EndOfStream(status);
+  if (place_.may_chunk) {
+    absl::StrAppend(bytes, absl::Hex(end.size()), "\r\n", end, "\r\n0\r\n\r\n");
+  } else {
+    *bytes += end;
+  }
 }
 
 }  // namespace dsg::server

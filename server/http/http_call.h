@@ -11,6 +11,14 @@
 
 namespace dsg::server {
 
+/// What is sent at once, one part behind the other: a message of a megabyte is not copied to stand
+/// between its head and its end.
+struct AnswerBytes {
+  std::string head;
+  std::string message;
+  std::string tail;
+};
+
 /// The connection as a call sees it.
 ///
 /// Threads: safe from any thread; what is written leaves in the order in which it came.
@@ -20,7 +28,7 @@ class Outlet {
 
   /// Sends bytes. After the last ones the call is deleted; after others its ServedCall::OnSent is
   /// called.
-  virtual void Write(std::string bytes, bool is_last) = 0;
+  virtual void Write(AnswerBytes bytes, bool is_last) = 0;
   /// Ends the call of that number, if it has not ended.
   virtual void End(uint64_t number) = 0;
 };
@@ -58,8 +66,8 @@ class HttpCall final : public CallWire {
  private:
   // The answer's head, or nothing if it has been sent.
   std::string TakeHead(int status);
-  // A part of a stream, as it leaves.
-  void AppendChunk(const std::string& head, const std::string& rest, std::string* bytes) const;
+  // What Pack made as a part of a stream, behind the answer's head if that has not been sent.
+  AnswerBytes TakeChunk();
   // How the stream ends, as it leaves.
   void AppendEnd(const absl::Status& status, std::string* bytes) const;
 

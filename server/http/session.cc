@@ -76,7 +76,7 @@ void Session::Stop() {
 void Session::EndAnswer() {
   if (phase_ != Phase::kAnswer) return;
   // What is half sent cannot be taken back, and nobody reads it.
-  if (is_sending_ || call_ == nullptr) {
+  if (sending_.has_value() || call_ == nullptr) {
     Close();
   } else {
     call_->served()->Cancel();
@@ -102,7 +102,7 @@ void Session::Remove() {
   if (runtime_->is_stopping && runtime_->sessions.empty()) runtime_->work.reset();
 }
 
-void Session::Write(std::string bytes, bool is_last) {
+void Session::Write(AnswerBytes bytes, bool is_last) {
   asio::post(runtime_->io, [self = shared_from_this(), bytes = std::move(bytes),
                             is_last]() mutable { self->SendBytes(std::move(bytes), is_last); });
 }
@@ -289,7 +289,7 @@ void Session::SendFile() {
     answer.body_bytes = file->bytes.size();
   }
   const bool has_body = !is_known && head.method == "GET";
-  SendBytes(TextOf(answer) + std::string(has_body ? file->bytes : ""), /*is_last=*/true);
+  SendBytes({TextOf(answer), std::string(has_body ? file->bytes : ""), ""}, /*is_last=*/true);
 }
 
 // The rest of the request is not read, so the connection takes no other one.
@@ -297,7 +297,7 @@ void Session::Refuse(const Refusal& refusal) {
   arrival_ = nullptr;
   phase_ = Phase::kAnswer;
   keeps_connection_ = false;
-  const std::string body = ErrorJson(refusal.error);
+  std::string body = ErrorJson(refusal.error);
   const std::string fields =
       absl::StrCat("Cache-Control: no-store\r\n", std::string(refusal.fields));
   AnswerHead answer;
@@ -307,7 +307,8 @@ void Session::Refuse(const Refusal& refusal) {
   answer.keeps_connection = false;
   answer.fields = fields;
   const bool is_head = has_head_ && parser_->get().method() == http::verb::head;
-  SendBytes(TextOf(answer) + (is_head ? "" : body), /*is_last=*/true);
+  if (is_head) body.clear();
+  SendBytes({TextOf(answer), std::move(body), ""}, /*is_last=*/true);
 }
 
 void Session::RefuseUnparsed(const error_code& error) {
@@ -324,21 +325,21 @@ void Session::RefuseUnparsed(const error_code& error) {
 
 // Answering
 
-void Session::SendBytes(std::string bytes, bool is_last) {
+void Session::SendBytes(AnswerBytes bytes, bool is_last) {
   if (phase_ == Phase::kClosed) return OnSent(/*ok=*/false, is_last);
   sending_ = std::move(bytes);
-  is_sending_ = true;
   // Whoever streams has a guard; see StreamCall.
   if (is_last) due_ = Clock::now() + runtime_->stall_max;
-  asio::async_write(socket_, asio::buffer(sending_),
+  const std::array<asio::const_buffer, 3> parts{
+      asio::buffer(sending_->head), asio::buffer(sending_->message), asio::buffer(sending_->tail)};
+  asio::async_write(socket_, parts,
                     [self = shared_from_this(), is_last](error_code error, size_t /*count*/) {
                       self->OnSent(!error, is_last);
                     });
 }
 
 void Session::OnSent(bool ok, bool is_last) {
-  is_sending_ = false;
-  std::string().swap(sending_);
+  sending_.reset();
   if (!ok) Close();
   if (is_last) {
     FinishAnswer();

@@ -61,7 +61,7 @@ class Session final : public Outlet, public std::enable_shared_from_this<Session
   void Close();
 
   // From any thread.
-  void Write(std::string bytes, bool is_last) override;
+  void Write(AnswerBytes bytes, bool is_last) override;
   void End(uint64_t number) override;
 
  private:
@@ -93,7 +93,7 @@ class Session final : public Outlet, public std::enable_shared_from_this<Session
   void Refuse(const Refusal& refusal);
   void RefuseUnparsed(const boost::system::error_code& error);
 
-  void SendBytes(std::string bytes, bool is_last);
+  void SendBytes(AnswerBytes bytes, bool is_last);
   void OnSent(bool ok, bool is_last);
   void FinishAnswer();
   void Linger();
@@ -124,8 +124,8 @@ class Session final : public Outlet, public std::enable_shared_from_this<Session
   // Answering.
   uint64_t call_number_ = 0;
   std::unique_ptr<HttpCall> call_;
-  std::string sending_;
-  bool is_sending_ = false;
+  // Until it has left.
+  std::optional<AnswerBytes> sending_;
 };
 
 }  // namespace dsg::server
