@@ -171,10 +171,11 @@ ResolvedAgent Resolve(const Snapshot& snapshot, AgentNames* names, const std::st
   return {std::move(id), std::move(text)};
 }
 
-absl::Status LocateOne(const Snapshot& snapshot, const ResolvedAgent& agent, TimeNs at_ns,
-                       v1::LocateResult* result) {
+absl::Status LocateOne(const Snapshot& snapshot, const ResolvedAgent& agent,
+                       const v1::AgentInstant& instant, v1::LocateResult* result) {
   if (!agent.id.ok()) return agent.id.status();
   result->set_agent_id(agent.id_text);
+  DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, InstantOf(instant));
   DSG_ASSIGN_OR_RETURN(const LocatedPose located, snapshot.Locate(*agent.id, at_ns));
   DSG_ASSIGN_OR_RETURN(const std::optional<Stay> stay, snapshot.StayAt(*agent.id, at_ns));
   FillPose(located, stay, result);
@@ -195,7 +196,7 @@ absl::Status LocateAgent(Engine* engine, const CallContext&, const v1::LocateAge
                          v1::LocateAgentResponse* reply) {
   DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
   const Snapshot& snapshot = view.snapshot();
-  const TimeNs at_ns = request.at_ns();
+  DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, InstantOf(request));
   DSG_ASSIGN_OR_RETURN(const NodeId agent, engine->names.Resolve(snapshot, request.agent()));
   DSG_ASSIGN_OR_RETURN(const LocatedPose located, snapshot.Locate(agent, at_ns));
   DSG_ASSIGN_OR_RETURN(const std::optional<Stay> stay, snapshot.StayAt(agent, at_ns));
@@ -243,7 +244,7 @@ absl::Status BatchLocateAgents(Engine* engine, const CallContext& call,
               .first;
     }
     v1::LocateResult* result = reply->add_results();
-    const absl::Status status = LocateOne(view.snapshot(), found->second, instant.at_ns(), result);
+    const absl::Status status = LocateOne(view.snapshot(), found->second, instant, result);
     if (!status.ok()) FillError(status, result);
   }
   return absl::OkStatus();

@@ -14,6 +14,7 @@
 #include "dsg/v1/scene.pb.h"
 #include "query/engine/coarse_mesh.h"
 #include "query/engine/engine.h"
+#include "query/engine/mesh_columns.h"
 #include "query/engine/node_mesh.h"
 #include "query/engine/request.h"
 #include "schema/base/status.h"
@@ -116,7 +117,38 @@ struct MeshForm {
   bool labels = true;
   bool instances = true;
   bool times = true;
+  v1::MeshEncoding encoding = v1::MESH_ENCODING_FIELDS;
 };
+
+absl::Status TakeChannels(const v1::GetMeshRequest& request, MeshForm* form) {
+  if (request.channels().empty()) return absl::OkStatus();
+  form->normals = form->colors = form->labels = form->instances = form->times = false;
+  for (const int channel : request.channels()) {
+    switch (channel) {
+      case v1::MESH_CHANNEL_NONE:
+        break;
+      case v1::MESH_CHANNEL_NORMALS:
+        form->normals = true;
+        break;
+      case v1::MESH_CHANNEL_COLORS:
+        form->colors = true;
+        break;
+      case v1::MESH_CHANNEL_LABELS:
+        form->labels = true;
+        break;
+      case v1::MESH_CHANNEL_INSTANCES:
+        form->instances = true;
+        break;
+      case v1::MESH_CHANNEL_TIMES:
+        form->times = true;
+        break;
+      default:
+        return FieldError("channels", absl::StrCat(channel),
+                          "name normals, colors, labels, instances, times or none");
+    }
+  }
+  return absl::OkStatus();
+}
 
 absl::StatusOr<MeshForm> FormOf(const v1::GetMeshRequest& request) {
   // A cell below the voxels of any mesh would only cost time.
@@ -128,32 +160,12 @@ absl::StatusOr<MeshForm> FormOf(const v1::GetMeshRequest& request) {
     return FieldError("cell_m", absl::StrCat(request.cell_m()),
                       "give 0.001 to 100 metres, or 0 for the mesh as it is stored");
   }
-  if (request.channels().empty()) return form;
-  form.normals = form.colors = form.labels = form.instances = form.times = false;
-  for (const int channel : request.channels()) {
-    switch (channel) {
-      case v1::MESH_CHANNEL_NONE:
-        break;
-      case v1::MESH_CHANNEL_NORMALS:
-        form.normals = true;
-        break;
-      case v1::MESH_CHANNEL_COLORS:
-        form.colors = true;
-        break;
-      case v1::MESH_CHANNEL_LABELS:
-        form.labels = true;
-        break;
-      case v1::MESH_CHANNEL_INSTANCES:
-        form.instances = true;
-        break;
-      case v1::MESH_CHANNEL_TIMES:
-        form.times = true;
-        break;
-      default:
-        return FieldError("channels", absl::StrCat(channel),
-                          "name normals, colors, labels, instances, times or none");
-    }
+  if (!v1::MeshEncoding_IsValid(request.encoding())) {
+    return FieldError("encoding", absl::StrCat(request.encoding()),
+                      "name fields, columns or coarse columns");
   }
+  if (request.encoding() != v1::MESH_ENCODING_UNSPECIFIED) form.encoding = request.encoding();
+  DSG_RETURN_IF_ERROR(TakeChannels(request, &form));
   return form;
 }
 
@@ -187,11 +199,21 @@ class MeshCursor final : public EngineCursor<v1::GetMeshResponse> {
       DSG_RETURN_IF_ERROR(call.Check());
       if (next_piece_ == pieces_.size()) DSG_RETURN_IF_ERROR(ReadBlock());
       if (next_piece_ == pieces_.size()) continue;
-      v1::MeshBlock* out = reply->add_blocks();
-      ToProto(pieces_[next_piece_++], out);
-      bytes += out->ByteSizeLong();
+      bytes += Send(pieces_[next_piece_++], reply);
     }
     return absl::OkStatus();
+  }
+
+  // Returns how many bytes it takes.
+  size_t Send(const MeshBlock& piece, v1::GetMeshResponse* reply) const {
+    if (form_.encoding == v1::MESH_ENCODING_FIELDS) {
+      v1::MeshBlock* out = reply->add_blocks();
+      ToProto(piece, out);
+      return out->ByteSizeLong();
+    }
+    v1::MeshColumns* out = reply->add_columns();
+    FillMeshColumns(piece, /*is_coarse=*/form_.encoding == v1::MESH_ENCODING_COARSE_COLUMNS, out);
+    return out->ByteSizeLong();
   }
 
   absl::Status ReadBlock() {

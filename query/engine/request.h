@@ -51,6 +51,14 @@ absl::Status FieldError(std::string_view field, std::string_view value, std::str
 /// 0 becomes the default, more than the cap becomes the cap. Errors: FIELD_INVALID if negative.
 absl::StatusOr<int> CheckPageSize(int32_t page_size);
 
+/// The instant that a request is about. Left out, proto3 would read it as 0, which is an instant
+/// too. Errors: FIELD_INVALID if it is left out.
+template <typename Request>
+absl::StatusOr<TimeNs> InstantOf(const Request& request) {
+  if (request.has_at_ns()) return request.at_ns();
+  return FieldError("at_ns", "", "give the world time in nanoseconds");
+}
+
 /// Errors: TIME_RANGE_INVERTED unless from_ns < to_ns.
 absl::Status CheckTimeRange(TimeNs from_ns, TimeNs to_ns);
 

@@ -105,10 +105,11 @@ class ShapesCursor final : public EngineCursor<v1::BatchGetShapesResponse> {
 CursorOr<v1::BatchGetShapesResponse> BatchGetShapes(Engine* engine, const CallContext& call,
                                                     const v1::BatchGetShapesRequest& request) {
   DSG_ASSIGN_OR_RETURN(const ReadView view, engine->Read(request));
+  DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, InstantOf(request));
   DSG_ASSIGN_OR_RETURN(const ShapeParts parts, ShapeParts::Of(request.parts()));
   DSG_ASSIGN_OR_RETURN(std::vector<TrackInfo> tracks,
                        TracksOf(&engine->names, view.snapshot(), request.agents(), call.stop()));
-  return std::make_unique<ShapesCursor>(view, std::move(tracks), parts, request.at_ns());
+  return std::make_unique<ShapesCursor>(view, std::move(tracks), parts, at_ns);
 }
 
 }  // namespace dsg::query

@@ -50,18 +50,28 @@ class PoseColumns {
   bool empty() const { return row_count_ == 0; }
   size_t size_bytes() const { return times_.size() + positions_.size() + orientations_.size(); }
 
-  void Fill(v1::TrackPoses* out) {
+  // Copies, so that the columns keep their memory for the next message, and empties them.
+  void Send(v1::TrackPoses* out) {
     out->set_row_count(row_count_);
     out->set_value_bytes(is_single_ ? sizeof(float) : sizeof(double));
     ToProto(origin_map_, out->mutable_origin_map());
-    *out->mutable_times_ns() = std::move(times_);
-    *out->mutable_positions() = std::move(positions_);
-    if (has_orientation_) *out->mutable_orientations() = std::move(orientations_);
-    *out->mutable_gaps() = std::move(gaps_);
-    *out->mutable_flags() = flags_.Take();
+    out->set_times_ns(times_);
+    out->set_positions(positions_);
+    if (has_orientation_) out->set_orientations(orientations_);
+    out->set_gaps(gaps_);
+    out->set_flags(flags_.Take());
+    Clear();
   }
 
  private:
+  void Clear() {
+    row_count_ = 0;
+    has_orientation_ = false;
+    origin_map_.setZero();
+    for (std::string* column : {&times_, &positions_, &orientations_, &gaps_}) column->clear();
+    flags_ = RareColumn<uint8_t>(0);
+  }
+
   template <typename Row>
   void AddRow(const Row& values, std::string* column) const {
     if (is_single_) {
@@ -118,9 +128,8 @@ class TracksCursor final : public EngineCursor<v1::GetTracksResponse> {
         tracks_(std::move(tracks)),
         range_(range),
         thin_period_ns_(request.thin_period_ns()),
-        is_single_(request.single_precision()),
-        with_orientations_(!request.without_orientations()),
-        thinner_(thin_period_ns_) {}
+        thinner_(thin_period_ns_),
+        columns_(request.single_precision(), !request.without_orientations()) {}
 
   bool done() const override { return track_ == tracks_.size(); }
 
@@ -155,19 +164,18 @@ class TracksCursor final : public EngineCursor<v1::GetTracksResponse> {
       walk_.emplace(tracks_[track_], range_);
       thinner_ = Thinner(thin_period_ns_);
     }
-    PoseColumns columns(is_single_, with_orientations_);
     DSG_RETURN_IF_ERROR(
         walk_->Read(view_.snapshot(), call.stop(), [&](const TimedPose& pose, bool is_after_gap) {
-          if (columns.size_bytes() >= room_bytes) return false;
-          Take(pose, is_after_gap, &columns);
+          if (columns_.size_bytes() >= room_bytes) return false;
+          Take(pose, is_after_gap);
           return true;
         }));
-    if (walk_->done()) thinner_.Finish(&columns);
-    if (!columns.empty()) {
-      *bytes += columns.size_bytes();
+    if (walk_->done()) thinner_.Finish(&columns_);
+    if (!columns_.empty()) {
+      *bytes += columns_.size_bytes();
       v1::TrackPoses* out = reply->add_poses();
       out->set_track(static_cast<int32_t>(track_));
-      columns.Fill(out);
+      columns_.Send(out);
     }
     if (walk_->done()) {
       walk_.reset();
@@ -176,11 +184,11 @@ class TracksCursor final : public EngineCursor<v1::GetTracksResponse> {
     return absl::OkStatus();
   }
 
-  void Take(const TimedPose& pose, bool is_after_gap, PoseColumns* columns) {
+  void Take(const TimedPose& pose, bool is_after_gap) {
     if (thin_period_ns_ > 0) {
-      thinner_.Take(pose, is_after_gap, columns);
+      thinner_.Take(pose, is_after_gap, &columns_);
     } else {
-      columns->Add(pose, is_after_gap);
+      columns_.Add(pose, is_after_gap);
     }
   }
 
@@ -188,13 +196,12 @@ class TracksCursor final : public EngineCursor<v1::GetTracksResponse> {
   const std::vector<TrackInfo> tracks_;
   const WalkRange range_;
   const TimeNs thin_period_ns_;
-  const bool is_single_;
-  const bool with_orientations_;
   bool is_first_ = true;
   // The track that is walked along.
   size_t track_ = 0;
   std::optional<TrackWalk> walk_;
   Thinner thinner_;
+  PoseColumns columns_;
 };
 
 absl::StatusOr<WalkRange> RangeOf(const v1::GetTracksRequest& request) {

@@ -97,6 +97,12 @@ const POSES = {
   5: ['origin', vector], 6: ['positions', block], 8: ['gaps', block],
 };
 const TRACKS = {2: ['tracks', block], 3: ['poses', block]};
+const double = (reader) => reader.double();
+const MESH = {3: ['pieces', block]};
+const MESH_PIECE = {
+  2: ['vertexCount', int], 3: ['faceCount', int], 4: ['step', double], 5: ['origin', vector],
+  6: ['positions', block], 8: ['colors', block], 13: ['faces', block],
+};
 
 /** "O42" of an id in 64 bits. */
 function idOf(low, high) {
@@ -231,4 +237,26 @@ export function readTracksMessage(bytes, epoch) {
       };
     }),
   };
+}
+
+/**
+ * One GetMeshResponse with coarse columns: blocks with positions (x y z of each vertex, metres,
+ * frame of the map), colours (0xRRGGBB, or null) and faces.
+ */
+export function readMeshMessage(bytes) {
+  const {pieces = []} = fieldsOf(bytes, MESH, new Set(['pieces']));
+  return pieces.map((one) => {
+    const {vertexCount = 0, faceCount = 0, step = 0, origin = [0, 0, 0], ...columns} =
+        fieldsOf(one, MESH_PIECE);
+    const positions = Float32Array.from(required(columns.positions, Uint16Array, vertexCount, 3),
+                                        (value, i) => origin[i % 3] + step * value);
+    const rgb = column(columns.colors, Uint8Array, vertexCount, 3);
+    const faces = required(columns.faces, Uint16Array, faceCount, 3);
+    if (faces.some((vertex) => vertex >= vertexCount)) {
+      throw new RangeError('a face of the mesh names a vertex that is not there');
+    }
+    const colors = rgb && Uint32Array.from(
+        {length: vertexCount}, (_, i) => rgb[3 * i] << 16 | rgb[3 * i + 1] << 8 | rgb[3 * i + 2]);
+    return {positions, colors, faces};
+  });
 }

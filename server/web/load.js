@@ -1,17 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // Loads a scene in the order in which it is worth seeing: rooms, places and objects, the edges
 // between them, tracks; and its mesh, revisions and tags.
-import {edgesOf, nodesOf, readSceneMessage, readTracksMessage} from './columns.js';
+import {
+  edgesOf, nodesOf, readMeshMessage, readSceneMessage, readTracksMessage,
+} from './columns.js';
 import {CallError} from './rpc.js';
 import {Scene, Track, withGroup} from './scene.js';
 import {nsOf} from './time.js';
-import {Reader, Writer} from './wire.js';
+import {Writer} from './wire.js';
 
 /** The drawn mesh has at most about so many triangles; a picture takes longer with more. */
 const TRIANGLES_MAX = 400000;
 /** Edge lengths of cells that vertices share, metres: of a large mesh a coarser one is drawn. */
 const CELLS = [0, 0.1, 0.2, 0.4, 0.8];
 const MESH_CHANNEL_COLORS = 3;
+const MESH_ENCODING_COARSE_COLUMNS = 3;
 const PAGE = 1000;
 /** More edges than these hide the map: the hierarchy alone is drawn, of layers not too large. */
 const EDGES_MAX = 30000;
@@ -128,27 +131,6 @@ export async function loadScene(client, name, revision, signal, progress) {
   return scene;
 }
 
-/** The blocks of one GetMeshResponse. */
-export function readMesh(bytes) {
-  const blocks = [];
-  new Reader(bytes).each({
-    2: (reader) => {
-      const block = {positions: new Float32Array(0), colors: null, faces: new Uint32Array(0)};
-      new Reader(reader.block()).each({
-        4: (r) => { block.positions = r.floats(); },
-        6: (r) => { block.colors = r.fixed32s(); },
-        11: (r) => { block.faces = r.varints(); },
-      });
-      const count = block.positions.length / 3;
-      if (block.faces.some((index) => index >= count)) {
-        throw new RangeError('a face of the mesh names a vertex that is not there');
-      }
-      blocks.push(block);
-    },
-  });
-  return blocks;
-}
-
 /** The bits of a double as a number of 64 bits. */
 function bitsOf(value) {
   const view = new DataView(new ArrayBuffer(8));
@@ -159,11 +141,12 @@ function bitsOf(value) {
 /** The mesh with one vertex a cell; false, and not all of it, if it has too many triangles. */
 async function loadMeshOf(client, scene, cell, signal, progress) {
   scene.mesh = [];
-  const request = requestOf(scene).block(7, Uint8Array.of(MESH_CHANNEL_COLORS));
+  const request = requestOf(scene).block(7, Uint8Array.of(MESH_CHANNEL_COLORS))
+      .number(8, MESH_ENCODING_COARSE_COLUMNS);
   if (cell > 0) request.fixed64(6, bitsOf(cell));
   let count = 0;
   for await (const bytes of client.bytes('QueryService/GetMesh', request.done(), signal)) {
-    for (const block of readMesh(bytes)) {
+    for (const block of readMeshMessage(bytes)) {
       scene.mesh.push(block);
       count += block.faces.length / 3;
     }

@@ -73,21 +73,6 @@ export class Reader {
     return new Float32Array(bytes.slice().buffer);
   }
 
-  /** Packed fixed32. */
-  fixed32s() {
-    const bytes = this.block();
-    if (bytes.length % 4 !== 0) throw new RangeError('packed numbers are cut off');
-    return new Uint32Array(bytes.slice().buffer);
-  }
-
-  /** Packed varints of at most 32 bits. */
-  varints() {
-    const inner = new Reader(this.block());
-    const values = [];
-    while (!inner.isAtEnd) values.push(inner.varint());
-    return Uint32Array.from(values);
-  }
-
   /**
    * Calls the function of each field's number; fields without one are passed over.
    * @param {Object<number, function(Reader): void>} fields

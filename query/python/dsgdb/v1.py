@@ -1792,6 +1792,38 @@ class ListMeshBlocksResponse:
     next_page_token: str = ""
 
 
+@dataclass(frozen=True)
+class MeshColumns:
+    """A block of a mesh, or a piece of a large one, as columns with a row for each vertex or face.
+    See MeshBlock. An empty column of a vertex = none has one, or it was not asked for.
+    """
+
+    index: Optional[MeshBlockIndex] = None
+    vertex_count: int = 0
+    face_count: int = 0
+    # 0 = positions are float32, metres, map frame. Else they are uint16, and a vertex is at
+    # origin_map + step_m x its numbers, at most half a step from where it is stored on each axis.
+    step_m: float = 0.0
+    # Metres, map frame; unset with positions of 32 bits.
+    origin_map: Optional[Vector3] = None
+    # 3 x float32 or 3 x uint16, as step_m says.
+    positions: bytes = b""
+    # Unit vectors, map frame: 3 x float32, or with positions of 16 bits 3 x int8 in 1/127.
+    normals: bytes = b""
+    # 3 x uint8: red, green, blue.
+    colors: bytes = b""
+    # uint32: SemanticLabel.id.
+    labels: bytes = b""
+    # uint32; 0 = no instance.
+    instance_ids: bytes = b""
+    # int64: world time of the first observation of each vertex, nanoseconds.
+    first_seen_ns: bytes = b""
+    # int64: world time of the last observation of each vertex, nanoseconds.
+    last_seen_ns: bytes = b""
+    # 3 x uint16: rows of the vertices. A piece has at most 20,000 vertices.
+    faces: bytes = b""
+
+
 class Comparison(ProtoEnum):
     """How an attribute is compared with a value."""
 
@@ -2264,6 +2296,18 @@ class MeshChannel(ProtoEnum):
     MESH_CHANNEL_TIMES = "MESH_CHANNEL_TIMES"
 
 
+class MeshEncoding(ProtoEnum):
+    """How blocks of a mesh are sent."""
+
+    MESH_ENCODING_UNSPECIFIED = "MESH_ENCODING_UNSPECIFIED"
+    # MeshBlock: every number as it is stored.
+    MESH_ENCODING_FIELDS = "MESH_ENCODING_FIELDS"
+    # MeshColumns: the same numbers, as columns that can be used in place.
+    MESH_ENCODING_COLUMNS = "MESH_ENCODING_COLUMNS"
+    # MeshColumns in fewer bytes: positions of 16 bits, normals of 8. For pictures.
+    MESH_ENCODING_COARSE_COLUMNS = "MESH_ENCODING_COARSE_COLUMNS"
+
+
 class ShapePart(ProtoEnum):
     """Parts of a body's shape."""
 
@@ -2296,8 +2340,8 @@ class LocateAgentRequest:
     read_at: Optional[ReadAt] = None
     # A node id ("H12") or the name that the log gave ("12").
     agent: str = ""
-    # World time of the pose.
-    at_ns: int = 0
+    # World time of the pose. Required: left out, it is refused with FIELD_INVALID.
+    at_ns: Optional[int] = None
 
 
 @dataclass(frozen=True)
@@ -2332,8 +2376,8 @@ class AgentInstant:
     """One question of a batch: where an agent is at a time."""
 
     agent: str = ""
-    # World time of the pose.
-    at_ns: int = 0
+    # World time of the pose. Required, as in LocateAgentRequest.
+    at_ns: Optional[int] = None
 
 
 @dataclass(frozen=True)
@@ -2536,6 +2580,8 @@ class GetMeshRequest:
     cell_m: float = 0.0
     # What to send beside positions and faces. Empty = everything.
     channels: tuple[MeshChannel, ...] = ()
+    # Unset = blocks of numbers in fields.
+    encoding: MeshEncoding = MeshEncoding.MESH_ENCODING_UNSPECIFIED
 
 
 @dataclass(frozen=True)
@@ -2546,6 +2592,8 @@ class GetMeshResponse:
     # for one message comes in pieces with the same index, each with the vertices that its faces
     # need.
     blocks: tuple[MeshBlock, ...] = ()
+    # The same instead of `blocks`, if the request asks for columns.
+    columns: tuple[MeshColumns, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -2726,8 +2774,8 @@ class BatchGetShapesRequest:
     read_at: Optional[ReadAt] = None
     # Node ids ("H12") or the names that the log gave ("12"), at most 10,000. Empty = all agents.
     agents: tuple[str, ...] = ()
-    # World time, nanoseconds.
-    at_ns: int = 0
+    # World time, nanoseconds. Required: left out, it is refused with FIELD_INVALID.
+    at_ns: Optional[int] = None
     # What to send; empty = everything.
     parts: tuple[ShapePart, ...] = ()
 

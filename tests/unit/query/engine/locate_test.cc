@@ -137,6 +137,22 @@ TEST_F(Locate, RefusesUnknownAgentsMapsAndNamesThatArePaths) {
   EXPECT_EQ(ReasonOf(Get(request).status()), Reason::kMapUnknown);
 }
 
+TEST_F(Locate, RefusesARequestWithoutATimeAndTakesTimeZero) {
+  v1::LocateAgentRequest request = Ask("H12", 0);
+  EXPECT_TRUE(Get(request).ok());
+  request.clear_at_ns();
+  const absl::Status refused = Get(request).status();
+  EXPECT_EQ(ReasonOf(refused), Reason::kFieldInvalid);
+  EXPECT_EQ(MetadataOf(refused).at("field"), "at_ns");
+  v1::BatchLocateAgentsRequest batch;
+  batch.set_map(kMap);
+  batch.add_instants()->set_agent("H12");
+  v1::BatchLocateAgentsResponse reply;
+  core_ = OpenCore(folder_.path());
+  ASSERT_TRUE(core_->BatchLocateAgents(query::CallContext(), batch, &reply).ok());
+  EXPECT_EQ(reply.results(0).status_code(), static_cast<int>(absl::StatusCode::kInvalidArgument));
+}
+
 TEST_F(Locate, AnswersFromAnOldRevisionWhatWasBelievedThen) {
   GraphDelta moved;
   moved.corrections = {{NodeId('H', 12), 3 * kSecond, 4 * kSecond, {PoseAt(3 * kSecond, 4, 9, 1)}}};

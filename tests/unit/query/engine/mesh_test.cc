@@ -6,11 +6,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <set>
 
 #include "dsg/v1/query_service.pb.h"
 #include "dsg/v1/scene.pb.h"
 #include "query/engine/coarse_mesh.h"
+#include "query/engine/mesh_columns.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 #include "tests/unit/query/engine/office.h"
@@ -154,6 +156,98 @@ TEST_F(Mesh, GivesTheBlocksAndChannelsThatAreNamed) {
   EXPECT_TRUE(block.last_seen_ns.empty());
   request.add_channels(static_cast<v1::MeshChannel>(99));
   EXPECT_EQ(ReasonOf(Ask(request).status()), Reason::kFieldInvalid);
+}
+
+// The numbers of a column.
+template <typename T>
+std::vector<T> ValuesOf(const std::string& column) {
+  std::vector<T> values(column.size() / sizeof(T));
+  std::memcpy(values.data(), column.data(), values.size() * sizeof(T));
+  return values;
+}
+
+TEST_F(Mesh, ComesAsColumnsWithTheSameNumbers) {
+  v1::GetMeshRequest request = OfMap();
+  const auto fields = Ask(request);
+  request.set_encoding(v1::MESH_ENCODING_COLUMNS);
+  const auto columns = Ask(request);
+  ASSERT_TRUE(columns.ok()) << columns.status();
+  std::vector<v1::MeshColumns> pieces;
+  for (const v1::GetMeshResponse& message : *columns) {
+    EXPECT_EQ(message.blocks_size(), 0);
+    EXPECT_LT(message.ByteSizeLong(), size_t{3} << 20);
+    pieces.insert(pieces.end(), message.columns().begin(), message.columns().end());
+  }
+  size_t next = 0;
+  for (const v1::GetMeshResponse& message : *fields) {
+    for (const v1::MeshBlock& in : message.blocks()) {
+      const MeshBlock block = *FromProto(in);
+      ASSERT_LT(next, pieces.size());
+      const v1::MeshColumns& piece = pieces[next++];
+      EXPECT_EQ(piece.index().x(), block.index.x);
+      EXPECT_EQ(piece.vertex_count(), in.positions_size() / 3);
+      EXPECT_EQ(piece.face_count(), in.faces_size() / 3);
+      EXPECT_EQ(piece.step_m(), 0.0);
+      EXPECT_EQ(ValuesOf<float>(piece.positions()),
+                std::vector<float>(in.positions().begin(), in.positions().end()));
+      EXPECT_EQ(ValuesOf<float>(piece.normals()),
+                std::vector<float>(in.normals().begin(), in.normals().end()));
+      EXPECT_EQ(piece.colors().substr(0, 3), "\x11\x22\x33");
+      EXPECT_EQ(ValuesOf<uint32_t>(piece.labels()), block.labels);
+      EXPECT_EQ(ValuesOf<uint32_t>(piece.instance_ids()), block.instance_ids);
+      EXPECT_EQ(ValuesOf<TimeNs>(piece.first_seen_ns()), block.first_seen_ns);
+      EXPECT_EQ(ValuesOf<TimeNs>(piece.last_seen_ns()), block.last_seen_ns);
+      EXPECT_EQ(ValuesOf<uint16_t>(piece.faces()),
+                std::vector<uint16_t>(in.faces().begin(), in.faces().end()));
+    }
+  }
+  EXPECT_EQ(next, pieces.size());
+}
+
+TEST_F(Mesh, CoarseColumnsAreWithinHalfAStep) {
+  v1::GetMeshRequest request = OfMap();
+  request.add_blocks()->set_x(4);
+  const auto exact = Ask(request);
+  request.set_encoding(v1::MESH_ENCODING_COARSE_COLUMNS);
+  const auto coarse = Ask(request);
+  ASSERT_TRUE(exact.ok() && coarse.ok()) << coarse.status();
+  const v1::MeshBlock& block = exact->front().blocks(0);
+  ASSERT_EQ(coarse->front().columns_size(), 1);
+  const v1::MeshColumns& piece = coarse->front().columns(0);
+  EXPECT_GT(piece.step_m(), 0.0);
+  EXPECT_LT(piece.step_m(), 1.9 / 65'535);
+  const auto steps = ValuesOf<uint16_t>(piece.positions());
+  ASSERT_EQ(steps.size(), static_cast<size_t>(block.positions_size()));
+  const double origin_map[] = {piece.origin_map().x(), piece.origin_map().y(),
+                               piece.origin_map().z()};
+  for (size_t i = 0; i < steps.size(); ++i) {
+    EXPECT_NEAR(origin_map[i % 3] + piece.step_m() * steps[i], block.positions(static_cast<int>(i)),
+                0.5001 * piece.step_m());
+  }
+  const auto normals = ValuesOf<int8_t>(piece.normals());
+  ASSERT_EQ(normals.size(), steps.size());
+  EXPECT_EQ(normals[2], 127);
+}
+
+TEST_F(Mesh, RefusesAnUnknownEncoding) {
+  v1::GetMeshRequest request = OfMap();
+  request.set_encoding(static_cast<v1::MeshEncoding>(9));
+  const absl::Status refused = Ask(request).status();
+  EXPECT_EQ(ReasonOf(refused), Reason::kFieldInvalid);
+  EXPECT_EQ(MetadataOf(refused).at("field"), "encoding");
+}
+
+TEST(FillMeshColumns, TakesOneVertexAndNone) {
+  v1::MeshColumns none;
+  FillMeshColumns(MeshBlock(), /*is_coarse=*/true, &none);
+  EXPECT_EQ(none.vertex_count(), 0);
+  MeshBlock point;
+  point.positions_map.emplace_back(3.0f, 4.0f, 5.0f);
+  v1::MeshColumns one;
+  FillMeshColumns(point, /*is_coarse=*/true, &one);
+  EXPECT_GT(one.step_m(), 0.0);
+  EXPECT_EQ(ValuesOf<uint16_t>(one.positions()), (std::vector<uint16_t>{0, 0, 0}));
+  EXPECT_EQ(one.origin_map().z(), 5.0);
 }
 
 TEST_F(Mesh, IsCoarserWithACell) {
