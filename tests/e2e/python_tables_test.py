@@ -125,6 +125,22 @@ class Tables(support.ProgramsTest):
         moved = frame[(frame["what"] == "node") & (frame["kind"] == "human")]["moved_m"]
         self.assertTrue((moved.dropna() > 0).any())
 
+    def test_chunks_hold_the_poses_of_the_tracks(self):
+        tracks = self.m.tracks()
+        chunks = {agent: [chunk for chunk in self.m.pose_chunks() if chunk.agent_id == agent]
+                  for agent in tracks}
+        for agent, track in tracks.items():
+            times, positions, orientations = track.to_arrays()
+            of = chunks[agent]
+            self.assertTrue(numpy.array_equal(times, numpy.concatenate([c.time_ns for c in of])))
+            self.assertTrue(numpy.array_equal(
+                positions, numpy.concatenate([c.positions for c in of])))
+            self.assertTrue(numpy.array_equal(
+                orientations, numpy.concatenate([c.orientations for c in of])))
+        self.assertEqual([], list(self.m.pose_chunks([])))
+        with self.assertRaises(ValueError):
+            times[0] = 0
+
     def test_a_map_without_a_mesh_has_none(self):
         mesh = self.m.mesh()
         arrays = mesh.to_numpy()
@@ -186,6 +202,7 @@ class UnixClock(support.ProgramsTest):
                          mesh.colors.tolist())
         self.assertEqual([1, 1, 2, 0, 0, 0], mesh.labels.tolist())
         self.assertIsNone(mesh.instance_ids)
+        self.assertEqual([0, 1, 2, 5, 4, 3], self.m.mesh().faces.tolist())
         one = self.m.mesh(box=(2.5, 0, 0, 4, 1, 1))
         self.assertEqual(3, len(one.to_numpy().vertices))
 

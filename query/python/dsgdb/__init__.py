@@ -14,12 +14,13 @@ from dsgdb.errors import (Aborted, AlreadyExists, Cancelled, DataLoss, DeadlineE
                           FailedPrecondition, Internal, InvalidArgument, NotFound, OutOfRange,
                           PermissionDenied, ResourceExhausted, Unauthenticated, Unavailable,
                           Unimplemented)
-from dsgdb.graphs import Change, Diff, Graph, Mesh, MeshArrays
+from dsgdb.graphs import Change, Diff, Graph
 from dsgdb.json_codec import FieldMask
 from dsgdb.map import Map
+from dsgdb.meshes import Mesh, MeshArrays
 from dsgdb.rows import Rows
 from dsgdb.times import TIME_MAX, TIME_MIN
-from dsgdb.tracks import Track, Tracks
+from dsgdb.tracks import PoseChunk, Track, Tracks
 from dsgdb.v1 import (VERSION, AttributeValue, Box, Capsule, Clock, Cuboid, Edge, GraphDelta, Node,
                       NodePattern, NodeView, Pose, PoseQuality, Quaternion, SemanticLabel, Sphere,
                       TimedPose, TriangleMesh, Vector3)
@@ -32,7 +33,7 @@ __all__ = [
     "Cuboid", "DataLoss", "Database", "DeadlineExceeded", "Diff", "Edge", "Error",
     "FailedPrecondition", "FieldMask", "Graph", "GraphDelta", "Internal", "InvalidArgument", "Map",
     "Mesh", "MeshArrays", "Node", "NodePattern", "NodeView", "NotFound", "OutOfRange",
-    "PermissionDenied", "Pose", "PoseQuality", "Quaternion", "ResourceExhausted", "Rows",
-    "SemanticLabel", "Session", "Sphere", "TIME_MAX", "TIME_MIN", "TimedPose", "Track", "Tracks",
-    "TriangleMesh", "Unauthenticated", "Unavailable", "Unimplemented", "Vector3", "open",
+    "PermissionDenied", "Pose", "PoseChunk", "PoseQuality", "Quaternion", "ResourceExhausted",
+    "Rows", "SemanticLabel", "Session", "Sphere", "TIME_MAX", "TIME_MIN", "TimedPose", "Track",
+    "Tracks", "TriangleMesh", "Unauthenticated", "Unavailable", "Unimplemented", "Vector3", "open",
 ]

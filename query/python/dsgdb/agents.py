@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
-from typing import Iterable, Optional
+import contextlib
+from typing import Iterable, Iterator, Optional
 
 from dsgdb import v1
 from dsgdb.errors import InvalidArgument
+from dsgdb.packed import encode_read_at
 from dsgdb.questions import Box, Questions, box as to_box, optional_duration
 from dsgdb.rows import Rows, join
 from dsgdb.times import Duration, Instant, instant_ns
-from dsgdb.tracks import Track, Tracks, encode_read_at, encode_request, read_tracks
+from dsgdb.tracks import PoseChunk, Track, Tracks, encode_request, read_chunks, read_tracks
 
 _COEFFICIENTS_AND_JOINTS = (v1.ShapePart.SHAPE_PART_COEFFICIENTS, v1.ShapePart.SHAPE_PART_JOINTS)
 
@@ -42,11 +44,7 @@ class AgentQuestions(Questions):
     def tracks(self, agents: Optional[Iterable[str]] = None, start: Optional[Instant] = None,
                end: Optional[Instant] = None, *, every: Optional[Duration] = None) -> Tracks:
         """The tracks of several agents (None = of all, by id), all of one revision."""
-        read_at = self._read_at
-        if isinstance(agents, str):
-            raise InvalidArgument(f"agents \"{agents}\" is one name; write [\"{agents}\"], or ask "
-                                  "for track()", "FIELD_INVALID", {"field": "agents"})
-        asked = None if agents is None else list(agents)
+        asked = _listed(agents)
         if asked == []:
             return Tracks({}, self.spec)
         found = self._tracks(asked or (), start, end, every)
@@ -56,6 +54,18 @@ class AgentQuestions(Questions):
         by_word = {name: track for name, track in found.values()}
         by_word.update({agent: track for agent, (_, track) in found.items()})
         return Tracks({word: by_word[word] for word in asked}, self.spec)
+
+    def pose_chunks(self, agents: Optional[Iterable[str]] = None, start: Optional[Instant] = None,
+                    end: Optional[Instant] = None) -> Iterator[PoseChunk]:
+        """The stored poses of several agents (None = of all) in numpy, some 16,000 at a time: one
+        agent behind the other, each ascending in time. Nothing is kept, so that there may be more
+        of them than memory holds; it is the quickest way to look at each pose once.
+        """
+        asked = _listed(agents)
+        if asked == []:
+            return
+        with self._track_messages(asked or (), start, end, 0) as messages:
+            yield from read_chunks(messages)
 
     def who(self, where: Optional[str] = None, start: Optional[Instant] = None,
             end: Optional[Instant] = None, *, box: Optional[Box] = None,
@@ -153,7 +163,19 @@ class AgentQuestions(Questions):
     def _tracks(self, agents: Iterable[str], start: Optional[Instant], end: Optional[Instant],
                 every: Optional[Duration]) -> dict[str, tuple[str, Track]]:
         period_ns = optional_duration(every, "every")
+        with self._track_messages(agents, start, end, period_ns) as messages:
+            return read_tracks(messages, self.spec, period_ns)
+
+    def _track_messages(self, agents: Iterable[str], start: Optional[Instant],
+                        end: Optional[Instant], period_ns: int
+                        ) -> contextlib.AbstractContextManager[Iterator[memoryview]]:
         request = encode_request(self.spec.name, encode_read_at(self._read_at), agents,
                                  self._ns(start, "start"), self._ns(end, "end"), period_ns)
-        with self.api.binary_stream("dsg.v1.QueryService/GetTracks", request) as messages:
-            return read_tracks(messages, self.spec, period_ns)
+        return self.api.binary_stream("dsg.v1.QueryService/GetTracks", request)
+
+
+def _listed(agents: Optional[Iterable[str]]) -> Optional[list[str]]:
+    if isinstance(agents, str):
+        raise InvalidArgument(f"agents \"{agents}\" is one name; write [\"{agents}\"], or ask for "
+                              "track()", "FIELD_INVALID", {"field": "agents"})
+    return None if agents is None else list(agents)

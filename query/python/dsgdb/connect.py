@@ -286,15 +286,10 @@ class Caller:
                 yield message
 
     @contextlib.contextmanager
-    def json_stream(self, path: str, request: Any) -> Iterator[Iterator[Json]]:
-        """The messages of a stream that reads, without objects for what is in them."""
-        stream = self.channel.stream(path, _request(request), None, True, "answer")
-        with contextlib.closing(stream), reading(path):
-            yield stream
-
-    @contextlib.contextmanager
     def binary_stream(self, path: str, request: bytes) -> Iterator[Iterator[memoryview]]:
-        """The same in protobuf's wire format; `request` is an encoded message."""
+        """The messages of a stream that reads, in protobuf's wire format; `request` is an encoded
+        message.
+        """
         stream = self.channel.binary_stream(path, request)
         with contextlib.closing(stream), reading(path):
             yield stream

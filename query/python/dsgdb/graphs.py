@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parts of a map as one value: a graph, a mesh, the differences between two revisions."""
+"""Parts of a map as one value: a graph, the differences between two revisions."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from array import array
-from typing import TYPE_CHECKING, Any, Iterable, Mapping, NamedTuple, Optional
+from typing import TYPE_CHECKING, Any, Iterable, Mapping, Optional
 
 from dsgdb.rows import plain_value
 from dsgdb.v1 import (DiffRevisionsResponse, Edge, EdgeChange, MapSpec, MeshChange, Node,
@@ -14,7 +13,6 @@ from dsgdb.v1 import (DiffRevisionsResponse, Edge, EdgeChange, MapSpec, MeshChan
 
 if TYPE_CHECKING:
     import networkx
-    import numpy
     import pandas
 
 
@@ -53,73 +51,6 @@ class Graph:
 
 def _plain(attributes: Mapping[str, Any]) -> dict[str, Any]:
     return {name: plain_value(value) for name, value in attributes.items()}
-
-
-class MeshArrays(NamedTuple):
-    """One mesh in numpy; None where no block of the map has such values, 0 where one lacks them."""
-
-    # (n, 3) float32, map frame, metres.
-    vertices: numpy.ndarray[Any, Any]
-    # (m, 3) uint32, rows of `vertices`.
-    faces: numpy.ndarray[Any, Any]
-    # (n, 3) uint8: red, green, blue.
-    colors: Optional[numpy.ndarray[Any, Any]]
-    # (n, 3) float32.
-    normals: Optional[numpy.ndarray[Any, Any]]
-    # (n,) uint32: semantic class; the object that the vertex belongs to.
-    labels: Optional[numpy.ndarray[Any, Any]]
-    instance_ids: Optional[numpy.ndarray[Any, Any]]
-
-
-class Mesh:
-    """The triangles of a map, or of one node, as flat arrays of the standard library: vertices and
-    normals x y z, faces three indices each, colors 0xRRGGBB.
-    """
-
-    # Columns with their numbers a vertex, and the fields of MeshBlock that they come from.
-    _COLUMNS = (("normals", "f", 3), ("colors", "I", 1), ("labels", "I", 1),
-                ("instance_ids", "I", 1))
-
-    def __init__(self, revision: int = 0) -> None:
-        self.revision = revision
-        self.vertices = array("f")
-        self.faces = array("I")
-        self.normals = array("f")
-        self.colors = array("I")
-        self.labels = array("I")
-        self.instance_ids = array("I")
-
-    def add(self, block: Mapping[str, Any]) -> None:
-        """Adds the JSON of a MeshBlock."""
-        first = len(self.vertices) // 3
-        self.vertices.extend(block["positions"])
-        self.faces.extend(first + int(corner) for corner in block["faces"])
-        count = len(block["positions"]) // 3
-        for name, _, size in self._COLUMNS:
-            values = block.get(name) or ()
-            column: Any = getattr(self, name)
-            if values and not column:
-                column.extend([0] * (first * size))
-            if values or column:
-                column.extend(values or [0] * (count * size))
-
-    def to_numpy(self) -> MeshArrays:
-        """Arrays in the shapes that mesh libraries take; `MeshArrays` says which."""
-        import numpy
-        found: dict[str, Any] = {}
-        for name, kind, size in self._COLUMNS:
-            column = getattr(self, name)
-            values = numpy.frombuffer(column, kind) if column else None
-            found[name] = values.reshape(-1, 3) if values is not None and size == 3 else values
-        if found["colors"] is not None:
-            found["colors"] = numpy.stack([found["colors"] >> shift & 0xff for shift in (16, 8, 0)],
-                                          axis=1).astype("u1")
-        return MeshArrays(numpy.frombuffer(self.vertices, "f").reshape(-1, 3),
-                          numpy.frombuffer(self.faces, "I").reshape(-1, 3), **found)
-
-    def __repr__(self) -> str:
-        return (f"<Mesh: {len(self.vertices) // 3} vertices, {len(self.faces) // 3} faces, "
-                f"revision {self.revision}>")
 
 
 @dataclasses.dataclass(frozen=True)

@@ -6,9 +6,11 @@ from __future__ import annotations
 import hashlib
 from typing import Iterable, Optional, Union
 
-from dsgdb import v1
+from dsgdb import meshes, v1
 from dsgdb.errors import DataLoss, InvalidArgument
-from dsgdb.graphs import Graph, Mesh
+from dsgdb.graphs import Graph
+from dsgdb.meshes import Mesh
+from dsgdb.packed import encode_read_at
 from dsgdb.questions import Box, Point, Questions, box as to_box, vector
 from dsgdb.rows import Rows, join
 from dsgdb.times import Instant
@@ -139,16 +141,10 @@ class SceneQuestions(Questions):
         """The triangles of the map, of one object, structure, room or region, or of the blocks that
         a box touches. A map without a mesh has none.
         """
-        request = v1.GetMeshRequest(**self._common(), box=to_box(box), node=node)
-        mesh = Mesh()
-        with self.api.json_stream("dsg.v1.QueryService/GetMesh", request) as messages:
-            for message in messages:
-                header = message.get("header")
-                if header:
-                    mesh.revision = int(header["read_revision"])
-                for block in message["blocks"]:
-                    mesh.add(block)
-        return mesh
+        request = meshes.encode_request(self.spec.name, encode_read_at(self._read_at), node,
+                                        to_box(box))
+        with self.api.binary_stream("dsg.v1.QueryService/GetMesh", request) as messages:
+            return Mesh(messages)
 
     def asset(self, sha256: Union[str, bytes]) -> bytes:
         """The content with this digest (32 bytes, or 64 hexadecimal digits): a CAD model, a body

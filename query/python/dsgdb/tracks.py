@@ -3,14 +3,14 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 from array import array
-from typing import TYPE_CHECKING, Any, Iterable, Iterator, Mapping, Optional, Sequence
+from typing import TYPE_CHECKING, Any, Iterable, Iterator, Mapping, NamedTuple, Optional, Sequence
 
 from dsgdb import wire
+from dsgdb.packed import Fields
 from dsgdb.rows import time_index
-from dsgdb.v1 import MapSpec, Pose, PoseQuality, Quaternion, ReadAt, TimedPose, Vector3
+from dsgdb.v1 import MapSpec, Pose, PoseQuality, Quaternion, TimedPose, Vector3
 
 if TYPE_CHECKING:
     import numpy
@@ -25,27 +25,31 @@ _EXACT, _INTERPOLATED, _IN_GAP = 1, 2, 3
 _NAN = float("nan")
 
 
-@dataclasses.dataclass(frozen=True)
-class _Part:
-    """The columns of one TrackPoses message."""
+class _Columns:
+    """The stored rows of a track as they came, one message behind the other. A message is copied
+    at once, so that all of them come in the same memory.
+    """
 
-    row_count: int
-    value_bytes: int
-    origin: tuple[float, float, float]
-    times: memoryview
-    positions: memoryview
-    # Empty: unknown in every row.
-    orientations: memoryview
-    # Empty: 0 in every row.
-    flags: memoryview
+    def __init__(self) -> None:
+        self.times = array("q")
+        # x y z of each row, and x y z w.
+        self.positions = array("d")
+        self.orientations = array("d")
+        self.flags = array("B")
 
-    def column(self, source: memoryview, index: int, width: int, shift: float) -> array[float]:
-        """One of `width` interleaved columns of numbers, all moved by `shift`."""
-        if not source:
-            return array("d", [_NAN]) * self.row_count
-        values = array("d", source.cast("B").cast("d" if self.value_bytes == 8 else "f")
-                       [index::width].tolist())
-        return array("d", [value + shift for value in values]) if shift else values
+    def add(self, part: Fields) -> None:
+        """Adds a TrackPoses message of 64-bit numbers."""
+        count = part.number(2)
+        if part.number(4) != 8:
+            raise ValueError(f"numbers of {part.number(4)} bytes were not asked for")
+        orientations = part.column(7, 32, count, is_optional=True)
+        self.times.frombytes(part.column(3, 8, count))
+        self.positions.frombytes(part.column(6, 24, count))
+        if orientations:
+            self.orientations.frombytes(orientations)
+        else:
+            self.orientations.extend(array("d", [_NAN]) * (4 * count))
+        self.flags.frombytes(part.column(9, 1, count, is_optional=True) or bytes(count))
 
 
 class Track(Sequence[TimedPose]):
@@ -59,17 +63,17 @@ class Track(Sequence[TimedPose]):
     """
 
     def __init__(self, agent_id: str, revision: int, spec: MapSpec, period_ns: int,
-                 parts: Sequence[_Part]) -> None:
+                 columns: _Columns) -> None:
         """period_ns: 0 = stored poses."""
         self.agent_id = agent_id
         self.revision = revision
         self.spec = spec
         self.period_ns = period_ns
-        self._parts = tuple(parts)
+        self._columns = columns
 
     @functools.cached_property
     def time_ns(self) -> array[int]:
-        times = self._stored_times
+        times = self._columns.times
         if not self._gaps:
             return times
         filled = array("q")
@@ -83,65 +87,54 @@ class Track(Sequence[TimedPose]):
 
     @functools.cached_property
     def x(self) -> array[float]:
-        return self._position(0)
+        return self._filled(self._columns.positions[0::3], _NAN)
 
     @functools.cached_property
     def y(self) -> array[float]:
-        return self._position(1)
+        return self._filled(self._columns.positions[1::3], _NAN)
 
     @functools.cached_property
     def z(self) -> array[float]:
-        return self._position(2)
+        return self._filled(self._columns.positions[2::3], _NAN)
 
     @functools.cached_property
     def qx(self) -> array[float]:
-        return self._orientation(0)
+        return self._filled(self._columns.orientations[0::4], _NAN)
 
     @functools.cached_property
     def qy(self) -> array[float]:
-        return self._orientation(1)
+        return self._filled(self._columns.orientations[1::4], _NAN)
 
     @functools.cached_property
     def qz(self) -> array[float]:
-        return self._orientation(2)
+        return self._filled(self._columns.orientations[2::4], _NAN)
 
     @functools.cached_property
     def qw(self) -> array[float]:
-        return self._orientation(3)
+        return self._filled(self._columns.orientations[3::4], _NAN)
 
     @functools.cached_property
     def flags(self) -> array[int]:
-        values = array("I")
-        for part in self._parts:
-            values.extend(part.flags if part.flags else bytes(part.row_count))
-        return self._filled(values, 0)
+        return self._filled(self._columns.flags, 0)
 
     def to_arrays(self) -> tuple[numpy.ndarray[Any, Any], numpy.ndarray[Any, Any],
                                  numpy.ndarray[Any, Any]]:
         """Times (n, int64 ns), positions (n x 3, metres) and orientations (n x 4, x y z w), with
-        NaN as in the columns: the quickest way to many poses.
+        NaN as in the columns: the quickest way to many poses. Without gaps they are the memory of
+        this track, and cannot be written to.
         """
         import numpy
-        count = sum(part.row_count for part in self._parts)
-        times = numpy.empty(count, "i8")
-        positions = numpy.empty((count, 3))
-        orientations = numpy.empty((count, 4))
-        at = 0
-        for part in self._parts:
-            rows = slice(at, at + part.row_count)
-            values = f"<f{part.value_bytes}"
-            times[rows] = numpy.frombuffer(part.times, "<i8")
-            numpy.add(numpy.frombuffer(part.positions, values).reshape(-1, 3), part.origin,
-                      out=positions[rows])
-            orientations[rows] = (numpy.frombuffer(part.orientations, values).reshape(-1, 4)
-                                  if part.orientations else _NAN)
-            at += part.row_count
-        if not self._gaps:
-            return times, positions, orientations
-        places = numpy.repeat([row for row, _ in self._gaps], [count for _, count in self._gaps])
-        return (numpy.frombuffer(self.time_ns, "i8").copy(),
-                numpy.insert(positions, places, _NAN, axis=0),
-                numpy.insert(orientations, places, _NAN, axis=0))
+        times = numpy.frombuffer(self.time_ns, "i8")
+        positions = numpy.frombuffer(self._columns.positions).reshape(-1, 3)
+        orientations = numpy.frombuffer(self._columns.orientations).reshape(-1, 4)
+        if self._gaps:
+            places = numpy.repeat([row for row, _ in self._gaps],
+                                  [count for _, count in self._gaps])
+            positions = numpy.insert(positions, places, _NAN, axis=0)
+            orientations = numpy.insert(orientations, places, _NAN, axis=0)
+        for column in (times, positions, orientations):
+            column.flags.writeable = False
+        return times, positions, orientations
 
     def to_numpy(self) -> numpy.ndarray[Any, Any]:
         """A structured array with the fields agent, time_ns, x, y, z, qx, qy, qz, qw, flags and
@@ -168,8 +161,7 @@ class Track(Sequence[TimedPose]):
         return _to_frame(self.to_numpy(), self.spec)
 
     def __len__(self) -> int:
-        return (sum(part.row_count for part in self._parts) +
-                sum(count for _, count in self._gaps))
+        return len(self._columns.times) + sum(count for _, count in self._gaps)
 
     def __getitem__(self, index: Any) -> Any:
         if isinstance(index, slice):
@@ -186,18 +178,11 @@ class Track(Sequence[TimedPose]):
         return f"<Track of {self.agent_id}: {len(self)} poses, revision {self.revision}>"
 
     @functools.cached_property
-    def _stored_times(self) -> array[int]:
-        times = array("q")
-        for part in self._parts:
-            times.frombytes(part.times)
-        return times
-
-    @functools.cached_property
     def _gaps(self) -> list[tuple[int, int]]:
         """With a period: the rows before which samples are missing, and how many."""
         if not self.period_ns:
             return []
-        times = self._stored_times
+        times = self._columns.times
         return [(row, (times[row] - times[row - 1]) // self.period_ns - 1)
                 for row in range(1, len(times)) if times[row] - times[row - 1] > self.period_ns]
 
@@ -212,17 +197,17 @@ class Track(Sequence[TimedPose]):
             begin = row
         return filled + values[begin:]
 
-    def _position(self, axis: int) -> array[float]:
-        values = array("d")
-        for part in self._parts:
-            values += part.column(part.positions, axis, 3, part.origin[axis])
-        return self._filled(values, _NAN)
 
-    def _orientation(self, index: int) -> array[float]:
-        values = array("d")
-        for part in self._parts:
-            values += part.column(part.orientations, index, 4, 0.0)
-        return self._filled(values, _NAN)
+class PoseChunk(NamedTuple):
+    """Consecutive poses of one agent, in numpy; they cannot be written to."""
+
+    agent_id: str
+    # (n,) int64.
+    time_ns: numpy.ndarray[Any, Any]
+    # (n, 3) float64, map frame, metres.
+    positions: numpy.ndarray[Any, Any]
+    # (n, 4) float64, x y z w. None where the source gave positions only.
+    orientations: Optional[numpy.ndarray[Any, Any]]
 
 
 class Tracks(Mapping[str, Track]):
@@ -237,7 +222,7 @@ class Tracks(Mapping[str, Track]):
         import numpy
         parts = [track.to_numpy() for track in self._tracks.values()]
         if not parts:
-            parts = [Track("", 0, self.spec, 0, ()).to_numpy()]
+            parts = [Track("", 0, self.spec, 0, _Columns()).to_numpy()]
         return numpy.concatenate(parts)
 
     def to_pandas(self) -> pandas.DataFrame:
@@ -257,18 +242,6 @@ class Tracks(Mapping[str, Track]):
         return f"<Tracks {list(self._tracks.values())}>"
 
 
-def encode_read_at(read_at: Optional[ReadAt]) -> bytes:
-    """The message ReadAt; empty = the newest revision."""
-    if read_at is None:
-        return b""
-    out = b""
-    for field, value in ((2, read_at.at_least_revision), (3, read_at.exact_revision),
-                         (5, read_at.committed_at_ns)):
-        if value is not None:
-            out += wire.number(field, value) or bytes((field << 3, 0))
-    return out + (wire.text(4, read_at.tag) if read_at.tag else b"")
-
-
 def encode_request(map_name: str, revision_at: bytes, agents: Iterable[str],
                    from_ns: Optional[int], to_ns: Optional[int], period_ns: int) -> bytes:
     """The message GetTracksRequest; revision_at: an encoded ReadAt."""
@@ -278,7 +251,7 @@ def encode_request(map_name: str, revision_at: bytes, agents: Iterable[str],
     for field, time_ns in ((4, from_ns), (5, to_ns)):
         if time_ns is not None:
             # Also 0 says something here.
-            out += wire.number(field, time_ns) or bytes((field << 3, 0))
+            out += wire.present_number(field, time_ns)
     return out + wire.number(6, period_ns)
 
 
@@ -289,45 +262,38 @@ def read_tracks(messages: Iterable[memoryview], spec: MapSpec,
     """
     revision = 0
     heads: list[tuple[str, str]] = []
-    parts: list[list[_Part]] = []
+    tracks: list[_Columns] = []
     for message in messages:
         for field, value in wire.fields(message):
-            inner = dict(wire.fields(value)) if isinstance(value, memoryview) else {}
             if field == 1:
-                revision = int(inner.get(1, 0))
+                revision = Fields(value).number(1)
             elif field == 2:
-                heads.append((_text(inner.get(1)), _text(inner.get(2))))
-                parts.append([])
+                head = Fields(value)
+                heads.append((head.text(1), head.text(2)))
+                tracks.append(_Columns())
             elif field == 3:
-                parts[int(inner.get(1, 0))].append(_part(inner))
-    return {agent: (name, Track(agent, revision, spec, period_ns, of))
-            for (agent, name), of in zip(heads, parts)}
+                part = Fields(value)
+                tracks[part.number(1)].add(part)
+    return {agent: (name, Track(agent, revision, spec, period_ns, columns))
+            for (agent, name), columns in zip(heads, tracks)}
 
 
-def _part(inner: Mapping[int, wire.Value]) -> _Part:
-    nothing = memoryview(b"")
-
-    def column(field: int, size: int, is_optional: bool = False) -> memoryview:
-        value = inner.get(field, nothing)
-        if not isinstance(value, memoryview):
-            raise TypeError(f"field {field} is no column")
-        if len(value) != size * rows and not (is_optional and not value):
-            raise ValueError(f"column {field} of {rows} rows has {len(value)} bytes")
-        return value
-
-    rows, value_bytes = int(inner.get(2, 0)), int(inner.get(4, 0))
-    if value_bytes not in (4, 8):
-        raise ValueError(f"numbers of {value_bytes} bytes")
-    at = inner.get(5)
-    axes = {field: wire.double(int(bits)) for field, bits in wire.fields(at)} if isinstance(
-        at, memoryview) else {}
-    return _Part(rows, value_bytes, (axes.get(1, 0.0), axes.get(2, 0.0), axes.get(3, 0.0)),
-                 column(3, 8), column(6, 3 * value_bytes), column(7, 4 * value_bytes, True),
-                 column(9, 1, True))
-
-
-def _text(value: Optional[wire.Value]) -> str:
-    return bytes(value).decode() if isinstance(value, memoryview) else ""
+def read_chunks(messages: Iterable[memoryview]) -> Iterator[PoseChunk]:
+    """The same poses as they come. Raises as read_tracks does."""
+    import numpy
+    agents: list[str] = []
+    for message in messages:
+        for field, value in wire.fields(message):
+            if field == 2:
+                agents.append(Fields(value).text(1))
+            elif field == 3:
+                part = Fields(value)
+                count = part.number(2)
+                turns = part.column(7, 32, count, is_optional=True)
+                yield PoseChunk(agents[part.number(1)],
+                                numpy.frombuffer(part.column(3, 8, count), "<i8"),
+                                numpy.frombuffer(part.column(6, 24, count), "<f8").reshape(-1, 3),
+                                numpy.frombuffer(turns, "<f8").reshape(-1, 4) if turns else None)
 
 
 def _to_frame(rows: numpy.ndarray[Any, Any], spec: MapSpec) -> pandas.DataFrame:

@@ -53,6 +53,16 @@ def number(field: int, value: int) -> bytes:
     return _encoded(field << 3) + _encoded(value) if value else b""
 
 
+def present_number(field: int, value: int) -> bytes:
+    """A field with a number, also if it is 0: of fields that may be unset."""
+    return _encoded(field << 3) + _encoded(value)
+
+
+def float64(field: int, value: float) -> bytes:
+    """A field with a double."""
+    return _encoded(field << 3 | _FIXED64) + struct.pack("<d", value)
+
+
 def block(field: int, value: bytes) -> bytes:
     """A field with bytes or a message; an empty one is there too."""
     return _encoded(field << 3 | _LENGTH) + _encoded(len(value)) + value
