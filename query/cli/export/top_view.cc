@@ -5,14 +5,13 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <map>
 
 #include "absl/strings/str_cat.h"
 #include "query/cli/export/axes.h"
 #include "query/cli/export/outline.h"
 #include "query/cli/export/overlay.h"
 #include "query/cli/export/top_view_labels.h"
-#include "query/cli/table.h"
+#include "query/cli/export/top_view_marks.h"
 #include "schema/base/check.h"
 #include "schema/picture/font.h"
 #include "schema/picture/look.h"
@@ -271,11 +270,12 @@ void DrawTracks(const MapContent& content, const FloorView& view, picture::Canva
       canvas->DrawPolyline(pixels, 3.0, picture::MakePaint(AgentColor(i), 0.65f));
     }
   }
+  const auto nodes = NodesById(content);
   for (size_t i = 0; i < content.tracks.size(); ++i) {
     if (HasBody(content, content.tracks[i].agent)) continue;
-    const Eigen::Vector2d last = view.ToPixel(LastOf(content.tracks[i]));
-    canvas->FillCircle(last, 14.0, picture::MakePaint(0xffffff));
-    canvas->FillCircle(last, 11.0, picture::MakePaint(AgentColor(i)));
+    const auto node = nodes.find(content.tracks[i].agent);
+    DrawAgentMark(node == nodes.end() ? kinds::kHuman : node->second->kind,
+                  view.ToPixel(LastOf(content.tracks[i])), AgentColor(i), canvas);
   }
 }
 
@@ -314,41 +314,6 @@ double DrawScaleBar(const FloorView& view, double y, picture::Canvas* canvas) {
   const double x = begin.x() - picture::Canvas::TextWidth(text, kTextDotPx) - 16.0;
   canvas->DrawText(Eigen::Vector2d(x, y), text, kTextDotPx, picture::MakePaint(kInkRgb));
   return x;
-}
-
-// Each agent has its own colour; the legend shows the colour of the first.
-uint32_t ColorOfKind(const MapContent& content, const char* kind) {
-  for (size_t i = 0; i < content.tracks.size(); ++i) {
-    const auto node = std::find_if(content.nodes.begin(), content.nodes.end(),
-                                   [&](const Node& n) { return n.id == content.tracks[i].agent; });
-    if (node != content.nodes.end() && node->kind == kind) return AgentColor(i);
-  }
-  return LayerColor(layers::kAgents);
-}
-
-// Counts of nodes by kind, with the colour of the kind.
-void DrawLegend(const MapContent& content, double y, double x_end, picture::Canvas* canvas) {
-  std::map<std::string, int64_t> count_of;
-  for (const Node& node : content.nodes) ++count_of[node.kind];
-  double x = kMarginPx;
-  const auto add = [&](const char* kind, const std::string& noun, uint32_t rgb) {
-    if (count_of[kind] == 0) return;
-    const std::string text = Counted(count_of[kind], noun);
-    const double end = x + 40.0 + picture::Canvas::TextWidth(text, kTextDotPx);
-    if (end > x_end) return;
-    canvas->FillCircle(Eigen::Vector2d(x + 12.0, y + 0.5 * kTextHeightPx), 11.0,
-                       picture::MakePaint(rgb));
-    canvas->DrawText(Eigen::Vector2d(x + 40.0, y), text, kTextDotPx, picture::MakePaint(kInkRgb));
-    x = end + 44.0;
-  };
-  add(kinds::kRoom, "room", 0xcfe0cf);
-  add(kinds::kStructure, "structure", kWallRgb);
-  add(kinds::kPlace, "place", LayerColor(layers::kPlaces));
-  add(kinds::kObject, "object", LayerColor(layers::kObjects));
-  add(kinds::kRobot, "robot", ColorOfKind(content, kinds::kRobot));
-  add(kinds::kHuman, "human", ColorOfKind(content, kinds::kHuman));
-  add(kinds::kVehicle, "vehicle", ColorOfKind(content, kinds::kVehicle));
-  add(kinds::kAnimal, "animal", ColorOfKind(content, kinds::kAnimal));
 }
 
 void DrawTitle(const std::string& title, picture::Canvas* canvas) {
@@ -394,7 +359,7 @@ picture::Picture DrawTopView(const MapContent& content, const TopViewOptions& op
   if (!drawn_map.isEmpty()) DrawAxes(view, &canvas);
   DrawTitle(options.title, &canvas);
   const double footer_y = canvas.height() - kMarginPx - kTextHeightPx;
-  DrawLegend(content, footer_y, DrawScaleBar(view, footer_y, &canvas) - 40.0, &canvas);
+  DrawLegend(content, {kMarginPx, footer_y}, DrawScaleBar(view, footer_y, &canvas) - 40.0, &canvas);
   DrawOverlayLegend(overlay, {kMarginPx, footer_y - key_height}, canvas.width() - kMarginPx,
                     &canvas);
   return canvas.Halved();

@@ -11,6 +11,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "query/cli/export/outline.h"
+#include "query/cli/export/top_view_marks.h"
 #include "schema/picture/font.h"
 #include "schema/picture/look.h"
 
@@ -174,17 +175,30 @@ void WriteRoom(const LabelledShape& room, const FloorView& view, picture::LabelL
   WriteBeside(dot, {.text = RoomLabel(*room.node)}, layout, canvas);
 }
 
-void WriteAgents(const MapContent& content, const FloorView& view, picture::LabelLayout* layout,
-                 picture::Canvas* canvas) {
-  constexpr double kDotRadiusPx = 16.0;
+// What an agent takes of the picture: its mark, and its body if that is drawn.
+Eigen::AlignedBox2d AgentBox(const MapContent& content, const Track& track, const FloorView& view) {
+  const Eigen::Vector2d middle = view.ToPixel(LastOf(track));
+  const Eigen::Vector2d reach(kAgentMarkReachPx, kAgentMarkReachPx);
+  Eigen::AlignedBox2d box(middle - reach, middle + reach);
+  for (const AgentBodies& agent : content.bodies) {
+    if (agent.agent != track.agent) continue;
+    for (const Body& body : agent.bodies) {
+      for (const Eigen::Vector3f& point : body.points_map) {
+        box.extend(view.ToPixel(Eigen::Vector3d(point.cast<double>())));
+      }
+    }
+  }
+  return box;
+}
+
+void WriteAgents(const MapContent& content, const std::vector<Eigen::AlignedBox2d>& boxes,
+                 picture::LabelLayout* layout, picture::Canvas* canvas) {
   const auto nodes = NodesById(content);
   for (size_t i = 0; i < content.tracks.size(); ++i) {
-    const Eigen::Vector2d middle = view.ToPixel(LastOf(content.tracks[i]));
-    const Eigen::Vector2d reach(kDotRadiusPx, kDotRadiusPx);
     const Label label{.text = NameOf(*nodes.at(content.tracks[i].agent)),
                       .dot_px = kAgentDotPx,
                       .rgb = AgentColor(i)};
-    WriteBeside(Eigen::AlignedBox2d(middle - reach, middle + reach), label, layout, canvas);
+    WriteBeside(boxes[i], label, layout, canvas);
   }
 }
 
@@ -192,6 +206,10 @@ void WriteAgents(const MapContent& content, const FloorView& view, picture::Labe
 
 void DrawLabels(const MapContent& content, const std::set<NodeId>& named, const FloorView& view,
                 picture::LabelLayout* layout, picture::Canvas* canvas) {
+  // No name hides an agent: where one stands says more than what a room is called.
+  std::vector<Eigen::AlignedBox2d> agents;
+  for (const Track& track : content.tracks) agents.push_back(AgentBox(content, track, view));
+  for (const Eigen::AlignedBox2d& agent : agents) layout->Block(agent);
   const std::vector<LabelledShape> objects = ShapesOf(content, kinds::kObject, view);
   picture::LabelLayout with_objects = *layout;
   for (const LabelledShape& object : objects) {
@@ -200,7 +218,7 @@ void DrawLabels(const MapContent& content, const std::set<NodeId>& named, const 
   for (const LabelledShape& room : ShapesOf(content, kinds::kRoom, view)) {
     if (!named.contains(room.node->id)) WriteRoom(room, view, &with_objects, layout, canvas);
   }
-  WriteAgents(content, view, layout, canvas);
+  WriteAgents(content, agents, layout, canvas);
   for (const LabelledShape& object : objects) {
     const Node& node = *object.node;
     if (named.contains(node.id)) continue;

@@ -15,7 +15,7 @@
 namespace dsg::cli {
 
 /// Rooms by size, then agents, then objects by size, without the nodes in `named`.
-/// Room names keep clear of objects if possible.
+/// No name covers an agent. Room names keep clear of objects if possible.
 void DrawLabels(const MapContent& content, const std::set<NodeId>& named, const FloorView& view,
                 picture::LabelLayout* layout, picture::Canvas* canvas);
 

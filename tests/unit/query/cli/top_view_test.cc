@@ -11,6 +11,7 @@
 #include "query/cli/export/outline.h"
 #include "schema/base/random.h"
 #include "schema/base/status.h"
+#include "schema/picture/look.h"
 #include "tests/unit/query/cli/example_content.h"
 
 namespace dsg::cli {
@@ -56,6 +57,59 @@ TEST(TopView, OfAnEmptyMapIsItsTitle) {
   const Picture picture = DrawTopView(MapContent(), {.width_px = 400, .title = "nothing"});
   EXPECT_GT(InkIn(picture, 0, 400, 0, 60), 50);
   EXPECT_EQ(InkIn(picture, 0, 400, 75, picture.height - 60), 0);
+}
+
+// A room of 8 m x 4 m with an agent in its middle, where the room's name would stand.
+MapContent RoomAround(const NodeId& id, const char* kind) {
+  Node room;
+  room.id = NodeId('R', 1);
+  room.kind = kinds::kRoom;
+  room.layer = layers::kRooms;
+  room.name = "a room of a name";
+  room.map_T_node.position = {4.0, 2.0, 1.0};
+  room.box_node = Box3d(Eigen::Vector3d(-4.0, -2.0, -1.0), Eigen::Vector3d(4.0, 2.0, 1.0));
+  Node agent;
+  agent.id = id;
+  agent.kind = kind;
+  agent.layer = layers::kAgents;
+  MapContent content;
+  content.nodes = {room, agent};
+  content.tracks = {{.agent = id, .pieces = {{{4.0, 2.0, 0.0}}}, .poses = {}}};
+  return content;
+}
+
+Pixel ColorOf(uint32_t rgb) {
+  return {static_cast<int>(rgb >> 16), static_cast<int>(rgb >> 8 & 0xff),
+          static_cast<int>(rgb & 0xff)};
+}
+
+TEST(TopView, NoNameHidesAnAgentAndItsShapeSaysItsKind) {
+  constexpr int kWidth = 801;
+  const double px_per_m = (kWidth - 108.0) / 8.0;
+  const int x = static_cast<int>(78.0 + 4.0 * px_per_m);
+  const int y = static_cast<int>(65.0 + 2.0 * px_per_m);
+  const auto draw = [&](NodeId id, const char* kind) {
+    return DrawTopView(RoomAround(id, kind), {.width_px = kWidth, .title = ""});
+  };
+  const Picture human = draw(NodeId('H', 1), kinds::kHuman);
+  const Picture robot = draw(NodeId('r', 1), kinds::kRobot);
+  for (const Picture& picture : {human, robot}) {
+    for (int step = -3; step <= 3; ++step) {
+      EXPECT_EQ(At(picture, x + step, y), ColorOf(AgentColor(0)));
+      EXPECT_EQ(At(picture, x, y + step), ColorOf(AgentColor(0)));
+    }
+  }
+  // A dot and a square of one colour.
+  EXPECT_NE(At(human, x + 4, y + 4), ColorOf(AgentColor(0)));
+  EXPECT_EQ(At(robot, x + 4, y + 4), ColorOf(AgentColor(0)));
+  // So the legend tells them apart, too.
+  int different = 0;
+  for (int row = human.height - 60; row < human.height - 20; ++row) {
+    for (int column = 30; column < kWidth; ++column) {
+      different += At(human, column, row) != At(robot, column, row);
+    }
+  }
+  EXPECT_GT(different, 20);
 }
 
 TEST(TopView, DrawsAMeshWithoutNodes) {
