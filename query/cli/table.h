@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tables of text for people: a heading line, then one line per row, each column as wide as its
-// widest cell. Control characters are replaced, so names from a log cannot control the terminal.
+// widest cell. Control characters and marks that turn the direction of writing are replaced, so
+// names from a log cannot control the terminal, nor pass for other names.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +11,8 @@
 
 namespace dsg::cli {
 
-/// `text` with control characters shown as '?'.
+/// `text` with control characters shown as '?', and marks that turn the direction of writing (such
+/// as U+202E) as escapes like "\u202e".
 std::string Printable(const std::string& text);
 
 /// A number with a fixed count of decimals; "-0.00" is written "0.00".
