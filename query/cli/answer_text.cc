@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include "absl/strings/numbers.h"
@@ -17,6 +18,20 @@ namespace dsg::cli {
 namespace {
 
 bool IsOpen(TimeNs time_ns) { return time_ns == kTimeMin || time_ns == kTimeMax; }
+
+// The interval that two values of an error's metadata give; none if they are no times.
+std::optional<Interval> IntervalIn(const ErrorMetadata& metadata, const std::string& from_key,
+                                   const std::string& to_key) {
+  const auto from = metadata.find(from_key);
+  const auto to = metadata.find(to_key);
+  Interval interval;
+  if (from == metadata.end() || to == metadata.end() ||
+      !absl::SimpleAtoi(from->second, &interval.from_ns) ||
+      !absl::SimpleAtoi(to->second, &interval.to_ns)) {
+    return std::nullopt;
+  }
+  return interval;
+}
 
 }  // namespace
 
@@ -49,19 +64,29 @@ std::string TimeText::Span(TimeNs from_ns, TimeNs to_ns) const {
 }
 
 absl::Status TimeText::Explain(const absl::Status& status) const {
-  if (ReasonOf(status) != Reason::kTimeOutsideTrack) return status;
   const ErrorMetadata metadata = MetadataOf(status);
-  const auto first = metadata.find("first_ns");
-  const auto last = metadata.find("last_ns");
-  TimeNs first_ns = 0;
-  TimeNs last_ns = 0;
-  if (first == metadata.end() || last == metadata.end() ||
-      !absl::SimpleAtoi(first->second, &first_ns) || !absl::SimpleAtoi(last->second, &last_ns)) {
-    return status;
+  switch (ReasonOf(status)) {
+    case Reason::kTimeOutsideTrack: {
+      const auto track = IntervalIn(metadata, "first_ns", "last_ns");
+      if (!track.has_value()) return status;
+      return MakeError(
+          Reason::kTimeOutsideTrack,
+          absl::StrCat(status.message(), " (the track: ", Span(track->from_ns, track->to_ns), ")"),
+          metadata);
+    }
+    case Reason::kTimeRangeInverted: {
+      const auto asked = IntervalIn(metadata, "from_ns", "to_ns");
+      if (!asked.has_value()) return status;
+      return MakeError(
+          Reason::kTimeRangeInverted,
+          absl::StrCat("--from ", Full(asked->from_ns), " is not before --to ", Full(asked->to_ns),
+                       "; an interval begins at --from and ends before --to: give an "
+                       "earlier --from or a later --to"),
+          metadata);
+    }
+    default:
+      return status;
   }
-  return MakeError(Reason::kTimeOutsideTrack,
-                   absl::StrCat(status.message(), " (the track: ", Span(first_ns, last_ns), ")"),
-                   metadata);
 }
 
 TimeNs LengthNs(TimeNs from_ns, TimeNs to_ns) {

@@ -37,7 +37,8 @@ class TimeText {
   /// "+1s to +2.5s"; empty if both ends are open.
   std::string Span(TimeNs from_ns, TimeNs to_ns) const;
 
-  /// The same error; TIME_OUTSIDE_TRACK also gets the times at which the track begins and ends.
+  /// The same error; TIME_OUTSIDE_TRACK also gets the times at which the track begins and ends, and
+  /// TIME_RANGE_INVERTED says the times of --from and --to as answers do.
   absl::Status Explain(const absl::Status& status) const;
 
  private:

@@ -33,7 +33,7 @@ absl::Status ApplyEnvironment(const Environment& environment, Command* command) 
 absl::StatusOr<Command> ParseArguments(const std::vector<std::string>& arguments,
                                        const Environment& environment) {
   Grammar grammar(environment.version);
-  for (const auto add : kVerbs) add(&grammar);
+  AddAllVerbs(&grammar);
   DSG_RETURN_IF_ERROR(grammar.Parse(arguments));
   Command command = grammar.command();
   if (!command.help.empty()) return command;

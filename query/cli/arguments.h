@@ -28,6 +28,17 @@ struct Environment {
 /// How a list is written, unless the whole reply is asked for as JSON.
 enum class ListFormat { kTable, kCsv, kJsonLines };
 
+/// A revision by number, by tag or by the time when it was committed; none of them = the default of
+/// the verb.
+struct RevisionOption {
+  std::optional<int64_t> number{};
+  std::string tag{};
+  /// The newest one that was committed until then, nanoseconds since 1970 UTC.
+  std::optional<int64_t> committed_at_ns{};
+
+  bool is_set() const { return number.has_value() || !tag.empty() || committed_at_ns.has_value(); }
+};
+
 /// Options that several verbs share.
 struct CommonOptions {
   /// At most one of the two is set.
@@ -37,9 +48,8 @@ struct CommonOptions {
   std::string map;
   /// `map` comes from DSG_MAP.
   bool map_is_default = false;
-  std::optional<int64_t> revision;
-  /// The revision by its tag; then `revision` is unset.
-  std::string tag;
+  /// What the map is read at; default the newest revision.
+  RevisionOption at;
   bool json = false;
   ListFormat format = ListFormat::kTable;
   /// Maximum number of entries; 0 = all.
@@ -65,14 +75,6 @@ struct PictureOptions {
   int width_px = 1600;
   /// Replace an existing file.
   bool force = false;
-};
-
-/// A revision by number or by tag; neither = the default of the verb.
-struct RevisionOption {
-  std::optional<int64_t> number;
-  std::string tag;
-
-  bool is_set() const { return number.has_value() || !tag.empty(); }
 };
 
 class Session;

@@ -18,7 +18,7 @@ namespace {
 using FieldFlag = std::pair<absl::string_view, absl::string_view>;
 
 // Fields at the beginning of a message; the first match counts, so longer names come first.
-constexpr std::array<FieldFlag, 28> kFirstWords = {{
+constexpr std::array<FieldFlag, 29> kFirstWords = {{
     {"bodies[0].sphere.", "--sphere: "},
     {"bodies[0].cuboid.", "--box: "},
     {"bodies[0].capsule.", "--capsule: "},
@@ -37,6 +37,7 @@ constexpr std::array<FieldFlag, 28> kFirstWords = {{
     {"agent", "AGENT"},
     {"object", "--object"},
     {"node_id", "--room"},
+    {"node", "--node"},
     {"relations", "--relation"},
     {"relation", "--relation"},
     {"position", "POSITION"},
@@ -49,8 +50,8 @@ constexpr std::array<FieldFlag, 28> kFirstWords = {{
     {"target", "--target"},
 }};
 
-// Fields anywhere in a message: none of them is an English word.
-constexpr std::array<FieldFlag, 16> kAnywhere = {{
+// Fields anywhere in a message, and calls that it tells to make: none of them is an English word.
+constexpr std::array<FieldFlag, 17> kAnywhere = {{
     {"from_ns", "--from"},
     {"to_ns", "--to"},
     {"at_ns", "--at"},
@@ -67,6 +68,7 @@ constexpr std::array<FieldFlag, 16> kAnywhere = {{
     {"path_count_max", "--paths"},
     {"depth_max", "--depth"},
     {"line_of_sight", "--line-of-sight"},
+    {"GetAgentShape", "dsg shape"},
 }};
 
 bool IsWordAt(const std::string& text, size_t at) {
@@ -100,6 +102,8 @@ void AddHint(Reason reason, const ErrorMetadata& metadata, std::string* message)
     absl::StrAppend(message, "; `dsg ls` and `dsg find` list the nodes");
   } else if (reason == Reason::kMapUnknown && metadata.contains("map")) {
     absl::StrAppend(message, "; `dsg maps` lists the maps");
+  } else if (reason == Reason::kRevisionCompacted) {
+    absl::StrAppend(message, "; `dsg log` lists the revisions, and when each was committed");
   }
 }
 

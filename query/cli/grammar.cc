@@ -12,6 +12,7 @@
 #include "absl/strings/str_join.h"
 #include "query/cli/export/top_view.h"
 #include "schema/base/spelling.h"
+#include "schema/base/time.h"
 #include "schema/program/manual.h"
 
 namespace dsg::cli {
@@ -25,6 +26,29 @@ std::string RevisionProblem(const std::string& text) {
       !text.empty() && text.find_first_not_of("+-.0123456789") == std::string::npos;
   if (!text.empty() && !is_number) return "";
   return absl::StrCat("\"", text, "\" is neither a revision number, from 0 on, nor a tag");
+}
+
+// Empty if the text is a date; else what is wrong. Stamps of commits are of the wall clock,
+// whatever clock the map has.
+std::string DateProblem(const std::string& text) {
+  const bool is_date = absl::StrContains(text, "T") && ParseTime(text, 0).ok();
+  if (is_date) return "";
+  return absl::StrCat("\"", text,
+                      "\" is no date; write it in UTC or with its zone, like 2014-06-25T16:58:44Z "
+                      "or 2014-06-25T18:58:44+02:00");
+}
+
+void AddReadAt(CLI::App* app, RevisionOption* at) {
+  CLI::Option* revision =
+      AddRevision(app, "--revision", "Read at this revision or tag; default the newest", at);
+  // Behind the check the text is a date.
+  const auto take = [at](const std::string& text) {
+    at->committed_at_ns = ParseTime(text, 0).value_or(0);
+  };
+  app->add_option_function<std::string>("--as-of", take,
+                                        "Read at the newest revision committed by this date")
+      ->check(CLI::Validator(DateProblem, "DATE"))
+      ->excludes(revision);
 }
 
 // CLI11 puts the option's name before what a check says; empty means that the text passes.
@@ -74,6 +98,7 @@ Grammar::Grammar(const std::string& version) {
 CLI::App* Grammar::AddApp(const std::string& name, const std::string& what,
                           const std::string& example, const std::string& footer, unsigned takes) {
   CLI::App* app = app_.add_subcommand(name, what);
+  app->group(heading_);
   app->footer(
       absl::StrCat("Example: dsg ", name, example.empty() ? "" : " ", example, "\n", footer));
   CommonOptions& common = command_.common;
@@ -90,7 +115,7 @@ CLI::App* Grammar::AddApp(const std::string& name, const std::string& what,
   }
   if (takes & kMapFilter) app->add_option("--map", common.map, "Only this map; default all");
   if (takes & kRevision) {
-    AddRevision(app, "--revision", "Read at this revision or tag; default the newest", &revision_);
+    AddReadAt(app, &common.at);
   }
   if (takes & kJson) app->add_flag("--json", common.json, "Print the reply as protobuf JSON");
   if (takes & kFormat) {
@@ -168,8 +193,6 @@ absl::Status Grammar::Parse(std::vector<std::string> arguments) {
     }
     return Usage(error.what(), is_verb ? first : "");
   }
-  command_.common.revision = revision_.number;
-  command_.common.tag = revision_.tag;
   return absl::OkStatus();
 }
 

@@ -86,6 +86,9 @@ class Grammar {
     return {app, verb.get()};
   }
 
+  /// The heading of the help under which the verbs stand that are added from now on.
+  void set_heading(std::string heading) { heading_ = std::move(heading); }
+
   CommonOptions* common() { return &command_.common; }
 
   absl::Status Parse(std::vector<std::string> arguments);
@@ -98,8 +101,8 @@ class Grammar {
                    const std::string& footer, unsigned takes);
 
   CLI::App app_{"Asks a store of dynamic scene graphs, or a server."};
+  std::string heading_;
   Command command_;
-  RevisionOption revision_;
 };
 
 // Options that several verbs have.

@@ -53,6 +53,19 @@ absl::StatusOr<Interval> PoseSpan(Session* session) {
   return span;
 }
 
+absl::Status BeyondPoses(const TimeText& times, const Interval& asked, bool is_from_given) {
+  const std::string what =
+      is_from_given
+          ? absl::StrCat("--from ", times.Full(asked.from_ns),
+                         " is behind the last pose of the map, ", times.Full(asked.to_ns - 1),
+                         ", at which --to ends by default; give an earlier --from")
+          : absl::StrCat("--to ", times.Full(asked.to_ns),
+                         " is not behind the first pose of the map, ", times.Full(asked.from_ns),
+                         ", at which --from begins by default; give a later --to");
+  return MakeError(Reason::kTimeRangeInverted, what,
+                   {{"field", is_from_given ? "--from" : "--to"}});
+}
+
 }  // namespace
 
 std::string NodeNames::Text(const std::string& id) const {
@@ -94,25 +107,27 @@ absl::StatusOr<std::vector<std::string>> NamesOfMaps(const Session& session) {
   return names;
 }
 
-absl::StatusOr<std::vector<std::string>> NamesOfNodes(const Session& session,
-                                                      const std::string& layer,
-                                                      int64_t node_count_max) {
+absl::StatusOr<NodeWords> WordsOfNodes(const Session& session, const std::string& layer,
+                                       int64_t node_count_max) {
   auto request = session.Begin<v1::ListNodesRequest>();
   request.mutable_filter()->set_layer(layer);
   request.set_view(v1::NODE_VIEW_BASIC);
   std::set<std::string> names;
-  DSG_RETURN_IF_ERROR(
-      session.EachPage(&query::Api::ListNodes, request, node_count_max,
-                       &v1::ListNodesResponse::nodes_size, [&](const v1::ListNodesResponse& page) {
-                         for (const v1::Node& node : page.nodes()) {
-                           names.insert(node.name().empty() ? node.id() : node.name());
-                           if (node.kind() == kinds::kRoom)
-                             names.insert(node.semantic_class().name());
-                         }
-                         return absl::OkStatus();
-                       }));
+  NodeWords words;
+  DSG_RETURN_IF_ERROR(session.EachPage(&query::Api::ListNodes, request, node_count_max,
+                                       &v1::ListNodesResponse::nodes_size,
+                                       [&](const v1::ListNodesResponse& page) {
+                                         for (const v1::Node& node : page.nodes()) {
+                                           words.ids.push_back(node.id());
+                                           names.insert(node.name());
+                                           if (node.kind() == kinds::kRoom)
+                                             names.insert(node.semantic_class().name());
+                                         }
+                                         return absl::OkStatus();
+                                       }));
   names.erase("");
-  return std::vector<std::string>(names.begin(), names.end());
+  words.names.assign(names.begin(), names.end());
+  return words;
 }
 
 absl::StatusOr<std::string> NodeIdOf(Session* session, const std::string& id_or_name) {
@@ -156,6 +171,14 @@ absl::StatusOr<v1::ListTagsResponse> ReadTags(Session* session) {
 }
 
 absl::StatusOr<std::optional<Revision>> NumberOf(const RevisionOption& revision, Session* session) {
+  if (revision.committed_at_ns.has_value()) {
+    v1::GetMapStatsRequest request;
+    request.set_map(session->map().name);
+    request.mutable_read_at()->set_committed_at_ns(*revision.committed_at_ns);
+    v1::GetMapStatsResponse stats;
+    DSG_RETURN_IF_ERROR(session->api().GetMapStats(session->NewCall(), request, &stats));
+    return std::optional<Revision>(stats.header().read_revision());
+  }
   if (revision.tag.empty()) return revision.number;
   DSG_ASSIGN_OR_RETURN(const v1::ListTagsResponse reply, ReadTags(session));
   std::vector<Tag> tags;
@@ -182,6 +205,10 @@ absl::StatusOr<Interval> AskedInterval(Session* session, const std::string& from
   }
   if (!to.empty()) {
     DSG_ASSIGN_OR_RETURN(asked.to_ns, ParseInstant("--to", to, map));
+  }
+  // Of two that are given the question itself tells; here one is an end of all poses.
+  if (asked.from_ns >= asked.to_ns && from.empty() != to.empty()) {
+    return BeyondPoses(session->times(), asked, to.empty());
   }
   return asked;
 }

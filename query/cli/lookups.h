@@ -49,11 +49,16 @@ absl::StatusOr<NodeNames> NamesOf(Session* session, int64_t revision,
 /// The names of all maps.
 absl::StatusOr<std::vector<std::string>> NamesOfMaps(const Session& session);
 
-/// Names of nodes, ids of those without one, and the classes of rooms, by which these can be named:
-/// each once, of at most so many nodes of a layer; empty = of all layers.
-absl::StatusOr<std::vector<std::string>> NamesOfNodes(const Session& session,
-                                                      const std::string& layer,
-                                                      int64_t node_count_max);
+/// What nodes of a layer can be named by; an empty layer = all layers.
+struct NodeWords {
+  /// Names, and the classes of rooms; each once.
+  std::vector<std::string> names;
+  std::vector<std::string> ids;
+};
+
+/// The words of at most so many nodes.
+absl::StatusOr<NodeWords> WordsOfNodes(const Session& session, const std::string& layer,
+                                       int64_t node_count_max);
 
 /// The id of a node by id or unique name. Errors: of GetNode.
 absl::StatusOr<std::string> NodeIdOf(Session* session, const std::string& id_or_name);
@@ -63,14 +68,16 @@ absl::StatusOr<std::string> NodeIdOf(Session* session, const std::string& id_or_
 /// several rooms have the name or the class, or something else the name and a room the class.
 absl::StatusOr<std::string> RegionId(Session* session, const std::string& id_or_name);
 
-/// The number of a revision, if the option is set. Errors: NOT_FOUND/TAG_UNKNOWN.
+/// The number of a revision, if the option is set. Errors: NOT_FOUND/TAG_UNKNOWN;
+/// OUT_OF_RANGE/REVISION_COMPACTED if nothing was committed until the time that it names.
 absl::StatusOr<std::optional<Revision>> NumberOf(const RevisionOption& revision, Session* session);
 
 /// The tags of the map; none from a server that does not know tags.
 absl::StatusOr<v1::ListTagsResponse> ReadTags(Session* session);
 
 /// The interval of --from and --to. An end that is not given is that of all poses of the map.
-/// Errors: INVALID_ARGUMENT with the option; of the calls.
+/// Errors: INVALID_ARGUMENT with the option, also TIME_RANGE_INVERTED if the end that is given lies
+/// beyond all poses; of the calls.
 absl::StatusOr<Interval> AskedInterval(Session* session, const std::string& from,
                                        const std::string& to);
 

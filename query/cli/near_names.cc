@@ -2,6 +2,7 @@
 #include "query/cli/near_names.h"
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/match.h"
@@ -21,6 +22,11 @@ std::string HintOf(const std::string& word, const absl::StatusOr<std::vector<std
   return known.ok() ? NearHint(word, *known) : "";
 }
 
+absl::StatusOr<std::vector<std::string>> NodeNamesOf(Session* session, const std::string& layer) {
+  DSG_ASSIGN_OR_RETURN(NodeWords words, WordsOfNodes(*session, layer, kNodesReadMax));
+  return std::move(words.names);
+}
+
 }  // namespace
 
 absl::Status WithNearNames(Session* session, const absl::Status& status) {
@@ -35,10 +41,10 @@ absl::Status WithNearNames(Session* session, const absl::Status& status) {
   if (reason == Reason::kMapUnknown && !word_of("map").empty()) {
     hint = HintOf(word_of("map"), NamesOfMaps(*session));
   } else if (reason == Reason::kAgentUnknown && !ParseNodeId(word_of("agent")).ok()) {
-    hint = HintOf(word_of("agent"), NamesOfNodes(*session, "agents", kNodesReadMax));
+    hint = HintOf(word_of("agent"), NodeNamesOf(session, "agents"));
   } else if (reason == Reason::kNodeUnknown && !word_of("node").empty() &&
              !ParseNodeId(word_of("node")).ok()) {
-    hint = HintOf(word_of("node"), NamesOfNodes(*session, "", kNodesReadMax));
+    hint = HintOf(word_of("node"), NodeNamesOf(session, ""));
   }
   if (hint.empty()) return status;
   return MakeError(reason, absl::StrCat(status.message(), hint), metadata);

@@ -175,6 +175,9 @@ class ContentReader {
       }
       if (!bodies.bodies.empty()) content.bodies.push_back(std::move(bodies));
     }
+    if (content.bodies.empty()) {
+      session_.notes() << "note: no agent has a body with faces and a pose then\n";
+    }
     return absl::OkStatus();
   }
 

@@ -21,7 +21,7 @@ struct ContentOptions {
   std::string mesh_node{};
   /// False: only the building, without agents.
   bool with_agents = true;
-  /// Also the bodies with faces of people: at the instant, or over time.
+  /// Also the bodies with faces of people: at the instant, or over time. A note says if none has.
   bool with_bodies = false;
   /// Bodies over time are at least so far apart, and no more than so many in all.
   TimeNs body_step_ns = 0;

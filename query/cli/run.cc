@@ -20,7 +20,7 @@ absl::StatusOr<ExitCode> RunCommand(const std::vector<std::string>& arguments,
   out << command.help;
   if (answered.ok() && command.run) answered = command.run(&session, out);
   if (!answered.ok() && command.opens != Opens::kNothing) {
-    return WithNearNames(&session, answered);
+    return WithNearNames(&session, session.times().Explain(answered));
   }
   DSG_RETURN_IF_ERROR(answered);
   out.flush();

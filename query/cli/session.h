@@ -136,10 +136,12 @@ class Session {
   Request Begin() const {
     Request request;
     request.set_map(map_.name);
-    if (common_.revision.has_value()) {
-      request.mutable_read_at()->set_exact_revision(*common_.revision);
-    } else if (!common_.tag.empty()) {
-      request.mutable_read_at()->set_tag(common_.tag);
+    if (common_.at.number.has_value()) {
+      request.mutable_read_at()->set_exact_revision(*common_.at.number);
+    } else if (!common_.at.tag.empty()) {
+      request.mutable_read_at()->set_tag(common_.at.tag);
+    } else if (common_.at.committed_at_ns.has_value()) {
+      request.mutable_read_at()->set_committed_at_ns(*common_.at.committed_at_ns);
     }
     return request;
   }

@@ -63,7 +63,9 @@ absl::StatusOr<std::vector<std::string>> KnownWords(Session* session, WordKind k
   const char* layer = kind == WordKind::kAgent    ? "agents"
                       : kind == WordKind::kRegion ? "rooms"
                                                   : "";
-  return NamesOfNodes(*session, layer, kNodesMax);
+  DSG_ASSIGN_OR_RETURN(NodeWords words, WordsOfNodes(*session, layer, kNodesMax));
+  words.names.insert(words.names.end(), words.ids.begin(), words.ids.end());
+  return std::move(words.names);
 }
 
 // The place and the map that the words name, or those of the environment.
@@ -86,7 +88,7 @@ absl::Status RunCompletion(Session* session, const CompletionVerb& verb, std::os
     return absl::OkStatus();
   }
   Grammar grammar(session->program_version());
-  for (const auto add : kVerbs) add(&grammar);
+  AddAllVerbs(&grammar);
   const Completion completion = Complete(grammar.app(), verb.words);
   for (const std::string& word : completion.words) out << word << "\n";
   out.flush();
@@ -111,7 +113,7 @@ absl::Status RunCompletion(Session* session, const CompletionVerb& verb, std::os
 void AddCompletionVerb(Grammar* grammar) {
   const auto [app, verb] = grammar->Add<CompletionVerb>(
       {.name = "completion",
-       .what = "A script with which a shell completes verbs, options and names",
+       .what = "A script with which a shell completes verbs, options, names and ids",
        .example = "bash",
        .takes = kServer | kMap,
        .opens = Opens::kNothing,
@@ -119,7 +121,8 @@ void AddCompletionVerb(Grammar* grammar) {
        .footer = "bash: source <(dsg completion bash)\nzsh:  source <(dsg completion zsh)\n"
                  "fish: dsg completion fish | source\n"
                  "The scripts ask `dsg completion words -- WORD...` for what may follow. Names of "
-                 "maps, tags and nodes\ncome from the store or server of the command line or the "
+                 "maps and tags, and\nnames and ids of nodes, come from the store or server of the "
+                 "command line or the "
                  "environment, within 200 ms or not at all."});
   app->add_option("SHELL", verb->shell, "bash, zsh or fish; or words")
       ->required()

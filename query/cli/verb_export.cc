@@ -133,10 +133,11 @@ absl::StatusOr<Written> WriteSparkExport(MapContent content, const ExportVerb& v
 
 absl::Status CheckAlone(const Session& session, const ExportVerb& verb) {
   const CommonOptions& common = session.common();
-  if (common.revision.has_value() || !common.tag.empty() || !verb.at.empty()) {
-    return MakeError(Reason::kFieldInvalid,
-                     "an archive has all revisions and all times; remove --revision and --at",
-                     {{"field", "--revision"}});
+  if (common.at.is_set() || !verb.at.empty()) {
+    return MakeError(
+        Reason::kFieldInvalid,
+        "an archive has all revisions and all times; remove --revision, --as-of and --at",
+        {{"field", "--revision"}});
   }
   if (ContentPaths(verb).empty() && RowPaths(verb).empty()) return absl::OkStatus();
   return MakeError(
@@ -296,9 +297,6 @@ absl::Status ExportContent(Session* session, const ExportVerb& verb, Revision re
            .body_count_max = verb.body_count_max,
            .with_poses = with_spark,
            .revision = revision}));
-  if (verb.with_bodies && answer.content.bodies.empty()) {
-    session->notes() << "note: no agent has a body with faces and a pose then\n";
-  }
   if (!verb.node.empty() && CountMesh(answer.content.mesh).faces == 0) {
     session->notes() << "note: the mesh has no triangles of " << Printable(verb.node) << "\n";
   }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The list of verbs, in the order of `dsg --help`. A new verb is added here.
+// The list of verbs, by heading and in the order of `dsg --help`. A new verb is added here.
 #pragma once
-
-#include <array>
 
 #include "query/cli/grammar.h"
 
@@ -18,6 +16,7 @@ void AddSearchVerbs(Grammar* grammar);
 void AddSpaceVerbs(Grammar* grammar);
 void AddChangeVerbs(Grammar* grammar);
 void AddMapsVerbs(Grammar* grammar);
+void AddVersionVerb(Grammar* grammar);
 void AddImportVerb(Grammar* grammar);
 void AddStoreVerbs(Grammar* grammar);
 void AddExportVerb(Grammar* grammar);
@@ -34,11 +33,45 @@ void AddCompletionVerb(Grammar* grammar);
 void AddViewVerb(Grammar* grammar);
 void AddHistoryVerbs(Grammar* grammar);
 
-inline constexpr std::array kVerbs = {
-    &AddAgentVerbs,  &AddShapeVerb,      &AddMeetingVerbs, &AddPredictVerb, &AddGraphVerbs,
-    &AddSearchVerbs, &AddSpaceVerbs,     &AddChangeVerbs,  &AddMapsVerbs,   &AddImportVerb,
-    &AddStoreVerbs,  &AddExportVerb,     &AddMapVerb,      &AddKeepVerbs,   &AddBackupVerbs,
-    &AddMergeVerb,   &AddPruneVerb,      &AddAssetVerb,    &AddFactorsVerb, &AddDropVerbs,
-    &AddSetVerb,     &AddCompletionVerb, &AddViewVerb,     &AddHistoryVerbs};
+inline void AddAllVerbs(Grammar* grammar) {
+  grammar->set_heading("Ask about people and robots");
+  AddAgentVerbs(grammar);
+  AddShapeVerb(grammar);
+  AddMeetingVerbs(grammar);
+  AddPredictVerb(grammar);
+  AddFactorsVerb(grammar);
+
+  grammar->set_heading("Ask about rooms, objects and the space between them");
+  AddSearchVerbs(grammar);
+  AddGraphVerbs(grammar);
+  AddHistoryVerbs(grammar);
+  AddSpaceVerbs(grammar);
+  AddAssetVerb(grammar);
+
+  grammar->set_heading("Look");
+  AddMapVerb(grammar);
+  AddViewVerb(grammar);
+
+  grammar->set_heading("Maps and their revisions");
+  AddMapsVerbs(grammar);
+  AddChangeVerbs(grammar);
+  AddSetVerb(grammar);
+  AddMergeVerb(grammar);
+  AddDropVerbs(grammar);
+
+  grammar->set_heading("Keep and forget");
+  AddKeepVerbs(grammar);
+  AddPruneVerb(grammar);
+  AddBackupVerbs(grammar);
+  AddStoreVerbs(grammar);
+
+  grammar->set_heading("In and out");
+  AddImportVerb(grammar);
+  AddExportVerb(grammar);
+
+  grammar->set_heading("This program");
+  AddCompletionVerb(grammar);
+  AddVersionVerb(grammar);
+}
 
 }  // namespace dsg::cli

@@ -15,6 +15,7 @@
 #include "query/cli/verb_list.h"
 #include "schema/base/status.h"
 #include "schema/files/atomic_file.h"
+#include "schema/picture/look.h"
 #include "schema/picture/raster.h"
 
 namespace dsg::cli {
@@ -60,13 +61,21 @@ std::string TitleOf(const Session& session, const ContentAnswer& answer, const M
 absl::StatusOr<MapContent> ReadBeside(const Session& session, const MapVerb& verb) {
   CommonOptions common = session.common();
   common.map = verb.beside;
-  common.revision.reset();
-  common.tag.clear();
+  common.at = {};
   Session other(std::move(common), session.program_version(), &session.notes());
   DSG_RETURN_IF_ERROR(other.Open());
   DSG_RETURN_IF_ERROR(other.ChooseMap());
   DSG_ASSIGN_OR_RETURN(ContentAnswer answer, ReadContentAt(&other, verb.at, {}));
   return std::move(answer.content);
+}
+
+// An empty picture would not say why it is.
+void NoteWithoutMesh(const Session& session, const MapContent& content, const std::string& floor) {
+  if (CountMesh(content.mesh).faces > 0) return;
+  session.notes() << "note: map " << content.spec.name << " has no mesh "
+                  << (floor.empty() ? "" : absl::StrCat("on floor ", floor, " ")) << "at revision "
+                  << content.revision
+                  << ", so its picture is empty; leave out --mesh to draw the rest of it\n";
 }
 
 absl::StatusOr<picture::Picture> DrawMap(Session* session, const MapVerb& verb,
@@ -75,8 +84,10 @@ absl::StatusOr<picture::Picture> DrawMap(Session* session, const MapVerb& verb,
     return DrawExplodedView(content, {.width_px = verb.width_px, .title = title});
   }
   if (!verb.is_mesh) return DrawTopView(content, {.width_px = verb.width_px, .title = title});
+  NoteWithoutMesh(*session, content, verb.floor);
   if (verb.beside.empty()) return DrawMeshes({{content, title}}, verb.width_px);
   DSG_ASSIGN_OR_RETURN(const MapContent other, ReadBeside(*session, verb));
+  NoteWithoutMesh(*session, other, "");
   return DrawMeshes({{content, NameAndRevision(content)}, {other, NameAndRevision(other)}},
                     verb.width_px);
 }

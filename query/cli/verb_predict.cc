@@ -185,8 +185,7 @@ absl::Status RunPredict(Session* session, const PredictVerb& verb, std::ostream&
   DSG_RETURN_IF_ERROR(CheckPicture(verb.picture));
   DSG_ASSIGN_OR_RETURN(const v1::PredictAgentRequest request, PredictionRequest(session, verb));
   v1::PredictAgentResponse reply;
-  DSG_RETURN_IF_ERROR(
-      session->times().Explain(session->api().PredictAgent(session->NewCall(), request, &reply)));
+  DSG_RETURN_IF_ERROR(session->api().PredictAgent(session->NewCall(), request, &reply));
   AnswerPicture picture;
   if (!verb.picture.png.empty()) {
     DSG_ASSIGN_OR_RETURN(picture, DrawPrediction(session, reply, verb.agent));

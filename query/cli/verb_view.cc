@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "query/cli/table.h"
 #include "query/cli/verb_list.h"
 #include "schema/base/status.h"
+#include "schema/store/graph_store.h"
 
 namespace dsg::cli {
 namespace {
@@ -35,6 +37,21 @@ absl::Status CheckView(const ViewVerb& verb, const CommonOptions& common) {
   return Usage("view needs a store folder: dsg view DIR", "view");
 }
 
+// A server would make a store of any folder, and serve a page without maps.
+absl::Status CheckStore(const std::string& folder) {
+  const auto refuse = [&](const std::string& what) {
+    return MakeError(Reason::kFieldInvalid,
+                     absl::StrCat("folder ", Printable(folder), " ", what,
+                                  "; name the folder of a store, or make a map there with "
+                                  "dsg-ingest --store DIR --map NAME LOG"),
+                     {{"field", "DIR"}, {"value", folder}});
+  };
+  if (!std::filesystem::is_directory(folder)) return refuse("is not there");
+  DSG_ASSIGN_OR_RETURN(const std::unique_ptr<GraphStore> store, GraphStore::Open(folder, {}));
+  DSG_ASSIGN_OR_RETURN(const std::vector<std::string> maps, store->MapNames());
+  return maps.empty() ? refuse("has no maps") : absl::OkStatus();
+}
+
 // The server beside this program, which has its version; else the one on PATH.
 std::string ServerProgram() {
   std::error_code error;
@@ -45,13 +62,7 @@ std::string ServerProgram() {
 
 absl::Status RunView(Session* session, const ViewVerb& verb, std::ostream& out) {
   const std::string store = StoreOf(verb, session->common());
-  // The server would make it anew.
-  if (!std::filesystem::is_directory(store)) {
-    return MakeError(Reason::kFieldInvalid,
-                     absl::StrCat("there is no store folder ", Printable(store),
-                                  "; dsg-ingest --store DIR makes one of a log"),
-                     {{"field", "DIR"}, {"value", store}});
-  }
+  DSG_RETURN_IF_ERROR(CheckStore(store));
   out.flush();
   std::vector<std::string> words = {ServerProgram(), "--store", store, "--http", verb.http};
   std::vector<char*> arguments;

@@ -151,8 +151,7 @@ absl::Status RunWhere(Session* session, const WhereVerb& verb, std::ostream& out
   DSG_ASSIGN_OR_RETURN(const TimeNs at_ns, ParseInstant("--at", verb.at, session->map()));
   request.set_at_ns(at_ns);
   v1::LocateAgentResponse reply;
-  DSG_RETURN_IF_ERROR(
-      session->times().Explain(session->api().LocateAgent(session->NewCall(), request, &reply)));
+  DSG_RETURN_IF_ERROR(session->api().LocateAgent(session->NewCall(), request, &reply));
   AnswerPicture picture;
   if (!verb.picture.png.empty()) {
     DSG_ASSIGN_OR_RETURN(picture, DrawLocation(*session, reply));
@@ -193,8 +192,7 @@ absl::Status RunTrack(Session* session, const TrackVerb& verb, std::ostream& out
     first.MergeFrom(message);
     return written.ok() && poses_left > 0;
   };
-  DSG_RETURN_IF_ERROR(
-      session->times().Explain(session->Read(&query::Api::GetTrajectory, request, take)));
+  DSG_RETURN_IF_ERROR(session->Read(&query::Api::GetTrajectory, request, take));
   DSG_RETURN_IF_ERROR(written);
   DSG_RETURN_IF_ERROR(list.End(TrackFooter(list.count(), first)));
   if (!is_kept) return absl::OkStatus();

@@ -92,12 +92,12 @@ absl::Status RemoveTag(Session* session, const std::string& name, std::ostream& 
 absl::Status RunTag(Session* session, const TagVerb& verb, std::ostream& out) {
   if (!verb.removed.empty()) return RemoveTag(session, verb.removed, out);
   if (verb.name.empty()) return ListTags(session, out);
-  const RevisionOption at{session->common().revision, session->common().tag};
   v1::SetTagRequest request;
   request.set_map(session->map().name);
   request.set_name(verb.name);
   if (verb.note.has_value()) request.set_note(*verb.note);
-  DSG_ASSIGN_OR_RETURN(const std::optional<Revision> revision, NumberOf(at, session));
+  DSG_ASSIGN_OR_RETURN(const std::optional<Revision> revision,
+                       NumberOf(session->common().at, session));
   if (revision.has_value()) request.set_revision(*revision);
   v1::SetTagResponse reply;
   DSG_RETURN_IF_ERROR(session->api().SetTag(session->NewCall(), request, &reply));

@@ -167,6 +167,9 @@ void AddMapsVerbs(Grammar* grammar) {
                           .takes = kServer | kJson | kFormat,
                           .opens = Opens::kPlace,
                           .run = RunMaps});
+}
+
+void AddVersionVerb(Grammar* grammar) {
   grammar->Add<VersionVerb>({.name = "version",
                              .what = "Version of this program, and of a server if one is named",
                              .example = "--server unix:dsg.sock",

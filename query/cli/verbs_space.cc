@@ -194,8 +194,7 @@ absl::Status RunPath(Session* session, const PathVerb& verb, std::ostream& out) 
   DSG_RETURN_IF_ERROR(CheckPicture(verb.picture));
   DSG_ASSIGN_OR_RETURN(const v1::PlanPathRequest request, PathRequest(session, verb));
   v1::PlanPathResponse reply;
-  DSG_RETURN_IF_ERROR(
-      session->times().Explain(session->api().PlanPath(session->NewCall(), request, &reply)));
+  DSG_RETURN_IF_ERROR(session->api().PlanPath(session->NewCall(), request, &reply));
   if (session->common().json) {
     DSG_RETURN_IF_ERROR(WriteJson(reply, out));
   } else {

@@ -121,6 +121,22 @@ std::string VerbSection(const CLI::App& verb) {
   return notes.empty() ? text : absl::StrCat(text, ".PP\n", notes);
 }
 
+// The verbs under the headings of their groups. Without a group a verb is hidden.
+std::string Verbs(const std::vector<const CLI::App*>& verbs) {
+  std::string text;
+  std::string group;
+  for (const CLI::App* verb : verbs) {
+    if (verb->get_group().empty()) continue;
+    if (verb->get_group() != group) {
+      group = verb->get_group();
+      const bool is_default = group == "Subcommands";
+      absl::StrAppend(&text, ".SH ", is_default ? "VERBS\n" : Text(absl::AsciiStrToUpper(group)));
+    }
+    absl::StrAppend(&text, VerbSection(*verb));
+  }
+  return text;
+}
+
 std::string Today() {
   int64_t seconds = WallClockNs() / kNsPerSecond;
   const char* fixed = std::getenv("SOURCE_DATE_EPOCH");
@@ -146,10 +162,7 @@ std::string ManualPage(const CLI::App& app, const std::string& version, const st
                    name, "\n", verbs.empty() ? "" : "\\fIVERB\\fR ", "[\\fIOPTION\\fR]...",
                    verbs.empty() ? Positionals(app) : " [\\fIARGUMENT\\fR]...", "\n");
   absl::StrAppend(&page, ".SH OPTIONS\n", Options(app, false));
-  if (!verbs.empty()) absl::StrAppend(&page, ".SH VERBS\n");
-  for (const CLI::App* verb : verbs) {
-    if (!verb->get_group().empty()) absl::StrAppend(&page, VerbSection(*verb));
-  }
+  absl::StrAppend(&page, Verbs(verbs));
   const std::string notes = Paragraphs(app.get_footer());
   return notes.empty() ? page : absl::StrCat(page, ".SH NOTES\n", notes);
 }

@@ -13,8 +13,8 @@ namespace dsg {
 /// Prints the manual page. The build uses it; no help shows it.
 inline constexpr char kManualFlag[] = "--man";
 
-/// The page of section 1 in the language of man(7): the program, its options by group, its verbs
-/// with theirs, and its notes. `date` is like 2026-11-21.
+/// The page of section 1 in the language of man(7): the program, its options by group, its verbs by
+/// group with theirs, and its notes. `date` is like 2026-11-21.
 std::string ManualPage(const CLI::App& app, const std::string& version, const std::string& date);
 
 /// Adds kManualFlag, which ends parsing as a flag for the version does: with CLI::CallForVersion,

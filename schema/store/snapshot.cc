@@ -89,12 +89,11 @@ absl::StatusOr<NodeId> Snapshot::ResolveAgent(std::string_view id_or_name) const
                                   ToString(agents[1]), " among them; ask by id"),
                      {{"map", spec().name}, {"agent", std::string(id_or_name)}});
   }
-  return MakeError(
-      Reason::kAgentUnknown,
-      absl::StrCat("no human or robot of map \"", spec().name, "\" has the id or name \"",
-                   std::string(id_or_name), "\" at revision ", revision(),
-                   "; `dsg ls --layer agents` lists the known ones"),
-      {{"map", spec().name}, {"agent", std::string(id_or_name)}});
+  return MakeError(Reason::kAgentUnknown,
+                   absl::StrCat("no agent of map \"", spec().name, "\" has the id or name \"",
+                                std::string(id_or_name), "\" at revision ", revision(),
+                                "; `dsg ls --layer agents` lists the known ones"),
+                   {{"map", spec().name}, {"agent", std::string(id_or_name)}});
 }
 
 absl::Status Snapshot::UnknownNode(NodeId id) const {

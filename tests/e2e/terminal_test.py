@@ -64,6 +64,8 @@ class Terminal(support.ProgramsTest):
         for words, expected in ((("ls", "--map", ""), "office"),
                                 (("ls", "--revision", "b"), "built"),
                                 (("where", "al"), "alice"),
+                                (("where", "H"), "H0"),
+                                (("show", "O1"), "O11"),
                                 (("who", "--room", "off"), "office\\ 1")):
             # A busy machine may need more than the 200 ms after which names are left out.
             for _ in range(20):

@@ -39,6 +39,18 @@ TEST(TimeText, TimeOutsideTrackSaysWhereTheTrackIs) {
                                  "no pose of H1 (the track: +2s to +9.5s)", MetadataOf(status)));
 }
 
+TEST(TimeText, AnInvertedRangeIsToldAsItWasGiven) {
+  const absl::Status status =
+      MakeError(Reason::kTimeRangeInverted, "from_ns 60000000000 is not before to_ns 30000000000",
+                {{"from_ns", "60000000000"}, {"to_ns", "30000000000"}});
+  const absl::Status explained = On(Clock::kMonotonic, 0).Explain(status);
+  EXPECT_EQ(ReasonOf(explained), Reason::kTimeRangeInverted);
+  EXPECT_EQ(MetadataOf(explained), MetadataOf(status));
+  const std::string message(explained.message());
+  EXPECT_EQ(message.find("--from +60s is not before --to +30s; "), 0U) << message;
+  EXPECT_NE(message.find("give an earlier --from or a later --to"), std::string::npos);
+}
+
 TEST(TimeText, OtherErrorsPassUnchanged) {
   const TimeText times = On(Clock::kMonotonic, 0);
   EXPECT_TRUE(times.Explain(absl::OkStatus()).ok());

@@ -73,7 +73,7 @@ TEST(Arguments, CommonOptionsStandBehindTheVerb) {
                   {});
   EXPECT_EQ(common.server, "unix:s");
   EXPECT_EQ(common.map, "office");
-  EXPECT_EQ(common.revision, 17);
+  EXPECT_EQ(common.at.number, 17);
   EXPECT_TRUE(common.json);
   EXPECT_EQ(common.limit, 5);
   EXPECT_EQ(common.timeout_s, 2.5);
@@ -83,7 +83,7 @@ TEST(Arguments, EnvironmentFillsWhatIsLeftOpen) {
   const CommonOptions common = ParseCommon({"stats"}, {.server = "unix:s", .map = "office"});
   EXPECT_EQ(common.server, "unix:s");
   EXPECT_EQ(common.map, "office");
-  EXPECT_FALSE(common.revision.has_value());
+  EXPECT_FALSE(common.at.is_set());
 }
 
 TEST(Arguments, CommandLineWinsOverEnvironment) {
@@ -146,6 +146,37 @@ TEST(Arguments, HelpIsAnAnswer) {
   EXPECT_NE(where.find("--at"), std::string::npos) << where;
 }
 
+TEST(Arguments, HelpHasEachVerbUnderAHeading) {
+  const std::string all = HelpOf({});
+  size_t before = 0;
+  for (const char* line : {"Ask about people and robots:", "  where ", "Look:", "  map ", "  view ",
+                           "Maps and their revisions:", "  log ", "Keep and forget:", "  prune ",
+                           "In and out:", "  export ", "This program:", "  completion "}) {
+    const size_t at = all.find(std::string("\n") + line, before);
+    ASSERT_NE(at, std::string::npos) << line << " in " << all;
+    before = at;
+  }
+  // The heading of verbs that have none.
+  EXPECT_EQ(all.find("Subcommands"), std::string::npos);
+}
+
+TEST(Arguments, AsOfIsADateBesideRevisionAndTag) {
+  EXPECT_EQ(
+      ParseCommon({"stats", "--as-of", "1970-01-01T00:00:02Z"}, {.store = "s"}).at.committed_at_ns,
+      2 * kNsPerSecond);
+  EXPECT_EQ(ParseCommon({"stats", "--as-of", "1970-01-01T02:00:00.5+02:00"}, {.store = "s"})
+                .at.committed_at_ns,
+            kNsPerSecond / 2);
+  for (const char* text : {"+2s", "-2s", "1403715524907143168", "yesterday", "T", ""}) {
+    EXPECT_NE(Refusal({"stats", "--as-of", text}).find("is no date; write it in UTC"),
+              std::string::npos)
+        << text;
+  }
+  EXPECT_NE(
+      Refusal({"stats", "--as-of", "1970-01-01T00:00:02Z", "--revision", "3"}).find("excludes"),
+      std::string::npos);
+}
+
 // As a shell would: quotes keep words together.
 Arguments WordsOf(const std::string& line) {
   Arguments words;
@@ -167,11 +198,12 @@ Arguments WordsOf(const std::string& line) {
 
 TEST(Arguments, HelpOfEachVerbHasAnExampleThatCanBeTyped) {
   const std::string all = HelpOf({});
-  std::istringstream lines(all.substr(all.find("Subcommands:")));
+  std::istringstream lines(all.substr(all.find("Ask about people and robots:")));
   std::string line;
-  std::getline(lines, line);
   int count = 0;
-  while (std::getline(lines, line) && line.substr(0, 2) == "  ") {
+  while (std::getline(lines, line)) {
+    // Headings and the notes at the end.
+    if (line.substr(0, 2) != "  ") continue;
     const std::string verb = WordsOf(line)[0];
     const std::string help = HelpOf({verb});
     const size_t at = help.find("Example: dsg ");

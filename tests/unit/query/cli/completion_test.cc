@@ -15,7 +15,7 @@ using Words = std::vector<std::string>;
 
 Completion After(const Words& words) {
   Grammar grammar("0.1.0");
-  for (const auto add : kVerbs) add(&grammar);
+  AddAllVerbs(&grammar);
   return Complete(grammar.app(), words);
 }
 

@@ -27,5 +27,16 @@ TEST(ExitCode, ErrorIsOneLineWithItsReason) {
   EXPECT_EQ(ErrorLine(absl::UnavailableError("no server")), "dsg: no server\n");
 }
 
+TEST(Errors, NameVerbsAndOptionsInsteadOfCallsAndFields) {
+  const absl::Status status =
+      MakeError(Reason::kFieldInvalid, "node is H1; ask GetAgentShape", {{"field", "node"}});
+  EXPECT_EQ(InFlags(status).message(), "--node is H1; ask dsg shape");
+}
+
+TEST(Errors, OfRevisionsTellWhereTheyAreListed) {
+  const std::string message(InFlags(MakeError(Reason::kRevisionCompacted, "gone")).message());
+  EXPECT_EQ(message.find("gone; `dsg log`"), 0U) << message;
+}
+
 }  // namespace
 }  // namespace dsg::cli

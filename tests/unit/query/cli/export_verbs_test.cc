@@ -192,6 +192,9 @@ TEST_F(ExportVerbs, SayWhatIsMissingOrWrong) {
   const Outcome none = Ask({"export", "--gltf", Path("b.glb"), "--bodies"});
   EXPECT_EQ(none.code, 0) << none.errors;
   EXPECT_NE(none.errors.find("no agent has a body"), std::string::npos) << none.errors;
+  const Outcome nobody = Ask({"map", "--png", Path("b.png"), "--bodies", "--at", "0ns"});
+  EXPECT_EQ(nobody.code, 0) << nobody.errors;
+  EXPECT_NE(nobody.errors.find("no agent has a body"), std::string::npos) << nobody.errors;
 }
 
 TEST_F(ExportVerbs, AFullDiskIsToldAndLeavesNoFile) {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "schema/base/status.h"
+#include "schema/base/time.h"
 #include "schema/store/graph_store.h"
 #include "tests/unit/query/cli/cli_test_util.h"
 
@@ -239,7 +240,15 @@ TEST_F(RunTest, WhatIsAskedWronglyExitsWithTwo) {
   ExpectRefused(2, "BOX_INVERTED", {"who", "--box", "1,0,0,0,1,1"});
   ExpectRefused(2, "--every", {"track", "H12", "--every", "0"});
   ExpectRefused(2, "POSITION", {"near", "1,2"});
-  ExpectRefused(2, "TIME_RANGE_INVERTED", {"who", "--room", "R1", "--from", "+2s", "--to", "+1s"});
+  ExpectRefused(2, "--from +2s is not before --to +1s;",
+                {"who", "--room", "R1", "--from", "+2s", "--to", "+1s"});
+  ExpectRefused(2, "--from +2s is not before --to +1s;",
+                {"track", "H12", "--from", "+2s", "--to", "+1s"});
+  // The end that is not given is one of all poses.
+  ExpectRefused(2, "--from +1m is behind the last pose of the map, +20s",
+                {"who", "--room", "R1", "--from", "+1m"});
+  ExpectRefused(2, "--to -3s is not behind the first pose of the map, +0s",
+                {"who", "--room", "R1", "--to=-3s"});
 }
 
 TEST_F(RunTest, NoServerExitsWithThree) {
@@ -297,6 +306,44 @@ TEST_F(RunTest, ListsNodesByLayerParentKindAndClass) {
   EXPECT_EQ(AskJson({"ls", "--class", "cup"})["nodes"][0]["id"], "O1");
   EXPECT_EQ(AskJson({"ls"})["nodes"].size(), 7u);
   EXPECT_EQ(AskJson({"ls", "--limit", "3"})["nodes"].size(), 3u);
+}
+
+TEST_F(RunTest, AsOfIsTheNewestRevisionCommittedUntilThen) {
+  // Newest first.
+  const Json revisions = AskJson({"log"})["revisions"];
+  ASSERT_EQ(revisions.size(), 2u);
+  const TimeNs second_ns = std::stoll(revisions[0]["committed_ns"].get<std::string>());
+  const TimeNs first_ns = std::stoll(revisions[1]["committed_ns"].get<std::string>());
+  ASSERT_LT(first_ns, second_ns);
+  EXPECT_EQ(AskJson({"ls", "--as-of", FormatRfc3339(first_ns)})["nodes"].size(), 6u);
+  EXPECT_EQ(AskJson({"ls", "--as-of", FormatRfc3339(second_ns - 1)})["nodes"].size(), 6u);
+  EXPECT_EQ(AskJson({"ls", "--as-of", FormatRfc3339(second_ns)})["nodes"].size(), 7u);
+  ExpectRefused(1, "no revision that was committed at or before",
+                {"ls", "--as-of", FormatRfc3339(first_ns - 1)});
+  // A tag can be set at one.
+  const Outcome tagged = Ask({"tag", "before", "--as-of", FormatRfc3339(first_ns)});
+  EXPECT_EQ(tagged.out, "tag before is revision 1\n") << tagged.errors;
+}
+
+TEST_F(RunTest, AFolderWithoutMapsIsNotServed) {
+  const std::string empty = folder_ + "/empty";
+  fs::create_directory(empty);
+  for (const auto& [folder, what] : {std::pair(empty, " has no maps; name the folder of a store"),
+                                     std::pair(folder_ + "/none", " is not there; ")}) {
+    const Outcome outcome = RunDsg({"view", folder});
+    EXPECT_EQ(outcome.code, 2);
+    EXPECT_NE(outcome.errors.find(folder + what), std::string::npos) << outcome.errors;
+  }
+  EXPECT_TRUE(fs::is_empty(empty));
+}
+
+TEST_F(RunTest, AMapWithoutAMeshIsDrawnWithANote) {
+  const std::string file = folder_ + "/mesh.png";
+  const Outcome outcome = Ask({"map", "--mesh", "--png", file, "--width", "300"});
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_NE(outcome.errors.find("map office has no mesh at revision 2"), std::string::npos)
+      << outcome.errors;
+  EXPECT_TRUE(fs::exists(file));
 }
 
 TEST_F(RunTest, PastRevisionsAnswerAsTheyDid) {

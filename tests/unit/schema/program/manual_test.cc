@@ -49,6 +49,19 @@ TEST(Manual, HasAVerbWithItsOptionsAndNotes) {
   EXPECT_TRUE(Holds(page, ".PP\nExample: dsg where ada\n")) << page;
 }
 
+TEST(Manual, VerbsStandUnderTheHeadingsOfTheirGroups) {
+  CLI::App app("Asks.", "dsg");
+  app.add_subcommand("where", "Where an agent was")->group("Ask");
+  app.add_subcommand("who", "Who was there")->group("Ask");
+  app.add_subcommand("drop", "Remove a map")->group("Keep");
+  app.add_subcommand("secret", "Not told")->group("");
+  const std::string page = ManualPage(app, "1", "2026-11-21");
+  EXPECT_TRUE(Holds(page, ".SH ASK\n.SS where\nWhere an agent was.\n.SS who\n")) << page;
+  EXPECT_TRUE(Holds(page, ".SH KEEP\n.SS drop\n")) << page;
+  EXPECT_FALSE(Holds(page, "VERBS"));
+  EXPECT_FALSE(Holds(page, "secret"));
+}
+
 TEST(Manual, TextIsNeverARequest) {
   CLI::App app("Does.", "dsg");
   bool is_set = false;
