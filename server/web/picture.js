@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// The picture in the middle of the page: drawn when something has changed, never while nothing
+// does.
+import {element} from './dom.js';
+import {drawLabels} from './labels.js';
+import {Plan} from './plan.js';
+import {Renderer, stepOf} from './renderer.js';
+import {app, changed, listen, tell} from './state.js';
+import {setStanding} from './trouble.js';
+
+const {show, camera} = app;
+const canvas = element('scene');
+let painter = null;
+let isDirty = true;
+let isStale = true;
+
+/** Shows the whole map. */
+export function frameAll() {
+  const {min, max} = app.scene.bounds;
+  const top = show.hidden.has('building') ? 2 : 3;
+  camera.frame(min, [max[0], max[1], max[2] + top * stepOf(app.scene, show.explode)]);
+  changed(false);
+}
+
+function resize() {
+  const scale = window.devicePixelRatio || 1;
+  for (const one of [canvas, element('labels')]) {
+    const [width, height] = [one.clientWidth, one.clientHeight].map((v) => Math.round(v * scale));
+    if (one.width === width && one.height === height) continue;
+    one.width = width;
+    one.height = height;
+    isDirty = true;
+  }
+}
+
+function draw() {
+  const {scene} = app;
+  if (isStale && scene) painter.build(scene, show);
+  isStale = isDirty = false;
+  painter.draw(scene, show, camera);
+  if (scene?.nodes.size && !performance.getEntriesByName('picture').length) {
+    performance.mark('picture');
+  }
+  const count = painter instanceof Plan ? 0 : drawLabels(element('labels'), scene, show, camera);
+  document.body.dataset.labels = String(count);
+  document.body.dataset.drawn = String(Number(document.body.dataset.drawn ?? 0) + 1);
+}
+
+function makePainter() {
+  try {
+    painter = new Renderer(canvas);
+  } catch (error) {
+    document.body.dataset.plan = '1';
+    painter = new Plan(canvas);
+    setStanding(`${error.message}: the plan from above is shown.`);
+  }
+  canvas.addEventListener('webglcontextlost', (event) => event.preventDefault());
+  canvas.addEventListener('webglcontextrestored', () => {
+    painter.restore();
+    tell('redraw', true);
+  });
+}
+
+/**
+ * Draws from now on.
+ * @param {function(number)} before runs before each picture that the browser could show, with its
+ *     time in milliseconds
+ */
+export function startPicture(before) {
+  makePainter();
+  listen('redraw', (isStaleToo) => {
+    isDirty = true;
+    isStale ||= isStaleToo;
+  });
+  const frame = (now) => {
+    before(now);
+    resize();
+    if (isDirty) draw();
+    requestAnimationFrame(frame);
+  };
+  requestAnimationFrame(frame);
+}
