@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What somebody asks about the scene, and its answer on the page: a node, a search, a path, a
 // prediction, a comparison. An answer that comes too late is dropped.
-import {debounced, element, link, make} from './dom.js';
+import {debounced, element, link, make, setText} from './dom.js';
 import {fillInspector} from './panels.js';
 import {app, ask, changed, listen, tell} from './state.js';
 import {textOf} from './time.js';
@@ -54,14 +54,15 @@ const locate = debounced(async () => {
   }
   if (app.scene !== asked || show.selected !== agent || show.time !== time) return;
   // The inspector may have been filled anew meanwhile.
-  document.getElementById('where')?.replaceChildren(...answer);
+  const where = document.getElementById('where');
+  if (where) setText(where, ...answer);
 }, 150);
 
 /** An answer (a text, or texts and links), or why there is none, below the inspector's buttons. */
 function sayAnswer(what) {
   if (what instanceof Error && isSaid(what)) return;
   const answer = document.getElementById('answer');
-  answer?.replaceChildren(...(what instanceof Error ? [what.message] : [what].flat()));
+  if (answer) setText(answer, ...(what instanceof Error ? [what.message] : [what].flat()));
 }
 
 /** An action that says why there is no answer to it. */
@@ -110,18 +111,18 @@ export async function search(query) {
   element('query').value = query;
   show.hits.clear();
   const found = element('found');
-  found.textContent = '';
+  setText(found, '');
   try {
     if (query) {
       const {ids, hasMore} = await ask().search(query, show.time);
       show.hits = new Set(ids);
-      found.textContent = `${ids.length}${hasMore ? ' and more' : ''} found, ` +
-                          `true at ${textOf(show.time, app.scene.map)}`;
+      setText(found, `${ids.length}${hasMore ? ' and more' : ''} found, ` +
+                     `true at ${textOf(show.time, app.scene.map)}`);
       if (ids.length === 1) await select(ids[0]);
     }
   } catch (error) {
     if (isSaid(error)) return;
-    found.textContent = error.message;
+    setText(found, error.message);
   }
   changed();
 }
@@ -148,8 +149,8 @@ export async function compare(revision) {
     show.diff = states;
     show.ghosts = removed;
     const count = (name) => [...states.values()].filter((one) => one === name).length;
-    element('found').textContent = `+${count('added')} -${count('removed')} ~${count('changed')} ` +
-                                   `since revision ${revision}`;
+    setText(element('found'), `+${count('added')} -${count('removed')} ~${count('changed')} ` +
+                              `since revision ${revision}`);
   }
   changed();
 }

@@ -2,7 +2,7 @@
 // The world time that is shown: its slider, play, and where everybody is at a time that stands
 // still.
 import {loadBodies} from './bodies.js';
-import {debounced, element} from './dom.js';
+import {debounced, element, setText} from './dom.js';
 import {app, ask, changed, listen, tell} from './state.js';
 import {textOf} from './time.js';
 import {isSaid} from './trouble.js';
@@ -75,7 +75,7 @@ async function showBodies(asked, positions, time) {
 function refresh() {
   const {scene} = app;
   if (!scene) return;
-  element('time-text').textContent = textOf(show.time, scene.map);
+  setText(element('time-text'), textOf(show.time, scene.map));
   const span = scene.end - scene.begin;
   element('time').value = String(
       span > 0 ? Math.round((show.time - scene.begin) / span * TIME_STEPS) : 0);

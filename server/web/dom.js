@@ -1,5 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-// Small helpers for the page. All text goes in as text: names come from logs, and are never markup.
+// Small helpers for the page. All text goes in as text, by `make` and `setText`: names come from
+// logs, and are never markup.
+
+/** Marks that turn the direction of what follows: they would make a name look like another one. */
+const DIRECTION_MARKS = /[\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]/g;
+
+/** A text as it is shown: marks of direction by their number, as [U+202E]. */
+export function visible(text) {
+  return text.replace(DIRECTION_MARKS, (mark) => {
+    const number = mark.charCodeAt(0).toString(16).toUpperCase().padStart(4, '0');
+    return `[U+${number}]`;
+  });
+}
+
+/** Children as they go into an element: texts become visible ones. */
+const shown = (children) => children.map(
+    (child) => (typeof child === 'string' ? visible(child) : child));
 
 /** @returns {HTMLElement} */
 export function element(id) {
@@ -15,8 +31,13 @@ export function element(id) {
  */
 export function make(tag, properties = {}, ...children) {
   const made = Object.assign(document.createElement(tag), properties);
-  made.append(...children);
+  made.append(...shown(children));
   return made;
+}
+
+/** Puts texts and elements into an element, instead of what it has. */
+export function setText(into, ...children) {
+  into.replaceChildren(...shown(children));
 }
 
 /** Text that leads somewhere. */

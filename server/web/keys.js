@@ -5,9 +5,9 @@ import {setPlaying, setTime} from './clock.js';
 import {element} from './dom.js';
 import {listenToKeys} from './input.js';
 import {setLive, showLayers, stepRevision, stepTag} from './opening.js';
-import {frameAll} from './picture.js';
+import {explode, frameAll} from './picture.js';
 import {GROUPS} from './scene.js';
-import {app, changed, tell} from './state.js';
+import {app, tell} from './state.js';
 import {explain} from './trouble.js';
 
 const {show} = app;
@@ -20,7 +20,7 @@ const KEYS = {
   ']': () => stepRevision(1),
   '{': () => stepTag(-1),
   '}': () => stepTag(1),
-  x: explode,
+  x: toggleLayersApart,
   d: () => compare(app.diff ? 0 : Math.max(1, app.scene.revision - 1)).catch(explain),
   f: frameAll,
   '/': () => element('query').focus(),
@@ -34,11 +34,9 @@ const KEYS = {
 };
 
 /** Layers apart, or in place again. */
-function explode() {
-  show.explode = show.explode > 0 ? 0 : 1;
+function toggleLayersApart() {
+  explode(show.explode > 0 ? 0 : 1);
   showLayers();
-  changed();
-  frameAll();
 }
 
 function toggleTable() {

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Names over the picture, on a canvas of their own: the most telling first, none over another.
 import {project} from './camera.js';
-import {shortened} from './dom.js';
-import {colorOfAgent, stepOf} from './renderer.js';
-import {GROUPS} from './scene.js';
+import {SELECTED, colorOfAgent, cssOf} from './colors.js';
+import {shortened, visible} from './dom.js';
+import {colorOfGroup} from './scene.js';
+import {liftOf} from './show.js';
 
 const LABELS_MAX = 80;
 /** Letters of a name on the picture. */
@@ -42,19 +43,17 @@ export function drawLabels(canvas, scene, show, camera) {
   context.textBaseline = 'middle';
   context.textAlign = 'center';
   const matrix = camera.matrix(width / height);
-  const step = stepOf(scene, show.explode);
   const taken = [];
   for (const [, node] of candidates(scene, show, camera.distance < NEAR_M)) {
     if (taken.length >= LABELS_MAX) break;
-    const group = GROUPS.find((one) => one.name === node.group);
     const place = node.outline.length ? middleOf(node.outline, node.zMin)
                                       : scene.placeOf(node, show.time);
     if (!place) continue;
     const above = node.group === 'agents' ? 1.2 : node.box ? node.box.max[2] + 0.2 : 0.2;
-    const spot = project(matrix, [place[0], place[1], place[2] + group.lift * step + above], width,
-                         height);
+    const spot = project(matrix, [place[0], place[1], place[2] + liftOf(scene, show, node) + above],
+                         width, height);
     if (!spot || spot.x < 0 || spot.y < 0 || spot.x > width || spot.y > height) continue;
-    const text = shortened(scene.titleOf(node.id), LETTERS_MAX);
+    const text = shortened(visible(scene.titleOf(node.id)), LETTERS_MAX);
     const half = context.measureText(text).width / 2 + 4 * scale;
     const tall = FONT_PX * 0.75 * scale;
     const area = [spot.x - half, spot.y - tall, spot.x + half, spot.y + tall];
@@ -63,10 +62,10 @@ export function drawLabels(canvas, scene, show, camera) {
                    other[1] < area[3]);
     if (overlaps) continue;
     taken.push(area);
-    const color = node.group === 'agents' ? colorOfAgent(node.id) : group.color;
+    const color = node.group === 'agents' ? colorOfAgent(node.id) : colorOfGroup(node.group);
     context.fillStyle = 'rgba(16, 20, 26, 0.72)';
     context.fillRect(area[0], area[1], area[2] - area[0], area[3] - area[1]);
-    context.fillStyle = node.id === show.selected ? '#ffffff' : `rgb(${color.join(',')})`;
+    context.fillStyle = cssOf(node.id === show.selected ? SELECTED : color);
     context.fillText(text, spot.x, spot.y);
   }
   return taken.length;

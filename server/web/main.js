@@ -4,9 +4,10 @@
 import {readAddress, writeAddress} from './address.js';
 import {goTo, select, startAnswers} from './answers.js';
 import {advance, startClock} from './clock.js';
-import {debounced, element} from './dom.js';
+import {debounced, element, setText} from './dom.js';
 import {listenToPointer} from './input.js';
 import {startKeys} from './keys.js';
+import {fillLegend} from './legend.js';
 import {mapsOf, open, startOpening} from './opening.js';
 import {drawHistogram, fillHelp, fillTable, sentenceOf} from './panels.js';
 import {pick} from './pick.js';
@@ -30,7 +31,7 @@ const saveAddress = debounced(() => {
 
 function saySentence() {
   if (!app.scene) return;
-  element('sentence').textContent = sentenceOf(app.scene, show, app.loading);
+  setText(element('sentence'), sentenceOf(app.scene, show, app.loading));
 }
 
 function refresh() {
@@ -60,6 +61,7 @@ function startParts() {
   startOpening();
   startKeys();
   fillHelp();
+  fillLegend();
   listenToPointer(element('scene'), camera, {
     moved: () => changed(false),
     clicked: (at) => app.scene && select(pick(app.scene, show, camera, at)),

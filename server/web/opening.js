@@ -2,11 +2,11 @@
 // Which map is shown at which revision: opening it, going to another revision, and following new
 // ones.
 import {compare, fillDiffs, search, select} from './answers.js';
-import {debounced, element, make, shortened} from './dom.js';
+import {debounced, element, make, setText, shortened, visible} from './dom.js';
 import {follow, persistently} from './live.js';
 import {loadMesh, loadRevisions, loadScene, loadTags} from './load.js';
 import {drawHistogram, fillLayers} from './panels.js';
-import {frameAll} from './picture.js';
+import {explode, lookAtAll} from './picture.js';
 import {app, changed, listen, tell} from './state.js';
 import {secondsOf, textOf} from './time.js';
 import {banner, clearBanner, explain, isState, setState} from './trouble.js';
@@ -70,7 +70,7 @@ export async function open(map, revision, wanted = {}) {
     take(loaded, '', wanted);
     // Where there is the most to see; at the end of a log nearly everybody is gone.
     if (isFirst && wanted.atNs === undefined && !app.isLive) show.time = loaded.busiest;
-    if (isFirst && !wanted.camera) frameAll();
+    if (isFirst && !wanted.camera) lookAtAll();
     await settle(loaded, wanted, signal);
   } catch (error) {
     if (signal.aborted) return;
@@ -137,9 +137,12 @@ async function settle(loaded, wanted, signal) {
 
 /** The layers beside the picture, as they are shown now. */
 export function showLayers() {
-  fillLayers(app.scene, show, () => {
-    meshIfShown().catch(explain);
-    changed();
+  fillLayers(app.scene, show, {
+    explode,
+    changed: () => {
+      meshIfShown().catch(explain);
+      changed();
+    },
   });
 }
 
@@ -185,7 +188,7 @@ function revisionText() {
   const at = app.revisions.find((one) => one.number === scene.revision);
   const named = app.tags.filter((tag) => Number(tag.revision) === scene.revision);
   const names = named.length ? ` (${named.map((tag) => tag.name).join(', ')})` : '';
-  return shortened(`${scene.revision} of ${scene.head}${names} ${at?.message ?? ''}`, 60);
+  return shortened(visible(`${scene.revision} of ${scene.head}${names} ${at?.message ?? ''}`), 60);
 }
 
 // ---- live ----
@@ -233,7 +236,7 @@ export function startOpening() {
   element('live').onclick = () => setLive(!app.isLive);
   listen('open', (map, revision) => open(map, revision));
   listen('changed', () => {
-    if (app.scene) element('revision-text').textContent = revisionText();
+    if (app.scene) setText(element('revision-text'), revisionText());
   });
   document.addEventListener('visibilitychange', () => {
     if (!app.isLive || !app.scene) return;

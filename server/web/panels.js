@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // What stands beside the picture: the layers, what is selected, and the same facts as a table.
+import {colorOfAgent, cssOf} from './colors.js';
 import {element, link, make, metres, pair} from './dom.js';
 import {NEIGHBORS_MAX} from './questions.js';
-import {colorOfAgent} from './renderer.js';
 import {GROUPS} from './scene.js';
 import {durationText, textOf} from './time.js';
 
@@ -10,19 +10,23 @@ const ROWS_MAX = 1000;
 
 function swatch(rgb) {
   const made = make('span', {className: 'swatch'});
-  made.style.background = `rgb(${rgb.join(',')})`;
+  made.style.background = cssOf(rgb);
   return made;
 }
 
-/** The legend; `changed` is called after each change of `show`. */
-export function fillLayers(scene, show, changed) {
+/**
+ * The layers, and how they are shown.
+ * @param {{changed: function(), explode: function(number)}} on `changed` is called after each
+ *     change of `show`; `explode` sets how far layers are apart, from 0 to 1
+ */
+export function fillLayers(scene, show, on) {
   const rows = GROUPS.map((group, i) => {
     const box = make('input', {type: 'checkbox', checked: !show.hidden.has(group.name),
                                id: `layer-${group.name}`});
     box.onchange = () => {
       if (box.checked) show.hidden.delete(group.name);
       else show.hidden.add(group.name);
-      changed();
+      on.changed();
     };
     const count = group.name === 'mesh' ? Number(scene.stats.mesh_block_count)
                                         : scene.of(group.name).length;
@@ -31,20 +35,17 @@ export function fillLayers(scene, show, changed) {
   });
   const explode = make('input', {type: 'range', id: 'explode', min: '0', max: '1', step: '0.01',
                                  value: String(show.explode)});
-  explode.oninput = () => {
-    show.explode = Number(explode.value);
-    changed();
-  };
+  explode.oninput = () => on.explode(Number(explode.value));
   const edges = make('input', {type: 'checkbox', id: 'edges', checked: show.hasEdges});
   edges.onchange = () => {
     show.hasEdges = edges.checked;
-    changed();
+    on.changed();
   };
   const tail = make('input', {type: 'range', min: '0', max: '300', step: '5',
                               value: String(show.tail)});
   tail.oninput = () => {
     show.tail = Number(tail.value);
-    changed();
+    on.changed();
   };
   const notes = scene.notes.map((text) => make('p', {}, text));
   element('layers').replaceChildren(
@@ -79,7 +80,9 @@ export function fillInspector(scene, show, neighbors, actions) {
   const panel = element('inspector');
   const node = scene?.nodes.get(show.selected);
   if (!node) {
-    panel.replaceChildren(make('p', {}, 'Click on something, or search.'));
+    panel.replaceChildren(...(show.selected ? [make('h2', {}, show.selected),
+                                               make('p', {id: 'answer'}, 'not in the picture')]
+                                            : [make('p', {}, 'Click on something, or search.')]));
     return;
   }
   const facts = [

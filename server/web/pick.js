@@ -2,15 +2,14 @@
 // Which node is under the pointer: places by their distance on the screen, people by that of their
 // figure, things with a box by the ray through it, rooms by their floor.
 import {project} from './camera.js';
-import {PERSON_HEIGHT, ROBOT_BOX, stepOf} from './renderer.js';
-import {GROUPS} from './scene.js';
+import {PERSON_HEIGHT, ROBOT_BOX} from './moving.js';
+import {liftOf} from './show.js';
 
 /** Pixels around an agent, and around a place: those stand close together before the floor. */
 const AGENT_REACH = 24;
 const PLACE_REACH = 8;
 /** Half the width of a figure, metres. */
 const FIGURE_WIDTH = 0.22;
-const LIFTS = Object.fromEntries(GROUPS.map((group) => [group.name, group.lift]));
 
 /** A vector turned back by a quaternion. */
 function turnedBack([x, y, z, w], v) {
@@ -84,7 +83,6 @@ export function pick(scene, show, camera, at) {
   const aspect = at.width / at.height;
   const ray = camera.ray(at.x / at.width * 2 - 1, 1 - at.y / at.height * 2, aspect);
   const matrix = camera.matrix(aspect);
-  const step = stepOf(scene, show.explode);
   let best = {id: '', rank: 3, distance: Infinity};
   const offer = (id, rank, distance) => {
     if (distance === Infinity || rank > best.rank) return;
@@ -93,7 +91,7 @@ export function pick(scene, show, camera, at) {
   for (const node of scene.nodes.values()) {
     if (show.hidden.has(node.group)) continue;
     if (node.group !== 'agents' && !scene.isValid(node, show.time)) continue;
-    const lift = LIFTS[node.group] * step;
+    const lift = liftOf(scene, show, node);
     const place = scene.placeOf(node, show.time);
     if (node.outline.length >= 3) {
       offer(node.id, node.group === 'rooms' ? 2 : 3, distanceToFloor(ray, node, lift));

@@ -4,13 +4,19 @@
 import {element} from './dom.js';
 import {drawLabels} from './labels.js';
 import {Plan} from './plan.js';
-import {Renderer, stepOf} from './renderer.js';
+import {Renderer} from './renderer.js';
+import {drawScale} from './scale.js';
+import {stepOf} from './show.js';
 import {app, changed, listen, tell} from './state.js';
 import {setStanding} from './trouble.js';
 
 const {show, camera} = app;
 const canvas = element('scene');
+/** Layers apart are seen from the side, and turned a little, radians. */
+const SIDE = {pitch: 0.32, turn: 0.35};
 let painter = null;
+/** From where the map was seen before its layers came apart; null while they are in place. */
+let inPlace = null;
 let isDirty = true;
 let isStale = true;
 
@@ -20,6 +26,35 @@ export function frameAll() {
   const top = show.hidden.has('building') ? 2 : 3;
   camera.frame(min, [max[0], max[1], max[2] + top * stepOf(app.scene, show.explode)]);
   changed(false);
+}
+
+/** Shows the whole map as it is best seen: layers apart from the side, none before another. */
+export function lookAtAll() {
+  if (show.explode > 0 && !inPlace) {
+    inPlace = {yaw: camera.yaw, pitch: camera.pitch};
+    camera.pitch = SIDE.pitch;
+    camera.yaw = nearestSide(camera.yaw);
+  } else if (show.explode === 0 && inPlace) {
+    Object.assign(camera, inPlace);
+    inPlace = null;
+  }
+  frameAll();
+}
+
+/** Of the headings across the longer side of the map, turned a little, the nearest to a heading. */
+function nearestSide(yaw) {
+  const {min, max} = app.scene.bounds;
+  const across = max[0] - min[0] >= max[1] - min[1] ? Math.PI / 2 : 0;
+  const turns = [across, across + Math.PI].flatMap((at) => [at - SIDE.turn, at + SIDE.turn]);
+  const away = (heading) => 1 - Math.cos(heading - yaw);
+  return turns.reduce((best, heading) => (away(heading) < away(best) ? heading : best));
+}
+
+/** Sets how far layers are apart: from 0, in place, to 1. */
+export function explode(share) {
+  show.explode = share;
+  tell('redraw', true);
+  lookAtAll();
 }
 
 function resize() {
@@ -42,6 +77,7 @@ function draw() {
     performance.mark('picture');
   }
   const count = painter instanceof Plan ? 0 : drawLabels(element('labels'), scene, show, camera);
+  drawScale(painter.pixelsPerMetre(scene, camera));
   document.body.dataset.labels = String(count);
   document.body.dataset.drawn = String(Number(document.body.dataset.drawn ?? 0) + 1);
 }

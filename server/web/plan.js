@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The plan from above on a 2-D canvas, for browsers without WebGL2: the same scene and the same
 // times, without layers apart.
-import {shortened} from './dom.js';
+import {BACKGROUND, SELECTED, colorOfAgent, cssOf} from './colors.js';
+import {shortened, visible} from './dom.js';
 import {LETTERS_MAX} from './labels.js';
-import {colorOfAgent} from './renderer.js';
 import {GROUPS} from './scene.js';
 
 const MARGIN = 30;
@@ -18,6 +18,12 @@ export class Plan {
 
   build() {}
 
+  /** Of the screen's pixels. */
+  pixelsPerMetre(scene) {
+    if (!scene) return 0;
+    return this.#view(scene).scale * this.canvas.clientWidth / this.canvas.width;
+  }
+
   /** Map frame to pixels, so that the whole map is to be seen. */
   #view(scene) {
     const {min, max} = scene.bounds;
@@ -30,7 +36,7 @@ export class Plan {
 
   draw(scene, show) {
     const {context, canvas} = this;
-    context.fillStyle = '#10141a';
+    context.fillStyle = cssOf(BACKGROUND);
     context.fillRect(0, 0, canvas.width, canvas.height);
     if (!scene) return;
     const view = this.#view(scene);
@@ -45,7 +51,7 @@ export class Plan {
     if (group.name !== 'agents' && !scene.isValid(node, show.time)) return;
     const isMarked = node.id === show.selected || show.hits.has(node.id);
     const rgb = group.name === 'agents' ? colorOfAgent(node.id) : group.color;
-    context.strokeStyle = context.fillStyle = isMarked ? '#ffffff' : `rgb(${rgb.join(',')})`;
+    context.strokeStyle = context.fillStyle = cssOf(isMarked ? SELECTED : rgb);
     if (node.outline.length >= 3) {
       context.beginPath();
       node.outline.forEach((point) => context.lineTo(...view.at(point)));
@@ -60,6 +66,6 @@ export class Plan {
     context.fillRect(x - half, y - half, 2 * half, 2 * half);
     if (group.name !== 'agents' && !isMarked) return;
     context.font = '12px system-ui, sans-serif';
-    context.fillText(shortened(scene.titleOf(node.id), LETTERS_MAX), x + 8, y + 4);
+    context.fillText(shortened(visible(scene.titleOf(node.id)), LETTERS_MAX), x + 8, y + 4);
   }
 }

@@ -98,13 +98,14 @@ export class Questions {
             length: reply.length_m, clearance: reply.clearance_m_min};
   }
 
-  /** Where an agent may go: ways with probabilities, and goals where there are some. */
+  /** Where an agent may go: ways with probabilities and spread, and goals where there are some. */
   async predict(agent, time) {
     const reply = await this.#ask('QueryService/PredictAgent', {
       agent, from_ns: this.#ns(time), ...PREDICTION,
     });
     return reply.paths.map(({probability, poses, goal_node_id: goal}) => ({
       probability, goal, points: poses.map(({position: p}) => [p.x, p.y, p.z]),
+      covariances: poses.map(({covariance}) => covariance),
     }));
   }
 

@@ -2,28 +2,15 @@
 // Draws a scene with WebGL2. What stands still is in one buffer a group, made when the scene or its
 // time changes; people and trails are made anew for each picture. Nothing is drawn while nothing
 // changes.
-import {GROUPS} from './scene.js';
+import {Buffer, linked} from './card.js';
+import {BACKGROUND, DIFF_COLORS, SELECTED, lookOf} from './colors.js';
+import {addAnswers, addPeople} from './moving.js';
+import {Pieces, Ribbons} from './ribbons.js';
+import {GROUPS, colorOfGroup} from './scene.js';
 import {
-  FLOATS_PER_VERTEX, Vertices, addBox, addBoxEdges, addFigure, addLine, addPoint, addPrism, addRing,
-  addTriangle,
+  VERTEX, Vertices, addBox, addBoxEdges, addFace, addLine, addPoint, addPrism, cornersOf,
 } from './shapes.js';
-
-const BACKGROUND = [0x10 / 255, 0x14 / 255, 0x1a / 255];
-export const PERSON_HEIGHT = 1.7;
-/** A crowd of more people is drawn as boxes. */
-const FIGURES_MAX = 300;
-export const ROBOT_BOX = {min: [-0.25, -0.25, 0], max: [0.25, 0.25, 0.5]};
-const DIFF_COLORS = {added: [0x4d, 0xa3, 0xff], removed: [0xff, 0x7a, 0x33],
-                     changed: [0xf5, 0xf0, 0xa0], same: [0x5a, 0x61, 0x6b]};
-const SELECTED = [255, 255, 255];
-const HIT = [255, 90, 200];
-const PATH = [120, 255, 160];
-/** Palette of people, without repeats among the first ten. */
-const PEOPLE = [
-  [0xe6, 0x9f, 0x00], [0xff, 0x6f, 0x61], [0x9b, 0x8c, 0xff], [0x2e, 0xc4, 0xb6],
-  [0xd4, 0xe1, 0x57], [0xff, 0xb3, 0xc6], [0x8d, 0x6e, 0x63], [0x4f, 0xc3, 0xf7],
-  [0xba, 0x68, 0xc8], [0xa5, 0xd6, 0xa7],
-];
+import {stepOf} from './show.js';
 
 const VERTEX_SHADER = `#version 300 es
 layout(location = 0) in vec3 position;
@@ -45,104 +32,8 @@ in vec4 tint;
 out vec4 result;
 void main() { result = tint; }`;
 
-/** Colour of an agent: always the same for the same id. */
-export function colorOfAgent(id) {
-  let hash = 0;
-  for (const letter of id) hash = (hash * 31 + letter.charCodeAt(0)) >>> 0;
-  return PEOPLE[(Number(id.slice(1)) || hash) % PEOPLE.length];
-}
-
-function compiled(gl, type, source) {
-  const shader = gl.createShader(type);
-  gl.shaderSource(shader, source);
-  gl.compileShader(shader);
-  if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS) && !gl.isContextLost()) {
-    throw new Error(`shader: ${gl.getShaderInfoLog(shader)}`);
-  }
-  return shader;
-}
-
-/** Vertices on the card, drawn as triangles, lines or points. */
-class Buffer {
-  constructor(gl, mode) {
-    this.gl = gl;
-    this.mode = mode;
-    this.count = 0;
-    this.array = gl.createVertexArray();
-    this.bytes = gl.createBuffer();
-    gl.bindVertexArray(this.array);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.bytes);
-    const stride = FLOATS_PER_VERTEX * 4;
-    [[0, 3, gl.FLOAT, false, 0], [1, 4, gl.UNSIGNED_BYTE, true, 12], [2, 1, gl.FLOAT, false, 16],
-     [3, 1, gl.FLOAT, false, 20]].forEach(([at, size, type, normalized, offset]) => {
-      gl.enableVertexAttribArray(at);
-      gl.vertexAttribPointer(at, size, type, normalized, stride, offset);
-    });
-  }
-
-  fill(vertices, usage) {
-    this.count = vertices.count;
-    this.gl.bindBuffer(this.gl.ARRAY_BUFFER, this.bytes);
-    this.gl.bufferData(this.gl.ARRAY_BUFFER, vertices.filled, usage);
-  }
-
-  draw() {
-    if (this.count === 0) return;
-    this.gl.bindVertexArray(this.array);
-    this.gl.drawArrays(this.mode, 0, this.count);
-  }
-
-  free() {
-    this.gl.deleteBuffer(this.bytes);
-    this.gl.deleteVertexArray(this.array);
-  }
-}
-
-/** What of a scene is shown, and how. */
-export class Show {
-  constructor() {
-    /** World time, seconds since the epoch. */
-    this.time = 0;
-    /** Names of groups that are not drawn. */
-    this.hidden = new Set(['mesh', 'structures']);
-    /** From 0, in place, to 1, layers apart. */
-    this.explode = 0;
-    this.hasEdges = true;
-    /** Length of the trails behind agents, seconds. */
-    this.tail = 20;
-    this.selected = '';
-    this.hits = new Set();
-    /** @type {number[][]} corners of a planned path */
-    this.path = [];
-    /** @type {{probability: number, points: number[][]}[]} */
-    this.predictions = [];
-    /** @type {Map<string, string> | null} id to "added", "removed", "changed" */
-    this.diff = null;
-    /** Nodes that the other revision had, and this one has no more. */
-    this.ghosts = [];
-  }
-}
-
 function isAgent(scene, id) {
   return scene.nodes.get(id)?.group === 'agents';
-}
-
-/** Metres between two steps of the exploded view. */
-export function stepOf(scene, explode) {
-  const {min, max} = scene.bounds;
-  const size = Math.max(max[0] - min[0], max[1] - min[1]);
-  return explode * Math.max(4, size * 0.16);
-}
-
-/** A colour of a node, and how opaque it is. */
-function lookOf(show, node, color) {
-  if (show.diff) {
-    const state = show.diff.get(node.id) ?? 'same';
-    return [DIFF_COLORS[state], state === 'same' ? 0.35 : 1];
-  }
-  if (node.id === show.selected) return [SELECTED, 1];
-  if (show.hits.has(node.id)) return [HIT, 1];
-  return [color, show.hits.size ? 0.4 : 1];
 }
 
 export class Renderer {
@@ -161,23 +52,25 @@ export class Renderer {
 
   #setUp() {
     const gl = this.gl;
-    const program = gl.createProgram();
-    gl.attachShader(program, compiled(gl, gl.VERTEX_SHADER, VERTEX_SHADER));
-    gl.attachShader(program, compiled(gl, gl.FRAGMENT_SHADER, FRAGMENT_SHADER));
-    gl.linkProgram(program);
-    this.program = program;
+    this.program = linked(gl, VERTEX_SHADER, FRAGMENT_SHADER);
     this.uniforms = Object.fromEntries(['matrix', 'step_m', 'point_size'].map(
-        (name) => [name, gl.getUniformLocation(program, name)]));
-    this.solid = new Buffer(gl, gl.TRIANGLES);
-    this.glass = new Buffer(gl, gl.TRIANGLES);
-    this.lines = new Buffer(gl, gl.LINES);
-    this.points = new Buffer(gl, gl.POINTS);
-    this.mesh = new Buffer(gl, gl.TRIANGLES);
-    this.movingSolid = new Buffer(gl, gl.TRIANGLES);
-    this.movingLines = new Buffer(gl, gl.LINES);
+        (name) => [name, gl.getUniformLocation(this.program, name)]));
+    this.solid = new Buffer(gl, gl.TRIANGLES, VERTEX);
+    this.glass = new Buffer(gl, gl.TRIANGLES, VERTEX);
+    this.lines = new Buffer(gl, gl.LINES, VERTEX);
+    this.points = new Buffer(gl, gl.POINTS, VERTEX);
+    this.mesh = new Buffer(gl, gl.TRIANGLES, VERTEX);
+    this.movingSolid = new Buffer(gl, gl.TRIANGLES, VERTEX);
+    this.movingLines = new Buffer(gl, gl.LINES, VERTEX);
+    this.ribbons = new Ribbons(gl);
     this.movingEdges = [];
     this.meshOf = null;
     this.meshBlocks = 0;
+  }
+
+  /** Of the screen's pixels, in the middle of the picture. */
+  pixelsPerMetre(scene, camera) {
+    return scene ? camera.pixelsPerMetre(camera.distance, this.canvas.clientHeight) : 0;
   }
 
   /** Makes the buffers of what stands still. */
@@ -219,7 +112,7 @@ export class Renderer {
       addPoint(out.points, node.position, color, opacity * share, lift);
     } else if (node.box && node.position) {
       addBox(out.solid, node.box, node.position, node.orientation, color, 1, lift);
-      addBoxEdges(out.lines, node.box, node.position, node.orientation, [16, 20, 26], 0.8, lift);
+      addBoxEdges(out.lines, node.box, node.position, node.orientation, BACKGROUND, 0.8, lift);
     } else if (node.position) {
       const half = group.name === 'objects' ? 0.12 : 0.4;
       const box = {min: [-half, -half, -half], max: [half, half, half]};
@@ -252,7 +145,7 @@ export class Renderer {
       const from = scene.placeOf(source, show.time);
       const to = scene.placeOf(target, show.time);
       if (!from || !to) continue;
-      const color = isSelected ? SELECTED : GROUPS.find((one) => one.name === target.group).color;
+      const color = isSelected ? SELECTED : colorOfGroup(target.group);
       const opacity = isSelected ? 0.9 : show.diff || show.explode === 0 ? 0.1 : 0.28;
       addLine(lines, from, to, color, opacity, lifts[source.group], lifts[target.group]);
     }
@@ -263,7 +156,8 @@ export class Renderer {
     const vertices = new Vertices(scene.origin, 65536);
     for (const block of scene.mesh) {
       for (let i = 0; i + 2 < block.faces.length; i += 3) {
-        this.#addFace(vertices, block, i, block.colors?.[block.faces[i]] ?? 0x9aa4b2);
+        const rgb = block.colors?.[block.faces[i]] ?? 0x9aa4b2;
+        addFace(vertices, ...cornersOf(block, i), [rgb >> 16 & 255, rgb >> 8 & 255, rgb & 255], 1);
       }
     }
     this.mesh.fill(vertices, this.gl.STATIC_DRAW);
@@ -271,84 +165,31 @@ export class Renderer {
     this.meshBlocks = scene.mesh.length;
   }
 
-  #addFace(vertices, block, i, rgb) {
-    const corner = (k) => block.positions.subarray(block.faces[i + k] * 3,
-                                                   block.faces[i + k] * 3 + 3);
-    const [a, b, c] = [corner(0), corner(1), corner(2)];
-    const u = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
-    const v = [c[0] - a[0], c[1] - a[1], c[2] - a[2]];
-    const normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
-                    u[0] * v[1] - u[1] * v[0]];
-    const length = Math.hypot(...normal) || 1;
-    const shade = 0.55 + 0.35 * Math.abs(normal[2] / length) + 0.1 * (normal[0] / length);
-    addTriangle(vertices, a, b, c, [rgb >> 16 & 255, rgb >> 8 & 255, rgb & 255], 1, shade, 0);
-  }
-
   /** People, their trails, and what was asked for last. */
   #buildMoving(scene, show) {
-    const [solid, lines] = [new Vertices(scene.origin), new Vertices(scene.origin)];
-    if (!show.hidden.has('agents')) {
-      for (const node of scene.of('agents')) this.#addAgent(solid, lines, scene, show, node);
-    }
+    const {origin} = scene;
+    const out = {solid: new Vertices(origin), ribbons: new Pieces(origin)};
+    const lines = new Vertices(origin);
+    addPeople(out, scene, show);
+    addAnswers(out.ribbons, show);
     if (show.hasEdges) this.#addEdges(lines, scene, show, this.movingEdges);
-    show.path.slice(1).forEach((point, i) => {
-      const lifted = (p) => [p[0], p[1], p[2] + 0.05];
-      addLine(lines, lifted(show.path[i]), lifted(point), PATH, 1, 0);
-    });
-    for (const {probability, points} of show.predictions) {
-      points.slice(1).forEach((point, i) => {
-        addLine(lines, points[i], point, HIT, 0.2 + 0.8 * probability, 0);
-      });
-    }
-    this.movingSolid.fill(solid, this.gl.DYNAMIC_DRAW);
+    this.movingSolid.fill(out.solid, this.gl.DYNAMIC_DRAW);
     this.movingLines.fill(lines, this.gl.DYNAMIC_DRAW);
-  }
-
-  #addAgent(solid, lines, scene, show, node) {
-    const track = scene.tracks.get(node.id);
-    if (!track) return;
-    const [color] = lookOf(show, node, colorOfAgent(node.id));
-    this.#addTrail(lines, track, show, color);
-    const here = scene.agentAt(node.id, show.time);
-    if (!here) return;
-    const foot = scene.footOf(here.position);
-    const body = scene.bodies.time === show.time && scene.bodies.meshes.get(node.id);
-    if (!here.known) {
-      addRing(lines, foot, 0.35, color, 0.9, 0);
-    } else if (body) {
-      const rgb = color[0] << 16 | color[1] << 8 | color[2];
-      for (let i = 0; i + 2 < body.faces.length; i += 3) this.#addFace(solid, body, i, rgb);
-    } else if (node.kind === 'human' && scene.of('agents').length <= FIGURES_MAX) {
-      addFigure(solid, foot, PERSON_HEIGHT, color, 1, 0);
-    } else {
-      addBox(solid, ROBOT_BOX, foot, [0, 0, 0, 1], color, 1, 0);
-    }
-    if (node.id === show.selected) addRing(lines, foot, 0.6, SELECTED, 1, 0);
-  }
-
-  #addTrail(lines, track, show, color) {
-    const begin = Math.max(0, track.indexAt(show.time - show.tail));
-    const end = track.indexAt(show.time);
-    for (let i = begin; i < end; ++i) {
-      if (track.times[i] < show.time - show.tail) continue;
-      if (track.gaps.has(i + 1)) continue;
-      const age = (show.time - track.times[i]) / show.tail;
-      addLine(lines, track.positions[i], track.positions[i + 1], color, 1 - 0.85 * age, 0);
-    }
+    this.ribbons.fill(out.ribbons);
   }
 
   draw(scene, show, camera) {
     const gl = this.gl;
     const {width, height} = this.canvas;
     gl.viewport(0, 0, width, height);
-    gl.clearColor(...BACKGROUND, 1);
+    gl.clearColor(...BACKGROUND.map((value) => value / 255), 1);
     gl.enable(gl.DEPTH_TEST);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     if (!scene) return;
     this.#buildMoving(scene, show);
+    const matrix = Float32Array.from(camera.matrix(width / height, scene.origin));
     gl.useProgram(this.program);
-    gl.uniformMatrix4fv(this.uniforms.matrix, false,
-                        Float32Array.from(camera.matrix(width / height, scene.origin)));
+    gl.uniformMatrix4fv(this.uniforms.matrix, false, matrix);
     gl.uniform1f(this.uniforms.step_m, stepOf(scene, show.explode));
     gl.uniform1f(this.uniforms.point_size, height * 0.12);
     gl.disable(gl.BLEND);
@@ -361,10 +202,13 @@ export class Renderer {
     this.movingSolid.draw();
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+    // What is seen through hides nothing that is drawn later.
+    gl.depthMask(false);
     this.points.draw();
     this.lines.draw();
     this.movingLines.draw();
-    gl.depthMask(false);
+    this.ribbons.draw(matrix, width, height);
+    gl.useProgram(this.program);
     this.glass.draw();
     gl.depthMask(true);
   }

@@ -15,6 +15,9 @@ export const GROUPS = [
   {name: 'mesh', title: 'Mesh', color: [0x9a, 0xa4, 0xb2], lift: 0},
 ];
 
+/** The colour of a group. */
+export const colorOfGroup = (name) => GROUPS.find((group) => group.name === name).color;
+
 const ORIGIN = [0, 0, 0];
 
 function groupOf({kind, layer, hasRegion}) {

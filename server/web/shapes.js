@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Triangles and lines of boxes, prisms and people, appended to growing buffers. A vertex is six
+// Triangles and lines of boxes, prisms and people, appended to growing rows. A vertex is six
 // floats: position in metres from the scene's origin, colour and opacity as four bytes in one,
 // how light it is, and its lift (which step of the exploded view).
 
-export const FLOATS_PER_VERTEX = 6;
+const FLOATS_PER_VERTEX = 6;
+/** Sizes of a vertex's attributes, as Buffer of card.js takes them. */
+export const VERTEX = [3, 'bytes', 1, 1];
 
 const colorBytes = new Uint8Array(4);
 const colorFloat = new Float32Array(colorBytes.buffer);
 
 /** Four bytes as one float, as the vertex format has them. */
-function packed([red, green, blue], opacity) {
+export function packed([red, green, blue], opacity) {
   colorBytes[0] = red;
   colorBytes[1] = green;
   colorBytes[2] = blue;
@@ -18,28 +20,41 @@ function packed([red, green, blue], opacity) {
   return colorFloat[0];
 }
 
-/** Vertices that grow; doubled when full, so that appending is cheap. */
-export class Vertices {
-  /** @param {number[]} origin what positions are written relative to, metres */
-  constructor(origin, capacity = 1024) {
-    this.data = new Float32Array(capacity * FLOATS_PER_VERTEX);
+/** Rows of floats that grow; doubled when full, so that appending is cheap. */
+export class Rows {
+  /** @param {number} width floats of a row */
+  constructor(width, capacity) {
+    this.width = width;
+    this.data = new Float32Array(capacity * width);
     this.count = 0;
-    this.origin = origin;
   }
 
   /** The part that is filled. */
   get filled() {
-    return this.data.subarray(0, this.count * FLOATS_PER_VERTEX);
+    return this.data.subarray(0, this.count * this.width);
   }
 
-  push(x, y, z, color, shade, lift) {
-    if ((this.count + 1) * FLOATS_PER_VERTEX > this.data.length) {
+  append(row) {
+    if ((this.count + 1) * this.width > this.data.length) {
       const larger = new Float32Array(this.data.length * 2);
       larger.set(this.data);
       this.data = larger;
     }
+    this.data.set(row, this.count++ * this.width);
+  }
+}
+
+/** Vertices as the head of this file says. */
+export class Vertices extends Rows {
+  /** @param {number[]} origin what positions are written relative to, metres */
+  constructor(origin, capacity = 1024) {
+    super(FLOATS_PER_VERTEX, capacity);
+    this.origin = origin;
+  }
+
+  push(x, y, z, color, shade, lift) {
     const [ox, oy, oz] = this.origin;
-    this.data.set([x - ox, y - oy, z - oz, color, shade, lift], this.count++ * FLOATS_PER_VERTEX);
+    this.append([x - ox, y - oy, z - oz, color, shade, lift]);
   }
 }
 
@@ -67,7 +82,7 @@ export function transformed(position, orientation, point) {
 }
 
 /** The eight corners of a node's box. */
-function cornersOf(box, position, orientation) {
+function boxCorners(box, position, orientation) {
   const corners = [];
   for (let i = 0; i < 8; ++i) {
     corners.push(transformed(position, orientation, [
@@ -79,7 +94,7 @@ function cornersOf(box, position, orientation) {
 }
 
 export function addBox(out, box, position, orientation, rgb, opacity, lift) {
-  const corners = cornersOf(box, position, orientation);
+  const corners = boxCorners(box, position, orientation);
   const color = packed(rgb, opacity);
   for (const [a, b, c, d, shade] of FACES) {
     for (const i of [a, b, c, a, c, d]) out.push(...corners[i], color, shade, lift);
@@ -87,7 +102,7 @@ export function addBox(out, box, position, orientation, rgb, opacity, lift) {
 }
 
 export function addBoxEdges(out, box, position, orientation, rgb, opacity, lift) {
-  const corners = cornersOf(box, position, orientation);
+  const corners = boxCorners(box, position, orientation);
   const color = packed(rgb, opacity);
   for (const i of BOX_EDGES) out.push(...corners[i], color, 1, lift);
 }
@@ -105,6 +120,21 @@ export function addPoint(out, position, rgb, opacity, lift) {
 export function addTriangle(out, a, b, c, rgb, opacity, shade, lift) {
   const color = packed(rgb, opacity);
   for (const point of [a, b, c]) out.push(...point, color, shade, lift);
+}
+
+/** The corners of the face of a mesh that begins at an index into its faces. */
+export function cornersOf({positions, faces}, i) {
+  return [0, 1, 2].map((k) => positions.subarray(faces[i + k] * 3, faces[i + k] * 3 + 3));
+}
+
+/** A face of a mesh: the flatter it lies, the lighter it is. */
+export function addFace(out, a, b, c, rgb, opacity) {
+  const u = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
+  const v = [c[0] - a[0], c[1] - a[1], c[2] - a[2]];
+  const normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+  const length = Math.hypot(...normal) || 1;
+  const shade = 0.55 + 0.35 * Math.abs(normal[2] / length) + 0.1 * (normal[0] / length);
+  addTriangle(out, a, b, c, rgb, opacity, shade, 0);
 }
 
 function cross(o, a, b) {
@@ -184,15 +214,5 @@ export function addFigure(out, foot, height, rgb, opacity, lift) {
         out.push(...point, color, shade, lift);
       }
     }
-  }
-}
-
-/** A ring on the floor: somebody whose place is not known between two sightings. */
-export function addRing(out, center, radius, rgb, opacity, lift) {
-  for (let i = 0; i < 24; ++i) {
-    const [a, b] = [i, i + 1].map((k) => 2 * Math.PI * k / 24);
-    addLine(out, [center[0] + Math.cos(a) * radius, center[1] + Math.sin(a) * radius, center[2]],
-            [center[0] + Math.cos(b) * radius, center[1] + Math.sin(b) * radius, center[2]], rgb,
-            opacity, lift);
   }
 }

@@ -4,8 +4,8 @@
 import {takeToken} from './address.js';
 import {Camera} from './camera.js';
 import {Questions} from './questions.js';
-import {Show} from './renderer.js';
 import {Client} from './rpc.js';
+import {Show} from './show.js';
 
 export const app = {
   client: new Client(takeToken()),

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the page says over the picture: why a call failed and what can be done, and notes.
-import {element, make} from './dom.js';
+import {element, make, setText} from './dom.js';
 import {CallError} from './rpc.js';
 import {app, tell} from './state.js';
 
@@ -19,7 +19,7 @@ export function banner(text, kind = 'error', buttons = []) {
   const shown = element('banner');
   shown.hidden = !text;
   shown.dataset.kind = kind;
-  shown.replaceChildren(text, ...buttons);
+  setText(shown, text, ...buttons);
 }
 
 /** Takes away what was said; what holds as long as the page does stays. */

@@ -86,6 +86,31 @@ class Facts(viewer_support.ViewerTest):
                 self.assertAlmostEqual(place.get(axis, 0), float(value), delta=0.0051, msg=node)
         return people
 
+    def test_the_scale_is_that_of_the_middle_of_the_picture(self):
+        camera = viewer_picks.Camera([20, 7, 0.5], 60, 0.4, 0.8)
+        self.open(f"&cam={camera.address()}")
+        scene = viewer_picks.Scene(self.nodes(self.head), self.nodes(self.head), 0)
+        for distance in (60, 3, 11, 700):
+            camera = viewer_picks.Camera(camera.target, distance, camera.yaw, camera.pitch)
+            text, width, area = self.window.run("""
+                const bar = document.getElementById('scale');
+                const {width, height} = document.getElementById('scene').getBoundingClientRect();
+                return import('/state.js').then(({app, changed}) => {
+                  app.camera.distance = arguments[0];
+                  changed(false);
+                  return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(
+                      () => done([bar.textContent, bar.getBoundingClientRect().width,
+                                  [width, height]]))));
+                });""", distance)
+            metres = float(text.removesuffix(" m"))
+            self.assertIn(f"{metres:e}"[0], "125", text)
+            self.assertEqual(0, float(f"{metres:e}"[2:8]), text)
+            # As long as it can be in 120 pixels.
+            self.assertTrue(120 / 2.5 - 1 < width <= 120, (text, width))
+            picture = viewer_picks.Picture(scene, camera, *area)
+            right = [t + r * metres for t, r in zip(camera.target, camera.right)]
+            self.assertAlmostEqual(picture.pixel(right)[0] - area[0] / 2, width, delta=0.2)
+
     def place_in_gap(self, node, at):
         """An agent in a gap of its track is drawn as a ring where it was last."""
         poses = self.ask("track", node["id"], "--to", support.at(at - self.epoch_ns), *STORE)

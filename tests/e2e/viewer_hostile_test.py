@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Texts of a map that would be markup or code stay text, wherever the viewer shows them."""
 
+import re
 import urllib.parse
 import unittest
 
@@ -20,9 +21,11 @@ REVISION_TEXT_MAX = 60
 STEPS_AT_ONCE = 20
 
 # What of a page a text could have become.
-TRACES = """
+TRACES = r"""
   const wrong = [];
   if (window.ran !== undefined) wrong.push('code ran');
+  const text = document.body.innerText + document.body.textContent;
+  if (/[\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]/.test(text)) wrong.push('turned text');
   if (document.title !== 'dsgdb') wrong.push('title ' + document.title);
   if (document.scripts.length !== 1) wrong.push(document.scripts.length + ' scripts');
   for (const one of document.querySelectorAll('*')) {
@@ -37,12 +40,18 @@ SEARCHED_NS = 2_000_000_000
 ELEMENTS = ["html", "head", "body", "meta", "title", "link", "script", "noscript", "header",
             "label", "select", "option", "form", "input", "button", "span", "main", "aside", "div",
             "canvas", "p", "footer", "output", "dialog", "h2", "h3", "dl", "dt", "dd", "bdi",
-            "table", "tbody", "tr", "th", "td", "kbd"]
+            "table", "tbody", "tr", "th", "td", "kbd", "section", "details", "summary", "ul", "li"]
 
 
 def cut(text, bytes_max):
     """As much of a text as the store takes."""
     return text.encode()[:bytes_max].decode(errors="ignore")
+
+
+def shown(text):
+    """A text as the page shows it: marks that turn the direction of writing by their number."""
+    return re.sub("[\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]",
+                  lambda mark: f"[U+{ord(mark[0]):04X}]", text)
 
 
 class Hostile(viewer_support.ViewerTest):
@@ -120,7 +129,8 @@ class Hostile(viewer_support.ViewerTest):
                 [row.cells[0].textContent, row.querySelector('.link').textContent,
                  row.cells[2].textContent, row.cells[3].textContent]);""")}
         for i, text in enumerate(PAYLOADS, 1):
-            self.assertEqual([f"O{i}", text, cut(text, RELATION_BYTES_MAX), text], rows[f"O{i}"])
+            short = cut(text, RELATION_BYTES_MAX)
+            self.assertEqual([f"O{i}", shown(text), shown(short), shown(text)], rows[f"O{i}"])
         self.assertEqual([PAYLOADS[0], PAYLOADS[1]], [rows["H1"][1], rows["R1"][1]])
         seen = []
         for begin in range(0, len(PAYLOADS), STEPS_AT_ONCE):
@@ -143,9 +153,9 @@ class Hostile(viewer_support.ViewerTest):
                 for (let i = begin; i <= end; ++i) seen.push(await select(i));
                 return seen;
               })();""", begin + 1, min(begin + STEPS_AT_ONCE, len(PAYLOADS)))
-        for text, shown in zip(PAYLOADS, seen, strict=True):
-            short = cut(text, RELATION_BYTES_MAX)
-            self.assertEqual([text, short, text, f"{short} {PAYLOADS[1]}"], shown)
+        for text, said in zip(PAYLOADS, seen, strict=True):
+            short = shown(cut(text, RELATION_BYTES_MAX))
+            self.assertEqual([shown(text), short, shown(text), f"{short} {PAYLOADS[1]}"], said)
         # Of the room all relations are shown at once.
         self.window.run("""[...document.querySelectorAll('#table tr')].find(
             (row) => row.cells[0].textContent === 'R1').querySelector('.link').click()""")
@@ -175,11 +185,11 @@ class Hostile(viewer_support.ViewerTest):
                 }
                 return seen;
               })();""", min(STEPS_AT_ONCE, head - begin - 1))
-        for i, shown in zip(range(head, 1, -1), seen, strict=True):
-            whole = f"{i} of {head} (t{i}) {PAYLOADS[i - 1]}"
+        for i, said in zip(range(head, 1, -1), seen, strict=True):
+            whole = shown(f"{i} of {head} (t{i}) {PAYLOADS[i - 1]}")
             due = whole if len(whole) <= REVISION_TEXT_MAX else \
                 whole[:REVISION_TEXT_MAX - 1] + "\u2026"
-            self.assertEqual(due, shown)
+            self.assertEqual(due, said)
         self.nothing_ran()
         self.controls_are_in_sight()
 
@@ -199,7 +209,7 @@ class Hostile(viewer_support.ViewerTest):
                     }
                     return [asked, found.textContent];
                   })();""", text)
-                due = self.answer(db.map("hostile"), asked)
+                due = shown(self.answer(db.map("hostile"), asked))
                 self.assertIn(due, (said, said.partition(", true at ")[0]), repr(text))
         self.controls_are_in_sight()
         self.assertEqual([], self.window.run(TRACES, ELEMENTS))
@@ -222,7 +232,7 @@ class Hostile(viewer_support.ViewerTest):
             quoted = urllib.parse.quote(text)
             self.go(f"{self.server}&map={quoted}")
             self.window.wait("document.body.dataset.state === 'error'")
-            self.assertIn(text[:100], self.text("banner"))
+            self.assertIn(shown(text[:100]), self.text("banner"))
             self.assertEqual([], self.window.run(TRACES, ELEMENTS))
             more = "&".join(f"{key}={quoted}" for key in ("sel", "hide", "q", "cam", "at", "rev",
                                                           "diff", "explode", "live"))

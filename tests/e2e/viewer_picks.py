@@ -15,7 +15,8 @@ AGENT_REACH, PLACE_REACH, EDGE_PX = 24, 8, 2
 PERSON_M, ROBOT_M = 1.7, 0.5
 # Half the width of a person or a robot: surely within it, surely beyond it, metres.
 INNER_M, OUTER_M = 0.08, 0.3
-STEP_SHARE, STEP_M_MIN = 0.16, 4
+# Between layers apart: a storey, and shares of the map's shorter and longer side.
+STOREY_M, SHORTER_SHARE, LONGER_SHARE = 3, 0.34, 0.12
 # Kind of an agent that is drawn as a ring, which a click need not choose.
 IN_GAP = "in a gap"
 LIFTS = {"agents": 0, "objects": 0, "places": 1, "rooms": 2, "buildings": 3}
@@ -65,8 +66,8 @@ class Scene:
         corners += [corner for thing in self.things if thing.layer in ("rooms", "buildings")
                     for corner in floor_corners(thing)]
         self.low, self.high = ([f(p[i] for p in corners) for i in range(3)] for f in (min, max))
-        size = max(self.high[i] - self.low[i] for i in range(2))
-        step = explode * max(STEP_M_MIN, size * STEP_SHARE)
+        shorter, longer = sorted(self.high[i] - self.low[i] for i in range(2))
+        step = explode * (STOREY_M + SHORTER_SHARE * shorter + LONGER_SHARE * longer)
         for thing in self.things:
             thing.position[2] += LIFTS[thing.layer] * step
 

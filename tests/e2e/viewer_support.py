@@ -96,7 +96,33 @@ class ViewerTest(support.ProgramsTest):
 
     def colors(self):
         """How many different colours the scene has: one of nothing but background has one."""
-        return self.window.run("""
+        return self.of_picture("""
+          const seen = new Set();
+          for (let i = 0; i < data.length; i += 4) {
+            seen.add(data[i] << 16 | data[i + 1] << 8 | data[i + 2]);
+          }
+          return seen.size;""")
+
+    def spots(self, color):
+        """How many squares of three by three pixels of the whole map have this colour, [r, g, b]: a
+        line of one pixel has none.
+        """
+        return self.of_picture("""
+          const is = (x, y) => [0, 1, 2].every(
+              (k) => data[4 * (y * width + x) + k] === argument[k]);
+          const near = [-1, 0, 1];
+          let count = 0;
+          for (let y = 1; y + 1 < height; ++y) {
+            for (let x = 1; x + 1 < width; ++x) {
+              count += is(x, y) && near.every((i) => near.every((k) => is(x + i, y + k)));
+            }
+          }
+          return count;""", color)
+
+    def of_picture(self, script, argument=None):
+        """What a script says of the pixels of the whole map, `data` of `width` and `height`."""
+        return self.window.run("const read = (data, width, height, argument) => {" + script + "};"
+                               """
           const of = document.getElementById('scene');
           const to = document.createElement('canvas');
           [to.width, to.height] = [of.width, of.height];
@@ -105,10 +131,6 @@ class ViewerTest(support.ProgramsTest):
           return new Promise((done) => requestAnimationFrame(() => {
             const context = to.getContext('2d');
             context.drawImage(of, 0, 0);
-            const data = context.getImageData(0, 0, to.width, to.height).data;
-            const seen = new Set();
-            for (let i = 0; i < data.length; i += 4) {
-              seen.add(data[i] << 16 | data[i + 1] << 8 | data[i + 2]);
-            }
-            done(seen.size);
-          }));""")
+            const {data, width, height} = context.getImageData(0, 0, to.width, to.height);
+            done(read(data, width, height, arguments[0]));
+          }));""", argument)

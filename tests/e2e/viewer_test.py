@@ -84,6 +84,78 @@ class Viewer(viewer_support.ViewerTest):
         self.window.wait("document.querySelectorAll('#layers input:checked').length <= 1")
         self.window.keys("6", "7")
 
+    def test_of_layers_apart_none_is_before_another(self):
+        self.open("&explode=1")
+        spans = self.window.run("""
+          return Promise.all([import('/state.js'), import('/camera.js'), import('/show.js')]).then(
+              ([{app}, {project}, {liftOf}]) => {
+            const {scene, show, camera} = app;
+            const matrix = camera.matrix(1.4);
+            return ['objects', 'places', 'rooms', 'building'].map((group) => {
+              const rows = scene.of(group).flatMap((node) => {
+                const points = node.outline.length ? node.outline.map(([x, y]) => [x, y, node.zMin])
+                                                   : [node.position];
+                return points.filter(Boolean).map(([x, y, z]) => project(
+                    matrix, [x, y, z + liftOf(scene, show, node)], 1400, 1000).y);
+              });
+              return [Math.min(...rows), Math.max(...rows)];
+            });
+          });""")
+        for (top, bottom), (_, above_bottom) in zip(spans, spans[1:]):
+            # Of a layer's height in the picture at most a tenth is behind the one above.
+            self.assertLess(above_bottom, top + 0.1 * (bottom - top), spans)
+        # The whole of it is to be seen, and in place again from where it was seen before.
+        self.assertTrue(all(0 < top and bottom < 1000 for top, bottom in spans), spans)
+        self.open()
+        angles = "return import('/state.js').then(({app}) => [app.camera.yaw, app.camera.pitch])"
+        before = self.window.run(angles)
+        self.window.keys("x")
+        self.assertLess(self.window.run(angles)[1], 0.5)
+        self.window.keys("x")
+        self.assertEqual(before, self.window.run(angles))
+
+    def test_paths_and_predictions_are_ribbons_and_the_legend_has_their_colours(self):
+        hidden = "&hide=mesh,structures,rooms,building,places,objects"
+        legend = lambda text: self.window.run("""
+            const row = [...document.querySelectorAll('#legend .row')].find(
+                (one) => one.textContent.includes(arguments[0]));
+            return getComputedStyle(row.querySelector('.mark')).color.match(/[0-9]+/g).map(Number);
+            """, text)
+        click = lambda text: self.window.run("""[...document.querySelectorAll('#inspector button')]
+            .find((one) => one.textContent === arguments[0]).click()""", text)
+        rooms = self.ask("ls", "--kind", "room", "--store", "store")["nodes"]
+        room = max(rooms, key=lambda one: one["bounding_box"]["max"]["y"])["id"]
+        self.open(f"{hidden}&sel={room}")
+        self.assertEqual(0, self.spots(legend("a path")))
+        click("path from the middle")
+        self.window.wait("document.getElementById('answer').textContent.includes('path of')")
+        self.assertGreater(self.spots(legend("a path")), 30)
+        somebody = next(node["id"] for node in self.ask("ls", "--layer", "agents", "--at", "+30s",
+                                                        "--store", "store")["nodes"]
+                        if node["kind"] == "human" and "map_T_node" in node)
+        self.open(f"&hide=mesh,structures,rooms,building,places&at={self.at_ns(30)}&q=chair")
+        self.assertGreater(self.spots(legend("found")), 30)
+        self.open(f"{hidden}&at={self.at_ns(30)}&sel={somebody}")
+        before = self.colors()
+        click("predict")
+        self.window.wait("document.getElementById('answer').textContent.includes('%')")
+        self.assertGreater(self.colors(), before)
+        wrong = self.window.run("""return import('/moving.js').then(({axesOf}) => {
+          const wrong = [];
+          const check = (covariance, ...due) => {
+            const lengths = axesOf(covariance).map((axis) => Math.hypot(...axis));
+            if (lengths.some((one, i) => !(Math.abs(one - due[i]) < 1e-9))) wrong.push(lengths);
+          };
+          check([4, 0, 0, 1, 0, 0], 4, 2);
+          check([1, 0, 0, 4, 0, 0], 4, 2);
+          check([2.5, 1.5, 9, 2.5, 9, 9], 4, 2);
+          const [[x, y]] = axesOf([2.5, 1.5, 0, 2.5, 0, 0]);
+          if (!(Math.abs(x - y) < 1e-9)) wrong.push([x, y]);
+          if (axesOf([0, 0, 0, 0, 0, 0]) !== null) wrong.push('an ellipse of nothing');
+          return wrong;
+        });""")
+        self.assertEqual([], wrong)
+
     def test_shows_the_mesh_of_a_sensor_log(self):
         self.ok("dsg-simulate", "sensors", "--out", "seen", "--world", "apartment", "--seconds",
                 "2", "--people", "1", "--seed", "2", "--rate", "5", "--keyframe-every", "1")
@@ -248,7 +320,7 @@ class Viewer(viewer_support.ViewerTest):
             self.window.wait("document.querySelectorAll('#table tr').length > 3")
             text = self.window.run("return document.getElementById('table').textContent")
             for name in payloads[:len(ids)]:
-                self.assertIn(name, text)
+                self.assertIn(name.replace("\u202e", "[U+202E]"), text)
             self.assertEqual([], self.window.messages())
             self.assertEqual("dsgdb", self.window.run("return document.title"))
 
