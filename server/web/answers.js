@@ -1,27 +1,39 @@
 // SPDX-License-Identifier: Apache-2.0
 // What somebody asks about the scene, and its answer on the page: a node, a search, a path, a
 // prediction, a comparison. An answer that comes too late is dropped.
+import {setPlaying} from './clock.js';
 import {debounced, element, link, make, setText} from './dom.js';
+import {fillHits, listenToHits, markHit} from './hits.js';
 import {fillInspector} from './panels.js';
+import {liftOf} from './show.js';
 import {app, ask, changed, listen, tell} from './state.js';
 import {textOf} from './time.js';
 import {explain, isSaid} from './trouble.js';
 
 /** How many revisions are offered to compare with. */
 const DIFFS_MAX = 50;
+/** How near somebody comes who flies to a thing that is not large, metres. */
+const NEAR_M = 8;
 
 const {show, camera} = app;
 /** Of the selected node. */
 let neighbors = [];
+/** The last answer about it. */
+let answer = [];
 
 /** Shows what is known of a node; an empty id ends that. */
 export async function select(id) {
   show.selected = id;
-  neighbors = [];
+  [neighbors, answer] = [[], []];
   inspect();
+  markHit(id);
   changed();
   if (!id) return;
   const asked = app.scene;
+  if (!asked.nodes.has(id)) {
+    await lookUp(id);
+    return;
+  }
   locate();
   try {
     const found = await ask().neighbors(id);
@@ -35,95 +47,152 @@ export async function select(id) {
   }
 }
 
+/** Selects the node that is meant by a name, or says what is wrong with an id that is not shown. */
+async function lookUp(word) {
+  const asked = app.scene;
+  try {
+    const id = await ask().idOf(word);
+    if (show.selected !== word || app.scene !== asked) return;
+    if (asked.nodes.has(id)) await select(id);
+    else sayAnswer('it is in the map, and not among the nodes that are drawn');
+  } catch (error) {
+    if (show.selected === word && app.scene === asked) sayAnswer(error);
+  }
+}
+
 function inspect() {
   fillInspector(app.scene, show, neighbors, actions);
+  putAnswer();
 }
 
 /** Says where the selected agent is at the time that is shown: its room, place and building. */
 const locate = debounced(async () => {
   const [asked, agent, time] = [app.scene, show.selected, show.time];
   if (asked?.nodes.get(agent)?.group !== 'agents') return;
-  let answer = ['no room is known'];
+  let known = ['no room is known'];
   try {
     const ids = await ask().where(agent, time);
     const links = ids.map((id) => link(asked.titleOf(id), () => select(id)));
-    if (ids.length) answer = links.flatMap((one, i) => (i ? [', ', one] : [one]));
+    if (ids.length) known = links.flatMap((one, i) => (i ? [', ', one] : [one]));
   } catch (error) {
     if (isSaid(error)) return;
-    answer = [error.message];
+    known = [error.message];
   }
   if (app.scene !== asked || show.selected !== agent || show.time !== time) return;
   // The inspector may have been filled anew meanwhile.
   const where = document.getElementById('where');
-  if (where) setText(where, ...answer);
+  if (where) setText(where, ...known);
 }, 150);
 
 /** An answer (a text, or texts and links), or why there is none, below the inspector's buttons. */
 function sayAnswer(what) {
   if (what instanceof Error && isSaid(what)) return;
-  const answer = document.getElementById('answer');
-  if (answer) setText(answer, ...(what instanceof Error ? [what.message] : [what].flat()));
+  answer = what instanceof Error ? [what.message] : [what].flat();
+  putAnswer();
 }
 
-/** An action that says why there is no answer to it. */
-const answering = (run) => () => run().catch(sayAnswer);
+function putAnswer() {
+  const into = document.getElementById('answer');
+  if (into && answer.length) setText(into, ...answer);
+}
+
+/**
+ * An action that asks about what is selected, and says what is answered or why nothing is.
+ * @param {function(): Promise} question
+ * @param {function(object)} words what is to be said of the reply
+ */
+const answering = (question, words) => async () => {
+  const [asked, id] = [app.scene, show.selected];
+  const isLate = () => app.scene !== asked || show.selected !== id;
+  try {
+    const reply = await question();
+    if (!isLate()) sayAnswer(words(reply));
+  } catch (error) {
+    if (!isLate()) sayAnswer(error);
+  }
+};
 
 const actions = {
   select,
-  path: answering(async () => {
-    const path = await ask().path(camera.target, show.selected, show.time);
+  path: answering(() => ask().path(camera.target, show.selected, show.time), (path) => {
     show.path = path.corners;
-    sayAnswer(`path of ${path.length.toFixed(1)} m from the middle of the picture, clearance ` +
-              `at least ${path.clearance.toFixed(2)} m`);
     tell('redraw', false);
+    return `path of ${path.length.toFixed(1)} m from the middle of the picture, clearance ` +
+           `at least ${path.clearance.toFixed(2)} m`;
   }),
-  history: answering(async () => {
-    const versions = await ask().versions(show.selected);
-    sayAnswer(['believed since ', ...versions.flatMap(({from, name, className}, i) => [
+  history: answering(() => ask().versions(show.selected), (versions) => [
+    'believed since ', ...versions.flatMap(({from, name, className}, i) => [
       i ? ', ' : '', link(`revision ${from}`, () => tell('open', app.map, from)),
       ` (${[name, className].filter(Boolean).join(', ') || 'without a name'})`,
-    ])]);
-  }),
+    ]),
+  ]),
   predict: answering(async () => {
-    show.predictions = await ask().predict(show.selected, show.time);
-    sayAnswer(show.predictions.map(
+    // What is predicted of a time is shown of no other one.
+    setPlaying(false);
+    const {time} = show;
+    const ways = await ask().predict(show.selected, time);
+    return show.time === time ? ways : [];
+  }, (ways) => {
+    show.predictions = ways;
+    tell('redraw', false);
+    return ways.map(
         ({probability, goal}) =>
             `${Math.round(probability * 100)} % ${goal ? `to ${app.scene.titleOf(goal)}` : 'on'}`)
-        .join('; '));
-    tell('redraw', false);
+        .join('; ');
   }),
 };
 
 /** Flies to what is selected. */
 export function goTo() {
-  const node = app.scene?.nodes.get(show.selected);
-  const place = node && (app.scene.placeOf(node, show.time) ?? node.position);
+  const {scene} = app;
+  const node = scene?.nodes.get(show.selected);
+  const place = node && (scene.placeOf(node, show.time) ?? node.position);
   if (!place) return;
-  camera.target = [...place];
-  camera.distance = Math.min(camera.distance, 8);
+  camera.target = [place[0], place[1], place[2] + liftOf(scene, show, node)];
+  const size = node.box ? Math.hypot(...node.box.max.map((v, i) => v - node.box.min[i])) : 0;
+  camera.distance = Math.min(camera.distance, Math.max(NEAR_M, 2 * size));
   changed(false);
 }
 
-/** Marks what a query finds at the time that is shown; an empty one ends that. */
+/** Selects a node, and flies to it. */
+function visit(id) {
+  select(id);
+  goTo();
+}
+
+/** Takes away what was found. */
+export function clearHits() {
+  show.hits.clear();
+  fillHits(app.scene, [], '', visit);
+  setText(element('found'), '');
+}
+
+/** Marks and lists what a query finds at the time that is shown; an empty one ends that. */
 export async function search(query) {
-  if (!app.scene) return;
+  const asked = app.scene;
+  if (!asked) return;
   app.query = query;
   element('query').value = query;
-  show.hits.clear();
   const found = element('found');
   setText(found, '');
+  show.hits.clear();
+  let [hits, count] = [[], ''];
   try {
     if (query) {
-      const {ids, hasMore} = await ask().search(query, show.time);
-      show.hits = new Set(ids);
-      setText(found, `${ids.length}${hasMore ? ' and more' : ''} found, ` +
-                     `true at ${textOf(show.time, app.scene.map)}`);
-      if (ids.length === 1) await select(ids[0]);
+      const reply = await ask().search(query, show.time);
+      if (app.scene !== asked || app.query !== query) return;
+      hits = reply.hits;
+      count = `${hits.length}${reply.hasMore ? ' and more' : ''} found`;
+      show.hits = new Set(hits.map(({id}) => id));
+      setText(found, `${count}, true at ${textOf(show.time, asked.map)}`);
     }
   } catch (error) {
-    if (isSaid(error)) return;
+    if (isSaid(error) || app.query !== query) return;
     setText(found, error.message);
   }
+  fillHits(asked, hits, count, visit);
+  if (hits.length === 1) await select(hits[0].id);
+  markHit(show.selected);
   changed();
 }
 
@@ -175,7 +244,14 @@ export function startAnswers() {
     search(element('query').value.trim());
   };
   element('diff').onchange = () => compare(Number(element('diff').value)).catch(explain);
-  listen('time', () => app.query && searchAgain());
+  listenToHits();
+  listen('time', () => {
+    if (show.predictions.length) {
+      show.predictions = [];
+      sayAnswer('');
+    }
+    if (app.query) searchAgain();
+  });
   listen('positions', () => {
     if (show.selected) inspect();
     if (app.scene.nodes.get(show.selected)?.group === 'agents') locate();

@@ -18,9 +18,8 @@ export function setTime(seconds) {
   const {scene} = app;
   const before = show.time;
   show.time = Math.min(Math.max(seconds, scene.begin), scene.end);
-  show.predictions = [];
-  changed(scene.changesBetween(before, show.time));
   tell('time');
+  changed(scene.changesBetween(before, show.time));
 }
 
 export function setPlaying(isPlaying) {

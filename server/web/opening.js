@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which map is shown at which revision: opening it, going to another revision, and following new
 // ones.
-import {compare, fillDiffs, search, select} from './answers.js';
+import {clearHits, compare, fillDiffs, search, select} from './answers.js';
 import {debounced, element, make, setText, shortened, visible} from './dom.js';
 import {follow, persistently} from './live.js';
 import {loadMesh, loadRevisions, loadScene, loadTags} from './load.js';
@@ -49,8 +49,8 @@ export async function open(map, revision, wanted = {}) {
   setState('loading');
   if (isOther) {
     [show.selected, app.query, app.diff] = ['', '', 0];
-    show.path = [];
-    show.predictions = [];
+    [show.path, show.predictions] = [[], []];
+    clearHits();
   }
   try {
     // Of another map each part is shown at once; of the same, the old picture stays until the new

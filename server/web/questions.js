@@ -109,12 +109,22 @@ export class Questions {
     }));
   }
 
-  /** Ids that a query finds, and whether there are more. */
+  /** The id of a node that an id or a name stands for. */
+  async idOf(word) {
+    const reply = await this.#ask('QueryService/GetNode', {id: word, view: 'NODE_VIEW_BASIC'});
+    return reply.node.id;
+  }
+
+  /** What a query finds, each with its ancestors, nearest first; and whether there is more. */
   async search(query, time) {
     const reply = await this.#ask('QueryService/SearchNodes', {
       query, at_ns: this.#ns(time), page_size: HITS_MAX,
     });
-    return {ids: reply.hits.map(({node}) => node.id), hasMore: reply.next_page_token !== ''};
+    const hits = reply.hits.map(({node, ancestor_ids: ancestors}) => ({
+      id: node.id, name: node.name, className: node.semantic_class?.name ?? '', layer: node.layer,
+      ancestors,
+    }));
+    return {hits, hasMore: reply.next_page_token !== ''};
   }
 
   /** What differs from another revision: id to "added", "removed", "changed"; removed nodes. */

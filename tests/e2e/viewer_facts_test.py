@@ -18,6 +18,7 @@ SEED = int(os.environ.get("DSG_SEED", "5"))
 PAIRS = 20
 PICKS = 100
 STORE = ("--store", "store")
+ARROW_DOWN, ENTER = "\ue015", "\ue007"
 # Layers that are shown, and their groups in the legend.
 GROUPS = {"agents": "agents", "objects": "objects", "places": "places", "rooms": "rooms",
           "buildings": "building"}
@@ -85,6 +86,58 @@ class Facts(viewer_support.ViewerTest):
             for axis, value in zip("xyz", where.split(",")):
                 self.assertAlmostEqual(place.get(axis, 0), float(value), delta=0.0051, msg=node)
         return people
+
+    def find(self, query, at):
+        """What `dsg find` says as the list of the viewer does: id, name and facts."""
+        hits = self.ask("find", query, "--at", support.at(at - self.epoch_ns), *STORE)["hits"]
+        rooms = {node["id"]: node["name"] for node in
+                 self.ask("ls", "--layer", "rooms", "--limit", 10_000, *STORE)["nodes"]}
+        listed = []
+        for hit in hits:
+            node = hit["node"]
+            room = next((rooms[id] for id in hit.get("ancestor_ids", ()) if id in rooms), None)
+            facts = (node.get("semantic_class", {}).get("name"), node["layer"], room)
+            listed.append([node["id"], node["name"], ", ".join(filter(None, facts))])
+        return listed
+
+    def listed(self):
+        return self.window.run("""return [...document.querySelectorAll('#hits li')].map(
+            (row) => [row.firstChild.dataset.id, row.firstChild.textContent,
+                      row.lastChild.textContent.trim()]);""")
+
+    def test_what_a_search_finds_is_listed_and_reached_by_keys(self):
+        at = self.at_ns(30)
+        self.open(f"&at={at}&q=chair")
+        due = self.find("chair", at)
+        self.assertGreater(len(due), 5)
+        self.assertTrue(any(facts.count(", ") == 2 for _, _, facts in due), due)
+        self.assertEqual(due, self.listed())
+        self.assertTrue(self.text("hits").startswith(f"{len(due)} found"), self.text("hits"))
+        self.window.keys("/", ARROW_DOWN, ARROW_DOWN, ENTER)
+        self.window.wait("document.querySelector('#hits [aria-current]')")
+        self.assertEqual([due[1][0]], self.window.run(
+            "return [...document.querySelectorAll('#hits [aria-current]')].map("
+            "(one) => one.dataset.id)"))
+        self.assertEqual(due[1][0], self.window.run(
+            "return document.querySelector('#inspector dd').textContent"))
+        # The camera has gone there.
+        place = {node["id"]: node for node in self.nodes(self.head)}[due[1][0]]["map_T_node"]
+        target = self.window.run(
+            "return import('/state.js').then(({app}) => app.camera.target)")
+        for axis, value in zip("xyz", target):
+            self.assertAlmostEqual(place["position"].get(axis, 0), value, delta=0.01)
+        # The same things are found at another time: the list that is made anew keeps the focus.
+        self.window.run("""
+            document.querySelector('#hits ul').dataset.old = '1';
+            document.activeElement.dispatchEvent(
+                new KeyboardEvent('keydown', {key: ',', bubbles: true}));""")
+        self.window.wait("document.querySelector('#hits ul:not([data-old])')")
+        self.assertEqual(due[1][0], self.window.run("return document.activeElement.dataset.id"))
+        human = self.find("human", at)
+        self.open(f"&at={at}&q=human")
+        self.assertEqual(human, self.listed())
+        self.window.keys(viewer_support.ESCAPE)
+        self.window.wait("document.getElementById('hits').hidden")
 
     def test_the_scale_is_that_of_the_middle_of_the_picture(self):
         camera = viewer_picks.Camera([20, 7, 0.5], 60, 0.4, 0.8)

@@ -227,6 +227,16 @@ class Hostile(viewer_support.ViewerTest):
         except dsgdb.Error as error:
             return error.message
 
+    def test_names_of_what_is_found_stay_text(self):
+        self.open(f"&at={SEARCHED_NS}&q=any")
+        names = self.window.run("""return Object.fromEntries(
+            [...document.querySelectorAll('#hits button')].map(
+                (one) => [one.dataset.id, one.textContent]));""")
+        for i, text in enumerate(PAYLOADS, 1):
+            self.assertEqual(shown(text), names.get(f"O{i}"), repr(text))
+        self.nothing_ran()
+        self.controls_are_in_sight()
+
     def test_an_address_is_no_markup_either(self):
         for text in PAYLOADS[::25]:
             quoted = urllib.parse.quote(text)
@@ -240,7 +250,7 @@ class Hostile(viewer_support.ViewerTest):
             self.window.wait(READY)
             self.assertEqual([], self.window.run(TRACES, ELEMENTS))
             self.controls_are_in_sight()
-        quiet = ("SearchNodes", "GetNeighbors", "GetMapStats")
+        quiet = ("SearchNodes", "GetNode", "GetMapStats")
         self.assertEqual([], [one for one in self.window.messages()
                               if not any(call in one for call in quiet)])
 

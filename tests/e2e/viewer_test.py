@@ -140,6 +140,9 @@ class Viewer(viewer_support.ViewerTest):
         click("predict")
         self.window.wait("document.getElementById('answer').textContent.includes('%')")
         self.assertGreater(self.colors(), before)
+        # Of another time nothing is predicted.
+        self.window.keys(",")
+        self.assertEqual("", self.text("answer"))
         wrong = self.window.run("""return import('/moving.js').then(({axesOf}) => {
           const wrong = [];
           const check = (covariance, ...due) => {

@@ -5,6 +5,7 @@
 import os
 import subprocess
 import unittest
+import urllib.parse
 
 import support
 import viewer_support
@@ -108,6 +109,17 @@ class Troubles(viewer_support.ViewerTest):
                 other.stdout.close()
             self.window.wait(READY)
             self.assertTrue(self.window.run("return document.getElementById('banner').hidden"))
+
+    def test_a_selection_that_is_not_in_the_map_is_said_to_be_so(self):
+        self.open("&sel=O999")
+        self.assertIn("no node of map \"office\"", self.text("inspector"))
+        self.assertIn("O999", self.text("inspector"))
+        # A name stands for the node that has it.
+        node = self.ask("ls", "--layer", "rooms", "--store", "store")["nodes"][0]
+        self.open("&sel=" + urllib.parse.quote(node["name"]))
+        self.assertEqual(node["id"], self.window.run(
+            "return document.querySelector('#inspector dd').textContent"))
+        self.window.wait(f"location.hash.includes('sel={node['id']}')")
 
     def test_a_time_outside_of_all_tracks_is_said_to_be_so(self):
         for seconds, shown in ((-100, "+0.0 s"), (100_000, "+9.9 s")):
