@@ -85,7 +85,11 @@ class Viewer(viewer_support.ViewerTest):
         self.window.keys("6", "7")
 
     def test_of_layers_apart_none_is_before_another(self):
-        self.open("&explode=1")
+        self.open()
+        angles = "return import('/state.js').then(({app}) => [app.camera.yaw, app.camera.pitch])"
+        before = self.window.run(angles)
+        self.window.keys("x")
+        self.assertLess(self.window.run(angles)[1], 0.5)
         spans = self.window.run("""
           return Promise.all([import('/state.js'), import('/camera.js'), import('/show.js')]).then(
               ([{app}, {project}, {liftOf}]) => {
@@ -106,16 +110,10 @@ class Viewer(viewer_support.ViewerTest):
             self.assertLess(above_bottom, top + 0.1 * (bottom - top), spans)
         # The whole of it is to be seen, and in place again from where it was seen before.
         self.assertTrue(all(0 < top and bottom < 1000 for top, bottom in spans), spans)
-        self.open()
-        angles = "return import('/state.js').then(({app}) => [app.camera.yaw, app.camera.pitch])"
-        before = self.window.run(angles)
-        self.window.keys("x")
-        self.assertLess(self.window.run(angles)[1], 0.5)
         self.window.keys("x")
         self.assertEqual(before, self.window.run(angles))
 
     def test_paths_and_predictions_are_ribbons_and_the_legend_has_their_colours(self):
-        hidden = "&hide=mesh,structures,rooms,building,places,objects"
         legend = lambda text: self.window.run("""
             const row = [...document.querySelectorAll('#legend .row')].find(
                 (one) => one.textContent.includes(arguments[0]));
@@ -125,7 +123,10 @@ class Viewer(viewer_support.ViewerTest):
             .find((one) => one.textContent === arguments[0]).click()""", text)
         rooms = self.ask("ls", "--kind", "room", "--store", "store")["nodes"]
         room = max(rooms, key=lambda one: one["bounding_box"]["max"]["y"])["id"]
-        self.open(f"{hidden}&sel={room}")
+        # Floors would tint what lies on them.
+        self.open(f"&hide=mesh,structures,rooms,building,places&at={self.at_ns(30)}&sel={room}"
+                  "&q=chair")
+        self.assertGreater(self.spots(legend("found")), 30)
         self.assertEqual(0, self.spots(legend("a path")))
         click("path from the middle")
         self.window.wait("document.getElementById('answer').textContent.includes('path of')")
@@ -133,9 +134,8 @@ class Viewer(viewer_support.ViewerTest):
         somebody = next(node["id"] for node in self.ask("ls", "--layer", "agents", "--at", "+30s",
                                                         "--store", "store")["nodes"]
                         if node["kind"] == "human" and "map_T_node" in node)
-        self.open(f"&hide=mesh,structures,rooms,building,places&at={self.at_ns(30)}&q=chair")
-        self.assertGreater(self.spots(legend("found")), 30)
-        self.open(f"{hidden}&at={self.at_ns(30)}&sel={somebody}")
+        self.window.run("return import('/answers.js').then(({select}) => select(arguments[0]))",
+                        somebody)
         before = self.colors()
         click("predict")
         self.window.wait("document.getElementById('answer').textContent.includes('%')")
