@@ -143,7 +143,7 @@ absl::Status InFlags(const absl::Status& status) {
   if (status.ok() || reason == Reason::kUnspecified) return status;
   const ErrorMetadata metadata = MetadataOf(status);
   std::string message(status.message());
-  if (reason == Reason::kTimeRangeInverted || metadata.contains("field")) {
+  if (metadata.contains("field")) {
     ReplaceFirst(&message);
     ReplaceAnywhere(&message);
   }

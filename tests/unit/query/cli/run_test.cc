@@ -245,7 +245,7 @@ TEST_F(RunTest, WhatIsAskedWronglyExitsWithTwo) {
   ExpectRefused(2, "--from +2s is not before --to +1s;",
                 {"track", "H12", "--from", "+2s", "--to", "+1s"});
   // The end that is not given is one of all poses.
-  ExpectRefused(2, "--from +1m is behind the last pose of the map, +20s",
+  ExpectRefused(2, "--from +60s is behind the last pose of the map, +20s",
                 {"who", "--room", "R1", "--from", "+1m"});
   ExpectRefused(2, "--to -3s is not behind the first pose of the map, +0s",
                 {"who", "--room", "R1", "--to=-3s"});
