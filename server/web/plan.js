@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The plan from above on a 2-D canvas, for browsers without WebGL2: the same scene and the same
 // times, without layers apart.
-import {BACKGROUND, SELECTED, colorOfAgent, cssOf} from './colors.js';
+import {BACKGROUND, colorOfAgent, cssOf, lookOf} from './colors.js';
 import {shortened, visible} from './dom.js';
 import {LETTERS_MAX} from './labels.js';
 import {GROUPS} from './scene.js';
@@ -51,7 +51,7 @@ export class Plan {
     if (group.name !== 'agents' && !scene.isValid(node, show.time)) return;
     const isMarked = node.id === show.selected || show.hits.has(node.id);
     const rgb = group.name === 'agents' ? colorOfAgent(node.id) : group.color;
-    context.strokeStyle = context.fillStyle = cssOf(isMarked ? SELECTED : rgb);
+    context.strokeStyle = context.fillStyle = cssOf(lookOf(show, node, rgb)[0]);
     if (node.outline.length >= 3) {
       context.beginPath();
       node.outline.forEach((point) => context.lineTo(...view.at(point)));
