@@ -93,19 +93,18 @@ class Channel:
             timeout_s = max(self.timeout_s, _STREAM_TIMEOUT_S)
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         for data in self._messages(path, "json", _dumped(request), deadline, silence_s, reads):
-            yield _parsed(data, path)
+            yield _parsed(bytes(data), path)
 
     def binary_stream(self, path: str, request: bytes) -> Generator[memoryview, None, None]:
         """The messages of a stream that reads and ends by itself, in protobuf's wire format."""
         deadline = time.monotonic() + max(self.timeout_s, _STREAM_TIMEOUT_S)
-        for data in self._messages(path, "proto", request, deadline, None, True):
-            yield memoryview(data)
+        return self._messages(path, "proto", request, deadline, None, True)
 
     def _messages(self, path: str, codec: str, data: bytes, deadline: Optional[float],
-                  silence_s: Optional[float], reads: bool) -> Generator[bytes, None, None]:
+                  silence_s: Optional[float], reads: bool) -> Generator[memoryview, None, None]:
         body = _ENVELOPE.pack(0, len(data)) + data
 
-        def begin() -> tuple[_Stream, Optional[bytes]]:
+        def begin() -> tuple[_Stream, Optional[memoryview]]:
             call = _Stream(self, path, codec, body, deadline, silence_s)
             return call, call.next()
 
@@ -200,6 +199,32 @@ class Channel:
             f"--store DIR --http {self.address.name.rpartition('//')[2]}")
 
 
+class _Memory:
+    """Memory for the messages of a stream. That of a message is used again as soon as nobody looks
+    at it, since new memory of a megabyte costs as much as reading that from the socket.
+    """
+
+    _KEPT_MAX = 4
+
+    def __init__(self) -> None:
+        self._kept: list[bytearray] = []
+
+    def take(self, size: int) -> memoryview:
+        for kept in self._kept:
+            try:
+                # Refused while a memoryview, or an array of numpy on one, is there.
+                kept.append(0)
+            except BufferError:
+                continue
+            if len(kept) < size:
+                kept.extend(bytes(size - len(kept)))
+            return memoryview(kept)[:size]
+        made = bytearray(size)
+        if len(self._kept) < self._KEPT_MAX:
+            self._kept.append(made)
+        return memoryview(made)
+
+
 class _Stream:
     """One stream from its request to its end."""
 
@@ -212,6 +237,7 @@ class _Stream:
         self._connection = channel.take(deadline)
         self._socket = self._connection.sock
         self._is_over = False
+        self._memory = _Memory()
         with channel.failures(path, self._connection):
             self._response = channel.post(self._connection, path, f"application/connect+{codec}",
                                           body, deadline)
@@ -223,7 +249,7 @@ class _Stream:
         if not self._is_over:
             self._connection.close()
 
-    def next(self) -> Optional[bytes]:
+    def next(self) -> Optional[memoryview]:
         """The next message, or None at the end. Raises the error that the stream ended with."""
         with self._channel.failures(self._path, self._connection):
             flags, data = self._envelope()
@@ -233,7 +259,7 @@ class _Stream:
             if not flags & _END:
                 return data
             # Its end is JSON in any codec.
-            end = _parsed(data, self._path)
+            end = _parsed(bytes(data), self._path)
             self._response.read()
         # From here on the connection may be another call's.
         self._is_over = True
@@ -243,7 +269,7 @@ class _Stream:
                 raise _error_from(end["error"])
         return None
 
-    def _envelope(self) -> tuple[int, bytes]:
+    def _envelope(self) -> tuple[int, memoryview]:
         left_s, silence_s = _left(self._deadline), self._silence_s
         is_silence = silence_s is not None and (left_s is None or silence_s < left_s)
         try:
@@ -257,10 +283,14 @@ class _Stream:
                 raise ConnectionError("no sign of life for too long") from None
             raise
 
-    def _exactly(self, size: int) -> bytes:
-        data = self._response.read(size)
-        if len(data) != size:
-            raise http.client.IncompleteRead(data, size - len(data))
+    def _exactly(self, size: int) -> memoryview:
+        data = self._memory.take(size)
+        count = 0
+        while count < size:
+            more = self._response.readinto(data[count:])
+            if not more:
+                raise http.client.IncompleteRead(bytes(data[:count]), size - count)
+            count += more
         return data
 
 
