@@ -89,8 +89,11 @@ TEST_F(Rpc, LocatesOneAgentAndMany) {
   grpc::ClientContext batch_context;
   v1::BatchLocateAgentsRequest batch;
   batch.set_map(kMap);
-  batch.add_instants()->set_agent("12");
-  batch.add_instants()->set_agent("99");
+  for (const char* agent : {"12", "99"}) {
+    v1::AgentInstant* instant = batch.add_instants();
+    instant->set_agent(agent);
+    instant->set_at_ns(0);
+  }
   v1::BatchLocateAgentsResponse results;
   ASSERT_TRUE(query_->BatchLocateAgents(&batch_context, batch, &results).ok());
   ASSERT_EQ(results.results_size(), 2);
