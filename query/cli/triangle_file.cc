@@ -169,12 +169,12 @@ absl::StatusOr<Header> ParseHeader(const std::string& bytes, const std::string& 
 }
 
 // One row of an element: scalars by property, and the last list.
-struct Row {
+struct PlyRow {
   std::vector<double> scalars;
   std::vector<double> list;
 };
 
-bool ReadRow(const Element& element, Values* values, Row* row) {
+bool ReadRow(const Element& element, Values* values, PlyRow* row) {
   constexpr double kListMax = 1000.0;
   row->scalars.clear();
   row->list.clear();
@@ -198,7 +198,7 @@ bool ReadRow(const Element& element, Values* values, Row* row) {
   return true;
 }
 
-absl::Status AddVertex(const Element& element, const Row& row, const std::string& name,
+absl::Status AddVertex(const Element& element, const PlyRow& row, const std::string& name,
                        Triangles* out) {
   Eigen::Vector3f vertex = Eigen::Vector3f::Constant(std::nanf(""));
   for (size_t i = 0; i < element.properties.size(); ++i) {
@@ -212,7 +212,7 @@ absl::Status AddVertex(const Element& element, const Row& row, const std::string
   return absl::OkStatus();
 }
 
-absl::Status AddFace(const Row& row, const std::string& name, Triangles* out) {
+absl::Status AddFace(const PlyRow& row, const std::string& name, Triangles* out) {
   const auto count = static_cast<double>(out->vertices.size());
   for (const double index : row.list) {
     if (!(index >= 0.0 && index < count)) return Malformed(name, "a face has an unknown vertex");
@@ -231,7 +231,7 @@ absl::StatusOr<Triangles> ParseTriangles(const std::string& bytes, const std::st
   DSG_ASSIGN_OR_RETURN(const Header header, ParseHeader(bytes, name));
   Triangles out;
   Values values(bytes, header);
-  Row row;
+  PlyRow row;
   for (const Element& element : header.elements) {
     for (int64_t i = 0; i < element.count; ++i) {
       if (!ReadRow(element, &values, &row)) {
