@@ -41,9 +41,9 @@ class PoseColumns {
     if (!with_orientations_) return;
     const bool is_known = (pose.flags & pose_flags::kNoOrientation) == 0;
     has_orientation_ = has_orientation_ || is_known;
-    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
     AddRow(is_known ? Eigen::Vector4d(pose.map_T_agent.orientation.coeffs())
-                    : Eigen::Vector4d::Constant(kNone),
+                    : Eigen::Vector4d::Constant(kUnknown),
            &orientations_);
   }
 
