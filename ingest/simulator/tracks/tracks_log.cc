@@ -216,7 +216,7 @@ std::string Readme(const TracksOptions& options) {
   return absl::StrFormat(
       "A generated log of tracked people and a robot, with its ground truth.\n"
       "Made by dsg-simulate tracks --world %s --seed %u --people %d --seconds %g --rate %g\n"
-      "  --noise-m %g --noise-yaw %g --jitter-s %g --gap-rate %g\n\n"
+      "  --noise-m %g --noise-yaw %g --jitter-s %g --gap-rate %g --picks %d\n\n"
       "log/map.json       the building as a scene graph: rooms, places, objects, structures\n"
       "log/tracks.csv     what the tracker saw; give the folder log/ to dsg-ingest\n"
       "truth/tracks.csv   the same instants without noise and without gaps\n"
@@ -237,7 +237,7 @@ std::string Readme(const TracksOptions& options) {
       std::string(Name(options.world.kind)), options.world.seed, options.crowd.people_count,
       options.crowd.duration_s, options.sensor.rate_hz, options.sensor.position_noise_m,
       options.sensor.yaw_noise_rad, options.sensor.clock_jitter_s, options.sensor.gap_rate_per_min,
-      options.sensor.gap_s_min, options.sensor.gap_s_max);
+      options.pick_count, options.sensor.gap_s_min, options.sensor.gap_s_max);
 }
 
 }  // namespace

@@ -3,7 +3,11 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any, Mapping, Optional
+
+# What a terminal obeys instead of showing it, and marks that turn the direction of writing.
+_UNSEEN = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]")
 
 
 class Error(Exception):
@@ -25,7 +29,8 @@ class Error(Exception):
         self.metadata = dict(metadata or {})
 
     def __str__(self) -> str:
-        return f"{self.message} [{self.reason}]" if self.reason else self.message
+        text = f"{self.message} [{self.reason}]" if self.reason else self.message
+        return _UNSEEN.sub(lambda mark: f"\\u{ord(mark.group()):04x}", text)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.message, self.reason, self.metadata)

@@ -11,6 +11,7 @@ the server too; it holds the pipe as well, so that of a killed process it keeps 
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import socket
 import subprocess
@@ -51,8 +52,11 @@ class PrivateServer:
         FailedPrecondition if the server does not start.
         """
         if not os.path.isdir(store):
-            raise NotFound(f"there is no store folder {store}; dsg-ingest and dsg-server make one",
-                           metadata={"store": store})
+            place = os.path.basename(store)
+            hint = (f"; if that is a server, write http://{place}"
+                    if re.fullmatch(r".+:\d+", place) else "")
+            raise NotFound(f"there is no store folder {store}; dsg-ingest and dsg-server make one"
+                           f"{hint}", metadata={"store": store})
         program = find_program()
         self.folder = tempfile.mkdtemp(prefix="dsgdb-")
         self.store = store
