@@ -193,6 +193,17 @@ absl::Status Grammar::Parse(std::vector<std::string> arguments) {
     }
     return Usage(error.what(), is_verb ? first : "");
   }
+  return is_verb ? CheckNothingIsEmpty(first) : absl::OkStatus();
+}
+
+absl::Status Grammar::CheckNothingIsEmpty(const std::string& verb) const {
+  for (const CLI::Option* option : app_.get_subcommand(verb)->get_options()) {
+    if (option->count() == 0 || may_be_empty_.contains(option)) continue;
+    const std::vector<std::string>& values = option->results();
+    if (std::find(values.begin(), values.end(), "") == values.end()) continue;
+    return Usage(absl::StrCat(option->get_name(), " is empty; give a value, or leave it out"),
+                 verb);
+  }
   return absl::OkStatus();
 }
 

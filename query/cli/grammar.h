@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -89,6 +90,9 @@ class Grammar {
   /// The heading of the help under which the verbs stand that are added from now on.
   void set_heading(std::string heading) { heading_ = std::move(heading); }
 
+  /// Of other options and arguments an empty text is refused.
+  void AllowEmpty(const CLI::Option* option) { may_be_empty_.insert(option); }
+
   CommonOptions* common() { return &command_.common; }
 
   absl::Status Parse(std::vector<std::string> arguments);
@@ -100,8 +104,13 @@ class Grammar {
   CLI::App* AddApp(const std::string& name, const std::string& what, const std::string& example,
                    const std::string& footer, unsigned takes);
 
+  // Something that is there and empty comes from an unset variable of a script. It must not count
+  // as left out: another store would be taken, or the whole list.
+  absl::Status CheckNothingIsEmpty(const std::string& verb) const;
+
   CLI::App app_{"Asks a store of dynamic scene graphs, or a server."};
   std::string heading_;
+  std::set<const CLI::Option*> may_be_empty_;
   Command command_;
 };
 

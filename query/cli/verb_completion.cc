@@ -127,7 +127,8 @@ void AddCompletionVerb(Grammar* grammar) {
   app->add_option("SHELL", verb->shell, "bash, zsh or fish; or words")
       ->required()
       ->check(CLI::IsMember({"bash", "zsh", "fish", "words"}));
-  app->add_option("WORD", verb->words, "With words: the command line so far, without dsg");
+  grammar->AllowEmpty(
+      app->add_option("WORD", verb->words, "With words: the command line so far, without dsg"));
 }
 
 }  // namespace dsg::cli

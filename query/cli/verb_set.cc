@@ -197,11 +197,11 @@ void AddSetVerb(Grammar* grammar) {
   SetVerb* const verb = added;
   app->add_option("ID", verb->id, kNodeHelp)->required();
   // An option of an optional text would take "" for none.
-  app->add_option_function<std::string>(
-      "--name", [verb](const std::string& name) { verb->name = name; }, "The name; \"\" = none");
-  app->add_option_function<std::string>(
+  grammar->AllowEmpty(app->add_option_function<std::string>(
+      "--name", [verb](const std::string& name) { verb->name = name; }, "The name; \"\" = none"));
+  grammar->AllowEmpty(app->add_option_function<std::string>(
       "--class", [verb](const std::string& name) { verb->class_name = name; },
-      "The class, as other nodes have it or a new one");
+      "The class, as other nodes have it or a new one; \"\" = none"));
 }
 
 }  // namespace dsg::cli

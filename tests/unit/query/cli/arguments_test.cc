@@ -115,6 +115,24 @@ TEST(Arguments, ImportAndVerifyNeedAStore) {
   EXPECT_EQ(ParseCommon({"import", "f.json", "--map", "m"}, {.store = "s"}).map, "m");
 }
 
+// As an unset variable of a script gives it.
+TEST(Arguments, RefusesWhatIsThereAndEmpty) {
+  const std::vector<std::vector<std::string>> lines = {
+      {"drop", "office", "--yes", "--store", ""},
+      {"stats", "--server", ""},
+      {"stats", "--map", ""},
+      {"tag", "", "--revision", "3"},
+      {"path", "carol", "kitchen", "--at", ""},
+      {"ls", "--class", ""},
+      {"where", "", "--at", "+1s"},
+  };
+  for (const std::vector<std::string>& line : lines) {
+    EXPECT_NE(Refusal(line).find("is empty"), std::string::npos) << line[0];
+  }
+  // Here it says something.
+  EXPECT_TRUE(ParseArguments({"set", "O9", "--name", "", "--store", "s"}, {}).ok());
+}
+
 TEST(Arguments, RefusesWhatItDoesNotKnow) {
   Refusal({});
   EXPECT_NE(Refusal({"fly"}).find("no verb \"fly\""), std::string::npos);
