@@ -27,6 +27,7 @@ export function setPlaying(isPlaying) {
   element('play').setAttribute('aria-pressed', String(isPlaying));
   if (isPlaying && app.scene && show.time >= app.scene.end - 0.01) setTime(app.scene.begin);
   lastFrame = 0;
+  if (!isPlaying) settleTime();
 }
 
 /** Lets time run; `now` is when a picture is made, milliseconds. */
@@ -41,7 +42,7 @@ export function advance(now) {
 /** Asks the server where everybody is at the time that is shown; tracks are samples of that. */
 const settleTime = debounced(async () => {
   const {scene} = app;
-  if (!scene) return;
+  if (!scene || app.isPlaying) return;
   const {time} = show;
   const agents = scene.of('agents').map((node) => node.id);
   if (!agents.length || scene.exact.time === time) return;
