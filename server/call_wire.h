@@ -45,7 +45,7 @@ class CallWire {
   /// Frees the bytes of the request, and those that Pack made.
   virtual void Drop() = 0;
 
-  /// Sends what Pack made; ServedCall::OnSent follows.
+  /// Sends what Pack made; ServedCall::OnSent follows when the next message may.
   virtual void Send() = 0;
   /// Sends what Pack made, and ends the call with `status`.
   virtual void SendLast(const absl::Status& status) = 0;

@@ -56,7 +56,7 @@ class ServedCall : public Job {
   void Refuse(const absl::Status& status);
   /// The caller has left. Safe from any thread while the call exists.
   void Cancel();
-  /// The message of a stream has left, or, if not `ok`, never will.
+  /// The next message of a stream may follow, or, if not `ok`, no message can.
   virtual void OnSent(bool ok) = 0;
 
   void Run() final;

@@ -18,8 +18,8 @@ template <typename Request, typename Reply>
 using OpenStream = query::CursorOr<Reply> (query::Api::*)(const query::CallContext&,
                                                           const Request&);
 
-// Run, the delay queue and OnSent alternate, so that at most one message is in flight and
-// Finish is called once.
+// Run, the delay queue and OnSent alternate, so that one message is made at a time, and Finish is
+// called once.
 template <typename Request, typename Reply>
 class StreamCall final : public ServedCall {
  public:

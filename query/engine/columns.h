@@ -6,8 +6,9 @@
 #include <bit>
 #include <cstring>
 #include <string>
+#include <string_view>
 #include <type_traits>
-#include <utility>
+#include <vector>
 
 namespace dsg::query {
 
@@ -27,6 +28,13 @@ void AppendRow(const Eigen::DenseBase<Derived>& values, std::string* column) {
                  sizeof(T) * static_cast<size_t>(row.size()));
 }
 
+/// The bytes of numbers in memory, as a column has them.
+template <typename T>
+std::string_view BytesOf(const std::vector<T>& values) {
+  static_assert(std::is_trivially_copyable_v<T> && std::endian::native == std::endian::little);
+  return {reinterpret_cast<const char*>(values.data()), sizeof(T) * values.size()};
+}
+
 /// A column that is left out while all of its values are the same as `usual`.
 ///
 /// `T` is a number, or some of them in an array without padding.
@@ -37,16 +45,21 @@ class RareColumn {
 
   void Add(const T& value) {
     if (std::memcmp(&value, &usual_, sizeof(T)) != 0) is_rare_ = true;
-    bytes_.append(reinterpret_cast<const char*>(&value), sizeof(T));
+    values_.push_back(value);
   }
-  size_t size_bytes() const { return bytes_.size(); }
-  /// Empty if all values were usual.
-  std::string Take() { return is_rare_ ? std::move(bytes_) : std::string(); }
+  size_t size_bytes() const { return sizeof(T) * values_.size(); }
+  /// Empty if all values were usual. Empties the column, and keeps its memory.
+  std::string Take() {
+    std::string bytes(is_rare_ ? BytesOf(values_) : std::string_view());
+    values_.clear();
+    is_rare_ = false;
+    return bytes;
+  }
 
  private:
   T usual_;
   bool is_rare_ = false;
-  std::string bytes_;
+  std::vector<T> values_;
 };
 
 }  // namespace dsg::query

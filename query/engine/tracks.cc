@@ -29,67 +29,72 @@ constexpr int kBinCountMax = 2000;
 class PoseColumns {
  public:
   PoseColumns(bool is_single, bool with_orientations)
-      : is_single_(is_single), with_orientations_(with_orientations) {}
+      : value_bytes_(is_single ? sizeof(float) : sizeof(double)),
+        with_orientations_(with_orientations) {}
 
   void Add(const TimedPose& pose, bool is_after_gap) {
-    if (row_count_ == 0 && is_single_) origin_map_ = pose.map_T_agent.position.array().round();
-    if (is_after_gap) Append(static_cast<uint32_t>(row_count_), &gaps_);
-    ++row_count_;
-    Append(pose.time_ns, &times_);
+    if (is_after_gap) gaps_.push_back(static_cast<uint32_t>(times_.size()));
+    times_.push_back(pose.time_ns);
     flags_.Add(static_cast<uint8_t>(pose.flags));
-    AddRow(pose.map_T_agent.position - origin_map_, &positions_);
+    for (const double value : pose.map_T_agent.position) positions_.push_back(value);
     if (!with_orientations_) return;
     const bool is_known = (pose.flags & pose_flags::kNoOrientation) == 0;
     has_orientation_ = has_orientation_ || is_known;
     constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-    AddRow(is_known ? Eigen::Vector4d(pose.map_T_agent.orientation.coeffs())
-                    : Eigen::Vector4d::Constant(kUnknown),
-           &orientations_);
-  }
-
-  bool empty() const { return row_count_ == 0; }
-  size_t size_bytes() const { return times_.size() + positions_.size() + orientations_.size(); }
-
-  // Copies, so that the columns keep their memory for the next message, and empties them.
-  void Send(v1::TrackPoses* out) {
-    out->set_row_count(row_count_);
-    out->set_value_bytes(is_single_ ? sizeof(float) : sizeof(double));
-    ToProto(origin_map_, out->mutable_origin_map());
-    out->set_times_ns(times_);
-    out->set_positions(positions_);
-    if (has_orientation_) out->set_orientations(orientations_);
-    out->set_gaps(gaps_);
-    out->set_flags(flags_.Take());
-    Clear();
-  }
-
- private:
-  void Clear() {
-    row_count_ = 0;
-    has_orientation_ = false;
-    origin_map_.setZero();
-    for (std::string* column : {&times_, &positions_, &orientations_, &gaps_}) column->clear();
-    flags_ = RareColumn<uint8_t>(0);
-  }
-
-  template <typename Row>
-  void AddRow(const Row& values, std::string* column) const {
-    if (is_single_) {
-      AppendRow<float>(values, column);
-    } else {
-      AppendRow<double>(values, column);
+    for (const double value : pose.map_T_agent.orientation.coeffs()) {
+      orientations_.push_back(is_known ? value : kUnknown);
     }
   }
 
-  const bool is_single_;
+  bool empty() const { return times_.empty(); }
+  size_t size_bytes() const {
+    return times_.size() * sizeof(TimeNs) +
+           (positions_.size() + orientations_.size()) * value_bytes_;
+  }
+
+  // Empties the columns, and keeps their memory for the next message.
+  void Send(v1::TrackPoses* out) {
+    out->set_row_count(static_cast<int32_t>(times_.size()));
+    out->set_value_bytes(static_cast<int32_t>(value_bytes_));
+    out->mutable_times_ns()->assign(BytesOf(times_));
+    out->mutable_gaps()->assign(BytesOf(gaps_));
+    out->set_flags(flags_.Take());
+    if (!has_orientation_) orientations_.clear();
+    if (value_bytes_ == sizeof(float)) {
+      SendSingle(out);
+    } else {
+      ToProto(Eigen::Vector3d::Zero(), out->mutable_origin_map());
+      out->mutable_positions()->assign(BytesOf(positions_));
+      out->mutable_orientations()->assign(BytesOf(orientations_));
+    }
+    times_.clear();
+    positions_.clear();
+    orientations_.clear();
+    gaps_.clear();
+    has_orientation_ = false;
+  }
+
+ private:
+  void SendSingle(v1::TrackPoses* out) const {
+    const Eigen::Vector3d origin_map = Eigen::Vector3d(positions_.data()).array().round();
+    ToProto(origin_map, out->mutable_origin_map());
+    std::vector<float> values(positions_.size());
+    for (size_t i = 0; i < values.size(); ++i) {
+      values[i] = static_cast<float>(positions_[i] - origin_map[static_cast<int>(i % 3)]);
+    }
+    out->mutable_positions()->assign(BytesOf(values));
+    values.assign(orientations_.begin(), orientations_.end());
+    out->mutable_orientations()->assign(BytesOf(values));
+  }
+
+  const size_t value_bytes_;
   const bool with_orientations_;
   bool has_orientation_ = false;
-  int row_count_ = 0;
-  Eigen::Vector3d origin_map_ = Eigen::Vector3d::Zero();
-  std::string times_;
-  std::string positions_;
-  std::string orientations_;
-  std::string gaps_;
+  std::vector<TimeNs> times_;
+  // 3 numbers a row, and 4.
+  std::vector<double> positions_;
+  std::vector<double> orientations_;
+  std::vector<uint32_t> gaps_;
   RareColumn<uint8_t> flags_{0};
 };
 

@@ -102,6 +102,8 @@ class SegmentReader {
   bool DecodePositions(TimeNs from_ns, TimeNs to_ns, std::vector<TimedPosition>* positions) const;
   /// All poses, oldest first. False on bad structure.
   bool DecodeAll(std::vector<StoredPose>* poses) const;
+  /// The same as FromStored makes them, in less time.
+  bool DecodePoses(std::vector<TimedPose>* poses) const;
 
  private:
   struct Block;
@@ -113,6 +115,9 @@ class SegmentReader {
   bool DecodeLossless();
   bool DecodeCovariances();
   void AttachCovariance(int index, StoredPose* pose) const;
+  // Of all poses; false if there are not as many as the header says.
+  template <typename Pose>
+  bool AttachCovariances(std::vector<Pose>* poses) const;
 
   std::string bytes_;
   TrajectoryCodec codec_ = TrajectoryCodec::kQuantized;

@@ -26,8 +26,9 @@ class Outlet {
  public:
   virtual ~Outlet() = default;
 
-  /// Sends bytes. After the last ones the call is deleted; after others its ServedCall::OnSent is
-  /// called.
+  /// Sends bytes. When the last ones have left, the call is deleted; of others its
+  /// ServedCall::OnSent is called when the next may follow: while they leave, since a stream is
+  /// quicker when its next message is made meanwhile.
   virtual void Write(AnswerBytes bytes, bool is_last) = 0;
   /// Ends the call of that number, if it has not ended.
   virtual void End(uint64_t number) = 0;

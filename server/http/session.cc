@@ -76,7 +76,7 @@ void Session::Stop() {
 void Session::EndAnswer() {
   if (phase_ != Phase::kAnswer) return;
   // What is half sent cannot be taken back, and nobody reads it.
-  if (sending_.has_value() || call_ == nullptr) {
+  if (waiting_.has_value() || call_ == nullptr) {
     Close();
   } else {
     call_->served()->Cancel();
@@ -89,7 +89,7 @@ void Session::Close() {
   arrival_ = nullptr;
   error_code ignored;
   socket_.close(ignored);
-  // A call ends by itself, and OnSent then removes this.
+  // A call ends by itself, and FinishAnswer then removes this.
   if (call_ != nullptr) {
     call_->served()->Cancel();
   } else {
@@ -326,25 +326,49 @@ void Session::RefuseUnparsed(const error_code& error) {
 // Answering
 
 void Session::SendBytes(AnswerBytes bytes, bool is_last) {
-  if (phase_ == Phase::kClosed) return OnSent(/*ok=*/false, is_last);
-  sending_ = std::move(bytes);
+  if (phase_ == Phase::kClosed) return DropPart(is_last);
   // Whoever streams has a guard; see StreamCall.
   if (is_last) due_ = Clock::now() + runtime_->stall_max;
-  const std::array<asio::const_buffer, 3> parts{
-      asio::buffer(sending_->head), asio::buffer(sending_->message), asio::buffer(sending_->tail)};
-  asio::async_write(socket_, parts,
-                    [self = shared_from_this(), is_last](error_code error, size_t /*count*/) {
-                      self->OnSent(!error, is_last);
-                    });
+  Part part{std::move(bytes), is_last};
+  if (sending_.has_value()) {
+    waiting_ = std::move(part);
+  } else {
+    SendPart(std::move(part));
+  }
 }
 
-void Session::OnSent(bool ok, bool is_last) {
+void Session::SendPart(Part part) {
+  sending_ = std::move(part);
+  const AnswerBytes& bytes = sending_->bytes;
+  const std::array<asio::const_buffer, 3> buffers{
+      asio::buffer(bytes.head), asio::buffer(bytes.message), asio::buffer(bytes.tail)};
+  asio::async_write(
+      socket_, buffers,
+      [self = shared_from_this()](error_code error, size_t /*count*/) { self->OnSent(!error); });
+  // The next part is made while this one leaves.
+  if (!sending_->is_last) call_->served()->OnSent(/*ok=*/true);
+}
+
+void Session::OnSent(bool ok) {
+  const bool was_last = sending_->is_last;
   sending_.reset();
   if (!ok) Close();
+  if (was_last) return FinishAnswer();
+  if (!waiting_.has_value()) return;
+  Part next = std::move(*waiting_);
+  waiting_.reset();
+  if (phase_ == Phase::kClosed) {
+    DropPart(next.is_last);
+  } else {
+    SendPart(std::move(next));
+  }
+}
+
+void Session::DropPart(bool is_last) {
   if (is_last) {
     FinishAnswer();
   } else {
-    call_->served()->OnSent(ok);
+    call_->served()->OnSent(/*ok=*/false);
   }
 }
 

@@ -76,6 +76,10 @@ class Session final : public Outlet, public std::enable_shared_from_this<Session
     kClosed,
   };
   using Parser = boost::beast::http::request_parser<boost::beast::http::string_body>;
+  struct Part {
+    AnswerBytes bytes;
+    bool is_last = false;
+  };
 
   void NextRequest();
   void ReadMore();
@@ -93,8 +97,12 @@ class Session final : public Outlet, public std::enable_shared_from_this<Session
   void Refuse(const Refusal& refusal);
   void RefuseUnparsed(const boost::system::error_code& error);
 
+  // Sends a part of the answer as soon as the one before has left.
   void SendBytes(AnswerBytes bytes, bool is_last);
-  void OnSent(bool ok, bool is_last);
+  void SendPart(Part part);
+  void OnSent(bool ok);
+  // A part that is not sent, since the connection is closed.
+  void DropPart(bool is_last);
   void FinishAnswer();
   void Linger();
   void Remove();
@@ -124,8 +132,9 @@ class Session final : public Outlet, public std::enable_shared_from_this<Session
   // Answering.
   uint64_t call_number_ = 0;
   std::unique_ptr<HttpCall> call_;
-  // Until it has left.
-  std::optional<AnswerBytes> sending_;
+  // The part that is leaving, and the next one, of which there is none while it is still made.
+  std::optional<Part> sending_;
+  std::optional<Part> waiting_;
 };
 
 }  // namespace dsg::server

@@ -120,31 +120,23 @@ absl::StatusOr<LocatedPose> SqliteSnapshot::Locate(NodeId agent, TimeNs at_ns) c
   return LocateBetween(before, after, at_ns, info.gap_ns_max, spec().codec);
 }
 
-absl::StatusOr<std::vector<StoredPose>> SqliteSnapshot::VisiblePoses(const Track& track,
-                                                                     size_t segment) const {
-  const SegmentRef& ref = track.segments[segment];
-  DSG_ASSIGN_OR_RETURN(const auto reader, reader_->GetSegment(ref, revision()));
-  std::vector<StoredPose> poses;
-  if (!reader->DecodeAll(&poses)) return CorruptSegment(spec().name, ref);
-  // Poses appended after this revision stand at the end.
-  while (!poses.empty() && poses.back().time_ns > ref.t1) poses.pop_back();
-  return poses;
-}
-
 absl::Status SqliteSnapshot::ReadPoses(NodeId agent, TimeNs from_ns, TimeNs to_ns,
                                        const StopCheck& stop,
                                        const std::function<bool(const TimedPose&)>& visit) const {
   DSG_ASSIGN_OR_RETURN(const auto track, reader_->GetTrack(agent, revision()));
   const int first = std::max(track->FindSegment(from_ns), 0);
+  std::vector<TimedPose> poses;
   for (auto i = static_cast<size_t>(first); i < track->segments.size(); ++i) {
-    if (track->segments[i].t0 >= to_ns) break;
+    const SegmentRef& segment = track->segments[i];
+    if (segment.t0 >= to_ns) break;
     DSG_RETURN_IF_ERROR(AskStop(stop));
-    DSG_ASSIGN_OR_RETURN(const auto poses, VisiblePoses(*track, i));
-    for (const StoredPose& pose : poses) {
+    DSG_ASSIGN_OR_RETURN(const auto reader, reader_->GetSegment(segment, revision()));
+    if (!reader->DecodePoses(&poses)) return CorruptSegment(spec().name, segment);
+    for (const TimedPose& pose : poses) {
+      // Poses appended after this revision stand at the end.
+      if (pose.time_ns > segment.t1) break;
       if (pose.time_ns < from_ns) continue;
-      if (pose.time_ns >= to_ns || !visit(FromStored(pose, spec().codec))) {
-        return absl::OkStatus();
-      }
+      if (pose.time_ns >= to_ns || !visit(pose)) return absl::OkStatus();
     }
   }
   return absl::OkStatus();

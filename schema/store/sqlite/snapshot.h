@@ -91,8 +91,6 @@ class SqliteSnapshot : public Snapshot {
   /// Positions around [from_ns, to_ns] of a segment and, joined to it, of the pose before it.
   absl::Status PositionsAround(const Track& track, size_t segment, TimeNs from_ns, TimeNs to_ns,
                                std::vector<TimedPosition>* positions) const;
-  /// Poses of a segment that this revision may see.
-  absl::StatusOr<std::vector<StoredPose>> VisiblePoses(const Track& track, size_t segment) const;
 
   std::shared_ptr<SqliteMapReader> reader_;
   std::shared_ptr<const RevisionRecord> head_;

@@ -189,6 +189,30 @@ TEST(TrajectoryCodec, KeepsCovariancesWhereTheyAreGiven) {
   }
 }
 
+TEST(TrajectoryCodec, PosesAtOnceAreThoseOneByOneToTheBit) {
+  auto walk = Walk(30, 400);
+  walk[7].covariance = std::make_shared<Covariance6>();
+  for (const auto codec : {TrajectoryCodec::kQuantized, TrajectoryCodec::kLossless}) {
+    for (const std::string& bytes : Encode(walk, codec)) {
+      const auto reader = SegmentReader::Parse(bytes);
+      std::vector<StoredPose> stored;
+      // What was there goes.
+      std::vector<TimedPose> poses(3);
+      ASSERT_TRUE(reader->DecodeAll(&stored));
+      ASSERT_TRUE(reader->DecodePoses(&poses));
+      ASSERT_EQ(poses.size(), stored.size());
+      for (size_t i = 0; i < poses.size(); ++i) {
+        const TimedPose one = FromStored(stored[i], codec);
+        EXPECT_EQ(poses[i].time_ns, one.time_ns);
+        EXPECT_EQ(poses[i].flags, one.flags);
+        EXPECT_EQ(poses[i].map_T_agent.position, one.map_T_agent.position);
+        EXPECT_EQ(poses[i].map_T_agent.orientation.coeffs(), one.map_T_agent.orientation.coeffs());
+        EXPECT_EQ(poses[i].covariance, one.covariance);
+      }
+    }
+  }
+}
+
 TEST(TrajectoryCodec, IdentityDoesNotCareAboutTheSignOfAQuaternion) {
   TimedPose pose = Walk(27, 1).front();
   std::string scratch_a;
@@ -219,6 +243,8 @@ TEST(TrajectoryCodec, DamagedSegmentsNeverCrash) {
       StoredPose after;
       // Structure may be found bad or not; the store's checksum finds bad numbers.
       const bool decoded = reader->DecodeAll(&all);
+      std::vector<TimedPose> poses;
+      EXPECT_EQ(reader->DecodePoses(&poses), decoded);
       const bool found =
           reader->FindBracket(reader->first_ns() + 5 * kNsPerSecond, &index, &before, &after);
       EXPECT_TRUE(!decoded || all.size() == static_cast<size_t>(reader->count()));
