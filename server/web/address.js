@@ -34,14 +34,22 @@ function revisionOf(text) {
   return Number.isSafeInteger(value) && value > 0 ? value : null;
 }
 
-/** What the address asks for; what it does not say is undefined. */
+/** World time, nanoseconds; undefined if it is none. */
+function timeOf(text) {
+  return /^-?\d{1,19}$/.test(text ?? '') ? BigInt(text) : undefined;
+}
+
+/** What the address asks for; what it does not say, or not so that it can be shown, is undefined. */
 export function readAddress() {
   const given = new URLSearchParams(location.hash.slice(1));
-  const at = given.get('at');
+  const readers = {rev: revisionOf, at: timeOf, cam: cameraOf, diff: revisionOf};
   return {
+    /** What is there and cannot be shown. */
+    refused: Object.keys(readers).filter(
+        (name) => given.get(name) && (readers[name](given.get(name)) ?? null) === null),
     map: given.get('map') ?? '',
     revision: revisionOf(given.get('rev')),
-    atNs: at !== null && /^-?\d{1,19}$/.test(at) ? BigInt(at) : undefined,
+    atNs: timeOf(given.get('at')),
     camera: cameraOf(given.get('cam')),
     selected: given.get('sel') ?? '',
     hidden: given.get('hide')?.split(',').filter(Boolean),

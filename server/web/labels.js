@@ -14,7 +14,7 @@ const FONT_PX = 12;
 const NEAR_M = 18;
 
 /** Middle of an outline. */
-function middleOf(outline, z) {
+export function middleOf(outline, z) {
   const sum = outline.reduce(([x, y], point) => [x + point[0], y + point[1]], [0, 0]);
   return [sum[0] / outline.length, sum[1] / outline.length, z];
 }

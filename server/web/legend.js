@@ -6,7 +6,7 @@ import {colorOfGroup} from './scene.js';
 
 /** Shape of the mark (a class of style.css), colour, meaning. */
 const MEANINGS = [
-  ['dot', colorOfGroup('agents'), 'somebody, each in a colour'],
+  ['dot', colorOfGroup('agents'), 'somebody; ten colours, which repeat'],
   ['ring', colorOfGroup('agents'), 'in a gap: where they were last'],
   ['band', colorOfGroup('agents'), 'their way; older is thinner'],
   ['box', colorOfGroup('objects'), 'the box of an object'],
@@ -18,7 +18,7 @@ const MEANINGS = [
   ['band', PATH, 'a path'],
   ['band', PREDICTION, 'where they may go; likelier is wider'],
   // Two standard deviations in the plane.
-  ['ring', PREDICTION, 'there they are then with 86 %'],
+  ['ring', PREDICTION, 'where they are then: inside with 86 %'],
   ['box', DIFF_COLORS.added, 'added'],
   ['box', DIFF_COLORS.changed, 'changed'],
   ['box', DIFF_COLORS.same, 'the same'],

@@ -14,7 +14,7 @@ import {pick} from './pick.js';
 import {startPicture} from './picture.js';
 import {app, changed, listen} from './state.js';
 import {nsOf} from './time.js';
-import {explain} from './trouble.js';
+import {addStanding, explain} from './trouble.js';
 
 const {show, camera} = app;
 
@@ -75,6 +75,9 @@ function startParts() {
 async function begin() {
   const wanted = readAddress();
   takeLook(wanted);
+  for (const name of wanted.refused) {
+    addStanding(`The address has a "${name}=" that cannot be shown: it is left out.`);
+  }
   startParts();
   try {
     const names = await mapsOf(app.running.signal);

@@ -8,7 +8,7 @@ import {Renderer} from './renderer.js';
 import {drawScale} from './scale.js';
 import {stepOf} from './show.js';
 import {app, changed, listen, tell} from './state.js';
-import {setStanding} from './trouble.js';
+import {addStanding} from './trouble.js';
 
 const {show, camera} = app;
 const canvas = element('scene');
@@ -88,7 +88,7 @@ function makePainter() {
   } catch (error) {
     document.body.dataset.plan = '1';
     painter = new Plan(canvas);
-    setStanding(`${error.message}: the plan from above is shown.`);
+    addStanding(`${error.message}: the plan from above is shown.`);
   }
   canvas.addEventListener('webglcontextlost', (event) => event.preventDefault());
   canvas.addEventListener('webglcontextrestored', () => {

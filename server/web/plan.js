@@ -3,10 +3,14 @@
 // times, without layers apart.
 import {BACKGROUND, colorOfAgent, cssOf, lookOf} from './colors.js';
 import {shortened, visible} from './dom.js';
-import {LETTERS_MAX} from './labels.js';
+import {LETTERS_MAX, middleOf} from './labels.js';
 import {GROUPS} from './scene.js';
 
 const MARGIN = 30;
+/** Whose names are written, beside what is marked. */
+const NAMED = new Set(['rooms', 'agents']);
+/** Half the side of a mark, pixels. */
+const HALF_PX = {agents: 5, objects: 3};
 
 export class Plan {
   constructor(canvas) {
@@ -52,20 +56,31 @@ export class Plan {
     const isMarked = node.id === show.selected || show.hits.has(node.id);
     const rgb = group.name === 'agents' ? colorOfAgent(node.id) : group.color;
     context.strokeStyle = context.fillStyle = cssOf(lookOf(show, node, rgb)[0]);
+    const place = node.outline.length ? middleOf(node.outline, 0) : scene.placeOf(node, show.time);
+    if (!place) return;
+    const [x, y] = view.at(place);
     if (node.outline.length >= 3) {
       context.beginPath();
       node.outline.forEach((point) => context.lineTo(...view.at(point)));
       context.closePath();
       context.stroke();
-      return;
+    } else if (node.kind === 'human') {
+      context.beginPath();
+      context.arc(x, y, HALF_PX.agents, 0, 2 * Math.PI);
+      context.fill();
+    } else {
+      const half = HALF_PX[group.name] ?? 1;
+      context.fillRect(x - half, y - half, 2 * half, 2 * half);
     }
-    const place = scene.placeOf(node, show.time);
-    if (!place) return;
-    const [x, y] = view.at(place);
-    const half = group.name === 'agents' ? 5 : group.name === 'objects' ? 3 : 1;
-    context.fillRect(x - half, y - half, 2 * half, 2 * half);
-    if (group.name !== 'agents' && !isMarked) return;
+    if (NAMED.has(group.name) || isMarked) this.#write(node, scene, x, y);
+  }
+
+  #write(node, scene, x, y) {
+    const {context} = this;
+    const isOutlined = node.outline.length > 0;
     context.font = '12px system-ui, sans-serif';
-    context.fillText(shortened(visible(scene.titleOf(node.id)), LETTERS_MAX), x + 8, y + 4);
+    context.textAlign = isOutlined ? 'center' : 'left';
+    const text = shortened(visible(scene.titleOf(node.id)), LETTERS_MAX);
+    context.fillText(text, isOutlined ? x : x + 8, y + 4);
   }
 }

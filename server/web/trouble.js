@@ -4,8 +4,8 @@ import {element, make, setText} from './dom.js';
 import {CallError} from './rpc.js';
 import {app, tell} from './state.js';
 
-/** Why there is no third dimension; empty if there is. */
-let standing = '';
+/** What holds as long as the page does, as why there is no third dimension. */
+const standing = [];
 
 /** In which state the page is: "loading", "ready", "empty", "error", ... */
 export function setState(name) {
@@ -24,12 +24,12 @@ export function banner(text, kind = 'error', buttons = []) {
 
 /** Takes away what was said; what holds as long as the page does stays. */
 export function clearBanner() {
-  banner(standing, 'note');
+  banner(standing.join('\n'), 'note');
 }
 
 /** Says something that holds as long as the page does. */
-export function setStanding(text) {
-  standing = text;
+export function addStanding(text) {
+  standing.push(text);
 }
 
 /** Says why a call failed, and what can be done. */

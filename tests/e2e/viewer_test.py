@@ -240,6 +240,10 @@ class Viewer(viewer_support.ViewerTest):
         self.assertIn("99", said)
         self.window.run("document.querySelector('#banner button').click()")
         self.window.wait(READY)
+        self.assertEqual("", self.text("banner"))
+        self.open("&rev=one&cam=1,2&at=soon")
+        for name in ("rev", "cam", "at"):
+            self.assertIn(f'"{name}="', self.text("banner"))
 
     def test_offers_what_can_be_read_of_a_compacted_map(self):
         self.ingest("short", self.simulate("short-log", people=1, seconds=5))
