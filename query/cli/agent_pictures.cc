@@ -65,7 +65,7 @@ absl::StatusOr<AnswerPicture> DrawLocation(const Session& session,
   DSG_ASSIGN_OR_RETURN(const auto pieces,
                        WayOf(session, reply.agent_id(), picture.revision, around));
   for (const auto& piece : pieces) overlay.lines.push_back({piece, kAroundRgb, 4.0});
-  overlay.legend.push_back({"10 s before and after", kAroundRgb, 4.0});
+  if (!pieces.empty()) overlay.legend.push_back({"10 s before and after", kAroundRgb, 4.0});
   if (!reply.has_pose()) {
     picture.title += ", not observed";
     DSG_RETURN_IF_ERROR(MarkEnd(session, reply, reply.before_ns(), "seen until", &overlay));
@@ -83,7 +83,10 @@ absl::StatusOr<AnswerPicture> DrawLocation(const Session& session,
                                 .width_px = 2.0});
     overlay.legend.push_back({"ellipse: 1 standard deviation", kTrackRgb, 2.0});
   }
-  if (!reply.orientation_unknown()) overlay.lines.push_back(Facing(reply.pose()));
+  if (!reply.orientation_unknown()) {
+    overlay.lines.push_back(Facing(reply.pose()));
+    overlay.legend.push_back({"faces this way", kTrackRgb, 6.0});
+  }
   overlay.marks.push_back({.position_map = position, .rgb = kTrackRgb, .label = name});
   return picture;
 }
@@ -117,6 +120,48 @@ AnswerPicture DrawTrack(const Session& session, const v1::GetTrajectoryResponse&
   return picture;
 }
 
+namespace {
+
+// The region or box that was asked for.
+absl::Status OutlineAsked(const Session& session, const v1::ListPresenceRequest& request,
+                          AnswerPicture* picture) {
+  OverlayOutline outline{.corners_map = {}, .rgb = kTrackRgb, .opacity = 0.1f};
+  if (request.has_box()) {
+    const Eigen::Vector3d low = PointOf(request.box().min());
+    const Eigen::Vector3d high = PointOf(request.box().max());
+    outline.corners_map = {
+        {low.x(), low.y()}, {high.x(), low.y()}, {high.x(), high.y()}, {low.x(), high.y()}};
+    outline.height_m = low.z();
+  } else {
+    auto node_request = session.Begin<v1::GetNodeRequest>();
+    node_request.mutable_read_at()->set_exact_revision(picture->revision);
+    node_request.set_id(request.node_id());
+    v1::GetNodeResponse node;
+    DSG_RETURN_IF_ERROR(session.api().GetNode(session.NewCall(), node_request, &node));
+    outline.corners_map = OutlineOf(node.node());
+    outline.height_m = node.node().map_t_node().position().z();
+    absl::StrAppend(&picture->title, " in ", NameOr(node.node().id(), node.node().name()));
+  }
+  picture->overlay.outlines.push_back(std::move(outline));
+  return absl::OkStatus();
+}
+
+// The way of one stay, from a ring with its time to a dot.
+void AddStay(const std::vector<std::vector<Eigen::Vector3d>>& pieces, uint32_t rgb,
+             const std::string& entered, Overlay* overlay) {
+  constexpr double kEndRadiusPx = 9.0;
+  for (const auto& piece : pieces) overlay->lines.push_back({piece, rgb, 5.0});
+  overlay->marks.push_back({.position_map = pieces.front().front(),
+                            .rgb = rgb,
+                            .shape = OverlayMark::Shape::kRing,
+                            .radius_px = kEndRadiusPx,
+                            .label = entered});
+  overlay->marks.push_back(
+      {.position_map = pieces.back().back(), .rgb = rgb, .radius_px = kEndRadiusPx});
+}
+
+}  // namespace
+
 absl::StatusOr<AnswerPicture> DrawPresence(const Session& session,
                                            const v1::ListPresenceRequest& request,
                                            const v1::ListPresenceResponse& reply) {
@@ -124,29 +169,8 @@ absl::StatusOr<AnswerPicture> DrawPresence(const Session& session,
   constexpr int kStayCountMax = 40;
   AnswerPicture picture{.title = Counted(reply.intervals_size(), "stay"),
                         .revision = reply.header().read_revision()};
+  DSG_RETURN_IF_ERROR(OutlineAsked(session, request, &picture));
   Overlay& overlay = picture.overlay;
-  if (request.has_box()) {
-    const Eigen::Vector3d low = PointOf(request.box().min());
-    const Eigen::Vector3d high = PointOf(request.box().max());
-    overlay.outlines.push_back({.corners_map = {{low.x(), low.y()},
-                                                {high.x(), low.y()},
-                                                {high.x(), high.y()},
-                                                {low.x(), high.y()}},
-                                .rgb = kTrackRgb,
-                                .height_m = low.z(),
-                                .opacity = 0.1f});
-  } else {
-    auto node_request = session.Begin<v1::GetNodeRequest>();
-    node_request.mutable_read_at()->set_exact_revision(picture.revision);
-    node_request.set_id(request.node_id());
-    v1::GetNodeResponse node;
-    DSG_RETURN_IF_ERROR(session.api().GetNode(session.NewCall(), node_request, &node));
-    overlay.outlines.push_back({.corners_map = OutlineOf(node.node()),
-                                .rgb = kTrackRgb,
-                                .height_m = node.node().map_t_node().position().z(),
-                                .opacity = 0.1f});
-    absl::StrAppend(&picture.title, " in ", NameOr(node.node().id(), node.node().name()));
-  }
   std::vector<std::string> agents;
   for (int i = 0; i < std::min(reply.intervals_size(), kStayCountMax); ++i) {
     const v1::PresenceInterval& stay = reply.intervals(i);
@@ -158,14 +182,13 @@ absl::StatusOr<AnswerPicture> DrawPresence(const Session& session,
     }
     DSG_ASSIGN_OR_RETURN(const auto pieces, WayOf(session, stay.agent_id(), picture.revision,
                                                   {stay.enter_ns(), stay.exit_ns()}));
-    if (pieces.empty()) continue;
-    for (const auto& piece : pieces) overlay.lines.push_back({piece, rgb, 5.0});
-    overlay.marks.push_back({.position_map = pieces.front().front(),
-                             .rgb = rgb,
-                             .shape = OverlayMark::Shape::kRing,
-                             .radius_px = 9.0,
-                             .label = session.times().Tenth(stay.enter_ns())});
-    overlay.marks.push_back({.position_map = pieces.back().back(), .rgb = rgb, .radius_px = 9.0});
+    if (!pieces.empty()) AddStay(pieces, rgb, session.times().Tenth(stay.enter_ns()), &overlay);
+  }
+  if (!overlay.marks.empty()) {
+    overlay.legend.push_back(
+        {.text = "enters", .rgb = kAroundRgb, .shape = OverlayMark::Shape::kRing});
+    overlay.legend.push_back(
+        {.text = "leaves", .rgb = kAroundRgb, .shape = OverlayMark::Shape::kDot});
   }
   return picture;
 }

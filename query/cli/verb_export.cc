@@ -279,6 +279,17 @@ class Exporter {
   std::vector<Written> files_;
 };
 
+// A file without content would not say why it is empty.
+void NoteEmptyMesh(const MapContent& content, const ExportVerb& verb, std::ostream& notes) {
+  if (!verb.node.empty()) {
+    if (CountMesh(content.mesh).faces > 0) return;
+    notes << "note: the mesh has no triangles of " << Printable(verb.node) << "\n";
+  } else if (!verb.ply.empty() && CountMesh(content.mesh).vertices == 0 && content.bodies.empty()) {
+    notes << "note: map " << content.spec.name << " has no mesh at revision " << content.revision
+          << ", so " << verb.ply << " has no vertices\n";
+  }
+}
+
 absl::Status ExportContent(Session* session, const ExportVerb& verb, Revision revision,
                            std::vector<Written>* files) {
   DSG_ASSIGN_OR_RETURN(const MeshColor color, ParseColor(verb.color));
@@ -297,9 +308,7 @@ absl::Status ExportContent(Session* session, const ExportVerb& verb, Revision re
            .body_count_max = verb.body_count_max,
            .with_poses = with_spark,
            .revision = revision}));
-  if (!verb.node.empty() && CountMesh(answer.content.mesh).faces == 0) {
-    session->notes() << "note: the mesh has no triangles of " << Printable(verb.node) << "\n";
-  }
+  NoteEmptyMesh(answer.content, verb, session->notes());
   Exporter exporter(answer.content, color, verb.force);
   if (!verb.ply.empty()) DSG_RETURN_IF_ERROR(exporter.WriteMesh(verb.ply));
   if (!verb.graph_ply.empty()) DSG_RETURN_IF_ERROR(exporter.WriteGraph(verb.graph_ply));

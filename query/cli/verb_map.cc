@@ -69,13 +69,29 @@ absl::StatusOr<MapContent> ReadBeside(const Session& session, const MapVerb& ver
   return std::move(answer.content);
 }
 
+// "on floor L1 at revision 7"; what is valid at --at is a part of that.
+std::string PartOf(const MapContent& content, const MapVerb& verb) {
+  return absl::StrCat(verb.floor.empty() ? "" : absl::StrCat("on floor ", verb.floor, " "),
+                      verb.at.empty() ? "" : absl::StrCat("at ", verb.at, " "), "at revision ",
+                      content.revision);
+}
+
 // An empty picture would not say why it is.
-void NoteWithoutMesh(const Session& session, const MapContent& content, const std::string& floor) {
+void NoteWithoutMesh(const Session& session, const MapContent& content, const MapVerb& verb) {
   if (CountMesh(content.mesh).faces > 0) return;
-  session.notes() << "note: map " << content.spec.name << " has no mesh "
-                  << (floor.empty() ? "" : absl::StrCat("on floor ", floor, " ")) << "at revision "
-                  << content.revision
+  session.notes() << "note: map " << content.spec.name << " has no mesh " << PartOf(content, verb)
                   << ", so its picture is empty; leave out --mesh to draw the rest of it\n";
+}
+
+void NoteWhatIsMissing(const Session& session, const MapContent& content, const MapVerb& verb) {
+  if (verb.is_mesh) {
+    NoteWithoutMesh(session, content, verb);
+  } else if (content.nodes.empty() && CountMesh(content.mesh).faces == 0) {
+    session.notes() << "note: map " << content.spec.name << " has nothing " << PartOf(content, verb)
+                    << ", so its picture is empty\n";
+  } else if (verb.with_bodies && content.bodies.empty()) {
+    session.notes() << "note: no body of anybody is known at " << verb.at << ", so none is drawn\n";
+  }
 }
 
 absl::StatusOr<picture::Picture> DrawMap(Session* session, const MapVerb& verb,
@@ -84,10 +100,9 @@ absl::StatusOr<picture::Picture> DrawMap(Session* session, const MapVerb& verb,
     return DrawExplodedView(content, {.width_px = verb.width_px, .title = title});
   }
   if (!verb.is_mesh) return DrawTopView(content, {.width_px = verb.width_px, .title = title});
-  NoteWithoutMesh(*session, content, verb.floor);
   if (verb.beside.empty()) return DrawMeshes({{content, title}}, verb.width_px);
   DSG_ASSIGN_OR_RETURN(const MapContent other, ReadBeside(*session, verb));
-  NoteWithoutMesh(*session, other, "");
+  NoteWithoutMesh(*session, other, verb);
   return DrawMeshes({{content, NameAndRevision(content)}, {other, NameAndRevision(other)}},
                     verb.width_px);
 }
@@ -101,6 +116,7 @@ absl::Status RunMap(Session* session, const MapVerb& verb, std::ostream& out) {
     DSG_ASSIGN_OR_RETURN(const HeightRange floor, ChooseFloor(content, verb.floor));
     KeepFloor(floor, &content);
   }
+  NoteWhatIsMissing(*session, content, verb);
   DSG_ASSIGN_OR_RETURN(const picture::Picture picture,
                        DrawMap(session, verb, content, TitleOf(*session, answer, verb)));
   DSG_ASSIGN_OR_RETURN(const Written written, WritePng(picture, verb.png, verb.force));

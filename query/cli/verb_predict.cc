@@ -89,6 +89,17 @@ std::string RenderPrediction(const v1::PredictAgentResponse& reply, const TimeTe
 
 namespace {
 
+// Less is almost impossible.
+constexpr double kChanceMin = 0.01;
+
+}  // namespace
+
+std::string ChanceText(double probability) {
+  return probability < kChanceMin ? "<1 %" : absl::StrCat(Fixed(100.0 * probability, 0), " %");
+}
+
+namespace {
+
 constexpr uint32_t kPastRgb = 0x555b6b;
 
 v1::PredictionModel ModelOf(const std::string& word) {
@@ -114,8 +125,12 @@ absl::StatusOr<v1::PredictAgentRequest> PredictionRequest(Session* session,
 
 constexpr double kEllipseWidthPx = 2.0;
 
-// A certain path is five times as wide as one that is almost impossible.
-double WidthOf(const v1::PredictedPath& path) { return 3.0 + 13.0 * path.probability(); }
+bool IsUnlikely(const v1::PredictedPath& path) { return path.probability() < kChanceMin; }
+
+// A certain path is eight times as wide as one that is almost impossible.
+double WidthOf(const v1::PredictedPath& path) {
+  return IsUnlikely(path) ? 2.0 : 3.0 + 13.0 * path.probability();
+}
 
 // Where the agent is with the certainty of one standard deviation, seen from above.
 void AddEllipse(const v1::PredictedPose& pose, uint32_t rgb, Overlay* overlay) {
@@ -147,7 +162,7 @@ absl::StatusOr<AnswerPicture> DrawPrediction(Session* session,
   if (reply.observed_ns() < kTimeMax) past.to_ns = reply.observed_ns() + 1;
   DSG_ASSIGN_OR_RETURN(const auto pieces,
                        WayOf(*session, reply.agent_id(), picture.revision, past));
-  overlay.legend.push_back({"seen", kPastRgb});
+  if (!pieces.empty()) overlay.legend.push_back({"seen", kPastRgb});
   // The most probable path is drawn last, on top.
   for (int i = reply.paths_size() - 1; i >= 0; --i) {
     const v1::PredictedPath& path = reply.paths(i);
@@ -156,18 +171,19 @@ absl::StatusOr<AnswerPicture> DrawPrediction(Session* session,
     if (!pieces.empty()) line.points_map.push_back(pieces.back().back());
     for (const v1::PredictedPose& pose : path.poses()) {
       line.points_map.push_back(PointOf(pose.position()));
-      AddEllipse(pose, rgb, &overlay);
+      // Where nobody is expected, ellipses would only hide the likely paths.
+      if (!IsUnlikely(path)) AddEllipse(pose, rgb, &overlay);
     }
     if (line.points_map.empty()) continue;
     overlay.marks.push_back({.position_map = line.points_map.back(),
                              .rgb = rgb,
-                             .radius_px = 9.0,
-                             .label = Fixed(path.probability(), 2)});
+                             .radius_px = IsUnlikely(path) ? 6.0 : 9.0,
+                             .label = ChanceText(path.probability())});
     overlay.lines.push_back(std::move(line));
   }
   for (int i = 0; i < reply.paths_size(); ++i) {
     overlay.legend.push_back(
-        {absl::StrCat("way ", i + 1, ": ", Fixed(reply.paths(i).probability(), 2)),
+        {absl::StrCat("way ", i + 1, ": ", ChanceText(reply.paths(i).probability())),
          AgentColor(static_cast<size_t>(i) + 1), WidthOf(reply.paths(i))});
   }
   if (!overlay.outlines.empty()) {

@@ -33,4 +33,7 @@ struct PredictVerb {
 std::string RenderPrediction(const v1::PredictAgentResponse& reply, const TimeText& times,
                              const NodeNames& names);
 
+/// Of a predicted path, in whole per cent: "89 %", "<1 %".
+std::string ChanceText(double probability);
+
 }  // namespace dsg::cli

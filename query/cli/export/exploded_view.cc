@@ -6,10 +6,14 @@
 #include <cmath>
 #include <numbers>
 #include <unordered_map>
+#include <utility>
 
 #include "query/cli/export/outline.h"
 #include "query/cli/export/top_view.h"
+#include "query/cli/export/top_view_labels.h"
+#include "query/cli/export/top_view_marks.h"
 #include "schema/base/check.h"
+#include "schema/picture/font.h"
 #include "schema/picture/look.h"
 #include "schema/picture/wire.h"
 
@@ -23,6 +27,9 @@ constexpr double kEdgePx = 60.0;
 constexpr double kHeadPx = 80.0;
 constexpr double kNamePx = 260.0;
 constexpr double kNameDotPx = 4.0;
+constexpr double kLevelDotPx = 3.0;
+// Names keep away from the border of the picture.
+constexpr double kBorderPx = 16.0;
 constexpr uint32_t kPlateRgb = 0xe9e7e0;
 
 // Where the eye stands: turned off the axes, so that walls along them do not hide one another.
@@ -51,9 +58,9 @@ bool IsOfType(const Node& node, const char* type) {
 // From the map and a level to pixels: a view from infinity.
 class Oblique {
  public:
-  // `edge_px`: what stays free on the left, for names of levels.
+  // `edge_px`: what stays free on the left, for names of levels; `legend_px`: at the bottom.
   Oblique(const Box3d& bounds, const std::array<bool, kLevelCount>& has, double edge_px,
-          int width_px)
+          double legend_px, int width_px)
       : bounds_(bounds) {
     Eigen::AlignedBox2d plane;
     for (int corner = 0; corner < 8; ++corner) {
@@ -68,14 +75,17 @@ class Oblique {
     }
     const double top_m = std::max(0.0, lift_m - gap_m) * std::cos(kElevationRad);
     const double width = 2.0 * width_px - kEdgePx - edge_px;
-    const double height_max = 2.0 * kTopViewWidthMax - 2.0 * kEdgePx - kHeadPx;
+    const double height_max = 2.0 * kTopViewWidthMax - 2.0 * kEdgePx - kHeadPx - legend_px;
     px_per_m_ = std::min(width / plane.sizes().x(), height_max / (plane.sizes().y() + top_m));
-    height_px_ = px_per_m_ * (plane.sizes().y() + top_m) + 2.0 * kEdgePx + kHeadPx;
+    legend_y_ = std::round(px_per_m_ * (plane.sizes().y() + top_m) + kEdgePx + kHeadPx);
+    height_px_ = legend_y_ + legend_px + kEdgePx;
     origin_px_ = Eigen::Vector2d(edge_px - px_per_m_ * plane.min().x(),
-                                 height_px_ - kEdgePx - px_per_m_ * plane.max().y());
+                                 legend_y_ - px_per_m_ * plane.max().y());
   }
 
   double height_px() const { return height_px_; }
+  // Where the drawn map ends.
+  double legend_y() const { return legend_y_; }
   Eigen::Vector2d ToPixel(const Eigen::Vector3d& point_map, int level) const {
     return origin_px_ + px_per_m_ * Flat(point_map - bounds_.center(), lift_m_[level]);
   }
@@ -104,6 +114,7 @@ class Oblique {
   std::array<double, kLevelCount> lift_m_{};
   double px_per_m_ = 1.0;
   double height_px_ = 0.0;
+  double legend_y_ = 0.0;
   Eigen::Vector2d origin_px_ = Eigen::Vector2d::Zero();
 };
 
@@ -144,18 +155,24 @@ picture::Paint Shaded(uint32_t rgb, double light, float opacity) {
 class Drawer {
  public:
   Drawer(const MapContent& content, int width_px)
-      : Drawer(content, BoundsOf(content), LevelsOf(content), kEdgePx + kNamePx, width_px) {}
+      : Drawer(content, BoundsOf(content), LevelsOf(content),
+               LegendRows(MapLegend(content), LegendSpaceOf(width_px)), kEdgePx + kNamePx,
+               width_px) {}
 
   Drawer(const MapContent& content, const Box3d& bounds, const std::array<bool, kLevelCount>& has,
-         double edge_px, int width_px)
+         LegendRows legend, double edge_px, int width_px)
       : content_(content),
         bounds_(bounds),
         has_(has),
-        view_(bounds_, has_, edge_px, width_px),
+        legend_(std::move(legend)),
+        view_(bounds_, has_, edge_px, LegendPx(legend_), width_px),
         nodes_(NodesById(content)),
         parent_of_(ParentsOf(content)),
         canvas_(2 * width_px, 2 * static_cast<int>(std::ceil(0.5 * view_.height_px())),
-                picture::MakePaint(kPaperRgb)) {}
+                picture::MakePaint(kPaperRgb)),
+        names_(Eigen::AlignedBox2d(
+            Eigen::Vector2d(kBorderPx, kHeadPx),
+            Eigen::Vector2d(canvas_.width() - kBorderPx, view_.legend_y() + kEdgePx))) {}
 
   picture::Picture Draw(const std::string& title) {
     for (int level = 0; level < kLevelCount; ++level) {
@@ -171,6 +188,7 @@ class Drawer {
       if (level == kRoomLevel) DrawRooms();
       if (level == kBuildingLevel) DrawNamed(kinds::kBuilding);
     }
+    legend_.Draw({kEdgePx, view_.legend_y() + kEdgePx}, &canvas_);
     DrawTitle(title);
     return canvas_.Halved();
   }
@@ -182,6 +200,15 @@ class Drawer {
   }
 
  private:
+  static LegendSpace LegendSpaceOf(int width_px) {
+    const double row_px = 2.0 * width_px - 2.0 * kEdgePx;
+    return {row_px, row_px, LegendRowsMax(width_px)};
+  }
+  // With the space above it.
+  static double LegendPx(const LegendRows& legend) {
+    return legend.height_px() > 0.0 ? legend.height_px() + kEdgePx : 0.0;
+  }
+
   void DrawTitle(const std::string& title) {
     double dot = 6.0;
     while (dot > 2.0 && picture::Canvas::TextWidth(title, dot) > canvas_.width() - 2.0 * kEdgePx)
@@ -216,8 +243,12 @@ class Drawer {
     canvas_.DrawOutline(plate, 2.0, picture::MakePaint(kInkRgb, 0.25f));
     const auto left = std::min_element(plate.begin(), plate.end(),
                                        [](const auto& a, const auto& b) { return a.x() < b.x(); });
-    canvas_.DrawText({kEdgePx, left->y() - 14.0}, kLevelNames[static_cast<size_t>(level)], 3.0,
-                     picture::MakePaint(kInkRgb));
+    const Eigen::Vector2d low(kEdgePx, left->y() - 14.0);
+    const char* name = kLevelNames[static_cast<size_t>(level)];
+    canvas_.DrawText(low, name, kLevelDotPx, picture::MakePaint(kInkRgb));
+    const Eigen::Vector2d size(picture::Canvas::TextWidth(name, kLevelDotPx),
+                               kLevelDotPx * (picture::kCapHeightDots + picture::kDescentDots));
+    names_.Block({low, low + size});
   }
 
   // From a level to what contains its nodes, drawn before the nodes above.
@@ -281,9 +312,9 @@ class Drawer {
         canvas_.DrawPolyline(pixels, 3.0, picture::MakePaint(AgentColor(i), 0.7f));
       }
       if (HasBody(content_, track.agent)) continue;
-      const Eigen::Vector2d last = view_.ToPixel(LastOf(track), kObjectLevel);
-      canvas_.FillCircle(last, 12.0, picture::MakePaint(0xffffff));
-      canvas_.FillCircle(last, 9.0, picture::MakePaint(AgentColor(i)));
+      const auto node = nodes_.find(track.agent);
+      DrawAgentMark(node == nodes_.end() ? kinds::kHuman : node->second->kind,
+                    view_.ToPixel(LastOf(track), kObjectLevel), AgentColor(i), &canvas_);
     }
   }
 
@@ -382,29 +413,40 @@ class Drawer {
     DrawNamed(kinds::kRoom);
   }
 
+  // All dots first, so that no name covers one.
   void DrawNamed(const char* kind) {
+    constexpr double kDotReachPx = 15.0;
+    const Eigen::Vector2d reach(kDotReachPx, kDotReachPx);
     for (const Node& node : content_.nodes) {
       if (node.kind != kind) continue;
       const Eigen::Vector2d at = PixelOf(node);
       const uint32_t rgb =
           node.kind == kinds::kRoom ? RoomColor(node) : LayerColor(layers::kBuildings);
-      canvas_.FillCircle(at, 15.0, picture::MakePaint(kPaperRgb));
-      canvas_.FillCircle(at, 12.0, picture::MakePaint(rgb));
+      canvas_.FillCircle(at, kDotReachPx, picture::MakePaint(kPaperRgb));
+      canvas_.FillCircle(at, kDotReachPx - 3.0, picture::MakePaint(rgb));
+      names_.Block({at - reach, at + reach});
+    }
+    for (const Node& node : content_.nodes) {
+      if (node.kind != kind) continue;
+      const Eigen::Vector2d at = PixelOf(node);
       const std::string name = node.class_name.empty() || !node.name.empty()
                                    ? NameOf(node)
                                    : node.class_name + " " + ToString(node.id);
-      canvas_.DrawText(at + Eigen::Vector2d(20.0, -14.0), name, kNameDotPx,
-                       picture::MakePaint(kInkRgb));
+      WriteNameBeside({at - reach, at + reach}, {.text = name, .dot_px = kNameDotPx}, &names_,
+                      &canvas_);
     }
   }
 
   const MapContent& content_;
   Box3d bounds_;
   std::array<bool, kLevelCount> has_;
+  LegendRows legend_;
   Oblique view_;
   std::unordered_map<NodeId, const Node*> nodes_;
   std::unordered_map<NodeId, const Node*> parent_of_;
   picture::Canvas canvas_;
+  // Spots of names, of all levels.
+  picture::LabelLayout names_;
 };
 
 }  // namespace
@@ -423,8 +465,8 @@ picture::Picture DrawMeshes(const std::vector<TitledMap>& maps, int width_px) {
   const int part_px = width_px / static_cast<int>(maps.size());
   std::vector<picture::Picture> parts;
   for (const TitledMap& map : maps) {
-    parts.push_back(
-        Drawer(map.content, BoundsOf(all), {}, kEdgePx, part_px).DrawMeshAlone(map.title));
+    parts.push_back(Drawer(map.content, BoundsOf(all), {}, LegendRows({}, {}), kEdgePx, part_px)
+                        .DrawMeshAlone(map.title));
   }
   // All have the same bounds, and so the same size.
   picture::Picture joined{part_px * static_cast<int>(maps.size()), parts[0].height, {}};

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <unordered_set>
 #include <utility>
 
@@ -35,6 +36,57 @@ HeightRange HeightsAround(const MapContent& content, double z_m) {
     has_room = true;
   }
   return has_room ? around : HeightRange{z_m - kFloorReachM, z_m + kFloorReachM};
+}
+
+// The floor of the room of each structure that has a room; of several the highest.
+std::unordered_map<NodeId, double> RoomFloors(const MapContent& content) {
+  const auto nodes = NodesById(content);
+  std::unordered_map<NodeId, double> floors_m;
+  for (const Edge& edge : content.edges) {
+    const bool encloses = edge.relation == relations::kEncloses;
+    if (!encloses && edge.relation != relations::kContains) continue;
+    const Node& structure = *nodes.at(encloses ? edge.source : edge.target);
+    const Node& room = *nodes.at(encloses ? edge.target : edge.source);
+    if (structure.kind != kinds::kStructure || room.kind != kinds::kRoom) continue;
+    const HeightRange heights = HeightsOf(room);
+    // A room that is only a point says nothing of its floor.
+    if (heights.high_m <= heights.low_m) continue;
+    const auto [floor, is_first] = floors_m.emplace(structure.id, heights.low_m);
+    if (!is_first) floor->second = std::max(floor->second, heights.low_m);
+  }
+  return floors_m;
+}
+
+std::vector<HeightRange> HeightsOfAll(const MapContent& content, const char* kind) {
+  std::vector<HeightRange> heights;
+  for (const Node& node : content.nodes) {
+    if (node.kind == kind) heights.push_back(HeightsOf(node));
+  }
+  return heights;
+}
+
+// Whether what begins at a height belongs to these heights, and not to the storey above.
+bool HoldsFoot(const HeightRange& heights, double foot_m) {
+  constexpr double kErrorM = 0.2;
+  return heights.low_m <= foot_m + kErrorM && foot_m < heights.high_m - kErrorM;
+}
+
+// The floor below the foot of a structure that has no room; the foot itself if nothing is around.
+double FloorBelow(double foot_m, const std::vector<HeightRange>& rooms,
+                  const std::vector<HeightRange>& structures) {
+  double floor_m = std::numeric_limits<double>::lowest();
+  bool has_room = false;
+  for (const HeightRange& room : rooms) {
+    if (!HoldsFoot(room, foot_m)) continue;
+    floor_m = std::max(floor_m, room.low_m);
+    has_room = true;
+  }
+  if (has_room) return floor_m;
+  floor_m = foot_m;
+  for (const HeightRange& structure : structures) {
+    if (HoldsFoot(structure, foot_m)) floor_m = std::min(floor_m, structure.low_m);
+  }
+  return floor_m;
 }
 
 double MiddleHeight(const Node& node) {
@@ -122,6 +174,23 @@ absl::StatusOr<HeightRange> ChooseFloor(const MapContent& content, const std::st
                                 "\": no node has this id or name; give a level or room (dsg ls "
                                 "--kind room) or a height in metres"),
                    {{"field", "--floor"}, {"value", floor}});
+}
+
+std::unordered_set<NodeId> StructuresOverHead(const MapContent& content) {
+  constexpr double kHeadM = 1.8;
+  const std::unordered_map<NodeId, double> room_floors_m = RoomFloors(content);
+  const std::vector<HeightRange> rooms = HeightsOfAll(content, kinds::kRoom);
+  const std::vector<HeightRange> structures = HeightsOfAll(content, kinds::kStructure);
+  std::unordered_set<NodeId> over_head;
+  for (const Node& node : content.nodes) {
+    if (node.kind != kinds::kStructure || node.box_node.isEmpty()) continue;
+    const double foot_m = node.BoxMap().min().z();
+    const auto of_room = room_floors_m.find(node.id);
+    const double floor_m =
+        of_room == room_floors_m.end() ? FloorBelow(foot_m, rooms, structures) : of_room->second;
+    if (foot_m - floor_m > kHeadM) over_head.insert(node.id);
+  }
+  return over_head;
 }
 
 void KeepFloor(const HeightRange& floor, MapContent* content) {

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <string>
 #include <unordered_map>
+#include <unordered_set>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -73,6 +74,11 @@ struct HeightRange {
 /// a height in metres, which gives the heights of the rooms that contain it, or 1.5 m around it
 /// without a room. Errors: NOT_FOUND/NODE_UNKNOWN.
 absl::StatusOr<HeightRange> ChooseFloor(const MapContent& content, const std::string& floor);
+
+/// Structures that begin more than 1.8 m above their floor, as the wall over a door does: people
+/// walk below them. The floor is that of the room that a structure encloses or lies in; without one
+/// that of the highest room around its foot, or else the foot of the lowest structure beside it.
+std::unordered_set<NodeId> StructuresOverHead(const MapContent& content);
 
 /// The floor extended 0.3 m down: heights of tracks on the floor have errors.
 HeightRange StandingHeights(const HeightRange& floor);

@@ -13,8 +13,6 @@
 namespace dsg::cli {
 namespace {
 
-constexpr double kKeyDotPx = 4.0;
-constexpr uint32_t kKeyInkRgb = 0x2b2f3a;
 constexpr uint32_t kHaloRgb = 0xffffff;
 
 Eigen::AlignedBox2d Around(const Eigen::Vector2d& middle, double reach_px) {
@@ -30,23 +28,22 @@ void DrawLine(const OverlayLine& line, const FloorView& view, picture::Canvas* c
   canvas->DrawPolyline(pixels, line.width_px, picture::MakePaint(line.rgb, line.opacity));
 }
 
-void DrawMark(const OverlayMark& mark, const FloorView& view, picture::Canvas* canvas) {
-  const Eigen::Vector2d middle = view.ToPixel(mark.position_map);
-  const double r = mark.radius_px;
-  if (mark.shape == OverlayMark::Shape::kCross) {
+void DrawShape(OverlayMark::Shape shape, const Eigen::Vector2d& middle, double r, uint32_t rgb,
+               picture::Canvas* canvas) {
+  if (shape == OverlayMark::Shape::kCross) {
     for (const double side : {-1.0, 1.0}) {
       const Eigen::Vector2d arm(r, side * r);
       canvas->DrawPolyline({middle - arm, middle + arm}, 11.0, picture::MakePaint(kHaloRgb));
     }
     for (const double side : {-1.0, 1.0}) {
       const Eigen::Vector2d arm(r, side * r);
-      canvas->DrawPolyline({middle - arm, middle + arm}, 6.0, picture::MakePaint(mark.rgb));
+      canvas->DrawPolyline({middle - arm, middle + arm}, 6.0, picture::MakePaint(rgb));
     }
     return;
   }
   canvas->FillCircle(middle, r + 4.0, picture::MakePaint(kHaloRgb));
-  canvas->FillCircle(middle, r, picture::MakePaint(mark.rgb));
-  if (mark.shape == OverlayMark::Shape::kRing) {
+  canvas->FillCircle(middle, r, picture::MakePaint(rgb));
+  if (shape == OverlayMark::Shape::kRing) {
     canvas->FillCircle(middle, 0.55 * r, picture::MakePaint(kHaloRgb));
   }
 }
@@ -81,6 +78,10 @@ void KeepFloor(const HeightRange& floor, Overlay* overlay) {
                 [&](const OverlayMark& mark) { return !heights.Contains(mark.position_map.z()); });
   std::erase_if(overlay->outlines,
                 [&](const OverlayOutline& outline) { return !heights.Contains(outline.height_m); });
+  std::erase_if(overlay->legend, [&](const OverlayKey& key) {
+    const auto is_drawn = [&](const OverlayMark& mark) { return mark.shape == *key.shape; };
+    return key.shape.has_value() && std::ranges::none_of(overlay->marks, is_drawn);
+  });
 }
 
 Eigen::AlignedBox2d BoundsOf(const Overlay& overlay) {
@@ -109,34 +110,53 @@ void DrawOverlay(const Overlay& overlay, const FloorView& view, picture::LabelLa
     BlockLine(line, view, layout);
   }
   for (const OverlayMark& mark : overlay.marks) {
-    DrawMark(mark, view, canvas);
-    layout->Block(Around(view.ToPixel(mark.position_map), mark.radius_px));
+    const Eigen::Vector2d middle = view.ToPixel(mark.position_map);
+    DrawShape(mark.shape, middle, mark.radius_px, mark.rgb, canvas);
+    layout->Block(Around(middle, mark.radius_px));
   }
 }
 
 void DrawOverlayLabels(const Overlay& overlay, const FloorView& view, picture::LabelLayout* layout,
                        picture::Canvas* canvas) {
+  picture::LabelLayout over_lines(view.area_px());
+  for (const OverlayMark& mark : overlay.marks) {
+    over_lines.Block(Around(view.ToPixel(mark.position_map), mark.radius_px));
+  }
   for (const OverlayMark& mark : overlay.marks) {
     if (mark.label.empty()) continue;
+    const Label label{.text = mark.label, .dot_px = kAgentDotPx, .rgb = mark.rgb};
     const Eigen::AlignedBox2d thing = Around(view.ToPixel(mark.position_map), mark.radius_px + 6.0);
-    WriteNameBeside(thing, mark.label, mark.rgb, layout, canvas);
+    std::optional<Eigen::AlignedBox2d> spot = WriteNameBeside(thing, label, layout, canvas);
+    if (spot.has_value()) {
+      over_lines.Block(*spot);
+      continue;
+    }
+    spot = WriteNameBeside(thing, label, &over_lines, canvas);
+    if (spot.has_value()) layout->Block(*spot);
   }
 }
 
-void DrawOverlayLegend(const Overlay& overlay, const Eigen::Vector2d& low, double x_end,
-                       picture::Canvas* canvas) {
-  constexpr double kSamplePx = 44.0;
-  const double middle_y = low.y() + 0.5 * kKeyDotPx * picture::kCapHeightDots;
-  double x = low.x();
+std::vector<LegendEntry> OverlayLegend(const Overlay& overlay) {
+  constexpr double kSamplePx = 46.0;
+  constexpr double kShapeRadiusPx = 9.0;
+  std::vector<LegendEntry> entries;
   for (const OverlayKey& key : overlay.legend) {
-    const double end = x + kSamplePx + 14.0 + picture::Canvas::TextWidth(key.text, kKeyDotPx);
-    if (end > x_end) return;
-    canvas->DrawPolyline({{x + 4.0, middle_y}, {x + kSamplePx, middle_y}}, key.width_px,
-                         picture::MakePaint(key.rgb));
-    canvas->DrawText({x + kSamplePx + 14.0, low.y()}, key.text, kKeyDotPx,
-                     picture::MakePaint(kKeyInkRgb));
-    x = end + 44.0;
+    if (key.shape.has_value()) {
+      entries.push_back(
+          {.text = key.text, .draw = [key](const Eigen::Vector2d& middle, picture::Canvas* canvas) {
+             DrawShape(*key.shape, middle, kShapeRadiusPx, key.rgb, canvas);
+           }});
+      continue;
+    }
+    entries.push_back({.text = key.text,
+                       .mark_px = kSamplePx,
+                       .draw = [key](const Eigen::Vector2d& middle, picture::Canvas* canvas) {
+                         const Eigen::Vector2d half(20.0, 0.0);
+                         canvas->DrawPolyline({middle - half, middle + half}, key.width_px,
+                                              picture::MakePaint(key.rgb));
+                       }});
   }
+  return entries;
 }
 
 }  // namespace dsg::cli

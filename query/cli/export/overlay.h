@@ -5,12 +5,14 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "query/cli/export/map_content.h"
 #include "query/cli/export/outline.h"
+#include "query/cli/export/top_view_marks.h"
 #include "schema/model/geometry.h"
 #include "schema/model/ids.h"
 #include "schema/picture/font.h"
@@ -52,6 +54,8 @@ struct OverlayKey {
   std::string text;
   uint32_t rgb = 0;
   double width_px = 9.0;
+  /// The mark that it explains; unset = a line or an outline.
+  std::optional<OverlayMark::Shape> shape{};
 };
 
 /// Later entries of a list are drawn over earlier ones; marks over lines over outlines.
@@ -68,7 +72,8 @@ struct Overlay {
   }
 };
 
-/// Keeps what lies within StandingHeights of the floor; lines are cut where they leave it.
+/// Keeps what lies within StandingHeights of the floor; lines are cut where they leave it. Shapes
+/// of which no mark is left are not in the legend either.
 void KeepFloor(const HeightRange& floor, Overlay* overlay);
 
 /// Bounds of all that is drawn, seen from above; empty without content.
@@ -78,12 +83,11 @@ Eigen::AlignedBox2d BoundsOf(const Overlay& overlay);
 void DrawOverlay(const Overlay& overlay, const FloorView& view, picture::LabelLayout* layout,
                  picture::Canvas* canvas);
 
-/// Labels of the marks, in their order; call before writing other names.
+/// Labels of the marks, in their order; call before writing other names. One that finds no space
+/// may cover lines, and one without any space is left out.
 void DrawOverlayLabels(const Overlay& overlay, const FloorView& view, picture::LabelLayout* layout,
                        picture::Canvas* canvas);
 
-/// One row; keys that do not fit before `x_end` are left out.
-void DrawOverlayLegend(const Overlay& overlay, const Eigen::Vector2d& low, double x_end,
-                       picture::Canvas* canvas);
+std::vector<LegendEntry> OverlayLegend(const Overlay& overlay);
 
 }  // namespace dsg::cli

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <unordered_set>
 
 #include "absl/strings/str_cat.h"
 #include "query/cli/export/axes.h"
@@ -23,9 +24,11 @@ namespace {
 constexpr double kMarginPx = 60.0;
 constexpr double kTitlePx = 70.0;
 constexpr double kFooterPx = 80.0;
-constexpr double kKeyRowPx = 52.0;
 constexpr double kTextDotPx = 4.0;
 constexpr double kTextHeightPx = kTextDotPx * picture::kCapHeightDots;
+// The longest scale bar, share of the canvas; its text at the left with the gap to the legend.
+constexpr double kScaleBarShare = 0.25;
+constexpr double kScaleTextPx = 200.0;
 // A smaller map is drawn with this size.
 constexpr double kMapSizeMinM = 2.0;
 
@@ -150,11 +153,12 @@ Eigen::AlignedBox2d MapBounds(Eigen::AlignedBox2d bounds) {
   return Eigen::AlignedBox2d(bounds.min() - 0.5 * lack, bounds.max() + 0.5 * lack);
 }
 
-// The part of the canvas for the map: the full width, and a height that fits.
-Eigen::AlignedBox2d AreaFor(const Eigen::AlignedBox2d& bounds_map, int width_px) {
+// The part of the canvas for the map: the full width, and a height that fits. `legend_px`: height
+// of the rows of the legend above the last one.
+Eigen::AlignedBox2d AreaFor(const Eigen::AlignedBox2d& bounds_map, int width_px, double legend_px) {
   const double width = 2.0 * width_px - 2.0 * kMarginPx - kAxisLeftPx;
   const double height_max = std::min(4.0 * width_px, 2.0 * kTopViewWidthMax) - 2.0 * kMarginPx -
-                            kTitlePx - kAxisBottomPx - kFooterPx;
+                            kTitlePx - kAxisBottomPx - kFooterPx - legend_px;
   const double height = width * bounds_map.sizes().y() / bounds_map.sizes().x();
   const Eigen::Vector2d low(kMarginPx + kAxisLeftPx, kMarginPx + kTitlePx);
   return Eigen::AlignedBox2d(low,
@@ -186,8 +190,10 @@ void DrawRooms(const MapContent& content, const FloorView& view, picture::Canvas
 }
 
 void DrawStructures(const MapContent& content, const FloorView& view, picture::Canvas* canvas) {
+  // The wall over a door would shut it.
+  const std::unordered_set<NodeId> over_head = StructuresOverHead(content);
   for (const Node& node : content.nodes) {
-    if (node.kind != kinds::kStructure) continue;
+    if (node.kind != kinds::kStructure || over_head.contains(node.id)) continue;
     const std::string type = StructureType(node);
     if (type == "floor" || type == "ceiling") continue;
     const picture::Paint paint =
@@ -298,10 +304,9 @@ void DrawPeople(const MapContent& content, const FloorView& view, picture::Canva
   }
 }
 
-// Returns its left end, pixels.
-double DrawScaleBar(const FloorView& view, double y, picture::Canvas* canvas) {
+void DrawScaleBar(const FloorView& view, double y, picture::Canvas* canvas) {
   constexpr int kParts = 5;
-  const double length_m = RoundBelow(0.25 * canvas->width() / view.px_per_m());
+  const double length_m = RoundBelow(kScaleBarShare * canvas->width() / view.px_per_m());
   const double part_px = length_m * view.px_per_m() / kParts;
   const Eigen::Vector2d begin(canvas->width() - kMarginPx - kParts * part_px,
                               y + 0.5 * kTextHeightPx - 6.0);
@@ -313,7 +318,6 @@ double DrawScaleBar(const FloorView& view, double y, picture::Canvas* canvas) {
   const std::string text = absl::StrCat(length_m, " m");
   const double x = begin.x() - picture::Canvas::TextWidth(text, kTextDotPx) - 16.0;
   canvas->DrawText(Eigen::Vector2d(x, y), text, kTextDotPx, picture::MakePaint(kInkRgb));
-  return x;
 }
 
 void DrawTitle(const std::string& title, picture::Canvas* canvas) {
@@ -324,30 +328,41 @@ void DrawTitle(const std::string& title, picture::Canvas* canvas) {
                    picture::MakePaint(kInkRgb));
 }
 
+void DrawAll(const MapContent& content, const FloorView& view, picture::Canvas* canvas) {
+  DrawMesh(content.mesh, view, canvas);
+  DrawGround(content, view, canvas);
+  DrawRooms(content, view, canvas);
+  DrawStructures(content, view, canvas);
+  DrawOthers(content, view, canvas);
+  DrawPlaces(content, view, canvas);
+  DrawRoomLinks(content, view, canvas);
+  DrawObjects(content, view, canvas);
+  DrawTracks(content, view, canvas);
+  DrawPeople(content, view, canvas);
+}
+
 }  // namespace
 
 picture::Picture DrawTopView(const MapContent& content, const TopViewOptions& options) {
   DSG_CHECK(options.width_px >= kTopViewWidthMin && options.width_px <= kTopViewWidthMax);
   const Overlay& overlay = options.overlay;
+  const double row_px = 2.0 * options.width_px - 2.0 * kMarginPx;
+  const double beside_bar_px = row_px - kScaleBarShare * 2.0 * options.width_px - kScaleTextPx;
+  const int row_count_max = LegendRowsMax(options.width_px);
+  const LegendRows keys(OverlayLegend(overlay), {row_px, row_px, row_count_max});
+  const LegendRows counts(MapLegend(content), {beside_bar_px, row_px, row_count_max});
+  // The footer has one row, with the scale.
+  const double more_px = keys.height_px() + std::max(0.0, counts.height_px() - kLegendRowPx);
   const Eigen::AlignedBox2d drawn_map = DrawnBounds(content, overlay);
   const Eigen::AlignedBox2d bounds_map = MapBounds(drawn_map);
-  const Eigen::AlignedBox2d area = AreaFor(bounds_map, options.width_px);
-  const FloorView view(bounds_map, area);
-  const double key_height = overlay.legend.empty() ? 0.0 : kKeyRowPx;
-  const double height =
-      view.area_px().max().y() + kAxisBottomPx + kMarginPx + kFooterPx + key_height;
+  const FloorView view(bounds_map, AreaFor(bounds_map, options.width_px, more_px));
+  // Whole pixels keep letters sharp.
+  const double key_y =
+      std::round(view.area_px().max().y() + kAxisBottomPx + kFooterPx - kTextHeightPx);
+  const double height = key_y + kTextHeightPx + more_px + kMarginPx;
   picture::Canvas canvas(2 * options.width_px, 2 * static_cast<int>(std::ceil(0.5 * height)),
                          picture::MakePaint(kPaperRgb));
-  DrawMesh(content.mesh, view, &canvas);
-  DrawGround(content, view, &canvas);
-  DrawRooms(content, view, &canvas);
-  DrawStructures(content, view, &canvas);
-  DrawOthers(content, view, &canvas);
-  DrawPlaces(content, view, &canvas);
-  DrawRoomLinks(content, view, &canvas);
-  DrawObjects(content, view, &canvas);
-  DrawTracks(content, view, &canvas);
-  DrawPeople(content, view, &canvas);
+  DrawAll(content, view, &canvas);
   picture::LabelLayout layout(view.area_px());
   if (!overlay.empty()) {
     canvas.FillRect({0.0, 0.0}, {canvas.width(), canvas.height()},
@@ -358,10 +373,9 @@ picture::Picture DrawTopView(const MapContent& content, const TopViewOptions& op
   DrawLabels(content, overlay.named, view, &layout, &canvas);
   if (!drawn_map.isEmpty()) DrawAxes(view, &canvas);
   DrawTitle(options.title, &canvas);
-  const double footer_y = canvas.height() - kMarginPx - kTextHeightPx;
-  DrawLegend(content, {kMarginPx, footer_y}, DrawScaleBar(view, footer_y, &canvas) - 40.0, &canvas);
-  DrawOverlayLegend(overlay, {kMarginPx, footer_y - key_height}, canvas.width() - kMarginPx,
-                    &canvas);
+  keys.Draw({kMarginPx, key_y}, &canvas);
+  counts.Draw({kMarginPx, key_y + keys.height_px()}, &canvas);
+  DrawScaleBar(view, key_y + keys.height_px(), &canvas);
   return canvas.Halved();
 }
 

@@ -19,27 +19,11 @@ namespace dsg::cli {
 namespace {
 
 constexpr double kRoomDotPx = 4.0;
-constexpr double kAgentDotPx = 3.0;
 constexpr double kSmallDotPx = 2.0;
 constexpr double kPadPx = 6.0;
 // Radius of the dot for a room without an outline.
 constexpr double kRoomRadiusPx = 14.0;
 constexpr double kObjectRadiusPx = 7.0;
-constexpr uint32_t kLabelInkRgb = 0x20242e;
-
-struct Label {
-  std::string text;
-  double dot_px = kSmallDotPx;
-  uint32_t rgb = kLabelInkRgb;
-
-  Eigen::Vector2d Size() const {
-    return {picture::Canvas::TextWidth(text, dot_px) + 2.0 * kPadPx,
-            dot_px * (picture::kCapHeightDots + picture::kDescentDots) + 2.0 * kPadPx};
-  }
-  Eigen::AlignedBox2d At(const Eigen::Vector2d& middle) const {
-    return Eigen::AlignedBox2d(middle - 0.5 * Size(), middle + 0.5 * Size());
-  }
-};
 
 void WriteLabel(const Label& label, const Eigen::AlignedBox2d& spot, picture::Canvas* canvas) {
   canvas->FillRect(spot.min(), spot.max(), picture::MakePaint(0xffffff, 0.72f));
@@ -153,6 +137,25 @@ bool WriteBeside(const Eigen::AlignedBox2d& thing, const Label& label, picture::
   return true;
 }
 
+// Beside a shape that is thought `off_px` larger on each side: straight, then over its corners.
+std::vector<Eigen::AlignedBox2d> SpotsAround(const Eigen::AlignedBox2d& thing, double off_px,
+                                             const Label& label) {
+  const Eigen::Vector2d off(off_px, off_px);
+  const Eigen::AlignedBox2d larger(thing.min() - off, thing.max() + off);
+  std::vector<Eigen::AlignedBox2d> spots = SpotsBeside(larger, label);
+  const Eigen::Vector2d reach = 0.5 * (larger.sizes() + label.Size());
+  const Eigen::Vector2d middle = larger.center();
+  for (const Eigen::Vector2d& corner : {Eigen::Vector2d(1, 1), Eigen::Vector2d(-1, 1),
+                                        Eigen::Vector2d(1, -1), Eigen::Vector2d(-1, -1)}) {
+    spots.push_back(label.At(middle + corner.cwiseProduct(reach)));
+  }
+  return spots;
+}
+
+Eigen::Vector2d NearestIn(const Eigen::AlignedBox2d& box, const Eigen::Vector2d& point) {
+  return point.cwiseMax(box.min()).cwiseMin(box.max());
+}
+
 // In large letters clear of objects, else in smaller ones, else over objects, else beside the room.
 void WriteRoom(const LabelledShape& room, const FloorView& view, picture::LabelLayout* with_objects,
                picture::LabelLayout* layout, picture::Canvas* canvas) {
@@ -204,6 +207,15 @@ void WriteAgents(const MapContent& content, const std::vector<Eigen::AlignedBox2
 
 }  // namespace
 
+Eigen::Vector2d Label::Size() const {
+  return {picture::Canvas::TextWidth(text, dot_px) + 2.0 * kPadPx,
+          dot_px * (picture::kCapHeightDots + picture::kDescentDots) + 2.0 * kPadPx};
+}
+
+Eigen::AlignedBox2d Label::At(const Eigen::Vector2d& middle) const {
+  return Eigen::AlignedBox2d(middle - 0.5 * Size(), middle + 0.5 * Size());
+}
+
 void DrawLabels(const MapContent& content, const std::set<NodeId>& named, const FloorView& view,
                 picture::LabelLayout* layout, picture::Canvas* canvas) {
   // No name hides an agent: where one stands says more than what a room is called.
@@ -232,17 +244,24 @@ void DrawLabels(const MapContent& content, const std::set<NodeId>& named, const 
   }
 }
 
-void WriteNameBeside(const Eigen::AlignedBox2d& thing_px, const std::string& name, uint32_t rgb,
-                     picture::LabelLayout* layout, picture::Canvas* canvas) {
-  const Label label{.text = name, .dot_px = kAgentDotPx, .rgb = rgb};
+std::optional<Eigen::AlignedBox2d> WriteNameBeside(const Eigen::AlignedBox2d& thing_px,
+                                                   const Label& label, picture::LabelLayout* layout,
+                                                   picture::Canvas* canvas) {
   // As close as possible.
-  for (const double off_px : {0.0, 30.0, 60.0, 100.0}) {
-    const Eigen::Vector2d off(off_px, off_px);
-    if (WriteBeside(Eigen::AlignedBox2d(thing_px.min() - off, thing_px.max() + off), label, layout,
-                    canvas)) {
-      return;
+  for (const double off_px : {0.0, 30.0, 60.0, 100.0, 150.0}) {
+    const std::optional<Eigen::AlignedBox2d> spot =
+        FirstFree(SpotsAround(thing_px, off_px, label), *layout);
+    if (!spot.has_value()) continue;
+    if (off_px > 0.0) {
+      canvas->DrawPolyline(
+          {NearestIn(thing_px, spot->center()), NearestIn(*spot, thing_px.center())}, 2.0,
+          picture::MakePaint(label.rgb, 0.7f));
     }
+    layout->Block(*spot);
+    WriteLabel(label, *spot, canvas);
+    return spot;
   }
+  return std::nullopt;
 }
 
 }  // namespace dsg::cli

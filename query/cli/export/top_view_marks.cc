@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <vector>
+#include <utility>
 
 #include "query/cli/table.h"
 #include "schema/picture/font.h"
@@ -15,6 +15,9 @@ namespace dsg::cli {
 namespace {
 
 constexpr double kLegendDotPx = 4.0;
+// Between a mark and its text, and between entries.
+constexpr double kLegendGapPx = 12.0;
+constexpr double kLegendApartPx = 44.0;
 constexpr double kMarkHalfPx = 11.0;
 constexpr uint32_t kRimRgb = 0xffffff;
 
@@ -65,9 +68,6 @@ void DrawMarkOf(const MapContent& content, const std::string& kind, const Eigen:
     const Eigen::Vector2d half(kMarkHalfPx, 0.4 * kMarkHalfPx);
     canvas->FillRect(middle - half, middle + half, picture::MakePaint(kWallRgb));
   } else if (kind == kinds::kPlace) {
-    const Eigen::Vector2d half(1.3 * kMarkHalfPx, 0.0);
-    canvas->DrawPolyline({middle - half, middle + half}, 2.0,
-                         picture::MakePaint(LayerColor(layers::kPlaces), 0.5f));
     canvas->FillCircle(middle, 6.0,
                        picture::MakePaint(PlaceColor(*first.node, ParentsOf(content))));
   } else if (kind == kinds::kObject) {
@@ -78,6 +78,19 @@ void DrawMarkOf(const MapContent& content, const std::string& kind, const Eigen:
                   first.has_track ? AgentColor(first.track_index) : LayerColor(layers::kAgents),
                   canvas);
   }
+}
+
+bool HasRelation(const MapContent& content, const char* relation) {
+  return std::any_of(content.edges.begin(), content.edges.end(),
+                     [&](const Edge& edge) { return edge.relation == relation; });
+}
+
+// A sample of a line.
+LegendEntry LineEntry(const std::string& text, double width_px, const picture::Paint& paint) {
+  return {.text = text, .draw = [=](const Eigen::Vector2d& middle, picture::Canvas* canvas) {
+            const Eigen::Vector2d half(1.3 * kMarkHalfPx, 0.0);
+            canvas->DrawPolyline({middle - half, middle + half}, width_px, paint);
+          }};
 }
 
 }  // namespace
@@ -101,23 +114,63 @@ void DrawAgentMark(const std::string& kind, const Eigen::Vector2d& middle, uint3
   }
 }
 
-void DrawLegend(const MapContent& content, const Eigen::Vector2d& low, double x_end,
-                picture::Canvas* canvas) {
+std::vector<LegendEntry> MapLegend(const MapContent& content) {
   constexpr std::array<const char*, 8> kKinds = {kinds::kRoom,    kinds::kStructure, kinds::kPlace,
                                                  kinds::kObject,  kinds::kRobot,     kinds::kHuman,
                                                  kinds::kVehicle, kinds::kAnimal};
-  double x = low.x();
+  std::vector<LegendEntry> entries;
   for (const char* kind : kKinds) {
     const auto count = std::count_if(content.nodes.begin(), content.nodes.end(),
                                      [&](const Node& node) { return node.kind == kind; });
     if (count == 0) continue;
-    const std::string text = Counted(count, kind);
-    const double end = x + 40.0 + picture::Canvas::TextWidth(text, kLegendDotPx);
-    if (end > x_end) continue;
-    const double middle_y = low.y() + 0.5 * kLegendDotPx * picture::kCapHeightDots;
-    DrawMarkOf(content, kind, {x + 14.0, middle_y}, canvas);
-    canvas->DrawText({x + 40.0, low.y()}, text, kLegendDotPx, picture::MakePaint(kInkRgb));
-    x = end + 44.0;
+    entries.push_back(
+        {.text = Counted(count, kind),
+         .draw = [&content, kind](const Eigen::Vector2d& middle, picture::Canvas* canvas) {
+           DrawMarkOf(content, kind, middle, canvas);
+         }});
+  }
+  if (HasRelation(content, relations::kAdjacent)) {
+    entries.push_back(LineEntry("neighbouring rooms", 4.0, picture::MakePaint(kRoomLinkRgb, 0.5f)));
+  }
+  if (HasRelation(content, relations::kTraversable)) {
+    entries.push_back(LineEntry("ways between places", 2.0,
+                                picture::MakePaint(LayerColor(layers::kPlaces), 0.5f)));
+  }
+  return entries;
+}
+
+int LegendRowsMax(int width_px) {
+  // Of the canvas, which is twice the size of the picture.
+  return std::max(1, static_cast<int>(0.25 * 2.0 * width_px / kLegendRowPx));
+}
+
+LegendRows::LegendRows(std::vector<LegendEntry> entries, const LegendSpace& space) {
+  int row = 0;
+  double x = 0.0;
+  for (LegendEntry& entry : entries) {
+    const double width =
+        entry.mark_px + kLegendGapPx + picture::Canvas::TextWidth(entry.text, kLegendDotPx);
+    if (width > space.width_px) continue;
+    if (x + width > (row == 0 ? space.first_width_px : space.width_px)) {
+      // A shorter one may still fit into the last row.
+      if (row + 1 >= space.row_count_max) continue;
+      ++row;
+      x = 0.0;
+    }
+    placed_.push_back({std::move(entry), Eigen::Vector2d(x, kLegendRowPx * row)});
+    x += width + kLegendApartPx;
+    row_count_ = row + 1;
+  }
+}
+
+void LegendRows::Draw(const Eigen::Vector2d& low, picture::Canvas* canvas) const {
+  const double half_letter_px = 0.5 * kLegendDotPx * picture::kCapHeightDots;
+  for (const Placed& placed : placed_) {
+    const Eigen::Vector2d at = low + placed.low;
+    const double mark_px = placed.entry.mark_px;
+    placed.entry.draw(at + Eigen::Vector2d(0.5 * mark_px, half_letter_px), canvas);
+    canvas->DrawText(at + Eigen::Vector2d(mark_px + kLegendGapPx, 0.0), placed.entry.text,
+                     kLegendDotPx, picture::MakePaint(kInkRgb));
   }
 }
 

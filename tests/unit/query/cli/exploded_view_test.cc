@@ -89,6 +89,31 @@ TEST(ExplodedView, OfAnEmptyMapIsItsTitle) {
   EXPECT_GE(RowsOf(picture, 0x2b2f3a)[0], 0);
 }
 
+TEST(ExplodedView, KeepsNamesInsideOfThePicture) {
+  MapContent content = WithBuilding();
+  for (Node& node : content.nodes) {
+    if (node.id == NodeId('R', 2)) node.name = "a storage room of a long name";
+  }
+  const Picture picture = DrawExplodedView(content, {.width_px = 800});
+  constexpr int kBorder = 7;
+  for (int y = 0; y < picture.height; ++y) {
+    for (int x = picture.width - kBorder; x < picture.width; ++x) {
+      const size_t i = 3 * static_cast<size_t>(y * picture.width + x);
+      const uint32_t rgb = static_cast<uint32_t>(picture.rgb[i]) << 16 |
+                           static_cast<uint32_t>(picture.rgb[i + 1]) << 8 | picture.rgb[i + 2];
+      ASSERT_EQ(rgb, kPaperRgb) << x << " " << y;
+    }
+  }
+}
+
+TEST(ExplodedView, HasALegendBelow) {
+  const MapContent content = WithBuilding();
+  const Picture picture = DrawExplodedView(content, {.width_px = 800});
+  // Only the legend is below the lowest level, with the mark of the human.
+  EXPECT_GT(RowsOf(picture, AgentColor(0))[1], picture.height - 90);
+  EXPECT_GE(RowsOf(picture, kInkRgb)[1], picture.height - 90);
+}
+
 TEST(ExplodedView, KeepsLongAndHighMapsInBounds) {
   for (const Eigen::Vector3d& far :
        {Eigen::Vector3d(0, 5000, 0), Eigen::Vector3d(5000, 0, 0), Eigen::Vector3d(0, 0, 5000)}) {

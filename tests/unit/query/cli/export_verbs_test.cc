@@ -101,6 +101,19 @@ TEST_F(ExportVerbs, WritesAllFilesOfOneRunAndTellsWhatIsInThem) {
   }
 }
 
+TEST_F(ExportVerbs, SaysThatAMapHasNoMesh) {
+  const std::string path = Path("m.ply");
+  const Outcome before = Ask({"export", "--ply", path, "--revision", "1"});
+  ASSERT_EQ(before.code, 0) << before.errors;
+  EXPECT_NE(before.errors.find("note: map example has no mesh at revision 1, so " + path +
+                               " has no vertices\n"),
+            std::string::npos)
+      << before.errors;
+  EXPECT_EQ(Ask({"export", "--ply", path, "--force"}).errors.find("no mesh"), std::string::npos);
+  EXPECT_EQ(Ask({"export", "--gltf", Path("a.glb"), "--revision", "1"}).errors.find("no mesh"),
+            std::string::npos);
+}
+
 TEST_F(ExportVerbs, WritesTheMeshOfOneNode) {
   // All of it lies in the first room.
   for (const auto& [room, faces] : {std::pair{"R1", "4"}, {"R2", "0"}}) {
@@ -231,7 +244,7 @@ TEST_F(ExportVerbs, TheEndingOfAFileSaysItsFormatOrIsRefused) {
                                            {"map", "--png", "a.jpg"}}) {
     const Outcome outcome = Ask({verb, option, Path(name)});
     EXPECT_EQ(outcome.code, 2) << option;
-    EXPECT_NE(outcome.errors.find("end the name in ."), std::string::npos) << outcome.errors;
+    EXPECT_NE(outcome.errors.find(" is written: "), std::string::npos) << outcome.errors;
     EXPECT_FALSE(fs::exists(Path(name)));
   }
   EXPECT_EQ(Ask({"map", "--png", Path("A.PNG"), "--width", "200"}).code, 0);

@@ -100,6 +100,32 @@ TEST(Overlay, LegendHasARowOfItsOwn) {
   EXPECT_GT(CountOf(Draw(keyed), kRed), 30);
 }
 
+TEST(Overlay, LegendExplainsShapes) {
+  Overlay line;
+  line.legend.push_back({"enters", kRed});
+  Overlay ring;
+  ring.legend.push_back({.text = "enters", .rgb = kRed, .shape = OverlayMark::Shape::kRing});
+  Overlay dot;
+  dot.legend.push_back({.text = "leaves", .rgb = kRed, .shape = OverlayMark::Shape::kDot});
+  EXPECT_EQ(OverlayLegend(ring).size(), 1u);
+  EXPECT_LT(OverlayLegend(ring)[0].mark_px, OverlayLegend(line)[0].mark_px);
+  EXPECT_GT(CountOf(Draw(ring), kRed), 5);
+  EXPECT_GT(CountOf(Draw(dot), kRed), CountOf(Draw(ring), kRed));
+}
+
+// Better over a line than nowhere.
+TEST(Overlay, LabelsMayCoverLines) {
+  constexpr uint32_t kBlue = 0x0000ff;
+  Overlay crowded;
+  for (double y = 0.0; y <= 4.0; y += 0.1) {
+    crowded.lines.push_back({.points_map = {{0.0, y, 0.0}, {8.0, y, 0.0}}, .rgb = kRed});
+  }
+  crowded.marks.push_back({.position_map = {4.0, 2.0, 0.0}, .rgb = kBlue});
+  const int unnamed = CountOf(Draw(crowded), kBlue);
+  crowded.marks[0].label = "MMMMMMMM";
+  EXPECT_GT(CountOf(Draw(crowded), kBlue), unnamed + 5);
+}
+
 TEST(Overlay, OfOnePointAndOfNothingIsNoFault) {
   Overlay odd;
   odd.lines.push_back({.points_map = {{1.0, 1.0, 0.0}}, .rgb = kRed});

@@ -214,6 +214,14 @@ TEST(CollisionText, TellsHitFreeAndUnknown) {
             "hit predicted agent carol (H1) at x 0.00 y 0.00 z 0.00 m");
 }
 
+TEST(ChanceText, IsInWholePerCent) {
+  EXPECT_EQ(ChanceText(1.0), "100 %");
+  EXPECT_EQ(ChanceText(0.894), "89 %");
+  EXPECT_EQ(ChanceText(0.01), "1 %");
+  EXPECT_EQ(ChanceText(0.0099), "<1 %");
+  EXPECT_EQ(ChanceText(0.0), "<1 %");
+}
+
 TEST(RenderPrediction, GivesWaysAndTheStepsOfTheFirst) {
   v1::PredictAgentResponse reply;
   reply.set_agent_id("H1");

@@ -6,12 +6,21 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
+#include <string>
+#include <unordered_set>
+#include <vector>
 
 #include "query/cli/export/map_content.h"
 #include "query/cli/export/outline.h"
+#include "query/cli/export/top_view_labels.h"
+#include "query/cli/export/top_view_marks.h"
 #include "schema/base/random.h"
 #include "schema/base/status.h"
+#include "schema/picture/font.h"
 #include "schema/picture/look.h"
+#include "schema/picture/raster.h"
+#include "tests/unit/query/cli/cli_test_util.h"
 #include "tests/unit/query/cli/example_content.h"
 
 namespace dsg::cli {
@@ -154,6 +163,111 @@ TEST(TopView, DrawsASlantedWallAsALineInItsBox) {
   EXPECT_LT(line, 3000);
 }
 
+Node WallFrom(uint64_t index, double low_m, double high_m) {
+  Node wall =
+      test::MakeNode(NodeId('S', index), kinds::kStructure, "", {1.5, 0.4, 0.5 * (low_m + high_m)});
+  wall.layer = layers::kStructures;
+  wall.structure = StructureInfo{"wall", Eigen::Vector3d::UnitY(), -0.4, 0};
+  const Eigen::Vector3d half(0.5, 0.1, 0.5 * (high_m - low_m));
+  wall.box_node = Box3d(-half, half);
+  return wall;
+}
+
+Node RoomFrom(uint64_t index, double low_m, double high_m) {
+  Node room = test::MakeNode(NodeId('R', index), kinds::kRoom, "", {4.0, 2.0, low_m});
+  room.layer = layers::kRooms;
+  room.region = RegionInfo{{{0, 0}, {8, 0}, {8, 4}, {0, 4}}, low_m, high_m, {}};
+  return room;
+}
+
+TEST(TopView, LeavesDoorsOpenBelowTheirWalls) {
+  constexpr int kWidth = 801;
+  const double px_per_m = (kWidth - 108.0) / 8.0;
+  const int x = static_cast<int>(78.0 + 1.5 * px_per_m);
+  const int y = static_cast<int>(65.0 + (4.0 - 0.4) * px_per_m);
+  MapContent content;
+  content.nodes = {RoomFrom(1, 0.0, 3.0), WallFrom(1, 0.0, 3.0)};
+  EXPECT_EQ(At(DrawTopView(content, {.width_px = kWidth}), x, y), ColorOf(kWallRgb));
+  content.nodes[1] = WallFrom(1, 2.1, 3.0);
+  EXPECT_NE(At(DrawTopView(content, {.width_px = kWidth}), x, y), ColorOf(kWallRgb));
+}
+
+TEST(OverHead, IsMeasuredFromTheFloorOfEachStorey) {
+  const std::unordered_set<NodeId> lintels = {NodeId('S', 2), NodeId('S', 4)};
+  MapContent content;
+  // Two storeys, each with a wall and the piece over its door.
+  content.nodes = {WallFrom(1, 0.0, 3.0), WallFrom(2, 2.1, 3.0), WallFrom(3, 3.0, 6.0),
+                   WallFrom(4, 5.1, 6.0)};
+  EXPECT_EQ(StructuresOverHead(content), lintels) << "beside other walls";
+  content.nodes.push_back(RoomFrom(1, 0.0, 3.0));
+  content.nodes.push_back(RoomFrom(2, 3.0, 6.0));
+  EXPECT_EQ(StructuresOverHead(content), lintels) << "in rooms";
+  for (uint64_t wall = 1; wall <= 4; ++wall) {
+    content.edges.push_back(
+        test::MakeEdge(NodeId('S', wall), relations::kEncloses, NodeId('R', wall <= 2 ? 1 : 2)));
+  }
+  EXPECT_EQ(StructuresOverHead(content), lintels) << "of rooms";
+  // Its own room says more than the lower one around it.
+  content.nodes.push_back(RoomFrom(3, 1.0, 4.0));
+  content.edges[1].target = NodeId('R', 3);
+  EXPECT_EQ(StructuresOverHead(content), std::unordered_set<NodeId>{NodeId('S', 4)});
+}
+
+std::vector<std::string> TextsOf(const std::vector<LegendEntry>& entries) {
+  std::vector<std::string> texts;
+  for (const LegendEntry& entry : entries) texts.push_back(entry.text);
+  return texts;
+}
+
+TEST(Legend, HasTheLinesThatAreDrawnAndNoOthers) {
+  MapContent content = test::ExampleContent();
+  using Texts = std::vector<std::string>;
+  const Texts kinds_only = {"2 rooms", "1 structure", "2 places", "1 object", "1 human"};
+  Texts with_ways = kinds_only;
+  with_ways.push_back("ways between places");
+  EXPECT_EQ(TextsOf(MapLegend(content)), with_ways);
+  Texts with_both = kinds_only;
+  with_both.insert(with_both.end(), {"neighbouring rooms", "ways between places"});
+  content.edges.push_back(test::MakeEdge(NodeId('R', 1), relations::kAdjacent, NodeId('R', 2)));
+  EXPECT_EQ(TextsOf(MapLegend(content)), with_both);
+  content.edges.clear();
+  EXPECT_EQ(TextsOf(MapLegend(content)), kinds_only);
+}
+
+TEST(Legend, GoesOnInTheNextRowAndLeavesOutWhatHasNoSpace) {
+  const MapContent content = test::ExampleContent();
+  const auto height = [&](const LegendSpace& space) {
+    return LegendRows(MapLegend(content), space).height_px();
+  };
+  EXPECT_EQ(height({5000.0, 5000.0, 9}), kLegendRowPx);
+  EXPECT_GE(height({800.0, 800.0, 9}), 2.0 * kLegendRowPx);
+  EXPECT_EQ(height({800.0, 800.0, 1}), kLegendRowPx);
+  // Nothing fits beside the scale of a narrow picture.
+  EXPECT_EQ(height({10.0, 5000.0, 9}), 2.0 * kLegendRowPx);
+  EXPECT_EQ(height({10.0, 10.0, 9}), 0.0);
+}
+
+TEST(Names, MoveAsideBeforeTheyAreDropped) {
+  const Eigen::AlignedBox2d area(Eigen::Vector2d(0.0, 0.0), Eigen::Vector2d(1000.0, 1000.0));
+  picture::Canvas canvas(1000, 1000, picture::MakePaint(kPaperRgb));
+  picture::LabelLayout layout(area);
+  const Eigen::AlignedBox2d thing(Eigen::Vector2d(490.0, 490.0), Eigen::Vector2d(510.0, 510.0));
+  layout.Block(thing);
+  std::vector<Eigen::AlignedBox2d> spots;
+  for (int i = 0; i < 8; ++i) {
+    const std::optional<Eigen::AlignedBox2d> spot =
+        WriteNameBeside(thing, {.text = "+90.9s", .dot_px = kAgentDotPx}, &layout, &canvas);
+    ASSERT_TRUE(spot.has_value()) << i;
+    EXPECT_FALSE(layout.IsFree(*spot));
+    for (const Eigen::AlignedBox2d& other : spots) {
+      EXPECT_LE(other.intersection(*spot).sizes().minCoeff(), 1e-9) << i;
+    }
+    spots.push_back(*spot);
+  }
+  layout.Block(area);
+  EXPECT_FALSE(WriteNameBeside(thing, {.text = "+90.9s"}, &layout, &canvas).has_value());
+}
+
 TEST(TopView, IsTheSameForTheSameMap) {
   const MapContent content = test::ExampleContent();
   EXPECT_EQ(DrawTopView(content, {.title = "a"}).rgb, DrawTopView(content, {.title = "a"}).rgb);
@@ -216,12 +330,18 @@ TEST(FloorChoice, KeepsTracksThatLieOnTheFloorAndCutsWaysThatLeaveIt) {
   overlay.lines.push_back(
       {.points_map = {{0, 0, 0}, {1, 0, 0}, {2, 0, 3.5}, {3, 0, 0}, {4, 0, 0}}});
   overlay.marks = {{.position_map = {1, 1, 1}}, {.position_map = {1, 1, 4}}};
+  overlay.marks[1].shape = OverlayMark::Shape::kRing;
+  overlay.legend = {{"way"},
+                    {.text = "leaves", .shape = OverlayMark::Shape::kDot},
+                    {.text = "enters", .shape = OverlayMark::Shape::kRing}};
   overlay.outlines = {{.height_m = 1.0}, {.height_m = 4.0}};
   KeepFloor({0.0, 3.0}, &overlay);
   ASSERT_EQ(overlay.lines.size(), 2u);
   EXPECT_EQ(overlay.lines[1].points_map.front().x(), 3.0);
   EXPECT_EQ(overlay.marks.size(), 1u);
   EXPECT_EQ(overlay.outlines.size(), 1u);
+  ASSERT_EQ(overlay.legend.size(), 2u);
+  EXPECT_EQ(overlay.legend[1].text, "leaves");
 }
 
 TEST(Outline, IsTheHullOfTheTurnedBox) {
