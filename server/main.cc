@@ -21,6 +21,7 @@
 #include "schema/base/byte_size.h"
 #include "schema/base/log.h"
 #include "schema/base/status.h"
+#include "schema/program/command_line.h"
 #include "schema/program/manual.h"
 #include "schema/retention/policy_file.h"
 #include "schema/store/graph_store.h"
@@ -241,13 +242,9 @@ int main(int argc, char** argv) {
   Flags flags;
   CLI::App app("Serves the maps of a store folder over gRPC, and over HTTP if asked to.",
                "dsg-server");
-  try {
-    DeclareFlags(&app, &flags);
-    dsg::AddManual(&app, DSG_VERSION);
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
+  DeclareFlags(&app, &flags);
+  dsg::AddManual(&app, DSG_VERSION);
+  if (const std::optional<int> end = dsg::ReadCommandLine(argc, argv, &app)) return *end;
   if (!dsg::SetLogLevel(flags.log_level)) {
     std::fprintf(stderr, "dsg-server: --log-level is \"%s\"; give debug, info, warning or error\n",
                  flags.log_level.c_str());

@@ -27,8 +27,8 @@
 #include "ingest/evaluation/store_reader.h"
 #include "ingest/truth/body_file.h"
 #include "ingest/truth/truth.h"
-#include "schema/base/exit_code.h"
 #include "schema/base/status.h"
+#include "schema/program/command_line.h"
 #include "schema/program/manual.h"
 #include "schema/store/graph_store.h"
 
@@ -287,14 +287,6 @@ absl::Status Run(const Flags& flags) {
   return absl::OkStatus();
 }
 
-ExitCode ReportError(const absl::Status& status) {
-  if (status.ok()) return kDone;
-  std::fprintf(stderr, "dsg-eval: %s: %s\n",
-               std::string(absl::StatusCodeToString(status.code())).c_str(),
-               std::string(status.message()).c_str());
-  return ExitCodeOf(status);
-}
-
 int Main(int argc, char** argv) {
   CLI::App app(
       "dsg-eval: scores a map against the ground truth of a simulated log, or a trajectory against "
@@ -304,19 +296,11 @@ int Main(int argc, char** argv) {
   AddMapFlags(&app, &flags);
   AddTrackFlags(&app, &flags);
   AddManual(&app, DSG_VERSION);
-  try {
-    app.parse(argc, argv);
-    CheckTogether(app, &flags);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kDone : kUsage;
-  }
-  return ReportError(Run(flags));
+  app.callback([&] { CheckTogether(app, &flags); });
+  return RunProgram(argc, argv, &app, [&] { return Run(flags); });
 }
 
 }  // namespace
 }  // namespace dsg::evaluation
 
-int main(int argc, char** argv) {
-  const int code = dsg::evaluation::Main(argc, argv);
-  return code == dsg::kDone ? dsg::evaluation::ReportError(dsg::FinishOutput()) : code;
-}
+int main(int argc, char** argv) { return dsg::evaluation::Main(argc, argv); }

@@ -21,8 +21,8 @@
 #include "ingest/loop/g2o_file.h"
 #include "ingest/loop/optimize.h"
 #include "ingest/loop/robust.h"
-#include "schema/base/exit_code.h"
 #include "schema/base/status.h"
+#include "schema/program/command_line.h"
 #include "schema/program/manual.h"
 
 namespace dsg::ingest {
@@ -270,26 +270,13 @@ absl::Status OptimizeFile(const Flags& flags) {
   return absl::OkStatus();
 }
 
-ExitCode ReportError(const absl::Status& status) {
-  if (status.ok()) return kDone;
-  std::fprintf(stderr, "dsg-optimize: %s: %s\n",
-               std::string(absl::StatusCodeToString(status.code())).c_str(),
-               std::string(status.message()).c_str());
-  return ExitCodeOf(status);
-}
-
 int Main(int argc, char** argv) {
   CLI::App app("dsg-optimize: finds the poses that agree best with what was measured between them",
                "dsg-optimize");
   Flags flags;
   AddFlags(&app, &flags);
   AddManual(&app, DSG_VERSION);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kDone : kUsage;
-  }
-  return ReportError(OptimizeFile(flags));
+  return RunProgram(argc, argv, &app, [&] { return OptimizeFile(flags); });
 }
 
 }  // namespace
@@ -298,6 +285,5 @@ int Main(int argc, char** argv) {
 int main(int argc, char** argv) {
   // A file over the limit of the shell is a failed write with a message, not a sudden end.
   std::signal(SIGXFSZ, SIG_IGN);
-  const int code = dsg::ingest::Main(argc, argv);
-  return code == dsg::kDone ? dsg::ingest::ReportError(dsg::FinishOutput()) : code;
+  return dsg::ingest::Main(argc, argv);
 }

@@ -14,8 +14,8 @@
 #include "ingest/alignment/map_alignment.h"
 #include "ingest/config/option_flags.h"
 #include "ingest/program/progress.h"
-#include "schema/base/exit_code.h"
 #include "schema/base/status.h"
+#include "schema/program/command_line.h"
 #include "schema/program/manual.h"
 #include "schema/store/graph_store.h"
 
@@ -112,32 +112,16 @@ absl::Status Align(Flags& flags) {
   return absl::OkStatus();
 }
 
-ExitCode ReportError(const absl::Status& status) {
-  if (status.ok()) return kDone;
-  std::fprintf(stderr, "dsg-align: %s: %s\n",
-               std::string(absl::StatusCodeToString(status.code())).c_str(),
-               std::string(status.message()).c_str());
-  return ExitCodeOf(status);
-}
-
 int AlignMain(int argc, char** argv) {
   CLI::App app("dsg-align: finds where a map is in another one from places that both have seen",
                "dsg-align");
   Flags flags;
   AddFlags(&app, &flags);
   AddManual(&app, DSG_VERSION);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kDone : kUsage;
-  }
-  return ReportError(Align(flags));
+  return RunProgram(argc, argv, &app, [&] { return Align(flags); });
 }
 
 }  // namespace
 }  // namespace dsg::ingest
 
-int main(int argc, char** argv) {
-  const int code = dsg::ingest::AlignMain(argc, argv);
-  return code == dsg::kDone ? dsg::ingest::ReportError(dsg::FinishOutput()) : code;
-}
+int main(int argc, char** argv) { return dsg::ingest::AlignMain(argc, argv); }

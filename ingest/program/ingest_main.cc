@@ -29,8 +29,8 @@
 #include "ingest/program/run_report.h"
 #include "ingest/program/yield.h"
 #include "schema/base/allocator.h"
-#include "schema/base/exit_code.h"
 #include "schema/base/status.h"
+#include "schema/program/command_line.h"
 #include "schema/program/manual.h"
 
 namespace dsg::ingest {
@@ -440,14 +440,6 @@ absl::Status Run(const IngestFlags& flags) {
   return absl::OkStatus();
 }
 
-ExitCode Report(const absl::Status& status) {
-  if (status.ok()) return kDone;
-  std::fprintf(stderr, "dsg-ingest: %s: %s\n",
-               std::string(absl::StatusCodeToString(status.code())).c_str(),
-               std::string(status.message()).c_str());
-  return ExitCodeOf(status);
-}
-
 // The first option that is given an empty value, as of a variable of the shell that is not set; it
 // would count as 0, or as not given. A prefix may be empty.
 const CLI::Option* FirstEmpty(const CLI::App& app) {
@@ -460,6 +452,31 @@ const CLI::Option* FirstEmpty(const CLI::App& app) {
   return nullptr;
 }
 
+// What CLI11's own checks cannot see. Throws CLI::ParseError.
+void CheckTogether(const CLI::App& app, const IngestFlags& flags) {
+  if (const CLI::Option* const empty = FirstEmpty(app)) {
+    throw CLI::ValidationError(
+        absl::StrCat(empty->get_name(), " has an empty value; give one, or leave the option out"));
+  }
+  if (flags.store.empty() && flags.server.empty()) {
+    throw CLI::ValidationError("give --store DIR or --server ADDR");
+  }
+  if (flags.is_dry_run && !flags.server.empty()) {
+    throw CLI::ValidationError("--dry-run works on a copy of a local map; leave --server out");
+  }
+  const SpaceLimits usual;
+  if (!flags.server.empty() && (flags.limits.quota_bytes != usual.quota_bytes ||
+                                flags.limits.reserve_bytes != usual.reserve_bytes)) {
+    throw CLI::ValidationError(
+        "--quota and --reserve are of a local store; leave them out with --server");
+  }
+  if (flags.server.empty() && flags.retry_for != IngestFlags().retry_for) {
+    throw CLI::ValidationError(
+        "--retry-for is how long a server that does not answer is waited for, and a local store is "
+        "not waited for; leave it out without --server");
+  }
+}
+
 int Main(int argc, char** argv) {
   CLI::App app("dsg-ingest: reads logs and scene graphs into a map of a dynamic scene graph store",
                "dsg-ingest");
@@ -468,44 +485,8 @@ int Main(int argc, char** argv) {
   AddIngestFlags(&app, &flags);
   AddConfigFile(&app);
   AddManual(&app, DSG_VERSION);
-  app.failure_message([](const CLI::App* program, const CLI::Error& error) {
-    return absl::StrCat(program->get_name(), ": ", CLI::FailureMessage::simple(program, error));
-  });
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kDone : kUsage;
-  }
-  if (const CLI::Option* const empty = FirstEmpty(app)) {
-    std::fprintf(stderr, "dsg-ingest: %s has an empty value; give one, or leave the option out\n",
-                 empty->get_name().c_str());
-    return kUsage;
-  }
-  if (flags.store.empty() && flags.server.empty()) {
-    std::fputs("dsg-ingest: give --store DIR or --server ADDR\n", stderr);
-    return kUsage;
-  }
-  if (flags.is_dry_run && !flags.server.empty()) {
-    std::fputs("dsg-ingest: --dry-run works on a copy of a local map; leave --server out\n",
-               stderr);
-    return kUsage;
-  }
-  const SpaceLimits usual;
-  if (!flags.server.empty() && (flags.limits.quota_bytes != usual.quota_bytes ||
-                                flags.limits.reserve_bytes != usual.reserve_bytes)) {
-    std::fputs(
-        "dsg-ingest: --quota and --reserve are of a local store; leave them out with --server\n",
-        stderr);
-    return kUsage;
-  }
-  if (flags.server.empty() && flags.retry_for != IngestFlags().retry_for) {
-    std::fputs(
-        "dsg-ingest: --retry-for is how long a server that does not answer is waited for, and a "
-        "local store is not waited for; leave it out without --server\n",
-        stderr);
-    return kUsage;
-  }
-  return Report(Run(flags));
+  app.callback([&] { CheckTogether(app, flags); });
+  return RunProgram(argc, argv, &app, [&] { return Run(flags); });
 }
 
 }  // namespace
@@ -516,6 +497,5 @@ int main(int argc, char** argv) {
   dsg::KeepFreedMemory(size_t{64} << 20);
   // A file over the limit of the shell is a failed write with a message, not a sudden end.
   std::signal(SIGXFSZ, SIG_IGN);
-  const int code = dsg::ingest::Main(argc, argv);
-  return code == dsg::kDone ? dsg::ingest::Report(dsg::FinishOutput()) : code;
+  return dsg::ingest::Main(argc, argv);
 }

@@ -20,9 +20,9 @@
 #include "ingest/overlay/draw_overlay.h"
 #include "ingest/overlay/map_scene.h"
 #include "ingest/program/progress.h"
-#include "schema/base/exit_code.h"
 #include "schema/base/status.h"
 #include "schema/files/atomic_file.h"
+#include "schema/program/command_line.h"
 #include "schema/program/manual.h"
 #include "schema/store/graph_store.h"
 
@@ -280,31 +280,15 @@ absl::Status DrawOverlays(const OverlayFlags& flags) {
   return run.Tell();
 }
 
-ExitCode ReportOverlay(const absl::Status& status) {
-  if (status.ok()) return kDone;
-  std::fprintf(stderr, "dsg-overlay: %s: %s\n",
-               std::string(absl::StatusCodeToString(status.code())).c_str(),
-               std::string(status.message()).c_str());
-  return ExitCodeOf(status);
-}
-
 int OverlayMain(int argc, char** argv) {
   CLI::App app("dsg-overlay: draws what a map has over the images of its log", "dsg-overlay");
   OverlayFlags flags;
   AddOverlayFlags(&app, &flags);
   AddManual(&app, DSG_VERSION);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kDone : kUsage;
-  }
-  return ReportOverlay(DrawOverlays(flags));
+  return RunProgram(argc, argv, &app, [&] { return DrawOverlays(flags); });
 }
 
 }  // namespace
 }  // namespace dsg::ingest
 
-int main(int argc, char** argv) {
-  const int code = dsg::ingest::OverlayMain(argc, argv);
-  return code == dsg::kDone ? dsg::ingest::ReportOverlay(dsg::FinishOutput()) : code;
-}
+int main(int argc, char** argv) { return dsg::ingest::OverlayMain(argc, argv); }

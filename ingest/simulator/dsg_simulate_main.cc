@@ -3,12 +3,14 @@
 // Refuses to do anything but choose the verb and print its error.
 #include <CLI/CLI.hpp>
 #include <iostream>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "ingest/simulator/cli/command.h"
 #include "schema/base/allocator.h"
+#include "schema/program/command_line.h"
 #include "schema/program/manual.h"
 
 namespace {
@@ -27,6 +29,7 @@ int main(int argc, char** argv) {
                "dsg-simulate");
   app.set_version_flag("--version", DSG_VERSION);
   app.require_subcommand(1);
+  dsg::UseVerbUsage(&app);
   CLI::App* tracks =
       app.add_subcommand("tracks", "People walking between rooms and a robot touring them");
   CLI::App* sensors = app.add_subcommand(
@@ -39,12 +42,9 @@ int main(int argc, char** argv) {
       {sensors, dsg::simulator::AddSensorsCommand(sensors)},
       {drift, dsg::simulator::AddDriftCommand(drift)},
       {preview, dsg::simulator::AddPreviewCommand(preview)}};
+  for (const auto& [verb, command] : commands) verb->group("Verbs");
   dsg::AddManual(&app, DSG_VERSION);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kExitUsage;
-  }
+  if (const std::optional<int> end = dsg::ReadCommandLine(argc, argv, &app)) return *end;
   for (const auto& [verb, command] : commands) {
     if (!verb->parsed()) continue;
     const absl::Status status = command();

@@ -2,6 +2,7 @@
 #include "query/cli/completion.h"
 
 #include <algorithm>
+#include <array>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
@@ -12,11 +13,16 @@ namespace {
 
 constexpr char kBash[] = R"sh(# Completion of dsg for bash: source <(dsg completion bash)
 _dsg_complete() {
-  local word
+  local found word
   COMPREPLY=()
+  if found=$("${COMP_WORDS[0]}" completion words -- "${COMP_WORDS[@]:1:COMP_CWORD}" 2>/dev/null)
+  then
+    # No file may stand here.
+    compopt +o default +o bashdefault 2>/dev/null
+  fi
   while IFS= read -r word; do
-    COMPREPLY+=("$(printf '%q' "$word")")
-  done < <("${COMP_WORDS[0]}" completion words -- "${COMP_WORDS[@]:1:COMP_CWORD}" 2>/dev/null)
+    [[ -n $word ]] && COMPREPLY+=("$(printf '%q' "$word")")
+  done <<< "$found"
 }
 complete -o default -o bashdefault -F _dsg_complete dsg
 )sh";
@@ -24,11 +30,13 @@ complete -o default -o bashdefault -F _dsg_complete dsg
 constexpr char kZsh[] = R"sh(#compdef dsg
 # Completion of dsg for zsh: source <(dsg completion zsh)
 _dsg_complete() {
+  local text is_file=0
+  text="$("${words[1]}" completion words -- "${(@)words[2,CURRENT]}" 2>/dev/null)" || is_file=1
   local -a found
-  found=("${(@f)$("${words[1]}" completion words -- "${(@)words[2,CURRENT]}" 2>/dev/null)}")
+  found=("${(@f)text}")
   if [[ -n "${found[1]}" ]]; then
     compadd -- "${found[@]}"
-  else
+  elif (( is_file )); then
     _files
   fi
 }
@@ -43,9 +51,10 @@ constexpr char kFish[] = R"sh(# Completion of dsg for fish: dsg completion fish 
 function __dsg_complete
     set -l typed (commandline -opc)
     set -l found ($typed[1] completion words -- $typed[2..-1] "$(commandline -ct)" 2>/dev/null)
+    set -l code $status
     if test (count $found) -gt 0
         printf '%s\n' $found
-    else
+    else if test $code -ne 0
         __fish_complete_path (commandline -ct)
     end
 end
@@ -76,6 +85,14 @@ std::vector<std::string> Choices(const CLI::Option& option) {
   return absl::StrSplit(type.substr(begin + 1, end - begin - 1), ',');
 }
 
+bool IsFile(const CLI::Option& option, const std::string& name) {
+  constexpr std::array<absl::string_view, 11> kFiles = {
+      "store", "out", "tum", "csv", "obj", "policy", "mesh", "FILE", "DIR", "OUT", "PATH"};
+  // Of EndsIn.
+  if (absl::StrContains(option.get_type_name(), "FILE.")) return true;
+  return std::find(kFiles.begin(), kFiles.end(), name) != kFiles.end();
+}
+
 WordKind KindOf(const CLI::Option& option) {
   const std::string name =
       option.get_positional() ? option.get_name(true) : option.get_lnames().front();
@@ -83,6 +100,11 @@ WordKind KindOf(const CLI::Option& option) {
   if (name == "AGENT" || name == "OTHER") return WordKind::kAgent;
   if (name == "map" || name == "beside" || name == "MAP" || name == "OLD") return WordKind::kMap;
   if (name == "room") return WordKind::kRegion;
+  if (name == "layer") return WordKind::kLayer;
+  if (name == "kind") return WordKind::kKind;
+  if (name == "class") return WordKind::kClass;
+  if (name == "relation") return WordKind::kRelation;
+  if (IsFile(option, name)) return WordKind::kFile;
   const bool is_node = name == "ID" || name == "FROM" || name == "TO" || name == "node" ||
                        name == "parent" || name == "source" || name == "target" ||
                        name == "object" || name == "avoid" || name == "ignore";

@@ -10,14 +10,27 @@
 
 namespace dsg::cli {
 
-/// What a word is, for words that depend on the maps of the store.
-enum class WordKind { kNone, kMap, kTag, kAgent, kRegion, kNode };
+/// What a word is, for words that depend on the maps of the store, and for files.
+enum class WordKind {
+  kNone,
+  kMap,
+  kTag,
+  kAgent,
+  kRegion,
+  kNode,
+  kLayer,
+  kKind,
+  kClass,
+  kRelation,
+  /// A file or a folder: the shell knows them.
+  kFile
+};
 
 /// What may stand at the end of a command line.
 struct Completion {
   /// Words that begin with what is typed.
   std::vector<std::string> words;
-  /// What else may stand there; kNone also where only a file or a number may.
+  /// What else may stand there; kNone also where only a number may.
   WordKind kind = WordKind::kNone;
 };
 

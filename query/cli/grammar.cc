@@ -4,15 +4,17 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "query/cli/export/top_view.h"
-#include "schema/base/spelling.h"
 #include "schema/base/time.h"
+#include "schema/program/command_line.h"
 #include "schema/program/manual.h"
 
 namespace dsg::cli {
@@ -91,6 +93,7 @@ absl::Status Usage(const std::string& message, const std::string& verb) {
 Grammar::Grammar(const std::string& version) {
   app_.name("dsg");
   app_.require_subcommand(1);
+  UseVerbUsage(&app_);
   app_.footer(absl::StrCat("dsg help VERB explains a verb.\n", kTimeHelp));
   AddManual(&app_, version);
 }
@@ -134,25 +137,6 @@ CLI::App* Grammar::AddApp(const std::string& name, const std::string& what,
 
 namespace {
 
-std::vector<std::string> NamesOfVerbs(const CLI::App& app) {
-  std::vector<std::string> names;
-  const auto any = [](const CLI::App*) { return true; };
-  for (const CLI::App* verb : app.get_subcommands(any)) names.push_back(verb->get_name());
-  return names;
-}
-
-// Options near in spelling to the first of the words that looks like one.
-std::string OptionHint(const CLI::App& verb, const std::vector<std::string>& words) {
-  std::vector<std::string> known;
-  for (const CLI::Option* option : verb.get_options()) {
-    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
-  }
-  for (const std::string& word : words) {
-    if (absl::StartsWith(word, "--")) return NearHint(word.substr(0, word.find('=')), known);
-  }
-  return "";
-}
-
 // "help VERB" as "VERB --help".
 void ReplaceHelp(std::vector<std::string>* arguments) {
   if (arguments->empty() || (*arguments)[0] != "help") return;
@@ -160,40 +144,32 @@ void ReplaceHelp(std::vector<std::string>* arguments) {
   if (arguments->size() <= 1) arguments->push_back("--help");
 }
 
+// Help is asked for of a word that is no verb.
+bool NamesNoVerb(const CLI::App& app) {
+  const std::vector<std::string> words = app.remaining();
+  return app.get_subcommands().empty() && !words.empty() && !absl::StartsWith(words[0], "-");
+}
+
 }  // namespace
 
 absl::Status Grammar::Parse(std::vector<std::string> arguments) {
   ReplaceHelp(&arguments);
-  // CLI11 would only say that a subcommand is missing.
-  if (arguments.empty()) return Usage("name a verb: where, who, find, path, ...", "");
-  if (arguments[0] == "--version") arguments[0] = "version";
-  const std::string first = arguments[0];
-  const auto is_first = [&](const CLI::App* verb) { return verb->check_name(first); };
-  const bool is_verb = !app_.get_subcommands(is_first).empty();
-  if (!is_verb && first != "-h" && first != "--help" && first != kManualFlag) {
-    return Usage(
-        absl::StrCat("there is no verb \"", first, "\"", NearHint(first, NamesOfVerbs(app_))), "");
-  }
+  if (!arguments.empty() && arguments[0] == "--version") arguments[0] = "version";
   // CLI11 takes them last first.
   std::reverse(arguments.begin(), arguments.end());
   try {
     app_.parse(std::move(arguments));
-  } catch (const CLI::CallForHelp&) {
+  } catch (const CLI::CallForHelp& call) {
+    if (NamesNoVerb(app_)) return absl::InvalidArgumentError(UsageMessage(app_, call));
     // The help of the verb, if one is named.
     command_.help = app_.help();
   } catch (const CLI::CallForVersion& manual) {
     command_.help = absl::StrCat(manual.what(), "\n");
   } catch (const CLI::ParseError& error) {
-    // A misspelt option is also missing; the word is what helps.
-    const std::vector<std::string> unknown = app_.remaining(true);
-    if (is_verb && !unknown.empty()) {
-      return Usage(absl::StrCat("not understood: ", absl::StrJoin(unknown, " "),
-                                OptionHint(*app_.get_subcommand(first), unknown)),
-                   first);
-    }
-    return Usage(error.what(), is_verb ? first : "");
+    return absl::InvalidArgumentError(UsageMessage(app_, error));
   }
-  return is_verb ? CheckNothingIsEmpty(first) : absl::OkStatus();
+  const std::vector<CLI::App*> verbs = app_.get_subcommands();
+  return verbs.empty() ? absl::OkStatus() : CheckNothingIsEmpty(verbs.front()->get_name());
 }
 
 absl::Status Grammar::CheckNothingIsEmpty(const std::string& verb) const {
@@ -261,15 +237,32 @@ CLI::Validator Between(double low, double high) {
                    [low, high](double number) { return number >= low && number <= high; });
 }
 
+namespace {
+
+// The format of files that end so.
+std::string FormatName(const std::string& ending) {
+  if (ending == ".glb") return "binary glTF";
+  if (ending == ".geojson") return "GeoJSON";
+  // Of Spark-DSG, text or binary.
+  if (ending == ".json") return "a Spark-DSG graph";
+  return absl::AsciiStrToUpper(ending.substr(1));
+}
+
+}  // namespace
+
 CLI::Validator EndsIn(const std::vector<std::string>& endings) {
   const auto check = [endings](const std::string& path) {
     const bool fits = std::any_of(endings.begin(), endings.end(), [&](const std::string& ending) {
       return path.size() > ending.size() && absl::EndsWithIgnoreCase(path, ending);
     });
-    if (fits) return std::string();
-    return absl::StrCat("\"", path,
-                        "\" is of another format than what is written; end the name in ",
-                        absl::StrJoin(endings, ", "));
+    // That an empty name is none is said of all options alike.
+    if (fits || path.empty()) return std::string();
+    const std::string given = absl::StrCat("\"", path, "\": only ", FormatName(endings.front()));
+    if (endings.size() > 1) {
+      return absl::StrCat(given, " is written: end the name in ", absl::StrJoin(endings, ", "));
+    }
+    return absl::StrCat(given, " is written: name it ",
+                        std::filesystem::path(path).replace_extension(endings.front()).string());
   };
   return CLI::Validator(check, absl::StrCat("FILE", absl::StrJoin(endings, "|")));
 }

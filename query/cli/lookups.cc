@@ -107,6 +107,30 @@ absl::StatusOr<std::vector<std::string>> NamesOfMaps(const Session& session) {
   return names;
 }
 
+absl::StatusOr<SearchWords> WordsOfSearches(const Session& session) {
+  // A class may stand in several layers.
+  std::set<std::string> layers;
+  std::map<v1::WordType, std::set<std::string>> words;
+  const auto take = [&](const v1::ListVocabularyResponse& page) {
+    for (const v1::Word& word : page.words()) {
+      words[word.type()].insert(word.text());
+      // Edges have none.
+      if (!word.layer().empty()) layers.insert(word.layer());
+    }
+    return absl::OkStatus();
+  };
+  DSG_RETURN_IF_ERROR(session.EachPage(&query::Api::ListVocabulary,
+                                       session.Begin<v1::ListVocabularyRequest>(), 0,
+                                       &v1::ListVocabularyResponse::words_size, take));
+  const auto list = [](const std::set<std::string>& found) {
+    return std::vector<std::string>(found.begin(), found.end());
+  };
+  return SearchWords{.layers = list(layers),
+                     .kinds = list(words[v1::WORD_TYPE_KIND]),
+                     .classes = list(words[v1::WORD_TYPE_CLASS]),
+                     .relations = list(words[v1::WORD_TYPE_RELATION])};
+}
+
 absl::StatusOr<NodeWords> WordsOfNodes(const Session& session, const std::string& layer,
                                        int64_t node_count_max) {
   auto request = session.Begin<v1::ListNodesRequest>();

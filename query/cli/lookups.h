@@ -60,6 +60,16 @@ struct NodeWords {
 absl::StatusOr<NodeWords> WordsOfNodes(const Session& session, const std::string& layer,
                                        int64_t node_count_max);
 
+/// Words of the map that searches can use, each once and ascending.
+struct SearchWords {
+  /// Those that have nodes.
+  std::vector<std::string> layers;
+  std::vector<std::string> kinds;
+  std::vector<std::string> classes;
+  std::vector<std::string> relations;
+};
+absl::StatusOr<SearchWords> WordsOfSearches(const Session& session);
+
 /// The id of a node by id or unique name. Errors: of GetNode.
 absl::StatusOr<std::string> NodeIdOf(Session* session, const std::string& id_or_name);
 

@@ -6,7 +6,6 @@
 #include <string_view>
 #include <utility>
 
-#include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "schema/base/check.h"
 #include "schema/base/utf8.h"
@@ -52,10 +51,6 @@ std::string Fixed(double value, int decimals) {
   std::string text = absl::StrFormat("%.*f", decimals, value);
   if (text[0] == '-' && text.find_first_not_of("-0.") == std::string::npos) text.erase(0, 1);
   return text;
-}
-
-std::string Counted(int64_t count, const std::string& noun) {
-  return absl::StrCat(count, " ", noun, count == 1 ? "" : "s");
 }
 
 void Table::AddRow(std::vector<std::string> cells) {

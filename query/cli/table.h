@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "schema/base/counted.h"
+
 namespace dsg::cli {
 
 /// `text` with control characters shown as '?', and marks that turn the direction of writing (such
@@ -17,9 +19,6 @@ std::string Printable(const std::string& text);
 
 /// A number with a fixed count of decimals; "-0.00" is written "0.00".
 std::string Fixed(double value, int decimals);
-
-/// "1 node", "2 nodes".
-std::string Counted(int64_t count, const std::string& noun);
 
 enum class Align { kLeft, kRight };
 

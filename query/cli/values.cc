@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
@@ -30,6 +31,25 @@ bool MayBeSeconds(TimeNs number, const MapSpec& map) {
   };
   if (number == 0 && map.epoch_ns == 0) return false;
   return is_within(number, is_within(map.epoch_ns, kThreeYears) ? kNsPerSecond : kThreeYears);
+}
+
+// Of what is no instant, and may be meant as a time from the epoch of the map: "30", "1m10s".
+absl::Status SayFromEpoch(const std::string& option, const std::string& text, const MapSpec& map) {
+  const bool is_signed = absl::StartsWith(text, "+") || absl::StartsWith(text, "-");
+  const bool has_unit = absl::ascii_isalpha(static_cast<unsigned char>(text.back()));
+  TimeNs number = 0;
+  std::string forms =
+      absl::StrCat(is_signed ? "" : "+", text, has_unit ? "" : "s", " (from the map's epoch)");
+  if (!is_signed && absl::SimpleAtoi(text, &number)) {
+    absl::StrAppend(&forms, ", ", text, "ns (on the map's clock)");
+  }
+  if (map.clock == Clock::kUnix) {
+    absl::StrAppend(&forms, ", or a date like ", FormatRfc3339(map.epoch_ns));
+  }
+  return MakeError(Reason::kFieldInvalid,
+                   absl::StrCat(option, ": ", text, has_unit ? " has no sign" : " has no unit",
+                                ": write ", forms),
+                   {{"field", option}, {"value", text}});
 }
 
 // Any number of them.
@@ -126,19 +146,11 @@ absl::StatusOr<TimeNs> ParseInstant(const std::string& option, const std::string
   }
   const bool is_number = text[0] != '+' && absl::SimpleAtoi(text, &number);
   const auto time_ns = dsg::ParseTime(text, map.epoch_ns);
-  if (!time_ns.ok()) return Annotate(time_ns.status(), option);
-  if (is_number && MayBeSeconds(number, map)) {
-    const std::string date =
-        map.clock == Clock::kUnix
-            ? absl::StrCat(", or a date like \"", FormatRfc3339(map.epoch_ns), "\"")
-            : "";
-    return BadValue(
-        Reason::kFieldInvalid, option, text,
-        absl::StrCat("a number without a unit means nanoseconds on the map's clock, here ", text,
-                     " ns; write \"", is_signed ? "" : "+", text,
-                     "s\" for seconds from the epoch of the map",
-                     is_signed ? "" : absl::StrCat(", \"", text, "ns\" for nanoseconds"), date));
+  if (!time_ns.ok()) {
+    const bool lacks_sign = !is_signed && dsg::ParseTime(absl::StrCat("+", text), 0).ok();
+    return lacks_sign ? SayFromEpoch(option, text, map) : Annotate(time_ns.status(), option);
   }
+  if (is_number && MayBeSeconds(number, map)) return SayFromEpoch(option, text, map);
   if (!is_number && !is_signed && map.clock != Clock::kUnix) {
     return BadValue(
         Reason::kFieldInvalid, option, text,

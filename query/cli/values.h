@@ -36,7 +36,7 @@ absl::StatusOr<TimeNs> ParseDuration(const std::string& option, const std::strin
 /// An instant of the map's time: "+12.5s" from its epoch, nanoseconds on its clock, or a date if
 /// the clock is UTC. "30ns" marks a small number as nanoseconds. Errors:
 /// INVALID_ARGUMENT/FIELD_INVALID naming the option; also for a number without a unit that may mean
-/// seconds, and for a date on another clock.
+/// seconds, for a time without a sign, and for a date on another clock.
 absl::StatusOr<TimeNs> ParseInstant(const std::string& option, const std::string& text,
                                     const MapSpec& map);
 

@@ -55,11 +55,26 @@ absl::StatusOr<std::vector<std::string>> NamesOfTags(Session* session) {
   return names;
 }
 
+std::vector<std::string> OfKind(SearchWords words, WordKind kind) {
+  if (kind == WordKind::kLayer) return std::move(words.layers);
+  if (kind == WordKind::kKind) return std::move(words.kinds);
+  return kind == WordKind::kClass ? std::move(words.classes) : std::move(words.relations);
+}
+
+bool IsOfSearches(WordKind kind) {
+  return kind == WordKind::kLayer || kind == WordKind::kKind || kind == WordKind::kClass ||
+         kind == WordKind::kRelation;
+}
+
 absl::StatusOr<std::vector<std::string>> KnownWords(Session* session, WordKind kind) {
   DSG_RETURN_IF_ERROR(session->Open());
   if (kind == WordKind::kMap) return NamesOfMaps(*session);
   DSG_RETURN_IF_ERROR(session->ChooseMap());
   if (kind == WordKind::kTag) return NamesOfTags(session);
+  if (IsOfSearches(kind)) {
+    DSG_ASSIGN_OR_RETURN(SearchWords words, WordsOfSearches(*session));
+    return OfKind(std::move(words), kind);
+  }
   const char* layer = kind == WordKind::kAgent    ? "agents"
                       : kind == WordKind::kRegion ? "rooms"
                                                   : "";
@@ -92,6 +107,10 @@ absl::Status RunCompletion(Session* session, const CompletionVerb& verb, std::os
   const Completion completion = Complete(grammar.app(), verb.words);
   for (const std::string& word : completion.words) out << word << "\n";
   out.flush();
+  if (completion.kind == WordKind::kFile) {
+    session->set_found(false);
+    return absl::OkStatus();
+  }
   const CommonOptions common = OptionsOf(verb.words, session->common());
   if (completion.kind == WordKind::kNone || common.store.empty() == common.server.empty()) {
     return absl::OkStatus();
@@ -118,12 +137,13 @@ void AddCompletionVerb(Grammar* grammar) {
        .takes = kServer | kMap,
        .opens = Opens::kNothing,
        .run = RunCompletion,
-       .footer = "bash: source <(dsg completion bash)\nzsh:  source <(dsg completion zsh)\n"
-                 "fish: dsg completion fish | source\n"
-                 "The scripts ask `dsg completion words -- WORD...` for what may follow. Names of "
-                 "maps and tags, and\nnames and ids of nodes, come from the store or server of the "
-                 "command line or the "
-                 "environment, within 200 ms or not at all."});
+       .footer =
+           "bash: source <(dsg completion bash)\nzsh:  source <(dsg completion zsh)\n"
+           "fish: dsg completion fish | source\n"
+           "The scripts ask `dsg completion words -- WORD...` for what may follow; exit code 1 "
+           "is for files, which\nthe shell completes. Names of maps and tags, names and ids of "
+           "nodes, layers, kinds, classes and relations\ncome from the store or server of the "
+           "command line or the environment, within 200 ms or not at all."});
   app->add_option("SHELL", verb->shell, "bash, zsh or fish; or words")
       ->required()
       ->check(CLI::IsMember({"bash", "zsh", "fish", "words"}));

@@ -28,7 +28,7 @@ MAY_PRINT = re.compile(r"^(docs/examples/|query/cli/|ingest/simulator/cli/|tests
                        r"(^|/|_)main\.cc$|"
                        r"schema/base/(log|check)\.|"
                        r"^proto/generate_api\.cc$|"
-                       r"^ingest/program/(progress|run_report)")
+                       r"^schema/program/command_line\.|^ingest/program/(progress|run_report)")
 SPDX = "SPDX-License-Identifier: Apache-2.0"
 TRANSPARENT = re.compile(r"\b(namespace|class|struct|union|enum|extern)\b")
 

@@ -248,7 +248,9 @@ TEST(Arguments, MistakesNameTheOptionAndWhereHelpIs) {
             "not understood: --server x; see dsg upgrade --help");
   EXPECT_NE(Refusal({"where", "carol"}).find("--at is required; see dsg where --help"),
             std::string::npos);
-  EXPECT_NE(Refusal({}).find("see dsg --help"), std::string::npos);
+  const std::string no_verb = Refusal({});
+  EXPECT_EQ(no_verb.find("name a verb: where, "), 0u) << no_verb;
+  EXPECT_NE(no_verb.find("; see dsg --help"), std::string::npos) << no_verb;
 }
 
 TEST(Arguments, SaysWhatAMisspeltWordMayHaveMeant) {
@@ -262,6 +264,31 @@ TEST(Arguments, SaysWhatAMisspeltWordMayHaveMeant) {
   EXPECT_NE(required.find("near in spelling: \"--gltf\""), std::string::npos) << required;
   EXPECT_EQ(Refusal({"where", "ada", "--att", "+1s"}),
             "not understood: --att +1s; near in spelling: \"--at\"; see dsg where --help");
+}
+
+TEST(Arguments, OptionsStandBehindTheVerb) {
+  EXPECT_EQ(Refusal({"--store", "S", "where", "carol"}),
+            "options come after the verb: dsg where --store S; see dsg where --help");
+  EXPECT_EQ(Refusal({"--store=S", "where", "carol"}),
+            "options come after the verb: dsg where --store=S; see dsg where --help");
+  EXPECT_EQ(Refusal({"--json"}), "options come after the verb: dsg VERB --json; see dsg --help");
+  EXPECT_EQ(Refusal({"--hlep"}).find("not understood: --hlep; near in spelling: \"--help\""), 0u);
+  const std::string help = HelpOf({});
+  EXPECT_NE(help.find("Usage: dsg VERB [OPTIONS]\n"), std::string::npos) << help;
+}
+
+TEST(Arguments, AFileOfAnotherEndingIsRefusedWithItsRightName) {
+  EXPECT_EQ(Refusal({"export", "--gltf", "out/office.gltf"}),
+            "--gltf: \"out/office.gltf\": only binary glTF is written: name it out/office.glb; "
+            "see dsg export --help");
+  EXPECT_EQ(Refusal({"map", "--png", "m.jpg"}),
+            "--png: \"m.jpg\": only PNG is written: name it m.png; see dsg map --help");
+  EXPECT_EQ(Refusal({"export", "--ply", "mesh"}),
+            "--ply: \"mesh\": only PLY is written: name it mesh.ply; see dsg export --help");
+  EXPECT_EQ(Refusal({"export", "--spark", "a.txt"}),
+            "--spark: \"a.txt\": only a Spark-DSG graph is written: end the name in .json, "
+            ".sparkdsg, .bin; see dsg export --help");
+  EXPECT_NE(Refusal({"export", "--ply", ""}).find("--ply is empty"), std::string::npos);
 }
 
 TEST(Arguments, HelpIsAlsoAVerb) {

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// What all programs say of a command line that they do not take, and how they end.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "absl/status/status.h"
+
+namespace CLI {
+class App;
+class ParseError;
+}  // namespace CLI
+
+namespace dsg {
+
+/// What is wrong with the words that `app` refused with `error`, and where help is:
+/// `not understood: --stor x; near in spelling: "--store"; see dsg stats --help`. Words that nobody
+/// knows come first: a misspelt option is also missing.
+std::string UsageMessage(const CLI::App& app, const CLI::ParseError& error);
+
+/// The help of a program with verbs says "Usage: dsg VERB [OPTIONS]".
+void UseVerbUsage(CLI::App* app);
+
+/// Reads a command line. Without a value the program goes on. Else it ends with this exit code: 0
+/// after a help, a version or a manual was printed; 2 after a mistake, which was told on stderr.
+/// Checks of options that depend on each other are a callback of `app` that throws
+/// CLI::ParseError.
+std::optional<int> ReadCommandLine(int argc, char** argv, CLI::App* app);
+
+/// Tells an error on stderr, "dsg-align: NOT_FOUND: ...". Returns the exit code, also of OK.
+int TellError(const CLI::App& app, const absl::Status& status);
+
+/// The whole of a program: reads its command line, runs, tells the error. What was printed and did
+/// not arrive is an error, too. Returns the exit code.
+int RunProgram(int argc, char** argv, CLI::App* app, const std::function<absl::Status()>& run);
+
+}  // namespace dsg
