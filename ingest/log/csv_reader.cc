@@ -2,7 +2,9 @@
 // Tables of poses whose header names the columns, whoever wrote them.
 #include <algorithm>
 #include <array>
+#include <map>
 #include <optional>
+#include <set>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/escaping.h"
@@ -19,28 +21,60 @@ namespace dsg::ingest {
 namespace {
 
 // What a column may mean, and the names that it goes by.
-enum Column { kTime, kId, kKind, kX, kY, kZ, kQx, kQy, kQz, kQw, kColumnCount };
-constexpr std::string_view kShownNames[kColumnCount] = {"time", "id", "kind", "x",  "y",
-                                                        "z",    "qx", "qy",   "qz", "qw"};
+enum Column { kTime, kId, kName, kKind, kX, kY, kZ, kQx, kQy, kQz, kQw, kColumnCount };
+constexpr std::string_view kShownNames[kColumnCount] = {
+    "time", "id", "agent_name", "kind", "x", "y", "z", "qx", "qy", "qz", "qw"};
 struct Alias {
   std::string_view name;
   Column column;
 };
-constexpr Alias kAliases[] = {{"time", kTime},    {"t", kTime},    {"timestamp", kTime},
-                              {"stamp", kTime},   {"id", kId},     {"agent", kId},
-                              {"agent_id", kId},  {"person", kId}, {"person_id", kId},
-                              {"ped_id", kId},    {"track", kId},  {"track_id", kId},
-                              {"object_id", kId}, {"name", kId},   {"kind", kKind},
-                              {"x", kX},          {"tx", kX},      {"px", kX},
-                              {"p_x", kX},        {"pos_x", kX},   {"position_x", kX},
-                              {"y", kY},          {"ty", kY},      {"py", kY},
-                              {"p_y", kY},        {"pos_y", kY},   {"position_y", kY},
-                              {"z", kZ},          {"tz", kZ},      {"pz", kZ},
-                              {"p_z", kZ},        {"pos_z", kZ},   {"position_z", kZ},
-                              {"qx", kQx},        {"q_x", kQx},    {"orientation_x", kQx},
-                              {"qy", kQy},        {"q_y", kQy},    {"orientation_y", kQy},
-                              {"qz", kQz},        {"q_z", kQz},    {"orientation_z", kQz},
-                              {"qw", kQw},        {"q_w", kQw},    {"orientation_w", kQw}};
+constexpr Alias kAliases[] = {{"time", kTime},
+                              {"t", kTime},
+                              {"timestamp", kTime},
+                              {"stamp", kTime},
+                              {"id", kId},
+                              {"agent", kId},
+                              {"agent_id", kId},
+                              {"person", kId},
+                              {"person_id", kId},
+                              {"ped_id", kId},
+                              {"track", kId},
+                              {"track_id", kId},
+                              {"object_id", kId},
+                              {"name", kId},
+                              {"kind", kKind},
+                              {"agent_name", kName},
+                              {"agent_kind", kKind},
+                              {"x", kX},
+                              {"tx", kX},
+                              {"px", kX},
+                              {"p_x", kX},
+                              {"pos_x", kX},
+                              {"position_x", kX},
+                              {"y", kY},
+                              {"ty", kY},
+                              {"py", kY},
+                              {"p_y", kY},
+                              {"pos_y", kY},
+                              {"position_y", kY},
+                              {"z", kZ},
+                              {"tz", kZ},
+                              {"pz", kZ},
+                              {"p_z", kZ},
+                              {"pos_z", kZ},
+                              {"position_z", kZ},
+                              {"qx", kQx},
+                              {"q_x", kQx},
+                              {"orientation_x", kQx},
+                              {"qy", kQy},
+                              {"q_y", kQy},
+                              {"orientation_y", kQy},
+                              {"qz", kQz},
+                              {"q_z", kQz},
+                              {"orientation_z", kQz},
+                              {"qw", kQw},
+                              {"q_w", kQw},
+                              {"orientation_w", kQw}};
 
 struct Unit {
   std::string_view name;
@@ -158,8 +192,8 @@ absl::StatusOr<Header> ReadColumns(const LinePosition& at, std::string_view line
     if (header.Has(due)) continue;
     return at.FieldError("header", line,
                          absl::StrCat("no column ", std::string(kShownNames[due]),
-                                      "; a table of poses has time, x, y and perhaps id, kind, z, "
-                                      "qx, qy, qz, qw"));
+                                      "; a table of poses has time, x, y and perhaps id, "
+                                      "agent_name, kind, z, qx, qy, qz, qw"));
   }
   int q_count = 0;
   for (const Column q : {kQx, kQy, kQz, kQw}) q_count += header.Has(q) ? 1 : 0;
@@ -210,7 +244,17 @@ class RowReader {
     if (id.empty() || !IsUtf8(id)) {
       return at.FieldError("id", id, "a name or number in UTF-8 is due; correct the line");
     }
-    return table_->FindOrAdd(options_.agent_prefix + std::string(id), kind);
+    return table_->FindOrAdd(options_.agent_prefix + NameOf(std::string(id), fields), kind);
+  }
+
+  // What the row calls its agent, if it is told beside an id; the id where that is another's name.
+  const std::string& NameOf(const std::string& id, const std::vector<std::string_view>& fields) {
+    auto [named, is_new] = name_of_.try_emplace(id, id);
+    if (!is_new || !header_.Has(kName)) return named->second;
+    const std::string name(Field(fields, kName));
+    const bool is_usable = !name.empty() && IsUtf8(name) && names_.insert(name).second;
+    if (is_usable) named->second = name;
+    return named->second;
   }
 
   // Four empty fields: no orientation.
@@ -237,6 +281,9 @@ class RowReader {
   const Header& header_;
   const LogOptions& options_;
   TrackTable* table_;
+  // Of agents by id.
+  std::map<std::string, std::string> name_of_;
+  std::set<std::string> names_;
 };
 
 void AddHeaderNotes(const Header& header, std::vector<std::string>* notes) {

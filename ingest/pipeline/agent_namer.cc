@@ -19,6 +19,14 @@ bool IsCanonicalIndex(std::string_view name, uint64_t* index) {
   return error == std::errc() && end == name.data() + name.size() && *index <= kIndexFromNameMax;
 }
 
+// The id that a name tells: of "7" and "H7" H7, if H is the letter; else empty.
+NodeId IdInName(std::string_view name, char letter) {
+  uint64_t index = 0;
+  if (IsCanonicalIndex(name, &index)) return NodeId(letter, index);
+  const absl::StatusOr<NodeId> id = ParseNodeId(name);
+  return id.ok() && id->letter() == letter ? *id : NodeId();
+}
+
 using NewIds = std::unordered_map<NodeId, NodeId>;
 
 void Replace(const NewIds& new_ids, NodeId* id) {
@@ -61,14 +69,19 @@ NodeId AgentNamer::Assign(std::string_view name, std::string_view kind) {
 
 NodeId AgentNamer::AssignPreferring(NodeId preferred, std::string_view name,
                                     std::string_view kind) {
+  const NodeId id = FindOrTake(preferred, name, kind);
+  const absl::StatusOr<NodeId> meant = ParseNodeId(name);
+  if (meant.ok() && *meant != id) misleading_.try_emplace(std::string(name), id);
+  return id;
+}
+
+NodeId AgentNamer::FindOrTake(NodeId preferred, std::string_view name, std::string_view kind) {
   const auto known = id_of_.find(std::pair(std::string(name), std::string(kind)));
   if (known != id_of_.end()) return known->second;
   if (!preferred.empty() && !taken_.contains(preferred)) return Take(preferred, name, kind);
   const char letter = LetterOf(kind);
-  uint64_t index = 0;
-  if (IsCanonicalIndex(name, &index) && !taken_.contains(NodeId(letter, index))) {
-    return Take(NodeId(letter, index), name, kind);
-  }
+  const NodeId named = IdInName(name, letter);
+  if (!named.empty() && !taken_.contains(named)) return Take(named, name, kind);
   const auto largest = largest_index_.find(letter);
   return Take(NodeId(letter, largest == largest_index_.end() ? 0 : largest->second + 1), name,
               kind);

@@ -24,19 +24,25 @@ class AgentNamer {
   explicit AgentNamer(const std::vector<Node>& known);
 
   /// The id of a known agent; otherwise a new one: letter H for humans and r for robots, and for
-  /// a name that is an integer below a million that index if it is free, else the index above
-  /// the largest.
+  /// a name that is an integer below a million that index if it is free, for one that reads as an
+  /// id of that letter this id if it is free, else the index above the largest.
   NodeId Assign(std::string_view name, std::string_view kind);
 
   /// As Assign, but a new agent keeps `preferred` if it is free.
   NodeId AssignPreferring(NodeId preferred, std::string_view name, std::string_view kind);
 
+  /// The agents asked for whose name reads as an id that is not theirs, by name. Who asks for such
+  /// a word gets the agent with that id.
+  const std::map<std::string, NodeId>& misleading() const { return misleading_; }
+
  private:
+  NodeId FindOrTake(NodeId preferred, std::string_view name, std::string_view kind);
   NodeId Take(NodeId id, std::string_view name, std::string_view kind);
 
   std::map<std::pair<std::string, std::string>, NodeId, std::less<>> id_of_;
   std::unordered_set<NodeId> taken_;
   std::map<char, uint64_t> largest_index_;
+  std::map<std::string, NodeId> misleading_;
 };
 
 /// Gives each agent of `delta` the id that `namer` has for its name, its own if that is free, in

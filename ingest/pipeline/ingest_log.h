@@ -111,6 +111,8 @@ struct IngestSummary {
   CommitCounts committed;
   /// Measurements that were read and not used, by channel.
   std::map<std::string, int64_t> unused;
+  /// Agents whose name reads as the id of another one.
+  std::map<std::string, NodeId> misleading_names;
   /// Unset when the log has no depth, or mapping is off.
   std::optional<MappingSummary> mapping;
   /// Unset when the log has no detections, or people are off.

@@ -243,6 +243,7 @@ IngestSummary LogRun::Summary() const {
   summary.agent_count = graph_agent_count_ + builder_.agent_count() + people_.told().agent_count();
   summary.committed = sink_.counts();
   summary.unused = unused_;
+  summary.misleading_names = namer_.misleading();
   // A followed log may have had some.
   if (has_loops_ && (!is_followed_ || loops_.counts().loop_count > 0)) {
     summary.loops = loops_.counts();

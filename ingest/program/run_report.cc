@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "ingest/program/yield.h"
+#include "schema/base/counted.h"
 
 namespace dsg::ingest {
 namespace {
@@ -39,14 +40,14 @@ std::string UnusedText(const IngestSummary& summary) {
 void PrintSummary(const std::string& path, const LogInfo& info, const IngestSummary& summary,
                   double seconds) {
   const CommitCounts& counts = summary.committed;
-  std::printf(
-      "%s (%s): %lld agents, %lld poses, %lld nodes, %lld edges, %lld stays in %lld revisions; "
-      "%lld poses skipped; %.1f s\n",
-      path.c_str(), info.format.c_str(), static_cast<long long>(summary.agent_count),
-      static_cast<long long>(counts.pose_count), static_cast<long long>(counts.node_count),
-      static_cast<long long>(counts.edge_count), static_cast<long long>(counts.stay_count),
-      static_cast<long long>(counts.revision_count),
-      static_cast<long long>(counts.skipped_pose_count), seconds);
+  const std::vector<std::string> parts = {
+      Counted(summary.agent_count, "agent"), Counted(counts.pose_count, "pose"),
+      Counted(counts.node_count, "node"), Counted(counts.edge_count, "edge"),
+      Counted(counts.stay_count, "stay")};
+  std::printf("%s (%s): %s in %s; %s skipped; %.1f s\n", path.c_str(), info.format.c_str(),
+              absl::StrJoin(parts, ", ").c_str(),
+              Counted(counts.revision_count, "revision").c_str(),
+              Counted(counts.skipped_pose_count, "pose").c_str(), seconds);
   if (counts.revision_count == 0) std::printf("%s: nothing new\n", path.c_str());
   if (!summary.unused.empty()) {
     std::printf("%s: read and not used yet: %s\n", path.c_str(), UnusedText(summary).c_str());
@@ -182,11 +183,28 @@ Json LoopsJson(const LoopCounts& loops) {
           {"not_believed", loops.doubted}};
 }
 
+std::string NoteOfName(const std::string& name, NodeId id) {
+  return absl::StrCat("agent \"", name, "\" of the log has the id ", ToString(id),
+                      ": ask for that, since \"", name, "\" is read as an id");
+}
+
+// Of the log, and of what became of it.
+std::vector<std::string> NotesOf(const RunReport& report) {
+  std::vector<std::string> notes = report.info.notes;
+  for (const auto& [name, id] : report.summary.misleading_names) {
+    notes.push_back(NoteOfName(name, id));
+  }
+  return notes;
+}
+
 }  // namespace
 
 void PrintReport(const RunReport& report, bool has_timings) {
   const IngestSummary& summary = report.summary;
   PrintSummary(report.path, report.info, summary, report.seconds);
+  for (const auto& [name, id] : summary.misleading_names) {
+    std::fprintf(stderr, "%s: note: %s\n", report.path.c_str(), NoteOfName(name, id).c_str());
+  }
   if (summary.loops.has_value()) PrintLoops(report.path, *summary.loops);
   if (summary.mapping.has_value()) PrintMapping(report.path, *summary.mapping, has_timings);
   if (summary.people.has_value()) {
@@ -217,7 +235,7 @@ std::string ReportJson(const RunReport& report) {
                {"revisions", counts.revision_count},
                {"last_revision", counts.last_revision},
                {"unused", Json(summary.unused)},
-               {"notes", Json(report.info.notes)},
+               {"notes", Json(NotesOf(report))},
                {"seconds", report.seconds}};
   if (summary.mapping.has_value()) {
     json["mapping"] = MappingJson(*summary.mapping);

@@ -132,7 +132,8 @@ Record EdgeRecord(const v1::Edge& edge, bool has_dates) {
 
 Record PoseRecord(const AgentRow& agent, const v1::TimedPose& pose, bool has_dates) {
   Record record(has_dates);
-  record.Text(agent.id).Text(agent.name).Time(pose.time_ns()).Point(pose.pose().position());
+  record.Text(agent.id).Text(agent.name).Text(agent.kind).Time(pose.time_ns());
+  record.Point(pose.pose().position());
   if (pose.flags() & pose_flags::kNoOrientation) {
     record.Empty(4);
   } else {
@@ -211,8 +212,8 @@ class TableWriter {
       return absl::OkStatus();
     };
     return Write("tracks",
-                 {"agent_id", "agent_name", "time_ns", "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw",
-                  "corrected", "predicted"},
+                 {"agent_id", "agent_name", "agent_kind", "time_ns", "x_m", "y_m", "z_m", "qx",
+                  "qy", "qz", "qw", "corrected", "predicted"},
                  rows);
   }
 

@@ -66,6 +66,9 @@ class Terminal(support.ProgramsTest):
                                 (("where", "al"), "alice"),
                                 (("where", "H"), "H0"),
                                 (("show", "O1"), "O11"),
+                                (("ls", "--layer", "ag"), "agents"),
+                                (("find", "--kind", "ro"), "room"),
+                                (("edges", "--relation", "CONT"), "CONTAINS"),
                                 (("who", "--room", "off"), "office\\ 1")):
             # A busy machine may need more than the 200 ms after which names are left out.
             for _ in range(20):
@@ -73,6 +76,13 @@ class Terminal(support.ProgramsTest):
                 if expected in offered:
                     break
             self.assertIn(expected, offered)
+
+    def test_every_program_says_what_a_misspelt_option_may_have_meant(self):
+        for program in filter(built, PROGRAMS):
+            self.refused(2, [f"{program}: not understood: --hlep; near in spelling: \"--help\"",
+                             f"; see {program} --help"], program, "--hlep")
+        self.refused(2, ["dsg-simulate: there is no verb \"track\"; near in spelling: \"tracks\""],
+                     "dsg-simulate", "track")
 
     def test_completion_of_an_unreachable_server_gives_up(self):
         done = support.run("dsg", "completion", "words", "--", "where", "--server",
@@ -155,6 +165,11 @@ class Terminal(support.ProgramsTest):
         with open(self.path("tables", "tracks.csv"), encoding="utf-8", newline="") as file:
             rows = [r for r in csv.DictReader(file) if r["agent_name"] == "robot"]
         self.assertEqual([p["time_ns"] for p in first], [r["time_ns"] for r in rows])
+        self.ok("dsg-ingest", "--store", "back", "--map", "back", "tables/tracks.csv")
+        agents = {store: sorted((node["name"], node["kind"]) for node in
+                                self.ask("ls", "--store", store, "--layer", "agents")["nodes"])
+                  for store in ("store", "back")}
+        self.assertEqual(agents["store"], agents["back"])
 
     def test_tum_files_are_scored(self):
         if not built("dsg-eval"):

@@ -129,6 +129,20 @@ TEST(CsvReader, FindsColumnsByTheirNames) {
   EXPECT_NE(Notes(log->info).find("not read: \"speed\""), std::string::npos) << Notes(log->info);
 }
 
+TEST(CsvReader, CallsAgentsByTheNameBesideTheirId) {
+  const auto log = ReadText(
+      "agent_id,agent_name,agent_kind,time_ns,x_m,y_m\n"
+      "H5,henry,human,1,0,0\nr0,robot,robot,2,0,0\nH6,,human,3,0,0\nH7,henry,human,4,0,0\n"
+      "H5,henry,human,5,0,0\n");
+  ASSERT_TRUE(log.ok()) << log.status();
+  std::vector<std::string> names;
+  for (const PoseMeasurement& pose : log->poses) names.push_back(pose.agent_name);
+  // A name that another agent has says nothing.
+  EXPECT_EQ(names, (std::vector<std::string>{"henry", "robot", "H6", "H7", "henry"}));
+  EXPECT_EQ(log->poses[1].agent_kind, kinds::kRobot);
+  EXPECT_EQ(Notes(log->info).find("not read"), std::string::npos) << Notes(log->info);
+}
+
 TEST(CsvReader, TakesPeopleWithIdsAndOneRobotWithout) {
   LogOptions options;
   options.agent_prefix = "a-";

@@ -43,6 +43,18 @@ TEST(AgentNamer, NeverGivesATakenIndexToANumber) {
   EXPECT_EQ(namer.Assign("1", kinds::kHuman), NodeId('H', 2));
 }
 
+TEST(AgentNamer, GivesANameThatReadsAsAnIdThatIdWhileItIsFree) {
+  AgentNamer namer({});
+  EXPECT_EQ(namer.Assign("H5", kinds::kHuman), NodeId('H', 5));
+  EXPECT_EQ(namer.Assign("anna", kinds::kHuman), NodeId('H', 6));
+  EXPECT_TRUE(namer.misleading().empty());
+  EXPECT_EQ(namer.Assign("H6", kinds::kHuman), NodeId('H', 7));
+  EXPECT_EQ(namer.Assign("H6", kinds::kRobot), NodeId('r', 0));
+  EXPECT_EQ(namer.Assign("r9", kinds::kHuman), NodeId('H', 8));
+  const std::map<std::string, NodeId> expected = {{"H6", NodeId('H', 7)}, {"r9", NodeId('H', 8)}};
+  EXPECT_EQ(namer.misleading(), expected);
+}
+
 TEST(AgentNamer, FindsTheAgentsOfTheMap) {
   AgentNamer namer(
       {Agent(NodeId('H', 3), "anna", kinds::kHuman), Agent(NodeId('H', 9), "3", kinds::kHuman)});
@@ -52,7 +64,8 @@ TEST(AgentNamer, FindsTheAgentsOfTheMap) {
 }
 
 TEST(AgentNamer, NamesAsBeforeWhenTheMapHoldsPartOfTheLog) {
-  const std::vector<std::string> names = {"5", "anna", "6", "7", "berta", "3", "carla", "anna"};
+  const std::vector<std::string> names = {"5",     "anna", "6",     "H7",  "7",
+                                          "berta", "3",    "carla", "H11", "anna"};
   AgentNamer whole({});
   std::vector<NodeId> expected;
   for (const std::string& name : names) expected.push_back(whole.Assign(name, kinds::kHuman));

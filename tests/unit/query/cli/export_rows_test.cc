@@ -171,8 +171,8 @@ TEST_F(ExportRows, TablesHaveAllRowsWithExactTimes) {
   EXPECT_EQ(Lines("t/edges.csv")[1].substr(0, 14), "R1,CONTAINS,p1");
   const std::vector<std::string> tracks = Lines("t/tracks.csv");
   ASSERT_EQ(tracks.size(), 6u);
-  EXPECT_EQ(tracks[1].substr(0, 66),
-            "H1,ada,1403715524907143168,2014-06-25T16:58:44.907143168Z,0,1,0.5,")
+  EXPECT_EQ(tracks[1].substr(0, 72),
+            "H1,ada,human,1403715524907143168,2014-06-25T16:58:44.907143168Z,0,1,0.5,")
       << tracks[1];
   // No orientation is no number.
   EXPECT_NE(tracks[5].find(",,,,,0,0"), std::string::npos) << tracks[5];
