@@ -15,8 +15,10 @@
 #include <limits>
 #include <vector>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
+#include "schema/base/spelling.h"
 #include "schema/base/status.h"
 
 namespace dsg::query {
@@ -288,6 +290,23 @@ void Printer::PrintReal(Real value) {
   text_.append(text, end.ptr);
 }
 
+// The field of the request itself that protobuf does not know; empty if the problem is another.
+std::string UnknownField(std::string_view problem) {
+  constexpr std::string_view kEnd = ": Cannot find field.";
+  if (!problem.ends_with(kEnd)) return "";
+  problem.remove_suffix(kEnd.size());
+  const bool is_name = std::all_of(problem.begin(), problem.end(), [](unsigned char c) {
+    return absl::ascii_isalnum(c) || c == '_';
+  });
+  return is_name ? std::string(problem) : "";
+}
+
+std::vector<std::string> FieldsOf(const pb::Descriptor& type) {
+  std::vector<std::string> names;
+  for (int i = 0; i < type.field_count(); ++i) names.push_back(type.field(i)->name());
+  return names;
+}
+
 }  // namespace
 
 absl::StatusOr<std::string> JsonOfMessage(const pb::Message& message, JsonLayout layout,
@@ -309,11 +328,14 @@ absl::StatusOr<std::string> BytesOfJson(std::string_view json, const pb::Descrip
       pb::util::JsonToBinaryStream(&types, absl::StrCat(kUrlPrefix, "/", type.full_name()), &in,
                                    &out, pb::util::JsonParseOptions());
   if (status.ok()) return bytes;
-  return MakeError(Reason::kFieldInvalid,
-                   absl::StrCat("the request is no ", type.full_name(),
-                                " in JSON: ", std::string(status.message()),
-                                "; proto/dsg/v1 has the fields of each request"),
-                   {{"field", ""}});
+  const std::string problem(status.message());
+  const std::string field = UnknownField(problem);
+  const std::string advice = field.empty() ? "; proto/dsg/v1 has the fields of each request"
+                                           : SpellingHint(field, FieldsOf(type));
+  return MakeError(
+      Reason::kFieldInvalid,
+      absl::StrCat("the request is no ", type.full_name(), " in JSON: ", problem, advice),
+      {{"field", field}});
 }
 
 }  // namespace dsg::query

@@ -22,8 +22,10 @@ std::string HintOf(const std::string& word, const absl::StatusOr<std::vector<std
   return known.ok() ? NearHint(word, *known) : "";
 }
 
-absl::StatusOr<std::vector<std::string>> NodeNamesOf(Session* session, const std::string& layer) {
+// Names, and the ids of all, since some have no name.
+absl::StatusOr<std::vector<std::string>> NodeWordsOf(Session* session, const std::string& layer) {
   DSG_ASSIGN_OR_RETURN(NodeWords words, WordsOfNodes(*session, layer, kNodesReadMax));
+  words.names.insert(words.names.end(), words.ids.begin(), words.ids.end());
   return std::move(words.names);
 }
 
@@ -41,10 +43,10 @@ absl::Status WithNearNames(Session* session, const absl::Status& status) {
   if (reason == Reason::kMapUnknown && !word_of("map").empty()) {
     hint = HintOf(word_of("map"), NamesOfMaps(*session));
   } else if (reason == Reason::kAgentUnknown && !ParseNodeId(word_of("agent")).ok()) {
-    hint = HintOf(word_of("agent"), NodeNamesOf(session, "agents"));
+    hint = HintOf(word_of("agent"), NodeWordsOf(session, "agents"));
   } else if (reason == Reason::kNodeUnknown && !word_of("node").empty() &&
              !ParseNodeId(word_of("node")).ok()) {
-    hint = HintOf(word_of("node"), NodeNamesOf(session, ""));
+    hint = HintOf(word_of("node"), NodeWordsOf(session, ""));
   }
   if (hint.empty()) return status;
   return MakeError(reason, absl::StrCat(status.message(), hint), metadata);

@@ -86,6 +86,11 @@ class Session {
 
   query::Api& api() const { return *api_; }
   const CommonOptions& common() const { return common_; }
+  /// JSON is what the call answers by itself; a table needs less of each node.
+  v1::NodeView ViewFor(v1::NodeView shown) const {
+    const bool is_json = common_.json || common_.format == ListFormat::kJsonLines;
+    return is_json ? v1::NODE_VIEW_UNSPECIFIED : shown;
+  }
   const std::string& program_version() const { return program_version_; }
   const MapSpec& map() const { return map_; }
   const TimeText& times() const { return times_; }

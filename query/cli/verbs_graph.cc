@@ -194,7 +194,7 @@ absl::Status RunList(Session* session, const ListVerb& verb, std::ostream& out) 
     DSG_ASSIGN_OR_RETURN(const Box3d box, ParseBox("--box", verb.box));
     ToProto(box, filter->mutable_box());
   }
-  request.set_view(v1::NODE_VIEW_GEOMETRY);
+  request.set_view(session->ViewFor(v1::NODE_VIEW_GEOMETRY));
   ListWriter list(session->common(), session->times(), "nodes", NodeColumns(), &out);
   PageEnd end;
   const auto take = [&](const v1::ListNodesResponse& page) -> absl::Status {
@@ -260,7 +260,7 @@ absl::Status RunNear(Session* session, const NearVerb& verb, std::ostream& out) 
   request.mutable_position()->set_z(position.z());
   request.set_k(verb.k);
   request.set_max_distance_m(verb.max_distance_m);
-  request.set_view(v1::NODE_VIEW_GEOMETRY);
+  request.set_view(session->ViewFor(v1::NODE_VIEW_GEOMETRY));
   DSG_RETURN_IF_ERROR(FillFilter(verb.filter, session->map(), request.mutable_filter()));
   v1::ListNearestNodesResponse reply;
   DSG_RETURN_IF_ERROR(session->api().ListNearestNodes(session->NewCall(), request, &reply));

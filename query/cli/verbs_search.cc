@@ -155,7 +155,7 @@ absl::StatusOr<v1::SearchNodesRequest> SearchRequest(Session* session, const Fin
   }
   DSG_RETURN_IF_ERROR(
       SetInstant("--at", verb.at, session->map(), &request, &v1::SearchNodesRequest::set_at_ns));
-  request.set_view(v1::NODE_VIEW_GEOMETRY);
+  request.set_view(session->ViewFor(v1::NODE_VIEW_GEOMETRY));
   request.set_count_only(verb.count);
   request.set_explain(verb.explain);
   return request;
@@ -298,7 +298,7 @@ absl::Status RunAround(Session* session, const AroundVerb& verb, std::ostream& o
   request.set_incoming(verb.incoming);
   DSG_RETURN_IF_ERROR(
       SetInstant("--at", verb.at, session->map(), &request, &v1::GetNeighborsRequest::set_at_ns));
-  request.set_view(has_picture ? v1::NODE_VIEW_GEOMETRY : v1::NODE_VIEW_BASIC);
+  request.set_view(session->ViewFor(has_picture ? v1::NODE_VIEW_GEOMETRY : v1::NODE_VIEW_BASIC));
   ListWriter list(session->common(), session->times(), "neighbors", NeighborColumns(), &out);
   PageEnd end;
   v1::GetNeighborsResponse kept;
@@ -323,7 +323,7 @@ absl::Status RunSubgraph(Session* session, const SubgraphVerb& verb, std::ostrea
   request.set_both_directions(verb.both_directions);
   request.set_depth_max(verb.depth);
   request.set_tree_only(verb.tree_only);
-  request.set_view(v1::NODE_VIEW_GEOMETRY);
+  request.set_view(session->ViewFor(v1::NODE_VIEW_GEOMETRY));
   DSG_RETURN_IF_ERROR(FillFilter(verb.filter, session->map(), request.mutable_filter()));
   v1::GetSubgraphResponse all;
   const auto merge = [&](const v1::GetSubgraphResponse& message) {

@@ -40,6 +40,11 @@ bool IsValidMapName(std::string_view name) {
 
 absl::Status CheckMapName(std::string_view name) {
   if (IsValidMapName(name)) return absl::OkStatus();
+  if (name.empty()) {
+    return MakeError(Reason::kMapNameInvalid,
+                     "no map is named, or its name is empty; say which one is meant",
+                     {{"value", ""}});
+  }
   return MakeError(Reason::kMapNameInvalid,
                    absl::StrCat("map name \"", std::string(name),
                                 "\" is not allowed; use 1 to 64 of a-z, 0-9, _ and -, "

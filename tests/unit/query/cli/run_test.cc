@@ -189,6 +189,7 @@ TEST_F(RunTest, MisspeltNamesGetThoseThatAreNear) {
   ExpectRefused(1, "near in spelling: \"12\"", {"where", "13", "--at", "+1s"});
   ExpectRefused(1, "near in spelling: \"kitchen\"", {"who", "--room", "kitchn"});
   ExpectRefused(1, "near in spelling: \"cup\"", {"show", "cupp"});
+  ExpectRefused(1, "near in spelling: \"p2\"", {"show", "pp2"});
   // An id is not a word.
   EXPECT_EQ(Ask({"show", "O2"}).errors.find("near in spelling"), std::string::npos);
 }
@@ -337,13 +338,20 @@ TEST_F(RunTest, AFolderWithoutMapsIsNotServed) {
   EXPECT_TRUE(fs::is_empty(empty));
 }
 
-TEST_F(RunTest, AMapWithoutAMeshIsDrawnWithANote) {
-  const std::string file = folder_ + "/mesh.png";
-  const Outcome outcome = Ask({"map", "--mesh", "--png", file, "--width", "300"});
-  EXPECT_EQ(outcome.code, 0);
-  EXPECT_NE(outcome.errors.find("map office has no mesh at revision 2"), std::string::npos)
-      << outcome.errors;
-  EXPECT_TRUE(fs::exists(file));
+TEST_F(RunTest, AnEmptyPictureIsDrawnWithANote) {
+  const std::string file = folder_ + "/empty.png";
+  using Words = std::vector<std::string>;
+  for (const auto& [words, note] :
+       {std::pair(Words{"--mesh"}, "map office has no mesh at revision 2"),
+        std::pair(Words{"--revision", "0"}, "map office has nothing at revision 0"),
+        std::pair(Words{"--bodies", "--at", "+1s"}, "no body of anybody is known at +1s")}) {
+    Words arguments = {"map", "--png", file, "--width", "300", "--force"};
+    arguments.insert(arguments.end(), words.begin(), words.end());
+    const Outcome outcome = Ask(arguments);
+    EXPECT_EQ(outcome.code, 0);
+    EXPECT_NE(outcome.errors.find(note), std::string::npos) << outcome.errors;
+    EXPECT_TRUE(fs::exists(file));
+  }
 }
 
 TEST_F(RunTest, PastRevisionsAnswerAsTheyDid) {

@@ -70,6 +70,17 @@ TEST(MessageJson, RefusesWhatIsNoSuchMessage) {
   }
 }
 
+TEST(MessageJson, NamesTheFieldThatMayBeMeant) {
+  const auto& type = *v1::LocateAgentRequest::descriptor();
+  const auto bytes = BytesOfJson(R"({"map": "m", "agnet": "a"})", type);
+  EXPECT_NE(bytes.status().message().find("near in spelling: \"agent\""), std::string::npos)
+      << bytes.status();
+  EXPECT_EQ(MetadataOf(bytes.status()).at("field"), "agnet");
+  // Of parts of the request nothing is listed that would belong to another message.
+  const auto part = BytesOfJson(R"({"read_at": {"agent": 1}})", type);
+  EXPECT_EQ(MetadataOf(part.status()).at("field"), "") << part.status();
+}
+
 TEST(MessageJson, KeepsToItsBound) {
   const v1::GetTrajectoryResponse reply = Poses(5000);
   const size_t bytes = JsonOfMessage(reply, JsonLayout::kOneLine)->size();
