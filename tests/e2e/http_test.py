@@ -35,8 +35,7 @@ class Contract(http_port.HttpTest):
             (["show", "R0"], "QueryService/GetNode",
              {"map": "office", "id": "R0", "view": "NODE_VIEW_FULL"}),
             (["near", "1,2,0", "-k", "5"], "QueryService/ListNearestNodes",
-             {"map": "office", "position": {"x": 1, "y": 2}, "k": 5,
-              "view": "NODE_VIEW_GEOMETRY"}),
+             {"map": "office", "position": {"x": 1, "y": 2}, "k": 5}),
             (["tag"], "MaintenanceService/ListTags", {"map": "office"}),
         ]
 

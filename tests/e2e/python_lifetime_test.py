@@ -158,7 +158,7 @@ time.sleep(600)
                 self.assertRaises(dsgdb.FailedPrecondition) as caught:
             dsgdb.open(self.path("store"))
         self.assertIn("did not start", str(caught.exception))
-        self.assertIn("it said: dsg: there is no verb", str(caught.exception))
+        self.assertIn("it said: dsg: options come after the verb", str(caught.exception))
         self.assertEqual([], os.listdir(self.path("tmp")))
 
 

@@ -15,9 +15,6 @@ import support
 import dsgdb
 from dsgdb import json_codec, v1
 
-GEOMETRY = v1.NodeView.NODE_VIEW_GEOMETRY
-BASIC = v1.NodeView.NODE_VIEW_BASIC
-
 
 class Answers(python_support.HttpTest):
     @classmethod
@@ -110,7 +107,7 @@ class Answers(python_support.HttpTest):
                 (["--box", "0,0,0,5,5,3"], {"box": [(0, 0, 0), (5, 5, 3)]})):
             with self.subTest(asked=asked):
                 told = self.dsg(v1.ListNodesResponse, "ls", *options)
-                found = self.m.nodes(view=GEOMETRY, **asked)
+                found = self.m.nodes(**asked)
                 self.assertGreater(len(found), 0)
                 self.assertEqual(list(told.nodes), list(found))
         self.assertEqual(list(self.dsg(v1.ListEdgesResponse, "edges").edges), list(self.m.edges()))
@@ -119,9 +116,9 @@ class Answers(python_support.HttpTest):
         self.assertEqual((list(told.edges), True), (list(few), few.has_more))
         self.assertEqual(self.dsg(v1.GetNodeResponse, "show", "O9"), self.m.show("O9"))
         self.assertEqual(list(self.dsg(v1.GetNeighborsResponse, "around", "O9").neighbors),
-                         list(self.m.around("O9", view=BASIC)))
+                         list(self.m.around("O9")))
         told = self.dsg(v1.GetSubgraphResponse, "subgraph", "B0", "--depth", "2")
-        graph = self.m.subgraph("B0", depth_max=2, view=GEOMETRY)
+        graph = self.m.subgraph("B0", depth_max=2)
         self.assertEqual((told.nodes, told.edges), (graph.nodes, graph.edges))
         whole = self.m.graph()
         stats = self.m.stats()
@@ -130,14 +127,14 @@ class Answers(python_support.HttpTest):
 
     def test_search_and_space(self):
         told = self.dsg(v1.SearchNodesResponse, "find", "chair", "--near", "3,2,0", "-k", "5")
-        found = self.m.find("chair", near=(3, 2, 0), view=GEOMETRY, limit=5)
+        found = self.m.find("chair", near=(3, 2, 0), limit=5)
         self.assertEqual(list(told.hits), list(found))
         self.assertEqual([hit.node.id for hit in told.hits], found.ids)
         self.assertEqual(told.canonical_query, found.reply.canonical_query)
         self.assertEqual(len(self.m.find("chair")), self.m.count("chair"))
         self.assertEqual(self.dsg(v1.ListNearestNodesResponse, "near", "3,2,0", "--k", "3",
                                   "--layer", "objects").nodes,
-                         tuple(self.m.near([3, 2, 0], 3, layer="objects", view=GEOMETRY)))
+                         tuple(self.m.near([3, 2, 0], 3, layer="objects")))
         self.assertEqual(self.dsg(v1.PlanPathResponse, "path", "alice", "nearest chair", "--at",
                                   "+30s", "--radius", "0.2"),
                          self.m.path("alice", "nearest chair", at="+30s", radius_m=0.2))

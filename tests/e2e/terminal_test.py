@@ -67,7 +67,7 @@ class Terminal(support.ProgramsTest):
                                 (("where", "H"), "H0"),
                                 (("show", "O1"), "O11"),
                                 (("ls", "--layer", "ag"), "agents"),
-                                (("find", "--kind", "ro"), "room"),
+                                (("ls", "--kind", "ro"), "room"),
                                 (("edges", "--relation", "CONT"), "CONTAINS"),
                                 (("who", "--room", "off"), "office\\ 1")):
             # A busy machine may need more than the 200 ms after which names are left out.
