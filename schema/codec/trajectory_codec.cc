@@ -340,10 +340,8 @@ struct SegmentReader::Block {
     }
   }
   // Straight from the columns: much quicker than by StoredPose, one pose after another.
-  void ReadPoses(std::vector<TimedPose>* poses) const {
-    const size_t base = poses->size();
-    poses->resize(base + static_cast<size_t>(count));
-    TimedPose* const out = poses->data() + base;
+  // Sets all of a pose but its covariance.
+  void ReadPoses(TimedPose* out) const {
     ReadColumn(columns[0], [&](size_t row, int64_t value) {
       out[row].time_ns = start_ns + value * unit_ns;
       out[row].flags = Flags(static_cast<int>(row));
@@ -552,17 +550,24 @@ bool SegmentReader::DecodeAll(std::vector<StoredPose>* poses) const {
 }
 
 bool SegmentReader::DecodePoses(std::vector<TimedPose>* poses) const {
-  poses->clear();
+  // Poses that are there from another segment are written over: making new ones takes as long.
+  poses->resize(static_cast<size_t>(count_));
   if (codec_ == TrajectoryCodec::kLossless) {
-    for (const StoredPose& pose : poses_) poses->push_back(FromStored(pose, codec_));
-  } else {
-    for (int block = 0; block < block_count_; ++block) {
-      Block parsed;
-      if (!ParseBlock(block, &parsed)) return false;
-      parsed.ReadPoses(poses);
-    }
+    std::transform(poses_.begin(), poses_.end(), poses->begin(),
+                   [this](const StoredPose& pose) { return FromStored(pose, codec_); });
+    return AttachCovariances(poses);
   }
-  return AttachCovariances(poses);
+  int read_count = 0;
+  for (int block = 0; block < block_count_; ++block) {
+    Block parsed;
+    if (!ParseBlock(block, &parsed) || parsed.count > count_ - read_count) return false;
+    parsed.ReadPoses(poses->data() + read_count);
+    read_count += parsed.count;
+  }
+  if (covariances_.empty()) {
+    for (TimedPose& pose : *poses) pose.covariance = nullptr;
+  }
+  return read_count == count_ && AttachCovariances(poses);
 }
 
 template <typename Pose>

@@ -197,7 +197,8 @@ TEST(TrajectoryCodec, PosesAtOnceAreThoseOneByOneToTheBit) {
       const auto reader = SegmentReader::Parse(bytes);
       std::vector<StoredPose> stored;
       // What was there goes.
-      std::vector<TimedPose> poses(3);
+      std::vector<TimedPose> poses(600);
+      for (TimedPose& pose : poses) pose.covariance = walk[7].covariance;
       ASSERT_TRUE(reader->DecodeAll(&stored));
       ASSERT_TRUE(reader->DecodePoses(&poses));
       ASSERT_EQ(poses.size(), stored.size());
