@@ -223,6 +223,18 @@ class RowReader {
     return absl::OkStatus();
   }
 
+  // Whether several ids are one agent: an agent goes by its name, in a log and across logs.
+  void AddNotes(std::vector<std::string>* notes) const {
+    constexpr size_t kNamedMax = 5;
+    for (const auto& [name, ids] : ids_of_) {
+      if (ids.size() < 2) continue;
+      if (notes->size() == kNamedMax) return notes->push_back("and more such names");
+      notes->push_back(absl::StrCat("\"", absl::Utf8SafeCHexEscape(name), "\" is one agent, of ",
+                                    ids.size(), " ids, ", absl::Utf8SafeCHexEscape(*ids.begin()),
+                                    " among them"));
+    }
+  }
+
  private:
   std::string_view Field(const std::vector<std::string_view>& fields, Column column) const {
     return Unquoted(fields[*header_.field[column]]);
@@ -244,17 +256,13 @@ class RowReader {
     if (id.empty() || !IsUtf8(id)) {
       return at.FieldError("id", id, "a name or number in UTF-8 is due; correct the line");
     }
-    return table_->FindOrAdd(options_.agent_prefix + NameOf(std::string(id), fields), kind);
-  }
-
-  // What the row calls its agent, if it is told beside an id; the id where that is another's name.
-  const std::string& NameOf(const std::string& id, const std::vector<std::string_view>& fields) {
-    auto [named, is_new] = name_of_.try_emplace(id, id);
-    if (!is_new || !header_.Has(kName)) return named->second;
-    const std::string name(Field(fields, kName));
-    const bool is_usable = !name.empty() && IsUtf8(name) && names_.insert(name).second;
-    if (is_usable) named->second = name;
-    return named->second;
+    std::string_view name = header_.Has(kName) ? Field(fields, kName) : id;
+    if (name.empty()) name = id;
+    if (!IsUtf8(name)) {
+      return at.FieldError("agent_name", name, "a name in UTF-8 is due; correct the line");
+    }
+    ids_of_[std::string(name)].emplace(id);
+    return table_->FindOrAdd(options_.agent_prefix + std::string(name), kind);
   }
 
   // Four empty fields: no orientation.
@@ -281,9 +289,8 @@ class RowReader {
   const Header& header_;
   const LogOptions& options_;
   TrackTable* table_;
-  // Of agents by id.
-  std::map<std::string, std::string> name_of_;
-  std::set<std::string> names_;
+  // Of agents by name.
+  std::map<std::string, std::set<std::string>> ids_of_;
 };
 
 void AddHeaderNotes(const Header& header, std::vector<std::string>* notes) {
@@ -338,6 +345,7 @@ absl::StatusOr<TextRows> ReadCsvRows(const LogFile& file, const LogOptions& opti
         CheckFieldCount(at, line, fields.size(), header.field_count, "as in the header"));
     DSG_RETURN_IF_ERROR(rows.Add(at, fields));
   }
+  rows.AddNotes(&found.notes);
   AddHeaderNotes(header, &found.notes);
   return found;
 }

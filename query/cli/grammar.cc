@@ -144,6 +144,22 @@ void ReplaceHelp(std::vector<std::string>* arguments) {
   if (arguments->size() <= 1) arguments->push_back("--help");
 }
 
+// Of a verb without arguments, a word that is empty and no value of an option: CLI11 would look for
+// its end among groups of options for ever.
+bool HasStrayEmptyWord(const CLI::App& verb, const std::vector<std::string>& words) {
+  const std::vector<const CLI::Option*> options = verb.get_options();
+  if (std::any_of(options.begin(), options.end(),
+                  [](const CLI::Option* option) { return option->get_positional(); })) {
+    return false;
+  }
+  for (size_t i = 1; i < words.size(); ++i) {
+    const CLI::Option* before = verb.get_option_no_throw(words[i - 1]);
+    const bool is_value = before != nullptr && before->get_expected_max() > 0;
+    if (words[i].empty() && !is_value) return true;
+  }
+  return false;
+}
+
 // Help is asked for of a word that is no verb.
 bool NamesNoVerb(const CLI::App& app) {
   const std::vector<std::string> words = app.remaining();
@@ -155,6 +171,15 @@ bool NamesNoVerb(const CLI::App& app) {
 absl::Status Grammar::Parse(std::vector<std::string> arguments) {
   ReplaceHelp(&arguments);
   if (!arguments.empty() && arguments[0] == "--version") arguments[0] = "version";
+  const std::string verb_name = arguments.empty() ? "" : arguments[0];
+  if (const std::string empty = OptionWithoutValue(arguments); !empty.empty()) {
+    return Usage(absl::StrCat(empty, " is empty; give a value, or leave it out"), verb_name);
+  }
+  const std::vector<CLI::App*> named =
+      app_.get_subcommands([&](const CLI::App* verb) { return verb->check_name(verb_name); });
+  if (!named.empty() && HasStrayEmptyWord(*named.front(), arguments)) {
+    return Usage("not understood: an empty word", verb_name);
+  }
   // CLI11 takes them last first.
   std::reverse(arguments.begin(), arguments.end());
   try {

@@ -132,9 +132,22 @@ std::string UsageMessage(const CLI::App& app, const CLI::ParseError& error) {
   return absl::StrCat(NotUnderstood(unknown, known), SeeHelp(app, verb));
 }
 
+std::string OptionWithoutValue(const std::vector<std::string>& words) {
+  for (const std::string& word : words) {
+    if (word == "--") break;
+    if (absl::StartsWith(word, "--") && absl::EndsWith(word, "=")) return NameOfOption(word);
+  }
+  return "";
+}
+
 void UseVerbUsage(CLI::App* app) { app->formatter(std::make_shared<VerbUsage>()); }
 
 std::optional<int> ReadCommandLine(int argc, char** argv, CLI::App* app) {
+  if (const std::string empty = OptionWithoutValue(Words(argv + 1, argv + argc)); !empty.empty()) {
+    std::fprintf(stderr, "%s: %s is empty; give a value, or leave it out%s\n",
+                 app->get_name().c_str(), empty.c_str(), SeeHelp(*app, nullptr).c_str());
+    return kUsage;
+  }
   try {
     app->parse(argc, argv);
     return std::nullopt;

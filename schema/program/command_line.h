@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 
@@ -19,6 +20,10 @@ namespace dsg {
 /// `not understood: --stor x; near in spelling: "--store"; see dsg stats --help`. Words that nobody
 /// knows come first: a misspelt option is also missing.
 std::string UsageMessage(const CLI::App& app, const CLI::ParseError& error);
+
+/// The first of the words that is an option with "=" and no value, as "--store"; CLI11 would take
+/// the next word for its value. Empty if there is none.
+std::string OptionWithoutValue(const std::vector<std::string>& words);
 
 /// The help of a program with verbs says "Usage: dsg VERB [OPTIONS]".
 void UseVerbUsage(CLI::App* app);

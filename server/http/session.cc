@@ -79,6 +79,8 @@ void Session::EndAnswer() {
   if (waiting_.has_value() || call_ == nullptr) {
     Close();
   } else {
+    // The reader may take nothing more of what is leaving, and then no end either.
+    if (sending_.has_value()) due_ = std::min(due_, Clock::now() + runtime_->stall_max);
     call_->served()->Cancel();
   }
 }

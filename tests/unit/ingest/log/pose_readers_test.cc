@@ -137,8 +137,10 @@ TEST(CsvReader, CallsAgentsByTheNameBesideTheirId) {
   ASSERT_TRUE(log.ok()) << log.status();
   std::vector<std::string> names;
   for (const PoseMeasurement& pose : log->poses) names.push_back(pose.agent_name);
-  // A name that another agent has says nothing.
-  EXPECT_EQ(names, (std::vector<std::string>{"henry", "robot", "H6", "H7", "henry"}));
+  EXPECT_EQ(names, (std::vector<std::string>{"henry", "robot", "H6", "henry", "henry"}));
+  EXPECT_NE(Notes(log->info).find("\"henry\" is one agent, of 2 ids, H5 among them"),
+            std::string::npos)
+      << Notes(log->info);
   EXPECT_EQ(log->poses[1].agent_kind, kinds::kRobot);
   EXPECT_EQ(Notes(log->info).find("not read"), std::string::npos) << Notes(log->info);
 }

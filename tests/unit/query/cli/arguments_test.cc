@@ -294,6 +294,12 @@ TEST(Arguments, AFileOfAnotherEndingIsRefusedWithItsRightName) {
 TEST(Arguments, HelpIsAlsoAVerb) {
   EXPECT_EQ(ParseArguments({"help"}, {})->help, HelpOf({}));
   EXPECT_EQ(ParseArguments({"help", "where"}, {})->help, HelpOf({"where"}));
+  EXPECT_EQ(Refusal({"prune", "--before", "+1s", ""}, {}),
+            "not understood: an empty word; see dsg prune --help");
+  EXPECT_EQ(Refusal({"prune", "--dry-run", ""}, {}),
+            "not understood: an empty word; see dsg prune --help");
+  EXPECT_EQ(Refusal({"ls", "--store=", "--map", "x"}, {}),
+            "--store is empty; give a value, or leave it out; see dsg ls --help");
   EXPECT_NE(Refusal({"help", "wheer"}, {}).find("near in spelling: \"where\""), std::string::npos);
   Refusal({"help", "where", "who"}, {});
 }
