@@ -261,7 +261,7 @@ class RowReader {
     if (!IsUtf8(name)) {
       return at.FieldError("agent_name", name, "a name in UTF-8 is due; correct the line");
     }
-    ids_of_[std::string(name)].emplace(id);
+    if (header_.Has(kName)) ids_of_[std::string(name)].emplace(id);
     return table_->FindOrAdd(options_.agent_prefix + std::string(name), kind);
   }
 
@@ -289,7 +289,7 @@ class RowReader {
   const Header& header_;
   const LogOptions& options_;
   TrackTable* table_;
-  // Of agents by name.
+  // Of agents by name, where names stand beside ids.
   std::map<std::string, std::set<std::string>> ids_of_;
 };
 

@@ -70,25 +70,27 @@ absl::StatusOr<MapContent> ReadBeside(const Session& session, const MapVerb& ver
 }
 
 // "on floor L1 at revision 7"; what is valid at --at is a part of that.
-std::string PartOf(const MapContent& content, const MapVerb& verb) {
-  return absl::StrCat(verb.floor.empty() ? "" : absl::StrCat("on floor ", verb.floor, " "),
-                      verb.at.empty() ? "" : absl::StrCat("at ", verb.at, " "), "at revision ",
+std::string PartOf(const MapContent& content, const std::string& floor, const std::string& at) {
+  return absl::StrCat(floor.empty() ? "" : absl::StrCat("on floor ", floor, " "),
+                      at.empty() ? "" : absl::StrCat("at ", at, " "), "at revision ",
                       content.revision);
 }
 
 // An empty picture would not say why it is.
-void NoteWithoutMesh(const Session& session, const MapContent& content, const MapVerb& verb) {
+void NoteWithoutMesh(const Session& session, const MapContent& content, const std::string& floor,
+                     const std::string& at) {
   if (CountMesh(content.mesh).faces > 0) return;
-  session.notes() << "note: map " << content.spec.name << " has no mesh " << PartOf(content, verb)
+  session.notes() << "note: map " << content.spec.name << " has no mesh "
+                  << PartOf(content, floor, at)
                   << ", so its picture is empty; leave out --mesh to draw the rest of it\n";
 }
 
 void NoteWhatIsMissing(const Session& session, const MapContent& content, const MapVerb& verb) {
   if (verb.is_mesh) {
-    NoteWithoutMesh(session, content, verb);
+    NoteWithoutMesh(session, content, verb.floor, verb.at);
   } else if (content.nodes.empty() && CountMesh(content.mesh).faces == 0) {
-    session.notes() << "note: map " << content.spec.name << " has nothing " << PartOf(content, verb)
-                    << ", so its picture is empty\n";
+    session.notes() << "note: map " << content.spec.name << " has nothing "
+                    << PartOf(content, verb.floor, verb.at) << ", so its picture is empty\n";
   } else if (verb.with_bodies && content.bodies.empty()) {
     session.notes() << "note: no body of anybody is known at " << verb.at << ", so none is drawn\n";
   }
@@ -102,7 +104,8 @@ absl::StatusOr<picture::Picture> DrawMap(Session* session, const MapVerb& verb,
   if (!verb.is_mesh) return DrawTopView(content, {.width_px = verb.width_px, .title = title});
   if (verb.beside.empty()) return DrawMeshes({{content, title}}, verb.width_px);
   DSG_ASSIGN_OR_RETURN(const MapContent other, ReadBeside(*session, verb));
-  NoteWithoutMesh(*session, other, verb);
+  // Of the other map all floors are drawn.
+  NoteWithoutMesh(*session, other, "", verb.at);
   return DrawMeshes({{content, NameAndRevision(content)}, {other, NameAndRevision(other)}},
                     verb.width_px);
 }
