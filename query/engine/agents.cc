@@ -252,7 +252,7 @@ absl::Status BatchLocateAgents(Engine* engine, const CallContext& call,
 
 namespace {
 
-constexpr int kPosesPerMessage = 1000;
+constexpr size_t kPosesPerMessage = 1000;
 
 class TrajectoryCursor final : public EngineCursor<v1::GetTrajectoryResponse> {
  public:
@@ -267,10 +267,10 @@ class TrajectoryCursor final : public EngineCursor<v1::GetTrajectoryResponse> {
       reply->set_agent_id(ToString(walk_.track().agent));
       is_first_ = false;
     }
-    return walk_.Read(view_.snapshot(), call.stop(), [&](const TimedPose& pose, bool) {
-      if (reply->poses_size() == kPosesPerMessage) return false;
-      ToProto(pose, reply->add_poses());
-      return true;
+    return walk_.Read(view_.snapshot(), call.stop(), [&](absl::Span<const TimedPose> poses, bool) {
+      poses = poses.subspan(0, kPosesPerMessage - static_cast<size_t>(reply->poses_size()));
+      for (const TimedPose& pose : poses) ToProto(pose, reply->add_poses());
+      return poses.size();
     });
   }
 

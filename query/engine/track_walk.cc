@@ -52,20 +52,34 @@ absl::Status TrackWalk::Read(const Snapshot& snapshot, const StopCheck& stop, co
 absl::Status TrackWalk::ReadStored(const Snapshot& snapshot, const StopCheck& stop,
                                    const Take& take) {
   bool has_paused = false;
-  DSG_RETURN_IF_ERROR(
-      snapshot.ReadPoses(track_.agent, next_ns_, to_ns_, stop, [&](const TimedPose& pose) {
-        const bool is_after_gap =
-            last_ns_.has_value() && pose.time_ns - *last_ns_ > track_.gap_ns_max;
-        if (!take(pose, is_after_gap)) {
-          next_ns_ = pose.time_ns;
-          has_paused = true;
-          return false;
-        }
-        last_ns_ = pose.time_ns;
-        return true;
-      }));
+  DSG_RETURN_IF_ERROR(snapshot.ReadPoseRuns(track_.agent, next_ns_, to_ns_, stop,
+                                            [&](absl::Span<const TimedPose> poses) {
+                                              has_paused = !TakeRun(poses, take);
+                                              return !has_paused;
+                                            }));
   is_done_ = !has_paused;
   return absl::OkStatus();
+}
+
+bool TrackWalk::TakeRun(absl::Span<const TimedPose> poses, const Take& take) {
+  const auto has_gap_after = [this](const TimedPose& pose, const TimedPose& next) {
+    return next.time_ns - pose.time_ns > track_.gap_ns_max;
+  };
+  while (!poses.empty()) {
+    const auto last = std::adjacent_find(poses.begin(), poses.end(), has_gap_after);
+    const size_t count =
+        last == poses.end() ? poses.size() : static_cast<size_t>(last - poses.begin()) + 1;
+    const bool is_after_gap =
+        last_ns_.has_value() && poses.front().time_ns - *last_ns_ > track_.gap_ns_max;
+    const size_t taken_count = take(poses.first(count), is_after_gap);
+    if (taken_count > 0) last_ns_ = poses[taken_count - 1].time_ns;
+    if (taken_count < count) {
+      next_ns_ = poses[taken_count].time_ns;
+      return false;
+    }
+    poses.remove_prefix(count);
+  }
+  return true;
 }
 
 bool TrackWalk::IsPastEnd(TimeNs time_ns) const {
@@ -84,7 +98,7 @@ absl::Status TrackWalk::Resample(const Snapshot& snapshot, const StopCheck& stop
       continue;
     }
     const TimedPose pose{next_ns_, located.flags, located.map_T_agent, located.covariance};
-    if (!take(pose, is_after_gap_)) return absl::OkStatus();
+    if (take(absl::MakeConstSpan(&pose, 1), is_after_gap_) == 0) return absl::OkStatus();
     last_ns_ = next_ns_;
     is_after_gap_ = false;
     next_ns_ = NextOnGrid(grid_from_ns_, period_ns_, next_ns_ + 1);

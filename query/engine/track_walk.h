@@ -8,6 +8,7 @@
 
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include "absl/types/span.h"
 #include "query/engine/request.h"
 #include "schema/store/snapshot.h"
 
@@ -46,17 +47,19 @@ class TrackWalk {
   const TrackInfo& track() const { return track_; }
   bool done() const { return is_done_; }
 
-  /// Gives `take` pose after pose until it returns false: that pose comes first in the next call.
-  /// `is_after_gap`: the track has a gap between this pose and the one before it.
-  /// Errors: of the store; what `stop` returned.
-  absl::Status Read(const Snapshot& snapshot, const StopCheck& stop,
-                    const std::function<bool(const TimedPose&, bool is_after_gap)>& take);
+  /// Poses that follow one another without a gap, and how many of them were taken.
+  /// `is_after_gap`: the track has a gap between the first of them and the pose before it.
+  using Take = std::function<size_t(absl::Span<const TimedPose> poses, bool is_after_gap)>;
+
+  /// Gives the poses to `take`, until it takes fewer than it is given: the first of the others
+  /// comes first in the next call. Errors: of the store; what `stop` returned.
+  absl::Status Read(const Snapshot& snapshot, const StopCheck& stop, const Take& take);
 
  private:
-  using Take = std::function<bool(const TimedPose&, bool)>;
-
   absl::Status ReadStored(const Snapshot& snapshot, const StopCheck& stop, const Take& take);
   absl::Status Resample(const Snapshot& snapshot, const StopCheck& stop, const Take& take);
+  // Of poses as they are stored; false if `take` left some.
+  bool TakeRun(absl::Span<const TimedPose> poses, const Take& take);
   bool IsPastEnd(TimeNs time_ns) const;
 
   TrackInfo track_;

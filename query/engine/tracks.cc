@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/types/span.h"
 #include "dsg/v1/query_service.pb.h"
 #include "dsg/v1/scene.pb.h"
 #include "query/engine/columns.h"
@@ -32,24 +33,28 @@ class PoseColumns {
       : value_bytes_(is_single ? sizeof(float) : sizeof(double)),
         with_orientations_(with_orientations) {}
 
-  void Add(const TimedPose& pose, bool is_after_gap) {
-    if (is_after_gap) gaps_.push_back(static_cast<uint32_t>(times_.size()));
-    times_.push_back(pose.time_ns);
-    flags_.Add(static_cast<uint8_t>(pose.flags));
-    for (const double value : pose.map_T_agent.position) positions_.push_back(value);
-    if (!with_orientations_) return;
-    const bool is_known = (pose.flags & pose_flags::kNoOrientation) == 0;
-    has_orientation_ = has_orientation_ || is_known;
-    constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-    for (const double value : pose.map_T_agent.orientation.coeffs()) {
-      orientations_.push_back(is_known ? value : kUnknown);
+  // Poses that follow one another without a gap.
+  void Add(absl::Span<const TimedPose> poses, bool is_after_gap) {
+    const size_t begin = times_.size();
+    if (is_after_gap) gaps_.push_back(static_cast<uint32_t>(begin));
+    times_.resize(begin + poses.size());
+    positions_.resize(3 * times_.size());
+    TimeNs* time = &times_[begin];
+    double* position = &positions_[3 * begin];
+    for (const TimedPose& pose : poses) {
+      *time++ = pose.time_ns;
+      Eigen::Vector3d::Map(position) = pose.map_T_agent.position;
+      position += 3;
+      flags_.Add(static_cast<uint8_t>(pose.flags));
     }
+    if (with_orientations_) AddOrientations(poses);
   }
 
   bool empty() const { return times_.empty(); }
-  size_t size_bytes() const {
-    return times_.size() * sizeof(TimeNs) +
-           (positions_.size() + orientations_.size()) * value_bytes_;
+  size_t size_bytes() const { return times_.size() * row_bytes(); }
+  // How many more poses until the columns have so many bytes.
+  size_t RowsUpTo(size_t bytes) const {
+    return bytes <= size_bytes() ? 0 : (bytes - size_bytes() + row_bytes() - 1) / row_bytes();
   }
 
   // Empties the columns, and keeps their memory for the next message.
@@ -75,6 +80,26 @@ class PoseColumns {
   }
 
  private:
+  size_t row_bytes() const {
+    return sizeof(TimeNs) + (with_orientations_ ? size_t{7} : size_t{3}) * value_bytes_;
+  }
+
+  void AddOrientations(absl::Span<const TimedPose> poses) {
+    const size_t begin = orientations_.size();
+    orientations_.resize(begin + 4 * poses.size());
+    double* orientation = &orientations_[begin];
+    for (const TimedPose& pose : poses) {
+      auto out = Eigen::Vector4d::Map(orientation);
+      orientation += 4;
+      if ((pose.flags & pose_flags::kNoOrientation) == 0) {
+        out = pose.map_T_agent.orientation.coeffs();
+        has_orientation_ = true;
+      } else {
+        out.setConstant(std::numeric_limits<double>::quiet_NaN());
+      }
+    }
+  }
+
   void SendSingle(v1::TrackPoses* out) const {
     const Eigen::Vector3d origin_map = Eigen::Vector3d(positions_.data()).array().round();
     ToProto(origin_map, out->mutable_origin_map());
@@ -109,13 +134,13 @@ class Thinner {
       waiting_ = pose;
       return;
     }
-    columns->Add(pose, is_after_gap);
+    columns->Add(absl::MakeConstSpan(&pose, 1), is_after_gap);
     last_ns_ = pose.time_ns;
     waiting_.reset();
   }
   // The last pose of a stretch.
   void Finish(PoseColumns* columns) {
-    if (waiting_.has_value()) columns->Add(*waiting_, false);
+    if (waiting_.has_value()) columns->Add(absl::MakeConstSpan(&*waiting_, 1), false);
     waiting_.reset();
   }
 
@@ -169,12 +194,10 @@ class TracksCursor final : public EngineCursor<v1::GetTracksResponse> {
       walk_.emplace(tracks_[track_], range_);
       thinner_ = Thinner(thin_period_ns_);
     }
-    DSG_RETURN_IF_ERROR(
-        walk_->Read(view_.snapshot(), call.stop(), [&](const TimedPose& pose, bool is_after_gap) {
-          if (columns_.size_bytes() >= room_bytes) return false;
-          Take(pose, is_after_gap);
-          return true;
-        }));
+    DSG_RETURN_IF_ERROR(walk_->Read(view_.snapshot(), call.stop(),
+                                    [&](absl::Span<const TimedPose> poses, bool is_after_gap) {
+                                      return Take(poses, is_after_gap, room_bytes);
+                                    }));
     if (walk_->done()) thinner_.Finish(&columns_);
     if (!columns_.empty()) {
       *bytes += columns_.size_bytes();
@@ -189,12 +212,18 @@ class TracksCursor final : public EngineCursor<v1::GetTracksResponse> {
     return absl::OkStatus();
   }
 
-  void Take(const TimedPose& pose, bool is_after_gap) {
-    if (thin_period_ns_ > 0) {
-      thinner_.Take(pose, is_after_gap, &columns_);
-    } else {
-      columns_.Add(pose, is_after_gap);
+  // Takes as many as there is room for.
+  size_t Take(absl::Span<const TimedPose> poses, bool is_after_gap, size_t room_bytes) {
+    if (thin_period_ns_ == 0) {
+      poses = poses.subspan(0, columns_.RowsUpTo(room_bytes));
+      if (!poses.empty()) columns_.Add(poses, is_after_gap);
+      return poses.size();
     }
+    size_t taken_count = 0;
+    for (; taken_count < poses.size() && columns_.size_bytes() < room_bytes; ++taken_count) {
+      thinner_.Take(poses[taken_count], is_after_gap && taken_count == 0, &columns_);
+    }
+    return taken_count;
   }
 
   const ReadView view_;
@@ -318,12 +347,16 @@ absl::Status GetTimeline(Engine* engine, const CallContext& call,
   for (const TrackInfo& track : tracks) {
     TrackWalk walk(track, Around(track, from_ns, to_ns));
     bool has_begun = false;
-    DSG_RETURN_IF_ERROR(
-        walk.Read(view.snapshot(), call.stop(), [&](const TimedPose& pose, bool is_after_gap) {
-          bins.Add(pose.time_ns, has_begun && !is_after_gap);
-          has_begun = true;
-          return true;
-        }));
+    DSG_RETURN_IF_ERROR(walk.Read(view.snapshot(), call.stop(),
+                                  [&](absl::Span<const TimedPose> poses, bool is_after_gap) {
+                                    bool is_connected = has_begun && !is_after_gap;
+                                    for (const TimedPose& pose : poses) {
+                                      bins.Add(pose.time_ns, is_connected);
+                                      is_connected = true;
+                                    }
+                                    has_begun = true;
+                                    return poses.size();
+                                  }));
     bins.EndTrack();
   }
   bins.Fill(reply);

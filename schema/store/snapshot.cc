@@ -29,6 +29,13 @@ absl::StatusOr<std::vector<BodyShape>> Snapshot::Shapes(NodeId agent, TimeNs fro
   return shapes;
 }
 
+absl::Status Snapshot::ReadPoses(NodeId agent, TimeNs from_ns, TimeNs to_ns, const StopCheck& stop,
+                                 const std::function<bool(const TimedPose&)>& visit) const {
+  return ReadPoseRuns(agent, from_ns, to_ns, stop, [&](absl::Span<const TimedPose> poses) {
+    return std::all_of(poses.begin(), poses.end(), std::cref(visit));
+  });
+}
+
 bool EdgeFilter::Matches(const Edge& edge) const {
   return (relation.empty() || edge.relation == relation) &&
          (source.empty() || edge.source == source) && (target.empty() || edge.target == target) &&

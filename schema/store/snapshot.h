@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "absl/types/span.h"
 #include "schema/base/stop_check.h"
 #include "schema/base/time.h"
 #include "schema/model/edge.h"
@@ -193,10 +194,15 @@ class Snapshot {
   /// Errors: NOT_FOUND/AGENT_UNKNOWN; OUT_OF_RANGE/TIME_OUTSIDE_TRACK with both ends.
   /// Cost:   one lookup in a cached directory and the decoding of part of one block of 64 poses.
   virtual absl::StatusOr<LocatedPose> Locate(NodeId agent, TimeNs at_ns) const = 0;
-  /// Calls `visit` for each stored pose with from_ns <= time < to_ns, until it returns false.
-  /// Order: ascending time. Errors: NOT_FOUND/AGENT_UNKNOWN.
-  virtual absl::Status ReadPoses(NodeId agent, TimeNs from_ns, TimeNs to_ns, const StopCheck& stop,
-                                 const std::function<bool(const TimedPose&)>& visit) const = 0;
+  /// Calls `visit` for the stored poses with from_ns <= time < to_ns, some hundreds at a time,
+  /// until it returns false. The poses are valid during the call. Order: ascending time. Errors:
+  /// NOT_FOUND/AGENT_UNKNOWN.
+  virtual absl::Status ReadPoseRuns(
+      NodeId agent, TimeNs from_ns, TimeNs to_ns, const StopCheck& stop,
+      const std::function<bool(absl::Span<const TimedPose>)>& visit) const = 0;
+  /// The same, pose by pose.
+  absl::Status ReadPoses(NodeId agent, TimeNs from_ns, TimeNs to_ns, const StopCheck& stop,
+                         const std::function<bool(const TimedPose&)>& visit) const;
   /// Exact intervals in which interpolated positions were inside a box, gaps excluded.
   /// A visit is clipped to [from_ns, to_ns) and at least 1 ns long, or one instant's pose.
   /// Order: ascending enter_ns, then agent.

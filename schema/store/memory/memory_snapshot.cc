@@ -50,8 +50,9 @@ class MemorySnapshot : public Snapshot {
   absl::StatusOr<std::vector<TrackInfo>> Tracks(const StopCheck& stop) const override;
   absl::StatusOr<TrackInfo> GetTrack(NodeId agent) const override;
   absl::StatusOr<LocatedPose> Locate(NodeId agent, TimeNs at_ns) const override;
-  absl::Status ReadPoses(NodeId agent, TimeNs from_ns, TimeNs to_ns, const StopCheck& stop,
-                         const std::function<bool(const TimedPose&)>& visit) const override;
+  absl::Status ReadPoseRuns(
+      NodeId agent, TimeNs from_ns, TimeNs to_ns, const StopCheck& stop,
+      const std::function<bool(absl::Span<const TimedPose>)>& visit) const override;
   absl::StatusOr<std::vector<BoxVisit>> VisitsToBox(const Box3d& box_map, TimeNs from_ns,
                                                     TimeNs to_ns,
                                                     const StopCheck& stop) const override;
@@ -315,16 +316,18 @@ absl::StatusOr<LocatedPose> MemorySnapshot::Locate(NodeId agent, TimeNs at_ns) c
                        spec().codec);
 }
 
-absl::Status MemorySnapshot::ReadPoses(NodeId agent, TimeNs from_ns, TimeNs to_ns,
-                                       const StopCheck& stop,
-                                       const std::function<bool(const TimedPose&)>& visit) const {
+absl::Status MemorySnapshot::ReadPoseRuns(
+    NodeId agent, TimeNs from_ns, TimeNs to_ns, const StopCheck& stop,
+    const std::function<bool(absl::Span<const TimedPose>)>& visit) const {
   DSG_RETURN_IF_ERROR(InfoOf(agent).status());
   DSG_ASSIGN_OR_RETURN(auto poses, PosesOf(agent));
   std::erase_if(poses, [&](const StoredPose& pose) {
     return pose.time_ns < from_ns || pose.time_ns >= to_ns;
   });
-  return ShowAll(poses, stop,
-                 [&](const StoredPose& pose) { return visit(FromStored(pose, spec().codec)); });
+  return ShowAll(poses, stop, [&](const StoredPose& stored) {
+    const TimedPose pose = FromStored(stored, spec().codec);
+    return visit(absl::MakeConstSpan(&pose, 1));
+  });
 }
 
 absl::StatusOr<std::vector<BoxVisit>> MemorySnapshot::VisitsToBox(const Box3d& box_map,

@@ -120,9 +120,9 @@ absl::StatusOr<LocatedPose> SqliteSnapshot::Locate(NodeId agent, TimeNs at_ns) c
   return LocateBetween(before, after, at_ns, info.gap_ns_max, spec().codec);
 }
 
-absl::Status SqliteSnapshot::ReadPoses(NodeId agent, TimeNs from_ns, TimeNs to_ns,
-                                       const StopCheck& stop,
-                                       const std::function<bool(const TimedPose&)>& visit) const {
+absl::Status SqliteSnapshot::ReadPoseRuns(
+    NodeId agent, TimeNs from_ns, TimeNs to_ns, const StopCheck& stop,
+    const std::function<bool(absl::Span<const TimedPose>)>& visit) const {
   DSG_ASSIGN_OR_RETURN(const auto track, reader_->GetTrack(agent, revision()));
   const int first = std::max(track->FindSegment(from_ns), 0);
   std::vector<TimedPose> poses;
@@ -132,12 +132,16 @@ absl::Status SqliteSnapshot::ReadPoses(NodeId agent, TimeNs from_ns, TimeNs to_n
     DSG_RETURN_IF_ERROR(AskStop(stop));
     DSG_ASSIGN_OR_RETURN(const auto reader, reader_->GetSegment(segment, revision()));
     if (!reader->DecodePoses(&poses)) return CorruptSegment(spec().name, segment);
-    for (const TimedPose& pose : poses) {
-      // Poses appended after this revision stand at the end.
-      if (pose.time_ns > segment.t1) break;
-      if (pose.time_ns < from_ns) continue;
-      if (pose.time_ns >= to_ns || !visit(pose)) return absl::OkStatus();
-    }
+    const auto first_not_before = [&poses](TimeNs time_ns) {
+      return std::partition_point(poses.begin(), poses.end(),
+                                  [=](const TimedPose& pose) { return pose.time_ns < time_ns; });
+    };
+    // Poses appended after this revision stand at the end.
+    const TimeNs end_ns = segment.t1 < to_ns ? segment.t1 + 1 : to_ns;
+    const auto begin = first_not_before(from_ns);
+    const auto end = first_not_before(end_ns);
+    if (begin >= end) continue;
+    if (!visit(absl::MakeConstSpan(&*begin, static_cast<size_t>(end - begin)))) break;
   }
   return absl::OkStatus();
 }

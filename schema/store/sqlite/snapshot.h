@@ -49,8 +49,9 @@ class SqliteSnapshot : public Snapshot {
   absl::StatusOr<std::vector<TrackInfo>> Tracks(const StopCheck& stop) const override;
   absl::StatusOr<TrackInfo> GetTrack(NodeId agent) const override;
   absl::StatusOr<LocatedPose> Locate(NodeId agent, TimeNs at_ns) const override;
-  absl::Status ReadPoses(NodeId agent, TimeNs from_ns, TimeNs to_ns, const StopCheck& stop,
-                         const std::function<bool(const TimedPose&)>& visit) const override;
+  absl::Status ReadPoseRuns(
+      NodeId agent, TimeNs from_ns, TimeNs to_ns, const StopCheck& stop,
+      const std::function<bool(absl::Span<const TimedPose>)>& visit) const override;
   absl::StatusOr<std::vector<BoxVisit>> VisitsToBox(const Box3d& box_map, TimeNs from_ns,
                                                     TimeNs to_ns,
                                                     const StopCheck& stop) const override;
