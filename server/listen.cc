@@ -27,8 +27,9 @@ namespace dsg::server {
 namespace {
 
 constexpr std::string_view kUnixPrefix = "unix:";
-// The same time that gRPC waits for the answer to its ping.
-constexpr unsigned kUnacknowledgedMsMax = 10'000;
+// As long as gRPC waits until its ping and for the answer. It counts while a reader takes nothing,
+// which may last for 30 s.
+constexpr unsigned kUnacknowledgedMsMax = 40'000;
 constexpr std::chrono::milliseconds kAcceptPause{100};
 constexpr int kBacklog = 4096;
 

@@ -96,8 +96,8 @@ void HttpCall::Finish(const absl::Status& status) {
 }
 
 EndCall HttpCall::ender() {
-  return [outlet = place_.outlet, number = place_.number](const absl::Status&) {
-    outlet->End(number);
+  return [outlet = place_.outlet, number = place_.number](const absl::Status& why) {
+    outlet->End(number, why);
   };
 }
 

@@ -31,7 +31,7 @@ class Outlet {
   /// quicker when its next message is made meanwhile.
   virtual void Write(AnswerBytes bytes, bool is_last) = 0;
   /// Ends the call of that number, if it has not ended.
-  virtual void End(uint64_t number) = 0;
+  virtual void End(uint64_t number, const absl::Status& why) = 0;
 };
 
 class HttpCall final : public CallWire {

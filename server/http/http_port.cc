@@ -137,7 +137,7 @@ class RunningPort final : public HttpPort {
     const Clock::time_point now = Clock::now();
     ForEach(&Session::Look, now);
     if (sessions_.is_stopping) {
-      if (now >= end_due_) ForEach(&Session::EndAnswer);
+      if (now >= end_due_) ForEach(&Session::EndAnswer, ShuttingDownError());
       if (now >= end_due_ + kLastWordsMax) ForEach(&Session::Close);
       if (sessions_.sessions.empty()) {
         sessions_.work.reset();

@@ -73,16 +73,13 @@ void Session::Stop() {
   if (phase_ == Phase::kRequest) Close();
 }
 
-void Session::EndAnswer() {
+void Session::EndAnswer(const absl::Status& why) {
   if (phase_ != Phase::kAnswer) return;
-  // What is half sent cannot be taken back, and nobody reads it.
-  if (waiting_.has_value() || call_ == nullptr) {
-    Close();
-  } else {
-    // The reader may take nothing more of what is leaving, and then no end either.
-    if (sending_.has_value()) due_ = std::min(due_, Clock::now() + runtime_->stall_max);
-    call_->served()->Cancel();
-  }
+  // What is half sent cannot be taken back, and such a reader takes nothing.
+  if (call_ == nullptr || (sending_.has_value() && absl::IsResourceExhausted(why))) return Close();
+  // Others are told why, behind what is leaving; they may take no more of that either.
+  if (sending_.has_value()) due_ = std::min(due_, Clock::now() + runtime_->stall_max);
+  call_->served()->Cancel();
 }
 
 void Session::Close() {
@@ -109,8 +106,8 @@ void Session::Write(AnswerBytes bytes, bool is_last) {
                             is_last]() mutable { self->SendBytes(std::move(bytes), is_last); });
 }
 
-void Session::End(uint64_t number) {
-  asio::post(runtime_->io, [self = shared_from_this(), number] {
+void Session::End(uint64_t number, const absl::Status& why) {
+  asio::post(runtime_->io, [self = shared_from_this(), number, why] {
     if (self->call_number_ != number) return;
     if (self->phase_ == Phase::kRequest) {
       self->Refuse({429,
@@ -118,7 +115,7 @@ void Session::End(uint64_t number) {
                                     "the oldest of the connection with the most"),
                     ""});
     } else {
-      self->EndAnswer();
+      self->EndAnswer(why);
     }
   });
 }
@@ -230,8 +227,8 @@ void Session::AwaitBody() {
   if (arrival_ != nullptr) return;
   due_ = BoundDeadline(plan_.deadline);
   arrival_ = runtime_->calls->arrivals->Enter(
-      [self = weak_from_this(), number = call_number_](const absl::Status&) {
-        if (const auto session = self.lock()) session->End(number);
+      [self = weak_from_this(), number = call_number_](const absl::Status& why) {
+        if (const auto session = self.lock()) session->End(number, why);
       },
       connection_.get());
 }

@@ -55,14 +55,14 @@ class Session final : public Outlet, public std::enable_shared_from_this<Session
   void Look(Clock::time_point now);
   /// Takes no more requests: closes the connection, when its answer has been sent.
   void Stop();
-  /// Ends the call that is being answered.
-  void EndAnswer();
+  /// Ends the call that is being answered. `why`: RESOURCE_EXHAUSTED if its reader takes nothing.
+  void EndAnswer(const absl::Status& why);
   /// Closes the connection now.
   void Close();
 
   // From any thread.
   void Write(AnswerBytes bytes, bool is_last) override;
-  void End(uint64_t number) override;
+  void End(uint64_t number, const absl::Status& why) override;
 
  private:
   enum class Phase {

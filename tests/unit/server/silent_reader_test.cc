@@ -2,12 +2,20 @@
 // Readers that open a stream and then do not read. The tests count the messages that these hold,
 // not the time that others wait.
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
 
+#include <array>
 #include <atomic>
+#include <cstring>
 #include <memory>
+#include <string>
 #include <thread>
 #include <vector>
 
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
 #include "dsg/v1/map_service.grpc.pb.h"
 #include "dsg/v1/query_service.grpc.pb.h"
 #include "grpcpp/grpcpp.h"
@@ -22,27 +30,35 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 using std::chrono::system_clock;
 
-// Counts the messages produced for streams of the mesh.
+// Makes all messages at once.
+constexpr int kNoneHeld = 0;
+
+// Counts the messages produced for streams of the mesh. Message number `held` of a stream, from 1,
+// is made when the call is over.
 class CountingCore final : public PassingCore {
  public:
-  CountingCore(std::unique_ptr<query::ServiceCore> core, std::atomic<int>* message_count)
-      : PassingCore(std::move(core)), message_count_(message_count) {}
+  CountingCore(std::unique_ptr<query::ServiceCore> core, std::atomic<int>* message_count, int held)
+      : PassingCore(std::move(core)), message_count_(message_count), held_(held) {}
 
   query::CursorOr<v1::GetMeshResponse> GetMesh(const query::CallContext& call,
                                                const v1::GetMeshRequest& request) override {
     auto cursor = PassingCore::GetMesh(call, request);
     if (!cursor.ok()) return cursor;
-    return std::make_unique<Cursor>(*std::move(cursor), message_count_);
+    return std::make_unique<Cursor>(*std::move(cursor), message_count_, held_);
   }
 
  private:
   class Cursor final : public query::StreamCursor<v1::GetMeshResponse> {
    public:
     Cursor(std::unique_ptr<query::StreamCursor<v1::GetMeshResponse>> cursor,
-           std::atomic<int>* message_count)
-        : cursor_(std::move(cursor)), message_count_(message_count) {}
+           std::atomic<int>* message_count, int held)
+        : cursor_(std::move(cursor)), message_count_(message_count), held_(held) {}
     absl::StatusOr<bool> Next(const query::CallContext& call, v1::GetMeshResponse* reply) override {
       ++*message_count_;
+      ++own_count_;
+      while (own_count_ == held_ && call.Check().ok()) {
+        std::this_thread::sleep_for(milliseconds(1));
+      }
       return cursor_->Next(call, reply);
     }
     bool done() const override { return cursor_->done(); }
@@ -50,9 +66,55 @@ class CountingCore final : public PassingCore {
    private:
     std::unique_ptr<query::StreamCursor<v1::GetMeshResponse>> cursor_;
     std::atomic<int>* message_count_;
+    const int held_;
+    int own_count_ = 0;
   };
 
   std::atomic<int>* message_count_;
+  const int held_;
+};
+
+// A stream of the whole mesh over HTTP, of which nothing is read until ReadAll.
+class HttpMeshReader {
+ public:
+  HttpMeshReader(const std::string& path, milliseconds timeout)
+      : fd_(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    path.copy(address.sun_path, sizeof(address.sun_path) - 1);
+    v1::GetMeshRequest request;
+    request.set_map(test::kMap);
+    const std::string message = request.SerializeAsString();
+    const std::string envelope = {0, 0, 0, 0, static_cast<char>(message.size())};
+    const std::string bytes = absl::StrCat(
+        "POST /dsg.v1.QueryService/GetMesh HTTP/1.1\r\nHost: localhost\r\n",
+        "Content-Type: application/connect+proto\r\nConnect-Timeout-Ms: ", timeout.count(),
+        "\r\nContent-Length: ", envelope.size() + message.size(), "\r\n\r\n", envelope, message);
+    is_asked_ =
+        connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0 &&
+        send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(bytes.size());
+  }
+  ~HttpMeshReader() { close(fd_); }
+  HttpMeshReader(const HttpMeshReader&) = delete;
+  HttpMeshReader& operator=(const HttpMeshReader&) = delete;
+
+  bool is_asked() const { return is_asked_; }
+  // Until the stream ends, or the connection.
+  std::string ReadAll() const {
+    constexpr char kEnd[] = "\r\n0\r\n\r\n";
+    std::string all;
+    std::array<char, size_t{64} << 10> part;
+    while (!absl::EndsWith(all, kEnd)) {
+      const ssize_t count = recv(fd_, part.data(), part.size(), 0);
+      if (count <= 0) break;
+      all.append(part.data(), static_cast<size_t>(count));
+    }
+    return all;
+  }
+
+ private:
+  const int fd_;
+  bool is_asked_ = false;
 };
 
 class SilentReader : public testing::Test {
@@ -62,13 +124,15 @@ class SilentReader : public testing::Test {
     test::CommitToOffice(folder_.path(), MeshDelta());
   }
 
-  void Start(milliseconds reader_stall_max = seconds(30)) {
+  void Start(milliseconds reader_stall_max = seconds(30), int held = kNoneHeld) {
     ServerOptions options;
     options.listen = "unix:" + folder_.path() + "/server.sock";
+    options.http.listen = "unix:" + http_path();
     options.worker_count = 2;
     options.reader_stall_max = reader_stall_max;
     auto server = Server::Start(
-        std::make_unique<CountingCore>(test::OpenCore(folder_.path()), &message_count_), options);
+        std::make_unique<CountingCore>(test::OpenCore(folder_.path()), &message_count_, held),
+        options);
     ASSERT_TRUE(server.ok()) << server.status();
     server_ = *std::move(server);
     channel_ = grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials());
@@ -96,9 +160,15 @@ class SilentReader : public testing::Test {
     return false;
   }
 
-  // Ends at the latest with the deadline of the readers.
+  std::string http_path() const { return folder_.path() + "/http.sock"; }
+
+  // Long before the readers' deadline, where they have a long one.
   bool AllStreamsEnd() {
-    while (server_->Load().open_stream_count > 0) std::this_thread::yield();
+    const auto end = system_clock::now() + seconds(20);
+    while (server_->Load().open_stream_count > 0) {
+      if (system_clock::now() > end) return false;
+      std::this_thread::yield();
+    }
     return true;
   }
 
@@ -136,6 +206,50 @@ TEST_F(SilentReader, IsGivenUpWithAReasonLongBeforeItsDeadline) {
   EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED) << status.error_message();
   EXPECT_NE(status.error_message().find("took no message"), std::string::npos)
       << status.error_message();
+}
+
+TEST_F(SilentReader, HasTheNextMessageWaitingOverHttp) {
+  Start();
+  const HttpMeshReader reader(http_path(), seconds(60));
+  ASSERT_TRUE(reader.is_asked());
+  while (message_count_ < 2) std::this_thread::yield();
+  ASSERT_TRUE(ComesToRest());
+  // The first fills the socket, the second was made meanwhile.
+  EXPECT_EQ(message_count_, 2);
+}
+
+TEST_F(SilentReader, IsGivenUpOverHttp) {
+  Start(milliseconds(200));
+  const HttpMeshReader reader(http_path(), seconds(60));
+  ASSERT_TRUE(reader.is_asked());
+  while (message_count_ < 2) std::this_thread::yield();
+  EXPECT_TRUE(AllStreamsEnd());
+}
+
+// Then nothing waits behind what the reader does not take.
+TEST_F(SilentReader, IsGivenUpOverHttpWhenItsDeadlinePassesWhileAMessageIsMade) {
+  Start(milliseconds(200), /*held=*/2);
+  const HttpMeshReader reader(http_path(), milliseconds(300));
+  ASSERT_TRUE(reader.is_asked());
+  while (message_count_ < 2) std::this_thread::yield();
+  EXPECT_TRUE(AllStreamsEnd());
+}
+
+TEST_F(SilentReader, IsToldOverHttpThatItsDeadlinePassedWhenItReadsAgain) {
+  for (const int held : {kNoneHeld, 2}) {
+    SCOPED_TRACE(held);
+    message_count_ = 0;
+    Start(seconds(30), held);
+    constexpr milliseconds kTimeout(300);
+    const HttpMeshReader reader(http_path(), kTimeout);
+    ASSERT_TRUE(reader.is_asked());
+    while (message_count_ < 2) std::this_thread::yield();
+    std::this_thread::sleep_for(2 * kTimeout);
+    const std::string answer = reader.ReadAll();
+    EXPECT_TRUE(absl::EndsWith(answer, "\r\n0\r\n\r\n"));
+    EXPECT_NE(answer.rfind("deadline_exceeded"), std::string::npos);
+    server_.reset();
+  }
 }
 
 TEST_F(SilentReader, IsGivenUpThoughOthersRead) {
