@@ -2,6 +2,7 @@
 // Tables of poses whose header names the columns, whoever wrote them.
 #include <algorithm>
 #include <array>
+#include <deque>
 #include <map>
 #include <optional>
 #include <set>
@@ -97,12 +98,12 @@ struct Header {
   bool Has(Column column) const { return field[column].has_value(); }
 };
 
-// A name may stand in quotes; a separator within them is not looked for.
-std::string_view Unquoted(std::string_view text) {
-  if (text.size() >= 2 && text.front() == '"' && text.back() == '"') {
-    return text.substr(1, text.size() - 2);
-  }
-  return text;
+absl::Status SplitRow(const LinePosition& at, std::string_view line, char comma,
+                      std::deque<std::string>* unquoted, std::vector<std::string_view>* fields) {
+  if (SplitCsv(line, comma, unquoted, fields)) return absl::OkStatus();
+  return at.Error(
+      "a field in quotes does not end, or has text behind them; quotes that are part of a field "
+      "stand twice, and a field ends in its line");
 }
 
 // "Timestamp [ns]", "time_ns" and "x (m)": the name, and the unit if there is one.
@@ -169,11 +170,12 @@ absl::StatusOr<Header> ReadColumns(const LinePosition& at, std::string_view line
   line = HeaderNames(line);
   Header header;
   header.comma = CommaOf(line);
+  std::deque<std::string> unquoted;
   std::vector<std::string_view> fields;
-  SplitAtCommas(line, &fields, header.comma);
+  DSG_RETURN_IF_ERROR(SplitRow(at, line, header.comma, &unquoted, &fields));
   header.field_count = fields.size();
   for (size_t i = 0; i < fields.size(); ++i) {
-    const std::string_view text = Unquoted(fields[i]);
+    const std::string_view text = fields[i];
     const auto [name, unit] = NameAndUnit(text);
     const std::optional<Column> column = FindColumn(name);
     if (!column.has_value()) {
@@ -237,7 +239,7 @@ class RowReader {
 
  private:
   std::string_view Field(const std::vector<std::string_view>& fields, Column column) const {
-    return Unquoted(fields[*header_.field[column]]);
+    return fields[*header_.field[column]];
   }
 
   absl::StatusOr<int32_t> FindAgent(const LinePosition& at,
@@ -315,12 +317,13 @@ void AddHeaderNotes(const Header& header, std::vector<std::string>* notes) {
 
 // What is wrong with units or single columns is for the reader to say.
 bool IsCsvHeader(std::string_view line) {
+  std::deque<std::string> unquoted;
   std::vector<std::string_view> fields;
   std::array<bool, kColumnCount> has = {};
   const std::string_view names = HeaderNames(line);
-  SplitAtCommas(names, &fields, CommaOf(names));
+  SplitCsv(names, CommaOf(names), &unquoted, &fields);
   for (const std::string_view field : fields) {
-    const std::optional<Column> column = FindColumn(NameAndUnit(Unquoted(field)).first);
+    const std::optional<Column> column = FindColumn(NameAndUnit(field).first);
     if (column.has_value()) has[*column] = true;
   }
   return has[kTime] && has[kX] && has[kY];
@@ -336,11 +339,12 @@ absl::StatusOr<TextRows> ReadCsvRows(const LogFile& file, const LogOptions& opti
                        ReadColumns(LinePosition{file.path, line.number}, line.text));
   found.is_of_one = !header.Has(kId);
   RowReader rows(header, options, &found.table);
+  std::deque<std::string> unquoted;
   std::vector<std::string_view> fields;
   while (lines.Next(&line)) {
     if (line.text.starts_with('#')) continue;
     const LinePosition at{file.path, line.number};
-    SplitAtCommas(line.text, &fields, header.comma);
+    DSG_RETURN_IF_ERROR(SplitRow(at, line.text, header.comma, &unquoted, &fields));
     DSG_RETURN_IF_ERROR(
         CheckFieldCount(at, line, fields.size(), header.field_count, "as in the header"));
     DSG_RETURN_IF_ERROR(rows.Add(at, fields));

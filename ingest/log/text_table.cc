@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ingest/log/text_table.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
@@ -27,6 +28,20 @@ std::string_view Trim(std::string_view text) {
   const size_t begin = text.find_first_not_of(" \t");
   if (begin == std::string_view::npos) return {};
   return text.substr(begin, text.find_last_not_of(" \t") - begin + 1);
+}
+
+// Takes a field in quotes off the front of `text`. False if it does not end.
+bool TakeQuoted(std::string_view* text, std::string* field) {
+  text->remove_prefix(1);
+  while (true) {
+    const size_t quote = text->find('"');
+    if (quote == std::string_view::npos) return false;
+    field->append(text->substr(0, quote));
+    text->remove_prefix(quote + 1);
+    if (!text->starts_with('"')) return true;
+    field->push_back('"');
+    text->remove_prefix(1);
+  }
 }
 
 bool ReadDouble(std::string_view text, double* value) {
@@ -122,6 +137,32 @@ void SplitAtCommas(std::string_view text, std::vector<std::string_view>* fields,
     fields->push_back(Trim(text.substr(begin, end - begin)));
     if (end == std::string_view::npos) return;
     begin = end + 1;
+  }
+}
+
+bool SplitCsv(std::string_view text, char comma, std::deque<std::string>* unquoted,
+              std::vector<std::string_view>* fields) {
+  unquoted->clear();
+  if (text.find('"') == std::string_view::npos) {
+    SplitAtCommas(text, fields, comma);
+    return true;
+  }
+  fields->clear();
+  const char* const blanks = comma == '\t' ? " " : " \t";
+  while (true) {
+    text.remove_prefix(std::min(text.find_first_not_of(blanks), text.size()));
+    if (text.starts_with('"')) {
+      if (!TakeQuoted(&text, &unquoted->emplace_back())) return false;
+      fields->push_back(unquoted->back());
+      text.remove_prefix(std::min(text.find_first_not_of(blanks), text.size()));
+      if (!text.empty() && text.front() != comma) return false;
+    } else {
+      const size_t end = std::min(text.find(comma), text.size());
+      fields->push_back(Trim(text.substr(0, end)));
+      text.remove_prefix(end);
+    }
+    if (text.empty()) return true;
+    text.remove_prefix(1);
   }
 }
 

@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <deque>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -45,6 +46,11 @@ class LineReader {
 void SplitAtBlanks(std::string_view text, std::vector<std::string_view>* fields);
 /// Fields between commas, or another character, blanks around them removed.
 void SplitAtCommas(std::string_view text, std::vector<std::string_view>* fields, char comma = ',');
+/// Fields of a line of CSV (RFC 4180): one in quotes may have the comma in it, and quotes, each
+/// twice. What stood in quotes is kept in `unquoted`, to which the fields then point.
+/// False if quotes do not end in the line, or have text behind them.
+bool SplitCsv(std::string_view text, char comma, std::deque<std::string>* unquoted,
+              std::vector<std::string_view>* fields);
 
 /// A line of a file, for messages.
 struct LinePosition {

@@ -145,6 +145,26 @@ TEST(CsvReader, CallsAgentsByTheNameBesideTheirId) {
   EXPECT_EQ(Notes(log->info).find("not read"), std::string::npos) << Notes(log->info);
 }
 
+TEST(CsvReader, ReadsFieldsInQuotes) {
+  const auto log = ReadText(
+      "time_ns,\"agent_id\",x,y,z\n"
+      "1,\"Smith, Anna\" ,0,0,0\n2,\"the \"\"old\"\" one\",0,\"1.5\",0\n3,5\" cart,0,0,0\n");
+  ASSERT_TRUE(log.ok()) << log.status();
+  ASSERT_EQ(log->poses.size(), 3u);
+  EXPECT_EQ(log->poses[0].agent_name, "Smith, Anna");
+  EXPECT_EQ(log->poses[1].agent_name, "the \"old\" one");
+  EXPECT_EQ(log->poses[1].pose.map_T_agent.position.y(), 1.5);
+  EXPECT_EQ(log->poses[2].agent_name, "5\" cart");
+  const auto tabs = ReadText("time_ns\tx\ty\tz\tid\n1\t0\t0\t\"2\"\t\"a\tb\"\n");
+  ASSERT_TRUE(tabs.ok()) << tabs.status();
+  EXPECT_EQ(tabs->poses.at(0).agent_name, "a\tb");
+  EXPECT_EQ(tabs->poses.at(0).pose.map_T_agent.position.z(), 2.0);
+  for (const char* field : {"\"anna", "\"anna\" b", "\"anna\nb\""}) {
+    ExpectMalformed(absl::StrCat("time_ns,id,x,y\n1,", field, ",0,0\n"), "csv",
+                    {":2", "field in quotes"});
+  }
+}
+
 TEST(CsvReader, TakesPeopleWithIdsAndOneRobotWithout) {
   LogOptions options;
   options.agent_prefix = "a-";
