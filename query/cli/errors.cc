@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/errors.pb.h"
 #include "query/cli/table.h"
+#include "schema/base/printable.h"
 #include "schema/base/status.h"
 
 namespace dsg::cli {

@@ -12,6 +12,7 @@
 #include "query/cli/answer_text.h"
 #include "query/cli/table.h"
 #include "query/cli/values.h"
+#include "schema/base/printable.h"
 #include "schema/base/status.h"
 #include "schema/files/atomic_file.h"
 #include "schema/model/trajectory.h"

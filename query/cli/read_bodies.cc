@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "dsg/v1/query_service.pb.h"
 #include "query/cli/table.h"
+#include "schema/base/printable.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/codec/topology.h"

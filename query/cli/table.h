@@ -13,10 +13,6 @@
 
 namespace dsg::cli {
 
-/// `text` with control characters shown as '?', and marks that turn the direction of writing (such
-/// as U+202E) as escapes like "\u202e".
-std::string Printable(const std::string& text);
-
 /// A number with a fixed count of decimals; "-0.00" is written "0.00".
 std::string Fixed(double value, int decimals);
 

@@ -11,6 +11,7 @@
 #include "query/cli/table.h"
 #include "query/cli/verb_list.h"
 #include "schema/archive/file_io.h"
+#include "schema/base/printable.h"
 #include "schema/base/status.h"
 #include "schema/codec/checksum.h"
 #include "schema/files/atomic_file.h"

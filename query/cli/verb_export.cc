@@ -29,6 +29,7 @@
 #include "query/cli/verbs_backup.h"
 #include "schema/archive/archive_file.h"
 #include "schema/archive/archive_map.h"
+#include "schema/base/printable.h"
 #include "schema/base/status.h"
 #include "schema/files/atomic_file.h"
 #include "schema/interop/map_to_spark.h"

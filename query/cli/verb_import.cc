@@ -25,6 +25,7 @@
 #include "query/cli/table.h"
 #include "query/cli/verb_list.h"
 #include "query/cli/verbs_backup.h"
+#include "schema/base/printable.h"
 #include "schema/base/status.h"
 #include "schema/codec/checksum.h"
 #include "schema/interop/scene_graph_file.h"

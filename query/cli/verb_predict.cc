@@ -16,6 +16,7 @@
 #include "query/cli/table.h"
 #include "query/cli/values.h"
 #include "query/cli/verb_list.h"
+#include "schema/base/printable.h"
 #include "schema/base/status.h"
 #include "schema/picture/look.h"
 

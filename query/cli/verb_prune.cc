@@ -21,6 +21,7 @@
 #include "query/cli/values.h"
 #include "query/cli/verb_list.h"
 #include "query/maintenance/prune_convert.h"
+#include "schema/base/printable.h"
 #include "schema/base/status.h"
 #include "schema/retention/policy.h"
 #include "schema/retention/policy_file.h"

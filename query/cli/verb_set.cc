@@ -15,6 +15,7 @@
 #include "query/cli/table.h"
 #include "query/cli/verb_list.h"
 #include "query/maintenance/commit.h"
+#include "schema/base/printable.h"
 #include "schema/base/status.h"
 #include "schema/base/utf8.h"
 #include "schema/model/delta_check.h"

@@ -19,6 +19,7 @@
 #include "query/cli/table.h"
 #include "query/cli/values.h"
 #include "query/cli/verb_list.h"
+#include "schema/base/printable.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/model/trajectory.h"

@@ -21,6 +21,7 @@
 #include "schema/archive/archive_format.h"
 #include "schema/archive/backup_folder.h"
 #include "schema/archive/restore.h"
+#include "schema/base/printable.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 #include "schema/model/node.h"

@@ -24,6 +24,7 @@
 #include "query/cli/session.h"
 #include "query/cli/table.h"
 #include "query/cli/verb_list.h"
+#include "schema/base/printable.h"
 #include "schema/base/status.h"
 
 namespace dsg::cli {

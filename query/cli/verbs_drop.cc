@@ -15,6 +15,7 @@
 #include "query/cli/session.h"
 #include "query/cli/table.h"
 #include "query/cli/verb_list.h"
+#include "schema/base/printable.h"
 #include "schema/base/status.h"
 #include "schema/model/ids.h"
 

@@ -11,6 +11,7 @@
 #include "query/cli/session.h"
 #include "query/cli/table.h"
 #include "query/cli/verb_list.h"
+#include "schema/base/printable.h"
 #include "schema/base/status.h"
 #include "schema/base/time.h"
 #include "schema/store/graph_store.h"

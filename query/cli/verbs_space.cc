@@ -26,6 +26,7 @@
 #include "query/cli/triangle_file.h"
 #include "query/cli/values.h"
 #include "query/cli/verb_list.h"
+#include "schema/base/printable.h"
 #include "schema/base/status.h"
 #include "schema/codec/proto_convert.h"
 

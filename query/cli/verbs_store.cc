@@ -13,6 +13,7 @@
 #include "query/cli/verb_list.h"
 #include "schema/archive/backup_folder.h"
 #include "schema/archive/restore.h"
+#include "schema/base/printable.h"
 #include "schema/base/status.h"
 #include "schema/store/graph_store.h"
 

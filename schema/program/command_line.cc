@@ -12,7 +12,9 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "schema/base/exit_code.h"
+#include "schema/base/printable.h"
 #include "schema/base/spelling.h"
+#include "schema/base/utf8.h"
 
 namespace dsg {
 namespace {
@@ -102,6 +104,32 @@ std::string NoVerb(const CLI::App& app) {
   return absl::StrCat("name a verb: ", absl::StrJoin(names, ", "));
 }
 
+struct Complaint {
+  std::string text;
+  // Whose help tells more; nullptr for the program's.
+  const CLI::App* verb = nullptr;
+};
+
+Complaint ComplaintOf(const CLI::App& app, const CLI::ParseError& error) {
+  const CLI::App* verb = ChosenVerb(app);
+  const Words verbs = VerbNames(app);
+  const Words early = NotTaken(app, false);
+  if (!verbs.empty() && !early.empty()) {
+    const std::string& first = early.front();
+    if (absl::StartsWith(first, "-")) return {EarlyOptions(app, early), verb};
+    return {absl::StrCat("there is no verb \"", first, "\"", NearHint(first, verbs))};
+  }
+  // CLI11 would only say that a subcommand is missing.
+  if (!verbs.empty() && verb == nullptr && error.get_name() == "RequiredError") {
+    return {NoVerb(app)};
+  }
+  const Words unknown = NotTaken(app, true);
+  if (unknown.empty()) return {error.what(), verb};
+  Words known;
+  AddOptionNames(verb == nullptr ? app : *verb, &known);
+  return {NotUnderstood(unknown, known), verb};
+}
+
 std::string SeeHelp(const CLI::App& app, const CLI::App* verb) {
   return absl::StrCat("; see ", app.get_name(), " ",
                       verb == nullptr ? "" : absl::StrCat(verb->get_name(), " "), "--help");
@@ -110,26 +138,11 @@ std::string SeeHelp(const CLI::App& app, const CLI::App* verb) {
 }  // namespace
 
 std::string UsageMessage(const CLI::App& app, const CLI::ParseError& error) {
-  const CLI::App* verb = ChosenVerb(app);
-  const Words verbs = VerbNames(app);
-  const Words early = NotTaken(app, false);
-  if (!verbs.empty() && !early.empty()) {
-    const std::string& first = early.front();
-    if (absl::StartsWith(first, "-")) {
-      return absl::StrCat(EarlyOptions(app, early), SeeHelp(app, verb));
-    }
-    return absl::StrCat("there is no verb \"", first, "\"", NearHint(first, verbs),
-                        SeeHelp(app, nullptr));
-  }
-  // CLI11 would only say that a subcommand is missing.
-  if (!verbs.empty() && verb == nullptr && error.get_name() == "RequiredError") {
-    return absl::StrCat(NoVerb(app), SeeHelp(app, nullptr));
-  }
-  const Words unknown = NotTaken(app, true);
-  if (unknown.empty()) return absl::StrCat(error.what(), SeeHelp(app, verb));
-  Words known;
-  AddOptionNames(verb == nullptr ? app : *verb, &known);
-  return absl::StrCat(NotUnderstood(unknown, known), SeeHelp(app, verb));
+  constexpr size_t kShownBytesMax = 1000;
+  const Complaint complaint = ComplaintOf(app, error);
+  const std::string shown(Utf8Prefix(complaint.text, kShownBytesMax));
+  return absl::StrCat(Printable(shown), shown.size() < complaint.text.size() ? "..." : "",
+                      SeeHelp(app, complaint.verb));
 }
 
 std::string OptionWithoutValue(const std::vector<std::string>& words) {

@@ -14,6 +14,7 @@
 #include "absl/strings/str_cat.h"
 #include "query/cli/export/outline.h"
 #include "query/cli/table.h"
+#include "schema/base/printable.h"
 #include "schema/base/status.h"
 #include "schema/picture/look.h"
 #include "schema/picture/wire.h"

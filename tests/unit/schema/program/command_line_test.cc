@@ -49,6 +49,13 @@ std::string RefusalOfSimulator(const Words& words) {
   return Refusal(&app, words);
 }
 
+TEST(CommandLine, WordsCannotControlTheTerminalNorFillIt) {
+  EXPECT_EQ(RefusalOfServer({"--store", "s", "x\x1b[31m\n\u202ey"}),
+            "not understood: x?[31m?\\u202ey; see dsg-server --help");
+  EXPECT_EQ(RefusalOfServer({"--store", "s", std::string(100'000, 'x')}),
+            "not understood: " + std::string(1000 - 16, 'x') + "...; see dsg-server --help");
+}
+
 TEST(CommandLine, WordsThatNobodyKnowsStandInTheirOrderWithWhatIsNear) {
   EXPECT_EQ(RefusalOfServer({"--store", "s", "--lisen", "unix:x.sock"}),
             "not understood: --lisen unix:x.sock; near in spelling: \"--listen\"; "

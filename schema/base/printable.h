@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+// Text of logs, files and callers that is fit for a terminal: it cannot control it, nor pass for
+// other text.
+#pragma once
+
+#include <string>
+
+namespace dsg {
+
+/// `text` with control characters shown as '?', and marks that turn the direction of writing (such
+/// as U+202E) as escapes like "\u202e".
+std::string Printable(const std::string& text);
+
+}  // namespace dsg
