@@ -132,6 +132,16 @@ std::string FormatOfBytes(std::string_view bytes) {
   return "";
 }
 
+// Rows of twelve numbers: 3x4 matrices, as KITTI's poses are.
+bool HasMatrices(std::string_view bytes) {
+  LineReader lines(bytes.substr(0, kFirstLineMax));
+  TextLine line;
+  std::vector<std::string_view> fields;
+  if (!lines.Next(&line)) return false;
+  SplitAtBlanks(line.text, &fields);
+  return fields.size() == 12 && std::all_of(fields.begin(), fields.end(), BeginsWithNumber);
+}
+
 absl::Status Unknown(const std::string& path, std::string_view what) {
   return MakeError(Reason::kFileMalformed,
                    absl::StrCat(path, ": ", std::string(what),
@@ -165,8 +175,16 @@ std::string FormatList() { return absl::StrJoin(FormatNames(), ", "); }
 
 absl::StatusOr<std::string> DetectFileFormat(std::string_view bytes, const std::string& path) {
   std::string format = FormatOfBytes(bytes);
-  if (format.empty()) return Unknown(path, "its first line belongs to no known log format");
-  return format;
+  if (!format.empty()) return format;
+  if (HasMatrices(bytes)) {
+    return MakeError(Reason::kFileMalformed,
+                     absl::StrCat(path,
+                                  ": its rows are matrices without times, as KITTI's poses are; "
+                                  "give the folder that has times.txt and the scans besides, or "
+                                  "make a TUM file of it (time, position, quaternion x y z w)"),
+                     {{"file", path}});
+  }
+  return Unknown(path, "its first line belongs to no known log format");
 }
 
 std::string FindEurocFile(const std::string& folder) {

@@ -14,6 +14,12 @@ TEST(ObsmatReader, RejectsBackwardTimeNamingTheLine) {
                   {"log.txt:3", "\"1\"", "frame 10", "line 1", "frame 0", "sort the log"});
 }
 
+TEST(LogFormat, OfMatricesWithoutTimesIsToldWithWhatToDo) {
+  ExpectMalformed("1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0.5 0 1 0 0 0 0 1 0\n", "auto",
+                  {"log.txt", "without times", "KITTI", "times.txt", "TUM"});
+  ExpectMalformed("1 0 0 0 0 1 0 0 0 0 1\n", "auto", {"no known log format", "--format"});
+}
+
 TEST(TrajnetReader, NotesALastLineThatMayBeCutInItsLastNumber) {
   const TempFolder folder;
   LogOptions options;
