@@ -10,10 +10,6 @@
 namespace dsg::cli {
 namespace {
 
-double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
-
 // One side of the hull over points in order of x.
 template <class Iterator>
 void AddChain(Iterator begin, Iterator end, Polygon2d* hull) {

@@ -10,6 +10,11 @@
 
 namespace dsg::cli {
 
+/// Of two vectors in the plane: positive if `b` points to the left of `a`.
+inline double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
 /// The convex hull, counter-clockwise; fewer corners when the points lie on a line.
 Polygon2d ConvexHull(Polygon2d points);
 

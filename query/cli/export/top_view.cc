@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "query/cli/export/axes.h"
+#include "query/cli/export/openings.h"
 #include "query/cli/export/outline.h"
 #include "query/cli/export/overlay.h"
 #include "query/cli/export/top_view_labels.h"
@@ -192,12 +193,20 @@ void DrawRooms(const MapContent& content, const FloorView& view, picture::Canvas
 void DrawStructures(const MapContent& content, const FloorView& view, picture::Canvas* canvas) {
   // The wall over a door would shut it.
   const std::unordered_set<NodeId> over_head = StructuresOverHead(content);
+  const Openings openings(content);
   for (const Node& node : content.nodes) {
     if (node.kind != kinds::kStructure || over_head.contains(node.id)) continue;
     const std::string type = StructureType(node);
     if (type == "floor" || type == "ceiling") continue;
     const picture::Paint paint =
         picture::MakePaint(type == "glass" || type == "window" ? kGlassRgb : kWallRgb);
+    if (const auto pieces = openings.PiecesOf(node); pieces.has_value()) {
+      for (const WallLine& piece : *pieces) {
+        canvas->DrawPolyline({view.ToPixel(piece.from), view.ToPixel(piece.to)},
+                             std::max(5.0, piece.thickness_m * view.px_per_m() + 3.0), paint);
+      }
+      continue;
+    }
     const Polygon2d outline_map = FloorOutline(node);
     const std::vector<Eigen::Vector2d> wall = SlantedWall(node);
     if (!wall.empty()) {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "query/cli/export/map_content.h"
+#include "query/cli/export/openings.h"
 #include "query/cli/export/outline.h"
 #include "query/cli/export/top_view_labels.h"
 #include "query/cli/export/top_view_marks.h"
@@ -190,6 +191,65 @@ TEST(TopView, LeavesDoorsOpenBelowTheirWalls) {
   EXPECT_EQ(At(DrawTopView(content, {.width_px = kWidth}), x, y), ColorOf(kWallRgb));
   content.nodes[1] = WallFrom(1, 2.1, 3.0);
   EXPECT_NE(At(DrawTopView(content, {.width_px = kWidth}), x, y), ColorOf(kWallRgb));
+}
+
+// A wall along x from 0 to 4, as a box of 0.2 m or a plane of it, with places on both sides at x.
+MapContent WallWithWays(double thickness_m, const std::vector<double>& ways_x, double clear_m) {
+  Node wall;
+  wall.id = NodeId('S', 1);
+  wall.kind = kinds::kStructure;
+  wall.map_T_node.position = {2.0, 1.0, 1.25};
+  const Eigen::Vector3d half(2.0, 0.5 * thickness_m, 1.25);
+  wall.box_node = Box3d(-half, half);
+  wall.structure.emplace().structure_type = "wall";
+  MapContent content;
+  content.nodes = {wall};
+  for (size_t i = 0; i < ways_x.size(); ++i) {
+    for (const double y : {0.4, 1.6}) {
+      Node place;
+      place.id = NodeId('p', 2 * i + (y < 1.0 ? 0 : 1));
+      place.kind = kinds::kPlace;
+      place.map_T_node.position = {ways_x[i], y, 0.0};
+      content.nodes.push_back(place);
+    }
+    Edge way;
+    way.source = NodeId('p', 2 * i);
+    way.relation = relations::kTraversable;
+    way.target = NodeId('p', 2 * i + 1);
+    way.weight = clear_m;
+    content.edges.push_back(way);
+  }
+  return content;
+}
+
+TEST(Openings, AreWhereWaysLeadThroughAWallAndAsWideAsTheseAreClear) {
+  for (const double thickness_m : {0.0, 0.2}) {
+    SCOPED_TRACE(thickness_m);
+    const MapContent content = WallWithWays(thickness_m, {1.0, 3.0, 3.3, 5.0}, 0.4);
+    const auto pieces = Openings(content).PiecesOf(content.nodes[0]);
+    ASSERT_TRUE(pieces.has_value());
+    std::vector<double> ends;
+    for (const WallLine& piece : *pieces) {
+      EXPECT_DOUBLE_EQ(piece.thickness_m, thickness_m);
+      EXPECT_NEAR(piece.from.y(), 1.0, 1e-9);
+      ends.push_back(std::min(piece.from.x(), piece.to.x()));
+      ends.push_back(std::max(piece.from.x(), piece.to.x()));
+    }
+    std::sort(ends.begin(), ends.end());
+    const std::vector<double> wanted = {0.0, 0.6, 1.4, 2.6, 3.7, 4.0};
+    ASSERT_EQ(ends.size(), wanted.size());
+    for (size_t i = 0; i < ends.size(); ++i) EXPECT_NEAR(ends[i], wanted[i], 1e-9);
+  }
+}
+
+TEST(Openings, OfAWallWithoutWaysAreNone) {
+  const MapContent beside = WallWithWays(0.2, {5.0}, 0.4);
+  EXPECT_FALSE(Openings(beside).PiecesOf(beside.nodes[0]).has_value());
+  MapContent above = WallWithWays(0.2, {1.0}, 0.4);
+  for (Node& node : above.nodes) {
+    if (node.kind == kinds::kPlace) node.map_T_node.position.z() = 3.0;
+  }
+  EXPECT_FALSE(Openings(above).PiecesOf(above.nodes[0]).has_value());
 }
 
 TEST(OverHead, IsMeasuredFromTheFloorOfEachStorey) {
