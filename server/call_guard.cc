@@ -107,6 +107,13 @@ void CallGuard::Place::BeginWrite() {
 
 void CallGuard::Place::EndWrite() { watched_->write_began.store(Watched::kNoWrite); }
 
+void CallGuard::Place::Progress() {
+  Clock::rep began = watched_->write_began.load();
+  if (began == Watched::kNoWrite) return;
+  // Unless the write has ended meanwhile.
+  watched_->write_began.compare_exchange_strong(began, Clock::now().time_since_epoch().count());
+}
+
 absl::Status CallGuard::Place::verdict() const { return watched_->Reason(); }
 
 }  // namespace dsg::server

@@ -37,6 +37,8 @@ class CallGuard {
     /// To be called when a message is handed over to be sent and when the reader has taken it.
     void BeginWrite();
     void EndWrite();
+    /// The reader took a part of the message: its time begins anew. Safe from any thread.
+    void Progress();
     /// Why the guard ended the call: DEADLINE_EXCEEDED, or RESOURCE_EXHAUSTED for a reader that
     /// took no message; OK if the guard did not end it.
     absl::Status verdict() const;

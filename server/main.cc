@@ -19,6 +19,7 @@
 #include "grpc/support/log.h"
 #include "schema/base/allocator.h"
 #include "schema/base/byte_size.h"
+#include "schema/base/counted.h"
 #include "schema/base/log.h"
 #include "schema/base/status.h"
 #include "schema/program/command_line.h"
@@ -129,7 +130,7 @@ void LogOfGrpc(gpr_log_func_args* args) {
 }
 
 int FailToStart(const absl::Status& status) {
-  std::fprintf(stderr, "dsg-server: %s\n", std::string(status.message()).c_str());
+  dsg::TellError("dsg-server", std::string(status.message()));
   return 2;
 }
 
@@ -215,8 +216,9 @@ int Serve(Flags flags) {
   if (!server.ok()) return FailToStart(server.status());
   std::optional<PruneThread> pruning;
   if (policies->has_value()) pruning.emplace(kept_core, **std::move(policies));
-  std::printf("dsg-server: listening on %s, store %s%s, %zu maps\n", (*server)->address().c_str(),
-              flags.store.c_str(), is_new ? " (new: it did not exist)" : "", maps->size());
+  std::printf("dsg-server: listening on %s, store %s%s, %s\n", (*server)->address().c_str(),
+              flags.store.c_str(), is_new ? " (new: it did not exist)" : "",
+              dsg::Counted(static_cast<int64_t>(maps->size()), "map").c_str());
   if (const std::string url = (*server)->http_url(); !url.empty()) {
     std::printf("dsg-server: HTTP on %s\n", url.c_str());
   }
@@ -246,8 +248,8 @@ int main(int argc, char** argv) {
   dsg::AddManual(&app, DSG_VERSION);
   if (const std::optional<int> end = dsg::ReadCommandLine(argc, argv, &app)) return *end;
   if (!dsg::SetLogLevel(flags.log_level)) {
-    std::fprintf(stderr, "dsg-server: --log-level is \"%s\"; give debug, info, warning or error\n",
-                 flags.log_level.c_str());
+    dsg::TellError("dsg-server", absl::StrCat("--log-level is \"", flags.log_level,
+                                              "\"; give debug, info, warning or error"));
     return 2;
   }
   return Serve(std::move(flags));

@@ -58,6 +58,8 @@ class ServedCall : public Job {
   void Cancel();
   /// The next message of a stream may follow, or, if not `ok`, no message can.
   virtual void OnSent(bool ok) = 0;
+  /// The reader took a part of what is being sent. Safe from any thread.
+  virtual void OnProgress() {}
 
   void Run() final;
 

@@ -41,6 +41,8 @@ class StreamCall final : public ServedCall {
     }
   }
 
+  void OnProgress() override { place_->Progress(); }
+
  private:
   void Work() override {
     const absl::StatusOr<std::chrono::nanoseconds> wait = Prepare();

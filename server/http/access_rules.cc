@@ -32,7 +32,9 @@ std::vector<std::string> HostsOf(const ListenAddress& address,
   std::vector<std::string> hosts;
   if (address.is_unix()) return hosts;
   const auto add_own = [&](const std::string& name) {
-    hosts.push_back(absl::StrCat(name, ":", address.port));
+    const std::string own = absl::StrCat(name, ":", address.port);
+    if (std::find(hosts.begin(), hosts.end(), own) != hosts.end()) return;
+    hosts.push_back(own);
     // Clients leave out the port that HTTP has by itself.
     if (address.port == 80) hosts.push_back(name);
   };

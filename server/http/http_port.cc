@@ -27,7 +27,7 @@ constexpr std::chrono::milliseconds kLookPeriod{200};
 // What the kernel keeps of an answer that is not read; it doubles the number.
 constexpr int kSendBufferBytes = 128 << 10;
 // For those that were told to end to send what they end with.
-constexpr std::chrono::milliseconds kLastWordsMax{500};
+constexpr std::chrono::milliseconds kLastWordsMax{3000};
 
 class RunningPort final : public HttpPort {
  public:

@@ -3,7 +3,6 @@
 // Before the rest of Asio.
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/post.hpp>
-#include <boost/asio/write.hpp>
 #include <boost/beast/http/error.hpp>
 
 #include "absl/strings/str_cat.h"
@@ -27,6 +26,8 @@ constexpr uint32_t kHeadBytesMax = 16 << 10;
 constexpr size_t kAheadBytesMax = size_t{64} << 10;
 constexpr size_t kLingerBytesMax = size_t{1} << 20;
 constexpr int kOpenStreamMax = 64;
+// A client that takes less than that in the time it has takes nothing.
+constexpr size_t kProgressBytes = size_t{64} << 10;
 
 std::string_view ViewOf(boost::beast::string_view text) { return {text.data(), text.size()}; }
 
@@ -78,7 +79,8 @@ void Session::EndAnswer(const absl::Status& why) {
   // What is half sent cannot be taken back, and such a reader takes nothing.
   if (call_ == nullptr || (sending_.has_value() && absl::IsResourceExhausted(why))) return Close();
   // Others are told why, behind what is leaving; they may take no more of that either.
-  if (sending_.has_value()) due_ = std::min(due_, Clock::now() + runtime_->stall_max);
+  last_due_ = std::min(last_due_, Clock::now() + 2 * runtime_->stall_max);
+  if (sending_.has_value()) GiveTime();
   call_->served()->Cancel();
 }
 
@@ -131,6 +133,7 @@ void Session::NextRequest() {
   // The plan of a call lowers it.
   parser_->body_limit(kMessageBytesMaxOnWire + kEnvelopeBytes);
   due_ = Clock::now() + kIdleMax;
+  last_due_ = Clock::time_point::max();
   if (unparsed_.empty()) {
     ReadMore();
   } else {
@@ -326,8 +329,6 @@ void Session::RefuseUnparsed(const error_code& error) {
 
 void Session::SendBytes(AnswerBytes bytes, bool is_last) {
   if (phase_ == Phase::kClosed) return DropPart(is_last);
-  // Whoever streams has a guard; see StreamCall.
-  if (is_last) due_ = Clock::now() + runtime_->stall_max;
   Part part{std::move(bytes), is_last};
   if (sending_.has_value()) {
     waiting_ = std::move(part);
@@ -341,12 +342,35 @@ void Session::SendPart(Part part) {
   const AnswerBytes& bytes = sending_->bytes;
   const std::array<asio::const_buffer, 3> buffers{
       asio::buffer(bytes.head), asio::buffer(bytes.message), asio::buffer(bytes.tail)};
-  asio::async_write(
-      socket_, buffers,
-      [self = shared_from_this()](error_code error, size_t /*count*/) { self->OnSent(!error); });
+  unsent_ = decltype(unsent_)(buffers);
+  taken_bytes_ = 0;
+  // Whoever streams has a guard until then; see StreamCall.
+  if (sending_->is_last || due_ != Clock::time_point::max()) GiveTime();
+  SendMore();
   // The next part is made while this one leaves.
   if (!sending_->is_last) call_->served()->OnSent(/*ok=*/true);
 }
+
+void Session::SendMore() {
+  socket_.async_write_some(unsent_,
+                           [self = shared_from_this()](error_code error, size_t byte_count) {
+                             self->OnTaken(!error, byte_count);
+                           });
+}
+
+void Session::OnTaken(bool ok, size_t byte_count) {
+  unsent_.consume(byte_count);
+  if (!ok || boost::beast::buffer_bytes(unsent_) == 0) return OnSent(ok);
+  taken_bytes_ += byte_count;
+  if (taken_bytes_ >= kProgressBytes) {
+    taken_bytes_ = 0;
+    if (due_ != Clock::time_point::max()) GiveTime();
+    if (call_ != nullptr) call_->served()->OnProgress();
+  }
+  SendMore();
+}
+
+void Session::GiveTime() { due_ = std::min(Clock::now() + runtime_->stall_max, last_due_); }
 
 void Session::OnSent(bool ok) {
   const bool was_last = sending_->is_last;

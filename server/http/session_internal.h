@@ -10,6 +10,7 @@
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/generic/stream_protocol.hpp>
 #include <boost/asio/io_context.hpp>
+#include <boost/beast/core/buffers_suffix.hpp>
 #include <boost/beast/http/parser.hpp>
 #include <boost/beast/http/string_body.hpp>
 #include <chrono>
@@ -100,7 +101,11 @@ class Session final : public Outlet, public std::enable_shared_from_this<Session
   // Sends a part of the answer as soon as the one before has left.
   void SendBytes(AnswerBytes bytes, bool is_last);
   void SendPart(Part part);
+  void SendMore();
+  void OnTaken(bool ok, size_t byte_count);
   void OnSent(bool ok);
+  // Of a part of which the client takes nothing.
+  void GiveTime();
   // A part that is not sent, since the connection is closed.
   void DropPart(bool is_last);
   void FinishAnswer();
@@ -113,6 +118,8 @@ class Session final : public Outlet, public std::enable_shared_from_this<Session
   Phase phase_ = Phase::kRequest;
   // When Look closes the connection.
   Clock::time_point due_ = Clock::time_point::max();
+  // How long what has been made of an answer that was ended may take, however slowly it is taken.
+  Clock::time_point last_due_ = Clock::time_point::max();
 
   // Reading. While a call runs, one read stays pending: it tells that the client has left.
   std::array<char, size_t{16} << 10> read_;
@@ -134,6 +141,9 @@ class Session final : public Outlet, public std::enable_shared_from_this<Session
   std::unique_ptr<HttpCall> call_;
   // The part that is leaving, and the next one, of which there is none while it is still made.
   std::optional<Part> sending_;
+  // What has not left of it, and what has since the client got time.
+  boost::beast::buffers_suffix<std::array<boost::asio::const_buffer, 3>> unsent_;
+  size_t taken_bytes_ = 0;
   std::optional<Part> waiting_;
 };
 

@@ -208,6 +208,7 @@ export function forget() {
 
 /** Colours what differs from another revision; 0 ends it. */
 export async function compare(revision) {
+  if (app.diff) setText(element('found'), '');
   // A revision does not differ from itself.
   app.diff = revision === app.scene.revision ? 0 : revision;
   show.diff = null;

@@ -99,12 +99,14 @@ class HttpMeshReader {
   HttpMeshReader& operator=(const HttpMeshReader&) = delete;
 
   bool is_asked() const { return is_asked_; }
-  // Until the stream ends, or the connection.
-  std::string ReadAll() const {
+  // Until the stream ends, or the connection. The first `slow_bytes` at most at a megabyte a
+  // second.
+  std::string ReadAll(size_t slow_bytes = 0) const {
     constexpr char kEnd[] = "\r\n0\r\n\r\n";
     std::string all;
-    std::array<char, size_t{64} << 10> part;
+    std::array<char, size_t{16} << 10> part;
     while (!absl::EndsWith(all, kEnd)) {
+      if (all.size() < slow_bytes) std::this_thread::sleep_for(milliseconds(16));
       const ssize_t count = recv(fd_, part.data(), part.size(), 0);
       if (count <= 0) break;
       all.append(part.data(), static_cast<size_t>(count));
@@ -224,6 +226,16 @@ TEST_F(SilentReader, IsGivenUpOverHttp) {
   ASSERT_TRUE(reader.is_asked());
   while (message_count_ < 2) std::this_thread::yield();
   EXPECT_TRUE(AllStreamsEnd());
+}
+
+TEST_F(SilentReader, IsNotASlowOneOverHttp) {
+  // A message takes a second.
+  Start(milliseconds(300));
+  const HttpMeshReader reader(http_path(), seconds(60));
+  ASSERT_TRUE(reader.is_asked());
+  const std::string answer = reader.ReadAll(/*slow_bytes=*/size_t{3} << 20);
+  EXPECT_TRUE(absl::EndsWith(answer, "\r\n0\r\n\r\n")) << answer.size();
+  EXPECT_EQ(answer.find("error"), std::string::npos);
 }
 
 // Then nothing waits behind what the reader does not take.

@@ -76,6 +76,8 @@ TEST(MessageJson, NamesTheFieldThatMayBeMeant) {
   EXPECT_NE(bytes.status().message().find("near in spelling: \"agent\""), std::string::npos)
       << bytes.status();
   EXPECT_EQ(MetadataOf(bytes.status()).at("field"), "agnet");
+  const auto value = BytesOfJson(R"({"at_ns": "+30s"})", type);
+  EXPECT_EQ(MetadataOf(value.status()).at("field"), "at_ns") << value.status();
   // Of parts of the request nothing is listed that would belong to another message.
   const auto part = BytesOfJson(R"({"read_at": {"agent": 1}})", type);
   EXPECT_EQ(MetadataOf(part.status()).at("field"), "") << part.status();
