@@ -13,7 +13,10 @@ void AppendCsvRecord(const std::vector<std::string>& cells, std::string* text) {
   for (size_t i = 0; i < cells.size(); ++i) {
     if (i > 0) text->push_back(',');
     const std::string& cell = cells[i];
-    if (cell.find_first_of(",\"\r\n") == std::string::npos) {
+    const bool has_blank_end = cell.starts_with(' ') || cell.ends_with(' ') ||
+                               cell.starts_with('\t') || cell.ends_with('\t');
+    // Readers may cut blanks outside of quotes.
+    if (!has_blank_end && cell.find_first_of(",\"\r\n") == std::string::npos) {
       text->append(cell);
     } else {
       absl::StrAppend(text, "\"", absl::StrReplaceAll(cell, {{"\"", "\"\""}}), "\"");

@@ -82,6 +82,21 @@ bool TrackWalk::TakeRun(absl::Span<const TimedPose> poses, const Take& take) {
   return true;
 }
 
+absl::StatusOr<bool> TrackWalk::StepsOverGap(const Snapshot& snapshot,
+                                             const StopCheck& stop) const {
+  // A sample of shorter periods lies in the gap.
+  if (!last_ns_.has_value() || period_ns_ <= track_.gap_ns_max) return false;
+  std::optional<TimeNs> before_ns;
+  bool has_gap = false;
+  DSG_RETURN_IF_ERROR(
+      snapshot.ReadPoses(track_.agent, *last_ns_, next_ns_ + 1, stop, [&](const TimedPose& pose) {
+        has_gap = before_ns.has_value() && pose.time_ns - *before_ns > track_.gap_ns_max;
+        before_ns = pose.time_ns;
+        return !has_gap;
+      }));
+  return has_gap;
+}
+
 bool TrackWalk::IsPastEnd(TimeNs time_ns) const {
   return time_ns >= to_ns_ || time_ns > track_.last_ns || time_ns == kTimeMax;
 }
@@ -96,6 +111,9 @@ absl::Status TrackWalk::Resample(const Snapshot& snapshot, const StopCheck& stop
       next_ns_ = NextOnGrid(grid_from_ns_, period_ns_, located.after_ns);
       is_after_gap_ = last_ns_.has_value();
       continue;
+    }
+    if (!is_after_gap_) {
+      DSG_ASSIGN_OR_RETURN(is_after_gap_, StepsOverGap(snapshot, stop));
     }
     const TimedPose pose{next_ns_, located.flags, located.map_T_agent, located.covariance};
     if (take(absl::MakeConstSpan(&pose, 1), is_after_gap_) == 0) return absl::OkStatus();

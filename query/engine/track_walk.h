@@ -60,6 +60,9 @@ class TrackWalk {
   absl::Status Resample(const Snapshot& snapshot, const StopCheck& stop, const Take& take);
   // Of poses as they are stored; false if `take` left some.
   bool TakeRun(absl::Span<const TimedPose> poses, const Take& take);
+  // Whether the track has a gap between the pose before and the next one, neither of which lies in
+  // one.
+  absl::StatusOr<bool> StepsOverGap(const Snapshot& snapshot, const StopCheck& stop) const;
   bool IsPastEnd(TimeNs time_ns) const;
 
   TrackInfo track_;

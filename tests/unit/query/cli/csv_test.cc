@@ -18,6 +18,7 @@ std::string RecordOf(const std::vector<std::string>& cells) {
 
 TEST(Csv, QuotesOnlyWhatNeedsIt) {
   EXPECT_EQ(RecordOf({"a", "", "b c"}), "a,,b c\r\n");
+  EXPECT_EQ(RecordOf({" a", "b ", "\t", "c"}), "\" a\",\"b \",\"\t\",c\r\n");
   EXPECT_EQ(RecordOf({"a,b", "say \"hi\"", "two\nlines", "\r"}),
             "\"a,b\",\"say \"\"hi\"\"\",\"two\nlines\",\"\r\"\r\n");
 }

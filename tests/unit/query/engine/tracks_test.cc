@@ -133,6 +133,20 @@ TEST_F(TracksTest, ResampledAreTheTrajectories) {
   EXPECT_EQ(tracks->at("H12").gaps, (std::vector<uint32_t>{13u}));
 }
 
+TEST_F(TracksTest, ResampledTellOfGapsThatNoSampleLiesIn) {
+  request_.add_agents("12");
+  request_.set_resample_period_ns(60 * kSecond);
+  const auto over = Get();
+  ASSERT_TRUE(over.ok()) << over.status();
+  EXPECT_EQ(over->at("H12").times, (std::vector<TimeNs>{0, 60 * kSecond}));
+  EXPECT_EQ(over->at("H12").gaps, (std::vector<uint32_t>{1u}));
+  request_.set_resample_period_ns(9 * kSecond);
+  const auto within = Get();
+  ASSERT_TRUE(within.ok()) << within.status();
+  EXPECT_EQ(within->at("H12").times, (std::vector<TimeNs>{0, 9 * kSecond, 18 * kSecond}));
+  EXPECT_TRUE(within->at("H12").gaps.empty());
+}
+
 TEST_F(TracksTest, ThinnedKeepTheEndsOfStretches) {
   request_.set_thin_period_ns(5 * kSecond);
   request_.add_agents("12");
