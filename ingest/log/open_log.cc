@@ -182,6 +182,13 @@ absl::StatusOr<std::unique_ptr<LogSource>> OpenLog(const std::string& path,
                                   bag_format.empty() ? "" : options.format, "; leave --format out"),
                      {{"file", path}});
   }
+  constexpr std::string_view kFolders[] = {"rgbd", "tum-rgbd", "kitti"};
+  if (std::find(std::begin(kFolders), std::end(kFolders), options.format) != std::end(kFolders)) {
+    return MakeError(Reason::kFileMalformed,
+                     absl::StrCat(path, ": a ", options.format,
+                                  " log is a folder, and this is a file; give the folder"),
+                     {{"file", path}});
+  }
   if (!bag_format.empty()) {
     DSG_RETURN_IF_ERROR(CheckLabels(path, bag_format, options));
     return OpenBag(path, options);

@@ -237,11 +237,10 @@ absl::Status OptimizeFile(const Flags& flags) {
   if (!flags.is_robust) DSG_RETURN_IF_ERROR(CheckWithoutRobust(flags));
   DSG_ASSIGN_OR_RETURN(const G2oFile file, ReadG2o(flags.file));
   for (const std::string& note : file.notes) {
-    std::fprintf(stderr, "%s: note: %s\n", flags.file.c_str(), note.c_str());
+    TellNote(flags.file, note);
   }
   if (flags.start == "file" && !file.has_start) {
-    std::fprintf(stderr, "%s: note: no VERTEX lines; beginning with poses along the edges\n",
-                 flags.file.c_str());
+    TellNote(flags.file, "no VERTEX lines; beginning with poses along the edges");
   }
   std::error_code ignored;
   if (!flags.out.empty() && std::filesystem::equivalent(flags.out, flags.file, ignored)) {

@@ -89,8 +89,8 @@ absl::StatusOr<TimeNs> ParseRetryFor(const std::string& text) {
 
 // A progress bar is drawn over, and drawn again below.
 void SayAboveProgress(const std::string& sentence) {
-  std::fprintf(stderr, "%sdsg-ingest: %s\n", isatty(STDERR_FILENO) == 1 ? "\r\033[K" : "",
-               sentence.c_str());
+  if (isatty(STDERR_FILENO) == 1) std::fputs("\r\033[K", stderr);
+  TellError("dsg-ingest", sentence);
 }
 
 absl::StatusOr<std::unique_ptr<Destination>> OpenDestination(const IngestFlags& flags,
@@ -205,7 +205,7 @@ constexpr size_t kAheadCount = 1000;
 size_t TellNotes(const IngestFlags& flags, const std::string& path, const LogInfo& info,
                  size_t first) {
   for (size_t i = first; i < info.notes.size() && !flags.is_quiet; ++i) {
-    std::fprintf(stderr, "%s: note: %s\n", path.c_str(), info.notes[i].c_str());
+    TellNote(path, info.notes[i]);
   }
   return info.notes.size();
 }
@@ -228,10 +228,9 @@ absl::StatusOr<std::unique_ptr<LogSource>> OpenShown(const IngestFlags& flags,
 
 void TellPause(const IngestFlags& flags, const std::string& path) {
   if (flags.is_quiet) return;
-  std::fprintf(stderr,
-               "%s: note: stopped before the end of the log: the map keeps what is committed; run "
-               "the same again to go on, with --follow-timeout 0 to end it\n",
-               path.c_str());
+  TellNote(path,
+           "stopped before the end of the log: the map keeps what is committed; run the same again "
+           "to go on, with --follow-timeout 0 to end it");
 }
 
 // Beside the map, where there is room if there is any; TMPDIR may be memory.
@@ -304,7 +303,7 @@ void TellLostFrames(const std::string& path, SkipCounts skipped, bool has_odomet
   // Odometry itself tells of how many images it has none.
   if (has_odometry) skipped.erase("no pose");
   for (const std::string& hint : HintsOnLostFrames(skipped)) {
-    std::fprintf(stderr, "%s: note: %s\n", path.c_str(), hint.c_str());
+    TellNote(path, hint);
   }
 }
 
@@ -355,7 +354,7 @@ absl::Status IngestOne(const IngestFlags& flags, const std::string& path, LogOpt
     DSG_ASSIGN_OR_RETURN(
         log, Prepare(std::move(log), flags, path, options, ingest_options, additions, &note));
     if (!flags.is_quiet && !note.empty() && tries == 0) {
-      std::fprintf(stderr, "%s: note: %s\n", path.c_str(), note.c_str());
+      TellNote(path, note);
     }
     told_count = TellNotes(flags, path, log->info(), told_count);
     DSG_ASSIGN_OR_RETURN(const std::unique_ptr<MapView> view, (*destination)->View());

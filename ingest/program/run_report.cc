@@ -10,6 +10,8 @@
 #include "absl/strings/str_join.h"
 #include "ingest/program/yield.h"
 #include "schema/base/counted.h"
+#include "schema/base/printable.h"
+#include "schema/program/command_line.h"
 
 namespace dsg::ingest {
 namespace {
@@ -101,7 +103,7 @@ void PrintMapping(const std::string& path, const MappingSummary& summary, bool h
   }
   std::printf("\n");
   if (!summary.note.empty()) {
-    std::fprintf(stderr, "%s: note: %s\n", path.c_str(), summary.note.c_str());
+    TellNote(path, summary.note);
   }
   if (volume.pixel_count == 0) {
     std::fprintf(stderr,
@@ -201,21 +203,21 @@ std::vector<std::string> NotesOf(const RunReport& report) {
 
 void PrintReport(const RunReport& report, bool has_timings) {
   const IngestSummary& summary = report.summary;
-  PrintSummary(report.path, report.info, summary, report.seconds);
+  const std::string path = Printable(report.path);
+  PrintSummary(path, report.info, summary, report.seconds);
   for (const auto& [name, id] : summary.misleading_names) {
-    std::fprintf(stderr, "%s: note: %s\n", report.path.c_str(), NoteOfName(name, id).c_str());
+    TellNote(path, NoteOfName(name, id));
   }
-  if (summary.loops.has_value()) PrintLoops(report.path, *summary.loops);
-  if (summary.mapping.has_value()) PrintMapping(report.path, *summary.mapping, has_timings);
+  if (summary.loops.has_value()) PrintLoops(path, *summary.loops);
+  if (summary.mapping.has_value()) PrintMapping(path, *summary.mapping, has_timings);
   if (summary.people.has_value()) {
-    PrintPeople(report.path, *summary.people, has_timings);
+    PrintPeople(path, *summary.people, has_timings);
     if (report.info.body_topology != nullptr && summary.people->counts.body_count == 0) {
-      std::fprintf(stderr, "%s: note: the log has faces of bodies, but no detection has vertices\n",
-                   report.path.c_str());
+      TellNote(path, "the log has faces of bodies, but no detection has vertices");
     }
   }
   if (report.is_dry_run) {
-    std::printf("%s: nothing was written: this was a dry run\n", report.path.c_str());
+    std::printf("%s: nothing was written: this was a dry run\n", path.c_str());
   }
   std::fflush(stdout);
 }

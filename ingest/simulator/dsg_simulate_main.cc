@@ -2,7 +2,6 @@
 // dsg-simulate: the command line over the simulator's libraries.
 // Refuses to do anything but choose the verb and print its error.
 #include <CLI/CLI.hpp>
-#include <iostream>
 #include <optional>
 #include <string>
 #include <utility>
@@ -49,7 +48,7 @@ int main(int argc, char** argv) {
     if (!verb->parsed()) continue;
     const absl::Status status = command();
     if (status.ok()) return 0;
-    std::cerr << "dsg-simulate: " << std::string(status.message()) << "\n";
+    dsg::TellError("dsg-simulate", std::string(status.message()));
     if (absl::IsInvalidArgument(status)) return kExitUsage;
   }
   return kExitFailed;

@@ -301,6 +301,13 @@ std::string UnknownField(std::string_view problem) {
   return is_name ? std::string(problem) : "";
 }
 
+// The field with a value that is none of its type, as protobuf says it: "(at_ns): invalid ...".
+std::string FieldOfValue(std::string_view problem) {
+  const size_t end = problem.find("): ");
+  if (!problem.starts_with('(') || end == std::string_view::npos) return "";
+  return std::string(problem.substr(1, end - 1));
+}
+
 std::vector<std::string> FieldsOf(const pb::Descriptor& type) {
   std::vector<std::string> names;
   for (int i = 0; i < type.field_count(); ++i) names.push_back(type.field(i)->name());
@@ -328,10 +335,15 @@ absl::StatusOr<std::string> BytesOfJson(std::string_view json, const pb::Descrip
       pb::util::JsonToBinaryStream(&types, absl::StrCat(kUrlPrefix, "/", type.full_name()), &in,
                                    &out, pb::util::JsonParseOptions());
   if (status.ok()) return bytes;
-  const std::string problem(status.message());
-  const std::string field = UnknownField(problem);
-  const std::string advice = field.empty() ? "; proto/dsg/v1 has the fields of each request"
-                                           : SpellingHint(field, FieldsOf(type));
+  std::string problem(status.message());
+  std::string field = UnknownField(problem);
+  std::string advice = "; proto/dsg/v1 has the fields of each request";
+  if (field.empty()) {
+    field = FieldOfValue(problem);
+  } else {
+    advice = SpellingHint(field, FieldsOf(type));
+  }
+  if (problem.ends_with('.')) problem.pop_back();
   return MakeError(
       Reason::kFieldInvalid,
       absl::StrCat("the request is no ", type.full_name(), " in JSON: ", problem, advice),

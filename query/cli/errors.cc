@@ -133,7 +133,7 @@ ExitCode ExitCodeOf(const absl::Status& status) {
 
 std::string ErrorLine(const absl::Status& status) {
   const Reason reason = ReasonOf(status);
-  const std::string message = Printable(std::string(status.message()));
+  const std::string message = PrintableMessage(std::string(status.message()));
   if (reason == Reason::kUnspecified) return absl::StrCat("dsg: ", message, "\n");
   return absl::StrCat("dsg: ", message, " [", v1::Reason_Name(static_cast<v1::Reason>(reason)),
                       "]\n");

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The program dsg: hands the process's arguments and environment to query/cli/run.h.
+#include <google/protobuf/stubs/logging.h>
+
 #include <csignal>
 #include <cstdlib>
 #include <iostream>
@@ -23,6 +25,8 @@ int main(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_DFL);
   // Beyond the file-size limit of the shell a write fails with a message, instead of a signal.
   std::signal(SIGXFSZ, SIG_IGN);
+  // What is wrong with a word is told as our own error.
+  google::protobuf::SetLogHandler(nullptr);
   const dsg::cli::Environment environment{.store = FromEnvironment("DSG_STORE"),
                                           .server = FromEnvironment("DSG_SERVER"),
                                           .map = FromEnvironment("DSG_MAP"),

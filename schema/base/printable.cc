@@ -29,12 +29,22 @@ std::string Printable(const std::string& text) {
       printable.push_back('?');
     } else if (character.is_valid && TurnsWriting(character.code)) {
       absl::StrAppendFormat(&printable, "\\u%04x", static_cast<uint32_t>(character.code));
+    } else if (!character.is_valid) {
+      for (const char byte : rest.substr(0, character.size)) {
+        absl::StrAppendFormat(&printable, "\\x%02x", static_cast<unsigned char>(byte));
+      }
     } else {
       printable.append(rest.substr(0, character.size));
     }
     rest.remove_prefix(character.size);
   }
   return printable;
+}
+
+std::string PrintableMessage(const std::string& text) {
+  constexpr size_t kBytesMax = 4000;
+  if (text.size() <= kBytesMax) return Printable(text);
+  return Printable(std::string(Utf8Prefix(text, kBytesMax))) + "...";
 }
 
 }  // namespace dsg

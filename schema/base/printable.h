@@ -8,7 +8,10 @@
 namespace dsg {
 
 /// `text` with control characters shown as '?', and marks that turn the direction of writing (such
-/// as U+202E) as escapes like "\u202e".
+/// as U+202E) and bytes that are no UTF-8 as escapes like "\u202e" and "\x9b".
 std::string Printable(const std::string& text);
+
+/// The same of a message: what is longer than some pages is cut, and ends with "...".
+std::string PrintableMessage(const std::string& text);
 
 }  // namespace dsg

@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
+#include "schema/base/counted.h"
 #include "schema/model/delta_check.h"
 #include "schema/model/value_check.h"
 
@@ -202,10 +203,12 @@ void SparkNodeConverter::ConvertClass(const SparkNode& in, Node* out) {
   }
   out->class_id = static_cast<int32_t>(*in.label);
   const auto space = graph_.label_spaces.find(in.key);
-  if (space == graph_.label_spaces.end()) return;
-  const auto label = std::find_if(space->second.begin(), space->second.end(),
-                                  [&](const auto& item) { return item.id == out->class_id; });
-  if (label != space->second.end()) out->class_name = label->name;
+  if (space != graph_.label_spaces.end()) {
+    const auto label = std::find_if(space->second.begin(), space->second.end(),
+                                    [&](const auto& item) { return item.id == out->class_id; });
+    if (label != space->second.end()) out->class_name = label->name;
+  }
+  if (out->class_name.empty() && out->kind == kinds::kObject) ++unnamed_class_count_;
 }
 
 void SparkNodeConverter::ConvertTimes(const SparkNode& in, Node* out) {
@@ -309,6 +312,11 @@ std::vector<std::string> SparkNodeConverter::notes() const {
   std::vector<std::string> notes;
   for (const auto& [reason, count] : left_out_) {
     notes.push_back(absl::StrCat("left out: ", count, " ", reason));
+  }
+  if (unnamed_class_count_ > 0) {
+    notes.push_back(absl::StrCat("the file has no names for the labels of ",
+                                 Counted(unnamed_class_count_, "object"),
+                                 ": no question by class finds them"));
   }
   return notes;
 }

@@ -46,6 +46,8 @@ class SparkNodeConverter {
   Interval plausible_;
   /// Reason -> count.
   std::map<std::string, int64_t> left_out_;
+  /// Objects whose label has no name.
+  int64_t unnamed_class_count_ = 0;
 };
 
 /// The class for a node that does not remember one. Things whose validity begins or ends are

@@ -157,8 +157,8 @@ void UseVerbUsage(CLI::App* app) { app->formatter(std::make_shared<VerbUsage>())
 
 std::optional<int> ReadCommandLine(int argc, char** argv, CLI::App* app) {
   if (const std::string empty = OptionWithoutValue(Words(argv + 1, argv + argc)); !empty.empty()) {
-    std::fprintf(stderr, "%s: %s is empty; give a value, or leave it out%s\n",
-                 app->get_name().c_str(), empty.c_str(), SeeHelp(*app, nullptr).c_str());
+    TellError(app->get_name(), absl::StrCat(empty, " is empty; give a value, or leave it out",
+                                            SeeHelp(*app, nullptr)));
     return kUsage;
   }
   try {
@@ -167,16 +167,23 @@ std::optional<int> ReadCommandLine(int argc, char** argv, CLI::App* app) {
   } catch (const CLI::ParseError& error) {
     // A help, a version, a manual.
     if (error.get_exit_code() == 0) return app->exit(error);
-    std::fprintf(stderr, "%s: %s\n", app->get_name().c_str(), UsageMessage(*app, error).c_str());
+    TellError(app->get_name(), UsageMessage(*app, error));
     return kUsage;
   }
 }
 
+void TellError(const std::string& program, const std::string& message) {
+  std::fprintf(stderr, "%s: %s\n", program.c_str(), PrintableMessage(message).c_str());
+}
+
+void TellNote(const std::string& about, const std::string& note) {
+  TellError(Printable(about), absl::StrCat("note: ", note));
+}
+
 int TellError(const CLI::App& app, const absl::Status& status) {
   if (status.ok()) return kDone;
-  std::fprintf(stderr, "%s: %s: %s\n", app.get_name().c_str(),
-               std::string(absl::StatusCodeToString(status.code())).c_str(),
-               std::string(status.message()).c_str());
+  TellError(app.get_name(),
+            absl::StrCat(absl::StatusCodeToString(status.code()), ": ", status.message()));
   return ExitCodeOf(status);
 }
 

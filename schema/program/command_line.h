@@ -34,7 +34,12 @@ void UseVerbUsage(CLI::App* app);
 /// CLI::ParseError.
 std::optional<int> ReadCommandLine(int argc, char** argv, CLI::App* app);
 
-/// Tells an error on stderr, "dsg-align: NOT_FOUND: ...". Returns the exit code, also of OK.
+/// Tells an error on stderr, "dsg-server: ...", and what a log or another file makes notable,
+/// "log.csv: note: ...": in one line that cannot control the terminal.
+void TellError(const std::string& program, const std::string& message);
+void TellNote(const std::string& about, const std::string& note);
+
+/// The same, "dsg-align: NOT_FOUND: ...". Returns the exit code, also of OK.
 int TellError(const CLI::App& app, const absl::Status& status);
 
 /// The whole of a program: reads its command line, runs, tells the error. What was printed and did

@@ -319,6 +319,12 @@ class Port(python_support.HttpTest):
                     dsgdb.open(place, timeout=5) as db, self.assertRaises(dsgdb.Error):
                 db.maps()
 
+    def test_the_address_for_grpc_is_said(self):
+        with self.http_server("store", "unix:" + self.path("http.sock")), \
+                dsgdb.open("unix:" + self.path("grpc.sock")) as db, \
+                self.assertRaisesRegex(dsgdb.Unavailable, "gRPC.*--http ADDRESS"):
+            db.maps()
+
     def test_streams_that_break_are_said(self):
         end = b"\2\0\0\0\2{}"
         message = b"\0\0\0\0\21{\"agent_id\":\"H0\"}"

@@ -10,7 +10,9 @@ TEST(Printable, ShowsControlsOfOneCharacterAsOne) {
   // U+009B is the form of ESC [ of eight bits.
   EXPECT_EQ(Printable("a\u009b31mb\x7f"), "a?31mb?");
   EXPECT_EQ(Printable("Küche \u4e2d"), "Küche \u4e2d");
-  EXPECT_EQ(Printable("\xff\xc3"), "\xff\xc3");
+  EXPECT_EQ(Printable("\xff"
+                      "caf\xe9"),
+            "\\xffcaf\\xe9");
 }
 
 TEST(Printable, ShowsMarksThatTurnTheDirectionOfWriting) {
@@ -23,6 +25,11 @@ TEST(Printable, ShowsMarksThatTurnTheDirectionOfWriting) {
   }
   // Letters that are written from the right, and joiners of letters, stay.
   EXPECT_EQ(Printable("\u05d0\u200d"), "\u05d0\u200d");
+}
+
+TEST(Printable, MessagesHaveAnEnd) {
+  EXPECT_EQ(PrintableMessage("a\nb"), "a?b");
+  EXPECT_EQ(PrintableMessage(std::string(100'000, 'x')), std::string(4000, 'x') + "...");
 }
 
 }  // namespace
