@@ -193,8 +193,8 @@ class Channel:
         # Frames of HTTP/2, which gRPC begins with.
         if isinstance(error, http.client.BadStatusLine) and "\0" in what:
             return errors.Unavailable(
-                f"{self.address.name} does not speak HTTP/1.1; if it is the address that dsg-server "
-                "has for gRPC, start it with --http ADDRESS besides, and open that one")
+                f"{self.address.name} does not speak HTTP/1.1; if it is dsg-server's address for "
+                "gRPC, start it with --http ADDRESS besides, and open that one")
         if path:
             return errors.Unavailable(f"the connection to dsg-server at {self.address.name} broke "
                                       f"while it answered {path} ({what}){self._explain()}")
