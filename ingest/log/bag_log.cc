@@ -113,7 +113,8 @@ absl::StatusOr<BagPoses> PlanPoses(const Bag& bag, const LogOptions& options, Ba
   }
   if (!from_file && choice == PoseChoice::kNone && options.poses != PoseSource::kOdometry) {
     info->notes.push_back(
-        "the log holds no poses of the robot, so nothing can be mapped; give --pose-file");
+        "the log holds no poses of the robot, so nothing can be mapped; let them be estimated "
+        "(--poses vio) or give --pose-file");
   }
   return poses;
 }

@@ -201,7 +201,8 @@ absl::StatusOr<std::optional<TrackTable>> ChoosePoses(const LogOptions& options,
   if (options.poses == PoseSource::kOdometry) return std::nullopt;
   if (choice == PoseChoice::kNone) {
     info->notes.push_back(
-        "the log holds no poses of the robot, so nothing can be mapped; give --pose-file");
+        "the log holds no poses of the robot, so nothing can be mapped; let them be estimated "
+        "(--poses vio) or give --pose-file");
     return std::nullopt;
   }
   TrackTable table = choice == PoseChoice::kExternal ? *std::move(tables.external)

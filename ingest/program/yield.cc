@@ -50,9 +50,10 @@ std::string WhyEmpty(const IngestSummary& summary) {
   if (summary.unused.empty()) {
     return "it has no poses and no nodes; look at the file, and at the --format it was read as";
   }
-  return absl::StrCat("it has no poses, without which what it has cannot be placed (",
-                      CountsText(summary.unused),
-                      "); give the robot's poses with --pose-file, EuRoC or TUM columns");
+  return absl::StrCat(
+      "it has measurements (", CountsText(summary.unused),
+      ") and no poses; let these be estimated from images with --poses vio, or give "
+      "--pose-file FILE with EuRoC or TUM columns");
 }
 
 // Empty if a frame was used, or there was none.

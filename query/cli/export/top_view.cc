@@ -166,7 +166,13 @@ Eigen::AlignedBox2d AreaFor(const Eigen::AlignedBox2d& bounds_map, int width_px,
                              low + Eigen::Vector2d(width, std::clamp(height, 60.0, height_max)));
 }
 
+// The box of a floor lies along the axes of the map: of a building that does not, it would reach
+// far outside.
 void DrawGround(const MapContent& content, const FloorView& view, picture::Canvas* canvas) {
+  if (std::ranges::any_of(content.nodes,
+                          [](const Node& node) { return !SlantedWall(node).empty(); })) {
+    return;
+  }
   for (const Node& node : content.nodes) {
     if (node.kind != kinds::kStructure || StructureType(node) != "floor") continue;
     canvas->FillPolygon(view.ToPixels(FloorOutline(node)), picture::MakePaint(kGroundRgb));
@@ -338,8 +344,8 @@ void DrawTitle(const std::string& title, picture::Canvas* canvas) {
 }
 
 void DrawAll(const MapContent& content, const FloorView& view, picture::Canvas* canvas) {
-  DrawMesh(content.mesh, view, canvas);
   DrawGround(content, view, canvas);
+  DrawMesh(content.mesh, view, canvas);
   DrawRooms(content, view, canvas);
   DrawStructures(content, view, canvas);
   DrawOthers(content, view, canvas);
