@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
@@ -64,12 +63,6 @@ absl::Status Session::ChooseMap() {
   v1::ListMapsResponse list;
   if (name.empty()) {
     DSG_RETURN_IF_ERROR(api_->ListMaps(NewCall(), v1::ListMapsRequest(), &list));
-    std::error_code ignored;
-    if (common_.server.empty() && !std::filesystem::is_directory(common_.store, ignored)) {
-      return MakeError(
-          Reason::kMapUnknown,
-          absl::StrCat(PlaceOf(common_), " is not there; name the ", "folder of a store"));
-    }
     DSG_ASSIGN_OR_RETURN(name, OnlyMap(list, PlaceOf(common_)));
   }
   // Of a map that cannot be opened the question for it says why.

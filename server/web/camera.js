@@ -4,6 +4,8 @@
 
 const PITCH_MAX = 1.55;
 const FIELD_OF_VIEW = 0.8;
+/** Share of the picture that a framed box takes. */
+const FRAMED = 0.95;
 
 /** The product a * b of two 4x4 matrices. */
 function times(a, b) {
@@ -66,11 +68,18 @@ export class Camera {
     for (let i = 0; i < 3; ++i) this.target[i] += (point[i] - this.target[i]) * share;
   }
 
-  /** Shows a box whole. */
-  frame(min, max) {
+  /** Shows a box whole, in a picture that is `aspect` times as wide as high. */
+  frame(min, max, aspect) {
     this.target = min.map((value, i) => (value + max[i]) / 2);
-    const radius = Math.hypot(...min.map((value, i) => max[i] - value)) / 2;
-    this.distance = Math.max(2, radius / Math.sin(FIELD_OF_VIEW / 2) * 0.9);
+    const {right, up, forward} = this.#axes();
+    const high = Math.tan(FIELD_OF_VIEW / 2) * FRAMED;
+    this.distance = 2;
+    for (let corner = 0; corner < 8; ++corner) {
+      const offset = min.map((low, i) => (corner >> i & 1 ? max[i] : low) - this.target[i]);
+      const along = (axis) => axis[0] * offset[0] + axis[1] * offset[1] + axis[2] * offset[2];
+      const reach = Math.max(Math.abs(along(up)), Math.abs(along(right)) / aspect) / high;
+      this.distance = Math.max(this.distance, reach - along(forward));
+    }
   }
 
   /**

@@ -24,7 +24,8 @@ let isStale = true;
 export function frameAll() {
   const {min, max} = app.scene.bounds;
   const top = show.hidden.has('building') ? 2 : 3;
-  camera.frame(min, [max[0], max[1], max[2] + top * stepOf(app.scene, show.explode)]);
+  const aspect = (canvas.clientWidth || 1) / (canvas.clientHeight || 1);
+  camera.frame(min, [max[0], max[1], max[2] + top * stepOf(app.scene, show.explode)], aspect);
   changed(false);
 }
 
