@@ -16,7 +16,7 @@ PERSON_M, ROBOT_M = 1.7, 0.5
 # Half the width of a person or a robot: surely within it, surely beyond it, metres.
 INNER_M, OUTER_M = 0.08, 0.3
 # Between layers apart: a storey, and shares of the map's shorter and longer side.
-STOREY_M, SHORTER_SHARE, LONGER_SHARE = 3, 0.34, 0.12
+STOREY_M, SHORTER_SHARE, LONGER_SHARE = 3, 0.36, 0.13
 # Kind of an agent that is drawn as a ring, which a click need not choose.
 IN_GAP = "in a gap"
 LIFTS = {"agents": 0, "objects": 0, "places": 1, "rooms": 2, "buildings": 3}
