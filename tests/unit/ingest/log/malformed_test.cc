@@ -17,6 +17,7 @@ TEST(ObsmatReader, RejectsBackwardTimeNamingTheLine) {
 TEST(LogFormat, OfMatricesWithoutTimesIsToldWithWhatToDo) {
   ExpectMalformed("1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0.5 0 1 0 0 0 0 1 0\n", "auto",
                   {"log.txt", "without times", "KITTI", "times.txt", "TUM"});
+  ExpectMalformed("1 0 0 0 0 1 0 0 0 0 1 0\n", "kitti", {"log.txt", "a kitti log is a folder"});
   ExpectMalformed("1 0 0 0 0 1 0 0 0 0 1\n", "auto", {"no known log format", "--format"});
 }
 
