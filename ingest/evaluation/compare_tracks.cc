@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ingest/evaluation/compare_tracks.h"
 
+#include <algorithm>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "ingest/evaluation/pose_file.h"
@@ -84,6 +86,29 @@ absl::Status CheckRowCounts(const NamedTrack& track, const PoseFile& truth) {
       {{"field", "truth"}, {"value", truth.path}});
 }
 
+// A pose is causal: what comes after the end has not changed it. Corrected poses know the whole
+// log.
+absl::Status CutAt(TimeNs until_ns, PoseFile* truth, Estimates* estimates) {
+  if (!truth->has_times || !estimates->has_times) {
+    return MakeError(Reason::kFieldInvalid,
+                     absl::StrCat(truth->has_times ? estimates->words : truth->path,
+                                  " has no times, so there is no first part of so many seconds; "
+                                  "leave --until out"),
+                     {{"field", "until"}});
+  }
+  if (truth->poses.empty()) return absl::OkStatus();
+  const TimeNs end_ns = truth->poses.front().time_ns + until_ns;
+  const auto is_after = [end_ns](const StampedPose& pose) { return pose.time_ns > end_ns; };
+  std::erase_if(truth->poses, is_after);
+  for (NamedTrack& track : estimates->tracks) std::erase_if(track.poses, is_after);
+  if (estimates->loops.has_value()) {
+    std::erase_if(*estimates->loops, [end_ns](const FoundLoop& loop) {
+      return std::max(loop.from_ns, loop.to_ns) > end_ns;
+    });
+  }
+  return absl::OkStatus();
+}
+
 void NoteCoverage(const TrackScore& score, TrackReport* report) {
   if (score.pair_count == 0) {
     report->notes.push_back(absl::StrCat("no pose of the ", score.name,
@@ -120,7 +145,7 @@ absl::StatusOr<TrackReport> CompareTracks(const TrackRequest& request, MapReader
   report.options = request.options;
   if (progress) progress("reading the truth", 0.0);
   const TimeNs epoch_ns = map == nullptr ? 0 : map->spec().epoch_ns;
-  DSG_ASSIGN_OR_RETURN(const PoseFile truth, ReadPoseFile(request.truth, epoch_ns));
+  DSG_ASSIGN_OR_RETURN(PoseFile truth, ReadPoseFile(request.truth, epoch_ns));
   report.truth = truth.path;
   Append(truth.notes, &report);
   DSG_ASSIGN_OR_RETURN(Estimates estimates, map == nullptr
@@ -129,6 +154,9 @@ absl::StatusOr<TrackReport> CompareTracks(const TrackRequest& request, MapReader
   report.estimate = estimates.words;
   if (!request.loops.empty()) {
     DSG_ASSIGN_OR_RETURN(estimates.loops, ReadLoopFile(request.loops, &report.notes));
+  }
+  if (request.options.until_ns.has_value()) {
+    DSG_RETURN_IF_ERROR(CutAt(*request.options.until_ns, &truth, &estimates));
   }
   DSG_ASSIGN_OR_RETURN(report.options.pairing, ChoosePairing(request, estimates, truth));
   for (const NamedTrack& track : estimates.tracks) {

@@ -38,8 +38,9 @@ namespace {
 constexpr char kStoreVariable[] = "DSG_STORE";
 constexpr char kMapVariable[] = "DSG_MAP";
 // The flags that only trajectories know; those of loop closures besides.
-constexpr const char* kTrackFlags[] = {"--robot",     "--loops", "--align",       "--associate",
-                                       "--tolerance", "--reach", "--rpe-lengths", "--rpe-seconds"};
+constexpr const char* kTrackFlags[] = {"--robot",     "--loops",       "--align",
+                                       "--associate", "--tolerance",   "--reach",
+                                       "--until",     "--rpe-lengths", "--rpe-seconds"};
 
 struct Flags {
   std::string store;
@@ -142,6 +143,10 @@ void AddTrackFlags(CLI::App* app, Flags* flags) {
                   "Seconds around a pose that it covers of the truth's time")
       ->check(NumberIn(0.0, 1e6))
       ->capture_default_str();
+  app->add_option_function<double>(
+         "--until", [&track](double seconds) { track.options.until_ns = NsOf(seconds); },
+         "Score the first so many seconds of the truth; default: all of it")
+      ->check(NumberIn(1e-3, 1e6));
   app->add_option("--rpe-lengths", track.options.rpe_lengths_m,
                   "Metres of true path over which relative errors are taken")
       ->delimiter(',')

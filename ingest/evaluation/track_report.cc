@@ -230,7 +230,11 @@ TrackScore ScoreTrack(const std::string& name, const std::vector<StampedPose>& e
 std::string TrackReportToText(const TrackReport& report) {
   std::string out =
       absl::StrCat(report.estimate, "\nagainst ", report.truth, "\n",
-                   HowAligned(report.options.alignment), "; ", HowPaired(report.options), "\n\n");
+                   HowAligned(report.options.alignment), "; ", HowPaired(report.options),
+                   report.options.until_ns.has_value()
+                       ? absl::StrFormat("; the first %g s", SecondsOf(*report.options.until_ns))
+                       : "",
+                   "\n\n");
   for (const TrackScore& score : report.tracks) AppendScore(score, &out);
   if (report.loops.has_value()) AppendLoops(*report.loops, &out);
   for (const std::string& note : report.notes) absl::StrAppend(&out, "note: ", note, "\n");
@@ -243,6 +247,9 @@ std::string TrackReportToJson(const TrackReport& report) {
                    {"align", NameOf(report.options.alignment)},
                    {"associate", NameOf(report.options.pairing)},
                    {"tolerance_s", SecondsOf(report.options.tolerance_ns)},
+                   {"until_s", report.options.until_ns.has_value()
+                                   ? TrackJson(SecondsOf(*report.options.until_ns))
+                                   : TrackJson(nullptr)},
                    {"tracks", TrackJson::object()},
                    {"loops", LoopsJson(report.loops)},
                    {"notes", report.notes}};

@@ -25,6 +25,8 @@ struct TrackOptions {
   std::vector<double> rpe_lengths_m = {1.0, 5.0, 10.0, 20.0};
   std::vector<TimeNs> rpe_durations_ns = {kNsPerSecond};
   LoopOptions loops;
+  /// What is scored ends so long after the first true pose; nullopt: with the log.
+  std::optional<TimeNs> until_ns;
 };
 
 struct TrackScore {

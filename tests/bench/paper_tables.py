@@ -19,6 +19,7 @@ Writes OUT/TABLE-FORM.md, .json, and .png if python3-matplotlib is there.
 """
 
 import argparse
+import dataclasses
 import pathlib
 import shlex
 import sys
@@ -52,7 +53,7 @@ NO_DEPTH = Variant("people without depth", (*NO_LAYERS, "--no-people-depth"), NO
 def odometry(method, masks):
     return Variant(f"{method}, masks {masks}",
                    ("--poses", "vio", "--no-layers", "--odometry", method, "--odometry-masks",
-                    masks), ("--trajectory", "--align", "yaw"))
+                    masks), ("--trajectory", "--align", "yaw"), is_of_people=masks == "on")
 
 
 def by_crowd(*numbers):
@@ -99,7 +100,10 @@ ODOMETRY = Table(
     tuple(odometry_row(method, masks, masks == "off" or method == "dvio")
           for method in TABLE_1 for masks in ("off", "on")),
     ("RMSE of causal poses over all poses, without a gate, aligned by heading and translation. "
-     "Without masks as in the paper; masks leave out features on people. EuRoC's columns of the "
+     "Without masks as in the paper; masks leave out features on people, and say nothing where "
+     "there are none. Of five logs whose covariances are right the mean of squared errors over "
+     "covariance is from 1.25 to 5.50 for positions and from 0.17 to 2.57 for headings in 95 of "
+     "100 tables (chi-square; errors of one log go together). EuRoC's columns of the "
      "paper's table need its recordings: `--log FOLDER --truth FOLDER`. Times are those of the "
      "clock, whatever else the machine did.",),
     "not in the paper (its odometry has no masks)")
@@ -266,6 +270,8 @@ def parse(words):
                         help="more for dsg-simulate, as --simulate='--imu-noise 2'")
     parser.add_argument("--ingest", type=shlex.split, default=[], metavar="OPTIONS",
                         help="more for dsg-ingest, as --ingest='--voxel 0.1'")
+    parser.add_argument("--first", type=float, nargs="+", metavar="SECONDS", default=[],
+                        help="odometry: tables of the first SECONDS of each log, too")
     parser.add_argument("--log", type=pathlib.Path, help="a recorded log (odometry alone)")
     parser.add_argument("--truth", type=pathlib.Path, help="its true trajectory")
     parser.add_argument("--drop", action="store_true", help="delete simulated logs once scored")
@@ -278,6 +284,8 @@ def parse(words):
         parser.error("--log and --truth go together")
     if arguments.log is not None and arguments.table != "odometry":
         parser.error("a recorded log has a true trajectory alone: ./dev tables odometry --log ...")
+    if arguments.first and arguments.table != "odometry":
+        parser.error("--first is of odometry alone: ./dev tables odometry --first 120")
     for program in ("dsg-simulate", "dsg-ingest", "dsg-eval"):
         if not (arguments.bin / program).exists():
             parser.error(f"there is no {program} in {arguments.bin}; ./dev build release makes it")
@@ -300,8 +308,18 @@ def logs_of(arguments):
             for seed in arguments.seeds for people in arguments.people]
 
 
+def first_part(table, seconds):
+    """The table of the first so many seconds of each log: causal poses know no more."""
+    rows = tuple(dataclasses.replace(row, paper={}, variant=dataclasses.replace(
+        row.variant, name=f"{row.variant.name}, {seconds:g} s",
+        evaluate=(*row.variant.evaluate, "--until", f"{seconds:g}"))) for row in table.rows)
+    return dataclasses.replace(table, title=f"{table.title}, the first {seconds:g} s", rows=rows,
+                               notes=())
+
+
 def tables_of(arguments):
     tables = list(TABLES.values()) if arguments.table == "all" else [TABLES[arguments.table]]
+    tables += [first_part(ODOMETRY, seconds) for seconds in arguments.first]
     if not arguments.variants:
         return tables
     chosen = [table_report.narrowed(table, arguments.variants) for table in tables]

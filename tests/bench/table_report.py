@@ -15,6 +15,8 @@ import statistics
 import subprocess
 import sys
 
+from table_runs import wanted
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
@@ -87,7 +89,7 @@ def fill(table, logs, runner, is_small=False):
     for people in crowds:
         of_crowd = [log for log in logs if log.people == people]
         for row in table.rows:
-            if is_small and not row.is_small:
+            if (is_small and not row.is_small) or not row.variant.says_something_of(of_crowd[0]):
                 continue
             known = {log.seed: runner.known(log, row.variant) for log in of_crowd}
             lines.append({"people": people, "label": row.label,
@@ -208,7 +210,7 @@ def provenance(command, logs, runner, variants, is_built):
             "programs_sha256": runner.build,
             "seeds": {crowd(people): [log.seed for log in logs if log.people == people]
                       for people in dict.fromkeys(log.people for log in logs)},
-            "runs": len(rows), "runs_missing": len(logs) * len(variants) - len(rows),
+            "runs": len(rows), "runs_missing": wanted(logs, variants) - len(rows),
             "machine": f"{processor()}, {os.cpu_count()} cores",
             "runs_from": dates[0] if dates else None, "runs_to": dates[-1] if dates else None,
             "date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds")}

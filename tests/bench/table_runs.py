@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs behind tables of figures: logs simulated once, maps made of them and scored, scores kept.
 
-A table names variants, each a way to make a map of a log and to score it. `Runner.score` gives the
-report of dsg-eval for each; what was scored before with the same programs and arguments comes from
-the file of scores, so that a run which was stopped goes on where it was.
+A table names variants, each a way to make a map of a log and to score it. `Runner.score_all` makes
+the report of dsg-eval for each; what was scored before with the same programs and arguments comes
+from the file of scores, so that a run which was stopped goes on where it was. Variants whose maps
+are made alike share one.
 """
 
 import dataclasses
@@ -33,6 +34,11 @@ class Variant:
     evaluate: tuple = ()
     # Whether a mesh is scored: then the number of samples on it is that of the runner.
     has_mesh: bool = False
+    # Whether it differs from another one only where there are people.
+    is_of_people: bool = False
+
+    def says_something_of(self, log):
+        return log.people != 0 or not self.is_of_people
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,6 +60,11 @@ def simulated(world, seconds, people, seed, more=()):
     return Log(f"{world}-{seconds:g}s-{people}p-{seed}{extra}", people, seed,
                ("--world", world, "--people", str(people), "--seed", str(seed),
                 "--seconds", f"{seconds:g}", *more))
+
+
+def wanted(logs, variants):
+    """How many scores all logs and variants make."""
+    return sum(one.says_something_of(log) for log in logs for one in variants)
 
 
 def say(text):
@@ -124,12 +135,13 @@ class Runner:
         return None, self.failed.get(key, "not run yet")
 
     def missing(self, log, variants):
-        return [one for one in variants if self.key(log, one) not in self.scores.known]
+        return [one for one in variants
+                if one.says_something_of(log) and self.key(log, one) not in self.scores.known]
 
     def score_all(self, logs, variants):
         """Scores what is missing, log by log; a run that fails leaves the others as they are."""
         self.left = sum(len(self.missing(log, variants)) for log in logs)
-        say(f"{self.left} of {len(logs) * len(variants)} runs to do")
+        say(f"{self.left} of {wanted(logs, variants)} scores to make")
         for log in logs:
             missing = self.missing(log, variants)
             if not missing:
@@ -140,8 +152,8 @@ class Runner:
                 self.failed.update({self.key(log, one): str(failure) for one in missing})
                 self.left -= len(missing)
                 continue
-            for variant in missing:
-                self.score(log, folders, variant)
+            for ingest in dict.fromkeys(one.ingest for one in missing):
+                self.score(log, folders, [one for one in missing if one.ingest == ingest])
             if is_new and self.drop:
                 shutil.rmtree(folders[0].parent)
 
@@ -159,32 +171,37 @@ class Runner:
         begun.rename(folder)
         return (folder / "log", folder / "truth"), True
 
-    def score(self, log, folders, variant):
-        """Makes the map and keeps its report."""
-        say(f"{log.name}: {variant.name} ({self.left} left)")
-        self.left -= 1
-        key = self.key(log, variant)
+    def score(self, log, folders, variants):
+        """Makes a map, all variants' ingest being the same, and keeps the report of each."""
+        say(f"{log.name}: {variants[0].name} ({self.left} left)")
+        self.left -= len(variants)
         store = self.folder / "store"
         shutil.rmtree(store, ignore_errors=True)
         truth = str(folders[1])
         begin = time.monotonic()
         try:
             run([self.programs / "dsg-ingest", "--store", store, "--map", "m", "--quiet",
-                 *[part.replace(TRUTH, truth) for part in variant.ingest], *self.more, folders[0]])
+                 *[part.replace(TRUTH, truth) for part in variants[0].ingest], *self.more,
+                 folders[0]])
             ingest_s = time.monotonic() - begin
-            report = json.loads(run([self.programs / "dsg-eval", "--store", store, "--map", "m",
-                                     "--truth", truth, "--json",
-                                     *self.evaluation(variant)]))
+            for variant in variants:
+                self.keep(log, variant, ingest_s, run(
+                    [self.programs / "dsg-eval", "--store", store, "--map", "m", "--truth", truth,
+                     "--json", *self.evaluation(variant)]))
         except RunFailed as failure:
-            self.failed[key] = str(failure)
+            self.failed.update({self.key(log, one): str(failure)
+                                for one in self.missing(log, variants)})
             return
         finally:
             shutil.rmtree(store, ignore_errors=True)
-        say(f"{log.name}: {variant.name}: {time.monotonic() - begin:.0f} s")
+        say(f"{log.name}: {variants[0].name}: {time.monotonic() - begin:.0f} s")
+
+    def keep(self, log, variant, ingest_s, output):
+        report = json.loads(output)
         report["ingest_s"] = ingest_s
         if report.get("mesh"):
             report["mesh"].pop("class_iou", None)
-        self.scores.add(key, {
+        self.scores.add(self.key(log, variant), {
             "log": log.name, "variant": variant.name, "people": log.people, "seed": log.seed,
             "date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
             "report": report})

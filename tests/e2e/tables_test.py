@@ -125,6 +125,7 @@ class Command(unittest.TestCase):
 
     def test_usage(self):
         for words in (["rooms", "--log", "a", "--truth", "b"], ["odometry", "--log", "a"],
+                      ["rooms", "--first", "5"],
                       ["tables"], []):
             done = support.run(sys.executable, TABLES, *words)
             self.assertEqual(2, done.returncode, done.stderr)
@@ -151,6 +152,24 @@ class SmallestRun(unittest.TestCase):
             self.assertEqual(0, again.returncode, again.stderr)
             self.assertNotIn("simulating", again.stderr)
             self.assertRegex(again.stdout, r"\| 2 \| true poses, masked \| - \[1\] \| \d+\.\d \|")
+
+    def test_parts_of_a_log_come_from_one_map_and_masks_need_people(self):
+        with tempfile.TemporaryDirectory() as folder:
+            done = support.run(sys.executable, TABLES, "odometry", "--world", "apartment",
+                               "--seconds", "4", "--people", "0", "--seeds", "12", "--first", "2",
+                               "--variants", "dvio", "--simulate", "--rate 10", "--bin",
+                               support.BIN, "--folder", os.path.join(folder, "data"), "--out",
+                               os.path.join(folder, "out"))
+            self.assertEqual(0, done.returncode, done.stderr)
+            # Two scores of one map, which takes two lines; with masks there would be four.
+            self.assertIn("2 of 2 scores to make", done.stderr)
+            self.assertEqual(2, done.stderr.count("dvio, masks off"), done.stderr)
+            whole, first = done.stdout.split("the first 2 s")
+            self.assertRegex(whole, r"\| 0 \| dvio, masks off \|")
+            self.assertRegex(first, r"\| 0 \| dvio, masks off \|")
+            self.assertNotIn("masks on", first)
+            ways = [float(part.split("| 0 | dvio")[1].split("|")[-3]) for part in (whole, first)]
+            self.assertLess(ways[1], ways[0])
 
     def test_the_task_script_takes_each_table_and_no_other_word(self):
         for table in (*paper_tables.TABLES, "all", "tracks"):

@@ -203,6 +203,27 @@ TEST_F(CompareTracksTest, ComparesTwoFiles) {
   EXPECT_NE(report->notes[0].find("less than 95 %"), std::string::npos);
 }
 
+TEST_F(CompareTracksTest, ScoresTheFirstPartOfALogLikeALogThatEndsThere) {
+  std::vector<StampedPose> path = Circle();
+  for (size_t i = 101; i < path.size(); ++i) path[i].map_T_body.position.z() += 1.0;
+  TrackRequest request;
+  request.truth = Write("truth.csv", Text(Circle(), "euroc"));
+  request.estimate = Write("estimate.txt", Text(path, "tum"));
+  EXPECT_GT(CompareTracks(request, nullptr, {})->tracks[0].ate->rmse_m, 0.1);
+  request.options.until_ns = 10 * kNsPerSecond;
+  const auto report = CompareTracks(request, nullptr, {});
+  ASSERT_TRUE(report.ok()) << report.status();
+  EXPECT_LT(report->tracks[0].ate->rmse_m, 1e-9);
+  EXPECT_EQ(report->tracks[0].pair_count, 101);
+  EXPECT_DOUBLE_EQ(*report->tracks[0].coverage, 1.0);
+  EXPECT_EQ(nlohmann::json::parse(TrackReportToJson(*report))["until_s"], 10.0);
+  EXPECT_NE(TrackReportToText(*report).find("first 10 s"), std::string::npos);
+  request.estimate = Write("estimate.kitti", Text(path, "kitti"));
+  const absl::Status status = CompareTracks(request, nullptr, {}).status();
+  EXPECT_EQ(ReasonOf(status), Reason::kFieldInvalid);
+  EXPECT_NE(status.message().find("estimate.kitti has no times"), std::string::npos) << status;
+}
+
 TEST_F(CompareTracksTest, ComparesPosesWithoutTimesRowByRowOnly) {
   TrackRequest request;
   request.truth = Write("truth.kitti", Text(Circle(), "kitti"));
