@@ -140,7 +140,12 @@ void VerifyPoints(const KeyframeFeatures& from, const KeyframeFeatures& to, cons
   TakeBodyPose(from.camera.body_T_camera, to.camera.body_T_camera, *pose, options, verdict);
 }
 
-// Of matches without depths.
+bool HasDepth(const KeyframeFeatures& keyframe) {
+  return std::any_of(keyframe.features.begin(), keyframe.features.end(),
+                     [](const KeyframeFeature& feature) { return feature.depth_m > 0.0f; });
+}
+
+// Of matches of two cameras that know no depth.
 void VerifyBearings(const KeyframeFeatures& from, const KeyframeFeatures& to,
                     const std::vector<FeatureMatch>& matches, const PlaceVerifierOptions& options,
                     PlaceVerdict* verdict) {
@@ -214,7 +219,7 @@ PlaceVerdict PlaceVerifier::Verify(const KeyframeFeatures& from, const KeyframeF
   if (verdict.match_count < options_.match_count_min) return verdict;
   if (verdict.point_count >= options_.match_count_min) {
     VerifyPoints(from, to, bits, view, options_, &verdict);
-  } else {
+  } else if (!HasDepth(from) && !HasDepth(to)) {
     VerifyBearings(from, to, matches, options_, &verdict);
   }
   return verdict;

@@ -16,7 +16,7 @@ enum class PlaceOutcome {
   kVerified,
   /// It is the same place; without any depth nobody knows how far apart both stood.
   kDirectionOnly,
-  /// Too few features look alike.
+  /// Too few features look alike, or too few of these have a depth where some have.
   kTooFewMatches,
   /// No pose has enough matches that agree.
   kDisagree,
@@ -54,7 +54,7 @@ struct PlaceVerdict {
 
 /// Matches of descriptors; a pose by samples of three points that one camera knows and the other
 /// one sees; matches near to where that pose says; least squares of all that agree, with both
-/// depths of a match where both are known. Without depths: five-point samples.
+/// depths of a match where both are known. Where neither keyframe has any depth: five-point samples.
 ///
 /// Either keyframe may be without depth, and each has its own camera. The same keyframes and
 /// options give the same verdict; counts bound it, never clocks. Threads: all calls may come from

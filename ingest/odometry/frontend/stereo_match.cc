@@ -3,10 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 #include <optional>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "ingest/odometry/frontend/gray_image_internal.h"
@@ -43,25 +46,60 @@ Template TemplateAt(const cv::Mat1b& image, const cv::Point2f& at, int reach) {
   return result;
 }
 
-// Correlation with the patch around a whole pixel; -1 if that is flat. Requires: inside.
-float CorrelationWith(const Template& sought, const cv::Mat1b& image, int x, int y, int reach) {
-  int sum = 0;
-  int sum2 = 0;
-  float product = 0.0f;
-  const int side = 2 * reach + 1;
-  const float* value = sought.values.data();
-  for (int row = y - reach; row <= y + reach; ++row, value += side) {
-    const uint8_t* pixels = image.ptr<uint8_t>(row) + (x - reach);
-    for (int i = 0; i < side; ++i) {
-      const int pixel = pixels[i];
-      sum += pixel;
-      sum2 += pixel * pixel;
-      product += value[i] * static_cast<float>(pixel);
+// Correlations of a patch with those around all whole pixels along a part of a row. The innermost
+// loops run along the row, which vectors do; at each pixel terms are added in the patch's order.
+class RowCorrelation {
+ public:
+  RowCorrelation(const Template& sought, int reach) : sought_(sought), reach_(reach) {}
+
+  // At (first_x, y) and the pixels on its right, `count` altogether; -1 where the image is flat.
+  // Requires: the patches are inside. Holds until the next call.
+  std::span<const float> At(const cv::Mat1b& image, int first_x, int y, int count) {
+    const int side = 2 * reach_ + 1;
+    product_.assign(static_cast<size_t>(count), 0.0f);
+    sums_.assign(static_cast<size_t>(count + side - 1), 0);
+    sums2_ = sums_;
+    pixels_.resize(sums_.size());
+    const float* value = sought_.values.data();
+    for (int row = y - reach_; row <= y + reach_; ++row, value += side) {
+      Take(image.ptr<uint8_t>(row) + (first_x - reach_));
+      for (int i = 0; i < side; ++i) AddProducts(value[i], i);
     }
+    for (int x = 0; x < count; ++x) Normalise(x, side);
+    return product_;
   }
-  const double spread2 = sum2 - static_cast<double>(sum) * sum / (side * side);
-  return spread2 > 0.5 ? product / static_cast<float>(std::sqrt(spread2)) : -1.0f;
-}
+
+ private:
+  void Take(const uint8_t* row) {
+    const auto width = static_cast<int>(pixels_.size());
+    for (int i = 0; i < width; ++i) pixels_[static_cast<size_t>(i)] = row[i];
+    for (int i = 0; i < width; ++i) sums_[static_cast<size_t>(i)] += row[i];
+    for (int i = 0; i < width; ++i) sums2_[static_cast<size_t>(i)] += row[i] * row[i];
+  }
+
+  void AddProducts(float value, int offset) {
+    const float* pixels = pixels_.data() + offset;
+    float* product = product_.data();
+    const size_t count = product_.size();
+    for (size_t x = 0; x < count; ++x) product[x] += value * pixels[x];
+  }
+
+  void Normalise(int x, int side) {
+    const double sum = std::accumulate(sums_.begin() + x, sums_.begin() + x + side, 0);
+    const double sum2 = std::accumulate(sums2_.begin() + x, sums2_.begin() + x + side, 0);
+    const double spread2 = sum2 - sum * sum / (side * side);
+    float& product = product_[static_cast<size_t>(x)];
+    product = spread2 > 0.5 ? product / static_cast<float>(std::sqrt(spread2)) : -1.0f;
+  }
+
+  const Template& sought_;
+  const int reach_;
+  std::vector<float> product_;
+  // Of the rows of a patch: each column's sum, and that of squares; one row's pixels.
+  std::vector<int> sums_;
+  std::vector<int> sums2_;
+  std::vector<float> pixels_;
+};
 
 // The best disparity, in whole pixels.
 struct Peak {
@@ -160,16 +198,20 @@ class StereoMatcher::Impl {
     const int y0 = cvRound(pixel.y());
     const int first = static_cast<int>(std::floor(std::min(disparity_min_, 0.0))) - kBeyond;
     const int last = static_cast<int>(std::ceil(disparity_max_)) + kBeyond;
-    std::vector<Peak> curve;
-    for (int disparity = first; disparity <= last; ++disparity) {
-      Peak best;
-      const int x = x0 + side_ * disparity;
-      for (int y = y0 - rows; y <= y0 + rows; ++y) {
-        if (x < reach || y < reach || x + reach >= right.cols || y + reach >= right.rows) continue;
-        const float correlation = CorrelationWith(sought, right, x, y, reach);
+    std::vector<Peak> curve(static_cast<size_t>(last - first + 1));
+    // Places whose patches are inside.
+    const int from_x = std::max(std::min(x0 + side_ * first, x0 + side_ * last), reach);
+    const int to_x =
+        std::min(std::max(x0 + side_ * first, x0 + side_ * last), right.cols - 1 - reach);
+    RowCorrelation along(sought, reach);
+    for (int y = std::max(y0 - rows, reach);
+         from_x <= to_x && y <= std::min(y0 + rows, right.rows - 1 - reach); ++y) {
+      int x = from_x;
+      for (const float correlation : along.At(right, from_x, y, to_x - from_x + 1)) {
+        Peak& best = curve[static_cast<size_t>(side_ * (x - x0) - first)];
         if (correlation > best.correlation) best = {{x, y}, correlation};
+        ++x;
       }
-      curve.push_back(best);
     }
     return BestOf(curve);
   }

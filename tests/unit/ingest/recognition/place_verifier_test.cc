@@ -140,6 +140,16 @@ TEST(PlaceVerifier, WithoutDepthsOnlyADirectionIsKnown) {
   EXPECT_LT(DegreesOfTurn(verdict.camera_from_T_to.orientation, truth.orientation), 0.5);
 }
 
+// A direction is no loop closure: samples of five are for cameras that never know a depth.
+TEST(PlaceVerifier, WithFewDepthsNothingIsTold) {
+  MadeVisit visit = MakeVisit({.from_has_depth = true, .to_has_depth = false});
+  for (size_t i = 5; i < visit.from.features.size(); ++i) visit.from.features[i].depth_m = 0.0f;
+  const PlaceVerdict verdict = MadeVerifier().Verify(visit.from, visit.to);
+  EXPECT_EQ(verdict.outcome, PlaceOutcome::kTooFewMatches);
+  EXPECT_GT(verdict.match_count, 100);
+  EXPECT_EQ(verdict.draw_count, 0);
+}
+
 TEST(PlaceVerifier, RefusesOtherPlaces) {
   const MadeVisit one = MakeVisit({.seed = 1});
   const MadeVisit other = MakeVisit({.seed = 2});
