@@ -54,7 +54,8 @@ struct PlaceVerdict {
 
 /// Matches of descriptors; a pose by samples of three points that one camera knows and the other
 /// one sees; matches near to where that pose says; least squares of all that agree, with both
-/// depths of a match where both are known. Where neither keyframe has any depth: five-point samples.
+/// depths of a match where both are known. Where neither keyframe has any depth: five-point
+/// samples.
 ///
 /// Either keyframe may be without depth, and each has its own camera. The same keyframes and
 /// options give the same verdict; counts bound it, never clocks. Threads: all calls may come from
