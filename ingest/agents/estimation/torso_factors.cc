@@ -4,18 +4,11 @@
 #include <Eigen/Cholesky>
 
 namespace dsg::ingest {
-namespace {
 
-// Says nothing about tilt, which no link holds.
-constexpr double kNoInformation = 0.0;
-
-}  // namespace
-
-Covariance6 BlockCovariance(const Eigen::Matrix3d& position, double tilt, double heading) {
+Covariance6 BlockCovariance(const Eigen::Matrix3d& position, const Eigen::Matrix3d& turn) {
   Eigen::Matrix<double, 6, 6> whole = Eigen::Matrix<double, 6, 6>::Zero();
   whole.topLeftCorner<3, 3>() = position;
-  whole(3, 3) = whole(4, 4) = tilt;
-  whole(5, 5) = heading;
+  whole.bottomRightCorner<3, 3>() = turn;
   Covariance6 triangle{};
   size_t next = 0;
   for (int row = 0; row < 6; ++row) {
@@ -34,23 +27,25 @@ PoseFactor DetectionFactor(TimeNs time_ns, const Pose3d& map_T_torso,
   factor.from_ns = factor.to_ns = time_ns;
   factor.relative_pose = map_T_torso;
   const Eigen::Matrix3d position = position_covariance_map.llt().solve(Eigen::Matrix3d::Identity());
-  const bool has_heading = heading_sigma_rad > 0.0;
-  const double tilt = has_heading ? 1.0 / (tilt_sigma_rad * tilt_sigma_rad) : kNoInformation;
-  const double heading =
-      has_heading ? 1.0 / (heading_sigma_rad * heading_sigma_rad) : kNoInformation;
-  factor.information = BlockCovariance(position, tilt, heading);
+  Eigen::Vector3d turn = Eigen::Vector3d::Zero();
+  if (heading_sigma_rad > 0.0) {
+    const Eigen::Vector3d sigma_rad(tilt_sigma_rad, tilt_sigma_rad, heading_sigma_rad);
+    turn = sigma_rad.cwiseAbs2().cwiseInverse();
+  }
+  factor.information = BlockCovariance(position, turn.asDiagonal());
   return factor;
 }
 
 PoseFactor LinkFactor(const char* type, TimeNs from_ns, TimeNs to_ns, const Pose3d& step,
-                      const Eigen::Vector3d& position_variance, double heading_variance) {
+                      const Eigen::Vector3d& position_variance,
+                      const Eigen::Vector3d& turn_information) {
   PoseFactor factor;
   factor.type = type;
   factor.from_ns = from_ns;
   factor.to_ns = to_ns;
   factor.relative_pose = step;
   const Eigen::Matrix3d position = position_variance.cwiseInverse().asDiagonal();
-  factor.information = BlockCovariance(position, kNoInformation, 1.0 / heading_variance);
+  factor.information = BlockCovariance(position, turn_information.asDiagonal());
   return factor;
 }
 

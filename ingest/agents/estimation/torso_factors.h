@@ -11,16 +11,18 @@
 
 namespace dsg::ingest {
 
-/// Upper triangle of a matrix with these diagonal blocks; heading about the torso's z axis.
-Covariance6 BlockCovariance(const Eigen::Matrix3d& position, double tilt, double heading);
+/// Upper triangle of a matrix with these diagonal blocks; turns about the torso's axes.
+Covariance6 BlockCovariance(const Eigen::Matrix3d& position, const Eigen::Matrix3d& turn);
 
 /// Of one detection. `heading_sigma_rad` 0 = it gives none.
 PoseFactor DetectionFactor(TimeNs time_ns, const Pose3d& map_T_torso,
                            const Eigen::Matrix3d& position_covariance_map, double heading_sigma_rad,
                            double tilt_sigma_rad);
 
-/// Between neighbours: `step` and the variances of what it leaves open.
+/// Between neighbours: `step`, the variances of the position that it leaves open, and how much it
+/// says of turns about the torso's axes (0 = nothing).
 PoseFactor LinkFactor(const char* type, TimeNs from_ns, TimeNs to_ns, const Pose3d& step,
-                      const Eigen::Vector3d& position_variance, double heading_variance);
+                      const Eigen::Vector3d& position_variance,
+                      const Eigen::Vector3d& turn_information);
 
 }  // namespace dsg::ingest

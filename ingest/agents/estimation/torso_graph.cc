@@ -10,6 +10,7 @@
 #include <utility>
 #include <variant>
 
+#include "ingest/agents/estimation/attitude_chain.h"
 #include "ingest/agents/estimation/chain_solver.h"
 #include "ingest/agents/estimation/state_chain.h"
 #include "ingest/agents/estimation/torso_factors.h"
@@ -31,7 +32,9 @@ namespace {
 
 using StandingChain = StateChain<3>;
 using WalkingChain = StateChain<kSmoothStateCount>;
+using HeadingChain = StateChain<1>;
 using PositionChain = std::variant<StandingChain, WalkingChain>;
+using RotationChain = std::variant<AttitudeChain, HeadingChain>;
 
 // Only where Ceres gives up.
 constexpr int kFallbackIterationCount = 30;
@@ -48,6 +51,18 @@ double StepS(TimeNs from_ns, TimeNs to_ns) {
 PositionChain MakePositionChain(const TorsoOptions& options) {
   if (options.model == TorsoModel::kPaper) return StandingChain(StandingStart());
   return WalkingChain(WalkingStart(options));
+}
+
+RotationChain MakeRotationChain(const TorsoOptions& options) {
+  if (options.model == TorsoModel::kPaper) return AttitudeChain(options);
+  return HeadingChain(HeadingChain::Matrix::Constant(kHeadingStart));
+}
+
+// At the end of a track. False where Ceres gives up.
+bool SolveToTheEnd(HeadingChain* chain) { return SolveWithCeres(chain); }
+bool SolveToTheEnd(AttitudeChain* chain) {
+  chain->Solve(0, kFallbackIterationCount, false);
+  return true;
 }
 
 ChainLink<3> LinkOf(const TorsoOptions& options, const StandingChain&, double step_s) {
@@ -72,18 +87,19 @@ struct TorsoGraph::Impl {
   explicit Impl(const TorsoOptions& torso_options)
       : options(torso_options),
         position(MakePositionChain(torso_options)),
-        heading(StateChain<1>::Matrix::Constant(kHeadingStart)) {}
+        rotation(MakeRotationChain(torso_options)) {}
 
   void AppendPosition(const PersonObservation& observation, double step_s, double link_step_s);
   void Relinearise(size_t first);
-  void AppendHeading(const PersonObservation& observation, double link_step_s);
+  void AppendRotation(const PersonObservation& observation, double link_step_s);
   void Solve(size_t first, int iteration_count, bool is_first_without_loss);
   void TakeEstimates(size_t first);
+  Eigen::Quaterniond RotationAt(size_t i, Eigen::Matrix3d* covariance) const;
   PoseFactor LinkBefore(size_t i) const;
 
   TorsoOptions options;
   PositionChain position;
-  StateChain<1> heading;
+  RotationChain rotation;
   std::vector<TorsoDetection> detections;
   /// kSmooth only: the first two terms of each position.
   std::vector<RayDetection> rays;
@@ -116,17 +132,24 @@ void TorsoGraph::Impl::Relinearise(size_t first) {
   }
 }
 
-void TorsoGraph::Impl::AppendHeading(const PersonObservation& observation, double link_step_s) {
+void TorsoGraph::Impl::AppendRotation(const PersonObservation& observation, double link_step_s) {
+  if (auto* attitude = std::get_if<AttitudeChain>(&rotation)) {
+    attitude->Append(observation, link_step_s);
+    return;
+  }
   const double start =
       observation.has_heading ? HeadingOf(observation.map_T_torso.orientation) : 0.0;
-  heading.Append(TurningLink(options, link_step_s), HeadingTerms(options, observation),
-                 StateChain<1>::State::Constant(start));
+  std::get<HeadingChain>(rotation).Append(TurningLink(options, link_step_s),
+                                          HeadingTerms(options, observation),
+                                          HeadingChain::State::Constant(start));
 }
 
 void TorsoGraph::Impl::Solve(size_t first, int iteration_count, bool is_first_without_loss) {
-  std::visit([&](auto& chain) { chain.Solve(first, iteration_count, is_first_without_loss); },
-             position);
-  heading.Solve(first, iteration_count, is_first_without_loss);
+  const auto solve = [&](auto& chain) {
+    chain.Solve(first, iteration_count, is_first_without_loss);
+  };
+  std::visit(solve, position);
+  std::visit(solve, rotation);
   TakeEstimates(first);
 }
 
@@ -140,28 +163,42 @@ void TorsoGraph::Impl::TakeEstimates(size_t first) {
           covariance = chain.covariance(i).template topLeftCorner<3, 3>();
         },
         position);
-    estimate.map_T_torso.orientation =
-        Turned(detections[i].map_T_torso.orientation, heading.state(i)(0));
-    estimate.covariance = BlockCovariance(
-        covariance, options.tilt_sigma_rad * options.tilt_sigma_rad, heading.covariance(i)(0, 0));
+    Eigen::Matrix3d turn_covariance;
+    estimate.map_T_torso.orientation = RotationAt(i, &turn_covariance);
+    estimate.covariance = BlockCovariance(covariance, turn_covariance);
   }
+}
+
+Eigen::Quaterniond TorsoGraph::Impl::RotationAt(size_t i, Eigen::Matrix3d* covariance) const {
+  if (const auto* attitude = std::get_if<AttitudeChain>(&rotation)) {
+    *covariance = attitude->covariance(i);
+    return attitude->rotation(i);
+  }
+  const auto& heading = std::get<HeadingChain>(rotation);
+  const double tilt_variance = options.tilt_sigma_rad * options.tilt_sigma_rad;
+  *covariance =
+      Eigen::Vector3d(tilt_variance, tilt_variance, heading.covariance(i)(0, 0)).asDiagonal();
+  return Turned(detections[i].map_T_torso.orientation, heading.state(i)(0));
 }
 
 PoseFactor TorsoGraph::Impl::LinkBefore(size_t i) const {
   const TimeNs from_ns = detections[i - 1].time_ns;
   const TimeNs to_ns = detections[i].time_ns;
-  const double turn_variance = heading.link(i).covariance(0, 0);
   if (const auto* standing = std::get_if<StandingChain>(&position)) {
+    const double variance = std::get<AttitudeChain>(rotation).link_variance(i);
     return LinkFactor("zero_velocity", from_ns, to_ns, Pose3d{},
-                      standing->link(i).covariance.diagonal(), turn_variance);
+                      standing->link(i).covariance.diagonal(),
+                      Eigen::Vector3d::Constant(1.0 / variance));
   }
   const auto& walking = std::get<WalkingChain>(position);
   const WalkingChain::State expected = walking.link(i).transition * walking.state(i - 1);
   const Pose3d& from = estimates[i - 1].map_T_torso;
   Pose3d step;
   step.position = from.orientation.conjugate() * (expected.head<3>() - from.position);
+  // Nothing holds roll and pitch.
+  const double variance = std::get<HeadingChain>(rotation).link(i).covariance(0, 0);
   return LinkFactor("motion", from_ns, to_ns, step, walking.link(i).covariance.diagonal().head<3>(),
-                    turn_variance);
+                    {0.0, 0.0, 1.0 / variance});
 }
 
 TorsoGraph::TorsoGraph(const TorsoOptions& options) : impl_(std::make_unique<Impl>(options)) {}
@@ -178,7 +215,7 @@ bool TorsoGraph::Add(const PersonObservation& observation) {
       is_first ? 1.0 : StepS(impl.detections.back().time_ns, observation.time_ns);
   const double step_s = is_first ? std::numeric_limits<double>::infinity() : link_step_s;
   impl.AppendPosition(observation, step_s, link_step_s);
-  impl.AppendHeading(observation, link_step_s);
+  impl.AppendRotation(observation, link_step_s);
   impl.detections.push_back({observation.time_ns, observation.map_T_torso,
                              observation.position_covariance_map,
                              observation.has_heading ? observation.heading_sigma_rad : 0.0});
@@ -207,13 +244,13 @@ void TorsoGraph::SolveAll() {
   impl_->Relinearise(0);
   const bool is_solved =
       std::visit([](auto& chain) { return SolveWithCeres(&chain); }, impl_->position) &&
-      SolveWithCeres(&impl_->heading);
+      std::visit([](auto& chain) { return SolveToTheEnd(&chain); }, impl_->rotation);
   impl_->Solve(0, is_solved ? 1 : kFallbackIterationCount, false);
 }
 
 void TorsoGraph::Freeze() {
   impl_->position = MakePositionChain(impl_->options);
-  impl_->heading = StateChain<1>(StateChain<1>::Matrix::Constant(kHeadingStart));
+  impl_->rotation = MakeRotationChain(impl_->options);
   std::vector<RayDetection>().swap(impl_->rays);
   std::vector<TorsoDetection>().swap(impl_->detections);
 }

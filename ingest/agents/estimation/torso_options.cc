@@ -43,7 +43,8 @@ constexpr OptionField<TorsoOptions> kFields[] = {
     {"track-paper-loss", &TorsoOptions::paper_loss_scale, 0.0, 100.0,
      "The same with --people paper: the paper names no loss, and 0 is its letter"},
     {"track-tilt", &TorsoOptions::tilt_sigma_rad, 0.001, 3.0,
-     "Error of rolling and pitching that is told, radians: the graph leaves them as detected"},
+     "Error of a detection's roll and pitch, radians; but for --people paper they stay as "
+     "detected"},
 };
 
 }  // namespace

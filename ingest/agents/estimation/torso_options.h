@@ -9,7 +9,7 @@
 namespace dsg::ingest {
 
 enum class TorsoModel {
-  /// Zero-velocity links and detection priors, and nothing else.
+  /// Zero-velocity links and detection priors in six degrees of freedom, and nothing else.
   /// Source: RSS 2020, section IV-A "Human Nodes".
   kPaper,
   /// White noise on acceleration with velocities that are forgotten, robust priors, an error along
@@ -48,7 +48,7 @@ struct TorsoOptions {
   double loss_scale = 2.0;
   /// The same for kPaper. The paper names no loss; 0 is its letter.
   double paper_loss_scale = 0.0;
-  /// Of rolling and pitching, which the graph leaves as the detection has them.
+  /// Of rolling and pitching: kPaper estimates them, kSmooth leaves them as the detection has them.
   double tilt_sigma_rad = 0.1;
 
   std::vector<BoundOption> Bind();

@@ -151,9 +151,7 @@ ChainLink<kSmoothStateCount> WalkingLink(const TorsoOptions& options, double ste
 
 ChainLink<1> TurningLink(const TorsoOptions& options, double step_s) {
   ChainLink<1> link;
-  const double sigma_rad = options.model == TorsoModel::kPaper
-                               ? options.turn_sigma_rad_s * step_s
-                               : options.turn_walk_sigma_rad * std::sqrt(step_s);
+  const double sigma_rad = options.turn_walk_sigma_rad * std::sqrt(step_s);
   link.covariance(0, 0) = sigma_rad * sigma_rad;
   return link;
 }
@@ -235,8 +233,7 @@ std::vector<ChainTerm<1>> HeadingTerms(const TorsoOptions& options,
   if (!observation.has_heading) return {};
   ChainTerm<1> term;
   const double information = 1.0 / observation.heading_sigma_rad;
-  term.loss_scale =
-      options.model == TorsoModel::kPaper ? options.paper_loss_scale : options.loss_scale;
+  term.loss_scale = options.loss_scale;
   term.jacobian(0, 0) = information;
   term.target(0) = information * HeadingOf(observation.map_T_torso.orientation);
   term.period = 2.0 * std::numbers::pi * information;

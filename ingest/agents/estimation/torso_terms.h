@@ -25,6 +25,7 @@ double HeadingOf(const Eigen::Quaterniond& map_Q_torso);
 
 ChainLink<3> StandingLink(const TorsoOptions& options, double step_s);
 ChainLink<kSmoothStateCount> WalkingLink(const TorsoOptions& options, double step_s);
+/// Of the heading (kSmooth).
 ChainLink<1> TurningLink(const TorsoOptions& options, double step_s);
 
 /// Before the first detection.
