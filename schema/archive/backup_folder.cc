@@ -20,6 +20,7 @@
 #include "schema/archive/archive_file.h"
 #include "schema/archive/file_io.h"
 #include "schema/archive/manifest_fields.h"
+#include "schema/base/folder_mode.h"
 #include "schema/base/status.h"
 #include "schema/codec/checksum.h"
 #include "schema/files/atomic_file.h"
@@ -292,7 +293,7 @@ absl::StatusOr<BackupEntry> BackupFile::Commit(const StopCheck& stop) {
 
 absl::StatusOr<std::unique_ptr<BackupFolder>> BackupFolder::Open(const std::string& folder) {
   std::error_code error;
-  if (!fs::exists(folder, error)) fs::create_directories(folder, error);
+  if (!fs::exists(folder, error)) DSG_RETURN_IF_ERROR(MakePrivateFolder(folder));
   const int fd = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (fd < 0) {
     return MakeError(Reason::kFieldInvalid,

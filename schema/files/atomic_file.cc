@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "schema/base/folder_mode.h"
 #include "schema/base/status.h"
 
 namespace dsg {
@@ -34,7 +35,8 @@ absl::Status DiskFull(int error, const std::string& message, const std::string& 
 std::FILE* CreateNew(const std::string& path) {
   // Of a run that was killed.
   unlink(path.c_str());
-  const int fd = open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+  const int fd = open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC,
+                      FileModeIn(std::filesystem::path(path).parent_path().string()));
   if (fd < 0) return nullptr;
   std::FILE* const file = fdopen(fd, "wb");
   if (file == nullptr) close(fd);

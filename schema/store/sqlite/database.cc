@@ -1,16 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "schema/store/sqlite/database.h"
 
+#include <fcntl.h>
 #include <sqlite3.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "schema/base/folder_mode.h"
 #include "schema/store/sqlite/page_checksum.h"
 
 namespace dsg::sqlite {
@@ -121,6 +125,14 @@ int64_t FindBadLogFrame(const std::string& path) {
   return 0;
 }
 
+// SQLite would let everybody read the file. Its log and index take after it. If this fails, so does
+// opening it, with a reason.
+void MakeFileFor(const std::string& path) {
+  const std::string folder = std::filesystem::path(path).parent_path().string();
+  const int fd = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, FileModeIn(folder));
+  if (fd >= 0) close(fd);
+}
+
 int OnWalCommit(void* pages, sqlite3*, const char*, int wal_pages) {
   *static_cast<int*>(pages) = wal_pages;
   return SQLITE_OK;
@@ -136,7 +148,10 @@ absl::StatusOr<std::unique_ptr<Database>> Database::Open(const std::string& path
   int flags = SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_EXRESCODE | SQLITE_OPEN_NOFOLLOW;
   if (mode == Mode::kRead) flags |= SQLITE_OPEN_READONLY;
   if (mode == Mode::kWrite) flags |= SQLITE_OPEN_READWRITE;
-  if (mode == Mode::kCreate) flags |= SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
+  if (mode == Mode::kCreate) {
+    flags |= SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
+    MakeFileFor(path);
+  }
   if (sqlite3_open_v2(path.c_str(), &made->db_, flags, SealedFilesName()) != SQLITE_OK) {
     return made->Error(absl::StrCat("opening ", path));
   }

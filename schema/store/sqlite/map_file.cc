@@ -20,6 +20,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "schema/base/folder_mode.h"
 #include "schema/base/time.h"
 #include "schema/model/edge.h"
 #include "schema/store/graph_store.h"
@@ -359,7 +360,8 @@ absl::StatusOr<std::unique_ptr<WriterLock>> WriterLock::Acquire(const std::strin
                                                                 const std::string& map,
                                                                 const std::string& program) {
   const std::string path = MapFolder(store_folder, map) + "/writer.lock";
-  const int fd = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644);
+  const int fd = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW,
+                      FileModeIn(MapFolder(store_folder, map)));
   if (fd < 0) {
     if (errno == ENOENT) return UnknownMapError(map, store_folder);
     return MakeError(Reason::kReadOnly, absl::StrCat("cannot open ", path, ": ", Errno()),
@@ -397,10 +399,8 @@ absl::StatusOr<std::unique_ptr<WriterLock>> LockNewMap(const std::string& store_
                                                        const std::string& program) {
   const std::string folder = MapFolder(store_folder, map);
   for (;;) {
-    std::error_code error;
-    fs::create_directory(folder, error);
-    if (error) {
-      return absl::InternalError(absl::StrCat("cannot make ", folder, ": ", error.message()));
+    if (mkdir(folder.c_str(), FolderModeIn(store_folder)) != 0 && errno != EEXIST) {
+      return absl::InternalError(absl::StrCat("cannot make ", folder, ": ", Errno()));
     }
     auto lock = WriterLock::Acquire(store_folder, map, program);
     // Somebody has dropped a map of that name in between, and its folder with it.

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "schema/base/folder_mode.h"
 #include "schema/base/log.h"
 #include "schema/store/sqlite/rows.h"
 
@@ -121,7 +122,8 @@ void Reserve::Make() const {
   std::error_code error;
   const fs::space_info space = fs::space(folder_, error);
   if (error || space.available < static_cast<uint64_t>(bytes_) * kPlenty) return;
-  const int fd = open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0644);
+  const int fd = open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW,
+                      FileModeIn(folder_));
   if (fd < 0) return;
   // Takes blocks of the disk; a file that was only made long would have none.
   const int failure = posix_fallocate(fd, 0, bytes_);

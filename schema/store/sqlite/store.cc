@@ -6,6 +6,7 @@
 #include <mutex>
 
 #include "absl/strings/str_cat.h"
+#include "schema/base/folder_mode.h"
 #include "schema/base/log.h"
 #include "schema/store/sqlite/copy.h"
 #include "schema/store/sqlite/map_reader.h"
@@ -111,7 +112,8 @@ class SqliteStore : public GraphStore {
 absl::StatusOr<std::unique_ptr<GraphStore>> OpenSqliteStore(const std::string& folder,
                                                             const StoreOptions& options) {
   std::error_code error;
-  if (options.create) fs::create_directories(folder, error);
+  // If it fails, the folder is not there.
+  if (options.create) MakePrivateFolder(folder).IgnoreError();
   if (!fs::is_directory(folder, error)) {
     return MakeError(Reason::kMapUnknown,
                      absl::StrCat("store folder \"", folder, "\" ",

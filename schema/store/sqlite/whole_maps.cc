@@ -18,6 +18,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
+#include "schema/base/folder_mode.h"
 #include "schema/base/log.h"
 #include "schema/base/status.h"
 #include "schema/store/sqlite/database.h"
@@ -226,7 +227,7 @@ std::string MarkPath(const std::string& store_folder, const std::string& from,
 absl::Status MakeMark(const std::string& store_folder, const std::string& from,
                       const std::string& to) {
   const int fd = open(MarkPath(store_folder, from, to).c_str(),
-                      O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644);
+                      O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, FileModeIn(store_folder));
   if (fd < 0) return ChangeError("rename", from, errno);
   close(fd);
   return SyncFolder(store_folder);

@@ -2,6 +2,8 @@
 // Stores and their maps: made, found, opened by many for reading and by one for writing.
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
 #include "absl/strings/match.h"
 #include "tests/unit/schema/store/delta_stream.h"
 #include "tests/unit/schema/store/store_test_util.h"
@@ -31,6 +33,25 @@ TEST_P(Stores, AreNotMadeUnlessAsked) {
   const std::string none = UriOf(GetParam(), folder_.path() + "/none");
   EXPECT_EQ(ReasonOf(OpenStore(none, {}).status()), Reason::kMapUnknown);
   EXPECT_TRUE(OpenStore(none, {.create = true}).ok());
+}
+
+TEST_P(Stores, InAFolderOfTheirOwnAreForTheirUserAlone) {
+  namespace fs = std::filesystem;
+  const std::string folder = folder_.path() + "/own";
+  const auto store = OrDie(OpenStore(UriOf(GetParam(), folder), {.create = true}));
+  OrDie(store->CreateMap(Named("lab")));
+  const auto writer = OrDie(store->OpenWriter("lab"));
+  std::error_code error;
+  // The other backend has no files.
+  if (!fs::exists(folder, error)) return;
+  constexpr fs::perms kOthers = fs::perms::group_all | fs::perms::others_all;
+  EXPECT_EQ(fs::status(folder).permissions() & kOthers, fs::perms::none);
+  int count = 0;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
+    EXPECT_EQ(entry.status().permissions() & kOthers, fs::perms::none) << entry.path();
+    ++count;
+  }
+  EXPECT_GE(count, 4);
 }
 
 TEST_P(Stores, ListTheirMapsByName) {
