@@ -1,12 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "schema/retention/policy_file.h"
 
-#include <yaml-cpp/yaml.h>
-
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <functional>
 #include <map>
 #include <set>
@@ -14,22 +10,20 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
-#include "schema/files/yaml_text.h"
+#include "schema/files/yaml_reader.h"
 
 namespace dsg {
 namespace {
 
-constexpr size_t kFileBytesMax = size_t{1} << 20;
 constexpr size_t kPolicyCountMax = 100;
-// Bounds the recursion of the parser; a policy nests three levels.
-constexpr size_t kBracketsMax = 1000;
 constexpr TimeNs kEveryMin = kNsPerSecond;
 
-class PolicyReader {
+class PolicyReader : private YamlReader {
  public:
-  explicit PolicyReader(std::string name) : name_(std::move(name)) {}
+  using YamlReader::Parse;
+  using YamlReader::YamlReader;
 
-  absl::StatusOr<PolicyFile> Read(const YAML::Node& root) {
+  absl::StatusOr<PolicyFile> Read(const YAML::Node& root) const {
     PolicyFile file;
     file.every_ns = kNsPerDay;
     if (!root.IsMap()) return Wrong(root, "the file is no map; begin with \"policies:\"");
@@ -62,44 +56,8 @@ class PolicyReader {
     return file;
   }
 
-  absl::Status Wrong(const YAML::Mark& mark, const std::string& what) const {
-    return MakeError(Reason::kFileMalformed,
-                     absl::StrCat(name_, ":", mark.line + 1, ":", mark.column + 1, ": ", what),
-                     {{"file", name_},
-                      {"line", absl::StrCat(mark.line + 1)},
-                      {"column", absl::StrCat(mark.column + 1)}});
-  }
-
  private:
   using Take = std::function<absl::Status(const YAML::Node&, PrunePolicy*)>;
-
-  absl::Status Wrong(const YAML::Node& node, const std::string& what) const {
-    return Wrong(node.Mark(), what);
-  }
-
-  absl::Status CheckKeys(const YAML::Node& map, const std::set<std::string>& known) const {
-    std::set<std::string> seen;
-    for (const auto& entry : map) {
-      if (!entry.first.IsScalar()) return Wrong(entry.first, "a key is no word");
-      const std::string key = entry.first.Scalar();
-      if (!known.contains(key)) {
-        std::string all;
-        for (const std::string& one : known) absl::StrAppend(&all, all.empty() ? "" : ", ", one);
-        return Wrong(entry.first,
-                     absl::StrCat("unknown key \"", key, "\"; those known here are ", all));
-      }
-      if (!seen.insert(key).second) {
-        return Wrong(entry.first, absl::StrCat("\"", key, "\" is given twice"));
-      }
-    }
-    return absl::OkStatus();
-  }
-
-  absl::StatusOr<std::string> Text(const YAML::Node& node, const std::string& key) const {
-    if (!node.IsScalar() || node.Scalar().empty()) return Wrong(node, key + " is no word");
-    if (node.Scalar().find('\0') == std::string::npos) return node.Scalar();
-    return Wrong(node, key + " has a byte 0 in it, which no name has");
-  }
 
   absl::StatusOr<TimeNs> Age(const YAML::Node& node, const std::string& key) const {
     DSG_ASSIGN_OR_RETURN(const std::string text, Text(node, key));
@@ -143,17 +101,6 @@ class PolicyReader {
       DSG_ASSIGN_OR_RETURN(numbers[static_cast<Eigen::Index>(i)], Number(node[i], key));
     }
     return Box3d(numbers.head<3>(), numbers.tail<3>());
-  }
-
-  absl::StatusOr<std::vector<std::string>> Words(const YAML::Node& node,
-                                                 const std::string& key) const {
-    if (!node.IsSequence()) return Wrong(node, key + " is no list");
-    std::vector<std::string> words;
-    for (const YAML::Node& item : node) {
-      DSG_ASSIGN_OR_RETURN(std::string word, Text(item, key));
-      words.push_back(std::move(word));
-    }
-    return words;
   }
 
   // The keys of which a policy has exactly one.
@@ -260,46 +207,18 @@ class PolicyReader {
     if (!valid.ok()) return Wrong(item, std::string(valid.message()));
     return policy;
   }
-
-  const std::string name_;
 };
 
 }  // namespace
 
 absl::StatusOr<PolicyFile> ParsePolicyFile(std::string_view text, const std::string& name) {
-  PolicyReader reader(name);
-  const auto brackets =
-      std::count_if(text.begin(), text.end(), [](char c) { return c == '[' || c == '{'; });
-  if (text.size() > kFileBytesMax || static_cast<size_t>(brackets) > kBracketsMax) {
-    return reader.Wrong(YAML::Mark(), "the file is too large for a file of policies");
-  }
-  try {
-    const YAML::Node root = YAML::Load(std::string(text));
-    if (const auto line = FindSecondYamlDocument(text)) {
-      YAML::Mark begin;
-      begin.line = *line;
-      return reader.Wrong(begin, "a second document begins here; write all policies into one list");
-    }
-    return reader.Read(root);
-  } catch (const YAML::Exception& error) {
-    return reader.Wrong(error.mark, error.msg);
-  }
+  const PolicyReader reader(name);
+  DSG_ASSIGN_OR_RETURN(const YAML::Node root, reader.Parse(text));
+  return reader.Read(root);
 }
 
 absl::StatusOr<PolicyFile> ReadPolicyFile(const std::string& path) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) {
-    return absl::NotFoundError(absl::StrCat("policy file ", path, " cannot be read: ",
-                                            error ? error.message() : "it is no plain file"));
-  }
-  std::ifstream in(path, std::ios::binary);
-  // Reads one byte above the limit, so that ParsePolicyFile sees that the file is too large.
-  std::string text(kFileBytesMax + 1, '\0');
-  in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (!in.is_open() || in.bad()) {
-    return absl::NotFoundError(absl::StrCat("policy file ", path, " cannot be read"));
-  }
-  text.resize(static_cast<size_t>(in.gcount()));
+  DSG_ASSIGN_OR_RETURN(const std::string text, ReadYamlText("policy file", path));
   return ParsePolicyFile(text, path);
 }
 
