@@ -50,6 +50,24 @@ std::string WordOf(dsg::v1::Lifetime lifetime) {
   }
 }
 
+// What changes something says who may do it; forgetting that must not let everybody.
+std::string RoleOf(const pb::MethodDescriptor& method) {
+  const bool reads = method.options().idempotency_level() == pb::MethodOptions::NO_SIDE_EFFECTS;
+  switch (method.options().GetExtension(dsg::v1::role)) {
+    case dsg::v1::ROLE_UNSPECIFIED:
+      if (!reads) Fail(method.full_name() + " may change something and has no role; give it one");
+      return "kReader";
+    case dsg::v1::ROLE_READER:
+      return "kReader";
+    case dsg::v1::ROLE_WRITER:
+      return "kWriter";
+    case dsg::v1::ROLE_MAINTAINER:
+      return "kMaintainer";
+    default:
+      return "kAdmin";
+  }
+}
+
 // The comment of a method in its proto, as a docstring inside a class.
 std::string CommentOf(const pb::MethodDescriptor& method) {
   pb::SourceLocation location;
@@ -80,7 +98,8 @@ Method ReadMethod(const pb::MethodDescriptor& method) {
       {"may_repeat", WordOf(options.idempotency_level() == pb::MethodOptions::NO_SIDE_EFFECTS)},
       {"writes", WordOf(method.service()->options().GetExtension(dsg::v1::writes))},
       {"waits", WordOf(options.GetExtension(dsg::v1::waits_for_memory))},
-      {"lifetime", WordOf(options.GetExtension(dsg::v1::lifetime))}};
+      {"lifetime", WordOf(options.GetExtension(dsg::v1::lifetime))},
+      {"role", RoleOf(method)}};
   return made;
 }
 
@@ -184,7 +203,7 @@ void WriteApi(const std::vector<Method>& methods, const std::string& folder) {
   const char info[] =
       "inline constexpr MethodInfo k$Name${.service = \"$Service$\", .name = \"$Name$\",\n"
       "    .may_repeat = $may_repeat$, .writes = $writes$, .waits_for_memory = $waits$,\n"
-      "    .lifetime = Lifetime::$lifetime$};\n";
+      "    .lifetime = Lifetime::$lifetime$, .role = Role::$role$};\n";
   out.Each(methods, info, info);
   out.Raw(
       "}  // namespace methods\n\n"

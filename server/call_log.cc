@@ -38,6 +38,7 @@ void CallLog::Write(const CallRecord& record) const {
        {"rows", absl::StrCat(record.row_count)},
        {"us", absl::StrCat(us)},
        {"peer", record.peer},
+       {"caller", record.caller},
        {"message", CutText(message, kMessageBytesMax)}});
 }
 

@@ -29,6 +29,8 @@ struct CallRecord {
   int64_t row_count = 0;
   std::chrono::steady_clock::duration elapsed{};
   std::string peer;
+  /// Empty where nobody asked, or knows.
+  std::string caller;
 };
 
 /// Number of entries in a reply or in one message of a stream: the elements of all its repeated

@@ -7,6 +7,8 @@
 #include <string_view>
 
 #include "query/service/service_core.h"
+#include "server/access/access_control.h"
+#include "server/access/call_audit.h"
 #include "server/arena_blocks.h"
 #include "server/arrivals.h"
 #include "server/call_guard.h"
@@ -29,6 +31,8 @@ struct CallRuntime {
   WorkerPool* workers = nullptr;
   CallGuard* guard = nullptr;
   CallLog log{false};
+  const AccessControl* access = nullptr;
+  CallAudit* audit = nullptr;
   Connections* connections = nullptr;
   /// Requests that have not arrived completely.
   Arrivals* arrivals = nullptr;

@@ -22,11 +22,13 @@ uint64_t CookieOf(int fd) {
 
 }  // namespace
 
-std::shared_ptr<Connection> Connections::Add(int fd, const std::string& peer) {
+std::shared_ptr<Connection> Connections::Add(int fd, const std::string& peer,
+                                             const Peer& identity) {
   auto connection = std::make_shared<Connection>();
   connection->fd = fd;
   connection->cookie = CookieOf(fd);
   connection->peer = peer;
+  connection->identity = identity;
   std::lock_guard lock(mutex_);
   by_fd_.erase(fd);
   if (by_fd_.size() >= static_cast<size_t>(limits_.connection_max)) Sweep();

@@ -12,6 +12,8 @@
 #include <string>
 #include <unordered_map>
 
+#include "server/access/access_control.h"
+
 namespace dsg::server {
 
 /// One connection, from its accept until its last call has ended.
@@ -22,6 +24,8 @@ struct Connection {
   uint64_t cookie = 0;
   /// Address of the peer, as the log shows it.
   std::string peer;
+  /// Who it is, as far as the connection tells.
+  Peer identity;
   std::atomic<int> call_count{0};
   /// The part of CallMemory that its calls hold.
   std::atomic<size_t> waiting_bytes{0};
@@ -59,7 +63,8 @@ class Connections {
   explicit Connections(const ConnectionLimits& limits) : limits_(limits) {}
 
   /// Registers an accepted socket before it is used. nullptr when there are too many.
-  [[nodiscard]] std::shared_ptr<Connection> Add(int fd, const std::string& peer);
+  [[nodiscard]] std::shared_ptr<Connection> Add(int fd, const std::string& peer,
+                                                const Peer& identity = {});
   /// The connection of a call; `name` is the peer name that gRPC gives.
   std::shared_ptr<Connection> Find(const std::string& name);
 

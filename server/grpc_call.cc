@@ -16,13 +16,24 @@
 #include "server/status_mapping.h"
 
 namespace dsg::server {
+namespace {
+
+std::string_view AuthorizationOf(const grpc::CallbackServerContext& context) {
+  const auto found = context.client_metadata().find("authorization");
+  if (found == context.client_metadata().end()) return {};
+  return {found->second.data(), found->second.size()};
+}
+
+}  // namespace
 
 GrpcCall::GrpcCall(const Method* method, grpc::CallbackServerContext* context)
     : runtime_(method->runtime),
       context_(context),
       connection_(runtime_->connections->Find(context->peer())),
       call_(method->make(method, this, connection_, context->deadline())) {
-  if (!call_->Admit()) return;
+  if (!call_->Admit(runtime_->access->Identify(connection_->identity, AuthorizationOf(*context)))) {
+    return;
+  }
   // gRPC ends only calls whose caller set a deadline, and no handler runs meanwhile.
   if (!ends_stalled()) {
     arrival_guard_ = runtime_->guard->Guard(ender(), BoundDeadline(context->deadline()));

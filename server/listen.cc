@@ -222,10 +222,12 @@ absl::StatusOr<std::unique_ptr<UnixSocketClaim>> UnixSocketClaim::Take(const std
 
 UnixSocketClaim::~UnixSocketClaim() { close(lock_fd_); }
 
-absl::StatusOr<std::unique_ptr<Acceptor>> Acceptor::Listen(const ListenAddress& address) {
+absl::StatusOr<std::unique_ptr<Acceptor>> Acceptor::Listen(const ListenAddress& address,
+                                                           unsigned socket_mode) {
   std::unique_ptr<Acceptor> acceptor(new Acceptor(address));
   if (acceptor->wakeup_fd_ < 0) return ListenError(address, std::strerror(errno));
-  DSG_RETURN_IF_ERROR(address.is_unix() ? acceptor->ListenOnSocket() : acceptor->ListenOnHost());
+  DSG_RETURN_IF_ERROR(address.is_unix() ? acceptor->ListenOnSocket(socket_mode)
+                                        : acceptor->ListenOnHost());
   return acceptor;
 }
 
@@ -237,7 +239,7 @@ Acceptor::~Acceptor() {
   if (wakeup_fd_ >= 0) close(wakeup_fd_);
 }
 
-absl::Status Acceptor::ListenOnSocket() {
+absl::Status Acceptor::ListenOnSocket(unsigned socket_mode) {
   const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   if (fd < 0) return ListenError(address_, std::strerror(errno));
   sockaddr_un address{};
@@ -245,7 +247,7 @@ absl::Status Acceptor::ListenOnSocket() {
   std::memcpy(address.sun_path, address_.socket_path.c_str(), address_.socket_path.size());
   const PrivateFiles private_files;
   if (bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0 ||
-      listen(fd, kBacklog) != 0) {
+      chmod(address_.socket_path.c_str(), socket_mode) != 0 || listen(fd, kBacklog) != 0) {
     const std::string why = std::strerror(errno);
     close(fd);
     return ListenError(address_, why);

@@ -31,7 +31,7 @@ struct ListenAddress {
 };
 
 /// Reads "unix:PATH" or "HOST:PORT"; port 0 takes a free port. Only loopback hosts are accepted
-/// unless `allow_remote`, because the server does not authenticate callers.
+/// unless `allow_remote`, because nothing is encrypted.
 ///
 /// Errors: INVALID_ARGUMENT/FIELD_INVALID for another form, a path too long for a socket, and for a
 /// host that is not loopback unless `allow_remote`.
@@ -66,11 +66,12 @@ class Acceptor {
   /// it. Called on the acceptor's thread.
   using Take = std::function<void(int fd, const std::string& peer)>;
 
-  /// Listens. Clients can connect from now on; their connections wait for Start. A unix socket is
-  /// accessible to its user only, and Stop removes it.
+  /// Listens. Clients can connect from now on; their connections wait for Start. `socket_mode`: who
+  /// may connect to a unix socket, by default its user only; Stop removes it.
   ///
   /// Errors: UNAVAILABLE with the address and the system's reason.
-  static absl::StatusOr<std::unique_ptr<Acceptor>> Listen(const ListenAddress& address);
+  static absl::StatusOr<std::unique_ptr<Acceptor>> Listen(const ListenAddress& address,
+                                                          unsigned socket_mode = 0600);
   ~Acceptor();
   Acceptor(const Acceptor&) = delete;
   Acceptor& operator=(const Acceptor&) = delete;
@@ -84,7 +85,7 @@ class Acceptor {
 
  private:
   explicit Acceptor(ListenAddress address);
-  absl::Status ListenOnSocket();
+  absl::Status ListenOnSocket(unsigned socket_mode);
   absl::Status ListenOnHost();
   void Run();
   void Accept(int listener);

@@ -26,6 +26,7 @@
 #include "schema/program/manual.h"
 #include "schema/retention/policy_file.h"
 #include "schema/store/graph_store.h"
+#include "server/access/access_control.h"
 #include "server/prune_schedule.h"
 #include "server/server.h"
 
@@ -46,6 +47,17 @@ struct Flags {
   std::string reflection = "local";
   dsg::server::ServerOptions options;
 };
+
+// The server keeps the digest alone.
+void TellNewToken() {
+  const absl::StatusOr<std::string> token = dsg::server::MakeToken();
+  if (!token.ok()) throw CLI::RuntimeError(std::string(token.status().message()), 2);
+  std::printf(
+      "token, for the caller's token file (chmod 600):\n%s\n"
+      "line for the server's access file:\ntoken_sha256: %s\n",
+      token->c_str(), dsg::server::Sha256OfToken(*token).c_str());
+  throw CLI::Success();
+}
 
 void DeclareFlags(CLI::App* app, Flags* flags) {
   app->add_option("--store", flags->store, "Folder of the maps; created if missing")
@@ -94,8 +106,30 @@ void DeclareFlags(CLI::App* app, Flags* flags) {
   app->add_option("--log-level", flags->log_level,
                   "debug (every call), info (errors and calls over 100 ms), warning, error")
       ->capture_default_str();
+}
+
+// Who may call, and how.
+void DeclareAccessFlags(CLI::App* app, Flags* flags) {
   app->add_flag("--allow-remote", flags->options.allow_remote,
-                "Listen on addresses that other machines reach; callers are not authenticated");
+                "Listen on addresses that other machines reach; nothing is encrypted");
+  app->add_option("--access", flags->options.access_file,
+                  "File that says who may call and do what (docs/access.md); read again on SIGHUP. "
+                  "Without it everybody who reaches the server may do everything");
+  CLI::Option* const audit = app->add_option(
+      "--audit", flags->options.audit_file,
+      "Write who changed which map into this file, and who was refused; `dsg audit` "
+      "reads it");
+  app->add_option("--audit-key", flags->options.audit_key_file,
+                  "Key that seals --audit, so that who changes the file cannot hide it; only you "
+                  "may read it")
+      ->needs(audit);
+  app->add_option_function<std::string>(
+         "--socket-mode",
+         [flags](const std::string& mode) {
+           flags->options.socket_mode = static_cast<unsigned>(std::stoul(mode, nullptr, 8));
+         },
+         "Who may connect to the unix socket: 600 its user (default), 660 its group, too, 666 all")
+      ->check(CLI::IsMember({"600", "660", "666"}));
   app->add_option("--reflection", flags->reflection,
                   "Tell gRPC clients the protos: local = on a unix socket or loopback only")
       ->check(CLI::IsMember({"local", "on", "off"}))
@@ -110,6 +144,9 @@ void DeclareFlags(CLI::App* app, Flags* flags) {
   app->add_flag("--http-write", flags->options.http.may_write, "Let HTTP clients change maps, too");
   app->add_flag("--http-no-token", flags->options.http.without_token,
                 "Answer HTTP clients without a token: every user of this machine reads every map");
+  app->add_flag_callback("--new-token", TellNewToken,
+                         "Make a token for a caller, and the line of it for --access; then end")
+      ->trigger_on_parse();
   app->set_version_flag("--version", DSG_VERSION);
 }
 
@@ -140,6 +177,7 @@ sigset_t BlockStopSignals() {
   sigemptyset(&signals);
   sigaddset(&signals, SIGTERM);
   sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   signal(SIGPIPE, SIG_IGN);
   return signals;
@@ -152,6 +190,23 @@ void StartWatchdog() {
     dsg::Log(dsg::LogLevel::kError, "stop took too long", {{"exit", "3"}});
     _exit(3);
   }).detach();
+}
+
+// What was in force stays in force if the files are wrong.
+void Reload(dsg::server::Server* server) {
+  const absl::Status status = server->Reload();
+  dsg::Log(status.ok() ? dsg::LogLevel::kInfo : dsg::LogLevel::kError,
+           status.ok() ? "read the access file again" : "the access file is not taken",
+           {{"why", std::string(status.message())}});
+}
+
+// The signal that ends the server.
+int AwaitStop(const sigset_t& signals, dsg::server::Server* server) {
+  int received = 0;
+  while (sigwait(&signals, &received) != 0 || received == SIGHUP) {
+    if (received == SIGHUP) Reload(server);
+  }
+  return received;
 }
 
 // Runs a PruneSchedule on a thread until destroyed.
@@ -224,8 +279,7 @@ int Serve(Flags flags) {
   }
   std::fflush(stdout);
 
-  int received = 0;
-  sigwait(&signals, &received);
+  const int received = AwaitStop(signals, server->get());
   dsg::Log(dsg::LogLevel::kInfo, "stopping", {{"signal", strsignal(received)}});
   StartWatchdog();
   pruning.reset();
@@ -245,6 +299,7 @@ int main(int argc, char** argv) {
   CLI::App app("Serves the maps of a store folder over gRPC, and over HTTP if asked to.",
                "dsg-server");
   DeclareFlags(&app, &flags);
+  DeclareAccessFlags(&app, &flags);
   dsg::AddManual(&app, DSG_VERSION);
   if (const std::optional<int> end = dsg::ReadCommandLine(argc, argv, &app)) return *end;
   if (!dsg::SetLogLevel(flags.log_level)) {

@@ -23,6 +23,7 @@ Method DescribeMethod(const query::MethodInfo& info, CallRuntime* runtime) {
   method.info = info;
   method.request = Request::descriptor();
   method.cost = std::make_unique<const RequestCost>(Request::descriptor());
+  method.maps = std::make_unique<const MapFields>(*Request::descriptor(), info.role);
   method.runtime = runtime;
   return method;
 }

@@ -56,10 +56,25 @@ ServedCall::ServedCall(const Method* method, CallWire* wire, std::shared_ptr<Con
 
 ServedCall::~ServedCall() { runtime().connections->EndCall(connection_.get()); }
 
-bool ServedCall::Admit() {
-  if (runtime().connections->BeginCall(connection_.get())) return true;
-  Refuse(OverloadedError("the connection has more calls than it may have, and was closed"));
+bool ServedCall::Admit(absl::StatusOr<std::shared_ptr<const Caller>> caller) {
+  absl::Status status = caller.status();
+  if (!runtime().connections->BeginCall(connection_.get())) {
+    status = OverloadedError("the connection has more calls than it may have, and was closed");
+  } else if (status.ok()) {
+    caller_ = *std::move(caller);
+    status = CheckRole();
+  }
+  if (status.ok()) return true;
+  Refuse(status);
   return false;
+}
+
+absl::Status ServedCall::CheckRole() const {
+  const query::Role needed = method_->info.role;
+  if (caller_->HighestRole() >= needed) return absl::OkStatus();
+  return absl::PermissionDeniedError(absl::StrCat(
+      "\"", caller_->name(), "\" has the role ", std::string(NameOf(needed)), " in no map, and ",
+      std::string(method_->info.name), " needs it; ask who keeps the server's access file"));
 }
 
 void ServedCall::Begin() {
@@ -94,6 +109,7 @@ void ServedCall::Run() {
 
 void ServedCall::Refuse(const absl::Status& status) {
   LogEnd("", status, 0, 0);
+  EndAudit("", status, 0);
   FinishRefused(status);
 }
 
@@ -139,11 +155,26 @@ absl::Status ServedCall::Parse(Message* request) {
   const bool is_parsed = request->ParseFromZeroCopyStream(wire_->OpenRequest().get());
   wire_->Drop();
   memory_.StopWaiting();
-  return is_parsed ? absl::OkStatus() : UnreadableError(*request, request_bytes_);
+  if (!is_parsed) return UnreadableError(*request, request_bytes_);
+  return method_->maps->Check(*caller_, *request);
 }
 
 absl::Status ServedCall::ForCaller(const absl::Status& status) const {
   return HideFolder(status, method_->runtime->store_folder);
+}
+
+AuditedCall ServedCall::Audited(std::string_view map) const {
+  const std::string_view caller = caller_ == nullptr ? std::string_view() : caller_->name();
+  return {&method_->info, caller, connection_->peer, map};
+}
+
+absl::Status ServedCall::BeginAudit(std::string_view map) const {
+  return method_->runtime->audit->Begin(Audited(map));
+}
+
+void ServedCall::EndAudit(std::string_view map, const absl::Status& status,
+                          int64_t revision) const {
+  method_->runtime->audit->End(Audited(map), status, revision);
 }
 
 bool ServedCall::WantsLog(const absl::Status& status) const {
@@ -155,7 +186,8 @@ void ServedCall::LogEnd(std::string_view map, const absl::Status& status, int64_
   const auto elapsed = query::CallContext::Clock::now() - begin_;
   const CallLog& log = method_->runtime->log;
   if (!log.Wants(status, elapsed)) return;
-  log.Write({method_->info.name, map, status, revision, row_count, elapsed, connection_->peer});
+  log.Write({method_->info.name, map, status, revision, row_count, elapsed, connection_->peer,
+             caller_ == nullptr ? std::string() : caller_->name()});
 }
 
 }  // namespace dsg::server

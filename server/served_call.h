@@ -12,6 +12,7 @@
 
 #include "absl/status/status.h"
 #include "query/api/method_info.h"
+#include "server/access/map_fields.h"
 #include "server/call_runtime.h"
 #include "server/call_wire.h"
 #include "server/request_cost.h"
@@ -30,6 +31,7 @@ struct Method {
   bool is_stream = false;
   const google::protobuf::Descriptor* request = nullptr;
   std::unique_ptr<const RequestCost> cost;
+  std::unique_ptr<const MapFields> maps;
   /// What its calls use.
   CallRuntime* runtime = nullptr;
   /// Makes a call on `wire`, which owns it.
@@ -46,8 +48,9 @@ class ServedCall : public Job {
   ServedCall(const ServedCall&) = delete;
   ServedCall& operator=(const ServedCall&) = delete;
 
-  /// Counts the call on its connection. False: it is refused, and has ended.
-  [[nodiscard]] bool Admit();
+  /// Counts the call on its connection, and asks whether its caller may call the method in any map.
+  /// False: it is refused, and has ended.
+  [[nodiscard]] bool Admit(absl::StatusOr<std::shared_ptr<const Caller>> caller);
   /// The request has come whole: charges for its bytes, and lets a worker take it.
   void Begin();
   /// The caller left before the request had come whole.
@@ -79,11 +82,16 @@ class ServedCall : public Job {
 
   /// Charges for the parsed request, parses it, and frees its bytes.
   ///
-  /// Errors: those of CallMemory; INVALID_ARGUMENT/FIELD_INVALID if the bytes do not parse.
+  /// Errors: those of CallMemory; INVALID_ARGUMENT/FIELD_INVALID if the bytes do not parse; those
+  /// of MapFields::Check.
   absl::Status Parse(google::protobuf::Message* request);
 
   /// An error as its caller may see it.
   absl::Status ForCaller(const absl::Status& status) const;
+  /// Before what the engine does; see CallAudit::Begin.
+  absl::Status BeginAudit(std::string_view map) const;
+  /// After it; also of a call that was refused.
+  void EndAudit(std::string_view map, const absl::Status& status, int64_t revision) const;
   /// Logs a call that ended with `status`, if CallLog wants it.
   void LogEnd(std::string_view map, const absl::Status& status, int64_t revision,
               int64_t row_count) const;
@@ -93,9 +101,12 @@ class ServedCall : public Job {
   const Method& method() const { return *method_; }
   CallWire& wire() { return *wire_; }
   query::CallContext& call() { return call_; }
+  const Caller& caller() const { return *caller_; }
   CallMemory::Hold& memory() { return memory_; }
 
  private:
+  absl::Status CheckRole() const;
+  AuditedCall Audited(std::string_view map) const;
   absl::Status Charge(size_t bytes);
   // Memory of the parsed request in bytes; counting stops above `bytes_max`.
   size_t EstimateBytes(size_t bytes_max);
@@ -105,6 +116,8 @@ class ServedCall : public Job {
   const query::CallContext::Clock::time_point begin_ = query::CallContext::Clock::now();
   query::CallContext call_;
   const std::shared_ptr<Connection> connection_;
+  // Set by Admit.
+  std::shared_ptr<const Caller> caller_;
   CallMemory::Hold memory_;
   size_t request_bytes_ = 0;
   // What the call ends with when Run comes again.

@@ -99,6 +99,13 @@ ConnectionLimits LimitsOfConnections(const ServerOptions& options) {
   return limits;
 }
 
+absl::StatusOr<std::unique_ptr<CallAudit>> OpenAudit(const ServerOptions& options) {
+  if (options.audit_file.empty()) return std::make_unique<CallAudit>(nullptr);
+  DSG_ASSIGN_OR_RETURN(const std::string key, ReadAuditKey(options.audit_key_file));
+  DSG_ASSIGN_OR_RETURN(std::unique_ptr<AuditLog> log, AuditLog::Open(options.audit_file, key));
+  return std::make_unique<CallAudit>(std::move(log));
+}
+
 class RunningServer final : public Server {
  public:
   RunningServer(std::unique_ptr<query::ServiceCore> core, const ServerOptions& options)
@@ -120,12 +127,16 @@ class RunningServer final : public Server {
   ~RunningServer() override { Shutdown(std::chrono::seconds(1)); }
 
   absl::Status Listen(const ServerOptions& options) {
+    DSG_ASSIGN_OR_RETURN(access_, AccessControl::Open(options.access_file));
+    questions_.access = commits_.access = access_.get();
+    DSG_ASSIGN_OR_RETURN(audit_, OpenAudit(options));
+    questions_.audit = commits_.audit = audit_.get();
     DSG_ASSIGN_OR_RETURN(ListenAddress address,
                          ParseListenAddress(options.listen, options.allow_remote));
     if (address.is_unix()) {
       DSG_ASSIGN_OR_RETURN(claim_, UnixSocketClaim::Take(address.socket_path));
     }
-    DSG_ASSIGN_OR_RETURN(acceptor_, Acceptor::Listen(address));
+    DSG_ASSIGN_OR_RETURN(acceptor_, Acceptor::Listen(address, options.socket_mode));
     if (!options.http.listen.empty()) {
       DSG_ASSIGN_OR_RETURN(
           http_port_, HttpPort::Listen(options.http, options.allow_remote, options.reader_stall_max,
@@ -142,7 +153,8 @@ class RunningServer final : public Server {
     }
     grpc_services_.ReportServing(grpc_server_.get());
     acceptor_->Start([this](int fd, const std::string& peer) {
-      if (connections_.Add(fd, peer) != nullptr) {
+      const Peer identity = acceptor_->address().is_unix() ? PeerOfUnixSocket(fd) : Peer();
+      if (connections_.Add(fd, peer, identity) != nullptr) {
         grpc::AddInsecureChannelFromFd(grpc_server_.get(), fd);
       } else {
         close(fd);
@@ -160,6 +172,8 @@ class RunningServer final : public Server {
     const auto [running_count, queued_count] = workers_.Load();
     return {running_count, queued_count, questions_.open_stream_count, questions_.open_watch_count};
   }
+
+  absl::Status Reload() override { return access_->Reload(); }
 
   void Shutdown(std::chrono::milliseconds grace) override {
     if (grpc_server_ != nullptr) {
@@ -203,6 +217,8 @@ class RunningServer final : public Server {
   // Ordered by dependence: later members use earlier ones and are destroyed first.
   std::unique_ptr<query::ServiceCore> core_;
   std::unique_ptr<UnixSocketClaim> claim_;
+  std::unique_ptr<AccessControl> access_;
+  std::unique_ptr<CallAudit> audit_;
   WorkerPool workers_;
   WorkerPool commit_workers_;
   Timer timer_;

@@ -41,6 +41,13 @@ struct ServerOptions {
   size_t call_memory_bytes = size_t{256} << 20;
   /// A stream or watch ends when its reader takes no message for this long.
   std::chrono::milliseconds reader_stall_max{30'000};
+  /// Who may call, and do what: a path for AccessControl::Open; empty = everybody everything.
+  std::string access_file;
+  /// Where it is written who changed what; empty = nowhere. The key seals it; empty = none.
+  std::string audit_file;
+  std::string audit_key_file;
+  /// Of a unix socket: who may connect, as chmod has it. Who may do what is for `access_file`.
+  unsigned socket_mode = 0600;
   /// Listen on addresses that other machines can reach.
   bool allow_remote = false;
   Reflection reflection = Reflection::kLocal;
@@ -85,6 +92,9 @@ class Server {
   virtual std::string http_url() const = 0;
 
   virtual ServerLoad Load() const = 0;
+
+  /// Takes the access file as it is now. Errors: those of AccessControl::Reload.
+  virtual absl::Status Reload() = 0;
 
   /// Reports not-ready, accepts no more calls, lets running calls end within `grace`, cancels the
   /// rest and joins the workers. Further calls do nothing. Must not be called from a handler.

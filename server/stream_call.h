@@ -91,6 +91,7 @@ class StreamCall final : public ServedCall {
     if (!ends_by_itself && runtime().stopping) return ShuttingDownError();
     if (cursor_ == nullptr) {
       DSG_RETURN_IF_ERROR(Parse(&request_));
+      DSG_RETURN_IF_ERROR(BeginAudit(request_.map()));
       DSG_ASSIGN_OR_RETURN(cursor_, (runtime().core->*open_)(call(), request_));
     }
     return cursor_->Wait();
@@ -129,6 +130,7 @@ class StreamCall final : public ServedCall {
   absl::Status LastWords(absl::Status status) {
     if (const absl::Status verdict = place_->verdict(); !verdict.ok()) status = verdict;
     LogEnd(request_.map(), status, revision_, row_count_);
+    EndAudit(request_.map(), status, revision_);
     return ForCaller(status);
   }
 

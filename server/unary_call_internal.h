@@ -5,6 +5,7 @@
 
 #include <google/protobuf/arena.h>
 
+#include <algorithm>
 #include <memory>
 #include <string_view>
 #include <utility>
@@ -25,6 +26,21 @@ std::string_view MapOf(const Request& request) {
     return request.map();
   } else {
     return {};
+  }
+}
+
+/// Takes the maps out of a list that its reader must not know of.
+template <typename Reply>
+void HideMaps(const Caller& caller, Reply* reply) {
+  if constexpr (requires { reply->mutable_unreadable_maps(); }) {
+    auto* const maps = reply->mutable_maps();
+    maps->erase(std::remove_if(maps->begin(), maps->end(),
+                               [&](const auto& map) { return !caller.RoleIn(map.name()); }),
+                maps->end());
+    auto* const unreadable = reply->mutable_unreadable_maps();
+    unreadable->erase(std::remove_if(unreadable->begin(), unreadable->end(),
+                                     [&](const auto& map) { return !caller.RoleIn(map); }),
+                      unreadable->end());
   }
 }
 
@@ -94,6 +110,7 @@ class UnaryCall final : public ServedCall {
     auto* const request = google::protobuf::Arena::CreateMessage<Request>(&arena);
     auto* const reply = google::protobuf::Arena::CreateMessage<Reply>(&arena);
     const absl::Status status = AnswerOn(request, reply);
+    EndAudit(MapOf(*request), status, RevisionOf(*reply));
     if (WantsLog(status)) {
       LogEnd(MapOf(*request), status, RevisionOf(*reply), status.ok() ? RowCountOf(*reply) : 0);
     }
@@ -104,7 +121,9 @@ class UnaryCall final : public ServedCall {
     // Do not begin a call whose deadline has passed or whose caller has left.
     DSG_RETURN_IF_ERROR(call().Check());
     DSG_RETURN_IF_ERROR(Parse(request));
+    DSG_RETURN_IF_ERROR(BeginAudit(MapOf(*request)));
     DSG_RETURN_IF_ERROR((runtime().core->*ask_)(call(), *request, reply));
+    HideMaps(caller(), reply);
     DSG_RETURN_IF_ERROR(wire().Pack(*reply));
     return memory().Resize(wire().packed_bytes());
   }

@@ -347,12 +347,12 @@ absl::StatusOr<std::string> CreateMap(Connection& connection, const MapSpec& spe
 absl::StatusOr<std::unique_ptr<RemoteMap>> OpenRemoteMap(const std::string& address,
                                                          const MapSpec& spec,
                                                          const RemoteOptions& options) {
-  DSG_ASSIGN_OR_RETURN(
-      std::unique_ptr<query::Api> api,
-      client::Connect(client::ServerAddress{.address = address,
-                                            .repeats = false,
-                                            .keeps_alive = true,
-                                            .receive_bytes_max = kReceiveBytesMax}));
+  DSG_ASSIGN_OR_RETURN(std::unique_ptr<query::Api> api,
+                       client::Connect(client::ServerAddress{.address = address,
+                                                             .repeats = false,
+                                                             .keeps_alive = true,
+                                                             .receive_bytes_max = kReceiveBytesMax,
+                                                             .credentials = options.credentials}));
   auto connection = std::make_unique<Connection>(std::move(api), address, options);
   DSG_ASSIGN_OR_RETURN(std::optional<MapSpec> found, FindMap(*connection, spec.name));
   std::string incarnation;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "query/client/credentials.h"
 #include "query/client/retry.h"
 #include "schema/model/layer.h"
 #include "schema/model/node.h"
@@ -57,6 +58,8 @@ struct RemoteOptions {
   /// Gets a sentence when a server does not answer, every few seconds while it does not, and when
   /// it does again. May be empty.
   client::TellWait tell;
+  /// How the server knows who calls.
+  client::Credentials credentials;
 };
 
 /// Opens a map on the server at `address` ("unix:PATH" or "HOST:PORT"), creating it from `spec`

@@ -11,6 +11,7 @@
 #include "ingest/config/option_flags.h"
 #include "ingest/log/format.h"
 #include "ingest/pipeline/robot_model.h"
+#include "query/client/credential_flags.h"
 #include "schema/base/byte_size.h"
 #include "schema/base/status.h"
 
@@ -82,6 +83,7 @@ void AddIngestFlags(CLI::App* app, IngestFlags* flags) {
   app->add_option(
       "--server", flags->server,
       "Commit through this dsg-server (unix:PATH or HOST:PORT); --store is not touched");
+  client::AddCredentialFlags(app, &flags->credentials);
   app->add_option("--retry-for", flags->retry_for,
                   "With --server: how long to wait for one that does not answer (90s, 10m, 24h); "
                   "the log waits too")

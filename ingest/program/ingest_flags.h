@@ -17,6 +17,7 @@
 #include "ingest/program/odometry_flags.h"
 #include "ingest/program/people_flags.h"
 #include "ingest/program/segmenter_flags.h"
+#include "query/client/credentials.h"
 
 namespace CLI {
 class App;
@@ -28,6 +29,7 @@ namespace dsg::ingest {
 struct IngestFlags {
   std::string store;
   std::string server;
+  client::CredentialFiles credentials;
   std::string retry_for = "10m";
   SpaceLimits limits;
   std::string spill_folder;

@@ -99,6 +99,7 @@ absl::StatusOr<std::unique_ptr<Destination>> OpenDestination(const IngestFlags& 
   if (flags.server.empty()) return OpenLocal(flags.store, spec, flags.limits);
   RemoteOptions options;
   DSG_ASSIGN_OR_RETURN(options.retry_ns_max, ParseRetryFor(flags.retry_for));
+  DSG_ASSIGN_OR_RETURN(options.credentials, client::ReadCredentials(flags.credentials));
   if (!flags.is_quiet) options.tell = SayAboveProgress;
   return OpenRemote(flags.server, spec, options);
 }

@@ -16,6 +16,9 @@ enum class Lifetime {
   kWork,
 };
 
+/// What a caller may do in a map; each includes those before it.
+enum class Role { kReader, kWriter, kMaintainer, kAdmin };
+
 struct MethodInfo {
   /// "QueryService", of the package dsg.v1.
   std::string_view service;
@@ -28,6 +31,8 @@ struct MethodInfo {
   /// A worker of the server may wait for memory.
   bool waits_for_memory = false;
   Lifetime lifetime = Lifetime::kAnswer;
+  /// What its caller needs in the map of the request.
+  Role role = Role::kAdmin;
 };
 
 }  // namespace dsg::query

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "query/client/credentials.h"
 
 namespace dsg::cli {
 
@@ -44,6 +45,8 @@ struct CommonOptions {
   /// At most one of the two is set.
   std::string store;
   std::string server;
+  /// How the server knows who calls.
+  client::CredentialFiles credentials;
   /// Empty = the only map of the store.
   std::string map;
   /// `map` comes from DSG_MAP.

@@ -13,6 +13,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "query/cli/export/top_view.h"
+#include "query/client/credential_flags.h"
 #include "schema/base/time.h"
 #include "schema/program/command_line.h"
 #include "schema/program/manual.h"
@@ -109,6 +110,7 @@ CLI::App* Grammar::AddApp(const std::string& name, const std::string& what,
   if (takes & kServer) {
     app->add_option("--server", common.server,
                     "unix:PATH or HOST:PORT of a dsg-server (or DSG_SERVER)");
+    client::AddCredentialFlags(app, &common.credentials, /*is_hidden=*/true);
     app->add_option("--timeout", common.timeout_s, "Deadline of each call, seconds")
         ->check(Between(0.001, 86400.0));
   }

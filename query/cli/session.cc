@@ -28,7 +28,11 @@ std::string PlaceOf(const CommonOptions& common) {
 constexpr size_t kCacheBytes = size_t{64} << 20;
 
 absl::StatusOr<std::unique_ptr<query::Api>> OpenApi(const CommonOptions& common) {
-  if (!common.server.empty()) return client::Connect(common.server);
+  if (!common.server.empty()) {
+    client::ServerAddress server{.address = common.server};
+    DSG_ASSIGN_OR_RETURN(server.credentials, client::ReadCredentials(common.credentials));
+    return client::Connect(server);
+  }
   const StoreOptions options{.cache_bytes = kCacheBytes, .program = "dsg"};
   DSG_ASSIGN_OR_RETURN(std::unique_ptr<GraphStore> store, OpenStore(common.store, options));
   return query::MakeServiceCore(std::move(store));

@@ -32,6 +32,7 @@ void AddSetVerb(Grammar* grammar);
 void AddCompletionVerb(Grammar* grammar);
 void AddViewVerb(Grammar* grammar);
 void AddHistoryVerbs(Grammar* grammar);
+void AddAuditVerb(Grammar* grammar);
 
 inline void AddAllVerbs(Grammar* grammar) {
   grammar->set_heading("Ask about people and robots");
@@ -64,6 +65,7 @@ inline void AddAllVerbs(Grammar* grammar) {
   AddPruneVerb(grammar);
   AddBackupVerbs(grammar);
   AddStoreVerbs(grammar);
+  AddAuditVerb(grammar);
 
   grammar->set_heading("In and out");
   AddImportVerb(grammar);

@@ -90,6 +90,9 @@ CallInFlight::CallInFlight(const CallContext& call, const ServerAddress& server,
                            const CallLimits& limits)
     : server_(server), limits_(limits) {
   context_.set_deadline(WallDeadline(call, limits.timeout));
+  if (const std::string& token = server.credentials.token; !token.empty()) {
+    context_.AddMetadata("authorization", absl::StrCat("Bearer ", token));
+  }
 }
 
 CallInFlight::~CallInFlight() {

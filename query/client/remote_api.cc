@@ -27,6 +27,19 @@ absl::Status BadAddress(const std::string& address, const std::string& why) {
                    {{"field", "address"}, {"value", address}});
 }
 
+// A unix socket needs no encryption.
+std::shared_ptr<grpc::ChannelCredentials> ChannelCredentialsOf(const ServerAddress& server) {
+  const Credentials& own = server.credentials;
+  if (!own.has_tls() || absl::StartsWith(server.address, kUnixScheme)) {
+    return grpc::InsecureChannelCredentials();
+  }
+  grpc::SslCredentialsOptions options;
+  options.pem_root_certs = own.authorities_pem;
+  options.pem_cert_chain = own.certificate_pem;
+  options.pem_private_key = own.key_pem;
+  return grpc::SslCredentials(options);
+}
+
 }  // namespace
 
 absl::Status CheckAddress(const std::string& address) {
@@ -74,7 +87,7 @@ std::shared_ptr<grpc::Channel> MakeChannel(const ServerAddress& server) {
   // Addresses are local sockets; neither a proxy nor a DNS record may redirect them.
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   arguments.SetInt(GRPC_ARG_SERVICE_CONFIG_DISABLE_RESOLUTION, 1);
-  return grpc::CreateCustomChannel(server.address, grpc::InsecureChannelCredentials(), arguments);
+  return grpc::CreateCustomChannel(server.address, ChannelCredentialsOf(server), arguments);
 }
 
 absl::StatusOr<std::unique_ptr<query::Api>> Connect(const std::string& address) {

@@ -9,6 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "query/api/api.h"
+#include "query/client/credentials.h"
 
 namespace grpc {
 class Channel;
@@ -30,6 +31,8 @@ struct ServerAddress {
   /// attempt to connect may take seconds: for robots on a radio link.
   bool keeps_alive = false;
   int receive_bytes_max = kMessageBytesMax;
+  /// Shown with each call; nothing for servers that do not ask.
+  Credentials credentials;
 };
 
 /// Errors: INVALID_ARGUMENT/FIELD_INVALID.

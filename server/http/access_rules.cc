@@ -2,17 +2,14 @@
 #include "server/http/access_rules.h"
 
 #include <openssl/crypto.h>
-#include <sys/random.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <utility>
 
 #include "absl/strings/ascii.h"
-#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "server/access/access_control.h"
 #include "server/status_mapping.h"
 
 namespace dsg::server {
@@ -137,25 +134,13 @@ std::optional<Refusal> AccessRules::CheckOrigin(const RequestHead& head) const {
 
 std::optional<Refusal> AccessRules::CheckToken(const RequestHead& head) const {
   if (token_.empty()) return std::nullopt;
-  constexpr std::string_view kScheme = "Bearer ";
   const std::string_view shown = head.Find("authorization").value_or("");
-  if (shown.substr(0, kScheme.size()) == kScheme && IsSame(shown.substr(kScheme.size()), token_)) {
-    return std::nullopt;
-  }
+  if (IsSame(BearerToken(shown), token_)) return std::nullopt;
   return Refuse(401, absl::StatusCode::kUnauthenticated,
                 absl::StrCat(shown.empty() ? "the call shows no token" : "the token is wrong",
                              "; send \"Authorization: Bearer TOKEN\" with the token that "
                              "dsg-server printed when it started, after #token="),
                 "WWW-Authenticate: Bearer\r\n");
-}
-
-absl::StatusOr<std::string> MakeToken() {
-  char bytes[32];
-  if (getrandom(bytes, sizeof(bytes), 0) != sizeof(bytes)) {
-    return absl::InternalError(
-        absl::StrCat("no random bytes for the token: ", std::strerror(errno)));
-  }
-  return absl::WebSafeBase64Escape(absl::string_view(bytes, sizeof(bytes)));
 }
 
 }  // namespace dsg::server

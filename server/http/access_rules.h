@@ -41,9 +41,4 @@ class AccessRules {
   const std::string token_;
 };
 
-/// 256 random bits from the system as 43 characters of base64url.
-///
-/// Errors: INTERNAL with the system's reason.
-absl::StatusOr<std::string> MakeToken();
-
 }  // namespace dsg::server

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <variant>
 
 #include "server/http/connect.h"
@@ -15,6 +16,7 @@ struct CallPlan {
   const Method* method = nullptr;
   ConnectType type;
   CallerDeadline deadline = CallerDeadline::max();
+  std::shared_ptr<const Caller> caller;
   /// Longest body.
   size_t body_bytes_max = 0;
 };

@@ -35,7 +35,8 @@ class RunningPort final : public HttpPort {
               const MethodTable* methods, CallRuntime* calls) {
     sessions_.methods = methods;
     sessions_.calls = calls;
-    sessions_.may_write = options.may_write;
+    // Where callers have roles, these say who may write.
+    sessions_.may_write = options.may_write || calls->access->asks_who();
     sessions_.stall_max = stall_max;
   }
 
@@ -53,7 +54,8 @@ class RunningPort final : public HttpPort {
     }
     DSG_ASSIGN_OR_RETURN(acceptor_, Acceptor::Listen(address));
     std::string token;
-    if (!options.without_token && !address.is_unix()) {
+    const bool asks_who = sessions_.calls->access->asks_who();
+    if (!options.without_token && !address.is_unix() && !asks_who) {
       DSG_ASSIGN_OR_RETURN(token, MakeToken());
     }
     const ListenAddress& actual = acceptor_->address();
@@ -68,7 +70,8 @@ class RunningPort final : public HttpPort {
     LookLater();
     thread_ = std::thread([this] { sessions_.io.run(); });
     acceptor_->Start([this](int fd, const std::string& peer) {
-      auto connection = sessions_.calls->connections->Add(fd, peer);
+      const Peer identity = acceptor_->address().is_unix() ? PeerOfUnixSocket(fd) : Peer();
+      auto connection = sessions_.calls->connections->Add(fd, peer, identity);
       if (connection == nullptr) {
         close(fd);
         return;

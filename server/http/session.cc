@@ -218,6 +218,10 @@ std::optional<Refusal> Session::PlanOf(const RequestHead& head) {
   auto planned = PlanCall(*runtime_->methods, head, runtime_->may_write);
   if (auto* const refusal = std::get_if<Refusal>(&planned)) return std::move(*refusal);
   plan_ = std::get<CallPlan>(planned);
+  auto caller = runtime_->calls->access->Identify(connection_->identity,
+                                                  head.Find("authorization").value_or(""));
+  if (!caller.ok()) return Refusal{401, caller.status(), "WWW-Authenticate: Bearer\r\n"};
+  plan_.caller = *std::move(caller);
   if (body_bytes > plan_.body_bytes_max) {
     return TooLong(413, absl::StrCat("the body has ", body_bytes, " bytes, and at most ",
                                      plan_.body_bytes_max, " are taken; ask for less"));
@@ -266,7 +270,7 @@ void Session::BeginCall() {
   call_ = std::make_unique<HttpCall>(plan_, std::move(parser_->get().body()), std::move(place));
   if (call_->is_stream()) ++runtime_->open_stream_count;
   parser_.reset();
-  if (call_->served()->Admit()) call_->served()->Begin();
+  if (call_->served()->Admit(plan_.caller)) call_->served()->Begin();
 }
 
 void Session::SendFile() {

@@ -30,6 +30,7 @@ ALLOWED = {
     # The generator of query/api.
     "proto": [],
     "schema/base": [],
+    "schema/audit": BASE,
     "schema/files": BASE,
     "schema/program": BASE,
     "schema/model": BASE,
@@ -58,7 +59,8 @@ ALLOWED = {
     "ingest/pipeline": (SCHEMA + INGEST_SHARED + INGEST_ROOMS +
                         [f"ingest/{s}" for s in INGEST_STAGES if s not in ASIDE]),
     "ingest/program": SCHEMA + ["ingest/config", "ingest/files", "ingest/log", "ingest/commit",
-                                "ingest/pipeline", "ingest/alignment", "ingest/overlay"],
+                                "ingest/pipeline", "ingest/alignment", "ingest/overlay",
+                                "query/client"],
     # The calls as C++, and the one client: below both the programs of query and those of ingest.
     "query/api": BASE,
     "query/client": CODEC + ["query/api"],
@@ -68,9 +70,10 @@ ALLOWED = {
     "query/maintenance": SCHEMA + ["query/api", "query/engine", "schema/archive", "schema/merge",
                                    "schema/retention"],
     "query/service": STORE + ["query/api", "query/engine", "query/maintenance"],
-    "query/cli": SCHEMA + ["schema/archive", "schema/retention", "query/api", "query/maintenance",
-                           "query/service", "query/client"],
-    "server": SCHEMA + ["schema/retention", "query/api", "query/maintenance", "query/service"],
+    "query/cli": SCHEMA + ["schema/archive", "schema/audit", "schema/retention", "query/api",
+                           "query/maintenance", "query/service", "query/client"],
+    "server": SCHEMA + ["schema/audit", "schema/retention", "query/api", "query/maintenance",
+                        "query/service"],
     "tests": SCHEMA + ["ingest", "query", "server"],
 }
 # What users of the client library would include.
@@ -103,13 +106,14 @@ THIRD_PARTY = [
       "docs/examples *.cc", "proto", "tests"]),
     (r"fcl/", ["query/engine *.cc", "tests"]),
     (r"pcl/|opencv2?/|ceres/|gtsam/|embree3/|rosbag/|yaml-cpp/|nanoflann",
-     ["schema/retention *.cc", "ingest *.cc", "tests"]),
+     ["schema/files", "ingest *.cc", "tests"]),
     (r"spdlog/", ["schema/base *.cc"]),
-    (r"CLI/", ["schema/program *.cc", "ingest *.cc", "query/cli", "server *.cc", "tests"]),
+    (r"CLI/", ["schema/program *.cc", "ingest *.cc", "query/cli", "query/client *.cc",
+               "server *.cc", "tests"]),
     (r"GeographicLib/", ["query/cli/export *.cc"]),
     (r"png\.h$", ["schema/picture *.cc", "ingest/truth *.cc", "tests"]),
-    (r"nlohmann/", ["schema/interop", "schema/archive *.cc", "ingest *.cc", "query/cli *.cc",
-                    "server/http *.cc", "tests"]),
+    (r"nlohmann/", ["schema/interop", "schema/archive *.cc", "schema/audit *.cc", "ingest *.cc",
+                    "query/cli *.cc", "server/http *.cc", "tests"]),
     (r"boost/(asio|beast|system)/", ["server/http *.cc"]),
 ]
 

@@ -5,6 +5,8 @@
 
 #include <set>
 
+#include "server/access/access_control.h"
+
 namespace dsg::server {
 namespace {
 

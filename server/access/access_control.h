@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// Finds out who calls, from what the connection and the call show. Refuses to say what callers may
+// do: their Caller does.
+#pragma once
+
+#include <sys/types.h>
+
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "absl/status/statusor.h"
+#include "server/access/access_file.h"
+#include "server/access/caller.h"
+
+namespace dsg::server {
+
+/// What is known of the other end of a connection.
+struct Peer {
+  /// The user there, of a unix socket.
+  std::optional<uid_t> uid;
+  /// The name in its certificate, which was verified; empty without one.
+  std::string certificate;
+};
+
+/// Of a connection that was accepted on a unix socket. Not for other sockets of that family: those
+/// of a pair are the process's own.
+Peer PeerOfUnixSocket(int fd);
+
+/// Threads: safe from any thread.
+class AccessControl {
+ public:
+  /// Without a file everybody may do everything.
+  ///
+  /// Errors: those of ReadAccessFile.
+  static absl::StatusOr<std::unique_ptr<AccessControl>> Open(const std::string& path);
+
+  /// Takes the file as it is now. Calls that have begun keep what they may.
+  ///
+  /// Errors: those of ReadAccessFile; then what was read before stays in force.
+  absl::Status Reload();
+
+  /// A token goes before a certificate, and a certificate before a user. The user of the server,
+  /// and root, may do everything over a unix socket: they could open the maps' files.
+  /// `authorization`: the field of that name; empty without one.
+  ///
+  /// Errors: UNAUTHENTICATED with what to show.
+  absl::StatusOr<std::shared_ptr<const Caller>> Identify(const Peer& peer,
+                                                         std::string_view authorization) const;
+
+  bool asks_who() const { return !path_.empty(); }
+
+ private:
+  explicit AccessControl(std::string path) : path_(std::move(path)) {}
+  std::shared_ptr<const AccessFile> file() const;
+
+  const std::string path_;
+  mutable std::mutex mutex_;
+  /// Guarded by `mutex_`; null without a path.
+  std::shared_ptr<const AccessFile> file_;
+};
+
+/// 256 random bits from the system as 43 characters of base64url.
+///
+/// Errors: INTERNAL with the system's reason.
+absl::StatusOr<std::string> MakeToken();
+
+/// The token of an Authorization field of the scheme Bearer; empty if it is of another one.
+std::string_view BearerToken(std::string_view authorization);
+
+}  // namespace dsg::server

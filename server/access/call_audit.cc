@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/access/call_audit.h"
+
+#include <chrono>
+#include <utility>
+
+#include "schema/base/log.h"
+#include "schema/base/status.h"
+#include "server/status_mapping.h"
+
+namespace dsg::server {
+namespace {
+
+using query::Role;
+
+constexpr size_t kMapBytesMax = 100;
+
+bool Changes(const query::MethodInfo& method) { return method.role >= Role::kWriter; }
+
+TimeNs WallNow() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+}  // namespace
+
+absl::Status CallAudit::Begin(const AuditedCall& call) {
+  if (log_ == nullptr || !Changes(*call.method)) return absl::OkStatus();
+  const bool is_grave = call.method->role >= Role::kMaintainer;
+  if (!is_grave && !is_failing_) return absl::OkStatus();
+  return Append(call, "BEGUN", 0, /*must_last=*/true);
+}
+
+void CallAudit::End(const AuditedCall& call, const absl::Status& status, int64_t revision) {
+  if (log_ == nullptr) return;
+  const bool is_refused = absl::IsUnauthenticated(status) || absl::IsPermissionDenied(status);
+  if (!Changes(*call.method) && !is_refused) return;
+  const bool is_grave = call.method->role >= Role::kMaintainer;
+  Append(call, std::string(absl::StatusCodeToString(status.code())), revision, is_grave)
+      .IgnoreError();
+}
+
+absl::Status CallAudit::Append(const AuditedCall& call, std::string code, int64_t revision,
+                               bool must_last) {
+  AuditEntry entry;
+  entry.time_ns = WallNow();
+  entry.caller = std::string(call.caller);
+  entry.peer = std::string(call.peer);
+  entry.method = std::string(call.method->name);
+  entry.map = CutText(call.map, kMapBytesMax);
+  entry.code = std::move(code);
+  entry.revision = revision;
+  absl::Status status = log_->Append(std::move(entry), must_last);
+  if (is_failing_.exchange(!status.ok()) == status.ok()) {
+    Log(status.ok() ? LogLevel::kInfo : LogLevel::kError,
+        status.ok() ? "the audit log is written again"
+                    : "the audit log cannot be written; nothing is changed until it can",
+        {{"why", std::string(status.message())}});
+  }
+  return status;
+}
+
+}  // namespace dsg::server

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which calls stand in the audit log, and what happens while it cannot be written.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "absl/status/status.h"
+#include "query/api/method_info.h"
+#include "schema/audit/audit_log.h"
+
+namespace dsg::server {
+
+/// A call, as the log has it.
+struct AuditedCall {
+  const query::MethodInfo* method = nullptr;
+  /// Empty: nobody knows.
+  std::string_view caller;
+  std::string_view peer;
+  std::string_view map;
+};
+
+/// What changes something stands in the log with its outcome, and what was refused for who called;
+/// calls of maintainers and admins stand there on disk before they begin, too. While the log cannot
+/// be written nothing is changed.
+///
+/// Threads: safe from any thread.
+class CallAudit {
+ public:
+  /// `log` may be null: then nothing is written.
+  explicit CallAudit(std::unique_ptr<AuditLog> log) : log_(std::move(log)) {}
+
+  /// Before the work of a call. Errors: UNAVAILABLE, RESOURCE_EXHAUSTED/DISK_FULL of the log.
+  absl::Status Begin(const AuditedCall& call);
+  /// `revision`: that a change made; 0 for none.
+  void End(const AuditedCall& call, const absl::Status& status, int64_t revision);
+
+ private:
+  absl::Status Append(const AuditedCall& call, std::string code, int64_t revision, bool must_last);
+
+  const std::unique_ptr<AuditLog> log_;
+  std::atomic<bool> is_failing_{false};
+};
+
+}  // namespace dsg::server

@@ -1,0 +1,241 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Who may call a server: tokens of dsg and dsg-ingest, users of a unix socket, HTTP, and a file
+that changes while the server runs."""
+
+import contextlib
+import json
+import os
+import re
+import signal
+import unittest
+
+import http_port
+import support
+
+
+class Access(http_port.HttpTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.tokens = {name: cls.new_token(name) for name in ("asker", "robot", "stranger")}
+        cls.write_access(cls.callers())
+
+    @classmethod
+    def new_token(cls, name):
+        """Makes a token as docs/access.md says: a file of the caller, and a line for the server."""
+        lines = cls.ok("dsg-server", "--new-token").splitlines()
+        token, line = lines[1], lines[3]
+        path = cls.path(name + ".token")
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(token + "\n")
+        os.chmod(path, 0o600)
+        return {"token": token, "line": line, "path": path}
+
+    @classmethod
+    def callers(cls):
+        return ("callers:\n"
+                f"  - name: asker\n    {cls.tokens['asker']['line']}\n    role: reader\n"
+                f"  - name: robot\n    {cls.tokens['robot']['line']}\n    role: writer\n"
+                "    maps: [\"robot-*\"]\n")
+
+    @classmethod
+    def write_access(cls, text):
+        path = cls.path("access.yaml")
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(text)
+        os.chmod(path, 0o600)
+        return path
+
+    @contextlib.contextmanager
+    def served(self, *options, listen="unix:grpc.sock"):
+        """A server with the access file and an HTTP port. That it is ready tells its log: nobody
+        may ask it without a token."""
+        with open(self.path("server.log"), "w", encoding="utf-8") as log:
+            process = support.start("dsg-server", "--store", "store", "--listen", listen, "--http",
+                                    "127.0.0.1:0", "--access", "access.yaml", *options,
+                                    cwd=self.folder, log=log)
+        try:
+            self.wait_for_log("HTTP on")
+            yield process, http_port.Port(self.in_log(r"HTTP on (\S+)"), self.folder)
+            process.send_signal(signal.SIGTERM)
+            self.assertEqual(0, process.wait(timeout=support.TIMEOUT_S))
+        finally:
+            if process.poll() is None:
+                process.kill()
+                process.wait()
+
+    def in_log(self, pattern):
+        with open(self.path("server.log"), encoding="utf-8") as log:
+            return re.search(pattern, log.read()).group(1)
+
+    def grpc_address(self):
+        return self.in_log(r"listening on (\S+),")
+
+    def asked(self, name, *verb):
+        """A verb of dsg on the server, as the caller of that name."""
+        token = ["--token-file", self.tokens[name]["path"]] if name else []
+        return support.run("dsg", *verb, "--server", self.grpc_address(), *token,
+                           cwd=self.folder)
+
+    def test_who_has_a_role_gets_answers_and_who_has_none_a_reason(self):
+        with self.served(listen="127.0.0.1:0"):
+            done = self.asked("asker", "stats", "--map", "office")
+            self.assertEqual(0, done.returncode, done.stderr)
+            done = self.asked("", "stats", "--map", "office")
+            self.assertNotEqual(0, done.returncode)
+            self.assertIn("does not know who calls", done.stderr)
+            self.assertIn("--token-file", done.stderr)
+            done = self.asked("stranger", "stats", "--map", "office")
+            self.assertIn("the token is not known", done.stderr)
+            done = self.asked("asker", "drop", "office", "--yes")
+            self.assertNotEqual(0, done.returncode)
+            self.assertIn("has the role admin in no map", done.stderr)
+            # A map of others is one that does not exist.
+            done = self.asked("robot", "stats", "--map", "office")
+            self.assertIn("may see no map \"office\"", done.stderr)
+            done = self.asked("robot", "maps", "--json")
+            maps = json.loads(done.stdout)["maps"]
+            self.assertNotIn("office", [one["name"] for one in maps], done.stderr)
+        self.assertIn("office",
+                      [one["name"] for one in self.ask("maps", "--store", "store")["maps"]])
+
+    def test_a_robot_commits_to_maps_of_its_own(self):
+        log = self.simulate("more", people=2, seconds=10)
+        with self.served(listen="127.0.0.1:0"):
+            token = ["--token-file", self.tokens["robot"]["path"]]
+            server = ["--server", self.grpc_address()]
+            done = support.run("dsg-ingest", *server, *token, "--map", "robot-7", "--quiet", log,
+                               cwd=self.folder)
+            self.assertEqual(0, done.returncode, done.stderr)
+            done = support.run("dsg-ingest", *server, *token, "--map", "office", "--quiet", log,
+                               cwd=self.folder)
+            self.assertNotEqual(0, done.returncode)
+            self.assertIn("office", done.stderr)
+            done = self.asked("robot", "prune", "--map", "robot-7", "--older-than", "1s", "--yes")
+            self.assertNotEqual(0, done.returncode)
+
+    def test_the_user_of_the_server_needs_no_token_on_its_socket(self):
+        with self.served():
+            self.ok("dsg", "stats", "--map", "office", "--server", "unix:grpc.sock")
+            self.assertEqual(0o600, os.stat(self.path("grpc.sock")).st_mode & 0o777)
+            # A token that is shown counts, though.
+            self.refused(2, ["the token is not known"], "dsg", "stats", "--map", "office",
+                         "--server", "unix:grpc.sock", "--token-file", "stranger.token")
+
+    def test_http_asks_for_the_same_tokens(self):
+        with self.served() as (_, port):
+            self.assertEqual("", port.token)
+            self.assertEqual(401, port.ask("MapService/ListMaps", {})[0])
+            port.token = self.tokens["asker"]["token"]
+            status, _, body = port.ask("MapService/ListMaps", {})
+            self.assertEqual((200, "office"), (status, json.loads(body)["maps"][0]["name"]))
+            status, _, body = port.ask("MaintenanceService/SetTag", {"map": "office", "name": "x"})
+            self.assertEqual((403, "permission_denied"), (status, json.loads(body)["code"]))
+            port.token = self.tokens["robot"]["token"]
+            self.assertEqual(404, port.ask("QueryService/GetNode",
+                                           {"map": "office", "id": "R0"})[0])
+            port.token = "guess"
+            status, reply, _ = port.ask("MapService/ListMaps", {})
+            self.assertEqual((401, "Bearer"), (status, reply.headers["WWW-Authenticate"]))
+            # The viewer's files hold no data; its calls show the token behind #token=.
+            with contextlib.closing(port.connect()) as connection:
+                connection.request("GET", "/")
+                self.assertEqual(200, connection.getresponse().status)
+
+    def test_the_file_is_read_again_and_a_wrong_one_is_not_taken(self):
+        with self.served(listen="127.0.0.1:0") as (process, _):
+            self.assertNotEqual(0, self.asked("stranger", "maps").returncode)
+            self.write_access(self.callers() + "  - name: stranger\n    role: king\n")
+            process.send_signal(signal.SIGHUP)
+            self.wait_for_log("the access file is not taken")
+            self.assertEqual(0, self.asked("asker", "maps").returncode)
+            self.write_access(self.callers() + "  - name: stranger\n    role: reader\n    " +
+                              self.tokens["stranger"]["line"] + "\n")
+            process.send_signal(signal.SIGHUP)
+            self.wait_for_log("read the access file again")
+            self.assertEqual(0, self.asked("stranger", "maps").returncode)
+        self.write_access(self.callers())
+
+    def wait_for_log(self, words):
+        def is_there():
+            with open(self.path("server.log"), encoding="utf-8") as log:
+                return words in log.read()
+        support.wait_until(is_there, words)
+
+    def test_the_audit_log_tells_who_changed_what_and_who_was_refused(self):
+        key = self.path("audit.key")
+        with open(key, "wb") as file:
+            file.write(os.urandom(32))
+        os.chmod(key, 0o600)
+        log = self.simulate("audited", people=2, seconds=5)
+        audit = ("--audit", "audit.jsonl", "--audit-key", "audit.key")
+        for name in ("robot-8", "robot-9"):
+            with self.served(*audit, listen="127.0.0.1:0"):
+                done = support.run("dsg-ingest", "--server", self.grpc_address(), "--token-file",
+                                   self.tokens["robot"]["path"], "--map", name, "--quiet", log,
+                                   cwd=self.folder)
+                self.assertEqual(0, done.returncode, done.stderr)
+                self.asked("asker", "stats", "--map", "office")
+                self.asked("asker", "drop", "office", "--yes")
+                self.asked("stranger", "maps")
+        shown = self.ok("dsg", "audit", "audit.jsonl", "--key", "audit.key", "--json")
+        lines = [json.loads(line) for line in shown.splitlines()]
+        self.assertEqual(list(range(1, len(lines) + 1)), [line["number"] for line in lines])
+        told = {(line["caller"], line["method"], line["map"], line["code"]) for line in lines}
+        self.assertLessEqual({("robot", "CreateMap", "robot-8", "OK"),
+                              ("robot", "Commit", "robot-9", "OK"),
+                              ("asker", "DropMap", "", "PERMISSION_DENIED"),
+                              ("", "ListMaps", "", "UNAUTHENTICATED")}, told)
+        # Questions are in no log.
+        self.assertNotIn("SearchNodes", {line["method"] for line in lines})
+        commits = [line for line in lines if line["method"] == "Commit"]
+        self.assertTrue(all(line["revision"] > 0 for line in commits), commits)
+        table = self.ok("dsg", "audit", "audit.jsonl", "--key", "audit.key", "--caller", "asker")
+        self.assertIn("PERMISSION_DENIED", table)
+        chain = re.search(r"chain ([0-9a-f]{64})", table).group(1)
+        self.ok("dsg", "audit", "audit.jsonl", "--key", "audit.key", "--noted", chain)
+        self.refused(4, ["no line of the chain"], "dsg", "audit", "audit.jsonl", "--key",
+                     "audit.key", "--noted", "0" * 64)
+        with open(self.path("audit.jsonl"), encoding="utf-8") as file:
+            text = file.read()
+        with open(self.path("audit.jsonl"), "w", encoding="utf-8") as file:
+            file.write(text.replace('"robot"', '"asker"', 1))
+        self.refused(4, ["is not what was written"], "dsg", "audit", "audit.jsonl", "--key",
+                     "audit.key")
+        # A server adds nothing to it.
+        done = support.run("dsg-server", "--store", "store", "--listen", "127.0.0.1:0", *audit,
+                           cwd=self.folder)
+        self.assertEqual(2, done.returncode, done.stderr)
+
+    def test_secrets_are_not_taken_from_files_of_everybody_and_are_in_no_log(self):
+        path = self.tokens["asker"]["path"]
+        with self.served(listen="127.0.0.1:0"):
+            os.chmod(path, 0o644)
+            try:
+                done = self.asked("asker", "maps")
+            finally:
+                os.chmod(path, 0o600)
+            self.assertEqual(2, done.returncode, done.stderr)
+            self.assertIn("chmod 600", done.stderr)
+            self.asked("asker", "maps")
+            self.asked("stranger", "maps")
+        with open(self.path("server.log"), encoding="utf-8") as log:
+            text = log.read()
+        for name, made in self.tokens.items():
+            self.assertNotIn(made["token"], text, name)
+
+    def test_a_server_with_a_wrong_file_does_not_start(self):
+        path = self.path("wrong.yaml")
+        with open(path, "w", encoding="utf-8") as file:
+            file.write("callers:\n  - name: a\n    role: reader\n")
+        os.chmod(path, 0o600)
+        done = support.run("dsg-server", "--store", self.path("store"), "--listen",
+                           "127.0.0.1:0", "--access", path)
+        self.assertEqual(2, done.returncode, done.stderr)
+        self.assertIn("wrong.yaml:2:", done.stderr)
+        self.assertIn("nothing to show", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
