@@ -205,7 +205,8 @@ absl::StatusOr<ListenAddress> ParseListenAddress(std::string_view text, bool all
     return AddressError(text,
                         "other machines could reach it, nothing is encrypted, and over gRPC "
                         "every client can read and write every map. Listen on a unix socket or "
-                        "127.0.0.1, or pass --allow-remote on a trusted network");
+                        "127.0.0.1, give --tls-cert and --access, or pass --allow-remote on a "
+                        "trusted network");
   }
   return address;
 }

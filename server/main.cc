@@ -115,6 +115,13 @@ void DeclareAccessFlags(CLI::App* app, Flags* flags) {
   app->add_option("--access", flags->options.access_file,
                   "File that says who may call and do what (docs/access.md); read again on SIGHUP. "
                   "Without it everybody who reaches the server may do everything");
+  app->add_option(
+      "--tls-cert", flags->options.tls.certificate_file,
+      "Encrypt connections over TCP, gRPC and HTTP: the server's certificate, and those "
+      "above it (PEM); read again on SIGHUP");
+  app->add_option("--tls-key", flags->options.tls.key_file, "Its key (PEM); only you may read it");
+  app->add_option("--tls-client-ca", flags->options.tls.client_ca_file,
+                  "Let in those alone whose certificate these authorities vouch for (PEM)");
   CLI::Option* const audit = app->add_option(
       "--audit", flags->options.audit_file,
       "Write who changed which map into this file, and who was refused; `dsg audit` "
@@ -196,7 +203,8 @@ void StartWatchdog() {
 void Reload(dsg::server::Server* server) {
   const absl::Status status = server->Reload();
   dsg::Log(status.ok() ? dsg::LogLevel::kInfo : dsg::LogLevel::kError,
-           status.ok() ? "read the access file again" : "the access file is not taken",
+           status.ok() ? "read the access file and certificates again"
+                       : "the access file or certificates are not taken",
            {{"why", std::string(status.message())}});
 }
 

@@ -15,6 +15,7 @@
 #include "grpcpp/server_posix.h"
 #include "schema/base/status.h"
 #include "server/call_runtime.h"
+#include "server/connection_front.h"
 #include "server/grpc_services.h"
 #include "server/http/http_port.h"
 #include "server/listen.h"
@@ -33,6 +34,15 @@ constexpr int kCommitWorkerCount = kCommitsInFlightMax;
 constexpr int kCommitNiceness = 5;
 // At most 4 MiB each.
 constexpr int kArrivalsMax = 64;
+
+// For answers on their way through TLS when all calls have ended.
+constexpr std::chrono::milliseconds kLastBytesMax{500};
+
+// Other machines may reach what is encrypted and asks who calls.
+bool IsGuarded(const ServerOptions& options) {
+  return !options.tls.certificate_file.empty() &&
+         (!options.access_file.empty() || !options.tls.client_ca_file.empty());
+}
 
 int WorkerCount(int asked) {
   if (asked > 0) return asked;
@@ -63,6 +73,16 @@ absl::Status CheckRange(const std::string& option, int value, int min, int max) 
   return MakeError(Reason::kFieldInvalid,
                    absl::StrCat(option, " is ", value, "; give ", min, " to ", max),
                    {{"field", option}, {"value", absl::StrCat(value)}});
+}
+
+absl::Status CheckTls(const TlsOptions& tls) {
+  const bool is_whole = tls.certificate_file.empty() == tls.key_file.empty();
+  if (is_whole && (tls.client_ca_file.empty() || !tls.certificate_file.empty())) {
+    return absl::OkStatus();
+  }
+  return MakeError(Reason::kFieldInvalid,
+                   "TLS needs a certificate and its key; give --tls-cert and --tls-key",
+                   {{"field", "tls-cert"}, {"value", tls.certificate_file}});
 }
 
 absl::Status CheckHttp(const HttpOptions& http) {
@@ -131,16 +151,17 @@ class RunningServer final : public Server {
     questions_.access = commits_.access = access_.get();
     DSG_ASSIGN_OR_RETURN(audit_, OpenAudit(options));
     questions_.audit = commits_.audit = audit_.get();
-    DSG_ASSIGN_OR_RETURN(ListenAddress address,
-                         ParseListenAddress(options.listen, options.allow_remote));
+    DSG_ASSIGN_OR_RETURN(front_, ConnectionFront::Open(options.tls, options.connection_max));
+    const bool allow_remote = options.allow_remote || IsGuarded(options);
+    DSG_ASSIGN_OR_RETURN(ListenAddress address, ParseListenAddress(options.listen, allow_remote));
     if (address.is_unix()) {
       DSG_ASSIGN_OR_RETURN(claim_, UnixSocketClaim::Take(address.socket_path));
     }
     DSG_ASSIGN_OR_RETURN(acceptor_, Acceptor::Listen(address, options.socket_mode));
     if (!options.http.listen.empty()) {
-      DSG_ASSIGN_OR_RETURN(
-          http_port_, HttpPort::Listen(options.http, options.allow_remote, options.reader_stall_max,
-                                       &methods_, &questions_));
+      DSG_ASSIGN_OR_RETURN(http_port_,
+                           HttpPort::Listen(options.http, allow_remote, options.reader_stall_max,
+                                            &methods_, &questions_, front_.get()));
     }
     grpc::ServerBuilder builder;
     SetLimits(&builder);
@@ -153,12 +174,9 @@ class RunningServer final : public Server {
     }
     grpc_services_.ReportServing(grpc_server_.get());
     acceptor_->Start([this](int fd, const std::string& peer) {
-      const Peer identity = acceptor_->address().is_unix() ? PeerOfUnixSocket(fd) : Peer();
-      if (connections_.Add(fd, peer, identity) != nullptr) {
-        grpc::AddInsecureChannelFromFd(grpc_server_.get(), fd);
-      } else {
-        close(fd);
-      }
+      front_->Pass(
+          fd, acceptor_->address().is_unix(), ConnectionFront::Protocol::kGrpc, peer,
+          [this, peer](int plain_fd, const Peer& identity) { TakeGrpc(plain_fd, peer, identity); });
     });
     address_ = acceptor_->address().ToString();
     if (http_port_ != nullptr) http_port_->Start();
@@ -173,7 +191,10 @@ class RunningServer final : public Server {
     return {running_count, queued_count, questions_.open_stream_count, questions_.open_watch_count};
   }
 
-  absl::Status Reload() override { return access_->Reload(); }
+  absl::Status Reload() override {
+    DSG_RETURN_IF_ERROR(access_->Reload());
+    return front_->Reload();
+  }
 
   void Shutdown(std::chrono::milliseconds grace) override {
     if (grpc_server_ != nullptr) {
@@ -188,6 +209,7 @@ class RunningServer final : public Server {
       grpc_server_->Shutdown(std::chrono::system_clock::now() + grace);
       grpc_server_->Wait();
       if (http_port_ != nullptr) http_port_->Join();
+      front_->Stop(kLastBytesMax);
       // The timer may still hold a call that the guard has just ended.
       timer_.Stop();
       grpc_server_ = nullptr;
@@ -199,6 +221,14 @@ class RunningServer final : public Server {
   }
 
  private:
+  void TakeGrpc(int fd, const std::string& peer, const Peer& identity) {
+    if (connections_.Add(fd, peer, identity) != nullptr) {
+      grpc::AddInsecureChannelFromFd(grpc_server_.get(), fd);
+    } else {
+      close(fd);
+    }
+  }
+
   void Prepare(const ServerOptions& options, WorkerPool* workers, CallRuntime* runtime) {
     runtime->core = core_.get();
     runtime->store_folder = core_->store_folder();
@@ -236,6 +266,8 @@ class RunningServer final : public Server {
   std::unique_ptr<Acceptor> acceptor_;
   std::string address_;
   std::unique_ptr<grpc::Server> grpc_server_;
+  // Its threads hand connections to all of the above.
+  std::unique_ptr<ConnectionFront> front_;
 };
 
 }  // namespace
@@ -271,6 +303,7 @@ absl::Status ShuttingDownError() {
 
 absl::Status ServerOptions::Validate() const {
   DSG_RETURN_IF_ERROR(CheckHttp(http));
+  DSG_RETURN_IF_ERROR(CheckTls(tls));
   DSG_RETURN_IF_ERROR(CheckRange("workers", worker_count, 0, 256));
   DSG_RETURN_IF_ERROR(CheckRange("max-in-flight", in_flight_max, 1, 65536));
   DSG_RETURN_IF_ERROR(CheckRange("max-streams", open_stream_max, 1, 65536));

@@ -9,6 +9,7 @@
 #include "absl/status/statusor.h"
 #include "query/service/service_core.h"
 #include "server/http/http_options.h"
+#include "server/tls/tls_context.h"
 
 namespace dsg::server {
 
@@ -43,12 +44,15 @@ struct ServerOptions {
   std::chrono::milliseconds reader_stall_max{30'000};
   /// Who may call, and do what: a path for AccessControl::Open; empty = everybody everything.
   std::string access_file;
+  /// Encrypts connections over TCP, gRPC and HTTP, if it has a certificate.
+  TlsOptions tls;
   /// Where it is written who changed what; empty = nowhere. The key seals it; empty = none.
   std::string audit_file;
   std::string audit_key_file;
   /// Of a unix socket: who may connect, as chmod has it. Who may do what is for `access_file`.
   unsigned socket_mode = 0600;
-  /// Listen on addresses that other machines can reach.
+  /// Listen on addresses that other machines can reach, although nothing is encrypted or nobody is
+  /// asked who calls.
   bool allow_remote = false;
   Reflection reflection = Reflection::kLocal;
   /// A log line for every call, not only for errors and slow ones.
@@ -93,7 +97,8 @@ class Server {
 
   virtual ServerLoad Load() const = 0;
 
-  /// Takes the access file as it is now. Errors: those of AccessControl::Reload.
+  /// Takes the access file and the certificates as they are now; those that are wrong are not
+  /// taken. Errors: those of AccessControl::Reload and ConnectionFront::Reload.
   virtual absl::Status Reload() = 0;
 
   /// Reports not-ready, accepts no more calls, lets running calls end within `grace`, cancels the

@@ -32,7 +32,8 @@ constexpr std::chrono::milliseconds kLastWordsMax{3000};
 class RunningPort final : public HttpPort {
  public:
   RunningPort(const HttpOptions& options, std::chrono::milliseconds stall_max,
-              const MethodTable* methods, CallRuntime* calls) {
+              const MethodTable* methods, CallRuntime* calls, ConnectionFront* front)
+      : front_(front) {
     sessions_.methods = methods;
     sessions_.calls = calls;
     // Where callers have roles, these say who may write.
@@ -59,7 +60,9 @@ class RunningPort final : public HttpPort {
       DSG_ASSIGN_OR_RETURN(token, MakeToken());
     }
     const ListenAddress& actual = acceptor_->address();
-    url_ = actual.is_unix() ? actual.ToString() : absl::StrCat("http://", actual.ToString(), "/");
+    url_ = actual.is_unix()
+               ? actual.ToString()
+               : absl::StrCat(front_->encrypts() ? "https://" : "http://", actual.ToString(), "/");
     if (!token.empty()) absl::StrAppend(&url_, "#token=", token);
     rules_.emplace(actual, options.hosts, std::move(token));
     sessions_.rules = &*rules_;
@@ -70,14 +73,10 @@ class RunningPort final : public HttpPort {
     LookLater();
     thread_ = std::thread([this] { sessions_.io.run(); });
     acceptor_->Start([this](int fd, const std::string& peer) {
-      const Peer identity = acceptor_->address().is_unix() ? PeerOfUnixSocket(fd) : Peer();
-      auto connection = sessions_.calls->connections->Add(fd, peer, identity);
-      if (connection == nullptr) {
-        close(fd);
-        return;
-      }
-      asio::post(sessions_.io,
-                 [this, fd, connection = std::move(connection)] { Take(fd, connection); });
+      front_->Pass(fd, acceptor_->address().is_unix(), ConnectionFront::Protocol::kHttp, peer,
+                   [this, peer](int plain_fd, const Peer& identity) {
+                     TakeLater(plain_fd, peer, identity);
+                   });
     });
   }
 
@@ -99,6 +98,17 @@ class RunningPort final : public HttpPort {
   }
 
  private:
+  // On any thread.
+  void TakeLater(int fd, const std::string& peer, const Peer& identity) {
+    auto connection = sessions_.calls->connections->Add(fd, peer, identity);
+    if (connection == nullptr) {
+      close(fd);
+      return;
+    }
+    asio::post(sessions_.io,
+               [this, fd, connection = std::move(connection)] { Take(fd, connection); });
+  }
+
   void Take(int fd, std::shared_ptr<Connection> connection) {
     const bool is_full = sessions_.sessions.size() >= kSessionMax;
     if (is_full && !is_full_) {
@@ -152,6 +162,7 @@ class RunningPort final : public HttpPort {
   }
 
   SessionRuntime sessions_;
+  ConnectionFront* const front_;
   std::optional<AccessRules> rules_;
   std::string url_;
   std::unique_ptr<UnixSocketClaim> claim_;
@@ -166,12 +177,10 @@ class RunningPort final : public HttpPort {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<HttpPort>> HttpPort::Listen(const HttpOptions& options,
-                                                           bool allow_remote,
-                                                           std::chrono::milliseconds stall_max,
-                                                           const MethodTable* methods,
-                                                           CallRuntime* runtime) {
-  auto port = std::make_unique<RunningPort>(options, stall_max, methods, runtime);
+absl::StatusOr<std::unique_ptr<HttpPort>> HttpPort::Listen(
+    const HttpOptions& options, bool allow_remote, std::chrono::milliseconds stall_max,
+    const MethodTable* methods, CallRuntime* runtime, ConnectionFront* front) {
+  auto port = std::make_unique<RunningPort>(options, stall_max, methods, runtime, front);
   DSG_RETURN_IF_ERROR(port->Listen(options, allow_remote));
   return std::unique_ptr<HttpPort>(std::move(port));
 }

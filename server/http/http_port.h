@@ -8,6 +8,7 @@
 #include <string>
 
 #include "absl/status/statusor.h"
+#include "server/connection_front.h"
 #include "server/http/http_options.h"
 #include "server/method_table.h"
 
@@ -16,16 +17,14 @@ namespace dsg::server {
 /// Threads: one caller at a time.
 class HttpPort {
  public:
-  /// Listens; nothing is accepted before Start. `methods` and `runtime`, whose connections and
-  /// arrivals are shared with gRPC, must outlive this. An answer ends when its reader takes nothing
-  /// of it for `stall_max`.
+  /// Listens; nothing is accepted before Start. `methods`, `runtime`, whose connections and
+  /// arrivals are shared with gRPC, and `front` must outlive this. An answer ends when its reader
+  /// takes nothing of it for `stall_max`.
   ///
   /// Errors: those of ParseListenAddress, UnixSocketClaim::Take, Acceptor::Listen and MakeToken.
-  static absl::StatusOr<std::unique_ptr<HttpPort>> Listen(const HttpOptions& options,
-                                                          bool allow_remote,
-                                                          std::chrono::milliseconds stall_max,
-                                                          const MethodTable* methods,
-                                                          CallRuntime* runtime);
+  static absl::StatusOr<std::unique_ptr<HttpPort>> Listen(
+      const HttpOptions& options, bool allow_remote, std::chrono::milliseconds stall_max,
+      const MethodTable* methods, CallRuntime* runtime, ConnectionFront* front);
 
   /// Shuts down without grace, if it has not been shut down.
   virtual ~HttpPort() = default;

@@ -8,6 +8,7 @@ import json
 import os
 import re
 import signal
+import ssl
 import unittest
 
 import http_port
@@ -15,6 +16,9 @@ import support
 
 
 class Access(http_port.HttpTest):
+    # More for dsg-ingest.
+    TLS = ()
+
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
@@ -48,13 +52,13 @@ class Access(http_port.HttpTest):
         return path
 
     @contextlib.contextmanager
-    def served(self, *options, listen="unix:grpc.sock"):
+    def served(self, *options, listen="unix:grpc.sock", access=True):
         """A server with the access file and an HTTP port. That it is ready tells its log: nobody
         may ask it without a token."""
         with open(self.path("server.log"), "w", encoding="utf-8") as log:
             process = support.start("dsg-server", "--store", "store", "--listen", listen, "--http",
-                                    "127.0.0.1:0", "--access", "access.yaml", *options,
-                                    cwd=self.folder, log=log)
+                                    "127.0.0.1:0", *(("--access", "access.yaml") if access else ()),
+                                    *options, cwd=self.folder, log=log)
         try:
             self.wait_for_log("HTTP on")
             yield process, http_port.Port(self.in_log(r"HTTP on (\S+)"), self.folder)
@@ -104,7 +108,7 @@ class Access(http_port.HttpTest):
         log = self.simulate("more", people=2, seconds=10)
         with self.served(listen="127.0.0.1:0"):
             token = ["--token-file", self.tokens["robot"]["path"]]
-            server = ["--server", self.grpc_address()]
+            server = ["--server", self.grpc_address(), *self.TLS]
             done = support.run("dsg-ingest", *server, *token, "--map", "robot-7", "--quiet", log,
                                cwd=self.folder)
             self.assertEqual(0, done.returncode, done.stderr)
@@ -148,12 +152,12 @@ class Access(http_port.HttpTest):
             self.assertNotEqual(0, self.asked("stranger", "maps").returncode)
             self.write_access(self.callers() + "  - name: stranger\n    role: king\n")
             process.send_signal(signal.SIGHUP)
-            self.wait_for_log("the access file is not taken")
+            self.wait_for_log("certificates are not taken")
             self.assertEqual(0, self.asked("asker", "maps").returncode)
             self.write_access(self.callers() + "  - name: stranger\n    role: reader\n    " +
                               self.tokens["stranger"]["line"] + "\n")
             process.send_signal(signal.SIGHUP)
-            self.wait_for_log("read the access file again")
+            self.wait_for_log("certificates again")
             self.assertEqual(0, self.asked("stranger", "maps").returncode)
         self.write_access(self.callers())
 
@@ -172,8 +176,8 @@ class Access(http_port.HttpTest):
         audit = ("--audit", "audit.jsonl", "--audit-key", "audit.key")
         for name in ("robot-8", "robot-9"):
             with self.served(*audit, listen="127.0.0.1:0"):
-                done = support.run("dsg-ingest", "--server", self.grpc_address(), "--token-file",
-                                   self.tokens["robot"]["path"], "--map", name, "--quiet", log,
+                done = support.run("dsg-ingest", "--server", self.grpc_address(), *self.TLS,
+                                   "--token-file", "robot.token", "--map", name, "--quiet", log,
                                    cwd=self.folder)
                 self.assertEqual(0, done.returncode, done.stderr)
                 self.asked("asker", "stats", "--map", "office")
@@ -235,6 +239,104 @@ class Access(http_port.HttpTest):
         self.assertEqual(2, done.returncode, done.stderr)
         self.assertIn("wrong.yaml:2:", done.stderr)
         self.assertIn("nothing to show", done.stderr)
+
+
+class Certificates:
+    """A CA, and what it signs, by the openssl program."""
+
+    def __init__(self, test):
+        self.test = test
+        self.make("ca", None, "basicConstraints=critical,CA:TRUE")
+
+    def make(self, name, alternative, extension=""):
+        """NAME.pem and NAME.key; of a server or client with that alternative name."""
+        run = self.test.ok
+        if alternative is None:
+            run("openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt",
+                "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2", "-subj", f"/CN={name}",
+                "-keyout", name + ".key", "-out", name + ".pem", "-addext", extension)
+        else:
+            run("openssl", "req", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1",
+                "-nodes", "-subj", f"/CN={name}", "-keyout", name + ".key", "-out", name + ".csr")
+            with open(self.test.path("extensions"), "w", encoding="utf-8") as file:
+                file.write(f"subjectAltName={alternative}\n")
+            run("openssl", "x509", "-req", "-in", name + ".csr", "-CA", "ca.pem", "-CAkey",
+                "ca.key", "-CAcreateserial", "-days", "2", "-extfile", "extensions", "-out",
+                name + ".pem")
+        os.chmod(self.test.path(name + ".key"), 0o600)
+
+
+class Encrypted(Access):
+    """The same server behind TLS."""
+
+    TLS = ("--tls-ca", "ca.pem")
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        made = Certificates(cls)
+        made.make("server", "DNS:localhost,IP:127.0.0.1")
+        made.make("robot", "DNS:robot.example.org")
+        made.make("nobody", "DNS:nobody.example.org")
+        cls.certificates = made
+
+    @classmethod
+    def callers(cls):
+        return super().callers() + ("  - name: certified\n    certificate: robot.example.org\n"
+                                    "    role: reader\n")
+
+    def served(self, *options, **more):
+        return super().served(*options, "--tls-cert", "server.pem", "--tls-key", "server.key",
+                              **more)
+
+    def asked(self, name, *verb):
+        return super().asked(name, *verb, "--tls-ca", "ca.pem")
+
+    def test_a_certificate_says_who_calls(self):
+        tls = ("--tls-client-ca", "ca.pem")
+        with self.served(*tls, listen="127.0.0.1:0"):
+            shown = ("stats", "--map", "office", "--server", self.grpc_address(), "--tls-ca",
+                     "ca.pem")
+            self.ok("dsg", *shown, "--tls-cert", "robot.pem", "--tls-key", "robot.key")
+            self.refused(2, ["does not know who calls"], "dsg", *shown, "--tls-cert", "nobody.pem",
+                         "--tls-key", "nobody.key")
+            # Without a certificate there is no connection.
+            done = support.run("dsg", *shown, cwd=self.folder)
+            self.assertNotEqual(0, done.returncode)
+
+    def test_nothing_is_answered_that_is_not_encrypted(self):
+        with self.served(listen="127.0.0.1:0") as (_, port):
+            self.assertTrue(port.url.startswith("https://"), port.url)
+            done = support.run("dsg", "version", "--server", self.grpc_address(), "--timeout", "3",
+                               "--token-file", "asker.token", cwd=self.folder)
+            self.assertNotEqual(0, done.returncode)
+            answer = port.raw(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")
+            self.assertEqual(0, http_port.status_of(answer), answer)
+            # One that is signed by others is not believed.
+            self.ok("openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt",
+                    "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2", "-subj", "/CN=other",
+                    "-keyout", "other.key", "-out", "other.pem")
+            done = support.run("dsg", "version", "--server", self.grpc_address(), "--timeout", "3",
+                               "--tls-ca", "other.pem", "--token-file", "asker.token",
+                               cwd=self.folder)
+            self.assertNotEqual(0, done.returncode)
+
+    def test_a_new_certificate_is_taken_without_a_restart(self):
+        with self.served(listen="127.0.0.1:0") as (process, port):
+            before = ssl.get_server_certificate(port.address)
+            self.certificates.make("server", "DNS:localhost,IP:127.0.0.1")
+            process.send_signal(signal.SIGHUP)
+            self.wait_for_log("certificates again")
+            self.assertNotEqual(before, ssl.get_server_certificate(port.address))
+            self.assertEqual(0, self.asked("asker", "maps").returncode)
+
+    def test_other_machines_may_reach_it(self):
+        with self.served(listen="0.0.0.0:0"):
+            self.assertIn("0.0.0.0", self.grpc_address())
+        done = support.run("dsg-server", "--store", "store", "--listen", "0.0.0.0:0", "--tls-cert",
+                           "server.pem", "--tls-key", "server.key", cwd=self.folder)
+        self.assertEqual(2, done.returncode)
+        self.assertIn("--access", done.stderr)
 
 
 if __name__ == "__main__":

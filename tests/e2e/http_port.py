@@ -8,6 +8,7 @@ import json
 import os
 import re
 import socket
+import ssl
 import struct
 import urllib.parse
 
@@ -66,6 +67,7 @@ class Port:
             self.host = "localhost"
             return
         parts = urllib.parse.urlsplit(url)
+        self.is_encrypted = parts.scheme == "https"
         self.host, self.address = parts.netloc, (parts.hostname, parts.port)
         self.token = parts.fragment.removeprefix("token=")
 
@@ -73,6 +75,10 @@ class Port:
         """A kept connection of the standard library's client."""
         if self.path:
             return UnixConnection(self.path)
+        if self.is_encrypted:
+            # Of a CA that the test has made.
+            context = ssl._create_unverified_context()
+            return http.client.HTTPSConnection(*self.address, timeout=TIMEOUT_S, context=context)
         return http.client.HTTPConnection(*self.address, timeout=TIMEOUT_S)
 
     def socket(self, receive_bytes=None):
