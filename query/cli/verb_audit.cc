@@ -24,10 +24,15 @@ struct AuditVerb {
 };
 
 nlohmann::ordered_json JsonOf(const AuditEntry& entry) {
-  return {{"number", entry.number}, {"time", FormatRfc3339(entry.time_ns)},
-          {"caller", entry.caller}, {"peer", entry.peer},
-          {"method", entry.method}, {"map", entry.map},
-          {"code", entry.code},     {"revision", entry.revision}};
+  return {{"number", entry.number},
+          {"time", FormatRfc3339(entry.time_ns)},
+          {"caller", entry.caller},
+          {"peer", entry.peer},
+          {"method", entry.method},
+          {"map", entry.map},
+          {"code", entry.code},
+          {"revision", entry.revision},
+          {"left_out", entry.left_out_count}};
 }
 
 absl::Status RunAudit(Session* session, const AuditVerb& verb, std::ostream& out) {
@@ -43,8 +48,10 @@ absl::Status RunAudit(Session* session, const AuditVerb& verb, std::ostream& out
                {"peer"}});
   std::string lines;
   bool has_noted = verb.noted.empty();
+  int64_t left_out_count = 0;
   const auto take = [&](const AuditEntry& entry) {
     has_noted = has_noted || entry.chain == verb.noted;
+    left_out_count += entry.left_out_count;
     const bool is_asked = (verb.caller.empty() || entry.caller == verb.caller) &&
                           (common.map.empty() || entry.map == common.map);
     if (!is_asked) return;
@@ -73,6 +80,10 @@ absl::Status RunAudit(Session* session, const AuditVerb& verb, std::ostream& out
   out << Counted(head.entry_count, "line") << ", all as they were written"
       << (head.has_torn_end ? " but for a last one that a crash cut off" : "") << "; chain "
       << head.chain << "\n";
+  if (left_out_count > 0) {
+    out << Counted(left_out_count, "refused call") << " more stand in no line: there were too many "
+        << "at once\n";
+  }
   return absl::OkStatus();
 }
 

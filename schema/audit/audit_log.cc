@@ -49,6 +49,7 @@ std::string TextOf(const AuditEntry& entry) {
                {"peer", entry.peer},       {"method", entry.method},
                {"map", entry.map},         {"code", entry.code}};
   if (entry.revision != 0) line["revision"] = entry.revision;
+  if (entry.left_out_count != 0) line["left_out"] = entry.left_out_count;
   // Names of maps that were refused may be any bytes.
   std::string text = line.dump(-1, ' ', true, Json::error_handler_t::replace);
   text.pop_back();
@@ -100,6 +101,7 @@ absl::StatusOr<AuditEntry> TakeLine(const std::string& path, std::string_view ke
   entry.map = TextField(object, "map");
   entry.code = TextField(object, "code");
   entry.revision = NumberField(object, "revision");
+  entry.left_out_count = NumberField(object, "left_out");
   entry.chain = chain;
   head->entry_count = number;
   head->chain = chain;

@@ -37,6 +37,8 @@ struct AuditEntry {
   std::string code;
   /// That a change made; 0 = none.
   int64_t revision = 0;
+  /// Refused calls before this one that stand in no line: there were too many at once.
+  int64_t left_out_count = 0;
   /// 64 hexadecimal digits; of what was read.
   std::string chain;
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/access/call_audit.h"
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -15,6 +16,10 @@ using query::Role;
 
 constexpr size_t kMapBytesMax = 100;
 
+// Of refused calls: at once, and a second.
+constexpr double kRefusalBurst = 100.0;
+constexpr double kRefusalsPerS = 10.0;
+
 bool Changes(const query::MethodInfo& method) { return method.role >= Role::kWriter; }
 
 TimeNs WallNow() {
@@ -24,6 +29,19 @@ TimeNs WallNow() {
 }
 
 }  // namespace
+
+CallAudit::CallAudit(std::unique_ptr<AuditLog> log) : log_(std::move(log)), lines_(kRefusalBurst) {}
+
+bool CallAudit::MayTellRefusal() {
+  std::lock_guard lock(mutex_);
+  const auto now = std::chrono::steady_clock::now();
+  const std::chrono::duration<double> passed = now - lines_at_;
+  lines_at_ = now;
+  lines_ = std::min(kRefusalBurst, lines_ + passed.count() * kRefusalsPerS);
+  if (lines_ < 1.0) return false;
+  lines_ -= 1.0;
+  return true;
+}
 
 absl::Status CallAudit::Begin(const AuditedCall& call) {
   if (log_ == nullptr || !Changes(*call.method)) return absl::OkStatus();
@@ -36,6 +54,10 @@ void CallAudit::End(const AuditedCall& call, const absl::Status& status, int64_t
   if (log_ == nullptr) return;
   const bool is_refused = absl::IsUnauthenticated(status) || absl::IsPermissionDenied(status);
   if (!Changes(*call.method) && !is_refused) return;
+  if (is_refused && !MayTellRefusal()) {
+    ++left_out_count_;
+    return;
+  }
   const bool is_grave = call.method->role >= Role::kMaintainer;
   Append(call, std::string(absl::StatusCodeToString(status.code())), revision, is_grave)
       .IgnoreError();
@@ -51,7 +73,10 @@ absl::Status CallAudit::Append(const AuditedCall& call, std::string code, int64_
   entry.map = CutText(call.map, kMapBytesMax);
   entry.code = std::move(code);
   entry.revision = revision;
+  const int64_t left_out_count = left_out_count_.exchange(0);
+  entry.left_out_count = left_out_count;
   absl::Status status = log_->Append(std::move(entry), must_last);
+  if (!status.ok()) left_out_count_ += left_out_count;
   if (is_failing_.exchange(!status.ok()) == status.ok()) {
     Log(status.ok() ? LogLevel::kInfo : LogLevel::kError,
         status.ok() ? "the audit log is written again"
