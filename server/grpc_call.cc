@@ -3,7 +3,10 @@
 
 #include <google/protobuf/message.h>
 
+#include <iterator>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "google/rpc/status.pb.h"
@@ -18,10 +21,12 @@
 namespace dsg::server {
 namespace {
 
-std::string_view AuthorizationOf(const grpc::CallbackServerContext& context) {
-  const auto found = context.client_metadata().find("authorization");
-  if (found == context.client_metadata().end()) return {};
-  return {found->second.data(), found->second.size()};
+// Two fields are none that anybody knows.
+std::optional<std::string_view> AuthorizationOf(const grpc::CallbackServerContext& context) {
+  const auto [first, end] = context.client_metadata().equal_range("authorization");
+  if (first == end) return std::nullopt;
+  if (std::next(first) != end) return "";
+  return std::string_view(first->second.data(), first->second.size());
 }
 
 }  // namespace

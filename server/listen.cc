@@ -202,11 +202,12 @@ absl::StatusOr<ListenAddress> ParseListenAddress(std::string_view text, bool all
     return AddressError(text, kForm);
   }
   if (!allow_remote && !address.is_local()) {
-    return AddressError(text,
-                        "other machines could reach it, nothing is encrypted, and over gRPC "
-                        "every client can read and write every map. Listen on a unix socket or "
-                        "127.0.0.1, give --tls-cert and --access, or pass --allow-remote on a "
-                        "trusted network");
+    return AddressError(
+        text,
+        "other machines could reach it, and without --tls-cert and --access what "
+        "they send can be read, and each of them can change every map. Listen on a unix socket or "
+        "127.0.0.1, give --tls-cert and --access, or pass --allow-remote on a "
+        "trusted network");
   }
   return address;
 }

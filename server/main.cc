@@ -108,27 +108,45 @@ void DeclareFlags(CLI::App* app, Flags* flags) {
       ->capture_default_str();
 }
 
+// Of an option that would otherwise switch itself off: "$UNSET" in a script.
+CLI::Validator NotEmpty() {
+  return CLI::Validator(
+      [](const std::string& text) {
+        return text.empty() ? std::string("it is empty; give a path, or leave the option out")
+                            : std::string();
+      },
+      "FILE");
+}
+
 // Who may call, and how.
 void DeclareAccessFlags(CLI::App* app, Flags* flags) {
   app->add_flag("--allow-remote", flags->options.allow_remote,
-                "Listen on addresses that other machines reach; nothing is encrypted");
+                "Listen on addresses that other machines reach, although --tls-cert or --access is "
+                "missing");
   app->add_option("--access", flags->options.access_file,
                   "File that says who may call and do what (docs/access.md); read again on SIGHUP. "
-                  "Without it everybody who reaches the server may do everything");
+                  "Without it everybody who reaches the server may do everything")
+      ->check(NotEmpty());
   app->add_option(
-      "--tls-cert", flags->options.tls.certificate_file,
-      "Encrypt connections over TCP, gRPC and HTTP: the server's certificate, and those "
-      "above it (PEM); read again on SIGHUP");
-  app->add_option("--tls-key", flags->options.tls.key_file, "Its key (PEM); only you may read it");
+         "--tls-cert", flags->options.tls.certificate_file,
+         "Encrypt connections over TCP, gRPC and HTTP: the server's certificate, and those "
+         "above it (PEM); read again on SIGHUP")
+      ->check(NotEmpty());
+  app->add_option("--tls-key", flags->options.tls.key_file, "Its key (PEM); only you may read it")
+      ->check(NotEmpty());
   app->add_option("--tls-client-ca", flags->options.tls.client_ca_file,
-                  "Let in those alone whose certificate these authorities vouch for (PEM)");
-  CLI::Option* const audit = app->add_option(
-      "--audit", flags->options.audit_file,
-      "Write who changed which map into this file, and who was refused; `dsg audit` "
-      "reads it");
+                  "Let in those alone whose certificate these authorities vouch for (PEM)")
+      ->check(NotEmpty());
+  CLI::Option* const audit =
+      app->add_option(
+             "--audit", flags->options.audit_file,
+             "Write who changed which map into this file, and who was refused; `dsg audit` "
+             "reads it")
+          ->check(NotEmpty());
   app->add_option("--audit-key", flags->options.audit_key_file,
                   "Key that seals --audit, so that who changes the file cannot hide it; only you "
                   "may read it")
+      ->check(NotEmpty())
       ->needs(audit);
   app->add_option_function<std::string>(
          "--socket-mode",
@@ -187,6 +205,8 @@ sigset_t BlockStopSignals() {
   sigaddset(&signals, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   signal(SIGPIPE, SIG_IGN);
+  // Writing beyond a limit of file sizes is an error, and no end.
+  signal(SIGXFSZ, SIG_IGN);
   return signals;
 }
 
@@ -204,7 +224,7 @@ void Reload(dsg::server::Server* server) {
   const absl::Status status = server->Reload();
   dsg::Log(status.ok() ? dsg::LogLevel::kInfo : dsg::LogLevel::kError,
            status.ok() ? "read the access file and certificates again"
-                       : "the access file or certificates are not taken",
+                       : "a file is not taken; of it, what was read before stays in force",
            {{"why", std::string(status.message())}});
 }
 

@@ -62,6 +62,7 @@ bool ServedCall::Admit(absl::StatusOr<std::shared_ptr<const Caller>> caller) {
     status = OverloadedError("the connection has more calls than it may have, and was closed");
   } else if (status.ok()) {
     caller_ = *std::move(caller);
+    access_generation_ = runtime().access->generation();
     status = CheckRole();
   }
   if (status.ok()) return true;
@@ -156,7 +157,20 @@ absl::Status ServedCall::Parse(Message* request) {
   wire_->Drop();
   memory_.StopWaiting();
   if (!is_parsed) return UnreadableError(*request, request_bytes_);
-  return method_->maps->Check(*caller_, *request);
+  return CheckAccess(*request);
+}
+
+absl::Status ServedCall::CheckAccess(const Message& request) {
+  // A head may have come long before its request.
+  if (runtime().access->generation() != access_generation_) {
+    is_refused_ = true;
+    return absl::UnauthenticatedError(
+        "who may call was changed while the request came; call again");
+  }
+  other_map_ = method_->maps->OtherOf(request);
+  absl::Status status = method_->maps->Check(*caller_, request);
+  is_refused_ = !status.ok();
+  return status;
 }
 
 absl::Status ServedCall::ForCaller(const absl::Status& status) const {
@@ -165,7 +179,7 @@ absl::Status ServedCall::ForCaller(const absl::Status& status) const {
 
 AuditedCall ServedCall::Audited(std::string_view map) const {
   const std::string_view caller = caller_ == nullptr ? std::string_view() : caller_->name();
-  return {&method_->info, caller, connection_->peer, map};
+  return {&method_->info, caller, connection_->peer, map, other_map_, is_refused_};
 }
 
 absl::Status ServedCall::BeginAudit(std::string_view map) const {

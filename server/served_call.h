@@ -106,6 +106,7 @@ class ServedCall : public Job {
 
  private:
   absl::Status CheckRole() const;
+  absl::Status CheckAccess(const google::protobuf::Message& request);
   AuditedCall Audited(std::string_view map) const;
   absl::Status Charge(size_t bytes);
   // Memory of the parsed request in bytes; counting stops above `bytes_max`.
@@ -118,6 +119,10 @@ class ServedCall : public Job {
   const std::shared_ptr<Connection> connection_;
   // Set by Admit.
   std::shared_ptr<const Caller> caller_;
+  int64_t access_generation_ = 0;
+  // Of the request, for the audit log.
+  std::string other_map_;
+  bool is_refused_ = false;
   CallMemory::Hold memory_;
   size_t request_bytes_ = 0;
   // What the call ends with when Run comes again.

@@ -75,6 +75,16 @@ absl::Status CheckRange(const std::string& option, int value, int min, int max) 
                    {{"field", option}, {"value", absl::StrCat(value)}});
 }
 
+absl::Status CheckSocketMode(const ServerOptions& options) {
+  if (options.socket_mode == ServerOptions().socket_mode || !options.access_file.empty()) {
+    return absl::OkStatus();
+  }
+  return MakeError(Reason::kFieldInvalid,
+                   "--socket-mode lets others connect, and without --access each of them may do "
+                   "everything; give --access",
+                   {{"field", "socket-mode"}, {"value", ""}});
+}
+
 absl::Status CheckTls(const TlsOptions& tls) {
   const bool is_whole = tls.certificate_file.empty() == tls.key_file.empty();
   if (is_whole && (tls.client_ca_file.empty() || !tls.certificate_file.empty())) {
@@ -119,13 +129,6 @@ ConnectionLimits LimitsOfConnections(const ServerOptions& options) {
   return limits;
 }
 
-absl::StatusOr<std::unique_ptr<CallAudit>> OpenAudit(const ServerOptions& options) {
-  if (options.audit_file.empty()) return std::make_unique<CallAudit>(nullptr);
-  DSG_ASSIGN_OR_RETURN(const std::string key, ReadAuditKey(options.audit_key_file));
-  DSG_ASSIGN_OR_RETURN(std::unique_ptr<AuditLog> log, AuditLog::Open(options.audit_file, key));
-  return std::make_unique<CallAudit>(std::move(log));
-}
-
 class RunningServer final : public Server {
  public:
   RunningServer(std::unique_ptr<query::ServiceCore> core, const ServerOptions& options)
@@ -149,7 +152,7 @@ class RunningServer final : public Server {
   absl::Status Listen(const ServerOptions& options) {
     DSG_ASSIGN_OR_RETURN(access_, AccessControl::Open(options.access_file));
     questions_.access = commits_.access = access_.get();
-    DSG_ASSIGN_OR_RETURN(audit_, OpenAudit(options));
+    DSG_ASSIGN_OR_RETURN(audit_, CallAudit::Open(options.audit_file, options.audit_key_file));
     questions_.audit = commits_.audit = audit_.get();
     DSG_ASSIGN_OR_RETURN(front_, ConnectionFront::Open(options.tls, options.connection_max));
     const bool allow_remote = options.allow_remote || IsGuarded(options);
@@ -192,8 +195,13 @@ class RunningServer final : public Server {
   }
 
   absl::Status Reload() override {
-    DSG_RETURN_IF_ERROR(access_->Reload());
-    return front_->Reload();
+    // Each for itself: a typing error in one file must not let a certificate expire.
+    absl::Status status = access_->Reload();
+    for (const absl::Status& other : {front_->Reload(), audit_->Reload()}) {
+      if (!other.ok())
+        status = status.ok() ? other : Annotate(status, std::string(other.message()));
+    }
+    return status;
   }
 
   void Shutdown(std::chrono::milliseconds grace) override {
@@ -304,6 +312,7 @@ absl::Status ShuttingDownError() {
 absl::Status ServerOptions::Validate() const {
   DSG_RETURN_IF_ERROR(CheckHttp(http));
   DSG_RETURN_IF_ERROR(CheckTls(tls));
+  DSG_RETURN_IF_ERROR(CheckSocketMode(*this));
   DSG_RETURN_IF_ERROR(CheckRange("workers", worker_count, 0, 256));
   DSG_RETURN_IF_ERROR(CheckRange("max-in-flight", in_flight_max, 1, 65536));
   DSG_RETURN_IF_ERROR(CheckRange("max-streams", open_stream_max, 1, 65536));

@@ -97,8 +97,9 @@ class Server {
 
   virtual ServerLoad Load() const = 0;
 
-  /// Takes the access file and the certificates as they are now; those that are wrong are not
-  /// taken. Errors: those of AccessControl::Reload and ConnectionFront::Reload.
+  /// Takes the access file and the certificates as they are now, and begins another audit log if
+  /// the one before was moved. Of what is wrong, that before stays in force. Errors: those of
+  /// AccessControl, ConnectionFront and CallAudit, all in one.
   virtual absl::Status Reload() = 0;
 
   /// Reports not-ready, accepts no more calls, lets running calls end within `grace`, cancels the

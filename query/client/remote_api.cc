@@ -27,6 +27,13 @@ absl::Status BadAddress(const std::string& address, const std::string& why) {
                    {{"field", "address"}, {"value", address}});
 }
 
+// What is sent there leaves the machine.
+bool IsRemote(const std::string& address) {
+  if (absl::StartsWith(address, kUnixScheme)) return false;
+  const std::string host = address.substr(0, address.rfind(':'));
+  return host != "localhost" && host != "[::1]" && !absl::StartsWith(host, "127.");
+}
+
 // A unix socket needs no encryption.
 std::shared_ptr<grpc::ChannelCredentials> ChannelCredentialsOf(const ServerAddress& server) {
   const Credentials& own = server.credentials;
@@ -96,6 +103,14 @@ absl::StatusOr<std::unique_ptr<query::Api>> Connect(const std::string& address) 
 
 absl::StatusOr<std::unique_ptr<query::Api>> Connect(const ServerAddress& server) {
   DSG_RETURN_IF_ERROR(CheckAddress(server.address));
+  const bool is_clear = !server.credentials.has_tls() && IsRemote(server.address);
+  if (is_clear && !server.credentials.token.empty()) {
+    return MakeError(Reason::kFieldInvalid,
+                     absl::StrCat("the token would be sent to ", server.address,
+                                  " where everybody on the way can read it; encrypt with --tls-ca, "
+                                  "or take a tunnel to a local address"),
+                     {{"field", "token_file"}, {"value", server.address}});
+  }
   return std::make_unique<query::RemoteApi<Caller>>(std::make_unique<Caller>(server));
 }
 

@@ -43,6 +43,7 @@ std::shared_ptr<grpc::Channel> MakeChannel(const ServerAddress& server);
 
 /// `address` is "unix:/path" or "host:port". Connects lazily; calls fail with UNAVAILABLE, naming
 /// the address, while no server listens. Errors carry the server's reason and metadata.
+/// Errors of the second: FIELD_INVALID for a token that would go to another machine in the clear.
 absl::StatusOr<std::unique_ptr<query::Api>> Connect(const std::string& address);
 absl::StatusOr<std::unique_ptr<query::Api>> Connect(const ServerAddress& server);
 

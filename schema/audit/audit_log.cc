@@ -8,6 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -48,6 +49,7 @@ std::string TextOf(const AuditEntry& entry) {
                {"time_ns", entry.time_ns}, {"caller", entry.caller},
                {"peer", entry.peer},       {"method", entry.method},
                {"map", entry.map},         {"code", entry.code}};
+  if (!entry.other.empty()) line["other"] = entry.other;
   if (entry.revision != 0) line["revision"] = entry.revision;
   if (entry.left_out_count != 0) line["left_out"] = entry.left_out_count;
   // Names of maps that were refused may be any bytes.
@@ -99,6 +101,7 @@ absl::StatusOr<AuditEntry> TakeLine(const std::string& path, std::string_view ke
   entry.peer = TextField(object, "peer");
   entry.method = TextField(object, "method");
   entry.map = TextField(object, "map");
+  entry.other = TextField(object, "other");
   entry.code = TextField(object, "code");
   entry.revision = NumberField(object, "revision");
   entry.left_out_count = NumberField(object, "left_out");
@@ -108,10 +111,28 @@ absl::StatusOr<AuditEntry> TakeLine(const std::string& path, std::string_view ke
   return entry;
 }
 
+// Whether a line without its end is the beginning of the next one.
+bool IsTornLine(const std::string& bytes, int64_t number) {
+  const std::string begin = absl::StrCat("{\"number\":", number, ",\"time\":\"");
+  const size_t size = std::min(bytes.size(), begin.size());
+  return bytes.compare(0, size, begin, 0, size) == 0;
+}
+
+absl::Status CheckIsFile(const std::string& path) {
+  struct stat found {};
+  if (stat(path.c_str(), &found) == 0 && !S_ISREG(found.st_mode)) {
+    return MakeError(Reason::kFieldInvalid,
+                     absl::StrCat("audit log ", path, " is no plain file; name another"),
+                     {{"field", "audit"}, {"value", path}});
+  }
+  return absl::OkStatus();
+}
+
 // The head, and how many bytes whole lines have.
 absl::StatusOr<std::pair<AuditHead, int64_t>> ReadLog(
     const std::string& path, std::string_view key,
     const std::function<void(const AuditEntry&)>& take) {
+  DSG_RETURN_IF_ERROR(CheckIsFile(path));
   std::ifstream file(path, std::ios::binary);
   if (!file.is_open()) {
     return absl::NotFoundError(
@@ -123,6 +144,9 @@ absl::StatusOr<std::pair<AuditHead, int64_t>> ReadLog(
   for (std::string line; std::getline(file, line);) {
     // A last line without its end was torn off.
     head.has_torn_end = file.eof();
+    if (head.has_torn_end && !IsTornLine(line, head.entry_count + 1)) {
+      return Broken(path, head.entry_count + 1, "is the beginning of no line of such a log");
+    }
     if (head.has_torn_end) break;
     if (line.size() > kLineBytesMax) return Broken(path, head.entry_count + 1, "is too long");
     DSG_ASSIGN_OR_RETURN(const AuditEntry entry, TakeLine(path, key, line, &head));
@@ -156,6 +180,10 @@ absl::StatusOr<std::string> ReadAuditKey(const std::string& path) {
   };
   struct stat found {};
   if (stat(path.c_str(), &found) != 0) return refuse(std::strerror(errno));
+  if (!S_ISREG(found.st_mode)) return refuse("is no file");
+  if (found.st_uid != geteuid() && found.st_uid != 0) {
+    return refuse("belongs to another user; make it yours: chown");
+  }
   if ((found.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
     return refuse(absl::StrCat("others can use it; make it yours alone: chmod 600 ", path));
   }
@@ -170,6 +198,8 @@ absl::StatusOr<std::string> ReadAuditKey(const std::string& path) {
 
 absl::StatusOr<std::unique_ptr<AuditLog>> AuditLog::Open(const std::string& path,
                                                          const std::string& key) {
+  // A pipe would wait for its reader.
+  DSG_RETURN_IF_ERROR(CheckIsFile(path));
   const int fd = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
   if (fd < 0) return WriteError(path, errno);
   if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
@@ -201,6 +231,11 @@ AuditLog::~AuditLog() { close(fd_); }
 
 absl::Status AuditLog::Append(AuditEntry entry, bool must_last) {
   std::lock_guard lock(mutex_);
+  if (!IsAtPath()) {
+    return absl::UnavailableError(
+        absl::StrCat("audit log ", path_,
+                     " was moved or deleted; send the server a SIGHUP to begin another one"));
+  }
   entry.number = head_.entry_count + 1;
   const std::string text = TextOf(entry);
   const std::string chain = ChainOf(key_, head_.chain, text);
@@ -218,6 +253,13 @@ absl::Status AuditLog::Append(AuditEntry entry, bool must_last) {
   head_ = {entry.number, chain, false};
   byte_count_ += static_cast<int64_t>(line.size());
   return absl::OkStatus();
+}
+
+bool AuditLog::IsAtPath() const {
+  struct stat held {};
+  struct stat named {};
+  return fstat(fd_, &held) == 0 && stat(path_.c_str(), &named) == 0 &&
+         held.st_ino == named.st_ino && held.st_dev == named.st_dev;
 }
 
 AuditHead AuditLog::head() const {

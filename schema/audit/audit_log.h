@@ -33,6 +33,8 @@ struct AuditEntry {
   std::string method;
   /// Empty for calls that name none, or that were refused before they were read.
   std::string map;
+  /// Another map that the call names: the one that is merged, the new name. Empty for none.
+  std::string other;
   /// "OK", or the name of the status code, "PERMISSION_DENIED"; "BEGUN" before long work.
   std::string code;
   /// That a change made; 0 = none.
@@ -69,7 +71,8 @@ absl::StatusOr<std::string> ReadAuditKey(const std::string& path);
 class AuditLog {
  public:
   /// Goes on behind the last line; makes the file, for its user alone, if it is missing. An end
-  /// that a crash tore off is cut.
+  /// that a crash tore off is cut, if it is the beginning of a line: a file of something else
+  /// stays.
   ///
   /// Errors: those of VerifyAuditLog: nothing is added to a log that is not right;
   /// UNAVAILABLE/WRITER_LOCKED if another process has it open.
@@ -81,9 +84,12 @@ class AuditLog {
 
   /// Adds a line, on disk when this returns if `must_last`.
   ///
-  /// Errors: RESOURCE_EXHAUSTED/DISK_FULL, UNAVAILABLE; then nothing of the line stays.
+  /// Errors: RESOURCE_EXHAUSTED/DISK_FULL; UNAVAILABLE, also when the file is not at its path any
+  /// more (IsAtPath); then nothing of the line stays.
   absl::Status Append(AuditEntry entry, bool must_last);
 
+  /// False once it was moved or deleted: then a log is to be opened anew.
+  bool IsAtPath() const;
   AuditHead head() const;
 
  private:

@@ -38,6 +38,7 @@ absl::Status AccessControl::Reload() {
   auto file = std::make_shared<const AccessFile>(std::move(read));
   std::lock_guard lock(mutex_);
   file_ = std::move(file);
+  ++generation_;
   return absl::OkStatus();
 }
 
@@ -47,12 +48,14 @@ std::shared_ptr<const AccessFile> AccessControl::file() const {
 }
 
 absl::StatusOr<std::shared_ptr<const Caller>> AccessControl::Identify(
-    const Peer& peer, std::string_view authorization) const {
+    const Peer& peer, std::optional<std::string_view> authorization) const {
   if (!asks_who()) return Caller::Anybody();
   const std::shared_ptr<const AccessFile> known = file();
-  if (!authorization.empty()) {
+  if (authorization.has_value()) {
+    const std::string_view token = BearerToken(*authorization);
     // By its digest, so that the time of the search tells nothing of a token.
-    const auto found = known->by_token_sha256.find(Sha256OfToken(BearerToken(authorization)));
+    const auto found = token.empty() ? known->by_token_sha256.end()
+                                     : known->by_token_sha256.find(Sha256OfToken(token));
     if (found != known->by_token_sha256.end()) return found->second;
     return absl::UnauthenticatedError(
         "the token is not known to this server; show one that its access file has, as "

@@ -5,6 +5,8 @@
 
 #include <sys/types.h>
 
+#include <atomic>
+#include <cstdint>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -44,11 +46,14 @@ class AccessControl {
 
   /// A token goes before a certificate, and a certificate before a user. The user of the server,
   /// and root, may do everything over a unix socket: they could open the maps' files.
-  /// `authorization`: the field of that name; empty without one.
+  /// `authorization`: the field of that name; none if there is none.
   ///
   /// Errors: UNAUTHENTICATED with what to show.
-  absl::StatusOr<std::shared_ptr<const Caller>> Identify(const Peer& peer,
-                                                         std::string_view authorization) const;
+  absl::StatusOr<std::shared_ptr<const Caller>> Identify(
+      const Peer& peer, std::optional<std::string_view> authorization) const;
+
+  /// Counts the files that were read. A call that began under another one asks again.
+  int64_t generation() const { return generation_; }
 
   bool asks_who() const { return !path_.empty(); }
 
@@ -57,6 +62,7 @@ class AccessControl {
   std::shared_ptr<const AccessFile> file() const;
 
   const std::string path_;
+  std::atomic<int64_t> generation_{0};
   mutable std::mutex mutex_;
   /// Guarded by `mutex_`; null without a path.
   std::shared_ptr<const AccessFile> file_;

@@ -2,6 +2,7 @@
 #include "server/access/access_file.h"
 
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <optional>
@@ -86,6 +87,8 @@ class AccessReader : private YamlReader {
           return absl::ascii_isalnum(static_cast<unsigned char>(letter)) ||
                  std::string_view("._-@").find(letter) != std::string_view::npos;
         });
+    // What the log calls the user of the server.
+    if (name == "keeper") return Wrong(item["name"], "the name \"keeper\" is taken; give another");
     if (is_plain) return name;
     return Wrong(item["name"], absl::StrCat("a caller's name has at most ", kNameBytesMax,
                                             " letters, digits, '.', '_', '-' and '@'"));
@@ -94,6 +97,7 @@ class AccessReader : private YamlReader {
   absl::StatusOr<std::string> Digest(const YAML::Node& node) const {
     DSG_ASSIGN_OR_RETURN(const std::string digest, Text(node, "token_sha256"));
     constexpr std::string_view kDigits = "0123456789abcdef";
+    if (digest == Sha256OfToken("")) return Wrong(node, "token_sha256 is that of no token at all");
     if (digest.size() == kDigestDigits && digest.find_first_not_of(kDigits) == std::string::npos) {
       return digest;
     }
@@ -158,13 +162,13 @@ class AccessReader : private YamlReader {
 // Who can change the file can do everything.
 absl::Status CheckOwner(const std::string& path) {
   struct stat found {};
-  if (stat(path.c_str(), &found) != 0 || (found.st_mode & (S_IWGRP | S_IWOTH)) == 0) {
-    return absl::OkStatus();
-  }
+  if (stat(path.c_str(), &found) != 0) return absl::OkStatus();
+  const bool is_ours = found.st_uid == geteuid() || found.st_uid == 0;
+  if (is_ours && (found.st_mode & (S_IWGRP | S_IWOTH)) == 0) return absl::OkStatus();
   return MakeError(
       Reason::kFieldInvalid,
-      absl::StrCat("access file ", path,
-                   " can be changed by others, who could let in anybody; chmod go-w ", path),
+      absl::StrCat("access file ", path, " can be changed by others, who could let in anybody; ",
+                   is_ours ? "chmod go-w " : "make it yours: chown USER ", path),
       {{"field", "access"}, {"value", path}});
 }
 

@@ -59,13 +59,21 @@ MapFields::MapFields(const Descriptor& request, Role role) {
     const FieldDescriptor* field = request.field(i);
     const v1::Role there = field->options().GetExtension(v1::role_there);
     if (there != v1::ROLE_UNSPECIFIED) {
-      fields_.push_back({{field}, RoleOf(there)});
+      fields_.push_back({{field}, RoleOf(there), /*is_other=*/true});
     } else if (IsName(field) && field->name() == "map") {
       fields_.push_back({{field}, role});
     } else if (field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE && !field->is_repeated()) {
       if (const FieldDescriptor* name = NameBelow(*field)) fields_.push_back({{field, name}, role});
     }
   }
+}
+
+std::string MapFields::OtherOf(const Message& request) const {
+  std::string scratch;
+  for (const Field& field : fields_) {
+    if (field.is_other) return TextAt(request, field.path, &scratch);
+  }
+  return {};
 }
 
 absl::Status MapFields::Check(const Caller& caller, const Message& request) const {

@@ -2,6 +2,7 @@
 // Which maps a request names, and what its caller needs in each.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -28,6 +29,9 @@ class MapFields {
   /// Errors: those of Caller::Check for the first map in which it may not do this.
   absl::Status Check(const Caller& caller, const google::protobuf::Message& request) const;
 
+  /// The other map that a request names; empty for none.
+  std::string OtherOf(const google::protobuf::Message& request) const;
+
   /// Whether requests name no map.
   bool empty() const { return fields_.empty(); }
 
@@ -35,6 +39,7 @@ class MapFields {
   struct Field {
     std::vector<const google::protobuf::FieldDescriptor*> path;
     query::Role role = query::Role::kAdmin;
+    bool is_other = false;
   };
 
   std::vector<Field> fields_;

@@ -218,9 +218,12 @@ std::optional<Refusal> Session::PlanOf(const RequestHead& head) {
   auto planned = PlanCall(*runtime_->methods, head, runtime_->may_write);
   if (auto* const refusal = std::get_if<Refusal>(&planned)) return std::move(*refusal);
   plan_ = std::get<CallPlan>(planned);
-  auto caller = runtime_->calls->access->Identify(connection_->identity,
-                                                  head.Find("authorization").value_or(""));
-  if (!caller.ok()) return Refusal{401, caller.status(), "WWW-Authenticate: Bearer\r\n"};
+  auto caller =
+      runtime_->calls->access->Identify(connection_->identity, head.Find("authorization"));
+  if (!caller.ok()) {
+    TellRefused(*plan_.method, caller.status());
+    return Refusal{401, caller.status(), "WWW-Authenticate: Bearer\r\n"};
+  }
   plan_.caller = *std::move(caller);
   if (body_bytes > plan_.body_bytes_max) {
     return TooLong(413, absl::StrCat("the body has ", body_bytes, " bytes, and at most ",
@@ -228,6 +231,11 @@ std::optional<Refusal> Session::PlanOf(const RequestHead& head) {
   }
   parser_->body_limit(plan_.body_bytes_max);
   return std::nullopt;
+}
+
+void Session::TellRefused(const Method& method, const absl::Status& why) const {
+  runtime_->calls->audit->End({&method.info, "", connection_->peer}, why, 0);
+  runtime_->calls->log.Write({method.info.name, "", why, 0, 0, {}, connection_->peer, ""});
 }
 
 void Session::AwaitBody() {

@@ -89,6 +89,8 @@ class Session final : public Outlet, public std::enable_shared_from_this<Session
   void Parse();
   // False if the request is refused.
   bool TakeHead();
+  // A call without a caller stands in both logs, as over gRPC.
+  void TellRefused(const Method& method, const absl::Status& why) const;
   std::optional<Refusal> PlanOf(const RequestHead& head);
   // Waits for the rest of a body.
   void AwaitBody();

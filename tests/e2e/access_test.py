@@ -152,7 +152,7 @@ class Access(http_port.HttpTest):
             self.assertNotEqual(0, self.asked("stranger", "maps").returncode)
             self.write_access(self.callers() + "  - name: stranger\n    role: king\n")
             process.send_signal(signal.SIGHUP)
-            self.wait_for_log("certificates are not taken")
+            self.wait_for_log("a file is not taken")
             self.assertEqual(0, self.asked("asker", "maps").returncode)
             self.write_access(self.callers() + "  - name: stranger\n    role: reader\n    " +
                               self.tokens["stranger"]["line"] + "\n")
@@ -175,7 +175,8 @@ class Access(http_port.HttpTest):
         log = self.simulate("audited", people=2, seconds=5)
         audit = ("--audit", "audit.jsonl", "--audit-key", "audit.key")
         for name in ("robot-8", "robot-9"):
-            with self.served(*audit, listen="127.0.0.1:0"):
+            with self.served(*audit, listen="127.0.0.1:0") as (_, port):
+                self.assertEqual(401, port.ask("QueryService/GetNode", {})[0])
                 done = support.run("dsg-ingest", "--server", self.grpc_address(), *self.TLS,
                                    "--token-file", "robot.token", "--map", name, "--quiet", log,
                                    cwd=self.folder)
@@ -190,11 +191,14 @@ class Access(http_port.HttpTest):
         self.assertLessEqual({("robot", "CreateMap", "robot-8", "OK"),
                               ("robot", "Commit", "robot-9", "OK"),
                               ("asker", "DropMap", "", "PERMISSION_DENIED"),
-                              ("", "ListMaps", "", "UNAUTHENTICATED")}, told)
+                              ("", "ListMaps", "", "UNAUTHENTICATED"),
+                              ("", "GetNode", "", "UNAUTHENTICATED")}, told)
         # Questions are in no log.
         self.assertNotIn("SearchNodes", {line["method"] for line in lines})
         commits = [line for line in lines if line["method"] == "Commit"]
-        self.assertTrue(all(line["revision"] > 0 for line in commits), commits)
+        for begun, done in zip(commits[::2], commits[1::2]):
+            self.assertEqual(("BEGUN", "OK"), (begun["code"], done["code"]))
+            self.assertGreater(done["revision"], 0)
         table = self.ok("dsg", "audit", "audit.jsonl", "--key", "audit.key", "--caller", "asker")
         self.assertIn("PERMISSION_DENIED", table)
         chain = re.search(r"chain ([0-9a-f]{64})", table).group(1)
@@ -228,6 +232,13 @@ class Access(http_port.HttpTest):
             text = log.read()
         for name, made in self.tokens.items():
             self.assertNotIn(made["token"], text, name)
+
+    def test_options_without_a_value_switch_nothing_off(self):
+        for option in ("--access", "--audit", "--tls-cert", "--tls-client-ca"):
+            with self.subTest(option=option):
+                self.refused(2, ["empty"], "dsg-server", "--store", "store", "--listen",
+                             "127.0.0.1:0", option, "")
+        self.refused(2, ["--access"], "dsg-server", "--store", "store", "--socket-mode", "666")
 
     def test_a_server_with_a_wrong_file_does_not_start(self):
         path = self.path("wrong.yaml")

@@ -177,6 +177,18 @@ TEST_F(AuditLogTest, NothingIsAddedToALogThatIsNotRightOrIsAnothers) {
   EXPECT_FALSE(AuditLog::Open(folder_.path() + "/none/audit.jsonl", kKey).ok());
 }
 
+TEST_F(AuditLogTest, AFileOfSomethingElseStaysAsItIs) {
+  for (const char* text : {"one line without its end", "lines\nof text\n", "{\"number\":2,"}) {
+    Write(text);
+    EXPECT_FALSE(AuditLog::Open(path_, kKey).ok()) << text;
+    EXPECT_EQ(Read(), text);
+  }
+  std::filesystem::remove(path_);
+  ASSERT_EQ(mkfifo(path_.c_str(), 0600), 0);
+  const absl::Status status = AuditLog::Open(path_, kKey).status();
+  EXPECT_NE(status.message().find("no plain file"), std::string::npos) << status;
+}
+
 TEST_F(AuditLogTest, KeysArePrivateAndLongEnough) {
   const std::string path = folder_.path() + "/key";
   std::ofstream(path) << kKey;

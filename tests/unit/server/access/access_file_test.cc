@@ -7,7 +7,9 @@
 #include <unistd.h>
 
 #include <fstream>
+#include <optional>
 #include <string>
+#include <string_view>
 
 #include "schema/base/status.h"
 #include "server/access/access_control.h"
@@ -84,6 +86,9 @@ TEST_F(AccessFileTest, SaysWhatIsWrongAndWhere) {
       {"callers:\n  - name: a\n    role: reader\n    uid: -1\n", "no number of a user"},
       {"callers:\n  - name: a\n    role: reader\n    uid: 4294967295\n", "no number of a user"},
       {"callers:\n  - name: a\n    role: reader\n    token_sha256: sesame\n", "--new-token"},
+      {"callers:\n  - name: a\n    role: reader\n    token_sha256: " + Sha256OfToken("") + "\n",
+       "no token at all"},
+      {"callers:\n  - name: keeper\n    role: reader\n" + token, "is taken"},
       {"callers:\n  - name: a\n    role: reader\n    maps: []\n" + token, "maps is empty"},
       {"callers:\n  - name: a\n    role: reader\n    maps: [\"../x\"]\n" + token, "\"../x\""},
       {"callers:\n  - name: a\n    role: reader\n    maps: [\"a*b\"]\n" + token, "\"a*b\""},
@@ -123,21 +128,22 @@ TEST_F(AccessFileTest, ATokenGoesBeforeWhatTheConnectionShows) {
       "  - {name: user, role: reader, uid: 1234}\n");
   const auto control = AccessControl::Open(path);
   ASSERT_TRUE(control.ok()) << control.status();
-  const auto name_of = [&](const Peer& peer, const std::string& authorization) -> std::string {
+  const auto name_of = [&](const Peer& peer,
+                           std::optional<std::string_view> authorization) -> std::string {
     const auto caller = (*control)->Identify(peer, authorization);
     EXPECT_TRUE(caller.ok() || absl::IsUnauthenticated(caller.status())) << caller.status();
     return caller.ok() ? (*caller)->name() : "";
   };
   EXPECT_EQ(name_of({1234, "robot"}, "Bearer sesame"), "tokened");
-  EXPECT_EQ(name_of({1234, "robot"}, ""), "certified");
-  EXPECT_EQ(name_of({1234, ""}, ""), "user");
+  EXPECT_EQ(name_of({1234, "robot"}, std::nullopt), "certified");
+  EXPECT_EQ(name_of({1234, ""}, std::nullopt), "user");
   // A wrong token is not passed over.
-  for (const char* wrong : {"Bearer sesam", "Bearer ", "sesame", "Basic sesame"}) {
+  for (const char* wrong : {"", "Bearer sesam", "Bearer ", "sesame", "Basic sesame"}) {
     EXPECT_EQ(name_of({1234, "robot"}, wrong), "") << wrong;
   }
-  EXPECT_EQ(name_of({std::nullopt, "other"}, ""), "");
-  EXPECT_EQ(name_of({}, ""), "");
-  EXPECT_EQ(name_of({geteuid(), ""}, ""), "keeper");
+  EXPECT_EQ(name_of({std::nullopt, "other"}, std::nullopt), "");
+  EXPECT_EQ(name_of({}, std::nullopt), "");
+  EXPECT_EQ(name_of({geteuid(), ""}, std::nullopt), "keeper");
 }
 
 TEST_F(AccessFileTest, AWrongFileLeavesTheOldOneInForce) {
@@ -146,10 +152,10 @@ TEST_F(AccessFileTest, AWrongFileLeavesTheOldOneInForce) {
   ASSERT_TRUE(control.ok()) << control.status();
   Write("callers:\n  - {name: other, role: king, uid: 1234}\n");
   EXPECT_FALSE((*control)->Reload().ok());
-  EXPECT_EQ((*(*control)->Identify({1234, ""}, ""))->name(), "user");
+  EXPECT_EQ((*(*control)->Identify({1234, ""}, std::nullopt))->name(), "user");
   Write("callers:\n  - {name: other, role: admin, uid: 1234}\n");
   EXPECT_TRUE((*control)->Reload().ok());
-  EXPECT_EQ((*(*control)->Identify({1234, ""}, ""))->name(), "other");
+  EXPECT_EQ((*(*control)->Identify({1234, ""}, std::nullopt))->name(), "other");
 }
 
 TEST(AccessControl, WithoutAFileEverybodyMayDoEverything) {

@@ -46,8 +46,13 @@ TEST_F(CallAuditTest, TellsWhatChangesAndWhoWasRefusedAndNoQuestions) {
   audit_.End(Call(methods::kGetNode), absl::NotFoundError("no"), 0);
   std::vector<std::string> told;
   for (const AuditEntry& entry : Entries()) told.push_back(entry.method + " " + entry.code);
-  EXPECT_EQ(told, (std::vector<std::string>{"Commit OK", "Prune BEGUN", "Prune OK",
+  EXPECT_EQ(told, (std::vector<std::string>{"Commit BEGUN", "Commit OK", "Prune BEGUN", "Prune OK",
                                             "GetNode PERMISSION_DENIED"}));
+  // Of a map that its caller must not know of.
+  AuditedCall hidden = Call(methods::kGetNode);
+  hidden.is_refused = true;
+  audit_.End(hidden, absl::NotFoundError("no"), 0);
+  EXPECT_EQ(Entries().back().code, "NOT_FOUND");
 }
 
 TEST_F(CallAuditTest, AFloodOfRefusedCallsFillsNoDisk) {
@@ -74,7 +79,6 @@ TEST_F(CallAuditTest, NothingIsChangedWhileTheLogCannotBeWritten) {
   // In the middle of the next line.
   full.rlim_cur = std::filesystem::file_size(path_) + 20;
   ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &full), 0);
-  audit_.End(Call(methods::kCommit), absl::OkStatus(), 2);
   const absl::Status commit = audit_.Begin(Call(methods::kCommit));
   const absl::Status prune = audit_.Begin(Call(methods::kPrune));
   const absl::Status question = audit_.Begin(Call(methods::kGetNode));
@@ -86,8 +90,22 @@ TEST_F(CallAuditTest, NothingIsChangedWhileTheLogCannotBeWritten) {
   EXPECT_EQ(Entries().size(), 1u);
   EXPECT_TRUE(audit_.Begin(Call(methods::kCommit)).ok());
   EXPECT_EQ(Entries().back().code, "BEGUN");
-  EXPECT_TRUE(audit_.Begin(Call(methods::kCommit)).ok());
-  EXPECT_EQ(Entries().size(), 2u);
+}
+
+TEST_F(CallAuditTest, ALogThatWasMovedIsBegunAnewWhenItIsAskedFor) {
+  const auto audit = CallAudit::Open(folder_.path() + "/moving.jsonl", "");
+  ASSERT_TRUE(audit.ok()) << audit.status();
+  ASSERT_TRUE((*audit)->Begin(Call(methods::kPrune)).ok());
+  std::filesystem::rename(folder_.path() + "/moving.jsonl", folder_.path() + "/moved.jsonl");
+  const absl::Status status = (*audit)->Begin(Call(methods::kPrune));
+  EXPECT_NE(status.message().find("SIGHUP"), std::string::npos) << status;
+  ASSERT_TRUE((*audit)->Reload().ok());
+  EXPECT_TRUE((*audit)->Begin(Call(methods::kPrune)).ok());
+  for (const char* name : {"/moving.jsonl", "/moved.jsonl"}) {
+    const auto head = VerifyAuditLog(folder_.path() + name, "");
+    ASSERT_TRUE(head.ok()) << head.status();
+    EXPECT_EQ(head->entry_count, 1);
+  }
 }
 
 TEST(CallAudit, WithoutALogNothingIsWritten) {
