@@ -52,10 +52,10 @@ struct Flags {
 void TellNewToken() {
   const absl::StatusOr<std::string> token = dsg::server::MakeToken();
   if (!token.ok()) throw CLI::RuntimeError(std::string(token.status().message()), 2);
-  std::printf(
-      "token, for the caller's token file (chmod 600):\n%s\n"
-      "line for the server's access file:\ntoken_sha256: %s\n",
-      token->c_str(), dsg::server::Sha256OfToken(*token).c_str());
+  // The token alone goes into a file of its caller.
+  std::printf("%s\n", token->c_str());
+  std::fprintf(stderr, "for the server's access file: token_sha256: %s\n",
+               dsg::server::Sha256OfToken(*token).c_str());
   throw CLI::Success();
 }
 
@@ -169,8 +169,9 @@ void DeclareAccessFlags(CLI::App* app, Flags* flags) {
   app->add_flag("--http-write", flags->options.http.may_write, "Let HTTP clients change maps, too");
   app->add_flag("--http-no-token", flags->options.http.without_token,
                 "Answer HTTP clients without a token: every user of this machine reads every map");
-  app->add_flag_callback("--new-token", TellNewToken,
-                         "Make a token for a caller, and the line of it for --access; then end")
+  app->add_flag_callback(
+         "--new-token", TellNewToken,
+         "Print a new token for a caller, and on standard error its line for --access")
       ->trigger_on_parse();
   app->set_version_flag("--version", DSG_VERSION);
 }
@@ -222,10 +223,13 @@ void StartWatchdog() {
 // What was in force stays in force if the files are wrong.
 void Reload(dsg::server::Server* server) {
   const absl::Status status = server->Reload();
-  dsg::Log(status.ok() ? dsg::LogLevel::kInfo : dsg::LogLevel::kError,
-           status.ok() ? "read the access file and certificates again"
-                       : "a file is not taken; of it, what was read before stays in force",
-           {{"why", std::string(status.message())}});
+  if (status.ok()) {
+    dsg::Log(dsg::LogLevel::kInfo, "read the access file and certificates again");
+  } else {
+    dsg::Log(dsg::LogLevel::kError,
+             "a file is not taken; of it, what was read before stays in force",
+             {{"why", std::string(status.message())}});
+  }
 }
 
 // The signal that ends the server.

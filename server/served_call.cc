@@ -73,9 +73,10 @@ bool ServedCall::Admit(absl::StatusOr<std::shared_ptr<const Caller>> caller) {
 absl::Status ServedCall::CheckRole() const {
   const query::Role needed = method_->info.role;
   if (caller_->HighestRole() >= needed) return absl::OkStatus();
-  return absl::PermissionDeniedError(absl::StrCat(
-      "\"", caller_->name(), "\" has the role ", std::string(NameOf(needed)), " in no map, and ",
-      std::string(method_->info.name), " needs it; ask who keeps the server's access file"));
+  return absl::PermissionDeniedError(
+      absl::StrCat("\"", caller_->name(), "\" may not call ", std::string(method_->info.name),
+                   ": that needs the role ", std::string(NameOf(needed)),
+                   ", which it has in no map; ask who keeps the server's access file"));
 }
 
 void ServedCall::Begin() {

@@ -13,6 +13,7 @@
 #include "absl/strings/str_cat.h"
 #include "grpcpp/grpcpp.h"
 #include "grpcpp/server_posix.h"
+#include "schema/base/log.h"
 #include "schema/base/status.h"
 #include "server/call_runtime.h"
 #include "server/connection_front.h"
@@ -152,6 +153,11 @@ class RunningServer final : public Server {
   absl::Status Listen(const ServerOptions& options) {
     DSG_ASSIGN_OR_RETURN(access_, AccessControl::Open(options.access_file));
     questions_.access = commits_.access = access_.get();
+    if (access_->names_certificates() && options.tls.client_ca_file.empty()) {
+      Log(LogLevel::kWarning,
+          "the access file knows callers by certificates, and none is asked for without "
+          "--tls-client-ca");
+    }
     DSG_ASSIGN_OR_RETURN(audit_, CallAudit::Open(options.audit_file, options.audit_key_file));
     questions_.audit = commits_.audit = audit_.get();
     DSG_ASSIGN_OR_RETURN(front_, ConnectionFront::Open(options.tls, options.connection_max));

@@ -109,7 +109,8 @@ CLI::App* Grammar::AddApp(const std::string& name, const std::string& what,
   app->add_option("--store", common.store, "Folder of the store (or DSG_STORE)");
   if (takes & kServer) {
     app->add_option("--server", common.server,
-                    "unix:PATH or HOST:PORT of a dsg-server (or DSG_SERVER)");
+                    "unix:PATH or HOST:PORT of a dsg-server (or DSG_SERVER); --token-file, "
+                    "--tls-ca, --tls-cert and --tls-key FILE tell it who calls (docs/access.md)");
     client::AddCredentialFlags(app, &common.credentials, /*is_hidden=*/true);
     app->add_option("--timeout", common.timeout_s, "Deadline of each call, seconds")
         ->check(Between(0.001, 86400.0));

@@ -13,9 +13,12 @@
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "schema/base/status.h"
+#include "server/status_mapping.h"
 
 namespace dsg::server {
 namespace {
+
+constexpr size_t kShownBytesMax = 100;
 
 // Who could open the files of the maps without the server.
 std::shared_ptr<const Caller> Keeper() {
@@ -40,6 +43,11 @@ absl::Status AccessControl::Reload() {
   file_ = std::move(file);
   ++generation_;
   return absl::OkStatus();
+}
+
+bool AccessControl::names_certificates() const {
+  const std::shared_ptr<const AccessFile> known = file();
+  return known != nullptr && !known->by_certificate.empty();
 }
 
 std::shared_ptr<const AccessFile> AccessControl::file() const {
@@ -69,6 +77,11 @@ absl::StatusOr<std::shared_ptr<const Caller>> AccessControl::Identify(
     const auto found = known->by_uid.find(*peer.uid);
     if (found != known->by_uid.end()) return found->second;
     if (*peer.uid == geteuid() || *peer.uid == 0) return Keeper();
+  }
+  if (!peer.certificate.empty()) {
+    return absl::UnauthenticatedError(absl::StrCat(
+        "the server does not know who calls: the certificate says \"",
+        CutText(peer.certificate, kShownBytesMax), "\", and its access file does not"));
   }
   return absl::UnauthenticatedError(
       "the server does not know who calls; show a token as \"authorization: Bearer TOKEN\" (dsg "

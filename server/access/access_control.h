@@ -55,6 +55,8 @@ class AccessControl {
   /// Counts the files that were read. A call that began under another one asks again.
   int64_t generation() const { return generation_; }
 
+  /// Whether callers are known by certificates.
+  bool names_certificates() const;
   bool asks_who() const { return !path_.empty(); }
 
  private:
