@@ -56,13 +56,12 @@ ServedCall::ServedCall(const Method* method, CallWire* wire, std::shared_ptr<Con
 
 ServedCall::~ServedCall() { runtime().connections->EndCall(connection_.get()); }
 
-bool ServedCall::Admit(absl::StatusOr<std::shared_ptr<const Caller>> caller) {
+bool ServedCall::Admit(absl::StatusOr<KnownCaller> caller) {
   absl::Status status = caller.status();
   if (!runtime().connections->BeginCall(connection_.get())) {
     status = OverloadedError("the connection has more calls than it may have, and was closed");
   } else if (status.ok()) {
-    caller_ = *std::move(caller);
-    access_generation_ = runtime().access->generation();
+    known_ = *std::move(caller);
     status = CheckRole();
   }
   if (status.ok()) return true;
@@ -72,9 +71,9 @@ bool ServedCall::Admit(absl::StatusOr<std::shared_ptr<const Caller>> caller) {
 
 absl::Status ServedCall::CheckRole() const {
   const query::Role needed = method_->info.role;
-  if (caller_->HighestRole() >= needed) return absl::OkStatus();
+  if (caller().HighestRole() >= needed) return absl::OkStatus();
   return absl::PermissionDeniedError(
-      absl::StrCat("\"", caller_->name(), "\" may not call ", std::string(method_->info.name),
+      absl::StrCat("\"", caller().name(), "\" may not call ", std::string(method_->info.name),
                    ": that needs the role ", std::string(NameOf(needed)),
                    ", which it has in no map; ask who keeps the server's access file"));
 }
@@ -163,13 +162,13 @@ absl::Status ServedCall::Parse(Message* request) {
 
 absl::Status ServedCall::CheckAccess(const Message& request) {
   // A head may have come long before its request.
-  if (runtime().access->generation() != access_generation_) {
+  if (runtime().access->generation() != known_.generation) {
     is_refused_ = true;
     return absl::UnauthenticatedError(
         "who may call was changed while the request came; call again");
   }
   other_map_ = method_->maps->OtherOf(request);
-  absl::Status status = method_->maps->Check(*caller_, request);
+  absl::Status status = method_->maps->Check(caller(), request);
   is_refused_ = !status.ok();
   return status;
 }
@@ -178,9 +177,12 @@ absl::Status ServedCall::ForCaller(const absl::Status& status) const {
   return HideFolder(status, method_->runtime->store_folder);
 }
 
+std::string_view ServedCall::CallerName() const {
+  return known_.caller == nullptr ? std::string_view() : caller().name();
+}
+
 AuditedCall ServedCall::Audited(std::string_view map) const {
-  const std::string_view caller = caller_ == nullptr ? std::string_view() : caller_->name();
-  return {&method_->info, caller, connection_->peer, map, other_map_, is_refused_};
+  return {&method_->info, CallerName(), connection_->peer, map, other_map_, is_refused_};
 }
 
 absl::Status ServedCall::BeginAudit(std::string_view map) const {
@@ -202,7 +204,7 @@ void ServedCall::LogEnd(std::string_view map, const absl::Status& status, int64_
   const CallLog& log = method_->runtime->log;
   if (!log.Wants(status, elapsed)) return;
   log.Write({method_->info.name, map, status, revision, row_count, elapsed, connection_->peer,
-             caller_ == nullptr ? std::string() : caller_->name()});
+             std::string(CallerName())});
 }
 
 }  // namespace dsg::server

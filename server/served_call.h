@@ -12,6 +12,7 @@
 
 #include "absl/status/status.h"
 #include "query/api/method_info.h"
+#include "server/access/access_control.h"
 #include "server/access/map_fields.h"
 #include "server/call_runtime.h"
 #include "server/call_wire.h"
@@ -50,7 +51,7 @@ class ServedCall : public Job {
 
   /// Counts the call on its connection, and asks whether its caller may call the method in any map.
   /// False: it is refused, and has ended.
-  [[nodiscard]] bool Admit(absl::StatusOr<std::shared_ptr<const Caller>> caller);
+  [[nodiscard]] bool Admit(absl::StatusOr<KnownCaller> caller);
   /// The request has come whole: charges for its bytes, and lets a worker take it.
   void Begin();
   /// The caller left before the request had come whole.
@@ -101,12 +102,14 @@ class ServedCall : public Job {
   const Method& method() const { return *method_; }
   CallWire& wire() { return *wire_; }
   query::CallContext& call() { return call_; }
-  const Caller& caller() const { return *caller_; }
+  const Caller& caller() const { return *known_.caller; }
   CallMemory::Hold& memory() { return memory_; }
 
  private:
   absl::Status CheckRole() const;
   absl::Status CheckAccess(const google::protobuf::Message& request);
+  // Empty of a call that nobody is known to have made.
+  std::string_view CallerName() const;
   AuditedCall Audited(std::string_view map) const;
   absl::Status Charge(size_t bytes);
   // Memory of the parsed request in bytes; counting stops above `bytes_max`.
@@ -118,8 +121,7 @@ class ServedCall : public Job {
   query::CallContext call_;
   const std::shared_ptr<Connection> connection_;
   // Set by Admit.
-  std::shared_ptr<const Caller> caller_;
-  int64_t access_generation_ = 0;
+  KnownCaller known_;
   // Of the request, for the audit log.
   std::string other_map_;
   bool is_refused_ = false;

@@ -17,8 +17,6 @@ struct CredentialFiles {
   /// PEM: the client's certificate and its key, for servers that ask for one.
   std::string certificate;
   std::string key;
-
-  bool empty() const { return token.empty() && authorities.empty() && certificate.empty(); }
 };
 
 /// What those files hold.

@@ -262,9 +262,4 @@ bool AuditLog::IsAtPath() const {
          held.st_ino == named.st_ino && held.st_dev == named.st_dev;
 }
 
-AuditHead AuditLog::head() const {
-  std::lock_guard lock(mutex_);
-  return head_;
-}
-
 }  // namespace dsg

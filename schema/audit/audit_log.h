@@ -90,7 +90,6 @@ class AuditLog {
 
   /// False once it was moved or deleted: then a log is to be opened anew.
   bool IsAtPath() const;
-  AuditHead head() const;
 
  private:
   AuditLog(std::string path, std::string key, int fd, AuditHead head, int64_t byte_count);

@@ -55,7 +55,15 @@ std::shared_ptr<const AccessFile> AccessControl::file() const {
   return file_;
 }
 
-absl::StatusOr<std::shared_ptr<const Caller>> AccessControl::Identify(
+absl::StatusOr<KnownCaller> AccessControl::Identify(
+    const Peer& peer, std::optional<std::string_view> authorization) const {
+  // Before the file is looked at: one that comes in between makes the caller show again.
+  const int64_t generation = generation_;
+  DSG_ASSIGN_OR_RETURN(std::shared_ptr<const Caller> caller, CallerOf(peer, authorization));
+  return KnownCaller{std::move(caller), generation};
+}
+
+absl::StatusOr<std::shared_ptr<const Caller>> AccessControl::CallerOf(
     const Peer& peer, std::optional<std::string_view> authorization) const {
   if (!asks_who()) return Caller::Anybody();
   const std::shared_ptr<const AccessFile> known = file();

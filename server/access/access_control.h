@@ -27,6 +27,12 @@ struct Peer {
   std::string certificate;
 };
 
+/// Who calls, by the access file of that generation.
+struct KnownCaller {
+  std::shared_ptr<const Caller> caller;
+  int64_t generation = 0;
+};
+
 /// Of a connection that was accepted on a unix socket. Not for other sockets of that family: those
 /// of a pair are the process's own.
 Peer PeerOfUnixSocket(int fd);
@@ -49,10 +55,10 @@ class AccessControl {
   /// `authorization`: the field of that name; none if there is none.
   ///
   /// Errors: UNAUTHENTICATED with what to show.
-  absl::StatusOr<std::shared_ptr<const Caller>> Identify(
-      const Peer& peer, std::optional<std::string_view> authorization) const;
+  absl::StatusOr<KnownCaller> Identify(const Peer& peer,
+                                       std::optional<std::string_view> authorization) const;
 
-  /// Counts the files that were read. A call that began under another one asks again.
+  /// Counts the files that were read. Who was identified by another one is to show again who it is.
   int64_t generation() const { return generation_; }
 
   /// Whether callers are known by certificates.
@@ -62,6 +68,8 @@ class AccessControl {
  private:
   explicit AccessControl(std::string path) : path_(std::move(path)) {}
   std::shared_ptr<const AccessFile> file() const;
+  absl::StatusOr<std::shared_ptr<const Caller>> CallerOf(
+      const Peer& peer, std::optional<std::string_view> authorization) const;
 
   const std::string path_;
   std::atomic<int64_t> generation_{0};

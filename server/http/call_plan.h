@@ -16,7 +16,7 @@ struct CallPlan {
   const Method* method = nullptr;
   ConnectType type;
   CallerDeadline deadline = CallerDeadline::max();
-  std::shared_ptr<const Caller> caller;
+  KnownCaller caller;
   /// Longest body.
   size_t body_bytes_max = 0;
 };

@@ -162,6 +162,29 @@ class Access(http_port.HttpTest):
             self.assertEqual(0, self.asked("stranger", "maps").returncode)
         self.write_access(self.callers())
 
+    def test_rights_that_are_taken_away_count_for_a_request_that_is_on_its_way(self):
+        with self.served() as (process, port):
+            port.token = self.tokens["asker"]["token"]
+            port.ask("MapService/ListMaps", {})
+            with contextlib.closing(port.connect()) as connection:
+                connection.putrequest("POST", "/dsg.v1.MapService/ListMaps")
+                for name, value in port.fields(connect_timeout_ms=60000).items():
+                    connection.putheader(name, value)
+                connection.putheader("Content-Length", "2")
+                connection.endheaders()
+                connection.send(b"{")
+                self.write_access(self.callers().replace("asker", "renamed"))
+                process.send_signal(signal.SIGHUP)
+                self.wait_for_log("certificates again")
+                connection.send(b"}")
+                reply = connection.getresponse()
+                self.assertEqual((401, True), (reply.status, b"call again" in reply.read()))
+        self.write_access(self.callers())
+
+    def test_a_token_does_not_leave_the_machine_in_the_clear(self):
+        self.refused(2, ["--tls-ca"], "dsg", "version", "--server", "maps.example.org:4410",
+                     "--token-file", "asker.token")
+
     def wait_for_log(self, words):
         def is_there():
             with open(self.path("server.log"), encoding="utf-8") as log:

@@ -132,7 +132,7 @@ TEST_F(AccessFileTest, ATokenGoesBeforeWhatTheConnectionShows) {
                            std::optional<std::string_view> authorization) -> std::string {
     const auto caller = (*control)->Identify(peer, authorization);
     EXPECT_TRUE(caller.ok() || absl::IsUnauthenticated(caller.status())) << caller.status();
-    return caller.ok() ? (*caller)->name() : "";
+    return caller.ok() ? caller->caller->name() : "";
   };
   EXPECT_EQ(name_of({1234, "robot"}, "Bearer sesame"), "tokened");
   EXPECT_EQ(name_of({1234, "robot"}, std::nullopt), "certified");
@@ -152,16 +152,19 @@ TEST_F(AccessFileTest, AWrongFileLeavesTheOldOneInForce) {
   ASSERT_TRUE(control.ok()) << control.status();
   Write("callers:\n  - {name: other, role: king, uid: 1234}\n");
   EXPECT_FALSE((*control)->Reload().ok());
-  EXPECT_EQ((*(*control)->Identify({1234, ""}, std::nullopt))->name(), "user");
+  EXPECT_EQ((*control)->Identify({1234, ""}, std::nullopt)->caller->name(), "user");
   Write("callers:\n  - {name: other, role: admin, uid: 1234}\n");
+  const KnownCaller before = *(*control)->Identify({1234, ""}, std::nullopt);
+  EXPECT_EQ(before.generation, (*control)->generation());
   EXPECT_TRUE((*control)->Reload().ok());
-  EXPECT_EQ((*(*control)->Identify({1234, ""}, std::nullopt))->name(), "other");
+  EXPECT_NE(before.generation, (*control)->generation());
+  EXPECT_EQ((*control)->Identify({1234, ""}, std::nullopt)->caller->name(), "other");
 }
 
 TEST(AccessControl, WithoutAFileEverybodyMayDoEverything) {
   const auto control = AccessControl::Open("");
   ASSERT_TRUE(control.ok());
-  EXPECT_EQ((*(*control)->Identify({}, "Bearer wrong"))->RoleIn("any"), Role::kAdmin);
+  EXPECT_EQ((*control)->Identify({}, "Bearer wrong")->caller->RoleIn("any"), Role::kAdmin);
   EXPECT_FALSE((*control)->asks_who());
 }
 
